@@ -1,0 +1,41 @@
+#pragma once
+
+#include <Eigen/Core>
+
+namespace sdvo {
+
+/// A rectified stereo pair: both views share one pinhole model, the right camera sits `baseline` metres along +x.
+/// Frames: left rectified optical frame (x right, y down, z forward). Pixels: (0, 0) is the centre of the top-left one.
+struct StereoCamera {
+  double fx = 0.0, fy = 0.0;  ///< focal lengths, px
+  double cx = 0.0, cy = 0.0;  ///< principal point, px
+  double baseline = 0.0;      ///< m
+  int width = 0, height = 0;  ///< px
+
+  /// Throws std::invalid_argument naming the first quantity that no camera can have.
+  void check() const;
+
+  /// (u_left, v, u_right) in px of a point in metres; the point must lie in front of the camera (z > 0).
+  Eigen::Vector3d project(const Eigen::Vector3d& point) const {
+    const double inverse_depth = 1.0 / point.z();
+    const double u = fx * point.x() * inverse_depth + cx;
+    return {u, fy * point.y() * inverse_depth + cy, u - fx * baseline * inverse_depth};
+  }
+
+  /// Derivative of project() with respect to the point, px/m.
+  Eigen::Matrix3d projectionJacobian(const Eigen::Vector3d& point) const;
+
+  /// Point in metres seen at (u, v) of the left image with a positive disparity (all px).
+  Eigen::Vector3d backProject(double u, double v, double disparity) const {
+    const double z = depth(disparity);
+    return {(u - cx) * z / fx, (v - cy) * z / fy, z};
+  }
+
+  double depth(double disparity) const { return fx * baseline / disparity; }
+  double disparity(double depth) const { return fx * baseline / depth; }
+
+  bool operator==(const StereoCamera& other) const;
+  bool operator!=(const StereoCamera& other) const { return !(*this == other); }
+};
+
+}  // namespace sdvo
