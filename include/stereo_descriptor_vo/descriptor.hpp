@@ -1,0 +1,54 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/options.hpp"
+#include "stereo_descriptor_vo/stereo_features.hpp"
+
+namespace sdvo {
+
+struct DescriptorOptions {
+  std::string type = "freak";
+  std::string layout = "left+right";
+  bool oriented = false;
+
+  void describe(OptionList& list) {
+    list.add("type", type, {"freak"}, "base descriptor");
+    list.add("layout", layout, {"left", "left+right"}, "one view, or the left half followed by the right half");
+    list.add("oriented", oriented, "turn the pattern to the left view's orientation (both halves by the same angle)");
+  }
+};
+
+/// A key point seen in both views, as the stereo descriptor needs it.
+struct StereoKeypoint {
+  float u_left, v_left;    ///< px
+  float u_right, v_right;  ///< px
+  float size;              ///< diameter, the same in both views, px
+};
+
+/// Descriptors of those key points that can be described in every view the layout asks for.
+struct DescribedKeypoints {
+  std::vector<int> index;    ///< into the key points given, ascending; one for each row
+  std::vector<float> angle;  ///< rad in (-pi, pi], -1 where not oriented; one for each row
+  cv::Mat rows;              ///< row = left half, or left half then right half
+};
+
+/// The stereo descriptor (paper, section 4.2): left half and right half of one feature, both described at the same
+/// depth-derived size. Rows stay aligned because a key point is described in all views or in none.
+class StereoDescriptor {
+ public:
+  explicit StereoDescriptor(const DescriptorOptions& options);
+
+  DescribedKeypoints describe(const cv::Mat& left, const cv::Mat& right,
+                              const std::vector<StereoKeypoint>& keypoints) const;
+
+  ElementType elementType() const { return ElementType::kBits; }
+  const DescriptorOptions& options() const { return options_; }
+
+ private:
+  DescriptorOptions options_;
+};
+
+}  // namespace sdvo

@@ -1,0 +1,81 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace sdvo {
+
+/// Poses T_world_camera in the order of the frames; translations in m.
+using Trajectory = std::vector<Eigen::Isometry3d>;
+
+/// Poses with their stamps, in the order of time; both lists have the same length.
+struct StampedTrajectory {
+  std::vector<std::int64_t> stamps;  ///< ns
+  Trajectory poses;
+};
+
+/// Pose from the rows of its 3x4 matrix. A rotation written with few digits is replaced by the nearest exact one;
+/// throws std::invalid_argument when the matrix is none (rows not orthonormal to 1e-3, a reflection, or not finite).
+Eigen::Isometry3d poseFromRows(const std::array<double, 12>& rows);
+
+/// Reads KITTI poses (one line of 12 numbers per frame: 3x4, row-major). Throws std::runtime_error that names file and
+/// line when a line is malformed; blank lines are only allowed at the end, since they would shift the frames after
+/// them.
+Trajectory readKittiPoses(const std::string& path);
+
+/// Writes KITTI poses, one line per frame; throws std::runtime_error that names the file when it cannot be written.
+void writeKittiPoses(const std::string& path, const Trajectory& poses);
+
+/// Reads TUM poses ("stamp[s] tx ty tz qx qy qz qw", comments begin with #). Throws std::runtime_error that names file
+/// and line when a line is malformed, a quaternion is not of unit length or the stamps do not increase.
+StampedTrajectory readTumPoses(const std::string& path);
+
+/// Writes TUM poses; throws std::invalid_argument when the lists differ in length, std::runtime_error as above.
+void writeTumPoses(const std::string& path, const StampedTrajectory& trajectory);
+
+/// Mean KITTI errors over the sub-paths of one length; NaN when there is none.
+struct SubPathErrors {
+  double length = 0.0;               ///< m; 0 for the mean over all lengths
+  int count = 0;                     ///< sub-paths
+  double translation_percent = 0.0;  ///< of the length
+  double rotation_deg_per_m = 0.0;
+};
+
+/// The errors of an estimated trajectory. Quantities without any sample are NaN.
+struct TrajectoryErrors {
+  int frames = 0;            ///< compared, which is the length of the estimate
+  double path_length = 0.0;  ///< of the ground truth over these frames, m
+
+  SubPathErrors sub_paths;                ///< mean over all sub-paths of all lengths
+  std::vector<SubPathErrors> per_length;  ///< one per requested length, in that order
+  double rpe_translation_m = 0.0;         ///< rmse from frame to frame
+  double rpe_rotation_deg = 0.0;          ///< rmse from frame to frame
+  double ate_aligned_m = 0.0;             ///< rmse of positions after the best rigid alignment (no scale)
+  double ate_first_pose_m = 0.0;          ///< rmse of positions with the first poses laid upon each other
+  double final_drift_m = 0.0;             ///< position error of the last frame, first poses laid upon each other
+  double final_drift_percent = 0.0;       ///< of the path length
+  double scale = 0.0;                     ///< median over steps of estimated / true step length
+};
+
+/// The official lengths of the KITTI benchmark: 100, 200 … 800 m.
+std::vector<double> kittiLengths();
+
+/// Distance travelled until each pose, m: starts with 0, as long as the trajectory.
+std::vector<double> distancesTravelled(const Trajectory& poses);
+
+/// Errors as in the KITTI development kit: a sub-path starts at every frame (step 1) and ends at the first frame at
+/// which the distance along the ground truth reaches the length; its error is inv(delta_truth) * delta_estimate,
+/// divided by the nominal length. The mean is over sub-paths, not over lengths, and comes last, with length 0. Throws
+/// std::invalid_argument when a length is not positive or the trajectories cannot be compared (see below).
+std::vector<SubPathErrors> subPathErrors(const Trajectory& ground_truth, const Trajectory& estimate,
+                                         const std::vector<double>& lengths);
+
+/// All errors of `estimate`, which is compared to the first poses of `ground_truth`. Throws std::invalid_argument when
+/// the estimate is empty or longer than the ground truth, or when a length is not positive.
+TrajectoryErrors evaluateTrajectory(const Trajectory& ground_truth, const Trajectory& estimate,
+                                    const std::vector<double>& lengths = kittiLengths());
+
+}  // namespace sdvo
