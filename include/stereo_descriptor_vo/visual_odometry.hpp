@@ -1,0 +1,126 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/feature_matcher.hpp"
+#include "stereo_descriptor_vo/motion_estimator.hpp"
+#include "stereo_descriptor_vo/se3.hpp"
+#include "stereo_descriptor_vo/stereo_features.hpp"
+
+namespace sdvo {
+
+struct TrackingOptions {
+  int max_predicted_pairs = 1;
+  double max_gap = 1.0;
+  double max_speed = 70.0;
+  double max_rotation_rate = 6.3;
+
+  void describe(OptionList& list) {
+    list.add("max_predicted_pairs", max_predicted_pairs, {0, 100}, "",
+             "pairs in a row whose motion may be predicted before the odometry is lost");
+    list.add("max_gap", max_gap, {0.01, 60.0}, "s", "longest time between pairs over which the motion is predicted");
+    list.add("max_speed", max_speed, {0.1, 1000.0}, "m/s", "a faster motion is a wrong one");
+    list.add("max_rotation_rate", max_rotation_rate, {0.1, 100.0}, "rad/s", "a faster rotation is a wrong one");
+  }
+};
+
+struct VisualOdometryOptions {
+  FeatureMatcherOptions matcher;
+  MotionEstimatorOptions motion;
+  TrackingOptions tracking;
+
+  void describe(OptionList& list) {
+    list.group("matcher", matcher);
+    list.group("motion", motion);
+    list.group("tracking", tracking);
+  }
+};
+
+enum class TrackingState { kWaiting, kTracking, kDegraded, kLost };
+
+const char* toString(TrackingState state);
+
+/// What one pair did to the odometry. Everything published is derived from this one object.
+struct OdometryResult {
+  TrackingState state = TrackingState::kWaiting;
+  std::string reason;      ///< in words, for every state but plain tracking
+  std::int64_t stamp = 0;  ///< of the left image, ns
+  int epoch = 0;           ///< one more after every discontinuity of the pose
+
+  bool has_pose = false;  ///< false while waiting or lost: nothing may be published then
+  Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();  ///< origin: the first left camera
+  Matrix6d pose_covariance = Matrix6d::Zero();  ///< of a right perturbation: T_origin_camera * exp(xi), m and rad
+
+  bool has_motion = false;  ///< false for the first pair and right after a discontinuity
+  double dt = 0.0;          ///< s since the previous pair
+  Eigen::Isometry3d T_previous_current = Eigen::Isometry3d::Identity();
+  Matrix6d motion_covariance = Matrix6d::Zero();  ///< of a right perturbation of T_previous_current
+
+  int features = 0, matches = 0, inliers = 0;
+  double coverage = 0.0;  ///< share of an 8x4 grid's cells over the image that hold an inlier
+  double rms = 0.0;       ///< reprojection error of the inliers, px per coordinate
+  double match_time = 0.0, motion_time = 0.0;  ///< s
+  double distance = 0.0;                       ///< travelled since the start or reset, m
+  int reference_id = 0;                        ///< running number of the pair that this one was matched to
+
+  std::vector<FeatureMatch> inlier_matches;  ///< reference pair to this pair
+};
+
+/// Frame-to-frame stereo odometry on stereo features alone.
+class VisualOdometry {
+ public:
+  /// Throws std::invalid_argument when an option is out of its range.
+  explicit VisualOdometry(const VisualOdometryOptions& options);
+
+  /// Processes the next pair. Stamps must increase and the features must pass check(), else std::invalid_argument and the
+  /// state is as before.
+  OdometryResult update(const StereoFeatures& features);
+
+  /// Back to the initial pose and a new epoch; nothing is remembered.
+  void reset();
+
+  /// Tells that the next pair does not continue the last one (another calibration, a restarted source): the odometry
+  /// re-seeds from the last pose under a new epoch.
+  void breakStream();
+
+  const VisualOdometryOptions& options() const { return options_; }
+
+ private:
+  struct Reference {
+    StereoFeatures features;
+    Eigen::Isometry3d T_origin_camera;
+    int id;
+  };
+
+  OdometryResult seed(OdometryResult result, const StereoFeatures& features);
+  OdometryResult follow(OdometryResult result, const StereoFeatures& features);
+  OdometryResult predict(OdometryResult result);
+  MotionEstimate estimateMotion(const StereoFeatures& features, const std::optional<Eigen::Isometry3d>& prior,
+                                OdometryResult& result) const;
+  void advance(OdometryResult& result, const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance);
+  std::string implausible(const Eigen::Isometry3d& T_previous_current, double dt) const;
+
+  VisualOdometryOptions options_;
+  FeatureMatcher matcher_;
+  MotionEstimator estimator_;
+
+  // State between pairs; reset() is the assignment of a new one.
+  struct State {
+    std::optional<Reference> reference;
+    std::optional<std::int64_t> last_stamp;
+    Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
+    Matrix6d pose_covariance = Matrix6d::Zero();
+    std::optional<Vector6d> velocity;  ///< of the camera in its own frame, m/s and rad/s
+    double distance = 0.0;
+    int predicted_pairs = 0;
+    int pairs = 0;
+    bool started = false;
+  } state_;
+  int epoch_ = 0;
+};
+
+}  // namespace sdvo

@@ -1,0 +1,122 @@
+#include "stereo_descriptor_vo/feature_matcher.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <stdexcept>
+
+// The population count of 64 bits is one instruction on every x86 processor since 2008, but only a function compiled for
+// it may use it; the loader picks the right version.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+#define SDVO_POPCOUNT __attribute__((target_clones("popcnt", "default")))
+#else
+#define SDVO_POPCOUNT
+#endif
+
+namespace sdvo {
+namespace {
+
+constexpr int kNoDistance = std::numeric_limits<int>::max();
+
+SDVO_POPCOUNT void hammingDistances(const std::uint8_t* row, const cv::Mat& others, const std::vector<int>& candidates,
+                                    std::vector<int>& distances) {
+  const int words = others.cols / 8;
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    const std::uint8_t* other = others.ptr(candidates[k]);
+    int distance = 0;
+    for (int w = 0; w < words; ++w) {
+      std::uint64_t a, b;
+      std::memcpy(&a, row + 8 * w, 8);
+      std::memcpy(&b, other + 8 * w, 8);
+      distance += __builtin_popcountll(a ^ b);
+    }
+    distances[k] = distance;
+  }
+}
+
+/// Rows of a feature set, found by position.
+class PositionGrid {
+ public:
+  PositionGrid(const StereoFeatures& features, double cell) : features_(features), cell_(cell) {
+    columns_ = static_cast<int>(features.camera.width / cell) + 1;
+    rows_ = static_cast<int>(features.camera.height / cell) + 1;
+    cells_.resize(static_cast<std::size_t>(columns_) * rows_);
+    for (int i = 0; i < features.count(); ++i)
+      cells_[static_cast<std::size_t>(clampedRow(features.v[i])) * columns_ + clampedColumn(features.u[i])].push_back(i);
+  }
+
+  void findWithin(double u, double v, double radius, std::vector<int>& found) const {
+    found.clear();
+    for (int row = clampedRow(v - radius); row <= clampedRow(v + radius); ++row)
+      for (int column = clampedColumn(u - radius); column <= clampedColumn(u + radius); ++column)
+        for (const int i : cells_[static_cast<std::size_t>(row) * columns_ + column])
+          if (std::hypot(features_.u[i] - u, features_.v[i] - v) <= radius) found.push_back(i);
+  }
+
+ private:
+  int clampedColumn(double u) const { return static_cast<int>(std::clamp(u / cell_, 0.0, columns_ - 1.0)); }
+  int clampedRow(double v) const { return static_cast<int>(std::clamp(v / cell_, 0.0, rows_ - 1.0)); }
+
+  const StereoFeatures& features_;
+  double cell_;
+  int columns_, rows_;
+  std::vector<std::vector<int>> cells_;
+};
+
+void checkComparable(const StereoFeatures& a, const StereoFeatures& b) {
+  if (a.descriptor != b.descriptor || a.layout != b.layout || a.descriptors.cols != b.descriptors.cols)
+    throw std::invalid_argument("descriptors cannot be compared: " + a.descriptor + " (" + a.layout + ") against " +
+                                b.descriptor + " (" + b.layout + ")");
+  if (a.element_type != ElementType::kBits || a.descriptors.cols % 8 != 0)
+    throw std::invalid_argument("descriptor " + a.descriptor + " is not made of whole 64-bit words");
+}
+
+}  // namespace
+
+FeatureMatcher::FeatureMatcher(const FeatureMatcherOptions& options) : options_(checked(options)) {}
+
+std::vector<FeatureMatch> FeatureMatcher::match(const StereoFeatures& reference, const StereoFeatures& current,
+                                                const std::optional<Eigen::Isometry3d>& T_current_reference) const {
+  if (reference.count() == 0 || current.count() == 0) return {};
+  checkComparable(reference, current);
+
+  const bool gated = options_.gating && T_current_reference.has_value();
+  const PositionGrid grid(current, gated ? options_.gate_radius : 1e9);
+  std::vector<int> everything(static_cast<std::size_t>(current.count()));
+  for (int i = 0; i < current.count(); ++i) everything[i] = i;
+
+  struct Nearest {
+    int index = -1;
+    int distance = kNoDistance;
+  };
+  std::vector<Nearest> of_reference(reference.count()), of_current(current.count());
+  std::vector<int> found, distances(current.count());
+  for (int i = 0; i < reference.count(); ++i) {
+    if (gated) {
+      const Eigen::Vector3d point = *T_current_reference * reference.point(i);
+      constexpr double kNearestDepth = 0.1;  // m: what passes closer than this cannot be seen again
+      if (point.z() < kNearestDepth) continue;
+      const Eigen::Vector3d predicted = current.camera.project(point);
+      grid.findWithin(predicted.x(), predicted.y(), options_.gate_radius, found);
+    }
+    const std::vector<int>& candidates = gated ? found : everything;
+    hammingDistances(reference.descriptors.ptr(i), current.descriptors, candidates, distances);
+    for (std::size_t k = 0; k < candidates.size(); ++k) {
+      const int j = candidates[k];
+      if (distances[k] < of_reference[i].distance) of_reference[i] = {j, distances[k]};
+      if (distances[k] < of_current[j].distance) of_current[j] = {i, distances[k]};
+    }
+  }
+
+  const double bits = 8.0 * reference.descriptors.cols;
+  std::vector<FeatureMatch> matches;
+  for (int i = 0; i < reference.count(); ++i) {
+    const auto& [j, distance] = of_reference[i];
+    if (j < 0 || of_current[j].index != i || distance > options_.max_distance * bits) continue;
+    matches.push_back({i, j, static_cast<float>(distance / bits)});
+  }
+  return matches;
+}
+
+}  // namespace sdvo

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "ray_caster.hpp"
+#include "shader.hpp"
+#include "vehicles.hpp"
+#include "world.hpp"
+
+namespace sdvo::render {
+
+/// A pinhole camera somewhere in the world; pixel (0, 0) is the centre of the top-left one.
+struct View {
+  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;  ///< px
+  int width = 0, height = 0;                      ///< px
+  Eigen::Isometry3d T_world_camera = Eigen::Isometry3d::Identity();
+
+  /// World direction of the ray through a pixel, scaled to depth 1.
+  Eigen::Vector3d direction(double u, double v) const {
+    return T_world_camera.linear() * Eigen::Vector3d((u - cx) / fx, (v - cy) / fy, 1.0);
+  }
+};
+
+/// What is known of the centres of a view's pixels.
+struct Hits {
+  cv::Mat1f depth;    ///< along the optical axis, m; NaN in the sky
+  cv::Mat1i car;      ///< index into the moving scene's cars, or −1
+};
+
+/// Casts the rays of a view and shades what they hit.
+class ViewRenderer {
+ public:
+  /// All of these must outlive the renderer.
+  ViewRenderer(const World& world, const RayCaster& caster, const std::vector<Mesh>& car_models)
+      : world_(&world), caster_(&caster), car_models_(&car_models), shader_(world) {}
+
+  /// Adds `weight` times the brightness (1 = white) of the view to `image`, at 1, 4 or 16 samples per pixel. A single
+  /// sample lies at (offset_x, offset_y) px from the pixel's centre; several fill the pixel evenly. Samples of a pixel
+  /// on one surface are shaded together: edges are anti-aliased by the samples, textures by their filter.
+  void add(const View& view, const MovingScene& cars, int samples, float offset_x, float offset_y, float weight,
+           cv::Mat1f& image) const;
+
+  Hits trace(const View& view, const MovingScene& cars) const;
+
+ private:
+  const World* world_;
+  const RayCaster* caster_;
+  const std::vector<Mesh>* car_models_;
+  Shader shader_;
+};
+
+}  // namespace sdvo::render

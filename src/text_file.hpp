@@ -1,0 +1,69 @@
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <locale>
+#include <sstream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace sdvo {
+
+/// "file 'poses/06.txt', line 3": where an error in a text file is.
+inline std::string placeInFile(const std::string& path, int line) {
+  return "file '" + path + "', line " + std::to_string(line);
+}
+
+/// Throws std::runtime_error that names the file when it is missing, a directory or unreadable.
+inline std::ifstream openTextFile(const std::string& path) {
+  if (std::filesystem::is_directory(path)) throw std::runtime_error("'" + path + "' is a directory, not a file");
+  std::ifstream file(path);
+  if (!file) {
+    throw std::runtime_error("cannot read file '" + path +
+                             (std::filesystem::exists(path) ? "': no permission?" : "': it does not exist"));
+  }
+  return file;
+}
+
+/// Words of a line separated by white space; a carriage return at its end counts as such.
+inline std::vector<std::string> splitWords(const std::string& line) {
+  std::istringstream stream(line);
+  std::vector<std::string> words;
+  for (std::string word; stream >> word;) words.push_back(word);
+  return words;
+}
+
+/// The finite number that a word holds, whatever the process' locale says of decimal points; throws
+/// std::invalid_argument that quotes the word otherwise. Number is double or long double.
+template <class Number = double>
+Number parseNumber(const std::string& word) {
+  std::istringstream stream(word);
+  stream.imbue(std::locale::classic());
+  Number value{};
+  if (!(stream >> value) || !(stream >> std::ws).eof() || !std::isfinite(value)) {
+    throw std::invalid_argument("'" + word + "' is not a finite number");
+  }
+  return value;
+}
+
+/// Seconds as a decimal number to nanoseconds. Goes through long double: a double near today's Unix time resolves 200
+/// ns.
+inline std::int64_t parseSeconds(const std::string& word) {
+  const long double nanoseconds = parseNumber<long double>(word) * 1e9L;
+  if (std::abs(nanoseconds) > 9e18L) throw std::invalid_argument("'" + word + "' s is out of range");
+  return std::llround(nanoseconds);
+}
+
+/// Nanoseconds as seconds with nine decimals, which parseSeconds() reads back exactly.
+inline std::string formatSeconds(std::int64_t nanoseconds) {
+  const std::int64_t giga = 1000000000;
+  const std::string fraction = std::to_string(std::abs(nanoseconds % giga));
+  return (nanoseconds < 0 ? "-" : "") + std::to_string(std::abs(nanoseconds / giga)) + "." +
+         std::string(9 - fraction.size(), '0') + fraction;
+}
+
+}  // namespace sdvo

@@ -1,0 +1,123 @@
+#include <cmath>
+#include <cstdio>
+#include <fstream>
+#include <iostream>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "run_tool.hpp"
+#include "stereo_descriptor_vo/trajectory.hpp"
+
+namespace {
+
+using sdvo::SubPathErrors;
+using sdvo::TrajectoryErrors;
+
+std::string format(const char* pattern, double value) {
+  char text[64];
+  std::snprintf(text, sizeof text, pattern, value);
+  return text;
+}
+
+/// "-" for a quantity without samples.
+std::string cell(const char* pattern, double value) {
+  return std::isnan(value) ? "-" : format(pattern, value);
+}
+
+void printRow(const std::string& name, const SubPathErrors& errors) {
+  std::printf("%10s %10d %15s %18s\n", name.c_str(), errors.count, cell("%.4f", errors.translation_percent).c_str(),
+              cell("%.5f", errors.rotation_deg_per_m).c_str());
+}
+
+void printTable(const TrajectoryErrors& errors) {
+  std::printf("%d frames, %.2f m along the ground truth\n\n", errors.frames, errors.path_length);
+  std::printf("%10s %10s %15s %18s\n", "length [m]", "sub-paths", "translation [%]", "rotation [deg/m]");
+  for (const SubPathErrors& row : errors.per_length) printRow(format("%g", row.length), row);
+  printRow("mean", errors.sub_paths);
+  std::printf("\n");
+
+  const auto line = [](const char* name, const std::string& value) { std::printf("%-44s %s\n", name, value.c_str()); };
+  line("RPE translation, rmse per frame [m]", cell("%.5f", errors.rpe_translation_m));
+  line("RPE rotation, rmse per frame [deg]", cell("%.5f", errors.rpe_rotation_deg));
+  line("ATE, rmse after rigid alignment [m]", cell("%.4f", errors.ate_aligned_m));
+  line("ATE, rmse with equal first poses [m]", cell("%.4f", errors.ate_first_pose_m));
+  line("final drift [m]", cell("%.4f", errors.final_drift_m));
+  line("final drift [% of length]", cell("%.4f", errors.final_drift_percent));
+  line("scale, median of estimated / true step", cell("%.5f", errors.scale));
+}
+
+/// The requested lengths that no sub-path reaches, as "100, 200"; empty when there is none.
+std::string missingLengths(const TrajectoryErrors& errors) {
+  std::string text;
+  for (const SubPathErrors& row : errors.per_length) {
+    if (row.count == 0) text += (text.empty() ? "" : ", ") + format("%g", row.length);
+  }
+  return text;
+}
+
+std::string jsonNumber(double value) {
+  return std::isfinite(value) ? format("%.12g", value) : "null";
+}
+
+std::string jsonSubPaths(const SubPathErrors& errors) {
+  return "\"sub_paths\": " + std::to_string(errors.count) +
+         ", \"translation_percent\": " + jsonNumber(errors.translation_percent) +
+         ", \"rotation_deg_per_m\": " + jsonNumber(errors.rotation_deg_per_m);
+}
+
+void writeJson(const std::string& path, const TrajectoryErrors& errors) {
+  std::ofstream file(path);
+  file << "{\n  \"frames\": " << errors.frames << ",\n  \"path_length_m\": " << jsonNumber(errors.path_length)
+       << ",\n  \"mean\": {" << jsonSubPaths(errors.sub_paths) << "},\n  \"per_length\": [";
+  const char* separator = "\n";
+  for (const SubPathErrors& row : errors.per_length) {
+    file << separator << "    {\"length_m\": " << jsonNumber(row.length) << ", " << jsonSubPaths(row) << "}";
+    separator = ",\n";
+  }
+  file << "\n  ]";
+  const auto field = [&](const char* name, double value) { file << ",\n  \"" << name << "\": " << jsonNumber(value); };
+  field("rpe_translation_m", errors.rpe_translation_m);
+  field("rpe_rotation_deg", errors.rpe_rotation_deg);
+  field("ate_aligned_m", errors.ate_aligned_m);
+  field("ate_first_pose_m", errors.ate_first_pose_m);
+  field("final_drift_m", errors.final_drift_m);
+  field("final_drift_percent", errors.final_drift_percent);
+  field("scale", errors.scale);
+  file << "\n}\n";
+  file.close();
+  if (!file) throw std::runtime_error("cannot write --json file '" + path + "'");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app(
+      "Errors of an estimated trajectory: KITTI translation and rotation errors over sub-paths, RPE, ATE, final drift "
+      "and scale. A shorter estimate is compared with the first poses of the ground truth.");
+  std::string ground_truth, estimate, json;
+  std::vector<double> lengths = sdvo::kittiLengths();
+  app.add_option("--ground-truth", ground_truth, "True poses, KITTI format (12 numbers per line)")->required();
+  app.add_option("--estimate", estimate, "Estimated poses, KITTI format")->required();
+  app.add_option("--lengths", lengths, "Lengths of the sub-paths in m, e.g. 5,10,20 (default 100,200,...,800)")
+      ->delimiter(',');
+  app.add_option("--json", json, "Also write the errors to this file");
+
+  return sdvo::runTool(app, argc, argv, [&] {
+    const TrajectoryErrors errors =
+        sdvo::evaluateTrajectory(sdvo::readKittiPoses(ground_truth), sdvo::readKittiPoses(estimate), lengths);
+    printTable(errors);
+    std::fflush(stdout);
+    if (!json.empty()) writeJson(json, errors);
+    const std::string missing = missingLengths(errors);
+    if (errors.sub_paths.count == 0) {
+      throw std::runtime_error("no sub-path of " + missing + " m fits into the " + format("%.2f", errors.path_length) +
+                               " m of ground truth: choose shorter --lengths");
+    }
+    if (!missing.empty()) {
+      std::cerr << "note: no sub-path of " << missing << " m fits into the " << format("%.2f", errors.path_length)
+                << " m of ground truth" << std::endl;
+    }
+    return 0;
+  });
+}

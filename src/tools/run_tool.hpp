@@ -1,0 +1,32 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <exception>
+#include <iostream>
+#include <string>
+
+namespace sdvo {
+
+/// What every tool's main() does: parse the command line, run `work` (returns the exit code), and report any failure as
+/// one line "error: …" on stderr with exit code 1.
+template <class Work>
+int runTool(CLI::App& app, int argc, char** argv, const Work& work) {
+  const auto fail = [](std::string what) {
+    std::replace(what.begin(), what.end(), '\n', ' ');
+    std::cerr << "error: " << what << std::endl;
+    return 1;
+  };
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& e) {
+    return e.get_exit_code() == 0 ? app.exit(e) : fail(std::string(e.what()) + " (see --help)");
+  }
+  try {
+    return work();
+  } catch (const std::exception& e) {
+    return fail(e.what());
+  }
+}
+
+}  // namespace sdvo
