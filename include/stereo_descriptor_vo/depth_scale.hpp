@@ -12,7 +12,7 @@ struct DepthScaleOptions {
   double exponent = 1.0;
   double offset = 0.0;
   double min_size = 10.0;
-  double max_size = 30.0;
+  double max_size = 20.0;
   double constant_size = 7.0;
 
   void describe(OptionList& list) {
