@@ -2,13 +2,30 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <stdexcept>
+
+#include "../ros/nodelet_options.hpp"
 
 namespace sdvo {
 namespace {
 
 /// Parameters that the nodelets read beside the core's options; a file that holds them is no error here.
-bool belongsToNodelet(const std::string& path) { return path.find("/ros/") != std::string::npos; }
+struct NodeletOptions {
+  StereoInputOptions stereo_features;
+  OdometryOutputOptions visual_odometry;
+
+  void describe(OptionList& list) {
+    list.group("stereo_features", stereo_features);
+    list.group("visual_odometry", visual_odometry);
+  }
+};
+
+bool belongsToNodelet(const std::string& path) {
+  NodeletOptions options;
+  const std::vector<Option> list = listOptions(options);
+  return std::any_of(list.begin(), list.end(), [&](const Option& option) { return option.name == path; });
+}
 
 void apply(const YAML::Node& node, const std::string& path, std::vector<Option>& options) {
   if (node.IsMap()) {

@@ -1,0 +1,112 @@
+#pragma once
+
+#include <stereo_descriptor_vo/StereoFeatures.h>
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <stdexcept>
+#include <string>
+
+namespace sdvo {
+
+/// A StereoFeatures message, checked once and then read without a copy. For every node that subscribes to descriptors.
+/// The message must outlive the view and the matrices it hands out; those are read-only although cv::Mat cannot say so.
+class StereoFeaturesView {
+ public:
+  /// Throws std::invalid_argument that says which field does not hold together; nothing is read before it is checked.
+  explicit StereoFeaturesView(const stereo_descriptor_vo::StereoFeatures& message) : message_(message) {
+    checkGeometry();
+    checkLengths();
+    checkNumbers();
+  }
+
+  int count() const { return static_cast<int>(message_.u.size()); }
+  bool hasRightHalf() const { return message_.layout == "left+right"; }
+
+  /// All rows, count() x elements: CV_8U, or CV_32F for element_type "float32".
+  cv::Mat descriptors() const { return columns(0, rowElements()); }
+  /// The left halves alone, count() x elements of one view.
+  cv::Mat leftDescriptors() const { return columns(0, viewElements()); }
+  /// The right halves alone; empty when the layout is "left".
+  cv::Mat rightDescriptors() const {
+    return hasRightHalf() ? columns(viewElements(), rowElements()) : cv::Mat();
+  }
+
+  /// Position of feature i in the left rectified optical frame, m.
+  cv::Point3d point(int i) const {
+    const double z = message_.fx * message_.baseline / message_.disparity[i];
+    return {(message_.u[i] - message_.cx) * z / message_.fx, (message_.v[i] - message_.cy) * z / message_.fy, z};
+  }
+
+ private:
+  [[noreturn]] static void refuse(const std::string& what) {
+    throw std::invalid_argument("StereoFeatures message refused: " + what);
+  }
+
+  bool isFloat() const { return message_.element_type == "float32"; }
+  int rowElements() const { return static_cast<int>(message_.bytes_per_row / (isFloat() ? 4 : 1)); }
+  int viewElements() const { return hasRightHalf() ? rowElements() / 2 : rowElements(); }
+
+  cv::Mat columns(int first, int last) const {
+    if (count() == 0) return cv::Mat();
+    const cv::Mat rows(count(), rowElements(), isFloat() ? CV_32F : CV_8U,
+                       const_cast<std::uint8_t*>(message_.descriptors.data()), message_.bytes_per_row);
+    return rows.colRange(first, last);
+  }
+
+  void checkGeometry() const {
+    const auto positive = [](double x) { return std::isfinite(x) && x > 0.0; };
+    if (!positive(message_.fx) || !positive(message_.fy) || !positive(message_.baseline) ||
+        !std::isfinite(message_.cx) || !std::isfinite(message_.cy))
+      refuse("fx, fy and baseline must be positive, cx and cy finite");
+    constexpr std::uint32_t kLargestSide = 1u << 16;
+    if (message_.image_width == 0 || message_.image_height == 0 || message_.image_width > kLargestSide ||
+        message_.image_height > kLargestSide)
+      refuse("image size " + std::to_string(message_.image_width) + "x" + std::to_string(message_.image_height));
+  }
+
+  void checkLengths() const {
+    const std::size_t n = message_.u.size();
+    const auto require = [n](std::size_t length, const char* name) {
+      if (length != n)
+        refuse(std::string(name) + " has " + std::to_string(length) + " elements, u has " + std::to_string(n));
+    };
+    require(message_.v.size(), "v");
+    require(message_.disparity.size(), "disparity");
+    require(message_.dv.size(), "dv");
+    require(message_.size.size(), "size");
+    require(message_.angle.size(), "angle");
+    require(message_.response.size(), "response");
+    require(message_.sigma.size(), "sigma");
+    require(message_.octave.size(), "octave");
+    if (message_.layout != "left" && message_.layout != "left+right") refuse("unknown layout '" + message_.layout + "'");
+    if (message_.element_type != "bits" && message_.element_type != "uint8" && message_.element_type != "float32")
+      refuse("unknown element_type '" + message_.element_type + "'");
+    constexpr std::uint32_t kLongestRow = 1u << 16;
+    const std::uint32_t unit = (isFloat() ? 4u : 1u) * (hasRightHalf() ? 2u : 1u);
+    if (message_.bytes_per_row == 0 || message_.bytes_per_row > kLongestRow || message_.bytes_per_row % unit != 0)
+      refuse("bytes_per_row = " + std::to_string(message_.bytes_per_row) + " does not fit layout and element_type");
+    if (message_.descriptors.size() != n * message_.bytes_per_row)
+      refuse("descriptors has " + std::to_string(message_.descriptors.size()) + " bytes, " + std::to_string(n) +
+             " rows of " + std::to_string(message_.bytes_per_row) + " need " +
+             std::to_string(n * message_.bytes_per_row));
+  }
+
+  void checkNumbers() const {
+    const auto finite = [](float x) { return std::isfinite(x); };
+    const auto positive = [](float x) { return std::isfinite(x) && x > 0.f; };
+    const auto all = [](const std::vector<float>& values, auto holds) {
+      return std::all_of(values.begin(), values.end(), holds);
+    };
+    if (!all(message_.u, finite) || !all(message_.v, finite) || !all(message_.dv, finite) ||
+        !all(message_.angle, finite) || !all(message_.response, finite))
+      refuse("u, v, dv, angle or response holds a number that is not finite");
+    if (!all(message_.disparity, positive) || !all(message_.size, positive) || !all(message_.sigma, positive))
+      refuse("disparity, size or sigma holds a number that is not positive and finite");
+  }
+
+  const stereo_descriptor_vo::StereoFeatures& message_;
+};
+
+}  // namespace sdvo

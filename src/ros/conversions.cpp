@@ -1,0 +1,287 @@
+#include "conversions.hpp"
+
+#include <cv_bridge/cv_bridge.h>
+#include <image_geometry/pinhole_camera_model.h>
+#include <sensor_msgs/image_encodings.h>
+#include <sensor_msgs/point_cloud2_iterator.h>
+#include <tf2_eigen/tf2_eigen.h>
+
+#include <cmath>
+#include <limits>
+#include <set>
+#include <sstream>
+#include <stdexcept>
+
+#include "stereo_descriptor_vo/ros/stereo_features_view.hpp"
+
+namespace sdvo::ros_conversions {
+namespace {
+
+/// Variance of what is not known at all, and the floor that keeps every covariance positive.
+constexpr double kUnknownVariance = 1e6;
+constexpr double kVarianceFloor = 1e-9;
+
+image_geometry::PinholeCameraModel toCameraModel(const sensor_msgs::CameraInfo& info, const char* side) {
+  const std::string name = std::string(side) + " camera_info";
+  if (info.width == 0 || info.height == 0) throw std::invalid_argument(name + " has no image size");
+  if (info.K[0] == 0.0 || info.P[0] == 0.0)
+    throw std::invalid_argument(name + ": K or P is zero, the camera is not calibrated (REP-104)");
+  image_geometry::PinholeCameraModel model;
+  try {
+    model.fromCameraInfo(info);
+  } catch (const std::exception& e) {
+    throw std::invalid_argument(name + ": " + e.what());
+  }
+  return model;
+}
+
+std::string describeP(const sensor_msgs::CameraInfo& info) {
+  std::ostringstream text;
+  text << "fx = " << info.P[0] << ", Tx = " << info.P[3];
+  return text.str();
+}
+
+template <class Covariance>
+void fillCovariance(const Matrix6d& covariance, Covariance& message) {
+  Matrix6d symmetric = 0.5 * (covariance + covariance.transpose());
+  symmetric.diagonal().array() += kVarianceFloor;
+  for (int row = 0; row < 6; ++row)
+    for (int column = 0; column < 6; ++column) message[6 * row + column] = symmetric(row, column);
+}
+
+const char* toText(ElementType type) {
+  switch (type) {
+    case ElementType::kBits: return "bits";
+    case ElementType::kUint8: return "uint8";
+    case ElementType::kFloat32: return "float32";
+  }
+  throw std::invalid_argument("unknown element type");
+}
+
+ElementType toElementType(const std::string& text) {
+  if (text == "bits") return ElementType::kBits;
+  if (text == "uint8") return ElementType::kUint8;
+  return ElementType::kFloat32;  // the view has checked that nothing else is left
+}
+
+}  // namespace
+
+std::string cleanFrameId(const std::string& frame_id) {
+  return !frame_id.empty() && frame_id.front() == '/' ? frame_id.substr(1) : frame_id;
+}
+
+StereoCamera toStereoCamera(const sensor_msgs::CameraInfo& left, const sensor_msgs::CameraInfo& right) {
+  const image_geometry::PinholeCameraModel left_model = toCameraModel(left, "left");
+  const image_geometry::PinholeCameraModel right_model = toCameraModel(right, "right");
+  constexpr double kSameFocalLength = 1e-3;  // px
+  if (std::abs(left_model.fx() - right_model.fx()) > kSameFocalLength)
+    throw std::invalid_argument("left and right camera_info have different focal lengths (left " + describeP(left) +
+                                "; right " + describeP(right) + "), the pair is not rectified");
+  StereoCamera camera;
+  camera.fx = left_model.fx();
+  camera.fy = left_model.fy();
+  camera.cx = left_model.cx();
+  camera.cy = left_model.cy();
+  // The left P may have a Tx of its own (KITTI's colour pair), so that the baseline is a difference.
+  camera.baseline = left_model.Tx() / left_model.fx() - right_model.Tx() / right_model.fx();
+  camera.width = left_model.reducedResolution().width;
+  camera.height = left_model.reducedResolution().height;
+  if (!(camera.baseline > 0.0))
+    throw std::invalid_argument("baseline = " + std::to_string(camera.baseline) + " m is not positive (left " +
+                                describeP(left) + "; right " + describeP(right) + "): are left and right swapped?");
+  camera.check();
+  return camera;
+}
+
+cv::Mat toGrey(const sensor_msgs::ImageConstPtr& message) {
+  namespace encodings = sensor_msgs::image_encodings;
+  static const std::set<std::string> supported = {encodings::MONO8, encodings::TYPE_8UC1, encodings::MONO16,
+                                                  encodings::BGR8,  encodings::RGB8,      encodings::BGRA8,
+                                                  encodings::RGBA8};
+  if (supported.count(message->encoding) == 0)
+    throw std::invalid_argument("encoding '" + message->encoding +
+                                "' is not supported: mono8, 8UC1, mono16, bgr8, rgb8, bgra8 and rgba8 are");
+  try {
+    const bool is_grey = message->encoding == encodings::MONO8 || message->encoding == encodings::TYPE_8UC1;
+    return cv_bridge::toCvShare(message, is_grey ? std::string() : std::string(encodings::MONO8))->image;
+  } catch (const std::exception& e) {
+    throw std::invalid_argument(std::string("malformed image: ") + e.what());
+  }
+}
+
+stereo_descriptor_vo::StereoFeatures toMessage(const StereoFeatures& features, const DepthScaleOptions& size_curve) {
+  stereo_descriptor_vo::StereoFeatures message;
+  message.image_width = static_cast<std::uint32_t>(features.camera.width);
+  message.image_height = static_cast<std::uint32_t>(features.camera.height);
+  message.fx = features.camera.fx;
+  message.fy = features.camera.fy;
+  message.cx = features.camera.cx;
+  message.cy = features.camera.cy;
+  message.baseline = features.camera.baseline;
+  message.descriptor = features.descriptor;
+  message.layout = features.layout;
+  message.element_type = toText(features.element_type);
+  message.bytes_per_row = static_cast<std::uint32_t>(features.descriptors.cols * features.descriptors.elemSize());
+  message.scale_normalised = size_curve.scale_normalisation;
+  message.size_slope = static_cast<float>(size_curve.slope);
+  message.size_exponent = static_cast<float>(size_curve.exponent);
+  message.size_offset = static_cast<float>(size_curve.offset);
+  message.size_min =
+      static_cast<float>(size_curve.scale_normalisation ? size_curve.min_size : size_curve.constant_size);
+  message.size_max =
+      static_cast<float>(size_curve.scale_normalisation ? size_curve.max_size : size_curve.constant_size);
+
+  const ExtractionReport& report = features.report;
+  message.detected = static_cast<std::uint32_t>(report.detected);
+  for (int side = 0; side < 2; ++side) {
+    message.mean_intensity[side] = static_cast<float>(report.mean_intensity[side]);
+    message.sharpness[side] = static_cast<float>(report.sharpness[side]);
+  }
+  message.detect_time = static_cast<float>(report.detect_time);
+  message.stereo_time = static_cast<float>(report.stereo_time);
+  message.describe_time = static_cast<float>(report.describe_time);
+  message.status = report.status;
+
+  message.u = features.u;
+  message.v = features.v;
+  message.disparity = features.disparity;
+  message.dv = features.dv;
+  message.size = features.size;
+  message.angle = features.angle;
+  message.response = features.response;
+  message.sigma = features.sigma;
+  message.octave = features.octave;
+  CV_Assert(features.descriptors.empty() || features.descriptors.isContinuous());
+  message.descriptors.assign(features.descriptors.datastart, features.descriptors.dataend);
+  return message;
+}
+
+StereoFeatures fromMessage(const stereo_descriptor_vo::StereoFeatures& message) {
+  const StereoFeaturesView view(message);
+  StereoFeatures features;
+  features.stamp = static_cast<std::int64_t>(message.header.stamp.toNSec());
+  features.camera = {message.fx, message.fy,       message.cx,
+                     message.cy, message.baseline, static_cast<int>(message.image_width),
+                     static_cast<int>(message.image_height)};
+  features.descriptor = message.descriptor;
+  features.layout = message.layout;
+  features.element_type = toElementType(message.element_type);
+  features.u = message.u;
+  features.v = message.v;
+  features.disparity = message.disparity;
+  features.dv = message.dv;
+  features.size = message.size;
+  features.angle = message.angle;
+  features.response = message.response;
+  features.sigma = message.sigma;
+  features.octave = message.octave;
+  features.descriptors = view.descriptors().clone();
+
+  ExtractionReport& report = features.report;
+  report.detected = static_cast<int>(message.detected);
+  for (int side = 0; side < 2; ++side) {
+    report.mean_intensity[side] = message.mean_intensity[side];
+    report.sharpness[side] = message.sharpness[side];
+  }
+  report.detect_time = message.detect_time;
+  report.stereo_time = message.stereo_time;
+  report.describe_time = message.describe_time;
+  report.status = message.status;
+  return features;
+}
+
+nav_msgs::Odometry toOdometry(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera,
+                              const OdometryFrames& frames) {
+  nav_msgs::Odometry odometry;
+  odometry.header.stamp.fromNSec(static_cast<std::uint64_t>(result.stamp));
+  odometry.header.frame_id = frames.odom;
+  odometry.child_frame_id = frames.base;
+
+  // odom is the base's first pose, as the core's origin is the camera's.
+  const Eigen::Isometry3d T_odom_base =
+      orthonormalised(T_base_camera * result.T_origin_camera * T_base_camera.inverse());
+  odometry.pose.pose = tf2::toMsg(T_odom_base);
+
+  // Perturbations of the camera, in its own axes, become those of the base; then the axes of odom.
+  const Matrix6d to_base = adjoint(T_base_camera);
+  Matrix6d to_odom_axes = Matrix6d::Zero();
+  to_odom_axes.topLeftCorner<3, 3>() = T_odom_base.linear();
+  to_odom_axes.bottomRightCorner<3, 3>() = T_odom_base.linear();
+  const Matrix6d to_pose = to_odom_axes * to_base;
+  fillCovariance(to_pose * result.pose_covariance * to_pose.transpose(), odometry.pose.covariance);
+
+  if (!result.has_motion || !(result.dt > 0.0)) {
+    fillCovariance(kUnknownVariance * Matrix6d::Identity(), odometry.twist.covariance);
+    return odometry;
+  }
+  const Vector6d twist = logSE3(T_base_camera * result.T_previous_current * T_base_camera.inverse()) / result.dt;
+  odometry.twist.twist.linear.x = twist[0];
+  odometry.twist.twist.linear.y = twist[1];
+  odometry.twist.twist.linear.z = twist[2];
+  odometry.twist.twist.angular.x = twist[3];
+  odometry.twist.twist.angular.y = twist[4];
+  odometry.twist.twist.angular.z = twist[5];
+  fillCovariance(to_base * result.motion_covariance * to_base.transpose() / (result.dt * result.dt),
+                 odometry.twist.covariance);
+  return odometry;
+}
+
+geometry_msgs::TransformStamped toTransform(const nav_msgs::Odometry& odometry, bool inverted) {
+  Eigen::Isometry3d T_odom_base;
+  tf2::fromMsg(odometry.pose.pose, T_odom_base);
+  geometry_msgs::TransformStamped transform = tf2::eigenToTransform(inverted ? T_odom_base.inverse() : T_odom_base);
+  transform.header = odometry.header;
+  transform.child_frame_id = odometry.child_frame_id;
+  if (inverted) std::swap(transform.header.frame_id, transform.child_frame_id);
+  return transform;
+}
+
+stereo_descriptor_vo::VoInfo toInfo(const OdometryResult& result,
+                                    const stereo_descriptor_vo::StereoFeatures& features) {
+  stereo_descriptor_vo::VoInfo info;
+  info.state = toString(result.state);
+  info.reason = result.reason;
+  info.epoch = static_cast<std::uint32_t>(result.epoch);
+  info.detected = features.detected;
+  info.features = static_cast<std::uint32_t>(result.features);
+  info.matches = static_cast<std::uint32_t>(result.matches);
+  info.inliers = static_cast<std::uint32_t>(result.inliers);
+  info.inlier_ratio = result.matches > 0 ? static_cast<float>(result.inliers) / static_cast<float>(result.matches) : 0.f;
+  info.coverage = static_cast<float>(result.coverage);
+  info.rms_reprojection_error = static_cast<float>(result.rms);
+  info.detect_time = features.detect_time;
+  info.stereo_time = features.stereo_time;
+  info.describe_time = features.describe_time;
+  info.match_time = static_cast<float>(result.match_time);
+  info.motion_time = static_cast<float>(result.motion_time);
+  info.dropped_pairs = features.dropped_pairs;
+  info.distance = result.distance;
+  info.keyframe_id = static_cast<std::uint32_t>(result.reference_id);
+  constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+  info.disparity_offset = info.disparity_offset_sigma = kUnknown;
+  info.right_rotation.assign(kUnknown);
+  info.right_rotation_sigma.assign(kUnknown);
+  return info;
+}
+
+sensor_msgs::PointCloud2 toPointCloud(const stereo_descriptor_vo::StereoFeatures& features) {
+  const StereoFeaturesView view(features);
+  sensor_msgs::PointCloud2 cloud;
+  cloud.header = features.header;
+  sensor_msgs::PointCloud2Modifier modifier(cloud);
+  modifier.setPointCloud2Fields(4, "x", 1, sensor_msgs::PointField::FLOAT32, "y", 1, sensor_msgs::PointField::FLOAT32,
+                                "z", 1, sensor_msgs::PointField::FLOAT32, "disparity", 1,
+                                sensor_msgs::PointField::FLOAT32);
+  modifier.resize(static_cast<std::size_t>(view.count()));
+  sensor_msgs::PointCloud2Iterator<float> out(cloud, "x");
+  for (int i = 0; i < view.count(); ++i, ++out) {
+    const cv::Point3d point = view.point(i);
+    out[0] = static_cast<float>(point.x);
+    out[1] = static_cast<float>(point.y);
+    out[2] = static_cast<float>(point.z);
+    out[3] = features.disparity[i];
+  }
+  return cloud;
+}
+
+}  // namespace sdvo::ros_conversions

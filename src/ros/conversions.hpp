@@ -1,0 +1,59 @@
+#pragma once
+
+#include <geometry_msgs/TransformStamped.h>
+#include <nav_msgs/Odometry.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <stereo_descriptor_vo/StereoFeatures.h>
+#include <stereo_descriptor_vo/VoInfo.h>
+
+#include <opencv2/core.hpp>
+#include <string>
+
+#include "stereo_descriptor_vo/depth_scale.hpp"
+#include "stereo_descriptor_vo/stereo_features.hpp"
+#include "stereo_descriptor_vo/visual_odometry.hpp"
+
+/// The only place where messages and core types meet.
+namespace sdvo::ros_conversions {
+
+/// Frame id as tf2 wants it, without a leading slash.
+std::string cleanFrameId(const std::string& frame_id);
+
+/// Geometry from the two projection matrices with binning and region of interest applied (REP-104, image_geometry).
+/// Throws std::invalid_argument when the cameras are uncalibrated, differ, or the baseline is not positive.
+StereoCamera toStereoCamera(const sensor_msgs::CameraInfo& left, const sensor_msgs::CameraInfo& right);
+
+/// CV_8U grey pixels of mono8, 8UC1, mono16, bgr8, rgb8, bgra8 and rgba8; shares the message's memory where it can, so
+/// that the message must outlive the result.
+/// Throws std::invalid_argument for any other encoding and for images whose size and data disagree.
+cv::Mat toGrey(const sensor_msgs::ImageConstPtr& message);
+
+/// Header, stream epoch and drop counter are the caller's to fill.
+stereo_descriptor_vo::StereoFeatures toMessage(const StereoFeatures& features, const DepthScaleOptions& size_curve);
+
+/// Throws std::invalid_argument when the message does not hold together; the result owns its memory.
+StereoFeatures fromMessage(const stereo_descriptor_vo::StereoFeatures& message);
+
+/// Names of the two frames an odometry connects.
+struct OdometryFrames {
+  std::string odom = "odom";
+  std::string base = "base_link";
+};
+
+/// Pose of the base in odom, twist in the base frame, both covariances in ROS' conventions (row-major, translation first,
+/// rotation about the fixed axes of the frame). `result` must have a pose. The odom frame is the base's first pose.
+nav_msgs::Odometry toOdometry(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera,
+                              const OdometryFrames& frames);
+
+/// The transform of an odometry message: odom -> base, or base -> odom when inverted.
+geometry_msgs::TransformStamped toTransform(const nav_msgs::Odometry& odometry, bool inverted);
+
+/// What the result and the image side tell; header, latency and input counters are the caller's to fill.
+stereo_descriptor_vo::VoInfo toInfo(const OdometryResult& result, const stereo_descriptor_vo::StereoFeatures& features);
+
+/// The features' points in the left optical frame; fields x, y, z (m) and disparity (px).
+sensor_msgs::PointCloud2 toPointCloud(const stereo_descriptor_vo::StereoFeatures& features);
+
+}  // namespace sdvo::ros_conversions

@@ -1,0 +1,53 @@
+#include "odometry_publisher.hpp"
+
+#include <boost/make_shared.hpp>
+#include <utility>
+
+namespace sdvo {
+
+OdometryPublisher::OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOptions& options)
+    : options_(options),
+      frames_{ros_conversions::cleanFrameId(options.odom_frame_id),
+              ros_conversions::cleanFrameId(options.base_frame_id)} {
+  constexpr int kQueue = 10;
+  odom_publisher_ = nh.advertise<nav_msgs::Odometry>("odom", kQueue);
+  path_publisher_ = nh.advertise<nav_msgs::Path>("path", 1);
+  info_publisher_ = nh.advertise<stereo_descriptor_vo::VoInfo>("vo_info", kQueue);
+  points_publisher_ = nh.advertise<sensor_msgs::PointCloud2>("points", 1);
+}
+
+void OdometryPublisher::publish(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera) {
+  if (!result.has_pose) return;
+  const auto odometry =
+      boost::make_shared<nav_msgs::Odometry>(ros_conversions::toOdometry(result, T_base_camera, frames_));
+  // TF first: whoever acts on the odometry finds the transform there.
+  if (options_.publish_tf) broadcaster_.sendTransform(ros_conversions::toTransform(*odometry, options_.invert_tf));
+  odom_publisher_.publish(odometry);
+  extendPath(*odometry, result.epoch);
+}
+
+void OdometryPublisher::publishInfo(stereo_descriptor_vo::VoInfo info, const ros::Time& stamp) {
+  info.header.stamp = stamp;
+  info.header.frame_id = frames_.odom;
+  info.latency = static_cast<float>((ros::Time::now() - stamp).toSec());
+  info_publisher_.publish(boost::make_shared<stereo_descriptor_vo::VoInfo>(std::move(info)));
+}
+
+void OdometryPublisher::publishPoints(const stereo_descriptor_vo::StereoFeatures& features) {
+  if (points_publisher_.getNumSubscribers() > 0)
+    points_publisher_.publish(boost::make_shared<sensor_msgs::PointCloud2>(ros_conversions::toPointCloud(features)));
+}
+
+void OdometryPublisher::extendPath(const nav_msgs::Odometry& odometry, int) {
+  // After a jump of the clock the trajectory begins anew.
+  if (odometry.header.stamp < path_.header.stamp) path_.poses.clear();
+  path_.header = odometry.header;
+  geometry_msgs::PoseStamped pose;
+  pose.header = odometry.header;
+  pose.pose = odometry.pose.pose;
+  path_.poses.push_back(pose);
+  if (path_.poses.size() > static_cast<std::size_t>(options_.max_path_length)) path_.poses.erase(path_.poses.begin());
+  if (path_publisher_.getNumSubscribers() > 0) path_publisher_.publish(boost::make_shared<nav_msgs::Path>(path_));
+}
+
+}  // namespace sdvo

@@ -1,0 +1,215 @@
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <nodelet/nodelet.h>
+#include <pluginlib/class_list_macros.hpp>
+#include <std_srvs/Empty.h>
+#include <tf2_eigen/tf2_eigen.h>
+#include <tf2_ros/buffer.h>
+#include <tf2_ros/transform_listener.h>
+
+#include <atomic>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stdexcept>
+
+#include "conversions.hpp"
+#include "nodelet_options.hpp"
+#include "odometry_publisher.hpp"
+#include "params.hpp"
+#include "stereo_descriptor_vo/visual_odometry.hpp"
+#include "worker.hpp"
+
+namespace sdvo {
+
+/// Stereo feature messages in; odometry, TF and the state of both out. Never sees an image.
+class VisualOdometryNodelet : public nodelet::Nodelet {
+ public:
+  ~VisualOdometryNodelet() override {
+    subscriber_.shutdown();
+    worker_.reset();
+  }
+
+ private:
+  using FeaturesMessage = stereo_descriptor_vo::StereoFeatures;
+  using FeaturesMessagePtr = stereo_descriptor_vo::StereoFeaturesConstPtr;
+
+  struct Options {
+    OdometryOutputOptions output;
+    VisualOdometryOptions odometry;
+
+    void describe(OptionList& list) {
+      output.describe(list);
+      odometry.describe(list);
+    }
+  };
+
+  void onInit() override try {
+    ros::NodeHandle& nh = getNodeHandle();
+    ros::NodeHandle& private_nh = getPrivateNodeHandle();
+    for (const std::string& name : loadParams(private_nh, options_))
+      NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect");
+    odometry_ = std::make_unique<VisualOdometry>(options_.odometry);
+    publisher_ = std::make_unique<OdometryPublisher>(nh, options_.output);
+    tf_listener_ = std::make_unique<tf2_ros::TransformListener>(tf_buffer_);
+
+    diagnostics_ = std::make_unique<diagnostic_updater::Updater>(nh, private_nh, getName());
+    diagnostics_->setHardwareID("none");
+    diagnostics_->add("odometry", this, &VisualOdometryNodelet::diagnose);
+    diagnostics_timer_ = nh.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { diagnostics_->update(); });
+    reset_service_ = private_nh.advertiseService("reset", &VisualOdometryNodelet::onReset, this);
+
+    worker_ = std::make_unique<Worker<FeaturesMessagePtr>>(static_cast<std::size_t>(options_.output.queue_size),
+                                                           [this](const FeaturesMessagePtr& m) { process(m); });
+    subscriber_ = nh.subscribe<FeaturesMessage>("stereo_features", static_cast<std::uint32_t>(options_.output.queue_size),
+                                                [this](const FeaturesMessagePtr& m) { worker_->push(m); });
+  } catch (const std::exception& e) {
+    NODELET_FATAL_STREAM("not started: " << e.what());
+  }
+
+  /// In the worker's thread.
+  void process(const FeaturesMessagePtr& message) try {
+    if (reset_requested_.exchange(false)) restart("reset was called");
+    if (!findExtrinsic(ros_conversions::cleanFrameId(message->header.frame_id))) return;
+    StereoFeatures features;
+    try {
+      features = ros_conversions::fromMessage(*message);
+    } catch (const std::invalid_argument&) {
+      ++malformed_;
+      throw;
+    }
+    if (!followsLast(*message)) return;
+
+    const OdometryResult result = odometry_->update(features);
+    if (result.state == TrackingState::kLost || result.state == TrackingState::kDegraded)
+      NODELET_WARN_STREAM_THROTTLE(kErrorPeriod, toString(result.state) << " at " << message->header.stamp << ": "
+                                                                        << result.reason);
+    publisher_->publish(result, *T_base_camera_);
+    publisher_->publishPoints(*message);
+    stereo_descriptor_vo::VoInfo info = ros_conversions::toInfo(result, *message);
+    info.dropped_features = worker_->dropped();
+    info.out_of_order = out_of_order_;
+    info.malformed = malformed_;
+    publisher_->publishInfo(info, message->header.stamp);
+    const std::lock_guard<std::mutex> lock(info_mutex_);
+    last_info_ = info;
+  } catch (const std::exception& e) {
+    NODELET_ERROR_STREAM_THROTTLE(kErrorPeriod, "features at " << message->header.stamp << " skipped: " << e.what());
+  }
+
+  /// False for a late message. A jump back of the clock is a reset, any other break of the stream a new seed.
+  bool followsLast(const FeaturesMessage& message) {
+    const ros::Time stamp = message.header.stamp;
+    if (last_stamp_ && stamp <= *last_stamp_) {
+      if (*last_stamp_ - stamp < ros::Duration(kClockJump)) {
+        ++out_of_order_;
+        NODELET_WARN_STREAM_THROTTLE(kErrorPeriod, "features at " << stamp << " are late, dropped (" << out_of_order_
+                                                                  << " so far)");
+        return false;
+      }
+      restart("the clock jumped back");
+    } else if (stream_epoch_ && *stream_epoch_ != message.stream_epoch) {
+      odometry_->breakStream();
+    }
+    last_stamp_ = stamp;
+    stream_epoch_ = message.stream_epoch;
+    return true;
+  }
+
+  void restart(const char* why) {
+    NODELET_WARN_STREAM(why << ": the odometry starts again from the origin");
+    odometry_->reset();
+    last_stamp_.reset();
+    stream_epoch_.reset();
+  }
+
+  /// The camera's place on the robot, read once. Waits a while at first, because static transforms and the first features
+  /// arrive together; then each message asks again.
+  bool findExtrinsic(const std::string& camera_frame) {
+    if (T_base_camera_ && camera_frame == camera_frame_) return true;
+    const std::string base_frame = ros_conversions::cleanFrameId(options_.output.base_frame_id);
+    const auto give_up = ros::WallTime::now() + ros::WallDuration(waited_for_extrinsic_ ? 0.0 : options_.output.tf_timeout);
+    waited_for_extrinsic_ = true;
+    std::string problem;
+    while (!tf_buffer_.canTransform(base_frame, camera_frame, ros::Time(0), &problem)) {
+      if (ros::WallTime::now() >= give_up || !ros::ok()) {
+        NODELET_ERROR_STREAM_THROTTLE(kErrorPeriod, "no transform from camera frame '"
+                                                        << camera_frame << "' to base frame '" << base_frame
+                                                        << "' on TF, no odometry without it: publish it (static) or set "
+                                                           "base_frame_id. "
+                                                        << problem);
+        return false;
+      }
+      ros::WallDuration(0.01).sleep();
+    }
+    T_base_camera_ = tf2::transformToEigen(tf_buffer_.lookupTransform(base_frame, camera_frame, ros::Time(0)));
+    camera_frame_ = camera_frame;
+    warnIfNotOptical();
+    return true;
+  }
+
+  /// An optical frame looks along +z; on a robot that is horizontal more often than up or down.
+  void warnIfNotOptical() {
+    if (T_base_camera_->linear().isIdentity(1e-3))
+      NODELET_WARN_STREAM("camera frame '" << camera_frame_
+                                           << "' has the axes of the base (x forward): an optical frame (z forward, x "
+                                              "right, REP-103) was expected, the odometry will move along the wrong axes");
+  }
+
+  bool onReset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
+    reset_requested_ = true;
+    return true;
+  }
+
+  void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
+    using Level = diagnostic_msgs::DiagnosticStatus;
+    const std::lock_guard<std::mutex> lock(info_mutex_);
+    if (!last_info_) {
+      status.summary(Level::WARN, "no features yet on " + getNodeHandle().resolveName("stereo_features"));
+      return;
+    }
+    const auto level = last_info_->state == "TRACKING" ? Level::OK : last_info_->state == "LOST" ? Level::ERROR : Level::WARN;
+    status.summary(level, last_info_->state + (last_info_->reason.empty() ? "" : ": " + last_info_->reason));
+    status.add("epoch", last_info_->epoch);
+    status.add("features", last_info_->features);
+    status.add("matches", last_info_->matches);
+    status.add("inliers", last_info_->inliers);
+    status.add("rms reprojection error [px]", last_info_->rms_reprojection_error);
+    status.add("distance [m]", last_info_->distance);
+    status.add("latency [s]", last_info_->latency);
+    status.add("dropped pairs", last_info_->dropped_pairs);
+    status.add("dropped feature messages", last_info_->dropped_features);
+    status.add("out of order", last_info_->out_of_order);
+    status.add("malformed", last_info_->malformed);
+  }
+
+  static constexpr double kErrorPeriod = 5.0;  // s between equal errors
+  static constexpr double kClockJump = 1.0;    // s; what is late by less was only overtaken
+
+  Options options_;
+  tf2_ros::Buffer tf_buffer_;
+  std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
+  std::unique_ptr<OdometryPublisher> publisher_;
+  std::unique_ptr<diagnostic_updater::Updater> diagnostics_;
+  ros::WallTimer diagnostics_timer_;
+  ros::ServiceServer reset_service_;
+  std::atomic<bool> reset_requested_{false};
+
+  // Only the worker's thread touches these.
+  std::unique_ptr<VisualOdometry> odometry_;
+  std::optional<Eigen::Isometry3d> T_base_camera_;
+  std::string camera_frame_;
+  bool waited_for_extrinsic_ = false;
+  std::optional<ros::Time> last_stamp_;
+  std::optional<std::uint32_t> stream_epoch_;
+  std::uint64_t out_of_order_ = 0, malformed_ = 0;
+
+  std::mutex info_mutex_;
+  std::optional<stereo_descriptor_vo::VoInfo> last_info_;
+
+  std::unique_ptr<Worker<FeaturesMessagePtr>> worker_;
+  ros::Subscriber subscriber_;
+};
+
+}  // namespace sdvo
+
+PLUGINLIB_EXPORT_CLASS(sdvo::VisualOdometryNodelet, nodelet::Nodelet)

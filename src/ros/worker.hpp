@@ -1,0 +1,75 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+namespace sdvo {
+
+/// One thread that handles items in order, behind a queue of bounded length: when it is full the oldest item is dropped and
+/// counted, so that latency cannot grow and callbacks never wait. The handler must not throw.
+template <class Item>
+class Worker {
+ public:
+  Worker(std::size_t capacity, std::function<void(const Item&)> handle)
+      : capacity_(capacity), handle_(std::move(handle)), thread_([this] { run(); }) {}
+
+  ~Worker() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      stopping_ = true;
+    }
+    wake_.notify_one();
+    thread_.join();
+  }
+
+  Worker(const Worker&) = delete;
+  Worker& operator=(const Worker&) = delete;
+
+  void push(Item item) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (queue_.size() == capacity_) {
+        queue_.pop_front();
+        ++dropped_;
+      }
+      queue_.push_back(std::move(item));
+    }
+    wake_.notify_one();
+  }
+
+  /// Items dropped since the start.
+  std::uint64_t dropped() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return dropped_;
+  }
+
+ private:
+  void run() {
+    for (;;) {
+      std::unique_lock<std::mutex> lock(mutex_);
+      wake_.wait(lock, [this] { return stopping_ || !queue_.empty(); });
+      if (stopping_) return;
+      const Item item = std::move(queue_.front());
+      queue_.pop_front();
+      lock.unlock();
+      handle_(item);
+    }
+  }
+
+  const std::size_t capacity_;
+  const std::function<void(const Item&)> handle_;
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  std::deque<Item> queue_;
+  std::uint64_t dropped_ = 0;
+  bool stopping_ = false;
+  std::thread thread_;  // last: it starts when everything else is there
+};
+
+}  // namespace sdvo
