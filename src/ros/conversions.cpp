@@ -37,7 +37,8 @@ image_geometry::PinholeCameraModel toCameraModel(const sensor_msgs::CameraInfo& 
 
 std::string describeP(const sensor_msgs::CameraInfo& info) {
   std::ostringstream text;
-  text << "fx = " << info.P[0] << ", Tx = " << info.P[3];
+  text << "fx = " << info.P[0] << ", fy = " << info.P[5] << ", cx = " << info.P[2] << ", cy = " << info.P[6]
+       << ", Tx = " << info.P[3];
   return text.str();
 }
 
@@ -73,10 +74,15 @@ std::string cleanFrameId(const std::string& frame_id) {
 StereoCamera toStereoCamera(const sensor_msgs::CameraInfo& left, const sensor_msgs::CameraInfo& right) {
   const image_geometry::PinholeCameraModel left_model = toCameraModel(left, "left");
   const image_geometry::PinholeCameraModel right_model = toCameraModel(right, "right");
-  constexpr double kSameFocalLength = 1e-3;  // px
-  if (std::abs(left_model.fx() - right_model.fx()) > kSameFocalLength)
+  constexpr double kSame = 1e-3;  // px
+  const auto differ = [](double a, double b) { return !(std::abs(a - b) <= kSame); };
+  if (differ(left_model.fx(), right_model.fx()) || differ(left_model.fy(), right_model.fy()))
     throw std::invalid_argument("left and right camera_info have different focal lengths (left " + describeP(left) +
                                 "; right " + describeP(right) + "), the pair is not rectified");
+  // A rectification without CALIB_ZERO_DISPARITY; every depth would be wrong.
+  if (differ(left_model.cx(), right_model.cx()) || differ(left_model.cy(), right_model.cy()))
+    throw std::invalid_argument("left and right camera_info have different principal points (left " + describeP(left) +
+                                "; right " + describeP(right) + "), rectify with zero disparity at infinity");
   StereoCamera camera;
   camera.fx = left_model.fx();
   camera.fy = left_model.fy();
@@ -152,7 +158,8 @@ stereo_descriptor_vo::StereoFeatures toMessage(const StereoFeatures& features, c
   message.sigma = features.sigma;
   message.octave = features.octave;
   CV_Assert(features.descriptors.empty() || features.descriptors.isContinuous());
-  message.descriptors.assign(features.descriptors.datastart, features.descriptors.dataend);
+  const std::uint8_t* rows = features.descriptors.data;  // not datastart: they may be part of a larger matrix
+  message.descriptors.assign(rows, rows + features.descriptors.total() * features.descriptors.elemSize());
   return message;
 }
 
