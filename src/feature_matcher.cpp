@@ -5,6 +5,7 @@
 #include <cstring>
 #include <limits>
 #include <stdexcept>
+#include <type_traits>
 
 // The population count of 64 bits is one instruction on every x86 processor since 2008, but only a function compiled for
 // it may use it; the loader picks the right version.
@@ -17,10 +18,10 @@
 namespace sdvo {
 namespace {
 
-constexpr int kNoDistance = std::numeric_limits<int>::max();
+constexpr float kNoDistance = std::numeric_limits<float>::max();
 
 SDVO_POPCOUNT void hammingDistances(const std::uint8_t* row, const cv::Mat& others, const std::vector<int>& candidates,
-                                    std::vector<int>& distances) {
+                                    std::vector<float>& distances) {
   const int words = others.cols / 8;
   for (std::size_t k = 0; k < candidates.size(); ++k) {
     const std::uint8_t* other = others.ptr(candidates[k]);
@@ -31,8 +32,49 @@ SDVO_POPCOUNT void hammingDistances(const std::uint8_t* row, const cv::Mat& othe
       std::memcpy(&b, other + 8 * w, 8);
       distance += __builtin_popcountll(a ^ b);
     }
-    distances[k] = distance;
+    for (int byte = 8 * words; byte < others.cols; ++byte)
+      distance += __builtin_popcount(static_cast<unsigned>(row[byte] ^ other[byte]));
+    distances[k] = static_cast<float>(distance);
   }
+}
+
+/// Squared L2 distances of rows of whole numbers 0…255 or of floats.
+template <class Element>
+void squaredDistances(const std::uint8_t* row, const cv::Mat& others, const std::vector<int>& candidates,
+                      std::vector<float>& distances) {
+  const int count = others.cols / static_cast<int>(sizeof(Element));
+  const auto* a = reinterpret_cast<const Element*>(row);
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    const auto* b = reinterpret_cast<const Element*>(others.ptr(candidates[k]));
+    using Sum = std::conditional_t<std::is_integral_v<Element>, int, float>;
+    Sum sum = 0;
+    for (int e = 0; e < count; ++e) {
+      const Sum difference = static_cast<Sum>(a[e]) - static_cast<Sum>(b[e]);
+      sum += difference * difference;
+    }
+    distances[k] = static_cast<float>(sum);
+  }
+}
+
+void computeDistances(ElementType type, const std::uint8_t* row, const cv::Mat& others,
+                      const std::vector<int>& candidates, std::vector<float>& distances) {
+  switch (type) {
+    case ElementType::kBits: return hammingDistances(row, others, candidates, distances);
+    case ElementType::kUint8: return squaredDistances<std::uint8_t>(row, others, candidates, distances);
+    case ElementType::kFloat32: return squaredDistances<float>(row, others, candidates, distances);
+  }
+}
+
+/// What turns a distance into a share in [0, 1]: the number of bits, or the sum of both rows' squared lengths (orthogonal
+/// rows of whatever length are at 1 then).
+float distanceUnit(ElementType type, const cv::Mat& a, int row_a, const cv::Mat& b, int row_b) {
+  if (type == ElementType::kBits) return 8.f * static_cast<float>(a.cols);
+  const cv::Mat zeros = cv::Mat::zeros(1, a.cols, CV_8U);
+  std::vector<float> lengths(1);
+  computeDistances(type, a.ptr(row_a), zeros, {0}, lengths);
+  const float length_a = lengths[0];
+  computeDistances(type, b.ptr(row_b), zeros, {0}, lengths);
+  return std::max(length_a + lengths[0], 1e-12f);
 }
 
 /// Rows of a feature set, found by position.
@@ -65,11 +107,9 @@ class PositionGrid {
 };
 
 void checkComparable(const StereoFeatures& a, const StereoFeatures& b) {
-  if (a.descriptor != b.descriptor || a.layout != b.layout || a.descriptors.cols != b.descriptors.cols)
+  if (a.descriptor != b.descriptor || a.element_type != b.element_type || a.layout != b.layout || a.descriptors.cols != b.descriptors.cols)
     throw std::invalid_argument("descriptors cannot be compared: " + a.descriptor + " (" + a.layout + ") against " +
                                 b.descriptor + " (" + b.layout + ")");
-  if (a.element_type != ElementType::kBits || a.descriptors.cols % 8 != 0)
-    throw std::invalid_argument("descriptor " + a.descriptor + " is not made of whole 64-bit words");
 }
 
 }  // namespace
@@ -88,10 +128,11 @@ std::vector<FeatureMatch> FeatureMatcher::match(const StereoFeatures& reference,
 
   struct Nearest {
     int index = -1;
-    int distance = kNoDistance;
+    float distance = kNoDistance;
   };
   std::vector<Nearest> of_reference(reference.count()), of_current(current.count());
-  std::vector<int> found, distances(current.count());
+  std::vector<int> found;
+  std::vector<float> distances(current.count());
   for (int i = 0; i < reference.count(); ++i) {
     if (gated) {
       const Eigen::Vector3d point = *T_current_reference * reference.point(i);
@@ -101,7 +142,7 @@ std::vector<FeatureMatch> FeatureMatcher::match(const StereoFeatures& reference,
       grid.findWithin(predicted.x(), predicted.y(), options_.gate_radius, found);
     }
     const std::vector<int>& candidates = gated ? found : everything;
-    hammingDistances(reference.descriptors.ptr(i), current.descriptors, candidates, distances);
+    computeDistances(reference.element_type, reference.descriptors.ptr(i), current.descriptors, candidates, distances);
     for (std::size_t k = 0; k < candidates.size(); ++k) {
       const int j = candidates[k];
       if (distances[k] < of_reference[i].distance) of_reference[i] = {j, distances[k]};
@@ -109,12 +150,12 @@ std::vector<FeatureMatch> FeatureMatcher::match(const StereoFeatures& reference,
     }
   }
 
-  const double bits = 8.0 * reference.descriptors.cols;
   std::vector<FeatureMatch> matches;
   for (int i = 0; i < reference.count(); ++i) {
     const auto& [j, distance] = of_reference[i];
-    if (j < 0 || of_current[j].index != i || distance > options_.max_distance * bits) continue;
-    matches.push_back({i, j, static_cast<float>(distance / bits)});
+    if (j < 0 || of_current[j].index != i) continue;
+    const float share = distance / distanceUnit(reference.element_type, reference.descriptors, i, current.descriptors, j);
+    if (share <= options_.max_distance) matches.push_back({i, j, share});
   }
   return matches;
 }

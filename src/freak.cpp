@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <opencv2/imgproc.hpp>
 
 namespace sdvo {
 namespace {
@@ -79,24 +78,7 @@ bool Freak::fits(const FreakKeypoint& keypoint, cv::Size image_size) {
          keypoint.u + r <= image_size.width - 0.5 && keypoint.v + r <= image_size.height - 0.5;
 }
 
-Freak::Freak(const cv::Mat& image) {
-  CV_Assert(image.type() == CV_8UC1);
-  cv::integral(image, integral_, CV_32S);
-}
-
-double Freak::boxSum(double x0, double y0, double x1, double y1) const {
-  // Pixel p covers [p - 0.5, p + 0.5]; interpolating the integral linearly gives the exact area-weighted sum.
-  const auto at = [this](double x, double y) {
-    const double column = x + 0.5, row = y + 0.5;
-    const int c = std::clamp(static_cast<int>(column), 0, integral_.cols - 2);
-    const int r = std::clamp(static_cast<int>(row), 0, integral_.rows - 2);
-    const double a = column - c, b = row - r;
-    const int* upper = integral_.ptr<int>(r) + c;
-    const int* lower = integral_.ptr<int>(r + 1) + c;
-    return (1.0 - b) * ((1.0 - a) * upper[0] + a * upper[1]) + b * ((1.0 - a) * lower[0] + a * lower[1]);
-  };
-  return at(x1, y1) - at(x0, y1) - at(x1, y0) + at(x0, y0);
-}
+Freak::Freak(const cv::Mat& image) : image_(image) {}
 
 std::array<float, Freak::kFields> Freak::intensities(const FreakKeypoint& keypoint) const {
   constexpr double kSmallestHalfSide = 0.5;  // one pixel
@@ -109,7 +91,7 @@ std::array<float, Freak::kFields> Freak::intensities(const FreakKeypoint& keypoi
     const double x = keypoint.u + cosine * field.x - sine * field.y;
     const double y = keypoint.v + sine * field.x + cosine * field.y;
     const double half = std::max(field.sigma * scale, kSmallestHalfSide);
-    means[i] = static_cast<float>(boxSum(x - half, y - half, x + half, y + half) / (4.0 * half * half));
+    means[i] = static_cast<float>(image_.boxMean(x, y, half));
   }
   return means;
 }

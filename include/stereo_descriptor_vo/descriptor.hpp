@@ -1,9 +1,11 @@
 #pragma once
 
+#include <memory>
 #include <opencv2/core.hpp>
 #include <string>
 #include <vector>
 
+#include "stereo_descriptor_vo/base_descriptor.hpp"
 #include "stereo_descriptor_vo/options.hpp"
 #include "stereo_descriptor_vo/stereo_features.hpp"
 
@@ -14,11 +16,7 @@ struct DescriptorOptions {
   std::string layout = "left+right";
   bool oriented = false;
 
-  void describe(OptionList& list) {
-    list.add("type", type, {"freak"}, "base descriptor");
-    list.add("layout", layout, {"left", "left+right"}, "one view, or the left half followed by the right half");
-    list.add("oriented", oriented, "turn the pattern to the left view's orientation (both halves by the same angle)");
-  }
+  void describe(OptionList& list);
 };
 
 /// A key point seen in both views, as the stereo descriptor needs it.
@@ -44,11 +42,12 @@ class StereoDescriptor {
   DescribedKeypoints describe(const cv::Mat& left, const cv::Mat& right,
                               const std::vector<StereoKeypoint>& keypoints) const;
 
-  ElementType elementType() const { return ElementType::kBits; }
+  ElementType elementType() const { return base_->elementType(); }
   const DescriptorOptions& options() const { return options_; }
 
  private:
   DescriptorOptions options_;
+  std::unique_ptr<BaseDescriptor> base_;
 };
 
 }  // namespace sdvo

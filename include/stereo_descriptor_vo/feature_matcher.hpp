@@ -18,7 +18,7 @@ struct FeatureMatcherOptions {
     list.add("gating", gating, "compare only near the position that the predicted motion gives");
     list.add("gate_radius", gate_radius, {1.0, 2000.0}, "px", "radius of that search around the predicted left position");
     list.add("max_distance", max_distance, {0.01, 1.0}, "",
-             "largest share of differing bits between matched descriptors");
+             "largest distance of matched descriptors: share of differing bits, or |a - b|^2 / (|a|^2 + |b|^2)");
   }
 };
 
@@ -26,7 +26,7 @@ struct FeatureMatcherOptions {
 struct FeatureMatch {
   int reference;   ///< row in the reference set
   int current;     ///< row in the current set
-  float distance;  ///< share of differing bits
+  float distance;  ///< in [0, 1]: share of differing bits, or |a - b|^2 / (|a|^2 + |b|^2)
 };
 
 /// Mutual nearest neighbours between the descriptors of two camera positions.

@@ -5,6 +5,8 @@
 #include <utility>
 #include <vector>
 
+#include "stereo_descriptor_vo/integral_image.hpp"
+
 namespace sdvo {
 
 /// A key point as a descriptor needs it.
@@ -58,9 +60,7 @@ class Freak {
  private:
   static constexpr double kReachPerSize = 22.0 / 7.0;
 
-  double boxSum(double x0, double y0, double x1, double y1) const;
-
-  cv::Mat integral_;  ///< (rows + 1) x (cols + 1), CV_32S
+  IntegralImage image_;
 };
 
 }  // namespace sdvo

@@ -42,7 +42,7 @@ struct StereoFeatures {
   std::vector<float> response;   ///< detector's score
   std::vector<float> sigma;      ///< standard deviation of the position, px
   std::vector<std::uint8_t> octave;
-  cv::Mat descriptors;  ///< rows x bytes (CV_8U), or rows x elements (CV_32F) for ElementType::kFloat32
+  cv::Mat descriptors;  ///< rows x bytes, CV_8U; elements wider than a byte in the machine's own order
 
   ExtractionReport report;
 
