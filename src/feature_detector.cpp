@@ -3,20 +3,57 @@
 #include <algorithm>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
+#include <stdexcept>
 #include <tuple>
+
+// SIFT moved from the non-free modules to features2d in 4.4.
+#define SDVO_HAVE_SIFT (CV_VERSION_MAJOR > 4 || (CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR >= 4))
 
 namespace sdvo {
 namespace {
+
+std::vector<Corner> toCorners(const std::vector<cv::KeyPoint>& keypoints) {
+  std::vector<Corner> corners;
+  corners.reserve(keypoints.size());
+  for (const cv::KeyPoint& keypoint : keypoints) corners.push_back({keypoint.pt, keypoint.response});
+  return corners;
+}
 
 /// The score of a FAST corner is the highest threshold at which it still is one. One pass at the lowest threshold, ranked
 /// by score inside each bucket, therefore equals running every bucket at its own adaptive threshold.
 std::vector<Corner> detectFast(const cv::Mat& image, const FeatureDetectorOptions& options) {
   std::vector<cv::KeyPoint> keypoints;
   cv::FAST(image, keypoints, options.fast_min_threshold, true);
-  std::vector<Corner> corners;
-  corners.reserve(keypoints.size());
-  for (const cv::KeyPoint& keypoint : keypoints) corners.push_back({keypoint.pt, keypoint.response});
-  return corners;
+  return toCorners(keypoints);
+}
+
+/// The same for AGAST, whose score has the same meaning.
+std::vector<Corner> detectAgast(const cv::Mat& image, const FeatureDetectorOptions& options) {
+  std::vector<cv::KeyPoint> keypoints;
+  cv::AGAST(image, keypoints, options.fast_min_threshold, true);
+  return toCorners(keypoints);
+}
+
+/// Detectors of OpenCV's with a scale space of their own: positions and scores are taken, the sizes come from the depth.
+/// More are asked for than wanted, so that the buckets have a choice.
+std::vector<Corner> detectInScaleSpace(const cv::Mat& image, const FeatureDetectorOptions& options) {
+  constexpr int kChoice = 4;
+  std::vector<cv::KeyPoint> keypoints;
+  cv::Ptr<cv::Feature2D> detector;
+  if (options.type == "orb") {
+    detector = cv::ORB::create(kChoice * options.max_features, 1.2f, 8, 31, 0, 2, cv::ORB::HARRIS_SCORE, 31,
+                               options.fast_min_threshold);
+  } else {
+#if SDVO_HAVE_SIFT
+    constexpr double kLooseContrast = 0.005;
+    detector = cv::SIFT::create(kChoice * options.max_features, 3, kLooseContrast);
+#else
+    throw std::invalid_argument("detector/type 'sift' is not in this OpenCV (" CV_VERSION
+                                "): OpenCV 4.4 and later have it in features2d");
+#endif
+  }
+  detector->detect(image, keypoints);
+  return toCorners(keypoints);
 }
 
 /// Local maxima of the gradient matrix' smaller eigenvalue (gftt) or of Harris' measure, as in cv::goodFeaturesToTrack,
@@ -24,14 +61,17 @@ std::vector<Corner> detectFast(const cv::Mat& image, const FeatureDetectorOption
 std::vector<Corner> detectGradientCorners(const cv::Mat& image, const FeatureDetectorOptions& options) {
   constexpr double kHarrisK = 0.04;
   cv::Mat response, neighbourhood_maximum;
-  if (options.type == "harris")
+  double quality = options.corner_quality;
+  if (options.type == "harris") {
     cv::cornerHarris(image, response, options.corner_block_size, 3, kHarrisK);
-  else
+    quality *= quality;  // Harris' measure is of the order of the eigenvalue squared
+  } else {
     cv::cornerMinEigenVal(image, response, options.corner_block_size, 3);
+  }
   cv::dilate(response, neighbourhood_maximum, cv::Mat());
   double strongest = 0.0;
   cv::minMaxLoc(response, nullptr, &strongest);
-  const float weakest = static_cast<float>(strongest * options.corner_quality);
+  const float weakest = static_cast<float>(strongest * quality);
 
   std::vector<Corner> corners;
   for (int y = 1; y + 1 < image.rows; ++y) {
@@ -41,6 +81,13 @@ std::vector<Corner> detectGradientCorners(const cv::Mat& image, const FeatureDet
       if (here[x] > weakest && here[x] == maximum[x]) corners.push_back({cv::Point2f(x, y), here[x]});
   }
   return corners;
+}
+
+std::vector<Corner> detectAll(const cv::Mat& image, const FeatureDetectorOptions& options) {
+  if (options.type == "fast") return detectFast(image, options);
+  if (options.type == "agast") return detectAgast(image, options);
+  if (options.type == "gftt" || options.type == "harris") return detectGradientCorners(image, options);
+  return detectInScaleSpace(image, options);
 }
 
 /// Foerstner's intersection of gradient lines; a corner that wanders off is not one point, its integer position is kept.
@@ -99,8 +146,7 @@ FeatureDetector::FeatureDetector(const FeatureDetectorOptions& options) : option
 
 std::vector<Corner> FeatureDetector::detect(const cv::Mat& image) const {
   CV_Assert(image.type() == CV_8UC1);
-  std::vector<Corner> corners =
-      options_.type == "fast" ? detectFast(image, options_) : detectGradientCorners(image, options_);
+  std::vector<Corner> corners = detectAll(image, options_);
   corners = spreadOverBuckets(std::move(corners), image.size(), options_.bucket_size, options_.max_features);
   if (options_.subpixel) refinePositions(image, options_.subpixel_radius, corners);
   return corners;

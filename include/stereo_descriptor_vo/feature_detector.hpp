@@ -19,11 +19,11 @@ struct FeatureDetectorOptions {
   int subpixel_radius = 3;
 
   void describe(OptionList& list) {
-    list.add("type", type, {"fast", "gftt", "harris"}, "corner detector");
+    list.add("type", type, {"fast", "agast", "gftt", "harris", "orb", "sift"}, "corner detector");
     list.add("max_features", max_features, {1, 20000}, "", "corners kept per left image");
     list.add("bucket_size", bucket_size, {8, 4096}, "px", "side of the square buckets that share the corners evenly");
     list.add("fast_min_threshold", fast_min_threshold, {1, 100}, "grey levels",
-             "weakest FAST corner considered; each bucket's own threshold adapts upwards from here");
+             "fast, agast, orb: weakest corner considered; each bucket's own threshold adapts upwards from here");
     list.add("corner_quality", corner_quality, {1e-6, 1.0}, "", "gftt, harris: weakest response relative to the best");
     list.add("corner_block_size", corner_block_size, {3, 31}, "px", "gftt, harris: window of the gradient matrix");
     list.add("subpixel", subpixel, "refine corners to sub-pixel positions");
