@@ -20,7 +20,7 @@ struct StereoMatcherOptions {
     list.add("max_backward_error", max_backward_error, {0.05, 5.0}, "px",
              "largest distance between a corner and its track to the right image and back");
     list.add("max_epipolar_residual", max_epipolar_residual, {0.1, 10.0}, "px",
-             "largest |v_right - v_left|; KITTI's rectification really leaves up to 1.3");
+             "largest difference of the rows in both views; KITTI's rectification really leaves up to 1.3");
     list.add("min_disparity", min_disparity, {0.01, 50.0}, "px", "smallest disparity of a point at finite depth");
   }
 };

@@ -5,21 +5,8 @@
 #include <algorithm>
 #include <stdexcept>
 
-#include "../ros/nodelet_options.hpp"
-
 namespace sdvo {
 namespace {
-
-/// Parameters that the nodelets read beside the core's options; a file that holds them is no error here.
-struct NodeletOptions {
-  StereoInputOptions stereo_features;
-  OdometryOutputOptions visual_odometry;
-
-  void describe(OptionList& list) {
-    list.group("stereo_features", stereo_features);
-    list.group("visual_odometry", visual_odometry);
-  }
-};
 
 bool belongsToNodelet(const std::string& path) {
   NodeletOptions options;

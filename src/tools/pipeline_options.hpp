@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "../ros/nodelet_options.hpp"
 #include "stereo_descriptor_vo/feature_extractor.hpp"
 #include "stereo_descriptor_vo/visual_odometry.hpp"
 
@@ -12,6 +13,17 @@ namespace sdvo {
 struct PipelineOptions {
   FeatureExtractorOptions stereo_features;
   VisualOdometryOptions visual_odometry;
+
+  void describe(OptionList& list) {
+    list.group("stereo_features", stereo_features);
+    list.group("visual_odometry", visual_odometry);
+  }
+};
+
+/// What the nodelets read beside the core's options; a YAML file that holds them is no error for the tools.
+struct NodeletOptions {
+  StereoInputOptions stereo_features;
+  OdometryOutputOptions visual_odometry;
 
   void describe(OptionList& list) {
     list.group("stereo_features", stereo_features);

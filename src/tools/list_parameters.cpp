@@ -1,0 +1,48 @@
+// Prints the parameters of both nodelets as Markdown tables, from the option structs that hold them.
+#include <CLI/CLI.hpp>
+#include <iostream>
+#include <sstream>
+
+#include "pipeline_options.hpp"
+#include "run_tool.hpp"
+
+namespace {
+
+std::string rangeOf(const sdvo::Option& option) {
+  std::ostringstream text;
+  if (std::holds_alternative<bool*>(option.value)) return "true, false";
+  for (const std::string& choice : option.choices) text << (text.tellp() > 0 ? ", " : "") << choice;
+  if (!std::holds_alternative<std::string*>(option.value)) text << option.range.min << " … " << option.range.max;
+  return text.str();
+}
+
+void printTable(const std::string& nodelet, const std::vector<sdvo::Option>& options) {
+  const std::string prefix = nodelet + "/";
+  std::cout << "| parameter | default | unit | range | meaning |\n| --- | --- | --- | --- | --- |\n";
+  for (const sdvo::Option& option : options)
+    if (option.name.compare(0, prefix.size(), prefix) == 0)
+      std::cout << "| `" << option.name.substr(prefix.size()) << "` | " << option.text() << " | " << option.unit << " | "
+                << rangeOf(option) << " | " << option.meaning << " |\n";
+}
+
+int run() {
+  sdvo::PipelineOptions core;
+  sdvo::NodeletOptions nodelets;
+  std::vector<sdvo::Option> options = sdvo::listOptions(nodelets);
+  for (const sdvo::Option& option : sdvo::listOptions(core)) options.push_back(option);
+
+  std::cout << "# Parameters\n\nPrivate parameters of the two nodelets, made by `rosrun stereo_descriptor_vo "
+               "list_parameters > docs/parameters.md` from the\noption structs, the only place where defaults stand.\n\n"
+               "## stereo_features\n\n";
+  printTable("stereo_features", options);
+  std::cout << "\n## visual_odometry\n\n";
+  printTable("visual_odometry", options);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Prints the nodelets' parameters, defaults, units and ranges as Markdown");
+  return sdvo::runTool(app, argc, argv, run);
+}
