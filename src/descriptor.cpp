@@ -15,11 +15,6 @@ void orient(const cv::Mat& image, std::vector<ViewKeypoint>& keypoints) {
   }
 }
 
-float toHalfOpenCircle(float angle) {
-  constexpr float kPi = static_cast<float>(CV_PI);
-  return angle > kPi ? angle - 2.f * kPi : angle;
-}
-
 }  // namespace
 
 void DescriptorOptions::describe(OptionList& list) {
@@ -51,7 +46,7 @@ DescribedKeypoints StereoDescriptor::describe(const cv::Mat& left, const cv::Mat
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
     if (!left_half.valid[i] || !right_half.valid[i]) continue;
     described.index.push_back(static_cast<int>(i));
-    described.angle.push_back(in_left[i].angle < 0.f ? -1.f : toHalfOpenCircle(in_left[i].angle));
+    described.angle.push_back(in_left[i].angle);
   }
   const bool both = options_.layout == "left+right";
   const int bytes = base_->bytes(), count = static_cast<int>(described.index.size());

@@ -91,9 +91,10 @@ std::vector<Corner> detectAll(const cv::Mat& image, const FeatureDetectorOptions
 }
 
 /// Foerstner's intersection of gradient lines; a corner that wanders off is not one point, its integer position is kept.
-void refinePositions(const cv::Mat& image, int radius, std::vector<Corner>& corners) {
+/// Gradient detectors answer up to half their window inside of a corner, hence the limit.
+void refinePositions(const cv::Mat& image, int radius, float largest_shift, std::vector<Corner>& corners) {
   if (corners.empty()) return;
-  constexpr float kLargestShift = 1.5f;  // px
+  const cv::Rect2f inside(0.f, 0.f, static_cast<float>(image.cols - 1), static_cast<float>(image.rows - 1));
   std::vector<cv::Point2f> positions;
   positions.reserve(corners.size());
   for (const Corner& corner : corners) positions.push_back(corner.position);
@@ -101,7 +102,8 @@ void refinePositions(const cv::Mat& image, int radius, std::vector<Corner>& corn
                    cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 10, 0.02));
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const cv::Point2f shift = positions[i] - corners[i].position;
-    if (std::max(std::abs(shift.x), std::abs(shift.y)) <= kLargestShift) corners[i].position = positions[i];
+    if (inside.contains(positions[i]) && std::max(std::abs(shift.x), std::abs(shift.y)) <= largest_shift)
+      corners[i].position = positions[i];
   }
 }
 
@@ -148,7 +150,11 @@ std::vector<Corner> FeatureDetector::detect(const cv::Mat& image) const {
   CV_Assert(image.type() == CV_8UC1);
   std::vector<Corner> corners = detectAll(image, options_);
   corners = spreadOverBuckets(std::move(corners), image.size(), options_.bucket_size, options_.max_features);
-  if (options_.subpixel) refinePositions(image, options_.subpixel_radius, corners);
+  if (options_.subpixel) {
+    const bool gradient = options_.type == "gftt" || options_.type == "harris";
+    const float largest_shift = gradient ? 0.5f * static_cast<float>(options_.corner_block_size) : 1.5f;  // px
+    refinePositions(image, options_.subpixel_radius, largest_shift, corners);
+  }
   return corners;
 }
 

@@ -42,7 +42,7 @@ constexpr float kCornerSigma = 0.3f;
 }  // namespace
 
 FeatureExtractor::FeatureExtractor(const FeatureExtractorOptions& options)
-    : options_(options),
+    : options_(checked(options)),
       detector_(options.detector),
       stereo_matcher_(options.stereo),
       depth_scale_(options.size_curve),

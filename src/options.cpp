@@ -13,11 +13,17 @@ namespace sdvo {
 namespace {
 
 std::string toText(double value) {
-  std::ostringstream stream;
-  stream.imbue(std::locale::classic());
-  stream.precision(std::numeric_limits<double>::max_digits10 - 2);
-  stream << value;
-  return stream.str();
+  for (int digits = std::numeric_limits<double>::digits10;; ++digits) {
+    std::ostringstream stream;
+    stream.imbue(std::locale::classic());
+    stream.precision(digits);
+    stream << value;
+    if (digits >= std::numeric_limits<double>::max_digits10) return stream.str();
+    std::istringstream back(stream.str());
+    back.imbue(std::locale::classic());
+    double again = 0.0;
+    if (back >> again && again == value) return stream.str();
+  }
 }
 
 std::string join(const std::vector<std::string>& words) {
@@ -118,8 +124,14 @@ void setOption(std::vector<Option>& options, const std::string& name, const std:
   if (found == options.end()) throw std::invalid_argument("there is no option '" + name + "'");
   if (std::find_if(found + 1, options.end(), matches) != options.end())
     throw std::invalid_argument("option '" + name + "' is ambiguous, give its full path such as " + found->name);
-  found->set(text);
-  found->check();
+  const std::string before = found->text();
+  try {
+    found->set(text);
+    found->check();
+  } catch (const std::invalid_argument&) {
+    found->set(before);
+    throw;
+  }
 }
 
 std::string hashOptions(const std::vector<Option>& options) {

@@ -68,7 +68,13 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features) {
   if (state_.last_stamp && features.stamp <= *state_.last_stamp)
     throw std::invalid_argument("stamp " + std::to_string(features.stamp) + " ns is not later than the last one, " +
                                 std::to_string(*state_.last_stamp) + " ns");
-  if (state_.reference && state_.reference->features.camera != features.camera) breakStream();
+  if (state_.reference) {
+    const StereoFeatures& last = state_.reference->features;
+    if (last.camera != features.camera ||
+        (features.count() > 0 && (last.descriptor != features.descriptor || last.layout != features.layout ||
+                                  last.descriptors.cols != features.descriptors.cols)))
+      breakStream();
+  }
 
   OdometryResult result;
   result.stamp = features.stamp;
@@ -139,7 +145,8 @@ OdometryResult VisualOdometry::follow(OdometryResult result, const StereoFeature
 
   result.state = TrackingState::kTracking;
   advance(result, since_previous(), motion.covariance);
-  state_.velocity = logSE3(result.T_previous_current) / result.dt;
+  const double since_reference = static_cast<double>(features.stamp - state_.reference->features.stamp) * 1e-9;
+  state_.velocity = logSE3(motion.T_current_reference.inverse()) / since_reference;
   state_.predicted_pairs = 0;
   state_.reference = Reference{features, state_.T_origin_camera, state_.pairs};
   return result;

@@ -27,7 +27,9 @@ inline std::string errorOf(const std::function<void()>& action) {
 }
 
 /// A rig like KITTI's at a size that renders quickly.
-inline StereoCamera camera() { return {400.0, 410.0, 322.5, 236.25, 0.5, 640, 480}; }
+inline StereoCamera camera() {
+  return {400.0, 410.0, 322.5, 236.25, 0.5, 640, 480};
+}
 
 /// A smooth random function of the plane: sinusoids in random directions, the same power in every octave between two
 /// wavelengths. It can be evaluated anywhere, and sampling it at less than half the shortest wavelength loses nothing,
@@ -125,7 +127,8 @@ inline void addFeature(StereoFeatures& features, double u, double v, double disp
   features.response.push_back(1.f);
   features.sigma.push_back(0.3f);
   features.octave.push_back(0);
-  features.descriptors.push_back(cv::Mat(1, static_cast<int>(row.size()), CV_8U, const_cast<std::uint8_t*>(row.data())));
+  features.descriptors.push_back(
+      cv::Mat(1, static_cast<int>(row.size()), CV_8U, const_cast<std::uint8_t*>(row.data())));
 }
 
 /// Points with a descriptor of their own each.

@@ -1,7 +1,6 @@
-#include "stereo_descriptor_vo/depth_scale.hpp"
-
 #include <gtest/gtest.h>
 
+#include "stereo_descriptor_vo/depth_scale.hpp"
 #include "stereo_descriptor_vo/stereo_camera.hpp"
 #include "synthetic_scene.hpp"
 

@@ -1,7 +1,6 @@
-#include "stereo_descriptor_vo/descriptor.hpp"
-
 #include <gtest/gtest.h>
 
+#include "stereo_descriptor_vo/descriptor.hpp"
 #include "stereo_descriptor_vo/freak.hpp"
 #include "synthetic_scene.hpp"
 
@@ -24,7 +23,7 @@ DescriptorOptions withLayout(const std::string& layout, bool oriented = false) {
 
 /// With a reach of 22 px: fits, leaves the left view, leaves the right view, fits, leaves it at the bottom, fits.
 std::vector<StereoKeypoint> mixedKeypoints() {
-  return {{100.25f, 90.f, 80.f, 90.4f, 7.f}, {310.f, 90.f, 280.f, 90.f, 7.f},    {40.f, 60.f, 10.f, 60.f, 7.f},
+  return {{100.25f, 90.f, 80.f, 90.4f, 7.f}, {310.f, 90.f, 280.f, 90.f, 7.f},   {40.f, 60.f, 10.f, 60.f, 7.f},
           {200.f, 50.f, 150.5f, 50.f, 7.f},  {200.f, 190.f, 150.f, 190.f, 7.f}, {60.f, 100.f, 50.f, 101.f, 9.6f}};
 }
 
@@ -40,7 +39,8 @@ TEST(StereoDescriptor, RowsStayAlignedWhenNeighbourhoodsLeaveAView) {
     ASSERT_EQ(described.angle, std::vector<float>(3, -1.f));
     for (int row = 0; row < described.rows.rows; ++row) {
       // The row of a key point is that of the key point alone.
-      const StereoKeypoint& keypoint = keypoints[static_cast<std::size_t>(described.index[static_cast<std::size_t>(row)])];
+      const StereoKeypoint& keypoint =
+          keypoints[static_cast<std::size_t>(described.index[static_cast<std::size_t>(row)])];
       const DescribedKeypoints alone = StereoDescriptor(withLayout(layout)).describe(left, right, {keypoint});
       EXPECT_TRUE(synthetic::equalMats(described.rows.row(row), alone.rows)) << layout << " row " << row;
     }
@@ -79,14 +79,16 @@ TEST(StereoDescriptor, HalvesOfEqualViewsAreEqual) {
 TEST(StereoDescriptor, OrientedHalvesTurnByTheLeftAngle) {
   const cv::Mat left = view(1), right = view(2);
   const std::vector<StereoKeypoint> keypoints = mixedKeypoints();
-  const DescribedKeypoints described = StereoDescriptor(withLayout("left+right", true)).describe(left, right, keypoints);
+  const DescribedKeypoints described =
+      StereoDescriptor(withLayout("left+right", true)).describe(left, right, keypoints);
   ASSERT_EQ(described.index, kFitting);
   const Freak left_view(left), right_view(right);
   for (std::size_t row = 0; row < described.index.size(); ++row) {
     const StereoKeypoint& k = keypoints[static_cast<std::size_t>(described.index[row])];
     const float angle = left_view.orientation({k.u_left, k.v_left, k.size, -1.f});
     EXPECT_NEAR(std::remainder(described.angle[row] - angle, 2.0 * CV_PI), 0.0, 1e-5);
-    EXPECT_LE(std::abs(described.angle[row]), static_cast<float>(CV_PI));
+    EXPECT_GE(described.angle[row], 0.f);
+    EXPECT_LT(described.angle[row], static_cast<float>(2.0 * CV_PI));
     cv::Mat expected(1, 2 * Freak::kBytes, CV_8U);
     left_view.describe({k.u_left, k.v_left, k.size, angle}, expected.ptr());
     right_view.describe({k.u_right, k.v_right, k.size, angle}, expected.ptr() + Freak::kBytes);

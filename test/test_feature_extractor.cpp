@@ -1,9 +1,8 @@
-#include "stereo_descriptor_vo/feature_extractor.hpp"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
+#include "stereo_descriptor_vo/feature_extractor.hpp"
 #include "synthetic_scene.hpp"
 
 namespace sdvo {

@@ -1,9 +1,8 @@
-#include "stereo_descriptor_vo/feature_matcher.hpp"
-
 #include <gtest/gtest.h>
 
 #include <set>
 
+#include "stereo_descriptor_vo/feature_matcher.hpp"
 #include "stereo_descriptor_vo/se3.hpp"
 #include "synthetic_scene.hpp"
 
@@ -23,7 +22,8 @@ FeatureMatcherOptions withoutGate() {
 /// The row with its first `count` bits turned over.
 std::vector<std::uint8_t> flipped(std::vector<std::uint8_t> row, int count) {
   for (int bit = 0; bit < count; ++bit)
-    row[static_cast<std::size_t>(bit / 8)] = static_cast<std::uint8_t>(row[static_cast<std::size_t>(bit / 8)] ^ (1 << (bit % 8)));
+    row[static_cast<std::size_t>(bit / 8)] =
+        static_cast<std::uint8_t>(row[static_cast<std::size_t>(bit / 8)] ^ (1 << (bit % 8)));
   return row;
 }
 
@@ -46,9 +46,12 @@ TEST(FeatureMatcher, FindsShuffledFeaturesAmongStrangers) {
   // Two rows of one point differ by 2 * 0.05 * 0.95 of their bits, strangers by half, six standard deviations from 0.3.
   EXPECT_EQ(static_cast<int>(matches.size()), common);
   for (const FeatureMatch& match : matches) {
-    EXPECT_EQ(reference.u[static_cast<std::size_t>(match.reference)], current.u[static_cast<std::size_t>(match.current)]);
-    EXPECT_NEAR(match.distance, synthetic::differingBits(reference.descriptors.row(match.reference),
-                                                         current.descriptors.row(match.current)), 1e-6);
+    EXPECT_EQ(reference.u[static_cast<std::size_t>(match.reference)],
+              current.u[static_cast<std::size_t>(match.current)]);
+    EXPECT_NEAR(
+        match.distance,
+        synthetic::differingBits(reference.descriptors.row(match.reference), current.descriptors.row(match.current)),
+        1e-6);
   }
 }
 

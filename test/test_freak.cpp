@@ -1,10 +1,9 @@
-#include "stereo_descriptor_vo/freak.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <set>
 
+#include "stereo_descriptor_vo/freak.hpp"
 #include "synthetic_scene.hpp"
 
 namespace sdvo {
@@ -22,7 +21,9 @@ cv::Mat randomImage(cv::Size size) {
   return image;
 }
 
-double overlap(double a0, double a1, double b0, double b1) { return std::max(0.0, std::min(a1, b1) - std::max(a0, b0)); }
+double overlap(double a0, double a1, double b0, double b1) {
+  return std::max(0.0, std::min(a1, b1) - std::max(a0, b0));
+}
 
 /// Mean over a box, pixel by pixel: pixel p covers [p - 0.5, p + 0.5].
 double boxMean(const cv::Mat& image, double x, double y, double half) {
@@ -45,7 +46,8 @@ TEST(Freak, PairsAreDistinctAndValid) {
   EXPECT_EQ(distinct.size(), 512u);
 
   std::set<std::pair<int, int>> candidates;
-  for (const Freak::FieldPair& pair : Freak::candidatePairs()) candidates.insert(std::minmax<int>(pair.first, pair.second));
+  for (const Freak::FieldPair& pair : Freak::candidatePairs())
+    candidates.insert(std::minmax<int>(pair.first, pair.second));
   EXPECT_EQ(candidates.size(), 43u * 42u / 2u);
   EXPECT_EQ(Freak::candidatePairs().size(), candidates.size());
 }
@@ -123,7 +125,8 @@ double bitsAtTwiceTheDistance(float near_size, float far_size, bool oriented = f
   int count = 0;
   for (double x = -3.1; x < 3.1; x += 0.37)
     for (double y = -2.0; y < 2.0; y += 0.41) {
-      const Eigen::Vector3d near_pixel = camera.project({x, y, kDepth}), far_pixel = camera.project({x, y, 2.0 * kDepth});
+      const Eigen::Vector3d near_pixel = camera.project({x, y, kDepth}),
+                            far_pixel = camera.project({x, y, 2.0 * kDepth});
       FreakKeypoint a{static_cast<float>(near_pixel.x()), static_cast<float>(near_pixel.y()), near_size, -1.f};
       FreakKeypoint b{static_cast<float>(far_pixel.x()), static_cast<float>(far_pixel.y()), far_size, -1.f};
       if (!Freak::fits(a, {camera.width, camera.height}) || !Freak::fits(b, {camera.width, camera.height})) continue;
@@ -227,8 +230,9 @@ TEST(Freak, FitsEndsExactlyAtTheBorders) {
     EXPECT_TRUE(Freak::fits({inside.x, inside.y, keypoint_size, -1.f}, size)) << inside;
   const float below = std::nextafter(low, 0.f), beyond_right = std::nextafter(right, 100.f),
               beyond_bottom = std::nextafter(bottom, 100.f);
-  for (const cv::Point2f& outside : {cv::Point2f(below, 40.f), cv::Point2f(50.f, below), cv::Point2f(beyond_right, 40.f),
-                                     cv::Point2f(50.f, beyond_bottom), cv::Point2f(-5.f, -5.f)})
+  for (const cv::Point2f& outside :
+       {cv::Point2f(below, 40.f), cv::Point2f(50.f, below), cv::Point2f(beyond_right, 40.f),
+        cv::Point2f(50.f, beyond_bottom), cv::Point2f(-5.f, -5.f)})
     EXPECT_FALSE(Freak::fits({outside.x, outside.y, keypoint_size, -1.f}, size)) << outside;
   EXPECT_FALSE(Freak::fits({50.f, 40.f, std::nextafter(40.f * 7.f / 22.f, 100.f) + 0.2f, -1.f}, size));
   EXPECT_FALSE(Freak::fits({50.f, 40.f, 0.f, -1.f}, size));
@@ -241,7 +245,8 @@ TEST(Freak, FieldsOfAFittingKeypointStayInsideAtAnyAngle) {
   const cv::Mat white(80, 100, CV_8U, cv::Scalar(200));
   const Freak freak(white);
   for (float angle = 0.f; angle < 6.28f; angle += 0.1f)
-    for (const FreakKeypoint& keypoint : {FreakKeypoint{21.5f, 21.5f, 7.f, angle}, FreakKeypoint{77.5f, 57.5f, 7.f, angle}})
+    for (const FreakKeypoint& keypoint :
+         {FreakKeypoint{21.5f, 21.5f, 7.f, angle}, FreakKeypoint{77.5f, 57.5f, 7.f, angle}})
       for (const float mean : freak.intensities(keypoint)) EXPECT_NEAR(mean, 200.f, 1e-3f) << "angle " << angle;
 }
 

@@ -1,11 +1,10 @@
-#include "stereo_descriptor_vo/motion_estimator.hpp"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
 #include <iterator>
 #include <limits>
 
+#include "stereo_descriptor_vo/motion_estimator.hpp"
 #include "synthetic_scene.hpp"
 
 namespace sdvo {
@@ -87,9 +86,9 @@ TEST(MotionEstimator, JacobianIsTheDerivative) {
     const Eigen::Matrix<double, 3, 6> jacobian = motionJacobian(camera, trueMotion(), point);
     for (int axis = 0; axis < 6; ++axis) {
       const Vector6d step = kStep * Vector6d::Unit(axis);
-      const Eigen::Vector3d difference = (camera.project(expSE3(step) * trueMotion() * point) -
-                                          camera.project(expSE3(-step) * trueMotion() * point)) /
-                                         (2.0 * kStep);
+      const Eigen::Vector3d difference =
+          (camera.project(expSE3(step) * trueMotion() * point) - camera.project(expSE3(-step) * trueMotion() * point)) /
+          (2.0 * kStep);
       EXPECT_LT((jacobian.col(axis) - difference).norm(), 1e-4 * (1.0 + difference.norm())) << "axis " << axis;
     }
   }
@@ -124,13 +123,13 @@ TEST(MotionEstimator, RecoversMotionAmongHalfOutliers) {
       options.seed = static_cast<int>(seed);
       const MotionEstimate estimate = MotionEstimator(options).estimate(synthetic::camera(), problem.correspondences);
       ASSERT_TRUE(estimate.success) << estimate.reason;
-      // In units of what the noise of the true inliers permits at best: chi square of six degrees of freedom, beyond 38 in
-      // one of a million; doubled for the efficiency of a robust kernel and the inliers lost at the threshold.
+      // In units of what the noise of the true inliers permits at best: chi square of six degrees of freedom, beyond 38
+      // in one of a million; doubled for the efficiency of a robust kernel and the inliers lost at the threshold.
       const Vector6d error = motionError(estimate);
       EXPECT_LT(error.dot(information(problem, kNoise) * error), 76.0) << kernel << ", seed " << seed;
 
-      // The threshold, 2 px, is four standard deviations: 1.1e-3 of the inliers lie beyond. A stranger is close by chance in
-      // far less than 1e-3 of the image.
+      // The threshold, 2 px, is four standard deviations: 1.1e-3 of the inliers lie beyond. A stranger is close by
+      // chance in far less than 1e-3 of the image.
       std::vector<int> found;
       std::set_intersection(estimate.inliers.begin(), estimate.inliers.end(), problem.inliers.begin(),
                             problem.inliers.end(), std::back_inserter(found));
@@ -174,9 +173,12 @@ TEST(MotionEstimator, CovarianceGrowsWithTheNoise) {
   options.kernel = "huber";
   options.kernel_scale = 20.0;
   const auto covariance = [&](double noise) {
-    return MotionEstimator(options).estimate(synthetic::camera(), randomProblem(5, 200, noise, 0.0).correspondences).covariance;
+    return MotionEstimator(options)
+        .estimate(synthetic::camera(), randomProblem(5, 200, noise, 0.0).correspondences)
+        .covariance;
   };
-  // Variance goes with the square of the noise; 594 degrees of freedom make the same draw agree to far better than this.
+  // Variance goes with the square of the noise; 594 degrees of freedom make the same draw agree to far better than
+  // this.
   EXPECT_NEAR(covariance(0.8).trace() / covariance(0.2).trace(), 16.0, 2.0);
 }
 
@@ -211,7 +213,8 @@ TEST(MotionEstimator, FailsOnTooFewMatches) {
 
 TEST(MotionEstimator, FailsWhenEverythingIsAnOutlier) {
   for (unsigned seed = 1; seed <= 5; ++seed)
-    expectFailure(MotionEstimator({}).estimate(synthetic::camera(), randomProblem(seed, 200, 0.5, 1.0).correspondences));
+    expectFailure(
+        MotionEstimator({}).estimate(synthetic::camera(), randomProblem(seed, 200, 0.5, 1.0).correspondences));
 }
 
 TEST(MotionEstimator, FailsOnDegenerateInput) {
@@ -232,6 +235,19 @@ TEST(MotionEstimator, FailsOnDegenerateInput) {
   {
     SCOPED_TRACE("one line");
     expectFailure(estimateOf([](int i) { return Eigen::Vector3d(-2.0 + 0.07 * i, 0.3 + 0.01 * i, 6.0 + 0.1 * i); }));
+  }
+  {
+    // The measurements' noise lets a sample have a pose, yet the rotation about the line stays unknown.
+    SCOPED_TRACE("one line, noisy");
+    std::mt19937 random(1);
+    std::normal_distribution<double> noise(0.0, 0.2);
+    Correspondences correspondences;
+    for (int i = 0; i < 60; ++i) {
+      const Eigen::Vector3d point(-2.0 + 0.07 * i, 0.3 + 1e-9 * noise(random), 6.0 + 1e-9 * noise(random));
+      correspondences.push_back({point, camera.project(trueMotion() * point)});
+      for (int k = 0; k < 3; ++k) correspondences.back().measurement[k] += noise(random);
+    }
+    expectFailure(MotionEstimator({}).estimate(camera, correspondences));
   }
   {
     SCOPED_TRACE("behind the camera");

@@ -10,8 +10,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The header that a line includes, if that header is ROS's or made by its build; else empty. Debian installs ROS headers
-/// in /usr/include, so the compiler would find them without being told where to look.
+/// The header that a line includes, if that header is ROS's or made by its build; else empty. Debian installs ROS
+/// headers in /usr/include, so the compiler would find them without being told where to look.
 std::string rosHeaderIncludedBy(const std::string& line) {
   static const std::regex include(R"(^\s*#\s*include\s*[<"]([^>"]+)[>"])");
   static const std::regex ros(
@@ -38,14 +38,14 @@ std::vector<fs::path> coreFiles() {
 }
 
 TEST(NoRosInCore, TheSearchKnowsRosHeaders) {
-  for (const char* line : {"#include <ros/ros.h>", "#include \"ros/conversions.hpp\"", "  #  include <ros/time.h>",
-                           "#include <sensor_msgs/Image.h>", "#include <nav_msgs/Odometry.h>", "#include <tf2/utils.h>",
-                           "#include <tf2_ros/buffer.h>", "#include <nodelet/nodelet.h>",
-                           "#include <cv_bridge/cv_bridge.h>", "#include <message_filters/subscriber.h>",
-                           "#include <image_transport/image_transport.h>", "#include <rosbag/bag.h>",
-                           "#include <pluginlib/class_list_macros.hpp>",
-                           "#include \"stereo_descriptor_vo/StereoFeatures.h\"",
-                           "#include <stereo_descriptor_vo/ros/stereo_features_view.hpp>"})
+  for (const char* line :
+       {"#include <ros/ros.h>", "#include \"ros/conversions.hpp\"", "  #  include <ros/time.h>",
+        "#include <sensor_msgs/Image.h>", "#include <nav_msgs/Odometry.h>", "#include <tf2/utils.h>",
+        "#include <tf2_ros/buffer.h>", "#include <nodelet/nodelet.h>", "#include <cv_bridge/cv_bridge.h>",
+        "#include <message_filters/subscriber.h>", "#include <image_transport/image_transport.h>",
+        "#include <rosbag/bag.h>", "#include <pluginlib/class_list_macros.hpp>",
+        "#include \"stereo_descriptor_vo/StereoFeatures.h\"",
+        "#include <stereo_descriptor_vo/ros/stereo_features_view.hpp>"})
     EXPECT_FALSE(rosHeaderIncludedBy(line).empty()) << line;
   for (const char* line : {"#include <cstdint>", "#include <opencv2/core.hpp>", "#include <Eigen/Geometry>",
                            "#include \"stereo_descriptor_vo/stereo_features.hpp\"", "#include \"freak_pairs.inc\"",

@@ -1,5 +1,3 @@
-#include "stereo_descriptor_vo/options.hpp"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -7,6 +5,7 @@
 #include <set>
 
 #include "stereo_descriptor_vo/feature_extractor.hpp"
+#include "stereo_descriptor_vo/options.hpp"
 #include "stereo_descriptor_vo/visual_odometry.hpp"
 #include "synthetic_scene.hpp"
 
@@ -42,7 +41,9 @@ struct Outer {
   }
 };
 
-bool contains(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
 
 template <class Options>
 void expectUsable(Options options) {
@@ -148,15 +149,15 @@ TEST(Options, SetRefusesAmbiguousAndUnknownNames) {
 
 TEST(Options, SetRefusesTextOfAnotherTypeAndValuesOutOfRange) {
   for (const auto& [name, text] : std::vector<std::pair<std::string, std::string>>{{"near_side/count", "3.5"},
-                                                                                  {"near_side/count", ""},
-                                                                                  {"near_side/count", "99999999999"},
-                                                                                  {"near_side/count", "0"},
-                                                                                  {"height", "tall"},
-                                                                                  {"height", "1,5"},
-                                                                                  {"height", "nan"},
-                                                                                  {"height", "-1"},
-                                                                                  {"on", "perhaps"},
-                                                                                  {"colour", "blue"}}) {
+                                                                                   {"near_side/count", ""},
+                                                                                   {"near_side/count", "99999999999"},
+                                                                                   {"near_side/count", "0"},
+                                                                                   {"height", "tall"},
+                                                                                   {"height", "1,5"},
+                                                                                   {"height", "nan"},
+                                                                                   {"height", "-1"},
+                                                                                   {"on", "perhaps"},
+                                                                                   {"colour", "blue"}}) {
     Outer outer;
     std::vector<Option> options = listOptions(outer);
     const std::string error = errorOf([&, n = name, t = text] { setOption(options, n, t); });
@@ -184,8 +185,7 @@ TEST(Options, ClampMovesNumbersToTheNearestEnd) {
   std::set<std::string> changed;
   for (Option& option : options)
     if (option.clamp()) changed.insert(option.name);
-  EXPECT_EQ(changed,
-            (std::set<std::string>{"near_side/count", "near_side/width", "far_side/count", "far_side/width"}));
+  EXPECT_EQ(changed, (std::set<std::string>{"near_side/count", "near_side/width", "far_side/count", "far_side/width"}));
   EXPECT_EQ(outer.near_side.count, 10);
   EXPECT_EQ(outer.near_side.width, 0.5);
   EXPECT_EQ(outer.far_side.count, 1);

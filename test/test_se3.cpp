@@ -1,8 +1,8 @@
-#include "stereo_descriptor_vo/se3.hpp"
-
 #include <gtest/gtest.h>
 
 #include <vector>
+
+#include "stereo_descriptor_vo/se3.hpp"
 
 namespace sdvo {
 namespace {

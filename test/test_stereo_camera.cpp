@@ -1,9 +1,8 @@
-#include "stereo_descriptor_vo/stereo_camera.hpp"
-
 #include <gtest/gtest.h>
 
 #include <limits>
 
+#include "stereo_descriptor_vo/stereo_camera.hpp"
 #include "synthetic_scene.hpp"
 
 namespace sdvo {
@@ -73,8 +72,8 @@ TEST(StereoCamera, CheckRefusesWhatNoCameraHas) {
 
 TEST(StereoCamera, EqualityLooksAtEveryField) {
   EXPECT_EQ(synthetic::camera(), synthetic::camera());
-  for (double StereoCamera::*field : {&StereoCamera::fx, &StereoCamera::fy, &StereoCamera::cx, &StereoCamera::cy,
-                                      &StereoCamera::baseline}) {
+  for (double StereoCamera::*field :
+       {&StereoCamera::fx, &StereoCamera::fy, &StereoCamera::cx, &StereoCamera::cy, &StereoCamera::baseline}) {
     StereoCamera camera = synthetic::camera();
     camera.*field += 1e-6;
     EXPECT_NE(camera, synthetic::camera());

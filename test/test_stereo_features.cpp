@@ -1,9 +1,8 @@
-#include "stereo_descriptor_vo/stereo_features.hpp"
-
 #include <gtest/gtest.h>
 
 #include <limits>
 
+#include "stereo_descriptor_vo/stereo_features.hpp"
 #include "synthetic_scene.hpp"
 
 namespace sdvo {
@@ -40,8 +39,7 @@ TEST(StereoFeatures, NamesTheArrayOfAnotherLength) {
     StereoFeatures features = threeFeatures();
     damage(features);
     EXPECT_THROW(features.check(), std::invalid_argument) << name;
-    EXPECT_NE(errorOf([&] { features.check(); }).find(name), std::string::npos)
-        << errorOf([&] { features.check(); });
+    EXPECT_NE(errorOf([&] { features.check(); }).find(name), std::string::npos) << errorOf([&] { features.check(); });
   };
   expectNamed("v", [](StereoFeatures& f) { f.v.pop_back(); });
   expectNamed("disparity", [](StereoFeatures& f) { f.disparity.push_back(1.f); });
@@ -62,16 +60,19 @@ TEST(StereoFeatures, RefusesNumbersThatMeanNothing) {
     return errorOf([&] { features.check(); });
   };
   constexpr float kNaN = std::numeric_limits<float>::quiet_NaN(), kInf = std::numeric_limits<float>::infinity();
-  const std::vector<std::pair<std::string, Array>> arrays = {
-      {"u", &StereoFeatures::u},         {"v", &StereoFeatures::v},       {"disparity", &StereoFeatures::disparity},
-      {"dv", &StereoFeatures::dv},       {"size", &StereoFeatures::size}, {"angle", &StereoFeatures::angle},
-      {"sigma", &StereoFeatures::sigma}, {"response", &StereoFeatures::response}};
+  const std::vector<std::pair<std::string, Array>> arrays = {{"u", &StereoFeatures::u},
+                                                             {"v", &StereoFeatures::v},
+                                                             {"disparity", &StereoFeatures::disparity},
+                                                             {"dv", &StereoFeatures::dv},
+                                                             {"size", &StereoFeatures::size},
+                                                             {"angle", &StereoFeatures::angle},
+                                                             {"sigma", &StereoFeatures::sigma},
+                                                             {"response", &StereoFeatures::response}};
   for (const auto& [name, array] : arrays)
     for (const float bad : {kNaN, kInf, -kInf})
       EXPECT_NE(damaged(array, bad).find("array " + name + " "), std::string::npos) << name << " = " << bad;
-  const std::vector<std::pair<std::string, Array>> positive = {{"disparity", &StereoFeatures::disparity},
-                                                               {"size", &StereoFeatures::size},
-                                                               {"sigma", &StereoFeatures::sigma}};
+  const std::vector<std::pair<std::string, Array>> positive = {
+      {"disparity", &StereoFeatures::disparity}, {"size", &StereoFeatures::size}, {"sigma", &StereoFeatures::sigma}};
   for (const auto& [name, array] : positive)
     for (const float bad : {0.f, -1.f})
       EXPECT_NE(damaged(array, bad).find("array " + name + " "), std::string::npos) << name << " = " << bad;

@@ -1,7 +1,6 @@
-#include "stereo_descriptor_vo/stereo_matcher.hpp"
-
 #include <gtest/gtest.h>
 
+#include "stereo_descriptor_vo/stereo_matcher.hpp"
 #include "synthetic_scene.hpp"
 
 namespace sdvo {
@@ -13,7 +12,8 @@ struct Pair {
   cv::Mat left, right;
 };
 
-/// A pair whose disparity depends on the row alone, so that the right view follows exactly; the right view is `dv` lower.
+/// A pair whose disparity depends on the row alone, so that the right view follows exactly; the right view is `dv`
+/// lower.
 Pair texturedPair(const std::function<double(double v)>& disparity, double dv = 0.0) {
   const synthetic::Texture texture(11, 5.0, 160.0);
   return {synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); }),

@@ -1,11 +1,10 @@
-#include "stereo_descriptor_vo/visual_odometry.hpp"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <limits>
 
+#include "stereo_descriptor_vo/visual_odometry.hpp"
 #include "synthetic_scene.hpp"
 
 namespace sdvo {
@@ -30,7 +29,9 @@ const synthetic::World& street() {
   return world;
 }
 
-std::int64_t stampOf(int i) { return 1000000000 + i * kPeriod; }
+std::int64_t stampOf(int i) {
+  return 1000000000 + i * kPeriod;
+}
 
 /// Pair i of the drive; pixels are off by `noise` px each.
 StereoFeatures pairOf(int i, double noise = 0.0) {
@@ -44,7 +45,9 @@ StereoFeatures pairOf(int i, double noise = 0.0) {
 }
 
 /// Pair i in which nothing is seen.
-StereoFeatures blindPair(int i) { return synthetic::noFeatures(synthetic::camera(), stampOf(i)); }
+StereoFeatures blindPair(int i) {
+  return synthetic::noFeatures(synthetic::camera(), stampOf(i));
+}
 
 /// Pair i in which everything is new, as after a jump to another place.
 StereoFeatures strangePair(int i) {
@@ -63,7 +66,9 @@ double angleBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
   return logSO3(a.linear().transpose() * b.linear()).norm();
 }
 
-Eigen::Isometry3d trueSinceStart(int i, int start = 0) { return drivePose(start).inverse() * drivePose(i); }
+Eigen::Isometry3d trueSinceStart(int i, int start = 0) {
+  return drivePose(start).inverse() * drivePose(i);
+}
 
 void expectCovariance(const Matrix6d& covariance) {
   EXPECT_TRUE(covariance.allFinite());
@@ -146,8 +151,8 @@ TEST(VisualOdometry, FollowsANoisyDriveAndKnowsHowWell) {
   }
   EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(kPairs)), 0.01 * kPairs * kStep);
   EXPECT_LT(angleBetween(result.T_origin_camera, trueSinceStart(kPairs)), 0.01);
-  // Normalised squares of six numbers average 6. Robust weights, noise of the reference's own points and what one frame's
-  // noise leaves to the next shift that; a factor of four either way is dishonest.
+  // Normalised squares of six numbers average 6. Robust weights, noise of the reference's own points and what one
+  // frame's noise leaves to the next shift that; a factor of four either way is dishonest.
   EXPECT_GT(mean_step, 1.5);
   EXPECT_LT(mean_step, 24.0);
   const Vector6d final_error = logSE3(trueSinceStart(kPairs).inverse() * result.T_origin_camera);
@@ -321,9 +326,7 @@ TEST(VisualOdometry, StartsAgainFromTheLastPoseWithAnotherCamera) {
   StereoCamera other = synthetic::camera();
   other.baseline = 0.3;
   other.fx = 380.0;
-  const auto otherPair = [&](int i) {
-    return synthetic::observe(street(), other, drivePose(i).inverse(), stampOf(i));
-  };
+  const auto otherPair = [&](int i) { return synthetic::observe(street(), other, drivePose(i).inverse(), stampOf(i)); };
   const OdometryResult again = odometry.update(otherPair(6));
   EXPECT_TRUE(again.has_pose);
   EXPECT_FALSE(again.has_motion);

@@ -29,7 +29,7 @@ struct StereoKeypoint {
 /// Descriptors of those key points that can be described in every view the layout asks for.
 struct DescribedKeypoints {
   std::vector<int> index;    ///< into the key points given, ascending; one for each row
-  std::vector<float> angle;  ///< rad in (-pi, pi], -1 where not oriented; one for each row
+  std::vector<float> angle;  ///< rad in [0, 2 pi), -1 where not oriented; one for each row
   cv::Mat rows;              ///< row = left half, or left half then right half
 };
 

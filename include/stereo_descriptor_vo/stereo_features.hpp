@@ -38,7 +38,7 @@ struct StereoFeatures {
   std::vector<float> disparity;  ///< u_left - u_right > 0, px
   std::vector<float> dv;         ///< v_right - v_left, px: the rig's residual misalignment shows here
   std::vector<float> size;       ///< diameter of the described neighbourhood's key point, px
-  std::vector<float> angle;      ///< rad in (-pi, pi], -1 where the descriptor is not oriented
+  std::vector<float> angle;      ///< rad in [0, 2 pi), -1 where the descriptor is not oriented
   std::vector<float> response;   ///< detector's score
   std::vector<float> sigma;      ///< standard deviation of the position, px
   std::vector<std::uint8_t> octave;
