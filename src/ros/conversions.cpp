@@ -127,7 +127,7 @@ stereo_descriptor_vo::StereoFeatures toMessage(const StereoFeatures& features, c
   message.descriptor = features.descriptor;
   message.layout = features.layout;
   message.element_type = toText(features.element_type);
-  message.bytes_per_row = static_cast<std::uint32_t>(features.descriptors.cols * features.descriptors.elemSize());
+  message.bytes_per_row = static_cast<std::uint32_t>(features.descriptors.cols);
   message.scale_normalised = size_curve.scale_normalisation;
   message.size_slope = static_cast<float>(size_curve.slope);
   message.size_exponent = static_cast<float>(size_curve.exponent);
@@ -164,7 +164,7 @@ stereo_descriptor_vo::StereoFeatures toMessage(const StereoFeatures& features, c
 }
 
 StereoFeatures fromMessage(const stereo_descriptor_vo::StereoFeatures& message) {
-  const StereoFeaturesView view(message);
+  StereoFeaturesView{message};  // throws unless everything holds together
   StereoFeatures features;
   features.stamp = static_cast<std::int64_t>(message.header.stamp.toNSec());
   features.camera = {message.fx, message.fy,       message.cx,
@@ -182,7 +182,9 @@ StereoFeatures fromMessage(const stereo_descriptor_vo::StereoFeatures& message) 
   features.response = message.response;
   features.sigma = message.sigma;
   features.octave = message.octave;
-  features.descriptors = view.descriptors().clone();
+  features.descriptors = cv::Mat(features.count(), static_cast<int>(message.bytes_per_row), CV_8U,
+                                 const_cast<std::uint8_t*>(message.descriptors.data()))
+                             .clone();
 
   ExtractionReport& report = features.report;
   report.detected = static_cast<int>(message.detected);

@@ -10,6 +10,8 @@
 #include "conversions.hpp"
 #include "nodelet_options.hpp"
 #include "params.hpp"
+#include "reconfigure_server.hpp"
+#include "report_throttle.hpp"
 #include "stereo_descriptor_vo/feature_extractor.hpp"
 #include "stereo_input.hpp"
 #include "worker.hpp"
@@ -50,6 +52,10 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
       if (!silence.empty()) NODELET_WARN_STREAM(silence);
     });
 
+    reconfigured_ = options_.extractor;
+    reconfigure_server_ =
+        std::make_unique<ReconfigureServer>(private_nh, listOptions(reconfigured_), [this] { onReconfigure(); });
+
     // A subscriber may connect before advertise() returns: the mutex makes it wait until publisher_ is there.
     const ros::SubscriberStatusCallback on_connect = [this](const ros::SingleSubscriberPublisher&) { updateInput(); };
     const std::lock_guard<std::mutex> lock(connect_mutex_);
@@ -70,28 +76,48 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     NODELET_ERROR_STREAM("cannot subscribe to the images: " << e.what());
   }
 
+  /// In a ROS callback; the worker takes the new options over before its next pair.
+  void onReconfigure() {
+    const std::lock_guard<std::mutex> lock(pending_mutex_);
+    pending_ = reconfigured_;
+  }
+
+  void takeOverOptions() {
+    std::optional<FeatureExtractorOptions> pending;
+    {
+      const std::lock_guard<std::mutex> lock(pending_mutex_);
+      pending.swap(pending_);
+    }
+    if (!pending) return;
+    extractor_ = std::make_unique<FeatureExtractor>(*pending);
+    ++stream_epoch_;  // rows of another kind or size do not continue the old ones
+    NODELET_INFO("options reconfigured: a new stream begins");
+  }
+
   /// In the worker's thread.
   void process(const StereoPairMessages& pair) try {
+    takeOverOptions();
     const ros::Time stamp = pair.left_image->header.stamp;
     if (!followsLast(stamp)) return;
-    updateCamera(pair);
-
+    const StereoCamera camera = ros_conversions::toStereoCamera(*pair.left_info, *pair.right_info);
     const cv::Mat left = ros_conversions::toGrey(pair.left_image);
     const cv::Mat right = ros_conversions::toGrey(pair.right_image);
     const StereoFeatures features =
-        extractor_->extract(*camera_, left, right, static_cast<std::int64_t>(stamp.toNSec()));
+        extractor_->extract(camera, left, right, static_cast<std::int64_t>(stamp.toNSec()));
+    // Only now: a calibration that does not fit the images was refused and is no new stream.
+    updateCamera(camera);
 
     const auto message = boost::make_shared<stereo_descriptor_vo::StereoFeatures>(
-        ros_conversions::toMessage(features, options_.extractor.size_curve));
+        ros_conversions::toMessage(features, extractor_->options().size_curve));
     message->header.stamp = stamp;
     message->header.frame_id = ros_conversions::cleanFrameId(pair.left_image->header.frame_id);
     message->stream_epoch = stream_epoch_;
     message->dropped_pairs = worker_->dropped() + late_pairs_;
     publisher_.publish(message);
   } catch (const std::exception& e) {
-    NODELET_ERROR_STREAM_THROTTLE(kErrorPeriod, "pair at " << pair.left_image->header.stamp << " of "
-                                                           << pair.left_image->header.frame_id
-                                                           << " skipped: " << e.what());
+    if (throttle_.allows(e.what()))
+      NODELET_ERROR_STREAM("pair at " << pair.left_image->header.stamp << " of " << pair.left_image->header.frame_id
+                                      << " skipped: " << e.what());
   }
 
   /// False for a late pair, which is dropped and counted; a jump back of the clock starts a new stream.
@@ -99,8 +125,8 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     if (last_stamp_ && stamp <= *last_stamp_) {
       if (*last_stamp_ - stamp < ros::Duration(kClockJump)) {
         ++late_pairs_;
-        NODELET_WARN_STREAM_THROTTLE(kErrorPeriod, "pair at " << stamp << " is late, dropped (" << late_pairs_
-                                                              << " so far)");
+        if (throttle_.allows("late"))
+          NODELET_WARN_STREAM("pair at " << stamp << " is late, dropped (" << late_pairs_ << " so far)");
         return false;
       }
       NODELET_WARN_STREAM("the clock jumped back from " << *last_stamp_ << " to " << stamp << ": a new stream begins");
@@ -110,8 +136,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     return true;
   }
 
-  void updateCamera(const StereoPairMessages& pair) {
-    const StereoCamera camera = ros_conversions::toStereoCamera(*pair.left_info, *pair.right_info);
+  void updateCamera(const StereoCamera& camera) {
     if (camera_ && *camera_ != camera) {
       NODELET_WARN("camera_info changed: a new stream begins");
       ++stream_epoch_;
@@ -120,16 +145,20 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   }
 
   static constexpr double kSilencePeriod = 10.0;  // s between explanations why nothing comes
-  static constexpr double kErrorPeriod = 5.0;     // s between equal errors
   static constexpr double kClockJump = 1.0;       // s; what is late by less was only overtaken
   static constexpr int kPublishQueue = 10;
 
   Options options_;
-  std::unique_ptr<FeatureExtractor> extractor_;
+  FeatureExtractorOptions reconfigured_;  // the server's
+  std::mutex pending_mutex_;
+  std::optional<FeatureExtractorOptions> pending_;
+  std::unique_ptr<ReconfigureServer> reconfigure_server_;
+  ReportThrottle throttle_;
   ros::Publisher publisher_;
   ros::WallTimer silence_timer_;
 
   // Only the worker's thread touches these.
+  std::unique_ptr<FeatureExtractor> extractor_;
   std::optional<StereoCamera> camera_;
   std::optional<ros::Time> last_stamp_;
   std::uint32_t stream_epoch_ = 0;

@@ -16,6 +16,7 @@
 #include "nodelet_options.hpp"
 #include "odometry_publisher.hpp"
 #include "params.hpp"
+#include "report_throttle.hpp"
 #include "stereo_descriptor_vo/visual_odometry.hpp"
 #include "worker.hpp"
 
@@ -81,8 +82,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
 
     const OdometryResult result = odometry_->update(features);
     if (result.state == TrackingState::kLost || result.state == TrackingState::kDegraded)
-      NODELET_WARN_STREAM_THROTTLE(kErrorPeriod, toString(result.state) << " at " << message->header.stamp << ": "
-                                                                        << result.reason);
+      if (throttle_.allows(toString(result.state)))
+        NODELET_WARN_STREAM(toString(result.state) << " at " << message->header.stamp << ": " << result.reason);
     publisher_->publish(result, *T_base_camera_);
     publisher_->publishPoints(*message);
     stereo_descriptor_vo::VoInfo info = ros_conversions::toInfo(result, *message);
@@ -93,7 +94,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     const std::lock_guard<std::mutex> lock(info_mutex_);
     last_info_ = info;
   } catch (const std::exception& e) {
-    NODELET_ERROR_STREAM_THROTTLE(kErrorPeriod, "features at " << message->header.stamp << " skipped: " << e.what());
+    if (throttle_.allows(e.what()))
+      NODELET_ERROR_STREAM("features at " << message->header.stamp << " skipped: " << e.what());
   }
 
   /// False for a late message. A jump back of the clock is a reset, any other break of the stream a new seed.
@@ -102,8 +104,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     if (last_stamp_ && stamp <= *last_stamp_) {
       if (*last_stamp_ - stamp < ros::Duration(kClockJump)) {
         ++out_of_order_;
-        NODELET_WARN_STREAM_THROTTLE(kErrorPeriod, "features at " << stamp << " are late, dropped (" << out_of_order_
-                                                                  << " so far)");
+        if (throttle_.allows("late"))
+          NODELET_WARN_STREAM("features at " << stamp << " are late, dropped (" << out_of_order_ << " so far)");
         return false;
       }
       restart("the clock jumped back");
@@ -132,13 +134,14 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     std::string problem;
     while (!tf_buffer_.canTransform(base_frame, camera_frame, ros::Time(0), &problem)) {
       if (ros::WallTime::now() >= give_up || !ros::ok()) {
-        NODELET_ERROR_STREAM_THROTTLE(kErrorPeriod, "no transform from camera frame '"
-                                                        << camera_frame << "' to base frame '" << base_frame
-                                                        << "' on TF, no odometry without it: publish it (static) or set "
-                                                           "base_frame_id. "
-                                                        << problem);
+        if (throttle_.allows("extrinsic"))
+          NODELET_ERROR_STREAM("no transform from camera frame '"
+                               << camera_frame << "' to base frame '" << base_frame
+                               << "' on TF, no odometry without it: publish it (static) or set base_frame_id. "
+                               << problem);
         return false;
       }
+      problem.clear();  // tf2 appends
       ros::WallDuration(0.01).sleep();
     }
     T_base_camera_ = tf2::transformToEigen(tf_buffer_.lookupTransform(base_frame, camera_frame, ros::Time(0)));
@@ -182,10 +185,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     status.add("malformed", last_info_->malformed);
   }
 
-  static constexpr double kErrorPeriod = 5.0;  // s between equal errors
   static constexpr double kClockJump = 1.0;    // s; what is late by less was only overtaken
 
   Options options_;
+  ReportThrottle throttle_;
   tf2_ros::Buffer tf_buffer_;
   std::unique_ptr<tf2_ros::TransformListener> tf_listener_;
   std::unique_ptr<OdometryPublisher> publisher_;

@@ -12,6 +12,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "run_tool.hpp"
 #include "stereo_descriptor_vo/feature_detector.hpp"
 #include "stereo_descriptor_vo/freak.hpp"
 
@@ -90,43 +91,47 @@ std::vector<Column> choose(std::vector<Column> columns, double samples, double& 
   }
 }
 
-}  // namespace
-
-int main(int argc, char** argv) try {
-  CLI::App app("Learns FREAK's 512 field pairs from images and writes them as a C++ initialiser list");
+struct Arguments {
   std::vector<std::string> images;
   std::string output;
   int per_image = 600;
   double max_correlation = 0.5;
   std::uint32_t seed = 1;
-  app.add_option("images", images, "training images")->required();
-  app.add_option("--output", output, "file to write, src/freak_pairs.inc of this package")->required();
-  app.add_option("--per-image", per_image, "corners sampled in each image")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 100000));
-  app.add_option("--max-correlation", max_correlation, "first admissible correlation")
-      ->capture_default_str()
-      ->check(CLI::Range(0.1, 1.0));
-  app.add_option("--seed", seed, "seed of the sizes")->capture_default_str();
-  CLI11_PARSE(app, argc, argv);
+};
 
-  const auto samples = sampleKeypoints(images, per_image, seed);
+int run(Arguments arguments) {
+  const auto samples = sampleKeypoints(arguments.images, arguments.per_image, arguments.seed);
   if (samples.size() < 1000)
     throw std::runtime_error("only " + std::to_string(samples.size()) + " key points, too few");
-  const std::vector<Column> chosen = choose(makeColumns(samples), static_cast<double>(samples.size()), max_correlation);
+  const std::vector<Column> chosen =
+      choose(makeColumns(samples), static_cast<double>(samples.size()), arguments.max_correlation);
 
-  std::ofstream file(output);
-  file << "// Learnt by tools/learn_freak_pairs from " << samples.size() << " key points in " << images.size()
-       << " images; largest correlation " << max_correlation << ".\n";
+  std::ofstream file(arguments.output);
+  file << "// Learnt by tools/learn_freak_pairs from " << samples.size() << " key points in " << arguments.images.size()
+       << " images; largest correlation " << arguments.max_correlation << ".\n";
   for (std::size_t i = 0; i < chosen.size(); ++i)
     file << "{" << int{chosen[i].pair.first} << ", " << int{chosen[i].pair.second} << "},"
          << (i % 12 == 11 ? "\n" : " ");
   file << "\n";
-  if (!file.flush()) throw std::runtime_error("cannot write " + output);
-  std::cout << samples.size() << " key points, largest correlation " << max_correlation << ", mean of the last pair "
-            << chosen.back().mean << ", written to " << output << "\n";
+  if (!file.flush()) throw std::runtime_error("cannot write " + arguments.output);
+  std::cout << samples.size() << " key points, largest correlation " << arguments.max_correlation
+            << ", mean of the last pair " << chosen.back().mean << ", written to " << arguments.output << "\n";
   return 0;
-} catch (const std::exception& error) {
-  std::cerr << "error: " << error.what() << "\n";
-  return 1;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Learns FREAK's 512 field pairs from images and writes them as a C++ initialiser list");
+  Arguments arguments;
+  app.add_option("images", arguments.images, "training images")->required();
+  app.add_option("--output", arguments.output, "file to write, src/freak_pairs.inc of this package")->required();
+  app.add_option("--per-image", arguments.per_image, "corners sampled in each image")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 100000));
+  app.add_option("--max-correlation", arguments.max_correlation, "first admissible correlation")
+      ->capture_default_str()
+      ->check(CLI::Range(0.1, 1.0));
+  app.add_option("--seed", arguments.seed, "seed of the sizes")->capture_default_str();
+  return sdvo::runTool(app, argc, argv, [&] { return run(arguments); });
 }

@@ -1,0 +1,255 @@
+#include "depth_scale_fit.hpp"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+#include <stdexcept>
+
+#include "../tools/progress.hpp"
+#include "keypoint_set.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr int kTriedSizes = 31;
+constexpr double kSmallestRatio = 0.5, kLargestRatio = 4.0;
+
+double triedRatio(double index) {
+  return kSmallestRatio * std::pow(kLargestRatio / kSmallestRatio, index / (kTriedSizes - 1));
+}
+
+struct Follower {
+  std::size_t first, later;  ///< corners of the two sets
+};
+
+/// The later corner next to each first one's reprojection, where there is one and its disparity agrees.
+std::vector<Follower> follow(const KeypointSet& first, const std::vector<int>& chosen, const KeypointSet& later,
+                             const Eigen::Isometry3d& T_later_first) {
+  constexpr double kLargestError = 1.5;             // px
+  constexpr double kLargestDisparityChange = 0.08;  // of the predicted disparity
+  std::vector<Follower> followers;
+  for (const int index : chosen) {
+    const auto& [corner, match] = first.corners[static_cast<std::size_t>(index)];
+    const Eigen::Vector3d point =
+        T_later_first * first.camera.backProject(corner.position.x, corner.position.y, match.disparity);
+    if (point.z() < 1.0) continue;
+    const Eigen::Vector3d predicted = later.camera.project(point);
+    double nearest = kLargestError;
+    std::optional<std::size_t> found;
+    for (std::size_t k = 0; k < later.corners.size(); ++k) {
+      const cv::Point2f& p = later.corners[k].corner.position;
+      const double distance = std::hypot(p.x - predicted.x(), p.y - predicted.y());
+      if (distance < nearest) nearest = distance, found = k;
+    }
+    if (!found) continue;
+    const double disparity = predicted.x() - predicted.z();
+    if (std::abs(later.corners[*found].match.disparity / disparity - 1.0) < kLargestDisparityChange)
+      followers.push_back({static_cast<std::size_t>(index), *found});
+  }
+  return followers;
+}
+
+ViewKeypoint leftView(const StereoCorner& corner, double size) {
+  return {corner.corner.position.x, corner.corner.position.y, static_cast<float>(size), -1.f};
+}
+
+double rowDistance(ElementType type, const cv::Mat& a, const cv::Mat& b) {
+  if (type == ElementType::kBits) return cv::norm(a, b, cv::NORM_HAMMING);
+  if (type == ElementType::kUint8) return cv::norm(a, b, cv::NORM_L2);
+  const cv::Mat float_a(1, a.cols / 4, CV_32F, const_cast<std::uint8_t*>(a.ptr()));
+  const cv::Mat float_b(1, b.cols / 4, CV_32F, const_cast<std::uint8_t*>(b.ptr()));
+  return cv::norm(float_a, float_b, cv::NORM_L2);
+}
+
+/// Ratio at the minimum of the distances, by a parabola through its neighbours in the logarithm; nothing when the minimum
+/// lies at an end of the search or the feature is not recognised at any size.
+std::optional<double> bestRatio(const std::vector<double>& distances) {
+  const auto smallest = std::min_element(distances.begin(), distances.end());
+  const std::size_t i = static_cast<std::size_t>(smallest - distances.begin());
+  if (i == 0 || i + 1 == distances.size()) return std::nullopt;
+  const double worst = *std::max_element(distances.begin(), distances.end());
+  constexpr double kRecognised = 0.6;  // of the distance at the worst size
+  if (*smallest > kRecognised * worst) return std::nullopt;
+  const double before = distances[i - 1], after = distances[i + 1];
+  const double curvature = before - 2.0 * *smallest + after;
+  const double shift = curvature > 0.0 ? 0.5 * (before - after) / curvature : 0.0;
+  return triedRatio(static_cast<double>(i) + shift);
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double residual(const SizeSample& sample, const ShapeFit& fit) {
+  const double now = fit.value(sample.disparity), first = fit.value(sample.first_disparity);
+  if (now <= 0.0 || first <= 0.0) return 10.0;  // octaves; no such curve
+  return std::log2(sample.ratio) - std::log2(now / first);
+}
+
+/// Iteratively reweighted Gauss-Newton over the free parameters, derivatives by differences.
+ShapeFit fitShape(const std::vector<SizeSample>& samples, const std::string& model, bool free_exponent, bool free_offset) {
+  constexpr double kScale = 0.15;  // octaves at which the Cauchy kernel bends: the step between tried sizes, doubled
+  constexpr int kIterations = 60;
+  constexpr double kDifference = 1e-4;
+  ShapeFit fit;
+  fit.model = model;
+  std::vector<double ShapeFit::*> free;
+  if (free_exponent) free.push_back(&ShapeFit::exponent);
+  if (free_offset) free.push_back(&ShapeFit::offset);
+  const auto cost = [&](const ShapeFit& candidate) {
+    double sum = 0.0;
+    for (const SizeSample& sample : samples) sum += std::log1p(std::pow(residual(sample, candidate) / kScale, 2));
+    return sum / static_cast<double>(samples.size());
+  };
+  const Eigen::Index n = static_cast<Eigen::Index>(free.size());
+  double damping = 1e-3;
+  fit.robust_cost = cost(fit);
+  for (int iteration = 0; n > 0 && iteration < kIterations; ++iteration) {
+    Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(n, n);
+    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(n);
+    for (const SizeSample& sample : samples) {
+      const double r = residual(sample, fit);
+      Eigen::VectorXd slope(n);
+      for (Eigen::Index k = 0; k < n; ++k) {
+        ShapeFit moved = fit;
+        moved.*free[static_cast<std::size_t>(k)] += kDifference;
+        slope[k] = (residual(sample, moved) - r) / kDifference;
+      }
+      const double weight = 1.0 / (1.0 + std::pow(r / kScale, 2));
+      hessian += weight * slope * slope.transpose();
+      gradient += weight * r * slope;
+    }
+    hessian.diagonal() *= 1.0 + damping;
+    const Eigen::VectorXd step = -hessian.ldlt().solve(gradient);
+    ShapeFit moved = fit;
+    for (Eigen::Index k = 0; k < n; ++k) moved.*free[static_cast<std::size_t>(k)] += step[k];
+    moved.robust_cost = cost(moved);
+    if (step.allFinite() && moved.robust_cost < fit.robust_cost) {
+      fit = moved;
+      damping *= 0.3;
+      if (step.norm() < 1e-6) break;
+    } else {
+      damping *= 10.0;
+    }
+  }
+  std::vector<double> residuals;
+  for (const SizeSample& sample : samples) residuals.push_back(std::abs(residual(sample, fit)));
+  fit.median_residual = median(residuals);
+  return fit;
+}
+
+}  // namespace
+
+double ShapeFit::value(double disparity) const { return std::pow(disparity, exponent) + offset; }
+
+std::vector<SizeSample> sampleSizes(const ReferenceSequence& sequence, const PipelineOptions& options,
+                                    const SizeSampling& sampling) {
+  const FeatureExtractorOptions& extraction = options.stereo_features;
+  const auto base = makeBaseDescriptor(extraction.descriptor.type);
+  const double reach = measureReachPerSize(extraction.descriptor.type);
+  DepthScaleOptions first_size, largest_size;
+  first_size.scale_normalisation = largest_size.scale_normalisation = false;
+  first_size.constant_size = sampling.first_size;
+  largest_size.constant_size = kLargestRatio * sampling.first_size;
+
+  std::vector<SizeSample> samples;
+  Progress progress("sampling " + sequence.name, sequence.frames / sampling.stride + 1);
+  for (int t = 0; t + 1 < sequence.frames; t += sampling.stride, progress.step()) {
+    const KeypointSet first = findKeypoints(sequence.images, t, extraction.detector, extraction.stereo);
+    const std::vector<int> chosen =
+        selectKeypoints(first, {DepthScale(first_size)}, reach, extraction.detector.bucket_size, sampling.features);
+    for (int step = 2; step <= sampling.max_step && t + step < sequence.frames; step += 2) {
+      const KeypointSet later = findKeypoints(sequence.images, t + step, extraction.detector, extraction.stereo);
+      std::vector<ViewKeypoint> first_views;
+      const std::vector<Follower> followers = follow(first, chosen, later, sequence.motion(t, t + step));
+      for (const Follower& f : followers) first_views.push_back(leftView(first.corners[f.first], sampling.first_size));
+      const ViewDescriptors first_rows = base->describe(first.images.left, first_views);
+
+      std::vector<std::vector<double>> distances(followers.size());
+      for (int k = 0; k < kTriedSizes; ++k) {
+        std::vector<ViewKeypoint> views;
+        for (const Follower& f : followers)
+          views.push_back(leftView(later.corners[f.later], sampling.first_size * triedRatio(k)));
+        const ViewDescriptors rows = base->describe(later.images.left, views);
+        for (std::size_t i = 0; i < followers.size(); ++i) {
+          const int row = static_cast<int>(i);
+          if (first_rows.valid[i] && rows.valid[i])
+            distances[i].push_back(rowDistance(base->elementType(), first_rows.rows.row(row), rows.rows.row(row)));
+        }
+      }
+      for (std::size_t i = 0; i < followers.size(); ++i) {
+        if (distances[i].size() != kTriedSizes) continue;  // the larger neighbourhoods leave the image
+        const std::optional<double> ratio = bestRatio(distances[i]);
+        if (!ratio) continue;
+        samples.push_back({first.corners[followers[i].first].match.disparity,
+                           later.corners[followers[i].later].match.disparity, *ratio});
+      }
+    }
+  }
+  return samples;
+}
+
+std::vector<ShapeFit> fitShapes(const std::vector<SizeSample>& samples) {
+  constexpr std::size_t kFewest = 30;
+  if (samples.size() < kFewest)
+    throw std::runtime_error("only " + std::to_string(samples.size()) +
+                             " features could be followed, at least 30 are needed: give longer sequences with more motion");
+  return {fitShape(samples, "a*d", false, false), fitShape(samples, "a*d+b", false, true),
+          fitShape(samples, "a*d^b", true, false), fitShape(samples, "a*d^b+c", true, true)};
+}
+
+std::vector<SlopeTrial> trySlopes(const std::vector<ReferenceSequence>& sequences, const PipelineOptions& options,
+                                  const ShapeFit& shape, const std::vector<double>& slopes,
+                                  const std::vector<double>& min_sizes, double max_size, int features) {
+  constexpr int kStride = 10, kSteps[] = {2, 5, 8};
+  const FeatureExtractorOptions& extraction = options.stereo_features;
+  DescriptorOptions left_view = extraction.descriptor;
+  left_view.layout = "left";
+  const StereoDescriptor descriptor(left_view);
+  const double reach = measureReachPerSize(left_view.type);
+  std::vector<DepthScale> curves;
+  std::vector<SlopeTrial> trials;
+  for (const double min_size : min_sizes) {
+    for (const double slope : slopes) {
+      DepthScaleOptions curve;
+      curve.slope = slope;
+      curve.exponent = shape.exponent;
+      curve.offset = slope * shape.offset;
+      curve.min_size = min_size;
+      curve.max_size = max_size;
+      curves.emplace_back(curve);
+      trials.push_back({slope, min_size, 0.0});
+    }
+  }
+  int pairs = 0;
+  for (const ReferenceSequence& sequence : sequences) {
+    Progress progress("trying slopes " + sequence.name, sequence.frames / kStride + 1);
+    for (int t = 0; t < sequence.frames; t += kStride, progress.step()) {
+      const auto describe = [&](int i) {
+        const KeypointSet set = findKeypoints(sequence.images, i, extraction.detector, extraction.stereo);
+        const auto chosen = selectKeypoints(set, curves, reach, extraction.detector.bucket_size, features);
+        std::vector<StereoFeatures> described;
+        for (const DepthScale& curve : curves) described.push_back(describeKeypoints(set, chosen, curve, descriptor));
+        return described;
+      };
+      const std::vector<StereoFeatures> first = describe(t);
+      for (const int step : kSteps) {
+        if (t + step >= sequence.frames) continue;
+        const std::vector<StereoFeatures> later = describe(t + step);
+        for (std::size_t k = 0; k < trials.size(); ++k)
+          trials[k].correct += countCorrect(first[k], later[k], matchByDescriptor(first[k], later[k]),
+                                            sequence.motion(t, t + step));
+        ++pairs;
+      }
+    }
+  }
+  for (SlopeTrial& trial : trials) trial.correct /= std::max(pairs, 1);
+  return trials;
+}
+
+}  // namespace sdvo

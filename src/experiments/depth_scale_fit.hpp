@@ -1,0 +1,56 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "experiment_setup.hpp"
+#include "stereo_descriptor_vo/depth_scale.hpp"
+
+namespace sdvo {
+
+/// One feature seen a second time: how many times larger it has to be described than in its first view.
+struct SizeSample {
+  double first_disparity;  ///< px
+  double disparity;        ///< px, of the later view
+  double ratio;            ///< size of the smallest descriptor distance / size in the first view
+};
+
+struct SizeSampling {
+  double first_size = 10.0;  ///< px, in the first view
+  int features = 800;        ///< followed from each start
+  int stride = 5;            ///< pairs between two starts
+  int max_step = 10;         ///< pairs between the two views at most
+};
+
+/// Features followed by the reference motion alone, so that no descriptor decides which ones are kept: the later view is the
+/// corner next to the reprojection. Its size is searched over 0.5…4 times the first one.
+std::vector<SizeSample> sampleSizes(const ReferenceSequence& sequence, const PipelineOptions& options,
+                                    const SizeSampling& sampling);
+
+/// A curve size ~ disparity^exponent + offset, up to the common factor that ratios do not tell.
+struct ShapeFit {
+  std::string model;  ///< "a*d", "a*d+b", "a*d^b", "a*d^b+c"
+  double exponent = 1.0;
+  double offset = 0.0;           ///< px of disparity^exponent
+  double median_residual = 0.0;  ///< median absolute residual of log2(ratio), octaves
+  double robust_cost = 0.0;      ///< mean Cauchy cost, to compare models
+
+  double value(double disparity) const;
+};
+
+/// Robust fits (Cauchy kernel, iteratively reweighted) of the four models to the logarithms of the ratios. Throws
+/// std::runtime_error when there are fewer than 30 samples.
+std::vector<ShapeFit> fitShapes(const std::vector<SizeSample>& samples);
+
+/// What a factor and smallest size achieve in matching.
+struct SlopeTrial {
+  double slope, min_size;  ///< px
+  double correct;          ///< correct matches of a pair, mean
+};
+
+/// Correct matches (as in experiment A) over pairs 2, 5 and 8 steps apart for every factor and smallest size of the shape.
+std::vector<SlopeTrial> trySlopes(const std::vector<ReferenceSequence>& sequences, const PipelineOptions& options,
+                                  const ShapeFit& shape, const std::vector<double>& slopes,
+                                  const std::vector<double>& min_sizes, double max_size, int features);
+
+}  // namespace sdvo

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/depth_scale.hpp"
+#include "stereo_descriptor_vo/descriptor.hpp"
+#include "stereo_descriptor_vo/feature_detector.hpp"
+#include "stereo_descriptor_vo/kitti_dataset.hpp"
+#include "stereo_descriptor_vo/stereo_features.hpp"
+#include "stereo_descriptor_vo/stereo_matcher.hpp"
+
+namespace sdvo {
+
+/// A corner with its place in the right view; no size yet.
+struct StereoCorner {
+  Corner corner;
+  StereoMatch match;  ///< left_index is not used
+};
+
+/// The stereo corners of one pair, to be described at whatever sizes an experiment compares.
+struct KeypointSet {
+  std::int64_t stamp = 0;  ///< ns
+  StereoCamera camera;
+  ImagePair images;
+  std::vector<StereoCorner> corners;
+};
+
+/// Detects and stereo matches frame i of a sequence.
+KeypointSet findKeypoints(const KittiSequence& sequence, int i, const FeatureDetectorOptions& detector,
+                          const StereoMatcherOptions& stereo);
+
+/// Distance in px from the centre, for each px of key point size, that a base descriptor needs inside the image. Measured
+/// with the descriptor itself on a blank image.
+double measureReachPerSize(const std::string& descriptor);
+
+/// Indices of the `count` strongest corners, spread over buckets, among those whose neighbourhood lies inside both views at
+/// the size that every one of `curves` gives. Hence all curves describe exactly the same features. Fewer when there are no
+/// more; indices of a smaller count are a subset of those of a larger one.
+std::vector<int> selectKeypoints(const KeypointSet& set, const std::vector<DepthScale>& curves, double reach_per_size,
+                                 int bucket_size, int count);
+
+/// Describes the chosen corners with sizes by `curve`, one row each in the order of `chosen`. Throws std::runtime_error when
+/// the descriptor leaves one of them out.
+StereoFeatures describeKeypoints(const KeypointSet& set, const std::vector<int>& chosen, const DepthScale& curve,
+                                 const StereoDescriptor& descriptor);
+
+/// The given rows of a feature set; layout "left" of a "left+right" set keeps the left halves.
+StereoFeatures selectRows(const StereoFeatures& features, const std::vector<int>& rows, const std::string& layout);
+
+}  // namespace sdvo

@@ -1,0 +1,276 @@
+#include "matching_experiment.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <map>
+#include <stdexcept>
+
+#include "../tools/progress.hpp"
+#include "csv_table.hpp"
+#include "keypoint_set.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr int kSteps = 10, kStride = 10;  // paper, algorithm 1
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
+
+/// One way to choose the sizes; the scale normalised one comes first, the standard one second.
+struct Side {
+  std::string name;
+  double constant_size;  ///< px; 0 when the size follows the disparity
+  DepthScale curve;
+};
+
+std::vector<Side> makeSides(const DepthScaleOptions& options, const MatchingExperiment& experiment) {
+  DepthScaleOptions normalised = options;
+  normalised.scale_normalisation = true;
+  std::vector<Side> sides = {{"scale_normalised", 0.0, DepthScale(normalised)}};
+  std::vector<double> sizes = experiment.constant_sizes;
+  sizes.insert(sizes.begin(), experiment.standard_size);
+  for (const double size : sizes) {
+    DepthScaleOptions constant = options;
+    constant.scale_normalisation = false;
+    constant.constant_size = size;
+    const std::string whole = std::to_string(static_cast<int>(std::lround(size)));
+    sides.push_back({"constant_" + whole, size, DepthScale(constant)});
+  }
+  return sides;
+}
+
+/// Correct matches of one side, by step.
+struct Score {
+  std::vector<int> correct = std::vector<int>(kSteps, 0);
+  std::vector<int> pairs = std::vector<int>(kSteps, 0);
+
+  void operator+=(const Score& other) {
+    for (int s = 0; s < kSteps; ++s) correct[s] += other.correct[s], pairs[s] += other.pairs[s];
+  }
+  double perPair() const {
+    int sum = 0, count = 0;
+    for (int s = 0; s < kSteps; ++s) sum += correct[s], count += pairs[s];
+    return count ? static_cast<double>(sum) / count : kUnknown;
+  }
+};
+
+/// What one row of the table is about.
+struct Case {
+  std::string descriptor, layout;
+  int features;
+
+  bool operator<(const Case& other) const {
+    return std::tie(descriptor, layout, features) < std::tie(other.descriptor, other.layout, other.features);
+  }
+};
+
+struct CaseScores {
+  std::vector<Score> of_side;
+  double described = 0.0, frames = 0.0;  ///< for the mean size of the feature sets
+
+  void operator+=(const CaseScores& other) {
+    of_side.resize(other.of_side.size());
+    for (std::size_t s = 0; s < other.of_side.size(); ++s) of_side[s] += other.of_side[s];
+    described += other.described;
+    frames += other.frames;
+  }
+};
+
+using Scores = std::map<Case, CaseScores>;
+
+/// Table 1 and figure 7 of the paper, for what it gives.
+double publishedImprovement(const Case& c, const std::string& sequence) {
+  static const std::map<std::pair<std::string, std::string>, double> table_1 = {
+      {{"freak", "00"}, 29.34}, {{"freak", "01"}, 18.42}, {{"freak", "02"}, 28.81}, {{"freak", "03"}, 22.39},
+      {{"freak", "04"}, 32.25}, {{"freak", "05"}, 34.69}, {{"freak", "06"}, 28.23}, {{"freak", "07"}, 34.64},
+      {{"freak", "08"}, 36.40}, {{"freak", "09"}, 24.53}, {{"freak", "10"}, 25.34}, {{"sift", "00"}, 10.95},
+      {{"sift", "01"}, 7.65},   {{"sift", "02"}, 9.16},   {{"sift", "03"}, 6.53},   {{"sift", "04"}, 7.37},
+      {{"sift", "05"}, 9.61},   {{"sift", "06"}, 7.04},   {{"sift", "07"}, 7.46},   {{"sift", "08"}, 13.05},
+      {{"sift", "09"}, 8.15},   {{"sift", "10"}, 7.34}};
+  static const std::map<int, double> figure_7 = {{310, 11.58}, {1350, 15.37}, {2320, 26.41}};
+  if (c.layout != "left") return kUnknown;
+  if (sequence == "mean") {
+    const auto found = figure_7.find(c.features);
+    return c.descriptor == "freak" && found != figure_7.end() ? found->second : kUnknown;
+  }
+  const auto found = table_1.find({c.descriptor, sequence});
+  return c.features == 2320 && found != table_1.end() ? found->second : kUnknown;
+}
+
+/// Features of one frame on every side, largest set, with the rows of the smaller sets.
+struct DescribedFrame {
+  std::vector<StereoFeatures> of_side;
+  std::map<int, std::vector<int>> rows_of_count;
+};
+
+class SequenceMatching {
+ public:
+  SequenceMatching(const ReferenceSequence& sequence, const MatchingExperiment& experiment, const PipelineOptions& options,
+                   const std::vector<Side>& sides)
+      : sequence_(sequence), experiment_(experiment), options_(options), sides_(sides) {
+    for (const Side& side : sides) curves_.push_back(side.curve);
+    for (const std::string& type : experiment.descriptors) {
+      DescriptorOptions descriptor = options.stereo_features.descriptor;
+      descriptor.type = type;
+      descriptor.layout = "left+right";  // the left layout is its left half
+      descriptors_.emplace_back(descriptor);
+      reach_.push_back(measureReachPerSize(type));
+    }
+  }
+
+  Scores run() {
+    int blocks = 0;
+    for (int t = 0; t + 1 < sequence_.frames; t += kStride) ++blocks;
+    Progress progress("matching " + sequence_.name, blocks * static_cast<int>(descriptors_.size()));
+    std::vector<std::map<int, DescribedFrame>> frames(descriptors_.size());
+    std::map<int, KeypointSet> keypoints;
+    for (int t = 0; t + 1 < sequence_.frames; t += kStride) {
+      const int last = std::min(t + kSteps, sequence_.frames - 1);
+      keypoints.clear();
+      for (std::size_t d = 0; d < descriptors_.size(); ++d, progress.step()) {
+        frames[d].erase(frames[d].begin(), frames[d].lower_bound(t));
+        for (int i = t; i <= last; ++i) {
+          if (frames[d].count(i)) continue;
+          auto found = keypoints.find(i);
+          if (found == keypoints.end()) {
+            const auto& extraction = options_.stereo_features;
+            found = keypoints.emplace(i, findKeypoints(sequence_.images, i, extraction.detector, extraction.stereo)).first;
+          }
+          frames[d][i] = describe(d, found->second);
+        }
+        for (int i = t + 1; i <= last; ++i) compare(experiment_.descriptors[d], frames[d][t], frames[d][i], t, i);
+      }
+    }
+    return scores_;
+  }
+
+ private:
+  DescribedFrame describe(std::size_t d, const KeypointSet& set) {
+    const int bucket = options_.stereo_features.detector.bucket_size;
+    const std::vector<int>& counts = experiment_.feature_counts;
+    const int most = *std::max_element(counts.begin(), counts.end());
+    const std::vector<int> chosen = selectKeypoints(set, curves_, reach_[d], bucket, most);
+    DescribedFrame frame;
+    for (const Side& side : sides_) frame.of_side.push_back(describeKeypoints(set, chosen, side.curve, descriptors_[d]));
+    for (const int count : counts) {
+      std::vector<int>& rows = frame.rows_of_count[count];
+      for (const int i : selectKeypoints(set, curves_, reach_[d], bucket, count)) {
+        const auto row = std::lower_bound(chosen.begin(), chosen.end(), i);
+        if (row != chosen.end() && *row == i) rows.push_back(static_cast<int>(row - chosen.begin()));
+      }
+      for (const std::string& layout : experiment_.layouts) {
+        CaseScores& scores = scores_[{experiment_.descriptors[d], layout, count}];
+        scores.of_side.resize(sides_.size());
+        scores.described += static_cast<double>(rows.size());
+        ++scores.frames;
+      }
+    }
+    return frame;
+  }
+
+  void compare(const std::string& descriptor, const DescribedFrame& reference, const DescribedFrame& current, int from,
+               int to) {
+    const Eigen::Isometry3d motion = sequence_.motion(from, to);
+    const std::size_t step = static_cast<std::size_t>(to - from - 1);
+    for (const int count : experiment_.feature_counts) {
+      for (const std::string& layout : experiment_.layouts) {
+        CaseScores& scores = scores_[{descriptor, layout, count}];
+        for (std::size_t s = 0; s < sides_.size(); ++s) {
+          const StereoFeatures a = selectRows(reference.of_side[s], reference.rows_of_count.at(count), layout);
+          const StereoFeatures b = selectRows(current.of_side[s], current.rows_of_count.at(count), layout);
+          scores.of_side[s].correct[step] += countCorrect(a, b, matchByDescriptor(a, b), motion);
+          ++scores.of_side[s].pairs[step];
+        }
+      }
+    }
+  }
+
+  const ReferenceSequence& sequence_;
+  const MatchingExperiment& experiment_;
+  const PipelineOptions& options_;
+  const std::vector<Side>& sides_;
+  std::vector<DepthScale> curves_;
+  std::vector<StereoDescriptor> descriptors_;
+  std::vector<double> reach_;
+  Scores scores_;
+};
+
+double improvement(double ours, double theirs) { return 100.0 * (ours / theirs - 1.0); }
+
+/// The improvements of one row: the scale normalised side against the standard one and against the best constant size.
+struct Improvements {
+  double standard = 0.0, best_constant = 0.0;
+};
+
+class Report {
+ public:
+  Report(const std::vector<Side>& sides, const ExperimentSetup& setup, std::string hash)
+      : sides_(sides), reference_(setup.reference), hash_(std::move(hash)) {}
+
+  void addRow(const std::string& sequence, const Case& c, const CaseScores& scores, const Improvements* mean) {
+    std::size_t best = 1;
+    for (std::size_t s = 2; s < sides_.size(); ++s)
+      if (scores.of_side[s].perPair() > scores.of_side[best].perPair()) best = s;
+    const double normalised = scores.of_side[0].perPair(), standard = scores.of_side[1].perPair();
+    const Improvements own{improvement(normalised, standard), improvement(normalised, scores.of_side[best].perPair())};
+    const Improvements shown = mean ? *mean : own;
+    table_.add(sequence, c.descriptor, c.layout, c.features, scores.described / std::max(scores.frames, 1.0), normalised,
+               standard, shown.standard, publishedImprovement(c, sequence), sides_[best].constant_size,
+               scores.of_side[best].perPair(), shown.best_constant, reference_, hash_);
+    for (std::size_t s = 0; s < sides_.size(); ++s)
+      for (int step = 0; step < kSteps; ++step)
+        if (const int pairs = scores.of_side[s].pairs[step])
+          steps_.add(sequence, c.descriptor, c.layout, c.features, sides_[s].name, step + 1, scores.of_side[s].correct[step],
+                     pairs);
+    latest_ = own;
+  }
+
+  const Improvements& latest() const { return latest_; }
+
+  std::string write(const std::string& directory) const {
+    table_.write(directory + "/matching.csv");
+    steps_.write(directory + "/matching_steps.csv");
+    return table_.aligned();
+  }
+
+ private:
+  const std::vector<Side>& sides_;
+  std::string reference_, hash_;
+  Improvements latest_;
+  CsvTable table_{{"sequence", "descriptor", "layout", "features", "described", "scale_normalised", "standard",
+                   "improvement_percent", "paper_percent", "best_constant_size", "best_constant",
+                   "improvement_on_best_percent", "reference", "options"}};
+  CsvTable steps_{{"sequence", "descriptor", "layout", "features", "side", "step", "correct", "pairs"}};
+};
+
+}  // namespace
+
+std::string runMatching(const ExperimentSetup& setup, const MatchingExperiment& experiment) {
+  PipelineOptions options = setup.options();
+  const std::vector<Side> sides = makeSides(options.stereo_features.size_curve, experiment);
+  Report report(sides, setup, hashOptions(listOptions(options)));
+  Scores total;
+  std::map<Case, std::vector<Improvements>> improvements;
+  for (const std::string& name : setup.sequences) {
+    const ReferenceSequence sequence = openSequence(setup, name, setup.reference);
+    for (const auto& [c, scores] : SequenceMatching(sequence, experiment, options, sides).run()) {
+      report.addRow(sequence.name, c, scores, nullptr);
+      improvements[c].push_back(report.latest());
+      total[c] += scores;
+    }
+  }
+  // As in the paper, the mean improvement is the mean of the sequences' improvements.
+  for (const auto& [c, scores] : total) {
+    Improvements mean;
+    const double count = static_cast<double>(improvements[c].size());
+    for (const Improvements& i : improvements[c]) {
+      mean.standard += i.standard / count;
+      mean.best_constant += i.best_constant / count;
+    }
+    report.addRow("mean", c, scores, &mean);
+  }
+  return report.write(setup.output);
+}
+
+}  // namespace sdvo

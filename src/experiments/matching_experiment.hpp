@@ -1,0 +1,19 @@
+#pragma once
+
+#include "experiment_setup.hpp"
+
+namespace sdvo {
+
+/// Experiment A of the paper: correct matches of scale normalised descriptors against the standard ones.
+struct MatchingExperiment {
+  std::vector<std::string> descriptors = {"freak", "sift"};
+  std::vector<std::string> layouts = {"left", "left+right"};
+  std::vector<int> feature_counts = {310, 1350, 2320};
+  double standard_size = 7.0;                           ///< px
+  std::vector<double> constant_sizes = {10.0, 14.0, 20.0};  ///< px, candidates beside the standard for the best one
+};
+
+/// Writes matching.csv (the layout of table 1) and matching_steps.csv to the output directory; returns the former as text.
+std::string runMatching(const ExperimentSetup& setup, const MatchingExperiment& experiment);
+
+}  // namespace sdvo

@@ -1,0 +1,53 @@
+#include "odometry_systems.hpp"
+
+#include "../tools/progress.hpp"
+#include "keypoint_set.hpp"
+
+namespace sdvo {
+
+const std::vector<OdometrySystem>& odometrySystems() {
+  static const std::vector<OdometrySystem> systems = {{"standard", false, "left"},
+                                                      {"scale_normalised", true, "left"},
+                                                      {"left+right", false, "left+right"},
+                                                      {"stereo", true, "left+right"}};
+  return systems;
+}
+
+std::vector<std::vector<StereoFeatures>> describeSequence(const ReferenceSequence& sequence, const PipelineOptions& options,
+                                                          double standard_size, int count) {
+  const FeatureExtractorOptions& extraction = options.stereo_features;
+  DepthScaleOptions normalised = extraction.size_curve, constant = extraction.size_curve;
+  normalised.scale_normalisation = true;
+  constant.scale_normalisation = false;
+  constant.constant_size = standard_size;
+  const std::vector<DepthScale> curves = {DepthScale(constant), DepthScale(normalised)};
+  DescriptorOptions both_views = extraction.descriptor;
+  both_views.layout = "left+right";
+  const StereoDescriptor descriptor(both_views);
+  const double reach = measureReachPerSize(both_views.type);
+
+  std::vector<std::vector<StereoFeatures>> described(odometrySystems().size());
+  Progress progress("describing " + sequence.name, sequence.frames);
+  for (int i = 0; i < sequence.frames; ++i, progress.step()) {
+    const KeypointSet set = findKeypoints(sequence.images, i, extraction.detector, extraction.stereo);
+    const std::vector<int> chosen = selectKeypoints(set, curves, reach, extraction.detector.bucket_size, count);
+    std::vector<int> all_rows;
+    for (std::size_t k = 0; k < chosen.size(); ++k) all_rows.push_back(static_cast<int>(k));
+    std::vector<StereoFeatures> of_curve;
+    for (const DepthScale& curve : curves) of_curve.push_back(describeKeypoints(set, chosen, curve, descriptor));
+    for (std::size_t s = 0; s < described.size(); ++s) {
+      const OdometrySystem& system = odometrySystems()[s];
+      described[s].push_back(selectRows(of_curve[system.scale_normalisation ? 1 : 0], all_rows, system.layout));
+    }
+  }
+  return described;
+}
+
+std::vector<Correspondence> makeCorrespondences(const StereoFeatures& reference, const StereoFeatures& current) {
+  std::vector<Correspondence> correspondences;
+  for (const FeatureMatch& match : matchByDescriptor(reference, current))
+    correspondences.push_back({reference.point(match.reference), current.measurement(match.current)});
+  return correspondences;
+}
+
+}  // namespace sdvo

@@ -1,0 +1,74 @@
+#include "features_image.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+#include <string>
+
+#include "stereo_descriptor_vo/ros/stereo_features_view.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr int kShift = 4;  // sub-pixel bits of OpenCV's drawing
+const cv::Scalar kInlier(80, 220, 80), kOutlier(200, 60, 220);
+
+cv::Point fixedPoint(double u, double v) {
+  return {static_cast<int>(std::lround(u * (1 << kShift))), static_cast<int>(std::lround(v * (1 << kShift)))};
+}
+
+/// Far (1 px of disparity) blue to near (128 px) red, in steps of equal ratios.
+cv::Scalar depthColour(float disparity) {
+  static const cv::Mat palette = [] {
+    cv::Mat grey(1, 256, CV_8U), colours;
+    for (int i = 0; i < 256; ++i) grey.at<std::uint8_t>(0, i) = static_cast<std::uint8_t>(i);
+    cv::applyColorMap(grey, colours, cv::COLORMAP_JET);
+    return colours;
+  }();
+  const double share = std::log2(std::clamp(disparity, 1.f, 128.f)) / 7.0;
+  const auto& colour = palette.at<cv::Vec3b>(0, static_cast<int>(share * 255.0));
+  return {static_cast<double>(colour[0]), static_cast<double>(colour[1]), static_cast<double>(colour[2])};
+}
+
+void drawCircle(cv::Mat& image, double u, double v, double diameter, const cv::Scalar& colour) {
+  const int radius = static_cast<int>(std::lround(0.5 * diameter * (1 << kShift)));
+  cv::circle(image, fixedPoint(u, v), radius, colour, 1, cv::LINE_AA, kShift);
+}
+
+void drawCaption(cv::Mat& image, const std::string& text) {
+  const cv::Point origin(6, 18);
+  cv::putText(image, text, origin, cv::FONT_HERSHEY_SIMPLEX, 0.5, cv::Scalar::all(0), 3, cv::LINE_AA);
+  cv::putText(image, text, origin, cv::FONT_HERSHEY_SIMPLEX, 0.5, cv::Scalar::all(255), 1, cv::LINE_AA);
+}
+
+}  // namespace
+
+cv::Mat drawFeatures(const cv::Mat& left, const cv::Mat& right, const stereo_descriptor_vo::StereoFeatures& features,
+                     const stereo_descriptor_vo::FeatureFlow& flow) {
+  const StereoFeaturesView view(features);
+  cv::Mat left_colour, right_colour;
+  cv::cvtColor(left, left_colour, cv::COLOR_GRAY2BGR);
+  cv::cvtColor(right, right_colour, cv::COLOR_GRAY2BGR);
+
+  for (int i = 0; i < view.count(); ++i) {
+    const cv::Scalar colour = depthColour(features.disparity[i]);
+    drawCircle(left_colour, features.u[i], features.v[i], features.size[i], colour);
+    drawCircle(right_colour, features.u[i] - features.disparity[i], features.v[i] + features.dv[i], features.size[i], colour);
+  }
+  const std::size_t matches = std::min({flow.u.size(), flow.v.size(), flow.u_reference.size(), flow.v_reference.size(),
+                                        flow.inlier.size()});
+  std::size_t inliers = 0;
+  for (std::size_t i = 0; i < matches; ++i) {
+    inliers += flow.inlier[i] ? 1 : 0;
+    cv::line(left_colour, fixedPoint(flow.u_reference[i], flow.v_reference[i]), fixedPoint(flow.u[i], flow.v[i]),
+             flow.inlier[i] ? kInlier : kOutlier, 1, cv::LINE_AA, kShift);
+  }
+  drawCaption(left_colour, "left: " + std::to_string(view.count()) + " features, " + std::to_string(matches) +
+                               " matches (green: " + std::to_string(inliers) + " inliers, magenta: outliers)");
+  drawCaption(right_colour, "right: circles have the size that the depth gives, near red to far blue");
+  cv::Mat both;
+  cv::vconcat(left_colour, right_colour, both);
+  return both;
+}
+
+}  // namespace sdvo

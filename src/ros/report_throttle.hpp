@@ -1,0 +1,34 @@
+#pragma once
+
+#include <ros/time.h>
+
+#include <map>
+#include <mutex>
+#include <string>
+
+namespace sdvo {
+
+/// Lets a report of one kind through at most once in a period. ROS' own throttle shares its state between all nodelets of
+/// a manager, lets different errors hide each other and goes by simulated time, which may stand still.
+class ReportThrottle {
+ public:
+  /// Whether to report `kind` now.
+  bool allows(const std::string& kind) {
+    const ros::WallTime now = ros::WallTime::now();
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto [last, is_new] = last_.try_emplace(kind, now);
+    if (!is_new && now - last->second < ros::WallDuration(kPeriod)) return false;
+    last->second = now;
+    if (last_.size() > kKinds) last_.clear();
+    return true;
+  }
+
+ private:
+  static constexpr double kPeriod = 5.0;      // s
+  static constexpr std::size_t kKinds = 100;  // remembered
+
+  std::mutex mutex_;
+  std::map<std::string, ros::WallTime> last_;
+};
+
+}  // namespace sdvo

@@ -1,0 +1,152 @@
+// The paper's experiments (section "Experimental Results") on sequences in KITTI layout, as CSV, PNG and text.
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <iostream>
+#include <memory>
+#include <opencv2/core/utility.hpp>
+#include <stdexcept>
+
+#include "../experiments/accuracy_experiment.hpp"
+#include "../experiments/consensus_experiment.hpp"
+#include "../experiments/matching_experiment.hpp"
+#include "../experiments/plot_script.hpp"
+#include "../experiments/robustness_experiment.hpp"
+#include "run_tool.hpp"
+
+namespace {
+
+struct Arguments {
+  sdvo::ExperimentSetup setup;
+  sdvo::MatchingExperiment matching;
+  sdvo::RobustnessExperiment robustness;
+  sdvo::AccuracyExperiment accuracy;
+  sdvo::ConsensusExperiment consensus;
+  bool plot = true;
+};
+
+void addOutput(CLI::App& app, Arguments& arguments) {
+  app.add_option("--output", arguments.setup.output, "directory to write to; made when missing")->required();
+  app.add_option("--param", arguments.setup.settings,
+                 "option as name=value, for example size_curve/slope=0.8; repeatable")
+      ->allow_extra_args(false);
+  app.add_flag("!--no-plot", arguments.plot, "write the CSV files only");
+}
+
+void addSequences(CLI::App& app, Arguments& arguments) {
+  app.add_option("--kitti", arguments.setup.kitti, "directory of the KITTI odometry data, the one that holds sequences/");
+  app.add_option("--sequences", arguments.setup.sequences,
+                 "numbers such as 04,06, or directories in KITTI layout; separated by commas")
+      ->required()
+      ->delimiter(',');
+  app.add_option("--frames", arguments.setup.frames, "use only the first N pairs of each sequence")
+      ->check(CLI::Range(2, 1000000));
+  addOutput(app, arguments);
+}
+
+CLI::App* addMatching(CLI::App& app, Arguments& arguments) {
+  CLI::App* command = app.add_subcommand("matching", "A: correct matches of scale normalised and standard descriptors");
+  addSequences(*command, arguments);
+  command->add_option("--reference", arguments.setup.reference, "motion taken for true: ground_truth or odometry")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"ground_truth", "odometry"}));
+  command->add_option("--descriptors", arguments.matching.descriptors, "base descriptors, separated by commas")
+      ->capture_default_str()
+      ->delimiter(',');
+  command->add_option("--layouts", arguments.matching.layouts, "left, left+right")
+      ->capture_default_str()
+      ->delimiter(',')
+      ->check(CLI::IsMember({"left", "left+right"}));
+  command->add_option("--features", arguments.matching.feature_counts, "sizes of the feature sets")
+      ->capture_default_str()
+      ->delimiter(',')
+      ->check(CLI::Range(10, 10000));
+  command->add_option("--constant-sizes", arguments.matching.constant_sizes,
+                      "px, tried for the best constant size beside the standard 7 px")
+      ->capture_default_str()
+      ->delimiter(',')
+      ->check(CLI::Range(2.0, 200.0));
+  return command;
+}
+
+CLI::App* addRobustness(CLI::App& app, Arguments& arguments) {
+  CLI::App* command = app.add_subcommand("robustness", "B: inliers of the motion over 1 to 5 steps");
+  addSequences(*command, arguments);
+  command->add_option("--features", arguments.robustness.features, "size of the feature set")
+      ->capture_default_str()
+      ->check(CLI::Range(10, 10000));
+  command->add_option("--stride", arguments.robustness.stride, "pairs between two starts")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 10000));
+  command->add_option("--seeds", arguments.robustness.seeds, "runs of the outlier rejection")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 1000));
+  return command;
+}
+
+CLI::App* addAccuracy(CLI::App& app, Arguments& arguments) {
+  CLI::App* command = app.add_subcommand("accuracy", "C: errors of the odometry over runs with different seeds");
+  addSequences(*command, arguments);
+  command->add_option("--features", arguments.accuracy.features, "size of the feature set")
+      ->capture_default_str()
+      ->check(CLI::Range(10, 10000));
+  command->add_option("--seeds", arguments.accuracy.seeds, "runs")->capture_default_str()->check(CLI::Range(1, 1000));
+  command->add_option("--methods", arguments.accuracy.methods, "outlier rejection, separated by commas")
+      ->capture_default_str()
+      ->delimiter(',')
+      ->check(CLI::IsMember({"ransac", "msac", "lo_ransac", "gasac", "adaptive_gasac"}));
+  command->add_flag("--package-odometry", arguments.accuracy.package_odometry,
+                    "also run the package's odometry, not only the paper's frame-to-frame model");
+  return command;
+}
+
+CLI::App* addConsensus(CLI::App& app, Arguments& arguments) {
+  CLI::App* command = app.add_subcommand("consensus", "outlier rejection by name on generated correspondences");
+  addOutput(*command, arguments);
+  command->add_option("--correspondences", arguments.consensus.correspondences, "of each problem")
+      ->capture_default_str()
+      ->check(CLI::Range(20, 100000));
+  command->add_option("--seeds", arguments.consensus.seeds, "problems")->capture_default_str()->check(CLI::Range(1, 10000));
+  command->add_option("--budgets", arguments.consensus.budgets, "most samples, separated by commas")
+      ->capture_default_str()
+      ->delimiter(',')
+      ->check(CLI::Range(1, 100000));
+  return command;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("The paper's experiments on sequences in KITTI layout: tables as CSV, figures as PNG");
+  app.require_subcommand(1);
+  Arguments arguments;
+  CLI::App* matching = addMatching(app, arguments);
+  CLI::App* robustness = addRobustness(app, arguments);
+  CLI::App* accuracy = addAccuracy(app, arguments);
+  CLI::App* consensus = addConsensus(app, arguments);
+  return sdvo::runTool(app, argc, argv, [&] {
+    cv::setNumThreads(1);  // experiments are compared with each other: no race may change them
+    const std::string& output = arguments.setup.output;
+    const sdvo::PipelineOptions options = arguments.setup.options();  // refuses bad settings before the work begins
+    std::error_code failure;
+    std::filesystem::create_directories(output, failure);
+    if (failure) throw std::runtime_error("cannot make the directory " + output + ": " + failure.message());
+    std::string table, name;
+    if (*matching) {
+      name = "matching";
+      table = sdvo::runMatching(arguments.setup, arguments.matching);
+    } else if (*robustness) {
+      name = "robustness";
+      table = sdvo::runRobustness(arguments.setup, arguments.robustness);
+    } else if (*accuracy) {
+      name = "accuracy";
+      table = sdvo::runAccuracy(arguments.setup, arguments.accuracy);
+    } else if (*consensus) {
+      name = "consensus";
+      arguments.consensus.options = options.visual_odometry.motion;
+      table = sdvo::runConsensus(arguments.consensus, output);
+    }
+    std::cout << table << "written to " << output << std::endl;
+    if (arguments.plot) sdvo::runPlotScript("plot_experiments.py", {name, output});
+    return 0;
+  });
+}

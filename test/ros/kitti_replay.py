@@ -1,0 +1,194 @@
+"""What the ROS tests share: real stereo pairs, the pipeline as a user launches it, and the wait for what must happen."""
+
+import os
+import subprocess
+import time
+import unittest
+import xmlrpc.client
+
+import cv2
+import numpy as np
+import rosgraph
+import rospy
+from cv_bridge import CvBridge
+from rosgraph_msgs.msg import Clock, Log
+from sensor_msgs.msg import CameraInfo, Image
+
+PACKAGE = 'stereo_descriptor_vo'
+FRAME = 'test_left_optical'
+EPOCH = 1000.0  # s; ROS reads a stamp of 0 as "no time"
+
+
+def kitti_dir():
+    """The directory of the data set; skips the test, loudly, when there is none."""
+    directory = os.environ.get('KITTI_DIR')
+    if not directory:
+        print('\n*** SKIPPED: KITTI_DIR is not set: give it the absolute path of KITTI odometry data '
+              '(sequences/06, poses/06.txt …) ***\n', flush=True)
+        raise unittest.SkipTest('KITTI_DIR is not set')
+    if not os.path.isdir(os.path.join(directory, 'sequences')):
+        raise AssertionError("KITTI_DIR = '%s' has no folder 'sequences'" % directory)
+    return directory
+
+
+def wait_until(condition, timeout=30.0):
+    """Waits in wall time; true when the condition came to hold."""
+    end = time.time() + timeout
+    while not condition():
+        if time.time() > end or rospy.is_shutdown():
+            return bool(condition())
+        time.sleep(0.01)
+    return True
+
+
+class Collector:
+    """Keeps every message of a topic in order."""
+
+    def __init__(self, topic, message_type):
+        self.messages = []
+        self.subscriber = rospy.Subscriber(topic, message_type, self.messages.append, queue_size=1000)
+
+    def __len__(self):
+        return len(self.messages)
+
+    def __getitem__(self, index):
+        return self.messages[index]
+
+    def close(self):
+        self.subscriber.unregister()
+
+
+class StereoSequence:
+    """The first pairs of a KITTI sequence in memory."""
+
+    def __init__(self, name, count):
+        directory = os.path.join(kitti_dir(), 'sequences', name)
+        paths = [[os.path.join(directory, 'image_%d' % side, '%06d.png' % i) for side in range(2)]
+                 for i in range(count)]
+        self.pairs = [[cv2.imread(path, cv2.IMREAD_GRAYSCALE) for path in pair] for pair in paths]
+        assert all(image is not None for pair in self.pairs for image in pair), 'cannot read images in ' + directory
+        with open(os.path.join(directory, 'calib.txt')) as file:
+            rows = dict(line.split(':') for line in file if line.strip())
+        self.projections = [[float(x) for x in rows['P%d' % side].split()] for side in range(2)]
+
+    def camera_info(self, side):
+        p = self.projections[side]
+        info = CameraInfo()
+        info.height, info.width = self.pairs[0][side].shape
+        info.distortion_model = 'plumb_bob'
+        info.D = [0.0] * 5
+        info.K = [p[0], 0, p[2], 0, p[5], p[6], 0, 0, 1]
+        info.R = [1, 0, 0, 0, 1, 0, 0, 0, 1]
+        info.P = p
+        return info
+
+
+class Camera:
+    """A stereo camera's driver: publishes pairs and, as the only source of it, the simulated time."""
+
+    def __init__(self, namespace, sequence, clock):
+        self.sequence, self.clock = sequence, clock
+        self.bridge = CvBridge()
+        sides = ['left', 'right']
+        self.images = [rospy.Publisher('%s/%s/image_rect' % (namespace, s), Image, queue_size=100) for s in sides]
+        self.infos = [rospy.Publisher('%s/%s/camera_info' % (namespace, s), CameraInfo, queue_size=100) for s in sides]
+
+    def is_subscribed(self):
+        return all(p.get_num_connections() > 0 for p in self.images + self.infos)
+
+    def has_subscribers(self):
+        return any(p.get_num_connections() > 0 for p in self.images + self.infos)
+
+    def messages(self, i, time_of=None, frame=FRAME):
+        """([left image, right image], [left info, right info]) of pair i, stamped as pair `time_of` of a 10 Hz camera."""
+        stamp = rospy.Time.from_sec(EPOCH) + rospy.Duration.from_sec(0.1 * (i if time_of is None else time_of))
+        images = [self.bridge.cv2_to_imgmsg(image, 'mono8') for image in self.sequence.pairs[i]]
+        infos = [self.sequence.camera_info(side) for side in range(2)]
+        for message in images + infos:
+            message.header.stamp = stamp
+            message.header.frame_id = frame
+        return images, infos
+
+    def publish(self, images, infos):
+        self.clock.advance_to(images[0].header.stamp)
+        for publisher, message in zip(self.infos + self.images, infos + images):
+            publisher.publish(message)
+
+    def close(self):
+        for publisher in self.images + self.infos:
+            publisher.unregister()
+
+
+class SimulatedClock:
+    """Runs ahead only: the stamps of the images may jump, the pauses between log messages must pass."""
+
+    def __init__(self):
+        self.now = rospy.Time.from_sec(EPOCH)
+        self.publisher = rospy.Publisher('/clock', Clock, queue_size=10, latch=True)
+        self.publish()
+
+    def publish(self):
+        self.publisher.publish(Clock(clock=self.now))
+
+    def advance_to(self, stamp):
+        if stamp > self.now:
+            self.now = stamp
+        self.publish()
+
+    def advance(self, seconds):
+        self.now += rospy.Duration.from_sec(seconds)
+        self.publish()
+        time.sleep(0.3)  # until every node has seen it
+
+
+class Pipeline:
+    """The two nodelets, launched as a user would."""
+
+    def __init__(self, namespace, **arguments):
+        self.namespace = namespace
+        self.manager = arguments.get('manager', namespace + '/stereo_vo_manager')
+        arguments = ['%s:=%s' % item for item in arguments.items()] + ['namespace:=' + namespace.strip('/')]
+        self.process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch'] + arguments)
+
+    def pid(self):
+        """Of the nodelet manager; None when it is gone."""
+        try:
+            uri = rosgraph.Master('/test').lookupNode(self.manager)
+            code, _, pid = xmlrpc.client.ServerProxy(uri).getPid('/test')
+            return pid if code == 1 else None
+        except Exception:  # whatever keeps it from answering: it is not there
+            return None
+
+    def close(self):
+        self.process.terminate()
+        self.process.wait()
+
+
+class Rosout:
+    """Errors and fatal messages that nodes of a namespace log."""
+
+    def __init__(self, namespace):
+        self.namespace = namespace
+        self.errors = []
+        self.subscriber = rospy.Subscriber('/rosout', Log, self.receive, queue_size=1000)
+
+    def receive(self, log):
+        if log.level >= Log.ERROR and log.name.startswith(self.namespace + '/'):
+            self.errors.append(log.msg)
+
+    def said(self, *words):
+        return any(all(word in error for word in words) for error in self.errors)
+
+    def close(self):
+        self.subscriber.unregister()
+
+
+def matrix_of(pose):
+    """4x4 matrix of a geometry_msgs/Pose or Transform."""
+    t = pose.position if hasattr(pose, 'position') else pose.translation
+    q = pose.orientation if hasattr(pose, 'orientation') else pose.rotation
+    x, y, z, w = q.x, q.y, q.z, q.w
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w), t.x],
+                     [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w), t.y],
+                     [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y), t.z],
+                     [0, 0, 0, 1]])

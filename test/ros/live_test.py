@@ -1,0 +1,321 @@
+#!/usr/bin/python3
+"""A camera that misbehaves in every way we know, on the launched pipeline. The test is the camera and the clock, and
+waits for the answer to each pair, so that nothing depends on the machine's speed."""
+
+import copy
+import subprocess
+import sys
+import time
+import unittest
+
+import numpy as np
+import roslib.packages
+import rospy
+import rostest
+import tf2_ros
+from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import Odometry
+from std_srvs.srv import Empty
+
+from kitti_replay import (FRAME, PACKAGE, Camera, Collector, Pipeline, Rosout, SimulatedClock, StereoSequence,
+                          matrix_of, wait_until)
+from stereo_descriptor_vo.msg import StereoFeatures, VoInfo
+
+PAIRS = 14  # 1.3 s: a jump back to the first one is no mere lateness
+SILENCE = 1.0  # s; a pair takes a tenth of it
+
+
+def camera_transform(frame):
+    """Of a camera that looks ahead, at the base's origin."""
+    transform = TransformStamped()
+    transform.header.frame_id = 'base_link'
+    transform.child_frame_id = frame
+    q = transform.transform.rotation
+    q.x, q.y, q.z, q.w = -0.5, 0.5, -0.5, 0.5  # optical: z forward, x right
+    return transform
+
+
+class Live(unittest.TestCase):
+    """Every test has a namespace and a pipeline of its own."""
+
+    tests = 0
+
+    @classmethod
+    def setUpClass(cls):
+        cls.sequence = StereoSequence('06', PAIRS)
+        cls.clock = SimulatedClock()
+        cls.broadcaster = tf2_ros.StaticTransformBroadcaster()
+        cls.broadcaster.sendTransform(camera_transform(FRAME))
+
+    def setUp(self):
+        Live.tests += 1
+        self.namespace = '/live_%d' % Live.tests
+        self.closeables = []
+
+    def tearDown(self):
+        for closeable in reversed(self.closeables):
+            closeable.close()
+
+    def keep(self, closeable):
+        self.closeables.append(closeable)
+        return closeable
+
+    def start(self, wait=True, **arguments):
+        """Launches the pipeline and returns when its input is subscribed."""
+        self.odometry = self.keep(Collector(self.namespace + '/odom', Odometry))
+        self.info = self.keep(Collector(self.namespace + '/vo_info', VoInfo))
+        self.features = self.keep(Collector(self.namespace + '/stereo_features', StereoFeatures))
+        self.rosout = self.keep(Rosout(self.namespace))
+        self.camera = self.keep(Camera(self.namespace, self.sequence, self.clock))
+        self.pipeline = self.keep(Pipeline(self.namespace, **arguments))
+        topics = (self.odometry, self.info, self.features)
+        self.assertTrue(wait_until(lambda: all(t.subscriber.get_num_connections() > 0 for t in topics)
+                                   and self.camera.is_subscribed(), 60), 'the pipeline did not start')
+        self.pid = self.pipeline.pid()
+        self.assertIsNotNone(self.pid)
+
+    def feed(self, i, **options):
+        """Publishes pair i and returns the VoInfo it gives."""
+        answers = len(self.info)
+        self.camera.publish(*self.camera.messages(i, **options))
+        self.assertTrue(wait_until(lambda: len(self.info) > answers), 'pair %d got no answer' % i)
+        return self.info[answers]
+
+    def expect_error(self, publish, *words):
+        """What `publish` sends must be answered by an error that holds these words, and by nothing else."""
+        self.clock.advance(10.0)  # errors are throttled
+        features, odometry = len(self.features), len(self.odometry)
+        publish()
+        self.assertTrue(wait_until(lambda: self.rosout.said(*words)), 'no error on /rosout with %s, only %s' %
+                        (words, self.rosout.errors))
+        time.sleep(0.2)
+        self.assertEqual((len(self.features), len(self.odometry)), (features, odometry))
+
+    def assert_alive(self):
+        self.assertEqual(self.pipeline.pid(), self.pid, 'the nodelet manager died')
+
+    def test_images_are_subscribed_only_while_someone_listens(self):
+        camera = self.keep(Camera(self.namespace, self.sequence, self.clock))
+        executable = roslib.packages.find_node(PACKAGE, 'stereo_features_node')[0]
+        process = subprocess.Popen([executable, '__ns:=' + self.namespace])
+        try:
+            master = rospy.get_master()
+            topic = self.namespace + '/stereo_features'
+            self.assertTrue(wait_until(lambda: any(topic == name for name, _ in master.getPublishedTopics('')[2])))
+            time.sleep(SILENCE)
+            self.assertFalse(camera.has_subscribers())
+            listener = Collector(topic, StereoFeatures)
+            self.assertTrue(wait_until(camera.is_subscribed))
+            camera.publish(*camera.messages(0))
+            self.assertTrue(wait_until(lambda: len(listener) == 1))
+            listener.close()
+            self.assertTrue(wait_until(lambda: not camera.has_subscribers()))
+            self.assertIsNone(process.poll())
+        finally:
+            process.terminate()
+            process.wait()
+
+    def test_malformed_features(self):
+        self.start()
+        publisher = rospy.Publisher(self.namespace + '/stereo_features', StereoFeatures, queue_size=10)
+        for i in range(3):
+            self.assertEqual(self.feed(i).state, 'TRACKING')
+        self.assertTrue(wait_until(lambda: publisher.get_num_connections() >= 2 and len(self.features) == 3))
+        good = self.features[2]
+
+        def damaged(**fields):
+            message = copy.copy(good)
+            message.header = copy.deepcopy(good.header)
+            message.header.stamp += rospy.Duration.from_sec(0.01)
+            for name, value in fields.items():
+                setattr(message, name, value)
+            return message
+
+        def expect_refusal(message, *words):
+            answers = len(self.info)
+            self.clock.advance(10.0)
+            publisher.publish(message)
+            self.assertTrue(wait_until(lambda: self.rosout.said('refused', *words)),
+                            'no error with %s, only %s' % (words, self.rosout.errors))
+            self.assertEqual(len(self.info), answers)
+
+        expect_refusal(damaged(v=good.v[:-1]), 'v has')
+        expect_refusal(damaged(descriptors=good.descriptors[:-1]), 'descriptors')
+        expect_refusal(damaged(bytes_per_row=0), 'bytes_per_row')
+        expect_refusal(damaged(disparity=[float('nan')] * len(good.u)), 'disparity')
+        expect_refusal(damaged(baseline=0.0), 'baseline')
+        expect_refusal(damaged(layout='sideways'), 'sideways')
+
+        # A flood of the same is one error, until some time has passed.
+        self.clock.advance(10.0)
+        errors = len(self.rosout.errors)
+        for _ in range(20):
+            publisher.publish(damaged(layout='flood'))
+        self.assertTrue(wait_until(lambda: self.rosout.said('flood')))
+        info = self.feed(3)
+        self.assertEqual(len(self.rosout.errors), errors + 1)
+        # Ten messages wait at most: what was dropped is counted elsewhere.
+        self.assertEqual(info.malformed + info.dropped_features, 26)
+        self.assertGreaterEqual(info.malformed, 7)
+        self.assertEqual((info.state, info.epoch), ('TRACKING', self.info[0].epoch))
+        publisher.unregister()
+        self.assert_alive()
+
+    def test_bad_calibration_and_images(self):
+        self.start()
+        self.assertEqual(self.feed(0).state, 'TRACKING')
+
+        def zero_k(images, infos):
+            infos[1].K = [0.0] * 9
+
+        def zero_baseline(images, infos):
+            infos[1].P = infos[0].P
+
+        def swapped(images, infos):
+            infos[0].P, infos[1].P = infos[1].P, infos[0].P
+
+        def other_size(images, infos):
+            for info in infos:
+                info.width, info.height = 640, 480
+
+        def other_encoding(images, infos):
+            for image in images:
+                image.encoding = 'bayer_rggb8'
+
+        def truncated(images, infos):
+            images[0].data = images[0].data[:-1000]
+
+        cases = ((zero_k, ('calibrated', )), (zero_baseline, ('baseline', 'Tx')), (swapped, ('swapped', 'Tx')),
+                 (other_size, ('640x480', )), (other_encoding, ("'bayer_rggb8'", )), (truncated, ('malformed', )))
+        for time_of, (damage, words) in enumerate(cases):
+            with self.subTest(damage.__name__):
+                def publish():
+                    images, infos = self.camera.messages(1, time_of=1 + 0.1 * time_of)
+                    damage(images, infos)
+                    self.camera.publish(images, infos)
+                self.rosout.errors.clear()
+                self.expect_error(publish, *words)
+        self.assert_alive()
+        info = self.feed(2)
+        self.assertEqual((info.state, info.epoch), ('TRACKING', self.info[0].epoch))
+        self.assert_alive()
+
+    def test_missing_transform(self):
+        self.start()
+        frame = 'camera_without_transform'
+        self.clock.advance(10.0)
+        self.camera.publish(*self.camera.messages(0, frame=frame))
+        self.assertTrue(wait_until(lambda: self.rosout.said("'%s'" % frame, "'base_link'")), self.rosout.errors)
+        self.camera.publish(*self.camera.messages(1, frame=frame))
+        time.sleep(SILENCE)
+        self.assertEqual((len(self.odometry), len(self.info)), (0, 0))
+        self.assertEqual(len(self.features), 2)  # the image side needs no transform
+        # Once it is there, and the listener has it, the odometry begins by itself.
+        self.broadcaster.sendTransform([camera_transform(FRAME), camera_transform(frame)])
+        time.sleep(SILENCE)
+        for i in (2, 3, 4):
+            self.assertEqual(self.feed(i, frame=frame).state, 'TRACKING')
+        self.assertEqual(len(self.odometry), 3)
+        self.assert_alive()
+
+    def test_clock_jump_is_a_reset(self):
+        self.start()
+        first = [self.feed(i) for i in range(PAIRS)]
+        second = [self.feed(i) for i in range(PAIRS)]
+        self.assertEqual({info.epoch for info in first}, {first[0].epoch})
+        self.assertEqual({info.epoch for info in second}, {first[0].epoch + 1})
+        self.assertEqual(second[0].distance, 0.0)
+        self.assertEqual(first[-1].distance, second[-1].distance)
+        self.assertTrue(wait_until(lambda: len(self.odometry) == 2 * PAIRS))
+        for a, b in zip(self.odometry[:PAIRS], self.odometry[PAIRS:]):
+            self.assertEqual(a.pose, b.pose)
+            self.assertEqual(a.twist, b.twist)
+
+    def test_reset_service(self):
+        self.start()
+        before = [self.feed(i) for i in range(3)][-1]
+        rospy.ServiceProxy(self.namespace + '/visual_odometry/reset', Empty)()
+        after = self.feed(3)
+        self.assertEqual((after.epoch, after.distance), (before.epoch + 1, 0.0))
+        self.assertTrue(wait_until(lambda: len(self.odometry) == 4))
+        np.testing.assert_allclose(matrix_of(self.odometry[3].pose.pose), np.eye(4), atol=1e-9)
+
+    def test_late_input_is_dropped_and_counted(self):
+        self.start()
+        for i in range(3):
+            self.feed(i)
+        self.camera.publish(*self.camera.messages(1))
+        info = self.feed(3)
+        self.assertEqual((len(self.info), info.dropped_pairs, info.out_of_order), (4, 1, 0))
+
+        publisher = rospy.Publisher(self.namespace + '/stereo_features', StereoFeatures, queue_size=10)
+        self.assertTrue(wait_until(lambda: publisher.get_num_connections() >= 2))
+        publisher.publish(self.features[1])
+        time.sleep(0.3)  # two publishers: nothing else orders it before the next pair
+        info = self.feed(4)
+        self.assertEqual((len(self.info), info.dropped_pairs, info.out_of_order), (5, 1, 1))
+        self.assertEqual((info.state, info.epoch), ('TRACKING', self.info[0].epoch))
+        publisher.unregister()
+
+    def test_darkness_loses_the_odometry_and_light_brings_it_back(self):
+        self.start()
+        for i in range(4):
+            self.assertEqual(self.feed(i).state, 'TRACKING')
+        states = []
+        for k in range(10):
+            images, infos = self.camera.messages(4, time_of=4 + k)
+            for image in images:
+                image.data = bytes(len(image.data))
+            answers, poses = len(self.info), len(self.odometry)
+            self.camera.publish(images, infos)
+            self.assertTrue(wait_until(lambda: len(self.info) > answers))
+            info = self.info[answers]
+            states.append(info.state)
+            if info.state == 'LOST':
+                self.assertNotEqual(info.reason, '')
+        self.assertEqual(states[1:], ['LOST'] * 9)
+        self.assertIn(states[0], ('DEGRADED', 'LOST'))
+        time.sleep(0.2)
+        predicted = states.count('DEGRADED')
+        self.assertEqual(len(self.odometry), 4 + predicted)  # nothing while LOST
+
+        light = [self.feed(i, time_of=i + 10) for i in (4, 5, 6)]
+        self.assertEqual(light[-1].state, 'TRACKING')
+        self.assertEqual(light[-1].epoch, self.info[0].epoch + 1)
+        self.assertTrue(wait_until(lambda: len(self.odometry) == 7 + predicted))
+        # It goes on from the last pose, less certain of it.
+        resumed, last = self.odometry[4 + predicted], self.odometry[3 + predicted]
+        np.testing.assert_allclose(matrix_of(resumed.pose.pose), matrix_of(last.pose.pose), atol=1e-9)
+        self.assertGreater(resumed.pose.covariance[0], last.pose.covariance[0])
+
+    def test_two_pipelines_in_one_manager_share_nothing(self):
+        self.start()
+        other_namespace = self.namespace + '_other'
+        other_info = self.keep(Collector(other_namespace + '/vo_info', VoInfo))
+        other_odometry = self.keep(Collector(other_namespace + '/odom', Odometry))
+        other_features = self.keep(Collector(other_namespace + '/stereo_features', StereoFeatures))
+        other_camera = self.keep(Camera(other_namespace, self.sequence, self.clock))
+        self.keep(Pipeline(other_namespace, start_manager='false', manager=self.pipeline.manager))
+        self.assertTrue(wait_until(lambda: other_camera.is_subscribed() and
+                                   other_info.subscriber.get_num_connections() > 0 and
+                                   other_odometry.subscriber.get_num_connections() > 0, 60))
+        for i in range(5):
+            self.feed(i)
+        self.assertTrue(wait_until(lambda: len(self.odometry) == 5))
+        time.sleep(SILENCE)
+        self.assertEqual((len(other_info), len(other_features), len(other_odometry)), (0, 0, 0))
+
+        # The other one starts from its own origin and goes the same way.
+        for i in range(5):
+            other_camera.publish(*other_camera.messages(i))
+            self.assertTrue(wait_until(lambda: len(other_odometry) == i + 1 and len(other_info) == i + 1))
+        self.assertEqual((len(self.info), len(self.odometry)), (5, 5))
+        for a, b in zip(self.odometry, other_odometry):
+            self.assertEqual(a.pose, b.pose)
+        self.assertEqual(other_info[-1].epoch, self.info[-1].epoch)
+        self.assertEqual(other_info[-1].distance, self.info[-1].distance)
+
+
+if __name__ == '__main__':
+    rospy.init_node('live_test')
+    rostest.rosrun(PACKAGE, 'live', Live, sys.argv)

@@ -1,0 +1,194 @@
+#!/usr/bin/python3
+"""Replays a whole converted KITTI sequence through the launched pipeline and checks all that comes out.
+
+Parameters: ~sequence, for example "06"; ~rate of the replay."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import numpy as np
+import rosbag
+import roslib.packages
+import rospy
+import rostest
+import tf2_ros
+from nav_msgs.msg import Odometry, Path
+from sensor_msgs.msg import PointCloud2
+from tf2_msgs.msg import TFMessage
+
+from kitti_replay import PACKAGE, Collector, kitti_dir, matrix_of, wait_until
+from stereo_descriptor_vo.msg import StereoFeatures, VoInfo
+
+STATIC_FRAMES = ('base_link', 'stereo_left_optical')
+
+
+def run_tool(name, *arguments):
+    executable = roslib.packages.find_node(PACKAGE, name)[0]
+    subprocess.run([executable] + list(arguments), check=True, stdout=subprocess.DEVNULL)
+
+
+class Replay(unittest.TestCase):
+    """One replay; each test looks at another side of what it gave."""
+
+    @classmethod
+    def setUpClass(cls):
+        sequence = os.path.join(kitti_dir(), 'sequences', rospy.get_param('~sequence'))
+        cls.directory = tempfile.mkdtemp(prefix='sdvo_replay_')
+        bag = os.path.join(cls.directory, 'sequence.bag')
+        poses = os.path.join(cls.directory, 'poses.txt')
+        run_tool('kitti_to_bag', '--sequence', sequence, '--output', bag)
+        run_tool('run_sequence', sequence, '--poses', poses)
+        cls.offline = np.loadtxt(poses).reshape(-1, 3, 4)
+        with rosbag.Bag(bag) as recorded:
+            cls.stamps = [m.header.stamp for _, m, _ in recorded.read_messages('/stereo/left/image_rect')]
+            cls.truth = {m.header.stamp: m for _, m, _ in recorded.read_messages('/ground_truth/odom')}
+
+        cls.odometry = Collector('/stereo/odom', Odometry)
+        cls.features = Collector('/stereo/stereo_features', StereoFeatures)
+        cls.info = Collector('/stereo/vo_info', VoInfo)
+        cls.path = Collector('/stereo/path', Path)
+        cls.points = Collector('/stereo/points', PointCloud2)
+        cls.ground_truth = [Collector('/ground_truth/odom', Odometry), Collector('/ground_truth/path', Path)]
+        cls.transforms = Collector('/tf', TFMessage)
+        cls.tf = tf2_ros.Buffer(rospy.Duration(1000))
+        cls.listener = tf2_ros.TransformListener(cls.tf)
+        connected = wait_until(lambda: all(c.subscriber.get_num_connections() > 0
+                                           for c in (cls.odometry, cls.features, cls.info, cls.path, cls.points)), 60)
+        assert connected, 'the nodelets did not advertise their topics within a minute'
+
+        subprocess.run(['rosbag', 'play', '--quiet', '--clock', '--wait-for-subscribers', '--rate',
+                        str(rospy.get_param('~rate')), bag], check=True)
+        pairs = len(cls.stamps)
+        wait_until(lambda: all(len(c) >= pairs for c in (cls.odometry, cls.features, cls.info, cls.path, cls.points)))
+
+    @classmethod
+    def tearDownClass(cls):
+        shutil.rmtree(cls.directory, ignore_errors=True)
+
+    def poses(self):
+        return [matrix_of(odometry.pose.pose) for odometry in self.odometry]
+
+    def test_one_of_everything_for_each_pair_with_its_stamp(self):
+        self.assertGreater(len(self.stamps), 50)
+        for collector in (self.odometry, self.features, self.info, self.points):
+            self.assertEqual([m.header.stamp for m in collector], self.stamps)
+
+    def test_frames(self):
+        for odometry in self.odometry:
+            self.assertEqual(odometry.header.frame_id, 'odom')
+            self.assertEqual(odometry.child_frame_id, 'base_link')
+        for message in list(self.features) + list(self.points):
+            self.assertEqual(message.header.frame_id, 'stereo_left_optical')
+
+    def test_numbers_are_finite_and_quaternions_unit(self):
+        for odometry in self.odometry:
+            q, p = odometry.pose.pose.orientation, odometry.pose.pose.position
+            t = odometry.twist.twist
+            self.assertAlmostEqual(q.x ** 2 + q.y ** 2 + q.z ** 2 + q.w ** 2, 1.0, delta=1e-6)
+            numbers = [p.x, p.y, p.z, t.linear.x, t.linear.y, t.linear.z, t.angular.x, t.angular.y, t.angular.z]
+            self.assertTrue(np.all(np.isfinite(numbers)))
+            self.assertTrue(np.all(np.isfinite(odometry.pose.covariance + odometry.twist.covariance)))
+
+    def test_tf_equals_odometry_at_each_stamp(self):
+        transforms = [t for message in self.transforms for t in message.transforms]
+        self.assertEqual([t.header.stamp for t in transforms], self.stamps)
+        for transform, odometry in zip(transforms, self.odometry):
+            self.assertEqual((transform.header.frame_id, transform.child_frame_id), ('odom', 'base_link'))
+            np.testing.assert_allclose(matrix_of(transform.transform), matrix_of(odometry.pose.pose), atol=1e-9)
+            # As a user asks for it; tf2's python side rounds the stamp to some 10 ns.
+            looked_up = self.tf.lookup_transform('odom', 'base_link', odometry.header.stamp)
+            np.testing.assert_allclose(matrix_of(looked_up.transform), matrix_of(odometry.pose.pose), atol=1e-4)
+
+    def test_path_holds_the_whole_trajectory(self):
+        path = self.path[-1]
+        self.assertEqual(path.header.frame_id, 'odom')
+        self.assertEqual([pose.header.stamp for pose in path.poses], self.stamps)
+        for pose, odometry in zip(path.poses, self.odometry):
+            self.assertEqual(pose.pose, odometry.pose.pose)
+
+    def test_covariances_are_valid_and_the_pose_gets_less_certain(self):
+        last_trace = 0.0
+        for odometry in self.odometry:
+            for covariance in (odometry.pose.covariance, odometry.twist.covariance):
+                matrix = np.array(covariance).reshape(6, 6)
+                np.testing.assert_array_equal(matrix, matrix.T)
+                self.assertTrue(np.all(np.diag(matrix) > 0.0))
+                eigenvalues = np.linalg.eigvalsh(matrix)
+                self.assertGreaterEqual(eigenvalues[0], -1e-12 * eigenvalues[-1])
+            trace = np.trace(np.array(odometry.pose.covariance).reshape(6, 6))
+            self.assertGreaterEqual(trace, last_trace)
+            last_trace = trace
+
+    def test_twist_is_unknown_at_first_then_that_of_the_ground_truth(self):
+        first = np.array(self.odometry[0].twist.covariance).reshape(6, 6)
+        self.assertTrue(np.all(np.diag(first) >= 1e5))
+        for odometry in self.odometry[1:]:
+            self.assertTrue(np.all(np.diag(np.array(odometry.twist.covariance).reshape(6, 6)) < 10.0))
+            actual, expected = odometry.twist.twist.linear, self.truth[odometry.header.stamp].twist.twist.linear
+            speed = np.linalg.norm([expected.x, expected.y, expected.z])
+            self.assertGreater(expected.x, 5.0)  # both sequences drive forward
+            self.assertAlmostEqual(np.linalg.norm([actual.x, actual.y, actual.z]), speed, delta=0.1 * speed)
+            self.assertAlmostEqual(actual.x, expected.x, delta=0.1 * speed)
+
+    def test_position_stays_near_the_ground_truth(self):
+        truth = [matrix_of(self.truth[stamp].pose.pose)[:3, 3] for stamp in self.stamps]
+        length = sum(np.linalg.norm(b - a) for a, b in zip(truth, truth[1:]))
+        self.assertGreater(length, 50.0)
+        self.assertLess(np.linalg.norm(self.poses()[-1][:3, 3] - truth[-1]), 0.03 * length)
+        np.testing.assert_allclose(self.poses()[0], np.eye(4), atol=1e-9)
+        x = [pose[0, 3] for pose in self.poses()]
+        self.assertTrue(all(b > a for a, b in zip(x, x[1:])), 'forward is not +x')
+
+    def test_states(self):
+        for info in self.info:
+            self.assertEqual(info.state, 'TRACKING', info.reason)
+            self.assertEqual(info.epoch, self.info[0].epoch)
+            self.assertEqual((info.dropped_pairs, info.dropped_features, info.out_of_order, info.malformed),
+                             (0, 0, 0, 0))
+        for info in self.info[1:]:
+            self.assertTrue(info.features >= info.matches >= info.inliers > 0)
+            self.assertTrue(0.0 < info.inlier_ratio <= 1.0 and 0.0 < info.coverage <= 1.0)
+            self.assertTrue(0.0 < info.rms_reprojection_error < 2.0)
+        length = sum(np.linalg.norm(b[:3, 3] - a[:3, 3]) for a, b in zip(self.poses(), self.poses()[1:]))
+        self.assertAlmostEqual(self.info[-1].distance, length, delta=0.01 * length)
+
+    def test_another_subscriber_reads_the_descriptors(self):
+        for message, info in zip(self.features, self.info):
+            n = len(message.u)
+            self.assertGreater(n, 100)
+            rows = np.frombuffer(message.descriptors, np.uint8).reshape(n, message.bytes_per_row)
+            self.assertEqual(message.element_type, 'bits')
+            self.assertEqual(message.layout, 'left+right')
+            left, right = np.hsplit(rows, 2)
+            # The halves describe the same place: they differ in far fewer bits than those of unrelated places.
+            differing = np.unpackbits(left ^ right, axis=1).mean(axis=1)
+            unrelated = np.unpackbits(left ^ np.roll(right, 1, axis=0), axis=1).mean(axis=1)
+            self.assertLess(np.median(differing), 0.6 * np.median(unrelated))
+            for values in (message.v, message.disparity, message.dv, message.size, message.angle, message.response,
+                           message.sigma, message.octave):
+                self.assertEqual(len(values), n)
+            u, v, disparity = (np.array(a) for a in (message.u, message.v, message.disparity))
+            self.assertTrue(np.all((u >= 0) & (u <= message.image_width - 1) & (v >= 0) & (v <= message.image_height - 1)))
+            self.assertTrue(np.all(disparity > 0) and np.all(u - disparity >= 0))
+            size = np.clip(message.size_slope * disparity ** message.size_exponent + message.size_offset,
+                           message.size_min, message.size_max)
+            np.testing.assert_allclose(message.size, size, rtol=1e-4)
+            self.assertEqual(info.features, n)
+
+    def test_trajectory_equals_that_of_run_sequence(self):
+        static = matrix_of(self.tf.lookup_transform(*STATIC_FRAMES, rospy.Time(0)).transform)
+        self.assertEqual(len(self.offline), len(self.poses()))
+        for offline, online in zip(self.offline, self.poses()):
+            camera = np.vstack((offline, [0, 0, 0, 1]))
+            base = static @ camera @ np.linalg.inv(static)
+            self.assertLess(np.linalg.norm(base[:3, 3] - online[:3, 3]), 1e-3)
+            np.testing.assert_allclose(base[:3, :3], online[:3, :3], atol=1e-4)
+
+
+if __name__ == '__main__':
+    rospy.init_node('replay_test')
+    rostest.rosrun(PACKAGE, 'replay', Replay, sys.argv)
