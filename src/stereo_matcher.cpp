@@ -1,6 +1,5 @@
 #include "stereo_descriptor_vo/stereo_matcher.hpp"
 
-#include <cmath>
 #include <opencv2/video/tracking.hpp>
 
 namespace sdvo {
@@ -9,9 +8,24 @@ StereoMatcher::StereoMatcher(const StereoMatcherOptions& options) : options_(che
 
 std::vector<StereoMatch> StereoMatcher::match(const cv::Mat& left, const cv::Mat& right,
                                               const std::vector<cv::Point2f>& left_positions) const {
-  std::vector<StereoMatch> matches;
-  if (left_positions.empty()) return matches;
+  if (left_positions.empty()) return {};
+  return options_.method == "lk" ? track(left, right, left_positions) : search(left, right, left_positions);
+}
 
+std::vector<StereoMatch> StereoMatcher::search(const cv::Mat& left, const cv::Mat& right,
+                                               const std::vector<cv::Point2f>& left_positions) const {
+  const EpipolarMatcher matcher(options_.epipolar, options_.max_epipolar_residual, left, right);
+  std::vector<StereoMatch> matches;
+  for (std::size_t i = 0; i < left_positions.size(); ++i) {
+    const auto found = matcher.find(left_positions[i]);
+    if (found && isTrusted(found->x, found->y)) matches.push_back({static_cast<int>(i), found->x, found->y});
+  }
+  return matches;
+}
+
+std::vector<StereoMatch> StereoMatcher::track(const cv::Mat& left, const cv::Mat& right,
+                                              const std::vector<cv::Point2f>& left_positions) const {
+  std::vector<StereoMatch> matches;
   const int side = 2 * options_.window_radius + 1;
   const cv::Size window(side, side);
   const cv::TermCriteria stop(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30, 0.005);
@@ -34,8 +48,7 @@ std::vector<StereoMatch> StereoMatcher::match(const cv::Mat& left, const cv::Mat
     if (std::hypot(backward.x, backward.y) > options_.max_backward_error) continue;
     const float disparity = left_positions[i].x - right_positions[i].x;
     const float dv = right_positions[i].y - left_positions[i].y;
-    if (!(disparity >= options_.min_disparity) || !(std::abs(dv) <= options_.max_epipolar_residual)) continue;
-    matches.push_back({static_cast<int>(i), disparity, dv});
+    if (isTrusted(disparity, dv)) matches.push_back({static_cast<int>(i), disparity, dv});
   }
   return matches;
 }
