@@ -7,8 +7,8 @@
 #include <stdexcept>
 #include <type_traits>
 
-// The population count of 64 bits is one instruction on every x86 processor since 2008, but only a function compiled for
-// it may use it; the loader picks the right version.
+// The population count of 64 bits is one instruction on every x86 processor since 2008, but only a function compiled
+// for it may use it; the loader picks the right version.
 #if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
 #define SDVO_POPCOUNT __attribute__((target_clones("popcnt", "default")))
 #else
@@ -85,7 +85,8 @@ class PositionGrid {
     rows_ = static_cast<int>(features.camera.height / cell) + 1;
     cells_.resize(static_cast<std::size_t>(columns_) * rows_);
     for (int i = 0; i < features.count(); ++i)
-      cells_[static_cast<std::size_t>(clampedRow(features.v[i])) * columns_ + clampedColumn(features.u[i])].push_back(i);
+      cells_[static_cast<std::size_t>(clampedRow(features.v[i])) * columns_ + clampedColumn(features.u[i])].push_back(
+          i);
   }
 
   void findWithin(double u, double v, double radius, std::vector<int>& found) const {
@@ -93,10 +94,11 @@ class PositionGrid {
     for (int row = clampedRow(v - radius); row <= clampedRow(v + radius); ++row)
       for (int column = clampedColumn(u - radius); column <= clampedColumn(u + radius); ++column)
         for (const int i : cells_[static_cast<std::size_t>(row) * columns_ + column])
-          if (std::hypot(features_.u[i] - u, features_.v[i] - v) <= radius) found.push_back(i);
+          if (square(features_.u[i] - u) + square(features_.v[i] - v) <= square(radius)) found.push_back(i);
   }
 
  private:
+  static double square(double value) { return value * value; }
   int clampedColumn(double u) const { return static_cast<int>(std::clamp(u / cell_, 0.0, columns_ - 1.0)); }
   int clampedRow(double v) const { return static_cast<int>(std::clamp(v / cell_, 0.0, rows_ - 1.0)); }
 
