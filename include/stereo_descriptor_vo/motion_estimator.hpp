@@ -32,8 +32,8 @@ struct MotionEstimate {
   int iterations = 0;        ///< samples drawn
 };
 
-/// Camera motion from 3-D to stereo correspondences with outliers: P3P sample consensus scored on the stereo reprojection
-/// error, then robust refinement. Stateless: the seed is part of the options.
+/// Camera motion from 3-D to stereo correspondences with outliers: P3P sample consensus scored on the stereo
+/// reprojection error, then robust refinement. Stateless: the seed is part of the options.
 class MotionEstimator {
  public:
   explicit MotionEstimator(const MotionEstimatorOptions& options);

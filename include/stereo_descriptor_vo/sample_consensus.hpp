@@ -12,7 +12,7 @@ namespace sdvo {
 
 struct SampleConsensusOptions {
   std::string consensus = "msac";
-  double inlier_threshold = 2.0;
+  double inlier_threshold = 3.0;
   double confidence = 0.999;
   int min_iterations = 30;
   int max_iterations = 500;

@@ -2,12 +2,16 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "stereo_descriptor_vo/calibration_filter.hpp"
 #include "stereo_descriptor_vo/feature_matcher.hpp"
+#include "stereo_descriptor_vo/local_map.hpp"
 #include "stereo_descriptor_vo/motion_estimator.hpp"
+#include "stereo_descriptor_vo/right_camera_rotation.hpp"
 #include "stereo_descriptor_vo/se3.hpp"
 #include "stereo_descriptor_vo/stereo_features.hpp"
 
@@ -31,11 +35,17 @@ struct TrackingOptions {
 struct VisualOdometryOptions {
   FeatureMatcherOptions matcher;
   MotionEstimatorOptions motion;
+  LocalMapOptions map;
+  WindowOptimizerOptions window;
+  CalibrationOptions calibration;
   TrackingOptions tracking;
 
   void describe(OptionList& list) {
     list.group("matcher", matcher);
     list.group("motion", motion);
+    list.group("map", map);
+    list.group("window", window);
+    list.group("calibration", calibration);
     list.group("tracking", tracking);
   }
 };
@@ -61,23 +71,35 @@ struct OdometryResult {
   Matrix6d motion_covariance = Matrix6d::Zero();  ///< of a right perturbation of T_previous_current
 
   int features = 0, matches = 0, inliers = 0;
-  double coverage = 0.0;  ///< share of an 8x4 grid's cells over the image that hold an inlier
-  double rms = 0.0;       ///< reprojection error of the inliers, px per coordinate
+  double coverage = 0.0;                       ///< share of an 8x4 grid's cells over the image that hold an inlier
+  double rms = 0.0;                            ///< reprojection error of the inliers, px per coordinate
   double match_time = 0.0, motion_time = 0.0;  ///< s
   double distance = 0.0;                       ///< travelled since the start or reset, m
-  int reference_id = 0;                        ///< running number of the pair that this one was matched to
+  int reference_id = 0;   ///< running number of the map's newest pair, to whose view this one was matched
+  int keyframe_id = 0;    ///< running number of the last key frame, this pair included
+  int window_frames = 0;  ///< pairs in the window that was adjusted
 
-  std::vector<FeatureMatch> inlier_matches;  ///< reference pair to this pair
+  /// Reference pair to this pair; the reference is -1 for a point of the map that only earlier pairs had seen.
+  std::vector<FeatureMatch> inlier_matches;
+
+  /// The rig's residual errors as estimated so far, with standard deviations; NaN until there is an estimate.
+  double disparity_offset = std::numeric_limits<double>::quiet_NaN();        ///< in the image centre, px; compensated
+  double disparity_offset_sigma = std::numeric_limits<double>::quiet_NaN();  ///< px
+  double disparity_bend = std::numeric_limits<double>::quiet_NaN();  ///< its change at 45 degrees, px; compensated
+  double disparity_bend_sigma = std::numeric_limits<double>::quiet_NaN();                                      ///< px
+  Eigen::Vector3d right_rotation = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());        ///< rad
+  Eigen::Vector3d right_rotation_sigma = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());  ///< rad
 };
 
-/// Frame-to-frame stereo odometry on stereo features alone.
+/// Stereo odometry on stereo features alone: every pair is matched to a local map of the points around the camera,
+/// found among its outliers by sample consensus, and adjusted together with the last key frames.
 class VisualOdometry {
  public:
   /// Throws std::invalid_argument when an option is out of its range.
   explicit VisualOdometry(const VisualOdometryOptions& options);
 
-  /// Processes the next pair. Stamps must increase and the features must pass check(), else std::invalid_argument and the
-  /// state is as before.
+  /// Processes the next pair. Stamps must increase and the features must pass check(), else std::invalid_argument and
+  /// the state is as before.
   OdometryResult update(const StereoFeatures& features);
 
   /// Back to the initial pose and a new epoch; nothing is remembered.
@@ -90,18 +112,20 @@ class VisualOdometry {
   const VisualOdometryOptions& options() const { return options_; }
 
  private:
-  struct Reference {
-    StereoFeatures features;
-    Eigen::Isometry3d T_origin_camera;
-    int id;
-  };
-
   OdometryResult seed(OdometryResult result, const StereoFeatures& features);
   OdometryResult follow(OdometryResult result, const StereoFeatures& features);
   OdometryResult predict(OdometryResult result);
-  MotionEstimate estimateMotion(const StereoFeatures& features, const std::optional<Eigen::Isometry3d>& prior,
-                                OdometryResult& result) const;
+  struct Localisation {
+    MotionEstimate motion;  ///< since the map's newest pair
+    LocalMap::View view;
+    std::vector<FeatureMatch> inliers;  ///< rows of the view to rows of the pair
+  };
+  Localisation localise(const StereoFeatures& features, const std::optional<Eigen::Isometry3d>& prior,
+                        OdometryResult& result) const;
+  void extendMap(const StereoFeatures& features, const Localisation& found, OdometryResult& result);
   void advance(OdometryResult& result, const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance);
+  void noteKeyframe();
+  void reportCalibration(OdometryResult& result) const;
   std::string implausible(const Eigen::Isometry3d& T_previous_current, double dt) const;
 
   VisualOdometryOptions options_;
@@ -110,10 +134,20 @@ class VisualOdometry {
 
   // State between pairs; reset() is the assignment of a new one.
   struct State {
-    std::optional<Reference> reference;
+    explicit State(const CalibrationOptions& options) : calibration(options) {}
+
+    std::optional<LocalMap> map;
+    CalibrationFilter calibration;
+    RightCameraRotation right_rotation;
     std::optional<std::int64_t> last_stamp;
     Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
     Matrix6d pose_covariance = Matrix6d::Zero();
+    Eigen::Isometry3d T_origin_keyframe = Eigen::Isometry3d::Identity();  ///< as reported when it was the newest pair
+    Matrix6d keyframe_covariance = Matrix6d::Zero();                      ///< of that pose
+    Matrix6d covariance_since_keyframe = Matrix6d::Zero();  ///< of the last pose as seen from the last key frame
+    bool previous_is_keyframe = false;
+    LocalMap::Adjustment last_adjustment;
+    int last_oldest_id = 0;            ///< first frame of that adjustment's window
     std::optional<Vector6d> velocity;  ///< of the camera in its own frame, m/s and rad/s
     double distance = 0.0;
     int predicted_pairs = 0;
