@@ -76,19 +76,22 @@ std::optional<int> EpipolarMatcher::searchRow(const cv::Point2f& left_position) 
   const int x = cvRound(0.5f * left_position.x - 0.25f), y = cvRound(0.5f * left_position.y - 0.25f);
   const std::uint8_t* left = left_half_.ptr(y + kMargin) + x + kMargin;
   const std::uint8_t* right = right_half_.ptr(y + kMargin) + x + kMargin;
+  // A point that looks best at a negative disparity has no match: swapped images show themselves this way.
+  constexpr int kNegative = 16;
   const int range = std::min(static_cast<int>(0.5 * options_.max_disparity), x);
   thread_local std::vector<unsigned> differences;
-  differences.resize(range + 1);
+  differences.resize(kNegative + range + 1);
   int best = 0;
-  for (int d = 0; d <= range; ++d) {
-    differences[d] = blockDifference(left, right - d, left_half_.step, kHalfRows);
-    if (differences[d] < differences[best]) best = d;
+  for (int k = 0; k <= kNegative + range; ++k) {
+    differences[k] = blockDifference(left, right + kNegative - k, left_half_.step, kHalfRows);
+    if (differences[k] < differences[best]) best = k;
   }
+  if (best < kNegative - 1) return std::nullopt;
   unsigned elsewhere = std::numeric_limits<unsigned>::max();
-  for (int d = 0; d <= range; ++d)
-    if (std::abs(d - best) > 2) elsewhere = std::min(elsewhere, differences[d]);
+  for (int k = 0; k <= kNegative + range; ++k)
+    if (std::abs(k - best) > 2) elsewhere = std::min(elsewhere, differences[k]);
   if (differences[best] > options_.uniqueness * elsewhere) return std::nullopt;
-  return 2 * best;
+  return 2 * (best - kNegative);
 }
 
 cv::Point EpipolarMatcher::searchAround(const cv::Point& left, int disparity) const {

@@ -230,9 +230,12 @@ void VisualOdometry::extendMap(const StereoFeatures& features, const Localisatio
                                                           : state_.covariance_since_keyframe;
     const Matrix6d carried = adjoint(T_previous_current.inverse());
     const Matrix6d& since_keyframe = adjustment.since_keyframe;
+    const Matrix6d before = carried * state_.pose_covariance * carried.transpose();
     advance(result, T_previous_current, carried * outdated * carried.transpose() + since_keyframe);
     const Matrix6d from_keyframe = adjoint(state_.T_origin_camera.inverse() * state_.T_origin_keyframe);
-    state_.pose_covariance = from_keyframe * state_.keyframe_covariance * from_keyframe.transpose() + since_keyframe;
+    const Matrix6d measured = from_keyframe * state_.keyframe_covariance * from_keyframe.transpose() + since_keyframe;
+    // What was published stays true: within an epoch the covariance does not shrink, not even after a predicted pair.
+    state_.pose_covariance = measured.trace() >= before.trace() ? measured : before;
     state_.covariance_since_keyframe = since_keyframe;
     state_.last_adjustment = adjustment;
     state_.last_oldest_id = map.oldestId();
