@@ -64,6 +64,7 @@ def main():
     parser.add_argument("--rendered", type=Path, required=True, help="drive that render_drive made")
     parser.add_argument("--pairs", type=int, default=6, help="pairs of each to look at [6]")
     parser.add_argument("--output", type=Path, required=True, help="directory for the figures")
+    parser.add_argument("--beside", type=Path, help="PNG to write with a real and a rendered picture")
     arguments = parser.parse_args()
     arguments.output.mkdir(parents=True, exist_ok=True)
 
@@ -85,12 +86,11 @@ def main():
     figure.tight_layout()
     figure.savefig(arguments.output / "rendered_histograms.png", dpi=80)
 
-    width = min(drive.example.shape[1] for drive in drives.values())
-    rows = [cv2.resize(drive.example[:, :width], None, fx=0.75, fy=0.75, interpolation=cv2.INTER_AREA)
-            for drive in drives.values()]
-    # JPEG-like size in PNG: 64 grey levels are plenty for a look.
-    cv2.imwrite(str(arguments.output / "rendered_beside_real.png"), (np.vstack(rows) // 4) * 4,
-                [cv2.IMWRITE_PNG_COMPRESSION, 9])
+    if arguments.beside:  # not for publication: it shows the real data
+        width = min(drive.example.shape[1] for drive in drives.values())
+        cv2.imwrite(str(arguments.beside), np.vstack([drive.example[:, :width] for drive in drives.values()]))
+    picture = cv2.resize(drives["rendered"].example, None, fx=0.75, fy=0.75, interpolation=cv2.INTER_AREA)
+    cv2.imwrite(str(arguments.output / "rendered_street.png"), picture, [cv2.IMWRITE_PNG_COMPRESSION, 9])
 
 
 if __name__ == "__main__":

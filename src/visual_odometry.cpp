@@ -71,6 +71,12 @@ const char* toString(TrackingState state) {
 VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
     : options_(checked(options)), matcher_(options.matcher), estimator_(options.motion), state_(options.calibration) {}
 
+void VisualOdometry::configure(const VisualOdometryOptions& options) {
+  options_ = checked(options);
+  matcher_ = FeatureMatcher(options.matcher);
+  estimator_ = MotionEstimator(options.motion);
+}
+
 void VisualOdometry::reset() {
   state_ = State(options_.calibration);
   ++epoch_;
@@ -157,6 +163,7 @@ OdometryResult VisualOdometry::follow(OdometryResult result, const StereoFeature
   }
   if (!reason.empty()) {
     result.inlier_matches.clear();
+    for (FeatureFlow& flow : result.flow) flow.inlier = false;
     result.reason = reason + (features.report.status.empty() ? "" : "; " + features.report.status);
     return predict(std::move(result));
   }
@@ -190,8 +197,12 @@ VisualOdometry::Localisation VisualOdometry::localise(const StereoFeatures& feat
   found.motion = estimator_.estimate(features.camera, correspondences);
   result.motion_time += stopwatch.lap();
 
+  result.flow.clear();
+  for (const FeatureMatch& match : matches)
+    result.flow.push_back({reference.u[match.reference], reference.v[match.reference], match.current, false});
   result.inlier_matches.clear();
   for (const int i : found.motion.inliers) {
+    result.flow[i].inlier = true;
     found.inliers.push_back(matches[i]);
     const int row_of_newest = found.view.row_of_newest[matches[i].reference];
     result.inlier_matches.push_back({row_of_newest, matches[i].current, matches[i].distance});

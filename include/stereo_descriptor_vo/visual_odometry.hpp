@@ -54,6 +54,13 @@ enum class TrackingState { kWaiting, kTracking, kDegraded, kLost };
 
 const char* toString(TrackingState state);
 
+/// Where a matched feature was in the previous pair, as the local map tells, and where it is now.
+struct FeatureFlow {
+  float u_previous, v_previous;  ///< px, left image
+  int current;                   ///< row of the pair's features
+  bool inlier;
+};
+
 /// What one pair did to the odometry. Everything published is derived from this one object.
 struct OdometryResult {
   TrackingState state = TrackingState::kWaiting;
@@ -81,6 +88,7 @@ struct OdometryResult {
 
   /// Reference pair to this pair; the reference is -1 for a point of the map that only earlier pairs had seen.
   std::vector<FeatureMatch> inlier_matches;
+  std::vector<FeatureFlow> flow;  ///< of all matches
 
   /// The rig's residual errors as estimated so far, with standard deviations; NaN until there is an estimate.
   double disparity_offset = std::numeric_limits<double>::quiet_NaN();        ///< in the image centre, px; compensated
@@ -108,6 +116,10 @@ class VisualOdometry {
   /// Tells that the next pair does not continue the last one (another calibration, a restarted source): the odometry
   /// re-seeds from the last pose under a new epoch.
   void breakStream();
+
+  /// Takes other options over while running. Those of `map` and `calibration` take effect at the next start or reset.
+  /// Throws std::invalid_argument, and keeps the old ones, when an option is out of its range.
+  void configure(const VisualOdometryOptions& options);
 
   const VisualOdometryOptions& options() const { return options_; }
 

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <sstream>
 #include <stdexcept>
 
 #include "random.hpp"
@@ -59,10 +57,10 @@ struct PlanCurve {
 Eigen::Isometry3d poseFrom(double x, double y, double z, double heading, double pitch, double roll) {
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.translation() << x, y, z;
-  pose.linear() = (Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitY()) *
-                   Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitX()) *
-                   Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ()))
-                      .toRotationMatrix();
+  pose.linear() =
+      (Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitX()) *
+       Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ()))
+          .toRotationMatrix();
   return pose;
 }
 
@@ -182,33 +180,6 @@ DrivePath makePresetPath(const std::string& name, int frames, double rate, std::
     }
     poses = relativeToFirst(std::move(poses));
   }
-  return DrivePath(std::move(poses), rate);
-}
-
-DrivePath readKittiPath(const std::string& file, double rate) {
-  std::ifstream stream(file);
-  if (!stream) throw std::runtime_error("cannot open the pose file " + file + ": give a KITTI pose file or a preset");
-  std::vector<Eigen::Isometry3d> poses;
-  std::string line;
-  for (int number = 1; std::getline(stream, line); ++number) {
-    if (line.find_first_not_of(" \t\r") == std::string::npos) continue;
-    std::istringstream words(line);
-    words.imbue(std::locale::classic());
-    Eigen::Matrix<double, 3, 4> matrix;
-    std::string rest;
-    bool valid = true;
-    for (int i = 0; i < 12; ++i) valid = valid && static_cast<bool>(words >> matrix(i / 4, i % 4));
-    valid = valid && !(words >> rest) && matrix.allFinite();
-    const Eigen::Matrix3d rotation = matrix.leftCols<3>();
-    if (!valid || (rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm() > 1e-3 ||
-        rotation.determinant() < 0.0)
-      throw std::runtime_error(file + ":" + std::to_string(number) + " is not a rigid motion of 12 numbers");
-    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    pose.linear() = Eigen::Quaterniond(rotation).normalized().toRotationMatrix();
-    pose.translation() = matrix.col(3);
-    poses.push_back(pose);
-  }
-  if (poses.empty()) throw std::runtime_error("the pose file " + file + " has no poses");
   return DrivePath(std::move(poses), rate);
 }
 

@@ -38,8 +38,4 @@ const std::vector<std::string>& presetNames();
 /// as cars do. Throws std::invalid_argument for another name.
 DrivePath makePresetPath(const std::string& name, int frames, double rate, std::uint64_t seed);
 
-/// Reads a KITTI pose file (12 numbers per line, row-major 3x4, camera to world); throws std::runtime_error that names
-/// the file and the line that is not a rigid motion.
-DrivePath readKittiPath(const std::string& file, double rate);
-
 }  // namespace sdvo::render

@@ -29,7 +29,8 @@ RoadLine::RoadLine(const DrivePath& path, double camera_height) {
   std::vector<Sample> way;
   const auto append = [&](const Eigen::Isometry3d& pose) {
     const Eigen::Vector3d position = pose.translation(), forward = pose.linear().col(2);
-    way.push_back({position.x(), position.z(), position.y() + camera_height, std::atan2(forward.x(), forward.z()), 0.0});
+    way.push_back(
+        {position.x(), position.z(), position.y() + camera_height, std::atan2(forward.x(), forward.z()), 0.0});
   };
   append(path.pose(0));
   for (const Eigen::Isometry3d& pose : path.poses()) {

@@ -40,11 +40,11 @@ class GroundMap {
 
   /// What is known of a place.
   struct Node {
-    float height = 0.0f;         ///< y, m
-    float path = 1e6f;           ///< distance to the nearest part of the way, m
-    float road = 1e6f;           ///< distance to the nearest part of the road's middle line, m
-    float lateral = 0.0f;        ///< signed distance to the way, right positive, m
-    float along = 0.0f;          ///< distance along the way of the nearest part, m
+    float height = 0.0f;   ///< y, m
+    float path = 1e6f;     ///< distance to the nearest part of the way, m
+    float road = 1e6f;     ///< distance to the nearest part of the road's middle line, m
+    float lateral = 0.0f;  ///< signed distance to the way, right positive, m
+    float along = 0.0f;    ///< distance along the way of the nearest part, m
   };
 
   explicit GroundMap(const RoadLine& road);

@@ -42,11 +42,13 @@ SunlightMap::SunlightMap(const GroundMap& ground, const RayCaster& caster, const
   }
   const Eigen::Vector3f direction = to_sun.cast<float>();
   parallelFor(static_cast<int>(tiles.size()), threads, [&](int tile) {
-    const int row = tiles[static_cast<std::size_t>(tile)] / columns_, column = tiles[static_cast<std::size_t>(tile)] % columns_;
+    const int row = tiles[static_cast<std::size_t>(tile)] / columns_,
+              column = tiles[static_cast<std::size_t>(tile)] % columns_;
     std::uint8_t* fine = &texels_[0][static_cast<std::size_t>(tile) * kTileSide * kTileSide];
     for (int y = 0; y < kTileSide; ++y)
       for (int x = 0; x < kTileSide; ++x) {
-        const Eigen::Vector2d p = origin_ + kTexel * Eigen::Vector2d(column * kTileSide + x + 0.5, row * kTileSide + y + 0.5);
+        const Eigen::Vector2d p =
+            origin_ + kTexel * Eigen::Vector2d(column * kTileSide + x + 0.5, row * kTileSide + y + 0.5);
         const Eigen::Vector3f origin(static_cast<float>(p.x()), static_cast<float>(ground.height(p.x(), p.y())) - 0.03f,
                                      static_cast<float>(p.y()));
         fine[y * kTileSide + x] = caster.occluded(origin, direction) ? 0 : 255;
@@ -58,7 +60,8 @@ SunlightMap::SunlightMap(const GroundMap& ground, const RayCaster& caster, const
       for (int y = 0; y < side; ++y)
         for (int x = 0; x < side; ++x) {
           const std::uint8_t* block = from + 4 * y * side + 2 * x;
-          to[y * side + x] = static_cast<std::uint8_t>((block[0] + block[1] + block[2 * side] + block[2 * side + 1] + 2) / 4);
+          to[y * side + x] =
+              static_cast<std::uint8_t>((block[0] + block[1] + block[2 * side] + block[2 * side + 1] + 2) / 4);
         }
     }
   });
@@ -89,9 +92,11 @@ float SunlightMap::bilinear(int level, double x, double z) const {
 float SunlightMap::sample(double x, double z, double width) const {
   const float lod = std::clamp(std::log2(static_cast<float>(width / kTexel)), 0.0f, kLevels - 1.0f);
   const int level = std::min(static_cast<int>(lod), kLevels - 2);
-  const float weight = lod - static_cast<float>(level);
+  const float weight = std::clamp((lod - static_cast<float>(level) - 0.25f) * 2.0f, 0.0f, 1.0f);
+  if (weight == 0.0f) return bilinear(level, x, z);
+  if (weight == 1.0f) return bilinear(level + 1, x, z);
   const float fine = bilinear(level, x, z);
-  return weight > 0.0f ? fine + weight * (bilinear(level + 1, x, z) - fine) : fine;
+  return fine + weight * (bilinear(level + 1, x, z) - fine);
 }
 
 float World::irradiance(const Eigen::Vector3f& normal, float sun_share) const {
@@ -116,9 +121,12 @@ void lightWorld(World& world, const RayCaster& caster, int threads) {
       const bool front_faces = normal.dot(direction) > 0.0f;
       const Eigen::Vector3f outside = front_faces ? normal : Eigen::Vector3f(-normal);
       const float share = caster.occluded(centre + 0.01f * outside, direction) ? 0.0f : 1.0f;
-      // Leaves shine through; of anything else the far side is dark by its normal alone.
-      if (front_faces || surface.material == Material::kLeaf) surface.sun_front = share;
-      if (!front_faces || surface.material == Material::kLeaf) surface.sun_back = share;
+      if (surface.material == Material::kLeaf) surface.sun_front = surface.sun_back = world.irradiance(outside, share);
+      // Of anything else the far side is dark by its normal alone.
+      else if (front_faces)
+        surface.sun_front = share;
+      else
+        surface.sun_back = share;
     }
   });
   world.sunlight = std::make_shared<SunlightMap>(*world.ground, caster, world.to_sun, threads);

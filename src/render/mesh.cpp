@@ -60,9 +60,7 @@ void Mesh::append(const Mesh& other, const Eigen::Isometry3d& T_this_other) {
 
 Eigen::Vector3f Mesh::normal(std::size_t quad) const {
   const Quad& corners = quads[quad];
-  return (vertices[corners[2]] - vertices[corners[0]])
-      .cross(vertices[corners[3]] - vertices[corners[1]])
-      .normalized();
+  return (vertices[corners[2]] - vertices[corners[0]]).cross(vertices[corners[3]] - vertices[corners[1]]).normalized();
 }
 
 Eigen::Vector3f Mesh::centre(std::size_t quad) const {

@@ -13,7 +13,9 @@ namespace sdvo::render {
 struct Surface {
   Material material = Material::kFlat;
   float albedo = 0.5f;  ///< factor on the texture, or the reflectance itself without one
-  float sun_front = 1.0f, sun_back = 1.0f;  ///< share of the sun that reaches either side, set by the lighting
+  /// Share of the sun that reaches either side, set by the lighting; of leaves, which shine through and look alike from
+  /// both sides, the whole irradiance.
+  float sun_front = 1.0f, sun_back = 1.0f;
   float s0 = 0.0f, t0 = 0.0f;
   float length_s = 1.0f, length_t = 1.0f;
 };
@@ -40,7 +42,7 @@ struct Mesh {
                Material material, double albedo);
   void append(const Mesh& other, const Eigen::Isometry3d& T_this_other);
 
-  /// Unit normal of the front side: the one from which the corners run clockwise (y points down).
+  /// Unit normal of the front side, first edge x last edge.
   Eigen::Vector3f normal(std::size_t quad) const;
   Eigen::Vector3f centre(std::size_t quad) const;
 };

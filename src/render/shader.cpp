@@ -30,6 +30,17 @@ float Shader::sky(const Eigen::Vector3f& direction) const {
   return world_->sky * (1.0f - 0.35f * std::clamp(elevation, 0.0f, 1.0f));
 }
 
+float Shader::throughHaze(float brightness, float depth) const {
+  if (world_->haze_distance <= 0.0) return brightness;
+  const float clear = std::exp(-depth / static_cast<float>(world_->haze_distance));
+  return world_->sky + (brightness - world_->sky) * clear;
+}
+
+float Shader::leaf(const Surface& surface, float u, float depth) const {
+  const float reflectance = surface.albedo * (0.6f + 0.8f * std::abs(u - 0.3f));  // lighter towards the tip
+  return throughHaze(reflectance * surface.sun_front, depth);
+}
+
 float Shader::ground(const ShadingPoint& point, const Eigen::Vector3f& step_x, const Eigen::Vector3f& step_y) const {
   const float x = point.position.x(), z = point.position.z();
   const Footprint footprint = {step_x.x(), step_x.z(), step_y.x(), step_y.z()};
@@ -69,9 +80,8 @@ float Shader::ground(const ShadingPoint& point, const Eigen::Vector3f& step_x, c
     reflectance += (1.0f - on_road) * beside;
   }
   // Stains and worn places of several metres.
-  const Footprint coarse = {footprint.s_x * 0.17f, footprint.t_x * 0.17f, footprint.s_y * 0.17f,
-                            footprint.t_y * 0.17f};
-  reflectance *= 0.55f + 0.9f * textures.detail().sample(x * 0.17f, z * 0.17f, coarse);
+  constexpr float kScale = 0.17f;
+  reflectance *= 0.72f + 0.56f * textures.detail().sample(x * kScale, z * kScale, kScale * std::max(width, length));
 
   const float sun_share = world_->sunlight ? world_->sunlight->sample(x, z, std::max(width, 0.5f * length)) : 1.0f;
   return reflectance * world_->irradiance(Eigen::Vector3f(0.0f, -1.0f, 0.0f), sun_share);
@@ -92,32 +102,23 @@ float Shader::shade(const Surface& surface, const ShadingPoint& point) const {
     brightness = ground(point, step(point.direction_x), step(point.direction_y));
   } else {
     float reflectance = surface.albedo;
-    if (surface.material == Material::kLeaf) {
-      reflectance *= 0.6f + 0.8f * std::abs(point.u - 0.3f);  // lighter towards the tip
-    } else if (const Texture* texture = world_->textures->of(surface.material)) {
+    if (const Texture* texture = world_->textures->of(surface.material)) {
       const Eigen::Vector3f step_x = step(point.direction_x), step_y = step(point.direction_y);
       const Footprint footprint = {step_x.dot(point.axis_s), step_x.dot(point.axis_t), step_y.dot(point.axis_s),
                                    step_y.dot(point.axis_t)};
       const float s = surface.s0 + point.u * surface.length_s, t = surface.t0 + point.v * surface.length_t;
       reflectance *= texture->sample(s, t, footprint);
       // Detail of another period hides that walls repeat, without hiding that their windows do.
-      if (surface.material >= Material::kFacade)
-        reflectance *= 0.8f + 0.4f * world_->textures->detail().sample(s + 0.37f * surface.length_s, t, footprint);
+      if (surface.material >= Material::kFacade) {
+        const float width = 0.5f * (std::abs(footprint.s_x) + std::abs(footprint.t_x) + std::abs(footprint.s_y) +
+                                    std::abs(footprint.t_y));
+        reflectance *= 0.9f + 0.2f * world_->textures->detail().sample(s + 0.37f * surface.length_s, t, width);
+      }
     }
     const Eigen::Vector3f normal = front ? point.normal : Eigen::Vector3f(-point.normal);
-    if (surface.material == Material::kLeaf) {
-      const Eigen::Vector3f to_sun = world_->to_sun.cast<float>();
-      const Eigen::Vector3f lit = normal.dot(to_sun) > 0.0f ? normal : Eigen::Vector3f(-normal);
-      brightness = reflectance * world_->irradiance(lit, front ? surface.sun_front : surface.sun_back);
-    } else {
-      brightness = reflectance * world_->irradiance(normal, front ? surface.sun_front : surface.sun_back);
-    }
+    brightness = reflectance * world_->irradiance(normal, front ? surface.sun_front : surface.sun_back);
   }
-  if (world_->haze_distance > 0.0) {
-    const float clear = std::exp(-point.depth / static_cast<float>(world_->haze_distance));
-    brightness = world_->sky + (brightness - world_->sky) * clear;
-  }
-  return brightness;
+  return throughHaze(brightness, point.depth);
 }
 
 }  // namespace sdvo::render

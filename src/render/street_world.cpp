@@ -89,7 +89,8 @@ class Street {
   }
   template <class Visit>
   static void forFootprint(const Vector2& centre, const Vector2& half_a, const Vector2& half_b, const Visit& visit) {
-    const int na = static_cast<int>(std::ceil(2.0 * half_a.norm())), nb = static_cast<int>(std::ceil(2.0 * half_b.norm()));
+    const int na = static_cast<int>(std::ceil(2.0 * half_a.norm())),
+              nb = static_cast<int>(std::ceil(2.0 * half_b.norm()));
     for (int i = 0; i <= na; ++i)
       for (int j = 0; j <= nb; ++j) {
         const double a = na > 0 ? 2.0 * i / na - 1.0 : 0.0, b = nb > 0 ? 2.0 * j / nb - 1.0 : 0.0;
@@ -106,8 +107,8 @@ class Street {
           const Vector2 p = ground_->position(r, c);
           return {p.x(), ground_->node(r, c).height, p.y()};
         };
-        mesh_.addQuad(corner(row, column), corner(row, column + 1), corner(row + 1, column + 1), corner(row + 1, column),
-                      Material::kGround, 1.0);
+        mesh_.addQuad(corner(row, column), corner(row, column + 1), corner(row + 1, column + 1),
+                      corner(row + 1, column), Material::kGround, 1.0);
       }
   }
 
@@ -232,10 +233,10 @@ class Street {
     for (double s = begin_; s < end_; s += random.uniform(5.5, 11.0)) {
       if (random.chance(side > 0 ? 0.45 : 0.15)) continue;
       const double lateral = side > 0 ? random.uniform(5.0, 6.4) : random.uniform(7.2, 9.5);
-      addTree(random, road_->beside(s, side * lateral), random.uniform(0.75, 1.25), 1100);
+      addTree(random, road_->beside(s, side * lateral), random.uniform(0.75, 1.25), 520);
     }
     for (double s = begin_; s < end_; s += random.uniform(4.0, 12.0))
-      addTree(random, road_->beside(s, side * random.uniform(13.0, 60.0)), random.uniform(1.1, 2.2), 700);
+      addTree(random, road_->beside(s, side * random.uniform(13.0, 60.0)), random.uniform(1.1, 2.2), 90);
   }
 
   void addTree(Random& random, const Vector2& p, double size, int leaves) {
@@ -248,29 +249,51 @@ class Street {
     const Vector3 fork = foot + trunk * (kUp + lean);
     const Vector3 heart = fork + 0.7 * crown_height * kUp;
     mesh_.addTube(foot - 0.4 * kUp, fork, 0.10 * size, 0.07 * size, 8, Material::kBark, 0.55);
-    if (size < 1.0 && leaves > 1000 && random.chance(0.6))  // young trees are held by stakes
+    if (size < 1.0 && leaves > 400 && random.chance(0.6))  // young trees are held by stakes
       for (int i = 0; i < 3; ++i) {
         const double angle = 2.1 * i + 0.3;
         const Vector3 out(std::cos(angle), 0.0, std::sin(angle));
         mesh_.addTube(foot + 0.55 * out - 0.4 * kUp, foot + 0.3 * out + 1.9 * kUp, 0.035, 0.035, 6, Material::kBark,
                       0.75);
       }
-    constexpr int kClusters = 26;
-    for (int cluster = 0; cluster < kClusters; ++cluster) {
+    // The crown is a heap of tufts: a lumpy core of foliage, with single leaves that stand out from it.
+    const int tufts = 13 + random.index(6);
+    for (int tuft = 0; tuft < tufts; ++tuft) {
       Vector3 direction(random.normal(), random.normal(), random.normal());
       direction.normalize();
-      const double depth = std::cbrt(random.uniform(0.15, 1.0));
-      const Vector3 centre =
-          heart + depth * Vector3(crown_radius * direction.x(), crown_height * 0.75 * direction.y(),
-                                  crown_radius * direction.z());
-      mesh_.addTube(fork + random.uniform(0.0, 0.5) * (heart - fork), centre, 0.028 * size, 0.01 * size, 4,
-                    Material::kBark, 0.4);
-      const double spread = 0.24 * crown_radius;
-      for (int leaf = 0; leaf < leaves / kClusters; ++leaf) {
-        const Vector3 at = centre + spread * Vector3(random.normal(), random.normal(), random.normal());
-        addLeaf(random, at, size * (leaves > 1000 ? random.uniform(0.05, 0.10) : random.uniform(0.09, 0.17)));
+      const double depth = std::cbrt(random.uniform(0.1, 1.0));
+      const Vector3 centre = heart + 0.85 * depth *
+                                         Vector3(crown_radius * direction.x(), crown_height * 0.75 * direction.y(),
+                                                 crown_radius * direction.z());
+      if (tuft % 3 == 0)
+        mesh_.addTube(fork + random.uniform(0.0, 0.5) * (heart - fork), centre, 0.03 * size, 0.01 * size, 4,
+                      Material::kBark, 0.4);
+      const double radius = crown_radius * random.uniform(0.24, 0.42);
+      addTuft(random, centre, 0.72 * radius);
+      for (int leaf = 0; leaf < leaves / tufts; ++leaf) {
+        Vector3 out(random.normal(), random.normal(), random.normal());
+        out.normalize();
+        addLeaf(random, centre + radius * random.uniform(0.7, 1.2) * out, size * random.uniform(0.05, 0.10));
       }
     }
+  }
+
+  /// A rough ball of foliage.
+  void addTuft(Random& random, const Vector3& centre, double radius) {
+    constexpr int kRings = 4, kSides = 6;
+    Vector3 points[kRings + 1][kSides];
+    for (int ring = 0; ring <= kRings; ++ring)
+      for (int side = 0; side < kSides; ++side) {
+        const double polar = M_PI * ring / kRings, around = 2.0 * M_PI * (side + 0.5 * (ring % 2)) / kSides;
+        const double r = radius * (ring == 0 || ring == kRings ? 0.9 : random.uniform(0.7, 1.1));
+        points[ring][side] = centre + r * Vector3(std::sin(polar) * std::cos(around), -std::cos(polar),
+                                                  std::sin(polar) * std::sin(around));
+      }
+    const double albedo = random.uniform(0.7, 1.1), s0 = random.uniform(0.0, 9.0), t0 = random.uniform(0.0, 9.0);
+    for (int ring = 0; ring < kRings; ++ring)
+      for (int side = 0; side < kSides; ++side)
+        mesh_.addQuad(points[ring][side], points[ring][(side + 1) % kSides], points[ring + 1][(side + 1) % kSides],
+                      points[ring + 1][side], Material::kFoliage, albedo, s0 + radius * side, t0 + radius * ring);
   }
 
   void addLeaf(Random& random, const Vector3& at, double half) {
@@ -281,7 +304,7 @@ class Street {
     const Vector3 a = half * (std::cos(turn) * a0 + std::sin(turn) * b0);
     const Vector3 b = 0.6 * half * (std::cos(turn) * b0 - std::sin(turn) * a0);
     // A rhombus: leaves have tips.
-    mesh_.addQuad(at - a, at - b, at + a, at + b, Material::kLeaf, random.uniform(0.18, 0.5));
+    mesh_.addQuad(at - a, at - b, at + a, at + b, Material::kLeaf, random.uniform(0.16, 0.4));
   }
 
   void addGarden(double side) {
@@ -306,12 +329,12 @@ class Street {
       if (!isFree(p, 0.9)) continue;
       const Vector3 foot = onGround(p);
       const Axes axes = axesAt(at);
-      mesh_.addBox(foot + 0.4 * height * kUp, 0.27 * axes.ahead, 0.22 * axes.right, 0.42 * height * kUp,
-                   Material::kFoliage, 0.35);
-      for (int leaf = 0; leaf < 110; ++leaf) {
+      mesh_.addBox(foot + 0.4 * height * kUp, 0.27 * axes.ahead, 0.25 * axes.right, 0.5 * height * kUp,
+                   Material::kFoliage, 0.9);
+      for (int leaf = 0; leaf < 36; ++leaf) {
         const Vector3 offset = random.normal() * 0.2 * axes.right + random.uniform(-0.35, 0.35) * axes.ahead +
                                random.uniform(0.0, height) * kUp;
-        addLeaf(random, foot + 1.2 * offset, random.uniform(0.04, 0.09));
+        addLeaf(random, foot + 1.25 * offset, random.uniform(0.04, 0.09));
       }
     }
   }
@@ -323,8 +346,13 @@ class Street {
       const Axes axes = axesAt(at);
       const Vector3 foot = onGround(p);
       mesh_.addBox(foot + 0.5 * kUp, 0.045 * axes.ahead, 0.012 * axes.right, 0.55 * kUp, Material::kBark, 0.85);
+    }
+    for (double at = s + 0.5; at + 0.5 < s + length; at += 1.0) {
+      const Vector2 p = road_->beside(at, lateral);
+      const Axes axes = axesAt(at);
+      if (!isFree(p, 0.5 * plan(axes.ahead), Vector2::Zero(), 0.7)) continue;
       for (const double rail : {0.3, 0.8})
-        mesh_.addBox(foot + rail * kUp, 0.085 * axes.ahead, 0.02 * axes.right, 0.03 * kUp, Material::kBark, 0.6);
+        mesh_.addBox(onGround(p) + rail * kUp, 0.5 * axes.ahead, 0.02 * axes.right, 0.03 * kUp, Material::kBark, 0.6);
     }
   }
 
@@ -375,8 +403,8 @@ class Street {
     take(p, 1.3 * plan(across), Vector2::Zero());
     const Vector3 foot = onGround(p);
     for (const double leg : {-0.8, 0.8})
-      mesh_.addBox(foot + leg * across + 0.6 * kUp, 0.06 * axes.ahead, 0.06 * axes.right, 1.2 * kUp, Material::kConcrete,
-                   0.5);
+      mesh_.addBox(foot + leg * across + 0.6 * kUp, 0.06 * axes.ahead, 0.06 * axes.right, 1.2 * kUp,
+                   Material::kConcrete, 0.5);
     mesh_.addPanel(foot + 3.4 * kUp - 1.2 * across - 0.08 * axes.ahead, 2.4 * across, -2.2 * kUp, Material::kPoster,
                    1.0, 4.0 * random.uniform(), 4.0 * random.uniform());
   }
@@ -436,6 +464,8 @@ class Street {
 
 }  // namespace
 
-World makeStreetWorld(const DrivePath& path, std::uint64_t seed) { return Street(path, seed).build(); }
+World makeStreetWorld(const DrivePath& path, std::uint64_t seed) {
+  return Street(path, seed).build();
+}
 
 }  // namespace sdvo::render

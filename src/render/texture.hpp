@@ -25,6 +25,9 @@ class Texture {
   /// outer corner of the first texel.
   float sample(float s, float t, const Footprint& footprint) const;
 
+  /// The same for a square footprint of `width` metres: cheaper, and blurs where the surface is seen at an angle.
+  float sample(float s, float t, float width) const;
+
   double size() const { return size_; }
 
  private:

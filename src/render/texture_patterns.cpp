@@ -42,11 +42,11 @@ cv::Mat1f clamped(const cv::Mat1f& image) {
 
 cv::Mat1f asphalt(std::uint64_t seed) {
   Random random(seed, 1);
-  cv::Mat1f image = 0.5 + 0.045 * makeNoise(1024, 1.0, seed + 1) + 0.10 * makeNoise(1024, 0.1, seed + 2);
+  cv::Mat1f image = 0.5 + 0.03 * makeNoise(1024, 1.0, seed + 1) + 0.10 * makeNoise(1024, 0.1, seed + 2);
   for (int i = 0; i < 5000; ++i)
     ellipseWrapped(image, random.uniform(0, 1024), random.uniform(0, 1024), random.uniform(0.6, 1.6), 0.8,
                    random.uniform(0, 180), static_cast<float>(random.chance(0.4) ? 0.78 : 0.25));
-  for (int i = 0; i < 5; ++i) crackWrapped(image, random, 500, 0.22f);
+  for (int i = 0; i < 3; ++i) crackWrapped(image, random, 500, 0.22f);
   for (int i = 0; i < 2; ++i)
     fillWrapped(image, random.index(1024), random.index(1024), 60 + random.index(160), 40 + random.index(90), 0.40f);
   return clamped(image + 0.05 * makeNoise(1024, 0.3, seed + 3));
@@ -117,8 +117,7 @@ cv::Mat1f facade(int style, std::uint64_t seed) {
   constexpr int kSide = 1024, kCell = 256;  // 12.5 mm per texel
   const double wall = style % 3 == 0 ? 0.93 : random.uniform(0.55, 0.85);
   cv::Mat1f image = wall + 0.015 * makeNoise(kSide, 1.1, seed) + 0.012 * makeNoise(kSide, 0.3, seed + 1);
-  if (style == 2 || style == 5)
-    image = 0.35 * image + 0.62 * masonry(seed + 2, kSide, 32, 16, 0.75, 0.07);
+  if (style == 2 || style == 5) image = 0.35 * image + 0.62 * masonry(seed + 2, kSide, 32, 16, 0.75, 0.07);
   const int width = 90 + random.index(60), height = 100 + random.index(50);
   const bool shutters = style == 1 || style == 4;
   for (int floor = 0; floor < 4; ++floor) {
@@ -154,16 +153,20 @@ cv::Mat1f carSide(std::uint64_t seed) {
 
 cv::Mat1f makeNoise(int side, double exponent, std::uint64_t seed) {
   Random random(seed, 7);
+  // Uniform numbers will do: every sample of the result is a sum of all of them, hence normal.
   cv::Mat1f white(side, side);
-  for (float& value : white) value = static_cast<float>(random.normal());
+  for (float& value : white) value = static_cast<float>(random.uniform(-1.0, 1.0));
   cv::Mat2f spectrum;
   cv::dft(white, spectrum, cv::DFT_COMPLEX_OUTPUT);
+  const int half = side / 2;
+  cv::Mat1f amplitude(half + 1, half + 1);
+  for (int fy = 0; fy <= half; ++fy)
+    for (int fx = 0; fx <= half; ++fx)
+      amplitude(fy, fx) =
+          fx + fy > 0 ? std::pow(static_cast<float>(fx * fx + fy * fy), static_cast<float>(-0.5 * exponent)) : 0.0f;
   for (int row = 0; row < side; ++row)
-    for (int col = 0; col < side; ++col) {
-      const double fy = std::min(row, side - row), fx = std::min(col, side - col);
-      const double frequency = std::hypot(fx, fy);
-      spectrum(row, col) *= frequency > 0.0 ? static_cast<float>(std::pow(frequency, -exponent)) : 0.0f;
-    }
+    for (int col = 0; col < side; ++col)
+      spectrum(row, col) *= amplitude(std::min(row, side - row), std::min(col, side - col));
   cv::Mat1f noise;
   cv::dft(spectrum, noise, cv::DFT_INVERSE | cv::DFT_REAL_OUTPUT | cv::DFT_SCALE);
   cv::Scalar mean, deviation;

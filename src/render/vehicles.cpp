@@ -10,9 +10,9 @@ namespace sdvo::render {
 
 namespace {
 
-constexpr double kOncomingSpeed = 9.0;    // m/s
-constexpr double kOncomingLateral = -3.3; // m right of the camera's way
-constexpr double kVisible = 120.0;        // m along the way
+constexpr double kOncomingSpeed = 9.0;     // m/s
+constexpr double kOncomingLateral = -3.3;  // m right of the camera's way
+constexpr double kVisible = 120.0;         // m along the way
 constexpr int kModelVariants = 9;
 
 /// Side view of a car, from the front bumper over the roof to the rear one: (ahead, up) in metres.

@@ -49,7 +49,7 @@ class Traffic {
   double gap_ = 0.0;      ///< to the car in front, m; 0: there is none
   double spacing_ = 0.0;  ///< of the oncoming cars, m
   int oncoming_ = 0;
-  double begin_ = 0.0;    ///< of the road, m
+  double begin_ = 0.0;  ///< of the road, m
 };
 
 }  // namespace sdvo::render

@@ -24,8 +24,8 @@ struct View {
 
 /// What is known of the centres of a view's pixels.
 struct Hits {
-  cv::Mat1f depth;    ///< along the optical axis, m; NaN in the sky
-  cv::Mat1i car;      ///< index into the moving scene's cars, or −1
+  cv::Mat1f depth;  ///< along the optical axis, m; NaN in the sky
+  cv::Mat1i car;    ///< index into the moving scene's cars, or −1
 };
 
 /// Casts the rays of a view and shades what they hit.
@@ -35,9 +35,10 @@ class ViewRenderer {
   ViewRenderer(const World& world, const RayCaster& caster, const std::vector<Mesh>& car_models)
       : world_(&world), caster_(&caster), car_models_(&car_models), shader_(world) {}
 
-  /// Adds `weight` times the brightness (1 = white) of the view to `image`, at 1, 4 or 16 samples per pixel. A single
-  /// sample lies at (offset_x, offset_y) px from the pixel's centre; several fill the pixel evenly. Samples of a pixel
-  /// on one surface are shaded together: edges are anti-aliased by the samples, textures by their filter.
+  /// Adds `weight` times the brightness (1 = white) of the view to `image`. With 1 sample per pixel it lies at
+  /// (offset_x, offset_y) px from the pixel's centre; with 4 there are as many at foliage, 12 at other edges and 2
+  /// where nothing changes; 16 are always cast. Samples of a pixel on one surface are shaded together: edges are
+  /// anti-aliased by the samples, textures by their filter.
   void add(const View& view, const MovingScene& cars, int samples, float offset_x, float offset_y, float weight,
            cv::Mat1f& image) const;
 

@@ -25,8 +25,8 @@ class SunlightMap {
   float sample(double x, double z, double width) const;
 
  private:
-  static constexpr int kTileSide = 64;      ///< texels
-  static constexpr double kTexel = 0.125;   ///< m
+  static constexpr int kTileSide = 64;     ///< texels
+  static constexpr double kTexel = 0.125;  ///< m
   static constexpr int kLevels = 4;
   static constexpr double kTileSize = kTileSide * kTexel;
 
@@ -34,8 +34,8 @@ class SunlightMap {
   float bilinear(int level, double x, double z) const;
 
   Eigen::Vector2d origin_;
-  int columns_ = 0, rows_ = 0;     ///< of tiles
-  std::vector<int> tile_index_;    ///< −1: not baked
+  int columns_ = 0, rows_ = 0;   ///< of tiles
+  std::vector<int> tile_index_;  ///< −1: not baked
   std::vector<std::uint8_t> texels_[kLevels];
 };
 
@@ -43,14 +43,14 @@ class SunlightMap {
 struct World {
   Mesh mesh;
   std::shared_ptr<const TextureSet> textures;
-  std::shared_ptr<const RoadLine> road;      ///< null indoors
-  std::shared_ptr<const GroundMap> ground;   ///< null indoors
+  std::shared_ptr<const RoadLine> road;         ///< null indoors
+  std::shared_ptr<const GroundMap> ground;      ///< null indoors
   std::shared_ptr<const SunlightMap> sunlight;  ///< null until lit, and indoors
-  Eigen::Vector3d to_sun = Eigen::Vector3d(0.45, -0.62, -0.64);
-  double ambient = 0.25;       ///< irradiance without the sun
-  double sun = 1.25;           ///< irradiance of a surface that faces the sun
+  Eigen::Vector3d to_sun = Eigen::Vector3d(-0.50, -0.62, -0.60);
+  double ambient = 0.30;       ///< irradiance without the sun
+  double sun = 1.50;           ///< irradiance of a surface that faces the sun
   double haze_distance = 700;  ///< m after which 1 - 1/e of the light is the air's; 0: none
-  float sky = 0.46f;           ///< brightness at the horizon, 1 = white
+  float sky = 0.50f;           ///< brightness at the horizon, 1 = white
 
   /// Irradiance of a surface seen from the side this unit normal points to.
   float irradiance(const Eigen::Vector3f& normal, float sun_share) const;

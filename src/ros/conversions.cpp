@@ -7,7 +7,6 @@
 #include <tf2_eigen/tf2_eigen.h>
 
 #include <cmath>
-#include <limits>
 #include <set>
 #include <sstream>
 #include <stdexcept>
@@ -265,12 +264,28 @@ stereo_descriptor_vo::VoInfo toInfo(const OdometryResult& result,
   info.motion_time = static_cast<float>(result.motion_time);
   info.dropped_pairs = features.dropped_pairs;
   info.distance = result.distance;
-  info.keyframe_id = static_cast<std::uint32_t>(result.reference_id);
-  constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
-  info.disparity_offset = info.disparity_offset_sigma = kUnknown;
-  info.right_rotation.assign(kUnknown);
-  info.right_rotation_sigma.assign(kUnknown);
+  info.keyframe_id = static_cast<std::uint32_t>(result.keyframe_id);
+  info.disparity_offset = static_cast<float>(result.disparity_offset);
+  info.disparity_offset_sigma = static_cast<float>(result.disparity_offset_sigma);
+  info.disparity_bend = static_cast<float>(result.disparity_bend);
+  info.disparity_bend_sigma = static_cast<float>(result.disparity_bend_sigma);
+  for (int axis = 0; axis < 3; ++axis) {
+    info.right_rotation[axis] = static_cast<float>(result.right_rotation[axis]);
+    info.right_rotation_sigma[axis] = static_cast<float>(result.right_rotation_sigma[axis]);
+  }
   return info;
+}
+
+stereo_descriptor_vo::FeatureFlow toFlow(const OdometryResult& result, const StereoFeatures& features) {
+  stereo_descriptor_vo::FeatureFlow message;
+  for (const FeatureFlow& flow : result.flow) {
+    message.u_reference.push_back(flow.u_previous);
+    message.v_reference.push_back(flow.v_previous);
+    message.u.push_back(features.u[flow.current]);
+    message.v.push_back(features.v[flow.current]);
+    message.inlier.push_back(flow.inlier);
+  }
+  return message;
 }
 
 sensor_msgs::PointCloud2 toPointCloud(const stereo_descriptor_vo::StereoFeatures& features) {

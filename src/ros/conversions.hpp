@@ -5,6 +5,7 @@
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
 #include <sensor_msgs/PointCloud2.h>
+#include <stereo_descriptor_vo/FeatureFlow.h>
 #include <stereo_descriptor_vo/StereoFeatures.h>
 #include <stereo_descriptor_vo/VoInfo.h>
 
@@ -52,6 +53,9 @@ geometry_msgs::TransformStamped toTransform(const nav_msgs::Odometry& odometry, 
 
 /// What the result and the image side tell; header, latency and input counters are the caller's to fill.
 stereo_descriptor_vo::VoInfo toInfo(const OdometryResult& result, const stereo_descriptor_vo::StereoFeatures& features);
+
+/// Where the matched features of a pair were before; header is the caller's to fill.
+stereo_descriptor_vo::FeatureFlow toFlow(const OdometryResult& result, const StereoFeatures& features);
 
 /// The features' points in the left optical frame; fields x, y, z (m) and disparity (px).
 sensor_msgs::PointCloud2 toPointCloud(const stereo_descriptor_vo::StereoFeatures& features);

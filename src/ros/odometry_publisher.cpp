@@ -14,6 +14,7 @@ OdometryPublisher::OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOp
   path_publisher_ = nh.advertise<nav_msgs::Path>("path", 1);
   info_publisher_ = nh.advertise<stereo_descriptor_vo::VoInfo>("vo_info", kQueue);
   points_publisher_ = nh.advertise<sensor_msgs::PointCloud2>("points", 1);
+  flow_publisher_ = nh.advertise<stereo_descriptor_vo::FeatureFlow>("feature_flow", kQueue);
 }
 
 void OdometryPublisher::publish(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera) {
@@ -23,7 +24,7 @@ void OdometryPublisher::publish(const OdometryResult& result, const Eigen::Isome
   // TF first: whoever acts on the odometry finds the transform there.
   if (options_.publish_tf) broadcaster_.sendTransform(ros_conversions::toTransform(*odometry, options_.invert_tf));
   odom_publisher_.publish(odometry);
-  extendPath(*odometry, result.epoch);
+  extendPath(*odometry);
 }
 
 void OdometryPublisher::publishInfo(stereo_descriptor_vo::VoInfo info, const ros::Time& stamp) {
@@ -33,12 +34,20 @@ void OdometryPublisher::publishInfo(stereo_descriptor_vo::VoInfo info, const ros
   info_publisher_.publish(boost::make_shared<stereo_descriptor_vo::VoInfo>(std::move(info)));
 }
 
+void OdometryPublisher::publishFlow(const OdometryResult& result, const StereoFeatures& features,
+                                    const std_msgs::Header& header) {
+  if (flow_publisher_.getNumSubscribers() == 0) return;
+  const auto message = boost::make_shared<stereo_descriptor_vo::FeatureFlow>(ros_conversions::toFlow(result, features));
+  message->header = header;
+  flow_publisher_.publish(message);
+}
+
 void OdometryPublisher::publishPoints(const stereo_descriptor_vo::StereoFeatures& features) {
   if (points_publisher_.getNumSubscribers() > 0)
     points_publisher_.publish(boost::make_shared<sensor_msgs::PointCloud2>(ros_conversions::toPointCloud(features)));
 }
 
-void OdometryPublisher::extendPath(const nav_msgs::Odometry& odometry, int) {
+void OdometryPublisher::extendPath(const nav_msgs::Odometry& odometry) {
   // After a jump of the clock the trajectory begins anew.
   if (odometry.header.stamp < path_.header.stamp) path_.poses.clear();
   path_.header = odometry.header;

@@ -9,7 +9,7 @@
 
 namespace sdvo {
 
-/// odom, TF, path, points and vo_info of one processed pair.
+/// odom, TF, path, points, feature_flow and vo_info of one processed pair.
 class OdometryPublisher {
  public:
   OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOptions& options);
@@ -17,17 +17,17 @@ class OdometryPublisher {
   /// Publishes what the result's state allows: without a pose neither odom nor TF.
   void publish(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera);
   void publishInfo(stereo_descriptor_vo::VoInfo info, const ros::Time& stamp);
+  void publishFlow(const OdometryResult& result, const StereoFeatures& features, const std_msgs::Header& header);
   void publishPoints(const stereo_descriptor_vo::StereoFeatures& features);
 
  private:
-  void extendPath(const nav_msgs::Odometry& odometry, int epoch);
+  void extendPath(const nav_msgs::Odometry& odometry);
 
   OdometryOutputOptions options_;
   ros_conversions::OdometryFrames frames_;
-  ros::Publisher odom_publisher_, path_publisher_, info_publisher_, points_publisher_;
+  ros::Publisher odom_publisher_, path_publisher_, info_publisher_, points_publisher_, flow_publisher_;
   tf2_ros::TransformBroadcaster broadcaster_;
   nav_msgs::Path path_;
-  ros::Time last_stamp_;
 };
 
 }  // namespace sdvo

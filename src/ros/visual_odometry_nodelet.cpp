@@ -7,6 +7,7 @@
 #include <tf2_ros/transform_listener.h>
 
 #include <atomic>
+#include <cmath>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -16,6 +17,7 @@
 #include "nodelet_options.hpp"
 #include "odometry_publisher.hpp"
 #include "params.hpp"
+#include "reconfigure_server.hpp"
 #include "report_throttle.hpp"
 #include "stereo_descriptor_vo/visual_odometry.hpp"
 #include "worker.hpp"
@@ -59,6 +61,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     diagnostics_timer_ = nh.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { diagnostics_->update(); });
     reset_service_ = private_nh.advertiseService("reset", &VisualOdometryNodelet::onReset, this);
 
+    reconfigured_ = options_.odometry;
+    reconfigure_server_ =
+        std::make_unique<ReconfigureServer>(private_nh, listOptions(reconfigured_), [this] { onReconfigure(); });
+
     worker_ = std::make_unique<Worker<FeaturesMessagePtr>>(static_cast<std::size_t>(options_.output.queue_size),
                                                            [this](const FeaturesMessagePtr& m) { process(m); });
     subscriber_ = nh.subscribe<FeaturesMessage>("stereo_features", static_cast<std::uint32_t>(options_.output.queue_size),
@@ -67,8 +73,24 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     NODELET_FATAL_STREAM("not started: " << e.what());
   }
 
+  /// In a ROS callback; the worker takes the new options over before its next message.
+  void onReconfigure() {
+    const std::lock_guard<std::mutex> lock(pending_mutex_);
+    pending_ = reconfigured_;
+  }
+
+  void takeOverOptions() {
+    std::optional<VisualOdometryOptions> pending;
+    {
+      const std::lock_guard<std::mutex> lock(pending_mutex_);
+      pending.swap(pending_);
+    }
+    if (pending) odometry_->configure(*pending);
+  }
+
   /// In the worker's thread.
   void process(const FeaturesMessagePtr& message) try {
+    takeOverOptions();
     if (reset_requested_.exchange(false)) restart("reset was called");
     if (!findExtrinsic(ros_conversions::cleanFrameId(message->header.frame_id))) return;
     StereoFeatures features;
@@ -86,6 +108,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
         NODELET_WARN_STREAM(toString(result.state) << " at " << message->header.stamp << ": " << result.reason);
     publisher_->publish(result, *T_base_camera_);
     publisher_->publishPoints(*message);
+    publisher_->publishFlow(result, features, message->header);
     stereo_descriptor_vo::VoInfo info = ros_conversions::toInfo(result, *message);
     info.dropped_features = worker_->dropped();
     info.out_of_order = out_of_order_;
@@ -163,6 +186,17 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     return true;
   }
 
+  /// Under the lock of last_info_.
+  void addCalibration(diagnostic_updater::DiagnosticStatusWrapper& status) const {
+    if (std::isfinite(last_info_->disparity_offset))
+      status.addf("calibration", "disparities are off by %.2f +- %.2f px in the centre, another %.2f +- %.2f px at 45 degrees",
+                  last_info_->disparity_offset, last_info_->disparity_offset_sigma, last_info_->disparity_bend,
+                  last_info_->disparity_bend_sigma);
+    if (std::isfinite(last_info_->right_rotation[0]))
+      status.addf("right camera rotation [mrad]", "%.2f %.2f %.2f", 1e3 * last_info_->right_rotation[0],
+                  1e3 * last_info_->right_rotation[1], 1e3 * last_info_->right_rotation[2]);
+  }
+
   void diagnose(diagnostic_updater::DiagnosticStatusWrapper& status) {
     using Level = diagnostic_msgs::DiagnosticStatus;
     const std::lock_guard<std::mutex> lock(info_mutex_);
@@ -178,6 +212,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     status.add("inliers", last_info_->inliers);
     status.add("rms reprojection error [px]", last_info_->rms_reprojection_error);
     status.add("distance [m]", last_info_->distance);
+    addCalibration(status);
     status.add("latency [s]", last_info_->latency);
     status.add("dropped pairs", last_info_->dropped_pairs);
     status.add("dropped feature messages", last_info_->dropped_features);
@@ -188,6 +223,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   static constexpr double kClockJump = 1.0;    // s; what is late by less was only overtaken
 
   Options options_;
+  VisualOdometryOptions reconfigured_;  // the server's
+  std::mutex pending_mutex_;
+  std::optional<VisualOdometryOptions> pending_;
+  std::unique_ptr<ReconfigureServer> reconfigure_server_;
   ReportThrottle throttle_;
   tf2_ros::Buffer tf_buffer_;
   std::unique_ptr<tf2_ros::TransformListener> tf_listener_;

@@ -62,7 +62,7 @@ sdvo::StereoCamera readCalibration(const std::string& path, const std::string& s
   int consumed = 0;
   if (std::sscanf(size.c_str(), "%dx%d%n", &camera.width, &camera.height, &consumed) != 2 ||
       consumed != static_cast<int>(size.size()))
-    throw std::invalid_argument("--size '" + size + "' is not a size such as 1241x376, which --calib needs");
+    throw std::invalid_argument("--calib needs --size such as 1241x376, not '" + size + "'");
   if (camera.width > 8192 || camera.height > 8192) throw std::invalid_argument("--size is limited to 8192x8192");
   camera.check();
   return camera;
@@ -118,7 +118,8 @@ void writeImage(const fs::path& path, const cv::Mat& image) {
 void prepareOutput(const fs::path& directory, bool truth) {
   std::error_code error;
   if (fs::exists(directory) && !(fs::is_directory(directory) && fs::is_empty(directory)))
-    throw std::runtime_error("--output '" + directory.string() + "' exists and is not empty: remove it or choose another");
+    throw std::runtime_error("--output '" + directory.string() +
+                             "' exists and is not empty: remove it or choose another");
   for (const char* name : {"image_0", "image_1"}) fs::create_directories(directory / name, error);
   if (truth) fs::create_directories(directory / "truth", error);
   if (error) throw std::runtime_error("cannot create --output '" + directory.string() + "': " + error.message());
@@ -167,14 +168,17 @@ DrivePath makePath(const Request& request) {
   if (std::find(presets.begin(), presets.end(), request.trajectory) == presets.end())
     return DrivePath(sdvo::readKittiPoses(request.trajectory), request.rate);
   const int frames = request.frames > 0 ? request.start + request.frames : 0;
-  return sdvo::render::makePresetPath(request.trajectory, frames, request.rate, static_cast<std::uint64_t>(request.options.seed));
+  return sdvo::render::makePresetPath(request.trajectory, frames, request.rate,
+                                      static_cast<std::uint64_t>(request.options.seed));
 }
 
 double seconds(const std::chrono::steady_clock::time_point& since) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - since).count();
 }
 
-double cpuSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+double cpuSeconds() {
+  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
+}
 
 int renderDrive(Request request) {
   const bool euroc = request.rig == "euroc";
@@ -195,6 +199,13 @@ int renderDrive(Request request) {
   if (request.start + count > path.count())
     throw std::invalid_argument("--frames " + std::to_string(count) + " from " + std::to_string(request.start) +
                                 " is more than the " + std::to_string(path.count()) + " poses of the trajectory");
+  const auto checkTruthFrames = [&](int available) {
+    for (const int frame : request.truth_frames)
+      if (frame < 0 || frame >= available)
+        throw std::invalid_argument("--truth-frame " + std::to_string(frame) + " is not one of the " +
+                                    std::to_string(available) + " frames written");
+  };
+  checkTruthFrames(count);
   const bool room = request.world == "room" || (request.world == "auto" && (euroc || request.trajectory == "hover"));
 
   prepareOutput(request.output, !request.truth_frames.empty());
@@ -217,10 +228,7 @@ int renderDrive(Request request) {
     times += sdvo::formatSeconds(std::llround(1e9 * i / request.rate)) + "\n";
     poses.push_back(T_first_world * path.pose(frame));
   }
-  for (const int truth_frame : request.truth_frames)
-    if (truth_frame < 0 || truth_frame >= static_cast<int>(frames.size()))
-      throw std::invalid_argument("--truth-frame " + std::to_string(truth_frame) + " is not one of the " +
-                                  std::to_string(frames.size()) + " frames written");
+  checkTruthFrames(static_cast<int>(frames.size()));  // some may have been dropped
 
   const auto rendering = std::chrono::steady_clock::now();
   const double cpu = cpuSeconds();
@@ -242,7 +250,7 @@ void addOptions(CLI::App& app, RenderOptions& options) {
     std::string flag = "--" + option.name;
     std::replace(flag.begin(), flag.end(), '_', '-');
     char range[96];
-    std::snprintf(range, sizeof range, " [%g … %g", option.range.min, option.range.max);
+    std::snprintf(range, sizeof range, " [%.10g … %.10g", option.range.min, option.range.max);
     app.add_option_function<std::string>(
            flag,
            [option, flag](const std::string& text) {
@@ -276,7 +284,8 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(0.1, 1000.0));
   app.add_option("--threads", request.threads, "Threads; they do not change the result [default: one per processor]")
       ->check(CLI::Range(1, 1024));
-  app.add_option("--rig", request.rig, "kitti (1241x376, f 707 px, 0.54 m) or euroc (752x480, f 436 px, 0.11 m, indoors)")
+  app.add_option("--rig", request.rig,
+                 "kitti (1241x376, f 707 px, 0.54 m) or euroc (752x480, f 436 px, 0.11 m, indoors)")
       ->check(CLI::IsMember({"kitti", "euroc"}));
   app.add_option("--calib", request.calibration, "A KITTI calib.txt (P0 and P1) instead of the rig; needs --size");
   app.add_option("--size", request.size, "WxH, image size in px for --calib");

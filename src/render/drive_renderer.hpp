@@ -1,0 +1,95 @@
+#pragma once
+
+#include <memory>
+#include <string>
+
+#include "camera_effects.hpp"
+#include "stereo_descriptor_vo/stereo_camera.hpp"
+#include "view_renderer.hpp"
+
+namespace sdvo::render {
+
+/// What the right camera really does, and its calibration does not know.
+struct Misalignment {
+  double disparity_offset = 0.0;  ///< added to every disparity, px
+  double rotation_x = 0.0;        ///< of the right camera in its own frame, applied x first, then y, then z; degrees
+  double rotation_y = 0.0;
+  double rotation_z = 0.0;
+
+  void describe(OptionList& list);
+};
+
+struct RenderOptions {
+  int samples = 4;              ///< rays per pixel
+  double moving_share = 0.01;   ///< of the pixels that see a moving car, on average over the drive
+  double dropped_frames = 0.0;  ///< share of the pairs that never arrive
+  int seed = 1;
+  CameraEffects effects;
+  Misalignment misalignment;
+
+  void describe(OptionList& list);
+};
+
+struct StereoPair {
+  cv::Mat1b left, right;
+};
+
+/// Exact knowledge of a left image at its pixels' centres. NaN where there is only sky, and flow is NaN as well where
+/// the point lies behind the next camera.
+struct Truth {
+  cv::Mat1f depth;      ///< along the optical axis, m
+  cv::Mat1f disparity;  ///< of the rig as calibrated, px
+  cv::Mat2f flow;       ///< to the left image of the next frame, px; may lead out of the image
+  cv::Mat1b moving;     ///< 1 on moving cars
+};
+
+/// KITTI's rig (sequences 04 to 10) and a rectified one like EuRoC's.
+StereoCamera kittiCamera();
+StereoCamera eurocCamera();
+
+/// A drive ready to be rendered: world, light and traffic around the whole trajectory. Rendering is const, depends on
+/// the seed and the frame alone and may run on many threads, each with its own Worker.
+class DriveRenderer {
+ public:
+  enum class Scenery { kStreet, kRoom };
+
+  /// Scratch space of a thread.
+  using Worker = MovingScene;
+
+  /// Builds the world on `threads` threads. The traffic is tuned for frames `first` … `first + count - 1`.
+  DriveRenderer(const DrivePath& path, Scenery scenery, const StereoCamera& camera, const RenderOptions& options,
+                int first, int count, int threads);
+  DriveRenderer(const DriveRenderer&) = delete;
+  DriveRenderer& operator=(const DriveRenderer&) = delete;
+
+  Worker makeWorker() const { return MovingScene(device_, car_casters_); }
+  StereoPair render(int frame, Worker& worker) const;
+  Truth truth(int frame, Worker& worker) const;
+  /// Whether this pair never arrives; the first of a drive always does.
+  bool isDropped(int frame) const;
+
+  /// Measured on small images over the drive.
+  double movingShare() const { return moving_share_; }
+  const World& world() const { return world_; }
+
+ private:
+  View view(int side, const Eigen::Isometry3d& T_world_left) const;
+  cv::Mat1f brightness(int side, double time, Worker& worker) const;
+  double measureMovingShare(int first, int count) const;
+  void tuneTraffic(int first, int count);
+  void setDensity(double density);
+
+  DrivePath path_;
+  StereoCamera camera_;
+  RenderOptions options_;
+  int first_;
+  Device device_;
+  World world_;
+  Traffic traffic_;
+  std::unique_ptr<RayCaster> caster_;
+  std::vector<RayCaster> car_casters_;
+  std::unique_ptr<ViewRenderer> renderer_;
+  double moving_share_ = 0.0;
+};
+
+}  // namespace sdvo::render
