@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "../src/ros/conversions.hpp"
+#include "../src/ros/features_image.hpp"
 #include "stereo_descriptor_vo/ros/stereo_features_view.hpp"
 #include "synthetic_scene.hpp"
 
@@ -752,7 +753,12 @@ TEST(ToInfo, TellsResultAndImageSide) {
   result.match_time = 0.25;
   result.motion_time = 0.125;
   result.distance = 42.5;
-  result.reference_id = 17;
+  result.reference_id = 20;
+  result.keyframe_id = 17;
+  result.disparity_offset = -0.25;
+  result.disparity_offset_sigma = 0.05;
+  result.disparity_bend = 1.5;
+  result.right_rotation << 0.001, -0.002, 0.003;
   FeaturesMessage features = someMessage();
   features.dropped_pairs = 6;
   const stereo_descriptor_vo::VoInfo info = toInfo(result, features);
@@ -774,6 +780,10 @@ TEST(ToInfo, TellsResultAndImageSide) {
   EXPECT_EQ(info.dropped_pairs, 6u);
   EXPECT_EQ(info.distance, 42.5);
   EXPECT_EQ(info.keyframe_id, 17u);
+  EXPECT_FLOAT_EQ(info.disparity_offset, -0.25f);
+  EXPECT_FLOAT_EQ(info.disparity_offset_sigma, 0.05f);
+  EXPECT_FLOAT_EQ(info.disparity_bend, 1.5f);
+  EXPECT_FLOAT_EQ(info.right_rotation[1], -0.002f);
 
   result.matches = result.inliers = 0;
   EXPECT_EQ(toInfo(result, features).inlier_ratio, 0.f);
@@ -785,6 +795,59 @@ TEST(ToInfo, IsUnderAKilobyteWithTheLongestReasons) {
   stereo_descriptor_vo::VoInfo info = toInfo(result, someMessage());
   info.header.frame_id = "robot/odom";
   EXPECT_LT(ros::serialization::serializationLength(info), 1000u);
+}
+
+TEST(ToFlow, LeadsFromThePreviousPositionToThePresentOne) {
+  OdometryResult result = trackedResult();
+  const StereoFeatures features = someFeatures();
+  result.flow = {{10.f, 20.f, 3, true}, {30.f, 40.f, 0, false}};
+  const stereo_descriptor_vo::FeatureFlow flow = toFlow(result, features);
+  EXPECT_EQ(flow.u_reference, (std::vector<float>{10.f, 30.f}));
+  EXPECT_EQ(flow.v_reference, (std::vector<float>{20.f, 40.f}));
+  EXPECT_EQ(flow.u, (std::vector<float>{features.u[3], features.u[0]}));
+  EXPECT_EQ(flow.v, (std::vector<float>{features.v[3], features.v[0]}));
+  ASSERT_EQ(flow.inlier.size(), 2u);
+  EXPECT_TRUE(flow.inlier[0]);
+  EXPECT_FALSE(flow.inlier[1]);
+}
+
+/// Pixels that are not grey any more.
+int colouredPixels(const cv::Mat& picture) {
+  int count = 0;
+  for (int y = 0; y < picture.rows; ++y)
+    for (int x = 0; x < picture.cols; ++x) {
+      const auto& pixel = picture.at<cv::Vec3b>(y, x);
+      count += pixel[0] != pixel[1] || pixel[1] != pixel[2] ? 1 : 0;
+    }
+  return count;
+}
+
+TEST(DrawFeatures, DrawsCirclesOfTheDepthDerivedSizeInBothViews) {
+  constexpr float kSize = 40.f;
+  stereo_descriptor_vo::StereoFeatures message = someMessage();
+  for (float& size : message.size) size = 1.f;
+  message.u[0] = 200.f;
+  message.v[0] = 200.f;
+  message.disparity[0] = 50.f;
+  message.dv[0] = 0.f;
+  message.size[0] = kSize;
+  const cv::Mat grey(370, 1226, CV_8UC1, cv::Scalar(90));
+  const cv::Mat picture = drawFeatures(grey, grey, message, {});
+  ASSERT_EQ(picture.size(), cv::Size(1226, 740));
+  const auto isColoured = [&](int x, int y) { return colouredPixels(picture(cv::Rect(x, y, 1, 1))) == 1; };
+  EXPECT_TRUE(isColoured(200 + 20, 200));
+  EXPECT_TRUE(isColoured(200, 200 - 20));
+  EXPECT_FALSE(isColoured(200 + 16, 200));
+  EXPECT_TRUE(isColoured(150 + 20, 370 + 200));
+  EXPECT_FALSE(isColoured(200 + 20, 370 + 200));
+}
+
+TEST(DrawFeatures, SurvivesFlowOfUnequalLengths) {
+  stereo_descriptor_vo::FeatureFlow flow;
+  flow.u = {1.f, 2.f};
+  flow.v = {1.f};
+  const cv::Mat grey(370, 1226, CV_8UC1, cv::Scalar(90));
+  EXPECT_NO_THROW(drawFeatures(grey, grey, someMessage(), flow));
 }
 
 }  // namespace

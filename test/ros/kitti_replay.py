@@ -9,6 +9,7 @@ import xmlrpc.client
 import cv2
 import numpy as np
 import rosgraph
+import roslib.packages
 import rospy
 from cv_bridge import CvBridge
 from rosgraph_msgs.msg import Clock, Log
@@ -29,6 +30,11 @@ def kitti_dir():
     if not os.path.isdir(os.path.join(directory, 'sequences')):
         raise AssertionError("KITTI_DIR = '%s' has no folder 'sequences'" % directory)
     return directory
+
+
+def run_tool(name, *arguments):
+    executable = roslib.packages.find_node(PACKAGE, name)[0]
+    subprocess.run([executable] + list(arguments), check=True, stdout=subprocess.DEVNULL)
 
 
 def wait_until(condition, timeout=30.0):

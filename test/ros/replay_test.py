@@ -12,7 +12,6 @@ import unittest
 
 import numpy as np
 import rosbag
-import roslib.packages
 import rospy
 import rostest
 import tf2_ros
@@ -20,15 +19,10 @@ from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import PointCloud2
 from tf2_msgs.msg import TFMessage
 
-from kitti_replay import PACKAGE, Collector, kitti_dir, matrix_of, wait_until
+from kitti_replay import PACKAGE, Collector, kitti_dir, matrix_of, run_tool, wait_until
 from stereo_descriptor_vo.msg import StereoFeatures, VoInfo
 
 STATIC_FRAMES = ('base_link', 'stereo_left_optical')
-
-
-def run_tool(name, *arguments):
-    executable = roslib.packages.find_node(PACKAGE, name)[0]
-    subprocess.run([executable] + list(arguments), check=True, stdout=subprocess.DEVNULL)
 
 
 class Replay(unittest.TestCase):
