@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <opencv2/features2d.hpp>
 
 #include "stereo_descriptor_vo/base_descriptor.hpp"
@@ -119,7 +119,7 @@ TEST_P(EveryDescriptor, TakesNoKeypoints) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Available, EveryDescriptor, testing::ValuesIn(availableDescriptors()),
-                         [](const auto& info) { return info.param; });
+                         [](const auto& parameter) { return parameter.param; });
 
 TEST(BaseDescriptor, WhatOpenCvLacksIsOneClearError) {
   const std::vector<std::string> available = availableDescriptors();
@@ -174,7 +174,8 @@ TEST(SiftDescriptor, SamplesTheOctaveAndLayerOfTheSizeAndItsRowsAreWholeNumbers)
   for (int i = 0; i < expected.rows; ++i) {
     ASSERT_TRUE(described.valid[static_cast<std::size_t>(i)]);
     EXPECT_EQ(cv::norm(as_floats.row(i), expected.row(i), cv::NORM_INF), 0.0)
-        << "size " << kept[static_cast<std::size_t>(i)].size << " octave " << (kept[static_cast<std::size_t>(i)].octave & 255);
+        << "size " << kept[static_cast<std::size_t>(i)].size << " octave "
+        << (kept[static_cast<std::size_t>(i)].octave & 255);
   }
 }
 

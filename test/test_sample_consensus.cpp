@@ -27,8 +27,8 @@ Scene makeScene(int count, double outlier_share, double noise, unsigned seed) {
   scene.T_current_reference = expSE3(motion);
   const StereoCamera& camera = scene.camera;
   for (int i = 0; i < count; ++i) {
-    const Eigen::Vector3d point =
-        camera.backProject(40.0 + 560.0 * uniform(random), 40.0 + 400.0 * uniform(random), 6.0 + 30.0 * uniform(random));
+    const Eigen::Vector3d point = camera.backProject(40.0 + 560.0 * uniform(random), 40.0 + 400.0 * uniform(random),
+                                                     6.0 + 30.0 * uniform(random));
     Eigen::Vector3d measurement = camera.project(scene.T_current_reference * point);
     for (int k = 0; k < 3; ++k) measurement[k] += noise * normal(random);
     if (i < outlier_share * count) {
@@ -112,7 +112,7 @@ TEST_P(EveryMethod, FindsNothingInTooFewCorrespondences) {
 }
 
 INSTANTIATE_TEST_SUITE_P(ByName, EveryMethod, testing::Values("ransac", "msac", "lo_ransac", "gasac", "adaptive_gasac"),
-                         [](const auto& info) { return std::string(info.param); });
+                         [](const auto& parameter) { return std::string(parameter.param); });
 
 TEST(SampleConsensus, RefusesUnknownNames) {
   SampleConsensusOptions options;
@@ -120,7 +120,8 @@ TEST(SampleConsensus, RefusesUnknownNames) {
   EXPECT_NE(synthetic::errorOf([&] { checked(options); }).find("adaptive_gasac"), std::string::npos);
 }
 
-/// A minimal sample carries the noise of its three points; optimised over all of its inliers a pose gathers more of them.
+/// A minimal sample carries the noise of its three points; optimised over all of its inliers a pose gathers more of
+/// them.
 TEST(SampleConsensus, LocalOptimisationFindsMoreInliers) {
   std::size_t plain = 0, optimised = 0;
   for (unsigned seed = 1; seed <= 10; ++seed) {

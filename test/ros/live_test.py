@@ -8,6 +8,7 @@ import sys
 import time
 import unittest
 
+import dynamic_reconfigure.client
 import numpy as np
 import roslib.packages
 import rospy
@@ -15,11 +16,12 @@ import rostest
 import tf2_ros
 from geometry_msgs.msg import TransformStamped
 from nav_msgs.msg import Odometry
+from sensor_msgs.msg import Image
 from std_srvs.srv import Empty
 
 from kitti_replay import (FRAME, PACKAGE, Camera, Collector, Pipeline, Rosout, SimulatedClock, StereoSequence,
                           matrix_of, wait_until)
-from stereo_descriptor_vo.msg import StereoFeatures, VoInfo
+from stereo_descriptor_vo.msg import FeatureFlow, StereoFeatures, VoInfo
 
 PAIRS = 14  # 1.3 s: a jump back to the first one is no mere lateness
 SILENCE = 1.0  # s; a pair takes a tenth of it
@@ -239,6 +241,45 @@ class Live(unittest.TestCase):
         self.assertEqual((after.epoch, after.distance), (before.epoch + 1, 0.0))
         self.assertTrue(wait_until(lambda: len(self.odometry) == 4))
         np.testing.assert_allclose(matrix_of(self.odometry[3].pose.pose), np.eye(4), atol=1e-9)
+
+    def test_reconfiguring_takes_effect_and_is_clamped(self):
+        self.start()
+        before = self.feed(0)
+        client = dynamic_reconfigure.client.Client(self.namespace + '/stereo_features', timeout=20)
+        answer = client.update_configuration({'detector/max_features': 200, 'stereo/min_disparity': 1000.0})
+        self.assertEqual(answer['detector/max_features'], 200)
+        self.assertEqual(answer['stereo/min_disparity'], 50.0)  # the end of its range
+        client.update_configuration({'stereo/min_disparity': 0.5, 'detector/type': 'no such detector'})
+        client.close()
+        after = self.feed(1)
+        self.assertGreater(before.detected, 1000)
+        self.assertEqual(after.detected, 200)
+        self.assertEqual(after.state, 'DEGRADED')  # other rows do not continue the old ones: seeded anew
+        self.assertEqual(self.feed(2).state, 'TRACKING')
+        self.assert_alive()
+
+    def test_features_image_is_drawn_while_someone_looks(self):
+        self.start()
+        self.feed(0)
+        picture = self.keep(Collector(self.namespace + '/features_image', Image))
+        flow = self.keep(Collector(self.namespace + '/feature_flow', FeatureFlow))
+        master = rospy.get_master()
+
+        def is_looking():
+            subscribers = dict(master.getSystemState()[2][1])
+            return len(subscribers.get(self.namespace + '/feature_flow', [])) == 2
+        self.assertTrue(wait_until(is_looking))
+        # Connections follow subscriptions after a moment, and a first pair may fall between.
+        for i in range(1, PAIRS):
+            self.feed(i)
+            if wait_until(lambda: len(picture) > 0, 1.0):
+                break
+        self.assertGreater(len(picture), 0)
+        height, width = self.sequence.pairs[0][0].shape
+        self.assertEqual((picture[0].height, picture[0].width, picture[0].encoding), (2 * height, width, 'bgr8'))
+        self.assertTrue(any(flow[-1].inlier))
+        picture.close()
+        self.assertTrue(wait_until(lambda: not is_looking()))
 
     def test_late_input_is_dropped_and_counted(self):
         self.start()

@@ -1,0 +1,146 @@
+#!/usr/bin/python3
+"""The examples of subscribers, on made-up descriptors whose answers are known and on a converted KITTI sequence."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+import unittest
+
+import numpy as np
+import roslib.packages
+import rospy
+import rostest
+from std_msgs.msg import Float32
+
+from kitti_replay import PACKAGE, Collector, Rosout, kitti_dir, wait_until
+from stereo_descriptor_vo.msg import StereoFeatures
+
+NODES = ('descriptor_counter', 'descriptor_listener')
+COUNT = 101  # odd: the median is one of them
+HALF_BYTES = 64
+FLIPPED_BITS = 51
+SILENCE = 1.0  # s
+
+
+def random_rows(random, count):
+    """Rows of two halves that differ in FLIPPED_BITS bits each; rows of different features have nothing in common."""
+    left = random.integers(0, 2, (count, 8 * HALF_BYTES), dtype=np.uint8)
+    right = left.copy()
+    for row in right:
+        row[random.permutation(row.size)[:FLIPPED_BITS]] ^= 1
+    return np.packbits(np.hstack((left, right)), axis=1)
+
+
+def features_message(rows, stream_epoch=0):
+    """A camera of fx = 500 px and 0.1 m: disparities around 10 px are depths around 5 m."""
+    n = len(rows)
+    message = StereoFeatures()
+    message.header.stamp = rospy.Time.now()
+    message.header.frame_id = 'left_optical'
+    message.image_width, message.image_height = 640, 480
+    message.fx, message.fy, message.cx, message.cy, message.baseline = 500.0, 500.0, 320.0, 240.0, 0.1
+    message.descriptor, message.layout, message.element_type = 'freak', 'left+right', 'bits'
+    message.bytes_per_row = rows.shape[1]
+    message.stream_epoch = stream_epoch
+    message.u, message.v = [100.0] * n, [100.0] * n
+    message.disparity = list(np.linspace(5.0, 15.0, n))
+    message.dv, message.angle, message.response = [0.0] * n, [-1.0] * n, [1.0] * n
+    message.size, message.sigma, message.octave = [7.0] * n, [0.3] * n, bytes(n)
+    message.descriptors = rows.tobytes()
+    return message
+
+
+class Examples(unittest.TestCase):
+    def listen(self, namespace):
+        self.share = Collector(namespace + '/descriptor_counter/match_share', Float32)
+        self.half_distance = Collector(namespace + '/descriptor_listener/half_distance', Float32)
+        self.depth = Collector(namespace + '/descriptor_listener/median_depth', Float32)
+        for collector in (self.share, self.half_distance, self.depth):
+            self.addCleanup(collector.close)
+            self.assertTrue(wait_until(lambda: collector.subscriber.get_num_connections() > 0),
+                            'nobody publishes ' + collector.subscriber.name)
+
+    def publish_until_seen(self, message):
+        answers = len(self.depth)
+        self.publisher.publish(message)
+        self.assertTrue(wait_until(lambda: len(self.depth) > answers))
+        time.sleep(0.2)  # for the other node
+
+    def test_answers_on_known_descriptors(self):
+        random = np.random.default_rng(1)
+        self.listen('/synthetic')
+        rosout = Rosout('/synthetic')
+        self.addCleanup(rosout.close)
+        self.publisher = rospy.Publisher('/synthetic/stereo_features', StereoFeatures, queue_size=10)
+        self.assertTrue(wait_until(lambda: self.publisher.get_num_connections() == len(NODES)))
+
+        first = random_rows(random, COUNT)
+        self.publish_until_seen(features_message(first))
+        self.assertEqual(len(self.share), 0)  # nothing to compare with yet
+
+        kept = 61
+        second = random.permutation(np.vstack((first[:kept], random_rows(random, COUNT - kept))))
+        self.publish_until_seen(features_message(second))
+        self.assertTrue(wait_until(lambda: len(self.share) == 1))
+        self.assertAlmostEqual(self.share[0].data, kept / COUNT, places=6)
+        self.assertAlmostEqual(self.half_distance[-1].data, FLIPPED_BITS / (8 * HALF_BYTES), places=6)
+        self.assertAlmostEqual(self.depth[-1].data, 5.0, places=5)
+
+        # Refused by both with one error each, which ends neither.
+        damaged = features_message(second)
+        damaged.descriptors = damaged.descriptors[:-1]
+        answers = len(self.depth)
+        for _ in range(5):
+            self.publisher.publish(damaged)
+        self.assertTrue(wait_until(lambda: len(rosout.errors) == len(NODES)), rosout.errors)
+        time.sleep(SILENCE)
+        self.assertEqual(len(rosout.errors), len(NODES), rosout.errors)
+        self.assertTrue(all('StereoFeatures message refused' in error for error in rosout.errors), rosout.errors)
+        self.assertEqual((len(self.share), len(self.depth)), (1, answers))
+
+        self.publish_until_seen(features_message(second))
+        self.assertTrue(wait_until(lambda: len(self.share) == 2))
+        self.assertAlmostEqual(self.share[1].data, 1.0, places=6)
+
+        # Another stream is not compared, an empty pair continues it with nothing.
+        self.publish_until_seen(features_message(second, stream_epoch=1))
+        time.sleep(SILENCE)
+        self.assertEqual(len(self.share), 2)
+        self.publisher.publish(features_message(second[:0], stream_epoch=1))
+        self.assertTrue(wait_until(lambda: len(self.share) == 3))
+        self.assertEqual(self.share[2].data, 0.0)
+
+    def test_answers_on_a_real_drive(self):
+        pairs = 10
+        sequence = os.path.join(kitti_dir(), 'sequences', '06')
+        directory = tempfile.mkdtemp(prefix='sdvo_examples_')
+        self.addCleanup(shutil.rmtree, directory, ignore_errors=True)
+        bag = os.path.join(directory, 'sequence.bag')
+        converter = roslib.packages.find_node(PACKAGE, 'kitti_to_bag')[0]
+        subprocess.run([converter, '--sequence', sequence, '--frames', str(pairs), '--output', bag], check=True,
+                       stdout=subprocess.DEVNULL)
+        self.listen('/stereo')
+        topics = ['/stereo/%s/%s' % (side, what) for side in ('left', 'right') for what in ('image_rect', 'camera_info')]
+        subprocess.run(['rosbag', 'play', '--quiet', '--wait-for-subscribers', '--rate', '0.5', bag, '--topics'] +
+                       topics + ['/tf_static'], check=True)
+        self.assertTrue(wait_until(lambda: (len(self.share), len(self.half_distance), len(self.depth)) ==
+                                   (pairs - 1, pairs, pairs)), [len(self.share), len(self.depth)])
+        print('match shares: %s' % [round(m.data, 3) for m in self.share])
+        print('half distances: %s' % [round(m.data, 3) for m in self.half_distance])
+        print('median depths: %s m' % [round(m.data, 1) for m in self.depth])
+        # The car moves a metre from pair to pair: what is ten metres away keeps its looks to a tenth, so that at least
+        # a third must be recognised. Unrelated rows, see above, give nothing at all.
+        self.assertGreater(min(m.data for m in self.share), 1 / 3)
+        # Both halves show one place: they are as alike as what the odometry accepts for a match.
+        self.assertLess(max(m.data for m in self.half_distance), 0.3)
+        # A street: the road begins some metres ahead, houses stand within 100 m.
+        for m in self.depth:
+            self.assertTrue(4.0 < m.data < 100.0, m.data)
+
+
+if __name__ == '__main__':
+    rospy.init_node('examples_test')
+    rostest.rosrun(PACKAGE, 'examples', Examples, sys.argv)
