@@ -22,7 +22,8 @@ struct Case {
   std::string sequence, model, method, system;
 
   bool operator<(const Case& other) const {
-    return std::tie(sequence, model, method, system) < std::tie(other.sequence, other.model, other.method, other.system);
+    return std::tie(sequence, model, method, system) <
+           std::tie(other.sequence, other.model, other.method, other.system);
   }
 };
 
@@ -32,9 +33,10 @@ std::vector<double> lengths() {
   return all;
 }
 
-/// The paper's model: every pair is matched to the one before, nothing else is remembered. A pair whose motion is not found
-/// repeats the last one. "sample": the motion is that of the best minimal sample.
-Trajectory followFrameToFrame(const StereoCamera& camera, const std::vector<std::vector<Correspondence>>& correspondences,
+/// The paper's model: every pair is matched to the one before, nothing else is remembered. A pair whose motion is not
+/// found repeats the last one. "sample": the motion is that of the best minimal sample.
+Trajectory followFrameToFrame(const StereoCamera& camera,
+                              const std::vector<std::vector<Correspondence>>& correspondences,
                               const MotionEstimatorOptions& options, bool refine) {
   Trajectory poses = {Eigen::Isometry3d::Identity()};
   Eigen::Isometry3d T_current_reference = Eigen::Isometry3d::Identity();
@@ -56,7 +58,8 @@ Trajectory followWithPackage(const std::vector<StereoFeatures>& features, const 
   Trajectory poses;
   for (const StereoFeatures& of_pair : features) {
     const OdometryResult result = odometry.update(of_pair);
-    poses.push_back(result.has_pose ? result.T_origin_camera : (poses.empty() ? Eigen::Isometry3d::Identity() : poses.back()));
+    poses.push_back(result.has_pose ? result.T_origin_camera
+                                    : (poses.empty() ? Eigen::Isometry3d::Identity() : poses.back()));
   }
   return poses;
 }
@@ -91,8 +94,8 @@ std::string runAccuracy(const ExperimentSetup& setup, const AccuracyExperiment& 
   const auto add = [&](const Case& c, int seed, const Trajectory& truth, const Trajectory& estimate) {
     const SubPathErrors errors = subPathErrors(truth, estimate, lengths()).back();
     results[c].push_back({errors.translation_percent, errors.rotation_deg_per_m});
-    runs.add(c.sequence, options.stereo_features.descriptor.type, experiment.features, c.model, c.method, c.system, seed,
-             errors.translation_percent, errors.rotation_deg_per_m, hash);
+    runs.add(c.sequence, options.stereo_features.descriptor.type, experiment.features, c.model, c.method, c.system,
+             seed, errors.translation_percent, errors.rotation_deg_per_m, hash);
   };
 
   for (const std::string& name : setup.sequences) {
@@ -111,7 +114,8 @@ std::string runAccuracy(const ExperimentSetup& setup, const AccuracyExperiment& 
           const Case c{sequence.name, "", method, odometrySystems()[s].name};
           for (const std::string& refinement : experiment.refinements)
             add({c.sequence, refinement, c.method, c.system}, seed, sequence.trajectory,
-                followFrameToFrame(sequence.images.camera(), correspondences, odometry.motion, refinement == "refined"));
+                followFrameToFrame(sequence.images.camera(), correspondences, odometry.motion,
+                                   refinement == "refined"));
           if (experiment.package_odometry)
             add({c.sequence, "package", c.method, c.system}, seed, sequence.trajectory,
                 followWithPackage(described[s], odometry));
@@ -134,8 +138,8 @@ std::string runAccuracy(const ExperimentSetup& setup, const AccuracyExperiment& 
   results.insert(means.begin(), means.end());
 
   CsvTable summary({"sequence", "descriptor", "features", "model", "method", "system", "seeds", "best_percent",
-                    "mean_percent", "worst_percent", "paper_best", "paper_mean", "paper_worst", "gain_on_standard_percent",
-                    "rotation_mean_deg_per_m", "options"});
+                    "mean_percent", "worst_percent", "paper_best", "paper_mean", "paper_worst",
+                    "gain_on_standard_percent", "rotation_mean_deg_per_m", "options"});
   for (const auto& [c, of_seed] : results) {
     std::vector<double> translation, rotation, standard;
     for (const Run& run : of_seed) {

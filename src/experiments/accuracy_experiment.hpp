@@ -10,12 +10,13 @@ struct AccuracyExperiment {
   double standard_size = 7.0;  ///< px
   int seeds = 20;              ///< runs, seeded 1, 2, …
   std::vector<std::string> methods = {"adaptive_gasac", "ransac", "msac"};
-  std::vector<std::string> refinements = {"sample", "refined"};  ///< last step of the motion: the best sample's pose, or refined
-  bool package_odometry = false;  ///< also the package's odometry on the same features
+  std::vector<std::string> refinements = {"sample",
+                                          "refined"};  ///< last step of the motion: the best sample's pose, or refined
+  bool package_odometry = false;                       ///< also the package's odometry on the same features
 };
 
-/// Writes accuracy.csv (a row for each run) and accuracy_summary.csv (table 2) to the output directory; returns the latter
-/// as text. Errors are against the ground truth, means over sub-paths of 5, 10 … 50 m.
+/// Writes accuracy.csv (a row for each run) and accuracy_summary.csv (table 2) to the output directory; returns the
+/// latter as text. Errors are against the ground truth, means over sub-paths of 5, 10 … 50 m.
 std::string runAccuracy(const ExperimentSetup& setup, const AccuracyExperiment& experiment);
 
 }  // namespace sdvo

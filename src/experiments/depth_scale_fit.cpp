@@ -64,8 +64,8 @@ double rowDistance(ElementType type, const cv::Mat& a, const cv::Mat& b) {
   return cv::norm(float_a, float_b, cv::NORM_L2);
 }
 
-/// Ratio at the minimum of the distances, by a parabola through its neighbours in the logarithm; nothing when the minimum
-/// lies at an end of the search or the feature is not recognised at any size.
+/// Ratio at the minimum of the distances, by a parabola through its neighbours in the logarithm; nothing when the
+/// minimum lies at an end of the search or the feature is not recognised at any size.
 std::optional<double> bestRatio(const std::vector<double>& distances) {
   const auto smallest = std::min_element(distances.begin(), distances.end());
   const std::size_t i = static_cast<std::size_t>(smallest - distances.begin());
@@ -92,7 +92,8 @@ double residual(const SizeSample& sample, const ShapeFit& fit) {
 }
 
 /// Iteratively reweighted Gauss-Newton over the free parameters, derivatives by differences.
-ShapeFit fitShape(const std::vector<SizeSample>& samples, const std::string& model, bool free_exponent, bool free_offset) {
+ShapeFit fitShape(const std::vector<SizeSample>& samples, const std::string& model, bool free_exponent,
+                  bool free_offset) {
   constexpr double kScale = 0.15;  // octaves at which the Cauchy kernel bends: the step between tried sizes, doubled
   constexpr int kIterations = 60;
   constexpr double kDifference = 1e-4;
@@ -145,7 +146,9 @@ ShapeFit fitShape(const std::vector<SizeSample>& samples, const std::string& mod
 
 }  // namespace
 
-double ShapeFit::value(double disparity) const { return std::pow(disparity, exponent) + offset; }
+double ShapeFit::value(double disparity) const {
+  return std::pow(disparity, exponent) + offset;
+}
 
 std::vector<SizeSample> sampleSizes(const ReferenceSequence& sequence, const PipelineOptions& options,
                                     const SizeSampling& sampling) {
@@ -197,8 +200,9 @@ std::vector<SizeSample> sampleSizes(const ReferenceSequence& sequence, const Pip
 std::vector<ShapeFit> fitShapes(const std::vector<SizeSample>& samples) {
   constexpr std::size_t kFewest = 30;
   if (samples.size() < kFewest)
-    throw std::runtime_error("only " + std::to_string(samples.size()) +
-                             " features could be followed, at least 30 are needed: give longer sequences with more motion");
+    throw std::runtime_error(
+        "only " + std::to_string(samples.size()) +
+        " features could be followed, at least 30 are needed: give longer sequences with more motion");
   return {fitShape(samples, "a*d", false, false), fitShape(samples, "a*d+b", false, true),
           fitShape(samples, "a*d^b", true, false), fitShape(samples, "a*d^b+c", true, true)};
 }
@@ -242,8 +246,8 @@ std::vector<SlopeTrial> trySlopes(const std::vector<ReferenceSequence>& sequence
         if (t + step >= sequence.frames) continue;
         const std::vector<StereoFeatures> later = describe(t + step);
         for (std::size_t k = 0; k < trials.size(); ++k)
-          trials[k].correct += countCorrect(first[k], later[k], matchByDescriptor(first[k], later[k]),
-                                            sequence.motion(t, t + step));
+          trials[k].correct +=
+              countCorrect(first[k], later[k], matchByDescriptor(first[k], later[k]), sequence.motion(t, t + step));
         ++pairs;
       }
     }

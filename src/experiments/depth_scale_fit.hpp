@@ -22,8 +22,8 @@ struct SizeSampling {
   int max_step = 10;         ///< pairs between the two views at most
 };
 
-/// Features followed by the reference motion alone, so that no descriptor decides which ones are kept: the later view is the
-/// corner next to the reprojection. Its size is searched over 0.5…4 times the first one.
+/// Features followed by the reference motion alone, so that no descriptor decides which ones are kept: the later view
+/// is the corner next to the reprojection. Its size is searched over 0.5…4 times the first one.
 std::vector<SizeSample> sampleSizes(const ReferenceSequence& sequence, const PipelineOptions& options,
                                     const SizeSampling& sampling);
 
@@ -48,7 +48,8 @@ struct SlopeTrial {
   double correct;          ///< correct matches of a pair, mean
 };
 
-/// Correct matches (as in experiment A) over pairs 2, 5 and 8 steps apart for every factor and smallest size of the shape.
+/// Correct matches (as in experiment A) over pairs 2, 5 and 8 steps apart for every factor and smallest size of the
+/// shape.
 std::vector<SlopeTrial> trySlopes(const std::vector<ReferenceSequence>& sequences, const PipelineOptions& options,
                                   const ShapeFit& shape, const std::vector<double>& slopes,
                                   const std::vector<double>& min_sizes, double max_size, int features);

@@ -41,7 +41,8 @@ Trajectory runOdometry(const KittiSequence& images, int frames, const std::strin
   Progress progress("reference odometry " + name, frames);
   for (int i = 0; i < frames; ++i, progress.step()) {
     const ImagePair pair = images.load(i);
-    const OdometryResult result = odometry.update(extractor.extract(images.camera(), pair.left, pair.right, images.stamp(i)));
+    const OdometryResult result =
+        odometry.update(extractor.extract(images.camera(), pair.left, pair.right, images.stamp(i)));
     if (!result.has_pose || result.epoch != 0)
       throw std::runtime_error("the reference odometry loses " + images.directory() + " at pair " + std::to_string(i) +
                                "; use --reference ground_truth");
@@ -72,9 +73,8 @@ ReferenceSequence openImages(const ExperimentSetup& setup, const std::string& na
 
 ReferenceSequence openSequence(const ExperimentSetup& setup, const std::string& name, const std::string& reference) {
   ReferenceSequence sequence = openImages(setup, name);
-  sequence.trajectory = reference == "ground_truth"
-                            ? groundTruth(sequence.images.directory(), sequence.frames)
-                            : runOdometry(sequence.images, sequence.frames, sequence.name);
+  sequence.trajectory = reference == "ground_truth" ? groundTruth(sequence.images.directory(), sequence.frames)
+                                                    : runOdometry(sequence.images, sequence.frames, sequence.name);
   return sequence;
 }
 

@@ -36,8 +36,8 @@ struct ReferenceSequence {
   }
 };
 
-/// Opens a sequence of the setup. With `reference` "ground_truth" its poses are read; with "odometry" the package's odometry
-/// is run over it. Throws std::runtime_error that names what is missing.
+/// Opens a sequence of the setup. With `reference` "ground_truth" its poses are read; with "odometry" the package's
+/// odometry is run over it. Throws std::runtime_error that names what is missing.
 ReferenceSequence openSequence(const ExperimentSetup& setup, const std::string& name, const std::string& reference);
 
 /// The same without a trajectory.

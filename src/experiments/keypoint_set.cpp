@@ -36,7 +36,8 @@ double measureReachPerSize(const std::string& descriptor) {
   for (int u = 0; u <= kSide / 2; ++u) keypoints.push_back({static_cast<float>(u), kCentre, kSize, -1.f});
   const ViewDescriptors described = makeBaseDescriptor(descriptor)->describe(blank, keypoints);
   const auto first = std::find(described.valid.begin(), described.valid.end(), 1);
-  if (first == described.valid.end()) throw std::runtime_error("descriptor " + descriptor + " reaches further than 300 px");
+  if (first == described.valid.end())
+    throw std::runtime_error("descriptor " + descriptor + " reaches further than 300 px");
   // Half a pixel belongs to the border pixel itself.
   return (static_cast<double>(first - described.valid.begin()) + 0.5) / kSize;
 }

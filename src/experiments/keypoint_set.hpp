@@ -31,18 +31,18 @@ struct KeypointSet {
 KeypointSet findKeypoints(const KittiSequence& sequence, int i, const FeatureDetectorOptions& detector,
                           const StereoMatcherOptions& stereo);
 
-/// Distance in px from the centre, for each px of key point size, that a base descriptor needs inside the image. Measured
-/// with the descriptor itself on a blank image.
+/// Distance in px from the centre, for each px of key point size, that a base descriptor needs inside the image.
+/// Measured with the descriptor itself on a blank image.
 double measureReachPerSize(const std::string& descriptor);
 
-/// Indices of the `count` strongest corners, spread over buckets, among those whose neighbourhood lies inside both views at
-/// the size that every one of `curves` gives. Hence all curves describe exactly the same features. Fewer when there are no
-/// more; indices of a smaller count are a subset of those of a larger one.
+/// Indices of the `count` strongest corners, spread over buckets, among those whose neighbourhood lies inside both
+/// views at the size that every one of `curves` gives. Hence all curves describe exactly the same features. Fewer when
+/// there are no more; indices of a smaller count are a subset of those of a larger one.
 std::vector<int> selectKeypoints(const KeypointSet& set, const std::vector<DepthScale>& curves, double reach_per_size,
                                  int bucket_size, int count);
 
-/// Describes the chosen corners with sizes by `curve`, one row each in the order of `chosen`. Throws std::runtime_error when
-/// the descriptor leaves one of them out.
+/// Describes the chosen corners with sizes by `curve`, one row each in the order of `chosen`. Throws std::runtime_error
+/// when the descriptor leaves one of them out.
 StereoFeatures describeKeypoints(const KeypointSet& set, const std::vector<int>& chosen, const DepthScale& curve,
                                  const StereoDescriptor& descriptor);
 

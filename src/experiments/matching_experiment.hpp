@@ -9,11 +9,12 @@ struct MatchingExperiment {
   std::vector<std::string> descriptors = {"freak", "sift"};
   std::vector<std::string> layouts = {"left", "left+right"};
   std::vector<int> feature_counts = {310, 1350, 2320};
-  double standard_size = 7.0;                           ///< px
+  double standard_size = 7.0;                               ///< px
   std::vector<double> constant_sizes = {10.0, 14.0, 20.0};  ///< px, candidates beside the standard for the best one
 };
 
-/// Writes matching.csv (the layout of table 1) and matching_steps.csv to the output directory; returns the former as text.
+/// Writes matching.csv (the layout of table 1) and matching_steps.csv to the output directory; returns the former as
+/// text.
 std::string runMatching(const ExperimentSetup& setup, const MatchingExperiment& experiment);
 
 }  // namespace sdvo

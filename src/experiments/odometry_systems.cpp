@@ -13,8 +13,9 @@ const std::vector<OdometrySystem>& odometrySystems() {
   return systems;
 }
 
-std::vector<std::vector<StereoFeatures>> describeSequence(const ReferenceSequence& sequence, const PipelineOptions& options,
-                                                          double standard_size, int count) {
+std::vector<std::vector<StereoFeatures>> describeSequence(const ReferenceSequence& sequence,
+                                                          const PipelineOptions& options, double standard_size,
+                                                          int count) {
   const FeatureExtractorOptions& extraction = options.stereo_features;
   DepthScaleOptions normalised = extraction.size_curve, constant = extraction.size_curve;
   normalised.scale_normalisation = true;

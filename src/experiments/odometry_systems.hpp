@@ -19,8 +19,9 @@ struct OdometrySystem {
 const std::vector<OdometrySystem>& odometrySystems();
 
 /// A sequence described by every system on the same `count` features of each pair: element [system][pair].
-std::vector<std::vector<StereoFeatures>> describeSequence(const ReferenceSequence& sequence, const PipelineOptions& options,
-                                                          double standard_size, int count);
+std::vector<std::vector<StereoFeatures>> describeSequence(const ReferenceSequence& sequence,
+                                                          const PipelineOptions& options, double standard_size,
+                                                          int count);
 
 /// 3-D to stereo correspondences of the matches between two pairs, by descriptors alone.
 std::vector<Correspondence> makeCorrespondences(const StereoFeatures& reference, const StereoFeatures& current);

@@ -21,7 +21,8 @@ double publishedInliers(const std::string& system, int step) {
 }
 
 double publishedGain(const std::string& system, int step) {
-  return system == "stereo" ? 100.0 * (publishedInliers(system, step) / publishedInliers("standard", step) - 1.0) : kUnknown;
+  return system == "stereo" ? 100.0 * (publishedInliers(system, step) / publishedInliers("standard", step) - 1.0)
+                            : kUnknown;
 }
 
 struct Sum {
@@ -34,9 +35,12 @@ struct Sum {
 
 using Sums = std::vector<std::vector<Sum>>;  // [system][step - 1]
 
-Sums emptySums() { return Sums(odometrySystems().size(), std::vector<Sum>(kSteps)); }
+Sums emptySums() {
+  return Sums(odometrySystems().size(), std::vector<Sum>(kSteps));
+}
 
-Sums measure(const ReferenceSequence& sequence, const RobustnessExperiment& experiment, const PipelineOptions& options) {
+Sums measure(const ReferenceSequence& sequence, const RobustnessExperiment& experiment,
+             const PipelineOptions& options) {
   const auto described = describeSequence(sequence, options, experiment.standard_size, experiment.features);
   Sums sums = emptySums();
   Progress progress("robustness " + sequence.name, sequence.frames / experiment.stride + 1);

@@ -12,6 +12,7 @@ namespace {
 
 constexpr double kOncomingSpeed = 9.0;     // m/s
 constexpr double kOncomingLateral = -3.3;  // m right of the camera's way
+constexpr double kHalfLength = 1.3;        // m between the middle of a car and its axles
 constexpr double kVisible = 120.0;         // m along the way
 constexpr int kModelVariants = 9;
 
@@ -135,6 +136,10 @@ double Traffic::distanceOf(int id, double time) const {
   return begin_ + (way < 0.0 ? way + length : way);
 }
 
+bool Traffic::isOnRoad(double distance) const {
+  return distance - kHalfLength >= begin_ && distance + kHalfLength <= road_->samples().back().distance;
+}
+
 Eigen::Isometry3d Traffic::poseOf(int id, double time) const {
   const double distance = distanceOf(id, time), direction = id == 0 ? 1.0 : -1.0;
   const double lateral = id == 0 ? 0.0 : kOncomingLateral;
@@ -142,7 +147,7 @@ Eigen::Isometry3d Traffic::poseOf(int id, double time) const {
     const Eigen::Vector2d p = road_->beside(s, lateral);
     return Eigen::Vector3d(p.x(), ground_->height(p.x(), p.y()), p.y());
   };
-  const Eigen::Vector3d slope = direction * (ground(distance + 1.3) - ground(distance - 1.3));
+  const Eigen::Vector3d slope = direction * (ground(distance + kHalfLength) - ground(distance - kHalfLength));
   return placeCar(ground(distance), slope, slope);
 }
 
@@ -152,7 +157,8 @@ std::vector<Traffic::Car> Traffic::at(double time) const {
   const double here = path_->distanceAt(time);
   const Eigen::Vector3d camera = path_->poseAt(time).translation();
   for (int id = 0; id <= oncoming_; ++id) {
-    if (std::abs(distanceOf(id, time) - here) > kVisible) continue;
+    const double distance = distanceOf(id, time);
+    if (std::abs(distance - here) > kVisible || !isOnRoad(distance)) continue;
     const Car car = {id % kModelVariants, poseOf(id, time), id};
     // On a way that crosses itself an oncoming car may come along while the camera crosses its lane.
     const Eigen::Vector3d offset = car.T_world_car.translation() - camera;

@@ -41,6 +41,7 @@ class Traffic {
 
  private:
   double distanceOf(int id, double time) const;
+  bool isOnRoad(double distance) const;  ///< with both axles
 
   const DrivePath* path_ = nullptr;
   const RoadLine* road_ = nullptr;

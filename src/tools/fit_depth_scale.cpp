@@ -41,8 +41,8 @@ const sdvo::ShapeFit& choose(const std::vector<sdvo::ShapeFit>& fits, const std:
   return *best;
 }
 
-void writeYaml(const std::string& path, const sdvo::ShapeFit& shape, const sdvo::SlopeTrial& best, const Arguments& arguments,
-               std::size_t samples) {
+void writeYaml(const std::string& path, const sdvo::ShapeFit& shape, const sdvo::SlopeTrial& best,
+               const Arguments& arguments, std::size_t samples) {
   std::ofstream file(path);
   file << "# Written by fit_depth_scale: " << shape.model << " on " << samples << " samples of "
        << arguments.setup.sequences.size() << " sequence(s), median residual " << shape.median_residual << " octaves.\n"
@@ -77,9 +77,10 @@ int run(const Arguments& arguments) {
   // Ratios do not tell the curve's factor: how large a neighbourhood is worth describing shows in matching.
   constexpr double kReferenceDisparity = 20.0;  // px
   std::vector<double> slopes;
-  for (const double size : {7.0, 10.0, 14.4, 20.0, 28.0, 40.0}) slopes.push_back(size / shape.value(kReferenceDisparity));
-  const std::vector<sdvo::SlopeTrial> trials = sdvo::trySlopes(sequences, options, shape, slopes, {7.0, 10.0, 14.0},
-                                                               arguments.max_size, arguments.features);
+  for (const double size : {7.0, 10.0, 14.4, 20.0, 28.0, 40.0})
+    slopes.push_back(size / shape.value(kReferenceDisparity));
+  const std::vector<sdvo::SlopeTrial> trials =
+      sdvo::trySlopes(sequences, options, shape, slopes, {7.0, 10.0, 14.0}, arguments.max_size, arguments.features);
   sdvo::CsvTable tried({"slope", "min_size", "correct_per_pair"});
   sdvo::SlopeTrial best = trials.front();
   for (const sdvo::SlopeTrial& trial : trials) {
@@ -89,7 +90,8 @@ int run(const Arguments& arguments) {
   std::cout << tried.aligned();
   writeYaml(arguments.output, shape, best, arguments, samples.size());
   std::cout << "size = clamp(" << best.slope << " * disparity^" << shape.exponent << " + " << best.slope * shape.offset
-            << ", " << best.min_size << ", " << arguments.max_size << ") px, written to " << arguments.output << std::endl;
+            << ", " << best.min_size << ", " << arguments.max_size << ") px, written to " << arguments.output
+            << std::endl;
 
   if (!arguments.plot.empty()) {
     const std::string csv = std::filesystem::path(arguments.plot).replace_extension(".csv").string();
@@ -122,7 +124,8 @@ int main(int argc, char** argv) {
   app.add_option("--max-size", arguments.max_size, "largest key point diameter, px")
       ->capture_default_str()
       ->check(CLI::Range(10.0, 400.0));
-  app.add_option("--param", arguments.setup.settings, "option as name=value, for example descriptor/type=sift; repeatable")
+  app.add_option("--param", arguments.setup.settings,
+                 "option as name=value, for example descriptor/type=sift; repeatable")
       ->allow_extra_args(false);
   return sdvo::runTool(app, argc, argv, [&] { return run(arguments); });
 }

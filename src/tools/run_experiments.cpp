@@ -33,7 +33,8 @@ void addOutput(CLI::App& app, Arguments& arguments) {
 }
 
 void addSequences(CLI::App& app, Arguments& arguments) {
-  app.add_option("--kitti", arguments.setup.kitti, "directory of the KITTI odometry data, the one that holds sequences/");
+  app.add_option("--kitti", arguments.setup.kitti,
+                 "directory of the KITTI odometry data, the one that holds sequences/");
   app.add_option("--sequences", arguments.setup.sequences,
                  "numbers such as 04,06, or directories in KITTI layout; separated by commas")
       ->required()
@@ -60,8 +61,9 @@ CLI::App* addMatching(CLI::App& app, Arguments& arguments) {
       ->capture_default_str()
       ->delimiter(',')
       ->check(CLI::Range(10, 10000));
-  command->add_option("--constant-sizes", arguments.matching.constant_sizes,
-                      "px, tried for the best constant size beside the standard 7 px")
+  command
+      ->add_option("--constant-sizes", arguments.matching.constant_sizes,
+                   "px, tried for the best constant size beside the standard 7 px")
       ->capture_default_str()
       ->delimiter(',')
       ->check(CLI::Range(2.0, 200.0));
@@ -105,7 +107,9 @@ CLI::App* addConsensus(CLI::App& app, Arguments& arguments) {
   command->add_option("--correspondences", arguments.consensus.correspondences, "of each problem")
       ->capture_default_str()
       ->check(CLI::Range(20, 100000));
-  command->add_option("--seeds", arguments.consensus.seeds, "problems")->capture_default_str()->check(CLI::Range(1, 10000));
+  command->add_option("--seeds", arguments.consensus.seeds, "problems")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 10000));
   command->add_option("--budgets", arguments.consensus.budgets, "most samples, separated by commas")
       ->capture_default_str()
       ->delimiter(',')

@@ -1,0 +1,162 @@
+#!/usr/bin/env python3
+"""Draws the figures of the paper's experiments from the CSV files that run_experiments writes."""
+import argparse
+import csv
+import os
+import sys
+
+import matplotlib
+
+matplotlib.use("Agg")
+import matplotlib.pyplot as plt  # noqa: E402  the backend has to be chosen first
+
+
+def read_table(folder, name):
+    with open(os.path.join(folder, name), newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def unique(values):
+    return list(dict.fromkeys(values))
+
+
+def number(text):
+    return float(text) if text else float("nan")
+
+
+def save(figure, folder, name):
+    path = os.path.join(folder, name)
+    figure.tight_layout()
+    figure.savefig(path, dpi=120)
+    plt.close(figure)
+    print("wrote " + path)
+
+
+def plot_matching(folder):
+    """Figure 7: improvement against the size of the feature set; and correct matches against the step."""
+    rows = read_table(folder, "matching.csv")
+    descriptors = unique(row["descriptor"] for row in rows)
+    figure, axes = plt.subplots(1, len(descriptors), figsize=(5.5 * len(descriptors), 4.2), squeeze=False)
+    for axis, descriptor in zip(axes[0], descriptors):
+        for layout in unique(row["layout"] for row in rows):
+            mean = [r for r in rows if (r["sequence"], r["descriptor"], r["layout"]) == ("mean", descriptor, layout)]
+            sizes = [int(r["features"]) for r in mean]
+            line, = axis.plot(sizes, [number(r["improvement_percent"]) for r in mean], "o-",
+                              label=layout + ", against 7 px")
+            axis.plot(sizes, [number(r["improvement_on_best_percent"]) for r in mean], "s:", color=line.get_color(),
+                      label=layout + ", against the best constant size")
+        if descriptor == "freak":
+            axis.plot([310, 1350, 2320], [11.58, 15.37, 26.41], "k^--", label="paper, figure 7")
+        axis.set_title("scale normalised " + descriptor.upper())
+        axis.set_xlabel("feature set size")
+        axis.set_ylabel("improvement in correct matches, %")
+        axis.axhline(0.0, color="grey", linewidth=0.6)
+        axis.grid(linestyle=":")
+        axis.legend(fontsize=7)
+    save(figure, folder, "matching_feature_set_size.png")
+
+    steps = read_table(folder, "matching_steps.csv")
+    largest = max(int(row["features"]) for row in steps)
+    figure, axes = plt.subplots(1, len(descriptors), figsize=(5.5 * len(descriptors), 4.2), squeeze=False)
+    for axis, descriptor in zip(axes[0], descriptors):
+        chosen = [r for r in steps if (r["sequence"], r["descriptor"]) == ("mean", descriptor)
+                  and int(r["features"]) == largest and r["layout"] == unique(s["layout"] for s in steps)[0]]
+        for side in unique(row["side"] for row in chosen):
+            of_side = [r for r in chosen if r["side"] == side]
+            axis.plot([int(r["step"]) for r in of_side], [int(r["correct"]) / int(r["pairs"]) for r in of_side], "o-",
+                      label=side.replace("_", " ") + (" px" if side.startswith("constant") else ""))
+        axis.set_title("%s, %d features" % (descriptor.upper(), largest))
+        axis.set_xlabel("step")
+        axis.set_ylabel("correct matches of a pair")
+        axis.set_yscale("log")
+        axis.grid(linestyle=":", which="both")
+        axis.legend(fontsize=7)
+    save(figure, folder, "matching_steps.png")
+
+
+def plot_robustness(folder):
+    """Figure 5: inliers against the step."""
+    rows = [r for r in read_table(folder, "robustness.csv") if r["step"] != "1-5"]
+    sequences = unique(row["sequence"] for row in rows)
+    figure, axes = plt.subplots(1, len(sequences), figsize=(4.2 * len(sequences), 4.0), squeeze=False)
+    for axis, sequence in zip(axes[0], sequences):
+        for system in unique(row["system"] for row in rows):
+            chosen = [r for r in rows if (r["sequence"], r["system"]) == (sequence, system)]
+            axis.plot([int(r["step"]) for r in chosen], [number(r["inliers"]) for r in chosen], "o-",
+                      label=system.replace("_", " "))
+        if sequence == "mean":
+            for system, style in (("stereo", "k^--"), ("standard", "kv:")):
+                chosen = [r for r in rows if (r["sequence"], r["system"]) == (sequence, system)]
+                axis.plot([int(r["step"]) for r in chosen], [number(r["paper_inliers"]) for r in chosen], style,
+                          label="paper, " + system)
+        axis.set_title(sequence if sequence == "mean" else "sequence " + sequence)
+        axis.set_xlabel("step")
+        axis.set_ylabel("mean inliers")
+        axis.set_yscale("log")
+        axis.grid(linestyle=":", which="both")
+        axis.legend(fontsize=7)
+    save(figure, folder, "robustness_inliers.png")
+
+
+def plot_accuracy(folder):
+    """Table 2: best, mean and worst translation error over the seeds."""
+    rows = read_table(folder, "accuracy_summary.csv")
+    models = unique(row["model"] for row in rows)
+    figure, axes = plt.subplots(1, len(models), figsize=(5.5 * len(models), 4.2), squeeze=False)
+    for axis, model in zip(axes[0], models):
+        chosen = [r for r in rows if (r["sequence"], r["model"]) == ("mean", model)]
+        methods = unique(row["method"] for row in chosen)
+        systems = unique(row["system"] for row in chosen)
+        for k, system in enumerate(systems):
+            for x, method in enumerate(methods):
+                row = next(r for r in chosen if (r["method"], r["system"]) == (method, system))
+                best, mean, worst = (number(row[c]) for c in ("best_percent", "mean_percent", "worst_percent"))
+                axis.errorbar(x + 0.15 * (k - len(systems) / 2.0), mean, yerr=[[mean - best], [worst - mean]], fmt="o",
+                              capsize=4, color="C%d" % k, label=system.replace("_", " ") if x == 0 else None)
+        axis.set_xticks(range(len(methods)))
+        axis.set_xticklabels(methods, fontsize=8)
+        axis.set_title("motion: " + model)
+        axis.set_ylabel("translation error, %: best, mean, worst")
+        axis.grid(linestyle=":", axis="y")
+        axis.legend(fontsize=7)
+    save(figure, folder, "accuracy_seeds.png")
+
+
+def plot_consensus(folder):
+    """Success, inliers and time of the outlier rejection methods against the share of outliers."""
+    rows = read_table(folder, "consensus.csv")
+    budgets = unique(row["max_iterations"] for row in rows)
+    columns = (("success_percent", "right motions, %"), ("inliers_of_true_percent", "inliers, % of the true motion's"),
+               ("cpu_ms_per_call", "CPU time of a search, ms"))
+    figure, axes = plt.subplots(len(budgets), 3, figsize=(14.0, 3.8 * len(budgets)), squeeze=False)
+    for line, budget in zip(axes, budgets):
+        for axis, (column, label) in zip(line, columns):
+            for method in unique(row["method"] for row in rows):
+                chosen = [r for r in rows if (r["max_iterations"], r["method"]) == (budget, method)]
+                axis.plot([int(r["outlier_percent"]) for r in chosen], [number(r[column]) for r in chosen],
+                          "x:" if "without" in method else "o-", label=method.replace("_", " "), markersize=4)
+            axis.set_title("at most %s samples" % budget)
+            axis.set_xlabel("outliers, %")
+            axis.set_ylabel(label)
+            axis.grid(linestyle=":")
+        line[0].legend(fontsize=7)
+    save(figure, folder, "consensus.png")
+
+
+PLOTS = {"matching": plot_matching, "robustness": plot_robustness, "accuracy": plot_accuracy,
+         "consensus": plot_consensus}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("experiment", choices=sorted(PLOTS))
+    parser.add_argument("folder", help="directory that run_experiments wrote its CSV files to; receives the PNG files")
+    arguments = parser.parse_args()
+    try:
+        PLOTS[arguments.experiment](arguments.folder)
+    except (OSError, KeyError, ValueError) as error:
+        sys.exit("error: cannot plot %s of %s: %s" % (arguments.experiment, arguments.folder, error))
+
+
+if __name__ == "__main__":
+    main()
