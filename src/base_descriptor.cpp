@@ -35,6 +35,8 @@ ViewDescriptors emptyRows(std::size_t count, int bytes) {
 
 class FreakDescriptor : public BaseDescriptor {
  public:
+  double reach(double size) const override { return Freak::reach(size); }
+
   ViewDescriptors describe(const cv::Mat& image, const std::vector<ViewKeypoint>& keypoints) const override {
     const Freak freak(image);
     ViewDescriptors described = emptyRows(keypoints.size(), Freak::kBytes);

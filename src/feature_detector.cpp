@@ -1,10 +1,15 @@
 #include "stereo_descriptor_vo/feature_detector.hpp"
 
+#include <Eigen/Core>
 #include <algorithm>
+#include <cmath>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <stdexcept>
 #include <tuple>
+
+#include "stereo_descriptor_vo/patch_sampling.hpp"
 
 // SIFT moved from the non-free modules to features2d in 4.4.
 #define SDVO_HAVE_SIFT (CV_VERSION_MAJOR > 4 || (CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR >= 4))
@@ -19,8 +24,8 @@ std::vector<Corner> toCorners(const std::vector<cv::KeyPoint>& keypoints) {
   return corners;
 }
 
-/// The score of a FAST corner is the highest threshold at which it still is one. One pass at the lowest threshold, ranked
-/// by score inside each bucket, therefore equals running every bucket at its own adaptive threshold.
+/// The score of a FAST corner is the highest threshold at which it still is one. One pass at the lowest threshold,
+/// ranked by score inside each bucket, therefore equals running every bucket at its own adaptive threshold.
 std::vector<Corner> detectFast(const cv::Mat& image, const FeatureDetectorOptions& options) {
   std::vector<cv::KeyPoint> keypoints;
   cv::FAST(image, keypoints, options.fast_min_threshold, true);
@@ -34,8 +39,8 @@ std::vector<Corner> detectAgast(const cv::Mat& image, const FeatureDetectorOptio
   return toCorners(keypoints);
 }
 
-/// Detectors of OpenCV's with a scale space of their own: positions and scores are taken, the sizes come from the depth.
-/// More are asked for than wanted, so that the buckets have a choice.
+/// Detectors of OpenCV's with a scale space of their own: positions and scores are taken, the sizes come from the
+/// depth. More are asked for than wanted, so that the buckets have a choice.
 std::vector<Corner> detectInScaleSpace(const cv::Mat& image, const FeatureDetectorOptions& options) {
   constexpr int kChoice = 4;
   std::vector<cv::KeyPoint> keypoints;
@@ -90,20 +95,77 @@ std::vector<Corner> detectAll(const cv::Mat& image, const FeatureDetectorOptions
   return detectInScaleSpace(image, options);
 }
 
-/// Foerstner's intersection of gradient lines; a corner that wanders off is not one point, its integer position is kept.
-/// Gradient detectors answer up to half their window inside of a corner, hence the limit.
+/// Foerstner's intersection of gradient lines, as cv::cornerSubPix finds it but several times faster.
+class CornerRefiner {
+ public:
+  CornerRefiner(const cv::Mat& image, int radius) : radius_(radius), margin_(patchStride(radius + 1) + 1) {
+    // Memory of this size is slow to get from the system for every image.
+    thread_local cv::Mat larger, larger_float;
+    cv::copyMakeBorder(image, larger, margin_, margin_, margin_, margin_, cv::BORDER_REPLICATE);
+    larger.convertTo(larger_float, CV_32F);
+    image_ = larger_float;
+    // Weights fall off from the centre; they are zero beyond the square, where a patch's rows go on.
+    const int rows = 2 * radius + 1;
+    weight_.setZero(rows * stride());
+    x_.setZero(rows * stride());
+    y_.setZero(rows * stride());
+    for (int y = -radius; y <= radius; ++y)
+      for (int x = -radius; x <= radius; ++x) {
+        const int i = (y + radius) * stride() + x + radius;
+        weight_[i] = std::exp(-static_cast<float>(x * x + y * y) / static_cast<float>(radius * radius));
+        x_[i] = static_cast<float>(x);
+        y_[i] = static_cast<float>(y);
+      }
+    patch_.resize((rows + 2) * stride() + 2);
+  }
+
+  /// The corner near `start`, or nothing where it is further away than `largest_shift` px.
+  std::optional<cv::Point2f> refine(const cv::Point2f& start, float largest_shift) {
+    constexpr int kIterations = 10;
+    constexpr float kConverged = 0.02f;  // px
+    cv::Point2f position = start;
+    const int count = static_cast<int>(weight_.size());
+    for (int iteration = 0; iteration < kIterations; ++iteration) {
+      samplePatch(image_, margin_, position.x, position.y, 0.f, radius_ + 1, stride(), patch_.data());
+      const auto neighbour = [&](int dx, int dy) { return patch_.segment((1 + dy) * stride() + 1 + dx, count); };
+      gradient_x_ = neighbour(1, 0) - neighbour(-1, 0);
+      gradient_y_ = neighbour(0, 1) - neighbour(0, -1);
+      xx_ = weight_ * gradient_x_ * gradient_x_;
+      xy_ = weight_ * gradient_x_ * gradient_y_;
+      yy_ = weight_ * gradient_y_ * gradient_y_;
+      const float a = xx_.sum(), b = xy_.sum(), c = yy_.sum(), determinant = a * c - b * b;
+      if (!(determinant > 1e-6f * a * c)) break;
+      const float along_x = (xx_ * x_ + xy_ * y_).sum(), along_y = (xy_ * x_ + yy_ * y_).sum();
+      const cv::Point2f step((c * along_x - b * along_y) / determinant, (a * along_y - b * along_x) / determinant);
+      position += step;
+      const cv::Point2f shift = position - start;
+      if (!(std::max(std::abs(shift.x), std::abs(shift.y)) <= static_cast<float>(radius_))) return std::nullopt;
+      if (step.dot(step) <= kConverged * kConverged) break;
+    }
+    const cv::Point2f shift = position - start;
+    if (std::max(std::abs(shift.x), std::abs(shift.y)) > largest_shift) return std::nullopt;
+    return position;
+  }
+
+ private:
+  int stride() const { return patchStride(radius_ + 1); }
+
+  int radius_, margin_;
+  cv::Mat image_;                  ///< CV_32F, with the margin
+  Eigen::ArrayXf weight_, x_, y_;  ///< of the square's pixels, in rows of stride()
+  Eigen::ArrayXf patch_;           ///< the square with one pixel more on each side
+  Eigen::ArrayXf gradient_x_, gradient_y_, xx_, xy_, yy_;
+};
+
+/// A corner that wanders off is not one point; its integer position is kept. Gradient detectors answer up to half their
+/// window inside of a corner, hence the limit.
 void refinePositions(const cv::Mat& image, int radius, float largest_shift, std::vector<Corner>& corners) {
   if (corners.empty()) return;
   const cv::Rect2f inside(0.f, 0.f, static_cast<float>(image.cols - 1), static_cast<float>(image.rows - 1));
-  std::vector<cv::Point2f> positions;
-  positions.reserve(corners.size());
-  for (const Corner& corner : corners) positions.push_back(corner.position);
-  cv::cornerSubPix(image, positions, cv::Size(radius, radius), cv::Size(-1, -1),
-                   cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 10, 0.02));
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    const cv::Point2f shift = positions[i] - corners[i].position;
-    if (inside.contains(positions[i]) && std::max(std::abs(shift.x), std::abs(shift.y)) <= largest_shift)
-      corners[i].position = positions[i];
+  CornerRefiner refiner(image, radius);
+  for (Corner& corner : corners) {
+    const auto refined = refiner.refine(corner.position, largest_shift);
+    if (refined && inside.contains(*refined)) corner.position = *refined;
   }
 }
 
@@ -146,9 +208,13 @@ std::vector<Corner> spreadOverBuckets(std::vector<Corner> corners, cv::Size imag
 
 FeatureDetector::FeatureDetector(const FeatureDetectorOptions& options) : options_(checked(options)) {}
 
-std::vector<Corner> FeatureDetector::detect(const cv::Mat& image) const {
+std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border) const {
   CV_Assert(image.type() == CV_8UC1);
-  std::vector<Corner> corners = detectAll(image, options_);
+  constexpr int kSmallestSide = 16;  // px, less is no image for the detectors
+  const cv::Rect inner(border, border, image.cols - 2 * border, image.rows - 2 * border);
+  if (inner.width < kSmallestSide || inner.height < kSmallestSide) return {};
+  std::vector<Corner> corners = detectAll(image(inner), options_);
+  for (Corner& corner : corners) corner.position += cv::Point2f(inner.tl());
   corners = spreadOverBuckets(std::move(corners), image.size(), options_.bucket_size, options_.max_features);
   if (options_.subpixel) {
     const bool gradient = options_.type == "gftt" || options_.type == "harris";

@@ -1,5 +1,6 @@
 #include "stereo_descriptor_vo/feature_extractor.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
@@ -12,9 +13,9 @@ namespace {
 void checkImage(const cv::Mat& image, const char* side, const StereoCamera& camera) {
   if (image.type() == CV_8UC1 && image.cols == camera.width && image.rows == camera.height) return;
   std::ostringstream message;
-  message << side << " image is " << image.cols << "x" << image.rows << " with " << image.channels() << " channel(s) of "
-          << image.elemSize1() << " byte(s); the camera model needs " << camera.width << "x" << camera.height
-          << " with 1 channel of 1 byte";
+  message << side << " image is " << image.cols << "x" << image.rows << " with " << image.channels()
+          << " channel(s) of " << image.elemSize1() << " byte(s); the camera model needs " << camera.width << "x"
+          << camera.height << " with 1 channel of 1 byte";
   throw std::invalid_argument(message.str());
 }
 
@@ -64,9 +65,10 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
   measureImage(left, report.mean_intensity[0], report.sharpness[0]);
   measureImage(right, report.mean_intensity[1], report.sharpness[1]);
 
-  // Detect in the left image.
+  // Detect in the left image, where at least the smallest descriptor fits.
+  const int border = static_cast<int>(descriptor_.reach(depth_scale_.size(options_.stereo.min_disparity)));
   Stopwatch stopwatch;
-  const std::vector<Corner> corners = detector_.detect(left);
+  const std::vector<Corner> corners = detector_.detect(left, border);
   report.detected = static_cast<int>(corners.size());
   report.detect_time = stopwatch.lap();
 
@@ -103,7 +105,10 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
   features.descriptors = described.rows;
   report.describe_time = stopwatch.lap();
 
-  if (report.detected == 0)
+  if (2 * border >= std::min(left.rows, left.cols))
+    report.status =
+        "every feature is too close to an image border for its descriptor: the image is too small for its size";
+  else if (report.detected == 0)
     report.status = "no corners: the left image has no texture (dark, covered or out of focus?)";
   else if (report.stereo_matched == 0)
     report.status = "no stereo matches: left and right do not show the same scene, are swapped or not rectified";

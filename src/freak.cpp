@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 namespace sdvo {
 namespace {
@@ -69,7 +68,9 @@ const std::vector<Freak::FieldPair>& Freak::candidatePairs() {
   return all;
 }
 
-const std::array<Freak::FieldPair, Freak::kBits>& Freak::pairs() { return kLearntPairs; }
+const std::array<Freak::FieldPair, Freak::kBits>& Freak::pairs() {
+  return kLearntPairs;
+}
 
 bool Freak::fits(const FreakKeypoint& keypoint, cv::Size image_size) {
   const double r = reach(keypoint.size);
@@ -98,10 +99,13 @@ std::array<float, Freak::kFields> Freak::intensities(const FreakKeypoint& keypoi
 
 void Freak::describe(const FreakKeypoint& keypoint, std::uint8_t* row) const {
   const std::array<float, kFields> means = intensities(keypoint);
-  std::memset(row, 0, kBytes);
-  for (int bit = 0; bit < kBits; ++bit) {
-    const FieldPair& pair = kLearntPairs[bit];
-    row[bit / 8] = static_cast<std::uint8_t>(row[bit / 8] | (means[pair.first] > means[pair.second]) << (bit % 8));
+  for (int byte = 0; byte < kBytes; ++byte) {
+    unsigned bits = 0;
+    for (int bit = 0; bit < 8; ++bit) {
+      const FieldPair& pair = kLearntPairs[8 * byte + bit];
+      bits |= static_cast<unsigned>(means[pair.first] > means[pair.second]) << bit;
+    }
+    row[byte] = static_cast<std::uint8_t>(bits);
   }
 }
 

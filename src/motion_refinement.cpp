@@ -44,7 +44,7 @@ NormalEquations linearise(const StereoCamera& camera, const MotionRefinementOpti
 
 NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementOptions& options,
                        const Correspondences& correspondences, const std::vector<int>& subset, Eigen::Isometry3d& T) {
-  constexpr double kSmallestStep = 1e-8;  // m and rad
+  constexpr double kSmallestStep = 1e-6;  // m and rad
   double damping = 1e-6;
   NormalEquations equations = linearise(camera, options, T, correspondences, subset);
   for (int iteration = 0; iteration < options.refinement_iterations; ++iteration) {

@@ -14,7 +14,8 @@ std::vector<StereoMatch> StereoMatcher::match(const cv::Mat& left, const cv::Mat
 
 std::vector<StereoMatch> StereoMatcher::search(const cv::Mat& left, const cv::Mat& right,
                                                const std::vector<cv::Point2f>& left_positions) const {
-  const EpipolarMatcher matcher(options_.epipolar, options_.max_epipolar_residual, left, right);
+  thread_local EpipolarMatcher::Images scratch;
+  const EpipolarMatcher matcher(options_.epipolar, options_.max_epipolar_residual, left, right, scratch);
   std::vector<StereoMatch> matches;
   for (std::size_t i = 0; i < left_positions.size(); ++i) {
     const auto found = matcher.find(left_positions[i]);

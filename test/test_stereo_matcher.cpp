@@ -51,9 +51,32 @@ TEST(StereoMatcher, RecoversConstantDisparities) {
     expectDisparities([=](double) { return disparity; }, disparity);
 }
 
-TEST(StereoMatcher, RecoversASlantedPlane) {
-  // The window moves as a whole, so only a slant that bends it by a fraction of a pixel can be followed exactly.
-  expectDisparities([](double v) { return 6.0 + 0.02 * v; }, 6.0 + 0.02 * kSize.height);
+/// Disparities of a plane that crosses the middle row at `middle` px and grows by `slant` px a row: the ground, whose
+/// slant is baseline / height. Returns the root mean square of the errors, px.
+double slantedPlaneError(double middle, double slant, const std::string& method) {
+  const auto disparity = [=](double v) { return middle + slant * (v - 0.5 * kSize.height); };
+  const double largest = disparity(kSize.height);
+  const Pair pair = texturedPair(disparity);
+  const std::vector<cv::Point2f> positions = grid(largest);
+  StereoMatcherOptions options;
+  options.method = method;
+  const std::vector<StereoMatch> matches = StereoMatcher(options).match(pair.left, pair.right, positions);
+  EXPECT_GE(matches.size(), positions.size() * 8 / 10);
+  double square = 0.0;
+  for (const StereoMatch& match : matches) {
+    const double error = match.disparity - disparity(positions[static_cast<std::size_t>(match.left_index)].y);
+    square += error * error;
+  }
+  return std::sqrt(square / static_cast<double>(std::max<std::size_t>(matches.size(), 1)));
+}
+
+TEST(StereoMatcher, FollowsSlantedPlanes) {
+  // A window that moves as a whole is off by half the slant times its reach on one side; the fitted slant is not.
+  EXPECT_LT(slantedPlaneError(30.0, 0.08, "epipolar"), 0.05);
+  EXPECT_LT(slantedPlaneError(45.0, 0.2, "epipolar"), 0.08);
+  EXPECT_LT(slantedPlaneError(70.0, 0.33, "epipolar"), 0.15);
+  EXPECT_LT(slantedPlaneError(60.0, -0.2, "epipolar"), 0.08);
+  EXPECT_LT(slantedPlaneError(30.0, 0.02, "lk"), 0.05);  // which fits none
 }
 
 TEST(StereoMatcher, MeasuresAResidualMisalignment) {

@@ -18,7 +18,7 @@ struct ViewKeypoint {
 
 /// Descriptors of one view: row i belongs to key point i.
 struct ViewDescriptors {
-  cv::Mat rows;                    ///< CV_8U, one row for each key point, zeros where not described
+  cv::Mat rows;                     ///< CV_8U, one row for each key point, zeros where not described
   std::vector<std::uint8_t> valid;  ///< 0 where the neighbourhood leaves the image
 };
 
@@ -30,6 +30,10 @@ class BaseDescriptor {
 
   /// `image` is CV_8UC1.
   virtual ViewDescriptors describe(const cv::Mat& image, const std::vector<ViewKeypoint>& keypoints) const = 0;
+
+  /// Distance in px from its centre within which a key point of `size` px needs the image; 0 where that is not known
+  /// before describe().
+  virtual double reach(double /*size*/) const { return 0.0; }
 
   virtual ElementType elementType() const = 0;
   virtual int bytes() const = 0;

@@ -42,6 +42,8 @@ class StereoDescriptor {
   DescribedKeypoints describe(const cv::Mat& left, const cv::Mat& right,
                               const std::vector<StereoKeypoint>& keypoints) const;
 
+  /// As BaseDescriptor::reach().
+  double reach(double size) const { return base_->reach(size); }
   ElementType elementType() const { return base_->elementType(); }
   const DescriptorOptions& options() const { return options_; }
 

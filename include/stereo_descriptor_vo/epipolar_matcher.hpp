@@ -27,8 +27,19 @@ struct EpipolarMatcherOptions {
 /// at full resolution, and the patch is aligned there to sub-pixel precision in both directions.
 class EpipolarMatcher {
  public:
-  /// Images are CV_8U of one size and must outlive the matcher. `max_dv` in px bounds |v_right - v_left|.
-  EpipolarMatcher(const EpipolarMatcherOptions& options, double max_dv, const cv::Mat& left, const cv::Mat& right);
+  /// What the matcher works on. Memory of this size is slow to get from the system for every pair; kept by the caller,
+  /// it is there already.
+  struct Images {
+    cv::Mat left, right;              ///< full resolution, with a margin
+    cv::Mat left_float, right_float;  ///< the same as CV_32F
+    cv::Mat left_half, right_half;    ///< half resolution, with a margin
+    cv::Mat half;                     ///< one of them before it gets the margin
+  };
+
+  /// Images are CV_8U of one size. `max_dv` in px bounds |v_right - v_left|. The matcher fills and reads `scratch`,
+  /// which must outlive it and serve no other matcher meanwhile.
+  EpipolarMatcher(const EpipolarMatcherOptions& options, double max_dv, const cv::Mat& left, const cv::Mat& right,
+                  Images& scratch);
 
   /// (disparity, dv) of a left position, px; nothing where no block stands out or the alignment leaves its pixel.
   std::optional<cv::Point2f> find(const cv::Point2f& left_position) const;
@@ -40,8 +51,7 @@ class EpipolarMatcher {
 
   EpipolarMatcherOptions options_;
   double max_dv_;
-  cv::Mat left_, right_;            ///< full resolution, with a margin
-  cv::Mat left_half_, right_half_;  ///< half resolution, with a margin
+  const Images& images_;
 };
 
 }  // namespace sdvo

@@ -10,9 +10,9 @@ namespace sdvo {
 
 struct FeatureDetectorOptions {
   std::string type = "fast";
-  int max_features = 1500;
+  int max_features = 1100;
   int bucket_size = 50;
-  int fast_min_threshold = 8;
+  int fast_min_threshold = 12;
   double corner_quality = 0.002;
   int corner_block_size = 5;
   bool subpixel = true;
@@ -42,15 +42,15 @@ class FeatureDetector {
  public:
   explicit FeatureDetector(const FeatureDetectorOptions& options);
 
-  /// Corners of a CV_8U image, at most `max_features`.
-  std::vector<Corner> detect(const cv::Mat& image) const;
+  /// Corners of a CV_8U image, at most `max_features`, at least `border` px away from the image's borders.
+  std::vector<Corner> detect(const cv::Mat& image, int border = 0) const;
 
  private:
   FeatureDetectorOptions options_;
 };
 
-/// Keeps `max_count` corners such that buckets of a `bucket_size` px grid hold as equal numbers as they can, the strongest of
-/// each first. Ties are broken by position, so the result does not depend on the order of the input.
+/// Keeps `max_count` corners such that buckets of a `bucket_size` px grid hold as equal numbers as they can, the
+/// strongest of each first. Ties are broken by position, so the result does not depend on the order of the input.
 std::vector<Corner> spreadOverBuckets(std::vector<Corner> corners, cv::Size image_size, int bucket_size, int max_count);
 
 }  // namespace sdvo

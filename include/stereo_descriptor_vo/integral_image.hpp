@@ -16,22 +16,32 @@ class IntegralImage {
     cv::integral(image, integral_, CV_32S);
   }
 
-  /// Mean grey level of the square around (u, v) with the given half side (all px). The square must lie inside the image.
+  /// Mean grey level of the square around (u, v) with the given half side (all px). The square must lie inside the
+  /// image.
   double boxMean(double u, double v, double half) const {
-    const double x0 = u - half, x1 = u + half, y0 = v - half, y1 = v + half;
-    return (at(x1, y1) - at(x0, y1) - at(x1, y0) + at(x0, y0)) / (4.0 * half * half);
+    const Edge left = edge(u - half, integral_.cols), right = edge(u + half, integral_.cols);
+    const Edge top = edge(v - half, integral_.rows), bottom = edge(v + half, integral_.rows);
+    const auto between = [&](int row) {
+      const int* sums = integral_.ptr<int>(row);
+      return interpolated(sums[right.index], sums[right.index + 1], right.share) -
+             interpolated(sums[left.index], sums[left.index + 1], left.share);
+    };
+    return (interpolated(between(bottom.index), between(bottom.index + 1), bottom.share) -
+            interpolated(between(top.index), between(top.index + 1), top.share)) /
+           (4.0 * half * half);
   }
 
  private:
-  double at(double x, double y) const {
-    const double column = x + 0.5, row = y + 0.5;
-    const int c = std::clamp(static_cast<int>(column), 0, integral_.cols - 2);
-    const int r = std::clamp(static_cast<int>(row), 0, integral_.rows - 2);
-    const double a = column - c, b = row - r;
-    const int* upper = integral_.ptr<int>(r) + c;
-    const int* lower = integral_.ptr<int>(r + 1) + c;
-    return (1.0 - b) * ((1.0 - a) * upper[0] + a * upper[1]) + b * ((1.0 - a) * lower[0] + a * lower[1]);
+  /// A position between two columns or two rows of the integral.
+  struct Edge {
+    int index;
+    double share;  ///< of the second one
+  };
+  static Edge edge(double position, int size) {
+    const int index = std::clamp(static_cast<int>(position + 0.5), 0, size - 2);
+    return {index, position + 0.5 - index};
   }
+  static double interpolated(double a, double b, double share) { return a + share * (b - a); }
 
   cv::Mat integral_;  ///< (rows + 1) x (cols + 1), CV_32S
 };

@@ -11,7 +11,7 @@
 namespace sdvo {
 
 struct WindowOptimizerOptions {
-  int iterations = 2;
+  int iterations = 1;
   double kernel_scale = 2.0;
   double position_sigma = 0.3;
   double disparity_sigma = 0.3;
