@@ -9,6 +9,8 @@ CalibrationFilter::CalibrationFilter(const CalibrationOptions& options) : option
   // The windows keep their nominal precision; weighing the prior up by 1/trust^2 says the same.
   const double sigma = options_.enabled ? options_.trust * options_.prior_sigma : 1e-6;
   option_information_ = RigCalibration::Matrix::Identity() / (sigma * sigma);
+  calibration_.value << options_.prior_offset, options_.prior_bend;
+  option_information_mean_ = option_information_ * calibration_.value;
 }
 
 CalibrationBelief CalibrationFilter::prior(int oldest_id) {
@@ -18,14 +20,14 @@ CalibrationBelief CalibrationFilter::prior(int oldest_id) {
     pending_.reset();
   }
   const RigCalibration::Matrix information = option_information_ + information_;
-  return {information.inverse() * information_mean_, information};
+  return {information.inverse() * (option_information_mean_ + information_mean_), information};
 }
 
 void CalibrationFilter::note(int newest_id, const RigCalibration& calibration,
                              const RigCalibration::Matrix& information) {
   calibration_ = calibration;
   total_information_ = option_information_ + information_ + information;
-  if (!pending_) pending_ = {newest_id, information, *total_information_ * calibration.value - information_mean_};
+  if (!pending_) pending_ = {newest_id, information, *total_information_ * calibration.value - option_information_mean_ - information_mean_};
 }
 
 RigCalibration::Vector CalibrationFilter::sigma() const {

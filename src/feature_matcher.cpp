@@ -80,32 +80,44 @@ float distanceUnit(ElementType type, const cv::Mat& a, int row_a, const cv::Mat&
 /// Rows of a feature set, found by position.
 class PositionGrid {
  public:
-  PositionGrid(const StereoFeatures& features, double cell) : features_(features), cell_(cell) {
-    columns_ = static_cast<int>(features.camera.width / cell) + 1;
-    rows_ = static_cast<int>(features.camera.height / cell) + 1;
+  PositionGrid(const StereoFeatures& features, double radius) : radius_(static_cast<float>(radius)) {
+    columns_ = static_cast<int>(features.camera.width / cell()) + 1;
+    rows_ = static_cast<int>(features.camera.height / cell()) + 1;
     cells_.resize(static_cast<std::size_t>(columns_) * rows_);
-    for (int i = 0; i < features.count(); ++i)
-      cells_[static_cast<std::size_t>(clampedRow(features.v[i])) * columns_ + clampedColumn(features.u[i])].push_back(
-          i);
+    for (int i = 0; i < features.count(); ++i) {
+      const float u = features.u[i], v = features.v[i];
+      cells_[static_cast<std::size_t>(clampedRow(v)) * columns_ + clampedColumn(u)].push_back({u, v, i});
+    }
   }
 
-  void findWithin(double u, double v, double radius, std::vector<int>& found) const {
+  void findAround(float u, float v, std::vector<int>& found) const {
     found.clear();
-    for (int row = clampedRow(v - radius); row <= clampedRow(v + radius); ++row)
-      for (int column = clampedColumn(u - radius); column <= clampedColumn(u + radius); ++column)
-        for (const int i : cells_[static_cast<std::size_t>(row) * columns_ + column])
-          if (square(features_.u[i] - u) + square(features_.v[i] - v) <= square(radius)) found.push_back(i);
+    const int first = clampedColumn(u - radius_), last = clampedColumn(u + radius_);
+    for (int row = clampedRow(v - radius_); row <= clampedRow(v + radius_); ++row)
+      for (int column = first; column <= last; ++column)
+        for (const Entry& entry : cells_[static_cast<std::size_t>(row) * columns_ + column]) {
+          const float du = entry.u - u, dv = entry.v - v;
+          if (du * du + dv * dv <= radius_ * radius_) found.push_back(entry.row);
+        }
   }
 
  private:
-  static double square(double value) { return value * value; }
-  int clampedColumn(double u) const { return static_cast<int>(std::clamp(u / cell_, 0.0, columns_ - 1.0)); }
-  int clampedRow(double v) const { return static_cast<int>(std::clamp(v / cell_, 0.0, rows_ - 1.0)); }
+  struct Entry {
+    float u, v;
+    int row;
+  };
 
-  const StereoFeatures& features_;
-  double cell_;
+  float cell() const { return 0.5f * radius_; }
+  int clampedColumn(float u) const {
+    return static_cast<int>(std::clamp(u / cell(), 0.f, static_cast<float>(columns_ - 1)));
+  }
+  int clampedRow(float v) const {
+    return static_cast<int>(std::clamp(v / cell(), 0.f, static_cast<float>(rows_ - 1)));
+  }
+
+  float radius_;
   int columns_, rows_;
-  std::vector<std::vector<int>> cells_;
+  std::vector<std::vector<Entry>> cells_;
 };
 
 void checkComparable(const StereoFeatures& a, const StereoFeatures& b) {
@@ -141,7 +153,7 @@ std::vector<FeatureMatch> FeatureMatcher::match(const StereoFeatures& reference,
       constexpr double kNearestDepth = 0.1;  // m: what passes closer than this cannot be seen again
       if (point.z() < kNearestDepth) continue;
       const Eigen::Vector3d predicted = current.camera.project(point);
-      grid.findWithin(predicted.x(), predicted.y(), options_.gate_radius, found);
+      grid.findAround(static_cast<float>(predicted.x()), static_cast<float>(predicted.y()), found);
     }
     const std::vector<int>& candidates = gated ? found : everything;
     computeDistances(reference.element_type, reference.descriptors.ptr(i), current.descriptors, candidates, distances);

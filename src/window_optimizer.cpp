@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "log_sum.hpp"
+
 namespace sdvo {
 namespace {
 
@@ -43,13 +45,8 @@ class Solver {
   int poses() const { return poses_; }
   int size() const { return size_; }
 
-  double kernelCost(double square) const {
-    const double c = options_.kernel_scale * options_.kernel_scale;
-    return c * std::log1p(square / c);
-  }
-  double kernelWeight(double square) const {
-    return 1.0 / (1.0 + square / (options_.kernel_scale * options_.kernel_scale));
-  }
+  /// Square of the residual at which the Cauchy kernel bends: a square s costs bend * log(1 + s / bend).
+  double bend() const { return options_.kernel_scale * options_.kernel_scale; }
 
   double priorCost(const Window& window) const {
     const CalibrationVector error = window.calibration.value - window.calibration_prior.mean;
@@ -73,11 +70,11 @@ class Solver {
   }
 
   double cost(const Window& window) const {
-    double sum = priorCost(window);
+    LogSum costs;
     Eigen::Vector3d r;
     for (const WindowObservation& observation : window.observations)
-      sum += kernelCost(residual(window, observation, r, nullptr) ? r.squaredNorm() : kBehindSquare);
-    return sum;
+      costs.add((residual(window, observation, r, nullptr) ? r.squaredNorm() : kBehindSquare) / bend());
+    return priorCost(window) + bend() * costs.value();
   }
 
   ReducedSystem linearise(const Window& window, double damping) const {
@@ -88,14 +85,14 @@ class Solver {
     const std::size_t points = first_of_point_.size() - 1;
     system.points.resize(points);
     system.calibration_point.resize(points);
-    const Eigen::Vector3d inverse_noise = inverseNoise();
     const int c = 6 * poses_;
     auto calibration_hessian = system.hessian.block<kCalibration, kCalibration>(c, c);
     auto calibration_gradient = system.gradient.segment<kCalibration>(c);
     calibration_hessian += window.calibration_prior.information;
     calibration_gradient +=
         window.calibration_prior.information * (window.calibration_prior.mean - window.calibration.value);
-    system.cost = priorCost(window);
+    const Eigen::Vector3d inverse_noise = inverseNoise();
+    LogSum costs;
 
     std::vector<int> seen_in;
     for (std::size_t p = 0; p < points; ++p) {
@@ -110,11 +107,11 @@ class Solver {
         Eigen::Vector3d r;
         ObservationJacobians jacobians;
         if (!residual(window, observation, r, &jacobians)) {
-          system.cost += kernelCost(kBehindSquare);
+          costs.add(kBehindSquare / bend());
           continue;
         }
-        const double square = r.squaredNorm(), weight = kernelWeight(square);
-        system.cost += kernelCost(square);
+        const double square = r.squaredNorm(), weight = 1.0 / (1.0 + square / bend());
+        costs.add(square / bend());
         system.weight += weight;
         system.weighted_square += weight * square;
         const double root = std::sqrt(weight);
@@ -156,6 +153,7 @@ class Solver {
       calibration_hessian.noalias() -= calibration_point * inverse * calibration_point.transpose();
       calibration_gradient.noalias() -= calibration_point * inverse * gradient;
     }
+    system.cost = priorCost(window) + bend() * costs.value();
     return system;
   }
 
@@ -216,10 +214,11 @@ WindowSolution optimizeWindow(const WindowOptimizerOptions& options, Window& win
   WindowSolution solution;
   const Solver solver(options, window);  // refers to the window: every accepted step is linearised anew
   double damping = 1e-5;
-  ReducedSystem system = solver.linearise(window, damping);
+  ReducedSystem system;
   const int c = 6 * solver.poses();
   while (solution.iterations < options.iterations && damping < kLargestDamping) {
     ++solution.iterations;
+    system = solver.linearise(window, damping);
     Eigen::MatrixXd damped = system.hessian;
     damped.diagonal().head(c) *= 1.0 + damping;
     const Eigen::VectorXd step = damped.selfadjointView<Eigen::Lower>().ldlt().solve(system.gradient);
@@ -232,14 +231,13 @@ WindowSolution optimizeWindow(const WindowOptimizerOptions& options, Window& win
       std::swap(window.points, next.points);
       window.calibration = next.calibration;
       damping = std::max(0.1 * damping, 1e-8);
-      system = solver.linearise(window, damping);
       if (converged) break;
     } else {
       damping *= 100.0;
-      system = solver.linearise(window, damping);
     }
   }
 
+  // Of the last linearisation, one step before the result: close enough for a covariance, and half of the work saved.
   const Eigen::MatrixXd information = system.hessian.selfadjointView<Eigen::Lower>();
   const Eigen::LDLT<Eigen::MatrixXd> factor(information);
   if (factor.info() != Eigen::Success || !factor.isPositive()) return solution;

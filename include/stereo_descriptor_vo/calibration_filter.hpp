@@ -9,14 +9,19 @@ namespace sdvo {
 
 struct CalibrationOptions {
   bool enabled = true;
+  double prior_offset = 0.0;
+  double prior_bend = 0.0;
   double prior_sigma = 1.0;
   double trust = 0.1;
   double memory = 0.5;
 
   void describe(OptionList& list) {
     list.add("enabled", enabled, "estimate the rig's residual disparity error while driving and compensate it");
+    list.add("prior_offset", prior_offset, {-20.0, 20.0}, "px",
+             "that error in the image centre as far as it is known beforehand; held fixed when not enabled");
+    list.add("prior_bend", prior_bend, {-20.0, 20.0}, "px", "the same for its change at 45 degrees from the centre");
     list.add("prior_sigma", prior_sigma, {1e-4, 10.0}, "px",
-             "standard deviation of that error over well rectified rigs, in the centre and at 45 degrees from it");
+             "standard deviation of what is known beforehand, in the centre and at 45 degrees from it");
     list.add("trust", trust, {0.01, 1.0}, "",
              "how far the window's own figure for its precision is believed: 1 / the factor on its standard deviation");
     list.add("memory", memory, {0.0, 1.0}, "",
@@ -50,6 +55,7 @@ class CalibrationFilter {
   CalibrationOptions options_;
   RigCalibration calibration_;
   RigCalibration::Matrix option_information_;
+  RigCalibration::Vector option_information_mean_;  ///< information * mean
   RigCalibration::Matrix information_ = RigCalibration::Matrix::Zero();  ///< of windows before the present one
   RigCalibration::Vector information_mean_ = RigCalibration::Vector::Zero();
   std::optional<Contribution> pending_;  ///< the last window that shared no pair with those already counted

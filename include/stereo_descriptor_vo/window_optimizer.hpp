@@ -13,8 +13,8 @@ namespace sdvo {
 struct WindowOptimizerOptions {
   int iterations = 1;
   double kernel_scale = 2.0;
-  double position_sigma = 0.3;
-  double disparity_sigma = 0.3;
+  double position_sigma = 0.2;
+  double disparity_sigma = 0.4;
 
   void describe(OptionList& list) {
     list.add("iterations", iterations, {1, 100}, "", "Levenberg-Marquardt steps at most, for each pair");
@@ -24,7 +24,7 @@ struct WindowOptimizerOptions {
              "standard deviation of a position in the left image");
     list.add(
         "disparity_sigma", disparity_sigma, {0.01, 10.0}, "px",
-        "standard deviation of a disparity, which two views of one instant give better than a detector its position");
+        "standard deviation of a disparity: its noise and what the calibration's two terms leave of the rig's error");
   }
 };
 
