@@ -85,8 +85,8 @@ def main():
     for name in FUNNEL:
         axis.plot(column[name], label=name)
     axis.set(title="what survives each stage", xlabel="pair", ylabel="count")
-    axis.set_ylim(bottom=0)
-    axis.legend()
+    axis.set_ylim(bottom=0, top=1.2 * axis.get_ylim()[1])  # room for the legend
+    axis.legend(loc="upper center", ncol=4, fontsize="small")
     axis.grid(alpha=0.3)
 
     axis = axes[1, 1]

@@ -15,10 +15,9 @@ import rospy
 import rostest
 from std_msgs.msg import Float32
 
-from kitti_replay import PACKAGE, Collector, Rosout, kitti_dir, wait_until
+from kitti_replay import PACKAGE, Collector, Rosout, kitti_dir, links, wait_until
 from stereo_descriptor_vo.msg import StereoFeatures
 
-NODES = ('descriptor_counter', 'descriptor_listener')
 COUNT = 101  # odd: the median is one of them
 HALF_BYTES = 64
 FLIPPED_BITS = 51
@@ -53,6 +52,11 @@ def features_message(rows, stream_epoch=0):
     return message
 
 
+def is_connected(node, *collectors):
+    """Whether a node sends its answers to us."""
+    return links(node) >= {('out', c.subscriber.resolved_name, rospy.get_name()) for c in collectors}
+
+
 class Examples(unittest.TestCase):
     def listen(self, namespace):
         self.share = Collector(namespace + '/descriptor_counter/match_share', Float32)
@@ -60,14 +64,14 @@ class Examples(unittest.TestCase):
         self.depth = Collector(namespace + '/descriptor_listener/median_depth', Float32)
         for collector in (self.share, self.half_distance, self.depth):
             self.addCleanup(collector.close)
-            self.assertTrue(wait_until(lambda: collector.subscriber.get_num_connections() > 0),
-                            'nobody publishes ' + collector.subscriber.name)
+        self.assertTrue(wait_until(lambda: is_connected(namespace + '/stereo_vo_manager', self.share) and
+                                   is_connected(namespace + '/descriptor_listener', self.half_distance, self.depth)),
+                        [links(namespace + '/' + node) for node in ('stereo_vo_manager', 'descriptor_listener')])
 
     def publish_until_seen(self, message):
         answers = len(self.depth)
         self.publisher.publish(message)
-        self.assertTrue(wait_until(lambda: len(self.depth) > answers))
-        time.sleep(0.2)  # for the other node
+        self.assertTrue(wait_until(lambda: len(self.depth) > answers and len(self.half_distance) > answers))
 
     def test_answers_on_known_descriptors(self):
         random = np.random.default_rng(1)
@@ -75,10 +79,15 @@ class Examples(unittest.TestCase):
         rosout = Rosout('/synthetic')
         self.addCleanup(rosout.close)
         self.publisher = rospy.Publisher('/synthetic/stereo_features', StereoFeatures, queue_size=10)
-        self.assertTrue(wait_until(lambda: self.publisher.get_num_connections() == len(NODES)))
+        nodes = ['/synthetic/stereo_vo_manager', '/synthetic/descriptor_listener']
+        self.assertTrue(wait_until(lambda: all(
+            ('out', self.publisher.resolved_name, node) in links(rospy.get_name()) and
+            ('in', self.publisher.resolved_name) in links(node) and
+            ('out', '/rosout', rospy.get_name()) in links(node) for node in nodes)))
 
         first = random_rows(random, COUNT)
         self.publish_until_seen(features_message(first))
+        time.sleep(SILENCE)
         self.assertEqual(len(self.share), 0)  # nothing to compare with yet
 
         kept = 61
@@ -95,9 +104,9 @@ class Examples(unittest.TestCase):
         answers = len(self.depth)
         for _ in range(5):
             self.publisher.publish(damaged)
-        self.assertTrue(wait_until(lambda: len(rosout.errors) == len(NODES)), rosout.errors)
+        self.assertTrue(wait_until(lambda: len(rosout.errors) == len(nodes)), rosout.errors)
         time.sleep(SILENCE)
-        self.assertEqual(len(rosout.errors), len(NODES), rosout.errors)
+        self.assertEqual(len(rosout.errors), len(nodes), rosout.errors)
         self.assertTrue(all('StereoFeatures message refused' in error for error in rosout.errors), rosout.errors)
         self.assertEqual((len(self.share), len(self.depth)), (1, answers))
 
@@ -123,6 +132,8 @@ class Examples(unittest.TestCase):
         subprocess.run([converter, '--sequence', sequence, '--frames', str(pairs), '--output', bag], check=True,
                        stdout=subprocess.DEVNULL)
         self.listen('/stereo')
+        nodes = ['/stereo/stereo_vo_manager', '/stereo/descriptor_listener']
+        self.assertTrue(wait_until(lambda: all(('in', '/stereo/stereo_features') in links(node) for node in nodes)))
         topics = ['/stereo/%s/%s' % (side, what) for side in ('left', 'right') for what in ('image_rect', 'camera_info')]
         subprocess.run(['rosbag', 'play', '--quiet', '--wait-for-subscribers', '--rate', '0.5', bag, '--topics'] +
                        topics + ['/tf_static'], check=True)

@@ -47,6 +47,18 @@ def wait_until(condition, timeout=30.0):
     return True
 
 
+def links(node):
+    """Connections of a node as it sees them itself: ('in', topic) and ('out', topic, name of the other node). Counting
+    subscribers at the master, or at this end, is too early: a connection is of use when both ends have it. Empty when the
+    node does not answer."""
+    try:
+        uri = rosgraph.Master('/test').lookupNode(node)
+        connections = xmlrpc.client.ServerProxy(uri).getBusInfo('/test')[2]
+    except Exception:  # whatever keeps it from answering: it is not there
+        return set()
+    return {('in', c[4]) if c[2] == 'i' else ('out', c[4], c[1]) for c in connections if c[5]}
+
+
 class Collector:
     """Keeps every message of a topic in order."""
 
@@ -126,7 +138,7 @@ class Camera:
 
 
 class SimulatedClock:
-    """Runs ahead only: the stamps of the images may jump, the pauses between log messages must pass."""
+    """Runs ahead only, while the stamps of the images may jump."""
 
     def __init__(self):
         self.now = rospy.Time.from_sec(EPOCH)
@@ -141,11 +153,6 @@ class SimulatedClock:
             self.now = stamp
         self.publish()
 
-    def advance(self, seconds):
-        self.now += rospy.Duration.from_sec(seconds)
-        self.publish()
-        time.sleep(0.3)  # until every node has seen it
-
 
 class Pipeline:
     """The two nodelets, launched as a user would."""
@@ -155,6 +162,13 @@ class Pipeline:
         self.manager = arguments.get('manager', namespace + '/stereo_vo_manager')
         arguments = ['%s:=%s' % item for item in arguments.items()] + ['namespace:=' + namespace.strip('/')]
         self.process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch'] + arguments)
+
+    def is_connected(self, listeners):
+        """Whether the manager sends this node each topic of the collectors given, and its errors, and has its own inputs."""
+        needed = {('out', topic, rospy.get_name()) for topic in [c.subscriber.resolved_name for c in listeners] + ['/rosout']}
+        inputs = ('stereo_features', 'left/image_rect', 'right/image_rect', 'left/camera_info', 'right/camera_info')
+        needed |= {('in', '%s/%s' % (self.namespace, topic)) for topic in inputs}
+        return links(self.manager) >= needed | {('in', '/tf_static')}
 
     def pid(self):
         """Of the nodelet manager; None when it is gone."""

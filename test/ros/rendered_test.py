@@ -17,7 +17,7 @@ import rospy
 import rostest
 from nav_msgs.msg import Odometry, Path
 
-from kitti_replay import PACKAGE, Collector, matrix_of, run_tool, wait_until
+from kitti_replay import PACKAGE, Collector, links, matrix_of, run_tool, wait_until
 from stereo_descriptor_vo.msg import VoInfo
 
 RATE = 10.0  # Hz
@@ -68,7 +68,9 @@ class RenderedDrive(unittest.TestCase):
         cls.odometry = Collector('/stereo/odom', Odometry)
         cls.info = Collector('/stereo/vo_info', VoInfo)
         cls.ground_truth = [Collector('/ground_truth/odom', Odometry), Collector('/ground_truth/path', Path)]
-        assert wait_until(lambda: cls.odometry.subscriber.get_num_connections() > 0, 60), 'no odometry is advertised'
+        needed = {('out', c.subscriber.resolved_name, rospy.get_name()) for c in (cls.odometry, cls.info)}
+        needed.add(('in', '/stereo/stereo_features'))
+        assert wait_until(lambda: links('/stereo/stereo_vo_manager') >= needed, 60), 'the nodelets are not connected'
         subprocess.run(['rosbag', 'play', '--quiet', '--clock', '--wait-for-subscribers', '--rate',
                         str(rospy.get_param('~rate')), bag], check=True)
         wait_until(lambda: len(cls.odometry) >= len(cls.stamps) and len(cls.info) >= len(cls.stamps))

@@ -1,0 +1,151 @@
+#!/usr/bin/python3
+"""Feeds a drive in KITTI layout to the running pipeline for some minutes, forwards and backwards in turn so that the motion
+goes on while the stamps only grow, and watches the nodelet manager's memory. Exits 1 when memory grows, a pair gets no
+answer, an error is logged or the odometry does not track."""
+import argparse
+import collections
+import os
+import statistics
+import sys
+import time
+import xmlrpc.client
+
+import cv2
+import cv_bridge
+import rosgraph
+import rospy
+import sensor_msgs.msg
+import tf2_ros
+from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import Odometry
+from rosgraph_msgs.msg import Log
+
+from stereo_descriptor_vo.msg import VoInfo
+
+FRAME = "soak_left_optical"
+SIDES = ("left", "right")
+
+
+def read_drive(directory):
+    """(pairs of images, [P of left and right])."""
+    count = sum(1 for line in open(os.path.join(directory, "times.txt")) if line.strip())
+    pairs = [[cv2.imread(os.path.join(directory, f"image_{side}", f"{i:06d}.png"), cv2.IMREAD_GRAYSCALE)
+              for side in range(2)] for i in range(count)]
+    with open(os.path.join(directory, "calib.txt")) as file:
+        rows = dict(line.split(":") for line in file if line.strip())
+    return pairs, [[float(x) for x in rows[f"P{side}"].split()] for side in range(2)]
+
+
+def camera_info(p, image):
+    info = sensor_msgs.msg.CameraInfo()
+    info.height, info.width = image.shape
+    info.distortion_model, info.D = "plumb_bob", [0.0] * 5
+    info.K = [p[0], 0, p[2], 0, p[5], p[6], 0, 0, 1]
+    info.R = [1, 0, 0, 0, 1, 0, 0, 0, 1]
+    info.P = p
+    return info
+
+
+def transform_of_camera():
+    """Of a camera that looks ahead, at the base's origin."""
+    transform = TransformStamped()
+    transform.header.frame_id, transform.child_frame_id = "base_link", FRAME
+    q = transform.transform.rotation
+    q.x, q.y, q.z, q.w = -0.5, 0.5, -0.5, 0.5
+    return transform
+
+
+def resident_memory(pid):
+    """MB."""
+    with open(f"/proc/{pid}/statm") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
+
+
+def pid_of(node):
+    return xmlrpc.client.ServerProxy(rosgraph.Master("/soak").lookupNode(node)).getPid("/soak")[2]
+
+
+class Soak:
+    def __init__(self, drive, rate):
+        self.rate = rate
+        self.pairs, self.projections = read_drive(drive)
+        self.info, self.errors, self.poses = [], [], 0
+        self.broadcaster = tf2_ros.StaticTransformBroadcaster()
+        self.broadcaster.sendTransform(transform_of_camera())
+        self.images = [rospy.Publisher(f"{s}/image_rect", sensor_msgs.msg.Image, queue_size=5) for s in SIDES]
+        self.infos = [rospy.Publisher(f"{s}/camera_info", sensor_msgs.msg.CameraInfo, queue_size=5) for s in SIDES]
+        rospy.Subscriber("/rosout", Log, self.on_log, queue_size=100)
+        rospy.Subscriber("vo_info", VoInfo, self.info.append, queue_size=100)
+        rospy.Subscriber("odom", Odometry, self.on_odometry, queue_size=100)
+
+    def on_log(self, log):
+        if log.level >= Log.ERROR:
+            self.errors.append(f"{log.name}: {log.msg}")
+
+    def on_odometry(self, _):
+        self.poses += 1
+
+    def is_connected(self):
+        return all(p.get_num_connections() > 0 for p in self.images + self.infos)
+
+    def publish(self, k):
+        """The k-th pair of the endless way there and back."""
+        turns = 2 * (len(self.pairs) - 1)
+        i = min(k % turns, turns - k % turns)
+        header = rospy.Header(stamp=rospy.Time.now(), frame_id=FRAME)
+        for side, image in enumerate(self.pairs[i]):
+            info = camera_info(self.projections[side], image)
+            info.header = header
+            self.infos[side].publish(info)
+            message = cv_bridge.CvBridge().cv2_to_imgmsg(image, "mono8")
+            message.header = header
+            self.images[side].publish(message)
+
+    def run(self, seconds, manager):
+        """Returns [(time, MB)] and the number of pairs published."""
+        pid, start, memory, k = pid_of(manager), time.monotonic(), [], 0
+        while time.monotonic() - start < seconds and not rospy.is_shutdown():
+            self.publish(k)
+            k += 1
+            memory.append((time.monotonic() - start, resident_memory(pid)))
+            if k % (10 * int(self.rate)) == 0:
+                print(f"\r{memory[-1][0]:.0f} of {seconds:.0f} s, {k} pairs, {memory[-1][1]:.1f} MB ", end="", flush=True)
+            time.sleep(max(0.0, start + k / self.rate - time.monotonic()))
+        print()
+        time.sleep(2.0)
+        return memory, k
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("drive", help="folder in KITTI layout")
+    parser.add_argument("--minutes", type=float, default=5.0)
+    parser.add_argument("--rate", type=float, default=10.0, help="pairs per second")
+    parser.add_argument("--manager", default="/stereo/stereo_vo_manager")
+    parser.add_argument("--growth", type=float, default=3.0, help="MB that the memory may grow from the second quarter to the last")
+    arguments = parser.parse_args(rospy.myargv()[1:])
+    rospy.init_node("soak", disable_signals=True)
+    soak = Soak(arguments.drive, arguments.rate)
+    while not soak.is_connected():
+        time.sleep(0.1)
+    memory, pairs = soak.run(60.0 * arguments.minutes, arguments.manager)
+
+    quarter = len(memory) // 4
+    before, after = (statistics.median(m for _, m in part) for part in (memory[quarter:2 * quarter], memory[-quarter:]))
+    states = collections.Counter(info.state for info in soak.info)
+    last = soak.info[-1] if soak.info else VoInfo()
+    answered = len(soak.info) + last.dropped_pairs + last.dropped_features
+    latencies = sorted(info.latency for info in soak.info) or [float("nan")]
+    print(f"{arguments.minutes:g} minutes at {arguments.rate:g} Hz: {pairs} pairs, {len(soak.info)} answered, {last.dropped_pairs} dropped, "
+          f"{dict(states)}, {soak.poses} poses, {last.distance:.0f} m, latency median {latencies[len(latencies) // 2] * 1e3:.0f} ms, "
+          f"memory {before:.1f} MB in the second quarter, {after:.1f} MB in the last, {len(soak.errors)} errors")
+    for error in soak.errors[:5]:
+        print(error)
+    # A busy machine may lose pairs before they come to be counted, in the queues of publisher and subscriber.
+    good = (after - before <= arguments.growth and not soak.errors and answered >= 0.95 * pairs
+            and states["TRACKING"] >= 0.99 * len(soak.info) > 0)
+    return 0 if good else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
