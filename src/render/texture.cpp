@@ -9,7 +9,7 @@ namespace sdvo::render {
 
 namespace {
 
-constexpr float kMaxProbes = 3.0f;
+constexpr int kMaxProbes = 3;
 // The bilinear kernel blurs by itself; this much of a level sharper keeps the sum of both close to one pixel.
 constexpr float kLodBias = -0.5f;
 
@@ -58,7 +58,7 @@ float Texture::bilinear(int level, std::int32_t s, std::int32_t t) const {
   const std::uint32_t lower = bottom[x0] * (256u - wx) + bottom[x1] * wx;
   // Half a step less than 32 bits can hold.
   const std::uint32_t sum = (upper >> 1) * (256u - wy) + (lower >> 1) * wy;
-  return static_cast<float>(static_cast<std::int32_t>(sum)) * (1.0f / (65535.0f * 32768.0f));
+  return static_cast<float>(static_cast<std::int32_t>(sum)) * (1.0f / (65535.0f * 128.0f * 256.0f));
 }
 
 float Texture::trilinear(float lod, float s, float t) const {
@@ -85,17 +85,19 @@ float Texture::sample(float s, float t, const Footprint& footprint) const {
   const float area =
       std::abs(footprint.s_x * footprint.t_y - footprint.t_x * footprint.s_y) * texels_per_metre * texels_per_metre;
   const float minor = std::max(area / std::max(major, 1e-6f), 1e-6f);
-  const int probes = static_cast<int>(std::clamp(major / std::max(minor, 1.0f) + 0.5f, 1.0f, kMaxProbes));
-  const float lod = quickLog2(std::max(minor, major / static_cast<float>(probes))) + kLodBias;
+  const float width = std::max(minor, 1.0f);
+  const int probes = major < 1.5f * width ? 1 : major < 2.5f * width ? 2 : kMaxProbes;
+  const float share = 1.0f / static_cast<float>(probes);
+  const float lod = quickLog2(std::max(minor, major * share)) + kLodBias;
   s *= steps_per_metre_;
   t *= steps_per_metre_;
   if (probes == 1) return trilinear(lod, s, t);
   float sum = 0.0f;
   for (int probe = 0; probe < probes; ++probe) {
-    const float offset = (static_cast<float>(probe) + 0.5f) / static_cast<float>(probes) - 0.5f;
+    const float offset = (static_cast<float>(probe) + 0.5f) * share - 0.5f;
     sum += trilinear(lod, s + offset * axis_s, t + offset * axis_t);
   }
-  return sum / static_cast<float>(probes);
+  return sum * share;
 }
 
 float Texture::sample(float s, float t, float width) const {

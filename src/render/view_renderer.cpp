@@ -47,8 +47,13 @@ class ViewPass {
         shader_(shader),
         samples_(samples),
         offset_(offset),
-        first_(static_cast<std::size_t>(kKeptRows) * view.width) {
-    for (const Traffic::Car& car : cars.cars()) T_world_cars_.push_back(car.T_world_car.cast<float>());
+        first_(static_cast<std::size_t>(kKeptRows) * view.width),
+        keys_(static_cast<std::size_t>(kKeptRows) * (view.width + 2)),
+        differs_(static_cast<std::size_t>(kBandHeight) * view.width) {
+    for (const Traffic::Car& car : cars.cars()) {
+      T_world_cars_.push_back(car.T_world_car.cast<float>());
+      car_boxes_.push_back(boxOf(car_models[static_cast<std::size_t>(car.model)], car.T_world_car, view));
+    }
     packet_.start(base_.origin);
   }
 
@@ -57,6 +62,7 @@ class ViewPass {
     if (has_first) castBand(0);
     for (int top = 0; top < height_; top += kBandHeight) {
       if (has_first && top + kBandHeight < height_) castBand(top + kBandHeight);
+      if (samples_ == kRegularSamples) compareNeighbours(top);
       for (int left = 0; left < width_; left += kTileWidth) finishTile(left, top, weight, image);
     }
   }
@@ -72,6 +78,8 @@ class ViewPass {
   };
 
   Hit* firstRow(int row) { return &first_[static_cast<std::size_t>(row % kKeptRows) * width_]; }
+  /// Keys of the hits of a row; those of the first and the last column are there twice.
+  std::uint32_t* keyRow(int row) { return &keys_[static_cast<std::size_t>(row % kKeptRows) * (width_ + 2) + 1]; }
   SampleOffset firstOffset(int row, int column) const {
     return samples_ == 1 ? offset_ : regularSample(row, column, 0);
   }
@@ -91,9 +99,32 @@ class ViewPass {
     return hit;
   }
 
-  void castPacket() {
+  /// The part of the image that a car can lie in, with a pixel to spare.
+  static cv::Rect boxOf(const Mesh& model, const Eigen::Isometry3d& T_world_car, const View& view) {
+    const Eigen::Isometry3d T_camera_car = view.T_world_camera.inverse() * T_world_car;
+    const cv::Rect image(0, 0, view.width, view.height);
+    Eigen::Array2d low(1e6, 1e6), high(-1e6, -1e6);
+    for (const Eigen::Vector3f& vertex : model.vertices) {
+      const Eigen::Vector3d point = T_camera_car * vertex.cast<double>();
+      if (point.z() < 0.1) return image;  // beside the camera: anywhere
+      const Eigen::Array2d place(view.fx * point.x() / point.z() + view.cx, view.fy * point.y() / point.z() + view.cy);
+      low = low.min(place);
+      high = high.max(place);
+    }
+    low = low.max(-10.0).min(1e5);
+    high = high.max(-10.0).min(1e5);
+    return image & cv::Rect(cv::Point(static_cast<int>(low.x()) - 2, static_cast<int>(low.y()) - 2),
+                            cv::Point(static_cast<int>(high.x()) + 3, static_cast<int>(high.y()) + 3));
+  }
+
+  /// Casts the rays through some part of the image.
+  void castPacket(const cv::Rect& part) {
     caster_.cast(packet_);
-    cars_.cast(packet_);
+    for (const cv::Rect& box : car_boxes_)
+      if ((box & part).area() > 0) {
+        cars_.cast(packet_);
+        return;
+      }
   }
 
   /// Casts the first samples of some rows.
@@ -111,15 +142,26 @@ class ViewPass {
         packet_.set(i, corner + (static_cast<float>(column) + offset.x) * step_x_ +
                            (static_cast<float>(row) + offset.y) * step_y_);
       }
-      castPacket();
+      castPacket({left, top, kPacketWidth, kBandHeight});
       for (int row = top; row < bottom; ++row) {
         Hit* hits = firstRow(row);
         for (int column = left; column < std::min(left + kPacketWidth, width_); ++column)
           hits[column] = read((row - top) * kPacketWidth + column - left);
       }
     }
+    for (int row = top; row < bottom; ++row) {
+      const Hit* hits = firstRow(row);
+      std::uint32_t* keys = keyRow(row);
+      for (int column = 0; column < width_; ++column) keys[column] = hits[column].key;
+      keys[-1] = keys[0];
+      keys[width_] = keys[width_ - 1];
+    }
   }
 
+  Eigen::Vector3f directionTo(int pixel, const SampleOffset& offset) const {
+    return tile_corner_ + (static_cast<float>(pixel % kTileWidth) + offset.x) * step_x_ +
+           (static_cast<float>(pixel / kTileWidth) + offset.y) * step_y_;
+  }
   void request(int pixel, const SampleOffset& offset) {
     requests_[request_count_++] = {pixel, offset};
     if (request_count_ == RayPacket::kSize) castRequests();
@@ -132,10 +174,9 @@ class ViewPass {
         continue;
       }
       const auto& [pixel, offset] = requests_[ray];
-      packet_.set(ray, tile_corner_ + (static_cast<float>(pixel % kTileWidth) + offset.x) * step_x_ +
-                           (static_cast<float>(pixel / kTileWidth) + offset.y) * step_y_);
+      packet_.set(ray, directionTo(pixel, offset));
     }
-    castPacket();
+    castPacket(tile_);
     for (int ray = 0; ray < request_count_; ++ray) pixels_[requests_[ray].pixel].add(read(ray), requests_[ray].offset);
     request_count_ = 0;
   }
@@ -154,27 +195,39 @@ class ViewPass {
     return materials_[hit.quad] == Material::kLeaf || materials_[hit.quad] == Material::kFoliage;
   }
 
-  /// How many samples a pixel needs beyond its first. Where it and its neighbours meet one surface, more of them would
-  /// tell nothing new. Elsewhere, an edge that is followed over many frames deserves to be known better than foliage,
-  /// of which every pixel is an edge.
+  /// Finds the pixels of some rows that have any neighbour that meets another surface.
+  void compareNeighbours(int top) {
+    for (int row = top; row < std::min(top + kBandHeight, height_); ++row) {
+      const std::uint32_t* above = keyRow(std::max(row - 1, 0));
+      const std::uint32_t* here = keyRow(row);
+      const std::uint32_t* below = keyRow(std::min(row + 1, height_ - 1));
+      std::uint32_t* differs = &differs_[static_cast<std::size_t>(row - top) * width_];
+      for (int column = 0; column < width_; ++column) {
+        const std::uint32_t key = here[column];
+        differs[column] = (above[column - 1] ^ key) | (above[column] ^ key) | (above[column + 1] ^ key) |
+                          (here[column - 1] ^ key) | (here[column + 1] ^ key) | (below[column - 1] ^ key) |
+                          (below[column] ^ key) | (below[column + 1] ^ key);
+      }
+    }
+  }
+
+  /// How many samples a pixel whose neighbours differ needs beyond its first: an edge that is followed over many frames
+  /// deserves to be known better than foliage, of which every pixel is an edge.
   int furtherSamples(int row, int column) {
-    const int left = std::max(column - 1, 0), right = std::min(column + 1, width_ - 1);
-    const Hit* above = firstRow(std::max(row - 1, 0));
-    const Hit* here = firstRow(row);
-    const Hit* below = firstRow(std::min(row + 1, height_ - 1));
-    const std::uint32_t key = here[column].key;
-    bool uniform = true;
-    for (const Hit* hits : {above, here, below})
-      uniform = uniform && hits[left].key == key && hits[column].key == key && hits[right].key == key;
-    if (uniform) return 0;
     constexpr int kFew = kRegularSamples - 1;
-    if (isFoliage(here[column])) return kFew;
-    for (const Hit* neighbour : {&here[left], &here[right], &above[column], &below[column]})
-      if (!lookAlike(here[column], *neighbour)) return kFew + kEdgeSamples;
+    const Hit* row_hits = firstRow(row);
+    const Hit& here = row_hits[column];
+    if (isFoliage(here)) return kFew;
+    const Hit* const neighbours[] = {&row_hits[std::max(column - 1, 0)], &row_hits[std::min(column + 1, width_ - 1)],
+                                     &firstRow(std::max(row - 1, 0))[column],
+                                     &firstRow(std::min(row + 1, height_ - 1))[column]};
+    for (const Hit* neighbour : neighbours)
+      if (!isFoliage(*neighbour) && !lookAlike(here, *neighbour)) return kFew + kEdgeSamples;
     return kFew;
   }
 
   void finishTile(int left, int top, float weight, cv::Mat1f& image) {
+    tile_ = {left, top, kTileWidth, kBandHeight};
     tile_corner_ = base_.direction(left, top);
     const int columns = std::min(kTileWidth, width_ - left), rows = std::min(kBandHeight, height_ - top);
     std::array<bool, kTileWidth * kBandHeight> single{};
@@ -186,9 +239,9 @@ class ViewPass {
           for (int sample = 0; sample < kFineSamples; ++sample) request(pixel, fineSample(sample));
           continue;
         }
-        const int further = samples_ == 1 ? 0 : furtherSamples(top + y, left + x);
-        single[pixel] = further == 0;
-        if (further == 0) continue;
+        single[pixel] = samples_ == 1 || differs_[static_cast<std::size_t>(y) * width_ + left + x] == 0;
+        if (single[pixel]) continue;
+        const int further = furtherSamples(top + y, left + x);
         pixels_[pixel].add(firstRow(top + y)[left + x], firstOffset(top + y, left + x));
         for (int sample = 1; sample < kRegularSamples; ++sample)
           request(pixel, regularSample(top + y, left + x, sample));
@@ -200,11 +253,11 @@ class ViewPass {
         const int pixel = y * kTileWidth + x;
         float brightness = 0.0f;
         if (single[pixel]) {
-          brightness = shadeSingle(firstRow(top + y)[left + x], left + x, top + y);
+          brightness = shadeSingle(firstRow(top + y)[left + x], pixel);
         } else {
           int count = 0;
           for (const HitGroup& group : pixels_[pixel]) {
-            brightness += static_cast<float>(group.count) * shadeGroup(group, left + x, top + y);
+            brightness += static_cast<float>(group.count) * shadeGroup(group, pixel);
             count += group.count;
           }
           brightness /= static_cast<float>(count);
@@ -215,22 +268,22 @@ class ViewPass {
 
   /// A pixel that shows one surface is shaded at its centre, wherever its sample lies; the only sample that is asked
   /// for, in its place.
-  float shadeSingle(const Hit& hit, int column, int row) {
+  float shadeSingle(const Hit& hit, int pixel) {
     const SampleOffset offset = samples_ == 1 ? offset_ : SampleOffset{0.0f, 0.0f};
-    const Eigen::Vector3f direction = base_.direction(column + offset.x, row + offset.y);
+    const Eigen::Vector3f direction = directionTo(pixel, offset);
     if (hit.car == Hit::kSky) return shader_.sky(direction);
     const Facet::Place place = {hit.depth, hit.u, hit.v};
     turnTo(hit, place);
     return shadeFacet(direction, facet_.meet(direction, place));
   }
   /// Samples on one surface are shaded together, at their mean.
-  float shadeGroup(const HitGroup& group, int column, int row) {
+  float shadeGroup(const HitGroup& group, int pixel) {
     const float mean = 1.0f / static_cast<float>(group.count);
     const Facet::Place place = {group.depth * mean, group.u * mean, group.v * mean};
     const Hit& hit = group.first;
     if (hit.car == Hit::kStatic && materials_[hit.quad] == Material::kLeaf)
       return shader_.leaf(world_.mesh.surfaces[hit.quad], place.u, place.depth);
-    const Eigen::Vector3f direction = base_.direction(column + group.x * mean, row + group.y * mean);
+    const Eigen::Vector3f direction = directionTo(pixel, {group.x * mean, group.y * mean});
     if (hit.car == Hit::kSky) return shader_.sky(direction);
     turnTo(hit, {hit.depth, hit.u, hit.v});
     // The ground's cells count as one surface: what their mean means is known in the plane of the first.
@@ -269,9 +322,13 @@ class ViewPass {
   const int samples_;
   const SampleOffset offset_;
   std::vector<Eigen::Isometry3f> T_world_cars_;
+  std::vector<cv::Rect> car_boxes_;
 
-  std::vector<Hit> first_;
+  std::vector<Hit> first_;             // of the kept rows
+  std::vector<std::uint32_t> keys_;    // theirs
+  std::vector<std::uint32_t> differs_; // of the rows at hand: not 0 where a neighbour meets another surface
   RayPacket packet_;
+  cv::Rect tile_;
   Eigen::Vector3f tile_corner_;  // direction of the ray through the centre of its first pixel
   std::array<PixelHits, kTileWidth * kBandHeight> pixels_;
   std::array<Request, RayPacket::kSize> requests_;
