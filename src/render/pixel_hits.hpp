@@ -46,6 +46,7 @@ class PixelHits {
     group.x += offset.x;
     group.y += offset.y;
   }
+  bool isOne() const { return count_ == 1; }
   const HitGroup* begin() const { return groups_.data(); }
   const HitGroup* end() const { return groups_.data() + count_; }
 

@@ -245,14 +245,15 @@ class ViewPass {
         pixels_[pixel].add(firstRow(top + y)[left + x], firstOffset(top + y, left + x));
         for (int sample = 1; sample < kRegularSamples; ++sample)
           request(pixel, regularSample(top + y, left + x, sample));
-        for (int sample = 0; sample < further - kRegularSamples + 1; ++sample) request(pixel, edgeSample(sample));
+        for (int sample = 0; sample < further - kRegularSamples + 1; ++sample)
+          request(pixel, edgeSample(sample));
       }
     castRequests();
     for (int y = 0; y < rows; ++y)
       for (int x = 0; x < columns; ++x) {
         const int pixel = y * kTileWidth + x;
         float brightness = 0.0f;
-        if (single[pixel]) {
+        if (single[pixel] || (samples_ == kRegularSamples && pixels_[pixel].isOne())) {
           brightness = shadeSingle(firstRow(top + y)[left + x], pixel);
         } else {
           int count = 0;

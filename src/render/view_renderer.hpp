@@ -35,7 +35,7 @@ class ViewRenderer {
   ViewRenderer(const World& world, const RayCaster& caster, const std::vector<Mesh>& car_models);
 
   /// Adds `weight` times the brightness (1 = white) of the view to `image`. With 1 sample per pixel it lies at
-  /// (offset_x, offset_y) px from the pixel's centre; with 4 there are as many at foliage, 8 at other edges and
+  /// (offset_x, offset_y) px from the pixel's centre; with 4 there are as many at foliage, 12 at other edges and
   /// 1 where nothing changes; 16 are always cast. Samples of a pixel on one surface are shaded together: edges are
   /// anti-aliased by the samples, textures by their filter.
   void add(const View& view, const MovingScene& cars, int samples, float offset_x, float offset_y, float weight,
