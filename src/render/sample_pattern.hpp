@@ -19,8 +19,7 @@ constexpr signed char kSampleSets[4][4][2] = {{{-7, -1}, {-3, -5}, {3, 7}, {5, 1
 /// every column: what is a quarter of a pixel wide and four pixels long is met by first samples alone.
 inline SampleOffset regularSample(int row, int column, int sample) {
   static constexpr int kFirst[4][4] = {{0, 1, 2, 3}, {2, 3, 0, 1}, {3, 2, 1, 0}, {1, 0, 3, 2}};
-  const signed char(&place)[2] =
-      kSampleSets[2 * (row % 2) + column % 2][(kFirst[row % 4][column % 4] + sample) % 4];
+  const signed char(&place)[2] = kSampleSets[2 * (row % 2) + column % 2][(kFirst[row % 4][column % 4] + sample) % 4];
   return {static_cast<float>(place[0]) / 16.0f, static_cast<float>(place[1]) / 16.0f};
 }
 constexpr int kRegularSamples = 4;

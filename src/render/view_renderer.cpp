@@ -245,8 +245,7 @@ class ViewPass {
         pixels_[pixel].add(firstRow(top + y)[left + x], firstOffset(top + y, left + x));
         for (int sample = 1; sample < kRegularSamples; ++sample)
           request(pixel, regularSample(top + y, left + x, sample));
-        for (int sample = 0; sample < further - kRegularSamples + 1; ++sample)
-          request(pixel, edgeSample(sample));
+        for (int sample = 0; sample < further - kRegularSamples + 1; ++sample) request(pixel, edgeSample(sample));
       }
     castRequests();
     for (int y = 0; y < rows; ++y)
@@ -325,9 +324,9 @@ class ViewPass {
   std::vector<Eigen::Isometry3f> T_world_cars_;
   std::vector<cv::Rect> car_boxes_;
 
-  std::vector<Hit> first_;             // of the kept rows
-  std::vector<std::uint32_t> keys_;    // theirs
-  std::vector<std::uint32_t> differs_; // of the rows at hand: not 0 where a neighbour meets another surface
+  std::vector<Hit> first_;              // of the kept rows
+  std::vector<std::uint32_t> keys_;     // theirs
+  std::vector<std::uint32_t> differs_;  // of the rows at hand: not 0 where a neighbour meets another surface
   RayPacket packet_;
   cv::Rect tile_;
   Eigen::Vector3f tile_corner_;  // direction of the ray through the centre of its first pixel
