@@ -146,6 +146,27 @@ TEST(RenderDrive, MovingShareIsMetAndZeroMeansNone) {
   EXPECT_EQ(0, cv::countNonZero(empty.truth(10, idle).moving));
 }
 
+TEST(RenderDrive, CarsBeyondTheEndOfTheRoadAreNotThere) {
+  // A way of 399 m whose road ends 160 m after its second pose: the car in front has no ground under it in the end.
+  const DrivePath path = makePresetPath("straight", 400, 10.0, 1);
+  const DrivePath beginning({path.pose(0), path.pose(1)}, 10.0);
+  const RoadLine road(beginning, 1.65);
+  const GroundMap ground(road);
+  const Traffic traffic(path, road, ground, 4.0, 1);
+  const double road_end = road.samples().back().distance;
+  ASSERT_LT(road_end, 200.0);
+  EXPECT_FALSE(traffic.at(1.0).empty());
+  int seen = 0;
+  for (double time = 0.0; time < 39.0; time += 0.25)
+    for (const Traffic::Car& car : traffic.at(time)) {
+      ++seen;
+      // A pose that is no rotation makes rays that are not numbers.
+      EXPECT_NEAR(car.T_world_car.linear().determinant(), 1.0, 1e-9) << "car " << car.id << " at " << time << " s";
+      EXPECT_LT(car.T_world_car.translation().z(), road_end - 1.0) << "car " << car.id << " at " << time << " s";
+    }
+  EXPECT_GT(seen, 100);
+}
+
 TEST(RenderDrive, MisalignmentMovesTheRightImageOnly) {
   const DrivePath path = makePresetPath("still", 1, 10.0, 1);
   RenderOptions options = plainOptions();

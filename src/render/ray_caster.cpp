@@ -18,22 +18,17 @@ std::shared_ptr<RTCSceneTy> newScene(RTCDevice device) {
 
 }  // namespace
 
-void RayPacket::set(int i, const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) {
-  valid[i] = -1;
-  rays.ray.org_x[i] = origin.x();
-  rays.ray.org_y[i] = origin.y();
-  rays.ray.org_z[i] = origin.z();
-  rays.ray.dir_x[i] = direction.x();
-  rays.ray.dir_y[i] = direction.y();
-  rays.ray.dir_z[i] = direction.z();
-  rays.ray.tnear[i] = kNear;
-  rays.ray.tfar[i] = std::numeric_limits<float>::infinity();
-  rays.ray.time[i] = 0.0f;
-  rays.ray.mask[i] = 0xffffffffu;
-  rays.ray.id[i] = 0;
-  rays.ray.flags[i] = 0;
-  rays.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
-  rays.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+void RayPacket::start(const Eigen::Vector3f& origin) {
+  for (int i = 0; i < kSize; ++i) {
+    rays.ray.org_x[i] = origin.x();
+    rays.ray.org_y[i] = origin.y();
+    rays.ray.org_z[i] = origin.z();
+    rays.ray.tnear[i] = kNear;
+    rays.ray.time[i] = 0.0f;
+    rays.ray.mask[i] = 0xffffffffu;
+    rays.ray.id[i] = 0;
+    rays.ray.flags[i] = 0;
+  }
 }
 
 Device::Device(int threads) {

@@ -3,6 +3,7 @@
 #include <embree3/rtcore.h>
 
 #include <Eigen/Geometry>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -18,7 +19,17 @@ struct alignas(64) RayPacket {
   RTCRayHit16 rays;
   alignas(64) int valid[kSize];
 
-  void set(int i, const Eigen::Vector3f& origin, const Eigen::Vector3f& direction);
+  /// All rays to come start here; must come before any other call.
+  void start(const Eigen::Vector3f& origin);
+  void set(int i, const Eigen::Vector3f& direction) {
+    valid[i] = -1;
+    rays.ray.dir_x[i] = direction.x();
+    rays.ray.dir_y[i] = direction.y();
+    rays.ray.dir_z[i] = direction.z();
+    rays.ray.tfar[i] = std::numeric_limits<float>::infinity();
+    rays.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+    rays.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+  }
   void disable(int i) { valid[i] = 0; }
   bool hit(int i) const { return valid[i] != 0 && rays.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID; }
   /// Index into MovingScene's cars, or −1 when what was hit stands still.

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <array>
-
 namespace sdvo::render {
 
 /// Place of a sample within a pixel, relative to its centre, px.
@@ -9,23 +7,22 @@ struct SampleOffset {
   float x, y;
 };
 
-/// Pixels are sampled in tiles of this width, which are decided upon together.
-constexpr int kTileWidth = 4;
+/// The regular samples of a pixel lie in the four quarters of its width and of its height. Neighbours take a set as it
+/// is, turned by half a turn, or either one transposed, so that an edge along several pixels is known better than along
+/// one. Unit: 1/16 px.
+constexpr signed char kSampleSets[4][4][2] = {{{-7, -1}, {-3, -5}, {3, 7}, {5, 1}},
+                                              {{-5, -1}, {-3, -7}, {3, 5}, {7, 1}},
+                                              {{-5, -3}, {-1, -7}, {1, 5}, {7, 3}},
+                                              {{-7, -3}, {-1, -5}, {1, 7}, {5, 3}}};
 
-/// The four regular samples of a pixel; `tile_row` is 0 or 1. The first two lie opposite each other, as do the others:
-/// the mean of either pair is the pixel's centre. Neighbouring pixels take different sets, so that an edge along
-/// several of them is known better than to a quarter. The first pair of a tile's corner pixels reaches towards its
-/// corners, that of the inner columns towards its upper and lower border: hardly anything that enters a tile goes
-/// unnoticed.
-inline SampleOffset regularSample(int tile_row, int tile_column, int sample) {
-  static constexpr int kSets[4][4][2] = {{{-15, -13}, {15, 13}, {5, -5}, {-5, 5}},  // unit: 1/32 px
-                                         {{-11, 15}, {11, -15}, {1, 3}, {-1, -3}},
-                                         {{-3, -15}, {3, 15}, {11, -5}, {-11, 5}},
-                                         {{7, -13}, {-7, 13}, {15, 3}, {-15, -3}}};
-  static constexpr int kSetOf[2][kTileWidth] = {{0, 2, 3, 1}, {1, 3, 2, 0}};
-  const int(&place)[2] = kSets[kSetOf[tile_row][tile_column]][sample];
-  return {static_cast<float>(place[0]) / 32.0f, static_cast<float>(place[1]) / 32.0f};
+/// The first sample of each of 4 x 4 pixels lies in another quarter of the width in every row, and of the height in
+/// every column: what is a quarter of a pixel wide and four pixels long is met by first samples alone.
+inline SampleOffset regularSample(int row, int column, int sample) {
+  static constexpr int kFirst[4][4] = {{0, 1, 2, 3}, {2, 3, 0, 1}, {3, 2, 1, 0}, {1, 0, 3, 2}};
+  const signed char(&place)[2] = kSampleSets[2 * (row % 2) + column % 2][(kFirst[row % 4][column % 4] + sample) % 4];
+  return {static_cast<float>(place[0]) / 16.0f, static_cast<float>(place[1]) / 16.0f};
 }
+constexpr int kRegularSamples = 4;
 
 /// Further samples of a pixel on an edge: no two in one row or column of an 8 x 8 raster; their mean is the pixel's
 /// centre.

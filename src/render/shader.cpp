@@ -93,8 +93,9 @@ float Shader::shade(const Surface& surface, const ShadingPoint& point) const {
   const bool front = facing < 0.0f;
   const float limit = kMinCosine * point.direction.norm();
   if (std::abs(facing) < limit) facing = front ? -limit : limit;
+  const Eigen::Vector3f slide = point.direction * (point.depth / facing);
   const auto step = [&](const Eigen::Vector3f& change) -> Eigen::Vector3f {
-    return point.depth * (change - point.direction * (point.normal.dot(change) / facing));
+    return point.depth * change - slide * point.normal.dot(change);
   };
 
   float brightness = 0.0f;

@@ -31,13 +31,16 @@ class Texture {
   double size() const { return size_; }
 
  private:
-  float bilinear(int level, float s, float t) const;
+  /// Places are in 1/256 of the finest level's texels.
+  float bilinear(int level, std::int32_t s, std::int32_t t) const;
   float trilinear(float lod, float s, float t) const;
 
   double size_;
   int side_;
-  float texels_per_metre_;
-  std::vector<std::vector<std::uint16_t>> levels_;
+  float steps_per_metre_;  ///< 1/256 of a texel each
+  int last_level_ = 0;
+  std::vector<std::size_t> level_begin_;
+  std::vector<std::uint16_t> texels_;  ///< of all levels, the finest first
 };
 
 }  // namespace sdvo::render

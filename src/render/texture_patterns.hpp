@@ -9,7 +9,7 @@
 namespace sdvo::render {
 
 /// What a surface is made of; each has its texture in a TextureSet.
-enum class Material : std::uint16_t {
+enum class Material : std::uint8_t {
   kFlat,
   kGround,  ///< asphalt, kerb, paving and grass by the distance to the road
   kLeaf,

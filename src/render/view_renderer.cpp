@@ -4,10 +4,12 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <cstdlib>
 #include <limits>
 #include <stdexcept>
 
-#include "sample_pattern.hpp"
+#include "facet.hpp"
+#include "pixel_hits.hpp"
 
 namespace sdvo::render {
 
@@ -26,257 +28,332 @@ struct RayBase {
   Eigen::Vector3d corner, step_x, step_y;
 };
 
-/// Samples of one pixel that met the same surface: a quadrilateral, all of the ground, or the sky.
-struct Group {
-  static constexpr int kSky = -2, kStatic = -1;
-  int car;  ///< or kSky, kStatic
-  std::uint32_t quad;
-  bool ground;
-  int count;
-  float depth, u, v, x, y;  ///< sums; x, y: position within the pixel
-
-  bool sameSurface(const Group& other) const {
-    return car == other.car && (quad == other.quad || (ground && other.ground) || car == kSky);
-  }
-};
-
-/// What the samples of a pixel have met so far.
-struct PixelHits {
-  std::array<Group, kFineSamples> groups;
-  int count = 0;
-
-  void add(const Group& hit) {
-    int i = 0;
-    while (i < count && !groups[i].sameSurface(hit)) ++i;
-    if (i == count) {
-      groups[count++] = hit;
-      return;
-    }
-    Group& group = groups[i];
-    group.count += hit.count;
-    group.depth += hit.depth;
-    group.u += hit.u;
-    group.v += hit.v;
-    group.x += hit.x;
-    group.y += hit.y;
-  }
-};
-
-/// Orientation of a quadrilateral in the world; kept from pixel to pixel, since neighbours mostly show the same one.
-struct Facet {
-  int car = Group::kSky;
-  std::uint32_t quad = 0;
-  const Surface* surface = nullptr;
-  Eigen::Vector3f corner, normal, axis_s, axis_t;
-};
-
-/// Casts the samples of one tile of pixels after the other.
-class TileSampler {
+/// Renders one view: a first sample of every pixel, then as many more as the neighbours of a pixel make necessary.
+class ViewPass {
  public:
-  TileSampler(const RayBase& base, const World& world, const RayCaster& caster, const MovingScene& cars)
-      : base_(base), world_(world), caster_(caster), cars_(cars) {}
-
-  void begin(int left, int top) {
-    left_ = left;
-    top_ = top;
-    for (PixelHits& pixel : pixels_) pixel.count = 0;
-  }
-  /// Asks for a ray; pixels are numbered row by row.
-  void request(int pixel, const SampleOffset& offset) {
-    requests_[count_++] = {pixel, offset};
-    if (count_ == RayPacket::kSize) flush();
-  }
-  /// Casts what is still waiting.
-  void flush() {
-    if (count_ == 0) return;
-    for (int ray = 0; ray < RayPacket::kSize; ++ray) {
-      if (ray >= count_) {
-        packet_.disable(ray);
-        continue;
-      }
-      const Request& request = requests_[ray];
-      packet_.set(ray, base_.origin,
-                  base_.direction(left_ + request.pixel % kTileWidth + request.offset.x,
-                                  top_ + request.pixel / kTileWidth + request.offset.y));
+  ViewPass(const View& view, const World& world, const std::vector<Material>& materials, const RayCaster& caster,
+           const std::vector<Mesh>& car_models, const MovingScene& cars, const Shader& shader, int samples,
+           SampleOffset offset)
+      : base_(view),
+        step_x_(base_.step_x.cast<float>()),
+        step_y_(base_.step_y.cast<float>()),
+        width_(view.width),
+        height_(view.height),
+        world_(world),
+        materials_(materials),
+        caster_(caster),
+        car_models_(car_models),
+        cars_(cars),
+        shader_(shader),
+        samples_(samples),
+        offset_(offset),
+        first_(static_cast<std::size_t>(kKeptRows) * view.width),
+        keys_(static_cast<std::size_t>(kKeptRows) * (view.width + 2)),
+        differs_(static_cast<std::size_t>(kBandHeight) * view.width) {
+    for (const Traffic::Car& car : cars.cars()) {
+      T_world_cars_.push_back(car.T_world_car.cast<float>());
+      car_boxes_.push_back(boxOf(car_models[static_cast<std::size_t>(car.model)], car.T_world_car, view));
     }
-    caster_.cast(packet_);
-    cars_.cast(packet_);
-    for (int ray = 0; ray < count_; ++ray) pixels_[requests_[ray].pixel].add(read(ray));
-    count_ = 0;
+    packet_.start(base_.origin);
   }
 
-  const PixelHits& pixel(int i) const { return pixels_[i]; }
-
-  /// Whether all samples so far met one surface.
-  bool isUniform() const {
-    const PixelHits& first = pixels_[0];
-    return std::all_of(pixels_.begin(), pixels_.end(), [&](const PixelHits& pixel) {
-      return pixel.count == 0 || (pixel.count == 1 && pixel.groups[0].sameSurface(first.groups[0]));
-    });
-  }
-  /// Whether a pixel shows an edge that can be seen, or has a neighbour within the tile that does or that looks
-  /// different, and is free of foliage.
-  bool isNearSolidEdge(int i) const {
-    const PixelHits& pixel = pixels_[i];
-    for (int g = 0; g < pixel.count; ++g) {
-      if (pixel.groups[g].car != Group::kStatic) continue;
-      const Material material = world_.mesh.surfaces[pixel.groups[g].quad].material;
-      if (material == Material::kLeaf || material == Material::kFoliage) return false;
+  void run(float weight, cv::Mat1f& image) {
+    const bool has_first = samples_ != kFineSamples;
+    if (has_first) castBand(0);
+    for (int top = 0; top < height_; top += kBandHeight) {
+      if (has_first && top + kBandHeight < height_) castBand(top + kBandHeight);
+      if (samples_ == kRegularSamples) compareNeighbours(top);
+      for (int left = 0; left < width_; left += kTileWidth) finishTile(left, top, weight, image);
     }
-    if (pixel.count == 0) return false;
-    const Group& reference = pixel.groups[0];
-    const auto differs = [&](int j) {
-      return std::any_of(pixels_[j].groups.begin(), pixels_[j].groups.begin() + pixels_[j].count,
-                         [&](const Group& other) { return !lookAlike(reference, other); });
-    };
-    const int column = i % kTileWidth, other_row = i < kTileWidth ? i + kTileWidth : i - kTileWidth;
-    return differs(i) || (column > 0 && differs(i - 1)) || (column + 1 < kTileWidth && differs(i + 1)) ||
-           differs(other_row);
   }
 
  private:
+  static constexpr int kBandHeight = 4, kTileWidth = 8;
+  static constexpr int kKeptRows = 3 * kBandHeight;  // the rows at hand with those above and below
+  static constexpr int kPacketWidth = RayPacket::kSize / kBandHeight;
+
   struct Request {
-    int pixel;
+    int pixel;  ///< of the tile
     SampleOffset offset;
   };
 
-  /// Whether two surfaces meet without an edge to be seen, as the sides of a post or the stones of a kerb do.
-  bool lookAlike(const Group& a, const Group& b) const {
-    if (a.sameSurface(b)) return true;
-    if (a.car != Group::kStatic || b.car != Group::kStatic) return false;
-    const Surface &one = world_.mesh.surfaces[a.quad], &other = world_.mesh.surfaces[b.quad];
-    const float depth_a = a.depth / static_cast<float>(a.count), depth_b = b.depth / static_cast<float>(b.count);
-    return one.material == other.material && std::abs(one.albedo - other.albedo) < 0.1f &&
-           std::abs(depth_a - depth_b) < 0.02f * depth_a &&
-           world_.mesh.normal(a.quad).dot(world_.mesh.normal(b.quad)) > 0.7f;
+  Hit* firstRow(int row) { return &first_[static_cast<std::size_t>(row % kKeptRows) * width_]; }
+  /// Keys of the hits of a row; those of the first and the last column are there twice.
+  std::uint32_t* keyRow(int row) { return &keys_[static_cast<std::size_t>(row % kKeptRows) * (width_ + 2) + 1]; }
+  SampleOffset firstOffset(int row, int column) const {
+    return samples_ == 1 ? offset_ : regularSample(row, column, 0);
   }
 
-  Group read(int ray) const {
-    const SampleOffset& offset = requests_[ray].offset;
-    Group hit{Group::kSky, 0, false, 1, 0.0f, 0.0f, 0.0f, offset.x, offset.y};
-    if (!packet_.hit(ray)) return hit;
-    hit.car = packet_.car(ray);
+  Hit read(int ray) const {
+    if (!packet_.hit(ray)) return {};
+    Hit hit;
+    hit.car = packet_.car(ray) < 0 ? Hit::kStatic : packet_.car(ray);
     hit.quad = packet_.rays.hit.primID[ray];
-    hit.ground = hit.car == Group::kStatic && world_.mesh.surfaces[hit.quad].material == Material::kGround;
+    if (hit.car >= 0)
+      hit.key = 0x80000000u | static_cast<std::uint32_t>(hit.car) << 16 | hit.quad;
+    else
+      hit.key = materials_[hit.quad] == Material::kGround ? Hit::kGroundKey : hit.quad;
     hit.depth = packet_.rays.ray.tfar[ray];
     hit.u = packet_.rays.hit.u[ray];
     hit.v = packet_.rays.hit.v[ray];
     return hit;
   }
 
-  const RayBase& base_;
+  /// The part of the image that a car can lie in, with a pixel to spare.
+  static cv::Rect boxOf(const Mesh& model, const Eigen::Isometry3d& T_world_car, const View& view) {
+    const Eigen::Isometry3d T_camera_car = view.T_world_camera.inverse() * T_world_car;
+    const cv::Rect image(0, 0, view.width, view.height);
+    Eigen::Array2d low(1e6, 1e6), high(-1e6, -1e6);
+    for (const Eigen::Vector3f& vertex : model.vertices) {
+      const Eigen::Vector3d point = T_camera_car * vertex.cast<double>();
+      if (point.z() < 0.1) return image;  // beside the camera: anywhere
+      const Eigen::Array2d place(view.fx * point.x() / point.z() + view.cx, view.fy * point.y() / point.z() + view.cy);
+      low = low.min(place);
+      high = high.max(place);
+    }
+    low = low.max(-10.0).min(1e5);
+    high = high.max(-10.0).min(1e5);
+    return image & cv::Rect(cv::Point(static_cast<int>(low.x()) - 2, static_cast<int>(low.y()) - 2),
+                            cv::Point(static_cast<int>(high.x()) + 3, static_cast<int>(high.y()) + 3));
+  }
+
+  /// Casts the rays through some part of the image.
+  void castPacket(const cv::Rect& part) {
+    caster_.cast(packet_);
+    for (const cv::Rect& box : car_boxes_)
+      if ((box & part).area() > 0) {
+        cars_.cast(packet_);
+        return;
+      }
+  }
+
+  /// Casts the first samples of some rows.
+  void castBand(int top) {
+    const int bottom = std::min(top + kBandHeight, height_);
+    for (int left = 0; left < width_; left += kPacketWidth) {
+      const Eigen::Vector3f corner = base_.direction(left, top);
+      for (int i = 0; i < RayPacket::kSize; ++i) {
+        const int row = i / kPacketWidth, column = i % kPacketWidth;
+        if (top + row >= bottom || left + column >= width_) {
+          packet_.disable(i);
+          continue;
+        }
+        const SampleOffset offset = firstOffset(top + row, left + column);
+        packet_.set(i, corner + (static_cast<float>(column) + offset.x) * step_x_ +
+                           (static_cast<float>(row) + offset.y) * step_y_);
+      }
+      castPacket({left, top, kPacketWidth, kBandHeight});
+      for (int row = top; row < bottom; ++row) {
+        Hit* hits = firstRow(row);
+        for (int column = left; column < std::min(left + kPacketWidth, width_); ++column)
+          hits[column] = read((row - top) * kPacketWidth + column - left);
+      }
+    }
+    for (int row = top; row < bottom; ++row) {
+      const Hit* hits = firstRow(row);
+      std::uint32_t* keys = keyRow(row);
+      for (int column = 0; column < width_; ++column) keys[column] = hits[column].key;
+      keys[-1] = keys[0];
+      keys[width_] = keys[width_ - 1];
+    }
+  }
+
+  Eigen::Vector3f directionTo(int pixel, const SampleOffset& offset) const {
+    return tile_corner_ + (static_cast<float>(pixel % kTileWidth) + offset.x) * step_x_ +
+           (static_cast<float>(pixel / kTileWidth) + offset.y) * step_y_;
+  }
+  void request(int pixel, const SampleOffset& offset) {
+    requests_[request_count_++] = {pixel, offset};
+    if (request_count_ == RayPacket::kSize) castRequests();
+  }
+  void castRequests() {
+    if (request_count_ == 0) return;
+    for (int ray = 0; ray < RayPacket::kSize; ++ray) {
+      if (ray >= request_count_) {
+        packet_.disable(ray);
+        continue;
+      }
+      const auto& [pixel, offset] = requests_[ray];
+      packet_.set(ray, directionTo(pixel, offset));
+    }
+    castPacket(tile_);
+    for (int ray = 0; ray < request_count_; ++ray) pixels_[requests_[ray].pixel].add(read(ray), requests_[ray].offset);
+    request_count_ = 0;
+  }
+
+  /// Whether two surfaces meet without an edge to be seen, as the sides of a post or the stones of a kerb do.
+  bool lookAlike(const Hit& a, const Hit& b) const {
+    if (a.isSame(b)) return true;
+    if (a.car != Hit::kStatic || b.car != Hit::kStatic) return false;
+    if (materials_[a.quad] != materials_[b.quad] || std::abs(a.depth - b.depth) > 0.02f * a.depth) return false;
+    const Surface &one = world_.mesh.surfaces[a.quad], &other = world_.mesh.surfaces[b.quad];
+    return std::abs(one.albedo - other.albedo) < 0.1f &&
+           world_.mesh.normal(a.quad).dot(world_.mesh.normal(b.quad)) > 0.7f;
+  }
+  bool isFoliage(const Hit& hit) const {
+    if (hit.car != Hit::kStatic) return false;
+    return materials_[hit.quad] == Material::kLeaf || materials_[hit.quad] == Material::kFoliage;
+  }
+
+  /// Finds the pixels of some rows that have any neighbour that meets another surface.
+  void compareNeighbours(int top) {
+    for (int row = top; row < std::min(top + kBandHeight, height_); ++row) {
+      const std::uint32_t* above = keyRow(std::max(row - 1, 0));
+      const std::uint32_t* here = keyRow(row);
+      const std::uint32_t* below = keyRow(std::min(row + 1, height_ - 1));
+      std::uint32_t* differs = &differs_[static_cast<std::size_t>(row - top) * width_];
+      for (int column = 0; column < width_; ++column) {
+        const std::uint32_t key = here[column];
+        differs[column] = (above[column - 1] ^ key) | (above[column] ^ key) | (above[column + 1] ^ key) |
+                          (here[column - 1] ^ key) | (here[column + 1] ^ key) | (below[column - 1] ^ key) |
+                          (below[column] ^ key) | (below[column + 1] ^ key);
+      }
+    }
+  }
+
+  /// How many samples a pixel whose neighbours differ needs beyond its first: an edge that is followed over many frames
+  /// deserves to be known better than foliage, of which every pixel is an edge.
+  int furtherSamples(int row, int column) {
+    constexpr int kFew = kRegularSamples - 1;
+    const Hit* row_hits = firstRow(row);
+    const Hit& here = row_hits[column];
+    if (isFoliage(here)) return kFew;
+    const Hit* const neighbours[] = {&row_hits[std::max(column - 1, 0)], &row_hits[std::min(column + 1, width_ - 1)],
+                                     &firstRow(std::max(row - 1, 0))[column],
+                                     &firstRow(std::min(row + 1, height_ - 1))[column]};
+    for (const Hit* neighbour : neighbours)
+      if (!isFoliage(*neighbour) && !lookAlike(here, *neighbour)) return kFew + kEdgeSamples;
+    return kFew;
+  }
+
+  void finishTile(int left, int top, float weight, cv::Mat1f& image) {
+    tile_ = {left, top, kTileWidth, kBandHeight};
+    tile_corner_ = base_.direction(left, top);
+    const int columns = std::min(kTileWidth, width_ - left), rows = std::min(kBandHeight, height_ - top);
+    std::array<bool, kTileWidth * kBandHeight> single{};
+    for (int y = 0; y < rows; ++y)
+      for (int x = 0; x < columns; ++x) {
+        const int pixel = y * kTileWidth + x;
+        pixels_[pixel].clear();
+        if (samples_ == kFineSamples) {
+          for (int sample = 0; sample < kFineSamples; ++sample) request(pixel, fineSample(sample));
+          continue;
+        }
+        single[pixel] = samples_ == 1 || differs_[static_cast<std::size_t>(y) * width_ + left + x] == 0;
+        if (single[pixel]) continue;
+        const int further = furtherSamples(top + y, left + x);
+        pixels_[pixel].add(firstRow(top + y)[left + x], firstOffset(top + y, left + x));
+        for (int sample = 1; sample < kRegularSamples; ++sample)
+          request(pixel, regularSample(top + y, left + x, sample));
+        for (int sample = 0; sample < further - kRegularSamples + 1; ++sample) request(pixel, edgeSample(sample));
+      }
+    castRequests();
+    for (int y = 0; y < rows; ++y)
+      for (int x = 0; x < columns; ++x) {
+        const int pixel = y * kTileWidth + x;
+        float brightness = 0.0f;
+        if (single[pixel] || (samples_ == kRegularSamples && pixels_[pixel].isOne())) {
+          brightness = shadeSingle(firstRow(top + y)[left + x], pixel);
+        } else {
+          int count = 0;
+          for (const HitGroup& group : pixels_[pixel]) {
+            brightness += static_cast<float>(group.count) * shadeGroup(group, pixel);
+            count += group.count;
+          }
+          brightness /= static_cast<float>(count);
+        }
+        image(top + y, left + x) += weight * brightness;
+      }
+  }
+
+  /// A pixel that shows one surface is shaded at its centre, wherever its sample lies; the only sample that is asked
+  /// for, in its place.
+  float shadeSingle(const Hit& hit, int pixel) {
+    const SampleOffset offset = samples_ == 1 ? offset_ : SampleOffset{0.0f, 0.0f};
+    const Eigen::Vector3f direction = directionTo(pixel, offset);
+    if (hit.car == Hit::kSky) return shader_.sky(direction);
+    const Facet::Place place = {hit.depth, hit.u, hit.v};
+    turnTo(hit, place);
+    return shadeFacet(direction, facet_.meet(direction, place));
+  }
+  /// Samples on one surface are shaded together, at their mean.
+  float shadeGroup(const HitGroup& group, int pixel) {
+    const float mean = 1.0f / static_cast<float>(group.count);
+    const Facet::Place place = {group.depth * mean, group.u * mean, group.v * mean};
+    const Hit& hit = group.first;
+    if (hit.car == Hit::kStatic && materials_[hit.quad] == Material::kLeaf)
+      return shader_.leaf(world_.mesh.surfaces[hit.quad], place.u, place.depth);
+    const Eigen::Vector3f direction = directionTo(pixel, {group.x * mean, group.y * mean});
+    if (hit.car == Hit::kSky) return shader_.sky(direction);
+    turnTo(hit, {hit.depth, hit.u, hit.v});
+    // The ground's cells count as one surface: what their mean means is known in the plane of the first.
+    return shadeFacet(direction, hit.key == Hit::kGroundKey ? facet_.meet(direction, place) : place);
+  }
+  float shadeFacet(const Eigen::Vector3f& direction, const Facet::Place& place) const {
+    const Surface& surface = facet_.surface();
+    if (surface.material == Material::kLeaf) return shader_.leaf(surface, place.u, place.depth);
+    return shader_.shade(surface, {base_.origin + place.depth * direction, direction, step_x_, step_y_, facet_.normal(),
+                                   facet_.axisS(), facet_.axisT(), place.depth, place.u, place.v});
+  }
+  /// Neighbours mostly show the same quadrilateral: it is kept from pixel to pixel.
+  void turnTo(const Hit& hit, const Facet::Place& place) {
+    const bool second = place.u + place.v > 1.0f;
+    if (facet_car_ == hit.car && facet_quad_ == hit.quad && facet_second_ == second) return;
+    facet_car_ = hit.car;
+    facet_quad_ = hit.quad;
+    facet_second_ = second;
+    const bool moving = hit.car >= 0;
+    const Mesh& mesh =
+        moving ? car_models_[static_cast<std::size_t>(cars_.cars()[static_cast<std::size_t>(hit.car)].model)]
+               : world_.mesh;
+    facet_.set(mesh, hit.quad, moving ? &T_world_cars_[static_cast<std::size_t>(hit.car)] : nullptr, base_.origin,
+               second);
+  }
+
+  const RayBase base_;
+  const Eigen::Vector3f step_x_, step_y_;
+  const int width_, height_;
   const World& world_;
+  const std::vector<Material>& materials_;
   const RayCaster& caster_;
+  const std::vector<Mesh>& car_models_;
   const MovingScene& cars_;
-  int left_ = 0, top_ = 0;
+  const Shader& shader_;
+  const int samples_;
+  const SampleOffset offset_;
+  std::vector<Eigen::Isometry3f> T_world_cars_;
+  std::vector<cv::Rect> car_boxes_;
+
+  std::vector<Hit> first_;              // of the kept rows
+  std::vector<std::uint32_t> keys_;     // theirs
+  std::vector<std::uint32_t> differs_;  // of the rows at hand: not 0 where a neighbour meets another surface
   RayPacket packet_;
+  cv::Rect tile_;
+  Eigen::Vector3f tile_corner_;  // direction of the ray through the centre of its first pixel
+  std::array<PixelHits, kTileWidth * kBandHeight> pixels_;
   std::array<Request, RayPacket::kSize> requests_;
-  int count_ = 0;
-  std::array<PixelHits, RayPacket::kSize> pixels_;
+  int request_count_ = 0;
+
+  Facet facet_;
+  int facet_car_ = Hit::kSky;
+  std::uint32_t facet_quad_ = 0;
+  bool facet_second_ = false;
 };
 
 }  // namespace
 
+ViewRenderer::ViewRenderer(const World& world, const RayCaster& caster, const std::vector<Mesh>& car_models)
+    : world_(&world), caster_(&caster), car_models_(&car_models), shader_(world) {
+  materials_.reserve(world.mesh.surfaces.size());
+  for (const Surface& surface : world.mesh.surfaces) materials_.push_back(surface.material);
+}
+
 void ViewRenderer::add(const View& view, const MovingScene& cars, int samples, float offset_x, float offset_y,
                        float weight, cv::Mat1f& image) const {
-  if (samples != 1 && samples != 4 && samples != kFineSamples)
+  if (samples != 1 && samples != kRegularSamples && samples != kFineSamples)
     throw std::invalid_argument("samples per pixel must be 1, 4 or 16");
-  const int tile_height = samples == 1 ? 4 : 2;
-  const RayBase base(view);
-  const Eigen::Vector3f step_x = base.step_x.cast<float>(), step_y = base.step_y.cast<float>();
-  Facet facet;
-
-  const auto orient = [&](const Group& group) {
-    if (facet.car == group.car && facet.quad == group.quad) return;
-    facet.car = group.car;
-    facet.quad = group.quad;
-    const bool moving = group.car >= 0;
-    const Mesh& mesh = moving ? (*car_models_)[static_cast<std::size_t>(cars.cars()[group.car].model)] : world_->mesh;
-    const Mesh::Quad& corners = mesh.quads[group.quad];
-    facet.surface = &mesh.surfaces[group.quad];
-    facet.corner = mesh.vertices[corners[0]];
-    facet.normal = mesh.normal(group.quad);
-    if (!facet.normal.allFinite()) facet.normal = Eigen::Vector3f(0.0f, -1.0f, 0.0f);
-    facet.axis_s = (mesh.vertices[corners[1]] - facet.corner).normalized();
-    facet.axis_t = (mesh.vertices[corners[3]] - facet.corner).normalized();
-    if (moving) {
-      const Eigen::Matrix3f turn = cars.cars()[group.car].T_world_car.linear().cast<float>();
-      facet.normal = turn * facet.normal;
-      facet.axis_s = turn * facet.axis_s;
-      facet.axis_t = turn * facet.axis_t;
-    }
-  };
-  const auto shade = [&](const Group& group, int column, int row) {
-    const float mean = 1.0f / static_cast<float>(group.count);
-    ShadingPoint point;
-    point.direction = base.direction(column + group.x * mean, row + group.y * mean);
-    if (group.car == Group::kSky) return shader_.sky(point.direction);
-    if (group.car == Group::kStatic) {
-      const Surface& surface = world_->mesh.surfaces[group.quad];
-      if (surface.material == Material::kLeaf) return shader_.leaf(surface, group.u * mean, group.depth * mean);
-    }
-    orient(group);
-    point.direction_x = step_x;
-    point.direction_y = step_y;
-    point.depth = group.depth * mean;
-    point.u = group.u * mean;
-    point.v = group.v * mean;
-    point.normal = facet.normal;
-    point.axis_s = facet.axis_s;
-    point.axis_t = facet.axis_t;
-    if (group.ground) {
-      // The ground's texture is laid by position: that of the mean ray in the plane of the first hit.
-      const float distance = facet.normal.dot(facet.corner - base.origin) / facet.normal.dot(point.direction);
-      point.position = base.origin + (distance > 0.0f ? distance : point.depth) * point.direction;
-    }
-    return shader_.shade(*facet.surface, point);
-  };
-
-  TileSampler tile(base, *world_, *caster_, cars);
-  for (int top = 0; top < view.height; top += tile_height)
-    for (int left = 0; left < view.width; left += kTileWidth) {
-      const auto forPixels = [&](const auto& visit) {
-        for (int i = 0; i < tile_height * kTileWidth; ++i)
-          if (top + i / kTileWidth < view.height && left + i % kTileWidth < view.width) visit(i);
-      };
-      const auto requestRegular = [&](int i, int first) {
-        for (int sample = first; sample < first + 2; ++sample)
-          tile.request(i, regularSample(i / kTileWidth, i % kTileWidth, sample));
-      };
-      tile.begin(left, top);
-      forPixels([&](int i) {
-        if (samples == 1) {
-          tile.request(i, {offset_x, offset_y});
-        } else if (samples == 4) {
-          requestRegular(i, 0);
-        } else {
-          for (int sample = 0; sample < kFineSamples; ++sample) tile.request(i, fineSample(sample));
-        }
-      });
-      tile.flush();
-      // Where all of a tile's first samples meet one surface, more of them would tell nothing new. Elsewhere, an edge
-      // that is followed over many frames deserves to be known better than foliage, of which every pixel is an edge.
-      if (samples == 4 && !tile.isUniform()) {
-        std::array<bool, RayPacket::kSize> edge{};
-        forPixels([&](int i) { edge[i] = tile.isNearSolidEdge(i); });
-        forPixels([&](int i) {
-          requestRegular(i, 2);
-          for (int sample = 0; edge[i] && sample < kEdgeSamples; ++sample) tile.request(i, edgeSample(sample));
-        });
-        tile.flush();
-      }
-      forPixels([&](int i) {
-        const int row = top + i / kTileWidth, column = left + i % kTileWidth;
-        const PixelHits& pixel = tile.pixel(i);
-        float brightness = 0.0f;
-        int count = 0;
-        for (int g = 0; g < pixel.count; ++g) {
-          brightness += static_cast<float>(pixel.groups[g].count) * shade(pixel.groups[g], column, row);
-          count += pixel.groups[g].count;
-        }
-        image(row, column) += weight * brightness / static_cast<float>(count);
-      });
-    }
+  ViewPass(view, *world_, materials_, *caster_, *car_models_, cars, shader_, samples, {offset_x, offset_y})
+      .run(weight, image);
 }
 
 Hits ViewRenderer::trace(const View& view, const MovingScene& cars) const {
@@ -284,11 +361,12 @@ Hits ViewRenderer::trace(const View& view, const MovingScene& cars) const {
   Hits hits{cv::Mat1f(view.height, view.width, std::numeric_limits<float>::quiet_NaN()),
             cv::Mat1i(view.height, view.width, -1)};
   RayPacket packet;
+  packet.start(base.origin);
   for (int row = 0; row < view.height; ++row)
     for (int left = 0; left < view.width; left += RayPacket::kSize) {
       for (int i = 0; i < RayPacket::kSize; ++i) {
         if (left + i < view.width)
-          packet.set(i, base.origin, base.direction(left + i, row));
+          packet.set(i, base.direction(left + i, row));
         else
           packet.disable(i);
       }

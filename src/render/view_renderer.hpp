@@ -32,12 +32,11 @@ struct Hits {
 class ViewRenderer {
  public:
   /// All of these must outlive the renderer.
-  ViewRenderer(const World& world, const RayCaster& caster, const std::vector<Mesh>& car_models)
-      : world_(&world), caster_(&caster), car_models_(&car_models), shader_(world) {}
+  ViewRenderer(const World& world, const RayCaster& caster, const std::vector<Mesh>& car_models);
 
   /// Adds `weight` times the brightness (1 = white) of the view to `image`. With 1 sample per pixel it lies at
-  /// (offset_x, offset_y) px from the pixel's centre; with 4 there are as many at foliage, 12 at other edges and 2
-  /// where nothing changes; 16 are always cast. Samples of a pixel on one surface are shaded together: edges are
+  /// (offset_x, offset_y) px from the pixel's centre; with 4 there are as many at foliage, 12 at other edges and
+  /// 1 where nothing changes; 16 are always cast. Samples of a pixel on one surface are shaded together: edges are
   /// anti-aliased by the samples, textures by their filter.
   void add(const View& view, const MovingScene& cars, int samples, float offset_x, float offset_y, float weight,
            cv::Mat1f& image) const;
@@ -49,6 +48,7 @@ class ViewRenderer {
   const RayCaster* caster_;
   const std::vector<Mesh>* car_models_;
   Shader shader_;
+  std::vector<Material> materials_;  // of all quadrilaterals, packed: this is read for every ray
 };
 
 }  // namespace sdvo::render
