@@ -189,7 +189,7 @@ LocalMap::Adjustment LocalMap::adjust(const WindowOptimizerOptions& options, con
   const int newest = adjustment.frames - 1;
   // What the window's equations do not contain (noise that differs from the options, the calibration's steps from
   // window to window) makes the errors of simulated drives this much larger.
-  constexpr double kUnmodelled = 1.5;
+  constexpr double kUnmodelled = 1.2;
   const auto covariance = [&](int from, int to) -> Matrix6d {
     return kUnmodelled * motionCovariance(window, solution.pose_covariance, from, to);
   };
@@ -207,7 +207,7 @@ LocalMap::Adjustment LocalMap::adjust(const WindowOptimizerOptions& options, con
 
 void LocalMap::cutOff(const std::vector<std::pair<int, int>>& sources, const std::vector<double>& residuals,
                       Adjustment& adjustment) {
-  constexpr double kRejected = 4.0;  // sigma
+  constexpr double kRejected = 6.0;  // sigma
   for (std::size_t i = 0; i < sources.size(); ++i) {
     if (residuals[i] <= kRejected) continue;
     auto& observations = points_[sources[i].first].observations;
