@@ -139,6 +139,10 @@ def main():
     print(f"{arguments.minutes:g} minutes at {arguments.rate:g} Hz: {pairs} pairs, {len(soak.info)} answered, {last.dropped_pairs} dropped, "
           f"{dict(states)}, {soak.poses} poses, {last.distance:.0f} m, latency median {latencies[len(latencies) // 2] * 1e3:.0f} ms, "
           f"memory {before:.1f} MB in the second quarter, {after:.1f} MB in the last, {len(soak.errors)} errors")
+    turns = len(soak.pairs) - 1
+    for k, info in enumerate(soak.info):
+        if info.state != "TRACKING":
+            print(f"{info.state}, {k % turns} pairs after a reversal: {info.reason}")
     for error in soak.errors[:5]:
         print(error)
     # A busy machine may lose pairs before they come to be counted, in the queues of publisher and subscriber.

@@ -1,16 +1,14 @@
 #include <cv_bridge/cv_bridge.h>
-#include <image_transport/image_transport.h>
-#include <image_transport/subscriber_filter.h>
 #include <message_filters/subscriber.h>
 #include <message_filters/time_synchronizer.h>
 #include <nodelet/nodelet.h>
-#include <pluginlib/class_list_macros.hpp>
 #include <sensor_msgs/image_encodings.h>
 #include <stereo_descriptor_vo/FeatureFlow.h>
 #include <stereo_descriptor_vo/StereoFeatures.h>
 
 #include <memory>
 #include <mutex>
+#include <pluginlib/class_list_macros.hpp>
 
 #include "conversions.hpp"
 #include "features_image.hpp"
@@ -26,28 +24,25 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
   using Flow = stereo_descriptor_vo::FeatureFlow;
 
   struct Inputs {
-    explicit Inputs(ros::NodeHandle& nh) : transport(nh), sync(kQueue) {
+    explicit Inputs(ros::NodeHandle& nh) : sync(kQueue) {
       sync.connectInput(left, right, features, flow);
-      left.subscribe(transport, "left/image_rect", kQueue);
-      right.subscribe(transport, "right/image_rect", kQueue);
+      left.subscribe(nh, "left/image_rect", kQueue);
+      right.subscribe(nh, "right/image_rect", kQueue);
       features.subscribe(nh, "stereo_features", kQueue);
       flow.subscribe(nh, "feature_flow", kQueue);
     }
 
     static constexpr int kQueue = 10;
-    image_transport::ImageTransport transport;
-    image_transport::SubscriberFilter left, right;
+    message_filters::Subscriber<Image> left, right;
     message_filters::Subscriber<Features> features;
     message_filters::Subscriber<Flow> flow;
     message_filters::TimeSynchronizer<Image, Image, Features, Flow> sync;
   };
 
   void onInit() override {
-    transport_ = std::make_unique<image_transport::ImageTransport>(getNodeHandle());
-    const image_transport::SubscriberStatusCallback on_connect =
-        [this](const image_transport::SingleSubscriberPublisher&) { updateInputs(); };
+    const ros::SubscriberStatusCallback on_connect = [this](const ros::SingleSubscriberPublisher&) { updateInputs(); };
     const std::lock_guard<std::mutex> lock(connect_mutex_);
-    publisher_ = transport_->advertise("features_image", 1, on_connect, on_connect);
+    publisher_ = getNodeHandle().advertise<Image>("features_image", 1, on_connect, on_connect);
   }
 
   void updateInputs() {
@@ -66,12 +61,12 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
     picture.image = drawFeatures(ros_conversions::toGrey(left), ros_conversions::toGrey(right), *features, *flow);
     publisher_.publish(picture.toImageMsg());
   } catch (const std::exception& e) {
-    if (throttle_.allows(e.what())) NODELET_ERROR_STREAM("features_image at " << left->header.stamp << " skipped: " << e.what());
+    if (throttle_.allows(e.what()))
+      NODELET_ERROR_STREAM("features_image at " << left->header.stamp << " skipped: " << e.what());
   }
 
   ReportThrottle throttle_;
-  std::unique_ptr<image_transport::ImageTransport> transport_;
-  image_transport::Publisher publisher_;
+  ros::Publisher publisher_;
   std::mutex connect_mutex_;
   std::unique_ptr<Inputs> inputs_;
 };

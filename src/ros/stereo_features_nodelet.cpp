@@ -69,7 +69,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     if (publisher_.getNumSubscribers() == 0) {
       input_.reset();
     } else if (!input_) {
-      input_ = std::make_unique<StereoInput>(getNodeHandle(), getPrivateNodeHandle(), options_.input,
+      input_ = std::make_unique<StereoInput>(getNodeHandle(), options_.input,
                                              [this](const StereoPairMessages& pair) { worker_->push(pair); });
     }
   } catch (const std::exception& e) {

@@ -7,9 +7,8 @@
 
 namespace sdvo {
 
-StereoInput::StereoInput(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const StereoInputOptions& options,
-                         Callback callback)
-    : callback_(std::move(callback)), smallest_gap_(std::numeric_limits<double>::infinity()), transport_(nh) {
+StereoInput::StereoInput(ros::NodeHandle& nh, const StereoInputOptions& options, Callback callback)
+    : callback_(std::move(callback)), smallest_gap_(std::numeric_limits<double>::infinity()) {
   const std::string topics[kInputs] = {"left/image_rect", "right/image_rect", "left/camera_info", "right/camera_info"};
   for (int input = 0; input < kInputs; ++input) arrivals_[input].topic = nh.resolveName(topics[input]);
 
@@ -31,9 +30,8 @@ StereoInput::StereoInput(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const
     exact_->registerCallback(&StereoInput::onPair, this);
   }
 
-  const image_transport::TransportHints hints("raw", ros::TransportHints(), private_nh);
-  left_image_.subscribe(transport_, topics[0], queue, hints);
-  right_image_.subscribe(transport_, topics[1], queue, hints);
+  left_image_.subscribe(nh, topics[0], queue);
+  right_image_.subscribe(nh, topics[1], queue);
   left_info_.subscribe(nh, topics[2], queue);
   right_info_.subscribe(nh, topics[3], queue);
 }
