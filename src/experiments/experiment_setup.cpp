@@ -55,8 +55,9 @@ Trajectory runOdometry(const KittiSequence& images, int frames, const std::strin
 
 PipelineOptions ExperimentSetup::options() const {
   // A loose threshold, as in the paper: weak corners belong to the large feature sets.
+  // Near features, whose scale changes most, are large and at the image borders: they must not be left out.
   std::vector<std::string> loose = {"stereo_features/detector/max_features=12000", "detector/fast_min_threshold=3",
-                                    "detector/corner_quality=0.0002"};
+                                    "detector/corner_quality=0.0002", "descriptor/extend_border=true"};
   loose.insert(loose.end(), settings.begin(), settings.end());
   return readPipelineOptions("", loose);
 }
