@@ -36,9 +36,10 @@ void DescriptorOptions::describe(OptionList& list) {
   list.add("type", type, baseDescriptorNames(), "base descriptor");
   list.add("layout", layout, {"left", "left+right"}, "one view, or the left half followed by the right half");
   list.add("oriented", oriented, "turn the pattern to the left view's orientation (both halves by the same angle)");
-  list.add("extend_border", extend_border,
-           "describe also what is too near to an image border for its size, if a size of 7 px fits: the image then goes on "
-           "as its outermost pixels");
+  list.add(
+      "extend_border", extend_border,
+      "describe also what is too near to an image border for its size, if a size of 7 px fits: the image then goes on "
+      "as its outermost pixels");
 }
 
 StereoDescriptor::StereoDescriptor(const DescriptorOptions& options)
@@ -70,8 +71,8 @@ DescribedKeypoints StereoDescriptor::describe(const cv::Mat& left_image, const c
     for (std::size_t i = 0; i < keypoints.size(); ++i) in_right[i].angle = in_left[i].angle;
   }
   const ViewDescriptors left_half = base_->describe(left, in_left);
-  // Described in the right view even where only the left row is wanted: a feature set does not depend on the layout, and
-  // layouts can be compared on the same features.
+  // Described in the right view even where only the left row is wanted: a feature set does not depend on the layout,
+  // and layouts can be compared on the same features.
   const ViewDescriptors right_half = base_->describe(right, in_right);
 
   DescribedKeypoints described;

@@ -14,20 +14,24 @@ struct Individual {
   double cost = std::numeric_limits<double>::max();
 };
 
-double uniform(std::mt19937& random) { return static_cast<double>(random()) / 4294967296.0; }
+double uniform(std::mt19937& random) {
+  return static_cast<double>(random()) / 4294967296.0;
+}
 
 bool contains(const MinimalSample& genes, int gene) {
   return std::find(genes.begin(), genes.end(), gene) != genes.end();
 }
 
-/// What mutation has learnt of each correspondence: the fitness of the best pose that it agrees with. The abstract of the
-/// 2017 paper leaves open what is learnt. A sample's fitness says something of its three genes alone, and most genes are
-/// never drawn; its pose says something of every correspondence. Poses below the average are chance and teach nothing.
+/// What mutation has learnt of each correspondence: the fitness of the best pose that it agrees with. The abstract of
+/// the 2017 paper leaves open what is learnt. A sample's fitness says something of its three genes alone, and most
+/// genes are never drawn; its pose says something of every correspondence. Poses below the average are chance and teach
+/// nothing.
 class GeneKnowledge {
  public:
   explicit GeneKnowledge(int count) : quality_(static_cast<std::size_t>(count), 0.0) {}
 
-  /// Takes note of a pose of the given fitness, 0…1; `inliers` lists the genes that agree with it and is called when needed.
+  /// Takes note of a pose of the given fitness, 0…1; `inliers` lists the genes that agree with it and is called when
+  /// needed.
   template <class Inliers>
   void learn(double fitness, const Inliers& inliers) {
     if (fitness * poses_ > sum_) {
@@ -146,13 +150,15 @@ class GeneticSearch {
 
   /// All genes of an unfit individual are replaced: at random in the beginning, by the best known ones in the end.
   void mutateUnfit(MinimalSample& genes) {
-    for (std::size_t g = 0; g < genes.size(); ++g) replace(genes, g, options_.learning && uniform(random_) < progress());
+    for (std::size_t g = 0; g < genes.size(); ++g)
+      replace(genes, g, options_.learning && uniform(random_) < progress());
   }
 
   void replace(MinimalSample& genes, std::size_t g, bool exploit) {
     int gene = genes[g];
     while (contains(genes, gene))
-      gene = exploit ? knowledge_.drawGood(random_) : static_cast<int>(random_() % static_cast<unsigned>(problem_.count()));
+      gene = exploit ? knowledge_.drawGood(random_)
+                     : static_cast<int>(random_() % static_cast<unsigned>(problem_.count()));
     genes[g] = gene;
   }
 

@@ -111,8 +111,8 @@ int run(const Arguments& arguments) {
   std::cout << tried.aligned();
   writeYaml(arguments.output, choice, arguments, samples.size());
   std::cout << "size = clamp(" << choice.trial.slope << " * disparity^" << choice.shape.exponent << " + "
-            << choice.trial.slope * choice.shape.offset << ", " << choice.trial.min_size << ", " << arguments.max_size << ") px, written to " << arguments.output
-            << std::endl;
+            << choice.trial.slope * choice.shape.offset << ", " << choice.trial.min_size << ", " << arguments.max_size
+            << ") px, written to " << arguments.output << std::endl;
 
   if (!arguments.plot.empty()) {
     const std::string csv = std::filesystem::path(arguments.plot).replace_extension(".csv").string();
