@@ -22,8 +22,6 @@
 namespace sdvo {
 namespace {
 
-constexpr float kStandardSize = 7.f;  // px, of a FAST corner
-
 bool fits(const ViewKeypoint& k, double reach, cv::Size image) {
   return k.u - reach >= -0.5 && k.v - reach >= -0.5 && k.u + reach <= image.width - 0.5 &&
          k.v + reach <= image.height - 0.5;
@@ -54,6 +52,8 @@ class FreakDescriptor : public BaseDescriptor {
 
 class BriefDescriptor : public BaseDescriptor {
  public:
+  double reach(double size) const override { return Brief::reach(size); }
+
   ViewDescriptors describe(const cv::Mat& image, const std::vector<ViewKeypoint>& keypoints) const override {
     const Brief brief(image);
     ViewDescriptors described = emptyRows(keypoints.size(), Brief::kBytes);
@@ -81,13 +81,15 @@ class OpenCvDescriptor : public BaseDescriptor {
         class_id_is_free_(class_id_is_free),
         impose_(std::move(impose)) {}
 
+  double reach(double size) const override { return reach_per_size_ * size; }
+
   ViewDescriptors describe(const cv::Mat& image, const std::vector<ViewKeypoint>& keypoints) const override {
     ViewDescriptors described = emptyRows(keypoints.size(), bytes());
     std::vector<cv::KeyPoint> cv_keypoints;
     std::vector<std::size_t> row_of;
     for (std::size_t i = 0; i < keypoints.size(); ++i) {
       const ViewKeypoint& k = keypoints[i];
-      if (!fits(k, reach_per_size_ * k.size, image.size())) continue;
+      if (!fits(k, reach(k.size), image.size())) continue;
       const float degrees = k.angle < 0.f ? 0.f : k.angle * static_cast<float>(180.0 / CV_PI);
       cv::KeyPoint keypoint(k.u, k.v, k.size, degrees, 0.f, 0, class_id_is_free_ ? static_cast<int>(row_of.size()) : -1);
       impose_(k.size, keypoint);
@@ -158,7 +160,7 @@ std::unique_ptr<BaseDescriptor> makeSift(const std::string& name) {
 
 /// ORB reads the pyramid level from `octave`; its 31 px patch belongs to the standard size.
 std::unique_ptr<BaseDescriptor> makeOrb(const std::string&) {
-  constexpr float kStep = 1.1f;
+  constexpr float kStep = 1.1f, kStandardSize = static_cast<float>(BaseDescriptor::kStandardSize);
   constexpr int kLevels = 24;
   const auto impose = [](float size, cv::KeyPoint& keypoint) {
     const double level = std::log(size / kStandardSize) / std::log(kStep);

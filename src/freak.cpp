@@ -92,7 +92,7 @@ std::array<float, Freak::kFields> Freak::intensities(const FreakKeypoint& keypoi
     const double x = keypoint.u + cosine * field.x - sine * field.y;
     const double y = keypoint.v + sine * field.x + cosine * field.y;
     const double half = std::max(field.sigma * scale, kSmallestHalfSide);
-    means[i] = static_cast<float>(image_.boxMean(x, y, half));
+    means[i] = image_.boxMean(x, y, half);
   }
   return means;
 }

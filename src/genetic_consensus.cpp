@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <vector>
 
 namespace sdvo {
@@ -13,46 +14,50 @@ struct Individual {
   double cost = std::numeric_limits<double>::max();
 };
 
-double uniform(std::mt19937& random) { return static_cast<double>(random()) / 4294967296.0; }
+double uniform(std::mt19937& random) {
+  return static_cast<double>(random()) / 4294967296.0;
+}
 
 bool contains(const MinimalSample& genes, int gene) {
   return std::find(genes.begin(), genes.end(), gene) != genes.end();
 }
 
-/// What mutation has learnt of each correspondence: the mean fitness of the individuals it took part in. A gene that was
-/// never tried counts as average, so that it stays in the game.
+/// What mutation has learnt of each correspondence: the fitness of the best pose that it agrees with. The abstract of
+/// the 2017 paper leaves open what is learnt. A sample's fitness says something of its three genes alone, and most
+/// genes are never drawn; its pose says something of every correspondence. Poses below the average are chance and teach
+/// nothing.
 class GeneKnowledge {
  public:
-  explicit GeneKnowledge(int count) : sum_(static_cast<std::size_t>(count), 0.0), tries_(sum_.size(), 0.0) {}
+  explicit GeneKnowledge(int count) : quality_(static_cast<std::size_t>(count), 0.0) {}
 
-  void learn(const MinimalSample& genes, double fitness) {
-    for (const int gene : genes) {
-      sum_[static_cast<std::size_t>(gene)] += fitness;
-      ++tries_[static_cast<std::size_t>(gene)];
+  /// Takes note of a pose of the given fitness, 0…1; `inliers` lists the genes that agree with it and is called when
+  /// needed.
+  template <class Inliers>
+  void learn(double fitness, const Inliers& inliers) {
+    if (fitness * poses_ > sum_) {
+      for (const int gene : inliers()) {
+        double& quality = quality_[static_cast<std::size_t>(gene)];
+        quality = std::max(quality, fitness);
+      }
     }
-    total_ += fitness;
-    ++individuals_;
+    sum_ += fitness;
+    ++poses_;
   }
 
   /// The best of a few genes drawn at random (tournament selection): exploitation that never repeats itself blindly.
   int drawGood(std::mt19937& random) const {
     constexpr int kTournament = 8;
-    int best = static_cast<int>(random() % sum_.size());
+    std::size_t best = random() % quality_.size();
     for (int k = 1; k < kTournament; ++k) {
-      const int rival = static_cast<int>(random() % sum_.size());
-      if (quality(rival) > quality(best)) best = rival;
+      const std::size_t rival = random() % quality_.size();
+      if (quality_[rival] > quality_[best]) best = rival;
     }
-    return best;
+    return static_cast<int>(best);
   }
 
  private:
-  double quality(int gene) const {
-    const double prior = individuals_ > 0.0 ? total_ / individuals_ : 0.0;
-    return (sum_[static_cast<std::size_t>(gene)] + prior) / (tries_[static_cast<std::size_t>(gene)] + 1.0);
-  }
-
-  std::vector<double> sum_, tries_;
-  double total_ = 0.0, individuals_ = 0.0;
+  std::vector<double> quality_;
+  double sum_ = 0.0, poses_ = 0.0;  ///< of the fitness, and how many
 };
 
 class GeneticSearch {
@@ -94,9 +99,13 @@ class GeneticSearch {
     ++result_.iterations;
     // An individual that gives no pose at all is as unfit as one that no correspondence agrees with.
     individual.cost = std::numeric_limits<double>::max();
+    std::optional<Eigen::Isometry3d> fittest;
     for (const Eigen::Isometry3d& T : problem_.solve(individual.genes)) {
       const double cost = problem_.truncatedCost(T);
-      individual.cost = std::min(individual.cost, cost);
+      if (cost < individual.cost) {
+        individual.cost = cost;
+        fittest = T;
+      }
       if (cost >= result_.cost) continue;
       result_.found = true;
       result_.cost = cost;
@@ -104,10 +113,8 @@ class GeneticSearch {
       const double inliers = static_cast<double>(problem_.inliers(T).size());
       needed_ = budget_.needed(inliers / problem_.count(), budget_.confidence);
     }
-    if (adaptive_ && options_.learning) {
-      const double worst = problem_.worstCost();
-      knowledge_.learn(individual.genes, std::max(0.0, 1.0 - individual.cost / worst));
-    }
+    if (adaptive_ && options_.learning && fittest)
+      knowledge_.learn(1.0 - individual.cost / problem_.worstCost(), [&] { return problem_.inliers(*fittest); });
   }
 
   /// The fitter half become parents; their children replace the unfit half.
@@ -143,13 +150,15 @@ class GeneticSearch {
 
   /// All genes of an unfit individual are replaced: at random in the beginning, by the best known ones in the end.
   void mutateUnfit(MinimalSample& genes) {
-    for (std::size_t g = 0; g < genes.size(); ++g) replace(genes, g, options_.learning && uniform(random_) < progress());
+    for (std::size_t g = 0; g < genes.size(); ++g)
+      replace(genes, g, options_.learning && uniform(random_) < progress());
   }
 
   void replace(MinimalSample& genes, std::size_t g, bool exploit) {
     int gene = genes[g];
     while (contains(genes, gene))
-      gene = exploit ? knowledge_.drawGood(random_) : static_cast<int>(random_() % static_cast<unsigned>(problem_.count()));
+      gene = exploit ? knowledge_.drawGood(random_)
+                     : static_cast<int>(random_() % static_cast<unsigned>(problem_.count()));
     genes[g] = gene;
   }
 

@@ -57,6 +57,15 @@ TEST(Brief, IgnoresBrightnessAndContrast) {
   EXPECT_LE(differing(describe(image, 150.0, 150.0, 7.0), describe(darker, 150.0, 150.0, 7.0)), 8);
 }
 
+/// Nothing is brighter than anything else on an even surface, at whatever fraction of a pixel the boxes end.
+TEST(Brief, SetsNoBitOnAnEvenImage) {
+  for (const int grey : {0, 1, 77, 200, 255}) {
+    const cv::Mat even(kSize, CV_8U, cv::Scalar(grey));
+    for (const double size : {5.3, 7.0, 11.9, 20.0})
+      EXPECT_EQ(setBits(describe(even, 150.3, 149.6, size)), 0) << "grey level " << grey << ", size " << size;
+  }
+}
+
 /// A surface at half the distance looks twice as large: so must the patch.
 TEST(Brief, FollowsTheSize) {
   const synthetic::Texture texture(4, 8.0, 60.0);

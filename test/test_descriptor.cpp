@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <opencv2/imgproc.hpp>
+
 #include "stereo_descriptor_vo/descriptor.hpp"
 #include "stereo_descriptor_vo/freak.hpp"
 #include "synthetic_scene.hpp"
@@ -63,6 +65,38 @@ TEST(StereoDescriptor, IsTheConcatenationOfBothViews) {
   }
   const DescribedKeypoints left_alone = StereoDescriptor(withLayout("left")).describe(left, right, keypoints);
   EXPECT_TRUE(synthetic::equalMats(both.rows.colRange(0, Freak::kBytes), left_alone.rows));
+}
+
+/// What fits is described as ever; what does not, as if the image went on as its outermost pixels.
+TEST(StereoDescriptor, ExtendsTheBorder) {
+  constexpr int kMargin = 100;
+  const cv::Mat left = view(1), right = view(2);
+  cv::Mat large_left, large_right;
+  cv::copyMakeBorder(left, large_left, kMargin, kMargin, kMargin, kMargin, cv::BORDER_REPLICATE);
+  cv::copyMakeBorder(right, large_right, kMargin, kMargin, kMargin, kMargin, cv::BORDER_REPLICATE);
+  // Inside, beyond the left view's top, beyond the right view's left, and two that not even a reach of 22 px fits.
+  const std::vector<StereoKeypoint> keypoints = {{160.25f, 95.f, 150.f, 95.4f, 20.f},
+                                                 {200.f, 22.f, 180.f, 22.f, 20.f},
+                                                 {50.5f, 90.f, 22.f, 90.5f, 30.f},
+                                                 {200.f, 21.f, 180.f, 21.f, 20.f},
+                                                 {50.f, 90.f, 21.f, 90.f, 8.f}};
+  for (const bool oriented : {false, true}) {
+    DescriptorOptions options = withLayout("left+right", oriented);
+    options.extend_border = true;
+    const DescribedKeypoints described = StereoDescriptor(options).describe(left, right, keypoints);
+    ASSERT_EQ(described.index, (std::vector<int>{0, 1, 2}));
+    const StereoDescriptor plain(withLayout("left+right", oriented));
+    for (int row = 0; row < described.rows.rows; ++row) {
+      StereoKeypoint k = keypoints[static_cast<std::size_t>(row)];
+      k.u_left += kMargin, k.v_left += kMargin, k.u_right += kMargin, k.v_right += kMargin;
+      const DescribedKeypoints expected = plain.describe(large_left, large_right, {k});
+      ASSERT_EQ(expected.rows.rows, 1);
+      // Floats lose digits when positions move by the margin; few bits depend on those.
+      EXPECT_LE(cv::norm(described.rows.row(row), expected.rows, cv::NORM_HAMMING), 3.0) << "row " << row;
+      EXPECT_NEAR(described.angle[static_cast<std::size_t>(row)], expected.angle[0], 1e-3);
+    }
+    EXPECT_EQ(plain.describe(left, right, keypoints).index, (std::vector<int>{0}));
+  }
 }
 
 TEST(StereoDescriptor, HalvesOfEqualViewsAreEqual) {

@@ -96,6 +96,17 @@ TEST(Freak, BitsCompareThePairsInOrder) {
   }
 }
 
+/// Nothing is brighter than anything else on an even surface, at whatever fraction of a pixel the boxes end.
+TEST(Freak, SetsNoBitOnAnEvenImage) {
+  for (const int grey : {0, 1, 77, 200, 255}) {
+    const Freak freak(cv::Mat(301, 301, CV_8U, cv::Scalar(grey)));
+    for (const float size : {5.3f, 7.f, 11.9f, 20.f})
+      for (const float angle : {-1.f, 0.7f})
+        EXPECT_EQ(cv::norm(row(freak, {150.3f, 149.6f, size, angle}), cv::NORM_HAMMING), 0.0)
+            << "grey level " << grey << ", size " << size << ", angle " << angle;
+  }
+}
+
 TEST(Freak, ChangesContinuouslyWithTheSize) {
   const synthetic::Texture texture(5, 5.0, 80.0);
   const Freak freak(synthetic::render({300, 300}, [&](double u, double v) { return texture.at(u, v); }));

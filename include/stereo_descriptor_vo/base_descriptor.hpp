@@ -26,14 +26,15 @@ struct ViewDescriptors {
 /// described on a neighbourhood of twice the size, and at 7 px, the size of a FAST corner, it is the published one.
 class BaseDescriptor {
  public:
+  static constexpr double kStandardSize = 7.0;  ///< px
+
   virtual ~BaseDescriptor() = default;
 
   /// `image` is CV_8UC1.
   virtual ViewDescriptors describe(const cv::Mat& image, const std::vector<ViewKeypoint>& keypoints) const = 0;
 
-  /// Distance in px from its centre within which a key point of `size` px needs the image; 0 where that is not known
-  /// before describe().
-  virtual double reach(double /*size*/) const { return 0.0; }
+  /// Distance in px from its centre within which a key point of `size` px needs the image.
+  virtual double reach(double size) const = 0;
 
   virtual ElementType elementType() const = 0;
   virtual int bytes() const = 0;

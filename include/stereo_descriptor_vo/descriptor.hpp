@@ -15,6 +15,7 @@ struct DescriptorOptions {
   std::string type = "freak";
   std::string layout = "left+right";
   bool oriented = false;
+  bool extend_border = false;
 
   void describe(OptionList& list);
 };
@@ -26,7 +27,7 @@ struct StereoKeypoint {
   float size;              ///< diameter, the same in both views, px
 };
 
-/// Descriptors of those key points that can be described in every view the layout asks for.
+/// Descriptors of those key points that can be described in both views.
 struct DescribedKeypoints {
   std::vector<int> index;    ///< into the key points given, ascending; one for each row
   std::vector<float> angle;  ///< rad in [0, 2 pi), -1 where not oriented; one for each row
@@ -39,11 +40,11 @@ class StereoDescriptor {
  public:
   explicit StereoDescriptor(const DescriptorOptions& options);
 
-  DescribedKeypoints describe(const cv::Mat& left, const cv::Mat& right,
+  DescribedKeypoints describe(const cv::Mat& left_image, const cv::Mat& right_image,
                               const std::vector<StereoKeypoint>& keypoints) const;
 
-  /// As BaseDescriptor::reach().
-  double reach(double size) const { return base_->reach(size); }
+  /// Distance in px from its centre within which a key point of `size` px must find the image.
+  double reach(double size) const;
   ElementType elementType() const { return base_->elementType(); }
   const DescriptorOptions& options() const { return options_; }
 

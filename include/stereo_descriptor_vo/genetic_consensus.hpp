@@ -37,10 +37,11 @@ struct SearchBudget {
   NeededIterations needed;
 };
 
-/// Genetic algorithm sample consensus. An individual is a minimal sample, its genes are the correspondences, its fitness is
-/// the consensus of the pose that it gives. With `adaptive` false the rates are fixed (GASAC, Rodehorst and Hellwich 2006);
-/// with `adaptive` true unfit individuals are mutated and the search learns for each gene how good a replacement it is, so
-/// that mutation moves from exploring at random to exploiting what was learnt (Shojaedini, Majd, Safabakhsh 2017).
+/// Genetic algorithm sample consensus. An individual is a minimal sample, its genes are the correspondences, its
+/// fitness is the consensus of the pose that it gives. With `adaptive` false the rates are fixed (GASAC, Rodehorst and
+/// Hellwich 2006); with `adaptive` true unfit individuals are mutated and the search learns for each gene how good a
+/// replacement it is (as good as the best pose it agrees with), so that mutation moves from exploring at random to
+/// exploiting what was learnt (Shojaedini, Majd, Safabakhsh 2017).
 GeneticResult searchGenetically(const PoseProblem& problem, const GeneticConsensusOptions& options, bool adaptive,
                                 const SearchBudget& budget, std::mt19937& random);
 

@@ -17,8 +17,8 @@ class IntegralImage {
   }
 
   /// Mean grey level of the square around (u, v) with the given half side (all px). The square must lie inside the
-  /// image.
-  double boxMean(double u, double v, double half) const {
+  /// image. Rounded to float: means that are equal must compare so, whatever the sums were rounded to on the way.
+  float boxMean(double u, double v, double half) const {
     const Edge left = edge(u - half, integral_.cols), right = edge(u + half, integral_.cols);
     const Edge top = edge(v - half, integral_.rows), bottom = edge(v + half, integral_.rows);
     const auto between = [&](int row) {
@@ -26,9 +26,9 @@ class IntegralImage {
       return interpolated(sums[right.index], sums[right.index + 1], right.share) -
              interpolated(sums[left.index], sums[left.index + 1], left.share);
     };
-    return (interpolated(between(bottom.index), between(bottom.index + 1), bottom.share) -
-            interpolated(between(top.index), between(top.index + 1), top.share)) /
-           (4.0 * half * half);
+    return static_cast<float>((interpolated(between(bottom.index), between(bottom.index + 1), bottom.share) -
+                               interpolated(between(top.index), between(top.index + 1), top.share)) /
+                              (4.0 * half * half));
   }
 
  private:

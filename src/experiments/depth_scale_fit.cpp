@@ -210,7 +210,7 @@ std::vector<ShapeFit> fitShapes(const std::vector<SizeSample>& samples) {
 std::vector<SlopeTrial> trySlopes(const std::vector<ReferenceSequence>& sequences, const PipelineOptions& options,
                                   const ShapeFit& shape, const std::vector<double>& slopes,
                                   const std::vector<double>& min_sizes, double max_size, int features) {
-  constexpr int kStride = 10, kSteps[] = {2, 5, 8};
+  constexpr int kStride = 10, kSteps[] = {1, 4, 7, 10};
   const FeatureExtractorOptions& extraction = options.stereo_features;
   DescriptorOptions left_view = extraction.descriptor;
   left_view.layout = "left";
@@ -230,13 +230,14 @@ std::vector<SlopeTrial> trySlopes(const std::vector<ReferenceSequence>& sequence
       trials.push_back({slope, min_size, 0.0});
     }
   }
+  const std::vector<DepthScale> binding = bindingCurves(curves, left_view);
   int pairs = 0;
   for (const ReferenceSequence& sequence : sequences) {
     Progress progress("trying slopes " + sequence.name, sequence.frames / kStride + 1);
     for (int t = 0; t < sequence.frames; t += kStride, progress.step()) {
       const auto describe = [&](int i) {
         const KeypointSet set = findKeypoints(sequence.images, i, extraction.detector, extraction.stereo);
-        const auto chosen = selectKeypoints(set, curves, reach, extraction.detector.bucket_size, features);
+        const auto chosen = selectKeypoints(set, binding, reach, extraction.detector.bucket_size, features);
         std::vector<StereoFeatures> described;
         for (const DepthScale& curve : curves) described.push_back(describeKeypoints(set, chosen, curve, descriptor));
         return described;

@@ -48,8 +48,8 @@ struct SlopeTrial {
   double correct;          ///< correct matches of a pair, mean
 };
 
-/// Correct matches (as in experiment A) over pairs 2, 5 and 8 steps apart for every factor and smallest size of the
-/// shape.
+/// Correct matches (as in experiment A) over pairs 1, 4, 7 and 10 steps apart, which stand for its ten steps, for every
+/// factor and smallest size of the shape.
 std::vector<SlopeTrial> trySlopes(const std::vector<ReferenceSequence>& sequences, const PipelineOptions& options,
                                   const ShapeFit& shape, const std::vector<double>& slopes,
                                   const std::vector<double>& min_sizes, double max_size, int features);

@@ -55,8 +55,13 @@ Trajectory runOdometry(const KittiSequence& images, int frames, const std::strin
 
 PipelineOptions ExperimentSetup::options() const {
   // A loose threshold, as in the paper: weak corners belong to the large feature sets.
+  // Near features, whose scale changes most, are large and at the image borders: they must not be left out.
   std::vector<std::string> loose = {"stereo_features/detector/max_features=12000", "detector/fast_min_threshold=3",
-                                    "detector/corner_quality=0.0002"};
+                                    "detector/corner_quality=0.0002", "descriptor/extend_border=true"};
+  // What fit_depth_scale found on a rendered drive, see docs/experiments.md. The odometry's own defaults differ: it
+  // gains nothing from large neighbourhoods, which cost it time.
+  for (const char* curve : {"size_curve/slope=0.7", "size_curve/min_size=14", "size_curve/max_size=60"})
+    loose.emplace_back(curve);
   loose.insert(loose.end(), settings.begin(), settings.end());
   return readPipelineOptions("", loose);
 }

@@ -20,7 +20,8 @@ struct ExperimentSetup {
   int frames = 0;                      ///< pairs used of each sequence; 0: all
   std::vector<std::string> settings;   ///< name=value of the package's options
 
-  /// The package's options with `settings`, and with a detector that finds loosely enough for the largest feature set.
+  /// The package's options with the experiments' own defaults (a detector that finds loosely enough for the largest
+  /// feature set, FREAK's curve, neighbourhoods that go on beyond the border) and, above all, `settings`.
   PipelineOptions options() const;
 };
 

@@ -42,6 +42,14 @@ double measureReachPerSize(const std::string& descriptor) {
   return (static_cast<double>(first - described.valid.begin()) + 0.5) / kSize;
 }
 
+std::vector<DepthScale> bindingCurves(const std::vector<DepthScale>& curves, const DescriptorOptions& descriptor) {
+  if (!descriptor.extend_border) return curves;
+  DepthScaleOptions standard;
+  standard.scale_normalisation = false;
+  standard.constant_size = BaseDescriptor::kStandardSize;
+  return {DepthScale(standard)};
+}
+
 std::vector<int> selectKeypoints(const KeypointSet& set, const std::vector<DepthScale>& curves, double reach_per_size,
                                  int bucket_size, int count) {
   std::map<std::pair<float, float>, int> index_at;  // corners that the refinement laid upon each other count once

@@ -35,6 +35,10 @@ KeypointSet findKeypoints(const KittiSequence& sequence, int i, const FeatureDet
 /// Measured with the descriptor itself on a blank image.
 double measureReachPerSize(const std::string& descriptor);
 
+/// The curves at whose sizes the neighbourhoods of `curves` must lie inside the image: these, or the standard size's
+/// alone when the descriptor goes on beyond the border.
+std::vector<DepthScale> bindingCurves(const std::vector<DepthScale>& curves, const DescriptorOptions& descriptor);
+
 /// Indices of the `count` strongest corners, spread over buckets, among those whose neighbourhood lies inside both
 /// views at the size that every one of `curves` gives. Hence all curves describe exactly the same features. Fewer when
 /// there are no more; indices of a smaller count are a subset of those of a larger one.

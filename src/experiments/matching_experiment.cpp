@@ -109,7 +109,8 @@ class SequenceMatching {
   SequenceMatching(const ReferenceSequence& sequence, const MatchingExperiment& experiment,
                    const PipelineOptions& options, const std::vector<Side>& sides)
       : sequence_(sequence), experiment_(experiment), options_(options), sides_(sides) {
-    for (const Side& side : sides) curves_.push_back(side.curve);
+    for (const Side& side : sides) binding_curves_.push_back(side.curve);
+    binding_curves_ = bindingCurves(binding_curves_, options.stereo_features.descriptor);
     for (const std::string& type : experiment.descriptors) {
       DescriptorOptions descriptor = options.stereo_features.descriptor;
       descriptor.type = type;
@@ -151,13 +152,13 @@ class SequenceMatching {
     const int bucket = options_.stereo_features.detector.bucket_size;
     const std::vector<int>& counts = experiment_.feature_counts;
     const int most = *std::max_element(counts.begin(), counts.end());
-    const std::vector<int> chosen = selectKeypoints(set, curves_, reach_[d], bucket, most);
+    const std::vector<int> chosen = selectKeypoints(set, binding_curves_, reach_[d], bucket, most);
     DescribedFrame frame;
     for (const Side& side : sides_)
       frame.of_side.push_back(describeKeypoints(set, chosen, side.curve, descriptors_[d]));
     for (const int count : counts) {
       std::vector<int>& rows = frame.rows_of_count[count];
-      for (const int i : selectKeypoints(set, curves_, reach_[d], bucket, count)) {
+      for (const int i : selectKeypoints(set, binding_curves_, reach_[d], bucket, count)) {
         const auto row = std::lower_bound(chosen.begin(), chosen.end(), i);
         if (row != chosen.end() && *row == i) rows.push_back(static_cast<int>(row - chosen.begin()));
       }
@@ -192,7 +193,7 @@ class SequenceMatching {
   const MatchingExperiment& experiment_;
   const PipelineOptions& options_;
   const std::vector<Side>& sides_;
-  std::vector<DepthScale> curves_;
+  std::vector<DepthScale> binding_curves_;
   std::vector<StereoDescriptor> descriptors_;
   std::vector<double> reach_;
   Scores scores_;

@@ -26,12 +26,13 @@ std::vector<std::vector<StereoFeatures>> describeSequence(const ReferenceSequenc
   both_views.layout = "left+right";
   const StereoDescriptor descriptor(both_views);
   const double reach = measureReachPerSize(both_views.type);
+  const std::vector<DepthScale> binding = bindingCurves(curves, both_views);
 
   std::vector<std::vector<StereoFeatures>> described(odometrySystems().size());
   Progress progress("describing " + sequence.name, sequence.frames);
   for (int i = 0; i < sequence.frames; ++i, progress.step()) {
     const KeypointSet set = findKeypoints(sequence.images, i, extraction.detector, extraction.stereo);
-    const std::vector<int> chosen = selectKeypoints(set, curves, reach, extraction.detector.bucket_size, count);
+    const std::vector<int> chosen = selectKeypoints(set, binding, reach, extraction.detector.bucket_size, count);
     std::vector<int> all_rows;
     for (std::size_t k = 0; k < chosen.size(); ++k) all_rows.push_back(static_cast<int>(k));
     std::vector<StereoFeatures> of_curve;

@@ -18,8 +18,8 @@ struct Arguments {
   sdvo::ExperimentSetup setup;
   sdvo::SizeSampling sampling;
   std::string output, plot, model;
-  int features = 1350;
-  double max_size = 40.0;
+  int features = 2320;
+  double max_size = 60.0;
 };
 
 void writeSamples(const std::string& path, const std::vector<sdvo::SizeSample>& samples) {
@@ -41,8 +41,31 @@ const sdvo::ShapeFit& choose(const std::vector<sdvo::ShapeFit>& fits, const std:
   return *best;
 }
 
-void writeYaml(const std::string& path, const sdvo::ShapeFit& shape, const sdvo::SlopeTrial& best,
-               const Arguments& arguments, std::size_t samples) {
+/// A shape with its factor and smallest size.
+struct Choice {
+  sdvo::ShapeFit shape;
+  sdvo::SlopeTrial trial{0.0, 0.0, 0.0};
+};
+
+/// The factor and the smallest size of a shape that match best; all that were tried are added to the table.
+Choice tryShape(const std::vector<sdvo::ReferenceSequence>& sequences, const sdvo::PipelineOptions& options,
+                const sdvo::ShapeFit& shape, const Arguments& arguments, sdvo::CsvTable& tried) {
+  constexpr double kReferenceDisparity = 20.0;  // px
+  std::vector<double> slopes;
+  for (const double size : {10.0, 12.0, 14.0, 17.0, 20.0, 24.0, 28.0})
+    slopes.push_back(size / shape.value(kReferenceDisparity));
+  Choice choice{shape, {0.0, 0.0, 0.0}};
+  for (const sdvo::SlopeTrial& trial : sdvo::trySlopes(sequences, options, shape, slopes, {8.0, 10.0, 12.0, 14.0},
+                                                       arguments.max_size, arguments.features)) {
+    tried.add(shape.model, trial.slope, trial.min_size, trial.correct);
+    if (trial.correct > choice.trial.correct) choice.trial = trial;
+  }
+  return choice;
+}
+
+void writeYaml(const std::string& path, const Choice& choice, const Arguments& arguments, std::size_t samples) {
+  const sdvo::ShapeFit& shape = choice.shape;
+  const sdvo::SlopeTrial& best = choice.trial;
   std::ofstream file(path);
   file << "# Written by fit_depth_scale: " << shape.model << " on " << samples << " samples of "
        << arguments.setup.sequences.size() << " sequence(s), median residual " << shape.median_residual << " octaves.\n"
@@ -74,24 +97,22 @@ int run(const Arguments& arguments) {
   const sdvo::ShapeFit& shape = choose(fits, arguments.model);
   std::cout << samples.size() << " samples\n" << shapes.aligned() << "chosen: " << shape.model << "\n";
 
-  // Ratios do not tell the curve's factor: how large a neighbourhood is worth describing shows in matching.
-  constexpr double kReferenceDisparity = 20.0;  // px
-  std::vector<double> slopes;
-  for (const double size : {7.0, 10.0, 14.4, 20.0, 28.0, 40.0})
-    slopes.push_back(size / shape.value(kReferenceDisparity));
-  const std::vector<sdvo::SlopeTrial> trials =
-      sdvo::trySlopes(sequences, options, shape, slopes, {7.0, 10.0, 14.0}, arguments.max_size, arguments.features);
-  sdvo::CsvTable tried({"slope", "min_size", "correct_per_pair"});
-  sdvo::SlopeTrial best = trials.front();
-  for (const sdvo::SlopeTrial& trial : trials) {
-    tried.add(trial.slope, trial.min_size, trial.correct);
-    if (trial.correct > best.correct) best = trial;
+  // Ratios do not tell the curve's factor: how large a neighbourhood is worth describing shows in matching. Neither do
+  // they tell what a shape is worth there, so the simplest one, a fixed circle in the world, competes with the chosen.
+  std::vector<sdvo::ShapeFit> candidates = {shape};
+  if (arguments.model.empty() && shape.model != fits.front().model) candidates.insert(candidates.begin(), fits.front());
+  sdvo::CsvTable tried({"model", "slope", "min_size", "correct_per_pair"});
+  Choice choice;
+  for (const sdvo::ShapeFit& candidate : candidates) {
+    const Choice best = tryShape(sequences, options, candidate, arguments, tried);
+    constexpr double kClearlyBetter = 1.005;  // in correct matches; less is within chance
+    if (best.trial.correct > kClearlyBetter * choice.trial.correct) choice = best;
   }
   std::cout << tried.aligned();
-  writeYaml(arguments.output, shape, best, arguments, samples.size());
-  std::cout << "size = clamp(" << best.slope << " * disparity^" << shape.exponent << " + " << best.slope * shape.offset
-            << ", " << best.min_size << ", " << arguments.max_size << ") px, written to " << arguments.output
-            << std::endl;
+  writeYaml(arguments.output, choice, arguments, samples.size());
+  std::cout << "size = clamp(" << choice.trial.slope << " * disparity^" << choice.shape.exponent << " + "
+            << choice.trial.slope * choice.shape.offset << ", " << choice.trial.min_size << ", " << arguments.max_size
+            << ") px, written to " << arguments.output << std::endl;
 
   if (!arguments.plot.empty()) {
     const std::string csv = std::filesystem::path(arguments.plot).replace_extension(".csv").string();
