@@ -1,17 +1,19 @@
 #include <cv_bridge/cv_bridge.h>
+#include <image_transport/image_transport.h>
 #include <message_filters/subscriber.h>
 #include <message_filters/time_synchronizer.h>
 #include <nodelet/nodelet.h>
+#include <pluginlib/class_list_macros.hpp>
 #include <sensor_msgs/image_encodings.h>
 #include <stereo_descriptor_vo/FeatureFlow.h>
 #include <stereo_descriptor_vo/StereoFeatures.h>
 
 #include <memory>
 #include <mutex>
-#include <pluginlib/class_list_macros.hpp>
 
 #include "conversions.hpp"
 #include "features_image.hpp"
+#include "image_subscriber.hpp"
 #include "report_throttle.hpp"
 
 namespace sdvo {
@@ -24,25 +26,30 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
   using Flow = stereo_descriptor_vo::FeatureFlow;
 
   struct Inputs {
-    explicit Inputs(ros::NodeHandle& nh) : sync(kQueue) {
+    Inputs(ros::NodeHandle& nh, StereoImageTransport& transport) : sync(kQueue) {
       sync.connectInput(left, right, features, flow);
-      left.subscribe(nh, "left/image_rect", kQueue);
-      right.subscribe(nh, "right/image_rect", kQueue);
+      left.subscribe(nh, "left/image_rect", kQueue, transport.left(), transport.hints());
+      right.subscribe(nh, "right/image_rect", kQueue, transport.right(), transport.hints());
       features.subscribe(nh, "stereo_features", kQueue);
       flow.subscribe(nh, "feature_flow", kQueue);
     }
 
     static constexpr int kQueue = 10;
-    message_filters::Subscriber<Image> left, right;
+    ImageSubscriber left, right;
     message_filters::Subscriber<Features> features;
     message_filters::Subscriber<Flow> flow;
     message_filters::TimeSynchronizer<Image, Image, Features, Flow> sync;
   };
 
-  void onInit() override {
-    const ros::SubscriberStatusCallback on_connect = [this](const ros::SingleSubscriberPublisher&) { updateInputs(); };
+  void onInit() override try {
+    transport_ = std::make_unique<StereoImageTransport>(getPrivateNodeHandle());
+    const image_transport::SubscriberStatusCallback on_connect =
+        [this](const image_transport::SingleSubscriberPublisher&) { updateInputs(); };
     const std::lock_guard<std::mutex> lock(connect_mutex_);
-    publisher_ = getNodeHandle().advertise<Image>("features_image", 1, on_connect, on_connect);
+    publisher_ =
+        image_transport::ImageTransport(getNodeHandle()).advertise("features_image", 1, on_connect, on_connect);
+  } catch (const std::exception& e) {
+    NODELET_FATAL_STREAM("not started: " << e.what());
   }
 
   void updateInputs() {
@@ -50,7 +57,7 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
     if (publisher_.getNumSubscribers() == 0) {
       inputs_.reset();
     } else if (!inputs_) {
-      inputs_ = std::make_unique<Inputs>(getNodeHandle());
+      inputs_ = std::make_unique<Inputs>(getNodeHandle(), *transport_);
       inputs_->sync.registerCallback(&FeaturesImageNodelet::draw, this);
     }
   }
@@ -61,12 +68,12 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
     picture.image = drawFeatures(ros_conversions::toGrey(left), ros_conversions::toGrey(right), *features, *flow);
     publisher_.publish(picture.toImageMsg());
   } catch (const std::exception& e) {
-    if (throttle_.allows(e.what()))
-      NODELET_ERROR_STREAM("features_image at " << left->header.stamp << " skipped: " << e.what());
+    if (throttle_.allows(e.what())) NODELET_ERROR_STREAM("features_image at " << left->header.stamp << " skipped: " << e.what());
   }
 
   ReportThrottle throttle_;
-  ros::Publisher publisher_;
+  std::unique_ptr<StereoImageTransport> transport_;
+  image_transport::Publisher publisher_;
   std::mutex connect_mutex_;
   std::unique_ptr<Inputs> inputs_;
 };

@@ -43,6 +43,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     ros::NodeHandle& private_nh = getPrivateNodeHandle();
     for (const std::string& name : loadParams(private_nh, options_))
       NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect");
+    transport_ = std::make_unique<StereoImageTransport>(private_nh);
     extractor_ = std::make_unique<FeatureExtractor>(options_.extractor);
     worker_ = std::make_unique<Worker<StereoPairMessages>>(static_cast<std::size_t>(options_.input.queue_size),
                                                            [this](const StereoPairMessages& pair) { process(pair); });
@@ -69,7 +70,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     if (publisher_.getNumSubscribers() == 0) {
       input_.reset();
     } else if (!input_) {
-      input_ = std::make_unique<StereoInput>(getNodeHandle(), options_.input,
+      input_ = std::make_unique<StereoInput>(getNodeHandle(), *transport_, options_.input,
                                              [this](const StereoPairMessages& pair) { worker_->push(pair); });
     }
   } catch (const std::exception& e) {
@@ -166,6 +167,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
 
   std::mutex connect_mutex_;
   std::unique_ptr<Worker<StereoPairMessages>> worker_;
+  std::unique_ptr<StereoImageTransport> transport_;
   std::unique_ptr<StereoInput> input_;
 };
 

@@ -7,7 +7,8 @@
 
 namespace sdvo {
 
-StereoInput::StereoInput(ros::NodeHandle& nh, const StereoInputOptions& options, Callback callback)
+StereoInput::StereoInput(ros::NodeHandle& nh, StereoImageTransport& transport, const StereoInputOptions& options,
+                         Callback callback)
     : callback_(std::move(callback)), smallest_gap_(std::numeric_limits<double>::infinity()) {
   const std::string topics[kInputs] = {"left/image_rect", "right/image_rect", "left/camera_info", "right/camera_info"};
   for (int input = 0; input < kInputs; ++input) arrivals_[input].topic = nh.resolveName(topics[input]);
@@ -30,8 +31,8 @@ StereoInput::StereoInput(ros::NodeHandle& nh, const StereoInputOptions& options,
     exact_->registerCallback(&StereoInput::onPair, this);
   }
 
-  left_image_.subscribe(nh, topics[0], queue);
-  right_image_.subscribe(nh, topics[1], queue);
+  left_image_.subscribe(nh, topics[0], queue, transport.left(), transport.hints());
+  right_image_.subscribe(nh, topics[1], queue, transport.right(), transport.hints());
   left_info_.subscribe(nh, topics[2], queue);
   right_info_.subscribe(nh, topics[3], queue);
 }

@@ -13,6 +13,7 @@
 #include <mutex>
 #include <string>
 
+#include "image_subscriber.hpp"
 #include "nodelet_options.hpp"
 
 namespace sdvo {
@@ -24,14 +25,14 @@ struct StereoPairMessages {
 };
 
 /// The four synchronised inputs of stereo processing under their usual names: left|right/image_rect and camera_info.
-/// Subscribed from construction to destruction, without image_transport: that loads a plugin for each subscription,
-/// which in a nodelet's thread races with the manager's loading of other nodelets and crashed it at times. Counts what
-/// arrives on each, to tell why no pair comes together.
+/// Subscribed from construction to destruction. Counts what arrives on each, to tell why no pair comes together.
 class StereoInput {
  public:
   using Callback = std::function<void(const StereoPairMessages&)>;
 
-  StereoInput(ros::NodeHandle& nh, const StereoInputOptions& options, Callback callback);
+  /// `transport` must outlive the input.
+  StereoInput(ros::NodeHandle& nh, StereoImageTransport& transport, const StereoInputOptions& options,
+              Callback callback);
 
   /// When no pair came together since the last call: what arrived on each topic and how far apart the stamps were.
   /// Empty when pairs come.
@@ -66,7 +67,7 @@ class StereoInput {
   double smallest_gap_ = 0.0;  ///< s, between the newest left and right image
 
   // Destroyed in reverse order: the synchronisers let go of the subscribers first.
-  message_filters::Subscriber<Image> left_image_, right_image_;
+  ImageSubscriber left_image_, right_image_;
   message_filters::Subscriber<Info> left_info_, right_info_;
   std::unique_ptr<message_filters::Synchronizer<ExactPolicy>> exact_;
   std::unique_ptr<message_filters::Synchronizer<ApproximatePolicy>> approximate_;
