@@ -9,6 +9,9 @@
 
 namespace sdvo::render {
 
+/// Away from the ground in the world frame.
+inline const Eigen::Vector3d kUp(0.0, -1.0, 0.0);
+
 /// Look of one quadrilateral. Texture coordinates are metres along its first (s) and last (t) edge from its corner.
 struct Surface {
   Material material = Material::kFlat;

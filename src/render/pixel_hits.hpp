@@ -25,6 +25,11 @@ struct HitGroup {
   Hit first;
   int count;
   float depth, u, v, x, y;  ///< sums; x, y: place within the pixel
+
+  SampleOffset meanOffset() const {
+    const float mean = 1.0f / static_cast<float>(count);
+    return {x * mean, y * mean};
+  }
 };
 
 /// What the samples of a pixel have met so far.

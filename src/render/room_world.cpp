@@ -9,7 +9,6 @@ namespace sdvo::render {
 
 namespace {
 
-const Eigen::Vector3d kUp(0.0, -1.0, 0.0);
 constexpr double kClearance = 0.75;  // between the path and anything solid, m
 
 }  // namespace

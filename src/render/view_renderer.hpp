@@ -6,21 +6,10 @@
 #include "ray_caster.hpp"
 #include "shader.hpp"
 #include "vehicles.hpp"
+#include "view.hpp"
 #include "world.hpp"
 
 namespace sdvo::render {
-
-/// A pinhole camera somewhere in the world; pixel (0, 0) is the centre of the top-left one.
-struct View {
-  double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;  ///< px
-  int width = 0, height = 0;                      ///< px
-  Eigen::Isometry3d T_world_camera = Eigen::Isometry3d::Identity();
-
-  /// World direction of the ray through a pixel, scaled to depth 1.
-  Eigen::Vector3d direction(double u, double v) const {
-    return T_world_camera.linear() * Eigen::Vector3d((u - cx) / fx, (v - cy) / fy, 1.0);
-  }
-};
 
 /// What is known of the centres of a view's pixels.
 struct Hits {
