@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "opencv_features.hpp"
 #include "stereo_descriptor_vo/brief.hpp"
 #include "stereo_descriptor_vo/freak.hpp"
 
@@ -15,9 +16,6 @@
 #include <opencv2/xfeatures2d.hpp>
 #include <opencv2/xfeatures2d/nonfree.hpp>
 #endif
-
-// SIFT moved from the non-free modules to features2d in 4.4.
-#define SDVO_HAVE_SIFT (CV_VERSION_MAJOR > 4 || (CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR >= 4))
 
 namespace sdvo {
 namespace {

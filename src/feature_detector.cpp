@@ -9,10 +9,8 @@
 #include <stdexcept>
 #include <tuple>
 
+#include "opencv_features.hpp"
 #include "stereo_descriptor_vo/patch_sampling.hpp"
-
-// SIFT moved from the non-free modules to features2d in 4.4.
-#define SDVO_HAVE_SIFT (CV_VERSION_MAJOR > 4 || (CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR >= 4))
 
 namespace sdvo {
 namespace {
