@@ -2,7 +2,7 @@
 """Tells an odometry's errors on KITTI from the ground truth's own: compares both with a third estimate of rotation and
 direction of motion that shares nothing with the odometry. It tracks corners through the left images (Lucas-Kanade) and
 fits the epipolar geometry of each pair of them; no stereo, no descriptors, no map, no calibration. Where it agrees with
-the odometry and both differ from the ground truth, the latter is off."""
+the odometry and both differ from the ground truth, the latter is off. Needs python3-scipy."""
 import argparse
 import pathlib
 
