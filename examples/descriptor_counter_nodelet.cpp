@@ -71,9 +71,9 @@ class DescriptorCounterNodelet : public nodelet::Nodelet {
   /// Of rows of one surface: share of differing bits, or |a - b|^2 / (|a|^2 + |b|^2). Unrelated rows are near 0.5.
   static constexpr double kMaxDistance = 0.3;
 
-  ros::Publisher publisher_;
-  ros::Subscriber subscriber_;
   std::unique_ptr<Set> previous_;
+  ros::Publisher publisher_;
+  ros::Subscriber subscriber_;  // destroyed first: a message may still be arriving
 };
 
 }  // namespace examples

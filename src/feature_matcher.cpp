@@ -9,7 +9,8 @@
 
 // The population count of 64 bits is one instruction on every x86 processor since 2008, but only a function compiled
 // for it may use it; the loader picks the right version.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__)
+// The thread sanitizer is not up yet when the loader picks.
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_THREAD__)
 #define SDVO_POPCOUNT __attribute__((target_clones("popcnt", "default")))
 #else
 #define SDVO_POPCOUNT
