@@ -27,7 +27,9 @@ void CalibrationFilter::note(int newest_id, const RigCalibration& calibration,
                              const RigCalibration::Matrix& information) {
   calibration_ = calibration;
   total_information_ = option_information_ + information_ + information;
-  if (!pending_) pending_ = {newest_id, information, *total_information_ * calibration.value - option_information_mean_ - information_mean_};
+  if (!pending_)
+    pending_ = {newest_id, information,
+                *total_information_ * calibration.value - option_information_mean_ - information_mean_};
 }
 
 RigCalibration::Vector CalibrationFilter::sigma() const {

@@ -60,14 +60,17 @@ void squaredDistances(const std::uint8_t* row, const cv::Mat& others, const std:
 void computeDistances(ElementType type, const std::uint8_t* row, const cv::Mat& others,
                       const std::vector<int>& candidates, std::vector<float>& distances) {
   switch (type) {
-    case ElementType::kBits: return hammingDistances(row, others, candidates, distances);
-    case ElementType::kUint8: return squaredDistances<std::uint8_t>(row, others, candidates, distances);
-    case ElementType::kFloat32: return squaredDistances<float>(row, others, candidates, distances);
+    case ElementType::kBits:
+      return hammingDistances(row, others, candidates, distances);
+    case ElementType::kUint8:
+      return squaredDistances<std::uint8_t>(row, others, candidates, distances);
+    case ElementType::kFloat32:
+      return squaredDistances<float>(row, others, candidates, distances);
   }
 }
 
-/// What turns a distance into a share in [0, 1]: the number of bits, or the sum of both rows' squared lengths (orthogonal
-/// rows of whatever length are at 1 then).
+/// What turns a distance into a share in [0, 1]: the number of bits, or the sum of both rows' squared lengths
+/// (orthogonal rows of whatever length are at 1 then).
 float distanceUnit(ElementType type, const cv::Mat& a, int row_a, const cv::Mat& b, int row_b) {
   if (type == ElementType::kBits) return 8.f * static_cast<float>(a.cols);
   const cv::Mat zeros = cv::Mat::zeros(1, a.cols, CV_8U);
@@ -112,9 +115,7 @@ class PositionGrid {
   int clampedColumn(float u) const {
     return static_cast<int>(std::clamp(u / cell(), 0.f, static_cast<float>(columns_ - 1)));
   }
-  int clampedRow(float v) const {
-    return static_cast<int>(std::clamp(v / cell(), 0.f, static_cast<float>(rows_ - 1)));
-  }
+  int clampedRow(float v) const { return static_cast<int>(std::clamp(v / cell(), 0.f, static_cast<float>(rows_ - 1))); }
 
   float radius_;
   int columns_, rows_;
@@ -122,7 +123,8 @@ class PositionGrid {
 };
 
 void checkComparable(const StereoFeatures& a, const StereoFeatures& b) {
-  if (a.descriptor != b.descriptor || a.element_type != b.element_type || a.layout != b.layout || a.descriptors.cols != b.descriptors.cols)
+  if (a.descriptor != b.descriptor || a.element_type != b.element_type || a.layout != b.layout ||
+      a.descriptors.cols != b.descriptors.cols)
     throw std::invalid_argument("descriptors cannot be compared: " + a.descriptor + " (" + a.layout + ") against " +
                                 b.descriptor + " (" + b.layout + ")");
 }
@@ -169,7 +171,8 @@ std::vector<FeatureMatch> FeatureMatcher::match(const StereoFeatures& reference,
   for (int i = 0; i < reference.count(); ++i) {
     const auto& [j, distance] = of_reference[i];
     if (j < 0 || of_current[j].index != i) continue;
-    const float share = distance / distanceUnit(reference.element_type, reference.descriptors, i, current.descriptors, j);
+    const float share =
+        distance / distanceUnit(reference.element_type, reference.descriptors, i, current.descriptors, j);
     if (share <= options_.max_distance) matches.push_back({i, j, share});
   }
   return matches;

@@ -2,10 +2,10 @@
 
 #include <image_transport/subscriber_plugin.h>
 #include <message_filters/simple_filter.h>
-#include <pluginlib/class_loader.hpp>
 #include <sensor_msgs/Image.h>
 
 #include <memory>
+#include <pluginlib/class_loader.hpp>
 #include <string>
 #include <utility>
 

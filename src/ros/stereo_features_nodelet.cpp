@@ -1,10 +1,10 @@
 #include <nodelet/nodelet.h>
-#include <pluginlib/class_list_macros.hpp>
 
 #include <boost/make_shared.hpp>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <pluginlib/class_list_macros.hpp>
 #include <stdexcept>
 
 #include "conversions.hpp"
@@ -23,7 +23,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
  public:
   ~StereoFeaturesNodelet() override {
     const std::lock_guard<std::mutex> lock(connect_mutex_);
-    input_.reset();  // nothing may arrive any more …
+    input_.reset();   // nothing may arrive any more …
     worker_.reset();  // … when the worker goes
   }
 
@@ -60,7 +60,8 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     // A subscriber may connect before advertise() returns: the mutex makes it wait until publisher_ is there.
     const ros::SubscriberStatusCallback on_connect = [this](const ros::SingleSubscriberPublisher&) { updateInput(); };
     const std::lock_guard<std::mutex> lock(connect_mutex_);
-    publisher_ = nh.advertise<stereo_descriptor_vo::StereoFeatures>("stereo_features", kPublishQueue, on_connect, on_connect);
+    publisher_ =
+        nh.advertise<stereo_descriptor_vo::StereoFeatures>("stereo_features", kPublishQueue, on_connect, on_connect);
   } catch (const std::exception& e) {
     NODELET_FATAL_STREAM("not started: " << e.what());
   }
@@ -103,8 +104,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     const StereoCamera camera = ros_conversions::toStereoCamera(*pair.left_info, *pair.right_info);
     const cv::Mat left = ros_conversions::toGrey(pair.left_image);
     const cv::Mat right = ros_conversions::toGrey(pair.right_image);
-    const StereoFeatures features =
-        extractor_->extract(camera, left, right, static_cast<std::int64_t>(stamp.toNSec()));
+    const StereoFeatures features = extractor_->extract(camera, left, right, static_cast<std::int64_t>(stamp.toNSec()));
     // Only now: a calibration that does not fit the images was refused and is no new stream.
     updateCamera(camera);
 
