@@ -5,7 +5,7 @@
 #include <random>
 #include <vector>
 
-#include "stereo_descriptor_vo/stereo_features.hpp"
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
 
 namespace sdvo {
 

@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "stereo_descriptor_vo/stereo_features.hpp"
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
 
 /// Synthetic images and features whose truth is known analytically; for the tests of the core.
 namespace sdvo::synthetic {

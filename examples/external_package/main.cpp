@@ -1,7 +1,7 @@
 #include <algorithm>
 #include <iostream>
 #include <opencv2/imgproc.hpp>
-#include <stereo_descriptor_vo/feature_extractor.hpp>
+#include <stereo_descriptor_vo/front_end/feature_extractor.hpp>
 
 /// The core in another package: describes a made-up stereo pair, a flat picture 20 px apart in both views.
 int main() {

@@ -5,12 +5,12 @@
 #include <map>
 #include <tuple>
 
-#include "../tools/progress.hpp"
+#include "../common/progress.hpp"
 #include "csv_table.hpp"
 #include "odometry_systems.hpp"
-#include "stereo_descriptor_vo/sample_consensus.hpp"
-#include "stereo_descriptor_vo/trajectory.hpp"
-#include "stereo_descriptor_vo/visual_odometry.hpp"
+#include "stereo_descriptor_vo/data/trajectory.hpp"
+#include "stereo_descriptor_vo/odometry/sample_consensus.hpp"
+#include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
 namespace sdvo {
 namespace {

@@ -5,10 +5,10 @@
 #include <opencv2/core.hpp>
 #include <random>
 
-#include "../tools/progress.hpp"
+#include "../common/progress.hpp"
 #include "csv_table.hpp"
-#include "stereo_descriptor_vo/motion_estimator.hpp"
-#include "stereo_descriptor_vo/se3.hpp"
+#include "stereo_descriptor_vo/common/se3.hpp"
+#include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
 
 namespace sdvo {
 namespace {

@@ -8,7 +8,7 @@
 #include <optional>
 #include <stdexcept>
 
-#include "../tools/progress.hpp"
+#include "../common/progress.hpp"
 #include "keypoint_set.hpp"
 
 namespace sdvo {

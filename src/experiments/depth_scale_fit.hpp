@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "experiment_setup.hpp"
-#include "stereo_descriptor_vo/depth_scale.hpp"
+#include "stereo_descriptor_vo/front_end/depth_scale.hpp"
 
 namespace sdvo {
 

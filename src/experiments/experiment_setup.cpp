@@ -6,9 +6,9 @@
 #include <optional>
 #include <stdexcept>
 
-#include "../tools/progress.hpp"
-#include "stereo_descriptor_vo/feature_extractor.hpp"
-#include "stereo_descriptor_vo/visual_odometry.hpp"
+#include "../common/progress.hpp"
+#include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
+#include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
 namespace sdvo {
 namespace {

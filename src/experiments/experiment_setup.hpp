@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
-#include "../tools/pipeline_options.hpp"
-#include "stereo_descriptor_vo/feature_matcher.hpp"
-#include "stereo_descriptor_vo/kitti_dataset.hpp"
-#include "stereo_descriptor_vo/trajectory.hpp"
+#include "../config/pipeline_options.hpp"
+#include "stereo_descriptor_vo/data/kitti_dataset.hpp"
+#include "stereo_descriptor_vo/data/trajectory.hpp"
+#include "stereo_descriptor_vo/odometry/feature_matcher.hpp"
 
 namespace sdvo {
 

@@ -4,12 +4,12 @@
 #include <string>
 #include <vector>
 
-#include "stereo_descriptor_vo/depth_scale.hpp"
-#include "stereo_descriptor_vo/descriptor.hpp"
-#include "stereo_descriptor_vo/feature_detector.hpp"
-#include "stereo_descriptor_vo/kitti_dataset.hpp"
-#include "stereo_descriptor_vo/stereo_features.hpp"
-#include "stereo_descriptor_vo/stereo_matcher.hpp"
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/data/kitti_dataset.hpp"
+#include "stereo_descriptor_vo/front_end/depth_scale.hpp"
+#include "stereo_descriptor_vo/front_end/feature_detector.hpp"
+#include "stereo_descriptor_vo/front_end/stereo_descriptor.hpp"
+#include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
 
 namespace sdvo {
 

@@ -7,7 +7,7 @@
 #include <tuple>
 #include <utility>
 
-#include "../tools/progress.hpp"
+#include "../common/progress.hpp"
 #include "csv_table.hpp"
 #include "keypoint_set.hpp"
 

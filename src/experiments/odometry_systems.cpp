@@ -1,6 +1,6 @@
 #include "odometry_systems.hpp"
 
-#include "../tools/progress.hpp"
+#include "../common/progress.hpp"
 #include "keypoint_set.hpp"
 
 namespace sdvo {

@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "experiment_setup.hpp"
-#include "stereo_descriptor_vo/motion_estimator.hpp"
-#include "stereo_descriptor_vo/stereo_features.hpp"
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
 
 namespace sdvo {
 

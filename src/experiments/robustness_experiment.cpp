@@ -2,7 +2,7 @@
 
 #include <limits>
 
-#include "../tools/progress.hpp"
+#include "../common/progress.hpp"
 #include "csv_table.hpp"
 #include "odometry_systems.hpp"
 

@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 
-#include "stereo_descriptor_vo/options.hpp"
+#include "stereo_descriptor_vo/common/options.hpp"
 
 namespace sdvo::render {
 

@@ -4,7 +4,7 @@
 #include <string>
 
 #include "camera_effects.hpp"
-#include "stereo_descriptor_vo/stereo_camera.hpp"
+#include "stereo_descriptor_vo/common/stereo_camera.hpp"
 #include "view_renderer.hpp"
 
 namespace sdvo::render {

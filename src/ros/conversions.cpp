@@ -51,9 +51,12 @@ void fillCovariance(const Matrix6d& covariance, Covariance& message) {
 
 const char* toText(ElementType type) {
   switch (type) {
-    case ElementType::kBits: return "bits";
-    case ElementType::kUint8: return "uint8";
-    case ElementType::kFloat32: return "float32";
+    case ElementType::kBits:
+      return "bits";
+    case ElementType::kUint8:
+      return "uint8";
+    case ElementType::kFloat32:
+      return "float32";
   }
   throw std::invalid_argument("unknown element type");
 }
@@ -166,8 +169,12 @@ StereoFeatures fromMessage(const stereo_descriptor_vo::StereoFeatures& message) 
   StereoFeaturesView{message};  // throws unless everything holds together
   StereoFeatures features;
   features.stamp = static_cast<std::int64_t>(message.header.stamp.toNSec());
-  features.camera = {message.fx, message.fy,       message.cx,
-                     message.cy, message.baseline, static_cast<int>(message.image_width),
+  features.camera = {message.fx,
+                     message.fy,
+                     message.cx,
+                     message.cy,
+                     message.baseline,
+                     static_cast<int>(message.image_width),
                      static_cast<int>(message.image_height)};
   features.descriptor = message.descriptor;
   features.layout = message.layout;
@@ -254,7 +261,8 @@ stereo_descriptor_vo::VoInfo toInfo(const OdometryResult& result,
   info.features = static_cast<std::uint32_t>(result.features);
   info.matches = static_cast<std::uint32_t>(result.matches);
   info.inliers = static_cast<std::uint32_t>(result.inliers);
-  info.inlier_ratio = result.matches > 0 ? static_cast<float>(result.inliers) / static_cast<float>(result.matches) : 0.f;
+  info.inlier_ratio =
+      result.matches > 0 ? static_cast<float>(result.inliers) / static_cast<float>(result.matches) : 0.f;
   info.coverage = static_cast<float>(result.coverage);
   info.rms_reprojection_error = static_cast<float>(result.rms);
   info.detect_time = features.detect_time;

@@ -12,9 +12,9 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "stereo_descriptor_vo/depth_scale.hpp"
-#include "stereo_descriptor_vo/stereo_features.hpp"
-#include "stereo_descriptor_vo/visual_odometry.hpp"
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/front_end/depth_scale.hpp"
+#include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
 /// The only place where messages and core types meet.
 namespace sdvo::ros_conversions {
@@ -43,8 +43,9 @@ struct OdometryFrames {
   std::string base = "base_link";
 };
 
-/// Pose of the base in odom, twist in the base frame, both covariances in ROS' conventions (row-major, translation first,
-/// rotation about the fixed axes of the frame). `result` must have a pose. The odom frame is the base's first pose.
+/// Pose of the base in odom, twist in the base frame, both covariances in ROS' conventions (row-major, translation
+/// first, rotation about the fixed axes of the frame). `result` must have a pose. The odom frame is the base's first
+/// pose.
 nav_msgs::Odometry toOdometry(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera,
                               const OdometryFrames& frames);
 

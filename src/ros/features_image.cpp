@@ -53,10 +53,11 @@ cv::Mat drawFeatures(const cv::Mat& left, const cv::Mat& right, const stereo_des
   for (int i = 0; i < view.count(); ++i) {
     const cv::Scalar colour = depthColour(features.disparity[i]);
     drawCircle(left_colour, features.u[i], features.v[i], features.size[i], colour);
-    drawCircle(right_colour, features.u[i] - features.disparity[i], features.v[i] + features.dv[i], features.size[i], colour);
+    drawCircle(right_colour, features.u[i] - features.disparity[i], features.v[i] + features.dv[i], features.size[i],
+               colour);
   }
-  const std::size_t matches = std::min({flow.u.size(), flow.v.size(), flow.u_reference.size(), flow.v_reference.size(),
-                                        flow.inlier.size()});
+  const std::size_t matches =
+      std::min({flow.u.size(), flow.v.size(), flow.u_reference.size(), flow.v_reference.size(), flow.inlier.size()});
   std::size_t inliers = 0;
   for (std::size_t i = 0; i < matches; ++i) {
     inliers += flow.inlier[i] ? 1 : 0;

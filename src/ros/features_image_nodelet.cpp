@@ -3,13 +3,13 @@
 #include <message_filters/subscriber.h>
 #include <message_filters/time_synchronizer.h>
 #include <nodelet/nodelet.h>
-#include <pluginlib/class_list_macros.hpp>
 #include <sensor_msgs/image_encodings.h>
 #include <stereo_descriptor_vo/FeatureFlow.h>
 #include <stereo_descriptor_vo/StereoFeatures.h>
 
 #include <memory>
 #include <mutex>
+#include <pluginlib/class_list_macros.hpp>
 
 #include "conversions.hpp"
 #include "features_image.hpp"
@@ -68,7 +68,8 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
     picture.image = drawFeatures(ros_conversions::toGrey(left), ros_conversions::toGrey(right), *features, *flow);
     publisher_.publish(picture.toImageMsg());
   } catch (const std::exception& e) {
-    if (throttle_.allows(e.what())) NODELET_ERROR_STREAM("features_image at " << left->header.stamp << " skipped: " << e.what());
+    if (throttle_.allows(e.what()))
+      NODELET_ERROR_STREAM("features_image at " << left->header.stamp << " skipped: " << e.what());
   }
 
   ReportThrottle throttle_;

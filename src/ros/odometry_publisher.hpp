@@ -4,8 +4,8 @@
 #include <ros/node_handle.h>
 #include <tf2_ros/transform_broadcaster.h>
 
+#include "../config/nodelet_options.hpp"
 #include "conversions.hpp"
-#include "nodelet_options.hpp"
 
 namespace sdvo {
 

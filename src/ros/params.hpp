@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "stereo_descriptor_vo/options.hpp"
+#include "stereo_descriptor_vo/common/options.hpp"
 
 namespace sdvo {
 

@@ -70,8 +70,9 @@ std::string editMethod(const Option& option) {
   if (option.choices.empty()) return "";
   std::string entries;
   for (const std::string& choice : option.choices)
-    entries += (entries.empty() ? "" : ", ") + ("{'name': '" + choice + "', 'value': '" + choice + "', 'type': 'str', ") +
-               "'description': '', 'srcline': 0, 'srcfile': '', 'ctype': 'std::string', 'cconsttype': 'const char * const'}";
+    entries +=
+        (entries.empty() ? "" : ", ") + ("{'name': '" + choice + "', 'value': '" + choice + "', 'type': 'str', ") +
+        "'description': '', 'srcline': 0, 'srcfile': '', 'ctype': 'std::string', 'cconsttype': 'const char * const'}";
   return "{'enum_description': '', 'enum': [" + entries + "]}";
 }
 

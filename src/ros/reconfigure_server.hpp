@@ -8,7 +8,7 @@
 #include <mutex>
 #include <vector>
 
-#include "stereo_descriptor_vo/options.hpp"
+#include "stereo_descriptor_vo/common/options.hpp"
 
 namespace sdvo {
 
@@ -21,7 +21,8 @@ class ReconfigureServer {
   ReconfigureServer(ros::NodeHandle private_nh, std::vector<Option> options, std::function<void()> on_change);
 
  private:
-  bool onRequest(dynamic_reconfigure::Reconfigure::Request& request, dynamic_reconfigure::Reconfigure::Response& response);
+  bool onRequest(dynamic_reconfigure::Reconfigure::Request& request,
+                 dynamic_reconfigure::Reconfigure::Response& response);
   void set(const std::string& name, const std::string& text);
   dynamic_reconfigure::Config currentConfig() const;
 

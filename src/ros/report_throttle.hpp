@@ -8,8 +8,8 @@
 
 namespace sdvo {
 
-/// Lets a report of one kind through at most once in a period. ROS' own throttle shares its state between all nodelets of
-/// a manager, lets different errors hide each other and goes by simulated time, which may stand still.
+/// Lets a report of one kind through at most once in a period. ROS' own throttle shares its state between all nodelets
+/// of a manager, lets different errors hide each other and goes by simulated time, which may stand still.
 class ReportThrottle {
  public:
   /// Whether to report `kind` now.

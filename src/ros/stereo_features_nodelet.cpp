@@ -7,12 +7,12 @@
 #include <pluginlib/class_list_macros.hpp>
 #include <stdexcept>
 
+#include "../config/nodelet_options.hpp"
 #include "conversions.hpp"
-#include "nodelet_options.hpp"
 #include "params.hpp"
 #include "reconfigure_server.hpp"
 #include "report_throttle.hpp"
-#include "stereo_descriptor_vo/feature_extractor.hpp"
+#include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 #include "stereo_input.hpp"
 #include "worker.hpp"
 

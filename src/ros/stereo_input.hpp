@@ -13,8 +13,8 @@
 #include <mutex>
 #include <string>
 
+#include "../config/nodelet_options.hpp"
 #include "image_subscriber.hpp"
-#include "nodelet_options.hpp"
 
 namespace sdvo {
 

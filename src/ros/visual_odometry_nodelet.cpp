@@ -1,6 +1,5 @@
 #include <diagnostic_updater/diagnostic_updater.h>
 #include <nodelet/nodelet.h>
-#include <pluginlib/class_list_macros.hpp>
 #include <std_srvs/Empty.h>
 #include <tf2_eigen/tf2_eigen.h>
 #include <tf2_ros/buffer.h>
@@ -11,15 +10,16 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <pluginlib/class_list_macros.hpp>
 #include <stdexcept>
 
+#include "../config/nodelet_options.hpp"
 #include "conversions.hpp"
-#include "nodelet_options.hpp"
 #include "odometry_publisher.hpp"
 #include "params.hpp"
 #include "reconfigure_server.hpp"
 #include "report_throttle.hpp"
-#include "stereo_descriptor_vo/visual_odometry.hpp"
+#include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 #include "worker.hpp"
 
 namespace sdvo {
@@ -58,7 +58,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     diagnostics_ = std::make_unique<diagnostic_updater::Updater>(nh, private_nh, getName());
     diagnostics_->setHardwareID("none");
     diagnostics_->add("odometry", this, &VisualOdometryNodelet::diagnose);
-    diagnostics_timer_ = nh.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { diagnostics_->update(); });
+    diagnostics_timer_ =
+        nh.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { diagnostics_->update(); });
     reset_service_ = private_nh.advertiseService("reset", &VisualOdometryNodelet::onReset, this);
 
     reconfigured_ = options_.odometry;
@@ -67,8 +68,9 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
 
     worker_ = std::make_unique<Worker<FeaturesMessagePtr>>(static_cast<std::size_t>(options_.output.queue_size),
                                                            [this](const FeaturesMessagePtr& m) { process(m); });
-    subscriber_ = nh.subscribe<FeaturesMessage>("stereo_features", static_cast<std::uint32_t>(options_.output.queue_size),
-                                                [this](const FeaturesMessagePtr& m) { worker_->push(m); });
+    subscriber_ =
+        nh.subscribe<FeaturesMessage>("stereo_features", static_cast<std::uint32_t>(options_.output.queue_size),
+                                      [this](const FeaturesMessagePtr& m) { worker_->push(m); });
   } catch (const std::exception& e) {
     NODELET_FATAL_STREAM("not started: " << e.what());
   }
@@ -147,12 +149,13 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     stream_epoch_.reset();
   }
 
-  /// The camera's place on the robot, read once. Waits a while at first, because static transforms and the first features
-  /// arrive together; then each message asks again.
+  /// The camera's place on the robot, read once. Waits a while at first, because static transforms and the first
+  /// features arrive together; then each message asks again.
   bool findExtrinsic(const std::string& camera_frame) {
     if (T_base_camera_ && camera_frame == camera_frame_) return true;
     const std::string base_frame = ros_conversions::cleanFrameId(options_.output.base_frame_id);
-    const auto give_up = ros::WallTime::now() + ros::WallDuration(waited_for_extrinsic_ ? 0.0 : options_.output.tf_timeout);
+    const auto give_up =
+        ros::WallTime::now() + ros::WallDuration(waited_for_extrinsic_ ? 0.0 : options_.output.tf_timeout);
     waited_for_extrinsic_ = true;
     std::string problem;
     while (!tf_buffer_.canTransform(base_frame, camera_frame, ros::Time(0), &problem)) {
@@ -176,9 +179,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   /// An optical frame looks along +z; on a robot that is horizontal more often than up or down.
   void warnIfNotOptical() {
     if (T_base_camera_->linear().isIdentity(1e-3))
-      NODELET_WARN_STREAM("camera frame '" << camera_frame_
-                                           << "' has the axes of the base (x forward): an optical frame (z forward, x "
-                                              "right, REP-103) was expected, the odometry will move along the wrong axes");
+      NODELET_WARN_STREAM("camera frame '"
+                          << camera_frame_
+                          << "' has the axes of the base (x forward): an optical frame (z forward, x "
+                             "right, REP-103) was expected, the odometry will move along the wrong axes");
   }
 
   bool onReset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
@@ -189,7 +193,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   /// Under the lock of last_info_.
   void addCalibration(diagnostic_updater::DiagnosticStatusWrapper& status) const {
     if (std::isfinite(last_info_->disparity_offset))
-      status.addf("calibration", "disparities are off by %.2f +- %.2f px in the centre, another %.2f +- %.2f px at 45 degrees",
+      status.addf("calibration",
+                  "disparities are off by %.2f +- %.2f px in the centre, another %.2f +- %.2f px at 45 degrees",
                   last_info_->disparity_offset, last_info_->disparity_offset_sigma, last_info_->disparity_bend,
                   last_info_->disparity_bend_sigma);
     if (std::isfinite(last_info_->right_rotation[0]))
@@ -204,7 +209,9 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
       status.summary(Level::WARN, "no features yet on " + getNodeHandle().resolveName("stereo_features"));
       return;
     }
-    const auto level = last_info_->state == "TRACKING" ? Level::OK : last_info_->state == "LOST" ? Level::ERROR : Level::WARN;
+    const auto level = last_info_->state == "TRACKING" ? Level::OK
+                       : last_info_->state == "LOST"   ? Level::ERROR
+                                                       : Level::WARN;
     status.summary(level, last_info_->state + (last_info_->reason.empty() ? "" : ": " + last_info_->reason));
     status.add("epoch", last_info_->epoch);
     status.add("features", last_info_->features);
@@ -220,7 +227,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     status.add("malformed", last_info_->malformed);
   }
 
-  static constexpr double kClockJump = 1.0;    // s; what is late by less was only overtaken
+  static constexpr double kClockJump = 1.0;  // s; what is late by less was only overtaken
 
   Options options_;
   VisualOdometryOptions reconfigured_;  // the server's

@@ -11,8 +11,8 @@
 
 namespace sdvo {
 
-/// One thread that handles items in order, behind a queue of bounded length: when it is full the oldest item is dropped and
-/// counted, so that latency cannot grow and callbacks never wait. The handler must not throw.
+/// One thread that handles items in order, behind a queue of bounded length: when it is full the oldest item is dropped
+/// and counted, so that latency cannot grow and callbacks never wait. The handler must not throw.
 template <class Item>
 class Worker {
  public:

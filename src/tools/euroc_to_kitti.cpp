@@ -19,11 +19,11 @@
 #include <string>
 #include <vector>
 
-#include "../text_file.hpp"
-#include "progress.hpp"
+#include "../common/progress.hpp"
+#include "../data/text_file.hpp"
 #include "run_tool.hpp"
-#include "stereo_descriptor_vo/kitti_dataset.hpp"
-#include "stereo_descriptor_vo/trajectory.hpp"
+#include "stereo_descriptor_vo/data/kitti_dataset.hpp"
+#include "stereo_descriptor_vo/data/trajectory.hpp"
 
 namespace fs = std::filesystem;
 

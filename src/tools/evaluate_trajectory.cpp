@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "run_tool.hpp"
-#include "stereo_descriptor_vo/trajectory.hpp"
+#include "stereo_descriptor_vo/data/trajectory.hpp"
 
 namespace {
 

@@ -23,10 +23,10 @@
 #include <unsupported/Eigen/MatrixFunctions>
 #include <vector>
 
-#include "progress.hpp"
+#include "../common/progress.hpp"
 #include "run_tool.hpp"
-#include "stereo_descriptor_vo/kitti_dataset.hpp"
-#include "stereo_descriptor_vo/trajectory.hpp"
+#include "stereo_descriptor_vo/data/kitti_dataset.hpp"
+#include "stereo_descriptor_vo/data/trajectory.hpp"
 
 namespace fs = std::filesystem;
 

@@ -13,8 +13,8 @@
 #include <stdexcept>
 
 #include "run_tool.hpp"
-#include "stereo_descriptor_vo/feature_detector.hpp"
-#include "stereo_descriptor_vo/freak.hpp"
+#include "stereo_descriptor_vo/front_end/feature_detector.hpp"
+#include "stereo_descriptor_vo/front_end/freak.hpp"
 
 namespace {
 

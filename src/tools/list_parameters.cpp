@@ -3,7 +3,7 @@
 #include <iostream>
 #include <sstream>
 
-#include "pipeline_options.hpp"
+#include "../config/pipeline_options.hpp"
 #include "run_tool.hpp"
 
 namespace {
@@ -21,8 +21,8 @@ void printTable(const std::string& nodelet, const std::vector<sdvo::Option>& opt
   std::cout << "| parameter | default | unit | range | meaning |\n| --- | --- | --- | --- | --- |\n";
   for (const sdvo::Option& option : options)
     if (option.name.compare(0, prefix.size(), prefix) == 0)
-      std::cout << "| `" << option.name.substr(prefix.size()) << "` | " << option.text() << " | " << option.unit << " | "
-                << rangeOf(option) << " | " << option.meaning << " |\n";
+      std::cout << "| `" << option.name.substr(prefix.size()) << "` | " << option.text() << " | " << option.unit
+                << " | " << rangeOf(option) << " | " << option.meaning << " |\n";
 }
 
 int run() {
@@ -31,9 +31,10 @@ int run() {
   std::vector<sdvo::Option> options = sdvo::listOptions(nodelets);
   for (const sdvo::Option& option : sdvo::listOptions(core)) options.push_back(option);
 
-  std::cout << "# Parameters\n\nPrivate parameters of the two nodelets, made by `rosrun stereo_descriptor_vo "
-               "list_parameters > docs/parameters.md` from the\noption structs, the only place where defaults stand.\n\n"
-               "## stereo_features\n\n";
+  std::cout
+      << "# Parameters\n\nPrivate parameters of the two nodelets, made by `rosrun stereo_descriptor_vo "
+         "list_parameters > docs/parameters.md` from the\noption structs, the only place where defaults stand.\n\n"
+         "## stereo_features\n\n";
   printTable("stereo_features", options);
   std::cout << "\n## visual_odometry\n\n";
   printTable("visual_odometry", options);

@@ -17,11 +17,11 @@
 #include <utility>
 #include <vector>
 
+#include "../common/progress.hpp"
+#include "../data/text_file.hpp"
 #include "../render/drive_renderer.hpp"
-#include "../text_file.hpp"
-#include "progress.hpp"
 #include "run_tool.hpp"
-#include "stereo_descriptor_vo/trajectory.hpp"
+#include "stereo_descriptor_vo/data/trajectory.hpp"
 
 namespace fs = std::filesystem;
 using sdvo::render::DrivePath;

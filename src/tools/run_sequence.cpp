@@ -8,14 +8,14 @@
 #include <opencv2/core/utility.hpp>
 #include <stdexcept>
 
-#include "pipeline_options.hpp"
-#include "progress.hpp"
+#include "../common/progress.hpp"
+#include "../config/pipeline_options.hpp"
 #include "run_tool.hpp"
-#include "stereo_descriptor_vo/feature_extractor.hpp"
-#include "stereo_descriptor_vo/kitti_dataset.hpp"
-#include "stereo_descriptor_vo/stopwatch.hpp"
-#include "stereo_descriptor_vo/trajectory.hpp"
-#include "stereo_descriptor_vo/visual_odometry.hpp"
+#include "stereo_descriptor_vo/common/stopwatch.hpp"
+#include "stereo_descriptor_vo/data/kitti_dataset.hpp"
+#include "stereo_descriptor_vo/data/trajectory.hpp"
+#include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
+#include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
 namespace {
 
@@ -32,7 +32,9 @@ struct Frame {
   double total_time = 0.0;  ///< s
 };
 
-double cpuSeconds() { return static_cast<double>(std::clock()) / CLOCKS_PER_SEC; }
+double cpuSeconds() {
+  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
+}
 
 double quantile(std::vector<double> values, double q) {
   std::sort(values.begin(), values.end());
@@ -107,7 +109,8 @@ int main(int argc, char** argv) {
   Arguments arguments;
   app.add_option("sequence", arguments.sequence, "directory with image_0, image_1, calib.txt, times.txt")->required();
   app.add_option("--config", arguments.config, "YAML file as the nodelets load it");
-  app.add_option("--param", arguments.settings, "option as name=value, for example detector/max_features=800; repeatable")
+  app.add_option("--param", arguments.settings,
+                 "option as name=value, for example detector/max_features=800; repeatable")
       ->allow_extra_args(false);
   app.add_option("--frames", arguments.frames, "process only the first N pairs")->check(CLI::Range(1, 1000000));
   app.add_option("--threads", arguments.threads, "threads of OpenCV")->capture_default_str()->check(CLI::Range(1, 256));

@@ -29,9 +29,7 @@ class StereoFeaturesView {
   /// The left halves alone, count() x elements of one view.
   cv::Mat leftDescriptors() const { return columns(0, viewElements()); }
   /// The right halves alone; empty when the layout is "left".
-  cv::Mat rightDescriptors() const {
-    return hasRightHalf() ? columns(viewElements(), rowElements()) : cv::Mat();
-  }
+  cv::Mat rightDescriptors() const { return hasRightHalf() ? columns(viewElements(), rowElements()) : cv::Mat(); }
 
   /// Position of feature i in the left rectified optical frame, m.
   cv::Point3d point(int i) const {
@@ -80,7 +78,8 @@ class StereoFeaturesView {
     require(message_.response.size(), "response");
     require(message_.sigma.size(), "sigma");
     require(message_.octave.size(), "octave");
-    if (message_.layout != "left" && message_.layout != "left+right") refuse("unknown layout '" + message_.layout + "'");
+    if (message_.layout != "left" && message_.layout != "left+right")
+      refuse("unknown layout '" + message_.layout + "'");
     if (message_.element_type != "bits" && message_.element_type != "uint8" && message_.element_type != "float32")
       refuse("unknown element_type '" + message_.element_type + "'");
     constexpr std::uint32_t kLongestRow = 1u << 16;

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/stereo_camera.hpp"
+
+namespace sdvo {
+
+/// What one row of the descriptor matrix is made of.
+enum class ElementType { kBits, kUint8, kFloat32 };
+
+/// What the image side alone can know of a pair; travels with the features for the sake of whoever receives them.
+struct ExtractionReport {
+  int detected = 0;                       ///< corners in the left image, before stereo matching
+  int stereo_matched = 0;                 ///< of these, found in the right image
+  double mean_intensity[2] = {0.0, 0.0};  ///< left and right, grey levels 0…255
+  double sharpness[2] = {0.0, 0.0};       ///< left and right, mean absolute horizontal gradient, grey levels per px
+  double detect_time = 0.0;               ///< s
+  double stereo_time = 0.0;               ///< s
+  double describe_time = 0.0;             ///< s
+  std::string status;                     ///< empty, or why the pair gave few or no features
+};
+
+/// Features of one rectified stereo pair as parallel arrays: element i of each belongs to row i of `descriptors`.
+/// This is the noun that flows from the image side to the motion side.
+struct StereoFeatures {
+  std::int64_t stamp = 0;  ///< of the left image, ns
+  StereoCamera camera;
+
+  std::string descriptor;  ///< base descriptor: "freak", …
+  std::string layout;      ///< "left" or "left+right" (row = left half, then right half)
+  ElementType element_type = ElementType::kBits;
+
+  std::vector<float> u, v;       ///< left position, px
+  std::vector<float> disparity;  ///< u_left - u_right > 0, px
+  std::vector<float> dv;         ///< v_right - v_left, px: the rig's residual misalignment shows here
+  std::vector<float> size;       ///< diameter of the described neighbourhood's key point, px
+  std::vector<float> angle;      ///< rad in [0, 2 pi), -1 where the descriptor is not oriented
+  std::vector<float> response;   ///< detector's score
+  std::vector<float> sigma;      ///< standard deviation of the position, px
+  std::vector<std::uint8_t> octave;
+  cv::Mat descriptors;  ///< rows x bytes, CV_8U; elements wider than a byte in the machine's own order
+
+  ExtractionReport report;
+
+  int count() const { return static_cast<int>(u.size()); }
+
+  /// (u_left, v_left, u_right) of feature i, px.
+  Eigen::Vector3d measurement(int i) const { return {u[i], v[i], static_cast<double>(u[i]) - disparity[i]}; }
+
+  /// Position of feature i in the left optical frame, m.
+  Eigen::Vector3d point(int i) const { return camera.backProject(u[i], v[i], disparity[i]); }
+
+  /// Throws std::invalid_argument when arrays differ in length, a number is not finite or a disparity not positive.
+  void check() const;
+};
+
+}  // namespace sdvo

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/stereo_camera.hpp"
+
+namespace sdvo {
+
+/// A rectified pair of the same size, CV_8U grey.
+struct ImagePair {
+  cv::Mat left, right;
+};
+
+/// Reads a PNG as CV_8U grey. Throws std::runtime_error that names the file when it is missing, no PNG, truncated or
+/// damaged; cv::imread would return whatever could be decoded of it.
+cv::Mat readGreyPng(const std::string& path);
+
+/// Which cameras of a KITTI car to use.
+enum class KittiCameras {
+  kAny,     ///< grey, or colour where the directory has neither image_0 nor image_1
+  kGrey,    ///< image_0 and image_1, P0 and P1
+  kColour,  ///< image_2 and image_3, P2 and P3; converted to grey
+};
+
+/// One sequence in the layout of the KITTI odometry benchmark: a directory with image_0, image_1 (or image_2, image_3),
+/// calib.txt and times.txt. Every error is a std::runtime_error that names the file and what is wrong with it.
+///
+/// The official poses are those of the left grey camera; the left colour camera sits about 6 cm beside it.
+class KittiSequence {
+ public:
+  /// Checks names and number of the images, the calibration and the stamps, and decodes the first left image for its
+  /// size; the other images are only read by load().
+  explicit KittiSequence(const std::string& directory, KittiCameras cameras = KittiCameras::kAny);
+
+  const std::string& directory() const { return directory_; }
+  const StereoCamera& camera() const { return camera_; }
+  int size() const { return static_cast<int>(stamps_.size()); }
+
+  /// Time of frame i since the start of the sequence's clock, ns; strictly increasing.
+  std::int64_t stamp(int i) const;
+
+  /// Decodes frame i; both images have the size of camera(). May be called from several threads.
+  ImagePair load(int i) const;
+
+ private:
+  void checkIndex(int i) const;
+  std::string imagePath(int side, int i) const;
+
+  std::string directory_;
+  std::string image_directories_[2];  ///< left and right
+  StereoCamera camera_;
+  std::vector<std::int64_t> stamps_;
+};
+
+/// The ground-truth file of a sequence directory, if there is one: poses.txt in it, or ../../poses/NN.txt as in the
+/// official layout (directory sequences/NN).
+std::optional<std::string> findKittiPoses(const std::string& directory);
+
+}  // namespace sdvo

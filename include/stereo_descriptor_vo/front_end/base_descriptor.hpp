@@ -1,0 +1,49 @@
+#pragma once
+
+#include <memory>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+
+namespace sdvo {
+
+/// A key point in one view.
+struct ViewKeypoint {
+  float u, v;   ///< px, sub-pixel
+  float size;   ///< diameter, px
+  float angle;  ///< rad; negative: upright
+};
+
+/// Descriptors of one view: row i belongs to key point i.
+struct ViewDescriptors {
+  cv::Mat rows;                     ///< CV_8U, one row for each key point, zeros where not described
+  std::vector<std::uint8_t> valid;  ///< 0 where the neighbourhood leaves the image
+};
+
+/// A descriptor of one view. Whatever the implementation reads (size, octave, level), a key point of twice the size is
+/// described on a neighbourhood of twice the size, and at 7 px, the size of a FAST corner, it is the published one.
+class BaseDescriptor {
+ public:
+  static constexpr double kStandardSize = 7.0;  ///< px
+
+  virtual ~BaseDescriptor() = default;
+
+  /// `image` is CV_8UC1.
+  virtual ViewDescriptors describe(const cv::Mat& image, const std::vector<ViewKeypoint>& keypoints) const = 0;
+
+  /// Distance in px from its centre within which a key point of `size` px needs the image.
+  virtual double reach(double size) const = 0;
+
+  virtual ElementType elementType() const = 0;
+  virtual int bytes() const = 0;
+};
+
+/// Names that makeBaseDescriptor() knows, also those that the OpenCV at hand lacks.
+const std::vector<std::string>& baseDescriptorNames();
+
+/// Throws std::invalid_argument when the OpenCV at hand lacks the descriptor, saying which build has it.
+std::unique_ptr<BaseDescriptor> makeBaseDescriptor(const std::string& name);
+
+}  // namespace sdvo

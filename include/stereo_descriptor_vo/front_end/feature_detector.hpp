@@ -1,0 +1,56 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+
+namespace sdvo {
+
+struct FeatureDetectorOptions {
+  std::string type = "fast";
+  int max_features = 1100;
+  int bucket_size = 50;
+  int fast_min_threshold = 12;
+  double corner_quality = 0.002;
+  int corner_block_size = 5;
+  bool subpixel = true;
+  int subpixel_radius = 3;
+
+  void describe(OptionList& list) {
+    list.add("type", type, {"fast", "agast", "gftt", "harris", "orb", "sift"}, "corner detector");
+    list.add("max_features", max_features, {1, 20000}, "", "corners kept per left image");
+    list.add("bucket_size", bucket_size, {8, 4096}, "px", "side of the square buckets that share the corners evenly");
+    list.add("fast_min_threshold", fast_min_threshold, {1, 100}, "grey levels",
+             "fast, agast, orb: weakest corner considered; each bucket's own threshold adapts upwards from here");
+    list.add("corner_quality", corner_quality, {1e-6, 1.0}, "", "gftt, harris: weakest response relative to the best");
+    list.add("corner_block_size", corner_block_size, {3, 31}, "px", "gftt, harris: window of the gradient matrix");
+    list.add("subpixel", subpixel, "refine corners to sub-pixel positions");
+    list.add("subpixel_radius", subpixel_radius, {1, 15}, "px", "half side of the sub-pixel window");
+  }
+};
+
+/// A corner in the left image.
+struct Corner {
+  cv::Point2f position;  ///< px, sub-pixel
+  float response;        ///< detector's own score, comparable within one image only
+};
+
+/// Finds corners and spreads them evenly over the image. Stateless: the same image gives the same corners.
+class FeatureDetector {
+ public:
+  explicit FeatureDetector(const FeatureDetectorOptions& options);
+
+  /// Corners of a CV_8U image, at most `max_features`, at least `border` px away from the image's borders.
+  std::vector<Corner> detect(const cv::Mat& image, int border = 0) const;
+
+ private:
+  FeatureDetectorOptions options_;
+};
+
+/// Keeps `max_count` corners such that buckets of a `bucket_size` px grid hold as equal numbers as they can, the
+/// strongest of each first. Ties are broken by position, so the result does not depend on the order of the input.
+std::vector<Corner> spreadOverBuckets(std::vector<Corner> corners, cv::Size image_size, int bucket_size, int max_count);
+
+}  // namespace sdvo

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/front_end/depth_scale.hpp"
+#include "stereo_descriptor_vo/front_end/feature_detector.hpp"
+#include "stereo_descriptor_vo/front_end/stereo_descriptor.hpp"
+#include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
+
+namespace sdvo {
+
+struct FeatureExtractorOptions {
+  FeatureDetectorOptions detector;
+  StereoMatcherOptions stereo;
+  DepthScaleOptions size_curve;
+  DescriptorOptions descriptor;
+
+  void describe(OptionList& list) {
+    list.group("detector", detector);
+    list.group("stereo", stereo);
+    list.group("size_curve", size_curve);
+    list.group("descriptor", descriptor);
+  }
+};
+
+/// From a rectified stereo pair to its depth-scaled stereo descriptors. Stateless: equal input gives equal output.
+class FeatureExtractor {
+ public:
+  /// Throws std::invalid_argument when an option is out of its range.
+  explicit FeatureExtractor(const FeatureExtractorOptions& options);
+
+  /// Images are CV_8U of the camera's size, else std::invalid_argument. A pair in which nothing is found gives an empty
+  /// set whose report says why.
+  StereoFeatures extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
+                         std::int64_t stamp) const;
+
+  const FeatureExtractorOptions& options() const { return options_; }
+
+ private:
+  FeatureExtractorOptions options_;
+  FeatureDetector detector_;
+  StereoMatcher stereo_matcher_;
+  DepthScale depth_scale_;
+  StereoDescriptor descriptor_;
+};
+
+}  // namespace sdvo

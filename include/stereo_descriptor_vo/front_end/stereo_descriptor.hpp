@@ -1,0 +1,56 @@
+#pragma once
+
+#include <memory>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/front_end/base_descriptor.hpp"
+
+namespace sdvo {
+
+struct DescriptorOptions {
+  std::string type = "freak";
+  std::string layout = "left+right";
+  bool oriented = false;
+  bool extend_border = false;
+
+  void describe(OptionList& list);
+};
+
+/// A key point seen in both views, as the stereo descriptor needs it.
+struct StereoKeypoint {
+  float u_left, v_left;    ///< px
+  float u_right, v_right;  ///< px
+  float size;              ///< diameter, the same in both views, px
+};
+
+/// Descriptors of those key points that can be described in both views.
+struct DescribedKeypoints {
+  std::vector<int> index;    ///< into the key points given, ascending; one for each row
+  std::vector<float> angle;  ///< rad in [0, 2 pi), -1 where not oriented; one for each row
+  cv::Mat rows;              ///< row = left half, or left half then right half
+};
+
+/// The stereo descriptor (paper, section 4.2): left half and right half of one feature, both described at the same
+/// depth-derived size. Rows stay aligned because a key point is described in all views or in none.
+class StereoDescriptor {
+ public:
+  explicit StereoDescriptor(const DescriptorOptions& options);
+
+  DescribedKeypoints describe(const cv::Mat& left_image, const cv::Mat& right_image,
+                              const std::vector<StereoKeypoint>& keypoints) const;
+
+  /// Distance in px from its centre within which a key point of `size` px must find the image.
+  double reach(double size) const;
+  ElementType elementType() const { return base_->elementType(); }
+  const DescriptorOptions& options() const { return options_; }
+
+ private:
+  DescriptorOptions options_;
+  std::unique_ptr<BaseDescriptor> base_;
+};
+
+}  // namespace sdvo

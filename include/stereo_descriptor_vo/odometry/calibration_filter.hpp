@@ -1,0 +1,65 @@
+#pragma once
+
+#include <optional>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/odometry/rig_calibration.hpp"
+
+namespace sdvo {
+
+struct CalibrationOptions {
+  bool enabled = true;
+  double prior_offset = 0.0;
+  double prior_bend = 0.0;
+  double prior_sigma = 1.0;
+  double trust = 0.1;
+  double memory = 0.5;
+
+  void describe(OptionList& list) {
+    list.add("enabled", enabled, "estimate the rig's residual disparity error while driving and compensate it");
+    list.add("prior_offset", prior_offset, {-20.0, 20.0}, "px",
+             "that error in the image centre as far as it is known beforehand; held fixed when not enabled");
+    list.add("prior_bend", prior_bend, {-20.0, 20.0}, "px", "the same for its change at 45 degrees from the centre");
+    list.add("prior_sigma", prior_sigma, {1e-4, 10.0}, "px",
+             "standard deviation of what is known beforehand, in the centre and at 45 degrees from it");
+    list.add("trust", trust, {0.01, 1.0}, "",
+             "how far the window's own figure for its precision is believed: 1 / the factor on its standard deviation");
+    list.add("memory", memory, {0.0, 1.0}, "",
+             "share of the earlier windows' information that one more window leaves; 1: forever");
+  }
+};
+
+/// Gathers what successive windows tell of the rig's calibration. Windows overlap: a window's information counts as
+/// prior only for windows that share no pair with it, so that nothing is counted twice.
+class CalibrationFilter {
+ public:
+  explicit CalibrationFilter(const CalibrationOptions& options);
+
+  /// What is known from pairs before the window that begins with pair `oldest_id`.
+  CalibrationBelief prior(int oldest_id);
+
+  /// Notes the result of the window that ends with pair `newest_id`; `information` excludes the prior.
+  void note(int newest_id, const RigCalibration& calibration, const RigCalibration::Matrix& information);
+
+  const RigCalibration& calibration() const { return calibration_; }
+  /// Standard deviations of (offset, bend) in px, NaN before the first window.
+  RigCalibration::Vector sigma() const;
+
+ private:
+  struct Contribution {
+    int newest_id;
+    RigCalibration::Matrix information;
+    RigCalibration::Vector information_mean;  ///< information * mean
+  };
+
+  CalibrationOptions options_;
+  RigCalibration calibration_;
+  RigCalibration::Matrix option_information_;
+  RigCalibration::Vector option_information_mean_;                       ///< information * mean
+  RigCalibration::Matrix information_ = RigCalibration::Matrix::Zero();  ///< of windows before the present one
+  RigCalibration::Vector information_mean_ = RigCalibration::Vector::Zero();
+  std::optional<Contribution> pending_;  ///< the last window that shared no pair with those already counted
+  std::optional<RigCalibration::Matrix> total_information_;
+};
+
+}  // namespace sdvo

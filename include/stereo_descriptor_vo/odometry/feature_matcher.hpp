@@ -1,0 +1,47 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+
+namespace sdvo {
+
+struct FeatureMatcherOptions {
+  bool gating = true;
+  double gate_radius = 60.0;
+  double max_distance = 0.3;
+
+  void describe(OptionList& list) {
+    list.add("gating", gating, "compare only near the position that the predicted motion gives");
+    list.add("gate_radius", gate_radius, {1.0, 2000.0}, "px",
+             "radius of that search around the predicted left position");
+    list.add("max_distance", max_distance, {0.01, 1.0}, "",
+             "largest distance of matched descriptors: share of differing bits, or |a - b|^2 / (|a|^2 + |b|^2)");
+  }
+};
+
+/// A correspondence between two feature sets.
+struct FeatureMatch {
+  int reference;   ///< row in the reference set
+  int current;     ///< row in the current set
+  float distance;  ///< in [0, 1]: share of differing bits, or |a - b|^2 / (|a|^2 + |b|^2)
+};
+
+/// Mutual nearest neighbours between the descriptors of two camera positions.
+class FeatureMatcher {
+ public:
+  explicit FeatureMatcher(const FeatureMatcherOptions& options);
+
+  /// Matches in the order of the reference rows. With a prediction of the motion and gating on, only features near
+  /// their predicted position are compared. Throws std::invalid_argument when the two sets hold different descriptors.
+  std::vector<FeatureMatch> match(const StereoFeatures& reference, const StereoFeatures& current,
+                                  const std::optional<Eigen::Isometry3d>& T_current_reference) const;
+
+ private:
+  FeatureMatcherOptions options_;
+};
+
+}  // namespace sdvo

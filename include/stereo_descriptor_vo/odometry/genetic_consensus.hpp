@@ -1,0 +1,51 @@
+#pragma once
+
+#include <random>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/odometry/pose_problem.hpp"
+
+namespace sdvo {
+
+struct GeneticConsensusOptions {
+  int population = 24;
+  double mutation_rate = 0.1;
+  bool learning = true;
+
+  void describe(OptionList& list) {
+    list.add("population", population, {4, 1000}, "", "gasac: individuals of a generation");
+    list.add("mutation_rate", mutation_rate, {0.0, 1.0}, "", "gasac: share of a child's genes replaced at random");
+    list.add("learning", learning, "adaptive_gasac: learn for each gene how good a replacement it is");
+  }
+};
+
+/// A hypothesis of the search and what it cost.
+struct GeneticResult {
+  bool found = false;
+  Eigen::Isometry3d T_current_reference = Eigen::Isometry3d::Identity();
+  double cost = 0.0;   ///< PoseProblem::truncatedCost
+  int iterations = 0;  ///< minimal samples solved
+};
+
+/// Tells the samples needed once the best pose so far has a share of inliers; see sample_consensus.cpp.
+using NeededIterations = double (*)(double inlier_ratio, double confidence);
+
+/// How long to search.
+struct SearchBudget {
+  int min_iterations, max_iterations;
+  double confidence;
+  NeededIterations needed;
+};
+
+/// Genetic algorithm sample consensus. An individual is a minimal sample, its genes are the correspondences, its
+/// fitness is the consensus of the pose that it gives. With `adaptive` false the rates are fixed (GASAC, Rodehorst and
+/// Hellwich 2006); with `adaptive` true unfit individuals are mutated and the search learns for each gene how good a
+/// replacement it is (as good as the best pose it agrees with), so that mutation moves from exploring at random to
+/// exploiting what was learnt (Shojaedini, Majd, Safabakhsh 2017).
+GeneticResult searchGenetically(const PoseProblem& problem, const GeneticConsensusOptions& options, bool adaptive,
+                                const SearchBudget& budget, std::mt19937& random);
+
+/// Three different indices below `count`, drawn evenly.
+MinimalSample drawSample(std::mt19937& random, int count);
+
+}  // namespace sdvo

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/odometry/motion_refinement.hpp"
+#include "stereo_descriptor_vo/odometry/pose_problem.hpp"
+#include "stereo_descriptor_vo/odometry/sample_consensus.hpp"
+
+namespace sdvo {
+
+struct MotionEstimatorOptions : SampleConsensusOptions, MotionRefinementOptions {
+  int min_inliers = 12;
+
+  void describe(OptionList& list) {
+    SampleConsensusOptions::describe(list);
+    MotionRefinementOptions::describe(list);
+    list.add("min_inliers", min_inliers, {4, 10000}, "", "fewer are no motion");
+  }
+};
+
+struct MotionEstimate {
+  bool success = false;
+  std::string reason;  ///< of a failure
+  Eigen::Isometry3d T_current_reference = Eigen::Isometry3d::Identity();
+  /// Covariance of the left perturbation xi = (translation, rotation) in exp(xi) * T_current_reference, m and rad.
+  Matrix6d covariance = Matrix6d::Zero();
+  std::vector<int> inliers;  ///< indices of the correspondences, ascending
+  double rms = 0.0;          ///< of the inliers' residuals, px per coordinate
+  int iterations = 0;        ///< samples drawn
+};
+
+/// Camera motion from 3-D to stereo correspondences with outliers: P3P sample consensus scored on the stereo
+/// reprojection error, then robust refinement. Stateless: the seed is part of the options.
+class MotionEstimator {
+ public:
+  explicit MotionEstimator(const MotionEstimatorOptions& options);
+
+  MotionEstimate estimate(const StereoCamera& camera, const std::vector<Correspondence>& correspondences) const;
+
+ private:
+  MotionEstimatorOptions options_;
+};
+
+}  // namespace sdvo

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/odometry/pose_problem.hpp"
+
+namespace sdvo {
+
+struct MotionRefinementOptions {
+  std::string kernel = "cauchy";
+  double kernel_scale = 1.0;
+  int refinement_iterations = 20;
+
+  void describe(OptionList& list) {
+    list.add("kernel", kernel, {"cauchy", "huber"}, "robust kernel of the refinement");
+    list.add("kernel_scale", kernel_scale, {0.05, 20.0}, "px", "residual at which the kernel starts to bend");
+    list.add("refinement_iterations", refinement_iterations, {1, 200}, "", "Levenberg-Marquardt steps at most");
+  }
+};
+
+/// The weighted least squares problem around a pose, for the left perturbation xi = (translation, rotation) of it.
+struct NormalEquations {
+  Matrix6d hessian = Matrix6d::Zero();
+  Vector6d gradient = Vector6d::Zero();
+  double cost = 0.0;             ///< sum of kernel costs, px^2
+  double weighted_square = 0.0;  ///< sum of weight * |residual|^2, px^2
+  double weight = 0.0;           ///< sum of weights
+};
+
+/// Minimises the robust stereo reprojection error over (u_left, v_left, u_right) of a subset of the correspondences,
+/// starting at T_current_reference and leaving the result there. Returns the normal equations at the result. Left and
+/// right rows are not mixed: the right view's may be off by more than the noise.
+NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementOptions& options,
+                             const std::vector<Correspondence>& correspondences, const std::vector<int>& subset,
+                             Eigen::Isometry3d& T_current_reference);
+
+}  // namespace sdvo

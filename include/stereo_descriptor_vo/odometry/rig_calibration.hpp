@@ -1,0 +1,35 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "stereo_descriptor_vo/common/stereo_camera.hpp"
+
+namespace sdvo {
+
+/// What is left of a stereo rig's misalignment after rectification, as an error of its disparities that varies smoothly
+/// over the image: measured disparity = true disparity + offset + bend * x^2, x = (u - cx) / fx. An offset is what an
+/// error of the convergence or of a principal point leaves in the centre; its change towards the sides has the shape
+/// that a turn about the vertical axis gives.
+struct RigCalibration {
+  static constexpr int kParameters = 2;
+  using Vector = Eigen::Matrix<double, kParameters, 1>;  ///< (offset, bend), px
+  using RowVector = Eigen::Matrix<double, 1, kParameters>;
+  using Matrix = Eigen::Matrix<double, kParameters, kParameters>;
+
+  Vector value = Vector::Zero();
+
+  /// Derivative of the disparity's error at column u of the left image by the parameters.
+  static RowVector shape(const StereoCamera& camera, double u) {
+    const double x = (u - camera.cx) / camera.fx;
+    return {1.0, x * x};
+  }
+  double disparityError(const StereoCamera& camera, double u) const { return shape(camera, u).dot(value); }
+};
+
+/// A normal distribution over the calibration in information form.
+struct CalibrationBelief {
+  RigCalibration::Vector mean = RigCalibration::Vector::Zero();                     ///< px
+  RigCalibration::Matrix information = 1e-12 * RigCalibration::Matrix::Identity();  ///< 1/px^2
+};
+
+}  // namespace sdvo

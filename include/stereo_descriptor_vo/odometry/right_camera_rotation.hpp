@@ -1,0 +1,31 @@
+#pragma once
+
+#include <Eigen/Core>
+
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+
+namespace sdvo {
+
+/// Rotation of the right camera that rectification left behind, from the vertical disparities of all features: a small
+/// rotation w (rad, about the axes of the left optical frame) moves the right view by
+///   dv = f * (w_x * (1 + y^2) - w_z * x - w_y * x * y),  x and y normalised coordinates in the right image.
+/// It is reported, so that a rig in need of calibration is noticed; the motion is measured with rows of the left view
+/// alone and does not depend on it.
+class RightCameraRotation {
+ public:
+  /// Takes in one pair; old pairs are forgotten slowly.
+  void add(const StereoFeatures& features);
+
+  /// rad; NaN before the first pair with features.
+  Eigen::Vector3d rotation() const;
+  /// Standard deviation, rad; NaN as above.
+  Eigen::Vector3d sigma() const;
+
+ private:
+  Eigen::Matrix3d information_ = Eigen::Matrix3d::Zero();  ///< in units of the residuals, 1/px^2
+  Eigen::Vector3d gradient_ = Eigen::Vector3d::Zero();
+  double square_ = 0.0;  ///< weighted sum of squared residuals, px^2
+  double weight_ = 0.0;
+};
+
+}  // namespace sdvo

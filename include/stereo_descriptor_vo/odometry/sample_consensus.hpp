@@ -1,0 +1,47 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/odometry/genetic_consensus.hpp"
+#include "stereo_descriptor_vo/odometry/pose_problem.hpp"
+
+namespace sdvo {
+
+struct SampleConsensusOptions {
+  std::string consensus = "msac";
+  double inlier_threshold = 3.0;
+  double confidence = 0.999;
+  int min_iterations = 30;
+  int max_iterations = 500;
+  int seed = 1;
+  GeneticConsensusOptions genetic;
+
+  void describe(OptionList& list) {
+    list.add("consensus", consensus, {"ransac", "msac", "lo_ransac", "gasac", "adaptive_gasac"},
+             "outlier rejection; adaptive_gasac is the paper's");
+    list.add("inlier_threshold", inlier_threshold, {0.1, 20.0}, "px",
+             "largest length of the stereo reprojection error (u_left, v_left, u_right) of an inlier");
+    list.add("confidence", confidence, {0.5, 0.999999}, "", "probability that one sample without outliers is drawn");
+    list.add("min_iterations", min_iterations, {1, 100000}, "", "samples drawn at least");
+    list.add("max_iterations", max_iterations, {1, 100000}, "", "samples drawn at most");
+    list.add("seed", seed, {0, 1000000000}, "", "of the random samples; equal seeds give equal results");
+    list.group("genetic", genetic);
+  }
+};
+
+/// The pose that most correspondences agree on.
+struct Consensus {
+  bool found = false;
+  Eigen::Isometry3d T_current_reference = Eigen::Isometry3d::Identity();
+  std::vector<int> inliers;  ///< ascending
+  int iterations = 0;        ///< minimal samples solved
+};
+
+/// Searches by the method named in the options; all of them share solver, scoring and the bound on samples. Not found
+/// when no sample gives a pose.
+Consensus findConsensus(const PoseProblem& problem, const SampleConsensusOptions& options);
+
+}  // namespace sdvo

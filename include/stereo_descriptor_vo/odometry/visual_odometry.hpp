@@ -1,0 +1,172 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/se3.hpp"
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/odometry/calibration_filter.hpp"
+#include "stereo_descriptor_vo/odometry/feature_matcher.hpp"
+#include "stereo_descriptor_vo/odometry/local_map.hpp"
+#include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
+#include "stereo_descriptor_vo/odometry/right_camera_rotation.hpp"
+
+namespace sdvo {
+
+struct TrackingOptions {
+  int max_predicted_pairs = 1;
+  double max_gap = 1.0;
+  double max_speed = 70.0;
+  double max_rotation_rate = 6.3;
+
+  void describe(OptionList& list) {
+    list.add("max_predicted_pairs", max_predicted_pairs, {0, 100}, "",
+             "pairs in a row whose motion may be predicted before the odometry is lost");
+    list.add("max_gap", max_gap, {0.01, 60.0}, "s", "longest time between pairs over which the motion is predicted");
+    list.add("max_speed", max_speed, {0.1, 1000.0}, "m/s", "a faster motion is a wrong one");
+    list.add("max_rotation_rate", max_rotation_rate, {0.1, 100.0}, "rad/s", "a faster rotation is a wrong one");
+  }
+};
+
+struct VisualOdometryOptions {
+  FeatureMatcherOptions matcher;
+  MotionEstimatorOptions motion;
+  LocalMapOptions map;
+  WindowOptimizerOptions window;
+  CalibrationOptions calibration;
+  TrackingOptions tracking;
+
+  void describe(OptionList& list) {
+    list.group("matcher", matcher);
+    list.group("motion", motion);
+    list.group("map", map);
+    list.group("window", window);
+    list.group("calibration", calibration);
+    list.group("tracking", tracking);
+  }
+};
+
+enum class TrackingState { kWaiting, kTracking, kDegraded, kLost };
+
+const char* toString(TrackingState state);
+
+/// Where a matched feature was in the previous pair, as the local map tells, and where it is now.
+struct FeatureFlow {
+  float u_previous, v_previous;  ///< px, left image
+  int current;                   ///< row of the pair's features
+  bool inlier;
+};
+
+/// What one pair did to the odometry. Everything published is derived from this one object.
+struct OdometryResult {
+  TrackingState state = TrackingState::kWaiting;
+  std::string reason;      ///< in words, for every state but plain tracking
+  std::int64_t stamp = 0;  ///< of the left image, ns
+  int epoch = 0;           ///< one more after every discontinuity of the pose
+
+  bool has_pose = false;  ///< false while waiting or lost: nothing may be published then
+  Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();  ///< origin: the first left camera
+  Matrix6d pose_covariance = Matrix6d::Zero();  ///< of a right perturbation: T_origin_camera * exp(xi), m and rad
+
+  bool has_motion = false;  ///< false for the first pair and right after a discontinuity
+  double dt = 0.0;          ///< s since the previous pair
+  Eigen::Isometry3d T_previous_current = Eigen::Isometry3d::Identity();
+  Matrix6d motion_covariance = Matrix6d::Zero();  ///< of a right perturbation of T_previous_current
+
+  int features = 0, matches = 0, inliers = 0;
+  double coverage = 0.0;                       ///< share of an 8x4 grid's cells over the image that hold an inlier
+  double rms = 0.0;                            ///< reprojection error of the inliers, px per coordinate
+  double match_time = 0.0, motion_time = 0.0;  ///< s
+  double distance = 0.0;                       ///< travelled since the start or reset, m
+  int reference_id = 0;   ///< running number of the map's newest pair, to whose view this one was matched
+  int keyframe_id = 0;    ///< running number of the last key frame, this pair included
+  int window_frames = 0;  ///< pairs in the window that was adjusted
+
+  /// Reference pair to this pair; the reference is -1 for a point of the map that only earlier pairs had seen.
+  std::vector<FeatureMatch> inlier_matches;
+  std::vector<FeatureFlow> flow;  ///< of all matches
+
+  /// The rig's residual errors as estimated so far, with standard deviations; NaN until there is an estimate.
+  double disparity_offset = std::numeric_limits<double>::quiet_NaN();        ///< in the image centre, px; compensated
+  double disparity_offset_sigma = std::numeric_limits<double>::quiet_NaN();  ///< px
+  double disparity_bend = std::numeric_limits<double>::quiet_NaN();  ///< its change at 45 degrees, px; compensated
+  double disparity_bend_sigma = std::numeric_limits<double>::quiet_NaN();                                      ///< px
+  Eigen::Vector3d right_rotation = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());        ///< rad
+  Eigen::Vector3d right_rotation_sigma = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());  ///< rad
+};
+
+/// Stereo odometry on stereo features alone: every pair is matched to a local map of the points around the camera,
+/// found among its outliers by sample consensus, and adjusted together with the last key frames.
+class VisualOdometry {
+ public:
+  /// Throws std::invalid_argument when an option is out of its range.
+  explicit VisualOdometry(const VisualOdometryOptions& options);
+
+  /// Processes the next pair. Stamps must increase and the features must pass check(), else std::invalid_argument and
+  /// the state is as before.
+  OdometryResult update(const StereoFeatures& features);
+
+  /// Back to the initial pose and a new epoch; nothing is remembered.
+  void reset();
+
+  /// Tells that the next pair does not continue the last one (another calibration, a restarted source): the odometry
+  /// re-seeds from the last pose under a new epoch.
+  void breakStream();
+
+  /// Takes other options over while running. Those of `map` and `calibration` take effect at the next start or reset.
+  /// Throws std::invalid_argument, and keeps the old ones, when an option is out of its range.
+  void configure(const VisualOdometryOptions& options);
+
+  const VisualOdometryOptions& options() const { return options_; }
+
+ private:
+  OdometryResult seed(OdometryResult result, const StereoFeatures& features);
+  OdometryResult follow(OdometryResult result, const StereoFeatures& features);
+  OdometryResult predict(OdometryResult result);
+  struct Localisation {
+    MotionEstimate motion;  ///< since the map's newest pair
+    LocalMap::View view;
+    std::vector<FeatureMatch> inliers;  ///< rows of the view to rows of the pair
+  };
+  Localisation localise(const StereoFeatures& features, const std::optional<Eigen::Isometry3d>& prior,
+                        OdometryResult& result) const;
+  void extendMap(const StereoFeatures& features, const Localisation& found, OdometryResult& result);
+  void advance(OdometryResult& result, const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance);
+  void noteKeyframe();
+  void reportCalibration(OdometryResult& result) const;
+  std::string implausible(const Eigen::Isometry3d& T_previous_current, double dt) const;
+
+  VisualOdometryOptions options_;
+  FeatureMatcher matcher_;
+  MotionEstimator estimator_;
+
+  // State between pairs; reset() is the assignment of a new one.
+  struct State {
+    explicit State(const CalibrationOptions& options) : calibration(options) {}
+
+    std::optional<LocalMap> map;
+    CalibrationFilter calibration;
+    RightCameraRotation right_rotation;
+    std::optional<std::int64_t> last_stamp;
+    Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
+    Matrix6d pose_covariance = Matrix6d::Zero();
+    Eigen::Isometry3d T_origin_keyframe = Eigen::Isometry3d::Identity();  ///< as reported when it was the newest pair
+    Matrix6d keyframe_covariance = Matrix6d::Zero();                      ///< of that pose
+    Matrix6d covariance_since_keyframe = Matrix6d::Zero();  ///< of the last pose as seen from the last key frame
+    bool previous_is_keyframe = false;
+    LocalMap::Adjustment last_adjustment;
+    int last_oldest_id = 0;            ///< first frame of that adjustment's window
+    std::optional<Vector6d> velocity;  ///< of the camera in its own frame, m/s and rad/s
+    double distance = 0.0;
+    int predicted_pairs = 0;
+    int pairs = 0;
+    bool started = false;
+  } state_;
+  int epoch_ = 0;
+};
+
+}  // namespace sdvo

@@ -1,0 +1,86 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/common/se3.hpp"
+#include "stereo_descriptor_vo/common/stereo_camera.hpp"
+#include "stereo_descriptor_vo/odometry/rig_calibration.hpp"
+
+namespace sdvo {
+
+struct WindowOptimizerOptions {
+  int iterations = 1;
+  double kernel_scale = 2.0;
+  double position_sigma = 0.2;
+  double disparity_sigma = 0.4;
+
+  void describe(OptionList& list) {
+    list.add("iterations", iterations, {1, 100}, "", "Levenberg-Marquardt steps at most, for each pair");
+    list.add("kernel_scale", kernel_scale, {0.1, 20.0}, "sigma",
+             "normalised residual at which the Cauchy kernel bends");
+    list.add("position_sigma", position_sigma, {0.01, 10.0}, "px",
+             "standard deviation of a position in the left image");
+    list.add(
+        "disparity_sigma", disparity_sigma, {0.01, 10.0}, "px",
+        "standard deviation of a disparity: its noise and what the calibration's two terms leave of the rig's error");
+  }
+};
+
+/// A point by its ray and inverse depth in the frame of the camera that saw it first: (x/z, y/z, 1/z). Far points stay
+/// well conditioned in this form. The anchor is a constant, not one of the window's poses.
+struct AnchoredPoint {
+  Eigen::Isometry3d T_origin_anchor = Eigen::Isometry3d::Identity();
+  Eigen::Vector3d ray_and_inverse_depth = Eigen::Vector3d::Zero();  ///< -, -, 1/m
+
+  /// The point in a camera's frame, divided by the point's depth in the anchor: finite even for points at infinity.
+  Eigen::Vector3d scaledPointIn(const Eigen::Isometry3d& T_camera_origin) const {
+    const Eigen::Isometry3d T = T_camera_origin * T_origin_anchor;
+    return T.linear() * Eigen::Vector3d(ray_and_inverse_depth.x(), ray_and_inverse_depth.y(), 1.0) +
+           ray_and_inverse_depth.z() * T.translation();
+  }
+};
+
+/// One sighting of a point. Rows come from the left view alone: the right view of real rigs is vertically off.
+struct WindowObservation {
+  int point;
+  int frame;
+  Eigen::Vector3d measurement;  ///< (u_left, v_left, disparity), px, as measured: the rig's error is not removed
+};
+
+/// Several pairs and the points they share.
+struct Window {
+  StereoCamera camera;
+  std::vector<Eigen::Isometry3d> T_camera_origin;  ///< the first one is held fixed
+  std::vector<AnchoredPoint> points;
+  std::vector<WindowObservation> observations;  ///< sorted by point
+  RigCalibration calibration;
+  CalibrationBelief calibration_prior;
+};
+
+/// What is known after the optimisation, besides the window's new values.
+struct WindowSolution {
+  bool success = false;
+  int iterations = 0;
+  Eigen::MatrixXd pose_covariance;  ///< of the left perturbations of all poses but the first, 6 rows each, m and rad
+  RigCalibration::Matrix calibration_information;  ///< of this window alone, the prior excluded, 1/px^2
+  std::vector<double> residuals;                   ///< normalised length for each observation, sigma
+};
+
+/// Bundle adjustment of a window: poses, points and the rig's calibration, by Levenberg-Marquardt with the points
+/// eliminated first (Schur complement). Deterministic.
+WindowSolution optimizeWindow(const WindowOptimizerOptions& options, Window& window);
+
+/// Derivatives of (u_left, v_left, disparity) of a point by the left perturbation of the pose (6) and by the point (3).
+struct ObservationJacobians {
+  Eigen::Matrix<double, 3, 6> pose;
+  Eigen::Matrix3d point;
+};
+
+/// Predicted (u_left, v_left, disparity) in px without the rig's error; false when the point is not in front of the
+/// camera.
+bool predictObservation(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
+                        const AnchoredPoint& point, Eigen::Vector3d& prediction, ObservationJacobians* jacobians);
+
+}  // namespace sdvo

@@ -1,0 +1,150 @@
+#include "stereo_descriptor_vo/common/options.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <limits>
+#include <locale>
+#include <sstream>
+#include <stdexcept>
+
+namespace sdvo {
+namespace {
+
+std::string toText(double value) {
+  for (int digits = std::numeric_limits<double>::digits10;; ++digits) {
+    std::ostringstream stream;
+    stream.imbue(std::locale::classic());
+    stream.precision(digits);
+    stream << value;
+    if (digits >= std::numeric_limits<double>::max_digits10) return stream.str();
+    std::istringstream back(stream.str());
+    back.imbue(std::locale::classic());
+    double again = 0.0;
+    if (back >> again && again == value) return stream.str();
+  }
+}
+
+std::string join(const std::vector<std::string>& words) {
+  std::string joined;
+  for (const std::string& word : words) joined += (joined.empty() ? "" : ", ") + word;
+  return joined;
+}
+
+template <class Number>
+Number parseNumber(const std::string& name, const std::string& text) {
+  std::istringstream stream(text);
+  stream.imbue(std::locale::classic());
+  Number number{};
+  if (!(stream >> number) || !(stream >> std::ws).eof())
+    throw std::invalid_argument(name + " = '" + text + "' is not a number of its type");
+  return number;
+}
+
+bool parseBool(const std::string& name, const std::string& text) {
+  if (text == "true" || text == "1") return true;
+  if (text == "false" || text == "0") return false;
+  throw std::invalid_argument(name + " = '" + text + "' is neither true nor false");
+}
+
+}  // namespace
+
+std::string Option::text() const {
+  if (const auto* b = std::get_if<bool*>(&value)) return **b ? "true" : "false";
+  if (const auto* i = std::get_if<int*>(&value)) return std::to_string(**i);
+  if (const auto* d = std::get_if<double*>(&value)) return toText(**d);
+  return *std::get<std::string*>(value);
+}
+
+void Option::set(const std::string& text) {
+  if (auto* b = std::get_if<bool*>(&value))
+    **b = parseBool(name, text);
+  else if (auto* i = std::get_if<int*>(&value))
+    **i = parseNumber<int>(name, text);
+  else if (auto* d = std::get_if<double*>(&value))
+    **d = parseNumber<double>(name, text);
+  else
+    *std::get<std::string*>(value) = text;
+}
+
+void Option::check() const {
+  if (const auto* s = std::get_if<std::string*>(&value)) {
+    if (!choices.empty() && std::find(choices.begin(), choices.end(), **s) == choices.end())
+      throw std::invalid_argument(name + " = '" + **s + "' is none of: " + join(choices));
+    return;
+  }
+  if (std::holds_alternative<bool*>(value)) return;
+  const auto* i = std::get_if<int*>(&value);
+  const double number = i ? **i : *std::get<double*>(value);
+  if (!(number >= range.min && number <= range.max))
+    throw std::invalid_argument(name + " = " + text() + " is outside [" + toText(range.min) + ", " + toText(range.max) +
+                                "]" + (unit.empty() ? "" : " " + unit));
+}
+
+bool Option::clamp() {
+  if (auto* i = std::get_if<int*>(&value)) {
+    const int clamped = static_cast<int>(std::clamp<double>(**i, range.min, range.max));
+    return std::exchange(**i, clamped) != clamped;
+  }
+  if (auto* d = std::get_if<double*>(&value)) {
+    const double clamped = std::isnan(**d) ? range.min : std::clamp(**d, range.min, range.max);
+    return std::exchange(**d, clamped) != clamped;
+  }
+  return false;
+}
+
+void OptionList::add(const std::string& name, bool& value, const std::string& meaning) {
+  options_.push_back({prefix_ + name, &value, {}, {}, "", meaning});
+}
+
+void OptionList::add(const std::string& name, int& value, Range range, const std::string& unit,
+                     const std::string& meaning) {
+  options_.push_back({prefix_ + name, &value, range, {}, unit, meaning});
+}
+
+void OptionList::add(const std::string& name, double& value, Range range, const std::string& unit,
+                     const std::string& meaning) {
+  options_.push_back({prefix_ + name, &value, range, {}, unit, meaning});
+}
+
+void OptionList::add(const std::string& name, std::string& value, std::vector<std::string> choices,
+                     const std::string& meaning) {
+  options_.push_back({prefix_ + name, &value, {}, std::move(choices), "", meaning});
+}
+
+void setOption(std::vector<Option>& options, const std::string& name, const std::string& text) {
+  const std::string suffix = "/" + name;
+  const auto matches = [&](const Option& option) {
+    const std::string& path = option.name;
+    return path == name ||
+           (path.size() > suffix.size() && path.compare(path.size() - suffix.size(), suffix.size(), suffix) == 0);
+  };
+  const auto found = std::find_if(options.begin(), options.end(), matches);
+  if (found == options.end()) throw std::invalid_argument("there is no option '" + name + "'");
+  if (std::find_if(found + 1, options.end(), matches) != options.end())
+    throw std::invalid_argument("option '" + name + "' is ambiguous, give its full path such as " + found->name);
+  const std::string before = found->text();
+  try {
+    found->set(text);
+    found->check();
+  } catch (const std::invalid_argument&) {
+    found->set(before);
+    throw;
+  }
+}
+
+std::string hashOptions(const std::vector<Option>& options) {
+  std::uint64_t hash = 14695981039346656037ull;
+  for (const Option& option : options) {
+    for (const char c : option.name + "=" + option.text() + "\n") {
+      hash ^= static_cast<unsigned char>(c);
+      hash *= 1099511628211ull;
+    }
+  }
+  char hex[17];
+  std::snprintf(hex, sizeof hex, "%016llx", static_cast<unsigned long long>(hash));
+  return hex;
+}
+
+}  // namespace sdvo

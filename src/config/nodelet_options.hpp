@@ -1,0 +1,45 @@
+#pragma once
+
+#include <string>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+
+namespace sdvo {
+
+/// What the image side's nodelet needs beside the extractor's options.
+struct StereoInputOptions {
+  bool approximate_sync = false;
+  double max_interval = 0.01;
+  int queue_size = 5;
+
+  void describe(OptionList& list) {
+    list.add("approximate_sync", approximate_sync, "pair images whose stamps differ; false: equal stamps only");
+    list.add("max_interval", max_interval, {1e-4, 1.0}, "s",
+             "approximate_sync: largest difference of stamps in a pair");
+    list.add("queue_size", queue_size, {1, 1000}, "", "messages kept per input; the newest win");
+  }
+};
+
+/// What the odometry's nodelet needs beside the odometry's options.
+struct OdometryOutputOptions {
+  std::string odom_frame_id = "odom";
+  std::string base_frame_id = "base_link";
+  bool publish_tf = true;
+  bool invert_tf = false;
+  double tf_timeout = 2.0;
+  int queue_size = 10;
+  int max_path_length = 20000;
+
+  void describe(OptionList& list) {
+    list.add("odom_frame_id", odom_frame_id, {}, "world-fixed frame of the odometry");
+    list.add("base_frame_id", base_frame_id, {}, "the robot's frame, whose pose is published");
+    list.add("publish_tf", publish_tf, "publish odom -> base on /tf");
+    list.add("invert_tf", invert_tf, "publish base -> odom instead, where base already has a parent");
+    list.add("tf_timeout", tf_timeout, {0.0, 60.0}, "s",
+             "wall time to wait for the transform base <- camera at the start");
+    list.add("queue_size", queue_size, {1, 1000}, "", "feature messages kept; the newest win");
+    list.add("max_path_length", max_path_length, {1, 10000000}, "", "poses kept in the path; the newest win");
+  }
+};
+
+}  // namespace sdvo

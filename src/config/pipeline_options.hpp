@@ -1,0 +1,38 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "nodelet_options.hpp"
+#include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
+#include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
+
+namespace sdvo {
+
+/// The options of both nodelets under the nodelets' names, so that one YAML file serves the launch files and the tools.
+struct PipelineOptions {
+  FeatureExtractorOptions stereo_features;
+  VisualOdometryOptions visual_odometry;
+
+  void describe(OptionList& list) {
+    list.group("stereo_features", stereo_features);
+    list.group("visual_odometry", visual_odometry);
+  }
+};
+
+/// What the nodelets read beside the core's options; a YAML file that holds them is no error for the tools.
+struct NodeletOptions {
+  StereoInputOptions stereo_features;
+  OdometryOutputOptions visual_odometry;
+
+  void describe(OptionList& list) {
+    list.group("stereo_features", stereo_features);
+    list.group("visual_odometry", visual_odometry);
+  }
+};
+
+/// Options from a YAML file (empty name: none) and from "name=value" settings, which win. Throws std::runtime_error
+/// that names the file or the setting when an option is unknown or out of its range.
+PipelineOptions readPipelineOptions(const std::string& yaml_file, const std::vector<std::string>& settings);
+
+}  // namespace sdvo

@@ -1,0 +1,251 @@
+#include "stereo_descriptor_vo/data/kitti_dataset.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+
+#include "text_file.hpp"
+
+namespace fs = std::filesystem;
+
+namespace sdvo {
+namespace {
+
+std::string frameName(int i) {
+  char name[32];
+  std::snprintf(name, sizeof name, "%06d.png", i);
+  return name;
+}
+
+std::string sizeText(const cv::Mat& image) {
+  return std::to_string(image.cols) + "x" + std::to_string(image.rows);
+}
+
+/// Walks the chunks of a PNG; false when the file ends before its IEND chunk does.
+bool isCompletePng(const std::vector<unsigned char>& bytes) {
+  std::size_t at = 8;  // behind the signature
+  while (at + 12 <= bytes.size()) {
+    const std::size_t length = (std::size_t{bytes[at]} << 24) | (std::size_t{bytes[at + 1]} << 16) |
+                               (std::size_t{bytes[at + 2]} << 8) | std::size_t{bytes[at + 3]};
+    const std::string type(bytes.begin() + static_cast<std::ptrdiff_t>(at) + 4,
+                           bytes.begin() + static_cast<std::ptrdiff_t>(at) + 8);
+    if (length > bytes.size() - at - 12) return false;
+    if (type == "IEND") return true;
+    at += 12 + length;
+  }
+  return false;
+}
+
+/// Names of the PNG files in a directory, sorted. Names that begin with a dot are some file manager's, not images.
+std::vector<std::string> listPngs(const std::string& directory) {
+  std::vector<std::string> names;
+  for (const fs::directory_entry& entry : fs::directory_iterator(directory)) {
+    const std::string name = entry.path().filename().string();
+    if (entry.path().extension() == ".png" && name.front() != '.') names.push_back(name);
+  }
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+/// Number of frames; throws when the files are not 000000.png, 000001.png … on both sides.
+int countFrames(const std::string& left_directory, const std::string& right_directory) {
+  const std::vector<std::string> left = listPngs(left_directory);
+  const std::vector<std::string> right = listPngs(right_directory);
+  if (left.empty()) throw std::runtime_error("directory '" + left_directory + "' has no PNG images");
+  const auto requireNumbered = [&](const std::vector<std::string>& names, const std::string& directory) {
+    for (std::size_t i = 0; i < std::max(left.size(), right.size()); ++i) {
+      const std::string expected = frameName(static_cast<int>(i));
+      if (i < names.size() && names[i] == expected) continue;
+      throw std::runtime_error("image '" + directory + "/" + expected + "' is missing ('" + left_directory + "' has " +
+                               std::to_string(left.size()) + " images, '" + right_directory + "' has " +
+                               std::to_string(right.size()) + "; frames are numbered from 000000.png)");
+    }
+  };
+  requireNumbered(left, left_directory);
+  requireNumbered(right, right_directory);
+  return static_cast<int>(left.size());
+}
+
+/// A 3x4 projection matrix, row-major.
+using Projection = std::vector<double>;
+
+Projection readProjection(const std::string& path, const std::string& name) {
+  std::ifstream file = openTextFile(path);
+  int number = 0;
+  for (std::string line; std::getline(file, line);) {
+    ++number;
+    const std::vector<std::string> words = splitWords(line);
+    if (words.empty() || words.front() != name + ":") continue;
+    try {
+      Projection projection;
+      for (std::size_t i = 1; i < words.size(); ++i) projection.push_back(parseNumber(words[i]));
+      if (projection.size() == 12) return projection;
+      throw std::invalid_argument("expected 12 numbers after '" + name + ":', found " +
+                                  std::to_string(projection.size()));
+    } catch (const std::invalid_argument& e) {
+      throw std::runtime_error(placeInFile(path, number) + ": " + e.what());
+    }
+  }
+  throw std::runtime_error("file '" + path + "' has no line '" + name + ":'");
+}
+
+std::string projectionText(const std::string& name, const Projection& p) {
+  return name + " has fx = " + std::to_string(p[0]) + ", Tx = " + std::to_string(p[3]);
+}
+
+/// Camera without image size. The baseline is the difference of both offsets: a colour pair's left one is not zero.
+StereoCamera cameraFromProjections(const std::string& path, const std::string& left_name,
+                                   const std::string& right_name) {
+  const Projection left = readProjection(path, left_name);
+  const Projection right = readProjection(path, right_name);
+  if (!(left[0] > 0.0 && left[5] > 0.0)) {
+    throw std::runtime_error("file '" + path + "': the focal lengths of " + left_name + " must be positive");
+  }
+  for (const int i : {0, 1, 2, 4, 5, 6, 8, 9, 10}) {
+    const bool must_vanish = i == 1 || i == 4 || i == 8 || i == 9;
+    if (std::abs(left[i] - right[i]) > 1e-6 * left[0] || (must_vanish && left[i] != 0.0)) {
+      throw std::runtime_error("file '" + path + "': " + left_name + " and " + right_name +
+                               " do not belong to a rectified pair (equal pinhole cameras side by side)");
+    }
+  }
+  StereoCamera camera;
+  camera.fx = left[0];
+  camera.fy = left[5];
+  camera.cx = left[2];
+  camera.cy = left[6];
+  camera.baseline = (left[3] - right[3]) / left[0];
+  if (!(camera.baseline > 0.0)) {
+    throw std::runtime_error("file '" + path + "': the baseline (difference of Tx / fx) is " +
+                             std::to_string(camera.baseline) + " m but must be positive; " +
+                             projectionText(left_name, left) + "; " + projectionText(right_name, right) +
+                             " (are left and right swapped?)");
+  }
+  return camera;
+}
+
+std::vector<std::int64_t> readStamps(const std::string& path, int count) {
+  std::ifstream file = openTextFile(path);
+  std::vector<std::int64_t> stamps;
+  int number = 0;
+  for (std::string line; static_cast<int>(stamps.size()) < count && std::getline(file, line);) {
+    ++number;
+    const std::vector<std::string> words = splitWords(line);
+    try {
+      if (words.size() != 1) throw std::invalid_argument("expected one time in seconds");
+      const std::int64_t stamp = parseSeconds(words.front());
+      if (!stamps.empty() && stamp <= stamps.back()) {
+        throw std::invalid_argument("time " + words.front() + " s is not later than the one before");
+      }
+      stamps.push_back(stamp);
+    } catch (const std::invalid_argument& e) {
+      throw std::runtime_error(placeInFile(path, number) + ": " + e.what());
+    }
+  }
+  if (static_cast<int>(stamps.size()) < count) {
+    throw std::runtime_error("file '" + path + "' has " + std::to_string(stamps.size()) + " times for " +
+                             std::to_string(count) + " images");
+  }
+  return stamps;
+}
+
+}  // namespace
+
+cv::Mat readGreyPng(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  if (!file || fs::is_directory(path)) throw std::runtime_error("cannot read image '" + path + "'");
+  const std::vector<unsigned char> bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  const std::string signature = "\x89PNG\r\n\x1a\n";
+  if (bytes.size() < signature.size() ||
+      !std::equal(signature.begin(), signature.end(), bytes.begin(),
+                  [](char a, unsigned char b) { return static_cast<unsigned char>(a) == b; })) {
+    throw std::runtime_error("image '" + path + "' is not a PNG file");
+  }
+  if (!isCompletePng(bytes)) throw std::runtime_error("image '" + path + "' is truncated: copy it again");
+  cv::Mat image;
+  try {
+    image = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE);
+  } catch (const cv::Exception&) {
+    image.release();
+  }
+  if (image.empty()) throw std::runtime_error("image '" + path + "' is damaged and cannot be decoded: copy it again");
+  return image;
+}
+
+KittiSequence::KittiSequence(const std::string& directory, KittiCameras cameras) : directory_(directory) {
+  if (!fs::is_directory(directory)) {
+    throw std::runtime_error("sequence directory '" + directory + "' does not exist or is not a directory");
+  }
+  const auto has = [&](const std::string& name) { return fs::is_directory(fs::path(directory) / name); };
+  if (cameras == KittiCameras::kAny) {
+    const bool grey = has("image_0") || has("image_1");
+    if (!grey && !has("image_2") && !has("image_3")) {
+      throw std::runtime_error("sequence directory '" + directory +
+                               "' has neither image_0 and image_1 nor image_2 and image_3");
+    }
+    cameras = grey ? KittiCameras::kGrey : KittiCameras::kColour;
+  }
+  const int first = cameras == KittiCameras::kGrey ? 0 : 2;
+  for (int side = 0; side < 2; ++side) {
+    const std::string name = "image_" + std::to_string(first + side);
+    if (!has(name)) throw std::runtime_error("sequence directory '" + directory + "' has no " + name);
+    image_directories_[side] = (fs::path(directory) / name).string();
+  }
+  const int count = countFrames(image_directories_[0], image_directories_[1]);
+  camera_ = cameraFromProjections((fs::path(directory) / "calib.txt").string(), "P" + std::to_string(first),
+                                  "P" + std::to_string(first + 1));
+  stamps_ = readStamps((fs::path(directory) / "times.txt").string(), count);
+
+  const cv::Mat image = readGreyPng(imagePath(0, 0));
+  camera_.width = image.cols;
+  camera_.height = image.rows;
+}
+
+std::int64_t KittiSequence::stamp(int i) const {
+  checkIndex(i);
+  return stamps_[static_cast<std::size_t>(i)];
+}
+
+ImagePair KittiSequence::load(int i) const {
+  checkIndex(i);
+  ImagePair pair{readGreyPng(imagePath(0, i)), readGreyPng(imagePath(1, i))};
+  if (pair.left.size() != pair.right.size()) {
+    throw std::runtime_error("images '" + imagePath(0, i) + "' (" + sizeText(pair.left) + ") and '" + imagePath(1, i) +
+                             "' (" + sizeText(pair.right) + ") differ in size");
+  }
+  if (pair.left.cols != camera_.width || pair.left.rows != camera_.height) {
+    throw std::runtime_error("image '" + imagePath(0, i) + "' is " + sizeText(pair.left) + " but the first one of '" +
+                             directory_ + "' is " + std::to_string(camera_.width) + "x" +
+                             std::to_string(camera_.height));
+  }
+  return pair;
+}
+
+void KittiSequence::checkIndex(int i) const {
+  if (i < 0 || i >= size()) {
+    throw std::runtime_error("frame " + std::to_string(i) + " is outside of sequence '" + directory_ + "', which has " +
+                             std::to_string(size()) + " frames");
+  }
+}
+
+std::string KittiSequence::imagePath(int side, int i) const {
+  return (fs::path(image_directories_[side]) / frameName(i)).string();
+}
+
+std::optional<std::string> findKittiPoses(const std::string& directory) {
+  // The absolute path resolves "." and a trailing slash, either of which would hide the sequence's name.
+  fs::path sequence = fs::absolute(directory).lexically_normal();
+  if (sequence.filename().empty()) sequence = sequence.parent_path();
+  const fs::path official =
+      sequence.parent_path().parent_path() / "poses" / fs::path(sequence.filename().string() + ".txt");
+  for (const fs::path& candidate : {sequence / "poses.txt", official}) {
+    if (fs::is_regular_file(candidate)) return candidate.string();
+  }
+  return std::nullopt;
+}
+
+}  // namespace sdvo

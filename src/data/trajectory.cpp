@@ -1,0 +1,293 @@
+#include "stereo_descriptor_vo/data/trajectory.hpp"
+
+#include <Eigen/SVD>
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+#include <iomanip>
+#include <limits>
+#include <locale>
+#include <stdexcept>
+
+#include "text_file.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr double kDegreesPerRadian = 180.0 / M_PI;
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+
+/// Frames that close a sub-path to within rounding count as having reached its length.
+constexpr double kLengthTolerance = 1e-9;  // m
+
+/// Steps shorter than this say nothing about scale: the robot stands.
+constexpr double kSmallestStep = 1e-3;  // m
+
+/// Tolerance on rows of rotations and quaternions in files, which may have been written with four decimals.
+constexpr double kRotationTolerance = 1e-3;
+
+double rotationAngle(const Eigen::Matrix3d& rotation) {
+  // The quaternion keeps full precision for small angles, where the devkit's acos of the trace loses half of the
+  // digits.
+  return Eigen::Quaterniond(rotation).angularDistance(Eigen::Quaterniond::Identity());
+}
+
+/// Error of the motion between two frames, in the frame of the true later pose.
+Eigen::Isometry3d motionError(const Trajectory& ground_truth, const Trajectory& estimate, std::size_t first,
+                              std::size_t last) {
+  const Eigen::Isometry3d true_motion = ground_truth[first].inverse() * ground_truth[last];
+  const Eigen::Isometry3d estimated_motion = estimate[first].inverse() * estimate[last];
+  return true_motion.inverse() * estimated_motion;
+}
+
+void checkComparable(const Trajectory& ground_truth, const Trajectory& estimate) {
+  if (estimate.empty()) throw std::invalid_argument("the estimated trajectory has no poses");
+  if (estimate.size() > ground_truth.size()) {
+    throw std::invalid_argument("the estimated trajectory has " + std::to_string(estimate.size()) +
+                                " poses, more than the " + std::to_string(ground_truth.size()) +
+                                " of the ground truth: do they belong to the same sequence?");
+  }
+}
+
+/// The ground truth of the frames that the estimate covers.
+Trajectory covered(const Trajectory& ground_truth, const Trajectory& estimate) {
+  checkComparable(ground_truth, estimate);
+  return {ground_truth.begin(), ground_truth.begin() + static_cast<std::ptrdiff_t>(estimate.size())};
+}
+
+Eigen::Matrix3Xd positions(const Trajectory& poses) {
+  Eigen::Matrix3Xd result(3, poses.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) result.col(static_cast<Eigen::Index>(i)) = poses[i].translation();
+  return result;
+}
+
+double rootMeanSquareDistance(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd& b) {
+  return std::sqrt((a - b).squaredNorm() / static_cast<double>(a.cols()));
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) return kNaN;
+  std::sort(values.begin(), values.end());
+  const std::size_t middle = values.size() / 2;
+  return values.size() % 2 == 1 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
+}
+
+double scaleOfSteps(const Trajectory& ground_truth, const Trajectory& estimate) {
+  std::vector<double> ratios;
+  for (std::size_t i = 1; i < estimate.size(); ++i) {
+    const double true_step = (ground_truth[i].translation() - ground_truth[i - 1].translation()).norm();
+    if (true_step < kSmallestStep) continue;
+    ratios.push_back((estimate[i].translation() - estimate[i - 1].translation()).norm() / true_step);
+  }
+  return median(ratios);
+}
+
+std::ofstream openForWriting(const std::string& path) {
+  std::ofstream file(path);
+  if (!file)
+    throw std::runtime_error("cannot write file '" + path + "': does its directory exist and may I write there?");
+  file.imbue(std::locale::classic());
+  return file;
+}
+
+void finishWriting(std::ofstream& file, const std::string& path) {
+  file.close();
+  if (!file) throw std::runtime_error("cannot write file '" + path + "' to its end: is the disk full?");
+}
+
+std::vector<double> parseNumbers(const std::vector<std::string>& words, std::size_t first = 0) {
+  std::vector<double> numbers;
+  for (std::size_t i = first; i < words.size(); ++i) numbers.push_back(parseNumber(words[i]));
+  return numbers;
+}
+
+/// Calls `read_line(words)` for every line that is not a comment; its std::invalid_argument gets file and line.
+template <class ReadLine>
+void readPoseLines(const std::string& path, std::size_t words_per_line, const ReadLine& read_line) {
+  std::ifstream file = openTextFile(path);
+  int number = 0;
+  int blank_line = 0;
+  int poses = 0;
+  for (std::string line; std::getline(file, line);) {
+    ++number;
+    const std::vector<std::string> words = splitWords(line);
+    if (!words.empty() && words.front().front() == '#') continue;
+    if (words.empty()) {
+      if (blank_line == 0) blank_line = number;
+      continue;
+    }
+    if (blank_line > 0) throw std::runtime_error(placeInFile(path, blank_line) + ": a blank line among the poses");
+    try {
+      if (words.size() != words_per_line) {
+        throw std::invalid_argument("expected " + std::to_string(words_per_line) + " numbers, found " +
+                                    std::to_string(words.size()));
+      }
+      read_line(words);
+    } catch (const std::invalid_argument& e) {
+      throw std::runtime_error(placeInFile(path, number) + ": " + e.what());
+    }
+    ++poses;
+  }
+  if (file.bad()) throw std::runtime_error("cannot read file '" + path + "' to its end");
+  if (poses == 0) throw std::runtime_error("file '" + path + "' contains no poses");
+}
+
+}  // namespace
+
+Eigen::Isometry3d poseFromRows(const std::array<double, 12>& rows) {
+  const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> matrix =
+      Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(rows.data());
+  if (!matrix.allFinite()) throw std::invalid_argument("the pose is not finite");
+  const Eigen::Matrix3d written = matrix.leftCols<3>();
+  const double deviation = (written * written.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (deviation > kRotationTolerance || written.determinant() < 0.0) {
+    throw std::invalid_argument("the left 3x3 part of the pose is not a rotation");
+  }
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(written, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  pose.linear() = svd.matrixU() * svd.matrixV().transpose();
+  pose.translation() = matrix.col(3);
+  return pose;
+}
+
+Trajectory readKittiPoses(const std::string& path) {
+  Trajectory poses;
+  readPoseLines(path, 12, [&](const std::vector<std::string>& words) {
+    const std::vector<double> numbers = parseNumbers(words);
+    std::array<double, 12> rows;
+    std::copy(numbers.begin(), numbers.end(), rows.begin());
+    poses.push_back(poseFromRows(rows));
+  });
+  return poses;
+}
+
+void writeKittiPoses(const std::string& path, const Trajectory& poses) {
+  std::ofstream file = openForWriting(path);
+  file << std::scientific << std::setprecision(12);
+  for (const Eigen::Isometry3d& pose : poses) {
+    for (int i = 0; i < 12; ++i) file << pose.matrix()(i / 4, i % 4) << (i == 11 ? '\n' : ' ');
+  }
+  finishWriting(file, path);
+}
+
+StampedTrajectory readTumPoses(const std::string& path) {
+  StampedTrajectory trajectory;
+  readPoseLines(path, 8, [&](const std::vector<std::string>& words) {
+    const std::int64_t stamp = parseSeconds(words.front());
+    if (!trajectory.stamps.empty() && stamp <= trajectory.stamps.back()) {
+      throw std::invalid_argument("stamp " + words.front() + " s is not later than the one before");
+    }
+    const std::vector<double> n = parseNumbers(words, 1);
+    const Eigen::Quaterniond rotation(n[6], n[3], n[4], n[5]);
+    if (std::abs(rotation.norm() - 1.0) > kRotationTolerance) {
+      throw std::invalid_argument("the quaternion is not of unit length");
+    }
+    trajectory.stamps.push_back(stamp);
+    trajectory.poses.push_back(Eigen::Translation3d(n[0], n[1], n[2]) * rotation.normalized());
+  });
+  return trajectory;
+}
+
+void writeTumPoses(const std::string& path, const StampedTrajectory& trajectory) {
+  if (trajectory.stamps.size() != trajectory.poses.size()) {
+    throw std::invalid_argument("a trajectory with " + std::to_string(trajectory.poses.size()) + " poses has " +
+                                std::to_string(trajectory.stamps.size()) + " stamps");
+  }
+  std::ofstream file = openForWriting(path);
+  file << "# stamp[s] tx ty tz qx qy qz qw\n" << std::scientific << std::setprecision(12);
+  for (std::size_t i = 0; i < trajectory.poses.size(); ++i) {
+    const Eigen::Vector3d t = trajectory.poses[i].translation();
+    const Eigen::Quaterniond q = Eigen::Quaterniond(trajectory.poses[i].linear()).normalized();
+    file << formatSeconds(trajectory.stamps[i]) << ' ' << t.x() << ' ' << t.y() << ' ' << t.z() << ' ' << q.x() << ' '
+         << q.y() << ' ' << q.z() << ' ' << q.w() << '\n';
+  }
+  finishWriting(file, path);
+}
+
+std::vector<double> kittiLengths() {
+  return {100.0, 200.0, 300.0, 400.0, 500.0, 600.0, 700.0, 800.0};
+}
+
+std::vector<double> distancesTravelled(const Trajectory& poses) {
+  std::vector<double> distances(poses.size(), 0.0);
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    distances[i] = distances[i - 1] + (poses[i].translation() - poses[i - 1].translation()).norm();
+  }
+  return distances;
+}
+
+std::vector<SubPathErrors> subPathErrors(const Trajectory& ground_truth, const Trajectory& estimate,
+                                         const std::vector<double>& lengths) {
+  const std::vector<double> distances = distancesTravelled(covered(ground_truth, estimate));
+  const auto divide = [](SubPathErrors& sums) {
+    const double count = sums.count > 0 ? sums.count : kNaN;
+    sums.translation_percent /= count;
+    sums.rotation_deg_per_m /= count;
+  };
+
+  SubPathErrors all;
+  std::vector<SubPathErrors> result;
+  for (const double length : lengths) {
+    if (!(std::isfinite(length) && length > 0.0)) {
+      throw std::invalid_argument("sub-path length " + std::to_string(length) + " m must be positive");
+    }
+    SubPathErrors sums;
+    sums.length = length;
+    for (std::size_t first = 0; first < distances.size(); ++first) {
+      const auto end =
+          std::lower_bound(distances.begin(), distances.end(), distances[first] + length - kLengthTolerance);
+      if (end == distances.end()) break;
+      const std::size_t last = static_cast<std::size_t>(end - distances.begin());
+      const Eigen::Isometry3d error = motionError(ground_truth, estimate, first, last);
+      sums.translation_percent += 100.0 * error.translation().norm() / length;
+      sums.rotation_deg_per_m += kDegreesPerRadian * rotationAngle(error.linear()) / length;
+      ++sums.count;
+    }
+    all.count += sums.count;
+    all.translation_percent += sums.translation_percent;
+    all.rotation_deg_per_m += sums.rotation_deg_per_m;
+    divide(sums);
+    result.push_back(sums);
+  }
+  divide(all);
+  result.push_back(all);
+  return result;
+}
+
+TrajectoryErrors evaluateTrajectory(const Trajectory& ground_truth, const Trajectory& estimate,
+                                    const std::vector<double>& lengths) {
+  const Trajectory truth = covered(ground_truth, estimate);
+  TrajectoryErrors errors;
+  errors.frames = static_cast<int>(estimate.size());
+  errors.path_length = distancesTravelled(truth).back();
+  errors.per_length = subPathErrors(truth, estimate, lengths);
+  errors.sub_paths = errors.per_length.back();
+  errors.per_length.pop_back();
+
+  const double steps = estimate.size() > 1 ? static_cast<double>(estimate.size() - 1) : kNaN;
+  double squared_translation = 0.0;
+  double squared_rotation = 0.0;
+  for (std::size_t i = 1; i < estimate.size(); ++i) {
+    const Eigen::Isometry3d error = motionError(truth, estimate, i - 1, i);
+    squared_translation += error.translation().squaredNorm();
+    squared_rotation += std::pow(kDegreesPerRadian * rotationAngle(error.linear()), 2);
+  }
+  errors.rpe_translation_m = std::sqrt(squared_translation / steps);
+  errors.rpe_rotation_deg = std::sqrt(squared_rotation / steps);
+
+  const Eigen::Matrix3Xd true_positions = positions(truth);
+  const Eigen::Matrix3Xd estimated_positions = positions(estimate);
+  const auto moved = [&](const Eigen::Isometry3d& T_truth_estimate) -> Eigen::Matrix3Xd {
+    return (T_truth_estimate.linear() * estimated_positions).colwise() + T_truth_estimate.translation();
+  };
+  const Eigen::Isometry3d best(Eigen::umeyama(estimated_positions, true_positions, false));
+  errors.ate_aligned_m = rootMeanSquareDistance(moved(best), true_positions);
+  const Eigen::Matrix3Xd from_first = moved(truth.front() * estimate.front().inverse());
+  errors.ate_first_pose_m = rootMeanSquareDistance(from_first, true_positions);
+  errors.final_drift_m = (from_first.rightCols<1>() - true_positions.rightCols<1>()).norm();
+  errors.final_drift_percent = errors.path_length > 0.0 ? 100.0 * errors.final_drift_m / errors.path_length : kNaN;
+  errors.scale = scaleOfSteps(truth, estimate);
+  return errors;
+}
+
+}  // namespace sdvo

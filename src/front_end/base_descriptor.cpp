@@ -1,0 +1,238 @@
+#include "stereo_descriptor_vo/front_end/base_descriptor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <opencv2/features2d.hpp>
+#include <stdexcept>
+#include <utility>
+
+#include "opencv_features.hpp"
+#include "stereo_descriptor_vo/front_end/brief.hpp"
+#include "stereo_descriptor_vo/front_end/freak.hpp"
+
+#ifdef SDVO_HAVE_XFEATURES2D
+#include <opencv2/xfeatures2d.hpp>
+#include <opencv2/xfeatures2d/nonfree.hpp>
+#endif
+
+namespace sdvo {
+namespace {
+
+bool fits(const ViewKeypoint& k, double reach, cv::Size image) {
+  return k.u - reach >= -0.5 && k.v - reach >= -0.5 && k.u + reach <= image.width - 0.5 &&
+         k.v + reach <= image.height - 0.5;
+}
+
+ViewDescriptors emptyRows(std::size_t count, int bytes) {
+  return {cv::Mat::zeros(static_cast<int>(count), bytes, CV_8U), std::vector<std::uint8_t>(count, 0)};
+}
+
+class FreakDescriptor : public BaseDescriptor {
+ public:
+  double reach(double size) const override { return Freak::reach(size); }
+
+  ViewDescriptors describe(const cv::Mat& image, const std::vector<ViewKeypoint>& keypoints) const override {
+    const Freak freak(image);
+    ViewDescriptors described = emptyRows(keypoints.size(), Freak::kBytes);
+    for (std::size_t i = 0; i < keypoints.size(); ++i) {
+      const FreakKeypoint keypoint{keypoints[i].u, keypoints[i].v, keypoints[i].size, keypoints[i].angle};
+      if (!Freak::fits(keypoint, image.size())) continue;
+      freak.describe(keypoint, described.rows.ptr(static_cast<int>(i)));
+      described.valid[i] = 1;
+    }
+    return described;
+  }
+  ElementType elementType() const override { return ElementType::kBits; }
+  int bytes() const override { return Freak::kBytes; }
+};
+
+class BriefDescriptor : public BaseDescriptor {
+ public:
+  double reach(double size) const override { return Brief::reach(size); }
+
+  ViewDescriptors describe(const cv::Mat& image, const std::vector<ViewKeypoint>& keypoints) const override {
+    const Brief brief(image);
+    ViewDescriptors described = emptyRows(keypoints.size(), Brief::kBytes);
+    for (std::size_t i = 0; i < keypoints.size(); ++i) {
+      const ViewKeypoint& k = keypoints[i];
+      if (!fits(k, Brief::reach(k.size), image.size())) continue;
+      brief.describe(k.u, k.v, k.size, described.rows.ptr(static_cast<int>(i)));
+      described.valid[i] = 1;
+    }
+    return described;
+  }
+  ElementType elementType() const override { return ElementType::kBits; }
+  int bytes() const override { return Brief::kBytes; }
+};
+
+/// A descriptor of OpenCV's. They differ in what they take the neighbourhood's size from, and some drop and reorder
+/// rows; `impose` sets the fields that one reads so that `size` has its effect, and class_id carries the row where it
+/// is free.
+class OpenCvDescriptor : public BaseDescriptor {
+ public:
+  using Impose = std::function<void(float size, cv::KeyPoint&)>;
+
+  OpenCvDescriptor(cv::Ptr<cv::Feature2D> feature, double reach_per_size, bool class_id_is_free, Impose impose)
+      : feature_(std::move(feature)),
+        reach_per_size_(reach_per_size),
+        class_id_is_free_(class_id_is_free),
+        impose_(std::move(impose)) {}
+
+  double reach(double size) const override { return reach_per_size_ * size; }
+
+  ViewDescriptors describe(const cv::Mat& image, const std::vector<ViewKeypoint>& keypoints) const override {
+    ViewDescriptors described = emptyRows(keypoints.size(), bytes());
+    std::vector<cv::KeyPoint> cv_keypoints;
+    std::vector<std::size_t> row_of;
+    for (std::size_t i = 0; i < keypoints.size(); ++i) {
+      const ViewKeypoint& k = keypoints[i];
+      if (!fits(k, reach(k.size), image.size())) continue;
+      const float degrees = k.angle < 0.f ? 0.f : k.angle * static_cast<float>(180.0 / CV_PI);
+      cv::KeyPoint keypoint(k.u, k.v, k.size, degrees, 0.f, 0,
+                            class_id_is_free_ ? static_cast<int>(row_of.size()) : -1);
+      impose_(k.size, keypoint);
+      cv_keypoints.push_back(keypoint);
+      row_of.push_back(i);
+    }
+    if (cv_keypoints.empty()) return described;
+
+    const std::size_t given = cv_keypoints.size();
+    cv::Mat rows;
+    feature_->compute(image, cv_keypoints, rows);
+    if (!class_id_is_free_ && cv_keypoints.size() != given)
+      throw std::runtime_error("a descriptor of OpenCV dropped rows that cannot be told apart");
+    if (rows.type() == CV_32F && elementType() == ElementType::kUint8) rows.convertTo(rows, CV_8U);
+    const cv::Mat row_bytes(rows.rows, static_cast<int>(rows.cols * rows.elemSize()), CV_8U, rows.data, rows.step);
+    for (std::size_t k = 0; k < cv_keypoints.size(); ++k) {
+      const std::size_t i = row_of[class_id_is_free_ ? static_cast<std::size_t>(cv_keypoints[k].class_id) : k];
+      row_bytes.row(static_cast<int>(k)).copyTo(described.rows.row(static_cast<int>(i)));
+      described.valid[i] = 1;
+    }
+    return described;
+  }
+
+  ElementType elementType() const override {
+    if (feature_->descriptorType() == CV_8U) return ElementType::kBits;
+    // SIFT saturates its floats to whole numbers in 0…255: a byte each loses nothing.
+    return feature_->defaultNorm() == cv::NORM_L2 && feature_->descriptorSize() == 128 ? ElementType::kUint8
+                                                                                       : ElementType::kFloat32;
+  }
+  int bytes() const override {
+    const int element = elementType() == ElementType::kFloat32 ? 4 : 1;
+    return feature_->descriptorSize() * element;
+  }
+
+ private:
+  cv::Ptr<cv::Feature2D> feature_;
+  double reach_per_size_;
+  bool class_id_is_free_;
+  Impose impose_;
+};
+
+[[noreturn]] void refuse(const std::string& name, const std::string& who_has_it) {
+  throw std::invalid_argument("descriptor/type '" + name + "' is not in this OpenCV (" CV_VERSION "): " + who_has_it);
+}
+
+#if SDVO_HAVE_SIFT
+/// OpenCV's SIFT samples the pyramid image named in the packed `octave` (octave in bits 0…7, layer in bits 8…15). A key
+/// point of diameter s has the blur s / 2 = 1.6 * 2^(octave + layer / 3), layer in 1…3 (Lowe 2004, section 3.3).
+void imposeSiftLayer(float size, cv::KeyPoint& keypoint) {
+  constexpr int kLayers = 3;
+  constexpr double kSigma = 1.6;
+  const double scale = std::log2(size / 2.0 / kSigma);
+  const int step = std::max(static_cast<int>(std::lround(kLayers * scale)), 1 - kLayers);
+  const int octave = static_cast<int>(std::floor((step - 1) / static_cast<double>(kLayers)));
+  const int layer = step - kLayers * octave;
+  keypoint.octave = (octave & 255) | (layer << 8);
+}
+#endif
+
+std::unique_ptr<BaseDescriptor> makeSift(const std::string& name) {
+#if SDVO_HAVE_SIFT
+  static_cast<void>(name);
+  return std::make_unique<OpenCvDescriptor>(cv::SIFT::create(), 3.0, true, imposeSiftLayer);
+#else
+  refuse(name, "OpenCV 4.4 and later have it in features2d");
+#endif
+}
+
+/// ORB reads the pyramid level from `octave`; its 31 px patch belongs to the standard size.
+std::unique_ptr<BaseDescriptor> makeOrb(const std::string&) {
+  constexpr float kStep = 1.1f, kStandardSize = static_cast<float>(BaseDescriptor::kStandardSize);
+  constexpr int kLevels = 24;
+  const auto impose = [](float size, cv::KeyPoint& keypoint) {
+    const double level = std::log(size / kStandardSize) / std::log(kStep);
+    keypoint.octave = std::clamp(static_cast<int>(std::lround(level)), 0, kLevels - 1);
+  };
+  const auto orb = cv::ORB::create(500, kStep, kLevels, 1, 0, 2, cv::ORB::HARRIS_SCORE, 31, 20);
+  return std::make_unique<OpenCvDescriptor>(orb, 19.0 / kStandardSize, true, impose);
+}
+
+/// BRISK reads the size itself.
+std::unique_ptr<BaseDescriptor> makeBrisk(const std::string&) {
+  return std::make_unique<OpenCvDescriptor>(cv::BRISK::create(), 2.0, true, [](float, cv::KeyPoint&) {});
+}
+
+/// AKAZE takes the evolution level, four to the octave from a blur of 1.6 px, from class_id; its own key points have a
+/// diameter of three times the blur.
+std::unique_ptr<BaseDescriptor> makeAkaze(const std::string&) {
+  constexpr int kOctaves = 4, kSublevels = 4;
+  const auto impose = [](float size, cv::KeyPoint& keypoint) {
+    const double level = kSublevels * std::log2(size / 3.0 / 1.6);
+    keypoint.class_id = std::clamp(static_cast<int>(std::lround(level)), 0, kOctaves * kSublevels - 1);
+    keypoint.octave = keypoint.class_id / kSublevels;
+  };
+  const auto akaze = cv::AKAZE::create(cv::AKAZE::DESCRIPTOR_MLDB_UPRIGHT, 0, 3, 0.001f, kOctaves, kSublevels);
+  return std::make_unique<OpenCvDescriptor>(akaze, 7.5, false, impose);
+}
+
+std::unique_ptr<BaseDescriptor> makeSurf(const std::string& name) {
+#ifdef SDVO_HAVE_XFEATURES2D
+  try {
+    return std::make_unique<OpenCvDescriptor>(cv::xfeatures2d::SURF::create(100, 4, 3, false, true), 10.0 * 1.2 / 9.0,
+                                              true, [](float, cv::KeyPoint&) {});
+  } catch (const cv::Exception&) {
+    refuse(name, "its xfeatures2d was built without OPENCV_ENABLE_NONFREE=ON");
+  }
+#else
+  refuse(name, "builds with opencv_contrib's xfeatures2d and OPENCV_ENABLE_NONFREE=ON have it");
+#endif
+}
+
+using Maker = std::unique_ptr<BaseDescriptor> (*)(const std::string&);
+
+const std::map<std::string, Maker>& makers() {
+  static const std::map<std::string, Maker> table = {
+      {"freak",
+       [](const std::string&) -> std::unique_ptr<BaseDescriptor> { return std::make_unique<FreakDescriptor>(); }},
+      {"brief",
+       [](const std::string&) -> std::unique_ptr<BaseDescriptor> { return std::make_unique<BriefDescriptor>(); }},
+      {"sift", makeSift},
+      {"orb", makeOrb},
+      {"brisk", makeBrisk},
+      {"akaze", makeAkaze},
+      {"surf", makeSurf},
+  };
+  return table;
+}
+
+}  // namespace
+
+const std::vector<std::string>& baseDescriptorNames() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> all;
+    for (const auto& entry : makers()) all.push_back(entry.first);
+    return all;
+  }();
+  return names;
+}
+
+std::unique_ptr<BaseDescriptor> makeBaseDescriptor(const std::string& name) {
+  const auto maker = makers().find(name);
+  if (maker == makers().end()) throw std::invalid_argument("descriptor/type '" + name + "' is unknown");
+  return maker->second(name);
+}
+
+}  // namespace sdvo

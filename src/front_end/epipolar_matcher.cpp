@@ -1,0 +1,173 @@
+#include "stereo_descriptor_vo/front_end/epipolar_matcher.hpp"
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <opencv2/core/hal/intrin.hpp>
+#include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "stereo_descriptor_vo/front_end/patch_sampling.hpp"
+
+namespace sdvo {
+namespace {
+
+// A block is one SIMD register wide.
+constexpr int kBlockWidth = 16, kLeftOfBlock = 8;
+constexpr int kHalfRows = 4;  // block rows above and below the centre at half resolution
+constexpr int kFullRows = 5;  // … and at full resolution
+constexpr int kMargin = 64;   // px added around every image, so that no read needs a check
+
+/// Sum of absolute differences of two blocks centred at the given pixels.
+inline unsigned blockDifference(const std::uint8_t* a, const std::uint8_t* b, std::size_t step, int rows) {
+  unsigned sum = 0;
+  for (int row = -rows; row <= rows; ++row) {
+    const std::ptrdiff_t offset = row * static_cast<std::ptrdiff_t>(step) - kLeftOfBlock;
+#if CV_SIMD128
+    sum += cv::v_reduce_sad(cv::v_load(a + offset), cv::v_load(b + offset));
+#else
+    for (int k = 0; k < kBlockWidth; ++k) sum += static_cast<unsigned>(std::abs(a[offset + k] - b[offset + k]));
+#endif
+  }
+  return sum;
+}
+
+void addMargin(const cv::Mat& image, cv::Mat& larger) {
+  cv::copyMakeBorder(image, larger, kMargin, kMargin, kMargin, kMargin, cv::BORDER_REPLICATE);
+}
+
+void halve(const cv::Mat& image, cv::Mat& half) {
+  cv::resize(image, half, cv::Size((image.cols + 1) / 2, (image.rows + 1) / 2), 0.0, 0.0, cv::INTER_AREA);
+}
+
+}  // namespace
+
+EpipolarMatcher::EpipolarMatcher(const EpipolarMatcherOptions& options, double max_dv, const cv::Mat& left,
+                                 const cv::Mat& right, Images& scratch)
+    : options_(options), max_dv_(max_dv), images_(scratch) {
+  addMargin(left, scratch.left);
+  addMargin(right, scratch.right);
+  scratch.left.convertTo(scratch.left_float, CV_32F);
+  scratch.right.convertTo(scratch.right_float, CV_32F);
+  halve(left, scratch.half);
+  addMargin(scratch.half, scratch.left_half);
+  halve(right, scratch.half);
+  addMargin(scratch.half, scratch.right_half);
+}
+
+std::optional<cv::Point2f> EpipolarMatcher::find(const cv::Point2f& left_position) const {
+  const std::optional<int> disparity = searchRow(left_position);
+  if (!disparity) return std::nullopt;
+  const cv::Point start = searchAround(cv::Point(cvRound(left_position.x), cvRound(left_position.y)), *disparity);
+  return align(left_position, start);
+}
+
+std::optional<int> EpipolarMatcher::searchRow(const cv::Point2f& left_position) const {
+  // The centre of half-resolution pixel h lies between full pixels 2 h and 2 h + 1.
+  const int x = cvRound(0.5f * left_position.x - 0.25f), y = cvRound(0.5f * left_position.y - 0.25f);
+  const std::uint8_t* left = images_.left_half.ptr(y + kMargin) + x + kMargin;
+  const std::uint8_t* right = images_.right_half.ptr(y + kMargin) + x + kMargin;
+  // A point that looks best at a negative disparity has no match: swapped images show themselves this way.
+  constexpr int kNegative = 16;
+  const int range = std::min(static_cast<int>(0.5 * options_.max_disparity), x);
+  thread_local std::vector<unsigned> differences;
+  differences.resize(kNegative + range + 1);
+  int best = 0;
+  for (int k = 0; k <= kNegative + range; ++k) {
+    differences[k] = blockDifference(left, right + kNegative - k, images_.left_half.step, kHalfRows);
+    if (differences[k] < differences[best]) best = k;
+  }
+  if (best < kNegative - 1) return std::nullopt;
+  unsigned elsewhere = std::numeric_limits<unsigned>::max();
+  for (int k = 0; k <= kNegative + range; ++k)
+    if (std::abs(k - best) > 2) elsewhere = std::min(elsewhere, differences[k]);
+  if (differences[best] > options_.uniqueness * elsewhere) return std::nullopt;
+  return 2 * (best - kNegative);
+}
+
+cv::Point EpipolarMatcher::searchAround(const cv::Point& left, int disparity) const {
+  constexpr int kReach = 2;
+  const int rows = std::min(2, static_cast<int>(std::ceil(max_dv_)));
+  const std::uint8_t* block = images_.left.ptr(left.y + kMargin) + left.x + kMargin;
+  cv::Point best;
+  unsigned least = std::numeric_limits<unsigned>::max();
+  for (int dv = -rows; dv <= rows; ++dv)
+    for (int d = disparity - kReach; d <= disparity + kReach; ++d) {
+      if (left.x - d < 0 || left.x - d > images_.right.cols - 2 * kMargin) continue;
+      const std::uint8_t* other = images_.right.ptr(left.y + dv + kMargin) + left.x - d + kMargin;
+      const unsigned difference = blockDifference(block, other, images_.left.step, kFullRows);
+      if (difference < least) least = difference, best = cv::Point(d, dv);
+    }
+  return best;
+}
+
+/// Inverse compositional alignment (Baker and Matthews 2004), blind to a difference of brightness, of (disparity, dv,
+/// slant): the ground in front of a vehicle has disparities that grow by a third of a pixel from row to row, and a
+/// patch that moved as a whole would be half a pixel off there.
+std::optional<cv::Point2f> EpipolarMatcher::align(const cv::Point2f& left_position, const cv::Point2f& start) const {
+  constexpr int kIterations = 10;
+  constexpr float kConverged = 0.03f, kLargestCorrection = 2.0f;  // px
+  constexpr float kSteepest = 0.8f;                               // px per row
+  // Where the patch says little about its slant, upright is the better guess.
+  constexpr float kNoise = 5.f, kUsualSlant = 0.2f;  // grey levels, px per row
+  constexpr float kUpright = (kNoise / kUsualSlant) * (kNoise / kUsualSlant);
+  const int radius = options_.patch_radius, n = 2 * radius + 1;
+  const int stride = patchStride(radius + 1), count = n * stride;
+  // Eigen works in parallel lanes, which a plain loop over floats may not. Rows go on beyond the patch: the mask makes
+  // the patch and its derivatives zero there, so that whatever is sampled does not count.
+  thread_local Eigen::ArrayXf wide, mask, row;
+  thread_local Eigen::VectorXf patch, by_disparity, by_dv, by_slant, other;
+  if (mask.size() != count) {
+    mask.setZero(count);
+    row.setZero(count);
+    for (int j = 0; j < n; ++j) {
+      mask.segment(j * stride, n).setOnes();
+      row.segment(j * stride, n).setConstant(static_cast<float>(j - radius));
+    }
+    wide.setZero(count + 2 * stride + 2);
+    other.resize(count);
+  }
+  samplePatch(images_.left_float, kMargin, left_position.x, left_position.y, 0.f, radius + 1, stride, wide.data());
+  const auto neighbour = [&](int dx, int dy) { return wide.segment((1 + dy) * stride + 1 + dx, count); };
+  patch = neighbour(0, 0) * mask;
+  by_disparity = 0.5f * (neighbour(1, 0) - neighbour(-1, 0)) * mask;
+  by_dv = 0.5f * (neighbour(0, -1) - neighbour(0, 1)) * mask;
+  by_slant = by_disparity.array() * row;
+  const float pixels = static_cast<float>(n * n);
+  for (auto* values : {&patch, &by_disparity, &by_dv, &by_slant}) values->array() -= values->sum() / pixels * mask;
+  const float dd = by_disparity.squaredNorm(), dv = by_disparity.dot(by_dv), vv = by_dv.squaredNorm();
+  if (dd * vv - dv * dv < 1e-3f * dd * vv || dd < pixels) return std::nullopt;
+  const float ds = by_disparity.dot(by_slant), vs = by_dv.dot(by_slant), ss = by_slant.squaredNorm() + kUpright;
+  Eigen::Matrix3f hessian;
+  hessian << dd, dv, ds, dv, vv, vs, ds, vs, ss;
+  const Eigen::Matrix3f inverse = hessian.inverse();
+
+  cv::Point2f found = start;
+  float slant = 0.f;
+  for (int iteration = 0; iteration < kIterations; ++iteration) {
+    samplePatch(images_.right_float, kMargin, left_position.x - found.x, left_position.y + found.y, slant, radius,
+                stride, other.data());
+    other -= patch;
+    // The derivatives have no mean, so that of the difference drops out.
+    const Eigen::Vector3f gradient(by_disparity.dot(other), by_dv.dot(other), by_slant.dot(other) - kUpright * slant);
+    const Eigen::Vector3f step = inverse * gradient;
+    slant += step[2];
+    found.x += step[0] + slant * step[1];
+    found.y += step[1];
+    const cv::Point2f correction = found - start;
+    if (!(std::max(std::abs(correction.x), std::abs(correction.y)) <= kLargestCorrection)) return std::nullopt;
+    if (!(std::abs(slant) <= kSteepest)) return std::nullopt;
+    const float u_right = left_position.x - found.x;
+    if (u_right < 0.f || u_right > static_cast<float>(images_.right.cols - 2 * kMargin - 1)) return std::nullopt;
+    if (std::max(std::abs(step[0]), std::abs(step[1])) < kConverged) break;
+  }
+
+  other = (other + patch).cwiseProduct(mask.matrix());
+  other.array() -= other.sum() / pixels * mask;
+  if (patch.dot(other) < options_.min_correlation * patch.norm() * other.norm()) return std::nullopt;
+  return found;
+}
+
+}  // namespace sdvo

@@ -1,0 +1,120 @@
+#include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+#include "stereo_descriptor_vo/common/stopwatch.hpp"
+
+namespace sdvo {
+namespace {
+
+void checkImage(const cv::Mat& image, const char* side, const StereoCamera& camera) {
+  if (image.type() == CV_8UC1 && image.cols == camera.width && image.rows == camera.height) return;
+  std::ostringstream message;
+  message << side << " image is " << image.cols << "x" << image.rows << " with " << image.channels()
+          << " channel(s) of " << image.elemSize1() << " byte(s); the camera model needs " << camera.width << "x"
+          << camera.height << " with 1 channel of 1 byte";
+  throw std::invalid_argument(message.str());
+}
+
+/// Mean grey level and mean absolute horizontal gradient, on every fourth row: both are there to recognise darkness and
+/// blur, not to be precise.
+void measureImage(const cv::Mat& image, double& mean_intensity, double& sharpness) {
+  constexpr int kRowStep = 4;
+  std::int64_t sum = 0, gradient = 0, pixels = 0;
+  for (int y = 0; y < image.rows; y += kRowStep) {
+    const std::uint8_t* row = image.ptr(y);
+    for (int x = 1; x < image.cols; ++x) {
+      sum += row[x];
+      gradient += std::abs(row[x] - row[x - 1]);
+    }
+    pixels += image.cols - 1;
+  }
+  mean_intensity = static_cast<double>(sum) / static_cast<double>(std::max<std::int64_t>(pixels, 1));
+  sharpness = static_cast<double>(gradient) / static_cast<double>(std::max<std::int64_t>(pixels, 1));
+}
+
+/// Standard deviation of a corner's position in px. Sub-pixel corners of a sharp image are good to a few tenths of a
+/// pixel; those that a large neighbourhood had to be smoothed for are no better, so one figure serves all.
+constexpr float kCornerSigma = 0.3f;
+
+}  // namespace
+
+FeatureExtractor::FeatureExtractor(const FeatureExtractorOptions& options)
+    : options_(checked(options)),
+      detector_(options.detector),
+      stereo_matcher_(options.stereo),
+      depth_scale_(options.size_curve),
+      descriptor_(options.descriptor) {}
+
+StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
+                                         std::int64_t stamp) const {
+  camera.check();
+  checkImage(left, "left", camera);
+  checkImage(right, "right", camera);
+
+  StereoFeatures features;
+  features.stamp = stamp;
+  features.camera = camera;
+  features.descriptor = options_.descriptor.type;
+  features.layout = options_.descriptor.layout;
+  features.element_type = descriptor_.elementType();
+  ExtractionReport& report = features.report;
+  measureImage(left, report.mean_intensity[0], report.sharpness[0]);
+  measureImage(right, report.mean_intensity[1], report.sharpness[1]);
+
+  // Detect in the left image, where at least the smallest descriptor fits.
+  const int border = static_cast<int>(descriptor_.reach(depth_scale_.size(options_.stereo.min_disparity)));
+  Stopwatch stopwatch;
+  const std::vector<Corner> corners = detector_.detect(left, border);
+  report.detected = static_cast<int>(corners.size());
+  report.detect_time = stopwatch.lap();
+
+  // Find each feature in the right image by tracking.
+  std::vector<cv::Point2f> positions;
+  positions.reserve(corners.size());
+  for (const Corner& corner : corners) positions.push_back(corner.position);
+  const std::vector<StereoMatch> matches = stereo_matcher_.match(left, right, positions);
+  report.stereo_matched = static_cast<int>(matches.size());
+  report.stereo_time = stopwatch.lap();
+
+  // Size from depth, then the descriptor of both views at that size.
+  std::vector<StereoKeypoint> keypoints;
+  keypoints.reserve(matches.size());
+  for (const StereoMatch& match : matches) {
+    const cv::Point2f& position = positions[match.left_index];
+    keypoints.push_back({position.x, position.y, position.x - match.disparity, position.y + match.dv,
+                         static_cast<float>(depth_scale_.size(match.disparity))});
+  }
+  const DescribedKeypoints described = descriptor_.describe(left, right, keypoints);
+  for (std::size_t row = 0; row < described.index.size(); ++row) {
+    const int i = described.index[row];
+    const Corner& corner = corners[matches[i].left_index];
+    features.u.push_back(corner.position.x);
+    features.v.push_back(corner.position.y);
+    features.disparity.push_back(matches[i].disparity);
+    features.dv.push_back(matches[i].dv);
+    features.size.push_back(keypoints[i].size);
+    features.angle.push_back(described.angle[row]);
+    features.response.push_back(corner.response);
+    features.sigma.push_back(kCornerSigma);
+    features.octave.push_back(0);
+  }
+  features.descriptors = described.rows;
+  report.describe_time = stopwatch.lap();
+
+  if (2 * border >= std::min(left.rows, left.cols))
+    report.status =
+        "every feature is too close to an image border for its descriptor: the image is too small for its size";
+  else if (report.detected == 0)
+    report.status = "no corners: the left image has no texture (dark, covered or out of focus?)";
+  else if (report.stereo_matched == 0)
+    report.status = "no stereo matches: left and right do not show the same scene, are swapped or not rectified";
+  else if (features.count() == 0)
+    report.status = "every feature is too close to an image border for its descriptor";
+  return features;
+}
+
+}  // namespace sdvo

@@ -1,0 +1,99 @@
+#include "stereo_descriptor_vo/front_end/stereo_descriptor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "stereo_descriptor_vo/front_end/freak.hpp"
+
+namespace sdvo {
+namespace {
+
+/// Orientation in rad in [0, 2 pi), by FREAK's own measure, which serves every base descriptor; upright (-1) where the
+/// neighbourhood leaves the image.
+void orient(const cv::Mat& image, std::vector<ViewKeypoint>& keypoints) {
+  const Freak freak(image);
+  for (ViewKeypoint& k : keypoints) {
+    const FreakKeypoint keypoint{k.u, k.v, k.size, -1.f};
+    if (Freak::fits(keypoint, image.size())) k.angle = freak.orientation(keypoint);
+  }
+}
+
+bool covers(cv::Size image, float u, float v, double reach) {
+  return u - reach >= -0.5 && v - reach >= -0.5 && u + reach <= image.width - 0.5 && v + reach <= image.height - 0.5;
+}
+
+/// The image going on as its outermost pixels for `margin` px on every side.
+cv::Mat extended(const cv::Mat& image, int margin) {
+  cv::Mat larger;
+  cv::copyMakeBorder(image, larger, margin, margin, margin, margin, cv::BORDER_REPLICATE);
+  return larger;
+}
+
+}  // namespace
+
+void DescriptorOptions::describe(OptionList& list) {
+  list.add("type", type, baseDescriptorNames(), "base descriptor");
+  list.add("layout", layout, {"left", "left+right"}, "one view, or the left half followed by the right half");
+  list.add("oriented", oriented, "turn the pattern to the left view's orientation (both halves by the same angle)");
+  list.add(
+      "extend_border", extend_border,
+      "describe also what is too near to an image border for its size, if a size of 7 px fits: the image then goes on "
+      "as its outermost pixels");
+}
+
+StereoDescriptor::StereoDescriptor(const DescriptorOptions& options)
+    : options_(checked(options)), base_(makeBaseDescriptor(options_.type)) {}
+
+double StereoDescriptor::reach(double size) const {
+  return base_->reach(options_.extend_border ? std::min(size, BaseDescriptor::kStandardSize) : size);
+}
+
+DescribedKeypoints StereoDescriptor::describe(const cv::Mat& left_image, const cv::Mat& right_image,
+                                              const std::vector<StereoKeypoint>& keypoints) const {
+  cv::Mat left = left_image, right = right_image;
+  float shift = 0.f;
+  if (options_.extend_border && !keypoints.empty()) {
+    const auto smaller = [](const StereoKeypoint& a, const StereoKeypoint& b) { return a.size < b.size; };
+    const float largest = std::max_element(keypoints.begin(), keypoints.end(), smaller)->size;
+    const int margin = static_cast<int>(std::ceil(base_->reach(largest)));
+    left = extended(left_image, margin);
+    right = extended(right_image, margin);
+    shift = static_cast<float>(margin);
+  }
+  std::vector<ViewKeypoint> in_left, in_right;
+  for (const StereoKeypoint& k : keypoints) {
+    in_left.push_back({k.u_left + shift, k.v_left + shift, k.size, -1.f});
+    in_right.push_back({k.u_right + shift, k.v_right + shift, k.size, -1.f});
+  }
+  if (options_.oriented) {
+    orient(left, in_left);
+    for (std::size_t i = 0; i < keypoints.size(); ++i) in_right[i].angle = in_left[i].angle;
+  }
+  const ViewDescriptors left_half = base_->describe(left, in_left);
+  // Described in the right view even where only the left row is wanted: a feature set does not depend on the layout,
+  // and layouts can be compared on the same features.
+  const ViewDescriptors right_half = base_->describe(right, in_right);
+
+  DescribedKeypoints described;
+  for (std::size_t i = 0; i < keypoints.size(); ++i) {
+    if (!left_half.valid[i] || !right_half.valid[i]) continue;
+    const StereoKeypoint& k = keypoints[i];
+    if (options_.extend_border && (!covers(left_image.size(), k.u_left, k.v_left, reach(k.size)) ||
+                                   !covers(right_image.size(), k.u_right, k.v_right, reach(k.size))))
+      continue;
+    described.index.push_back(static_cast<int>(i));
+    described.angle.push_back(in_left[i].angle);
+  }
+  const bool both = options_.layout == "left+right";
+  const int bytes = base_->bytes(), count = static_cast<int>(described.index.size());
+  described.rows.create(count, (both ? 2 : 1) * bytes, CV_8U);
+  for (int row = 0; row < count; ++row) {
+    const int i = described.index[row];
+    left_half.rows.row(i).copyTo(described.rows.row(row).colRange(0, bytes));
+    if (both) right_half.rows.row(i).copyTo(described.rows.row(row).colRange(bytes, 2 * bytes));
+  }
+  return described;
+}
+
+}  // namespace sdvo

@@ -1,0 +1,221 @@
+#include "stereo_descriptor_vo/odometry/local_map.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+namespace sdvo {
+namespace {
+
+/// Disparity below which a point's distance is beyond measuring; it serves as a direction, far away.
+constexpr double kFarthestDisparity = 0.05;  // px
+
+/// Covariance of the motion M = T_from_to between two frames, perturbed as M * exp(xi), from that of the left
+/// perturbations of all poses but the first: exp(f) M exp(-t) = M exp(Ad(M^-1) f - t) to first order.
+Matrix6d motionCovariance(const Window& window, const Eigen::MatrixXd& pose_covariance, int from, int to) {
+  if (from == to) return Matrix6d::Zero();
+  const int t = 6 * (to - 1), f = 6 * (from - 1);
+  Matrix6d covariance = pose_covariance.block<6, 6>(t, t);
+  if (from == 0) return covariance;  // held fixed
+  const Matrix6d carried = adjoint(window.T_camera_origin[to] * window.T_camera_origin[from].inverse());
+  const Matrix6d cross = carried * pose_covariance.block<6, 6>(f, t);
+  covariance += carried * pose_covariance.block<6, 6>(f, f) * carried.transpose() - cross - cross.transpose();
+  return 0.5 * (covariance + covariance.transpose());
+}
+
+}  // namespace
+
+LocalMap::LocalMap(const LocalMapOptions& options) : options_(checked(options)) {}
+
+int LocalMap::lastKeyframeId() const {
+  for (auto frame = frames_.rbegin(); frame != frames_.rend(); ++frame)
+    if (frame->is_keyframe) return frame->id;
+  return frames_.front().id;
+}
+
+bool LocalMap::continuedBy(const StereoFeatures& features) const {
+  if (features.camera != prototype_.camera) return false;
+  return features.count() == 0 ||
+         (features.descriptor == prototype_.descriptor && features.layout == prototype_.layout &&
+          features.descriptors.type() == descriptor_type_ && features.descriptors.cols == descriptor_columns_);
+}
+
+LocalMap::View LocalMap::view() const {
+  View view;
+  view.features = prototype_;
+  StereoFeatures& features = view.features;
+  const StereoCamera& camera = features.camera;
+  const int newest = newestId();
+  const std::size_t first_remembered = frames_.size() - std::min(frames_.size(), std::size_t(options_.remembered));
+  const int oldest = frames_[first_remembered].id;
+  std::vector<const Point*> seen;
+  for (std::size_t p = 0; p < points_.size(); ++p) {
+    const Observation& last = points_[p].observations.back();
+    if (last.frame_id < oldest) continue;
+    Eigen::Vector3d predicted;
+    if (!predictObservation(camera, newestPose(), points_[p].position, predicted, nullptr)) continue;
+    view.point.push_back(static_cast<int>(p));
+    view.row_of_newest.push_back(last.frame_id == newest ? last.row : -1);
+    features.u.push_back(static_cast<float>(predicted.x()));
+    features.v.push_back(static_cast<float>(predicted.y()));
+    features.disparity.push_back(static_cast<float>(std::max(predicted.z(), kFarthestDisparity)));
+    features.size.push_back(points_[p].size);
+    seen.push_back(&points_[p]);
+  }
+  if (seen.empty()) return view;
+  features.descriptors.create(static_cast<int>(seen.size()), descriptor_columns_, descriptor_type_);
+  const std::size_t count = seen.size();
+  features.dv.assign(count, 0.f);
+  features.angle.assign(count, -1.f);
+  features.response.assign(count, 0.f);
+  features.sigma.assign(count, 0.f);
+  features.octave.assign(count, 0);
+  for (std::size_t i = 0; i < seen.size(); ++i)
+    std::memcpy(features.descriptors.ptr(static_cast<int>(i)), seen[i]->descriptor.data(), seen[i]->descriptor.size());
+  return view;
+}
+
+void LocalMap::insert(const StereoFeatures& features, int id, const Eigen::Isometry3d& T_camera_origin,
+                      const std::vector<Sighting>& sightings, const RigCalibration& calibration) {
+  prototype_ = StereoFeatures{};
+  prototype_.stamp = features.stamp;
+  prototype_.camera = features.camera;
+  prototype_.descriptor = features.descriptor;
+  prototype_.layout = features.layout;
+  prototype_.element_type = features.element_type;
+  descriptor_type_ = features.descriptors.type();
+  descriptor_columns_ = features.descriptors.cols;
+
+  const std::size_t row_bytes = features.descriptors.cols * features.descriptors.elemSize();
+  std::vector<bool> recognised(features.u.size(), false);
+  for (const Sighting& sighting : sightings) {
+    Point& point = points_[sighting.point];
+    const int row = sighting.row;
+    recognised[row] = true;
+    point.observations.push_back({id, row, {features.u[row], features.v[row], features.disparity[row]}});
+    const std::uint8_t* bytes = features.descriptors.ptr(row);
+    point.descriptor.assign(bytes, bytes + row_bytes);
+    point.size = features.size[row];
+  }
+  // Only now that the new sightings are noted: points that they carry on must outlive the forgotten pair.
+  if (!frames_.empty() && !frames_.back().is_keyframe) removeFrame(frames_.size() - 1);
+  frames_.push_back({id, T_camera_origin, false});
+  frames_.back().is_keyframe = needsKeyframe();
+  for (int row = 0; row < features.count(); ++row)
+    if (!recognised[row]) startPoint(features, row, id, T_camera_origin, calibration);
+  if (static_cast<int>(frames_.size()) > options_.keyframes + 1) removeFrame(0);
+}
+
+void LocalMap::startPoint(const StereoFeatures& features, int row, int id, const Eigen::Isometry3d& T_camera_origin,
+                          const RigCalibration& calibration) {
+  const StereoCamera& camera = features.camera;
+  const Eigen::Vector3d measurement(features.u[row], features.v[row], features.disparity[row]);
+  const double disparity =
+      std::max(measurement.z() - calibration.disparityError(camera, measurement.x()), kFarthestDisparity);
+  Point point;
+  point.position.T_origin_anchor = T_camera_origin.inverse();
+  point.position.ray_and_inverse_depth = {(measurement.x() - camera.cx) / camera.fx,
+                                          (measurement.y() - camera.cy) / camera.fy, 1.0 / camera.depth(disparity)};
+  point.observations.push_back({id, row, measurement});
+  const std::uint8_t* bytes = features.descriptors.ptr(row);
+  point.descriptor.assign(bytes, bytes + features.descriptors.cols * features.descriptors.elemSize());
+  point.size = features.size[row];
+  points_.push_back(std::move(point));
+}
+
+bool LocalMap::needsKeyframe() const {
+  const int id = newestId(), keyframe = lastKeyframeId();
+  if (id == keyframe) return true;  // the first one
+  std::vector<double> parallax;
+  int seen = 0;
+  for (const Point& point : points_) {
+    if (point.observations.back().frame_id != id) continue;
+    ++seen;
+    for (const Observation& observation : point.observations)
+      if (observation.frame_id == keyframe)
+        parallax.push_back((observation.measurement - point.observations.back().measurement).head<2>().norm());
+  }
+  if (static_cast<double>(parallax.size()) < options_.keyframe_overlap * seen || parallax.empty()) return true;
+  const auto middle = parallax.begin() + static_cast<std::ptrdiff_t>(parallax.size() / 2);
+  std::nth_element(parallax.begin(), middle, parallax.end());
+  return *middle > options_.keyframe_parallax;
+}
+
+void LocalMap::removeFrame(std::size_t index) {
+  const int id = frames_[index].id;
+  frames_.erase(frames_.begin() + static_cast<std::ptrdiff_t>(index));
+  for (Point& point : points_) {
+    auto& observations = point.observations;
+    observations.erase(std::remove_if(observations.begin(), observations.end(),
+                                      [id](const Observation& observation) { return observation.frame_id == id; }),
+                       observations.end());
+  }
+  points_.erase(std::remove_if(points_.begin(), points_.end(), [](const Point& p) { return p.observations.empty(); }),
+                points_.end());
+}
+
+LocalMap::Adjustment LocalMap::adjust(const WindowOptimizerOptions& options, const CalibrationBelief& prior,
+                                      RigCalibration& calibration) {
+  Window window;
+  window.camera = prototype_.camera;
+  window.calibration = calibration;
+  window.calibration_prior = prior;
+  std::vector<int> ids;
+  for (const Frame& frame : frames_) {
+    window.T_camera_origin.push_back(frame.T_camera_origin);
+    ids.push_back(frame.id);
+  }
+  std::vector<std::pair<int, int>> sources;  // point and its observation, for each of the window's observations
+  std::vector<int> used;
+  for (std::size_t p = 0; p < points_.size(); ++p) {
+    const Point& point = points_[p];
+    if (point.observations.size() < 2) continue;
+    for (std::size_t k = 0; k < point.observations.size(); ++k) {
+      const auto frame = std::lower_bound(ids.begin(), ids.end(), point.observations[k].frame_id);
+      window.observations.push_back(
+          {static_cast<int>(used.size()), static_cast<int>(frame - ids.begin()), point.observations[k].measurement});
+      sources.emplace_back(static_cast<int>(p), static_cast<int>(k));
+    }
+    window.points.push_back(point.position);
+    used.push_back(static_cast<int>(p));
+  }
+
+  Adjustment adjustment;
+  adjustment.frames = static_cast<int>(frames_.size());
+  const WindowSolution solution = optimizeWindow(options, window);
+  if (!solution.success) return adjustment;
+  adjustment.success = true;
+  adjustment.calibration_information = solution.calibration_information;
+  const int newest = adjustment.frames - 1;
+  // What the window's equations do not contain (noise that differs from the options, the calibration's steps from
+  // window to window) makes the errors of simulated drives this much larger.
+  constexpr double kUnmodelled = 1.2;
+  const auto covariance = [&](int from, int to) -> Matrix6d {
+    return kUnmodelled * motionCovariance(window, solution.pose_covariance, from, to);
+  };
+  adjustment.since_keyframe = covariance(newest - 1, newest);
+  adjustment.since_first = covariance(0, newest);
+  adjustment.since_second = covariance(1, newest);
+  adjustment.keyframe_since_first = covariance(0, newest - 1);
+  calibration = window.calibration;
+  for (std::size_t f = 0; f < frames_.size(); ++f)
+    frames_[f].T_camera_origin = orthonormalised(window.T_camera_origin[f]);
+  for (std::size_t i = 0; i < used.size(); ++i) points_[used[i]].position = window.points[i];
+  cutOff(sources, solution.residuals, adjustment);
+  return adjustment;
+}
+
+void LocalMap::cutOff(const std::vector<std::pair<int, int>>& sources, const std::vector<double>& residuals,
+                      Adjustment& adjustment) {
+  constexpr double kRejected = 6.0;  // sigma
+  for (std::size_t i = 0; i < sources.size(); ++i) {
+    if (residuals[i] <= kRejected) continue;
+    auto& observations = points_[sources[i].first].observations;
+    const Observation& observation = observations[sources[i].second];
+    if (observation.frame_id != newestId()) continue;
+    adjustment.rejected_rows.push_back(observation.row);
+    observations.pop_back();  // the newest sighting is the last one
+  }
+}
+
+}  // namespace sdvo

@@ -1,0 +1,262 @@
+#include "stereo_descriptor_vo/odometry/window_optimizer.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "log_sum.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr int kCalibration = RigCalibration::kParameters;
+using CalibrationVector = RigCalibration::Vector;
+
+/// Normal equations of poses and calibration after the elimination of the points, and what is needed to get these back.
+struct ReducedSystem {
+  struct Point {
+    Eigen::Matrix3d inverse_hessian;
+    Eigen::Vector3d gradient;
+  };
+  Eigen::MatrixXd hessian;  ///< poses but the first, then the calibration
+  Eigen::VectorXd gradient;
+  std::vector<Point> points;
+  std::vector<Eigen::Matrix<double, 6, 3>> pose_point;                    ///< for each observation
+  std::vector<Eigen::Matrix<double, kCalibration, 3>> calibration_point;  ///< for each point
+  double cost = 0.0;
+  double weight = 0.0;
+  double weighted_square = 0.0;
+};
+
+/// A sighting of a point that is not in front of the camera costs as much as a very wrong one.
+constexpr double kBehindSquare = 1e4;
+
+class Solver {
+ public:
+  Solver(const WindowOptimizerOptions& options, const Window& window) : options_(options), window_(window) {
+    const auto& observations = window.observations;
+    for (std::size_t i = 0; i < observations.size(); ++i)
+      if (i == 0 || observations[i].point != observations[i - 1].point) first_of_point_.push_back(static_cast<int>(i));
+    first_of_point_.push_back(static_cast<int>(observations.size()));
+    poses_ = static_cast<int>(window.T_camera_origin.size()) - 1;
+    size_ = 6 * poses_ + kCalibration;
+  }
+
+  int poses() const { return poses_; }
+  int size() const { return size_; }
+
+  /// Square of the residual at which the Cauchy kernel bends: a square s costs bend * log(1 + s / bend).
+  double bend() const { return options_.kernel_scale * options_.kernel_scale; }
+
+  double priorCost(const Window& window) const {
+    const CalibrationVector error = window.calibration.value - window.calibration_prior.mean;
+    return error.dot(window.calibration_prior.information * error);
+  }
+
+  /// Normalised residual of an observation; the kernel is not applied.
+  bool residual(const Window& window, const WindowObservation& observation, Eigen::Vector3d& residual,
+                ObservationJacobians* jacobians) const {
+    Eigen::Vector3d prediction;
+    if (!predictObservation(window.camera, window.T_camera_origin[observation.frame], window.points[observation.point],
+                            prediction, jacobians))
+      return false;
+    prediction.z() += window.calibration.disparityError(window.camera, observation.measurement.x());
+    residual = inverseNoise().cwiseProduct(observation.measurement - prediction);
+    return true;
+  }
+
+  Eigen::Vector3d inverseNoise() const {
+    return {1.0 / options_.position_sigma, 1.0 / options_.position_sigma, 1.0 / options_.disparity_sigma};
+  }
+
+  double cost(const Window& window) const {
+    LogSum costs;
+    Eigen::Vector3d r;
+    for (const WindowObservation& observation : window.observations)
+      costs.add((residual(window, observation, r, nullptr) ? r.squaredNorm() : kBehindSquare) / bend());
+    return priorCost(window) + bend() * costs.value();
+  }
+
+  ReducedSystem linearise(const Window& window, double damping) const {
+    ReducedSystem system;
+    system.hessian = Eigen::MatrixXd::Zero(size_, size_);
+    system.gradient = Eigen::VectorXd::Zero(size_);
+    system.pose_point.resize(window.observations.size());
+    const std::size_t points = first_of_point_.size() - 1;
+    system.points.resize(points);
+    system.calibration_point.resize(points);
+    const int c = 6 * poses_;
+    auto calibration_hessian = system.hessian.block<kCalibration, kCalibration>(c, c);
+    auto calibration_gradient = system.gradient.segment<kCalibration>(c);
+    calibration_hessian += window.calibration_prior.information;
+    calibration_gradient +=
+        window.calibration_prior.information * (window.calibration_prior.mean - window.calibration.value);
+    const Eigen::Vector3d inverse_noise = inverseNoise();
+    LogSum costs;
+
+    std::vector<int> seen_in;
+    for (std::size_t p = 0; p < points; ++p) {
+      Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
+      Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+      Eigen::Matrix<double, kCalibration, 3>& calibration_point = system.calibration_point[p];
+      calibration_point.setZero();
+      seen_in.clear();
+      for (int i = first_of_point_[p]; i < first_of_point_[p + 1]; ++i) {
+        const WindowObservation& observation = window.observations[i];
+        system.pose_point[i].setZero();
+        Eigen::Vector3d r;
+        ObservationJacobians jacobians;
+        if (!residual(window, observation, r, &jacobians)) {
+          costs.add(kBehindSquare / bend());
+          continue;
+        }
+        const double square = r.squaredNorm(), weight = 1.0 / (1.0 + square / bend());
+        costs.add(square / bend());
+        system.weight += weight;
+        system.weighted_square += weight * square;
+        const double root = std::sqrt(weight);
+        r *= root;
+        const Eigen::Vector3d scale = root * inverse_noise;
+        const Eigen::Matrix3d by_point = scale.asDiagonal() * jacobians.point;
+        const RigCalibration::RowVector by_calibration =
+            scale.z() * RigCalibration::shape(window.camera, observation.measurement.x());
+        hessian.noalias() += by_point.transpose() * by_point;
+        gradient.noalias() += by_point.transpose() * r;
+        calibration_point.noalias() += by_calibration.transpose() * by_point.row(2);
+        calibration_hessian.noalias() += by_calibration.transpose() * by_calibration;
+        calibration_gradient.noalias() += by_calibration.transpose() * r.z();
+        if (observation.frame == 0) continue;
+        const int f = 6 * (observation.frame - 1);
+        const Eigen::Matrix<double, 3, 6> by_pose = scale.asDiagonal() * jacobians.pose;
+        system.hessian.block<6, 6>(f, f).noalias() += by_pose.transpose() * by_pose;
+        system.hessian.block<kCalibration, 6>(c, f).noalias() += by_calibration.transpose() * by_pose.row(2);
+        system.gradient.segment<6>(f).noalias() += by_pose.transpose() * r;
+        system.pose_point[i].noalias() = by_pose.transpose() * by_point;
+        seen_in.push_back(i);
+      }
+
+      hessian.diagonal() *= 1.0 + damping;
+      hessian.diagonal().array() += 1e-9;
+      const Eigen::Matrix3d inverse = hessian.inverse();
+      system.points[p] = {inverse, gradient};
+      // Schur complement, lower triangle: frames within a point ascend.
+      for (std::size_t a = 0; a < seen_in.size(); ++a) {
+        const int fa = 6 * (window.observations[seen_in[a]].frame - 1);
+        const Eigen::Matrix<double, 6, 3> scaled = system.pose_point[seen_in[a]] * inverse;
+        system.gradient.segment<6>(fa).noalias() -= scaled * gradient;
+        for (std::size_t b = 0; b <= a; ++b) {
+          const int fb = 6 * (window.observations[seen_in[b]].frame - 1);
+          system.hessian.block<6, 6>(fa, fb).noalias() -= scaled * system.pose_point[seen_in[b]].transpose();
+        }
+        system.hessian.block<kCalibration, 6>(c, fa).noalias() -= calibration_point * scaled.transpose();
+      }
+      calibration_hessian.noalias() -= calibration_point * inverse * calibration_point.transpose();
+      calibration_gradient.noalias() -= calibration_point * inverse * gradient;
+    }
+    system.cost = priorCost(window) + bend() * costs.value();
+    return system;
+  }
+
+  Window stepped(const ReducedSystem& system, const Eigen::VectorXd& step) const {
+    Window next = window_;
+    for (int f = 0; f < poses_; ++f)
+      next.T_camera_origin[f + 1] = expSE3(step.segment<6>(6 * f)) * window_.T_camera_origin[f + 1];
+    const CalibrationVector calibration = step.tail<kCalibration>();
+    next.calibration.value += calibration;
+    for (std::size_t p = 0; p + 1 < first_of_point_.size(); ++p) {
+      Eigen::Vector3d gradient = system.points[p].gradient - system.calibration_point[p].transpose() * calibration;
+      for (int i = first_of_point_[p]; i < first_of_point_[p + 1]; ++i) {
+        const int frame = window_.observations[i].frame;
+        if (frame > 0) gradient -= system.pose_point[i].transpose() * step.segment<6>(6 * (frame - 1));
+      }
+      next.points[window_.observations[first_of_point_[p]].point].ray_and_inverse_depth +=
+          system.points[p].inverse_hessian * gradient;
+    }
+    return next;
+  }
+
+ private:
+  const WindowOptimizerOptions& options_;
+  const Window& window_;
+  std::vector<int> first_of_point_;
+  int poses_ = 0, size_ = 0;
+};
+
+}  // namespace
+
+bool predictObservation(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
+                        const AnchoredPoint& point, Eigen::Vector3d& prediction, ObservationJacobians* jacobians) {
+  constexpr double kNearest = 1e-3;  // of the depth in the anchor
+  const Eigen::Matrix3d R = T_camera_origin.linear() * point.T_origin_anchor.linear();
+  const Eigen::Vector3d t =
+      T_camera_origin.linear() * point.T_origin_anchor.translation() + T_camera_origin.translation();
+  const double rho = point.ray_and_inverse_depth.z();
+  const Eigen::Vector3d P =
+      R.col(0) * point.ray_and_inverse_depth.x() + R.col(1) * point.ray_and_inverse_depth.y() + R.col(2) + rho * t;
+  if (P.z() < kNearest) return false;
+  const double iz = 1.0 / P.z();
+  const double x = P.x() * iz, y = P.y() * iz, fb = camera.fx * camera.baseline;
+  prediction = {camera.fx * x + camera.cx, camera.fy * y + camera.cy, fb * rho * iz};
+  if (!jacobians) return true;
+
+  Eigen::Matrix3d by_scaled_point;                              // rho held
+  by_scaled_point << camera.fx * iz, 0.0, -camera.fx * x * iz,  //
+      0.0, camera.fy * iz, -camera.fy * y * iz,                 //
+      0.0, 0.0, -fb * rho * iz * iz;
+  jacobians->pose << rho * by_scaled_point, -by_scaled_point * skew(P);
+  jacobians->point << by_scaled_point * R.col(0), by_scaled_point * R.col(1), by_scaled_point * t;
+  jacobians->point(2, 2) += fb * iz;
+  return true;
+}
+
+WindowSolution optimizeWindow(const WindowOptimizerOptions& options, Window& window) {
+  constexpr double kLargestDamping = 1e4;
+  WindowSolution solution;
+  const Solver solver(options, window);  // refers to the window: every accepted step is linearised anew
+  double damping = 1e-5;
+  ReducedSystem system;
+  const int c = 6 * solver.poses();
+  while (solution.iterations < options.iterations && damping < kLargestDamping) {
+    ++solution.iterations;
+    system = solver.linearise(window, damping);
+    Eigen::MatrixXd damped = system.hessian;
+    damped.diagonal().head(c) *= 1.0 + damping;
+    const Eigen::VectorXd step = damped.selfadjointView<Eigen::Lower>().ldlt().solve(system.gradient);
+    if (!step.allFinite()) return solution;
+    Window next = solver.stepped(system, step);
+    const double next_cost = solver.cost(next);
+    if (next_cost <= system.cost) {
+      const bool converged = system.cost - next_cost < 1e-4 * (system.cost + 1.0);
+      std::swap(window.T_camera_origin, next.T_camera_origin);
+      std::swap(window.points, next.points);
+      window.calibration = next.calibration;
+      damping = std::max(0.1 * damping, 1e-8);
+      if (converged) break;
+    } else {
+      damping *= 100.0;
+    }
+  }
+
+  // Of the last linearisation, one step before the result: close enough for a covariance, and half of the work saved.
+  const Eigen::MatrixXd information = system.hessian.selfadjointView<Eigen::Lower>();
+  const Eigen::LDLT<Eigen::MatrixXd> factor(information);
+  if (factor.info() != Eigen::Success || !factor.isPositive()) return solution;
+  const Eigen::MatrixXd covariance = factor.solve(Eigen::MatrixXd::Identity(solver.size(), solver.size()));
+  const double points = static_cast<double>(window.points.size());
+  const double degrees_of_freedom = std::max(3.0 * system.weight - 3.0 * points - c, 1.0);
+  const double variance = system.weighted_square / degrees_of_freedom;
+  solution.pose_covariance = variance * covariance.topLeftCorner(c, c);
+  solution.calibration_information =
+      covariance.bottomRightCorner<kCalibration, kCalibration>().inverse() - window.calibration_prior.information;
+
+  solution.residuals.reserve(window.observations.size());
+  for (const WindowObservation& observation : window.observations) {
+    Eigen::Vector3d r;
+    solution.residuals.push_back(solver.residual(window, observation, r, nullptr) ? r.norm()
+                                                                                  : std::sqrt(kBehindSquare));
+  }
+  solution.success = solution.pose_covariance.allFinite();
+  return solution;
+}
+
+}  // namespace sdvo

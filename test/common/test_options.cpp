@@ -1,0 +1,217 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <set>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
+#include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
+
+namespace sdvo {
+namespace {
+
+using synthetic::errorOf;
+
+/// One option of every type, two of them with the same last name.
+struct Inner {
+  int count = 5;
+  double width = 1.5;
+
+  void describe(OptionList& list) {
+    list.add("count", count, {1, 10}, "", "how many");
+    list.add("width", width, {0.5, 2.0}, "m", "how wide");
+  }
+};
+
+struct Outer {
+  Inner near_side;
+  Inner far_side;
+  bool on = true;
+  std::string colour = "red";
+  double height = 3.0;
+
+  void describe(OptionList& list) {
+    list.group("near_side", near_side);
+    list.group("far_side", far_side);
+    list.add("on", on, "whether");
+    list.add("colour", colour, {"red", "green"}, "which");
+    list.add("height", height, {0.0, 10.0}, "m", "how high");
+  }
+};
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+template <class Options>
+void expectUsable(Options options) {
+  EXPECT_NO_THROW(checked(options));
+  std::set<std::string> names;
+  for (const Option& option : listOptions(options)) {
+    EXPECT_TRUE(names.insert(option.name).second) << option.name << " is listed twice";
+    EXPECT_FALSE(option.meaning.empty()) << option.name << " has no meaning";
+  }
+  EXPECT_FALSE(names.empty());
+}
+
+TEST(Options, DefaultsOfAllComponentsAreInRange) {
+  expectUsable(FeatureExtractorOptions());
+  expectUsable(VisualOdometryOptions());
+}
+
+TEST(Options, PathsFollowTheComposition) {
+  Outer outer;
+  const std::vector<Option> options = listOptions(outer);
+  std::vector<std::string> names;
+  for (const Option& option : options) names.push_back(option.name);
+  EXPECT_EQ(names, (std::vector<std::string>{"near_side/count", "near_side/width", "far_side/count", "far_side/width",
+                                             "on", "colour", "height"}));
+}
+
+TEST(Options, OutOfRangeIsNamedWithPathValueAndRange) {
+  Outer outer;
+  outer.far_side.width = 2.25;
+  const std::string width = errorOf([&] { checked(outer); });
+  for (const char* part : {"far_side/width", "2.25", "0.5", "2", "m"}) EXPECT_TRUE(contains(width, part)) << width;
+
+  outer = {};
+  outer.near_side.count = 11;
+  const std::string count = errorOf([&] { checked(outer); });
+  for (const char* part : {"near_side/count", "11", "[1, 10]"}) EXPECT_TRUE(contains(count, part)) << count;
+
+  outer = {};
+  outer.colour = "blue";
+  const std::string colour = errorOf([&] { checked(outer); });
+  for (const char* part : {"colour", "blue", "red", "green"}) EXPECT_TRUE(contains(colour, part)) << colour;
+}
+
+TEST(Options, EndsOfTheRangeAreInsideAndNeighboursAreNot) {
+  Outer outer;
+  outer.near_side.width = 0.5;
+  outer.far_side.width = 2.0;
+  EXPECT_NO_THROW(checked(outer));
+  outer.near_side.width = std::nextafter(0.5, 0.0);
+  EXPECT_THROW(checked(outer), std::invalid_argument);
+  outer.near_side.width = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(checked(outer), std::invalid_argument);
+  outer.near_side.width = std::numeric_limits<double>::infinity();
+  EXPECT_THROW(checked(outer), std::invalid_argument);
+}
+
+TEST(Options, CompositionsNameTheFullPath) {
+  FeatureExtractorOptions extractor;
+  extractor.detector.max_features = 0;
+  const std::string detector_error = errorOf([&] { FeatureExtractor{extractor}; });
+  EXPECT_TRUE(contains(detector_error, "detector/max_features")) << detector_error;
+
+  VisualOdometryOptions odometry;
+  odometry.motion.confidence = 1.0;
+  const std::string motion_error = errorOf([&] { VisualOdometry{odometry}; });
+  EXPECT_TRUE(contains(motion_error, "motion/confidence")) << motion_error;
+}
+
+TEST(Options, SetBySuffixOrFullPath) {
+  Outer outer;
+  std::vector<Option> options = listOptions(outer);
+  setOption(options, "near_side/count", "7");
+  setOption(options, "height", "2.5");
+  setOption(options, "on", "false");
+  setOption(options, "colour", "green");
+  EXPECT_EQ(outer.near_side.count, 7);
+  EXPECT_EQ(outer.far_side.count, 5);
+  EXPECT_EQ(outer.height, 2.5);
+  EXPECT_FALSE(outer.on);
+  EXPECT_EQ(outer.colour, "green");
+
+  FeatureExtractorOptions extractor;
+  std::vector<Option> real = listOptions(extractor);
+  setOption(real, "window_radius", "6");
+  EXPECT_EQ(extractor.stereo.window_radius, 6);
+}
+
+TEST(Options, SetRefusesAmbiguousAndUnknownNames) {
+  Outer outer;
+  std::vector<Option> options = listOptions(outer);
+  const std::string ambiguous = errorOf([&] { setOption(options, "count", "7"); });
+  EXPECT_TRUE(contains(ambiguous, "ambiguous") && contains(ambiguous, "near_side/count")) << ambiguous;
+  EXPECT_EQ(outer.near_side.count, 5);
+  EXPECT_EQ(outer.far_side.count, 5);
+
+  const std::string unknown = errorOf([&] { setOption(options, "depth", "7"); });
+  EXPECT_TRUE(contains(unknown, "depth")) << unknown;
+  // A part of a name is not a name.
+  EXPECT_THROW(setOption(options, "eight", "1"), std::invalid_argument);
+  EXPECT_THROW(setOption(options, "side/count", "1"), std::invalid_argument);
+  EXPECT_THROW(setOption(options, "", "1"), std::invalid_argument);
+}
+
+TEST(Options, SetRefusesTextOfAnotherTypeAndValuesOutOfRange) {
+  for (const auto& [name, text] : std::vector<std::pair<std::string, std::string>>{{"near_side/count", "3.5"},
+                                                                                   {"near_side/count", ""},
+                                                                                   {"near_side/count", "99999999999"},
+                                                                                   {"near_side/count", "0"},
+                                                                                   {"height", "tall"},
+                                                                                   {"height", "1,5"},
+                                                                                   {"height", "nan"},
+                                                                                   {"height", "-1"},
+                                                                                   {"on", "perhaps"},
+                                                                                   {"colour", "blue"}}) {
+    Outer outer;
+    std::vector<Option> options = listOptions(outer);
+    const std::string error = errorOf([&, n = name, t = text] { setOption(options, n, t); });
+    EXPECT_TRUE(contains(error, name)) << name << " = '" << text << "': " << error;
+  }
+}
+
+TEST(Options, TextIsReadBackExactly) {
+  for (const double value : {0.1, 1.0 / 3.0, 0.72, 9.87654321e-5, std::nextafter(2.5, 3.0)}) {
+    Outer source, target;
+    source.height = value;
+    std::vector<Option> from = listOptions(source), to = listOptions(target);
+    setOption(to, "height", from.back().text());
+    EXPECT_EQ(target.height, value) << "written as " << from.back().text();
+  }
+}
+
+TEST(Options, ClampMovesNumbersToTheNearestEnd) {
+  Outer outer;
+  outer.near_side.count = 99;
+  outer.near_side.width = -1.0;
+  outer.far_side.count = -3;
+  outer.far_side.width = std::numeric_limits<double>::quiet_NaN();
+  std::vector<Option> options = listOptions(outer);
+  std::set<std::string> changed;
+  for (Option& option : options)
+    if (option.clamp()) changed.insert(option.name);
+  EXPECT_EQ(changed, (std::set<std::string>{"near_side/count", "near_side/width", "far_side/count", "far_side/width"}));
+  EXPECT_EQ(outer.near_side.count, 10);
+  EXPECT_EQ(outer.near_side.width, 0.5);
+  EXPECT_EQ(outer.far_side.count, 1);
+  EXPECT_EQ(outer.height, 3.0);
+  EXPECT_NO_THROW(checked(outer));
+  for (Option& option : options) EXPECT_FALSE(option.clamp()) << option.name;
+}
+
+TEST(Options, HashIsEqualIfAndOnlyIfTheOptionsAre) {
+  const auto hash = [](Outer outer) { return hashOptions(listOptions(outer)); };
+  EXPECT_EQ(hash(Outer()), hash(Outer()));
+  EXPECT_EQ(hash(Outer()).size(), 16u);
+
+  std::set<std::string> hashes = {hash(Outer())};
+  const auto expectNew = [&](const std::function<void(Outer&)>& change) {
+    Outer outer;
+    change(outer);
+    EXPECT_TRUE(hashes.insert(hash(outer)).second) << "options differ, their hashes do not";
+  };
+  expectNew([](Outer& o) { o.near_side.count = 6; });
+  expectNew([](Outer& o) { o.far_side.count = 6; });
+  expectNew([](Outer& o) { o.on = false; });
+  expectNew([](Outer& o) { o.colour = "green"; });
+  expectNew([](Outer& o) { o.height = 3.0 + 1e-12; });
+  expectNew([](Outer& o) { o.height = std::nextafter(3.0, 4.0); });
+}
+
+}  // namespace
+}  // namespace sdvo

@@ -1,0 +1,88 @@
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+
+namespace sdvo {
+namespace {
+
+using synthetic::errorOf;
+
+StereoFeatures threeFeatures() {
+  std::mt19937 random(1);
+  StereoFeatures features = synthetic::noFeatures(synthetic::camera());
+  synthetic::addFeature(features, 100.0, 50.0, 20.0, synthetic::randomRow(random, 128));
+  synthetic::addFeature(features, 322.5, 236.25, 10.0, synthetic::randomRow(random, 128));
+  synthetic::addFeature(features, 600.0, 400.0, 5.0, synthetic::randomRow(random, 128));
+  return features;
+}
+
+TEST(StereoFeatures, AcceptsConsistentSets) {
+  EXPECT_NO_THROW(threeFeatures().check());
+  EXPECT_NO_THROW(synthetic::noFeatures(synthetic::camera()).check());
+  EXPECT_EQ(threeFeatures().count(), 3);
+}
+
+TEST(StereoFeatures, MeasurementAndPointAgree) {
+  const StereoFeatures features = threeFeatures();
+  EXPECT_LT((features.measurement(0) - Eigen::Vector3d(100.0, 50.0, 80.0)).norm(), 1e-12);
+  // The principal ray at 10 px: depth 400 * 0.5 / 10.
+  EXPECT_LT((features.point(1) - Eigen::Vector3d(0.0, 0.0, 20.0)).norm(), 1e-12);
+  for (int i = 0; i < features.count(); ++i)
+    EXPECT_LT((features.camera.project(features.point(i)) - features.measurement(i)).norm(), 1e-9);
+}
+
+TEST(StereoFeatures, NamesTheArrayOfAnotherLength) {
+  const auto expectNamed = [](const std::string& name, const std::function<void(StereoFeatures&)>& damage) {
+    StereoFeatures features = threeFeatures();
+    damage(features);
+    EXPECT_THROW(features.check(), std::invalid_argument) << name;
+    EXPECT_NE(errorOf([&] { features.check(); }).find(name), std::string::npos) << errorOf([&] { features.check(); });
+  };
+  expectNamed("v", [](StereoFeatures& f) { f.v.pop_back(); });
+  expectNamed("disparity", [](StereoFeatures& f) { f.disparity.push_back(1.f); });
+  expectNamed("dv", [](StereoFeatures& f) { f.dv.clear(); });
+  expectNamed("size", [](StereoFeatures& f) { f.size.pop_back(); });
+  expectNamed("angle", [](StereoFeatures& f) { f.angle.pop_back(); });
+  expectNamed("response", [](StereoFeatures& f) { f.response.pop_back(); });
+  expectNamed("sigma", [](StereoFeatures& f) { f.sigma.pop_back(); });
+  expectNamed("octave", [](StereoFeatures& f) { f.octave.pop_back(); });
+  expectNamed("descriptors", [](StereoFeatures& f) { f.descriptors.pop_back(); });
+}
+
+TEST(StereoFeatures, RefusesNumbersThatMeanNothing) {
+  using Array = std::vector<float> StereoFeatures::*;
+  const auto damaged = [](Array array, float value) {
+    StereoFeatures features = threeFeatures();
+    (features.*array)[1] = value;
+    return errorOf([&] { features.check(); });
+  };
+  constexpr float kNaN = std::numeric_limits<float>::quiet_NaN(), kInf = std::numeric_limits<float>::infinity();
+  const std::vector<std::pair<std::string, Array>> arrays = {{"u", &StereoFeatures::u},
+                                                             {"v", &StereoFeatures::v},
+                                                             {"disparity", &StereoFeatures::disparity},
+                                                             {"dv", &StereoFeatures::dv},
+                                                             {"size", &StereoFeatures::size},
+                                                             {"angle", &StereoFeatures::angle},
+                                                             {"sigma", &StereoFeatures::sigma},
+                                                             {"response", &StereoFeatures::response}};
+  for (const auto& [name, array] : arrays)
+    for (const float bad : {kNaN, kInf, -kInf})
+      EXPECT_NE(damaged(array, bad).find("array " + name + " "), std::string::npos) << name << " = " << bad;
+  const std::vector<std::pair<std::string, Array>> positive = {
+      {"disparity", &StereoFeatures::disparity}, {"size", &StereoFeatures::size}, {"sigma", &StereoFeatures::sigma}};
+  for (const auto& [name, array] : positive)
+    for (const float bad : {0.f, -1.f})
+      EXPECT_NE(damaged(array, bad).find("array " + name + " "), std::string::npos) << name << " = " << bad;
+}
+
+TEST(StereoFeatures, RefusesACameraThatIsNone) {
+  StereoFeatures features = threeFeatures();
+  features.camera.baseline = 0.0;
+  EXPECT_NE(errorOf([&] { features.check(); }).find("baseline"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace sdvo

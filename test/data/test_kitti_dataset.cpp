@@ -1,0 +1,267 @@
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+#include <string>
+
+#include "stereo_descriptor_vo/data/kitti_dataset.hpp"
+
+namespace sdvo {
+namespace {
+
+namespace fs = std::filesystem;
+
+const char kGreyCalibration[] =
+    "P0: 700 0 60 0 0 710 40 0 0 0 1 0\n"
+    "P1: 700 0 60 -350 0 710 40 0 0 0 1 0\n";
+
+cv::Mat noise(int width, int height, int type, int seed) {
+  cv::Mat image(height, width, type);
+  cv::RNG rng(static_cast<std::uint64_t>(seed) + 1);
+  rng.fill(image, cv::RNG::UNIFORM, 0, 256);
+  return image;
+}
+
+std::string errorOf(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const std::runtime_error& e) {
+    return e.what();
+  }
+  return "no error";
+}
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+/// sequences/07 with three grey pairs of 120x80 px in a directory that is removed at the end; each test damages it.
+class KittiDataset : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "sdvo_kitti_XXXXXX").string();
+    ASSERT_NE(mkdtemp(name.data()), nullptr);
+    root_ = name;
+    directory_ = root_ / "sequences" / "07";
+    writeImages("image_0", 3, CV_8UC1);
+    writeImages("image_1", 3, CV_8UC1);
+    writeText("calib.txt", kGreyCalibration);
+    writeText("times.txt", "0.000000e+00\n1.036000e-01\n2.072000e-01\n");
+  }
+  void TearDown() override { fs::remove_all(root_); }
+
+  void writeImages(const std::string& folder, int count, int type) {
+    fs::create_directories(directory_ / folder);
+    for (int i = 0; i < count; ++i) {
+      cv::imwrite((directory_ / folder / ("00000" + std::to_string(i) + ".png")).string(), noise(120, 80, type, i));
+    }
+  }
+  void writeText(const std::string& name, const std::string& text) { std::ofstream(directory_ / name) << text; }
+  std::string path(const std::string& name) const { return (directory_ / name).string(); }
+  KittiSequence open(KittiCameras cameras = KittiCameras::kAny) const {
+    return KittiSequence(directory_.string(), cameras);
+  }
+  std::string openError(KittiCameras cameras = KittiCameras::kAny) const {
+    return errorOf([&] { open(cameras); });
+  }
+
+  fs::path root_, directory_;
+};
+
+TEST_F(KittiDataset, GivesCameraStampsAndImages) {
+  const KittiSequence sequence = open();
+  EXPECT_EQ(sequence.size(), 3);
+  const StereoCamera& camera = sequence.camera();
+  EXPECT_DOUBLE_EQ(camera.fx, 700.0);
+  EXPECT_DOUBLE_EQ(camera.fy, 710.0);
+  EXPECT_DOUBLE_EQ(camera.cx, 60.0);
+  EXPECT_DOUBLE_EQ(camera.cy, 40.0);
+  EXPECT_DOUBLE_EQ(camera.baseline, 0.5);
+  EXPECT_EQ(camera.width, 120);
+  EXPECT_EQ(camera.height, 80);
+  EXPECT_NO_THROW(camera.check());
+  EXPECT_EQ(sequence.stamp(0), 0);
+  EXPECT_EQ(sequence.stamp(1), 103600000);
+  EXPECT_EQ(sequence.stamp(2), 207200000);
+
+  cv::imwrite(path("image_1/000002.png"), cv::Mat(80, 120, CV_8UC1, cv::Scalar(77)));
+  const ImagePair pair = sequence.load(2);
+  EXPECT_EQ(cv::norm(pair.left, noise(120, 80, CV_8UC1, 2), cv::NORM_INF), 0.0);
+  EXPECT_EQ(pair.right.type(), CV_8UC1);
+  EXPECT_EQ(cv::norm(pair.right, cv::Mat(80, 120, CV_8UC1, cv::Scalar(77)), cv::NORM_INF), 0.0);
+}
+
+TEST_F(KittiDataset, BaselineOfTheColourPairIsADifference) {
+  fs::remove_all(directory_ / "image_0");
+  fs::remove_all(directory_ / "image_1");
+  writeImages("image_2", 2, CV_8UC3);
+  writeImages("image_3", 2, CV_8UC3);
+  writeText("calib.txt", std::string(kGreyCalibration) +
+                             "P2: 700 0 60 42 0 710 40 0.2 0 0 1 0.003\nP3: 700 0 60 -308 0 710 40 2 0 0 1 0.003\n");
+  const KittiSequence sequence = open();
+  EXPECT_EQ(sequence.size(), 2);
+  EXPECT_DOUBLE_EQ(sequence.camera().baseline, (42.0 + 308.0) / 700.0);
+  EXPECT_EQ(sequence.load(1).left.type(), CV_8UC1);
+}
+
+TEST_F(KittiDataset, CamerasMayBeChosen) {
+  writeImages("image_2", 2, CV_8UC3);
+  writeImages("image_3", 2, CV_8UC3);
+  writeText("calib.txt", std::string(kGreyCalibration) +
+                             "P2: 600 0 60 42 0 710 40 0 0 0 1 0\nP3: 600 0 60 -308 0 710 40 0 0 0 1 0\n");
+  EXPECT_EQ(open().size(), 3);
+  EXPECT_EQ(open(KittiCameras::kColour).size(), 2);
+  EXPECT_DOUBLE_EQ(open(KittiCameras::kColour).camera().fx, 600.0);
+  fs::remove_all(directory_ / "image_2");
+  EXPECT_TRUE(contains(openError(KittiCameras::kColour), "no image_2"));
+}
+
+TEST_F(KittiDataset, NegativeOrZeroBaselineQuotesBothMatrices) {
+  writeText("calib.txt", "P0: 700 0 60 0 0 710 40 0 0 0 1 0\nP1: 700 0 60 350 0 710 40 0 0 0 1 0\n");
+  const std::string error = openError();
+  EXPECT_TRUE(contains(error, path("calib.txt"))) << error;
+  EXPECT_TRUE(contains(error, "-0.5")) << error;
+  EXPECT_TRUE(contains(error, "P0 has fx = 700.000000, Tx = 0.000000")) << error;
+  EXPECT_TRUE(contains(error, "P1 has fx = 700.000000, Tx = 350.000000")) << error;
+  writeText("calib.txt", "P0: 700 0 60 5 0 710 40 0 0 0 1 0\nP1: 700 0 60 5 0 710 40 0 0 0 1 0\n");
+  EXPECT_TRUE(contains(openError(), "must be positive"));
+}
+
+TEST_F(KittiDataset, BadCalibrationsAreNamed) {
+  writeText("calib.txt", "P0: 700 0 60 0 0 710 40 0 0 0 1 0\n");
+  EXPECT_EQ(openError(), "file '" + path("calib.txt") + "' has no line 'P1:'");
+  writeText("calib.txt", "P0: 700 0 60 0 0 710 40 0 0 0 1 0\nP1: 700 0 60\n");
+  EXPECT_TRUE(contains(openError(), "line 2: expected 12 numbers after 'P1:', found 3")) << openError();
+  writeText("calib.txt", "P0: 700 0 60 0 0 nan 40 0 0 0 1 0\n");
+  EXPECT_TRUE(contains(openError(), "line 1: 'nan' is not a finite number")) << openError();
+  writeText("calib.txt", "P0: 0 0 60 0 0 710 40 0 0 0 1 0\nP1: 0 0 60 -350 0 710 40 0 0 0 1 0\n");
+  EXPECT_TRUE(contains(openError(), "focal lengths of P0 must be positive")) << openError();
+  writeText("calib.txt", "P0: 700 0 60 0 0 710 40 0 0 0 1 0\nP1: 700 0 65 -350 0 710 40 0 0 0 1 0\n");
+  EXPECT_TRUE(contains(openError(), "do not belong to a rectified pair")) << openError();
+  fs::remove(directory_ / "calib.txt");
+  EXPECT_EQ(openError(), "cannot read file '" + path("calib.txt") + "': it does not exist");
+}
+
+TEST_F(KittiDataset, BadTimesAreNamed) {
+  writeText("times.txt", "0.0\n0.1\n");
+  EXPECT_EQ(openError(), "file '" + path("times.txt") + "' has 2 times for 3 images");
+  writeText("times.txt", "0.0\n0.1\n0.1\n");
+  EXPECT_TRUE(contains(openError(), "line 3: time 0.1 s is not later")) << openError();
+  writeText("times.txt", "0.0\nabc\n0.1\n");
+  EXPECT_TRUE(contains(openError(), "line 2: 'abc' is not a finite number")) << openError();
+  writeText("times.txt", "0.0\n\n0.1\n");
+  EXPECT_TRUE(contains(openError(), "line 2: expected one time")) << openError();
+  fs::remove(directory_ / "times.txt");
+  EXPECT_TRUE(contains(openError(), path("times.txt") + "': it does not exist"));
+}
+
+TEST_F(KittiDataset, StampsAreExactToTheNanosecond) {
+  writeText("times.txt", "1403636584.763555584\n1403636584.763555585\n1403636584.813555456\n");
+  const KittiSequence sequence = open();
+  EXPECT_EQ(sequence.stamp(0), 1403636584763555584);
+  EXPECT_EQ(sequence.stamp(1), 1403636584763555585);
+}
+
+TEST_F(KittiDataset, MoreTimesThanImagesAreAnExtract) {
+  writeText("times.txt", "0.0\n0.1\n0.2\n0.3\n0.3\n");
+  EXPECT_EQ(open().size(), 3);
+}
+
+TEST_F(KittiDataset, MissingDirectoriesAndImagesAreNamed) {
+  EXPECT_TRUE(contains(errorOf([] { KittiSequence("/nowhere/06"); }), "'/nowhere/06' does not exist"));
+  fs::remove(directory_ / "image_1" / "000001.png");
+  const std::string error = openError();
+  EXPECT_TRUE(contains(error, "'" + path("image_1/000001.png") + "' is missing")) << error;
+  EXPECT_TRUE(contains(error, "has 3 images")) << error;
+  EXPECT_TRUE(contains(error, "has 2;")) << error;
+  fs::remove_all(directory_ / "image_1");
+  EXPECT_TRUE(contains(openError(), "has no image_1")) << openError();
+  fs::remove_all(directory_ / "image_0");
+  EXPECT_TRUE(contains(openError(), "neither image_0 and image_1 nor image_2 and image_3")) << openError();
+}
+
+TEST_F(KittiDataset, MissingLeftImageAndGapsAreNamed) {
+  fs::remove(directory_ / "image_0" / "000002.png");
+  EXPECT_TRUE(contains(openError(), path("image_0/000002.png") + "' is missing")) << openError();
+  fs::remove(directory_ / "image_1" / "000002.png");
+  EXPECT_EQ(open().size(), 2);
+  fs::remove(directory_ / "image_0" / "000000.png");
+  fs::remove(directory_ / "image_1" / "000000.png");
+  EXPECT_TRUE(contains(openError(), path("image_0/000000.png") + "' is missing")) << openError();
+  fs::remove(directory_ / "image_0" / "000001.png");
+  EXPECT_TRUE(contains(openError(), "has no PNG images")) << openError();
+}
+
+TEST_F(KittiDataset, TruncatedImagesAreRefusedWhereverTheyEnd) {
+  const std::string file = path("image_1/000001.png");
+  std::ifstream stream(file, std::ios::binary);
+  const std::string bytes((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
+  const KittiSequence sequence = open();
+  ASSERT_NO_THROW(sequence.load(1));
+  for (const std::size_t size :
+       {bytes.size() - 1, bytes.size() - 12, bytes.size() / 2, std::size_t{40}, std::size_t{8}}) {
+    std::ofstream(file, std::ios::binary) << bytes.substr(0, size);
+    EXPECT_EQ(errorOf([&] { sequence.load(1); }), "image '" + file + "' is truncated: copy it again") << size;
+  }
+  std::ofstream(file, std::ios::binary) << "";
+  EXPECT_EQ(errorOf([&] { sequence.load(1); }), "image '" + file + "' is not a PNG file");
+}
+
+TEST_F(KittiDataset, DamagedImagesAreRefused) {
+  const std::string file = path("image_0/000001.png");
+  std::ifstream stream(file, std::ios::binary);
+  std::string bytes((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
+  bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 0x55);
+  std::ofstream(file, std::ios::binary) << bytes;
+  EXPECT_TRUE(contains(errorOf([&] { open().load(1); }), "'" + file + "' is damaged"));
+}
+
+TEST_F(KittiDataset, SizesMustAgree) {
+  cv::imwrite(path("image_1/000001.png"), noise(119, 80, CV_8UC1, 5));
+  const std::string error = errorOf([&] { open().load(1); });
+  EXPECT_TRUE(contains(error, path("image_0/000001.png") + "' (120x80)")) << error;
+  EXPECT_TRUE(contains(error, path("image_1/000001.png") + "' (119x80) differ in size")) << error;
+  cv::imwrite(path("image_0/000001.png"), noise(119, 80, CV_8UC1, 5));
+  EXPECT_TRUE(contains(errorOf([&] { open().load(1); }), "is 119x80 but the first one"));
+}
+
+TEST_F(KittiDataset, FramesOutsideAreRefused) {
+  const KittiSequence sequence = open();
+  for (const int i : {-1, 3}) {
+    EXPECT_TRUE(contains(errorOf([&] { sequence.load(i); }), "frame " + std::to_string(i) + " is outside"));
+    EXPECT_TRUE(contains(errorOf([&] { sequence.stamp(i); }), "which has 3 frames"));
+  }
+}
+
+TEST_F(KittiDataset, FindsPosesBesideTheSequence) {
+  EXPECT_FALSE(findKittiPoses(directory_.string()));
+  fs::create_directory(root_ / "poses");
+  std::ofstream(root_ / "poses" / "07.txt") << "1 0 0 0 0 1 0 0 0 0 1 0\n";
+  EXPECT_EQ(findKittiPoses(directory_.string()), (root_ / "poses" / "07.txt").string());
+  EXPECT_EQ(findKittiPoses(directory_.string() + "/"), (root_ / "poses" / "07.txt").string());
+  writeText("poses.txt", "1 0 0 0 0 1 0 0 0 0 1 0\n");
+  EXPECT_EQ(findKittiPoses(directory_.string()), path("poses.txt"));
+}
+
+TEST(KittiRealData, Sequence04) {
+  const char* kitti = std::getenv("KITTI_DIR");
+  if (kitti == nullptr) GTEST_SKIP() << "KITTI_DIR is not set: no real sequence is read";
+  const std::string directory = std::string(kitti) + "/sequences/04";
+  const KittiSequence sequence(directory);
+  EXPECT_EQ(sequence.size(), 51);
+  EXPECT_EQ(sequence.stamp(1), 104128400);
+  EXPECT_NEAR(sequence.camera().baseline, 0.53715, 1e-4);  // the 54 cm that the data set's paper states
+  const ImagePair pair = sequence.load(50);
+  EXPECT_EQ(pair.left.size(), cv::Size(1226, 370));
+  EXPECT_EQ(pair.right.type(), CV_8UC1);
+  EXPECT_TRUE(findKittiPoses(directory));
+}
+
+}  // namespace
+}  // namespace sdvo

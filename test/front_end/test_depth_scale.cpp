@@ -1,0 +1,67 @@
+#include <gtest/gtest.h>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/common/stereo_camera.hpp"
+#include "stereo_descriptor_vo/front_end/depth_scale.hpp"
+
+namespace sdvo {
+namespace {
+
+DepthScaleOptions plainCurve() {
+  DepthScaleOptions options;
+  options.slope = 0.5;
+  options.exponent = 1.0;
+  options.offset = 0.0;
+  options.min_size = 5.0;
+  options.max_size = 30.0;
+  options.constant_size = 9.0;
+  return options;
+}
+
+TEST(DepthScale, IsProportionalToDisparityBetweenTheBounds) {
+  const DepthScale scale(plainCurve());
+  for (const double disparity : {10.0, 17.3, 40.0, 60.0}) EXPECT_NEAR(scale.size(disparity), 0.5 * disparity, 1e-12);
+}
+
+TEST(DepthScale, CoversAFixedCircleInTheWorld) {
+  const DepthScale scale(plainCurve());
+  const StereoCamera camera = synthetic::camera();
+  // size * Z / f is the diameter in the world: slope * baseline, whatever the depth.
+  for (const double depth : {4.0, 9.0, 16.0})
+    EXPECT_NEAR(scale.size(camera.disparity(depth)) * depth / camera.fx, 0.5 * camera.baseline, 1e-12) << depth;
+}
+
+TEST(DepthScale, StaysWithinTheBounds) {
+  const DepthScale scale(plainCurve());
+  for (const double disparity : {0.01, 1.0, 10.0}) EXPECT_EQ(scale.size(disparity), 5.0) << disparity;
+  for (const double disparity : {60.0, 61.0, 1e6}) EXPECT_EQ(scale.size(disparity), 30.0) << disparity;
+}
+
+TEST(DepthScale, FollowsExponentAndOffset) {
+  DepthScaleOptions options = plainCurve();
+  options.exponent = 0.5;
+  options.slope = 2.0;
+  options.offset = 3.0;
+  EXPECT_NEAR(DepthScale(options).size(16.0), 2.0 * 4.0 + 3.0, 1e-12);
+}
+
+TEST(DepthScale, IsConstantWithoutNormalisation) {
+  DepthScaleOptions options = plainCurve();
+  options.scale_normalisation = false;
+  for (const double disparity : {0.5, 20.0, 300.0}) EXPECT_EQ(DepthScale(options).size(disparity), 9.0);
+}
+
+TEST(DepthScale, RefusesBoundsThatLeaveNoSize) {
+  DepthScaleOptions options = plainCurve();
+  options.min_size = 30.5;
+  EXPECT_THROW(DepthScale{options}, std::invalid_argument);
+  const std::string error = synthetic::errorOf([&] { DepthScale{options}; });
+  EXPECT_NE(error.find("min_size"), std::string::npos) << error;
+  options.min_size = options.max_size;
+  EXPECT_EQ(DepthScale(options).size(1.0), 30.0);
+  options.exponent = 0.0;
+  EXPECT_THROW(DepthScale{options}, std::invalid_argument);
+}
+
+}  // namespace
+}  // namespace sdvo

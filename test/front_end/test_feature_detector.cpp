@@ -1,0 +1,238 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numeric>
+#include <utility>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/front_end/feature_detector.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr int kBucket = 50;  // px
+const cv::Size kSize(600, 400);
+
+std::vector<int> bucketCounts(const std::vector<Corner>& corners, cv::Size size, int bucket) {
+  const int columns = (size.width + bucket - 1) / bucket, rows = (size.height + bucket - 1) / bucket;
+  std::vector<int> counts(static_cast<std::size_t>(columns) * rows, 0);
+  for (const Corner& corner : corners)
+    ++counts[static_cast<std::size_t>(static_cast<int>(corner.position.y) / bucket * columns +
+                                      static_cast<int>(corner.position.x) / bucket)];
+  return counts;
+}
+
+/// Corners everywhere, ten times fainter in the left half.
+cv::Mat unevenTexture() {
+  const synthetic::Texture texture(3, 6.0, 24.0);
+  return synthetic::render(kSize, [&](double u, double v) {
+    const double contrast = u < kSize.width / 2.0 ? 0.15 : 1.5;
+    return 128.0 + contrast * (texture.at(u, v) - 128.0);
+  });
+}
+
+/// Length of the overlap of [a0, a1] and [b0, b1].
+double overlap(double a0, double a1, double b0, double b1) {
+  return std::max(0.0, std::min(a1, b1) - std::max(a0, b0));
+}
+
+/// Bright squares on dark ground, every pixel the mean over its area; `corners` receives the true positions.
+cv::Mat squares(std::vector<cv::Point2d>& corners) {
+  std::vector<cv::Rect2d> rectangles;
+  for (int row = 0; row < 6; ++row)
+    for (int column = 0; column < 9; ++column)
+      rectangles.emplace_back(30.0 + 60.0 * column + 0.113 * row + 0.09 * column,
+                              30.0 + 60.0 * row + 0.071 * column + 0.13 * row, 24.37, 22.61);
+  corners.clear();
+  for (const cv::Rect2d& r : rectangles)
+    for (const double x : {r.x, r.x + r.width})
+      for (const double y : {r.y, r.y + r.height}) corners.emplace_back(x, y);
+  return synthetic::render(kSize, [&](double u, double v) {
+    double covered = 0.0;
+    for (const cv::Rect2d& r : rectangles)
+      covered += overlap(u - 0.5, u + 0.5, r.x, r.x + r.width) * overlap(v - 0.5, v + 0.5, r.y, r.y + r.height);
+    return 50.0 + 150.0 * covered;
+  });
+}
+
+TEST(SpreadOverBuckets, ServesEveryBucketBeforeASecondTime) {
+  std::mt19937 random(1);
+  std::vector<Corner> corners;
+  for (int i = 0; i < 500; ++i)  // one crowded bucket of strong corners
+    corners.push_back({cv::Point2f(random() % 50, random() % 50), 1000.f + static_cast<float>(i)});
+  for (int column = 1; column < 12; ++column)  // a weak one in each of the others
+    for (int row = 0; row < 8; ++row) corners.push_back({cv::Point2f(column * 50 + 7, row * 50 + 7), 1.f});
+
+  const std::vector<int> counts = bucketCounts(spreadOverBuckets(corners, kSize, kBucket, 100), kSize, kBucket);
+  EXPECT_EQ(std::accumulate(counts.begin(), counts.end(), 0), 100);
+  for (int column = 1; column < 12; ++column)
+    for (int row = 0; row < 8; ++row) EXPECT_EQ(counts[static_cast<std::size_t>(row * 12 + column)], 1);
+  EXPECT_EQ(counts[0], 100 - 11 * 8);
+}
+
+TEST(SpreadOverBuckets, KeepsTheStrongestOfABucket) {
+  std::vector<Corner> corners;
+  for (int i = 0; i < 20; ++i) corners.push_back({cv::Point2f(i, i), static_cast<float>((i * 7) % 20)});
+  const std::vector<Corner> kept = spreadOverBuckets(corners, kSize, kBucket, 5);
+  ASSERT_EQ(kept.size(), 5u);
+  for (const Corner& corner : kept) EXPECT_GE(corner.response, 15.f);
+}
+
+TEST(SpreadOverBuckets, DoesNotDependOnTheOrderOfTheInput) {
+  std::mt19937 random(2);
+  std::vector<Corner> corners;
+  for (int i = 0; i < 2000; ++i)  // many equal responses
+    corners.push_back({cv::Point2f(random() % 600, i % 400), static_cast<float>(random() % 4)});
+  const std::vector<Corner> expected = spreadOverBuckets(corners, kSize, kBucket, 300);
+  std::shuffle(corners.begin(), corners.end(), random);
+  const std::vector<Corner> shuffled = spreadOverBuckets(corners, kSize, kBucket, 300);
+  ASSERT_EQ(shuffled.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) EXPECT_EQ(shuffled[i].position, expected[i].position);
+}
+
+TEST(SpreadOverBuckets, TakesPositionsOutsideTheImage) {
+  const std::vector<Corner> corners = {{cv::Point2f(-3.f, -2.f), 1.f}, {cv::Point2f(700.f, 500.f), 1.f}};
+  EXPECT_EQ(spreadOverBuckets(corners, kSize, kBucket, 10).size(), 2u);
+  EXPECT_TRUE(spreadOverBuckets({}, kSize, kBucket, 10).empty());
+}
+
+TEST(FeatureDetector, RefusesOptionsOutOfRange) {
+  FeatureDetectorOptions options;
+  options.type = "unheard_of";
+  EXPECT_THROW(FeatureDetector{options}, std::invalid_argument);
+  options = {};
+  options.max_features = 0;
+  EXPECT_THROW(FeatureDetector{options}, std::invalid_argument);
+}
+
+class EveryDetector : public testing::TestWithParam<const char*> {
+ protected:
+  static FeatureDetectorOptions options() {
+    FeatureDetectorOptions options;
+    options.type = GetParam();
+    options.bucket_size = kBucket;
+    options.fast_min_threshold = 5;
+    options.corner_quality = 1e-6;
+    return options;
+  }
+};
+
+/// Those that look at the full image alone, whose positions are those of corners; the others find blobs at any scale.
+class CornerDetector : public EveryDetector {};
+
+TEST_P(CornerDetector, SpreadsCornersEvenlyOverAnUnevenImage) {
+  FeatureDetectorOptions uneven = options();
+  uneven.max_features = 2 * 12 * 8;  // two for every bucket
+  uneven.subpixel = false;           // refinement may carry a corner over the edge of its bucket
+  const std::vector<Corner> corners = FeatureDetector(uneven).detect(unevenTexture());
+  EXPECT_EQ(corners.size(), 192u);
+  for (const int count : bucketCounts(corners, kSize, kBucket)) EXPECT_EQ(count, 2);
+}
+
+TEST_P(EveryDetector, RespectsTheLargestNumber) {
+  const cv::Mat image = unevenTexture();
+  for (const int max_features : {1, 37, 150}) {
+    FeatureDetectorOptions few = options();
+    few.max_features = max_features;
+    EXPECT_EQ(FeatureDetector(few).detect(image).size(), static_cast<std::size_t>(max_features));
+  }
+}
+
+TEST_P(EveryDetector, FindsNothingInABlankImage) {
+  for (const int grey : {0, 128, 255})
+    EXPECT_TRUE(FeatureDetector(options()).detect(cv::Mat(kSize, CV_8U, cv::Scalar(grey))).empty()) << grey;
+}
+
+TEST_P(EveryDetector, IsDeterministic) {
+  const cv::Mat image = unevenTexture();
+  const FeatureDetector detector(options());
+  const std::vector<Corner> first = detector.detect(image);
+  detector.detect(cv::Mat(kSize, CV_8U, cv::Scalar(0)));
+  const std::vector<Corner> second = detector.detect(image.clone());
+  ASSERT_EQ(first.size(), second.size());
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    EXPECT_EQ(first[i].position, second[i].position);
+    EXPECT_EQ(first[i].response, second[i].response);
+  }
+}
+
+TEST_P(EveryDetector, StaysInsideTheImage) {
+  for (const Corner& corner : FeatureDetector(options()).detect(unevenTexture())) {
+    EXPECT_TRUE(corner.position.x >= 0.f && corner.position.x <= kSize.width - 1.f) << corner.position;
+    EXPECT_TRUE(corner.position.y >= 0.f && corner.position.y <= kSize.height - 1.f) << corner.position;
+  }
+}
+
+/// Differences found - true (px) of those true positions near which a corner was found at all.
+std::vector<std::pair<std::size_t, cv::Point2d>> locationErrors(const std::vector<Corner>& corners,
+                                                                const std::vector<cv::Point2d>& truth) {
+  constexpr double kSearchRadius = 4.0;  // px
+  std::vector<std::pair<std::size_t, cv::Point2d>> errors;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    cv::Point2d nearest(kSearchRadius, kSearchRadius);
+    for (const Corner& corner : corners) {
+      const cv::Point2d difference = cv::Point2d(corner.position) - truth[i];
+      if (cv::norm(difference) < cv::norm(nearest)) nearest = difference;
+    }
+    if (cv::norm(nearest) < kSearchRadius) errors.emplace_back(i, nearest);
+  }
+  return errors;
+}
+
+TEST_P(CornerDetector, LocatesDotsBetweenPixels) {
+  // All gradients of a round dot point at its centre, so that its position is not a matter of definition.
+  constexpr double kTolerance = 0.15, kSigma = 1.3;  // px
+  std::vector<cv::Point2d> truth;
+  for (int row = 0; row < 9; ++row)
+    for (int column = 0; column < 14; ++column)
+      truth.emplace_back(30.0 + 40.0 * column + 0.083 * row - 0.4, 30.0 + 40.0 * row + 0.067 * column - 0.45);
+  const cv::Mat image = synthetic::render(kSize, [&](double u, double v) {
+    double sum = 40.0;
+    for (const cv::Point2d& dot : truth)
+      sum += 180.0 * std::exp(-0.5 * ((u - dot.x) * (u - dot.x) + (v - dot.y) * (v - dot.y)) / (kSigma * kSigma));
+    return sum;
+  });
+  FeatureDetectorOptions precise = options();
+  precise.corner_quality = 0.1;
+  const auto errors = locationErrors(FeatureDetector(precise).detect(image), truth);
+  EXPECT_GE(errors.size(), truth.size() * 9 / 10);
+  for (const auto& [i, error] : errors) EXPECT_LT(cv::norm(error), kTolerance) << "at " << truth[i] << " by " << error;
+}
+
+TEST_P(CornerDetector, LocatesCornersOfSquaresBetweenPixels) {
+  // Sampling rounds a square's corner, which carries every detected corner inwards by the same amount in x and in y.
+  // That amount is bounded; what must be small is how much positions scatter about it with the offset from the pixel
+  // grid.
+  constexpr double kTolerance = 0.2, kLargestBias = 0.3;  // px
+  std::vector<cv::Point2d> truth;  // of each square: upper left, lower left, upper right, lower right
+  const cv::Mat image = squares(truth);
+  FeatureDetectorOptions precise = options();
+  precise.corner_quality = 0.1;
+  const auto errors = locationErrors(FeatureDetector(precise).detect(image), truth);
+  ASSERT_GE(errors.size(), truth.size() * 9 / 10);
+  const auto inwards = [](std::size_t i) { return cv::Point2d(i % 4 < 2 ? 1.0 : -1.0, i % 2 == 0 ? 1.0 : -1.0); };
+  double bias = 0.0;
+  cv::Point2d offset;
+  for (const auto& [i, error] : errors) {
+    bias += error.dot(inwards(i)) / (2.0 * static_cast<double>(errors.size()));
+    offset += error / static_cast<double>(errors.size());
+  }
+  EXPECT_LT(std::abs(bias), kLargestBias);
+  // Corners half-way between two pixels may tie and be answered a pixel off; that concerns single ones.
+  std::size_t located = 0;
+  for (const auto& [i, error] : errors) located += cv::norm(error - bias * inwards(i)) < kTolerance;
+  EXPECT_GE(located, errors.size() * 98 / 100) << "of " << errors.size();
+  // The four corners mirror each other: what is left in the mean is an offset of the coordinates.
+  EXPECT_NEAR(offset.x, 0.0, 0.03);
+  EXPECT_NEAR(offset.y, 0.0, 0.03);
+}
+
+#if CV_VERSION_MAJOR > 4 || (CV_VERSION_MAJOR == 4 && CV_VERSION_MINOR >= 4)
+INSTANTIATE_TEST_SUITE_P(Types, EveryDetector, testing::Values("fast", "agast", "gftt", "harris", "orb", "sift"));
+#else
+INSTANTIATE_TEST_SUITE_P(Types, EveryDetector, testing::Values("fast", "agast", "gftt", "harris", "orb"));
+#endif
+INSTANTIATE_TEST_SUITE_P(Types, CornerDetector, testing::Values("fast", "agast", "gftt", "harris"));
+
+}  // namespace
+}  // namespace sdvo

@@ -1,0 +1,160 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
+
+namespace sdvo {
+namespace {
+
+using synthetic::errorOf;
+
+struct Pair {
+  cv::Mat left, right;
+};
+
+/// A textured plane across the optical axis; wavelengths from 6 px on.
+Pair planeAt(double depth, unsigned seed = 31) {
+  const StereoCamera camera = synthetic::camera();
+  const double metres_per_pixel = depth / camera.fx;
+  const synthetic::Texture texture(seed, 6.0 * metres_per_pixel, 96.0 * metres_per_pixel);
+  return {synthetic::renderPlane(texture, camera, depth),
+          synthetic::renderPlane(texture, camera, depth, camera.baseline)};
+}
+
+FeatureExtractorOptions fewFeatures() {
+  FeatureExtractorOptions options;
+  options.detector.max_features = 400;
+  return options;
+}
+
+void expectEqual(const StereoFeatures& a, const StereoFeatures& b) {
+  EXPECT_EQ(a.u, b.u);
+  EXPECT_EQ(a.v, b.v);
+  EXPECT_EQ(a.disparity, b.disparity);
+  EXPECT_EQ(a.dv, b.dv);
+  EXPECT_EQ(a.size, b.size);
+  EXPECT_EQ(a.angle, b.angle);
+  EXPECT_EQ(a.response, b.response);
+  EXPECT_TRUE(synthetic::equalMats(a.descriptors, b.descriptors));
+}
+
+TEST(FeatureExtractor, MeasuresAPlaneAtKnownDepth) {
+  const StereoCamera camera = synthetic::camera();
+  FeatureExtractorOptions options = fewFeatures();
+  options.size_curve.slope = 0.8;
+  options.size_curve.min_size = 4.0;
+  options.size_curve.max_size = 40.0;
+  const FeatureExtractor extractor(options);
+  for (const double depth : {8.0, 16.0}) {
+    const Pair pair = planeAt(depth);
+    const StereoFeatures features = extractor.extract(camera, pair.left, pair.right, 1234);
+    ASSERT_NO_THROW(features.check());
+    EXPECT_GE(features.count(), 200);
+    EXPECT_EQ(features.stamp, 1234);
+    EXPECT_EQ(features.camera, camera);
+    EXPECT_EQ(features.descriptor, "freak");
+    EXPECT_EQ(features.layout, "left+right");
+    EXPECT_EQ(features.descriptors.cols, 128);
+    EXPECT_TRUE(features.report.status.empty()) << features.report.status;
+    EXPECT_LE(features.report.detected, 400);
+    EXPECT_GE(features.report.detected, features.report.stereo_matched);
+    EXPECT_GE(features.report.stereo_matched, features.count());
+
+    const double disparity = camera.fx * camera.baseline / depth;
+    int precise = 0;
+    for (int i = 0; i < features.count(); ++i) {
+      const std::size_t k = static_cast<std::size_t>(i);
+      precise += std::abs(features.disparity[k] - disparity) < 0.1 && std::abs(features.dv[k]) < 0.1;
+      EXPECT_NEAR(features.size[k], 0.8 * features.disparity[k], 1e-4);
+    }
+    // Windows at the borders see too little.
+    EXPECT_GE(precise, features.count() * 95 / 100) << "depth " << depth;
+  }
+}
+
+TEST(FeatureExtractor, MeasuresBrightnessAndSharpness) {
+  const StereoCamera camera = synthetic::camera();
+  // Left: a ramp of one grey level per pixel that folds at 200; right: a constant.
+  const cv::Mat left = synthetic::render({camera.width, camera.height}, [](double u, double) {
+    const double x = std::fmod(u, 400.0);
+    return x < 200.0 ? x : 400.0 - x;
+  });
+  const cv::Mat right(camera.height, camera.width, CV_8U, cv::Scalar(77));
+  const ExtractionReport report = FeatureExtractor(fewFeatures()).extract(camera, left, right, 0).report;
+  double mean = 0.0;
+  for (int u = 0; u < camera.width; ++u) mean += left.at<std::uint8_t>(0, u) / static_cast<double>(camera.width);
+  EXPECT_NEAR(report.mean_intensity[0], mean, 0.5);
+  EXPECT_NEAR(report.sharpness[0], 1.0, 0.01);
+  EXPECT_NEAR(report.mean_intensity[1], 77.0, 1e-9);
+  EXPECT_NEAR(report.sharpness[1], 0.0, 1e-9);
+}
+
+TEST(FeatureExtractor, RefusesWrongImagesNamingTheSide) {
+  const StereoCamera camera = synthetic::camera();
+  const FeatureExtractor extractor(fewFeatures());
+  const cv::Mat good(camera.height, camera.width, CV_8U, cv::Scalar(100));
+  const cv::Mat narrow = good.colRange(0, camera.width - 1).clone(), low = good.rowRange(0, camera.height - 1).clone();
+  const cv::Mat colour(camera.height, camera.width, CV_8UC3, cv::Scalar(100));
+  const cv::Mat deep(camera.height, camera.width, CV_16U, cv::Scalar(100));
+  for (const cv::Mat& bad : {narrow, low, colour, deep, cv::Mat()}) {
+    EXPECT_THROW(extractor.extract(camera, bad, good, 0), std::invalid_argument);
+    EXPECT_EQ(errorOf([&] { extractor.extract(camera, bad, good, 0); }).rfind("left image", 0), 0u);
+    EXPECT_THROW(extractor.extract(camera, good, bad, 0), std::invalid_argument);
+    EXPECT_EQ(errorOf([&] { extractor.extract(camera, good, bad, 0); }).rfind("right image", 0), 0u);
+  }
+  const std::string error = errorOf([&] { extractor.extract(camera, narrow, good, 0); });
+  EXPECT_NE(error.find("639x480"), std::string::npos) << error;
+  EXPECT_NE(error.find("640x480"), std::string::npos) << error;
+  StereoCamera uncalibrated = camera;
+  uncalibrated.fx = 0.0;
+  EXPECT_THROW(extractor.extract(uncalibrated, good, good, 0), std::invalid_argument);
+}
+
+TEST(FeatureExtractor, SaysWhyAPairGivesNothing) {
+  const StereoCamera camera = synthetic::camera();
+  const FeatureExtractor extractor(fewFeatures());
+  const cv::Mat black(camera.height, camera.width, CV_8U, cv::Scalar(0));
+  const Pair pair = planeAt(10.0);
+  const auto expectEmpty = [&](const cv::Mat& left, const cv::Mat& right, const std::string& word) {
+    const StereoFeatures features = extractor.extract(camera, left, right, 5);
+    EXPECT_EQ(features.count(), 0);
+    EXPECT_NO_THROW(features.check());
+    EXPECT_NE(features.report.status.find(word), std::string::npos) << features.report.status;
+  };
+  expectEmpty(black, black, "corners");
+  expectEmpty(black, pair.right, "corners");
+  expectEmpty(pair.left, black, "stereo");
+  expectEmpty(pair.right, pair.left, "stereo");  // swapped
+
+  FeatureExtractorOptions huge = fewFeatures();
+  huge.size_curve.min_size = 150.0;  // reaches 471 px
+  huge.size_curve.max_size = 150.0;
+  const StereoFeatures outside = FeatureExtractor(huge).extract(camera, pair.left, pair.right, 5);
+  EXPECT_EQ(outside.count(), 0);
+  EXPECT_NE(outside.report.status.find("border"), std::string::npos) << outside.report.status;
+}
+
+TEST(FeatureExtractor, IsStateless) {
+  const StereoCamera camera = synthetic::camera();
+  const FeatureExtractor extractor(fewFeatures());
+  const Pair first = planeAt(8.0), second = planeAt(12.0, 32);
+  const StereoFeatures before = extractor.extract(camera, first.left, first.right, 1);
+  const StereoFeatures other = extractor.extract(camera, second.left, second.right, 2);
+  const StereoFeatures after = extractor.extract(camera, first.left, first.right, 3);
+  EXPECT_NE(before.u, other.u);
+  expectEqual(before, after);
+  expectEqual(before, FeatureExtractor(fewFeatures()).extract(camera, first.left, first.right, 4));
+}
+
+TEST(FeatureExtractor, LeavesItsImagesAlone) {
+  const Pair pair = planeAt(8.0);
+  const cv::Mat left = pair.left.clone(), right = pair.right.clone();
+  FeatureExtractor(fewFeatures()).extract(synthetic::camera(), pair.left, pair.right, 1);
+  EXPECT_TRUE(synthetic::equalMats(pair.left, left));
+  EXPECT_TRUE(synthetic::equalMats(pair.right, right));
+}
+
+}  // namespace
+}  // namespace sdvo

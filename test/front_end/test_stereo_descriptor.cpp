@@ -1,0 +1,153 @@
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/front_end/freak.hpp"
+#include "stereo_descriptor_vo/front_end/stereo_descriptor.hpp"
+
+namespace sdvo {
+namespace {
+
+const cv::Size kSize(320, 200);
+
+cv::Mat view(unsigned seed) {
+  const synthetic::Texture texture(seed, 5.0, 80.0);
+  return synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); });
+}
+
+DescriptorOptions withLayout(const std::string& layout, bool oriented = false) {
+  DescriptorOptions options;
+  options.layout = layout;
+  options.oriented = oriented;
+  return options;
+}
+
+/// With a reach of 22 px: fits, leaves the left view, leaves the right view, fits, leaves it at the bottom, fits.
+std::vector<StereoKeypoint> mixedKeypoints() {
+  return {{100.25f, 90.f, 80.f, 90.4f, 7.f}, {310.f, 90.f, 280.f, 90.f, 7.f},   {40.f, 60.f, 10.f, 60.f, 7.f},
+          {200.f, 50.f, 150.5f, 50.f, 7.f},  {200.f, 190.f, 150.f, 190.f, 7.f}, {60.f, 100.f, 50.f, 101.f, 9.6f}};
+}
+
+const std::vector<int> kFitting = {0, 3, 5};
+
+TEST(StereoDescriptor, RowsStayAlignedWhenNeighbourhoodsLeaveAView) {
+  const cv::Mat left = view(1), right = view(2);
+  const std::vector<StereoKeypoint> keypoints = mixedKeypoints();
+  for (const std::string layout : {"left", "left+right"}) {
+    const DescribedKeypoints described = StereoDescriptor(withLayout(layout)).describe(left, right, keypoints);
+    ASSERT_EQ(described.index, kFitting) << layout;
+    ASSERT_EQ(described.rows.rows, 3);
+    ASSERT_EQ(described.angle, std::vector<float>(3, -1.f));
+    for (int row = 0; row < described.rows.rows; ++row) {
+      // The row of a key point is that of the key point alone.
+      const StereoKeypoint& keypoint =
+          keypoints[static_cast<std::size_t>(described.index[static_cast<std::size_t>(row)])];
+      const DescribedKeypoints alone = StereoDescriptor(withLayout(layout)).describe(left, right, {keypoint});
+      EXPECT_TRUE(synthetic::equalMats(described.rows.row(row), alone.rows)) << layout << " row " << row;
+    }
+  }
+}
+
+TEST(StereoDescriptor, IsTheConcatenationOfBothViews) {
+  const cv::Mat left = view(1), right = view(2);
+  const std::vector<StereoKeypoint> keypoints = mixedKeypoints();
+  const DescribedKeypoints both = StereoDescriptor(withLayout("left+right")).describe(left, right, keypoints);
+  ASSERT_EQ(both.index, kFitting);
+  ASSERT_EQ(both.rows.cols, 2 * Freak::kBytes);
+  const Freak left_view(left), right_view(right);
+  for (int row = 0; row < both.rows.rows; ++row) {
+    const StereoKeypoint& k = keypoints[static_cast<std::size_t>(both.index[static_cast<std::size_t>(row)])];
+    cv::Mat expected(1, 2 * Freak::kBytes, CV_8U);
+    left_view.describe({k.u_left, k.v_left, k.size, -1.f}, expected.ptr());
+    right_view.describe({k.u_right, k.v_right, k.size, -1.f}, expected.ptr() + Freak::kBytes);
+    EXPECT_TRUE(synthetic::equalMats(both.rows.row(row), expected)) << "row " << row;
+  }
+  const DescribedKeypoints left_alone = StereoDescriptor(withLayout("left")).describe(left, right, keypoints);
+  EXPECT_TRUE(synthetic::equalMats(both.rows.colRange(0, Freak::kBytes), left_alone.rows));
+}
+
+/// What fits is described as ever; what does not, as if the image went on as its outermost pixels.
+TEST(StereoDescriptor, ExtendsTheBorder) {
+  constexpr int kMargin = 100;
+  const cv::Mat left = view(1), right = view(2);
+  cv::Mat large_left, large_right;
+  cv::copyMakeBorder(left, large_left, kMargin, kMargin, kMargin, kMargin, cv::BORDER_REPLICATE);
+  cv::copyMakeBorder(right, large_right, kMargin, kMargin, kMargin, kMargin, cv::BORDER_REPLICATE);
+  // Inside, beyond the left view's top, beyond the right view's left, and two that not even a reach of 22 px fits.
+  const std::vector<StereoKeypoint> keypoints = {{160.25f, 95.f, 150.f, 95.4f, 20.f},
+                                                 {200.f, 22.f, 180.f, 22.f, 20.f},
+                                                 {50.5f, 90.f, 22.f, 90.5f, 30.f},
+                                                 {200.f, 21.f, 180.f, 21.f, 20.f},
+                                                 {50.f, 90.f, 21.f, 90.f, 8.f}};
+  for (const bool oriented : {false, true}) {
+    DescriptorOptions options = withLayout("left+right", oriented);
+    options.extend_border = true;
+    const DescribedKeypoints described = StereoDescriptor(options).describe(left, right, keypoints);
+    ASSERT_EQ(described.index, (std::vector<int>{0, 1, 2}));
+    const StereoDescriptor plain(withLayout("left+right", oriented));
+    for (int row = 0; row < described.rows.rows; ++row) {
+      StereoKeypoint k = keypoints[static_cast<std::size_t>(row)];
+      k.u_left += kMargin, k.v_left += kMargin, k.u_right += kMargin, k.v_right += kMargin;
+      const DescribedKeypoints expected = plain.describe(large_left, large_right, {k});
+      ASSERT_EQ(expected.rows.rows, 1);
+      // Floats lose digits when positions move by the margin; few bits depend on those.
+      EXPECT_LE(cv::norm(described.rows.row(row), expected.rows, cv::NORM_HAMMING), 3.0) << "row " << row;
+      EXPECT_NEAR(described.angle[static_cast<std::size_t>(row)], expected.angle[0], 1e-3);
+    }
+    EXPECT_EQ(plain.describe(left, right, keypoints).index, (std::vector<int>{0}));
+  }
+}
+
+TEST(StereoDescriptor, HalvesOfEqualViewsAreEqual) {
+  const cv::Mat image = view(1);
+  for (const bool oriented : {false, true}) {
+    const DescribedKeypoints described = StereoDescriptor(withLayout("left+right", oriented))
+                                             .describe(image, image, {{100.3f, 90.7f, 100.3f, 90.7f, 8.5f}});
+    ASSERT_EQ(described.rows.rows, 1);
+    EXPECT_TRUE(synthetic::equalMats(described.rows.colRange(0, Freak::kBytes),
+                                     described.rows.colRange(Freak::kBytes, 2 * Freak::kBytes)));
+  }
+}
+
+TEST(StereoDescriptor, OrientedHalvesTurnByTheLeftAngle) {
+  const cv::Mat left = view(1), right = view(2);
+  const std::vector<StereoKeypoint> keypoints = mixedKeypoints();
+  const DescribedKeypoints described =
+      StereoDescriptor(withLayout("left+right", true)).describe(left, right, keypoints);
+  ASSERT_EQ(described.index, kFitting);
+  const Freak left_view(left), right_view(right);
+  for (std::size_t row = 0; row < described.index.size(); ++row) {
+    const StereoKeypoint& k = keypoints[static_cast<std::size_t>(described.index[row])];
+    const float angle = left_view.orientation({k.u_left, k.v_left, k.size, -1.f});
+    EXPECT_NEAR(std::remainder(described.angle[row] - angle, 2.0 * CV_PI), 0.0, 1e-5);
+    EXPECT_GE(described.angle[row], 0.f);
+    EXPECT_LT(described.angle[row], static_cast<float>(2.0 * CV_PI));
+    cv::Mat expected(1, 2 * Freak::kBytes, CV_8U);
+    left_view.describe({k.u_left, k.v_left, k.size, angle}, expected.ptr());
+    right_view.describe({k.u_right, k.v_right, k.size, angle}, expected.ptr() + Freak::kBytes);
+    EXPECT_TRUE(synthetic::equalMats(described.rows.row(static_cast<int>(row)), expected)) << "row " << row;
+  }
+}
+
+TEST(StereoDescriptor, TakesNoKeypoints) {
+  const cv::Mat image = view(1);
+  const DescribedKeypoints none = StereoDescriptor(withLayout("left+right")).describe(image, image, {});
+  EXPECT_TRUE(none.index.empty());
+  EXPECT_TRUE(none.angle.empty());
+  EXPECT_EQ(none.rows.rows, 0);
+  const DescribedKeypoints outside =
+      StereoDescriptor(withLayout("left")).describe(image, image, {{1.f, 1.f, 1.f, 1.f, 7.f}});
+  EXPECT_TRUE(outside.index.empty());
+  EXPECT_EQ(outside.rows.rows, 0);
+}
+
+TEST(StereoDescriptor, RefusesUnknownNames) {
+  EXPECT_THROW(StereoDescriptor{withLayout("right")}, std::invalid_argument);
+  DescriptorOptions options;
+  options.type = "unheard_of";
+  EXPECT_NE(synthetic::errorOf([&] { StereoDescriptor{options}; }).find("unheard_of"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace sdvo

@@ -1,0 +1,417 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <limits>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr std::int64_t kPeriod = 100000000;  // ns between pairs
+constexpr double kStep = 0.8;                // m between pairs
+
+/// A drive forwards through a left bend, with some sway.
+Eigen::Isometry3d drivePose(int i) {
+  Vector6d step;
+  step << 0.0, 0.0, kStep, 0.0, -0.015, 0.0;
+  Vector6d sway;
+  sway << 0.0, 0.02 * std::sin(0.7 * i), 0.0, 0.004 * std::sin(0.5 * i), 0.0, 0.006 * std::sin(0.9 * i);
+  Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
+  for (int k = 0; k < i; ++k) T_origin_camera = T_origin_camera * expSE3(step);
+  return T_origin_camera * expSE3(sway);
+}
+
+const synthetic::World& street() {
+  static const synthetic::World world = synthetic::randomWorld(1, 5000, {-40.0, -4.0, -5.0}, {30.0, 3.0, 70.0});
+  return world;
+}
+
+std::int64_t stampOf(int i) {
+  return 1000000000 + i * kPeriod;
+}
+
+/// Pair i of the drive; pixels are off by `noise` px each.
+StereoFeatures pairOf(int i, double noise = 0.0) {
+  synthetic::Sighting sighting;
+  sighting.noise = noise;
+  sighting.flipped = 0.03;
+  sighting.strangers = 60;
+  sighting.max_depth = 25.0;
+  sighting.seed = 100 + static_cast<unsigned>(i);
+  return synthetic::observe(street(), synthetic::camera(), drivePose(i).inverse(), stampOf(i), sighting);
+}
+
+/// Pair i in which nothing is seen.
+StereoFeatures blindPair(int i) {
+  return synthetic::noFeatures(synthetic::camera(), stampOf(i));
+}
+
+/// Pair i in which everything is new, as after a jump to another place.
+StereoFeatures strangePair(int i) {
+  synthetic::Sighting sighting;
+  sighting.seed = 900 + static_cast<unsigned>(i);
+  const synthetic::World elsewhere =
+      synthetic::randomWorld(500 + static_cast<unsigned>(i), 600, {-10.0, -4.0, 3.0}, {10.0, 3.0, 25.0});
+  return synthetic::observe(elsewhere, synthetic::camera(), Eigen::Isometry3d::Identity(), stampOf(i), sighting);
+}
+
+double distanceBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
+  return (a.translation() - b.translation()).norm();
+}
+
+double angleBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
+  return logSO3(a.linear().transpose() * b.linear()).norm();
+}
+
+Eigen::Isometry3d trueSinceStart(int i, int start = 0) {
+  return drivePose(start).inverse() * drivePose(i);
+}
+
+void expectCovariance(const Matrix6d& covariance) {
+  EXPECT_TRUE(covariance.allFinite());
+  EXPECT_LT((covariance - covariance.transpose()).norm(), 1e-9 * (1.0 + covariance.norm()));
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(covariance);
+  EXPECT_GE(solver.eigenvalues().minCoeff(), -1e-12 * (1.0 + covariance.norm()));
+}
+
+void expectHealthy(const OdometryResult& result) {
+  EXPECT_TRUE(result.T_origin_camera.matrix().allFinite());
+  EXPECT_TRUE(result.T_previous_current.matrix().allFinite());
+  const Eigen::Matrix3d& rotation = result.T_origin_camera.linear();
+  EXPECT_LT((rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm(), 1e-9);
+  expectCovariance(result.pose_covariance);
+  expectCovariance(result.motion_covariance);
+  EXPECT_EQ(result.reason.empty(), result.state == TrackingState::kTracking && result.has_motion);
+}
+
+/// Follows the pairs 0 … last of the drive; the last result.
+OdometryResult follow(VisualOdometry& odometry, int last, int first = 0) {
+  OdometryResult result;
+  for (int i = first; i <= last; ++i) result = odometry.update(pairOf(i));
+  return result;
+}
+
+TEST(VisualOdometry, FirstPairIsTheOrigin) {
+  VisualOdometry odometry({});
+  const OdometryResult first = odometry.update(pairOf(0));
+  EXPECT_EQ(first.state, TrackingState::kTracking);
+  EXPECT_TRUE(first.has_pose);
+  EXPECT_FALSE(first.has_motion);
+  EXPECT_EQ(first.stamp, stampOf(0));
+  EXPECT_EQ(first.features, pairOf(0).count());
+  EXPECT_TRUE(first.T_origin_camera.isApprox(Eigen::Isometry3d::Identity()));
+  EXPECT_EQ(first.distance, 0.0);
+  expectHealthy(first);
+}
+
+TEST(VisualOdometry, FollowsAnExactDrive) {
+  VisualOdometry odometry({});
+  double travelled = 0.0;
+  for (int i = 0; i <= 30; ++i) {
+    const OdometryResult result = odometry.update(pairOf(i));
+    ASSERT_EQ(result.state, TrackingState::kTracking) << i << ": " << result.reason;
+    ASSERT_TRUE(result.has_pose);
+    expectHealthy(result);
+    // Pixels are stored as 32-bit floats, good to 3e-5 px: at 25 m that is 1e-4 m of depth for one point.
+    EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(i)), 1e-3) << i;
+    EXPECT_LT(angleBetween(result.T_origin_camera, trueSinceStart(i)), 1e-4) << i;
+    if (i == 0) continue;
+    EXPECT_TRUE(result.has_motion);
+    EXPECT_NEAR(result.dt, 0.1, 1e-12);
+    EXPECT_LT(distanceBetween(result.T_previous_current, trueSinceStart(i, i - 1)), 1e-3);
+    travelled += trueSinceStart(i, i - 1).translation().norm();
+    EXPECT_NEAR(result.distance, travelled, 0.01);
+    EXPECT_GT(result.inliers, 50);
+    EXPECT_LE(result.inliers, result.matches);
+    EXPECT_LE(result.matches, result.features);
+    EXPECT_EQ(result.inlier_matches.size(), static_cast<std::size_t>(result.inliers));
+    EXPECT_GT(result.coverage, 0.5);
+    EXPECT_LT(result.rms, 0.01);
+  }
+}
+
+TEST(VisualOdometry, FollowsANoisyDriveAndKnowsHowWell) {
+  constexpr double kNoise = 0.3;  // px
+  VisualOdometry odometry({});
+  OdometryResult result;
+  double previous_trace = 0.0, mean_step = 0.0;
+  constexpr int kPairs = 40;
+  for (int i = 0; i <= kPairs; ++i) {
+    result = odometry.update(pairOf(i, kNoise));
+    ASSERT_EQ(result.state, TrackingState::kTracking) << i << ": " << result.reason;
+    expectHealthy(result);
+    EXPECT_GE(result.pose_covariance.trace(), previous_trace) << i;
+    previous_trace = result.pose_covariance.trace();
+    if (i == 0) continue;
+    const Vector6d error = logSE3(trueSinceStart(i, i - 1).inverse() * result.T_previous_current);
+    mean_step += error.dot(result.motion_covariance.llt().solve(error)) / kPairs;
+  }
+  EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(kPairs)), 0.01 * kPairs * kStep);
+  EXPECT_LT(angleBetween(result.T_origin_camera, trueSinceStart(kPairs)), 0.01);
+  // Normalised squares of six numbers average 6. Robust weights, noise of the reference's own points and what one
+  // frame's noise leaves to the next shift that; a factor of four either way is dishonest.
+  EXPECT_GT(mean_step, 1.5);
+  EXPECT_LT(mean_step, 24.0);
+  const Vector6d final_error = logSE3(trueSinceStart(kPairs).inverse() * result.T_origin_camera);
+  EXPECT_LT(final_error.dot(result.pose_covariance.llt().solve(final_error)), 4.0 * 38.0);
+}
+
+TEST(VisualOdometry, WaitsForTheFirstFeatures) {
+  VisualOdometry odometry({});
+  for (int i = 0; i < 3; ++i) {
+    const OdometryResult result = odometry.update(blindPair(i));
+    EXPECT_EQ(result.state, TrackingState::kWaiting);
+    EXPECT_FALSE(result.has_pose);
+    EXPECT_FALSE(result.has_motion);
+    EXPECT_FALSE(result.reason.empty());
+    expectHealthy(result);
+  }
+  const OdometryResult first = odometry.update(pairOf(3));
+  EXPECT_TRUE(first.has_pose);
+  EXPECT_TRUE(first.T_origin_camera.isApprox(Eigen::Isometry3d::Identity()));
+  EXPECT_EQ(odometry.update(pairOf(4)).state, TrackingState::kTracking);
+}
+
+TEST(VisualOdometry, PassesOnWhyThereAreNoFeatures) {
+  VisualOdometry odometry({});
+  StereoFeatures dark = blindPair(0);
+  dark.report.status = "the lens is covered";
+  EXPECT_NE(odometry.update(dark).reason.find("the lens is covered"), std::string::npos);
+  follow(odometry, 2, 1);
+  dark.stamp = stampOf(3);
+  EXPECT_NE(odometry.update(dark).reason.find("the lens is covered"), std::string::npos);
+}
+
+TEST(VisualOdometry, BridgesOneFailedPairByPrediction) {
+  for (const bool strange : {false, true}) {
+    VisualOdometry odometry({});
+    const OdometryResult before = follow(odometry, 5);
+    const OdometryResult predicted = odometry.update(strange ? strangePair(6) : blindPair(6));
+    EXPECT_EQ(predicted.state, TrackingState::kDegraded);
+    EXPECT_FALSE(predicted.reason.empty());
+    EXPECT_TRUE(predicted.has_pose);
+    EXPECT_TRUE(predicted.has_motion);
+    EXPECT_EQ(predicted.epoch, before.epoch);
+    expectHealthy(predicted);
+    // Constant velocity: the sway of the drive is a few centimetres.
+    EXPECT_LT(distanceBetween(predicted.T_origin_camera, trueSinceStart(6)), 0.1);
+    EXPECT_GT(predicted.pose_covariance.trace(), 2.0 * before.pose_covariance.trace());
+    EXPECT_GT(predicted.motion_covariance.trace(), 2.0 * before.motion_covariance.trace());
+
+    const OdometryResult after = odometry.update(pairOf(7));
+    EXPECT_EQ(after.state, TrackingState::kTracking) << after.reason;
+    EXPECT_EQ(after.epoch, before.epoch);
+    EXPECT_LT(distanceBetween(after.T_origin_camera, trueSinceStart(7)), 0.01) << "the prediction's error stayed";
+    EXPECT_GE(after.pose_covariance.trace(), before.pose_covariance.trace());
+    EXPECT_EQ(odometry.update(pairOf(8)).state, TrackingState::kTracking);
+  }
+}
+
+TEST(VisualOdometry, IsLostAfterTheSecondFailureAndStartsAgainFromTheLastPose) {
+  VisualOdometry odometry({});
+  const OdometryResult before = follow(odometry, 5);
+  const OdometryResult predicted = odometry.update(blindPair(6));
+  for (int i = 7; i <= 9; ++i) {
+    const OdometryResult lost = odometry.update(blindPair(i));
+    EXPECT_EQ(lost.state, TrackingState::kLost) << i;
+    EXPECT_FALSE(lost.has_pose) << i;
+    EXPECT_FALSE(lost.has_motion) << i;
+    EXPECT_FALSE(lost.reason.empty()) << i;
+    expectHealthy(lost);
+  }
+  const OdometryResult again = odometry.update(pairOf(10));
+  EXPECT_TRUE(again.has_pose);
+  EXPECT_FALSE(again.has_motion);
+  EXPECT_FALSE(again.reason.empty());
+  EXPECT_EQ(again.epoch, before.epoch + 1);
+  EXPECT_TRUE(again.T_origin_camera.isApprox(predicted.T_origin_camera, 1e-9)) << "not the last published pose";
+  EXPECT_GT(again.pose_covariance.trace(), predicted.pose_covariance.trace());
+  EXPECT_GE(again.distance, predicted.distance);
+  expectHealthy(again);
+
+  for (int i = 11; i <= 14; ++i) {
+    const OdometryResult result = odometry.update(pairOf(i));
+    EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
+    EXPECT_EQ(result.epoch, before.epoch + 1);
+    EXPECT_LT(distanceBetween(result.T_origin_camera, again.T_origin_camera * trueSinceStart(i, 10)), 1e-3);
+    EXPECT_GE(result.pose_covariance.trace(), again.pose_covariance.trace());
+  }
+}
+
+TEST(VisualOdometry, IsLostAtOnceWhenThereIsNoMotionToPredict) {
+  VisualOdometry odometry({});
+  odometry.update(pairOf(0));
+  const OdometryResult second = odometry.update(blindPair(1));
+  EXPECT_EQ(second.state, TrackingState::kLost);
+  EXPECT_FALSE(second.has_pose);
+}
+
+TEST(VisualOdometry, DoesNotPredictOverALongGap) {
+  VisualOdometryOptions options;
+  options.tracking.max_gap = 0.5;
+  VisualOdometry odometry(options);
+  follow(odometry, 5);
+  EXPECT_EQ(odometry.update(blindPair(20)).state, TrackingState::kLost);
+}
+
+TEST(VisualOdometry, PoseIsContinuousWithinAnEpoch) {
+  VisualOdometry odometry({});
+  std::optional<OdometryResult> previous;
+  for (int i = 0; i <= 24; ++i) {
+    const bool blind = i == 8 || i == 15 || i == 16 || i == 17;
+    const OdometryResult result = odometry.update(blind ? blindPair(i) : pairOf(i));
+    if (!result.has_pose) continue;
+    if (previous && result.has_motion) {
+      EXPECT_TRUE((previous->T_origin_camera * result.T_previous_current).isApprox(result.T_origin_camera, 1e-9)) << i;
+    }
+    if (previous) {
+      EXPECT_LT(distanceBetween(previous->T_origin_camera, result.T_origin_camera), 2.0 * kStep) << i;
+      EXPECT_GE(result.pose_covariance.trace(), previous->pose_covariance.trace()) << i;
+      EXPECT_GE(result.distance, previous->distance);
+    }
+    previous = result;
+  }
+}
+
+TEST(VisualOdometry, RefusesStampsThatDoNotIncreaseAndGoesOn) {
+  VisualOdometry disturbed({}), undisturbed({});
+  follow(disturbed, 5);
+  follow(undisturbed, 5);
+  EXPECT_THROW(disturbed.update(pairOf(5)), std::invalid_argument);
+  EXPECT_THROW(disturbed.update(pairOf(2)), std::invalid_argument);
+  StereoFeatures broken = pairOf(6);
+  broken.disparity[0] = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THROW(disturbed.update(broken), std::invalid_argument);
+  broken = pairOf(6);
+  broken.v.pop_back();
+  EXPECT_THROW(disturbed.update(broken), std::invalid_argument);
+
+  const OdometryResult a = disturbed.update(pairOf(6)), b = undisturbed.update(pairOf(6));
+  EXPECT_EQ(a.state, b.state);
+  EXPECT_EQ(a.epoch, b.epoch);
+  EXPECT_EQ(a.T_origin_camera.matrix(), b.T_origin_camera.matrix());
+  EXPECT_EQ(a.pose_covariance, b.pose_covariance);
+  EXPECT_EQ(a.dt, b.dt);
+}
+
+TEST(VisualOdometry, ResetReturnsToTheOriginUnderANewEpoch) {
+  VisualOdometry odometry({});
+  const OdometryResult before = follow(odometry, 8);
+  odometry.reset();
+  // The clock may have gone back.
+  const OdometryResult first = odometry.update(pairOf(2));
+  EXPECT_EQ(first.epoch, before.epoch + 1);
+  EXPECT_TRUE(first.T_origin_camera.isApprox(Eigen::Isometry3d::Identity()));
+  EXPECT_LT(first.pose_covariance.trace(), before.pose_covariance.trace());
+  EXPECT_EQ(first.distance, 0.0);
+  EXPECT_FALSE(first.has_motion);
+
+  // From here on as a new one does.
+  VisualOdometry fresh({});
+  fresh.update(pairOf(2));
+  for (int i = 3; i <= 6; ++i) {
+    const OdometryResult a = odometry.update(pairOf(i)), b = fresh.update(pairOf(i));
+    EXPECT_EQ(a.T_origin_camera.matrix(), b.T_origin_camera.matrix());
+    EXPECT_EQ(a.pose_covariance, b.pose_covariance);
+    EXPECT_EQ(a.epoch, before.epoch + 1);
+  }
+}
+
+TEST(VisualOdometry, StartsAgainFromTheLastPoseWithAnotherCamera) {
+  VisualOdometry odometry({});
+  const OdometryResult before = follow(odometry, 5);
+  StereoCamera other = synthetic::camera();
+  other.baseline = 0.3;
+  other.fx = 380.0;
+  const auto otherPair = [&](int i) { return synthetic::observe(street(), other, drivePose(i).inverse(), stampOf(i)); };
+  const OdometryResult again = odometry.update(otherPair(6));
+  EXPECT_TRUE(again.has_pose);
+  EXPECT_FALSE(again.has_motion);
+  EXPECT_EQ(again.epoch, before.epoch + 1);
+  EXPECT_TRUE(again.T_origin_camera.isApprox(before.T_origin_camera, 1e-9));
+  EXPECT_GT(again.pose_covariance.trace(), before.pose_covariance.trace());
+  const OdometryResult next = odometry.update(otherPair(7));
+  EXPECT_EQ(next.state, TrackingState::kTracking) << next.reason;
+  EXPECT_LT(distanceBetween(next.T_origin_camera, again.T_origin_camera * trueSinceStart(7, 6)), 1e-3);
+}
+
+TEST(VisualOdometry, StartsAgainFromTheLastPoseWithAnotherDescriptor) {
+  VisualOdometry odometry({});
+  const OdometryResult before = follow(odometry, 5);
+  const auto leftPair = [&](int i) {
+    StereoFeatures features = pairOf(i);
+    features.layout = "left";
+    features.descriptors = features.descriptors.colRange(0, 64).clone();
+    return features;
+  };
+  OdometryResult again;
+  ASSERT_NO_THROW(again = odometry.update(leftPair(6)));
+  EXPECT_EQ(again.epoch, before.epoch + 1);
+  EXPECT_TRUE(again.T_origin_camera.isApprox(before.T_origin_camera, 1e-9));
+  EXPECT_EQ(odometry.update(leftPair(7)).state, TrackingState::kTracking);
+}
+
+TEST(VisualOdometry, BrokenStreamStartsAgainFromTheLastPose) {
+  VisualOdometry odometry({});
+  const OdometryResult before = follow(odometry, 5);
+  odometry.breakStream();
+  const OdometryResult again = odometry.update(pairOf(9));
+  EXPECT_EQ(again.epoch, before.epoch + 1);
+  EXPECT_FALSE(again.has_motion);
+  EXPECT_TRUE(again.T_origin_camera.isApprox(before.T_origin_camera, 1e-9));
+  EXPECT_EQ(odometry.update(pairOf(10)).state, TrackingState::kTracking);
+}
+
+TEST(VisualOdometry, RefusesMotionsThatNoRobotMakes) {
+  VisualOdometryOptions options;
+  options.tracking.max_speed = 12.0;  // the drive goes at 8 m/s
+  VisualOdometry odometry(options);
+  follow(odometry, 4);
+  StereoFeatures leap = pairOf(7);  // three steps in one period: 24 m/s
+  leap.stamp = stampOf(5);
+  const OdometryResult result = odometry.update(leap);
+  EXPECT_NE(result.state, TrackingState::kTracking);
+  EXPECT_NE(result.reason.find("max_speed"), std::string::npos) << result.reason;
+}
+
+TEST(VisualOdometry, IsDeterministic) {
+  VisualOdometry first({}), second({});
+  for (int i = 0; i <= 6; ++i) {
+    const OdometryResult a = first.update(pairOf(i, 0.3)), b = second.update(pairOf(i, 0.3));
+    EXPECT_EQ(a.T_origin_camera.matrix(), b.T_origin_camera.matrix()) << i;
+    EXPECT_EQ(a.pose_covariance, b.pose_covariance) << i;
+    EXPECT_EQ(a.inliers, b.inliers) << i;
+  }
+}
+
+TEST(VisualOdometry, VelocityAfterAPredictedPairIsTheTrueOne) {
+  // Constant speed, then a stop while blind. The first pair seen again corrects the prediction; the correction is no
+  // motion, so a pair predicted right after it must stand still too.
+  VisualOdometry odometry({});
+  follow(odometry, 5);
+  const auto standing = [](int stamp_index) {
+    StereoFeatures features = pairOf(5);
+    features.stamp = stampOf(stamp_index);
+    return features;
+  };
+  odometry.update(blindPair(6));
+  const OdometryResult seen = odometry.update(standing(7));
+  ASSERT_EQ(seen.state, TrackingState::kTracking) << seen.reason;
+  ASSERT_LT(distanceBetween(seen.T_origin_camera, trueSinceStart(5)), 0.01);
+  const OdometryResult predicted = odometry.update(blindPair(8));
+  ASSERT_EQ(predicted.state, TrackingState::kDegraded);
+  EXPECT_LT(distanceBetween(predicted.T_origin_camera, trueSinceStart(5)), 0.1);
+}
+
+TEST(VisualOdometry, NamesItsStates) {
+  EXPECT_STREQ(toString(TrackingState::kWaiting), "WAITING");
+  EXPECT_STREQ(toString(TrackingState::kTracking), "TRACKING");
+  EXPECT_STREQ(toString(TrackingState::kDegraded), "DEGRADED");
+  EXPECT_STREQ(toString(TrackingState::kLost), "LOST");
+}
+
+}  // namespace
+}  // namespace sdvo

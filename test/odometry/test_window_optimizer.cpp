@@ -1,0 +1,142 @@
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "../synthetic_features.hpp"
+#include "stereo_descriptor_vo/odometry/window_optimizer.hpp"
+
+namespace sdvo {
+namespace {
+
+StereoCamera someCamera() {
+  return SyntheticScene(1, 0, 10.0).camera;
+}
+
+Eigen::Isometry3d perturbed(const Eigen::Isometry3d& T, int axis, double step) {
+  Vector6d xi = Vector6d::Zero();
+  xi[axis] = step;
+  return expSE3(xi) * T;
+}
+
+TEST(PredictObservation, AgreesWithTheCameraModel) {
+  AnchoredPoint point;
+  point.T_origin_anchor = syntheticPose(3);
+  point.ray_and_inverse_depth = {0.2, -0.1, 1.0 / 12.5};
+  const Eigen::Isometry3d T_camera_origin = syntheticPose(5).inverse();
+  const Eigen::Vector3d in_camera = T_camera_origin * point.T_origin_anchor * Eigen::Vector3d(2.5, -1.25, 12.5);
+  const Eigen::Vector3d projection = someCamera().project(in_camera);
+  Eigen::Vector3d prediction;
+  ASSERT_TRUE(predictObservation(someCamera(), T_camera_origin, point, prediction, nullptr));
+  EXPECT_NEAR(prediction.x(), projection.x(), 1e-9);
+  EXPECT_NEAR(prediction.y(), projection.y(), 1e-9);
+  EXPECT_NEAR(prediction.z(), projection.x() - projection.z(), 1e-9);
+}
+
+TEST(PredictObservation, PointAtInfinityHasNoDisparityAndIgnoresTranslation) {
+  AnchoredPoint point;
+  point.ray_and_inverse_depth = {0.1, 0.05, 0.0};
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.translation() = Eigen::Vector3d(5.0, -3.0, 2.0);
+  Eigen::Vector3d prediction;
+  ASSERT_TRUE(predictObservation(someCamera(), T, point, prediction, nullptr));
+  EXPECT_NEAR((prediction - Eigen::Vector3d(670.0, 215.0, 0.0)).norm(), 0.0, 1e-9);
+}
+
+TEST(PredictObservation, RefusesPointsBehindTheCamera) {
+  AnchoredPoint point;
+  point.ray_and_inverse_depth = {0.0, 0.0, 0.2};  // 5 m ahead of the origin
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.translation().z() = -6.0;
+  Eigen::Vector3d prediction;
+  EXPECT_FALSE(predictObservation(someCamera(), T, point, prediction, nullptr));
+}
+
+TEST(PredictObservation, JacobiansAgreeWithFiniteDifferences) {
+  constexpr double kStep = 1e-6;
+  AnchoredPoint point;
+  point.T_origin_anchor = syntheticPose(2);
+  point.ray_and_inverse_depth = {0.3, 0.1, 0.08};
+  const Eigen::Isometry3d T = syntheticPose(6).inverse();
+  Eigen::Vector3d prediction, plus, minus;
+  ObservationJacobians jacobians;
+  ASSERT_TRUE(predictObservation(someCamera(), T, point, prediction, &jacobians));
+  for (int axis = 0; axis < 6; ++axis) {
+    predictObservation(someCamera(), perturbed(T, axis, kStep), point, plus, nullptr);
+    predictObservation(someCamera(), perturbed(T, axis, -kStep), point, minus, nullptr);
+    EXPECT_LT((jacobians.pose.col(axis) - (plus - minus) / (2 * kStep)).norm(), 1e-4) << "pose axis " << axis;
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    AnchoredPoint moved = point;
+    moved.ray_and_inverse_depth[axis] += kStep;
+    predictObservation(someCamera(), T, moved, plus, nullptr);
+    moved.ray_and_inverse_depth[axis] -= 2 * kStep;
+    predictObservation(someCamera(), T, moved, minus, nullptr);
+    EXPECT_LT((jacobians.point.col(axis) - (plus - minus) / (2 * kStep)).norm(), 1e-4) << "point axis " << axis;
+  }
+}
+
+/// Five poses, sixty points, measurements without noise but with the rig's error; poses and points start off the truth.
+Window disturbedWindow(const RigCalibration& truth) {
+  std::mt19937 random(7);
+  const auto uniform = [&](double low, double high) {
+    return low + (high - low) * static_cast<double>(random()) / static_cast<double>(std::mt19937::max());
+  };
+  Window window;
+  window.camera = someCamera();
+  for (int f = 0; f < 5; ++f) window.T_camera_origin.push_back(syntheticPose(f).inverse());
+  for (int p = 0; p < 60; ++p) {
+    AnchoredPoint point;
+    point.ray_and_inverse_depth = {uniform(-0.6, 0.6), uniform(-0.2, 0.2), 1.0 / uniform(8.0, 40.0)};
+    for (int f = 0; f < 5; ++f) {
+      Eigen::Vector3d measurement;
+      if (!predictObservation(window.camera, window.T_camera_origin[f], point, measurement, nullptr)) continue;
+      measurement.z() += truth.disparityError(window.camera, measurement.x());
+      window.observations.push_back({p, f, measurement});
+    }
+    point.ray_and_inverse_depth += Eigen::Vector3d(uniform(-1, 1) * 1e-3, uniform(-1, 1) * 1e-3, uniform(-1, 1) * 2e-3);
+    window.points.push_back(point);
+  }
+  for (int f = 1; f < 5; ++f)
+    for (int axis = 0; axis < 6; ++axis)
+      window.T_camera_origin[f] =
+          perturbed(window.T_camera_origin[f], axis, uniform(-1, 1) * (axis < 3 ? 0.05 : 0.005));
+  return window;
+}
+
+TEST(OptimizeWindow, FindsPosesAndCalibrationOfExactMeasurements) {
+  RigCalibration truth;
+  truth.value << 0.3, -1.0;
+  Window window = disturbedWindow(truth);
+  WindowOptimizerOptions options;
+  options.iterations = 50;
+  const WindowSolution solution = optimizeWindow(options, window);
+  ASSERT_TRUE(solution.success);
+  for (int f = 0; f < 5; ++f) {
+    const Vector6d error = logSE3(window.T_camera_origin[f] * syntheticPose(f));
+    EXPECT_LT(error.head<3>().norm(), 2e-3) << "pose " << f;
+    EXPECT_LT(error.tail<3>().norm(), 2e-4) << "pose " << f;
+  }
+  EXPECT_NEAR(window.calibration.value[0], 0.3, 0.01);
+  EXPECT_NEAR(window.calibration.value[1], -1.0, 0.05);
+}
+
+TEST(OptimizeWindow, HoldsTheFirstPose) {
+  Window window = disturbedWindow(RigCalibration{});
+  const Eigen::Matrix4d before = window.T_camera_origin[0].matrix();
+  ASSERT_TRUE(optimizeWindow(WindowOptimizerOptions{}, window).success);
+  EXPECT_EQ(before, window.T_camera_origin[0].matrix());
+}
+
+TEST(OptimizeWindow, OneWrongSightingDoesNotMoveTheRest) {
+  Window window = disturbedWindow(RigCalibration{});
+  window.observations[42].measurement += Eigen::Vector3d(40.0, -25.0, 5.0);
+  WindowOptimizerOptions options;
+  options.iterations = 50;
+  const WindowSolution solution = optimizeWindow(options, window);
+  ASSERT_TRUE(solution.success);
+  EXPECT_GT(solution.residuals[42], 20.0);
+  EXPECT_LT(logSE3(window.T_camera_origin[4] * syntheticPose(4)).norm(), 0.01);
+}
+
+}  // namespace
+}  // namespace sdvo

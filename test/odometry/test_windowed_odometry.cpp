@@ -1,0 +1,141 @@
+// What the local map, the window and the self-calibration promise, on features whose truth is known.
+#include <gtest/gtest.h>
+
+#include "../synthetic_features.hpp"
+#include "stereo_descriptor_vo/odometry/right_camera_rotation.hpp"
+#include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr std::int64_t kPeriod = 100000000;  // ns
+
+OdometryResult drive(SyntheticScene& scene, VisualOdometry& odometry, int pairs) {
+  OdometryResult result;
+  for (int k = 0; k < pairs; ++k) result = odometry.update(scene.view(syntheticPose(k), (k + 1) * kPeriod));
+  return result;
+}
+
+class SelfCalibration : public testing::TestWithParam<double> {};
+
+TEST_P(SelfCalibration, RecoversTheDisparityOffset) {
+  SyntheticScene scene(11, 4000, 120.0);
+  scene.disparity_offset = GetParam();
+  VisualOdometry odometry{VisualOdometryOptions{}};
+  const OdometryResult result = drive(scene, odometry, 40);
+  EXPECT_NEAR(result.disparity_offset, GetParam(), 0.05);
+  EXPECT_NEAR(result.disparity_bend, 0.0, 0.15);
+  EXPECT_GT(result.disparity_offset_sigma, 0.0);
+}
+INSTANTIATE_TEST_CASE_P(Offsets, SelfCalibration, testing::Values(-0.3, 0.0, 0.3));
+
+TEST(SelfCalibrationScale, CompensatesWhatWouldStretchTheTrajectory) {
+  const auto length = [](bool enabled) {
+    SyntheticScene scene(12, 4000, 120.0);
+    scene.disparity_offset = -0.5;
+    VisualOdometryOptions options;
+    options.calibration.enabled = enabled;
+    VisualOdometry odometry(options);
+    return drive(scene, odometry, 40).T_origin_camera.translation().norm();
+  };
+  const double truth = syntheticPose(39).translation().norm();
+  EXPECT_GT(std::abs(length(false) - truth), 0.01 * truth) << "the offset must matter, else this tests nothing";
+  EXPECT_LT(std::abs(length(true) - truth), 0.006 * truth);
+}
+
+TEST(SelfCalibrationPrior, AnErrorThatIsKnownBeforehandIsCompensatedFromTheStart) {
+  const auto firstStep = [](double known) {
+    SyntheticScene scene(12, 4000, 120.0);
+    scene.disparity_offset = -2.0;
+    VisualOdometryOptions options;
+    options.calibration.enabled = false;
+    options.calibration.prior_offset = known;
+    VisualOdometry odometry(options);
+    return drive(scene, odometry, 2).T_origin_camera.translation().norm();
+  };
+  const double truth = syntheticPose(1).translation().norm();
+  EXPECT_GT(std::abs(firstStep(0.0) - truth), 0.03 * truth) << "the offset must matter, else this tests nothing";
+  EXPECT_LT(std::abs(firstStep(-2.0) - truth), 0.01 * truth);
+}
+
+TEST(SelfCalibrationReport, IsNotANumberBeforeThereIsAnEstimate) {
+  SyntheticScene scene(13, 2000, 60.0);
+  VisualOdometry odometry{VisualOdometryOptions{}};
+  EXPECT_TRUE(std::isnan(drive(scene, odometry, 1).disparity_offset));
+  VisualOdometryOptions off;
+  off.calibration.enabled = false;
+  VisualOdometry without(off);
+  EXPECT_TRUE(std::isnan(drive(scene, without, 5).disparity_offset));
+}
+
+TEST(StandingStill, DoesNotDrift) {
+  SyntheticScene scene(14, 3000, 60.0);
+  VisualOdometry odometry{VisualOdometryOptions{}};
+  OdometryResult result;
+  double early = 0.0, late = 0.0;  // m
+  for (int k = 0; k < 120; ++k) {
+    result = odometry.update(scene.view(Eigen::Isometry3d::Identity(), (k + 1) * kPeriod));
+    (k < 60 ? early : late) = std::max(k < 60 ? early : late, result.T_origin_camera.translation().norm());
+  }
+  EXPECT_EQ(result.keyframe_id, 1) << "measured against the first pair all the time";
+  EXPECT_LT(late, 0.02);
+  EXPECT_LT(late, 2.0 * early) << "a random walk would have grown";
+}
+
+// How well it is calibrated, test_rendered_odometry tells; here the noise is smaller than of real corners.
+TEST(MotionCovariance, ContainsTheErrorWithoutExaggeration) {
+  constexpr double kChiSquare95 = 12.592;  // six degrees of freedom
+  int inside = 0, total = 0;
+  double sum = 0.0;
+  for (std::uint32_t seed = 0; seed < 8; ++seed) {
+    SyntheticScene scene(100 + seed, 4000, 100.0);
+    VisualOdometry odometry{VisualOdometryOptions{}};
+    for (int k = 0; k < 30; ++k) {
+      const OdometryResult result = odometry.update(scene.view(syntheticPose(k), (k + 1) * kPeriod));
+      if (!result.has_motion) continue;
+      const Eigen::Isometry3d truth = syntheticPose(k - 1).inverse() * syntheticPose(k);
+      const Vector6d error = logSE3(result.T_previous_current.inverse() * truth);
+      const double normalised = error.dot(result.motion_covariance.ldlt().solve(error));
+      inside += normalised < kChiSquare95;
+      sum += normalised;
+      ++total;
+    }
+  }
+  EXPECT_GE(static_cast<double>(inside) / total, 0.90);
+  EXPECT_GE(sum / total, 0.25 * 6.0) << "standard deviations more than twice too large";
+}
+
+TEST(PoseCovariance, GrowsWithTheDistance) {
+  SyntheticScene scene(15, 4000, 100.0);
+  VisualOdometry odometry{VisualOdometryOptions{}};
+  double last = 0.0;
+  for (int k = 0; k < 20; ++k) {
+    const OdometryResult result = odometry.update(scene.view(syntheticPose(k), (k + 1) * kPeriod));
+    const double trace = result.pose_covariance.trace();
+    if (k > 0) {
+      EXPECT_GT(trace, last) << "pair " << k;
+    }
+    last = trace;
+  }
+}
+
+TEST(RightCameraRotationFilter, RecoversARotationFromVerticalDisparities) {
+  const Eigen::Vector3d truth(0.4e-3, -3.0e-3, 1.1e-3);
+  SyntheticScene scene(16, 4000, 60.0);
+  StereoFeatures features = scene.view(Eigen::Isometry3d::Identity(), 1);
+  const StereoCamera& camera = scene.camera;
+  for (int i = 0; i < features.count(); ++i) {
+    // Rotates the ray itself instead of using the first-order formula under test.
+    const Eigen::Vector3d ray((features.u[i] - features.disparity[i] - camera.cx) / camera.fx,
+                              (features.v[i] - camera.cy) / camera.fy, 1.0);
+    const Eigen::Vector3d turned = expSO3(-truth) * ray;
+    features.dv[i] = static_cast<float>(camera.fy * (turned.y() / turned.z() - ray.y()));
+  }
+  RightCameraRotation filter;
+  EXPECT_TRUE(std::isnan(filter.rotation().x()));
+  filter.add(features);
+  EXPECT_LT((filter.rotation() - truth).cwiseAbs().maxCoeff(), 5e-5);
+}
+
+}  // namespace
+}  // namespace sdvo

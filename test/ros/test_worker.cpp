@@ -1,0 +1,88 @@
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <chrono>
+#include <future>
+#include <mutex>
+#include <thread>
+#include <vector>
+
+#include "../../src/ros/worker.hpp"
+
+namespace sdvo {
+namespace {
+
+using namespace std::chrono_literals;
+
+TEST(Worker, HandlesEveryItemInOrder) {
+  constexpr int kItems = 500;
+  std::vector<int> handled;
+  std::promise<void> done;
+  Worker<int> worker(kItems, [&](const int& item) {
+    handled.push_back(item);
+    if (item == kItems - 1) done.set_value();
+  });
+  for (int i = 0; i < kItems; ++i) worker.push(i);
+  ASSERT_EQ(done.get_future().wait_for(10s), std::future_status::ready);
+  ASSERT_EQ(handled.size(), static_cast<std::size_t>(kItems));
+  for (int i = 0; i < kItems; ++i) EXPECT_EQ(handled[static_cast<std::size_t>(i)], i);
+  EXPECT_EQ(worker.dropped(), 0u);
+}
+
+TEST(Worker, DropsTheOldestWhenFullAndCounts) {
+  std::vector<int> handled;
+  std::promise<void> started, released, done;
+  std::shared_future<void> release = released.get_future().share();
+  Worker<int> worker(3, [&](const int& item) {
+    if (item == 0) {
+      started.set_value();
+      release.wait();
+    }
+    handled.push_back(item);
+    if (item == 5) done.set_value();
+  });
+  worker.push(0);
+  ASSERT_EQ(started.get_future().wait_for(10s), std::future_status::ready);
+  // The first item occupies the thread, not the queue: of the next five the newest three stay.
+  for (int item = 1; item <= 5; ++item) worker.push(item);
+  EXPECT_EQ(worker.dropped(), 2u);
+  released.set_value();
+  ASSERT_EQ(done.get_future().wait_for(10s), std::future_status::ready);
+  EXPECT_EQ(handled, (std::vector<int>{0, 3, 4, 5}));
+}
+
+TEST(Worker, NeverLetsThePusherWait) {
+  std::promise<void> released;
+  std::shared_future<void> release = released.get_future().share();
+  Worker<int> worker(1, [&](const int&) { release.wait(); });
+  const auto pushed = std::async(std::launch::async, [&] {
+    for (int i = 0; i < 100; ++i) worker.push(i);
+  });
+  EXPECT_EQ(pushed.wait_for(10s), std::future_status::ready);
+  released.set_value();
+}
+
+TEST(Worker, JoinsTheItemInWorkAndLeavesTheRest) {
+  std::atomic<int> finished{0};
+  std::promise<void> started;
+  {
+    Worker<int> worker(10, [&](const int& item) {
+      if (item == 0) started.set_value();
+      std::this_thread::sleep_for(100ms);
+      ++finished;
+    });
+    worker.push(0);
+    started.get_future().wait();
+    worker.push(1);
+  }
+  EXPECT_EQ(finished, 1);
+  std::this_thread::sleep_for(150ms);
+  EXPECT_EQ(finished, 1) << "the thread outlived its Worker";
+}
+
+TEST(Worker, EndsWithoutEverHavingHadAnItem) {
+  for (int i = 0; i < 50; ++i) Worker<int>(1, [](const int&) {});
+}
+
+}  // namespace
+}  // namespace sdvo

@@ -1,0 +1,273 @@
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <iterator>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "../synthetic_scene.hpp"
+
+namespace sdvo {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Outcome {
+  int exit_code;  ///< -1: ended by a signal
+  std::string out, err;
+};
+
+std::string readText(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary);
+  EXPECT_TRUE(file) << path;
+  return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+}
+
+std::vector<std::string> linesOf(const std::string& text) {
+  std::istringstream stream(text);
+  std::vector<std::string> lines;
+  for (std::string line; std::getline(stream, line);) lines.push_back(line);
+  return lines;
+}
+
+std::vector<std::string> errorLines(const Outcome& outcome) {
+  std::vector<std::string> errors;
+  for (const std::string& line : linesOf(outcome.err))
+    if (line.rfind("error:", 0) == 0) errors.push_back(line);
+  return errors;
+}
+
+/// The built tools on a small drive towards a textured wall, in a directory that is removed at the end.
+class Tools : public testing::Test {
+ protected:
+  static constexpr int kPairs = 4;
+  static constexpr double kStep = 0.2;      // m forward in each pair
+  static constexpr double kWall = 8.0;      // m ahead of the first camera
+  static constexpr double kBaseline = 0.5;  // m
+
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "sdvo_tools_XXXXXX").string();
+    ASSERT_NE(mkdtemp(name.data()), nullptr);
+    root_ = name;
+    sequence_ = root_ / "sequences" / "09";
+    const StereoCamera camera{300.0, 300.0, 160.0, 120.0, kBaseline, 320, 240};
+    const synthetic::Texture texture(5, 0.15, 4.0);
+    for (int side = 0; side < 2; ++side) fs::create_directories(image(side, 0).parent_path());
+    std::ofstream times(sequence_ / "times.txt"), poses(root_ / "truth.txt");
+    for (int i = 0; i < kPairs; ++i) {
+      for (int side = 0; side < 2; ++side)
+        cv::imwrite(image(side, i).string(),
+                    synthetic::renderPlane(texture, camera, kWall - kStep * i, side * kBaseline));
+      times << 0.1 * i << "\n";
+      poses << "1 0 0 0 0 1 0 0 0 0 1 " << kStep * i << "\n";
+    }
+    writeCalibration(-300.0 * kBaseline);
+  }
+  void TearDown() override { fs::remove_all(root_); }
+
+  fs::path image(int side, int i) const {
+    return sequence_ / ("image_" + std::to_string(side)) / ("00000" + std::to_string(i) + ".png");
+  }
+
+  void writeCalibration(double tx) const {
+    std::ofstream(sequence_ / "calib.txt") << "P0: 300 0 160 0 0 300 120 0 0 0 1 0\n"
+                                           << "P1: 300 0 160 " << tx << " 0 300 120 0 0 0 1 0\n";
+  }
+
+  /// Runs a tool; `arguments` must hold no character that is special to a shell.
+  Outcome run(const std::string& tool, const std::string& arguments) const {
+    const fs::path out = root_ / "stdout", err = root_ / "stderr";
+    const std::string command = std::string(SDVO_TOOL_DIR) + "/" + tool + " " + arguments + " > " + out.string() +
+                                " 2> " + err.string() + " < /dev/null";
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, readText(out), readText(err)};
+  }
+
+  Outcome runSequence(const std::string& extra = "") const {
+    return run("run_sequence", sequence_.string() + " --poses " + poses().string() + " " + extra);
+  }
+  fs::path poses() const { return root_ / "poses.txt"; }
+
+  /// Bad input ends with one line that says what is wrong, and never with a signal or an exit code of zero.
+  static void expectError(const Outcome& outcome, const std::string& said) {
+    SCOPED_TRACE("stdout: " + outcome.out + "\nstderr: " + outcome.err);
+    EXPECT_GT(outcome.exit_code, 0);
+    const std::vector<std::string> errors = errorLines(outcome);
+    ASSERT_EQ(errors.size(), 1u);
+    EXPECT_NE(errors.front().find(said), std::string::npos) << "expected it to say: " << said;
+    EXPECT_EQ(linesOf(outcome.err).back(), errors.front()) << "the error is not the last thing said";
+  }
+
+  fs::path root_, sequence_;
+};
+
+/// The tools that read a sequence, with arguments for a sound run.
+struct Reader {
+  const char* tool;
+  std::function<std::string(const fs::path& sequence, const fs::path& root)> arguments;
+};
+
+const std::vector<Reader>& readers() {
+  static const std::vector<Reader> all = {
+      {"run_sequence",
+       [](const fs::path& sequence, const fs::path& root) {
+         return sequence.string() + " --poses " + (root / "reader.txt").string();
+       }},
+      {"kitti_to_bag",
+       [](const fs::path& sequence, const fs::path& root) {
+         return "--sequence " + sequence.string() + " --output " + (root / "reader.bag").string();
+       }},
+  };
+  return all;
+}
+
+TEST_F(Tools, AllExplainThemselves) {
+  for (const char* tool : {SDVO_TOOLS}) {
+    const Outcome outcome = run(tool, "--help");
+    EXPECT_EQ(outcome.exit_code, 0) << tool << ": " << outcome.err;
+    EXPECT_NE(outcome.out.find("--help"), std::string::npos) << tool;
+    EXPECT_EQ(outcome.err, "") << tool;
+    expectError(run(tool, "--no-such-option"), "--help");
+  }
+}
+
+TEST_F(Tools, SoundSequenceIsRead) {
+  for (const Reader& reader : readers()) {
+    const Outcome outcome = run(reader.tool, reader.arguments(sequence_, root_));
+    EXPECT_EQ(outcome.exit_code, 0) << reader.tool << ": " << outcome.err;
+    EXPECT_TRUE(errorLines(outcome).empty()) << reader.tool << ": " << outcome.err;
+  }
+}
+
+TEST_F(Tools, NoCalibration) {
+  fs::remove(sequence_ / "calib.txt");
+  for (const Reader& reader : readers())
+    expectError(run(reader.tool, reader.arguments(sequence_, root_)), (sequence_ / "calib.txt").string());
+}
+
+TEST_F(Tools, NoSequence) {
+  for (const Reader& reader : readers())
+    expectError(run(reader.tool, reader.arguments(root_ / "missing", root_)), (root_ / "missing").string());
+}
+
+TEST_F(Tools, TruncatedImage) {
+  fs::resize_file(image(1, 2), fs::file_size(image(1, 2)) / 2);
+  for (const Reader& reader : readers())
+    expectError(run(reader.tool, reader.arguments(sequence_, root_)), image(1, 2).string());
+}
+
+TEST_F(Tools, LeftAndRightOfDifferentSize) {
+  cv::imwrite(image(1, 1).string(), cv::Mat(200, 320, CV_8U, cv::Scalar(90)));
+  for (const Reader& reader : readers())
+    expectError(run(reader.tool, reader.arguments(sequence_, root_)), image(1, 1).string());
+}
+
+TEST_F(Tools, BaselineOfZero) {
+  writeCalibration(0.0);
+  for (const Reader& reader : readers()) expectError(run(reader.tool, reader.arguments(sequence_, root_)), "baseline");
+}
+
+TEST_F(Tools, OutputThatCannotBeWritten) {
+  const std::string missing = (root_ / "missing" / "out").string();
+  expectError(run("run_sequence", sequence_.string() + " --poses " + missing), missing);
+  expectError(runSequence("--timing " + missing), missing);
+  expectError(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output " + missing), missing);
+  const std::string truth = (root_ / "truth.txt").string();
+  expectError(run("evaluate_trajectory",
+                  "--ground-truth " + truth + " --estimate " + truth + " --lengths 0.2 --json " + missing),
+              missing);
+}
+
+TEST_F(Tools, OptionsThatDoNotExistOrAreOutOfRange) {
+  expectError(runSequence("--param detector/no_such_option=1"), "detector/no_such_option");
+  expectError(runSequence("--param motion/confidence=1.5"), "motion/confidence");
+  expectError(runSequence("--param motion/max_iterations=many"), "motion/max_iterations");
+  expectError(runSequence("--param motion/kernel=square"), "motion/kernel");
+  expectError(runSequence("--param motion/confidence"), "name=value");
+  expectError(runSequence("--frames 0"), "--frames");
+
+  const fs::path config = root_ / "config.yaml";
+  const std::string option = "--config " + config.string();
+  expectError(runSequence(option), config.string());
+  std::ofstream(config) << "visual_odometry: {motion: {no_such_option: 1}}\n";
+  expectError(runSequence(option), "no_such_option");
+  std::ofstream(config) << "visual_odometry: {motion: {confidence: 2}}\n";
+  expectError(runSequence(option), "motion/confidence");
+  std::ofstream(config) << "visual_odometry: [unfinished\n";
+  expectError(runSequence(option), config.string());
+}
+
+TEST_F(Tools, OnePoseForEachPairAndTheDriveIsFollowed) {
+  const Outcome outcome = runSequence("--timing " + (root_ / "timing.csv").string());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find("options "), std::string::npos) << "no hash of the options: " << outcome.out;
+
+  const std::vector<std::string> lines = linesOf(readText(poses()));
+  ASSERT_EQ(lines.size(), static_cast<std::size_t>(kPairs));
+  for (int i = 0; i < kPairs; ++i) {
+    std::istringstream stream(lines[static_cast<std::size_t>(i)]);
+    std::vector<double> numbers((std::istream_iterator<double>(stream)), std::istream_iterator<double>());
+    ASSERT_EQ(numbers.size(), 12u);
+    EXPECT_NEAR(numbers[3], 0.0, 0.05) << "pair " << i;
+    EXPECT_NEAR(numbers[7], 0.0, 0.05) << "pair " << i;
+    EXPECT_NEAR(numbers[11], kStep * i, 0.05) << "pair " << i;
+  }
+
+  const std::vector<std::string> rows = linesOf(readText(root_ / "timing.csv"));
+  ASSERT_EQ(rows.size(), static_cast<std::size_t>(kPairs) + 1);
+  EXPECT_EQ(rows.front().rfind("frame,total_ms,detect_ms,stereo_ms,describe_ms,match_ms,motion_ms,", 0), 0u);
+  const auto commas = [](const std::string& row) { return std::count(row.begin(), row.end(), ','); };
+  for (int i = 0; i < kPairs; ++i) {
+    const std::string& row = rows[static_cast<std::size_t>(i) + 1];
+    EXPECT_EQ(row.rfind(std::to_string(i) + ",", 0), 0u) << row;
+    EXPECT_EQ(commas(row), commas(rows.front())) << row;
+  }
+}
+
+TEST_F(Tools, FramesLimitsThePairs) {
+  ASSERT_EQ(runSequence("--frames 2").exit_code, 0);
+  EXPECT_EQ(linesOf(readText(poses())).size(), 2u);
+}
+
+TEST_F(Tools, ResultsAreBitIdenticalInEveryRunAndWithAnyThreads) {
+  ASSERT_EQ(runSequence("--threads 1").exit_code, 0);
+  const std::string first = readText(poses());
+  for (const char* threads : {"--threads 1", "--threads 2", "--threads 3"}) {
+    fs::remove(poses());
+    ASSERT_EQ(runSequence(threads).exit_code, 0);
+    EXPECT_EQ(readText(poses()), first) << threads;
+  }
+}
+
+TEST_F(Tools, HashTellsOptionsApart) {
+  const auto hash = [this](const std::string& extra) { return linesOf(runSequence("--frames 1 " + extra).out).at(0); };
+  const std::string defaults = hash("");
+  EXPECT_EQ(hash(""), defaults);
+  EXPECT_NE(hash("--param motion/seed=2"), defaults);
+  std::ofstream(root_ / "same.yaml") << "visual_odometry: {motion: {seed: 2}}\n";
+  EXPECT_EQ(hash("--param motion/seed=2"), hash("--config " + (root_ / "same.yaml").string()));
+}
+
+TEST_F(Tools, PerfectTrajectoryHasNoError) {
+  const std::string truth = (root_ / "truth.txt").string();
+  const fs::path json = root_ / "errors.json";
+  const Outcome outcome = run("evaluate_trajectory", "--ground-truth " + truth + " --estimate " + truth +
+                                                         " --lengths 0.2,0.4 --json " + json.string());
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_FALSE(readText(json).empty());
+  expectError(run("evaluate_trajectory", "--ground-truth " + truth + " --estimate " + (root_ / "none").string()),
+              (root_ / "none").string());
+}
+
+}  // namespace
+}  // namespace sdvo
