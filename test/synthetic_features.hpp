@@ -47,10 +47,8 @@ class SyntheticScene {
                                disparity_noise * normal_(random_);
       if (u < 0 || u > camera.width - 1 || v < 0 || v > camera.height - 1 || disparity < 0.5) continue;
       if (uniform(0.0, 1.0) < missed) continue;
-      features.u.push_back(static_cast<float>(u)), features.v.push_back(static_cast<float>(v));
-      features.disparity.push_back(static_cast<float>(disparity)), features.dv.push_back(0.f);
-      features.size.push_back(10.f), features.angle.push_back(-1.f), features.response.push_back(1.f);
-      features.sigma.push_back(0.3f), features.octave.push_back(0);
+      features.append(
+          {static_cast<float>(u), static_cast<float>(v), static_cast<float>(disparity), 0.f, 10.f, -1.f, 1.f, 0.3f, 0});
       seen.push_back(static_cast<int>(i));
     }
     features.descriptors.create(static_cast<int>(seen.size()), 128, CV_8U);

@@ -118,15 +118,8 @@ inline StereoFeatures noFeatures(const StereoCamera& rig, std::int64_t stamp = 0
 /// Adds one feature; `row` must have the width of the set's descriptors.
 inline void addFeature(StereoFeatures& features, double u, double v, double disparity,
                        const std::vector<std::uint8_t>& row) {
-  features.u.push_back(static_cast<float>(u));
-  features.v.push_back(static_cast<float>(v));
-  features.disparity.push_back(static_cast<float>(disparity));
-  features.dv.push_back(0.f);
-  features.size.push_back(10.f);
-  features.angle.push_back(-1.f);
-  features.response.push_back(1.f);
-  features.sigma.push_back(0.3f);
-  features.octave.push_back(0);
+  features.append(
+      {static_cast<float>(u), static_cast<float>(v), static_cast<float>(disparity), 0.f, 10.f, -1.f, 1.f, 0.3f, 0});
   features.descriptors.push_back(
       cv::Mat(1, static_cast<int>(row.size()), CV_8U, const_cast<std::uint8_t*>(row.data())));
 }

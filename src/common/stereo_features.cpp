@@ -5,41 +5,71 @@
 #include <stdexcept>
 
 namespace sdvo {
+namespace {
+
+int bytesOf(ElementType type) {
+  return type == ElementType::kFloat32 ? 4 : 1;
+}
+
+[[noreturn]] void refuse(const std::string& why) {
+  throw std::invalid_argument("stereo features: " + why);
+}
+
+}  // namespace
+
+bool DescriptorKind::operator==(const DescriptorKind& other) const {
+  return descriptor == other.descriptor && layout == other.layout && element_type == other.element_type &&
+         bytes == other.bytes;
+}
+
+std::string toString(const DescriptorKind& kind) {
+  const char* elements = kind.element_type == ElementType::kBits    ? "bits"
+                         : kind.element_type == ElementType::kUint8 ? "uint8"
+                                                                    : "float32";
+  return kind.descriptor + " (" + kind.layout + ", " + std::to_string(kind.bytes) + " bytes of " + elements + ")";
+}
+
+void StereoFeatures::append(const StereoFeature& feature) {
+  forEachArray([&](const char*, auto array, auto number) { (this->*array).push_back(feature.*number); });
+}
+
+StereoFeatures StereoFeatures::select(const std::vector<int>& rows) const {
+  StereoFeatures selected;
+  selected.stamp = stamp;
+  selected.camera = camera;
+  selected.descriptor = descriptor;
+  selected.layout = layout;
+  selected.element_type = element_type;
+  selected.report = report;
+  forEachArray([&](const char*, auto array, auto) {
+    for (const int row : rows) (selected.*array).push_back((this->*array)[static_cast<std::size_t>(row)]);
+  });
+  selected.descriptors.create(static_cast<int>(rows.size()), descriptors.cols, descriptors.type());
+  for (std::size_t k = 0; k < rows.size(); ++k)
+    descriptors.row(rows[k]).copyTo(selected.descriptors.row(static_cast<int>(k)));
+  return selected;
+}
 
 void StereoFeatures::check() const {
   camera.check();
   const std::size_t n = u.size();
-  const auto requireLength = [n](std::size_t length, const char* name) {
+  const auto requireLength = [n](std::size_t length, const std::string& name) {
     if (length != n)
-      throw std::invalid_argument("stereo features: array " + std::string(name) + " has " + std::to_string(length) +
-                                  " elements, u has " + std::to_string(n));
+      refuse("array " + name + " has " + std::to_string(length) + " elements, u has " + std::to_string(n));
   };
-  requireLength(v.size(), "v");
-  requireLength(disparity.size(), "disparity");
-  requireLength(dv.size(), "dv");
-  requireLength(size.size(), "size");
-  requireLength(angle.size(), "angle");
-  requireLength(response.size(), "response");
-  requireLength(sigma.size(), "sigma");
-  requireLength(octave.size(), "octave");
+  forEachArray([&](const char* name, auto array, auto) { requireLength((this->*array).size(), name); });
   requireLength(static_cast<std::size_t>(descriptors.rows), "descriptors (rows)");
+  if (n > 0 && (descriptors.type() != CV_8U || descriptors.cols % bytesOf(element_type) != 0))
+    refuse("descriptors are not rows of whole elements: " + toString(kind()));
 
-  const auto requireFinite = [](const std::vector<float>& values, const char* name) {
-    if (!std::all_of(values.begin(), values.end(), [](float x) { return std::isfinite(x); }))
-      throw std::invalid_argument("stereo features: array " + std::string(name) + " holds a number that is not finite");
-  };
-  requireFinite(u, "u");
-  requireFinite(v, "v");
-  requireFinite(disparity, "disparity");
-  requireFinite(dv, "dv");
-  requireFinite(size, "size");
-  requireFinite(angle, "angle");
-  requireFinite(response, "response");
-  requireFinite(sigma, "sigma");
-  const auto requirePositive = [](const std::vector<float>& values, const char* name) {
+  forEachArray([&](const char* name, auto array, auto) {
+    const auto& values = this->*array;
+    if (!std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); }))
+      refuse("array " + std::string(name) + " holds a number that is not finite");
+  });
+  const auto requirePositive = [](const std::vector<float>& values, const std::string& name) {
     if (!std::all_of(values.begin(), values.end(), [](float x) { return x > 0.f; }))
-      throw std::invalid_argument("stereo features: array " + std::string(name) +
-                                  " holds a number that is not positive");
+      refuse("array " + name + " holds a number that is not positive");
   };
   requirePositive(disparity, "disparity");
   requirePositive(size, "size");

@@ -85,14 +85,7 @@ StereoFeatures describeKeypoints(const KeypointSet& set, const std::vector<int>&
     const cv::Point2f& p = corner.position;
     const float size = static_cast<float>(curve.size(match.disparity));
     keypoints.push_back({p.x, p.y, p.x - match.disparity, p.y + match.dv, size});
-    features.u.push_back(p.x);
-    features.v.push_back(p.y);
-    features.disparity.push_back(match.disparity);
-    features.dv.push_back(match.dv);
-    features.size.push_back(size);
-    features.response.push_back(corner.response);
-    features.sigma.push_back(0.3f);
-    features.octave.push_back(0);
+    features.append({p.x, p.y, match.disparity, match.dv, size, -1.f, corner.response, 0.3f, 0});
   }
   const DescribedKeypoints described = descriptor.describe(set.images.left, set.images.right, keypoints);
   if (described.index.size() != chosen.size())
@@ -105,29 +98,11 @@ StereoFeatures describeKeypoints(const KeypointSet& set, const std::vector<int>&
 }
 
 StereoFeatures selectRows(const StereoFeatures& features, const std::vector<int>& rows, const std::string& layout) {
-  StereoFeatures selected;
-  selected.stamp = features.stamp;
-  selected.camera = features.camera;
-  selected.descriptor = features.descriptor;
-  selected.layout = layout;
-  selected.element_type = features.element_type;
-  const auto pick = [&](const auto& from, auto& to) {
-    for (const int row : rows) to.push_back(from[static_cast<std::size_t>(row)]);
-  };
-  pick(features.u, selected.u);
-  pick(features.v, selected.v);
-  pick(features.disparity, selected.disparity);
-  pick(features.dv, selected.dv);
-  pick(features.size, selected.size);
-  pick(features.angle, selected.angle);
-  pick(features.response, selected.response);
-  pick(features.sigma, selected.sigma);
-  pick(features.octave, selected.octave);
-  const bool halve = layout == "left" && features.layout == "left+right";
-  const int bytes = halve ? features.descriptors.cols / 2 : features.descriptors.cols;
-  selected.descriptors.create(static_cast<int>(rows.size()), bytes, CV_8U);
-  for (std::size_t k = 0; k < rows.size(); ++k)
-    features.descriptors.row(rows[k]).colRange(0, bytes).copyTo(selected.descriptors.row(static_cast<int>(k)));
+  StereoFeatures selected = features.select(rows);
+  if (layout == "left" && features.layout == "left+right") {
+    selected.layout = layout;
+    selected.descriptors = selected.descriptors.colRange(0, selected.descriptors.cols / 2).clone();
+  }
   return selected;
 }
 

@@ -92,15 +92,8 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
   for (std::size_t row = 0; row < described.index.size(); ++row) {
     const int i = described.index[row];
     const Corner& corner = corners[matches[i].left_index];
-    features.u.push_back(corner.position.x);
-    features.v.push_back(corner.position.y);
-    features.disparity.push_back(matches[i].disparity);
-    features.dv.push_back(matches[i].dv);
-    features.size.push_back(keypoints[i].size);
-    features.angle.push_back(described.angle[row]);
-    features.response.push_back(corner.response);
-    features.sigma.push_back(kCornerSigma);
-    features.octave.push_back(0);
+    features.append({corner.position.x, corner.position.y, matches[i].disparity, matches[i].dv, keypoints[i].size,
+                     described.angle[row], corner.response, kCornerSigma, 0});
   }
   features.descriptors = described.rows;
   report.describe_time = stopwatch.lap();

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <optional>
 #include <stdexcept>
 #include <type_traits>
 
@@ -81,25 +82,25 @@ float distanceUnit(ElementType type, const cv::Mat& a, int row_a, const cv::Mat&
   return std::max(length_a + lengths[0], 1e-12f);
 }
 
-/// Rows of a feature set, found by position.
+/// Rows of a feature set (not an empty one), found by position. Its extent is the features' own: the image size is a
+/// claim of whoever sent them.
 class PositionGrid {
  public:
-  PositionGrid(const StereoFeatures& features, double radius) : radius_(static_cast<float>(radius)) {
-    columns_ = static_cast<int>(features.camera.width / cell()) + 1;
-    rows_ = static_cast<int>(features.camera.height / cell()) + 1;
-    cells_.resize(static_cast<std::size_t>(columns_) * rows_);
+  PositionGrid(const StereoFeatures& features, double radius)
+      : radius_(static_cast<float>(radius)), columns_(features.u, 0.5 * radius), rows_(features.v, 0.5 * radius) {
+    cells_.resize(static_cast<std::size_t>(columns_.count()) * rows_.count());
     for (int i = 0; i < features.count(); ++i) {
       const float u = features.u[i], v = features.v[i];
-      cells_[static_cast<std::size_t>(clampedRow(v)) * columns_ + clampedColumn(u)].push_back({u, v, i});
+      cells_[static_cast<std::size_t>(rows_.at(v)) * columns_.count() + columns_.at(u)].push_back({u, v, i});
     }
   }
 
   void findAround(float u, float v, std::vector<int>& found) const {
     found.clear();
-    const int first = clampedColumn(u - radius_), last = clampedColumn(u + radius_);
-    for (int row = clampedRow(v - radius_); row <= clampedRow(v + radius_); ++row)
+    const int first = columns_.at(u - radius_), last = columns_.at(u + radius_);
+    for (int row = rows_.at(v - radius_); row <= rows_.at(v + radius_); ++row)
       for (int column = first; column <= last; ++column)
-        for (const Entry& entry : cells_[static_cast<std::size_t>(row) * columns_ + column]) {
+        for (const Entry& entry : cells_[static_cast<std::size_t>(row) * columns_.count() + column]) {
           const float du = entry.u - u, dv = entry.v - v;
           if (du * du + dv * dv <= radius_ * radius_) found.push_back(entry.row);
         }
@@ -111,35 +112,43 @@ class PositionGrid {
     int row;
   };
 
-  float cell() const { return 0.5f * radius_; }
-  int clampedColumn(float u) const {
-    return static_cast<int>(std::clamp(u / cell(), 0.f, static_cast<float>(columns_ - 1)));
-  }
-  int clampedRow(float v) const { return static_cast<int>(std::clamp(v / cell(), 0.f, static_cast<float>(rows_ - 1))); }
+  /// The cells along one axis; what lies beside them belongs to the nearest one.
+  class Axis {
+   public:
+    Axis(const std::vector<float>& positions, double smallest_cell) {
+      constexpr double kMostCells = 256.0;
+      const auto [low, high] = std::minmax_element(positions.begin(), positions.end());
+      const double extent = static_cast<double>(*high) - *low;
+      cell_ = std::max(smallest_cell, extent / kMostCells);
+      origin_ = cell_ * std::floor(*low / cell_);
+      last_ = std::floor((*high - origin_) / cell_);
+    }
+    int count() const { return static_cast<int>(last_) + 1; }
+    int at(double position) const { return static_cast<int>(std::clamp((position - origin_) / cell_, 0.0, last_)); }
+
+   private:
+    double cell_, origin_, last_;
+  };
 
   float radius_;
-  int columns_, rows_;
+  Axis columns_, rows_;
   std::vector<std::vector<Entry>> cells_;
 };
-
-void checkComparable(const StereoFeatures& a, const StereoFeatures& b) {
-  if (a.descriptor != b.descriptor || a.element_type != b.element_type || a.layout != b.layout ||
-      a.descriptors.cols != b.descriptors.cols)
-    throw std::invalid_argument("descriptors cannot be compared: " + a.descriptor + " (" + a.layout + ") against " +
-                                b.descriptor + " (" + b.layout + ")");
-}
 
 }  // namespace
 
 FeatureMatcher::FeatureMatcher(const FeatureMatcherOptions& options) : options_(checked(options)) {}
 
-std::vector<FeatureMatch> FeatureMatcher::match(const StereoFeatures& reference, const StereoFeatures& current,
+std::vector<FeatureMatch> FeatureMatcher::match(const DescribedPoints& reference, const StereoFeatures& current,
                                                 const std::optional<Eigen::Isometry3d>& T_current_reference) const {
   if (reference.count() == 0 || current.count() == 0) return {};
-  checkComparable(reference, current);
+  const DescriptorKind kind = current.kind();
+  if (kind != reference.kind)
+    throw std::invalid_argument("descriptors cannot be compared: " + toString(reference.kind) + " against " +
+                                toString(kind));
 
-  const bool gated = options_.gating && T_current_reference.has_value();
-  const PositionGrid grid(current, gated ? options_.gate_radius : 1e9);
+  std::optional<PositionGrid> grid;
+  if (options_.gating && T_current_reference) grid.emplace(current, options_.gate_radius);
   std::vector<int> everything(static_cast<std::size_t>(current.count()));
   for (int i = 0; i < current.count(); ++i) everything[i] = i;
 
@@ -151,15 +160,15 @@ std::vector<FeatureMatch> FeatureMatcher::match(const StereoFeatures& reference,
   std::vector<int> found;
   std::vector<float> distances(current.count());
   for (int i = 0; i < reference.count(); ++i) {
-    if (gated) {
-      const Eigen::Vector3d point = *T_current_reference * reference.point(i);
+    if (grid) {
+      const Eigen::Vector3d point = *T_current_reference * reference.positions[i];
       constexpr double kNearestDepth = 0.1;  // m: what passes closer than this cannot be seen again
       if (point.z() < kNearestDepth) continue;
       const Eigen::Vector3d predicted = current.camera.project(point);
-      grid.findAround(static_cast<float>(predicted.x()), static_cast<float>(predicted.y()), found);
+      grid->findAround(static_cast<float>(predicted.x()), static_cast<float>(predicted.y()), found);
     }
-    const std::vector<int>& candidates = gated ? found : everything;
-    computeDistances(reference.element_type, reference.descriptors.ptr(i), current.descriptors, candidates, distances);
+    const std::vector<int>& candidates = grid ? found : everything;
+    computeDistances(kind.element_type, reference.descriptors.ptr(i), current.descriptors, candidates, distances);
     for (std::size_t k = 0; k < candidates.size(); ++k) {
       const int j = candidates[k];
       if (distances[k] < of_reference[i].distance) of_reference[i] = {j, distances[k]};
@@ -171,8 +180,7 @@ std::vector<FeatureMatch> FeatureMatcher::match(const StereoFeatures& reference,
   for (int i = 0; i < reference.count(); ++i) {
     const auto& [j, distance] = of_reference[i];
     if (j < 0 || of_current[j].index != i) continue;
-    const float share =
-        distance / distanceUnit(reference.element_type, reference.descriptors, i, current.descriptors, j);
+    const float share = distance / distanceUnit(kind.element_type, reference.descriptors, i, current.descriptors, j);
     if (share <= options_.max_distance) matches.push_back({i, j, share});
   }
   return matches;

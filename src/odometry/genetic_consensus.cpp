@@ -62,15 +62,14 @@ class GeneKnowledge {
 
 class GeneticSearch {
  public:
-  GeneticSearch(const PoseProblem& problem, const GeneticConsensusOptions& options, bool adaptive,
-                const SearchBudget& budget, std::mt19937& random)
+  GeneticSearch(const PoseProblem& problem, const GeneticConsensusOptions& options, bool adaptive, SampleBudget budget,
+                std::mt19937& random)
       : problem_(problem),
         options_(options),
         adaptive_(adaptive),
         budget_(budget),
         random_(random),
-        knowledge_(problem.count()),
-        needed_(budget.max_iterations) {}
+        knowledge_(problem.count()) {}
 
   GeneticResult run() {
     result_.cost = std::numeric_limits<double>::max();
@@ -85,15 +84,7 @@ class GeneticSearch {
   }
 
  private:
-  bool finished() const {
-    return result_.iterations >= budget_.max_iterations ||
-           result_.iterations >= std::max<double>(needed_, budget_.min_iterations);
-  }
-
-  /// Share of the budget that is used up, 0…1.
-  double progress() const {
-    return std::min(1.0, result_.iterations / std::max(1.0, std::min<double>(needed_, budget_.max_iterations)));
-  }
+  bool finished() const { return budget_.spent(result_.iterations); }
 
   void evaluate(Individual& individual) {
     ++result_.iterations;
@@ -110,8 +101,7 @@ class GeneticSearch {
       result_.found = true;
       result_.cost = cost;
       result_.T_current_reference = T;
-      const double inliers = static_cast<double>(problem_.inliers(T).size());
-      needed_ = budget_.needed(inliers / problem_.count(), budget_.confidence);
+      budget_.noteInliers(static_cast<double>(problem_.inliers(T).size()) / problem_.count());
     }
     if (adaptive_ && options_.learning && fittest)
       knowledge_.learn(1.0 - individual.cost / problem_.worstCost(), [&] { return problem_.inliers(*fittest); });
@@ -151,7 +141,7 @@ class GeneticSearch {
   /// All genes of an unfit individual are replaced: at random in the beginning, by the best known ones in the end.
   void mutateUnfit(MinimalSample& genes) {
     for (std::size_t g = 0; g < genes.size(); ++g)
-      replace(genes, g, options_.learning && uniform(random_) < progress());
+      replace(genes, g, options_.learning && uniform(random_) < budget_.progress(result_.iterations));
   }
 
   void replace(MinimalSample& genes, std::size_t g, bool exploit) {
@@ -165,26 +155,16 @@ class GeneticSearch {
   const PoseProblem& problem_;
   const GeneticConsensusOptions& options_;
   const bool adaptive_;
-  const SearchBudget& budget_;
+  SampleBudget budget_;
   std::mt19937& random_;
   GeneKnowledge knowledge_;
-  double needed_;
   GeneticResult result_;
 };
 
 }  // namespace
 
-MinimalSample drawSample(std::mt19937& random, int count) {
-  MinimalSample sample{};
-  for (std::size_t k = 0; k < sample.size();) {
-    sample[k] = static_cast<int>(random() % static_cast<unsigned>(count));
-    if (std::find(sample.begin(), sample.begin() + k, sample[k]) == sample.begin() + k) ++k;
-  }
-  return sample;
-}
-
 GeneticResult searchGenetically(const PoseProblem& problem, const GeneticConsensusOptions& options, bool adaptive,
-                                const SearchBudget& budget, std::mt19937& random) {
+                                SampleBudget budget, std::mt19937& random) {
   return GeneticSearch(problem, options, adaptive, budget, random).run();
 }
 

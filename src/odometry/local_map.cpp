@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 namespace sdvo {
 namespace {
@@ -34,68 +33,42 @@ int LocalMap::lastKeyframeId() const {
 }
 
 bool LocalMap::continuedBy(const StereoFeatures& features) const {
-  if (features.camera != prototype_.camera) return false;
-  return features.count() == 0 ||
-         (features.descriptor == prototype_.descriptor && features.layout == prototype_.layout &&
-          features.descriptors.type() == descriptor_type_ && features.descriptors.cols == descriptor_columns_);
+  return features.camera == camera_ && (features.count() == 0 || features.kind() == kind_);
 }
 
 LocalMap::View LocalMap::view() const {
   View view;
-  view.features = prototype_;
-  StereoFeatures& features = view.features;
-  const StereoCamera& camera = features.camera;
-  const int newest = newestId();
+  view.rows.kind = kind_;
   const std::size_t first_remembered = frames_.size() - std::min(frames_.size(), std::size_t(options_.remembered));
   const int oldest = frames_[first_remembered].id;
-  std::vector<const Point*> seen;
   for (std::size_t p = 0; p < points_.size(); ++p) {
-    const Observation& last = points_[p].observations.back();
-    if (last.frame_id < oldest) continue;
+    if (points_[p].observations.back().frame_id < oldest) continue;
     Eigen::Vector3d predicted;
-    if (!predictObservation(camera, newestPose(), points_[p].position, predicted, nullptr)) continue;
+    if (!predictObservation(camera_, newestPose(), points_[p].position, predicted, nullptr)) continue;
     view.point.push_back(static_cast<int>(p));
-    view.row_of_newest.push_back(last.frame_id == newest ? last.row : -1);
-    features.u.push_back(static_cast<float>(predicted.x()));
-    features.v.push_back(static_cast<float>(predicted.y()));
-    features.disparity.push_back(static_cast<float>(std::max(predicted.z(), kFarthestDisparity)));
-    features.size.push_back(points_[p].size);
-    seen.push_back(&points_[p]);
+    view.pixels.emplace_back(static_cast<float>(predicted.x()), static_cast<float>(predicted.y()),
+                             static_cast<float>(std::max(predicted.z(), kFarthestDisparity)));
   }
-  if (seen.empty()) return view;
-  features.descriptors.create(static_cast<int>(seen.size()), descriptor_columns_, descriptor_type_);
-  const std::size_t count = seen.size();
-  features.dv.assign(count, 0.f);
-  features.angle.assign(count, -1.f);
-  features.response.assign(count, 0.f);
-  features.sigma.assign(count, 0.f);
-  features.octave.assign(count, 0);
-  for (std::size_t i = 0; i < seen.size(); ++i)
-    std::memcpy(features.descriptors.ptr(static_cast<int>(i)), seen[i]->descriptor.data(), seen[i]->descriptor.size());
+  view.rows.descriptors.create(static_cast<int>(view.point.size()), kind_.bytes, CV_8U);
+  for (std::size_t row = 0; row < view.point.size(); ++row) {
+    const cv::Point3f& pixel = view.pixels[row];
+    view.rows.positions.push_back(camera_.backProject(pixel.x, pixel.y, pixel.z));
+    const std::vector<std::uint8_t>& descriptor = points_[view.point[row]].descriptor;
+    std::copy(descriptor.begin(), descriptor.end(), view.rows.descriptors.ptr(static_cast<int>(row)));
+  }
   return view;
 }
 
 void LocalMap::insert(const StereoFeatures& features, int id, const Eigen::Isometry3d& T_camera_origin,
                       const std::vector<Sighting>& sightings, const RigCalibration& calibration) {
-  prototype_ = StereoFeatures{};
-  prototype_.stamp = features.stamp;
-  prototype_.camera = features.camera;
-  prototype_.descriptor = features.descriptor;
-  prototype_.layout = features.layout;
-  prototype_.element_type = features.element_type;
-  descriptor_type_ = features.descriptors.type();
-  descriptor_columns_ = features.descriptors.cols;
+  newest_stamp_ = features.stamp;
+  camera_ = features.camera;
+  kind_ = features.kind();
 
-  const std::size_t row_bytes = features.descriptors.cols * features.descriptors.elemSize();
   std::vector<bool> recognised(features.u.size(), false);
   for (const Sighting& sighting : sightings) {
-    Point& point = points_[sighting.point];
-    const int row = sighting.row;
-    recognised[row] = true;
-    point.observations.push_back({id, row, {features.u[row], features.v[row], features.disparity[row]}});
-    const std::uint8_t* bytes = features.descriptors.ptr(row);
-    point.descriptor.assign(bytes, bytes + row_bytes);
-    point.size = features.size[row];
+    recognised[sighting.row] = true;
+    addSighting(points_[sighting.point], features, sighting.row, id);
   }
   // Only now that the new sightings are noted: points that they carry on must outlive the forgotten pair.
   if (!frames_.empty() && !frames_.back().is_keyframe) removeFrame(frames_.size() - 1);
@@ -106,20 +79,23 @@ void LocalMap::insert(const StereoFeatures& features, int id, const Eigen::Isome
   if (static_cast<int>(frames_.size()) > options_.keyframes + 1) removeFrame(0);
 }
 
+void LocalMap::addSighting(Point& point, const StereoFeatures& features, int row, int id) {
+  point.observations.push_back({id, row, {features.u[row], features.v[row], features.disparity[row]}});
+  const std::uint8_t* bytes = features.descriptors.ptr(row);
+  point.descriptor.assign(bytes, bytes + features.descriptors.cols);
+}
+
 void LocalMap::startPoint(const StereoFeatures& features, int row, int id, const Eigen::Isometry3d& T_camera_origin,
                           const RigCalibration& calibration) {
   const StereoCamera& camera = features.camera;
-  const Eigen::Vector3d measurement(features.u[row], features.v[row], features.disparity[row]);
+  const double u = features.u[row], v = features.v[row];
   const double disparity =
-      std::max(measurement.z() - calibration.disparityError(camera, measurement.x()), kFarthestDisparity);
+      std::max(features.disparity[row] - calibration.disparityError(camera, u), kFarthestDisparity);
   Point point;
   point.position.T_origin_anchor = T_camera_origin.inverse();
-  point.position.ray_and_inverse_depth = {(measurement.x() - camera.cx) / camera.fx,
-                                          (measurement.y() - camera.cy) / camera.fy, 1.0 / camera.depth(disparity)};
-  point.observations.push_back({id, row, measurement});
-  const std::uint8_t* bytes = features.descriptors.ptr(row);
-  point.descriptor.assign(bytes, bytes + features.descriptors.cols * features.descriptors.elemSize());
-  point.size = features.size[row];
+  point.position.ray_and_inverse_depth = {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy,
+                                          1.0 / camera.depth(disparity)};
+  addSighting(point, features, row, id);
   points_.push_back(std::move(point));
 }
 
@@ -157,7 +133,7 @@ void LocalMap::removeFrame(std::size_t index) {
 LocalMap::Adjustment LocalMap::adjust(const WindowOptimizerOptions& options, const CalibrationBelief& prior,
                                       RigCalibration& calibration) {
   Window window;
-  window.camera = prototype_.camera;
+  window.camera = camera_;
   window.calibration = calibration;
   window.calibration_prior = prior;
   std::vector<int> ids;
@@ -181,22 +157,19 @@ LocalMap::Adjustment LocalMap::adjust(const WindowOptimizerOptions& options, con
   }
 
   Adjustment adjustment;
-  adjustment.frames = static_cast<int>(frames_.size());
   const WindowSolution solution = optimizeWindow(options, window);
   if (!solution.success) return adjustment;
   adjustment.success = true;
   adjustment.calibration_information = solution.calibration_information;
-  const int newest = adjustment.frames - 1;
+  const int newest = static_cast<int>(frames_.size()) - 1;
   // What the window's equations do not contain (noise that differs from the options, the calibration's steps from
   // window to window) makes the errors of simulated drives this much larger.
   constexpr double kUnmodelled = 1.2;
   const auto covariance = [&](int from, int to) -> Matrix6d {
     return kUnmodelled * motionCovariance(window, solution.pose_covariance, from, to);
   };
-  adjustment.since_keyframe = covariance(newest - 1, newest);
-  adjustment.since_first = covariance(0, newest);
-  adjustment.since_second = covariance(1, newest);
-  adjustment.keyframe_since_first = covariance(0, newest - 1);
+  adjustment.covariances = {oldestId(), covariance(newest - 1, newest), covariance(0, newest), covariance(1, newest),
+                            covariance(0, newest - 1)};
   calibration = window.calibration;
   for (std::size_t f = 0; f < frames_.size(); ++f)
     frames_[f].T_camera_origin = orthonormalised(window.T_camera_origin[f]);

@@ -1,21 +1,11 @@
 #include "stereo_descriptor_vo/odometry/sample_consensus.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "stereo_descriptor_vo/odometry/motion_refinement.hpp"
 
 namespace sdvo {
 namespace {
-
-/// Samples needed to draw one without outliers at the wanted confidence (Fischler and Bolles 1981).
-double neededIterations(double inlier_ratio, double confidence) {
-  const double all_inliers = std::pow(inlier_ratio, 3);
-  if (all_inliers >= 1.0) return 1.0;
-  if (all_inliers <= 1e-12) return std::numeric_limits<double>::max();
-  return std::log(1.0 - confidence) / std::log(1.0 - all_inliers);
-}
 
 /// Local optimisation of a new best pose over its own inliers (Chum, Matas, Kittler 2003).
 void optimiseLocally(const PoseProblem& problem, Eigen::Isometry3d& T, double& cost) {
@@ -29,16 +19,13 @@ void optimiseLocally(const PoseProblem& problem, Eigen::Isometry3d& T, double& c
   cost = optimised_cost;
 }
 
-Consensus searchAtRandom(const PoseProblem& problem, const SampleConsensusOptions& options, std::mt19937& random) {
+Consensus searchAtRandom(const PoseProblem& problem, const SampleConsensusOptions& options, SampleBudget budget,
+                         std::mt19937& random) {
   const bool count_only = options.consensus == "ransac";
   const bool local = options.consensus == "lo_ransac";
   Consensus consensus;
-  double best = std::numeric_limits<double>::max(), needed = options.max_iterations;
-  const auto unfinished = [&] {
-    return consensus.iterations < options.max_iterations &&
-           consensus.iterations < std::max<double>(needed, options.min_iterations);
-  };
-  for (; unfinished(); ++consensus.iterations) {
+  double best = std::numeric_limits<double>::max();
+  for (; !budget.spent(consensus.iterations); ++consensus.iterations) {
     for (const Eigen::Isometry3d& candidate : problem.solve(drawSample(random, problem.count()))) {
       double cost = count_only ? problem.outlierCost(candidate, best) : problem.truncatedCost(candidate, best);
       if (cost >= best) continue;
@@ -47,14 +34,14 @@ Consensus searchAtRandom(const PoseProblem& problem, const SampleConsensusOption
       if (local) optimiseLocally(problem, consensus.T_current_reference, cost);
       best = cost;
       const double inliers = static_cast<double>(problem.inliers(consensus.T_current_reference).size());
-      needed = neededIterations(inliers / problem.count(), options.confidence);
+      budget.noteInliers(inliers / problem.count());
     }
   }
   return consensus;
 }
 
-Consensus searchByGenes(const PoseProblem& problem, const SampleConsensusOptions& options, std::mt19937& random) {
-  const SearchBudget budget{options.min_iterations, options.max_iterations, options.confidence, neededIterations};
+Consensus searchByGenes(const PoseProblem& problem, const SampleConsensusOptions& options, const SampleBudget& budget,
+                        std::mt19937& random) {
   const GeneticResult result =
       searchGenetically(problem, options.genetic, options.consensus == "adaptive_gasac", budget, random);
   Consensus consensus;
@@ -71,7 +58,9 @@ Consensus findConsensus(const PoseProblem& problem, const SampleConsensusOptions
   if (problem.count() < kSmallestProblem) return {};
   std::mt19937 random(static_cast<std::uint32_t>(options.seed));
   const bool genetic = options.consensus == "gasac" || options.consensus == "adaptive_gasac";
-  Consensus consensus = genetic ? searchByGenes(problem, options, random) : searchAtRandom(problem, options, random);
+  const SampleBudget budget(options.min_iterations, options.max_iterations, options.confidence);
+  Consensus consensus =
+      genetic ? searchByGenes(problem, options, budget, random) : searchAtRandom(problem, options, budget, random);
   if (consensus.found) consensus.inliers = problem.inliers(consensus.T_current_reference);
   return consensus;
 }

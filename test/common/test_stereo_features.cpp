@@ -78,6 +78,43 @@ TEST(StereoFeatures, RefusesNumbersThatMeanNothing) {
       EXPECT_NE(damaged(array, bad).find("array " + name + " "), std::string::npos) << name << " = " << bad;
 }
 
+TEST(StereoFeatures, RefusesDescriptorsThatAreNotRowsOfWholeElements) {
+  StereoFeatures features = threeFeatures();
+  features.descriptors.convertTo(features.descriptors, CV_32F);
+  EXPECT_NE(errorOf([&] { features.check(); }).find("descriptors"), std::string::npos);
+  features = threeFeatures();
+  features.element_type = ElementType::kFloat32;
+  EXPECT_NO_THROW(features.check());
+  features.descriptors = features.descriptors.colRange(0, 126).clone();
+  EXPECT_NE(errorOf([&] { features.check(); }).find("126 bytes of float32"), std::string::npos);
+}
+
+TEST(StereoFeatures, SelectedRowsStayWhole) {
+  StereoFeatures features = threeFeatures();
+  features.append({1.f, 2.f, 3.f, 4.f, 5.f, 6.f, 7.f, 8.f, 9});
+  features.descriptors.push_back(cv::Mat(1, 128, CV_8U, cv::Scalar(77)));
+  features.report.status = "as it was";
+  const StereoFeatures selected = features.select({3, 1});
+  EXPECT_NO_THROW(selected.check());
+  EXPECT_EQ(selected.count(), 2);
+  EXPECT_EQ(selected.camera, features.camera);
+  EXPECT_EQ(selected.kind(), features.kind());
+  EXPECT_EQ(selected.report.status, "as it was");
+  EXPECT_EQ(selected.u[0], 1.f);
+  EXPECT_EQ(selected.v[0], 2.f);
+  EXPECT_EQ(selected.disparity[0], 3.f);
+  EXPECT_EQ(selected.dv[0], 4.f);
+  EXPECT_EQ(selected.size[0], 5.f);
+  EXPECT_EQ(selected.angle[0], 6.f);
+  EXPECT_EQ(selected.response[0], 7.f);
+  EXPECT_EQ(selected.sigma[0], 8.f);
+  EXPECT_EQ(selected.octave[0], 9);
+  EXPECT_EQ(selected.u[1], features.u[1]);
+  EXPECT_TRUE(synthetic::equalMats(selected.descriptors.row(0), features.descriptors.row(3)));
+  EXPECT_TRUE(synthetic::equalMats(selected.descriptors.row(1), features.descriptors.row(1)));
+  EXPECT_EQ(features.select({}).count(), 0);
+}
+
 TEST(StereoFeatures, RefusesACameraThatIsNone) {
   StereoFeatures features = threeFeatures();
   features.camera.baseline = 0.0;

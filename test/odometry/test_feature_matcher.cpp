@@ -161,6 +161,23 @@ TEST(FeatureMatcher, RefusesSetsThatCannotBeCompared) {
   StereoFeatures other = both;
   other.descriptor = "orb";
   EXPECT_THROW(FeatureMatcher({}).match(both, other, std::nullopt), std::invalid_argument);
+  other = both;
+  other.element_type = ElementType::kUint8;
+  EXPECT_THROW(FeatureMatcher({}).match(both, other, std::nullopt), std::invalid_argument);
+}
+
+TEST(FeatureMatcher, IsNotLedAstrayByTheClaimsOfAMessage) {
+  // A message may claim any image and put features anywhere; a grid over all that would hold millions of cells.
+  std::mt19937 random(9);
+  StereoCamera camera = synthetic::camera();
+  camera.width = camera.height = 1 << 30;
+  StereoFeatures features = noFeatures(camera);
+  for (const double far : {0.0, 1e3, 1e9, -3e38, 3e38}) addFeature(features, far, -far, 10, randomRow(random, 128));
+  FeatureMatcherOptions options;
+  options.gate_radius = 1.0;
+  const auto matches = FeatureMatcher(options).match(features, features, Eigen::Isometry3d::Identity());
+  for (const FeatureMatch& match : matches) EXPECT_EQ(match.reference, match.current);
+  EXPECT_GE(matches.size(), 2u);
 }
 
 TEST(FeatureMatcher, TakesEmptySets) {

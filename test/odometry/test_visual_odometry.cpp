@@ -127,7 +127,9 @@ TEST(VisualOdometry, FollowsAnExactDrive) {
     EXPECT_GT(result.inliers, 50);
     EXPECT_LE(result.inliers, result.matches);
     EXPECT_LE(result.matches, result.features);
-    EXPECT_EQ(result.inlier_matches.size(), static_cast<std::size_t>(result.inliers));
+    EXPECT_EQ(result.flow.size(), static_cast<std::size_t>(result.matches));
+    EXPECT_EQ(std::count_if(result.flow.begin(), result.flow.end(), [](const FeatureFlow& f) { return f.inlier; }),
+              result.inliers);
     EXPECT_GT(result.coverage, 0.5);
     EXPECT_LT(result.rms, 0.01);
   }

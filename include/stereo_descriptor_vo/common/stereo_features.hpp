@@ -12,6 +12,20 @@ namespace sdvo {
 /// What one row of the descriptor matrix is made of.
 enum class ElementType { kBits, kUint8, kFloat32 };
 
+/// Whether rows of descriptors can be compared: only those of the same kind can.
+struct DescriptorKind {
+  std::string descriptor;  ///< base descriptor: "freak", …
+  std::string layout;      ///< "left" or "left+right" (row = left half, then right half)
+  ElementType element_type = ElementType::kBits;
+  int bytes = 0;  ///< of a row
+
+  bool operator==(const DescriptorKind& other) const;
+  bool operator!=(const DescriptorKind& other) const { return !(*this == other); }
+};
+
+/// In words, for messages.
+std::string toString(const DescriptorKind& kind);
+
 /// What the image side alone can know of a pair; travels with the features for the sake of whoever receives them.
 struct ExtractionReport {
   int detected = 0;                       ///< corners in the left image, before stereo matching
@@ -22,6 +36,12 @@ struct ExtractionReport {
   double stereo_time = 0.0;               ///< s
   double describe_time = 0.0;             ///< s
   std::string status;                     ///< empty, or why the pair gave few or no features
+};
+
+/// One row of StereoFeatures without its descriptor; meaning and units as there.
+struct StereoFeature {
+  float u, v, disparity, dv, size, angle, response, sigma;
+  std::uint8_t octave;
 };
 
 /// Features of one rectified stereo pair as parallel arrays: element i of each belongs to row i of `descriptors`.
@@ -48,14 +68,37 @@ struct StereoFeatures {
 
   int count() const { return static_cast<int>(u.size()); }
 
+  DescriptorKind kind() const { return {descriptor, layout, element_type, descriptors.cols}; }
+
+  /// Adds a row to every array; its descriptor goes into the last row of `descriptors` separately.
+  void append(const StereoFeature& feature);
+
+  /// The same pair with some of its rows, in the order given.
+  StereoFeatures select(const std::vector<int>& rows) const;
+
   /// (u_left, v_left, u_right) of feature i, px.
   Eigen::Vector3d measurement(int i) const { return {u[i], v[i], static_cast<double>(u[i]) - disparity[i]}; }
 
   /// Position of feature i in the left optical frame, m.
   Eigen::Vector3d point(int i) const { return camera.backProject(u[i], v[i], disparity[i]); }
 
-  /// Throws std::invalid_argument when arrays differ in length, a number is not finite or a disparity not positive.
+  /// Throws std::invalid_argument when arrays differ in length, a number is not finite or not positive where it must
+  /// be, or the descriptors are not rows of whole elements.
   void check() const;
+
+  /// Calls visit(name, array, number of one row) with pointers to members, for each array of numbers.
+  template <class Visit>
+  static void forEachArray(const Visit& visit) {
+    visit("u", &StereoFeatures::u, &StereoFeature::u);
+    visit("v", &StereoFeatures::v, &StereoFeature::v);
+    visit("disparity", &StereoFeatures::disparity, &StereoFeature::disparity);
+    visit("dv", &StereoFeatures::dv, &StereoFeature::dv);
+    visit("size", &StereoFeatures::size, &StereoFeature::size);
+    visit("angle", &StereoFeatures::angle, &StereoFeature::angle);
+    visit("response", &StereoFeatures::response, &StereoFeature::response);
+    visit("sigma", &StereoFeatures::sigma, &StereoFeature::sigma);
+    visit("octave", &StereoFeatures::octave, &StereoFeature::octave);
+  }
 };
 
 }  // namespace sdvo

@@ -6,6 +6,7 @@
 
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/odometry/described_points.hpp"
 
 namespace sdvo {
 
@@ -23,10 +24,10 @@ struct FeatureMatcherOptions {
   }
 };
 
-/// A correspondence between two feature sets.
+/// A correspondence between described points, of another pair or of a map, and the features of a pair.
 struct FeatureMatch {
-  int reference;   ///< row in the reference set
-  int current;     ///< row in the current set
+  int reference;   ///< row of the reference
+  int current;     ///< row of the current features
   float distance;  ///< in [0, 1]: share of differing bits, or |a - b|^2 / (|a|^2 + |b|^2)
 };
 
@@ -36,8 +37,8 @@ class FeatureMatcher {
   explicit FeatureMatcher(const FeatureMatcherOptions& options);
 
   /// Matches in the order of the reference rows. With a prediction of the motion and gating on, only features near
-  /// their predicted position are compared. Throws std::invalid_argument when the two sets hold different descriptors.
-  std::vector<FeatureMatch> match(const StereoFeatures& reference, const StereoFeatures& current,
+  /// their predicted position are compared. Throws std::invalid_argument when the descriptors are of different kinds.
+  std::vector<FeatureMatch> match(const DescribedPoints& reference, const StereoFeatures& current,
                                   const std::optional<Eigen::Isometry3d>& T_current_reference) const;
 
  private:

@@ -3,6 +3,7 @@
 #include <random>
 
 #include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/odometry/minimal_sampling.hpp"
 #include "stereo_descriptor_vo/odometry/pose_problem.hpp"
 
 namespace sdvo {
@@ -27,25 +28,12 @@ struct GeneticResult {
   int iterations = 0;  ///< minimal samples solved
 };
 
-/// Tells the samples needed once the best pose so far has a share of inliers; see sample_consensus.cpp.
-using NeededIterations = double (*)(double inlier_ratio, double confidence);
-
-/// How long to search.
-struct SearchBudget {
-  int min_iterations, max_iterations;
-  double confidence;
-  NeededIterations needed;
-};
-
 /// Genetic algorithm sample consensus. An individual is a minimal sample, its genes are the correspondences, its
 /// fitness is the consensus of the pose that it gives. With `adaptive` false the rates are fixed (GASAC, Rodehorst and
 /// Hellwich 2006); with `adaptive` true unfit individuals are mutated and the search learns for each gene how good a
 /// replacement it is (as good as the best pose it agrees with), so that mutation moves from exploring at random to
 /// exploiting what was learnt (Shojaedini, Majd, Safabakhsh 2017).
 GeneticResult searchGenetically(const PoseProblem& problem, const GeneticConsensusOptions& options, bool adaptive,
-                                const SearchBudget& budget, std::mt19937& random);
-
-/// Three different indices below `count`, drawn evenly.
-MinimalSample drawSample(std::mt19937& random, int count);
+                                SampleBudget budget, std::mt19937& random);
 
 }  // namespace sdvo

@@ -4,12 +4,14 @@
 #include <array>
 #include <cstdint>
 #include <deque>
+#include <opencv2/core.hpp>
 #include <utility>
 #include <vector>
 
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/odometry/feature_matcher.hpp"
+#include "stereo_descriptor_vo/odometry/described_points.hpp"
+#include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
 #include "stereo_descriptor_vo/odometry/window_optimizer.hpp"
 
 namespace sdvo {
@@ -36,8 +38,7 @@ class LocalMap {
  public:
   explicit LocalMap(const LocalMapOptions& options);
 
-  bool empty() const { return frames_.empty(); }
-  std::int64_t newestStamp() const { return prototype_.stamp; }
+  std::int64_t newestStamp() const { return newest_stamp_; }
 
   /// Whether features come from the same camera and, if there are any, with descriptors of the same kind.
   bool continuedBy(const StereoFeatures& features) const;
@@ -47,12 +48,12 @@ class LocalMap {
   int lastKeyframeId() const;
   bool newestIsKeyframe() const { return frames_.back().is_keyframe; }
   const Eigen::Isometry3d& newestPose() const { return frames_.back().T_camera_origin; }
-  /// The map as the newest pair would see it, one row for each point still looked for: positions and disparities
-  /// (without the rig's error) of the points as now estimated, with the descriptors of their last sighting.
+  /// The map as the newest pair would see it, one row for each point still looked for: the points as now estimated,
+  /// with the descriptors of their last sighting.
   struct View {
-    StereoFeatures features;
-    std::vector<int> point;          ///< for each row
-    std::vector<int> row_of_newest;  ///< row of the newest pair's features, -1 where that did not see it
+    DescribedPoints rows;             ///< in the newest pair's left optical frame
+    std::vector<cv::Point3f> pixels;  ///< (u_left, v_left, disparity without the rig's error) in the newest pair, px
+    std::vector<int> point;           ///< what sightings call them
   };
   View view() const;
 
@@ -67,13 +68,7 @@ class LocalMap {
   /// Bundle adjustment over all frames; sightings that do not agree with it are cut off from their points.
   struct Adjustment {
     bool success = false;
-    int frames = 0;
-    /// Covariances of motions between two frames, as right perturbations (m and rad): the newest pair since the key
-    /// frame before it; the newest pair since the first and since the second frame; that key frame since the first
-    /// frame.
-    Matrix6d since_keyframe = Matrix6d::Zero();
-    Matrix6d since_first = Matrix6d::Zero(), since_second = Matrix6d::Zero();
-    Matrix6d keyframe_since_first = Matrix6d::Zero();
+    WindowCovariances covariances;
     RigCalibration::Matrix calibration_information = RigCalibration::Matrix::Zero();
     std::vector<int> rejected_rows;  ///< of the newest pair
   };
@@ -94,20 +89,20 @@ class LocalMap {
     AnchoredPoint position;
     std::vector<Observation> observations;  ///< in the order of the frames
     std::vector<std::uint8_t> descriptor;
-    float size;
   };
 
   void removeFrame(std::size_t index);
   void cutOff(const std::vector<std::pair<int, int>>& sources, const std::vector<double>& residuals,
               Adjustment& adjustment);
   bool needsKeyframe() const;
+  static void addSighting(Point& point, const StereoFeatures& features, int row, int id);
   void startPoint(const StereoFeatures& features, int row, int id, const Eigen::Isometry3d& T_camera_origin,
                   const RigCalibration& calibration);
 
   LocalMapOptions options_;
-  StereoFeatures prototype_;  ///< newest pair without its arrays: camera and descriptor kind
-  int descriptor_type_ = 0;   ///< of OpenCV
-  int descriptor_columns_ = 0;
+  std::int64_t newest_stamp_ = 0;  ///< of the newest pair, as are camera and kind
+  StereoCamera camera_;
+  DescriptorKind kind_;
   std::deque<Frame> frames_;
   std::vector<Point> points_;
 };

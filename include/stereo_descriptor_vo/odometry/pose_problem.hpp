@@ -1,13 +1,13 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <array>
 #include <limits>
 #include <optional>
 #include <vector>
 
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
+#include "stereo_descriptor_vo/odometry/minimal_sampling.hpp"
 
 namespace sdvo {
 
@@ -26,9 +26,6 @@ std::optional<Eigen::Vector3d> reprojectionResidual(const StereoCamera& camera,
 /// Derivative of the projection of exp(xi) * T_current_reference * point by xi at zero, (u_left, v_left, u_right) rows.
 Eigen::Matrix<double, 3, 6> motionJacobian(const StereoCamera& camera, const Eigen::Isometry3d& T_current_reference,
                                            const Eigen::Vector3d& point);
-
-/// Indices of the correspondences that a minimal solver takes.
-using MinimalSample = std::array<int, 3>;
 
 /// What every sample consensus works on: correspondences with outliers, the minimal solver and the consensus of a pose.
 class PoseProblem {

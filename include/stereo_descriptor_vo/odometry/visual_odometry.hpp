@@ -13,6 +13,7 @@
 #include "stereo_descriptor_vo/odometry/feature_matcher.hpp"
 #include "stereo_descriptor_vo/odometry/local_map.hpp"
 #include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
+#include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
 #include "stereo_descriptor_vo/odometry/right_camera_rotation.hpp"
 
 namespace sdvo {
@@ -58,7 +59,7 @@ const char* toString(TrackingState state);
 struct FeatureFlow {
   float u_previous, v_previous;  ///< px, left image
   int current;                   ///< row of the pair's features
-  bool inlier;
+  bool inlier;                   ///< agrees with the motion that was found, used or not, and with the map
 };
 
 /// What one pair did to the odometry. Everything published is derived from this one object.
@@ -82,12 +83,7 @@ struct OdometryResult {
   double rms = 0.0;                            ///< reprojection error of the inliers, px per coordinate
   double match_time = 0.0, motion_time = 0.0;  ///< s
   double distance = 0.0;                       ///< travelled since the start or reset, m
-  int reference_id = 0;   ///< running number of the map's newest pair, to whose view this one was matched
-  int keyframe_id = 0;    ///< running number of the last key frame, this pair included
-  int window_frames = 0;  ///< pairs in the window that was adjusted
-
-  /// Reference pair to this pair; the reference is -1 for a point of the map that only earlier pairs had seen.
-  std::vector<FeatureMatch> inlier_matches;
+  int keyframe_id = 0;            ///< running number of the map's last key frame, this pair included; 0 without a map
   std::vector<FeatureFlow> flow;  ///< of all matches
 
   /// The rig's residual errors as estimated so far, with standard deviations; NaN until there is an estimate.
@@ -124,20 +120,33 @@ class VisualOdometry {
   const VisualOdometryOptions& options() const { return options_; }
 
  private:
-  OdometryResult seed(OdometryResult result, const StereoFeatures& features);
-  OdometryResult follow(OdometryResult result, const StereoFeatures& features);
-  OdometryResult predict(OdometryResult result);
+  /// Where a pair is, as matching tells.
   struct Localisation {
+    std::string failure;    ///< why its motion is not to be used; empty when it is
     MotionEstimate motion;  ///< since the map's newest pair
     LocalMap::View view;
-    std::vector<FeatureMatch> inliers;  ///< rows of the view to rows of the pair
+    std::vector<FeatureMatch> matches;           ///< rows of the view to rows of the pair
+    double match_time = 0.0, motion_time = 0.0;  ///< s
   };
-  Localisation localise(const StereoFeatures& features, const std::optional<Eigen::Isometry3d>& prior,
-                        OdometryResult& result) const;
-  void extendMap(const StereoFeatures& features, const Localisation& found, OdometryResult& result);
-  void advance(OdometryResult& result, const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance);
-  void noteKeyframe();
-  void reportCalibration(OdometryResult& result) const;
+  /// What becomes of the pose with a pair.
+  struct Step {
+    TrackingState state = TrackingState::kWaiting;
+    std::string reason;
+    std::optional<Eigen::Isometry3d> T_previous_current;
+    Matrix6d covariance = Matrix6d::Zero();  ///< of that motion
+    std::vector<int> rejected_rows;          ///< matched rows of the pair that the adjustment does not confirm
+    double time = 0.0;                       ///< s
+  };
+
+  void refuse(const StereoFeatures& features) const;
+  Localisation localise(const StereoFeatures& features, double dt) const;
+  Localisation search(const StereoFeatures& features, const std::optional<Eigen::Isometry3d>& T_current_reference,
+                      double dt) const;
+  Step seed(const StereoFeatures& features);
+  Step extendMap(const StereoFeatures& features, const Localisation& found);
+  Step predict(const StereoFeatures& features, double dt, const std::string& failure);
+  void move(const Eigen::Isometry3d& T_previous_current);
+  OdometryResult report(const StereoFeatures& features, double dt, const Localisation& found, const Step& step) const;
   std::string implausible(const Eigen::Isometry3d& T_previous_current, double dt) const;
 
   VisualOdometryOptions options_;
@@ -153,13 +162,7 @@ class VisualOdometry {
     RightCameraRotation right_rotation;
     std::optional<std::int64_t> last_stamp;
     Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
-    Matrix6d pose_covariance = Matrix6d::Zero();
-    Eigen::Isometry3d T_origin_keyframe = Eigen::Isometry3d::Identity();  ///< as reported when it was the newest pair
-    Matrix6d keyframe_covariance = Matrix6d::Zero();                      ///< of that pose
-    Matrix6d covariance_since_keyframe = Matrix6d::Zero();  ///< of the last pose as seen from the last key frame
-    bool previous_is_keyframe = false;
-    LocalMap::Adjustment last_adjustment;
-    int last_oldest_id = 0;            ///< first frame of that adjustment's window
+    PoseCovariance covariance;         ///< of that pose
     std::optional<Vector6d> velocity;  ///< of the camera in its own frame, m/s and rad/s
     double distance = 0.0;
     int predicted_pairs = 0;

@@ -1,0 +1,76 @@
+#include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
+
+#include <Eigen/Eigenvalues>
+
+namespace sdvo {
+namespace {
+
+/// What a discontinuity of unknown size adds: metres and a good part of a right angle.
+Matrix6d discontinuity() {
+  Vector6d variance;
+  variance << Eigen::Vector3d::Constant(100.0), Eigen::Vector3d::Constant(0.25);
+  return variance.asDiagonal();
+}
+
+/// The nearest positive semi-definite matrix to a symmetric one.
+Matrix6d positivePart(const Matrix6d& matrix) {
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(matrix);
+  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).asDiagonal() * solver.eigenvectors().transpose();
+}
+
+/// The covariance of a pose T as that of T * M: T exp(xi) M = T M exp(Ad(M^-1) xi).
+Matrix6d carriedBy(const Eigen::Isometry3d& motion, const Matrix6d& covariance) {
+  const Matrix6d ad = adjoint(motion.inverse());
+  const Matrix6d carried = ad * covariance * ad.transpose();
+  return 0.5 * (carried + carried.transpose());
+}
+
+}  // namespace
+
+void PoseCovariance::restart() {
+  value_ += discontinuity();
+  since_keyframe_.setZero();
+  last_window_.reset();
+  markKeyframe();
+}
+
+void PoseCovariance::markKeyframe() {
+  keyframe_ = value_;
+  last_is_keyframe_ = true;
+}
+
+void PoseCovariance::carry(const Eigen::Isometry3d& T_previous_current) {
+  value_ = carriedBy(T_previous_current, value_);
+  keyframe_ = carriedBy(T_previous_current, keyframe_);
+}
+
+void PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance) {
+  carry(T_previous_current);
+  value_ += covariance;
+  since_keyframe_ =
+      covariance + (last_is_keyframe_ ? Matrix6d(Matrix6d::Zero()) : carriedBy(T_previous_current, since_keyframe_));
+  last_is_keyframe_ = false;
+  last_window_.reset();
+}
+
+Matrix6d PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, const WindowCovariances& window) {
+  const Matrix6d motion = carriedBy(T_previous_current, outdated(window)) + window.since_keyframe;
+  carry(T_previous_current);
+  const Matrix6d measured = keyframe_ + window.since_keyframe;
+  if (measured.trace() >= value_.trace()) value_ = measured;
+  since_keyframe_ = window.since_keyframe;
+  last_is_keyframe_ = false;
+  last_window_ = window;
+  return motion;
+}
+
+/// What the last pose lacked when it was reported, seen from the key frame that the new pair is measured from.
+Matrix6d PoseCovariance::outdated(const WindowCovariances& window) const {
+  if (!last_is_keyframe_ || !last_window_) return since_keyframe_;
+  // It is that key frame itself: this window knows it better than its own did.
+  const Matrix6d& then =
+      window.first_id == last_window_->first_id ? last_window_->since_first : last_window_->since_second;
+  return positivePart(then - window.keyframe_since_first);
+}
+
+}  // namespace sdvo
