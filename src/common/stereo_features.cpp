@@ -11,6 +11,12 @@ int bytesOf(ElementType type) {
   return type == ElementType::kFloat32 ? 4 : 1;
 }
 
+cv::Mat selectRows(const cv::Mat& matrix, const std::vector<int>& rows) {
+  cv::Mat selected(static_cast<int>(rows.size()), matrix.cols, matrix.type());
+  for (std::size_t k = 0; k < rows.size(); ++k) matrix.row(rows[k]).copyTo(selected.row(static_cast<int>(k)));
+  return selected;
+}
+
 [[noreturn]] void refuse(const std::string& why) {
   throw std::invalid_argument("stereo features: " + why);
 }
@@ -44,9 +50,9 @@ StereoFeatures StereoFeatures::select(const std::vector<int>& rows) const {
   forEachArray([&](const char*, auto array, auto) {
     for (const int row : rows) (selected.*array).push_back((this->*array)[static_cast<std::size_t>(row)]);
   });
-  selected.descriptors.create(static_cast<int>(rows.size()), descriptors.cols, descriptors.type());
-  for (std::size_t k = 0; k < rows.size(); ++k)
-    descriptors.row(rows[k]).copyTo(selected.descriptors.row(static_cast<int>(k)));
+  selected.descriptors = selectRows(descriptors, rows);
+  selected.patch_layout = patch_layout;
+  if (hasPatches()) selected.patches = selectRows(patches, rows);
   return selected;
 }
 
@@ -61,6 +67,15 @@ void StereoFeatures::check() const {
   requireLength(static_cast<std::size_t>(descriptors.rows), "descriptors (rows)");
   if (n > 0 && (descriptors.type() != CV_8U || descriptors.cols % bytesOf(element_type) != 0))
     refuse("descriptors are not rows of whole elements: " + toString(kind()));
+  if (patch_layout.side < 0 || !(patch_layout.min_spacing > 0.f) || !(patch_layout.spacing_by_size >= 0.f) ||
+      !std::isfinite(patch_layout.min_spacing) || !std::isfinite(patch_layout.spacing_by_size))
+    refuse("the patches' side must not be negative and their spacing must be positive");
+  if (hasPatches()) {
+    requireLength(static_cast<std::size_t>(patches.rows), "patches (rows)");
+    if (n > 0 && (patches.type() != CV_8U || patches.cols != patch_layout.bytes()))
+      refuse("patches of " + std::to_string(patch_layout.side) + "x" + std::to_string(patch_layout.side) +
+             " samples need rows of " + std::to_string(patch_layout.bytes()) + " bytes");
+  }
 
   forEachArray([&](const char* name, auto array, auto) {
     const auto& values = this->*array;
@@ -73,7 +88,6 @@ void StereoFeatures::check() const {
   };
   requirePositive(disparity, "disparity");
   requirePositive(size, "size");
-  requirePositive(sigma, "sigma");
 }
 
 }  // namespace sdvo

@@ -36,9 +36,12 @@ void measureImage(const cv::Mat& image, double& mean_intensity, double& sharpnes
   sharpness = static_cast<double>(gradient) / static_cast<double>(std::max<std::int64_t>(pixels, 1));
 }
 
-/// Standard deviation of a corner's position in px. Sub-pixel corners of a sharp image are good to a few tenths of a
-/// pixel; those that a large neighbourhood had to be smoothed for are no better, so one figure serves all.
-constexpr float kCornerSigma = 0.3f;
+cv::Mat cutPatches(const cv::Mat& image, const StereoFeatures& features) {
+  const PatchCutter cutter(features.patch_layout, image);
+  cv::Mat patches(features.count(), features.patch_layout.bytes(), CV_8U);
+  for (int i = 0; i < features.count(); ++i) cutter.cut(features.u[i], features.v[i], features.size[i], patches.ptr(i));
+  return patches;
+}
 
 }  // namespace
 
@@ -93,9 +96,13 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
     const int i = described.index[row];
     const Corner& corner = corners[matches[i].left_index];
     features.append({corner.position.x, corner.position.y, matches[i].disparity, matches[i].dv, keypoints[i].size,
-                     described.angle[row], corner.response, kCornerSigma, 0});
+                     described.angle[row], corner.response});
   }
   features.descriptors = described.rows;
+
+  // A patch at that size, too, by which the feature can be aligned between pairs.
+  features.patch_layout = options_.patch.layout();
+  if (features.hasPatches()) features.patches = cutPatches(left, features);
   report.describe_time = stopwatch.lap();
 
   if (2 * border >= std::min(left.rows, left.cols))

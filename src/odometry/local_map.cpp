@@ -68,7 +68,11 @@ void LocalMap::insert(const StereoFeatures& features, int id, const Eigen::Isome
   std::vector<bool> recognised(features.u.size(), false);
   for (const Sighting& sighting : sightings) {
     recognised[sighting.row] = true;
-    addSighting(points_[sighting.point], features, sighting.row, id);
+    Point& point = points_[sighting.point];
+    addSighting(point, features, sighting, id);
+    const double change = std::max(sighting.scale, 1.0 / sighting.scale);
+    if (sighting.aligned && change > options_.renewal_scale)
+      point.reference = takeReference(features, sighting, T_camera_origin);
   }
   // Only now that the new sightings are noted: points that they carry on must outlive the forgotten pair.
   if (!frames_.empty() && !frames_.back().is_keyframe) removeFrame(frames_.size() - 1);
@@ -79,23 +83,70 @@ void LocalMap::insert(const StereoFeatures& features, int id, const Eigen::Isome
   if (static_cast<int>(frames_.size()) > options_.keyframes + 1) removeFrame(0);
 }
 
-void LocalMap::addSighting(Point& point, const StereoFeatures& features, int row, int id) {
-  point.observations.push_back({id, row, {features.u[row], features.v[row], features.disparity[row]}});
-  const std::uint8_t* bytes = features.descriptors.ptr(row);
+LocalMap::Sighting LocalMap::sight(const PatchAlignmentOptions& options, const StereoFeatures& features,
+                                   const Eigen::Isometry3d& T_camera_origin, int point, int row) const {
+  Sighting sighting{point, row, {features.u[row], features.v[row], features.disparity[row]}, options_.corner_sigma};
+  const Reference& reference = points_[point].reference;
+  if (!options.enabled || !features.hasPatches() ||
+      reference.samples.size() != static_cast<std::size_t>(features.patch_layout.bytes()))
+    return sighting;
+
+  // The patch is small and taken as facing the camera that it was taken from: to first order the two views then differ
+  // by an affine map, the ratio of the depths above all.
+  const AnchoredPoint& position = points_[point].position;
+  const Eigen::Vector3d then = position.scaledPointIn(reference.T_camera_origin);
+  const Eigen::Vector3d now = position.scaledPointIn(T_camera_origin);
+  constexpr double kNearest = 1e-3;  // of the depth where the point was first seen
+  if (then.z() < kNearest || now.z() < kNearest) return sighting;
+  const Eigen::Matrix3d R = T_camera_origin.linear() * reference.T_camera_origin.linear().transpose();
+  const Eigen::Vector2d ray = now.head<2>() / now.z();
+  const double scale = then.z() / now.z();
+  const Eigen::Matrix2d warp = scale * (R.topLeftCorner<2, 2>() - ray * R.bottomLeftCorner<1, 2>());
+
+  const int side = features.patch_layout.side;
+  const Patch old_patch{reference.samples.data(), side, reference.spacing};
+  const Patch new_patch{features.patches.ptr(row), side, features.patch_layout.spacing(features.size[row])};
+  const auto found = alignPatch(options, old_patch, reference.centre, new_patch, warp.cast<float>());
+  if (!found) return sighting;
+  sighting.measurement.head<2>() += found->shift.cast<double>();
+  sighting.sigma = found->sigma;
+  sighting.aligned = true;
+  sighting.scale = scale;
+  return sighting;
+}
+
+void LocalMap::addSighting(Point& point, const StereoFeatures& features, const Sighting& sighting, int id) {
+  point.observations.push_back({id, sighting.row, sighting.measurement, sighting.sigma});
+  const std::uint8_t* bytes = features.descriptors.ptr(sighting.row);
   point.descriptor.assign(bytes, bytes + features.descriptors.cols);
+}
+
+LocalMap::Reference LocalMap::takeReference(const StereoFeatures& features, const Sighting& sighting,
+                                            const Eigen::Isometry3d& T_camera_origin) {
+  if (!features.hasPatches()) return {};
+  const int row = sighting.row;
+  const std::uint8_t* samples = features.patches.ptr(row);
+  const float spacing = features.patch_layout.spacing(features.size[row]);
+  const Eigen::Vector2d shift = sighting.measurement.head<2>() - Eigen::Vector2d(features.u[row], features.v[row]);
+  return {{samples, samples + features.patches.cols}, spacing, shift.cast<float>() / spacing, T_camera_origin};
 }
 
 void LocalMap::startPoint(const StereoFeatures& features, int row, int id, const Eigen::Isometry3d& T_camera_origin,
                           const RigCalibration& calibration) {
   const StereoCamera& camera = features.camera;
   const double u = features.u[row], v = features.v[row];
+  const Sighting sighting{-1,
+                          row,
+                          {u, v, features.disparity[row]},
+                          features.hasPatches() ? options_.reference_sigma : options_.corner_sigma};
   const double disparity =
       std::max(features.disparity[row] - calibration.disparityError(camera, u), kFarthestDisparity);
   Point point;
   point.position.T_origin_anchor = T_camera_origin.inverse();
   point.position.ray_and_inverse_depth = {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy,
                                           1.0 / camera.depth(disparity)};
-  addSighting(point, features, row, id);
+  point.reference = takeReference(features, sighting, T_camera_origin);
+  addSighting(point, features, sighting, id);
   points_.push_back(std::move(point));
 }
 
@@ -147,9 +198,10 @@ LocalMap::Adjustment LocalMap::adjust(const WindowOptimizerOptions& options, con
     const Point& point = points_[p];
     if (point.observations.size() < 2) continue;
     for (std::size_t k = 0; k < point.observations.size(); ++k) {
-      const auto frame = std::lower_bound(ids.begin(), ids.end(), point.observations[k].frame_id);
-      window.observations.push_back(
-          {static_cast<int>(used.size()), static_cast<int>(frame - ids.begin()), point.observations[k].measurement});
+      const Observation& observation = point.observations[k];
+      const auto frame = std::lower_bound(ids.begin(), ids.end(), observation.frame_id);
+      window.observations.push_back({static_cast<int>(used.size()), static_cast<int>(frame - ids.begin()),
+                                     observation.measurement, observation.sigma});
       sources.emplace_back(static_cast<int>(p), static_cast<int>(k));
     }
     window.points.push_back(point.position);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bitset>
+#include <numeric>
 #include <sstream>
 #include <stdexcept>
 
@@ -75,7 +76,8 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features) {
   refuse(features);
   const double dt = state_.last_stamp ? static_cast<double>(features.stamp - *state_.last_stamp) * 1e-9 : 0.0;
   const bool continued = state_.map && state_.map->continuedBy(features);
-  const Localisation found = continued ? localise(features, dt) : Localisation{};
+  Localisation found = continued ? localise(features, dt) : Localisation{};
+  if (continued && found.failure.empty()) align(features, found);
 
   // Nothing has changed so far, and from here on nothing is refused.
   Stopwatch stopwatch;
@@ -140,6 +142,31 @@ VisualOdometry::Localisation VisualOdometry::search(const StereoFeatures& featur
   return found;
 }
 
+void VisualOdometry::align(const StereoFeatures& features, Localisation& found) const {
+  constexpr std::size_t kEnough = 30;  // fewer are no better than all corners together
+  Stopwatch stopwatch;
+  const RigCalibration& calibration = state_.calibration.calibration();
+  Eigen::Isometry3d& T_current_reference = found.motion.T_current_reference;
+  const Eigen::Isometry3d T_camera_origin = T_current_reference * state_.map->newestPose();
+  std::vector<Correspondence> aligned;
+  for (const int i : found.motion.inliers) {
+    const FeatureMatch& match = found.matches[i];
+    const LocalMap::Sighting sighting = state_.map->sight(options_.alignment, features, T_camera_origin,
+                                                          found.view.point[match.reference], match.current);
+    found.sightings.push_back(sighting);
+    if (!sighting.aligned) continue;
+    const double u = sighting.measurement.x();
+    const double disparity = sighting.measurement.z() - calibration.disparityError(features.camera, u);
+    aligned.push_back({found.view.rows.positions[match.reference], {u, sighting.measurement.y(), u - disparity}});
+  }
+  if (aligned.size() >= kEnough) {
+    std::vector<int> all(aligned.size());
+    std::iota(all.begin(), all.end(), 0);
+    refineMotion(features.camera, options_.motion, aligned, all, T_current_reference);
+  }
+  found.motion_time += stopwatch.lap();
+}
+
 VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
   Step step;
   breakStream();
@@ -171,11 +198,8 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   state_.velocity = logSE3(found.motion.T_current_reference.inverse()) / since_newest;
   state_.predicted_pairs = 0;
 
-  std::vector<LocalMap::Sighting> sightings;
-  for (const int i : found.motion.inliers)
-    sightings.push_back({found.view.point[found.matches[i].reference], found.matches[i].current});
   RigCalibration calibration = state_.calibration.calibration();
-  map.insert(features, state_.pairs, found.motion.T_current_reference * map.newestPose(), sightings, calibration);
+  map.insert(features, state_.pairs, found.motion.T_current_reference * map.newestPose(), found.sightings, calibration);
   const CalibrationBelief prior = state_.calibration.prior(map.oldestId());
   const LocalMap::Adjustment adjustment = map.adjust(options_.window, prior, calibration);
 

@@ -38,6 +38,8 @@ class Solver {
     for (std::size_t i = 0; i < observations.size(); ++i)
       if (i == 0 || observations[i].point != observations[i - 1].point) first_of_point_.push_back(static_cast<int>(i));
     first_of_point_.push_back(static_cast<int>(observations.size()));
+    sightings_.resize(window.points.size());
+    for (const WindowObservation& observation : observations) ++sightings_[static_cast<std::size_t>(observation.point)];
     poses_ = static_cast<int>(window.T_camera_origin.size()) - 1;
     size_ = 6 * poses_ + kCalibration;
   }
@@ -61,12 +63,17 @@ class Solver {
                             prediction, jacobians))
       return false;
     prediction.z() += window.calibration.disparityError(window.camera, observation.measurement.x());
-    residual = inverseNoise().cwiseProduct(observation.measurement - prediction);
+    residual = inverseNoise(observation).cwiseProduct(observation.measurement - prediction);
     return true;
   }
 
-  Eigen::Vector3d inverseNoise() const {
-    return {1.0 / options_.position_sigma, 1.0 / options_.position_sigma, 1.0 / options_.disparity_sigma};
+  /// Of n disparities of one point the mean has the variance sigma^2 / n + common^2, as if each by itself had n times
+  /// that: more sightings do not average away what they share.
+  Eigen::Vector3d inverseNoise(const WindowObservation& observation) const {
+    const double common = options_.common_disparity_sigma;
+    const double variance = options_.disparity_sigma * options_.disparity_sigma +
+                            sightings_[static_cast<std::size_t>(observation.point)] * common * common;
+    return {1.0 / observation.sigma, 1.0 / observation.sigma, 1.0 / std::sqrt(variance)};
   }
 
   double cost(const Window& window) const {
@@ -91,7 +98,6 @@ class Solver {
     calibration_hessian += window.calibration_prior.information;
     calibration_gradient +=
         window.calibration_prior.information * (window.calibration_prior.mean - window.calibration.value);
-    const Eigen::Vector3d inverse_noise = inverseNoise();
     LogSum costs;
 
     std::vector<int> seen_in;
@@ -116,7 +122,7 @@ class Solver {
         system.weighted_square += weight * square;
         const double root = std::sqrt(weight);
         r *= root;
-        const Eigen::Vector3d scale = root * inverse_noise;
+        const Eigen::Vector3d scale = root * inverseNoise(observation);
         const Eigen::Matrix3d by_point = scale.asDiagonal() * jacobians.point;
         const RigCalibration::RowVector by_calibration =
             scale.z() * RigCalibration::shape(window.camera, observation.measurement.x());
@@ -179,6 +185,7 @@ class Solver {
   const WindowOptimizerOptions& options_;
   const Window& window_;
   std::vector<int> first_of_point_;
+  std::vector<int> sightings_;  ///< of each point
   int poses_ = 0, size_ = 0;
 };
 

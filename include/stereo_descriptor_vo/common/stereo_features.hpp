@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "stereo_descriptor_vo/common/patch_layout.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 
 namespace sdvo {
@@ -38,10 +39,9 @@ struct ExtractionReport {
   std::string status;                     ///< empty, or why the pair gave few or no features
 };
 
-/// One row of StereoFeatures without its descriptor; meaning and units as there.
+/// One row of StereoFeatures without its descriptor and its patch; meaning and units as there.
 struct StereoFeature {
-  float u, v, disparity, dv, size, angle, response, sigma;
-  std::uint8_t octave;
+  float u, v, disparity, dv, size, angle, response;
 };
 
 /// Features of one rectified stereo pair as parallel arrays: element i of each belongs to row i of `descriptors`.
@@ -60,9 +60,10 @@ struct StereoFeatures {
   std::vector<float> size;       ///< diameter of the described neighbourhood's key point, px
   std::vector<float> angle;      ///< rad in [0, 2 pi), -1 where the descriptor is not oriented
   std::vector<float> response;   ///< detector's score
-  std::vector<float> sigma;      ///< standard deviation of the position, px
-  std::vector<std::uint8_t> octave;
-  cv::Mat descriptors;  ///< rows x bytes, CV_8U; elements wider than a byte in the machine's own order
+  cv::Mat descriptors;           ///< rows x bytes, CV_8U; elements wider than a byte in the machine's own order
+
+  PatchLayout patch_layout;
+  cv::Mat patches;  ///< of the left view, rows x patch_layout.bytes(), CV_8U; empty where none are sent
 
   ExtractionReport report;
 
@@ -70,7 +71,9 @@ struct StereoFeatures {
 
   DescriptorKind kind() const { return {descriptor, layout, element_type, descriptors.cols}; }
 
-  /// Adds a row to every array; its descriptor goes into the last row of `descriptors` separately.
+  bool hasPatches() const { return patch_layout.side > 0; }
+
+  /// Adds a row to every array; its descriptor and its patch go into the matrices separately.
   void append(const StereoFeature& feature);
 
   /// The same pair with some of its rows, in the order given.
@@ -96,8 +99,6 @@ struct StereoFeatures {
     visit("size", &StereoFeatures::size, &StereoFeature::size);
     visit("angle", &StereoFeatures::angle, &StereoFeature::angle);
     visit("response", &StereoFeatures::response, &StereoFeature::response);
-    visit("sigma", &StereoFeatures::sigma, &StereoFeature::sigma);
-    visit("octave", &StereoFeatures::octave, &StereoFeature::octave);
   }
 };
 

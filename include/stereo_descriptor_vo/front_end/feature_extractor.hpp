@@ -6,6 +6,7 @@
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/front_end/depth_scale.hpp"
 #include "stereo_descriptor_vo/front_end/feature_detector.hpp"
+#include "stereo_descriptor_vo/front_end/patch_cutter.hpp"
 #include "stereo_descriptor_vo/front_end/stereo_descriptor.hpp"
 #include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
 
@@ -16,12 +17,14 @@ struct FeatureExtractorOptions {
   StereoMatcherOptions stereo;
   DepthScaleOptions size_curve;
   DescriptorOptions descriptor;
+  PatchOptions patch;
 
   void describe(OptionList& list) {
     list.group("detector", detector);
     list.group("stereo", stereo);
     list.group("size_curve", size_curve);
     list.group("descriptor", descriptor);
+    list.group("descriptor", patch);
   }
 };
 

@@ -11,6 +11,7 @@
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/odometry/described_points.hpp"
+#include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
 #include "stereo_descriptor_vo/odometry/window_optimizer.hpp"
 
@@ -21,6 +22,9 @@ struct LocalMapOptions {
   int remembered = 4;
   double keyframe_parallax = 4.0;
   double keyframe_overlap = 0.6;
+  double corner_sigma = 0.4;
+  double reference_sigma = 0.1;
+  double renewal_scale = 1.4;
 
   void describe(OptionList& list) {
     list.add("keyframes", keyframes, {2, 50}, "", "key frames that the window holds beside the newest pair");
@@ -30,6 +34,13 @@ struct LocalMapOptions {
              "a pair is kept as a key frame once its points moved by this median since the last one");
     list.add("keyframe_overlap", keyframe_overlap, {0.0, 1.0}, "",
              "… or once a smaller share of its points was seen in the last key frame");
+    list.add("corner_sigma", corner_sigma, {0.01, 10.0}, "px",
+             "standard deviation of a corner's position, where no patch was aligned");
+    list.add("reference_sigma", reference_sigma, {0.01, 10.0}, "px",
+             "the same of the position that a point's reference patch defines");
+    list.add(
+        "renewal_scale", renewal_scale, {1.0, 100.0}, "",
+        "a point takes a new reference patch once it appears larger or smaller than in the old one by this factor");
   }
 };
 
@@ -57,11 +68,23 @@ class LocalMap {
   };
   View view() const;
 
-  /// Adds a pair seen from `T_camera_origin`; `sightings` are (point, row) of what it recognised, every other row
-  /// becomes a new point. The previous pair is forgotten unless it was a key frame.
+  /// A point recognised in a pair, and where that saw it.
   struct Sighting {
     int point, row;
+    Eigen::Vector3d measurement;  ///< (u_left, v_left, disparity), px
+    double sigma;                 ///< of u_left and of v_left, px
+    bool aligned = false;         ///< by its patch: the position is not the corner's but that of the reference's middle
+    double scale = 1.0;           ///< how much larger the point appears than in its reference patch
   };
+
+  /// What the pair's row says of a point when seen from about `T_camera_origin`: its patch is aligned with the point's
+  /// reference, which is warped by what the poses and the point's depth say of both views. Without patches, or where
+  /// they do not agree, it is the corner as detected.
+  Sighting sight(const PatchAlignmentOptions& options, const StereoFeatures& features,
+                 const Eigen::Isometry3d& T_camera_origin, int point, int row) const;
+
+  /// Adds a pair seen from `T_camera_origin` and what it recognised; every other row becomes a new point. The previous
+  /// pair is forgotten unless it was a key frame.
   void insert(const StereoFeatures& features, int id, const Eigen::Isometry3d& T_camera_origin,
               const std::vector<Sighting>& sightings, const RigCalibration& calibration);
 
@@ -84,18 +107,29 @@ class LocalMap {
     int frame_id;
     int row;
     Eigen::Vector3d measurement;
+    double sigma;
+  };
+  /// The patch that a point's sightings are aligned with, and the point's place in it.
+  struct Reference {
+    std::vector<std::uint8_t> samples;  ///< empty without patches
+    float spacing;                      ///< px
+    Eigen::Vector2f centre;             ///< samples from the patch's middle
+    Eigen::Isometry3d T_camera_origin;  ///< of the pair that it was taken from
   };
   struct Point {
     AnchoredPoint position;
     std::vector<Observation> observations;  ///< in the order of the frames
     std::vector<std::uint8_t> descriptor;
+    Reference reference;
   };
 
   void removeFrame(std::size_t index);
   void cutOff(const std::vector<std::pair<int, int>>& sources, const std::vector<double>& residuals,
               Adjustment& adjustment);
   bool needsKeyframe() const;
-  static void addSighting(Point& point, const StereoFeatures& features, int row, int id);
+  static void addSighting(Point& point, const StereoFeatures& features, const Sighting& sighting, int id);
+  static Reference takeReference(const StereoFeatures& features, const Sighting& sighting,
+                                 const Eigen::Isometry3d& T_camera_origin);
   void startPoint(const StereoFeatures& features, int row, int id, const Eigen::Isometry3d& T_camera_origin,
                   const RigCalibration& calibration);
 

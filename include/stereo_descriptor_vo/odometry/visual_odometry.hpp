@@ -13,6 +13,7 @@
 #include "stereo_descriptor_vo/odometry/feature_matcher.hpp"
 #include "stereo_descriptor_vo/odometry/local_map.hpp"
 #include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
+#include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
 #include "stereo_descriptor_vo/odometry/right_camera_rotation.hpp"
 
@@ -36,6 +37,7 @@ struct TrackingOptions {
 struct VisualOdometryOptions {
   FeatureMatcherOptions matcher;
   MotionEstimatorOptions motion;
+  PatchAlignmentOptions alignment;
   LocalMapOptions map;
   WindowOptimizerOptions window;
   CalibrationOptions calibration;
@@ -44,6 +46,7 @@ struct VisualOdometryOptions {
   void describe(OptionList& list) {
     list.group("matcher", matcher);
     list.group("motion", motion);
+    list.group("alignment", alignment);
     list.group("map", map);
     list.group("window", window);
     list.group("calibration", calibration);
@@ -126,6 +129,7 @@ class VisualOdometry {
     MotionEstimate motion;  ///< since the map's newest pair
     LocalMap::View view;
     std::vector<FeatureMatch> matches;           ///< rows of the view to rows of the pair
+    std::vector<LocalMap::Sighting> sightings;   ///< of the motion's inliers
     double match_time = 0.0, motion_time = 0.0;  ///< s
   };
   /// What becomes of the pose with a pair.
@@ -142,6 +146,7 @@ class VisualOdometry {
   Localisation localise(const StereoFeatures& features, double dt) const;
   Localisation search(const StereoFeatures& features, const std::optional<Eigen::Isometry3d>& T_current_reference,
                       double dt) const;
+  void align(const StereoFeatures& features, Localisation& found) const;
   Step seed(const StereoFeatures& features);
   Step extendMap(const StereoFeatures& features, const Localisation& found);
   Step predict(const StereoFeatures& features, double dt, const std::string& failure);

@@ -13,18 +13,19 @@ namespace sdvo {
 struct WindowOptimizerOptions {
   int iterations = 1;
   double kernel_scale = 2.0;
-  double position_sigma = 0.2;
-  double disparity_sigma = 0.4;
+  double disparity_sigma = 0.2;
+  double common_disparity_sigma = 0.3;
 
   void describe(OptionList& list) {
     list.add("iterations", iterations, {1, 100}, "", "Levenberg-Marquardt steps at most, for each pair");
     list.add("kernel_scale", kernel_scale, {0.1, 20.0}, "sigma",
              "normalised residual at which the Cauchy kernel bends");
-    list.add("position_sigma", position_sigma, {0.01, 10.0}, "px",
-             "standard deviation of a position in the left image");
+    list.add("disparity_sigma", disparity_sigma, {0.01, 10.0}, "px",
+             "standard deviation of a disparity's noise, which is new in every sighting");
     list.add(
-        "disparity_sigma", disparity_sigma, {0.01, 10.0}, "px",
-        "standard deviation of a disparity: its noise and what the calibration's two terms leave of the rig's error");
+        "common_disparity_sigma", common_disparity_sigma, {0.0, 10.0}, "px",
+        "standard deviation of the error that all disparities of one point share: what the calibration's two terms "
+        "leave of the rig's, and what its texture does to the matching");
   }
 };
 
@@ -47,6 +48,7 @@ struct WindowObservation {
   int point;
   int frame;
   Eigen::Vector3d measurement;  ///< (u_left, v_left, disparity), px, as measured: the rig's error is not removed
+  double sigma;                 ///< standard deviation of u_left and of v_left, px
 };
 
 /// Several pairs and the points they share.

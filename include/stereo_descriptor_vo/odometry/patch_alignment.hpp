@@ -1,0 +1,53 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+
+namespace sdvo {
+
+struct PatchAlignmentOptions {
+  bool enabled = true;
+  int radius = 4;
+  double min_correlation = 0.7;
+  double max_shift = 1.5;
+  double min_sigma = 0.02;
+
+  void describe(OptionList& list) {
+    list.add("enabled", enabled, "align the patches of matched features, where the image side sends them");
+    list.add("radius", radius, {2, kLargestRadius}, "samples",
+             "half side of the part of the reference that is aligned");
+    list.add("min_correlation", min_correlation, {0.0, 1.0}, "", "least correlation of the aligned patches");
+    list.add("max_shift", max_shift, {0.1, 10.0}, "px", "largest correction of a corner's position");
+    list.add("min_sigma", min_sigma, {0.0, 10.0}, "px",
+             "standard deviation of an aligned position that no clarity of its patch takes away");
+  }
+
+  static constexpr int kLargestRadius = 6;
+};
+
+/// A grey patch as it travels with a feature: side x side samples, row by row.
+struct Patch {
+  const std::uint8_t* samples = nullptr;
+  int side = 0;
+  float spacing = 1.f;  ///< px
+};
+
+/// Where a point of one patch lies in another.
+struct PatchShift {
+  Eigen::Vector2f shift;  ///< from the middle of the current patch, px
+  float sigma;            ///< standard deviation of each coordinate, px
+  float correlation;      ///< of the two patches there
+};
+
+/// Finds the point that lies at `centre` (samples from its middle) of the reference patch in the current one, by
+/// inverse compositional alignment (Baker and Matthews 2004) that is blind to brightness and contrast. `warp` takes
+/// offsets in the reference image to offsets in the current one, px: the ratio of the depths above all. The search
+/// starts in the current patch's middle. Nothing where the patches differ (an occluding edge, another point), where
+/// they show too little, or where the answer lies outside.
+std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const Patch& reference,
+                                     const Eigen::Vector2f& centre, const Patch& current, const Eigen::Matrix2f& warp);
+
+}  // namespace sdvo
