@@ -34,7 +34,8 @@ class SyntheticScene {
   /// What the rig sees from a pose; a share of the visible points is missed at random, as detectors do.
   StereoFeatures view(const Eigen::Isometry3d& T_origin_camera, std::int64_t stamp, double missed = 0.3) {
     StereoFeatures features;
-    features.stamp = stamp, features.camera = camera, features.descriptor = "freak", features.layout = "left+right";
+    features.stamp = stamp, features.camera = camera, features.descriptor = "freak",
+    features.layout = DescriptorLayout::kLeftAndRight;
     std::vector<int> seen;
     for (std::size_t i = 0; i < points_.size(); ++i) {
       const Eigen::Vector3d point = T_origin_camera.inverse() * points_[i];

@@ -110,7 +110,7 @@ inline StereoFeatures noFeatures(const StereoCamera& rig, std::int64_t stamp = 0
   features.stamp = stamp;
   features.camera = rig;
   features.descriptor = "freak";
-  features.layout = "left+right";
+  features.layout = DescriptorLayout::kLeftAndRight;
   features.descriptors.create(0, bytes, CV_8U);
   return features;
 }

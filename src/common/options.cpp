@@ -26,12 +26,6 @@ std::string toText(double value) {
   }
 }
 
-std::string join(const std::vector<std::string>& words) {
-  std::string joined;
-  for (const std::string& word : words) joined += (joined.empty() ? "" : ", ") + word;
-  return joined;
-}
-
 template <class Number>
 Number parseNumber(const std::string& name, const std::string& text) {
   std::istringstream stream(text);
@@ -54,7 +48,9 @@ std::string Option::text() const {
   if (const auto* b = std::get_if<bool*>(&value)) return **b ? "true" : "false";
   if (const auto* i = std::get_if<int*>(&value)) return std::to_string(**i);
   if (const auto* d = std::get_if<double*>(&value)) return toText(**d);
-  return *std::get<std::string*>(value);
+  if (const auto* s = std::get_if<std::string*>(&value)) return **s;
+  const auto& choice = std::get<ChoiceReference>(value);
+  return choices.at(static_cast<std::size_t>(choice.get(choice.value)));
 }
 
 void Option::set(const std::string& text) {
@@ -64,17 +60,18 @@ void Option::set(const std::string& text) {
     **i = parseNumber<int>(name, text);
   else if (auto* d = std::get_if<double*>(&value))
     **d = parseNumber<double>(name, text);
-  else
-    *std::get<std::string*>(value) = text;
+  else if (auto* s = std::get_if<std::string*>(&value))
+    **s = text;
+  else {
+    const auto& choice = std::get<ChoiceReference>(value);
+    const std::optional<int> chosen = indexOf(choices, text);
+    if (!chosen) throw std::invalid_argument(name + " = " + noneOf(choices, text));
+    choice.set(choice.value, *chosen);
+  }
 }
 
 void Option::check() const {
-  if (const auto* s = std::get_if<std::string*>(&value)) {
-    if (!choices.empty() && std::find(choices.begin(), choices.end(), **s) == choices.end())
-      throw std::invalid_argument(name + " = '" + **s + "' is none of: " + join(choices));
-    return;
-  }
-  if (std::holds_alternative<bool*>(value)) return;
+  if (isText() || std::holds_alternative<bool*>(value)) return;
   const auto* i = std::get_if<int*>(&value);
   const double number = i ? **i : *std::get<double*>(value);
   if (!(number >= range.min && number <= range.max))
@@ -108,9 +105,17 @@ void OptionList::add(const std::string& name, double& value, Range range, const 
   options_.push_back({prefix_ + name, &value, range, {}, unit, meaning});
 }
 
-void OptionList::add(const std::string& name, std::string& value, std::vector<std::string> choices,
-                     const std::string& meaning) {
-  options_.push_back({prefix_ + name, &value, {}, std::move(choices), "", meaning});
+void OptionList::add(const std::string& name, std::string& value, const std::string& meaning) {
+  options_.push_back({prefix_ + name, &value, {}, {}, "", meaning});
+}
+
+void OptionList::check() const {
+  for (const Option& option : options_) option.check();
+  for (const ComponentCheck& component : checks_) try {
+      component.check();
+    } catch (const std::invalid_argument& e) {
+      throw std::invalid_argument(component.prefix + e.what());
+    }
 }
 
 void setOption(std::vector<Option>& options, const std::string& name, const std::string& text) {

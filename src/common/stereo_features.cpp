@@ -29,10 +29,8 @@ bool DescriptorKind::operator==(const DescriptorKind& other) const {
 }
 
 std::string toString(const DescriptorKind& kind) {
-  const char* elements = kind.element_type == ElementType::kBits    ? "bits"
-                         : kind.element_type == ElementType::kUint8 ? "uint8"
-                                                                    : "float32";
-  return kind.descriptor + " (" + kind.layout + ", " + std::to_string(kind.bytes) + " bytes of " + elements + ")";
+  return kind.descriptor + " (" + nameOf(kind.layout) + ", " + std::to_string(kind.bytes) + " bytes of " +
+         nameOf(kind.element_type) + ")";
 }
 
 void StereoFeatures::append(const StereoFeature& feature) {

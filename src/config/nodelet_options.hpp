@@ -31,8 +31,8 @@ struct OdometryOutputOptions {
   int max_path_length = 20000;
 
   void describe(OptionList& list) {
-    list.add("odom_frame_id", odom_frame_id, {}, "world-fixed frame of the odometry");
-    list.add("base_frame_id", base_frame_id, {}, "the robot's frame, whose pose is published");
+    list.add("odom_frame_id", odom_frame_id, "world-fixed frame of the odometry");
+    list.add("base_frame_id", base_frame_id, "the robot's frame, whose pose is published");
     list.add("publish_tf", publish_tf, "publish odom -> base on /tf");
     list.add("invert_tf", invert_tf, "publish base -> odom instead, where base already has a parent");
     list.add("tf_timeout", tf_timeout, {0.0, 60.0}, "s",

@@ -39,7 +39,7 @@ PipelineOptions readPipelineOptions(const std::string& yaml_file, const std::vec
     if (equals == std::string::npos) throw std::runtime_error("--param " + setting + " is not of the form name=value");
     setOption(list, setting.substr(0, equals), setting.substr(equals + 1));
   }
-  return options;
+  return checked(options);
 }
 
 }  // namespace sdvo

@@ -32,7 +32,8 @@ struct NodeletOptions {
 };
 
 /// Options from a YAML file (empty name: none) and from "name=value" settings, which win. Throws std::runtime_error
-/// that names the file or the setting when an option is unknown or out of its range.
+/// that names the file, or std::invalid_argument that names the option, when an option is unknown or out of its range
+/// or when options do not go together.
 PipelineOptions readPipelineOptions(const std::string& yaml_file, const std::vector<std::string>& settings);
 
 }  // namespace sdvo

@@ -2,13 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 
+#include "kitti_layout.hpp"
 #include "text_file.hpp"
 
 namespace fs = std::filesystem;
@@ -17,9 +17,7 @@ namespace sdvo {
 namespace {
 
 std::string frameName(int i) {
-  char name[32];
-  std::snprintf(name, sizeof name, "%06d.png", i);
-  return name;
+  return kittiFrameName(i) + ".png";
 }
 
 std::string sizeText(const cv::Mat& image) {
@@ -94,47 +92,27 @@ Projection readProjection(const std::string& path, const std::string& name) {
   throw std::runtime_error("file '" + path + "' has no line '" + name + ":'");
 }
 
-std::string projectionText(const std::string& name, const Projection& p) {
-  return name + " has fx = " + std::to_string(p[0]) + ", Tx = " + std::to_string(p[3]);
+/// Number of the left camera.
+int firstCamera(KittiCameras cameras) {
+  return cameras == KittiCameras::kColour ? 2 : 0;
 }
 
-/// Camera without image size. The baseline is the difference of both offsets: a colour pair's left one is not zero.
-StereoCamera cameraFromProjections(const std::string& path, const std::string& left_name,
-                                   const std::string& right_name) {
-  const Projection left = readProjection(path, left_name);
-  const Projection right = readProjection(path, right_name);
-  if (!(left[0] > 0.0 && left[5] > 0.0)) {
-    throw std::runtime_error("file '" + path + "': the focal lengths of " + left_name + " must be positive");
-  }
-  for (const int i : {0, 1, 2, 4, 5, 6, 8, 9, 10}) {
-    const bool must_vanish = i == 1 || i == 4 || i == 8 || i == 9;
-    if (std::abs(left[i] - right[i]) > 1e-6 * left[0] || (must_vanish && left[i] != 0.0)) {
-      throw std::runtime_error("file '" + path + "': " + left_name + " and " + right_name +
-                               " do not belong to a rectified pair (equal pinhole cameras side by side)");
-    }
-  }
-  StereoCamera camera;
-  camera.fx = left[0];
-  camera.fy = left[5];
-  camera.cx = left[2];
-  camera.cy = left[6];
-  camera.baseline = (left[3] - right[3]) / left[0];
-  if (!(camera.baseline > 0.0)) {
-    throw std::runtime_error("file '" + path + "': the baseline (difference of Tx / fx) is " +
-                             std::to_string(camera.baseline) + " m but must be positive; " +
-                             projectionText(left_name, left) + "; " + projectionText(right_name, right) +
-                             " (are left and right swapped?)");
-  }
-  return camera;
+std::string projectionText(const std::string& name, const Projection& p) {
+  return name + " has fx = " + std::to_string(p[0]) + ", Tx = " + std::to_string(p[3]);
 }
 
 std::vector<std::int64_t> readStamps(const std::string& path, int count) {
   std::ifstream file = openTextFile(path);
   std::vector<std::int64_t> stamps;
   int number = 0;
-  for (std::string line; static_cast<int>(stamps.size()) < count && std::getline(file, line);) {
+  for (std::string line; std::getline(file, line);) {
     ++number;
     const std::vector<std::string> words = splitWords(line);
+    const bool complete = static_cast<int>(stamps.size()) == count;
+    if (complete && words.empty()) continue;  // blank lines at the end
+    if (complete)
+      throw std::runtime_error("file '" + path + "' has more times than the " + std::to_string(count) +
+                               " images: are images missing? An extract needs the times of its own images alone");
     try {
       if (words.size() != 1) throw std::invalid_argument("expected one time in seconds");
       const std::int64_t stamp = parseSeconds(words.front());
@@ -154,6 +132,37 @@ std::vector<std::int64_t> readStamps(const std::string& path, int count) {
 }
 
 }  // namespace
+
+StereoCamera readKittiCalibration(const std::string& path, KittiCameras cameras) {
+  const int first = firstCamera(cameras);
+  const std::string left_name = "P" + std::to_string(first), right_name = "P" + std::to_string(first + 1);
+  const Projection left = readProjection(path, left_name);
+  const Projection right = readProjection(path, right_name);
+  if (!(left[0] > 0.0 && left[5] > 0.0)) {
+    throw std::runtime_error("file '" + path + "': the focal lengths of " + left_name + " must be positive");
+  }
+  for (const int i : {0, 1, 2, 4, 5, 6, 8, 9, 10}) {
+    const bool must_vanish = i == 1 || i == 4 || i == 8 || i == 9;
+    if (std::abs(left[i] - right[i]) > 1e-6 * left[0] || (must_vanish && left[i] != 0.0)) {
+      throw std::runtime_error("file '" + path + "': " + left_name + " and " + right_name +
+                               " do not belong to a rectified pair (equal pinhole cameras side by side)");
+    }
+  }
+  StereoCamera camera;
+  camera.fx = left[0];
+  camera.fy = left[5];
+  camera.cx = left[2];
+  camera.cy = left[6];
+  // The difference of both offsets: a colour pair's left one is not zero.
+  camera.baseline = (left[3] - right[3]) / left[0];
+  if (!(camera.baseline > 0.0)) {
+    throw std::runtime_error("file '" + path + "': the baseline (difference of Tx / fx) is " +
+                             std::to_string(camera.baseline) + " m but must be positive; " +
+                             projectionText(left_name, left) + "; " + projectionText(right_name, right) +
+                             " (are left and right swapped?)");
+  }
+  return camera;
+}
 
 cv::Mat readGreyPng(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
@@ -189,15 +198,14 @@ KittiSequence::KittiSequence(const std::string& directory, KittiCameras cameras)
     }
     cameras = grey ? KittiCameras::kGrey : KittiCameras::kColour;
   }
-  const int first = cameras == KittiCameras::kGrey ? 0 : 2;
+  const int first = firstCamera(cameras);
   for (int side = 0; side < 2; ++side) {
     const std::string name = "image_" + std::to_string(first + side);
     if (!has(name)) throw std::runtime_error("sequence directory '" + directory + "' has no " + name);
     image_directories_[side] = (fs::path(directory) / name).string();
   }
   const int count = countFrames(image_directories_[0], image_directories_[1]);
-  camera_ = cameraFromProjections((fs::path(directory) / "calib.txt").string(), "P" + std::to_string(first),
-                                  "P" + std::to_string(first + 1));
+  camera_ = readKittiCalibration((fs::path(directory) / "calib.txt").string(), cameras);
   stamps_ = readStamps((fs::path(directory) / "times.txt").string(), count);
 
   const cv::Mat image = readGreyPng(imagePath(0, 0));

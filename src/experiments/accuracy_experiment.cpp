@@ -19,7 +19,10 @@ constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 
 /// A row of the summary.
 struct Case {
-  std::string sequence, model, method, system;
+  std::string sequence;
+  std::string model;  ///< the last step of the motion: the best "sample" or "refined"; or the whole "package"
+  ConsensusMethod method;
+  std::string system;
 
   bool operator<(const Case& other) const {
     return std::tie(sequence, model, method, system) <
@@ -66,7 +69,7 @@ Trajectory followWithPackage(const std::vector<StereoFeatures>& features, const 
 
 /// Table 2 of the paper: best, mean, worst.
 std::array<double, 3> published(const Case& c) {
-  if (c.sequence == "mean" && c.method == "adaptive_gasac") {
+  if (c.sequence == "mean" && c.method == ConsensusMethod::kAdaptiveGasac) {
     if (c.system == "stereo") return {2.47, 3.5, 4.29};
     if (c.system == "standard") return {3.43, 4.78, 8.8};
   }
@@ -94,12 +97,12 @@ std::string runAccuracy(const ExperimentSetup& setup, const AccuracyExperiment& 
   const auto add = [&](const Case& c, int seed, const Trajectory& truth, const Trajectory& estimate) {
     const SubPathErrors errors = subPathErrors(truth, estimate, lengths()).back();
     results[c].push_back({errors.translation_percent, errors.rotation_deg_per_m});
-    runs.add(c.sequence, options.stereo_features.descriptor.type, experiment.features, c.model, c.method, c.system,
-             seed, errors.translation_percent, errors.rotation_deg_per_m, hash);
+    runs.add(c.sequence, nameOf(options.stereo_features.descriptor.type), experiment.features, c.model,
+             nameOf(c.method), c.system, seed, errors.translation_percent, errors.rotation_deg_per_m, hash);
   };
 
   for (const std::string& name : setup.sequences) {
-    const ReferenceSequence sequence = openSequence(setup, name, "ground_truth");
+    const ReferenceSequence sequence = openSequence(setup, name, ReferenceMotion::kGroundTruth);
     const auto described = describeSequence(sequence, options, experiment.standard_size, experiment.features);
     Progress progress("accuracy " + sequence.name, static_cast<int>(described.size()) * experiment.seeds);
     for (std::size_t s = 0; s < described.size(); ++s) {
@@ -107,17 +110,16 @@ std::string runAccuracy(const ExperimentSetup& setup, const AccuracyExperiment& 
       for (std::size_t i = 1; i < described[s].size(); ++i)
         correspondences.push_back(makeCorrespondences(described[s][i - 1], described[s][i]));
       for (int seed = 1; seed <= experiment.seeds; ++seed, progress.step()) {
-        for (const std::string& method : experiment.methods) {
+        for (const ConsensusMethod method : experiment.methods) {
           VisualOdometryOptions odometry = options.visual_odometry;
           odometry.motion.consensus = method;
           odometry.motion.seed = seed;
-          const Case c{sequence.name, "", method, odometrySystems()[s].name};
-          for (const std::string& refinement : experiment.refinements)
-            add({c.sequence, refinement, c.method, c.system}, seed, sequence.trajectory,
-                followFrameToFrame(sequence.images.camera(), correspondences, odometry.motion,
-                                   refinement == "refined"));
+          const std::string& system = odometrySystems()[s].name;
+          for (const bool refine : {false, true})
+            add({sequence.name, refine ? "refined" : "sample", method, system}, seed, sequence.trajectory,
+                followFrameToFrame(sequence.images.camera(), correspondences, odometry.motion, refine));
           if (experiment.package_odometry)
-            add({c.sequence, "package", c.method, c.system}, seed, sequence.trajectory,
+            add({sequence.name, "package", method, system}, seed, sequence.trajectory,
                 followWithPackage(described[s], odometry));
         }
       }
@@ -150,9 +152,9 @@ std::string runAccuracy(const ExperimentSetup& setup, const AccuracyExperiment& 
       standard.push_back(run.translation_percent);
     const auto [best, worst] = std::minmax_element(translation.begin(), translation.end());
     const auto paper = published(c);
-    summary.add(c.sequence, options.stereo_features.descriptor.type, experiment.features, c.model, c.method, c.system,
-                static_cast<int>(of_seed.size()), *best, mean(translation), *worst, paper[0], paper[1], paper[2],
-                100.0 * (1.0 - mean(translation) / mean(standard)), mean(rotation), hash);
+    summary.add(c.sequence, nameOf(options.stereo_features.descriptor.type), experiment.features, c.model,
+                nameOf(c.method), c.system, static_cast<int>(of_seed.size()), *best, mean(translation), *worst,
+                paper[0], paper[1], paper[2], 100.0 * (1.0 - mean(translation) / mean(standard)), mean(rotation), hash);
   }
   runs.write(setup.output + "/accuracy.csv");
   summary.write(setup.output + "/accuracy_summary.csv");

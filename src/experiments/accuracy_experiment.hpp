@@ -9,10 +9,9 @@ struct AccuracyExperiment {
   int features = 2320;
   double standard_size = 7.0;  ///< px
   int seeds = 20;              ///< runs, seeded 1, 2, …
-  std::vector<std::string> methods = {"adaptive_gasac", "ransac", "msac"};
-  std::vector<std::string> refinements = {"sample",
-                                          "refined"};  ///< last step of the motion: the best sample's pose, or refined
-  bool package_odometry = false;                       ///< also the package's odometry on the same features
+  std::vector<ConsensusMethod> methods = {ConsensusMethod::kAdaptiveGasac, ConsensusMethod::kRansac,
+                                          ConsensusMethod::kMsac};
+  bool package_odometry = false;  ///< also the package's odometry on the same features
 };
 
 /// Writes accuracy.csv (a row for each run) and accuracy_summary.csv (table 2) to the output directory; returns the

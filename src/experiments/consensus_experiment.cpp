@@ -67,19 +67,18 @@ bool isRight(const Problem& problem, const MotionEstimate& estimate, const PoseP
 }
 
 struct Method {
-  std::string name, consensus;
+  std::string name;
+  ConsensusMethod consensus;
   bool learning;
 };
 
 }  // namespace
 
 std::string runConsensus(const ConsensusExperiment& experiment, const std::string& output) {
-  const std::vector<Method> methods = {{"ransac", "ransac", true},
-                                       {"msac", "msac", true},
-                                       {"lo_ransac", "lo_ransac", true},
-                                       {"gasac", "gasac", true},
-                                       {"adaptive_gasac", "adaptive_gasac", true},
-                                       {"adaptive_gasac_without_learning", "adaptive_gasac", false}};
+  std::vector<Method> methods;
+  for (const std::string& name : namesOf(ConsensusMethod{}))
+    methods.push_back({name, valueOf<ConsensusMethod>(name), true});
+  methods.push_back({"adaptive_gasac_without_learning", ConsensusMethod::kAdaptiveGasac, false});
   CsvTable table({"outlier_percent", "max_iterations", "method", "inliers_of_true_percent", "success_percent",
                   "samples", "cpu_ms_per_call", "first_seed", "seeds"});
   Progress progress("consensus",

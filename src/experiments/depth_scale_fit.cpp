@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "../common/progress.hpp"
+#include "correct_matches.hpp"
 #include "keypoint_set.hpp"
 
 namespace sdvo {
@@ -154,7 +155,7 @@ std::vector<SizeSample> sampleSizes(const ReferenceSequence& sequence, const Pip
                                     const SizeSampling& sampling) {
   const FeatureExtractorOptions& extraction = options.stereo_features;
   const auto base = makeBaseDescriptor(extraction.descriptor.type);
-  const double reach = measureReachPerSize(extraction.descriptor.type);
+  const Reach reach = [&](double size) { return base->reach(size); };
   DepthScaleOptions first_size, largest_size;
   first_size.scale_normalisation = largest_size.scale_normalisation = false;
   first_size.constant_size = sampling.first_size;
@@ -213,9 +214,9 @@ std::vector<SlopeTrial> trySlopes(const std::vector<ReferenceSequence>& sequence
   constexpr int kStride = 10, kSteps[] = {1, 4, 7, 10};
   const FeatureExtractorOptions& extraction = options.stereo_features;
   DescriptorOptions left_view = extraction.descriptor;
-  left_view.layout = "left";
+  left_view.layout = DescriptorLayout::kLeft;
   const StereoDescriptor descriptor(left_view);
-  const double reach = measureReachPerSize(left_view.type);
+  const Reach reach = [&](double size) { return descriptor.reach(size); };
   std::vector<DepthScale> curves;
   std::vector<SlopeTrial> trials;
   for (const double min_size : min_sizes) {
@@ -230,14 +231,13 @@ std::vector<SlopeTrial> trySlopes(const std::vector<ReferenceSequence>& sequence
       trials.push_back({slope, min_size, 0.0});
     }
   }
-  const std::vector<DepthScale> binding = bindingCurves(curves, left_view);
   int pairs = 0;
   for (const ReferenceSequence& sequence : sequences) {
     Progress progress("trying slopes " + sequence.name, sequence.frames / kStride + 1);
     for (int t = 0; t < sequence.frames; t += kStride, progress.step()) {
       const auto describe = [&](int i) {
         const KeypointSet set = findKeypoints(sequence.images, i, extraction.detector, extraction.stereo);
-        const auto chosen = selectKeypoints(set, binding, reach, extraction.detector.bucket_size, features);
+        const auto chosen = selectKeypoints(set, curves, reach, extraction.detector.bucket_size, features);
         std::vector<StereoFeatures> described;
         for (const DepthScale& curve : curves) described.push_back(describeKeypoints(set, chosen, curve, descriptor));
         return described;

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "experiment_setup.hpp"
+#include "reference_sequence.hpp"
 #include "stereo_descriptor_vo/front_end/depth_scale.hpp"
 
 namespace sdvo {

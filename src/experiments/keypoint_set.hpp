@@ -1,7 +1,7 @@
 #pragma once
 
+#include <functional>
 #include <opencv2/core.hpp>
-#include <string>
 #include <vector>
 
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
@@ -31,18 +31,13 @@ struct KeypointSet {
 KeypointSet findKeypoints(const KittiSequence& sequence, int i, const FeatureDetectorOptions& detector,
                           const StereoMatcherOptions& stereo);
 
-/// Distance in px from the centre, for each px of key point size, that a base descriptor needs inside the image.
-/// Measured with the descriptor itself on a blank image.
-double measureReachPerSize(const std::string& descriptor);
-
-/// The curves at whose sizes the neighbourhoods of `curves` must lie inside the image: these, or the standard size's
-/// alone when the descriptor goes on beyond the border.
-std::vector<DepthScale> bindingCurves(const std::vector<DepthScale>& curves, const DescriptorOptions& descriptor);
+/// Distance in px from its centre within which a key point of a size in px needs the image.
+using Reach = std::function<double(double size)>;
 
 /// Indices of the `count` strongest corners, spread over buckets, among those whose neighbourhood lies inside both
 /// views at the size that every one of `curves` gives. Hence all curves describe exactly the same features. Fewer when
 /// there are no more; indices of a smaller count are a subset of those of a larger one.
-std::vector<int> selectKeypoints(const KeypointSet& set, const std::vector<DepthScale>& curves, double reach_per_size,
+std::vector<int> selectKeypoints(const KeypointSet& set, const std::vector<DepthScale>& curves, const Reach& reach,
                                  int bucket_size, int count);
 
 /// Describes the chosen corners with sizes by `curve`, one row each in the order of `chosen`. Throws std::runtime_error
@@ -50,7 +45,7 @@ std::vector<int> selectKeypoints(const KeypointSet& set, const std::vector<Depth
 StereoFeatures describeKeypoints(const KeypointSet& set, const std::vector<int>& chosen, const DepthScale& curve,
                                  const StereoDescriptor& descriptor);
 
-/// The given rows of a feature set; layout "left" of a "left+right" set keeps the left halves.
-StereoFeatures selectRows(const StereoFeatures& features, const std::vector<int>& rows, const std::string& layout);
+/// The given rows of a feature set; the left layout of a set of both views keeps the left halves.
+StereoFeatures selectRows(const StereoFeatures& features, const std::vector<int>& rows, DescriptorLayout layout);
 
 }  // namespace sdvo

@@ -8,8 +8,10 @@
 #include <utility>
 
 #include "../common/progress.hpp"
+#include "correct_matches.hpp"
 #include "csv_table.hpp"
 #include "keypoint_set.hpp"
+#include "reference_sequence.hpp"
 
 namespace sdvo {
 namespace {
@@ -57,7 +59,8 @@ struct Score {
 
 /// What one row of the table is about.
 struct Case {
-  std::string descriptor, layout;
+  DescriptorType descriptor;
+  DescriptorLayout layout;
   int features;
 
   bool operator<(const Case& other) const {
@@ -81,21 +84,24 @@ using Scores = std::map<Case, CaseScores>;
 
 /// Table 1 and figure 7 of the paper, for what it gives.
 double publishedImprovement(const Case& c, const std::string& sequence) {
-  static const std::map<std::pair<std::string, std::string>, double> table_1 = {
-      {{"freak", "00"}, 29.34}, {{"freak", "01"}, 18.42}, {{"freak", "02"}, 28.81}, {{"freak", "03"}, 22.39},
-      {{"freak", "04"}, 32.25}, {{"freak", "05"}, 34.69}, {{"freak", "06"}, 28.23}, {{"freak", "07"}, 34.64},
-      {{"freak", "08"}, 36.40}, {{"freak", "09"}, 24.53}, {{"freak", "10"}, 25.34}, {{"sift", "00"}, 10.95},
-      {{"sift", "01"}, 7.65},   {{"sift", "02"}, 9.16},   {{"sift", "03"}, 6.53},   {{"sift", "04"}, 7.37},
-      {{"sift", "05"}, 9.61},   {{"sift", "06"}, 7.04},   {{"sift", "07"}, 7.46},   {{"sift", "08"}, 13.05},
-      {{"sift", "09"}, 8.15},   {{"sift", "10"}, 7.34}};
+  static const std::map<std::string, double> freak = {{"00", 29.34}, {"01", 18.42}, {"02", 28.81}, {"03", 22.39},
+                                                      {"04", 32.25}, {"05", 34.69}, {"06", 28.23}, {"07", 34.64},
+                                                      {"08", 36.40}, {"09", 24.53}, {"10", 25.34}};
+  static const std::map<std::string, double> sift = {{"00", 10.95}, {"01", 7.65}, {"02", 9.16}, {"03", 6.53},
+                                                     {"04", 7.37},  {"05", 9.61}, {"06", 7.04}, {"07", 7.46},
+                                                     {"08", 13.05}, {"09", 8.15}, {"10", 7.34}};
+  static const std::map<DescriptorType, std::map<std::string, double>> table_1 = {{DescriptorType::kFreak, freak},
+                                                                                  {DescriptorType::kSift, sift}};
   static const std::map<int, double> figure_7 = {{310, 11.58}, {1350, 15.37}, {2320, 26.41}};
-  if (c.layout != "left") return kUnknown;
+  if (c.layout != DescriptorLayout::kLeft) return kUnknown;
   if (sequence == "mean") {
     const auto found = figure_7.find(c.features);
-    return c.descriptor == "freak" && found != figure_7.end() ? found->second : kUnknown;
+    return c.descriptor == DescriptorType::kFreak && found != figure_7.end() ? found->second : kUnknown;
   }
-  const auto found = table_1.find({c.descriptor, sequence});
-  return c.features == 2320 && found != table_1.end() ? found->second : kUnknown;
+  const auto row = table_1.find(c.descriptor);
+  if (c.features != 2320 || row == table_1.end()) return kUnknown;
+  const auto found = row->second.find(sequence);
+  return found != row->second.end() ? found->second : kUnknown;
 }
 
 /// Features of one frame on every side, largest set, with the rows of the smaller sets.
@@ -109,14 +115,12 @@ class SequenceMatching {
   SequenceMatching(const ReferenceSequence& sequence, const MatchingExperiment& experiment,
                    const PipelineOptions& options, const std::vector<Side>& sides)
       : sequence_(sequence), experiment_(experiment), options_(options), sides_(sides) {
-    for (const Side& side : sides) binding_curves_.push_back(side.curve);
-    binding_curves_ = bindingCurves(binding_curves_, options.stereo_features.descriptor);
-    for (const std::string& type : experiment.descriptors) {
+    for (const Side& side : sides) curves_.push_back(side.curve);
+    for (const DescriptorType type : experiment.descriptors) {
       DescriptorOptions descriptor = options.stereo_features.descriptor;
       descriptor.type = type;
-      descriptor.layout = "left+right";  // the left layout is its left half
+      descriptor.layout = DescriptorLayout::kLeftAndRight;  // the left layout is its left half
       descriptors_.emplace_back(descriptor);
-      reach_.push_back(measureReachPerSize(type));
     }
   }
 
@@ -152,17 +156,18 @@ class SequenceMatching {
     const int bucket = options_.stereo_features.detector.bucket_size;
     const std::vector<int>& counts = experiment_.feature_counts;
     const int most = *std::max_element(counts.begin(), counts.end());
-    const std::vector<int> chosen = selectKeypoints(set, binding_curves_, reach_[d], bucket, most);
+    const Reach reach = [&](double size) { return descriptors_[d].reach(size); };
+    const std::vector<int> chosen = selectKeypoints(set, curves_, reach, bucket, most);
     DescribedFrame frame;
     for (const Side& side : sides_)
       frame.of_side.push_back(describeKeypoints(set, chosen, side.curve, descriptors_[d]));
     for (const int count : counts) {
       std::vector<int>& rows = frame.rows_of_count[count];
-      for (const int i : selectKeypoints(set, binding_curves_, reach_[d], bucket, count)) {
+      for (const int i : selectKeypoints(set, curves_, reach, bucket, count)) {
         const auto row = std::lower_bound(chosen.begin(), chosen.end(), i);
         if (row != chosen.end() && *row == i) rows.push_back(static_cast<int>(row - chosen.begin()));
       }
-      for (const std::string& layout : experiment_.layouts) {
+      for (const DescriptorLayout layout : experiment_.layouts) {
         CaseScores& scores = scores_[{experiment_.descriptors[d], layout, count}];
         scores.of_side.resize(sides_.size());
         scores.described += static_cast<double>(rows.size());
@@ -172,12 +177,12 @@ class SequenceMatching {
     return frame;
   }
 
-  void compare(const std::string& descriptor, const DescribedFrame& reference, const DescribedFrame& current, int from,
+  void compare(DescriptorType descriptor, const DescribedFrame& reference, const DescribedFrame& current, int from,
                int to) {
     const Eigen::Isometry3d motion = sequence_.motion(from, to);
     const std::size_t step = static_cast<std::size_t>(to - from - 1);
     for (const int count : experiment_.feature_counts) {
-      for (const std::string& layout : experiment_.layouts) {
+      for (const DescriptorLayout layout : experiment_.layouts) {
         CaseScores& scores = scores_[{descriptor, layout, count}];
         for (std::size_t s = 0; s < sides_.size(); ++s) {
           const StereoFeatures a = selectRows(reference.of_side[s], reference.rows_of_count.at(count), layout);
@@ -193,9 +198,8 @@ class SequenceMatching {
   const MatchingExperiment& experiment_;
   const PipelineOptions& options_;
   const std::vector<Side>& sides_;
-  std::vector<DepthScale> binding_curves_;
+  std::vector<DepthScale> curves_;
   std::vector<StereoDescriptor> descriptors_;
-  std::vector<double> reach_;
   Scores scores_;
 };
 
@@ -212,7 +216,7 @@ struct Improvements {
 class Report {
  public:
   Report(const std::vector<Side>& sides, const ExperimentSetup& setup, std::string hash)
-      : sides_(sides), reference_(setup.reference), hash_(std::move(hash)) {}
+      : sides_(sides), reference_(nameOf(setup.reference)), hash_(std::move(hash)) {}
 
   void addRow(const std::string& sequence, const Case& c, const Scores& of_sequence, const Improvements* mean) {
     const CaseScores& scores = of_sequence.at(c);
@@ -220,18 +224,19 @@ class Report {
     for (std::size_t s = 2; s < sides_.size(); ++s)
       if (scores.of_side[s].perPair() > scores.of_side[best].perPair()) best = s;
     const double normalised = scores.of_side[0].perPair(), standard = scores.of_side[1].perPair();
-    const auto left = of_sequence.find({c.descriptor, "left", c.features});
+    const auto left = of_sequence.find({c.descriptor, DescriptorLayout::kLeft, c.features});
     const double standard_left = left == of_sequence.end() ? kUnknown : left->second.of_side[1].perPair();
     const Improvements own{improvement(normalised, standard), improvement(normalised, scores.of_side[best].perPair()),
                            improvement(normalised, standard_left)};
     const Improvements shown = mean ? *mean : own;
-    table_.add(sequence, c.descriptor, c.layout, c.features, scores.described / std::max(scores.frames, 1.0),
-               normalised, standard, shown.standard, publishedImprovement(c, sequence), sides_[best].constant_size,
-               scores.of_side[best].perPair(), shown.best_constant, shown.standard_left, reference_, hash_);
+    table_.add(sequence, nameOf(c.descriptor), nameOf(c.layout), c.features,
+               scores.described / std::max(scores.frames, 1.0), normalised, standard, shown.standard,
+               publishedImprovement(c, sequence), sides_[best].constant_size, scores.of_side[best].perPair(),
+               shown.best_constant, shown.standard_left, reference_, hash_);
     for (std::size_t s = 0; s < sides_.size(); ++s)
       for (int step = 0; step < kSteps; ++step)
         if (const int pairs = scores.of_side[s].pairs[step])
-          steps_.add(sequence, c.descriptor, c.layout, c.features, sides_[s].name, step + 1,
+          steps_.add(sequence, nameOf(c.descriptor), nameOf(c.layout), c.features, sides_[s].name, step + 1,
                      scores.of_side[s].correct[step], pairs);
     latest_ = own;
   }

@@ -6,8 +6,8 @@ namespace sdvo {
 
 /// Experiment A of the paper: correct matches of scale normalised descriptors against the standard ones.
 struct MatchingExperiment {
-  std::vector<std::string> descriptors = {"freak", "sift"};
-  std::vector<std::string> layouts = {"left", "left+right"};
+  std::vector<DescriptorType> descriptors = {DescriptorType::kFreak, DescriptorType::kSift};
+  std::vector<DescriptorLayout> layouts = {DescriptorLayout::kLeft, DescriptorLayout::kLeftAndRight};
   std::vector<int> feature_counts = {310, 1350, 2320};
   double standard_size = 7.0;                               ///< px
   std::vector<double> constant_sizes = {10.0, 14.0, 20.0};  ///< px, candidates beside the standard for the best one

@@ -1,15 +1,16 @@
 #include "odometry_systems.hpp"
 
 #include "../common/progress.hpp"
+#include "correct_matches.hpp"
 #include "keypoint_set.hpp"
 
 namespace sdvo {
 
 const std::vector<OdometrySystem>& odometrySystems() {
-  static const std::vector<OdometrySystem> systems = {{"standard", false, "left"},
-                                                      {"scale_normalised", true, "left"},
-                                                      {"left+right", false, "left+right"},
-                                                      {"stereo", true, "left+right"}};
+  static const std::vector<OdometrySystem> systems = {{"standard", false, DescriptorLayout::kLeft},
+                                                      {"scale_normalised", true, DescriptorLayout::kLeft},
+                                                      {"left+right", false, DescriptorLayout::kLeftAndRight},
+                                                      {"stereo", true, DescriptorLayout::kLeftAndRight}};
   return systems;
 }
 
@@ -23,16 +24,15 @@ std::vector<std::vector<StereoFeatures>> describeSequence(const ReferenceSequenc
   constant.constant_size = standard_size;
   const std::vector<DepthScale> curves = {DepthScale(constant), DepthScale(normalised)};
   DescriptorOptions both_views = extraction.descriptor;
-  both_views.layout = "left+right";
+  both_views.layout = DescriptorLayout::kLeftAndRight;
   const StereoDescriptor descriptor(both_views);
-  const double reach = measureReachPerSize(both_views.type);
-  const std::vector<DepthScale> binding = bindingCurves(curves, both_views);
+  const Reach reach = [&](double size) { return descriptor.reach(size); };
 
   std::vector<std::vector<StereoFeatures>> described(odometrySystems().size());
   Progress progress("describing " + sequence.name, sequence.frames);
   for (int i = 0; i < sequence.frames; ++i, progress.step()) {
     const KeypointSet set = findKeypoints(sequence.images, i, extraction.detector, extraction.stereo);
-    const std::vector<int> chosen = selectKeypoints(set, binding, reach, extraction.detector.bucket_size, count);
+    const std::vector<int> chosen = selectKeypoints(set, curves, reach, extraction.detector.bucket_size, count);
     std::vector<int> all_rows;
     for (std::size_t k = 0; k < chosen.size(); ++k) all_rows.push_back(static_cast<int>(k));
     std::vector<StereoFeatures> of_curve;

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "experiment_setup.hpp"
+#include "reference_sequence.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
 
@@ -13,7 +13,7 @@ namespace sdvo {
 struct OdometrySystem {
   std::string name;  ///< "standard", "scale_normalised", "left+right", "stereo"
   bool scale_normalisation;
-  std::string layout;
+  DescriptorLayout layout;
 };
 
 const std::vector<OdometrySystem>& odometrySystems();

@@ -82,13 +82,13 @@ std::string runRobustness(const ExperimentSetup& setup, const RobustnessExperime
         const Sum& standard = sums[0][static_cast<std::size_t>(step - 1)];
         if (sum.runs == 0.0) continue;
         mean_inliers[s] += sum.inliers / sum.runs / kSteps;
-        table.add(sequence, options.stereo_features.descriptor.type, experiment.features, std::to_string(step), system,
-                  sum.matches / sum.runs, sum.inliers / sum.runs, 100.0 * (sum.inliers / standard.inliers - 1.0),
-                  publishedInliers(system, step), publishedGain(system, step), 100.0 * sum.successes / sum.runs,
-                  experiment.seeds, hash);
+        table.add(sequence, nameOf(options.stereo_features.descriptor.type), experiment.features, std::to_string(step),
+                  system, sum.matches / sum.runs, sum.inliers / sum.runs,
+                  100.0 * (sum.inliers / standard.inliers - 1.0), publishedInliers(system, step),
+                  publishedGain(system, step), 100.0 * sum.successes / sum.runs, experiment.seeds, hash);
       }
       const bool stereo = system == "stereo";
-      table.add(sequence, options.stereo_features.descriptor.type, experiment.features, "1-5", system, kUnknown,
+      table.add(sequence, nameOf(options.stereo_features.descriptor.type), experiment.features, "1-5", system, kUnknown,
                 mean_inliers[s], 100.0 * (mean_inliers[s] / mean_inliers[0] - 1.0),
                 stereo ? 73.0 : (s == 0 ? 64.7 : kUnknown), stereo ? 19.0 : kUnknown, kUnknown, experiment.seeds, hash);
     }

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <map>
 #include <opencv2/features2d.hpp>
 #include <stdexcept>
 #include <utility>
@@ -11,6 +10,7 @@
 #include "opencv_features.hpp"
 #include "stereo_descriptor_vo/front_end/brief.hpp"
 #include "stereo_descriptor_vo/front_end/freak.hpp"
+#include "stereo_descriptor_vo/front_end/image_bounds.hpp"
 
 #ifdef SDVO_HAVE_XFEATURES2D
 #include <opencv2/xfeatures2d.hpp>
@@ -19,11 +19,6 @@
 
 namespace sdvo {
 namespace {
-
-bool fits(const ViewKeypoint& k, double reach, cv::Size image) {
-  return k.u - reach >= -0.5 && k.v - reach >= -0.5 && k.u + reach <= image.width - 0.5 &&
-         k.v + reach <= image.height - 0.5;
-}
 
 ViewDescriptors emptyRows(std::size_t count, int bytes) {
   return {cv::Mat::zeros(static_cast<int>(count), bytes, CV_8U), std::vector<std::uint8_t>(count, 0)};
@@ -57,7 +52,7 @@ class BriefDescriptor : public BaseDescriptor {
     ViewDescriptors described = emptyRows(keypoints.size(), Brief::kBytes);
     for (std::size_t i = 0; i < keypoints.size(); ++i) {
       const ViewKeypoint& k = keypoints[i];
-      if (!fits(k, Brief::reach(k.size), image.size())) continue;
+      if (!liesInside(k.u, k.v, Brief::reach(k.size), image.size())) continue;
       brief.describe(k.u, k.v, k.size, described.rows.ptr(static_cast<int>(i)));
       described.valid[i] = 1;
     }
@@ -88,7 +83,7 @@ class OpenCvDescriptor : public BaseDescriptor {
     std::vector<std::size_t> row_of;
     for (std::size_t i = 0; i < keypoints.size(); ++i) {
       const ViewKeypoint& k = keypoints[i];
-      if (!fits(k, reach(k.size), image.size())) continue;
+      if (!liesInside(k.u, k.v, reach(k.size), image.size())) continue;
       const float degrees = k.angle < 0.f ? 0.f : k.angle * static_cast<float>(180.0 / CV_PI);
       cv::KeyPoint keypoint(k.u, k.v, k.size, degrees, 0.f, 0,
                             class_id_is_free_ ? static_cast<int>(row_of.size()) : -1);
@@ -131,8 +126,8 @@ class OpenCvDescriptor : public BaseDescriptor {
   Impose impose_;
 };
 
-[[noreturn]] void refuse(const std::string& name, const std::string& who_has_it) {
-  throw std::invalid_argument("descriptor/type '" + name + "' is not in this OpenCV (" CV_VERSION "): " + who_has_it);
+[[noreturn]] void refuse(DescriptorType type, const std::string& who_has_it) {
+  throw std::invalid_argument("type '" + nameOf(type) + "' is not in this OpenCV (" CV_VERSION "): " + who_has_it);
 }
 
 #if SDVO_HAVE_SIFT
@@ -149,17 +144,16 @@ void imposeSiftLayer(float size, cv::KeyPoint& keypoint) {
 }
 #endif
 
-std::unique_ptr<BaseDescriptor> makeSift(const std::string& name) {
+std::unique_ptr<BaseDescriptor> makeSift() {
 #if SDVO_HAVE_SIFT
-  static_cast<void>(name);
   return std::make_unique<OpenCvDescriptor>(cv::SIFT::create(), 3.0, true, imposeSiftLayer);
 #else
-  refuse(name, "OpenCV 4.4 and later have it in features2d");
+  refuse(DescriptorType::kSift, "OpenCV 4.4 and later have it in features2d");
 #endif
 }
 
 /// ORB reads the pyramid level from `octave`; its 31 px patch belongs to the standard size.
-std::unique_ptr<BaseDescriptor> makeOrb(const std::string&) {
+std::unique_ptr<BaseDescriptor> makeOrb() {
   constexpr float kStep = 1.1f, kStandardSize = static_cast<float>(BaseDescriptor::kStandardSize);
   constexpr int kLevels = 24;
   const auto impose = [](float size, cv::KeyPoint& keypoint) {
@@ -171,13 +165,13 @@ std::unique_ptr<BaseDescriptor> makeOrb(const std::string&) {
 }
 
 /// BRISK reads the size itself.
-std::unique_ptr<BaseDescriptor> makeBrisk(const std::string&) {
+std::unique_ptr<BaseDescriptor> makeBrisk() {
   return std::make_unique<OpenCvDescriptor>(cv::BRISK::create(), 2.0, true, [](float, cv::KeyPoint&) {});
 }
 
 /// AKAZE takes the evolution level, four to the octave from a blur of 1.6 px, from class_id; its own key points have a
 /// diameter of three times the blur.
-std::unique_ptr<BaseDescriptor> makeAkaze(const std::string&) {
+std::unique_ptr<BaseDescriptor> makeAkaze() {
   constexpr int kOctaves = 4, kSublevels = 4;
   const auto impose = [](float size, cv::KeyPoint& keypoint) {
     const double level = kSublevels * std::log2(size / 3.0 / 1.6);
@@ -188,51 +182,39 @@ std::unique_ptr<BaseDescriptor> makeAkaze(const std::string&) {
   return std::make_unique<OpenCvDescriptor>(akaze, 7.5, false, impose);
 }
 
-std::unique_ptr<BaseDescriptor> makeSurf(const std::string& name) {
+std::unique_ptr<BaseDescriptor> makeSurf() {
 #ifdef SDVO_HAVE_XFEATURES2D
   try {
     return std::make_unique<OpenCvDescriptor>(cv::xfeatures2d::SURF::create(100, 4, 3, false, true), 10.0 * 1.2 / 9.0,
                                               true, [](float, cv::KeyPoint&) {});
   } catch (const cv::Exception&) {
-    refuse(name, "its xfeatures2d was built without OPENCV_ENABLE_NONFREE=ON");
+    refuse(DescriptorType::kSurf, "its xfeatures2d was built without OPENCV_ENABLE_NONFREE=ON");
   }
 #else
-  refuse(name, "builds with opencv_contrib's xfeatures2d and OPENCV_ENABLE_NONFREE=ON have it");
+  refuse(DescriptorType::kSurf, "builds with opencv_contrib's xfeatures2d and OPENCV_ENABLE_NONFREE=ON have it");
 #endif
-}
-
-using Maker = std::unique_ptr<BaseDescriptor> (*)(const std::string&);
-
-const std::map<std::string, Maker>& makers() {
-  static const std::map<std::string, Maker> table = {
-      {"freak",
-       [](const std::string&) -> std::unique_ptr<BaseDescriptor> { return std::make_unique<FreakDescriptor>(); }},
-      {"brief",
-       [](const std::string&) -> std::unique_ptr<BaseDescriptor> { return std::make_unique<BriefDescriptor>(); }},
-      {"sift", makeSift},
-      {"orb", makeOrb},
-      {"brisk", makeBrisk},
-      {"akaze", makeAkaze},
-      {"surf", makeSurf},
-  };
-  return table;
 }
 
 }  // namespace
 
-const std::vector<std::string>& baseDescriptorNames() {
-  static const std::vector<std::string> names = [] {
-    std::vector<std::string> all;
-    for (const auto& entry : makers()) all.push_back(entry.first);
-    return all;
-  }();
-  return names;
-}
-
-std::unique_ptr<BaseDescriptor> makeBaseDescriptor(const std::string& name) {
-  const auto maker = makers().find(name);
-  if (maker == makers().end()) throw std::invalid_argument("descriptor/type '" + name + "' is unknown");
-  return maker->second(name);
+std::unique_ptr<BaseDescriptor> makeBaseDescriptor(DescriptorType type) {
+  switch (type) {
+    case DescriptorType::kAkaze:
+      return makeAkaze();
+    case DescriptorType::kBrief:
+      return std::make_unique<BriefDescriptor>();
+    case DescriptorType::kBrisk:
+      return makeBrisk();
+    case DescriptorType::kFreak:
+      return std::make_unique<FreakDescriptor>();
+    case DescriptorType::kOrb:
+      return makeOrb();
+    case DescriptorType::kSift:
+      return makeSift();
+    case DescriptorType::kSurf:
+      return makeSurf();
+  }
+  throw std::invalid_argument("there is no such base descriptor");
 }
 
 }  // namespace sdvo

@@ -6,10 +6,11 @@
 
 namespace sdvo {
 
-DepthScale::DepthScale(const DepthScaleOptions& options) : options_(checked(options)) {
-  if (options_.min_size > options_.max_size)
-    throw std::invalid_argument("size_curve: min_size exceeds max_size, no size is left");
+void DepthScaleOptions::check() const {
+  if (min_size > max_size) throw std::invalid_argument("min_size exceeds max_size, no size is left");
 }
+
+DepthScale::DepthScale(const DepthScaleOptions& options) : options_(checked(options)) {}
 
 double DepthScale::size(double disparity) const {
   if (!options_.scale_normalisation) return options_.constant_size;

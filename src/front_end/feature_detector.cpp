@@ -39,23 +39,24 @@ std::vector<Corner> detectAgast(const cv::Mat& image, const FeatureDetectorOptio
 
 /// Detectors of OpenCV's with a scale space of their own: positions and scores are taken, the sizes come from the
 /// depth. More are asked for than wanted, so that the buckets have a choice.
-std::vector<Corner> detectInScaleSpace(const cv::Mat& image, const FeatureDetectorOptions& options) {
-  constexpr int kChoice = 4;
+constexpr int kChoice = 4;
+
+std::vector<Corner> detectOrb(const cv::Mat& image, const FeatureDetectorOptions& options) {
   std::vector<cv::KeyPoint> keypoints;
-  cv::Ptr<cv::Feature2D> detector;
-  if (options.type == "orb") {
-    detector = cv::ORB::create(kChoice * options.max_features, 1.2f, 8, 31, 0, 2, cv::ORB::HARRIS_SCORE, 31,
-                               options.fast_min_threshold);
-  } else {
+  cv::ORB::create(kChoice * options.max_features, 1.2f, 8, 31, 0, 2, cv::ORB::HARRIS_SCORE, 31,
+                  options.fast_min_threshold)
+      ->detect(image, keypoints);
+  return toCorners(keypoints);
+}
+
+std::vector<Corner> detectSift(const cv::Mat& image, const FeatureDetectorOptions& options) {
+  std::vector<cv::KeyPoint> keypoints;
 #if SDVO_HAVE_SIFT
-    constexpr double kLooseContrast = 0.005;
-    detector = cv::SIFT::create(kChoice * options.max_features, 3, kLooseContrast);
+  constexpr double kLooseContrast = 0.005;
+  cv::SIFT::create(kChoice * options.max_features, 3, kLooseContrast)->detect(image, keypoints);
 #else
-    throw std::invalid_argument("detector/type 'sift' is not in this OpenCV (" CV_VERSION
-                                "): OpenCV 4.4 and later have it in features2d");
+  static_cast<void>(image), static_cast<void>(options);  // refused by check()
 #endif
-  }
-  detector->detect(image, keypoints);
   return toCorners(keypoints);
 }
 
@@ -65,7 +66,7 @@ std::vector<Corner> detectGradientCorners(const cv::Mat& image, const FeatureDet
   constexpr double kHarrisK = 0.04;
   cv::Mat response, neighbourhood_maximum;
   double quality = options.corner_quality;
-  if (options.type == "harris") {
+  if (options.type == DetectorType::kHarris) {
     cv::cornerHarris(image, response, options.corner_block_size, 3, kHarrisK);
     quality *= quality;  // Harris' measure is of the order of the eigenvalue squared
   } else {
@@ -87,10 +88,20 @@ std::vector<Corner> detectGradientCorners(const cv::Mat& image, const FeatureDet
 }
 
 std::vector<Corner> detectAll(const cv::Mat& image, const FeatureDetectorOptions& options) {
-  if (options.type == "fast") return detectFast(image, options);
-  if (options.type == "agast") return detectAgast(image, options);
-  if (options.type == "gftt" || options.type == "harris") return detectGradientCorners(image, options);
-  return detectInScaleSpace(image, options);
+  switch (options.type) {
+    case DetectorType::kFast:
+      return detectFast(image, options);
+    case DetectorType::kAgast:
+      return detectAgast(image, options);
+    case DetectorType::kGftt:
+    case DetectorType::kHarris:
+      return detectGradientCorners(image, options);
+    case DetectorType::kOrb:
+      return detectOrb(image, options);
+    case DetectorType::kSift:
+      return detectSift(image, options);
+  }
+  throw std::invalid_argument("there is no such detector");
 }
 
 /// Foerstner's intersection of gradient lines, as cv::cornerSubPix finds it but several times faster.
@@ -204,6 +215,12 @@ std::vector<Corner> spreadOverBuckets(std::vector<Corner> corners, cv::Size imag
   return kept;
 }
 
+void FeatureDetectorOptions::check() const {
+  if (type == DetectorType::kSift && !SDVO_HAVE_SIFT)
+    throw std::invalid_argument("type 'sift' is not in this OpenCV (" CV_VERSION
+                                "): OpenCV 4.4 and later have it in features2d");
+}
+
 FeatureDetector::FeatureDetector(const FeatureDetectorOptions& options) : options_(checked(options)) {}
 
 std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border) const {
@@ -215,7 +232,7 @@ std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border) co
   for (Corner& corner : corners) corner.position += cv::Point2f(inner.tl());
   corners = spreadOverBuckets(std::move(corners), image.size(), options_.bucket_size, options_.max_features);
   if (options_.subpixel) {
-    const bool gradient = options_.type == "gftt" || options_.type == "harris";
+    const bool gradient = options_.type == DetectorType::kGftt || options_.type == DetectorType::kHarris;
     const float largest_shift = gradient ? 0.5f * static_cast<float>(options_.corner_block_size) : 1.5f;  // px
     refinePositions(image, options_.subpixel_radius, largest_shift, corners);
   }

@@ -61,7 +61,7 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
   StereoFeatures features;
   features.stamp = stamp;
   features.camera = camera;
-  features.descriptor = options_.descriptor.type;
+  features.descriptor = nameOf(options_.descriptor.type);
   features.layout = options_.descriptor.layout;
   features.element_type = descriptor_.elementType();
   ExtractionReport& report = features.report;

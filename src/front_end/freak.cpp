@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stereo_descriptor_vo/front_end/image_bounds.hpp"
+
 namespace sdvo {
 namespace {
 
@@ -73,10 +75,7 @@ const std::array<Freak::FieldPair, Freak::kBits>& Freak::pairs() {
 }
 
 bool Freak::fits(const FreakKeypoint& keypoint, cv::Size image_size) {
-  const double r = reach(keypoint.size);
-  // The image covers [-0.5, width - 0.5] x [-0.5, height - 0.5].
-  return keypoint.size > 0.f && keypoint.u - r >= -0.5 && keypoint.v - r >= -0.5 &&
-         keypoint.u + r <= image_size.width - 0.5 && keypoint.v + r <= image_size.height - 0.5;
+  return keypoint.size > 0.f && liesInside(keypoint.u, keypoint.v, reach(keypoint.size), image_size);
 }
 
 Freak::Freak(const cv::Mat& image) : image_(image) {}

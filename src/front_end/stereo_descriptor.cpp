@@ -5,6 +5,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "stereo_descriptor_vo/front_end/freak.hpp"
+#include "stereo_descriptor_vo/front_end/image_bounds.hpp"
 
 namespace sdvo {
 namespace {
@@ -19,10 +20,6 @@ void orient(const cv::Mat& image, std::vector<ViewKeypoint>& keypoints) {
   }
 }
 
-bool covers(cv::Size image, float u, float v, double reach) {
-  return u - reach >= -0.5 && v - reach >= -0.5 && u + reach <= image.width - 0.5 && v + reach <= image.height - 0.5;
-}
-
 /// The image going on as its outermost pixels for `margin` px on every side.
 cv::Mat extended(const cv::Mat& image, int margin) {
   cv::Mat larger;
@@ -33,13 +30,17 @@ cv::Mat extended(const cv::Mat& image, int margin) {
 }  // namespace
 
 void DescriptorOptions::describe(OptionList& list) {
-  list.add("type", type, baseDescriptorNames(), "base descriptor");
-  list.add("layout", layout, {"left", "left+right"}, "one view, or the left half followed by the right half");
+  list.add("type", type, "base descriptor");
+  list.add("layout", layout, "one view, or the left half followed by the right half");
   list.add("oriented", oriented, "turn the pattern to the left view's orientation (both halves by the same angle)");
   list.add(
       "extend_border", extend_border,
       "describe also what is too near to an image border for its size, if a size of 7 px fits: the image then goes on "
       "as its outermost pixels");
+}
+
+void DescriptorOptions::check() const {
+  makeBaseDescriptor(type);
 }
 
 StereoDescriptor::StereoDescriptor(const DescriptorOptions& options)
@@ -79,13 +80,13 @@ DescribedKeypoints StereoDescriptor::describe(const cv::Mat& left_image, const c
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
     if (!left_half.valid[i] || !right_half.valid[i]) continue;
     const StereoKeypoint& k = keypoints[i];
-    if (options_.extend_border && (!covers(left_image.size(), k.u_left, k.v_left, reach(k.size)) ||
-                                   !covers(right_image.size(), k.u_right, k.v_right, reach(k.size))))
+    if (options_.extend_border && (!liesInside(k.u_left, k.v_left, reach(k.size), left_image.size()) ||
+                                   !liesInside(k.u_right, k.v_right, reach(k.size), right_image.size())))
       continue;
     described.index.push_back(static_cast<int>(i));
     described.angle.push_back(in_left[i].angle);
   }
-  const bool both = options_.layout == "left+right";
+  const bool both = options_.layout == DescriptorLayout::kLeftAndRight;
   const int bytes = base_->bytes(), count = static_cast<int>(described.index.size());
   described.rows.create(count, (both ? 2 : 1) * bytes, CV_8U);
   for (int row = 0; row < count; ++row) {

@@ -1,15 +1,22 @@
 #include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
 
 #include <opencv2/video/tracking.hpp>
+#include <stdexcept>
 
 namespace sdvo {
+
+void StereoMatcherOptions::check() const {
+  if (method == StereoMethod::kEpipolar && min_disparity >= epipolar.max_disparity)
+    throw std::invalid_argument("min_disparity is not below epipolar/max_disparity, no disparity is left");
+}
 
 StereoMatcher::StereoMatcher(const StereoMatcherOptions& options) : options_(checked(options)) {}
 
 std::vector<StereoMatch> StereoMatcher::match(const cv::Mat& left, const cv::Mat& right,
                                               const std::vector<cv::Point2f>& left_positions) const {
   if (left_positions.empty()) return {};
-  return options_.method == "lk" ? track(left, right, left_positions) : search(left, right, left_positions);
+  return options_.method == StereoMethod::kLucasKanade ? track(left, right, left_positions)
+                                                       : search(left, right, left_positions);
 }
 
 std::vector<StereoMatch> StereoMatcher::search(const cv::Mat& left, const cv::Mat& right,

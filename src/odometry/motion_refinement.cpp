@@ -15,7 +15,7 @@ using Correspondences = std::vector<Correspondence>;
 class Kernel {
  public:
   explicit Kernel(const MotionRefinementOptions& options)
-      : huber_(options.kernel == "huber"), scale_(options.kernel_scale) {}
+      : huber_(options.kernel == RobustKernel::kHuber), scale_(options.kernel_scale) {}
 
   /// Adds the cost of a residual and returns its weight.
   double add(double residual) {

@@ -21,8 +21,8 @@ void optimiseLocally(const PoseProblem& problem, Eigen::Isometry3d& T, double& c
 
 Consensus searchAtRandom(const PoseProblem& problem, const SampleConsensusOptions& options, SampleBudget budget,
                          std::mt19937& random) {
-  const bool count_only = options.consensus == "ransac";
-  const bool local = options.consensus == "lo_ransac";
+  const bool count_only = options.consensus == ConsensusMethod::kRansac;
+  const bool local = options.consensus == ConsensusMethod::kLoRansac;
   Consensus consensus;
   double best = std::numeric_limits<double>::max();
   for (; !budget.spent(consensus.iterations); ++consensus.iterations) {
@@ -43,7 +43,7 @@ Consensus searchAtRandom(const PoseProblem& problem, const SampleConsensusOption
 Consensus searchByGenes(const PoseProblem& problem, const SampleConsensusOptions& options, const SampleBudget& budget,
                         std::mt19937& random) {
   const GeneticResult result =
-      searchGenetically(problem, options.genetic, options.consensus == "adaptive_gasac", budget, random);
+      searchGenetically(problem, options.genetic, options.consensus == ConsensusMethod::kAdaptiveGasac, budget, random);
   Consensus consensus;
   consensus.found = result.found;
   consensus.T_current_reference = result.T_current_reference;
@@ -57,7 +57,7 @@ Consensus findConsensus(const PoseProblem& problem, const SampleConsensusOptions
   constexpr int kSmallestProblem = 4;  // the genetic search needs a gene to exchange
   if (problem.count() < kSmallestProblem) return {};
   std::mt19937 random(static_cast<std::uint32_t>(options.seed));
-  const bool genetic = options.consensus == "gasac" || options.consensus == "adaptive_gasac";
+  const bool genetic = options.consensus == ConsensusMethod::kGasac || options.consensus == ConsensusMethod::kAdaptiveGasac;
   const SampleBudget budget(options.min_iterations, options.max_iterations, options.confidence);
   Consensus consensus =
       genetic ? searchByGenes(problem, options, budget, random) : searchAtRandom(problem, options, budget, random);

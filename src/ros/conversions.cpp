@@ -49,24 +49,6 @@ void fillCovariance(const Matrix6d& covariance, Covariance& message) {
     for (int column = 0; column < 6; ++column) message[6 * row + column] = symmetric(row, column);
 }
 
-const char* toText(ElementType type) {
-  switch (type) {
-    case ElementType::kBits:
-      return "bits";
-    case ElementType::kUint8:
-      return "uint8";
-    case ElementType::kFloat32:
-      return "float32";
-  }
-  throw std::invalid_argument("unknown element type");
-}
-
-ElementType toElementType(const std::string& text) {
-  if (text == "bits") return ElementType::kBits;
-  if (text == "uint8") return ElementType::kUint8;
-  return ElementType::kFloat32;  // the view has checked that nothing else is left
-}
-
 }  // namespace
 
 std::string cleanFrameId(const std::string& frame_id) {
@@ -127,8 +109,8 @@ stereo_descriptor_vo::StereoFeatures toMessage(const StereoFeatures& features, c
   message.cy = features.camera.cy;
   message.baseline = features.camera.baseline;
   message.descriptor = features.descriptor;
-  message.layout = features.layout;
-  message.element_type = toText(features.element_type);
+  message.layout = nameOf(features.layout);
+  message.element_type = nameOf(features.element_type);
   message.bytes_per_row = static_cast<std::uint32_t>(features.descriptors.cols);
   message.scale_normalised = size_curve.scale_normalisation;
   message.size_slope = static_cast<float>(size_curve.slope);
@@ -177,8 +159,8 @@ StereoFeatures fromMessage(const stereo_descriptor_vo::StereoFeatures& message) 
                      static_cast<int>(message.image_width),
                      static_cast<int>(message.image_height)};
   features.descriptor = message.descriptor;
-  features.layout = message.layout;
-  features.element_type = toElementType(message.element_type);
+  features.layout = valueOf<DescriptorLayout>(message.layout);
+  features.element_type = valueOf<ElementType>(message.element_type);
   features.u = message.u;
   features.v = message.v;
   features.disparity = message.disparity;

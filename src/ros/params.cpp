@@ -6,12 +6,10 @@
 namespace sdvo {
 namespace {
 
-void assign(const XmlRpc::XmlRpcValue& parameter, const std::string& path, Option& option) {
+void assign(const XmlRpc::XmlRpcValue& parameter, Option& option) {
   using Value = XmlRpc::XmlRpcValue;
   Value value = parameter;  // its conversions are not const
-  const auto wrongType = [&](const char* wanted) {
-    return std::invalid_argument("parameter " + path + " is not " + wanted);
-  };
+  const auto wrongType = [&](const char* wanted) { return std::invalid_argument(option.name + " is not " + wanted); };
   if (auto* b = std::get_if<bool*>(&option.value)) {
     if (value.getType() != Value::TypeBoolean) throw wrongType("a boolean");
     **b = static_cast<bool&>(value);
@@ -23,7 +21,7 @@ void assign(const XmlRpc::XmlRpcValue& parameter, const std::string& path, Optio
     **d = value.getType() == Value::TypeInt ? static_cast<int&>(value) : static_cast<double&>(value);
   } else {
     if (value.getType() != Value::TypeString) throw wrongType("a string");
-    *std::get<std::string*>(option.value) = static_cast<std::string&>(value);
+    option.set(static_cast<std::string&>(value));
   }
 }
 
@@ -33,8 +31,8 @@ std::vector<std::string> loadParams(const ros::NodeHandle& nh, std::vector<Optio
   for (Option& option : options) {
     XmlRpc::XmlRpcValue value;
     if (!nh.getParam(option.name, value)) continue;
-    assign(value, nh.resolveName(option.name), option);
     try {
+      assign(value, option);
       option.check();
     } catch (const std::invalid_argument& e) {
       throw std::invalid_argument("parameter " + nh.getNamespace() + "/" + e.what());

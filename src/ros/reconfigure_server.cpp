@@ -49,7 +49,7 @@ void addLimits(Config& min, Config& max, const Option& option) {
   if (std::holds_alternative<bool*>(option.value)) {
     add(min, option, "false");
     add(max, option, "true");
-  } else if (std::holds_alternative<std::string*>(option.value)) {
+  } else if (option.isText()) {
     add(min, option, "");
     add(max, option, "");
   } else {

@@ -12,9 +12,7 @@
 #include <map>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -23,6 +21,7 @@
 #include "../data/text_file.hpp"
 #include "run_tool.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
+#include "stereo_descriptor_vo/data/kitti_writer.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
 
 namespace fs = std::filesystem;
@@ -122,9 +121,8 @@ AslCamera readCamera(const fs::path& directory) {
 /// How to turn both views into rectified ones.
 struct Rectification {
   cv::Mat map_x[2], map_y[2];     ///< for cv::remap, left and right
-  cv::Mat P[2];                   ///< 3x4 projections
+  sdvo::StereoCamera camera;      ///< that they then have
   Eigen::Matrix3d R_rect_camera;  ///< of the left view
-  double baseline;                ///< m
 };
 
 Rectification rectify(const AslCamera& left, const AslCamera& right) {
@@ -132,21 +130,23 @@ Rectification rectify(const AslCamera& left, const AslCamera& right) {
     throw std::runtime_error("'" + left.directory + "' and '" + right.directory + "' differ in image resolution");
   }
   const Eigen::Isometry3d T_right_left = right.T_body_camera.inverse() * left.T_body_camera;
-  cv::Mat R, T, R_rect[2], Q;
+  cv::Mat R, T, R_rect[2], P[2], Q;
   cv::eigen2cv(Eigen::Matrix3d(T_right_left.linear()), R);
   cv::eigen2cv(Eigen::Vector3d(T_right_left.translation()), T);
   Rectification result;
   cv::stereoRectify(left.intrinsics, left.distortion, right.intrinsics, right.distortion, left.size, R, T, R_rect[0],
-                    R_rect[1], result.P[0], result.P[1], Q, cv::CALIB_ZERO_DISPARITY, 0.0);
-  result.baseline = -result.P[1].at<double>(0, 3) / result.P[1].at<double>(0, 0);
-  if (!(result.baseline > 0.0)) {
+                    R_rect[1], P[0], P[1], Q, cv::CALIB_ZERO_DISPARITY, 0.0);
+  const double fx = P[1].at<double>(0, 0), baseline = -P[1].at<double>(0, 3) / fx;
+  result.camera = {fx,       P[1].at<double>(1, 1), P[1].at<double>(0, 2), P[1].at<double>(1, 2),
+                   baseline, left.size.width,       left.size.height};
+  if (!(baseline > 0.0)) {
     throw std::runtime_error("the T_BS of '" + right.directory + "' does not put it to the right of '" +
                              left.directory + "': are the cameras swapped?");
   }
   for (int side = 0; side < 2; ++side) {
     const AslCamera& camera = side == 0 ? left : right;
-    cv::initUndistortRectifyMap(camera.intrinsics, camera.distortion, R_rect[side], result.P[side], camera.size,
-                                CV_32FC1, result.map_x[side], result.map_y[side]);
+    cv::initUndistortRectifyMap(camera.intrinsics, camera.distortion, R_rect[side], P[side], camera.size, CV_32FC1,
+                                result.map_x[side], result.map_y[side]);
   }
   cv::cv2eigen(R_rect[0], result.R_rect_camera);
   return result;
@@ -178,12 +178,12 @@ std::map<std::int64_t, Eigen::Isometry3d> readGroundTruth(const std::string& pat
   return poses;
 }
 
-/// The rectified left camera relative to its first pose; nothing, with a note, when a stamp has no ground truth.
-std::optional<sdvo::Trajectory> rectifiedPoses(const std::string& path, const std::vector<std::int64_t>& stamps,
-                                               const Eigen::Matrix3d& R_rect_camera) {
+/// The rectified left camera relative to its first pose; empty, with a note, when a stamp has no ground truth.
+sdvo::Trajectory rectifiedPoses(const std::string& path, const std::vector<std::int64_t>& stamps,
+                                const Eigen::Matrix3d& R_rect_camera) {
   if (!fs::exists(path)) {
     std::cerr << "note: there is no '" << path << "', so poses.txt is not written" << std::endl;
-    return std::nullopt;
+    return {};
   }
   const std::map<std::int64_t, Eigen::Isometry3d> ground_truth = readGroundTruth(path);
   const Eigen::Isometry3d T_camera_rect(R_rect_camera.transpose());
@@ -192,7 +192,7 @@ std::optional<sdvo::Trajectory> rectifiedPoses(const std::string& path, const st
     const auto found = ground_truth.find(stamp);
     if (found == ground_truth.end()) {
       std::cerr << "note: '" << path << "' has no pose at " << stamp << ", so poses.txt is not written" << std::endl;
-      return std::nullopt;
+      return {};
     }
     poses.push_back(found->second * T_camera_rect);
   }
@@ -201,67 +201,10 @@ std::optional<sdvo::Trajectory> rectifiedPoses(const std::string& path, const st
   return poses;
 }
 
-void writeText(const fs::path& path, const std::string& text) {
-  std::ofstream file(path);
-  file << text;
-  file.close();
-  if (!file) throw std::runtime_error("cannot write file '" + path.string() + "'");
-}
-
-std::string calibrationText(const Rectification& rectification) {
-  std::string text;
-  for (int side = 0; side < 2; ++side) {
-    text += "P" + std::to_string(side) + ":";
-    for (int i = 0; i < 12; ++i) {
-      char number[32];
-      std::snprintf(number, sizeof number, " %.12e", rectification.P[side].at<double>(i / 4, i % 4));
-      text += number;
-    }
-    text += "\n";
-  }
-  return text;
-}
-
-/// A directory that appears under its name only once it is complete; removed when something failed before.
-class OutputDirectory {
- public:
-  explicit OutputDirectory(const std::string& path) : final_(fs::absolute(path).lexically_normal()) {
-    if (final_.filename().empty()) final_ = final_.parent_path();
-    if (fs::exists(final_) && !(fs::is_directory(final_) && fs::is_empty(final_))) {
-      throw std::runtime_error("--output '" + path + "' exists and is not empty: remove it or choose another one");
-    }
-    partial_ = final_.string() + ".part";
-    if (fs::exists(partial_)) {
-      throw std::runtime_error("'" + partial_.string() + "' is left from an interrupted run: remove it");
-    }
-    std::error_code error;
-    fs::create_directories(partial_, error);
-    if (error) throw std::runtime_error("cannot create --output '" + path + "': " + error.message());
-  }
-  ~OutputDirectory() {
-    std::error_code ignored;
-    if (!committed_) fs::remove_all(partial_, ignored);
-  }
-  OutputDirectory(const OutputDirectory&) = delete;
-  OutputDirectory& operator=(const OutputDirectory&) = delete;
-
-  const fs::path& path() const { return partial_; }
-  void commit() {
-    fs::rename(partial_, final_);
-    committed_ = true;
-  }
-
- private:
-  fs::path final_, partial_;
-  bool committed_ = false;
-};
-
 void writeImages(const AslCamera& left, const AslCamera& right, const Rectification& rectification,
-                 const std::vector<std::int64_t>& stamps, const fs::path& output) {
+                 const std::vector<std::int64_t>& stamps, const sdvo::KittiWriter& output) {
   sdvo::Progress progress("rectifying", static_cast<int>(stamps.size()));
   for (std::size_t i = 0; i < stamps.size(); ++i) {
-    char name[32];
-    std::snprintf(name, sizeof name, "%06zu.png", i);
     for (int side = 0; side < 2; ++side) {
       const std::string& source = (side == 0 ? left : right).files.at(stamps[i]);
       const cv::Mat raw = sdvo::readGreyPng(source);
@@ -270,10 +213,7 @@ void writeImages(const AslCamera& left, const AslCamera& right, const Rectificat
       }
       cv::Mat image;
       cv::remap(raw, image, rectification.map_x[side], rectification.map_y[side], cv::INTER_LINEAR);
-      const fs::path target = output / ("image_" + std::to_string(side)) / name;
-      if (!cv::imwrite(target.string(), image)) {
-        throw std::runtime_error("cannot write image '" + target.string() + "': is the disk full?");
-      }
+      output.writeImage(side, static_cast<int>(i), image);
     }
     progress.step();
   }
@@ -284,22 +224,17 @@ void convert(const fs::path& input, const std::string& output_path) {
   const AslCamera right = readCamera(input / "cam1");
   const Rectification rectification = rectify(left, right);
   const std::vector<std::int64_t> stamps = commonStamps(left, right);
-  const std::optional<sdvo::Trajectory> poses =
+  const sdvo::Trajectory poses =
       rectifiedPoses((input / "cam0_ground_truth.txt").string(), stamps, rectification.R_rect_camera);
 
-  OutputDirectory output(output_path);
-  fs::create_directory(output.path() / "image_0");
-  fs::create_directory(output.path() / "image_1");
-  writeText(output.path() / "calib.txt", calibrationText(rectification));
-  std::string times;
-  for (const std::int64_t stamp : stamps) times += sdvo::formatSeconds(stamp - stamps.front()) + "\n";
-  writeText(output.path() / "times.txt", times);
-  if (poses) sdvo::writeKittiPoses((output.path() / "poses.txt").string(), *poses);
-  writeImages(left, right, rectification, stamps, output.path());
-  output.commit();
+  sdvo::KittiWriter output(output_path);
+  writeImages(left, right, rectification, stamps, output);
+  const sdvo::StereoCamera& camera = rectification.camera;
+  std::vector<std::int64_t> since_first;
+  for (const std::int64_t stamp : stamps) since_first.push_back(stamp - stamps.front());
+  output.finish(camera, since_first, poses);
   std::printf("%zu pairs of %dx%d px, f = %.3f px, baseline = %.5f m, first stamp %lld ns\n", stamps.size(),
-              left.size.width, left.size.height, rectification.P[0].at<double>(0, 0), rectification.baseline,
-              static_cast<long long>(stamps.front()));
+              camera.width, camera.height, camera.fx, camera.baseline, static_cast<long long>(stamps.front()));
 }
 
 }  // namespace
@@ -307,8 +242,7 @@ void convert(const fs::path& input, const std::string& output_path) {
 int main(int argc, char** argv) {
   CLI::App app(
       "Rectifies an EuRoC (ASL) folder into the KITTI layout: image_0, image_1, calib.txt, times.txt (seconds since "
-      "the "
-      "first stamp) and, where cam0_ground_truth.txt exists, poses.txt of the rectified left camera.");
+      "the first stamp) and, where cam0_ground_truth.txt exists, poses.txt of the rectified left camera.");
   std::string input, output;
   app.add_option("--input", input, "The mav0 folder with cam0 and cam1")->required();
   app.add_option("--output", output, "Directory to create")->required();

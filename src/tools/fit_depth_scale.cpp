@@ -10,6 +10,7 @@
 #include "../experiments/csv_table.hpp"
 #include "../experiments/depth_scale_fit.hpp"
 #include "../experiments/plot_script.hpp"
+#include "named_choice.hpp"
 #include "run_tool.hpp"
 
 namespace {
@@ -132,9 +133,7 @@ int main(int argc, char** argv) {
       ->delimiter(',');
   app.add_option("--output", arguments.output, "YAML file to write, as the nodelets load it")->required();
   app.add_option("--plot", arguments.plot, "PNG of samples and curve to draw; the samples go to a CSV file beside it");
-  app.add_option("--reference", arguments.setup.reference, "motion taken for true: ground_truth or odometry")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"ground_truth", "odometry"}));
+  sdvo::addChoice(app, "--reference", arguments.setup.reference, "motion taken for true");
   app.add_option("--model", arguments.model, "a*d, a*d+b, a*d^b or a*d^b+c instead of the one that fits best")
       ->check(CLI::IsMember({"a*d", "a*d+b", "a*d^b", "a*d^b+c"}));
   app.add_option("--frames", arguments.setup.frames, "use only the first N pairs of each sequence")

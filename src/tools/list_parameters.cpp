@@ -12,7 +12,7 @@ std::string rangeOf(const sdvo::Option& option) {
   std::ostringstream text;
   if (std::holds_alternative<bool*>(option.value)) return "true, false";
   for (const std::string& choice : option.choices) text << (text.tellp() > 0 ? ", " : "") << choice;
-  if (!std::holds_alternative<std::string*>(option.value)) text << option.range.min << " … " << option.range.max;
+  if (!option.isText()) text << option.range.min << " … " << option.range.max;
   return text.str();
 }
 

@@ -9,8 +9,6 @@
 #include <filesystem>
 #include <fstream>
 #include <mutex>
-#include <opencv2/imgcodecs.hpp>
-#include <optional>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -18,9 +16,11 @@
 #include <vector>
 
 #include "../common/progress.hpp"
-#include "../data/text_file.hpp"
+#include "../data/kitti_layout.hpp"
 #include "../render/drive_renderer.hpp"
 #include "run_tool.hpp"
+#include "stereo_descriptor_vo/data/kitti_dataset.hpp"
+#include "stereo_descriptor_vo/data/kitti_writer.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
 
 namespace fs = std::filesystem;
@@ -41,24 +41,9 @@ struct Request {
   RenderOptions options;
 };
 
-/// The pair P0, P1 of a KITTI calib.txt.
+/// A calibration with the size of the images, which it does not tell itself.
 sdvo::StereoCamera readCalibration(const std::string& path, const std::string& size) {
-  std::ifstream file = sdvo::openTextFile(path);
-  std::optional<std::vector<double>> P[2];
-  for (std::string line; std::getline(file, line);) {
-    const std::vector<std::string> words = sdvo::splitWords(line);
-    if (words.size() != 13 || (words[0] != "P0:" && words[0] != "P1:")) continue;
-    std::vector<double> values;
-    for (std::size_t i = 1; i < words.size(); ++i) values.push_back(sdvo::parseNumber<double>(words[i]));
-    P[words[0] == "P0:" ? 0 : 1] = values;
-  }
-  if (!P[0] || !P[1]) throw std::runtime_error("file '" + path + "' needs a line 'P0:' and a line 'P1:' of 12 numbers");
-  sdvo::StereoCamera camera;
-  camera.fx = (*P[0])[0];
-  camera.fy = (*P[0])[5];
-  camera.cx = (*P[0])[2];
-  camera.cy = (*P[0])[6];
-  camera.baseline = -(*P[1])[3] / camera.fx;
+  sdvo::StereoCamera camera = sdvo::readKittiCalibration(path, sdvo::KittiCameras::kGrey);
   int consumed = 0;
   if (std::sscanf(size.c_str(), "%dx%d%n", &camera.width, &camera.height, &consumed) != 2 ||
       consumed != static_cast<int>(size.size()))
@@ -66,24 +51,6 @@ sdvo::StereoCamera readCalibration(const std::string& path, const std::string& s
   if (camera.width > 8192 || camera.height > 8192) throw std::invalid_argument("--size is limited to 8192x8192");
   camera.check();
   return camera;
-}
-
-std::string calibrationText(const sdvo::StereoCamera& camera) {
-  char text[1024];
-  std::string lines;
-  for (int side = 0; side < 2; ++side) {
-    std::snprintf(text, sizeof text, "P%d: %.12e 0 %.12e %.12e 0 %.12e %.12e 0 0 0 1 0\n", side, camera.fx, camera.cx,
-                  side == 0 ? 0.0 : -camera.fx * camera.baseline, camera.fy, camera.cy);
-    lines += text;
-  }
-  return lines;
-}
-
-void writeFile(const fs::path& path, const std::string& content) {
-  std::ofstream file(path, std::ios::binary);
-  file << content;
-  file.close();
-  if (!file) throw std::runtime_error("cannot write file '" + path.string() + "': is the disk full?");
 }
 
 /// NumPy's array format, version 1: rows x columns (x channels), little endian.
@@ -99,35 +66,17 @@ void writeArray(const fs::path& path, const cv::Mat& array) {
   content += static_cast<char>(header.size() >> 8);
   content += header;
   content.append(array.ptr<char>(), array.total() * array.elemSize());
-  writeFile(path, content);
-}
-
-std::string frameName(int number) {
-  char name[32];
-  std::snprintf(name, sizeof name, "%06d", number);
-  return name;
-}
-
-void writeImage(const fs::path& path, const cv::Mat& image) {
-  // OpenCV's own settings are its fastest, one filter and run lengths; naming a level makes it try all filters.
-  if (!cv::imwrite(path.string(), image))
-    throw std::runtime_error("cannot write image '" + path.string() + "': is the disk full?");
-}
-
-/// Creates the directories; whatever is in an existing one must not be mixed with the new drive.
-void prepareOutput(const fs::path& directory, bool truth) {
-  std::error_code error;
-  if (fs::exists(directory) && !(fs::is_directory(directory) && fs::is_empty(directory)))
-    throw std::runtime_error("--output '" + directory.string() +
-                             "' exists and is not empty: remove it or choose another");
-  for (const char* name : {"image_0", "image_1"}) fs::create_directories(directory / name, error);
-  if (truth) fs::create_directories(directory / "truth", error);
-  if (error) throw std::runtime_error("cannot create --output '" + directory.string() + "': " + error.message());
+  std::ofstream file(path, std::ios::binary);
+  file << content;
+  file.close();
+  if (!file) throw std::runtime_error("cannot write file '" + path.string() + "': is the disk full?");
 }
 
 /// Renders and writes the frames on several threads; each frame depends on its number alone.
-void renderFrames(const DriveRenderer& renderer, const std::vector<int>& frames, const Request& request) {
-  const fs::path output = request.output;
+void renderFrames(const DriveRenderer& renderer, const std::vector<int>& frames, const Request& request,
+                  const sdvo::KittiWriter& output) {
+  const fs::path truth_directory = fs::path(output.path()) / "truth";
+  if (!request.truth_frames.empty()) fs::create_directory(truth_directory);
   sdvo::Progress progress("rendering", static_cast<int>(frames.size()));
   std::mutex mutex;
   std::exception_ptr failure;
@@ -137,16 +86,16 @@ void renderFrames(const DriveRenderer& renderer, const std::vector<int>& frames,
       DriveRenderer::Worker worker = renderer.makeWorker();
       for (std::size_t i = next++; i < frames.size(); i = next++) {
         const sdvo::render::StereoPair pair = renderer.render(frames[i], worker);
-        const std::string name = frameName(static_cast<int>(i));
-        writeImage(output / "image_0" / (name + ".png"), pair.left);
-        writeImage(output / "image_1" / (name + ".png"), pair.right);
+        output.writeImage(0, static_cast<int>(i), pair.left);
+        output.writeImage(1, static_cast<int>(i), pair.right);
         const auto& wanted = request.truth_frames;
         if (std::find(wanted.begin(), wanted.end(), static_cast<int>(i)) != wanted.end()) {
           const sdvo::render::Truth truth = renderer.truth(frames[i], worker);
-          writeArray(output / "truth" / (name + "_depth.npy"), truth.depth);
-          writeArray(output / "truth" / (name + "_disparity.npy"), truth.disparity);
-          writeArray(output / "truth" / (name + "_flow.npy"), truth.flow);
-          writeArray(output / "truth" / (name + "_moving.npy"), truth.moving);
+          const std::string frame = (truth_directory / sdvo::kittiFrameName(static_cast<int>(i))).string();
+          writeArray(frame + "_depth.npy", truth.depth);
+          writeArray(frame + "_disparity.npy", truth.disparity);
+          writeArray(frame + "_flow.npy", truth.flow);
+          writeArray(frame + "_moving.npy", truth.moving);
         }
         const std::lock_guard<std::mutex> lock(mutex);
         progress.step();
@@ -208,7 +157,7 @@ int renderDrive(Request request) {
   checkTruthFrames(count);
   const bool room = request.world == "room" || (request.world == "auto" && (euroc || request.trajectory == "hover"));
 
-  prepareOutput(request.output, !request.truth_frames.empty());
+  sdvo::KittiWriter output(request.output);
   cv::setNumThreads(1);  // the frames are the parallel work
   const auto begin = std::chrono::steady_clock::now();
   const DriveRenderer renderer(path, room ? DriveRenderer::Scenery::kRoom : DriveRenderer::Scenery::kStreet, camera,
@@ -218,26 +167,22 @@ int renderDrive(Request request) {
   std::fflush(stdout);
 
   std::vector<int> frames;
-  std::string times;
+  std::vector<std::int64_t> stamps;
   sdvo::Trajectory poses;
   const Eigen::Isometry3d T_first_world = path.pose(request.start).inverse();
   for (int i = 0; i < count; ++i) {
     const int frame = request.start + i;
     if (frame > request.start && renderer.isDropped(frame)) continue;
     frames.push_back(frame);
-    times += sdvo::formatSeconds(std::llround(1e9 * i / request.rate)) + "\n";
+    stamps.push_back(std::llround(1e9 * i / request.rate));
     poses.push_back(T_first_world * path.pose(frame));
   }
   checkTruthFrames(static_cast<int>(frames.size()));  // some may have been dropped
 
   const auto rendering = std::chrono::steady_clock::now();
   const double cpu = cpuSeconds();
-  renderFrames(renderer, frames, request);
-  // Last: a directory without them is recognised as incomplete.
-  const fs::path output = request.output;
-  writeFile(output / "calib.txt", calibrationText(camera));
-  writeFile(output / "times.txt", times);
-  sdvo::writeKittiPoses((output / "poses.txt").string(), poses);
+  renderFrames(renderer, frames, request, output);
+  output.finish(camera, stamps, poses);
   const auto pairs = static_cast<double>(frames.size());
   std::printf("%zu pairs of %dx%d px, %.1f pairs/s, %.2f CPU s per pair\n", frames.size(), camera.width, camera.height,
               pairs / std::max(1e-9, seconds(rendering)), (cpuSeconds() - cpu) / pairs);

@@ -11,6 +11,7 @@
 #include "../experiments/matching_experiment.hpp"
 #include "../experiments/plot_script.hpp"
 #include "../experiments/robustness_experiment.hpp"
+#include "named_choice.hpp"
 #include "run_tool.hpp"
 
 namespace {
@@ -47,16 +48,9 @@ void addSequences(CLI::App& app, Arguments& arguments) {
 CLI::App* addMatching(CLI::App& app, Arguments& arguments) {
   CLI::App* command = app.add_subcommand("matching", "A: correct matches of scale normalised and standard descriptors");
   addSequences(*command, arguments);
-  command->add_option("--reference", arguments.setup.reference, "motion taken for true: ground_truth or odometry")
-      ->capture_default_str()
-      ->check(CLI::IsMember({"ground_truth", "odometry"}));
-  command->add_option("--descriptors", arguments.matching.descriptors, "base descriptors, separated by commas")
-      ->capture_default_str()
-      ->delimiter(',');
-  command->add_option("--layouts", arguments.matching.layouts, "left, left+right")
-      ->capture_default_str()
-      ->delimiter(',')
-      ->check(CLI::IsMember({"left", "left+right"}));
+  sdvo::addChoice(*command, "--reference", arguments.setup.reference, "motion taken for true");
+  sdvo::addChoices(*command, "--descriptors", arguments.matching.descriptors, "base descriptors, separated by commas");
+  sdvo::addChoices(*command, "--layouts", arguments.matching.layouts, "views in a descriptor, separated by commas");
   command->add_option("--features", arguments.matching.feature_counts, "sizes of the feature sets")
       ->capture_default_str()
       ->delimiter(',')
@@ -92,10 +86,7 @@ CLI::App* addAccuracy(CLI::App& app, Arguments& arguments) {
       ->capture_default_str()
       ->check(CLI::Range(10, 10000));
   command->add_option("--seeds", arguments.accuracy.seeds, "runs")->capture_default_str()->check(CLI::Range(1, 1000));
-  command->add_option("--methods", arguments.accuracy.methods, "outlier rejection, separated by commas")
-      ->capture_default_str()
-      ->delimiter(',')
-      ->check(CLI::IsMember({"ransac", "msac", "lo_ransac", "gasac", "adaptive_gasac"}));
+  sdvo::addChoices(*command, "--methods", arguments.accuracy.methods, "outlier rejection, separated by commas");
   command->add_flag("--package-odometry", arguments.accuracy.package_odometry,
                     "also run the package's odometry, not only the paper's frame-to-frame model");
   return command;

@@ -25,18 +25,25 @@ struct Inner {
   }
 };
 
+enum class Colour { kRed, kGreen };
+
+const std::vector<std::string>& namesOf(Colour) {
+  static const std::vector<std::string> names = {"red", "green"};
+  return names;
+}
+
 struct Outer {
   Inner near_side;
   Inner far_side;
   bool on = true;
-  std::string colour = "red";
+  Colour colour = Colour::kRed;
   double height = 3.0;
 
   void describe(OptionList& list) {
     list.group("near_side", near_side);
     list.group("far_side", far_side);
     list.add("on", on, "whether");
-    list.add("colour", colour, {"red", "green"}, "which");
+    list.add("colour", colour, "which");
     list.add("height", height, {0.0, 10.0}, "m", "how high");
   }
 };
@@ -82,8 +89,9 @@ TEST(Options, OutOfRangeIsNamedWithPathValueAndRange) {
   for (const char* part : {"near_side/count", "11", "[1, 10]"}) EXPECT_TRUE(contains(count, part)) << count;
 
   outer = {};
-  outer.colour = "blue";
-  const std::string colour = errorOf([&] { checked(outer); });
+  std::vector<Option> options = listOptions(outer);
+  const std::string colour = errorOf([&] { setOption(options, "colour", "blue"); });
+  EXPECT_EQ(outer.colour, Colour::kRed);
   for (const char* part : {"colour", "blue", "red", "green"}) EXPECT_TRUE(contains(colour, part)) << colour;
 }
 
@@ -112,6 +120,43 @@ TEST(Options, CompositionsNameTheFullPath) {
   EXPECT_TRUE(contains(motion_error, "motion/confidence")) << motion_error;
 }
 
+/// What fields demand of each other is checked with the whole set, wherever the component stands in it.
+TEST(Options, CheckedLooksAtTheFieldsTogether) {
+  FeatureExtractorOptions options;
+  options.size_curve.min_size = 100.0;  // above max_size; each of them is in its range
+  const std::string error = errorOf([&] { checked(options); });
+  for (const char* part : {"size_curve/", "min_size", "max_size"}) EXPECT_TRUE(contains(error, part)) << error;
+  options.size_curve.max_size = 100.0;
+  EXPECT_NO_THROW(checked(options));
+
+  options.stereo.min_disparity = 20.0;
+  options.stereo.epipolar.max_disparity = 10.0;
+  EXPECT_TRUE(contains(errorOf([&] { checked(options); }), "stereo/min_disparity"));
+  options.stereo.method = StereoMethod::kLucasKanade;  // which has no largest one
+  EXPECT_NO_THROW(checked(options));
+}
+
+TEST(Options, EnumsAreTextOutsideAndKnowTheirNames) {
+  Outer outer;
+  std::vector<Option> options = listOptions(outer);
+  const Option& colour = options[5];
+  EXPECT_TRUE(colour.isText());
+  EXPECT_EQ(colour.choices, (std::vector<std::string>{"red", "green"}));
+  EXPECT_EQ(colour.text(), "red");
+  outer.colour = Colour::kGreen;
+  EXPECT_EQ(colour.text(), "green");
+  EXPECT_EQ(nameOf(Colour::kGreen), "green");
+  EXPECT_EQ(valueOf<Colour>("red"), Colour::kRed);
+  EXPECT_EQ(errorOf([] { valueOf<Colour>("blue"); }), "'blue' is none of: red, green");
+}
+
+/// Recorded hashes name configurations in the documents; a new way to hold an option must not change them.
+TEST(Options, HashOfTheTextIsTheSameForEver) {
+  EXPECT_EQ(hashOptions({}), "cbf29ce484222325");
+  Outer outer;
+  EXPECT_EQ(hashOptions(listOptions(outer)), "027afa27c9d5d09a");
+}
+
 TEST(Options, SetBySuffixOrFullPath) {
   Outer outer;
   std::vector<Option> options = listOptions(outer);
@@ -123,7 +168,7 @@ TEST(Options, SetBySuffixOrFullPath) {
   EXPECT_EQ(outer.far_side.count, 5);
   EXPECT_EQ(outer.height, 2.5);
   EXPECT_FALSE(outer.on);
-  EXPECT_EQ(outer.colour, "green");
+  EXPECT_EQ(outer.colour, Colour::kGreen);
 
   FeatureExtractorOptions extractor;
   std::vector<Option> real = listOptions(extractor);
@@ -194,7 +239,7 @@ TEST(Options, ClampMovesNumbersToTheNearestEnd) {
   for (Option& option : options) EXPECT_FALSE(option.clamp()) << option.name;
 }
 
-TEST(Options, HashIsEqualIfAndOnlyIfTheOptionsAre) {
+TEST(Options, HashTellsOptionsApart) {
   const auto hash = [](Outer outer) { return hashOptions(listOptions(outer)); };
   EXPECT_EQ(hash(Outer()), hash(Outer()));
   EXPECT_EQ(hash(Outer()).size(), 16u);
@@ -208,7 +253,7 @@ TEST(Options, HashIsEqualIfAndOnlyIfTheOptionsAre) {
   expectNew([](Outer& o) { o.near_side.count = 6; });
   expectNew([](Outer& o) { o.far_side.count = 6; });
   expectNew([](Outer& o) { o.on = false; });
-  expectNew([](Outer& o) { o.colour = "green"; });
+  expectNew([](Outer& o) { o.colour = Colour::kGreen; });
   expectNew([](Outer& o) { o.height = 3.0 + 1e-12; });
   expectNew([](Outer& o) { o.height = std::nextafter(3.0, 4.0); });
 }

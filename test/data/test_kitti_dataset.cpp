@@ -102,6 +102,7 @@ TEST_F(KittiDataset, BaselineOfTheColourPairIsADifference) {
   fs::remove_all(directory_ / "image_1");
   writeImages("image_2", 2, CV_8UC3);
   writeImages("image_3", 2, CV_8UC3);
+  writeText("times.txt", "0.0\n0.1\n");
   writeText("calib.txt", std::string(kGreyCalibration) +
                              "P2: 700 0 60 42 0 710 40 0.2 0 0 1 0.003\nP3: 700 0 60 -308 0 710 40 2 0 0 1 0.003\n");
   const KittiSequence sequence = open();
@@ -111,12 +112,11 @@ TEST_F(KittiDataset, BaselineOfTheColourPairIsADifference) {
 }
 
 TEST_F(KittiDataset, CamerasMayBeChosen) {
-  writeImages("image_2", 2, CV_8UC3);
-  writeImages("image_3", 2, CV_8UC3);
+  writeImages("image_2", 3, CV_8UC3);
+  writeImages("image_3", 3, CV_8UC3);
   writeText("calib.txt", std::string(kGreyCalibration) +
                              "P2: 600 0 60 42 0 710 40 0 0 0 1 0\nP3: 600 0 60 -308 0 710 40 0 0 0 1 0\n");
   EXPECT_EQ(open().size(), 3);
-  EXPECT_EQ(open(KittiCameras::kColour).size(), 2);
   EXPECT_DOUBLE_EQ(open(KittiCameras::kColour).camera().fx, 600.0);
   fs::remove_all(directory_ / "image_2");
   EXPECT_TRUE(contains(openError(KittiCameras::kColour), "no image_2"));
@@ -168,8 +168,11 @@ TEST_F(KittiDataset, StampsAreExactToTheNanosecond) {
   EXPECT_EQ(sequence.stamp(1), 1403636584763555585);
 }
 
-TEST_F(KittiDataset, MoreTimesThanImagesAreAnExtract) {
-  writeText("times.txt", "0.0\n0.1\n0.2\n0.3\n0.3\n");
+TEST_F(KittiDataset, MoreTimesThanImagesAreRefused) {
+  writeText("times.txt", "0.0\n0.1\n0.2\n0.3\n");
+  const std::string error = openError();
+  EXPECT_TRUE(contains(error, "'" + path("times.txt") + "' has more times than the 3 images")) << error;
+  writeText("times.txt", "0.0\n0.1\n0.2\n\n  \n");
   EXPECT_EQ(open().size(), 3);
 }
 
@@ -190,6 +193,7 @@ TEST_F(KittiDataset, MissingLeftImageAndGapsAreNamed) {
   fs::remove(directory_ / "image_0" / "000002.png");
   EXPECT_TRUE(contains(openError(), path("image_0/000002.png") + "' is missing")) << openError();
   fs::remove(directory_ / "image_1" / "000002.png");
+  writeText("times.txt", "0.0\n0.1\n");
   EXPECT_EQ(open().size(), 2);
   fs::remove(directory_ / "image_0" / "000000.png");
   fs::remove(directory_ / "image_1" / "000000.png");

@@ -33,34 +33,26 @@ KeypointSet wall(double depth, int corners) {
   return set;
 }
 
-TEST(KeypointSet, ReachIsThatOfTheDescriptors) {
-  // Freak: 22 px at a size of 7 px; Brief: half a patch of 48 px and half a box of 9 px. Measured in steps of a pixel.
-  EXPECT_NEAR(measureReachPerSize("freak"), 22.0 / 7.0, 1.5 / 20.0);
-  EXPECT_NEAR(measureReachPerSize("brief"), 28.5 / 7.0, 1.5 / 20.0);
-  EXPECT_GE(measureReachPerSize("freak"), 22.0 / 7.0);
-}
-
 TEST(KeypointSet, ChosenKeyPointsFitBothViewsAtEverySize) {
   const KeypointSet set = wall(10.0, 3000);
   const std::vector<DepthScale> curves = {constantSize(7.0), constantSize(20.0)};
-  const double reach = measureReachPerSize("freak");
-  const std::vector<int> chosen = selectKeypoints(set, curves, reach, 50, 100000);
+  const std::vector<int> chosen = selectKeypoints(set, curves, Freak::reach, 50, 100000);
   ASSERT_GT(chosen.size(), 200u);
   ASSERT_LT(chosen.size(), 3000u);
   const double margin = 22.0 / 7.0 * 20.0, disparity = set.camera.disparity(10.0);
   std::size_t inside = 0;
   for (const StereoCorner& c : set.corners) {
     const cv::Point2f& p = c.corner.position;
-    inside += p.x - disparity >= margin + 1.5 && p.x <= 639.0 - margin - 1.5 && p.y >= margin + 1.5 &&
-              p.y <= 479.0 - margin - 1.75;
+    inside +=
+        p.x - disparity >= margin - 0.49 && p.x <= 639.49 - margin && p.y >= margin - 0.49 && p.y <= 479.24 - margin;
   }
   EXPECT_GE(chosen.size(), inside * 99 / 100);  // equal positions count once
   for (const int i : chosen) {
     const cv::Point2f& p = set.corners[static_cast<std::size_t>(i)].corner.position;
-    EXPECT_GE(p.x - disparity, margin - 1.0);
-    EXPECT_LE(p.x, 639.0 - margin + 1.0);
-    EXPECT_GE(p.y, margin - 1.0);
-    EXPECT_LE(p.y + 0.25, 479.0 - margin + 1.0);
+    EXPECT_GE(p.x - disparity, margin - 0.51);
+    EXPECT_LE(p.x, 639.51 - margin);
+    EXPECT_GE(p.y, margin - 0.51);
+    EXPECT_LE(p.y + 0.25, 479.51 - margin);
   }
   for (const DepthScale& curve : curves)
     EXPECT_EQ(describeKeypoints(set, chosen, curve, StereoDescriptor({})).count(), static_cast<int>(chosen.size()));
@@ -69,8 +61,8 @@ TEST(KeypointSet, ChosenKeyPointsFitBothViewsAtEverySize) {
 TEST(KeypointSet, SmallerSetsAreSubsetsOfLargerOnes) {
   const KeypointSet set = wall(10.0, 3000);
   const std::vector<DepthScale> curves = {constantSize(7.0)};
-  const std::vector<int> large = selectKeypoints(set, curves, 3.2, 50, 1000),
-                         small = selectKeypoints(set, curves, 3.2, 50, 310);
+  const std::vector<int> large = selectKeypoints(set, curves, Freak::reach, 50, 1000),
+                         small = selectKeypoints(set, curves, Freak::reach, 50, 310);
   EXPECT_EQ(large.size(), 1000u);
   EXPECT_EQ(small.size(), 310u);
   EXPECT_TRUE(std::includes(large.begin(), large.end(), small.begin(), small.end()));
@@ -78,17 +70,17 @@ TEST(KeypointSet, SmallerSetsAreSubsetsOfLargerOnes) {
 
 TEST(KeypointSet, RowsOfOneViewAreTheLeftHalves) {
   const KeypointSet set = wall(10.0, 400);
-  const std::vector<int> chosen = selectKeypoints(set, {constantSize(9.0)}, 3.3, 50, 120);
+  const std::vector<int> chosen = selectKeypoints(set, {constantSize(9.0)}, Freak::reach, 50, 120);
   DescriptorOptions left_view;
-  left_view.layout = "left";
+  left_view.layout = DescriptorLayout::kLeft;
   const StereoFeatures both = describeKeypoints(set, chosen, constantSize(9.0), StereoDescriptor({}));
   const StereoFeatures left = describeKeypoints(set, chosen, constantSize(9.0), StereoDescriptor(left_view));
   std::vector<int> rows;
   for (int i = 0; i < both.count(); i += 3) rows.push_back(i);
-  const StereoFeatures halves = selectRows(both, rows, "left");
+  const StereoFeatures halves = selectRows(both, rows, DescriptorLayout::kLeft);
   halves.check();
   ASSERT_EQ(halves.count(), static_cast<int>(rows.size()));
-  EXPECT_EQ(halves.layout, "left");
+  EXPECT_EQ(halves.layout, DescriptorLayout::kLeft);
   for (int k = 0; k < halves.count(); ++k) {
     EXPECT_TRUE(synthetic::equalMats(halves.descriptors.row(k), left.descriptors.row(3 * k)));
     EXPECT_EQ(halves.u[static_cast<std::size_t>(k)], left.u[static_cast<std::size_t>(3 * k)]);
@@ -103,14 +95,13 @@ TEST_P(FeatureSetSize, IsTheWantedOneWithinFivePercent) {
   if (!kitti) GTEST_SKIP() << "KITTI_DIR is not set: feature sets of a real image are not counted";
   const KittiSequence sequence(std::string(kitti) + "/sequences/06");
   FeatureDetectorOptions detector;
-  detector.type = GetParam();
+  detector.type = valueOf<DetectorType>(GetParam());
   detector.max_features = 12000;
   detector.fast_min_threshold = 3;
   detector.corner_quality = 0.0002;
   const KeypointSet set = findKeypoints(sequence, 10, detector, {});
-  const double reach = measureReachPerSize("freak");
   for (const int wanted : {310, 1350, 2320}) {
-    const auto chosen = selectKeypoints(set, {constantSize(7.0), constantSize(20.0)}, reach, 50, wanted);
+    const auto chosen = selectKeypoints(set, {constantSize(7.0), constantSize(20.0)}, Freak::reach, 50, wanted);
     EXPECT_NEAR(static_cast<double>(chosen.size()), wanted, 0.05 * wanted);
   }
 }

@@ -4,6 +4,7 @@
 
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
+#include "stereo_descriptor_vo/front_end/freak.hpp"
 
 namespace sdvo {
 namespace {
@@ -55,7 +56,7 @@ TEST(FeatureExtractor, MeasuresAPlaneAtKnownDepth) {
     EXPECT_EQ(features.stamp, 1234);
     EXPECT_EQ(features.camera, camera);
     EXPECT_EQ(features.descriptor, "freak");
-    EXPECT_EQ(features.layout, "left+right");
+    EXPECT_EQ(features.layout, DescriptorLayout::kLeftAndRight);
     EXPECT_EQ(features.descriptors.cols, 128);
     EXPECT_TRUE(features.report.status.empty()) << features.report.status;
     EXPECT_LE(features.report.detected, 400);
@@ -72,6 +73,58 @@ TEST(FeatureExtractor, MeasuresAPlaneAtKnownDepth) {
     // Windows at the borders see too little.
     EXPECT_GE(precise, features.count() * 95 / 100) << "depth " << depth;
   }
+}
+
+/// Each row is what FREAK says at the feature's own positions in both views: u - disparity and v + dv on the right.
+TEST(FeatureExtractor, DescribesTheRightViewWhereTheFeatureIs) {
+  const StereoCamera camera = synthetic::camera();
+  constexpr double kDisparity = 14.0;
+  const synthetic::Texture texture(33, 6.0, 96.0);
+  const cv::Size size(camera.width, camera.height);
+  const cv::Mat left = synthetic::render(size, [&](double u, double v) { return texture.at(u, v); });
+  for (const double dv : {-1.2, 1.2}) {
+    const cv::Mat right =
+        synthetic::render(size, [&](double u, double v) { return texture.at(u + kDisparity, v - dv); });
+    const StereoFeatures features = FeatureExtractor(fewFeatures()).extract(camera, left, right, 0);
+    ASSERT_GE(features.count(), 100);
+    const Freak left_view(left), right_view(right);
+    double apart = 0.0, mean_dv = 0.0;
+    for (int i = 0; i < features.count(); ++i) {
+      const std::size_t k = static_cast<std::size_t>(i);
+      cv::Mat expected(1, 2 * Freak::kBytes, CV_8U);
+      left_view.describe({features.u[k], features.v[k], features.size[k], -1.f}, expected.ptr());
+      right_view.describe(
+          {features.u[k] - features.disparity[k], features.v[k] + features.dv[k], features.size[k], -1.f},
+          expected.ptr() + Freak::kBytes);
+      EXPECT_TRUE(synthetic::equalMats(features.descriptors.row(i), expected)) << "feature " << i << ", dv " << dv;
+      apart += synthetic::differingBits(features.descriptors.row(i).colRange(0, Freak::kBytes),
+                                        features.descriptors.row(i).colRange(Freak::kBytes, 2 * Freak::kBytes));
+      mean_dv += features.dv[k];
+    }
+    EXPECT_NEAR(mean_dv / features.count(), dv, 0.03);
+    EXPECT_LT(apart / features.count(), 0.05) << "the halves do not show the same point";
+  }
+}
+
+TEST(FeatureExtractor, DetectsWhereTheSmallestDescriptorFits) {
+  // No corner nearer to the border than a descriptor of the least size reaches; those that are nearer than their own
+  // size reaches are detected but not described.
+  FeatureExtractorOptions options = fewFeatures();
+  options.size_curve.min_size = 10.0;
+  options.size_curve.max_size = 10.0;
+  const double reach = Freak::reach(10.0);
+  const StereoCamera camera = synthetic::camera();
+  const Pair pair = planeAt(10.0);  // disparity 20 px
+  const StereoFeatures features = FeatureExtractor(options).extract(camera, pair.left, pair.right, 0);
+  float top = 1e9f, nearest_right_view = 1e9f;
+  for (std::size_t k = 0; k < features.u.size(); ++k) {
+    top = std::min(top, features.v[k]);
+    nearest_right_view = std::min(nearest_right_view, features.u[k] - features.disparity[k]);
+  }
+  EXPECT_GE(top, reach - 0.5);
+  EXPECT_LT(top, reach + 10.0);
+  EXPECT_GE(nearest_right_view, reach - 0.5);
+  EXPECT_LT(nearest_right_view, reach + 10.0);
 }
 
 TEST(FeatureExtractor, MeasuresBrightnessAndSharpness) {

@@ -65,6 +65,28 @@ TEST(Freak, PatternFillsItsReachAndIsFinerTowardsTheCentre) {
   EXPECT_EQ(std::hypot(Freak::pattern().back().x, Freak::pattern().back().y), 0.0);
 }
 
+/// Rings of six from 2/3 of the reach down to 1/12, each second one turned by half a step (Alahi et al. 2012, section
+/// 4.1); a field's half side is half its ring's radius.
+TEST(Freak, PatternIsThePublishedRetina) {
+  const double unit = (2.0 / 3.0 - 1.0 / 12.0) / 21.0;
+  const double radius[] = {2.0 / 3.0,
+                           2.0 / 3.0 - 6 * unit,
+                           2.0 / 3.0 - 11 * unit,
+                           2.0 / 3.0 - 15 * unit,
+                           2.0 / 3.0 - 18 * unit,
+                           2.0 / 3.0 - 20 * unit,
+                           1.0 / 12.0};
+  for (std::size_t ring = 0; ring < 7; ++ring)
+    for (std::size_t k = 0; k < 6; ++k) {
+      const Freak::Field& field = Freak::pattern()[6 * ring + k];
+      const double degrees = 60.0 * static_cast<double>(k) + (ring % 2 == 1 ? 30.0 : 0.0);
+      EXPECT_NEAR(field.x, radius[ring] * std::cos(degrees * CV_PI / 180.0), 1e-12) << ring << ", " << k;
+      EXPECT_NEAR(field.y, radius[ring] * std::sin(degrees * CV_PI / 180.0), 1e-12) << ring << ", " << k;
+      EXPECT_NEAR(field.sigma, 0.5 * radius[ring], 1e-12) << ring << ", " << k;
+    }
+  EXPECT_NEAR(Freak::pattern().back().sigma, 0.5 * radius[6], 1e-12);
+}
+
 TEST(Freak, IntensitiesAreExactBoxMeans) {
   const cv::Mat image = randomImage({97, 91});
   const Freak freak(image);

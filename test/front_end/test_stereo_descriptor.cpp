@@ -16,7 +16,7 @@ cv::Mat view(unsigned seed) {
   return synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); });
 }
 
-DescriptorOptions withLayout(const std::string& layout, bool oriented = false) {
+DescriptorOptions withLayout(DescriptorLayout layout, bool oriented = false) {
   DescriptorOptions options;
   options.layout = layout;
   options.oriented = oriented;
@@ -34,9 +34,9 @@ const std::vector<int> kFitting = {0, 3, 5};
 TEST(StereoDescriptor, RowsStayAlignedWhenNeighbourhoodsLeaveAView) {
   const cv::Mat left = view(1), right = view(2);
   const std::vector<StereoKeypoint> keypoints = mixedKeypoints();
-  for (const std::string layout : {"left", "left+right"}) {
+  for (const DescriptorLayout layout : {DescriptorLayout::kLeft, DescriptorLayout::kLeftAndRight}) {
     const DescribedKeypoints described = StereoDescriptor(withLayout(layout)).describe(left, right, keypoints);
-    ASSERT_EQ(described.index, kFitting) << layout;
+    ASSERT_EQ(described.index, kFitting) << nameOf(layout);
     ASSERT_EQ(described.rows.rows, 3);
     ASSERT_EQ(described.angle, std::vector<float>(3, -1.f));
     for (int row = 0; row < described.rows.rows; ++row) {
@@ -44,7 +44,7 @@ TEST(StereoDescriptor, RowsStayAlignedWhenNeighbourhoodsLeaveAView) {
       const StereoKeypoint& keypoint =
           keypoints[static_cast<std::size_t>(described.index[static_cast<std::size_t>(row)])];
       const DescribedKeypoints alone = StereoDescriptor(withLayout(layout)).describe(left, right, {keypoint});
-      EXPECT_TRUE(synthetic::equalMats(described.rows.row(row), alone.rows)) << layout << " row " << row;
+      EXPECT_TRUE(synthetic::equalMats(described.rows.row(row), alone.rows)) << nameOf(layout) << " row " << row;
     }
   }
 }
@@ -52,7 +52,8 @@ TEST(StereoDescriptor, RowsStayAlignedWhenNeighbourhoodsLeaveAView) {
 TEST(StereoDescriptor, IsTheConcatenationOfBothViews) {
   const cv::Mat left = view(1), right = view(2);
   const std::vector<StereoKeypoint> keypoints = mixedKeypoints();
-  const DescribedKeypoints both = StereoDescriptor(withLayout("left+right")).describe(left, right, keypoints);
+  const DescribedKeypoints both =
+      StereoDescriptor(withLayout(DescriptorLayout::kLeftAndRight)).describe(left, right, keypoints);
   ASSERT_EQ(both.index, kFitting);
   ASSERT_EQ(both.rows.cols, 2 * Freak::kBytes);
   const Freak left_view(left), right_view(right);
@@ -63,7 +64,8 @@ TEST(StereoDescriptor, IsTheConcatenationOfBothViews) {
     right_view.describe({k.u_right, k.v_right, k.size, -1.f}, expected.ptr() + Freak::kBytes);
     EXPECT_TRUE(synthetic::equalMats(both.rows.row(row), expected)) << "row " << row;
   }
-  const DescribedKeypoints left_alone = StereoDescriptor(withLayout("left")).describe(left, right, keypoints);
+  const DescribedKeypoints left_alone =
+      StereoDescriptor(withLayout(DescriptorLayout::kLeft)).describe(left, right, keypoints);
   EXPECT_TRUE(synthetic::equalMats(both.rows.colRange(0, Freak::kBytes), left_alone.rows));
 }
 
@@ -81,11 +83,11 @@ TEST(StereoDescriptor, ExtendsTheBorder) {
                                                  {200.f, 21.f, 180.f, 21.f, 20.f},
                                                  {50.f, 90.f, 21.f, 90.f, 8.f}};
   for (const bool oriented : {false, true}) {
-    DescriptorOptions options = withLayout("left+right", oriented);
+    DescriptorOptions options = withLayout(DescriptorLayout::kLeftAndRight, oriented);
     options.extend_border = true;
     const DescribedKeypoints described = StereoDescriptor(options).describe(left, right, keypoints);
     ASSERT_EQ(described.index, (std::vector<int>{0, 1, 2}));
-    const StereoDescriptor plain(withLayout("left+right", oriented));
+    const StereoDescriptor plain(withLayout(DescriptorLayout::kLeftAndRight, oriented));
     for (int row = 0; row < described.rows.rows; ++row) {
       StereoKeypoint k = keypoints[static_cast<std::size_t>(row)];
       k.u_left += kMargin, k.v_left += kMargin, k.u_right += kMargin, k.v_right += kMargin;
@@ -102,7 +104,7 @@ TEST(StereoDescriptor, ExtendsTheBorder) {
 TEST(StereoDescriptor, HalvesOfEqualViewsAreEqual) {
   const cv::Mat image = view(1);
   for (const bool oriented : {false, true}) {
-    const DescribedKeypoints described = StereoDescriptor(withLayout("left+right", oriented))
+    const DescribedKeypoints described = StereoDescriptor(withLayout(DescriptorLayout::kLeftAndRight, oriented))
                                              .describe(image, image, {{100.3f, 90.7f, 100.3f, 90.7f, 8.5f}});
     ASSERT_EQ(described.rows.rows, 1);
     EXPECT_TRUE(synthetic::equalMats(described.rows.colRange(0, Freak::kBytes),
@@ -114,7 +116,7 @@ TEST(StereoDescriptor, OrientedHalvesTurnByTheLeftAngle) {
   const cv::Mat left = view(1), right = view(2);
   const std::vector<StereoKeypoint> keypoints = mixedKeypoints();
   const DescribedKeypoints described =
-      StereoDescriptor(withLayout("left+right", true)).describe(left, right, keypoints);
+      StereoDescriptor(withLayout(DescriptorLayout::kLeftAndRight, true)).describe(left, right, keypoints);
   ASSERT_EQ(described.index, kFitting);
   const Freak left_view(left), right_view(right);
   for (std::size_t row = 0; row < described.index.size(); ++row) {
@@ -132,21 +134,31 @@ TEST(StereoDescriptor, OrientedHalvesTurnByTheLeftAngle) {
 
 TEST(StereoDescriptor, TakesNoKeypoints) {
   const cv::Mat image = view(1);
-  const DescribedKeypoints none = StereoDescriptor(withLayout("left+right")).describe(image, image, {});
+  const DescribedKeypoints none =
+      StereoDescriptor(withLayout(DescriptorLayout::kLeftAndRight)).describe(image, image, {});
   EXPECT_TRUE(none.index.empty());
   EXPECT_TRUE(none.angle.empty());
   EXPECT_EQ(none.rows.rows, 0);
   const DescribedKeypoints outside =
-      StereoDescriptor(withLayout("left")).describe(image, image, {{1.f, 1.f, 1.f, 1.f, 7.f}});
+      StereoDescriptor(withLayout(DescriptorLayout::kLeft)).describe(image, image, {{1.f, 1.f, 1.f, 1.f, 7.f}});
   EXPECT_TRUE(outside.index.empty());
   EXPECT_EQ(outside.rows.rows, 0);
 }
 
 TEST(StereoDescriptor, RefusesUnknownNames) {
-  EXPECT_THROW(StereoDescriptor{withLayout("right")}, std::invalid_argument);
   DescriptorOptions options;
-  options.type = "unheard_of";
-  EXPECT_NE(synthetic::errorOf([&] { StereoDescriptor{options}; }).find("unheard_of"), std::string::npos);
+  std::vector<Option> list = listOptions(options);
+  EXPECT_THROW(setOption(list, "layout", "right"), std::invalid_argument);
+  EXPECT_NE(synthetic::errorOf([&] { setOption(list, "type", "unheard_of"); }).find("unheard_of"), std::string::npos);
+}
+
+TEST(StereoDescriptor, OptionsKnowWhatTheOpenCvAtHandLacks) {
+  for (const std::string& name : namesOf(DescriptorType{})) {
+    DescriptorOptions options;
+    options.type = valueOf<DescriptorType>(name);
+    const std::string lacks = synthetic::errorOf([&] { makeBaseDescriptor(options.type); });
+    EXPECT_EQ(synthetic::errorOf([&] { checked(options); }), lacks);
+  }
 }
 
 }  // namespace

@@ -154,7 +154,7 @@ TEST(FeatureMatcher, RefusesSetsThatCannotBeCompared) {
   StereoFeatures both = noFeatures(synthetic::camera(), 0, 128), left = noFeatures(synthetic::camera(), 0, 64);
   addFeature(both, 100, 100, 10, randomRow(random, 128));
   addFeature(left, 100, 100, 10, randomRow(random, 64));
-  left.layout = "left";
+  left.layout = DescriptorLayout::kLeft;
   EXPECT_THROW(FeatureMatcher({}).match(both, left, std::nullopt), std::invalid_argument);
   const std::string error = synthetic::errorOf([&] { FeatureMatcher({}).match(both, left, std::nullopt); });
   EXPECT_NE(error.find("left+right"), std::string::npos) << error;

@@ -45,7 +45,7 @@ Scene makeScene(int count, double outlier_share, double noise, unsigned seed) {
 
 Consensus search(const Scene& scene, const std::string& method, int seed = 1, int max_iterations = 500) {
   SampleConsensusOptions options;
-  options.consensus = method;
+  options.consensus = valueOf<ConsensusMethod>(method);
   options.seed = seed;
   options.max_iterations = max_iterations;
   return findConsensus(PoseProblem(scene.camera, scene.correspondences, options.inlier_threshold), options);
@@ -116,8 +116,9 @@ INSTANTIATE_TEST_SUITE_P(ByName, EveryMethod, testing::Values("ransac", "msac", 
 
 TEST(SampleConsensus, RefusesUnknownNames) {
   SampleConsensusOptions options;
-  options.consensus = "prosac";
-  EXPECT_NE(synthetic::errorOf([&] { checked(options); }).find("adaptive_gasac"), std::string::npos);
+  std::vector<Option> list = listOptions(options);
+  const std::string error = synthetic::errorOf([&] { setOption(list, "consensus", "prosac"); });
+  EXPECT_NE(error.find("adaptive_gasac"), std::string::npos) << error;
 }
 
 /// A minimal sample carries the noise of its three points; optimised over all of its inliers a pose gathers more of

@@ -345,7 +345,7 @@ TEST(VisualOdometry, StartsAgainFromTheLastPoseWithAnotherDescriptor) {
   const OdometryResult before = follow(odometry, 5);
   const auto leftPair = [&](int i) {
     StereoFeatures features = pairOf(i);
-    features.layout = "left";
+    features.layout = DescriptorLayout::kLeft;
     features.descriptors = features.descriptors.colRange(0, 64).clone();
     return features;
   };

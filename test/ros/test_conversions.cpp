@@ -35,7 +35,8 @@ bool contains(const std::string& text, const std::string& part) {
 // ---- StereoFeatures ------------------------------------------------------------------------------------------------
 
 /// Every field has a value of its own, so that a mix-up of two fields shows.
-StereoFeatures someFeatures(ElementType type = ElementType::kBits, const std::string& layout = "left+right") {
+StereoFeatures someFeatures(ElementType type = ElementType::kBits,
+                            DescriptorLayout layout = DescriptorLayout::kLeftAndRight) {
   constexpr int kCount = 5;
   StereoFeatures features;
   features.stamp = 1403636579763555584;
@@ -77,7 +78,8 @@ StereoFeatures someFeatures(ElementType type = ElementType::kBits, const std::st
   return features;
 }
 
-FeaturesMessage someMessage(ElementType type = ElementType::kBits, const std::string& layout = "left+right") {
+FeaturesMessage someMessage(ElementType type = ElementType::kBits,
+                            DescriptorLayout layout = DescriptorLayout::kLeftAndRight) {
   FeaturesMessage message = toMessage(someFeatures(type, layout), DepthScaleOptions());
   message.header.stamp.fromNSec(1403636579763555584u);
   message.header.frame_id = "left_optical";
@@ -113,8 +115,8 @@ void expectSame(const StereoFeatures& a, const StereoFeatures& b) {
 
 TEST(FeaturesMessageTest, RoundTripIsExactAlsoOverTheWire) {
   for (const ElementType type : {ElementType::kBits, ElementType::kUint8, ElementType::kFloat32})
-    for (const std::string layout : {"left", "left+right"}) {
-      SCOPED_TRACE(layout + " " + std::to_string(static_cast<int>(type)));
+    for (const DescriptorLayout layout : {DescriptorLayout::kLeft, DescriptorLayout::kLeftAndRight}) {
+      SCOPED_TRACE(nameOf(layout) + " " + std::to_string(static_cast<int>(type)));
       const FeaturesMessage sent = someMessage(type, layout);
       std::vector<std::uint8_t> buffer(ros::serialization::serializationLength(sent));
       ros::serialization::OStream out(buffer.data(), static_cast<std::uint32_t>(buffer.size()));
@@ -304,7 +306,7 @@ TEST(StereoFeaturesViewTest, FloatsAreReadInPlace) {
 }
 
 TEST(StereoFeaturesViewTest, OneViewHasNoRightHalf) {
-  const FeaturesMessage message = someMessage(ElementType::kBits, "left");
+  const FeaturesMessage message = someMessage(ElementType::kBits, DescriptorLayout::kLeft);
   const StereoFeaturesView view(message);
   EXPECT_FALSE(view.hasRightHalf());
   EXPECT_TRUE(view.rightDescriptors().empty());

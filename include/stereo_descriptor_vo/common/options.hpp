@@ -1,10 +1,13 @@
 #pragma once
 
-#include <initializer_list>
+#include <functional>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <variant>
 #include <vector>
+
+#include "stereo_descriptor_vo/common/named_enum.hpp"
 
 namespace sdvo {
 
@@ -14,12 +17,19 @@ struct Range {
   double max;
 };
 
+/// An enum by reference, read and written as its position among the option's choices.
+struct ChoiceReference {
+  void* value;
+  int (*get)(const void* value);
+  void (*set)(void* value, int choice);
+};
+
 /// One option of a component, by reference: what a parameter server, a command line or a manual needs to know of it.
 struct Option {
   std::string name;  ///< path such as "detector/max_features"
-  std::variant<bool*, int*, double*, std::string*> value;
+  std::variant<bool*, int*, double*, std::string*, ChoiceReference> value;
   Range range{0.0, 0.0};             ///< numbers only
-  std::vector<std::string> choices;  ///< strings only
+  std::vector<std::string> choices;  ///< names of an enum's values
   std::string unit;                  ///< "px", "s", … or empty for a pure number
   std::string meaning;
 
@@ -27,55 +37,94 @@ struct Option {
   std::string text() const;
   /// Parses and assigns; throws std::invalid_argument that names the option when the text is no such value.
   void set(const std::string& text);
-  /// Throws std::invalid_argument that names the option, its value and its range.
+  /// Throws std::invalid_argument that names the option, its value and its range. Text and enums have no range.
   void check() const;
+  /// Whether its value is given as text: a free one, or the name of an enum's value.
+  bool isText() const {
+    return std::holds_alternative<std::string*>(value) || std::holds_alternative<ChoiceReference>(value);
+  }
   /// Moves a number to the nearest end of its range; true when that changed it. Other types are left alone.
   bool clamp();
 };
 
 /// Collects the options of a struct and of the structs it is composed of. Every options struct has a member
-/// `void describe(OptionList&)` that adds its fields in order; defaults stay in the struct itself.
+/// `void describe(OptionList&)` that adds its fields in order; defaults stay in the struct itself. It may have a member
+/// `void check() const` for what its fields demand of each other, which throws std::invalid_argument.
 class OptionList {
  public:
   void add(const std::string& name, bool& value, const std::string& meaning);
   void add(const std::string& name, int& value, Range range, const std::string& unit, const std::string& meaning);
   void add(const std::string& name, double& value, Range range, const std::string& unit, const std::string& meaning);
-  void add(const std::string& name, std::string& value, std::vector<std::string> choices, const std::string& meaning);
+  void add(const std::string& name, std::string& value, const std::string& meaning);
+  /// An enum with names, see named_enum.hpp.
+  template <class Enum, class = decltype(namesOf(Enum{}))>
+  void add(const std::string& name, Enum& value, const std::string& meaning) {
+    const ChoiceReference reference{&value,
+                                    [](const void* v) { return static_cast<int>(*static_cast<const Enum*>(v)); },
+                                    [](void* v, int choice) { *static_cast<Enum*>(v) = static_cast<Enum>(choice); }};
+    options_.push_back({prefix_ + name, reference, {}, namesOf(value), "", meaning});
+  }
 
+  /// A component's fields under its name.
   template <class Options>
   void group(const std::string& name, Options& options) {
     const std::string outer = std::exchange(prefix_, prefix_ + name + "/");
-    options.describe(*this);
+    collect(options);
     prefix_ = outer;
   }
 
+  /// A component's fields as they are.
+  template <class Options>
+  void collect(Options& options) {
+    options.describe(*this);
+    if constexpr (HasCheck<Options>::value) checks_.push_back({prefix_, [&options] { options.check(); }});
+  }
+
   const std::vector<Option>& options() const { return options_; }
-  std::vector<Option>& options() { return options_; }
+
+  /// Throws std::invalid_argument at the first field outside its range and at the first component whose fields do not
+  /// go together; either is named with its path.
+  void check() const;
 
  private:
+  template <class Options, class = void>
+  struct HasCheck : std::false_type {};
+  template <class Options>
+  struct HasCheck<Options, std::void_t<decltype(std::declval<const Options&>().check())>> : std::true_type {};
+
+  struct ComponentCheck {
+    std::string prefix;
+    std::function<void()> check;
+  };
+
   std::string prefix_;
   std::vector<Option> options_;
+  std::vector<ComponentCheck> checks_;
 };
 
 /// The fields of `options`, which must outlive the result.
 template <class Options>
 std::vector<Option> listOptions(Options& options) {
   OptionList list;
-  options.describe(list);
+  list.collect(options);
   return list.options();
 }
 
-/// Throws std::invalid_argument at the first field outside its range; returns the options for use in initialisers.
+/// The whole set: throws std::invalid_argument as OptionList::check() does; returns the options for use in
+/// initialisers.
 template <class Options>
 Options checked(Options options) {
-  for (const Option& option : listOptions(options)) option.check();
+  OptionList list;
+  list.collect(options);
+  list.check();
   return options;
 }
 
 /// Sets the option whose path equals `name` or ends with "/" + name; throws std::invalid_argument when there is none.
 void setOption(std::vector<Option>& options, const std::string& name, const std::string& text);
 
-/// FNV-1a hash (16 hex digits) over all "name=value" lines: equal if and only if the effective options are equal.
+/// FNV-1a hash (16 hex digits) over all "name=value" lines. Equal options have equal hashes; different ones have
+/// different hashes but for a chance of 2^-64.
 std::string hashOptions(const std::vector<Option>& options);
 
 }  // namespace sdvo

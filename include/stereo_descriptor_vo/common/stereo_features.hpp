@@ -5,18 +5,16 @@
 #include <string>
 #include <vector>
 
+#include "stereo_descriptor_vo/common/descriptor_format.hpp"
 #include "stereo_descriptor_vo/common/patch_layout.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 
 namespace sdvo {
 
-/// What one row of the descriptor matrix is made of.
-enum class ElementType { kBits, kUint8, kFloat32 };
-
 /// Whether rows of descriptors can be compared: only those of the same kind can.
 struct DescriptorKind {
   std::string descriptor;  ///< base descriptor: "freak", …
-  std::string layout;      ///< "left" or "left+right" (row = left half, then right half)
+  DescriptorLayout layout = DescriptorLayout::kLeft;
   ElementType element_type = ElementType::kBits;
   int bytes = 0;  ///< of a row
 
@@ -50,8 +48,8 @@ struct StereoFeatures {
   std::int64_t stamp = 0;  ///< of the left image, ns
   StereoCamera camera;
 
-  std::string descriptor;  ///< base descriptor: "freak", …
-  std::string layout;      ///< "left" or "left+right" (row = left half, then right half)
+  std::string descriptor;  ///< base descriptor: "freak", …; a free name, for other extractors may send their own
+  DescriptorLayout layout = DescriptorLayout::kLeft;
   ElementType element_type = ElementType::kBits;
 
   std::vector<float> u, v;       ///< left position, px

@@ -26,6 +26,10 @@ enum class KittiCameras {
   kColour,  ///< image_2 and image_3, P2 and P3; converted to grey
 };
 
+/// The camera of a calib.txt, without the size of its images, which that does not tell; kAny means grey. Throws
+/// std::runtime_error that names the file when the two matrices are missing or belong to no rectified pair.
+StereoCamera readKittiCalibration(const std::string& path, KittiCameras cameras);
+
 /// One sequence in the layout of the KITTI odometry benchmark: a directory with image_0, image_1 (or image_2, image_3),
 /// calib.txt and times.txt. Every error is a std::runtime_error that names the file and what is wrong with it.
 ///

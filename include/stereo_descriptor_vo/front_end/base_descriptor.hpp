@@ -40,10 +40,15 @@ class BaseDescriptor {
   virtual int bytes() const = 0;
 };
 
-/// Names that makeBaseDescriptor() knows, also those that the OpenCV at hand lacks.
-const std::vector<std::string>& baseDescriptorNames();
+/// The base descriptors, also those that the OpenCV at hand lacks.
+enum class DescriptorType { kAkaze, kBrief, kBrisk, kFreak, kOrb, kSift, kSurf };
+
+inline const std::vector<std::string>& namesOf(DescriptorType) {
+  static const std::vector<std::string> names = {"akaze", "brief", "brisk", "freak", "orb", "sift", "surf"};
+  return names;
+}
 
 /// Throws std::invalid_argument when the OpenCV at hand lacks the descriptor, saying which build has it.
-std::unique_ptr<BaseDescriptor> makeBaseDescriptor(const std::string& name);
+std::unique_ptr<BaseDescriptor> makeBaseDescriptor(DescriptorType type);
 
 }  // namespace sdvo

@@ -25,6 +25,8 @@ struct DepthScaleOptions {
     list.add("max_size", max_size, {2.0, 400.0}, "px", "largest key point diameter");
     list.add("constant_size", constant_size, {2.0, 200.0}, "px", "diameter without scale normalisation");
   }
+  /// Throws std::invalid_argument when min_size exceeds max_size.
+  void check() const;
 };
 
 class DepthScale {

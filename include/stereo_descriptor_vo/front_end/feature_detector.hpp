@@ -8,8 +8,15 @@
 
 namespace sdvo {
 
+enum class DetectorType { kFast, kAgast, kGftt, kHarris, kOrb, kSift };
+
+inline const std::vector<std::string>& namesOf(DetectorType) {
+  static const std::vector<std::string> names = {"fast", "agast", "gftt", "harris", "orb", "sift"};
+  return names;
+}
+
 struct FeatureDetectorOptions {
-  std::string type = "fast";
+  DetectorType type = DetectorType::kFast;
   int max_features = 1100;
   int bucket_size = 50;
   int fast_min_threshold = 12;
@@ -19,7 +26,7 @@ struct FeatureDetectorOptions {
   int subpixel_radius = 3;
 
   void describe(OptionList& list) {
-    list.add("type", type, {"fast", "agast", "gftt", "harris", "orb", "sift"}, "corner detector");
+    list.add("type", type, "corner detector");
     list.add("max_features", max_features, {1, 20000}, "", "corners kept per left image");
     list.add("bucket_size", bucket_size, {8, 4096}, "px", "side of the square buckets that share the corners evenly");
     list.add("fast_min_threshold", fast_min_threshold, {1, 100}, "grey levels",
@@ -29,6 +36,8 @@ struct FeatureDetectorOptions {
     list.add("subpixel", subpixel, "refine corners to sub-pixel positions");
     list.add("subpixel_radius", subpixel_radius, {1, 15}, "px", "half side of the sub-pixel window");
   }
+  /// Throws std::invalid_argument when the OpenCV at hand lacks the detector.
+  void check() const;
 };
 
 /// A corner in the left image.

@@ -12,12 +12,14 @@
 namespace sdvo {
 
 struct DescriptorOptions {
-  std::string type = "freak";
-  std::string layout = "left+right";
+  DescriptorType type = DescriptorType::kFreak;
+  DescriptorLayout layout = DescriptorLayout::kLeftAndRight;
   bool oriented = false;
   bool extend_border = false;
 
   void describe(OptionList& list);
+  /// Throws std::invalid_argument when the OpenCV at hand lacks the base descriptor.
+  void check() const;
 };
 
 /// A key point seen in both views, as the stereo descriptor needs it.

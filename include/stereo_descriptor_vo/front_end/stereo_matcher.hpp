@@ -10,8 +10,16 @@
 
 namespace sdvo {
 
+/// How left positions are found in the right image: a block search along the row, or pyramidal Lucas-Kanade tracking.
+enum class StereoMethod { kEpipolar, kLucasKanade };
+
+inline const std::vector<std::string>& namesOf(StereoMethod) {
+  static const std::vector<std::string> names = {"epipolar", "lk"};
+  return names;
+}
+
 struct StereoMatcherOptions {
-  std::string method = "epipolar";
+  StereoMethod method = StereoMethod::kEpipolar;
   EpipolarMatcherOptions epipolar;
   int window_radius = 9;
   int pyramid_levels = 4;
@@ -20,7 +28,7 @@ struct StereoMatcherOptions {
   double min_disparity = 0.5;
 
   void describe(OptionList& list) {
-    list.add("method", method, {"epipolar", "lk"}, "block search along the row, or pyramidal Lucas-Kanade tracking");
+    list.add("method", method, "block search along the row, or pyramidal Lucas-Kanade tracking");
     list.group("epipolar", epipolar);
     list.add("window_radius", window_radius, {2, 30}, "px", "lk: half side of the window");
     list.add("pyramid_levels", pyramid_levels, {0, 8}, "",
@@ -31,6 +39,8 @@ struct StereoMatcherOptions {
              "largest difference of the rows in both views; KITTI's rectification really leaves up to 1.3");
     list.add("min_disparity", min_disparity, {0.01, 50.0}, "px", "smallest disparity of a point at finite depth");
   }
+  /// Throws std::invalid_argument when no disparity is left to look for.
+  void check() const;
 };
 
 /// Where a left corner was found in the right image.

@@ -9,13 +9,21 @@
 
 namespace sdvo {
 
+/// What residuals cost that are larger than noise.
+enum class RobustKernel { kCauchy, kHuber };
+
+inline const std::vector<std::string>& namesOf(RobustKernel) {
+  static const std::vector<std::string> names = {"cauchy", "huber"};
+  return names;
+}
+
 struct MotionRefinementOptions {
-  std::string kernel = "cauchy";
+  RobustKernel kernel = RobustKernel::kCauchy;
   double kernel_scale = 1.0;
   int refinement_iterations = 20;
 
   void describe(OptionList& list) {
-    list.add("kernel", kernel, {"cauchy", "huber"}, "robust kernel of the refinement");
+    list.add("kernel", kernel, "robust kernel of the refinement");
     list.add("kernel_scale", kernel_scale, {0.05, 20.0}, "px", "residual at which the kernel starts to bend");
     list.add("refinement_iterations", refinement_iterations, {1, 200}, "", "Levenberg-Marquardt steps at most");
   }

@@ -10,8 +10,15 @@
 
 namespace sdvo {
 
+enum class ConsensusMethod { kRansac, kMsac, kLoRansac, kGasac, kAdaptiveGasac };
+
+inline const std::vector<std::string>& namesOf(ConsensusMethod) {
+  static const std::vector<std::string> names = {"ransac", "msac", "lo_ransac", "gasac", "adaptive_gasac"};
+  return names;
+}
+
 struct SampleConsensusOptions {
-  std::string consensus = "msac";
+  ConsensusMethod consensus = ConsensusMethod::kMsac;
   double inlier_threshold = 3.0;
   double confidence = 0.999;
   int min_iterations = 30;
@@ -20,8 +27,7 @@ struct SampleConsensusOptions {
   GeneticConsensusOptions genetic;
 
   void describe(OptionList& list) {
-    list.add("consensus", consensus, {"ransac", "msac", "lo_ransac", "gasac", "adaptive_gasac"},
-             "outlier rejection; adaptive_gasac is the paper's");
+    list.add("consensus", consensus, "outlier rejection; adaptive_gasac is the paper's");
     list.add("inlier_threshold", inlier_threshold, {0.1, 20.0}, "px",
              "largest length of the stereo reprojection error (u_left, v_left, u_right) of an inlier");
     list.add("confidence", confidence, {0.5, 0.999999}, "", "probability that one sample without outliers is drawn");

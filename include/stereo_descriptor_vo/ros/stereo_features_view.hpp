@@ -8,6 +8,8 @@
 #include <stdexcept>
 #include <string>
 
+#include "stereo_descriptor_vo/common/descriptor_format.hpp"
+
 namespace sdvo {
 
 /// A StereoFeatures message, checked once and then read without a copy. For every node that subscribes to descriptors.
@@ -22,7 +24,7 @@ class StereoFeaturesView {
   }
 
   int count() const { return static_cast<int>(message_.u.size()); }
-  bool hasRightHalf() const { return message_.layout == "left+right"; }
+  bool hasRightHalf() const { return message_.layout == nameOf(DescriptorLayout::kLeftAndRight); }
 
   /// All rows, count() x elements: CV_8U, or CV_32F for element_type "float32".
   cv::Mat descriptors() const { return columns(0, rowElements()); }
@@ -42,7 +44,7 @@ class StereoFeaturesView {
     throw std::invalid_argument("StereoFeatures message refused: " + what);
   }
 
-  bool isFloat() const { return message_.element_type == "float32"; }
+  bool isFloat() const { return message_.element_type == nameOf(ElementType::kFloat32); }
   int rowElements() const { return static_cast<int>(message_.bytes_per_row / (isFloat() ? 4 : 1)); }
   int viewElements() const { return hasRightHalf() ? rowElements() / 2 : rowElements(); }
 
@@ -78,9 +80,8 @@ class StereoFeaturesView {
     require(message_.response.size(), "response");
     require(message_.sigma.size(), "sigma");
     require(message_.octave.size(), "octave");
-    if (message_.layout != "left" && message_.layout != "left+right")
-      refuse("unknown layout '" + message_.layout + "'");
-    if (message_.element_type != "bits" && message_.element_type != "uint8" && message_.element_type != "float32")
+    if (!indexOf(namesOf(DescriptorLayout{}), message_.layout)) refuse("unknown layout '" + message_.layout + "'");
+    if (!indexOf(namesOf(ElementType{}), message_.element_type))
       refuse("unknown element_type '" + message_.element_type + "'");
     constexpr std::uint32_t kLongestRow = 1u << 16;
     const std::uint32_t unit = (isFloat() ? 4u : 1u) * (hasRightHalf() ? 2u : 1u);

@@ -1,0 +1,200 @@
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <random>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/front_end/epipolar_matcher.hpp"
+
+namespace sdvo {
+namespace {
+
+const cv::Size kSize(320, 160);
+constexpr double kMaxDv = 2.5;  // px
+
+struct Pair {
+  cv::Mat left, right;
+};
+
+std::optional<cv::Point2f> find(const Pair& pair, const cv::Point2f& position,
+                                const EpipolarMatcherOptions& options = {}, double max_dv = kMaxDv) {
+  EpipolarMatcher::Images scratch;
+  return EpipolarMatcher(options, max_dv, pair.left, pair.right, scratch).find(position);
+}
+
+/// A smooth surface of disparity `d` everywhere, the right view `dv` lower.
+Pair smoothPair(double d, double dv) {
+  const synthetic::Texture texture(3, 6.0, 90.0);
+  return {synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); }),
+          synthetic::render(kSize, [&](double u, double v) { return texture.at(u + d, v - dv); })};
+}
+
+cv::Mat noise(unsigned seed) {
+  cv::Mat image(kSize, CV_8U);
+  cv::RNG(seed).fill(image, cv::RNG::UNIFORM, 0, 256);
+  return image;
+}
+
+/// The part of `image` that a shift by (-d, dv) carries into the picture; the rest comes from `elsewhere`.
+cv::Mat shifted(const cv::Mat& image, int d, int dv, const cv::Mat& elsewhere) {
+  cv::Mat result = elsewhere.clone();
+  for (int v = 0; v < kSize.height; ++v)
+    for (int u = 0; u < kSize.width; ++u)
+      if (u + d >= 0 && u + d < kSize.width && v - dv >= 0 && v - dv < kSize.height)
+        result.at<std::uint8_t>(v, u) = image.at<std::uint8_t>(v - dv, u + d);
+  return result;
+}
+
+TEST(EpipolarMatcher, MeasuresDisparityAndRowToAFewHundredths) {
+  for (const auto& [d, dv] : std::vector<std::pair<double, double>>{
+           {12.0, 0.0}, {12.0, -2.0}, {12.0, 2.0}, {7.3, -0.6}, {31.75, 1.4}, {1.2, 0.3}}) {
+    const Pair pair = smoothPair(d, dv);
+    for (const cv::Point2f& position :
+         {cv::Point2f(150.f, 80.f), cv::Point2f(201.3f, 61.6f), cv::Point2f(90.f, 99.5f)}) {
+      const auto found = find(pair, position);
+      ASSERT_TRUE(found) << position << ", disparity " << d << ", dv " << dv;
+      EXPECT_NEAR(found->x, d, 0.06) << position << ", dv " << dv;
+      EXPECT_NEAR(found->y, dv, 0.06) << position << ", disparity " << d;
+    }
+  }
+}
+
+/// Waves so short that an alignment from the wrong row ends at another one.
+TEST(EpipolarMatcher, LooksAtTheRowsAboveAndBelow) {
+  const synthetic::Texture texture(4, 6.0, 24.0);
+  const cv::Mat left = synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); });
+  for (const double dv : {-2.0, -1.0, 1.0, 2.0}) {
+    const Pair pair{left, synthetic::render(kSize, [&](double u, double v) { return texture.at(u + 14.0, v - dv); })};
+    int right = 0, tried = 0;
+    for (float u = 60.f; u < 280.f; u += 20.f, ++tried) {
+      const auto found = find(pair, {u, 80.f});
+      right += found && std::abs(found->x - 14.f) < 0.1f && std::abs(found->y - dv) < 0.1;
+    }
+    EXPECT_GE(right, tried * 8 / 10) << "dv " << dv;
+  }
+}
+
+TEST(EpipolarMatcher, FollowsASlantedSurface) {
+  // The disparity grows from row to row as the ground's does, and the right view is lower.
+  const synthetic::Texture texture(5, 8.0, 90.0);
+  for (const double slant : {0.3, -0.3}) {
+    const auto disparity = [=](double v) { return 30.0 + slant * (v - 80.0); };
+    constexpr double kDv = 1.3;
+    const Pair pair{
+        synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); }),
+        synthetic::render(kSize, [&](double u, double v) { return texture.at(u + disparity(v - kDv), v - kDv); })};
+    const auto found = find(pair, {160.f, 82.4f});
+    ASSERT_TRUE(found) << slant;
+    EXPECT_NEAR(found->x, disparity(82.4), 0.1) << slant;
+    EXPECT_NEAR(found->y, kDv, 0.1) << slant;
+  }
+}
+
+TEST(EpipolarMatcher, BrightnessAndContrastOfTheViewsMayDiffer) {
+  Pair pair = smoothPair(10.0, 0.0);
+  pair.right.convertTo(pair.right, CV_8U, 0.9, 20.0);
+  const auto found = find(pair, {150.f, 80.f});
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->x, 10.0, 0.1);
+}
+
+/// A strip that repeats itself.
+TEST(EpipolarMatcher, RefusesWhatLooksTheSameElsewhereOnTheRow) {
+  constexpr int kPeriod = 40;
+  cv::Mat left = noise(3);
+  for (int u = kPeriod; u < kSize.width; ++u) left.col(u - kPeriod).copyTo(left.col(u));
+  cv::Mat disturbed(kSize, CV_16S), right;
+  cv::RNG(4).fill(disturbed, cv::RNG::NORMAL, 0.0, 4.0);
+  cv::add(left, disturbed, right, cv::noArray(), CV_8U);
+  const Pair pair{left, right};  // disparities 0, 40, 80 … all fit
+  EXPECT_FALSE(find(pair, {200.f, 80.f}));
+  EpipolarMatcherOptions narrow;
+  narrow.max_disparity = 30.0;  // only one of them is looked at
+  const Pair moved{left, shifted(left, 6, 0, left)};
+  EXPECT_TRUE(find(moved, {200.f, 80.f}, narrow));
+}
+
+/// The block is the one around the position: two pixels further it would see what does not match.
+TEST(EpipolarMatcher, HalfResolutionBlocksAreCentredOnThePosition) {
+  constexpr int kDisparity = 20;
+  for (const cv::Point& position : {cv::Point(151, 81), cv::Point(150, 80), cv::Point(149, 79), cv::Point(152, 82)}) {
+    // Half-resolution pixel h covers 2 h and 2 h + 1; a block has 16 x 9 of them, 8 to the left of its centre.
+    const int x = 2 * (position.x / 2), y = 2 * (position.y / 2);
+    const cv::Rect block(x - 16, y - 8, 32, 18);
+    const cv::Mat left = noise(5);
+    cv::Mat right = noise(6);
+    left(block).copyTo(right(block - cv::Point(kDisparity, 0)));
+    EpipolarMatcherOptions strict;
+    strict.uniqueness = 0.1;  // a row and a column of noise in the block are 0.17 of what noise everywhere is
+    const auto found = find({left, right}, position, strict);
+    ASSERT_TRUE(found) << position;
+    EXPECT_NEAR(found->x, kDisparity, 0.05) << position;
+    EXPECT_NEAR(found->y, 0.0, 0.05) << position;
+  }
+}
+
+TEST(EpipolarMatcher, UniquenessIsARatioToTheBestBlockElsewhere) {
+  // The true block, damaged a little, against noise: their ratio is known.
+  constexpr int kDisparity = 20;
+  const cv::Mat left = noise(7);
+  cv::Mat right = shifted(left, kDisparity, 0, noise(8));
+  // Half of the block's rows is replaced.
+  noise(9).rowRange(80, 100).copyTo(right.rowRange(80, 100));
+  EpipolarMatcherOptions options;
+  options.min_correlation = 0.0;
+  options.uniqueness = 0.3;
+  EXPECT_FALSE(find({left, right}, {200.f, 80.f}, options));
+  options.uniqueness = 0.9;
+  EXPECT_TRUE(find({left, right}, {200.f, 70.f}, options));
+}
+
+TEST(EpipolarMatcher, RefusesDisparitiesBeyondTheLargest) {
+  const cv::Mat left = noise(11);
+  const Pair pair{left, shifted(left, 60, 0, noise(12))};
+  EpipolarMatcherOptions options;
+  options.max_disparity = 64.0;
+  EXPECT_TRUE(find(pair, {200.f, 80.f}, options));
+  options.max_disparity = 40.0;
+  EXPECT_FALSE(find(pair, {200.f, 80.f}, options));
+}
+
+TEST(EpipolarMatcher, RefusesPointsThatAreFurtherRightInTheRightView) {
+  const cv::Mat left = noise(13);
+  EXPECT_FALSE(find({left, shifted(left, -12, 0, noise(14))}, {150.f, 80.f}));
+  EXPECT_TRUE(find({left, shifted(left, 12, 0, noise(14))}, {150.f, 80.f}));
+}
+
+TEST(EpipolarMatcher, RefusesAnEdgeAlongTheRow) {
+  // Only the row is known there.
+  const cv::Mat edge = synthetic::render(kSize, [](double, double v) { return v < 80.0 ? 60.0 : 180.0; });
+  EXPECT_FALSE(find({edge, edge}, {150.f, 80.f}));
+}
+
+TEST(EpipolarMatcher, RefusesPatchesThatCorrelateLittle) {
+  const Pair clean = smoothPair(10.0, 0.0);
+  Pair noisy{clean.left, clean.right.clone()};
+  cv::Mat disturbed(kSize, CV_16S);
+  cv::RNG(15).fill(disturbed, cv::RNG::NORMAL, 0.0, 15.0);
+  cv::add(noisy.right, disturbed, noisy.right, cv::noArray(), CV_8U);
+  const auto count = [](const Pair& pair, double min_correlation) {
+    EpipolarMatcherOptions options;
+    options.min_correlation = min_correlation;
+    int found = 0;
+    for (float u = 60.f; u < 280.f; u += 20.f) found += find(pair, {u, 80.f}, options).has_value();
+    return found;
+  };
+  EXPECT_EQ(count(clean, 0.97), 11);
+  EXPECT_LE(count(noisy, 0.97), 1);
+  EXPECT_GE(count(noisy, 0.5), 9);
+}
+
+TEST(EpipolarMatcher, ScratchMayServeOneMatcherAfterAnother) {
+  EpipolarMatcher::Images scratch;
+  const Pair first = smoothPair(10.0, 0.0), second = smoothPair(20.5, 0.0);
+  const EpipolarMatcherOptions options;
+  EXPECT_NEAR(EpipolarMatcher(options, kMaxDv, first.left, first.right, scratch).find({150.f, 80.f})->x, 10.0, 0.06);
+  EXPECT_NEAR(EpipolarMatcher(options, kMaxDv, second.left, second.right, scratch).find({150.f, 80.f})->x, 20.5, 0.06);
+}
+
+}  // namespace
+}  // namespace sdvo
