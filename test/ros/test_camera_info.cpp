@@ -99,7 +99,10 @@ TEST(ToStereoCamera, RefusesWhatIsNoRectifiedPair) {
   EXPECT_TRUE(contains(refusal(left, unequal), "not rectified"));
   sensor_msgs::CameraInfo not_finite = right;
   not_finite.P[3] = kNaN;
-  refusal(left, not_finite);
+  EXPECT_TRUE(contains(refusal(left, not_finite), "right camera_info: P[3] is not a number"));
+  sensor_msgs::CameraInfo smaller = right;
+  smaller.width = 640;
+  EXPECT_TRUE(contains(refusal(left, smaller), "left 1200x360, right 640x360"));
 }
 
 }  // namespace

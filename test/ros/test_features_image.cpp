@@ -3,6 +3,7 @@
 #include <string>
 
 #include "../../src/ros/features_image.hpp"
+#include "../synthetic_scene.hpp"
 #include "message_samples.hpp"
 
 namespace sdvo::ros_conversions {
@@ -37,6 +38,22 @@ TEST(DrawFeatures, DrawsCirclesOfTheDepthDerivedSizeInBothViews) {
   EXPECT_FALSE(isColoured(200 + 16, 200));
   EXPECT_TRUE(isColoured(150 + 20, 370 + 200));
   EXPECT_FALSE(isColoured(200 + 20, 370 + 200));
+}
+
+TEST(DrawFeatures, LeavesOutFlowThatNoImageHolds) {
+  stereo_descriptor_vo::FeatureFlow flow;
+  flow.u_reference = {kNaN, 1e30f, 100.f};
+  flow.v_reference = {1.f, 1.f, 300.f};
+  flow.u = {1.f, 2.f, 140.f};
+  flow.v = {1.f, kInfinity, 300.f};
+  flow.inlier = {true, true, true};
+  const cv::Mat grey(370, 1226, CV_8UC1, cv::Scalar(90));
+  const FeaturesMessage none = toMessage(synthetic::noFeatures(someFeatures().camera), DepthScaleOptions());
+  const cv::Mat picture = drawFeatures(grey, grey, none, flow);
+  const cv::Rect line(98, 296, 46, 8);
+  EXPECT_GT(colouredPixels(picture(line)), 30);
+  picture(line).setTo(cv::Scalar::all(90));
+  EXPECT_EQ(colouredPixels(picture), 0);
 }
 
 TEST(DrawFeatures, SurvivesFlowOfUnequalLengths) {

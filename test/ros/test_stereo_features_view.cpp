@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 #include <sensor_msgs/point_cloud2_iterator.h>
 
+#include <algorithm>
 #include <cstring>
 #include <functional>
 #include <string>
@@ -8,6 +9,7 @@
 #include <vector>
 
 #include "message_samples.hpp"
+#include "stereo_descriptor_vo/front_end/feature_detector.hpp"
 #include "stereo_descriptor_vo/ros/stereo_features_view.hpp"
 
 namespace sdvo::ros_conversions {
@@ -81,6 +83,12 @@ std::vector<Damage> allDamages() {
   damages.push_back({"width 0", [](M& m) { m.image_width = 0; }, "image size"});
   damages.push_back({"height 0", [](M& m) { m.image_height = 0; }, "image size"});
   damages.push_back({"width huge", [](M& m) { m.image_width = 0xffffffffu; }, "image size"});
+  damages.push_back({"width large", [](M& m) { m.image_width = 65536; }, "image size"});
+  damages.push_back({"height large", [](M& m) { m.image_height = 65536; }, "image size"});
+  damages.push_back({"u beyond the image", [](M& m) { m.u[2] = 1e9f; }, "u or v"});
+  damages.push_back({"v before the image", [](M& m) { m.v[2] = -20.f; }, "u or v"});
+  damages.push_back({"disparity larger than the image", [](M& m) { m.disparity[2] = 1e9f; }, "disparity"});
+  damages.push_back({"size larger than the image", [](M& m) { m.size[2] = 1e9f; }, "size"});
   damages.push_back({"height huge", [](M& m) { m.image_height = 0xffffffffu; }, "image size"});
   return damages;
 }
@@ -101,6 +109,27 @@ TEST(StereoFeaturesViewTest, RefusesEveryMalformedMessage) {
     }
     EXPECT_THROW(fromMessage(message), std::invalid_argument) << damage.name;
   }
+}
+
+TEST(StereoFeaturesViewTest, AcceptsAsManyFeaturesAsTheDetectorMayGiveAndNoMore) {
+  const auto ofCount = [](std::size_t count) {
+    FeaturesMessage message = someMessage();
+    for (auto* array : {&message.u, &message.v, &message.disparity, &message.dv, &message.size, &message.angle,
+                        &message.response, &message.sigma})
+      array->assign(count, 1.f);
+    message.octave.assign(count, 0);
+    message.descriptors.assign(count * message.bytes_per_row, 0);
+    return message;
+  };
+  FeatureDetectorOptions options;
+  OptionList list;
+  options.describe(list);
+  const auto most = std::find_if(list.options().begin(), list.options().end(),
+                                 [](const Option& option) { return option.name == "max_features"; });
+  ASSERT_NE(most, list.options().end());
+  const auto count = static_cast<std::size_t>(most->range.max);
+  EXPECT_NO_THROW(StereoFeaturesView{ofCount(count)});
+  EXPECT_THROW(StereoFeaturesView{ofCount(count + 1)}, std::invalid_argument);
 }
 
 TEST(StereoFeaturesViewTest, HalvesAreThoseOfTheRowsWithoutACopy) {
