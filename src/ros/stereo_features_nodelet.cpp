@@ -52,8 +52,9 @@ bool agree(const StereoCamera& a, const StereoCamera& b) {
 class StereoFeaturesNodelet : public nodelet::Nodelet {
  public:
   ~StereoFeaturesNodelet() override {
-    callbacks_.stop();  // nothing may arrive any more …
-    worker_.reset();    // … when the worker goes
+    // Nothing may arrive any more, and nothing be in work, when members go.
+    callbacks_.stop();
+    if (worker_) worker_->stop();
   }
 
  private:

@@ -31,8 +31,9 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
  public:
   ~VisualOdometryNodelet() override {
     stopping_ = true;
-    callbacks_.stop();  // nothing may arrive any more …
-    worker_.reset();    // … when the worker goes
+    // Nothing may arrive any more, and nothing be in work, when members go.
+    callbacks_.stop();
+    if (worker_) worker_->stop();
   }
 
  private:
