@@ -10,13 +10,16 @@ namespace sdvo {
 struct StereoInputOptions {
   bool approximate_sync = false;
   double max_interval = 0.01;
-  int queue_size = 5;
+  int sync_queue_size = 20;
+  int queue_size = 1;
 
   void describe(OptionList& list) {
     list.add("approximate_sync", approximate_sync, "pair images whose stamps differ; false: equal stamps only");
     list.add("max_interval", max_interval, {1e-4, 1.0}, "s",
              "approximate_sync: largest difference of stamps in a pair");
-    list.add("queue_size", queue_size, {1, 1000}, "", "messages kept per input; the newest win");
+    list.add("sync_queue_size", sync_queue_size, {1, 1000}, "",
+             "messages kept per input until those that belong to them have come");
+    list.add("queue_size", queue_size, {1, 1000}, "", "pairs that wait while one is processed; the newest win");
   }
 };
 
@@ -27,8 +30,9 @@ struct OdometryOutputOptions {
   bool publish_tf = true;
   bool invert_tf = false;
   double tf_timeout = 2.0;
-  int queue_size = 10;
+  int queue_size = 1;
   int max_path_length = 20000;
+  double max_silence = 2.0;
 
   void describe(OptionList& list) {
     list.add("odom_frame_id", odom_frame_id, "world-fixed frame of the odometry");
@@ -37,8 +41,11 @@ struct OdometryOutputOptions {
     list.add("invert_tf", invert_tf, "publish base -> odom instead, where base already has a parent");
     list.add("tf_timeout", tf_timeout, {0.0, 60.0}, "s",
              "wall time to wait for the transform base <- camera at the start");
-    list.add("queue_size", queue_size, {1, 1000}, "", "feature messages kept; the newest win");
+    list.add("queue_size", queue_size, {1, 1000}, "",
+             "feature messages that wait while one is processed; the newest win");
     list.add("max_path_length", max_path_length, {1, 10000000}, "", "poses kept in the path; the newest win");
+    list.add("max_silence", max_silence, {0.1, 3600.0}, "s",
+             "/diagnostics report an error when no pair has come for longer (wall time)");
   }
 };
 

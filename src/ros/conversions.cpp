@@ -23,6 +23,8 @@ constexpr double kVarianceFloor = 1e-9;
 image_geometry::PinholeCameraModel toCameraModel(const sensor_msgs::CameraInfo& info, const char* side) {
   const std::string name = std::string(side) + " camera_info";
   if (info.width == 0 || info.height == 0) throw std::invalid_argument(name + " has no image size");
+  for (std::size_t i = 0; i < info.P.size(); ++i)
+    if (!std::isfinite(info.P[i])) throw std::invalid_argument(name + ": P[" + std::to_string(i) + "] is not a number");
   if (info.K[0] == 0.0 || info.P[0] == 0.0)
     throw std::invalid_argument(name + ": K or P is zero, the camera is not calibrated (REP-104)");
   image_geometry::PinholeCameraModel model;
@@ -39,6 +41,10 @@ std::string describeP(const sensor_msgs::CameraInfo& info) {
   text << "fx = " << info.P[0] << ", fy = " << info.P[5] << ", cx = " << info.P[2] << ", cy = " << info.P[6]
        << ", Tx = " << info.P[3];
   return text.str();
+}
+
+std::string describe(const cv::Size& size) {
+  return std::to_string(size.width) + "x" + std::to_string(size.height);
 }
 
 template <class Covariance>
@@ -58,6 +64,10 @@ std::string cleanFrameId(const std::string& frame_id) {
 StereoCamera toStereoCamera(const sensor_msgs::CameraInfo& left, const sensor_msgs::CameraInfo& right) {
   const image_geometry::PinholeCameraModel left_model = toCameraModel(left, "left");
   const image_geometry::PinholeCameraModel right_model = toCameraModel(right, "right");
+  const cv::Size size = left_model.reducedResolution(), right_size = right_model.reducedResolution();
+  if (size != right_size)
+    throw std::invalid_argument("left and right camera_info have different image sizes (left " + describe(size) +
+                                ", right " + describe(right_size) + ")");
   constexpr double kSame = 1e-3;  // px
   const auto differ = [](double a, double b) { return !(std::abs(a - b) <= kSame); };
   if (differ(left_model.fx(), right_model.fx()) || differ(left_model.fy(), right_model.fy()))
@@ -74,8 +84,8 @@ StereoCamera toStereoCamera(const sensor_msgs::CameraInfo& left, const sensor_ms
   camera.cy = left_model.cy();
   // The left P may have a Tx of its own (KITTI's colour pair), so that the baseline is a difference.
   camera.baseline = left_model.Tx() / left_model.fx() - right_model.Tx() / right_model.fx();
-  camera.width = left_model.reducedResolution().width;
-  camera.height = left_model.reducedResolution().height;
+  camera.width = size.width;
+  camera.height = size.height;
   if (!(camera.baseline > 0.0))
     throw std::invalid_argument("baseline = " + std::to_string(camera.baseline) + " m is not positive (left " +
                                 describeP(left) + "; right " + describeP(right) + "): are left and right swapped?");

@@ -59,7 +59,11 @@ cv::Mat drawFeatures(const cv::Mat& left, const cv::Mat& right, const stereo_des
   const std::size_t matches =
       std::min({flow.u.size(), flow.v.size(), flow.u_reference.size(), flow.v_reference.size(), flow.inlier.size()});
   std::size_t inliers = 0;
+  const auto drawable = [&](double u, double v) {
+    return u >= -left.cols && u <= 2 * left.cols && v >= -left.rows && v <= 2 * left.rows;
+  };
   for (std::size_t i = 0; i < matches; ++i) {
+    if (!drawable(flow.u_reference[i], flow.v_reference[i]) || !drawable(flow.u[i], flow.v[i])) continue;
     inliers += flow.inlier[i] ? 1 : 0;
     cv::line(left_colour, fixedPoint(flow.u_reference[i], flow.v_reference[i]), fixedPoint(flow.u[i], flow.v[i]),
              flow.inlier[i] ? kInlier : kOutlier, 1, cv::LINE_AA, kShift);

@@ -11,6 +11,7 @@
 #include <mutex>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "callback_thread.hpp"
 #include "conversions.hpp"
 #include "features_image.hpp"
 #include "image_subscriber.hpp"
@@ -20,6 +21,9 @@ namespace sdvo {
 
 /// Draws the features and their flow over the images, for people. Everything is subscribed only while somebody looks.
 class FeaturesImageNodelet : public nodelet::Nodelet {
+ public:
+  ~FeaturesImageNodelet() override { callbacks_.stop(); }
+
  private:
   using Image = sensor_msgs::Image;
   using Features = stereo_descriptor_vo::StereoFeatures;
@@ -42,24 +46,27 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
   };
 
   void onInit() override try {
+    nh_ = callbacks_.serve(getNodeHandle());
     transport_ = std::make_unique<StereoImageTransport>(getPrivateNodeHandle());
     const image_transport::SubscriberStatusCallback on_connect =
         [this](const image_transport::SingleSubscriberPublisher&) { updateInputs(); };
     const std::lock_guard<std::mutex> lock(connect_mutex_);
-    publisher_ =
-        image_transport::ImageTransport(getNodeHandle()).advertise("features_image", 1, on_connect, on_connect);
+    publisher_ = image_transport::ImageTransport(nh_).advertise("features_image", 1, on_connect, on_connect);
+    callbacks_.start();
   } catch (const std::exception& e) {
     NODELET_FATAL_STREAM("not started: " << e.what());
   }
 
-  void updateInputs() {
+  void updateInputs() try {
     const std::lock_guard<std::mutex> lock(connect_mutex_);
     if (publisher_.getNumSubscribers() == 0) {
       inputs_.reset();
     } else if (!inputs_) {
-      inputs_ = std::make_unique<Inputs>(getNodeHandle(), *transport_);
+      inputs_ = std::make_unique<Inputs>(nh_, *transport_);
       inputs_->sync.registerCallback(&FeaturesImageNodelet::draw, this);
     }
+  } catch (const std::exception& e) {
+    NODELET_ERROR_STREAM("cannot subscribe to what is to be drawn: " << e.what());
   }
 
   void draw(const sensor_msgs::ImageConstPtr& left, const sensor_msgs::ImageConstPtr& right,
@@ -72,6 +79,8 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
       NODELET_ERROR_STREAM("features_image at " << left->header.stamp << " skipped: " << e.what());
   }
 
+  CallbackThread callbacks_;
+  ros::NodeHandle nh_;
   ReportThrottle throttle_;
   std::unique_ptr<StereoImageTransport> transport_;
   image_transport::Publisher publisher_;

@@ -1,14 +1,16 @@
 #include "odometry_publisher.hpp"
 
 #include <boost/make_shared.hpp>
-#include <utility>
+
+#include "stamps.hpp"
 
 namespace sdvo {
 
 OdometryPublisher::OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOptions& options)
     : options_(options),
       frames_{ros_conversions::cleanFrameId(options.odom_frame_id),
-              ros_conversions::cleanFrameId(options.base_frame_id)} {
+              ros_conversions::cleanFrameId(options.base_frame_id)},
+      session_(ros::Time().fromNSec(ros::WallTime::now().toNSec())) {
   constexpr int kQueue = 10;
   odom_publisher_ = nh.advertise<nav_msgs::Odometry>("odom", kQueue);
   path_publisher_ = nh.advertise<nav_msgs::Path>("path", 1);
@@ -27,11 +29,13 @@ void OdometryPublisher::publish(const OdometryResult& result, const Eigen::Isome
   extendPath(*odometry);
 }
 
-void OdometryPublisher::publishInfo(stereo_descriptor_vo::VoInfo info, const ros::Time& stamp) {
+stereo_descriptor_vo::VoInfo OdometryPublisher::publishInfo(stereo_descriptor_vo::VoInfo info, const ros::Time& stamp) {
   info.header.stamp = stamp;
   info.header.frame_id = frames_.odom;
-  info.latency = static_cast<float>((ros::Time::now() - stamp).toSec());
-  info_publisher_.publish(boost::make_shared<stereo_descriptor_vo::VoInfo>(std::move(info)));
+  info.session = session_;
+  info.latency = static_cast<float>(secondsBetween(stamp, ros::Time::now()));
+  info_publisher_.publish(boost::make_shared<stereo_descriptor_vo::VoInfo>(info));
+  return info;
 }
 
 void OdometryPublisher::publishFlow(const OdometryResult& result, const StereoFeatures& features,
@@ -47,9 +51,11 @@ void OdometryPublisher::publishPoints(const stereo_descriptor_vo::StereoFeatures
     points_publisher_.publish(boost::make_shared<sensor_msgs::PointCloud2>(ros_conversions::toPointCloud(features)));
 }
 
+void OdometryPublisher::restartPath() {
+  path_.poses.clear();
+}
+
 void OdometryPublisher::extendPath(const nav_msgs::Odometry& odometry) {
-  // After a jump of the clock the trajectory begins anew.
-  if (odometry.header.stamp < path_.header.stamp) path_.poses.clear();
   path_.header = odometry.header;
   geometry_msgs::PoseStamped pose;
   pose.header = odometry.header;

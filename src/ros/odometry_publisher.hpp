@@ -16,15 +16,19 @@ class OdometryPublisher {
 
   /// Publishes what the result's state allows: without a pose neither odom nor TF.
   void publish(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera);
-  void publishInfo(stereo_descriptor_vo::VoInfo info, const ros::Time& stamp);
+  /// Fills in header, session and latency; returns what was published.
+  stereo_descriptor_vo::VoInfo publishInfo(stereo_descriptor_vo::VoInfo info, const ros::Time& stamp);
   void publishFlow(const OdometryResult& result, const StereoFeatures& features, const std_msgs::Header& header);
   void publishPoints(const stereo_descriptor_vo::StereoFeatures& features);
+  /// After a return to the origin: the path begins anew.
+  void restartPath();
 
  private:
   void extendPath(const nav_msgs::Odometry& odometry);
 
   OdometryOutputOptions options_;
   ros_conversions::OdometryFrames frames_;
+  const ros::Time session_;
   ros::Publisher odom_publisher_, path_publisher_, info_publisher_, points_publisher_, flow_publisher_;
   tf2_ros::TransformBroadcaster broadcaster_;
   nav_msgs::Path path_;

@@ -79,8 +79,8 @@ std::string editMethod(const Option& option) {
 }  // namespace
 
 ReconfigureServer::ReconfigureServer(ros::NodeHandle private_nh, std::vector<Option> options,
-                                     std::function<void()> on_change)
-    : nh_(std::move(private_nh)), options_(std::move(options)), on_change_(std::move(on_change)) {
+                                     std::function<void()> apply)
+    : nh_(std::move(private_nh)), options_(std::move(options)), apply_(std::move(apply)) {
   dynamic_reconfigure::ConfigDescription description;
   dynamic_reconfigure::Group group;
   group.name = "Default";
@@ -106,41 +106,46 @@ ReconfigureServer::ReconfigureServer(ros::NodeHandle private_nh, std::vector<Opt
 
 bool ReconfigureServer::onRequest(dynamic_reconfigure::Reconfigure::Request& request,
                                   dynamic_reconfigure::Reconfigure::Response& response) {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    for (const auto& parameter : request.config.bools) set(parameter.name, parameter.value ? "true" : "false");
-    for (const auto& parameter : request.config.ints) set(parameter.name, std::to_string(parameter.value));
-    for (const auto& parameter : request.config.strs) set(parameter.name, parameter.value);
-    for (const auto& parameter : request.config.doubles) {
-      std::ostringstream text;
-      text.precision(17);
-      text << parameter.value;
-      set(parameter.name, text.str());
-    }
-    response.config = currentConfig();
-    updates_.publish(response.config);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::vector<std::string> before = texts();
+  try {
+    assign(request.config);
+    if (texts() != before) apply_();
+  } catch (const std::exception& e) {
+    for (std::size_t i = 0; i < options_.size(); ++i) options_[i].set(before[i]);
+    ROS_WARN_STREAM(nh_.getNamespace() << ": nothing reconfigured: " << e.what());
   }
-  on_change_();
+  response.config = currentConfig();
+  updates_.publish(response.config);
   return true;
+}
+
+void ReconfigureServer::assign(const Config& request) {
+  for (const auto& parameter : request.bools) set(parameter.name, parameter.value ? "true" : "false");
+  for (const auto& parameter : request.ints) set(parameter.name, std::to_string(parameter.value));
+  for (const auto& parameter : request.strs) set(parameter.name, parameter.value);
+  for (const auto& parameter : request.doubles) {
+    std::ostringstream text;
+    text.precision(17);
+    text << parameter.value;
+    set(parameter.name, text.str());
+  }
 }
 
 void ReconfigureServer::set(const std::string& name, const std::string& text) {
   const auto option = std::find_if(options_.begin(), options_.end(), [&](const Option& o) { return o.name == name; });
-  if (option == options_.end()) {
-    ROS_WARN_STREAM(nh_.getNamespace() << ": there is no option '" << name << "' to reconfigure");
-    return;
-  }
-  const std::string before = option->text();
-  try {
-    option->set(text);
-    if (option->clamp())
-      ROS_WARN_STREAM(nh_.getNamespace() << "/" << name << " = " << text << " is out of range, " << option->text()
-                                         << " is used");
-    option->check();
-  } catch (const std::invalid_argument& e) {
-    option->set(before);
-    ROS_WARN_STREAM(nh_.getNamespace() << ": " << e.what() << "; " << before << " is kept");
-  }
+  if (option == options_.end()) throw std::invalid_argument("there is no option '" + name + "'");
+  option->set(text);
+  if (option->clamp())
+    ROS_WARN_STREAM(nh_.getNamespace() << "/" << name << " = " << text << " is out of range, " << option->text()
+                                       << " is used");
+  option->check();
+}
+
+std::vector<std::string> ReconfigureServer::texts() const {
+  std::vector<std::string> texts;
+  for (const Option& option : options_) texts.push_back(option.text());
+  return texts;
 }
 
 Config ReconfigureServer::currentConfig() const {

@@ -6,6 +6,7 @@
 
 #include <functional>
 #include <mutex>
+#include <string>
 #include <vector>
 
 #include "stereo_descriptor_vo/common/options.hpp"
@@ -16,19 +17,22 @@ namespace sdvo {
 /// meanings come from the options themselves; a .cfg file would state each of them a second time.
 class ReconfigureServer {
  public:
-  /// `options` refer to values that must outlive the server and that only the server writes. `on_change` runs in a ROS
-  /// callback after values have changed.
-  ReconfigureServer(ros::NodeHandle private_nh, std::vector<Option> options, std::function<void()> on_change);
+  /// `options` refer to values that must outlive the server and that only the server writes. `apply` runs in a ROS
+  /// callback, never twice at a time, after values have changed. A request is taken over as a whole or not at all: when
+  /// a name or a value is wrong, or `apply` throws, all values are as before and the response shows these.
+  ReconfigureServer(ros::NodeHandle private_nh, std::vector<Option> options, std::function<void()> apply);
 
  private:
   bool onRequest(dynamic_reconfigure::Reconfigure::Request& request,
                  dynamic_reconfigure::Reconfigure::Response& response);
+  void assign(const dynamic_reconfigure::Config& request);
   void set(const std::string& name, const std::string& text);
+  std::vector<std::string> texts() const;
   dynamic_reconfigure::Config currentConfig() const;
 
   ros::NodeHandle nh_;
   std::vector<Option> options_;
-  std::function<void()> on_change_;
+  std::function<void()> apply_;
   std::mutex mutex_;
   ros::Publisher descriptions_, updates_;
   ros::ServiceServer service_;

@@ -1,30 +1,60 @@
 #include <nodelet/nodelet.h>
 
+#include <atomic>
 #include <boost/make_shared.hpp>
+#include <cmath>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <pluginlib/class_list_macros.hpp>
 #include <stdexcept>
+#include <utility>
 
 #include "../config/nodelet_options.hpp"
+#include "callback_thread.hpp"
 #include "conversions.hpp"
 #include "params.hpp"
 #include "reconfigure_server.hpp"
 #include "report_throttle.hpp"
+#include "stamp_filter.hpp"
+#include "stamps.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 #include "stereo_input.hpp"
 #include "worker.hpp"
 
 namespace sdvo {
+namespace {
+
+/// Whether rows described with either options can be compared. What finds the features may differ.
+bool describeAlike(const FeatureExtractorOptions& a, const FeatureExtractorOptions& b) {
+  const auto texts = [](FeatureExtractorOptions options) {
+    OptionList list;
+    options.size_curve.describe(list);
+    options.descriptor.describe(list);
+    std::vector<std::string> values;
+    for (const Option& option : list.options()) values.push_back(option.text());
+    return values;
+  };
+  return texts(a) == texts(b);
+}
+
+/// Whether two calibrations are one but for rounding: some drivers compute P anew for each image.
+bool agree(const StereoCamera& a, const StereoCamera& b) {
+  constexpr double kPixels = 1e-3, kShare = 1e-5;
+  const auto near = [](double x, double y, double tolerance) { return std::abs(x - y) <= tolerance; };
+  return a.width == b.width && a.height == b.height && near(a.fx, b.fx, kPixels) && near(a.fy, b.fy, kPixels) &&
+         near(a.cx, b.cx, kPixels) && near(a.cy, b.cy, kPixels) && near(a.baseline, b.baseline, kShare * a.baseline);
+}
+
+}  // namespace
 
 /// Rectified stereo images in, depth-scaled stereo descriptors out. Images are subscribed only while somebody listens.
 class StereoFeaturesNodelet : public nodelet::Nodelet {
  public:
   ~StereoFeaturesNodelet() override {
-    const std::lock_guard<std::mutex> lock(connect_mutex_);
-    input_.reset();   // nothing may arrive any more …
-    worker_.reset();  // … when the worker goes
+    // Nothing may arrive any more, and nothing be in work, when members go.
+    callbacks_.stop();
+    if (worker_) worker_->stop();
   }
 
  private:
@@ -38,16 +68,19 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     }
   };
 
+  using PairFilter = StampFilter<StereoPairMessages>;
+
   void onInit() override try {
-    ros::NodeHandle& nh = getNodeHandle();
-    ros::NodeHandle& private_nh = getPrivateNodeHandle();
+    nh_ = callbacks_.serve(getNodeHandle());
+    ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
       NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect");
     transport_ = std::make_unique<StereoImageTransport>(private_nh);
     extractor_ = std::make_unique<FeatureExtractor>(options_.extractor);
-    worker_ = std::make_unique<Worker<StereoPairMessages>>(static_cast<std::size_t>(options_.input.queue_size),
-                                                           [this](const StereoPairMessages& pair) { process(pair); });
-    silence_timer_ = nh.createWallTimer(ros::WallDuration(kSilencePeriod), [this](const ros::WallTimerEvent&) {
+    worker_ =
+        std::make_unique<Worker<PairFilter::Passed>>(static_cast<std::size_t>(options_.input.queue_size),
+                                                     [this](const PairFilter::Passed& passed) { process(passed); });
+    silence_timer_ = nh_.createWallTimer(ros::WallDuration(kSilencePeriod), [this](const ros::WallTimerEvent&) {
       const std::lock_guard<std::mutex> lock(connect_mutex_);
       const std::string silence = input_ ? input_->explainSilence() : std::string();
       if (!silence.empty()) NODELET_WARN_STREAM(silence);
@@ -61,7 +94,8 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     const ros::SubscriberStatusCallback on_connect = [this](const ros::SingleSubscriberPublisher&) { updateInput(); };
     const std::lock_guard<std::mutex> lock(connect_mutex_);
     publisher_ =
-        nh.advertise<stereo_descriptor_vo::StereoFeatures>("stereo_features", kPublishQueue, on_connect, on_connect);
+        nh_.advertise<stereo_descriptor_vo::StereoFeatures>("stereo_features", kPublishQueue, on_connect, on_connect);
+    callbacks_.start();
   } catch (const std::exception& e) {
     NODELET_FATAL_STREAM("not started: " << e.what());
   }
@@ -71,40 +105,66 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     if (publisher_.getNumSubscribers() == 0) {
       input_.reset();
     } else if (!input_) {
-      input_ = std::make_unique<StereoInput>(getNodeHandle(), *transport_, options_.input,
-                                             [this](const StereoPairMessages& pair) { worker_->push(pair); });
+      input_ = std::make_unique<StereoInput>(
+          nh_, *transport_, options_.input, [this](const StereoPairMessages& pair) { onPair(pair); },
+          [this](const std::string& topic, const std::string& why) { onRefusal(topic, why); });
     }
   } catch (const std::exception& e) {
     NODELET_ERROR_STREAM("cannot subscribe to the images: " << e.what());
   }
 
-  /// In a ROS callback; the worker takes the new options over before its next pair.
+  void onRefusal(const std::string& topic, const std::string& why) {
+    if (topic == nh_.resolveName("left/image_rect")) ++refused_;
+    if (throttle_.allows(topic)) NODELET_ERROR_STREAM(topic << ": a message is not used: " << why);
+  }
+
+  void onPair(const StereoPairMessages& pair) {
+    const ros::Time stamp = pair.left_image->header.stamp;
+    const std::uint64_t dropped = filter_.dropped();
+    for (PairFilter::Passed& passed : filter_.add(pair, nanoseconds(stamp), nanoseconds(ros::Time::now())))
+      worker_->push(std::move(passed));
+    out_of_order_ = filter_.dropped();
+    if (filter_.dropped() > dropped && throttle_.allows("late"))
+      NODELET_WARN_STREAM("a pair near " << stamp << " is late, or its stamp leapt away for once: dropped ("
+                                         << filter_.dropped() << " so far)");
+  }
+
+  /// In a ROS callback; the worker takes the new extractor over before its next pair. Throws when the options do not go
+  /// together.
   void onReconfigure() {
+    auto extractor = std::make_unique<FeatureExtractor>(reconfigured_);
     const std::lock_guard<std::mutex> lock(pending_mutex_);
-    pending_ = reconfigured_;
+    pending_ = std::move(extractor);
   }
 
   void takeOverOptions() {
-    std::optional<FeatureExtractorOptions> pending;
+    std::unique_ptr<FeatureExtractor> pending;
     {
       const std::lock_guard<std::mutex> lock(pending_mutex_);
       pending.swap(pending_);
     }
     if (!pending) return;
-    extractor_ = std::make_unique<FeatureExtractor>(*pending);
+    const bool same_rows = describeAlike(extractor_->options(), pending->options());
+    extractor_ = std::move(pending);
+    if (same_rows) return;
     ++stream_epoch_;  // rows of another kind or size do not continue the old ones
-    NODELET_INFO("options reconfigured: a new stream begins");
+    NODELET_INFO("options reconfigured, descriptors are others: a new stream begins");
   }
 
   /// In the worker's thread.
-  void process(const StereoPairMessages& pair) try {
+  void process(const PairFilter::Passed& passed) try {
+    const StereoPairMessages& pair = passed.item;
     takeOverOptions();
     const ros::Time stamp = pair.left_image->header.stamp;
-    if (!followsLast(stamp)) return;
-    const StereoCamera camera = ros_conversions::toStereoCamera(*pair.left_info, *pair.right_info);
+    if (std::exchange(timeline_, passed.timeline) != passed.timeline) {
+      NODELET_WARN_STREAM("the clock jumped back to " << stamp << ": a new stream begins");
+      ++stream_epoch_;
+    }
+    const StereoCamera given = ros_conversions::toStereoCamera(*pair.left_info, *pair.right_info);
+    const StereoCamera camera = camera_ && agree(*camera_, given) ? *camera_ : given;
     const cv::Mat left = ros_conversions::toGrey(pair.left_image);
     const cv::Mat right = ros_conversions::toGrey(pair.right_image);
-    const StereoFeatures features = extractor_->extract(camera, left, right, static_cast<std::int64_t>(stamp.toNSec()));
+    const StereoFeatures features = extractor_->extract(camera, left, right, nanoseconds(stamp));
     // Only now: a calibration that does not fit the images was refused and is no new stream.
     updateCamera(camera);
 
@@ -113,60 +173,49 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     message->header.stamp = stamp;
     message->header.frame_id = ros_conversions::cleanFrameId(pair.left_image->header.frame_id);
     message->stream_epoch = stream_epoch_;
-    message->dropped_pairs = worker_->dropped() + late_pairs_;
+    message->dropped_pairs = worker_->dropped() + out_of_order_ + refused_;
     publisher_.publish(message);
   } catch (const std::exception& e) {
     if (throttle_.allows(e.what()))
-      NODELET_ERROR_STREAM("pair at " << pair.left_image->header.stamp << " of " << pair.left_image->header.frame_id
-                                      << " skipped: " << e.what());
-  }
-
-  /// False for a late pair, which is dropped and counted; a jump back of the clock starts a new stream.
-  bool followsLast(const ros::Time& stamp) {
-    if (last_stamp_ && stamp <= *last_stamp_) {
-      if (*last_stamp_ - stamp < ros::Duration(kClockJump)) {
-        ++late_pairs_;
-        if (throttle_.allows("late"))
-          NODELET_WARN_STREAM("pair at " << stamp << " is late, dropped (" << late_pairs_ << " so far)");
-        return false;
-      }
-      NODELET_WARN_STREAM("the clock jumped back from " << *last_stamp_ << " to " << stamp << ": a new stream begins");
-      ++stream_epoch_;
-    }
-    last_stamp_ = stamp;
-    return true;
+      NODELET_ERROR_STREAM("pair at " << passed.item.left_image->header.stamp << " of "
+                                      << passed.item.left_image->header.frame_id << " skipped: " << e.what());
   }
 
   void updateCamera(const StereoCamera& camera) {
     if (camera_ && *camera_ != camera) {
-      NODELET_WARN("camera_info changed: a new stream begins");
       ++stream_epoch_;
+      if (throttle_.allows("camera_info"))
+        NODELET_WARN_STREAM("camera_info changed: a new stream begins (" << stream_epoch_ << " so far)");
     }
     camera_ = camera;
   }
 
   static constexpr double kSilencePeriod = 10.0;  // s between explanations why nothing comes
-  static constexpr double kClockJump = 1.0;       // s; what is late by less was only overtaken
   static constexpr int kPublishQueue = 10;
 
+  CallbackThread callbacks_;
+  ros::NodeHandle nh_;
   Options options_;
   FeatureExtractorOptions reconfigured_;  // the server's
-  std::mutex pending_mutex_;
-  std::optional<FeatureExtractorOptions> pending_;
-  std::unique_ptr<ReconfigureServer> reconfigure_server_;
   ReportThrottle throttle_;
   ros::Publisher publisher_;
   ros::WallTimer silence_timer_;
 
+  std::mutex pending_mutex_;
+  std::unique_ptr<FeatureExtractor> pending_;
+  std::unique_ptr<ReconfigureServer> reconfigure_server_;
+
+  PairFilter filter_;  // only the callbacks' thread touches it
+  std::atomic<std::uint64_t> out_of_order_{0}, refused_{0};
+
   // Only the worker's thread touches these.
   std::unique_ptr<FeatureExtractor> extractor_;
   std::optional<StereoCamera> camera_;
-  std::optional<ros::Time> last_stamp_;
+  int timeline_ = 0;
   std::uint32_t stream_epoch_ = 0;
-  std::uint64_t late_pairs_ = 0;
 
   std::mutex connect_mutex_;
-  std::unique_ptr<Worker<StereoPairMessages>> worker_;
+  std::unique_ptr<Worker<PairFilter::Passed>> worker_;
   std::unique_ptr<StereoImageTransport> transport_;
   std::unique_ptr<StereoInput> input_;
 };

@@ -1,76 +1,78 @@
 #include "stereo_input.hpp"
 
-#include <cmath>
-#include <limits>
-#include <sstream>
+#include <algorithm>
+#include <array>
+#include <exception>
 #include <utility>
 
+#include "stamps.hpp"
+
 namespace sdvo {
+namespace {
+
+/// Messages that wait for this node's own thread, which handles each in no time: long enough that none is lost there.
+constexpr int kArrivalQueue = 20;
+
+std::array<std::string, ArrivalLog::kInputs> resolvedTopics(const ros::NodeHandle& nh) {
+  return {nh.resolveName("left/image_rect"), nh.resolveName("right/image_rect"), nh.resolveName("left/camera_info"),
+          nh.resolveName("right/camera_info")};
+}
+
+}  // namespace
 
 StereoInput::StereoInput(ros::NodeHandle& nh, StereoImageTransport& transport, const StereoInputOptions& options,
-                         Callback callback)
-    : callback_(std::move(callback)), smallest_gap_(std::numeric_limits<double>::infinity()) {
-  const std::string topics[kInputs] = {"left/image_rect", "right/image_rect", "left/camera_info", "right/camera_info"};
-  for (int input = 0; input < kInputs; ++input) arrivals_[input].topic = nh.resolveName(topics[input]);
+                         Callback callback, Refusal refuse)
+    : callback_(std::move(callback)), refuse_(std::move(refuse)), arrivals_(resolvedTopics(nh), options) {
+  const auto topics = resolvedTopics(nh);
+  connect(left_image_, left_image_gate_, ArrivalLog::kLeftImage, topics[0]);
+  connect(right_image_, right_image_gate_, ArrivalLog::kRightImage, topics[1]);
+  connect(left_info_, left_info_gate_, ArrivalLog::kLeftInfo, topics[2]);
+  connect(right_info_, right_info_gate_, ArrivalLog::kRightInfo, topics[3]);
 
-  left_image_.registerCallback<const sensor_msgs::ImageConstPtr&>(counter<sensor_msgs::ImageConstPtr>(0));
-  right_image_.registerCallback<const sensor_msgs::ImageConstPtr&>(counter<sensor_msgs::ImageConstPtr>(1));
-  left_info_.registerCallback<const sensor_msgs::CameraInfoConstPtr&>(counter<sensor_msgs::CameraInfoConstPtr>(2));
-  right_info_.registerCallback<const sensor_msgs::CameraInfoConstPtr&>(counter<sensor_msgs::CameraInfoConstPtr>(3));
-
-  const auto queue = static_cast<std::uint32_t>(options.queue_size);
+  const auto queue = static_cast<std::uint32_t>(options.sync_queue_size);
   if (options.approximate_sync) {
     ApproximatePolicy policy(queue);
     policy.setMaxIntervalDuration(ros::Duration(options.max_interval));
     approximate_ = std::make_unique<message_filters::Synchronizer<ApproximatePolicy>>(
-        static_cast<const ApproximatePolicy&>(policy), left_image_, right_image_, left_info_, right_info_);
+        static_cast<const ApproximatePolicy&>(policy), left_image_gate_, right_image_gate_, left_info_gate_,
+        right_info_gate_);
     approximate_->registerCallback(&StereoInput::onPair, this);
   } else {
-    exact_ = std::make_unique<message_filters::Synchronizer<ExactPolicy>>(ExactPolicy(queue), left_image_, right_image_,
-                                                                          left_info_, right_info_);
+    exact_ = std::make_unique<message_filters::Synchronizer<ExactPolicy>>(
+        ExactPolicy(queue), left_image_gate_, right_image_gate_, left_info_gate_, right_info_gate_);
     exact_->registerCallback(&StereoInput::onPair, this);
   }
 
-  left_image_.subscribe(nh, topics[0], queue, transport.left(), transport.hints());
-  right_image_.subscribe(nh, topics[1], queue, transport.right(), transport.hints());
-  left_info_.subscribe(nh, topics[2], queue);
-  right_info_.subscribe(nh, topics[3], queue);
+  const std::uint32_t arrivals = std::max<std::uint32_t>(queue, kArrivalQueue);
+  left_image_.subscribe(nh, topics[0], arrivals, transport.left(), transport.hints());
+  right_image_.subscribe(nh, topics[1], arrivals, transport.right(), transport.hints());
+  left_info_.subscribe(nh, topics[2], arrivals);
+  right_info_.subscribe(nh, topics[3], arrivals);
 }
 
-std::string StereoInput::explainSilence() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  std::ostringstream text;
-  if (pairs_ == 0) {
-    text << "no synchronised stereo pair; received:";
-    for (const Arrivals& arrivals : arrivals_) {
-      text << " " << arrivals.topic << " " << arrivals.count;
-      if (arrivals.count > 0 && arrivals.last_stamp.isZero()) text << " (stamp is zero)";
+template <class Source, class Message>
+void StereoInput::connect(Source& source, Gate<Message>& gate, ArrivalLog::Input input, const std::string& topic) {
+  using MessagePtr = boost::shared_ptr<const Message>;
+  const boost::function<void(const MessagePtr&)> pass = [this, &gate, input, topic](const MessagePtr& message) {
+    try {
+      const ros::Time& stamp = message->header.stamp;
+      arrivals_.note(input, stamp, ros::SteadyTime::now().toSec());
+      const std::string problem = whyUnusable(stamp);
+      if (problem.empty())
+        gate.signalMessage(message);
+      else
+        refuse_(topic, problem);
+    } catch (const std::exception& e) {
+      refuse_(topic, e.what());
     }
-    if (std::isfinite(smallest_gap_))
-      text << "; smallest gap between a left and a right image stamp " << smallest_gap_
-           << " s (set approximate_sync if the cameras are not triggered together)";
-  }
-  for (Arrivals& arrivals : arrivals_) arrivals.count = 0;
-  pairs_ = 0;
-  smallest_gap_ = std::numeric_limits<double>::infinity();
-  return text.str();
-}
-
-void StereoInput::onMessage(int input, const ros::Time& stamp) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  ++arrivals_[input].count;
-  arrivals_[input].last_stamp = stamp;
-  if (input < 2 && arrivals_[1 - input].count > 0)
-    smallest_gap_ = std::min(smallest_gap_, std::abs((stamp - arrivals_[1 - input].last_stamp).toSec()));
+  };
+  source.template registerCallback<const MessagePtr&>(pass);
 }
 
 void StereoInput::onPair(const sensor_msgs::ImageConstPtr& left_image, const sensor_msgs::ImageConstPtr& right_image,
                          const sensor_msgs::CameraInfoConstPtr& left_info,
                          const sensor_msgs::CameraInfoConstPtr& right_info) {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    ++pairs_;
-  }
+  arrivals_.notePair();
   callback_({left_image, right_image, left_info, right_info});
 }
 

@@ -10,10 +10,10 @@
 
 #include <functional>
 #include <memory>
-#include <mutex>
 #include <string>
 
 #include "../config/nodelet_options.hpp"
+#include "arrival_log.hpp"
 #include "image_subscriber.hpp"
 
 namespace sdvo {
@@ -25,18 +25,19 @@ struct StereoPairMessages {
 };
 
 /// The four synchronised inputs of stereo processing under their usual names: left|right/image_rect and camera_info.
-/// Subscribed from construction to destruction. Counts what arrives on each, to tell why no pair comes together.
+/// Subscribed from construction to destruction.
 class StereoInput {
  public:
   using Callback = std::function<void(const StereoPairMessages&)>;
+  /// Of a message that is not used, and why.
+  using Refusal = std::function<void(const std::string& topic, const std::string& why)>;
 
   /// `transport` must outlive the input.
   StereoInput(ros::NodeHandle& nh, StereoImageTransport& transport, const StereoInputOptions& options,
-              Callback callback);
+              Callback callback, Refusal refuse);
 
-  /// When no pair came together since the last call: what arrived on each topic and how far apart the stamps were.
-  /// Empty when pairs come.
-  std::string explainSilence();
+  /// See ArrivalLog.
+  std::string explainSilence() { return arrivals_.explainSilence(); }
 
  private:
   using Image = sensor_msgs::Image;
@@ -44,33 +45,29 @@ class StereoInput {
   using ExactPolicy = message_filters::sync_policies::ExactTime<Image, Image, Info, Info>;
   using ApproximatePolicy = message_filters::sync_policies::ApproximateTime<Image, Image, Info, Info>;
 
-  static constexpr int kInputs = 4;
+  /// Lets messages through that the synchroniser can take: it throws at some stamps.
+  template <class Message>
+  struct Gate : message_filters::SimpleFilter<Message> {
+    using message_filters::SimpleFilter<Message>::signalMessage;
+  };
 
-  void onMessage(int input, const ros::Time& stamp);
-
-  template <class MessagePtr>
-  boost::function<void(const MessagePtr&)> counter(int input) {
-    return [this, input](const MessagePtr& message) { onMessage(input, message->header.stamp); };
-  }
+  template <class Source, class Message>
+  void connect(Source& source, Gate<Message>& gate, ArrivalLog::Input input, const std::string& topic);
 
   void onPair(const sensor_msgs::ImageConstPtr& left_image, const sensor_msgs::ImageConstPtr& right_image,
               const sensor_msgs::CameraInfoConstPtr& left_info, const sensor_msgs::CameraInfoConstPtr& right_info);
 
   Callback callback_;
-  std::mutex mutex_;
-  struct Arrivals {
-    std::string topic;
-    int count = 0;
-    ros::Time last_stamp;
-  } arrivals_[kInputs];
-  int pairs_ = 0;
-  double smallest_gap_ = 0.0;  ///< s, between the newest left and right image
+  Refusal refuse_;
+  ArrivalLog arrivals_;
 
-  // Destroyed in reverse order: the synchronisers let go of the subscribers first.
-  ImageSubscriber left_image_, right_image_;
-  message_filters::Subscriber<Info> left_info_, right_info_;
+  // Destroyed in reverse order: first the subscribers, then the synchronisers, which let go of the gates.
+  Gate<Image> left_image_gate_, right_image_gate_;
+  Gate<Info> left_info_gate_, right_info_gate_;
   std::unique_ptr<message_filters::Synchronizer<ExactPolicy>> exact_;
   std::unique_ptr<message_filters::Synchronizer<ApproximatePolicy>> approximate_;
+  ImageSubscriber left_image_, right_image_;
+  message_filters::Subscriber<Info> left_info_, right_info_;
 };
 
 }  // namespace sdvo

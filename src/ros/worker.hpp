@@ -19,14 +19,7 @@ class Worker {
   Worker(std::size_t capacity, std::function<void(const Item&)> handle)
       : capacity_(capacity), handle_(std::move(handle)), thread_([this] { run(); }) {}
 
-  ~Worker() {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      stopping_ = true;
-    }
-    wake_.notify_one();
-    thread_.join();
-  }
+  ~Worker() { stop(); }
 
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
@@ -41,6 +34,17 @@ class Worker {
       queue_.push_back(std::move(item));
     }
     wake_.notify_one();
+  }
+
+  /// Waits for the item in work; those that wait are left. For an owner whose handler refers to this worker: the pointer
+  /// to it must stay until then.
+  void stop() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      stopping_ = true;
+    }
+    wake_.notify_one();
+    if (thread_.joinable()) thread_.join();
   }
 
   /// Items dropped since the start.

@@ -153,6 +153,11 @@ class SimulatedClock:
             self.now = stamp
         self.publish()
 
+    def jump_to(self, stamp):
+        """As when a bag is started again."""
+        self.now = stamp
+        self.publish()
+
 
 class Pipeline:
     """The two nodelets, launched as a user would."""
@@ -185,19 +190,22 @@ class Pipeline:
 
 
 class Rosout:
-    """Errors and fatal messages that nodes of a namespace log."""
+    """Warnings, and errors and fatal messages, that nodes of a namespace log."""
 
     def __init__(self, namespace):
         self.namespace = namespace
-        self.errors = []
+        self.errors, self.warnings = [], []
         self.subscriber = rospy.Subscriber('/rosout', Log, self.receive, queue_size=1000)
 
     def receive(self, log):
-        if log.level >= Log.ERROR and log.name.startswith(self.namespace + '/'):
-            self.errors.append(log.msg)
+        if log.name.startswith(self.namespace + '/') and log.level >= Log.WARN:
+            (self.errors if log.level >= Log.ERROR else self.warnings).append(log.msg)
 
     def said(self, *words):
         return any(all(word in error for word in words) for error in self.errors)
+
+    def warned(self, *words):
+        return any(all(word in warning for word in words) for warning in self.warnings)
 
     def close(self):
         self.subscriber.unregister()

@@ -5,6 +5,8 @@ waits for the answer to each pair, so that nothing depends on the machine's spee
 import copy
 import subprocess
 import sys
+import tempfile
+import threading
 import time
 import unittest
 
@@ -14,10 +16,13 @@ import roslib.packages
 import rospy
 import rostest
 import tf2_ros
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import TransformStamped
-from nav_msgs.msg import Odometry
+from nav_msgs.msg import Odometry, Path
+from nodelet.srv import NodeletLoad, NodeletUnload
 from sensor_msgs.msg import Image
 from std_srvs.srv import Empty
+from tf2_msgs.msg import TFMessage
 
 from kitti_replay import (FRAME, PACKAGE, Camera, Collector, Pipeline, Rosout, SimulatedClock, StereoSequence,
                           links, matrix_of, wait_until)
@@ -67,6 +72,7 @@ class Live(unittest.TestCase):
         self.odometry = self.keep(Collector(self.namespace + '/odom', Odometry))
         self.info = self.keep(Collector(self.namespace + '/vo_info', VoInfo))
         self.features = self.keep(Collector(self.namespace + '/stereo_features', StereoFeatures))
+        self.diagnostics = self.keep(Collector('/diagnostics', DiagnosticArray))
         self.rosout = self.keep(Rosout(self.namespace))
         self.camera = self.keep(Camera(self.namespace, self.sequence, self.clock))
         self.pipeline = self.keep(Pipeline(self.namespace, **arguments))
@@ -95,7 +101,7 @@ class Live(unittest.TestCase):
         info = self.info[answers]
         self.assertEqual(info.header.stamp, stamp)
         self.assertTrue(wait_until(lambda: any(m.header.stamp == stamp for m in self.features[features:])))
-        if info.state != 'LOST':
+        if info.state in ('TRACKING', 'DEGRADED'):
             self.assertTrue(wait_until(lambda: len(self.odometry) > poses))
         return info
 
@@ -107,6 +113,12 @@ class Live(unittest.TestCase):
                         (words, self.rosout.errors))
         time.sleep(0.2)
         self.assertEqual((len(self.features), len(self.odometry)), (features, odometry))
+
+    def diagnosis(self, task='odometry'):
+        """The newest status of a task of ours on /diagnostics."""
+        name = '%s/visual_odometry: %s' % (self.namespace, task)
+        found = [status for array in list(self.diagnostics) for status in array.status if status.name.endswith(name[1:])]
+        return found[-1] if found else DiagnosticStatus()
 
     def is_sent_to_pipeline(self, publisher):
         """Whether the messages of a publisher of ours reach the nodelets."""
@@ -138,7 +150,7 @@ class Live(unittest.TestCase):
             process.wait()
 
     def test_malformed_features(self):
-        self.start()
+        self.start(odometry_queue_size=100)
         publisher = rospy.Publisher(self.namespace + '/stereo_features', StereoFeatures, queue_size=100)
         for i in range(3):
             self.assertEqual(self.feed(i).state, 'TRACKING')
@@ -229,53 +241,291 @@ class Live(unittest.TestCase):
         self.assertTrue(wait_until(lambda: self.rosout.said("'%s'" % frame, "'base_link'")), self.rosout.errors)
         self.camera.publish(*self.camera.messages(1, frame=frame))
         self.assertTrue(wait_until(lambda: len(self.features) == 2))  # the image side needs no transform
-        time.sleep(SILENCE)
-        self.assertEqual((len(self.odometry), len(self.info)), (0, 0))
+        # Each pair is answered with what is missing, and so are the diagnostics.
+        self.assertTrue(wait_until(lambda: len(self.info) == 2))
+        for info in self.info:
+            self.assertEqual((info.state, info.epoch), ('WAITING', 0))
+            self.assertIn("'%s'" % frame, info.reason)
+            self.assertGreater(info.detected, 0)
+        self.assertTrue(wait_until(lambda: self.diagnosis().message.startswith('WAITING: no transform')),
+                        self.diagnosis().message)
+        self.assertEqual(len(self.odometry), 0)
         # Once it is there, and the listener has it, the odometry begins by itself.
         self.broadcaster.sendTransform([camera_transform(FRAME), camera_transform(frame)])
-        begin = next(i for i in range(2, PAIRS - 2) if self.is_answered(i, frame=frame))
+        begin = next(i for i in range(2, PAIRS - 2) if self.feed(i, frame=frame).state == 'TRACKING')
         for i in (begin + 1, begin + 2):
             self.assertEqual(self.feed(i, frame=frame).state, 'TRACKING')
-        self.assertEqual({info.state for info in self.info}, {'TRACKING'})
-        self.assertEqual(len(self.odometry), len(self.info))
+        self.assertEqual(len(self.odometry), 3)
         self.assert_alive()
 
-    def test_clock_jump_is_a_reset(self):
-        self.start()
-        first = [self.feed(i) for i in range(PAIRS)]
-        second = [self.feed(i) for i in range(PAIRS)]
+    def assert_same_drives(self, first, second):
+        """Both went the same way, the second one from the origin again."""
         self.assertEqual({info.epoch for info in first}, {first[0].epoch})
         self.assertEqual({info.epoch for info in second}, {first[0].epoch + 1})
         self.assertEqual(second[0].distance, 0.0)
         self.assertEqual(first[-1].distance, second[-1].distance)
+        self.assertEqual(second[-1].dropped_pairs, 0)
         self.assertEqual(len(self.odometry), 2 * PAIRS)
         for a, b in zip(self.odometry[:PAIRS], self.odometry[PAIRS:]):
             self.assertEqual(a.pose, b.pose)
             self.assertEqual(a.twist, b.twist)
 
+    def test_clock_jump_is_a_reset(self):
+        self.start()
+        path = self.keep(Collector(self.namespace + '/path', Path))
+        self.assertTrue(wait_until(lambda: self.pipeline.is_connected((path, ))))
+        first = [self.feed(i) for i in range(PAIRS)]
+        self.clock.jump_to(self.info[0].header.stamp)
+        time.sleep(SILENCE)  # nothing orders the clock and the images
+        second = [self.feed(i) for i in range(PAIRS)]
+        self.assert_same_drives(first, second)
+        self.assertTrue(wait_until(lambda: path[-1].header.stamp == second[-1].header.stamp))
+        self.assertEqual(len(path[-1].poses), PAIRS)
+
+    def test_lasting_jump_of_the_stamps_is_a_reset_and_loses_nothing(self):
+        self.start()
+        first = [self.feed(i) for i in range(PAIRS)]
+        # The clock goes on: the first pair after the jump waits for the next one to confirm it.
+        self.camera.publish(*self.camera.messages(0))
+        time.sleep(SILENCE)
+        self.assertEqual(len(self.info), PAIRS)
+        self.camera.publish(*self.camera.messages(1))
+        self.assertTrue(wait_until(lambda: len(self.info) == PAIRS + 2 and len(self.odometry) == PAIRS + 2))
+        for i in range(2, PAIRS):
+            self.feed(i)
+        self.assert_same_drives(first, self.info[PAIRS:])
+
+    def test_single_outliers_among_the_stamps_are_dropped_and_counted(self):
+        self.start()
+        outliers = (-300, 300, -9999.9, 20000)  # tenths of a second; the third is 10 ms after zero
+        for i, outlier in enumerate(outliers):
+            self.assertEqual(self.feed(i).state, 'TRACKING')
+            images, infos = self.camera.messages(i, time_of=i + outlier)
+            for publisher, message in zip(self.camera.infos + self.camera.images, infos + images):
+                publisher.publish(message)
+        zero, infos = self.camera.messages(len(outliers))
+        for publisher, message in zip(self.camera.infos + self.camera.images, infos + zero):
+            message.header.stamp = rospy.Time()
+            publisher.publish(message)
+        self.assertTrue(wait_until(lambda: self.rosout.said('left/image_rect', 'zero stamp')), self.rosout.errors)
+        for i in range(len(outliers), PAIRS):
+            info = self.feed(i)
+            self.assertEqual((info.state, info.epoch), ('TRACKING', self.info[0].epoch))
+        self.assertEqual((len(self.info), info.dropped_pairs), (PAIRS, len(outliers) + 1))
+
+    def try_extreme_stamps(self, first):
+        """Every subscriber of the pipeline gets them; pairs go on from `first`."""
+        features = rospy.Publisher(self.namespace + '/stereo_features', StereoFeatures, queue_size=100)
+        flow = rospy.Publisher(self.namespace + '/feature_flow', FeatureFlow, queue_size=100)
+        tf = rospy.Publisher('/tf', TFMessage, queue_size=100)
+        tf_static = self.broadcaster.pub_tf  # another one would replace what is latched
+        picture = self.keep(Collector(self.namespace + '/features_image', Image))
+        publishers = [features, flow, tf]
+        self.assertTrue(wait_until(lambda: all(self.is_sent_to_pipeline(p) for p in publishers) and
+                                   self.pipeline.is_connected((picture, ))))
+        info = self.feed(first)
+        good = copy.copy(self.features[-1])
+        for k, seconds in enumerate((0, 1, 2**31 - 1, 2**31, 2**32 - 1)):
+            stamp = rospy.Time(seconds, 999999999 if seconds else 0)
+            images, infos = self.camera.messages(first)
+            messages = [(p, m) for p, m in zip(self.camera.infos + self.camera.images, infos + images)]
+            messages += [(features, copy.copy(good)), (flow, FeatureFlow())]
+            for publisher, message in messages:
+                message.header = copy.deepcopy(message.header)
+                message.header.stamp = stamp
+                publisher.publish(message)
+            transform = camera_transform('camera_of_another_time')
+            transform.header.stamp = stamp
+            tf.publish(TFMessage([transform]))
+            tf_static.publish(TFMessage([transform]))
+            self.broadcaster.sendTransform(camera_transform(FRAME))  # latched again
+            time.sleep(0.2)
+            self.assert_alive()
+        for i in range(first + 1, first + 4):
+            self.assertTrue(wait_until(lambda: self.is_answered(i)), 'pair %d after %s' % (i, info.header.stamp))
+            self.assertEqual((self.info[-1].state, self.info[-1].epoch), ('TRACKING', info.epoch))
+        for publisher in publishers:
+            publisher.unregister()
+        self.assert_alive()
+
+    def test_extreme_stamps(self):
+        self.start()
+        self.try_extreme_stamps(0)
+
+    def test_extreme_stamps_with_approximate_sync(self):
+        self.start(approximate_sync='true', queue_size=100, odometry_queue_size=100)
+        for i in range(5):  # approximate: a pair comes out when later ones show that none fits better
+            self.camera.publish(*self.camera.messages(i))
+        self.assertTrue(wait_until(lambda: len(self.info) >= 3))
+        for seconds in (1, 2**31 - 1, 2**31, 2**32 - 1):
+            images, infos = self.camera.messages(5)
+            for publisher, message in zip(self.camera.infos + self.camera.images, infos + images):
+                message.header.stamp = rospy.Time(seconds, 999999999)
+                publisher.publish(message)
+            time.sleep(0.2)
+            self.assert_alive()
+
     def test_reset_service(self):
         self.start()
+        path = self.keep(Collector(self.namespace + '/path', Path))
+        self.assertTrue(wait_until(lambda: self.pipeline.is_connected((path, ))))
         before = [self.feed(i) for i in range(3)][-1]
         rospy.ServiceProxy(self.namespace + '/visual_odometry/reset', Empty)()
         after = self.feed(3)
         self.assertEqual((after.epoch, after.distance), (before.epoch + 1, 0.0))
         self.assertEqual(len(self.odometry), 4)
         np.testing.assert_allclose(matrix_of(self.odometry[3].pose.pose), np.eye(4), atol=1e-9)
+        self.assertTrue(wait_until(lambda: path[-1].header.stamp == after.header.stamp))
+        self.assertEqual(len(path[-1].poses), 1)  # no line from the last place to the origin
 
     def test_reconfiguring_takes_effect_and_is_clamped(self):
         self.start()
         before = self.feed(0)
         client = dynamic_reconfigure.client.Client(self.namespace + '/stereo_features', timeout=60)
+        self.closeables.append(client)
         answer = client.update_configuration({'detector/max_features': 200, 'stereo/min_disparity': 1000.0})
         self.assertEqual(answer['detector/max_features'], 200)
         self.assertEqual(answer['stereo/min_disparity'], 50.0)  # the end of its range
-        client.update_configuration({'stereo/min_disparity': 0.5, 'detector/type': 'no such detector'})
-        client.close()
+        client.update_configuration({'stereo/min_disparity': 0.5})
         after = self.feed(1)
         self.assertGreater(before.detected, 1000)
         self.assertEqual(after.detected, 200)
-        self.assertEqual(after.state, 'DEGRADED')  # other rows do not continue the old ones: seeded anew
-        self.assertEqual(self.feed(2).state, 'TRACKING')
+        # Fewer features are described as before: nothing begins anew.
+        self.assertEqual((after.state, after.epoch), ('TRACKING', before.epoch))
+        # Nor with the same value.
+        client.update_configuration({'size_curve/max_size': 20.0})
+        after = self.feed(2)
+        self.assertEqual((after.state, after.epoch), ('TRACKING', before.epoch))
+        # Rows of another size do not continue the old ones.
+        client.update_configuration({'size_curve/max_size': 25.0})
+        after = self.feed(3)
+        self.assertEqual((after.state, after.epoch), ('DEGRADED', before.epoch + 1))
+        self.assertEqual(self.feed(4).state, 'TRACKING')
+        self.assert_alive()
+
+    def test_reconfiguring_refuses_what_does_not_go_together(self):
+        self.start()
+        self.feed(0)
+        client = dynamic_reconfigure.client.Client(self.namespace + '/stereo_features', timeout=60)
+        self.closeables.append(client)
+        wrong = ({'size_curve/min_size': 100.0}, {'descriptor/type': 'surf'}, {'detector/type': 'no such detector'})
+        for i, request in enumerate(wrong):
+            answer = client.update_configuration(dict(request, **{'detector/max_features': 300}))
+            for name, value in request.items():
+                self.assertNotEqual(answer[name], value)
+            self.assertNotEqual(answer['detector/max_features'], 300)
+            self.assertTrue(wait_until(lambda: len(self.rosout.warnings) == i + 1), self.rosout.warnings)
+            self.assertIn('nothing reconfigured', self.rosout.warnings[i])
+            self.assertGreater(self.feed(i + 1).detected, 1000)
+        # What comes next and is right takes effect.
+        client.update_configuration({'detector/max_features': 200})
+        self.assertEqual(self.feed(4).detected, 200)
+        self.assertEqual(self.rosout.errors, [])
+
+    def test_rounding_of_the_calibration_is_no_new_one(self):
+        self.start()
+        for i in range(PAIRS - 1):
+            images, infos = self.camera.messages(i)
+            for info in infos:
+                p = list(info.P)
+                p[0] += 1e-9 * i
+                p[2] += 1e-9 * i
+                info.P = p
+            info = self.feed_messages(images, infos)
+            self.assertEqual((info.state, info.epoch), ('TRACKING', self.info[0].epoch))
+        self.assertEqual({features.stream_epoch for features in self.features}, {self.features[0].stream_epoch})
+        images, infos = self.camera.messages(PAIRS - 1)
+        for info in infos:
+            info.P = [1.01 * p if k < 8 else p for k, p in enumerate(info.P)]
+        self.assertEqual(self.feed_messages(images, infos).epoch, self.info[0].epoch + 1)
+
+    def test_diagnostics_tell_state_latency_and_silence(self):
+        config = tempfile.NamedTemporaryFile('w', suffix='.yaml')
+        self.addCleanup(config.close)
+        config.write('visual_odometry: {max_silence: 3.0}\n')
+        config.flush()
+        self.start(config=config.name)
+        self.assertTrue(wait_until(lambda: 'no features yet' in self.diagnosis().message), self.diagnosis())
+
+        def values():
+            return {value.key: value.value for value in self.diagnosis().values}
+        for i in range(5):
+            images, infos = self.camera.messages(i)
+            self.clock.advance_to(images[0].header.stamp + rospy.Duration(10))
+            time.sleep(0.1)
+            self.feed_messages(images, infos)
+        self.assertTrue(wait_until(lambda: self.diagnosis().message == 'TRACKING'), self.diagnosis())
+        self.assertEqual(self.diagnosis().level, DiagnosticStatus.OK)
+        self.assertGreater(float(values()['latency [s]']), 5.0)
+        self.assertTrue(wait_until(lambda: self.diagnosis('input rate').name != ''))
+        # The clock stands still as it does when a bag has ended.
+        self.assertTrue(wait_until(lambda: self.diagnosis().level == DiagnosticStatus.ERROR))
+        self.assertIn('no features for', self.diagnosis().message)
+        self.assertIn('TRACKING', self.diagnosis().message)
+        self.assertTrue(wait_until(lambda: self.diagnosis('input rate').level == DiagnosticStatus.ERROR))
+
+    def test_another_publisher_of_the_same_transform_is_named(self):
+        self.start()
+        self.feed(0)
+        tf = self.keep(tf2_ros.TransformBroadcaster())
+        tf.close = tf.pub_tf.unregister
+        transform = TransformStamped()
+        transform.header.frame_id, transform.child_frame_id = 'odom', 'base_link'
+        transform.header.stamp = self.info[0].header.stamp
+        transform.transform.rotation.w = 1.0
+
+        def is_named():
+            tf.sendTransform(transform)
+            return self.rosout.warned(rospy.get_name() + ' publishes odom -> base_link',
+                                      self.pipeline.manager + ' publishes odom -> base_link')
+        self.assertTrue(wait_until(is_named), self.rosout.warnings)
+
+    def test_overload_drops_whole_pairs_and_keeps_the_newest(self):
+        self.start()
+        last = PAIRS - 1
+        # All pairs at once, each of which takes its time.
+        for i in range(PAIRS):
+            self.camera.publish(*self.camera.messages(i))
+        stamp = self.camera.messages(last)[0][0].header.stamp
+        self.assertTrue(wait_until(lambda: len(self.info) > 0 and self.info[-1].header.stamp == stamp))
+        info = self.info[-1]
+        self.assertEqual(len(self.info) + info.dropped_pairs + info.dropped_features, PAIRS)
+        self.assertGreater(info.dropped_pairs, 0)
+
+    def test_queues_as_long_as_a_recording_keep_every_pair(self):
+        self.start(queue_size=100, odometry_queue_size=100)
+        for i in range(PAIRS):
+            self.camera.publish(*self.camera.messages(i))
+        self.assertTrue(wait_until(lambda: len(self.info) == PAIRS), len(self.info))
+
+    def test_loading_and_unloading_while_messages_come(self):
+        self.start()
+        load = rospy.ServiceProxy(self.pipeline.manager + '/load_nodelet', NodeletLoad)
+        unload = rospy.ServiceProxy(self.pipeline.manager + '/unload_nodelet', NodeletUnload)
+        nodelets = (('stereo_features', 'StereoFeatures'), ('visual_odometry', 'VisualOdometry'),
+                    ('features_image', 'FeaturesImage'))
+        self.keep(Collector(self.namespace + '/features_image', Image))
+        running = True
+
+        def publish():
+            i = 0
+            while running:
+                self.camera.publish(*self.camera.messages(i % PAIRS, time_of=i))
+                i += 1
+                time.sleep(0.03)
+        thread = threading.Thread(target=publish)
+        thread.start()
+        try:
+            for _ in range(8):
+                for name, type_name in nodelets:
+                    self.assertTrue(unload('%s/%s' % (self.namespace, name)).success)
+                    self.assertTrue(load('%s/%s' % (self.namespace, name), PACKAGE + '/' + type_name, [], [], [], '').success)
+                    self.assert_alive()
+        finally:
+            running = False
+            thread.join()
+        answers = len(self.info)
+        self.assertTrue(wait_until(lambda: self.is_answered(0, time_of=10000 + len(self.info))), answers)
         self.assert_alive()
 
     def test_features_image_is_drawn_while_someone_looks(self):

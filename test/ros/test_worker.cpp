@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <future>
+#include <memory>
 #include <mutex>
 #include <thread>
 #include <vector>
@@ -78,6 +79,24 @@ TEST(Worker, JoinsTheItemInWorkAndLeavesTheRest) {
   EXPECT_EQ(finished, 1);
   std::this_thread::sleep_for(150ms);
   EXPECT_EQ(finished, 1) << "the thread outlived its Worker";
+}
+
+TEST(Worker, TheHandlerCanAskItsWorkerToTheVeryEnd) {
+  std::promise<void> started;
+  std::unique_ptr<Worker<int>> worker;
+  std::atomic<bool> asked{false};
+  worker = std::make_unique<Worker<int>>(1, [&](const int&) {
+    started.set_value();
+    std::this_thread::sleep_for(50ms);  // stop() is called meanwhile
+    EXPECT_EQ(worker->dropped(), 0u);
+    asked = true;
+  });
+  worker->push(0);
+  started.get_future().wait();
+  worker->stop();
+  EXPECT_TRUE(asked);
+  worker->push(1);  // goes nowhere
+  worker->stop();
 }
 
 TEST(Worker, EndsWithoutEverHavingHadAnItem) {

@@ -60,7 +60,8 @@ class StereoFeaturesView {
     if (!positive(message_.fx) || !positive(message_.fy) || !positive(message_.baseline) ||
         !std::isfinite(message_.cx) || !std::isfinite(message_.cy))
       refuse("fx, fy and baseline must be positive, cx and cy finite");
-    constexpr std::uint32_t kLargestSide = 1u << 16;
+    // Whoever receives it makes tables of the image's size, and time grows with the number of features.
+    constexpr std::uint32_t kLargestSide = 1u << 14;
     if (message_.image_width == 0 || message_.image_height == 0 || message_.image_width > kLargestSide ||
         message_.image_height > kLargestSide)
       refuse("image size " + std::to_string(message_.image_width) + "x" + std::to_string(message_.image_height));
@@ -68,6 +69,9 @@ class StereoFeaturesView {
 
   void checkLengths() const {
     const std::size_t n = message_.u.size();
+    constexpr std::size_t kMostFeatures = 20000;
+    if (n > kMostFeatures)
+      refuse(std::to_string(n) + " features, more than " + std::to_string(kMostFeatures) + " are not accepted");
     const auto require = [n](std::size_t length, const char* name) {
       if (length != n)
         refuse(std::string(name) + " has " + std::to_string(length) + " elements, u has " + std::to_string(n));
@@ -104,6 +108,13 @@ class StereoFeaturesView {
       refuse("u, v, dv, angle or response holds a number that is not finite");
     if (!all(message_.disparity, positive) || !all(message_.size, positive) || !all(message_.sigma, positive))
       refuse("disparity, size or sigma holds a number that is not positive and finite");
+    // A position on the border of a pixel of the border is still in the image.
+    const auto within = [](float end) { return [end](float x) { return x >= -1.f && x <= end; }; };
+    const auto width = static_cast<float>(message_.image_width), height = static_cast<float>(message_.image_height);
+    if (!all(message_.u, within(width)) || !all(message_.v, within(height)))
+      refuse("u or v holds a position outside of the image");
+    if (!all(message_.disparity, within(width)) || !all(message_.size, within(width + height)))
+      refuse("disparity or size holds a number larger than the image");
   }
 
   const stereo_descriptor_vo::StereoFeatures& message_;

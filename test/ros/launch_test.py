@@ -1,0 +1,50 @@
+#!/usr/bin/python3
+"""What the launch files set on the parameter server, without starting anything."""
+
+import subprocess
+import sys
+import tempfile
+import unittest
+
+import rostest
+import yaml
+
+PACKAGE = 'stereo_descriptor_vo'
+# Under the nodelets' names; what an argument of the launch file can set.
+ARGUMENTS = {'odom_frame_id': 'visual_odometry/odom_frame_id', 'base_frame_id': 'visual_odometry/base_frame_id',
+             'publish_tf': 'visual_odometry/publish_tf', 'approximate_sync': 'stereo_features/approximate_sync',
+             'queue_size': 'stereo_features/queue_size', 'odometry_queue_size': 'visual_odometry/queue_size'}
+IN_YAML = {'odom_frame_id': 'world', 'base_frame_id': 'robot', 'publish_tf': False, 'approximate_sync': True,
+           'queue_size': 7, 'odometry_queue_size': 8}
+
+
+def parameters(**arguments):
+    """Of stereo_vo.launch, relative to its namespace."""
+    command = ['roslaunch', '--dump-params', PACKAGE, 'stereo_vo.launch'] + ['%s:=%s' % item for item in arguments.items()]
+    dump = yaml.safe_load(subprocess.run(command, check=True, stdout=subprocess.PIPE).stdout) or {}
+    return {name[len('/stereo/'):]: value for name, value in dump.items() if name.startswith('/stereo/')}
+
+
+class Launch(unittest.TestCase):
+    def test_without_arguments_nothing_is_set(self):
+        self.assertEqual({name: value for name, value in parameters().items() if value != {}}, {})
+
+    def test_arguments_left_alone_leave_the_yaml_file_alone(self):
+        with tempfile.NamedTemporaryFile('w', suffix='.yaml') as config:
+            nested = {'stereo_features': {}, 'visual_odometry': {}}
+            for name, path in ARGUMENTS.items():
+                nodelet, option = path.split('/')
+                nested[nodelet][option] = IN_YAML[name]
+            yaml.safe_dump(nested, config)
+            config.flush()
+            found = parameters(config=config.name)
+            self.assertEqual({name: found.get(path) for name, path in ARGUMENTS.items()}, IN_YAML)
+            # What is given wins, with its type.
+            found = parameters(config=config.name, publish_tf='true', queue_size='30', odom_frame_id='odom_2')
+            self.assertEqual([found[ARGUMENTS[name]] for name in ('publish_tf', 'queue_size', 'odom_frame_id')],
+                             [True, 30, 'odom_2'])
+            self.assertEqual(found[ARGUMENTS['base_frame_id']], 'robot')
+
+
+if __name__ == '__main__':
+    rostest.unitrun(PACKAGE, 'launch', Launch, sys.argv)

@@ -1,0 +1,187 @@
+#include <gtest/gtest.h>
+#include <ros/ros.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "../../src/ros/odometry_publisher.hpp"
+#include "message_samples.hpp"
+
+namespace sdvo {
+namespace {
+
+using ros_conversions::trackedResult;
+
+/// Keeps what comes on a topic.
+template <class Message>
+class Inbox {
+ public:
+  Inbox(ros::NodeHandle& nh, const std::string& topic)
+      : subscriber_(nh.subscribe<Message>(
+            topic, 100, [this](const boost::shared_ptr<const Message>& message) { messages.push_back(*message); })) {}
+
+  bool isConnected() const { return subscriber_.getNumPublishers() > 0; }
+
+  std::vector<Message> messages;
+
+ private:
+  ros::Subscriber subscriber_;
+};
+
+class OdometryPublisherTest : public ::testing::Test {
+ protected:
+  /// All that was published before has come when this returns.
+  static bool spinUntil(const std::function<bool()>& condition) {
+    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(10.0);
+    while (!condition() && ros::WallTime::now() < end) {
+      ros::spinOnce();
+      ros::WallDuration(0.001).sleep();
+    }
+    return condition();
+  }
+
+  void start(const OdometryOutputOptions& options) {
+    publisher_ = std::make_unique<OdometryPublisher>(nh_, options);
+    odom_ = std::make_unique<Inbox<nav_msgs::Odometry>>(nh_, "odom");
+    path_ = std::make_unique<Inbox<nav_msgs::Path>>(nh_, "path");
+    info_ = std::make_unique<Inbox<stereo_descriptor_vo::VoInfo>>(nh_, "vo_info");
+    tf_ = std::make_unique<Inbox<tf2_msgs::TFMessage>>(nh_, "/tf");
+    ASSERT_TRUE(spinUntil([&] {
+      return odom_->isConnected() && path_->isConnected() && info_->isConnected() &&
+             (tf_->isConnected() || !options.publish_tf);
+    }));
+  }
+
+  /// A result `step` m ahead of the origin, stamped as many tenths of a second later.
+  static OdometryResult resultAt(int step) {
+    OdometryResult result = trackedResult();
+    result.stamp += step * 100000000;
+    result.T_origin_camera.translation().z() = step;
+    return result;
+  }
+
+  /// Publishes and waits for the information of this pair, which is the last to come.
+  void publish(const OdometryResult& result) {
+    const std::size_t odom = odom_->messages.size(), info = info_->messages.size();
+    publisher_->publish(result, T_base_camera_);
+    publisher_->publishInfo({}, ros::Time().fromNSec(static_cast<std::uint64_t>(result.stamp)));
+    ASSERT_TRUE(spinUntil(
+        [&] { return info_->messages.size() > info && (!result.has_pose || odom_->messages.size() > odom); }));
+  }
+
+  ros::NodeHandle nh_{"/odometry_publisher"};
+  Eigen::Isometry3d T_base_camera_ = Eigen::Isometry3d::Identity();
+  std::unique_ptr<OdometryPublisher> publisher_;
+  std::unique_ptr<Inbox<nav_msgs::Odometry>> odom_;
+  std::unique_ptr<Inbox<nav_msgs::Path>> path_;
+  std::unique_ptr<Inbox<stereo_descriptor_vo::VoInfo>> info_;
+  std::unique_ptr<Inbox<tf2_msgs::TFMessage>> tf_;
+};
+
+TEST_F(OdometryPublisherTest, OdometryTransformAndPathSayTheSame) {
+  start({});
+  publish(resultAt(2));
+  ASSERT_TRUE(spinUntil([&] { return !tf_->messages.empty() && !path_->messages.empty(); }));
+  const geometry_msgs::TransformStamped& transform = tf_->messages.at(0).transforms.at(0);
+  EXPECT_EQ(odom_->messages[0].pose.pose.position.z, 2.0);
+  EXPECT_EQ(transform.transform.translation.z, 2.0);
+  EXPECT_EQ(transform.header.frame_id, "odom");
+  EXPECT_EQ(transform.child_frame_id, "base_link");
+  EXPECT_EQ(path_->messages[0].poses.at(0).pose.position.z, 2.0);
+  for (const std_msgs::Header& header :
+       {odom_->messages[0].header, transform.header, path_->messages[0].header, info_->messages[0].header}) {
+    EXPECT_EQ(header.stamp.toNSec(), 1000000000300000007u);
+    EXPECT_EQ(header.frame_id, "odom");
+  }
+}
+
+TEST_F(OdometryPublisherTest, WithoutAPoseThereIsNeitherOdometryNorPath) {
+  start({});
+  OdometryResult lost = resultAt(1);
+  lost.has_pose = false;
+  publish(lost);
+  publish(resultAt(2));
+  ASSERT_TRUE(spinUntil([&] { return !path_->messages.empty(); }));
+  EXPECT_EQ(odom_->messages.size(), 1u);
+  EXPECT_EQ(path_->messages.size(), 1u);
+  EXPECT_EQ(path_->messages[0].poses.size(), 1u);
+}
+
+TEST_F(OdometryPublisherTest, FramesAndTransformAsConfigured) {
+  OdometryOutputOptions options;
+  options.odom_frame_id = "/world";
+  options.base_frame_id = "robot";
+  options.invert_tf = true;
+  start(options);
+  publish(resultAt(3));
+  ASSERT_TRUE(spinUntil([&] { return !tf_->messages.empty(); }));
+  EXPECT_EQ(odom_->messages[0].header.frame_id, "world");
+  EXPECT_EQ(odom_->messages[0].child_frame_id, "robot");
+  const geometry_msgs::TransformStamped& transform = tf_->messages[0].transforms.at(0);
+  EXPECT_EQ(transform.header.frame_id, "robot");
+  EXPECT_EQ(transform.child_frame_id, "world");
+  EXPECT_EQ(transform.transform.translation.z, -3.0);
+}
+
+TEST_F(OdometryPublisherTest, NoTransformWhereAFilterPublishesIt) {
+  OdometryOutputOptions options;
+  options.publish_tf = false;
+  start(options);
+  for (int i = 0; i < 5; ++i) publish(resultAt(i));
+  EXPECT_TRUE(tf_->messages.empty());
+}
+
+TEST_F(OdometryPublisherTest, ThePathKeepsItsNewestPoses) {
+  OdometryOutputOptions options;
+  options.max_path_length = 3;
+  start(options);
+  for (int i = 0; i < 5; ++i) publish(resultAt(i));
+  ASSERT_TRUE(spinUntil(
+      [&] { return !path_->messages.empty() && path_->messages.back().poses.back().pose.position.z == 4.0; }));
+  const auto& poses = path_->messages.back().poses;
+  ASSERT_EQ(poses.size(), 3u);
+  EXPECT_EQ(poses[0].pose.position.z, 2.0);
+}
+
+TEST_F(OdometryPublisherTest, AfterAResetThePathBeginsAnew) {
+  start({});
+  publish(resultAt(7));
+  publisher_->restartPath();
+  OdometryResult origin = resultAt(8);  // later, and back at the origin
+  origin.T_origin_camera.setIdentity();
+  publish(origin);
+  ASSERT_TRUE(spinUntil([&] {
+    return !path_->messages.empty() && path_->messages.back().header.stamp == odom_->messages.back().header.stamp;
+  }));
+  ASSERT_EQ(path_->messages.back().poses.size(), 1u);
+  EXPECT_EQ(path_->messages.back().poses[0].pose.position.z, 0.0);
+}
+
+TEST_F(OdometryPublisherTest, InfoTellsLatencyAndSession) {
+  start({});
+  const ros::Time stamp = ros::Time::now() - ros::Duration(2.0);
+  const stereo_descriptor_vo::VoInfo published = publisher_->publishInfo({}, stamp);
+  ASSERT_TRUE(spinUntil([&] { return !info_->messages.empty(); }));
+  EXPECT_EQ(info_->messages[0].header.stamp, stamp);
+  EXPECT_NEAR(published.latency, 2.0, 0.5);
+  EXPECT_EQ(info_->messages[0].latency, published.latency);
+  const OdometryPublisher other(nh_, {});
+  EXPECT_FALSE(published.session.isZero());
+  EXPECT_NE(OdometryPublisher(nh_, {}).publishInfo({}, stamp).session, published.session);
+  // Stamps that are wildly wrong have a latency too.
+  EXPECT_GT(publisher_->publishInfo({}, ros::Time(0, 1)).latency, 1e9f);
+  EXPECT_LT(publisher_->publishInfo({}, ros::Time(0xffffffffu, 0)).latency, -1e9f);
+}
+
+}  // namespace
+}  // namespace sdvo
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "odometry_publisher_test");
+  ros::NodeHandle keeps_ros_alive;
+  return RUN_ALL_TESTS();
+}

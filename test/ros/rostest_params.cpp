@@ -1,0 +1,125 @@
+#include <gtest/gtest.h>
+#include <ros/ros.h>
+
+#include <string>
+#include <vector>
+
+#include "../../src/ros/params.hpp"
+#include "../synthetic_scene.hpp"
+
+namespace sdvo {
+namespace {
+
+using synthetic::errorOf;
+
+struct Inner {
+  double ratio = 0.5;
+
+  void describe(OptionList& list) { list.add("ratio", ratio, {0.0, 1.0}, "", "a number"); }
+};
+
+struct Sample {
+  bool flag = false;
+  int count = 3;
+  std::string kind = "a";
+  Inner inner;
+
+  void describe(OptionList& list) {
+    list.add("flag", flag, "a switch");
+    list.add("count", count, {1, 10}, "", "a whole number");
+    list.add("kind", kind, {"a", "b"}, "a choice");
+    list.group("inner", inner);
+  }
+};
+
+class LoadParams : public ::testing::Test {
+ protected:
+  ~LoadParams() override { nh_.deleteParam(nh_.getNamespace()); }
+
+  std::string refusal() {
+    Sample sample;
+    EXPECT_THROW(loadParams(nh_, sample), std::invalid_argument);
+    return errorOf([&] { loadParams(nh_, sample); });
+  }
+
+  ros::NodeHandle nh_{"/load_params"};
+};
+
+TEST_F(LoadParams, WhatIsAbsentKeepsItsValue) {
+  Sample sample;
+  sample.count = 7;
+  EXPECT_EQ(loadParams(nh_, sample), std::vector<std::string>{});
+  EXPECT_FALSE(sample.flag);
+  EXPECT_EQ(sample.count, 7);
+  EXPECT_EQ(sample.kind, "a");
+  EXPECT_EQ(sample.inner.ratio, 0.5);
+}
+
+TEST_F(LoadParams, ReadsEachTypeFromItsPath) {
+  nh_.setParam("flag", true);
+  nh_.setParam("count", 10);  // the end of the range
+  nh_.setParam("kind", "b");
+  nh_.setParam("inner/ratio", 0.25);
+  Sample sample;
+  EXPECT_EQ(loadParams(nh_, sample), std::vector<std::string>{});
+  EXPECT_TRUE(sample.flag);
+  EXPECT_EQ(sample.count, 10);
+  EXPECT_EQ(sample.kind, "b");
+  EXPECT_EQ(sample.inner.ratio, 0.25);
+}
+
+TEST_F(LoadParams, AWholeNumberIsANumber) {
+  nh_.setParam("inner/ratio", 1);
+  Sample sample;
+  loadParams(nh_, sample);
+  EXPECT_EQ(sample.inner.ratio, 1.0);
+}
+
+TEST_F(LoadParams, RefusesWhatIsOutsideOfItsRange) {
+  nh_.setParam("count", 11);
+  EXPECT_EQ(refusal(), "parameter /load_params/count = 11 is outside [1, 10]");
+  nh_.setParam("count", 0);
+  EXPECT_EQ(refusal(), "parameter /load_params/count = 0 is outside [1, 10]");
+  nh_.setParam("count", 1);
+  nh_.setParam("inner/ratio", -0.5);
+  EXPECT_EQ(refusal(), "parameter /load_params/inner/ratio = -0.5 is outside [0, 1]");
+  nh_.setParam("inner/ratio", 0.5);
+  nh_.setParam("kind", "c");
+  EXPECT_EQ(refusal(), "parameter /load_params/kind = 'c' is none of: a, b");
+}
+
+TEST_F(LoadParams, RefusesOtherTypesByName) {
+  nh_.setParam("flag", 1);
+  EXPECT_EQ(refusal(), "parameter /load_params/flag is not a boolean");
+  nh_.setParam("flag", true);
+  nh_.setParam("count", 2.5);
+  EXPECT_EQ(refusal(), "parameter /load_params/count is not an integer");
+  nh_.setParam("count", 2);
+  nh_.setParam("kind", 5);
+  EXPECT_EQ(refusal(), "parameter /load_params/kind is not a string");
+  nh_.setParam("kind", "a");
+  nh_.setParam("inner/ratio", "half");
+  EXPECT_EQ(refusal(), "parameter /load_params/inner/ratio is not a number");
+}
+
+TEST_F(LoadParams, NamesWhatIsNoOption) {
+  nh_.setParam("cuont", 5);
+  nh_.setParam("inner/rate", 5);
+  nh_.setParam("image_transport", "raw");
+  nh_.setParam("diagnostic_period", 1.0);
+  ros::NodeHandle("/load_params_of_another").setParam("other", 1);
+  Sample sample;
+  std::vector<std::string> unknown = loadParams(nh_, sample);
+  std::sort(unknown.begin(), unknown.end());
+  EXPECT_EQ(unknown, (std::vector<std::string>{"/load_params/cuont", "/load_params/inner/rate"}));
+}
+
+}  // namespace
+}  // namespace sdvo
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "params_test");
+  ros::NodeHandle keeps_ros_alive;
+  return RUN_ALL_TESTS();
+}

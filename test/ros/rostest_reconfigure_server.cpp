@@ -1,0 +1,174 @@
+#include <dynamic_reconfigure/ConfigDescription.h>
+#include <dynamic_reconfigure/Reconfigure.h>
+#include <gtest/gtest.h>
+#include <ros/ros.h>
+
+#include <algorithm>
+#include <atomic>
+#include <stdexcept>
+#include <string>
+#include <thread>
+
+#include "../../src/ros/reconfigure_server.hpp"
+
+namespace sdvo {
+namespace {
+
+struct Sample {
+  bool flag = false;
+  int low = 2, high = 8;
+  double ratio = 0.5;
+  std::string kind = "a";
+
+  void describe(OptionList& list) {
+    list.add("flag", flag, "a switch");
+    list.add("low", low, {0, 10}, "px", "smaller than high");
+    list.add("high", high, {0, 10}, "px", "larger than low");
+    list.add("ratio", ratio, {0.0, 1.0}, "", "a number");
+    list.add("kind", kind, {"a", "b"}, "a choice");
+  }
+};
+
+class ReconfigureServerTest : public ::testing::Test {
+ protected:
+  using Config = dynamic_reconfigure::Config;
+
+  ReconfigureServerTest() : spinner_(2), server_(nh_, listOptions(sample_), [this] { apply(); }) { spinner_.start(); }
+  ~ReconfigureServerTest() override { spinner_.stop(); }
+
+  void apply() {
+    EXPECT_EQ(++inside_, 1) << "two at a time";
+    ros::WallDuration(pause_).sleep();
+    ++applied_;
+    --inside_;
+    if (sample_.low > sample_.high) throw std::invalid_argument("low exceeds high");
+  }
+
+  template <class Array, class Value>
+  static void add(Array& array, const std::string& name, const Value& value) {
+    typename Array::value_type parameter;
+    parameter.name = name;
+    parameter.value = value;
+    array.push_back(parameter);
+  }
+
+  Config request(const Config& config) {
+    dynamic_reconfigure::Reconfigure call;
+    call.request.config = config;
+    EXPECT_TRUE(ros::service::call("/reconfigure_server/set_parameters", call));
+    return call.response.config;
+  }
+
+  /// Both are in the response and in the struct.
+  void expectLimits(const Config& response, int low, int high) {
+    EXPECT_EQ(sample_.low, low);
+    EXPECT_EQ(sample_.high, high);
+    ASSERT_EQ(response.ints.size(), 2u);
+    EXPECT_EQ(response.ints[0].value, low);
+    EXPECT_EQ(response.ints[1].value, high);
+  }
+
+  Sample sample_;
+  std::atomic<int> applied_{0}, inside_{0};
+  double pause_ = 0.0;  // s
+  ros::AsyncSpinner spinner_;
+  ros::NodeHandle nh_{"/reconfigure_server"};
+  ReconfigureServer server_;
+};
+
+TEST_F(ReconfigureServerTest, SetsEachTypeAndAnswersWithTheWholeSet) {
+  Config config;
+  add(config.bools, "flag", true);
+  add(config.ints, "low", 4);
+  add(config.doubles, "ratio", 0.1);
+  add(config.strs, "kind", "b");
+  const Config response = request(config);
+  EXPECT_TRUE(sample_.flag);
+  EXPECT_EQ(sample_.ratio, 0.1);
+  EXPECT_EQ(sample_.kind, "b");
+  expectLimits(response, 4, 8);
+  EXPECT_TRUE(response.bools.at(0).value);
+  EXPECT_EQ(response.doubles.at(0).value, 0.1);
+  EXPECT_EQ(response.strs.at(0).value, "b");
+  EXPECT_EQ(applied_, 1);
+}
+
+TEST_F(ReconfigureServerTest, TheSameValuesAreNoChange) {
+  Config config;
+  add(config.ints, "low", 2);
+  add(config.doubles, "ratio", 0.5);
+  request(config);
+  request(Config());
+  EXPECT_EQ(applied_, 0);
+}
+
+TEST_F(ReconfigureServerTest, NumbersOutOfRangeAreClamped) {
+  Config config;
+  add(config.ints, "high", 99);
+  expectLimits(request(config), 2, 10);
+}
+
+TEST_F(ReconfigureServerTest, AWrongNameOrValueRefusesTheWholeSet) {
+  Config wrong_choice;
+  add(wrong_choice.ints, "low", 5);
+  add(wrong_choice.strs, "kind", "c");
+  expectLimits(request(wrong_choice), 2, 8);
+  Config wrong_name;
+  add(wrong_name.ints, "low", 5);
+  add(wrong_name.ints, "lower", 5);
+  expectLimits(request(wrong_name), 2, 8);
+  Config no_number;
+  add(no_number.ints, "low", 5);
+  add(no_number.doubles, "ratio", std::numeric_limits<double>::quiet_NaN());
+  expectLimits(request(no_number), 2, 8);
+  EXPECT_EQ(sample_.ratio, 0.5);
+  EXPECT_EQ(applied_, 0);
+}
+
+TEST_F(ReconfigureServerTest, ASetThatDoesNotGoTogetherIsRefusedAndTheNextOneWorks) {
+  Config config;
+  add(config.ints, "low", 9);  // in its range, but above high
+  add(config.bools, "flag", true);
+  expectLimits(request(config), 2, 8);
+  EXPECT_FALSE(sample_.flag);
+  add(config.ints, "high", 10);
+  expectLimits(request(config), 9, 10);
+  EXPECT_TRUE(sample_.flag);
+}
+
+TEST_F(ReconfigureServerTest, RequestsAreTakenOverOneAfterTheOther) {
+  pause_ = 0.02;
+  const auto call = [this](int low) {
+    for (int i = 0; i < 5; ++i) {
+      Config config;
+      add(config.ints, "low", low + i % 2);
+      request(config);
+    }
+  };
+  std::thread first([&] { call(1); }), second([&] { call(3); });
+  first.join();
+  second.join();
+  EXPECT_GE(applied_, 5);
+}
+
+TEST_F(ReconfigureServerTest, DescribesRangesAndDefaults) {
+  const auto description =
+      ros::topic::waitForMessage<dynamic_reconfigure::ConfigDescription>("/reconfigure_server/parameter_descriptions");
+  ASSERT_TRUE(description);
+  ASSERT_EQ(description->groups.size(), 1u);
+  ASSERT_EQ(description->groups[0].parameters.size(), 5u);
+  EXPECT_EQ(description->groups[0].parameters[1].description, "smaller than high [px]");
+  EXPECT_EQ(description->max.ints.at(0).value, 10);
+  EXPECT_EQ(description->dflt.ints.at(1).value, 8);
+  EXPECT_NE(description->groups[0].parameters[4].edit_method.find("'value': 'b'"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace sdvo
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "reconfigure_server_test");
+  ros::NodeHandle keeps_ros_alive;
+  return RUN_ALL_TESTS();
+}

@@ -1,0 +1,133 @@
+#include <gtest/gtest.h>
+#include <ros/callback_queue.h>
+#include <ros/ros.h>
+#include <tf2_msgs/TFMessage.h>
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "../../src/ros/robot_transforms.hpp"
+
+namespace sdvo {
+namespace {
+
+bool contains(const std::string& text, const std::string& part) {
+  return text.find(part) != std::string::npos;
+}
+
+geometry_msgs::TransformStamped transform(const std::string& parent, const std::string& child, const ros::Time& stamp,
+                                          double x = 0.0) {
+  geometry_msgs::TransformStamped message;
+  message.header.frame_id = parent;
+  message.header.stamp = stamp;
+  message.child_frame_id = child;
+  message.transform.translation.x = x;
+  message.transform.rotation.w = 1.0;
+  return message;
+}
+
+class RobotTransformsTest : public ::testing::Test {
+ protected:
+  RobotTransformsTest()
+      : tf_(nh_.advertise<tf2_msgs::TFMessage>("/tf", 100)),
+        tf_static_(nh_.advertise<tf2_msgs::TFMessage>("/tf_static", 100)) {}
+
+  void start(std::optional<ros_conversions::OdometryFrames> ours = std::nullopt) {
+    transforms_.emplace(nh_, std::move(ours), [this](const std::string& what) { warnings_.push_back(what); });
+    ASSERT_TRUE(spinUntil([&] { return tf_.getNumSubscribers() > 0 && tf_static_.getNumSubscribers() > 0; }));
+  }
+
+  static bool spinUntil(const std::function<bool()>& condition) {
+    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(10.0);
+    while (!condition() && ros::WallTime::now() < end) {
+      ros::spinOnce();
+      ros::WallDuration(0.001).sleep();
+    }
+    return condition();
+  }
+
+  void send(ros::Publisher& publisher, const std::vector<geometry_msgs::TransformStamped>& transforms) {
+    tf2_msgs::TFMessage message;
+    message.transforms = transforms;
+    publisher.publish(message);
+  }
+
+  /// When this comes, all that was sent on the topic before has come.
+  void waitForMarker(ros::Publisher& publisher) {
+    const std::string child = "marker_" + std::to_string(++markers_);
+    send(publisher, {transform("markers", child, ros::Time::now())});
+    std::string problem;
+    ASSERT_TRUE(spinUntil([&] { return transforms_->find("markers", child, problem).has_value(); })) << problem;
+  }
+
+  ros::NodeHandle nh_;
+  ros::Publisher tf_, tf_static_;
+  std::optional<RobotTransforms> transforms_;
+  std::vector<std::string> warnings_;
+  int markers_ = 0;
+};
+
+TEST_F(RobotTransformsTest, ChainsStaticAndMovingTransforms) {
+  start();
+  std::string problem;
+  EXPECT_FALSE(transforms_->find("base", "camera", problem));
+  EXPECT_TRUE(contains(problem, "base")) << problem;
+  send(tf_static_, {transform("base", "mast", ros::Time(), 1.0)});
+  send(tf_, {transform("mast", "camera", ros::Time::now(), 2.0)});
+  ASSERT_TRUE(spinUntil([&] { return transforms_->find("base", "camera", problem).has_value(); }));
+  EXPECT_EQ(transforms_->find("base", "camera", problem)->translation().x(), 3.0);
+}
+
+TEST_F(RobotTransformsTest, WildStampsAndFramesAreLeftOutAndNothingElse) {
+  start();
+  for (const std::uint32_t seconds : {0u, 1u << 31, 0xffffffffu, 1u, 0x7fffffffu}) {
+    send(tf_, {transform("base", "camera", ros::Time(seconds, 999999999u)), transform("", "camera", ros::Time::now()),
+               transform("base", "base", ros::Time::now())});
+    send(tf_static_, {transform("base", "mast", ros::Time(seconds, 999999999u))});
+  }
+  waitForMarker(tf_);
+  waitForMarker(tf_static_);
+}
+
+TEST_F(RobotTransformsTest, AnotherPublisherOfOurChildIsNamed) {
+  start(ros_conversions::OdometryFrames{"odom", "base_link"});
+  send(tf_, {transform("odom", "base_link", ros::Time::now())});  // our own
+  waitForMarker(tf_);
+  EXPECT_TRUE(warnings_.empty());
+  for (int i = 0; i < 3; ++i) send(tf_, {transform("world", "base_link", ros::Time::now())});
+  waitForMarker(tf_);
+  ASSERT_EQ(warnings_.size(), 1u);
+  EXPECT_TRUE(contains(warnings_[0], ros::this_node::getName() + " publishes world -> base_link")) << warnings_[0];
+  EXPECT_TRUE(contains(warnings_[0], ros::this_node::getName() + " publishes odom -> base_link")) << warnings_[0];
+}
+
+TEST_F(RobotTransformsTest, ACycleIsNamed) {
+  start(ros_conversions::OdometryFrames{"odom", "base_link"});
+  send(tf_, {transform("map", "odom", ros::Time::now()), transform("base_link", "camera", ros::Time::now())});
+  waitForMarker(tf_);
+  EXPECT_TRUE(warnings_.empty());
+  send(tf_, {transform("camera", "map", ros::Time::now())});
+  waitForMarker(tf_);
+  ASSERT_EQ(warnings_.size(), 1u);
+  EXPECT_TRUE(contains(warnings_[0], "publishes camera -> map")) << warnings_[0];
+  EXPECT_TRUE(contains(warnings_[0], "a cycle")) << warnings_[0];
+}
+
+TEST_F(RobotTransformsTest, WithoutATransformOfOursThereIsNoContention) {
+  start();
+  send(tf_, {transform("world", "base_link", ros::Time::now()), transform("base_link", "world", ros::Time::now())});
+  waitForMarker(tf_);
+  EXPECT_TRUE(warnings_.empty());
+}
+
+}  // namespace
+}  // namespace sdvo
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "robot_transforms_test");
+  ros::NodeHandle keeps_ros_alive;
+  return RUN_ALL_TESTS();
+}

@@ -1,0 +1,109 @@
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "../synthetic_scene.hpp"
+#include "message_samples.hpp"
+
+namespace sdvo::ros_conversions {
+namespace {
+
+using synthetic::errorOf;
+
+sensor_msgs::CameraInfo cameraInfo(double tx, double f = 700.0) {
+  sensor_msgs::CameraInfo info;
+  info.width = 1200;
+  info.height = 360;
+  info.distortion_model = "plumb_bob";
+  info.D.assign(5, 0.0);
+  info.K = {f, 0.0, 600.0, 0.0, f, 180.0, 0.0, 0.0, 1.0};
+  info.R = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
+  info.P = {f, 0.0, 600.0, tx, 0.0, f, 180.0, 0.0, 0.0, 0.0, 1.0, 0.0};
+  return info;
+}
+
+TEST(ToStereoCamera, BaselineIsTheDifferenceOfBothOffsets) {
+  const StereoCamera camera = toStereoCamera(cameraInfo(42.0), cameraInfo(-336.0));
+  EXPECT_DOUBLE_EQ(camera.fx, 700.0);
+  EXPECT_DOUBLE_EQ(camera.fy, 700.0);
+  EXPECT_DOUBLE_EQ(camera.cx, 600.0);
+  EXPECT_DOUBLE_EQ(camera.cy, 180.0);
+  EXPECT_NEAR(camera.baseline, 0.54, 1e-12);  // (42 + 336) / 700
+  EXPECT_EQ(camera.width, 1200);
+  EXPECT_EQ(camera.height, 360);
+}
+
+TEST(ToStereoCamera, GeometryComesFromPNotFromK) {
+  sensor_msgs::CameraInfo left = cameraInfo(0.0), right = cameraInfo(-350.0);
+  for (sensor_msgs::CameraInfo* info : {&left, &right}) info->K = {900.0, 0.0, 1.0, 0.0, 900.0, 2.0, 0.0, 0.0, 1.0};
+  const StereoCamera camera = toStereoCamera(left, right);
+  EXPECT_DOUBLE_EQ(camera.fx, 700.0);
+  EXPECT_DOUBLE_EQ(camera.cx, 600.0);
+}
+
+TEST(ToStereoCamera, BinningAndRegionOfInterest) {
+  sensor_msgs::CameraInfo left = cameraInfo(0.0), right = cameraInfo(-350.0);
+  for (sensor_msgs::CameraInfo* info : {&left, &right}) {
+    info->binning_x = info->binning_y = 2;
+    info->roi.x_offset = 200;
+    info->roi.y_offset = 40;
+    info->roi.width = 800;
+    info->roi.height = 240;
+  }
+  const StereoCamera camera = toStereoCamera(left, right);
+  EXPECT_DOUBLE_EQ(camera.fx, 350.0);
+  EXPECT_DOUBLE_EQ(camera.fy, 350.0);
+  EXPECT_DOUBLE_EQ(camera.cx, 200.0);        // (600 - 200) / 2
+  EXPECT_DOUBLE_EQ(camera.cy, 70.0);         // (180 - 40) / 2
+  EXPECT_NEAR(camera.baseline, 0.5, 1e-12);  // metres do not shrink with the pixels
+  EXPECT_EQ(camera.width, 400);
+  EXPECT_EQ(camera.height, 120);
+}
+
+TEST(ToStereoCamera, RefusesWhatIsNoRectifiedPair) {
+  const sensor_msgs::CameraInfo left = cameraInfo(0.0), right = cameraInfo(-350.0);
+  ASSERT_NO_THROW(toStereoCamera(left, right));
+  const auto refusal = [](const sensor_msgs::CameraInfo& l, const sensor_msgs::CameraInfo& r) {
+    EXPECT_THROW(toStereoCamera(l, r), std::invalid_argument);
+    return errorOf([&] { toStereoCamera(l, r); });
+  };
+
+  sensor_msgs::CameraInfo uncalibrated = right;
+  uncalibrated.K.assign(0.0);
+  EXPECT_TRUE(contains(refusal(left, uncalibrated), "right camera_info"));
+  EXPECT_TRUE(contains(refusal(uncalibrated, right), "left camera_info"));
+  sensor_msgs::CameraInfo zero_p = right;
+  zero_p.P.assign(0.0);
+  EXPECT_TRUE(contains(refusal(left, zero_p), "calibrated"));
+  sensor_msgs::CameraInfo no_size = left;
+  no_size.width = 0;
+  EXPECT_TRUE(contains(refusal(no_size, right), "size"));
+
+  // Swapped: both projection matrices are quoted, so that the user sees which is wrong.
+  const std::string swapped = refusal(right, left);
+  EXPECT_TRUE(contains(swapped, "baseline")) << swapped;
+  EXPECT_TRUE(contains(swapped, "Tx = -350")) << swapped;
+  EXPECT_TRUE(contains(swapped, "Tx = 0")) << swapped;
+  EXPECT_TRUE(contains(refusal(left, left), "baseline"));
+
+  EXPECT_TRUE(contains(refusal(left, cameraInfo(-350.0, 701.0)), "not rectified"));
+  // Rectified without CALIB_ZERO_DISPARITY: depth would be wrong everywhere.
+  sensor_msgs::CameraInfo shifted = right;
+  shifted.P[2] += 5.0;
+  EXPECT_TRUE(contains(refusal(left, shifted), "principal point"));
+  shifted = right;
+  shifted.P[6] += 5.0;
+  EXPECT_TRUE(contains(refusal(left, shifted), "principal point"));
+  sensor_msgs::CameraInfo unequal = right;
+  unequal.P[5] = 650.0;
+  EXPECT_TRUE(contains(refusal(left, unequal), "not rectified"));
+  sensor_msgs::CameraInfo not_finite = right;
+  not_finite.P[3] = kNaN;
+  EXPECT_TRUE(contains(refusal(left, not_finite), "right camera_info: P[3] is not a number"));
+  sensor_msgs::CameraInfo smaller = right;
+  smaller.width = 640;
+  EXPECT_TRUE(contains(refusal(left, smaller), "left 1200x360, right 640x360"));
+}
+
+}  // namespace
+}  // namespace sdvo::ros_conversions

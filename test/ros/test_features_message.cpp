@@ -1,0 +1,110 @@
+#include <gtest/gtest.h>
+#include <ros/serialization.h>
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "../synthetic_scene.hpp"
+#include "message_samples.hpp"
+
+namespace sdvo::ros_conversions {
+namespace {
+
+void expectSame(const StereoFeatures& a, const StereoFeatures& b) {
+  EXPECT_EQ(a.stamp, b.stamp);
+  EXPECT_TRUE(a.camera == b.camera);
+  EXPECT_EQ(a.descriptor, b.descriptor);
+  EXPECT_EQ(a.layout, b.layout);
+  EXPECT_EQ(a.element_type, b.element_type);
+  EXPECT_EQ(a.u, b.u);
+  EXPECT_EQ(a.v, b.v);
+  EXPECT_EQ(a.disparity, b.disparity);
+  EXPECT_EQ(a.dv, b.dv);
+  EXPECT_EQ(a.size, b.size);
+  EXPECT_EQ(a.angle, b.angle);
+  EXPECT_EQ(a.response, b.response);
+  EXPECT_EQ(a.sigma, b.sigma);
+  EXPECT_EQ(a.octave, b.octave);
+  EXPECT_TRUE(synthetic::equalMats(a.descriptors, b.descriptors));
+  EXPECT_EQ(a.report.detected, b.report.detected);
+  for (int side = 0; side < 2; ++side) {
+    EXPECT_EQ(a.report.mean_intensity[side], b.report.mean_intensity[side]);
+    EXPECT_EQ(a.report.sharpness[side], b.report.sharpness[side]);
+  }
+  EXPECT_EQ(a.report.detect_time, b.report.detect_time);
+  EXPECT_EQ(a.report.stereo_time, b.report.stereo_time);
+  EXPECT_EQ(a.report.describe_time, b.report.describe_time);
+  EXPECT_EQ(a.report.status, b.report.status);
+}
+
+TEST(FeaturesMessageTest, RoundTripIsExactAlsoOverTheWire) {
+  for (const ElementType type : {ElementType::kBits, ElementType::kUint8, ElementType::kFloat32})
+    for (const std::string layout : {"left", "left+right"}) {
+      SCOPED_TRACE(layout + " " + std::to_string(static_cast<int>(type)));
+      const FeaturesMessage sent = someMessage(type, layout);
+      std::vector<std::uint8_t> buffer(ros::serialization::serializationLength(sent));
+      ros::serialization::OStream out(buffer.data(), static_cast<std::uint32_t>(buffer.size()));
+      ros::serialization::serialize(out, sent);
+      ros::serialization::IStream in(buffer.data(), static_cast<std::uint32_t>(buffer.size()));
+      FeaturesMessage received;
+      ros::serialization::deserialize(in, received);
+      expectSame(fromMessage(received), someFeatures(type, layout));
+    }
+}
+
+TEST(FeaturesMessageTest, NamesItsContents) {
+  const FeaturesMessage bits = someMessage();
+  EXPECT_EQ(bits.element_type, "bits");
+  EXPECT_EQ(bits.bytes_per_row, 16u);
+  EXPECT_EQ(bits.descriptors.size(), 5u * 16u);
+  const FeaturesMessage floats = someMessage(ElementType::kFloat32);
+  EXPECT_EQ(floats.element_type, "float32");
+  EXPECT_EQ(floats.bytes_per_row, 64u);
+  EXPECT_EQ(someMessage(ElementType::kUint8).element_type, "uint8");
+}
+
+TEST(FeaturesMessageTest, SizeCurveWithAndWithoutNormalisation) {
+  DepthScaleOptions curve;
+  curve.slope = 0.5;
+  curve.exponent = 1.25;
+  curve.offset = -2.0;
+  curve.min_size = 8.0;
+  curve.max_size = 64.0;
+  curve.constant_size = 11.0;
+  FeaturesMessage message = toMessage(someFeatures(), curve);
+  EXPECT_TRUE(message.scale_normalised);
+  EXPECT_EQ(message.size_slope, 0.5f);
+  EXPECT_EQ(message.size_exponent, 1.25f);
+  EXPECT_EQ(message.size_offset, -2.f);
+  EXPECT_EQ(message.size_min, 8.f);
+  EXPECT_EQ(message.size_max, 64.f);
+  curve.scale_normalisation = false;
+  message = toMessage(someFeatures(), curve);
+  EXPECT_FALSE(message.scale_normalised);
+  EXPECT_EQ(message.size_min, 11.f);
+  EXPECT_EQ(message.size_max, 11.f);
+}
+
+TEST(FeaturesMessageTest, RowsOfALargerMatrixAreSentAlone) {
+  StereoFeatures features = someFeatures();
+  cv::Mat larger(9, 16, CV_8U, cv::Scalar(0xee));
+  features.descriptors.copyTo(larger.rowRange(2, 7));
+  features.descriptors = larger.rowRange(2, 7);
+  expectSame(fromMessage([&] {
+               FeaturesMessage message = toMessage(features, DepthScaleOptions());
+               message.header.stamp.fromNSec(1403636579763555584u);
+               return message;
+             }()),
+             someFeatures());
+}
+
+TEST(FeaturesMessageTest, NoFeaturesAreAValidMessage) {
+  const StereoFeatures none = synthetic::noFeatures(synthetic::camera());
+  const StereoFeatures received = fromMessage(toMessage(none, DepthScaleOptions()));
+  EXPECT_EQ(received.count(), 0);
+  EXPECT_NO_THROW(received.check());
+}
+
+}  // namespace
+}  // namespace sdvo::ros_conversions

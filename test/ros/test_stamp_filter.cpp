@@ -1,0 +1,116 @@
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <limits>
+#include <utility>
+#include <vector>
+
+#include "../../src/ros/stamp_filter.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr std::int64_t kSecond = 1000000000;
+
+/// A stream whose items are their own running numbers.
+class StampFilterTest : public ::testing::Test {
+ protected:
+  /// Items passed on, with their timelines. Times in s.
+  std::vector<std::pair<int, int>> add(double stamp, double now, bool announced = false) {
+    std::vector<std::pair<int, int>> passed;
+    for (const auto& item : filter_.add(next_++, toNanoseconds(stamp), toNanoseconds(now), announced))
+      passed.emplace_back(item.item, item.timeline);
+    return passed;
+  }
+
+  static std::int64_t toNanoseconds(double seconds) {
+    return static_cast<std::int64_t>(seconds * static_cast<double>(kSecond));
+  }
+
+  using Passed = std::vector<std::pair<int, int>>;
+  StampFilter<int> filter_;
+  int next_ = 0;
+};
+
+TEST_F(StampFilterTest, PassesWhatComesInOrder) {
+  EXPECT_EQ(add(100.0, 50.0), (Passed{{0, 0}}));
+  EXPECT_EQ(add(100.1, 50.0), (Passed{{1, 0}}));
+  EXPECT_EQ(add(101.1, 50.0), (Passed{{2, 0}}));
+  EXPECT_EQ(filter_.dropped(), 0u);
+}
+
+TEST_F(StampFilterTest, DropsWhatIsLateOrTheSame) {
+  add(100.0, 50.0);
+  add(100.1, 50.1);
+  EXPECT_EQ(add(100.1, 50.2), Passed{});
+  EXPECT_EQ(add(99.2, 50.3), Passed{});
+  EXPECT_EQ(filter_.dropped(), 2u);
+  EXPECT_EQ(add(100.2, 50.4), (Passed{{4, 0}}));
+}
+
+TEST_F(StampFilterTest, ASingleOutlierToEitherSideIsDropped) {
+  add(100.0, 50.0);
+  for (const double outlier : {70.0, 0.1, 130.0, 4e9}) {
+    SCOPED_TRACE(outlier);
+    const std::uint64_t dropped = filter_.dropped();
+    EXPECT_EQ(add(outlier, 50.1), Passed{});
+    const Passed next = add(100.0 + 0.1 * next_, 50.2);
+    EXPECT_EQ(next, (Passed{{next_ - 1, 0}}));
+    EXPECT_EQ(filter_.dropped(), dropped + 1);
+  }
+}
+
+TEST_F(StampFilterTest, OutliersOneAfterTheOtherAreDropped) {
+  add(100.0, 50.0);
+  EXPECT_EQ(add(70.0, 50.0), Passed{});
+  EXPECT_EQ(add(20.0, 50.0), Passed{});
+  EXPECT_EQ(add(900.0, 50.0), Passed{});
+  EXPECT_EQ(add(100.1, 50.0), (Passed{{4, 0}}));
+  EXPECT_EQ(filter_.dropped(), 3u);
+}
+
+TEST_F(StampFilterTest, ALastingJumpBackIsANewTimelineAndLosesNothing) {
+  add(100.0, 50.0);
+  EXPECT_EQ(add(70.0, 50.1), Passed{});
+  EXPECT_EQ(add(70.1, 50.2), (Passed{{1, 1}, {2, 1}}));
+  EXPECT_EQ(add(70.2, 50.3), (Passed{{3, 1}}));
+  EXPECT_EQ(filter_.dropped(), 0u);
+}
+
+TEST_F(StampFilterTest, ALastingJumpAheadStaysInItsTimeline) {
+  add(100.0, 50.0);
+  EXPECT_EQ(add(130.0, 50.1), Passed{});
+  EXPECT_EQ(add(130.1, 50.2), (Passed{{1, 0}, {2, 0}}));
+}
+
+TEST_F(StampFilterTest, AJumpThatTheClockMadeIsBelievedAtOnce) {
+  add(100.0, 100.0);
+  add(160.0, 160.0);                               // a pause
+  EXPECT_EQ(add(100.0, 100.0), (Passed{{2, 1}}));  // a bag that starts again
+  EXPECT_EQ(add(100.5, 100.5), (Passed{{3, 1}}));
+  EXPECT_EQ(add(100.0, 100.0), (Passed{{4, 2}}));  // a bag shorter than a second
+  EXPECT_EQ(filter_.dropped(), 0u);
+}
+
+TEST_F(StampFilterTest, AJumpThatTheSourceAnnouncesIsBelievedAtOnce) {
+  add(100.0, 50.0);
+  EXPECT_EQ(add(70.0, 50.1, true), (Passed{{1, 1}}));
+  EXPECT_EQ(add(90.0, 50.2, true), (Passed{{2, 1}}));
+}
+
+TEST_F(StampFilterTest, SlowStreamsWaitForNothing) {
+  for (int i = 0; i < 5; ++i) EXPECT_EQ(add(100.0 + 3.0 * i, 7.0 + 3.0 * i), (Passed{{i, 0}}));
+}
+
+TEST_F(StampFilterTest, SurvivesEveryStamp) {
+  const std::uint32_t most = std::numeric_limits<std::uint32_t>::max();
+  for (const std::uint32_t stamp : {0u, most, 1u << 31, 1u, most - 1, 0u, most})
+    for (const std::uint32_t now : {0u, most}) add(stamp, now);
+  add(100.0, 50.0);
+  const Passed next = add(100.1, 50.0);
+  ASSERT_FALSE(next.empty());
+  EXPECT_EQ(next.back().first, next_ - 1);
+}
+
+}  // namespace
+}  // namespace sdvo
