@@ -49,7 +49,7 @@ class SyntheticScene {
       if (u < 0 || u > camera.width - 1 || v < 0 || v > camera.height - 1 || disparity < 0.5) continue;
       if (uniform(0.0, 1.0) < missed) continue;
       features.append(
-          {static_cast<float>(u), static_cast<float>(v), static_cast<float>(disparity), 0.f, 10.f, -1.f, 1.f, 0.3f, 0});
+          {static_cast<float>(u), static_cast<float>(v), static_cast<float>(disparity), 0.f, 10.f, -1.f, 1.f});
       seen.push_back(static_cast<int>(i));
     }
     features.descriptors.create(static_cast<int>(seen.size()), 128, CV_8U);

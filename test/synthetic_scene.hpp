@@ -118,8 +118,7 @@ inline StereoFeatures noFeatures(const StereoCamera& rig, std::int64_t stamp = 0
 /// Adds one feature; `row` must have the width of the set's descriptors.
 inline void addFeature(StereoFeatures& features, double u, double v, double disparity,
                        const std::vector<std::uint8_t>& row) {
-  features.append(
-      {static_cast<float>(u), static_cast<float>(v), static_cast<float>(disparity), 0.f, 10.f, -1.f, 1.f, 0.3f, 0});
+  features.append({static_cast<float>(u), static_cast<float>(v), static_cast<float>(disparity), 0.f, 10.f, -1.f, 1.f});
   features.descriptors.push_back(
       cv::Mat(1, static_cast<int>(row.size()), CV_8U, const_cast<std::uint8_t*>(row.data())));
 }

@@ -58,7 +58,7 @@ StereoFeatures describeKeypoints(const KeypointSet& set, const std::vector<int>&
     const cv::Point2f& p = corner.position;
     const float size = static_cast<float>(curve.size(match.disparity));
     keypoints.push_back({p.x, p.y, p.x - match.disparity, p.y + match.dv, size});
-    features.append({p.x, p.y, match.disparity, match.dv, size, -1.f, corner.response, 0.3f, 0});
+    features.append({p.x, p.y, match.disparity, match.dv, size, -1.f, corner.response});
   }
   const DescribedKeypoints described = descriptor.describe(set.images.left, set.images.right, keypoints);
   if (described.index.size() != chosen.size())

@@ -16,6 +16,13 @@
 namespace sdvo::ros_conversions {
 namespace {
 
+/// The bytes of a matrix, row by row.
+std::vector<std::uint8_t> bytesOf(const cv::Mat& matrix) {
+  CV_Assert(matrix.empty() || matrix.isContinuous());
+  const std::uint8_t* first = matrix.data;  // not datastart: it may be part of a larger one
+  return {first, first + matrix.total() * matrix.elemSize()};
+}
+
 /// Variance of what is not known at all, and the floor that keeps every covariance positive.
 constexpr double kUnknownVariance = 1e6;
 constexpr double kVarianceFloor = 1e-9;
@@ -149,16 +156,16 @@ stereo_descriptor_vo::StereoFeatures toMessage(const StereoFeatures& features, c
   message.size = features.size;
   message.angle = features.angle;
   message.response = features.response;
-  message.sigma = features.sigma;
-  message.octave = features.octave;
-  CV_Assert(features.descriptors.empty() || features.descriptors.isContinuous());
-  const std::uint8_t* rows = features.descriptors.data;  // not datastart: they may be part of a larger matrix
-  message.descriptors.assign(rows, rows + features.descriptors.total() * features.descriptors.elemSize());
+  message.descriptors = bytesOf(features.descriptors);
+  message.patch_side = static_cast<std::uint32_t>(features.patch_layout.side);
+  message.patch_min_spacing = features.patch_layout.min_spacing;
+  message.patch_spacing = features.patch_layout.spacing_by_size;
+  message.patches = bytesOf(features.patches);
   return message;
 }
 
 StereoFeatures fromMessage(const stereo_descriptor_vo::StereoFeatures& message) {
-  StereoFeaturesView{message};  // throws unless everything holds together
+  const StereoFeaturesView view(message);  // throws unless everything holds together
   StereoFeatures features;
   features.stamp = static_cast<std::int64_t>(message.header.stamp.toNSec());
   features.camera = {message.fx,
@@ -178,11 +185,11 @@ StereoFeatures fromMessage(const stereo_descriptor_vo::StereoFeatures& message) 
   features.size = message.size;
   features.angle = message.angle;
   features.response = message.response;
-  features.sigma = message.sigma;
-  features.octave = message.octave;
   features.descriptors = cv::Mat(features.count(), static_cast<int>(message.bytes_per_row), CV_8U,
                                  const_cast<std::uint8_t*>(message.descriptors.data()))
                              .clone();
+  features.patch_layout = {static_cast<int>(message.patch_side), message.patch_min_spacing, message.patch_spacing};
+  features.patches = view.patches().clone();
 
   ExtractionReport& report = features.report;
   report.detected = static_cast<int>(message.detected);

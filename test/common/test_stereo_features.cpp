@@ -47,8 +47,6 @@ TEST(StereoFeatures, NamesTheArrayOfAnotherLength) {
   expectNamed("size", [](StereoFeatures& f) { f.size.pop_back(); });
   expectNamed("angle", [](StereoFeatures& f) { f.angle.pop_back(); });
   expectNamed("response", [](StereoFeatures& f) { f.response.pop_back(); });
-  expectNamed("sigma", [](StereoFeatures& f) { f.sigma.pop_back(); });
-  expectNamed("octave", [](StereoFeatures& f) { f.octave.pop_back(); });
   expectNamed("descriptors", [](StereoFeatures& f) { f.descriptors.pop_back(); });
 }
 
@@ -66,13 +64,12 @@ TEST(StereoFeatures, RefusesNumbersThatMeanNothing) {
                                                              {"dv", &StereoFeatures::dv},
                                                              {"size", &StereoFeatures::size},
                                                              {"angle", &StereoFeatures::angle},
-                                                             {"sigma", &StereoFeatures::sigma},
                                                              {"response", &StereoFeatures::response}};
   for (const auto& [name, array] : arrays)
     for (const float bad : {kNaN, kInf, -kInf})
       EXPECT_NE(damaged(array, bad).find("array " + name + " "), std::string::npos) << name << " = " << bad;
-  const std::vector<std::pair<std::string, Array>> positive = {
-      {"disparity", &StereoFeatures::disparity}, {"size", &StereoFeatures::size}, {"sigma", &StereoFeatures::sigma}};
+  const std::vector<std::pair<std::string, Array>> positive = {{"disparity", &StereoFeatures::disparity},
+                                                               {"size", &StereoFeatures::size}};
   for (const auto& [name, array] : positive)
     for (const float bad : {0.f, -1.f})
       EXPECT_NE(damaged(array, bad).find("array " + name + " "), std::string::npos) << name << " = " << bad;
@@ -89,10 +86,25 @@ TEST(StereoFeatures, RefusesDescriptorsThatAreNotRowsOfWholeElements) {
   EXPECT_NE(errorOf([&] { features.check(); }).find("126 bytes of float32"), std::string::npos);
 }
 
+TEST(StereoFeatures, RefusesPatchesThatDoNotFit) {
+  StereoFeatures features = threeFeatures();
+  features.patch_layout = {5, 1.f, 0.1f};
+  EXPECT_NE(errorOf([&] { features.check(); }).find("patches (rows)"), std::string::npos);
+  features.patches = cv::Mat::zeros(3, 24, CV_8U);
+  EXPECT_NE(errorOf([&] { features.check(); }).find("rows of 25 bytes"), std::string::npos);
+  features.patches = cv::Mat::zeros(3, 25, CV_8U);
+  EXPECT_NO_THROW(features.check());
+  features.patch_layout.min_spacing = 0.f;
+  EXPECT_NE(errorOf([&] { features.check(); }).find("spacing"), std::string::npos);
+}
+
 TEST(StereoFeatures, SelectedRowsStayWhole) {
   StereoFeatures features = threeFeatures();
-  features.append({1.f, 2.f, 3.f, 4.f, 5.f, 6.f, 7.f, 8.f, 9});
+  features.append({1.f, 2.f, 3.f, 4.f, 5.f, 6.f, 7.f});
   features.descriptors.push_back(cv::Mat(1, 128, CV_8U, cv::Scalar(77)));
+  features.patch_layout = {3, 1.f, 0.f};
+  features.patches.create(4, 9, CV_8U);
+  for (int i = 0; i < 4; ++i) features.patches.row(i).setTo(10 * i);
   features.report.status = "as it was";
   const StereoFeatures selected = features.select({3, 1});
   EXPECT_NO_THROW(selected.check());
@@ -107,11 +119,12 @@ TEST(StereoFeatures, SelectedRowsStayWhole) {
   EXPECT_EQ(selected.size[0], 5.f);
   EXPECT_EQ(selected.angle[0], 6.f);
   EXPECT_EQ(selected.response[0], 7.f);
-  EXPECT_EQ(selected.sigma[0], 8.f);
-  EXPECT_EQ(selected.octave[0], 9);
   EXPECT_EQ(selected.u[1], features.u[1]);
   EXPECT_TRUE(synthetic::equalMats(selected.descriptors.row(0), features.descriptors.row(3)));
   EXPECT_TRUE(synthetic::equalMats(selected.descriptors.row(1), features.descriptors.row(1)));
+  EXPECT_EQ(selected.patch_layout, features.patch_layout);
+  EXPECT_TRUE(synthetic::equalMats(selected.patches.row(0), features.patches.row(3)));
+  EXPECT_TRUE(synthetic::equalMats(selected.patches.row(1), features.patches.row(1)));
   EXPECT_EQ(features.select({}).count(), 0);
 }
 

@@ -75,6 +75,8 @@ TEST(PredictObservation, JacobiansAgreeWithFiniteDifferences) {
   }
 }
 
+constexpr double kPositionSigma = 0.2;  // px
+
 /// Five poses, sixty points, measurements without noise but with the rig's error; poses and points start off the truth.
 Window disturbedWindow(const RigCalibration& truth) {
   std::mt19937 random(7);
@@ -91,7 +93,7 @@ Window disturbedWindow(const RigCalibration& truth) {
       Eigen::Vector3d measurement;
       if (!predictObservation(window.camera, window.T_camera_origin[f], point, measurement, nullptr)) continue;
       measurement.z() += truth.disparityError(window.camera, measurement.x());
-      window.observations.push_back({p, f, measurement});
+      window.observations.push_back({p, f, measurement, kPositionSigma});
     }
     point.ray_and_inverse_depth += Eigen::Vector3d(uniform(-1, 1) * 1e-3, uniform(-1, 1) * 1e-3, uniform(-1, 1) * 2e-3);
     window.points.push_back(point);

@@ -47,7 +47,7 @@ def features_message(rows, stream_epoch=0):
     message.u, message.v = [100.0] * n, [100.0] * n
     message.disparity = list(np.linspace(5.0, 15.0, n))
     message.dv, message.angle, message.response = [0.0] * n, [-1.0] * n, [1.0] * n
-    message.size, message.sigma, message.octave = [7.0] * n, [0.3] * n, bytes(n)
+    message.size = [7.0] * n
     message.descriptors = rows.tobytes()
     return message
 

@@ -20,7 +20,8 @@ inline bool contains(const std::string& text, const std::string& part) {
 }
 
 /// Every field has a value of its own, so that a mix-up of two fields shows.
-inline StereoFeatures someFeatures(ElementType type = ElementType::kBits, const std::string& layout = "left+right") {
+inline StereoFeatures someFeatures(ElementType type = ElementType::kBits,
+                                   DescriptorLayout layout = DescriptorLayout::kLeftAndRight) {
   constexpr int kCount = 5;
   StereoFeatures features;
   features.stamp = 1403636579763555584;
@@ -37,8 +38,6 @@ inline StereoFeatures someFeatures(ElementType type = ElementType::kBits, const 
     features.size.push_back(7.3f + x);
     features.angle.push_back(i == 0 ? -1.f : 0.3f * x);
     features.response.push_back(1e-3f * (x + 1.f));
-    features.sigma.push_back(0.21f + 0.01f * x);
-    features.octave.push_back(static_cast<std::uint8_t>(250 + i));
   }
   cv::Mat rows(kCount, type == ElementType::kFloat32 ? 64 : 16, CV_8U);
   cv::RNG random(7);
@@ -50,6 +49,9 @@ inline StereoFeatures someFeatures(ElementType type = ElementType::kBits, const 
     random.fill(rows, cv::RNG::UNIFORM, 0, 256);
   }
   features.descriptors = rows;
+  features.patch_layout = {11, 1.25f, 0.125f};
+  features.patches.create(kCount, features.patch_layout.bytes(), CV_8U);
+  random.fill(features.patches, cv::RNG::UNIFORM, 0, 256);
   features.report.detected = 1234;
   features.report.mean_intensity[0] = 101.5;
   features.report.mean_intensity[1] = 99.25;
@@ -62,7 +64,8 @@ inline StereoFeatures someFeatures(ElementType type = ElementType::kBits, const 
   return features;
 }
 
-inline FeaturesMessage someMessage(ElementType type = ElementType::kBits, const std::string& layout = "left+right") {
+inline FeaturesMessage someMessage(ElementType type = ElementType::kBits,
+                                   DescriptorLayout layout = DescriptorLayout::kLeftAndRight) {
   FeaturesMessage message = toMessage(someFeatures(type, layout), DepthScaleOptions());
   message.header.stamp.fromNSec(1403636579763555584u);
   message.header.frame_id = "left_optical";

@@ -172,8 +172,7 @@ class Replay(unittest.TestCase):
             differing = np.unpackbits(left ^ right, axis=1).mean(axis=1)
             unrelated = np.unpackbits(left ^ np.roll(right, 1, axis=0), axis=1).mean(axis=1)
             self.assertLess(np.median(differing), 0.6 * np.median(unrelated))
-            for values in (message.v, message.disparity, message.dv, message.size, message.angle, message.response,
-                           message.sigma, message.octave):
+            for values in (message.v, message.disparity, message.dv, message.size, message.angle, message.response):
                 self.assertEqual(len(values), n)
             u, v, disparity = (np.array(a) for a in (message.u, message.v, message.disparity))
             self.assertTrue(np.all((u >= 0) & (u <= message.image_width - 1) & (v >= 0) & (v <= message.image_height - 1)))
@@ -181,6 +180,8 @@ class Replay(unittest.TestCase):
             size = np.clip(message.size_slope * disparity ** message.size_exponent + message.size_offset,
                            message.size_min, message.size_max)
             np.testing.assert_allclose(message.size, size, rtol=1e-4)
+            self.assertEqual(len(message.patches), n * message.patch_side ** 2)
+            self.assertGreater(message.patch_side, 0)
             self.assertEqual(info.features, n)
 
     def test_trajectory_equals_that_of_run_sequence(self):

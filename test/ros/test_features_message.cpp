@@ -24,9 +24,9 @@ void expectSame(const StereoFeatures& a, const StereoFeatures& b) {
   EXPECT_EQ(a.size, b.size);
   EXPECT_EQ(a.angle, b.angle);
   EXPECT_EQ(a.response, b.response);
-  EXPECT_EQ(a.sigma, b.sigma);
-  EXPECT_EQ(a.octave, b.octave);
   EXPECT_TRUE(synthetic::equalMats(a.descriptors, b.descriptors));
+  EXPECT_TRUE(a.patch_layout == b.patch_layout);
+  EXPECT_TRUE(synthetic::equalMats(a.patches, b.patches));
   EXPECT_EQ(a.report.detected, b.report.detected);
   for (int side = 0; side < 2; ++side) {
     EXPECT_EQ(a.report.mean_intensity[side], b.report.mean_intensity[side]);

@@ -34,15 +34,21 @@ std::vector<Damage> allDamages() {
   std::vector<Damage> damages;
   const std::pair<std::string, std::vector<float> M::*> floats[] = {
       {"u", &M::u},       {"v", &M::v},         {"disparity", &M::disparity}, {"dv", &M::dv},
-      {"size", &M::size}, {"angle", &M::angle}, {"response", &M::response},   {"sigma", &M::sigma}};
+      {"size", &M::size}, {"angle", &M::angle}, {"response", &M::response}};
   for (const auto& [name, array] : floats) {
     addLengthDamages(damages, name, array);
     for (const float bad : {kNaN, kInfinity, -kInfinity})
       damages.push_back({name + " = " + std::to_string(bad), [a = array, bad](M& m) { (m.*a)[3] = bad; }, name});
   }
-  addLengthDamages(damages, "octave", &M::octave);
   addLengthDamages(damages, "descriptors", &M::descriptors);
-  for (const auto& [name, array] : {floats[2], floats[4], floats[7]})
+  addLengthDamages(damages, "patches", &M::patches);
+  damages.push_back({"patch_side too large", [](M& m) { m.patch_side = 0xffffffffu; }, "patch_side"});
+  damages.push_back({"patch_side of another size", [](M& m) { m.patch_side = 12; }, "patches"});
+  damages.push_back({"patch_side = 0", [](M& m) { m.patch_side = 0; }, "patches"});
+  damages.push_back({"patch_min_spacing = 0", [](M& m) { m.patch_min_spacing = 0.f; }, "patch_min_spacing"});
+  damages.push_back({"patch_min_spacing = NaN", [](M& m) { m.patch_min_spacing = kNaN; }, "patch_min_spacing"});
+  damages.push_back({"patch_spacing = -1", [](M& m) { m.patch_spacing = -1.f; }, "patch_spacing"});
+  for (const auto& [name, array] : {floats[2], floats[4]})
     for (const float bad : {0.f, -1.f})
       damages.push_back({name + " = " + std::to_string(bad), [a = array, bad](M& m) { (m.*a)[0] = bad; }, name});
 
@@ -114,10 +120,10 @@ TEST(StereoFeaturesViewTest, RefusesEveryMalformedMessage) {
 TEST(StereoFeaturesViewTest, AcceptsAsManyFeaturesAsTheDetectorMayGiveAndNoMore) {
   const auto ofCount = [](std::size_t count) {
     FeaturesMessage message = someMessage();
-    for (auto* array : {&message.u, &message.v, &message.disparity, &message.dv, &message.size, &message.angle,
-                        &message.response, &message.sigma})
+    for (auto* array :
+         {&message.u, &message.v, &message.disparity, &message.dv, &message.size, &message.angle, &message.response})
       array->assign(count, 1.f);
-    message.octave.assign(count, 0);
+    message.patches.assign(count * message.patch_side * message.patch_side, 0);
     message.descriptors.assign(count * message.bytes_per_row, 0);
     return message;
   };

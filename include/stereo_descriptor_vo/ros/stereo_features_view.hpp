@@ -33,6 +33,17 @@ class StereoFeaturesView {
   /// The right halves alone; empty when the layout is "left".
   cv::Mat rightDescriptors() const { return hasRightHalf() ? columns(viewElements(), rowElements()) : cv::Mat(); }
 
+  /// Grey patches, count() x patch_side^2, CV_8U; empty when none are sent.
+  cv::Mat patches() const {
+    if (count() == 0 || message_.patch_side == 0) return cv::Mat();
+    return cv::Mat(count(), static_cast<int>(message_.patch_side * message_.patch_side), CV_8U,
+                   const_cast<std::uint8_t*>(message_.patches.data()));
+  }
+  /// Distance of neighbouring samples of feature i's patch, px.
+  float patchSpacing(int i) const {
+    return std::max(message_.patch_min_spacing, message_.patch_spacing * message_.size[i]);
+  }
+
   /// Position of feature i in the left rectified optical frame, m.
   cv::Point3d point(int i) const {
     const double z = message_.fx * message_.baseline / message_.disparity[i];
@@ -82,8 +93,6 @@ class StereoFeaturesView {
     require(message_.size.size(), "size");
     require(message_.angle.size(), "angle");
     require(message_.response.size(), "response");
-    require(message_.sigma.size(), "sigma");
-    require(message_.octave.size(), "octave");
     if (!indexOf(namesOf(DescriptorLayout{}), message_.layout)) refuse("unknown layout '" + message_.layout + "'");
     if (!indexOf(namesOf(ElementType{}), message_.element_type))
       refuse("unknown element_type '" + message_.element_type + "'");
@@ -95,6 +104,12 @@ class StereoFeaturesView {
       refuse("descriptors has " + std::to_string(message_.descriptors.size()) + " bytes, " + std::to_string(n) +
              " rows of " + std::to_string(message_.bytes_per_row) + " need " +
              std::to_string(n * message_.bytes_per_row));
+    constexpr std::uint32_t kLargestPatch = 64;
+    if (message_.patch_side > kLargestPatch) refuse("patch_side = " + std::to_string(message_.patch_side));
+    const std::size_t patch = std::size_t(message_.patch_side) * message_.patch_side;
+    if (message_.patches.size() != n * patch)
+      refuse("patches has " + std::to_string(message_.patches.size()) + " bytes, " + std::to_string(n) +
+             " patches of " + std::to_string(patch) + " samples need " + std::to_string(n * patch));
   }
 
   void checkNumbers() const {
@@ -106,8 +121,11 @@ class StereoFeaturesView {
     if (!all(message_.u, finite) || !all(message_.v, finite) || !all(message_.dv, finite) ||
         !all(message_.angle, finite) || !all(message_.response, finite))
       refuse("u, v, dv, angle or response holds a number that is not finite");
-    if (!all(message_.disparity, positive) || !all(message_.size, positive) || !all(message_.sigma, positive))
-      refuse("disparity, size or sigma holds a number that is not positive and finite");
+    if (!all(message_.disparity, positive) || !all(message_.size, positive))
+      refuse("disparity or size holds a number that is not positive and finite");
+    const float least = message_.patch_min_spacing, by_size = message_.patch_spacing;
+    if (message_.patch_side > 0 && !(positive(least) && finite(by_size) && by_size >= 0.f))
+      refuse("patch_min_spacing must be positive, patch_spacing must not be negative");
     // A position on the border of a pixel of the border is still in the image.
     const auto within = [](float end) { return [end](float x) { return x >= -1.f && x <= end; }; };
     const auto width = static_cast<float>(message_.image_width), height = static_cast<float>(message_.image_height);

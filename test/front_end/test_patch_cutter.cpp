@@ -1,0 +1,69 @@
+#include <gtest/gtest.h>
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "stereo_descriptor_vo/front_end/patch_cutter.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr PatchLayout kLayout{5, 1.f, 0.1f};
+
+std::vector<std::uint8_t> cut(const cv::Mat& image, const PatchLayout& layout, float u, float v, float size) {
+  std::vector<std::uint8_t> samples(static_cast<std::size_t>(layout.bytes()));
+  PatchCutter(layout, image).cut(u, v, size, samples.data());
+  return samples;
+}
+
+/// Grey level 2 x + 3 y + 10: the mean of any square is the level at its centre.
+cv::Mat ramp() {
+  cv::Mat image(40, 50, CV_8U);
+  for (int y = 0; y < image.rows; ++y)
+    for (int x = 0; x < image.cols; ++x) image.at<std::uint8_t>(y, x) = static_cast<std::uint8_t>(2 * x + 3 * y + 10);
+  return image;
+}
+
+TEST(PatchCutter, OnePixelSpacingAtWholePixelsCopiesThem) {
+  cv::Mat image(20, 20, CV_8U);
+  cv::RNG(3).fill(image, cv::RNG::UNIFORM, 0, 256);
+  const std::vector<std::uint8_t> samples = cut(image, kLayout, 9.f, 7.f, 7.f);
+  for (int j = 0; j < 5; ++j)
+    for (int i = 0; i < 5; ++i)
+      EXPECT_EQ(samples[static_cast<std::size_t>(5 * j + i)], image.at<std::uint8_t>(5 + j, 7 + i)) << i << " " << j;
+}
+
+TEST(PatchCutter, SamplesLieAroundThePositionAtTheSizesSpacing) {
+  // 16 px of size: samples 1.6 px apart; columns to the right, rows downwards.
+  const float u = 20.3f, v = 15.6f, spacing = 1.6f;
+  const std::vector<std::uint8_t> samples = cut(ramp(), kLayout, u, v, 16.f);
+  for (int j = 0; j < 5; ++j)
+    for (int i = 0; i < 5; ++i) {
+      const float level = 2.f * (u + spacing * (i - 2)) + 3.f * (v + spacing * (j - 2)) + 10.f;
+      // Pixels are squares of one level, not a slope: that and rounding.
+      EXPECT_NEAR(samples[static_cast<std::size_t>(5 * j + i)], level, 0.9f) << i << " " << j;
+    }
+}
+
+TEST(PatchCutter, ASampleIsTheMeanOfItsSquare) {
+  // Black but for one white pixel: a square of 2 px that covers it has a quarter of its level.
+  cv::Mat image = cv::Mat::zeros(21, 21, CV_8U);
+  image.at<std::uint8_t>(10, 10) = 200;
+  const PatchLayout layout{3, 2.f, 0.f};
+  const std::vector<std::uint8_t> samples = cut(image, layout, 10.5f, 10.5f, 7.f);
+  for (int k = 0; k < 9; ++k) EXPECT_EQ(samples[static_cast<std::size_t>(k)], k == 4 ? 50 : 0) << k;
+}
+
+TEST(PatchCutter, SumsBeyond31BitsDoNoHarm) {
+  const cv::Mat image(3000, 3000, CV_8U, cv::Scalar(255));
+  for (const std::uint8_t sample : cut(image, kLayout, 2990.4f, 2990.7f, 7.f)) EXPECT_EQ(sample, 255);
+}
+
+TEST(PatchCutter, AcrossTheBorderNothingIsReadFromOutside) {
+  const cv::Mat image(30, 30, CV_8U, cv::Scalar(90));
+  for (const std::uint8_t sample : cut(image, kLayout, 0.f, 29.f, 7.f))
+    EXPECT_TRUE(sample == 90 || sample == 0) << int{sample};
+}
+
+}  // namespace
+}  // namespace sdvo
