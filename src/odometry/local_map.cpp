@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace sdvo {
 namespace {
@@ -42,9 +43,12 @@ LocalMap::View LocalMap::view() const {
   const std::size_t first_remembered = frames_.size() - std::min(frames_.size(), std::size_t(options_.remembered));
   const int oldest = frames_[first_remembered].id;
   for (std::size_t p = 0; p < points_.size(); ++p) {
-    if (points_[p].observations.back().frame_id < oldest) continue;
+    const auto& observations = points_[p].observations;
+    if (observations.size() < 2 && observations.back().frame_id < oldest) continue;
     Eigen::Vector3d predicted;
     if (!predictObservation(camera_, newestPose(), points_[p].position, predicted, nullptr)) continue;
+    if (predicted.x() < 0.0 || predicted.y() < 0.0 || predicted.x() > camera_.width || predicted.y() > camera_.height)
+      continue;
     view.point.push_back(static_cast<int>(p));
     view.pixels.emplace_back(static_cast<float>(predicted.x()), static_cast<float>(predicted.y()),
                              static_cast<float>(std::max(predicted.z(), kFarthestDisparity)));
@@ -80,7 +84,7 @@ void LocalMap::insert(const StereoFeatures& features, int id, const Eigen::Isome
   frames_.back().is_keyframe = needsKeyframe();
   for (int row = 0; row < features.count(); ++row)
     if (!recognised[row]) startPoint(features, row, id, T_camera_origin, calibration);
-  if (static_cast<int>(frames_.size()) > options_.keyframes + 1) removeFrame(0);
+  if (static_cast<int>(frames_.size()) > options_.keyframes + 1) forgetKeyframe();
 }
 
 LocalMap::Sighting LocalMap::sight(const PatchAlignmentOptions& options, const StereoFeatures& features,
@@ -166,6 +170,52 @@ bool LocalMap::needsKeyframe() const {
   const auto middle = parallax.begin() + static_cast<std::ptrdiff_t>(parallax.size() / 2);
   std::nth_element(parallax.begin(), middle, parallax.end());
   return *middle > options_.keyframe_parallax;
+}
+
+/// Key frames beyond the newest ones stay for what they see: the first that shares too few points with the newest pair
+/// goes, and of too many the one that adds the least to the one before it.
+void LocalMap::forgetKeyframe() {
+  const std::size_t lasting = frames_.size() - 1 - static_cast<std::size_t>(options_.keyframes);
+  const std::vector<int> shared = sharedPoints();
+  for (std::size_t f = 0; f < lasting; ++f)
+    if (shared[f] < options_.lasting_points) return removeFrame(f);
+  if (static_cast<int>(lasting) <= options_.lasting_keyframes) return;
+  std::size_t least = 0;
+  double least_parallax = std::numeric_limits<double>::max();
+  for (std::size_t f = 1; f < lasting; ++f) {
+    const double parallax = parallaxToPredecessor(f);
+    if (parallax < least_parallax) least = f, least_parallax = parallax;
+  }
+  removeFrame(least);
+}
+
+/// For each frame the points that it shares with the newest pair.
+std::vector<int> LocalMap::sharedPoints() const {
+  std::vector<int> shared(frames_.size(), 0);
+  for (const Point& point : points_) {
+    if (point.observations.back().frame_id != newestId()) continue;
+    std::size_t f = 0;
+    for (const Observation& observation : point.observations) {
+      while (frames_[f].id < observation.frame_id) ++f;
+      ++shared[f];
+    }
+  }
+  return shared;
+}
+
+/// Median distance in px by which points moved since the frame before; infinite where none are shared.
+double LocalMap::parallaxToPredecessor(std::size_t frame) const {
+  std::vector<double> parallax;
+  for (const Point& point : points_)
+    for (std::size_t k = 1; k < point.observations.size(); ++k)
+      if (point.observations[k].frame_id == frames_[frame].id &&
+          point.observations[k - 1].frame_id == frames_[frame - 1].id)
+        parallax.push_back(
+            (point.observations[k].measurement - point.observations[k - 1].measurement).head<2>().norm());
+  if (parallax.empty()) return std::numeric_limits<double>::infinity();
+  const auto middle = parallax.begin() + static_cast<std::ptrdiff_t>(parallax.size() / 2);
+  std::nth_element(parallax.begin(), middle, parallax.end());
+  return *middle;
 }
 
 void LocalMap::removeFrame(std::size_t index) {

@@ -20,6 +20,8 @@ namespace sdvo {
 struct LocalMapOptions {
   int keyframes = 8;
   int remembered = 4;
+  int lasting_keyframes = 8;
+  int lasting_points = 150;
   double keyframe_parallax = 4.0;
   double keyframe_overlap = 0.6;
   double corner_sigma = 0.4;
@@ -27,9 +29,12 @@ struct LocalMapOptions {
   double renewal_scale = 1.4;
 
   void describe(OptionList& list) {
-    list.add("keyframes", keyframes, {2, 50}, "", "key frames that the window holds beside the newest pair");
-    list.add("remembered", remembered, {1, 50}, "",
-             "a point is looked for until this many frames of the map missed it");
+    list.add("keyframes", keyframes, {2, 50}, "", "newest key frames, which the map holds whatever they see");
+    list.add("lasting_keyframes", lasting_keyframes, {0, 100}, "",
+             "older key frames that it holds at most, because they share points with the newest pair");
+    list.add("lasting_points", lasting_points, {1, 10000}, "", "points that such a key frame must share at least");
+    list.add("remembered", remembered, {1, 100}, "",
+             "a point seen once is looked for until this many frames of the map missed it");
     list.add("keyframe_parallax", keyframe_parallax, {0.0, 500.0}, "px",
              "a pair is kept as a key frame once its points moved by this median since the last one");
     list.add("keyframe_overlap", keyframe_overlap, {0.0, 1.0}, "",
@@ -123,6 +128,9 @@ class LocalMap {
     Reference reference;
   };
 
+  void forgetKeyframe();
+  std::vector<int> sharedPoints() const;
+  double parallaxToPredecessor(std::size_t frame) const;
   void removeFrame(std::size_t index);
   void cutOff(const std::vector<std::pair<int, int>>& sources, const std::vector<double>& residuals,
               Adjustment& adjustment);

@@ -12,7 +12,7 @@ namespace sdvo {
 
 struct WindowOptimizerOptions {
   int iterations = 1;
-  double kernel_scale = 2.0;
+  double kernel_scale = 1.0;
   double disparity_sigma = 0.2;
   double common_disparity_sigma = 0.3;
 
