@@ -48,7 +48,8 @@ Trajectory followFrameToFrame(const StereoCamera& camera,
       const MotionEstimate estimate = MotionEstimator(options).estimate(camera, of_pair);
       if (estimate.success) T_current_reference = estimate.T_current_reference;
     } else {
-      const Consensus consensus = findConsensus(PoseProblem(camera, of_pair, options.inlier_threshold), options);
+      const Consensus consensus =
+          findConsensus(PoseProblem(camera, of_pair, options.inlier_threshold), options, options);
       if (consensus.found) T_current_reference = consensus.T_current_reference;
     }
     poses.push_back(poses.back() * T_current_reference.inverse());

@@ -101,9 +101,9 @@ std::string runConsensus(const ConsensusExperiment& experiment, const std::strin
           options.min_iterations = std::min(options.min_iterations, budget);
           options.seed = seed;
           const PoseProblem pose_problem(camera, problem.correspondences, options.inlier_threshold);
-          if (seed == 1) findConsensus(pose_problem, options);  // warms the caches up
+          if (seed == 1) findConsensus(pose_problem, options, options);  // warms the caches up
           const std::clock_t start = std::clock();
-          const Consensus consensus = findConsensus(pose_problem, options);
+          const Consensus consensus = findConsensus(pose_problem, options, options);
           time += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
           // Against the inliers of the true motion: noise alone puts some correct matches beyond the threshold.
           inliers += static_cast<double>(consensus.inliers.size()) /

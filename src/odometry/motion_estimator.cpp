@@ -23,7 +23,7 @@ MotionEstimate MotionEstimator::estimate(const StereoCamera& camera,
 
   // Reject outliers.
   const PoseProblem problem(camera, correspondences, options_.inlier_threshold);
-  const Consensus consensus = findConsensus(problem, options_);
+  const Consensus consensus = findConsensus(problem, options_, options_);
   estimate.iterations = consensus.iterations;
   estimate.inliers = consensus.inliers;
   if (static_cast<int>(estimate.inliers.size()) < options_.min_inliers)

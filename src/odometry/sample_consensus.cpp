@@ -1,26 +1,26 @@
 #include "stereo_descriptor_vo/odometry/sample_consensus.hpp"
 
+#include <algorithm>
 #include <limits>
-
-#include "stereo_descriptor_vo/odometry/motion_refinement.hpp"
 
 namespace sdvo {
 namespace {
 
 /// Local optimisation of a new best pose over its own inliers (Chum, Matas, Kittler 2003).
-void optimiseLocally(const PoseProblem& problem, Eigen::Isometry3d& T, double& cost) {
-  MotionRefinementOptions few_steps;
-  few_steps.refinement_iterations = 3;
+void optimiseLocally(const PoseProblem& problem, MotionRefinementOptions refinement, Eigen::Isometry3d& T,
+                     double& cost) {
+  constexpr int kFewSteps = 3;
+  refinement.refinement_iterations = std::min(refinement.refinement_iterations, kFewSteps);
   Eigen::Isometry3d optimised = T;
-  refineMotion(problem.camera(), few_steps, problem.correspondences(), problem.inliers(T), optimised);
+  refineMotion(problem.camera(), refinement, problem.correspondences(), problem.inliers(T), optimised);
   const double optimised_cost = problem.truncatedCost(optimised, cost);
   if (optimised_cost >= cost) return;
   T = optimised;
   cost = optimised_cost;
 }
 
-Consensus searchAtRandom(const PoseProblem& problem, const SampleConsensusOptions& options, SampleBudget budget,
-                         std::mt19937& random) {
+Consensus searchAtRandom(const PoseProblem& problem, const SampleConsensusOptions& options,
+                         const MotionRefinementOptions& refinement, SampleBudget budget, std::mt19937& random) {
   const bool count_only = options.consensus == ConsensusMethod::kRansac;
   const bool local = options.consensus == ConsensusMethod::kLoRansac;
   Consensus consensus;
@@ -31,7 +31,7 @@ Consensus searchAtRandom(const PoseProblem& problem, const SampleConsensusOption
       if (cost >= best) continue;
       consensus.found = true;
       consensus.T_current_reference = candidate;
-      if (local) optimiseLocally(problem, consensus.T_current_reference, cost);
+      if (local) optimiseLocally(problem, refinement, consensus.T_current_reference, cost);
       best = cost;
       const double inliers = static_cast<double>(problem.inliers(consensus.T_current_reference).size());
       budget.noteInliers(inliers / problem.count());
@@ -53,14 +53,15 @@ Consensus searchByGenes(const PoseProblem& problem, const SampleConsensusOptions
 
 }  // namespace
 
-Consensus findConsensus(const PoseProblem& problem, const SampleConsensusOptions& options) {
+Consensus findConsensus(const PoseProblem& problem, const SampleConsensusOptions& options,
+                        const MotionRefinementOptions& refinement) {
   constexpr int kSmallestProblem = 4;  // the genetic search needs a gene to exchange
   if (problem.count() < kSmallestProblem) return {};
   std::mt19937 random(static_cast<std::uint32_t>(options.seed));
   const bool genetic = options.consensus == ConsensusMethod::kGasac || options.consensus == ConsensusMethod::kAdaptiveGasac;
   const SampleBudget budget(options.min_iterations, options.max_iterations, options.confidence);
-  Consensus consensus =
-      genetic ? searchByGenes(problem, options, budget, random) : searchAtRandom(problem, options, budget, random);
+  Consensus consensus = genetic ? searchByGenes(problem, options, budget, random)
+                                : searchAtRandom(problem, options, refinement, budget, random);
   if (consensus.found) consensus.inliers = problem.inliers(consensus.T_current_reference);
   return consensus;
 }

@@ -48,7 +48,7 @@ Consensus search(const Scene& scene, const std::string& method, int seed = 1, in
   options.consensus = valueOf<ConsensusMethod>(method);
   options.seed = seed;
   options.max_iterations = max_iterations;
-  return findConsensus(PoseProblem(scene.camera, scene.correspondences, options.inlier_threshold), options);
+  return findConsensus(PoseProblem(scene.camera, scene.correspondences, options.inlier_threshold), options, {});
 }
 
 class EveryMethod : public testing::TestWithParam<const char*> {};
@@ -131,6 +131,23 @@ TEST(SampleConsensus, LocalOptimisationFindsMoreInliers) {
     optimised += search(scene, "lo_ransac", static_cast<int>(seed)).inliers.size();
   }
   EXPECT_GT(optimised, plain);
+}
+
+TEST(SampleConsensus, LocalOptimisationUsesTheKernelOfTheRefinement) {
+  const Scene scene = makeScene(200, 0.4, 0.7, 1);
+  SampleConsensusOptions options;
+  options.consensus = ConsensusMethod::kLoRansac;
+  const PoseProblem problem(scene.camera, scene.correspondences, options.inlier_threshold);
+  const auto poseWith = [&](RobustKernel kernel, double scale) {
+    MotionRefinementOptions refinement;
+    refinement.kernel = kernel;
+    refinement.kernel_scale = scale;
+    return findConsensus(problem, options, refinement).T_current_reference.matrix();
+  };
+  const Eigen::Matrix4d cauchy = poseWith(RobustKernel::kCauchy, 1.0);
+  EXPECT_EQ(cauchy, poseWith(RobustKernel::kCauchy, 1.0));
+  EXPECT_NE(cauchy, poseWith(RobustKernel::kCauchy, 0.2));
+  EXPECT_NE(cauchy, poseWith(RobustKernel::kHuber, 1.0));
 }
 
 }  // namespace

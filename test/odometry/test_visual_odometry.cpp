@@ -290,6 +290,13 @@ TEST(VisualOdometry, RefusesStampsThatDoNotIncreaseAndGoesOn) {
   broken = pairOf(6);
   broken.v.pop_back();
   EXPECT_THROW(disturbed.update(broken), std::invalid_argument);
+  broken = pairOf(8);
+  broken.descriptors.convertTo(broken.descriptors, CV_32F);
+  EXPECT_THROW(disturbed.update(broken), std::invalid_argument);
+  broken = pairOf(8);
+  broken.element_type = ElementType::kFloat32;
+  broken.descriptors = broken.descriptors.colRange(0, 126).clone();
+  EXPECT_THROW(disturbed.update(broken), std::invalid_argument);
 
   const OdometryResult a = disturbed.update(pairOf(6)), b = undisturbed.update(pairOf(6));
   EXPECT_EQ(a.state, b.state);
@@ -354,6 +361,22 @@ TEST(VisualOdometry, StartsAgainFromTheLastPoseWithAnotherDescriptor) {
   EXPECT_EQ(again.epoch, before.epoch + 1);
   EXPECT_TRUE(again.T_origin_camera.isApprox(before.T_origin_camera, 1e-9));
   EXPECT_EQ(odometry.update(leftPair(7)).state, TrackingState::kTracking);
+}
+
+TEST(VisualOdometry, StartsAgainFromTheLastPoseWithOtherElements) {
+  // The same bytes to be read as numbers: neither the name nor the width of the rows tells the difference.
+  VisualOdometry odometry({});
+  const OdometryResult before = follow(odometry, 5);
+  const auto pairOfNumbers = [&](int i) {
+    StereoFeatures features = pairOf(i);
+    features.element_type = ElementType::kUint8;
+    return features;
+  };
+  OdometryResult again;
+  ASSERT_NO_THROW(again = odometry.update(pairOfNumbers(6)));
+  EXPECT_EQ(again.epoch, before.epoch + 1);
+  EXPECT_TRUE(again.T_origin_camera.isApprox(before.T_origin_camera, 1e-9));
+  EXPECT_EQ(odometry.update(pairOfNumbers(7)).state, TrackingState::kTracking);
 }
 
 TEST(VisualOdometry, BrokenStreamStartsAgainFromTheLastPose) {

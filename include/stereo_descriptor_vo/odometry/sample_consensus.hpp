@@ -6,6 +6,7 @@
 
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/odometry/genetic_consensus.hpp"
+#include "stereo_descriptor_vo/odometry/motion_refinement.hpp"
 #include "stereo_descriptor_vo/odometry/pose_problem.hpp"
 
 namespace sdvo {
@@ -46,8 +47,10 @@ struct Consensus {
   int iterations = 0;        ///< minimal samples solved
 };
 
-/// Searches by the method named in the options; all of them share solver, scoring and the bound on samples. Not found
-/// when no sample gives a pose.
-Consensus findConsensus(const PoseProblem& problem, const SampleConsensusOptions& options);
+/// Searches by the method named in the options; all of them share solver, scoring and the bound on samples. Where the
+/// method refines on the way (lo_ransac), it does so as `refinement` says, but in a few steps. Not found when no sample
+/// gives a pose.
+Consensus findConsensus(const PoseProblem& problem, const SampleConsensusOptions& options,
+                        const MotionRefinementOptions& refinement);
 
 }  // namespace sdvo
