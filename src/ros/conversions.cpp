@@ -16,6 +16,8 @@
 namespace sdvo::ros_conversions {
 namespace {
 
+namespace encodings = sensor_msgs::image_encodings;
+
 /// The bytes of a matrix, row by row.
 std::vector<std::uint8_t> bytesOf(const cv::Mat& matrix) {
   CV_Assert(matrix.empty() || matrix.isContinuous());
@@ -62,6 +64,25 @@ void fillCovariance(const Matrix6d& covariance, Covariance& message) {
     for (int column = 0; column < 6; ++column) message[6 * row + column] = symmetric(row, column);
 }
 
+/// The pixels of a mono16 image in this machine's order of bytes; refers to the message where that is its order.
+cv::Mat pixelsOf16Bits(const sensor_msgs::Image& message) {
+  const std::size_t rows = message.height, columns = message.width, step = message.step;
+  if (step < 2 * columns || message.data.size() < step * rows)
+    throw std::invalid_argument("malformed image: " + std::to_string(message.data.size()) + " bytes in rows of " +
+                                std::to_string(step) + " for " + std::to_string(columns) + "x" + std::to_string(rows) +
+                                " pixels of 2 bytes");
+  const cv::Mat bytes(static_cast<int>(rows), static_cast<int>(columns), CV_8UC2,
+                      const_cast<std::uint8_t*>(message.data.data()), step);
+  const std::uint16_t probe = 1;
+  const bool machine_is_bigendian = *reinterpret_cast<const std::uint8_t*>(&probe) == 0;
+  if ((message.is_bigendian != 0) == machine_is_bigendian)
+    return cv::Mat(bytes.rows, bytes.cols, CV_16U, bytes.data, step);
+  cv::Mat swapped(bytes.size(), CV_8UC2);
+  const int from_to[] = {0, 1, 1, 0};
+  cv::mixChannels(&bytes, 1, &swapped, 1, from_to, 2);
+  return cv::Mat(swapped.rows, swapped.cols, CV_16U, swapped.data, swapped.step).clone();
+}
+
 }  // namespace
 
 std::string cleanFrameId(const std::string& frame_id) {
@@ -100,14 +121,27 @@ StereoCamera toStereoCamera(const sensor_msgs::CameraInfo& left, const sensor_ms
   return camera;
 }
 
-cv::Mat toGrey(const sensor_msgs::ImageConstPtr& message) {
-  namespace encodings = sensor_msgs::image_encodings;
+int bitDepth(const sensor_msgs::Image& message) {
+  if (message.encoding != encodings::MONO16) return 8;
+  double brightest = 0.0;
+  cv::minMaxLoc(pixelsOf16Bits(message), nullptr, &brightest);
+  for (int bits = 8; bits < 16; bits += 2)
+    if (brightest < (1 << bits)) return bits;
+  return 16;
+}
+
+cv::Mat toGrey(const sensor_msgs::ImageConstPtr& message, int bits) {
   static const std::set<std::string> supported = {encodings::MONO8, encodings::TYPE_8UC1, encodings::MONO16,
                                                   encodings::BGR8,  encodings::RGB8,      encodings::BGRA8,
                                                   encodings::RGBA8};
   if (supported.count(message->encoding) == 0)
     throw std::invalid_argument("encoding '" + message->encoding +
                                 "' is not supported: mono8, 8UC1, mono16, bgr8, rgb8, bgra8 and rgba8 are");
+  if (message->encoding == encodings::MONO16) {
+    cv::Mat grey;
+    pixelsOf16Bits(*message).convertTo(grey, CV_8U, 255.0 / ((1 << bits) - 1));
+    return grey;
+  }
   try {
     const bool is_grey = message->encoding == encodings::MONO8 || message->encoding == encodings::TYPE_8UC1;
     return cv_bridge::toCvShare(message, is_grey ? std::string() : std::string(encodings::MONO8))->image;
@@ -205,15 +239,15 @@ StereoFeatures fromMessage(const stereo_descriptor_vo::StereoFeatures& message) 
 }
 
 nav_msgs::Odometry toOdometry(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera,
-                              const OdometryFrames& frames) {
+                              const OdometryFrames& frames, const Eigen::Isometry3d& T_odom_start) {
   nav_msgs::Odometry odometry;
   odometry.header.stamp.fromNSec(static_cast<std::uint64_t>(result.stamp));
   odometry.header.frame_id = frames.odom;
   odometry.child_frame_id = frames.base;
 
-  // odom is the base's first pose, as the core's origin is the camera's.
+  // The base starts where the core's origin, the camera's first pose, puts it.
   const Eigen::Isometry3d T_odom_base =
-      orthonormalised(T_base_camera * result.T_origin_camera * T_base_camera.inverse());
+      orthonormalised(T_odom_start * T_base_camera * result.T_origin_camera * T_base_camera.inverse());
   odometry.pose.pose = tf2::toMsg(T_odom_base);
 
   // Perturbations of the camera, in its own axes, become those of the base; then the axes of odom.

@@ -26,10 +26,14 @@ std::string cleanFrameId(const std::string& frame_id);
 /// Throws std::invalid_argument when the cameras are uncalibrated, differ, or the baseline is not positive.
 StereoCamera toStereoCamera(const sensor_msgs::CameraInfo& left, const sensor_msgs::CameraInfo& right);
 
+/// Bits that the brightest pixel needs: 10, 12, 14 or 16 for mono16, as which cameras of any depth send their images; 8
+/// for every other encoding and for a dark image. Throws as toGrey() does.
+int bitDepth(const sensor_msgs::Image& message);
+
 /// CV_8U grey pixels of mono8, 8UC1, mono16, bgr8, rgb8, bgra8 and rgba8; shares the message's memory where it can, so
-/// that the message must outlive the result.
+/// that the message must outlive the result. `bits`: mono16 only, depth of the pixel that becomes 255.
 /// Throws std::invalid_argument for any other encoding and for images whose size and data disagree.
-cv::Mat toGrey(const sensor_msgs::ImageConstPtr& message);
+cv::Mat toGrey(const sensor_msgs::ImageConstPtr& message, int bits = 16);
 
 /// Header, stream epoch and drop counter are the caller's to fill.
 stereo_descriptor_vo::StereoFeatures toMessage(const StereoFeatures& features, const DepthScaleOptions& size_curve);
@@ -44,10 +48,11 @@ struct OdometryFrames {
 };
 
 /// Pose of the base in odom, twist in the base frame, both covariances in ROS' conventions (row-major, translation
-/// first, rotation about the fixed axes of the frame). `result` must have a pose. The odom frame is the base's first
+/// first, rotation about the fixed axes of the frame). `result` must have a pose. `T_odom_start`: the base's first
 /// pose.
 nav_msgs::Odometry toOdometry(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera,
-                              const OdometryFrames& frames);
+                              const OdometryFrames& frames,
+                              const Eigen::Isometry3d& T_odom_start = Eigen::Isometry3d::Identity());
 
 /// The transform of an odometry message: odom -> base, or base -> odom when inverted.
 geometry_msgs::TransformStamped toTransform(const nav_msgs::Odometry& odometry, bool inverted);

@@ -7,6 +7,7 @@
 #include <stereo_descriptor_vo/FeatureFlow.h>
 #include <stereo_descriptor_vo/StereoFeatures.h>
 
+#include <algorithm>
 #include <memory>
 #include <mutex>
 #include <pluginlib/class_list_macros.hpp>
@@ -72,7 +73,9 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
   void draw(const sensor_msgs::ImageConstPtr& left, const sensor_msgs::ImageConstPtr& right,
             const Features::ConstPtr& features, const Flow::ConstPtr& flow) try {
     cv_bridge::CvImage picture(left->header, sensor_msgs::image_encodings::BGR8);
-    picture.image = drawFeatures(ros_conversions::toGrey(left), ros_conversions::toGrey(right), *features, *flow);
+    const int depth = std::max(ros_conversions::bitDepth(*left), ros_conversions::bitDepth(*right));
+    picture.image =
+        drawFeatures(ros_conversions::toGrey(left, depth), ros_conversions::toGrey(right, depth), *features, *flow);
     publisher_.publish(picture.toImageMsg());
   } catch (const std::exception& e) {
     if (throttle_.allows(e.what()))

@@ -29,8 +29,17 @@ void OdometryDiagnostics::note(const stereo_descriptor_vo::VoInfo& info) {
   last_time_ = std::chrono::steady_clock::now();
 }
 
+void OdometryDiagnostics::notePaused(bool is_paused) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  is_paused_ = is_paused;
+}
+
 void OdometryDiagnostics::diagnose(Status& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
+  if (is_paused_) {
+    status.summary(Level::WARN, "paused");
+    return;
+  }
   if (!last_) {
     status.summary(Level::WARN, "no features yet on " + input_);
     return;

@@ -22,6 +22,8 @@ class OdometryDiagnostics {
 
   /// Of each pair, as published.
   void note(const stereo_descriptor_vo::VoInfo& info);
+  /// While paused, silence is no fault.
+  void notePaused(bool is_paused);
 
  private:
   using Status = diagnostic_updater::DiagnosticStatusWrapper;
@@ -37,6 +39,7 @@ class OdometryDiagnostics {
   std::mutex mutex_;
   std::optional<stereo_descriptor_vo::VoInfo> last_;
   std::chrono::steady_clock::time_point last_time_;
+  bool is_paused_ = false;
 
   diagnostic_updater::FrequencyStatus rate_;
   diagnostic_updater::Updater updater_;

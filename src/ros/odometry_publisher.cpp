@@ -21,8 +21,8 @@ OdometryPublisher::OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOp
 
 void OdometryPublisher::publish(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera) {
   if (!result.has_pose) return;
-  const auto odometry =
-      boost::make_shared<nav_msgs::Odometry>(ros_conversions::toOdometry(result, T_base_camera, frames_));
+  const auto odometry = boost::make_shared<nav_msgs::Odometry>(
+      ros_conversions::toOdometry(result, T_base_camera, frames_, T_odom_start_));
   // TF first: whoever acts on the odometry finds the transform there.
   if (options_.publish_tf) broadcaster_.sendTransform(ros_conversions::toTransform(*odometry, options_.invert_tf));
   odom_publisher_.publish(odometry);
@@ -51,11 +51,19 @@ void OdometryPublisher::publishPoints(const stereo_descriptor_vo::StereoFeatures
     points_publisher_.publish(boost::make_shared<sensor_msgs::PointCloud2>(ros_conversions::toPointCloud(features)));
 }
 
-void OdometryPublisher::restartPath() {
+void OdometryPublisher::restart(const Eigen::Isometry3d& T_odom_start) {
+  T_odom_start_ = T_odom_start;
+  const std::lock_guard<std::mutex> lock(path_mutex_);
   path_.poses.clear();
 }
 
+nav_msgs::Path OdometryPublisher::path() const {
+  const std::lock_guard<std::mutex> lock(path_mutex_);
+  return path_;
+}
+
 void OdometryPublisher::extendPath(const nav_msgs::Odometry& odometry) {
+  const std::lock_guard<std::mutex> lock(path_mutex_);
   path_.header = odometry.header;
   geometry_msgs::PoseStamped pose;
   pose.header = odometry.header;

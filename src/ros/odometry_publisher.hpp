@@ -4,6 +4,8 @@
 #include <ros/node_handle.h>
 #include <tf2_ros/transform_broadcaster.h>
 
+#include <mutex>
+
 #include "../config/nodelet_options.hpp"
 #include "conversions.hpp"
 
@@ -20,8 +22,11 @@ class OdometryPublisher {
   stereo_descriptor_vo::VoInfo publishInfo(stereo_descriptor_vo::VoInfo info, const ros::Time& stamp);
   void publishFlow(const OdometryResult& result, const StereoFeatures& features, const std_msgs::Header& header);
   void publishPoints(const stereo_descriptor_vo::StereoFeatures& features);
-  /// After a return to the origin: the path begins anew.
-  void restartPath();
+  /// The odometry has been reset: the path begins anew, and the base is here in odom.
+  void restart(const Eigen::Isometry3d& T_odom_start);
+
+  /// The poses since the last reset, the newest `max_path_length` of them. From any thread.
+  nav_msgs::Path path() const;
 
  private:
   void extendPath(const nav_msgs::Odometry& odometry);
@@ -31,6 +36,8 @@ class OdometryPublisher {
   const ros::Time session_;
   ros::Publisher odom_publisher_, path_publisher_, info_publisher_, points_publisher_, flow_publisher_;
   tf2_ros::TransformBroadcaster broadcaster_;
+  Eigen::Isometry3d T_odom_start_ = Eigen::Isometry3d::Identity();
+  mutable std::mutex path_mutex_;
   nav_msgs::Path path_;
 };
 

@@ -1,5 +1,6 @@
 #include <nodelet/nodelet.h>
 
+#include <algorithm>
 #include <atomic>
 #include <boost/make_shared.hpp>
 #include <cmath>
@@ -162,8 +163,9 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     }
     const StereoCamera given = ros_conversions::toStereoCamera(*pair.left_info, *pair.right_info);
     const StereoCamera camera = camera_ && agree(*camera_, given) ? *camera_ : given;
-    const cv::Mat left = ros_conversions::toGrey(pair.left_image);
-    const cv::Mat right = ros_conversions::toGrey(pair.right_image);
+    noteDepth(pair);
+    const cv::Mat left = ros_conversions::toGrey(pair.left_image, bit_depth_);
+    const cv::Mat right = ros_conversions::toGrey(pair.right_image, bit_depth_);
     const StereoFeatures features = extractor_->extract(camera, left, right, nanoseconds(stamp));
     // Only now: a calibration that does not fit the images was refused and is no new stream.
     updateCamera(camera);
@@ -179,6 +181,15 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     if (throttle_.allows(e.what()))
       NODELET_ERROR_STREAM("pair at " << passed.item.left_image->header.stamp << " of "
                                       << passed.item.left_image->header.frame_id << " skipped: " << e.what());
+  }
+
+  /// One depth for both sides and the whole stream, so that grey levels keep their meaning from pair to pair.
+  void noteDepth(const StereoPairMessages& pair) {
+    const int depth =
+        std::max(ros_conversions::bitDepth(*pair.left_image), ros_conversions::bitDepth(*pair.right_image));
+    if (depth <= bit_depth_) return;
+    bit_depth_ = depth;
+    if (depth > 8) NODELET_INFO_STREAM("mono16 images hold " << depth << " bits");
   }
 
   void updateCamera(const StereoCamera& camera) {
@@ -212,6 +223,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   std::unique_ptr<FeatureExtractor> extractor_;
   std::optional<StereoCamera> camera_;
   int timeline_ = 0;
+  int bit_depth_ = 8;
   std::uint32_t stream_epoch_ = 0;
 
   std::mutex connect_mutex_;

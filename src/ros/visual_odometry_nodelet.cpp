@@ -1,13 +1,19 @@
 #include <nodelet/nodelet.h>
 #include <std_srvs/Empty.h>
+#include <std_srvs/Trigger.h>
+#include <stereo_descriptor_vo/ResetToPose.h>
+#include <stereo_descriptor_vo/SaveTrajectory.h>
 
 #include <atomic>
+#include <cmath>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <pluginlib/class_list_macros.hpp>
 #include <stdexcept>
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "../config/nodelet_options.hpp"
 #include "callback_thread.hpp"
@@ -22,6 +28,7 @@
 #include "stamps.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 #include "stereo_descriptor_vo/ros/stereo_features_view.hpp"
+#include "trajectory_file.hpp"
 #include "worker.hpp"
 
 namespace sdvo {
@@ -53,18 +60,22 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   using FeaturesFilter = StampFilter<FeaturesMessagePtr>;
 
   void onInit() override try {
-    ros::NodeHandle nh = callbacks_.serve(getNodeHandle());
+    nh_ = callbacks_.serve(getNodeHandle());
     ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
       NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect");
     odometry_ = std::make_unique<VisualOdometry>(options_.odometry);
-    publisher_ = std::make_unique<OdometryPublisher>(nh, options_.output);
-    transforms_ = std::make_unique<RobotTransforms>(nh, publishedFrames(), [this](const std::string& what) {
+    publisher_ = std::make_unique<OdometryPublisher>(nh_, options_.output);
+    transforms_ = std::make_unique<RobotTransforms>(nh_, publishedFrames(), [this](const std::string& what) {
       if (throttle_.allows(what)) NODELET_WARN_STREAM(what);
     });
-    diagnostics_ = std::make_unique<OdometryDiagnostics>(nh, private_nh, getName(), nh.resolveName("stereo_features"),
+    diagnostics_ = std::make_unique<OdometryDiagnostics>(nh_, private_nh, getName(), nh_.resolveName("stereo_features"),
                                                          options_.output.max_silence);
-    reset_service_ = private_nh.advertiseService("reset", &VisualOdometryNodelet::onReset, this);
+    services_ = {private_nh.advertiseService("reset", &VisualOdometryNodelet::onReset, this),
+                 private_nh.advertiseService("reset_to_pose", &VisualOdometryNodelet::onResetToPose, this),
+                 private_nh.advertiseService("pause", &VisualOdometryNodelet::onPause, this),
+                 private_nh.advertiseService("resume", &VisualOdometryNodelet::onResume, this),
+                 private_nh.advertiseService("save_trajectory", &VisualOdometryNodelet::onSaveTrajectory, this)};
 
     reconfigured_ = options_.odometry;
     reconfigure_server_ =
@@ -73,11 +84,15 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     worker_ = std::make_unique<Worker<FeaturesFilter::Passed>>(
         static_cast<std::size_t>(options_.output.queue_size),
         [this](const FeaturesFilter::Passed& passed) { process(passed); });
-    subscriber_ = nh.subscribe<FeaturesMessage>("stereo_features", kArrivalQueue,
-                                                [this](const FeaturesMessagePtr& m) { onFeatures(m); });
+    subscribe();
     callbacks_.start();
   } catch (const std::exception& e) {
     NODELET_FATAL_STREAM("not started: " << e.what());
+  }
+
+  void subscribe() {
+    subscriber_ = nh_.subscribe<FeaturesMessage>("stereo_features", kArrivalQueue,
+                                                 [this](const FeaturesMessagePtr& m) { onFeatures(m); });
   }
 
   /// Parent and child of the transform that goes out on TF.
@@ -137,8 +152,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   void process(const FeaturesFilter::Passed& passed) try {
     const FeaturesMessage& message = *passed.item;
     takeOverOptions();
-    if (std::exchange(timeline_, passed.timeline) != passed.timeline) restart("the clock jumped back");
-    if (reset_requested_.exchange(false)) restart("reset was called");
+    if (std::exchange(timeline_, passed.timeline) != passed.timeline)
+      restart("the clock jumped back", Eigen::Isometry3d::Identity());
+    if (const std::optional<Eigen::Isometry3d> start = takeRequestedStart()) restart("reset was called", *start);
+    if (resumed_.exchange(false)) odometry_->breakStream();
     const std::string problem = findExtrinsic(ros_conversions::cleanFrameId(message.header.frame_id));
     if (!problem.empty()) {
       OdometryResult waiting;
@@ -172,7 +189,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   }
 
   void report(const OdometryResult& result, const ros::Time& stamp) {
-    if (result.state != TrackingState::kLost && result.state != TrackingState::kDegraded) return;
+    if (result.state == TrackingState::kTracking) return;
     // Each start is told apart from the predictions that go before it.
     const bool started_again = result.has_pose && !result.has_motion;
     if (throttle_.allows(started_again ? "started again" : toString(result.state)))
@@ -180,10 +197,12 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
                           << " at " << stamp << ", epoch " << result.epoch << ": " << result.reason);
   }
 
-  void restart(const char* why) {
-    NODELET_WARN_STREAM(why << ": the odometry starts again from the origin");
+  void restart(const char* why, const Eigen::Isometry3d& T_odom_start) {
+    NODELET_WARN_STREAM(
+        why << ": the odometry starts again from "
+            << (T_odom_start.isApprox(Eigen::Isometry3d::Identity()) ? "the origin" : "the given pose"));
     odometry_->reset();
-    publisher_->restartPath();
+    publisher_->restart(T_odom_start);
     processed_epoch_.reset();
   }
 
@@ -199,7 +218,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     for (;;) {
       const std::optional<Eigen::Isometry3d> found = transforms_->find(base_frame, camera_frame, problem);
       if (found) {
-        T_base_camera_ = found;
+        {
+          const std::lock_guard<std::mutex> lock(pending_mutex_);  // others read it there
+          T_base_camera_ = found;
+        }
         camera_frame_ = camera_frame;
         warnIfNotOptical();
         return "";
@@ -222,8 +244,73 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
                              "right, REP-103) was expected, the odometry will move along the wrong axes");
   }
 
+  // The services. The worker takes a new start over before its next message.
+
+  void requestStart(const Eigen::Isometry3d& T_odom_start) {
+    const std::lock_guard<std::mutex> lock(pending_mutex_);
+    requested_start_ = T_odom_start;
+  }
+
+  std::optional<Eigen::Isometry3d> takeRequestedStart() {
+    const std::lock_guard<std::mutex> lock(pending_mutex_);
+    return std::exchange(requested_start_, std::nullopt);
+  }
+
   bool onReset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
-    reset_requested_ = true;
+    requestStart(Eigen::Isometry3d::Identity());
+    return true;
+  }
+
+  bool onResetToPose(stereo_descriptor_vo::ResetToPose::Request& request,
+                     stereo_descriptor_vo::ResetToPose::Response& response) {
+    constexpr double kUnitLength = 1e-3;
+    const auto& p = request.pose.position;
+    const auto& q = request.pose.orientation;
+    const Eigen::Quaterniond rotation(q.w, q.x, q.y, q.z);
+    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+      response.message = "the position is not finite";
+    else if (!(std::abs(rotation.norm() - 1.0) <= kUnitLength))
+      response.message = "the quaternion has not unit length";
+    else
+      requestStart(Eigen::Translation3d(p.x, p.y, p.z) * rotation.normalized());
+    response.success = response.message.empty();
+    return true;
+  }
+
+  /// Without a subscriber the image side rests too.
+  bool onPause(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+    response.success = true;
+    response.message = subscriber_ ? "paused" : "was paused already";
+    subscriber_.shutdown();
+    diagnostics_->notePaused(true);
+    return true;
+  }
+
+  bool onResume(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
+    response.success = true;
+    response.message = subscriber_ ? "was not paused" : "resumed; the motion in between is unknown";
+    if (subscriber_) return true;
+    resumed_ = true;
+    diagnostics_->notePaused(false);
+    subscribe();
+    return true;
+  }
+
+  bool onSaveTrajectory(stereo_descriptor_vo::SaveTrajectory::Request& request,
+                        stereo_descriptor_vo::SaveTrajectory::Response& response) try {
+    const nav_msgs::Path path = publisher_->path();
+    if (path.poses.empty()) throw std::runtime_error("there is no pose yet");
+    Eigen::Isometry3d T_base_camera;
+    {
+      const std::lock_guard<std::mutex> lock(pending_mutex_);
+      T_base_camera = *T_base_camera_;
+    }
+    saveTrajectory(path, T_base_camera, request.format, request.path);
+    response.success = true;
+    response.message = std::to_string(path.poses.size()) + " poses";
+    return true;
+  } catch (const std::exception& e) {
+    response.message = e.what();
     return true;
   }
 
@@ -231,6 +318,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   static constexpr int kArrivalQueue = 20;
 
   CallbackThread callbacks_;
+  ros::NodeHandle nh_;
   Options options_;
   VisualOdometryOptions reconfigured_;  // the server's
   std::mutex pending_mutex_;
@@ -240,8 +328,9 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   std::unique_ptr<RobotTransforms> transforms_;
   std::unique_ptr<OdometryPublisher> publisher_;
   std::unique_ptr<OdometryDiagnostics> diagnostics_;
-  ros::ServiceServer reset_service_;
-  std::atomic<bool> reset_requested_{false}, stopping_{false};
+  std::vector<ros::ServiceServer> services_;
+  std::optional<Eigen::Isometry3d> requested_start_;  // under pending_mutex_
+  std::atomic<bool> resumed_{false}, stopping_{false};
 
   // Only the callbacks' thread touches these.
   FeaturesFilter filter_;

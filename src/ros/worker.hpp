@@ -36,8 +36,8 @@ class Worker {
     wake_.notify_one();
   }
 
-  /// Waits for the item in work; those that wait are left. For an owner whose handler refers to this worker: the pointer
-  /// to it must stay until then.
+  /// Waits for the item in work; those that wait are left. For an owner whose handler refers to this worker: the
+  /// pointer to it must stay until then.
   void stop() {
     {
       const std::lock_guard<std::mutex> lock(mutex_);

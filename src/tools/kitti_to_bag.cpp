@@ -130,6 +130,9 @@ class BagWriter {
  public:
   explicit BagWriter(const std::string& path) : final_(path), partial_(path + ".active") {
     if (fs::is_directory(final_)) throw std::runtime_error("--output '" + path + "' is a directory, not a file name");
+    // A device or a pipe would be replaced by the bag.
+    if (fs::exists(final_) && !fs::is_regular_file(final_))
+      throw std::runtime_error("--output '" + path + "' is no regular file");
     guard("create (does its directory exist, may I write there?)",
           [&] { bag_->open(partial_, rosbag::bagmode::Write); });
   }

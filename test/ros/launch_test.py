@@ -1,13 +1,17 @@
 #!/usr/bin/python3
 """What the launch files set on the parameter server, without starting anything."""
 
+import os
 import subprocess
 import sys
 import tempfile
 import unittest
 
+import rosbag
+import rospy
 import rostest
 import yaml
+from sensor_msgs.msg import CameraInfo
 
 PACKAGE = 'stereo_descriptor_vo'
 # Under the nodelets' names; what an argument of the launch file can set.
@@ -44,6 +48,24 @@ class Launch(unittest.TestCase):
             self.assertEqual([found[ARGUMENTS[name]] for name in ('publish_tf', 'queue_size', 'odom_frame_id')],
                              [True, 30, 'odom_2'])
             self.assertEqual(found[ARGUMENTS['base_frame_id']], 'robot')
+
+    def test_kitti_launch_fails_for_a_bag_that_cannot_be_read(self):
+        with tempfile.TemporaryDirectory() as directory:
+            good, bad = os.path.join(directory, 'good.bag'), os.path.join(directory, 'bad.bag')
+            with rosbag.Bag(good, 'w') as bag:
+                bag.write('/stereo/left/camera_info', CameraInfo(), rospy.Time(1))
+            with open(good, 'rb') as whole, open(bad, 'wb') as half:
+                half.write(whole.read()[:4200])
+
+            def launch(*arguments):
+                return subprocess.run(['roslaunch'] + list(arguments[1:]) + [PACKAGE, 'kitti.launch', 'rviz:=false',
+                                                                             'bag:=' + arguments[0]],
+                                      cwd=directory, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
+            self.assertEqual(launch(good, '--dump-params').stderr, b'')
+            for bag in (bad, os.path.join(directory, 'missing.bag'), 'good.bag'):  # the player has another directory
+                outcome = launch(bag)
+                self.assertNotEqual(outcome.returncode, 0, bag)
+                self.assertIn(bag.encode(), outcome.stderr)
 
 
 if __name__ == '__main__':

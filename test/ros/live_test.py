@@ -3,6 +3,8 @@
 waits for the answer to each pair, so that nothing depends on the machine's speed."""
 
 import copy
+import os
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -17,16 +19,17 @@ import rospy
 import rostest
 import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import Pose, TransformStamped
 from nav_msgs.msg import Odometry, Path
 from nodelet.srv import NodeletLoad, NodeletUnload
 from sensor_msgs.msg import Image
-from std_srvs.srv import Empty
+from std_srvs.srv import Empty, Trigger
 from tf2_msgs.msg import TFMessage
 
 from kitti_replay import (FRAME, PACKAGE, Camera, Collector, Pipeline, Rosout, SimulatedClock, StereoSequence,
                           links, matrix_of, wait_until)
 from stereo_descriptor_vo.msg import FeatureFlow, StereoFeatures, VoInfo
+from stereo_descriptor_vo.srv import ResetToPose, SaveTrajectory
 
 PAIRS = 14  # 1.3 s: a jump back to the first one is no mere lateness
 SILENCE = 1.0  # s; a pair takes a tenth of it
@@ -378,6 +381,62 @@ class Live(unittest.TestCase):
         self.assertTrue(wait_until(lambda: path[-1].header.stamp == after.header.stamp))
         self.assertEqual(len(path[-1].poses), 1)  # no line from the last place to the origin
 
+    def service(self, name, service_type, *arguments):
+        return rospy.ServiceProxy('%s/visual_odometry/%s' % (self.namespace, name), service_type)(*arguments)
+
+    def test_reset_to_a_pose(self):
+        self.start()
+        before = self.feed(0)
+        place = Pose()
+        place.position.x, place.position.y = 10.0, 5.0
+        self.assertFalse(self.service('reset_to_pose', ResetToPose, place).success)  # a quaternion of zeros
+        place.orientation.w = 1.0
+        self.assertTrue(self.service('reset_to_pose', ResetToPose, place).success)
+        after = [self.feed(i) for i in range(1, 5)]
+        self.assertEqual({info.epoch for info in after}, {before.epoch + 1})
+        self.assertEqual(self.odometry[1].pose.pose, place)
+        self.assertGreater(self.odometry[-1].pose.pose.position.x, 11.0)
+
+    def test_pause_and_resume(self):
+        self.start()
+        self.features.close()
+        before = [self.feed_alone(i) for i in range(3)][-1]
+        self.assertTrue(self.service('pause', Trigger).success)
+        self.assertTrue(self.service('pause', Trigger).success)
+        self.assertTrue(wait_until(lambda: not self.camera.has_subscribers()))  # the image side rests too
+        self.assertFalse(self.is_answered(3))
+        self.assertTrue(wait_until(lambda: self.diagnosis().message == 'paused'), self.diagnosis())
+        self.assertTrue(self.service('resume', Trigger).success)
+        self.assertTrue(wait_until(lambda: self.camera.is_subscribed() and self.pipeline.is_connected(())))
+        after = [self.feed_alone(i) for i in range(4, 7)]
+        self.assertEqual([info.state for info in after], ['DEGRADED', 'TRACKING', 'TRACKING'])
+        self.assertEqual({info.epoch for info in after}, {before.epoch + 1})
+
+    def feed_alone(self, i):
+        """As feed(), where nobody but the odometry listens to the features."""
+        self.assertTrue(wait_until(lambda: self.is_answered(i)))
+        return self.info[-1]
+
+    def test_save_trajectory(self):
+        self.start()
+        directory = tempfile.mkdtemp(prefix='sdvo_live_')
+        self.addCleanup(shutil.rmtree, directory, ignore_errors=True)
+        path = os.path.join(directory, 'poses.txt')
+        self.assertFalse(self.service('save_trajectory', SaveTrajectory, path, 'tum').success)  # nothing yet
+        for i in range(4):
+            self.feed(i)
+        answer = self.service('save_trajectory', SaveTrajectory, path, 'tum')
+        self.assertEqual((answer.success, answer.message), (True, '4 poses'))
+        rows = np.loadtxt(path)
+        np.testing.assert_allclose(rows[:, 0], [m.header.stamp.to_sec() for m in self.odometry])
+        np.testing.assert_allclose(rows[:, 1], [m.pose.pose.position.x for m in self.odometry], atol=1e-9)
+        self.assertTrue(self.service('save_trajectory', SaveTrajectory, path, 'kitti').success)
+        rows = np.loadtxt(path)
+        np.testing.assert_allclose(rows[0].reshape(3, 4), np.eye(4)[:3], atol=1e-9)
+        self.assertAlmostEqual(rows[3][11], self.odometry[3].pose.pose.position.x)  # the camera looks ahead
+        self.assertFalse(self.service('save_trajectory', SaveTrajectory, '/dev/null', 'tum').success)
+        self.assert_alive()
+
     def test_reconfiguring_takes_effect_and_is_clamped(self):
         self.start()
         before = self.feed(0)
@@ -439,6 +498,17 @@ class Live(unittest.TestCase):
             info.P = [1.01 * p if k < 8 else p for k, p in enumerate(info.P)]
         self.assertEqual(self.feed_messages(images, infos).epoch, self.info[0].epoch + 1)
 
+    def test_images_of_twelve_bits(self):
+        self.start()
+        for i in range(5):
+            images, infos = self.camera.messages(i)
+            for image, pixels in zip(images, self.sequence.pairs[i]):
+                image.encoding, image.step, image.is_bigendian = 'mono16', 2 * image.width, i % 2
+                image.data = (pixels.astype(np.uint16) * 16).astype('>u2' if i % 2 else '<u2').tobytes()
+            info = self.feed_messages(images, infos)
+            self.assertEqual(info.state, 'TRACKING')
+            self.assertGreater(info.features, 500)
+
     def test_diagnostics_tell_state_latency_and_silence(self):
         config = tempfile.NamedTemporaryFile('w', suffix='.yaml')
         self.addCleanup(config.close)
@@ -483,11 +553,12 @@ class Live(unittest.TestCase):
     def test_overload_drops_whole_pairs_and_keeps_the_newest(self):
         self.start()
         last = PAIRS - 1
-        # All pairs at once, each of which takes its time.
+        # All pairs at once, each of which takes its time; stamps as of a fast camera, whose gaps are no jumps.
         for i in range(PAIRS):
-            self.camera.publish(*self.camera.messages(i))
-        stamp = self.camera.messages(last)[0][0].header.stamp
-        self.assertTrue(wait_until(lambda: len(self.info) > 0 and self.info[-1].header.stamp == stamp))
+            self.camera.publish(*self.camera.messages(i, time_of=0.1 * i))
+        stamp = self.camera.messages(last, time_of=0.1 * last)[0][0].header.stamp
+        self.assertTrue(wait_until(lambda: len(self.info) > 0 and self.info[-1].header.stamp == stamp),
+                        [m.header.stamp.to_sec() for m in self.info])
         info = self.info[-1]
         self.assertEqual(len(self.info) + info.dropped_pairs + info.dropped_features, PAIRS)
         self.assertGreater(info.dropped_pairs, 0)

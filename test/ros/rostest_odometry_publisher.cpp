@@ -2,6 +2,7 @@
 #include <ros/ros.h>
 #include <tf2_msgs/TFMessage.h>
 
+#include <cmath>
 #include <functional>
 #include <memory>
 #include <string>
@@ -149,7 +150,7 @@ TEST_F(OdometryPublisherTest, ThePathKeepsItsNewestPoses) {
 TEST_F(OdometryPublisherTest, AfterAResetThePathBeginsAnew) {
   start({});
   publish(resultAt(7));
-  publisher_->restartPath();
+  publisher_->restart(Eigen::Isometry3d::Identity());
   OdometryResult origin = resultAt(8);  // later, and back at the origin
   origin.T_origin_camera.setIdentity();
   publish(origin);
@@ -158,6 +159,21 @@ TEST_F(OdometryPublisherTest, AfterAResetThePathBeginsAnew) {
   }));
   ASSERT_EQ(path_->messages.back().poses.size(), 1u);
   EXPECT_EQ(path_->messages.back().poses[0].pose.position.z, 0.0);
+}
+
+TEST_F(OdometryPublisherTest, StartsAgainFromAnyPlace) {
+  start({});
+  Eigen::Isometry3d T_odom_start = Eigen::Isometry3d::Identity();
+  T_odom_start.translation() << 10.0, 20.0, 30.0;
+  T_odom_start.linear() = Eigen::AngleAxisd(0.5 * M_PI, Eigen::Vector3d::UnitX()).toRotationMatrix();
+  publisher_->restart(T_odom_start);
+  publish(resultAt(2));  // 2 m along z, which is -y of odom now
+  const geometry_msgs::Pose& pose = odom_->messages.at(0).pose.pose;
+  EXPECT_NEAR(pose.position.x, 10.0, 1e-9);
+  EXPECT_NEAR(pose.position.y, 18.0, 1e-9);
+  EXPECT_NEAR(pose.position.z, 30.0, 1e-9);
+  EXPECT_NEAR(pose.orientation.x, std::sqrt(0.5), 1e-9);
+  EXPECT_EQ(publisher_->path().poses.size(), 1u);
 }
 
 TEST_F(OdometryPublisherTest, InfoTellsLatencyAndSession) {

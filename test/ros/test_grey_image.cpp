@@ -47,6 +47,41 @@ TEST(ToGrey, SixteenBitsAreScaledToEight) {
   EXPECT_EQ(grey.at<std::uint8_t>(0, 2), 255);
 }
 
+TEST(ToGrey, SixteenBitsOfEitherOrderOfBytes) {
+  const auto message = image("mono16", 2, 1, {0x64, 0x65, 0xff, 0x00});
+  EXPECT_EQ(toGrey(message).at<std::uint8_t>(0, 0), 0x65);  // 0x6564 / 257 = 101
+  EXPECT_EQ(toGrey(message).at<std::uint8_t>(0, 1), 1);
+  message->is_bigendian = 1;
+  EXPECT_EQ(toGrey(message).at<std::uint8_t>(0, 0), 0x64);
+  EXPECT_EQ(toGrey(message).at<std::uint8_t>(0, 1), 0xfe);
+}
+
+TEST(ToGrey, CamerasOfFewerBitsFillTheRange) {
+  // 1023 and 341 of 10 bits.
+  const auto message = image("mono16", 2, 1, {0xff, 0x03, 0x55, 0x01});
+  const cv::Mat grey = toGrey(message, 10);
+  EXPECT_EQ(grey.at<std::uint8_t>(0, 0), 255);
+  EXPECT_EQ(grey.at<std::uint8_t>(0, 1), 85);
+  EXPECT_EQ(toGrey(message, 12).at<std::uint8_t>(0, 0), 64);
+}
+
+TEST(BitDepth, IsThatOfTheBrightestPixel) {
+  const auto depthOf = [](int value) {
+    const auto low = static_cast<std::uint8_t>(value & 0xff), high = static_cast<std::uint8_t>(value >> 8);
+    return bitDepth(*image("mono16", 2, 1, {0, 0, low, high}));
+  };
+  EXPECT_EQ(depthOf(0), 8);
+  EXPECT_EQ(depthOf(255), 8);
+  EXPECT_EQ(depthOf(256), 10);
+  EXPECT_EQ(depthOf(1023), 10);
+  EXPECT_EQ(depthOf(1024), 12);
+  EXPECT_EQ(depthOf(4095), 12);
+  EXPECT_EQ(depthOf(16383), 14);
+  EXPECT_EQ(depthOf(65535), 16);
+  EXPECT_EQ(bitDepth(*image("mono8", 2, 1, {255, 255})), 8);
+  EXPECT_THROW(bitDepth(*image("mono16", 2, 2, {0, 0, 0, 0})), std::invalid_argument);
+}
+
 TEST(ToGrey, ColoursByLuminance) {
   // Rec. 601: 0.299 red + 0.587 green + 0.114 blue.
   constexpr int kRed = 76, kGreen = 150, kBlue = 29;

@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -186,6 +187,16 @@ TEST_F(Tools, OutputThatCannotBeWritten) {
   expectError(run("evaluate_trajectory",
                   "--ground-truth " + truth + " --estimate " + truth + " --lengths 0.2 --json " + missing),
               missing);
+}
+
+TEST_F(Tools, OutputIsNeverADeviceOrAPipe) {
+  const fs::path pipe = root_ / "pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  expectError(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output " + pipe.string()),
+              "no regular file");
+  EXPECT_TRUE(fs::is_fifo(pipe));
+  EXPECT_FALSE(fs::exists(pipe.string() + ".active"));
+  expectError(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output /dev/null"), "no regular file");
 }
 
 TEST_F(Tools, OptionsThatDoNotExistOrAreOutOfRange) {

@@ -1,0 +1,63 @@
+#include "trajectory_file.hpp"
+
+#include <tf2_eigen/tf2_eigen.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <iomanip>
+#include <stdexcept>
+
+namespace fs = std::filesystem;
+
+namespace sdvo {
+namespace {
+
+void writeTum(const nav_msgs::Path& poses, std::ostream& out) {
+  for (const geometry_msgs::PoseStamped& stamped : poses.poses) {
+    const auto& p = stamped.pose.position;
+    const auto& q = stamped.pose.orientation;
+    out << stamped.header.stamp.sec << "." << std::setw(9) << std::setfill('0') << stamped.header.stamp.nsec << " "
+        << p.x << " " << p.y << " " << p.z << " " << q.x << " " << q.y << " " << q.z << " " << q.w << "\n";
+  }
+}
+
+void writeKitti(const nav_msgs::Path& poses, const Eigen::Isometry3d& T_base_camera, std::ostream& out) {
+  Eigen::Isometry3d T_first_odom = Eigen::Isometry3d::Identity();
+  for (std::size_t i = 0; i < poses.poses.size(); ++i) {
+    Eigen::Isometry3d T_odom_base;
+    tf2::fromMsg(poses.poses[i].pose, T_odom_base);
+    const Eigen::Isometry3d T_odom_camera = T_odom_base * T_base_camera;
+    if (i == 0) T_first_odom = T_odom_camera.inverse();
+    const Eigen::Matrix4d pose = (T_first_odom * T_odom_camera).matrix();
+    for (int k = 0; k < 12; ++k) out << pose(k / 4, k % 4) << (k < 11 ? " " : "\n");
+  }
+}
+
+}  // namespace
+
+void saveTrajectory(const nav_msgs::Path& poses, const Eigen::Isometry3d& T_base_camera, const std::string& format,
+                    const std::string& path) {
+  const auto fail = [&](const std::string& why) { throw std::runtime_error("'" + path + "': " + why); };
+  if (format != "tum" && format != "kitti") fail("format '" + format + "' is neither tum nor kitti");
+  if (!fs::path(path).is_absolute()) fail("the path must be absolute");
+  std::error_code ignored;
+  if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored)) fail("it is no regular file");
+
+  const std::string partial = path + ".partial";
+  errno = 0;
+  std::ofstream out(partial);
+  out.precision(12);
+  if (out && format == "tum") writeTum(poses, out);
+  if (out && format == "kitti") writeKitti(poses, T_base_camera, out);
+  out.close();
+  if (out) fs::rename(partial, path, ignored);
+  if (!out || ignored) {
+    const std::string why = ignored ? ignored.message() : std::strerror(errno);
+    fs::remove(partial, ignored);
+    fail("cannot be written: " + why);
+  }
+}
+
+}  // namespace sdvo

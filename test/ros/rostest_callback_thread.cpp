@@ -1,0 +1,86 @@
+#include <gtest/gtest.h>
+#include <ros/ros.h>
+#include <std_msgs/Int32.h>
+
+#include <atomic>
+#include <thread>
+
+#include "../../src/ros/callback_thread.hpp"
+
+namespace sdvo {
+namespace {
+
+bool waitUntil(const std::function<bool()>& condition) {
+  const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(10.0);
+  while (!condition() && ros::WallTime::now() < end) ros::WallDuration(0.001).sleep();
+  return condition();
+}
+
+std_msgs::Int32 message(int data) {
+  std_msgs::Int32 message;
+  message.data = data;
+  return message;
+}
+
+/// What the threads that all nodelets share are to us here: nobody serves the global queue.
+TEST(CallbackThread, NeedsNobodyElsesThreads) {
+  std::atomic<int> last{0};
+  std::atomic<std::size_t> thread{0};
+  ros::NodeHandle nh;
+  ros::Publisher publisher = nh.advertise<std_msgs::Int32>("numbers", 100);
+  CallbackThread callbacks;
+  ros::NodeHandle served = callbacks.serve(nh);
+  const boost::function<void(const std_msgs::Int32::ConstPtr&)> receive = [&](const std_msgs::Int32::ConstPtr& m) {
+    last = m->data;
+    thread = std::hash<std::thread::id>()(std::this_thread::get_id());
+  };
+  ros::Subscriber subscriber = served.subscribe<std_msgs::Int32>("numbers", 100, receive);
+  ASSERT_TRUE(waitUntil([&] { return publisher.getNumSubscribers() > 0; }));
+  publisher.publish(message(1));
+  ros::WallDuration(0.1).sleep();
+  EXPECT_EQ(last, 0) << "called before start()";
+  callbacks.start();
+  EXPECT_TRUE(waitUntil([&] { return last == 1; }));
+  EXPECT_NE(thread, std::hash<std::thread::id>()(std::this_thread::get_id()));
+  publisher.publish(message(2));
+  EXPECT_TRUE(waitUntil([&] { return last == 2; }));
+}
+
+TEST(CallbackThread, AfterStopNoCallbackRuns) {
+  std::atomic<bool> is_running{false}, may_run{true}, ran_late{false};
+  std::atomic<int> calls{0};
+  ros::NodeHandle nh;
+  ros::Publisher publisher = nh.advertise<std_msgs::Int32>("more_numbers", 100);
+  CallbackThread callbacks;
+  ros::NodeHandle served = callbacks.serve(nh);
+  const boost::function<void(const std_msgs::Int32::ConstPtr&)> receive = [&](const std_msgs::Int32::ConstPtr&) {
+    is_running = true;
+    ++calls;
+    ros::WallDuration(0.05).sleep();
+    if (!may_run) ran_late = true;
+    is_running = false;
+  };
+  ros::Subscriber subscriber = served.subscribe<std_msgs::Int32>("more_numbers", 100, receive);
+  callbacks.start();
+  ASSERT_TRUE(waitUntil([&] { return publisher.getNumSubscribers() > 0; }));
+  for (int i = 0; i < 20; ++i) publisher.publish(message(i));
+  ASSERT_TRUE(waitUntil([&] { return is_running.load(); }));
+  callbacks.stop();
+  may_run = false;
+  const int calls_then = calls;
+  EXPECT_FALSE(is_running);
+  publisher.publish(message(99));
+  ros::WallDuration(0.2).sleep();
+  EXPECT_EQ(calls, calls_then);
+  EXPECT_FALSE(ran_late);
+}
+
+}  // namespace
+}  // namespace sdvo
+
+int main(int argc, char** argv) {
+  testing::InitGoogleTest(&argc, argv);
+  ros::init(argc, argv, "callback_thread_test");
+  ros::NodeHandle keeps_ros_alive;
+  return RUN_ALL_TESTS();
+}

@@ -1,0 +1,87 @@
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+#include "../../src/ros/trajectory_file.hpp"
+#include "../synthetic_scene.hpp"
+#include "message_samples.hpp"
+
+namespace sdvo {
+namespace {
+
+namespace fs = std::filesystem;
+using ros_conversions::contains;
+using synthetic::errorOf;
+
+class TrajectoryFile : public ::testing::Test {
+ protected:
+  TrajectoryFile() {
+    std::string name = (fs::temp_directory_path() / "sdvo_trajectory_XXXXXX").string();
+    directory_ = ::mkdtemp(name.data());
+    T_base_camera_.linear() << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
+    add(1, 5, 0.0);
+    add(2, 123456789, 1.5);
+  }
+  ~TrajectoryFile() override { fs::remove_all(directory_); }
+
+  /// `x` m ahead of the origin, turned by 180 degrees about the vertical.
+  void add(std::uint32_t seconds, std::uint32_t nanoseconds, double x) {
+    geometry_msgs::PoseStamped pose;
+    pose.header.stamp = ros::Time(seconds, nanoseconds);
+    pose.pose.position.x = x;
+    pose.pose.orientation.z = 1.0;
+    poses_.poses.push_back(pose);
+  }
+
+  std::string save(const std::string& format) {
+    const std::string path = (directory_ / "file.txt").string();
+    saveTrajectory(poses_, T_base_camera_, format, path);
+    EXPECT_FALSE(fs::exists(path + ".partial"));
+    std::stringstream text;
+    text << std::ifstream(path).rdbuf();
+    return text.str();
+  }
+
+  std::string refusal(const std::string& path, const std::string& format = "tum") {
+    EXPECT_THROW(saveTrajectory(poses_, T_base_camera_, format, path), std::runtime_error) << path;
+    EXPECT_FALSE(fs::exists(path + ".partial"));
+    return errorOf([&] { saveTrajectory(poses_, T_base_camera_, format, path); });
+  }
+
+  fs::path directory_;
+  nav_msgs::Path poses_;
+  Eigen::Isometry3d T_base_camera_ = Eigen::Isometry3d::Identity();
+};
+
+TEST_F(TrajectoryFile, TumHasStampPositionAndQuaternion) {
+  EXPECT_EQ(save("tum"), "1.000000005 0 0 0 0 0 1 0\n2.123456789 1.5 0 0 0 0 1 0\n");
+}
+
+TEST_F(TrajectoryFile, KittiIsTheCamerasMotionFromItsFirstPose) {
+  // The base turned round and went 1.5 m ahead in odom: backwards for itself and for the camera.
+  EXPECT_EQ(save("kitti"), "1 0 0 0 0 1 0 0 0 0 1 0\n1 0 0 0 0 1 0 0 0 0 1 -1.5\n");
+}
+
+TEST_F(TrajectoryFile, ReplacesAFile) {
+  std::ofstream(directory_ / "file.txt") << "much longer than what will be written into it, by far, and then some more";
+  EXPECT_EQ(save("tum").substr(0, 12), "1.000000005 ");
+}
+
+TEST_F(TrajectoryFile, RefusesWhatIsNoFileOfTheUsers) {
+  EXPECT_TRUE(contains(refusal("file.txt"), "absolute"));
+  EXPECT_TRUE(contains(refusal(""), "absolute"));
+  EXPECT_TRUE(contains(refusal(directory_.string()), "no regular file"));
+  EXPECT_TRUE(contains(refusal("/dev/null"), "no regular file"));
+  EXPECT_TRUE(contains(refusal((directory_ / "missing" / "file.txt").string()), "No such file or directory"));
+  EXPECT_TRUE(contains(refusal("/proc/sys/file.txt"), "cannot be written"));
+  EXPECT_TRUE(contains(refusal((directory_ / "file.txt").string(), "csv"), "neither tum nor kitti"));
+  EXPECT_FALSE(fs::exists(directory_ / "file.txt"));
+}
+
+}  // namespace
+}  // namespace sdvo
