@@ -40,8 +40,8 @@ void expectSame(const StereoFeatures& a, const StereoFeatures& b) {
 
 TEST(FeaturesMessageTest, RoundTripIsExactAlsoOverTheWire) {
   for (const ElementType type : {ElementType::kBits, ElementType::kUint8, ElementType::kFloat32})
-    for (const std::string layout : {"left", "left+right"}) {
-      SCOPED_TRACE(layout + " " + std::to_string(static_cast<int>(type)));
+    for (const DescriptorLayout layout : {DescriptorLayout::kLeft, DescriptorLayout::kLeftAndRight}) {
+      SCOPED_TRACE(nameOf(layout) + " " + std::to_string(static_cast<int>(type)));
       const FeaturesMessage sent = someMessage(type, layout);
       std::vector<std::uint8_t> buffer(ros::serialization::serializationLength(sent));
       ros::serialization::OStream out(buffer.data(), static_cast<std::uint32_t>(buffer.size()));

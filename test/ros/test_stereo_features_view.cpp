@@ -173,7 +173,7 @@ TEST(StereoFeaturesViewTest, FloatsAreReadInPlace) {
 }
 
 TEST(StereoFeaturesViewTest, OneViewHasNoRightHalf) {
-  const FeaturesMessage message = someMessage(ElementType::kBits, "left");
+  const FeaturesMessage message = someMessage(ElementType::kBits, DescriptorLayout::kLeft);
   const StereoFeaturesView view(message);
   EXPECT_FALSE(view.hasRightHalf());
   EXPECT_TRUE(view.rightDescriptors().empty());

@@ -22,7 +22,6 @@ TEST(ToInfo, TellsResultAndImageSide) {
   result.match_time = 0.25;
   result.motion_time = 0.125;
   result.distance = 42.5;
-  result.reference_id = 20;
   result.keyframe_id = 17;
   result.disparity_offset = -0.25;
   result.disparity_offset_sigma = 0.05;
