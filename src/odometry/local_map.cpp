@@ -264,11 +264,8 @@ LocalMap::Adjustment LocalMap::adjust(const WindowOptimizerOptions& options, con
   adjustment.success = true;
   adjustment.calibration_information = solution.calibration_information;
   const int newest = static_cast<int>(frames_.size()) - 1;
-  // What the window's equations do not contain (noise that differs from the options, the calibration's steps from
-  // window to window) makes the errors of simulated drives this much larger.
-  constexpr double kUnmodelled = 1.2;
   const auto covariance = [&](int from, int to) -> Matrix6d {
-    return kUnmodelled * motionCovariance(window, solution.pose_covariance, from, to);
+    return motionCovariance(window, solution.pose_covariance, from, to);
   };
   adjustment.covariances = {oldestId(), covariance(newest - 1, newest), covariance(0, newest), covariance(1, newest),
                             covariance(0, newest - 1)};
