@@ -5,6 +5,7 @@ import os
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
 
 import rosbag
@@ -48,6 +49,26 @@ class Launch(unittest.TestCase):
             self.assertEqual([found[ARGUMENTS[name]] for name in ('publish_tf', 'queue_size', 'odom_frame_id')],
                              [True, 30, 'odom_2'])
             self.assertEqual(found[ARGUMENTS['base_frame_id']], 'robot')
+
+    def test_parameters_of_an_earlier_run_are_forgotten_on_demand(self):
+        stale, other = '/stereo/visual_odometry/publish_tf', '/stereo/camera/exposure'
+        for clear in ('false', 'true'):
+            rospy.set_param(stale, False)
+            rospy.set_param(other, 5)
+            # Without a manager the nodelets wait: nothing is started.
+            process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch', 'start_manager:=false',
+                                        'base_frame_id:=robot', 'clear_params:=' + clear])
+            try:
+                end = time.time() + 30
+                while not rospy.has_param('/stereo/visual_odometry/base_frame_id') and time.time() < end:
+                    time.sleep(0.05)
+                self.assertEqual(rospy.get_param('/stereo/visual_odometry/base_frame_id', ''), 'robot')
+                self.assertEqual(rospy.has_param(stale), clear == 'false')
+                self.assertEqual(rospy.get_param(other), 5)
+            finally:
+                process.terminate()
+                process.wait()
+            rospy.delete_param('/stereo')
 
     def test_kitti_launch_fails_for_a_bag_that_cannot_be_read(self):
         with tempfile.TemporaryDirectory() as directory:
