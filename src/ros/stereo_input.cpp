@@ -43,7 +43,8 @@ StereoInput::StereoInput(ros::NodeHandle& nh, StereoImageTransport& transport, c
     exact_->registerCallback(&StereoInput::onPair, this);
   }
 
-  const std::uint32_t arrivals = std::max<std::uint32_t>(queue, kArrivalQueue);
+  const auto arrivals =
+      static_cast<std::uint32_t>(std::max({kArrivalQueue, options.sync_queue_size, options.queue_size}));
   left_image_.subscribe(nh, topics[0], arrivals, transport.left(), transport.hints());
   right_image_.subscribe(nh, topics[1], arrivals, transport.right(), transport.hints());
   left_info_.subscribe(nh, topics[2], arrivals);

@@ -4,6 +4,7 @@
 #include <stereo_descriptor_vo/ResetToPose.h>
 #include <stereo_descriptor_vo/SaveTrajectory.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <memory>
@@ -91,7 +92,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   }
 
   void subscribe() {
-    subscriber_ = nh_.subscribe<FeaturesMessage>("stereo_features", kArrivalQueue,
+    const auto queue = static_cast<std::uint32_t>(std::max(kArrivalQueue, options_.output.queue_size));
+    subscriber_ = nh_.subscribe<FeaturesMessage>("stereo_features", queue,
                                                  [this](const FeaturesMessagePtr& m) { onFeatures(m); });
   }
 

@@ -1,16 +1,23 @@
 #!/usr/bin/python3
-"""What the launch files set on the parameter server, without starting anything."""
+"""What the launch files set on the parameter server, what they refuse, and what they start again."""
 
 import os
+import signal
 import subprocess
 import sys
 import tempfile
+import time
 import unittest
+import xmlrpc.client
 
 import rosbag
+import rosgraph
+import rosnode
 import rospy
+import rosservice
 import rostest
 import yaml
+from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import CameraInfo
 
 PACKAGE = 'stereo_descriptor_vo'
@@ -49,6 +56,54 @@ class Launch(unittest.TestCase):
                              [True, 30, 'odom_2'])
             self.assertEqual(found[ARGUMENTS['base_frame_id']], 'robot')
 
+    def test_parameters_of_an_earlier_run_are_forgotten_on_demand(self):
+        stale, other = '/stereo/visual_odometry/publish_tf', '/stereo/camera/exposure'
+        for clear in ('false', 'true'):
+            rospy.set_param(stale, False)
+            rospy.set_param(other, 5)
+            # Without a manager the nodelets wait: nothing is started.
+            process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch', 'start_manager:=false',
+                                        'base_frame_id:=robot', 'clear_params:=' + clear])
+            try:
+                end = time.time() + 30
+                while not rospy.has_param('/stereo/visual_odometry/base_frame_id') and time.time() < end:
+                    time.sleep(0.05)
+                self.assertEqual(rospy.get_param('/stereo/visual_odometry/base_frame_id', ''), 'robot')
+                self.assertEqual(rospy.has_param(stale), clear == 'false')
+                self.assertEqual(rospy.get_param(other), 5)
+            finally:
+                process.terminate()
+                process.wait()
+            rospy.delete_param('/stereo')
+
+    def test_a_loader_that_is_killed_is_replaced_without_an_error(self):
+        errors, service = [], '/stereo/visual_odometry/reset'
+        listener = rospy.Subscriber('/rosout', Log, lambda log: errors.append(log.msg) if log.level >= Log.ERROR else None)
+        process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch', 'respawn:=true'])
+
+        def is_offered():
+            try:
+                return rosservice.get_service_node(service) is not None
+            except rosservice.ROSServiceIOException:
+                return False
+
+        def wait_until(condition):
+            end = time.time() + 60
+            while not condition() and time.time() < end:
+                time.sleep(0.1)
+            return condition()
+        try:
+            self.assertTrue(wait_until(is_offered))
+            loader = rosnode.get_api_uri(rosgraph.Master('/test'), '/stereo/visual_odometry')
+            os.kill(xmlrpc.client.ServerProxy(loader).getPid('/test')[2], signal.SIGKILL)
+            self.assertTrue(wait_until(lambda: not is_offered()))
+            self.assertTrue(wait_until(is_offered))
+            self.assertEqual(errors, [])
+        finally:
+            process.terminate()
+            process.wait()
+            listener.unregister()
+
     def test_kitti_launch_fails_for_a_bag_that_cannot_be_read(self):
         with tempfile.TemporaryDirectory() as directory:
             good, bad = os.path.join(directory, 'good.bag'), os.path.join(directory, 'bad.bag')
@@ -69,4 +124,5 @@ class Launch(unittest.TestCase):
 
 
 if __name__ == '__main__':
-    rostest.unitrun(PACKAGE, 'launch', Launch, sys.argv)
+    rospy.init_node('launch_test')
+    rostest.rosrun(PACKAGE, 'launch', Launch, sys.argv)

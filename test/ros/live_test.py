@@ -286,7 +286,7 @@ class Live(unittest.TestCase):
         self.assertEqual(len(path[-1].poses), PAIRS)
 
     def test_lasting_jump_of_the_stamps_is_a_reset_and_loses_nothing(self):
-        self.start()
+        self.start(queue_size=2, odometry_queue_size=2)  # the pair held back and the next one come at once
         first = [self.feed(i) for i in range(PAIRS)]
         # The clock goes on: the first pair after the jump waits for the next one to confirm it.
         self.camera.publish(*self.camera.messages(0))
