@@ -15,7 +15,7 @@ namespace sdvo {
 namespace {
 
 // A block is one SIMD register wide.
-constexpr int kBlockWidth = 16, kLeftOfBlock = 8;
+constexpr int kBlockWidth = 16, kLeftOfBlock = kBlockWidth / 2;
 constexpr int kHalfRows = 4;  // block rows above and below the centre at half resolution
 constexpr int kFullRows = 5;  // … and at full resolution
 constexpr int kMargin = 64;   // px added around every image, so that no read needs a check
