@@ -26,7 +26,7 @@ struct LocalMapOptions {
   double keyframe_overlap = 0.6;
   double corner_sigma = 0.4;
   double reference_sigma = 0.1;
-  double renewal_scale = 1.4;
+  double renewal_scale = 1.2;
 
   void describe(OptionList& list) {
     list.add("keyframes", keyframes, {2, 50}, "", "newest key frames, which the map holds whatever they see");
