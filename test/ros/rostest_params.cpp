@@ -12,6 +12,13 @@ namespace {
 
 using synthetic::errorOf;
 
+enum class Kind { kA, kB };
+
+const std::vector<std::string>& namesOf(Kind) {
+  static const std::vector<std::string> names = {"a", "b"};
+  return names;
+}
+
 struct Inner {
   double ratio = 0.5;
 
@@ -21,13 +28,13 @@ struct Inner {
 struct Sample {
   bool flag = false;
   int count = 3;
-  std::string kind = "a";
+  Kind kind = Kind::kA;
   Inner inner;
 
   void describe(OptionList& list) {
     list.add("flag", flag, "a switch");
     list.add("count", count, {1, 10}, "", "a whole number");
-    list.add("kind", kind, {"a", "b"}, "a choice");
+    list.add("kind", kind, "a choice");
     list.group("inner", inner);
   }
 };
@@ -51,7 +58,7 @@ TEST_F(LoadParams, WhatIsAbsentKeepsItsValue) {
   EXPECT_EQ(loadParams(nh_, sample), std::vector<std::string>{});
   EXPECT_FALSE(sample.flag);
   EXPECT_EQ(sample.count, 7);
-  EXPECT_EQ(sample.kind, "a");
+  EXPECT_EQ(sample.kind, Kind::kA);
   EXPECT_EQ(sample.inner.ratio, 0.5);
 }
 
@@ -64,7 +71,7 @@ TEST_F(LoadParams, ReadsEachTypeFromItsPath) {
   EXPECT_EQ(loadParams(nh_, sample), std::vector<std::string>{});
   EXPECT_TRUE(sample.flag);
   EXPECT_EQ(sample.count, 10);
-  EXPECT_EQ(sample.kind, "b");
+  EXPECT_EQ(sample.kind, Kind::kB);
   EXPECT_EQ(sample.inner.ratio, 0.25);
 }
 

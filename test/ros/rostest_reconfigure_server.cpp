@@ -8,24 +8,32 @@
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "../../src/ros/reconfigure_server.hpp"
 
 namespace sdvo {
 namespace {
 
+enum class Kind { kA, kB };
+
+const std::vector<std::string>& namesOf(Kind) {
+  static const std::vector<std::string> names = {"a", "b"};
+  return names;
+}
+
 struct Sample {
   bool flag = false;
   int low = 2, high = 8;
   double ratio = 0.5;
-  std::string kind = "a";
+  Kind kind = Kind::kA;
 
   void describe(OptionList& list) {
     list.add("flag", flag, "a switch");
     list.add("low", low, {0, 10}, "px", "smaller than high");
     list.add("high", high, {0, 10}, "px", "larger than low");
     list.add("ratio", ratio, {0.0, 1.0}, "", "a number");
-    list.add("kind", kind, {"a", "b"}, "a choice");
+    list.add("kind", kind, "a choice");
   }
 };
 
@@ -85,7 +93,7 @@ TEST_F(ReconfigureServerTest, SetsEachTypeAndAnswersWithTheWholeSet) {
   const Config response = request(config);
   EXPECT_TRUE(sample_.flag);
   EXPECT_EQ(sample_.ratio, 0.1);
-  EXPECT_EQ(sample_.kind, "b");
+  EXPECT_EQ(sample_.kind, Kind::kB);
   expectLimits(response, 4, 8);
   EXPECT_TRUE(response.bools.at(0).value);
   EXPECT_EQ(response.doubles.at(0).value, 0.1);
