@@ -199,5 +199,34 @@ TEST(SiftDescriptor, IsMostAlikeAtTheSizeOfTheDistance) {
 }
 #endif
 
+/// The same for AKAZE, whose key points know the evolution level they were found in.
+TEST(AkazeDescriptor, SamplesTheLevelOfTheSize) {
+  const synthetic::Texture texture(11, 6.0, 120.0);
+  const cv::Mat image = synthetic::render({640, 480}, [&](double u, double v) { return texture.at(u, v); });
+  const cv::Ptr<cv::AKAZE> akaze = cv::AKAZE::create(cv::AKAZE::DESCRIPTOR_MLDB_UPRIGHT, 0, 3, 0.001f, 4, 4);
+  std::vector<cv::KeyPoint> detected, kept;
+  akaze->detect(image, detected);
+  std::vector<ViewKeypoint> keypoints;
+  int levels[16] = {};
+  for (const cv::KeyPoint& k : detected) {
+    const float margin = 8.f * k.size;
+    if (k.pt.x < margin || k.pt.y < margin || k.pt.x > 639.f - margin || k.pt.y > 479.f - margin) continue;
+    kept.push_back(k);
+    kept.back().angle = 0.f;
+    keypoints.push_back({k.pt.x, k.pt.y, k.size, -1.f});
+    ++levels[k.class_id];
+  }
+  ASSERT_GT(keypoints.size(), 50u);
+  EXPECT_GT(std::count_if(std::begin(levels), std::end(levels), [](int count) { return count > 3; }), 2);
+  cv::Mat expected;
+  akaze->compute(image, kept, expected);
+  const ViewDescriptors described = makeBaseDescriptor(DescriptorType::kAkaze)->describe(image, keypoints);
+  ASSERT_EQ(expected.rows, described.rows.rows);
+  for (int i = 0; i < expected.rows; ++i) {
+    ASSERT_TRUE(described.valid[static_cast<std::size_t>(i)]);
+    EXPECT_TRUE(synthetic::equalMats(described.rows.row(i), expected.row(i))) << kept[static_cast<std::size_t>(i)].size;
+  }
+}
+
 }  // namespace
 }  // namespace sdvo
