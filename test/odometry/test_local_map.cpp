@@ -155,9 +155,7 @@ TEST(LocalMapSight, IsTheCornerWithoutAnAlignment) {
 
 TEST(LocalMapSight, RenewsTheReferenceWhenTheScaleHasChangedAndKeepsThePoint) {
   const Wall wall;
-  LocalMapOptions options;
-  options.renewal_scale = 1.2;
-  LocalMap map(options);
+  LocalMap map{LocalMapOptions()};
   map.insert(wall.view(10.0), 1, Wall::poseAt(10.0), {}, RigCalibration());
   int id = 1;
   const auto approach = [&](double distance, const Eigen::Vector2d& error) {
