@@ -170,6 +170,32 @@ TEST(EpipolarMatcher, RefusesAnEdgeAlongTheRow) {
   EXPECT_FALSE(find({edge, edge}, {150.f, 80.f}));
 }
 
+TEST(EpipolarMatcher, RefusesASlopingEdge) {
+  // Moved along itself it looks the same: neither disparity nor row is known.
+  const auto edge = [](double d) {
+    return synthetic::render(
+        kSize, [=](double u, double v) { return 120.0 + 60.0 * std::tanh(((u + d - 150.0) + (v - 80.0)) / 3.0); });
+  };
+  EXPECT_FALSE(find({edge(0.0), edge(10.0)}, {150.f, 80.f}));
+}
+
+TEST(EpipolarMatcher, NeverLeavesTheRightImage) {
+  // The true place of some is up to 2 px outside; whatever correlates is taken.
+  const synthetic::Texture texture(6, 24.0, 90.0);
+  const cv::Mat left = synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); });
+  EpipolarMatcherOptions options;
+  options.min_correlation = 0.0;
+  options.uniqueness = 1.0;
+  for (const double disparity : {20.0, 21.0, 30.5}) {
+    const Pair pair{left, synthetic::render(kSize, [&](double u, double v) { return texture.at(u + disparity, v); })};
+    for (double outside = -2.0; outside < 2.0; outside += 0.25)
+      for (float v = 20.f; v < 140.f; v += 8.f) {
+        const float u = static_cast<float>(disparity - outside);
+        if (const auto found = find(pair, {u, v}, options)) EXPECT_GE(u - found->x, 0.f) << u << ", " << v;
+      }
+  }
+}
+
 TEST(EpipolarMatcher, RefusesPatchesThatCorrelateLittle) {
   const Pair clean = smoothPair(10.0, 0.0);
   Pair noisy{clean.left, clean.right.clone()};
