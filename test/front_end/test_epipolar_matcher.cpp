@@ -171,12 +171,38 @@ TEST(EpipolarMatcher, RefusesAnEdgeAlongTheRow) {
 }
 
 TEST(EpipolarMatcher, RefusesASlopingEdge) {
-  // Moved along itself it looks the same: neither disparity nor row is known.
+  // Moved along itself it looks the same: neither disparity nor row is known, however well the patches agree.
   const auto edge = [](double d) {
     return synthetic::render(
-        kSize, [=](double u, double v) { return 120.0 + 60.0 * std::tanh(((u + d - 150.0) + (v - 80.0)) / 3.0); });
+        kSize, [=](double u, double v) { return 120.0 + 60.0 * std::tanh(((u + d - 150.0) + (v - 80.0)) / 4.0); });
   };
-  EXPECT_FALSE(find({edge(0.0), edge(10.0)}, {150.f, 80.f}));
+  const Pair pair{edge(0.0), edge(10.3)};
+  EpipolarMatcherOptions options;
+  options.uniqueness = 1.0;
+  options.min_correlation = 0.0;
+  for (float v = 40.f; v < 120.f; v += 5.3f)
+    EXPECT_FALSE(find(pair, {230.f - v, v}, options)) << "row " << v;  // on the edge
+}
+
+/// What is seen of a patch above its centre alone has the disparity of the rows above: the slant tells that of the
+/// centre.
+TEST(EpipolarMatcher, ASlantIsToldFromADisparity) {
+  const synthetic::Texture texture(5, 6.0, 40.0);
+  for (const double slant : {0.3, -0.3}) {
+    const auto disparity = [=](double v) { return 30.0 + slant * (v - 80.0); };
+    const auto grey = [&](double u, double v) {
+      const double contrast = v < 80.0 ? 1.0 : 0.15;
+      return 128.0 + contrast * (texture.at(u, v) - 128.0);
+    };
+    const Pair pair{synthetic::render(kSize, grey),
+                    synthetic::render(kSize, [&](double u, double v) { return grey(u + disparity(v), v); })};
+    double sum = 0.0;
+    int count = 0;
+    for (float u = 100.f; u < 290.f; u += 10.f)
+      if (const auto found = find(pair, {u, 80.f})) sum += found->x - disparity(80.0), ++count;
+    ASSERT_GE(count, 12) << slant;
+    EXPECT_NEAR(sum / count, 0.0, 0.25) << slant;  // without a slant 0.3 * 3
+  }
 }
 
 TEST(EpipolarMatcher, NeverLeavesTheRightImage) {
