@@ -205,6 +205,19 @@ TEST(EpipolarMatcher, ASlantIsToldFromADisparity) {
   }
 }
 
+/// A patch that moved as a whole would agree little with short waves on slanted ground.
+TEST(EpipolarMatcher, PatchesAreHeldAgainstEachOtherAtTheirSlant) {
+  const synthetic::Texture texture(8, 6.0, 12.0);
+  const auto disparity = [](double v) { return 30.0 + 0.3 * (v - 80.0); };
+  const Pair pair{synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); }),
+                  synthetic::render(kSize, [&](double u, double v) { return texture.at(u + disparity(v), v); })};
+  EpipolarMatcherOptions options;
+  options.min_correlation = 0.95;
+  int found = 0, tried = 0;
+  for (float u = 100.f; u < 290.f; u += 10.f, ++tried) found += find(pair, {u, 80.f}, options).has_value();
+  EXPECT_GE(found, tried / 2);
+}
+
 TEST(EpipolarMatcher, NeverLeavesTheRightImage) {
   // The true place of some is up to 2 px outside; whatever correlates is taken.
   const synthetic::Texture texture(6, 24.0, 90.0);

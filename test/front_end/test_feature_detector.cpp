@@ -274,7 +274,7 @@ TEST_P(CornerDetector, LocatesDotsBetweenPixels) {
 }
 
 TEST(FeatureDetector, LocatesObliqueCrossingsBetweenPixels) {
-  // Two edges that cross at 60 degrees, fading outwards: all gradients point along lines through the crossing, and
+  // Two edges that cross at 35 degrees, fading outwards: all gradients point along lines through the crossing, and
   // their x and y go together.
   constexpr double kTolerance = 0.1;  // px
   std::vector<cv::Point2d> truth;
@@ -285,7 +285,7 @@ TEST(FeatureDetector, LocatesObliqueCrossingsBetweenPixels) {
     double sum = 128.0;
     for (const cv::Point2d& crossing : truth) {
       const double x = u - crossing.x, y = v - crossing.y;
-      sum += 110.0 * std::tanh(x) * std::tanh(0.5 * x + 0.87 * y) * std::exp(-(x * x + y * y) / 72.0);
+      sum += 110.0 * std::tanh(x) * std::tanh(0.82 * x + 0.57 * y) * std::exp(-(x * x + y * y) / 72.0);
     }
     return sum;
   });
