@@ -65,6 +65,10 @@ def make(target, log):
         raise NotBuilt
 
 
+def matches(name, patterns):
+    return any(fnmatch.fnmatch(name, pattern) for pattern in patterns)
+
+
 def gtest_names():
     listing = subprocess.run(["make", "help"], cwd=BUILD, check=True, stdout=subprocess.PIPE).stdout.decode()
     return sorted(set(re.findall(r"^\.\.\. (test_\w+)$", listing, re.MULTILINE)))
@@ -139,13 +143,13 @@ def judge(patch, seconds, with_rostests):
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("pattern", nargs="?", default="*", help="of the patches' names, such as front_end_*")
+    parser.add_argument("patterns", nargs="*", default=["*"], help="of the patches' names, such as front_end_*")
     parser.add_argument("--gtests", nargs="+", default=["*"], metavar="PATTERN", help="ask these gtests only")
     parser.add_argument("--rostests", action="store_true", help="show to the ROS tests what the gtests do not notice")
     arguments = parser.parse_args()
-    patches = [p for p in sorted(PATCHES.glob("*.patch")) if fnmatch.fnmatch(p.stem, arguments.pattern)]
+    patches = [p for p in sorted(PATCHES.glob("*.patch")) if matches(p.stem, arguments.patterns)]
     if not patches:
-        sys.exit(f"error: no patch in {PATCHES} is called {arguments.pattern}")
+        sys.exit(f"error: no patch in {PATCHES} is called {' or '.join(arguments.patterns)}")
     harmless = set(re.findall(r"^\| `(\w+)` \|", (PATCHES / "README.md").read_text(), re.MULTILINE))
 
     WORK.mkdir(parents=True, exist_ok=True)
@@ -153,7 +157,7 @@ def main():
     print("Building …", flush=True)
     if not configure():
         sys.exit(f"error: the package does not build, see {WORK / 'build.log'}")
-    chosen = [t for t in gtest_names() if any(fnmatch.fnmatch(t, pattern) for pattern in arguments.gtests)]
+    chosen = [t for t in gtest_names() if matches(t, arguments.gtests)]
     try:
         seconds = measure(chosen)
     except NotBuilt:

@@ -77,6 +77,29 @@ TEST(Brief, FollowsTheSize) {
   EXPECT_GE(differing(seen, describe(near, 150.0, 150.0, 7.0)), 40);
 }
 
+TEST(Brief, WritesEveryBitOfTheRow) {
+  const synthetic::Texture texture(4, 8.0, 60.0);
+  const cv::Mat image = synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); });
+  Row used;
+  used.fill(0xff);
+  Brief(image).describe(150.0, 150.0, 7.0, used.data());
+  EXPECT_EQ(used, describe(image, 150.0, 150.0, 7.0));
+}
+
+/// A standard deviation of a fifth of the patch's side, 9.6 px at a size of 7 px: four coordinates within that are the
+/// lot of one test in five, and the other tests see what lies beyond.
+TEST(Brief, PointsScatterAsPublished) {
+  const synthetic::Texture texture(4, 8.0, 60.0), other(5, 8.0, 60.0);
+  const int inside = 14;  // 9.6 px and half a box
+  const auto within = [&](double x) { return std::abs(x - 150.0) <= inside; };
+  const cv::Mat image = synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); });
+  const cv::Mat changed = synthetic::render(
+      kSize, [&](double u, double v) { return within(u) && within(v) ? texture.at(u, v) : other.at(u, v); });
+  const int bits = differing(describe(image, 150.0, 150.0, 7.0), describe(changed, 150.0, 150.0, 7.0));
+  EXPECT_GT(bits, 25);   // four in five would change with even chances, but what is near looks alike
+  EXPECT_LT(bits, 140);  // one in five does not
+}
+
 TEST(Brief, SeesItsReachAndNothingBeyond) {
   const synthetic::Texture texture(9, 8.0, 60.0);
   const cv::Mat image = synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); });

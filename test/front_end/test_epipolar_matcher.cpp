@@ -170,6 +170,71 @@ TEST(EpipolarMatcher, RefusesAnEdgeAlongTheRow) {
   EXPECT_FALSE(find({edge, edge}, {150.f, 80.f}));
 }
 
+TEST(EpipolarMatcher, RefusesASlopingEdge) {
+  // Moved along itself it looks the same: neither disparity nor row is known, however well the patches agree.
+  const auto edge = [](double d) {
+    return synthetic::render(
+        kSize, [=](double u, double v) { return 120.0 + 60.0 * std::tanh(((u + d - 150.0) + (v - 80.0)) / 4.0); });
+  };
+  const Pair pair{edge(0.0), edge(10.3)};
+  EpipolarMatcherOptions options;
+  options.uniqueness = 1.0;
+  options.min_correlation = 0.0;
+  for (float v = 40.f; v < 120.f; v += 5.3f)
+    EXPECT_FALSE(find(pair, {230.f - v, v}, options)) << "row " << v;  // on the edge
+}
+
+/// What is seen of a patch above its centre alone has the disparity of the rows above: the slant tells that of the
+/// centre.
+TEST(EpipolarMatcher, ASlantIsToldFromADisparity) {
+  const synthetic::Texture texture(5, 6.0, 40.0);
+  for (const double slant : {0.3, -0.3}) {
+    const auto disparity = [=](double v) { return 30.0 + slant * (v - 80.0); };
+    const auto grey = [&](double u, double v) {
+      const double contrast = v < 80.0 ? 1.0 : 0.15;
+      return 128.0 + contrast * (texture.at(u, v) - 128.0);
+    };
+    const Pair pair{synthetic::render(kSize, grey),
+                    synthetic::render(kSize, [&](double u, double v) { return grey(u + disparity(v), v); })};
+    double sum = 0.0;
+    int count = 0;
+    for (float u = 100.f; u < 290.f; u += 10.f)
+      if (const auto found = find(pair, {u, 80.f})) sum += found->x - disparity(80.0), ++count;
+    ASSERT_GE(count, 12) << slant;
+    EXPECT_NEAR(sum / count, 0.0, 0.25) << slant;  // without a slant 0.3 * 3
+  }
+}
+
+/// A patch that moved as a whole would agree little with short waves on slanted ground.
+TEST(EpipolarMatcher, PatchesAreHeldAgainstEachOtherAtTheirSlant) {
+  const synthetic::Texture texture(8, 6.0, 12.0);
+  const auto disparity = [](double v) { return 30.0 + 0.3 * (v - 80.0); };
+  const Pair pair{synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); }),
+                  synthetic::render(kSize, [&](double u, double v) { return texture.at(u + disparity(v), v); })};
+  EpipolarMatcherOptions options;
+  options.min_correlation = 0.95;
+  int found = 0, tried = 0;
+  for (float u = 100.f; u < 290.f; u += 10.f, ++tried) found += find(pair, {u, 80.f}, options).has_value();
+  EXPECT_GE(found, tried / 2);
+}
+
+TEST(EpipolarMatcher, NeverLeavesTheRightImage) {
+  // The true place of some is up to 2 px outside; whatever correlates is taken.
+  const synthetic::Texture texture(6, 24.0, 90.0);
+  const cv::Mat left = synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); });
+  EpipolarMatcherOptions options;
+  options.min_correlation = 0.0;
+  options.uniqueness = 1.0;
+  for (const double disparity : {20.0, 21.0, 30.5}) {
+    const Pair pair{left, synthetic::render(kSize, [&](double u, double v) { return texture.at(u + disparity, v); })};
+    for (double outside = -2.0; outside < 2.0; outside += 0.25)
+      for (float v = 20.f; v < 140.f; v += 8.f) {
+        const float u = static_cast<float>(disparity - outside);
+        if (const auto found = find(pair, {u, v}, options)) EXPECT_GE(u - found->x, 0.f) << u << ", " << v;
+      }
+  }
+}
+
 TEST(EpipolarMatcher, RefusesPatchesThatCorrelateLittle) {
   const Pair clean = smoothPair(10.0, 0.0);
   Pair noisy{clean.left, clean.right.clone()};

@@ -242,6 +242,28 @@ TEST(Freak, OrientationFollowsTheImage) {
   }
 }
 
+/// The sum over symmetric pairs of the difference of intensity along the unit vector between the fields (Alahi et al.
+/// 2012, section 4.4), far pairs and near ones alike.
+TEST(Freak, OrientationIsThePublishedSum) {
+  const Freak freak(randomImage({97, 91}));
+  for (float u = 42.f; u < 54.f; u += 2.7f) {
+    const FreakKeypoint keypoint{u, 45.8f, 11.f, -1.f};
+    const auto means = freak.intensities(keypoint);
+    double x = 0.0, y = 0.0;
+    const auto add = [&](std::size_t a, std::size_t b) {
+      const double dx = Freak::pattern()[a].x - Freak::pattern()[b].x,
+                   dy = Freak::pattern()[a].y - Freak::pattern()[b].y;
+      x += (means[a] - means[b]) * dx / std::hypot(dx, dy);
+      y += (means[a] - means[b]) * dy / std::hypot(dx, dy);
+    };
+    for (std::size_t ring = 0; ring < 30; ring += 6) {
+      for (std::size_t k = 0; k < 3; ++k) add(ring + k, ring + k + 3);
+      for (std::size_t k = 0; k < 6; ++k) add(ring + k, ring + (k + 2) % 6);
+    }
+    EXPECT_NEAR(std::remainder(freak.orientation(keypoint) - std::atan2(y, x), 2.0 * CV_PI), 0.0, 1e-5) << u;
+  }
+}
+
 TEST(Freak, OrientationPointsUphill) {
   for (const double degrees : {0.0, 60.0, 200.0, 300.0}) {
     const double angle = degrees * CV_PI / 180.0;

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <vector>
 
 #include "stereo_descriptor_vo/front_end/patch_sampling.hpp"
@@ -9,29 +10,34 @@ namespace {
 
 constexpr int kMargin = 5, kWidth = 30, kHeight = 20;
 
-/// Bilinear interpolation is exact for it, and each of its four terms shows up in a wrong weight.
-double surface(double x, double y) {
-  return 3.0 + 2.0 * x - 7.0 * y + 0.5 * x * y;
+/// Grey levels without any order, over a picture of kWidth x kHeight and its margin.
+cv::Mat noise() {
+  cv::Mat image(kHeight + 2 * kMargin, kWidth + 2 * kMargin, CV_32F);
+  cv::RNG(3).fill(image, cv::RNG::UNIFORM, 0.0, 256.0);
+  return image;
 }
 
-/// The surface over a picture of kWidth x kHeight, going on over the margin.
-cv::Mat surfaceImage() {
-  cv::Mat image(kHeight + 2 * kMargin, kWidth + 2 * kMargin, CV_32F);
-  for (int row = 0; row < image.rows; ++row)
-    for (int column = 0; column < image.cols; ++column)
-      image.at<float>(row, column) = static_cast<float>(surface(column - kMargin, row - kMargin));
-  return image;
+/// Bilinear interpolation between the four pixels around a position of the picture.
+double interpolated(const cv::Mat& image, double x, double y) {
+  const double column = std::floor(x), row = std::floor(y), a = x - column, b = y - row;
+  const auto pixel = [&](int dx, int dy) {
+    return static_cast<double>(
+        image.at<float>(static_cast<int>(row) + dy + kMargin, static_cast<int>(column) + dx + kMargin));
+  };
+  return (1.0 - a) * (1.0 - b) * pixel(0, 0) + a * (1.0 - b) * pixel(1, 0) + (1.0 - a) * b * pixel(0, 1) +
+         a * b * pixel(1, 1);
 }
 
 void expectSampled(float x, float y, float slant, int radius, int columns) {
   const int rows = 2 * radius + 1;
+  const cv::Mat image = noise();
   constexpr float kUntouched = -1e6f;
   std::vector<float> patch(static_cast<std::size_t>(rows * columns + 1), kUntouched);
-  samplePatch(surfaceImage(), kMargin, x, y, slant, radius, columns, patch.data());
+  samplePatch(image, kMargin, x, y, slant, radius, columns, patch.data());
   for (int j = 0; j < rows; ++j)
     for (int i = 0; i < columns; ++i)
       EXPECT_NEAR(patch[static_cast<std::size_t>(j * columns + i)],
-                  surface(x - radius + i - slant * (j - radius), y - radius + j), 1e-3)
+                  interpolated(image, x - radius + i - slant * (j - radius), y - radius + j), 2e-3)
           << "at (" << x << ", " << y << "), slant " << slant << ", row " << j << ", column " << i;
   EXPECT_EQ(patch.back(), kUntouched);
 }
