@@ -109,7 +109,7 @@ TEST(CalibrationFilter, HoldsThePriorWhenNotEnabled) {
   options.enabled = false;
   CalibrationFilter filter(options);
   const CalibrationBelief prior = filter.prior(1);
-  EXPECT_EQ(prior.mean, Vector(0.5, -1.0));
+  EXPECT_LT((prior.mean - Vector(0.5, -1.0)).norm(), 1e-9);
   EXPECT_GE(prior.information.diagonal().minCoeff(), 1e11);
   filter.note(5, calibrationOf(0.5, -1.0), information(12.0, 5.0));
   EXPECT_TRUE(filter.sigma().array().isNaN().all());
