@@ -72,11 +72,7 @@ void LocalMap::insert(const StereoFeatures& features, int id, const Eigen::Isome
   std::vector<bool> recognised(features.u.size(), false);
   for (const Sighting& sighting : sightings) {
     recognised[sighting.row] = true;
-    Point& point = points_[sighting.point];
-    addSighting(point, features, sighting, id);
-    const double change = std::max(sighting.scale, 1.0 / sighting.scale);
-    if (sighting.aligned && change > options_.renewal_scale)
-      point.reference = takeReference(features, sighting, T_camera_origin);
+    points_[sighting.point].observations.push_back({id, sighting.row, sighting.measurement, sighting.sigma});
   }
   // Only now that the new sightings are noted: points that they carry on must outlive the forgotten pair.
   if (!frames_.empty() && !frames_.back().is_keyframe) removeFrame(frames_.size() - 1);
@@ -119,9 +115,22 @@ LocalMap::Sighting LocalMap::sight(const PatchAlignmentOptions& options, const S
   return sighting;
 }
 
-void LocalMap::addSighting(Point& point, const StereoFeatures& features, const Sighting& sighting, int id) {
-  point.observations.push_back({id, sighting.row, sighting.measurement, sighting.sigma});
-  const std::uint8_t* bytes = features.descriptors.ptr(sighting.row);
+void LocalMap::renewLooks(const StereoFeatures& features, const std::vector<Sighting>& sightings) {
+  std::vector<const Sighting*> of_row(features.u.size(), nullptr);
+  for (const Sighting& sighting : sightings) of_row[sighting.row] = &sighting;
+  for (Point& point : points_) {
+    const Observation& last = point.observations.back();
+    const Sighting* sighting = last.frame_id == newestId() ? of_row[last.row] : nullptr;
+    if (!sighting) continue;  // not seen, cut off or just started
+    takeDescriptor(point, features, last.row);
+    const double change = std::max(sighting->scale, 1.0 / sighting->scale);
+    if (sighting->aligned && change > options_.renewal_scale)
+      point.reference = takeReference(features, *sighting, newestPose());
+  }
+}
+
+void LocalMap::takeDescriptor(Point& point, const StereoFeatures& features, int row) {
+  const std::uint8_t* bytes = features.descriptors.ptr(row);
   point.descriptor.assign(bytes, bytes + features.descriptors.cols);
 }
 
@@ -150,7 +159,8 @@ void LocalMap::startPoint(const StereoFeatures& features, int row, int id, const
   point.position.ray_and_inverse_depth = {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy,
                                           1.0 / camera.depth(disparity)};
   point.reference = takeReference(features, sighting, T_camera_origin);
-  addSighting(point, features, sighting, id);
+  point.observations.push_back({id, row, sighting.measurement, sighting.sigma});
+  takeDescriptor(point, features, row);
   points_.push_back(std::move(point));
 }
 

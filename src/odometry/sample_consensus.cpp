@@ -58,7 +58,8 @@ Consensus findConsensus(const PoseProblem& problem, const SampleConsensusOptions
   constexpr int kSmallestProblem = 4;  // the genetic search needs a gene to exchange
   if (problem.count() < kSmallestProblem) return {};
   std::mt19937 random(static_cast<std::uint32_t>(options.seed));
-  const bool genetic = options.consensus == ConsensusMethod::kGasac || options.consensus == ConsensusMethod::kAdaptiveGasac;
+  const bool genetic =
+      options.consensus == ConsensusMethod::kGasac || options.consensus == ConsensusMethod::kAdaptiveGasac;
   const SampleBudget budget(options.min_iterations, options.max_iterations, options.confidence);
   Consensus consensus = genetic ? searchByGenes(problem, options, budget, random)
                                 : searchAtRandom(problem, options, refinement, budget, random);

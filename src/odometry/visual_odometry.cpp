@@ -202,6 +202,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   map.insert(features, state_.pairs, found.motion.T_current_reference * map.newestPose(), found.sightings, calibration);
   const CalibrationBelief prior = state_.calibration.prior(map.oldestId());
   const LocalMap::Adjustment adjustment = map.adjust(options_.window, prior, calibration);
+  map.renewLooks(features, found.sightings);
 
   Step step;
   step.state = TrackingState::kTracking;

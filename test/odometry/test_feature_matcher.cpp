@@ -149,6 +149,71 @@ TEST(FeatureMatcher, TakesPredictionsThatLeaveTheImageOrPassTheCamera) {
   }
 }
 
+TEST(FeatureMatcher, DoesNotLookForWhatIsBehindTheCamera) {
+  std::mt19937 random(10);
+  const StereoCamera camera = synthetic::camera();
+  const auto row = randomRow(random, 128);
+  const Eigen::Vector3d point(0.5, -0.3, 5.0);
+  StereoFeatures reference = noFeatures(camera);
+  const Eigen::Vector3d pixel = camera.project(point);
+  addFeature(reference, pixel.x(), pixel.y(), pixel.x() - pixel.z(), row);
+  Eigen::Isometry3d passed = Eigen::Isometry3d::Identity();
+  passed.translation().z() = -10.0;
+  // Where the mirrored projection of a point behind would lie.
+  const Eigen::Vector3d mirrored = camera.project(passed * point);
+  StereoFeatures current = noFeatures(camera);
+  addFeature(current, mirrored.x(), mirrored.y(), 10.0, row);
+  EXPECT_TRUE(FeatureMatcher({}).match(reference, current, passed).empty());
+  EXPECT_EQ(FeatureMatcher({}).match(reference, current, std::nullopt).size(), 1u);
+}
+
+/// Descriptors of numbers: {a few of them}, written as the type's bytes.
+template <class Element>
+StereoFeatures numbers(ElementType type, const std::vector<std::vector<Element>>& rows) {
+  StereoFeatures features = noFeatures(synthetic::camera(), 0, static_cast<int>(rows[0].size() * sizeof(Element)));
+  features.element_type = type;
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const auto* bytes = reinterpret_cast<const std::uint8_t*>(rows[i].data());
+    addFeature(features, 100.0 + 50.0 * static_cast<double>(i), 100.0, 10.0,
+               {bytes, bytes + rows[i].size() * sizeof(Element)});
+  }
+  return features;
+}
+
+template <class Element>
+void expectShares(ElementType type) {
+  // The second of each set are the alike ones: |a - b|^2 = 1 + 4, |a|^2 = 9 + 16, |b|^2 = 16 + 36.
+  const StereoFeatures a = numbers<Element>(type, {{100, 0, 0}, {3, 4, 0}});
+  const StereoFeatures b = numbers<Element>(type, {{4, 6, 0}, {0, 0, 90}});
+  FeatureMatcherOptions options = withoutGate();
+  options.max_distance = 1.0;
+  const auto matches = FeatureMatcher(options).match(a, b, std::nullopt);
+  ASSERT_EQ(matches.size(), 1u);
+  EXPECT_EQ(matches[0].reference, 1);
+  EXPECT_EQ(matches[0].current, 0);
+  EXPECT_NEAR(matches[0].distance, 5.0 / (25.0 + 52.0), 1e-6);
+}
+
+TEST(FeatureMatcher, DistanceOfNumbersIsAShareOfBothRowsLengths) {
+  expectShares<std::uint8_t>(ElementType::kUint8);
+  expectShares<float>(ElementType::kFloat32);
+}
+
+TEST(FeatureMatcher, CountsTheBitsOfRowsThatAreNoMultipleOfEightBytes) {
+  std::mt19937 random(11);
+  for (const int bytes : {1, 7, 8, 13, 20}) {
+    StereoFeatures reference = noFeatures(synthetic::camera(), 0, bytes), current = reference;
+    const auto row = randomRow(random, bytes);
+    addFeature(reference, 100, 100, 10, row);
+    auto other = row;
+    other.back() = static_cast<std::uint8_t>(other.back() ^ 0x81);
+    addFeature(current, 100, 100, 10, other);
+    const auto matches = FeatureMatcher(withoutGate()).match(reference, current, std::nullopt);
+    ASSERT_EQ(matches.size(), 1u) << bytes;
+    EXPECT_NEAR(matches[0].distance, 2.0 / (8.0 * bytes), 1e-6);
+  }
+}
+
 TEST(FeatureMatcher, RefusesSetsThatCannotBeCompared) {
   std::mt19937 random(7);
   StereoFeatures both = noFeatures(synthetic::camera(), 0, 128), left = noFeatures(synthetic::camera(), 0, 64);

@@ -1,10 +1,13 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
 #include <cmath>
 #include <cstring>
 #include <functional>
 
 #include "../synthetic_features.hpp"
+#include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/odometry/local_map.hpp"
 
 namespace sdvo {
@@ -163,6 +166,7 @@ TEST(LocalMapSight, RenewsTheReferenceWhenTheScaleHasChangedAndKeepsThePoint) {
     const Eigen::Isometry3d pose = Wall::poseAt(distance);
     const LocalMap::Sighting sighting = map.sight(PatchAlignmentOptions(), features, pose, 0, 0);
     map.insert(features, ++id, pose, {sighting}, RigCalibration());
+    map.renewLooks(features, {sighting});
     return sighting;
   };
   // A little larger: the first reference serves on. 1.25 times: from then on that view is the reference.
@@ -173,6 +177,400 @@ TEST(LocalMapSight, RenewsTheReferenceWhenTheScaleHasChangedAndKeepsThePoint) {
   EXPECT_TRUE(last.aligned);
   EXPECT_NEAR(last.measurement.x(), 320.0, 0.1) << "the new reference's own error does not move the point";
   EXPECT_NEAR(last.measurement.y(), 240.0, 0.1);
+}
+
+using Sightings = std::vector<LocalMap::Sighting>;
+
+/// `count` points that every pose of these tests sees, none of them nearer than 6 m.
+synthetic::World someWorld(int count, unsigned seed = 1) {
+  return synthetic::randomWorld(seed, count, {-2.0, -1.5, 6.0}, {2.0, 1.5, 14.0});
+}
+
+Eigen::Isometry3d translated(double x, double y, double z) {
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.translation() << x, y, z;
+  return T;
+}
+
+/// The points `from` … `to` - 1 of a world, one row each, in that order.
+StereoFeatures see(const synthetic::World& world, int from, int to, const Eigen::Isometry3d& T_camera_origin,
+                   double noise = 0.0, unsigned seed = 1) {
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal(0.0, noise);
+  StereoFeatures features = synthetic::noFeatures(synthetic::camera());
+  for (int i = from; i < to; ++i) {
+    Eigen::Vector3d pixel = features.camera.project(T_camera_origin * world.points[static_cast<std::size_t>(i)]);
+    for (int k = 0; noise > 0.0 && k < 3; ++k) pixel[k] += normal(random);
+    synthetic::addFeature(features, pixel.x(), pixel.y(), pixel.x() - pixel.z(),
+                          world.rows[static_cast<std::size_t>(i)]);
+  }
+  return features;
+}
+
+/// Row `row` of the view's map point as a sighting by row `row_of_pair` of a pair, corners as they are.
+LocalMap::Sighting sighting(const LocalMap& map, const LocalMap::View& view, int row, const StereoFeatures& features,
+                            int row_of_pair) {
+  return map.sight({}, features, map.newestPose(), view.point[static_cast<std::size_t>(row)], row_of_pair);
+}
+
+/// The pair's rows `from` … recognise the view's rows from 0 on, `count` of them.
+Sightings recognised(const LocalMap& map, const StereoFeatures& features, int count, int from = 0) {
+  const LocalMap::View view = map.view();
+  Sightings sightings;
+  for (int k = 0; k < count; ++k) sightings.push_back(sighting(map, view, k, features, from + k));
+  return sightings;
+}
+
+/// What an odometry does with a pair, without the adjustment.
+void add(LocalMap& map, const StereoFeatures& features, int id, const Eigen::Isometry3d& T_camera_origin,
+         const Sightings& sightings, const RigCalibration& calibration = {}) {
+  map.insert(features, id, T_camera_origin, sightings, calibration);
+  map.renewLooks(features, sightings);
+}
+
+LocalMapOptions everyPairAKeyframe() {
+  LocalMapOptions options;
+  options.keyframe_parallax = 0.0;
+  return options;
+}
+
+LocalMapOptions noFurtherKeyframe() {
+  LocalMapOptions options;
+  options.keyframe_parallax = 500.0;
+  options.keyframe_overlap = 0.0;
+  return options;
+}
+
+TEST(LocalMap, IsContinuedByTheSameCameraAndKindOfDescriptor) {
+  const synthetic::World world = someWorld(5);
+  LocalMap map({});
+  const StereoFeatures features = see(world, 0, 5, Eigen::Isometry3d::Identity());
+  add(map, features, 1, Eigen::Isometry3d::Identity(), {});
+  EXPECT_TRUE(map.continuedBy(features));
+  const auto continuedWith = [&](const std::function<void(StereoFeatures&)>& change) {
+    StereoFeatures other = features;
+    change(other);
+    return map.continuedBy(other);
+  };
+  EXPECT_FALSE(continuedWith([](StereoFeatures& f) { f.camera.baseline = 0.4; }));
+  EXPECT_FALSE(continuedWith([](StereoFeatures& f) { f.descriptor = "orb"; }));
+  EXPECT_FALSE(continuedWith([](StereoFeatures& f) { f.layout = DescriptorLayout::kLeft; }));
+  EXPECT_FALSE(continuedWith([](StereoFeatures& f) { f.element_type = ElementType::kUint8; }));
+  EXPECT_FALSE(continuedWith([](StereoFeatures& f) { f.descriptors = f.descriptors.colRange(0, 64).clone(); }));
+  EXPECT_TRUE(map.continuedBy(synthetic::noFeatures(synthetic::camera(), 0, 64))) << "no features, no other kind";
+}
+
+TEST(LocalMap, ViewIsWhatTheNewestPairSees) {
+  const synthetic::World world = someWorld(20);
+  LocalMap map({});
+  Vector6d xi;
+  xi << 0.3, -0.1, 0.5, 0.02, -0.05, 0.03;
+  const Eigen::Isometry3d first = expSE3(xi), second = translated(0.0, 0.0, -0.4) * first;
+  StereoFeatures features = see(world, 0, 20, first);
+  features.stamp = 42;
+  add(map, features, 1, first, {});
+  EXPECT_EQ(map.newestStamp(), 42);
+  EXPECT_EQ(map.newestId(), 1);
+  for (const Eigen::Isometry3d& pose : {first, second}) {
+    if (&pose != &first && map.newestId() == 1) {
+      const StereoFeatures next = see(world, 0, 20, second);
+      add(map, next, 2, second, recognised(map, next, 20));
+    }
+    const Eigen::Isometry3d newest = map.newestPose();
+    const LocalMap::View view = map.view();
+    ASSERT_EQ(view.rows.count(), 20);
+    EXPECT_EQ(view.rows.kind, features.kind());
+    for (int i = 0; i < 20; ++i) {
+      const Eigen::Vector3d truth = newest * world.points[i];
+      EXPECT_LT((view.rows.positions[i] - truth).norm(), 1e-4);
+      const Eigen::Vector3d pixel = features.camera.project(truth);
+      EXPECT_NEAR(view.pixels[i].x, pixel.x(), 1e-3);
+      EXPECT_NEAR(view.pixels[i].y, pixel.y(), 1e-3);
+      EXPECT_NEAR(view.pixels[i].z, pixel.x() - pixel.z(), 1e-3);
+      EXPECT_EQ(view.point[i], i);
+      EXPECT_EQ(0, std::memcmp(view.rows.descriptors.ptr(i), world.rows[i].data(), world.rows[i].size()));
+    }
+  }
+  EXPECT_EQ(map.newestId(), 2);
+}
+
+TEST(LocalMap, PointsAreWithoutTheRigsError) {
+  const synthetic::World world = someWorld(20);
+  StereoFeatures features = see(world, 0, 20, Eigen::Isometry3d::Identity());
+  RigCalibration calibration;
+  calibration.value << 0.5, -2.0;
+  for (int i = 0; i < 20; ++i) {
+    const double x = (features.u[i] - features.camera.cx) / features.camera.fx;
+    features.disparity[i] += static_cast<float>(0.5 - 2.0 * x * x);
+  }
+  LocalMap map({});
+  add(map, features, 1, Eigen::Isometry3d::Identity(), {}, calibration);
+  const LocalMap::View view = map.view();
+  for (int i = 0; i < 20; ++i) EXPECT_LT((view.rows.positions[i] - world.points[i]).norm(), 1e-4);
+}
+
+TEST(LocalMap, FarPointsAreDirections) {
+  StereoFeatures features = synthetic::noFeatures(synthetic::camera());
+  std::mt19937 random(1);
+  synthetic::addFeature(features, 422.5, 236.25, 0.01, synthetic::randomRow(random, 128));
+  LocalMap map({});
+  add(map, features, 1, Eigen::Isometry3d::Identity(), {});
+  const Eigen::Vector3d position = map.view().rows.positions.at(0);
+  EXPECT_NEAR(position.z(), 400.0 * 0.5 / 0.05, 1e-2) << "farther than that cannot be told apart";
+  EXPECT_NEAR(position.x() / position.z(), 0.25, 1e-9);
+}
+
+TEST(LocalMap, DoesNotShowWhatLiesBehind) {
+  const synthetic::World world = someWorld(100);
+  LocalMap map(noFurtherKeyframe());
+  add(map, see(world, 0, 100, Eigen::Isometry3d::Identity()), 1, Eigen::Isometry3d::Identity(), {});
+  const Eigen::Isometry3d ahead = translated(0.0, 0.0, -10.0);
+  add(map, synthetic::noFeatures(synthetic::camera()), 2, ahead, {});
+  int in_front = 0, shown = 0;
+  for (const Eigen::Vector3d& point : world.points) {
+    if ((ahead * point).z() <= 0.01) continue;
+    ++in_front;
+    const Eigen::Vector3d pixel = synthetic::camera().project(ahead * point);
+    shown += pixel.x() > 0.0 && pixel.x() < 640.0 && pixel.y() > 0.0 && pixel.y() < 480.0;
+  }
+  ASSERT_LT(in_front, 90);
+  ASSERT_LT(shown, in_front);
+  ASSERT_GT(shown, 5);
+  EXPECT_EQ(map.view().rows.count(), shown) << "nor what lies beside the image";
+}
+
+TEST(LocalMap, ForgetsThePairBeforeUnlessItWasAKeyframe) {
+  const synthetic::World world = someWorld(30);
+  LocalMap map(noFurtherKeyframe());
+  const Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  add(map, see(world, 0, 10, pose), 1, pose, {});
+  EXPECT_TRUE(map.newestIsKeyframe()) << "the first one is";
+  StereoFeatures second = see(world, 0, 20, pose);
+  add(map, second, 2, pose, recognised(map, second, 10));
+  EXPECT_FALSE(map.newestIsKeyframe());
+  EXPECT_EQ(map.view().rows.count(), 20);
+  // The third sees five of the points that only the second had shown; the other five go with it.
+  StereoFeatures third = see(world, 0, 15, pose);
+  add(map, third, 3, pose, recognised(map, third, 15));
+  EXPECT_EQ(map.view().rows.count(), 15);
+  EXPECT_EQ(map.oldestId(), 1);
+  EXPECT_EQ(map.newestId(), 3);
+  EXPECT_EQ(map.lastKeyframeId(), 1);
+}
+
+TEST(LocalMap, KeepsAPairWhosePointsMovedFarEnough) {
+  // All points 8 m away: a step of 2 cm across moves them by a pixel.
+  synthetic::World world = someWorld(21);
+  for (Eigen::Vector3d& point : world.points) point.z() = 8.0;
+  LocalMapOptions options;
+  options.keyframe_parallax = 4.0;
+  for (const bool vertical : {false, true})
+    for (const double pixels : {3.9, 4.1}) {
+      LocalMap map(options);
+      const Eigen::Isometry3d first = Eigen::Isometry3d::Identity();
+      const Eigen::Isometry3d moved =
+          vertical ? translated(0.0, pixels * 8.0 / 410.0, 0.0) : translated(pixels * 8.0 / 400.0, 0.0, 0.0);
+      add(map, see(world, 0, 21, first), 1, first, {});
+      StereoFeatures second = see(world, 0, 21, moved);
+      // A fifth of them far off: the median decides.
+      for (int i = 0; i < 4; ++i) second.u[i] += 40.f;
+      add(map, second, 2, moved, recognised(map, second, 21));
+      EXPECT_EQ(map.newestIsKeyframe(), pixels > 4.0) << pixels;
+      EXPECT_EQ(map.lastKeyframeId(), pixels > 4.0 ? 2 : 1);
+    }
+}
+
+TEST(LocalMap, KeepsAPairOnceFewOfItsPointsWereInTheLastKeyframe) {
+  const synthetic::World world = someWorld(40);
+  const Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  for (const int old : {11, 13}) {
+    LocalMapOptions options = noFurtherKeyframe();
+    options.keyframe_overlap = 0.6;
+    LocalMap map(options);
+    add(map, see(world, 0, 13, pose), 1, pose, {});
+    StereoFeatures second = see(world, 0, 21, pose);  // eight new ones
+    add(map, second, 2, pose, recognised(map, second, 13));
+    ASSERT_FALSE(map.newestIsKeyframe());
+    // The third recognises the eight and `old` of the first pair: 11 of 19 is less than 0.6, 13 of 21 is not.
+    const LocalMap::View view = map.view();
+    StereoFeatures third = see(world, 13 - old, 21, pose);
+    Sightings sightings;
+    for (int row = 0; row < third.count(); ++row) sightings.push_back(sighting(map, view, 13 - old + row, third, row));
+    add(map, third, 3, pose, sightings);
+    EXPECT_EQ(map.newestIsKeyframe(), old == 11);
+  }
+}
+
+TEST(LocalMap, HoldsAsManyKeyframesAsItIsTold) {
+  const synthetic::World world = someWorld(20);
+  LocalMapOptions options = everyPairAKeyframe();
+  options.keyframes = 3;
+  options.lasting_keyframes = 0;
+  LocalMap map(options);
+  for (int id = 1; id <= 6; ++id) {
+    const Eigen::Isometry3d pose = translated(0.1 * id, 0.0, 0.0);
+    const StereoFeatures features = see(world, 0, 20, pose);
+    add(map, features, id, pose, id == 1 ? Sightings{} : recognised(map, features, 20));
+    EXPECT_TRUE(map.newestIsKeyframe());
+    EXPECT_EQ(map.oldestId(), std::max(1, id - 3)) << "three beside the newest";
+  }
+}
+
+TEST(LocalMap, LooksForAPointUntilEnoughFramesMissedIt) {
+  const synthetic::World world = someWorld(20);
+  LocalMapOptions options = everyPairAKeyframe();
+  options.remembered = 3;
+  LocalMap map(options);
+  add(map, see(world, 0, 20, translated(0.0, 0.0, 0.0)), 1, translated(0.0, 0.0, 0.0), {});
+  for (int id = 2; id <= 4; ++id) {
+    EXPECT_EQ(map.view().rows.count(), 20) << "before pair " << id;
+    const Eigen::Isometry3d pose = translated(0.1 * id, 0.0, 0.0);
+    const StereoFeatures features = see(world, 0, 10, pose);
+    add(map, features, id, pose, recognised(map, features, 10));
+  }
+  EXPECT_EQ(map.view().rows.count(), 10) << "pairs 2, 3 and 4 missed the others";
+}
+
+TEST(LocalMap, TakesTheLooksOfTheLastSighting) {
+  const synthetic::World world = someWorld(20), other_looks = someWorld(20, 2);
+  LocalMap map(noFurtherKeyframe());
+  const Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  add(map, see(world, 0, 20, pose), 1, pose, {});
+  StereoFeatures second = see(world, 0, 20, pose);
+  for (int i = 0; i < 20; ++i) std::memcpy(second.descriptors.ptr(i), other_looks.rows[i].data(), 128);
+  add(map, second, 2, pose, recognised(map, second, 12));
+  const LocalMap::View view = map.view();
+  ASSERT_EQ(view.rows.count(), 28) << "the other eight rows are new points";
+  for (int i = 0; i < 28; ++i) {
+    const auto& looks = i < 12 ? other_looks.rows[i] : i < 20 ? world.rows[i] : other_looks.rows[i - 8];
+    EXPECT_EQ(0, std::memcmp(view.rows.descriptors.ptr(i), looks.data(), looks.size())) << i;
+  }
+}
+
+TEST(LocalMap, WithoutPatchesASightingIsTheCorner) {
+  const synthetic::World world = someWorld(3);
+  LocalMapOptions options;
+  options.corner_sigma = 0.7;
+  LocalMap map(options);
+  const StereoFeatures features = see(world, 0, 3, Eigen::Isometry3d::Identity());
+  add(map, features, 1, Eigen::Isometry3d::Identity(), {});
+  const LocalMap::Sighting seen = map.sight({}, features, Eigen::Isometry3d::Identity(), 1, 2);
+  EXPECT_EQ(seen.point, 1);
+  EXPECT_EQ(seen.row, 2);
+  EXPECT_EQ(seen.measurement, Eigen::Vector3d(features.u[2], features.v[2], features.disparity[2]));
+  EXPECT_EQ(seen.sigma, 0.7);
+  EXPECT_FALSE(seen.aligned);
+}
+
+WindowOptimizerOptions thorough() {
+  WindowOptimizerOptions options;
+  options.iterations = 20;
+  return options;
+}
+
+/// The rig's error is known to be none.
+CalibrationBelief noRigError() {
+  return {RigCalibration::Vector::Zero(), 1e12 * RigCalibration::Matrix::Identity()};
+}
+
+TEST(LocalMap, AdjustmentMovesTheNewestPairToWhereItsPointsSayItIs) {
+  const synthetic::World world = someWorld(60);
+  LocalMap map(everyPairAKeyframe());
+  const Eigen::Isometry3d first = Eigen::Isometry3d::Identity(), second = translated(0.1, 0.02, -0.5);
+  add(map, see(world, 0, 60, first), 1, first, {});
+  const StereoFeatures features = see(world, 0, 60, second);
+  Vector6d error;
+  error << 0.03, -0.02, 0.04, 0.002, -0.003, 0.004;
+  map.insert(features, 2, expSE3(error) * second, recognised(map, features, 60), {});
+  RigCalibration calibration;
+  const LocalMap::Adjustment adjustment = map.adjust(thorough(), noRigError(), calibration);
+  ASSERT_TRUE(adjustment.success);
+  EXPECT_TRUE(adjustment.rejected_rows.empty());
+  EXPECT_LT(logSE3(map.newestPose() * second.inverse()).norm(), 1e-4);
+  EXPECT_LT(calibration.value.norm(), 1e-6);
+}
+
+TEST(LocalMap, APointKeepsItsLooksWhenASightingTurnsOutWrong) {
+  const synthetic::World world = someWorld(60);
+  LocalMap map(everyPairAKeyframe());
+  const Eigen::Isometry3d first = Eigen::Isometry3d::Identity(), second = translated(0.1, 0.02, -0.5);
+  add(map, see(world, 0, 60, first), 1, first, {});
+  StereoFeatures features = see(world, 0, 60, second);
+  std::mt19937 random(9);
+  const std::vector<std::uint8_t> strange = synthetic::randomRow(random, 128);
+  features.u[17] += 30.f;  // another thing, that looked like point 17
+  std::memcpy(features.descriptors.ptr(17), strange.data(), strange.size());
+  const Sightings sightings = recognised(map, features, 60);
+  map.insert(features, 2, second, sightings, {});
+  RigCalibration calibration;
+  const LocalMap::Adjustment adjustment = map.adjust(thorough(), noRigError(), calibration);
+  ASSERT_TRUE(adjustment.success);
+  EXPECT_EQ(adjustment.rejected_rows, std::vector<int>{17});
+  map.renewLooks(features, sightings);
+
+  const LocalMap::View view = map.view();
+  ASSERT_EQ(view.rows.count(), 60);
+  EXPECT_EQ(0, std::memcmp(view.rows.descriptors.ptr(17), world.rows[17].data(), 128));
+  EXPECT_LT((view.rows.positions[17] - second * world.points[17]).norm(), 0.02);
+}
+
+/// Frames 2 and 3, a step and a turn apart, know each other well by forty points, and together know hardly where frame
+/// 1 is: what the map says of the motion from 2 to 3 must be what a map of these two alone says.
+TEST(LocalMap, CovarianceBetweenTwoFramesDoesNotDependOnWhereTheFirstOneIs) {
+  const synthetic::World world = someWorld(40);
+  Vector6d step;
+  step << 0.4, -0.2, -0.6, 0.03, 0.12, -0.05;
+  const Eigen::Isometry3d second = translated(0.2, 0.0, -0.5), third = expSE3(step) * second;
+  LocalMapOptions options = everyPairAKeyframe();
+  options.corner_sigma = 0.05;
+  WindowOptimizerOptions window;
+  window.common_disparity_sigma = 0.0;
+  RigCalibration calibration;
+  constexpr double kNoise = 0.05;  // px
+  const StereoFeatures of_second = see(world, 0, 40, second, kNoise, 2), of_third = see(world, 0, 40, third, kNoise, 3);
+
+  LocalMap alone(options);
+  add(alone, of_second, 2, second, {});
+  alone.insert(of_third, 3, third, recognised(alone, of_third, 40), {});
+  const LocalMap::Adjustment known = alone.adjust(window, noRigError(), calibration);
+  ASSERT_TRUE(known.success);
+  EXPECT_EQ(known.covariances.first_id, 2);
+  EXPECT_EQ(known.covariances.keyframe_since_first, Matrix6d::Zero());
+  EXPECT_EQ(known.covariances.since_keyframe, known.covariances.since_first);
+  EXPECT_EQ(known.covariances.since_second, Matrix6d::Zero());
+
+  LocalMap map(options);
+  add(map, see(world, 0, 12, Eigen::Isometry3d::Identity()), 1, Eigen::Isometry3d::Identity(), {});
+  Sightings loose = recognised(map, of_second, 12);
+  for (LocalMap::Sighting& sighting : loose) sighting.sigma = 20.0;
+  // The rows come a second time as points of the second frame's own.
+  StereoFeatures twice = of_second;
+  for (int i = 0; i < 12; ++i) {
+    twice.append({of_second.u[i], of_second.v[i], of_second.disparity[i], 0.f, 10.f, -1.f, 1.f});
+    twice.descriptors.push_back(of_second.descriptors.row(i));
+  }
+  add(map, twice, 2, second, loose);
+  // View: 12 points of the first frame, then rows 12 … 39 and the twelve again.
+  const LocalMap::View view = map.view();
+  ASSERT_EQ(view.rows.count(), 52);
+  Sightings sightings;
+  for (int i = 0; i < 40; ++i) sightings.push_back(sighting(map, view, 12 + i, of_third, i < 28 ? 12 + i : i - 28));
+  map.insert(of_third, 3, third, sightings, {});
+  const LocalMap::Adjustment adjustment = map.adjust(window, noRigError(), calibration);
+  ASSERT_TRUE(adjustment.success);
+  const WindowCovariances& covariances = adjustment.covariances;
+  EXPECT_EQ(covariances.first_id, 1);
+  EXPECT_GT(covariances.keyframe_since_first.trace(), 100.0 * known.covariances.since_first.trace());
+  EXPECT_GT(covariances.since_first.trace(), 100.0 * known.covariances.since_first.trace());
+  // But for a factor: residuals of loose sightings are smaller than expected.
+  const Matrix6d root = known.covariances.since_first.llt().matrixL();
+  for (const Matrix6d& between : {covariances.since_keyframe, covariances.since_second}) {
+    const Matrix6d ratio = root.inverse() * between * root.inverse().transpose();
+    const double factor = ratio.trace() / 6.0;
+    EXPECT_GT(factor, 0.1);
+    EXPECT_LT(factor, 1.1);
+    EXPECT_LT((ratio / factor - Matrix6d::Identity()).norm(), 0.05) << ratio;
+  }
 }
 
 }  // namespace

@@ -73,8 +73,8 @@ TEST(RefineMotion, CauchysKernel) {
   const Eigen::Vector3d shift(0.6, 0.0, 0.8);  // 1 px long
   const auto correspondences = balancedCorrespondences(shift);
   Eigen::Isometry3d T = trueMotion();
-  const NormalEquations result = refineMotion(synthetic::camera(), kernel(RobustKernel::kCauchy, 0.5), correspondences,
-                                              all(correspondences), T);
+  const NormalEquations result =
+      refineMotion(synthetic::camera(), kernel(RobustKernel::kCauchy, 0.5), correspondences, all(correspondences), T);
   EXPECT_LT(distance(T, trueMotion()), 1e-9);
   EXPECT_NEAR(result.weight, 40.0 / 5.0, 1e-6);  // 1 / (1 + 2^2)
   EXPECT_NEAR(result.weighted_square, 40.0 / 5.0, 1e-6);
@@ -87,9 +87,9 @@ TEST(RefineMotion, HubersKernelWithinAndBeyondItsBend) {
   Eigen::Isometry3d T = trueMotion();
   const NormalEquations beyond =
       refineMotion(synthetic::camera(), kernel(RobustKernel::kHuber, 0.5), correspondences, all(correspondences), T);
-  EXPECT_NEAR(beyond.weight, 40.0 * 0.25, 1e-6);                     // 0.5 px / 2 px
-  EXPECT_NEAR(beyond.weighted_square, 40.0 * 0.25 * 4.0, 1e-6);      // px^2
-  EXPECT_NEAR(beyond.cost, 40.0 * 0.5 * (2.0 * 2.0 - 0.5), 1e-6);    // px^2
+  EXPECT_NEAR(beyond.weight, 40.0 * 0.25, 1e-6);                   // 0.5 px / 2 px
+  EXPECT_NEAR(beyond.weighted_square, 40.0 * 0.25 * 4.0, 1e-6);    // px^2
+  EXPECT_NEAR(beyond.cost, 40.0 * 0.5 * (2.0 * 2.0 - 0.5), 1e-6);  // px^2
   const NormalEquations within =
       refineMotion(synthetic::camera(), kernel(RobustKernel::kHuber, 3.0), correspondences, all(correspondences), T);
   EXPECT_NEAR(within.weight, 40.0, 1e-6);
@@ -99,8 +99,8 @@ TEST(RefineMotion, HubersKernelWithinAndBeyondItsBend) {
 TEST(RefineMotion, EquationsAreTheSumOverWeightedJacobians) {
   const auto correspondences = balancedCorrespondences({0.6, 0.0, 0.8});
   Eigen::Isometry3d T = trueMotion();
-  const NormalEquations result = refineMotion(synthetic::camera(), kernel(RobustKernel::kCauchy, 0.5), correspondences,
-                                              all(correspondences), T);
+  const NormalEquations result =
+      refineMotion(synthetic::camera(), kernel(RobustKernel::kCauchy, 0.5), correspondences, all(correspondences), T);
   Matrix6d expected = Matrix6d::Zero();
   for (const Correspondence& c : correspondences) {
     const auto jacobian = motionJacobian(synthetic::camera(), trueMotion(), c.point);
@@ -126,8 +126,10 @@ TEST(RefineMotion, LooksAtTheSubsetOnly) {
   auto correspondences = exactCorrespondences(30);
   std::vector<int> subset;
   for (int i = 0; i < 30; ++i) {
-    if (i % 3 == 0) correspondences[i].measurement += Eigen::Vector3d(30.0, 30.0, 30.0);
-    else subset.push_back(i);
+    if (i % 3 == 0)
+      correspondences[i].measurement += Eigen::Vector3d(30.0, 30.0, 30.0);
+    else
+      subset.push_back(i);
   }
   Eigen::Isometry3d T = expSE3(0.02 * Vector6d::Ones()) * trueMotion();
   const NormalEquations result = refineMotion(synthetic::camera(), {}, correspondences, subset, T);
@@ -139,8 +141,7 @@ TEST(RefineMotion, LeavesOutWhatLiesBehindTheCamera) {
   auto correspondences = exactCorrespondences(30);
   correspondences.push_back({{0.0, 0.0, -5.0}, {300.0, 200.0, 290.0}});
   Eigen::Isometry3d T = expSE3(0.02 * Vector6d::Ones()) * trueMotion();
-  const NormalEquations result =
-      refineMotion(synthetic::camera(), {}, correspondences, all(correspondences), T);
+  const NormalEquations result = refineMotion(synthetic::camera(), {}, correspondences, all(correspondences), T);
   EXPECT_LT(distance(T, trueMotion()), 1e-6);
   EXPECT_NEAR(result.weight, 30.0, 1e-6);
 }
@@ -149,7 +150,8 @@ TEST(RefineMotion, NeverEndsAtAHigherCost) {
   auto correspondences = exactCorrespondences(30);
   std::mt19937 random(3);
   std::normal_distribution<double> normal(0.0, 40.0);
-  for (Correspondence& c : correspondences) c.measurement += Eigen::Vector3d(normal(random), normal(random), normal(random));
+  for (Correspondence& c : correspondences)
+    c.measurement += Eigen::Vector3d(normal(random), normal(random), normal(random));
   MotionRefinementOptions options = kernel(RobustKernel::kCauchy, 1.0);
   double previous = std::numeric_limits<double>::max();
   for (const int iterations : {1, 2, 3, 5, 10, 50}) {

@@ -2,7 +2,9 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <cmath>
 #include <limits>
+#include <set>
 
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
@@ -429,6 +431,170 @@ TEST(VisualOdometry, VelocityAfterAPredictedPairIsTheTrueOne) {
   const OdometryResult predicted = odometry.update(blindPair(8));
   ASSERT_EQ(predicted.state, TrackingState::kDegraded);
   EXPECT_LT(distanceBetween(predicted.T_origin_camera, trueSinceStart(5)), 0.1);
+}
+
+TEST(VisualOdometry, MeasuresASuddenTurnAgainstThePredictedOne) {
+  // A robot turns on the spot and all at once turns back: everything is 160 px away from where it was expected.
+  const synthetic::World around = synthetic::randomWorld(3, 5000, {-25.0, -4.0, -25.0}, {25.0, 4.0, 25.0});
+  const auto turnedPair = [&](int i) {
+    const double yaw = 0.2 * (i <= 5 ? i : 10 - i);
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.linear() = expSO3({0.0, yaw, 0.0});
+    synthetic::Sighting sighting;
+    sighting.max_depth = 25.0;
+    sighting.seed = 50 + static_cast<unsigned>(i);
+    return std::make_pair(pose, synthetic::observe(around, synthetic::camera(), pose.inverse(), stampOf(i), sighting));
+  };
+  VisualOdometry odometry({});
+  for (int i = 0; i <= 8; ++i) {
+    const auto [truth, features] = turnedPair(i);
+    const OdometryResult result = odometry.update(features);
+    ASSERT_EQ(result.state, TrackingState::kTracking) << i << ": " << result.reason;
+    EXPECT_LT(angleBetween(result.T_origin_camera, truth), 1e-3) << i;
+  }
+}
+
+TEST(VisualOdometry, RefusesRotationsThatNoRobotMakes) {
+  VisualOdometryOptions options;
+  options.tracking.max_rotation_rate = 1.0;
+  VisualOdometry odometry(options);
+  const auto pairTurnedBy = [&](double yaw, int i) {
+    Eigen::Isometry3d pose = drivePose(4);
+    pose.linear() = pose.linear() * expSO3({0.0, yaw, 0.0});
+    synthetic::Sighting sighting;
+    sighting.max_depth = 25.0;
+    return synthetic::observe(street(), synthetic::camera(), pose.inverse(), stampOf(i), sighting);
+  };
+  follow(odometry, 4);
+  EXPECT_EQ(odometry.update(pairTurnedBy(0.08, 5)).state, TrackingState::kTracking);
+  const OdometryResult result = odometry.update(pairTurnedBy(0.2, 6));
+  EXPECT_NE(result.state, TrackingState::kTracking);
+  EXPECT_NE(result.reason.find("max_rotation_rate"), std::string::npos) << result.reason;
+}
+
+TEST(VisualOdometry, AVelocityIsOfNoUseAfterABreak) {
+  VisualOdometry odometry({});
+  follow(odometry, 5);
+  odometry.breakStream();
+  odometry.update(pairOf(6));
+  // Nothing was measured since, so there is nothing to predict from.
+  EXPECT_EQ(odometry.update(blindPair(7)).state, TrackingState::kLost);
+}
+
+TEST(VisualOdometry, MayPredictAgainOnceItHasMeasured) {
+  VisualOdometry odometry({});
+  follow(odometry, 5);
+  for (int i = 6; i <= 13; ++i) {
+    const OdometryResult result = odometry.update(i % 2 == 0 ? blindPair(i) : pairOf(i));
+    EXPECT_EQ(result.state, i % 2 == 0 ? TrackingState::kDegraded : TrackingState::kTracking) << i;
+    EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(i)), 0.1) << i;
+  }
+}
+
+TEST(VisualOdometry, APredictedPairIsAsUncertainAsAVehicleMayAccelerate) {
+  for (const int missed : {1, 2}) {
+    VisualOdometry odometry({});
+    const OdometryResult before = follow(odometry, 5);
+    const OdometryResult predicted = odometry.update(blindPair(5 + missed));
+    const double dt = 0.1 * missed;
+    Vector6d variance;
+    variance << Eigen::Vector3d::Constant(std::pow(0.5 * 5.0 * dt * dt, 2)),
+        Eigen::Vector3d::Constant(std::pow(0.5 * 2.0 * dt * dt, 2));
+    const Matrix6d expected = variance.asDiagonal();
+    EXPECT_LT((predicted.motion_covariance - expected).norm(), 1e-12);
+    const Matrix6d carried = adjoint(predicted.T_previous_current.inverse());
+    EXPECT_LT((predicted.pose_covariance - carried * before.pose_covariance * carried.transpose() - expected).norm(),
+              1e-9 * expected.norm());
+    // The next motion starts from the predicted pose and so contains what that lacked.
+    const OdometryResult after = odometry.update(pairOf(6 + missed));
+    ASSERT_EQ(after.state, TrackingState::kTracking) << after.reason;
+    const Matrix6d back = adjoint(after.T_previous_current.inverse());
+    const Matrix6d lacked = back * expected * back.transpose();
+    const Eigen::SelfAdjointEigenSolver<Matrix6d> rest(after.motion_covariance - lacked);
+    EXPECT_GE(rest.eigenvalues().minCoeff(), -1e-9 * lacked.norm());
+    EXPECT_LT(rest.eigenvalues().maxCoeff(), 0.1 * lacked.norm());
+  }
+}
+
+TEST(VisualOdometry, FlowLeadsFromWhereAFeatureWasToWhereItIs) {
+  synthetic::Sighting clear;
+  clear.max_depth = 25.0;
+  const auto clearPair = [&](int i) {
+    clear.seed = 70 + static_cast<unsigned>(i);
+    return synthetic::observe(street(), synthetic::camera(), drivePose(i).inverse(), stampOf(i), clear);
+  };
+  VisualOdometry odometry({});
+  for (int i = 0; i < 3; ++i) odometry.update(clearPair(i));
+  const StereoFeatures before = clearPair(2), now = clearPair(3);
+  const OdometryResult result = odometry.update(now);
+  int compared = 0;
+  for (const FeatureFlow& flow : result.flow) {
+    EXPECT_TRUE(flow.inlier);
+    for (int row = 0; row < before.count(); ++row) {
+      if (!synthetic::equalMats(before.descriptors.row(row), now.descriptors.row(flow.current))) continue;
+      EXPECT_NEAR(flow.u_previous, before.u[row], 0.1);
+      EXPECT_NEAR(flow.v_previous, before.v[row], 0.1);
+      ++compared;
+    }
+  }
+  EXPECT_GT(compared, 50);
+}
+
+TEST(VisualOdometry, CoverageIsTheShareOfCellsWithAnInlier) {
+  VisualOdometry odometry({});
+  for (int i = 0; i < 6; ++i) {
+    StereoFeatures features = pairOf(i);
+    if (i == 5) {
+      // Right of 160 px and above 240 px: six columns of 80 px and two rows of 120 px.
+      std::vector<int> rows;
+      for (int row = 0; row < features.count(); ++row)
+        if (features.u[row] >= 160.f && features.v[row] < 240.f) rows.push_back(row);
+      features = features.select(rows);
+    }
+    const OdometryResult result = odometry.update(features);
+    if (i == 0) continue;
+    std::set<std::pair<int, int>> cells;
+    for (const FeatureFlow& flow : result.flow)
+      if (flow.inlier) cells.emplace(int(features.u[flow.current] / 80.f), int(features.v[flow.current] / 120.f));
+    EXPECT_EQ(result.coverage, static_cast<double>(cells.size()) / 32.0);
+    EXPECT_EQ(result.coverage <= 12.0 / 32.0, i == 5);
+  }
+}
+
+TEST(VisualOdometry, SpeedIsByTheClock) {
+  // Every second pair is missing, then one is blind: its motion is one period's.
+  VisualOdometry odometry({});
+  follow(odometry, 3);
+  for (const int i : {5, 7}) ASSERT_EQ(odometry.update(pairOf(i)).state, TrackingState::kTracking);
+  const OdometryResult predicted = odometry.update(blindPair(8));
+  ASSERT_EQ(predicted.state, TrackingState::kDegraded);
+  EXPECT_NEAR(predicted.dt, 0.1, 1e-12);
+  EXPECT_LT(distanceBetween(predicted.T_origin_camera, trueSinceStart(8)), 0.1);
+}
+
+TEST(VisualOdometry, TakesOtherOptionsOverWhileRunning) {
+  VisualOdometry odometry({});
+  follow(odometry, 5);
+  VisualOdometryOptions options;
+  options.tracking.max_predicted_pairs = 1000;
+  EXPECT_THROW(odometry.configure(options), std::invalid_argument);
+  EXPECT_EQ(odometry.options().tracking.max_predicted_pairs, 1);
+  options.tracking.max_predicted_pairs = 0;
+  odometry.configure(options);
+  EXPECT_EQ(odometry.update(pairOf(6)).state, TrackingState::kTracking) << "the map goes on";
+  EXPECT_EQ(odometry.update(blindPair(7)).state, TrackingState::kLost);
+  options.motion.min_inliers = 5000;
+  odometry.configure(options);
+  EXPECT_EQ(odometry.update(pairOf(8)).state, TrackingState::kLost) << "never so many features";
+}
+
+TEST(VisualOdometry, NamesTheMapsLastKeyframe) {
+  VisualOdometry odometry({});
+  EXPECT_EQ(odometry.update(pairOf(0)).keyframe_id, 1);
+  EXPECT_EQ(odometry.update(pairOf(1)).keyframe_id, 2) << "at this speed every pair is one";
+  EXPECT_EQ(odometry.update(blindPair(2)).keyframe_id, 2);
+  EXPECT_EQ(odometry.update(blindPair(3)).keyframe_id, 0) << "lost";
+  EXPECT_EQ(odometry.update(pairOf(4)).keyframe_id, 5);
 }
 
 TEST(VisualOdometry, NamesItsStates) {

@@ -2,7 +2,6 @@
 #include <gtest/gtest.h>
 
 #include "../synthetic_features.hpp"
-#include "stereo_descriptor_vo/odometry/right_camera_rotation.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
 namespace sdvo {
@@ -57,6 +56,32 @@ TEST(SelfCalibrationPrior, AnErrorThatIsKnownBeforehandIsCompensatedFromTheStart
   EXPECT_GT(std::abs(firstStep(0.0) - truth), 0.03 * truth) << "the offset must matter, else this tests nothing";
   EXPECT_LT(std::abs(firstStep(-2.0) - truth), 0.01 * truth);
 }
+
+TEST(SelfCalibrationPrior, MatchesAgreeWithTheMapOnceItIsTakenOut) {
+  SyntheticScene scene(12, 4000, 120.0);
+  scene.disparity_offset = -1.0;
+  VisualOdometryOptions options;
+  options.calibration.enabled = false;
+  options.calibration.prior_offset = -1.0;
+  VisualOdometry odometry(options);
+  const OdometryResult result = drive(scene, odometry, 3);
+  EXPECT_GT(result.inliers, 0.9 * result.matches);
+  EXPECT_LT(result.rms, 0.6) << "0.3 px in u and v, 0.15 px in the disparity, in both pairs";
+}
+
+class SelfCalibrationBend : public testing::TestWithParam<double> {};
+
+TEST_P(SelfCalibrationBend, IsRecovered) {
+  SyntheticScene scene(17, 6000, 120.0);
+  scene.disparity_bend = GetParam();
+  VisualOdometry odometry{VisualOdometryOptions{}};
+  const OdometryResult result = drive(scene, odometry, 60);
+  // The prior, zero, gives way slowly.
+  EXPECT_NEAR(result.disparity_bend, GetParam(), 0.35);
+  EXPECT_NEAR(result.disparity_offset, 0.0, 0.08);
+  EXPECT_GT(result.disparity_bend_sigma, 0.0);
+}
+INSTANTIATE_TEST_CASE_P(Bends, SelfCalibrationBend, testing::Values(-1.0, 1.0));
 
 TEST(SelfCalibrationReport, IsNotANumberBeforeThereIsAnEstimate) {
   SyntheticScene scene(13, 2000, 60.0);
@@ -117,24 +142,6 @@ TEST(PoseCovariance, GrowsWithTheDistance) {
     }
     last = trace;
   }
-}
-
-TEST(RightCameraRotationFilter, RecoversARotationFromVerticalDisparities) {
-  const Eigen::Vector3d truth(0.4e-3, -3.0e-3, 1.1e-3);
-  SyntheticScene scene(16, 4000, 60.0);
-  StereoFeatures features = scene.view(Eigen::Isometry3d::Identity(), 1);
-  const StereoCamera& camera = scene.camera;
-  for (int i = 0; i < features.count(); ++i) {
-    // Rotates the ray itself instead of using the first-order formula under test.
-    const Eigen::Vector3d ray((features.u[i] - features.disparity[i] - camera.cx) / camera.fx,
-                              (features.v[i] - camera.cy) / camera.fy, 1.0);
-    const Eigen::Vector3d turned = expSO3(-truth) * ray;
-    features.dv[i] = static_cast<float>(camera.fy * (turned.y() / turned.z() - ray.y()));
-  }
-  RightCameraRotation filter;
-  EXPECT_TRUE(std::isnan(filter.rotation().x()));
-  filter.add(features);
-  EXPECT_LT((filter.rotation() - truth).cwiseAbs().maxCoeff(), 5e-5);
 }
 
 }  // namespace

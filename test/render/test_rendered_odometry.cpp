@@ -44,11 +44,11 @@ std::vector<StereoFeatures> extractAll(const Drive& drive) {
   return features;
 }
 
-TEST(RenderedOdometry, MotionsLieInTheirCovariancesAndTheRigIsCalibrated) {
+TEST(RenderedOdometry, MotionsAndPosesLieInTheirCovariancesAndTheRigIsCalibrated) {
   constexpr double kChiSquare95 = 12.592;  // six degrees of freedom
   constexpr int kFrames = 40, kSettled = 20;
   int inside = 0, total = 0;
-  double sum = 0.0;
+  double sum = 0.0, pose_sum = 0.0;
   for (const auto& [seed, disparity_offset] : {std::pair(1, 0.0), std::pair(2, 0.3), std::pair(3, 0.3)}) {
     render::RenderOptions options;
     options.seed = seed;
@@ -67,6 +67,9 @@ TEST(RenderedOdometry, MotionsLieInTheirCovariancesAndTheRigIsCalibrated) {
         const double normalised = error.dot(result.motion_covariance.ldlt().solve(error));
         inside += normalised < kChiSquare95;
         sum += normalised;
+        const Eigen::Isometry3d true_pose = drive.path.pose(0).inverse() * drive.path.pose(frame);
+        const Vector6d pose_error = logSE3(result.T_origin_camera.inverse() * true_pose);
+        pose_sum += pose_error.dot(result.pose_covariance.ldlt().solve(pose_error));
         ++total;
       }
       if (frame >= kSettled) offsets += result.disparity_offset;
@@ -76,6 +79,9 @@ TEST(RenderedOdometry, MotionsLieInTheirCovariancesAndTheRigIsCalibrated) {
   }
   EXPECT_GE(static_cast<double>(inside) / total, 0.90);
   EXPECT_GE(sum / total, 0.25 * 6.0) << "standard deviations more than twice too large";
+  // Six in the mean, if all were normal; the poses of one drive err together.
+  EXPECT_GE(pose_sum / total, 2.5);
+  EXPECT_LE(pose_sum / total, 10.5);
 }
 
 TEST(RenderedOdometry, TheNumberOfThreadsChangesNoBit) {

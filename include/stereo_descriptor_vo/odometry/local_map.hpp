@@ -102,6 +102,10 @@ class LocalMap {
   };
   Adjustment adjust(const WindowOptimizerOptions& options, const CalibrationBelief& prior, RigCalibration& calibration);
 
+  /// The newest pair's sightings that were not cut off renew what their points look like: the descriptors, and a
+  /// reference patch that has become too small or too large.
+  void renewLooks(const StereoFeatures& features, const std::vector<Sighting>& sightings);
+
  private:
   struct Frame {
     int id;
@@ -135,7 +139,7 @@ class LocalMap {
   void cutOff(const std::vector<std::pair<int, int>>& sources, const std::vector<double>& residuals,
               Adjustment& adjustment);
   bool needsKeyframe() const;
-  static void addSighting(Point& point, const StereoFeatures& features, const Sighting& sighting, int id);
+  static void takeDescriptor(Point& point, const StereoFeatures& features, int row);
   static Reference takeReference(const StereoFeatures& features, const Sighting& sighting,
                                  const Eigen::Isometry3d& T_camera_origin);
   void startPoint(const StereoFeatures& features, int row, int id, const Eigen::Isometry3d& T_camera_origin,
