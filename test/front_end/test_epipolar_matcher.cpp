@@ -230,7 +230,10 @@ TEST(EpipolarMatcher, NeverLeavesTheRightImage) {
     for (double outside = -2.0; outside < 2.0; outside += 0.25)
       for (float v = 20.f; v < 140.f; v += 8.f) {
         const float u = static_cast<float>(disparity - outside);
-        if (const auto found = find(pair, {u, v}, options)) EXPECT_GE(u - found->x, 0.f) << u << ", " << v;
+        const auto found = find(pair, {u, v}, options);
+        if (found) {
+          EXPECT_GE(u - found->x, 0.f) << u << ", " << v;
+        }
       }
   }
 }
