@@ -124,6 +124,8 @@ TEST(FeatureMatcher, GateHoldsThePredictedPositionAndNothingFar) {
     addFeature(reference, before.x(), before.y(), before.x() - before.z(), row);
     const auto matchesAt = [&](double du, double dv, const std::optional<Eigen::Isometry3d>& prediction) {
       StereoFeatures current = noFeatures(camera);
+      for (const double corner : {0.0, 1.0})  // strangers that stretch the grid over the image
+        addFeature(current, 639.0 * corner, 479.0 * corner, 1.0, randomRow(random, 128));
       addFeature(current, after.x() + du, after.y() + dv, after.x() - after.z(), row);
       return matcher.match(reference, current, prediction).size();
     };

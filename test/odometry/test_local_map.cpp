@@ -133,6 +133,40 @@ TEST(LocalMapSight, TakesOutTheDetectorsErrorAtAnotherDepth) {
   EXPECT_LT(sighting.sigma, 0.1);
 }
 
+TEST(LocalMapSight, KnowsWhatATurnedCameraMakesOfAPatch) {
+  // The wall again, seen from one place: straight on, then turned away until the point is half a radian off the axis,
+  // where a pixel covers less of the wall.
+  const auto texture = [](double x, double y) {
+    return 120.0 + 50.0 * std::sin(0.8 * x + 0.3) + 50.0 * std::cos(0.7 * y - 0.4 * x);
+  };
+  StereoFeatures straight = Wall().view(10.0);
+  const StereoCamera& camera = straight.camera;
+  const Eigen::Matrix3d R = expSO3({0.0, -0.5, 0.0});  // camera from wall
+  Eigen::Isometry3d turned = Eigen::Isometry3d::Identity();
+  turned.linear() = R;
+  const Eigen::Vector3d pixel = camera.project(R * Eigen::Vector3d(0.0, 0.0, 10.0));
+  ASSERT_GT(std::abs(pixel.x() - camera.cx), 200.0);
+  const Eigen::Vector2d error(0.6, -0.5);
+  StereoFeatures features = straight;
+  features.u[0] = static_cast<float>(pixel.x() + error.x());
+  features.v[0] = static_cast<float>(pixel.y() + error.y());
+  for (int j = 0; j < 13; ++j)
+    for (int i = 0; i < 13; ++i) {
+      const Eigen::Vector3d ray((pixel.x() + i - 6 + error.x() - camera.cx) / camera.fx,
+                                (pixel.y() + j - 6 + error.y() - camera.cy) / camera.fy, 1.0);
+      const Eigen::Vector3d on_wall = R.transpose() * ray;
+      const double grey = texture(camera.fx * on_wall.x() / on_wall.z(), camera.fy * on_wall.y() / on_wall.z());
+      features.patches.at<std::uint8_t>(0, 13 * j + i) = static_cast<std::uint8_t>(grey + 0.5);
+    }
+  LocalMap map{LocalMapOptions()};
+  map.insert(Wall().view(10.0), 1, Eigen::Isometry3d::Identity(), {}, RigCalibration());
+  const LocalMap::Sighting sighting = map.sight(PatchAlignmentOptions(), features, turned, 0, 0);
+  ASSERT_TRUE(sighting.aligned);
+  EXPECT_NEAR(sighting.measurement.x(), pixel.x(), 0.06);
+  EXPECT_NEAR(sighting.measurement.y(), pixel.y(), 0.06);
+  EXPECT_LT(sighting.sigma, 0.05) << "the warped patches hardly differ";
+}
+
 TEST(LocalMapSight, IsTheCornerWithoutAnAlignment) {
   const Wall wall;
   LocalMap map{LocalMapOptions()};
@@ -374,6 +408,7 @@ TEST(LocalMap, KeepsAPairWhosePointsMovedFarEnough) {
       StereoFeatures second = see(world, 0, 21, moved);
       // A fifth of them far off: the median decides.
       for (int i = 0; i < 4; ++i) second.u[i] += 40.f;
+      for (float& disparity : second.disparity) disparity += 10.f;  // that is no parallax
       add(map, second, 2, moved, recognised(map, second, 21));
       EXPECT_EQ(map.newestIsKeyframe(), pixels > 4.0) << pixels;
       EXPECT_EQ(map.lastKeyframeId(), pixels > 4.0 ? 2 : 1);
