@@ -205,8 +205,10 @@ TEST(Options, SetRefusesTextOfAnotherTypeAndValuesOutOfRange) {
                                                                                    {"colour", "blue"}}) {
     Outer outer;
     std::vector<Option> options = listOptions(outer);
+    const std::string before = hashOptions(options);
     const std::string error = errorOf([&, n = name, t = text] { setOption(options, n, t); });
     EXPECT_TRUE(contains(error, name)) << name << " = '" << text << "': " << error;
+    EXPECT_EQ(hashOptions(options), before) << name << " took '" << text << "'";
   }
 }
 

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <numeric>
+#include <set>
 #include <utility>
 
 #include "../synthetic_scene.hpp"
@@ -78,6 +79,18 @@ TEST(SpreadOverBuckets, KeepsTheStrongestOfABucket) {
   for (const Corner& corner : kept) EXPECT_GE(corner.response, 15.f);
 }
 
+TEST(SpreadOverBuckets, TheLastRoundGoesToTheStrongestOfAllBuckets) {
+  std::vector<Corner> corners;
+  for (int bucket = 0; bucket < 4; ++bucket)
+    for (int i = 0; i < 2; ++i)
+      corners.push_back({cv::Point2f(50.f * bucket + 5.f + i, 5.f), 100.f - 50.f * i + static_cast<float>(bucket)});
+  const std::vector<Corner> kept = spreadOverBuckets(corners, kSize, kBucket, 6);
+  ASSERT_EQ(kept.size(), 6u);
+  std::multiset<float> responses;
+  for (const Corner& corner : kept) responses.insert(corner.response);
+  EXPECT_EQ(responses, (std::multiset<float>{100.f, 101.f, 102.f, 103.f, 52.f, 53.f}));
+}
+
 TEST(SpreadOverBuckets, DoesNotDependOnTheOrderOfTheInput) {
   std::mt19937 random(2);
   std::vector<Corner> corners;
@@ -94,6 +107,70 @@ TEST(SpreadOverBuckets, TakesPositionsOutsideTheImage) {
   const std::vector<Corner> corners = {{cv::Point2f(-3.f, -2.f), 1.f}, {cv::Point2f(700.f, 500.f), 1.f}};
   EXPECT_EQ(spreadOverBuckets(corners, kSize, kBucket, 10).size(), 2u);
   EXPECT_TRUE(spreadOverBuckets({}, kSize, kBucket, 10).empty());
+}
+
+/// What a border hides is hidden; the rest is where it is in the whole image.
+TEST(FeatureDetector, BorderLeavesPositionsWhereTheyAre) {
+  constexpr int kBorder = 40;
+  const cv::Mat image = unevenTexture();
+  FeatureDetectorOptions options;
+  options.max_features = 20000;
+  options.subpixel = false;
+  std::set<std::pair<float, float>> of_image;
+  for (const Corner& corner : FeatureDetector(options).detect(image))
+    of_image.insert({corner.position.x, corner.position.y});
+  const std::vector<Corner> inner = FeatureDetector(options).detect(image, kBorder);
+  ASSERT_GT(inner.size(), 50u);
+  for (const Corner& corner : inner) {
+    // Whether a corner is the strongest around depends at the very border on what is hidden there.
+    const cv::Rect2f clear(kBorder + 5.f, kBorder + 5.f, kSize.width - 2.f * kBorder - 10.f,
+                           kSize.height - 2.f * kBorder - 10.f);
+    const bool known = of_image.count({corner.position.x, corner.position.y}) == 1;
+    EXPECT_TRUE(known || !clear.contains(corner.position)) << corner.position;
+    EXPECT_TRUE(corner.position.x >= kBorder && corner.position.x <= kSize.width - 1 - kBorder) << corner.position;
+    EXPECT_TRUE(corner.position.y >= kBorder && corner.position.y <= kSize.height - 1 - kBorder) << corner.position;
+  }
+}
+
+/// The quality is a ratio of contrasts squared, whichever measure the detector has.
+TEST(FeatureDetector, CornerQualityMeansTheSameForBothGradientDetectors) {
+  cv::Mat image(kSize, CV_8U, cv::Scalar(40));
+  image(cv::Rect(100, 100, 60, 60)).setTo(240);  // contrast 200
+  image(cv::Rect(400, 100, 60, 60)).setTo(100);  // and 60, whose eigenvalues are 0.09 of the others'
+  for (const DetectorType type : {DetectorType::kGftt, DetectorType::kHarris})
+    for (const auto& [quality, faint] : std::vector<std::pair<double, bool>>{{0.05, true}, {0.15, false}}) {
+      FeatureDetectorOptions options;
+      options.type = type;
+      options.corner_quality = quality;
+      bool found[2] = {false, false};
+      for (const Corner& corner : FeatureDetector(options).detect(image)) found[corner.position.x > 300.f] = true;
+      EXPECT_TRUE(found[0]) << nameOf(type) << ", quality " << quality;
+      EXPECT_EQ(found[1], faint) << nameOf(type) << ", quality " << quality;
+    }
+}
+
+/// What a refinement carries further away is another point; the corner then stays where the detector put it.
+TEST(FeatureDetector, RefinedPositionsStayNear) {
+  const cv::Mat image = unevenTexture();
+  for (const auto& [type, largest] :
+       std::vector<std::pair<DetectorType, float>>{{DetectorType::kFast, 1.5f}, {DetectorType::kGftt, 2.5f}}) {
+    FeatureDetectorOptions options;
+    options.type = type;
+    options.corner_quality = 1e-6;
+    options.corner_block_size = 5;
+    options.subpixel = false;
+    const std::vector<Corner> whole = FeatureDetector(options).detect(image);
+    options.subpixel = true;
+    const std::vector<Corner> refined = FeatureDetector(options).detect(image);
+    ASSERT_EQ(whole.size(), refined.size());
+    std::size_t moved = 0;
+    for (std::size_t i = 0; i < whole.size(); ++i) {
+      const cv::Point2f shift = refined[i].position - whole[i].position;
+      EXPECT_LE(std::max(std::abs(shift.x), std::abs(shift.y)), largest + 1e-4f) << nameOf(type);
+      moved += shift != cv::Point2f();
+    }
+    EXPECT_GT(moved, 10u) << nameOf(type);
+  }
 }
 
 TEST(FeatureDetector, RefusesOptionsOutOfRange) {
@@ -194,6 +271,34 @@ TEST_P(CornerDetector, LocatesDotsBetweenPixels) {
   const auto errors = locationErrors(FeatureDetector(precise).detect(image), truth);
   EXPECT_GE(errors.size(), truth.size() * 9 / 10);
   for (const auto& [i, error] : errors) EXPECT_LT(cv::norm(error), kTolerance) << "at " << truth[i] << " by " << error;
+}
+
+TEST(FeatureDetector, LocatesObliqueCrossingsBetweenPixels) {
+  // Two edges that cross at 60 degrees, fading outwards: all gradients point along lines through the crossing, and
+  // their x and y go together.
+  constexpr double kTolerance = 0.1;  // px
+  std::vector<cv::Point2d> truth;
+  for (int row = 0; row < 6; ++row)
+    for (int column = 0; column < 9; ++column)
+      truth.emplace_back(40.0 + 60.0 * column + 0.083 * row - 0.4, 40.0 + 60.0 * row + 0.067 * column - 0.45);
+  const cv::Mat image = synthetic::render(kSize, [&](double u, double v) {
+    double sum = 128.0;
+    for (const cv::Point2d& crossing : truth) {
+      const double x = u - crossing.x, y = v - crossing.y;
+      sum += 110.0 * std::tanh(x) * std::tanh(0.5 * x + 0.87 * y) * std::exp(-(x * x + y * y) / 72.0);
+    }
+    return sum;
+  });
+  for (const DetectorType type : {DetectorType::kGftt, DetectorType::kHarris}) {
+    FeatureDetectorOptions options;
+    options.type = type;
+    options.corner_quality = 0.3;
+    const auto errors = locationErrors(FeatureDetector(options).detect(image), truth);
+    EXPECT_GE(errors.size(), truth.size() * 9 / 10) << nameOf(type);
+    std::size_t located = 0;
+    for (const auto& [i, error] : errors) located += cv::norm(error) < kTolerance;
+    EXPECT_GE(located, errors.size() * 95 / 100) << nameOf(type);
+  }
 }
 
 TEST_P(CornerDetector, LocatesCornersOfSquaresBetweenPixels) {
