@@ -7,6 +7,8 @@
 #include <map>
 #include <optional>
 #include <stdexcept>
+#include <unsupported/Eigen/LevenbergMarquardt>
+#include <unsupported/Eigen/NumericalDiff>
 
 #include "../common/progress.hpp"
 #include "correct_matches.hpp"
@@ -92,56 +94,53 @@ double residual(const SizeSample& sample, const ShapeFit& fit) {
   return std::log2(sample.ratio) - std::log2(now / first);
 }
 
-/// Iteratively reweighted Gauss-Newton over the free parameters, derivatives by differences.
+/// Error of each sample by the free parameters of a curve, bent so that the squares add up to the Cauchy cost.
+struct ShapeResiduals : Eigen::DenseFunctor<double> {
+  ShapeResiduals(const std::vector<SizeSample>& of, const ShapeFit& start, std::vector<double ShapeFit::*> to_fit)
+      : DenseFunctor(static_cast<int>(to_fit.size()), static_cast<int>(of.size())),
+        samples(of),
+        fixed(start),
+        free(std::move(to_fit)) {}
+
+  ShapeFit curve(const Eigen::VectorXd& parameters) const {
+    ShapeFit fit = fixed;
+    for (std::size_t k = 0; k < free.size(); ++k) fit.*free[k] = parameters[static_cast<Eigen::Index>(k)];
+    return fit;
+  }
+
+  int operator()(const Eigen::VectorXd& parameters, Eigen::VectorXd& errors) const {
+    constexpr double kScale = 0.15;  // octaves at which the kernel bends: the step between tried sizes, doubled
+    const ShapeFit fit = curve(parameters);
+    for (std::size_t i = 0; i < samples.size(); ++i) {
+      const double r = residual(samples[i], fit) / kScale;
+      errors[static_cast<Eigen::Index>(i)] = std::copysign(std::sqrt(std::log1p(r * r)), r);
+    }
+    return 0;
+  }
+
+  const std::vector<SizeSample>& samples;
+  ShapeFit fixed;
+  std::vector<double ShapeFit::*> free;
+};
+
 ShapeFit fitShape(const std::vector<SizeSample>& samples, const std::string& model, bool free_exponent,
                   bool free_offset) {
-  constexpr double kScale = 0.15;  // octaves at which the Cauchy kernel bends: the step between tried sizes, doubled
-  constexpr int kIterations = 60;
-  constexpr double kDifference = 1e-4;
-  ShapeFit fit;
-  fit.model = model;
+  ShapeFit start;
+  start.model = model;
   std::vector<double ShapeFit::*> free;
   if (free_exponent) free.push_back(&ShapeFit::exponent);
   if (free_offset) free.push_back(&ShapeFit::offset);
-  const auto cost = [&](const ShapeFit& candidate) {
-    double sum = 0.0;
-    for (const SizeSample& sample : samples) sum += std::log1p(std::pow(residual(sample, candidate) / kScale, 2));
-    return sum / static_cast<double>(samples.size());
-  };
-  const Eigen::Index n = static_cast<Eigen::Index>(free.size());
-  double damping = 1e-3;
-  fit.robust_cost = cost(fit);
-  for (int iteration = 0; n > 0 && iteration < kIterations; ++iteration) {
-    Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(n, n);
-    Eigen::VectorXd gradient = Eigen::VectorXd::Zero(n);
-    for (const SizeSample& sample : samples) {
-      const double r = residual(sample, fit);
-      Eigen::VectorXd slope(n);
-      for (Eigen::Index k = 0; k < n; ++k) {
-        ShapeFit moved = fit;
-        moved.*free[static_cast<std::size_t>(k)] += kDifference;
-        slope[k] = (residual(sample, moved) - r) / kDifference;
-      }
-      const double weight = 1.0 / (1.0 + std::pow(r / kScale, 2));
-      hessian += weight * slope * slope.transpose();
-      gradient += weight * r * slope;
-    }
-    hessian.diagonal() *= 1.0 + damping;
-    const Eigen::VectorXd step = -hessian.ldlt().solve(gradient);
-    ShapeFit moved = fit;
-    for (Eigen::Index k = 0; k < n; ++k) moved.*free[static_cast<std::size_t>(k)] += step[k];
-    moved.robust_cost = cost(moved);
-    if (step.allFinite() && moved.robust_cost < fit.robust_cost) {
-      fit = moved;
-      damping *= 0.3;
-      if (step.norm() < 1e-6) break;
-    } else {
-      damping *= 10.0;
-    }
-  }
-  std::vector<double> residuals;
-  for (const SizeSample& sample : samples) residuals.push_back(std::abs(residual(sample, fit)));
-  fit.median_residual = median(residuals);
+  Eigen::NumericalDiff<ShapeResiduals> residuals(ShapeResiduals(samples, start, free));
+  Eigen::VectorXd parameters(residuals.inputs()), errors(residuals.values());
+  for (std::size_t k = 0; k < free.size(); ++k) parameters[static_cast<Eigen::Index>(k)] = start.*free[k];
+  if (!free.empty()) Eigen::LevenbergMarquardt<Eigen::NumericalDiff<ShapeResiduals>>(residuals).minimize(parameters);
+
+  ShapeFit fit = residuals.curve(parameters);
+  residuals(parameters, errors);
+  fit.robust_cost = errors.squaredNorm() / static_cast<double>(samples.size());
+  std::vector<double> sizes;
+  for (const SizeSample& sample : samples) sizes.push_back(std::abs(residual(sample, fit)));
+  fit.median_residual = median(sizes);
   return fit;
 }
 
