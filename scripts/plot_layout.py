@@ -52,14 +52,15 @@ def picture():
     level = {room: 0 for room in rooms}
     for _ in rooms:  # the longest way down
         level = {room: max((level[other] + 1 for other in includes[room]), default=0) for room in rooms}
-    text = {room: textwrap.wrap(", ".join(sorted({f.stem for f in files_of(room)})), 38) for room in rooms}
+    text = {room: textwrap.wrap(", ".join(sorted({f.stem for f in files_of(room)})), 34) for room in rooms}
     height = {room: 50 + LINE * len(text[room]) for room in rooms}
 
     top, y = {}, MARGIN
     for row in range(max(level.values()), -1, -1):
         inside = [room for room in rooms if level[room] == row]
-        top.update({room: y for room in inside})
-        y += max(height[room] for room in inside) + 45
+        y += max(height[room] for room in inside)
+        top.update({room: y - height[room] for room in inside})  # so that no arrow down crosses a neighbour
+        y += 45
     total_height = y - 45 + MARGIN
     left = {room: MARGIN + ROOMS[room][1] * (WIDTH + GAP) for room in rooms}
     total_width = max(left.values()) + WIDTH + MARGIN
