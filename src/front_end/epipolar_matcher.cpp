@@ -9,7 +9,7 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "stereo_descriptor_vo/front_end/patch_sampling.hpp"
+#include "stereo_descriptor_vo/front_end/slanted_patch.hpp"
 
 namespace sdvo {
 namespace {
@@ -49,8 +49,6 @@ EpipolarMatcher::EpipolarMatcher(const EpipolarMatcherOptions& options, double m
     : options_(options), max_dv_(max_dv), images_(scratch) {
   addMargin(left, scratch.left);
   addMargin(right, scratch.right);
-  scratch.left.convertTo(scratch.left_float, CV_32F);
-  scratch.right.convertTo(scratch.right_float, CV_32F);
   halve(left, scratch.half);
   addMargin(scratch.half, scratch.left_half);
   halve(right, scratch.half);
@@ -113,45 +111,22 @@ std::optional<cv::Point2f> EpipolarMatcher::align(const cv::Point2f& left_positi
   // Where the patch says little about its slant, upright is the better guess.
   constexpr float kNoise = 5.f, kUsualSlant = 0.2f;  // grey levels, px per row
   constexpr float kUpright = (kNoise / kUsualSlant) * (kNoise / kUsualSlant);
-  const int radius = options_.patch_radius, n = 2 * radius + 1;
-  const int stride = patchStride(radius + 1), count = n * stride;
-  // Eigen works in parallel lanes, which a plain loop over floats may not. Rows go on beyond the patch: the mask makes
-  // the patch and its derivatives zero there, so that whatever is sampled does not count.
-  thread_local Eigen::ArrayXf wide, mask, row;
-  thread_local Eigen::VectorXf patch, by_disparity, by_dv, by_slant, other;
-  if (mask.size() != count) {
-    mask.setZero(count);
-    row.setZero(count);
-    for (int j = 0; j < n; ++j) {
-      mask.segment(j * stride, n).setOnes();
-      row.segment(j * stride, n).setConstant(static_cast<float>(j - radius));
-    }
-    wide.setZero(count + 2 * stride + 2);
-    other.resize(count);
-  }
-  samplePatch(images_.left_float, kMargin, left_position.x, left_position.y, 0.f, radius + 1, stride, wide.data());
-  const auto neighbour = [&](int dx, int dy) { return wide.segment((1 + dy) * stride + 1 + dx, count); };
-  patch = neighbour(0, 0) * mask;
-  by_disparity = 0.5f * (neighbour(1, 0) - neighbour(-1, 0)) * mask;
-  by_dv = 0.5f * (neighbour(0, -1) - neighbour(0, 1)) * mask;
-  by_slant = by_disparity.array() * row;
-  const float pixels = static_cast<float>(n * n);
-  for (auto* values : {&patch, &by_disparity, &by_dv, &by_slant}) values->array() -= values->sum() / pixels * mask;
-  const float dd = by_disparity.squaredNorm(), dv = by_disparity.dot(by_dv), vv = by_dv.squaredNorm();
-  if (dd * vv - dv * dv < 1e-3f * dd * vv || dd < pixels) return std::nullopt;
-  const float ds = by_disparity.dot(by_slant), vs = by_dv.dot(by_slant), ss = by_slant.squaredNorm() + kUpright;
-  Eigen::Matrix3f hessian;
-  hessian << dd, dv, ds, dv, vv, vs, ds, vs, ss;
+  thread_local std::optional<SlantedPatch> scratch;
+  if (!scratch || scratch->radius() != options_.patch_radius) scratch.emplace(options_.patch_radius);
+  SlantedPatch& patch = *scratch;
+  patch.take(images_.left, kMargin, left_position.x, left_position.y);
+  Eigen::Matrix3f hessian = patch.hessian();
+  const float dd = hessian(0, 0), dv = hessian(0, 1), vv = hessian(1, 1);
+  if (dd * vv - dv * dv < 1e-3f * dd * vv || dd < static_cast<float>(patch.pixels())) return std::nullopt;
+  hessian(2, 2) += kUpright;
   const Eigen::Matrix3f inverse = hessian.inverse();
 
   cv::Point2f found = start;
   float slant = 0.f;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    samplePatch(images_.right_float, kMargin, left_position.x - found.x, left_position.y + found.y, slant, radius,
-                stride, other.data());
-    other -= patch;
-    // The derivatives have no mean, so that of the difference drops out.
-    const Eigen::Vector3f gradient(by_disparity.dot(other), by_dv.dot(other), by_slant.dot(other) - kUpright * slant);
+    Eigen::Vector3f gradient =
+        patch.compare(images_.right, kMargin, left_position.x - found.x, left_position.y + found.y, slant);
+    gradient[2] -= kUpright * slant;
     const Eigen::Vector3f step = inverse * gradient;
     slant += step[2];
     found.x += step[0] + slant * step[1];
@@ -164,9 +139,8 @@ std::optional<cv::Point2f> EpipolarMatcher::align(const cv::Point2f& left_positi
     if (std::max(std::abs(step[0]), std::abs(step[1])) < kConverged) break;
   }
 
-  other = (other + patch).cwiseProduct(mask.matrix());
-  other.array() -= other.sum() / pixels * mask;
-  if (patch.dot(other) < options_.min_correlation * patch.norm() * other.norm()) return std::nullopt;
+  const auto [product, square, other_square] = patch.similarity();
+  if (product < options_.min_correlation * std::sqrt(square) * std::sqrt(other_square)) return std::nullopt;
   return found;
 }
 

@@ -1,16 +1,14 @@
 #include "stereo_descriptor_vo/front_end/feature_detector.hpp"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
-#include <optional>
 #include <stdexcept>
 #include <tuple>
 
 #include "opencv_features.hpp"
-#include "stereo_descriptor_vo/front_end/patch_sampling.hpp"
+#include "stereo_descriptor_vo/front_end/corner_refiner.hpp"
 
 namespace sdvo {
 namespace {
@@ -104,74 +102,13 @@ std::vector<Corner> detectAll(const cv::Mat& image, const FeatureDetectorOptions
   throw std::invalid_argument("there is no such detector");
 }
 
-/// Foerstner's intersection of gradient lines, as cv::cornerSubPix finds it but several times faster.
-class CornerRefiner {
- public:
-  CornerRefiner(const cv::Mat& image, int radius) : radius_(radius), margin_(patchStride(radius + 1) + 1) {
-    // Memory of this size is slow to get from the system for every image.
-    thread_local cv::Mat larger, larger_float;
-    cv::copyMakeBorder(image, larger, margin_, margin_, margin_, margin_, cv::BORDER_REPLICATE);
-    larger.convertTo(larger_float, CV_32F);
-    image_ = larger_float;
-    // Weights fall off from the centre; they are zero beyond the square, where a patch's rows go on.
-    const int rows = 2 * radius + 1;
-    weight_.setZero(rows * stride());
-    x_.setZero(rows * stride());
-    y_.setZero(rows * stride());
-    for (int y = -radius; y <= radius; ++y)
-      for (int x = -radius; x <= radius; ++x) {
-        const int i = (y + radius) * stride() + x + radius;
-        weight_[i] = std::exp(-static_cast<float>(x * x + y * y) / static_cast<float>(radius * radius));
-        x_[i] = static_cast<float>(x);
-        y_[i] = static_cast<float>(y);
-      }
-    patch_.resize((rows + 2) * stride() + 2);
-  }
-
-  /// The corner near `start`, or nothing where it is further away than `largest_shift` px.
-  std::optional<cv::Point2f> refine(const cv::Point2f& start, float largest_shift) {
-    constexpr int kIterations = 10;
-    constexpr float kConverged = 0.02f;  // px
-    cv::Point2f position = start;
-    const int count = static_cast<int>(weight_.size());
-    for (int iteration = 0; iteration < kIterations; ++iteration) {
-      samplePatch(image_, margin_, position.x, position.y, 0.f, radius_ + 1, stride(), patch_.data());
-      const auto neighbour = [&](int dx, int dy) { return patch_.segment((1 + dy) * stride() + 1 + dx, count); };
-      gradient_x_ = neighbour(1, 0) - neighbour(-1, 0);
-      gradient_y_ = neighbour(0, 1) - neighbour(0, -1);
-      xx_ = weight_ * gradient_x_ * gradient_x_;
-      xy_ = weight_ * gradient_x_ * gradient_y_;
-      yy_ = weight_ * gradient_y_ * gradient_y_;
-      const float a = xx_.sum(), b = xy_.sum(), c = yy_.sum(), determinant = a * c - b * b;
-      if (!(determinant > 1e-6f * a * c)) break;
-      const float along_x = (xx_ * x_ + xy_ * y_).sum(), along_y = (xy_ * x_ + yy_ * y_).sum();
-      const cv::Point2f step((c * along_x - b * along_y) / determinant, (a * along_y - b * along_x) / determinant);
-      position += step;
-      const cv::Point2f shift = position - start;
-      if (!(std::max(std::abs(shift.x), std::abs(shift.y)) <= static_cast<float>(radius_))) return std::nullopt;
-      if (step.dot(step) <= kConverged * kConverged) break;
-    }
-    const cv::Point2f shift = position - start;
-    if (std::max(std::abs(shift.x), std::abs(shift.y)) > largest_shift) return std::nullopt;
-    return position;
-  }
-
- private:
-  int stride() const { return patchStride(radius_ + 1); }
-
-  int radius_, margin_;
-  cv::Mat image_;                  ///< CV_32F, with the margin
-  Eigen::ArrayXf weight_, x_, y_;  ///< of the square's pixels, in rows of stride()
-  Eigen::ArrayXf patch_;           ///< the square with one pixel more on each side
-  Eigen::ArrayXf gradient_x_, gradient_y_, xx_, xy_, yy_;
-};
-
 /// A corner that wanders off is not one point; its integer position is kept. Gradient detectors answer up to half their
 /// window inside of a corner, hence the limit.
 void refinePositions(const cv::Mat& image, int radius, float largest_shift, std::vector<Corner>& corners) {
   if (corners.empty()) return;
   const cv::Rect2f inside(0.f, 0.f, static_cast<float>(image.cols - 1), static_cast<float>(image.rows - 1));
-  CornerRefiner refiner(image, radius);
+  thread_local cv::Mat scratch;
+  CornerRefiner refiner(image, radius, scratch);
   for (Corner& corner : corners) {
     const auto refined = refiner.refine(corner.position, largest_shift);
     if (refined && inside.contains(*refined)) corner.position = *refined;
