@@ -9,6 +9,7 @@
 
 #include "opencv_features.hpp"
 #include "stereo_descriptor_vo/front_end/corner_refiner.hpp"
+#include "stereo_descriptor_vo/front_end/fast_corners.hpp"
 
 namespace sdvo {
 namespace {
@@ -23,9 +24,7 @@ std::vector<Corner> toCorners(const std::vector<cv::KeyPoint>& keypoints) {
 /// The score of a FAST corner is the highest threshold at which it still is one. One pass at the lowest threshold,
 /// ranked by score inside each bucket, therefore equals running every bucket at its own adaptive threshold.
 std::vector<Corner> detectFast(const cv::Mat& image, const FeatureDetectorOptions& options) {
-  std::vector<cv::KeyPoint> keypoints;
-  cv::FAST(image, keypoints, options.fast_min_threshold, true);
-  return toCorners(keypoints);
+  return toCorners(findFastCorners(image, options.fast_min_threshold));
 }
 
 /// The same for AGAST, whose score has the same meaning.
@@ -117,7 +116,7 @@ void refinePositions(const cv::Mat& image, int radius, float largest_shift, std:
 
 }  // namespace
 
-std::vector<Corner> spreadOverBuckets(std::vector<Corner> corners, cv::Size image_size, int bucket_size,
+std::vector<Corner> spreadOverBuckets(const std::vector<Corner>& corners, cv::Size image_size, int bucket_size,
                                       int max_count) {
   const int columns = (image_size.width + bucket_size - 1) / bucket_size;
   const int rows = (image_size.height + bucket_size - 1) / bucket_size;
@@ -130,19 +129,24 @@ std::vector<Corner> spreadOverBuckets(std::vector<Corner> corners, cv::Size imag
   const auto stronger = [](const Corner& a, const Corner& b) {
     return std::tie(b.response, a.position.y, a.position.x) < std::tie(a.response, b.position.y, b.position.x);
   };
-  std::size_t fullest = 0;
-  for (auto& bucket : buckets) {
-    std::sort(bucket.begin(), bucket.end(), stronger);
-    fullest = std::max(fullest, bucket.size());
-  }
 
   // Serve every bucket's strongest corner, then every second strongest, …; the last round goes to the strongest of it.
-  std::vector<Corner> kept;
-  for (std::size_t round = 0; round < fullest && static_cast<int>(kept.size()) < max_count; ++round) {
-    std::vector<Corner> served;
+  // No more of a bucket need be in order than the rounds ask for.
+  const std::size_t wanted = std::min(static_cast<std::size_t>(max_count), corners.size());
+  std::size_t rounds = 0;
+  for (std::size_t served = 0; served < wanted; ++rounds)
+    for (const auto& bucket : buckets) served += bucket.size() > rounds ? 1 : 0;
+  for (auto& bucket : buckets) {
+    const auto needed = static_cast<std::ptrdiff_t>(std::min(rounds, bucket.size()));
+    std::partial_sort(bucket.begin(), bucket.begin() + needed, bucket.end(), stronger);
+  }
+  std::vector<Corner> kept, served;
+  kept.reserve(wanted + buckets.size());
+  for (std::size_t round = 0; round < rounds; ++round) {
+    served.clear();
     for (const auto& bucket : buckets)
       if (round < bucket.size()) served.push_back(bucket[round]);
-    const std::size_t room = static_cast<std::size_t>(max_count) - kept.size();
+    const std::size_t room = wanted - kept.size();
     if (served.size() > room) {
       std::sort(served.begin(), served.end(), stronger);
       served.resize(room);
@@ -167,7 +171,7 @@ std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border) co
   if (inner.width < kSmallestSide || inner.height < kSmallestSide) return {};
   std::vector<Corner> corners = detectAll(image(inner), options_);
   for (Corner& corner : corners) corner.position += cv::Point2f(inner.tl());
-  corners = spreadOverBuckets(std::move(corners), image.size(), options_.bucket_size, options_.max_features);
+  corners = spreadOverBuckets(corners, image.size(), options_.bucket_size, options_.max_features);
   if (options_.subpixel) {
     const bool gradient = options_.type == DetectorType::kGftt || options_.type == DetectorType::kHarris;
     const float largest_shift = gradient ? 0.5f * static_cast<float>(options_.corner_block_size) : 1.5f;  // px
