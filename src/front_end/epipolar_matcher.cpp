@@ -5,11 +5,15 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <opencv2/core/hal/intrin.hpp>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "../common/kernel.hpp"
 #include "stereo_descriptor_vo/front_end/slanted_patch.hpp"
+
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
 
 namespace sdvo {
 namespace {
@@ -20,18 +24,55 @@ constexpr int kHalfRows = 4;  // block rows above and below the centre at half r
 constexpr int kFullRows = 5;  // … and at full resolution
 constexpr int kMargin = 64;   // px added around every image, so that no read needs a check
 
-/// Sum of absolute differences of two blocks centred at the given pixels.
-inline unsigned blockDifference(const std::uint8_t* a, const std::uint8_t* b, std::size_t step, int rows) {
-  unsigned sum = 0;
-  for (int row = -rows; row <= rows; ++row) {
-    const std::ptrdiff_t offset = row * static_cast<std::ptrdiff_t>(step) - kLeftOfBlock;
-#if CV_SIMD128
-    sum += cv::v_reduce_sad(cv::v_load(a + offset), cv::v_load(b + offset));
+/// Sums of absolute differences between the block of 2 kRows + 1 rows centred at `block` and the `count` ones centred at
+/// `others`, one pixel further left each time.
+template <int kRows>
+struct BlockDifferences {
+#ifdef __SSE2__
+  static SDVO_IN_KERNEL __m128i load(const std::uint8_t* pixels) {
+    return _mm_loadu_si128(reinterpret_cast<const __m128i*>(pixels));
+  }
+#endif
+
+  static SDVO_IN_KERNEL void run(const std::uint8_t* block, const std::uint8_t* others, std::ptrdiff_t step, int count,
+                                 unsigned* differences) {
+    block -= kRows * step + kLeftOfBlock, others -= kRows * step + kLeftOfBlock;
+#ifdef __SSE2__
+    __m128i rows[2 * kRows + 1];
+#pragma GCC unroll 16
+    for (int row = 0; row <= 2 * kRows; ++row) rows[row] = load(block + row * step);
+    for (int k = 0; k < count; ++k) {
+      __m128i sums = _mm_setzero_si128();  // one of either half
+#pragma GCC unroll 16
+      for (int row = 0; row <= 2 * kRows; ++row)
+        sums = _mm_add_epi64(sums, _mm_sad_epu8(rows[row], load(others + row * step - k)));
+      differences[k] = static_cast<unsigned>(_mm_cvtsi128_si32(sums) + _mm_extract_epi16(sums, 4));
+    }
 #else
-    for (int k = 0; k < kBlockWidth; ++k) sum += static_cast<unsigned>(std::abs(a[offset + k] - b[offset + k]));
+    for (int k = 0; k < count; ++k) {
+      unsigned sum = 0;
+      for (int row = 0; row <= 2 * kRows; ++row)
+        for (int i = 0; i < kBlockWidth; ++i)
+          sum += static_cast<unsigned>(std::abs(block[row * step + i] - others[row * step + i - k]));
+      differences[k] = sum;
+    }
 #endif
   }
-  return sum;
+};
+
+/// The least of the values from `begin` to before `end`.
+struct Least {
+  static SDVO_IN_KERNEL void run(const unsigned* values, int begin, int end, unsigned* least) {
+    unsigned smallest = std::numeric_limits<unsigned>::max();
+    for (int k = begin; k < end; ++k) smallest = std::min(smallest, values[k]);
+    *least = smallest;
+  }
+};
+
+unsigned leastOf(const unsigned* values, int begin, int end) {
+  unsigned least;
+  runKernel<Least>(values, begin, end, &least);
+  return least;
 }
 
 void addMargin(const cv::Mat& image, cv::Mat& larger) {
@@ -70,18 +111,18 @@ std::optional<int> EpipolarMatcher::searchRow(const cv::Point2f& left_position) 
   // A point that looks best at a negative disparity has no match: swapped images show themselves this way.
   constexpr int kNegative = 16;
   const int range = std::min(static_cast<int>(0.5 * options_.max_disparity), x);
+  const int count = kNegative + range + 1;
   thread_local std::vector<unsigned> differences;
-  differences.resize(kNegative + range + 1);
-  int best = 0;
-  for (int k = 0; k <= kNegative + range; ++k) {
-    differences[k] = blockDifference(left, right + kNegative - k, images_.left_half.step, kHalfRows);
-    if (differences[k] < differences[best]) best = k;
-  }
+  differences.resize(static_cast<std::size_t>(count));
+  const std::ptrdiff_t step = static_cast<std::ptrdiff_t>(images_.left_half.step[0]);
+  runKernel<BlockDifferences<kHalfRows>>(left, right + kNegative, step, count, differences.data());
+  const unsigned least = leastOf(differences.data(), 0, count);
+  const int best = static_cast<int>(std::find(differences.begin(), differences.end(), least) - differences.begin());
   if (best < kNegative - 1) return std::nullopt;
-  unsigned elsewhere = std::numeric_limits<unsigned>::max();
-  for (int k = 0; k <= kNegative + range; ++k)
-    if (std::abs(k - best) > 2) elsewhere = std::min(elsewhere, differences[k]);
-  if (differences[best] > options_.uniqueness * elsewhere) return std::nullopt;
+  constexpr int kSame = 2;  // px around the best that count as the same place
+  const unsigned elsewhere =
+      std::min(leastOf(differences.data(), 0, best - kSame), leastOf(differences.data(), best + kSame + 1, count));
+  if (least > options_.uniqueness * elsewhere) return std::nullopt;
   return 2 * (best - kNegative);
 }
 
@@ -89,15 +130,19 @@ cv::Point EpipolarMatcher::searchAround(const cv::Point& left, int disparity) co
   constexpr int kReach = 2;
   const int rows = std::min(2, static_cast<int>(std::ceil(max_dv_)));
   const std::uint8_t* block = images_.left.ptr(left.y + kMargin) + left.x + kMargin;
+  const std::ptrdiff_t step = static_cast<std::ptrdiff_t>(images_.left.step[0]);
   cv::Point best;
   unsigned least = std::numeric_limits<unsigned>::max();
-  for (int dv = -rows; dv <= rows; ++dv)
-    for (int d = disparity - kReach; d <= disparity + kReach; ++d) {
+  for (int dv = -rows; dv <= rows; ++dv) {
+    const std::uint8_t* other = images_.right.ptr(left.y + dv + kMargin) + left.x - disparity + kReach + kMargin;
+    unsigned differences[2 * kReach + 1];
+    runKernel<BlockDifferences<kFullRows>>(block, other, step, 2 * kReach + 1, differences);
+    for (int k = 0; k <= 2 * kReach; ++k) {
+      const int d = disparity - kReach + k;
       if (left.x - d < 0 || left.x - d > images_.right.cols - 2 * kMargin) continue;
-      const std::uint8_t* other = images_.right.ptr(left.y + dv + kMargin) + left.x - d + kMargin;
-      const unsigned difference = blockDifference(block, other, images_.left.step, kFullRows);
-      if (difference < least) least = difference, best = cv::Point(d, dv);
+      if (differences[k] < least) least = differences[k], best = cv::Point(d, dv);
     }
+  }
   return best;
 }
 
