@@ -26,10 +26,13 @@ void measureImage(const cv::Mat& image, double& mean_intensity, double& sharpnes
   std::int64_t sum = 0, gradient = 0, pixels = 0;
   for (int y = 0; y < image.rows; y += kRowStep) {
     const std::uint8_t* row = image.ptr(y);
+    int sum_of_row = 0, gradient_of_row = 0;  // narrow numbers are added up several at once
     for (int x = 1; x < image.cols; ++x) {
-      sum += row[x];
-      gradient += std::abs(row[x] - row[x - 1]);
+      sum_of_row += row[x];
+      gradient_of_row += std::abs(row[x] - row[x - 1]);
     }
+    sum += sum_of_row;
+    gradient += gradient_of_row;
     pixels += image.cols - 1;
   }
   mean_intensity = static_cast<double>(sum) / static_cast<double>(std::max<std::int64_t>(pixels, 1));

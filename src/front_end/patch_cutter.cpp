@@ -15,6 +15,9 @@ struct Edge {
 /// The squares' edges: they tile, so each edge serves two of them.
 using Edges = std::array<Edge, PatchOptions::kMostSamples + 1>;
 
+/// Along one row, at the edges.
+using Sums = std::array<float, PatchOptions::kMostSamples + 1>;
+
 /// `size`: columns or rows of the integral. Pixel p covers [p - 0.5, p + 0.5], and column p of the integral is its left
 /// edge.
 Edges edgesAround(float centre, const PatchLayout& layout, float spacing, int size) {
@@ -39,25 +42,30 @@ void PatchCutter::cut(float u, float v, float size, std::uint8_t* samples) const
   const float spacing = layout_.spacing(size);
   const Edges columns = edgesAround(u, layout_, spacing, integral_.cols);
   const Edges rows = edgesAround(v, layout_, spacing, integral_.rows);
-  std::array<float, PatchOptions::kMostSamples> above{}, upto{};
+  const int origin = integral_.ptr<int>(rows[0].index)[columns[0].index];
+  // Sums since the patch's own corner are small enough to be exact in single precision.
+  const auto sumsAt = [&](int row, Sums& sums) {
+    const int* integral = integral_.ptr<int>(row);
+    const auto since = [&](int index) {
+      return static_cast<float>(
+          static_cast<int>(static_cast<unsigned>(integral[index]) - static_cast<unsigned>(origin)));
+    };
+    for (int k = 0; k <= layout_.side; ++k) {
+      const auto& [index, share] = columns[k];
+      sums[k] = since(index) + share * (since(index + 1) - since(index));
+    }
+  };
+  Sums upper{}, lower{}, above{}, upto{};
   for (int j = 0; j <= layout_.side; ++j) {
-    const int* upper = integral_.ptr<int>(rows[j].index);
-    const int* lower = integral_.ptr<int>(rows[j].index + 1);
-    // Sums since the patch's own corner are small enough to be exact in single precision.
-    const auto sumAt = [&](const int* row, const Edge& column) {
-      const int origin = integral_.ptr<int>(rows[0].index)[columns[0].index];
-      const auto since = [&](int index) {
-        return static_cast<float>(static_cast<int>(static_cast<unsigned>(row[index]) - static_cast<unsigned>(origin)));
-      };
-      return since(column.index) + column.share * (since(column.index + 1) - since(column.index));
-    };
-    const auto interpolated = [&](const Edge& column) {
-      const float a = sumAt(upper, column), b = sumAt(lower, column);
-      return a + rows[j].share * (b - a);
-    };
-    float left = interpolated(columns[0]);
+    // Where edges are a pixel apart, each row of the integral serves two of them.
+    if (j > 0 && rows[j].index == rows[j - 1].index + 1)
+      upper = lower;
+    else
+      sumsAt(rows[j].index, upper);
+    sumsAt(rows[j].index + 1, lower);
+    float left = upper[0] + rows[j].share * (lower[0] - upper[0]);
     for (int i = 0; i < layout_.side; ++i) {
-      const float right = interpolated(columns[i + 1]);
+      const float right = upper[i + 1] + rows[j].share * (lower[i + 1] - upper[i + 1]);
       upto[i] = right - left;
       left = right;
     }
