@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "../common/kernel.hpp"
+#include "stereo_descriptor_vo/front_end/half_image.hpp"
 #include "stereo_descriptor_vo/front_end/slanted_patch.hpp"
 
 #ifdef __SSE2__
@@ -24,8 +25,8 @@ constexpr int kHalfRows = 4;  // block rows above and below the centre at half r
 constexpr int kFullRows = 5;  // … and at full resolution
 constexpr int kMargin = 64;   // px added around every image, so that no read needs a check
 
-/// Sums of absolute differences between the block of 2 kRows + 1 rows centred at `block` and the `count` ones centred at
-/// `others`, one pixel further left each time.
+/// Sums of absolute differences between the block of 2 kRows + 1 rows centred at `block` and the `count` ones centred
+/// at `others`, one pixel further left each time.
 template <int kRows>
 struct BlockDifferences {
 #ifdef __SSE2__
@@ -79,10 +80,6 @@ void addMargin(const cv::Mat& image, cv::Mat& larger) {
   cv::copyMakeBorder(image, larger, kMargin, kMargin, kMargin, kMargin, cv::BORDER_REPLICATE);
 }
 
-void halve(const cv::Mat& image, cv::Mat& half) {
-  cv::resize(image, half, cv::Size((image.cols + 1) / 2, (image.rows + 1) / 2), 0.0, 0.0, cv::INTER_AREA);
-}
-
 }  // namespace
 
 EpipolarMatcher::EpipolarMatcher(const EpipolarMatcherOptions& options, double max_dv, const cv::Mat& left,
@@ -90,9 +87,9 @@ EpipolarMatcher::EpipolarMatcher(const EpipolarMatcherOptions& options, double m
     : options_(options), max_dv_(max_dv), images_(scratch) {
   addMargin(left, scratch.left);
   addMargin(right, scratch.right);
-  halve(left, scratch.half);
+  halveImage(left, scratch.half);
   addMargin(scratch.half, scratch.left_half);
-  halve(right, scratch.half);
+  halveImage(right, scratch.half);
   addMargin(scratch.half, scratch.right_half);
 }
 
