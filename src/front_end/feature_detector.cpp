@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core/utility.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
@@ -107,11 +108,13 @@ void refinePositions(const cv::Mat& image, int radius, float largest_shift, std:
   if (corners.empty()) return;
   const cv::Rect2f inside(0.f, 0.f, static_cast<float>(image.cols - 1), static_cast<float>(image.rows - 1));
   thread_local cv::Mat scratch;
-  CornerRefiner refiner(image, radius, scratch);
-  for (Corner& corner : corners) {
-    const auto refined = refiner.refine(corner.position, largest_shift);
-    if (refined && inside.contains(*refined)) corner.position = *refined;
-  }
+  const CornerRefiner refiner(image, radius, scratch);
+  cv::parallel_for_(cv::Range(0, static_cast<int>(corners.size())), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) {
+      const auto refined = refiner.refine(corners[i].position, largest_shift);
+      if (refined && inside.contains(*refined)) corners[i].position = *refined;
+    }
+  });
 }
 
 }  // namespace

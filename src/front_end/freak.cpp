@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core/utility.hpp>
 
 #include "freak_octet.hpp"
 #include "stereo_descriptor_vo/front_end/image_bounds.hpp"
@@ -107,13 +108,16 @@ void Freak::describe(const FreakKeypoint& keypoint, std::uint8_t* row) const {
 }
 
 void Freak::describe(const std::vector<FreakKeypoint>& keypoints, const std::vector<std::uint8_t*>& rows) const {
-  OctetMeans means;
-  std::size_t i = 0;
-  for (; i + kOctet <= keypoints.size(); i += kOctet) {
-    measureOctet(*this, &keypoints[i], means);
-    compareOctet(means, &rows[i]);
-  }
-  for (; i < keypoints.size(); ++i) describe(keypoints[i], rows[i]);
+  const std::size_t octets = keypoints.size() / kOctet;
+  cv::parallel_for_(cv::Range(0, static_cast<int>(octets)), [&](const cv::Range& range) {
+    OctetMeans means;
+    for (int octet = range.start; octet < range.end; ++octet) {
+      const std::size_t first = static_cast<std::size_t>(octet) * kOctet;
+      measureOctet(*this, &keypoints[first], means);
+      compareOctet(means, &rows[first]);
+    }
+  });
+  for (std::size_t i = octets * kOctet; i < keypoints.size(); ++i) describe(keypoints[i], rows[i]);
 }
 
 float Freak::orientation(FreakKeypoint keypoint) const {
