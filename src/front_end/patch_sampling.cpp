@@ -1,6 +1,7 @@
 #include "stereo_descriptor_vo/front_end/patch_sampling.hpp"
 
 #include <array>
+#include <cstring>
 
 #include "../common/kernel.hpp"
 
@@ -31,7 +32,13 @@ SDVO_AVX2 inline __m256 eightPixels(const std::uint8_t* pixels) {
   return _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(pixels))));
 }
 
-/// The same operations in the same order, eight columns at once.
+SDVO_AVX2 inline __m128 fourPixels(const std::uint8_t* pixels) {
+  int four;
+  std::memcpy(&four, pixels, sizeof four);
+  return _mm_cvtepi32_ps(_mm_cvtepu8_epi32(_mm_cvtsi32_si128(four)));
+}
+
+/// The same operations in the same order, eight columns at once, and four of the rest.
 SDVO_AVX2 void sampleAvx2(const SampledRow* rows, int count, int columns, float* patch) {
   for (int j = 0; j < count; ++j, patch += columns) {
     const auto& [upper, lower, w00, w01, w10, w11] = rows[j];
@@ -42,6 +49,14 @@ SDVO_AVX2 void sampleAvx2(const SampledRow* rows, int count, int columns, float*
       sum = _mm256_add_ps(sum, _mm256_mul_ps(_mm256_set1_ps(w10), eightPixels(lower + i)));
       sum = _mm256_add_ps(sum, _mm256_mul_ps(_mm256_set1_ps(w11), eightPixels(lower + i + 1)));
       _mm256_storeu_ps(patch + i, sum);
+    }
+    if (i + 4 <= columns) {
+      __m128 sum = _mm_mul_ps(_mm_set1_ps(w00), fourPixels(upper + i));
+      sum = _mm_add_ps(sum, _mm_mul_ps(_mm_set1_ps(w01), fourPixels(upper + i + 1)));
+      sum = _mm_add_ps(sum, _mm_mul_ps(_mm_set1_ps(w10), fourPixels(lower + i)));
+      sum = _mm_add_ps(sum, _mm_mul_ps(_mm_set1_ps(w11), fourPixels(lower + i + 1)));
+      _mm_storeu_ps(patch + i, sum);
+      i += 4;
     }
     sampleFrom(i, rows[j], columns, patch);
   }

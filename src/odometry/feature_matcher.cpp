@@ -99,14 +99,18 @@ class PositionGrid {
   }
 
   void findAround(float u, float v, std::vector<int>& found) const {
-    found.clear();
+    found.resize(entries_.size());
+    std::size_t count = 0;
     const int first = columns_.at(u - radius_), last = columns_.at(u + radius_);
     for (int row = rows_.at(v - radius_); row <= rows_.at(v + radius_); ++row)
       for (std::size_t i = begin_[cell(first, row)]; i < begin_[cell(last, row) + 1]; ++i) {
         const Entry& entry = entries_[i];
         const float du = entry.u - u, dv = entry.v - v;
-        if (du * du + dv * dv <= radius_ * radius_) found.push_back(entry.row);
+        // Written in any case and counted if near: no branch, as none could be foreseen.
+        found[count] = entry.row;
+        count += du * du + dv * dv <= radius_ * radius_ ? 1 : 0;
       }
+    found.resize(count);
   }
 
  private:
