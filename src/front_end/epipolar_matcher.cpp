@@ -9,57 +9,16 @@
 #include <vector>
 
 #include "../common/kernel.hpp"
+#include "stereo_descriptor_vo/front_end/block_differences.hpp"
 #include "stereo_descriptor_vo/front_end/half_image.hpp"
 #include "stereo_descriptor_vo/front_end/slanted_patch.hpp"
-
-#ifdef __SSE2__
-#include <emmintrin.h>
-#endif
 
 namespace sdvo {
 namespace {
 
-// A block is one SIMD register wide.
-constexpr int kBlockWidth = 16, kLeftOfBlock = kBlockWidth / 2;
 constexpr int kHalfRows = 4;  // block rows above and below the centre at half resolution
 constexpr int kFullRows = 5;  // … and at full resolution
 constexpr int kMargin = 64;   // px added around every image, so that no read needs a check
-
-/// Sums of absolute differences between the block of 2 kRows + 1 rows centred at `block` and the `count` ones centred
-/// at `others`, one pixel further left each time.
-template <int kRows>
-struct BlockDifferences {
-#ifdef __SSE2__
-  static SDVO_IN_KERNEL __m128i load(const std::uint8_t* pixels) {
-    return _mm_loadu_si128(reinterpret_cast<const __m128i*>(pixels));
-  }
-#endif
-
-  static SDVO_IN_KERNEL void run(const std::uint8_t* block, const std::uint8_t* others, std::ptrdiff_t step, int count,
-                                 unsigned* differences) {
-    block -= kRows * step + kLeftOfBlock, others -= kRows * step + kLeftOfBlock;
-#ifdef __SSE2__
-    __m128i rows[2 * kRows + 1];
-#pragma GCC unroll 16
-    for (int row = 0; row <= 2 * kRows; ++row) rows[row] = load(block + row * step);
-    for (int k = 0; k < count; ++k) {
-      __m128i sums = _mm_setzero_si128();  // one of either half
-#pragma GCC unroll 16
-      for (int row = 0; row <= 2 * kRows; ++row)
-        sums = _mm_add_epi64(sums, _mm_sad_epu8(rows[row], load(others + row * step - k)));
-      differences[k] = static_cast<unsigned>(_mm_cvtsi128_si32(sums) + _mm_extract_epi16(sums, 4));
-    }
-#else
-    for (int k = 0; k < count; ++k) {
-      unsigned sum = 0;
-      for (int row = 0; row <= 2 * kRows; ++row)
-        for (int i = 0; i < kBlockWidth; ++i)
-          sum += static_cast<unsigned>(std::abs(block[row * step + i] - others[row * step + i - k]));
-      differences[k] = sum;
-    }
-#endif
-  }
-};
 
 /// The least of the values from `begin` to before `end`.
 struct Least {
@@ -112,7 +71,7 @@ std::optional<int> EpipolarMatcher::searchRow(const cv::Point2f& left_position) 
   thread_local std::vector<unsigned> differences;
   differences.resize(static_cast<std::size_t>(count));
   const std::ptrdiff_t step = static_cast<std::ptrdiff_t>(images_.left_half.step[0]);
-  runKernel<BlockDifferences<kHalfRows>>(left, right + kNegative, step, count, differences.data());
+  blockDifferences<kHalfRows>(left, right + kNegative, step, count, differences.data());
   const unsigned least = leastOf(differences.data(), 0, count);
   const int best = static_cast<int>(std::find(differences.begin(), differences.end(), least) - differences.begin());
   if (best < kNegative - 1) return std::nullopt;
@@ -133,7 +92,7 @@ cv::Point EpipolarMatcher::searchAround(const cv::Point& left, int disparity) co
   for (int dv = -rows; dv <= rows; ++dv) {
     const std::uint8_t* other = images_.right.ptr(left.y + dv + kMargin) + left.x - disparity + kReach + kMargin;
     unsigned differences[2 * kReach + 1];
-    runKernel<BlockDifferences<kFullRows>>(block, other, step, 2 * kReach + 1, differences);
+    blockDifferences<kFullRows>(block, other, step, 2 * kReach + 1, differences);
     for (int k = 0; k <= 2 * kReach; ++k) {
       const int d = disparity - kReach + k;
       if (left.x - d < 0 || left.x - d > images_.right.cols - 2 * kMargin) continue;
