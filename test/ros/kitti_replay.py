@@ -72,6 +72,10 @@ class Collector:
     def __getitem__(self, index):
         return self.messages[index]
 
+    def has(self, stamp):
+        """Whether a message of this stamp has come."""
+        return any(message.header.stamp == stamp for message in list(self.messages))
+
     def close(self):
         self.subscriber.unregister()
 
