@@ -24,7 +24,9 @@ def commands():
     """How CMake would compile each file of the package."""
     build = [ROOT / "scripts" / "build", "-DCMAKE_EXPORT_COMPILE_COMMANDS=ON", "--force-cmake",
              "stereo_descriptor_vo_generate_messages_cpp"]
-    subprocess.run(build, check=True, stdout=subprocess.DEVNULL)
+    done = subprocess.run(build, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    if done.returncode != 0:
+        sys.exit(done.stdout[-2000:] + "error: the package cannot be configured")
     entries = json.loads((WORKSPACE / "build" / "compile_commands.json").read_text())
     return {entry["file"]: entry for entry in entries if "/src/stereo_descriptor_vo/" in entry["file"]}.values()
 
