@@ -5,6 +5,8 @@ The copy and its own catkin workspace lie in .catkin_ws/mutants and are kept: la
 tests of the file that is changed run first, then those of its room, then all others, the quick ones before the slow ones,
 until one fails. A patch that changes nothing a test could see is named with the reason in test/mutants/README.md.
 Exit code 1 when another one survives, does not apply or does not compile.
+
+With --check nothing is built: does each patch still apply to the sources as they are?
 """
 import argparse
 import fnmatch
@@ -119,10 +121,18 @@ def who_notices(file, seconds, with_rostests):
     return None
 
 
-def patched(patch, reverse=False):
-    arguments = ["--reverse"] if reverse else []
+def patched(patch, folder=PACKAGE, arguments=()):
     command = ["patch", "-p1", "--silent", "--no-backup-if-mismatch", *arguments, "-i", str(patch)]
-    return subprocess.run(command, cwd=PACKAGE, stdout=subprocess.DEVNULL).returncode == 0
+    return subprocess.run(command, cwd=folder, stdout=subprocess.DEVNULL).returncode == 0
+
+
+def check(patches):
+    """Names the patches that the code has left behind."""
+    stale = [patch.stem for patch in patches if not patched(patch, ROOT, ["--dry-run"])]
+    for name in stale:
+        print(f"test/mutants/{name}.patch no longer applies: make the same mistake in the code as it is now, or remove it")
+    print(f"{len(patches) - len(stale)} of {len(patches)} mutants apply")
+    return not stale
 
 
 def judge(patch, seconds, with_rostests):
@@ -145,11 +155,14 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("patterns", nargs="*", default=["*"], help="of the patches' names, such as front_end_*")
     parser.add_argument("--gtests", nargs="+", default=["*"], metavar="PATTERN", help="ask these gtests only")
+    parser.add_argument("--check", action="store_true", help="only see whether the patches apply")
     parser.add_argument("--rostests", action="store_true", help="show to the ROS tests what the gtests do not notice")
     arguments = parser.parse_args()
     patches = [p for p in sorted(PATCHES.glob("*.patch")) if matches(p.stem, arguments.patterns)]
     if not patches:
         sys.exit(f"error: no patch in {PATCHES} is called {' or '.join(arguments.patterns)}")
+    if arguments.check:
+        sys.exit(0 if check(patches) else 1)
     harmless = set(re.findall(r"^\| `(\w+)` \|", (PATCHES / "README.md").read_text(), re.MULTILINE))
 
     WORK.mkdir(parents=True, exist_ok=True)

@@ -24,7 +24,7 @@ const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"config", {"common", "front_end", "odometry"}},
     {"ros", {"common", "front_end", "odometry", "config"}},
     {"experiments", {"common", "front_end", "odometry", "data", "config"}},
-    {"tools", {"common", "front_end", "odometry", "data", "config", "experiments", "render"}},
+    {"tools", {"common", "front_end", "odometry", "data", "config", "experiments", "render", "ros"}},
 };
 
 /// Rooms that a program without ROS can use.

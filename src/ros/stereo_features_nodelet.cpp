@@ -1,12 +1,9 @@
 #include <nodelet/nodelet.h>
 
-#include <algorithm>
 #include <atomic>
 #include <boost/make_shared.hpp>
-#include <cmath>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <pluginlib/class_list_macros.hpp>
 #include <stdexcept>
 #include <utility>
@@ -14,6 +11,7 @@
 #include "../config/nodelet_options.hpp"
 #include "callback_thread.hpp"
 #include "conversions.hpp"
+#include "pair_decoder.hpp"
 #include "params.hpp"
 #include "reconfigure_server.hpp"
 #include "report_throttle.hpp"
@@ -37,14 +35,6 @@ bool describeAlike(const FeatureExtractorOptions& a, const FeatureExtractorOptio
     return values;
   };
   return texts(a) == texts(b);
-}
-
-/// Whether two calibrations are one but for rounding: some drivers compute P anew for each image.
-bool agree(const StereoCamera& a, const StereoCamera& b) {
-  constexpr double kPixels = 1e-3, kShare = 1e-5;
-  const auto near = [](double x, double y, double tolerance) { return std::abs(x - y) <= tolerance; };
-  return a.width == b.width && a.height == b.height && near(a.fx, b.fx, kPixels) && near(a.fy, b.fy, kPixels) &&
-         near(a.cx, b.cx, kPixels) && near(a.cy, b.cy, kPixels) && near(a.baseline, b.baseline, kShare * a.baseline);
 }
 
 }  // namespace
@@ -161,14 +151,17 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
       NODELET_WARN_STREAM("the clock jumped back to " << stamp << ": a new stream begins");
       ++stream_epoch_;
     }
-    const StereoCamera given = ros_conversions::toStereoCamera(*pair.left_info, *pair.right_info);
-    const StereoCamera camera = camera_ && agree(*camera_, given) ? *camera_ : given;
-    noteDepth(pair);
-    const cv::Mat left = ros_conversions::toGrey(pair.left_image, bit_depth_);
-    const cv::Mat right = ros_conversions::toGrey(pair.right_image, bit_depth_);
-    const StereoFeatures features = extractor_->extract(camera, left, right, nanoseconds(stamp));
+    const int depth = decoder_.bitDepth();
+    const DecodedPair decoded = decoder_.decode(pair);
+    if (decoder_.bitDepth() > depth) NODELET_INFO_STREAM("mono16 images hold " << decoder_.bitDepth() << " bits");
+    const StereoFeatures features =
+        extractor_->extract(decoded.camera, decoded.left, decoded.right, nanoseconds(stamp));
     // Only now: a calibration that does not fit the images was refused and is no new stream.
-    updateCamera(camera);
+    if (decoder_.accept(decoded.camera)) {
+      ++stream_epoch_;
+      if (throttle_.allows("camera_info"))
+        NODELET_WARN_STREAM("camera_info changed: a new stream begins (" << stream_epoch_ << " so far)");
+    }
 
     const auto message = boost::make_shared<stereo_descriptor_vo::StereoFeatures>(
         ros_conversions::toMessage(features, extractor_->options().size_curve));
@@ -181,24 +174,6 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     if (throttle_.allows(e.what()))
       NODELET_ERROR_STREAM("pair at " << passed.item.left_image->header.stamp << " of "
                                       << passed.item.left_image->header.frame_id << " skipped: " << e.what());
-  }
-
-  /// One depth for both sides and the whole stream, so that grey levels keep their meaning from pair to pair.
-  void noteDepth(const StereoPairMessages& pair) {
-    const int depth =
-        std::max(ros_conversions::bitDepth(*pair.left_image), ros_conversions::bitDepth(*pair.right_image));
-    if (depth <= bit_depth_) return;
-    bit_depth_ = depth;
-    if (depth > 8) NODELET_INFO_STREAM("mono16 images hold " << depth << " bits");
-  }
-
-  void updateCamera(const StereoCamera& camera) {
-    if (camera_ && *camera_ != camera) {
-      ++stream_epoch_;
-      if (throttle_.allows("camera_info"))
-        NODELET_WARN_STREAM("camera_info changed: a new stream begins (" << stream_epoch_ << " so far)");
-    }
-    camera_ = camera;
   }
 
   static constexpr double kSilencePeriod = 10.0;  // s between explanations why nothing comes
@@ -221,9 +196,8 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
 
   // Only the worker's thread touches these.
   std::unique_ptr<FeatureExtractor> extractor_;
-  std::optional<StereoCamera> camera_;
+  PairDecoder decoder_;
   int timeline_ = 0;
-  int bit_depth_ = 8;
   std::uint32_t stream_epoch_ = 0;
 
   std::mutex connect_mutex_;

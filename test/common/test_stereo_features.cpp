@@ -128,6 +128,23 @@ TEST(StereoFeatures, SelectedRowsStayWhole) {
   EXPECT_EQ(features.select({}).count(), 0);
 }
 
+TEST(StereoFeatures, RowsCompareWhereAllOfTheirKindIsEqual) {
+  const DescriptorKind kind = threeFeatures().kind();
+  EXPECT_TRUE(kind == threeFeatures().kind());
+  DescriptorKind other = kind;
+  other.descriptor = "brief";
+  EXPECT_FALSE(kind == other);
+  other = kind;
+  other.layout = DescriptorLayout::kLeft;
+  EXPECT_FALSE(kind == other);
+  other = kind;
+  other.element_type = ElementType::kUint8;
+  EXPECT_FALSE(kind == other);
+  other = kind;
+  ++other.bytes;
+  EXPECT_FALSE(kind == other);
+}
+
 TEST(StereoFeatures, RefusesACameraThatIsNone) {
   StereoFeatures features = threeFeatures();
   features.camera.baseline = 0.0;

@@ -213,6 +213,10 @@ TEST_F(KittiDataset, TruncatedImagesAreRefusedWhereverTheyEnd) {
     std::ofstream(file, std::ios::binary) << bytes.substr(0, size);
     EXPECT_EQ(errorOf([&] { sequence.load(1); }), "image '" + file + "' is truncated: copy it again") << size;
   }
+  std::string longer_end = bytes;
+  longer_end[bytes.size() - 12 + 3] = 1;  // the length of the last chunk, which is empty
+  std::ofstream(file, std::ios::binary) << longer_end;
+  EXPECT_EQ(errorOf([&] { sequence.load(1); }), "image '" + file + "' is truncated: copy it again");
   std::ofstream(file, std::ios::binary) << "";
   EXPECT_EQ(errorOf([&] { sequence.load(1); }), "image '" + file + "' is not a PNG file");
 }

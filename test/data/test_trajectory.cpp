@@ -127,7 +127,7 @@ TEST(KittiPoses, MissingEmptyAndDirectoryFilesAreNamed) {
 
 TEST(TumPoses, SurviveWritingAndReadingToTheNanosecond) {
   const TemporaryFile file;
-  const StampedTrajectory written{{0, 1, 1403636584763555584, 1403636584763555585}, curve(4)};
+  const StampedTrajectory written{{-1250000000, 0, 1, 1403636584763555584}, curve(4)};
   writeTumPoses(file.path(), written);
   const StampedTrajectory read = readTumPoses(file.path());
   EXPECT_EQ(read.stamps, written.stamps);

@@ -140,6 +140,24 @@ TEST(MotionEstimator, RecoversMotionAmongHalfOutliers) {
     }
 }
 
+TEST(MotionEstimator, RefinesOnceMoreOnTheInliersThatTheFirstTimeDrewIn) {
+  MotionEstimatorOptions options;
+  options.consensus = ConsensusMethod::kRansac;
+  options.max_iterations = 3;  // a poor sample, whose pose misses some
+  const StereoCamera camera = synthetic::camera();
+  const Correspondences correspondences = randomProblem(1, 240, 0.8, 0.3).correspondences;
+  const PoseProblem problem(camera, correspondences, options.inlier_threshold);
+  const Consensus consensus = findConsensus(problem, options, options);
+  Eigen::Isometry3d T = consensus.T_current_reference;
+  refineMotion(camera, options, correspondences, consensus.inliers, T);
+  const std::vector<int> drawn_in = problem.inliers(T);
+  ASSERT_GT(drawn_in.size(), consensus.inliers.size());
+  refineMotion(camera, options, correspondences, drawn_in, T);
+  const MotionEstimate estimate = MotionEstimator(options).estimate(camera, correspondences);
+  ASSERT_TRUE(estimate.success) << estimate.reason;
+  EXPECT_TRUE(estimate.T_current_reference.isApprox(T, 1e-12));
+}
+
 TEST(MotionEstimator, CovarianceIsCalibrated) {
   constexpr int kTrials = 300, kPoints = 80;
   constexpr double kNoise = 0.5;  // px

@@ -215,6 +215,63 @@ TEST(PatchAlignment, RefusesWhatIsNotTheSame) {
   }
 }
 
+TEST(PatchAlignment, RefusesALowerCorrelationThanAskedFor) {
+  std::mt19937 random(7);
+  const auto reference = cut(texture(3), Eigen::Vector2d::Zero(), 1.0, random);
+  const auto current = cut(texture(3), Eigen::Vector2d::Zero(), 1.0, random, 20.0);
+  PatchAlignmentOptions options;
+  const auto align = [&] {
+    return alignPatch(options, patchOf(reference), Eigen::Vector2f::Zero(), patchOf(current),
+                      Eigen::Matrix2f::Identity());
+  };
+  options.min_correlation = 0.1;
+  const auto found = align();
+  ASSERT_TRUE(found);
+  ASSERT_LT(found->correlation, 0.98f);
+  options.min_correlation = found->correlation - 0.01;
+  EXPECT_TRUE(align());
+  options.min_correlation = found->correlation + 0.01;
+  EXPECT_FALSE(align());
+}
+
+TEST(PatchAlignment, RefusesAFartherShiftThanAskedFor) {
+  std::mt19937 random(7);
+  const auto reference = cut(texture(3), Eigen::Vector2d::Zero(), 1.0, random);
+  const auto current = cut(moved(texture(3), scaled(1.0), {0.0, -0.8}), Eigen::Vector2d::Zero(), 1.0, random);
+  PatchAlignmentOptions options;
+  const auto align = [&] {
+    return alignPatch(options, patchOf(reference), Eigen::Vector2f::Zero(), patchOf(current),
+                      Eigen::Matrix2f::Identity());
+  };
+  options.max_shift = 1.0;
+  EXPECT_TRUE(align());
+  options.max_shift = 0.6;
+  EXPECT_FALSE(align());
+}
+
+// Along an edge nothing but rounding tells the position.
+TEST(PatchAlignment, RefusesSlantedEdges) {
+  std::mt19937 random(7);
+  for (const double slant : {-1.03, 1.03}) {
+    const Scene edge = [slant](double x, double y) { return 125.0 + 75.0 * std::tanh(0.7 * (x + slant * y)); };
+    const auto patch = cut(edge, Eigen::Vector2d::Zero(), 1.0, random, 0.0);
+    EXPECT_FALSE(alignPatch(PatchAlignmentOptions(), patchOf(patch), Eigen::Vector2f::Zero(), patchOf(patch),
+                            Eigen::Matrix2f::Identity()));
+  }
+}
+
+TEST(PatchAlignment, PatchesMayBeSpacedDifferently) {
+  std::mt19937 random(7);
+  const Eigen::Vector2d shift(0.6, -0.4);
+  const auto reference = cut(texture(3), Eigen::Vector2d::Zero(), 1.0, random);
+  const auto current = cut(moved(texture(3), scaled(1.0), shift), Eigen::Vector2d::Zero(), 1.6, random);
+  const auto found = alignPatch(PatchAlignmentOptions(), patchOf(reference, 1.0), Eigen::Vector2f::Zero(),
+                                patchOf(current, 1.6), Eigen::Matrix2f::Identity());
+  ASSERT_TRUE(found);
+  EXPECT_LT((found->shift.cast<double>() - shift).norm(), 0.15);
+  EXPECT_GT(found->correlation, 0.95f);
+}
+
 TEST(PatchAlignment, RefusesWhatLiesOutside) {
   std::mt19937 random(5);
   const Scene scene = texture(2);
@@ -225,7 +282,9 @@ TEST(PatchAlignment, RefusesWhatLiesOutside) {
                       ratio * Eigen::Matrix2f::Identity());
   };
   EXPECT_FALSE(align(far, Eigen::Vector2f::Zero(), 1.f)) << "beyond max_shift";
-  EXPECT_FALSE(align(reference, {1.5f, 0.f}, 1.f)) << "the reference's square and its neighbours leave its patch";
+  const auto beside = cut(scene, {1.5, 0.0}, 1.0, random, 0.0);
+  EXPECT_TRUE(align(cut(scene, {1.0, 0.0}, 1.0, random, 0.0), {1.f, 0.f}, 1.f));
+  EXPECT_FALSE(align(beside, {1.5f, 0.f}, 1.f)) << "the reference's square and its neighbours leave its patch";
   EXPECT_FALSE(align(reference, Eigen::Vector2f::Zero(), 1.6f)) << "the warped square leaves the current patch";
   EXPECT_FALSE(align(reference, Eigen::Vector2f::Zero(), std::numeric_limits<float>::quiet_NaN()));
 }

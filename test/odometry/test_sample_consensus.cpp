@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/odometry/sample_consensus.hpp"
@@ -131,6 +132,26 @@ TEST(SampleConsensus, LocalOptimisationFindsMoreInliers) {
     optimised += search(scene, "lo_ransac", static_cast<int>(seed)).inliers.size();
   }
   EXPECT_GT(optimised, plain);
+}
+
+// What a local optimisation has gained is not given up for a later sample that is better than the one before it.
+TEST(SampleConsensus, MoreSamplesNeverGiveAWorsePose) {
+  for (const char* method : {"msac", "lo_ransac"})
+    for (unsigned seed = 1; seed <= 5; ++seed) {
+      const Scene scene = makeScene(100, 0.4, 0.7, seed);
+      SampleConsensusOptions options;
+      options.consensus = valueOf<ConsensusMethod>(method);
+      const PoseProblem problem(scene.camera, scene.correspondences, options.inlier_threshold);
+      double best = std::numeric_limits<double>::max();
+      for (int samples = 1; samples <= 40; ++samples) {
+        options.min_iterations = options.max_iterations = samples;
+        const Consensus consensus = findConsensus(problem, options, {});
+        if (!consensus.found) continue;
+        const double cost = problem.truncatedCost(consensus.T_current_reference);
+        EXPECT_LE(cost, best) << method << ", seed " << seed << ", " << samples << " samples";
+        best = cost;
+      }
+    }
 }
 
 TEST(SampleConsensus, LocalOptimisationUsesTheKernelOfTheRefinement) {

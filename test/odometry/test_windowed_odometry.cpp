@@ -26,7 +26,7 @@ TEST_P(SelfCalibration, RecoversTheDisparityOffset) {
   EXPECT_NEAR(result.disparity_bend, 0.0, 0.15);
   EXPECT_GT(result.disparity_offset_sigma, 0.0);
 }
-INSTANTIATE_TEST_CASE_P(Offsets, SelfCalibration, testing::Values(-0.3, 0.0, 0.3));
+INSTANTIATE_TEST_SUITE_P(Offsets, SelfCalibration, testing::Values(-0.3, 0.0, 0.3));
 
 TEST(SelfCalibrationScale, CompensatesWhatWouldStretchTheTrajectory) {
   const auto length = [](bool enabled) {
@@ -81,7 +81,7 @@ TEST_P(SelfCalibrationBend, IsRecovered) {
   EXPECT_NEAR(result.disparity_offset, 0.0, 0.08);
   EXPECT_GT(result.disparity_bend_sigma, 0.0);
 }
-INSTANTIATE_TEST_CASE_P(Bends, SelfCalibrationBend, testing::Values(-1.0, 1.0));
+INSTANTIATE_TEST_SUITE_P(Bends, SelfCalibrationBend, testing::Values(-1.0, 1.0));
 
 TEST(SelfCalibrationReport, IsNotANumberBeforeThereIsAnEstimate) {
   SyntheticScene scene(13, 2000, 60.0);

@@ -20,16 +20,20 @@ FRAME = 'test_left_optical'
 EPOCH = 1000.0  # s; ROS reads a stamp of 0 as "no time"
 
 
-def kitti_dir():
-    """The directory of the data set; skips the test, loudly, when there is none."""
-    directory = os.environ.get('KITTI_DIR')
+def data_dir(variable, folder):
+    """The directory of a data set that has this folder; skips the test, loudly, when there is none."""
+    directory = os.environ.get(variable)
     if not directory:
-        print('\n*** SKIPPED: KITTI_DIR is not set: give it the absolute path of KITTI odometry data '
-              '(sequences/06, poses/06.txt …) ***\n', flush=True)
-        raise unittest.SkipTest('KITTI_DIR is not set')
-    if not os.path.isdir(os.path.join(directory, 'sequences')):
-        raise AssertionError("KITTI_DIR = '%s' has no folder 'sequences'" % directory)
+        print('\n*** SKIPPED: %s is not set: give it the absolute path of the data set (with %s) ***\n' % (variable, folder),
+              flush=True)
+        raise unittest.SkipTest(variable + ' is not set')
+    if not os.path.isdir(os.path.join(directory, folder)):
+        raise AssertionError("%s = '%s' has no folder '%s'" % (variable, directory, folder))
     return directory
+
+
+def kitti_dir():
+    return data_dir('KITTI_DIR', 'sequences')
 
 
 def run_tool(name, *arguments):
@@ -71,6 +75,10 @@ class Collector:
 
     def __getitem__(self, index):
         return self.messages[index]
+
+    def has(self, stamp):
+        """Whether a message of this stamp has come."""
+        return any(message.header.stamp == stamp for message in list(self.messages))
 
     def close(self):
         self.subscriber.unregister()

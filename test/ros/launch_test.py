@@ -84,8 +84,8 @@ class Launch(unittest.TestCase):
         def is_offered():
             try:
                 return rosservice.get_service_node(service) is not None
-            except rosservice.ROSServiceIOException:
-                return False
+            except (rosservice.ROSServiceException, rosgraph.network.ROSHandshakeException):
+                return False  # it ends while it is asked
 
         def wait_until(condition):
             end = time.time() + 60

@@ -66,6 +66,19 @@ TEST(ToOdometry, ForwardOfTheCameraIsXAndALeftTurnIsPositiveYaw) {
   EXPECT_NEAR(yawOf(toOdometry(result, optical, {}).pose.pose.orientation), 0.3, 1e-12);
 }
 
+TEST(ToOdometry, GoesOnFromWhereTheBaseWasPut) {
+  OdometryResult result = trackedResult();
+  Eigen::Isometry3d optical = Eigen::Isometry3d::Identity();
+  optical.linear() = mountedCamera().linear();
+  result.T_origin_camera = Eigen::Translation3d(0.0, 0.0, 2.5);  // forward
+  const Eigen::Isometry3d T_odom_start =
+      Eigen::Translation3d(10.0, 5.0, 0.0) * Eigen::AngleAxisd(CV_PI / 2.0, Eigen::Vector3d::UnitZ());  // looks along y
+  const geometry_msgs::Pose pose = toOdometry(result, optical, {}, T_odom_start).pose.pose;
+  EXPECT_NEAR(pose.position.x, 10.0, 1e-12);
+  EXPECT_NEAR(pose.position.y, 7.5, 1e-12);
+  EXPECT_NEAR(yawOf(pose.orientation), CV_PI / 2.0, 1e-12);
+}
+
 TEST(ToOdometry, PoseAndTwistAreThoseOfTheBaseNotOfTheCamera) {
   const Eigen::Isometry3d T_base_camera = mountedCamera();
   const double dt = 0.1, speed = 8.0, yaw_rate = 0.7;

@@ -260,6 +260,62 @@ TEST_F(Tools, ResultsAreBitIdenticalInEveryRunAndWithAnyThreads) {
   }
 }
 
+TEST_F(Tools, BagsGiveWhatTheirSequencesGive) {
+  const fs::path bags = root_ / "bags", results = root_ / "results";
+  fs::create_directories(bags);
+  ASSERT_EQ(runSequence().exit_code, 0);
+  for (const char* name : {"a.bag", "b.bag"})
+    ASSERT_EQ(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output " + (bags / name).string()).exit_code,
+              0);
+  const std::string command = bags.string() + " --output " + results.string() + " --format kitti --jobs 2";
+  const Outcome outcome = run("run_bag", command);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  const std::vector<std::string> report = linesOf(readText(results / "report.csv"));
+  ASSERT_EQ(report.size(), 3u);
+  EXPECT_EQ(report[1].rfind("a,4,0,0,0,", 0), 0u) << report[1];
+  EXPECT_EQ(report[2].rfind("b,4,0,0,0,", 0), 0u) << report[2];
+  EXPECT_EQ(readText(results / "a.txt"), readText(poses()));
+  EXPECT_EQ(readText(results / "b.txt"), readText(poses()));
+  EXPECT_EQ(linesOf(readText(results / "a.csv")).size(), static_cast<std::size_t>(kPairs) + 1);
+
+  // TUM's format has the stamps: times.txt plus 1e9 s.
+  const std::string one = (bags / "a.bag").string() + " --output " + (root_ / "one").string();
+  ASSERT_EQ(run("run_bag", one).exit_code, 0);
+  const std::vector<std::string> lines = linesOf(readText(root_ / "one" / "a.txt"));
+  ASSERT_EQ(lines.size(), static_cast<std::size_t>(kPairs) + 1);  // and a comment
+  EXPECT_EQ(lines[1].rfind("1000000000.000000000 ", 0), 0u) << lines[1];
+  EXPECT_EQ(lines[4].rfind("1000000000.300000000 ", 0), 0u) << lines[4];
+}
+
+TEST_F(Tools, ABagThatFailsIsNamedAndTheOthersAreNotRunAgain) {
+  const fs::path bags = root_ / "bags", results = root_ / "results";
+  fs::create_directories(bags);
+  const std::string convert = "--sequence " + sequence_.string() + " --output ";
+  ASSERT_EQ(run("kitti_to_bag", convert + (bags / "good.bag").string()).exit_code, 0);
+  fs::copy(bags / "good.bag", bags / "cut.bag");
+  fs::resize_file(bags / "cut.bag", fs::file_size(bags / "cut.bag") / 2);
+  const std::string command = bags.string() + " --output " + results.string() + " --resume";
+  expectError(run("run_bag", command), "1 of 2 bags failed");
+  std::vector<std::string> report = linesOf(readText(results / "report.csv"));
+  ASSERT_EQ(report.size(), 3u);
+  EXPECT_EQ(report[1].rfind("cut,,,,,,,,,,", 0), 0u) << report[1];
+  EXPECT_GT(report[1].size(), std::string("cut,,,,,,,,,,").size());
+  EXPECT_EQ(report[2].rfind("good,4,", 0), 0u) << report[2];
+
+  const fs::file_time_type finished = fs::last_write_time(results / "good.txt");
+  fs::remove(bags / "cut.bag");
+  ASSERT_EQ(run("kitti_to_bag", convert + (bags / "cut.bag").string()).exit_code, 0);
+  EXPECT_EQ(run("run_bag", command).exit_code, 0);
+  EXPECT_EQ(readText(results / "cut.txt"), readText(results / "good.txt"));
+  EXPECT_EQ(fs::last_write_time(results / "good.txt"), finished);
+
+  expectError(run("run_bag", (bags / "good.bag").string() + " --camera /other --output " + results.string()), "1 of 1");
+  EXPECT_NE(readText(results / "report.csv").find("there is no /other/left/image_rect"), std::string::npos);
+  expectError(run("run_bag", (bags / "none.bag").string() + " --output " + results.string()), "none.bag");
+  expectError(run("run_bag", bags.string() + " --output " + results.string() + " --param motion/kernel=square"),
+              "motion/kernel");
+}
+
 TEST_F(Tools, HashTellsOptionsApart) {
   const auto hash = [this](const std::string& extra) { return linesOf(runSequence("--frames 1 " + extra).out).at(0); };
   const std::string defaults = hash("");

@@ -1,0 +1,124 @@
+#include "offline_run.hpp"
+
+#include <algorithm>
+#include <ctime>
+#include <fstream>
+#include <iomanip>
+#include <stdexcept>
+#include <utility>
+
+#include "stereo_descriptor_vo/common/stopwatch.hpp"
+
+namespace sdvo {
+namespace {
+
+double cpuSeconds() {
+  return static_cast<double>(std::clock()) / CLOCKS_PER_SEC;
+}
+
+/// Row by row, 36 numbers.
+void writeCovariance(std::ostream& file, const Matrix6d& covariance) {
+  for (int i = 0; i < 36; ++i) file << "," << covariance(i / 6, i % 6);
+}
+
+}  // namespace
+
+OfflineRun::OfflineRun(const PipelineOptions& options)
+    : extractor_(options.stereo_features), odometry_(options.visual_odometry) {}
+
+void OfflineRun::process(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp) {
+  Frame frame;
+  const double cpu_before = cpuSeconds();
+  Stopwatch stopwatch;
+  const StereoFeatures features = extractor_.extract(camera, left, right, stamp);
+  if (camera_ && *camera_ != camera) odometry_.breakStream();
+  camera_ = camera;
+  frame.odometry = odometry_.update(features);
+  frame.total_time = stopwatch.lap();
+  cpu_time_ += cpuSeconds() - cpu_before;
+  frame.extraction = features.report;
+  frame.odometry.flow.clear();  // by far the largest part of it
+  frame.odometry.flow.shrink_to_fit();
+  frames_.push_back(std::move(frame));
+}
+
+int OfflineRun::pairsWithoutPose() const {
+  return static_cast<int>(
+      std::count_if(frames_.begin(), frames_.end(), [](const Frame& f) { return !f.odometry.has_pose; }));
+}
+
+int OfflineRun::discontinuities() const {
+  return frames_.empty() ? 0 : frames_.back().odometry.epoch - frames_.front().odometry.epoch;
+}
+
+double OfflineRun::distance() const {
+  return frames_.empty() ? 0.0 : frames_.back().odometry.distance;
+}
+
+double OfflineRun::time(double quantile) const {
+  if (frames_.empty()) return 0.0;
+  std::vector<double> times;
+  for (const Frame& frame : frames_) times.push_back(1e3 * frame.total_time);
+  std::sort(times.begin(), times.end());
+  return times[static_cast<std::size_t>(quantile * static_cast<double>(times.size() - 1) + 0.5)];
+}
+
+double OfflineRun::cpuTime() const {
+  return frames_.empty() ? 0.0 : 1e3 * cpu_time_ / static_cast<double>(frames_.size());
+}
+
+Trajectory OfflineRun::poses() const {
+  Trajectory poses;
+  for (const auto& [odometry, extraction, total_time] : frames_) {
+    if (odometry.has_pose)
+      poses.push_back(odometry.T_origin_camera);
+    else
+      poses.push_back(poses.empty() ? Eigen::Isometry3d::Identity() : poses.back());
+  }
+  return poses;
+}
+
+StampedTrajectory OfflineRun::stampedPoses() const {
+  StampedTrajectory trajectory;
+  for (const auto& [odometry, extraction, total_time] : frames_) {
+    if (!odometry.has_pose) continue;
+    trajectory.stamps.push_back(odometry.stamp);
+    trajectory.poses.push_back(odometry.T_origin_camera);
+  }
+  return trajectory;
+}
+
+void OfflineRun::writeTiming(const std::string& path) const {
+  std::ofstream file(path);
+  file << "frame,total_ms,detect_ms,stereo_ms,describe_ms,match_ms,motion_ms,detected,features,matches,inliers,rms_px,"
+          "coverage,state\n";
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    const auto& [odometry, extraction, total_time] = frames_[i];
+    file << i << "," << 1e3 * total_time << "," << 1e3 * extraction.detect_time << "," << 1e3 * extraction.stereo_time
+         << "," << 1e3 * extraction.describe_time << "," << 1e3 * odometry.match_time << ","
+         << 1e3 * odometry.motion_time << "," << extraction.detected << "," << odometry.features << ","
+         << odometry.matches << "," << odometry.inliers << "," << odometry.rms << "," << odometry.coverage << ","
+         << toString(odometry.state) << "\n";
+  }
+  if (!file.flush()) throw std::runtime_error("cannot write " + path);
+}
+
+void OfflineRun::writeStates(const std::string& path) const {
+  std::ofstream file(path);
+  file << "frame,stamp_ns,state,epoch,has_pose,has_motion";
+  for (const char* name : {"motion", "pose"})
+    for (int i = 0; i < 36; ++i) file << "," << name << "_" << i / 6 << i % 6;
+  file << ",reason\n"  // which stands last, for it may hold commas
+       << std::setprecision(10);
+  for (std::size_t i = 0; i < frames_.size(); ++i) {
+    const OdometryResult& odometry = frames_[i].odometry;
+    file << i << "," << odometry.stamp << "," << toString(odometry.state) << "," << odometry.epoch << ","
+         << odometry.has_pose << "," << odometry.has_motion;
+    writeCovariance(file, odometry.motion_covariance);
+    writeCovariance(file, odometry.pose_covariance);
+    file << "," << odometry.reason << "\n";
+  }
+  if (!file.flush()) throw std::runtime_error("cannot write " + path);
+}
+
+}  // namespace sdvo

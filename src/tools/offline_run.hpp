@@ -1,0 +1,59 @@
+#pragma once
+
+#include <cstdint>
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "../config/pipeline_options.hpp"
+#include "stereo_descriptor_vo/common/stereo_camera.hpp"
+#include "stereo_descriptor_vo/data/trajectory.hpp"
+#include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
+#include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
+
+namespace sdvo {
+
+/// The pipeline of both nodelets without ROS: every pair it is given is processed, and all that comes out is kept.
+class OfflineRun {
+ public:
+  explicit OfflineRun(const PipelineOptions& options);
+
+  /// Stamps (ns) must increase. Another camera than before begins a new stream.
+  void process(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
+
+  int pairs() const { return static_cast<int>(frames_.size()); }
+  int pairsWithoutPose() const;
+  /// How often the pose was not continued by measurement.
+  int discontinuities() const;
+  double distance() const;  ///< m
+
+  /// Per pair, ms; decoding excluded. Zero without pairs. `quantile`: 0.5 is the median.
+  double time(double quantile) const;
+  double cpuTime() const;  ///< mean of all threads
+
+  /// Poses of the left camera, one for each pair: without one of its own a pair repeats the last one.
+  Trajectory poses() const;
+  /// The poses there are, with their stamps.
+  StampedTrajectory stampedPoses() const;
+
+  /// A CSV with a line for each pair: times, counts and state.
+  void writeTiming(const std::string& path) const;
+  /// A CSV with what a filter behind the odometry is told of each pair: state, covariances of motion and pose, reason.
+  void writeStates(const std::string& path) const;
+
+ private:
+  struct Frame {
+    OdometryResult odometry;
+    ExtractionReport extraction;
+    double total_time = 0.0;  ///< s
+  };
+
+  FeatureExtractor extractor_;
+  VisualOdometry odometry_;
+  std::optional<StereoCamera> camera_;
+  std::vector<Frame> frames_;
+  double cpu_time_ = 0.0;  ///< s
+};
+
+}  // namespace sdvo

@@ -1,0 +1,127 @@
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <cstdint>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/data/euroc_dataset.hpp"
+
+namespace sdvo {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string errorOf(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const std::runtime_error& e) {
+    return e.what();
+  }
+  return "no error";
+}
+
+/// mav0 with two pairs of 120x80 px and one more left image, of cameras 0.2 m apart, in a directory that is removed at
+/// the end.
+class EurocDataset : public testing::Test {
+ protected:
+  void SetUp() override {
+    std::string name = (fs::temp_directory_path() / "sdvo_euroc_XXXXXX").string();
+    ASSERT_NE(mkdtemp(name.data()), nullptr);
+    root_ = name;
+    writeCamera("cam0", 0.0, {1000, 1050, 1100});
+    writeCamera("cam1", 0.2, {1000, 1100});
+  }
+  void TearDown() override { fs::remove_all(root_); }
+
+  void writeCamera(const std::string& camera, double place, const std::vector<int>& stamps) const {
+    fs::create_directories(root_ / camera / "data");
+    writeSensor(camera, place, "120, 80");
+    std::ofstream list(root_ / camera / "data.csv");
+    list << "#timestamp [ns],filename\r\n";
+    for (const int stamp : stamps) {
+      list << stamp << "," << stamp << ".png\r\n";
+      cv::imwrite((root_ / camera / "data" / (std::to_string(stamp) + ".png")).string(),
+                  cv::Mat(80, 120, CV_8UC1, cv::Scalar(camera == "cam0" ? 10 : 20)));
+    }
+  }
+
+  /// The camera's x points along the body's z, on which it has its `place` in m.
+  void writeSensor(const std::string& camera, double place, const std::string& resolution) const {
+    std::ofstream(root_ / camera / "sensor.yaml")
+        << "T_BS:\n  data: [0, 0, 1, 0,  0, -1, 0, 0.5,  1, 0, 0, " << place << ",  0, 0, 0, 1]\n"
+        << "resolution: [" << resolution << "]\ncamera_model: pinhole\nintrinsics: [100, 110, 60, 40]\n"
+        << "distortion_model: radial-tangential\ndistortion_coefficients: [-0.1, 0.01, 0.001, 0.002]\n";
+  }
+
+  fs::path root_;
+};
+
+TEST_F(EurocDataset, PairsAreThoseThatBothCamerasTook) {
+  const EurocSequence sequence(root_.string());
+  ASSERT_EQ(sequence.size(), 2);
+  EXPECT_EQ(sequence.unpaired(), 1);
+  EXPECT_EQ(sequence.stamp(0), 1000);
+  EXPECT_EQ(sequence.stamp(1), 1100);
+  const ImagePair pair = sequence.load(1);
+  EXPECT_EQ(pair.left.at<std::uint8_t>(5, 5), 10);
+  EXPECT_EQ(pair.right.at<std::uint8_t>(5, 5), 20);
+}
+
+TEST_F(EurocDataset, CalibrationIsThatOfTheFilesAndRectified) {
+  const EurocSequence sequence(root_.string());
+  const EurocCamera& left = sequence.camera(0);
+  EXPECT_EQ(left.intrinsics, cv::Matx33d(100, 0, 60, 0, 110, 40, 0, 0, 1));
+  EXPECT_EQ(left.distortion, (std::vector<double>{-0.1, 0.01, 0.001, 0.002}));
+  // The cameras' axes agree already, so there is nothing to turn.
+  const StereoRectification& rectification = sequence.rectification();
+  EXPECT_LT(cv::norm(rectification.rotations[0] - cv::Matx33d::eye()), 1e-9);
+  EXPECT_LT(cv::norm(rectification.rotations[1] - cv::Matx33d::eye()), 1e-9);
+  const StereoCamera& camera = rectification.camera;
+  EXPECT_NEAR(camera.baseline, 0.2, 1e-9);
+  EXPECT_EQ(camera.width, 120);
+  EXPECT_EQ(camera.height, 80);
+  EXPECT_GT(camera.fx, 50.0);
+  EXPECT_NEAR(rectification.projections[1](0, 3), -0.2 * camera.fx, 1e-9);
+  EXPECT_EQ(rectification.projections[0](0, 3), 0.0);
+}
+
+TEST_F(EurocDataset, PosesAreRelativeToTheFirst) {
+  std::string problem;
+  const EurocSequence sequence(root_.string());
+  EXPECT_TRUE(sequence.rectifiedPoses(problem).empty());
+  EXPECT_NE(problem.find("there is no"), std::string::npos);
+  std::ofstream(root_ / "cam0_ground_truth.txt") << "1000 1 0 0 5 0 1 0 6 0 0 1 7\n1050 1 0 0 9 0 1 0 9 0 0 1 9\n";
+  EXPECT_TRUE(sequence.rectifiedPoses(problem).empty());
+  EXPECT_NE(problem.find("no pose at 1100"), std::string::npos);
+  std::ofstream(root_ / "cam0_ground_truth.txt") << "1000 1 0 0 5 0 1 0 6 0 0 1 7\n1100 1 0 0 5 0 1 0 6 0 0 1 8.5\n";
+  const Trajectory poses = sequence.rectifiedPoses(problem);
+  ASSERT_EQ(poses.size(), 2u);
+  EXPECT_TRUE(poses[0].isApprox(Eigen::Isometry3d::Identity()));
+  EXPECT_TRUE(poses[1].translation().isApprox(Eigen::Vector3d(0, 0, 1.5)));
+}
+
+TEST_F(EurocDataset, WhatDoesNotHoldTogetherIsNamed) {
+  const auto open = [this] { EurocSequence(root_.string()).load(0); };
+  writeSensor("cam1", -0.2, "120, 80");
+  EXPECT_NE(errorOf(open).find("swapped"), std::string::npos);
+  writeSensor("cam1", 0.2, "100, 80");
+  EXPECT_NE(errorOf(open).find("resolution"), std::string::npos);
+  writeSensor("cam0", 0.0, "100, 80");
+  EXPECT_NE(errorOf(open).find("1000.png"), std::string::npos);
+  writeCamera("cam0", 0.0, {1001});
+  EXPECT_NE(errorOf(open).find("resolution"), std::string::npos);
+  writeCamera("cam1", 0.2, {1000});
+  EXPECT_NE(errorOf(open).find("no stamp in common"), std::string::npos);
+  fs::remove_all(root_ / "cam1");
+  EXPECT_NE(errorOf(open).find("cam1' is missing"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace sdvo
