@@ -65,5 +65,16 @@ TEST(PatchCutter, AcrossTheBorderNothingIsReadFromOutside) {
     EXPECT_TRUE(sample == 90 || sample == 0) << int{sample};
 }
 
+TEST(PatchCutter, AcrossTheBorderSquaresInsideAreWhole) {
+  const cv::Mat image(30, 30, CV_8U, cv::Scalar(90));
+  const std::vector<std::uint8_t> samples = cut(image, kLayout, 0.f, 15.f, 7.f);
+  const int side = kLayout.side;
+  for (int row = 0; row < side; ++row) {
+    for (int column = side / 2; column < side; ++column)
+      EXPECT_EQ(samples[static_cast<std::size_t>(row * side + column)], 90) << row << ", " << column;
+    EXPECT_EQ(samples[static_cast<std::size_t>(row * side)], 0) << row;
+  }
+}
+
 }  // namespace
 }  // namespace sdvo
