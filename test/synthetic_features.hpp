@@ -18,6 +18,7 @@ class SyntheticScene {
   double disparity_noise = 0.15;  ///< px, normal
   double disparity_offset = 0.0;  ///< px
   double disparity_bend = 0.0;    ///< px times ((u - cx) / fx)^2
+  bool patches = false;           ///< with patches of a texture of each point's own, cut where the position says
 
   /// `count` points over a street 30 m wide and `length` metres long, down to 1.6 m below the camera.
   SyntheticScene(std::uint32_t seed, int count, double length) : random_(seed) {
@@ -52,7 +53,23 @@ class SyntheticScene {
           {static_cast<float>(u), static_cast<float>(v), static_cast<float>(disparity), 0.f, 10.f, -1.f, 1.f});
       seen.push_back(static_cast<int>(i));
     }
+    if (patches)
+      features.patch_layout = {13, 1.f, 0.f}, features.patches.create(static_cast<int>(seen.size()), 169, CV_8U);
     features.descriptors.create(static_cast<int>(seen.size()), 128, CV_8U);
+    for (std::size_t row = 0; row < seen.size() && patches; ++row) {
+      const Eigen::Vector3d point = T_origin_camera.inverse() * points_[seen[row]];
+      const Eigen::Vector3d projection = camera.project(point);
+      const auto& byte = descriptors_[seen[row]];
+      for (int j = 0; j < 13; ++j)
+        for (int i = 0; i < 13; ++i) {
+          // From the point, in the pixels of a view from 20 m.
+          const double x = (features.u[row] + i - 6 - projection.x()) * point.z() / 20.0;
+          const double y = (features.v[row] + j - 6 - projection.y()) * point.z() / 20.0;
+          const double waves = std::sin(0.8 * x + byte[0]) + std::cos(0.7 * y - 0.4 * x + byte[1]);
+          features.patches.at<std::uint8_t>(static_cast<int>(row), 13 * j + i) =
+              static_cast<std::uint8_t>(128.5 + 50.0 * waves);
+        }
+    }
     for (std::size_t row = 0; row < seen.size(); ++row)
       std::copy(descriptors_[seen[row]].begin(), descriptors_[seen[row]].end(),
                 features.descriptors.ptr(static_cast<int>(row)));

@@ -5,41 +5,38 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <opencv2/core/hal/intrin.hpp>
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
-#include "stereo_descriptor_vo/front_end/patch_sampling.hpp"
+#include "../common/kernel.hpp"
+#include "stereo_descriptor_vo/front_end/block_differences.hpp"
+#include "stereo_descriptor_vo/front_end/half_image.hpp"
+#include "stereo_descriptor_vo/front_end/slanted_patch.hpp"
 
 namespace sdvo {
 namespace {
 
-// A block is one SIMD register wide.
-constexpr int kBlockWidth = 16, kLeftOfBlock = kBlockWidth / 2;
 constexpr int kHalfRows = 4;  // block rows above and below the centre at half resolution
 constexpr int kFullRows = 5;  // … and at full resolution
 constexpr int kMargin = 64;   // px added around every image, so that no read needs a check
 
-/// Sum of absolute differences of two blocks centred at the given pixels.
-inline unsigned blockDifference(const std::uint8_t* a, const std::uint8_t* b, std::size_t step, int rows) {
-  unsigned sum = 0;
-  for (int row = -rows; row <= rows; ++row) {
-    const std::ptrdiff_t offset = row * static_cast<std::ptrdiff_t>(step) - kLeftOfBlock;
-#if CV_SIMD128
-    sum += cv::v_reduce_sad(cv::v_load(a + offset), cv::v_load(b + offset));
-#else
-    for (int k = 0; k < kBlockWidth; ++k) sum += static_cast<unsigned>(std::abs(a[offset + k] - b[offset + k]));
-#endif
+/// The least of the values from `begin` to before `end`.
+struct Least {
+  static SDVO_IN_KERNEL void run(const unsigned* values, int begin, int end, unsigned* least) {
+    unsigned smallest = std::numeric_limits<unsigned>::max();
+    for (int k = begin; k < end; ++k) smallest = std::min(smallest, values[k]);
+    *least = smallest;
   }
-  return sum;
+};
+
+unsigned leastOf(const unsigned* values, int begin, int end) {
+  unsigned least;
+  runKernel<Least>(values, begin, end, &least);
+  return least;
 }
 
 void addMargin(const cv::Mat& image, cv::Mat& larger) {
   cv::copyMakeBorder(image, larger, kMargin, kMargin, kMargin, kMargin, cv::BORDER_REPLICATE);
-}
-
-void halve(const cv::Mat& image, cv::Mat& half) {
-  cv::resize(image, half, cv::Size((image.cols + 1) / 2, (image.rows + 1) / 2), 0.0, 0.0, cv::INTER_AREA);
 }
 
 }  // namespace
@@ -49,11 +46,9 @@ EpipolarMatcher::EpipolarMatcher(const EpipolarMatcherOptions& options, double m
     : options_(options), max_dv_(max_dv), images_(scratch) {
   addMargin(left, scratch.left);
   addMargin(right, scratch.right);
-  scratch.left.convertTo(scratch.left_float, CV_32F);
-  scratch.right.convertTo(scratch.right_float, CV_32F);
-  halve(left, scratch.half);
+  halveImage(left, scratch.half);
   addMargin(scratch.half, scratch.left_half);
-  halve(right, scratch.half);
+  halveImage(right, scratch.half);
   addMargin(scratch.half, scratch.right_half);
 }
 
@@ -72,18 +67,18 @@ std::optional<int> EpipolarMatcher::searchRow(const cv::Point2f& left_position) 
   // A point that looks best at a negative disparity has no match: swapped images show themselves this way.
   constexpr int kNegative = 16;
   const int range = std::min(static_cast<int>(0.5 * options_.max_disparity), x);
+  const int count = kNegative + range + 1;
   thread_local std::vector<unsigned> differences;
-  differences.resize(kNegative + range + 1);
-  int best = 0;
-  for (int k = 0; k <= kNegative + range; ++k) {
-    differences[k] = blockDifference(left, right + kNegative - k, images_.left_half.step, kHalfRows);
-    if (differences[k] < differences[best]) best = k;
-  }
+  differences.resize(static_cast<std::size_t>(count));
+  const std::ptrdiff_t step = static_cast<std::ptrdiff_t>(images_.left_half.step[0]);
+  blockDifferences<kHalfRows>(left, right + kNegative, step, count, differences.data());
+  const unsigned least = leastOf(differences.data(), 0, count);
+  const int best = static_cast<int>(std::find(differences.begin(), differences.end(), least) - differences.begin());
   if (best < kNegative - 1) return std::nullopt;
-  unsigned elsewhere = std::numeric_limits<unsigned>::max();
-  for (int k = 0; k <= kNegative + range; ++k)
-    if (std::abs(k - best) > 2) elsewhere = std::min(elsewhere, differences[k]);
-  if (differences[best] > options_.uniqueness * elsewhere) return std::nullopt;
+  constexpr int kSame = 2;  // px around the best that count as the same place
+  const unsigned elsewhere =
+      std::min(leastOf(differences.data(), 0, best - kSame), leastOf(differences.data(), best + kSame + 1, count));
+  if (least > options_.uniqueness * elsewhere) return std::nullopt;
   return 2 * (best - kNegative);
 }
 
@@ -91,15 +86,19 @@ cv::Point EpipolarMatcher::searchAround(const cv::Point& left, int disparity) co
   constexpr int kReach = 2;
   const int rows = std::min(2, static_cast<int>(std::ceil(max_dv_)));
   const std::uint8_t* block = images_.left.ptr(left.y + kMargin) + left.x + kMargin;
+  const std::ptrdiff_t step = static_cast<std::ptrdiff_t>(images_.left.step[0]);
   cv::Point best;
   unsigned least = std::numeric_limits<unsigned>::max();
-  for (int dv = -rows; dv <= rows; ++dv)
-    for (int d = disparity - kReach; d <= disparity + kReach; ++d) {
+  for (int dv = -rows; dv <= rows; ++dv) {
+    const std::uint8_t* other = images_.right.ptr(left.y + dv + kMargin) + left.x - disparity + kReach + kMargin;
+    unsigned differences[2 * kReach + 1];
+    blockDifferences<kFullRows>(block, other, step, 2 * kReach + 1, differences);
+    for (int k = 0; k <= 2 * kReach; ++k) {
+      const int d = disparity - kReach + k;
       if (left.x - d < 0 || left.x - d > images_.right.cols - 2 * kMargin) continue;
-      const std::uint8_t* other = images_.right.ptr(left.y + dv + kMargin) + left.x - d + kMargin;
-      const unsigned difference = blockDifference(block, other, images_.left.step, kFullRows);
-      if (difference < least) least = difference, best = cv::Point(d, dv);
+      if (differences[k] < least) least = differences[k], best = cv::Point(d, dv);
     }
+  }
   return best;
 }
 
@@ -113,45 +112,22 @@ std::optional<cv::Point2f> EpipolarMatcher::align(const cv::Point2f& left_positi
   // Where the patch says little about its slant, upright is the better guess.
   constexpr float kNoise = 5.f, kUsualSlant = 0.2f;  // grey levels, px per row
   constexpr float kUpright = (kNoise / kUsualSlant) * (kNoise / kUsualSlant);
-  const int radius = options_.patch_radius, n = 2 * radius + 1;
-  const int stride = patchStride(radius + 1), count = n * stride;
-  // Eigen works in parallel lanes, which a plain loop over floats may not. Rows go on beyond the patch: the mask makes
-  // the patch and its derivatives zero there, so that whatever is sampled does not count.
-  thread_local Eigen::ArrayXf wide, mask, row;
-  thread_local Eigen::VectorXf patch, by_disparity, by_dv, by_slant, other;
-  if (mask.size() != count) {
-    mask.setZero(count);
-    row.setZero(count);
-    for (int j = 0; j < n; ++j) {
-      mask.segment(j * stride, n).setOnes();
-      row.segment(j * stride, n).setConstant(static_cast<float>(j - radius));
-    }
-    wide.setZero(count + 2 * stride + 2);
-    other.resize(count);
-  }
-  samplePatch(images_.left_float, kMargin, left_position.x, left_position.y, 0.f, radius + 1, stride, wide.data());
-  const auto neighbour = [&](int dx, int dy) { return wide.segment((1 + dy) * stride + 1 + dx, count); };
-  patch = neighbour(0, 0) * mask;
-  by_disparity = 0.5f * (neighbour(1, 0) - neighbour(-1, 0)) * mask;
-  by_dv = 0.5f * (neighbour(0, -1) - neighbour(0, 1)) * mask;
-  by_slant = by_disparity.array() * row;
-  const float pixels = static_cast<float>(n * n);
-  for (auto* values : {&patch, &by_disparity, &by_dv, &by_slant}) values->array() -= values->sum() / pixels * mask;
-  const float dd = by_disparity.squaredNorm(), dv = by_disparity.dot(by_dv), vv = by_dv.squaredNorm();
-  if (dd * vv - dv * dv < 1e-3f * dd * vv || dd < pixels) return std::nullopt;
-  const float ds = by_disparity.dot(by_slant), vs = by_dv.dot(by_slant), ss = by_slant.squaredNorm() + kUpright;
-  Eigen::Matrix3f hessian;
-  hessian << dd, dv, ds, dv, vv, vs, ds, vs, ss;
+  thread_local std::optional<SlantedPatch> scratch;
+  if (!scratch || scratch->radius() != options_.patch_radius) scratch.emplace(options_.patch_radius);
+  SlantedPatch& patch = *scratch;
+  patch.take(images_.left, kMargin, left_position.x, left_position.y);
+  Eigen::Matrix3f hessian = patch.hessian();
+  const float dd = hessian(0, 0), dv = hessian(0, 1), vv = hessian(1, 1);
+  if (dd * vv - dv * dv < 1e-3f * dd * vv || dd < static_cast<float>(patch.pixels())) return std::nullopt;
+  hessian(2, 2) += kUpright;
   const Eigen::Matrix3f inverse = hessian.inverse();
 
   cv::Point2f found = start;
   float slant = 0.f;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    samplePatch(images_.right_float, kMargin, left_position.x - found.x, left_position.y + found.y, slant, radius,
-                stride, other.data());
-    other -= patch;
-    // The derivatives have no mean, so that of the difference drops out.
-    const Eigen::Vector3f gradient(by_disparity.dot(other), by_dv.dot(other), by_slant.dot(other) - kUpright * slant);
+    Eigen::Vector3f gradient =
+        patch.compare(images_.right, kMargin, left_position.x - found.x, left_position.y + found.y, slant);
+    gradient[2] -= kUpright * slant;
     const Eigen::Vector3f step = inverse * gradient;
     slant += step[2];
     found.x += step[0] + slant * step[1];
@@ -164,9 +140,8 @@ std::optional<cv::Point2f> EpipolarMatcher::align(const cv::Point2f& left_positi
     if (std::max(std::abs(step[0]), std::abs(step[1])) < kConverged) break;
   }
 
-  other = (other + patch).cwiseProduct(mask.matrix());
-  other.array() -= other.sum() / pixels * mask;
-  if (patch.dot(other) < options_.min_correlation * patch.norm() * other.norm()) return std::nullopt;
+  const auto [product, square, other_square] = patch.similarity();
+  if (product < options_.min_correlation * std::sqrt(square) * std::sqrt(other_square)) return std::nullopt;
   return found;
 }
 

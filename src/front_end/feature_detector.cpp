@@ -1,16 +1,16 @@
 #include "stereo_descriptor_vo/front_end/feature_detector.hpp"
 
-#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core/utility.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
-#include <optional>
 #include <stdexcept>
 #include <tuple>
 
 #include "opencv_features.hpp"
-#include "stereo_descriptor_vo/front_end/patch_sampling.hpp"
+#include "stereo_descriptor_vo/front_end/corner_refiner.hpp"
+#include "stereo_descriptor_vo/front_end/fast_corners.hpp"
 
 namespace sdvo {
 namespace {
@@ -25,9 +25,7 @@ std::vector<Corner> toCorners(const std::vector<cv::KeyPoint>& keypoints) {
 /// The score of a FAST corner is the highest threshold at which it still is one. One pass at the lowest threshold,
 /// ranked by score inside each bucket, therefore equals running every bucket at its own adaptive threshold.
 std::vector<Corner> detectFast(const cv::Mat& image, const FeatureDetectorOptions& options) {
-  std::vector<cv::KeyPoint> keypoints;
-  cv::FAST(image, keypoints, options.fast_min_threshold, true);
-  return toCorners(keypoints);
+  return toCorners(findFastCorners(image, options.fast_min_threshold));
 }
 
 /// The same for AGAST, whose score has the same meaning.
@@ -104,83 +102,24 @@ std::vector<Corner> detectAll(const cv::Mat& image, const FeatureDetectorOptions
   throw std::invalid_argument("there is no such detector");
 }
 
-/// Foerstner's intersection of gradient lines, as cv::cornerSubPix finds it but several times faster.
-class CornerRefiner {
- public:
-  CornerRefiner(const cv::Mat& image, int radius) : radius_(radius), margin_(patchStride(radius + 1) + 1) {
-    // Memory of this size is slow to get from the system for every image.
-    thread_local cv::Mat larger, larger_float;
-    cv::copyMakeBorder(image, larger, margin_, margin_, margin_, margin_, cv::BORDER_REPLICATE);
-    larger.convertTo(larger_float, CV_32F);
-    image_ = larger_float;
-    // Weights fall off from the centre; they are zero beyond the square, where a patch's rows go on.
-    const int rows = 2 * radius + 1;
-    weight_.setZero(rows * stride());
-    x_.setZero(rows * stride());
-    y_.setZero(rows * stride());
-    for (int y = -radius; y <= radius; ++y)
-      for (int x = -radius; x <= radius; ++x) {
-        const int i = (y + radius) * stride() + x + radius;
-        weight_[i] = std::exp(-static_cast<float>(x * x + y * y) / static_cast<float>(radius * radius));
-        x_[i] = static_cast<float>(x);
-        y_[i] = static_cast<float>(y);
-      }
-    patch_.resize((rows + 2) * stride() + 2);
-  }
-
-  /// The corner near `start`, or nothing where it is further away than `largest_shift` px.
-  std::optional<cv::Point2f> refine(const cv::Point2f& start, float largest_shift) {
-    constexpr int kIterations = 10;
-    constexpr float kConverged = 0.02f;  // px
-    cv::Point2f position = start;
-    const int count = static_cast<int>(weight_.size());
-    for (int iteration = 0; iteration < kIterations; ++iteration) {
-      samplePatch(image_, margin_, position.x, position.y, 0.f, radius_ + 1, stride(), patch_.data());
-      const auto neighbour = [&](int dx, int dy) { return patch_.segment((1 + dy) * stride() + 1 + dx, count); };
-      gradient_x_ = neighbour(1, 0) - neighbour(-1, 0);
-      gradient_y_ = neighbour(0, 1) - neighbour(0, -1);
-      xx_ = weight_ * gradient_x_ * gradient_x_;
-      xy_ = weight_ * gradient_x_ * gradient_y_;
-      yy_ = weight_ * gradient_y_ * gradient_y_;
-      const float a = xx_.sum(), b = xy_.sum(), c = yy_.sum(), determinant = a * c - b * b;
-      if (!(determinant > 1e-6f * a * c)) break;
-      const float along_x = (xx_ * x_ + xy_ * y_).sum(), along_y = (xy_ * x_ + yy_ * y_).sum();
-      const cv::Point2f step((c * along_x - b * along_y) / determinant, (a * along_y - b * along_x) / determinant);
-      position += step;
-      const cv::Point2f shift = position - start;
-      if (!(std::max(std::abs(shift.x), std::abs(shift.y)) <= static_cast<float>(radius_))) return std::nullopt;
-      if (step.dot(step) <= kConverged * kConverged) break;
-    }
-    const cv::Point2f shift = position - start;
-    if (std::max(std::abs(shift.x), std::abs(shift.y)) > largest_shift) return std::nullopt;
-    return position;
-  }
-
- private:
-  int stride() const { return patchStride(radius_ + 1); }
-
-  int radius_, margin_;
-  cv::Mat image_;                  ///< CV_32F, with the margin
-  Eigen::ArrayXf weight_, x_, y_;  ///< of the square's pixels, in rows of stride()
-  Eigen::ArrayXf patch_;           ///< the square with one pixel more on each side
-  Eigen::ArrayXf gradient_x_, gradient_y_, xx_, xy_, yy_;
-};
-
 /// A corner that wanders off is not one point; its integer position is kept. Gradient detectors answer up to half their
 /// window inside of a corner, hence the limit.
 void refinePositions(const cv::Mat& image, int radius, float largest_shift, std::vector<Corner>& corners) {
   if (corners.empty()) return;
   const cv::Rect2f inside(0.f, 0.f, static_cast<float>(image.cols - 1), static_cast<float>(image.rows - 1));
-  CornerRefiner refiner(image, radius);
-  for (Corner& corner : corners) {
-    const auto refined = refiner.refine(corner.position, largest_shift);
-    if (refined && inside.contains(*refined)) corner.position = *refined;
-  }
+  thread_local cv::Mat scratch;
+  const CornerRefiner refiner(image, radius, scratch);
+  cv::parallel_for_(cv::Range(0, static_cast<int>(corners.size())), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) {
+      const auto refined = refiner.refine(corners[i].position, largest_shift);
+      if (refined && inside.contains(*refined)) corners[i].position = *refined;
+    }
+  });
 }
 
 }  // namespace
 
-std::vector<Corner> spreadOverBuckets(std::vector<Corner> corners, cv::Size image_size, int bucket_size,
+std::vector<Corner> spreadOverBuckets(const std::vector<Corner>& corners, cv::Size image_size, int bucket_size,
                                       int max_count) {
   const int columns = (image_size.width + bucket_size - 1) / bucket_size;
   const int rows = (image_size.height + bucket_size - 1) / bucket_size;
@@ -193,19 +132,24 @@ std::vector<Corner> spreadOverBuckets(std::vector<Corner> corners, cv::Size imag
   const auto stronger = [](const Corner& a, const Corner& b) {
     return std::tie(b.response, a.position.y, a.position.x) < std::tie(a.response, b.position.y, b.position.x);
   };
-  std::size_t fullest = 0;
-  for (auto& bucket : buckets) {
-    std::sort(bucket.begin(), bucket.end(), stronger);
-    fullest = std::max(fullest, bucket.size());
-  }
 
   // Serve every bucket's strongest corner, then every second strongest, …; the last round goes to the strongest of it.
-  std::vector<Corner> kept;
-  for (std::size_t round = 0; round < fullest && static_cast<int>(kept.size()) < max_count; ++round) {
-    std::vector<Corner> served;
+  // No more of a bucket need be in order than the rounds ask for.
+  const std::size_t wanted = std::min(static_cast<std::size_t>(max_count), corners.size());
+  std::size_t rounds = 0;
+  for (std::size_t served = 0; served < wanted; ++rounds)
+    for (const auto& bucket : buckets) served += bucket.size() > rounds ? 1 : 0;
+  for (auto& bucket : buckets) {
+    const auto needed = static_cast<std::ptrdiff_t>(std::min(rounds, bucket.size()));
+    std::partial_sort(bucket.begin(), bucket.begin() + needed, bucket.end(), stronger);
+  }
+  std::vector<Corner> kept, served;
+  kept.reserve(wanted + buckets.size());
+  for (std::size_t round = 0; round < rounds; ++round) {
+    served.clear();
     for (const auto& bucket : buckets)
       if (round < bucket.size()) served.push_back(bucket[round]);
-    const std::size_t room = static_cast<std::size_t>(max_count) - kept.size();
+    const std::size_t room = wanted - kept.size();
     if (served.size() > room) {
       std::sort(served.begin(), served.end(), stronger);
       served.resize(room);
@@ -230,7 +174,7 @@ std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border) co
   if (inner.width < kSmallestSide || inner.height < kSmallestSide) return {};
   std::vector<Corner> corners = detectAll(image(inner), options_);
   for (Corner& corner : corners) corner.position += cv::Point2f(inner.tl());
-  corners = spreadOverBuckets(std::move(corners), image.size(), options_.bucket_size, options_.max_features);
+  corners = spreadOverBuckets(corners, image.size(), options_.bucket_size, options_.max_features);
   if (options_.subpixel) {
     const bool gradient = options_.type == DetectorType::kGftt || options_.type == DetectorType::kHarris;
     const float largest_shift = gradient ? 0.5f * static_cast<float>(options_.corner_block_size) : 1.5f;  // px

@@ -5,6 +5,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "../common/kernel.hpp"
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
 
 namespace sdvo {
@@ -19,6 +20,18 @@ void checkImage(const cv::Mat& image, const char* side, const StereoCamera& came
   throw std::invalid_argument(message.str());
 }
 
+/// Sums of the grey levels but the first, and of the absolute horizontal gradients.
+struct MeasureRow {
+  static SDVO_IN_KERNEL void run(const std::uint8_t* row, int columns, int* sum, int* gradient) {
+    int greys = 0, gradients = 0;
+    for (int x = 1; x < columns; ++x) {
+      greys += row[x];
+      gradients += std::abs(row[x] - row[x - 1]);
+    }
+    *sum = greys, *gradient = gradients;
+  }
+};
+
 /// Mean grey level and mean absolute horizontal gradient, on every fourth row: both are there to recognise darkness and
 /// blur, not to be precise.
 void measureImage(const cv::Mat& image, double& mean_intensity, double& sharpness) {
@@ -26,10 +39,10 @@ void measureImage(const cv::Mat& image, double& mean_intensity, double& sharpnes
   std::int64_t sum = 0, gradient = 0, pixels = 0;
   for (int y = 0; y < image.rows; y += kRowStep) {
     const std::uint8_t* row = image.ptr(y);
-    for (int x = 1; x < image.cols; ++x) {
-      sum += row[x];
-      gradient += std::abs(row[x] - row[x - 1]);
-    }
+    int sum_of_row, gradient_of_row;
+    runKernel<MeasureRow>(row, image.cols, &sum_of_row, &gradient_of_row);
+    sum += sum_of_row;
+    gradient += gradient_of_row;
     pixels += image.cols - 1;
   }
   mean_intensity = static_cast<double>(sum) / static_cast<double>(std::max<std::int64_t>(pixels, 1));

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core/utility.hpp>
 
+#include "freak_octet.hpp"
 #include "stereo_descriptor_vo/front_end/image_bounds.hpp"
 
 namespace sdvo {
@@ -81,16 +83,13 @@ bool Freak::fits(const FreakKeypoint& keypoint, cv::Size image_size) {
 Freak::Freak(const cv::Mat& image) : image_(image) {}
 
 std::array<float, Freak::kFields> Freak::intensities(const FreakKeypoint& keypoint) const {
-  constexpr double kSmallestHalfSide = 0.5;  // one pixel
-  const double scale = reach(keypoint.size);
-  const double angle = keypoint.angle < 0.f ? 0.0 : keypoint.angle;
-  const double cosine = std::cos(angle) * scale, sine = std::sin(angle) * scale;
+  const auto [scale, cosine, sine] = FreakPose(keypoint);
   std::array<float, kFields> means;
   for (int i = 0; i < kFields; ++i) {
     const Field& field = pattern()[i];
     const double x = keypoint.u + cosine * field.x - sine * field.y;
     const double y = keypoint.v + sine * field.x + cosine * field.y;
-    const double half = std::max(field.sigma * scale, kSmallestHalfSide);
+    const double half = std::max(field.sigma * scale, FreakPose::kSmallestHalfSide);
     means[i] = image_.boxMean(x, y, half);
   }
   return means;
@@ -106,6 +105,19 @@ void Freak::describe(const FreakKeypoint& keypoint, std::uint8_t* row) const {
     }
     row[byte] = static_cast<std::uint8_t>(bits);
   }
+}
+
+void Freak::describe(const std::vector<FreakKeypoint>& keypoints, const std::vector<std::uint8_t*>& rows) const {
+  const std::size_t octets = keypoints.size() / kOctet;
+  cv::parallel_for_(cv::Range(0, static_cast<int>(octets)), [&](const cv::Range& range) {
+    OctetMeans means;
+    for (int octet = range.start; octet < range.end; ++octet) {
+      const std::size_t first = static_cast<std::size_t>(octet) * kOctet;
+      measureOctet(*this, &keypoints[first], means);
+      compareOctet(means, &rows[first]);
+    }
+  });
+  for (std::size_t i = octets * kOctet; i < keypoints.size(); ++i) describe(keypoints[i], rows[i]);
 }
 
 float Freak::orientation(FreakKeypoint keypoint) const {

@@ -3,30 +3,65 @@
 #include <array>
 #include <opencv2/imgproc.hpp>
 
+#include "../common/kernel.hpp"
+
 namespace sdvo {
 namespace {
 
-/// A position between two columns or two rows of the integral.
-struct Edge {
-  int index;
-  float share;  ///< of the second one
-};
+/// The squares tile, so each edge serves two of them. Arrays go on to whole registers.
+constexpr int kMostEdges = (PatchOptions::kMostSamples + 1 + 7) / 8 * 8;
+using Floats = std::array<float, kMostEdges>;
 
-/// The squares' edges: they tile, so each edge serves two of them.
-using Edges = std::array<Edge, PatchOptions::kMostSamples + 1>;
+/// Positions between two columns or two rows of the integral.
+struct Edges {
+  std::array<int, kMostEdges> index{};
+  Floats share{};  ///< of the second one
+
+  /// From the edge before.
+  float distance(int k) const { return static_cast<float>(index[k] - index[k - 1]) + share[k] - share[k - 1]; }
+};
 
 /// `size`: columns or rows of the integral. Pixel p covers [p - 0.5, p + 0.5], and column p of the integral is its left
 /// edge.
 Edges edgesAround(float centre, const PatchLayout& layout, float spacing, int size) {
-  Edges edges{};
+  Edges edges;
   for (int k = 0; k <= layout.side; ++k) {
     const float offset = (static_cast<float>(k) - 0.5f * static_cast<float>(layout.side)) * spacing;
     const float position = std::clamp(centre + 0.5f + offset, 0.f, static_cast<float>(size) - 1.001f);
-    const int index = static_cast<int>(position);
-    edges[k] = {index, position - static_cast<float>(index)};
+    edges.index[k] = static_cast<int>(position);
+    edges.share[k] = position - static_cast<float>(edges.index[k]);
   }
   return edges;
 }
+
+/// Sums along one row of the integral, at the edges. Since the patch's own corner they are small enough to be exact in
+/// single precision.
+struct SumsAtEdges {
+  static SDVO_IN_KERNEL void run(const int* integral, int origin, const Edges* edges, int count, float* sums) {
+    for (int k = 0; k < count; ++k) {
+      const int index = edges->index[k];
+      const float first = since(origin, integral[index]), second = since(origin, integral[index + 1]);
+      sums[k] = first + edges->share[k] * (second - first);
+    }
+  }
+  static SDVO_IN_KERNEL float since(int origin, int sum) {
+    return static_cast<float>(static_cast<int>(static_cast<unsigned>(sum) - static_cast<unsigned>(origin)));
+  }
+};
+
+/// What lies above an edge between two rows of the integral, for each square; and the means down to there.
+struct MeansOfRow {
+  static SDVO_IN_KERNEL void run(const float* upper, const float* lower, float share, const float* widths, float height,
+                                 int count, float* above, float* means) {
+    for (int i = 0; i < count; ++i) {
+      const float left = upper[i] + share * (lower[i] - upper[i]);
+      const float right = upper[i + 1] + share * (lower[i + 1] - upper[i + 1]);
+      const float upto = right - left, area = widths[i] * height;
+      means[i] = area > 0.f ? (upto - above[i]) / area : 0.f;
+      above[i] = upto;
+    }
+  }
+};
 
 }  // namespace
 
@@ -39,38 +74,25 @@ void PatchCutter::cut(float u, float v, float size, std::uint8_t* samples) const
   const float spacing = layout_.spacing(size);
   const Edges columns = edgesAround(u, layout_, spacing, integral_.cols);
   const Edges rows = edgesAround(v, layout_, spacing, integral_.rows);
-  std::array<float, PatchOptions::kMostSamples> above{}, upto{};
-  for (int j = 0; j <= layout_.side; ++j) {
-    const int* upper = integral_.ptr<int>(rows[j].index);
-    const int* lower = integral_.ptr<int>(rows[j].index + 1);
-    // Sums since the patch's own corner are small enough to be exact in single precision.
-    const auto sumAt = [&](const int* row, const Edge& column) {
-      const int origin = integral_.ptr<int>(rows[0].index)[columns[0].index];
-      const auto since = [&](int index) {
-        return static_cast<float>(static_cast<int>(static_cast<unsigned>(row[index]) - static_cast<unsigned>(origin)));
-      };
-      return since(column.index) + column.share * (since(column.index + 1) - since(column.index));
-    };
-    const auto interpolated = [&](const Edge& column) {
-      const float a = sumAt(upper, column), b = sumAt(lower, column);
-      return a + rows[j].share * (b - a);
-    };
-    float left = interpolated(columns[0]);
-    for (int i = 0; i < layout_.side; ++i) {
-      const float right = interpolated(columns[i + 1]);
-      upto[i] = right - left;
-      left = right;
-    }
-    if (j > 0) {
-      const float height = rows[j].index - rows[j - 1].index + rows[j].share - rows[j - 1].share;
-      for (int i = 0; i < layout_.side; ++i) {
-        const float width = columns[i + 1].index - columns[i].index + columns[i + 1].share - columns[i].share;
-        const float area = width * height;
-        const float mean = area > 0.f ? (upto[i] - above[i]) / area : 0.f;
-        *samples++ = cv::saturate_cast<std::uint8_t>(mean);
-      }
-    }
-    above = upto;
+  const int origin = integral_.ptr<int>(rows.index[0])[columns.index[0]];
+  const int side = layout_.side, edges = (side + 1 + 7) / 8 * 8;
+  const auto sumsAt = [&](int row, Floats& sums) {
+    runKernel<SumsAtEdges>(integral_.ptr<int>(row), origin, &columns, edges, sums.data());
+  };
+  Floats upper{}, lower{}, widths{}, above{}, means{};
+  for (int i = 0; i < side; ++i) widths[i] = columns.distance(i + 1);
+  for (int j = 0; j <= side; ++j) {
+    // Where edges are a pixel apart, each row of the integral serves two of them.
+    if (j > 0 && rows.index[j] == rows.index[j - 1] + 1)
+      upper = lower;
+    else
+      sumsAt(rows.index[j], upper);
+    sumsAt(rows.index[j] + 1, lower);
+    const float height = j > 0 ? rows.distance(j) : 0.f;
+    runKernel<MeansOfRow>(upper.data(), lower.data(), rows.share[j], widths.data(), height, side, above.data(),
+                          means.data());
+    if (j == 0) continue;
+    for (int i = 0; i < side; ++i) *samples++ = cv::saturate_cast<std::uint8_t>(means[i]);
   }
 }
 

@@ -1,6 +1,8 @@
 #include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
 
+#include <opencv2/core/utility.hpp>
 #include <opencv2/video/tracking.hpp>
+#include <optional>
 #include <stdexcept>
 
 namespace sdvo {
@@ -23,11 +25,14 @@ std::vector<StereoMatch> StereoMatcher::search(const cv::Mat& left, const cv::Ma
                                                const std::vector<cv::Point2f>& left_positions) const {
   thread_local EpipolarMatcher::Images scratch;
   const EpipolarMatcher matcher(options_.epipolar, options_.max_epipolar_residual, left, right, scratch);
+  std::vector<std::optional<cv::Point2f>> found(left_positions.size());
+  cv::parallel_for_(cv::Range(0, static_cast<int>(found.size())), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) found[i] = matcher.find(left_positions[i]);
+  });
   std::vector<StereoMatch> matches;
-  for (std::size_t i = 0; i < left_positions.size(); ++i) {
-    const auto found = matcher.find(left_positions[i]);
-    if (found && isTrusted(found->x, found->y)) matches.push_back({static_cast<int>(i), found->x, found->y});
-  }
+  for (std::size_t i = 0; i < found.size(); ++i)
+    if (found[i] && isTrusted(found[i]->x, found[i]->y))
+      matches.push_back({static_cast<int>(i), found[i]->x, found[i]->y});
   return matches;
 }
 

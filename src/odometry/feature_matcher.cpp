@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <type_traits>
@@ -88,22 +89,28 @@ class PositionGrid {
  public:
   PositionGrid(const StereoFeatures& features, double radius)
       : radius_(static_cast<float>(radius)), columns_(features.u, 0.5 * radius), rows_(features.v, 0.5 * radius) {
-    cells_.resize(static_cast<std::size_t>(columns_.count()) * rows_.count());
-    for (int i = 0; i < features.count(); ++i) {
-      const float u = features.u[i], v = features.v[i];
-      cells_[static_cast<std::size_t>(rows_.at(v)) * columns_.count() + columns_.at(u)].push_back({u, v, i});
-    }
+    const auto cellOf = [&](int i) { return cell(columns_.at(features.u[i]), rows_.at(features.v[i])); };
+    begin_.assign(static_cast<std::size_t>(columns_.count()) * rows_.count() + 1, 0);
+    for (int i = 0; i < features.count(); ++i) ++begin_[cellOf(i) + 1];
+    std::partial_sum(begin_.begin(), begin_.end(), begin_.begin());
+    std::vector<std::size_t> next = begin_;
+    entries_.resize(features.u.size());
+    for (int i = 0; i < features.count(); ++i) entries_[next[cellOf(i)]++] = {features.u[i], features.v[i], i};
   }
 
   void findAround(float u, float v, std::vector<int>& found) const {
-    found.clear();
+    found.resize(entries_.size());
+    std::size_t count = 0;
     const int first = columns_.at(u - radius_), last = columns_.at(u + radius_);
     for (int row = rows_.at(v - radius_); row <= rows_.at(v + radius_); ++row)
-      for (int column = first; column <= last; ++column)
-        for (const Entry& entry : cells_[static_cast<std::size_t>(row) * columns_.count() + column]) {
-          const float du = entry.u - u, dv = entry.v - v;
-          if (du * du + dv * dv <= radius_ * radius_) found.push_back(entry.row);
-        }
+      for (std::size_t i = begin_[cell(first, row)]; i < begin_[cell(last, row) + 1]; ++i) {
+        const Entry& entry = entries_[i];
+        const float du = entry.u - u, dv = entry.v - v;
+        // Written in any case and counted if near: no branch, as none could be foreseen.
+        found[count] = entry.row;
+        count += du * du + dv * dv <= radius_ * radius_ ? 1 : 0;
+      }
+    found.resize(count);
   }
 
  private:
@@ -130,9 +137,12 @@ class PositionGrid {
     double cell_, origin_, last_;
   };
 
+  std::size_t cell(int column, int row) const { return static_cast<std::size_t>(row) * columns_.count() + column; }
+
   float radius_;
   Axis columns_, rows_;
-  std::vector<std::vector<Entry>> cells_;
+  std::vector<Entry> entries_;      ///< cell after cell, row by row
+  std::vector<std::size_t> begin_;  ///< where each cell's entries begin, and the end
 };
 
 }  // namespace

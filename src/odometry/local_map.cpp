@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <unordered_map>
 
 namespace sdvo {
 namespace {
@@ -25,7 +26,12 @@ Matrix6d motionCovariance(const Window& window, const Eigen::MatrixXd& pose_cova
 
 }  // namespace
 
-LocalMap::LocalMap(const LocalMapOptions& options) : options_(checked(options)) {}
+LocalMap::LocalMap(const LocalMapOptions& options)
+    : options_(checked(options)), memory_(options.remembered_keyframes) {}
+
+int LocalMap::oldestId() const {
+  return std::find_if(frames_.begin(), frames_.end(), [](const Frame& frame) { return !frame.is_recalled; })->id;
+}
 
 int LocalMap::lastKeyframeId() const {
   for (auto frame = frames_.rbegin(); frame != frames_.rend(); ++frame)
@@ -76,7 +82,7 @@ void LocalMap::insert(const StereoFeatures& features, int id, const Eigen::Isome
   }
   // Only now that the new sightings are noted: points that they carry on must outlive the forgotten pair.
   if (!frames_.empty() && !frames_.back().is_keyframe) removeFrame(frames_.size() - 1);
-  frames_.push_back({id, T_camera_origin, false});
+  frames_.push_back({id, T_camera_origin, false, false});
   frames_.back().is_keyframe = needsKeyframe();
   for (int row = 0; row < features.count(); ++row)
     if (!recognised[row]) startPoint(features, row, id, T_camera_origin, calibration);
@@ -86,32 +92,13 @@ void LocalMap::insert(const StereoFeatures& features, int id, const Eigen::Isome
 LocalMap::Sighting LocalMap::sight(const PatchAlignmentOptions& options, const StereoFeatures& features,
                                    const Eigen::Isometry3d& T_camera_origin, int point, int row) const {
   Sighting sighting{point, row, {features.u[row], features.v[row], features.disparity[row]}, options_.corner_sigma};
-  const Reference& reference = points_[point].reference;
-  if (!options.enabled || !features.hasPatches() ||
-      reference.samples.size() != static_cast<std::size_t>(features.patch_layout.bytes()))
-    return sighting;
-
-  // The patch is small and taken as facing the camera that it was taken from: to first order the two views then differ
-  // by an affine map, the ratio of the depths above all.
-  const AnchoredPoint& position = points_[point].position;
-  const Eigen::Vector3d then = position.scaledPointIn(reference.T_camera_origin);
-  const Eigen::Vector3d now = position.scaledPointIn(T_camera_origin);
-  constexpr double kNearest = 1e-3;  // of the depth where the point was first seen
-  if (then.z() < kNearest || now.z() < kNearest) return sighting;
-  const Eigen::Matrix3d R = T_camera_origin.linear() * reference.T_camera_origin.linear().transpose();
-  const Eigen::Vector2d ray = now.head<2>() / now.z();
-  const double scale = then.z() / now.z();
-  const Eigen::Matrix2d warp = scale * (R.topLeftCorner<2, 2>() - ray * R.bottomLeftCorner<1, 2>());
-
-  const int side = features.patch_layout.side;
-  const Patch old_patch{reference.samples.data(), side, reference.spacing};
-  const Patch new_patch{features.patches.ptr(row), side, features.patch_layout.spacing(features.size[row])};
-  const auto found = alignPatch(options, old_patch, reference.centre, new_patch, warp.cast<float>());
+  const Point& seen = points_[point];
+  const auto found = seen.reference.findIn(options, features, row, T_camera_origin, seen.position);
   if (!found) return sighting;
-  sighting.measurement.head<2>() += found->shift.cast<double>();
+  sighting.measurement.head<2>() += found->shift;
   sighting.sigma = found->sigma;
   sighting.aligned = true;
-  sighting.scale = scale;
+  sighting.scale = found->scale;
   return sighting;
 }
 
@@ -125,7 +112,7 @@ void LocalMap::renewLooks(const StereoFeatures& features, const std::vector<Sigh
     takeDescriptor(point, features, last.row);
     const double change = std::max(sighting->scale, 1.0 / sighting->scale);
     if (sighting->aligned && change > options_.renewal_scale)
-      point.reference = takeReference(features, *sighting, newestPose());
+      point.reference = {features, last.row, sighting->measurement.head<2>(), newestPose()};
   }
 }
 
@@ -134,32 +121,19 @@ void LocalMap::takeDescriptor(Point& point, const StereoFeatures& features, int 
   point.descriptor.assign(bytes, bytes + features.descriptors.cols);
 }
 
-LocalMap::Reference LocalMap::takeReference(const StereoFeatures& features, const Sighting& sighting,
-                                            const Eigen::Isometry3d& T_camera_origin) {
-  if (!features.hasPatches()) return {};
-  const int row = sighting.row;
-  const std::uint8_t* samples = features.patches.ptr(row);
-  const float spacing = features.patch_layout.spacing(features.size[row]);
-  const Eigen::Vector2d shift = sighting.measurement.head<2>() - Eigen::Vector2d(features.u[row], features.v[row]);
-  return {{samples, samples + features.patches.cols}, spacing, shift.cast<float>() / spacing, T_camera_origin};
-}
-
 void LocalMap::startPoint(const StereoFeatures& features, int row, int id, const Eigen::Isometry3d& T_camera_origin,
                           const RigCalibration& calibration) {
   const StereoCamera& camera = features.camera;
   const double u = features.u[row], v = features.v[row];
-  const Sighting sighting{-1,
-                          row,
-                          {u, v, features.disparity[row]},
-                          features.hasPatches() ? options_.reference_sigma : options_.corner_sigma};
+  const double sigma = features.hasPatches() ? options_.reference_sigma : options_.corner_sigma;
   const double disparity =
       std::max(features.disparity[row] - calibration.disparityError(camera, u), kFarthestDisparity);
   Point point;
   point.position.T_origin_anchor = T_camera_origin.inverse();
   point.position.ray_and_inverse_depth = {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy,
                                           1.0 / camera.depth(disparity)};
-  point.reference = takeReference(features, sighting, T_camera_origin);
-  point.observations.push_back({id, row, sighting.measurement, sighting.sigma});
+  point.reference = {features, row, {u, v}, T_camera_origin};
+  point.observations.push_back({id, row, {u, v, features.disparity[row]}, sigma});
   takeDescriptor(point, features, row);
   points_.push_back(std::move(point));
 }
@@ -185,18 +159,79 @@ bool LocalMap::needsKeyframe() const {
 /// Key frames beyond the newest ones stay for what they see: the first that shares too few points with the newest pair
 /// goes, and of too many the one that adds the least to the one before it.
 void LocalMap::forgetKeyframe() {
-  const std::size_t lasting = frames_.size() - 1 - static_cast<std::size_t>(options_.keyframes);
+  const auto lasting = [&] { return frames_.size() - 1 - static_cast<std::size_t>(options_.keyframes); };
+  if (!frames_[lasting() - 1].is_recalled) memory_.remember(camera_, keyframe(lasting() - 1));
   const std::vector<int> shared = sharedPoints();
-  for (std::size_t f = 0; f < lasting; ++f)
-    if (shared[f] < options_.lasting_points) return removeFrame(f);
-  if (static_cast<int>(lasting) <= options_.lasting_keyframes) return;
-  std::size_t least = 0;
-  double least_parallax = std::numeric_limits<double>::max();
-  for (std::size_t f = 1; f < lasting; ++f) {
-    const double parallax = parallaxToPredecessor(f);
-    if (parallax < least_parallax) least = f, least_parallax = parallax;
+  const auto too_few = std::find_if(shared.begin(), shared.begin() + static_cast<std::ptrdiff_t>(lasting()),
+                                    [&](int points) { return points < options_.lasting_points; });
+  const std::size_t unshared = static_cast<std::size_t>(too_few - shared.begin());
+  if (unshared < lasting()) removeFrame(unshared);
+  while (static_cast<int>(lasting()) > options_.lasting_keyframes) {
+    std::size_t least = 0;
+    double least_parallax = std::numeric_limits<double>::max();
+    for (std::size_t f = 1; f < lasting(); ++f) {
+      const double parallax = parallaxToPredecessor(f);
+      if (parallax < least_parallax) least = f, least_parallax = parallax;
+    }
+    removeFrame(least);
   }
-  removeFrame(least);
+}
+
+/// With the points that another frame has seen as well.
+OldKeyframe LocalMap::keyframe(std::size_t frame) const {
+  OldKeyframe old{frames_[frame].id, frames_[frame].T_camera_origin, {}, {}};
+  old.rows.kind = kind_;
+  for (const Point& point : points_) {
+    if (point.observations.size() < 2) continue;
+    const auto here = std::find_if(point.observations.begin(), point.observations.end(),
+                                   [&](const Observation& observation) { return observation.frame_id == old.id; });
+    Eigen::Vector3d predicted;
+    if (here == point.observations.end() ||
+        !predictObservation(camera_, old.T_camera_origin, point.position, predicted, nullptr))
+      continue;
+    old.points.push_back({point.position, here->measurement, here->sigma, point.reference});
+    old.rows.positions.push_back(
+        camera_.backProject(predicted.x(), predicted.y(), std::max(predicted.z(), kFarthestDisparity)));
+    old.rows.descriptors.push_back(cv::Mat(1, kind_.bytes, CV_8U, const_cast<std::uint8_t*>(point.descriptor.data())));
+  }
+  return old;
+}
+
+const OldKeyframe* LocalMap::revisited() const {
+  const auto is_recalled = [](const Frame& frame) { return frame.is_recalled; };
+  if (std::any_of(frames_.begin(), frames_.end(), is_recalled)) return nullptr;
+  const OldKeyframe* best = memory_.best(camera_, newestPose(), options_.lasting_points);
+  const auto is_here = [&](const Frame& frame) { return frame.id == best->id; };
+  return best && std::none_of(frames_.begin(), frames_.end(), is_here) ? best : nullptr;
+}
+
+void LocalMap::recall(const OldKeyframe& old, const std::vector<Tie>& ties) {
+  const auto later =
+      std::find_if(frames_.begin(), frames_.end(), [&](const Frame& frame) { return frame.id > old.id; });
+  frames_.insert(later, {old.id, old.T_camera_origin, true, true});
+  std::unordered_map<int, Point*> of_row;
+  for (Point& point : points_)
+    if (point.observations.back().frame_id == newestId()) of_row[point.observations.back().row] = &point;
+  for (const Tie& tie : ties) {
+    auto& observations = of_row.at(tie.row)->observations;
+    const OldKeyframe::Point& point = old.points[static_cast<std::size_t>(tie.point)];
+    // The two reference patches may show points a little apart.
+    const Eigen::Vector2d apart = tie.position - observations.back().measurement.head<2>();
+    Eigen::Vector3d measurement = point.measurement;
+    measurement.head<2>() -= apart / tie.scale;
+    const auto place = std::find_if(observations.begin(), observations.end(),
+                                    [&](const Observation& observation) { return observation.frame_id > old.id; });
+    observations.insert(place, {old.id, -1, measurement, std::hypot(point.sigma, tie.sigma)});
+  }
+}
+
+void LocalMap::moveTo(const Eigen::Isometry3d& T_newest_origin) {
+  const Eigen::Isometry3d T_old_new = newestPose().inverse() * T_newest_origin;
+  for (Frame& frame : frames_) frame.T_camera_origin = frame.T_camera_origin * T_old_new;
+  for (Point& point : points_) {
+    point.position.T_origin_anchor = T_old_new.inverse() * point.position.T_origin_anchor;
+    point.reference.T_camera_origin = point.reference.T_camera_origin * T_old_new;
+  }
 }
 
 /// For each frame the points that it shares with the newest pair.
@@ -277,8 +312,8 @@ LocalMap::Adjustment LocalMap::adjust(const WindowOptimizerOptions& options, con
   const auto covariance = [&](int from, int to) -> Matrix6d {
     return motionCovariance(window, solution.pose_covariance, from, to);
   };
-  adjustment.covariances = {oldestId(), covariance(newest - 1, newest), covariance(0, newest), covariance(1, newest),
-                            covariance(0, newest - 1)};
+  adjustment.covariances = {frames_.front().id, covariance(newest - 1, newest), covariance(0, newest),
+                            covariance(1, newest), covariance(0, newest - 1)};
   calibration = window.calibration;
   for (std::size_t f = 0; f < frames_.size(); ++f)
     frames_[f].T_camera_origin = orthonormalised(window.T_camera_origin[f]);

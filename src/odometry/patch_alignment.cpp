@@ -1,71 +1,92 @@
 #include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
 
 #include <Eigen/LU>
-#include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
+
+#include "../common/patch_products.hpp"
+#include "patch_samples.hpp"
 
 namespace sdvo {
 namespace {
 
-constexpr int kLargestSide = 2 * PatchAlignmentOptions::kLargestRadius + 1;
-using Samples = Eigen::Array<float, Eigen::Dynamic, 1, 0, kLargestSide * kLargestSide, 1>;
-
-/// Samples a patch on the square of side 2 radius + 1 around `centre` whose grid is taken there by `grid` (all in
-/// samples of the patch, from its middle), bilinearly. False when a corner of that square lies outside.
-bool sampleSquare(const Patch& patch, const Eigen::Vector2f& centre, const Eigen::Matrix2f& grid, int radius,
-                  Samples& values) {
-  const float half = 0.5f * static_cast<float>(patch.side - 1), r = static_cast<float>(radius);
-  const Eigen::Vector2f reach = r * grid.cwiseAbs().rowwise().sum();
-  if (!((centre.cwiseAbs() + reach).maxCoeff() <= half)) return false;
-  const int last = patch.side - 2;
-  const float step_x = grid(0, 0), step_y = grid(1, 0);
-  values.resize((2 * radius + 1) * (2 * radius + 1));
-  float* value = values.data();
-  for (int j = -radius; j <= radius; ++j) {
-    float x = half + centre.x() + grid(0, 1) * static_cast<float>(j) - grid(0, 0) * r;
-    float y = half + centre.y() + grid(1, 1) * static_cast<float>(j) - grid(1, 0) * r;
-    for (int i = -radius; i <= radius; ++i, x += step_x, y += step_y) {
-      // Rounding may lead a hair outside of the square that was checked.
-      const int column = std::clamp(static_cast<int>(x), 0, last), row = std::clamp(static_cast<int>(y), 0, last);
-      const float a = x - static_cast<float>(column), b = y - static_cast<float>(row);
-      const std::uint8_t* sample = patch.samples + row * patch.side + column;
-      const float upper = sample[0] + a * static_cast<float>(sample[1] - sample[0]);
-      const float lower = sample[patch.side] + a * static_cast<float>(sample[patch.side + 1] - sample[patch.side]);
-      *value++ = upper + b * (lower - upper);
+/// Products of the current patch with the pattern and its two derivatives.
+struct Project {
+  static SDVO_IN_KERNEL void run(int count, const float* grey, const float* pattern, const float* by_x,
+                                 const float* by_y, float* product, float* by_shift) {
+    Lanes along_pattern{}, along_x{}, along_y{};
+    for (int k = 0; k < count; k += 8) {
+      Lanes g, p, x, y;
+      load(grey + k, g), load(pattern + k, p), load(by_x + k, x), load(by_y + k, y);
+      along_pattern += p * g, along_x += x * g, along_y += y * g;
     }
+    *product = sumOf(along_pattern), by_shift[0] = sumOf(along_x), by_shift[1] = sumOf(along_y);
   }
-  return true;
+};
+
+void removeMean(const SampleSquare& square, Samples& values) {
+  runKernel<RemoveMean>(square.count(), static_cast<float>(square.pixels()), square.mask(), values.data());
+}
+
+LaneProducts multiply(int count, const float* a, const float* b, const float* c) {
+  LaneProducts products;
+  runKernel<SumProducts>(count, a, b, c, &products);
+  return products;
+}
+
+/// Sum of (contrast * grey - pattern)^2.
+float sumOfSquaredDifferences(int count, float contrast, const float* grey, const float* pattern) {
+  float sum = 0.f;
+  for (int k = 0; k < count; ++k) {
+    const float difference = contrast * grey[k] - pattern[k];
+    sum += difference * difference;
+  }
+  return sum;
+}
+
+/// The square of this radius and the one that is a pixel larger on each side.
+const std::pair<SampleSquare, SampleSquare>& squaresOf(int radius) {
+  static const std::array<std::pair<SampleSquare, SampleSquare>, PatchAlignmentOptions::kLargestRadius + 1> squares =
+      [] {
+        std::array<std::pair<SampleSquare, SampleSquare>, PatchAlignmentOptions::kLargestRadius + 1> all;
+        for (int r = 0; r <= PatchAlignmentOptions::kLargestRadius; ++r)
+          all[static_cast<std::size_t>(r)] = {SampleSquare(r), SampleSquare(r + 1)};
+        return all;
+      }();
+  return squares[static_cast<std::size_t>(radius)];
 }
 
 /// The reference's pixels and their derivatives, without their means.
 struct Template {
-  Samples grey, by_x, by_y;
-  float square = 0.f;  ///< sum of the pixels' squares
+  Samples grey{}, by_x{}, by_y{};
+  float square = 0.f;        ///< sum of the pixels' squares
+  Eigen::Vector2f gradient;  ///< products of the derivatives with the pixels
   Eigen::Matrix2f hessian;
 };
 
-std::optional<Template> makeTemplate(const Patch& reference, const Eigen::Vector2f& centre, int radius) {
+bool makeTemplate(const Patch& reference, const Eigen::Vector2f& centre, const SampleSquare& square,
+                  const SampleSquare& larger, Template& result) {
   constexpr float kFlat = 1.f;        // grey level: less contrast than this is noise
   constexpr float kOneSided = 1e-3f;  // of the hessian's two directions: an edge holds no position along itself
-  Template result;
-  const Eigen::Matrix2f upright = Eigen::Matrix2f::Identity();
-  Samples right, left, below, above;
-  if (!sampleSquare(reference, centre, upright, radius, result.grey) ||
-      !sampleSquare(reference, centre + Eigen::Vector2f::UnitX(), upright, radius, right) ||
-      !sampleSquare(reference, centre - Eigen::Vector2f::UnitX(), upright, radius, left) ||
-      !sampleSquare(reference, centre + Eigen::Vector2f::UnitY(), upright, radius, below) ||
-      !sampleSquare(reference, centre - Eigen::Vector2f::UnitY(), upright, radius, above))
-    return std::nullopt;
-  result.by_x = 0.5f * (right - left);
-  result.by_y = 0.5f * (below - above);
-  for (Samples* values : {&result.grey, &result.by_x, &result.by_y}) *values -= values->mean();
-  result.square = result.grey.square().sum();
-  const float xx = result.by_x.square().sum(), xy = (result.by_x * result.by_y).sum(), yy = result.by_y.square().sum();
-  result.hessian << xx, xy, xy, yy;
-  if (!(result.square > kFlat * kFlat * static_cast<float>(result.grey.size())) ||
-      !(xx * yy - xy * xy > kOneSided * xx * yy))
-    return std::nullopt;
-  return result;
+  Samples around;
+  if (!larger.sample(reference, centre, Eigen::Matrix2f::Identity(), around)) return false;
+  const int side = square.side(), stride = larger.side();
+  for (int j = 0; j < side; ++j)
+    for (int i = 0; i < side; ++i) {
+      const float* here = around.data() + (j + 1) * stride + i + 1;
+      const std::size_t k = static_cast<std::size_t>(j * side + i);
+      result.grey[k] = here[0];
+      result.by_x[k] = 0.5f * (here[1] - here[-1]);
+      result.by_y[k] = 0.5f * (here[stride] - here[-stride]);
+    }
+  for (Samples* values : {&result.grey, &result.by_x, &result.by_y}) removeMean(square, *values);
+  const LaneProducts p = multiply(square.count(), result.by_x.data(), result.by_y.data(), result.grey.data());
+  result.hessian << p.aa, p.ab, p.ab, p.bb;
+  result.gradient = {p.ac, p.bc};
+  result.square = p.cc;
+  return result.square > kFlat * kFlat * static_cast<float>(square.pixels()) &&
+         p.aa * p.bb - p.ab * p.ab > kOneSided * p.aa * p.bb;
 }
 
 }  // namespace
@@ -74,35 +95,41 @@ std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const
                                      const Eigen::Vector2f& centre, const Patch& current, const Eigen::Matrix2f& warp) {
   constexpr int kIterations = 10;
   constexpr float kConverged = 0.02f;  // samples
-  const std::optional<Template> pattern = makeTemplate(reference, centre, options.radius);
-  if (!pattern) return std::nullopt;
-  const Eigen::Matrix2f inverse = pattern->hessian.inverse();
+  const auto& [square, larger] = squaresOf(options.radius);
+  Template pattern;
+  if (!makeTemplate(reference, centre, square, larger, pattern)) return std::nullopt;
+  const Eigen::Matrix2f inverse = pattern.hessian.inverse();
   const Eigen::Matrix2f grid = warp * (reference.spacing / current.spacing);
   const float largest = static_cast<float>(options.max_shift) / current.spacing;
 
   Eigen::Vector2f position = Eigen::Vector2f::Zero();
-  Samples grey;
-  float square = 0.f, product = 0.f;
+  Samples grey{};
+  float contrast = 1.f;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    if (!sampleSquare(current, position, grid, options.radius, grey)) return std::nullopt;
-    grey -= grey.mean();
-    square = grey.square().sum();
-    product = (pattern->grey * grey).sum();
+    if (!square.sample(current, position, grid, grey)) return std::nullopt;
+    // The pattern and its derivatives have no mean, so that of the current patch drops out.
+    float product;
+    Eigen::Vector2f products;
+    runKernel<Project>(square.count(), grey.data(), pattern.grey.data(), pattern.by_x.data(), pattern.by_y.data(),
+                       &product, products.data());
     if (!(product > 0.f)) return std::nullopt;
-    grey = (pattern->square / product) * grey - pattern->grey;
-    const Eigen::Vector2f gradient((pattern->by_x * grey).sum(), (pattern->by_y * grey).sum());
+    contrast = pattern.square / product;
+    const Eigen::Vector2f gradient = contrast * products - pattern.gradient;
     const Eigen::Vector2f step = inverse * gradient;
     position -= grid * step;
     if (!(position.cwiseAbs().maxCoeff() <= largest)) return std::nullopt;
     if (step.cwiseAbs().maxCoeff() < kConverged) break;
   }
 
+  removeMean(square, grey);
+  const LaneProducts p = multiply(square.count(), grey.data(), pattern.grey.data(), pattern.grey.data());
   PatchShift found;
   found.shift = current.spacing * position;
-  found.correlation = product / std::sqrt(pattern->square * square);
+  found.correlation = p.ab / std::sqrt(pattern.square * p.aa);
   if (!(found.correlation >= static_cast<float>(options.min_correlation))) return std::nullopt;
   // What is left of the difference is noise of the images, four parameters fitted, and so tells the position's.
-  const float noise = grey.square().sum() / static_cast<float>(grey.size() - 4);
+  const float left = sumOfSquaredDifferences(square.count(), contrast, grey.data(), pattern.grey.data());
+  const float noise = left / static_cast<float>(square.pixels() - 4);
   const float scale = reference.spacing * reference.spacing;
   const float floor = static_cast<float>(options.min_sigma);
   found.sigma = std::sqrt(0.5f * noise * inverse.trace() * scale + floor * floor);

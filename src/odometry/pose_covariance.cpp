@@ -67,6 +67,8 @@ Matrix6d PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, co
 /// What the last pose lacked when it was reported, seen from the key frame that the new pair is measured from.
 Matrix6d PoseCovariance::outdated(const WindowCovariances& window) const {
   if (!last_is_keyframe_ || !last_window_) return since_keyframe_;
+  if (window.first_id < last_window_->first_id)
+    return since_keyframe_;  // an older frame was recalled: nothing in common
   // It is that key frame itself: this window knows it better than its own did.
   const Matrix6d& then =
       window.first_id == last_window_->first_id ? last_window_->since_first : last_window_->since_second;

@@ -1,5 +1,6 @@
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <bitset>
 #include <numeric>
@@ -122,19 +123,10 @@ VisualOdometry::Localisation VisualOdometry::search(const StereoFeatures& featur
                                                     double dt) const {
   Localisation found;
   found.view = state_.map->view();
-  const DescribedPoints& reference = found.view.rows;
   Stopwatch stopwatch;
-  found.matches = matcher_.match(reference, features, T_current_reference);
+  found.matches = matcher_.match(found.view.rows, features, T_current_reference);
   found.match_time = stopwatch.lap();
-
-  std::vector<Correspondence> correspondences;
-  correspondences.reserve(found.matches.size());
-  for (const FeatureMatch& match : found.matches) {
-    Eigen::Vector3d measurement = features.measurement(match.current);
-    measurement.z() += state_.calibration.calibration().disparityError(features.camera, measurement.x());
-    correspondences.push_back({reference.positions[match.reference], measurement});
-  }
-  found.motion = estimator_.estimate(features.camera, correspondences);
+  found.motion = estimate(found.view.rows, features, found.matches);
   const Eigen::Isometry3d T_camera_origin = found.motion.T_current_reference * state_.map->newestPose();
   found.failure = found.motion.success ? implausible((T_camera_origin * state_.T_origin_camera).inverse(), dt)
                                        : found.motion.reason;
@@ -142,12 +134,35 @@ VisualOdometry::Localisation VisualOdometry::search(const StereoFeatures& featur
   return found;
 }
 
+/// (u_left, v_left, u_right) of a feature whose position is known better by `shift`, px, without the rig's error.
+Eigen::Vector3d VisualOdometry::measure(const StereoFeatures& features, int row, const Eigen::Vector2d& shift) const {
+  const double u = features.u[row] + shift.x(), v = features.v[row] + shift.y();
+  const double error = state_.calibration.calibration().disparityError(features.camera, u);
+  return {u, v, u - (features.disparity[row] - error)};
+}
+
+MotionEstimate VisualOdometry::estimate(const DescribedPoints& reference, const StereoFeatures& features,
+                                        const std::vector<FeatureMatch>& matches) const {
+  std::vector<Correspondence> correspondences;
+  correspondences.reserve(matches.size());
+  for (const FeatureMatch& match : matches)
+    correspondences.push_back(
+        {reference.positions[match.reference], measure(features, match.current, Eigen::Vector2d::Zero())});
+  return estimator_.estimate(features.camera, correspondences);
+}
+
+/// Refines the motion on correspondences that have no outliers among them.
+void VisualOdometry::refine(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
+                            Eigen::Isometry3d& T_current_reference) const {
+  std::vector<int> all(correspondences.size());
+  std::iota(all.begin(), all.end(), 0);
+  refineMotion(camera, options_.motion, correspondences, all, T_current_reference);
+}
+
 void VisualOdometry::align(const StereoFeatures& features, Localisation& found) const {
   constexpr std::size_t kEnough = 30;  // fewer are no better than all corners together
   Stopwatch stopwatch;
-  const RigCalibration& calibration = state_.calibration.calibration();
-  Eigen::Isometry3d& T_current_reference = found.motion.T_current_reference;
-  const Eigen::Isometry3d T_camera_origin = T_current_reference * state_.map->newestPose();
+  const Eigen::Isometry3d T_camera_origin = found.motion.T_current_reference * state_.map->newestPose();
   std::vector<Correspondence> aligned;
   for (const int i : found.motion.inliers) {
     const FeatureMatch& match = found.matches[i];
@@ -155,15 +170,11 @@ void VisualOdometry::align(const StereoFeatures& features, Localisation& found) 
                                                           found.view.point[match.reference], match.current);
     found.sightings.push_back(sighting);
     if (!sighting.aligned) continue;
-    const double u = sighting.measurement.x();
-    const double disparity = sighting.measurement.z() - calibration.disparityError(features.camera, u);
-    aligned.push_back({found.view.rows.positions[match.reference], {u, sighting.measurement.y(), u - disparity}});
+    const Eigen::Vector2d corner(features.u[match.current], features.v[match.current]);
+    aligned.push_back({found.view.rows.positions[match.reference],
+                       measure(features, match.current, sighting.measurement.head<2>() - corner)});
   }
-  if (aligned.size() >= kEnough) {
-    std::vector<int> all(aligned.size());
-    std::iota(all.begin(), all.end(), 0);
-    refineMotion(features.camera, options_.motion, aligned, all, T_current_reference);
-  }
+  if (aligned.size() >= kEnough) refine(features.camera, aligned, found.motion.T_current_reference);
   found.motion_time += stopwatch.lap();
 }
 
@@ -200,6 +211,8 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
 
   RigCalibration calibration = state_.calibration.calibration();
   map.insert(features, state_.pairs, found.motion.T_current_reference * map.newestPose(), found.sightings, calibration);
+  const Eigen::Isometry3d T_before_origin = map.poseBeforeNewest();
+  if (map.newestIsKeyframe()) recall(features);
   const CalibrationBelief prior = state_.calibration.prior(map.oldestId());
   const LocalMap::Adjustment adjustment = map.adjust(options_.window, prior, calibration);
   map.renewLooks(features, found.sightings);
@@ -211,12 +224,62 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
     state_.calibration.note(map.newestId(), calibration, adjustment.calibration_information);
     step.covariance = state_.covariance.advance(*step.T_previous_current, adjustment.covariances);
     step.rejected_rows = adjustment.rejected_rows;
+    // As a perturbation of the frame before, then of the newest one.
+    step.correction = adjoint(map.newestPose() * map.poseBeforeNewest().inverse()) *
+                      logSE3(T_before_origin * map.poseBeforeNewest().inverse());
+    cover(step);
   } else {
     step.covariance = found.motion.covariance;
     state_.covariance.advance(*step.T_previous_current, step.covariance);
   }
   if (map.newestIsKeyframe()) state_.covariance.markKeyframe();
   return step;
+}
+
+/// A camera that comes back to where it was before is tied to the key frame that it left there.
+void VisualOdometry::recall(const StereoFeatures& features) {
+  LocalMap& map = *state_.map;
+  const OldKeyframe* old = map.revisited();
+  if (!old) return;
+  const auto matches = matcher_.match(old->rows, features, map.newestPose() * old->T_camera_origin.inverse());
+  MotionEstimate motion = estimate(old->rows, features, matches);
+  if (!motion.success) return;
+
+  std::vector<LocalMap::Tie> ties;
+  std::vector<Correspondence> aligned;
+  for (const int i : motion.inliers) {
+    const FeatureMatch& match = matches[i];
+    const OldKeyframe::Point& point = old->points[match.reference];
+    const auto found = point.reference.findIn(options_.alignment, features, match.current,
+                                              motion.T_current_reference * old->T_camera_origin, point.position);
+    if (!found) continue;
+    const Eigen::Vector3d& then = old->rows.positions[match.reference];
+    const Eigen::Vector3d measurement = measure(features, match.current, found->shift);
+    const double scale = then.z() / (motion.T_current_reference * then).z();
+    ties.push_back({match.reference, match.current, measurement.head<2>(), found->sigma, scale});
+    aligned.push_back({then, measurement});
+  }
+  if (static_cast<int>(ties.size()) < options_.map.lasting_points) return;
+  refine(features.camera, aligned, motion.T_current_reference);
+
+  // What the map lost since then, it lost as a whole: the adjustment would take so large an offset for outliers.
+  constexpr double kSignificant = 16.8;  // chi-square of six, 99 %
+  const Eigen::Isometry3d T_camera_origin = motion.T_current_reference * old->T_camera_origin;
+  const Vector6d offset = logSE3(T_camera_origin * map.newestPose().inverse());
+  if (offset.dot(motion.covariance.ldlt().solve(offset)) > kSignificant) map.moveTo(T_camera_origin);
+  map.recall(*old, ties);
+}
+
+/// A motion between two reported poses contains what the map has learnt of the first one meanwhile. Where that is more
+/// than its covariance says, the covariance says so and the reason, too.
+void VisualOdometry::cover(Step& step) {
+  constexpr double kExpected = 12.6;  // chi-square of six, 95 %
+  if (step.correction.dot(step.covariance.ldlt().solve(step.correction)) <= kExpected) return;
+  step.covariance += step.correction * step.correction.transpose();
+  std::ostringstream reason;
+  reason << "the map corrected the pose by " << step.correction.head<3>().norm() << " m and "
+         << step.correction.tail<3>().norm() << " rad";
+  step.reason = reason.str();
 }
 
 VisualOdometry::Step VisualOdometry::predict(const StereoFeatures& features, double dt, const std::string& failure) {
@@ -262,6 +325,7 @@ OdometryResult VisualOdometry::report(const StereoFeatures& features, double dt,
     result.has_motion = true;
     result.T_previous_current = *step.T_previous_current;
     result.motion_covariance = step.covariance;
+    result.correction = step.correction;
   }
 
   for (const FeatureMatch& match : found.matches) {

@@ -40,6 +40,8 @@ class Solver {
     first_of_point_.push_back(static_cast<int>(observations.size()));
     sightings_.resize(window.points.size());
     for (const WindowObservation& observation : observations) ++sightings_[static_cast<std::size_t>(observation.point)];
+    inverse_noise_.reserve(observations.size());
+    for (const WindowObservation& observation : observations) inverse_noise_.push_back(inverseNoise(observation));
     poses_ = static_cast<int>(window.T_camera_origin.size()) - 1;
     size_ = 6 * poses_ + kCalibration;
   }
@@ -55,32 +57,27 @@ class Solver {
     return error.dot(window.calibration_prior.information * error);
   }
 
-  /// Normalised residual of an observation; the kernel is not applied.
-  bool residual(const Window& window, const WindowObservation& observation, Eigen::Vector3d& residual,
-                ObservationJacobians* jacobians) const {
+  /// Normalised residual of observation i; the kernel is not applied.
+  bool residual(const Window& window, std::size_t i, Eigen::Vector3d& residual, ObservationJacobians* jacobians) const {
+    const WindowObservation& observation = window.observations[i];
     Eigen::Vector3d prediction;
     if (!predictObservation(window.camera, window.T_camera_origin[observation.frame], window.points[observation.point],
                             prediction, jacobians))
       return false;
     prediction.z() += window.calibration.disparityError(window.camera, observation.measurement.x());
-    residual = inverseNoise(observation).cwiseProduct(observation.measurement - prediction);
+    residual = inverse_noise_[i].cwiseProduct(observation.measurement - prediction);
     return true;
   }
 
-  /// Of n disparities of one point the mean has the variance sigma^2 / n + common^2, as if each by itself had n times
-  /// that: more sightings do not average away what they share.
-  Eigen::Vector3d inverseNoise(const WindowObservation& observation) const {
-    const double common = options_.common_disparity_sigma;
-    const double variance = options_.disparity_sigma * options_.disparity_sigma +
-                            sightings_[static_cast<std::size_t>(observation.point)] * common * common;
-    return {1.0 / observation.sigma, 1.0 / observation.sigma, 1.0 / std::sqrt(variance)};
-  }
-
-  double cost(const Window& window) const {
+  /// Also gives the square of each observation's residual.
+  double cost(const Window& window, std::vector<double>& squares) const {
     LogSum costs;
     Eigen::Vector3d r;
-    for (const WindowObservation& observation : window.observations)
-      costs.add((residual(window, observation, r, nullptr) ? r.squaredNorm() : kBehindSquare) / bend());
+    squares.resize(window.observations.size());
+    for (std::size_t i = 0; i < squares.size(); ++i) {
+      squares[i] = residual(window, i, r, nullptr) ? r.squaredNorm() : kBehindSquare;
+      costs.add(squares[i] / bend());
+    }
     return priorCost(window) + bend() * costs.value();
   }
 
@@ -112,7 +109,7 @@ class Solver {
         system.pose_point[i].setZero();
         Eigen::Vector3d r;
         ObservationJacobians jacobians;
-        if (!residual(window, observation, r, &jacobians)) {
+        if (!residual(window, static_cast<std::size_t>(i), r, &jacobians)) {
           costs.add(kBehindSquare / bend());
           continue;
         }
@@ -122,7 +119,7 @@ class Solver {
         system.weighted_square += weight * square;
         const double root = std::sqrt(weight);
         r *= root;
-        const Eigen::Vector3d scale = root * inverseNoise(observation);
+        const Eigen::Vector3d scale = root * inverse_noise_[static_cast<std::size_t>(i)];
         const Eigen::Matrix3d by_point = scale.asDiagonal() * jacobians.point;
         const RigCalibration::RowVector by_calibration =
             scale.z() * RigCalibration::shape(window.camera, observation.measurement.x());
@@ -182,10 +179,20 @@ class Solver {
   }
 
  private:
+  /// Of n disparities of one point the mean has the variance sigma^2 / n + common^2, as if each by itself had n times
+  /// that: more sightings do not average away what they share.
+  Eigen::Vector3d inverseNoise(const WindowObservation& observation) const {
+    const double common = options_.common_disparity_sigma;
+    const double variance = options_.disparity_sigma * options_.disparity_sigma +
+                            sightings_[static_cast<std::size_t>(observation.point)] * common * common;
+    return {1.0 / observation.sigma, 1.0 / observation.sigma, 1.0 / std::sqrt(variance)};
+  }
+
   const WindowOptimizerOptions& options_;
   const Window& window_;
   std::vector<int> first_of_point_;
-  std::vector<int> sightings_;  ///< of each point
+  std::vector<int> sightings_;                  ///< of each point
+  std::vector<Eigen::Vector3d> inverse_noise_;  ///< of each observation
   int poses_ = 0, size_ = 0;
 };
 
@@ -222,6 +229,8 @@ WindowSolution optimizeWindow(const WindowOptimizerOptions& options, Window& win
   const Solver solver(options, window);  // refers to the window: every accepted step is linearised anew
   double damping = 1e-5;
   ReducedSystem system;
+  std::vector<double> squares;
+  bool accepted = false;
   const int c = 6 * solver.poses();
   while (solution.iterations < options.iterations && damping < kLargestDamping) {
     ++solution.iterations;
@@ -231,8 +240,9 @@ WindowSolution optimizeWindow(const WindowOptimizerOptions& options, Window& win
     const Eigen::VectorXd step = damped.selfadjointView<Eigen::Lower>().ldlt().solve(system.gradient);
     if (!step.allFinite()) return solution;
     Window next = solver.stepped(system, step);
-    const double next_cost = solver.cost(next);
-    if (next_cost <= system.cost) {
+    const double next_cost = solver.cost(next, squares);
+    accepted = next_cost <= system.cost;
+    if (accepted) {
       const bool converged = system.cost - next_cost < 1e-4 * (system.cost + 1.0);
       std::swap(window.T_camera_origin, next.T_camera_origin);
       std::swap(window.points, next.points);
@@ -256,12 +266,9 @@ WindowSolution optimizeWindow(const WindowOptimizerOptions& options, Window& win
   solution.calibration_information =
       covariance.bottomRightCorner<kCalibration, kCalibration>().inverse() - window.calibration_prior.information;
 
-  solution.residuals.reserve(window.observations.size());
-  for (const WindowObservation& observation : window.observations) {
-    Eigen::Vector3d r;
-    solution.residuals.push_back(solver.residual(window, observation, r, nullptr) ? r.norm()
-                                                                                  : std::sqrt(kBehindSquare));
-  }
+  if (!accepted) solver.cost(window, squares);  // those at hand belong to a refused step
+  solution.residuals.reserve(squares.size());
+  for (const double square : squares) solution.residuals.push_back(std::sqrt(square));
   solution.success = solution.pose_covariance.allFinite();
   return solution;
 }

@@ -304,6 +304,8 @@ stereo_descriptor_vo::VoInfo toInfo(const OdometryResult& result,
   info.match_time = static_cast<float>(result.match_time);
   info.motion_time = static_cast<float>(result.motion_time);
   info.dropped_pairs = features.dropped_pairs;
+  info.correction_translation = static_cast<float>(result.correction.head<3>().norm());
+  info.correction_rotation = static_cast<float>(result.correction.tail<3>().norm());
   info.distance = result.distance;
   info.keyframe_id = static_cast<std::uint32_t>(result.keyframe_id);
   info.disparity_offset = static_cast<float>(result.disparity_offset);

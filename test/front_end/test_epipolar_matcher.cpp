@@ -4,6 +4,7 @@
 #include <random>
 
 #include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/front_end/epipolar_matcher.hpp"
 
 namespace sdvo {
@@ -262,6 +263,24 @@ TEST(EpipolarMatcher, ScratchMayServeOneMatcherAfterAnother) {
   const EpipolarMatcherOptions options;
   EXPECT_NEAR(EpipolarMatcher(options, kMaxDv, first.left, first.right, scratch).find({150.f, 80.f})->x, 10.0, 0.06);
   EXPECT_NEAR(EpipolarMatcher(options, kMaxDv, second.left, second.right, scratch).find({150.f, 80.f})->x, 20.5, 0.06);
+}
+
+TEST(EpipolarMatcher, FindsTheSameToTheBitWithAndWithoutAvx2) {
+  if (!usesAvx2()) GTEST_SKIP() << "this processor has no AVX2";
+  const Pair pair = smoothPair(17.3, 0.6);
+  int compared = 0;
+  for (float v = 0.f; v < 160.f; v += 7.3f)
+    for (float u = 0.f; u < 320.f; u += 5.7f) {
+      const auto fast = find(pair, {u, v});
+      allowAvx2(false);
+      const auto plain = find(pair, {u, v});
+      allowAvx2(true);
+      ASSERT_EQ(fast.has_value(), plain.has_value()) << u << ", " << v;
+      if (!fast) continue;
+      ++compared;
+      ASSERT_EQ(*fast, *plain) << u << ", " << v;
+    }
+  EXPECT_GT(compared, 500);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <set>
 
 #include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/front_end/freak.hpp"
 
 namespace sdvo {
@@ -303,6 +304,39 @@ TEST(Freak, FieldsOfAFittingKeypointStayInsideAtAnyAngle) {
     for (const FreakKeypoint& keypoint :
          {FreakKeypoint{21.5f, 21.5f, 7.f, angle}, FreakKeypoint{77.5f, 57.5f, 7.f, angle}})
       for (const float mean : freak.intensities(keypoint)) EXPECT_NEAR(mean, 200.f, 1e-3f) << "angle " << angle;
+}
+
+TEST(Freak, RowsOfManyKeypointsAreThoseOfEach) {
+  const cv::Mat image = randomImage({231, 177});
+  const Freak freak(image);
+  cv::RNG random(5);
+  std::vector<FreakKeypoint> keypoints;
+  while (keypoints.size() < 203) {  // no whole number of registers
+    const float size = random.uniform(0.3f, 20.f), angle = random.uniform(-3.f, 6.28f);
+    const FreakKeypoint keypoint{random.uniform(0.f, 231.f), random.uniform(0.f, 177.f), size, angle};
+    if (Freak::fits(keypoint, image.size())) keypoints.push_back(keypoint);
+  }
+  // As near to the image's corners as they fit.
+  const float reach = static_cast<float>(Freak::reach(7.f));
+  for (const float u : {reach - 0.5f, 230.5f - reach})
+    for (const float v : {reach - 0.5f, 176.5f - reach}) {
+      const FreakKeypoint keypoint{u, v, 6.999f, -1.f};
+      ASSERT_TRUE(Freak::fits(keypoint, image.size()));
+      keypoints.push_back(keypoint);
+    }
+  std::vector<cv::Mat> described;
+  std::vector<std::uint8_t*> rows;
+  for (std::size_t i = 0; i < keypoints.size(); ++i) {
+    described.emplace_back(1, Freak::kBytes, CV_8U);
+    rows.push_back(described.back().ptr());
+  }
+  for (const bool with_avx2 : {true, false}) {
+    allowAvx2(with_avx2);
+    freak.describe(keypoints, rows);
+    for (std::size_t i = 0; i < keypoints.size(); ++i)
+      ASSERT_EQ(cv::norm(described[i], row(freak, keypoints[i]), cv::NORM_HAMMING), 0.0) << i << ", " << with_avx2;
+  }
+  allowAvx2(true);
 }
 
 }  // namespace

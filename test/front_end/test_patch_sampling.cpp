@@ -3,6 +3,7 @@
 #include <cmath>
 #include <vector>
 
+#include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/front_end/patch_sampling.hpp"
 
 namespace sdvo {
@@ -12,7 +13,7 @@ constexpr int kMargin = 5, kWidth = 30, kHeight = 20;
 
 /// Grey levels without any order, over a picture of kWidth x kHeight and its margin.
 cv::Mat noise() {
-  cv::Mat image(kHeight + 2 * kMargin, kWidth + 2 * kMargin, CV_32F);
+  cv::Mat image(kHeight + 2 * kMargin, kWidth + 2 * kMargin, CV_8U);
   cv::RNG(3).fill(image, cv::RNG::UNIFORM, 0.0, 256.0);
   return image;
 }
@@ -22,7 +23,7 @@ double interpolated(const cv::Mat& image, double x, double y) {
   const double column = std::floor(x), row = std::floor(y), a = x - column, b = y - row;
   const auto pixel = [&](int dx, int dy) {
     return static_cast<double>(
-        image.at<float>(static_cast<int>(row) + dy + kMargin, static_cast<int>(column) + dx + kMargin));
+        image.at<std::uint8_t>(static_cast<int>(row) + dy + kMargin, static_cast<int>(column) + dx + kMargin));
   };
   return (1.0 - a) * (1.0 - b) * pixel(0, 0) + a * (1.0 - b) * pixel(1, 0) + (1.0 - a) * b * pixel(0, 1) +
          a * b * pixel(1, 1);
@@ -62,6 +63,24 @@ TEST(SamplePatch, SlantShiftsRowsFromTheCentre) {
   expectSampled(12.f, 9.f, 1.f, 2, 5);  // by whole pixels
   expectSampled(12.3f, 9.6f, 0.3f, 3, 8);
   expectSampled(12.3f, 9.6f, -0.7f, 3, 8);
+}
+
+TEST(SamplePatch, IsTheSameToTheBitWithAndWithoutAvx2) {
+  if (!usesAvx2()) GTEST_SKIP() << "this processor has no AVX2";
+  cv::Mat image(120, 150, CV_8U);
+  cv::RNG(5).fill(image, cv::RNG::UNIFORM, 0, 256);
+  cv::RNG random(7);
+  constexpr int kBorder = 50;
+  for (int trial = 0; trial < 500; ++trial) {
+    const float x = random.uniform(0.f, 49.f), y = random.uniform(0.f, 19.f), slant = random.uniform(-0.8f, 0.8f);
+    const int radius = 1 + trial % 20, columns = 2 * radius + 1 + trial % 7;
+    std::vector<float> fast(static_cast<std::size_t>((2 * radius + 1) * columns)), plain = fast;
+    samplePatch(image, kBorder, x, y, slant, radius, columns, fast.data());
+    allowAvx2(false);
+    samplePatch(image, kBorder, x, y, slant, radius, columns, plain.data());
+    allowAvx2(true);
+    ASSERT_EQ(fast, plain) << "radius " << radius << ", " << columns << " columns";
+  }
 }
 
 TEST(PatchStride, IsTheSideRoundedUpToWholeRegisters) {

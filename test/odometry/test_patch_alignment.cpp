@@ -8,6 +8,7 @@
 #include <random>
 #include <vector>
 
+#include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
 
 namespace sdvo {
@@ -286,6 +287,37 @@ TEST(PatchAlignment, RefusesWhatLiesOutside) {
   EXPECT_FALSE(align(beside, {1.5f, 0.f}, 1.f)) << "the reference's square and its neighbours leave its patch";
   EXPECT_FALSE(align(reference, Eigen::Vector2f::Zero(), 1.6f)) << "the warped square leaves the current patch";
   EXPECT_FALSE(align(reference, Eigen::Vector2f::Zero(), std::numeric_limits<float>::quiet_NaN()));
+}
+
+TEST(PatchAlignment, IsTheSameToTheBitWithAndWithoutAvx2) {
+  if (!usesAvx2()) GTEST_SKIP() << "this processor has no AVX2";
+  std::mt19937 random(23);
+  std::uniform_real_distribution<double> part(-1.0, 1.0);
+  int compared = 0;
+  for (unsigned trial = 0; trial < 200; ++trial) {
+    const Scene scene = texture(trial);
+    const Eigen::Vector2d shift(part(random), part(random));
+    const Eigen::Matrix2d warp = scaled(1.0 + 0.2 * part(random));
+    const auto reference = cut(scene, {0.0, 0.0}, 1.0, random);
+    const auto current = cut(moved(scene, warp, shift), {0.0, 0.0}, 1.0, random);
+    PatchAlignmentOptions options;
+    options.radius = 2 + static_cast<int>(trial % 4);
+    const Eigen::Vector2f centre(0.4f * static_cast<float>(part(random)), 0.4f * static_cast<float>(part(random)));
+    const auto align = [&] {
+      return alignPatch(options, patchOf(reference), centre, patchOf(current), warp.cast<float>());
+    };
+    const auto fast = align();
+    allowAvx2(false);
+    const auto plain = align();
+    allowAvx2(true);
+    ASSERT_EQ(fast.has_value(), plain.has_value()) << trial;
+    if (!fast) continue;
+    ++compared;
+    ASSERT_EQ(fast->shift, plain->shift) << trial;
+    ASSERT_EQ(fast->sigma, plain->sigma) << trial;
+    ASSERT_EQ(fast->correlation, plain->correlation) << trial;
+  }
+  EXPECT_GT(compared, 100);
 }
 
 }  // namespace

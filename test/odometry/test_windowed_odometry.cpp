@@ -144,5 +144,52 @@ TEST(PoseCovariance, GrowsWithTheDistance) {
   }
 }
 
+/// Three times 32 m ahead and back again, with disparities so noisy that the odometry drifts.
+struct ThereAndBack {
+  double error = 0.0;               ///< of the last position, m
+  double largest_correction = 0.0;  ///< m
+  int corrections = 0;              ///< that the odometry gave as a reason
+  double normalised_square = 0.0;   ///< mean over the motions
+};
+
+ThereAndBack driveThereAndBack(int remembered_keyframes) {
+  SyntheticScene scene(7, 2500, 120.0);
+  scene.patches = true;
+  scene.position_noise = 0.8;
+  scene.disparity_noise = 1.5;
+  VisualOdometryOptions options;
+  options.map.remembered_keyframes = remembered_keyframes;
+  options.map.lasting_points = 50;
+  VisualOdometry odometry(options);
+  ThereAndBack drive;
+  Eigen::Isometry3d last = Eigen::Isometry3d::Identity();
+  constexpr int kPairs = 180;
+  for (int i = 0; i <= kPairs; ++i) {
+    Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
+    T_origin_camera.translation().z() = 16.0 * (1.0 - std::cos(2.0 * M_PI * i / 60.0));
+    const OdometryResult result = odometry.update(scene.view(T_origin_camera, 1 + 100000000LL * i));
+    EXPECT_EQ(result.state, TrackingState::kTracking) << i;
+    drive.error = (result.T_origin_camera.translation() - T_origin_camera.translation()).norm();
+    drive.largest_correction = std::max(drive.largest_correction, result.correction.head<3>().norm());
+    drive.corrections += result.reason.rfind("the map corrected", 0) == 0;
+    if (i > 0) {
+      const Vector6d error = logSE3((last.inverse() * T_origin_camera).inverse() * result.T_previous_current);
+      drive.normalised_square += error.dot(result.motion_covariance.llt().solve(error)) / kPairs;
+    }
+    last = T_origin_camera;
+  }
+  return drive;
+}
+
+TEST(WindowedOdometry, EndsWhereItBeganAfterDrivingBackAndForth) {
+  const ThereAndBack forgetful = driveThereAndBack(0), remembering = driveThereAndBack(40);
+  EXPECT_GT(forgetful.error, 0.05) << "the drive has to be one that drifts";
+  EXPECT_LT(remembering.error, 0.01);
+  // What it takes back at once, it says, and its covariances contain it.
+  EXPECT_GT(remembering.largest_correction, 0.05);
+  EXPECT_GT(remembering.corrections, 0);
+  EXPECT_LT(remembering.normalised_square, 12.0) << "six numbers";
+}
+
 }  // namespace
 }  // namespace sdvo

@@ -21,6 +21,7 @@ TEST(ToInfo, TellsResultAndImageSide) {
   result.rms = 0.5;
   result.match_time = 0.25;
   result.motion_time = 0.125;
+  result.correction << 0.03, 0.0, -0.04, 0.0, 0.002, 0.0;
   result.distance = 42.5;
   result.keyframe_id = 17;
   result.disparity_offset = -0.25;
@@ -46,6 +47,8 @@ TEST(ToInfo, TellsResultAndImageSide) {
   EXPECT_EQ(info.match_time, 0.25f);
   EXPECT_EQ(info.motion_time, 0.125f);
   EXPECT_EQ(info.dropped_pairs, 6u);
+  EXPECT_FLOAT_EQ(info.correction_translation, 0.05f);
+  EXPECT_FLOAT_EQ(info.correction_rotation, 0.002f);
   EXPECT_EQ(info.distance, 42.5);
   EXPECT_EQ(info.keyframe_id, 17u);
   EXPECT_FLOAT_EQ(info.disparity_offset, -0.25f);

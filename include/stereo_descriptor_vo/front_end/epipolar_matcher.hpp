@@ -30,10 +30,9 @@ class EpipolarMatcher {
   /// What the matcher works on. Memory of this size is slow to get from the system for every pair; kept by the caller,
   /// it is there already.
   struct Images {
-    cv::Mat left, right;              ///< full resolution, with a margin
-    cv::Mat left_float, right_float;  ///< the same as CV_32F
-    cv::Mat left_half, right_half;    ///< half resolution, with a margin
-    cv::Mat half;                     ///< one of them before it gets the margin
+    cv::Mat left, right;            ///< full resolution, with a margin
+    cv::Mat left_half, right_half;  ///< half resolution, with a margin
+    cv::Mat half;                   ///< one of them before it gets the margin
   };
 
   /// Images are CV_8U of one size. `max_dv` in px bounds |v_right - v_left|. The matcher fills and reads `scratch`,

@@ -60,6 +60,7 @@ class FeatureDetector {
 
 /// Keeps `max_count` corners such that buckets of a `bucket_size` px grid hold as equal numbers as they can, the
 /// strongest of each first. Ties are broken by position, so the result does not depend on the order of the input.
-std::vector<Corner> spreadOverBuckets(std::vector<Corner> corners, cv::Size image_size, int bucket_size, int max_count);
+std::vector<Corner> spreadOverBuckets(const std::vector<Corner>& corners, cv::Size image_size, int bucket_size,
+                                      int max_count);
 
 }  // namespace sdvo

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <opencv2/core.hpp>
 #include <utility>
 #include <vector>
@@ -54,13 +55,31 @@ class Freak {
   std::array<float, kFields> intensities(const FreakKeypoint& keypoint) const;
   /// Writes the kBytes of one row; the key point must fit.
   void describe(const FreakKeypoint& keypoint, std::uint8_t* row) const;
+  /// The same rows for many key points, several at once.
+  void describe(const std::vector<FreakKeypoint>& keypoints, const std::vector<std::uint8_t*>& rows) const;
   /// Orientation in [0, 2 pi) from the intensity gradient over symmetric field pairs (section 4.4 there).
   float orientation(FreakKeypoint keypoint) const;
+
+  /// The image's sums.
+  const cv::Mat& integral() const { return image_.sums(); }
 
  private:
   static constexpr double kReachPerSize = 22.0 / 7.0;
 
   IntegralImage image_;
+};
+
+/// What a key point makes of the pattern: how much larger it is and how it is turned.
+struct FreakPose {
+  static constexpr double kSmallestHalfSide = 0.5;  ///< of a field's box: one pixel
+
+  explicit FreakPose(const FreakKeypoint& keypoint)
+      : scale(Freak::reach(keypoint.size)),
+        cosine(keypoint.angle < 0.f ? scale : std::cos(static_cast<double>(keypoint.angle)) * scale),
+        sine(keypoint.angle < 0.f ? 0.0 : std::sin(static_cast<double>(keypoint.angle)) * scale) {}
+
+  double scale;         ///< px
+  double cosine, sine;  ///< of the angle, times the scale
 };
 
 }  // namespace sdvo

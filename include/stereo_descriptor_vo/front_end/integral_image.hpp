@@ -21,6 +21,9 @@ class IntegralImage {
     cv::integral(image, integral_, image.total() <= kFewPixels ? CV_32S : CV_64F);
   }
 
+  /// (rows + 1) x (columns + 1) sums, CV_32S or CV_64F.
+  const cv::Mat& sums() const { return integral_; }
+
   /// Mean grey level of the square around (u, v) with the given half side (all px). The square must lie inside the
   /// image. Rounded to float: means that are equal must compare so, whatever the sums were rounded to on the way.
   float boxMean(double u, double v, double half) const {

@@ -11,8 +11,10 @@
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/odometry/described_points.hpp"
+#include "stereo_descriptor_vo/odometry/keyframe_memory.hpp"
 #include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
+#include "stereo_descriptor_vo/odometry/reference_patch.hpp"
 #include "stereo_descriptor_vo/odometry/window_optimizer.hpp"
 
 namespace sdvo {
@@ -22,6 +24,7 @@ struct LocalMapOptions {
   int remembered = 4;
   int lasting_keyframes = 8;
   int lasting_points = 150;
+  int remembered_keyframes = 40;
   double keyframe_parallax = 4.0;
   double keyframe_overlap = 0.6;
   double corner_sigma = 0.4;
@@ -33,6 +36,8 @@ struct LocalMapOptions {
     list.add("lasting_keyframes", lasting_keyframes, {0, 100}, "",
              "older key frames that it holds at most, because they share points with the newest pair");
     list.add("lasting_points", lasting_points, {1, 10000}, "", "points that such a key frame must share at least");
+    list.add("remembered_keyframes", remembered_keyframes, {0, 1000}, "",
+             "key frames that are remembered beyond that, by where they were taken, for a camera that comes back");
     list.add("remembered", remembered, {1, 100}, "",
              "a point seen once is looked for until this many frames of the map missed it");
     list.add("keyframe_parallax", keyframe_parallax, {0.0, 500.0}, "px",
@@ -59,11 +64,14 @@ class LocalMap {
   /// Whether features come from the same camera and, if there are any, with descriptors of the same kind.
   bool continuedBy(const StereoFeatures& features) const;
 
-  int oldestId() const { return frames_.front().id; }
+  int oldestId() const;  ///< recalled key frames aside
   int newestId() const { return frames_.back().id; }
   int lastKeyframeId() const;
   bool newestIsKeyframe() const { return frames_.back().is_keyframe; }
   const Eigen::Isometry3d& newestPose() const { return frames_.back().T_camera_origin; }
+  /// T_camera_origin of the last key frame before the newest pair. There must be one.
+  const Eigen::Isometry3d& poseBeforeNewest() const { return frames_[frames_.size() - 2].T_camera_origin; }
+
   /// The map as the newest pair would see it, one row for each point still looked for: the points as now estimated,
   /// with the descriptors of their last sighting.
   struct View {
@@ -93,6 +101,24 @@ class LocalMap {
   void insert(const StereoFeatures& features, int id, const Eigen::Isometry3d& T_camera_origin,
               const std::vector<Sighting>& sightings, const RigCalibration& calibration);
 
+  /// The remembered key frame whose place the newest pair has come back to; null where there is none, where it never
+  /// left the map, and while another one is recalled.
+  const OldKeyframe* revisited() const;
+
+  /// A point of an old key frame in the newest pair.
+  struct Tie {
+    int point;                 ///< of the old key frame
+    int row;                   ///< of the newest pair
+    Eigen::Vector2d position;  ///< (u_left, v_left) of the old key frame's point in the newest pair, px
+    double sigma;              ///< of each of them, px
+    double scale;              ///< how much larger the point appears now
+  };
+  /// Takes an old key frame into the map again, tied to the newest pair by points that both saw.
+  void recall(const OldKeyframe& old, const std::vector<Tie>& ties);
+
+  /// Moves the map as a whole, so that its newest pair was seen from there.
+  void moveTo(const Eigen::Isometry3d& T_newest_origin);
+
   /// Bundle adjustment over all frames; sightings that do not agree with it are cut off from their points.
   struct Adjustment {
     bool success = false;
@@ -111,6 +137,7 @@ class LocalMap {
     int id;
     Eigen::Isometry3d T_camera_origin;
     bool is_keyframe;
+    bool is_recalled;  ///< from the memory
   };
   struct Observation {
     int frame_id;
@@ -118,21 +145,15 @@ class LocalMap {
     Eigen::Vector3d measurement;
     double sigma;
   };
-  /// The patch that a point's sightings are aligned with, and the point's place in it.
-  struct Reference {
-    std::vector<std::uint8_t> samples;  ///< empty without patches
-    float spacing;                      ///< px
-    Eigen::Vector2f centre;             ///< samples from the patch's middle
-    Eigen::Isometry3d T_camera_origin;  ///< of the pair that it was taken from
-  };
   struct Point {
     AnchoredPoint position;
     std::vector<Observation> observations;  ///< in the order of the frames
     std::vector<std::uint8_t> descriptor;
-    Reference reference;
+    ReferencePatch reference;
   };
 
   void forgetKeyframe();
+  OldKeyframe keyframe(std::size_t frame) const;
   std::vector<int> sharedPoints() const;
   double parallaxToPredecessor(std::size_t frame) const;
   void removeFrame(std::size_t index);
@@ -140,8 +161,6 @@ class LocalMap {
               Adjustment& adjustment);
   bool needsKeyframe() const;
   static void takeDescriptor(Point& point, const StereoFeatures& features, int row);
-  static Reference takeReference(const StereoFeatures& features, const Sighting& sighting,
-                                 const Eigen::Isometry3d& T_camera_origin);
   void startPoint(const StereoFeatures& features, int row, int id, const Eigen::Isometry3d& T_camera_origin,
                   const RigCalibration& calibration);
 
@@ -151,6 +170,7 @@ class LocalMap {
   DescriptorKind kind_;
   std::deque<Frame> frames_;
   std::vector<Point> points_;
+  KeyframeMemory memory_;
 };
 
 }  // namespace sdvo

@@ -80,6 +80,8 @@ struct OdometryResult {
   double dt = 0.0;          ///< s since the previous pair
   Eigen::Isometry3d T_previous_current = Eigen::Isometry3d::Identity();
   Matrix6d motion_covariance = Matrix6d::Zero();  ///< of a right perturbation of T_previous_current
+  /// The part of that motion which is the map's second thought about the previous pose: another right perturbation.
+  Vector6d correction = Vector6d::Zero();
 
   int features = 0, matches = 0, inliers = 0;
   double coverage = 0.0;                       ///< share of an 8x4 grid's cells over the image that hold an inlier
@@ -138,6 +140,7 @@ class VisualOdometry {
     std::string reason;
     std::optional<Eigen::Isometry3d> T_previous_current;
     Matrix6d covariance = Matrix6d::Zero();  ///< of that motion
+    Vector6d correction = Vector6d::Zero();  ///< the part of it that the map corrects
     std::vector<int> rejected_rows;          ///< matched rows of the pair that the adjustment does not confirm
     double time = 0.0;                       ///< s
   };
@@ -146,9 +149,16 @@ class VisualOdometry {
   Localisation localise(const StereoFeatures& features, double dt) const;
   Localisation search(const StereoFeatures& features, const std::optional<Eigen::Isometry3d>& T_current_reference,
                       double dt) const;
+  Eigen::Vector3d measure(const StereoFeatures& features, int row, const Eigen::Vector2d& shift) const;
+  MotionEstimate estimate(const DescribedPoints& reference, const StereoFeatures& features,
+                          const std::vector<FeatureMatch>& matches) const;
+  void refine(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
+              Eigen::Isometry3d& T_current_reference) const;
   void align(const StereoFeatures& features, Localisation& found) const;
   Step seed(const StereoFeatures& features);
   Step extendMap(const StereoFeatures& features, const Localisation& found);
+  void recall(const StereoFeatures& features);
+  static void cover(Step& step);
   Step predict(const StereoFeatures& features, double dt, const std::string& failure);
   void move(const Eigen::Isometry3d& T_previous_current);
   OdometryResult report(const StereoFeatures& features, double dt, const Localisation& found, const Step& step) const;

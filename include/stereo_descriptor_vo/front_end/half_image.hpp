@@ -1,0 +1,11 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+
+namespace sdvo {
+
+/// A CV_8U image at half its resolution, odd sizes rounded up: the same pixels as by cv::resize with INTER_AREA, which
+/// takes forty times longer for odd sizes than for even ones.
+void halveImage(const cv::Mat& image, cv::Mat& half);
+
+}  // namespace sdvo

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <opencv2/core.hpp>
+#include <vector>
+
+namespace sdvo {
+
+/// A square patch of the left image that is compared with the right one, blind to a difference of brightness: with
+/// derivatives by disparity, by dv and by the slant (px of disparity per row). Images are CV_8U with a border of
+/// `margin` px around the picture, to whose pixels positions refer.
+class SlantedPatch {
+ public:
+  /// `radius`: half side, px.
+  explicit SlantedPatch(int radius);
+
+  /// Takes the patch around (x, y).
+  void take(const cv::Mat& image, int margin, float x, float y);
+
+  int radius() const { return radius_; }
+  int pixels() const { return side() * side(); }
+  /// Products of the three derivatives with each other.
+  const Eigen::Matrix3f& hessian() const { return hessian_; }
+
+  /// Products of the derivatives with the difference between an image around (x, y), its rows shifted by the slant, and
+  /// the patch.
+  Eigen::Vector3f compare(const cv::Mat& image, int margin, float x, float y, float slant);
+
+  /// Of the patch and what it was compared with last, both without their means.
+  struct Similarity {
+    float product, square_of_patch, square_of_other;
+  };
+  Similarity similarity();
+
+ private:
+  int side() const { return 2 * radius_ + 1; }
+  void removeMean(std::vector<float>& values) const;
+
+  int radius_, stride_, count_;
+  std::vector<float> mask_, row_;  ///< one within the square, zero beyond; rows from its centre
+  std::vector<float> wide_;        ///< the square with one pixel more on each side
+  std::vector<float> grey_, by_disparity_, by_dv_, by_slant_, difference_;
+  Eigen::Matrix3f hessian_;
+};
+
+}  // namespace sdvo

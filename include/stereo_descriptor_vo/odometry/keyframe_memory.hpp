@@ -1,0 +1,49 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <list>
+#include <vector>
+
+#include "stereo_descriptor_vo/odometry/described_points.hpp"
+#include "stereo_descriptor_vo/odometry/reference_patch.hpp"
+#include "stereo_descriptor_vo/odometry/window_optimizer.hpp"
+
+namespace sdvo {
+
+/// A key frame that the local map let go, and what was known of its points then.
+struct OldKeyframe {
+  struct Point {
+    AnchoredPoint position;
+    Eigen::Vector3d measurement;  ///< (u_left, v_left, disparity) in this key frame, px
+    double sigma;                 ///< of u_left and of v_left, px
+    ReferencePatch reference;
+  };
+  int id;
+  Eigen::Isometry3d T_camera_origin;
+  std::vector<Point> points;
+  DescribedPoints rows;  ///< one for each point, in this key frame's left optical frame
+
+  /// How many of its points a camera sees about as large as this key frame did.
+  int sharedWith(const StereoCamera& camera, const Eigen::Isometry3d& T_other_origin) const;
+};
+
+/// Key frames by where they were taken: a camera that comes back finds what it saw there before. Bounded; those
+/// farthest from the camera are forgotten.
+class KeyframeMemory {
+ public:
+  explicit KeyframeMemory(int capacity) : capacity_(capacity) {}
+
+  /// Keeps a key frame unless an older one sees the same.
+  void remember(const StereoCamera& camera, OldKeyframe keyframe);
+
+  /// The key frame that shares the most points with a view, at least so many; null where there is none.
+  const OldKeyframe* best(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin, int least) const;
+
+  int count() const { return static_cast<int>(keyframes_.size()); }
+
+ private:
+  int capacity_;
+  std::list<OldKeyframe> keyframes_;
+};
+
+}  // namespace sdvo

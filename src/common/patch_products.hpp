@@ -1,0 +1,66 @@
+#pragma once
+
+#include "lanes.hpp"
+
+namespace sdvo {
+
+// Kernels on patches: arrays of `count` floats, a multiple of four.
+
+/// Takes the mean away within the mask.
+struct RemoveMean {
+  template <class Vector>
+  static SDVO_IN_KERNEL void add(const float* values, Vector& sum) {
+    Vector v;
+    load(values, v);
+    sum += v;
+  }
+  template <class Vector>
+  static SDVO_IN_KERNEL void subtract(float mean, const float* mask, float* values) {
+    Vector v, m;
+    load(values, v), load(mask, m);
+    v -= mean * m;
+    store(v, values);
+  }
+
+  static SDVO_IN_KERNEL void run(int count, float pixels, const float* mask, float* values) {
+    Lanes whole{};
+    HalfLanes rest{};
+    int i = 0;
+    for (; i + 8 <= count; i += 8) add(values + i, whole);
+    if (i < count) add(values + i, rest);
+    const float mean = sumOf(whole, rest) / pixels;
+    for (i = 0; i + 8 <= count; i += 8) subtract<Lanes>(mean, mask + i, values + i);
+    if (i < count) subtract<HalfLanes>(mean, mask + i, values + i);
+  }
+};
+
+/// Of arrays a, b and c.
+template <class Vector>
+struct Products {
+  Vector aa{}, ab{}, ac{}, bb{}, bc{}, cc{};
+};
+
+using LaneProducts = Products<float>;
+
+/// Sums of the products of three arrays.
+struct SumProducts {
+  template <class Vector>
+  static SDVO_IN_KERNEL void add(const float* a, const float* b, const float* c, Products<Vector>& sums) {
+    Vector u, v, w;
+    load(a, u), load(b, v), load(c, w);
+    sums.aa += u * u, sums.ab += u * v, sums.ac += u * w;
+    sums.bb += v * v, sums.bc += v * w, sums.cc += w * w;
+  }
+
+  static SDVO_IN_KERNEL void run(int count, const float* a, const float* b, const float* c, LaneProducts* sums) {
+    Products<Lanes> whole;
+    Products<HalfLanes> rest;
+    int i = 0;
+    for (; i + 8 <= count; i += 8) add(a + i, b + i, c + i, whole);
+    if (i < count) add(a + i, b + i, c + i, rest);
+    *sums = {sumOf(whole.aa, rest.aa), sumOf(whole.ab, rest.ab), sumOf(whole.ac, rest.ac),
+             sumOf(whole.bb, rest.bb), sumOf(whole.bc, rest.bc), sumOf(whole.cc, rest.cc)};
+  }
+};
+
+}  // namespace sdvo

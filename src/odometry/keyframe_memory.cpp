@@ -1,0 +1,52 @@
+#include "stereo_descriptor_vo/odometry/keyframe_memory.hpp"
+
+#include <algorithm>
+
+namespace sdvo {
+
+int OldKeyframe::sharedWith(const StereoCamera& camera, const Eigen::Isometry3d& T_other_origin) const {
+  constexpr double kLargestRatio = 1.1;  // of depths
+  const Eigen::Isometry3d T_other_this = T_other_origin * T_camera_origin.inverse();
+  int shared = 0;
+  for (const Eigen::Vector3d& here : rows.positions) {
+    const Eigen::Vector3d there = T_other_this * here;
+    if (there.z() * kLargestRatio < here.z() || there.z() > kLargestRatio * here.z()) continue;
+    const Eigen::Vector3d pixel = camera.project(there);
+    if (pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < camera.width && pixel.y() < camera.height) ++shared;
+  }
+  return shared;
+}
+
+void KeyframeMemory::remember(const StereoCamera& camera, OldKeyframe keyframe) {
+  constexpr double kSame = 0.8;  // of the points
+  if (capacity_ == 0) return;
+  const auto sees_the_same = [&](const OldKeyframe& old) {
+    return keyframe.sharedWith(camera, old.T_camera_origin) > kSame * static_cast<double>(keyframe.points.size());
+  };
+  if (std::any_of(keyframes_.begin(), keyframes_.end(), sees_the_same)) return;
+  const Eigen::Vector3d here = keyframe.T_camera_origin.inverse().translation();
+  keyframes_.push_back(std::move(keyframe));
+  if (count() <= capacity_) return;
+  const auto distance = [&](const OldKeyframe& old) {
+    return (old.T_camera_origin.inverse().translation() - here).norm();
+  };
+  keyframes_.erase(
+      std::max_element(keyframes_.begin(), keyframes_.end(),
+                       [&](const OldKeyframe& a, const OldKeyframe& b) { return distance(a) < distance(b); }));
+}
+
+const OldKeyframe* KeyframeMemory::best(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
+                                        int least) const {
+  constexpr double kEnough = 0.6;  // of its points
+  const OldKeyframe* best = nullptr;
+  int most = least - 1;
+  for (const OldKeyframe& keyframe : keyframes_) {
+    if (static_cast<int>(keyframe.points.size()) <= most) continue;
+    const int shared = keyframe.sharedWith(camera, T_camera_origin);
+    if (shared > most && shared > kEnough * static_cast<double>(keyframe.points.size()))
+      best = &keyframe, most = shared;
+  }
+  return best;
+}
+
+}  // namespace sdvo

@@ -1,0 +1,103 @@
+#include "patch_samples.hpp"
+
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+
+#include "../common/kernel.hpp"
+
+#ifdef SDVO_HAVE_AVX2
+#include <immintrin.h>
+#endif
+
+namespace sdvo {
+namespace {
+
+/// Where the samples lie in a patch: the middle, and what a step along x and along y of the square changes.
+struct Placement {
+  float x, y, x_by_x, x_by_y, y_by_x, y_by_y;
+};
+
+void samplePlain(const std::uint8_t* patch, int side, const Placement& at, const float* dx, const float* dy,
+                 const float* mask, int count, float* values) {
+  const int last = side - 2;
+  for (int k = 0; k < count; ++k) {
+    const float x = at.x + at.x_by_x * dx[k] + at.x_by_y * dy[k];
+    const float y = at.y + at.y_by_x * dx[k] + at.y_by_y * dy[k];
+    // Rounding may lead a hair outside of the square that was checked.
+    const int column = std::clamp(static_cast<int>(x), 0, last), row = std::clamp(static_cast<int>(y), 0, last);
+    const float a = x - static_cast<float>(column), b = y - static_cast<float>(row);
+    const std::uint8_t* sample = patch + row * side + column;
+    const float upper = sample[0] + a * static_cast<float>(sample[1] - sample[0]);
+    const float lower = sample[side] + a * static_cast<float>(sample[side + 1] - sample[side]);
+    values[k] = (upper + b * (lower - upper)) * mask[k];
+  }
+}
+
+#ifdef SDVO_HAVE_AVX2
+/// Two bytes next to each other, interpolated.
+SDVO_AVX2 inline __m256 between(__m256i first, __m256i second, __m256 share) {
+  return _mm256_add_ps(_mm256_cvtepi32_ps(first),
+                       _mm256_mul_ps(share, _mm256_cvtepi32_ps(_mm256_sub_epi32(second, first))));
+}
+
+SDVO_AVX2 inline __m256i fourBytes(const std::uint8_t* samples, __m256i index) {
+  return _mm256_i32gather_epi32(reinterpret_cast<const int*>(samples), index, 1);
+}
+
+SDVO_AVX2 inline __m256 position(float middle, float by_x, float by_y, __m256 x, __m256 y) {
+  return _mm256_add_ps(_mm256_add_ps(_mm256_set1_ps(middle), _mm256_mul_ps(_mm256_set1_ps(by_x), x)),
+                       _mm256_mul_ps(_mm256_set1_ps(by_y), y));
+}
+
+/// The same operations in the same order, eight samples at once.
+SDVO_AVX2 void sampleAvx2(const std::uint8_t* patch, int side, const Placement& at, const float* dx, const float* dy,
+                          const float* mask, int count, float* values) {
+  const __m256i zero = _mm256_setzero_si256(), last = _mm256_set1_epi32(side - 2), width = _mm256_set1_epi32(side);
+  const __m256i byte = _mm256_set1_epi32(255);
+  for (int k = 0; k < count; k += 8) {
+    const __m256 over = _mm256_loadu_ps(dx + k), down = _mm256_loadu_ps(dy + k);
+    const __m256 x = position(at.x, at.x_by_x, at.x_by_y, over, down);
+    const __m256 y = position(at.y, at.y_by_x, at.y_by_y, over, down);
+    const __m256i column = _mm256_max_epi32(_mm256_min_epi32(_mm256_cvttps_epi32(x), last), zero);
+    const __m256i row = _mm256_max_epi32(_mm256_min_epi32(_mm256_cvttps_epi32(y), last), zero);
+    const __m256 a = _mm256_sub_ps(x, _mm256_cvtepi32_ps(column)), b = _mm256_sub_ps(y, _mm256_cvtepi32_ps(row));
+    const __m256i index = _mm256_add_epi32(_mm256_mullo_epi32(row, width), column);
+    // Of the four bytes at each place the upper row takes the first two and the lower one the last two, so that nothing
+    // beyond the patch is read.
+    const __m256i above = fourBytes(patch, index), below = fourBytes(patch + side - 2, index);
+    const __m256 upper = between(_mm256_and_si256(above, byte), _mm256_and_si256(_mm256_srli_epi32(above, 8), byte), a);
+    const __m256 lower = between(_mm256_and_si256(_mm256_srli_epi32(below, 16), byte), _mm256_srli_epi32(below, 24), a);
+    const __m256 value = _mm256_add_ps(upper, _mm256_mul_ps(b, _mm256_sub_ps(lower, upper)));
+    _mm256_storeu_ps(values + k, _mm256_mul_ps(value, _mm256_loadu_ps(mask + k)));
+  }
+}
+#endif
+
+}  // namespace
+
+SampleSquare::SampleSquare(int radius) : radius_(radius) {
+  for (int j = 0; j < side(); ++j)
+    for (int i = 0; i < side(); ++i) {
+      const std::size_t k = static_cast<std::size_t>(j * side() + i);
+      x_[k] = static_cast<float>(i - radius), y_[k] = static_cast<float>(j - radius);
+      mask_[k] = 1.f;
+    }
+}
+
+bool SampleSquare::sample(const Patch& patch, const Eigen::Vector2f& centre, const Eigen::Matrix2f& grid,
+                          Samples& values) const {
+  const float half = 0.5f * static_cast<float>(patch.side - 1);
+  const Eigen::Vector2f reach = static_cast<float>(radius_) * grid.cwiseAbs().rowwise().sum();
+  if (!((centre.cwiseAbs() + reach).maxCoeff() <= half)) return false;
+  const Placement at{half + centre.x(), half + centre.y(), grid(0, 0), grid(0, 1), grid(1, 0), grid(1, 1)};
+#ifdef SDVO_HAVE_AVX2
+  if (usesAvx2())
+    sampleAvx2(patch.samples, patch.side, at, x_.data(), y_.data(), mask_.data(), count(), values.data());
+  else
+#endif
+    samplePlain(patch.samples, patch.side, at, x_.data(), y_.data(), mask_.data(), count(), values.data());
+  return true;
+}
+
+}  // namespace sdvo

@@ -1,0 +1,47 @@
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/processor.hpp"
+#include "stereo_descriptor_vo/front_end/block_differences.hpp"
+
+namespace sdvo {
+namespace {
+
+cv::Mat noise(unsigned seed, bool extreme) {
+  cv::Mat image(40, 131, CV_8U);
+  cv::RNG(seed).fill(image, cv::RNG::UNIFORM, 0, 256);
+  return extreme ? cv::Mat(image > 100) : image;
+}
+
+template <int kRows>
+void expectSums(const cv::Mat& left, const cv::Mat& right) {
+  constexpr int kX = 90, kY = 17, kCount = 77;
+  std::vector<unsigned> found(kCount);
+  blockDifferences<kRows>(left.ptr(kY) + kX, right.ptr(kY) + kX, static_cast<std::ptrdiff_t>(left.step[0]), kCount,
+                          found.data());
+  for (int k = 0; k < kCount; ++k) {
+    unsigned sum = 0;
+    for (int y = kY - kRows; y <= kY + kRows; ++y)
+      for (int x = kX - kBlockWidth / 2; x < kX + kBlockWidth / 2; ++x)
+        sum += static_cast<unsigned>(std::abs(left.at<std::uint8_t>(y, x) - right.at<std::uint8_t>(y, x - k)));
+    ASSERT_EQ(found[static_cast<std::size_t>(k)], sum) << kRows << " rows, block " << k;
+  }
+}
+
+TEST(BlockDifferences, AreSumsOverWholeBlocks) {
+  for (const bool with_avx2 : {true, false}) {
+    allowAvx2(with_avx2);
+    for (const bool extreme : {false, true}) {
+      expectSums<4>(noise(3, extreme), noise(5, extreme));
+      expectSums<5>(noise(3, extreme), noise(5, extreme));
+    }
+    expectSums<5>(cv::Mat(40, 131, CV_8U, cv::Scalar(0)), cv::Mat(40, 131, CV_8U, cv::Scalar(255)));
+  }
+  allowAvx2(true);
+}
+
+}  // namespace
+}  // namespace sdvo

@@ -1,0 +1,33 @@
+#include <gtest/gtest.h>
+
+#include <opencv2/imgproc.hpp>
+
+#include "stereo_descriptor_vo/common/processor.hpp"
+#include "stereo_descriptor_vo/front_end/half_image.hpp"
+
+namespace sdvo {
+namespace {
+
+void expectHalfOfOpenCv(cv::Size size) {
+  cv::Mat image(size, CV_8U), expected, half;
+  cv::RNG(static_cast<unsigned>(size.area())).fill(image, cv::RNG::UNIFORM, 0, 256);
+  cv::resize(image, expected, cv::Size((size.width + 1) / 2, (size.height + 1) / 2), 0.0, 0.0, cv::INTER_AREA);
+  halveImage(image, half);
+  ASSERT_EQ(half.size(), expected.size());
+  ASSERT_EQ(cv::norm(half, expected, cv::NORM_INF), 0.0) << size;
+}
+
+TEST(HalfImage, IsThatOfOpenCv) {
+  for (const int width : {16, 17, 31, 64, 125, 641, 1226, 1241, 1242})
+    for (const int height : {16, 19, 77, 370, 375, 376}) expectHalfOfOpenCv({width, height});
+}
+
+TEST(HalfImage, IsTheSameWithoutAvx2) {
+  allowAvx2(false);
+  expectHalfOfOpenCv({1241, 376});
+  expectHalfOfOpenCv({127, 75});
+  allowAvx2(true);
+}
+
+}  // namespace
+}  // namespace sdvo
