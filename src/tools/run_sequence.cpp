@@ -20,7 +20,7 @@
 namespace {
 
 struct Arguments {
-  std::string sequence, config, poses, timing;
+  std::string sequence, config, poses, timing, states;
   std::vector<std::string> settings;
   int frames = 0;
   int threads = 1;
@@ -52,6 +52,29 @@ void writeTiming(const std::string& path, const std::vector<Frame>& frames) {
          << 1e3 * odometry.motion_time << "," << extraction.detected << "," << odometry.features << ","
          << odometry.matches << "," << odometry.inliers << "," << odometry.rms << "," << odometry.coverage << ","
          << toString(odometry.state) << "\n";
+  }
+  if (!file.flush()) throw std::runtime_error("cannot write " + path);
+}
+
+/// Row by row, 36 numbers.
+void writeCovariance(std::ostream& file, const sdvo::Matrix6d& covariance) {
+  for (int i = 0; i < 36; ++i) file << "," << covariance(i / 6, i % 6);
+}
+
+/// What a filter behind the odometry is told of each pair. The reason stands last, for it may hold commas.
+void writeStates(const std::string& path, const std::vector<Frame>& frames) {
+  std::ofstream file(path);
+  file << "frame,stamp_ns,state,epoch,has_pose,has_motion";
+  for (const char* name : {"motion", "pose"})
+    for (int i = 0; i < 36; ++i) file << "," << name << "_" << i / 6 << i % 6;
+  file << ",reason\n" << std::setprecision(10);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const sdvo::OdometryResult& odometry = frames[i].odometry;
+    file << i << "," << odometry.stamp << "," << toString(odometry.state) << "," << odometry.epoch << ","
+         << odometry.has_pose << "," << odometry.has_motion;
+    writeCovariance(file, odometry.motion_covariance);
+    writeCovariance(file, odometry.pose_covariance);
+    file << "," << odometry.reason << "\n";
   }
   if (!file.flush()) throw std::runtime_error("cannot write " + path);
 }
@@ -91,6 +114,7 @@ int run(const Arguments& arguments) {
   }
   sdvo::writeKittiPoses(arguments.poses, poses);
   if (!arguments.timing.empty()) writeTiming(arguments.timing, frames);
+  if (!arguments.states.empty()) writeStates(arguments.states, frames);
 
   std::vector<double> times;
   for (const Frame& frame : frames) times.push_back(1e3 * frame.total_time);
@@ -116,5 +140,7 @@ int main(int argc, char** argv) {
   app.add_option("--threads", arguments.threads, "threads of OpenCV")->capture_default_str()->check(CLI::Range(1, 256));
   app.add_option("--poses", arguments.poses, "poses to write, 12 numbers a line")->required();
   app.add_option("--timing", arguments.timing, "CSV to write, a line for each pair");
+  app.add_option("--states", arguments.states,
+                 "CSV to write, a line for each pair: state, covariances of motion and pose, reason");
   return sdvo::runTool(app, argc, argv, [&] { return run(arguments); });
 }
