@@ -108,7 +108,7 @@ std::string RigMonitor::diagnose(const cv::Mat& left, const cv::Mat& right,
   for (double& value : rest) value = std::abs(value - offset);
   const double scatter = median(rest);
 
-  if (scatter > std::max(max_dv_, std::abs(offset)))
+  if (scatter > std::max(max_dv_, 0.5 * std::abs(offset)))
     return sentence("rows of left and right differ by ", scatter,
                     " px here and there: not rectified, or not taken at the same moment?");
   if (std::abs(offset) > max_dv_)
