@@ -56,7 +56,6 @@ std::string describe(const cv::Size& size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
 }
 
-template <class Covariance>
 /// Over a gap the mean velocity, which is all that is measured, says little of that at its end: meanwhile a vehicle may
 /// accelerate by 5 m/s^2 and 2 rad/s^2.
 Matrix6d unsteadiness(double dt) {
@@ -67,6 +66,7 @@ Matrix6d unsteadiness(double dt) {
   return deviation.cwiseAbs2().asDiagonal();
 }
 
+template <class Covariance>
 void fillCovariance(const Matrix6d& covariance, Covariance& message) {
   Matrix6d symmetric = 0.5 * (covariance + covariance.transpose());
   symmetric.diagonal().array() += kVarianceFloor;
