@@ -62,6 +62,7 @@ FeatureExtractor::FeatureExtractor(const FeatureExtractorOptions& options)
     : options_(checked(options)),
       detector_(options.detector),
       stereo_matcher_(options.stereo),
+      rig_monitor_(options.rig_monitor, options.stereo.max_epipolar_residual, options.stereo.epipolar.max_disparity),
       depth_scale_(options.size_curve),
       descriptor_(options.descriptor) {}
 
@@ -92,8 +93,12 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
   std::vector<cv::Point2f> positions;
   positions.reserve(corners.size());
   for (const Corner& corner : corners) positions.push_back(corner.position);
-  const std::vector<StereoMatch> matches = stereo_matcher_.match(left, right, positions);
+  std::vector<StereoMatch> matches = stereo_matcher_.match(left, right, positions);
   report.stereo_matched = static_cast<int>(matches.size());
+  std::string refusal;  // matches of a rig that is not what it should be are wrong ones
+  if (rig_monitor_.isSuspicious(report.detected, report.stereo_matched))
+    refusal = rig_monitor_.diagnose(left, right, positions);
+  if (!refusal.empty()) matches.clear();
   report.stereo_time = stopwatch.lap();
 
   // Size from depth, then the descriptor of both views at that size.
@@ -118,7 +123,9 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
   if (features.hasPatches()) features.patches = cutPatches(left, features);
   report.describe_time = stopwatch.lap();
 
-  if (2 * border >= std::min(left.rows, left.cols))
+  if (!refusal.empty())
+    report.status = refusal;
+  else if (2 * border >= std::min(left.rows, left.cols))
     report.status =
         "every feature is too close to an image border for its descriptor: the image is too small for its size";
   else if (report.detected == 0)

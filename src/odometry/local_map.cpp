@@ -56,6 +56,7 @@ LocalMap::View LocalMap::view() const {
     if (predicted.x() < 0.0 || predicted.y() < 0.0 || predicted.x() > camera_.width || predicted.y() > camera_.height)
       continue;
     view.point.push_back(static_cast<int>(p));
+    view.seen.push_back(points_[p].seen);
     view.pixels.emplace_back(static_cast<float>(predicted.x()), static_cast<float>(predicted.y()),
                              static_cast<float>(std::max(predicted.z(), kFarthestDisparity)));
   }
@@ -78,6 +79,7 @@ void LocalMap::insert(const StereoFeatures& features, int id, const Eigen::Isome
   std::vector<bool> recognised(features.u.size(), false);
   for (const Sighting& sighting : sightings) {
     recognised[sighting.row] = true;
+    ++points_[sighting.point].seen;
     points_[sighting.point].observations.push_back({id, sighting.row, sighting.measurement, sighting.sigma});
   }
   // Only now that the new sightings are noted: points that they carry on must outlive the forgotten pair.
@@ -331,6 +333,7 @@ void LocalMap::cutOff(const std::vector<std::pair<int, int>>& sources, const std
     const Observation& observation = observations[sources[i].second];
     if (observation.frame_id != newestId()) continue;
     adjustment.rejected_rows.push_back(observation.row);
+    --points_[sources[i].first].seen;
     observations.pop_back();  // the newest sighting is the last one
   }
 }

@@ -27,8 +27,8 @@ Matrix6d carriedBy(const Eigen::Isometry3d& motion, const Matrix6d& covariance) 
 
 }  // namespace
 
-void PoseCovariance::restart() {
-  value_ += discontinuity();
+void PoseCovariance::restart(const Matrix6d& travelled) {
+  value_ += discontinuity() + travelled;
   since_keyframe_.setZero();
   last_window_.reset();
   markKeyframe();
@@ -62,6 +62,12 @@ Matrix6d PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, co
   last_is_keyframe_ = false;
   last_window_ = window;
   return motion;
+}
+
+void PoseCovariance::doubt(const Matrix6d& covariance) {
+  value_ += covariance;
+  since_keyframe_ += covariance;
+  last_window_.reset();
 }
 
 /// What the last pose lacked when it was reported, seen from the key frame that the new pair is measured from.

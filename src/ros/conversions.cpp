@@ -6,6 +6,7 @@
 #include <sensor_msgs/point_cloud2_iterator.h>
 #include <tf2_eigen/tf2_eigen.h>
 
+#include <algorithm>
 #include <cmath>
 #include <set>
 #include <sstream>
@@ -54,6 +55,16 @@ std::string describeP(const sensor_msgs::CameraInfo& info) {
 
 std::string describe(const cv::Size& size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
+}
+
+/// Over a gap the mean velocity, which is all that is measured, says little of that at its end: meanwhile a vehicle may
+/// accelerate by 5 m/s^2 and 2 rad/s^2.
+Matrix6d unsteadiness(double dt) {
+  constexpr double kSteady = 0.2;  // s
+  const double gap = std::max(0.0, dt - kSteady);
+  Vector6d deviation;
+  deviation << Eigen::Vector3d::Constant(0.5 * 5.0 * gap), Eigen::Vector3d::Constant(0.5 * 2.0 * gap);
+  return deviation.cwiseAbs2().asDiagonal();
 }
 
 template <class Covariance>
@@ -269,8 +280,9 @@ nav_msgs::Odometry toOdometry(const OdometryResult& result, const Eigen::Isometr
   odometry.twist.twist.angular.x = twist[3];
   odometry.twist.twist.angular.y = twist[4];
   odometry.twist.twist.angular.z = twist[5];
-  fillCovariance(to_base * result.motion_covariance * to_base.transpose() / (result.dt * result.dt),
-                 odometry.twist.covariance);
+  fillCovariance(
+      to_base * result.motion_covariance * to_base.transpose() / (result.dt * result.dt) + unsteadiness(result.dt),
+      odometry.twist.covariance);
   return odometry;
 }
 

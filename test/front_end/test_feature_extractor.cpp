@@ -179,7 +179,7 @@ TEST(FeatureExtractor, SaysWhyAPairGivesNothing) {
   expectEmpty(black, black, "corners");
   expectEmpty(black, pair.right, "corners");
   expectEmpty(pair.left, black, "stereo");
-  expectEmpty(pair.right, pair.left, "stereo");  // swapped
+  expectEmpty(pair.right, pair.left, "swapped");
 
   FeatureExtractorOptions huge = fewFeatures();
   huge.size_curve.min_size = 150.0;  // reaches 471 px

@@ -141,6 +141,24 @@ TEST(PoseCovariance, RestartsFromTheLastPoseWithMetresAndAGoodPartOfARightAngle)
   expectEqual(covariance.value(), afterForward(100.5, 0.5) + diagonal(0.125, 0.0));
 }
 
+TEST(PoseCovariance, WhatMayHaveBeenTravelledUnseenIsAddedAtARestart) {
+  PoseCovariance covariance;
+  covariance.restart(diagonal(4.0, 1.0));
+  expectEqual(covariance.value(), diagonal(104.0, 1.25));
+}
+
+TEST(PoseCovariance, ADoubtedPoseIsReportedSoAndTheNextMotionContainsTheDoubt) {
+  PoseCovariance covariance;
+  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
+  WindowCovariances measured = window(1, diagonal(0.5, 0.25));
+  covariance.advance(still, measured);
+  covariance.doubt(diagonal(8.0, 2.0));
+  expectEqual(covariance.value(), diagonal(8.5, 2.25));
+  expectEqual(covariance.advance(still, measured), diagonal(9.0, 2.5));
+  // What was reported stays true.
+  expectEqual(covariance.value(), diagonal(8.5, 2.25));
+}
+
 TEST(PoseCovariance, StaysSymmetricAndPositive) {
   PoseCovariance covariance;
   Vector6d step;

@@ -223,6 +223,19 @@ TEST(ToOdometry, TwistCovarianceIsThatOfThePublishedTwist) {
                        }));
 }
 
+TEST(ToOdometry, AMeanVelocityOverAGapSaysLittleOfThePresentOne) {
+  OdometryResult result = trackedResult();
+  result.motion_covariance = 1e-6 * Matrix6d::Identity();
+  const auto deviation = [&](double dt, int axis) {
+    result.dt = dt;
+    return std::sqrt(covarianceOf(toOdometry(result, Eigen::Isometry3d::Identity(), {}).twist.covariance)(axis, axis));
+  };
+  EXPECT_NEAR(deviation(0.1, 0), 0.01, 1e-4);
+  EXPECT_NEAR(deviation(0.2, 0), 0.005, 1e-4);
+  EXPECT_NEAR(deviation(1.5, 0), 0.5 * 5.0 * 1.3, 1e-3);
+  EXPECT_NEAR(deviation(1.5, 5), 0.5 * 2.0 * 1.3, 1e-3);
+}
+
 TEST(CleanFrameId, LosesTheLeadingSlash) {
   EXPECT_EQ(cleanFrameId("/odom"), "odom");
   EXPECT_EQ(cleanFrameId("robot/odom"), "robot/odom");

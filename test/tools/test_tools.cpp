@@ -182,6 +182,7 @@ TEST_F(Tools, OutputThatCannotBeWritten) {
   const std::string missing = (root_ / "missing" / "out").string();
   expectError(run("run_sequence", sequence_.string() + " --poses " + missing), missing);
   expectError(runSequence("--timing " + missing), missing);
+  expectError(runSequence("--states " + missing), missing);
   expectError(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output " + missing), missing);
   const std::string truth = (root_ / "truth.txt").string();
   expectError(run("evaluate_trajectory",
@@ -242,6 +243,27 @@ TEST_F(Tools, OnePoseForEachPairAndTheDriveIsFollowed) {
     const std::string& row = rows[static_cast<std::size_t>(i) + 1];
     EXPECT_EQ(row.rfind(std::to_string(i) + ",", 0), 0u) << row;
     EXPECT_EQ(commas(row), commas(rows.front())) << row;
+  }
+}
+
+TEST_F(Tools, StatesHaveTheCovariancesOfEachPair) {
+  ASSERT_EQ(runSequence("--states " + (root_ / "states.csv").string()).exit_code, 0);
+  const std::vector<std::string> rows = linesOf(readText(root_ / "states.csv"));
+  ASSERT_EQ(rows.size(), static_cast<std::size_t>(kPairs) + 1);
+  EXPECT_EQ(rows.front().rfind("frame,stamp_ns,state,epoch,has_pose,has_motion,motion_00,", 0), 0u);
+  for (int i = 0; i < kPairs; ++i) {
+    std::vector<std::string> fields;
+    std::istringstream stream(rows[static_cast<std::size_t>(i) + 1]);
+    for (std::string field; std::getline(stream, field, ',');) fields.push_back(field);
+    ASSERT_GE(fields.size(), 78u);
+    EXPECT_EQ(fields[0], std::to_string(i));
+    EXPECT_EQ(fields[1], std::to_string(i * 100000000));
+    EXPECT_EQ(fields[2], "TRACKING");
+    EXPECT_EQ(fields[5], i == 0 ? "0" : "1");
+    for (const int diagonal : {6, 13, 20, 27, 34, 41}) {
+      if (i > 0) EXPECT_GT(std::stod(fields[diagonal]), 0.0) << "motion, pair " << i;
+      if (i > 0) EXPECT_GT(std::stod(fields[diagonal + 36]), 0.0) << "pose, pair " << i;
+    }
   }
 }
 

@@ -7,6 +7,7 @@
 #include "stereo_descriptor_vo/front_end/depth_scale.hpp"
 #include "stereo_descriptor_vo/front_end/feature_detector.hpp"
 #include "stereo_descriptor_vo/front_end/patch_cutter.hpp"
+#include "stereo_descriptor_vo/front_end/rig_monitor.hpp"
 #include "stereo_descriptor_vo/front_end/stereo_descriptor.hpp"
 #include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
 
@@ -15,6 +16,7 @@ namespace sdvo {
 struct FeatureExtractorOptions {
   FeatureDetectorOptions detector;
   StereoMatcherOptions stereo;
+  RigMonitorOptions rig_monitor;
   DepthScaleOptions size_curve;
   DescriptorOptions descriptor;
   PatchOptions patch;
@@ -22,6 +24,7 @@ struct FeatureExtractorOptions {
   void describe(OptionList& list) {
     list.group("detector", detector);
     list.group("stereo", stereo);
+    list.group("rig_monitor", rig_monitor);
     list.group("size_curve", size_curve);
     list.group("descriptor", descriptor);
     list.group("descriptor", patch);
@@ -35,7 +38,7 @@ class FeatureExtractor {
   explicit FeatureExtractor(const FeatureExtractorOptions& options);
 
   /// Images are CV_8U of the camera's size, else std::invalid_argument. A pair in which nothing is found gives an empty
-  /// set whose report says why.
+  /// set whose report says why; so does one that the rig monitor refuses.
   StereoFeatures extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
                          std::int64_t stamp) const;
 
@@ -45,6 +48,7 @@ class FeatureExtractor {
   FeatureExtractorOptions options_;
   FeatureDetector detector_;
   StereoMatcher stereo_matcher_;
+  RigMonitor rig_monitor_;
   DepthScale depth_scale_;
   StereoDescriptor descriptor_;
 };

@@ -61,6 +61,8 @@ class LocalMap {
 
   std::int64_t newestStamp() const { return newest_stamp_; }
 
+  const StereoCamera& camera() const { return camera_; }
+
   /// Whether features come from the same camera and, if there are any, with descriptors of the same kind.
   bool continuedBy(const StereoFeatures& features) const;
 
@@ -78,6 +80,7 @@ class LocalMap {
     DescribedPoints rows;             ///< in the newest pair's left optical frame
     std::vector<cv::Point3f> pixels;  ///< (u_left, v_left, disparity without the rig's error) in the newest pair, px
     std::vector<int> point;           ///< what sightings call them
+    std::vector<int> seen;            ///< in how many pairs, the map's and forgotten ones
   };
   View view() const;
 
@@ -150,6 +153,7 @@ class LocalMap {
     std::vector<Observation> observations;  ///< in the order of the frames
     std::vector<std::uint8_t> descriptor;
     ReferencePatch reference;
+    int seen = 1;  ///< pairs, those included that the map has forgotten
   };
 
   void forgetKeyframe();

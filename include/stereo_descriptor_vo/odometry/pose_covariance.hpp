@@ -26,14 +26,18 @@ class PoseCovariance {
   /// Of the last pose. Zero in the beginning, when that is a key frame by definition.
   const Matrix6d& value() const { return value_; }
 
-  /// The last pose becomes the beginning of a new drive, after a motion of unknown size; it is a key frame.
-  void restart();
+  /// The last pose becomes the beginning of a new drive, after a motion of unknown size; it is a key frame. `travelled`
+  /// is what may have been travelled unseen.
+  void restart(const Matrix6d& travelled = Matrix6d::Zero());
 
   /// The pose moved on; the motion is known by itself, with a covariance that adds to the last pose's.
   void advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance);
 
   /// The pose moved on; the motion is what the adjustment of a window left of it. Returns the motion's covariance.
   Matrix6d advance(const Eigen::Isometry3d& T_previous_current, const WindowCovariances& window);
+
+  /// The last pose may be wrong by more than its measurement says.
+  void doubt(const Matrix6d& covariance);
 
   /// The last pose is a key frame of the map: the next ones are measured from it.
   void markKeyframe();

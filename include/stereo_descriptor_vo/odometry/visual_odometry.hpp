@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
 #include <limits>
 #include <optional>
@@ -15,22 +16,20 @@
 #include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
 #include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
+#include "stereo_descriptor_vo/odometry/pose_verdict.hpp"
 #include "stereo_descriptor_vo/odometry/right_camera_rotation.hpp"
 
 namespace sdvo {
 
-struct TrackingOptions {
+struct TrackingOptions : PoseVerdictOptions {
   int max_predicted_pairs = 1;
   double max_gap = 1.0;
-  double max_speed = 70.0;
-  double max_rotation_rate = 6.3;
 
   void describe(OptionList& list) {
     list.add("max_predicted_pairs", max_predicted_pairs, {0, 100}, "",
              "pairs in a row whose motion may be predicted before the odometry is lost");
     list.add("max_gap", max_gap, {0.01, 60.0}, "s", "longest time between pairs over which the motion is predicted");
-    list.add("max_speed", max_speed, {0.1, 1000.0}, "m/s", "a faster motion is a wrong one");
-    list.add("max_rotation_rate", max_rotation_rate, {0.1, 100.0}, "rad/s", "a faster rotation is a wrong one");
+    PoseVerdictOptions::describe(list);
   }
 };
 
@@ -127,10 +126,17 @@ class VisualOdometry {
  private:
   /// Where a pair is, as matching tells.
   struct Localisation {
-    std::string failure;    ///< why its motion is not to be used; empty when it is
+    PoseEvidence evidence;
+    PoseVerdict verdict;
     MotionEstimate motion;  ///< since the map's newest pair
+    /// The same as another hypothesis has it that could not be ruled out.
+    std::optional<Eigen::Isometry3d> T_current_reference_else;
+    int lasting_close = 0;   ///< lasting points that agree closely
+    bool guided = false;     ///< found with a prior
+    bool contested = false;  ///< by a motion of something else in view
     LocalMap::View view;
-    std::vector<FeatureMatch> matches;           ///< rows of the view to rows of the pair
+    std::vector<FeatureMatch> matches;  ///< rows of the view to rows of the pair
+    std::vector<Correspondence> correspondences;
     std::vector<LocalMap::Sighting> sightings;   ///< of the motion's inliers
     double match_time = 0.0, motion_time = 0.0;  ///< s
   };
@@ -147,22 +153,33 @@ class VisualOdometry {
 
   void refuse(const StereoFeatures& features) const;
   Localisation localise(const StereoFeatures& features, double dt) const;
-  Localisation search(const StereoFeatures& features, const std::optional<Eigen::Isometry3d>& T_current_reference,
-                      double dt) const;
   Eigen::Vector3d measure(const StereoFeatures& features, int row, const Eigen::Vector2d& shift) const;
-  MotionEstimate estimate(const DescribedPoints& reference, const StereoFeatures& features,
-                          const std::vector<FeatureMatch>& matches) const;
+  std::vector<Correspondence> correspond(const DescribedPoints& reference, const StereoFeatures& features,
+                                         const std::vector<FeatureMatch>& matches) const;
   void refine(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
               Eigen::Isometry3d& T_current_reference) const;
+  Localisation search(const StereoFeatures& features,
+                      const std::optional<Eigen::Isometry3d>& T_current_reference) const;
+  void weigh(const StereoFeatures& features, Localisation& found) const;
+  Localisation searchAmong(const StereoFeatures& features, const Localisation& all,
+                           const std::vector<int>& subset) const;
+  bool isLasting(const Localisation& found, int match) const;
+  bool hasStrayed(const StereoCamera& camera, const Localisation& found) const;
+  Localisation choose(std::vector<Localisation> hypotheses) const;
+  bool lastingDisagree(const PoseEvidence& evidence) const;
+  bool areOne(const Localisation& a, const Localisation& b) const;
+  int leastOfRival(const MotionEstimate& motion) const;
   void align(const StereoFeatures& features, Localisation& found) const;
+  bool isFrozen(const StereoFeatures& features, double dt) const;
   Step seed(const StereoFeatures& features);
-  Step extendMap(const StereoFeatures& features, const Localisation& found);
+  Step extendMap(const StereoFeatures& features, double dt, const Localisation& found);
+  Matrix6d doubt(const Localisation& found, const Eigen::Isometry3d& T_previous_measured,
+                 const Eigen::Isometry3d& T_previous_current, double dt) const;
   void recall(const StereoFeatures& features);
   static void cover(Step& step);
   Step predict(const StereoFeatures& features, double dt, const std::string& failure);
   void move(const Eigen::Isometry3d& T_previous_current);
   OdometryResult report(const StereoFeatures& features, double dt, const Localisation& found, const Step& step) const;
-  std::string implausible(const Eigen::Isometry3d& T_previous_current, double dt) const;
 
   VisualOdometryOptions options_;
   FeatureMatcher matcher_;
@@ -177,12 +194,18 @@ class VisualOdometry {
     RightCameraRotation right_rotation;
     std::optional<std::int64_t> last_stamp;
     Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
-    PoseCovariance covariance;         ///< of that pose
-    std::optional<Vector6d> velocity;  ///< of the camera in its own frame, m/s and rad/s
+    PoseCovariance covariance;                  ///< of that pose
+    std::optional<Vector6d> velocity;           ///< of the camera in its own frame, m/s and rad/s
+    Vector6d last_velocity = Vector6d::Zero();  ///< the same, kept while lost
+    std::int64_t last_pose_stamp = 0;           ///< ns
     double distance = 0.0;
     int predicted_pairs = 0;
     int pairs = 0;
     bool started = false;
+    Matrix6d last_doubt = Matrix6d::Zero();   ///< of a doubtful motion
+    int contested_pairs = 0;                  ///< for which a second motion is still to be looked for
+    bool frozen = false;                      ///< the last pair showed what the one before did, while the camera moved
+    std::array<std::vector<float>, 3> image;  ///< u, v and disparity of the last pair's features, to recognise that
   } state_;
   int epoch_ = 0;
 };

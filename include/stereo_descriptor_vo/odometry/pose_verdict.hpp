@@ -1,0 +1,68 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <string>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/common/se3.hpp"
+
+namespace sdvo {
+
+struct PoseVerdictOptions {
+  double max_speed = 70.0;
+  double max_rotation_rate = 6.3;
+  double max_acceleration = 20.0;
+  double max_rotation_acceleration = 30.0;
+  double stamp_tolerance = 0.02;
+  int doubtful_inliers = 40;
+  double doubtful_ratio = 0.4;
+  double doubtful_lasting_ratio = 0.5;
+  double doubtful_coverage = 0.4;
+  double doubtful_rms = 1.2;
+
+  void describe(OptionList& list) {
+    list.add("max_speed", max_speed, {0.1, 1000.0}, "m/s", "a faster motion is a wrong one");
+    list.add("max_rotation_rate", max_rotation_rate, {0.1, 100.0}, "rad/s", "a faster rotation is a wrong one");
+    list.add("max_acceleration", max_acceleration, {0.1, 10000.0}, "m/s^2", "a larger acceleration is doubted");
+    list.add("max_rotation_acceleration", max_rotation_acceleration, {0.1, 10000.0}, "rad/s^2",
+             "a larger acceleration of the rotation is doubted");
+    list.add("stamp_tolerance", stamp_tolerance, {0.0, 1.0}, "s",
+             "error of the time between two stamps that speeds, rates and accelerations are forgiven");
+    list.add("doubtful_inliers", doubtful_inliers, {0, 10000}, "", "fewer inliers are doubted");
+    list.add("doubtful_ratio", doubtful_ratio, {0.0, 1.0}, "",
+             "a smaller share of inliers among the matches is doubted; a third of it is no motion");
+    list.add("doubtful_lasting_ratio", doubtful_lasting_ratio, {0.0, 1.0}, "",
+             "the same among the matches of points that four pairs saw");
+    list.add("doubtful_coverage", doubtful_coverage, {0.0, 1.0}, "",
+             "inliers in a smaller share of the image's cells are doubted");
+    list.add("doubtful_rms", doubtful_rms, {0.0, 20.0}, "px", "a larger reprojection error of the inliers is doubted");
+  }
+};
+
+/// What a motion that was found rests on, and what it would mean.
+struct PoseEvidence {
+  int matches = 0, inliers = 0;
+  int lasting_matches = 0, lasting_inliers = 0;  ///< of points that at least four pairs saw
+  double coverage = 1.0;                         ///< share of the image's cells that hold an inlier
+  bool confirmed = false;                        ///< found likewise without a prior: few inliers are no doubt then
+  double rms = 0.0;                              ///< reprojection error of the inliers, px per coordinate
+  Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();  ///< since the last measured pair
+  Matrix6d covariance = Matrix6d::Zero();                    ///< of that motion, m and rad
+  double dt = 0.0;                                           ///< since the last measured pair, s
+  std::optional<Vector6d> velocity;                          ///< before, m/s and rad/s; nothing when unknown
+};
+
+/// What is to be done with a motion: use it, use it as one hypothesis among others, or not at all.
+enum class Trust { kSound, kDoubtful, kNone };
+
+struct PoseVerdict {
+  Trust trust = Trust::kSound;
+  std::string reason;  ///< in words, unless it is sound
+};
+
+/// Judges a motion by what it rests on. It only looks: the motion is taken or left, never changed. Rates are judged
+/// with the motion's own standard deviation and with the stamps' tolerance, so that noise over a tiny dt is no rate.
+PoseVerdict judgePose(const PoseVerdictOptions& options, int min_inliers, const PoseEvidence& evidence);
+
+}  // namespace sdvo

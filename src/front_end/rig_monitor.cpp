@@ -1,0 +1,122 @@
+#include "stereo_descriptor_vo/front_end/rig_monitor.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <iomanip>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+#include <sstream>
+
+namespace sdvo {
+namespace {
+
+constexpr int kEnough = 25;  // corners found that a judgement needs
+
+/// A corner of the left image and where it is in the right one.
+struct Sighting {
+  double u;  ///< px from the middle of the left image
+  double disparity, dv;
+};
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// Where the block around `centre` looks most alike within `area`, a rectangle of block centres, and how much.
+std::optional<cv::Point> findBlock(const cv::Mat& left, const cv::Mat& right, cv::Point centre, cv::Size half,
+                                   cv::Rect area, double least_correlation) {
+  const cv::Rect block(centre.x - half.width, centre.y - half.height, 2 * half.width + 1, 2 * half.height + 1);
+  const cv::Rect whole(0, 0, left.cols, left.rows);
+  const cv::Rect reach =
+      cv::Rect(area.x - half.width, area.y - half.height, area.width + 2 * half.width, area.height + 2 * half.height) &
+      whole;
+  if ((block & whole) != block || reach.width < block.width || reach.height < block.height) return std::nullopt;
+  constexpr double kFlat = 3.0;  // grey levels; the correlation of flat blocks means nothing
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(left(block), mean, deviation);
+  if (deviation[0] < kFlat) return std::nullopt;
+  cv::Mat correlation;
+  cv::matchTemplate(right(reach), left(block), correlation, cv::TM_CCOEFF_NORMED);
+  double best = 0.0;
+  cv::Point at;
+  cv::minMaxLoc(correlation, nullptr, &best, nullptr, &at);
+  if (!(best >= least_correlation)) return std::nullopt;
+  return cv::Point(reach.x + at.x + half.width, reach.y + at.y + half.height);
+}
+
+void quarter(const cv::Mat& image, cv::Mat& small) {
+  cv::resize(image, small, cv::Size(image.cols / 4, image.rows / 4), 0.0, 0.0, cv::INTER_AREA);
+}
+
+template <class... Parts>
+std::string sentence(const Parts&... parts) {
+  std::ostringstream text;
+  text << std::fixed << std::setprecision(1);
+  (text << ... << parts);
+  return text.str();
+}
+
+}  // namespace
+
+RigMonitor::RigMonitor(const RigMonitorOptions& options, double max_dv, double max_disparity)
+    : options_(checked(options)), max_dv_(max_dv), max_disparity_(max_disparity) {}
+
+bool RigMonitor::isSuspicious(int corners, int found) const {
+  return options_.enabled && corners >= kEnough && found < options_.suspicious_share * corners;
+}
+
+std::string RigMonitor::diagnose(const cv::Mat& left, const cv::Mat& right,
+                                 const std::vector<cv::Point2f>& corners) const {
+  cv::Mat small_left, small_right;
+  quarter(left, small_left);
+  quarter(right, small_right);
+  const int columns = static_cast<int>(std::ceil(0.25 * max_disparity_));
+  const int rows = static_cast<int>(std::ceil(0.25 * options_.reach));
+  std::vector<Sighting> sightings;
+  const std::size_t step = std::max<std::size_t>(1, corners.size() / static_cast<std::size_t>(options_.corners));
+  for (std::size_t i = 0; i < corners.size(); i += step) {
+    // Coarsely in all directions, swapped sides included, then around that to a pixel.
+    const cv::Point small(cvRound(0.25f * corners[i].x - 0.375f), cvRound(0.25f * corners[i].y - 0.375f));
+    const cv::Rect everywhere(small.x - columns, small.y - rows, 2 * columns + 1, 2 * rows + 1);
+    const auto coarse = findBlock(small_left, small_right, small, {5, 4}, everywhere, 0.85);
+    if (!coarse) continue;
+    const cv::Point centre(cvRound(corners[i].x), cvRound(corners[i].y));
+    const cv::Point guess = centre + 4 * (*coarse - small);
+    const auto fine = findBlock(left, right, centre, {7, 7}, {guess.x - 4, guess.y - 4, 9, 9}, 0.85);
+    if (!fine) continue;
+    sightings.push_back(
+        {centre.x - 0.5 * left.cols, static_cast<double>(centre.x - fine->x), static_cast<double>(fine->y - centre.y)});
+  }
+  if (static_cast<int>(sightings.size()) < kEnough) return "";
+
+  const auto swapped =
+      std::count_if(sightings.begin(), sightings.end(), [](const Sighting& s) { return s.disparity < -1.0; });
+  if (static_cast<double>(swapped) > 0.6 * static_cast<double>(sightings.size()))
+    return "left and right images are swapped? Corners lie further right in the right image";
+
+  // Rows over columns: a line through the medians, by the median of slopes between corners far apart.
+  std::vector<double> slopes, rest;
+  for (std::size_t i = 0; i < sightings.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k)
+      if (std::abs(sightings[i].u - sightings[k].u) > 0.1 * left.cols)
+        slopes.push_back((sightings[i].dv - sightings[k].dv) / (sightings[i].u - sightings[k].u));
+  const double slope = slopes.empty() ? 0.0 : median(slopes);
+  for (const Sighting& sighting : sightings) rest.push_back(sighting.dv - slope * sighting.u);
+  const double offset = median(rest);
+  for (double& value : rest) value = std::abs(value - offset);
+  const double scatter = median(rest);
+
+  if (scatter > std::max(max_dv_, 0.5 * std::abs(offset)))
+    return sentence("rows of left and right differ by ", scatter,
+                    " px here and there: not rectified, or not taken at the same moment?");
+  if (std::abs(offset) > max_dv_)
+    return sentence("right image ", std::abs(offset), " px too ", offset > 0.0 ? "low" : "high", ": not rectified?");
+  if (0.5 * left.cols * std::abs(slope) > 2.0 * max_dv_)
+    return sentence("right image turned by ", std::abs(std::atan(slope)) * 180.0 / CV_PI, " degrees ",
+                    slope > 0.0 ? "clockwise" : "counterclockwise", ": not rectified?");
+  return "";
+}
+
+}  // namespace sdvo

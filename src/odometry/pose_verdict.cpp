@@ -1,0 +1,74 @@
+#include "stereo_descriptor_vo/odometry/pose_verdict.hpp"
+
+#include <cmath>
+#include <sstream>
+
+namespace sdvo {
+namespace {
+
+constexpr double kSigmas = 5.0;     // by which noise alone may exceed a limit
+constexpr int kEnoughLasting = 20;  // fewer matches of lasting points say nothing
+
+template <class... Parts>
+PoseVerdict verdict(Trust trust, const Parts&... parts) {
+  std::ostringstream reason;
+  (reason << ... << parts);
+  return {trust, reason.str()};
+}
+
+/// Standard deviation of a motion's translation (0) or rotation (3) in its worst direction, or a little more.
+double deviation(const Matrix6d& covariance, int first) {
+  return std::sqrt(covariance.block<3, 3>(first, first).trace());
+}
+
+}  // namespace
+
+PoseVerdict judgePose(const PoseVerdictOptions& options, int min_inliers, const PoseEvidence& evidence) {
+  const Vector6d motion = logSE3(evidence.motion);
+  const double time = evidence.dt + options.stamp_tolerance;
+  const double noise = kSigmas * deviation(evidence.covariance, 0);
+  const double turn_noise = kSigmas * deviation(evidence.covariance, 3);
+  const double way = evidence.motion.translation().norm(), angle = motion.tail<3>().norm();
+  const double ratio = evidence.matches > 0 ? static_cast<double>(evidence.inliers) / evidence.matches : 0.0;
+
+  // What no motion may be.
+  if (evidence.inliers < min_inliers)
+    return verdict(Trust::kNone, "only ", evidence.inliers, " of ", evidence.matches, " matches agree on one motion");
+  if (ratio < options.doubtful_ratio / 3.0)
+    return verdict(Trust::kNone, "only ", evidence.inliers, " of ", evidence.matches,
+                   " matches agree on one motion, less than a third of tracking/doubtful_ratio");
+  if (way > options.max_speed * time + noise)
+    return verdict(Trust::kNone, "a speed of ", way / evidence.dt, " m/s exceeds tracking/max_speed");
+  if (angle > options.max_rotation_rate * time + turn_noise)
+    return verdict(Trust::kNone, "a rotation of ", angle / evidence.dt, " rad/s exceeds tracking/max_rotation_rate");
+
+  // What a motion should not be.
+  if (evidence.lasting_matches >= kEnoughLasting &&
+      evidence.lasting_inliers < options.doubtful_lasting_ratio * evidence.lasting_matches)
+    return verdict(Trust::kDoubtful, "only ", evidence.lasting_inliers, " of ", evidence.lasting_matches,
+                   " lasting points agree with the motion of ", evidence.inliers, " inliers");
+  if (!evidence.confirmed && evidence.inliers < options.doubtful_inliers)
+    return verdict(Trust::kDoubtful, "only ", evidence.inliers, " inliers");
+  if (!evidence.confirmed && ratio < options.doubtful_ratio)
+    return verdict(Trust::kDoubtful, "only ", evidence.inliers, " of ", evidence.matches, " matches are inliers");
+  if (!evidence.confirmed && evidence.coverage < options.doubtful_coverage)
+    return verdict(Trust::kDoubtful, "inliers in only ", std::round(100.0 * evidence.coverage), " % of the image");
+  if (!evidence.confirmed && evidence.rms > options.doubtful_rms)
+    return verdict(Trust::kDoubtful, "a reprojection error of ", evidence.rms, " px");
+  if (evidence.velocity) {
+    // The velocity before rests on stamps that may be wrong, too.
+    const Vector6d& before = *evidence.velocity;
+    const double change = (motion - before * evidence.dt).head<3>().norm();
+    const double turn_change = (motion - before * evidence.dt).tail<3>().norm();
+    const double forgiven = 2.0 * options.stamp_tolerance;
+    if (change > options.max_acceleration * time * time + before.head<3>().norm() * forgiven + noise)
+      return verdict(Trust::kDoubtful, "a change of the motion by ", change, " m in ", evidence.dt,
+                     " s exceeds tracking/max_acceleration");
+    if (turn_change > options.max_rotation_acceleration * time * time + before.tail<3>().norm() * forgiven + turn_noise)
+      return verdict(Trust::kDoubtful, "a change of the rotation by ", turn_change, " rad in ", evidence.dt,
+                     " s exceeds tracking/max_rotation_acceleration");
+  }
+  return {};
+}
+
+}  // namespace sdvo

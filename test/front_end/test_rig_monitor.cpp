@@ -1,0 +1,96 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/front_end/rig_monitor.hpp"
+
+namespace sdvo {
+namespace {
+
+const cv::Size kSize(640, 400);
+constexpr double kDisparity = 17.0;  // px
+
+const synthetic::Texture& texture() {
+  static const synthetic::Texture grown(11, 5.0, 160.0);
+  return grown;
+}
+
+cv::Mat leftImage() {
+  return synthetic::render(kSize, [](double u, double v) { return texture().at(u, v); });
+}
+
+/// The right view of a plane at kDisparity whose content appears `dv` px lower and turned clockwise by `turn` rad.
+cv::Mat rightImage(double dv, double turn = 0.0, double gain = 1.0) {
+  const double middle_u = 0.5 * kSize.width, middle_v = 0.5 * kSize.height;
+  return synthetic::render(kSize, [=](double u, double v) {
+    const double x = u - middle_u, y = v - dv - middle_v;
+    const double c = std::cos(turn), s = std::sin(turn);
+    return gain * texture().at(middle_u + c * x + s * y + kDisparity, middle_v - s * x + c * y);
+  });
+}
+
+std::vector<cv::Point2f> corners() {
+  std::vector<cv::Point2f> positions;
+  for (float v = 40.3f; v < 360.f; v += 29.1f)
+    for (float u = 40.7f; u < 600.f; u += 31.3f) positions.emplace_back(u, v);
+  return positions;
+}
+
+std::string diagnosis(const cv::Mat& left, const cv::Mat& right) {
+  return RigMonitor({}, 1.5, 192.0).diagnose(left, right, corners());
+}
+
+void expectSaid(const std::string& diagnosis, const std::string& words) {
+  EXPECT_NE(diagnosis.find(words), std::string::npos) << "'" << diagnosis << "' does not say '" << words << "'";
+}
+
+TEST(RigMonitor, LooksOnlyWhenFewCornersAreFound) {
+  const RigMonitor monitor({}, 1.5, 192.0);
+  EXPECT_FALSE(monitor.isSuspicious(1000, 400));
+  EXPECT_TRUE(monitor.isSuspicious(1000, 399));
+  EXPECT_FALSE(monitor.isSuspicious(24, 0)) << "too few to judge by";
+  RigMonitorOptions off;
+  off.enabled = false;
+  EXPECT_FALSE(RigMonitor(off, 1.5, 192.0).isSuspicious(1000, 0));
+}
+
+TEST(RigMonitor, SaysNothingOfARigInOrder) {
+  EXPECT_EQ(diagnosis(leftImage(), rightImage(0.0)), "");
+  EXPECT_EQ(diagnosis(leftImage(), rightImage(1.0)), "") << "less than the matcher takes";
+  EXPECT_EQ(diagnosis(leftImage(), rightImage(0.0, 0.0, 0.5)), "") << "gain is no fault of the rig";
+}
+
+TEST(RigMonitor, NamesTheHeightOfTheRightImage) {
+  expectSaid(diagnosis(leftImage(), rightImage(4.0)), "right image 4.0 px too low: not rectified?");
+  expectSaid(diagnosis(leftImage(), rightImage(-5.0)), "right image 5.0 px too high: not rectified?");
+  expectSaid(diagnosis(leftImage(), rightImage(4.0, 0.0, 0.5)), "right image 4.0 px too low");
+}
+
+TEST(RigMonitor, NamesARotation) {
+  expectSaid(diagnosis(leftImage(), rightImage(0.0, 2.0 * CV_PI / 180.0)), "turned by 2.0 degrees clockwise");
+  expectSaid(diagnosis(leftImage(), rightImage(0.0, -3.0 * CV_PI / 180.0)), "turned by 3.0 degrees counterclockwise");
+}
+
+TEST(RigMonitor, NamesSwappedImages) {
+  expectSaid(diagnosis(rightImage(0.0), leftImage()), "swapped");
+}
+
+TEST(RigMonitor, NamesRowsThatDiffer) {
+  // Waves of 6 px, as no offset and no rotation makes them.
+  const cv::Mat wavy = synthetic::render(
+      kSize, [](double u, double v) { return texture().at(u + kDisparity, v - 6.0 * std::sin(u / 40.0)); });
+  expectSaid(diagnosis(leftImage(), wavy), "px here and there");
+}
+
+TEST(RigMonitor, SaysNothingWhereNothingIsFound) {
+  const cv::Mat dark(kSize, CV_8U, cv::Scalar(3));
+  EXPECT_EQ(diagnosis(leftImage(), dark), "");
+  EXPECT_EQ(diagnosis(dark, dark), "");
+  const synthetic::Texture other(99, 5.0, 160.0);
+  EXPECT_EQ(diagnosis(leftImage(), synthetic::render(kSize, [&](double u, double v) { return other.at(u, v); })), "");
+  EXPECT_EQ(RigMonitor({}, 1.5, 192.0).diagnose(leftImage(), rightImage(4.0), {}), "");
+}
+
+}  // namespace
+}  // namespace sdvo

@@ -1,0 +1,128 @@
+#include <gtest/gtest.h>
+
+#include "stereo_descriptor_vo/odometry/pose_verdict.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr int kMinInliers = 12;
+
+/// A motion of 1 m ahead in 0.1 s that nothing speaks against.
+PoseEvidence soundEvidence() {
+  PoseEvidence evidence;
+  evidence.matches = 500, evidence.inliers = 350;
+  evidence.lasting_matches = 200, evidence.lasting_inliers = 180;
+  evidence.coverage = 0.8, evidence.rms = 0.6;
+  evidence.motion.translation().z() = 1.0;
+  evidence.dt = 0.1;
+  Vector6d velocity = Vector6d::Zero();
+  velocity[2] = 10.0;
+  evidence.velocity = velocity;
+  return evidence;
+}
+
+Trust trustIn(const PoseEvidence& evidence, const PoseVerdictOptions& options = {}) {
+  const PoseVerdict verdict = judgePose(options, kMinInliers, evidence);
+  EXPECT_EQ(verdict.reason.empty(), verdict.trust == Trust::kSound) << verdict.reason;
+  return verdict.trust;
+}
+
+TEST(PoseVerdict, NothingSpeaksAgainstASoundMotion) {
+  EXPECT_EQ(trustIn(soundEvidence()), Trust::kSound);
+  PoseEvidence evidence = soundEvidence();
+  evidence.velocity.reset();
+  evidence.lasting_matches = evidence.lasting_inliers = 0;
+  EXPECT_EQ(trustIn(evidence), Trust::kSound);
+}
+
+TEST(PoseVerdict, TooFewInliersAreNoMotionWhateverConfirmsThem) {
+  PoseEvidence evidence = soundEvidence();
+  evidence.confirmed = true;
+  evidence.matches = 30;
+  evidence.inliers = kMinInliers;
+  EXPECT_EQ(trustIn(evidence), Trust::kSound);
+  evidence.inliers = kMinInliers - 1;
+  EXPECT_EQ(trustIn(evidence), Trust::kNone);
+}
+
+TEST(PoseVerdict, AShareThatChanceGivesIsNoMotion) {
+  PoseEvidence evidence = soundEvidence();
+  evidence.inliers = 67;  // 0.4 / 3 of 500
+  EXPECT_EQ(trustIn(evidence), Trust::kDoubtful);
+  evidence.inliers = 66;
+  EXPECT_EQ(trustIn(evidence), Trust::kNone);
+  evidence.matches = 0, evidence.inliers = kMinInliers;
+  EXPECT_EQ(trustIn(evidence), Trust::kNone);
+}
+
+TEST(PoseVerdict, WeakEvidenceIsDoubtedUnlessConfirmed) {
+  const auto weaken = [](int which) {
+    PoseEvidence evidence = soundEvidence();
+    if (which == 0) evidence.inliers = 39, evidence.matches = 60;
+    if (which == 1) evidence.inliers = 199;  // 0.4 of 500 is 200
+    if (which == 2) evidence.coverage = 0.39;
+    if (which == 3) evidence.rms = 1.21;
+    return evidence;
+  };
+  for (int which = 0; which < 4; ++which) {
+    PoseEvidence evidence = weaken(which);
+    EXPECT_EQ(trustIn(evidence), Trust::kDoubtful) << which;
+    evidence.confirmed = true;
+    EXPECT_EQ(trustIn(evidence), Trust::kSound) << which;
+  }
+}
+
+TEST(PoseVerdict, LastingPointsThatDisagreeAreDoubtEvenWhenConfirmed) {
+  PoseEvidence evidence = soundEvidence();
+  evidence.confirmed = true;
+  evidence.lasting_inliers = 100;  // 0.5 of 200
+  EXPECT_EQ(trustIn(evidence), Trust::kSound);
+  evidence.lasting_inliers = 99;
+  EXPECT_EQ(trustIn(evidence), Trust::kDoubtful);
+  evidence.lasting_matches = 19, evidence.lasting_inliers = 0;  // too few to say anything
+  EXPECT_EQ(trustIn(evidence), Trust::kSound);
+}
+
+TEST(PoseVerdict, SpeedsAndRatesHaveLimits) {
+  PoseEvidence evidence = soundEvidence();
+  evidence.velocity.reset();
+  evidence.motion.translation().z() = 70.0 * 0.12 - 0.01;  // dt and the stamps' tolerance
+  EXPECT_EQ(trustIn(evidence), Trust::kSound);
+  evidence.motion.translation().z() = 70.0 * 0.12 + 0.01;
+  EXPECT_EQ(trustIn(evidence), Trust::kNone);
+  evidence.motion = Eigen::AngleAxisd(6.3 * 0.12 - 0.001, Eigen::Vector3d::UnitY());
+  EXPECT_EQ(trustIn(evidence), Trust::kSound);
+  evidence.motion = Eigen::AngleAxisd(6.3 * 0.12 + 0.001, Eigen::Vector3d::UnitY());
+  EXPECT_EQ(trustIn(evidence), Trust::kNone);
+}
+
+TEST(PoseVerdict, NoiseOverATinyTimeIsNoRate) {
+  PoseVerdictOptions options;
+  options.stamp_tolerance = 0.0;
+  PoseEvidence evidence = soundEvidence();
+  evidence.velocity.reset();
+  evidence.dt = 0.001;
+  evidence.motion = Eigen::AngleAxisd(0.01, Eigen::Vector3d::UnitX());  // 10 rad/s
+  EXPECT_EQ(trustIn(evidence, options), Trust::kNone);
+  evidence.covariance.diagonal().tail<3>().setConstant(1e-6 / 3.0);  // 1 mrad in all: five are 5 mrad
+  EXPECT_EQ(trustIn(evidence, options), Trust::kSound);
+  evidence.covariance.setZero();
+  options.stamp_tolerance = 0.02;
+  EXPECT_EQ(trustIn(evidence, options), Trust::kSound);
+}
+
+TEST(PoseVerdict, AccelerationsAreJudgedAgainstTheVelocityBefore) {
+  PoseEvidence evidence = soundEvidence();
+  evidence.confirmed = true;
+  const double allowed = 20.0 * 0.12 * 0.12 + 10.0 * 0.04;  // max_acceleration and what the stamps may do
+  evidence.motion.translation().z() = 1.0 - allowed + 0.001;
+  EXPECT_EQ(trustIn(evidence), Trust::kSound);
+  evidence.motion.translation().z() = 1.0 - allowed - 0.001;
+  EXPECT_EQ(trustIn(evidence), Trust::kDoubtful);
+  evidence.motion = soundEvidence().motion;
+  evidence.motion.linear() = expSO3({0.0, 30.0 * 0.12 * 0.12 + 0.001, 0.0});
+  EXPECT_EQ(trustIn(evidence), Trust::kDoubtful);
+}
+
+}  // namespace
+}  // namespace sdvo
