@@ -286,6 +286,12 @@ TrajectoryErrors evaluateTrajectory(const Trajectory& ground_truth, const Trajec
   errors.ate_first_pose_m = rootMeanSquareDistance(from_first, true_positions);
   errors.final_drift_m = (from_first.rightCols<1>() - true_positions.rightCols<1>()).norm();
   errors.final_drift_percent = errors.path_length > 0.0 ? 100.0 * errors.final_drift_m / errors.path_length : kNaN;
+  for (std::size_t i = 0; i < estimate.size(); ++i) {
+    const Eigen::Isometry3d error = motionError(truth, estimate, 0, i);
+    errors.final_drift_deg = kDegreesPerRadian * rotationAngle(error.linear());
+    errors.largest_drift_m = std::max(errors.largest_drift_m, error.translation().norm());
+    errors.largest_drift_deg = std::max(errors.largest_drift_deg, errors.final_drift_deg);
+  }
   errors.scale = scaleOfSteps(truth, estimate);
   return errors;
 }

@@ -116,7 +116,8 @@ double DrivePath::distanceAt(double time) const {
 }
 
 const std::vector<std::string>& presetNames() {
-  static const std::vector<std::string> names = {"straight", "figure_eight", "city_loop", "hover", "still"};
+  static const std::vector<std::string> names = {"straight",       "figure_eight", "city_loop",
+                                                 "back_and_forth", "hover",        "still"};
   return names;
 }
 
@@ -129,6 +130,14 @@ DrivePath makePresetPath(const std::string& name, int frames, double rate, std::
 
   if (name == "still") {
     poses.assign(static_cast<std::size_t>(frames > 0 ? frames : 100), Eigen::Isometry3d::Identity());
+  } else if (name == "back_and_forth") {
+    constexpr double kWay = 20.0, kPeriod = 13.0;  // m ahead, s for there and back
+    constexpr int kTimes = 5;
+    if (frames <= 0) frames = 1 + static_cast<int>(kTimes * kPeriod * rate);
+    for (int i = 0; i < frames; ++i) {
+      const double z = 0.5 * kWay * (1.0 - std::cos(2.0 * M_PI * i / (rate * kPeriod)));
+      poses.push_back(poseFrom(0.3 * std::sin(M_PI * z / kWay), 0.0, z, 0.0, 0.0, 0.0));
+    }
   } else if (name == "hover") {
     const Wobble x(random, 0.03, 0.15), y(random, 0.03, 0.2), z(random, 0.03, 0.15), yaw(random, 0.02, 0.1),
         pitch(random, 0.1, 0.4), roll(random, 0.1, 0.4);

@@ -44,6 +44,9 @@ void printTable(const TrajectoryErrors& errors) {
   line("ATE, rmse with equal first poses [m]", cell("%.4f", errors.ate_first_pose_m));
   line("final drift [m]", cell("%.4f", errors.final_drift_m));
   line("final drift [% of length]", cell("%.4f", errors.final_drift_percent));
+  line("final drift [deg]", cell("%.4f", errors.final_drift_deg));
+  line("largest drift [m]", cell("%.4f", errors.largest_drift_m));
+  line("largest drift [deg]", cell("%.4f", errors.largest_drift_deg));
   line("scale, median of estimated / true step", cell("%.5f", errors.scale));
 }
 
@@ -83,6 +86,9 @@ void writeJson(const std::string& path, const TrajectoryErrors& errors) {
   field("ate_first_pose_m", errors.ate_first_pose_m);
   field("final_drift_m", errors.final_drift_m);
   field("final_drift_percent", errors.final_drift_percent);
+  field("final_drift_deg", errors.final_drift_deg);
+  field("largest_drift_m", errors.largest_drift_m);
+  field("largest_drift_deg", errors.largest_drift_deg);
   field("scale", errors.scale);
   file << "\n}\n";
   file.close();

@@ -219,7 +219,7 @@ int main(int argc, char** argv) {
   CLI::App app("Renders a stereo drive of any length with exact ground truth in KITTI layout.");
   Request request;
   app.add_option("--trajectory", request.trajectory,
-                 "straight, figure_eight, city_loop, hover, still, or a KITTI pose file")
+                 "straight, figure_eight, city_loop, back_and_forth, hover, still, or a KITTI pose file")
       ->required();
   app.add_option("--output", request.output, "Directory to create")->required();
   app.add_option("--frames", request.frames, "Pairs to render [default: all of the trajectory]")

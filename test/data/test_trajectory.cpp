@@ -273,6 +273,18 @@ TEST(Errors, ShorterEstimateIsComparedToTheFirstPoses) {
   EXPECT_NEAR(errors.sub_paths.translation_percent, 0.0, 1e-12);
 }
 
+TEST(Errors, OfTheWorstFrameAndOfTheLast) {
+  Trajectory estimate = straightLine(10);
+  const double turn = 0.02;  // rad
+  estimate[4] = estimate[4] * pose(0.0, 0.3, 0.0, turn);
+  estimate[10] = estimate[10] * pose(0.0, 0.1, 0.0, 0.5 * turn);
+  const TrajectoryErrors errors = evaluateTrajectory(straightLine(10), estimate, {1.0});
+  EXPECT_NEAR(errors.largest_drift_m, 0.3, 1e-12);
+  EXPECT_NEAR(errors.final_drift_m, 0.1, 1e-12);
+  EXPECT_NEAR(errors.largest_drift_deg, 2.0 * errors.final_drift_deg, 1e-9);
+  EXPECT_GT(errors.final_drift_deg, 0.0);
+}
+
 TEST(Errors, WithoutMotionAreNaNNotZero) {
   const Trajectory still(3, Eigen::Isometry3d::Identity());
   const TrajectoryErrors errors = evaluateTrajectory(still, still);

@@ -267,6 +267,11 @@ TEST(RenderDrive, PresetsHaveTheirShape) {
   for (int i = 1; i < loop.count(); ++i)
     standing += (loop.pose(i).translation() - loop.pose(i - 1).translation()).norm() < 1e-9;
   EXPECT_GT(standing, 2 * 20) << "stops of three seconds";
+  const DrivePath to_and_fro = makePresetPath("back_and_forth", 0, 10.0, 1);
+  ASSERT_EQ(to_and_fro.count(), 651);
+  EXPECT_NEAR(length(to_and_fro), 200.0, 1.0);
+  for (int lap = 0; lap <= 5; ++lap) EXPECT_LT(to_and_fro.pose(130 * lap).translation().norm(), 1e-9) << lap;
+  EXPECT_NEAR(to_and_fro.pose(65).translation().z(), 20.0, 1e-9);
   for (const std::string& name : presetNames()) {
     const DrivePath path = makePresetPath(name, 50, 10.0, 3);
     EXPECT_EQ(50, path.count());

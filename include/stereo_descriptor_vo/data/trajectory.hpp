@@ -57,6 +57,9 @@ struct TrajectoryErrors {
   double ate_first_pose_m = 0.0;          ///< rmse of positions with the first poses laid upon each other
   double final_drift_m = 0.0;             ///< position error of the last frame, first poses laid upon each other
   double final_drift_percent = 0.0;       ///< of the path length
+  double final_drift_deg = 0.0;           ///< rotation error of the last frame, first poses laid upon each other
+  double largest_drift_m = 0.0;           ///< the same of the worst frame
+  double largest_drift_deg = 0.0;         ///< … which may be another one
   double scale = 0.0;                     ///< median over steps of estimated / true step length
 };
 
