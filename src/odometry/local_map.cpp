@@ -162,7 +162,8 @@ bool LocalMap::needsKeyframe() const {
 /// goes, and of too many the one that adds the least to the one before it.
 void LocalMap::forgetKeyframe() {
   const auto lasting = [&] { return frames_.size() - 1 - static_cast<std::size_t>(options_.keyframes); };
-  if (!frames_[lasting() - 1].is_recalled) memory_.remember(camera_, keyframe(lasting() - 1));
+  if (options_.remembered_keyframes > 0 && !frames_[lasting() - 1].is_recalled)
+    memory_.remember(camera_, keyframe(lasting() - 1));
   const std::vector<int> shared = sharedPoints();
   const auto too_few = std::find_if(shared.begin(), shared.begin() + static_cast<std::ptrdiff_t>(lasting()),
                                     [&](int points) { return points < options_.lasting_points; });
