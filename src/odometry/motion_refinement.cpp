@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "log_sum.hpp"
 
@@ -84,6 +85,13 @@ NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementO
     }
   }
   return equations;
+}
+
+NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementOptions& options,
+                             const Correspondences& correspondences, Eigen::Isometry3d& T) {
+  std::vector<int> all(correspondences.size());
+  std::iota(all.begin(), all.end(), 0);
+  return refineMotion(camera, options, correspondences, all, T);
 }
 
 }  // namespace sdvo

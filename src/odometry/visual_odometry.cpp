@@ -2,81 +2,19 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <bitset>
 #include <cmath>
-#include <iterator>
-#include <numeric>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
 
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
-#include "stereo_descriptor_vo/odometry/rival_motion.hpp"
+#include "stereo_descriptor_vo/odometry/correspondences.hpp"
+#include "stereo_descriptor_vo/odometry/motion_doubt.hpp"
 
 namespace sdvo {
 namespace {
 
-constexpr int kWatched = 5;         // pairs after a motion was contested
-constexpr int kEnoughLasting = 20;  // fewer matches of lasting points do not tell which motion is the camera's
-
-/// How much less a predicted motion is known than a measured one: constant velocity errs by the acceleration, for which
-/// a vehicle's 5 m/s^2 and 2 rad/s^2 stand.
-Matrix6d predictionCovariance(double dt) {
-  const double translation = 0.5 * 5.0 * dt * dt, rotation = 0.5 * 2.0 * dt * dt;
-  Vector6d variance;
-  variance << Eigen::Vector3d::Constant(translation * translation), Eigen::Vector3d::Constant(rotation * rotation);
-  return variance.asDiagonal();
-}
-
-/// What could have been travelled unseen, by a vehicle that went on as before and accelerated as above.
-Matrix6d travelCovariance(const Vector6d& velocity, double seconds, double max_speed) {
-  const double translation =
-      std::min(velocity.head<3>().norm() * seconds + 0.5 * 5.0 * seconds * seconds, max_speed * seconds);
-  const double rotation = std::min(velocity.tail<3>().norm() * seconds + 0.5 * 2.0 * seconds * seconds, CV_PI);
-  Vector6d variance;
-  variance << Eigen::Vector3d::Constant(translation * translation), Eigen::Vector3d::Constant(rotation * rotation);
-  return variance.asDiagonal();
-}
-
-/// Share of the cells over the image that hold one of the pair's rows.
-double coverage(const StereoFeatures& features, const std::vector<int>& inlier_rows) {
-  constexpr int kColumns = 8, kRows = 4;
-  std::bitset<kColumns * kRows> cells;
-  for (const int i : inlier_rows) {
-    const int column = static_cast<int>(features.u[i] * kColumns / features.camera.width);
-    const int row = static_cast<int>(features.v[i] * kRows / features.camera.height);
-    cells.set(static_cast<std::size_t>(std::clamp(row, 0, kRows - 1) * kColumns + std::clamp(column, 0, kColumns - 1)));
-  }
-  return static_cast<double>(cells.count()) / (kColumns * kRows);
-}
-
-/// Rows of the pair that the motion's inliers matched, but for the rejected ones.
-std::vector<int> inlierRows(const std::vector<FeatureMatch>& matches, const std::vector<int>& inliers,
-                            const std::vector<int>& rejected = {}) {
-  std::vector<int> rows;
-  for (const int i : inliers)
-    if (std::find(rejected.begin(), rejected.end(), matches[i].current) == rejected.end())
-      rows.push_back(matches[i].current);
-  return rows;
-}
-
-/// Rows that are among the first but not among the second.
-std::vector<int> rowsOnlyIn(std::vector<int> first, std::vector<int> second) {
-  std::sort(first.begin(), first.end());
-  std::sort(second.begin(), second.end());
-  std::vector<int> rows;
-  std::set_difference(first.begin(), first.end(), second.begin(), second.end(), std::back_inserter(rows));
-  return rows;
-}
-
-/// As large in every direction as two motions differ.
-Matrix6d disagreement(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
-  const Vector6d difference = logSE3(a.inverse() * b);
-  Vector6d variance;
-  variance << Eigen::Vector3d::Constant(difference.head<3>().squaredNorm()),
-      Eigen::Vector3d::Constant(difference.tail<3>().squaredNorm());
-  return variance.asDiagonal();
-}
+constexpr int kWatched = 5;  // pairs after a motion was contested
 
 }  // namespace
 
@@ -95,10 +33,15 @@ const char* toString(TrackingState state) {
 }
 
 VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
-    : options_(checked(options)), matcher_(options.matcher), estimator_(options.motion), state_(options.calibration) {}
+    : options_(checked(options)),
+      search_(options.matcher, options.motion, options.alignment, options.tracking),
+      matcher_(options.matcher),
+      estimator_(options.motion),
+      state_(options.calibration) {}
 
 void VisualOdometry::configure(const VisualOdometryOptions& options) {
   options_ = checked(options);
+  search_ = MotionSearch(options.matcher, options.motion, options.alignment, options.tracking);
   matcher_ = FeatureMatcher(options.matcher);
   estimator_ = MotionEstimator(options.motion);
 }
@@ -118,7 +61,7 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features) {
   const double dt = state_.last_stamp ? static_cast<double>(features.stamp - *state_.last_stamp) * 1e-9 : 0.0;
   const bool continued = state_.map && state_.map->continuedBy(features);
   const bool frozen = isFrozen(features, dt);
-  const Localisation found = continued && !frozen ? localise(features, dt) : Localisation{};
+  const MotionHypothesis found = continued && !frozen ? localise(features, dt) : MotionHypothesis{};
 
   // Nothing has changed so far, and from here on nothing is refused.
   Stopwatch stopwatch;
@@ -151,237 +94,16 @@ void VisualOdometry::refuse(const StereoFeatures& features) const {
                                 std::to_string(*state_.last_stamp) + " ns");
 }
 
-VisualOdometry::Localisation VisualOdometry::localise(const StereoFeatures& features, double dt) const {
+/// Looks for the pair in the map.
+MotionHypothesis VisualOdometry::localise(const StereoFeatures& features, double dt) const {
+  const RigCalibration calibration = state_.calibration.calibration();
+  MotionScene scene{*state_.map, calibration, features, std::nullopt, state_.velocity, state_.contested_pairs > 0};
   // The motion since the map's newest pair: what was already covered by predicted pairs, and the velocity from there
   // on.
-  std::optional<Eigen::Isometry3d> prior;
   if (state_.velocity && dt <= options_.tracking.max_gap)
-    prior = (state_.map->newestPose() * state_.T_origin_camera * expSE3(*state_.velocity * dt)).inverse();
-  Localisation found = search(features, prior);
-  if (found.verdict.trust == Trust::kSound && state_.contested_pairs == 0) {
-    align(features, found);
-    if (!hasStrayed(features.camera, found)) return found;
-    found.sightings.clear();
-  }
-
-  // The prior itself may be what misled the search, and what moves by itself may outnumber the world.
-  std::vector<Localisation> hypotheses = {std::move(found)};
-  if (prior) hypotheses.push_back(search(features, std::nullopt));
-  const Localisation all = hypotheses.back();
-  std::vector<int> lasting, outliers;
-  for (int i = 0; i < static_cast<int>(all.matches.size()); ++i) {
-    if (isLasting(all, i)) lasting.push_back(i);
-    if (!std::binary_search(all.motion.inliers.begin(), all.motion.inliers.end(), i)) outliers.push_back(i);
-  }
-  for (const std::vector<int>& subset : {lasting, outliers}) hypotheses.push_back(searchAmong(features, all, subset));
-  found = choose(std::move(hypotheses));
-  if (found.verdict.trust != Trust::kNone) align(features, found);
-  return found;
-}
-
-/// A motion that some of another hypothesis' matches agree on, and whatever else does.
-VisualOdometry::Localisation VisualOdometry::searchAmong(const StereoFeatures& features, const Localisation& all,
-                                                         const std::vector<int>& subset) const {
-  Stopwatch stopwatch;
-  Localisation found = all;
-  found.match_time = 0.0;
-  found.motion = estimateAmong(estimator_, features.camera, all.correspondences, subset);
-  if (found.motion.success)
-    found.motion.inliers = PoseProblem(features.camera, all.correspondences, options_.motion.inlier_threshold)
-                               .inliers(found.motion.T_current_reference);
-  weigh(features, found);
-  found.motion_time = stopwatch.lap();
-  return found;
-}
-
-/// Whether a match is one of a point that stood still in several pairs.
-bool VisualOdometry::isLasting(const Localisation& found, int match) const {
-  constexpr int kPairs = 4;
-  return found.view.seen[found.matches[match].reference] >= kPairs;
-}
-
-/// Whether most lasting points lie beside their aligned sightings: a motion between those of two things, which agrees
-/// roughly with both.
-bool VisualOdometry::hasStrayed(const StereoCamera& camera, const Localisation& found) const {
-  constexpr double kClose = 1.0;  // px
-  constexpr double kMost = 0.6;
-  int lasting = 0, close = 0;
-  for (std::size_t k = 0; k < found.sightings.size(); ++k) {
-    const int i = found.motion.inliers[k];
-    const LocalMap::Sighting& sighting = found.sightings[k];
-    if (!sighting.aligned || !isLasting(found, i)) continue;
-    const Eigen::Vector3d point = found.motion.T_current_reference * found.correspondences[i].point;
-    ++lasting;
-    close += (camera.project(point) - sighting.measurement).head<2>().norm() < kClose;
-  }
-  return lasting >= kEnoughLasting && close < kMost * lasting;
-}
-
-/// Takes the hypothesis that most lasting points agree with, for they stood still so far; where they do not tell, the
-/// one that goes on as before. What the others say confirms it or speaks against it.
-VisualOdometry::Localisation VisualOdometry::choose(std::vector<Localisation> hypotheses) const {
-  const auto change = [&](const Localisation& of) {
-    return (expSE3(*state_.velocity * -of.evidence.dt) * of.evidence.motion).translation().norm();
-  };
-  const auto isBetter = [&](const Localisation& a, const Localisation& b) {
-    if (a.motion.success != b.motion.success) return a.motion.success;
-    constexpr int kVotes = 8;
-    const int lasting_a = a.lasting_close, lasting_b = b.lasting_close;
-    if (lasting_a + lasting_b >= kVotes && (lasting_a >= 2 * lasting_b || lasting_b >= 2 * lasting_a))
-      return lasting_a > lasting_b;
-    const bool comparable = b.evidence.inliers > leastOfRival(a.motion) && a.evidence.inliers > leastOfRival(b.motion);
-    if (state_.velocity && comparable && !areOne(a, b)) return change(a) < change(b);
-    return a.evidence.inliers > b.evidence.inliers;
-  };
-  std::size_t best = 0;
-  double match_time = 0.0, motion_time = 0.0;
-  for (std::size_t k = 0; k < hypotheses.size(); ++k) {
-    const bool same =
-        best != k && hypotheses[best].verdict.trust == Trust::kSound && areOne(hypotheses[best], hypotheses[k]);
-    if (!same && isBetter(hypotheses[k], hypotheses[best])) best = k;
-    match_time += hypotheses[k].match_time;
-    motion_time += hypotheses[k].motion_time;
-  }
-  Localisation& chosen = hypotheses[best];
-  chosen.match_time = match_time;
-  chosen.motion_time = motion_time;
-  if (!chosen.motion.success) return std::move(chosen);
-
-  const Localisation* rival = nullptr;
-  std::vector<int> of_rival;  // rows that the rival explains and the chosen one does not
-  const std::vector<int> own = inlierRows(chosen.matches, chosen.motion.inliers);
-  for (const Localisation& other : hypotheses) {
-    if (&other == &chosen || !other.motion.success) continue;
-    if (areOne(chosen, other)) {
-      chosen.evidence.confirmed |= chosen.guided != other.guided;  // from matches of their own
-      continue;
-    }
-    std::vector<int> rows = rowsOnlyIn(inlierRows(other.matches, other.motion.inliers), own);
-    if (static_cast<int>(rows.size()) >= leastOfRival(chosen.motion) && rows.size() > of_rival.size())
-      rival = &other, of_rival = std::move(rows);
-  }
-  // What the rival explains does not speak against the chosen one.
-  chosen.evidence.matches -=
-      static_cast<int>(std::count_if(chosen.matches.begin(), chosen.matches.end(), [&](const FeatureMatch& match) {
-        return std::binary_search(of_rival.begin(), of_rival.end(), match.current);
-      }));
-  chosen.verdict = judgePose(options_.tracking, options_.motion.min_inliers, chosen.evidence);
-  // Less than that is something small that moves, or a texture that repeats itself; unless it was larger just before.
-  const double substantial_share = state_.contested_pairs > 0 ? 0.0 : 0.35;
-  const bool substantial = static_cast<double>(of_rival.size()) >= substantial_share * chosen.evidence.inliers;
-  chosen.contested = lastingDisagree(chosen.evidence);
-  if (rival && (substantial ? chosen.verdict.trust != Trust::kNone : chosen.verdict.trust == Trust::kDoubtful)) {
-    chosen.contested = true;
-    chosen.T_current_reference_else = rival->motion.T_current_reference;
-    chosen.verdict = {Trust::kDoubtful, "two motions in view, of " + std::to_string(own.size()) + " and " +
-                                            std::to_string(of_rival.size()) +
-                                            " matches: does something move before the camera?"};
-  }
-  return std::move(chosen);
-}
-
-/// Whether a motion is not that of the points that stood still so far.
-bool VisualOdometry::lastingDisagree(const PoseEvidence& evidence) const {
-  return evidence.lasting_matches >= kEnoughLasting &&
-         evidence.lasting_inliers < options_.tracking.doubtful_lasting_ratio * evidence.lasting_matches;
-}
-
-/// Whether two hypotheses mean one motion.
-bool VisualOdometry::areOne(const Localisation& a, const Localisation& b) const {
-  return a.motion.success && b.motion.success &&
-         agree(state_.map->camera(), a.correspondences, a.motion.inliers, a.motion.T_current_reference,
-               b.motion.T_current_reference);
-}
-
-/// Fewer inliers than that are no rival of a motion.
-int VisualOdometry::leastOfRival(const MotionEstimate& motion) const {
-  constexpr double kLeast = 0.1;
-  return std::max(2 * options_.motion.min_inliers,
-                  static_cast<int>(kLeast * static_cast<double>(motion.inliers.size())));
-}
-
-/// Gathers what speaks for the motion found and judges it.
-void VisualOdometry::weigh(const StereoFeatures& features, Localisation& found) const {
-  const std::vector<int>& inliers = found.motion.inliers;
-  const auto lasts = [&](int match) { return isLasting(found, match); };
-  PoseEvidence& evidence = found.evidence;
-  evidence = {};
-  evidence.matches = static_cast<int>(found.matches.size());
-  evidence.inliers = static_cast<int>(inliers.size());
-  for (int i = 0; i < evidence.matches; ++i) evidence.lasting_matches += lasts(i);
-  evidence.lasting_inliers = static_cast<int>(std::count_if(inliers.begin(), inliers.end(), lasts));
-  found.lasting_close = static_cast<int>(std::count_if(inliers.begin(), inliers.end(), [&](int i) {
-    const auto residual =
-        reprojectionResidual(features.camera, found.motion.T_current_reference, found.correspondences[i]);
-    return lasts(i) && residual && residual->norm() < 0.5 * options_.motion.inlier_threshold;
-  }));
-  evidence.coverage = coverage(features, inlierRows(found.matches, inliers));
-  evidence.rms = found.motion.rms;
-  evidence.motion = found.motion.T_current_reference.inverse();
-  evidence.covariance = found.motion.covariance;
-  evidence.dt = static_cast<double>(features.stamp - state_.map->newestStamp()) * 1e-9;
-  evidence.velocity = state_.velocity;
-  found.verdict = found.motion.success ? judgePose(options_.tracking, options_.motion.min_inliers, evidence)
-                                       : PoseVerdict{Trust::kNone, found.motion.reason};
-}
-
-VisualOdometry::Localisation VisualOdometry::search(const StereoFeatures& features,
-                                                    const std::optional<Eigen::Isometry3d>& T_current_reference) const {
-  Localisation found;
-  found.guided = T_current_reference.has_value();
-  found.view = state_.map->view();
-  Stopwatch stopwatch;
-  found.matches = matcher_.match(found.view.rows, features, T_current_reference);
-  found.match_time = stopwatch.lap();
-  found.correspondences = correspond(found.view.rows, features, found.matches);
-  found.motion = estimator_.estimate(features.camera, found.correspondences);
-  weigh(features, found);
-  found.motion_time = stopwatch.lap();
-  return found;
-}
-
-/// (u_left, v_left, u_right) of a feature whose position is known better by `shift`, px, without the rig's error.
-Eigen::Vector3d VisualOdometry::measure(const StereoFeatures& features, int row, const Eigen::Vector2d& shift) const {
-  const double u = features.u[row] + shift.x(), v = features.v[row] + shift.y();
-  const double error = state_.calibration.calibration().disparityError(features.camera, u);
-  return {u, v, u - (features.disparity[row] - error)};
-}
-
-std::vector<Correspondence> VisualOdometry::correspond(const DescribedPoints& reference, const StereoFeatures& features,
-                                                       const std::vector<FeatureMatch>& matches) const {
-  std::vector<Correspondence> correspondences;
-  correspondences.reserve(matches.size());
-  for (const FeatureMatch& match : matches)
-    correspondences.push_back(
-        {reference.positions[match.reference], measure(features, match.current, Eigen::Vector2d::Zero())});
-  return correspondences;
-}
-
-/// Refines the motion on correspondences that have no outliers among them.
-void VisualOdometry::refine(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
-                            Eigen::Isometry3d& T_current_reference) const {
-  std::vector<int> all(correspondences.size());
-  std::iota(all.begin(), all.end(), 0);
-  refineMotion(camera, options_.motion, correspondences, all, T_current_reference);
-}
-
-void VisualOdometry::align(const StereoFeatures& features, Localisation& found) const {
-  constexpr std::size_t kEnough = 30;  // fewer are no better than all corners together
-  Stopwatch stopwatch;
-  const Eigen::Isometry3d T_camera_origin = found.motion.T_current_reference * state_.map->newestPose();
-  std::vector<Correspondence> aligned;
-  for (const int i : found.motion.inliers) {
-    const FeatureMatch& match = found.matches[i];
-    const LocalMap::Sighting sighting = state_.map->sight(options_.alignment, features, T_camera_origin,
-                                                          found.view.point[match.reference], match.current);
-    found.sightings.push_back(sighting);
-    if (!sighting.aligned) continue;
-    const Eigen::Vector2d corner(features.u[match.current], features.v[match.current]);
-    aligned.push_back({found.view.rows.positions[match.reference],
-                       measure(features, match.current, sighting.measurement.head<2>() - corner)});
-  }
-  if (aligned.size() >= kEnough) refine(features.camera, aligned, found.motion.T_current_reference);
-  found.motion_time += stopwatch.lap();
+    scene.T_current_reference =
+        (state_.map->newestPose() * state_.T_origin_camera * expSE3(*state_.velocity * dt)).inverse();
+  return search_.find(scene);
 }
 
 VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
@@ -410,7 +132,8 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
   return step;
 }
 
-VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, double dt, const Localisation& found) {
+VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, double dt,
+                                               const MotionHypothesis& found) {
   LocalMap& map = *state_.map;
   std::optional<LocalMap> before;  // for a motion that the adjustment may refute
   if (found.verdict.trust != Trust::kSound) before = map;
@@ -431,15 +154,12 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
   step.rejected_rows = adjustment.rejected_rows;
   step.T_previous_current = (map.newestPose() * state_.T_origin_camera).inverse();
   PoseEvidence evidence = found.evidence;
-  const std::vector<int> confirmed = inlierRows(found.matches, found.motion.inliers, step.rejected_rows);
+  const std::vector<int> confirmed = found.inlierRows(step.rejected_rows);
   evidence.inliers = static_cast<int>(confirmed.size());
   evidence.coverage = coverage(features, confirmed);
   // What the adjustment did to the map as a whole is no motion.
   evidence.motion = newest_before * (T_before_origin.inverse() * map.poseBeforeNewest()) * map.newestPose().inverse();
-  evidence.lasting_inliers = 0;
-  for (const int i : found.motion.inliers)
-    evidence.lasting_inliers += isLasting(found, i) && std::find(step.rejected_rows.begin(), step.rejected_rows.end(),
-                                                                 found.matches[i].current) == step.rejected_rows.end();
+  evidence.lasting_inliers = found.lastingInliers(step.rejected_rows);
   PoseVerdict verdict = judgePose(options_.tracking, options_.motion.min_inliers, evidence);
   if (verdict.trust == Trust::kNone) {
     // Without a map to go back to, what it has become is of no use.
@@ -449,7 +169,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
       breakStream();
     return predict(features, dt, verdict.reason + " after the adjustment");
   }
-  if (lastingDisagree(evidence)) state_.contested_pairs = kWatched;
+  if (search_.lastingDisagree(evidence)) state_.contested_pairs = kWatched;
   if (verdict.trust == Trust::kSound) verdict = found.verdict;
   const bool watched = verdict.trust == Trust::kSound && state_.contested_pairs > 0;
   if (watched) verdict = {Trust::kDoubtful, "a moment ago two motions were in view, or none was certain"};
@@ -491,7 +211,8 @@ void VisualOdometry::recall(const StereoFeatures& features) {
   const OldKeyframe* old = map.revisited();
   if (!old) return;
   const auto matches = matcher_.match(old->rows, features, map.newestPose() * old->T_camera_origin.inverse());
-  MotionEstimate motion = estimator_.estimate(features.camera, correspond(old->rows, features, matches));
+  const RigCalibration calibration = state_.calibration.calibration();
+  MotionEstimate motion = estimator_.estimate(features.camera, correspond(old->rows, features, matches, calibration));
   if (!motion.success) return;
 
   std::vector<LocalMap::Tie> ties;
@@ -503,13 +224,13 @@ void VisualOdometry::recall(const StereoFeatures& features) {
                                               motion.T_current_reference * old->T_camera_origin, point.position);
     if (!found) continue;
     const Eigen::Vector3d& then = old->rows.positions[match.reference];
-    const Eigen::Vector3d measurement = measure(features, match.current, found->shift);
+    const Eigen::Vector3d measurement = measurementOf(features, match.current, calibration, found->shift);
     const double scale = then.z() / (motion.T_current_reference * then).z();
     ties.push_back({match.reference, match.current, measurement.head<2>(), found->sigma, scale});
     aligned.push_back({then, measurement});
   }
   if (static_cast<int>(ties.size()) < options_.map.lasting_points) return;
-  refine(features.camera, aligned, motion.T_current_reference);
+  refineMotion(features.camera, options_.motion, aligned, motion.T_current_reference);
 
   // What the map lost since then, it lost as a whole: the adjustment would take so large an offset for outliers.
   constexpr double kSignificant = 16.8;  // chi-square of six, 99 %
@@ -533,7 +254,7 @@ void VisualOdometry::cover(Step& step) {
 
 /// How far a doubtful motion may be off: as far as the hypothesis that speaks against it, or else as what was
 /// predicted; and as far as the adjustment moved it.
-Matrix6d VisualOdometry::doubt(const Localisation& found, const Eigen::Isometry3d& T_previous_measured,
+Matrix6d VisualOdometry::doubt(const MotionHypothesis& found, const Eigen::Isometry3d& T_previous_measured,
                                const Eigen::Isometry3d& T_previous_current, double dt) const {
   const Matrix6d moved = disagreement(T_previous_current, T_previous_measured);
   if (found.T_current_reference_else) {
@@ -569,7 +290,7 @@ void VisualOdometry::move(const Eigen::Isometry3d& T_previous_current) {
   state_.distance += T_previous_current.translation().norm();
 }
 
-OdometryResult VisualOdometry::report(const StereoFeatures& features, double dt, const Localisation& found,
+OdometryResult VisualOdometry::report(const StereoFeatures& features, double dt, const MotionHypothesis& found,
                                       const Step& step) const {
   OdometryResult result;
   result.state = step.state;
@@ -600,7 +321,7 @@ OdometryResult VisualOdometry::report(const StereoFeatures& features, double dt,
     FeatureFlow& flow = result.flow[i];
     flow.inlier = std::find(rejected.begin(), rejected.end(), flow.current) == rejected.end();
   }
-  const std::vector<int> inliers = inlierRows(found.matches, found.motion.inliers, rejected);
+  const std::vector<int> inliers = found.inlierRows(rejected);
   result.features = features.count();
   result.matches = static_cast<int>(found.matches.size());
   result.inliers = static_cast<int>(inliers.size());

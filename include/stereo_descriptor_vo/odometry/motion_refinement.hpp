@@ -45,4 +45,9 @@ NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementO
                              const std::vector<Correspondence>& correspondences, const std::vector<int>& subset,
                              Eigen::Isometry3d& T_current_reference);
 
+/// The same on all of the correspondences.
+NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementOptions& options,
+                             const std::vector<Correspondence>& correspondences,
+                             Eigen::Isometry3d& T_current_reference);
+
 }  // namespace sdvo

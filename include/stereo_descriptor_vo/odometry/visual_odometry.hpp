@@ -14,6 +14,7 @@
 #include "stereo_descriptor_vo/odometry/feature_matcher.hpp"
 #include "stereo_descriptor_vo/odometry/local_map.hpp"
 #include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
+#include "stereo_descriptor_vo/odometry/motion_search.hpp"
 #include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
 #include "stereo_descriptor_vo/odometry/pose_verdict.hpp"
@@ -124,22 +125,6 @@ class VisualOdometry {
   const VisualOdometryOptions& options() const { return options_; }
 
  private:
-  /// Where a pair is, as matching tells.
-  struct Localisation {
-    PoseEvidence evidence;
-    PoseVerdict verdict;
-    MotionEstimate motion;  ///< since the map's newest pair
-    /// The same as another hypothesis has it that could not be ruled out.
-    std::optional<Eigen::Isometry3d> T_current_reference_else;
-    int lasting_close = 0;   ///< lasting points that agree closely
-    bool guided = false;     ///< found with a prior
-    bool contested = false;  ///< by a motion of something else in view
-    LocalMap::View view;
-    std::vector<FeatureMatch> matches;  ///< rows of the view to rows of the pair
-    std::vector<Correspondence> correspondences;
-    std::vector<LocalMap::Sighting> sightings;   ///< of the motion's inliers
-    double match_time = 0.0, motion_time = 0.0;  ///< s
-  };
   /// What becomes of the pose with a pair.
   struct Step {
     TrackingState state = TrackingState::kWaiting;
@@ -152,37 +137,22 @@ class VisualOdometry {
   };
 
   void refuse(const StereoFeatures& features) const;
-  Localisation localise(const StereoFeatures& features, double dt) const;
-  Eigen::Vector3d measure(const StereoFeatures& features, int row, const Eigen::Vector2d& shift) const;
-  std::vector<Correspondence> correspond(const DescribedPoints& reference, const StereoFeatures& features,
-                                         const std::vector<FeatureMatch>& matches) const;
-  void refine(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
-              Eigen::Isometry3d& T_current_reference) const;
-  Localisation search(const StereoFeatures& features,
-                      const std::optional<Eigen::Isometry3d>& T_current_reference) const;
-  void weigh(const StereoFeatures& features, Localisation& found) const;
-  Localisation searchAmong(const StereoFeatures& features, const Localisation& all,
-                           const std::vector<int>& subset) const;
-  bool isLasting(const Localisation& found, int match) const;
-  bool hasStrayed(const StereoCamera& camera, const Localisation& found) const;
-  Localisation choose(std::vector<Localisation> hypotheses) const;
-  bool lastingDisagree(const PoseEvidence& evidence) const;
-  bool areOne(const Localisation& a, const Localisation& b) const;
-  int leastOfRival(const MotionEstimate& motion) const;
-  void align(const StereoFeatures& features, Localisation& found) const;
+  MotionHypothesis localise(const StereoFeatures& features, double dt) const;
   bool isFrozen(const StereoFeatures& features, double dt) const;
   Step seed(const StereoFeatures& features);
-  Step extendMap(const StereoFeatures& features, double dt, const Localisation& found);
-  Matrix6d doubt(const Localisation& found, const Eigen::Isometry3d& T_previous_measured,
+  Step extendMap(const StereoFeatures& features, double dt, const MotionHypothesis& found);
+  Matrix6d doubt(const MotionHypothesis& found, const Eigen::Isometry3d& T_previous_measured,
                  const Eigen::Isometry3d& T_previous_current, double dt) const;
   void recall(const StereoFeatures& features);
   static void cover(Step& step);
   Step predict(const StereoFeatures& features, double dt, const std::string& failure);
   void move(const Eigen::Isometry3d& T_previous_current);
-  OdometryResult report(const StereoFeatures& features, double dt, const Localisation& found, const Step& step) const;
+  OdometryResult report(const StereoFeatures& features, double dt, const MotionHypothesis& found,
+                        const Step& step) const;
 
   VisualOdometryOptions options_;
-  FeatureMatcher matcher_;
+  MotionSearch search_;
+  FeatureMatcher matcher_;  ///< of recalled key frames, as is the next
   MotionEstimator estimator_;
 
   // State between pairs; reset() is the assignment of a new one.

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <Eigen/Geometry>
+
+#include "stereo_descriptor_vo/common/se3.hpp"
+
+namespace sdvo {
+
+/// Covariances, of right perturbations in m and rad, of motions that were not measured or not for certain.
+
+/// How much less a predicted motion is known than a measured one: constant velocity errs by the acceleration, for which
+/// a vehicle's 5 m/s^2 and 2 rad/s^2 stand; `dt` in s.
+Matrix6d predictionCovariance(double dt);
+
+/// What could have been travelled unseen, by a vehicle that went on with its velocity, m/s and rad/s, and accelerated
+/// as above; it is never faster than `max_speed`, m/s.
+Matrix6d travelCovariance(const Vector6d& velocity, double seconds, double max_speed);
+
+/// As large in every direction as two motions differ.
+Matrix6d disagreement(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b);
+
+}  // namespace sdvo

@@ -1,0 +1,87 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/se3.hpp"
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/odometry/feature_matcher.hpp"
+#include "stereo_descriptor_vo/odometry/local_map.hpp"
+#include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
+#include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
+#include "stereo_descriptor_vo/odometry/pose_verdict.hpp"
+#include "stereo_descriptor_vo/odometry/rig_calibration.hpp"
+
+namespace sdvo {
+
+/// What a pair's motion is looked for in. The references must outlive it.
+struct MotionScene {
+  const LocalMap& map;
+  const RigCalibration& calibration;
+  const StereoFeatures& features;
+  std::optional<Eigen::Isometry3d> T_current_reference;  ///< as expected, since the map's newest pair
+  std::optional<Vector6d> velocity;                      ///< of the camera before, m/s and rad/s
+  bool contested = false;                                ///< a moment ago something else moved in view
+};
+
+/// One answer to where a pair is, and what speaks for it.
+struct MotionHypothesis {
+  PoseEvidence evidence;
+  PoseVerdict verdict;
+  MotionEstimate motion;  ///< since the map's newest pair
+  /// The same as another hypothesis has it that could not be ruled out.
+  std::optional<Eigen::Isometry3d> T_current_reference_else;
+  int lasting_close = 0;   ///< lasting points that agree closely
+  bool guided = false;     ///< found with a prior
+  bool contested = false;  ///< by a motion of something else in view
+  LocalMap::View view;
+  std::vector<FeatureMatch> matches;  ///< rows of the view to rows of the pair
+  std::vector<Correspondence> correspondences;
+  std::vector<LocalMap::Sighting> sightings;   ///< of the motion's inliers
+  double match_time = 0.0, motion_time = 0.0;  ///< s
+
+  /// Whether a match is one of a point that stood still in several pairs.
+  bool isLasting(int match) const;
+
+  /// Rows of the pair that the inliers matched, but for the rejected ones.
+  std::vector<int> inlierRows(const std::vector<int>& rejected = {}) const;
+
+  /// How many of those are of lasting points.
+  int lastingInliers(const std::vector<int>& rejected = {}) const;
+};
+
+/// Share of an 8x4 grid's cells over the image that hold one of the pair's rows.
+double coverage(const StereoFeatures& features, const std::vector<int>& rows);
+
+/// Finds the motion of a pair since the map's newest pair among hypotheses. The first rests on what was expected. Where
+/// that is in doubt, it competes with one that expects nothing, with the motion of the points that stood still so far,
+/// and with that of the other outliers, among which something that moves by itself may be.
+class MotionSearch {
+ public:
+  MotionSearch(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion,
+               const PatchAlignmentOptions& alignment, const PoseVerdictOptions& verdict);
+
+  MotionHypothesis find(const MotionScene& scene) const;
+
+  /// Whether a motion is not that of the points that stood still so far.
+  bool lastingDisagree(const PoseEvidence& evidence) const;
+
+ private:
+  MotionHypothesis search(const MotionScene& scene, const std::optional<Eigen::Isometry3d>& T_current_reference) const;
+  MotionHypothesis searchAmong(const MotionScene& scene, const MotionHypothesis& all,
+                               const std::vector<int>& subset) const;
+  void weigh(const MotionScene& scene, MotionHypothesis& found) const;
+  void align(const MotionScene& scene, MotionHypothesis& found) const;
+  MotionHypothesis choose(const MotionScene& scene, std::vector<MotionHypothesis> hypotheses) const;
+  std::size_t best(const MotionScene& scene, const std::vector<MotionHypothesis>& hypotheses) const;
+  int leastOfRival(const MotionEstimate& motion) const;
+
+  MotionEstimatorOptions motion_options_;
+  PatchAlignmentOptions alignment_options_;
+  PoseVerdictOptions verdict_options_;
+  FeatureMatcher matcher_;
+  MotionEstimator estimator_;
+};
+
+}  // namespace sdvo

@@ -1,0 +1,278 @@
+#include "stereo_descriptor_vo/odometry/motion_search.hpp"
+
+#include <algorithm>
+#include <bitset>
+#include <cstddef>
+#include <iterator>
+#include <string>
+#include <utility>
+
+#include "stereo_descriptor_vo/common/stopwatch.hpp"
+#include "stereo_descriptor_vo/odometry/correspondences.hpp"
+#include "stereo_descriptor_vo/odometry/rival_motion.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr int kEnoughLasting = 20;  // fewer matches of lasting points do not tell which motion is the camera's
+
+bool contains(const std::vector<int>& values, int value) {
+  return std::find(values.begin(), values.end(), value) != values.end();
+}
+
+/// Rows that are among the first but not among the second.
+std::vector<int> rowsOnlyIn(std::vector<int> first, std::vector<int> second) {
+  std::sort(first.begin(), first.end());
+  std::sort(second.begin(), second.end());
+  std::vector<int> rows;
+  std::set_difference(first.begin(), first.end(), second.begin(), second.end(), std::back_inserter(rows));
+  return rows;
+}
+
+/// Whether most lasting points lie beside their aligned sightings: a motion between those of two things, which agrees
+/// roughly with both.
+bool hasStrayed(const StereoCamera& camera, const MotionHypothesis& found) {
+  constexpr double kClose = 1.0;  // px
+  constexpr double kMost = 0.6;
+  int lasting = 0, close = 0;
+  for (std::size_t k = 0; k < found.sightings.size(); ++k) {
+    const int i = found.motion.inliers[k];
+    const LocalMap::Sighting& sighting = found.sightings[k];
+    if (!sighting.aligned || !found.isLasting(i)) continue;
+    const Eigen::Vector3d point = found.motion.T_current_reference * found.correspondences[i].point;
+    ++lasting;
+    close += (camera.project(point) - sighting.measurement).head<2>().norm() < kClose;
+  }
+  return lasting >= kEnoughLasting && close < kMost * lasting;
+}
+
+/// Whether two hypotheses mean one motion.
+bool areOne(const StereoCamera& camera, const MotionHypothesis& a, const MotionHypothesis& b) {
+  return a.motion.success && b.motion.success &&
+         agree(camera, a.correspondences, a.motion.inliers, a.motion.T_current_reference, b.motion.T_current_reference);
+}
+
+}  // namespace
+
+bool MotionHypothesis::isLasting(int match) const {
+  constexpr int kPairs = 4;
+  return view.seen[matches[match].reference] >= kPairs;
+}
+
+std::vector<int> MotionHypothesis::inlierRows(const std::vector<int>& rejected) const {
+  std::vector<int> rows;
+  for (const int i : motion.inliers)
+    if (!contains(rejected, matches[i].current)) rows.push_back(matches[i].current);
+  return rows;
+}
+
+int MotionHypothesis::lastingInliers(const std::vector<int>& rejected) const {
+  return static_cast<int>(std::count_if(motion.inliers.begin(), motion.inliers.end(), [&](int i) {
+    return isLasting(i) && !contains(rejected, matches[i].current);
+  }));
+}
+
+double coverage(const StereoFeatures& features, const std::vector<int>& rows) {
+  constexpr int kColumns = 8, kRows = 4;
+  std::bitset<kColumns * kRows> cells;
+  for (const int i : rows) {
+    const int column = static_cast<int>(features.u[i] * kColumns / features.camera.width);
+    const int row = static_cast<int>(features.v[i] * kRows / features.camera.height);
+    cells.set(static_cast<std::size_t>(std::clamp(row, 0, kRows - 1) * kColumns + std::clamp(column, 0, kColumns - 1)));
+  }
+  return static_cast<double>(cells.count()) / (kColumns * kRows);
+}
+
+MotionSearch::MotionSearch(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion,
+                           const PatchAlignmentOptions& alignment, const PoseVerdictOptions& verdict)
+    : motion_options_(motion),
+      alignment_options_(alignment),
+      verdict_options_(verdict),
+      matcher_(matcher),
+      estimator_(motion) {}
+
+MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
+  MotionHypothesis found = search(scene, scene.T_current_reference);
+  if (found.verdict.trust == Trust::kSound && !scene.contested) {
+    align(scene, found);
+    if (!hasStrayed(scene.features.camera, found)) return found;
+    found.sightings.clear();
+  }
+
+  // The prior itself may be what misled the search, and what moves by itself may outnumber the world.
+  std::vector<MotionHypothesis> hypotheses = {std::move(found)};
+  if (scene.T_current_reference) hypotheses.push_back(search(scene, std::nullopt));
+  const MotionHypothesis all = hypotheses.back();
+  std::vector<int> lasting, outliers;
+  for (int i = 0; i < static_cast<int>(all.matches.size()); ++i) {
+    if (all.isLasting(i)) lasting.push_back(i);
+    if (!std::binary_search(all.motion.inliers.begin(), all.motion.inliers.end(), i)) outliers.push_back(i);
+  }
+  for (const std::vector<int>& subset : {lasting, outliers}) hypotheses.push_back(searchAmong(scene, all, subset));
+  found = choose(scene, std::move(hypotheses));
+  if (found.verdict.trust != Trust::kNone) align(scene, found);
+  return found;
+}
+
+MotionHypothesis MotionSearch::search(const MotionScene& scene,
+                                      const std::optional<Eigen::Isometry3d>& T_current_reference) const {
+  MotionHypothesis found;
+  found.guided = T_current_reference.has_value();
+  found.view = scene.map.view();
+  Stopwatch stopwatch;
+  found.matches = matcher_.match(found.view.rows, scene.features, T_current_reference);
+  found.match_time = stopwatch.lap();
+  found.correspondences = correspond(found.view.rows, scene.features, found.matches, scene.calibration);
+  found.motion = estimator_.estimate(scene.features.camera, found.correspondences);
+  weigh(scene, found);
+  found.motion_time = stopwatch.lap();
+  return found;
+}
+
+/// A motion that some of another hypothesis' matches agree on, and whatever else does.
+MotionHypothesis MotionSearch::searchAmong(const MotionScene& scene, const MotionHypothesis& all,
+                                           const std::vector<int>& subset) const {
+  Stopwatch stopwatch;
+  const StereoCamera& camera = scene.features.camera;
+  MotionHypothesis found = all;
+  found.match_time = 0.0;
+  found.motion = estimateAmong(estimator_, camera, all.correspondences, subset);
+  if (found.motion.success)
+    found.motion.inliers = PoseProblem(camera, all.correspondences, motion_options_.inlier_threshold)
+                               .inliers(found.motion.T_current_reference);
+  weigh(scene, found);
+  found.motion_time = stopwatch.lap();
+  return found;
+}
+
+/// Gathers what speaks for the motion found and judges it.
+void MotionSearch::weigh(const MotionScene& scene, MotionHypothesis& found) const {
+  const std::vector<int>& inliers = found.motion.inliers;
+  PoseEvidence& evidence = found.evidence;
+  evidence = {};
+  evidence.matches = static_cast<int>(found.matches.size());
+  evidence.inliers = static_cast<int>(inliers.size());
+  for (int i = 0; i < evidence.matches; ++i) evidence.lasting_matches += found.isLasting(i);
+  evidence.lasting_inliers = found.lastingInliers();
+  found.lasting_close = static_cast<int>(std::count_if(inliers.begin(), inliers.end(), [&](int i) {
+    const auto residual =
+        reprojectionResidual(scene.features.camera, found.motion.T_current_reference, found.correspondences[i]);
+    return found.isLasting(i) && residual && residual->norm() < 0.5 * motion_options_.inlier_threshold;
+  }));
+  evidence.coverage = coverage(scene.features, found.inlierRows());
+  evidence.rms = found.motion.rms;
+  evidence.motion = found.motion.T_current_reference.inverse();
+  evidence.covariance = found.motion.covariance;
+  evidence.dt = static_cast<double>(scene.features.stamp - scene.map.newestStamp()) * 1e-9;
+  evidence.velocity = scene.velocity;
+  found.verdict = found.motion.success ? judgePose(verdict_options_, motion_options_.min_inliers, evidence)
+                                       : PoseVerdict{Trust::kNone, found.motion.reason};
+}
+
+/// Aligns the inliers' patches and refines the motion on them.
+void MotionSearch::align(const MotionScene& scene, MotionHypothesis& found) const {
+  constexpr std::size_t kEnough = 30;  // fewer are no better than all corners together
+  Stopwatch stopwatch;
+  const StereoFeatures& features = scene.features;
+  const Eigen::Isometry3d T_camera_origin = found.motion.T_current_reference * scene.map.newestPose();
+  std::vector<Correspondence> aligned;
+  for (const int i : found.motion.inliers) {
+    const FeatureMatch& match = found.matches[i];
+    const LocalMap::Sighting sighting = scene.map.sight(alignment_options_, features, T_camera_origin,
+                                                        found.view.point[match.reference], match.current);
+    found.sightings.push_back(sighting);
+    if (!sighting.aligned) continue;
+    const Eigen::Vector2d corner(features.u[match.current], features.v[match.current]);
+    aligned.push_back(
+        {found.view.rows.positions[match.reference],
+         measurementOf(features, match.current, scene.calibration, sighting.measurement.head<2>() - corner)});
+  }
+  if (aligned.size() >= kEnough)
+    refineMotion(features.camera, motion_options_, aligned, found.motion.T_current_reference);
+  found.motion_time += stopwatch.lap();
+}
+
+/// The hypothesis that most lasting points agree with, for they stood still so far; where they do not tell, the one
+/// that goes on as before.
+std::size_t MotionSearch::best(const MotionScene& scene, const std::vector<MotionHypothesis>& hypotheses) const {
+  const auto areSame = [&](const MotionHypothesis& a, const MotionHypothesis& b) {
+    return areOne(scene.map.camera(), a, b);
+  };
+  const auto change = [&](const MotionHypothesis& of) {
+    return (expSE3(*scene.velocity * -of.evidence.dt) * of.evidence.motion).translation().norm();
+  };
+  const auto isBetter = [&](const MotionHypothesis& a, const MotionHypothesis& b) {
+    if (a.motion.success != b.motion.success) return a.motion.success;
+    constexpr int kVotes = 8;
+    const int lasting_a = a.lasting_close, lasting_b = b.lasting_close;
+    if (lasting_a + lasting_b >= kVotes && (lasting_a >= 2 * lasting_b || lasting_b >= 2 * lasting_a))
+      return lasting_a > lasting_b;
+    const bool comparable = b.evidence.inliers > leastOfRival(a.motion) && a.evidence.inliers > leastOfRival(b.motion);
+    if (scene.velocity && comparable && !areSame(a, b)) return change(a) < change(b);
+    return a.evidence.inliers > b.evidence.inliers;
+  };
+  std::size_t best = 0;
+  for (std::size_t k = 1; k < hypotheses.size(); ++k) {
+    const bool same = hypotheses[best].verdict.trust == Trust::kSound && areSame(hypotheses[best], hypotheses[k]);
+    if (!same && isBetter(hypotheses[k], hypotheses[best])) best = k;
+  }
+  return best;
+}
+
+/// Takes the best hypothesis. What the others say confirms it or speaks against it.
+MotionHypothesis MotionSearch::choose(const MotionScene& scene, std::vector<MotionHypothesis> hypotheses) const {
+  MotionHypothesis& chosen = hypotheses[best(scene, hypotheses)];
+  double match_time = 0.0, motion_time = 0.0;
+  for (const MotionHypothesis& hypothesis : hypotheses)
+    match_time += hypothesis.match_time, motion_time += hypothesis.motion_time;
+  chosen.match_time = match_time;
+  chosen.motion_time = motion_time;
+  if (!chosen.motion.success) return std::move(chosen);
+
+  const MotionHypothesis* rival = nullptr;
+  std::vector<int> of_rival;  // rows that the rival explains and the chosen one does not
+  const std::vector<int> own = chosen.inlierRows();
+  for (const MotionHypothesis& other : hypotheses) {
+    if (&other == &chosen || !other.motion.success) continue;
+    if (areOne(scene.map.camera(), chosen, other)) {
+      chosen.evidence.confirmed |= chosen.guided != other.guided;  // from matches of their own
+      continue;
+    }
+    std::vector<int> rows = rowsOnlyIn(other.inlierRows(), own);
+    if (static_cast<int>(rows.size()) >= leastOfRival(chosen.motion) && rows.size() > of_rival.size())
+      rival = &other, of_rival = std::move(rows);
+  }
+  // What the rival explains does not speak against the chosen one.
+  chosen.evidence.matches -=
+      static_cast<int>(std::count_if(chosen.matches.begin(), chosen.matches.end(), [&](const FeatureMatch& match) {
+        return std::binary_search(of_rival.begin(), of_rival.end(), match.current);
+      }));
+  chosen.verdict = judgePose(verdict_options_, motion_options_.min_inliers, chosen.evidence);
+  // Less than that is something small that moves, or a texture that repeats itself; unless it was larger just before.
+  const double substantial_share = scene.contested ? 0.0 : 0.35;
+  const bool substantial = static_cast<double>(of_rival.size()) >= substantial_share * chosen.evidence.inliers;
+  chosen.contested = lastingDisagree(chosen.evidence);
+  if (rival && (substantial ? chosen.verdict.trust != Trust::kNone : chosen.verdict.trust == Trust::kDoubtful)) {
+    chosen.contested = true;
+    chosen.T_current_reference_else = rival->motion.T_current_reference;
+    chosen.verdict = {Trust::kDoubtful, "two motions in view, of " + std::to_string(own.size()) + " and " +
+                                            std::to_string(of_rival.size()) +
+                                            " matches: does something move before the camera?"};
+  }
+  return std::move(chosen);
+}
+
+/// Whether a motion is not that of the points that stood still so far.
+bool MotionSearch::lastingDisagree(const PoseEvidence& evidence) const {
+  return evidence.lasting_matches >= kEnoughLasting &&
+         evidence.lasting_inliers < verdict_options_.doubtful_lasting_ratio * evidence.lasting_matches;
+}
+
+/// Fewer inliers than that are no rival of a motion.
+int MotionSearch::leastOfRival(const MotionEstimate& motion) const {
+  constexpr double kLeast = 0.1;
+  return std::max(2 * motion_options_.min_inliers,
+                  static_cast<int>(kLeast * static_cast<double>(motion.inliers.size())));
+}
+
+}  // namespace sdvo

@@ -1,0 +1,161 @@
+#include <gtest/gtest.h>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/odometry/motion_search.hpp"
+
+namespace sdvo {
+namespace {
+
+/// What a camera sees that stands still or moves along x, of a world that stands and of a swarm that moves along x,
+/// too.
+class Street {
+ public:
+  StereoFeatures see(double camera_x, double swarm_x, std::int64_t stamp, bool world_visible = true,
+                     bool swarm_visible = true) const {
+    StereoFeatures features = synthetic::noFeatures(synthetic::camera(), stamp);
+    if (world_visible) add(features, world_, camera_x);
+    if (swarm_visible) add(features, swarm_, camera_x - swarm_x);
+    return features;
+  }
+
+ private:
+  static void add(StereoFeatures& features, const synthetic::World& world, double x) {
+    const Eigen::Isometry3d T_camera_world(Eigen::Translation3d(-x, 0.0, 0.0));
+    const StereoFeatures seen = synthetic::observe(world, synthetic::camera(), T_camera_world, features.stamp);
+    for (int row = 0; row < seen.count(); ++row)
+      synthetic::addFeature(features, seen.u[row], seen.v[row], seen.disparity[row],
+                            {seen.descriptors.ptr(row), seen.descriptors.ptr(row) + seen.descriptors.cols});
+  }
+
+  synthetic::World world_ = synthetic::randomWorld(21, 250, {-10.0, -4.0, 6.0}, {10.0, 3.0, 12.0});
+  synthetic::World swarm_ = synthetic::randomWorld(22, 300, {-2.0, -1.5, 3.0}, {2.0, 1.5, 5.0});
+};
+
+constexpr std::int64_t kPeriod = 100000000;  // ns
+
+/// A map that is extended with the motions that the search finds.
+class MotionSearchTest : public ::testing::Test {
+ protected:
+  /// The pair's motion since the map's newest pair; `expected` is how far along x the camera is expected to go.
+  MotionHypothesis find(const StereoFeatures& features, std::optional<double> expected, bool contested = false) const {
+    MotionScene scene{map_, calibration_, features, std::nullopt, std::nullopt, contested};
+    if (expected) {
+      scene.T_current_reference = Eigen::Isometry3d(Eigen::Translation3d(-*expected, 0.0, 0.0));
+      scene.velocity = Vector6d::Zero();
+      (*scene.velocity)[0] = *expected / 0.1;
+    }
+    return search_.find(scene);
+  }
+
+  void begin(const StereoFeatures& features) {
+    map_.insert(features, ++pairs_, Eigen::Isometry3d::Identity(), {}, calibration_);
+  }
+
+  void extend(const StereoFeatures& features, const MotionHypothesis& found) {
+    map_.insert(features, ++pairs_, found.motion.T_current_reference * map_.newestPose(), found.sightings,
+                calibration_);
+  }
+
+  /// The first `count` pairs, of the standing world.
+  void start(int count) {
+    begin(street_.see(0.0, 0.0, stamp(), true, false));
+    while (pairs_ < count) {
+      const StereoFeatures features = street_.see(0.0, 0.0, stamp(), true, false);
+      extend(features, find(features, 0.0));
+    }
+  }
+
+  std::int64_t stamp() const { return (pairs_ + 1) * kPeriod; }
+  static double moved(const MotionHypothesis& found) { return -found.motion.T_current_reference.translation().x(); }
+
+  Street street_;
+  LocalMap map_{LocalMapOptions()};
+  RigCalibration calibration_;
+  MotionSearch search_{{}, {}, {}, {}};
+  int pairs_ = 0;
+};
+
+TEST_F(MotionSearchTest, TakesASoundMotionThatWasExpected) {
+  start(2);
+  const MotionHypothesis found = find(street_.see(0.1, 0.0, stamp(), true, false), 0.1);
+  EXPECT_EQ(found.verdict.trust, Trust::kSound) << found.verdict.reason;
+  EXPECT_TRUE(found.guided);
+  EXPECT_FALSE(found.contested);
+  EXPECT_NEAR(moved(found), 0.1, 1e-3);
+  EXPECT_NEAR(found.evidence.dt, 0.1, 1e-12);
+  EXPECT_EQ(found.evidence.inliers, static_cast<int>(found.motion.inliers.size()));
+  EXPECT_EQ(found.sightings.size(), found.motion.inliers.size());
+}
+
+TEST_F(MotionSearchTest, AWrongExpectationIsOneHypothesisAmongOthers) {
+  start(2);
+  // Points 5 m away were expected 120 px beside where they are, beyond the gate.
+  const MotionHypothesis found = find(street_.see(0.1, 0.0, stamp(), true, false), 1.6);
+  EXPECT_NEAR(moved(found), 0.1, 1e-3);
+  EXPECT_GT(found.evidence.inliers, 100);
+  EXPECT_EQ(found.sightings.size(), found.motion.inliers.size());
+}
+
+TEST_F(MotionSearchTest, WhatStoodStillSoFarOutvotesAMajority) {
+  start(5);
+  const StereoFeatures arrived = street_.see(0.0, 0.0, stamp());
+  extend(arrived, find(arrived, 0.0));
+  const MotionHypothesis found = find(street_.see(0.0, 0.4, stamp()), 0.0, true);
+  ASSERT_TRUE(found.motion.success) << found.motion.reason;
+  EXPECT_NEAR(moved(found), 0.0, 1e-3);
+  EXPECT_TRUE(found.contested);
+  EXPECT_EQ(found.verdict.trust, Trust::kDoubtful);
+  EXPECT_NE(found.verdict.reason.find("two motions"), std::string::npos) << found.verdict.reason;
+  ASSERT_TRUE(found.T_current_reference_else);
+  EXPECT_NEAR(found.T_current_reference_else->translation().x(), 0.4, 1e-3) << "as if the swarm stood";
+}
+
+TEST_F(MotionSearchTest, WithoutLastingPointsTheOneThatGoesOnAsBeforeWins) {
+  begin(street_.see(0.0, 0.0, stamp()));
+  const StereoFeatures features = street_.see(0.0, 0.4, stamp());
+  EXPECT_NEAR(moved(find(features, 0.0, true)), 0.0, 1e-3) << "of the world";
+  EXPECT_NEAR(moved(find(features, -0.4, true)), -0.4, 1e-3) << "of the swarm";
+}
+
+TEST_F(MotionSearchTest, FailsWithAReason) {
+  start(2);
+  const MotionHypothesis found = find(synthetic::noFeatures(synthetic::camera(), stamp()), 0.0);
+  EXPECT_EQ(found.verdict.trust, Trust::kNone);
+  EXPECT_NE(found.verdict.reason.find("only 0 matches"), std::string::npos) << found.verdict.reason;
+}
+
+TEST_F(MotionSearchTest, LastingPointsThatAreOutliersDisagree) {
+  const auto disagree = [&](int matches, int inliers) {
+    PoseEvidence evidence;
+    evidence.lasting_matches = matches, evidence.lasting_inliers = inliers;
+    return search_.lastingDisagree(evidence);
+  };
+  EXPECT_TRUE(disagree(20, 9));
+  EXPECT_FALSE(disagree(20, 10)) << "tracking/doubtful_lasting_ratio is a half";
+  EXPECT_FALSE(disagree(19, 0)) << "too few to tell";
+}
+
+TEST(MotionHypothesis, LeavesOutWhatWasRejected) {
+  MotionHypothesis found;
+  found.view.seen = {4, 3, 4, 5};
+  found.matches = {{0, 10, 0.f}, {1, 11, 0.f}, {2, 12, 0.f}, {3, 13, 0.f}};
+  found.motion.inliers = {0, 1, 3};
+  EXPECT_TRUE(found.isLasting(0));
+  EXPECT_FALSE(found.isLasting(1));
+  EXPECT_EQ(found.inlierRows(), std::vector<int>({10, 11, 13}));
+  EXPECT_EQ(found.inlierRows({13, 12}), std::vector<int>({10, 11}));
+  EXPECT_EQ(found.lastingInliers(), 2);
+  EXPECT_EQ(found.lastingInliers({13}), 1);
+}
+
+TEST(Coverage, CountsCellsOfEightColumnsAndFourRows) {
+  StereoFeatures features = synthetic::noFeatures(synthetic::camera());
+  for (const auto& [u, v] : {std::pair(10.0, 10.0), {70.0, 110.0}, {85.0, 10.0}, {630.0, 470.0}})
+    synthetic::addFeature(features, u, v, 5.0, std::vector<std::uint8_t>(128, 0));
+  EXPECT_EQ(coverage(features, {0, 1}), 1.0 / 32.0);
+  EXPECT_EQ(coverage(features, {0, 1, 2, 3}), 3.0 / 32.0);
+  EXPECT_EQ(coverage(features, {}), 0.0);
+}
+
+}  // namespace
+}  // namespace sdvo
