@@ -156,7 +156,7 @@ ThereAndBack driveThereAndBack(int remembered_keyframes) {
   SyntheticScene scene(7, 2500, 120.0);
   scene.patches = true;
   scene.position_noise = 0.8;
-  scene.disparity_noise = 0.8;
+  scene.disparity_noise = 1.2;
   VisualOdometryOptions options;
   options.map.remembered_keyframes = remembered_keyframes;
   options.map.lasting_points = 50;
