@@ -170,7 +170,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
     return predict(features, dt, verdict.reason + " after the adjustment");
   }
   if (search_.lastingDisagree(evidence)) state_.contested_pairs = kWatched;
-  if (verdict.trust == Trust::kSound) verdict = found.verdict;
+  if (verdict.trust == Trust::kSound || found.T_current_reference_else) verdict = found.verdict;
   const bool watched = verdict.trust == Trust::kSound && state_.contested_pairs > 0;
   if (watched) verdict = {Trust::kDoubtful, "a moment ago two motions were in view, or none was certain"};
 
