@@ -241,11 +241,10 @@ void VisualOdometry::recall(const StereoFeatures& features) {
 }
 
 /// A motion between two reported poses contains what the map has learnt of the first one meanwhile. Where that is more
-/// than its covariance says, the covariance says so and the reason, too.
+/// than the covariances of the motion and of the pose say, they are widened by it, and the reason says so.
 void VisualOdometry::cover(Step& step) {
-  constexpr double kExpected = 12.6;  // chi-square of six, 95 %
-  if (step.correction.dot(step.covariance.ldlt().solve(step.correction)) <= kExpected) return;
-  step.covariance += step.correction * step.correction.transpose();
+  state_.covariance.cover(step.correction);
+  if (!widen(step.covariance, step.correction)) return;
   std::ostringstream reason;
   reason << "the map corrected the pose by " << step.correction.head<3>().norm() << " m and "
          << step.correction.tail<3>().norm() << " rad";
