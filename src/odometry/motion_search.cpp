@@ -291,10 +291,13 @@ MotionHypothesis MotionSearch::choose(const MotionScene& scene, std::vector<Moti
   return std::move(chosen);
 }
 
-/// Whether a motion is not that of the points that stood still so far.
 bool MotionSearch::lastingDisagree(const PoseEvidence& evidence) const {
   return evidence.lasting_matches >= kEnoughLasting &&
          evidence.lasting_inliers < verdict_options_.doubtful_lasting_ratio * evidence.lasting_matches;
+}
+
+bool MotionSearch::lastingAgree(const PoseEvidence& evidence) const {
+  return evidence.lasting_matches >= kEnoughLasting && !lastingDisagree(evidence);
 }
 
 /// Fewer inliers than that are no rival of a motion.

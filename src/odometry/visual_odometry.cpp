@@ -193,7 +193,8 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
     step.state = TrackingState::kDegraded;
     step.reason = "doubtful: " + verdict.reason;
     step.covariance += doubted;
-    state_.covariance.doubt(doubted);
+    // Where the lasting points confirm the way, the stamps may be wrong, and only the speed is in doubt.
+    if (!verdict.of_rate || !search_.lastingAgree(evidence)) state_.covariance.doubt(doubted);
   }
   const Vector6d velocity = logSE3(found.motion.T_current_reference.inverse()) / since_newest;
   // Stamps that lie too close make no velocity.

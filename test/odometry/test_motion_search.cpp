@@ -168,15 +168,18 @@ TEST_F(MotionSearchTest, FailsWithAReason) {
   EXPECT_NE(found.verdict.reason.find("only 0 matches"), std::string::npos) << found.verdict.reason;
 }
 
-TEST_F(MotionSearchTest, LastingPointsThatAreOutliersDisagree) {
-  const auto disagree = [&](int matches, int inliers) {
+TEST_F(MotionSearchTest, LastingPointsAgreeOrDisagreeOrAreTooFew) {
+  const auto say = [&](int matches, int inliers) {
     PoseEvidence evidence;
     evidence.lasting_matches = matches, evidence.lasting_inliers = inliers;
-    return search_.lastingDisagree(evidence);
+    const bool agree = search_.lastingAgree(evidence), disagree = search_.lastingDisagree(evidence);
+    EXPECT_FALSE(agree && disagree);
+    return agree - disagree;
   };
-  EXPECT_TRUE(disagree(20, 9));
-  EXPECT_FALSE(disagree(20, 10)) << "tracking/doubtful_lasting_ratio is a half";
-  EXPECT_FALSE(disagree(19, 0)) << "too few to tell";
+  EXPECT_EQ(say(20, 9), -1);
+  EXPECT_EQ(say(20, 10), 1) << "tracking/doubtful_lasting_ratio is a half";
+  EXPECT_EQ(say(19, 0), 0);
+  EXPECT_EQ(say(19, 19), 0);
 }
 
 TEST(MotionHypothesis, LeavesOutWhatWasRejected) {

@@ -66,6 +66,9 @@ class MotionSearch {
   /// Whether a motion is not that of the points that stood still so far.
   bool lastingDisagree(const PoseEvidence& evidence) const;
 
+  /// Whether it is that of enough of them. Too few neither agree nor disagree.
+  bool lastingAgree(const PoseEvidence& evidence) const;
+
  private:
   MotionHypothesis search(const MotionScene& scene, const std::optional<Eigen::Isometry3d>& T_current_reference) const;
   MotionHypothesis searchAmong(const MotionScene& scene, const MotionHypothesis& all,
