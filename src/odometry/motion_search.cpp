@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <bitset>
+#include <cmath>
 #include <cstddef>
 #include <iterator>
+#include <numeric>
+#include <set>
 #include <string>
 #include <utility>
 
@@ -29,27 +32,13 @@ std::vector<int> rowsOnlyIn(std::vector<int> first, std::vector<int> second) {
   return rows;
 }
 
-/// Whether most lasting points lie beside their aligned sightings: a motion between those of two things, which agrees
-/// roughly with both.
-bool hasStrayed(const StereoCamera& camera, const MotionHypothesis& found) {
-  constexpr double kClose = 1.0;  // px
-  constexpr double kMost = 0.6;
-  int lasting = 0, close = 0;
-  for (std::size_t k = 0; k < found.sightings.size(); ++k) {
-    const int i = found.motion.inliers[k];
-    const LocalMap::Sighting& sighting = found.sightings[k];
-    if (!sighting.aligned || !found.isLasting(i)) continue;
-    const Eigen::Vector3d point = found.motion.T_current_reference * found.correspondences[i].point;
-    ++lasting;
-    close += (camera.project(point) - sighting.measurement).head<2>().norm() < kClose;
-  }
-  return lasting >= kEnoughLasting && close < kMost * lasting;
-}
-
-/// Whether two hypotheses mean one motion.
+/// Whether two hypotheses mean one motion, for what the one explains and for what the other does: far points alone do
+/// not tell a turn from a step.
 bool areOne(const StereoCamera& camera, const MotionHypothesis& a, const MotionHypothesis& b) {
-  return a.motion.success && b.motion.success &&
-         agree(camera, a.correspondences, a.motion.inliers, a.motion.T_current_reference, b.motion.T_current_reference);
+  if (!a.motion.success || !b.motion.success) return false;
+  const Eigen::Isometry3d &T_a = a.motion.T_current_reference, &T_b = b.motion.T_current_reference;
+  return agree(camera, a.correspondences, a.motion.inliers, T_a, T_b) &&
+         agree(camera, b.correspondences, b.motion.inliers, T_a, T_b);
 }
 
 }  // namespace
@@ -94,8 +83,8 @@ MotionSearch::MotionSearch(const FeatureMatcherOptions& matcher, const MotionEst
 MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
   MotionHypothesis found = search(scene, scene.T_current_reference);
   if (found.verdict.trust == Trust::kSound && !scene.contested) {
-    align(scene, found);
-    if (!hasStrayed(scene.features.camera, found)) return found;
+    const auto measured = align(scene, found);
+    if (!hasStrayed(scene.features.camera, found, measured)) return found;
     found.sightings.clear();
   }
 
@@ -154,11 +143,6 @@ void MotionSearch::weigh(const MotionScene& scene, MotionHypothesis& found) cons
   evidence.inliers = static_cast<int>(inliers.size());
   for (int i = 0; i < evidence.matches; ++i) evidence.lasting_matches += found.isLasting(i);
   evidence.lasting_inliers = found.lastingInliers();
-  found.lasting_close = static_cast<int>(std::count_if(inliers.begin(), inliers.end(), [&](int i) {
-    const auto residual =
-        reprojectionResidual(scene.features.camera, found.motion.T_current_reference, found.correspondences[i]);
-    return found.isLasting(i) && residual && residual->norm() < 0.5 * motion_options_.inlier_threshold;
-  }));
   evidence.coverage = coverage(scene.features, found.inlierRows());
   evidence.rms = found.motion.rms;
   evidence.motion = found.motion.T_current_reference.inverse();
@@ -169,44 +153,89 @@ void MotionSearch::weigh(const MotionScene& scene, MotionHypothesis& found) cons
                                        : PoseVerdict{Trust::kNone, found.motion.reason};
 }
 
-/// Aligns the inliers' patches and refines the motion on them.
-void MotionSearch::align(const MotionScene& scene, MotionHypothesis& found) const {
+/// Aligns the inliers' patches and refines the motion on them. Returns what the inliers measure now.
+std::vector<Correspondence> MotionSearch::align(const MotionScene& scene, MotionHypothesis& found) const {
   constexpr std::size_t kEnough = 30;  // fewer are no better than all corners together
   Stopwatch stopwatch;
   const StereoFeatures& features = scene.features;
   const Eigen::Isometry3d T_camera_origin = found.motion.T_current_reference * scene.map.newestPose();
-  std::vector<Correspondence> aligned;
+  std::vector<Correspondence> measured, aligned;
   for (const int i : found.motion.inliers) {
     const FeatureMatch& match = found.matches[i];
     const LocalMap::Sighting sighting = scene.map.sight(alignment_options_, features, T_camera_origin,
                                                         found.view.point[match.reference], match.current);
     found.sightings.push_back(sighting);
+    measured.push_back(found.correspondences[i]);
     if (!sighting.aligned) continue;
     const Eigen::Vector2d corner(features.u[match.current], features.v[match.current]);
-    aligned.push_back(
-        {found.view.rows.positions[match.reference],
-         measurementOf(features, match.current, scene.calibration, sighting.measurement.head<2>() - corner)});
+    measured.back().measurement =
+        measurementOf(features, match.current, scene.calibration, sighting.measurement.head<2>() - corner);
+    aligned.push_back(measured.back());
   }
   if (aligned.size() >= kEnough)
     refineMotion(features.camera, motion_options_, aligned, found.motion.T_current_reference);
   found.motion_time += stopwatch.lap();
+  return measured;
 }
 
-/// The hypothesis that most lasting points agree with, for they stood still so far; where they do not tell, the one
-/// that goes on as before.
+/// Whether the points that stood still so far, left alone, tell another motion than all together: one that puts most of
+/// the others elsewhere, and that is not within their own error. Far points agree with nearly any step once a turn
+/// makes up for it, so their number says nothing.
+bool MotionSearch::hasStrayed(const StereoCamera& camera, const MotionHypothesis& found,
+                              const std::vector<Correspondence>& measured) const {
+  constexpr double kSignificant = 100.0;  // chi-square of six; errors of neighbouring points are not independent
+  std::vector<Correspondence> lasting, others;
+  for (std::size_t k = 0; k < measured.size(); ++k)
+    (found.isLasting(found.motion.inliers[k]) ? lasting : others).push_back(measured[k]);
+  if (static_cast<int>(lasting.size()) < kEnoughLasting || static_cast<int>(others.size()) < kEnoughLasting)
+    return false;
+
+  const Eigen::Isometry3d& T = found.motion.T_current_reference;
+  Eigen::Isometry3d T_lasting = T;
+  const NormalEquations equations = refineMotion(camera, motion_options_, lasting, T_lasting);
+  std::vector<int> all(others.size());
+  std::iota(all.begin(), all.end(), 0);
+  if (agree(camera, others, all, T, T_lasting)) return false;
+  const double variance = equations.weighted_square / std::max(3.0 * equations.weight - 6.0, 1.0);  // px^2
+  const Vector6d difference = logSE3(T_lasting * T.inverse());
+  return difference.dot(equations.hessian * difference) > kSignificant * variance;
+}
+
+/// Half the squared residuals, in standard deviations, of the matches of lasting points under each hypothesis,
+/// whichever hypothesis matched them: the smaller, the likelier.
+std::vector<double> MotionSearch::lastingCosts(const MotionScene& scene,
+                                               const std::vector<MotionHypothesis>& hypotheses) const {
+  constexpr double kSigma = 0.7;    // px, of a corner and of the map's point
+  constexpr double kOutlier = 3.0;  // sigma
+  std::set<std::pair<int, int>> seen;
+  std::vector<Correspondence> lasting;
+  for (const MotionHypothesis& hypothesis : hypotheses)
+    for (int i = 0; i < static_cast<int>(hypothesis.matches.size()); ++i)
+      if (hypothesis.isLasting(i) &&
+          seen.emplace(hypothesis.matches[i].reference, hypothesis.matches[i].current).second)
+        lasting.push_back(hypothesis.correspondences[i]);
+  const PoseProblem problem(scene.features.camera, lasting, kOutlier * kSigma);
+  std::vector<double> costs;
+  for (const MotionHypothesis& hypothesis : hypotheses)
+    costs.push_back(0.5 / (kSigma * kSigma) * problem.truncatedCost(hypothesis.motion.T_current_reference));
+  return costs;
+}
+
+/// The hypothesis that the lasting points speak for, for they stood still so far; where they do not tell, the one that
+/// goes on as before.
 std::size_t MotionSearch::best(const MotionScene& scene, const std::vector<MotionHypothesis>& hypotheses) const {
+  constexpr double kDecisive = 20.0;  // logarithm of the ratio of the likelihoods: some five points
+  const std::vector<double> lasting_costs = lastingCosts(scene, hypotheses);
   const auto areSame = [&](const MotionHypothesis& a, const MotionHypothesis& b) {
     return areOne(scene.map.camera(), a, b);
   };
   const auto change = [&](const MotionHypothesis& of) {
     return (expSE3(*scene.velocity * -of.evidence.dt) * of.evidence.motion).translation().norm();
   };
-  const auto isBetter = [&](const MotionHypothesis& a, const MotionHypothesis& b) {
+  const auto isBetter = [&](std::size_t i, std::size_t j) {
+    const MotionHypothesis &a = hypotheses[i], &b = hypotheses[j];
     if (a.motion.success != b.motion.success) return a.motion.success;
-    constexpr int kVotes = 8;
-    const int lasting_a = a.lasting_close, lasting_b = b.lasting_close;
-    if (lasting_a + lasting_b >= kVotes && (lasting_a >= 2 * lasting_b || lasting_b >= 2 * lasting_a))
-      return lasting_a > lasting_b;
+    if (std::abs(lasting_costs[i] - lasting_costs[j]) > kDecisive) return lasting_costs[i] < lasting_costs[j];
     const bool comparable = b.evidence.inliers > leastOfRival(a.motion) && a.evidence.inliers > leastOfRival(b.motion);
     if (scene.velocity && comparable && !areSame(a, b)) return change(a) < change(b);
     return a.evidence.inliers > b.evidence.inliers;
@@ -214,7 +243,7 @@ std::size_t MotionSearch::best(const MotionScene& scene, const std::vector<Motio
   std::size_t best = 0;
   for (std::size_t k = 1; k < hypotheses.size(); ++k) {
     const bool same = hypotheses[best].verdict.trust == Trust::kSound && areSame(hypotheses[best], hypotheses[k]);
-    if (!same && isBetter(hypotheses[k], hypotheses[best])) best = k;
+    if (!same && isBetter(k, best)) best = k;
   }
   return best;
 }
@@ -262,10 +291,13 @@ MotionHypothesis MotionSearch::choose(const MotionScene& scene, std::vector<Moti
   return std::move(chosen);
 }
 
-/// Whether a motion is not that of the points that stood still so far.
 bool MotionSearch::lastingDisagree(const PoseEvidence& evidence) const {
   return evidence.lasting_matches >= kEnoughLasting &&
          evidence.lasting_inliers < verdict_options_.doubtful_lasting_ratio * evidence.lasting_matches;
+}
+
+bool MotionSearch::lastingAgree(const PoseEvidence& evidence) const {
+  return evidence.lasting_matches >= kEnoughLasting && !lastingDisagree(evidence);
 }
 
 /// Fewer inliers than that are no rival of a motion.

@@ -1,5 +1,6 @@
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 
 namespace sdvo {
@@ -26,6 +27,18 @@ Matrix6d carriedBy(const Eigen::Isometry3d& motion, const Matrix6d& covariance) 
 }
 
 }  // namespace
+
+bool widen(Matrix6d& covariance, const Vector6d& deviation) {
+  constexpr double kExpected = 12.6;  // chi-square of six, 95 %
+  if (deviation.dot(covariance.ldlt().solve(deviation)) <= kExpected) return false;
+  covariance += deviation * deviation.transpose();
+  return true;
+}
+
+void PoseCovariance::cover(const Vector6d& correction) {
+  // The next poses are measured from the same key frame.
+  if (widen(value_, correction)) keyframe_ += correction * correction.transpose();
+}
 
 void PoseCovariance::restart(const Matrix6d& travelled) {
   value_ += discontinuity() + travelled;

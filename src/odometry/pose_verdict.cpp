@@ -61,12 +61,16 @@ PoseVerdict judgePose(const PoseVerdictOptions& options, int min_inliers, const 
     const double change = (motion - before * evidence.dt).head<3>().norm();
     const double turn_change = (motion - before * evidence.dt).tail<3>().norm();
     const double forgiven = 2.0 * options.stamp_tolerance;
+    PoseVerdict doubt;
     if (change > options.max_acceleration * time * time + before.head<3>().norm() * forgiven + noise)
-      return verdict(Trust::kDoubtful, "a change of the motion by ", change, " m in ", evidence.dt,
-                     " s exceeds tracking/max_acceleration");
-    if (turn_change > options.max_rotation_acceleration * time * time + before.tail<3>().norm() * forgiven + turn_noise)
-      return verdict(Trust::kDoubtful, "a change of the rotation by ", turn_change, " rad in ", evidence.dt,
-                     " s exceeds tracking/max_rotation_acceleration");
+      doubt = verdict(Trust::kDoubtful, "a change of the motion by ", change, " m in ", evidence.dt,
+                      " s exceeds tracking/max_acceleration");
+    else if (turn_change >
+             options.max_rotation_acceleration * time * time + before.tail<3>().norm() * forgiven + turn_noise)
+      doubt = verdict(Trust::kDoubtful, "a change of the rotation by ", turn_change, " rad in ", evidence.dt,
+                      " s exceeds tracking/max_rotation_acceleration");
+    doubt.of_rate = doubt.trust == Trust::kDoubtful;
+    return doubt;
   }
   return {};
 }

@@ -170,7 +170,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
     return predict(features, dt, verdict.reason + " after the adjustment");
   }
   if (search_.lastingDisagree(evidence)) state_.contested_pairs = kWatched;
-  if (verdict.trust == Trust::kSound) verdict = found.verdict;
+  if (verdict.trust == Trust::kSound || found.T_current_reference_else) verdict = found.verdict;
   const bool watched = verdict.trust == Trust::kSound && state_.contested_pairs > 0;
   if (watched) verdict = {Trust::kDoubtful, "a moment ago two motions were in view, or none was certain"};
 
@@ -193,7 +193,8 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
     step.state = TrackingState::kDegraded;
     step.reason = "doubtful: " + verdict.reason;
     step.covariance += doubted;
-    state_.covariance.doubt(doubted);
+    // Where the lasting points confirm the way, the stamps may be wrong, and only the speed is in doubt.
+    if (!verdict.of_rate || !search_.lastingAgree(evidence)) state_.covariance.doubt(doubted);
   }
   const Vector6d velocity = logSE3(found.motion.T_current_reference.inverse()) / since_newest;
   // Stamps that lie too close make no velocity.
@@ -243,11 +244,10 @@ void VisualOdometry::recall(const StereoFeatures& features) {
 }
 
 /// A motion between two reported poses contains what the map has learnt of the first one meanwhile. Where that is more
-/// than its covariance says, the covariance says so and the reason, too.
+/// than the covariances of the motion and of the pose say, they are widened by it, and the reason says so.
 void VisualOdometry::cover(Step& step) {
-  constexpr double kExpected = 12.6;  // chi-square of six, 95 %
-  if (step.correction.dot(step.covariance.ldlt().solve(step.correction)) <= kExpected) return;
-  step.covariance += step.correction * step.correction.transpose();
+  state_.covariance.cover(step.correction);
+  if (!widen(step.covariance, step.correction)) return;
   std::ostringstream reason;
   reason << "the map corrected the pose by " << step.correction.head<3>().norm() << " m and "
          << step.correction.tail<3>().norm() << " rad";

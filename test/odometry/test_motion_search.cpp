@@ -18,15 +18,18 @@ class Street {
     return features;
   }
 
- private:
-  static void add(StereoFeatures& features, const synthetic::World& world, double x) {
+  static void add(StereoFeatures& features, const synthetic::World& world, double x, double max_depth = 40.0) {
+    synthetic::Sighting sighting;
+    sighting.max_depth = max_depth;
     const Eigen::Isometry3d T_camera_world(Eigen::Translation3d(-x, 0.0, 0.0));
-    const StereoFeatures seen = synthetic::observe(world, synthetic::camera(), T_camera_world, features.stamp);
+    const StereoFeatures seen =
+        synthetic::observe(world, synthetic::camera(), T_camera_world, features.stamp, sighting);
     for (int row = 0; row < seen.count(); ++row)
       synthetic::addFeature(features, seen.u[row], seen.v[row], seen.disparity[row],
                             {seen.descriptors.ptr(row), seen.descriptors.ptr(row) + seen.descriptors.cols});
   }
 
+ private:
   synthetic::World world_ = synthetic::randomWorld(21, 250, {-10.0, -4.0, 6.0}, {10.0, 3.0, 12.0});
   synthetic::World swarm_ = synthetic::randomWorld(22, 300, {-2.0, -1.5, 3.0}, {2.0, 1.5, 5.0});
 };
@@ -110,6 +113,47 @@ TEST_F(MotionSearchTest, WhatStoodStillSoFarOutvotesAMajority) {
   EXPECT_NEAR(found.T_current_reference_else->translation().x(), 0.4, 1e-3) << "as if the swarm stood";
 }
 
+TEST_F(MotionSearchTest, FarPointsThatAgreeWithAnyStepAreNoMajority) {
+  // A board 4 m ahead steps aside. A step and a little turn of the camera explain that and nearly what is far away.
+  const synthetic::World far = synthetic::randomWorld(23, 150, {-25.0, -8.0, 35.0}, {25.0, 6.0, 50.0});
+  const synthetic::World board = synthetic::randomWorld(24, 300, {-2.0, -1.5, 3.9}, {2.0, 1.5, 4.1});
+  const auto see = [&](double board_x, bool board_visible) {
+    StereoFeatures features = synthetic::noFeatures(synthetic::camera(), stamp());
+    Street::add(features, far, 0.0, 60.0);
+    if (board_visible) Street::add(features, board, -board_x, 60.0);
+    return features;
+  };
+  begin(see(0.0, false));
+  while (pairs_ < 5) {
+    const StereoFeatures features = see(0.0, false);
+    extend(features, find(features, 0.0));
+  }
+  const StereoFeatures arrived = see(0.0, true);
+  extend(arrived, find(arrived, 0.0));
+  const MotionHypothesis found = find(see(0.1, true), 0.0);
+  EXPECT_NEAR(moved(found), 0.0, 0.01);
+  EXPECT_EQ(found.verdict.trust, Trust::kDoubtful);
+  EXPECT_TRUE(found.contested);
+}
+
+TEST_F(MotionSearchTest, MotionsThatOnlyFarPointsConfuseAreTwo) {
+  // As above, but the board has been there as long as the rest and what goes on as before decides.
+  const synthetic::World far = synthetic::randomWorld(23, 100, {-25.0, -8.0, 35.0}, {25.0, 6.0, 50.0});
+  const synthetic::World near = synthetic::randomWorld(25, 60, {-2.0, -1.5, 4.0}, {0.0, 1.5, 6.0});
+  const synthetic::World board = synthetic::randomWorld(24, 300, {0.0, -1.5, 3.9}, {2.0, 1.5, 4.1});
+  const auto see = [&](double board_x) {
+    StereoFeatures features = synthetic::noFeatures(synthetic::camera(), stamp());
+    Street::add(features, far, 0.0, 60.0);
+    Street::add(features, near, 0.0);
+    Street::add(features, board, -board_x);
+    return features;
+  };
+  begin(see(0.0));
+  const MotionHypothesis found = find(see(0.15), 0.0, true);
+  EXPECT_NEAR(moved(found), 0.0, 0.01);
+  EXPECT_EQ(found.verdict.trust, Trust::kDoubtful) << "it may be the board that stands";
+}
+
 TEST_F(MotionSearchTest, WithoutLastingPointsTheOneThatGoesOnAsBeforeWins) {
   begin(street_.see(0.0, 0.0, stamp()));
   const StereoFeatures features = street_.see(0.0, 0.4, stamp());
@@ -124,15 +168,18 @@ TEST_F(MotionSearchTest, FailsWithAReason) {
   EXPECT_NE(found.verdict.reason.find("only 0 matches"), std::string::npos) << found.verdict.reason;
 }
 
-TEST_F(MotionSearchTest, LastingPointsThatAreOutliersDisagree) {
-  const auto disagree = [&](int matches, int inliers) {
+TEST_F(MotionSearchTest, LastingPointsAgreeOrDisagreeOrAreTooFew) {
+  const auto say = [&](int matches, int inliers) {
     PoseEvidence evidence;
     evidence.lasting_matches = matches, evidence.lasting_inliers = inliers;
-    return search_.lastingDisagree(evidence);
+    const bool agree = search_.lastingAgree(evidence), disagree = search_.lastingDisagree(evidence);
+    EXPECT_FALSE(agree && disagree);
+    return agree - disagree;
   };
-  EXPECT_TRUE(disagree(20, 9));
-  EXPECT_FALSE(disagree(20, 10)) << "tracking/doubtful_lasting_ratio is a half";
-  EXPECT_FALSE(disagree(19, 0)) << "too few to tell";
+  EXPECT_EQ(say(20, 9), -1);
+  EXPECT_EQ(say(20, 10), 1) << "tracking/doubtful_lasting_ratio is a half";
+  EXPECT_EQ(say(19, 0), 0);
+  EXPECT_EQ(say(19, 19), 0);
 }
 
 TEST(MotionHypothesis, LeavesOutWhatWasRejected) {

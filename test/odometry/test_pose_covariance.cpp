@@ -68,6 +68,28 @@ TEST(PoseCovariance, DoesNotGrowBetweenPairsMeasuredFromOneKeyframe) {
   expectEqual(covariance.value(), diagonal(0.75, 0.25));
 }
 
+TEST(PoseCovariance, ContainsWhatASecondThoughtMoved) {
+  PoseCovariance covariance;
+  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
+  covariance.advance(still, window(1, diagonal(0.0001, 0.0001)));
+  Vector6d correction = Vector6d::Zero();
+  correction[0] = 0.03;
+  covariance.cover(correction);
+  expectEqual(covariance.value(), diagonal(0.0001, 0.0001));  // three standard deviations, within 12.6
+  correction[0] = 0.5;
+  covariance.cover(correction);
+  Matrix6d expected = diagonal(0.0001, 0.0001);
+  expected(0, 0) += 0.25;
+  expectEqual(covariance.value(), expected);
+  covariance.cover(correction);
+  expectEqual(covariance.value(), expected);
+  // What is measured from the same key frame later has that error, too.
+  covariance.advance(still, window(1, diagonal(1.0, 1.0)));
+  Matrix6d later = diagonal(1.0, 1.0);
+  later(0, 0) += 0.25;
+  expectEqual(covariance.value(), later);
+}
+
 TEST(PoseCovariance, CarriesWhatEarlierPosesLackedIntoTheNewOne) {
   PoseCovariance covariance;
   covariance.advance(forward(), window(1, diagonal(0.5, 0.25)));

@@ -124,5 +124,16 @@ TEST(PoseVerdict, AccelerationsAreJudgedAgainstTheVelocityBefore) {
   EXPECT_EQ(trustIn(evidence), Trust::kDoubtful);
 }
 
+TEST(PoseVerdict, TellsADoubtOfTheRateFromOneOfTheWay) {
+  PoseEvidence evidence = soundEvidence();
+  evidence.motion.translation().z() = 3.0;  // 30 m/s after 10 m/s
+  EXPECT_TRUE(judgePose({}, 12, evidence).of_rate);
+  evidence.lasting_matches = 100, evidence.lasting_inliers = 10;
+  const PoseVerdict verdict = judgePose({}, 12, evidence);
+  EXPECT_EQ(verdict.trust, Trust::kDoubtful);
+  EXPECT_FALSE(verdict.of_rate);
+  EXPECT_FALSE(judgePose({}, 12, soundEvidence()).of_rate);
+}
+
 }  // namespace
 }  // namespace sdvo

@@ -150,6 +150,7 @@ struct ThereAndBack {
   double largest_correction = 0.0;  ///< m
   int corrections = 0;              ///< that the odometry gave as a reason
   double normalised_square = 0.0;   ///< mean over the motions
+  double worst_cover = 0.0;         ///< normalised square of a correction by the pose's covariance
 };
 
 ThereAndBack driveThereAndBack(int remembered_keyframes) {
@@ -171,6 +172,8 @@ ThereAndBack driveThereAndBack(int remembered_keyframes) {
     EXPECT_TRUE(result.has_pose) << i << ": " << result.reason;
     drive.error = (result.T_origin_camera.translation() - T_origin_camera.translation()).norm();
     drive.largest_correction = std::max(drive.largest_correction, result.correction.head<3>().norm());
+    drive.worst_cover =
+        std::max(drive.worst_cover, result.correction.dot(result.pose_covariance.ldlt().solve(result.correction)));
     drive.corrections += result.reason.rfind("the map corrected", 0) == 0;
     if (i > 0) {
       const Vector6d error = logSE3((last.inverse() * T_origin_camera).inverse() * result.T_previous_current);
@@ -189,6 +192,7 @@ TEST(WindowedOdometry, EndsWhereItBeganAfterDrivingBackAndForth) {
   EXPECT_GT(remembering.largest_correction, 0.02);
   EXPECT_GT(remembering.corrections, 0);
   EXPECT_LT(remembering.normalised_square, 12.0) << "six numbers";
+  EXPECT_LT(remembering.worst_cover, 12.6) << "chi-square of six, 95 %";
 }
 
 }  // namespace

@@ -32,7 +32,6 @@ struct MotionHypothesis {
   MotionEstimate motion;  ///< since the map's newest pair
   /// The same as another hypothesis has it that could not be ruled out.
   std::optional<Eigen::Isometry3d> T_current_reference_else;
-  int lasting_close = 0;   ///< lasting points that agree closely
   bool guided = false;     ///< found with a prior
   bool contested = false;  ///< by a motion of something else in view
   LocalMap::View view;
@@ -67,13 +66,19 @@ class MotionSearch {
   /// Whether a motion is not that of the points that stood still so far.
   bool lastingDisagree(const PoseEvidence& evidence) const;
 
+  /// Whether it is that of enough of them. Too few neither agree nor disagree.
+  bool lastingAgree(const PoseEvidence& evidence) const;
+
  private:
   MotionHypothesis search(const MotionScene& scene, const std::optional<Eigen::Isometry3d>& T_current_reference) const;
   MotionHypothesis searchAmong(const MotionScene& scene, const MotionHypothesis& all,
                                const std::vector<int>& subset) const;
   void weigh(const MotionScene& scene, MotionHypothesis& found) const;
-  void align(const MotionScene& scene, MotionHypothesis& found) const;
+  std::vector<Correspondence> align(const MotionScene& scene, MotionHypothesis& found) const;
+  bool hasStrayed(const StereoCamera& camera, const MotionHypothesis& found,
+                  const std::vector<Correspondence>& measured) const;
   MotionHypothesis choose(const MotionScene& scene, std::vector<MotionHypothesis> hypotheses) const;
+  std::vector<double> lastingCosts(const MotionScene& scene, const std::vector<MotionHypothesis>& hypotheses) const;
   std::size_t best(const MotionScene& scene, const std::vector<MotionHypothesis>& hypotheses) const;
   int leastOfRival(const MotionEstimate& motion) const;
 

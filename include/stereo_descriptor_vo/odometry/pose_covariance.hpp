@@ -16,6 +16,10 @@ struct WindowCovariances {
   Matrix6d keyframe_since_first = Matrix6d::Zero();  ///< that key frame since the first frame
 };
 
+/// Widens a covariance by a deviation that is larger than it says, beyond chance (chi-square of six, 95 %). Whether it
+/// was.
+bool widen(Matrix6d& covariance, const Vector6d& deviation);
+
 /// Covariance of a pose that is reported again and again while later pairs improve what is known of it. What is
 /// reported stays true: a motion's covariance is that between two *reported* poses, so it contains what the earlier one
 /// lacked; and the pose's covariance grows from key frame to key frame, because all pairs since the last one were
@@ -25,6 +29,9 @@ class PoseCovariance {
  public:
   /// Of the last pose. Zero in the beginning, when that is a key frame by definition.
   const Matrix6d& value() const { return value_; }
+
+  /// A second thought moved the last pose by this right perturbation. Its covariance then contains that.
+  void cover(const Vector6d& correction);
 
   /// The last pose becomes the beginning of a new drive, after a motion of unknown size; it is a key frame. `travelled`
   /// is what may have been travelled unseen.

@@ -58,7 +58,8 @@ enum class Trust { kSound, kDoubtful, kNone };
 
 struct PoseVerdict {
   Trust trust = Trust::kSound;
-  std::string reason;  ///< in words, unless it is sound
+  std::string reason;    ///< in words, unless it is sound
+  bool of_rate = false;  ///< what is doubted is only how fast that would have been
 };
 
 /// Judges a motion by what it rests on. It only looks: the motion is taken or left, never changed. Rates are judged

@@ -144,7 +144,7 @@ class VisualOdometry {
   Matrix6d doubt(const MotionHypothesis& found, const Eigen::Isometry3d& T_previous_measured,
                  const Eigen::Isometry3d& T_previous_current, double dt) const;
   void recall(const StereoFeatures& features);
-  static void cover(Step& step);
+  void cover(Step& step);
   Step predict(const StereoFeatures& features, double dt, const std::string& failure);
   void move(const Eigen::Isometry3d& T_previous_current);
   OdometryResult report(const StereoFeatures& features, double dt, const MotionHypothesis& found,
