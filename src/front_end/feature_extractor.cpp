@@ -61,6 +61,7 @@ cv::Mat cutPatches(const cv::Mat& image, const StereoFeatures& features) {
 FeatureExtractor::FeatureExtractor(const FeatureExtractorOptions& options)
     : options_(checked(options)),
       detector_(options.detector),
+      exposure_balance_(options.exposure_balance),
       stereo_matcher_(options.stereo),
       rig_monitor_(options.rig_monitor, options.stereo.max_epipolar_residual, options.stereo.epipolar.max_disparity),
       depth_scale_(options.size_curve),
@@ -89,16 +90,19 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
   report.detected = static_cast<int>(corners.size());
   report.detect_time = stopwatch.lap();
 
-  // Find each feature in the right image by tracking.
+  // Find each feature in the right image by tracking, in images that are equally exposed.
+  cv::Mat searched_left = left, searched_right = right;
+  exposure_balance_.apply(report.mean_intensity[0], report.mean_intensity[1], searched_left, searched_right);
   std::vector<cv::Point2f> positions;
   positions.reserve(corners.size());
   for (const Corner& corner : corners) positions.push_back(corner.position);
-  std::vector<StereoMatch> matches = stereo_matcher_.match(left, right, positions);
+  std::vector<StereoMatch> matches = stereo_matcher_.match(searched_left, searched_right, positions);
   report.stereo_matched = static_cast<int>(matches.size());
   std::string refusal;  // matches of a rig that is not what it should be are wrong ones
   if (rig_monitor_.isSuspicious(report.detected, report.stereo_matched))
     refusal = rig_monitor_.diagnose(left, right, positions);
-  if (!refusal.empty()) matches.clear();
+  report.refused = !refusal.empty();
+  if (report.refused) matches.clear();
   report.stereo_time = stopwatch.lap();
 
   // Size from depth, then the descriptor of both views at that size.
@@ -123,7 +127,7 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
   if (features.hasPatches()) features.patches = cutPatches(left, features);
   report.describe_time = stopwatch.lap();
 
-  if (!refusal.empty())
+  if (report.refused)
     report.status = refusal;
   else if (2 * border >= std::min(left.rows, left.cols))
     report.status =

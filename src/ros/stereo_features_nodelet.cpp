@@ -163,6 +163,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
         NODELET_WARN_STREAM("camera_info changed: a new stream begins (" << stream_epoch_ << " so far)");
     }
 
+    reportRig(features, stamp);
     const auto message = boost::make_shared<stereo_descriptor_vo::StereoFeatures>(
         ros_conversions::toMessage(features, extractor_->options().size_curve));
     message->header.stamp = stamp;
@@ -174,6 +175,17 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     if (throttle_.allows(e.what()))
       NODELET_ERROR_STREAM("pair at " << passed.item.left_image->header.stamp << " of "
                                       << passed.item.left_image->header.frame_id << " skipped: " << e.what());
+  }
+
+  /// What the rig monitor says, when it says something else than before. A pair without features (dark) says nothing.
+  void reportRig(const StereoFeatures& features, const ros::Time& stamp) {
+    const bool refused = features.report.refused;
+    if (refused == rig_refused_ || (!refused && features.count() == 0) || !throttle_.allows("rig")) return;
+    rig_refused_ = refused;
+    if (refused)
+      NODELET_WARN_STREAM("pairs from " << stamp << " on are refused: " << features.report.status);
+    else
+      NODELET_WARN_STREAM("rows of left and right agree again: pairs are used");
   }
 
   static constexpr double kSilencePeriod = 10.0;  // s between explanations why nothing comes
@@ -199,6 +211,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   PairDecoder decoder_;
   int timeline_ = 0;
   std::uint32_t stream_epoch_ = 0;
+  bool rig_refused_ = false;  // as reported last
 
   std::mutex connect_mutex_;
   std::unique_ptr<Worker<PairFilter::Passed>> worker_;

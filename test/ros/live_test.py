@@ -667,6 +667,25 @@ class Live(unittest.TestCase):
         np.testing.assert_allclose(matrix_of(resumed.pose.pose), matrix_of(last.pose.pose), atol=1e-9)
         self.assertGreater(resumed.pose.covariance[0], last.pose.covariance[0])
 
+    def test_a_rig_whose_rows_do_not_agree_is_named_once(self):
+        self.start()
+        for i in range(3):
+            self.assertEqual(self.feed(i).state, 'TRACKING')
+        for i in range(3, 7):
+            images, infos = self.camera.messages(i)
+            images[1].data = self.camera.bridge.cv2_to_imgmsg(np.roll(self.sequence.pairs[i][1], 5, axis=0)).data
+            info = self.feed_messages(images, infos)
+            self.assertIn('px too low', info.reason)
+        named = [warning for warning in self.rosout.warnings if 'pairs from' in warning]
+        self.assertEqual(len(named), 1, self.rosout.warnings)
+        self.assertIn('are refused: right image', named[0])
+        self.assertIn('too low: not rectified?', named[0])
+        # Said once in five seconds, whatever the rows do meanwhile.
+        times = itertools.count(7)
+        self.assertTrue(wait_until(lambda: self.feed(7, time_of=next(times)) and
+                                   self.rosout.warned('rows of left and right agree again')))
+        self.assert_alive()
+
     def test_two_pipelines_in_one_manager_share_nothing(self):
         self.start()
         other_namespace = self.namespace + '_other'
