@@ -68,7 +68,7 @@ FeatureExtractor::FeatureExtractor(const FeatureExtractorOptions& options)
       descriptor_(options.descriptor) {}
 
 StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
-                                         std::int64_t stamp) const {
+                                         std::int64_t stamp, const cv::Mat& mask) const {
   camera.check();
   checkImage(left, "left", camera);
   checkImage(right, "right", camera);
@@ -83,10 +83,10 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
   measureImage(left, report.mean_intensity[0], report.sharpness[0]);
   measureImage(right, report.mean_intensity[1], report.sharpness[1]);
 
-  // Detect in the left image, where at least the smallest descriptor fits.
+  // Detect in the left image, where at least the smallest descriptor fits and nothing is masked.
   const int border = static_cast<int>(descriptor_.reach(depth_scale_.size(options_.stereo.min_disparity)));
   Stopwatch stopwatch;
-  const std::vector<Corner> corners = detector_.detect(left, border);
+  const std::vector<Corner> corners = detector_.detect(left, border, mask);
   report.detected = static_cast<int>(corners.size());
   report.detect_time = stopwatch.lap();
 
@@ -133,7 +133,7 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
     report.status =
         "every feature is too close to an image border for its descriptor: the image is too small for its size";
   else if (report.detected == 0)
-    report.status = "no corners: the left image has no texture (dark, covered or out of focus?)";
+    report.status = "no corners: the left image has no texture (dark, covered, masked or out of focus?)";
   else if (report.stereo_matched == 0)
     report.status = "no stereo matches: left and right do not show the same scene, are swapped or not rectified";
   else if (features.count() == 0)

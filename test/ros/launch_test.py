@@ -23,9 +23,11 @@ from sensor_msgs.msg import CameraInfo
 PACKAGE = 'stereo_descriptor_vo'
 # Under the nodelets' names; what an argument of the launch file can set.
 ARGUMENTS = {'odom_frame_id': 'visual_odometry/odom_frame_id', 'base_frame_id': 'visual_odometry/base_frame_id',
+             'initial_pose': 'visual_odometry/initial_pose', 'mask': 'stereo_features/detector/mask',
              'publish_tf': 'visual_odometry/publish_tf', 'approximate_sync': 'stereo_features/approximate_sync',
              'queue_size': 'stereo_features/queue_size', 'odometry_queue_size': 'visual_odometry/queue_size'}
-IN_YAML = {'odom_frame_id': 'world', 'base_frame_id': 'robot', 'publish_tf': False, 'approximate_sync': True,
+IN_YAML = {'odom_frame_id': 'world', 'base_frame_id': 'robot', 'initial_pose': '1 2 3 0 0 0', 'mask': '/in/yaml.png',
+           'publish_tf': False, 'approximate_sync': True,
            'queue_size': 7, 'odometry_queue_size': 8}
 
 
@@ -42,10 +44,13 @@ class Launch(unittest.TestCase):
 
     def test_arguments_left_alone_leave_the_yaml_file_alone(self):
         with tempfile.NamedTemporaryFile('w', suffix='.yaml') as config:
-            nested = {'stereo_features': {}, 'visual_odometry': {}}
+            nested = {}
             for name, path in ARGUMENTS.items():
-                nodelet, option = path.split('/')
-                nested[nodelet][option] = IN_YAML[name]
+                *groups, option = path.split('/')
+                block = nested
+                for group in groups:
+                    block = block.setdefault(group, {})
+                block[option] = IN_YAML[name]
             yaml.safe_dump(nested, config)
             config.flush()
             found = parameters(config=config.name)

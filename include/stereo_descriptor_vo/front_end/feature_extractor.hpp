@@ -40,10 +40,11 @@ class FeatureExtractor {
   /// Throws std::invalid_argument when an option is out of its range.
   explicit FeatureExtractor(const FeatureExtractorOptions& options);
 
-  /// Images are CV_8U of the camera's size, else std::invalid_argument. A pair in which nothing is found gives an empty
+  /// Images are CV_8U of the camera's size, else std::invalid_argument; so is `mask`, which hides where it is zero what
+  /// moves with the robot (empty: the detector's own). A pair in which nothing is found gives an empty
   /// set whose report says why; so does one that the rig monitor refuses.
-  StereoFeatures extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
-                         std::int64_t stamp) const;
+  StereoFeatures extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp,
+                         const cv::Mat& mask = cv::Mat()) const;
 
   const FeatureExtractorOptions& options() const { return options_; }
 
