@@ -27,6 +27,7 @@ struct StereoInputOptions {
 struct OdometryOutputOptions {
   std::string odom_frame_id = "odom";
   std::string base_frame_id = "base_link";
+  std::string initial_pose = "0 0 0 0 0 0";
   bool publish_tf = true;
   bool invert_tf = false;
   double tf_timeout = 2.0;
@@ -37,6 +38,8 @@ struct OdometryOutputOptions {
   void describe(OptionList& list) {
     list.add("odom_frame_id", odom_frame_id, "world-fixed frame of the odometry");
     list.add("base_frame_id", base_frame_id, "the robot's frame, whose pose is published");
+    list.add("initial_pose", initial_pose,
+             "pose of the base in odom at the start and after a reset: 'x y z roll pitch yaw' (m, rad)");
     list.add("publish_tf", publish_tf, "publish odom -> base on /tf");
     list.add("invert_tf", invert_tf, "publish base -> odom instead, where base already has a parent");
     list.add("tf_timeout", tf_timeout, {0.0, 60.0}, "s",

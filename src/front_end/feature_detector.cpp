@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/features2d.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <tuple>
@@ -117,6 +118,15 @@ void refinePositions(const cv::Mat& image, int radius, float largest_shift, std:
   });
 }
 
+void removeMasked(const cv::Mat& mask, cv::Size size, std::vector<Corner>& corners) {
+  if (mask.size() != size)
+    throw std::invalid_argument("the mask is " + std::to_string(mask.cols) + "x" + std::to_string(mask.rows) +
+                                ", the left image is " + std::to_string(size.width) + "x" +
+                                std::to_string(size.height));
+  const auto is_masked = [&](const Corner& corner) { return mask.at<std::uint8_t>(cv::Point(corner.position)) == 0; };
+  corners.erase(std::remove_if(corners.begin(), corners.end(), is_masked), corners.end());
+}
+
 }  // namespace
 
 std::vector<Corner> spreadOverBuckets(const std::vector<Corner>& corners, cv::Size image_size, int bucket_size,
@@ -165,15 +175,21 @@ void FeatureDetectorOptions::check() const {
                                 "): OpenCV 4.4 and later have it in features2d");
 }
 
-FeatureDetector::FeatureDetector(const FeatureDetectorOptions& options) : options_(checked(options)) {}
+FeatureDetector::FeatureDetector(const FeatureDetectorOptions& options) : options_(checked(options)) {
+  if (options_.mask.empty()) return;
+  mask_ = cv::imread(options_.mask, cv::IMREAD_GRAYSCALE);
+  if (mask_.empty()) throw std::invalid_argument("mask: cannot read an image from '" + options_.mask + "'");
+}
 
-std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border) const {
+std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border, const cv::Mat& mask) const {
   CV_Assert(image.type() == CV_8UC1);
   constexpr int kSmallestSide = 16;  // px, less is no image for the detectors
   const cv::Rect inner(border, border, image.cols - 2 * border, image.rows - 2 * border);
   if (inner.width < kSmallestSide || inner.height < kSmallestSide) return {};
   std::vector<Corner> corners = detectAll(image(inner), options_);
   for (Corner& corner : corners) corner.position += cv::Point2f(inner.tl());
+  const cv::Mat& valid = mask.empty() ? mask_ : mask;
+  if (!valid.empty()) removeMasked(valid, image.size(), corners);
   corners = spreadOverBuckets(corners, image.size(), options_.bucket_size, options_.max_features);
   if (options_.subpixel) {
     const bool gradient = options_.type == DetectorType::kGftt || options_.type == DetectorType::kHarris;

@@ -61,13 +61,14 @@ cv::Mat cutPatches(const cv::Mat& image, const StereoFeatures& features) {
 FeatureExtractor::FeatureExtractor(const FeatureExtractorOptions& options)
     : options_(checked(options)),
       detector_(options.detector),
+      exposure_balance_(options.exposure_balance),
       stereo_matcher_(options.stereo),
       rig_monitor_(options.rig_monitor, options.stereo.max_epipolar_residual, options.stereo.epipolar.max_disparity),
       depth_scale_(options.size_curve),
       descriptor_(options.descriptor) {}
 
 StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
-                                         std::int64_t stamp) const {
+                                         std::int64_t stamp, const cv::Mat& mask) const {
   camera.check();
   checkImage(left, "left", camera);
   checkImage(right, "right", camera);
@@ -82,23 +83,26 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
   measureImage(left, report.mean_intensity[0], report.sharpness[0]);
   measureImage(right, report.mean_intensity[1], report.sharpness[1]);
 
-  // Detect in the left image, where at least the smallest descriptor fits.
+  // Detect in the left image, where at least the smallest descriptor fits and nothing is masked.
   const int border = static_cast<int>(descriptor_.reach(depth_scale_.size(options_.stereo.min_disparity)));
   Stopwatch stopwatch;
-  const std::vector<Corner> corners = detector_.detect(left, border);
+  const std::vector<Corner> corners = detector_.detect(left, border, mask);
   report.detected = static_cast<int>(corners.size());
   report.detect_time = stopwatch.lap();
 
-  // Find each feature in the right image by tracking.
+  // Find each feature in the right image by tracking, in images that are equally exposed.
+  cv::Mat searched_left = left, searched_right = right;
+  exposure_balance_.apply(report.mean_intensity[0], report.mean_intensity[1], searched_left, searched_right);
   std::vector<cv::Point2f> positions;
   positions.reserve(corners.size());
   for (const Corner& corner : corners) positions.push_back(corner.position);
-  std::vector<StereoMatch> matches = stereo_matcher_.match(left, right, positions);
+  std::vector<StereoMatch> matches = stereo_matcher_.match(searched_left, searched_right, positions);
   report.stereo_matched = static_cast<int>(matches.size());
   std::string refusal;  // matches of a rig that is not what it should be are wrong ones
   if (rig_monitor_.isSuspicious(report.detected, report.stereo_matched))
     refusal = rig_monitor_.diagnose(left, right, positions);
-  if (!refusal.empty()) matches.clear();
+  report.refused = !refusal.empty();
+  if (report.refused) matches.clear();
   report.stereo_time = stopwatch.lap();
 
   // Size from depth, then the descriptor of both views at that size.
@@ -123,13 +127,13 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
   if (features.hasPatches()) features.patches = cutPatches(left, features);
   report.describe_time = stopwatch.lap();
 
-  if (!refusal.empty())
+  if (report.refused)
     report.status = refusal;
   else if (2 * border >= std::min(left.rows, left.cols))
     report.status =
         "every feature is too close to an image border for its descriptor: the image is too small for its size";
   else if (report.detected == 0)
-    report.status = "no corners: the left image has no texture (dark, covered or out of focus?)";
+    report.status = "no corners: the left image has no texture (dark, covered, masked or out of focus?)";
   else if (report.stereo_matched == 0)
     report.status = "no stereo matches: left and right do not show the same scene, are swapped or not rectified";
   else if (features.count() == 0)

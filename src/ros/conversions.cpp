@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <locale>
 #include <set>
 #include <sstream>
 #include <stdexcept>
@@ -284,6 +285,16 @@ nav_msgs::Odometry toOdometry(const OdometryResult& result, const Eigen::Isometr
       to_base * result.motion_covariance * to_base.transpose() / (result.dt * result.dt) + unsteadiness(result.dt),
       odometry.twist.covariance);
   return odometry;
+}
+
+Eigen::Isometry3d toPose(const std::string& text) {
+  std::istringstream stream(text);
+  stream.imbue(std::locale::classic());
+  double x, y, z, roll, pitch, yaw;
+  if (!(stream >> x >> y >> z >> roll >> pitch >> yaw) || !(stream >> std::ws).eof())
+    throw std::invalid_argument("'" + text + "' is no pose: six numbers 'x y z roll pitch yaw' (m, rad) are");
+  return Eigen::Translation3d(x, y, z) * Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
+         Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX());
 }
 
 geometry_msgs::TransformStamped toTransform(const nav_msgs::Odometry& odometry, bool inverted) {

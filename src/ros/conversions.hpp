@@ -54,6 +54,10 @@ nav_msgs::Odometry toOdometry(const OdometryResult& result, const Eigen::Isometr
                               const OdometryFrames& frames,
                               const Eigen::Isometry3d& T_odom_start = Eigen::Isometry3d::Identity());
 
+/// A pose of six numbers, "x y z roll pitch yaw" (m, rad; about the fixed axes x, y and z in this order, as in URDF).
+/// Throws std::invalid_argument when it is none.
+Eigen::Isometry3d toPose(const std::string& text);
+
 /// The transform of an odometry message: odom -> base, or base -> odom when inverted.
 geometry_msgs::TransformStamped toTransform(const nav_msgs::Odometry& odometry, bool inverted);
 

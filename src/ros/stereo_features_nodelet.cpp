@@ -95,10 +95,13 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     const std::lock_guard<std::mutex> lock(connect_mutex_);
     if (publisher_.getNumSubscribers() == 0) {
       input_.reset();
+      mask_subscriber_.shutdown();
     } else if (!input_) {
       input_ = std::make_unique<StereoInput>(
           nh_, *transport_, options_.input, [this](const StereoPairMessages& pair) { onPair(pair); },
           [this](const std::string& topic, const std::string& why) { onRefusal(topic, why); });
+      mask_subscriber_ =
+          nh_.subscribe<sensor_msgs::Image>("left/mask", 1, [this](const sensor_msgs::ImageConstPtr& m) { onMask(m); });
     }
   } catch (const std::exception& e) {
     NODELET_ERROR_STREAM("cannot subscribe to the images: " << e.what());
@@ -107,6 +110,20 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   void onRefusal(const std::string& topic, const std::string& why) {
     if (topic == nh_.resolveName("left/image_rect")) ++refused_;
     if (throttle_.allows(topic)) NODELET_ERROR_STREAM(topic << ": a message is not used: " << why);
+  }
+
+  /// The newest mask holds, whatever its stamp, until the next one comes.
+  void onMask(const sensor_msgs::ImageConstPtr& message) try {
+    const cv::Mat mask = ros_conversions::toGrey(message).clone();
+    const std::lock_guard<std::mutex> lock(pending_mutex_);
+    mask_ = mask;
+  } catch (const std::exception& e) {
+    onRefusal(nh_.resolveName("left/mask"), e.what());
+  }
+
+  cv::Mat mask() {
+    const std::lock_guard<std::mutex> lock(pending_mutex_);
+    return mask_;
   }
 
   void onPair(const StereoPairMessages& pair) {
@@ -155,7 +172,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     const DecodedPair decoded = decoder_.decode(pair);
     if (decoder_.bitDepth() > depth) NODELET_INFO_STREAM("mono16 images hold " << decoder_.bitDepth() << " bits");
     const StereoFeatures features =
-        extractor_->extract(decoded.camera, decoded.left, decoded.right, nanoseconds(stamp));
+        extractor_->extract(decoded.camera, decoded.left, decoded.right, nanoseconds(stamp), mask());
     // Only now: a calibration that does not fit the images was refused and is no new stream.
     if (decoder_.accept(decoded.camera)) {
       ++stream_epoch_;
@@ -163,6 +180,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
         NODELET_WARN_STREAM("camera_info changed: a new stream begins (" << stream_epoch_ << " so far)");
     }
 
+    reportRig(features, stamp);
     const auto message = boost::make_shared<stereo_descriptor_vo::StereoFeatures>(
         ros_conversions::toMessage(features, extractor_->options().size_curve));
     message->header.stamp = stamp;
@@ -174,6 +192,17 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     if (throttle_.allows(e.what()))
       NODELET_ERROR_STREAM("pair at " << passed.item.left_image->header.stamp << " of "
                                       << passed.item.left_image->header.frame_id << " skipped: " << e.what());
+  }
+
+  /// What the rig monitor says, when it says something else than before. A pair without features (dark) says nothing.
+  void reportRig(const StereoFeatures& features, const ros::Time& stamp) {
+    const bool refused = features.report.refused;
+    if (refused == rig_refused_ || (!refused && features.count() == 0) || !throttle_.allows("rig")) return;
+    rig_refused_ = refused;
+    if (refused)
+      NODELET_WARN_STREAM("pairs from " << stamp << " on are refused: " << features.report.status);
+    else
+      NODELET_WARN_STREAM("rows of left and right agree again: pairs are used");
   }
 
   static constexpr double kSilencePeriod = 10.0;  // s between explanations why nothing comes
@@ -189,6 +218,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
 
   std::mutex pending_mutex_;
   std::unique_ptr<FeatureExtractor> pending_;
+  cv::Mat mask_;  // of the topic; empty: none has come
   std::unique_ptr<ReconfigureServer> reconfigure_server_;
 
   PairFilter filter_;  // only the callbacks' thread touches it
@@ -199,11 +229,13 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   PairDecoder decoder_;
   int timeline_ = 0;
   std::uint32_t stream_epoch_ = 0;
+  bool rig_refused_ = false;  // as reported last
 
   std::mutex connect_mutex_;
   std::unique_ptr<Worker<PairFilter::Passed>> worker_;
   std::unique_ptr<StereoImageTransport> transport_;
   std::unique_ptr<StereoInput> input_;
+  ros::Subscriber mask_subscriber_;
 };
 
 }  // namespace sdvo

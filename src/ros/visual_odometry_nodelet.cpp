@@ -65,8 +65,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
       NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect");
+    T_odom_start_ = ros_conversions::toPose(options_.output.initial_pose);
     odometry_ = std::make_unique<VisualOdometry>(options_.odometry);
     publisher_ = std::make_unique<OdometryPublisher>(nh_, options_.output);
+    publisher_->restart(T_odom_start_);
     transforms_ = std::make_unique<RobotTransforms>(nh_, publishedFrames(), [this](const std::string& what) {
       if (throttle_.allows(what)) NODELET_WARN_STREAM(what);
     });
@@ -154,8 +156,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   void process(const FeaturesFilter::Passed& passed) try {
     const FeaturesMessage& message = *passed.item;
     takeOverOptions();
-    if (std::exchange(timeline_, passed.timeline) != passed.timeline)
-      restart("the clock jumped back", Eigen::Isometry3d::Identity());
+    if (std::exchange(timeline_, passed.timeline) != passed.timeline) restart("the clock jumped back", T_odom_start_);
     if (const std::optional<Eigen::Isometry3d> start = takeRequestedStart()) restart("reset was called", *start);
     if (resumed_.exchange(false)) odometry_->breakStream();
     const std::string problem = findExtrinsic(ros_conversions::cleanFrameId(message.header.frame_id));
@@ -259,7 +260,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   }
 
   bool onReset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
-    requestStart(Eigen::Isometry3d::Identity());
+    requestStart(T_odom_start_);
     return true;
   }
 
@@ -322,6 +323,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   CallbackThread callbacks_;
   ros::NodeHandle nh_;
   Options options_;
+  Eigen::Isometry3d T_odom_start_;      // of a run
   VisualOdometryOptions reconfigured_;  // the server's
   std::mutex pending_mutex_;
   std::optional<VisualOdometryOptions> pending_;

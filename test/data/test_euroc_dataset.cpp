@@ -1,8 +1,6 @@
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cstdint>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -11,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "../temporary_folder.hpp"
 #include "stereo_descriptor_vo/data/euroc_dataset.hpp"
 
 namespace sdvo {
@@ -27,18 +26,13 @@ std::string errorOf(const std::function<void()>& action) {
   return "no error";
 }
 
-/// mav0 with two pairs of 120x80 px and one more left image, of cameras 0.2 m apart, in a directory that is removed at
-/// the end.
+/// mav0 with two pairs of 120x80 px and one more left image, of cameras 0.2 m apart.
 class EurocDataset : public testing::Test {
  protected:
   void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "sdvo_euroc_XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    root_ = name;
     writeCamera("cam0", 0.0, {1000, 1050, 1100});
     writeCamera("cam1", 0.2, {1000, 1100});
   }
-  void TearDown() override { fs::remove_all(root_); }
 
   void writeCamera(const std::string& camera, double place, const std::vector<int>& stamps) const {
     fs::create_directories(root_ / camera / "data");
@@ -60,7 +54,8 @@ class EurocDataset : public testing::Test {
         << "distortion_model: radial-tangential\ndistortion_coefficients: [-0.1, 0.01, 0.001, 0.002]\n";
   }
 
-  fs::path root_;
+  const TemporaryFolder folder_;
+  const fs::path root_ = folder_.path();
 };
 
 TEST_F(EurocDataset, PairsAreThoseThatBothCamerasTook) {

@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
-#include <unistd.h>
 
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -10,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "../temporary_folder.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 
 namespace sdvo {
@@ -41,20 +40,15 @@ bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
 }
 
-/// sequences/07 with three grey pairs of 120x80 px in a directory that is removed at the end; each test damages it.
+/// sequences/07 with three grey pairs of 120x80 px; each test damages it.
 class KittiDataset : public testing::Test {
  protected:
   void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "sdvo_kitti_XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    root_ = name;
-    directory_ = root_ / "sequences" / "07";
     writeImages("image_0", 3, CV_8UC1);
     writeImages("image_1", 3, CV_8UC1);
     writeText("calib.txt", kGreyCalibration);
     writeText("times.txt", "0.000000e+00\n1.036000e-01\n2.072000e-01\n");
   }
-  void TearDown() override { fs::remove_all(root_); }
 
   void writeImages(const std::string& folder, int count, int type) {
     fs::create_directories(directory_ / folder);
@@ -71,7 +65,8 @@ class KittiDataset : public testing::Test {
     return errorOf([&] { open(cameras); });
   }
 
-  fs::path root_, directory_;
+  const TemporaryFolder folder_;
+  const fs::path root_ = folder_.path(), directory_ = root_ / "sequences" / "07";
 };
 
 TEST_F(KittiDataset, GivesCameraStampsAndImages) {

@@ -1,11 +1,11 @@
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
 #include <stdexcept>
 #include <string>
 
+#include "../temporary_folder.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 #include "stereo_descriptor_vo/data/kitti_writer.hpp"
 
@@ -16,14 +16,6 @@ namespace fs = std::filesystem;
 
 class KittiWriterTest : public testing::Test {
  protected:
-  void SetUp() override {
-    std::string name = (fs::temp_directory_path() / "sdvo_writer_XXXXXX").string();
-    ASSERT_NE(mkdtemp(name.data()), nullptr);
-    root_ = name;
-    directory_ = (root_ / "drive").string();
-  }
-  void TearDown() override { fs::remove_all(root_); }
-
   cv::Mat image(int side, int i) const { return cv::Mat(30, 40, CV_8U, cv::Scalar(10 * i + side)); }
 
   void write(KittiWriter& writer, const Trajectory& poses = {}) const {
@@ -42,8 +34,9 @@ class KittiWriterTest : public testing::Test {
   }
 
   const StereoCamera camera_{123.0 / 7.0, 18.5, 20.25, 14.75, 0.1203, 40, 30};
-  fs::path root_;
-  std::string directory_;
+  const TemporaryFolder folder_;
+  const fs::path root_ = folder_.path();
+  const std::string directory_ = (root_ / "drive").string();
 };
 
 TEST_F(KittiWriterTest, WhatIsWrittenIsReadBack) {

@@ -1,8 +1,6 @@
 #include <gtest/gtest.h>
-#include <unistd.h>
 
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <functional>
@@ -10,6 +8,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "../temporary_folder.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
 
 namespace sdvo {
@@ -20,19 +19,12 @@ namespace fs = std::filesystem;
 /// A file that is removed at the end of the test.
 class TemporaryFile {
  public:
-  explicit TemporaryFile(const std::string& text = "") {
-    std::string name = (fs::temp_directory_path() / "sdvo_trajectory_XXXXXX").string();
-    const int descriptor = mkstemp(name.data());
-    if (descriptor < 0) throw std::runtime_error("no temporary file");
-    close(descriptor);
-    path_ = name;
-    std::ofstream(path_) << text;
-  }
-  ~TemporaryFile() { fs::remove(path_); }
+  explicit TemporaryFile(const std::string& text = "") { std::ofstream(path_) << text; }
   const std::string& path() const { return path_; }
 
  private:
-  std::string path_;
+  const TemporaryFolder folder_;
+  const std::string path_ = (folder_.path() / "trajectory.txt").string();
 };
 
 std::string errorOf(const std::function<void()>& action) {

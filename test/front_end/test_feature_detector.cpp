@@ -2,14 +2,18 @@
 
 #include <cmath>
 #include <numeric>
+#include <opencv2/imgcodecs.hpp>
 #include <set>
 #include <utility>
 
 #include "../synthetic_scene.hpp"
+#include "../temporary_folder.hpp"
 #include "stereo_descriptor_vo/front_end/feature_detector.hpp"
 
 namespace sdvo {
 namespace {
+
+using synthetic::errorOf;
 
 constexpr int kBucket = 50;  // px
 const cv::Size kSize(600, 400);
@@ -54,6 +58,54 @@ cv::Mat squares(std::vector<cv::Point2d>& corners) {
       covered += overlap(u - 0.5, u + 0.5, r.x, r.x + r.width) * overlap(v - 0.5, v + 0.5, r.y, r.y + r.height);
     return 50.0 + 150.0 * covered;
   });
+}
+
+/// Nothing but the part of it left of `column` is masked.
+cv::Mat maskUpTo(int column) {
+  cv::Mat mask(kSize, CV_8U, cv::Scalar(255));
+  mask.colRange(0, column) = 0;
+  return mask;
+}
+
+TEST(FeatureDetector, FindsNothingWhereTheMaskIsBlack) {
+  const cv::Mat image = unevenTexture();
+  FeatureDetectorOptions options;
+  options.max_features = 300;
+  options.subpixel = false;
+  const FeatureDetector detector(options);
+  const std::vector<Corner> corners = detector.detect(image, 10, maskUpTo(320));
+  EXPECT_EQ(corners.size(), 300u);  // what is masked takes nothing from the rest
+  for (const Corner& corner : corners) EXPECT_GE(corner.position.x, 320.f);
+  EXPECT_TRUE(detector.detect(image, 10, cv::Mat::zeros(kSize, CV_8U)).empty());
+}
+
+TEST(FeatureDetector, TheMaskOfAFileHoldsUntilAnotherIsGiven) {
+  const TemporaryFolder folder;
+  const std::string file = (folder.path() / "mask.png").string();
+  const cv::Mat image = unevenTexture(), mask = maskUpTo(400);
+  cv::imwrite(file, mask);
+  FeatureDetectorOptions options;
+  const auto positions = [&](const cv::Mat& given) {
+    std::vector<cv::Point2f> found;
+    for (const Corner& corner : FeatureDetector(options).detect(image, 0, given)) found.push_back(corner.position);
+    return found;
+  };
+  const auto everywhere = positions(cv::Mat()), right = positions(mask), none = positions(maskUpTo(kSize.width));
+  ASSERT_FALSE(right.empty());
+  ASSERT_NE(everywhere, right);
+  options.mask = file;
+  EXPECT_EQ(positions(cv::Mat()), right);
+  EXPECT_EQ(positions(maskUpTo(kSize.width)), none);
+  EXPECT_EQ(positions(maskUpTo(0)), everywhere);
+}
+
+TEST(FeatureDetector, AMaskThatDoesNotFitIsNamed) {
+  FeatureDetectorOptions options;
+  const cv::Mat image = unevenTexture();
+  EXPECT_EQ(errorOf([&] { FeatureDetector(options).detect(image, 0, cv::Mat::zeros(100, 200, CV_8U)); }),
+            "the mask is 200x100, the left image is 600x400");
+  options.mask = "/nowhere/mask.png";
+  EXPECT_EQ(errorOf([&] { FeatureDetector{options}; }), "mask: cannot read an image from '/nowhere/mask.png'");
 }
 
 TEST(SpreadOverBuckets, ServesEveryBucketBeforeASecondTime) {

@@ -20,12 +20,16 @@ import yaml
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import CameraInfo
 
+from stereo_descriptor_vo.msg import StereoFeatures, VoInfo
+
 PACKAGE = 'stereo_descriptor_vo'
 # Under the nodelets' names; what an argument of the launch file can set.
 ARGUMENTS = {'odom_frame_id': 'visual_odometry/odom_frame_id', 'base_frame_id': 'visual_odometry/base_frame_id',
+             'initial_pose': 'visual_odometry/initial_pose', 'mask': 'stereo_features/detector/mask',
              'publish_tf': 'visual_odometry/publish_tf', 'approximate_sync': 'stereo_features/approximate_sync',
              'queue_size': 'stereo_features/queue_size', 'odometry_queue_size': 'visual_odometry/queue_size'}
-IN_YAML = {'odom_frame_id': 'world', 'base_frame_id': 'robot', 'publish_tf': False, 'approximate_sync': True,
+IN_YAML = {'odom_frame_id': 'world', 'base_frame_id': 'robot', 'initial_pose': '1 2 3 0 0 0', 'mask': '/in/yaml.png',
+           'publish_tf': False, 'approximate_sync': True,
            'queue_size': 7, 'odometry_queue_size': 8}
 
 
@@ -42,10 +46,13 @@ class Launch(unittest.TestCase):
 
     def test_arguments_left_alone_leave_the_yaml_file_alone(self):
         with tempfile.NamedTemporaryFile('w', suffix='.yaml') as config:
-            nested = {'stereo_features': {}, 'visual_odometry': {}}
+            nested = {}
             for name, path in ARGUMENTS.items():
-                nodelet, option = path.split('/')
-                nested[nodelet][option] = IN_YAML[name]
+                *groups, option = path.split('/')
+                block = nested
+                for group in groups:
+                    block = block.setdefault(group, {})
+                block[option] = IN_YAML[name]
             yaml.safe_dump(nested, config)
             config.flush()
             found = parameters(config=config.name)
@@ -76,7 +83,23 @@ class Launch(unittest.TestCase):
                 process.wait()
             rospy.delete_param('/stereo')
 
-    def test_a_loader_that_is_killed_is_replaced_without_an_error(self):
+    def session(self):
+        """(session, epoch) of the odometry that answers a message of ours; None where none does."""
+        answers = []
+        listener = rospy.Subscriber('/stereo/vo_info', VoInfo, lambda info: answers.append((info.session, info.epoch)))
+        publisher = rospy.Publisher('/stereo/stereo_features', StereoFeatures, queue_size=1)
+        message = StereoFeatures(image_width=640, image_height=480, fx=400.0, fy=400.0, cx=320.0, cy=240.0, baseline=0.1,
+                                 descriptor='freak', layout='left+right', element_type='bits', bytes_per_row=128)
+        end = time.time() + 30
+        while not answers and time.time() < end:
+            message.header.stamp = rospy.Time.now()
+            publisher.publish(message)
+            time.sleep(0.3)
+        listener.unregister()
+        publisher.unregister()
+        return answers[-1] if answers else None
+
+    def test_killed_loaders_and_managers_are_replaced_and_told_apart(self):
         errors, service = [], '/stereo/visual_odometry/reset'
         listener = rospy.Subscriber('/rosout', Log, lambda log: errors.append(log.msg) if log.level >= Log.ERROR else None)
         process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch', 'respawn:=true'])
@@ -94,11 +117,18 @@ class Launch(unittest.TestCase):
             return condition()
         try:
             self.assertTrue(wait_until(is_offered))
-            loader = rosnode.get_api_uri(rosgraph.Master('/test'), '/stereo/visual_odometry')
-            os.kill(xmlrpc.client.ServerProxy(loader).getPid('/test')[2], signal.SIGKILL)
-            self.assertTrue(wait_until(lambda: not is_offered()))
-            self.assertTrue(wait_until(is_offered))
-            self.assertEqual(errors, [])
+            sessions = [self.session()]
+            for node in ('/stereo/visual_odometry', '/stereo/stereo_vo_manager'):
+                uri = rosnode.get_api_uri(rosgraph.Master('/test'), node)
+                errors.clear()  # that our messages have no transform
+                os.kill(xmlrpc.client.ServerProxy(uri).getPid('/test')[2], signal.SIGKILL)
+                self.assertTrue(wait_until(lambda: not is_offered()))
+                self.assertTrue(wait_until(is_offered))
+                self.assertEqual(errors, [], node)
+                sessions.append(self.session())
+            # The epoch begins at zero with each, so only the session tells them apart.
+            self.assertEqual([epoch for _, epoch in sessions], [0, 0, 0])
+            self.assertEqual(len({session for session, _ in sessions}), 3)
         finally:
             process.terminate()
             process.wait()

@@ -13,6 +13,7 @@ import threading
 import time
 import unittest
 
+import cv2
 import dynamic_reconfigure.client
 import numpy as np
 import roslib.packages
@@ -370,8 +371,8 @@ class Live(unittest.TestCase):
             time.sleep(0.2)
             self.assert_alive()
 
-    def test_reset_service(self):
-        self.start()
+    def test_reset_service_goes_back_to_the_initial_pose(self):
+        self.start(initial_pose='10 5 0 0 0 1.5707963267948966')
         path = self.keep(Collector(self.namespace + '/path', Path))
         self.assertTrue(wait_until(lambda: self.pipeline.is_connected((path, ))))
         before = [self.feed(i) for i in range(3)][-1]
@@ -379,7 +380,10 @@ class Live(unittest.TestCase):
         after = self.feed(3)
         self.assertEqual((after.epoch, after.distance), (before.epoch + 1, 0.0))
         self.assertEqual(len(self.odometry), 4)
-        np.testing.assert_allclose(matrix_of(self.odometry[3].pose.pose), np.eye(4), atol=1e-9)
+        start = [[0, -1, 0, 10], [1, 0, 0, 5], [0, 0, 1, 0], [0, 0, 0, 1]]  # looks along y
+        for first in (self.odometry[0], self.odometry[3]):
+            np.testing.assert_allclose(matrix_of(first.pose.pose), start, atol=1e-9)
+        self.assertGreater(self.odometry[2].pose.pose.position.y, 5.5)
         self.assertTrue(wait_until(lambda: path.has(after.header.stamp)))
         self.assertEqual(len(path[-1].poses), 1)  # no line from the last place to the origin
 
@@ -621,6 +625,32 @@ class Live(unittest.TestCase):
         picture.close()
         self.assertTrue(wait_until(lambda: not is_looking()))
 
+    def test_mask(self):
+        height, width = self.sequence.pairs[0][0].shape
+        right, left = np.zeros((2, height, width), np.uint8)
+        right[:, width // 2:] = left[:, :width // 2] = 255
+        file = tempfile.NamedTemporaryFile(suffix='.png')
+        self.addCleanup(file.close)
+        cv2.imwrite(file.name, right)
+        self.start(mask=file.name)
+        self.assertGreater(self.feed(0).features, 100)
+        self.assertGreater(min(self.features[-1].u), width // 2 - 2)
+        publisher = rospy.Publisher(self.namespace + '/left/mask', Image, queue_size=1)
+        self.assertTrue(wait_until(lambda: self.is_sent_to_pipeline(publisher)))
+        times = itertools.count(1)
+
+        def is_used(mask, used):
+            """Whether it is in use by the time a pair is answered: nothing orders masks and images."""
+            publisher.publish(self.camera.bridge.cv2_to_imgmsg(mask, 'mono8'))
+            self.camera.publish(*self.camera.messages(1, time_of=next(times)))
+            return wait_until(used, 0.5)
+        self.assertTrue(wait_until(lambda: is_used(left, lambda: max(self.features[-1].u) < width // 2 + 2)))
+        self.assertTrue(wait_until(lambda: is_used(left[1:], lambda: self.rosout.said(
+            'skipped', 'the mask is %dx%d, the left image is %dx%d' % (width, height - 1, width, height)))))
+        self.assertTrue(wait_until(lambda: is_used(right, lambda: min(self.features[-1].u) > width // 2 - 2)))
+        publisher.unregister()
+        self.assert_alive()
+
     def test_late_input_is_dropped_and_counted(self):
         self.start()
         for i in range(3):
@@ -666,6 +696,25 @@ class Live(unittest.TestCase):
         resumed, last = self.odometry[4 + predicted], self.odometry[3 + predicted]
         np.testing.assert_allclose(matrix_of(resumed.pose.pose), matrix_of(last.pose.pose), atol=1e-9)
         self.assertGreater(resumed.pose.covariance[0], last.pose.covariance[0])
+
+    def test_a_rig_whose_rows_do_not_agree_is_named_once(self):
+        self.start()
+        for i in range(3):
+            self.assertEqual(self.feed(i).state, 'TRACKING')
+        for i in range(3, 7):
+            images, infos = self.camera.messages(i)
+            images[1].data = self.camera.bridge.cv2_to_imgmsg(np.roll(self.sequence.pairs[i][1], 5, axis=0)).data
+            info = self.feed_messages(images, infos)
+            self.assertIn('px too low', info.reason)
+        named = [warning for warning in self.rosout.warnings if 'pairs from' in warning]
+        self.assertEqual(len(named), 1, self.rosout.warnings)
+        self.assertIn('are refused: right image', named[0])
+        self.assertIn('too low: not rectified?', named[0])
+        # Said once in five seconds, whatever the rows do meanwhile.
+        times = itertools.count(7)
+        self.assertTrue(wait_until(lambda: self.feed(7, time_of=next(times)) and
+                                   self.rosout.warned('rows of left and right agree again')))
+        self.assert_alive()
 
     def test_two_pipelines_in_one_manager_share_nothing(self):
         self.start()

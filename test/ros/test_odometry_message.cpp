@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <tf2/LinearMath/Quaternion.h>
 
 #include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
@@ -77,6 +78,23 @@ TEST(ToOdometry, GoesOnFromWhereTheBaseWasPut) {
   EXPECT_NEAR(pose.position.x, 10.0, 1e-12);
   EXPECT_NEAR(pose.position.y, 7.5, 1e-12);
   EXPECT_NEAR(yawOf(pose.orientation), CV_PI / 2.0, 1e-12);
+}
+
+TEST(ToPose, AnglesAreAboutTheFixedAxes) {
+  const Eigen::Isometry3d pose = toPose(" 1 -2.5 3e-1  0.1 0.2\t0.3 ");
+  EXPECT_EQ(pose.translation(), Eigen::Vector3d(1.0, -2.5, 0.3));
+  tf2::Quaternion expected;
+  expected.setRPY(0.1, 0.2, 0.3);
+  const Eigen::Quaterniond found(pose.linear());
+  EXPECT_NEAR(found.x(), expected.x(), 1e-12);
+  EXPECT_NEAR(found.y(), expected.y(), 1e-12);
+  EXPECT_NEAR(found.z(), expected.z(), 1e-12);
+  EXPECT_NEAR(found.w(), expected.w(), 1e-12);
+}
+
+TEST(ToPose, WhatIsNoPoseIsRefused) {
+  for (const char* text : {"", "1 2 3", "1 2 3 0 0 0 0", "1, 2, 3, 0, 0, 0", "1 2 3 0 0 nan", "1 2 3 0 0 x"})
+    EXPECT_THROW(toPose(text), std::invalid_argument) << text;
 }
 
 TEST(ToOdometry, PoseAndTwistAreThoseOfTheBaseNotOfTheCamera) {

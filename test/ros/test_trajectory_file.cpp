@@ -9,6 +9,7 @@
 
 #include "../../src/ros/trajectory_file.hpp"
 #include "../synthetic_scene.hpp"
+#include "../temporary_folder.hpp"
 #include "message_samples.hpp"
 
 namespace sdvo {
@@ -21,13 +22,10 @@ using synthetic::errorOf;
 class TrajectoryFile : public ::testing::Test {
  protected:
   TrajectoryFile() {
-    std::string name = (fs::temp_directory_path() / "sdvo_trajectory_XXXXXX").string();
-    directory_ = ::mkdtemp(name.data());
     T_base_camera_.linear() << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
     add(1, 5, 0.0);
     add(2, 123456789, 1.5);
   }
-  ~TrajectoryFile() override { fs::remove_all(directory_); }
 
   /// `x` m ahead of the origin, turned by 180 degrees about the vertical.
   void add(std::uint32_t seconds, std::uint32_t nanoseconds, double x) {
@@ -53,7 +51,8 @@ class TrajectoryFile : public ::testing::Test {
     return errorOf([&] { saveTrajectory(poses_, T_base_camera_, format, path); });
   }
 
-  fs::path directory_;
+  const TemporaryFolder folder_;
+  const fs::path directory_ = folder_.path();
   nav_msgs::Path poses_;
   Eigen::Isometry3d T_base_camera_ = Eigen::Isometry3d::Identity();
 };

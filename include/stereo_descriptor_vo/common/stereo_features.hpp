@@ -34,6 +34,7 @@ struct ExtractionReport {
   double detect_time = 0.0;               ///< s
   double stereo_time = 0.0;               ///< s
   double describe_time = 0.0;             ///< s
+  bool refused = false;                   ///< by the rig monitor: rows do not agree, `status` names the cause
   std::string status;                     ///< empty, or why the pair gave few or no features
 };
 

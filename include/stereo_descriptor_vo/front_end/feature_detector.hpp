@@ -24,6 +24,7 @@ struct FeatureDetectorOptions {
   int corner_block_size = 5;
   bool subpixel = true;
   int subpixel_radius = 3;
+  std::string mask;
 
   void describe(OptionList& list) {
     list.add("type", type, "corner detector");
@@ -35,6 +36,8 @@ struct FeatureDetectorOptions {
     list.add("corner_block_size", corner_block_size, {3, 31}, "px", "gftt, harris: window of the gradient matrix");
     list.add("subpixel", subpixel, "refine corners to sub-pixel positions");
     list.add("subpixel_radius", subpixel_radius, {1, 15}, "px", "half side of the sub-pixel window");
+    list.add("mask", mask,
+             "image file (absolute path) of the left image's size: no corners where it is black; empty: none");
   }
   /// Throws std::invalid_argument when the OpenCV at hand lacks the detector.
   void check() const;
@@ -49,13 +52,17 @@ struct Corner {
 /// Finds corners and spreads them evenly over the image. Stateless: the same image gives the same corners.
 class FeatureDetector {
  public:
+  /// Throws std::invalid_argument when an option is out of its range, or names a mask that cannot be read.
   explicit FeatureDetector(const FeatureDetectorOptions& options);
 
-  /// Corners of a CV_8U image, at most `max_features`, at least `border` px away from the image's borders.
-  std::vector<Corner> detect(const cv::Mat& image, int border = 0) const;
+  /// Corners of a CV_8U image, at most `max_features`, at least `border` px away from the image's borders and outside
+  /// of the mask's zeros: `mask` is CV_8U, or empty for the one of the options. Throws std::invalid_argument when the
+  /// mask has another size than the image.
+  std::vector<Corner> detect(const cv::Mat& image, int border = 0, const cv::Mat& mask = cv::Mat()) const;
 
  private:
   FeatureDetectorOptions options_;
+  cv::Mat mask_;  ///< of the file; empty: none
 };
 
 /// Keeps `max_count` corners such that buckets of a `bucket_size` px grid hold as equal numbers as they can, the

@@ -5,6 +5,7 @@
 
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/front_end/depth_scale.hpp"
+#include "stereo_descriptor_vo/front_end/exposure_balance.hpp"
 #include "stereo_descriptor_vo/front_end/feature_detector.hpp"
 #include "stereo_descriptor_vo/front_end/patch_cutter.hpp"
 #include "stereo_descriptor_vo/front_end/rig_monitor.hpp"
@@ -15,6 +16,7 @@ namespace sdvo {
 
 struct FeatureExtractorOptions {
   FeatureDetectorOptions detector;
+  ExposureBalanceOptions exposure_balance;
   StereoMatcherOptions stereo;
   RigMonitorOptions rig_monitor;
   DepthScaleOptions size_curve;
@@ -23,6 +25,7 @@ struct FeatureExtractorOptions {
 
   void describe(OptionList& list) {
     list.group("detector", detector);
+    list.group("exposure_balance", exposure_balance);
     list.group("stereo", stereo);
     list.group("rig_monitor", rig_monitor);
     list.group("size_curve", size_curve);
@@ -37,16 +40,18 @@ class FeatureExtractor {
   /// Throws std::invalid_argument when an option is out of its range.
   explicit FeatureExtractor(const FeatureExtractorOptions& options);
 
-  /// Images are CV_8U of the camera's size, else std::invalid_argument. A pair in which nothing is found gives an empty
+  /// Images are CV_8U of the camera's size, else std::invalid_argument; so is `mask`, which hides where it is zero what
+  /// moves with the robot (empty: the detector's own). A pair in which nothing is found gives an empty
   /// set whose report says why; so does one that the rig monitor refuses.
-  StereoFeatures extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
-                         std::int64_t stamp) const;
+  StereoFeatures extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp,
+                         const cv::Mat& mask = cv::Mat()) const;
 
   const FeatureExtractorOptions& options() const { return options_; }
 
  private:
   FeatureExtractorOptions options_;
   FeatureDetector detector_;
+  ExposureBalance exposure_balance_;
   StereoMatcher stereo_matcher_;
   RigMonitor rig_monitor_;
   DepthScale depth_scale_;
