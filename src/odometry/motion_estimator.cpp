@@ -5,11 +5,24 @@
 #include <cmath>
 
 namespace sdvo {
+namespace {
+
+/// The better of a pose and the one that all correspondences within several thresholds of `start` lead to. Where most
+/// points are far, a pose can suit all of them while the near ones, which alone tell the translation, lie beyond the
+/// threshold; the inliers by themselves never draw them in (Lebeda, Matas and Chum 2012).
+void refineWidely(const PoseProblem& problem, const MotionRefinementOptions& options, Eigen::Isometry3d start,
+                  Eigen::Isometry3d& T) {
+  constexpr double kWide = 5.0;  // thresholds
+  refineMotion(problem.camera(), options, problem.correspondences(), problem.inliers(start, kWide), start);
+  if (problem.truncatedCost(start) < problem.truncatedCost(T)) T = start;
+}
+
+}  // namespace
 
 MotionEstimator::MotionEstimator(const MotionEstimatorOptions& options) : options_(checked(options)) {}
 
-MotionEstimate MotionEstimator::estimate(const StereoCamera& camera,
-                                         const std::vector<Correspondence>& correspondences) const {
+MotionEstimate MotionEstimator::estimate(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
+                                         const std::optional<Eigen::Isometry3d>& expected) const {
   MotionEstimate estimate;
   const auto failed = [&](const std::string& reason) {
     estimate.success = false;
@@ -25,20 +38,18 @@ MotionEstimate MotionEstimator::estimate(const StereoCamera& camera,
   const PoseProblem problem(camera, correspondences, options_.inlier_threshold);
   const Consensus consensus = findConsensus(problem, options_, options_);
   estimate.iterations = consensus.iterations;
-  estimate.inliers = consensus.inliers;
+  Eigen::Isometry3d& T = estimate.T_current_reference = consensus.T_current_reference;
+  if (consensus.found) refineWidely(problem, options_, consensus.T_current_reference, T);
+  if (expected) refineWidely(problem, options_, *expected, T);
+  estimate.inliers = problem.inliers(T);
   if (static_cast<int>(estimate.inliers.size()) < options_.min_inliers)
     return failed("only " + std::to_string(estimate.inliers.size()) + " of " + std::to_string(count) +
                   " matches agree on one motion");
 
-  // Refine; the better pose draws in inliers that the sample's pose missed, hence twice.
-  Eigen::Isometry3d& T = estimate.T_current_reference = consensus.T_current_reference;
-  NormalEquations equations;
-  for (int round = 0; round < 2; ++round) {
-    equations = refineMotion(camera, options_, correspondences, estimate.inliers, T);
-    estimate.inliers = problem.inliers(T);
-    if (static_cast<int>(estimate.inliers.size()) < options_.min_inliers)
-      return failed("only " + std::to_string(estimate.inliers.size()) + " matches agree with the refined motion");
-  }
+  const NormalEquations equations = refineMotion(camera, options_, correspondences, estimate.inliers, T);
+  estimate.inliers = problem.inliers(T);
+  if (static_cast<int>(estimate.inliers.size()) < options_.min_inliers)
+    return failed("only " + std::to_string(estimate.inliers.size()) + " matches agree with the refined motion");
 
   double square = 0.0;
   for (const int i : estimate.inliers)

@@ -123,7 +123,7 @@ MotionHypothesis MotionSearch::search(const MotionScene& scene,
   found.matches = matcher_.match(found.view.rows, scene.features, T_current_reference);
   found.match_time = stopwatch.lap();
   found.correspondences = correspond(found.view.rows, scene.features, found.matches, scene.calibration);
-  found.motion = estimator_.estimate(scene.features.camera, found.correspondences);
+  found.motion = estimator_.estimate(scene.features.camera, found.correspondences, T_current_reference);
   weigh(scene, found);
   found.motion_time = stopwatch.lap();
   return found;

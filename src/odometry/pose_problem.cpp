@@ -73,11 +73,11 @@ double PoseProblem::outlierCost(const Eigen::Isometry3d& T, double score_to_beat
   return outliers;
 }
 
-std::vector<int> PoseProblem::inliers(const Eigen::Isometry3d& T) const {
+std::vector<int> PoseProblem::inliers(const Eigen::Isometry3d& T, double thresholds) const {
   std::vector<int> found;
   for (int i = 0; i < count(); ++i) {
     const auto residual = reprojectionResidual(camera_, T, correspondences_[static_cast<std::size_t>(i)]);
-    if (residual && residual->norm() <= threshold_) found.push_back(i);
+    if (residual && residual->norm() <= thresholds * threshold_) found.push_back(i);
   }
   return found;
 }

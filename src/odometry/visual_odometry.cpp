@@ -210,9 +210,11 @@ void VisualOdometry::recall(const StereoFeatures& features) {
   LocalMap& map = *state_.map;
   const OldKeyframe* old = map.revisited();
   if (!old) return;
-  const auto matches = matcher_.match(old->rows, features, map.newestPose() * old->T_camera_origin.inverse());
+  const Eigen::Isometry3d expected = map.newestPose() * old->T_camera_origin.inverse();
+  const auto matches = matcher_.match(old->rows, features, expected);
   const RigCalibration calibration = state_.calibration.calibration();
-  MotionEstimate motion = estimator_.estimate(features.camera, correspond(old->rows, features, matches, calibration));
+  const auto correspondences = correspond(old->rows, features, matches, calibration);
+  MotionEstimate motion = estimator_.estimate(features.camera, correspondences, expected);
   if (!motion.success) return;
 
   std::vector<LocalMap::Tie> ties;

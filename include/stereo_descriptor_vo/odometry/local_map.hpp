@@ -24,7 +24,7 @@ struct LocalMapOptions {
   int remembered = 4;
   int lasting_keyframes = 8;
   int lasting_points = 150;
-  int remembered_keyframes = 0;
+  int remembered_keyframes = 40;
   double keyframe_parallax = 4.0;
   double keyframe_overlap = 0.6;
   double corner_sigma = 0.4;

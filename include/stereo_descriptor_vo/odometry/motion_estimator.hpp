@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -38,7 +39,10 @@ class MotionEstimator {
  public:
   explicit MotionEstimator(const MotionEstimatorOptions& options);
 
-  MotionEstimate estimate(const StereoCamera& camera, const std::vector<Correspondence>& correspondences) const;
+  /// `expected`, T_current_reference as predicted, is one more start of the refinement: it wins where it ends at a pose
+  /// that the correspondences agree with better.
+  MotionEstimate estimate(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
+                          const std::optional<Eigen::Isometry3d>& expected = std::nullopt) const;
 
  private:
   MotionEstimatorOptions options_;

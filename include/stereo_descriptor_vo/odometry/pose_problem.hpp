@@ -53,8 +53,8 @@ class PoseProblem {
   double outlierCost(const Eigen::Isometry3d& T_current_reference,
                      double score_to_beat = std::numeric_limits<double>::max()) const;
 
-  /// Ascending indices of the correspondences within the threshold.
-  std::vector<int> inliers(const Eigen::Isometry3d& T_current_reference) const;
+  /// Ascending indices of the correspondences within so many thresholds.
+  std::vector<int> inliers(const Eigen::Isometry3d& T_current_reference, double thresholds = 1.0) const;
 
  private:
   const StereoCamera& camera_;
