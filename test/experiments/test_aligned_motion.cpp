@@ -22,7 +22,8 @@ KeypointSet wallFrom(double forward, const std::vector<cv::Point2f>& positions) 
 
 class AlignedMotion : public testing::Test {
  protected:
-  /// Corners found up to a pixel beside their place in the second pair, and the motion from the patches.
+  /// Corners found up to a pixel beside their place in the second pair, most of them to the right of it, and the motion
+  /// from the patches.
   Eigen::Isometry3d align(PatchWarp warp, double forward, int corners) {
     const StereoCamera camera = synthetic::camera();
     std::mt19937 random(3);
@@ -36,7 +37,8 @@ class AlignedMotion : public testing::Test {
       point.z() -= forward;
       const Eigen::Vector3d seen = camera.project(point);
       first.push_back(p);
-      second.emplace_back(static_cast<float>(seen.x() + error(random)), static_cast<float>(seen.y() + error(random)));
+      second.emplace_back(static_cast<float>(seen.x() + 0.4 + error(random)),
+                          static_cast<float>(seen.y() + error(random)));
       rows.push_back(i);
       matches.push_back({i, i, 0.f});
     }
