@@ -7,6 +7,7 @@
 #include <map>
 #include <numeric>
 #include <optional>
+#include <stdexcept>
 #include <tuple>
 
 #include "../common/progress.hpp"
@@ -167,10 +168,14 @@ class DriveAccuracy {
       for (auto& pairs : described.of_system) takeOut(rig_, pairs);
       takeOut(rig_, described.patches.constant);
       takeOut(rig_, described.patches.by_depth);
-      Progress progress("accuracy " + sequence_.name, kSteps * static_cast<int>(odometrySystems().size()));
+      Progress progress("accuracy " + sequence_.name, kSteps * static_cast<int>(experiment_.systems.size()));
       for (int step = 1; step <= kSteps; ++step)
-        for (std::size_t s = 0; s < odometrySystems().size(); ++s, progress.step())
-          follow(described.of_system[s], described.patches, odometrySystems()[s].name, features, step);
+        for (std::size_t s = 0; s < odometrySystems().size(); ++s) {
+          const std::string& system = odometrySystems()[s].name;
+          if (std::count(experiment_.systems.begin(), experiment_.systems.end(), system) == 0) continue;
+          follow(described.of_system[s], described.patches, system, features, step);
+          progress.step();
+        }
     }
     return results_;
   }
@@ -236,6 +241,8 @@ Results meansOver(const Results& results, int drives) {
 }  // namespace
 
 std::string runAccuracy(const ExperimentSetup& setup, const AccuracyExperiment& experiment) {
+  if (std::count(experiment.systems.begin(), experiment.systems.end(), "standard") == 0)
+    throw std::invalid_argument("the system 'standard' is missing: the others are compared with it");
   PipelineOptions options = setup.options();
   const std::string hash = hashOptions(listOptions(options));
   const std::string descriptor = nameOf(options.stereo_features.descriptor.type);

@@ -8,8 +8,9 @@ namespace sdvo {
 /// the seed alone.
 struct AccuracyExperiment {
   std::vector<int> feature_counts = {400, 2320};
-  double standard_size = 7.0;  ///< px
-  int seeds = 20;              ///< runs, seeded 1, 2, …
+  double standard_size = 7.0;                                 ///< px
+  int seeds = 20;                                             ///< runs, seeded 1, 2, …
+  std::vector<std::string> systems = {"standard", "stereo"};  ///< by name; the standard one is among them
   std::vector<ConsensusMethod> methods = {ConsensusMethod::kAdaptiveGasac};
   bool without_rig_error = false;  ///< take out of the disparities what the package's odometry says of the rig's error
 };

@@ -9,6 +9,7 @@
 #include "../experiments/accuracy_experiment.hpp"
 #include "../experiments/consensus_experiment.hpp"
 #include "../experiments/matching_experiment.hpp"
+#include "../experiments/odometry_systems.hpp"
 #include "../experiments/plot_script.hpp"
 #include "../experiments/robustness_experiment.hpp"
 #include "named_choice.hpp"
@@ -92,6 +93,12 @@ CLI::App* addAccuracy(CLI::App& app, Arguments& arguments) {
       ->check(CLI::Range(10, 10000));
   command->add_option("--seeds", arguments.accuracy.seeds, "runs")->capture_default_str()->check(CLI::Range(1, 1000));
   sdvo::addChoices(*command, "--methods", arguments.accuracy.methods, "outlier rejection, separated by commas");
+  std::vector<std::string> systems;
+  for (const sdvo::OdometrySystem& system : sdvo::odometrySystems()) systems.push_back(system.name);
+  command->add_option("--systems", arguments.accuracy.systems, "what is compared, the standard one among them")
+      ->capture_default_str()
+      ->delimiter(',')
+      ->check(CLI::IsMember(systems));
   command->add_flag("--without-rig-error", arguments.accuracy.without_rig_error,
                     "take out of the disparities what the package's odometry says of the rig's error");
   return command;
