@@ -144,6 +144,7 @@ def plot_accuracy(folder):
         line[1].set_ylabel("gain of stereo, %")
         for axis in line:
             axis.set_title("%s features" % count)
+            axis.set_xticks(range(1, 6))
             axis.set_xlabel("step")
             axis.grid(linestyle=":", which="both")
             axis.legend(fontsize=7)
