@@ -24,6 +24,18 @@ def number(text):
     return float(text) if text else float("nan")
 
 
+def loosest(rows):
+    """The rows of the largest tolerance."""
+    largest = max(float(row["tolerance_px"]) for row in rows)
+    return [row for row in rows if float(row["tolerance_px"]) == largest]
+
+
+def interval(row, value, name):
+    """Distances of an interval's ends from the value, for error bars; nothing where there is none."""
+    low, high = number(row[name + "_low"]), number(row[name + "_high"])
+    return [0.0 if low != low else number(row[value]) - low], [0.0 if high != high else high - number(row[value])]
+
+
 def save(figure, folder, name):
     path = os.path.join(folder, name)
     figure.tight_layout()
@@ -34,7 +46,7 @@ def save(figure, folder, name):
 
 def plot_matching(folder):
     """Figure 7: improvement against the size of the feature set; and correct matches against the step."""
-    rows = read_table(folder, "matching.csv")
+    rows = loosest(read_table(folder, "matching.csv"))
     descriptors = unique(row["descriptor"] for row in rows)
     figure, axes = plt.subplots(1, len(descriptors), figsize=(5.5 * len(descriptors), 4.2), squeeze=False)
     for axis, descriptor in zip(axes[0], descriptors):
@@ -43,10 +55,13 @@ def plot_matching(folder):
             sizes = [int(r["features"]) for r in mean]
             line, = axis.plot(sizes, [number(r["improvement_percent"]) for r in mean], "o-",
                               label=layout + ", against 7 px")
+            for size, row in zip(sizes, mean):
+                axis.errorbar(size, number(row["improvement_percent"]), capsize=3, color=line.get_color(),
+                              yerr=interval(row, "improvement_percent", "improvement"))
             axis.plot(sizes, [number(r["improvement_on_best_percent"]) for r in mean], "s:", color=line.get_color(),
                       label=layout + ", against the best constant size")
         if descriptor == "freak":
-            axis.plot([310, 1350, 2320], [11.58, 15.37, 26.41], "k^--", label="paper, figure 7")
+            axis.plot([310, 1350, 2320], [11.58, 15.37, 26.41], "k^--", label="paper, figure 7 (its sequence 21)")
         axis.set_title("scale normalised " + descriptor.upper())
         axis.set_xlabel("feature set size")
         axis.set_ylabel("improvement in correct matches, %")
@@ -55,7 +70,7 @@ def plot_matching(folder):
         axis.legend(fontsize=7)
     save(figure, folder, "matching_feature_set_size.png")
 
-    steps = read_table(folder, "matching_steps.csv")
+    steps = loosest(read_table(folder, "matching_steps.csv"))
     largest = max(int(row["features"]) for row in steps)
     figure, axes = plt.subplots(1, len(descriptors), figsize=(5.5 * len(descriptors), 4.2), squeeze=False)
     for axis, descriptor in zip(axes[0], descriptors):
@@ -99,27 +114,41 @@ def plot_robustness(folder):
 
 
 def plot_accuracy(folder):
-    """Table 2: best, mean and worst translation error over the seeds."""
-    rows = read_table(folder, "accuracy_summary.csv")
-    models = unique(row["model"] for row in rows)
-    figure, axes = plt.subplots(1, len(models), figsize=(5.5 * len(models), 4.2), squeeze=False)
-    for axis, model in zip(axes[0], models):
-        chosen = [r for r in rows if (r["sequence"], r["model"]) == ("mean", model)]
-        methods = unique(row["method"] for row in chosen)
-        systems = unique(row["system"] for row in chosen)
-        for k, system in enumerate(systems):
-            for x, method in enumerate(methods):
-                row = next(r for r in chosen if (r["method"], r["system"]) == (method, system))
-                best, mean, worst = (number(row[c]) for c in ("best_percent", "mean_percent", "worst_percent"))
-                axis.errorbar(x + 0.15 * (k - len(systems) / 2.0), mean, yerr=[[mean - best], [worst - mean]], fmt="o",
-                              capsize=4, color="C%d" % k, label=system.replace("_", " ") if x == 0 else None)
-        axis.set_xticks(range(len(methods)))
-        axis.set_xticklabels(methods, fontsize=8)
-        axis.set_title("motion: " + model)
-        axis.set_ylabel("translation error, %: best, mean, worst")
-        axis.grid(linestyle=":", axis="y")
-        axis.legend(fontsize=7)
-    save(figure, folder, "accuracy_seeds.png")
+    """Translation error of a pair against the step, by what was done to the matches; and the gain of stereo."""
+    rows = [r for r in read_table(folder, "accuracy_summary.csv") if r["sequence"] == "mean"]
+    counts, methods = unique(row["features"] for row in rows), unique(row["method"] for row in rows)
+    figure, axes = plt.subplots(len(counts), 2, figsize=(11.0, 4.2 * len(counts)), squeeze=False)
+    lines = (("standard", "refined", "C0o:"), ("stereo", "refined", "C1o:"), ("standard", "aligned", "C0s--"),
+             ("standard", "aligned_by_depth", "C0^-"), ("stereo", "aligned_by_depth", "C1^-"))
+    gains = (("stereo", "refined", "gain", "C1o:", "refined, on standard refined"),
+             ("stereo", "aligned_by_depth", "gain", "C1^-", "aligned by depth, on standard aligned by depth"),
+             ("stereo", "aligned_by_depth", "gain_on_plain", "C2s--", "aligned by depth, on standard aligned"))
+    for line, count in zip(axes, counts):
+        chosen = [r for r in rows if (r["features"], r["method"]) == (count, methods[0])]
+
+        def of(system, model):
+            return [r for r in chosen if (r["system"], r["model"]) == (system, model)]
+
+        for system, model, style in lines:
+            line[0].plot([int(r["step"]) for r in of(system, model)],
+                         [number(r["pair_percent"]) for r in of(system, model)], style,
+                         label="%s, %s" % (system, model.replace("_", " ")))
+        for k, (system, model, name, style, label) in enumerate(gains):
+            for row in of(system, model):
+                line[1].errorbar(int(row["step"]) + 0.08 * (k - 1), number(row[name + "_percent"]), fmt=style[:3],
+                                 yerr=interval(row, name + "_percent", name), capsize=3,
+                                 label=label if row["step"] == "1" else None)
+        line[0].set_yscale("log")
+        line[0].set_ylabel("translation error, % of the way")
+        line[1].axhline(0.0, color="grey", linewidth=0.6)
+        line[1].set_ylabel("gain of stereo, %")
+        for axis in line:
+            axis.set_title("%s features" % count)
+            axis.set_xticks(range(1, 6))
+            axis.set_xlabel("step")
+            axis.grid(linestyle=":", which="both")
+            axis.legend(fontsize=7)
+    save(figure, folder, "accuracy_steps.png")
 
 
 def plot_consensus(folder):

@@ -13,8 +13,8 @@ std::vector<FeatureMatch> matchByDescriptor(const StereoFeatures& reference, con
 }
 
 int countCorrect(const StereoFeatures& reference, const StereoFeatures& current,
-                 const std::vector<FeatureMatch>& matches, const Eigen::Isometry3d& T_current_reference) {
-  constexpr double kLargestError = 3.0;   // px
+                 const std::vector<FeatureMatch>& matches, const Eigen::Isometry3d& T_current_reference,
+                 double tolerance) {
   constexpr double kNearestDepth = 0.05;  // m
   int correct = 0;
   for (const FeatureMatch& match : matches) {
@@ -22,7 +22,7 @@ int countCorrect(const StereoFeatures& reference, const StereoFeatures& current,
     if (point.z() < kNearestDepth) continue;
     const Eigen::Vector3d predicted = current.camera.project(point);
     const Eigen::Vector3d measured = current.measurement(match.current);
-    if (std::hypot(predicted.x() - measured.x(), predicted.y() - measured.y()) <= kLargestError) ++correct;
+    if (std::hypot(predicted.x() - measured.x(), predicted.y() - measured.y()) <= tolerance) ++correct;
   }
   return correct;
 }

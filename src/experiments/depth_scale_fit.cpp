@@ -211,6 +211,7 @@ std::vector<SlopeTrial> trySlopes(const std::vector<ReferenceSequence>& sequence
                                   const ShapeFit& shape, const std::vector<double>& slopes,
                                   const std::vector<double>& min_sizes, double max_size, int features) {
   constexpr int kStride = 10, kSteps[] = {1, 4, 7, 10};
+  constexpr double kTolerance = 3.0;  // px
   const FeatureExtractorOptions& extraction = options.stereo_features;
   DescriptorOptions left_view = extraction.descriptor;
   left_view.layout = DescriptorLayout::kLeft;
@@ -246,8 +247,8 @@ std::vector<SlopeTrial> trySlopes(const std::vector<ReferenceSequence>& sequence
         if (t + step >= sequence.frames) continue;
         const std::vector<StereoFeatures> later = describe(t + step);
         for (std::size_t k = 0; k < trials.size(); ++k)
-          trials[k].correct +=
-              countCorrect(first[k], later[k], matchByDescriptor(first[k], later[k]), sequence.motion(t, t + step));
+          trials[k].correct += countCorrect(first[k], later[k], matchByDescriptor(first[k], later[k]),
+                                            sequence.motion(t, t + step), kTolerance);
         ++pairs;
       }
     }

@@ -70,6 +70,24 @@ StereoFeatures describeKeypoints(const KeypointSet& set, const std::vector<int>&
   return features;
 }
 
+StereoFeatures cutPatches(const KeypointSet& set, const std::vector<int>& chosen, const DepthScale& curve,
+                          const PatchLayout& layout) {
+  StereoFeatures features;
+  features.stamp = set.stamp;
+  features.camera = set.camera;
+  features.patch_layout = layout;
+  features.patches.create(static_cast<int>(chosen.size()), layout.bytes(), CV_8U);
+  const PatchCutter cutter(layout, set.images.left);
+  for (const int i : chosen) {
+    const auto& [corner, match] = set.corners[static_cast<std::size_t>(i)];
+    const cv::Point2f& p = corner.position;
+    const float size = static_cast<float>(curve.size(match.disparity));
+    cutter.cut(p.x, p.y, size, features.patches.ptr(features.count()));
+    features.append({p.x, p.y, match.disparity, match.dv, size, -1.f, corner.response});
+  }
+  return features;
+}
+
 StereoFeatures selectRows(const StereoFeatures& features, const std::vector<int>& rows, DescriptorLayout layout) {
   StereoFeatures selected = features.select(rows);
   if (layout == DescriptorLayout::kLeft && features.layout == DescriptorLayout::kLeftAndRight) {

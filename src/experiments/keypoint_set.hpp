@@ -8,6 +8,7 @@
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 #include "stereo_descriptor_vo/front_end/depth_scale.hpp"
 #include "stereo_descriptor_vo/front_end/feature_detector.hpp"
+#include "stereo_descriptor_vo/front_end/patch_cutter.hpp"
 #include "stereo_descriptor_vo/front_end/stereo_descriptor.hpp"
 #include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
 
@@ -44,6 +45,10 @@ std::vector<int> selectKeypoints(const KeypointSet& set, const std::vector<Depth
 /// when the descriptor leaves one of them out.
 StereoFeatures describeKeypoints(const KeypointSet& set, const std::vector<int>& chosen, const DepthScale& curve,
                                  const StereoDescriptor& descriptor);
+
+/// The chosen corners with grey patches of the left view instead of descriptors, sized by `curve`.
+StereoFeatures cutPatches(const KeypointSet& set, const std::vector<int>& chosen, const DepthScale& curve,
+                          const PatchLayout& layout);
 
 /// The given rows of a feature set; the left layout of a set of both views keeps the left halves.
 StereoFeatures selectRows(const StereoFeatures& features, const std::vector<int>& rows, DescriptorLayout layout);

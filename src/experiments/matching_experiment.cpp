@@ -4,10 +4,12 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <tuple>
 #include <utility>
 
 #include "../common/progress.hpp"
+#include "bootstrap.hpp"
 #include "correct_matches.hpp"
 #include "csv_table.hpp"
 #include "keypoint_set.hpp"
@@ -62,9 +64,11 @@ struct Case {
   DescriptorType descriptor;
   DescriptorLayout layout;
   int features;
+  double tolerance;  ///< px
 
   bool operator<(const Case& other) const {
-    return std::tie(descriptor, layout, features) < std::tie(other.descriptor, other.layout, other.features);
+    return std::tie(descriptor, layout, features, tolerance) <
+           std::tie(other.descriptor, other.layout, other.features, other.tolerance);
   }
 };
 
@@ -93,7 +97,7 @@ double publishedImprovement(const Case& c, const std::string& sequence) {
   static const std::map<DescriptorType, std::map<std::string, double>> table_1 = {{DescriptorType::kFreak, freak},
                                                                                   {DescriptorType::kSift, sift}};
   static const std::map<int, double> figure_7 = {{310, 11.58}, {1350, 15.37}, {2320, 26.41}};
-  if (c.layout != DescriptorLayout::kLeft) return kUnknown;
+  if (c.layout != DescriptorLayout::kLeft || c.tolerance != 3.0) return kUnknown;
   if (sequence == "mean") {
     const auto found = figure_7.find(c.features);
     return c.descriptor == DescriptorType::kFreak && found != figure_7.end() ? found->second : kUnknown;
@@ -167,12 +171,13 @@ class SequenceMatching {
         const auto row = std::lower_bound(chosen.begin(), chosen.end(), i);
         if (row != chosen.end() && *row == i) rows.push_back(static_cast<int>(row - chosen.begin()));
       }
-      for (const DescriptorLayout layout : experiment_.layouts) {
-        CaseScores& scores = scores_[{experiment_.descriptors[d], layout, count}];
-        scores.of_side.resize(sides_.size());
-        scores.described += static_cast<double>(rows.size());
-        ++scores.frames;
-      }
+      for (const DescriptorLayout layout : experiment_.layouts)
+        for (const double tolerance : experiment_.tolerances) {
+          CaseScores& scores = scores_[{experiment_.descriptors[d], layout, count, tolerance}];
+          scores.of_side.resize(sides_.size());
+          scores.described += static_cast<double>(rows.size());
+          ++scores.frames;
+        }
     }
     return frame;
   }
@@ -183,12 +188,15 @@ class SequenceMatching {
     const std::size_t step = static_cast<std::size_t>(to - from - 1);
     for (const int count : experiment_.feature_counts) {
       for (const DescriptorLayout layout : experiment_.layouts) {
-        CaseScores& scores = scores_[{descriptor, layout, count}];
         for (std::size_t s = 0; s < sides_.size(); ++s) {
           const StereoFeatures a = selectRows(reference.of_side[s], reference.rows_of_count.at(count), layout);
           const StereoFeatures b = selectRows(current.of_side[s], current.rows_of_count.at(count), layout);
-          scores.of_side[s].correct[step] += countCorrect(a, b, matchByDescriptor(a, b), motion);
-          ++scores.of_side[s].pairs[step];
+          const std::vector<FeatureMatch> matches = matchByDescriptor(a, b);
+          for (const double tolerance : experiment_.tolerances) {
+            Score& score = scores_[{descriptor, layout, count, tolerance}].of_side[s];
+            score.correct[step] += countCorrect(a, b, matches, motion, tolerance);
+            ++score.pairs[step];
+          }
         }
       }
     }
@@ -218,26 +226,38 @@ class Report {
   Report(const std::vector<Side>& sides, const ExperimentSetup& setup, std::string hash)
       : sides_(sides), reference_(nameOf(setup.reference)), hash_(std::move(hash)) {}
 
-  void addRow(const std::string& sequence, const Case& c, const Scores& of_sequence, const Improvements* mean) {
+  /// A sequence's row, or the mean's, with the improvements of the sequences.
+  void addRow(const std::string& sequence, const Case& c, const Scores& of_sequence,
+              const std::vector<Improvements>& of_drives = {}) {
     const CaseScores& scores = of_sequence.at(c);
     std::size_t best = 1;
     for (std::size_t s = 2; s < sides_.size(); ++s)
       if (scores.of_side[s].perPair() > scores.of_side[best].perPair()) best = s;
     const double normalised = scores.of_side[0].perPair(), standard = scores.of_side[1].perPair();
-    const auto left = of_sequence.find({c.descriptor, DescriptorLayout::kLeft, c.features});
+    const auto left = of_sequence.find({c.descriptor, DescriptorLayout::kLeft, c.features, c.tolerance});
     const double standard_left = left == of_sequence.end() ? kUnknown : left->second.of_side[1].perPair();
     const Improvements own{improvement(normalised, standard), improvement(normalised, scores.of_side[best].perPair()),
                            improvement(normalised, standard_left)};
-    const Improvements shown = mean ? *mean : own;
-    table_.add(sequence, nameOf(c.descriptor), nameOf(c.layout), c.features,
-               scores.described / std::max(scores.frames, 1.0), normalised, standard, shown.standard,
-               publishedImprovement(c, sequence), sides_[best].constant_size, scores.of_side[best].perPair(),
-               shown.best_constant, shown.standard_left, reference_, hash_);
+    // As in the paper, the mean improvement is the mean of the sequences' improvements.
+    const auto shown = [&](double Improvements::*value) {
+      std::vector<double> values;
+      for (const Improvements& of_drive : of_drives) values.push_back(of_drive.*value);
+      const double mean = std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+      return std::make_pair(values.empty() ? own.*value : mean, bootstrapMean(values));
+    };
+    const auto [on_standard, interval] = shown(&Improvements::standard);
+    const auto [on_best, interval_on_best] = shown(&Improvements::best_constant);
+    const auto [on_left, interval_on_left] = shown(&Improvements::standard_left);
+    table_.add(sequence, nameOf(c.descriptor), nameOf(c.layout), c.features, c.tolerance,
+               scores.described / std::max(scores.frames, 1.0), normalised, standard, on_standard, interval.low,
+               interval.high, publishedImprovement(c, sequence), sides_[best].constant_size,
+               scores.of_side[best].perPair(), on_best, interval_on_best.low, interval_on_best.high, on_left,
+               interval_on_left.low, interval_on_left.high, reference_, hash_);
     for (std::size_t s = 0; s < sides_.size(); ++s)
       for (int step = 0; step < kSteps; ++step)
         if (const int pairs = scores.of_side[s].pairs[step])
-          steps_.add(sequence, nameOf(c.descriptor), nameOf(c.layout), c.features, sides_[s].name, step + 1,
-                     scores.of_side[s].correct[step], pairs);
+          steps_.add(sequence, nameOf(c.descriptor), nameOf(c.layout), c.features, c.tolerance, sides_[s].name,
+                     step + 1, scores.of_side[s].correct[step], pairs);
     latest_ = own;
   }
 
@@ -253,10 +273,29 @@ class Report {
   const std::vector<Side>& sides_;
   std::string reference_, hash_;
   Improvements latest_;
-  CsvTable table_{{"sequence", "descriptor", "layout", "features", "described", "scale_normalised", "standard",
-                   "improvement_percent", "paper_percent", "best_constant_size", "best_constant",
-                   "improvement_on_best_percent", "improvement_on_standard_left_percent", "reference", "options"}};
-  CsvTable steps_{{"sequence", "descriptor", "layout", "features", "side", "step", "correct", "pairs"}};
+  CsvTable table_{{"sequence",
+                   "descriptor",
+                   "layout",
+                   "features",
+                   "tolerance_px",
+                   "described",
+                   "scale_normalised",
+                   "standard",
+                   "improvement_percent",
+                   "improvement_low",
+                   "improvement_high",
+                   "paper_percent",
+                   "best_constant_size",
+                   "best_constant",
+                   "improvement_on_best_percent",
+                   "improvement_on_best_low",
+                   "improvement_on_best_high",
+                   "improvement_on_standard_left_percent",
+                   "improvement_on_standard_left_low",
+                   "improvement_on_standard_left_high",
+                   "reference",
+                   "options"}};
+  CsvTable steps_{{"sequence", "descriptor", "layout", "features", "tolerance_px", "side", "step", "correct", "pairs"}};
 };
 
 }  // namespace
@@ -271,23 +310,12 @@ std::string runMatching(const ExperimentSetup& setup, const MatchingExperiment& 
     const ReferenceSequence sequence = openSequence(setup, name, setup.reference);
     const Scores of_sequence = SequenceMatching(sequence, experiment, options, sides).run();
     for (const auto& [c, scores] : of_sequence) {
-      report.addRow(sequence.name, c, of_sequence, nullptr);
+      report.addRow(sequence.name, c, of_sequence);
       improvements[c].push_back(report.latest());
       total[c] += scores;
     }
   }
-  // As in the paper, the mean improvement is the mean of the sequences' improvements.
-  for (const auto& entry : total) {
-    const Case& c = entry.first;
-    Improvements mean;
-    const double count = static_cast<double>(improvements[c].size());
-    for (const Improvements& i : improvements[c]) {
-      mean.standard += i.standard / count;
-      mean.best_constant += i.best_constant / count;
-      mean.standard_left += i.standard_left / count;
-    }
-    report.addRow("mean", c, total, &mean);
-  }
+  for (const auto& entry : total) report.addRow("mean", entry.first, total, improvements.at(entry.first));
   return report.write(setup.output);
 }
 

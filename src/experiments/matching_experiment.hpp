@@ -9,6 +9,7 @@ struct MatchingExperiment {
   std::vector<DescriptorType> descriptors = {DescriptorType::kFreak, DescriptorType::kSift};
   std::vector<DescriptorLayout> layouts = {DescriptorLayout::kLeft, DescriptorLayout::kLeftAndRight};
   std::vector<int> feature_counts = {310, 1350, 2320};
+  std::vector<double> tolerances = {1.0, 2.0, 3.0};         ///< px, within which a match is correct
   double standard_size = 7.0;                               ///< px
   std::vector<double> constant_sizes = {10.0, 14.0, 20.0};  ///< px, candidates beside the standard for the best one
 };

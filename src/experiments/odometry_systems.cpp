@@ -1,7 +1,6 @@
 #include "odometry_systems.hpp"
 
 #include "../common/progress.hpp"
-#include "correct_matches.hpp"
 #include "keypoint_set.hpp"
 
 namespace sdvo {
@@ -14,9 +13,8 @@ const std::vector<OdometrySystem>& odometrySystems() {
   return systems;
 }
 
-std::vector<std::vector<StereoFeatures>> describeSequence(const ReferenceSequence& sequence,
-                                                          const PipelineOptions& options, double standard_size,
-                                                          int count) {
+DescribedSequence describeSequence(const ReferenceSequence& sequence, const PipelineOptions& options,
+                                   double standard_size, int count) {
   const FeatureExtractorOptions& extraction = options.stereo_features;
   DepthScaleOptions normalised = extraction.size_curve, constant = extraction.size_curve;
   normalised.scale_normalisation = true;
@@ -28,7 +26,10 @@ std::vector<std::vector<StereoFeatures>> describeSequence(const ReferenceSequenc
   const StereoDescriptor descriptor(both_views);
   const Reach reach = [&](double size) { return descriptor.reach(size); };
 
-  std::vector<std::vector<StereoFeatures>> described(odometrySystems().size());
+  const PatchLayout by_depth = PatchOptions().layout(), constant_layout{by_depth.side, by_depth.min_spacing, 0.f};
+
+  DescribedSequence described;
+  described.of_system.resize(odometrySystems().size());
   Progress progress("describing " + sequence.name, sequence.frames);
   for (int i = 0; i < sequence.frames; ++i, progress.step()) {
     const KeypointSet set = findKeypoints(sequence.images, i, extraction.detector, extraction.stereo);
@@ -37,17 +38,22 @@ std::vector<std::vector<StereoFeatures>> describeSequence(const ReferenceSequenc
     for (std::size_t k = 0; k < chosen.size(); ++k) all_rows.push_back(static_cast<int>(k));
     std::vector<StereoFeatures> of_curve;
     for (const DepthScale& curve : curves) of_curve.push_back(describeKeypoints(set, chosen, curve, descriptor));
-    for (std::size_t s = 0; s < described.size(); ++s) {
+    for (std::size_t s = 0; s < odometrySystems().size(); ++s) {
       const OdometrySystem& system = odometrySystems()[s];
-      described[s].push_back(selectRows(of_curve[system.scale_normalisation ? 1 : 0], all_rows, system.layout));
+      described.of_system[s].push_back(
+          selectRows(of_curve[system.scale_normalisation ? 1 : 0], all_rows, system.layout));
     }
+    const DepthScale odometry_curve(DepthScaleOptions{});
+    described.patches.constant.push_back(cutPatches(set, chosen, odometry_curve, constant_layout));
+    described.patches.by_depth.push_back(cutPatches(set, chosen, odometry_curve, by_depth));
   }
   return described;
 }
 
-std::vector<Correspondence> makeCorrespondences(const StereoFeatures& reference, const StereoFeatures& current) {
+std::vector<Correspondence> makeCorrespondences(const StereoFeatures& reference, const StereoFeatures& current,
+                                                const std::vector<FeatureMatch>& matches) {
   std::vector<Correspondence> correspondences;
-  for (const FeatureMatch& match : matchByDescriptor(reference, current))
+  for (const FeatureMatch& match : matches)
     correspondences.push_back({reference.point(match.reference), current.measurement(match.current)});
   return correspondences;
 }

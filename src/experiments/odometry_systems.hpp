@@ -5,6 +5,7 @@
 
 #include "reference_sequence.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/odometry/feature_matcher.hpp"
 #include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
 
 namespace sdvo {
@@ -18,12 +19,23 @@ struct OdometrySystem {
 
 const std::vector<OdometrySystem>& odometrySystems();
 
-/// A sequence described by every system on the same `count` features of each pair: element [system][pair].
-std::vector<std::vector<StereoFeatures>> describeSequence(const ReferenceSequence& sequence,
-                                                          const PipelineOptions& options, double standard_size,
-                                                          int count);
+/// Features with grey patches of the left view but no descriptors, one set for each pair.
+struct GreyPatches {
+  std::vector<StereoFeatures> constant;  ///< every patch of the same size
+  std::vector<StereoFeatures> by_depth;  ///< sized as the package's odometry does
+};
 
-/// 3-D to stereo correspondences of the matches between two pairs, by descriptors alone.
-std::vector<Correspondence> makeCorrespondences(const StereoFeatures& reference, const StereoFeatures& current);
+struct DescribedSequence {
+  std::vector<std::vector<StereoFeatures>> of_system;  ///< [system][pair]
+  GreyPatches patches;                                 ///< of the same rows
+};
+
+/// A sequence described by every system on the same `count` features of each pair.
+DescribedSequence describeSequence(const ReferenceSequence& sequence, const PipelineOptions& options,
+                                   double standard_size, int count);
+
+/// 3-D to stereo correspondences of the matches between two pairs.
+std::vector<Correspondence> makeCorrespondences(const StereoFeatures& reference, const StereoFeatures& current,
+                                                const std::vector<FeatureMatch>& matches);
 
 }  // namespace sdvo

@@ -1,6 +1,7 @@
 #include "reference_sequence.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <stdexcept>
@@ -31,12 +32,17 @@ Trajectory groundTruth(const std::string& directory, int frames) {
   return poses;
 }
 
+struct OdometryRun {
+  Trajectory poses;
+  RigCalibration rig;  ///< as found at the end
+};
+
 /// The package's own odometry with its default options: the reference must not depend on what the experiment varies.
-Trajectory runOdometry(const KittiSequence& images, int frames, const std::string& name) {
+OdometryRun runOdometry(const KittiSequence& images, int frames, const std::string& name) {
   const PipelineOptions options;
   const FeatureExtractor extractor(options.stereo_features);
   VisualOdometry odometry(options.visual_odometry);
-  Trajectory poses;
+  OdometryRun run;
   Progress progress("reference odometry " + name, frames);
   for (int i = 0; i < frames; ++i, progress.step()) {
     const ImagePair pair = images.load(i);
@@ -45,9 +51,10 @@ Trajectory runOdometry(const KittiSequence& images, int frames, const std::strin
     if (!result.has_pose || result.epoch != 0)
       throw std::runtime_error("the reference odometry loses " + images.directory() + " at pair " + std::to_string(i) +
                                "; use --reference ground_truth");
-    poses.push_back(result.T_origin_camera);
+    run.poses.push_back(result.T_origin_camera);
+    if (std::isfinite(result.disparity_offset)) run.rig.value = {result.disparity_offset, result.disparity_bend};
   }
-  return poses;
+  return run;
 }
 
 }  // namespace
@@ -66,8 +73,12 @@ ReferenceSequence openSequence(const ExperimentSetup& setup, const std::string& 
   ReferenceSequence sequence = openImages(setup, name);
   sequence.trajectory = reference == ReferenceMotion::kGroundTruth
                             ? groundTruth(sequence.images.directory(), sequence.frames)
-                            : runOdometry(sequence.images, sequence.frames, sequence.name);
+                            : runOdometry(sequence.images, sequence.frames, sequence.name).poses;
   return sequence;
+}
+
+RigCalibration estimateRig(const ReferenceSequence& sequence) {
+  return runOdometry(sequence.images, sequence.frames, sequence.name).rig;
 }
 
 }  // namespace sdvo

@@ -7,6 +7,7 @@
 #include "experiment_setup.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
+#include "stereo_descriptor_vo/odometry/rig_calibration.hpp"
 
 namespace sdvo {
 
@@ -28,5 +29,8 @@ ReferenceSequence openSequence(const ExperimentSetup& setup, const std::string& 
 
 /// The same without a trajectory.
 ReferenceSequence openImages(const ExperimentSetup& setup, const std::string& name);
+
+/// The error of its rig's disparities that the package's odometry has found at the sequence's end.
+RigCalibration estimateRig(const ReferenceSequence& sequence);
 
 }  // namespace sdvo

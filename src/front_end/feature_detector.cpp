@@ -8,6 +8,7 @@
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <tuple>
+#include <utility>
 
 #include "opencv_features.hpp"
 #include "stereo_descriptor_vo/front_end/corner_refiner.hpp"
@@ -127,7 +128,45 @@ void removeMasked(const cv::Mat& mask, cv::Size size, std::vector<Corner>& corne
   corners.erase(std::remove_if(corners.begin(), corners.end(), is_masked), corners.end());
 }
 
+/// Ties are broken by position.
+bool isStronger(const Corner& a, const Corner& b) {
+  return std::tie(b.response, a.position.y, a.position.x) < std::tie(a.response, b.position.y, b.position.x);
+}
+
 }  // namespace
+
+std::vector<Corner> keepApart(std::vector<Corner> corners, double min_spacing) {
+  if (min_spacing <= 0.0 || corners.empty()) return corners;
+  std::sort(corners.begin(), corners.end(), isStronger);
+  const double side = std::max(min_spacing, 1.0);
+  const auto cellOf = [side](float coordinate) { return static_cast<int>(std::max(coordinate, 0.f) / side) + 1; };
+  int columns = 0, rows = 0;
+  for (const Corner& corner : corners) {
+    columns = std::max(columns, cellOf(corner.position.x) + 2);
+    rows = std::max(rows, cellOf(corner.position.y) + 2);
+  }
+  // The corners kept of each cell are chained: the cell tells the newest of them, each of them the one before. What is
+  // too near lies in one of nine cells; a cell's width around the image is free.
+  std::vector<int> newest(static_cast<std::size_t>(columns) * rows, -1), before;
+  std::vector<Corner> kept;
+  const auto isFree = [&](const Corner& corner, std::size_t cell) {
+    for (int row = -1; row <= 1; ++row)
+      for (int column = -1; column <= 1; ++column)
+        for (int i = newest[cell + static_cast<std::size_t>(row * columns + column)]; i >= 0; i = before[i]) {
+          const cv::Point2f apart = kept[i].position - corner.position;
+          if (std::hypot(apart.x, apart.y) < min_spacing) return false;
+        }
+    return true;
+  };
+  for (const Corner& corner : corners) {
+    const std::size_t cell = static_cast<std::size_t>(cellOf(corner.position.y)) * columns + cellOf(corner.position.x);
+    if (!isFree(corner, cell)) continue;
+    before.push_back(newest[cell]);
+    newest[cell] = static_cast<int>(kept.size());
+    kept.push_back(corner);
+  }
+  return kept;
+}
 
 std::vector<Corner> spreadOverBuckets(const std::vector<Corner>& corners, cv::Size image_size, int bucket_size,
                                       int max_count) {
@@ -139,9 +178,6 @@ std::vector<Corner> spreadOverBuckets(const std::vector<Corner>& corners, cv::Si
     const int row = std::clamp(static_cast<int>(corner.position.y) / bucket_size, 0, rows - 1);
     buckets[static_cast<std::size_t>(row) * columns + column].push_back(corner);
   }
-  const auto stronger = [](const Corner& a, const Corner& b) {
-    return std::tie(b.response, a.position.y, a.position.x) < std::tie(a.response, b.position.y, b.position.x);
-  };
 
   // Serve every bucket's strongest corner, then every second strongest, …; the last round goes to the strongest of it.
   // No more of a bucket need be in order than the rounds ask for.
@@ -151,7 +187,7 @@ std::vector<Corner> spreadOverBuckets(const std::vector<Corner>& corners, cv::Si
     for (const auto& bucket : buckets) served += bucket.size() > rounds ? 1 : 0;
   for (auto& bucket : buckets) {
     const auto needed = static_cast<std::ptrdiff_t>(std::min(rounds, bucket.size()));
-    std::partial_sort(bucket.begin(), bucket.begin() + needed, bucket.end(), stronger);
+    std::partial_sort(bucket.begin(), bucket.begin() + needed, bucket.end(), isStronger);
   }
   std::vector<Corner> kept, served;
   kept.reserve(wanted + buckets.size());
@@ -161,7 +197,7 @@ std::vector<Corner> spreadOverBuckets(const std::vector<Corner>& corners, cv::Si
       if (round < bucket.size()) served.push_back(bucket[round]);
     const std::size_t room = wanted - kept.size();
     if (served.size() > room) {
-      std::sort(served.begin(), served.end(), stronger);
+      std::sort(served.begin(), served.end(), isStronger);
       served.resize(room);
     }
     kept.insert(kept.end(), served.begin(), served.end());
@@ -190,6 +226,7 @@ std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border, co
   for (Corner& corner : corners) corner.position += cv::Point2f(inner.tl());
   const cv::Mat& valid = mask.empty() ? mask_ : mask;
   if (!valid.empty()) removeMasked(valid, image.size(), corners);
+  corners = keepApart(std::move(corners), options_.min_spacing);
   corners = spreadOverBuckets(corners, image.size(), options_.bucket_size, options_.max_features);
   if (options_.subpixel) {
     const bool gradient = options_.type == DetectorType::kGftt || options_.type == DetectorType::kHarris;

@@ -9,6 +9,7 @@
 #include "../experiments/accuracy_experiment.hpp"
 #include "../experiments/consensus_experiment.hpp"
 #include "../experiments/matching_experiment.hpp"
+#include "../experiments/odometry_systems.hpp"
 #include "../experiments/plot_script.hpp"
 #include "../experiments/robustness_experiment.hpp"
 #include "named_choice.hpp"
@@ -55,6 +56,10 @@ CLI::App* addMatching(CLI::App& app, Arguments& arguments) {
       ->capture_default_str()
       ->delimiter(',')
       ->check(CLI::Range(10, 10000));
+  command->add_option("--tolerances", arguments.matching.tolerances, "px, within which a match is correct")
+      ->capture_default_str()
+      ->delimiter(',')
+      ->check(CLI::Range(0.1, 20.0));
   command
       ->add_option("--constant-sizes", arguments.matching.constant_sizes,
                    "px, tried for the best constant size beside the standard 7 px")
@@ -80,15 +85,22 @@ CLI::App* addRobustness(CLI::App& app, Arguments& arguments) {
 }
 
 CLI::App* addAccuracy(CLI::App& app, Arguments& arguments) {
-  CLI::App* command = app.add_subcommand("accuracy", "C: errors of the odometry over runs with different seeds");
+  CLI::App* command = app.add_subcommand("accuracy", "C: errors of the motion over 1 to 5 steps and several seeds");
   addSequences(*command, arguments);
-  command->add_option("--features", arguments.accuracy.features, "size of the feature set")
+  command->add_option("--features", arguments.accuracy.feature_counts, "sizes of the feature sets")
       ->capture_default_str()
+      ->delimiter(',')
       ->check(CLI::Range(10, 10000));
   command->add_option("--seeds", arguments.accuracy.seeds, "runs")->capture_default_str()->check(CLI::Range(1, 1000));
   sdvo::addChoices(*command, "--methods", arguments.accuracy.methods, "outlier rejection, separated by commas");
-  command->add_flag("--package-odometry", arguments.accuracy.package_odometry,
-                    "also run the package's odometry, not only the paper's frame-to-frame model");
+  std::vector<std::string> systems;
+  for (const sdvo::OdometrySystem& system : sdvo::odometrySystems()) systems.push_back(system.name);
+  command->add_option("--systems", arguments.accuracy.systems, "what is compared, the standard one among them")
+      ->capture_default_str()
+      ->delimiter(',')
+      ->check(CLI::IsMember(systems));
+  command->add_flag("--without-rig-error", arguments.accuracy.without_rig_error,
+                    "take out of the disparities what the package's odometry says of the rig's error");
   return command;
 }
 

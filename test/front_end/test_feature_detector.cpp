@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <opencv2/imgcodecs.hpp>
@@ -162,6 +163,66 @@ TEST(SpreadOverBuckets, TakesPositionsOutsideTheImage) {
 }
 
 /// What a border hides is hidden; the rest is where it is in the whole image.
+float nearestOther(const std::vector<Corner>& corners, const Corner& corner) {
+  float nearest = 1e9f;
+  for (const Corner& other : corners)
+    if (&other != &corner)
+      nearest =
+          std::min(nearest, std::hypot(other.position.x - corner.position.x, other.position.y - corner.position.y));
+  return nearest;
+}
+
+TEST(KeepApart, LeavesOutExactlyWhatLiesNearerToAStrongerOne) {
+  std::mt19937 random(5);
+  std::vector<Corner> corners;
+  for (int i = 0; i < 3000; ++i)
+    corners.push_back(
+        {cv::Point2f(static_cast<float>(random() % 6000) / 10.f, static_cast<float>(random() % 4000) / 10.f),
+         static_cast<float>(random() % 40)});
+  for (const double spacing : {0.4, 1.0, 4.0, 23.5}) {
+    const std::vector<Corner> kept = keepApart(corners, spacing);
+    for (const Corner& corner : kept) EXPECT_GE(nearestOther(kept, corner), spacing);
+    for (const Corner& corner : corners) {
+      bool explained = false;
+      for (const Corner& other : kept)
+        explained |= other.response >= corner.response &&
+                     std::hypot(other.position.x - corner.position.x, other.position.y - corner.position.y) < spacing;
+      // What is kept explains itself: it lies at its own place.
+      EXPECT_TRUE(explained);
+    }
+    std::shuffle(corners.begin(), corners.end(), random);
+    const std::vector<Corner> again = keepApart(corners, spacing);
+    ASSERT_EQ(again.size(), kept.size());
+    for (std::size_t i = 0; i < kept.size(); ++i) EXPECT_EQ(again[i].position, kept[i].position);
+  }
+}
+
+TEST(KeepApart, NoSpacingLeavesEverythingAsItIs) {
+  const std::vector<Corner> corners = {{{5.f, 5.f}, 1.f}, {{5.f, 5.f}, 3.f}, {{5.5f, 5.f}, 2.f}};
+  EXPECT_EQ(keepApart(corners, 0.0).size(), 3u);
+  EXPECT_EQ(keepApart(corners, 0.0).front().response, 1.f);
+  EXPECT_EQ(keepApart(corners, 0.6).size(), 1u);
+  EXPECT_EQ(keepApart(corners, 0.6).front().response, 3.f);
+  EXPECT_TRUE(keepApart({}, 4.0).empty());
+}
+
+TEST(FeatureDetector, KeepsCornersApart) {
+  FeatureDetectorOptions options;
+  options.subpixel = false;
+  options.max_features = 5000;
+  const std::vector<Corner> all = FeatureDetector(options).detect(unevenTexture());
+  options.min_spacing = 6.0;
+  const std::vector<Corner> apart = FeatureDetector(options).detect(unevenTexture());
+  const auto nearestOf = [](const std::vector<Corner>& corners) {
+    float nearest = 1e9f;
+    for (const Corner& corner : corners) nearest = std::min(nearest, nearestOther(corners, corner));
+    return nearest;
+  };
+  EXPECT_LT(nearestOf(all), 4.0);
+  EXPECT_GE(nearestOf(apart), 6.0);
+  EXPECT_GT(apart.size(), 200u);
+}
+
 TEST(FeatureDetector, BorderLeavesPositionsWhereTheyAre) {
   constexpr int kBorder = 40;
   const cv::Mat image = unevenTexture();

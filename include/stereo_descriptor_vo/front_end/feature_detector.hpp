@@ -19,6 +19,7 @@ struct FeatureDetectorOptions {
   DetectorType type = DetectorType::kFast;
   int max_features = 1100;
   int bucket_size = 50;
+  double min_spacing = 0.0;
   int fast_min_threshold = 12;
   double corner_quality = 0.002;
   int corner_block_size = 5;
@@ -30,6 +31,8 @@ struct FeatureDetectorOptions {
     list.add("type", type, "corner detector");
     list.add("max_features", max_features, {1, 20000}, "", "corners kept per left image");
     list.add("bucket_size", bucket_size, {8, 4096}, "px", "side of the square buckets that share the corners evenly");
+    list.add("min_spacing", min_spacing, {0.0, 100.0}, "px",
+             "corners nearer than this to a stronger one are left out; 0: none is");
     list.add("fast_min_threshold", fast_min_threshold, {1, 100}, "grey levels",
              "fast, agast, orb: weakest corner considered; each bucket's own threshold adapts upwards from here");
     list.add("corner_quality", corner_quality, {1e-6, 1.0}, "", "gftt, harris: weakest response relative to the best");
@@ -64,6 +67,10 @@ class FeatureDetector {
   FeatureDetectorOptions options_;
   cv::Mat mask_;  ///< of the file; empty: none
 };
+
+/// Without the corners that lie nearer than `min_spacing` px to a stronger one that is kept, strongest first. Larger
+/// neighbourhoods cannot tell neighbours of a few px apart. Does not depend on the order of the input.
+std::vector<Corner> keepApart(std::vector<Corner> corners, double min_spacing);
 
 /// Keeps `max_count` corners such that buckets of a `bucket_size` px grid hold as equal numbers as they can, the
 /// strongest of each first. Ties are broken by position, so the result does not depend on the order of the input.
