@@ -103,7 +103,7 @@ NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementO
 }
 
 NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementOptions& options,
-                             const Correspondences& correspondences, Eigen::Isometry3d& T) {
+                             const std::vector<Correspondence>& correspondences, Eigen::Isometry3d& T) {
   std::vector<int> all(correspondences.size());
   std::iota(all.begin(), all.end(), 0);
   return refineMotion(camera, options, correspondences, all, T);
