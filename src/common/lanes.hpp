@@ -11,14 +11,16 @@ namespace sdvo {
 typedef float Lanes __attribute__((vector_size(32)));
 /// Half of them, for what is left at the end.
 typedef float HalfLanes __attribute__((vector_size(16)));
+/// Four doubles, in the same registers.
+typedef double DoubleLanes __attribute__((vector_size(32)));
 
-template <class Vector>
-SDVO_IN_KERNEL void load(const float* values, Vector& lanes) {
+template <class Number, class Vector>
+SDVO_IN_KERNEL void load(const Number* values, Vector& lanes) {
   std::memcpy(&lanes, values, sizeof(Vector));
 }
 
-template <class Vector>
-SDVO_IN_KERNEL void store(const Vector& lanes, float* values) {
+template <class Number, class Vector>
+SDVO_IN_KERNEL void store(const Vector& lanes, Number* values) {
   std::memcpy(values, &lanes, sizeof(Vector));
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgcodecs.hpp>
@@ -172,29 +173,38 @@ std::vector<Corner> spreadOverBuckets(const std::vector<Corner>& corners, cv::Si
                                       int max_count) {
   const int columns = (image_size.width + bucket_size - 1) / bucket_size;
   const int rows = (image_size.height + bucket_size - 1) / bucket_size;
-  std::vector<std::vector<Corner>> buckets(static_cast<std::size_t>(columns) * rows);
-  for (const Corner& corner : corners) {
+  const auto bucketOf = [&](const Corner& corner) {
     const int column = std::clamp(static_cast<int>(corner.position.x) / bucket_size, 0, columns - 1);
     const int row = std::clamp(static_cast<int>(corner.position.y) / bucket_size, 0, rows - 1);
-    buckets[static_cast<std::size_t>(row) * columns + column].push_back(corner);
-  }
+    return static_cast<std::size_t>(row) * columns + column;
+  };
+  // The corners bucket by bucket, and where each bucket ends; it begins where the one before ends.
+  const std::size_t buckets = static_cast<std::size_t>(columns) * rows;
+  std::vector<std::size_t> end(buckets + 1, 0);
+  for (const Corner& corner : corners) ++end[bucketOf(corner) + 1];
+  std::partial_sum(end.begin(), end.end(), end.begin());
+  std::vector<Corner> sorted(corners.size());
+  for (const Corner& corner : corners) sorted[end[bucketOf(corner)]++] = corner;
+  const auto begin = [&](std::size_t bucket) { return bucket == 0 ? 0 : end[bucket - 1]; };
 
   // Serve every bucket's strongest corner, then every second strongest, …; the last round goes to the strongest of it.
   // No more of a bucket need be in order than the rounds ask for.
   const std::size_t wanted = std::min(static_cast<std::size_t>(max_count), corners.size());
   std::size_t rounds = 0;
   for (std::size_t served = 0; served < wanted; ++rounds)
-    for (const auto& bucket : buckets) served += bucket.size() > rounds ? 1 : 0;
-  for (auto& bucket : buckets) {
-    const auto needed = static_cast<std::ptrdiff_t>(std::min(rounds, bucket.size()));
-    std::partial_sort(bucket.begin(), bucket.begin() + needed, bucket.end(), isStronger);
+    for (std::size_t bucket = 0; bucket < buckets; ++bucket) served += begin(bucket) + rounds < end[bucket] ? 1 : 0;
+  for (std::size_t bucket = 0; bucket < buckets; ++bucket) {
+    const auto first = sorted.begin() + static_cast<std::ptrdiff_t>(begin(bucket));
+    const auto last = sorted.begin() + static_cast<std::ptrdiff_t>(end[bucket]);
+    std::partial_sort(first, first + std::min(static_cast<std::ptrdiff_t>(rounds), last - first), last, isStronger);
   }
   std::vector<Corner> kept, served;
-  kept.reserve(wanted + buckets.size());
+  kept.reserve(wanted + buckets);
+  served.reserve(buckets);
   for (std::size_t round = 0; round < rounds; ++round) {
     served.clear();
-    for (const auto& bucket : buckets)
-      if (round < bucket.size()) served.push_back(bucket[round]);
+    for (std::size_t bucket = 0; bucket < buckets; ++bucket)
+      if (begin(bucket) + round < end[bucket]) served.push_back(sorted[begin(bucket) + round]);
     const std::size_t room = wanted - kept.size();
     if (served.size() > room) {
       std::sort(served.begin(), served.end(), isStronger);

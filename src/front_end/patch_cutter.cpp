@@ -63,6 +63,16 @@ struct MeansOfRow {
   }
 };
 
+/// To the nearest whole number, the even one of two, as cv::saturate_cast has it: means lie within 0…255 but for their
+/// own rounding.
+struct Round {
+  static SDVO_IN_KERNEL void run(const float* means, int count, std::uint8_t* samples) {
+    constexpr float kUnitsOnly = 12582912.f;  // 1.5 * 2^23: what is added to it loses its fraction
+    for (int i = 0; i < count; ++i)
+      samples[i] = static_cast<std::uint8_t>(static_cast<int>((means[i] + kUnitsOnly) - kUnitsOnly));
+  }
+};
+
 }  // namespace
 
 PatchCutter::PatchCutter(const PatchLayout& layout, const cv::Mat& image) : layout_(layout) {
@@ -92,7 +102,8 @@ void PatchCutter::cut(float u, float v, float size, std::uint8_t* samples) const
     runKernel<MeansOfRow>(upper.data(), lower.data(), rows.share[j], widths.data(), height, side, above.data(),
                           means.data());
     if (j == 0) continue;
-    for (int i = 0; i < side; ++i) *samples++ = cv::saturate_cast<std::uint8_t>(means[i]);
+    runKernel<Round>(means.data(), side, samples);
+    samples += side;
   }
 }
 

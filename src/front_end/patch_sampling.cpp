@@ -1,6 +1,7 @@
 #include "stereo_descriptor_vo/front_end/patch_sampling.hpp"
 
 #include <array>
+#include <cstddef>
 #include <cstring>
 
 #include "../common/kernel.hpp"
@@ -61,6 +62,33 @@ SDVO_AVX2 void sampleAvx2(const SampledRow* rows, int count, int columns, float*
     sampleFrom(i, rows[j], columns, patch);
   }
 }
+
+/// Eight or four columns of rows that lie right below each other: what is the lower row of one is the upper one of the
+/// next.
+template <class Vector, Vector (*kPixels)(const std::uint8_t*)>
+SDVO_AVX2 inline void sampleColumnsAvx2(const SampledRow& row, std::ptrdiff_t step, int count, int columns,
+                                        float* patch) {
+  Vector a = kPixels(row.upper), b = kPixels(row.upper + 1);
+  const std::uint8_t* lower = row.lower;
+  for (int j = 0; j < count; ++j, lower += step, patch += columns) {
+    const Vector c = kPixels(lower), d = kPixels(lower + 1);
+    const Vector sum = row.w00 * a + row.w01 * b + row.w10 * c + row.w11 * d;
+    std::memcpy(patch, &sum, sizeof sum);
+    a = c, b = d;
+  }
+}
+
+SDVO_AVX2 void sampleUprightAvx2(SampledRow row, std::ptrdiff_t step, int count, int columns, float* patch) {
+  for (int i = 0; i < columns;) {
+    const bool eight = i + 8 <= columns;
+    if (eight)
+      sampleColumnsAvx2<__m256, eightPixels>(row, step, count, columns, patch + i);
+    else
+      sampleColumnsAvx2<__m128, fourPixels>(row, step, count, columns, patch + i);
+    const int done = eight ? 8 : 4;
+    i += done, row.upper += done, row.lower += done;
+  }
+}
 #endif
 
 /// std::floor of what an int can hold.
@@ -69,27 +97,33 @@ int floorOf(float value) {
   return truncated - static_cast<int>(static_cast<float>(truncated) > value);
 }
 
+/// A row that begins at `start`, of a patch that lies `b` px below `upper`.
+SampledRow rowAt(const std::uint8_t* upper, std::size_t step, float start, float b) {
+  const int column = floorOf(start);
+  const float a = start - static_cast<float>(column);
+  upper += column;
+  return {upper, upper + step, (1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b};
+}
+
 }  // namespace
 
 void samplePatch(const cv::Mat& image, int margin, float x, float y, float slant, int radius, int columns,
                  float* patch) {
-  std::array<SampledRow, 2 * kLargestPatchRadius + 1> rows;
-  const int row = floorOf(y);
+  const int row = floorOf(y), count = 2 * radius + 1;
   const float b = y - static_cast<float>(row);
   const std::size_t step = image.step[0];
-  const std::uint8_t* first = image.ptr(row - radius + margin);
-  for (int j = -radius; j <= radius; ++j, first += step) {
-    const float start = x - slant * static_cast<float>(j);
-    const int column = floorOf(start);
-    const float a = start - static_cast<float>(column);
-    const float w00 = (1 - a) * (1 - b), w01 = a * (1 - b), w10 = (1 - a) * b, w11 = a * b;
-    const std::uint8_t* upper = first + column - radius + margin;
-    rows[static_cast<std::size_t>(j + radius)] = {upper, upper + step, w00, w01, w10, w11};
-  }
+  const std::uint8_t* first = image.ptr(row - radius + margin) - radius + margin;
 #ifdef SDVO_HAVE_AVX2
-  if (usesAvx2()) return sampleAvx2(rows.data(), 2 * radius + 1, columns, patch);
+  if (slant == 0.f && usesAvx2() && columns % 4 == 0)
+    return sampleUprightAvx2(rowAt(first, step, x, b), static_cast<std::ptrdiff_t>(step), count, columns, patch);
 #endif
-  samplePlain(rows.data(), 2 * radius + 1, columns, patch);
+  std::array<SampledRow, 2 * kLargestPatchRadius + 1> rows;
+  for (int j = -radius; j <= radius; ++j, first += step)
+    rows[static_cast<std::size_t>(j + radius)] = rowAt(first, step, x - slant * static_cast<float>(j), b);
+#ifdef SDVO_HAVE_AVX2
+  if (usesAvx2()) return sampleAvx2(rows.data(), count, columns, patch);
+#endif
+  samplePlain(rows.data(), count, columns, patch);
 }
 
 }  // namespace sdvo

@@ -63,6 +63,7 @@ DescribedKeypoints StereoDescriptor::describe(const cv::Mat& left_image, const c
     shift = static_cast<float>(margin);
   }
   std::vector<ViewKeypoint> in_left, in_right;
+  in_left.reserve(keypoints.size()), in_right.reserve(keypoints.size());
   for (const StereoKeypoint& k : keypoints) {
     in_left.push_back({k.u_left + shift, k.v_left + shift, k.size, -1.f});
     in_right.push_back({k.u_right + shift, k.v_right + shift, k.size, -1.f});
@@ -91,8 +92,8 @@ DescribedKeypoints StereoDescriptor::describe(const cv::Mat& left_image, const c
   described.rows.create(count, (both ? 2 : 1) * bytes, CV_8U);
   for (int row = 0; row < count; ++row) {
     const int i = described.index[row];
-    left_half.rows.row(i).copyTo(described.rows.row(row).colRange(0, bytes));
-    if (both) right_half.rows.row(i).copyTo(described.rows.row(row).colRange(bytes, 2 * bytes));
+    std::uint8_t* rest = std::copy_n(left_half.rows.ptr(i), bytes, described.rows.ptr(row));
+    if (both) std::copy_n(right_half.rows.ptr(i), bytes, rest);
   }
   return described;
 }

@@ -23,10 +23,10 @@ namespace {
 
 constexpr float kNoDistance = std::numeric_limits<float>::max();
 
-SDVO_POPCOUNT void hammingDistances(const std::uint8_t* row, const cv::Mat& others, const std::vector<int>& candidates,
-                                    std::vector<float>& distances) {
+SDVO_POPCOUNT void hammingDistances(const std::uint8_t* row, const cv::Mat& others, const int* candidates,
+                                    std::size_t count, float* distances) {
   const int words = others.cols / 8;
-  for (std::size_t k = 0; k < candidates.size(); ++k) {
+  for (std::size_t k = 0; k < count; ++k) {
     const std::uint8_t* other = others.ptr(candidates[k]);
     int distance = 0;
     for (int w = 0; w < words; ++w) {
@@ -43,15 +43,15 @@ SDVO_POPCOUNT void hammingDistances(const std::uint8_t* row, const cv::Mat& othe
 
 /// Squared L2 distances of rows of whole numbers 0…255 or of floats.
 template <class Element>
-void squaredDistances(const std::uint8_t* row, const cv::Mat& others, const std::vector<int>& candidates,
-                      std::vector<float>& distances) {
-  const int count = others.cols / static_cast<int>(sizeof(Element));
+void squaredDistances(const std::uint8_t* row, const cv::Mat& others, const int* candidates, std::size_t count,
+                      float* distances) {
+  const int elements = others.cols / static_cast<int>(sizeof(Element));
   const auto* a = reinterpret_cast<const Element*>(row);
-  for (std::size_t k = 0; k < candidates.size(); ++k) {
+  for (std::size_t k = 0; k < count; ++k) {
     const auto* b = reinterpret_cast<const Element*>(others.ptr(candidates[k]));
     using Sum = std::conditional_t<std::is_integral_v<Element>, int, float>;
     Sum sum = 0;
-    for (int e = 0; e < count; ++e) {
+    for (int e = 0; e < elements; ++e) {
       const Sum difference = static_cast<Sum>(a[e]) - static_cast<Sum>(b[e]);
       sum += difference * difference;
     }
@@ -59,15 +59,15 @@ void squaredDistances(const std::uint8_t* row, const cv::Mat& others, const std:
   }
 }
 
-void computeDistances(ElementType type, const std::uint8_t* row, const cv::Mat& others,
-                      const std::vector<int>& candidates, std::vector<float>& distances) {
+void computeDistances(ElementType type, const std::uint8_t* row, const cv::Mat& others, const int* candidates,
+                      std::size_t count, float* distances) {
   switch (type) {
     case ElementType::kBits:
-      return hammingDistances(row, others, candidates, distances);
+      return hammingDistances(row, others, candidates, count, distances);
     case ElementType::kUint8:
-      return squaredDistances<std::uint8_t>(row, others, candidates, distances);
+      return squaredDistances<std::uint8_t>(row, others, candidates, count, distances);
     case ElementType::kFloat32:
-      return squaredDistances<float>(row, others, candidates, distances);
+      return squaredDistances<float>(row, others, candidates, count, distances);
   }
 }
 
@@ -76,11 +76,11 @@ void computeDistances(ElementType type, const std::uint8_t* row, const cv::Mat& 
 float distanceUnit(ElementType type, const cv::Mat& a, int row_a, const cv::Mat& b, int row_b) {
   if (type == ElementType::kBits) return 8.f * static_cast<float>(a.cols);
   const cv::Mat zeros = cv::Mat::zeros(1, a.cols, CV_8U);
-  std::vector<float> lengths(1);
-  computeDistances(type, a.ptr(row_a), zeros, {0}, lengths);
-  const float length_a = lengths[0];
-  computeDistances(type, b.ptr(row_b), zeros, {0}, lengths);
-  return std::max(length_a + lengths[0], 1e-12f);
+  const int first = 0;
+  float length_a, length_b;
+  computeDistances(type, a.ptr(row_a), zeros, &first, 1, &length_a);
+  computeDistances(type, b.ptr(row_b), zeros, &first, 1, &length_b);
+  return std::max(length_a + length_b, 1e-12f);
 }
 
 /// Rows of a feature set (not an empty one), found by position. Its extent is the features' own: the image size is a
@@ -98,8 +98,8 @@ class PositionGrid {
     for (int i = 0; i < features.count(); ++i) entries_[next[cellOf(i)]++] = {features.u[i], features.v[i], i};
   }
 
-  void findAround(float u, float v, std::vector<int>& found) const {
-    found.resize(entries_.size());
+  /// Writes the rows to the front of `found`, which holds at least as many as there are features; returns their number.
+  std::size_t findAround(float u, float v, std::vector<int>& found) const {
     std::size_t count = 0;
     const int first = columns_.at(u - radius_), last = columns_.at(u + radius_);
     for (int row = rows_.at(v - radius_); row <= rows_.at(v + radius_); ++row)
@@ -110,7 +110,7 @@ class PositionGrid {
         found[count] = entry.row;
         count += du * du + dv * dv <= radius_ * radius_ ? 1 : 0;
       }
-    found.resize(count);
+    return count;
   }
 
  private:
@@ -159,27 +159,27 @@ std::vector<FeatureMatch> FeatureMatcher::match(const DescribedPoints& reference
 
   std::optional<PositionGrid> grid;
   if (options_.gating && T_current_reference) grid.emplace(current, options_.gate_radius);
-  std::vector<int> everything(static_cast<std::size_t>(current.count()));
-  for (int i = 0; i < current.count(); ++i) everything[i] = i;
 
   struct Nearest {
     int index = -1;
     float distance = kNoDistance;
   };
   std::vector<Nearest> of_reference(reference.count()), of_current(current.count());
-  std::vector<int> found;
-  std::vector<float> distances(current.count());
+  std::vector<int> candidates(static_cast<std::size_t>(current.count()));  // all of them, unless gated
+  std::iota(candidates.begin(), candidates.end(), 0);
+  std::size_t count = candidates.size();
+  std::vector<float> distances(count);
   for (int i = 0; i < reference.count(); ++i) {
     if (grid) {
       const Eigen::Vector3d point = *T_current_reference * reference.positions[i];
       constexpr double kNearestDepth = 0.1;  // m: what passes closer than this cannot be seen again
       if (point.z() < kNearestDepth) continue;
       const Eigen::Vector3d predicted = current.camera.project(point);
-      grid->findAround(static_cast<float>(predicted.x()), static_cast<float>(predicted.y()), found);
+      count = grid->findAround(static_cast<float>(predicted.x()), static_cast<float>(predicted.y()), candidates);
     }
-    const std::vector<int>& candidates = grid ? found : everything;
-    computeDistances(kind.element_type, reference.descriptors.ptr(i), current.descriptors, candidates, distances);
-    for (std::size_t k = 0; k < candidates.size(); ++k) {
+    computeDistances(kind.element_type, reference.descriptors.ptr(i), current.descriptors, candidates.data(), count,
+                     distances.data());
+    for (std::size_t k = 0; k < count; ++k) {
       const int j = candidates[k];
       if (distances[k] < of_reference[i].distance) of_reference[i] = {j, distances[k]};
       if (distances[k] < of_current[j].distance) of_current[j] = {i, distances[k]};

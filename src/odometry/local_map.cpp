@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <unordered_map>
+#include <utility>
 
 namespace sdvo {
 namespace {
@@ -114,7 +116,7 @@ void LocalMap::renewLooks(const StereoFeatures& features, const std::vector<Sigh
     takeDescriptor(point, features, last.row);
     const double change = std::max(sighting->scale, 1.0 / sighting->scale);
     if (sighting->aligned && change > options_.renewal_scale)
-      point.reference = {features, last.row, sighting->measurement.head<2>(), newestPose()};
+      point.reference.take(features, last.row, sighting->measurement.head<2>(), newestPose());
   }
 }
 
@@ -130,14 +132,17 @@ void LocalMap::startPoint(const StereoFeatures& features, int row, int id, const
   const double sigma = features.hasPatches() ? options_.reference_sigma : options_.corner_sigma;
   const double disparity =
       std::max(features.disparity[row] - calibration.disparityError(camera, u), kFarthestDisparity);
-  Point point;
+  if (spare_.empty()) spare_.emplace_back();
+  points_.push_back(std::move(spare_.back()));
+  spare_.pop_back();
+  Point& point = points_.back();
+  point.seen = 1;
   point.position.T_origin_anchor = T_camera_origin.inverse();
   point.position.ray_and_inverse_depth = {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy,
                                           1.0 / camera.depth(disparity)};
-  point.reference = {features, row, {u, v}, T_camera_origin};
+  point.reference.take(features, row, {u, v}, T_camera_origin);
   point.observations.push_back({id, row, {u, v, features.disparity[row]}, sigma});
   takeDescriptor(point, features, row);
-  points_.push_back(std::move(point));
 }
 
 bool LocalMap::needsKeyframe() const {
@@ -275,8 +280,12 @@ void LocalMap::removeFrame(std::size_t index) {
                                       [id](const Observation& observation) { return observation.frame_id == id; }),
                        observations.end());
   }
-  points_.erase(std::remove_if(points_.begin(), points_.end(), [](const Point& p) { return p.observations.empty(); }),
-                points_.end());
+  // The others close up in their order; what nothing sees any more keeps its memory for a new point.
+  auto kept = points_.begin();
+  for (Point& point : points_)
+    if (!point.observations.empty()) std::swap(*kept++, point);
+  std::move(kept, points_.end(), std::back_inserter(spare_));
+  points_.erase(kept, points_.end());
 }
 
 LocalMap::Adjustment LocalMap::adjust(const WindowOptimizerOptions& options, const CalibrationBelief& prior,

@@ -10,69 +10,84 @@
 namespace sdvo {
 namespace {
 
-using Correspondences = std::vector<Correspondence>;
-
 /// The robust kernel by name, its costs added up.
 class Kernel {
  public:
   explicit Kernel(const MotionRefinementOptions& options)
-      : huber_(options.kernel == RobustKernel::kHuber), scale_(options.kernel_scale) {}
+      : huber_(options.kernel == RobustKernel::kHuber),
+        scale_(options.kernel_scale),
+        inverse_square_(1.0 / (scale_ * scale_)) {}
 
-  /// Adds the cost of a residual and returns its weight.
-  double add(double residual) {
-    const double ratio = residual / scale_;
+  /// Adds the cost of a squared residual and returns its weight.
+  double add(double square) {
     if (huber_) {
-      huber_cost_ += ratio <= 1.0 ? residual * residual : scale_ * (2.0 * residual - scale_);
+      const double residual = std::sqrt(square), ratio = residual / scale_;
+      huber_cost_ += ratio <= 1.0 ? square : scale_ * (2.0 * residual - scale_);
       return ratio <= 1.0 ? 1.0 : 1.0 / ratio;
     }
-    cauchy_cost_.add(ratio * ratio);
-    return 1.0 / (1.0 + ratio * ratio);
+    const double ratio_square = square * inverse_square_;
+    cauchy_cost_.add(ratio_square);
+    return 1.0 / (1.0 + ratio_square);
   }
   double cost() const { return huber_ ? huber_cost_ : scale_ * scale_ * cauchy_cost_.value(); }
 
  private:
   bool huber_;
-  double scale_;
+  double scale_, inverse_square_;
   double huber_cost_ = 0.0;
   LogSum cauchy_cost_;
 };
 
-NormalEquations linearise(const StereoCamera& camera, const MotionRefinementOptions& options,
-                          const Eigen::Isometry3d& T, const Correspondences& correspondences,
-                          const std::vector<int>& subset) {
-  NormalEquations equations;
-  Kernel kernel(options);
-  for (const int i : subset) {
-    const auto residual = reprojectionResidual(camera, T, correspondences[i]);
-    if (!residual) continue;
-    const double square = residual->squaredNorm(), weight = kernel.add(std::sqrt(square));
-    const Eigen::Matrix<double, 3, 6> jacobian = motionJacobian(camera, T, correspondences[i].point);
-    const Eigen::Matrix<double, 3, 6> weighted = weight * jacobian;
-    equations.hessian.noalias() += weighted.transpose() * jacobian;
-    equations.gradient.noalias() += weighted.transpose() * *residual;
-    equations.weighted_square += weight * square;
-    equations.weight += weight;
+/// The problem around one pose after the other.
+class Lineariser {
+ public:
+  Lineariser(const StereoCamera& camera, const MotionRefinementOptions& options,
+             const std::vector<Correspondence>& correspondences, const std::vector<int>& subset)
+      : camera_(camera), options_(options), arrays_(correspondences, subset) {
+    weights_.resize(static_cast<std::size_t>(CorrespondenceArrays::roundedUp(arrays_.count())));
   }
-  equations.cost = kernel.cost();
-  return equations;
-}
+
+  NormalEquations at(const Eigen::Isometry3d& T) {
+    NormalEquations equations;
+    Kernel kernel(options_);
+    arrays_.squareResiduals(camera_, T, 0, static_cast<int>(weights_.size()), weights_.data());
+    const auto beyond = weights_.begin() + arrays_.count();
+    for (auto at = weights_.begin(); at != beyond; ++at) {
+      const double square = *at, weight = std::isinf(square) ? 0.0 : kernel.add(square);
+      *at = weight;
+      if (weight > 0.0) equations.weighted_square += weight * square;
+      equations.weight += weight;
+    }
+    std::fill(beyond, weights_.end(), 0.0);
+    arrays_.sumEquations(camera_, T, weights_.data(), equations.hessian, equations.gradient);
+    equations.cost = kernel.cost();
+    return equations;
+  }
+
+ private:
+  const StereoCamera& camera_;
+  const MotionRefinementOptions& options_;
+  CorrespondenceArrays arrays_;
+  std::vector<double> weights_;  ///< the squared residuals at first
+};
 
 }  // namespace
 
 NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementOptions& options,
-                             const Correspondences& correspondences, const std::vector<int>& subset,
+                             const std::vector<Correspondence>& correspondences, const std::vector<int>& subset,
                              Eigen::Isometry3d& T) {
   constexpr double kSmallestStep = 1e-6;  // m and rad
   constexpr double kSmallestGain = 1e-6;  // of the cost: a few hundredths of the result's standard deviation
   double damping = 1e-6;
-  NormalEquations equations = linearise(camera, options, T, correspondences, subset);
+  Lineariser problem(camera, options, correspondences, subset);
+  NormalEquations equations = problem.at(T);
   for (int iteration = 0; iteration < options.refinement_iterations; ++iteration) {
     Matrix6d damped = equations.hessian;
     damped.diagonal() *= 1.0 + damping;
     const Vector6d step = damped.ldlt().solve(equations.gradient);
     if (!step.allFinite()) break;
     const Eigen::Isometry3d candidate = expSE3(step) * T;
-    const NormalEquations next = linearise(camera, options, candidate, correspondences, subset);
+    const NormalEquations next = problem.at(candidate);
     if (next.cost <= equations.cost) {
       const bool converged = step.norm() < kSmallestStep || equations.cost - next.cost < kSmallestGain * equations.cost;
       T = candidate;
@@ -88,7 +103,7 @@ NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementO
 }
 
 NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementOptions& options,
-                             const Correspondences& correspondences, Eigen::Isometry3d& T) {
+                             const std::vector<Correspondence>& correspondences, Eigen::Isometry3d& T) {
   std::vector<int> all(correspondences.size());
   std::iota(all.begin(), all.end(), 0);
   return refineMotion(camera, options, correspondences, all, T);

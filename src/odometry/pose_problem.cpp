@@ -1,15 +1,10 @@
 #include "stereo_descriptor_vo/odometry/pose_problem.hpp"
 
 #include <algorithm>
-#include <opencv2/calib3d.hpp>
-#include <opencv2/core/eigen.hpp>
+#include <array>
+#include <cmath>
 
 namespace sdvo {
-namespace {
-
-constexpr double kNearestDepth = 0.05;  // m, in front of the camera
-
-}  // namespace
 
 std::optional<Eigen::Vector3d> reprojectionResidual(const StereoCamera& camera, const Eigen::Isometry3d& T,
                                                     const Correspondence& correspondence) {
@@ -27,58 +22,56 @@ Eigen::Matrix<double, 3, 6> motionJacobian(const StereoCamera& camera, const Eig
   return jacobian;
 }
 
-std::vector<Eigen::Isometry3d> PoseProblem::solve(const MinimalSample& sample) const {
-  std::vector<cv::Point3d> points;
-  std::vector<cv::Point2d> rays;
-  for (const int i : sample) {
-    const Correspondence& c = correspondences_[static_cast<std::size_t>(i)];
-    points.emplace_back(c.point.x(), c.point.y(), c.point.z());
-    rays.emplace_back((c.measurement.x() - camera_.cx) / camera_.fx, (c.measurement.y() - camera_.cy) / camera_.fy);
+PoseCandidates PoseProblem::solve(const MinimalSample& sample) const {
+  std::array<Eigen::Vector3d, 3> points, rays;
+  for (std::size_t k = 0; k < sample.size(); ++k) {
+    const Correspondence& c = correspondences_[static_cast<std::size_t>(sample[k])];
+    points[k] = c.point;
+    rays[k] = Eigen::Vector3d((c.measurement.x() - camera_.cx) / camera_.fx,
+                              (c.measurement.y() - camera_.cy) / camera_.fy, 1.0)
+                  .normalized();
   }
-  std::vector<cv::Mat> rotations, translations;
-  const int solutions =
-      cv::solveP3P(points, rays, cv::Matx33d::eye(), cv::noArray(), rotations, translations, cv::SOLVEPNP_AP3P);
-  std::vector<Eigen::Isometry3d> poses;
-  for (int s = 0; s < solutions; ++s) {
-    Eigen::Vector3d rotation, translation;
-    cv::cv2eigen(rotations[s], rotation);
-    cv::cv2eigen(translations[s], translation);
-    if (!rotation.allFinite() || !translation.allFinite()) continue;
-    Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-    T.linear() = expSO3(rotation);
-    T.translation() = translation;
-    poses.push_back(T);
+  return solveThreePointPose(points, rays);
+}
+
+template <class Visit>
+void PoseProblem::visitSquares(const Eigen::Isometry3d& T, const Visit& visit) const {
+  constexpr int kBlock = 8 * CorrespondenceArrays::kLanes;  // few enough to stop early
+  std::array<double, kBlock> squares;
+  for (int first = 0; first < count(); first += kBlock) {
+    const int left = std::min(count() - first, kBlock);
+    arrays_.squareResiduals(camera_, T, first, CorrespondenceArrays::roundedUp(left), squares.data());
+    for (int k = 0; k < left; ++k)
+      if (!visit(first + k, squares[static_cast<std::size_t>(k)])) return;
   }
-  return poses;
 }
 
 double PoseProblem::truncatedCost(const Eigen::Isometry3d& T, double score_to_beat) const {
   const double limit = threshold_ * threshold_;
   double sum = 0.0;
-  for (const Correspondence& correspondence : correspondences_) {
-    const auto residual = reprojectionResidual(camera_, T, correspondence);
-    sum += residual ? std::min(residual->squaredNorm(), limit) : limit;
-    if (sum >= score_to_beat) break;
-  }
+  visitSquares(T, [&](int, double square) {
+    sum += std::min(square, limit);
+    return sum < score_to_beat;
+  });
   return sum;
 }
 
 double PoseProblem::outlierCost(const Eigen::Isometry3d& T, double score_to_beat) const {
   double outliers = 0.0;
-  for (const Correspondence& correspondence : correspondences_) {
-    const auto residual = reprojectionResidual(camera_, T, correspondence);
-    if (!residual || residual->norm() > threshold_) ++outliers;
-    if (outliers >= score_to_beat) break;
-  }
+  visitSquares(T, [&](int, double square) {
+    outliers += std::sqrt(square) > threshold_;
+    return outliers < score_to_beat;
+  });
   return outliers;
 }
 
 std::vector<int> PoseProblem::inliers(const Eigen::Isometry3d& T, double thresholds) const {
   std::vector<int> found;
-  for (int i = 0; i < count(); ++i) {
-    const auto residual = reprojectionResidual(camera_, T, correspondences_[static_cast<std::size_t>(i)]);
-    if (residual && residual->norm() <= thresholds * threshold_) found.push_back(i);
-  }
+  found.reserve(correspondences_.size());
+  visitSquares(T, [&](int i, double square) {
+    if (std::sqrt(square) <= thresholds * threshold_) found.push_back(i);
+    return true;
+  });
   return found;
 }
 

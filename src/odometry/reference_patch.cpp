@@ -3,8 +3,14 @@
 namespace sdvo {
 
 ReferencePatch::ReferencePatch(const StereoFeatures& features, int row, const Eigen::Vector2d& position,
-                               const Eigen::Isometry3d& T_then_origin)
-    : T_camera_origin(T_then_origin) {
+                               const Eigen::Isometry3d& T_then_origin) {
+  take(features, row, position, T_then_origin);
+}
+
+void ReferencePatch::take(const StereoFeatures& features, int row, const Eigen::Vector2d& position,
+                          const Eigen::Isometry3d& T_then_origin) {
+  T_camera_origin = T_then_origin;
+  samples.clear(), spacing = 1.f, centre.setZero();
   if (!features.hasPatches()) return;
   const std::uint8_t* first = features.patches.ptr(row);
   samples.assign(first, first + features.patches.cols);

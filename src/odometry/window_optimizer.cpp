@@ -5,27 +5,55 @@
 #include <cmath>
 
 #include "log_sum.hpp"
+#include "pose_blocks.hpp"
 
 namespace sdvo {
 namespace {
 
 constexpr int kCalibration = RigCalibration::kParameters;
 using CalibrationVector = RigCalibration::Vector;
+using PosePoint = Eigen::Matrix<double, 6, 3>;
 
 /// Normal equations of poses and calibration after the elimination of the points, and what is needed to get these back.
 struct ReducedSystem {
   struct Point {
     Eigen::Matrix3d inverse_hessian;
     Eigen::Vector3d gradient;
+    int end;  ///< of its sightings; they begin where those of the point before end
   };
   Eigen::MatrixXd hessian;  ///< poses but the first, then the calibration
   Eigen::VectorXd gradient;
   std::vector<Point> points;
-  std::vector<Eigen::Matrix<double, 6, 3>> pose_point;                    ///< for each observation
+  std::vector<PosePoint> pose_point;  ///< for each sighting from a pose that may move
+  std::vector<int> pose;              ///< of it, from zero on
   std::vector<Eigen::Matrix<double, kCalibration, 3>> calibration_point;  ///< for each point
   double cost = 0.0;
   double weight = 0.0;
   double weighted_square = 0.0;
+};
+
+/// T_camera_anchor of all poses: points that one pair saw first lie next to each other and share them.
+class RelativePoses {
+ public:
+  explicit RelativePoses(const std::vector<Eigen::Isometry3d>& T_camera_origin)
+      : T_camera_origin_(T_camera_origin), T_camera_anchor_(T_camera_origin.size()), known_(T_camera_origin.size()) {}
+
+  void setAnchor(const Eigen::Isometry3d& T_origin_anchor) {
+    if (T_origin_anchor.matrix() == T_origin_anchor_.matrix()) return;
+    T_origin_anchor_ = T_origin_anchor;
+    std::fill(known_.begin(), known_.end(), 0);
+  }
+  const Eigen::Isometry3d& at(int frame) {
+    const std::size_t f = static_cast<std::size_t>(frame);
+    if (!known_[f]) T_camera_anchor_[f] = T_camera_origin_[f] * T_origin_anchor_, known_[f] = 1;
+    return T_camera_anchor_[f];
+  }
+
+ private:
+  const std::vector<Eigen::Isometry3d>& T_camera_origin_;
+  Eigen::Isometry3d T_origin_anchor_ = Eigen::Isometry3d::Identity();
+  std::vector<Eigen::Isometry3d> T_camera_anchor_;
+  std::vector<char> known_;
 };
 
 /// A sighting of a point that is not in front of the camera costs as much as a very wrong one.
@@ -58,11 +86,14 @@ class Solver {
   }
 
   /// Normalised residual of observation i; the kernel is not applied.
-  bool residual(const Window& window, std::size_t i, Eigen::Vector3d& residual, ObservationJacobians* jacobians) const {
+  bool residual(const Window& window, RelativePoses& T_camera_anchor, std::size_t i, Eigen::Vector3d& residual,
+                ObservationJacobians* jacobians) const {
     const WindowObservation& observation = window.observations[i];
+    const AnchoredPoint& point = window.points[observation.point];
+    T_camera_anchor.setAnchor(point.T_origin_anchor);
     Eigen::Vector3d prediction;
-    if (!predictObservation(window.camera, window.T_camera_origin[observation.frame], window.points[observation.point],
-                            prediction, jacobians))
+    if (!predictFromAnchor(window.camera, T_camera_anchor.at(observation.frame), point.ray_and_inverse_depth,
+                           prediction, jacobians))
       return false;
     prediction.z() += window.calibration.disparityError(window.camera, observation.measurement.x());
     residual = inverse_noise_[i].cwiseProduct(observation.measurement - prediction);
@@ -72,10 +103,11 @@ class Solver {
   /// Also gives the square of each observation's residual.
   double cost(const Window& window, std::vector<double>& squares) const {
     LogSum costs;
+    RelativePoses T_camera_anchor(window.T_camera_origin);
     Eigen::Vector3d r;
     squares.resize(window.observations.size());
     for (std::size_t i = 0; i < squares.size(); ++i) {
-      squares[i] = residual(window, i, r, nullptr) ? r.squaredNorm() : kBehindSquare;
+      squares[i] = residual(window, T_camera_anchor, i, r, nullptr) ? r.squaredNorm() : kBehindSquare;
       costs.add(squares[i] / bend());
     }
     return priorCost(window) + bend() * costs.value();
@@ -86,6 +118,7 @@ class Solver {
     system.hessian = Eigen::MatrixXd::Zero(size_, size_);
     system.gradient = Eigen::VectorXd::Zero(size_);
     system.pose_point.resize(window.observations.size());
+    system.pose.reserve(window.observations.size());
     const std::size_t points = first_of_point_.size() - 1;
     system.points.resize(points);
     system.calibration_point.resize(points);
@@ -97,19 +130,20 @@ class Solver {
         window.calibration_prior.information * (window.calibration_prior.mean - window.calibration.value);
     LogSum costs;
 
-    std::vector<int> seen_in;
+    RelativePoses T_camera_anchor(window.T_camera_origin);
+    std::vector<WeightedSighting> sightings(window.T_camera_origin.size());
+    std::vector<PosePoint> scaled(sightings.size());
     for (std::size_t p = 0; p < points; ++p) {
       Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
       Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
       Eigen::Matrix<double, kCalibration, 3>& calibration_point = system.calibration_point[p];
       calibration_point.setZero();
-      seen_in.clear();
+      int seen = 0;
       for (int i = first_of_point_[p]; i < first_of_point_[p + 1]; ++i) {
         const WindowObservation& observation = window.observations[i];
-        system.pose_point[i].setZero();
         Eigen::Vector3d r;
         ObservationJacobians jacobians;
-        if (!residual(window, static_cast<std::size_t>(i), r, &jacobians)) {
+        if (!residual(window, T_camera_anchor, static_cast<std::size_t>(i), r, &jacobians)) {
           costs.add(kBehindSquare / bend());
           continue;
         }
@@ -129,30 +163,28 @@ class Solver {
         calibration_hessian.noalias() += by_calibration.transpose() * by_calibration;
         calibration_gradient.noalias() += by_calibration.transpose() * r.z();
         if (observation.frame == 0) continue;
-        const int f = 6 * (observation.frame - 1);
-        const Eigen::Matrix<double, 3, 6> by_pose = scale.asDiagonal() * jacobians.pose;
-        system.hessian.block<6, 6>(f, f).noalias() += by_pose.transpose() * by_pose;
-        system.hessian.block<kCalibration, 6>(c, f).noalias() += by_calibration.transpose() * by_pose.row(2);
-        system.gradient.segment<6>(f).noalias() += by_pose.transpose() * r;
-        system.pose_point[i].noalias() = by_pose.transpose() * by_point;
-        seen_in.push_back(i);
+        WeightedSighting& sighting = sightings[static_cast<std::size_t>(seen++)];
+        Eigen::Map<PosePoint> by_pose(sighting.by_pose);
+        by_pose = jacobians.pose.transpose() * scale.asDiagonal();
+        Eigen::Map<Eigen::Matrix3d>(sighting.by_point) = by_point;
+        Eigen::Map<Eigen::Vector3d>(sighting.residual) = r;
+        sighting.pose = observation.frame - 1;
+        system.pose.push_back(sighting.pose);
+        system.hessian.block<kCalibration, 6>(c, 6 * sighting.pose).noalias() +=
+            by_calibration.transpose() * by_pose.col(2).transpose();
       }
 
       hessian.diagonal() *= 1.0 + damping;
       hessian.diagonal().array() += 1e-9;
       const Eigen::Matrix3d inverse = hessian.inverse();
-      system.points[p] = {inverse, gradient};
-      // Schur complement, lower triangle: frames within a point ascend.
-      for (std::size_t a = 0; a < seen_in.size(); ++a) {
-        const int fa = 6 * (window.observations[seen_in[a]].frame - 1);
-        const Eigen::Matrix<double, 6, 3> scaled = system.pose_point[seen_in[a]] * inverse;
-        system.gradient.segment<6>(fa).noalias() -= scaled * gradient;
-        for (std::size_t b = 0; b <= a; ++b) {
-          const int fb = 6 * (window.observations[seen_in[b]].frame - 1);
-          system.hessian.block<6, 6>(fa, fb).noalias() -= scaled * system.pose_point[seen_in[b]].transpose();
-        }
-        system.hessian.block<kCalibration, 6>(c, fa).noalias() -= calibration_point * scaled.transpose();
-      }
+      const int end = static_cast<int>(system.pose.size());
+      system.points[p] = {inverse, gradient, end};
+      const PointProducts products{inverse.data(), gradient.data(), system.pose_point[0].data() + 18 * (end - seen),
+                                   scaled[0].data()};
+      addEliminatedPoint(sightings.data(), seen, products, system.hessian.data(), size_, system.gradient.data());
+      for (int k = 0; k < seen; ++k)
+        system.hessian.block<kCalibration, 6>(c, 6 * sightings[k].pose).noalias() -=
+            calibration_point * scaled[k].transpose();
       calibration_hessian.noalias() -= calibration_point * inverse * calibration_point.transpose();
       calibration_gradient.noalias() -= calibration_point * inverse * gradient;
     }
@@ -166,12 +198,11 @@ class Solver {
       next.T_camera_origin[f + 1] = expSE3(step.segment<6>(6 * f)) * window_.T_camera_origin[f + 1];
     const CalibrationVector calibration = step.tail<kCalibration>();
     next.calibration.value += calibration;
+    int sighting = 0;
     for (std::size_t p = 0; p + 1 < first_of_point_.size(); ++p) {
       Eigen::Vector3d gradient = system.points[p].gradient - system.calibration_point[p].transpose() * calibration;
-      for (int i = first_of_point_[p]; i < first_of_point_[p + 1]; ++i) {
-        const int frame = window_.observations[i].frame;
-        if (frame > 0) gradient -= system.pose_point[i].transpose() * step.segment<6>(6 * (frame - 1));
-      }
+      for (; sighting < system.points[p].end; ++sighting)
+        gradient -= system.pose_point[sighting].transpose() * step.segment<6>(6 * system.pose[sighting]);
       next.points[window_.observations[first_of_point_[p]].point].ray_and_inverse_depth +=
           system.points[p].inverse_hessian * gradient;
     }
@@ -198,29 +229,40 @@ class Solver {
 
 }  // namespace
 
-bool predictObservation(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
-                        const AnchoredPoint& point, Eigen::Vector3d& prediction, ObservationJacobians* jacobians) {
+bool predictFromAnchor(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_anchor,
+                       const Eigen::Vector3d& ray_and_inverse_depth, Eigen::Vector3d& prediction,
+                       ObservationJacobians* jacobians) {
   constexpr double kNearest = 1e-3;  // of the depth in the anchor
-  const Eigen::Matrix3d R = T_camera_origin.linear() * point.T_origin_anchor.linear();
-  const Eigen::Vector3d t =
-      T_camera_origin.linear() * point.T_origin_anchor.translation() + T_camera_origin.translation();
-  const double rho = point.ray_and_inverse_depth.z();
+  const auto R = T_camera_anchor.linear();
+  const auto t = T_camera_anchor.translation();
+  const double rho = ray_and_inverse_depth.z();
   const Eigen::Vector3d P =
-      R.col(0) * point.ray_and_inverse_depth.x() + R.col(1) * point.ray_and_inverse_depth.y() + R.col(2) + rho * t;
+      R.col(0) * ray_and_inverse_depth.x() + R.col(1) * ray_and_inverse_depth.y() + R.col(2) + rho * t;
   if (P.z() < kNearest) return false;
   const double iz = 1.0 / P.z();
   const double x = P.x() * iz, y = P.y() * iz, fb = camera.fx * camera.baseline;
   prediction = {camera.fx * x + camera.cx, camera.fy * y + camera.cy, fb * rho * iz};
   if (!jacobians) return true;
 
-  Eigen::Matrix3d by_scaled_point;                              // rho held
-  by_scaled_point << camera.fx * iz, 0.0, -camera.fx * x * iz,  //
-      0.0, camera.fy * iz, -camera.fy * y * iz,                 //
-      0.0, 0.0, -fb * rho * iz * iz;
-  jacobians->pose << rho * by_scaled_point, -by_scaled_point * skew(P);
-  jacobians->point << by_scaled_point * R.col(0), by_scaled_point * R.col(1), by_scaled_point * t;
+  // By the scaled point, rho held: (a, 0, -a x), (0, b, -b y), (0, 0, -d). A turn moves the point by -skew(P).
+  const double a = camera.fx * iz, b = camera.fy * iz, d = fb * rho * iz * iz;
+  jacobians->pose << rho * a, 0.0, -rho * a * x, -a * x * P.y(), a * (P.z() + x * P.x()), -a * P.y(),  //
+      0.0, rho * b, -rho * b * y, -b * (P.z() + y * P.y()), b * y * P.x(), b * P.x(),                  //
+      0.0, 0.0, -rho * d, -d * P.y(), d * P.x(), 0.0;
+  const auto byDirection = [&](const auto& w) -> Eigen::Vector3d {
+    return {a * (w.x() - x * w.z()), b * (w.y() - y * w.z()), -d * w.z()};
+  };
+  jacobians->point.col(0) = byDirection(R.col(0));
+  jacobians->point.col(1) = byDirection(R.col(1));
+  jacobians->point.col(2) = byDirection(t);
   jacobians->point(2, 2) += fb * iz;
   return true;
+}
+
+bool predictObservation(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
+                        const AnchoredPoint& point, Eigen::Vector3d& prediction, ObservationJacobians* jacobians) {
+  return predictFromAnchor(camera, T_camera_origin * point.T_origin_anchor, point.ray_and_inverse_depth, prediction,
+                           jacobians);
 }
 
 WindowSolution optimizeWindow(const WindowOptimizerOptions& options, Window& window) {

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "../synthetic_features.hpp"
+#include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/odometry/window_optimizer.hpp"
 
 namespace sdvo {
@@ -123,6 +124,22 @@ TEST(OptimizeWindow, FindsPosesAndCalibrationOfExactMeasurements) {
   }
   EXPECT_NEAR(window.calibration.value[0], 0.3, 0.01);
   EXPECT_NEAR(window.calibration.value[1], -1.0, 0.05);
+}
+
+TEST(OptimizeWindow, IsTheSameToTheBitWithAndWithoutAvx2) {
+  RigCalibration truth;
+  truth.value << 0.3, -1.0;
+  const Window disturbed = disturbedWindow(truth);
+  Window fast = disturbed, plain = disturbed;
+  const WindowSolution with_avx2 = optimizeWindow({}, fast);
+  allowAvx2(false);
+  const WindowSolution without = optimizeWindow({}, plain);
+  allowAvx2(true);
+  for (std::size_t f = 0; f < fast.T_camera_origin.size(); ++f)
+    EXPECT_EQ(fast.T_camera_origin[f].matrix(), plain.T_camera_origin[f].matrix()) << "pose " << f;
+  EXPECT_EQ(fast.calibration.value, plain.calibration.value);
+  EXPECT_EQ(with_avx2.pose_covariance, without.pose_covariance);
+  EXPECT_EQ(with_avx2.residuals, without.residuals);
 }
 
 /// Adds normal noise: `position` px to u and v, `disparity` px to the disparity.

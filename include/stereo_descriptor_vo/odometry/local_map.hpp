@@ -174,6 +174,7 @@ class LocalMap {
   DescriptorKind kind_;
   std::deque<Frame> frames_;
   std::vector<Point> points_;
+  std::vector<Point> spare_;  ///< no points any more, but their memory
   KeyframeMemory memory_;
 };
 

@@ -7,15 +7,11 @@
 
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
+#include "stereo_descriptor_vo/odometry/correspondence_arrays.hpp"
 #include "stereo_descriptor_vo/odometry/minimal_sampling.hpp"
+#include "stereo_descriptor_vo/odometry/three_point_pose.hpp"
 
 namespace sdvo {
-
-/// One point seen from two camera positions.
-struct Correspondence {
-  Eigen::Vector3d point;        ///< in the reference camera's left optical frame, m
-  Eigen::Vector3d measurement;  ///< (u_left, v_left, u_right) in the current pair, px
-};
 
 /// Residual (measurement - projection, px) of a correspondence under T_current_reference; nothing when the point is not
 /// in front of the camera.
@@ -32,14 +28,14 @@ class PoseProblem {
  public:
   /// Both arguments must outlive the problem; `inlier_threshold` bounds the residual's length in px.
   PoseProblem(const StereoCamera& camera, const std::vector<Correspondence>& correspondences, double inlier_threshold)
-      : camera_(camera), correspondences_(correspondences), threshold_(inlier_threshold) {}
+      : camera_(camera), correspondences_(correspondences), arrays_(correspondences), threshold_(inlier_threshold) {}
 
   int count() const { return static_cast<int>(correspondences_.size()); }
   const StereoCamera& camera() const { return camera_; }
   const std::vector<Correspondence>& correspondences() const { return correspondences_; }
 
   /// Up to four poses T_current_reference from three correspondences, by the left view (P3P).
-  std::vector<Eigen::Isometry3d> solve(const MinimalSample& sample) const;
+  PoseCandidates solve(const MinimalSample& sample) const;
 
   /// Sum over all correspondences of the squared residual, cut off at the threshold (MSAC, Torr and Zisserman 2000),
   /// px^2; the smaller the better. Stops early, at some value above it, once `score_to_beat` is out of reach.
@@ -57,8 +53,13 @@ class PoseProblem {
   std::vector<int> inliers(const Eigen::Isometry3d& T_current_reference, double thresholds = 1.0) const;
 
  private:
+  /// Calls visit(i, squared residual) for one correspondence after the other until it returns false.
+  template <class Visit>
+  void visitSquares(const Eigen::Isometry3d& T_current_reference, const Visit& visit) const;
+
   const StereoCamera& camera_;
   const std::vector<Correspondence>& correspondences_;
+  CorrespondenceArrays arrays_;
   double threshold_;
 };
 

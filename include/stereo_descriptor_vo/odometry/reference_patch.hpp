@@ -22,6 +22,9 @@ struct ReferencePatch {
   /// A row's patch; the point lies at `position` of its left image, px. Empty where the features have no patches.
   ReferencePatch(const StereoFeatures& features, int row, const Eigen::Vector2d& position,
                  const Eigen::Isometry3d& T_then_origin);
+  /// Becomes such a patch, in the memory that it has.
+  void take(const StereoFeatures& features, int row, const Eigen::Vector2d& position,
+            const Eigen::Isometry3d& T_then_origin);
 
   /// Where the reference's point lies in another pair.
   struct Found {

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/se3.hpp"
+#include "stereo_descriptor_vo/common/stereo_camera.hpp"
+
+namespace sdvo {
+
+/// One point seen from two camera positions.
+struct Correspondence {
+  Eigen::Vector3d point;        ///< in the reference camera's left optical frame, m
+  Eigen::Vector3d measurement;  ///< (u_left, v_left, u_right) in the current pair, px
+};
+
+/// A point nearer than this to the camera's plane is not in front of it, m.
+constexpr double kNearestDepth = 0.05;
+
+/// Correspondences number by number, so that several are worked on at once.
+class CorrespondenceArrays {
+ public:
+  explicit CorrespondenceArrays(const std::vector<Correspondence>& correspondences);
+  /// Some of them.
+  CorrespondenceArrays(const std::vector<Correspondence>& correspondences, const std::vector<int>& subset);
+
+  int count() const { return count_; }
+
+  /// How many are worked on at once.
+  static constexpr int kLanes = 4;
+  static int roundedUp(int count) { return (count + kLanes - 1) / kLanes * kLanes; }
+
+  /// Squared lengths of the residuals (measurement - projection) of `count` of them from `first` on, both multiples of
+  /// kLanes, under T_current_reference, px^2; infinite for a point that is not in front of the camera.
+  void squareResiduals(const StereoCamera& camera, const Eigen::Isometry3d& T_current_reference, int first, int count,
+                       double* squares) const;
+
+  /// Sums over all: weight J^T J and weight J^T residual, for the derivative J of the projection by a left perturbation
+  /// of T_current_reference. There are roundedUp(count()) weights; points that are not in front of the camera, and what
+  /// is beyond the count, must have zero.
+  void sumEquations(const StereoCamera& camera, const Eigen::Isometry3d& T_current_reference, const double* weights,
+                    Matrix6d& hessian, Vector6d& gradient) const;
+
+ private:
+  void resize(int count);
+  void set(int i, const Correspondence& correspondence);
+
+  int count_ = 0;
+  std::vector<double> values_;  ///< six arrays: x, y, z of the points, u_left, v_left, u_right
+};
+
+}  // namespace sdvo
