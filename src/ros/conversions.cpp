@@ -41,6 +41,7 @@ image_geometry::PinholeCameraModel toCameraModel(const sensor_msgs::CameraInfo& 
   image_geometry::PinholeCameraModel model;
   try {
     model.fromCameraInfo(info);
+    model.reducedResolution();  // rectifies the region of interest, which fails for some distortions
   } catch (const std::exception& e) {
     throw std::invalid_argument(name + ": " + e.what());
   }

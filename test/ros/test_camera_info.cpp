@@ -103,6 +103,14 @@ TEST(ToStereoCamera, RefusesWhatIsNoRectifiedPair) {
   sensor_msgs::CameraInfo smaller = right;
   smaller.width = 640;
   EXPECT_TRUE(contains(refusal(left, smaller), "left 1200x360, right 640x360"));
+  // A region of interest is rectified with the distortion, of which OpenCV does not take every number of coefficients.
+  sensor_msgs::CameraInfo distorted = right;
+  distorted.roi.x_offset = 10;
+  distorted.roi.width = 600;
+  distorted.roi.height = 200;
+  distorted.roi.do_rectify = true;
+  distorted.D.assign(3, 0.1);
+  EXPECT_TRUE(contains(refusal(left, distorted), "right camera_info"));
 }
 
 }  // namespace
