@@ -55,6 +55,10 @@ PoseVerdict judgePose(const PoseVerdictOptions& options, int min_inliers, const 
     return verdict(Trust::kDoubtful, "inliers in only ", std::round(100.0 * evidence.coverage), " % of the image");
   if (!evidence.confirmed && evidence.rms > options.doubtful_rms)
     return verdict(Trust::kDoubtful, "a reprojection error of ", evidence.rms, " px");
+  constexpr double kShare = 0.03;
+  if (evidence.deviation > options.doubtful_deviation + kShare * way)
+    return verdict(Trust::kDoubtful, "a way of ", way, " m known to ", evidence.deviation,
+                   " m exceeds tracking/doubtful_deviation");
   if (evidence.velocity) {
     // The velocity before rests on stamps that may be wrong, too.
     const Vector6d& before = *evidence.velocity;

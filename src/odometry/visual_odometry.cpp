@@ -160,6 +160,8 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
   // What the adjustment did to the map as a whole is no motion.
   evidence.motion = newest_before * (T_before_origin.inverse() * map.poseBeforeNewest()) * map.newestPose().inverse();
   evidence.lasting_inliers = found.lastingInliers(step.rejected_rows);
+  if (adjustment.success)
+    evidence.deviation = std::sqrt(adjustment.covariances.since_keyframe.topLeftCorner<3, 3>().trace());
   PoseVerdict verdict = judgePose(options_.tracking, options_.motion.min_inliers, evidence);
   if (verdict.trust == Trust::kNone) {
     // Without a map to go back to, what it has become is of no use.

@@ -124,6 +124,15 @@ TEST(PoseVerdict, AccelerationsAreJudgedAgainstTheVelocityBefore) {
   EXPECT_EQ(trustIn(evidence), Trust::kDoubtful);
 }
 
+TEST(PoseVerdict, AWayThatIsKnownBadlyIsDoubtedWhateverConfirmsIt) {
+  PoseEvidence evidence = soundEvidence();
+  evidence.confirmed = true;
+  evidence.deviation = 0.05 + 0.03 - 0.001;  // of 1 m
+  EXPECT_EQ(trustIn(evidence), Trust::kSound);
+  evidence.deviation = 0.05 + 0.03 + 0.001;
+  EXPECT_EQ(trustIn(evidence), Trust::kDoubtful);
+}
+
 TEST(PoseVerdict, TellsADoubtOfTheRateFromOneOfTheWay) {
   PoseEvidence evidence = soundEvidence();
   evidence.motion.translation().z() = 3.0;  // 30 m/s after 10 m/s

@@ -554,6 +554,31 @@ TEST(VisualOdometry, RotationsOfABurstAreMeasured) {
   }
 }
 
+TEST(VisualOdometry, AWayThatTheMapKnowsBadlyIsDoubted) {
+  // What stands 60 to 120 m away, where half a pixel is metres, hardly tells a step from a standstill.
+  const synthetic::World far = synthetic::randomWorld(31, 2000, {-80.0, -40.0, 60.0}, {80.0, 40.0, 120.0});
+  VisualOdometryOptions options;
+  options.tracking.doubtful_deviation = 0.005;
+  VisualOdometry odometry(options);
+  synthetic::Sighting sighting;
+  sighting.noise = 0.5;
+  sighting.max_depth = 150.0;
+  OdometryResult result;
+  for (int i = 0; i <= 3; ++i) {
+    sighting.seed = 400 + static_cast<unsigned>(i);
+    result = odometry.update(
+        synthetic::observe(far, synthetic::camera(), Eigen::Isometry3d::Identity(), stampOf(i), sighting));
+  }
+  EXPECT_EQ(result.state, TrackingState::kDegraded);
+  EXPECT_NE(result.reason.find("doubtful_deviation"), std::string::npos) << result.reason;
+  options.tracking.doubtful_deviation = 10.0;
+  odometry.configure(options);
+  sighting.seed = 404;
+  result = odometry.update(
+      synthetic::observe(far, synthetic::camera(), Eigen::Isometry3d::Identity(), stampOf(4), sighting));
+  EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
+}
+
 TEST(VisualOdometry, ImagesThatRepeatThemselvesWhileItMovesAreNoStandstill) {
   VisualOdometry odometry({});
   const OdometryResult before = follow(odometry, 8);

@@ -20,6 +20,7 @@ struct PoseVerdictOptions {
   double doubtful_lasting_ratio = 0.5;
   double doubtful_coverage = 0.4;
   double doubtful_rms = 1.2;
+  double doubtful_deviation = 0.05;
 
   void describe(OptionList& list) {
     list.add("max_speed", max_speed, {0.1, 1000.0}, "m/s", "a faster motion is a wrong one");
@@ -37,6 +38,8 @@ struct PoseVerdictOptions {
     list.add("doubtful_coverage", doubtful_coverage, {0.0, 1.0}, "",
              "inliers in a smaller share of the image's cells are doubted");
     list.add("doubtful_rms", doubtful_rms, {0.0, 20.0}, "px", "a larger reprojection error of the inliers is doubted");
+    list.add("doubtful_deviation", doubtful_deviation, {0.001, 1000.0}, "m",
+             "a way whose standard deviation is larger than this and 3 % of it is doubted");
   }
 };
 
@@ -47,6 +50,7 @@ struct PoseEvidence {
   double coverage = 1.0;                         ///< share of the image's cells that hold an inlier
   bool confirmed = false;                        ///< found likewise without a prior: few inliers are no doubt then
   double rms = 0.0;                              ///< reprojection error of the inliers, px per coordinate
+  double deviation = 0.0;                        ///< of the way, standard, as the map's adjustment knows it, m
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();  ///< since the last measured pair
   Matrix6d covariance = Matrix6d::Zero();                    ///< of that motion, m and rad
   double dt = 0.0;                                           ///< since the last measured pair, s
