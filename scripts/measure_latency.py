@@ -12,7 +12,8 @@ import subprocess
 import sys
 import time
 
-import rospy
+os.environ["ROS_NAMESPACE"] = "stereo"  # of the topics; rospy reads it when imported
+import rospy  # noqa: E402
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent))
 import soak  # noqa: E402
@@ -57,10 +58,11 @@ def main():
     parser.add_argument("drive", help="folder in KITTI layout")
     parser.add_argument("--rates", type=float, nargs="+", default=[10.0, 30.0, 60.0], help="pairs per second")
     parser.add_argument("--seconds", type=float, default=10.0, help="for each rate")
-    arguments = parser.parse_args()
+    arguments = parser.parse_args(rospy.myargv()[1:])
     port = free_port()
     os.environ["ROS_MASTER_URI"] = f"http://localhost:{port}"
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    environment = {name: value for name, value in os.environ.items() if name != "ROS_NAMESPACE"}
+    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "env": environment}
     processes = [subprocess.Popen(["roscore", "-p", str(port)], **quiet)]
     try:
         while subprocess.run(["rosparam", "list"], check=False, **quiet).returncode:
@@ -71,7 +73,10 @@ def main():
         processes.append(subprocess.Popen(["roslaunch", "stereo_descriptor_vo", "stereo_vo.launch"], **quiet))
         feeder = soak.Soak(arguments.drive, arguments.rates[0])
         feeder.broadcaster.sendTransform(soak.transform_of_camera())
+        start = time.monotonic()
         while not feeder.is_connected():
+            if time.monotonic() - start > 60.0:
+                raise SystemExit("the nodelets did not start")
             time.sleep(0.1)
         rows = [measure(feeder, rate, arguments.seconds) for rate in arguments.rates]
         memory = soak.resident_memory(soak.pid_of(MANAGER))
