@@ -188,6 +188,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
     state_.covariance.advance(*step.T_previous_current, step.covariance);
   }
   step.state = TrackingState::kTracking;
+  if (verdict.trust == Trust::kSound) state_.last_doubt.setZero();
   if (verdict.trust == Trust::kDoubtful) {
     const Matrix6d doubted =
         watched ? state_.last_doubt : doubt(found, T_previous_measured, *step.T_previous_current, dt);
@@ -284,7 +285,8 @@ VisualOdometry::Step VisualOdometry::predict(const StereoFeatures& features, dou
   step.state = TrackingState::kDegraded;
   step.reason = "motion predicted: " + step.reason;
   step.T_previous_current = expSE3(*state_.velocity * dt);
-  step.covariance = predictionCovariance(dt);
+  // What is predicted from a doubtful motion is doubtful, too.
+  step.covariance = predictionCovariance(dt) + state_.last_doubt;
   state_.covariance.advance(*step.T_previous_current, step.covariance);
   return step;
 }

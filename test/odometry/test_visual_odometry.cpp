@@ -543,6 +543,22 @@ TEST(VisualOdometry, StampsThatMisleadThePriorDoNotMisleadThePose) {
   EXPECT_GE(degraded, 5) << "the stamps are not believed";
 }
 
+TEST(VisualOdometry, WhatIsPredictedFromADoubtfulMotionIsDoubtful) {
+  VisualOdometry odometry({});
+  follow(odometry, 5);
+  const OdometryResult doubtful = odometry.update(pairStamped(6, -90000000));
+  ASSERT_EQ(doubtful.state, TrackingState::kDegraded) << doubtful.reason;
+  StereoFeatures blind = blindPair(7);
+  blind.stamp = stampOf(6);
+  const OdometryResult predicted = odometry.update(blind);
+  ASSERT_EQ(predicted.state, TrackingState::kDegraded) << predicted.reason;
+  EXPECT_GT(std::sqrt(predicted.motion_covariance(2, 2)), 0.3);
+
+  VisualOdometry sound({});
+  follow(sound, 5);
+  EXPECT_LT(std::sqrt(sound.update(blindPair(6)).motion_covariance(2, 2)), 0.03);
+}
+
 TEST(VisualOdometry, RotationsOfABurstAreMeasured) {
   // Pairs that arrive by threes, stamped a millisecond apart: 0.02 rad each would be 20 rad/s.
   VisualOdometry odometry({});
