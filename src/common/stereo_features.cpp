@@ -65,10 +65,11 @@ void StereoFeatures::check() const {
   requireLength(static_cast<std::size_t>(descriptors.rows), "descriptors (rows)");
   if (n > 0 && (descriptors.type() != CV_8U || descriptors.cols % bytesOf(element_type) != 0))
     refuse("descriptors are not rows of whole elements: " + toString(kind()));
-  if (patch_layout.side < 0 || !(patch_layout.min_spacing > 0.f) || !(patch_layout.spacing_by_size >= 0.f) ||
-      !std::isfinite(patch_layout.min_spacing) || !std::isfinite(patch_layout.spacing_by_size))
-    refuse("the patches' side must not be negative and their spacing must be positive");
+  if (patch_layout.side < 0) refuse("the patches' side must not be negative");
   if (hasPatches()) {
+    if (!(patch_layout.min_spacing > 0.f) || !(patch_layout.spacing_by_size >= 0.f) ||
+        !std::isfinite(patch_layout.min_spacing) || !std::isfinite(patch_layout.spacing_by_size))
+      refuse("the patches' spacing must be positive");
     requireLength(static_cast<std::size_t>(patches.rows), "patches (rows)");
     if (n > 0 && (patches.type() != CV_8U || patches.cols != patch_layout.bytes()))
       refuse("patches of " + std::to_string(patch_layout.side) + "x" + std::to_string(patch_layout.side) +
