@@ -364,6 +364,7 @@ sensor_msgs::PointCloud2 toPointCloud(const stereo_descriptor_vo::StereoFeatures
                                 "z", 1, sensor_msgs::PointField::FLOAT32, "disparity", 1,
                                 sensor_msgs::PointField::FLOAT32);
   modifier.resize(static_cast<std::size_t>(view.count()));
+  if (view.count() == 0) return cloud;  // of which the iterator would take the first byte
   sensor_msgs::PointCloud2Iterator<float> out(cloud, "x");
   for (int i = 0; i < view.count(); ++i, ++out) {
     const cv::Point3d point = view.point(i);

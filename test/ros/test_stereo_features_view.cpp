@@ -208,5 +208,11 @@ TEST(StereoFeaturesViewTest, PointFollowsFromDisparity) {
   EXPECT_EQ(*d, 25.f);
 }
 
+TEST(StereoFeaturesViewTest, NoFeaturesMakeAnEmptyCloud) {
+  const sensor_msgs::PointCloud2 cloud = toPointCloud(FeaturesMessage{});
+  EXPECT_EQ(cloud.width * cloud.height, 0u);
+  EXPECT_EQ(cloud.fields.size(), 4u);
+}
+
 }  // namespace
 }  // namespace sdvo::ros_conversions
