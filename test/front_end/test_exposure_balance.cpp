@@ -88,7 +88,7 @@ TEST(ExposureBalance, FeaturesAreFoundWhateverTheGainOfOneSide) {
   ASSERT_GT(wanted, 300);
   EXPECT_GT(features(exposed(0.4)), 0.9 * wanted);
   EXPECT_GT(features(exposed(1.6)), 0.9 * wanted);
-  EXPECT_GT(features(exposed(0.5, 80.0)), 0.9 * wanted);
+  EXPECT_GT(features(exposed(0.5, 110.0)), 0.9 * wanted);
   EXPECT_GT(features(exposed(2.5)), 0.5 * wanted);
   options.exposure_balance.enabled = false;
   EXPECT_LT(features(exposed(0.4)), 0.5 * wanted);

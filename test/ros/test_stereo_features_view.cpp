@@ -209,7 +209,7 @@ TEST(StereoFeaturesViewTest, PointFollowsFromDisparity) {
 }
 
 TEST(StereoFeaturesViewTest, NoFeaturesMakeAnEmptyCloud) {
-  const sensor_msgs::PointCloud2 cloud = toPointCloud(FeaturesMessage{});
+  const sensor_msgs::PointCloud2 cloud = toPointCloud(toMessage(someFeatures().select({}), DepthScaleOptions()));
   EXPECT_EQ(cloud.width * cloud.height, 0u);
   EXPECT_EQ(cloud.fields.size(), 4u);
 }
