@@ -19,17 +19,18 @@ const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"common", {}},
     {"front_end", {"common"}},
     {"odometry", {"common"}},
+    {"places", {"common", "odometry"}},
     {"data", {"common"}},
     {"render", {"common"}},
-    {"config", {"common", "front_end", "odometry"}},
-    {"ros", {"common", "front_end", "odometry", "config"}},
+    {"config", {"common", "front_end", "odometry", "places"}},
+    {"ros", {"common", "front_end", "odometry", "places", "config"}},
     {"experiments", {"common", "front_end", "odometry", "data", "config"}},
-    {"tools", {"common", "front_end", "odometry", "data", "config", "experiments", "render", "ros"}},
+    {"tools", {"common", "front_end", "odometry", "places", "data", "config", "experiments", "render", "ros"}},
 };
 
 /// Rooms that a program without ROS can use.
-const std::set<std::string> kWithoutRos = {"common", "front_end", "odometry",   "data",
-                                           "render", "config",    "experiments"};
+const std::set<std::string> kWithoutRos = {"common", "front_end", "odometry", "places",
+                                           "data",   "render",    "config",   "experiments"};
 
 struct Include {
   fs::path file;

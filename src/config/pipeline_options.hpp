@@ -6,17 +6,20 @@
 #include "nodelet_options.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
+#include "stereo_descriptor_vo/places/place_recognition.hpp"
 
 namespace sdvo {
 
-/// The options of both nodelets under the nodelets' names, so that one YAML file serves the launch files and the tools.
+/// The options of all nodelets under the nodelets' names, so that one YAML file serves the launch files and the tools.
 struct PipelineOptions {
   FeatureExtractorOptions stereo_features;
   VisualOdometryOptions visual_odometry;
+  PlaceRecognitionOptions place_recognition;
 
   void describe(OptionList& list) {
     list.group("stereo_features", stereo_features);
     list.group("visual_odometry", visual_odometry);
+    list.group("place_recognition", place_recognition);
   }
 };
 

@@ -26,11 +26,11 @@ void writeCovariance(std::ostream& file, const Matrix6d& covariance) {
 OfflineRun::OfflineRun(const PipelineOptions& options)
     : extractor_(options.stereo_features), odometry_(options.visual_odometry) {}
 
-void OfflineRun::process(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp) {
+StereoFeatures OfflineRun::process(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp) {
   Frame frame;
   const double cpu_before = cpuSeconds();
   Stopwatch stopwatch;
-  const StereoFeatures features = extractor_.extract(camera, left, right, stamp);
+  StereoFeatures features = extractor_.extract(camera, left, right, stamp);
   if (camera_ && *camera_ != camera) odometry_.breakStream();
   camera_ = camera;
   frame.odometry = odometry_.update(features);
@@ -40,6 +40,7 @@ void OfflineRun::process(const StereoCamera& camera, const cv::Mat& left, const 
   frame.odometry.flow.clear();  // by far the largest part of it
   frame.odometry.flow.shrink_to_fit();
   frames_.push_back(std::move(frame));
+  return features;
 }
 
 int OfflineRun::pairsWithoutPose() const {

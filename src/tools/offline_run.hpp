@@ -19,8 +19,11 @@ class OfflineRun {
  public:
   explicit OfflineRun(const PipelineOptions& options);
 
-  /// Stamps (ns) must increase. Another camera than before begins a new stream.
-  void process(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
+  /// Stamps (ns) must increase. Another camera than before begins a new stream. Returns the pair's features.
+  StereoFeatures process(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
+
+  /// Of the last pair; its flow is not kept.
+  const OdometryResult& last() const { return frames_.back().odometry; }
 
   int pairs() const { return static_cast<int>(frames_.size()); }
   int pairsWithoutPose() const;

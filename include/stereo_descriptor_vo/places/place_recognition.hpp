@@ -1,0 +1,139 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/common/se3.hpp"
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/places/loop_agreement.hpp"
+#include "stereo_descriptor_vo/places/place.hpp"
+#include "stereo_descriptor_vo/places/place_index.hpp"
+#include "stereo_descriptor_vo/places/place_verifier.hpp"
+#include "stereo_descriptor_vo/places/pose_graph.hpp"
+
+namespace sdvo {
+
+struct PlaceRecognitionOptions {
+  double keyframe_distance = 3.0;
+  double keyframe_angle = 15.0;
+  int max_features = 500;
+  int max_places = 10000;
+  double min_age = 20.0;
+  double min_travel = 30.0;
+  int candidates = 3;
+  double drift_translation = 0.03;
+  double drift_rotation = 0.01;
+  double drift_turn = 0.01;
+  PlaceIndexOptions index;
+  PlaceVerifierOptions verifier;
+  LoopAgreementOptions agreement;
+  PoseGraphOptions graph;
+
+  void describe(OptionList& list) {
+    list.add("keyframe_distance", keyframe_distance, {0.01, 100.0}, "m",
+             "a pair is kept as a key frame after so long a way");
+    list.add("keyframe_angle", keyframe_angle, {0.5, 180.0}, "deg", "… or after such a turn");
+    list.add("max_features", max_features, {50, 10000}, "", "features kept of a key frame");
+    list.add("max_places", max_places, {10, 1000000}, "", "key frames kept; the oldest goes");
+    list.add("min_age", min_age, {0.0, 3600.0}, "s", "no place is looked for among key frames younger than that");
+    list.add("min_travel", min_travel, {0.0, 10000.0}, "m", "… or from which the way here is shorter");
+    list.add("candidates", candidates, {1, 100}, "", "places that geometry looks at for each key frame");
+    list.add("drift_translation", drift_translation, {0.0, 1.0}, "m/m",
+             "error of the odometry, beyond its covariance, that a loop may have to take back");
+    list.add("drift_rotation", drift_rotation, {0.0, 10.0}, "deg/m", "the same of its rotation, for the way");
+    list.add("drift_turn", drift_turn, {0.0, 1.0}, "rad/rad", "… and for what it turned");
+    list.group("index", index);
+    list.group("verifier", verifier);
+    list.group("agreement", agreement);
+    list.group("graph", graph);
+  }
+};
+
+/// Where the odometry sees the camera at a pair.
+struct CameraMotion {
+  Eigen::Isometry3d T_odom_camera = Eigen::Isometry3d::Identity();
+  Matrix6d covariance =
+      Matrix6d::Zero();    ///< of the motion since the pair before: of its right perturbation, m and rad
+  bool continuous = true;  ///< false: the motion since the pair before is unknown (a new epoch)
+};
+
+/// What a new key frame led to.
+struct PlaceReport {
+  int id = 0;                                 ///< of the new key frame
+  std::vector<PlaceCandidate> candidates;     ///< that looked alike
+  std::optional<int> same;                    ///< the place that geometry confirmed
+  PlaceMatch match;                           ///< its measurement; of the last one looked at, where none was confirmed
+  bool loop = false;                          ///< accepted: the graph has a new loop and wants to be optimised
+  std::string reason;                         ///< why there is no loop
+  double find_time = 0.0, verify_time = 0.0;  ///< s
+};
+
+/// Recognises places by the features of stereo pairs and keeps a graph of them: the drift of an odometry is taken back
+/// where the camera comes by again. Sees no image.
+class PlaceRecognition {
+ public:
+  /// Throws std::invalid_argument when an option is out of its range.
+  explicit PlaceRecognition(const PlaceRecognitionOptions& options);
+
+  /// Takes the next pair of the odometry. A report where it became a key frame. The graph is not optimised here: that
+  /// takes long and may be done on a copy meanwhile (graph(), PoseGraph::optimise(), adopt()). Throws
+  /// std::invalid_argument for features that are no rows of bits, or of another kind or camera than those before; the
+  /// state is as before then.
+  std::optional<PlaceReport> observe(const StereoFeatures& features, const CameraMotion& motion);
+
+  const PoseGraph& graph() const { return graph_; }
+  bool adopt(const PoseGraph& optimised) { return graph_.adopt(optimised); }
+
+  /// What the map says of the odometry's origin, by the last key frame.
+  Eigen::Isometry3d T_map_odom() const;
+
+  /// Places of which rows are kept, by id.
+  const std::map<int, Place>& places() const { return places_; }
+  PlaceSignature signature(int place) const;
+  std::size_t bytes() const;  ///< of all places and their words
+
+  /// Places known that look like another robot's, the best first, and whether they are the same.
+  std::vector<PlaceCandidate> find(const PlaceSignature& signature) const;
+  PlaceMatch verify(int place, const StereoFeatures& features) const;
+
+  /// Takes up the places and the graph of an earlier session, before the first pair of this one. They stay where they
+  /// are, and where the present session is among them is unknown until a place is recognised. Throws
+  /// std::invalid_argument when there are places already, or when places and graph do not belong together.
+  void restore(std::vector<Place> places, const PoseGraph& graph);
+
+ private:
+  bool isKeyframe(const StereoFeatures& features) const;
+  void addKeyframe(const StereoFeatures& features, int id);
+  void recognise(const Place& here, PlaceReport& report);
+  bool isPossible(const GraphEdge& loop) const;
+  Matrix6d drift(double length, double turn) const;
+
+  PlaceRecognitionOptions options_;
+  PlaceIndex index_;
+  PlaceVerifier verifier_;
+  LoopAgreement agreement_;
+  PoseGraph graph_;
+  std::map<int, Place> places_;
+  std::optional<int> last_;  ///< key frame of this session
+  int next_id_ = 0;
+  int segment_ = 0;
+
+  /// The way since the last key frame.
+  struct Way {
+    std::optional<Eigen::Isometry3d> T_odom_camera;  ///< of the last pair
+    Matrix6d covariance = Matrix6d::Zero();          ///< of a right perturbation of its end
+    double length = 0.0;                             ///< m
+    double turn = 0.0;                               ///< rad
+    bool known = true;
+  };
+  Way way_;
+  double travelled_ = 0.0;  ///< m
+};
+
+}  // namespace sdvo

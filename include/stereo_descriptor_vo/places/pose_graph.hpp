@@ -1,0 +1,96 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <map>
+#include <optional>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/common/se3.hpp"
+
+namespace sdvo {
+
+struct PoseGraphOptions {
+  double loop_threshold = 3.0;
+  int iterations = 50;
+
+  void describe(OptionList& list) {
+    list.add("loop_threshold", loop_threshold, {0.1, 100.0}, "",
+             "residual of a loop, in standard deviations, beyond which it counts less and less");
+    list.add("iterations", iterations, {1, 1000}, "", "largest number of steps of one optimisation");
+  }
+};
+
+/// A measured relative pose between two nodes.
+struct GraphEdge {
+  enum class Kind {
+    kOdometry,  ///< between neighbours in time
+    kLoop,      ///< of a place that was recognised
+    kBreak,     ///< between neighbours in time, but the motion is unknown
+  };
+  int from = 0, to = 0;
+  Kind kind = Kind::kOdometry;
+  Eigen::Isometry3d T_from_to = Eigen::Isometry3d::Identity();
+  Matrix6d covariance = Matrix6d::Identity();  ///< of its right perturbation, m and rad
+  double length = 0.0;                         ///< of the way between, m; zero for a loop
+  double turn = 0.0;                           ///< sum of all turns on it, rad; zero for a loop
+};
+
+/// What the edges between two nodes say of their relative pose.
+struct GraphPath {
+  bool known = false;                      ///< false where every way between them leads over a break
+  double length = 0.0;                     ///< m, of the shortest one
+  double turn = 0.0;                       ///< sum of its turns, rad
+  Matrix6d covariance = Matrix6d::Zero();  ///< of a right perturbation of the relative pose, along that one
+};
+
+/// Poses of key frames in a map, held together by odometry and by loops. A value: an optimisation may work on a copy
+/// while the original grows.
+class PoseGraph {
+ public:
+  explicit PoseGraph(const PoseGraphOptions& options);
+
+  /// The first node, which stays where it is.
+  void start(int id, const Eigen::Isometry3d& T_map_node);
+
+  /// A new node `edge.to`, placed by its edge from one that is there.
+  void extend(const GraphEdge& edge);
+
+  /// A loop between nodes that are there. Where nothing else than breaks tied its two ends, the part of the graph that
+  /// holds `edge.to` moves as a whole, so that the loop holds.
+  void close(const GraphEdge& edge);
+
+  /// Forgets a node and its edges; the node that follows stays where it is if this was the first one.
+  void remove(int id);
+
+  /// Moves all nodes but the first so that the edges agree best (Levenberg-Marquardt over SE(3), sparse Cholesky, by
+  /// Ceres). Loops that disagree with the rest count little (Cauchy's loss).
+  struct Summary {
+    bool converged = false;
+    int iterations = 0;
+    double initial_cost = 0.0, final_cost = 0.0;
+    double time = 0.0;  ///< s
+  };
+  Summary optimise();
+
+  /// Takes the poses of an optimised copy over; nodes that were added since then follow their neighbours. False, and
+  /// nothing changes, for a copy from before a part of the graph moved as a whole.
+  bool adopt(const PoseGraph& optimised);
+
+  GraphPath path(int from, int to) const;
+
+  /// Residual of an edge at the present poses, in standard deviations (the root of its chi-square of six).
+  double residual(const GraphEdge& edge) const;
+
+  const std::map<int, Eigen::Isometry3d>& nodes() const { return nodes_; }
+  const std::vector<GraphEdge>& edges() const { return edges_; }
+  int loops() const;
+
+ private:
+  PoseGraphOptions options_;
+  std::map<int, Eigen::Isometry3d> nodes_;  ///< T_map_node
+  std::vector<GraphEdge> edges_;
+  int moved_parts_ = 0;
+};
+
+}  // namespace sdvo

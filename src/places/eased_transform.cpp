@@ -1,0 +1,24 @@
+#include "stereo_descriptor_vo/places/eased_transform.hpp"
+
+#include <algorithm>
+
+namespace sdvo {
+
+void EasedTransform::moveTo(const Eigen::Isometry3d& target, double now) {
+  from_ = at(now);
+  target_ = target;
+  begin_ = now;
+}
+
+Eigen::Isometry3d EasedTransform::at(double now) const {
+  if (now >= begin_ + duration_) return target_;
+  const double passed = std::clamp((now - begin_) / duration_, 0.0, 1.0);
+  const double share = passed * passed * (3.0 - 2.0 * passed);
+  const Eigen::Quaterniond from(from_.linear()), target(target_.linear());
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.linear() = from.slerp(share, target).toRotationMatrix();
+  T.translation() = from_.translation() + share * (target_.translation() - from_.translation());
+  return T;
+}
+
+}  // namespace sdvo

@@ -1,0 +1,100 @@
+#include "stereo_descriptor_vo/places/place_index.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <random>
+#include <stdexcept>
+#include <string>
+
+namespace sdvo {
+namespace {
+
+/// The bits of a row that make its words, word after word: none twice, always the same for rows of one length.
+std::vector<int> sampleBits(int row_bits, int count) {
+  std::vector<int> bits(static_cast<std::size_t>(row_bits));
+  std::iota(bits.begin(), bits.end(), 0);
+  std::minstd_rand random;  // its numbers are the same everywhere; std::shuffle's use of them is not
+  for (int i = 0; i < count; ++i) std::swap(bits[i], bits[i + static_cast<int>(random() % (row_bits - i))]);
+  bits.resize(static_cast<std::size_t>(count));
+  return bits;
+}
+
+}  // namespace
+
+PlaceIndex::PlaceIndex(const PlaceIndexOptions& options)
+    : options_(checked(options)),
+      postings_(static_cast<std::size_t>(options_.words_per_row) << options_.bits_per_word) {}
+
+PlaceSignature PlaceIndex::signature(const StereoFeatures& features) const {
+  const int row_bits = 8 * features.descriptors.cols;
+  const int needed = options_.words_per_row * options_.bits_per_word;
+  if (features.count() > 0 && (features.element_type != ElementType::kBits || row_bits < needed))
+    throw std::invalid_argument("places are recognised by rows of at least " + std::to_string(needed) +
+                                " bits, not by " + toString(features.kind()));
+  PlaceSignature words;
+  if (features.count() == 0) return words;
+  const std::vector<int> bits = sampleBits(row_bits, needed);
+  words.reserve(static_cast<std::size_t>(features.count()) * options_.words_per_row);
+  for (int i = 0; i < features.count(); ++i) {
+    const std::uint8_t* row = features.descriptors.ptr(i);
+    auto bit = bits.begin();
+    for (int w = 0; w < options_.words_per_row; ++w) {
+      auto word = static_cast<std::uint32_t>(w);
+      for (int b = 0; b < options_.bits_per_word; ++b, ++bit) word = word << 1 | (row[*bit / 8] >> (*bit % 8) & 1u);
+      words.push_back(word);
+    }
+  }
+  std::sort(words.begin(), words.end());
+  words.erase(std::unique(words.begin(), words.end()), words.end());
+  return words;
+}
+
+void PlaceIndex::add(int place, const PlaceSignature& signature) {
+  if (!places_.emplace(place, signature).second)
+    throw std::invalid_argument("place " + std::to_string(place) + " is in the index already");
+  for (const std::uint32_t word : signature) {
+    std::vector<int>& posting = postings_.at(word);
+    posting.insert(std::upper_bound(posting.begin(), posting.end(), place), place);
+  }
+}
+
+void PlaceIndex::remove(int place) {
+  const auto entry = places_.find(place);
+  if (entry == places_.end()) return;
+  for (const std::uint32_t word : entry->second) {
+    std::vector<int>& posting = postings_[word];
+    posting.erase(std::lower_bound(posting.begin(), posting.end(), place));
+  }
+  places_.erase(entry);
+}
+
+double PlaceIndex::weight(std::uint32_t word) const {
+  const double known = static_cast<double>(places_.size()), having = static_cast<double>(postings_[word].size());
+  return std::log((1.0 + known) / (1.0 + having));
+}
+
+std::vector<PlaceCandidate> PlaceIndex::find(const PlaceSignature& signature, int most,
+                                             const std::function<bool(int place)>& admitted) const {
+  if (places_.empty()) return {};
+  const int first = places_.begin()->first, last = places_.rbegin()->first;
+  std::vector<double> weights(static_cast<std::size_t>(last - first) + 1, 0.0);
+  double all = 0.0;
+  for (const std::uint32_t word : signature) {
+    if (word >= postings_.size()) throw std::invalid_argument("a signature with words of another index");
+    const double w = weight(word);
+    all += w;
+    for (const int place : postings_[word]) weights[place - first] += w;
+  }
+  std::vector<PlaceCandidate> candidates;
+  for (const auto& [place, words] : places_)
+    if (weights[place - first] > 0.0 && admitted(place)) candidates.push_back({place, weights[place - first] / all});
+  const auto end = candidates.begin() + std::min<std::ptrdiff_t>(most, static_cast<std::ptrdiff_t>(candidates.size()));
+  std::partial_sort(candidates.begin(), end, candidates.end(), [](const PlaceCandidate& a, const PlaceCandidate& b) {
+    return a.score != b.score ? a.score > b.score : a.place < b.place;
+  });
+  candidates.erase(end, candidates.end());
+  return candidates;
+}
+
+}  // namespace sdvo

@@ -1,0 +1,222 @@
+#include "stereo_descriptor_vo/places/place_recognition.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <stdexcept>
+#include <utility>
+
+#include "stereo_descriptor_vo/common/stopwatch.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+/// Independent errors of translation and rotation, the same along all axes.
+Matrix6d isotropic(double translation, double rotation) {
+  Vector6d variances;
+  variances << Eigen::Vector3d::Constant(translation * translation), Eigen::Vector3d::Constant(rotation * rotation);
+  return variances.asDiagonal();
+}
+
+/// Of a motion of which nothing is known: wide enough to give way to anything.
+Matrix6d unknown() {
+  return isotropic(1000.0, 10.0);
+}
+
+}  // namespace
+
+PlaceRecognition::PlaceRecognition(const PlaceRecognitionOptions& options)
+    : options_(checked(options)),
+      index_(options.index),
+      verifier_(options.verifier),
+      agreement_(options.agreement),
+      graph_(options.graph) {}
+
+std::optional<PlaceReport> PlaceRecognition::observe(const StereoFeatures& features, const CameraMotion& motion) {
+  features.check();
+  if (!places_.empty() && features.count() > 0 && features.kind() != places_.begin()->second.features.kind())
+    throw std::invalid_argument("the places are described by " + toString(places_.begin()->second.features.kind()) +
+                                ", not by " + toString(features.kind()));
+  // The way since the last key frame.
+  if (way_.T_odom_camera) {
+    const Eigen::Isometry3d T_previous_current = way_.T_odom_camera->inverse() * motion.T_odom_camera;
+    const Matrix6d ad = adjoint(T_previous_current.inverse());
+    way_.covariance = ad * way_.covariance * ad.transpose() + motion.covariance;
+    if (motion.continuous) {
+      way_.length += T_previous_current.translation().norm();
+      way_.turn += Eigen::AngleAxisd(T_previous_current.linear()).angle();
+    }
+  }
+  way_.known &= motion.continuous;
+  way_.T_odom_camera = motion.T_odom_camera;
+  if (!isKeyframe(features)) return std::nullopt;
+
+  PlaceReport report;
+  report.id = next_id_;
+  Stopwatch stopwatch;
+  const StereoFeatures kept = thinOut(features, options_.max_features);
+  const PlaceSignature signature = index_.signature(kept);
+  addKeyframe(kept, next_id_++);
+  const Place& here = places_.at(report.id);
+  report.candidates = index_.find(signature, options_.candidates, [&](int id) {
+    const Place& place = places_.at(id);
+    return place.segment != here.segment ||
+           (static_cast<double>(here.features.stamp - place.features.stamp) * 1e-9 >= options_.min_age &&
+            here.travelled - place.travelled >= options_.min_travel);
+  });
+  index_.add(report.id, signature);
+  report.find_time = stopwatch.lap();
+  recognise(here, report);
+  report.verify_time = stopwatch.lap();
+  if (static_cast<int>(places_.size()) > options_.max_places) {
+    const int oldest = places_.begin()->first;
+    index_.remove(oldest);
+    graph_.remove(oldest);
+    places_.erase(oldest);
+  }
+  return report;
+}
+
+/// Whether the last pair is worth keeping: far enough from the last key frame, and with enough to be recognised by.
+bool PlaceRecognition::isKeyframe(const StereoFeatures& features) const {
+  if (features.count() < options_.verifier.min_inliers) return false;
+  if (!last_ || !way_.known) return true;
+  const Eigen::Isometry3d T_keyframe_camera = places_.at(*last_).T_odom_camera.inverse() * *way_.T_odom_camera;
+  return T_keyframe_camera.translation().norm() >= options_.keyframe_distance ||
+         Eigen::AngleAxisd(T_keyframe_camera.linear()).angle() >= options_.keyframe_angle * kPi / 180.0;
+}
+
+void PlaceRecognition::addKeyframe(const StereoFeatures& features, int id) {
+  if (!way_.known) ++segment_;
+  travelled_ += way_.length;
+  Place place;
+  place.id = id;
+  place.segment = segment_;
+  place.travelled = travelled_;
+  place.T_odom_camera = *way_.T_odom_camera;
+  place.features = features;
+
+  if (places_.empty()) {
+    graph_.start(id, place.T_odom_camera);
+  } else if (last_ && way_.known) {
+    GraphEdge edge;
+    edge.from = *last_;
+    edge.to = id;
+    edge.T_from_to = places_.at(*last_).T_odom_camera.inverse() * place.T_odom_camera;
+    edge.length = way_.length;
+    edge.turn = way_.turn;
+    edge.covariance = way_.covariance + drift(way_.length, way_.turn);
+    graph_.extend(edge);
+  } else {
+    GraphEdge edge;
+    edge.from = places_.rbegin()->first;
+    edge.to = id;
+    edge.kind = GraphEdge::Kind::kBreak;
+    edge.T_from_to = graph_.nodes().at(edge.from).inverse() * T_map_odom() * place.T_odom_camera;
+    edge.covariance = unknown();
+    graph_.extend(edge);
+  }
+  places_.emplace(id, std::move(place));
+  last_ = id;
+  way_.covariance.setZero();
+  way_.length = way_.turn = 0.0;
+  way_.known = true;
+}
+
+/// Looks at the candidates one after the other until geometry says that one is the same place; a neighbour that said
+/// so, too, makes it a loop.
+void PlaceRecognition::recognise(const Place& here, PlaceReport& report) {
+  report.reason = "nothing looks alike";
+  for (const PlaceCandidate& candidate : report.candidates) {
+    report.match = verifier_.verify(places_.at(candidate.place).features, here.features);
+    report.reason = report.match.reason;
+    if (!report.match.same) continue;
+    GraphEdge loop;
+    loop.from = candidate.place;
+    loop.to = here.id;
+    loop.kind = GraphEdge::Kind::kLoop;
+    loop.T_from_to = report.match.T_place_camera;
+    loop.covariance = report.match.covariance;
+    if (!isPossible(loop)) {
+      report.reason = "the odometry cannot have drifted that far";
+      continue;
+    }
+    report.same = candidate.place;
+    const std::vector<GraphEdge> loops = agreement_.confirm(graph_, loop);
+    for (const GraphEdge& trusted : loops) graph_.close(trusted);
+    report.loop = !loops.empty();
+    report.reason = report.loop ? "" : "no neighbour has confirmed it yet";
+    return;
+  }
+}
+
+/// Whether what a loop says of the drift is within what the odometry's errors can have made on the way between.
+bool PlaceRecognition::isPossible(const GraphEdge& loop) const {
+  constexpr double kImpossible = 22.5;  // chi-square of six, 99.9 %
+  const GraphPath path = graph_.path(loop.from, loop.to);
+  if (!path.known) return true;
+  const Matrix6d covariance = path.covariance + loop.covariance + drift(path.length, path.turn);
+  const Eigen::Isometry3d T_from_to = graph_.nodes().at(loop.from).inverse() * graph_.nodes().at(loop.to);
+  const Vector6d correction = logSE3(T_from_to.inverse() * loop.T_from_to);
+  return correction.dot(covariance.ldlt().solve(correction)) <= kImpossible;
+}
+
+/// What is wrong with a rig adds up along the way instead of averaging out; its covariance does not know.
+Matrix6d PlaceRecognition::drift(double length, double turn) const {
+  const double rotation = options_.drift_rotation * kPi / 180.0 * length + options_.drift_turn * turn;
+  return isotropic(options_.drift_translation * length + 0.5 * rotation * length, rotation);
+}
+
+Eigen::Isometry3d PlaceRecognition::T_map_odom() const {
+  if (!last_) return Eigen::Isometry3d::Identity();
+  return orthonormalised(graph_.nodes().at(*last_) * places_.at(*last_).T_odom_camera.inverse());
+}
+
+PlaceSignature PlaceRecognition::signature(int place) const {
+  return index_.signature(places_.at(place).features);
+}
+
+std::size_t PlaceRecognition::bytes() const {
+  std::size_t bytes = 0;
+  for (const auto& [id, place] : places_)
+    bytes += place.bytes() + 2 * sizeof(std::uint32_t) * static_cast<std::size_t>(options_.index.words_per_row) *
+                                 static_cast<std::size_t>(place.features.count());
+  return bytes;
+}
+
+std::vector<PlaceCandidate> PlaceRecognition::find(const PlaceSignature& signature) const {
+  return index_.find(signature, options_.candidates, [](int) { return true; });
+}
+
+PlaceMatch PlaceRecognition::verify(int place, const StereoFeatures& features) const {
+  return verifier_.verify(places_.at(place).features, thinOut(features, options_.max_features));
+}
+
+void PlaceRecognition::restore(std::vector<Place> places, const PoseGraph& graph) {
+  if (!places_.empty()) throw std::invalid_argument("places can only be taken up before there are any");
+  if (places.empty()) throw std::invalid_argument("there are no places to take up");
+  PlaceIndex index(options_.index);
+  std::map<int, Place> restored;
+  for (Place& place : places) {
+    place.features.check();
+    if (graph.nodes().count(place.id) == 0)
+      throw std::invalid_argument("place " + std::to_string(place.id) + " is not in the graph");
+    if (!restored.empty() && place.features.kind() != restored.begin()->second.features.kind())
+      throw std::invalid_argument("places are described by both " + toString(place.features.kind()) + " and " +
+                                  toString(restored.begin()->second.features.kind()));
+    index.add(place.id, index.signature(place.features));
+    segment_ = std::max(segment_, place.segment);
+    const int id = place.id;
+    restored.emplace(id, std::move(place));
+  }
+  if (restored.size() != graph.nodes().size()) throw std::invalid_argument("the graph has nodes without a place");
+  places_ = std::move(restored);
+  index_ = std::move(index);
+  graph_ = graph;
+  next_id_ = places_.rbegin()->first + 1;
+  way_.known = false;
+}
+
+}  // namespace sdvo

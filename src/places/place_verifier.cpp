@@ -1,0 +1,67 @@
+#include "stereo_descriptor_vo/places/place_verifier.hpp"
+
+#include <vector>
+
+#include "stereo_descriptor_vo/odometry/correspondences.hpp"
+#include "stereo_descriptor_vo/odometry/described_points.hpp"
+#include "stereo_descriptor_vo/odometry/motion_search.hpp"
+
+namespace sdvo {
+namespace {
+
+FeatureMatcherOptions matcherOptions(const PlaceVerifierOptions& options) {
+  FeatureMatcherOptions matcher;
+  matcher.gating = false;  // nothing is known of where the place would be seen from
+  matcher.max_distance = options.max_distance;
+  return matcher;
+}
+
+MotionEstimatorOptions estimatorOptions(const PlaceVerifierOptions& options) {
+  MotionEstimatorOptions estimator;
+  estimator.inlier_threshold = options.inlier_threshold;
+  // Enough for the smallest share of inliers that is accepted; what is another place takes all of them.
+  estimator.max_iterations = 150;
+  return estimator;
+}
+
+}  // namespace
+
+PlaceVerifier::PlaceVerifier(const PlaceVerifierOptions& options)
+    : options_(checked(options)), matcher_(matcherOptions(options)), estimator_(estimatorOptions(options)) {}
+
+PlaceMatch PlaceVerifier::verify(const StereoFeatures& place, const StereoFeatures& current) const {
+  const DescribedPoints points(place);
+  const std::vector<FeatureMatch> matches = matcher_.match(points, current, std::nullopt);
+  const std::vector<Correspondence> correspondences = correspond(points, current, matches, RigCalibration());
+  PlaceMatch match;
+  match.matches = static_cast<int>(matches.size());
+  if (match.matches < options_.min_inliers) {
+    match.reason = "only " + std::to_string(match.matches) + " matches";
+    return match;
+  }
+  const MotionEstimate motion = estimator_.estimate(current.camera, correspondences);
+  if (!motion.success) {
+    match.reason = motion.reason;
+    return match;
+  }
+  std::vector<int> rows;
+  for (const int i : motion.inliers) rows.push_back(matches[i].current);
+  match.inliers = static_cast<int>(rows.size());
+  match.coverage = coverage(current, rows);
+  match.rms = motion.rms;
+  // exp(xi) T_camera_place inverted is T_place_camera exp(-xi): the covariance is the same.
+  match.T_place_camera = motion.T_current_reference.inverse();
+  match.covariance = motion.covariance;
+
+  const std::string inliers = std::to_string(match.inliers) + " of " + std::to_string(match.matches) + " matches";
+  if (match.inliers < options_.min_inliers || match.inliers < options_.min_inlier_ratio * match.matches)
+    match.reason = "only " + inliers + " agree";
+  else if (match.coverage < options_.min_coverage)
+    match.reason = inliers + " agree, but in a corner of the image alone";
+  else if (match.rms > options_.max_rms)
+    match.reason = inliers + " agree, but not well";
+  match.same = match.reason.empty();
+  return match;
+}
+
+}  // namespace sdvo

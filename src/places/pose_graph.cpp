@@ -1,0 +1,240 @@
+#include "stereo_descriptor_vo/places/pose_graph.hpp"
+
+#include <ceres/ceres.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <queue>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <utility>
+
+namespace sdvo {
+namespace {
+
+/// Where two nodes are, as their edge does not want it: residual of its right perturbation in standard deviations.
+class EdgeResidual {
+ public:
+  explicit EdgeResidual(const GraphEdge& edge)
+      : q_(edge.T_from_to.linear()),
+        t_(edge.T_from_to.translation()),
+        // L L^T = covariance: L^-1 makes unit variances.
+        whitening_(edge.covariance.llt().matrixL().solve(Matrix6d::Identity())) {}
+
+  template <class T>
+  bool operator()(const T* q_from, const T* t_from, const T* q_to, const T* t_to, T* residual) const {
+    using Quaternion = Eigen::Quaternion<T>;
+    using Vector3 = Eigen::Matrix<T, 3, 1>;
+    const Eigen::Map<const Quaternion> q_a(q_from), q_b(q_to);
+    const Eigen::Map<const Vector3> t_a(t_from), t_b(t_to);
+    const Quaternion to_edge = q_.cast<T>().conjugate();
+    Eigen::Matrix<T, 6, 1> error;
+    error.template head<3>() = to_edge * (q_a.conjugate() * (t_b - t_a) - t_.cast<T>());
+    const Quaternion turn = to_edge * (q_a.conjugate() * q_b);
+    error.template tail<3>() = (turn.w() < T(0) ? T(-2) : T(2)) * turn.vec();
+    Eigen::Map<Eigen::Matrix<T, 6, 1>> whitened(residual);
+    whitened = whitening_.cast<T>() * error;
+    return true;
+  }
+
+ private:
+  Eigen::Quaterniond q_;
+  Eigen::Vector3d t_;
+  Matrix6d whitening_;
+};
+
+struct NodePose {
+  Eigen::Quaterniond q;
+  Eigen::Vector3d t;
+};
+
+void keepUnitLength(ceres::Problem& problem, double* quaternion) {
+#if CERES_VERSION_MAJOR * 100 + CERES_VERSION_MINOR >= 201
+  problem.SetManifold(quaternion, new ceres::EigenQuaternionManifold);
+#else
+  problem.SetParameterization(quaternion, new ceres::EigenQuaternionParameterization);
+#endif
+}
+
+/// The nodes that edges other than breaks tie to one.
+std::set<int> part(const std::vector<GraphEdge>& edges, int id) {
+  std::map<int, std::vector<int>> neighbours;
+  for (const GraphEdge& edge : edges) {
+    if (edge.kind == GraphEdge::Kind::kBreak) continue;
+    neighbours[edge.from].push_back(edge.to);
+    neighbours[edge.to].push_back(edge.from);
+  }
+  std::set<int> found{id};
+  std::vector<int> open{id};
+  while (!open.empty()) {
+    const int next = open.back();
+    open.pop_back();
+    for (const int neighbour : neighbours[next])
+      if (found.insert(neighbour).second) open.push_back(neighbour);
+  }
+  return found;
+}
+
+/// Covariance of a right perturbation of T^-1 from that of T.
+Matrix6d inverted(const Eigen::Isometry3d& T, const Matrix6d& covariance) {
+  const Matrix6d ad = adjoint(T);
+  return ad * covariance * ad.transpose();
+}
+
+}  // namespace
+
+PoseGraph::PoseGraph(const PoseGraphOptions& options) : options_(checked(options)) {}
+
+void PoseGraph::start(int id, const Eigen::Isometry3d& T_map_node) {
+  nodes_.emplace(id, T_map_node);
+}
+
+void PoseGraph::extend(const GraphEdge& edge) {
+  nodes_[edge.to] = orthonormalised(nodes_.at(edge.from) * edge.T_from_to);
+  edges_.push_back(edge);
+}
+
+void PoseGraph::close(const GraphEdge& edge) {
+  const Eigen::Isometry3d T_map_from = nodes_.at(edge.from), T_map_to = nodes_.at(edge.to);
+  std::set<int> moved = part(edges_, edge.to);
+  if (moved.count(edge.from) == 0) {
+    Eigen::Isometry3d T_moved = T_map_from * edge.T_from_to * T_map_to.inverse();
+    if (moved.count(nodes_.begin()->first) > 0) {
+      moved = part(edges_, edge.from);
+      T_moved = T_moved.inverse();
+    }
+    for (const int id : moved) nodes_[id] = orthonormalised(T_moved * nodes_[id]);
+    ++moved_parts_;
+  }
+  edges_.push_back(edge);
+}
+
+void PoseGraph::remove(int id) {
+  nodes_.erase(id);
+  edges_.erase(
+      std::remove_if(edges_.begin(), edges_.end(), [id](const GraphEdge& e) { return e.from == id || e.to == id; }),
+      edges_.end());
+}
+
+PoseGraph::Summary PoseGraph::optimise() {
+  Summary summary;
+  if (loops() == 0) {
+    summary.converged = true;
+    return summary;
+  }
+  std::map<int, NodePose> poses;
+  for (const auto& [id, T] : nodes_) poses[id] = {Eigen::Quaterniond(T.linear()), T.translation()};
+
+  ceres::Problem problem;
+  for (auto& [id, pose] : poses) {
+    problem.AddParameterBlock(pose.q.coeffs().data(), 4);
+    problem.AddParameterBlock(pose.t.data(), 3);
+    keepUnitLength(problem, pose.q.coeffs().data());
+  }
+  NodePose& first = poses.begin()->second;
+  problem.SetParameterBlockConstant(first.q.coeffs().data());
+  problem.SetParameterBlockConstant(first.t.data());
+  for (const GraphEdge& edge : edges_) {
+    NodePose &from = poses.at(edge.from), &to = poses.at(edge.to);
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<EdgeResidual, 6, 4, 3, 4, 3>(new EdgeResidual(edge)),
+        edge.kind == GraphEdge::Kind::kLoop ? new ceres::CauchyLoss(options_.loop_threshold) : nullptr,
+        from.q.coeffs().data(), from.t.data(), to.q.coeffs().data(), to.t.data());
+  }
+  ceres::Solver::Options options;
+  options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
+  options.max_num_iterations = options_.iterations;
+  options.logging_type = ceres::SILENT;
+  ceres::Solver::Summary solved;
+  ceres::Solve(options, &problem, &solved);
+
+  summary.converged = solved.termination_type == ceres::CONVERGENCE;
+  summary.iterations = static_cast<int>(solved.iterations.size());
+  summary.initial_cost = solved.initial_cost;
+  summary.final_cost = solved.final_cost;
+  summary.time = solved.total_time_in_seconds;
+  if (!solved.IsSolutionUsable()) return summary;
+  for (auto& [id, T] : nodes_) {
+    const NodePose& pose = poses.at(id);
+    T.linear() = pose.q.normalized().toRotationMatrix();
+    T.translation() = pose.t;
+  }
+  return summary;
+}
+
+bool PoseGraph::adopt(const PoseGraph& optimised) {
+  if (optimised.moved_parts_ != moved_parts_) return false;
+  const std::map<int, Eigen::Isometry3d> before = nodes_;
+  for (auto& [id, T] : nodes_) {
+    const auto better = optimised.nodes_.find(id);
+    if (better != optimised.nodes_.end()) T = better->second;
+  }
+  for (const GraphEdge& edge : edges_) {
+    if (edge.kind == GraphEdge::Kind::kLoop || optimised.nodes_.count(edge.to) > 0) continue;
+    nodes_.at(edge.to) = nodes_.at(edge.from) * before.at(edge.from).inverse() * before.at(edge.to);
+  }
+  return true;
+}
+
+GraphPath PoseGraph::path(int from, int to) const {
+  std::map<int, std::vector<const GraphEdge*>> edges_of;
+  for (const GraphEdge& edge : edges_) {
+    if (edge.kind == GraphEdge::Kind::kBreak) continue;
+    edges_of[edge.from].push_back(&edge);
+    edges_of[edge.to].push_back(&edge);
+  }
+  // Dijkstra's algorithm.
+  struct Reached {
+    double length = std::numeric_limits<double>::infinity();
+    const GraphEdge* by = nullptr;
+  };
+  std::map<int, Reached> reached;
+  using Open = std::pair<double, int>;
+  std::priority_queue<Open, std::vector<Open>, std::greater<Open>> open;
+  reached[from].length = 0.0;
+  open.push({0.0, from});
+  while (!open.empty() && open.top().second != to) {
+    const auto [length, id] = open.top();
+    open.pop();
+    if (length > reached[id].length) continue;
+    for (const GraphEdge* edge : edges_of[id]) {
+      Reached& next = reached[edge->from == id ? edge->to : edge->from];
+      if (length + edge->length >= next.length) continue;
+      next = {length + edge->length, edge};
+      open.push({next.length, edge->from == id ? edge->to : edge->from});
+    }
+  }
+  GraphPath path;
+  path.known = reached.count(to) > 0;
+  if (!path.known) return path;
+  path.length = reached[to].length;
+  // Back from the end: what is known of the way from a node on to the end.
+  Eigen::Isometry3d T_node_end = Eigen::Isometry3d::Identity();
+  for (int id = to; id != from;) {
+    const GraphEdge& edge = *reached[id].by;
+    const bool forward = edge.to == id;
+    const Matrix6d step = forward ? edge.covariance : inverted(edge.T_from_to, edge.covariance);
+    const Matrix6d ad = adjoint(T_node_end.inverse());
+    path.covariance += ad * step * ad.transpose();
+    path.turn += edge.turn;
+    T_node_end = (forward ? edge.T_from_to : edge.T_from_to.inverse()) * T_node_end;
+    id = forward ? edge.from : edge.to;
+  }
+  return path;
+}
+
+double PoseGraph::residual(const GraphEdge& edge) const {
+  const Vector6d error = logSE3(edge.T_from_to.inverse() * nodes_.at(edge.from).inverse() * nodes_.at(edge.to));
+  return std::sqrt(error.dot(edge.covariance.ldlt().solve(error)));
+}
+
+int PoseGraph::loops() const {
+  return static_cast<int>(
+      std::count_if(edges_.begin(), edges_.end(), [](const GraphEdge& e) { return e.kind == GraphEdge::Kind::kLoop; }));
+}
+
+}  // namespace sdvo

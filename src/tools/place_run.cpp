@@ -1,0 +1,128 @@
+#include "place_run.hpp"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <fstream>
+#include <stdexcept>
+
+#include "stereo_descriptor_vo/common/stopwatch.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr double kDegree = 180.0 / 3.14159265358979323846;
+
+double angle(const Eigen::Isometry3d& T) {
+  return Eigen::AngleAxisd(T.linear()).angle() * kDegree;
+}
+
+}  // namespace
+
+void PlaceRun::process(const StereoFeatures& features, const OdometryResult& odometry) {
+  const int number = static_cast<int>(pairs_.size());
+  stamps_.push_back(odometry.stamp);
+  pairs_.push_back({static_cast<int>(keyframes_.size()) - 1,
+                    odometry.has_pose || pairs_.empty() ? odometry.T_origin_camera : pairs_.back().T_odom_camera});
+  if (!odometry.has_pose) return;
+  Stopwatch stopwatch;
+  const CameraMotion motion{odometry.T_origin_camera, odometry.motion_covariance, odometry.has_motion || !had_pose_};
+  had_pose_ = true;
+  const auto report = recognition_.observe(features, motion);
+  time_ += 1e3 * stopwatch.lap();
+  if (!report) return;
+  if (report->loop) {
+    PoseGraph graph = recognition_.graph();
+    graph.optimise();
+    recognition_.adopt(graph);
+    const double took = 1e3 * stopwatch.lap();
+    time_ += took;
+    longest_optimisation_ = std::max(longest_optimisation_, took);
+  }
+  pairs_.back().keyframe = static_cast<int>(keyframes_.size());
+  keyframes_.push_back({number, *report});
+}
+
+Trajectory PlaceRun::poses() const {
+  Trajectory poses;
+  for (const auto& [keyframe, T_odom_camera] : pairs_) {
+    Eigen::Isometry3d T_map_odom = Eigen::Isometry3d::Identity();
+    if (keyframe >= 0) {
+      const Place& place = recognition_.places().at(keyframes_[keyframe].report.id);
+      T_map_odom = recognition_.graph().nodes().at(place.id) * place.T_odom_camera.inverse();
+    }
+    poses.push_back(orthonormalised(T_map_odom * T_odom_camera));
+  }
+  return poses;
+}
+
+bool PlaceRun::isRevisit(const Trajectory& truth, const Keyframe& keyframe) const {
+  constexpr double kNear = 5.0, kSameDirection = 30.0;  // m, deg
+  const Place& here = recognition_.places().at(keyframe.report.id);
+  return std::any_of(keyframes_.begin(), keyframes_.end(), [&](const Keyframe& other) {
+    const Place& place = recognition_.places().at(other.report.id);
+    if (static_cast<double>(here.features.stamp - place.features.stamp) * 1e-9 < options_.min_age ||
+        here.travelled - place.travelled < options_.min_travel)
+      return false;
+    const Eigen::Isometry3d T = truth[other.pair].inverse() * truth[keyframe.pair];
+    return T.translation().norm() <= kNear && angle(T) <= kSameDirection;
+  });
+}
+
+PlaceErrors PlaceRun::errors(const Trajectory& truth) const {
+  constexpr double kWrong = 1.0, kWrongAngle = 5.0;  // m, deg
+  if (truth.size() < pairs_.size()) throw std::invalid_argument("fewer true poses than pairs");
+  PlaceErrors errors;
+  std::map<int, int> pair_of;
+  std::map<int, bool> has_loop;
+  for (const Keyframe& keyframe : keyframes_) pair_of[keyframe.report.id] = keyframe.pair;
+  for (const GraphEdge& edge : recognition_.graph().edges()) {
+    if (edge.kind != GraphEdge::Kind::kLoop) continue;
+    has_loop[edge.to] = true;
+    const Eigen::Isometry3d T_true = truth[pair_of.at(edge.from)].inverse() * truth[pair_of.at(edge.to)];
+    const Eigen::Isometry3d error = T_true.inverse() * edge.T_from_to;
+    ++errors.loops;
+    errors.false_loops += error.translation().norm() > kWrong || angle(error) > kWrongAngle;
+    errors.worst_translation = std::max(errors.worst_translation, error.translation().norm());
+    errors.worst_rotation = std::max(errors.worst_rotation, angle(error));
+  }
+  for (const Keyframe& keyframe : keyframes_) {
+    if (!isRevisit(truth, keyframe)) continue;
+    ++errors.revisits;
+    errors.recognised += has_loop[keyframe.report.id];
+  }
+  Trajectory before;
+  for (const Pair& pair : pairs_) before.push_back(pair.T_odom_camera);
+  errors.ate_before = evaluateTrajectory(truth, before).ate_aligned_m;
+  errors.ate_after = evaluateTrajectory(truth, poses()).ate_aligned_m;
+  return errors;
+}
+
+double PlaceRun::keyframeTime(double quantile) const {
+  if (keyframes_.empty()) return 0.0;
+  std::vector<double> times;
+  for (const Keyframe& keyframe : keyframes_)
+    times.push_back(1e3 * (keyframe.report.find_time + keyframe.report.verify_time));
+  std::sort(times.begin(), times.end());
+  return times[static_cast<std::size_t>(quantile * static_cast<double>(times.size() - 1) + 0.5)];
+}
+
+double PlaceRun::meanTime() const {
+  return pairs_.empty() ? 0.0 : time_ / static_cast<double>(pairs_.size());
+}
+
+void PlaceRun::writeKeyframes(const std::string& path) const {
+  std::ofstream file(path);
+  file << "id,pair,stamp_ns,features,best,score,same,matches,inliers,coverage,rms_px,loop,find_ms,verify_ms,reason\n";
+  for (const auto& [pair, report] : keyframes_) {
+    const bool any = !report.candidates.empty();
+    file << report.id << "," << pair << "," << stamps_[pair] << ","
+         << recognition_.places().at(report.id).features.count() << "," << (any ? report.candidates.front().place : -1)
+         << "," << (any ? report.candidates.front().score : 0.0) << "," << report.same.value_or(-1) << ","
+         << report.match.matches << "," << report.match.inliers << "," << report.match.coverage << ","
+         << report.match.rms << "," << report.loop << "," << 1e3 * report.find_time << "," << 1e3 * report.verify_time
+         << "," << report.reason << "\n";
+  }
+  if (!file.flush()) throw std::runtime_error("cannot write " + path);
+}
+
+}  // namespace sdvo

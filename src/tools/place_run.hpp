@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/data/trajectory.hpp"
+#include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
+#include "stereo_descriptor_vo/places/place_recognition.hpp"
+
+namespace sdvo {
+
+/// How well places were recognised, by the true poses.
+struct PlaceErrors {
+  int revisits = 0;     ///< key frames where the camera had been before: within 5 m and 30 degrees
+  int recognised = 0;   ///< of these, those that a loop was accepted for
+  int loops = 0;        ///< accepted
+  int false_loops = 0;  ///< of these, those wrong by more than 1 m or 5 degrees
+  double worst_translation = 0.0, worst_rotation = 0.0;  ///< of any accepted loop, m and deg
+  double ate_before = 0.0, ate_after = 0.0;              ///< m, rmse of all pairs after the best rigid alignment
+};
+
+/// Places along an odometry that was run off line: each loop is followed by an optimisation of the graph at once.
+class PlaceRun {
+ public:
+  explicit PlaceRun(const PlaceRecognitionOptions& options) : options_(options), recognition_(options) {}
+
+  void process(const StereoFeatures& features, const OdometryResult& odometry);
+
+  const PlaceRecognition& recognition() const { return recognition_; }
+
+  /// Poses of all pairs in the map as it is in the end: each follows the last key frame before it.
+  Trajectory poses() const;
+
+  PlaceErrors errors(const Trajectory& truth) const;
+
+  /// Quantile of the time that a key frame took, without the optimisation, and of the longest optimisation, ms.
+  double keyframeTime(double quantile) const;
+  double meanTime() const;  ///< of a pair, all included
+  double longestOptimisation() const { return longest_optimisation_; }
+
+  /// A CSV with a line for each key frame.
+  void writeKeyframes(const std::string& path) const;
+
+ private:
+  struct Keyframe {
+    int pair;
+    PlaceReport report;
+  };
+  struct Pair {
+    int keyframe;  ///< the last one, by its place in `keyframes_`; -1 before the first
+    Eigen::Isometry3d T_odom_camera;
+  };
+  bool isRevisit(const Trajectory& truth, const Keyframe& keyframe) const;
+
+  PlaceRecognitionOptions options_;
+  PlaceRecognition recognition_;
+  std::vector<Keyframe> keyframes_;
+  std::vector<Pair> pairs_;
+  std::vector<std::int64_t> stamps_;
+  double time_ = 0.0, longest_optimisation_ = 0.0;  ///< ms
+  bool had_pose_ = false;
+};
+
+}  // namespace sdvo
