@@ -22,9 +22,7 @@ std::vector<int> sampleBits(int row_bits, int count) {
 
 }  // namespace
 
-PlaceIndex::PlaceIndex(const PlaceIndexOptions& options)
-    : options_(checked(options)),
-      postings_(static_cast<std::size_t>(options_.words_per_row) << options_.bits_per_word) {}
+PlaceIndex::PlaceIndex(const PlaceIndexOptions& options) : options_(checked(options)) {}
 
 PlaceSignature PlaceIndex::signature(const StereoFeatures& features) const {
   const int row_bits = 8 * features.descriptors.cols;
@@ -54,7 +52,7 @@ void PlaceIndex::add(int place, const PlaceSignature& signature) {
   if (!places_.emplace(place, signature).second)
     throw std::invalid_argument("place " + std::to_string(place) + " is in the index already");
   for (const std::uint32_t word : signature) {
-    std::vector<int>& posting = postings_.at(word);
+    std::vector<int>& posting = postings_[word];
     posting.insert(std::upper_bound(posting.begin(), posting.end(), place), place);
   }
 }
@@ -65,13 +63,14 @@ void PlaceIndex::remove(int place) {
   for (const std::uint32_t word : entry->second) {
     std::vector<int>& posting = postings_[word];
     posting.erase(std::lower_bound(posting.begin(), posting.end(), place));
+    if (posting.empty()) postings_.erase(word);
   }
   places_.erase(entry);
 }
 
-double PlaceIndex::weight(std::uint32_t word) const {
-  const double known = static_cast<double>(places_.size()), having = static_cast<double>(postings_[word].size());
-  return std::log((1.0 + known) / (1.0 + having));
+/// Of a word that so many places have.
+double PlaceIndex::weight(std::size_t having) const {
+  return std::log((1.0 + static_cast<double>(places_.size())) / (1.0 + static_cast<double>(having)));
 }
 
 std::vector<PlaceCandidate> PlaceIndex::find(const PlaceSignature& signature, int most,
@@ -81,10 +80,11 @@ std::vector<PlaceCandidate> PlaceIndex::find(const PlaceSignature& signature, in
   std::vector<double> weights(static_cast<std::size_t>(last - first) + 1, 0.0);
   double all = 0.0;
   for (const std::uint32_t word : signature) {
-    if (word >= postings_.size()) throw std::invalid_argument("a signature with words of another index");
-    const double w = weight(word);
+    const auto posting = postings_.find(word);
+    const double w = weight(posting == postings_.end() ? 0 : posting->second.size());
     all += w;
-    for (const int place : postings_[word]) weights[place - first] += w;
+    if (posting == postings_.end()) continue;
+    for (const int place : posting->second) weights[place - first] += w;
   }
   std::vector<PlaceCandidate> candidates;
   for (const auto& [place, words] : places_)

@@ -89,6 +89,18 @@ Matrix6d inverted(const Eigen::Isometry3d& T, const Matrix6d& covariance) {
 
 PoseGraph::PoseGraph(const PoseGraphOptions& options) : options_(checked(options)) {}
 
+PoseGraph::PoseGraph(const PoseGraphOptions& options, std::map<int, Eigen::Isometry3d> nodes,
+                     std::vector<GraphEdge> edges)
+    : options_(checked(options)), nodes_(std::move(nodes)), edges_(std::move(edges)) {
+  for (const GraphEdge& edge : edges_) {
+    const std::string name = "edge " + std::to_string(edge.from) + " - " + std::to_string(edge.to);
+    if (nodes_.count(edge.from) == 0 || nodes_.count(edge.to) == 0)
+      throw std::invalid_argument(name + " has an end that is no node");
+    if (!edge.covariance.allFinite() || edge.covariance.llt().info() != Eigen::Success)
+      throw std::invalid_argument(name + " has no positive definite covariance");
+  }
+}
+
 void PoseGraph::start(int id, const Eigen::Isometry3d& T_map_node) {
   nodes_.emplace(id, T_map_node);
 }

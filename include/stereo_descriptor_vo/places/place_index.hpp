@@ -1,8 +1,10 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <unordered_map>
 #include <vector>
 
 #include "stereo_descriptor_vo/common/options.hpp"
@@ -52,11 +54,11 @@ class PlaceIndex {
   int count() const { return static_cast<int>(places_.size()); }
 
  private:
-  double weight(std::uint32_t word) const;
+  double weight(std::size_t having) const;
 
   PlaceIndexOptions options_;
   std::map<int, PlaceSignature> places_;
-  std::vector<std::vector<int>> postings_;  ///< for each word, the places that have it, ascending
+  std::unordered_map<std::uint32_t, std::vector<int>> postings_;  ///< for each word, the places that have it, ascending
 };
 
 }  // namespace sdvo

@@ -50,6 +50,9 @@ class PoseGraph {
  public:
   explicit PoseGraph(const PoseGraphOptions& options);
 
+  /// A graph as it was before. Throws std::invalid_argument where an edge names no node, or its covariance is none.
+  PoseGraph(const PoseGraphOptions& options, std::map<int, Eigen::Isometry3d> nodes, std::vector<GraphEdge> edges);
+
   /// The first node, which stays where it is.
   void start(int id, const Eigen::Isometry3d& T_map_node);
 
