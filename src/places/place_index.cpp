@@ -70,7 +70,7 @@ void PlaceIndex::remove(int place) {
 
 /// Of a word that so many places have.
 double PlaceIndex::weight(std::size_t having) const {
-  return std::log((1.0 + static_cast<double>(places_.size())) / (1.0 + static_cast<double>(having)));
+  return std::log1p(static_cast<double>(places_.size()) / static_cast<double>(std::max<std::size_t>(having, 1)));
 }
 
 std::vector<PlaceCandidate> PlaceIndex::find(const PlaceSignature& signature, int most,

@@ -49,9 +49,10 @@ PlaceMatch PlaceVerifier::verify(const StereoFeatures& place, const StereoFeatur
   match.inliers = static_cast<int>(rows.size());
   match.coverage = coverage(current, rows);
   match.rms = motion.rms;
-  // exp(xi) T_camera_place inverted is T_place_camera exp(-xi): the covariance is the same.
+  // exp(xi) T_camera_place inverted is T_place_camera exp(-xi): the covariance is the same, but for the noise of the
+  // place's own view, which the motion's does not count.
   match.T_place_camera = motion.T_current_reference.inverse();
-  match.covariance = motion.covariance;
+  match.covariance = 2.0 * motion.covariance;
 
   const std::string inliers = std::to_string(match.inliers) + " of " + std::to_string(match.matches) + " matches";
   if (match.inliers < options_.min_inliers || match.inliers < options_.min_inlier_ratio * match.matches)

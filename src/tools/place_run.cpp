@@ -2,7 +2,9 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <ctime>
 #include <fstream>
+#include <map>
 #include <stdexcept>
 
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
@@ -24,20 +26,19 @@ void PlaceRun::process(const StereoFeatures& features, const OdometryResult& odo
   pairs_.push_back({static_cast<int>(keyframes_.size()) - 1,
                     odometry.has_pose || pairs_.empty() ? odometry.T_origin_camera : pairs_.back().T_odom_camera});
   if (!odometry.has_pose) return;
-  Stopwatch stopwatch;
+  const std::clock_t cpu_before = std::clock();
   const CameraMotion motion{odometry.T_origin_camera, odometry.motion_covariance, odometry.has_motion || !had_pose_};
   had_pose_ = true;
   const auto report = recognition_.observe(features, motion);
-  time_ += 1e3 * stopwatch.lap();
-  if (!report) return;
-  if (report->loop) {
+  if (report && report->loop) {
+    Stopwatch stopwatch;
     PoseGraph graph = recognition_.graph();
     graph.optimise();
     recognition_.adopt(graph);
-    const double took = 1e3 * stopwatch.lap();
-    time_ += took;
-    longest_optimisation_ = std::max(longest_optimisation_, took);
+    longest_optimisation_ = std::max(longest_optimisation_, 1e3 * stopwatch.lap());
   }
+  cpu_time_ += 1e3 * static_cast<double>(std::clock() - cpu_before) / CLOCKS_PER_SEC;
+  if (!report) return;
   pairs_.back().keyframe = static_cast<int>(keyframes_.size());
   keyframes_.push_back({number, *report});
 }
@@ -106,8 +107,8 @@ double PlaceRun::keyframeTime(double quantile) const {
   return times[static_cast<std::size_t>(quantile * static_cast<double>(times.size() - 1) + 0.5)];
 }
 
-double PlaceRun::meanTime() const {
-  return pairs_.empty() ? 0.0 : time_ / static_cast<double>(pairs_.size());
+double PlaceRun::cpuTime() const {
+  return pairs_.empty() ? 0.0 : cpu_time_ / static_cast<double>(pairs_.size());
 }
 
 void PlaceRun::writeKeyframes(const std::string& path) const {

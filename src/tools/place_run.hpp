@@ -34,10 +34,10 @@ class PlaceRun {
 
   PlaceErrors errors(const Trajectory& truth) const;
 
-  /// Quantile of the time that a key frame took, without the optimisation, and of the longest optimisation, ms.
+  /// Quantile of the time that a key frame took, without the optimisation, ms.
   double keyframeTime(double quantile) const;
-  double meanTime() const;  ///< of a pair, all included
-  double longestOptimisation() const { return longest_optimisation_; }
+  double longestOptimisation() const { return longest_optimisation_; }  ///< ms
+  double cpuTime() const;                                               ///< ms a pair, mean, all included
 
   /// A CSV with a line for each key frame.
   void writeKeyframes(const std::string& path) const;
@@ -58,7 +58,7 @@ class PlaceRun {
   std::vector<Keyframe> keyframes_;
   std::vector<Pair> pairs_;
   std::vector<std::int64_t> stamps_;
-  double time_ = 0.0, longest_optimisation_ = 0.0;  ///< ms
+  double cpu_time_ = 0.0, longest_optimisation_ = 0.0;  ///< ms
   bool had_pose_ = false;
 };
 

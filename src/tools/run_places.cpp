@@ -58,7 +58,7 @@ int runPlaces(const Arguments& arguments) {
             << odometry.distance() / kept * 1e6 / bytes << " km per GB, " << recognition.graph().loops() << " loops\n"
             << std::setprecision(2) << "time per key frame: median " << places.keyframeTime(0.5) << " ms, p95 "
             << places.keyframeTime(0.95) << " ms; longest optimisation " << places.longestOptimisation()
-            << " ms; all per pair " << places.meanTime() << " ms\n";
+            << " ms; CPU per pair, all included, " << places.cpuTime() << " ms\n";
   if (!arguments.truth.empty()) printErrors(places.errors(sdvo::readKittiPoses(arguments.truth)));
   return 0;
 }

@@ -1,0 +1,226 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <utility>
+#include <vector>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/places/place_recognition.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+/// The way is a circle, m, with a pair and a key frame after each step.
+constexpr int kAround = 189, kStep = 3;
+constexpr std::int64_t kPeriod = 300'000'000;  // ns
+
+Eigen::Isometry3d onCircle(double metres) {
+  const double radius = kAround / (2.0 * kPi), angle = metres / radius;
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.linear() = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  T.translation() = radius * Eigen::Vector3d(1.0 - std::cos(angle), 0.0, std::sin(angle));
+  return T;
+}
+
+const synthetic::World& world() {
+  static const synthetic::World points = synthetic::randomWorld(1, 12000, {-40.0, -3.0, -70.0}, {100.0, 3.0, 70.0}, 64);
+  return points;
+}
+
+StereoFeatures see(const Eigen::Isometry3d& T_world_camera, std::int64_t stamp) {
+  synthetic::Sighting sighting;
+  sighting.noise = 0.3;
+  sighting.flipped = 0.08;
+  sighting.strangers = 50;
+  sighting.max_depth = 25.0;
+  sighting.seed = static_cast<unsigned>(stamp / kPeriod) + 1;
+  return synthetic::observe(world(), synthetic::camera(), T_world_camera.inverse(), stamp, sighting);
+}
+
+/// Drives along the circle at 10 m/s; the odometry turns too far by so many radians a metre.
+struct Drive {
+  explicit Drive(double turn_per_metre = 0.0, PlaceRecognitionOptions options = fewAndFast())
+      : recognition(options), drift(turn_per_metre) {}
+
+  static PlaceRecognitionOptions fewAndFast() {
+    PlaceRecognitionOptions options;
+    options.keyframe_distance = 2.5;
+    options.min_age = 5.0;
+    options.max_features = 300;
+    return options;
+  }
+
+  /// Reports of the key frames on the way from one metre to another one.
+  std::vector<PlaceReport> go(int from, int to, bool continuous = true) {
+    std::vector<PlaceReport> reports;
+    for (int metre = from; metre < to; metre += kStep) {
+      const Eigen::Isometry3d T_true = onCircle(metre);
+      if (last_true && continuous) {
+        Eigen::Isometry3d error = Eigen::Isometry3d::Identity();
+        error.linear() = Eigen::AngleAxisd(drift * kStep, Eigen::Vector3d::UnitY()).toRotationMatrix();
+        T_odom_camera = T_odom_camera * last_true->inverse() * T_true * error;
+      }
+      last_true = T_true;
+      const CameraMotion motion{T_odom_camera, 1e-6 * Matrix6d::Identity(), continuous};
+      continuous = true;
+      if (auto report = recognition.observe(see(T_true, kPeriod * ++pairs), motion)) {
+        if (report->loop) {
+          PoseGraph graph = recognition.graph();
+          graph.optimise();
+          recognition.adopt(graph);
+        }
+        reports.push_back(*report);
+      }
+    }
+    return reports;
+  }
+
+  /// How far the last pair is off in the map, m.
+  double error() const {
+    return (recognition.T_map_odom() * T_odom_camera * last_true->inverse()).translation().norm();
+  }
+
+  PlaceRecognition recognition;
+  double drift;
+  int pairs = 0;
+  std::optional<Eigen::Isometry3d> last_true;
+  Eigen::Isometry3d T_odom_camera = onCircle(0.0);
+};
+
+int loops(const std::vector<PlaceReport>& reports) {
+  int loops = 0;
+  for (const PlaceReport& report : reports) loops += report.loop;
+  return loops;
+}
+
+TEST(PlaceRecognition, ARoundClosesAndTheDriftIsTakenBack) {
+  Drive drive(0.001);
+  EXPECT_EQ(loops(drive.go(0, 150)), 0);
+  const double before = (drive.T_odom_camera * drive.last_true->inverse()).translation().norm();
+  ASSERT_GT(before, 3.0);
+  const auto second = drive.go(150, kAround + 40);
+  EXPECT_GE(loops(second), 10) << "of " << second.size() << " key frames";
+  EXPECT_LT(drive.error(), 0.1 * before);
+  EXPECT_GT(drive.recognition.graph().loops(), loops(second)) << "the first one waited for a neighbour to confirm it";
+}
+
+TEST(PlaceRecognition, KeyframesAreApartByWayOrByTurn) {
+  Drive drive;
+  drive.go(0, 33);
+  EXPECT_EQ(drive.recognition.places().size(), 11u) << "every 3 m";
+  PlaceRecognitionOptions sparse = Drive::fewAndFast();
+  sparse.keyframe_distance = 5.0;
+  Drive sparser(0.0, sparse);
+  sparser.go(0, 33);
+  EXPECT_EQ(sparser.recognition.places().size(), 6u) << "every second step";
+  PlaceRecognition turning{PlaceRecognitionOptions()};
+  for (int i = 0; i <= 60; i += 5) {
+    Eigen::Isometry3d T = onCircle(0.0);
+    T.linear() = Eigen::AngleAxisd(i * kPi / 180.0, Eigen::Vector3d::UnitY()).toRotationMatrix();
+    turning.observe(see(T, kPeriod * (i + 1)), {T, Matrix6d::Zero(), true});
+  }
+  EXPECT_EQ(turning.places().size(), 5u) << "every 15 degrees";
+}
+
+TEST(PlaceRecognition, APairWithHardlyAnythingToSeeIsNotKept) {
+  PlaceRecognition recognition{PlaceRecognitionOptions()};
+  EXPECT_FALSE(recognition.observe(synthetic::noFeatures(synthetic::camera(), 1), {}).has_value());
+  EXPECT_TRUE(recognition.observe(see(onCircle(0.0), 2), {}).has_value());
+}
+
+TEST(PlaceRecognition, RecentPlacesAreNotLookedFor) {
+  Drive drive;
+  for (const PlaceReport& report : drive.go(0, 60))
+    for (const PlaceCandidate& candidate : report.candidates)
+      EXPECT_GE(
+          drive.recognition.places().at(report.id).travelled - drive.recognition.places().at(candidate.place).travelled,
+          PlaceRecognitionOptions().min_travel);
+}
+
+TEST(PlaceRecognition, ALookalikeThatTheOdometryCannotHaveReachedIsNoLoop) {
+  Drive drive;
+  drive.go(0, 80);
+  // The same view once more, 80 m on: the way between was straight and is known to a few metres.
+  const StereoFeatures first = see(onCircle(0.0), kPeriod * (drive.pairs + 20));
+  const CameraMotion motion{drive.T_odom_camera * onCircle(0.0).inverse() * onCircle(5.0), 1e-6 * Matrix6d::Identity(),
+                            true};
+  const auto report = drive.recognition.observe(first, motion);
+  ASSERT_TRUE(report.has_value());
+  EXPECT_TRUE(report->match.same);
+  EXPECT_FALSE(report->same.has_value());
+  EXPECT_EQ(report->reason, "the odometry cannot have drifted that far");
+}
+
+TEST(PlaceRecognition, AfterAnUnknownMotionAKnownPlaceSaysWhereItIs) {
+  Drive drive;
+  drive.go(0, 100);
+  // Lost, carried back to metre 40, and started again from the last pose.
+  const auto reports = drive.go(40, 60, false);
+  EXPECT_GE(loops(reports), 1);
+  EXPECT_LT(drive.error(), 0.3);
+}
+
+TEST(PlaceRecognition, RestoredPlacesLetANewSessionFindItself) {
+  Drive mapping;
+  mapping.go(0, 120);
+  std::vector<Place> places;
+  for (const auto& [id, place] : mapping.recognition.places()) places.push_back(place);
+
+  Drive later;
+  later.recognition.restore(places, mapping.recognition.graph());
+  const std::size_t known = later.recognition.places().size();
+  EXPECT_EQ(known, mapping.recognition.places().size());
+  later.T_odom_camera = Eigen::Isometry3d::Identity();  // the new odometry's own origin
+  EXPECT_GE(loops(later.go(50, 70)), 1);
+  EXPECT_LT(later.error(), 0.3) << "in the old map's frame";
+  EXPECT_GT(later.recognition.places().size(), known);
+
+  EXPECT_NE(synthetic::errorOf([&] { later.recognition.restore(places, mapping.recognition.graph()); }).find("before"),
+            std::string::npos);
+  PlaceRecognition fresh{PlaceRecognitionOptions()};
+  places.pop_back();
+  EXPECT_NE(synthetic::errorOf([&] { fresh.restore(places, mapping.recognition.graph()); }).find("without a place"),
+            std::string::npos);
+  EXPECT_TRUE(fresh.places().empty());
+}
+
+TEST(PlaceRecognition, AnotherRobotsSignatureAndRowsFindAPlace) {
+  Drive one, other;
+  one.go(0, 60);
+  other.go(20, 24);
+  const int asked = other.recognition.places().begin()->first;
+  const auto found = one.recognition.find(other.recognition.signature(asked));
+  ASSERT_FALSE(found.empty());
+  const PlaceMatch match = one.recognition.verify(found[0].place, other.recognition.places().at(asked).features);
+  EXPECT_TRUE(match.same) << match.reason;
+}
+
+TEST(PlaceRecognition, TheOldestPlacesGo) {
+  PlaceRecognitionOptions options = Drive::fewAndFast();
+  options.max_places = 20;
+  Drive drive(0.0, options);
+  drive.go(0, kAround);
+  EXPECT_EQ(drive.recognition.places().size(), 20u);
+  EXPECT_EQ(drive.recognition.graph().nodes().size(), 20u);
+  EXPECT_GT(drive.recognition.bytes(), 20u * 100u * 64u);
+  EXPECT_EQ(loops(drive.go(kAround, kAround + 20)), 0) << "the beginning is forgotten";
+}
+
+TEST(PlaceRecognition, RefusesOtherDescriptorsAndKeepsItsState) {
+  Drive drive;
+  drive.go(0, 10);
+  const std::size_t known = drive.recognition.places().size();
+  StereoFeatures other = see(onCircle(20.0), 100'000'000'000);
+  other.descriptor = "brief";
+  EXPECT_NE(synthetic::errorOf([&] { drive.recognition.observe(other, {}); }).find("brief"), std::string::npos);
+  other.element_type = ElementType::kUint8;
+  PlaceRecognition fresh{PlaceRecognitionOptions()};
+  EXPECT_NE(synthetic::errorOf([&] { fresh.observe(other, {}); }).find("uint8"), std::string::npos);
+  EXPECT_TRUE(fresh.places().empty());
+  EXPECT_EQ(drive.recognition.places().size(), known);
+}
+
+}  // namespace
+}  // namespace sdvo

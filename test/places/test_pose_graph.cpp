@@ -1,0 +1,226 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/places/pose_graph.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+Matrix6d covariance(double translation, double rotation) {
+  Vector6d variances;
+  variances << Eigen::Vector3d::Constant(translation * translation), Eigen::Vector3d::Constant(rotation * rotation);
+  return variances.asDiagonal();
+}
+
+/// Node k of n on a circle, looking along it.
+Eigen::Isometry3d onCircle(int k, int n, double radius) {
+  const double angle = 2.0 * kPi * k / n;
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.linear() = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  T.translation() = radius * Eigen::Vector3d(1.0 - std::cos(angle), 0.0, std::sin(angle));
+  return T;
+}
+
+GraphEdge edge(int from, int to, GraphEdge::Kind kind, const Eigen::Isometry3d& T_from_to, const Matrix6d& covariance) {
+  GraphEdge edge;
+  edge.from = from;
+  edge.to = to;
+  edge.kind = kind;
+  edge.T_from_to = T_from_to;
+  edge.covariance = covariance;
+  edge.length = kind == GraphEdge::Kind::kOdometry ? T_from_to.translation().norm() : 0.0;
+  return edge;
+}
+
+/// Truth and a chain once around a circle of 100 nodes and 20 more, each step of which turns too far.
+struct Ring {
+  static constexpr int kAround = 100, kNodes = 120;
+  PoseGraph graph{PoseGraphOptions()};
+  std::vector<Eigen::Isometry3d> truth;
+
+  Ring() {
+    for (int k = 0; k < kNodes; ++k) truth.push_back(onCircle(k, kAround, 50.0));
+    Eigen::Isometry3d drift = Eigen::Isometry3d::Identity();
+    drift.linear() = Eigen::AngleAxisd(0.001, Eigen::Vector3d::UnitY()).toRotationMatrix();
+    graph.start(0, truth[0]);
+    for (int k = 1; k < kNodes; ++k)
+      graph.extend(edge(k - 1, k, GraphEdge::Kind::kOdometry, truth[k - 1].inverse() * truth[k] * drift,
+                        covariance(0.03, 0.002)));
+  }
+
+  GraphEdge loop(int from, int to) const {
+    return edge(from, to, GraphEdge::Kind::kLoop, truth[from].inverse() * truth[to], covariance(0.02, 0.002));
+  }
+
+  double largestError() const {
+    double largest = 0.0;
+    for (int k = 0; k < kNodes; ++k)
+      largest = std::max(largest, (graph.nodes().at(k).translation() - truth[k].translation()).norm());
+    return largest;
+  }
+};
+
+TEST(PoseGraph, ALoopTakesTheDriftBack) {
+  Ring ring;
+  const double before = ring.largestError();
+  ASSERT_GT(before, 5.0);
+  for (int k = 100; k < 110; ++k) ring.graph.close(ring.loop(k - 100, k));
+  const PoseGraph::Summary summary = ring.graph.optimise();
+  EXPECT_TRUE(summary.converged);
+  EXPECT_LT(summary.final_cost, summary.initial_cost);
+  EXPECT_LT(ring.largestError(), 0.1 * before);
+  EXPECT_EQ(ring.graph.loops(), 10);
+  EXPECT_TRUE(ring.graph.nodes().at(0).isApprox(ring.truth[0])) << "the first one stays";
+}
+
+TEST(PoseGraph, WithoutLoopsNothingMoves) {
+  Ring ring;
+  const auto before = ring.graph.nodes();
+  EXPECT_TRUE(ring.graph.optimise().converged);
+  for (const auto& [id, T] : before) EXPECT_TRUE(T.isApprox(ring.graph.nodes().at(id), 0.0));
+}
+
+TEST(PoseGraph, OneFalseLoopDoesNotBendTheMap) {
+  Ring ring, misled;
+  for (Ring* each : {&ring, &misled})
+    for (int k = 100; k < 110; ++k) each->graph.close(each->loop(k - 100, k));
+  GraphEdge wrong = misled.loop(20, 70);  // opposite sides of the circle, said to be one place
+  wrong.T_from_to = Eigen::Isometry3d::Identity();
+  misled.graph.close(wrong);
+  ring.graph.optimise();
+  misled.graph.optimise();
+  for (int k = 0; k < Ring::kNodes; ++k)
+    EXPECT_LT((misled.graph.nodes().at(k).translation() - ring.graph.nodes().at(k).translation()).norm(), 0.5) << k;
+  EXPECT_GT(misled.graph.residual(wrong), 100.0);
+}
+
+TEST(PoseGraph, OneFalseLoopAloneDoesNotBendItEither) {
+  Ring ring;
+  const auto before = ring.graph.nodes();
+  GraphEdge wrong = ring.loop(20, 70);
+  wrong.T_from_to = Eigen::Isometry3d::Identity();
+  ring.graph.close(wrong);
+  ring.graph.optimise();
+  for (const auto& [id, T] : before)
+    EXPECT_LT((T.translation() - ring.graph.nodes().at(id).translation()).norm(), 2.0) << id << ", of 100 m";
+}
+
+TEST(PoseGraph, APartBehindABreakMovesAsAWholeOnceAPlaceIsRecognised) {
+  const auto truth = [](int k) { return onCircle(k, 100, 50.0); };
+  PoseGraph graph{PoseGraphOptions()};
+  graph.start(0, truth(0));
+  for (int k = 1; k < 100; ++k) {
+    const bool broken = k == 60;
+    Eigen::Isometry3d T = truth(k - 1).inverse() * truth(k);
+    if (broken) T = onCircle(13, 31, 80.0);  // anything
+    graph.extend(edge(k - 1, k, broken ? GraphEdge::Kind::kBreak : GraphEdge::Kind::kOdometry, T,
+                      broken ? covariance(1000.0, 10.0) : covariance(0.01, 0.001)));
+  }
+  EXPECT_FALSE(graph.path(50, 70).known);
+  EXPECT_TRUE(graph.path(50, 59).known);
+  const Eigen::Isometry3d T_10_90 = truth(10).inverse() * truth(90);
+  graph.close(edge(10, 90, GraphEdge::Kind::kLoop, T_10_90, covariance(0.02, 0.002)));
+  for (int k = 0; k < 100; ++k) EXPECT_TRUE(graph.nodes().at(k).isApprox(truth(k), 1e-6)) << k;
+  EXPECT_TRUE(graph.path(50, 70).known);
+  EXPECT_TRUE(graph.optimise().converged);
+  for (int k = 0; k < 100; ++k)
+    EXPECT_LT((graph.nodes().at(k).translation() - truth(k).translation()).norm(), 0.2) << k;
+}
+
+TEST(PoseGraph, AnOptimisedCopyIsAdoptedByWhatHasGrownMeanwhile) {
+  Ring ring;
+  for (int k = 100; k < 110; ++k) ring.graph.close(ring.loop(k - 100, k));
+  PoseGraph copy = ring.graph;
+  const Eigen::Isometry3d step = onCircle(1, 100, 50.0);
+  ring.graph.extend(edge(Ring::kNodes - 1, Ring::kNodes, GraphEdge::Kind::kOdometry, step, covariance(0.01, 0.001)));
+  copy.optimise();
+  ASSERT_TRUE(ring.graph.adopt(copy));
+  for (const auto& [id, T] : copy.nodes()) EXPECT_TRUE(T.isApprox(ring.graph.nodes().at(id), 0.0)) << id;
+  const Eigen::Isometry3d last = copy.nodes().at(Ring::kNodes - 1) * step;
+  EXPECT_TRUE(ring.graph.nodes().at(Ring::kNodes).isApprox(last, 1e-9)) << "the new one follows its neighbour";
+}
+
+TEST(PoseGraph, ACopyFromBeforeAPartMovedIsRefused) {
+  PoseGraph graph{PoseGraphOptions()};
+  graph.start(0, Eigen::Isometry3d::Identity());
+  graph.extend(edge(0, 1, GraphEdge::Kind::kBreak, Eigen::Isometry3d::Identity(), covariance(1000.0, 10.0)));
+  const PoseGraph copy = graph;
+  graph.close(edge(0, 1, GraphEdge::Kind::kLoop, onCircle(3, 10, 5.0), covariance(0.01, 0.01)));
+  EXPECT_FALSE(graph.adopt(copy));
+  EXPECT_TRUE(graph.nodes().at(1).isApprox(onCircle(3, 10, 5.0), 1e-9));
+}
+
+TEST(PoseGraph, APathIsTheShortestAndItsCovarianceThatOfTheWholeMotion) {
+  Ring ring;
+  const GraphPath way = ring.graph.path(0, 110);
+  ASSERT_TRUE(way.known);
+  EXPECT_NEAR(way.length, 110 * ring.graph.edges().front().length, 1e-6);
+  const GraphPath back = ring.graph.path(110, 0);
+  EXPECT_NEAR(back.length, way.length, 1e-9);
+  ring.graph.close(ring.loop(0, 100));
+  EXPECT_NEAR(ring.graph.path(0, 110).length, 10 * ring.graph.edges().front().length, 1e-6);
+
+  // Against samples of the edges' errors.
+  PoseGraph chain{PoseGraphOptions()};
+  chain.start(0, Eigen::Isometry3d::Identity());
+  std::vector<GraphEdge> edges;
+  for (int k = 0; k < 5; ++k) {
+    edges.push_back(edge(k, k + 1, GraphEdge::Kind::kOdometry, onCircle(1, 12, 10.0), covariance(0.02, 0.003)));
+    chain.extend(edges.back());
+  }
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal(0.0, 1.0);
+  const Eigen::Isometry3d T_5_0 = chain.nodes().at(5).inverse();
+  for (const bool forward : {true, false}) {
+    Matrix6d sampled = Matrix6d::Zero();
+    constexpr int kSamples = 4000;
+    for (int s = 0; s < kSamples; ++s) {
+      Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+      for (const GraphEdge& each : edges) {
+        Vector6d xi;
+        for (int i = 0; i < 6; ++i) xi[i] = (i < 3 ? 0.02 : 0.003) * normal(random);
+        T = T * each.T_from_to * expSE3(xi);
+      }
+      const Vector6d error = forward ? logSE3(T_5_0 * T) : logSE3(T_5_0.inverse() * T.inverse());
+      sampled += error * error.transpose() / kSamples;
+    }
+    const Matrix6d told = forward ? chain.path(0, 5).covariance : chain.path(5, 0).covariance;
+    EXPECT_LT((sampled - told).norm(), 0.08 * told.norm()) << (forward ? "forward" : "back");
+  }
+}
+
+TEST(PoseGraph, ForgettingTheFirstNodeLeavesTheRestWhereItIs) {
+  Ring ring;
+  ring.graph.close(ring.loop(0, 100));
+  ring.graph.close(ring.loop(5, 105));
+  const Eigen::Isometry3d second = ring.graph.nodes().at(1);
+  ring.graph.remove(0);
+  EXPECT_EQ(ring.graph.nodes().count(0), 0u);
+  EXPECT_EQ(ring.graph.loops(), 1);
+  EXPECT_TRUE(ring.graph.optimise().converged);
+  EXPECT_TRUE(ring.graph.nodes().at(1).isApprox(second, 1e-12));
+}
+
+TEST(PoseGraph, IsMadeOfItsPartsAgainAndRefusesPartsThatDoNotFit) {
+  Ring ring;
+  ring.graph.close(ring.loop(0, 100));
+  PoseGraph again(PoseGraphOptions(), ring.graph.nodes(), ring.graph.edges());
+  ring.graph.optimise();
+  again.optimise();
+  for (const auto& [id, T] : ring.graph.nodes()) EXPECT_TRUE(T.isApprox(again.nodes().at(id), 1e-12));
+
+  std::vector<GraphEdge> edges{ring.loop(0, 100)};
+  EXPECT_NE(synthetic::errorOf([&] { PoseGraph(PoseGraphOptions(), {}, edges); }).find("edge 0 - 100"),
+            std::string::npos);
+  edges[0].covariance(2, 2) = -1.0;
+  EXPECT_NE(synthetic::errorOf([&] { PoseGraph(PoseGraphOptions(), ring.graph.nodes(), edges); }).find("covariance"),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace sdvo
