@@ -26,7 +26,7 @@ struct PlaceRecognitionOptions {
   int max_places = 10000;
   double min_age = 20.0;
   double min_travel = 30.0;
-  int candidates = 3;
+  int candidates = 1;
   double drift_translation = 0.03;
   double drift_rotation = 0.01;
   double drift_turn = 0.01;
