@@ -14,8 +14,8 @@ namespace msgs = stereo_descriptor_vo;
 namespace {
 
 constexpr const char* kService = "other/get_place";
-constexpr std::size_t kWaiting = 20;      ///< signatures, while an answer is waited for
-constexpr double kWatchPeriod = 0.05;     ///< s
+constexpr std::size_t kWaiting = 20;   ///< signatures, while an answer is waited for
+constexpr double kWatchPeriod = 0.05;  ///< s
 
 }  // namespace
 
@@ -90,8 +90,8 @@ std::optional<Place> OtherRobot::fetch(const SignatureMessage& signature) {
     const std::lock_guard<std::mutex> lock(call_mutex_);
     if (stopping_) return std::nullopt;
     client_ = client;
-    deadline_ = std::chrono::steady_clock::now() +
-                std::chrono::duration_cast<std::chrono::steady_clock::duration>(std::chrono::duration<double>(timeout_));
+    deadline_ = std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::steady_clock::duration>(
+                                                       std::chrono::duration<double>(timeout_));
   }
   const bool is_answered = client.isValid() && client.call(call);
   bool is_late;

@@ -257,8 +257,8 @@ PlaceSignature fromMessage(const msgs::PlaceSignature& message, const PlaceIndex
   if (message.descriptor != kind.descriptor || message.layout != nameOf(kind.layout) ||
       message.element_type != nameOf(kind.element_type) ||
       message.bytes_per_row != static_cast<std::uint32_t>(kind.bytes))
-    refuse("descriptors " + message.descriptor + ", " + message.layout + ", " +
-           std::to_string(message.bytes_per_row) + " bytes, here " + toString(kind));
+    refuse("descriptors " + message.descriptor + ", " + message.layout + ", " + std::to_string(message.bytes_per_row) +
+           " bytes, here " + toString(kind));
   constexpr std::size_t kMostWords = 1u << 18;
   if (message.words.size() > kMostWords) refuse(std::to_string(message.words.size()) + " words");
   if (std::adjacent_find(message.words.begin(), message.words.end(), std::greater_equal<>()) != message.words.end())

@@ -80,8 +80,8 @@ void PlacePublisher::publishMap() {
   const std::optional<Map> map = map_();
   if (!map) return;
   if (path_wanted)
-    path_publisher_.publish(boost::make_shared<nav_msgs::Path>(
-        ros_conversions::toPath(map->state, map->T_base_camera, map_frame_)));
+    path_publisher_.publish(
+        boost::make_shared<nav_msgs::Path>(ros_conversions::toPath(map->state, map->T_base_camera, map_frame_)));
   if (loops_wanted)
     loops_publisher_.publish(
         boost::make_shared<visualization_msgs::MarkerArray>(ros_conversions::toMarkers(map->state, map_frame_)));

@@ -238,7 +238,8 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     const StereoFeatures& known = places.begin()->second.features;
     if (camera != known.camera)
       throw std::invalid_argument(
-          "the places are of another camera, or of another calibration of this one: call reset, or load_places of this");
+          "the places are of another camera, or of another calibration of this one: call reset, or load_places of "
+          "this");
     if (kind != known.kind())
       throw std::invalid_argument("the places are described by " + toString(known.kind()) + ", not by " +
                                   toString(kind) + ": call reset, or load_places of these");
@@ -249,8 +250,8 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     CameraMotion motion;
     motion.T_odom_camera = T_odom_camera;
     const std::optional<Last>& last = session_->last;
-    motion.continuous = session_->continues && last && pair.info->session == last->session &&
-                        pair.info->epoch == last->epoch;
+    motion.continuous =
+        session_->continues && last && pair.info->session == last->session && pair.info->epoch == last->epoch;
     if (motion.continuous)
       motion.covariance = ros_conversions::toMotionCovariance(
           *pair.odometry, secondsBetween(last->stamp, pair.features->header.stamp), T_base_camera);

@@ -94,6 +94,7 @@ class Robot:
         self.pair, self.odom_frame = -1, namespace.strip('/') + '_odom'
         self.odometry = np.eye(4)
         self.stamp = clock.now
+        self.session = rospy.Time(7)
         self.features, self.odom, self.info = (
             rospy.Publisher('%s/%s' % (namespace, topic), message, queue_size=100)
             for topic, message in (('stereo_features', StereoFeatures), ('odom', Odometry), ('vo_info', VoInfo)))
@@ -101,7 +102,7 @@ class Robot:
     def truth(self):
         return on_the_ring(self.start + self.pair)
 
-    def drive(self):
+    def drive(self, is_lost=False):
         """Publishes the next pair."""
         before = self.truth()
         self.pair += 1
@@ -110,19 +111,20 @@ class Robot:
             self.odometry = self.odometry @ np.linalg.inv(before) @ self.truth() @ drift
         self.stamp += rospy.Duration(1)
         self.clock.advance_to(self.stamp)
-        self.publish()
+        self.publish(is_lost)
 
-    def publish(self):
+    def publish(self, is_lost):
         odometry = Odometry(child_frame_id='base_link')
         odometry.header.stamp, odometry.header.frame_id = self.stamp, self.odom_frame
         p, q = odometry.pose.pose.position, odometry.pose.pose.orientation
         p.x, p.y, p.z = self.odometry[:3, 3]
         q.x, q.y, q.z, q.w = quaternion_of(self.odometry)
         odometry.twist.covariance = np.diag([1e-3] * 3 + [1e-5] * 3).flatten()
-        info = VoInfo(state='TRACKING', session=rospy.Time(7))
+        info = VoInfo(state='LOST' if is_lost else 'TRACKING', session=self.session)
         info.header.stamp, info.header.frame_id = self.stamp, self.odom_frame
         self.features.publish(self.ring.seen_from(self.truth(), self.stamp, self.focal))
-        self.odom.publish(odometry)
+        if not is_lost:
+            self.odom.publish(odometry)
         self.info.publish(info)
 
 
@@ -256,6 +258,7 @@ class Places(unittest.TestCase):
         self.another_robot_restarted_in_that_map(recognition, b, file)
         self.another_camera(file)
         self.paused_and_resumed(robot, recognition)
+        self.the_odometry_is_lost_and_restarted(robot, recognition)
         self.the_clock_jumps_back(robot, recognition)
 
     def another_robot_that_does_not_answer(self, recognition, namespace):
@@ -339,6 +342,16 @@ class Places(unittest.TestCase):
         self.assertTrue(wait_until(recognition.is_connected))
         self.drive(robot, recognition, 1)
         self.assertTrue(wait_until(lambda: 'break' in {edge.kind for edge in recognition.graph[-1].edges}))
+
+    def the_odometry_is_lost_and_restarted(self, robot, recognition):
+        """Odom stays where it is in the map until a loop tells."""
+        before = recognition.info[-1]
+        robot.drive(is_lost=True)
+        robot.session, robot.odometry = rospy.Time(8), np.eye(4)
+        info = self.drive(robot, recognition, 1)
+        self.assertEqual((info.places, info.unpaired), (before.places + 1, before.unpaired))
+        self.assertTrue(wait_until(lambda: [edge.kind for edge in recognition.graph[-1].edges].count('break') == 2))
+        self.assertLess(np.linalg.norm(matrix_of(info.map_to_odom) - matrix_of(before.map_to_odom)), 1e-6)
 
     def the_clock_jumps_back(self, robot, recognition):
         self.clock.jump_to(recognition.info[0].header.stamp + rospy.Duration.from_sec(0.5))

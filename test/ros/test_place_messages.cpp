@@ -17,8 +17,7 @@ using synthetic::errorOf;
 namespace msgs = stereo_descriptor_vo;
 
 Eigen::Isometry3d somePose(double x) {
-  return Eigen::Translation3d(x, -2.5, 0.25) *
-         Eigen::AngleAxisd(0.3 * x, Eigen::Vector3d(0.36, 0.48, 0.8));
+  return Eigen::Translation3d(x, -2.5, 0.25) * Eigen::AngleAxisd(0.3 * x, Eigen::Vector3d(0.36, 0.48, 0.8));
 }
 
 /// Full, and another one for each number given.
