@@ -52,4 +52,42 @@ struct OdometryOutputOptions {
   }
 };
 
+/// What the place recognition's nodelet needs beside the recognition's options.
+struct PlaceOutputOptions {
+  std::string map_frame_id = "map";
+  bool publish_tf = true;
+  double tf_rate = 10.0;
+  double transform_tolerance = 0.2;
+  double correction_time = 2.0;
+  double tf_timeout = 2.0;
+  int sync_queue_size = 100;
+  int queue_size = 10;
+  double max_silence = 10.0;
+  std::string places_file;
+  std::string robot_name;
+  double other_min_score = 0.05;
+  double other_timeout = 2.0;
+
+  void describe(OptionList& list) {
+    list.add("map_frame_id", map_frame_id, "frame of the corrected poses, parent of the odometry's frame");
+    list.add("publish_tf", publish_tf, "publish map -> odom on /tf");
+    list.add("tf_rate", tf_rate, {0.1, 1000.0}, "Hz", "of map -> odom on /tf");
+    list.add("transform_tolerance", transform_tolerance, {0.0, 10.0}, "s",
+             "map -> odom is stamped so far ahead: until then it is good");
+    list.add("correction_time", correction_time, {0.0, 600.0}, "s", "in which a correction goes into map -> odom");
+    list.add("tf_timeout", tf_timeout, {0.0, 60.0}, "s",
+             "wall time to wait for the transform base <- camera at the start");
+    list.add("sync_queue_size", sync_queue_size, {2, 10000}, "",
+             "messages kept per input until those that belong to them have come");
+    list.add("queue_size", queue_size, {1, 10000}, "", "pairs that wait while one is processed; the newest win");
+    list.add("max_silence", max_silence, {0.1, 3600.0}, "s",
+             "/diagnostics warn when no pair with odometry has come for longer (wall time)");
+    list.add("places_file", places_file, "file of save_places to begin with (absolute path); empty: with no places");
+    list.add("robot_name", robot_name, "what other robots know this one by; empty: the namespace");
+    list.add("other_min_score", other_min_score, {0.0, 1.0}, "",
+             "least likeness of a place of mine for which another robot is asked for its rows");
+    list.add("other_timeout", other_timeout, {0.01, 60.0}, "s", "wall time in which another robot must answer");
+  }
+};
+
 }  // namespace sdvo

@@ -27,10 +27,12 @@ struct PipelineOptions {
 struct NodeletOptions {
   StereoInputOptions stereo_features;
   OdometryOutputOptions visual_odometry;
+  PlaceOutputOptions place_recognition;
 
   void describe(OptionList& list) {
     list.group("stereo_features", stereo_features);
     list.group("visual_odometry", visual_odometry);
+    list.group("place_recognition", place_recognition);
   }
 };
 

@@ -298,6 +298,30 @@ Eigen::Isometry3d toPose(const std::string& text) {
          Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX());
 }
 
+Eigen::Isometry3d toPose(const geometry_msgs::Pose& message) {
+  constexpr double kUnitLength = 1e-3;
+  const auto& p = message.position;
+  const auto& q = message.orientation;
+  const Eigen::Quaterniond rotation(q.w, q.x, q.y, q.z);
+  if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
+    throw std::invalid_argument("the position is not finite");
+  if (!(std::abs(rotation.norm() - 1.0) <= kUnitLength))
+    throw std::invalid_argument("the quaternion has not unit length");
+  return Eigen::Translation3d(p.x, p.y, p.z) * rotation.normalized();
+}
+
+Matrix6d toMotionCovariance(const nav_msgs::Odometry& odometry, double dt, const Eigen::Isometry3d& T_base_camera) {
+  Matrix6d twist;
+  for (int row = 0; row < 6; ++row)
+    for (int column = 0; column < 6; ++column) twist(row, column) = odometry.twist.covariance[6 * row + column];
+  if (!twist.allFinite()) throw std::invalid_argument("the twist's covariance is not finite");
+  const Matrix6d steady = twist - unsteadiness(dt);
+  // Of a fused odometry it never was a part.
+  if (steady.llt().info() == Eigen::Success) twist = steady;
+  const Matrix6d to_camera = adjoint(T_base_camera.inverse());
+  return to_camera * twist * to_camera.transpose() * dt * dt;
+}
+
 geometry_msgs::TransformStamped toTransform(const nav_msgs::Odometry& odometry, bool inverted) {
   Eigen::Isometry3d T_odom_base;
   tf2::fromMsg(odometry.pose.pose, T_odom_base);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <geometry_msgs/Pose.h>
 #include <geometry_msgs/TransformStamped.h>
 #include <nav_msgs/Odometry.h>
 #include <sensor_msgs/CameraInfo.h>
@@ -57,6 +58,13 @@ nav_msgs::Odometry toOdometry(const OdometryResult& result, const Eigen::Isometr
 /// A pose of six numbers, "x y z roll pitch yaw" (m, rad; about the fixed axes x, y and z in this order, as in URDF).
 /// Throws std::invalid_argument when it is none.
 Eigen::Isometry3d toPose(const std::string& text);
+
+/// Throws std::invalid_argument when the position is not finite or the quaternion has not unit length.
+Eigen::Isometry3d toPose(const geometry_msgs::Pose& message);
+
+/// What toOdometry() was given as the covariance of the camera's motion since the pair before, `dt` s ago: of its right
+/// perturbation, m and rad. Throws std::invalid_argument where a number of the twist's covariance is not finite.
+Matrix6d toMotionCovariance(const nav_msgs::Odometry& odometry, double dt, const Eigen::Isometry3d& T_base_camera);
 
 /// The transform of an odometry message: odom -> base, or base -> odom when inverted.
 geometry_msgs::TransformStamped toTransform(const nav_msgs::Odometry& odometry, bool inverted);

@@ -9,6 +9,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 
 #include "conversions.hpp"
 
@@ -23,6 +24,9 @@ class RobotTransforms {
 
   /// `ours`: the transform that this node publishes (odom: parent, base: child); none when it publishes none.
   RobotTransforms(ros::NodeHandle& nh, std::optional<ros_conversions::OdometryFrames> ours, Report warn);
+
+  /// The transform that this node publishes from now on, for a node that learns it late. Only where callbacks run.
+  void claim(ros_conversions::OdometryFrames ours) { ours_ = std::move(ours); }
 
   /// T_parent_child at the newest time known; none, and why, while TF has no such transform.
   std::optional<Eigen::Isometry3d> find(const std::string& parent, const std::string& child,

@@ -4,12 +4,11 @@
 
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <iomanip>
 #include <stdexcept>
 
-namespace fs = std::filesystem;
+#include "whole_file.hpp"
 
 namespace sdvo {
 namespace {
@@ -39,25 +38,19 @@ void writeKitti(const nav_msgs::Path& poses, const Eigen::Isometry3d& T_base_cam
 
 void saveTrajectory(const nav_msgs::Path& poses, const Eigen::Isometry3d& T_base_camera, const std::string& format,
                     const std::string& path) {
-  const auto fail = [&](const std::string& why) { throw std::runtime_error("'" + path + "': " + why); };
-  if (format != "tum" && format != "kitti") fail("format '" + format + "' is neither tum nor kitti");
-  if (!fs::path(path).is_absolute()) fail("the path must be absolute");
-  std::error_code ignored;
-  if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored)) fail("it is no regular file");
-
-  const std::string partial = path + ".partial";
-  errno = 0;
-  std::ofstream out(partial);
-  out.precision(12);
-  if (out && format == "tum") writeTum(poses, out);
-  if (out && format == "kitti") writeKitti(poses, T_base_camera, out);
-  out.close();
-  if (out) fs::rename(partial, path, ignored);
-  if (!out || ignored) {
-    const std::string why = ignored ? ignored.message() : std::strerror(errno);
-    fs::remove(partial, ignored);
-    fail("cannot be written: " + why);
-  }
+  if (format != "tum" && format != "kitti")
+    throw std::runtime_error("'" + path + "': format '" + format + "' is neither tum nor kitti");
+  writeWhole(path, [&](const std::string& partial) {
+    errno = 0;
+    std::ofstream out(partial);
+    out.precision(12);
+    if (format == "tum")
+      writeTum(poses, out);
+    else
+      writeKitti(poses, T_base_camera, out);
+    out.close();
+    if (!out) throw std::runtime_error(std::strerror(errno));
+  });
 }
 
 }  // namespace sdvo

@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -18,6 +17,7 @@
 
 #include "../config/nodelet_options.hpp"
 #include "callback_thread.hpp"
+#include "camera_mount.hpp"
 #include "conversions.hpp"
 #include "odometry_diagnostics.hpp"
 #include "odometry_publisher.hpp"
@@ -38,7 +38,7 @@ namespace sdvo {
 class VisualOdometryNodelet : public nodelet::Nodelet {
  public:
   ~VisualOdometryNodelet() override {
-    stopping_ = true;
+    if (mount_) mount_->stop();
     // Nothing may arrive any more, and nothing be in work, when members go.
     callbacks_.stop();
     if (worker_) worker_->stop();
@@ -72,6 +72,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     transforms_ = std::make_unique<RobotTransforms>(nh_, publishedFrames(), [this](const std::string& what) {
       if (throttle_.allows(what)) NODELET_WARN_STREAM(what);
     });
+    mount_ = std::make_unique<CameraMount>(*transforms_, options_.output.tf_timeout);
     diagnostics_ = std::make_unique<OdometryDiagnostics>(nh_, private_nh, getName(), nh_.resolveName("stereo_features"),
                                                          options_.output.max_silence);
     services_ = {private_nh.advertiseService("reset", &VisualOdometryNodelet::onReset, this),
@@ -174,7 +175,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     const OdometryResult result = odometry_->update(features);
     epoch_ = result.epoch;
     report(result, message.header.stamp);
-    publisher_->publish(result, *T_base_camera_);
+    publisher_->publish(result, *mount_->last());
     publisher_->publishPoints(message);
     publisher_->publishFlow(result, features, message.header);
     publishInfo(result, message);
@@ -209,28 +210,14 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     processed_epoch_.reset();
   }
 
-  /// The camera's place on the robot, read once; says what is missing, nothing when it is known. Waits a while at
-  /// first, because static transforms and the first features arrive together; then each message asks again.
+  /// Asks for the camera's place on the robot; says what is missing, nothing when it is known.
   std::string findExtrinsic(const std::string& camera_frame) {
-    if (T_base_camera_ && camera_frame == camera_frame_) return "";
     const std::string base_frame = ros_conversions::cleanFrameId(options_.output.base_frame_id);
-    const auto give_up =
-        ros::WallTime::now() + ros::WallDuration(waited_for_extrinsic_ ? 0.0 : options_.output.tf_timeout);
-    waited_for_extrinsic_ = true;
+    if (mount_->knows(base_frame, camera_frame)) return "";
     std::string problem;
-    for (;;) {
-      const std::optional<Eigen::Isometry3d> found = transforms_->find(base_frame, camera_frame, problem);
-      if (found) {
-        {
-          const std::lock_guard<std::mutex> lock(pending_mutex_);  // others read it there
-          T_base_camera_ = found;
-        }
-        camera_frame_ = camera_frame;
-        warnIfNotOptical();
-        return "";
-      }
-      if (ros::WallTime::now() >= give_up || stopping_ || !ros::ok()) break;
-      ros::WallDuration(0.01).sleep();
+    if (const std::optional<Eigen::Isometry3d> found = mount_->find(base_frame, camera_frame, problem)) {
+      warnIfNotOptical(camera_frame, *found);
+      return "";
     }
     const std::string report = "no transform from camera frame '" + camera_frame + "' to base frame '" + base_frame +
                                "' on TF, no odometry without it: publish it (static) or set base_frame_id";
@@ -239,10 +226,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   }
 
   /// An optical frame looks along +z; on a robot that is horizontal more often than up or down.
-  void warnIfNotOptical() {
-    if (T_base_camera_->linear().isIdentity(1e-3))
+  void warnIfNotOptical(const std::string& camera_frame, const Eigen::Isometry3d& T_base_camera) {
+    if (T_base_camera.linear().isIdentity(1e-3))
       NODELET_WARN_STREAM("camera frame '"
-                          << camera_frame_
+                          << camera_frame
                           << "' has the axes of the base (x forward): an optical frame (z forward, x "
                              "right, REP-103) was expected, the odometry will move along the wrong axes");
   }
@@ -265,18 +252,12 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   }
 
   bool onResetToPose(stereo_descriptor_vo::ResetToPose::Request& request,
-                     stereo_descriptor_vo::ResetToPose::Response& response) {
-    constexpr double kUnitLength = 1e-3;
-    const auto& p = request.pose.position;
-    const auto& q = request.pose.orientation;
-    const Eigen::Quaterniond rotation(q.w, q.x, q.y, q.z);
-    if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
-      response.message = "the position is not finite";
-    else if (!(std::abs(rotation.norm() - 1.0) <= kUnitLength))
-      response.message = "the quaternion has not unit length";
-    else
-      requestStart(Eigen::Translation3d(p.x, p.y, p.z) * rotation.normalized());
-    response.success = response.message.empty();
+                     stereo_descriptor_vo::ResetToPose::Response& response) try {
+    requestStart(ros_conversions::toPose(request.pose));
+    response.success = true;
+    return true;
+  } catch (const std::invalid_argument& e) {
+    response.message = e.what();
     return true;
   }
 
@@ -303,12 +284,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
                         stereo_descriptor_vo::SaveTrajectory::Response& response) try {
     const nav_msgs::Path path = publisher_->path();
     if (path.poses.empty()) throw std::runtime_error("there is no pose yet");
-    Eigen::Isometry3d T_base_camera;
-    {
-      const std::lock_guard<std::mutex> lock(pending_mutex_);
-      T_base_camera = *T_base_camera_;
-    }
-    saveTrajectory(path, T_base_camera, request.format, request.path);
+    saveTrajectory(path, *mount_->last(), request.format, request.path);
     response.success = true;
     response.message = std::to_string(path.poses.size()) + " poses";
     return true;
@@ -330,11 +306,12 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   std::unique_ptr<ReconfigureServer> reconfigure_server_;
   ReportThrottle throttle_;
   std::unique_ptr<RobotTransforms> transforms_;
+  std::unique_ptr<CameraMount> mount_;
   std::unique_ptr<OdometryPublisher> publisher_;
   std::unique_ptr<OdometryDiagnostics> diagnostics_;
   std::vector<ros::ServiceServer> services_;
   std::optional<Eigen::Isometry3d> requested_start_;  // under pending_mutex_
-  std::atomic<bool> resumed_{false}, stopping_{false};
+  std::atomic<bool> resumed_{false};
 
   // Only the callbacks' thread touches these.
   FeaturesFilter filter_;
@@ -344,9 +321,6 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
 
   // Only the worker's thread touches these.
   std::unique_ptr<VisualOdometry> odometry_;
-  std::optional<Eigen::Isometry3d> T_base_camera_;
-  std::string camera_frame_;
-  bool waited_for_extrinsic_ = false;
   int timeline_ = 0;
   int epoch_ = 0;
   std::optional<std::uint32_t> processed_epoch_;

@@ -1,4 +1,4 @@
-// Prints the parameters of both nodelets as Markdown tables, from the option structs that hold them.
+// Prints the parameters of the nodelets as Markdown tables, from the option structs that hold them.
 #include <CLI/CLI.hpp>
 #include <iostream>
 #include <sstream>
@@ -32,12 +32,14 @@ int run() {
   for (const sdvo::Option& option : sdvo::listOptions(core)) options.push_back(option);
 
   std::cout
-      << "# Parameters\n\nPrivate parameters of the two nodelets, made by `rosrun stereo_descriptor_vo "
+      << "# Parameters\n\nPrivate parameters of the nodelets, made by `rosrun stereo_descriptor_vo "
          "list_parameters > docs/parameters.md` from the\noption structs, the only place where defaults stand.\n\n"
          "## stereo_features\n\n";
   printTable("stereo_features", options);
   std::cout << "\n## visual_odometry\n\n";
   printTable("visual_odometry", options);
+  std::cout << "\n## place_recognition\n\n";
+  printTable("place_recognition", options);
   return 0;
 }
 

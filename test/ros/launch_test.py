@@ -63,6 +63,14 @@ class Launch(unittest.TestCase):
                              [True, 30, 'odom_2'])
             self.assertEqual(found[ARGUMENTS['base_frame_id']], 'robot')
 
+    def test_loop_closing_passes_its_arguments_on(self):
+        found = parameters(loop_closing='true', map_frame_id='site', publish_map_tf='false', places_file='/site.bag',
+                           robot_name='one', places_queue_size='40')
+        self.assertEqual({name: value for name, value in found.items() if value != {}},
+                         {'place_recognition/' + name: value for name, value in
+                          (('map_frame_id', 'site'), ('publish_tf', False), ('places_file', '/site.bag'), ('robot_name', 'one'),
+                           ('sync_queue_size', 40), ('queue_size', 40))})
+
     def test_parameters_of_an_earlier_run_are_forgotten_on_demand(self):
         stale, other = '/stereo/visual_odometry/publish_tf', '/stereo/camera/exposure'
         for clear in ('false', 'true'):

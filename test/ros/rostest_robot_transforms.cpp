@@ -115,6 +115,15 @@ TEST_F(RobotTransformsTest, ACycleIsNamed) {
   EXPECT_TRUE(contains(warnings_[0], "a cycle")) << warnings_[0];
 }
 
+TEST_F(RobotTransformsTest, ATransformMayBeClaimedLater) {
+  start();
+  transforms_->claim({"map", "odom"});
+  send(tf_, {transform("site", "odom", ros::Time::now())});
+  waitForMarker(tf_);
+  ASSERT_EQ(warnings_.size(), 1u);
+  EXPECT_TRUE(contains(warnings_[0], ros::this_node::getName() + " publishes map -> odom")) << warnings_[0];
+}
+
 TEST_F(RobotTransformsTest, WithoutATransformOfOursThereIsNoContention) {
   start();
   send(tf_, {transform("world", "base_link", ros::Time::now()), transform("base_link", "world", ros::Time::now())});

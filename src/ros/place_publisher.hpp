@@ -1,0 +1,63 @@
+#pragma once
+
+#include <ros/node_handle.h>
+#include <stereo_descriptor_vo/PlaceInfo.h>
+#include <tf2_ros/transform_broadcaster.h>
+
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "../config/nodelet_options.hpp"
+#include "place_conversions.hpp"
+#include "stereo_descriptor_vo/places/eased_transform.hpp"
+
+namespace sdvo {
+
+/// TF map -> odom, place_info, place_signature, and the map: map_path, loops and map_graph.
+class PlacePublisher {
+ public:
+  /// `map`: the map as it is and where the camera sits on the base; nothing while there is none. From a timer.
+  struct Map {
+    ros_conversions::MapState state;
+    Eigen::Isometry3d T_base_camera;
+  };
+  PlacePublisher(ros::NodeHandle& nh, const PlaceOutputOptions& options, const std::string& robot,
+                 std::function<std::optional<Map>()> map);
+
+  void publish(const stereo_descriptor_vo::PlaceInfo& info) { info_publisher_.publish(info); }
+  void publish(const stereo_descriptor_vo::PlaceSignature& signature) { signature_publisher_.publish(signature); }
+  void publish(const stereo_descriptor_vo::PlaceMatch& match) { match_publisher_.publish(match); }
+
+  /// The map has changed: it is published soon, if somebody listens.
+  void noteChange();
+
+  /// T_map_odom from now on; TF moves there smoothly, but for the first time, or when asked to at once.
+  void correct(const Eigen::Isometry3d& T_map_odom, const std::string& odom_frame, bool at_once);
+  /// T_map_odom is unknown.
+  void forget();
+
+ private:
+  void publishTransform();
+  void publishMap();
+
+  const PlaceOutputOptions options_;
+  const std::string robot_, map_frame_;
+  const std::function<std::optional<Map>()> map_;
+  ros::Publisher info_publisher_, signature_publisher_, match_publisher_, path_publisher_, loops_publisher_,
+      graph_publisher_;
+  tf2_ros::TransformBroadcaster broadcaster_;
+
+  std::mutex mutex_;
+  bool changed_ = false;
+  std::string odom_frame_;
+  Eigen::Isometry3d T_map_odom_;  ///< where eased_ goes
+  std::optional<EasedTransform> eased_;
+  ros::Time last_stamp_;
+
+  ros::Timer tf_timer_;
+  ros::WallTimer map_timer_;
+};
+
+}  // namespace sdvo

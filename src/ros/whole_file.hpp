@@ -1,0 +1,13 @@
+#pragma once
+
+#include <functional>
+#include <string>
+
+namespace sdvo {
+
+/// Has a file written that appears whole or not at all: `write` is given the path of a partial one, and throws when it
+/// cannot. Throws std::runtime_error that names the file, and leaves it as it was, then and when the path is not
+/// absolute or leads to something else than a file.
+void writeWhole(const std::string& path, const std::function<void(const std::string& partial)>& write);
+
+}  // namespace sdvo

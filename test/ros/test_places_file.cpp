@@ -1,0 +1,104 @@
+#include <gtest/gtest.h>
+#include <rosbag/bag.h>
+#include <std_msgs/Header.h>
+
+#include <filesystem>
+#include <fstream>
+#include <string>
+#include <vector>
+
+#include "../../src/ros/places_file.hpp"
+#include "../synthetic_scene.hpp"
+#include "../temporary_folder.hpp"
+#include "message_samples.hpp"
+
+namespace sdvo {
+namespace {
+
+namespace fs = std::filesystem;
+using ros_conversions::contains;
+using synthetic::errorOf;
+
+class PlacesFile : public ::testing::Test {
+ protected:
+  PlacesFile() {
+    std::map<int, Eigen::Isometry3d> nodes;
+    std::vector<GraphEdge> edges;
+    for (int id = 0; id < 3; ++id) {
+      Place place;
+      place.id = id;
+      place.features = ros_conversions::someFeatures();
+      place.features.stamp += id * 1000000000;
+      places_.push_back(place);
+      nodes[id] = Eigen::Isometry3d(Eigen::Translation3d(id, 0.0, 0.0));
+      GraphEdge edge;
+      edge.from = id - 1;
+      edge.to = id;
+      if (id > 0) edges.push_back(edge);
+    }
+    map_.graph = PoseGraph(PoseGraphOptions(), nodes, edges);
+    for (const Place& place : places_) map_.stamps[place.id] = place.features.stamp;
+    stream_.frame_id = "left_optical";
+  }
+
+  void save(const std::string& path) { savePlaces(places_, map_, stream_, "/robot", "map", path); }
+
+  static std::string refusal(const std::string& path) {
+    EXPECT_THROW(loadPlaces(path, {}), std::runtime_error) << path;
+    return errorOf([&] { loadPlaces(path, {}); });
+  }
+
+  const TemporaryFolder folder_;
+  const std::string path_ = (fs::path(folder_.path()) / "places.bag").string();
+  std::vector<Place> places_;
+  ros_conversions::MapState map_{PoseGraph(PoseGraphOptions()), {}};
+  ros_conversions::FeatureStream stream_;
+};
+
+TEST_F(PlacesFile, WhatIsSavedIsLoaded) {
+  save(path_);
+  EXPECT_FALSE(fs::exists(path_ + ".partial"));
+  const SavedPlaces loaded = loadPlaces(path_, {});
+  ASSERT_EQ(loaded.places.size(), 3u);
+  EXPECT_EQ(loaded.places[2].id, 2);
+  EXPECT_EQ(loaded.places[2].features.stamp, places_[2].features.stamp);
+  EXPECT_EQ(loaded.graph.nodes().at(2).translation().x(), 2.0);
+  EXPECT_EQ(loaded.graph.edges().size(), 2u);
+  EXPECT_EQ(loaded.stream.frame_id, "left_optical");
+}
+
+TEST_F(PlacesFile, PathsThatCannotBeWrittenAreRefused) {
+  EXPECT_TRUE(contains(errorOf([&] { save("places.bag"); }), "'places.bag': the path must be absolute"));
+  EXPECT_TRUE(contains(errorOf([&] { save(folder_.path()); }), "it is no regular file"));
+  EXPECT_TRUE(contains(errorOf([&] { save(path_ + "/places.bag"); }), "cannot be written"));
+}
+
+TEST_F(PlacesFile, FilesThatAreNoneAreRefused) {
+  EXPECT_TRUE(contains(refusal("places.bag"), "the path must be absolute"));
+  EXPECT_TRUE(contains(refusal(path_), "there is no such file"));
+  EXPECT_TRUE(contains(refusal(folder_.path()), "there is no such file"));
+  std::ofstream(path_) << "no bag";
+  EXPECT_TRUE(contains(refusal(path_), path_));
+  rosbag::Bag bag(path_, rosbag::bagmode::Write);
+  bag.close();
+  EXPECT_TRUE(contains(refusal(path_), "it holds no places"));
+  bag.open(path_, rosbag::bagmode::Write);
+  bag.write("place", ros::Time(1), std_msgs::Header());
+  bag.close();
+  EXPECT_TRUE(contains(refusal(path_), "another type or version"));
+}
+
+TEST_F(PlacesFile, PlacesOfTwoCamerasAreRefused) {
+  places_[1].features.camera.fx += 1.0;
+  save(path_);
+  EXPECT_TRUE(contains(refusal(path_), "its places 0 and 1 are of different cameras"));
+}
+
+TEST_F(PlacesFile, ATruncatedFileIsRefused) {
+  save(path_);
+  fs::resize_file(path_, fs::file_size(path_) / 2);
+  refusal(path_);
+}
+
+}  // namespace
+}  // namespace sdvo
