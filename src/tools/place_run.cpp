@@ -5,6 +5,7 @@
 #include <ctime>
 #include <fstream>
 #include <map>
+#include <set>
 #include <stdexcept>
 
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
@@ -21,8 +22,7 @@ double angle(const Eigen::Isometry3d& T) {
 }  // namespace
 
 void PlaceRun::process(const StereoFeatures& features, const OdometryResult& odometry) {
-  const int number = static_cast<int>(pairs_.size());
-  stamps_.push_back(odometry.stamp);
+  const int number = static_cast<int>(pairs_.size() - first_pair_);
   pairs_.push_back({static_cast<int>(keyframes_.size()) - 1,
                     odometry.has_pose || pairs_.empty() ? odometry.T_origin_camera : pairs_.back().T_odom_camera});
   if (!odometry.has_pose) return;
@@ -43,9 +43,15 @@ void PlaceRun::process(const StereoFeatures& features, const OdometryResult& odo
   keyframes_.push_back({number, *report});
 }
 
+void PlaceRun::startSequence() {
+  first_pair_ = pairs_.size();
+  first_keyframe_ = keyframes_.size();
+}
+
 Trajectory PlaceRun::poses() const {
   Trajectory poses;
-  for (const auto& [keyframe, T_odom_camera] : pairs_) {
+  for (std::size_t i = first_pair_; i < pairs_.size(); ++i) {
+    const auto& [keyframe, T_odom_camera] = pairs_[i];
     Eigen::Isometry3d T_map_odom = Eigen::Isometry3d::Identity();
     if (keyframe >= 0) {
       const Place& place = recognition_.places().at(keyframes_[keyframe].report.id);
@@ -59,7 +65,7 @@ Trajectory PlaceRun::poses() const {
 bool PlaceRun::isRevisit(const Trajectory& truth, const Keyframe& keyframe) const {
   constexpr double kNear = 5.0, kSameDirection = 30.0;  // m, deg
   const Place& here = recognition_.places().at(keyframe.report.id);
-  return std::any_of(keyframes_.begin(), keyframes_.end(), [&](const Keyframe& other) {
+  return std::any_of(ownKeyframes(), keyframes_.end(), [&](const Keyframe& other) {
     const Place& place = recognition_.places().at(other.report.id);
     if (static_cast<double>(here.features.stamp - place.features.stamp) * 1e-9 < options_.min_age ||
         here.travelled - place.travelled < options_.min_travel)
@@ -71,28 +77,34 @@ bool PlaceRun::isRevisit(const Trajectory& truth, const Keyframe& keyframe) cons
 
 PlaceErrors PlaceRun::errors(const Trajectory& truth) const {
   constexpr double kWrong = 1.0, kWrongAngle = 5.0;  // m, deg
-  if (truth.size() < pairs_.size()) throw std::invalid_argument("fewer true poses than pairs");
+  const std::size_t pairs = pairs_.size() - first_pair_;
+  if (truth.size() < pairs) throw std::invalid_argument("fewer true poses than pairs");
   PlaceErrors errors;
   std::map<int, int> pair_of;
-  std::map<int, bool> has_loop;
-  for (const Keyframe& keyframe : keyframes_) pair_of[keyframe.report.id] = keyframe.pair;
+  for (auto keyframe = ownKeyframes(); keyframe != keyframes_.end(); ++keyframe)
+    pair_of[keyframe->report.id] = keyframe->pair;
+  std::set<int> recognised;
   for (const GraphEdge& edge : recognition_.graph().edges()) {
-    if (edge.kind != GraphEdge::Kind::kLoop) continue;
-    has_loop[edge.to] = true;
+    if (edge.kind != GraphEdge::Kind::kLoop || pair_of.count(edge.to) == 0) continue;
+    ++errors.loops;
+    if (pair_of.count(edge.from) == 0) {
+      ++errors.false_loops;
+      continue;
+    }
+    recognised.insert(edge.to);
     const Eigen::Isometry3d T_true = truth[pair_of.at(edge.from)].inverse() * truth[pair_of.at(edge.to)];
     const Eigen::Isometry3d error = T_true.inverse() * edge.T_from_to;
-    ++errors.loops;
     errors.false_loops += error.translation().norm() > kWrong || angle(error) > kWrongAngle;
     errors.worst_translation = std::max(errors.worst_translation, error.translation().norm());
     errors.worst_rotation = std::max(errors.worst_rotation, angle(error));
   }
-  for (const Keyframe& keyframe : keyframes_) {
-    if (!isRevisit(truth, keyframe)) continue;
+  for (auto keyframe = ownKeyframes(); keyframe != keyframes_.end(); ++keyframe) {
+    if (!isRevisit(truth, *keyframe)) continue;
     ++errors.revisits;
-    errors.recognised += has_loop[keyframe.report.id];
+    errors.recognised += recognised.count(keyframe->report.id) > 0;
   }
   Trajectory before;
-  for (const Pair& pair : pairs_) before.push_back(pair.T_odom_camera);
+  for (std::size_t i = first_pair_; i < pairs_.size(); ++i) before.push_back(pairs_[i].T_odom_camera);
   errors.ate_before = evaluateTrajectory(truth, before).ate_aligned_m;
   errors.ate_after = evaluateTrajectory(truth, poses()).ate_aligned_m;
   return errors;
@@ -116,7 +128,7 @@ void PlaceRun::writeKeyframes(const std::string& path) const {
   file << "id,pair,stamp_ns,features,best,score,same,matches,inliers,coverage,rms_px,loop,find_ms,verify_ms,reason\n";
   for (const auto& [pair, report] : keyframes_) {
     const bool any = !report.candidates.empty();
-    file << report.id << "," << pair << "," << stamps_[pair] << ","
+    file << report.id << "," << pair << "," << recognition_.places().at(report.id).features.stamp << ","
          << recognition_.places().at(report.id).features.count() << "," << (any ? report.candidates.front().place : -1)
          << "," << (any ? report.candidates.front().score : 0.0) << "," << report.same.value_or(-1) << ","
          << report.match.matches << "," << report.match.inliers << "," << report.match.coverage << ","

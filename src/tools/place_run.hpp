@@ -1,6 +1,6 @@
 #pragma once
 
-#include <cstdint>
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -15,7 +15,7 @@ struct PlaceErrors {
   int revisits = 0;     ///< key frames where the camera had been before: within 5 m and 30 degrees
   int recognised = 0;   ///< of these, those that a loop was accepted for
   int loops = 0;        ///< accepted
-  int false_loops = 0;  ///< of these, those wrong by more than 1 m or 5 degrees
+  int false_loops = 0;  ///< of these, those wrong by more than 1 m or 5 degrees, and all to another sequence
   double worst_translation = 0.0, worst_rotation = 0.0;  ///< of any accepted loop, m and deg
   double ate_before = 0.0, ate_after = 0.0;              ///< m, rmse of all pairs after the best rigid alignment
 };
@@ -26,6 +26,10 @@ class PlaceRun {
   explicit PlaceRun(const PlaceRecognitionOptions& options) : options_(options), recognition_(options) {}
 
   void process(const StereoFeatures& features, const OdometryResult& odometry);
+
+  /// What comes now is another sequence, in a place that none of those before has seen. Poses and errors are of the
+  /// last one.
+  void startSequence();
 
   const PlaceRecognition& recognition() const { return recognition_; }
 
@@ -44,22 +48,25 @@ class PlaceRun {
 
  private:
   struct Keyframe {
-    int pair;
+    int pair;  ///< number in its sequence
     PlaceReport report;
   };
   struct Pair {
     int keyframe;  ///< the last one, by its place in `keyframes_`; -1 before the first
     Eigen::Isometry3d T_odom_camera;
   };
+  std::vector<Keyframe>::const_iterator ownKeyframes() const {
+    return keyframes_.begin() + static_cast<std::ptrdiff_t>(first_keyframe_);
+  }
   bool isRevisit(const Trajectory& truth, const Keyframe& keyframe) const;
 
   PlaceRecognitionOptions options_;
   PlaceRecognition recognition_;
   std::vector<Keyframe> keyframes_;
   std::vector<Pair> pairs_;
-  std::vector<std::int64_t> stamps_;
   double cpu_time_ = 0.0, longest_optimisation_ = 0.0;  ///< ms
   bool had_pose_ = false;
+  std::size_t first_pair_ = 0, first_keyframe_ = 0;  ///< of the last sequence
 };
 
 }  // namespace sdvo

@@ -19,7 +19,7 @@ namespace {
 
 struct Arguments {
   std::string sequence, config, truth, odometry, poses, keyframes;
-  std::vector<std::string> settings;
+  std::vector<std::string> before, settings;
   int frames = 0;
 };
 
@@ -30,22 +30,28 @@ void printErrors(const sdvo::PlaceErrors& errors) {
             << "ATE before " << errors.ate_before << " m, after " << errors.ate_after << " m\n";
 }
 
+void drive(const std::string& directory, int frames, sdvo::OfflineRun& odometry, sdvo::PlaceRun& places) {
+  const sdvo::KittiSequence sequence(directory);
+  const int count = frames > 0 ? std::min(frames, sequence.size()) : sequence.size();
+  sdvo::Progress progress("places", count);
+  for (int i = 0; i < count; ++i, progress.step()) {
+    const sdvo::ImagePair pair = sequence.load(i);
+    const sdvo::StereoFeatures features = odometry.process(sequence.camera(), pair.left, pair.right, sequence.stamp(i));
+    places.process(features, odometry.last());
+  }
+}
+
 int runPlaces(const Arguments& arguments) {
   const sdvo::PipelineOptions options = sdvo::readPipelineOptions(arguments.config, arguments.settings);
-  const sdvo::KittiSequence sequence(arguments.sequence);
-  const int count = arguments.frames > 0 ? std::min(arguments.frames, sequence.size()) : sequence.size();
   cv::setNumThreads(1);
-  sdvo::OfflineRun odometry(options);
   sdvo::PlaceRun places(options.place_recognition);
-  {
-    sdvo::Progress progress("places", count);
-    for (int i = 0; i < count; ++i, progress.step()) {
-      const sdvo::ImagePair pair = sequence.load(i);
-      const sdvo::StereoFeatures features =
-          odometry.process(sequence.camera(), pair.left, pair.right, sequence.stamp(i));
-      places.process(features, odometry.last());
-    }
+  for (const std::string& before : arguments.before) {
+    sdvo::OfflineRun odometry(options);
+    drive(before, 0, odometry, places);
+    places.startSequence();
   }
+  sdvo::OfflineRun odometry(options);
+  drive(arguments.sequence, arguments.frames, odometry, places);
   sdvo::writeKittiPoses(arguments.poses, places.poses());
   if (!arguments.odometry.empty()) sdvo::writeKittiPoses(arguments.odometry, odometry.poses());
   if (!arguments.keyframes.empty()) places.writeKeyframes(arguments.keyframes);
@@ -53,7 +59,7 @@ int runPlaces(const Arguments& arguments) {
   const sdvo::PlaceRecognition& recognition = places.recognition();
   const auto kept = static_cast<double>(std::max<std::size_t>(recognition.places().size(), 1));
   const double bytes = static_cast<double>(recognition.bytes()) / kept;
-  std::cout << std::fixed << std::setprecision(1) << count << " pairs, " << odometry.distance() << " m, "
+  std::cout << std::fixed << std::setprecision(1) << odometry.pairs() << " pairs, " << odometry.distance() << " m, "
             << recognition.places().size() << " key frames of " << bytes / 1e3 << " kB, "
             << odometry.distance() / kept * 1e6 / bytes << " km per GB, " << recognition.graph().loops() << " loops\n"
             << std::setprecision(2) << "time per key frame: median " << places.keyframeTime(0.5) << " ms, p95 "
@@ -74,6 +80,8 @@ int main(int argc, char** argv) {
                  "option as name=value, for example place_recognition/keyframe_distance=2; repeatable")
       ->allow_extra_args(false);
   app.add_option("--frames", arguments.frames, "process only the first N pairs")->check(CLI::Range(1, 1000000));
+  app.add_option("--before", arguments.before, "sequences of other places that were driven before; repeatable")
+      ->allow_extra_args(false);
   app.add_option("--poses", arguments.poses, "poses in the map to write, 12 numbers a line")->required();
   app.add_option("--odometry", arguments.odometry, "poses of the odometry to write, 12 numbers a line");
   app.add_option("--keyframes", arguments.keyframes, "CSV to write, a line for each key frame");
