@@ -138,13 +138,13 @@ TEST(MapGraphMessage, HoldsAllOfAGraph) {
 TEST(MapGraphMessage, CovariancesAreInTheParentsAxes) {
   GraphEdge edge;
   edge.to = 1;
-  edge.T_from_to.linear() = Eigen::AngleAxisd(0.5 * CV_PI, Eigen::Vector3d::UnitZ()).toRotationMatrix();
+  // The child's x axis is the parent's y axis, its y axis the parent's z axis.
+  edge.T_from_to.linear() << 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0;
   edge.covariance.diagonal() << 1.0, 2.0, 3.0, 4.0, 5.0, 6.0;
   const PoseGraph graph(PoseGraphOptions(), {{0, Eigen::Isometry3d::Identity()}, {1, edge.T_from_to}}, {edge});
   const msgs::MapGraph message = toMessage(MapState{graph, {}}, "", "map");
-  // The child's x axis is the parent's y axis.
   const auto& covariance = message.edges[0].motion.covariance;
-  const double expected[] = {2.0, 1.0, 3.0, 5.0, 4.0, 6.0};
+  const double expected[] = {3.0, 1.0, 2.0, 6.0, 4.0, 5.0};
   for (int i = 0; i < 6; ++i) EXPECT_NEAR(covariance[7 * i], expected[i], 1e-12) << i;
 }
 

@@ -73,6 +73,14 @@ TEST_F(PlacesFile, PathsThatCannotBeWrittenAreRefused) {
   EXPECT_TRUE(contains(errorOf([&] { save(path_ + "/places.bag"); }), "cannot be written"));
 }
 
+TEST_F(PlacesFile, WhatCannotBeWrittenToItsEndLeavesTheFileOfBefore) {
+  save(path_);
+  places_[2].features.stamp = 0;
+  EXPECT_TRUE(contains(errorOf([&] { save(path_); }), "cannot be written"));
+  EXPECT_FALSE(fs::exists(path_ + ".partial"));
+  EXPECT_EQ(loadPlaces(path_, {}).places.size(), 3u);
+}
+
 TEST_F(PlacesFile, FilesThatAreNoneAreRefused) {
   EXPECT_TRUE(contains(refusal("places.bag"), "the path must be absolute"));
   EXPECT_TRUE(contains(refusal(path_), "there is no such file"));
