@@ -107,7 +107,7 @@ void PlaceRecognition::addKeyframe(const StereoFeatures& features, int id) {
     edge.T_from_to = places_.at(*last_).T_odom_camera.inverse() * place.T_odom_camera;
     edge.length = way_.length;
     edge.turn = way_.turn;
-    edge.covariance = way_.covariance + drift(way_.length, way_.turn);
+    edge.covariance = way_.covariance;
     graph_.extend(edge);
   } else {
     GraphEdge edge;
@@ -160,17 +160,10 @@ bool PlaceRecognition::isPossible(const GraphEdge& loop) const {
   // A loop may be less exact than it says; small corrections are never out of question, or an inexact loop would keep
   // all better ones out.
   const Matrix6d inexact = isotropic(0.5, 0.03);
-  const Matrix6d covariance = path.covariance + loop.covariance + drift(path.length, path.turn) + inexact;
+  const Matrix6d covariance = path.covariance + loop.covariance + graph_.drift(path.length, path.turn) + inexact;
   const Eigen::Isometry3d T_from_to = graph_.nodes().at(loop.from).inverse() * graph_.nodes().at(loop.to);
   const Vector6d correction = logSE3(T_from_to.inverse() * loop.T_from_to);
   return correction.dot(covariance.ldlt().solve(correction)) <= kImpossible;
-}
-
-/// What is wrong with a rig adds up along the way instead of averaging out; its covariance does not know. Nothing is
-/// known better than to a millimetre.
-Matrix6d PlaceRecognition::drift(double length, double turn) const {
-  const double rotation = options_.drift_rotation * kPi / 180.0 * length + options_.drift_turn * turn;
-  return isotropic(1e-3 + options_.drift_translation * length + 0.5 * rotation * length, 1e-4 + rotation);
 }
 
 Eigen::Isometry3d PlaceRecognition::T_map_odom() const {

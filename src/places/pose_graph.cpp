@@ -19,11 +19,11 @@ namespace {
 /// Where two nodes are, as their edge does not want it: residual of its right perturbation in standard deviations.
 class EdgeResidual {
  public:
-  explicit EdgeResidual(const GraphEdge& edge)
+  EdgeResidual(const GraphEdge& edge, const Matrix6d& covariance)
       : q_(edge.T_from_to.linear()),
         t_(edge.T_from_to.translation()),
         // L L^T = covariance: L^-1 makes unit variances.
-        whitening_(edge.covariance.llt().matrixL().solve(Matrix6d::Identity())) {}
+        whitening_(covariance.llt().matrixL().solve(Matrix6d::Identity())) {}
 
   template <class T>
   bool operator()(const T* q_from, const T* t_from, const T* q_to, const T* t_to, T* residual) const {
@@ -133,11 +133,48 @@ void PoseGraph::remove(int id) {
 }
 
 PoseGraph::Summary PoseGraph::optimise() {
+  constexpr double kMoreSlack = 3.2;
   Summary summary;
   if (loops() == 0) {
     summary.converged = true;
     return summary;
   }
+  solve(summary);
+  while (slack_ < 1.0 && !loopsHold()) {
+    slack_ = std::min(1.0, kMoreSlack * slack_);
+    solve(summary);
+  }
+  return summary;
+}
+
+Matrix6d PoseGraph::drift(double length, double turn) const {
+  constexpr double kRadians = 3.14159265358979323846 / 180.0;
+  const double rotation = options_.drift_rotation * kRadians * length + options_.drift_turn * turn;
+  const double translation = options_.drift_translation * length + 0.5 * rotation * length;
+  Vector6d variances;
+  variances << Eigen::Vector3d::Constant(translation * translation), Eigen::Vector3d::Constant(rotation * rotation);
+  return variances.asDiagonal();
+}
+
+/// With the drift that edges give way by, and never better than to a millimetre.
+Matrix6d PoseGraph::covariance(const GraphEdge& edge) const {
+  Vector6d least;
+  least << Eigen::Vector3d::Constant(1e-6), Eigen::Vector3d::Constant(1e-8);
+  return edge.covariance + slack_ * slack_ * drift(edge.length, edge.turn) + Matrix6d(least.asDiagonal());
+}
+
+/// Whether most loops are within the residual beyond which they count less.
+bool PoseGraph::loopsHold() const {
+  int all = 0, hold = 0;
+  for (const GraphEdge& edge : edges_) {
+    if (edge.kind != GraphEdge::Kind::kLoop) continue;
+    ++all;
+    hold += residual(edge) <= options_.loop_threshold;
+  }
+  return 2 * hold > all;
+}
+
+void PoseGraph::solve(Summary& summary) {
   std::map<int, NodePose> poses;
   for (const auto& [id, T] : nodes_) poses[id] = {Eigen::Quaterniond(T.linear()), T.translation()};
 
@@ -153,7 +190,7 @@ PoseGraph::Summary PoseGraph::optimise() {
   for (const GraphEdge& edge : edges_) {
     NodePose &from = poses.at(edge.from), &to = poses.at(edge.to);
     problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<EdgeResidual, 6, 4, 3, 4, 3>(new EdgeResidual(edge)),
+        new ceres::AutoDiffCostFunction<EdgeResidual, 6, 4, 3, 4, 3>(new EdgeResidual(edge, covariance(edge))),
         edge.kind == GraphEdge::Kind::kLoop ? new ceres::CauchyLoss(options_.loop_threshold) : nullptr,
         from.q.coeffs().data(), from.t.data(), to.q.coeffs().data(), to.t.data());
   }
@@ -165,21 +202,21 @@ PoseGraph::Summary PoseGraph::optimise() {
   ceres::Solve(options, &problem, &solved);
 
   summary.converged = solved.termination_type == ceres::CONVERGENCE;
-  summary.iterations = static_cast<int>(solved.iterations.size());
+  summary.iterations += static_cast<int>(solved.iterations.size());
   summary.initial_cost = solved.initial_cost;
   summary.final_cost = solved.final_cost;
-  summary.time = solved.total_time_in_seconds;
-  if (!solved.IsSolutionUsable()) return summary;
+  summary.time += solved.total_time_in_seconds;
+  if (!solved.IsSolutionUsable()) return;
   for (auto& [id, T] : nodes_) {
     const NodePose& pose = poses.at(id);
     T.linear() = pose.q.normalized().toRotationMatrix();
     T.translation() = pose.t;
   }
-  return summary;
 }
 
 bool PoseGraph::adopt(const PoseGraph& optimised) {
   if (optimised.moved_parts_ != moved_parts_) return false;
+  slack_ = optimised.slack_;
   const std::map<int, Eigen::Isometry3d> before = nodes_;
   for (auto& [id, T] : nodes_) {
     const auto better = optimised.nodes_.find(id);
@@ -241,7 +278,7 @@ GraphPath PoseGraph::path(int from, int to) const {
 
 double PoseGraph::residual(const GraphEdge& edge) const {
   const Vector6d error = logSE3(edge.T_from_to.inverse() * nodes_.at(edge.from).inverse() * nodes_.at(edge.to));
-  return std::sqrt(error.dot(edge.covariance.ldlt().solve(error)));
+  return std::sqrt(error.dot(covariance(edge).ldlt().solve(error)));
 }
 
 int PoseGraph::loops() const {

@@ -55,6 +55,7 @@ msgs::MapEdge edgeMessage(const GraphEdge& edge) {
   message.to_id = static_cast<std::uint32_t>(edge.to);
   message.motion = toMessage(edge.T_from_to, edge.covariance);
   message.length = edge.length;
+  message.turn = edge.turn;
   return message;
 }
 
@@ -64,9 +65,10 @@ GraphEdge edgeOf(const msgs::MapEdge& message) {
   edge.from = toInt(message.from_id, "id");
   edge.to = toInt(message.to_id, "id");
   fromMessage(message.motion, edge.T_from_to, edge.covariance);
-  if (!(std::isfinite(message.length) && message.length >= 0.0))
-    throw std::invalid_argument("the length of an edge is not a number or negative");
+  if (!(std::isfinite(message.length) && message.length >= 0.0 && std::isfinite(message.turn) && message.turn >= 0.0))
+    throw std::invalid_argument("the length or the turn of an edge is not a number or negative");
   edge.length = message.length;
+  edge.turn = message.turn;
   return edge;
 }
 

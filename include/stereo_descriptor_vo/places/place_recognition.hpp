@@ -27,9 +27,6 @@ struct PlaceRecognitionOptions {
   double min_age = 20.0;
   double min_travel = 30.0;
   int candidates = 1;
-  double drift_translation = 0.03;
-  double drift_rotation = 0.01;
-  double drift_turn = 0.01;
   PlaceIndexOptions index;
   PlaceVerifierOptions verifier;
   LoopAgreementOptions agreement;
@@ -44,10 +41,6 @@ struct PlaceRecognitionOptions {
     list.add("min_age", min_age, {0.0, 3600.0}, "s", "no place is looked for among key frames younger than that");
     list.add("min_travel", min_travel, {0.0, 10000.0}, "m", "… or from which the way here is shorter");
     list.add("candidates", candidates, {1, 100}, "", "places that geometry looks at for each key frame");
-    list.add("drift_translation", drift_translation, {0.0, 1.0}, "m/m",
-             "error of the odometry, beyond its covariance, that a loop may have to take back");
-    list.add("drift_rotation", drift_rotation, {0.0, 10.0}, "deg/m", "the same of its rotation, for the way");
-    list.add("drift_turn", drift_turn, {0.0, 1.0}, "rad/rad", "… and for what it turned");
     list.group("index", index);
     list.group("verifier", verifier);
     list.group("agreement", agreement);
@@ -112,7 +105,6 @@ class PlaceRecognition {
   void addKeyframe(const StereoFeatures& features, int id);
   void recognise(const Place& here, PlaceReport& report);
   bool isPossible(const GraphEdge& loop) const;
-  Matrix6d drift(double length, double turn) const;
 
   PlaceRecognitionOptions options_;
   PlaceIndex index_;

@@ -11,10 +11,17 @@
 namespace sdvo {
 
 struct PoseGraphOptions {
+  double drift_translation = 0.03;
+  double drift_rotation = 0.01;
+  double drift_turn = 0.01;
   double loop_threshold = 3.0;
   int iterations = 50;
 
   void describe(OptionList& list) {
+    list.add("drift_translation", drift_translation, {0.0, 1.0}, "m/m",
+             "largest error of the odometry, beyond its covariance, that a loop may have to take back");
+    list.add("drift_rotation", drift_rotation, {0.0, 10.0}, "deg/m", "the same of its rotation, for the way");
+    list.add("drift_turn", drift_turn, {0.0, 1.0}, "rad/rad", "… and for what it turned");
     list.add("loop_threshold", loop_threshold, {0.1, 100.0}, "",
              "residual of a loop, in standard deviations, beyond which it counts less and less");
     list.add("iterations", iterations, {1, 1000}, "", "largest number of steps of one optimisation");
@@ -31,7 +38,7 @@ struct GraphEdge {
   int from = 0, to = 0;
   Kind kind = Kind::kOdometry;
   Eigen::Isometry3d T_from_to = Eigen::Isometry3d::Identity();
-  Matrix6d covariance = Matrix6d::Identity();  ///< of its right perturbation, m and rad
+  Matrix6d covariance = Matrix6d::Identity();  ///< of its right perturbation, without drift, m and rad
   double length = 0.0;                         ///< of the way between, m; zero for a loop
   double turn = 0.0;                           ///< sum of all turns on it, rad; zero for a loop
 };
@@ -68,6 +75,8 @@ class PoseGraph {
 
   /// Moves all nodes but the first so that the edges agree best (Levenberg-Marquardt over SE(3), sparse Cholesky, by
   /// Ceres). Loops that disagree with the rest count little (Cauchy's loss).
+  /// The odometry's edges are as stiff as the loops allow: they give way by a small share of the largest drift, and by
+  /// more where loops disagree with that.
   struct Summary {
     bool converged = false;
     int iterations = 0;
@@ -82,6 +91,10 @@ class PoseGraph {
 
   GraphPath path(int from, int to) const;
 
+  /// What is wrong with a rig adds up along the way instead of averaging out, and the odometry's covariance does not
+  /// know. The covariance of that at its largest, for a way of so many m that turned by so many rad.
+  Matrix6d drift(double length, double turn) const;
+
   /// Residual of an edge at the present poses, in standard deviations (the root of its chi-square of six).
   double residual(const GraphEdge& edge) const;
 
@@ -90,10 +103,15 @@ class PoseGraph {
   int loops() const;
 
  private:
+  Matrix6d covariance(const GraphEdge& edge) const;
+  void solve(Summary& summary);
+  bool loopsHold() const;
+
   PoseGraphOptions options_;
   std::map<int, Eigen::Isometry3d> nodes_;  ///< T_map_node
   std::vector<GraphEdge> edges_;
   int moved_parts_ = 0;
+  double slack_ = 0.1;  ///< share of the largest drift that edges give way by
 };
 
 }  // namespace sdvo
