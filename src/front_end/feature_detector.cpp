@@ -107,11 +107,12 @@ std::vector<Corner> detectAll(const cv::Mat& image, const FeatureDetectorOptions
 
 /// A corner that wanders off is not one point; its integer position is kept. Gradient detectors answer up to half their
 /// window inside of a corner, hence the limit.
-void refinePositions(const cv::Mat& image, int radius, float largest_shift, std::vector<Corner>& corners) {
+void refinePositions(const cv::Mat& image, int radius, int clearance, float largest_shift,
+                     std::vector<Corner>& corners) {
   if (corners.empty()) return;
   const cv::Rect2f inside(0.f, 0.f, static_cast<float>(image.cols - 1), static_cast<float>(image.rows - 1));
   thread_local cv::Mat scratch;
-  const CornerRefiner refiner(image, radius, scratch);
+  const CornerRefiner refiner(image, radius, clearance, scratch);
   cv::parallel_for_(cv::Range(0, static_cast<int>(corners.size())), [&](const cv::Range& range) {
     for (int i = range.start; i < range.end; ++i) {
       const auto refined = refiner.refine(corners[i].position, largest_shift);
@@ -241,7 +242,7 @@ std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border, co
   if (options_.subpixel) {
     const bool gradient = options_.type == DetectorType::kGftt || options_.type == DetectorType::kHarris;
     const float largest_shift = gradient ? 0.5f * static_cast<float>(options_.corner_block_size) : 1.5f;  // px
-    refinePositions(image, options_.subpixel_radius, largest_shift, corners);
+    refinePositions(image, options_.subpixel_radius, border, largest_shift, corners);
   }
   return corners;
 }
