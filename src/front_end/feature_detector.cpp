@@ -181,11 +181,11 @@ std::vector<Corner> spreadOverBuckets(const std::vector<Corner>& corners, cv::Si
   };
   // The corners bucket by bucket, and where each bucket ends; it begins where the one before ends.
   const std::size_t buckets = static_cast<std::size_t>(columns) * rows;
-  std::vector<std::size_t> end(buckets + 1, 0);
-  for (const Corner& corner : corners) ++end[bucketOf(corner) + 1];
+  std::vector<std::size_t> end(buckets + 1, 0), bucket_of(corners.size());
+  for (std::size_t i = 0; i < corners.size(); ++i) ++end[(bucket_of[i] = bucketOf(corners[i])) + 1];
   std::partial_sum(end.begin(), end.end(), end.begin());
   std::vector<Corner> sorted(corners.size());
-  for (const Corner& corner : corners) sorted[end[bucketOf(corner)]++] = corner;
+  for (std::size_t i = 0; i < corners.size(); ++i) sorted[end[bucket_of[i]]++] = corners[i];
   const auto begin = [&](std::size_t bucket) { return bucket == 0 ? 0 : end[bucket - 1]; };
 
   // Serve every bucket's strongest corner, then every second strongest, …; the last round goes to the strongest of it.

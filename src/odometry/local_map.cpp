@@ -56,6 +56,7 @@ bool LocalMap::continuedBy(const StereoFeatures& features) const {
 LocalMap::View LocalMap::view() const {
   View view;
   view.rows.kind = kind_;
+  view.point.reserve(points_.size()), view.seen.reserve(points_.size()), view.pixels.reserve(points_.size());
   const std::size_t first_remembered = frames_.size() - std::min(frames_.size(), std::size_t(options_.remembered));
   const int oldest = frames_[first_remembered].id;
   for (std::size_t p = 0; p < points_.size(); ++p) {
@@ -70,6 +71,7 @@ LocalMap::View LocalMap::view() const {
     view.pixels.emplace_back(static_cast<float>(predicted.x()), static_cast<float>(predicted.y()),
                              static_cast<float>(std::max(predicted.z(), kFarthestDisparity)));
   }
+  view.rows.positions.reserve(view.point.size());
   view.rows.descriptors.create(static_cast<int>(view.point.size()), kind_.bytes, CV_8U);
   for (std::size_t row = 0; row < view.point.size(); ++row) {
     const cv::Point3f& pixel = view.pixels[row];
@@ -291,11 +293,13 @@ void LocalMap::removeFrame(std::size_t index) {
   // The others close up in their order; what nothing sees any more keeps its memory for a new point.
   auto kept = points_.begin();
   for (auto point = points_.begin(); point != points_.end(); ++point) {
-    if (point->observations.empty()) continue;
-    if (kept != point) std::swap(*kept, *point);
-    ++kept;
+    if (point->observations.empty()) {
+      spare_.push_back(std::move(*point));
+    } else {
+      if (kept != point) *kept = std::move(*point);
+      ++kept;
+    }
   }
-  std::move(kept, points_.end(), std::back_inserter(spare_));
   points_.erase(kept, points_.end());
 }
 
@@ -312,6 +316,10 @@ LocalMap::Adjustment LocalMap::adjust(const WindowOptimizerOptions& options, con
   }
   std::vector<std::pair<int, int>> sources;  // point and its observation, for each of the window's observations
   std::vector<int> used;
+  std::size_t sightings = 0;
+  for (const Point& point : points_) sightings += point.observations.size();
+  sources.reserve(sightings), window.observations.reserve(sightings);
+  used.reserve(points_.size()), window.points.reserve(points_.size());
   for (std::size_t p = 0; p < points_.size(); ++p) {
     const Point& point = points_[p];
     if (point.observations.size() < 2) continue;
