@@ -182,6 +182,7 @@ std::vector<FeatureMatch> FeatureMatcher::match(const DescribedPoints& reference
   }
 
   std::vector<FeatureMatch> matches;
+  matches.reserve(of_reference.size());
   for (int i = 0; i < reference.count(); ++i) {
     if (!of_reference[i].found()) continue;
     const int j = of_reference[i].index();
