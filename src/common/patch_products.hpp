@@ -38,9 +38,19 @@ struct RemoveMean {
 template <class Vector>
 struct Products {
   Vector aa{}, ab{}, ac{}, bb{}, bc{}, cc{};
+
+  SDVO_IN_KERNEL void add(const Vector& a, const Vector& b, const Vector& c) {
+    aa += a * a, ab += a * b, ac += a * c;
+    bb += b * b, bc += b * c, cc += c * c;
+  }
 };
 
 using LaneProducts = Products<float>;
+
+SDVO_IN_KERNEL LaneProducts sumOf(const Products<Lanes>& whole, const Products<HalfLanes>& rest) {
+  return {sumOf(whole.aa, rest.aa), sumOf(whole.ab, rest.ab), sumOf(whole.ac, rest.ac),
+          sumOf(whole.bb, rest.bb), sumOf(whole.bc, rest.bc), sumOf(whole.cc, rest.cc)};
+}
 
 /// Sums of the products of three arrays.
 struct SumProducts {
@@ -48,8 +58,7 @@ struct SumProducts {
   static SDVO_IN_KERNEL void add(const float* a, const float* b, const float* c, Products<Vector>& sums) {
     Vector u, v, w;
     load(a, u), load(b, v), load(c, w);
-    sums.aa += u * u, sums.ab += u * v, sums.ac += u * w;
-    sums.bb += v * v, sums.bc += v * w, sums.cc += w * w;
+    sums.add(u, v, w);
   }
 
   static SDVO_IN_KERNEL void run(int count, const float* a, const float* b, const float* c, LaneProducts* sums) {
@@ -58,8 +67,7 @@ struct SumProducts {
     int i = 0;
     for (; i + 8 <= count; i += 8) add(a + i, b + i, c + i, whole);
     if (i < count) add(a + i, b + i, c + i, rest);
-    *sums = {sumOf(whole.aa, rest.aa), sumOf(whole.ab, rest.ab), sumOf(whole.ac, rest.ac),
-             sumOf(whole.bb, rest.bb), sumOf(whole.bc, rest.bc), sumOf(whole.cc, rest.cc)};
+    *sums = sumOf(whole, rest);
   }
 };
 

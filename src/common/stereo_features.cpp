@@ -33,6 +33,10 @@ std::string toString(const DescriptorKind& kind) {
          nameOf(kind.element_type) + ")";
 }
 
+void StereoFeatures::reserve(int count) {
+  forEachArray([&](const char*, auto array, auto) { (this->*array).reserve(static_cast<std::size_t>(count)); });
+}
+
 void StereoFeatures::append(const StereoFeature& feature) {
   forEachArray([&](const char*, auto array, auto number) { (this->*array).push_back(feature.*number); });
 }

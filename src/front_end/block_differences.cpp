@@ -1,10 +1,13 @@
 #include "stereo_descriptor_vo/front_end/block_differences.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "../common/kernel.hpp"
 
-#ifdef __SSE2__
+#ifdef SDVO_HAVE_AVX2
+#include <immintrin.h>
+#elif defined(__SSE2__)
 #include <emmintrin.h>
 #endif
 
@@ -46,11 +49,58 @@ struct BlockDifferences {
   }
 };
 
+#ifdef SDVO_HAVE_AVX2
+constexpr int kAtOnce = 16;  // blocks
+
+/// Pixels for eight blocks, and in the other half for the eight further right.
+SDVO_AVX2 inline __m256i loadTwice(const std::uint8_t* pixels) {
+  const auto* first = reinterpret_cast<const __m128i*>(pixels);
+  const auto* second = reinterpret_cast<const __m128i*>(pixels + 8);
+  return _mm256_inserti128_si256(_mm256_castsi128_si256(_mm_loadu_si128(first)), _mm_loadu_si128(second), 1);
+}
+
+/// At least kAtOnce blocks: each instruction compares four columns of one with those of eight others. The last ones may
+/// be done twice.
+template <int kRows>
+SDVO_AVX2 void blockDifferencesWithAvx2(const std::uint8_t* block, const std::uint8_t* others, std::ptrdiff_t step,
+                                        int count, unsigned* differences) {
+  constexpr int kLeft = kBlockWidth / 2;
+  block -= kRows * step + kLeft, others -= kRows * step + kLeft;
+  __m256i rows[2 * kRows + 1];
+#pragma GCC unroll 16
+  for (int row = 0; row <= 2 * kRows; ++row)
+    rows[row] = _mm256_broadcastsi128_si256(_mm_loadu_si128(reinterpret_cast<const __m128i*>(block + row * step)));
+  const __m256i reverse =
+      _mm256_broadcastsi128_si256(_mm_setr_epi8(14, 15, 12, 13, 10, 11, 8, 9, 6, 7, 4, 5, 2, 3, 0, 1));
+  for (int done = 0; done < count; done += kAtOnce) {
+    const int k = std::min(done, count - kAtOnce);
+    const std::uint8_t* leftmost = others - k - (kAtOnce - 1);
+    __m256i sums = _mm256_setzero_si256();  // 16 bits hold them: 11 rows of 16 bytes
+#pragma GCC unroll 16
+    for (int row = 0; row <= 2 * kRows; ++row) {
+      const __m256i left_half = loadTwice(leftmost + row * step), right_half = loadTwice(leftmost + row * step + 8);
+      // The last argument: which four columns, and where the others' begin.
+      sums = _mm256_add_epi16(sums, _mm256_mpsadbw_epu8(left_half, rows[row], 0b000'000));
+      sums = _mm256_add_epi16(sums, _mm256_mpsadbw_epu8(left_half, rows[row], 0b101'101));
+      sums = _mm256_add_epi16(sums, _mm256_mpsadbw_epu8(right_half, rows[row], 0b010'010));
+      sums = _mm256_add_epi16(sums, _mm256_mpsadbw_epu8(right_half, rows[row], 0b111'111));
+    }
+    const __m256i turned = _mm256_shuffle_epi8(sums, reverse);
+    auto* to = reinterpret_cast<__m256i*>(differences + k);
+    _mm256_storeu_si256(to, _mm256_cvtepu16_epi32(_mm256_extracti128_si256(turned, 1)));
+    _mm256_storeu_si256(to + 1, _mm256_cvtepu16_epi32(_mm256_castsi256_si128(turned)));
+  }
+}
+#endif
+
 }  // namespace
 
 template <int kRows>
 void blockDifferences(const std::uint8_t* block, const std::uint8_t* others, std::ptrdiff_t step, int count,
                       unsigned* differences) {
+#ifdef SDVO_HAVE_AVX2
+  if (usesAvx2() && count >= kAtOnce) return blockDifferencesWithAvx2<kRows>(block, others, step, count, differences);
+#endif
   runKernel<BlockDifferences<kRows>>(block, others, step, count, differences);
 }
 

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
 #include "../common/lanes.hpp"
+#include "stereo_descriptor_vo/front_end/image_margin.hpp"
 #include "stereo_descriptor_vo/front_end/patch_sampling.hpp"
 
 namespace sdvo {
@@ -44,9 +44,13 @@ struct SumGradients {
 
 }  // namespace
 
-CornerRefiner::CornerRefiner(const cv::Mat& image, int radius, cv::Mat& scratch)
-    : radius_(radius), margin_(patchStride(radius + 1) + 1), image_(scratch) {
-  cv::copyMakeBorder(image, scratch, margin_, margin_, margin_, margin_, cv::BORDER_REPLICATE);
+CornerRefiner::CornerRefiner(const cv::Mat& image, int radius, int clearance, cv::Mat& scratch)
+    : radius_(radius), margin_(0), image_(image) {
+  const int reach = stride() + 1;  // px that are read beside a start
+  if (clearance < reach) {
+    addMargin(image, reach, scratch);
+    image_ = scratch, margin_ = reach;
+  }
   // Weights fall off from the centre; they are zero beyond the square, where a patch's rows go on.
   const int rows = 2 * radius + 1;
   for (auto* values : {&weight_, &x_, &y_}) values->assign(static_cast<std::size_t>(rows * stride()), 0.f);

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <opencv2/imgproc.hpp>
 #include <vector>
 
 #include "../common/kernel.hpp"
 #include "stereo_descriptor_vo/front_end/block_differences.hpp"
 #include "stereo_descriptor_vo/front_end/half_image.hpp"
+#include "stereo_descriptor_vo/front_end/image_margin.hpp"
 #include "stereo_descriptor_vo/front_end/slanted_patch.hpp"
 
 namespace sdvo {
@@ -35,21 +35,17 @@ unsigned leastOf(const unsigned* values, int begin, int end) {
   return least;
 }
 
-void addMargin(const cv::Mat& image, cv::Mat& larger) {
-  cv::copyMakeBorder(image, larger, kMargin, kMargin, kMargin, kMargin, cv::BORDER_REPLICATE);
-}
-
 }  // namespace
 
 EpipolarMatcher::EpipolarMatcher(const EpipolarMatcherOptions& options, double max_dv, const cv::Mat& left,
                                  const cv::Mat& right, Images& scratch)
     : options_(options), max_dv_(max_dv), images_(scratch) {
-  addMargin(left, scratch.left);
-  addMargin(right, scratch.right);
+  addMargin(left, kMargin, scratch.left);
+  addMargin(right, kMargin, scratch.right);
   halveImage(left, scratch.half);
-  addMargin(scratch.half, scratch.left_half);
+  addMargin(scratch.half, kMargin, scratch.left_half);
   halveImage(right, scratch.half);
-  addMargin(scratch.half, scratch.right_half);
+  addMargin(scratch.half, kMargin, scratch.right_half);
 }
 
 std::optional<cv::Point2f> EpipolarMatcher::find(const cv::Point2f& left_position) const {

@@ -107,11 +107,12 @@ std::vector<Corner> detectAll(const cv::Mat& image, const FeatureDetectorOptions
 
 /// A corner that wanders off is not one point; its integer position is kept. Gradient detectors answer up to half their
 /// window inside of a corner, hence the limit.
-void refinePositions(const cv::Mat& image, int radius, float largest_shift, std::vector<Corner>& corners) {
+void refinePositions(const cv::Mat& image, int radius, int clearance, float largest_shift,
+                     std::vector<Corner>& corners) {
   if (corners.empty()) return;
   const cv::Rect2f inside(0.f, 0.f, static_cast<float>(image.cols - 1), static_cast<float>(image.rows - 1));
   thread_local cv::Mat scratch;
-  const CornerRefiner refiner(image, radius, scratch);
+  const CornerRefiner refiner(image, radius, clearance, scratch);
   cv::parallel_for_(cv::Range(0, static_cast<int>(corners.size())), [&](const cv::Range& range) {
     for (int i = range.start; i < range.end; ++i) {
       const auto refined = refiner.refine(corners[i].position, largest_shift);
@@ -180,11 +181,11 @@ std::vector<Corner> spreadOverBuckets(const std::vector<Corner>& corners, cv::Si
   };
   // The corners bucket by bucket, and where each bucket ends; it begins where the one before ends.
   const std::size_t buckets = static_cast<std::size_t>(columns) * rows;
-  std::vector<std::size_t> end(buckets + 1, 0);
-  for (const Corner& corner : corners) ++end[bucketOf(corner) + 1];
+  std::vector<std::size_t> end(buckets + 1, 0), bucket_of(corners.size());
+  for (std::size_t i = 0; i < corners.size(); ++i) ++end[(bucket_of[i] = bucketOf(corners[i])) + 1];
   std::partial_sum(end.begin(), end.end(), end.begin());
   std::vector<Corner> sorted(corners.size());
-  for (const Corner& corner : corners) sorted[end[bucketOf(corner)]++] = corner;
+  for (std::size_t i = 0; i < corners.size(); ++i) sorted[end[bucket_of[i]]++] = corners[i];
   const auto begin = [&](std::size_t bucket) { return bucket == 0 ? 0 : end[bucket - 1]; };
 
   // Serve every bucket's strongest corner, then every second strongest, …; the last round goes to the strongest of it.
@@ -241,7 +242,7 @@ std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border, co
   if (options_.subpixel) {
     const bool gradient = options_.type == DetectorType::kGftt || options_.type == DetectorType::kHarris;
     const float largest_shift = gradient ? 0.5f * static_cast<float>(options_.corner_block_size) : 1.5f;  // px
-    refinePositions(image, options_.subpixel_radius, largest_shift, corners);
+    refinePositions(image, options_.subpixel_radius, border, largest_shift, corners);
   }
   return corners;
 }

@@ -114,6 +114,7 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
                          static_cast<float>(depth_scale_.size(match.disparity))});
   }
   const DescribedKeypoints described = descriptor_.describe(left, right, keypoints);
+  features.reserve(static_cast<int>(described.index.size()));
   for (std::size_t row = 0; row < described.index.size(); ++row) {
     const int i = described.index[row];
     const Corner& corner = corners[matches[i].left_index];

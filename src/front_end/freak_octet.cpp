@@ -76,6 +76,7 @@ class FourBoxes {
 
 SDVO_AVX2 void measureWithAvx2(const cv::Mat& integral, const FreakKeypoint* keypoints, OctetMeans& means) {
   const FourBoxes boxes(integral);
+  const auto& pattern = Freak::pattern();
   for (std::size_t first = 0; first < kOctet; first += 4) {
     alignas(32) double us[4], vs[4], scales[4], cosines[4], sines[4];
     for (std::size_t k = 0; k < 4; ++k) {
@@ -87,7 +88,7 @@ SDVO_AVX2 void measureWithAvx2(const cv::Mat& integral, const FreakKeypoint* key
     const __m256d u = _mm256_load_pd(us), v = _mm256_load_pd(vs), scale = _mm256_load_pd(scales);
     const __m256d cosine = _mm256_load_pd(cosines), sine = _mm256_load_pd(sines);
     for (std::size_t i = 0; i < Freak::kFields; ++i) {
-      const Freak::Field& field = Freak::pattern()[i];
+      const Freak::Field& field = pattern[i];
       const __m256d fx = _mm256_set1_pd(field.x), fy = _mm256_set1_pd(field.y);
       const __m256d x = _mm256_sub_pd(_mm256_add_pd(u, _mm256_mul_pd(cosine, fx)), _mm256_mul_pd(sine, fy));
       const __m256d y = _mm256_add_pd(_mm256_add_pd(v, _mm256_mul_pd(sine, fx)), _mm256_mul_pd(cosine, fy));
@@ -99,21 +100,40 @@ SDVO_AVX2 void measureWithAvx2(const cv::Mat& integral, const FreakKeypoint* key
 }
 #endif
 
-struct CompareFields {
-  static SDVO_IN_KERNEL void run(const OctetMeans* means, std::uint8_t* const* rows) {
-    typedef std::int32_t LaneBits __attribute__((vector_size(sizeof(Lanes))));
-    for (int byte = 0; byte < Freak::kBytes; ++byte) {
-      LaneBits bits{};
-      for (int bit = 0; bit < 8; ++bit) {
-        const Freak::FieldPair& pair = Freak::pairs()[static_cast<std::size_t>(8 * byte + bit)];
-        Lanes a, b;
-        load((*means)[pair.first].data(), a), load((*means)[pair.second].data(), b);
-        bits |= (a > b) & (1 << bit);
-      }
-      for (int k = 0; k < kOctet; ++k) rows[k][byte] = static_cast<std::uint8_t>(bits[k]);
+void comparePlain(const OctetMeans& means, std::uint8_t* const* rows) {
+  typedef std::int32_t LaneBits __attribute__((vector_size(sizeof(Lanes))));
+  for (int byte = 0; byte < Freak::kBytes; ++byte) {
+    LaneBits bits{};
+    for (int bit = 0; bit < 8; ++bit) {
+      const Freak::FieldPair& pair = Freak::pairs()[static_cast<std::size_t>(8 * byte + bit)];
+      Lanes a, b;
+      load(means[pair.first].data(), a), load(means[pair.second].data(), b);
+      bits |= (a > b) & (1 << bit);
+    }
+    for (int k = 0; k < kOctet; ++k) rows[k][byte] = static_cast<std::uint8_t>(bits[k]);
+  }
+}
+
+#ifdef SDVO_HAVE_AVX2
+/// First one bit of all eight rows with each comparison, then 32 bits of one row with each mask.
+SDVO_AVX2 void compareWithAvx2(const OctetMeans& means, std::uint8_t* const* rows) {
+  const auto& pairs = Freak::pairs();
+  alignas(32) std::uint8_t bit_of_rows[Freak::kBits];
+  for (std::size_t bit = 0; bit < Freak::kBits; ++bit) {
+    const __m256 a = _mm256_loadu_ps(means[pairs[bit].first].data());
+    const __m256 b = _mm256_loadu_ps(means[pairs[bit].second].data());
+    bit_of_rows[bit] = static_cast<std::uint8_t>(_mm256_movemask_ps(_mm256_cmp_ps(a, b, _CMP_GT_OQ)));
+  }
+  for (int first = 0; first < Freak::kBits; first += 32) {
+    __m256i bits = _mm256_load_si256(reinterpret_cast<const __m256i*>(bit_of_rows + first));
+    for (int k = kOctet - 1; k >= 0; --k) {
+      const int of_row = _mm256_movemask_epi8(bits);  // each byte's highest bit
+      std::memcpy(rows[k] + first / 8, &of_row, sizeof of_row);
+      bits = _mm256_add_epi8(bits, bits);
     }
   }
-};
+}
+#endif
 
 }  // namespace
 
@@ -126,7 +146,10 @@ void measureOctet(const Freak& freak, const FreakKeypoint* keypoints, OctetMeans
 }
 
 void compareOctet(const OctetMeans& means, std::uint8_t* const* rows) {
-  runKernel<CompareFields>(&means, rows);
+#ifdef SDVO_HAVE_AVX2
+  if (usesAvx2()) return compareWithAvx2(means, rows);
+#endif
+  comparePlain(means, rows);
 }
 
 }  // namespace sdvo

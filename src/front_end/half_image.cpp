@@ -39,10 +39,22 @@ struct HalveRow {
   }
 };
 
+/// Also rounds to the nearest whole number, the even one of two, as cv::saturate_cast has it: means lie within 0…255
+/// but for their own rounding.
 struct AddRows {
   static SDVO_IN_KERNEL void run(const float* above, const float* middle, const float* below, float share_above,
-                                 float share_middle, float share_below, int count, float* sum) {
-    for (int k = 0; k < count; ++k) sum[k] = above[k] * share_above + middle[k] * share_middle + below[k] * share_below;
+                                 float share_middle, float share_below, int count, std::uint8_t* half) {
+    constexpr float kUnitsOnly = 12582912.f;  // 1.5 * 2^23: what is added to it loses its fraction
+    for (int k = 0; k < count; ++k) {
+      const float sum = above[k] * share_above + middle[k] * share_middle + below[k] * share_below;
+      half[k] = static_cast<std::uint8_t>(static_cast<int>((sum + kUnitsOnly) - kUnitsOnly));
+    }
+  }
+};
+
+struct ToFloat {
+  static SDVO_IN_KERNEL void run(const std::uint8_t* pixels, int count, float* values) {
+    for (int k = 0; k < count; ++k) values[k] = static_cast<float>(pixels[k]);
   }
 };
 
@@ -55,10 +67,10 @@ void halveImage(const cv::Mat& image, cv::Mat& half) {
 
   const Shares columns(image.cols), rows(image.rows);
   const std::size_t width = static_cast<std::size_t>(size.width);
-  std::vector<float> pixels(2 * width + 2, 0.f), above(width, 0.f), middle(width), below(width), sum(width);
+  std::vector<float> pixels(2 * width + 2, 0.f), above(width, 0.f), middle(width), below(width);
   const auto halveRow = [&](int row, std::vector<float>& result) {
     if (row >= image.rows) return std::fill(result.begin(), result.end(), 0.f);
-    std::copy_n(image.ptr(row), image.cols, pixels.begin() + 1);
+    runKernel<ToFloat>(image.ptr(row), image.cols, pixels.data() + 1);
     runKernel<HalveRow>(pixels.data() + 1, columns.before.data(), columns.here.data(), columns.after.data(), size.width,
                         result.data());
   };
@@ -68,9 +80,7 @@ void halveImage(const cv::Mat& image, cv::Mat& half) {
     halveRow(2 * k + 1, below);
     const std::size_t row = static_cast<std::size_t>(k);
     runKernel<AddRows>(above.data(), middle.data(), below.data(), rows.before[row], rows.here[row], rows.after[row],
-                       size.width, sum.data());
-    std::transform(sum.begin(), sum.end(), half.ptr(k),
-                   [](float value) { return cv::saturate_cast<std::uint8_t>(value); });
+                       size.width, half.ptr(k));
     std::swap(above, below);
   }
 }

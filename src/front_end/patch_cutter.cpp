@@ -1,9 +1,14 @@
 #include "stereo_descriptor_vo/front_end/patch_cutter.hpp"
 
+#include <algorithm>
 #include <array>
 #include <opencv2/imgproc.hpp>
 
 #include "../common/kernel.hpp"
+
+#ifdef SDVO_HAVE_AVX2
+#include <immintrin.h>
+#endif
 
 namespace sdvo {
 namespace {
@@ -14,64 +19,145 @@ using Floats = std::array<float, kMostEdges>;
 
 /// Positions between two columns or two rows of the integral.
 struct Edges {
-  std::array<int, kMostEdges> index{};
-  Floats share{};  ///< of the second one
-
-  /// From the edge before.
-  float distance(int k) const { return static_cast<float>(index[k] - index[k - 1]) + share[k] - share[k - 1]; }
+  std::array<int, kMostEdges> index;
+  Floats share;  ///< of the second one
+  Floats width;  ///< from here to the next edge; none behind the last one
 };
 
 /// `size`: columns or rows of the integral. Pixel p covers [p - 0.5, p + 0.5], and column p of the integral is its left
 /// edge.
-Edges edgesAround(float centre, const PatchLayout& layout, float spacing, int size) {
-  Edges edges;
-  for (int k = 0; k <= layout.side; ++k) {
-    const float offset = (static_cast<float>(k) - 0.5f * static_cast<float>(layout.side)) * spacing;
-    const float position = std::clamp(centre + 0.5f + offset, 0.f, static_cast<float>(size) - 1.001f);
-    edges.index[k] = static_cast<int>(position);
-    edges.share[k] = position - static_cast<float>(edges.index[k]);
+struct FindEdges {
+  static SDVO_IN_KERNEL void run(float centre, int side, float spacing, int size, Edges* edges) {
+    const float middle = centre + 0.5f, last = static_cast<float>(size) - 1.001f;
+    for (int k = 0; k < kMostEdges; ++k) {
+      const float offset = (static_cast<float>(k) - 0.5f * static_cast<float>(side)) * spacing;
+      const float position = std::clamp(middle + offset, 0.f, last);
+      edges->index[k] = static_cast<int>(position);
+      edges->share[k] = position - static_cast<float>(edges->index[k]);
+    }
+    edges->width[kMostEdges - 1] = 0.f;
+    for (int k = 0; k < kMostEdges - 1; ++k)
+      edges->width[k] =
+          static_cast<float>(edges->index[k + 1] - edges->index[k]) + edges->share[k + 1] - edges->share[k];
   }
+};
+
+Edges edgesAround(float centre, int side, float spacing, int size) {
+  Edges edges;
+  runKernel<FindEdges>(centre, side, spacing, size, &edges);
   return edges;
 }
 
-/// Sums along one row of the integral, at the edges. Since the patch's own corner they are small enough to be exact in
-/// single precision.
-struct SumsAtEdges {
-  static SDVO_IN_KERNEL void run(const int* integral, int origin, const Edges* edges, int count, float* sums) {
-    for (int k = 0; k < count; ++k) {
-      const int index = edges->index[k];
-      const float first = since(origin, integral[index]), second = since(origin, integral[index + 1]);
-      sums[k] = first + edges->share[k] * (second - first);
-    }
+/// The integral at the columns' edges, between rows of it. It counts from the patch's own corner: such sums are small
+/// enough to be exact in single precision.
+class Sums {
+ public:
+  Sums(const cv::Mat& integral, const Edges& columns, const Edges& rows)
+      : integral_(integral), columns_(columns), origin_(integral.ptr<int>(rows.index[0])[columns.index[0]]) {}
+
+  float at(int row, float share, int edge) const {
+    const float upper = inRow(row, edge), lower = inRow(row + 1, edge);
+    return upper + share * (lower - upper);
   }
-  static SDVO_IN_KERNEL float since(int origin, int sum) {
-    return static_cast<float>(static_cast<int>(static_cast<unsigned>(sum) - static_cast<unsigned>(origin)));
+
+ private:
+  float inRow(int row, int edge) const {
+    const int* sums = integral_.ptr<int>(row) + columns_.index[edge];
+    const float first = sinceOrigin(sums[0]), second = sinceOrigin(sums[1]);
+    return first + columns_.share[edge] * (second - first);
   }
+  float sinceOrigin(int sum) const {
+    return static_cast<float>(static_cast<int>(static_cast<unsigned>(sum) - static_cast<unsigned>(origin_)));
+  }
+
+  const cv::Mat& integral_;
+  const Edges& columns_;
+  int origin_;
 };
 
-/// What lies above an edge between two rows of the integral, for each square; and the means down to there.
-struct MeansOfRow {
-  static SDVO_IN_KERNEL void run(const float* upper, const float* lower, float share, const float* widths, float height,
-                                 int count, float* above, float* means) {
-    for (int i = 0; i < count; ++i) {
-      const float left = upper[i] + share * (lower[i] - upper[i]);
-      const float right = upper[i + 1] + share * (lower[i + 1] - upper[i + 1]);
-      const float upto = right - left, area = widths[i] * height;
-      means[i] = area > 0.f ? (upto - above[i]) / area : 0.f;
+void cutPlain(const cv::Mat& integral, const Edges& columns, const Edges& rows, int side, std::uint8_t* samples) {
+  const Sums sums(integral, columns, rows);
+  Floats above{};  // all that lies above a row of squares, for each of its columns
+  for (int j = 0; j <= side; ++j)
+    for (int i = 0; i < side; ++i) {
+      const float upto = sums.at(rows.index[j], rows.share[j], i + 1) - sums.at(rows.index[j], rows.share[j], i);
+      const float inside = upto - above[i];
       above[i] = upto;
+      if (j == 0) continue;
+      const float area = columns.width[i] * rows.width[j - 1];
+      *samples++ = cv::saturate_cast<std::uint8_t>(area > 0.f ? inside / area : 0.f);
     }
+}
+
+#ifdef SDVO_HAVE_AVX2
+/// Sums in a row at the edges, eight of them at once, with the operations of the plain form.
+class EightSums {
+ public:
+  SDVO_AVX2 EightSums(const Edges& columns, int origin) : columns_(columns), origin_(_mm256_set1_epi32(origin)) {}
+
+  SDVO_AVX2 __m256 inRow(const int* row, int r) const {
+    const __m256i index = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(&columns_.index[8 * r]));
+    // As 0, 1, 4, 5, 2, 3, 6, 7, so that the shuffles leave them in order. Two neighbours come with one read.
+    const __m256i turned = _mm256_permute4x64_epi64(index, 0xd8);
+    const auto* pairs = reinterpret_cast<const long long*>(row);
+    const __m256i low = _mm256_i32gather_epi64(pairs, _mm256_castsi256_si128(turned), sizeof(int));
+    const __m256i high = _mm256_i32gather_epi64(pairs, _mm256_extracti128_si256(turned, 1), sizeof(int));
+    const __m256 first = sinceOrigin(shuffled<0x88>(low, high)), second = sinceOrigin(shuffled<0xdd>(low, high));
+    const __m256 share = _mm256_loadu_ps(&columns_.share[8 * r]);
+    return _mm256_add_ps(first, _mm256_mul_ps(share, _mm256_sub_ps(second, first)));
   }
+
+ private:
+  template <int kChoice>
+  SDVO_AVX2 static __m256i shuffled(__m256i a, __m256i b) {
+    return _mm256_castps_si256(_mm256_shuffle_ps(_mm256_castsi256_ps(a), _mm256_castsi256_ps(b), kChoice));
+  }
+  SDVO_AVX2 __m256 sinceOrigin(__m256i sums) const { return _mm256_cvtepi32_ps(_mm256_sub_epi32(sums, origin_)); }
+
+  const Edges& columns_;
+  __m256i origin_;
 };
 
-/// To the nearest whole number, the even one of two, as cv::saturate_cast has it: means lie within 0…255 but for their
-/// own rounding.
-struct Round {
-  static SDVO_IN_KERNEL void run(const float* means, int count, std::uint8_t* samples) {
-    constexpr float kUnitsOnly = 12582912.f;  // 1.5 * 2^23: what is added to it loses its fraction
-    for (int i = 0; i < count; ++i)
-      samples[i] = static_cast<std::uint8_t>(static_cast<int>((means[i] + kUnitsOnly) - kUnitsOnly));
+/// Eight means as bytes, rounded to the nearest whole number, the even one of two.
+SDVO_AVX2 inline void storeRounded(__m256 means, std::uint8_t* bytes) {
+  const __m256i whole = _mm256_cvtps_epi32(means);
+  const __m128i words = _mm_packus_epi32(_mm256_castsi256_si128(whole), _mm256_extracti128_si256(whole, 1));
+  _mm_storel_epi64(reinterpret_cast<__m128i*>(bytes), _mm_packus_epi16(words, words));
+}
+
+/// The same row by row, eight columns at once.
+SDVO_AVX2 void cutWithAvx2(const cv::Mat& integral, const Edges& columns, const Edges& rows, int side,
+                           std::uint8_t* samples) {
+  const EightSums sums(columns, integral.ptr<int>(rows.index[0])[columns.index[0]]);
+  const __m256 zero = _mm256_setzero_ps();
+  const int registers = side / 8 + 1;  // that the edges need
+  __m256 upper[kMostEdges / 8], lower[kMostEdges / 8], above[kMostEdges / 8] = {zero, zero, zero};
+  std::array<float, kMostEdges + 8> across{};  // at the edges, and what a register reads beyond
+  std::array<std::uint8_t, PatchOptions::kMostSamples * PatchOptions::kMostSamples + 8> patch;
+  for (int j = 0; j <= side; ++j) {
+    const int row = rows.index[j];
+    // Where edges are a pixel apart, each row of the integral serves two of them.
+    const bool known = j > 0 && row == rows.index[j - 1] + 1;
+    const __m256 share = _mm256_set1_ps(rows.share[j]), height = _mm256_set1_ps(j > 0 ? rows.width[j - 1] : 0.f);
+    for (int r = 0; r < registers; ++r) {
+      upper[r] = known ? lower[r] : sums.inRow(integral.ptr<int>(row), r);
+      lower[r] = sums.inRow(integral.ptr<int>(row + 1), r);
+      _mm256_storeu_ps(&across[8 * r],
+                       _mm256_add_ps(upper[r], _mm256_mul_ps(share, _mm256_sub_ps(lower[r], upper[r]))));
+    }
+    for (int r = 0; 8 * r < side; ++r) {
+      const __m256 upto = _mm256_sub_ps(_mm256_loadu_ps(&across[8 * r + 1]), _mm256_loadu_ps(&across[8 * r]));
+      const __m256 inside = _mm256_sub_ps(upto, above[r]);
+      above[r] = upto;
+      if (j == 0) continue;
+      const __m256 area = _mm256_mul_ps(_mm256_loadu_ps(&columns.width[8 * r]), height);
+      const __m256 mean = _mm256_and_ps(_mm256_div_ps(inside, area), _mm256_cmp_ps(area, zero, _CMP_GT_OQ));
+      storeRounded(mean, &patch[(j - 1) * side + 8 * r]);
+    }
   }
-};
+  std::copy_n(patch.begin(), side * side, samples);
+}
+#endif
 
 }  // namespace
 
@@ -82,29 +168,12 @@ PatchCutter::PatchCutter(const PatchLayout& layout, const cv::Mat& image) : layo
 
 void PatchCutter::cut(float u, float v, float size, std::uint8_t* samples) const {
   const float spacing = layout_.spacing(size);
-  const Edges columns = edgesAround(u, layout_, spacing, integral_.cols);
-  const Edges rows = edgesAround(v, layout_, spacing, integral_.rows);
-  const int origin = integral_.ptr<int>(rows.index[0])[columns.index[0]];
-  const int side = layout_.side, edges = (side + 1 + 7) / 8 * 8;
-  const auto sumsAt = [&](int row, Floats& sums) {
-    runKernel<SumsAtEdges>(integral_.ptr<int>(row), origin, &columns, edges, sums.data());
-  };
-  Floats upper{}, lower{}, widths{}, above{}, means{};
-  for (int i = 0; i < side; ++i) widths[i] = columns.distance(i + 1);
-  for (int j = 0; j <= side; ++j) {
-    // Where edges are a pixel apart, each row of the integral serves two of them.
-    if (j > 0 && rows.index[j] == rows.index[j - 1] + 1)
-      upper = lower;
-    else
-      sumsAt(rows.index[j], upper);
-    sumsAt(rows.index[j] + 1, lower);
-    const float height = j > 0 ? rows.distance(j) : 0.f;
-    runKernel<MeansOfRow>(upper.data(), lower.data(), rows.share[j], widths.data(), height, side, above.data(),
-                          means.data());
-    if (j == 0) continue;
-    runKernel<Round>(means.data(), side, samples);
-    samples += side;
-  }
+  const Edges columns = edgesAround(u, layout_.side, spacing, integral_.cols);
+  const Edges rows = edgesAround(v, layout_.side, spacing, integral_.rows);
+#ifdef SDVO_HAVE_AVX2
+  if (usesAvx2()) return cutWithAvx2(integral_, columns, rows, layout_.side, samples);
+#endif
+  cutPlain(integral_, columns, rows, layout_.side, samples);
 }
 
 }  // namespace sdvo

@@ -1,6 +1,5 @@
 #include "stereo_descriptor_vo/front_end/patch_sampling.hpp"
 
-#include <array>
 #include <cstddef>
 #include <cstring>
 
@@ -13,19 +12,52 @@
 namespace sdvo {
 namespace {
 
-/// Where a row of the patch lies in the image. The four pixels around a position weigh the same all along a row.
-struct SampledRow {
-  const std::uint8_t *upper, *lower;
+/// std::floor of what an int can hold.
+SDVO_IN_KERNEL int floorOf(float value) {
+  const int truncated = static_cast<int>(value);
+  return truncated - static_cast<int>(static_cast<float>(truncated) > value);
+}
+
+/// Where a row of the patch begins. The four pixels around a position weigh the same all along a row.
+struct Place {
+  int column;
   float w00, w01, w10, w11;
 };
 
-void sampleFrom(int i, const SampledRow& row, int columns, float* values) {
-  const auto& [upper, lower, w00, w01, w10, w11] = row;
-  for (; i < columns; ++i) values[i] = w00 * upper[i] + w01 * upper[i + 1] + w10 * lower[i] + w11 * lower[i + 1];
+/// Of a row that begins at `start`, of a patch whose rows lie `b` px below those of the image.
+SDVO_IN_KERNEL Place placeAt(float start, float b) {
+  const int column = floorOf(start);
+  const float a = start - static_cast<float>(column);
+  return {column, (1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b};
 }
 
-void samplePlain(const SampledRow* rows, int count, int columns, float* patch) {
-  for (int j = 0; j < count; ++j) sampleFrom(0, rows[j], columns, patch + j * columns);
+constexpr int kMostRows = (2 * kLargestPatchRadius + 1 + 7) / 8 * 8;  // whole registers
+
+/// Places of all rows of a patch.
+struct Places {
+  int column[kMostRows];
+  float w00[kMostRows], w01[kMostRows], w10[kMostRows], w11[kMostRows];
+};
+
+struct PlaceRows {
+  static SDVO_IN_KERNEL void run(float x, float b, float slant, int radius, Places* places) {
+    const int rounded = (2 * radius + 1 + 7) / 8 * 8;
+    for (int j = 0; j < rounded; ++j) {
+      const auto [column, w00, w01, w10, w11] = placeAt(x - slant * static_cast<float>(j - radius), b);
+      places->column[j] = column;
+      places->w00[j] = w00, places->w01[j] = w01, places->w10[j] = w10, places->w11[j] = w11;
+    }
+  }
+};
+
+void samplePlain(const std::uint8_t* image, std::size_t step, const Places& places, int count, int columns,
+                 float* patch) {
+  for (int j = 0; j < count; ++j, image += step, patch += columns) {
+    const std::uint8_t *upper = image + places.column[j], *lower = upper + step;
+    for (int i = 0; i < columns; ++i)
+      patch[i] = places.w00[j] * upper[i] + places.w01[j] * upper[i + 1] + places.w10[j] * lower[i] +
+                 places.w11[j] * lower[i + 1];
+  }
 }
 
 #ifdef SDVO_HAVE_AVX2
@@ -39,71 +71,52 @@ SDVO_AVX2 inline __m128 fourPixels(const std::uint8_t* pixels) {
   return _mm_cvtepi32_ps(_mm_cvtepu8_epi32(_mm_cvtsi32_si128(four)));
 }
 
-/// The same operations in the same order, eight columns at once, and four of the rest.
-SDVO_AVX2 void sampleAvx2(const SampledRow* rows, int count, int columns, float* patch) {
-  for (int j = 0; j < count; ++j, patch += columns) {
-    const auto& [upper, lower, w00, w01, w10, w11] = rows[j];
+/// The same operations in the same order, eight columns at once, and the last ones one by one.
+template <class Vector, Vector (*kPixels)(const std::uint8_t*)>
+SDVO_AVX2 inline void sampleRow(const std::uint8_t* upper, const std::uint8_t* lower, Place place, float* values) {
+  const Vector sum = place.w00 * kPixels(upper) + place.w01 * kPixels(upper + 1) + place.w10 * kPixels(lower) +
+                     place.w11 * kPixels(lower + 1);
+  std::memcpy(values, &sum, sizeof sum);
+}
+
+SDVO_AVX2 void sampleAvx2(const std::uint8_t* image, std::size_t step, const Places& places, int count, int columns,
+                          float* patch) {
+  for (int j = 0; j < count; ++j, image += step, patch += columns) {
+    const Place place{places.column[j], places.w00[j], places.w01[j], places.w10[j], places.w11[j]};
+    const std::uint8_t *upper = image + place.column, *lower = upper + step;
     int i = 0;
-    for (; i + 8 <= columns; i += 8) {
-      __m256 sum = _mm256_mul_ps(_mm256_set1_ps(w00), eightPixels(upper + i));
-      sum = _mm256_add_ps(sum, _mm256_mul_ps(_mm256_set1_ps(w01), eightPixels(upper + i + 1)));
-      sum = _mm256_add_ps(sum, _mm256_mul_ps(_mm256_set1_ps(w10), eightPixels(lower + i)));
-      sum = _mm256_add_ps(sum, _mm256_mul_ps(_mm256_set1_ps(w11), eightPixels(lower + i + 1)));
-      _mm256_storeu_ps(patch + i, sum);
-    }
-    if (i + 4 <= columns) {
-      __m128 sum = _mm_mul_ps(_mm_set1_ps(w00), fourPixels(upper + i));
-      sum = _mm_add_ps(sum, _mm_mul_ps(_mm_set1_ps(w01), fourPixels(upper + i + 1)));
-      sum = _mm_add_ps(sum, _mm_mul_ps(_mm_set1_ps(w10), fourPixels(lower + i)));
-      sum = _mm_add_ps(sum, _mm_mul_ps(_mm_set1_ps(w11), fourPixels(lower + i + 1)));
-      _mm_storeu_ps(patch + i, sum);
-      i += 4;
-    }
-    sampleFrom(i, rows[j], columns, patch);
+    for (; i + 8 <= columns; i += 8) sampleRow<__m256, eightPixels>(upper + i, lower + i, place, patch + i);
+    if (i + 4 <= columns) sampleRow<__m128, fourPixels>(upper + i, lower + i, place, patch + i), i += 4;
+    for (; i < columns; ++i)
+      patch[i] = place.w00 * upper[i] + place.w01 * upper[i + 1] + place.w10 * lower[i] + place.w11 * lower[i + 1];
   }
 }
 
 /// Eight or four columns of rows that lie right below each other: what is the lower row of one is the upper one of the
 /// next.
 template <class Vector, Vector (*kPixels)(const std::uint8_t*)>
-SDVO_AVX2 inline void sampleColumnsAvx2(const SampledRow& row, std::ptrdiff_t step, int count, int columns,
-                                        float* patch) {
-  Vector a = kPixels(row.upper), b = kPixels(row.upper + 1);
-  const std::uint8_t* lower = row.lower;
+SDVO_AVX2 inline void sampleColumnsAvx2(const std::uint8_t* upper, std::size_t step, Place place, int count,
+                                        int columns, float* patch) {
+  Vector a = kPixels(upper), b = kPixels(upper + 1);
+  const std::uint8_t* lower = upper + step;
   for (int j = 0; j < count; ++j, lower += step, patch += columns) {
     const Vector c = kPixels(lower), d = kPixels(lower + 1);
-    const Vector sum = row.w00 * a + row.w01 * b + row.w10 * c + row.w11 * d;
+    const Vector sum = place.w00 * a + place.w01 * b + place.w10 * c + place.w11 * d;
     std::memcpy(patch, &sum, sizeof sum);
     a = c, b = d;
   }
 }
 
-SDVO_AVX2 void sampleUprightAvx2(SampledRow row, std::ptrdiff_t step, int count, int columns, float* patch) {
-  for (int i = 0; i < columns;) {
-    const bool eight = i + 8 <= columns;
-    if (eight)
-      sampleColumnsAvx2<__m256, eightPixels>(row, step, count, columns, patch + i);
-    else
-      sampleColumnsAvx2<__m128, fourPixels>(row, step, count, columns, patch + i);
-    const int done = eight ? 8 : 4;
-    i += done, row.upper += done, row.lower += done;
-  }
+/// For a number of columns that is a multiple of four.
+SDVO_AVX2 void sampleUprightAvx2(const std::uint8_t* image, std::size_t step, Place place, int count, int columns,
+                                 float* patch) {
+  image += place.column;
+  int i = 0;
+  for (; i + 8 <= columns; i += 8)
+    sampleColumnsAvx2<__m256, eightPixels>(image + i, step, place, count, columns, patch + i);
+  if (i < columns) sampleColumnsAvx2<__m128, fourPixels>(image + i, step, place, count, columns, patch + i);
 }
 #endif
-
-/// std::floor of what an int can hold.
-int floorOf(float value) {
-  const int truncated = static_cast<int>(value);
-  return truncated - static_cast<int>(static_cast<float>(truncated) > value);
-}
-
-/// A row that begins at `start`, of a patch that lies `b` px below `upper`.
-SampledRow rowAt(const std::uint8_t* upper, std::size_t step, float start, float b) {
-  const int column = floorOf(start);
-  const float a = start - static_cast<float>(column);
-  upper += column;
-  return {upper, upper + step, (1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b};
-}
 
 }  // namespace
 
@@ -115,15 +128,14 @@ void samplePatch(const cv::Mat& image, int margin, float x, float y, float slant
   const std::uint8_t* first = image.ptr(row - radius + margin) - radius + margin;
 #ifdef SDVO_HAVE_AVX2
   if (slant == 0.f && usesAvx2() && columns % 4 == 0)
-    return sampleUprightAvx2(rowAt(first, step, x, b), static_cast<std::ptrdiff_t>(step), count, columns, patch);
+    return sampleUprightAvx2(first, step, placeAt(x, b), count, columns, patch);
 #endif
-  std::array<SampledRow, 2 * kLargestPatchRadius + 1> rows;
-  for (int j = -radius; j <= radius; ++j, first += step)
-    rows[static_cast<std::size_t>(j + radius)] = rowAt(first, step, x - slant * static_cast<float>(j), b);
+  Places places;
+  runKernel<PlaceRows>(x, b, slant, radius, &places);
 #ifdef SDVO_HAVE_AVX2
-  if (usesAvx2()) return sampleAvx2(rows.data(), count, columns, patch);
+  if (usesAvx2()) return sampleAvx2(first, step, places, count, columns, patch);
 #endif
-  samplePlain(rows.data(), count, columns, patch);
+  samplePlain(first, step, places, count, columns, patch);
 }
 
 }  // namespace sdvo

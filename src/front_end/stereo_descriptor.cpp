@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
 #include "stereo_descriptor_vo/front_end/freak.hpp"
 #include "stereo_descriptor_vo/front_end/image_bounds.hpp"
+#include "stereo_descriptor_vo/front_end/image_margin.hpp"
 
 namespace sdvo {
 namespace {
@@ -18,13 +18,6 @@ void orient(const cv::Mat& image, std::vector<ViewKeypoint>& keypoints) {
     const FreakKeypoint keypoint{k.u, k.v, k.size, -1.f};
     if (Freak::fits(keypoint, image.size())) k.angle = freak.orientation(keypoint);
   }
-}
-
-/// The image going on as its outermost pixels for `margin` px on every side.
-cv::Mat extended(const cv::Mat& image, int margin) {
-  cv::Mat larger;
-  cv::copyMakeBorder(image, larger, margin, margin, margin, margin, cv::BORDER_REPLICATE);
-  return larger;
 }
 
 }  // namespace
@@ -58,8 +51,10 @@ DescribedKeypoints StereoDescriptor::describe(const cv::Mat& left_image, const c
     const auto smaller = [](const StereoKeypoint& a, const StereoKeypoint& b) { return a.size < b.size; };
     const float largest = std::max_element(keypoints.begin(), keypoints.end(), smaller)->size;
     const int margin = static_cast<int>(std::ceil(base_->reach(largest)));
-    left = extended(left_image, margin);
-    right = extended(right_image, margin);
+    cv::Mat larger_left, larger_right;
+    addMargin(left_image, margin, larger_left);
+    addMargin(right_image, margin, larger_right);
+    left = larger_left, right = larger_right;
     shift = static_cast<float>(margin);
   }
   std::vector<ViewKeypoint> in_left, in_right;

@@ -30,6 +30,7 @@ std::vector<StereoMatch> StereoMatcher::search(const cv::Mat& left, const cv::Ma
     for (int i = range.start; i < range.end; ++i) found[i] = matcher.find(left_positions[i]);
   });
   std::vector<StereoMatch> matches;
+  matches.reserve(found.size());
   for (std::size_t i = 0; i < found.size(); ++i)
     if (found[i] && isTrusted(found[i]->x, found[i]->y))
       matches.push_back({static_cast<int>(i), found[i]->x, found[i]->y});

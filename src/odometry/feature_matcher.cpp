@@ -3,43 +3,15 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <type_traits>
 
-// The population count of 64 bits is one instruction on every x86 processor since 2008, but only a function compiled
-// for it may use it; the loader picks the right version.
-// The thread sanitizer is not up yet when the loader picks.
-#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_THREAD__)
-#define SDVO_POPCOUNT __attribute__((target_clones("popcnt", "default")))
-#else
-#define SDVO_POPCOUNT
-#endif
+#include "stereo_descriptor_vo/odometry/hamming_distances.hpp"
 
 namespace sdvo {
 namespace {
-
-constexpr float kNoDistance = std::numeric_limits<float>::max();
-
-SDVO_POPCOUNT void hammingDistances(const std::uint8_t* row, const cv::Mat& others, const int* candidates,
-                                    std::size_t count, float* distances) {
-  const int words = others.cols / 8;
-  for (std::size_t k = 0; k < count; ++k) {
-    const std::uint8_t* other = others.ptr(candidates[k]);
-    int distance = 0;
-    for (int w = 0; w < words; ++w) {
-      std::uint64_t a, b;
-      std::memcpy(&a, row + 8 * w, 8);
-      std::memcpy(&b, other + 8 * w, 8);
-      distance += __builtin_popcountll(a ^ b);
-    }
-    for (int byte = 8 * words; byte < others.cols; ++byte)
-      distance += __builtin_popcount(static_cast<unsigned>(row[byte] ^ other[byte]));
-    distances[k] = static_cast<float>(distance);
-  }
-}
 
 /// Squared L2 distances of rows of whole numbers 0…255 or of floats.
 template <class Element>
@@ -82,6 +54,32 @@ float distanceUnit(ElementType type, const cv::Mat& a, int row_a, const cv::Mat&
   computeDistances(type, b.ptr(row_b), zeros, &first, 1, &length_b);
   return std::max(length_a + length_b, 1e-12f);
 }
+
+/// The nearest of several, the first of equal ones if they come in the order of their indices. Distance and index are
+/// one number, whose minimum needs no branch, as none could be foreseen: the bits of floats from zero on are ordered as
+/// they are.
+class Nearest {
+ public:
+  void note(float distance, int index) { least_ = std::min(least_, numberOf(distance, index)); }
+  bool found() const { return least_ != kNone; }
+  float distance() const {
+    const auto bits = static_cast<std::uint32_t>(least_ >> 32);
+    float distance;
+    std::memcpy(&distance, &bits, sizeof distance);
+    return distance;
+  }
+  int index() const { return static_cast<int>(least_ & 0xffffffffu); }
+
+ private:
+  static std::uint64_t numberOf(float distance, int index) {
+    std::uint32_t bits;
+    std::memcpy(&bits, &distance, sizeof bits);
+    return static_cast<std::uint64_t>(bits) << 32 | static_cast<std::uint32_t>(index);
+  }
+
+  static constexpr std::uint64_t kNone = 0x7f800000'00000000;  // at infinity, where nothing is
+  std::uint64_t least_ = kNone;
+};
 
 /// Rows of a feature set (not an empty one), found by position. Its extent is the features' own: the image size is a
 /// claim of whoever sent them.
@@ -160,10 +158,6 @@ std::vector<FeatureMatch> FeatureMatcher::match(const DescribedPoints& reference
   std::optional<PositionGrid> grid;
   if (options_.gating && T_current_reference) grid.emplace(current, options_.gate_radius);
 
-  struct Nearest {
-    int index = -1;
-    float distance = kNoDistance;
-  };
   std::vector<Nearest> of_reference(reference.count()), of_current(current.count());
   std::vector<int> candidates(static_cast<std::size_t>(current.count()));  // all of them, unless gated
   std::iota(candidates.begin(), candidates.end(), 0);
@@ -179,18 +173,22 @@ std::vector<FeatureMatch> FeatureMatcher::match(const DescribedPoints& reference
     }
     computeDistances(kind.element_type, reference.descriptors.ptr(i), current.descriptors, candidates.data(), count,
                      distances.data());
+    Nearest nearest;  // of the candidates
     for (std::size_t k = 0; k < count; ++k) {
-      const int j = candidates[k];
-      if (distances[k] < of_reference[i].distance) of_reference[i] = {j, distances[k]};
-      if (distances[k] < of_current[j].distance) of_current[j] = {i, distances[k]};
+      nearest.note(distances[k], static_cast<int>(k));
+      of_current[candidates[k]].note(distances[k], i);
     }
+    if (nearest.found()) of_reference[i].note(nearest.distance(), candidates[nearest.index()]);
   }
 
   std::vector<FeatureMatch> matches;
+  matches.reserve(of_reference.size());
   for (int i = 0; i < reference.count(); ++i) {
-    const auto& [j, distance] = of_reference[i];
-    if (j < 0 || of_current[j].index != i) continue;
-    const float share = distance / distanceUnit(kind.element_type, reference.descriptors, i, current.descriptors, j);
+    if (!of_reference[i].found()) continue;
+    const int j = of_reference[i].index();
+    if (of_current[j].index() != i) continue;
+    const float share =
+        of_reference[i].distance() / distanceUnit(kind.element_type, reference.descriptors, i, current.descriptors, j);
     if (share <= options_.max_distance) matches.push_back({i, j, share});
   }
   return matches;

@@ -17,13 +17,16 @@ int OldKeyframe::sharedWith(const StereoCamera& camera, const Eigen::Isometry3d&
   return shared;
 }
 
-void KeyframeMemory::remember(const StereoCamera& camera, OldKeyframe keyframe) {
+bool KeyframeMemory::covers(const StereoCamera& camera, const OldKeyframe& keyframe) const {
   constexpr double kSame = 0.8;  // of the points
-  if (capacity_ == 0) return;
   const auto sees_the_same = [&](const OldKeyframe& old) {
-    return keyframe.sharedWith(camera, old.T_camera_origin) > kSame * static_cast<double>(keyframe.points.size());
+    return keyframe.sharedWith(camera, old.T_camera_origin) > kSame * static_cast<double>(keyframe.rows.count());
   };
-  if (std::any_of(keyframes_.begin(), keyframes_.end(), sees_the_same)) return;
+  return std::any_of(keyframes_.rbegin(), keyframes_.rend(), sees_the_same);  // the newest are the nearest
+}
+
+void KeyframeMemory::remember(const StereoCamera& camera, OldKeyframe keyframe) {
+  if (capacity_ == 0 || covers(camera, keyframe)) return;
   const Eigen::Vector3d here = keyframe.T_camera_origin.inverse().translation();
   keyframes_.push_back(std::move(keyframe));
   if (count() <= capacity_) return;

@@ -26,6 +26,14 @@ Matrix6d motionCovariance(const Window& window, const Eigen::MatrixXd& pose_cova
   return 0.5 * (covariance + covariance.transpose());
 }
 
+/// Of observations in the order of their frames the one in this frame, or their end.
+template <class Observations>
+auto sightingIn(Observations& observations, int frame_id) {
+  const auto here = std::lower_bound(observations.begin(), observations.end(), frame_id,
+                                     [](const auto& observation, int id) { return observation.frame_id < id; });
+  return here != observations.end() && here->frame_id == frame_id ? here : observations.end();
+}
+
 }  // namespace
 
 LocalMap::LocalMap(const LocalMapOptions& options)
@@ -48,6 +56,7 @@ bool LocalMap::continuedBy(const StereoFeatures& features) const {
 LocalMap::View LocalMap::view() const {
   View view;
   view.rows.kind = kind_;
+  view.point.reserve(points_.size()), view.seen.reserve(points_.size()), view.pixels.reserve(points_.size());
   const std::size_t first_remembered = frames_.size() - std::min(frames_.size(), std::size_t(options_.remembered));
   const int oldest = frames_[first_remembered].id;
   for (std::size_t p = 0; p < points_.size(); ++p) {
@@ -62,6 +71,7 @@ LocalMap::View LocalMap::view() const {
     view.pixels.emplace_back(static_cast<float>(predicted.x()), static_cast<float>(predicted.y()),
                              static_cast<float>(std::max(predicted.z(), kFarthestDisparity)));
   }
+  view.rows.positions.reserve(view.point.size());
   view.rows.descriptors.create(static_cast<int>(view.point.size()), kind_.bytes, CV_8U);
   for (std::size_t row = 0; row < view.point.size(); ++row) {
     const cv::Point3f& pixel = view.pixels[row];
@@ -167,8 +177,10 @@ bool LocalMap::needsKeyframe() const {
 /// goes, and of too many the one that adds the least to the one before it.
 void LocalMap::forgetKeyframe() {
   const auto lasting = [&] { return frames_.size() - 1 - static_cast<std::size_t>(options_.keyframes); };
-  if (options_.remembered_keyframes > 0 && !frames_[lasting() - 1].is_recalled)
-    memory_.remember(camera_, keyframe(lasting() - 1));
+  const std::size_t leaving = lasting() - 1;
+  if (options_.remembered_keyframes > 0 && !frames_[leaving].is_recalled &&
+      !memory_.covers(camera_, keyframe(leaving, false)))
+    memory_.remember(camera_, keyframe(leaving, true));
   const std::vector<int> shared = sharedPoints();
   const auto too_few = std::find_if(shared.begin(), shared.begin() + static_cast<std::ptrdiff_t>(lasting()),
                                     [&](int points) { return points < options_.lasting_points; });
@@ -185,21 +197,21 @@ void LocalMap::forgetKeyframe() {
   }
 }
 
-/// With the points that another frame has seen as well.
-OldKeyframe LocalMap::keyframe(std::size_t frame) const {
+/// With the points that another frame has seen as well: where they are, and what they look like if that is asked for.
+OldKeyframe LocalMap::keyframe(std::size_t frame, bool with_looks) const {
   OldKeyframe old{frames_[frame].id, frames_[frame].T_camera_origin, {}, {}};
   old.rows.kind = kind_;
   for (const Point& point : points_) {
     if (point.observations.size() < 2) continue;
-    const auto here = std::find_if(point.observations.begin(), point.observations.end(),
-                                   [&](const Observation& observation) { return observation.frame_id == old.id; });
+    const auto here = sightingIn(point.observations, old.id);
     Eigen::Vector3d predicted;
     if (here == point.observations.end() ||
         !predictObservation(camera_, old.T_camera_origin, point.position, predicted, nullptr))
       continue;
-    old.points.push_back({point.position, here->measurement, here->sigma, point.reference});
     old.rows.positions.push_back(
         camera_.backProject(predicted.x(), predicted.y(), std::max(predicted.z(), kFarthestDisparity)));
+    if (!with_looks) continue;
+    old.points.push_back({point.position, here->measurement, here->sigma, point.reference});
     old.rows.descriptors.push_back(cv::Mat(1, kind_.bytes, CV_8U, const_cast<std::uint8_t*>(point.descriptor.data())));
   }
   return old;
@@ -275,16 +287,19 @@ void LocalMap::removeFrame(std::size_t index) {
   const int id = frames_[index].id;
   frames_.erase(frames_.begin() + static_cast<std::ptrdiff_t>(index));
   for (Point& point : points_) {
-    auto& observations = point.observations;
-    observations.erase(std::remove_if(observations.begin(), observations.end(),
-                                      [id](const Observation& observation) { return observation.frame_id == id; }),
-                       observations.end());
+    const auto here = sightingIn(point.observations, id);
+    if (here != point.observations.end()) point.observations.erase(here);
   }
   // The others close up in their order; what nothing sees any more keeps its memory for a new point.
   auto kept = points_.begin();
-  for (Point& point : points_)
-    if (!point.observations.empty()) std::swap(*kept++, point);
-  std::move(kept, points_.end(), std::back_inserter(spare_));
+  for (auto point = points_.begin(); point != points_.end(); ++point) {
+    if (point->observations.empty()) {
+      spare_.push_back(std::move(*point));
+    } else {
+      if (kept != point) *kept = std::move(*point);
+      ++kept;
+    }
+  }
   points_.erase(kept, points_.end());
 }
 
@@ -301,6 +316,10 @@ LocalMap::Adjustment LocalMap::adjust(const WindowOptimizerOptions& options, con
   }
   std::vector<std::pair<int, int>> sources;  // point and its observation, for each of the window's observations
   std::vector<int> used;
+  std::size_t sightings = 0;
+  for (const Point& point : points_) sightings += point.observations.size();
+  sources.reserve(sightings), window.observations.reserve(sightings);
+  used.reserve(points_.size()), window.points.reserve(points_.size());
   for (std::size_t p = 0; p < points_.size(); ++p) {
     const Point& point = points_[p];
     if (point.observations.size() < 2) continue;

@@ -59,7 +59,7 @@ void cornerRefinement(benchmark::State& state) {
   const auto corners = positions();
   cv::Mat scratch;
   for (auto _ : state) {
-    const sdvo::CornerRefiner refiner(image, 3, scratch);
+    const sdvo::CornerRefiner refiner(image, 3, 0, scratch);
     for (const cv::Point2f& corner : corners) benchmark::DoNotOptimize(refiner.refine(corner, 1.5f));
   }
 }

@@ -17,12 +17,12 @@ cv::Mat noise(unsigned seed, bool extreme) {
 }
 
 template <int kRows>
-void expectSums(const cv::Mat& left, const cv::Mat& right) {
-  constexpr int kX = 90, kY = 17, kCount = 77;
-  std::vector<unsigned> found(kCount);
-  blockDifferences<kRows>(left.ptr(kY) + kX, right.ptr(kY) + kX, static_cast<std::ptrdiff_t>(left.step[0]), kCount,
+void expectSums(const cv::Mat& left, const cv::Mat& right, int count = 77) {
+  constexpr int kX = 90, kY = 17;
+  std::vector<unsigned> found(static_cast<std::size_t>(count));
+  blockDifferences<kRows>(left.ptr(kY) + kX, right.ptr(kY) + kX, static_cast<std::ptrdiff_t>(left.step[0]), count,
                           found.data());
-  for (int k = 0; k < kCount; ++k) {
+  for (int k = 0; k < count; ++k) {
     unsigned sum = 0;
     for (int y = kY - kRows; y <= kY + kRows; ++y)
       for (int x = kX - kBlockWidth / 2; x < kX + kBlockWidth / 2; ++x)
@@ -38,6 +38,7 @@ TEST(BlockDifferences, AreSumsOverWholeBlocks) {
       expectSums<4>(noise(3, extreme), noise(5, extreme));
       expectSums<5>(noise(3, extreme), noise(5, extreme));
     }
+    for (const int count : {1, 15, 16, 17, 32, 33}) expectSums<4>(noise(3, false), noise(5, false), count);
     expectSums<5>(cv::Mat(40, 131, CV_8U, cv::Scalar(0)), cv::Mat(40, 131, CV_8U, cv::Scalar(255)));
   }
   allowAvx2(true);

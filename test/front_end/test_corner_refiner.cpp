@@ -22,7 +22,7 @@ TEST(CornerRefiner, FindsWhereTheGradientLinesMeet) {
   for (const int radius : {2, 3, 4, 5}) {
     cv::Mat scratch;
     const cv::Mat image = quadrant(20.3, 14.6);
-    const auto corner = CornerRefiner(image, radius, scratch).refine({20.f, 15.f}, 1.5f);
+    const auto corner = CornerRefiner(image, radius, 0, scratch).refine({20.f, 15.f}, 1.5f);
     ASSERT_TRUE(corner) << radius;
     EXPECT_NEAR(corner->x, 20.3, 0.3) << radius;
     EXPECT_NEAR(corner->y, 14.6, 0.3) << radius;
@@ -54,7 +54,7 @@ TEST(CornerRefiner, GoesWhereItsDefinitionLeads) {
   cv::RNG(5).fill(image, cv::RNG::UNIFORM, 0, 256);
   cv::GaussianBlur(image, image, {}, 1.2);
   for (const int radius : {2, 3, 4, 7}) {
-    const CornerRefiner refiner(image, radius, scratch);
+    const CornerRefiner refiner(image, radius, 0, scratch);
     int found = 0;
     for (int y = 20; y < 80; y += 3)
       for (int x = 20; x < 100; x += 3) {
@@ -76,7 +76,16 @@ TEST(CornerRefiner, GoesWhereItsDefinitionLeads) {
 
 TEST(CornerRefiner, RefusesWhatWandersOff) {
   cv::Mat scratch;
-  EXPECT_FALSE(CornerRefiner(quadrant(22.4, 14.6), 3, scratch).refine({20.f, 15.f}, 1.5f));
+  EXPECT_FALSE(CornerRefiner(quadrant(22.4, 14.6), 3, 0, scratch).refine({20.f, 15.f}, 1.5f));
+}
+
+TEST(CornerRefiner, NeedsNoCopyWhereStartsAreFarFromTheBorder) {
+  const cv::Mat image = quadrant(20.3, 14.6);
+  cv::Mat copy, none;
+  const auto expected = CornerRefiner(image, 2, 0, copy).refine({20.f, 15.f}, 1.5f);
+  EXPECT_EQ(CornerRefiner(image, 2, 13, none).refine({20.f, 15.f}, 1.5f), expected);
+  EXPECT_FALSE(copy.empty());
+  EXPECT_TRUE(none.empty());
 }
 
 TEST(CornerRefiner, IsTheSameToTheBitWithAndWithoutAvx2) {
@@ -84,7 +93,7 @@ TEST(CornerRefiner, IsTheSameToTheBitWithAndWithoutAvx2) {
   cv::Mat image(61, 83, CV_8U), scratch;
   cv::RNG(3).fill(image, cv::RNG::UNIFORM, 0, 256);
   for (int radius = 1; radius <= 15; ++radius) {
-    const CornerRefiner refiner(image, radius, scratch);
+    const CornerRefiner refiner(image, radius, 0, scratch);
     for (int y = 0; y < image.rows; y += 4)
       for (int x = 0; x < image.cols; x += 3) {
         const cv::Point2f start(static_cast<float>(x), static_cast<float>(y));

@@ -3,6 +3,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/front_end/patch_cutter.hpp"
 
 namespace sdvo {
@@ -52,6 +53,22 @@ TEST(PatchCutter, ASampleIsTheMeanOfItsSquare) {
   const PatchLayout layout{3, 2.f, 0.f};
   const std::vector<std::uint8_t> samples = cut(image, layout, 10.5f, 10.5f, 7.f);
   for (int k = 0; k < 9; ++k) EXPECT_EQ(samples[static_cast<std::size_t>(k)], k == 4 ? 50 : 0) << k;
+}
+
+TEST(PatchCutter, AnyProcessorGivesTheSameBytes) {
+  cv::Mat image(60, 70, CV_8U);
+  cv::RNG random(5);
+  random.fill(image, cv::RNG::UNIFORM, 0, 256);
+  for (const int side : {1, 5, 7, 8, 9, 13, 15, 16})
+    for (int k = 0; k < 50; ++k) {
+      // Also beyond the borders.
+      const float u = random.uniform(-5.f, 75.f), v = random.uniform(-5.f, 65.f), size = random.uniform(1.f, 40.f);
+      const PatchLayout layout{side, k % 2 ? 1.f : 0.5f, 0.1f};
+      allowAvx2(false);
+      const std::vector<std::uint8_t> plain = cut(image, layout, u, v, size);
+      allowAvx2(true);
+      ASSERT_EQ(cut(image, layout, u, v, size), plain) << side << " samples, " << u << " " << v << " " << size;
+    }
 }
 
 TEST(PatchCutter, SumsBeyond31BitsDoNoHarm) {

@@ -74,6 +74,8 @@ struct StereoFeatures {
 
   /// Adds a row to every array; its descriptor and its patch go into the matrices separately.
   void append(const StereoFeature& feature);
+  /// Memory for so many of them.
+  void reserve(int count);
 
   /// The same pair with some of its rows, in the order given.
   StereoFeatures select(const std::vector<int>& rows) const;

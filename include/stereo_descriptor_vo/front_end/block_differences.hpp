@@ -9,7 +9,8 @@ namespace sdvo {
 constexpr int kBlockWidth = 16;
 
 /// Sums of absolute differences between the block of 2 kRows + 1 rows centred at `block` and the `count` ones centred
-/// at `others`, one pixel further left each time. Rows of both images are `step` bytes apart. For kRows of 4 and 5.
+/// at `others`, one pixel further left each time; one column more on the right may be read. Rows of both images are
+/// `step` bytes apart. For kRows of 4 and 5.
 template <int kRows>
 void blockDifferences(const std::uint8_t* block, const std::uint8_t* others, std::ptrdiff_t step, int count,
                       unsigned* differences);

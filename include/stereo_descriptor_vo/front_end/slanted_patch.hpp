@@ -34,7 +34,6 @@ class SlantedPatch {
 
  private:
   int side() const { return 2 * radius_ + 1; }
-  void removeMean(std::vector<float>& values) const;
 
   int radius_, stride_, count_;
   std::vector<float> mask_, row_;  ///< one within the square, zero beyond; rows from its centre

@@ -33,6 +33,9 @@ class KeyframeMemory {
  public:
   explicit KeyframeMemory(int capacity) : capacity_(capacity) {}
 
+  /// Whether an old key frame sees the same as this one, of which the pose and the points' positions are enough.
+  bool covers(const StereoCamera& camera, const OldKeyframe& keyframe) const;
+
   /// Keeps a key frame unless an older one sees the same.
   void remember(const StereoCamera& camera, OldKeyframe keyframe);
 

@@ -157,7 +157,7 @@ class LocalMap {
   };
 
   void forgetKeyframe();
-  OldKeyframe keyframe(std::size_t frame) const;
+  OldKeyframe keyframe(std::size_t frame, bool with_looks) const;
   std::vector<int> sharedPoints() const;
   double parallaxToPredecessor(std::size_t frame) const;
   void removeFrame(std::size_t index);

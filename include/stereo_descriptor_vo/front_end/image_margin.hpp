@@ -1,0 +1,11 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+
+namespace sdvo {
+
+/// A CV_8U image that goes on as its outermost pixels for `margin` px on every side: cv::copyMakeBorder with
+/// BORDER_REPLICATE, several times faster. `larger` keeps its memory where that has the size.
+void addMargin(const cv::Mat& image, int margin, cv::Mat& larger);
+
+}  // namespace sdvo
