@@ -111,6 +111,20 @@ TEST(PoseVerdict, NoiseOverATinyTimeIsNoRate) {
   EXPECT_EQ(trustIn(evidence, options), Trust::kSound);
 }
 
+TEST(PoseVerdict, WhatIsLongAgoMayHaveChangedSince) {
+  PoseEvidence evidence = soundEvidence();
+  evidence.velocity_age = 0.5;
+  const double allowed = (20.0 * 0.12 + 5.0 * 0.5) * 0.12 + 10.0 * 0.04;
+  evidence.motion.translation().z() = 1.0 - allowed + 0.001;
+  EXPECT_EQ(trustIn(evidence), Trust::kSound);
+  evidence.motion.translation().z() = 1.0 - allowed - 0.001;
+  EXPECT_EQ(trustIn(evidence), Trust::kDoubtful);
+  EXPECT_TRUE(judgeChange({}, evidence).of_rate);
+  evidence.motion = soundEvidence().motion;
+  evidence.motion.linear() = expSO3({0.0, (30.0 * 0.12 + 2.0 * 0.5) * 0.12 + 0.001, 0.0});
+  EXPECT_EQ(trustIn(evidence), Trust::kDoubtful);
+}
+
 TEST(PoseVerdict, AccelerationsAreJudgedAgainstTheVelocityBefore) {
   PoseEvidence evidence = soundEvidence();
   evidence.confirmed = true;

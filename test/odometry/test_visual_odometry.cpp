@@ -245,6 +245,27 @@ TEST(VisualOdometry, IsLostAfterTheSecondFailureAndStartsAgainFromTheLastPose) {
   }
 }
 
+TEST(VisualOdometry, DoubtsAfterALossWhatNoCameraWithTheVelocityBeforeDoes) {
+  // Something that is fixed to the camera comes to cover the whole view.
+  VisualOdometryOptions options;
+  options.tracking.max_acceleration = 10.0;
+  VisualOdometry odometry(options);
+  follow(odometry, 5);
+  OdometryResult result;
+  for (int i = 6; i <= 10; ++i) {
+    StereoFeatures covered = strangePair(0);
+    covered.stamp = stampOf(i);
+    for (float& u : covered.u) u += 0.01f * static_cast<float>(i);  // noise: no image is that of the pair before
+    result = odometry.update(covered);
+    ASSERT_NE(result.state, TrackingState::kTracking) << i;
+    if (!result.has_motion) continue;
+    const Vector6d error = logSE3(result.T_previous_current.inverse() * drivePose(i - 1).inverse() * drivePose(i));
+    EXPECT_LT(error.dot(result.motion_covariance.ldlt().solve(error)), 20.0) << i;
+  }
+  EXPECT_TRUE(result.has_motion);
+  EXPECT_NE(result.reason.find("max_acceleration"), std::string::npos) << result.reason;
+}
+
 TEST(VisualOdometry, IsLostAtOnceWhenThereIsNoMotionToPredict) {
   VisualOdometry odometry({});
   odometry.update(pairOf(0));

@@ -23,6 +23,7 @@ struct MotionScene {
   std::optional<Eigen::Isometry3d> T_current_reference;  ///< as expected, since the map's newest pair
   std::optional<Vector6d> velocity;                      ///< of the camera before, m/s and rad/s
   bool contested = false;                                ///< a moment ago something else moved in view
+  double velocity_age = 0.0;                             ///< of that at the map's newest pair, s
 };
 
 /// One answer to where a pair is, and what speaks for it.
@@ -68,6 +69,9 @@ class MotionSearch {
 
   /// Whether it is that of enough of them. Too few neither agree nor disagree.
   bool lastingAgree(const PoseEvidence& evidence) const;
+
+  /// Whether no camera moves so, as far as the velocity before tells, and the lasting points do not confirm it either.
+  bool isImplausible(const PoseEvidence& evidence) const;
 
  private:
   MotionHypothesis search(const MotionScene& scene, const std::optional<Eigen::Isometry3d>& T_current_reference) const;

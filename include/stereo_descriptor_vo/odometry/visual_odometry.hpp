@@ -138,6 +138,7 @@ class VisualOdometry {
 
   void refuse(const StereoFeatures& features) const;
   MotionHypothesis localise(const StereoFeatures& features, double dt) const;
+  double velocityAge() const;
   bool isFrozen(const StereoFeatures& features, double dt) const;
   Step seed(const StereoFeatures& features);
   Step extendMap(const StereoFeatures& features, double dt, const MotionHypothesis& found);
@@ -164,10 +165,11 @@ class VisualOdometry {
     RightCameraRotation right_rotation;
     std::optional<std::int64_t> last_stamp;
     Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
-    PoseCovariance covariance;                  ///< of that pose
-    std::optional<Vector6d> velocity;           ///< of the camera in its own frame, m/s and rad/s
-    Vector6d last_velocity = Vector6d::Zero();  ///< the same, kept while lost
-    std::int64_t last_pose_stamp = 0;           ///< ns
+    PoseCovariance covariance;              ///< of that pose
+    std::optional<Vector6d> velocity;       ///< of the camera in its own frame, m/s and rad/s
+    std::optional<Vector6d> last_velocity;  ///< the same, kept while lost
+    std::int64_t velocity_stamp = 0;        ///< of the pair that it is of, ns
+    std::int64_t last_pose_stamp = 0;       ///< ns
     double distance = 0.0;
     int predicted_pairs = 0;
     int pairs = 0;
