@@ -84,7 +84,8 @@ MotionSearch::MotionSearch(const FeatureMatcherOptions& matcher, const MotionEst
       estimator_(motion) {}
 
 MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
-  MotionHypothesis found = search(scene, scene.T_current_reference);
+  const std::optional<Eigen::Isometry3d>& prior = scene.guess ? scene.guess : scene.T_current_reference;
+  MotionHypothesis found = search(scene, prior);
   if (found.verdict.trust == Trust::kSound && !scene.contested) {
     const auto measured = align(scene, found);
     if (!hasStrayed(scene.features.camera, found, measured)) return found;
@@ -93,7 +94,8 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
 
   // The prior itself may be what misled the search, and what moves by itself may outnumber the world.
   std::vector<MotionHypothesis> hypotheses = {std::move(found)};
-  if (scene.T_current_reference) hypotheses.push_back(search(scene, std::nullopt));
+  if (scene.guess && scene.T_current_reference) hypotheses.push_back(search(scene, scene.T_current_reference));
+  if (prior) hypotheses.push_back(search(scene, std::nullopt));
   const MotionHypothesis all = hypotheses.back();
   std::vector<int> lasting, rest;
   for (int i = 0; i < static_cast<int>(all.matches.size()); ++i) {
@@ -161,6 +163,7 @@ void MotionSearch::weigh(const MotionScene& scene, MotionHypothesis& found) cons
   evidence.dt = static_cast<double>(scene.features.stamp - scene.map.newestStamp()) * 1e-9;
   evidence.velocity = scene.velocity;
   evidence.velocity_age = scene.velocity_age;
+  if (scene.guess) evidence.guess = scene.guess->inverse();
   found.verdict = found.motion.success ? judgePose(verdict_options_, motion_options_.min_inliers, evidence)
                                        : PoseVerdict{Trust::kNone, found.motion.reason};
 }

@@ -66,20 +66,27 @@ PoseVerdict judgePose(const PoseVerdictOptions& options, int min_inliers, const 
 PoseVerdict judgeChange(const PoseVerdictOptions& options, const PoseEvidence& evidence) {
   if (!evidence.velocity) return {};
   const Vector6d& before = *evidence.velocity;
-  const Vector6d change = logSE3(evidence.motion) - before * evidence.dt;
   const double time = evidence.dt + options.stamp_tolerance;
   // The velocity before rests on stamps that may be wrong, too. What is long ago may have changed since.
   const double forgiven = 2.0 * options.stamp_tolerance;
   const double speed_change = options.max_acceleration * time + kLastingAcceleration * evidence.velocity_age;
   const double rate_change =
       options.max_rotation_acceleration * time + kLastingTurnAcceleration * evidence.velocity_age;
+  const double most =
+      speed_change * time + before.head<3>().norm() * forgiven + kSigmas * deviation(evidence.covariance, 0);
+  const double most_turn =
+      rate_change * time + before.tail<3>().norm() * forgiven + kSigmas * deviation(evidence.covariance, 3);
+  if (evidence.guess) {
+    const Vector6d aside = logSE3(evidence.guess->inverse() * evidence.motion);
+    if (aside.head<3>().norm() <= most && aside.tail<3>().norm() <= most_turn) return {};
+  }
+  const Vector6d change = logSE3(evidence.motion) - before * evidence.dt;
   const double way = change.head<3>().norm(), angle = change.tail<3>().norm();
   PoseVerdict doubt;
-  if (way > speed_change * time + before.head<3>().norm() * forgiven + kSigmas * deviation(evidence.covariance, 0))
+  if (way > most)
     doubt = verdict(Trust::kDoubtful, "a change of the motion by ", way, " m in ", evidence.dt,
                     " s exceeds tracking/max_acceleration");
-  else if (angle >
-           rate_change * time + before.tail<3>().norm() * forgiven + kSigmas * deviation(evidence.covariance, 3))
+  else if (angle > most_turn)
     doubt = verdict(Trust::kDoubtful, "a change of the rotation by ", angle, " rad in ", evidence.dt,
                     " s exceeds tracking/max_rotation_acceleration");
   doubt.of_rate = doubt.trust == Trust::kDoubtful;

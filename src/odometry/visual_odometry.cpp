@@ -56,12 +56,12 @@ void VisualOdometry::breakStream() {
   state_.velocity.reset();
 }
 
-OdometryResult VisualOdometry::update(const StereoFeatures& features) {
+OdometryResult VisualOdometry::update(const StereoFeatures& features, const std::optional<MotionGuess>& guess) {
   refuse(features);
   const double dt = state_.last_stamp ? static_cast<double>(features.stamp - *state_.last_stamp) * 1e-9 : 0.0;
   const bool continued = state_.map && state_.map->continuedBy(features);
   const bool frozen = isFrozen(features, dt);
-  const MotionHypothesis found = continued && !frozen ? localise(features, dt) : MotionHypothesis{};
+  const MotionHypothesis found = continued && !frozen ? localise(features, dt, guess) : MotionHypothesis{};
 
   // Nothing has changed so far, and from here on nothing is refused.
   Stopwatch stopwatch;
@@ -95,15 +95,23 @@ void VisualOdometry::refuse(const StereoFeatures& features) const {
 }
 
 /// Looks for the pair in the map.
-MotionHypothesis VisualOdometry::localise(const StereoFeatures& features, double dt) const {
+MotionHypothesis VisualOdometry::localise(const StereoFeatures& features, double dt,
+                                          const std::optional<MotionGuess>& guess) const {
   const RigCalibration calibration = state_.calibration.calibration();
-  MotionScene scene{*state_.map,  calibration, features, std::nullopt, state_.last_velocity, state_.contested_pairs > 0,
-                    velocityAge()};
-  // The motion since the map's newest pair: what was already covered by predicted pairs, and the velocity from there
-  // on.
+  MotionScene scene{*state_.map,   calibration,          features,
+                    std::nullopt,  state_.last_velocity, state_.contested_pairs > 0,
+                    velocityAge(), std::nullopt};
+  // The motion since the map's newest pair: what was already covered by predicted pairs, and from there on the velocity
+  // or the guess.
+  const Eigen::Isometry3d T_reference_previous = state_.map->newestPose() * state_.T_origin_camera;
   if (state_.velocity && dt <= options_.tracking.max_gap)
-    scene.T_current_reference =
-        (state_.map->newestPose() * state_.T_origin_camera * expSE3(*state_.velocity * dt)).inverse();
+    scene.T_current_reference = (T_reference_previous * expSE3(*state_.velocity * dt)).inverse();
+  if (guess) {
+    Eigen::Isometry3d T_previous_current = guess->T_previous_current;
+    if (guess->rotation_only)
+      T_previous_current.translation() = state_.velocity.value_or(Vector6d::Zero()).head<3>() * dt;
+    scene.guess = (T_reference_previous * T_previous_current).inverse();
+  }
   return search_.find(scene);
 }
 

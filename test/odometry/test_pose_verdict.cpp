@@ -111,6 +111,18 @@ TEST(PoseVerdict, NoiseOverATinyTimeIsNoRate) {
   EXPECT_EQ(trustIn(evidence, options), Trust::kSound);
 }
 
+TEST(PoseVerdict, WhatAnotherSourceSaysTooIsNotImplausible) {
+  PoseEvidence evidence = soundEvidence();
+  evidence.motion.linear() = expSO3({0.0, 0.5, 0.0});
+  EXPECT_EQ(trustIn(evidence), Trust::kDoubtful);
+  evidence.guess = evidence.motion;
+  EXPECT_EQ(trustIn(evidence), Trust::kSound);
+  evidence.guess->linear() = expSO3({0.0, -0.5, 0.0});
+  EXPECT_EQ(trustIn(evidence), Trust::kDoubtful);
+  evidence.motion.linear().setIdentity();
+  EXPECT_EQ(trustIn(evidence), Trust::kSound) << "a wrong guess is no evidence against a motion";
+}
+
 TEST(PoseVerdict, WhatIsLongAgoMayHaveChangedSince) {
   PoseEvidence evidence = soundEvidence();
   evidence.velocity_age = 0.5;
