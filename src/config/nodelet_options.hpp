@@ -31,6 +31,9 @@ struct OdometryOutputOptions {
   bool publish_tf = true;
   bool invert_tf = false;
   double tf_timeout = 2.0;
+  std::string guess_frame_id;
+  bool use_imu = false;
+  double guess_timeout = 0.1;
   int queue_size = 1;
   int max_path_length = 20000;
   double max_silence = 2.0;
@@ -44,6 +47,12 @@ struct OdometryOutputOptions {
     list.add("invert_tf", invert_tf, "publish base -> odom instead, where base already has a parent");
     list.add("tf_timeout", tf_timeout, {0.0, 60.0}, "s",
              "wall time to wait for the transform base <- camera at the start");
+    list.add("guess_frame_id", guess_frame_id,
+             "world-fixed frame of another odometry: where its guess_frame_id -> base on TF has the base is one more "
+             "place to look for the motion; empty: none");
+    list.add("use_imu", use_imu,
+             "look for the rotation where the gyro of topic imu has it, too; not with guess_frame_id");
+    list.add("guess_timeout", guess_timeout, {0.0, 1.0}, "s", "wall time to wait for either at each pair");
     list.add("queue_size", queue_size, {1, 1000}, "",
              "feature messages that wait while one is processed; the newest win");
     list.add("max_path_length", max_path_length, {1, 10000000}, "", "poses kept in the path; the newest win");

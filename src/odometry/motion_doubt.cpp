@@ -6,9 +6,6 @@
 namespace sdvo {
 namespace {
 
-constexpr double kAcceleration = 5.0;      // m/s^2
-constexpr double kTurnAcceleration = 2.0;  // rad/s^2
-
 Matrix6d covarianceOf(double translation, double rotation) {
   Vector6d variance;
   variance << Eigen::Vector3d::Constant(translation * translation), Eigen::Vector3d::Constant(rotation * rotation);
@@ -18,12 +15,12 @@ Matrix6d covarianceOf(double translation, double rotation) {
 }  // namespace
 
 Matrix6d predictionCovariance(double dt) {
-  return covarianceOf(0.5 * kAcceleration * dt * dt, 0.5 * kTurnAcceleration * dt * dt);
+  return covarianceOf(0.5 * kLastingAcceleration * dt * dt, 0.5 * kLastingTurnAcceleration * dt * dt);
 }
 
 Matrix6d travelCovariance(const Vector6d& velocity, double seconds, double max_speed) {
-  const double way = velocity.head<3>().norm() * seconds + 0.5 * kAcceleration * seconds * seconds;
-  const double angle = velocity.tail<3>().norm() * seconds + 0.5 * kTurnAcceleration * seconds * seconds;
+  const double way = velocity.head<3>().norm() * seconds + 0.5 * kLastingAcceleration * seconds * seconds;
+  const double angle = velocity.tail<3>().norm() * seconds + 0.5 * kLastingTurnAcceleration * seconds * seconds;
   return covarianceOf(std::min(way, max_speed * seconds), std::min(angle, CV_PI));
 }
 

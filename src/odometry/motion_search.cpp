@@ -23,13 +23,16 @@ bool contains(const std::vector<int>& values, int value) {
   return std::find(values.begin(), values.end(), value) != values.end();
 }
 
-/// Rows that are among the first but not among the second.
-std::vector<int> rowsOnlyIn(std::vector<int> first, std::vector<int> second) {
-  std::sort(first.begin(), first.end());
-  std::sort(second.begin(), second.end());
-  std::vector<int> rows;
-  std::set_difference(first.begin(), first.end(), second.begin(), second.end(), std::back_inserter(rows));
-  return rows;
+/// What is among the first but not among the second; both ascend.
+std::vector<int> without(const std::vector<int>& first, const std::vector<int>& second) {
+  std::vector<int> rest;
+  std::set_difference(first.begin(), first.end(), second.begin(), second.end(), std::back_inserter(rest));
+  return rest;
+}
+
+std::vector<int> sorted(std::vector<int> values) {
+  std::sort(values.begin(), values.end());
+  return values;
 }
 
 /// Whether two hypotheses mean one motion, for what the one explains and for what the other does: far points alone do
@@ -81,7 +84,8 @@ MotionSearch::MotionSearch(const FeatureMatcherOptions& matcher, const MotionEst
       estimator_(motion) {}
 
 MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
-  MotionHypothesis found = search(scene, scene.T_current_reference);
+  const std::optional<Eigen::Isometry3d>& prior = scene.guess ? scene.guess : scene.T_current_reference;
+  MotionHypothesis found = search(scene, prior);
   if (found.verdict.trust == Trust::kSound && !scene.contested) {
     const auto measured = align(scene, found);
     if (!hasStrayed(scene.features.camera, found, measured)) return found;
@@ -90,14 +94,23 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
 
   // The prior itself may be what misled the search, and what moves by itself may outnumber the world.
   std::vector<MotionHypothesis> hypotheses = {std::move(found)};
-  if (scene.T_current_reference) hypotheses.push_back(search(scene, std::nullopt));
+  if (scene.guess && scene.T_current_reference) hypotheses.push_back(search(scene, scene.T_current_reference));
+  if (prior) hypotheses.push_back(search(scene, std::nullopt));
   const MotionHypothesis all = hypotheses.back();
-  std::vector<int> lasting, outliers;
+  std::vector<int> lasting, rest;
   for (int i = 0; i < static_cast<int>(all.matches.size()); ++i) {
     if (all.isLasting(i)) lasting.push_back(i);
-    if (!std::binary_search(all.motion.inliers.begin(), all.motion.inliers.end(), i)) outliers.push_back(i);
+    rest.push_back(i);
   }
-  for (const std::vector<int>& subset : {lasting, outliers}) hypotheses.push_back(searchAmong(scene, all, subset));
+  hypotheses.push_back(searchAmong(scene, all, lasting));
+  // What moves by itself may have left copies of itself in the map, each with a motion of its own.
+  constexpr int kMotions = 4;
+  MotionEstimate peeled = all.motion;
+  for (int k = 0; k < kMotions && (k == 0 || peeled.success); ++k) {
+    rest = without(rest, peeled.inliers);
+    hypotheses.push_back(searchAmong(scene, all, rest));
+    peeled = hypotheses.back().motion;
+  }
   found = choose(scene, std::move(hypotheses));
   if (found.verdict.trust != Trust::kNone) align(scene, found);
   return found;
@@ -149,6 +162,8 @@ void MotionSearch::weigh(const MotionScene& scene, MotionHypothesis& found) cons
   evidence.covariance = found.motion.covariance;
   evidence.dt = static_cast<double>(scene.features.stamp - scene.map.newestStamp()) * 1e-9;
   evidence.velocity = scene.velocity;
+  evidence.velocity_age = scene.velocity_age;
+  if (scene.guess) evidence.guess = scene.guess->inverse();
   found.verdict = found.motion.success ? judgePose(verdict_options_, motion_options_.min_inliers, evidence)
                                        : PoseVerdict{Trust::kNone, found.motion.reason};
 }
@@ -236,6 +251,9 @@ std::size_t MotionSearch::best(const MotionScene& scene, const std::vector<Motio
     const MotionHypothesis &a = hypotheses[i], &b = hypotheses[j];
     if (a.motion.success != b.motion.success) return a.motion.success;
     if (std::abs(lasting_costs[i] - lasting_costs[j]) > kDecisive) return lasting_costs[i] < lasting_costs[j];
+    // However many they are: a board that covers most of the view outnumbers what is left of the world.
+    const bool is_a_implausible = isImplausible(a.evidence), is_b_implausible = isImplausible(b.evidence);
+    if (is_a_implausible != is_b_implausible) return is_b_implausible;
     const bool comparable = b.evidence.inliers > leastOfRival(a.motion) && a.evidence.inliers > leastOfRival(b.motion);
     if (scene.velocity && comparable && !areSame(a, b)) return change(a) < change(b);
     return a.evidence.inliers > b.evidence.inliers;
@@ -259,22 +277,25 @@ MotionHypothesis MotionSearch::choose(const MotionScene& scene, std::vector<Moti
   if (!chosen.motion.success) return std::move(chosen);
 
   const MotionHypothesis* rival = nullptr;
-  std::vector<int> of_rival;  // rows that the rival explains and the chosen one does not
-  const std::vector<int> own = chosen.inlierRows();
+  std::vector<int> of_rival, of_rivals;  // rows that the largest rival, or any, explains and the chosen one does not
+  const std::vector<int> own = sorted(chosen.inlierRows());
   for (const MotionHypothesis& other : hypotheses) {
     if (&other == &chosen || !other.motion.success) continue;
     if (areOne(scene.map.camera(), chosen, other)) {
       chosen.evidence.confirmed |= chosen.guided != other.guided;  // from matches of their own
       continue;
     }
-    std::vector<int> rows = rowsOnlyIn(other.inlierRows(), own);
-    if (static_cast<int>(rows.size()) >= leastOfRival(chosen.motion) && rows.size() > of_rival.size())
-      rival = &other, of_rival = std::move(rows);
+    std::vector<int> rows = without(sorted(other.inlierRows()), own);
+    if (static_cast<int>(rows.size()) < leastOfRival(chosen.motion)) continue;
+    std::vector<int> both;
+    std::set_union(of_rivals.begin(), of_rivals.end(), rows.begin(), rows.end(), std::back_inserter(both));
+    of_rivals = std::move(both);
+    if (rows.size() > of_rival.size()) rival = &other, of_rival = std::move(rows);
   }
-  // What the rival explains does not speak against the chosen one.
+  // What rivals explain does not speak against the chosen one.
   chosen.evidence.matches -=
       static_cast<int>(std::count_if(chosen.matches.begin(), chosen.matches.end(), [&](const FeatureMatch& match) {
-        return std::binary_search(of_rival.begin(), of_rival.end(), match.current);
+        return std::binary_search(of_rivals.begin(), of_rivals.end(), match.current);
       }));
   chosen.verdict = judgePose(verdict_options_, motion_options_.min_inliers, chosen.evidence);
   // Less than that is something small that moves, or a texture that repeats itself; unless it was larger just before.
@@ -288,6 +309,11 @@ MotionHypothesis MotionSearch::choose(const MotionScene& scene, std::vector<Moti
                                             std::to_string(of_rival.size()) +
                                             " matches: does something move before the camera?"};
   }
+  // Rather what was expected than the motion of something that has come to cover most of the view.
+  if (scene.contested && scene.T_current_reference && isImplausible(chosen.evidence)) {
+    chosen.verdict = {Trust::kNone, judgeChange(verdict_options_, chosen.evidence).reason +
+                                        ", right after something else moved in view"};
+  }
   return std::move(chosen);
 }
 
@@ -298,6 +324,10 @@ bool MotionSearch::lastingDisagree(const PoseEvidence& evidence) const {
 
 bool MotionSearch::lastingAgree(const PoseEvidence& evidence) const {
   return evidence.lasting_matches >= kEnoughLasting && !lastingDisagree(evidence);
+}
+
+bool MotionSearch::isImplausible(const PoseEvidence& evidence) const {
+  return judgeChange(verdict_options_, evidence).trust == Trust::kDoubtful && !lastingAgree(evidence);
 }
 
 /// Fewer inliers than that are no rival of a motion.

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <sstream>
 
+#include "stereo_descriptor_vo/odometry/motion_doubt.hpp"
+
 namespace sdvo {
 namespace {
 
@@ -24,11 +26,10 @@ double deviation(const Matrix6d& covariance, int first) {
 }  // namespace
 
 PoseVerdict judgePose(const PoseVerdictOptions& options, int min_inliers, const PoseEvidence& evidence) {
-  const Vector6d motion = logSE3(evidence.motion);
   const double time = evidence.dt + options.stamp_tolerance;
   const double noise = kSigmas * deviation(evidence.covariance, 0);
   const double turn_noise = kSigmas * deviation(evidence.covariance, 3);
-  const double way = evidence.motion.translation().norm(), angle = motion.tail<3>().norm();
+  const double way = evidence.motion.translation().norm(), angle = logSE3(evidence.motion).tail<3>().norm();
   const double ratio = evidence.matches > 0 ? static_cast<double>(evidence.inliers) / evidence.matches : 0.0;
 
   // What no motion may be.
@@ -59,24 +60,37 @@ PoseVerdict judgePose(const PoseVerdictOptions& options, int min_inliers, const 
   if (evidence.deviation > options.doubtful_deviation + kShare * way)
     return verdict(Trust::kDoubtful, "a way of ", way, " m known to ", evidence.deviation,
                    " m exceeds tracking/doubtful_deviation");
-  if (evidence.velocity) {
-    // The velocity before rests on stamps that may be wrong, too.
-    const Vector6d& before = *evidence.velocity;
-    const double change = (motion - before * evidence.dt).head<3>().norm();
-    const double turn_change = (motion - before * evidence.dt).tail<3>().norm();
-    const double forgiven = 2.0 * options.stamp_tolerance;
-    PoseVerdict doubt;
-    if (change > options.max_acceleration * time * time + before.head<3>().norm() * forgiven + noise)
-      doubt = verdict(Trust::kDoubtful, "a change of the motion by ", change, " m in ", evidence.dt,
-                      " s exceeds tracking/max_acceleration");
-    else if (turn_change >
-             options.max_rotation_acceleration * time * time + before.tail<3>().norm() * forgiven + turn_noise)
-      doubt = verdict(Trust::kDoubtful, "a change of the rotation by ", turn_change, " rad in ", evidence.dt,
-                      " s exceeds tracking/max_rotation_acceleration");
-    doubt.of_rate = doubt.trust == Trust::kDoubtful;
-    return doubt;
+  return judgeChange(options, evidence);
+}
+
+PoseVerdict judgeChange(const PoseVerdictOptions& options, const PoseEvidence& evidence) {
+  if (!evidence.velocity) return {};
+  const Vector6d& before = *evidence.velocity;
+  const double time = evidence.dt + options.stamp_tolerance;
+  // The velocity before rests on stamps that may be wrong, too. What is long ago may have changed since.
+  const double forgiven = 2.0 * options.stamp_tolerance;
+  const double speed_change = options.max_acceleration * time + kLastingAcceleration * evidence.velocity_age;
+  const double rate_change =
+      options.max_rotation_acceleration * time + kLastingTurnAcceleration * evidence.velocity_age;
+  const double most =
+      speed_change * time + before.head<3>().norm() * forgiven + kSigmas * deviation(evidence.covariance, 0);
+  const double most_turn =
+      rate_change * time + before.tail<3>().norm() * forgiven + kSigmas * deviation(evidence.covariance, 3);
+  if (evidence.guess) {
+    const Vector6d aside = logSE3(evidence.guess->inverse() * evidence.motion);
+    if (aside.head<3>().norm() <= most && aside.tail<3>().norm() <= most_turn) return {};
   }
-  return {};
+  const Vector6d change = logSE3(evidence.motion) - before * evidence.dt;
+  const double way = change.head<3>().norm(), angle = change.tail<3>().norm();
+  PoseVerdict doubt;
+  if (way > most)
+    doubt = verdict(Trust::kDoubtful, "a change of the motion by ", way, " m in ", evidence.dt,
+                    " s exceeds tracking/max_acceleration");
+  else if (angle > most_turn)
+    doubt = verdict(Trust::kDoubtful, "a change of the rotation by ", angle, " rad in ", evidence.dt,
+                    " s exceeds tracking/max_rotation_acceleration");
+  doubt.of_rate = doubt.trust == Trust::kDoubtful;
+  return doubt;
 }
 
 }  // namespace sdvo

@@ -56,12 +56,12 @@ void VisualOdometry::breakStream() {
   state_.velocity.reset();
 }
 
-OdometryResult VisualOdometry::update(const StereoFeatures& features) {
+OdometryResult VisualOdometry::update(const StereoFeatures& features, const std::optional<MotionGuess>& guess) {
   refuse(features);
   const double dt = state_.last_stamp ? static_cast<double>(features.stamp - *state_.last_stamp) * 1e-9 : 0.0;
   const bool continued = state_.map && state_.map->continuedBy(features);
   const bool frozen = isFrozen(features, dt);
-  const MotionHypothesis found = continued && !frozen ? localise(features, dt) : MotionHypothesis{};
+  const MotionHypothesis found = continued && !frozen ? localise(features, dt, guess) : MotionHypothesis{};
 
   // Nothing has changed so far, and from here on nothing is refused.
   Stopwatch stopwatch;
@@ -95,15 +95,29 @@ void VisualOdometry::refuse(const StereoFeatures& features) const {
 }
 
 /// Looks for the pair in the map.
-MotionHypothesis VisualOdometry::localise(const StereoFeatures& features, double dt) const {
+MotionHypothesis VisualOdometry::localise(const StereoFeatures& features, double dt,
+                                          const std::optional<MotionGuess>& guess) const {
   const RigCalibration calibration = state_.calibration.calibration();
-  MotionScene scene{*state_.map, calibration, features, std::nullopt, state_.velocity, state_.contested_pairs > 0};
-  // The motion since the map's newest pair: what was already covered by predicted pairs, and the velocity from there
-  // on.
+  MotionScene scene{*state_.map,   calibration,          features,
+                    std::nullopt,  state_.last_velocity, state_.contested_pairs > 0,
+                    velocityAge(), std::nullopt};
+  // The motion since the map's newest pair: what was already covered by predicted pairs, and from there on the velocity
+  // or the guess.
+  const Eigen::Isometry3d T_reference_previous = state_.map->newestPose() * state_.T_origin_camera;
   if (state_.velocity && dt <= options_.tracking.max_gap)
-    scene.T_current_reference =
-        (state_.map->newestPose() * state_.T_origin_camera * expSE3(*state_.velocity * dt)).inverse();
+    scene.T_current_reference = (T_reference_previous * expSE3(*state_.velocity * dt)).inverse();
+  if (guess) {
+    Eigen::Isometry3d T_previous_current = guess->T_previous_current;
+    if (guess->rotation_only)
+      T_previous_current.translation() = state_.velocity.value_or(Vector6d::Zero()).head<3>() * dt;
+    scene.guess = (T_reference_previous * T_previous_current).inverse();
+  }
   return search_.find(scene);
+}
+
+/// How old the last velocity was when the map's newest pair was taken, s.
+double VisualOdometry::velocityAge() const {
+  return static_cast<double>(state_.map->newestStamp() - state_.velocity_stamp) * 1e-9;
 }
 
 VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
@@ -118,7 +132,8 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
   if (state_.started) {
     ++epoch_;
     const double unseen = static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9;
-    state_.covariance.restart(travelCovariance(state_.last_velocity, unseen, options_.tracking.max_speed));
+    state_.covariance.restart(
+        travelCovariance(state_.last_velocity.value_or(Vector6d::Zero()), unseen, options_.tracking.max_speed));
     step.state = TrackingState::kDegraded;
     step.reason = "started again from the last pose; the motion in between is unknown";
   } else {
@@ -126,6 +141,7 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
     step.reason = "first pair";
   }
   state_.started = true;
+  state_.last_doubt.setZero();
   state_.predicted_pairs = 0;
   state_.map.emplace(options_.map);
   state_.map->insert(features, state_.pairs, state_.T_origin_camera.inverse(), {}, state_.calibration.calibration());
@@ -190,8 +206,9 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
   step.state = TrackingState::kTracking;
   if (verdict.trust == Trust::kSound) state_.last_doubt.setZero();
   if (verdict.trust == Trust::kDoubtful) {
-    const Matrix6d doubted =
-        watched ? state_.last_doubt : doubt(found, T_previous_measured, *step.T_previous_current, dt);
+    const Matrix6d doubted = watched && !state_.last_doubt.isZero()
+                                 ? state_.last_doubt
+                                 : doubt(found, T_previous_measured, *step.T_previous_current, dt);
     state_.last_doubt = doubted;
     step.state = TrackingState::kDegraded;
     step.reason = "doubtful: " + verdict.reason;
@@ -200,10 +217,12 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
     if (!verdict.of_rate || !search_.lastingAgree(evidence)) state_.covariance.doubt(doubted);
   }
   const Vector6d velocity = logSE3(found.motion.T_current_reference.inverse()) / since_newest;
-  // Stamps that lie too close make no velocity.
-  if (velocity.head<3>().norm() <= options_.tracking.max_speed &&
-      velocity.tail<3>().norm() <= options_.tracking.max_rotation_rate)
+  // Stamps that lie too close make no velocity, nor does what may be the motion of something else.
+  if (!search_.isImplausible(evidence) && velocity.head<3>().norm() <= options_.tracking.max_speed &&
+      velocity.tail<3>().norm() <= options_.tracking.max_rotation_rate) {
     state_.velocity = state_.last_velocity = velocity;
+    state_.velocity_stamp = features.stamp;
+  }
   state_.predicted_pairs = 0;
   if (map.newestIsKeyframe()) state_.covariance.markKeyframe();
   return step;
@@ -267,7 +286,7 @@ Matrix6d VisualOdometry::doubt(const MotionHypothesis& found, const Eigen::Isome
     const Eigen::Isometry3d T_else_found = found.motion.T_current_reference * found.T_current_reference_else->inverse();
     return moved + disagreement(Eigen::Isometry3d::Identity(), T_else_found);
   }
-  const Eigen::Isometry3d predicted = expSE3(state_.velocity.value_or(Vector6d::Zero()) * dt);
+  const Eigen::Isometry3d predicted = expSE3(state_.last_velocity.value_or(Vector6d::Zero()) * dt);
   return moved + disagreement(T_previous_current, predicted) + predictionCovariance(dt);
 }
 

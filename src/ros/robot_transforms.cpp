@@ -33,6 +33,15 @@ std::optional<Eigen::Isometry3d> RobotTransforms::find(const std::string& parent
   return std::nullopt;
 }
 
+std::optional<Eigen::Isometry3d> RobotTransforms::findMotion(const std::string& fixed, const std::string& child,
+                                                             const ros::Time& from, const ros::Time& to,
+                                                             std::string& problem) const try {
+  return tf2::transformToEigen(buffer_.lookupTransform(child, from, child, to, fixed));
+} catch (const std::exception& e) {
+  problem = e.what();
+  return std::nullopt;
+}
+
 void RobotTransforms::receive(const Event& event, bool is_static) {
   const ros::Time now = ros::Time::now();
   if (now < last_update_) buffer_.clear();  // the clock jumped back: static transforms stay

@@ -32,6 +32,10 @@ class RobotTransforms {
   std::optional<Eigen::Isometry3d> find(const std::string& parent, const std::string& child,
                                         std::string& problem) const;
 
+  /// T_child(from)_child(to), as `fixed` has it: how a frame moved between two times.
+  std::optional<Eigen::Isometry3d> findMotion(const std::string& fixed, const std::string& child, const ros::Time& from,
+                                              const ros::Time& to, std::string& problem) const;
+
  private:
   using Event = ros::MessageEvent<const tf2_msgs::TFMessage>;
 

@@ -1,4 +1,5 @@
 #include <nodelet/nodelet.h>
+#include <sensor_msgs/Imu.h>
 #include <std_srvs/Empty.h>
 #include <std_srvs/Trigger.h>
 #include <stereo_descriptor_vo/ResetToPose.h>
@@ -19,6 +20,7 @@
 #include "callback_thread.hpp"
 #include "camera_mount.hpp"
 #include "conversions.hpp"
+#include "gyro_track.hpp"
 #include "odometry_diagnostics.hpp"
 #include "odometry_publisher.hpp"
 #include "params.hpp"
@@ -38,6 +40,7 @@ namespace sdvo {
 class VisualOdometryNodelet : public nodelet::Nodelet {
  public:
   ~VisualOdometryNodelet() override {
+    stopping_ = true;
     if (mount_) mount_->stop();
     // Nothing may arrive any more, and nothing be in work, when members go.
     callbacks_.stop();
@@ -85,6 +88,11 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     reconfigure_server_ =
         std::make_unique<ReconfigureServer>(private_nh, listOptions(reconfigured_), [this] { onReconfigure(); });
 
+    if (options_.output.use_imu && !options_.output.guess_frame_id.empty())
+      throw std::invalid_argument("use_imu and guess_frame_id exclude each other");
+    if (options_.output.use_imu)
+      imu_subscriber_ =
+          nh_.subscribe<sensor_msgs::Imu>("imu", kImuQueue, [this](const sensor_msgs::ImuConstPtr& m) { onImu(*m); });
     worker_ = std::make_unique<Worker<FeaturesFilter::Passed>>(
         static_cast<std::size_t>(options_.output.queue_size),
         [this](const FeaturesFilter::Passed& passed) { process(passed); });
@@ -124,6 +132,20 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   } catch (const std::exception& e) {
     if (throttle_.allows(e.what()))
       NODELET_ERROR_STREAM("features at " << message->header.stamp << " skipped: " << e.what());
+  }
+
+  void onImu(const sensor_msgs::Imu& message) {
+    const std::string problem = whyUnusable(message.header.stamp);
+    if (!problem.empty()) {
+      if (throttle_.allows("imu")) NODELET_WARN_STREAM("a message of the IMU is not used: " << problem);
+      return;
+    }
+    const auto& rate = message.angular_velocity;
+    {
+      const std::lock_guard<std::mutex> lock(pending_mutex_);
+      imu_frame_ = ros_conversions::cleanFrameId(message.header.frame_id);
+    }
+    gyro_.add(nanoseconds(message.header.stamp), {rate.x, rate.y, rate.z});
   }
 
   /// Throws for what cannot be used, before its stamp counts.
@@ -172,7 +194,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     if (processed_epoch_ && *processed_epoch_ != message.stream_epoch) odometry_->breakStream();
     processed_epoch_ = message.stream_epoch;
 
-    const OdometryResult result = odometry_->update(features);
+    const OdometryResult result = odometry_->update(features, findGuess(message.header));
+    processed_stamp_ = message.header.stamp;
     epoch_ = result.epoch;
     report(result, message.header.stamp);
     publisher_->publish(result, *mount_->last());
@@ -208,6 +231,55 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     odometry_->reset();
     publisher_->restart(T_odom_start);
     processed_epoch_.reset();
+    processed_stamp_.reset();
+  }
+
+  /// How another odometry, or the gyro, has the camera's motion since the pair before; nothing where neither is asked
+  /// for or knows it.
+  std::optional<MotionGuess> findGuess(const std_msgs::Header& header) {
+    const bool of_frame = !options_.output.guess_frame_id.empty();
+    if (!processed_stamp_ || (!of_frame && !options_.output.use_imu)) return std::nullopt;
+    std::string problem;
+    std::optional<MotionGuess> guess;
+    const auto give_up = ros::WallTime::now() + ros::WallDuration(options_.output.guess_timeout);
+    for (;;) {
+      guess = of_frame ? guessOfFrame(header.stamp, problem) : guessOfGyro(header, problem);
+      if (guess || ros::WallTime::now() >= give_up || stopping_ || !ros::ok()) break;
+      ros::WallDuration(0.002).sleep();
+    }
+    if (!guess && throttle_.allows("guess"))
+      NODELET_WARN_STREAM("no guess of the motion until " << header.stamp << ", going on without: " << problem);
+    return guess;
+  }
+
+  std::optional<MotionGuess> guessOfFrame(const ros::Time& stamp, std::string& problem) const {
+    const std::optional<Eigen::Isometry3d> T_before_now = transforms_->findMotion(
+        ros_conversions::cleanFrameId(options_.output.guess_frame_id),
+        ros_conversions::cleanFrameId(options_.output.base_frame_id), *processed_stamp_, stamp, problem);
+    if (!T_before_now) return std::nullopt;
+    const Eigen::Isometry3d T_base_camera = *mount_->last();
+    return MotionGuess{T_base_camera.inverse() * *T_before_now * T_base_camera};
+  }
+
+  std::optional<MotionGuess> guessOfGyro(const std_msgs::Header& header, std::string& problem) {
+    const std::optional<Eigen::Matrix3d> R_before_now =
+        gyro_.rotation(nanoseconds(*processed_stamp_), nanoseconds(header.stamp));
+    if (!R_before_now) {
+      problem = "topic " + imu_subscriber_.getTopic() + " has no measurements of that time";
+      return std::nullopt;
+    }
+    std::string imu_frame;
+    {
+      const std::lock_guard<std::mutex> lock(pending_mutex_);
+      imu_frame = imu_frame_;
+    }
+    const std::optional<Eigen::Isometry3d> T_camera_imu =
+        transforms_->find(ros_conversions::cleanFrameId(header.frame_id), imu_frame, problem);
+    if (!T_camera_imu) return std::nullopt;
+    MotionGuess guess;
+    guess.T_previous_current.linear() = T_camera_imu->linear() * *R_before_now * T_camera_imu->linear().transpose();
+    guess.rotation_only = true;
+    return guess;
   }
 
   /// Asks for the camera's place on the robot; says what is missing, nothing when it is known.
@@ -295,6 +367,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
 
   /// Messages that wait for this node's own thread, which handles each in no time.
   static constexpr int kArrivalQueue = 20;
+  static constexpr int kImuQueue = 1000;
 
   CallbackThread callbacks_;
   ros::NodeHandle nh_;
@@ -311,11 +384,14 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   std::unique_ptr<OdometryDiagnostics> diagnostics_;
   std::vector<ros::ServiceServer> services_;
   std::optional<Eigen::Isometry3d> requested_start_;  // under pending_mutex_
-  std::atomic<bool> resumed_{false};
+  std::atomic<bool> resumed_{false}, stopping_{false};
 
   // Only the callbacks' thread touches these.
   FeaturesFilter filter_;
   std::optional<std::uint32_t> stream_epoch_;
+
+  GyroTrack gyro_;
+  std::string imu_frame_;  // under pending_mutex_
 
   std::atomic<std::uint64_t> out_of_order_{0}, malformed_{0};
 
@@ -324,9 +400,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   int timeline_ = 0;
   int epoch_ = 0;
   std::optional<std::uint32_t> processed_epoch_;
+  std::optional<ros::Time> processed_stamp_;
 
   std::unique_ptr<Worker<FeaturesFilter::Passed>> worker_;
-  ros::Subscriber subscriber_;
+  ros::Subscriber subscriber_, imu_subscriber_;
 };
 
 }  // namespace sdvo

@@ -161,6 +161,53 @@ TEST_F(MotionSearchTest, WithoutLastingPointsTheOneThatGoesOnAsBeforeWins) {
   EXPECT_NEAR(moved(find(features, -0.4, true)), -0.4, 1e-3) << "of the swarm";
 }
 
+/// What is left of the world beside a board that is fixed to the camera and covers most of the view.
+class CoveredView : public MotionSearchTest {
+ protected:
+  StereoFeatures see(double camera_x, bool world_visible = true) const {
+    StereoFeatures features = synthetic::noFeatures(synthetic::camera(), stamp());
+    if (world_visible) Street::add(features, world_, camera_x);
+    Street::add(features, board_, 0.0);
+    return features;
+  }
+
+  /// Where no prior tells the copies of the board in the map from the board.
+  MotionHypothesis findUnguided(const StereoFeatures& features) const {
+    Vector6d velocity = Vector6d::Zero();
+    velocity[0] = kStep / 0.1;
+    return search_.find({map_, calibration_, features, std::nullopt, velocity, true});
+  }
+
+  static constexpr double kStep = 1.2;  // m between pairs: no camera stops from there
+
+ private:
+  synthetic::World world_ = synthetic::randomWorld(26, 30, {-2.0, -2.0, 8.0}, {6.0, 2.0, 12.0});
+  synthetic::World board_ = synthetic::randomWorld(27, 400, {-2.0, -1.5, 3.9}, {1.0, 1.5, 4.1});
+};
+
+TEST_F(CoveredView, WhatNoCameraDoesIsNotTheCamerasHoweverManyAgree) {
+  begin(see(0.0));
+  for (const double x : {kStep, 2.0 * kStep, 3.0 * kStep}) {
+    // With each pair the board has left one more copy of itself in the map.
+    const StereoFeatures features = see(x);
+    const MotionHypothesis found = find(features, kStep, x > kStep);
+    ASSERT_TRUE(found.motion.success) << found.motion.reason;
+    EXPECT_NEAR(moved(found), kStep, 0.02) << x;
+    EXPECT_LT(found.evidence.inliers, 40);
+    EXPECT_EQ(found.verdict.trust, Trust::kDoubtful) << found.verdict.reason;
+    EXPECT_TRUE(found.contested);
+    EXPECT_NEAR(moved(findUnguided(features)), kStep, 0.02) << x;
+    extend(features, found);
+  }
+}
+
+TEST_F(CoveredView, WhereNothingElseIsSeenThereIsRatherNoMotion) {
+  begin(see(0.0, false));
+  EXPECT_EQ(find(see(0.0, false), kStep, true).verdict.trust, Trust::kNone);
+  EXPECT_EQ(find(see(0.0, false), kStep, false).verdict.trust, Trust::kDoubtful) << "a stamp may be wrong";
+  EXPECT_EQ(find(see(0.0, false), 0.0, true).verdict.trust, Trust::kSound);
+}
+
 TEST_F(MotionSearchTest, FailsWithAReason) {
   start(2);
   const MotionHypothesis found = find(synthetic::noFeatures(synthetic::camera(), stamp()), 0.0);

@@ -111,6 +111,32 @@ TEST(PoseVerdict, NoiseOverATinyTimeIsNoRate) {
   EXPECT_EQ(trustIn(evidence, options), Trust::kSound);
 }
 
+TEST(PoseVerdict, WhatAnotherSourceSaysTooIsNotImplausible) {
+  PoseEvidence evidence = soundEvidence();
+  evidence.motion.linear() = expSO3({0.0, 0.5, 0.0});
+  EXPECT_EQ(trustIn(evidence), Trust::kDoubtful);
+  evidence.guess = evidence.motion;
+  EXPECT_EQ(trustIn(evidence), Trust::kSound);
+  evidence.guess->linear() = expSO3({0.0, -0.5, 0.0});
+  EXPECT_EQ(trustIn(evidence), Trust::kDoubtful);
+  evidence.motion.linear().setIdentity();
+  EXPECT_EQ(trustIn(evidence), Trust::kSound) << "a wrong guess is no evidence against a motion";
+}
+
+TEST(PoseVerdict, WhatIsLongAgoMayHaveChangedSince) {
+  PoseEvidence evidence = soundEvidence();
+  evidence.velocity_age = 0.5;
+  const double allowed = (20.0 * 0.12 + 5.0 * 0.5) * 0.12 + 10.0 * 0.04;
+  evidence.motion.translation().z() = 1.0 - allowed + 0.001;
+  EXPECT_EQ(trustIn(evidence), Trust::kSound);
+  evidence.motion.translation().z() = 1.0 - allowed - 0.001;
+  EXPECT_EQ(trustIn(evidence), Trust::kDoubtful);
+  EXPECT_TRUE(judgeChange({}, evidence).of_rate);
+  evidence.motion = soundEvidence().motion;
+  evidence.motion.linear() = expSO3({0.0, (30.0 * 0.12 + 2.0 * 0.5) * 0.12 + 0.001, 0.0});
+  EXPECT_EQ(trustIn(evidence), Trust::kDoubtful);
+}
+
 TEST(PoseVerdict, AccelerationsAreJudgedAgainstTheVelocityBefore) {
   PoseEvidence evidence = soundEvidence();
   evidence.confirmed = true;

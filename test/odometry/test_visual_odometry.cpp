@@ -245,6 +245,82 @@ TEST(VisualOdometry, IsLostAfterTheSecondFailureAndStartsAgainFromTheLastPose) {
   }
 }
 
+/// A camera that stood for some pairs, and knows it, then turns by 25 degrees at once; a texture that repeats itself
+/// leaves nothing to be found but near where it is expected.
+class GuessedTurn : public ::testing::Test {
+ protected:
+  GuessedTurn() {
+    for (std::size_t i = 0; i < world_.rows.size(); ++i) world_.rows[i] = world_.rows[i % 80];
+    for (int i = 0; i < 6; ++i) result_ = odometry_.update(pairAt(i, still_), MotionGuess{still_});
+  }
+
+  StereoFeatures pairAt(int i, const Eigen::Isometry3d& T_origin_camera) const {
+    synthetic::Sighting sighting;
+    sighting.noise = 0.1;
+    sighting.seed = 700 + static_cast<unsigned>(i);
+    return synthetic::observe(world_, synthetic::camera(), T_origin_camera.inverse(), stampOf(i), sighting);
+  }
+
+  const Eigen::Isometry3d still_ = Eigen::Isometry3d::Identity();
+  const Eigen::Isometry3d turn_{Eigen::AngleAxisd(25.0 / 180.0 * M_PI, Eigen::Vector3d::UnitY())};
+  synthetic::World world_ = synthetic::randomWorld(41, 1600, {-12.0, -4.0, 4.0}, {25.0, 3.0, 15.0});
+  VisualOdometry odometry_{{}};
+  OdometryResult result_;
+};
+
+TEST_F(GuessedTurn, IsLostWithoutAGuess) {
+  EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
+  result_ = odometry_.update(pairAt(6, turn_));
+  EXPECT_NE(result_.state, TrackingState::kTracking);
+  EXPECT_GT(angleBetween(result_.T_origin_camera, turn_), 0.2);
+}
+
+TEST_F(GuessedTurn, IsTrackedWithOne) {
+  const Eigen::Isometry3d about = turn_ * expSE3((Vector6d() << 0.02, -0.01, 0.03, 0.01, 0.02, -0.01).finished());
+  result_ = odometry_.update(pairAt(6, turn_), MotionGuess{about});
+  EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
+  EXPECT_LT(angleBetween(result_.T_origin_camera, turn_), 1e-3);
+  EXPECT_LT(distanceBetween(result_.T_origin_camera, turn_), 0.01) << "the guess is 0.04 m off";
+}
+
+TEST_F(GuessedTurn, ARotationAloneWillDo) {
+  Eigen::Isometry3d elsewhere = turn_;
+  elsewhere.translation() << 3.0, 0.0, 3.0;
+  result_ = odometry_.update(pairAt(6, turn_), MotionGuess{elsewhere, true});
+  EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
+  EXPECT_LT(angleBetween(result_.T_origin_camera, turn_), 1e-3);
+}
+
+TEST_F(GuessedTurn, AWrongGuessDoesNoHarm) {
+  for (int i = 6; i < 10; ++i) {
+    result_ = odometry_.update(pairAt(i, still_), MotionGuess{i % 2 ? turn_ : turn_.inverse()});
+    EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
+    EXPECT_LT(angleBetween(result_.T_origin_camera, still_), 1e-3);
+    EXPECT_LT(distanceBetween(result_.T_origin_camera, still_), 0.01);
+  }
+}
+
+TEST(VisualOdometry, DoubtsAfterALossWhatNoCameraWithTheVelocityBeforeDoes) {
+  // Something that is fixed to the camera comes to cover the whole view.
+  VisualOdometryOptions options;
+  options.tracking.max_acceleration = 10.0;
+  VisualOdometry odometry(options);
+  follow(odometry, 5);
+  OdometryResult result;
+  for (int i = 6; i <= 10; ++i) {
+    StereoFeatures covered = strangePair(0);
+    covered.stamp = stampOf(i);
+    for (float& u : covered.u) u += 0.01f * static_cast<float>(i);  // noise: no image is that of the pair before
+    result = odometry.update(covered);
+    ASSERT_NE(result.state, TrackingState::kTracking) << i;
+    if (!result.has_motion) continue;
+    const Vector6d error = logSE3(result.T_previous_current.inverse() * drivePose(i - 1).inverse() * drivePose(i));
+    EXPECT_LT(error.dot(result.motion_covariance.ldlt().solve(error)), 20.0) << i;
+  }
+  EXPECT_TRUE(result.has_motion);
+  EXPECT_NE(result.reason.find("max_acceleration"), std::string::npos) << result.reason;
+}
+
 TEST(VisualOdometry, IsLostAtOnceWhenThereIsNoMotionToPredict) {
   VisualOdometry odometry({});
   odometry.update(pairOf(0));

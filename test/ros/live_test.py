@@ -24,7 +24,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Pose, TransformStamped
 from nav_msgs.msg import Odometry, Path
 from nodelet.srv import NodeletLoad, NodeletUnload
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import Image, Imu
 from std_srvs.srv import Empty, Trigger
 from tf2_msgs.msg import TFMessage
 
@@ -540,6 +540,66 @@ class Live(unittest.TestCase):
         self.assertIn('no features for', self.diagnosis().message)
         self.assertIn('TRACKING', self.diagnosis().message)
         self.assertTrue(wait_until(lambda: self.diagnosis('input rate').level == DiagnosticStatus.ERROR))
+
+    def test_another_odometry_tells_of_a_motion_that_was_not_to_be_expected(self):
+        config = tempfile.NamedTemporaryFile('w', suffix='.yaml')
+        self.addCleanup(config.close)
+        config.write('visual_odometry: {guess_frame_id: wheels, publish_tf: false}\n')
+        config.flush()
+        self.start(config=config.name)
+        for i in range(4):
+            self.feed(i)
+        self.assertTrue(wait_until(lambda: self.rosout.warned('no guess of the motion')), self.rosout.warnings)
+
+        # From one pair to the next as far as in six.
+        tf = self.keep(tf2_ros.TransformBroadcaster())
+        tf.close = tf.pub_tf.unregister
+        self.assertTrue(wait_until(lambda: self.is_sent_to_pipeline(tf.pub_tf)))
+        before, last = self.odometry[-2].pose.pose.position, self.odometry[-1].pose.pose.position
+        step = np.hypot(last.x - before.x, last.y - before.y)
+        images, infos = self.camera.messages(9, time_of=4)
+        for stamp, x in ((self.info[-1].header.stamp, 20.0), (images[0].header.stamp, 20.0 + 6.0 * step)):
+            transform = TransformStamped()
+            transform.header.frame_id, transform.child_frame_id, transform.header.stamp = 'wheels', 'base_link', stamp
+            transform.transform.translation.x, transform.transform.rotation.w = x, 1.0
+            tf.sendTransform(transform)
+        info = self.feed_messages(images, infos)
+        self.assertEqual(info.state, 'TRACKING', info.reason)
+        now = self.odometry[-1].pose.pose.position
+        self.assertAlmostEqual(np.hypot(now.x - last.x, now.y - last.y), 6.0 * step, delta=0.5)
+
+    def test_a_gyro_is_asked_for_the_rotation(self):
+        config = tempfile.NamedTemporaryFile('w', suffix='.yaml')
+        self.addCleanup(config.close)
+        config.write('visual_odometry: {use_imu: true, guess_timeout: 1.0}\n')
+        config.flush()
+        self.start(config=config.name)
+        imu = rospy.Publisher(self.namespace + '/imu', Imu, queue_size=100)
+        self.addCleanup(imu.unregister)
+        self.assertTrue(wait_until(lambda: self.is_sent_to_pipeline(imu)))
+
+        def turn(images):
+            """What the gyro measured in the tenth of a second before a pair: it stands on its head and turns a little."""
+            for k in range(11):
+                message = Imu()
+                message.header.frame_id = 'gyro'
+                message.header.stamp = images[0].header.stamp - rospy.Duration.from_sec(0.01 * (10 - k))
+                message.angular_velocity.z = 0.02
+                imu.publish(message)
+        self.feed(0)
+        images, infos = self.camera.messages(1)
+        turn(images)
+        self.assertEqual(self.feed_messages(images, infos).state, 'TRACKING')
+        self.assertTrue(wait_until(lambda: self.rosout.warned('no guess of the motion', 'gyro')), self.rosout.warnings)
+
+        transform = camera_transform('gyro')
+        q = transform.transform.rotation
+        q.x, q.y, q.z, q.w = 1.0, 0.0, 0.0, 0.0
+        self.broadcaster.sendTransform(transform)
+        for i in range(2, 6):
+            images, infos = self.camera.messages(i)
+            turn(images)
+            self.assertEqual(self.feed_messages(images, infos).state, 'TRACKING')
 
     def test_another_publisher_of_the_same_transform_is_named(self):
         self.start()

@@ -3,6 +3,7 @@
 #include <ros/ros.h>
 #include <tf2_msgs/TFMessage.h>
 
+#include <cmath>
 #include <functional>
 #include <optional>
 #include <string>
@@ -25,6 +26,12 @@ geometry_msgs::TransformStamped transform(const std::string& parent, const std::
   message.child_frame_id = child;
   message.transform.translation.x = x;
   message.transform.rotation.w = 1.0;
+  return message;
+}
+
+geometry_msgs::TransformStamped turned(geometry_msgs::TransformStamped message, double yaw) {
+  message.transform.rotation.z = std::sin(0.5 * yaw);
+  message.transform.rotation.w = std::cos(0.5 * yaw);
   return message;
 }
 
@@ -68,6 +75,23 @@ class RobotTransformsTest : public ::testing::Test {
   std::vector<std::string> warnings_;
   int markers_ = 0;
 };
+
+TEST_F(RobotTransformsTest, TellsHowAFrameMovedBetweenTwoTimes) {
+  start();
+  const ros::Time from = ros::Time::now(), to = from + ros::Duration(0.1);
+  std::string problem;
+  send(tf_, {turned(transform("wheels", "base", from, 5.0), 0.3)});
+  waitForMarker(tf_);
+  EXPECT_FALSE(transforms_->findMotion("wheels", "base", from, to, problem));
+  EXPECT_FALSE(problem.empty());
+  send(tf_, {turned(transform("wheels", "base", from + ros::Duration(0.2), 7.0), 0.3)});
+  waitForMarker(tf_);
+  const auto motion = transforms_->findMotion("wheels", "base", from, to, problem);
+  ASSERT_TRUE(motion) << problem;
+  const Eigen::Vector3d expected(std::cos(0.3), -std::sin(0.3), 0.0);  // half of 2 m along x of the wheels' frame
+  EXPECT_LT((motion->translation() - expected).norm(), 1e-6) << motion->translation().transpose();
+  EXPECT_TRUE(motion->linear().isIdentity(1e-6));
+}
 
 TEST_F(RobotTransformsTest, ChainsStaticAndMovingTransforms) {
   start();

@@ -6,10 +6,14 @@
 
 namespace sdvo {
 
+/// What a vehicle's acceleration does not exceed for longer than a moment.
+constexpr double kLastingAcceleration = 5.0;      // m/s^2
+constexpr double kLastingTurnAcceleration = 2.0;  // rad/s^2
+
 /// Covariances, of right perturbations in m and rad, of motions that were not measured or not for certain.
 
 /// How much less a predicted motion is known than a measured one: constant velocity errs by the acceleration, for which
-/// a vehicle's 5 m/s^2 and 2 rad/s^2 stand; `dt` in s.
+/// the above stand; `dt` in s.
 Matrix6d predictionCovariance(double dt);
 
 /// What could have been travelled unseen, by a vehicle that went on with its velocity, m/s and rad/s, and accelerated

@@ -23,6 +23,8 @@ struct MotionScene {
   std::optional<Eigen::Isometry3d> T_current_reference;  ///< as expected, since the map's newest pair
   std::optional<Vector6d> velocity;                      ///< of the camera before, m/s and rad/s
   bool contested = false;                                ///< a moment ago something else moved in view
+  double velocity_age = 0.0;                             ///< of that at the map's newest pair, s
+  std::optional<Eigen::Isometry3d> guess;                ///< T_current_reference as something else than images has it
 };
 
 /// One answer to where a pair is, and what speaks for it.
@@ -53,9 +55,10 @@ struct MotionHypothesis {
 /// Share of an 8x4 grid's cells over the image that hold one of the pair's rows.
 double coverage(const StereoFeatures& features, const std::vector<int>& rows);
 
-/// Finds the motion of a pair since the map's newest pair among hypotheses. The first rests on what was expected. Where
-/// that is in doubt, it competes with one that expects nothing, with the motion of the points that stood still so far,
-/// and with that of the other outliers, among which something that moves by itself may be.
+/// Finds the motion of a pair since the map's newest pair among hypotheses. The first rests on what was guessed, else
+/// on what was expected. Where that is in doubt, it competes with the other one, with one that expects nothing, with
+/// the motion of the points that stood still so far, and with that of the other outliers, among which something that
+/// moves by itself may be.
 class MotionSearch {
  public:
   MotionSearch(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion,
@@ -68,6 +71,9 @@ class MotionSearch {
 
   /// Whether it is that of enough of them. Too few neither agree nor disagree.
   bool lastingAgree(const PoseEvidence& evidence) const;
+
+  /// Whether no camera moves so, as far as the velocity before tells, and the lasting points do not confirm it either.
+  bool isImplausible(const PoseEvidence& evidence) const;
 
  private:
   MotionHypothesis search(const MotionScene& scene, const std::optional<Eigen::Isometry3d>& T_current_reference) const;

@@ -55,6 +55,8 @@ struct PoseEvidence {
   Matrix6d covariance = Matrix6d::Zero();                    ///< of that motion, m and rad
   double dt = 0.0;                                           ///< since the last measured pair, s
   std::optional<Vector6d> velocity;                          ///< before, m/s and rad/s; nothing when unknown
+  double velocity_age = 0.0;                                 ///< of that at the last measured pair, s
+  std::optional<Eigen::Isometry3d> guess;                    ///< the motion as another source than the images has it
 };
 
 /// What is to be done with a motion: use it, use it as one hypothesis among others, or not at all.
@@ -69,5 +71,9 @@ struct PoseVerdict {
 /// Judges a motion by what it rests on. It only looks: the motion is taken or left, never changed. Rates are judged
 /// with the motion's own standard deviation and with the stamps' tolerance, so that noise over a tiny dt is no rate.
 PoseVerdict judgePose(const PoseVerdictOptions& options, int min_inliers, const PoseEvidence& evidence);
+
+/// The part of it that asks whether a camera with the velocity before could have moved so, or whether another source
+/// says about the same: sound or doubtful.
+PoseVerdict judgeChange(const PoseVerdictOptions& options, const PoseEvidence& evidence);
 
 }  // namespace sdvo

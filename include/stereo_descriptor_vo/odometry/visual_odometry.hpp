@@ -100,6 +100,12 @@ struct OdometryResult {
   Eigen::Vector3d right_rotation_sigma = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());  ///< rad
 };
 
+/// How the camera moved since the pair before, as something else than the images has it.
+struct MotionGuess {
+  Eigen::Isometry3d T_previous_current = Eigen::Isometry3d::Identity();
+  bool rotation_only = false;  ///< a gyro's: of the translation it says nothing
+};
+
 /// Stereo odometry on stereo features alone: every pair is matched to a local map of the points around the camera,
 /// found among its outliers by sample consensus, and adjusted together with the last key frames.
 class VisualOdometry {
@@ -108,8 +114,8 @@ class VisualOdometry {
   explicit VisualOdometry(const VisualOdometryOptions& options);
 
   /// Processes the next pair. Stamps must increase and the features must pass check(), else std::invalid_argument and
-  /// the state is as before.
-  OdometryResult update(const StereoFeatures& features);
+  /// the state is as before. `guess` is one more place to look for the motion; it is never taken for a measurement.
+  OdometryResult update(const StereoFeatures& features, const std::optional<MotionGuess>& guess = std::nullopt);
 
   /// Back to the initial pose and a new epoch; nothing is remembered.
   void reset();
@@ -137,7 +143,8 @@ class VisualOdometry {
   };
 
   void refuse(const StereoFeatures& features) const;
-  MotionHypothesis localise(const StereoFeatures& features, double dt) const;
+  MotionHypothesis localise(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
+  double velocityAge() const;
   bool isFrozen(const StereoFeatures& features, double dt) const;
   Step seed(const StereoFeatures& features);
   Step extendMap(const StereoFeatures& features, double dt, const MotionHypothesis& found);
@@ -164,10 +171,11 @@ class VisualOdometry {
     RightCameraRotation right_rotation;
     std::optional<std::int64_t> last_stamp;
     Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
-    PoseCovariance covariance;                  ///< of that pose
-    std::optional<Vector6d> velocity;           ///< of the camera in its own frame, m/s and rad/s
-    Vector6d last_velocity = Vector6d::Zero();  ///< the same, kept while lost
-    std::int64_t last_pose_stamp = 0;           ///< ns
+    PoseCovariance covariance;              ///< of that pose
+    std::optional<Vector6d> velocity;       ///< of the camera in its own frame, m/s and rad/s
+    std::optional<Vector6d> last_velocity;  ///< the same, kept while lost
+    std::int64_t velocity_stamp = 0;        ///< of the pair that it is of, ns
+    std::int64_t last_pose_stamp = 0;       ///< ns
     double distance = 0.0;
     int predicted_pairs = 0;
     int pairs = 0;
