@@ -19,6 +19,7 @@ ROOMS = {
     "common": ("what all sides speak", 1.0),
     "front_end": ("image side: pair of images to features", 0.0),
     "odometry": ("motion side: features to poses", 1.0),
+    "places": ("places recognised by features", 1.0),
     "data": ("files of data sets", 2.0),
     "render": ("rendered drives", 3.0),
     "config": ("all options in one place", 0.5),
@@ -27,7 +28,7 @@ ROOMS = {
     "tools": ("command lines", 2.3),
 }
 WIDTH, GAP, MARGIN, LINE = 250, 30, 15, 15
-COLOURS = {"front_end": "#dcebfa", "odometry": "#dcebfa", "common": "#e3e0f7", "ros": "#eef6e6"}
+COLOURS = {"front_end": "#dcebfa", "odometry": "#dcebfa", "places": "#dcebfa", "common": "#e3e0f7", "ros": "#eef6e6"}
 
 
 def files_of(room):

@@ -41,7 +41,7 @@ class MotionSearchTest : public ::testing::Test {
  protected:
   /// The pair's motion since the map's newest pair; `expected` is how far along x the camera is expected to go.
   MotionHypothesis find(const StereoFeatures& features, std::optional<double> expected, bool contested = false) const {
-    MotionScene scene{map_, calibration_, features, std::nullopt, std::nullopt, contested};
+    MotionScene scene{map_, calibration_, features, std::nullopt, std::nullopt, contested, 0.0, {}};
     if (expected) {
       scene.T_current_reference = Eigen::Isometry3d(Eigen::Translation3d(-*expected, 0.0, 0.0));
       scene.velocity = Vector6d::Zero();
@@ -175,7 +175,7 @@ class CoveredView : public MotionSearchTest {
   MotionHypothesis findUnguided(const StereoFeatures& features) const {
     Vector6d velocity = Vector6d::Zero();
     velocity[0] = kStep / 0.1;
-    return search_.find({map_, calibration_, features, std::nullopt, velocity, true});
+    return search_.find({map_, calibration_, features, std::nullopt, velocity, true, 0.0, {}});
   }
 
   static constexpr double kStep = 1.2;  // m between pairs: no camera stops from there
