@@ -18,7 +18,7 @@
 namespace {
 
 struct Arguments {
-  std::string sequence, config, truth, odometry, poses, keyframes;
+  std::string sequence, config, truth, odometry, poses, keyframes, views;
   std::vector<std::string> before, settings;
   int frames = 0;
 };
@@ -65,7 +65,10 @@ int runPlaces(const Arguments& arguments) {
             << std::setprecision(2) << "time per key frame: median " << places.keyframeTime(0.5) << " ms, p95 "
             << places.keyframeTime(0.95) << " ms; longest optimisation " << places.longestOptimisation()
             << " ms; CPU per pair, all included, " << places.cpuTime() << " ms\n";
-  if (!arguments.truth.empty()) printErrors(places.errors(sdvo::readKittiPoses(arguments.truth)));
+  if (arguments.truth.empty()) return 0;
+  const sdvo::Trajectory truth = sdvo::readKittiPoses(arguments.truth);
+  printErrors(places.errors(truth));
+  if (!arguments.views.empty()) places.writeViews(arguments.views, truth);
   return 0;
 }
 
@@ -85,7 +88,10 @@ int main(int argc, char** argv) {
   app.add_option("--poses", arguments.poses, "poses in the map to write, 12 numbers a line")->required();
   app.add_option("--odometry", arguments.odometry, "poses of the odometry to write, 12 numbers a line");
   app.add_option("--keyframes", arguments.keyframes, "CSV to write, a line for each key frame");
-  app.add_option("--ground-truth", arguments.truth,
-                 "true poses: prints how many revisits were found and what is false");
+  CLI::Option* truth = app.add_option("--ground-truth", arguments.truth,
+                                      "true poses: prints how many revisits were found and what is false");
+  app.add_option("--views", arguments.views,
+                 "CSV to write: what geometry says of each two key frames whose views overlap")
+      ->needs(truth);
   return sdvo::runTool(app, argc, argv, [&] { return runPlaces(arguments); });
 }
