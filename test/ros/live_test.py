@@ -595,7 +595,7 @@ class Live(unittest.TestCase):
         transform = camera_transform('gyro')
         q = transform.transform.rotation
         q.x, q.y, q.z, q.w = 1.0, 0.0, 0.0, 0.0
-        self.broadcaster.sendTransform(transform)
+        self.broadcaster.sendTransform([camera_transform(FRAME), transform])  # what is latched replaces what was
         for i in range(2, 6):
             images, infos = self.camera.messages(i)
             turn(images)
