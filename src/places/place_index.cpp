@@ -70,21 +70,31 @@ void PlaceIndex::remove(int place) {
 
 /// Of a word that so many places have.
 double PlaceIndex::weight(std::size_t having) const {
-  return std::log1p(static_cast<double>(places_.size()) / static_cast<double>(std::max<std::size_t>(having, 1)));
+  return std::log1p(static_cast<double>(places_.size()) / static_cast<double>(having));
 }
 
 std::vector<PlaceCandidate> PlaceIndex::find(const PlaceSignature& signature, int most,
                                              const std::function<bool(int place)>& admitted) const {
   if (places_.empty()) return {};
   const int first = places_.begin()->first, last = places_.rbegin()->first;
-  std::vector<double> weights(static_cast<std::size_t>(last - first) + 1, 0.0);
-  double all = 0.0;
+  // The rarest words first, and of the others as many as the time allows: they say little.
+  constexpr std::size_t kLookups = 100'000;
+  std::vector<const std::vector<int>*> postings;
   for (const std::uint32_t word : signature) {
     const auto posting = postings_.find(word);
-    const double w = weight(posting == postings_.end() ? 0 : posting->second.size());
+    if (posting != postings_.end()) postings.push_back(&posting->second);
+  }
+  std::stable_sort(postings.begin(), postings.end(),
+                   [](const auto* a, const auto* b) { return a->size() < b->size(); });
+  double all = weight(1) * static_cast<double>(signature.size() - postings.size());
+  std::vector<double> weights(static_cast<std::size_t>(last - first) + 1, 0.0);
+  std::size_t lookups = 0;
+  for (const std::vector<int>* posting : postings) {
+    const double w = weight(posting->size());
     all += w;
-    if (posting == postings_.end()) continue;
-    for (const int place : posting->second) weights[place - first] += w;
+    lookups += posting->size();
+    if (lookups > kLookups) break;
+    for (const int place : *posting) weights[place - first] += w;
   }
   std::vector<PlaceCandidate> candidates;
   for (const auto& [place, words] : places_)

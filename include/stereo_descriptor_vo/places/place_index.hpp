@@ -47,7 +47,8 @@ class PlaceIndex {
   void add(int place, const PlaceSignature& signature);
   void remove(int place);
 
-  /// Places by falling score, at most so many; only those that `admitted` says yes to.
+  /// Places by falling score, at most so many; only those that `admitted` says yes to. Rare words are asked first and
+  /// common ones not at all in a large map, so that the time hardly grows with it.
   std::vector<PlaceCandidate> find(const PlaceSignature& signature, int most,
                                    const std::function<bool(int place)>& admitted) const;
 
