@@ -1,6 +1,7 @@
 #include "stereo_descriptor_vo/places/pose_graph.hpp"
 
 #include <ceres/ceres.h>
+#include <ceres/rotation.h>
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -16,24 +17,29 @@
 namespace sdvo {
 namespace {
 
-/// Where two nodes are, as their edge does not want it: residual of its right perturbation in standard deviations.
+/// Where two nodes are, as their edge does not want it: residual of its right perturbation in standard deviations. What
+/// odometry measured of turns is taken for too small by a share that is common to all edges.
 class EdgeResidual {
  public:
   EdgeResidual(const GraphEdge& edge, const Matrix6d& covariance)
       : q_(edge.T_from_to.linear()),
         t_(edge.T_from_to.translation()),
+        turn_(edge.kind == GraphEdge::Kind::kOdometry ? logSO3(edge.T_from_to.linear()) : Eigen::Vector3d::Zero()),
         // L L^T = covariance: L^-1 makes unit variances.
         whitening_(covariance.llt().matrixL().solve(Matrix6d::Identity())) {}
 
   template <class T>
-  bool operator()(const T* q_from, const T* t_from, const T* q_to, const T* t_to, T* residual) const {
+  bool operator()(const T* q_from, const T* t_from, const T* q_to, const T* t_to, const T* turn_error,
+                  T* residual) const {
     using Quaternion = Eigen::Quaternion<T>;
     using Vector3 = Eigen::Matrix<T, 3, 1>;
     const Eigen::Map<const Quaternion> q_a(q_from), q_b(q_to);
     const Eigen::Map<const Vector3> t_a(t_from), t_b(t_to);
-    const Quaternion to_edge = q_.cast<T>().conjugate();
+    // The way turns on average by half of what its end does.
+    const Quaternion half = rotation<T>(turn_.cast<T>() * (T(0.5) * *turn_error));
+    const Quaternion to_edge = (q_.cast<T>() * half * half).conjugate();
     Eigen::Matrix<T, 6, 1> error;
-    error.template head<3>() = to_edge * (q_a.conjugate() * (t_b - t_a) - t_.cast<T>());
+    error.template head<3>() = to_edge * (q_a.conjugate() * (t_b - t_a) - half * t_.cast<T>());
     const Quaternion turn = to_edge * (q_a.conjugate() * q_b);
     error.template tail<3>() = (turn.w() < T(0) ? T(-2) : T(2)) * turn.vec();
     Eigen::Map<Eigen::Matrix<T, 6, 1>> whitened(residual);
@@ -42,9 +48,27 @@ class EdgeResidual {
   }
 
  private:
+  template <class T>
+  static Eigen::Quaternion<T> rotation(const Eigen::Matrix<T, 3, 1>& angle_axis) {
+    T q[4];
+    ceres::AngleAxisToQuaternion(angle_axis.data(), q);
+    return {q[0], q[1], q[2], q[3]};
+  }
+
   Eigen::Quaterniond q_;
-  Eigen::Vector3d t_;
+  Eigen::Vector3d t_, turn_;
   Matrix6d whitening_;
+};
+
+/// What is known of a number beforehand: it is zero with a standard deviation.
+struct NearZero {
+  double sigma;
+
+  template <class T>
+  bool operator()(const T* value, T* residual) const {
+    *residual = *value / T(sigma);
+    return true;
+  }
 };
 
 struct NodePose {
@@ -190,10 +214,12 @@ void PoseGraph::solve(Summary& summary) {
   for (const GraphEdge& edge : edges_) {
     NodePose &from = poses.at(edge.from), &to = poses.at(edge.to);
     problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<EdgeResidual, 6, 4, 3, 4, 3>(new EdgeResidual(edge, covariance(edge))),
+        new ceres::AutoDiffCostFunction<EdgeResidual, 6, 4, 3, 4, 3, 1>(new EdgeResidual(edge, covariance(edge))),
         edge.kind == GraphEdge::Kind::kLoop ? new ceres::CauchyLoss(options_.loop_threshold) : nullptr,
-        from.q.coeffs().data(), from.t.data(), to.q.coeffs().data(), to.t.data());
+        from.q.coeffs().data(), from.t.data(), to.q.coeffs().data(), to.t.data(), &turn_error_);
   }
+  const double sigma = std::max(options_.drift_turn, 1e-6);
+  problem.AddResidualBlock(new ceres::AutoDiffCostFunction<NearZero, 1, 1>(new NearZero{sigma}), nullptr, &turn_error_);
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   options.max_num_iterations = options_.iterations;
@@ -217,6 +243,7 @@ void PoseGraph::solve(Summary& summary) {
 bool PoseGraph::adopt(const PoseGraph& optimised) {
   if (optimised.moved_parts_ != moved_parts_) return false;
   slack_ = optimised.slack_;
+  turn_error_ = optimised.turn_error_;
   const std::map<int, Eigen::Isometry3d> before = nodes_;
   for (auto& [id, T] : nodes_) {
     const auto better = optimised.nodes_.find(id);

@@ -282,6 +282,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     info.places = static_cast<std::uint32_t>(recognition.places().size());
     info.loops = static_cast<std::uint32_t>(recognition.graph().loops());
     info.bytes = recognition.bytes();
+    info.turn_error = static_cast<float>(recognition.graph().turnError());
     info.map_to_odom = tf2::eigenToTransform(recognition.T_map_odom()).transform;
     info.dropped_pairs = observer_->dropped();
     info.unpaired = unpaired_;

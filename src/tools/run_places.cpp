@@ -61,7 +61,9 @@ int runPlaces(const Arguments& arguments) {
   const double bytes = static_cast<double>(recognition.bytes()) / kept;
   std::cout << std::fixed << std::setprecision(1) << odometry.pairs() << " pairs, " << odometry.distance() << " m, "
             << recognition.places().size() << " key frames of " << bytes / 1e3 << " kB, "
-            << odometry.distance() / kept * 1e6 / bytes << " km per GB, " << recognition.graph().loops() << " loops\n"
+            << odometry.distance() / kept * 1e6 / bytes << " km per GB, " << recognition.graph().loops()
+            << " loops, turns measured too small by " << std::setprecision(2) << 100.0 * recognition.graph().turnError()
+            << " %\n"
             << std::setprecision(2) << "time per key frame: median " << places.keyframeTime(0.5) << " ms, p95 "
             << places.keyframeTime(0.95) << " ms; longest optimisation " << places.longestOptimisation()
             << " ms; CPU per pair, all included, " << places.cpuTime() << " ms\n";

@@ -73,7 +73,9 @@ TEST(PoseGraph, ALoopTakesTheDriftBack) {
   const PoseGraph::Summary summary = ring.graph.optimise();
   EXPECT_TRUE(summary.converged);
   EXPECT_LT(summary.final_cost, summary.initial_cost);
-  EXPECT_LT(ring.largestError(), 0.1 * before);
+  EXPECT_LT(ring.largestError(), 0.02 * before);
+  const double measured = 2.0 * kPi / Ring::kAround + 0.001, is = 2.0 * kPi / Ring::kAround;
+  EXPECT_NEAR(ring.graph.turnError(), is / measured - 1.0, 0.001) << "common to all turns";
   EXPECT_EQ(ring.graph.loops(), 10);
   EXPECT_TRUE(ring.graph.nodes().at(0).isApprox(ring.truth[0])) << "the first one stays";
 }

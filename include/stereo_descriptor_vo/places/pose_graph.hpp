@@ -75,7 +75,8 @@ class PoseGraph {
 
   /// Moves all nodes but the first so that the edges agree best (Levenberg-Marquardt over SE(3), sparse Cholesky, by
   /// Ceres). Loops that disagree with the rest count little (Cauchy's loss).
-  /// The odometry's edges are as stiff as the loops allow: they give way by a small share of the largest drift, and by
+  /// What the odometry gets wrong of every turn alike is estimated, too. Beyond that its edges are as stiff as the
+  /// loops allow: they give way by a small share of the largest drift, and by
   /// more where loops disagree with that.
   struct Summary {
     bool converged = false;
@@ -102,6 +103,10 @@ class PoseGraph {
   const std::vector<GraphEdge>& edges() const { return edges_; }
   int loops() const;
 
+  /// The share by which the odometry measures all turns too small, as a focal length that is wrong makes it do; zero
+  /// before there are loops.
+  double turnError() const { return turn_error_; }
+
  private:
   Matrix6d covariance(const GraphEdge& edge) const;
   void solve(Summary& summary);
@@ -111,6 +116,7 @@ class PoseGraph {
   std::map<int, Eigen::Isometry3d> nodes_;  ///< T_map_node
   std::vector<GraphEdge> edges_;
   int moved_parts_ = 0;
+  double turn_error_ = 0.0;
   double slack_ = 0.1;  ///< share of the largest drift that edges give way by
 };
 
