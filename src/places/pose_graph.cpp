@@ -223,6 +223,7 @@ void PoseGraph::solve(Summary& summary) {
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   options.max_num_iterations = options_.iterations;
+  options.function_tolerance = 1e-4;  // further steps move nodes by less than loops know
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary solved;
   ceres::Solve(options, &problem, &solved);

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -131,12 +132,19 @@ TEST(PlaceRecognition, APairWithHardlyAnythingToSeeIsNotKept) {
 }
 
 TEST(PlaceRecognition, RecentPlacesAreNotLookedFor) {
-  Drive drive;
-  for (const PlaceReport& report : drive.go(0, 60))
-    for (const PlaceCandidate& candidate : report.candidates)
-      EXPECT_GE(
-          drive.recognition.places().at(report.id).travelled - drive.recognition.places().at(candidate.place).travelled,
-          PlaceRecognitionOptions().min_travel);
+  for (const bool by_age : {false, true}) {
+    PlaceRecognitionOptions options = Drive::fewAndFast();
+    options.candidates = 100;
+    options.min_age = by_age ? 3.0 : 0.0;
+    options.min_travel = by_age ? 0.0 : 30.0;
+    Drive drive(0.0, options);
+    double nearest = 1e9;
+    for (const PlaceReport& report : drive.go(0, 60))
+      for (const PlaceCandidate& candidate : report.candidates)
+        nearest = std::min(nearest, drive.recognition.places().at(report.id).travelled -
+                                        drive.recognition.places().at(candidate.place).travelled);
+    EXPECT_NEAR(nearest, 31.5, 1.6) << "30 m, or 3 s at 10 m/s, and then the next key frame";
+  }
 }
 
 TEST(PlaceRecognition, ALookalikeThatTheOdometryCannotHaveReachedIsNoLoop) {
