@@ -1,16 +1,13 @@
 #include "stereo_descriptor_vo/places/loop_agreement.hpp"
 
 #include <Eigen/Geometry>
+#include <opencv2/core.hpp>
+#include <set>
 
 namespace sdvo {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr std::size_t kRemembered = 20;
-
-bool isShort(const GraphPath& path, double length) {
-  return path.known && path.length <= length;
-}
 
 }  // namespace
 
@@ -18,17 +15,16 @@ LoopAgreement::LoopAgreement(const LoopAgreementOptions& options) : options_(che
 
 std::vector<GraphEdge> LoopAgreement::confirm(const PoseGraph& graph, const GraphEdge& proposal) {
   const auto& nodes = graph.nodes();
+  const std::set<int> near_from = graph.near(proposal.from, options_.max_way);
+  const std::set<int> near_to = graph.near(proposal.to, options_.max_way);
+  // Nodes that were forgotten meanwhile are near to none.
   const auto agrees = [&](const GraphEdge& earlier) {
-    // Nodes may have been forgotten meanwhile.
-    if (nodes.count(earlier.from) == 0 || nodes.count(earlier.to) == 0 || earlier.to == proposal.to) return false;
-    if (!isShort(graph.path(earlier.from, proposal.from), options_.max_way) ||
-        !isShort(graph.path(earlier.to, proposal.to), options_.max_way))
-      return false;
+    if (near_from.count(earlier.from) == 0 || near_to.count(earlier.to) == 0 || earlier.to == proposal.to) return false;
     const Eigen::Isometry3d T_from_from = nodes.at(proposal.from).inverse() * nodes.at(earlier.from);
     const Eigen::Isometry3d T_to_to = nodes.at(earlier.to).inverse() * nodes.at(proposal.to);
     const Eigen::Isometry3d offset = proposal.T_from_to.inverse() * T_from_from * earlier.T_from_to * T_to_to;
     return offset.translation().norm() <= options_.max_translation &&
-           Eigen::AngleAxisd(offset.linear()).angle() <= options_.max_rotation * kPi / 180.0;
+           Eigen::AngleAxisd(offset.linear()).angle() <= options_.max_rotation * CV_PI / 180.0;
   };
 
   std::vector<GraphEdge> trusted;

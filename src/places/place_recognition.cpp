@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <opencv2/core.hpp>
 #include <stdexcept>
 #include <utility>
 
@@ -10,8 +11,6 @@
 
 namespace sdvo {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 /// Independent errors of translation and rotation, the same along all axes.
 Matrix6d isotropic(double translation, double rotation) {
@@ -85,7 +84,7 @@ bool PlaceRecognition::isKeyframe(const StereoFeatures& features) const {
   if (!last_ || !way_.known) return true;
   const Eigen::Isometry3d T_keyframe_camera = places_.at(*last_).T_odom_camera.inverse() * *way_.T_odom_camera;
   return T_keyframe_camera.translation().norm() >= options_.keyframe_distance ||
-         Eigen::AngleAxisd(T_keyframe_camera.linear()).angle() >= options_.keyframe_angle * kPi / 180.0;
+         Eigen::AngleAxisd(T_keyframe_camera.linear()).angle() >= options_.keyframe_angle * CV_PI / 180.0;
 }
 
 void PlaceRecognition::addKeyframe(const StereoFeatures& features, int id) {

@@ -8,6 +8,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <opencv2/core.hpp>
 #include <queue>
 #include <set>
 #include <stdexcept>
@@ -84,23 +85,64 @@ void keepUnitLength(ceres::Problem& problem, double* quaternion) {
 #endif
 }
 
-/// The nodes that edges other than breaks tie to one.
-std::set<int> part(const std::vector<GraphEdge>& edges, int id) {
-  std::map<int, std::vector<int>> neighbours;
+using EdgesOf = std::map<int, std::vector<const GraphEdge*>>;
+
+/// The edges at each node, but for breaks.
+EdgesOf edgesOf(const std::vector<GraphEdge>& edges) {
+  EdgesOf edges_of;
   for (const GraphEdge& edge : edges) {
     if (edge.kind == GraphEdge::Kind::kBreak) continue;
-    neighbours[edge.from].push_back(edge.to);
-    neighbours[edge.to].push_back(edge.from);
+    edges_of[edge.from].push_back(&edge);
+    edges_of[edge.to].push_back(&edge);
   }
+  return edges_of;
+}
+
+int otherEnd(const GraphEdge& edge, int id) {
+  return edge.from == id ? edge.to : edge.from;
+}
+
+/// The nodes that edges other than breaks tie to one.
+std::set<int> part(const std::vector<GraphEdge>& edges, int id) {
+  EdgesOf edges_of = edgesOf(edges);
   std::set<int> found{id};
   std::vector<int> open{id};
   while (!open.empty()) {
     const int next = open.back();
     open.pop_back();
-    for (const int neighbour : neighbours[next])
-      if (found.insert(neighbour).second) open.push_back(neighbour);
+    for (const GraphEdge* edge : edges_of[next])
+      if (found.insert(otherEnd(*edge, next)).second) open.push_back(otherEnd(*edge, next));
   }
   return found;
+}
+
+struct Way {
+  double length = std::numeric_limits<double>::infinity();
+  const GraphEdge* last = nullptr;
+};
+
+/// The ways from a node, not over breaks, until one is done (id, length); the shortest for all that are not longer
+/// (Dijkstra's algorithm).
+template <class Done>
+std::map<int, Way> shortestWays(const std::vector<GraphEdge>& edges, int from, const Done& done) {
+  EdgesOf edges_of = edgesOf(edges);
+  std::map<int, Way> ways;
+  using Open = std::pair<double, int>;
+  std::priority_queue<Open, std::vector<Open>, std::greater<Open>> open;
+  ways[from].length = 0.0;
+  open.push({0.0, from});
+  while (!open.empty() && !done(open.top().second, open.top().first)) {
+    const auto [length, id] = open.top();
+    open.pop();
+    if (length > ways[id].length) continue;
+    for (const GraphEdge* edge : edges_of[id]) {
+      Way& next = ways[otherEnd(*edge, id)];
+      if (length + edge->length >= next.length) continue;
+      next = {length + edge->length, edge};
+      open.push({next.length, otherEnd(*edge, id)});
+    }
+  }
+  return ways;
 }
 
 /// Covariance of a right perturbation of T^-1 from that of T.
@@ -172,7 +214,7 @@ PoseGraph::Summary PoseGraph::optimise() {
 }
 
 Matrix6d PoseGraph::drift(double length, double turn) const {
-  constexpr double kRadians = 3.14159265358979323846 / 180.0;
+  constexpr double kRadians = CV_PI / 180.0;
   const double rotation = options_.drift_rotation * kRadians * length + options_.drift_turn * turn;
   const double translation = options_.drift_translation * length + 0.5 * rotation * length;
   Vector6d variances;
@@ -257,42 +299,23 @@ bool PoseGraph::adopt(const PoseGraph& optimised) {
   return true;
 }
 
+std::set<int> PoseGraph::near(int id, double longest) const {
+  std::set<int> found;
+  for (const auto& [node, way] : shortestWays(edges_, id, [&](int, double length) { return length > longest; }))
+    if (way.length <= longest) found.insert(node);
+  return found;
+}
+
 GraphPath PoseGraph::path(int from, int to) const {
-  std::map<int, std::vector<const GraphEdge*>> edges_of;
-  for (const GraphEdge& edge : edges_) {
-    if (edge.kind == GraphEdge::Kind::kBreak) continue;
-    edges_of[edge.from].push_back(&edge);
-    edges_of[edge.to].push_back(&edge);
-  }
-  // Dijkstra's algorithm.
-  struct Reached {
-    double length = std::numeric_limits<double>::infinity();
-    const GraphEdge* by = nullptr;
-  };
-  std::map<int, Reached> reached;
-  using Open = std::pair<double, int>;
-  std::priority_queue<Open, std::vector<Open>, std::greater<Open>> open;
-  reached[from].length = 0.0;
-  open.push({0.0, from});
-  while (!open.empty() && open.top().second != to) {
-    const auto [length, id] = open.top();
-    open.pop();
-    if (length > reached[id].length) continue;
-    for (const GraphEdge* edge : edges_of[id]) {
-      Reached& next = reached[edge->from == id ? edge->to : edge->from];
-      if (length + edge->length >= next.length) continue;
-      next = {length + edge->length, edge};
-      open.push({next.length, edge->from == id ? edge->to : edge->from});
-    }
-  }
+  const std::map<int, Way> ways = shortestWays(edges_, from, [&](int id, double) { return id == to; });
   GraphPath path;
-  path.known = reached.count(to) > 0;
+  path.known = ways.count(to) > 0;
   if (!path.known) return path;
-  path.length = reached[to].length;
+  path.length = ways.at(to).length;
   // Back from the end: what is known of the way from a node on to the end.
   Eigen::Isometry3d T_node_end = Eigen::Isometry3d::Identity();
   for (int id = to; id != from;) {
-    const GraphEdge& edge = *reached[id].by;
+    const GraphEdge& edge = *ways.at(id).last;
     const bool forward = edge.to == id;
     const Matrix6d step = forward ? edge.covariance : inverted(edge.T_from_to, edge.covariance);
     const Matrix6d ad = adjoint(T_node_end.inverse());

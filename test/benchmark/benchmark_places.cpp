@@ -125,6 +125,11 @@ void optimiseAfterALoop(benchmark::State& state) {
   }
 }
 
+void nodesNearAnother(benchmark::State& state) {
+  const sdvo::PoseGraph graph = streets(static_cast<int>(state.range(0)), 500);
+  for (auto _ : state) benchmark::DoNotOptimize(graph.near(static_cast<int>(state.range(0)) / 2, 20.0));
+}
+
 void optimiseFromOdometry(benchmark::State& state) {
   const sdvo::PoseGraph graph = streets(static_cast<int>(state.range(0)), 500);
   for (auto _ : state) {
@@ -136,6 +141,7 @@ void optimiseFromOdometry(benchmark::State& state) {
 BENCHMARK(signature)->Unit(benchmark::kMillisecond);
 BENCHMARK(findPlace)->Arg(100)->Arg(1000)->Arg(10000)->Unit(benchmark::kMillisecond);
 BENCHMARK(verifyAnotherPlace)->Unit(benchmark::kMillisecond);
+BENCHMARK(nodesNearAnother)->Arg(1000)->Arg(10000)->Unit(benchmark::kMillisecond);
 BENCHMARK(optimiseAfterALoop)->Arg(1000)->Arg(10000)->Unit(benchmark::kMillisecond);
 BENCHMARK(optimiseFromOdometry)->Arg(1000)->Arg(10000)->Unit(benchmark::kMillisecond);
 

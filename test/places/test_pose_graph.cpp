@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <random>
+#include <set>
 
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/places/pose_graph.hpp"
@@ -210,6 +211,20 @@ TEST(PoseGraph, APathIsTheShortestAndItsCovarianceThatOfTheWholeMotion) {
     const Matrix6d told = forward ? chain.path(0, 5).covariance : chain.path(5, 0).covariance;
     EXPECT_LT((sampled - told).norm(), 0.08 * told.norm()) << (forward ? "forward" : "back");
   }
+}
+
+TEST(PoseGraph, NearAreTheNodesOnAShortWayOverLoopsAndNotOverBreaks) {
+  Ring ring;
+  const double step = ring.graph.edges().front().length;
+  EXPECT_EQ(ring.graph.near(5, 2.5 * step), (std::set<int>{3, 4, 5, 6, 7}));
+  EXPECT_EQ(ring.graph.near(5, 0.0), std::set<int>{5});
+  ring.graph.close(ring.loop(5, 105));
+  EXPECT_EQ(ring.graph.near(5, 1.5 * step), (std::set<int>{4, 5, 6, 104, 105, 106}));
+
+  PoseGraph broken{PoseGraphOptions()};
+  broken.start(0, Eigen::Isometry3d::Identity());
+  broken.extend(edge(0, 1, GraphEdge::Kind::kBreak, onCircle(1, 12, 10.0), covariance(0.02, 0.003)));
+  EXPECT_EQ(broken.near(0, 1e6), std::set<int>{0});
 }
 
 TEST(PoseGraph, ForgettingTheFirstNodeLeavesTheRestWhereItIs) {

@@ -2,7 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <map>
-#include <optional>
+#include <set>
 #include <vector>
 
 #include "stereo_descriptor_vo/common/options.hpp"
@@ -91,6 +91,9 @@ class PoseGraph {
   bool adopt(const PoseGraph& optimised);
 
   GraphPath path(int from, int to) const;
+
+  /// The nodes, this one among them, that are not farther away (m) on the shortest way that leads over no break.
+  std::set<int> near(int id, double longest) const;
 
   /// What is wrong with a rig adds up along the way instead of averaging out, and the odometry's covariance does not
   /// know. The covariance of that at its largest, for a way of so many m that turned by so many rad.
