@@ -45,13 +45,16 @@ int runPlaces(const Arguments& arguments) {
   const sdvo::PipelineOptions options = sdvo::readPipelineOptions(arguments.config, arguments.settings);
   cv::setNumThreads(1);
   sdvo::PlaceRun places(options.place_recognition);
+  double way = 0.0;  // m, of all sequences
   for (const std::string& before : arguments.before) {
     sdvo::OfflineRun odometry(options);
     drive(before, 0, odometry, places);
+    way += odometry.distance();
     places.startSequence();
   }
   sdvo::OfflineRun odometry(options);
   drive(arguments.sequence, arguments.frames, odometry, places);
+  way += odometry.distance();
   sdvo::writeKittiPoses(arguments.poses, places.poses());
   if (!arguments.odometry.empty()) sdvo::writeKittiPoses(arguments.odometry, odometry.poses());
   if (!arguments.keyframes.empty()) places.writeKeyframes(arguments.keyframes);
@@ -61,7 +64,7 @@ int runPlaces(const Arguments& arguments) {
   const double bytes = static_cast<double>(recognition.bytes()) / kept;
   std::cout << std::fixed << std::setprecision(1) << odometry.pairs() << " pairs, " << odometry.distance() << " m, "
             << recognition.places().size() << " key frames of " << bytes / 1e3 << " kB, "
-            << odometry.distance() / kept * 1e6 / bytes << " km per GB, " << recognition.graph().loops()
+            << way / kept * 1e6 / bytes << " km per GB, " << recognition.graph().loops()
             << " loops, turns measured too small by " << std::setprecision(2) << 100.0 * recognition.graph().turnError()
             << " %\n"
             << std::setprecision(2) << "time per key frame: median " << places.keyframeTime(0.5) << " ms, p95 "
