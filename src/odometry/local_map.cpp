@@ -13,6 +13,14 @@ namespace {
 /// Disparity below which a point's distance is beyond measuring; it serves as a direction, far away.
 constexpr double kFarthestDisparity = 0.05;  // px
 
+/// Zero of none; reorders them.
+double median(std::vector<double>& values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
 /// Covariance of the motion M = T_from_to between two frames, perturbed as M * exp(xi), from that of the left
 /// perturbations of all poses but the first: exp(f) M exp(-t) = M exp(Ad(M^-1) f - t) to first order.
 Matrix6d motionCovariance(const Window& window, const Eigen::MatrixXd& pose_covariance, int from, int to) {
@@ -24,6 +32,27 @@ Matrix6d motionCovariance(const Window& window, const Eigen::MatrixXd& pose_cova
   const Matrix6d cross = carried * pose_covariance.block<6, 6>(f, t);
   covariance += carried * pose_covariance.block<6, 6>(f, f) * carried.transpose() - cross - cross.transpose();
   return 0.5 * (covariance + covariance.transpose());
+}
+
+/// Medians of a frame's squared residuals and disparities (px).
+std::pair<double, double> typicalOf(const Window& window, const std::vector<double>& residuals, int frame) {
+  std::vector<double> squares, disparities;
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
+    if (window.observations[i].frame != frame) continue;
+    squares.push_back(residuals[i] * residuals[i]);
+    disparities.push_back(window.observations[i].measurement.z());
+  }
+  return {median(squares), median(disparities)};
+}
+
+/// What all patches of an image may be off by alike, because it is sampled at whole pixels: no number of them tells.
+/// As a covariance of the camera's pose that looks at points of this disparity.
+Matrix6d commonShift(const StereoCamera& camera, double disparity) {
+  constexpr double kShift = 0.005;  // px
+  const double rotation = kShift / camera.fx, translation = kShift * camera.baseline / std::max(disparity, 1.0);
+  Vector6d variances;
+  variances << Eigen::Vector3d::Constant(translation * translation), Eigen::Vector3d::Constant(rotation * rotation);
+  return variances.asDiagonal();
 }
 
 /// Of observations in the order of their frames the one in this frame, or their end.
@@ -277,10 +306,7 @@ double LocalMap::parallaxToPredecessor(std::size_t frame) const {
           point.observations[k - 1].frame_id == frames_[frame - 1].id)
         parallax.push_back(
             (point.observations[k].measurement - point.observations[k - 1].measurement).head<2>().norm());
-  if (parallax.empty()) return std::numeric_limits<double>::infinity();
-  const auto middle = parallax.begin() + static_cast<std::ptrdiff_t>(parallax.size() / 2);
-  std::nth_element(parallax.begin(), middle, parallax.end());
-  return *middle;
+  return parallax.empty() ? std::numeric_limits<double>::infinity() : median(parallax);
 }
 
 void LocalMap::removeFrame(std::size_t index) {
@@ -343,8 +369,12 @@ LocalMap::Adjustment LocalMap::adjust(const WindowOptimizerOptions& options, con
   const auto covariance = [&](int from, int to) -> Matrix6d {
     return motionCovariance(window, solution.pose_covariance, from, to);
   };
-  adjustment.covariances = {frames_.front().id, covariance(newest - 1, newest), covariance(0, newest),
-                            covariance(1, newest), covariance(0, newest - 1)};
+  const auto [square, disparity] = typicalOf(window, solution.residuals, newest);
+  const double excess = residual_level_.excess(square);
+  const Matrix6d shift = commonShift(camera_, disparity);
+  const auto of_newest = [&](int from) -> Matrix6d { return excess * covariance(from, newest) + shift; };
+  adjustment.covariances = {frames_.front().id, of_newest(newest - 1), of_newest(0), of_newest(1),
+                            covariance(0, newest - 1)};
   calibration = window.calibration;
   for (std::size_t f = 0; f < frames_.size(); ++f)
     frames_[f].T_camera_origin = orthonormalised(window.T_camera_origin[f]);

@@ -48,6 +48,7 @@ void PoseCovariance::restart(const Matrix6d& travelled) {
 }
 
 void PoseCovariance::markKeyframe() {
+  if (last_window_) value_ += (kAlike - 1.0) * last_window_->since_keyframe;
   keyframe_ = value_;
   last_is_keyframe_ = true;
 }

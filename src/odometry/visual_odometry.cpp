@@ -68,6 +68,8 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features, const std:
   state_.last_stamp = features.stamp;
   ++state_.pairs;
   state_.right_rotation.add(features);
+  // What the pairs before a refused one told of the rig may be wrong already.
+  if (features.report.refused) state_.calibration = CalibrationFilter(options_.calibration);
   state_.frozen = frozen;
   state_.contested_pairs = found.contested ? kWatched : std::max(0, state_.contested_pairs - 1);
   state_.image = {features.u, features.v, features.disparity};

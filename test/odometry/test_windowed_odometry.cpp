@@ -93,6 +93,22 @@ TEST(SelfCalibrationReport, IsNotANumberBeforeThereIsAnEstimate) {
   EXPECT_TRUE(std::isnan(drive(scene, without, 5).disparity_offset));
 }
 
+TEST(SelfCalibrationReport, WhatARigTaughtBeforeItWasFoundToBeWrongIsForgotten) {
+  SyntheticScene scene(13, 4000, 60.0);
+  scene.disparity_offset = -1.0;
+  VisualOdometry odometry{VisualOdometryOptions{}};
+  ASSERT_LT(drive(scene, odometry, 20).disparity_offset, -0.5);
+  StereoFeatures none = scene.view(syntheticPose(20), 21 * kPeriod, 1.0);
+  none.report.refused = true;
+  EXPECT_TRUE(std::isnan(odometry.update(none).disparity_offset));
+
+  // The rig is mended meanwhile.
+  scene.disparity_offset = 0.0;
+  OdometryResult result;
+  for (int k = 30; k < 36; ++k) result = odometry.update(scene.view(syntheticPose(k), (k + 1) * kPeriod));
+  EXPECT_NEAR(result.disparity_offset, 0.0, 0.1);
+}
+
 TEST(StandingStill, DoesNotDrift) {
   SyntheticScene scene(14, 3000, 60.0);
   VisualOdometry odometry{VisualOdometryOptions{}};

@@ -15,6 +15,7 @@
 #include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
 #include "stereo_descriptor_vo/odometry/reference_patch.hpp"
+#include "stereo_descriptor_vo/odometry/residual_level.hpp"
 #include "stereo_descriptor_vo/odometry/window_optimizer.hpp"
 
 namespace sdvo {
@@ -176,6 +177,7 @@ class LocalMap {
   std::vector<Point> points_;
   std::vector<Point> spare_;  ///< no points any more, but their memory
   KeyframeMemory memory_;
+  ResidualLevel residual_level_;  ///< of the newest pairs, each when it was new
 };
 
 }  // namespace sdvo

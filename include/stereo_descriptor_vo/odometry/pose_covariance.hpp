@@ -27,6 +27,10 @@ bool widen(Matrix6d& covariance, const Vector6d& deviation);
 /// T * exp(xi), translation before rotation, in m and rad.
 class PoseCovariance {
  public:
+  /// Successive key frames see the same points, compensated with the same calibration: their errors are alike, not
+  /// independent. The variance of their sum is larger than the sum of their variances by about as many as are alike.
+  static constexpr double kAlike = 6.0;
+
   /// Of the last pose. Zero in the beginning, when that is a key frame by definition.
   const Matrix6d& value() const { return value_; }
 
@@ -46,7 +50,8 @@ class PoseCovariance {
   /// The last pose may be wrong by more than its measurement says.
   void doubt(const Matrix6d& covariance);
 
-  /// The last pose is a key frame of the map: the next ones are measured from it.
+  /// The last pose is a key frame of the map: the next ones are measured from it. Its error since the key frame before
+  /// counts `kAlike` times if a window measured it.
   void markKeyframe();
 
  private:

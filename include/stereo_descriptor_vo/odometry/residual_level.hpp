@@ -1,0 +1,18 @@
+#pragma once
+
+#include <optional>
+
+namespace sdvo {
+
+/// What is usual among the residuals of successive pairs. Where those of one pair are larger (other light, blur), its
+/// pose is known worse, by as much, than the adjustment of all pairs together says.
+class ResidualLevel {
+ public:
+  /// Takes in a pair's median squared residual. Returns how many times the usual one that is; at least 1.
+  double excess(double square);
+
+ private:
+  std::optional<double> usual_;
+};
+
+}  // namespace sdvo
