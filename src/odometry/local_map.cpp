@@ -45,11 +45,9 @@ std::pair<double, double> typicalOf(const Window& window, const std::vector<doub
   return {median(squares), median(disparities)};
 }
 
-/// What all patches of an image may be off by alike, because it is sampled at whole pixels: no number of them tells.
-/// As a covariance of the camera's pose that looks at points of this disparity.
-Matrix6d commonShift(const StereoCamera& camera, double disparity) {
-  constexpr double kShift = 0.005;  // px
-  const double rotation = kShift / camera.fx, translation = kShift * camera.baseline / std::max(disparity, 1.0);
+/// A shift (px) of a whole image as a covariance of its pose: that of a camera which looks at points of this disparity.
+Matrix6d shifted(const StereoCamera& camera, double shift, double disparity) {
+  const double rotation = shift / camera.fx, translation = shift * camera.baseline / std::max(disparity, 1.0);
   Vector6d variances;
   variances << Eigen::Vector3d::Constant(translation * translation), Eigen::Vector3d::Constant(rotation * rotation);
   return variances.asDiagonal();
@@ -371,8 +369,11 @@ LocalMap::Adjustment LocalMap::adjust(const WindowOptimizerOptions& options, con
   };
   const auto [square, disparity] = typicalOf(window, solution.residuals, newest);
   const double excess = residual_level_.excess(square);
-  const Matrix6d shift = commonShift(camera_, disparity);
-  const auto of_newest = [&](int from) -> Matrix6d { return excess * covariance(from, newest) + shift; };
+  const Matrix6d shift = shifted(camera_, options.common_shift, disparity);
+  const auto of_newest = [&](int from) -> Matrix6d {
+    if (from == newest) return Matrix6d::Zero();
+    return excess * covariance(from, newest) + shift;
+  };
   adjustment.covariances = {frames_.front().id, of_newest(newest - 1), of_newest(0), of_newest(1),
                             covariance(0, newest - 1)};
   calibration = window.calibration;

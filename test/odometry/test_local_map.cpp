@@ -551,6 +551,29 @@ TEST(LocalMap, APointKeepsItsLooksWhenASightingTurnsOutWrong) {
 
 /// Frames 2 and 3, a step and a turn apart, know each other well by forty points, and together know hardly where frame
 /// 1 is: what the map says of the motion from 2 to 3 must be what a map of these two alone says.
+TEST(LocalMap, NoNumberOfPointsTellsWhatAllOfAnImageAreOffByAlike) {
+  const synthetic::World world = someWorld(40);
+  const Eigen::Isometry3d second = translated(0.2, 0.0, -0.5);
+  const auto covariance = [&](double common_shift) {
+    LocalMap map(everyPairAKeyframe());
+    const StereoFeatures features = see(world, 0, 40, second);
+    add(map, see(world, 0, 40, Eigen::Isometry3d::Identity()), 1, Eigen::Isometry3d::Identity(), {});
+    map.insert(features, 2, second, recognised(map, features, 40), {});
+    WindowOptimizerOptions window;
+    window.common_shift = common_shift;
+    RigCalibration calibration;
+    return map.adjust(window, noRigError(), calibration).covariances.since_keyframe;
+  };
+  const double shift = 0.5, fx = synthetic::camera().fx;  // px
+  const Matrix6d added = covariance(shift) - covariance(0.0);
+  for (int axis = 0; axis < 3; ++axis) {
+    EXPECT_NEAR(std::sqrt(added(3 + axis, 3 + axis)), shift / fx, 1e-9);
+    // As far away as the points are: some 5 to 30 m.
+    EXPECT_GT(std::sqrt(added(axis, axis)), 5.0 * shift / fx);
+    EXPECT_LT(std::sqrt(added(axis, axis)), 30.0 * shift / fx);
+  }
+}
+
 TEST(LocalMap, CovarianceBetweenTwoFramesDoesNotDependOnWhereTheFirstOneIs) {
   const synthetic::World world = someWorld(40);
   Vector6d step;
@@ -560,6 +583,7 @@ TEST(LocalMap, CovarianceBetweenTwoFramesDoesNotDependOnWhereTheFirstOneIs) {
   options.corner_sigma = 0.05;
   WindowOptimizerOptions window;
   window.common_disparity_sigma = 0.0;
+  window.common_shift = 0.0;
   RigCalibration calibration;
   constexpr double kNoise = 0.05;  // px
   const StereoFeatures of_second = see(world, 0, 40, second, kNoise, 2), of_third = see(world, 0, 40, third, kNoise, 3);

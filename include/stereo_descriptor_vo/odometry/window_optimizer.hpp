@@ -15,6 +15,7 @@ struct WindowOptimizerOptions {
   double kernel_scale = 1.0;
   double disparity_sigma = 0.2;
   double common_disparity_sigma = 0.3;
+  double common_shift = 0.005;
 
   void describe(OptionList& list) {
     list.add("iterations", iterations, {1, 100}, "", "Levenberg-Marquardt steps at most, for each pair");
@@ -26,6 +27,8 @@ struct WindowOptimizerOptions {
         "common_disparity_sigma", common_disparity_sigma, {0.0, 10.0}, "px",
         "standard deviation of the error that all disparities of one point share: what the calibration's two terms "
         "leave of the rig's, and what its texture does to the matching");
+    list.add("common_shift", common_shift, {0.0, 1.0}, "px",
+             "what all patches of an image may be off by alike, and more of them do not tell: in covariances only");
   }
 };
 
