@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <ctime>
 #include <fstream>
+#include <future>
 #include <iomanip>
 #include <stdexcept>
 #include <utility>
@@ -26,21 +27,49 @@ void writeCovariance(std::ostream& file, const Matrix6d& covariance) {
 OfflineRun::OfflineRun(const PipelineOptions& options)
     : extractor_(options.stereo_features), odometry_(options.visual_odometry) {}
 
-StereoFeatures OfflineRun::process(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp) {
-  Frame frame;
+StereoFeatures OfflineRun::process(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
+                                   std::int64_t stamp) {
   const double cpu_before = cpuSeconds();
   Stopwatch stopwatch;
-  StereoFeatures features = extractor_.extract(camera, left, right, stamp);
-  if (camera_ && *camera_ != camera) odometry_.breakStream();
-  camera_ = camera;
-  frame.odometry = odometry_.update(features);
-  frame.total_time = stopwatch.lap();
+  const Extracted pair{camera, extractor_.extract(camera, left, right, stamp), 0.0};
+  track(pair);
+  frames_.back().total_time = stopwatch.lap();
   cpu_time_ += cpuSeconds() - cpu_before;
-  frame.extraction = features.report;
+  return pair.features;
+}
+
+void OfflineRun::processBeside(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
+                               std::int64_t stamp) {
+  const double cpu_before = cpuSeconds();
+  Stopwatch stopwatch;
+  // The extraction stays in this thread, whose buffers it knows.
+  const std::optional<Extracted> before = std::exchange(waiting_, std::nullopt);
+  std::future<void> odometry;
+  if (before) odometry = std::async(std::launch::async, [&] { track(*before); });
+  Extracted pair{camera, extractor_.extract(camera, left, right, stamp), 0.0};
+  if (odometry.valid()) odometry.get();
+  pair.time = stopwatch.lap();
+  waiting_ = std::move(pair);
+  cpu_time_ += cpuSeconds() - cpu_before;
+}
+
+void OfflineRun::finish() {
+  const double cpu_before = cpuSeconds();
+  Stopwatch stopwatch;
+  if (const std::optional<Extracted> last = std::exchange(waiting_, std::nullopt)) {
+    track(*last);
+    frames_.back().total_time += stopwatch.lap();
+  }
+  cpu_time_ += cpuSeconds() - cpu_before;
+}
+
+void OfflineRun::track(const Extracted& pair) {
+  if (camera_ && *camera_ != pair.camera) odometry_.breakStream();
+  camera_ = pair.camera;
+  Frame frame{odometry_.update(pair.features), pair.features.report, pair.time};
   frame.odometry.flow.clear();  // by far the largest part of it
   frame.odometry.flow.shrink_to_fit();
   frames_.push_back(std::move(frame));
-  return features;
 }
 
 int OfflineRun::pairsWithoutPose() const {

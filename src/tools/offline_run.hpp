@@ -22,6 +22,11 @@ class OfflineRun {
   /// Stamps (ns) must increase. Another camera than before begins a new stream. Returns the pair's features.
   StereoFeatures process(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
 
+  /// The same, but the odometry of the pair before runs beside the extraction of this one, as it does between the
+  /// nodelets: equal results, which are there after the next call or `finish()`.
+  void processBeside(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
+  void finish();
+
   /// Of the last pair; its flow is not kept.
   const OdometryResult& last() const { return frames_.back().odometry; }
 
@@ -31,7 +36,8 @@ class OfflineRun {
   int discontinuities() const;
   double distance() const;  ///< m
 
-  /// Per pair, ms; decoding excluded. Zero without pairs. `quantile`: 0.5 is the median.
+  /// Per pair, ms; decoding excluded. Zero without pairs. `quantile`: 0.5 is the median. Beside each other the time of
+  /// a pair is that from one pair to the next.
   double time(double quantile) const;
   double cpuTime() const;  ///< mean of all threads
 
@@ -52,8 +58,17 @@ class OfflineRun {
     double total_time = 0.0;  ///< s
   };
 
+  /// A pair between extractor and odometry.
+  struct Extracted {
+    StereoCamera camera;
+    StereoFeatures features;
+    double time;  ///< s, since the pair before
+  };
+  void track(const Extracted& pair);
+
   FeatureExtractor extractor_;
   VisualOdometry odometry_;
+  std::optional<Extracted> waiting_;  ///< for its odometry
   std::optional<StereoCamera> camera_;
   std::vector<Frame> frames_;
   double cpu_time_ = 0.0;  ///< s

@@ -33,8 +33,12 @@ int runSequence(const Arguments& arguments) {
     sdvo::Progress progress("odometry", count);
     for (int i = 0; i < count; ++i, progress.step()) {
       const sdvo::ImagePair pair = sequence.load(i);
-      run.process(sequence.camera(), pair.left, pair.right, sequence.stamp(i));
+      if (arguments.threads > 1)
+        run.processBeside(sequence.camera(), pair.left, pair.right, sequence.stamp(i));
+      else
+        run.process(sequence.camera(), pair.left, pair.right, sequence.stamp(i));
     }
+    run.finish();
   }
   sdvo::writeKittiPoses(arguments.poses, run.poses());
   if (!arguments.timing.empty()) run.writeTiming(arguments.timing);
@@ -59,7 +63,10 @@ int main(int argc, char** argv) {
                  "option as name=value, for example detector/max_features=800; repeatable")
       ->allow_extra_args(false);
   app.add_option("--frames", arguments.frames, "process only the first N pairs")->check(CLI::Range(1, 1000000));
-  app.add_option("--threads", arguments.threads, "threads of OpenCV")->capture_default_str()->check(CLI::Range(1, 256));
+  app.add_option("--threads", arguments.threads,
+                 "threads of OpenCV; more than one: odometry of a pair beside the features of the next")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 256));
   app.add_option("--poses", arguments.poses, "poses to write, 12 numbers a line")->required();
   app.add_option("--timing", arguments.timing, "CSV to write, a line for each pair");
   app.add_option("--states", arguments.states,
