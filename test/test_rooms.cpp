@@ -108,6 +108,15 @@ TEST(Rooms, TheCoreAndItsToolboxKnowNoRos) {
           << include.file.string() << ":" << include.line << " includes " << include.header;
 }
 
+/// OpenCV's readers of image files, which cv_bridge brings as well, bring a hundred libraries into a robot's processes.
+TEST(Rooms, WhatRunsOnARobotReadsNoImageFilesWithOpenCv) {
+  for (const std::string room : {"common", "front_end", "odometry", "places", "config", "ros"})
+    for (const Include& include : includesOf(room))
+      EXPECT_TRUE(include.header != "opencv2/imgcodecs.hpp" && include.header != "opencv2/highgui.hpp" &&
+                  include.header != "opencv2/opencv.hpp" && include.header.rfind("cv_bridge/", 0) != 0)
+          << include.file.string() << ":" << include.line << " includes " << include.header;
+}
+
 TEST(Rooms, TheSearchKnowsRosHeaders) {
   for (const char* line :
        {"#include <ros/ros.h>", "#include \"../ros/conversions.hpp\"", "  #  include <ros/time.h>",

@@ -5,12 +5,12 @@
 #include <numeric>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/features2d.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <tuple>
 #include <utility>
 
+#include "mask_file.hpp"
 #include "opencv_features.hpp"
 #include "stereo_descriptor_vo/front_end/corner_refiner.hpp"
 #include "stereo_descriptor_vo/front_end/fast_corners.hpp"
@@ -224,8 +224,8 @@ void FeatureDetectorOptions::check() const {
 
 FeatureDetector::FeatureDetector(const FeatureDetectorOptions& options) : options_(checked(options)) {
   if (options_.mask.empty()) return;
-  mask_ = cv::imread(options_.mask, cv::IMREAD_GRAYSCALE);
-  if (mask_.empty()) throw std::invalid_argument("mask: cannot read an image from '" + options_.mask + "'");
+  mask_ = readMask(options_.mask);
+  if (mask_.empty()) throw std::invalid_argument("mask: cannot read a PNG from '" + options_.mask + "'");
 }
 
 std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border, const cv::Mat& mask) const {

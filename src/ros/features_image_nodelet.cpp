@@ -1,8 +1,8 @@
-#include <cv_bridge/cv_bridge.h>
 #include <image_transport/image_transport.h>
 #include <message_filters/subscriber.h>
 #include <message_filters/time_synchronizer.h>
 #include <nodelet/nodelet.h>
+#include <sensor_msgs/fill_image.h>
 #include <sensor_msgs/image_encodings.h>
 #include <stereo_descriptor_vo/FeatureFlow.h>
 #include <stereo_descriptor_vo/StereoFeatures.h>
@@ -72,11 +72,14 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
 
   void draw(const sensor_msgs::ImageConstPtr& left, const sensor_msgs::ImageConstPtr& right,
             const Features::ConstPtr& features, const Flow::ConstPtr& flow) try {
-    cv_bridge::CvImage picture(left->header, sensor_msgs::image_encodings::BGR8);
     const int depth = std::max(ros_conversions::bitDepth(*left), ros_conversions::bitDepth(*right));
-    picture.image =
+    const cv::Mat drawn =
         drawFeatures(ros_conversions::toGrey(left, depth), ros_conversions::toGrey(right, depth), *features, *flow);
-    publisher_.publish(picture.toImageMsg());
+    const auto picture = boost::make_shared<sensor_msgs::Image>();
+    picture->header = left->header;
+    sensor_msgs::fillImage(*picture, sensor_msgs::image_encodings::BGR8, static_cast<std::uint32_t>(drawn.rows),
+                           static_cast<std::uint32_t>(drawn.cols), static_cast<std::uint32_t>(drawn.step), drawn.data);
+    publisher_.publish(sensor_msgs::ImageConstPtr(picture));
   } catch (const std::exception& e) {
     if (throttle_.allows(e.what()))
       NODELET_ERROR_STREAM("features_image at " << left->header.stamp << " skipped: " << e.what());

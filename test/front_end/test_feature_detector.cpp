@@ -106,7 +106,7 @@ TEST(FeatureDetector, AMaskThatDoesNotFitIsNamed) {
   EXPECT_EQ(errorOf([&] { FeatureDetector(options).detect(image, 0, cv::Mat::zeros(100, 200, CV_8U)); }),
             "the mask is 200x100, the left image is 600x400");
   options.mask = "/nowhere/mask.png";
-  EXPECT_EQ(errorOf([&] { FeatureDetector{options}; }), "mask: cannot read an image from '/nowhere/mask.png'");
+  EXPECT_EQ(errorOf([&] { FeatureDetector{options}; }), "mask: cannot read a PNG from '/nowhere/mask.png'");
 }
 
 TEST(SpreadOverBuckets, ServesEveryBucketBeforeASecondTime) {

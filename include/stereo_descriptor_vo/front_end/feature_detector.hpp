@@ -39,8 +39,7 @@ struct FeatureDetectorOptions {
     list.add("corner_block_size", corner_block_size, {3, 31}, "px", "gftt, harris: window of the gradient matrix");
     list.add("subpixel", subpixel, "refine corners to sub-pixel positions");
     list.add("subpixel_radius", subpixel_radius, {1, 15}, "px", "half side of the sub-pixel window");
-    list.add("mask", mask,
-             "image file (absolute path) of the left image's size: no corners where it is black; empty: none");
+    list.add("mask", mask, "PNG (absolute path) of the left image's size: no corners where it is black; empty: none");
   }
   /// Throws std::invalid_argument when the OpenCV at hand lacks the detector.
   void check() const;
