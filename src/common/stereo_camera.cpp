@@ -8,15 +8,15 @@
 namespace sdvo {
 
 void StereoCamera::check() const {
-  const auto require = [](bool holds, const std::string& what) {
-    if (!holds) throw std::invalid_argument("stereo camera: " + what);
-  };
-  require(width > 0 && height > 0, "image size " + std::to_string(width) + "x" + std::to_string(height) + " is empty");
-  require(std::isfinite(fx) && fx > 0.0, "fx = " + std::to_string(fx) + " px must be positive (uncalibrated?)");
-  require(std::isfinite(fy) && fy > 0.0, "fy = " + std::to_string(fy) + " px must be positive (uncalibrated?)");
-  require(std::isfinite(cx) && std::isfinite(cy), "the principal point is not finite");
-  require(std::isfinite(baseline) && baseline > 0.0,
-          "baseline = " + std::to_string(baseline) + " m must be positive (are left and right swapped?)");
+  const auto refuse = [](const std::string& what) { throw std::invalid_argument("stereo camera: " + what); };
+  const auto isPositive = [](double value) { return std::isfinite(value) && value > 0.0; };
+  if (width <= 0 || height <= 0)
+    refuse("image size " + std::to_string(width) + "x" + std::to_string(height) + " is empty");
+  if (!isPositive(fx)) refuse("fx = " + std::to_string(fx) + " px must be positive (uncalibrated?)");
+  if (!isPositive(fy)) refuse("fy = " + std::to_string(fy) + " px must be positive (uncalibrated?)");
+  if (!std::isfinite(cx) || !std::isfinite(cy)) refuse("the principal point is not finite");
+  if (!isPositive(baseline))
+    refuse("baseline = " + std::to_string(baseline) + " m must be positive (are left and right swapped?)");
 }
 
 Eigen::Matrix3d StereoCamera::projectionJacobian(const Eigen::Vector3d& point) const {

@@ -118,7 +118,9 @@ std::vector<cv::KeyPoint> findWithAvx2(const cv::Mat& image, int threshold) {
   thread_local std::vector<std::uint8_t> memory;
   memory.assign(3 * length, 0);
   const auto contrasts = [&](int y) { return memory.data() + static_cast<std::size_t>(y % 3) * length + kBlock; };
+  constexpr std::size_t kPixels = 32;  // for a corner: few images have more of them
   std::vector<cv::KeyPoint> corners;
+  corners.reserve(image.total() / kPixels);
   for (int y = kRadius; y <= image.rows - kRadius; ++y) {
     if (y < image.rows - kRadius)
       contrastsOfRow(image.ptr(y), image.cols, offsets, threshold, contrasts(y));

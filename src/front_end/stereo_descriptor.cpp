@@ -73,6 +73,7 @@ DescribedKeypoints StereoDescriptor::describe(const cv::Mat& left_image, const c
   const ViewDescriptors right_half = base_->describe(right, in_right);
 
   DescribedKeypoints described;
+  described.index.reserve(keypoints.size()), described.angle.reserve(keypoints.size());
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
     if (!left_half.valid[i] || !right_half.valid[i]) continue;
     const StereoKeypoint& k = keypoints[i];

@@ -178,6 +178,8 @@ void LocalMap::startPoint(const StereoFeatures& features, int row, int id, const
   point.position.ray_and_inverse_depth = {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy,
                                           1.0 / camera.depth(disparity)};
   point.reference.take(features, row, {u, v}, T_camera_origin);
+  constexpr std::size_t kUsual = 8;  // sightings: most points need no more memory until it goes to another one
+  point.observations.reserve(kUsual);
   point.observations.push_back({id, row, {u, v, features.disparity[row]}, sigma});
   takeDescriptor(point, features, row);
 }
@@ -186,6 +188,7 @@ bool LocalMap::needsKeyframe() const {
   const int id = newestId(), keyframe = lastKeyframeId();
   if (id == keyframe) return true;  // the first one
   std::vector<double> parallax;
+  parallax.reserve(points_.size());
   int seen = 0;
   for (const Point& point : points_) {
     if (point.observations.back().frame_id != id) continue;
@@ -228,6 +231,14 @@ void LocalMap::forgetKeyframe() {
 OldKeyframe LocalMap::keyframe(std::size_t frame, bool with_looks) const {
   OldKeyframe old{frames_[frame].id, frames_[frame].T_camera_origin, {}, {}};
   old.rows.kind = kind_;
+  if (with_looks) {  // to be kept, so in no more memory than it needs
+    const std::size_t most =
+        static_cast<std::size_t>(std::count_if(points_.begin(), points_.end(), [&](const Point& p) {
+          return p.observations.size() >= 2 && sightingIn(p.observations, old.id) != p.observations.end();
+        }));
+    old.points.reserve(most), old.rows.positions.reserve(most);
+    old.rows.descriptors.create(static_cast<int>(most), kind_.bytes, CV_8U);
+  }
   for (const Point& point : points_) {
     if (point.observations.size() < 2) continue;
     const auto here = sightingIn(point.observations, old.id);
@@ -238,9 +249,11 @@ OldKeyframe LocalMap::keyframe(std::size_t frame, bool with_looks) const {
     old.rows.positions.push_back(
         camera_.backProject(predicted.x(), predicted.y(), std::max(predicted.z(), kFarthestDisparity)));
     if (!with_looks) continue;
+    std::copy(point.descriptor.begin(), point.descriptor.end(),
+              old.rows.descriptors.ptr(static_cast<int>(old.points.size())));
     old.points.push_back({point.position, here->measurement, here->sigma, point.reference});
-    old.rows.descriptors.push_back(cv::Mat(1, kind_.bytes, CV_8U, const_cast<std::uint8_t*>(point.descriptor.data())));
   }
+  if (with_looks) old.rows.descriptors = old.rows.descriptors.rowRange(0, static_cast<int>(old.points.size()));
   return old;
 }
 
@@ -334,6 +347,7 @@ LocalMap::Adjustment LocalMap::adjust(const WindowOptimizerOptions& options, con
   window.calibration = calibration;
   window.calibration_prior = prior;
   std::vector<int> ids;
+  ids.reserve(frames_.size()), window.T_camera_origin.reserve(frames_.size());
   for (const Frame& frame : frames_) {
     window.T_camera_origin.push_back(frame.T_camera_origin);
     ids.push_back(frame.id);

@@ -53,6 +53,7 @@ bool MotionHypothesis::isLasting(int match) const {
 
 std::vector<int> MotionHypothesis::inlierRows(const std::vector<int>& rejected) const {
   std::vector<int> rows;
+  rows.reserve(motion.inliers.size());
   for (const int i : motion.inliers)
     if (!contains(rejected, matches[i].current)) rows.push_back(matches[i].current);
   return rows;
@@ -175,6 +176,8 @@ std::vector<Correspondence> MotionSearch::align(const MotionScene& scene, Motion
   const StereoFeatures& features = scene.features;
   const Eigen::Isometry3d T_camera_origin = found.motion.T_current_reference * scene.map.newestPose();
   std::vector<Correspondence> measured, aligned;
+  measured.reserve(found.motion.inliers.size()), aligned.reserve(found.motion.inliers.size());
+  found.sightings.reserve(found.motion.inliers.size());
   for (const int i : found.motion.inliers) {
     const FeatureMatch& match = found.matches[i];
     const LocalMap::Sighting sighting = scene.map.sight(alignment_options_, features, T_camera_origin,
@@ -200,6 +203,7 @@ bool MotionSearch::hasStrayed(const StereoCamera& camera, const MotionHypothesis
                               const std::vector<Correspondence>& measured) const {
   constexpr double kSignificant = 100.0;  // chi-square of six; errors of neighbouring points are not independent
   std::vector<Correspondence> lasting, others;
+  lasting.reserve(measured.size()), others.reserve(measured.size());
   for (std::size_t k = 0; k < measured.size(); ++k)
     (found.isLasting(found.motion.inliers[k]) ? lasting : others).push_back(measured[k]);
   if (static_cast<int>(lasting.size()) < kEnoughLasting || static_cast<int>(others.size()) < kEnoughLasting)

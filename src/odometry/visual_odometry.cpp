@@ -339,6 +339,7 @@ OdometryResult VisualOdometry::report(const StereoFeatures& features, double dt,
     result.correction = step.correction;
   }
 
+  result.flow.reserve(found.matches.size());
   for (const FeatureMatch& match : found.matches) {
     const cv::Point3f& previous = found.view.pixels[match.reference];
     result.flow.push_back({previous.x, previous.y, match.current, false});
