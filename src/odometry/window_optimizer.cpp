@@ -85,10 +85,11 @@ class Solver {
     return error.dot(window.calibration_prior.information * error);
   }
 
-  /// Normalised residual of observation i; the kernel is not applied.
+  /// Normalised residual of observation i under another estimate of poses, points and calibration; the kernel is not
+  /// applied.
   bool residual(const Window& window, RelativePoses& T_camera_anchor, std::size_t i, Eigen::Vector3d& residual,
                 ObservationJacobians* jacobians) const {
-    const WindowObservation& observation = window.observations[i];
+    const WindowObservation& observation = window_.observations[i];
     const AnchoredPoint& point = window.points[observation.point];
     T_camera_anchor.setAnchor(point.T_origin_anchor);
     Eigen::Vector3d prediction;
@@ -105,7 +106,7 @@ class Solver {
     LogSum costs;
     RelativePoses T_camera_anchor(window.T_camera_origin);
     Eigen::Vector3d r;
-    squares.resize(window.observations.size());
+    squares.resize(window_.observations.size());
     for (std::size_t i = 0; i < squares.size(); ++i) {
       squares[i] = residual(window, T_camera_anchor, i, r, nullptr) ? r.squaredNorm() : kBehindSquare;
       costs.add(squares[i] / bend());
@@ -113,12 +114,14 @@ class Solver {
     return priorCost(window) + bend() * costs.value();
   }
 
-  ReducedSystem linearise(const Window& window, double damping) const {
-    ReducedSystem system;
-    system.hessian = Eigen::MatrixXd::Zero(size_, size_);
-    system.gradient = Eigen::VectorXd::Zero(size_);
+  /// In the memory that the system has of an earlier linearisation.
+  void linearise(const Window& window, double damping, ReducedSystem& system) const {
+    system.hessian.setZero(size_, size_);
+    system.gradient.setZero(size_);
     system.pose_point.resize(window.observations.size());
+    system.pose.clear();
     system.pose.reserve(window.observations.size());
+    system.weight = system.weighted_square = 0.0;
     const std::size_t points = first_of_point_.size() - 1;
     system.points.resize(points);
     system.calibration_point.resize(points);
@@ -189,11 +192,15 @@ class Solver {
       calibration_gradient.noalias() -= calibration_point * inverse * gradient;
     }
     system.cost = priorCost(window) + bend() * costs.value();
-    return system;
   }
 
-  Window stepped(const ReducedSystem& system, const Eigen::VectorXd& step) const {
-    Window next = window_;
+  /// The next estimate of poses, points and calibration; observations stay those of the window.
+  void makeStep(const ReducedSystem& system, const Eigen::VectorXd& step, Window& next) const {
+    next.camera = window_.camera;
+    next.T_camera_origin = window_.T_camera_origin;
+    next.points = window_.points;
+    next.calibration = window_.calibration;
+    next.calibration_prior = window_.calibration_prior;
     for (int f = 0; f < poses_; ++f)
       next.T_camera_origin[f + 1] = expSE3(step.segment<6>(6 * f)) * window_.T_camera_origin[f + 1];
     const CalibrationVector calibration = step.tail<kCalibration>();
@@ -206,7 +213,6 @@ class Solver {
       next.points[window_.observations[first_of_point_[p]].point].ray_and_inverse_depth +=
           system.points[p].inverse_hessian * gradient;
     }
-    return next;
   }
 
  private:
@@ -271,17 +277,19 @@ WindowSolution optimizeWindow(const WindowOptimizerOptions& options, Window& win
   const Solver solver(options, window);  // refers to the window: every accepted step is linearised anew
   double damping = 1e-5;
   ReducedSystem system;
+  Window next;
+  Eigen::MatrixXd damped;
   std::vector<double> squares;
   bool accepted = false;
   const int c = 6 * solver.poses();
   while (solution.iterations < options.iterations && damping < kLargestDamping) {
     ++solution.iterations;
-    system = solver.linearise(window, damping);
-    Eigen::MatrixXd damped = system.hessian;
+    solver.linearise(window, damping, system);
+    damped = system.hessian;
     damped.diagonal().head(c) *= 1.0 + damping;
     const Eigen::VectorXd step = damped.selfadjointView<Eigen::Lower>().ldlt().solve(system.gradient);
     if (!step.allFinite()) return solution;
-    Window next = solver.stepped(system, step);
+    solver.makeStep(system, step, next);
     const double next_cost = solver.cost(next, squares);
     accepted = next_cost <= system.cost;
     if (accepted) {
