@@ -4,6 +4,14 @@
 
 namespace sdvo {
 
+ReferencePatch OldKeyframe::reference(int point) const {
+  const std::size_t p = static_cast<std::size_t>(point);
+  const auto at = [&](std::size_t byte) { return samples.begin() + static_cast<std::ptrdiff_t>(byte); };
+  ReferencePatch reference = points[p].reference;
+  reference.samples.assign(at(p == 0 ? 0 : points[p - 1].samples_end), at(points[p].samples_end));
+  return reference;
+}
+
 int OldKeyframe::sharedWith(const StereoCamera& camera, const Eigen::Isometry3d& T_other_origin) const {
   constexpr double kLargestRatio = 1.1;  // of depths
   const Eigen::Isometry3d T_other_this = T_other_origin * T_camera_origin.inverse();

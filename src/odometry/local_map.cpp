@@ -229,29 +229,33 @@ void LocalMap::forgetKeyframe() {
 
 /// With the points that another frame has seen as well: where they are, and what they look like if that is asked for.
 OldKeyframe LocalMap::keyframe(std::size_t frame, bool with_looks) const {
-  OldKeyframe old{frames_[frame].id, frames_[frame].T_camera_origin, {}, {}};
+  OldKeyframe old{frames_[frame].id, frames_[frame].T_camera_origin, {}, {}, {}};
   old.rows.kind = kind_;
+  const auto isShared = [&](const Point& point) {
+    return point.observations.size() >= 2 && sightingIn(point.observations, old.id) != point.observations.end();
+  };
   if (with_looks) {  // to be kept, so in no more memory than it needs
-    const std::size_t most =
-        static_cast<std::size_t>(std::count_if(points_.begin(), points_.end(), [&](const Point& p) {
-          return p.observations.size() >= 2 && sightingIn(p.observations, old.id) != p.observations.end();
-        }));
-    old.points.reserve(most), old.rows.positions.reserve(most);
+    std::size_t most = 0, samples = 0;
+    for (const Point& point : points_)
+      if (isShared(point)) ++most, samples += point.reference.samples.size();
+    old.points.reserve(most), old.samples.reserve(samples), old.rows.positions.reserve(most);
     old.rows.descriptors.create(static_cast<int>(most), kind_.bytes, CV_8U);
   }
   for (const Point& point : points_) {
-    if (point.observations.size() < 2) continue;
-    const auto here = sightingIn(point.observations, old.id);
     Eigen::Vector3d predicted;
-    if (here == point.observations.end() ||
-        !predictObservation(camera_, old.T_camera_origin, point.position, predicted, nullptr))
+    if (!isShared(point) || !predictObservation(camera_, old.T_camera_origin, point.position, predicted, nullptr))
       continue;
     old.rows.positions.push_back(
         camera_.backProject(predicted.x(), predicted.y(), std::max(predicted.z(), kFarthestDisparity)));
     if (!with_looks) continue;
+    const auto& [samples, spacing, centre, T_camera_origin] = point.reference;
+    old.samples.insert(old.samples.end(), samples.begin(), samples.end());
     std::copy(point.descriptor.begin(), point.descriptor.end(),
               old.rows.descriptors.ptr(static_cast<int>(old.points.size())));
-    old.points.push_back({point.position, here->measurement, here->sigma, point.reference});
+    const auto here = sightingIn(point.observations, old.id);
+    old.points.push_back({point.position, here->measurement, here->sigma, {}, old.samples.size()});
+    ReferencePatch& reference = old.points.back().reference;
+    reference.spacing = spacing, reference.centre = centre, reference.T_camera_origin = T_camera_origin;
   }
   if (with_looks) old.rows.descriptors = old.rows.descriptors.rowRange(0, static_cast<int>(old.points.size()));
   return old;

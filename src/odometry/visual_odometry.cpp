@@ -247,8 +247,9 @@ void VisualOdometry::recall(const StereoFeatures& features) {
   for (const int i : motion.inliers) {
     const FeatureMatch& match = matches[i];
     const OldKeyframe::Point& point = old->points[match.reference];
-    const auto found = point.reference.findIn(options_.alignment, features, match.current,
-                                              motion.T_current_reference * old->T_camera_origin, point.position);
+    const auto found = old->reference(match.reference)
+                           .findIn(options_.alignment, features, match.current,
+                                   motion.T_current_reference * old->T_camera_origin, point.position);
     if (!found) continue;
     const Eigen::Vector3d& then = old->rows.positions[match.reference];
     const Eigen::Vector3d measurement = measurementOf(features, match.current, calibration, found->shift);

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cstddef>
+#include <cstdint>
 #include <list>
 #include <vector>
 
@@ -16,12 +18,17 @@ struct OldKeyframe {
     AnchoredPoint position;
     Eigen::Vector3d measurement;  ///< (u_left, v_left, disparity) in this key frame, px
     double sigma;                 ///< of u_left and of v_left, px
-    ReferencePatch reference;
+    ReferencePatch reference;     ///< without its samples
+    std::size_t samples_end;      ///< … which end there and begin where those of the point before end
   };
   int id;
   Eigen::Isometry3d T_camera_origin;
   std::vector<Point> points;
-  DescribedPoints rows;  ///< one for each point, in this key frame's left optical frame
+  std::vector<std::uint8_t> samples;  ///< of all references: one piece of memory leaves no holes
+  DescribedPoints rows;               ///< one for each point, in this key frame's left optical frame
+
+  /// With its samples.
+  ReferencePatch reference(int point) const;
 
   /// How many of its points a camera sees about as large as this key frame did.
   int sharedWith(const StereoCamera& camera, const Eigen::Isometry3d& T_other_origin) const;
