@@ -63,6 +63,16 @@ def links(node):
     return {('in', c[4]) if c[2] == 'i' else ('out', c[4], c[1]) for c in connections if c[5]}
 
 
+def node_pid(node):
+    """None when the node does not answer."""
+    try:
+        uri = rosgraph.Master('/test').lookupNode(node)
+        code, _, pid = xmlrpc.client.ServerProxy(uri).getPid('/test')
+        return pid if code == 1 else None
+    except Exception:  # whatever keeps it from answering: it is not there
+        return None
+
+
 class Collector:
     """Keeps every message of a topic in order."""
 
@@ -185,12 +195,7 @@ class Pipeline:
 
     def pid(self):
         """Of the nodelet manager; None when it is gone."""
-        try:
-            uri = rosgraph.Master('/test').lookupNode(self.manager)
-            code, _, pid = xmlrpc.client.ServerProxy(uri).getPid('/test')
-            return pid if code == 1 else None
-        except Exception:  # whatever keeps it from answering: it is not there
-            return None
+        return node_pid(self.manager)
 
     def close(self):
         self.process.terminate()

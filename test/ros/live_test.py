@@ -30,7 +30,7 @@ from tf2_msgs.msg import TFMessage
 
 from kitti_replay import (EPOCH, FRAME, PACKAGE, Camera, Collector, Pipeline, Rosout, SimulatedClock, StereoSequence,
                           links, matrix_of, wait_until)
-from stereo_descriptor_vo.msg import FeatureFlow, StereoFeatures, VoInfo
+from stereo_descriptor_vo.msg import FeatureFlow, PlaceInfo, StereoFeatures, VoInfo
 from stereo_descriptor_vo.srv import ResetToPose, SaveTrajectory
 
 PAIRS = 14  # 1.3 s: a jump back to the first one is no mere lateness
@@ -777,16 +777,20 @@ class Live(unittest.TestCase):
                                    self.rosout.warned('rows of left and right agree again')))
         self.assert_alive()
 
+    def start_another(self, sequence):
+        """A second pipeline in the same manager; its camera and what it says."""
+        namespace = self.namespace + '_other'
+        info = self.keep(Collector(namespace + '/vo_info', VoInfo))
+        odometry = self.keep(Collector(namespace + '/odom', Odometry))
+        features = self.keep(Collector(namespace + '/stereo_features', StereoFeatures))
+        camera = self.keep(Camera(namespace, sequence, self.clock))
+        other = self.keep(Pipeline(namespace, start_manager='false', manager=self.pipeline.manager))
+        self.assertTrue(wait_until(lambda: camera.is_subscribed() and other.is_connected((info, odometry, features)), 60))
+        return camera, info, odometry, features
+
     def test_two_pipelines_in_one_manager_share_nothing(self):
         self.start()
-        other_namespace = self.namespace + '_other'
-        other_info = self.keep(Collector(other_namespace + '/vo_info', VoInfo))
-        other_odometry = self.keep(Collector(other_namespace + '/odom', Odometry))
-        other_features = self.keep(Collector(other_namespace + '/stereo_features', StereoFeatures))
-        other_camera = self.keep(Camera(other_namespace, self.sequence, self.clock))
-        other = self.keep(Pipeline(other_namespace, start_manager='false', manager=self.pipeline.manager))
-        self.assertTrue(wait_until(lambda: other_camera.is_subscribed() and
-                                   other.is_connected((other_info, other_odometry, other_features)), 60))
+        other_camera, other_info, other_odometry, other_features = self.start_another(self.sequence)
         for i in range(5):
             self.feed(i)
         time.sleep(SILENCE)
@@ -801,6 +805,76 @@ class Live(unittest.TestCase):
             self.assertEqual(a.pose, b.pose)
         self.assertEqual(other_info[-1].epoch, self.info[-1].epoch)
         self.assertEqual(other_info[-1].distance, self.info[-1].distance)
+
+    def test_two_cameras_in_one_manager(self):
+        self.start()
+        smaller = copy.copy(self.sequence)
+        smaller.pairs = [[cv2.resize(image, None, fx=0.75, fy=0.75, interpolation=cv2.INTER_AREA) for image in pair]
+                         for pair in self.sequence.pairs]
+        smaller.projections = [[0.75 * p if k < 8 else p for k, p in enumerate(row)] for row in self.sequence.projections]
+        other_camera, other_info, other_odometry, other_features = self.start_another(smaller)
+        for i in range(6):
+            other_camera.publish(*other_camera.messages(i))
+            self.feed(i)
+            self.assertTrue(wait_until(lambda: len(other_info) == i + 1 and len(other_odometry) == i + 1))
+        for info, features, scale in ((self.info, self.features, 1.0), (other_info, other_features, 0.75)):
+            self.assertEqual([(m.state, m.epoch) for m in info], [('TRACKING', info[0].epoch)] * 6)
+            self.assertTrue(wait_until(lambda: len(features) == 6))
+            self.assertEqual({m.stream_epoch for m in features}, {features[0].stream_epoch})
+            self.assertAlmostEqual(features[-1].fx, scale * self.sequence.projections[0][0])
+            self.assertEqual(features[-1].image_height, round(scale * self.sequence.pairs[0][0].shape[0]))
+        # Both saw the same way.
+        self.assertGreater(self.info[-1].distance, 4.0)
+        self.assertAlmostEqual(other_info[-1].distance, self.info[-1].distance, delta=0.05 * self.info[-1].distance)
+
+    def start_manager_of_others(self):
+        """A manager with two threads, and two nodelets of others in it that each keep one."""
+        directory = tempfile.mkdtemp(prefix='sdvo_live_')
+        self.addCleanup(shutil.rmtree, directory, ignore_errors=True)
+        with open(os.path.join(directory, 'package.xml'), 'w') as file:
+            file.write('<package format="2"><name>slow_nodelets</name><version>0.0.0</version><description>slow</description>'
+                       '<maintainer email="a@b.org">a</maintainer><license>BSD</license><depend>nodelet</depend>'
+                       '<export><nodelet plugin="${prefix}/plugins.xml"/></export></package>')
+        with open(os.path.join(directory, 'plugins.xml'), 'w') as file:
+            file.write('<library path="lib%s_slow_nodelet"><class name="slow_nodelets/Slow" '
+                       'type="slow_nodelets::SlowNodelet" base_class_type="nodelet::Nodelet"/></library>' % PACKAGE)
+        manager = self.namespace + '/manager_of_others'
+        rospy.set_param(manager + '/num_worker_threads', 2)
+        executable = roslib.packages.find_node('nodelet', 'nodelet')[0]
+        environment = dict(os.environ, ROS_PACKAGE_PATH=directory + ':' + os.environ['ROS_PACKAGE_PATH'])
+        process = subprocess.Popen([executable, 'manager', '__ns:=' + self.namespace, '__name:=manager_of_others'],
+                                   env=environment)
+
+        def end():
+            for name in ('slow_1', 'slow_2'):
+                rospy.set_param('%s/%s/released' % (self.namespace, name), True)
+            process.terminate()
+            process.wait()
+        self.addCleanup(end)
+        load = rospy.ServiceProxy(manager + '/load_nodelet', NodeletLoad)
+        load.wait_for_service(60)
+        for name in ('slow_1', 'slow_2'):
+            self.assertTrue(load('%s/%s' % (self.namespace, name), 'slow_nodelets/Slow', [], [], [], '').success)
+        return manager
+
+    def test_slow_nodelets_of_others_do_not_slow_ours(self):
+        manager = self.start_manager_of_others()
+        driver = self.keep(Camera(self.namespace, self.sequence, self.clock))
+
+        def are_busy():
+            return all(rospy.get_param('%s/slow_%d/busy' % (self.namespace, k), False) for k in (1, 2))
+        self.assertTrue(wait_until(lambda: driver.publish(*driver.messages(0)) or are_busy()), 'they never began')
+        places = self.keep(Collector(self.namespace + '/place_info', PlaceInfo))
+        picture = self.keep(Collector(self.namespace + '/features_image', Image))
+        self.start(manager=manager, start_manager='false', loop_closing='true')
+        for i in range(1, 5):
+            self.assertEqual(self.feed(i).state, 'TRACKING')
+        self.assertEqual(self.info[-1].dropped_pairs, 0)
+        self.assertTrue(wait_until(lambda: len(places) > 0 and len(picture) > 0))
+        self.service('reset', Empty)
+        self.assertEqual(self.feed(5).epoch, self.info[0].epoch + 1)
+        self.assertTrue(are_busy())
+        self.assert_alive()
 
 
 if __name__ == '__main__':

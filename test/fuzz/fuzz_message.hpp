@@ -1,0 +1,51 @@
+#pragma once
+
+#include <fuzzer/FuzzedDataProvider.h>
+
+#include <cstddef>
+#include <string>
+
+#include "../../src/ros/conversions.hpp"
+
+namespace sdvo {
+
+/// Sometimes any other bits.
+template <class Value>
+void replace(Value& value, FuzzedDataProvider& bytes) {
+  if (bytes.ConsumeBool()) bytes.ConsumeData(&value, sizeof(value));
+}
+
+inline void replace(std::string& text, FuzzedDataProvider& bytes) {
+  if (bytes.ConsumeBool()) text = bytes.ConsumeRandomLengthString(12);
+}
+
+/// Some elements of any other bits.
+template <class Container>
+void damageElements(Container& values, FuzzedDataProvider& bytes) {
+  while (!values.empty() && bytes.ConsumeBool()) {
+    auto& element = values[bytes.ConsumeIntegralInRange<std::size_t>(0, values.size() - 1)];
+    bytes.ConsumeData(&element, sizeof(element));
+  }
+}
+
+/// Sometimes of another length, with some other elements.
+template <class Vector>
+void damage(Vector& values, FuzzedDataProvider& bytes) {
+  if (bytes.ConsumeBool()) values.resize(bytes.ConsumeIntegralInRange<std::size_t>(0, 64));
+  damageElements(values, bytes);
+}
+
+inline void damage(stereo_descriptor_vo::StereoFeatures& message, FuzzedDataProvider& bytes) {
+  replace(message.image_width, bytes), replace(message.image_height, bytes);
+  for (double* value : {&message.fx, &message.fy, &message.cx, &message.cy, &message.baseline}) replace(*value, bytes);
+  replace(message.bytes_per_row, bytes), replace(message.stream_epoch, bytes);
+  replace(message.patch_side, bytes), replace(message.patch_min_spacing, bytes), replace(message.patch_spacing, bytes);
+  replace(message.descriptor, bytes), replace(message.layout, bytes), replace(message.element_type, bytes);
+  for (auto* values :
+       {&message.u, &message.v, &message.disparity, &message.dv, &message.size, &message.angle, &message.response})
+    damage(*values, bytes);
+  damage(message.descriptors, bytes);
+  damage(message.patches, bytes);
+}
+
+}  // namespace sdvo
