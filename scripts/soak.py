@@ -12,6 +12,7 @@ import xmlrpc.client
 
 import cv2
 import cv_bridge
+import numpy as np
 import rosgraph
 import rospy
 import sensor_msgs.msg
@@ -122,7 +123,7 @@ def main():
     parser.add_argument("--minutes", type=float, default=5.0)
     parser.add_argument("--rate", type=float, default=10.0, help="pairs per second")
     parser.add_argument("--manager", default="/stereo/stereo_vo_manager")
-    parser.add_argument("--growth", type=float, default=3.0, help="MB that the memory may grow from the second quarter to the last")
+    parser.add_argument("--growth", type=float, default=1.0, help="%% that the memory may grow from the second quarter to the last")
     arguments = parser.parse_args(rospy.myargv()[1:])
     rospy.init_node("soak", disable_signals=True)
     soak = Soak(arguments.drive, arguments.rate)
@@ -135,10 +136,14 @@ def main():
     states = collections.Counter(info.state for info in soak.info)
     last = soak.info[-1] if soak.info else VoInfo()
     answered = len(soak.info) + last.dropped_pairs + last.dropped_features
-    latencies = sorted(info.latency for info in soak.info) or [float("nan")]
+    # ms, of the same two quarters
+    latencies = [[1e3 * info.latency for info in part] or [float("nan")]
+                 for part in (soak.info[len(soak.info) // 4:len(soak.info) // 2], soak.info[-(len(soak.info) // 4):])]
+    first, last_quarter = ("%.0f (95 %% below %.0f)" % tuple(np.percentile(part, (50, 95))) for part in latencies)
     print(f"{arguments.minutes:g} minutes at {arguments.rate:g} Hz: {pairs} pairs, {len(soak.info)} answered, {last.dropped_pairs} dropped, "
-          f"{dict(states)}, {soak.poses} poses, {last.distance:.0f} m, latency median {latencies[len(latencies) // 2] * 1e3:.0f} ms, "
-          f"memory {before:.1f} MB in the second quarter, {after:.1f} MB in the last, {len(soak.errors)} errors")
+          f"{last.dropped_features} features dropped, {dict(states)}, {soak.poses} poses, {last.distance:.0f} m, {len(soak.errors)} errors")
+    print(f"second quarter: latency {first} ms, memory {before:.1f} MB; last quarter: {last_quarter} ms, {after:.1f} MB "
+          f"({100.0 * (after / before - 1.0):+.2f} %)")
     turns = len(soak.pairs) - 1
     for k, info in enumerate(soak.info):
         if info.state != "TRACKING":
@@ -146,7 +151,7 @@ def main():
     for error in soak.errors[:5]:
         print(error)
     # A busy machine may lose pairs before they come to be counted, in the queues of publisher and subscriber.
-    good = (after - before <= arguments.growth and not soak.errors and answered >= 0.95 * pairs
+    good = (after / before - 1.0 <= 0.01 * arguments.growth and not soak.errors and answered >= 0.95 * pairs
             and states["TRACKING"] >= 0.99 * len(soak.info) > 0)
     return 0 if good else 1
 
