@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <stdexcept>
 #include <utility>
@@ -18,6 +19,9 @@ Matrix6d isotropic(double translation, double rotation) {
   variances << Eigen::Vector3d::Constant(translation * translation), Eigen::Vector3d::Constant(rotation * rotation);
   return variances.asDiagonal();
 }
+
+constexpr int kMostNumber = std::numeric_limits<int>::max() / 2;  ///< of places and segments that are taken up
+constexpr int kMostApart = 1'000'000;                             ///< numbers of places; as many as can be kept
 
 /// Of a motion of which nothing is known: wide enough to give way to anything.
 Matrix6d unknown() {
@@ -195,19 +199,29 @@ void PlaceRecognition::restore(std::vector<Place> places, const PoseGraph& graph
   if (places.empty()) throw std::invalid_argument("there are no places to take up");
   PlaceIndex index(options_.index);
   std::map<int, Place> restored;
+  int segment = 0;
   for (Place& place : places) {
     place.features.check();
+    if (place.id < 0 || place.id > kMostNumber || place.segment < 0 || place.segment > kMostNumber)
+      throw std::invalid_argument("place " + std::to_string(place.id) + " of segment " + std::to_string(place.segment) +
+                                  " leaves no numbers to go on with");
     if (graph.nodes().count(place.id) == 0)
       throw std::invalid_argument("place " + std::to_string(place.id) + " is not in the graph");
     if (!restored.empty() && place.features.kind() != restored.begin()->second.features.kind())
       throw std::invalid_argument("places are described by both " + toString(place.features.kind()) + " and " +
                                   toString(restored.begin()->second.features.kind()));
     index.add(place.id, index.signature(place.features));
-    segment_ = std::max(segment_, place.segment);
+    segment = std::max(segment, place.segment);
     const int id = place.id;
     restored.emplace(id, std::move(place));
   }
   if (restored.size() != graph.nodes().size()) throw std::invalid_argument("the graph has nodes without a place");
+  // The index looks through all numbers between the first place and the last one.
+  const int first = restored.begin()->first, last = restored.rbegin()->first;
+  if (last - first > kMostApart)
+    throw std::invalid_argument("places " + std::to_string(first) + " and " + std::to_string(last) +
+                                " cannot be of one map");
+  segment_ = segment;
   places_ = std::move(restored);
   index_ = std::move(index);
   graph_ = graph;

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -192,6 +194,28 @@ TEST(PlaceRecognition, RestoredPlacesLetANewSessionFindItself) {
   EXPECT_NE(synthetic::errorOf([&] { fresh.restore(places, mapping.recognition.graph()); }).find("without a place"),
             std::string::npos);
   EXPECT_TRUE(fresh.places().empty());
+}
+
+/// A file may say anything.
+TEST(PlaceRecognition, PlacesWithWildNumbersAreNotTakenUp) {
+  Drive mapping;
+  mapping.go(0, 6);
+  ASSERT_EQ(mapping.recognition.places().size(), 2u);
+  const auto refusal = [&](int id, int segment) {
+    std::vector<Place> places;
+    for (const auto& [number, place] : mapping.recognition.places()) places.push_back(place);
+    places[1].id = id;
+    places[1].segment = segment;
+    std::map<int, Eigen::Isometry3d> nodes = {{0, Eigen::Isometry3d::Identity()}, {id, Eigen::Isometry3d::Identity()}};
+    PlaceRecognition fresh{PlaceRecognitionOptions()};
+    return synthetic::errorOf([&] { fresh.restore(places, PoseGraph(PoseGraphOptions(), nodes, {})); });
+  };
+  constexpr int kLargest = std::numeric_limits<int>::max();
+  EXPECT_EQ(refusal(5, 0), "no error");
+  EXPECT_EQ(refusal(kLargest, 0), "place 2147483647 of segment 0 leaves no numbers to go on with");
+  EXPECT_EQ(refusal(1, kLargest), "place 1 of segment 2147483647 leaves no numbers to go on with");
+  EXPECT_EQ(refusal(-1, 0), "place -1 of segment 0 leaves no numbers to go on with");
+  EXPECT_EQ(refusal(2'000'000, 0), "places 0 and 2000000 cannot be of one map");
 }
 
 TEST(PlaceRecognition, AnotherRobotsSignatureAndRowsFindAPlace) {
