@@ -18,7 +18,7 @@ inline ros_conversions::FeatureStream someStream() {
 /// Four places a metre apart, the last one of which is the first again: a loop.
 inline SavedPlaces somePlaces() {
   static const SavedPlaces some = [] {
-    SyntheticScene scene(1, 160, 40.0);
+    SyntheticScene scene(1, 90, 40.0);
     std::vector<Place> places;
     std::map<int, Eigen::Isometry3d> nodes;
     std::vector<GraphEdge> edges;
