@@ -9,9 +9,7 @@ namespace slow_nodelets {
 /// A nodelet of others, whose callback takes a thread of the manager and keeps it until the parameter ~released is set.
 /// ~busy tells that it has one.
 class SlowNodelet : public nodelet::Nodelet {
-  void onInit() override {
-    subscriber_ = getNodeHandle().subscribe("left/image_rect", 1, &SlowNodelet::onImage, this);
-  }
+  void onInit() override { subscriber_ = getNodeHandle().subscribe("left/image_rect", 1, &SlowNodelet::onImage, this); }
 
   void onImage(const sensor_msgs::ImageConstPtr&) {
     const ros::NodeHandle& nh = getPrivateNodeHandle();
