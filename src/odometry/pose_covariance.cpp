@@ -29,15 +29,16 @@ Matrix6d carriedBy(const Eigen::Isometry3d& motion, const Matrix6d& covariance) 
 }  // namespace
 
 bool widen(Matrix6d& covariance, const Vector6d& deviation) {
-  constexpr double kExpected = 12.6;  // chi-square of six, 95 %
-  if (deviation.dot(covariance.ldlt().solve(deviation)) <= kExpected) return false;
-  covariance += deviation * deviation.transpose();
-  return true;
+  constexpr double kExpected = 6.0, kByChance = 12.6;  // chi-square of six: its mean, 95 %
+  const double square = deviation.dot(covariance.ldlt().solve(deviation));
+  if (square > kExpected) covariance += deviation * deviation.transpose();
+  return square > kByChance;
 }
 
 void PoseCovariance::cover(const Vector6d& correction) {
-  // The next poses are measured from the same key frame.
-  if (widen(value_, correction)) keyframe_ += correction * correction.transpose();
+  const Matrix6d before = value_;
+  widen(value_, correction);
+  keyframe_ += value_ - before;  // the next poses are measured from the same key frame
 }
 
 void PoseCovariance::restart(const Matrix6d& travelled) {

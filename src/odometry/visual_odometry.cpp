@@ -269,7 +269,8 @@ void VisualOdometry::recall(const StereoFeatures& features) {
 }
 
 /// A motion between two reported poses contains what the map has learnt of the first one meanwhile. Where that is more
-/// than the covariances of the motion and of the pose say, they are widened by it, and the reason says so.
+/// than the covariances of the motion and of the pose expect, they are widened by it, and beyond chance the reason says
+/// so.
 void VisualOdometry::cover(Step& step) {
   state_.covariance.cover(step.correction);
   if (!widen(step.covariance, step.correction)) return;

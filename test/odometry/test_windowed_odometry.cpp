@@ -98,14 +98,16 @@ TEST(SelfCalibrationReport, WhatARigTaughtBeforeItWasFoundToBeWrongIsForgotten) 
   scene.disparity_offset = -1.0;
   VisualOdometry odometry{VisualOdometryOptions{}};
   ASSERT_LT(drive(scene, odometry, 20).disparity_offset, -0.5);
-  StereoFeatures none = scene.view(syntheticPose(20), 21 * kPeriod, 1.0);
-  none.report.refused = true;
-  EXPECT_TRUE(std::isnan(odometry.update(none).disparity_offset));
+  for (const int k : {20, 21}) {
+    StereoFeatures none = scene.view(syntheticPose(k), (k + 1) * kPeriod, 1.0);
+    none.report.refused = true;
+    EXPECT_TRUE(std::isnan(odometry.update(none).disparity_offset));
+  }
 
   // The rig is mended meanwhile.
   scene.disparity_offset = 0.0;
   OdometryResult result;
-  for (int k = 30; k < 36; ++k) result = odometry.update(scene.view(syntheticPose(k), (k + 1) * kPeriod));
+  for (int k = 22; k < 28; ++k) result = odometry.update(scene.view(syntheticPose(k), (k + 1) * kPeriod));
   EXPECT_NEAR(result.disparity_offset, 0.0, 0.1);
 }
 

@@ -16,8 +16,8 @@ struct WindowCovariances {
   Matrix6d keyframe_since_first = Matrix6d::Zero();  ///< that key frame since the first frame
 };
 
-/// Widens a covariance by a deviation that is larger than it says, beyond chance (chi-square of six, 95 %). Whether it
-/// was.
+/// Widens a covariance by a deviation that is larger than it expects. Whether it was so beyond chance (chi-square of
+/// six, 95 %).
 bool widen(Matrix6d& covariance, const Vector6d& deviation);
 
 /// Covariance of a pose that is reported again and again while later pairs improve what is known of it. What is

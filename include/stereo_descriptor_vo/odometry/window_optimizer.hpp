@@ -15,7 +15,7 @@ struct WindowOptimizerOptions {
   double kernel_scale = 1.0;
   double disparity_sigma = 0.2;
   double common_disparity_sigma = 0.3;
-  double common_shift = 0.005;
+  double common_shift = 0.01;
 
   void describe(OptionList& list) {
     list.add("iterations", iterations, {1, 100}, "", "Levenberg-Marquardt steps at most, for each pair");
