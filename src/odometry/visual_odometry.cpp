@@ -205,6 +205,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
     step.covariance = found.motion.covariance;
     state_.covariance.advance(*step.T_previous_current, step.covariance);
   }
+  const Matrix6d measured = step.covariance;
   step.state = TrackingState::kTracking;
   if (verdict.trust == Trust::kSound) state_.last_doubt.setZero();
   if (verdict.trust == Trust::kDoubtful) {
@@ -223,6 +224,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
   if (!search_.isImplausible(evidence) && velocity.head<3>().norm() <= options_.tracking.max_speed &&
       velocity.tail<3>().norm() <= options_.tracking.max_rotation_rate) {
     state_.velocity = state_.last_velocity = velocity;
+    state_.velocity_covariance = measured / (since_newest * since_newest);
     state_.velocity_stamp = features.stamp;
   }
   state_.predicted_pairs = 0;
@@ -308,8 +310,8 @@ VisualOdometry::Step VisualOdometry::predict(const StereoFeatures& features, dou
   step.state = TrackingState::kDegraded;
   step.reason = "motion predicted: " + step.reason;
   step.T_previous_current = expSE3(*state_.velocity * dt);
-  // What is predicted from a doubtful motion is doubtful, too.
-  step.covariance = predictionCovariance(dt) + state_.last_doubt;
+  // What is predicted from a motion that is known badly, or doubtful, is so, too.
+  step.covariance = predictionCovariance(dt) + dt * dt * state_.velocity_covariance + state_.last_doubt;
   state_.covariance.advance(*step.T_previous_current, step.covariance);
   return step;
 }

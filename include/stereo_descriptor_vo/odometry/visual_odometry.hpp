@@ -171,11 +171,12 @@ class VisualOdometry {
     RightCameraRotation right_rotation;
     std::optional<std::int64_t> last_stamp;
     Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
-    PoseCovariance covariance;              ///< of that pose
-    std::optional<Vector6d> velocity;       ///< of the camera in its own frame, m/s and rad/s
-    std::optional<Vector6d> last_velocity;  ///< the same, kept while lost
-    std::int64_t velocity_stamp = 0;        ///< of the pair that it is of, ns
-    std::int64_t last_pose_stamp = 0;       ///< ns
+    PoseCovariance covariance;                        ///< of that pose
+    std::optional<Vector6d> velocity;                 ///< of the camera in its own frame, m/s and rad/s
+    std::optional<Vector6d> last_velocity;            ///< the same, kept while lost
+    Matrix6d velocity_covariance = Matrix6d::Zero();  ///< of the last velocity as it was measured, 1/s^2
+    std::int64_t velocity_stamp = 0;                  ///< of the pair that it is of, ns
+    std::int64_t last_pose_stamp = 0;                 ///< ns
     double distance = 0.0;
     int predicted_pairs = 0;
     int pairs = 0;
