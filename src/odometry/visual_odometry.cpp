@@ -14,7 +14,7 @@
 namespace sdvo {
 namespace {
 
-constexpr int kWatched = 5;  // pairs after a motion was contested
+constexpr int kWatched = 5;  // pairs after a motion was contested, or a pair refused
 
 }  // namespace
 
@@ -68,10 +68,13 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features, const std:
   state_.last_stamp = features.stamp;
   ++state_.pairs;
   state_.right_rotation.add(features);
-  // What the pairs before a refused one told of the rig may be wrong already.
-  if (features.report.refused) state_.calibration = CalibrationFilter(options_.calibration);
   state_.frozen = frozen;
   state_.contested_pairs = found.contested ? kWatched : std::max(0, state_.contested_pairs - 1);
+  if (features.report.refused) {
+    // What the pairs before told of the rig may be wrong already, and those after may be refused again.
+    state_.calibration = CalibrationFilter(options_.calibration);
+    state_.contested_pairs = kWatched;
+  }
   state_.image = {features.u, features.v, features.disparity};
   Step step;
   if (frozen)
@@ -192,7 +195,9 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
   if (search_.lastingDisagree(evidence)) state_.contested_pairs = kWatched;
   if (verdict.trust == Trust::kSound || found.T_current_reference_else) verdict = found.verdict;
   const bool watched = verdict.trust == Trust::kSound && state_.contested_pairs > 0;
-  if (watched) verdict = {Trust::kDoubtful, "a moment ago two motions were in view, or none was certain"};
+  if (watched)
+    verdict = {Trust::kDoubtful,
+               "a moment ago left and right disagreed, two motions were in view, or none was certain"};
 
   if (adjustment.success) {
     state_.calibration.note(map.newestId(), calibration, adjustment.calibration_information);

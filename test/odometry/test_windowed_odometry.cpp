@@ -107,7 +107,11 @@ TEST(SelfCalibrationReport, WhatARigTaughtBeforeItWasFoundToBeWrongIsForgotten) 
   // The rig is mended meanwhile.
   scene.disparity_offset = 0.0;
   OdometryResult result;
-  for (int k = 22; k < 28; ++k) result = odometry.update(scene.view(syntheticPose(k), (k + 1) * kPeriod));
+  for (int k = 22; k < 30; ++k) {
+    result = odometry.update(scene.view(syntheticPose(k), (k + 1) * kPeriod));
+    EXPECT_EQ(result.state, k < 26 ? TrackingState::kDegraded : TrackingState::kTracking)
+        << k << ": it may be refused again";
+  }
   EXPECT_NEAR(result.disparity_offset, 0.0, 0.1);
 }
 

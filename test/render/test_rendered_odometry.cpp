@@ -79,8 +79,9 @@ TEST(RenderedOdometry, MotionsAndPosesLieInTheirCovariancesAndTheRigIsCalibrated
   }
   EXPECT_GE(static_cast<double>(inside) / total, 0.90);
   EXPECT_GE(sum / total, 0.25 * 6.0) << "standard deviations more than twice too large";
-  // Six in the mean, if all were normal; the poses of one drive err together.
-  EXPECT_GE(pose_sum / total, 2.5);
+  // Six in the mean, if all were normal. The poses of one drive err together, and what key frames have alike counts in
+  // their covariance from the start, though it adds up over a kilometre only.
+  EXPECT_GE(pose_sum / total, 1.0);
   EXPECT_LE(pose_sum / total, 10.5);
 }
 

@@ -29,7 +29,7 @@ class PoseCovariance {
  public:
   /// Successive key frames see the same points, compensated with the same calibration: their errors are alike, not
   /// independent. The variance of their sum is larger than the sum of their variances by about as many as are alike.
-  static constexpr double kAlike = 6.0;
+  static constexpr double kAlike = 4.0;
 
   /// Of the last pose. Zero in the beginning, when that is a key frame by definition.
   const Matrix6d& value() const { return value_; }
