@@ -37,6 +37,7 @@ Matrix6d motionCovariance(const Window& window, const Eigen::MatrixXd& pose_cova
 /// Medians of a frame's squared residuals and disparities (px).
 std::pair<double, double> typicalOf(const Window& window, const std::vector<double>& residuals, int frame) {
   std::vector<double> squares, disparities;
+  squares.reserve(residuals.size()), disparities.reserve(residuals.size());
   for (std::size_t i = 0; i < residuals.size(); ++i) {
     if (window.observations[i].frame != frame) continue;
     squares.push_back(residuals[i] * residuals[i]);
@@ -198,9 +199,7 @@ bool LocalMap::needsKeyframe() const {
         parallax.push_back((observation.measurement - point.observations.back().measurement).head<2>().norm());
   }
   if (static_cast<double>(parallax.size()) < options_.keyframe_overlap * seen || parallax.empty()) return true;
-  const auto middle = parallax.begin() + static_cast<std::ptrdiff_t>(parallax.size() / 2);
-  std::nth_element(parallax.begin(), middle, parallax.end());
-  return *middle > options_.keyframe_parallax;
+  return median(parallax) > options_.keyframe_parallax;
 }
 
 /// Key frames beyond the newest ones stay for what they see: the first that shares too few points with the newest pair

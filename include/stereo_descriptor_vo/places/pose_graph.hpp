@@ -76,8 +76,7 @@ class PoseGraph {
   /// Moves all nodes but the first so that the edges agree best (Levenberg-Marquardt over SE(3), sparse Cholesky, by
   /// Ceres). Loops that disagree with the rest count little (Cauchy's loss).
   /// What the odometry gets wrong of every turn alike is estimated, too. Beyond that its edges are as stiff as the
-  /// loops allow: they give way by a small share of the largest drift, and by
-  /// more where loops disagree with that.
+  /// loops allow: they give way by a small share of the largest drift, and by more where loops disagree with that.
   struct Summary {
     bool converged = false;
     int iterations = 0;
