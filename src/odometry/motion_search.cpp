@@ -81,12 +81,14 @@ MotionSearch::MotionSearch(const FeatureMatcherOptions& matcher, const MotionEst
     : motion_options_(motion),
       alignment_options_(alignment),
       verdict_options_(verdict),
+      matcher_options_(matcher),
       matcher_(matcher),
+      wide_matcher_(matcher.widened()),
       estimator_(motion) {}
 
 MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
   const std::optional<Eigen::Isometry3d>& prior = scene.guess ? scene.guess : scene.T_current_reference;
-  MotionHypothesis found = search(scene, prior);
+  MotionHypothesis found = searchNear(scene, prior);
   if (found.verdict.trust == Trust::kSound && !scene.contested) {
     const auto measured = align(scene, found);
     if (!hasStrayed(scene.features.camera, found, measured)) return found;
@@ -95,8 +97,8 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
 
   // The prior itself may be what misled the search, and what moves by itself may outnumber the world.
   std::vector<MotionHypothesis> hypotheses = {std::move(found)};
-  if (scene.guess && scene.T_current_reference) hypotheses.push_back(search(scene, scene.T_current_reference));
-  if (prior) hypotheses.push_back(search(scene, std::nullopt));
+  if (scene.guess && scene.T_current_reference) hypotheses.push_back(searchNear(scene, scene.T_current_reference));
+  if (prior) hypotheses.push_back(search(matcher_, scene, std::nullopt));
   const MotionHypothesis all = hypotheses.back();
   std::vector<int> lasting, rest;
   for (int i = 0; i < static_cast<int>(all.matches.size()); ++i) {
@@ -117,13 +119,46 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
   return found;
 }
 
-MotionHypothesis MotionSearch::search(const MotionScene& scene,
+/// First where a good prediction has the points, then three times as far.
+MotionHypothesis MotionSearch::searchNear(const MotionScene& scene,
+                                          const std::optional<Eigen::Isometry3d>& T_current_reference) const {
+  if (!T_current_reference || !matcher_options_.gating) return search(matcher_, scene, T_current_reference);
+  double match_time = 0.0, motion_time = 0.0;
+  if (!scene.contested) {
+    MotionHypothesis found = search(matcher_, scene, T_current_reference);
+    if (found.verdict.trust == Trust::kSound && !leavesGate(scene, *T_current_reference, found)) return found;
+    match_time = found.match_time, motion_time = found.motion_time;
+  }
+  MotionHypothesis found = search(wide_matcher_, scene, T_current_reference);
+  found.match_time += match_time, found.motion_time += motion_time;
+  return found;
+}
+
+/// Whether the motion found has a good part of the points where the search did not look for them.
+bool MotionSearch::leavesGate(const MotionScene& scene, const Eigen::Isometry3d& predicted,
+                              const MotionHypothesis& found) const {
+  constexpr double kGoodPart = 0.1;
+  const StereoCamera& camera = scene.features.camera;
+  const Eigen::Isometry3d& T_current_reference = found.motion.T_current_reference;
+  std::size_t seen = 0, outside = 0;
+  for (const Eigen::Vector3d& point : found.view.rows.positions) {
+    const Eigen::Vector3d here = T_current_reference * point, expected = predicted * point;
+    if (here.z() <= 0.0 || expected.z() <= 0.0) continue;
+    const Eigen::Vector3d pixel = camera.project(here);
+    if (pixel.x() < 0.0 || pixel.y() < 0.0 || pixel.x() > camera.width || pixel.y() > camera.height) continue;
+    ++seen;
+    outside += (pixel - camera.project(expected)).head<2>().norm() > matcher_options_.gate_radius;
+  }
+  return static_cast<double>(outside) > kGoodPart * static_cast<double>(seen);
+}
+
+MotionHypothesis MotionSearch::search(const FeatureMatcher& matcher, const MotionScene& scene,
                                       const std::optional<Eigen::Isometry3d>& T_current_reference) const {
   MotionHypothesis found;
   found.guided = T_current_reference.has_value();
   found.view = scene.map.view();
   Stopwatch stopwatch;
-  found.matches = matcher_.match(found.view.rows, scene.features, T_current_reference);
+  found.matches = matcher.match(found.view.rows, scene.features, T_current_reference);
   found.match_time = stopwatch.lap();
   found.correspondences = correspond(found.view.rows, scene.features, found.matches, scene.calibration);
   found.motion = estimator_.estimate(scene.features.camera, found.correspondences, T_current_reference);

@@ -35,14 +35,14 @@ const char* toString(TrackingState state) {
 VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
     : options_(checked(options)),
       search_(options.matcher, options.motion, options.alignment, options.tracking),
-      matcher_(options.matcher),
+      matcher_(options.matcher.widened()),
       estimator_(options.motion),
       state_(options.calibration) {}
 
 void VisualOdometry::configure(const VisualOdometryOptions& options) {
   options_ = checked(options);
   search_ = MotionSearch(options.matcher, options.motion, options.alignment, options.tracking);
-  matcher_ = FeatureMatcher(options.matcher);
+  matcher_ = FeatureMatcher(options.matcher.widened());
   estimator_ = MotionEstimator(options.motion);
 }
 

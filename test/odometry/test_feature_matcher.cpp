@@ -140,6 +140,16 @@ TEST(FeatureMatcher, GateHoldsThePredictedPositionAndNothingFar) {
   }
 }
 
+TEST(FeatureMatcher, AWidenedGateReachesThreeTimesAsFarAndStaysInItsRange) {
+  FeatureMatcherOptions options;
+  options.gate_radius = 12.0;
+  options.max_distance = 0.1;
+  EXPECT_DOUBLE_EQ(options.widened().gate_radius, 36.0);
+  EXPECT_DOUBLE_EQ(options.widened().max_distance, 0.1);
+  options.gate_radius = 1500.0;
+  EXPECT_NO_THROW(FeatureMatcher(options.widened()));
+}
+
 TEST(FeatureMatcher, TakesPredictionsThatLeaveTheImageOrPassTheCamera) {
   const StereoCamera camera = synthetic::camera();
   const synthetic::World world = synthetic::randomWorld(6, 300, {-8.0, -4.0, 2.0}, {8.0, 4.0, 30.0});

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/odometry/motion_search.hpp"
 
@@ -50,6 +52,18 @@ class MotionSearchTest : public ::testing::Test {
     return search_.find(scene);
   }
 
+  /// Where no velocity tells that the camera cannot have been that fast.
+  MotionHypothesis findAround(const StereoFeatures& features, double expected) const {
+    return search_.find({map_,
+                         calibration_,
+                         features,
+                         Eigen::Isometry3d(Eigen::Translation3d(-expected, 0.0, 0.0)),
+                         std::nullopt,
+                         false,
+                         0.0,
+                         {}});
+  }
+
   void begin(const StereoFeatures& features) {
     map_.insert(features, ++pairs_, Eigen::Isometry3d::Identity(), {}, calibration_);
   }
@@ -97,6 +111,35 @@ TEST_F(MotionSearchTest, AWrongExpectationIsOneHypothesisAmongOthers) {
   EXPECT_NEAR(moved(found), 0.1, 1e-3);
   EXPECT_GT(found.evidence.inliers, 100);
   EXPECT_EQ(found.sightings.size(), found.motion.inliers.size());
+}
+
+TEST_F(MotionSearchTest, AnExpectationThatIsALittleWrongIsLookedAroundFurther) {
+  start(2);
+  // Points 6 to 12 m away were expected 27 to 53 px beside where they are: beyond the gate, not three times as far.
+  const MotionHypothesis found = findAround(street_.see(0.1, 0.0, stamp(), true, false), 0.9);
+  EXPECT_TRUE(found.guided);
+  EXPECT_EQ(found.verdict.trust, Trust::kSound) << found.verdict.reason;
+  EXPECT_NEAR(moved(found), 0.1, 1e-3);
+  EXPECT_GT(found.evidence.inliers, 100);
+}
+
+TEST_F(MotionSearchTest, WhatWasFoundNearTheExpectationMustNotLeaveThatOut) {
+  // Points far away are where they were expected, those nearby are not, and tell the step.
+  const synthetic::World far = synthetic::randomWorld(25, 300, {-25.0, -8.0, 35.0}, {25.0, 6.0, 50.0});
+  const synthetic::World near = synthetic::randomWorld(26, 120, {-4.0, -2.0, 5.0}, {4.0, 2.0, 6.0});
+  const auto see = [&](double x) {
+    StereoFeatures features = synthetic::noFeatures(synthetic::camera(), stamp());
+    for (const synthetic::World* world : {&far, &near}) Street::add(features, *world, x, 60.0);
+    return features;
+  };
+  begin(see(0.0));
+  extend(see(0.0), find(see(0.0), 0.0));
+  const MotionHypothesis found = findAround(see(0.1), 0.6);
+  EXPECT_TRUE(found.guided);
+  EXPECT_NEAR(moved(found), 0.1, 1e-3);
+  const auto isNear = [&](int i) { return found.correspondences[static_cast<std::size_t>(i)].point.z() < 10.0; };
+  const std::vector<int>& inliers = found.motion.inliers;
+  EXPECT_GT(std::count_if(inliers.begin(), inliers.end(), isNear), 50);
 }
 
 TEST_F(MotionSearchTest, WhatStoodStillSoFarOutvotesAMajority) {

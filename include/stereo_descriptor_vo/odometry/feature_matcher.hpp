@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <optional>
 #include <vector>
 
@@ -12,13 +13,22 @@ namespace sdvo {
 
 struct FeatureMatcherOptions {
   bool gating = true;
-  double gate_radius = 60.0;
+  double gate_radius = 20.0;
   double max_distance = 0.3;
+
+  static constexpr double kWidestGate = 2000.0;  ///< px
+  /// For a prediction that may be wrong.
+  FeatureMatcherOptions widened() const {
+    FeatureMatcherOptions wide = *this;
+    wide.gate_radius = std::min(3.0 * gate_radius, kWidestGate);
+    return wide;
+  }
 
   void describe(OptionList& list) {
     list.add("gating", gating, "compare only near the position that the predicted motion gives");
-    list.add("gate_radius", gate_radius, {1.0, 2000.0}, "px",
-             "radius of that search around the predicted left position");
+    list.add("gate_radius", gate_radius, {1.0, kWidestGate}, "px",
+             "radius of that search around the predicted left position; three times as far where that finds no certain "
+             "motion, or one that leads out of it");
     list.add("max_distance", max_distance, {0.01, 1.0}, "",
              "largest distance of matched descriptors: share of differing bits, or |a - b|^2 / (|a|^2 + |b|^2)");
   }

@@ -76,7 +76,11 @@ class MotionSearch {
   bool isImplausible(const PoseEvidence& evidence) const;
 
  private:
-  MotionHypothesis search(const MotionScene& scene, const std::optional<Eigen::Isometry3d>& T_current_reference) const;
+  MotionHypothesis searchNear(const MotionScene& scene,
+                              const std::optional<Eigen::Isometry3d>& T_current_reference) const;
+  MotionHypothesis search(const FeatureMatcher& matcher, const MotionScene& scene,
+                          const std::optional<Eigen::Isometry3d>& T_current_reference) const;
+  bool leavesGate(const MotionScene& scene, const Eigen::Isometry3d& predicted, const MotionHypothesis& found) const;
   MotionHypothesis searchAmong(const MotionScene& scene, const MotionHypothesis& all,
                                const std::vector<int>& subset) const;
   void weigh(const MotionScene& scene, MotionHypothesis& found) const;
@@ -91,7 +95,8 @@ class MotionSearch {
   MotionEstimatorOptions motion_options_;
   PatchAlignmentOptions alignment_options_;
   PoseVerdictOptions verdict_options_;
-  FeatureMatcher matcher_;
+  FeatureMatcherOptions matcher_options_;
+  FeatureMatcher matcher_, wide_matcher_;
   MotionEstimator estimator_;
 };
 
