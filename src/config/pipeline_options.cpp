@@ -9,7 +9,7 @@ namespace sdvo {
 namespace {
 
 bool belongsToNodelet(const std::string& path) {
-  NodeletOptions options;
+  InterfaceOptions options;
   const std::vector<Option> list = listOptions(options);
   return std::any_of(list.begin(), list.end(), [&](const Option& option) { return option.name == path; });
 }

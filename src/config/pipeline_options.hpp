@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "nodelet_options.hpp"
+#include "interface_options.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
@@ -24,7 +24,7 @@ struct PipelineOptions {
 };
 
 /// What the nodelets read beside the core's options; a YAML file that holds them is no error for the tools.
-struct NodeletOptions {
+struct InterfaceOptions {
   StereoInputOptions stereo_features;
   OdometryOutputOptions visual_odometry;
   PlaceOutputOptions place_recognition;

@@ -8,7 +8,7 @@
 #include <mutex>
 #include <string>
 
-#include "../config/nodelet_options.hpp"
+#include "../config/interface_options.hpp"
 
 namespace sdvo {
 

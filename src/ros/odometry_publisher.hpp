@@ -6,7 +6,7 @@
 
 #include <mutex>
 
-#include "../config/nodelet_options.hpp"
+#include "../config/interface_options.hpp"
 #include "conversions.hpp"
 
 namespace sdvo {

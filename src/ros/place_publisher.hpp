@@ -9,7 +9,7 @@
 #include <optional>
 #include <string>
 
-#include "../config/nodelet_options.hpp"
+#include "../config/interface_options.hpp"
 #include "place_conversions.hpp"
 #include "stereo_descriptor_vo/places/eased_transform.hpp"
 

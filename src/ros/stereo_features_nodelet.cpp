@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "../config/nodelet_options.hpp"
+#include "../config/interface_options.hpp"
 #include "callback_thread.hpp"
 #include "conversions.hpp"
 #include "pair_decoder.hpp"

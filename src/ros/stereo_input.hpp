@@ -12,7 +12,7 @@
 #include <memory>
 #include <string>
 
-#include "../config/nodelet_options.hpp"
+#include "../config/interface_options.hpp"
 #include "arrival_log.hpp"
 #include "image_subscriber.hpp"
 

@@ -16,7 +16,7 @@
 #include <utility>
 #include <vector>
 
-#include "../config/nodelet_options.hpp"
+#include "../config/interface_options.hpp"
 #include "callback_thread.hpp"
 #include "camera_mount.hpp"
 #include "conversions.hpp"

@@ -27,7 +27,7 @@ void printTable(const std::string& nodelet, const std::vector<sdvo::Option>& opt
 
 int run() {
   sdvo::PipelineOptions core;
-  sdvo::NodeletOptions nodelets;
+  sdvo::InterfaceOptions nodelets;
   std::vector<sdvo::Option> options = sdvo::listOptions(nodelets);
   for (const sdvo::Option& option : sdvo::listOptions(core)) options.push_back(option);
 
