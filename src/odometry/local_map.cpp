@@ -385,7 +385,8 @@ LocalMap::Adjustment LocalMap::adjust(const WindowOptimizerOptions& options, con
     return motionCovariance(window, solution.pose_covariance, from, to);
   };
   const auto [square, disparity] = typicalOf(window, solution.residuals, newest);
-  const double excess = residual_level_.excess(square);
+  constexpr double kAlike = 1.15;  // errors of neighbouring points are not independent
+  const double excess = kAlike * residual_level_.excess(square);
   const Matrix6d shift = shifted(camera_, options.common_shift, disparity);
   const auto of_newest = [&](int from) -> Matrix6d {
     if (from == newest) return Matrix6d::Zero();

@@ -14,7 +14,13 @@
 namespace sdvo {
 namespace {
 
-constexpr int kWatched = 5;  // pairs after a motion was contested, or a pair refused
+constexpr int kWatched = 5;           // pairs after a motion was contested, or a pair refused
+constexpr double kFewOutliers = 0.1;  // share of the matches whose twofold says nothing
+constexpr double kLately = 2.0;       // s that a motion nobody doubted tells what may be expected
+
+double outlierShare(const PoseEvidence& evidence) {
+  return 1.0 - static_cast<double>(evidence.inliers) / std::max(evidence.matches, 1);
+}
 
 }  // namespace
 
@@ -148,6 +154,7 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
   state_.started = true;
   state_.last_doubt.setZero();
   state_.predicted_pairs = 0;
+  state_.outlier_level = {};
   state_.map.emplace(options_.map);
   state_.map->insert(features, state_.pairs, state_.T_origin_camera.inverse(), {}, state_.calibration.calibration());
   return step;
@@ -168,7 +175,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
   const Eigen::Isometry3d T_before_origin = map.poseBeforeNewest();
   if (map.newestIsKeyframe() && found.verdict.trust == Trust::kSound) recall(features);
   const CalibrationBelief prior = state_.calibration.prior(map.oldestId());
-  const LocalMap::Adjustment adjustment = map.adjust(options_.window, prior, calibration);
+  LocalMap::Adjustment adjustment = map.adjust(options_.window, prior, calibration);
   map.renewLooks(features, found.sightings);
 
   Step step;
@@ -201,6 +208,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
 
   if (adjustment.success) {
     state_.calibration.note(map.newestId(), calibration, adjustment.calibration_information);
+    adjustment.covariances.inflateNewest(state_.outlier_level.excess(kFewOutliers + outlierShare(evidence)));
     step.covariance = state_.covariance.advance(*step.T_previous_current, adjustment.covariances);
     // As a perturbation of the frame before, then of the newest one.
     step.correction = adjoint(map.newestPose() * map.poseBeforeNewest().inverse()) *
@@ -228,9 +236,14 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
   // Stamps that lie too close make no velocity, nor does what may be the motion of something else.
   if (!search_.isImplausible(evidence) && velocity.head<3>().norm() <= options_.tracking.max_speed &&
       velocity.tail<3>().norm() <= options_.tracking.max_rotation_rate) {
-    state_.velocity = state_.last_velocity = velocity;
+    state_.velocity = velocity;
     state_.velocity_covariance = measured / (since_newest * since_newest);
-    state_.velocity_stamp = features.stamp;
+    // What is doubted predicts the next pair, but nothing is judged by it as long as there is something better.
+    const double age = static_cast<double>(features.stamp - state_.velocity_stamp) * 1e-9;
+    if (verdict.trust == Trust::kSound || !state_.last_velocity || age > kLately) {
+      state_.last_velocity = velocity;
+      state_.velocity_stamp = features.stamp;
+    }
   }
   state_.predicted_pairs = 0;
   if (map.newestIsKeyframe()) state_.covariance.markKeyframe();
@@ -287,18 +300,19 @@ void VisualOdometry::cover(Step& step) {
   step.reason = reason.str();
 }
 
-/// How far a doubtful motion may be off: as far as the hypothesis that speaks against it, or else as what was
-/// predicted; and as far as the adjustment moved it.
+/// How far a doubtful motion may be off: as far as what was expected, and as the hypothesis that speaks against it; and
+/// as far as the adjustment moved it.
 Matrix6d VisualOdometry::doubt(const MotionHypothesis& found, const Eigen::Isometry3d& T_previous_measured,
                                const Eigen::Isometry3d& T_previous_current, double dt) const {
-  const Matrix6d moved = disagreement(T_previous_current, T_previous_measured);
+  const Eigen::Isometry3d predicted = expSE3(state_.last_velocity.value_or(Vector6d::Zero()) * dt);
+  Matrix6d doubt = disagreement(T_previous_current, T_previous_measured) + disagreement(T_previous_current, predicted) +
+                   predictionCovariance(dt);
   if (found.T_current_reference_else) {
     // Both hypotheses start from the same pair of the map.
     const Eigen::Isometry3d T_else_found = found.motion.T_current_reference * found.T_current_reference_else->inverse();
-    return moved + disagreement(Eigen::Isometry3d::Identity(), T_else_found);
+    doubt += disagreement(Eigen::Isometry3d::Identity(), T_else_found);
   }
-  const Eigen::Isometry3d predicted = expSE3(state_.last_velocity.value_or(Vector6d::Zero()) * dt);
-  return moved + disagreement(T_previous_current, predicted) + predictionCovariance(dt);
+  return doubt;
 }
 
 VisualOdometry::Step VisualOdometry::predict(const StereoFeatures& features, double dt, const std::string& failure) {

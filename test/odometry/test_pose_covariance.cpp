@@ -201,5 +201,14 @@ TEST(PoseCovariance, StaysSymmetricAndPositive) {
   }
 }
 
+TEST(WindowCovariances, OnlyTheNewestFrameIsInflated) {
+  WindowCovariances window;
+  window.since_keyframe = window.since_first = window.since_second = window.keyframe_since_first = Matrix6d::Identity();
+  window.inflateNewest(3.0);
+  for (const Matrix6d& covariance : {window.since_keyframe, window.since_first, window.since_second})
+    EXPECT_TRUE(covariance.isApprox(3.0 * Matrix6d::Identity()));
+  EXPECT_TRUE(window.keyframe_since_first.isApprox(Matrix6d::Identity()));
+}
+
 }  // namespace
 }  // namespace sdvo

@@ -698,21 +698,20 @@ TEST(VisualOdometry, ImagesThatRepeatThemselvesWhileItStandsAreAStandstill) {
   }
 }
 
-/// What stands still around a standing camera, and a swarm of points that moves past it by 0.12 m a pair and is the
+/// What stands still around a camera at `x`, and a swarm of points that moves past it by 0.12 m a pair and is the
 /// larger part of the view from pair 6 on.
-StereoFeatures crowdedPair(int i) {
+StereoFeatures crowdedPair(int i, double x = 0.0) {
+  const Eigen::Isometry3d T_camera_world(Eigen::Translation3d(-x, 0.0, 0.0));
   synthetic::Sighting sighting;
   sighting.noise = 0.1;
   sighting.max_depth = 25.0;
   sighting.seed = 300 + static_cast<unsigned>(i);
   const synthetic::World still = synthetic::randomWorld(21, 250, {-10.0, -4.0, 5.0}, {10.0, 3.0, 20.0});
-  StereoFeatures features =
-      synthetic::observe(still, synthetic::camera(), Eigen::Isometry3d::Identity(), stampOf(i), sighting);
+  StereoFeatures features = synthetic::observe(still, synthetic::camera(), T_camera_world, stampOf(i), sighting);
   if (i < 6) return features;
   synthetic::World swarm = synthetic::randomWorld(22, 400, {-3.0, -1.5, 3.0}, {3.0, 1.5, 6.0});
   for (Eigen::Vector3d& point : swarm.points) point.x() += 0.12 * (i - 6);
-  const StereoFeatures moving =
-      synthetic::observe(swarm, synthetic::camera(), Eigen::Isometry3d::Identity(), stampOf(i), sighting);
+  const StereoFeatures moving = synthetic::observe(swarm, synthetic::camera(), T_camera_world, stampOf(i), sighting);
   for (int row = 0; row < moving.count(); ++row)
     synthetic::addFeature(features, moving.u[row], moving.v[row], moving.disparity[row],
                           {moving.descriptors.ptr(row), moving.descriptors.ptr(row) + moving.descriptors.cols});
@@ -733,6 +732,75 @@ TEST(VisualOdometry, DoesNotFollowWhatMovesBeforeAStandingCamera) {
     EXPECT_GT(std::sqrt(result.motion_covariance(0, 0)), 0.08) << i;
   }
   EXPECT_GE(degraded, 10);
+}
+
+TEST(VisualOdometry, AContestedMotionIsAlsoAsUncertainAsItIsUnexpected) {
+  // It stops at once: 0.1 m were expected, and the swarm speaks for a motion of 0.12 m against it.
+  const auto sigmaAfter = [](double step) {
+    VisualOdometry odometry({});
+    for (int i = 0; i <= 6; ++i) odometry.update(crowdedPair(i, step * i));
+    const OdometryResult result = odometry.update(crowdedPair(7, step * 6));
+    EXPECT_NE(result.reason.find("two motions"), std::string::npos) << result.reason;
+    return std::sqrt(result.motion_covariance(0, 0));
+  };
+  const double contested = sigmaAfter(0.0);
+  EXPECT_GT(contested, 0.1);
+  EXPECT_GT(sigmaAfter(0.1), std::hypot(contested, 0.08));
+}
+
+TEST(VisualOdometry, WhatIsInDoubtTellsNothingOfWhatMayBeExpected) {
+  // From pair 6 on only what is far away is to be seen, as if by a camera that goes 0.4 m a pair and not 0.8 m.
+  const synthetic::World far = synthetic::randomWorld(31, 2000, {-80.0, -40.0, 60.0}, {80.0, 40.0, 120.0});
+  const auto farPair = [&](int i, const Eigen::Isometry3d& T_origin_camera) {
+    synthetic::Sighting sighting;
+    sighting.noise = 0.5;
+    sighting.max_depth = 150.0;
+    sighting.seed = 700 + static_cast<unsigned>(i);
+    return synthetic::observe(far, synthetic::camera(), T_origin_camera.inverse(), stampOf(i), sighting);
+  };
+  const auto slowPair = [&](int i) {
+    Eigen::Isometry3d T_origin_camera = drivePose(5);
+    T_origin_camera.translation() += 0.4 * (i - 5) * T_origin_camera.linear().col(2);
+    return farPair(i, T_origin_camera);
+  };
+  VisualOdometryOptions options;
+  options.tracking.doubtful_deviation = 0.001;
+  VisualOdometry odometry(options);
+  for (int i = 0; i <= 5; ++i) {
+    StereoFeatures features = pairOf(i);
+    const StereoFeatures behind = farPair(i, drivePose(i));
+    for (int row = 0; row < behind.count(); ++row)
+      synthetic::addFeature(features, behind.u[row], behind.v[row], behind.disparity[row],
+                            {behind.descriptors.ptr(row), behind.descriptors.ptr(row) + behind.descriptors.cols});
+    ASSERT_EQ(odometry.update(features).state, TrackingState::kTracking) << i;
+  }
+  for (int i = 6; i <= 8; ++i) ASSERT_EQ(odometry.update(slowPair(i)).state, TrackingState::kDegraded) << i;
+  for (int i = 9; i <= 10; ++i) odometry.update(blindPair(i));
+  ASSERT_EQ(odometry.update(slowPair(11)).state, TrackingState::kDegraded) << "started again";
+  const OdometryResult doubtful = odometry.update(slowPair(12));
+  ASSERT_EQ(doubtful.state, TrackingState::kDegraded) << doubtful.reason;
+  EXPECT_NEAR(doubtful.T_previous_current.translation().z(), 0.4, 0.2);
+  EXPECT_GT(std::sqrt(doubtful.motion_covariance(2, 2)), 0.25);
+
+  OdometryResult later;
+  for (int i = 13; i <= 30; ++i) later = odometry.update(slowPair(i));
+  ASSERT_EQ(later.state, TrackingState::kDegraded) << later.reason;
+  EXPECT_LT(std::sqrt(later.motion_covariance(2, 2)), 0.2) << "by now there is nothing better";
+}
+
+TEST(VisualOdometry, APairOfUnusuallyManyOutliersIsKnownWorse) {
+  const auto varianceWith = [](int every) {
+    VisualOdometry odometry({});
+    for (int i = 0; i <= 8; ++i) odometry.update(pairOf(i, 0.3));
+    StereoFeatures features = pairOf(9, 0.3);
+    for (int row = 0; row < features.count(); row += every)
+      features.v[static_cast<std::size_t>(row)] += row % 4 == 0 ? 9.f : -9.f;
+    const OdometryResult result = odometry.update(features);
+    EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
+    return result.motion_covariance.topLeftCorner<3, 3>().trace();
+  };
+  // Half of the points alone would make it twice as large.
+  EXPECT_GT(varianceWith(2), 3.0 * varianceWith(100000));
 }
 
 TEST(VisualOdometry, FlowLeadsFromWhereAFeatureWasToWhereItIs) {

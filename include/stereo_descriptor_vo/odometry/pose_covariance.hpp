@@ -14,6 +14,11 @@ struct WindowCovariances {
   Matrix6d since_first = Matrix6d::Zero();           ///< the newest frame since the first
   Matrix6d since_second = Matrix6d::Zero();          ///< the newest frame since the second, which may be the first soon
   Matrix6d keyframe_since_first = Matrix6d::Zero();  ///< that key frame since the first frame
+
+  /// The newest frame is known worse than that by a factor.
+  void inflateNewest(double factor) {
+    for (Matrix6d* covariance : {&since_keyframe, &since_first, &since_second}) *covariance *= factor;
+  }
 };
 
 /// Widens a covariance by a deviation that is larger than it expects. Whether it was so beyond chance (chi-square of
@@ -29,7 +34,7 @@ class PoseCovariance {
  public:
   /// Successive key frames see the same points, compensated with the same calibration: their errors are alike, not
   /// independent. The variance of their sum is larger than the sum of their variances by about as many as are alike.
-  static constexpr double kAlike = 4.0;
+  static constexpr double kAlike = 3.5;
 
   /// Of the last pose. Zero in the beginning, when that is a key frame by definition.
   const Matrix6d& value() const { return value_; }

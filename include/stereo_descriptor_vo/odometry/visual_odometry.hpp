@@ -18,6 +18,7 @@
 #include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
 #include "stereo_descriptor_vo/odometry/pose_verdict.hpp"
+#include "stereo_descriptor_vo/odometry/residual_level.hpp"
 #include "stereo_descriptor_vo/odometry/right_camera_rotation.hpp"
 
 namespace sdvo {
@@ -173,14 +174,15 @@ class VisualOdometry {
     Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
     PoseCovariance covariance;                        ///< of that pose
     std::optional<Vector6d> velocity;                 ///< of the camera in its own frame, m/s and rad/s
-    std::optional<Vector6d> last_velocity;            ///< the same, kept while lost
-    Matrix6d velocity_covariance = Matrix6d::Zero();  ///< of the last velocity as it was measured, 1/s^2
-    std::int64_t velocity_stamp = 0;                  ///< of the pair that it is of, ns
+    std::optional<Vector6d> last_velocity;            ///< the last one that was not in doubt, kept while lost
+    std::int64_t velocity_stamp = 0;                  ///< of the pair that it was measured in, ns
+    Matrix6d velocity_covariance = Matrix6d::Zero();  ///< of the velocity as it was measured, 1/s^2
     std::int64_t last_pose_stamp = 0;                 ///< ns
     double distance = 0.0;
     int predicted_pairs = 0;
     int pairs = 0;
     bool started = false;
+    ResidualLevel outlier_level;              ///< shares of the last pairs' matches that did not agree
     Matrix6d last_doubt = Matrix6d::Zero();   ///< of a doubtful motion
     int contested_pairs = 0;                  ///< for which a second motion is still to be looked for
     bool frozen = false;                      ///< the last pair showed what the one before did, while the camera moved
