@@ -22,6 +22,15 @@ double outlierShare(const PoseEvidence& evidence) {
   return 1.0 - static_cast<double>(evidence.inliers) / std::max(evidence.matches, 1);
 }
 
+/// Whether no vehicle comes to this motion in the time since its velocity was known for certain, even if a pair could.
+bool isUnexpected(const PoseEvidence& evidence) {
+  if (!evidence.velocity) return false;
+  const double age = evidence.velocity_age + evidence.dt;
+  const Vector6d change = logSE3(evidence.motion) - evidence.dt * *evidence.velocity;
+  return change.head<3>().norm() > kLastingAcceleration * age * evidence.dt ||
+         change.tail<3>().norm() > kLastingTurnAcceleration * age * evidence.dt;
+}
+
 }  // namespace
 
 const char* toString(TrackingState state) {
@@ -201,6 +210,8 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
   }
   if (search_.lastingDisagree(evidence)) state_.contested_pairs = kWatched;
   if (verdict.trust == Trust::kSound || found.T_current_reference_else) verdict = found.verdict;
+  // After a new start, or a motion of something else, it may be that which is followed.
+  if ((!state_.velocity || state_.contested_pairs > 0) && isUnexpected(evidence)) state_.contested_pairs = kWatched;
   const bool watched = verdict.trust == Trust::kSound && state_.contested_pairs > 0;
   if (watched)
     verdict = {Trust::kDoubtful,

@@ -321,6 +321,31 @@ TEST(VisualOdometry, DoubtsAfterALossWhatNoCameraWithTheVelocityBeforeDoes) {
   EXPECT_NE(result.reason.find("max_acceleration"), std::string::npos) << result.reason;
 }
 
+TEST(VisualOdometry, DoesNotTrustAStandstillRightAfterALossOnTheWay) {
+  // The same, and 8 m/s could be gone in a pair or two, but hardly ever are.
+  VisualOdometry odometry({});
+  follow(odometry, 5);
+  for (int i = 6; i <= 20; ++i) {
+    StereoFeatures covered = strangePair(0);
+    covered.stamp = stampOf(i);
+    for (float& u : covered.u) u += 0.01f * static_cast<float>(i);
+    const OdometryResult result = odometry.update(covered);
+    EXPECT_NE(result.state, TrackingState::kTracking) << i;
+    if (!result.has_motion) continue;
+    const Vector6d error = logSE3(result.T_previous_current.inverse() * drivePose(i - 1).inverse() * drivePose(i));
+    EXPECT_LT(error.dot(result.motion_covariance.ldlt().solve(error)), 20.0) << i;
+  }
+  // It does not last for ever: it may have stopped after all.
+  OdometryResult result;
+  for (int i = 21; i <= 40; ++i) {
+    StereoFeatures still = strangePair(0);
+    still.stamp = stampOf(i);
+    for (float& u : still.u) u += 0.01f * static_cast<float>(i);
+    result = odometry.update(still);
+  }
+  EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
+}
+
 TEST(VisualOdometry, IsLostAtOnceWhenThereIsNoMotionToPredict) {
   VisualOdometry odometry({});
   odometry.update(pairOf(0));
