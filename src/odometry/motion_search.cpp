@@ -81,7 +81,6 @@ MotionSearch::MotionSearch(const FeatureMatcherOptions& matcher, const MotionEst
     : motion_options_(motion),
       alignment_options_(alignment),
       verdict_options_(verdict),
-      matcher_options_(matcher),
       matcher_(matcher),
       wide_matcher_(matcher.widened()),
       estimator_(motion) {}
@@ -122,7 +121,7 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
 /// First where a good prediction has the points, then three times as far.
 MotionHypothesis MotionSearch::searchNear(const MotionScene& scene,
                                           const std::optional<Eigen::Isometry3d>& T_current_reference) const {
-  if (!T_current_reference || !matcher_options_.gating) return search(matcher_, scene, T_current_reference);
+  if (!T_current_reference || !matcher_.options().gating) return search(matcher_, scene, T_current_reference);
   double match_time = 0.0, motion_time = 0.0;
   if (!scene.contested) {
     MotionHypothesis found = search(matcher_, scene, T_current_reference);
@@ -147,7 +146,7 @@ bool MotionSearch::leavesGate(const MotionScene& scene, const Eigen::Isometry3d&
     const Eigen::Vector3d pixel = camera.project(here);
     if (pixel.x() < 0.0 || pixel.y() < 0.0 || pixel.x() > camera.width || pixel.y() > camera.height) continue;
     ++seen;
-    outside += (pixel - camera.project(expected)).head<2>().norm() > matcher_options_.gate_radius;
+    outside += (pixel - camera.project(expected)).head<2>().norm() > matcher_.options().gate_radius;
   }
   return static_cast<double>(outside) > kGoodPart * static_cast<double>(seen);
 }

@@ -93,4 +93,12 @@ PoseVerdict judgeChange(const PoseVerdictOptions& options, const PoseEvidence& e
   return doubt;
 }
 
+bool isUnexpected(const PoseEvidence& evidence) {
+  if (!evidence.velocity) return false;
+  const double age = evidence.velocity_age + evidence.dt;
+  const Vector6d change = logSE3(evidence.motion) - evidence.dt * *evidence.velocity;
+  return change.head<3>().norm() > kLastingAcceleration * age * evidence.dt ||
+         change.tail<3>().norm() > kLastingTurnAcceleration * age * evidence.dt;
+}
+
 }  // namespace sdvo

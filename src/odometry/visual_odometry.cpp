@@ -22,15 +22,6 @@ double outlierShare(const PoseEvidence& evidence) {
   return 1.0 - static_cast<double>(evidence.inliers) / std::max(evidence.matches, 1);
 }
 
-/// Whether no vehicle comes to this motion in the time since its velocity was known for certain, even if a pair could.
-bool isUnexpected(const PoseEvidence& evidence) {
-  if (!evidence.velocity) return false;
-  const double age = evidence.velocity_age + evidence.dt;
-  const Vector6d change = logSE3(evidence.motion) - evidence.dt * *evidence.velocity;
-  return change.head<3>().norm() > kLastingAcceleration * age * evidence.dt ||
-         change.tail<3>().norm() > kLastingTurnAcceleration * age * evidence.dt;
-}
-
 }  // namespace
 
 const char* toString(TrackingState state) {

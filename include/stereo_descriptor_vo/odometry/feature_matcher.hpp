@@ -46,6 +46,8 @@ class FeatureMatcher {
  public:
   explicit FeatureMatcher(const FeatureMatcherOptions& options);
 
+  const FeatureMatcherOptions& options() const { return options_; }
+
   /// Matches in the order of the reference rows. With a prediction of the motion and gating on, only features near
   /// their predicted position are compared. Throws std::invalid_argument when the descriptors are of different kinds.
   std::vector<FeatureMatch> match(const DescribedPoints& reference, const StereoFeatures& current,

@@ -95,7 +95,6 @@ class MotionSearch {
   MotionEstimatorOptions motion_options_;
   PatchAlignmentOptions alignment_options_;
   PoseVerdictOptions verdict_options_;
-  FeatureMatcherOptions matcher_options_;
   FeatureMatcher matcher_, wide_matcher_;
   MotionEstimator estimator_;
 };

@@ -76,4 +76,8 @@ PoseVerdict judgePose(const PoseVerdictOptions& options, int min_inliers, const 
 /// says about the same: sound or doubtful.
 PoseVerdict judgeChange(const PoseVerdictOptions& options, const PoseEvidence& evidence);
 
+/// Whether no vehicle comes to this motion in the time since its velocity was known for certain, though a single pair
+/// could be so fast.
+bool isUnexpected(const PoseEvidence& evidence);
+
 }  // namespace sdvo
