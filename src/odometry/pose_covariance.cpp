@@ -29,7 +29,8 @@ Matrix6d carriedBy(const Eigen::Isometry3d& motion, const Matrix6d& covariance) 
 }  // namespace
 
 bool widen(Matrix6d& covariance, const Vector6d& deviation) {
-  constexpr double kExpected = 6.0, kByChance = 12.6;  // chi-square of six: its mean, 95 %
+  constexpr double kExpected = 3.0, kByChance = 12.6;  // chi-square of six: half its mean, for a deviation is a part of
+                                                       // the whole error only, and 95 %
   const double square = deviation.dot(covariance.ldlt().solve(deviation));
   if (square > kExpected) covariance += deviation * deviation.transpose();
   return square > kByChance;

@@ -17,9 +17,16 @@ namespace {
 constexpr int kWatched = 5;           // pairs after a motion was contested, or a pair refused
 constexpr double kFewOutliers = 0.1;  // share of the matches whose twofold says nothing
 constexpr double kLately = 2.0;       // s that a motion nobody doubted tells what may be expected
+constexpr double kSurprise = 0.003;   // share of what was not expected of a motion that its measurement misses
 
 double outlierShare(const PoseEvidence& evidence) {
   return 1.0 - static_cast<double>(evidence.inliers) / std::max(evidence.matches, 1);
+}
+
+/// How many times larger the variance is than the adjustment says, where few inliers let a wrong one weigh more.
+double excessOfFew(int inliers, int enough) {
+  const double times = static_cast<double>(enough) / std::max(inliers, 1);
+  return std::max(1.0, times * times);
 }
 
 }  // namespace
@@ -188,8 +195,10 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
   // What the adjustment did to the map as a whole is no motion.
   evidence.motion = newest_before * (T_before_origin.inverse() * map.poseBeforeNewest()) * map.newestPose().inverse();
   evidence.lasting_inliers = found.lastingInliers(step.rejected_rows);
-  if (adjustment.success)
+  if (adjustment.success) {
+    adjustment.covariances.inflateNewest(excessOfFew(evidence.inliers, options_.tracking.doubtful_inliers));
     evidence.deviation = std::sqrt(adjustment.covariances.since_keyframe.topLeftCorner<3, 3>().trace());
+  }
   PoseVerdict verdict = judgePose(options_.tracking, options_.motion.min_inliers, evidence);
   if (verdict.trust == Trust::kNone) {
     // Without a map to go back to, what it has become is of no use.
@@ -216,6 +225,9 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
     step.correction = adjoint(map.newestPose() * map.poseBeforeNewest().inverse()) *
                       logSE3(T_before_origin * map.poseBeforeNewest().inverse());
     cover(step);
+    // A view that changed in another way than expected was aligned from a worse start.
+    const Eigen::Isometry3d expected = expSE3(state_.velocity.value_or(Vector6d::Zero()) * dt);
+    step.covariance += kSurprise * kSurprise * disagreement(*step.T_previous_current, expected);
   } else {
     step.covariance = found.motion.covariance;
     state_.covariance.advance(*step.T_previous_current, step.covariance);

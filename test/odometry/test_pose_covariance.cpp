@@ -73,12 +73,16 @@ TEST(PoseCovariance, ContainsWhatASecondThoughtMoved) {
   const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
   covariance.advance(still, window(1, diagonal(0.0001, 0.0001)));
   Vector6d correction = Vector6d::Zero();
+  correction[0] = 0.015;
+  covariance.cover(correction);
+  expectEqual(covariance.value(), diagonal(0.0001, 0.0001));  // one and a half standard deviations are expected
   correction[0] = 0.02;
   covariance.cover(correction);
-  expectEqual(covariance.value(), diagonal(0.0001, 0.0001));  // two standard deviations are expected
+  Matrix6d expected = diagonal(0.0001, 0.0001);
+  expected(0, 0) += 0.0004;
+  expectEqual(covariance.value(), expected);
   correction[0] = 0.5;
   covariance.cover(correction);
-  Matrix6d expected = diagonal(0.0001, 0.0001);
   expected(0, 0) += 0.25;
   expectEqual(covariance.value(), expected);
   covariance.cover(correction);
@@ -86,7 +90,7 @@ TEST(PoseCovariance, ContainsWhatASecondThoughtMoved) {
   // What is measured from the same key frame later has that error, too.
   covariance.advance(still, window(1, diagonal(1.0, 1.0)));
   Matrix6d later = diagonal(1.0, 1.0);
-  later(0, 0) += 0.25;
+  later(0, 0) += 0.2504;
   expectEqual(covariance.value(), later);
 }
 

@@ -554,6 +554,10 @@ TEST(VisualOdometry, MeasuresASuddenTurnAgainstThePredictedOne) {
     const OdometryResult result = odometry.update(features);
     ASSERT_EQ(result.state, TrackingState::kTracking) << i << ": " << result.reason;
     EXPECT_LT(angleBetween(result.T_origin_camera, truth), 1e-3) << i;
+    // The turn differs from the expected one by 0.4 rad, of which three in a thousand may be missed.
+    if (i > 1) {
+      EXPECT_EQ(std::sqrt(result.motion_covariance(4, 4)) > 0.0012, i == 6) << i;
+    }
   }
 }
 
@@ -826,6 +830,30 @@ TEST(VisualOdometry, APairOfUnusuallyManyOutliersIsKnownWorse) {
   };
   // Half of the points alone would make it twice as large.
   EXPECT_GT(varianceWith(2), 3.0 * varianceWith(100000));
+}
+
+TEST(VisualOdometry, WhatFewInliersTellIsKnownWorse) {
+  // All at once hardly anything is found; what is agrees, with a prior and without, and is followed.
+  const auto lastOf = [](int doubtful_inliers) {
+    VisualOdometryOptions options;
+    options.tracking.doubtful_inliers = doubtful_inliers;
+    options.tracking.doubtful_coverage = 0.0;
+    options.tracking.doubtful_deviation = 10.0;
+    VisualOdometry odometry(options);
+    for (int i = 0; i <= 8; ++i) odometry.update(pairOf(i, 0.3));
+    const StereoFeatures all = pairOf(9, 0.3);
+    StereoFeatures few = blindPair(9);
+    for (int row = 0; row < all.count(); row += 18)
+      synthetic::addFeature(few, all.u[row], all.v[row], all.disparity[row],
+                            {all.descriptors.ptr(row), all.descriptors.ptr(row) + all.descriptors.cols});
+    return odometry.update(few);
+  };
+  const OdometryResult result = lastOf(40), plain = lastOf(0);
+  ASSERT_EQ(result.state, TrackingState::kTracking) << result.reason;
+  ASSERT_LT(result.inliers, 35);
+  ASSERT_EQ(result.inliers, plain.inliers);
+  const double times = std::sqrt(result.motion_covariance.trace() / plain.motion_covariance.trace());
+  EXPECT_NEAR(times, 40.0 / result.inliers, 0.1 * times);
 }
 
 TEST(VisualOdometry, FlowLeadsFromWhereAFeatureWasToWhereItIs) {
