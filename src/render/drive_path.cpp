@@ -84,6 +84,14 @@ std::vector<Eigen::Isometry3d> relativeToFirst(std::vector<Eigen::Isometry3d> po
   return poses;
 }
 
+/// Shrinks the way along each axis to the side of a cube, m.
+void shrinkInto(double side, std::vector<Eigen::Isometry3d>& poses) {
+  Eigen::AlignedBox3d box;
+  for (const Eigen::Isometry3d& pose : poses) box.extend(pose.translation());
+  const Eigen::Array3d scale = side / box.sizes().array().max(side);
+  for (Eigen::Isometry3d& pose : poses) pose.translation().array() *= scale;
+}
+
 }  // namespace
 
 DrivePath::DrivePath(std::vector<Eigen::Isometry3d> poses, double rate) : poses_(std::move(poses)), rate_(rate) {
@@ -116,8 +124,8 @@ double DrivePath::distanceAt(double time) const {
 }
 
 const std::vector<std::string>& presetNames() {
-  static const std::vector<std::string> names = {"straight",       "figure_eight", "city_loop",
-                                                 "back_and_forth", "hover",        "still"};
+  static const std::vector<std::string> names = {"straight", "figure_eight", "city_loop", "back_and_forth",
+                                                 "hover",    "hover_1m",     "still"};
   return names;
 }
 
@@ -138,7 +146,7 @@ DrivePath makePresetPath(const std::string& name, int frames, double rate, std::
       const double z = 0.5 * kWay * (1.0 - std::cos(2.0 * M_PI * i / (rate * kPeriod)));
       poses.push_back(poseFrom(0.3 * std::sin(M_PI * z / kWay), 0.0, z, 0.0, 0.0, 0.0));
     }
-  } else if (name == "hover") {
+  } else if (name == "hover" || name == "hover_1m") {
     const Wobble x(random, 0.03, 0.15), y(random, 0.03, 0.2), z(random, 0.03, 0.15), yaw(random, 0.02, 0.1),
         pitch(random, 0.1, 0.4), roll(random, 0.1, 0.4);
     for (int i = 0; i < (frames > 0 ? frames : 400); ++i) {
@@ -146,6 +154,7 @@ DrivePath makePresetPath(const std::string& name, int frames, double rate, std::
       poses.push_back(poseFrom(0.9 * x(t), 0.35 * y(t), 0.9 * z(t), 0.45 * yaw(t), 0.04 * pitch(t), 0.04 * roll(t)));
     }
     poses = relativeToFirst(std::move(poses));
+    if (name == "hover_1m") shrinkInto(1.0, poses);
   } else {
     PlanCurve curve;
     double speed = 10.0;

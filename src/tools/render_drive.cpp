@@ -155,7 +155,8 @@ int renderDrive(Request request) {
                                     std::to_string(available) + " frames written");
   };
   checkTruthFrames(count);
-  const bool room = request.world == "room" || (request.world == "auto" && (euroc || request.trajectory == "hover"));
+  const bool indoors = request.trajectory == "hover" || request.trajectory == "hover_1m";
+  const bool room = request.world == "room" || (request.world == "auto" && (euroc || indoors));
 
   sdvo::KittiWriter output(request.output);
   cv::setNumThreads(1);  // the frames are the parallel work
@@ -219,7 +220,7 @@ int main(int argc, char** argv) {
   CLI::App app("Renders a stereo drive of any length with exact ground truth in KITTI layout.");
   Request request;
   app.add_option("--trajectory", request.trajectory,
-                 "straight, figure_eight, city_loop, back_and_forth, hover, still, or a KITTI pose file")
+                 "straight, figure_eight, city_loop, back_and_forth, hover, hover_1m, still, or a KITTI pose file")
       ->required();
   app.add_option("--output", request.output, "Directory to create")->required();
   app.add_option("--frames", request.frames, "Pairs to render [default: all of the trajectory]")

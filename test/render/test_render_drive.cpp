@@ -272,6 +272,14 @@ TEST(RenderDrive, PresetsHaveTheirShape) {
   EXPECT_NEAR(length(to_and_fro), 200.0, 1.0);
   for (int lap = 0; lap <= 5; ++lap) EXPECT_LT(to_and_fro.pose(130 * lap).translation().norm(), 1e-9) << lap;
   EXPECT_NEAR(to_and_fro.pose(65).translation().z(), 20.0, 1e-9);
+  const DrivePath hover = makePresetPath("hover", 2400, 20.0, 1), small = makePresetPath("hover_1m", 2400, 20.0, 1);
+  Eigen::AlignedBox3d wide, cube;
+  for (int i = 0; i < small.count(); ++i) {
+    wide.extend(hover.pose(i).translation()), cube.extend(small.pose(i).translation());
+    EXPECT_EQ(small.pose(i).linear(), hover.pose(i).linear());
+  }
+  EXPECT_GT(wide.sizes().minCoeff(), 1.1);
+  EXPECT_LT((cube.sizes() - Eigen::Vector3d::Ones()).norm(), 1e-9);
   for (const std::string& name : presetNames()) {
     const DrivePath path = makePresetPath(name, 50, 10.0, 3);
     EXPECT_EQ(50, path.count());
