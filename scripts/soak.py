@@ -1,7 +1,8 @@
 #!/usr/bin/python3
-"""Feeds a drive in KITTI layout to the running pipeline for some minutes, forwards and backwards in turn so that the motion
-goes on while the stamps only grow, and watches the nodelet manager's memory. Exits 1 when memory grows, a pair gets no
-answer, an error is logged or the odometry does not track."""
+"""Feeds a drive in KITTI layout to the running pipeline for some minutes, again and again while the stamps only grow, and
+watches the nodelet manager's memory. A drive that ends where it began goes round; another one goes forwards and backwards in
+turn, which no vehicle does: at each end it is DEGRADED for 2 s. Exits 1 when memory grows, a pair gets no answer, an error is
+logged or the odometry does not track."""
 import argparse
 import collections
 import os
@@ -67,8 +68,8 @@ def pid_of(node):
 
 
 class Soak:
-    def __init__(self, drive, rate):
-        self.rate = rate
+    def __init__(self, drive, rate, closed):
+        self.rate, self.closed = rate, closed
         self.pairs, self.projections = read_drive(drive)
         self.info, self.errors, self.poses = [], [], 0
         self.broadcaster = tf2_ros.StaticTransformBroadcaster()
@@ -90,9 +91,9 @@ class Soak:
         return all(p.get_num_connections() > 0 for p in self.images + self.infos)
 
     def publish(self, k):
-        """The k-th pair of the endless way there and back."""
-        turns = 2 * (len(self.pairs) - 1)
-        i = min(k % turns, turns - k % turns)
+        """The k-th pair of the endless way."""
+        turns = len(self.pairs) if self.closed else 2 * (len(self.pairs) - 1)
+        i = k % turns if self.closed else min(k % turns, turns - k % turns)
         header = rospy.Header(stamp=rospy.Time.now(), frame_id=FRAME)
         for side, image in enumerate(self.pairs[i]):
             info = camera_info(self.projections[side], image)
@@ -122,11 +123,12 @@ def main():
     parser.add_argument("drive", help="folder in KITTI layout")
     parser.add_argument("--minutes", type=float, default=5.0)
     parser.add_argument("--rate", type=float, default=10.0, help="pairs per second")
+    parser.add_argument("--closed", action="store_true", help="the drive's first pair follows its last one")
     parser.add_argument("--manager", default="/stereo/stereo_vo_manager")
     parser.add_argument("--growth", type=float, default=1.0, help="%% that the memory may grow from the second quarter to the last")
     arguments = parser.parse_args(rospy.myargv()[1:])
     rospy.init_node("soak", disable_signals=True)
-    soak = Soak(arguments.drive, arguments.rate)
+    soak = Soak(arguments.drive, arguments.rate, arguments.closed)
     while not soak.is_connected():
         time.sleep(0.1)
     memory, pairs = soak.run(60.0 * arguments.minutes, arguments.manager)
@@ -144,10 +146,9 @@ def main():
           f"{last.dropped_features} features dropped, {dict(states)}, {soak.poses} poses, {last.distance:.0f} m, {len(soak.errors)} errors")
     print(f"second quarter: latency {first} ms, memory {before:.1f} MB; last quarter: {last_quarter} ms, {after:.1f} MB "
           f"({100.0 * (after / before - 1.0):+.2f} %)")
-    turns = len(soak.pairs) - 1
-    for k, info in enumerate(soak.info):
-        if info.state != "TRACKING":
-            print(f"{info.state}, {k % turns} pairs after a reversal: {info.reason}")
+    for reason, count in collections.Counter((info.state, info.reason) for info in soak.info
+                                             if info.state != "TRACKING").most_common(20):
+        print(f"{count} pairs {reason[0]}: {reason[1]}")
     for error in soak.errors[:5]:
         print(error)
     # A busy machine may lose pairs before they come to be counted, in the queues of publisher and subscriber.

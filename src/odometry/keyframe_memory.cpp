@@ -27,8 +27,8 @@ int OldKeyframe::sharedWith(const StereoCamera& camera, const Eigen::Isometry3d&
 
 bool KeyframeMemory::covers(const StereoCamera& camera, const OldKeyframe& keyframe) const {
   constexpr double kSame = 0.8;  // of the points
-  const auto sees_the_same = [&](const OldKeyframe& old) {
-    return keyframe.sharedWith(camera, old.T_camera_origin) > kSame * static_cast<double>(keyframe.rows.count());
+  const auto sees_the_same = [&](const std::shared_ptr<const OldKeyframe>& old) {
+    return keyframe.sharedWith(camera, old->T_camera_origin) > kSame * static_cast<double>(keyframe.rows.count());
   };
   return std::any_of(keyframes_.rbegin(), keyframes_.rend(), sees_the_same);  // the newest are the nearest
 }
@@ -36,14 +36,13 @@ bool KeyframeMemory::covers(const StereoCamera& camera, const OldKeyframe& keyfr
 void KeyframeMemory::remember(const StereoCamera& camera, OldKeyframe keyframe) {
   if (capacity_ == 0 || covers(camera, keyframe)) return;
   const Eigen::Vector3d here = keyframe.T_camera_origin.inverse().translation();
-  keyframes_.push_back(std::move(keyframe));
+  keyframes_.push_back(std::make_shared<OldKeyframe>(std::move(keyframe)));
   if (count() <= capacity_) return;
-  const auto distance = [&](const OldKeyframe& old) {
-    return (old.T_camera_origin.inverse().translation() - here).norm();
+  const auto distance = [&](const std::shared_ptr<const OldKeyframe>& old) {
+    return (old->T_camera_origin.inverse().translation() - here).norm();
   };
-  keyframes_.erase(
-      std::max_element(keyframes_.begin(), keyframes_.end(),
-                       [&](const OldKeyframe& a, const OldKeyframe& b) { return distance(a) < distance(b); }));
+  keyframes_.erase(std::max_element(keyframes_.begin(), keyframes_.end(),
+                                    [&](const auto& a, const auto& b) { return distance(a) < distance(b); }));
 }
 
 const OldKeyframe* KeyframeMemory::best(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
@@ -51,11 +50,11 @@ const OldKeyframe* KeyframeMemory::best(const StereoCamera& camera, const Eigen:
   constexpr double kEnough = 0.6;  // of its points
   const OldKeyframe* best = nullptr;
   int most = least - 1;
-  for (const OldKeyframe& keyframe : keyframes_) {
-    if (static_cast<int>(keyframe.points.size()) <= most) continue;
-    const int shared = keyframe.sharedWith(camera, T_camera_origin);
-    if (shared > most && shared > kEnough * static_cast<double>(keyframe.points.size()))
-      best = &keyframe, most = shared;
+  for (const auto& keyframe : keyframes_) {
+    if (static_cast<int>(keyframe->points.size()) <= most) continue;
+    const int shared = keyframe->sharedWith(camera, T_camera_origin);
+    if (shared > most && shared > kEnough * static_cast<double>(keyframe->points.size()))
+      best = keyframe.get(), most = shared;
   }
   return best;
 }

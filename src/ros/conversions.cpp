@@ -200,6 +200,7 @@ stereo_descriptor_vo::StereoFeatures toMessage(const StereoFeatures& features, c
   message.detect_time = static_cast<float>(report.detect_time);
   message.stereo_time = static_cast<float>(report.stereo_time);
   message.describe_time = static_cast<float>(report.describe_time);
+  message.refused = report.refused;
   message.status = report.status;
 
   message.u = features.u;
@@ -253,6 +254,7 @@ StereoFeatures fromMessage(const stereo_descriptor_vo::StereoFeatures& message) 
   report.detect_time = message.detect_time;
   report.stereo_time = message.stereo_time;
   report.describe_time = message.describe_time;
+  report.refused = message.refused;
   report.status = message.status;
   return features;
 }

@@ -35,6 +35,7 @@ void expectSame(const StereoFeatures& a, const StereoFeatures& b) {
   EXPECT_EQ(a.report.detect_time, b.report.detect_time);
   EXPECT_EQ(a.report.stereo_time, b.report.stereo_time);
   EXPECT_EQ(a.report.describe_time, b.report.describe_time);
+  EXPECT_EQ(a.report.refused, b.report.refused);
   EXPECT_EQ(a.report.status, b.report.status);
 }
 
@@ -104,6 +105,15 @@ TEST(FeaturesMessageTest, NoFeaturesAreAValidMessage) {
   const StereoFeatures received = fromMessage(toMessage(none, DepthScaleOptions()));
   EXPECT_EQ(received.count(), 0);
   EXPECT_NO_THROW(received.check());
+}
+
+TEST(FeaturesMessageTest, APairThatTheRigMonitorRefusedIsKnownAsOne) {
+  StereoFeatures refused = synthetic::noFeatures(synthetic::camera());
+  refused.report.refused = true;
+  refused.report.status = "right image 4 px too low: not rectified?";
+  const StereoFeatures received = fromMessage(toMessage(refused, DepthScaleOptions()));
+  EXPECT_TRUE(received.report.refused);
+  EXPECT_EQ(received.report.status, refused.report.status);
 }
 
 }  // namespace

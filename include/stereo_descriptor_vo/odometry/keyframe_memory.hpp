@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <list>
+#include <memory>
 #include <vector>
 
 #include "stereo_descriptor_vo/odometry/described_points.hpp"
@@ -53,7 +54,7 @@ class KeyframeMemory {
 
  private:
   int capacity_;
-  std::list<OldKeyframe> keyframes_;
+  std::list<std::shared_ptr<const OldKeyframe>> keyframes_;  ///< shared by copies of the memory
 };
 
 }  // namespace sdvo
