@@ -90,7 +90,7 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
   report.detected = static_cast<int>(corners.size());
   report.detect_time = stopwatch.lap();
 
-  // Find each feature in the right image by tracking, in images that are equally exposed.
+  // Find each feature in the right image, in images that are equally exposed.
   cv::Mat searched_left = left, searched_right = right;
   exposure_balance_.apply(report.mean_intensity[0], report.mean_intensity[1], searched_left, searched_right);
   std::vector<cv::Point2f> positions;

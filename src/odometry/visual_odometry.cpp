@@ -302,9 +302,9 @@ void VisualOdometry::recall(const StereoFeatures& features) {
   map.recall(*old, ties);
 }
 
-/// A motion between two reported poses contains what the map has learnt of the first one meanwhile. Where that is more
-/// than the covariances of the motion and of the pose expect, they are widened by it, and beyond chance the reason says
-/// so.
+/// A motion between two reported poses contains what the map has learnt of the first one meanwhile. Where its
+/// square is more than half of what the covariances of the motion and of the pose expect on average, they are widened
+/// by it, and beyond chance the reason says so.
 void VisualOdometry::cover(Step& step) {
   state_.covariance.cover(step.correction);
   if (!widen(step.covariance, step.correction)) return;

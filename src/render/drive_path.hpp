@@ -34,8 +34,9 @@ class DrivePath {
 const std::vector<std::string>& presetNames();
 
 /// A preset at `rate` Hz: straight (10 m/s), figure_eight (two circles of 28 m radius), city_loop (1.1 km with three
-/// stops), hover (a drone in a room) or still. `frames` = 0 asks for the preset's natural length. Drives shake a little
-/// as cars do. Throws std::invalid_argument for another name.
+/// stops), back_and_forth (20 m, five times), hover (a drone in a room), hover_1m (the same, all of its way shrunk into
+/// 1 m^3) or still. `frames` = 0 asks for the preset's natural length. Drives shake a little as cars do. Throws
+/// std::invalid_argument for another name.
 DrivePath makePresetPath(const std::string& name, int frames, double rate, std::uint64_t seed);
 
 }  // namespace sdvo::render

@@ -17,7 +17,7 @@
 #include "stereo_descriptor_vo/front_end/depth_scale.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
-/// The only place where messages and core types meet.
+/// Where messages and core types meet; those of places do in place_conversions.
 namespace sdvo::ros_conversions {
 
 /// Frame id as tf2 wants it, without a leading slash.

@@ -367,7 +367,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     return true;
   }
 
-  /// Without a subscriber the odometry's publishers of features have one less to serve.
+  /// A paused nodelet subscribes to nothing: the image side has one listener less.
   bool onPause(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
     response.success = true;
     response.message = subscribers_.empty() ? "was paused already" : "paused";

@@ -125,7 +125,8 @@ int main(int argc, char** argv) {
   CLI::App app("Learns FREAK's 512 field pairs from images and writes them as a C++ initialiser list");
   Arguments arguments;
   app.add_option("images", arguments.images, "training images")->required();
-  app.add_option("--output", arguments.output, "file to write, src/freak_pairs.inc of this package")->required();
+  app.add_option("--output", arguments.output, "file to write, src/front_end/freak_pairs.inc of this package")
+      ->required();
   app.add_option("--per-image", arguments.per_image, "corners sampled in each image")
       ->capture_default_str()
       ->check(CLI::Range(1, 100000));

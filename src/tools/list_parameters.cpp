@@ -16,13 +16,19 @@ std::string rangeOf(const sdvo::Option& option) {
   return text.str();
 }
 
+/// Text for a table's cell, where a bar would end it.
+std::string cell(std::string text) {
+  for (std::size_t at = 0; (at = text.find('|', at)) != std::string::npos; at += 2) text.insert(at, 1, '\\');
+  return text;
+}
+
 void printTable(const std::string& nodelet, const std::vector<sdvo::Option>& options) {
   const std::string prefix = nodelet + "/";
   std::cout << "| parameter | default | unit | range | meaning |\n| --- | --- | --- | --- | --- |\n";
   for (const sdvo::Option& option : options)
     if (option.name.compare(0, prefix.size(), prefix) == 0)
       std::cout << "| `" << option.name.substr(prefix.size()) << "` | " << option.text() << " | " << option.unit
-                << " | " << rangeOf(option) << " | " << option.meaning << " |\n";
+                << " | " << rangeOf(option) << " | " << cell(option.meaning) << " |\n";
 }
 
 int run() {

@@ -235,7 +235,7 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"kitti", "euroc"}));
   app.add_option("--calib", request.calibration, "A KITTI calib.txt (P0 and P1) instead of the rig; needs --size");
   app.add_option("--size", request.size, "WxH, image size in px for --calib");
-  app.add_option("--world", request.world, "street, room, or auto: a room for --rig euroc and hover")
+  app.add_option("--world", request.world, "street, room, or auto: a room for --rig euroc, hover and hover_1m")
       ->check(CLI::IsMember({"auto", "street", "room"}));
   app.add_option("--truth-frame", request.truth_frames,
                  "Number(s) of written frames whose exact depth, disparity, flow and moving pixels go to truth/*.npy");

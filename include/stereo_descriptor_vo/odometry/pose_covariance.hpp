@@ -21,8 +21,8 @@ struct WindowCovariances {
   }
 };
 
-/// Widens a covariance by a deviation that is larger than it expects. Whether it was so beyond chance (chi-square of
-/// six, 95 %).
+/// Widens a covariance by a deviation whose square is more than half of what it expects on average (chi-square of six).
+/// Whether it was so beyond chance (95 %).
 bool widen(Matrix6d& covariance, const Vector6d& deviation);
 
 /// Covariance of a pose that is reported again and again while later pairs improve what is known of it. What is

@@ -38,7 +38,8 @@ struct PlaceRecognitionOptions {
     list.add("keyframe_angle", keyframe_angle, {0.5, 180.0}, "deg", "… or after such a turn");
     list.add("max_features", max_features, {50, 10000}, "", "features kept of a key frame");
     list.add("max_places", max_places, {10, 1000000}, "", "key frames kept; the oldest goes");
-    list.add("min_age", min_age, {0.0, 3600.0}, "s", "no place is looked for among key frames younger than that");
+    list.add("min_age", min_age, {0.0, 3600.0}, "s",
+             "no place is looked for among key frames younger than that, unless there was a break since");
     list.add("min_travel", min_travel, {0.0, 10000.0}, "m", "… or from which the way here is shorter");
     list.add("candidates", candidates, {1, 100}, "", "places that geometry looks at for each key frame");
     list.group("index", index);
@@ -76,8 +77,8 @@ class PlaceRecognition {
 
   /// Takes the next pair of the odometry. A report where it became a key frame. The graph is not optimised here: that
   /// takes long and may be done on a copy meanwhile (graph(), PoseGraph::optimise(), adopt()). Throws
-  /// std::invalid_argument for features that are no rows of bits, or of another kind or camera than those before; the
-  /// state is as before then.
+  /// std::invalid_argument, and adds no place, for features that are no rows of bits or of another kind than those
+  /// before; that the camera is the same is the caller's to see to.
   std::optional<PlaceReport> observe(const StereoFeatures& features, const CameraMotion& motion);
 
   const PoseGraph& graph() const { return graph_; }
