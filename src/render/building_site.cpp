@@ -7,7 +7,7 @@ namespace sdvo::render {
 namespace {
 
 std::int64_t squareMetre(const Eigen::Vector2d& p) {
-  return (static_cast<std::int64_t>(std::floor(p.x())) << 32) ^
+  return (static_cast<std::int64_t>(std::floor(p.x())) * (std::int64_t{1} << 32)) ^
          static_cast<std::int64_t>(static_cast<std::uint32_t>(static_cast<std::int32_t>(std::floor(p.y()))));
 }
 
