@@ -13,6 +13,9 @@ namespace {
 /// Disparity below which a point's distance is beyond measuring; it serves as a direction, far away.
 constexpr double kFarthestDisparity = 0.05;  // px
 
+/// Most points need no more memory than for these until it goes to another one.
+constexpr std::size_t kUsualSightings = 8;
+
 /// Zero of none; reorders them.
 double median(std::vector<double>& values) {
   if (values.empty()) return 0.0;
@@ -179,8 +182,7 @@ void LocalMap::startPoint(const StereoFeatures& features, int row, int id, const
   point.position.ray_and_inverse_depth = {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy,
                                           1.0 / camera.depth(disparity)};
   point.reference.take(features, row, {u, v}, T_camera_origin);
-  constexpr std::size_t kUsual = 8;  // sightings: most points need no more memory until it goes to another one
-  point.observations.reserve(kUsual);
+  point.observations.reserve(kUsualSightings);
   point.observations.push_back({id, row, {u, v, features.disparity[row]}, sigma});
   takeDescriptor(point, features, row);
 }
@@ -334,6 +336,8 @@ void LocalMap::removeFrame(std::size_t index) {
   auto kept = points_.begin();
   for (auto point = points_.begin(); point != points_.end(); ++point) {
     if (point->observations.empty()) {
+      // Room for many sightings would stay with a point that will have few.
+      if (point->observations.capacity() > kUsualSightings) point->observations = std::vector<Observation>();
       spare_.push_back(std::move(*point));
     } else {
       if (kept != point) *kept = std::move(*point);
