@@ -241,6 +241,8 @@ OldKeyframe LocalMap::keyframe(std::size_t frame, bool with_looks) const {
       if (isShared(point)) ++most, samples += point.reference.samples.size();
     old.points.reserve(most), old.samples.reserve(samples), old.rows.positions.reserve(most);
     old.rows.descriptors.create(static_cast<int>(most), kind_.bytes, CV_8U);
+  } else {
+    old.rows.positions.reserve(points_.size());
   }
   for (const Point& point : points_) {
     Eigen::Vector3d predicted;
@@ -347,40 +349,48 @@ void LocalMap::removeFrame(std::size_t index) {
   points_.erase(kept, points_.end());
 }
 
-LocalMap::Adjustment LocalMap::adjust(const WindowOptimizerOptions& options, const CalibrationBelief& prior,
-                                      RigCalibration& calibration) {
-  Window window;
+void LocalMap::Problem::clear() {
+  window.T_camera_origin.clear(), window.points.clear(), window.observations.clear();
+  frame_ids.clear(), points.clear(), sources.clear();
+}
+
+void LocalMap::pose(Problem& problem) const {
+  Window& window = problem.window;
   window.camera = camera_;
-  window.calibration = calibration;
-  window.calibration_prior = prior;
-  std::vector<int> ids;
-  ids.reserve(frames_.size()), window.T_camera_origin.reserve(frames_.size());
-  for (const Frame& frame : frames_) {
-    window.T_camera_origin.push_back(frame.T_camera_origin);
-    ids.push_back(frame.id);
-  }
-  std::vector<std::pair<int, int>> sources;  // point and its observation, for each of the window's observations
-  std::vector<int> used;
   std::size_t sightings = 0;
   for (const Point& point : points_) sightings += point.observations.size();
-  sources.reserve(sightings), window.observations.reserve(sightings);
-  used.reserve(points_.size()), window.points.reserve(points_.size());
+  window.points.reserve(points_.size()), problem.points.reserve(points_.size());
+  window.observations.reserve(sightings), problem.sources.reserve(sightings);
+  for (const Frame& frame : frames_) {
+    window.T_camera_origin.push_back(frame.T_camera_origin);
+    problem.frame_ids.push_back(frame.id);
+  }
   for (std::size_t p = 0; p < points_.size(); ++p) {
     const Point& point = points_[p];
     if (point.observations.size() < 2) continue;
     for (std::size_t k = 0; k < point.observations.size(); ++k) {
       const Observation& observation = point.observations[k];
-      const auto frame = std::lower_bound(ids.begin(), ids.end(), observation.frame_id);
-      window.observations.push_back({static_cast<int>(used.size()), static_cast<int>(frame - ids.begin()),
-                                     observation.measurement, observation.sigma});
-      sources.emplace_back(static_cast<int>(p), static_cast<int>(k));
+      const auto frame = std::lower_bound(problem.frame_ids.begin(), problem.frame_ids.end(), observation.frame_id);
+      window.observations.push_back({static_cast<int>(problem.points.size()),
+                                     static_cast<int>(frame - problem.frame_ids.begin()), observation.measurement,
+                                     observation.sigma});
+      problem.sources.emplace_back(static_cast<int>(p), static_cast<int>(k));
     }
     window.points.push_back(point.position);
-    used.push_back(static_cast<int>(p));
+    problem.points.push_back(static_cast<int>(p));
   }
+}
+
+LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const CalibrationBelief& prior,
+                                      RigCalibration& calibration) {
+  problem_.clear();
+  pose(problem_);
+  Window& window = problem_.window;
+  window.calibration = calibration;
+  window.calibration_prior = prior;
 
   Adjustment adjustment;
-  const WindowSolution solution = optimizeWindow(options, window);
+  const WindowSolution& solution = optimizer.optimize(window);
   if (!solution.success) return adjustment;
   adjustment.success = true;
   adjustment.calibration_information = solution.calibration_information;
@@ -391,7 +401,7 @@ LocalMap::Adjustment LocalMap::adjust(const WindowOptimizerOptions& options, con
   const auto [square, disparity] = typicalOf(window, solution.residuals, newest);
   constexpr double kAlike = 1.15;  // errors of neighbouring points are not independent
   const double excess = kAlike * residual_level_.excess(square);
-  const Matrix6d shift = shifted(camera_, options.common_shift, disparity);
+  const Matrix6d shift = shifted(camera_, optimizer.options().common_shift, disparity);
   const auto of_newest = [&](int from) -> Matrix6d {
     if (from == newest) return Matrix6d::Zero();
     return excess * covariance(from, newest) + shift;
@@ -401,21 +411,22 @@ LocalMap::Adjustment LocalMap::adjust(const WindowOptimizerOptions& options, con
   calibration = window.calibration;
   for (std::size_t f = 0; f < frames_.size(); ++f)
     frames_[f].T_camera_origin = orthonormalised(window.T_camera_origin[f]);
-  for (std::size_t i = 0; i < used.size(); ++i) points_[used[i]].position = window.points[i];
-  cutOff(sources, solution.residuals, adjustment);
+  for (std::size_t i = 0; i < problem_.points.size(); ++i) points_[problem_.points[i]].position = window.points[i];
+  cutOff(solution.residuals, adjustment);
+  problem_.clear();
   return adjustment;
 }
 
-void LocalMap::cutOff(const std::vector<std::pair<int, int>>& sources, const std::vector<double>& residuals,
-                      Adjustment& adjustment) {
+void LocalMap::cutOff(const std::vector<double>& residuals, Adjustment& adjustment) {
   constexpr double kRejected = 6.0;  // sigma
-  for (std::size_t i = 0; i < sources.size(); ++i) {
+  for (std::size_t i = 0; i < residuals.size(); ++i) {
     if (residuals[i] <= kRejected) continue;
-    auto& observations = points_[sources[i].first].observations;
-    const Observation& observation = observations[sources[i].second];
+    const auto& [point, k] = problem_.sources[i];
+    auto& observations = points_[point].observations;
+    const Observation& observation = observations[k];
     if (observation.frame_id != newestId()) continue;
     adjustment.rejected_rows.push_back(observation.row);
-    --points_[sources[i].first].seen;
+    --points_[point].seen;
     observations.pop_back();  // the newest sighting is the last one
   }
 }

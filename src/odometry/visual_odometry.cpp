@@ -50,6 +50,7 @@ VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
       search_(options.matcher, options.motion, options.alignment, options.tracking),
       matcher_(options.matcher.widened()),
       estimator_(options.motion),
+      optimizer_(options.window),
       state_(options.calibration) {}
 
 void VisualOdometry::configure(const VisualOdometryOptions& options) {
@@ -57,6 +58,7 @@ void VisualOdometry::configure(const VisualOdometryOptions& options) {
   search_ = MotionSearch(options.matcher, options.motion, options.alignment, options.tracking);
   matcher_ = FeatureMatcher(options.matcher.widened());
   estimator_ = MotionEstimator(options.motion);
+  optimizer_ = WindowOptimizer(options.window);
 }
 
 void VisualOdometry::reset() {
@@ -182,7 +184,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
   const Eigen::Isometry3d T_before_origin = map.poseBeforeNewest();
   if (map.newestIsKeyframe() && found.verdict.trust == Trust::kSound) recall(features);
   const CalibrationBelief prior = state_.calibration.prior(map.oldestId());
-  LocalMap::Adjustment adjustment = map.adjust(options_.window, prior, calibration);
+  LocalMap::Adjustment adjustment = map.adjust(optimizer_, prior, calibration);
   map.renewLooks(features, found.sightings);
 
   Step step;

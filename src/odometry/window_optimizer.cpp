@@ -35,8 +35,13 @@ struct ReducedSystem {
 /// T_camera_anchor of all poses: points that one pair saw first lie next to each other and share them.
 class RelativePoses {
  public:
-  explicit RelativePoses(const std::vector<Eigen::Isometry3d>& T_camera_origin)
-      : T_camera_origin_(T_camera_origin), T_camera_anchor_(T_camera_origin.size()), known_(T_camera_origin.size()) {}
+  /// In the memory of earlier poses. These must outlive their use.
+  void take(const std::vector<Eigen::Isometry3d>& T_camera_origin) {
+    T_camera_origin_ = T_camera_origin.data();
+    T_camera_anchor_.resize(T_camera_origin.size());
+    known_.assign(T_camera_origin.size(), 0);
+    T_origin_anchor_.setIdentity();
+  }
 
   void setAnchor(const Eigen::Isometry3d& T_origin_anchor) {
     if (T_origin_anchor.matrix() == T_origin_anchor_.matrix()) return;
@@ -50,8 +55,8 @@ class RelativePoses {
   }
 
  private:
-  const std::vector<Eigen::Isometry3d>& T_camera_origin_;
-  Eigen::Isometry3d T_origin_anchor_ = Eigen::Isometry3d::Identity();
+  const Eigen::Isometry3d* T_camera_origin_ = nullptr;
+  Eigen::Isometry3d T_origin_anchor_;
   std::vector<Eigen::Isometry3d> T_camera_anchor_;
   std::vector<char> known_;
 };
@@ -59,15 +64,22 @@ class RelativePoses {
 /// A sighting of a point that is not in front of the camera costs as much as a very wrong one.
 constexpr double kBehindSquare = 1e4;
 
+/// Linear algebra of one window after the other, in the same memory.
 class Solver {
  public:
-  Solver(const WindowOptimizerOptions& options, const Window& window) : options_(options), window_(window) {
+  explicit Solver(const WindowOptimizerOptions& options) : options_(options) {}
+
+  /// Refers to the window from now on: every accepted step is linearised anew.
+  void take(const Window& window) {
+    window_ = &window;
     const auto& observations = window.observations;
+    first_of_point_.clear();
     for (std::size_t i = 0; i < observations.size(); ++i)
       if (i == 0 || observations[i].point != observations[i - 1].point) first_of_point_.push_back(static_cast<int>(i));
     first_of_point_.push_back(static_cast<int>(observations.size()));
-    sightings_.resize(window.points.size());
+    sightings_.assign(window.points.size(), 0);
     for (const WindowObservation& observation : observations) ++sightings_[static_cast<std::size_t>(observation.point)];
+    inverse_noise_.clear();
     inverse_noise_.reserve(observations.size());
     for (const WindowObservation& observation : observations) inverse_noise_.push_back(inverseNoise(observation));
     poses_ = static_cast<int>(window.T_camera_origin.size()) - 1;
@@ -87,13 +99,12 @@ class Solver {
 
   /// Normalised residual of observation i under another estimate of poses, points and calibration; the kernel is not
   /// applied.
-  bool residual(const Window& window, RelativePoses& T_camera_anchor, std::size_t i, Eigen::Vector3d& residual,
-                ObservationJacobians* jacobians) const {
-    const WindowObservation& observation = window_.observations[i];
+  bool residual(const Window& window, std::size_t i, Eigen::Vector3d& residual, ObservationJacobians* jacobians) {
+    const WindowObservation& observation = window_->observations[i];
     const AnchoredPoint& point = window.points[observation.point];
-    T_camera_anchor.setAnchor(point.T_origin_anchor);
+    T_camera_anchor_.setAnchor(point.T_origin_anchor);
     Eigen::Vector3d prediction;
-    if (!predictFromAnchor(window.camera, T_camera_anchor.at(observation.frame), point.ray_and_inverse_depth,
+    if (!predictFromAnchor(window.camera, T_camera_anchor_.at(observation.frame), point.ray_and_inverse_depth,
                            prediction, jacobians))
       return false;
     prediction.z() += window.calibration.disparityError(window.camera, observation.measurement.x());
@@ -102,20 +113,20 @@ class Solver {
   }
 
   /// Also gives the square of each observation's residual.
-  double cost(const Window& window, std::vector<double>& squares) const {
+  double cost(const Window& window, std::vector<double>& squares) {
     LogSum costs;
-    RelativePoses T_camera_anchor(window.T_camera_origin);
+    T_camera_anchor_.take(window.T_camera_origin);
     Eigen::Vector3d r;
-    squares.resize(window_.observations.size());
+    squares.resize(window_->observations.size());
     for (std::size_t i = 0; i < squares.size(); ++i) {
-      squares[i] = residual(window, T_camera_anchor, i, r, nullptr) ? r.squaredNorm() : kBehindSquare;
+      squares[i] = residual(window, i, r, nullptr) ? r.squaredNorm() : kBehindSquare;
       costs.add(squares[i] / bend());
     }
     return priorCost(window) + bend() * costs.value();
   }
 
   /// In the memory that the system has of an earlier linearisation.
-  void linearise(const Window& window, double damping, ReducedSystem& system) const {
+  void linearise(const Window& window, double damping, ReducedSystem& system) {
     system.hessian.setZero(size_, size_);
     system.gradient.setZero(size_);
     system.pose_point.resize(window.observations.size());
@@ -133,9 +144,9 @@ class Solver {
         window.calibration_prior.information * (window.calibration_prior.mean - window.calibration.value);
     LogSum costs;
 
-    RelativePoses T_camera_anchor(window.T_camera_origin);
-    std::vector<WeightedSighting> sightings(window.T_camera_origin.size());
-    std::vector<PosePoint> scaled(sightings.size());
+    T_camera_anchor_.take(window.T_camera_origin);
+    of_point_.resize(window.T_camera_origin.size());
+    scaled_.resize(of_point_.size());
     for (std::size_t p = 0; p < points; ++p) {
       Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
       Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
@@ -146,7 +157,7 @@ class Solver {
         const WindowObservation& observation = window.observations[i];
         Eigen::Vector3d r;
         ObservationJacobians jacobians;
-        if (!residual(window, T_camera_anchor, static_cast<std::size_t>(i), r, &jacobians)) {
+        if (!residual(window, static_cast<std::size_t>(i), r, &jacobians)) {
           costs.add(kBehindSquare / bend());
           continue;
         }
@@ -166,7 +177,7 @@ class Solver {
         calibration_hessian.noalias() += by_calibration.transpose() * by_calibration;
         calibration_gradient.noalias() += by_calibration.transpose() * r.z();
         if (observation.frame == 0) continue;
-        WeightedSighting& sighting = sightings[static_cast<std::size_t>(seen++)];
+        WeightedSighting& sighting = of_point_[static_cast<std::size_t>(seen++)];
         Eigen::Map<PosePoint> by_pose(sighting.by_pose);
         by_pose = jacobians.pose.transpose() * scale.asDiagonal();
         Eigen::Map<Eigen::Matrix3d>(sighting.by_point) = by_point;
@@ -183,11 +194,11 @@ class Solver {
       const int end = static_cast<int>(system.pose.size());
       system.points[p] = {inverse, gradient, end};
       const PointProducts products{inverse.data(), gradient.data(), system.pose_point[0].data() + 18 * (end - seen),
-                                   scaled[0].data()};
-      addEliminatedPoint(sightings.data(), seen, products, system.hessian.data(), size_, system.gradient.data());
+                                   scaled_[0].data()};
+      addEliminatedPoint(of_point_.data(), seen, products, system.hessian.data(), size_, system.gradient.data());
       for (int k = 0; k < seen; ++k)
-        system.hessian.block<kCalibration, 6>(c, 6 * sightings[k].pose).noalias() -=
-            calibration_point * scaled[k].transpose();
+        system.hessian.block<kCalibration, 6>(c, 6 * of_point_[k].pose).noalias() -=
+            calibration_point * scaled_[k].transpose();
       calibration_hessian.noalias() -= calibration_point * inverse * calibration_point.transpose();
       calibration_gradient.noalias() -= calibration_point * inverse * gradient;
     }
@@ -196,13 +207,13 @@ class Solver {
 
   /// The next estimate of poses, points and calibration; observations stay those of the window.
   void makeStep(const ReducedSystem& system, const Eigen::VectorXd& step, Window& next) const {
-    next.camera = window_.camera;
-    next.T_camera_origin = window_.T_camera_origin;
-    next.points = window_.points;
-    next.calibration = window_.calibration;
-    next.calibration_prior = window_.calibration_prior;
+    next.camera = window_->camera;
+    next.T_camera_origin = window_->T_camera_origin;
+    next.points = window_->points;
+    next.calibration = window_->calibration;
+    next.calibration_prior = window_->calibration_prior;
     for (int f = 0; f < poses_; ++f)
-      next.T_camera_origin[f + 1] = expSE3(step.segment<6>(6 * f)) * window_.T_camera_origin[f + 1];
+      next.T_camera_origin[f + 1] = expSE3(step.segment<6>(6 * f)) * window_->T_camera_origin[f + 1];
     const CalibrationVector calibration = step.tail<kCalibration>();
     next.calibration.value += calibration;
     int sighting = 0;
@@ -210,7 +221,7 @@ class Solver {
       Eigen::Vector3d gradient = system.points[p].gradient - system.calibration_point[p].transpose() * calibration;
       for (; sighting < system.points[p].end; ++sighting)
         gradient -= system.pose_point[sighting].transpose() * step.segment<6>(6 * system.pose[sighting]);
-      next.points[window_.observations[first_of_point_[p]].point].ray_and_inverse_depth +=
+      next.points[window_->observations[first_of_point_[p]].point].ray_and_inverse_depth +=
           system.points[p].inverse_hessian * gradient;
     }
   }
@@ -225,11 +236,14 @@ class Solver {
     return {1.0 / observation.sigma, 1.0 / observation.sigma, 1.0 / std::sqrt(variance)};
   }
 
-  const WindowOptimizerOptions& options_;
-  const Window& window_;
+  WindowOptimizerOptions options_;
+  const Window* window_ = nullptr;
   std::vector<int> first_of_point_;
   std::vector<int> sightings_;                  ///< of each point
   std::vector<Eigen::Vector3d> inverse_noise_;  ///< of each observation
+  RelativePoses T_camera_anchor_;
+  std::vector<WeightedSighting> of_point_;
+  std::vector<PosePoint> scaled_;  ///< for each of them: by the pose and the point, times the point's inverse Hessian
   int poses_ = 0, size_ = 0;
 };
 
@@ -271,23 +285,41 @@ bool predictObservation(const StereoCamera& camera, const Eigen::Isometry3d& T_c
                            jacobians);
 }
 
-WindowSolution optimizeWindow(const WindowOptimizerOptions& options, Window& window) {
-  constexpr double kLargestDamping = 1e4;
-  WindowSolution solution;
-  const Solver solver(options, window);  // refers to the window: every accepted step is linearised anew
-  double damping = 1e-5;
+struct WindowOptimizer::Memory {
+  explicit Memory(const WindowOptimizerOptions& options) : solver(options) {}
+
+  Solver solver;
   ReducedSystem system;
   Window next;
-  Eigen::MatrixXd damped;
+  Eigen::MatrixXd hessian, covariance;
+  Eigen::LDLT<Eigen::MatrixXd> factor;
+  Eigen::VectorXd step;
   std::vector<double> squares;
+  WindowSolution solution;
+};
+
+WindowOptimizer::WindowOptimizer(const WindowOptimizerOptions& options)
+    : options_(checked(options)), memory_(std::make_unique<Memory>(options_)) {}
+
+WindowOptimizer::WindowOptimizer(WindowOptimizer&&) noexcept = default;
+WindowOptimizer& WindowOptimizer::operator=(WindowOptimizer&&) noexcept = default;
+WindowOptimizer::~WindowOptimizer() = default;
+
+const WindowSolution& WindowOptimizer::optimize(Window& window) {
+  constexpr double kLargestDamping = 1e4;
+  auto& [solver, system, next, hessian, covariance, factor, step, squares, solution] = *memory_;
+  solver.take(window);
+  solution.success = false;
+  solution.iterations = 0;
+  double damping = 1e-5;
   bool accepted = false;
   const int c = 6 * solver.poses();
-  while (solution.iterations < options.iterations && damping < kLargestDamping) {
+  while (solution.iterations < options_.iterations && damping < kLargestDamping) {
     ++solution.iterations;
     solver.linearise(window, damping, system);
-    damped = system.hessian;
-    damped.diagonal().head(c) *= 1.0 + damping;
-    const Eigen::VectorXd step = damped.selfadjointView<Eigen::Lower>().ldlt().solve(system.gradient);
+    hessian = system.hessian;  // its lower triangle
+    hessian.diagonal().head(c) *= 1.0 + damping;
+    step = factor.compute(hessian).solve(system.gradient);
     if (!step.allFinite()) return solution;
     solver.makeStep(system, step, next);
     const double next_cost = solver.cost(next, squares);
@@ -305,10 +337,9 @@ WindowSolution optimizeWindow(const WindowOptimizerOptions& options, Window& win
   }
 
   // Of the last linearisation, one step before the result: close enough for a covariance, and half of the work saved.
-  const Eigen::MatrixXd information = system.hessian.selfadjointView<Eigen::Lower>();
-  const Eigen::LDLT<Eigen::MatrixXd> factor(information);
+  factor.compute(system.hessian);
   if (factor.info() != Eigen::Success || !factor.isPositive()) return solution;
-  const Eigen::MatrixXd covariance = factor.solve(Eigen::MatrixXd::Identity(solver.size(), solver.size()));
+  covariance = factor.solve(Eigen::MatrixXd::Identity(solver.size(), solver.size()));
   const double points = static_cast<double>(window.points.size());
   const double degrees_of_freedom = std::max(3.0 * system.weight - 3.0 * points - c, 1.0);
   const double variance = system.weighted_square / degrees_of_freedom;
@@ -317,7 +348,7 @@ WindowSolution optimizeWindow(const WindowOptimizerOptions& options, Window& win
       covariance.bottomRightCorner<kCalibration, kCalibration>().inverse() - window.calibration_prior.information;
 
   if (!accepted) solver.cost(window, squares);  // those at hand belong to a refused step
-  solution.residuals.reserve(squares.size());
+  solution.residuals.clear();
   for (const double square : squares) solution.residuals.push_back(std::sqrt(square));
   solution.success = solution.pose_covariance.allFinite();
   return solution;

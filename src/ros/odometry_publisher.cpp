@@ -10,7 +10,8 @@ OdometryPublisher::OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOp
     : options_(options),
       frames_{ros_conversions::cleanFrameId(options.odom_frame_id),
               ros_conversions::cleanFrameId(options.base_frame_id)},
-      session_(ros::Time().fromNSec(ros::WallTime::now().toNSec())) {
+      session_(ros::Time().fromNSec(ros::WallTime::now().toNSec())),
+      path_(static_cast<std::size_t>(options.max_path_length)) {
   constexpr int kQueue = 10;
   odom_publisher_ = nh.advertise<nav_msgs::Odometry>("odom", kQueue);
   path_publisher_ = nh.advertise<nav_msgs::Path>("path", 1);
@@ -54,23 +55,31 @@ void OdometryPublisher::publishPoints(const stereo_descriptor_vo::StereoFeatures
 void OdometryPublisher::restart(const Eigen::Isometry3d& T_odom_start) {
   T_odom_start_ = T_odom_start;
   const std::lock_guard<std::mutex> lock(path_mutex_);
-  path_.poses.clear();
+  path_.clear();
 }
 
 nav_msgs::Path OdometryPublisher::path() const {
   const std::lock_guard<std::mutex> lock(path_mutex_);
-  return path_;
+  nav_msgs::Path message;
+  message.header.frame_id = frames_.odom;
+  if (!path_.empty()) message.header.stamp = path_.back().stamp;
+  message.poses.reserve(path_.size());
+  geometry_msgs::PoseStamped pose;
+  pose.header.frame_id = frames_.odom;
+  for (const PathPose& kept : path_) {
+    pose.header.stamp = kept.stamp;
+    pose.pose = kept.pose;
+    message.poses.push_back(pose);
+  }
+  return message;
 }
 
 void OdometryPublisher::extendPath(const nav_msgs::Odometry& odometry) {
-  const std::lock_guard<std::mutex> lock(path_mutex_);
-  path_.header = odometry.header;
-  geometry_msgs::PoseStamped pose;
-  pose.header = odometry.header;
-  pose.pose = odometry.pose.pose;
-  path_.poses.push_back(pose);
-  if (path_.poses.size() > static_cast<std::size_t>(options_.max_path_length)) path_.poses.erase(path_.poses.begin());
-  if (path_publisher_.getNumSubscribers() > 0) path_publisher_.publish(boost::make_shared<nav_msgs::Path>(path_));
+  {
+    const std::lock_guard<std::mutex> lock(path_mutex_);
+    path_.push_back({odometry.header.stamp, odometry.pose.pose});  // in the place of the oldest once it is full
+  }
+  if (path_publisher_.getNumSubscribers() > 0) path_publisher_.publish(boost::make_shared<nav_msgs::Path>(path()));
 }
 
 }  // namespace sdvo

@@ -1,9 +1,11 @@
 #pragma once
 
+#include <geometry_msgs/Pose.h>
 #include <nav_msgs/Path.h>
 #include <ros/node_handle.h>
 #include <tf2_ros/transform_broadcaster.h>
 
+#include <boost/circular_buffer.hpp>
 #include <mutex>
 
 #include "../config/interface_options.hpp"
@@ -29,6 +31,12 @@ class OdometryPublisher {
   nav_msgs::Path path() const;
 
  private:
+  /// A pose of the path, in no more memory than it needs: there are many, in one block.
+  struct PathPose {
+    ros::Time stamp;
+    geometry_msgs::Pose pose;
+  };
+
   void extendPath(const nav_msgs::Odometry& odometry);
 
   OdometryOutputOptions options_;
@@ -38,7 +46,7 @@ class OdometryPublisher {
   tf2_ros::TransformBroadcaster broadcaster_;
   Eigen::Isometry3d T_odom_start_ = Eigen::Isometry3d::Identity();
   mutable std::mutex path_mutex_;
-  nav_msgs::Path path_;
+  boost::circular_buffer<PathPose> path_;
 };
 
 }  // namespace sdvo

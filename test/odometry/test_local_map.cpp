@@ -497,10 +497,10 @@ TEST(LocalMap, WithoutPatchesASightingIsTheCorner) {
   EXPECT_FALSE(seen.aligned);
 }
 
-WindowOptimizerOptions thorough() {
+WindowOptimizer thorough() {
   WindowOptimizerOptions options;
   options.iterations = 20;
-  return options;
+  return WindowOptimizer(options);
 }
 
 /// The rig's error is known to be none.
@@ -518,7 +518,8 @@ TEST(LocalMap, AdjustmentMovesTheNewestPairToWhereItsPointsSayItIs) {
   error << 0.03, -0.02, 0.04, 0.002, -0.003, 0.004;
   map.insert(features, 2, expSE3(error) * second, recognised(map, features, 60), {});
   RigCalibration calibration;
-  const LocalMap::Adjustment adjustment = map.adjust(thorough(), noRigError(), calibration);
+  WindowOptimizer optimizer = thorough();
+  const LocalMap::Adjustment adjustment = map.adjust(optimizer, noRigError(), calibration);
   ASSERT_TRUE(adjustment.success);
   EXPECT_TRUE(adjustment.rejected_rows.empty());
   EXPECT_LT(logSE3(map.newestPose() * second.inverse()).norm(), 1e-4);
@@ -538,7 +539,8 @@ TEST(LocalMap, APointKeepsItsLooksWhenASightingTurnsOutWrong) {
   const Sightings sightings = recognised(map, features, 60);
   map.insert(features, 2, second, sightings, {});
   RigCalibration calibration;
-  const LocalMap::Adjustment adjustment = map.adjust(thorough(), noRigError(), calibration);
+  WindowOptimizer optimizer = thorough();
+  const LocalMap::Adjustment adjustment = map.adjust(optimizer, noRigError(), calibration);
   ASSERT_TRUE(adjustment.success);
   EXPECT_EQ(adjustment.rejected_rows, std::vector<int>{17});
   map.renewLooks(features, sightings);
@@ -561,8 +563,9 @@ TEST(LocalMap, NoNumberOfPointsTellsWhatAllOfAnImageAreOffByAlike) {
     map.insert(features, 2, second, recognised(map, features, 40), {});
     WindowOptimizerOptions window;
     window.common_shift = common_shift;
+    WindowOptimizer optimizer(window);
     RigCalibration calibration;
-    return map.adjust(window, noRigError(), calibration).covariances.since_keyframe;
+    return map.adjust(optimizer, noRigError(), calibration).covariances.since_keyframe;
   };
   const double shift = 0.5, fx = synthetic::camera().fx;  // px
   const Matrix6d added = covariance(shift) - covariance(0.0);
@@ -584,6 +587,7 @@ TEST(LocalMap, CovarianceBetweenTwoFramesDoesNotDependOnWhereTheFirstOneIs) {
   WindowOptimizerOptions window;
   window.common_disparity_sigma = 0.0;
   window.common_shift = 0.0;
+  WindowOptimizer optimizer(window);
   RigCalibration calibration;
   constexpr double kNoise = 0.05;  // px
   const StereoFeatures of_second = see(world, 0, 40, second, kNoise, 2), of_third = see(world, 0, 40, third, kNoise, 3);
@@ -591,7 +595,7 @@ TEST(LocalMap, CovarianceBetweenTwoFramesDoesNotDependOnWhereTheFirstOneIs) {
   LocalMap alone(options);
   add(alone, of_second, 2, second, {});
   alone.insert(of_third, 3, third, recognised(alone, of_third, 40), {});
-  const LocalMap::Adjustment known = alone.adjust(window, noRigError(), calibration);
+  const LocalMap::Adjustment known = alone.adjust(optimizer, noRigError(), calibration);
   ASSERT_TRUE(known.success);
   EXPECT_EQ(known.covariances.first_id, 2);
   EXPECT_EQ(known.covariances.keyframe_since_first, Matrix6d::Zero());
@@ -615,7 +619,7 @@ TEST(LocalMap, CovarianceBetweenTwoFramesDoesNotDependOnWhereTheFirstOneIs) {
   Sightings sightings;
   for (int i = 0; i < 40; ++i) sightings.push_back(sighting(map, view, 12 + i, of_third, i < 28 ? 12 + i : i - 28));
   map.insert(of_third, 3, third, sightings, {});
-  const LocalMap::Adjustment adjustment = map.adjust(window, noRigError(), calibration);
+  const LocalMap::Adjustment adjustment = map.adjust(optimizer, noRigError(), calibration);
   ASSERT_TRUE(adjustment.success);
   const WindowCovariances& covariances = adjustment.covariances;
   EXPECT_EQ(covariances.first_id, 1);

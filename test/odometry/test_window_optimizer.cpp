@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -109,13 +110,13 @@ Window disturbedWindow(const RigCalibration& truth) {
   return window;
 }
 
-TEST(OptimizeWindow, FindsPosesAndCalibrationOfExactMeasurements) {
+TEST(WindowOptimizer, FindsPosesAndCalibrationOfExactMeasurements) {
   RigCalibration truth;
   truth.value << 0.3, -1.0;
   Window window = disturbedWindow(truth);
   WindowOptimizerOptions options;
   options.iterations = 50;
-  const WindowSolution solution = optimizeWindow(options, window);
+  const WindowSolution solution = WindowOptimizer(options).optimize(window);
   ASSERT_TRUE(solution.success);
   for (int f = 0; f < 5; ++f) {
     const Vector6d error = logSE3(window.T_camera_origin[f] * syntheticPose(f));
@@ -126,20 +127,45 @@ TEST(OptimizeWindow, FindsPosesAndCalibrationOfExactMeasurements) {
   EXPECT_NEAR(window.calibration.value[1], -1.0, 0.05);
 }
 
-TEST(OptimizeWindow, IsTheSameToTheBitWithAndWithoutAvx2) {
+TEST(WindowOptimizer, IsTheSameToTheBitWithAndWithoutAvx2) {
   RigCalibration truth;
   truth.value << 0.3, -1.0;
   const Window disturbed = disturbedWindow(truth);
   Window fast = disturbed, plain = disturbed;
-  const WindowSolution with_avx2 = optimizeWindow({}, fast);
+  const WindowSolution with_avx2 = WindowOptimizer(WindowOptimizerOptions{}).optimize(fast);
   allowAvx2(false);
-  const WindowSolution without = optimizeWindow({}, plain);
+  const WindowSolution without = WindowOptimizer(WindowOptimizerOptions{}).optimize(plain);
   allowAvx2(true);
   for (std::size_t f = 0; f < fast.T_camera_origin.size(); ++f)
     EXPECT_EQ(fast.T_camera_origin[f].matrix(), plain.T_camera_origin[f].matrix()) << "pose " << f;
   EXPECT_EQ(fast.calibration.value, plain.calibration.value);
   EXPECT_EQ(with_avx2.pose_covariance, without.pose_covariance);
   EXPECT_EQ(with_avx2.residuals, without.residuals);
+}
+
+TEST(WindowOptimizer, AWindowSaysTheSameWhateverWasOptimisedBefore) {
+  RigCalibration truth;
+  truth.value << 0.3, -1.0;
+  const Window large = disturbedWindow(truth);
+  Window small = large;
+  small.T_camera_origin.resize(4);
+  small.points.resize(40);
+  const auto is_left_out = [](const WindowObservation& o) { return o.frame >= 4 || o.point >= 40; };
+  small.observations.erase(std::remove_if(small.observations.begin(), small.observations.end(), is_left_out),
+                           small.observations.end());
+
+  WindowOptimizer optimizer(WindowOptimizerOptions{});
+  for (const Window& window : {large, small, large}) {
+    Window alone = window, after_others = window;
+    const WindowSolution expected = WindowOptimizer(WindowOptimizerOptions{}).optimize(alone);
+    ASSERT_TRUE(expected.success);
+    const WindowSolution& solution = optimizer.optimize(after_others);
+    EXPECT_EQ(solution.iterations, expected.iterations);
+    EXPECT_EQ(solution.pose_covariance, expected.pose_covariance);
+    EXPECT_EQ(solution.calibration_information, expected.calibration_information);
+    EXPECT_EQ(solution.residuals, expected.residuals);
+    EXPECT_EQ(after_others.T_camera_origin.back().matrix(), alone.T_camera_origin.back().matrix());
+  }
 }
 
 /// Adds normal noise: `position` px to u and v, `disparity` px to the disparity.
@@ -160,7 +186,7 @@ WindowOptimizerOptions leastSquares() {
   return options;
 }
 
-TEST(OptimizeWindow, CovariancesAreThoseOfTheErrors) {
+TEST(WindowOptimizer, CovariancesAreThoseOfTheErrors) {
   constexpr int kTrials = 200;
   const WindowOptimizerOptions options = leastSquares();
   RigCalibration truth;
@@ -169,7 +195,7 @@ TEST(OptimizeWindow, CovariancesAreThoseOfTheErrors) {
   for (int trial = 0; trial < kTrials; ++trial) {
     Window window = disturbedWindow(truth);
     addNoise(window, kPositionSigma, options.disparity_sigma, 100 + static_cast<std::uint32_t>(trial));
-    const WindowSolution solution = optimizeWindow(options, window);
+    const WindowSolution solution = WindowOptimizer(options).optimize(window);
     ASSERT_TRUE(solution.success);
     ASSERT_EQ(solution.pose_covariance.rows(), 24);
     const Vector6d error = logSE3(syntheticPose(4).inverse() * window.T_camera_origin[4].inverse());
@@ -183,28 +209,29 @@ TEST(OptimizeWindow, CovariancesAreThoseOfTheErrors) {
   EXPECT_NEAR(calibration_nees, 2.0, 0.6);
 }
 
-TEST(OptimizeWindow, InformationOfTheCalibrationIsWithoutThePrior) {
+TEST(WindowOptimizer, InformationOfTheCalibrationIsWithoutThePrior) {
   RigCalibration truth;
   truth.value << 0.2, -0.5;
   Window weak = disturbedWindow(truth), strong = disturbedWindow(truth);
   addNoise(weak, kPositionSigma, 0.2, 1);
   addNoise(strong, kPositionSigma, 0.2, 1);
   strong.calibration_prior = {truth.value, 1e4 * RigCalibration::Matrix::Identity()};
-  const WindowSolution a = optimizeWindow(leastSquares(), weak), b = optimizeWindow(leastSquares(), strong);
+  const WindowSolution a = WindowOptimizer(leastSquares()).optimize(weak),
+                       b = WindowOptimizer(leastSquares()).optimize(strong);
   ASSERT_TRUE(a.success && b.success);
   EXPECT_LT((a.calibration_information - b.calibration_information).norm(), 0.05 * a.calibration_information.norm());
   EXPECT_LT((strong.calibration.value - truth.value).norm(), 0.2 * (weak.calibration.value - truth.value).norm());
 }
 
-TEST(OptimizeWindow, ThePriorPullsTowardsItsMean) {
+TEST(WindowOptimizer, ThePriorPullsTowardsItsMean) {
   Window window = disturbedWindow(RigCalibration{});
   window.calibration_prior.mean << 0.4, 0.3;
   window.calibration_prior.information = 1e9 * RigCalibration::Matrix::Identity();
-  ASSERT_TRUE(optimizeWindow(leastSquares(), window).success);
+  ASSERT_TRUE(WindowOptimizer(leastSquares()).optimize(window).success);
   EXPECT_LT((window.calibration.value - window.calibration_prior.mean).norm(), 1e-3);
 }
 
-TEST(OptimizeWindow, ResidualsAreInUnitsOfWhatIsExpected) {
+TEST(WindowOptimizer, ResidualsAreInUnitsOfWhatIsExpected) {
   RigCalibration truth;
   truth.value << 0.2, -0.5;
   Window window = disturbedWindow(truth);
@@ -212,7 +239,7 @@ TEST(OptimizeWindow, ResidualsAreInUnitsOfWhatIsExpected) {
   for (std::size_t i = 0; i < window.observations.size(); i += 3) window.observations[i].sigma = 0.7;
   WindowOptimizerOptions options;
   options.iterations = 10;
-  const WindowSolution solution = optimizeWindow(options, window);
+  const WindowSolution solution = WindowOptimizer(options).optimize(window);
   ASSERT_TRUE(solution.success);
   ASSERT_EQ(solution.residuals.size(), window.observations.size());
   for (std::size_t i = 0; i < window.observations.size(); ++i) {
@@ -230,32 +257,32 @@ TEST(OptimizeWindow, ResidualsAreInUnitsOfWhatIsExpected) {
   }
 }
 
-TEST(OptimizeWindow, ASightingThatCannotBeIsNotUsed) {
+TEST(WindowOptimizer, ASightingThatCannotBeIsNotUsed) {
   Window window = disturbedWindow(RigCalibration{});
   Eigen::Isometry3d turned = Eigen::Isometry3d::Identity();
   turned.linear() = Eigen::AngleAxisd(3.0, Eigen::Vector3d::UnitY()).toRotationMatrix();
   window.points[0].T_origin_anchor = turned;  // behind all cameras
   WindowOptimizerOptions options;
   options.iterations = 20;
-  const WindowSolution solution = optimizeWindow(options, window);
+  const WindowSolution solution = WindowOptimizer(options).optimize(window);
   ASSERT_TRUE(solution.success);
   for (int i = 0; i < 5; ++i) EXPECT_GT(solution.residuals[i], 50.0);
   EXPECT_LT(logSE3(window.T_camera_origin[4] * syntheticPose(4)).norm(), 0.01);
 }
 
-TEST(OptimizeWindow, HoldsTheFirstPose) {
+TEST(WindowOptimizer, HoldsTheFirstPose) {
   Window window = disturbedWindow(RigCalibration{});
   const Eigen::Matrix4d before = window.T_camera_origin[0].matrix();
-  ASSERT_TRUE(optimizeWindow(WindowOptimizerOptions{}, window).success);
+  ASSERT_TRUE(WindowOptimizer(WindowOptimizerOptions{}).optimize(window).success);
   EXPECT_EQ(before, window.T_camera_origin[0].matrix());
 }
 
-TEST(OptimizeWindow, OneWrongSightingDoesNotMoveTheRest) {
+TEST(WindowOptimizer, OneWrongSightingDoesNotMoveTheRest) {
   Window window = disturbedWindow(RigCalibration{});
   window.observations[42].measurement += Eigen::Vector3d(40.0, -25.0, 5.0);
   WindowOptimizerOptions options;
   options.iterations = 50;
-  const WindowSolution solution = optimizeWindow(options, window);
+  const WindowSolution solution = WindowOptimizer(options).optimize(window);
   ASSERT_TRUE(solution.success);
   EXPECT_GT(solution.residuals[42], 20.0);
   EXPECT_LT(logSE3(window.T_camera_origin[4] * syntheticPose(4)).norm(), 0.01);

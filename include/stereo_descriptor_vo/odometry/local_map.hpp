@@ -130,7 +130,7 @@ class LocalMap {
     RigCalibration::Matrix calibration_information = RigCalibration::Matrix::Zero();
     std::vector<int> rejected_rows;  ///< of the newest pair
   };
-  Adjustment adjust(const WindowOptimizerOptions& options, const CalibrationBelief& prior, RigCalibration& calibration);
+  Adjustment adjust(WindowOptimizer& optimizer, const CalibrationBelief& prior, RigCalibration& calibration);
 
   /// The newest pair's sightings that were not cut off renew what their points look like: the descriptors, and a
   /// reference patch that has become too small or too large.
@@ -157,13 +157,23 @@ class LocalMap {
     int seen = 1;  ///< pairs, those included that the map has forgotten
   };
 
+  /// The map as the optimizer takes it, and what of the map it is made of.
+  struct Problem {
+    Window window;
+    std::vector<int> frame_ids;
+    std::vector<int> points;                   ///< for each of the window's
+    std::vector<std::pair<int, int>> sources;  ///< point and its observation, for each of the window's observations
+
+    void clear();
+  };
+
+  void pose(Problem& problem) const;
   void forgetKeyframe();
   OldKeyframe keyframe(std::size_t frame, bool with_looks) const;
   std::vector<int> sharedPoints() const;
   double parallaxToPredecessor(std::size_t frame) const;
   void removeFrame(std::size_t index);
-  void cutOff(const std::vector<std::pair<int, int>>& sources, const std::vector<double>& residuals,
-              Adjustment& adjustment);
+  void cutOff(const std::vector<double>& residuals, Adjustment& adjustment);
   bool needsKeyframe() const;
   static void takeDescriptor(Point& point, const StereoFeatures& features, int row);
   void startPoint(const StereoFeatures& features, int row, int id, const Eigen::Isometry3d& T_camera_origin,
@@ -178,6 +188,7 @@ class LocalMap {
   std::vector<Point> spare_;  ///< no points any more, but their memory
   KeyframeMemory memory_;
   ResidualLevel residual_level_;  ///< of the newest pairs, each when it was new
+  Problem problem_;               ///< empty between adjustments, so that a copy of the map is none of it
 };
 
 }  // namespace sdvo

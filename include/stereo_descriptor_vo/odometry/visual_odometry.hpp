@@ -162,6 +162,7 @@ class VisualOdometry {
   MotionSearch search_;
   FeatureMatcher matcher_;  ///< of recalled key frames, as is the next
   MotionEstimator estimator_;
+  WindowOptimizer optimizer_;
 
   // State between pairs; reset() is the assignment of a new one.
   struct State {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <memory>
 #include <vector>
 
 #include "stereo_descriptor_vo/common/options.hpp"
@@ -73,9 +74,27 @@ struct WindowSolution {
   std::vector<double> residuals;                   ///< normalised length for each observation, sigma
 };
 
-/// Bundle adjustment of a window: poses, points and the rig's calibration, by Levenberg-Marquardt with the points
-/// eliminated first (Schur complement). Deterministic.
-WindowSolution optimizeWindow(const WindowOptimizerOptions& options, Window& window);
+/// Bundle adjustment of windows: poses, points and the rig's calibration, by Levenberg-Marquardt with the points
+/// eliminated first (Schur complement). Deterministic: only its memory, some megabytes, goes from one window to the
+/// next.
+class WindowOptimizer {
+ public:
+  /// Throws std::invalid_argument when an option is out of its range.
+  explicit WindowOptimizer(const WindowOptimizerOptions& options);
+  WindowOptimizer(WindowOptimizer&&) noexcept;
+  WindowOptimizer& operator=(WindowOptimizer&&) noexcept;
+  ~WindowOptimizer();
+
+  /// The solution is there until the next one.
+  const WindowSolution& optimize(Window& window);
+
+  const WindowOptimizerOptions& options() const { return options_; }
+
+ private:
+  struct Memory;
+  WindowOptimizerOptions options_;
+  std::unique_ptr<Memory> memory_;
+};
 
 /// Derivatives of (u_left, v_left, disparity) of a point by the left perturbation of the pose (6) and by the point (3).
 struct ObservationJacobians {
