@@ -1,9 +1,18 @@
 #include "stereo_descriptor_vo/odometry/calibration_filter.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
 #include <limits>
 
 namespace sdvo {
+namespace {
+
+constexpr int kFewestCommons = 20;       // windows that must tell of what is left at a point
+constexpr int kRememberedCommons = 200;  // of which the mean is taken
+constexpr double kAlike = 1.4;           // on the variance: neighbouring points err alike, so many tell less
+
+}  // namespace
 
 CalibrationFilter::CalibrationFilter(const CalibrationOptions& options) : options_(checked(options)) {
   // The windows keep their nominal precision; weighing the prior up by 1/trust^2 says the same.
@@ -20,7 +29,14 @@ CalibrationBelief CalibrationFilter::prior(int oldest_id) {
     pending_.reset();
   }
   const RigCalibration::Matrix information = option_information_ + information_;
-  return {information.inverse() * (option_information_mean_ + information_mean_), information};
+  CalibrationBelief belief{information.inverse() * (option_information_mean_ + information_mean_), information};
+  if (commons_ >= kFewestCommons) belief.common_sigma = std::sqrt(kAlike * common_square_);
+  return belief;
+}
+
+void CalibrationFilter::noteCommon(double square) {
+  commons_ = std::min(commons_ + 1, kRememberedCommons);
+  common_square_ += (square - common_square_) / commons_;
 }
 
 void CalibrationFilter::note(int newest_id, const RigCalibration& calibration,

@@ -394,6 +394,7 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   if (!solution.success) return adjustment;
   adjustment.success = true;
   adjustment.calibration_information = solution.calibration_information;
+  adjustment.common_disparity_square = solution.common_disparity_square;
   const int newest = static_cast<int>(frames_.size()) - 1;
   const auto covariance = [&](int from, int to) -> Matrix6d {
     return motionCovariance(window, solution.pose_covariance, from, to);

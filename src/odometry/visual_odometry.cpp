@@ -221,6 +221,8 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
 
   if (adjustment.success) {
     state_.calibration.note(map.newestId(), calibration, adjustment.calibration_information);
+    if (verdict.trust == Trust::kSound && adjustment.common_disparity_square)
+      state_.calibration.noteCommon(*adjustment.common_disparity_square);
     adjustment.covariances.inflateNewest(state_.outlier_level.excess(kFewOutliers + outlierShare(evidence)));
     step.covariance = state_.covariance.advance(*step.T_previous_current, adjustment.covariances);
     // As a perturbation of the frame before, then of the newest one.

@@ -27,6 +27,7 @@ struct ReducedSystem {
   std::vector<PosePoint> pose_point;  ///< for each sighting from a pose that may move
   std::vector<int> pose;              ///< of it, from zero on
   std::vector<Eigen::Matrix<double, kCalibration, 3>> calibration_point;  ///< for each point
+  std::vector<double> common_squares;                                     ///< of the points that tell, px^2
   double cost = 0.0;
   double weight = 0.0;
   double weighted_square = 0.0;
@@ -61,6 +62,44 @@ class RelativePoses {
   std::vector<char> known_;
 };
 
+/// What all disparities of one point say beyond what its positions do.
+class DisparitiesOfPoint {
+ public:
+  /// Residual and its derivatives by the point, both divided by the noise and times the root of the sighting's weight.
+  void add(double root, double residual, const Eigen::RowVector3d& by_point) {
+    ++count_;
+    weight_ += root * root;
+    residuals_ += root * residual;
+    by_point_ += root * by_point;
+  }
+
+  /// Square of their mean residual as a variance: what the point itself followed of it is made up for. None where that
+  /// is more than half.
+  std::optional<double> commonSquare(const Eigen::Matrix3d& covariance) const {
+    constexpr int kFewest = 4;
+    if (count_ < kFewest) return std::nullopt;
+    const double followed = by_point_.dot(covariance * by_point_.transpose()) / weight_;
+    if (followed > 0.5) return std::nullopt;
+    const double mean = residuals_ / weight_;
+    return mean * mean / (1.0 - followed);
+  }
+
+ private:
+  int count_ = 0;
+  double weight_ = 0.0, residuals_ = 0.0;
+  Eigen::RowVector3d by_point_ = Eigen::RowVector3d::Zero();
+};
+
+/// Median of squares as the variance of a normal distribution; none of too few. Reorders them.
+std::optional<double> varianceOf(std::vector<double>& squares) {
+  constexpr std::size_t kFewest = 20;
+  constexpr double kMedianOfChiSquare = 0.4549;  // of one degree of freedom
+  if (squares.size() < kFewest) return std::nullopt;
+  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+  std::nth_element(squares.begin(), middle, squares.end());
+  return *middle / kMedianOfChiSquare;
+}
+
 /// A sighting of a point that is not in front of the camera costs as much as a very wrong one.
 constexpr double kBehindSquare = 1e4;
 
@@ -72,6 +111,7 @@ class Solver {
   /// Refers to the window from now on: every accepted step is linearised anew.
   void take(const Window& window) {
     window_ = &window;
+    common_sigma_ = window.calibration_prior.common_sigma.value_or(options_.common_disparity_sigma);
     const auto& observations = window.observations;
     first_of_point_.clear();
     for (std::size_t i = 0; i < observations.size(); ++i)
@@ -134,6 +174,8 @@ class Solver {
     system.pose.reserve(window.observations.size());
     system.weight = system.weighted_square = 0.0;
     const std::size_t points = first_of_point_.size() - 1;
+    system.common_squares.clear();
+    system.common_squares.reserve(points);
     system.points.resize(points);
     system.calibration_point.resize(points);
     const int c = 6 * poses_;
@@ -152,6 +194,7 @@ class Solver {
       Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
       Eigen::Matrix<double, kCalibration, 3>& calibration_point = system.calibration_point[p];
       calibration_point.setZero();
+      DisparitiesOfPoint disparities;
       int seen = 0;
       for (int i = first_of_point_[p]; i < first_of_point_[p + 1]; ++i) {
         const WindowObservation& observation = window.observations[i];
@@ -176,6 +219,7 @@ class Solver {
         calibration_point.noalias() += by_calibration.transpose() * by_point.row(2);
         calibration_hessian.noalias() += by_calibration.transpose() * by_calibration;
         calibration_gradient.noalias() += by_calibration.transpose() * r.z();
+        disparities.add(root, r.z(), by_point.row(2));
         if (observation.frame == 0) continue;
         WeightedSighting& sighting = of_point_[static_cast<std::size_t>(seen++)];
         Eigen::Map<PosePoint> by_pose(sighting.by_pose);
@@ -193,6 +237,9 @@ class Solver {
       const Eigen::Matrix3d inverse = hessian.inverse();
       const int end = static_cast<int>(system.pose.size());
       system.points[p] = {inverse, gradient, end};
+      const double sigma = 1.0 / inverse_noise_[static_cast<std::size_t>(first_of_point_[p])].z();
+      if (const auto square = disparities.commonSquare(inverse))
+        system.common_squares.push_back(sigma * sigma * *square);
       const PointProducts products{inverse.data(), gradient.data(), system.pose_point[0].data() + 18 * (end - seen),
                                    scaled_[0].data()};
       addEliminatedPoint(of_point_.data(), seen, products, system.hessian.data(), size_, system.gradient.data());
@@ -230,14 +277,14 @@ class Solver {
   /// Of n disparities of one point the mean has the variance sigma^2 / n + common^2, as if each by itself had n times
   /// that: more sightings do not average away what they share.
   Eigen::Vector3d inverseNoise(const WindowObservation& observation) const {
-    const double common = options_.common_disparity_sigma;
     const double variance = options_.disparity_sigma * options_.disparity_sigma +
-                            sightings_[static_cast<std::size_t>(observation.point)] * common * common;
+                            sightings_[static_cast<std::size_t>(observation.point)] * common_sigma_ * common_sigma_;
     return {1.0 / observation.sigma, 1.0 / observation.sigma, 1.0 / std::sqrt(variance)};
   }
 
   WindowOptimizerOptions options_;
   const Window* window_ = nullptr;
+  double common_sigma_ = 0.0;
   std::vector<int> first_of_point_;
   std::vector<int> sightings_;                  ///< of each point
   std::vector<Eigen::Vector3d> inverse_noise_;  ///< of each observation
@@ -350,6 +397,7 @@ const WindowSolution& WindowOptimizer::optimize(Window& window) {
   if (!accepted) solver.cost(window, squares);  // those at hand belong to a refused step
   solution.residuals.clear();
   for (const double square : squares) solution.residuals.push_back(std::sqrt(square));
+  solution.common_disparity_square = varianceOf(system.common_squares);
   solution.success = solution.pose_covariance.allFinite();
   return solution;
 }

@@ -115,5 +115,24 @@ TEST(CalibrationFilter, HoldsThePriorWhenNotEnabled) {
   EXPECT_TRUE(filter.sigma().array().isNaN().all());
 }
 
+TEST(CalibrationFilter, WhatIsLeftAtAPointIsKnownOnceTwentyWindowsToldOfIt) {
+  CalibrationFilter filter(someOptions());
+  for (int window = 1; window < 20; ++window) filter.noteCommon(0.02 + (window % 2) * 0.04);
+  EXPECT_FALSE(filter.prior(1).common_sigma);
+  filter.noteCommon(0.02);
+  ASSERT_TRUE(filter.prior(1).common_sigma);
+  // Their mean is 0.04 px^2, and neighbours err alike.
+  EXPECT_NEAR(*filter.prior(1).common_sigma, std::sqrt(1.4 * 0.04), 1e-9);
+}
+
+TEST(CalibrationFilter, WhatIsLeftAtAPointMayChange) {
+  CalibrationFilter filter(someOptions());
+  for (int window = 0; window < 1000; ++window) filter.noteCommon(0.01);
+  for (int window = 0; window < 200; ++window) filter.noteCommon(0.09);
+  EXPECT_GT(*filter.prior(1).common_sigma, std::sqrt(1.4 * 0.05));
+  for (int window = 0; window < 2000; ++window) filter.noteCommon(0.09);
+  EXPECT_NEAR(*filter.prior(1).common_sigma, std::sqrt(1.4 * 0.09), 1e-3);
+}
+
 }  // namespace
 }  // namespace sdvo

@@ -231,6 +231,83 @@ TEST(WindowOptimizer, ThePriorPullsTowardsItsMean) {
   EXPECT_LT((window.calibration.value - window.calibration_prior.mean).norm(), 1e-3);
 }
 
+/// Sixty points whose disparities are off, each by an error that all its sightings share. Positions have normal noise.
+Window windowWithCommonErrors(double common, double position, std::uint32_t seed) {
+  Window window = disturbedWindow(RigCalibration{});
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  std::vector<double> errors(window.points.size());
+  for (double& error : errors) error = common * normal(random);
+  for (WindowObservation& observation : window.observations) {
+    observation.measurement.z() += errors[static_cast<std::size_t>(observation.point)];
+    observation.sigma = position;
+  }
+  addNoise(window, position, 0.0, seed + 1);
+  return window;
+}
+
+/// Mean of what forty such windows tell, as a standard deviation in px.
+double commonSigmaFound(double common, double believed, double position = 0.02, double kernel_scale = 20.0) {
+  constexpr int kTrials = 40;
+  WindowOptimizerOptions options;
+  options.iterations = 10;
+  options.kernel_scale = kernel_scale;
+  double sum = 0.0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    Window window = windowWithCommonErrors(common, position, 500 + 2 * static_cast<std::uint32_t>(trial));
+    window.calibration_prior.common_sigma = believed;
+    const auto square = WindowOptimizer(options).optimize(window).common_disparity_square;
+    if (!square) return -1.0;
+    sum += *square;
+  }
+  return std::sqrt(sum / kTrials);
+}
+
+TEST(WindowOptimizer, TellsHowLargeTheErrorsAreThatAllDisparitiesOfAPointShare) {
+  for (const double common : {0.1, 0.2, 0.5})
+    EXPECT_NEAR(commonSigmaFound(common, common), common, 0.15 * common) << common << " px";
+}
+
+TEST(WindowOptimizer, WhatAPointFollowsOfItsDisparitiesIsMadeUpFor) {
+  EXPECT_NEAR(commonSigmaFound(0.2, 0.2, 0.3), 0.2, 0.02);
+}
+
+TEST(WindowOptimizer, ABentKernelHidesLittleOfTheCommonErrors) {
+  EXPECT_NEAR(commonSigmaFound(0.2, 0.2, 0.3, 1.0), 0.2, 0.03);
+}
+
+TEST(WindowOptimizer, WhatIsBelievedOfTheCommonErrorsDoesNotMakeThem) {
+  for (const double believed : {0.1, 0.2, 0.5}) {
+    const double found = commonSigmaFound(0.2, believed);
+    EXPECT_GT(found, 0.15) << "believed to be " << believed << " px";
+    EXPECT_LT(found, 0.25) << "believed to be " << believed << " px";
+  }
+}
+
+TEST(WindowOptimizer, FewPointsTellNothingOfCommonErrors) {
+  Window window = windowWithCommonErrors(0.2, 0.02, 1);
+  window.points.resize(19);
+  const auto is_left_out = [](const WindowObservation& o) { return o.point >= 19; };
+  window.observations.erase(std::remove_if(window.observations.begin(), window.observations.end(), is_left_out),
+                            window.observations.end());
+  const WindowSolution solution = WindowOptimizer(WindowOptimizerOptions{}).optimize(window);
+  EXPECT_TRUE(solution.success);
+  EXPECT_FALSE(solution.common_disparity_square);
+}
+
+/// Seen from where they were seen first, points are as far as their disparities say.
+TEST(WindowOptimizer, PointsKnownByTheirDisparitiesAloneTellNothingOfCommonErrors) {
+  Window window = windowWithCommonErrors(0.2, 0.02, 1);
+  for (Eigen::Isometry3d& T : window.T_camera_origin) T.setIdentity();
+  for (WindowObservation& o : window.observations) {
+    ASSERT_TRUE(predictObservation(window.camera, window.T_camera_origin[static_cast<std::size_t>(o.frame)],
+                                   window.points[static_cast<std::size_t>(o.point)], o.measurement, nullptr));
+  }
+  const WindowSolution solution = WindowOptimizer(WindowOptimizerOptions{}).optimize(window);
+  EXPECT_TRUE(solution.success);
+  EXPECT_FALSE(solution.common_disparity_square);
+}
+
 TEST(WindowOptimizer, ResidualsAreInUnitsOfWhatIsExpected) {
   RigCalibration truth;
   truth.value << 0.2, -0.5;

@@ -83,6 +83,20 @@ TEST_P(SelfCalibrationBend, IsRecovered) {
 }
 INSTANTIATE_TEST_SUITE_P(Bends, SelfCalibrationBend, testing::Values(-1.0, 1.0));
 
+TEST(SelfCalibrationReport, IsBetterKnownOnceDisparitiesHaveProvedGood) {
+  SyntheticScene scene(12, 4000, 120.0);
+  scene.position_noise = 0.1;
+  scene.disparity_noise = 0.02;
+  VisualOdometry odometry{VisualOdometryOptions{}};
+  double before = 0.0, after = 0.0;
+  for (int k = 0; k < 60; ++k) {
+    const double sigma = odometry.update(scene.view(syntheticPose(k), (k + 1) * kPeriod)).disparity_offset_sigma;
+    if (k < 15) before = sigma;
+    after = sigma;
+  }
+  EXPECT_LT(after, 0.5 * before);
+}
+
 TEST(SelfCalibrationReport, IsNotANumberBeforeThereIsAnEstimate) {
   SyntheticScene scene(13, 2000, 60.0);
   VisualOdometry odometry{VisualOdometryOptions{}};

@@ -41,6 +41,9 @@ class CalibrationFilter {
   /// Notes the result of the window that ends with pair `newest_id`; `information` excludes the prior.
   void note(int newest_id, const RigCalibration& calibration, const RigCalibration::Matrix& information);
 
+  /// Notes the square (px^2) of what a window found the calibration to leave at a point.
+  void noteCommon(double square);
+
   const RigCalibration& calibration() const { return calibration_; }
   /// Standard deviations of (offset, bend) in px, NaN before the first window.
   RigCalibration::Vector sigma() const;
@@ -60,6 +63,8 @@ class CalibrationFilter {
   RigCalibration::Vector information_mean_ = RigCalibration::Vector::Zero();
   std::optional<Contribution> pending_;  ///< the last window that shared no pair with those already counted
   std::optional<RigCalibration::Matrix> total_information_;
+  int commons_ = 0;  ///< how many squares were noted
+  double common_square_ = 0.0;
 };
 
 }  // namespace sdvo

@@ -128,7 +128,8 @@ class LocalMap {
     bool success = false;
     WindowCovariances covariances;
     RigCalibration::Matrix calibration_information = RigCalibration::Matrix::Zero();
-    std::vector<int> rejected_rows;  ///< of the newest pair
+    std::optional<double> common_disparity_square;  ///< px^2, see WindowSolution
+    std::vector<int> rejected_rows;                 ///< of the newest pair
   };
   Adjustment adjust(WindowOptimizer& optimizer, const CalibrationBelief& prior, RigCalibration& calibration);
 

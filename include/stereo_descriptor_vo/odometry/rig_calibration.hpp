@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 
@@ -30,6 +31,8 @@ struct RigCalibration {
 struct CalibrationBelief {
   RigCalibration::Vector mean = RigCalibration::Vector::Zero();                     ///< px
   RigCalibration::Matrix information = 1e-12 * RigCalibration::Matrix::Identity();  ///< 1/px^2
+  /// Standard deviation in px of what it leaves at a point, the same in all sightings; unknown to begin with.
+  std::optional<double> common_sigma = std::nullopt;
 };
 
 }  // namespace sdvo

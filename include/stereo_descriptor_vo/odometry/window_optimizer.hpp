@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "stereo_descriptor_vo/common/options.hpp"
@@ -27,7 +28,7 @@ struct WindowOptimizerOptions {
     list.add(
         "common_disparity_sigma", common_disparity_sigma, {0.0, 10.0}, "px",
         "standard deviation of the error that all disparities of one point share: what the calibration's two terms "
-        "leave of the rig's, and what its texture does to the matching");
+        "leave of the rig's, and what its texture does to the matching; until 20 windows told more of it");
     list.add("common_shift", common_shift, {0.0, 1.0}, "px",
              "what all patches of an image may be off by alike, and more of them do not tell: in covariances only");
   }
@@ -71,7 +72,10 @@ struct WindowSolution {
   int iterations = 0;
   Eigen::MatrixXd pose_covariance;  ///< of the left perturbations of all poses but the first, 6 rows each, m and rad
   RigCalibration::Matrix calibration_information;  ///< of this window alone, the prior excluded, 1/px^2
-  std::vector<double> residuals;                   ///< normalised length for each observation, sigma
+  /// Median over the points of the squared error that all disparities of one share, px^2, as a variance; none where too
+  /// few points are known better from their motion than from their disparities.
+  std::optional<double> common_disparity_square;
+  std::vector<double> residuals;  ///< normalised length for each observation, sigma
 };
 
 /// Bundle adjustment of windows: poses, points and the rig's calibration, by Levenberg-Marquardt with the points
