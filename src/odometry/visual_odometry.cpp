@@ -100,6 +100,10 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features, const std:
     step = extendMap(features, dt, found);
   else
     step = predict(features, dt, found.verdict.reason);
+  // Many agreed on a motion that could not be: what comes next may be wrong in the same way.
+  const bool measured = step.state != TrackingState::kLost && state_.predicted_pairs == 0;
+  if (continued && !frozen && !measured && found.evidence.inliers >= options_.tracking.doubtful_inliers)
+    state_.contested_pairs = kWatched;
   if (step.T_previous_current) move(*step.T_previous_current);
   if (step.state == TrackingState::kTracking || step.state == TrackingState::kDegraded)
     state_.last_pose_stamp = features.stamp;

@@ -214,6 +214,20 @@ TEST(VisualOdometry, BridgesOneFailedPairByPrediction) {
   }
 }
 
+TEST(VisualOdometry, WhatFollowsAMotionThatManyAgreedOnThoughItCouldNotBeIsWatched) {
+  VisualOdometryOptions options;
+  options.tracking.max_speed = 10.0;
+  VisualOdometry odometry(options);
+  for (int i = 0; i < 6; ++i) ASSERT_EQ(odometry.update(pairOf(i)).state, TrackingState::kTracking);
+  StereoFeatures too_fast = pairOf(7);
+  too_fast.stamp = stampOf(5) + kPeriod / 10;
+  const OdometryResult refuted = odometry.update(too_fast);
+  EXPECT_NE(refuted.reason.find("max_speed"), std::string::npos) << refuted.reason;
+  const OdometryResult next = odometry.update(pairOf(8));
+  EXPECT_EQ(next.state, TrackingState::kDegraded);
+  EXPECT_NE(next.reason.find("a moment ago"), std::string::npos) << next.reason;
+}
+
 TEST(VisualOdometry, IsLostAfterTheSecondFailureAndStartsAgainFromTheLastPose) {
   VisualOdometry odometry({});
   const OdometryResult before = follow(odometry, 5);
