@@ -14,7 +14,7 @@
 namespace sdvo {
 namespace {
 
-constexpr int kWatched = 5;           // pairs after a motion was contested, or a pair refused
+constexpr int kWatched = 5;           // pairs after a motion was contested or could not be, or a pair refused
 constexpr double kFewOutliers = 0.1;  // share of the matches whose twofold says nothing
 constexpr double kLately = 2.0;       // s that a motion nobody doubted tells what may be expected
 constexpr double kSurprise = 0.003;   // share of what was not expected of a motion that its measurement misses

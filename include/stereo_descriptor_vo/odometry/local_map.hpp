@@ -189,7 +189,7 @@ class LocalMap {
   std::vector<Point> spare_;  ///< no points any more, but their memory
   KeyframeMemory memory_;
   ResidualLevel residual_level_;  ///< of the newest pairs, each when it was new
-  Problem problem_;               ///< empty between adjustments, so that a copy of the map is none of it
+  Problem problem_;               ///< empty once it is solved, so that a copy of the map is none of it
 };
 
 }  // namespace sdvo
