@@ -10,6 +10,7 @@
 #include <unsupported/Eigen/LevenbergMarquardt>
 #include <unsupported/Eigen/NumericalDiff>
 
+#include "../common/median.hpp"
 #include "../common/progress.hpp"
 #include "correct_matches.hpp"
 #include "keypoint_set.hpp"
@@ -80,12 +81,6 @@ std::optional<double> bestRatio(const std::vector<double>& distances) {
   const double curvature = before - 2.0 * *smallest + after;
   const double shift = curvature > 0.0 ? 0.5 * (before - after) / curvature : 0.0;
   return triedRatio(static_cast<double>(i) + shift);
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 double residual(const SizeSample& sample, const ShapeFit& fit) {

@@ -7,6 +7,8 @@
 #include <optional>
 #include <sstream>
 
+#include "../common/median.hpp"
+
 namespace sdvo {
 namespace {
 
@@ -17,12 +19,6 @@ struct Sighting {
   double u;  ///< px from the middle of the left image
   double disparity, dv;
 };
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Where the block around `centre` looks most alike within `area`, a rectangle of block centres, and how much.
 std::optional<cv::Point> findBlock(const cv::Mat& left, const cv::Mat& right, cv::Point centre, cv::Size half,
@@ -102,7 +98,7 @@ std::string RigMonitor::diagnose(const cv::Mat& left, const cv::Mat& right,
     for (std::size_t k = 0; k < i; ++k)
       if (std::abs(sightings[i].u - sightings[k].u) > 0.1 * left.cols)
         slopes.push_back((sightings[i].dv - sightings[k].dv) / (sightings[i].u - sightings[k].u));
-  const double slope = slopes.empty() ? 0.0 : median(slopes);
+  const double slope = median(slopes);
   for (const Sighting& sighting : sightings) rest.push_back(sighting.dv - slope * sighting.u);
   const double offset = median(rest);
   for (double& value : rest) value = std::abs(value - offset);

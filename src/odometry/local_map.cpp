@@ -7,6 +7,8 @@
 #include <unordered_map>
 #include <utility>
 
+#include "../common/median.hpp"
+
 namespace sdvo {
 namespace {
 
@@ -15,14 +17,6 @@ constexpr double kFarthestDisparity = 0.05;  // px
 
 /// Most points need no more memory than for these until it goes to another one.
 constexpr std::size_t kUsualSightings = 8;
-
-/// Zero of none; reorders them.
-double median(std::vector<double>& values) {
-  if (values.empty()) return 0.0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Covariance of the motion M = T_from_to between two frames, perturbed as M * exp(xi), from that of the left
 /// perturbations of all poses but the first: exp(f) M exp(-t) = M exp(Ad(M^-1) f - t) to first order.

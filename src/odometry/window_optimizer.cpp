@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../common/median.hpp"
 #include "log_sum.hpp"
 #include "pose_blocks.hpp"
 
@@ -95,9 +96,7 @@ std::optional<double> varianceOf(std::vector<double>& squares) {
   constexpr std::size_t kFewest = 20;
   constexpr double kMedianOfChiSquare = 0.4549;  // of one degree of freedom
   if (squares.size() < kFewest) return std::nullopt;
-  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
-  std::nth_element(squares.begin(), middle, squares.end());
-  return *middle / kMedianOfChiSquare;
+  return median(squares) / kMedianOfChiSquare;
 }
 
 /// A sighting of a point that is not in front of the camera costs as much as a very wrong one.

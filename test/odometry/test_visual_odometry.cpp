@@ -870,6 +870,40 @@ TEST(VisualOdometry, WhatFewInliersTellIsKnownWorse) {
   EXPECT_NEAR(times, 40.0 / result.inliers, 0.1 * times);
 }
 
+/// Some rows of pair i, four of five of them too high or too low by what the search accepts and the adjustment does
+/// not.
+StereoFeatures loosePair(int i) {
+  constexpr float kLoose = 6.f;  // px
+  const StereoFeatures all = pairOf(i);
+  StereoFeatures few = blindPair(i);
+  for (int k = 0, row = 0; row < all.count(); ++k, row += 14) {
+    const float off = k % 5 == 0 ? 0.f : k % 5 % 2 == 0 ? kLoose : -kLoose;
+    synthetic::addFeature(few, all.u[row], all.v[row] + off, all.disparity[row],
+                          {all.descriptors.ptr(row), all.descriptors.ptr(row) + all.descriptors.cols});
+  }
+  return few;
+}
+
+TEST(VisualOdometry, WhatTheAdjustmentRefutesLeavesTheMapAsItWas) {
+  VisualOdometryOptions options;
+  options.motion.inlier_threshold = 8.0;
+  options.motion.min_inliers = 18;
+  options.tracking.doubtful_lasting_ratio = 1.0;  // motions are doubted, and so can be refuted
+  VisualOdometry odometry(options), blind(options);
+  follow(odometry, 8), follow(blind, 8);
+  // The second time the map before is kept in the memory of the first one.
+  for (int i = 9; i <= 13; i += 2) {
+    const OdometryResult refuted = odometry.update(loosePair(i));
+    ASSERT_EQ(refuted.state, TrackingState::kDegraded) << refuted.reason;
+    ASSERT_NE(refuted.reason.find("after the adjustment"), std::string::npos) << refuted.reason;
+    EXPECT_EQ(blind.update(blindPair(i)).state, TrackingState::kDegraded);
+    const OdometryResult next = odometry.update(pairOf(i + 1)), expected = blind.update(pairOf(i + 1));
+    EXPECT_EQ(next.epoch, 0);
+    EXPECT_TRUE(next.T_origin_camera.isApprox(expected.T_origin_camera, 1e-12));
+    EXPECT_EQ(next.inliers, expected.inliers);
+  }
+}
+
 TEST(VisualOdometry, FlowLeadsFromWhereAFeatureWasToWhereItIs) {
   synthetic::Sighting clear;
   clear.max_depth = 25.0;
