@@ -4,6 +4,7 @@ CSV line for each vo_info. Ends when nothing has come for a while after the firs
 import argparse
 import csv
 import math
+import sys
 import threading
 import time
 
@@ -51,12 +52,17 @@ class Recorder:
             self.info[message.header.stamp] = message
             self.last = time.monotonic()
 
-    def wait(self, idle):
+    def wait(self, patience, idle):
+        """False when nothing came at all."""
+        start = time.monotonic()
         while not rospy.is_shutdown():
             time.sleep(0.2)
             with self.lock:
+                if self.last is None and time.monotonic() - start > patience:
+                    return False
                 if self.last is not None and time.monotonic() - self.last > idle:
-                    return
+                    return True
+        return self.last is not None
 
     def write(self, odometry_file, truth_file, info_file):
         with self.lock:
@@ -79,14 +85,18 @@ def main():
     parser.add_argument("--odometry", required=True, help="poses to write")
     parser.add_argument("--ground-truth", required=True, help="poses to write")
     parser.add_argument("--info", required=True, help="CSV to write")
+    parser.add_argument("--patience", type=float, default=120.0, help="seconds to wait for the first message")
     parser.add_argument("--idle", type=float, default=5.0, help="seconds of silence that end the recording")
     arguments = parser.parse_args(rospy.myargv()[1:])
     rospy.init_node("record_odometry", anonymous=True, disable_signals=True)
     recorder = Recorder()
-    recorder.wait(arguments.idle)
+    if not recorder.wait(arguments.patience, arguments.idle):
+        print(f"error: no message on {rospy.resolve_name('odom')} or {rospy.resolve_name('vo_info')}", file=sys.stderr)
+        return 1
     poses, infos = recorder.write(arguments.odometry, arguments.ground_truth, arguments.info)
     print(f"recorded {poses} poses with ground truth and {infos} info messages")
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

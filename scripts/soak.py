@@ -71,18 +71,23 @@ class Soak:
     def __init__(self, drive, rate, closed):
         self.rate, self.closed = rate, closed
         self.pairs, self.projections = read_drive(drive)
-        self.info, self.errors, self.poses = [], [], 0
+        self.answers, self.last, self.errors, self.poses = [], VoInfo(), [], 0
         self.broadcaster = tf2_ros.StaticTransformBroadcaster()
         self.broadcaster.sendTransform(transform_of_camera())
         self.images = [rospy.Publisher(f"{s}/image_rect", sensor_msgs.msg.Image, queue_size=5) for s in SIDES]
         self.infos = [rospy.Publisher(f"{s}/camera_info", sensor_msgs.msg.CameraInfo, queue_size=5) for s in SIDES]
         rospy.Subscriber("/rosout", Log, self.on_log, queue_size=100)
-        rospy.Subscriber("vo_info", VoInfo, self.info.append, queue_size=100)
+        rospy.Subscriber("vo_info", VoInfo, self.on_info, queue_size=100)
         rospy.Subscriber("odom", Odometry, self.on_odometry, queue_size=100)
 
     def on_log(self, log):
         if log.level >= Log.ERROR:
             self.errors.append(f"{log.name}: {log.msg}")
+
+    def on_info(self, info):
+        # No messages: the garbage collector would look through all of them, and pairs would wait meanwhile.
+        self.answers.append((info.state, info.reason, 1e3 * info.latency))
+        self.last = info
 
     def on_odometry(self, _):
         self.poses += 1
@@ -135,27 +140,27 @@ def main():
 
     quarter = len(memory) // 4
     before, after = (statistics.median(m for _, m in part) for part in (memory[quarter:2 * quarter], memory[-quarter:]))
-    states = collections.Counter(info.state for info in soak.info)
-    last = soak.info[-1] if soak.info else VoInfo()
-    answered = len(soak.info) + last.dropped_pairs + last.dropped_features
+    states = collections.Counter(state for state, _, _ in soak.answers)
+    last, count = soak.last, len(soak.answers)
+    answered = count + last.dropped_pairs + last.dropped_features
     # ms, of the same two quarters
-    latencies = [[1e3 * info.latency for info in part] or [float("nan")]
-                 for part in (soak.info[len(soak.info) // 4:len(soak.info) // 2], soak.info[-(len(soak.info) // 4):])]
+    latencies = [[latency for _, _, latency in part] or [float("nan")]
+                 for part in (soak.answers[count // 4:count // 2], soak.answers[-(count // 4):])]
     first, last_quarter = ("%.0f (95 %% below %.0f)" % tuple(np.percentile(part, (50, 95))) for part in latencies)
-    print(f"{arguments.minutes:g} minutes at {arguments.rate:g} Hz: {pairs} pairs, {len(soak.info)} answered, {last.dropped_pairs} dropped, "
+    print(f"{arguments.minutes:g} minutes at {arguments.rate:g} Hz: {pairs} pairs, {count} answered, {last.dropped_pairs} dropped, "
           f"{last.dropped_features} features dropped, {dict(states)}, {soak.poses} poses, {last.distance:.0f} m, {len(soak.errors)} errors")
     print(f"second quarter: latency {first} ms, memory {before:.1f} MB; last quarter: {last_quarter} ms, {after:.1f} MB "
           f"({100.0 * (after / before - 1.0):+.2f} %)")
     minutes = [f"{m:.1f}" for (t, m), (next_t, _) in zip(memory, memory[1:]) if t // 60 < next_t // 60]
     print("memory after each minute:", ", ".join(minutes), "MB")
-    for reason, count in collections.Counter((info.state, info.reason) for info in soak.info
-                                             if info.state != "TRACKING").most_common(20):
-        print(f"{count} pairs {reason[0]}: {reason[1]}")
+    untracked = collections.Counter((state, reason) for state, reason, _ in soak.answers if state != "TRACKING")
+    for (state, reason), times in untracked.most_common(20):
+        print(f"{times} pairs {state}: {reason}")
     for error in soak.errors[:5]:
         print(error)
     # A busy machine may lose pairs before they come to be counted, in the queues of publisher and subscriber.
     good = (after / before - 1.0 <= 0.01 * arguments.growth and not soak.errors and answered >= 0.95 * pairs
-            and states["TRACKING"] >= 0.99 * len(soak.info) > 0)
+            and states["TRACKING"] >= 0.99 * count > 0)
     return 0 if good else 1
 
 

@@ -870,8 +870,7 @@ TEST(VisualOdometry, WhatFewInliersTellIsKnownWorse) {
   EXPECT_NEAR(times, 40.0 / result.inliers, 0.1 * times);
 }
 
-/// Some rows of pair i, four of five of them too high or too low by what the search accepts and the adjustment does
-/// not.
+/// Some rows of pair i, most of them too high or too low by what the search accepts and the adjustment refutes.
 StereoFeatures loosePair(int i) {
   constexpr float kLoose = 6.f;  // px
   const StereoFeatures all = pairOf(i);
