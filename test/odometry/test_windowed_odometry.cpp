@@ -1,5 +1,6 @@
 // What the local map, the window and the self-calibration promise, on features whose truth is known.
 #include <gtest/gtest.h>
+#include <malloc.h>
 
 #include "../synthetic_features.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
@@ -229,6 +230,44 @@ TEST(WindowedOdometry, EndsWhereItBeganAfterDrivingBackAndForth) {
   EXPECT_GT(remembering.corrections, 0);
   EXPECT_LT(remembering.normalised_square, 12.0) << "six numbers";
   EXPECT_LT(remembering.worst_cover, 12.6) << "chi-square of six, 95 %";
+}
+
+/// Bytes that the process has of the heap; none known where a sanitizer has taken its place.
+double heapInUse() {
+#if __GLIBC_PREREQ(2, 33)
+  const auto heap = mallinfo2();
+#else
+  const auto heap = mallinfo();
+#endif
+  return static_cast<double>(heap.uordblks) + static_cast<double>(heap.hblkhd);
+}
+
+TEST(WindowedOdometry, TakesNoMoreMemoryTheLongerItRuns) {
+  if (heapInUse() == 0.0) GTEST_SKIP() << "the heap cannot be asked";
+  SyntheticScene scene(8, 2500, 120.0);
+  scene.patches = true;
+  VisualOdometryOptions options;
+  options.map.lasting_points = 50;
+  options.map.remembered_keyframes = 4;  // as many soon
+  VisualOdometry odometry(options);
+  // Round and round, and once in each round something to be doubted: a stamp that says too little time has passed.
+  constexpr int kRound = 60, kRounds = 12;
+  std::int64_t stamp = 1;
+  std::vector<double> largest(kRounds, 0.0);
+  int doubted = 0;
+  for (int i = 0; i < kRound * kRounds; ++i) {
+    Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
+    T_origin_camera.translation().z() = 16.0 * (1.0 - std::cos(2.0 * M_PI * i / kRound));
+    stamp += i % kRound == kRound / 4 ? 5000000 : 200000000;
+    doubted += odometry.update(scene.view(T_origin_camera, stamp)).state == TrackingState::kDegraded;
+    double& most = largest[static_cast<std::size_t>(i / kRound)];
+    most = std::max(most, heapInUse());
+  }
+  EXPECT_GE(doubted, kRounds);
+  const double early = *std::max_element(largest.begin() + kRounds / 3, largest.begin() + 2 * kRounds / 3);
+  const double late = *std::max_element(largest.begin() + 2 * kRounds / 3, largest.end());
+  // How many points live how long is chance.
+  EXPECT_LT(late, 1.03 * early);
 }
 
 }  // namespace
