@@ -85,7 +85,7 @@ class Soak:
             self.errors.append(f"{log.name}: {log.msg}")
 
     def on_info(self, info):
-        # No messages: the garbage collector would look through all of them, and pairs would wait meanwhile.
+        # No messages: the garbage collector would look through all of them again and again.
         self.answers.append((info.state, info.reason, 1e3 * info.latency))
         self.last = info
 

@@ -176,8 +176,8 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
 VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, double dt,
                                                const MotionHypothesis& found) {
   LocalMap& map = *state_.map;
-  const bool refutable = found.verdict.trust != Trust::kSound;
-  if (refutable) state_.map_before = map;  // for a motion that the adjustment may refute
+  std::optional<LocalMap> before;  // for a motion that the adjustment may refute
+  if (found.verdict.trust != Trust::kSound) before = map;
   const double since_newest = static_cast<double>(features.stamp - map.newestStamp()) * 1e-9;
 
   const Eigen::Isometry3d newest_before = map.newestPose();
@@ -208,8 +208,8 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
   PoseVerdict verdict = judgePose(options_.tracking, options_.motion.min_inliers, evidence);
   if (verdict.trust == Trust::kNone) {
     // Without a map to go back to, what it has become is of no use.
-    if (refutable)
-      std::swap(map, *state_.map_before);
+    if (before)
+      map = std::move(*before);
     else
       breakStream();
     return predict(features, dt, verdict.reason + " after the adjustment");

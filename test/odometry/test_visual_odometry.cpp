@@ -890,7 +890,6 @@ TEST(VisualOdometry, WhatTheAdjustmentRefutesLeavesTheMapAsItWas) {
   options.tracking.doubtful_lasting_ratio = 1.0;  // motions are doubted, and so can be refuted
   VisualOdometry odometry(options), blind(options);
   follow(odometry, 8), follow(blind, 8);
-  // The second time the map before is kept in the memory of the first one.
   for (int i = 9; i <= 13; i += 2) {
     const OdometryResult refuted = odometry.update(loosePair(i));
     ASSERT_EQ(refuted.state, TrackingState::kDegraded) << refuted.reason;

@@ -169,7 +169,6 @@ class VisualOdometry {
     explicit State(const CalibrationOptions& options) : calibration(options) {}
 
     std::optional<LocalMap> map;
-    std::optional<LocalMap> map_before;  ///< before the last motion that was doubted; its memory serves the next
     CalibrationFilter calibration;
     RightCameraRotation right_rotation;
     std::optional<std::int64_t> last_stamp;
