@@ -12,7 +12,7 @@
 
 #include "mask_file.hpp"
 #include "opencv_features.hpp"
-#include "stereo_descriptor_vo/front_end/corner_refiner.hpp"
+#include "stereo_descriptor_vo/front_end/corner_peak.hpp"
 #include "stereo_descriptor_vo/front_end/fast_corners.hpp"
 
 namespace sdvo {
@@ -105,20 +105,39 @@ std::vector<Corner> detectAll(const cv::Mat& image, const FeatureDetectorOptions
   throw std::invalid_argument("there is no such detector");
 }
 
-/// A corner that wanders off is not one point; its integer position is kept. Gradient detectors answer up to half their
-/// window inside of a corner, hence the limit.
-void refinePositions(const cv::Mat& image, int radius, int clearance, float largest_shift,
-                     std::vector<Corner>& corners) {
+/// To the intersection of the gradient lines. A corner that wanders off is not one point; its integer position is kept.
+/// Gradient detectors answer up to half their window inside of a corner, hence the limit.
+void refineByGradients(const cv::Mat& image, const FeatureDetectorOptions& options, std::vector<Corner>& corners) {
   if (corners.empty()) return;
   const cv::Rect2f inside(0.f, 0.f, static_cast<float>(image.cols - 1), static_cast<float>(image.rows - 1));
-  thread_local cv::Mat scratch;
-  const CornerRefiner refiner(image, radius, clearance, scratch);
-  cv::parallel_for_(cv::Range(0, static_cast<int>(corners.size())), [&](const cv::Range& range) {
-    for (int i = range.start; i < range.end; ++i) {
-      const auto refined = refiner.refine(corners[i].position, largest_shift);
-      if (refined && inside.contains(*refined)) corners[i].position = *refined;
-    }
-  });
+  const float largest_shift = 0.5f * static_cast<float>(options.corner_block_size);
+  std::vector<cv::Point2f> refined;
+  for (const Corner& corner : corners) refined.push_back(corner.position);
+  cv::cornerSubPix(image, refined, {options.subpixel_radius, options.subpixel_radius}, {-1, -1},
+                   {cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 10, 0.02});
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const cv::Point2f shift = refined[i] - corners[i].position;
+    if (std::max(std::abs(shift.x), std::abs(shift.y)) <= largest_shift && inside.contains(refined[i]))
+      corners[i].position = refined[i];
+  }
+}
+
+/// Each detector's corners by what makes them one. Those of SIFT lie between pixels already, and those of ORB's smaller
+/// images are not corners of the image itself.
+void refine(const cv::Mat& image, const FeatureDetectorOptions& options, std::vector<Corner>& corners) {
+  switch (options.type) {
+    case DetectorType::kFast:
+    case DetectorType::kAgast:
+      for (Corner& corner : corners) corner.position += cornerPeak(image, cv::Point(corner.position));
+      break;
+    case DetectorType::kGftt:
+    case DetectorType::kHarris:
+      refineByGradients(image, options, corners);
+      break;
+    case DetectorType::kOrb:
+    case DetectorType::kSift:
+      break;
+  }
 }
 
 void removeMasked(const cv::Mat& mask, cv::Size size, std::vector<Corner>& corners) {
@@ -239,11 +258,7 @@ std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border, co
   if (!valid.empty()) removeMasked(valid, image.size(), corners);
   corners = keepApart(std::move(corners), options_.min_spacing);
   corners = spreadOverBuckets(corners, image.size(), options_.bucket_size, options_.max_features);
-  if (options_.subpixel) {
-    const bool gradient = options_.type == DetectorType::kGftt || options_.type == DetectorType::kHarris;
-    const float largest_shift = gradient ? 0.5f * static_cast<float>(options_.corner_block_size) : 1.5f;  // px
-    refinePositions(image, options_.subpixel_radius, border, largest_shift, corners);
-  }
+  if (options_.subpixel) refine(image, options_, corners);
   return corners;
 }
 

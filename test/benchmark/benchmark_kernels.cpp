@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "stereo_descriptor_vo/common/processor.hpp"
-#include "stereo_descriptor_vo/front_end/corner_refiner.hpp"
+#include "stereo_descriptor_vo/front_end/corner_peak.hpp"
 #include "stereo_descriptor_vo/front_end/epipolar_matcher.hpp"
 #include "stereo_descriptor_vo/front_end/fast_corners.hpp"
 #include "stereo_descriptor_vo/front_end/freak.hpp"
@@ -53,15 +53,18 @@ void fastCorners(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(sdvo::findFastCorners(image, 12));
 }
 
-void cornerRefinement(benchmark::State& state) {
-  const WithOrWithoutAvx2 version(state);
+/// One form for all processors; beside it what OpenCV has for corners.
+void cornerPeaks(benchmark::State& state) {
   const cv::Mat image = view(false);
   const auto corners = positions();
-  cv::Mat scratch;
-  for (auto _ : state) {
-    const sdvo::CornerRefiner refiner(image, 3, 0, scratch);
-    for (const cv::Point2f& corner : corners) benchmark::DoNotOptimize(refiner.refine(corner, 1.5f));
-  }
+  const cv::TermCriteria until{cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 10, 0.02};
+  for (auto _ : state)
+    if (state.range(0) == 0) {
+      auto refined = corners;
+      cv::cornerSubPix(image, refined, {3, 3}, {-1, -1}, until);
+    } else {
+      for (const cv::Point2f& corner : corners) benchmark::DoNotOptimize(sdvo::cornerPeak(image, corner));
+    }
 }
 
 void halfResolution(benchmark::State& state) {
@@ -127,7 +130,7 @@ void patchAlignment(benchmark::State& state) {
 }
 
 BENCHMARK(fastCorners)->Arg(0)->Arg(1);
-BENCHMARK(cornerRefinement)->Arg(0)->Arg(1);
+BENCHMARK(cornerPeaks)->Arg(0)->Arg(1);
 BENCHMARK(halfResolution)->Arg(0)->Arg(1);
 BENCHMARK(stereoMatch)->Arg(0)->Arg(1);
 BENCHMARK(freakInTwoViews)->Arg(0)->Arg(1);

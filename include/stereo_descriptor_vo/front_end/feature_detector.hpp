@@ -37,8 +37,8 @@ struct FeatureDetectorOptions {
              "fast, agast, orb: weakest corner considered; each bucket's own threshold adapts upwards from here");
     list.add("corner_quality", corner_quality, {1e-6, 1.0}, "", "gftt, harris: weakest response relative to the best");
     list.add("corner_block_size", corner_block_size, {3, 31}, "px", "gftt, harris: window of the gradient matrix");
-    list.add("subpixel", subpixel, "refine corners to sub-pixel positions");
-    list.add("subpixel_radius", subpixel_radius, {1, 15}, "px", "half side of the sub-pixel window");
+    list.add("subpixel", subpixel, "fast, agast, gftt, harris: refine corners to sub-pixel positions");
+    list.add("subpixel_radius", subpixel_radius, {1, 15}, "px", "gftt, harris: half side of the sub-pixel window");
     list.add("mask", mask, "PNG (absolute path) of the left image's size: no corners where it is black; empty: none");
   }
   /// Throws std::invalid_argument when the OpenCV at hand lacks the detector.
