@@ -1,6 +1,7 @@
 #include "stereo_descriptor_vo/odometry/right_camera_rotation.hpp"
 
 #include <Eigen/LU>
+#include <cmath>
 #include <limits>
 
 namespace sdvo {
@@ -20,43 +21,53 @@ Eigen::RowVector3d effect(const StereoCamera& camera, double u_right, double v) 
 
 }  // namespace
 
-void RightCameraRotation::add(const StereoFeatures& features) {
+RightCameraRotation::Sums RightCameraRotation::sumUp(const StereoFeatures& features, const Sums& past) const {
   constexpr int kReweightings = 3;
-  if (features.count() == 0) return;
-  Eigen::Vector3d estimate = weight_ > 0.0 ? rotation() : Eigen::Vector3d::Zero();
-  Eigen::Matrix3d information;
-  Eigen::Vector3d gradient;
-  double square = 0.0, weight = 0.0;
+  Eigen::Vector3d estimate = sums_.weight > 0.0 ? rotation() : Eigen::Vector3d::Zero();
+  Sums sums;
   for (int pass = 0; pass < kReweightings; ++pass) {
-    information.setZero(), gradient.setZero();
-    square = weight = 0.0;
+    sums = past;
     for (int i = 0; i < features.count(); ++i) {
       const Eigen::RowVector3d row = effect(features.camera, features.u[i] - features.disparity[i], features.v[i]);
       const double residual = features.dv[i] - row.dot(estimate);
       const double w = 1.0 / (1.0 + residual * residual / (kKernelScale * kKernelScale));
-      information.noalias() += w * row.transpose() * row;
-      gradient.noalias() += w * row.transpose() * features.dv[i];
-      square += w * residual * residual;
-      weight += w;
+      sums.information.noalias() += w * row.transpose() * row;
+      sums.gradient.noalias() += w * row.transpose() * features.dv[i];
+      sums.square += w * residual * residual;
+      sums.weight += w;
     }
-    const Eigen::Matrix3d total = kMemory * information_ + information + kPrior * Eigen::Matrix3d::Identity();
-    estimate = total.inverse() * (kMemory * gradient_ + gradient);
+    estimate = sums.rotation();
   }
-  information_ = kMemory * information_ + information;
-  gradient_ = kMemory * gradient_ + gradient;
-  square_ = kMemory * square_ + square;
-  weight_ = kMemory * weight_ + weight;
+  return sums;
+}
+
+void RightCameraRotation::add(const StereoFeatures& features) {
+  if (features.count() == 0) return;
+  const Sums past{kMemory * sums_.information, kMemory * sums_.gradient, kMemory * sums_.square,
+                  kMemory * sums_.weight};
+  sums_ = sumUp(features, past);
+}
+
+double RightCameraRotation::change(const StereoFeatures& features) const {
+  if (features.count() == 0 || sums_.weight <= 0.0) return 0.0;
+  const Sums now = sumUp(features, {});
+  const Eigen::Vector3d change = now.rotation() - rotation();
+  return std::sqrt(change.dot(now.information * change) / now.weight);
+}
+
+Eigen::Vector3d RightCameraRotation::Sums::rotation() const {
+  return (information + kPrior * Eigen::Matrix3d::Identity()).inverse() * gradient;
 }
 
 Eigen::Vector3d RightCameraRotation::rotation() const {
-  if (weight_ <= 0.0) return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
-  return (information_ + kPrior * Eigen::Matrix3d::Identity()).inverse() * gradient_;
+  if (sums_.weight <= 0.0) return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  return sums_.rotation();
 }
 
 Eigen::Vector3d RightCameraRotation::sigma() const {
-  if (weight_ <= 0.0) return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
-  const Eigen::Matrix3d covariance = (information_ + kPrior * Eigen::Matrix3d::Identity()).inverse();
-  return (kCorrelatedSightings * square_ / weight_ * covariance.diagonal()).cwiseSqrt();
+  if (sums_.weight <= 0.0) return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  const Eigen::Matrix3d covariance = (sums_.information + kPrior * Eigen::Matrix3d::Identity()).inverse();
+  return (kCorrelatedSightings * sums_.square / sums_.weight * covariance.diagonal()).cwiseSqrt();
 }
 
 }  // namespace sdvo

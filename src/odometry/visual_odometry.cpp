@@ -15,6 +15,7 @@ namespace sdvo {
 namespace {
 
 constexpr int kWatched = 5;           // pairs after a motion was contested or could not be, or a pair refused
+constexpr double kTurned = 0.6;       // px, of the right camera's rotation from what the pairs before told
 constexpr double kFewOutliers = 0.1;  // share of the matches whose twofold says nothing
 constexpr double kLately = 2.0;       // s that a motion nobody doubted tells what may be expected
 constexpr double kSurprise = 0.003;   // share of what was not expected of a motion that its measurement misses
@@ -82,6 +83,7 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features, const std:
   Stopwatch stopwatch;
   state_.last_stamp = features.stamp;
   ++state_.pairs;
+  const double turned = state_.right_rotation.change(features);
   state_.right_rotation.add(features);
   state_.frozen = frozen;
   state_.contested_pairs = found.contested ? kWatched : std::max(0, state_.contested_pairs - 1);
@@ -90,6 +92,8 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features, const std:
     state_.calibration = CalibrationFilter(options_.calibration);
     state_.contested_pairs = kWatched;
   }
+  // The map is of another rig than this pair.
+  if (turned > kTurned) state_.contested_pairs = kWatched;
   state_.image = {features.u, features.v, features.disparity};
   Step step;
   if (frozen)

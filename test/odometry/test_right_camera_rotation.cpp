@@ -66,6 +66,20 @@ TEST(RightCameraRotation, FollowsARigThatChangesAndForgetsSlowly) {
   EXPECT_LT((filter.rotation() - after).norm(), 0.05e-3);
 }
 
+TEST(RightCameraRotation, ChangeIsWhatTheRowsOfAPairSayAgainstThoseBefore) {
+  const Eigen::Vector3d before(0.3e-3, 0.0, -0.5e-3), turn(0.5e-3, 0.0, 1e-3);
+  const StereoFeatures usual = gridSeenWith(before), turned = gridSeenWith(before + turn);
+  RightCameraRotation filter;
+  EXPECT_EQ(filter.change(turned), 0.0);
+  for (int k = 0; k < 5; ++k) filter.add(usual);
+  EXPECT_EQ(filter.change(synthetic::noFeatures(synthetic::camera())), 0.0);
+  EXPECT_LT(filter.change(usual), 0.01);
+  double square = 0.0;
+  for (int i = 0; i < usual.count(); ++i) square += std::pow(turned.dv[i] - usual.dv[i], 2) / usual.count();
+  EXPECT_NEAR(filter.change(turned), std::sqrt(square), 0.05 * std::sqrt(square));
+  EXPECT_LT((filter.rotation() - before).norm(), 5e-6) << "a question changes nothing";
+}
+
 TEST(RightCameraRotation, SigmaIsThatOfLeastSquaresForCorrelatedSightings) {
   // Every feature twice, off by the same amount to either side: the residuals are known and do not move the result.
   constexpr double kError = 0.2;  // px

@@ -228,6 +228,26 @@ TEST(VisualOdometry, WhatFollowsAMotionThatManyAgreedOnThoughItCouldNotBeIsWatch
   EXPECT_NE(next.reason.find("a moment ago"), std::string::npos) << next.reason;
 }
 
+/// Rows as a right camera sees them that is turned about its axis, rad.
+StereoFeatures pairWithRightTurnedBy(double roll, int i) {
+  StereoFeatures features = pairOf(i);
+  for (int k = 0; k < features.count(); ++k)
+    features.dv[k] -= static_cast<float>(roll * (features.u[k] - features.disparity[k] - features.camera.cx));
+  return features;
+}
+
+TEST(VisualOdometry, ARightCameraThatTurnsUnderWayIsWatched) {
+  for (const bool much : {false, true}) {
+    VisualOdometry odometry({});
+    for (int i = 0; i < 6; ++i) ASSERT_EQ(odometry.update(pairOf(i)).state, TrackingState::kTracking);
+    const OdometryResult result = odometry.update(pairWithRightTurnedBy(much ? 8e-3 : 0.5e-3, 6));
+    EXPECT_EQ(result.state, much ? TrackingState::kDegraded : TrackingState::kTracking) << result.reason;
+    EXPECT_EQ(result.reason.find("a moment ago") != std::string::npos, much) << result.reason;
+    for (int i = 7; i < 15; ++i) odometry.update(pairOf(i));
+    EXPECT_EQ(odometry.update(pairOf(15)).state, TrackingState::kTracking);
+  }
+}
+
 TEST(VisualOdometry, IsLostAfterTheSecondFailureAndStartsAgainFromTheLastPose) {
   VisualOdometry odometry({});
   const OdometryResult before = follow(odometry, 5);

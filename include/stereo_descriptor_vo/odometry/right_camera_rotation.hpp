@@ -9,8 +9,8 @@ namespace sdvo {
 /// Rotation of the right camera that rectification left behind, from the vertical disparities of all features: a small
 /// rotation w (rad, about the axes of the left optical frame) moves the right view by
 ///   dv = f * (w_x * (1 + y^2) - w_z * x - w_y * x * y),  x and y normalised coordinates in the right image.
-/// It is reported, so that a rig in need of calibration is noticed; the motion is measured with rows of the left view
-/// alone and does not depend on it.
+/// It is reported, so that a rig in need of calibration is noticed, and a pair that contradicts it is doubted; the
+/// motion is measured with rows of the left view alone and does not depend on it.
 class RightCameraRotation {
  public:
   /// Takes in one pair; old pairs are forgotten slowly.
@@ -21,11 +21,23 @@ class RightCameraRotation {
   /// Standard deviation, rad; NaN as above.
   Eigen::Vector3d sigma() const;
 
+  /// How far a pair disagrees with those before: what the rotation that its own rows tell does to them beyond what
+  /// rotation() does, px, root mean square. Zero before the first pair and without features.
+  double change(const StereoFeatures& features) const;
+
  private:
-  Eigen::Matrix3d information_ = Eigen::Matrix3d::Zero();  ///< in units of the residuals, 1/px^2
-  Eigen::Vector3d gradient_ = Eigen::Vector3d::Zero();
-  double square_ = 0.0;  ///< weighted sum of squared residuals, px^2
-  double weight_ = 0.0;
+  struct Sums {
+    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< in units of the residuals, 1/px^2
+    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
+    double square = 0.0;  ///< weighted sum of squared residuals, px^2
+    double weight = 0.0;
+
+    Eigen::Vector3d rotation() const;
+  };
+  /// Those of the past and of one pair, whose wrong matches have no weight.
+  Sums sumUp(const StereoFeatures& features, const Sums& past) const;
+
+  Sums sums_;
 };
 
 }  // namespace sdvo
