@@ -40,12 +40,12 @@ def direction(step):
     return step[:3, 3] / np.linalg.norm(step[:3, 3])
 
 
-def kitti_errors(truth, estimate):
+def kitti_errors(truth, estimate, lengths=LENGTHS):
     """Mean translation error (%) and rotation error (deg/m) over all sub-paths."""
     way = np.r_[0, np.cumsum([np.linalg.norm(step[:3, 3]) for step in motions(truth)])]
     t, r = [], []
     for i in range(len(truth)):
-        for length in LENGTHS:
+        for length in lengths:
             j = np.searchsorted(way, way[i] + length)
             if j >= len(truth):
                 continue

@@ -1,6 +1,7 @@
 #include "stereo_descriptor_vo/odometry/right_camera_rotation.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -13,6 +14,11 @@ constexpr double kPrior = 1e-3;       // keeps the first pairs' equations solvab
 /// The same scene points are seen again in the next pairs, so that their errors average out much more slowly than those
 /// of independent features.
 constexpr double kCorrelatedSightings = 10.0;
+
+// A turn of the camera.
+constexpr double kTurned = 0.6;   // px: undisturbed, KITTI's and EuRoC's rigs change by less than 0.2
+constexpr double kUnusual = 3.0;  // times the usual change, which grows slowly where rectification left more than …
+constexpr double kUsualMemory = 0.9;  // … a rotation and features come to lie elsewhere: Karlsruhe's rig has 0.5 px
 
 Eigen::RowVector3d effect(const StereoCamera& camera, double u_right, double v) {
   const double x = (u_right - camera.cx) / camera.fx, y = (v - camera.cy) / camera.fy;
@@ -41,11 +47,15 @@ RightCameraRotation::Sums RightCameraRotation::sumUp(const StereoFeatures& featu
   return sums;
 }
 
-void RightCameraRotation::add(const StereoFeatures& features) {
-  if (features.count() == 0) return;
+bool RightCameraRotation::add(const StereoFeatures& features) {
+  if (features.count() == 0) return false;
+  const double disagreement = change(features);
+  const bool turned = disagreement > std::max(kTurned, kUnusual * std::sqrt(usual_square_));
+  if (!turned) usual_square_ += (1.0 - kUsualMemory) * (disagreement * disagreement - usual_square_);
   const Sums past{kMemory * sums_.information, kMemory * sums_.gradient, kMemory * sums_.square,
                   kMemory * sums_.weight};
   sums_ = sumUp(features, past);
+  return turned;
 }
 
 double RightCameraRotation::change(const StereoFeatures& features) const {

@@ -14,8 +14,9 @@
 namespace sdvo {
 namespace {
 
-constexpr int kWatched = 5;           // pairs after a motion was contested or could not be, or a pair refused
-constexpr double kTurned = 0.6;       // px, of the right camera's rotation from what the pairs before told
+constexpr int kWatched = 5;       // pairs after a motion was contested or could not be, or a pair refused
+constexpr int kWatchedLong = 20;  // pairs after many matches agreed on no motion at all
+constexpr int kManyMatches = 100;
 constexpr double kFewOutliers = 0.1;  // share of the matches whose twofold says nothing
 constexpr double kLately = 2.0;       // s that a motion nobody doubted tells what may be expected
 constexpr double kSurprise = 0.003;   // share of what was not expected of a motion that its measurement misses
@@ -83,17 +84,16 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features, const std:
   Stopwatch stopwatch;
   state_.last_stamp = features.stamp;
   ++state_.pairs;
-  const double turned = state_.right_rotation.change(features);
-  state_.right_rotation.add(features);
+  const bool turned = state_.right_rotation.add(features);
   state_.frozen = frozen;
-  state_.contested_pairs = found.contested ? kWatched : std::max(0, state_.contested_pairs - 1);
+  state_.contested_pairs = std::max(found.contested ? kWatched : 0, state_.contested_pairs - 1);
   if (features.report.refused) {
     // What the pairs before told of the rig may be wrong already, and those after may be refused again.
     state_.calibration = CalibrationFilter(options_.calibration);
-    state_.contested_pairs = kWatched;
+    watch(kWatched);
   }
   // The map is of another rig than this pair.
-  if (turned > kTurned) state_.contested_pairs = kWatched;
+  if (turned) watch(kWatched);
   state_.image = {features.u, features.v, features.disparity};
   Step step;
   if (frozen)
@@ -107,12 +107,21 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features, const std:
   // Many agreed on a motion that could not be: what comes next may be wrong in the same way.
   const bool measured = step.state != TrackingState::kLost && state_.predicted_pairs == 0;
   if (continued && !frozen && !measured && found.evidence.inliers >= options_.tracking.doubtful_inliers)
-    state_.contested_pairs = kWatched;
+    watch(kWatched);
+  // Where many agree on none, and it is not that the camera went unseen, the views may not be of one rigid world, and
+  // the next map would be as wrong.
+  if (continued && !frozen && !measured && found.evidence.matches >= kManyMatches && dt <= options_.tracking.max_gap)
+    watch(kWatchedLong);
   if (step.T_previous_current) move(*step.T_previous_current);
   if (step.state == TrackingState::kTracking || step.state == TrackingState::kDegraded)
     state_.last_pose_stamp = features.stamp;
   step.time = stopwatch.lap();
   return report(features, dt, found, step);
+}
+
+/// The motions of the next pairs are doubted, if nothing else tells that they are right.
+void VisualOdometry::watch(int pairs) {
+  state_.contested_pairs = std::max(state_.contested_pairs, pairs);
 }
 
 void VisualOdometry::refuse(const StereoFeatures& features) const {
@@ -170,6 +179,7 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
   }
   state_.started = true;
   state_.last_doubt.setZero();
+  state_.correction_left.setZero();
   state_.predicted_pairs = 0;
   state_.outlier_level = {};
   state_.map.emplace(options_.map);
@@ -218,10 +228,10 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
       breakStream();
     return predict(features, dt, verdict.reason + " after the adjustment");
   }
-  if (search_.lastingDisagree(evidence)) state_.contested_pairs = kWatched;
+  if (search_.lastingDisagree(evidence)) watch(kWatched);
   if (verdict.trust == Trust::kSound || found.T_current_reference_else) verdict = found.verdict;
   // After a new start, or a motion of something else, it may be that which is followed.
-  if ((!state_.velocity || state_.contested_pairs > 0) && isUnexpected(evidence)) state_.contested_pairs = kWatched;
+  if ((!state_.velocity || state_.contested_pairs > 0) && isUnexpected(evidence)) watch(kWatched);
   const bool watched = verdict.trust == Trust::kSound && state_.contested_pairs > 0;
   if (watched)
     verdict = {Trust::kDoubtful,
@@ -316,10 +326,15 @@ void VisualOdometry::recall(const StereoFeatures& features) {
 
 /// A motion between two reported poses contains what the map has learnt of the first one meanwhile. Where its
 /// square is more than half of what the covariances of the motion and of the pose expect on average, they are widened
-/// by it, and beyond chance the reason says so.
+/// by it, and beyond chance the reason says so. The adjustment takes one step a pair: part of so large a correction is
+/// left for the next ones.
 void VisualOdometry::cover(Step& step) {
+  constexpr double kLeft = 0.25;
+  step.covariance += state_.correction_left * state_.correction_left.transpose();
+  state_.correction_left *= kLeft;
   state_.covariance.cover(step.correction);
   if (!widen(step.covariance, step.correction)) return;
+  state_.correction_left = kLeft * step.correction;
   std::ostringstream reason;
   reason << "the map corrected the pose by " << step.correction.head<3>().norm() << " m and "
          << step.correction.tail<3>().norm() << " rad";

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 #include "../synthetic_scene.hpp"
@@ -78,6 +79,28 @@ TEST(RightCameraRotation, ChangeIsWhatTheRowsOfAPairSayAgainstThoseBefore) {
   for (int i = 0; i < usual.count(); ++i) square += std::pow(turned.dv[i] - usual.dv[i], 2) / usual.count();
   EXPECT_NEAR(filter.change(turned), std::sqrt(square), 0.05 * std::sqrt(square));
   EXPECT_LT((filter.rotation() - before).norm(), 5e-6) << "a question changes nothing";
+}
+
+TEST(RightCameraRotation, ATurnIsSaidOfARigThatWasSteady) {
+  const Eigen::Vector3d turn(0.0, 0.0, 9e-3);
+  RightCameraRotation filter;
+  for (int k = 0; k < 20; ++k) EXPECT_FALSE(filter.add(gridSeenWith(Eigen::Vector3d::Zero())));
+  EXPECT_GT(filter.change(gridSeenWith(turn)), 0.6);
+  for (int k = 0; k < 5; ++k) EXPECT_TRUE(filter.add(gridSeenWith(turn))) << "a turn does not become usual by lasting";
+  EXPECT_FALSE(filter.add(gridSeenWith(Eigen::Vector3d::Zero())));
+}
+
+TEST(RightCameraRotation, ARigWhoseRowsAlwaysDisagreeIsNotSaidToTurn) {
+  // Rows that say more and more of a rotation, as where what rectification left depends on the place in the image.
+  RightCameraRotation filter;
+  double largest = 0.0;
+  for (int k = 0; k < 100; ++k) {
+    const StereoFeatures features = gridSeenWith(Eigen::Vector3d(0.0, 0.0, 6e-3 * std::sin(0.1 * k)));
+    largest = std::max(largest, filter.change(features));
+    EXPECT_FALSE(filter.add(features)) << "pair " << k;
+  }
+  EXPECT_GT(largest, 0.6) << "more than a steady rig may show";
+  EXPECT_TRUE(filter.add(gridSeenWith(Eigen::Vector3d(0.0, 0.0, 60e-3))));
 }
 
 TEST(RightCameraRotation, SigmaIsThatOfLeastSquaresForCorrelatedSightings) {

@@ -380,6 +380,26 @@ TEST(VisualOdometry, DoesNotTrustAStandstillRightAfterALossOnTheWay) {
   EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
 }
 
+TEST(VisualOdometry, DoubtsTheNextMapWhereManyMatchesAgreedOnNoMotion) {
+  // A right camera that is late while the camera moves to the side: the depths are wrong, in every pair alike.
+  VisualOdometry odometry({});
+  follow(odometry, 5);
+  int lost = 0, degraded = 0;
+  for (int i = 6; i <= 20; ++i) {
+    StereoFeatures late = pairOf(i);
+    for (float& disparity : late.disparity) disparity *= 1.5f;
+    const OdometryResult result = odometry.update(late);
+    EXPECT_NE(result.state, TrackingState::kTracking) << i;
+    lost += result.state == TrackingState::kLost;
+    if (!result.has_motion) continue;
+    ++degraded;
+    const Vector6d error = logSE3(result.T_previous_current.inverse() * drivePose(i - 1).inverse() * drivePose(i));
+    EXPECT_LT(error.dot(result.motion_covariance.ldlt().solve(error)), 20.0) << i;
+  }
+  EXPECT_GE(lost, 1);
+  EXPECT_GE(degraded, 10) << "a map of the wrong depths explains one another's pairs";
+}
+
 TEST(VisualOdometry, IsLostAtOnceWhenThereIsNoMotionToPredict) {
   VisualOdometry odometry({});
   odometry.update(pairOf(0));

@@ -13,8 +13,9 @@ namespace sdvo {
 /// motion is measured with rows of the left view alone and does not depend on it.
 class RightCameraRotation {
  public:
-  /// Takes in one pair; old pairs are forgotten slowly.
-  void add(const StereoFeatures& features);
+  /// Takes in one pair; old pairs are forgotten slowly. Returns whether the camera turned before it: its change is more
+  /// than a rig shows, and more than this rig shows as a rule.
+  bool add(const StereoFeatures& features);
 
   /// rad; NaN before the first pair with features.
   Eigen::Vector3d rotation() const;
@@ -38,6 +39,7 @@ class RightCameraRotation {
   Sums sumUp(const StereoFeatures& features, const Sums& past) const;
 
   Sums sums_;
+  double usual_square_ = 0.0;  ///< of the change of pairs before which it did not turn, px^2
 };
 
 }  // namespace sdvo

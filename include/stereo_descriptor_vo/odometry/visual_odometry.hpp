@@ -144,6 +144,7 @@ class VisualOdometry {
   };
 
   void refuse(const StereoFeatures& features) const;
+  void watch(int pairs);
   MotionHypothesis localise(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
   double velocityAge() const;
   bool isFrozen(const StereoFeatures& features, double dt) const;
@@ -183,9 +184,10 @@ class VisualOdometry {
     int predicted_pairs = 0;
     int pairs = 0;
     bool started = false;
-    ResidualLevel outlier_level;              ///< shares of the last pairs' matches that did not agree
-    Matrix6d last_doubt = Matrix6d::Zero();   ///< of a doubtful motion
-    int contested_pairs = 0;                  ///< for which a second motion is still to be looked for
+    ResidualLevel outlier_level;                  ///< shares of the last pairs' matches that did not agree
+    Matrix6d last_doubt = Matrix6d::Zero();       ///< of a doubtful motion
+    Vector6d correction_left = Vector6d::Zero();  ///< by the map, which the next motion is expected to contain
+    int contested_pairs = 0;                      ///< for which a second motion is still to be looked for
     bool frozen = false;                      ///< the last pair showed what the one before did, while the camera moved
     std::array<std::vector<float>, 3> image;  ///< u, v and disparity of the last pair's features, to recognise that
   } state_;

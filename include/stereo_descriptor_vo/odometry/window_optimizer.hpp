@@ -15,7 +15,7 @@ namespace sdvo {
 struct WindowOptimizerOptions {
   int iterations = 1;
   double kernel_scale = 1.0;
-  double disparity_sigma = 0.2;
+  double disparity_sigma = 0.1;
   double common_disparity_sigma = 0.3;
   double common_shift = 0.01;
 
