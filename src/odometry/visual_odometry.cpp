@@ -14,9 +14,9 @@
 namespace sdvo {
 namespace {
 
-constexpr int kWatched = 5;       // pairs after a motion was contested or could not be, or a pair refused
-constexpr int kWatchedLong = 20;  // pairs after many matches agreed on no motion at all
-constexpr int kManyMatches = 100;
+constexpr int kWatched = 5;           // pairs after a motion was contested or could not be, or a pair refused
+constexpr int kWatchedLong = 20;      // … after many matches agreed on none at all
+constexpr int kManyMatches = 100;     // of one pair
 constexpr double kFewOutliers = 0.1;  // share of the matches whose twofold says nothing
 constexpr double kLately = 2.0;       // s that a motion nobody doubted tells what may be expected
 constexpr double kSurprise = 0.003;   // share of what was not expected of a motion that its measurement misses
@@ -104,14 +104,12 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features, const std:
     step = extendMap(features, dt, found);
   else
     step = predict(features, dt, found.verdict.reason);
+  const bool unexplained = continued && !frozen && (step.state == TrackingState::kLost || state_.predicted_pairs > 0);
   // Many agreed on a motion that could not be: what comes next may be wrong in the same way.
-  const bool measured = step.state != TrackingState::kLost && state_.predicted_pairs == 0;
-  if (continued && !frozen && !measured && found.evidence.inliers >= options_.tracking.doubtful_inliers)
-    watch(kWatched);
+  if (unexplained && found.evidence.inliers >= options_.tracking.doubtful_inliers) watch(kWatched);
   // Where many agree on none, and it is not that the camera went unseen, the views may not be of one rigid world, and
   // the next map would be as wrong.
-  if (continued && !frozen && !measured && found.evidence.matches >= kManyMatches && dt <= options_.tracking.max_gap)
-    watch(kWatchedLong);
+  if (unexplained && found.evidence.matches >= kManyMatches && dt <= options_.tracking.max_gap) watch(kWatchedLong);
   if (step.T_previous_current) move(*step.T_previous_current);
   if (step.state == TrackingState::kTracking || step.state == TrackingState::kDegraded)
     state_.last_pose_stamp = features.stamp;

@@ -400,6 +400,22 @@ TEST(VisualOdometry, DoubtsTheNextMapWhereManyMatchesAgreedOnNoMotion) {
   EXPECT_GE(degraded, 10) << "a map of the wrong depths explains one another's pairs";
 }
 
+TEST(VisualOdometry, DoesNotDoubtForLongWhatComesAfterAGap) {
+  VisualOdometry odometry({});
+  follow(odometry, 5);
+  const auto afterGap = [](int i) {
+    StereoFeatures features = pairOf(i);
+    features.stamp += 3000000000;
+    return features;
+  };
+  StereoFeatures first = afterGap(6);
+  for (float& disparity : first.disparity) disparity *= 1.5f;  // as many wrong matches as there may be
+  EXPECT_EQ(odometry.update(first).state, TrackingState::kLost);
+  odometry.update(afterGap(7));
+  for (int i = 8; i <= 10; ++i) odometry.update(afterGap(i));
+  EXPECT_EQ(odometry.update(afterGap(11)).state, TrackingState::kTracking);
+}
+
 TEST(VisualOdometry, IsLostAtOnceWhenThereIsNoMotionToPredict) {
   VisualOdometry odometry({});
   odometry.update(pairOf(0));
