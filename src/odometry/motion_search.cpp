@@ -105,6 +105,8 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
     rest.push_back(i);
   }
   hypotheses.push_back(searchAmong(scene, all, lasting));
+  // A compromise between two motions may have more inliers than the one that goes on as before.
+  if (prior) hypotheses.push_back(searchAmong(scene, all, agreeing(scene, all, *prior)));
   // What moves by itself may have left copies of itself in the map, each with a motion of its own.
   constexpr int kMotions = 4;
   MotionEstimate peeled = all.motion;
@@ -174,12 +176,17 @@ MotionHypothesis MotionSearch::searchAmong(const MotionScene& scene, const Motio
   MotionHypothesis found = all;
   found.match_time = 0.0;
   found.motion = estimateAmong(estimator_, camera, all.correspondences, subset);
-  if (found.motion.success)
-    found.motion.inliers = PoseProblem(camera, all.correspondences, motion_options_.inlier_threshold)
-                               .inliers(found.motion.T_current_reference);
+  if (found.motion.success) found.motion.inliers = agreeing(scene, all, found.motion.T_current_reference);
   weigh(scene, found);
   found.motion_time = stopwatch.lap();
   return found;
+}
+
+/// Matches of a hypothesis that agree with a motion.
+std::vector<int> MotionSearch::agreeing(const MotionScene& scene, const MotionHypothesis& all,
+                                        const Eigen::Isometry3d& T_current_reference) const {
+  return PoseProblem(scene.features.camera, all.correspondences, motion_options_.inlier_threshold)
+      .inliers(T_current_reference);
 }
 
 /// Gathers what speaks for the motion found and judges it.

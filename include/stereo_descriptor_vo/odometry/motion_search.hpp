@@ -83,6 +83,8 @@ class MotionSearch {
   bool leavesGate(const MotionScene& scene, const Eigen::Isometry3d& predicted, const MotionHypothesis& found) const;
   MotionHypothesis searchAmong(const MotionScene& scene, const MotionHypothesis& all,
                                const std::vector<int>& subset) const;
+  std::vector<int> agreeing(const MotionScene& scene, const MotionHypothesis& all,
+                            const Eigen::Isometry3d& T_current_reference) const;
   void weigh(const MotionScene& scene, MotionHypothesis& found) const;
   std::vector<Correspondence> align(const MotionScene& scene, MotionHypothesis& found) const;
   bool hasStrayed(const StereoCamera& camera, const MotionHypothesis& found,
