@@ -305,7 +305,9 @@ std::size_t MotionSearch::best(const MotionScene& scene, const std::vector<Motio
   };
   std::size_t best = 0;
   for (std::size_t k = 1; k < hypotheses.size(); ++k) {
-    const bool same = hypotheses[best].verdict.trust == Trust::kSound && areSame(hypotheses[best], hypotheses[k]);
+    // Of one motion the first will do, unless it was drawn away by what moves a little differently.
+    const bool same = hypotheses[best].verdict.trust == Trust::kSound && areSame(hypotheses[best], hypotheses[k]) &&
+                      lasting_costs[best] - lasting_costs[k] <= kDecisive;
     if (!same && isBetter(k, best)) best = k;
   }
   return best;

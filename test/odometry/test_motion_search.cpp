@@ -197,6 +197,23 @@ TEST_F(MotionSearchTest, MotionsThatOnlyFarPointsConfuseAreTwo) {
   EXPECT_EQ(found.verdict.trust, Trust::kDoubtful) << "it may be the board that stands";
 }
 
+TEST_F(MotionSearchTest, WhatGoesOnAsBeforeIsAHypothesisAlsoWhereACompromiseExplainsMore) {
+  // As above without anything near that stands: a step and a turn explain both the board and what is far away.
+  const synthetic::World far = synthetic::randomWorld(23, 100, {-25.0, -8.0, 35.0}, {25.0, 6.0, 50.0});
+  const synthetic::World board = synthetic::randomWorld(24, 300, {0.0, -1.5, 3.9}, {2.0, 1.5, 4.1});
+  const auto see = [&](double board_x) {
+    StereoFeatures features = synthetic::noFeatures(synthetic::camera(), stamp());
+    Street::add(features, far, 0.0, 60.0);
+    Street::add(features, board, -board_x);
+    return features;
+  };
+  begin(see(0.0));
+  EXPECT_LT(moved(findAround(see(0.15), 0.0)), -0.1) << "most agree with the compromise";
+  const MotionHypothesis found = find(see(0.15), 0.0, true);
+  EXPECT_NEAR(moved(found), 0.0, 0.02);
+  EXPECT_EQ(found.verdict.trust, Trust::kDoubtful) << found.verdict.reason;
+}
+
 TEST_F(MotionSearchTest, WithoutLastingPointsTheOneThatGoesOnAsBeforeWins) {
   begin(street_.see(0.0, 0.0, stamp()));
   const StereoFeatures features = street_.see(0.0, 0.4, stamp());
