@@ -18,6 +18,7 @@ namespace sdvo {
 namespace {
 
 constexpr int kEnoughLasting = 20;  // fewer matches of lasting points do not tell which motion is the camera's
+constexpr double kElsewhere = 0.6;  // px, of aligned positions; up to 0.5 where nothing moved
 
 bool contains(const std::vector<int>& values, int value) {
   return std::find(values.begin(), values.end(), value) != values.end();
@@ -90,7 +91,7 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
   MotionHypothesis found = searchNear(scene, prior);
   if (found.verdict.trust == Trust::kSound && !scene.contested) {
     const auto measured = align(scene, found);
-    if (!hasStrayed(scene.features.camera, found, measured)) return found;
+    if (!motionOfLasting(scene.features.camera, found, measured)) return found;
     found.sightings.clear();
   }
 
@@ -116,7 +117,10 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
     peeled = hypotheses.back().motion;
   }
   found = choose(scene, std::move(hypotheses));
-  if (found.verdict.trust != Trust::kNone) align(scene, found);
+  if (found.verdict.trust == Trust::kNone) return found;
+  const auto measured = align(scene, found);
+  if (const auto T_lasting = motionOfLasting(scene.features.camera, found, measured))
+    keepTo(scene, *T_lasting, measured, found);
   return found;
 }
 
@@ -191,16 +195,12 @@ std::vector<int> MotionSearch::agreeing(const MotionScene& scene, const MotionHy
 
 /// Gathers what speaks for the motion found and judges it.
 void MotionSearch::weigh(const MotionScene& scene, MotionHypothesis& found) const {
-  const std::vector<int>& inliers = found.motion.inliers;
   PoseEvidence& evidence = found.evidence;
   evidence = {};
   evidence.matches = static_cast<int>(found.matches.size());
-  evidence.inliers = static_cast<int>(inliers.size());
   for (int i = 0; i < evidence.matches; ++i) evidence.lasting_matches += found.isLasting(i);
-  evidence.lasting_inliers = found.lastingInliers();
-  evidence.coverage = coverage(scene.features, found.inlierRows());
+  countInliers(scene, found);
   evidence.rms = found.motion.rms;
-  evidence.motion = found.motion.T_current_reference.inverse();
   evidence.covariance = found.motion.covariance;
   evidence.dt = static_cast<double>(scene.features.stamp - scene.map.newestStamp()) * 1e-9;
   evidence.velocity = scene.velocity;
@@ -208,6 +208,14 @@ void MotionSearch::weigh(const MotionScene& scene, MotionHypothesis& found) cons
   if (scene.guess) evidence.guess = scene.guess->inverse();
   found.verdict = found.motion.success ? judgePose(verdict_options_, motion_options_.min_inliers, evidence)
                                        : PoseVerdict{Trust::kNone, found.motion.reason};
+}
+
+void MotionSearch::countInliers(const MotionScene& scene, MotionHypothesis& found) const {
+  PoseEvidence& evidence = found.evidence;
+  evidence.inliers = static_cast<int>(found.motion.inliers.size());
+  evidence.lasting_inliers = found.lastingInliers();
+  evidence.coverage = coverage(scene.features, found.inlierRows());
+  evidence.motion = found.motion.T_current_reference.inverse();
 }
 
 /// Aligns the inliers' patches and refines the motion on them. Returns what the inliers measure now.
@@ -237,28 +245,52 @@ std::vector<Correspondence> MotionSearch::align(const MotionScene& scene, Motion
   return measured;
 }
 
-/// Whether the points that stood still so far, left alone, tell another motion than all together: one that puts most of
-/// the others elsewhere, and that is not within their own error. Far points agree with nearly any step once a turn
-/// makes up for it, so their number says nothing.
-bool MotionSearch::hasStrayed(const StereoCamera& camera, const MotionHypothesis& found,
-                              const std::vector<Correspondence>& measured) const {
+/// The motion that the points which stood still so far tell when left alone, if it is another than that of all
+/// together: one that puts most of the others elsewhere, and that is not within their own error. Far points agree with
+/// nearly any step once a turn makes up for it, so their number says nothing.
+std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const StereoCamera& camera,
+                                                               const MotionHypothesis& found,
+                                                               const std::vector<Correspondence>& measured) const {
   constexpr double kSignificant = 100.0;  // chi-square of six; errors of neighbouring points are not independent
   std::vector<Correspondence> lasting, others;
   lasting.reserve(measured.size()), others.reserve(measured.size());
   for (std::size_t k = 0; k < measured.size(); ++k)
     (found.isLasting(found.motion.inliers[k]) ? lasting : others).push_back(measured[k]);
   if (static_cast<int>(lasting.size()) < kEnoughLasting || static_cast<int>(others.size()) < kEnoughLasting)
-    return false;
+    return std::nullopt;
 
   const Eigen::Isometry3d& T = found.motion.T_current_reference;
   Eigen::Isometry3d T_lasting = T;
   const NormalEquations equations = refineMotion(camera, motion_options_, lasting, T_lasting);
   std::vector<int> all(others.size());
   std::iota(all.begin(), all.end(), 0);
-  if (agree(camera, others, all, T, T_lasting)) return false;
+  if (agree(camera, others, all, T, T_lasting, kElsewhere)) return std::nullopt;
   const double variance = equations.weighted_square / std::max(3.0 * equations.weight - 6.0, 1.0);  // px^2
   const Vector6d difference = logSE3(T_lasting * T.inverse());
-  return difference.dot(equations.hessian * difference) > kSignificant * variance;
+  if (difference.dot(equations.hessian * difference) <= kSignificant * variance) return std::nullopt;
+  return T_lasting;
+}
+
+/// Something that moves by less than what corners may err by is among the inliers of every hypothesis and draws them
+/// all away. Aligned positions tell it from the points that stood still so far.
+void MotionSearch::keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_lasting,
+                          const std::vector<Correspondence>& measured, MotionHypothesis& found) const {
+  MotionEstimate& motion = found.motion;
+  std::vector<int> inliers;
+  std::vector<LocalMap::Sighting> sightings;
+  for (const int k : PoseProblem(scene.features.camera, measured, kElsewhere).inliers(T_lasting)) {
+    inliers.push_back(motion.inliers[k]);
+    sightings.push_back(found.sightings[k]);
+  }
+  if (!found.T_current_reference_else) found.T_current_reference_else = motion.T_current_reference;
+  motion.T_current_reference = T_lasting;
+  motion.inliers = std::move(inliers);
+  found.sightings = std::move(sightings);
+  countInliers(scene, found);
+  found.contested = true;
+  found.verdict = {Trust::kDoubtful, "the points that stood still so far tell another motion than all " +
+                                         std::to_string(measured.size()) +
+                                         " inliers: does something move before the camera?"};
 }
 
 /// Half the squared residuals, in standard deviations, of the matches of lasting points under each hypothesis,

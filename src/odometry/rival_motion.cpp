@@ -16,12 +16,11 @@ MotionEstimate estimateAmong(const MotionEstimator& estimator, const StereoCamer
 }
 
 bool agree(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
-           const std::vector<int>& points, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
-  constexpr double kSame = 1.0;  // px
+           const std::vector<int>& points, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double within) {
   const auto same = std::count_if(points.begin(), points.end(), [&](int i) {
     const Eigen::Vector3d in_a = a * correspondences[i].point, in_b = b * correspondences[i].point;
     if (in_a.z() <= 0.0 || in_b.z() <= 0.0) return false;
-    return (camera.project(in_a) - camera.project(in_b)).norm() < kSame;
+    return (camera.project(in_a) - camera.project(in_b)).norm() < within;
   });
   return 2 * static_cast<std::size_t>(same) > points.size();
 }

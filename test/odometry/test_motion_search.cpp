@@ -156,6 +156,31 @@ TEST_F(MotionSearchTest, WhatStoodStillSoFarOutvotesAMajority) {
   EXPECT_NEAR(found.T_current_reference_else->translation().x(), 0.4, 1e-3) << "as if the swarm stood";
 }
 
+TEST_F(MotionSearchTest, WhatMovesByLessThanCornersErrIsLeftAside) {
+  const synthetic::World still = synthetic::randomWorld(27, 200, {-10.0, -4.0, 6.0}, {10.0, 3.0, 12.0});
+  const synthetic::World board = synthetic::randomWorld(28, 500, {-2.0, -1.5, 3.9}, {2.0, 1.5, 4.1});
+  const auto see = [&](std::optional<double> board_x) {
+    StereoFeatures features = synthetic::noFeatures(synthetic::camera(), stamp());
+    Street::add(features, still, 0.0);
+    if (board_x) Street::add(features, board, -*board_x);
+    return features;
+  };
+  begin(see({}));
+  while (pairs_ < 5) extend(see({}), find(see({}), 0.0));
+  extend(see(0.0), find(see(0.0), 0.0));
+  // The board moves by 0.7 px: inliers of any motion are all there is.
+  const MotionHypothesis found = find(see(0.007), 0.0);
+  ASSERT_EQ(found.verdict.trust, Trust::kDoubtful);
+  EXPECT_TRUE(found.contested);
+  EXPECT_NEAR(moved(found), 0.0, 1e-4);
+  EXPECT_EQ(found.evidence.inliers, static_cast<int>(found.motion.inliers.size()));
+  EXPECT_EQ(found.evidence.inliers, found.lastingInliers()) << "the board is no longer among them";
+  EXPECT_EQ(found.sightings.size(), found.motion.inliers.size());
+  ASSERT_TRUE(found.T_current_reference_else) << "the covariance has to hold what all inliers together say";
+  const Eigen::Isometry3d aside = *found.T_current_reference_else * found.motion.T_current_reference.inverse();
+  EXPECT_GT(aside.translation().norm(), 0.005);
+}
+
 TEST_F(MotionSearchTest, FarPointsThatAgreeWithAnyStepAreNoMajority) {
   // A board 4 m ahead steps aside. A step and a little turn of the camera explain that and nearly what is far away.
   const synthetic::World far = synthetic::randomWorld(23, 150, {-25.0, -8.0, 35.0}, {25.0, 6.0, 50.0});

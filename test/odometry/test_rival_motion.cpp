@@ -54,6 +54,7 @@ TEST(RivalMotion, MotionsAgreeThatProjectToTheSamePixel) {
   // 400 px * 0.01 m / 8 m are half a pixel in both views, 0.05 m are 2.5 px.
   EXPECT_TRUE(agree(synthetic::camera(), correspondences, all, moved(0.0), moved(0.01)));
   EXPECT_FALSE(agree(synthetic::camera(), correspondences, all, moved(0.0), moved(0.05)));
+  EXPECT_FALSE(agree(synthetic::camera(), correspondences, all, moved(0.0), moved(0.01), 0.3));
 }
 
 }  // namespace

@@ -86,9 +86,12 @@ class MotionSearch {
   std::vector<int> agreeing(const MotionScene& scene, const MotionHypothesis& all,
                             const Eigen::Isometry3d& T_current_reference) const;
   void weigh(const MotionScene& scene, MotionHypothesis& found) const;
+  void countInliers(const MotionScene& scene, MotionHypothesis& found) const;
   std::vector<Correspondence> align(const MotionScene& scene, MotionHypothesis& found) const;
-  bool hasStrayed(const StereoCamera& camera, const MotionHypothesis& found,
-                  const std::vector<Correspondence>& measured) const;
+  std::optional<Eigen::Isometry3d> motionOfLasting(const StereoCamera& camera, const MotionHypothesis& found,
+                                                   const std::vector<Correspondence>& measured) const;
+  void keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_lasting, const std::vector<Correspondence>& measured,
+              MotionHypothesis& found) const;
   MotionHypothesis choose(const MotionScene& scene, std::vector<MotionHypothesis> hypotheses) const;
   std::vector<double> lastingCosts(const MotionScene& scene, const std::vector<MotionHypothesis>& hypotheses) const;
   std::size_t best(const MotionScene& scene, const std::vector<MotionHypothesis>& hypotheses) const;

@@ -12,8 +12,8 @@ namespace sdvo {
 MotionEstimate estimateAmong(const MotionEstimator& estimator, const StereoCamera& camera,
                              const std::vector<Correspondence>& correspondences, const std::vector<int>& subset);
 
-/// Whether two motions T_current_reference mean the same: they project most of the given points to the same pixel.
+/// Whether two motions T_current_reference mean the same: they project most of the given points within so many px.
 bool agree(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
-           const std::vector<int>& points, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b);
+           const std::vector<int>& points, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double within = 1.0);
 
 }  // namespace sdvo
