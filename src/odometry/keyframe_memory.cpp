@@ -45,18 +45,20 @@ void KeyframeMemory::remember(const StereoCamera& camera, OldKeyframe keyframe) 
                                     [&](const auto& a, const auto& b) { return distance(a) < distance(b); }));
 }
 
-const OldKeyframe* KeyframeMemory::best(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
-                                        int least) const {
-  constexpr double kEnough = 0.6;  // of its points
-  const OldKeyframe* best = nullptr;
-  int most = least - 1;
+const OldKeyframe* KeyframeMemory::nearest(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
+                                           int least) const {
+  constexpr double kEnough = 0.6;    // of its points
+  constexpr double kFarthest = 3.0;  // baselines: an error of a disparity is seen so many times as large from there
+  const Eigen::Vector3d here = T_camera_origin.inverse().translation();
+  const OldKeyframe* nearest = nullptr;
+  double way = kFarthest * camera.baseline;
   for (const auto& keyframe : keyframes_) {
-    if (static_cast<int>(keyframe->points.size()) <= most) continue;
-    const int shared = keyframe->sharedWith(camera, T_camera_origin);
-    if (shared > most && shared > kEnough * static_cast<double>(keyframe->points.size()))
-      best = keyframe.get(), most = shared;
+    const double distance = (keyframe->T_camera_origin.inverse().translation() - here).norm();
+    const double enough = std::max<double>(least, kEnough * static_cast<double>(keyframe->points.size()));
+    if (distance < way && keyframe->sharedWith(camera, T_camera_origin) >= enough)
+      nearest = keyframe.get(), way = distance;
   }
-  return best;
+  return nearest;
 }
 
 }  // namespace sdvo

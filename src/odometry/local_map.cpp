@@ -261,9 +261,9 @@ OldKeyframe LocalMap::keyframe(std::size_t frame, bool with_looks) const {
 const OldKeyframe* LocalMap::revisited() const {
   const auto is_recalled = [](const Frame& frame) { return frame.is_recalled; };
   if (std::any_of(frames_.begin(), frames_.end(), is_recalled)) return nullptr;
-  const OldKeyframe* best = memory_.best(camera_, newestPose(), options_.lasting_points);
-  const auto is_here = [&](const Frame& frame) { return frame.id == best->id; };
-  return best && std::none_of(frames_.begin(), frames_.end(), is_here) ? best : nullptr;
+  const OldKeyframe* nearest = memory_.nearest(camera_, newestPose(), options_.lasting_points);
+  const auto is_here = [&](const Frame& frame) { return frame.id == nearest->id; };
+  return nearest && std::none_of(frames_.begin(), frames_.end(), is_here) ? nearest : nullptr;
 }
 
 void LocalMap::recall(const OldKeyframe& old, const std::vector<Tie>& ties) {

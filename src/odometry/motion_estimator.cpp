@@ -56,12 +56,10 @@ MotionEstimate MotionEstimator::estimate(const StereoCamera& camera, const std::
     square += reprojectionResidual(camera, T, correspondences[i]).value_or(Eigen::Vector3d::Zero()).squaredNorm();
   estimate.rms = std::sqrt(square / (3.0 * static_cast<double>(estimate.inliers.size())));
 
-  // Three residuals for each point, six parameters; weights below one take their share of the degrees of freedom.
-  const double degrees_of_freedom = std::max(3.0 * equations.weight - 6.0, 1.0);
   const Eigen::LDLT<Matrix6d> factor(equations.hessian);
   if (factor.info() != Eigen::Success || !factor.isPositive() || factor.rcond() < 1e-14)
     return failed("the matches do not determine the motion (all of them far away or on one line?)");
-  estimate.covariance = equations.weighted_square / degrees_of_freedom * factor.solve(Matrix6d::Identity());
+  estimate.covariance = equations.variance() * factor.solve(Matrix6d::Identity());
   estimate.covariance = 0.5 * (estimate.covariance + estimate.covariance.transpose()).eval();
   estimate.success = T.matrix().allFinite() && estimate.covariance.allFinite();
   if (!estimate.success) return failed("the refinement did not converge to a finite motion");

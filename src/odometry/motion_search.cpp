@@ -265,9 +265,8 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const StereoCamer
   std::vector<int> all(others.size());
   std::iota(all.begin(), all.end(), 0);
   if (agree(camera, others, all, T, T_lasting, kElsewhere)) return std::nullopt;
-  const double variance = equations.weighted_square / std::max(3.0 * equations.weight - 6.0, 1.0);  // px^2
   const Vector6d difference = logSE3(T_lasting * T.inverse());
-  if (difference.dot(equations.hessian * difference) <= kSignificant * variance) return std::nullopt;
+  if (difference.dot(equations.hessian * difference) <= kSignificant * equations.variance()) return std::nullopt;
   return T_lasting;
 }
 

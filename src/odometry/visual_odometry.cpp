@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "../common/median.hpp"
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
 #include "stereo_descriptor_vo/odometry/correspondences.hpp"
 #include "stereo_descriptor_vo/odometry/motion_doubt.hpp"
@@ -23,6 +24,18 @@ constexpr double kSurprise = 0.003;   // share of what was not expected of a mot
 
 double outlierShare(const PoseEvidence& evidence) {
   return 1.0 - static_cast<double>(evidence.inliers) / std::max(evidence.matches, 1);
+}
+
+/// Median distance in the left image, px, between where correspondences were seen and where a motion puts them.
+double medianMiss(const StereoCamera& camera, const Eigen::Isometry3d& T_current_reference,
+                  const std::vector<Correspondence>& correspondences) {
+  std::vector<double> misses;
+  misses.reserve(correspondences.size());
+  for (const Correspondence& c : correspondences) {
+    const Eigen::Vector3d expected = camera.project(T_current_reference * c.point);
+    misses.push_back((expected - c.measurement).head<2>().norm());
+  }
+  return median(misses);
 }
 
 /// How many times larger the variance is than the adjustment says, where few inliers let a wrong one weigh more.
@@ -313,6 +326,9 @@ void VisualOdometry::recall(const StereoFeatures& features) {
   }
   if (static_cast<int>(ties.size()) < options_.map.lasting_points) return;
   refineMotion(features.camera, options_.motion, aligned, motion.T_current_reference);
+  // A rig whose rectification is not exact sees a place differently once it is elsewhere in the image.
+  constexpr double kSameWorld = 0.3;  // px; up to 0.25 where rectification is exact
+  if (medianMiss(features.camera, motion.T_current_reference, aligned) > kSameWorld) return;
 
   // What the map lost since then, it lost as a whole: the adjustment would take so large an offset for outliers.
   constexpr double kSignificant = 16.8;  // chi-square of six, 99 %

@@ -55,19 +55,40 @@ TEST(KeyframeMemory, FindsTheKeyframeOfAPlace) {
   for (int i = 0; i < 5; ++i) memory.remember(rig(), facingAWall(i, 2.0 * i, 10.0));
   ASSERT_EQ(memory.count(), 5);
   for (int i = 0; i < 5; ++i) {
-    const OldKeyframe* found = memory.best(rig(), cameraAt(0.0, 2.0 * i + 0.3), 50);
+    const OldKeyframe* found = memory.nearest(rig(), cameraAt(0.0, 2.0 * i + 0.3), 50);
     ASSERT_NE(found, nullptr) << i;
     EXPECT_EQ(found->id, i);
   }
-  EXPECT_EQ(memory.best(rig(), cameraAt(0.0, 30.0), 50), nullptr);
-  EXPECT_EQ(memory.best(rig(), cameraAt(0.0, 0.0), 101), nullptr) << "more than it has points";
+  EXPECT_EQ(memory.nearest(rig(), cameraAt(0.0, 30.0), 50), nullptr);
+  EXPECT_EQ(memory.nearest(rig(), cameraAt(0.0, 0.0), 101), nullptr) << "more than it has points";
+}
+
+TEST(KeyframeMemory, RatherTheNearestThanTheOneThatSharesMost) {
+  KeyframeMemory memory(10);
+  OldKeyframe nearer = facingAWall(2, 1.2, 10.0);
+  nearer.rows.positions.resize(80);
+  nearer.points.resize(80);
+  memory.remember(rig(), facingAWall(1, 0.0, 10.0));
+  memory.remember(rig(), nearer);
+  ASSERT_EQ(memory.count(), 2);
+  EXPECT_EQ(memory.nearest(rig(), cameraAt(0.0, 0.8), 50)->id, 2) << "0.4 m away instead of 0.8 m";
+  EXPECT_EQ(memory.nearest(rig(), cameraAt(0.0, 0.8), 90)->id, 1) << "the nearer one shares 80 points";
 }
 
 TEST(KeyframeMemory, NeedsMostOfAKeyframesPoints) {
   KeyframeMemory memory(10);
+  StereoCamera wide = rig();
+  wide.baseline = 3.0;
+  memory.remember(wide, facingAWall(1, 0.0, 10.0));
+  EXPECT_EQ(memory.nearest(wide, cameraAt(8.0, 0.0), 10), nullptr) << "half of them";
+  EXPECT_NE(memory.nearest(wide, cameraAt(7.0, 0.0), 10), nullptr) << "seven tenths";
+}
+
+TEST(KeyframeMemory, LooksNoFartherThanThreeBaselines) {
+  KeyframeMemory memory(10);
   memory.remember(rig(), facingAWall(1, 0.0, 10.0));
-  EXPECT_EQ(memory.best(rig(), cameraAt(8.0, 0.0), 10), nullptr) << "half of them";
-  EXPECT_NE(memory.best(rig(), cameraAt(7.0, 0.0), 10), nullptr) << "seven tenths";
+  EXPECT_NE(memory.nearest(rig(), cameraAt(1.4, 0.0), 10), nullptr);
+  EXPECT_EQ(memory.nearest(rig(), cameraAt(1.6, 0.0), 10), nullptr);
 }
 
 TEST(KeyframeMemory, KeepsTheOlderOneOfTwoThatSeeTheSame) {
@@ -75,15 +96,15 @@ TEST(KeyframeMemory, KeepsTheOlderOneOfTwoThatSeeTheSame) {
   memory.remember(rig(), facingAWall(1, 0.0, 10.0));
   memory.remember(rig(), facingAWall(2, 0.1, 9.9));
   EXPECT_EQ(memory.count(), 1);
-  EXPECT_EQ(memory.best(rig(), cameraAt(0.0, 0.1), 50)->id, 1);
+  EXPECT_EQ(memory.nearest(rig(), cameraAt(0.0, 0.1), 50)->id, 1);
 }
 
 TEST(KeyframeMemory, ForgetsTheFarthestOne) {
   KeyframeMemory memory(3);
   for (const int i : {2, 0, 1, 3}) memory.remember(rig(), facingAWall(i, 2.0 * i, 10.0));
   EXPECT_EQ(memory.count(), 3);
-  EXPECT_EQ(memory.best(rig(), cameraAt(0.0, 0.0), 50), nullptr) << "6 m from the newest";
-  EXPECT_NE(memory.best(rig(), cameraAt(0.0, 2.0), 50), nullptr);
+  EXPECT_EQ(memory.nearest(rig(), cameraAt(0.0, 0.0), 50), nullptr) << "6 m from the newest";
+  EXPECT_NE(memory.nearest(rig(), cameraAt(0.0, 2.0), 50), nullptr);
 }
 
 TEST(KeyframeMemory, OfNoCapacityRemembersNothing) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -36,6 +37,10 @@ struct NormalEquations {
   double cost = 0.0;             ///< sum of kernel costs, px^2
   double weighted_square = 0.0;  ///< sum of weight * |residual|^2, px^2
   double weight = 0.0;           ///< sum of weights
+
+  /// Of a residual's coordinate, px^2: three for each point and six parameters, and weights below one take their share
+  /// of the degrees of freedom.
+  double variance() const { return weighted_square / std::max(3.0 * weight - 6.0, 1.0); }
 };
 
 /// Minimises the robust stereo reprojection error over (u_left, v_left, u_right) of a subset of the correspondences,
