@@ -73,6 +73,7 @@ TEST(KeyframeMemory, RatherTheNearestThanTheOneThatSharesMost) {
   ASSERT_EQ(memory.count(), 2);
   EXPECT_EQ(memory.nearest(rig(), cameraAt(0.0, 0.8), 50)->id, 2) << "0.4 m away instead of 0.8 m";
   EXPECT_EQ(memory.nearest(rig(), cameraAt(0.0, 0.8), 90)->id, 1) << "the nearer one shares 80 points";
+  EXPECT_EQ(memory.nearest(rig(), cameraAt(0.0, 0.3), 50)->id, 1);
 }
 
 TEST(KeyframeMemory, NeedsMostOfAKeyframesPoints) {
