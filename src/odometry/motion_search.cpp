@@ -19,6 +19,9 @@ namespace {
 
 constexpr int kEnoughLasting = 20;  // fewer matches of lasting points do not tell which motion is the camera's
 constexpr double kElsewhere = 0.6;  // px, of aligned positions; up to 0.5 where nothing moved
+// Chi-square of six, by which it is worth to look further, and to follow few points rather than all. Errors of
+// neighbouring points are not independent: up to 170 where nothing moved.
+constexpr double kSuspicious = 100.0, kCertain = 200.0;
 
 bool contains(const std::vector<int>& values, int value) {
   return std::find(values.begin(), values.end(), value) != values.end();
@@ -91,7 +94,7 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
   MotionHypothesis found = searchNear(scene, prior);
   if (found.verdict.trust == Trust::kSound && !scene.contested) {
     const auto measured = align(scene, found);
-    if (!motionOfLasting(scene.features.camera, found, measured)) return found;
+    if (!motionOfLasting(scene.features.camera, found, measured, kSuspicious)) return found;
     found.sightings.clear();
   }
 
@@ -119,7 +122,7 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
   found = choose(scene, std::move(hypotheses));
   if (found.verdict.trust == Trust::kNone) return found;
   const auto measured = align(scene, found);
-  if (const auto T_lasting = motionOfLasting(scene.features.camera, found, measured))
+  if (const auto T_lasting = motionOfLasting(scene.features.camera, found, measured, kCertain))
     keepTo(scene, *T_lasting, measured, found);
   return found;
 }
@@ -250,8 +253,8 @@ std::vector<Correspondence> MotionSearch::align(const MotionScene& scene, Motion
 /// nearly any step once a turn makes up for it, so their number says nothing.
 std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const StereoCamera& camera,
                                                                const MotionHypothesis& found,
-                                                               const std::vector<Correspondence>& measured) const {
-  constexpr double kSignificant = 100.0;  // chi-square of six; errors of neighbouring points are not independent
+                                                               const std::vector<Correspondence>& measured,
+                                                               double significant) const {
   std::vector<Correspondence> lasting, others;
   lasting.reserve(measured.size()), others.reserve(measured.size());
   for (std::size_t k = 0; k < measured.size(); ++k)
@@ -266,7 +269,7 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const StereoCamer
   std::iota(all.begin(), all.end(), 0);
   if (agree(camera, others, all, T, T_lasting, kElsewhere)) return std::nullopt;
   const Vector6d difference = logSE3(T_lasting * T.inverse());
-  if (difference.dot(equations.hessian * difference) <= kSignificant * equations.variance()) return std::nullopt;
+  if (difference.dot(equations.hessian * difference) <= significant * equations.variance()) return std::nullopt;
   return T_lasting;
 }
 

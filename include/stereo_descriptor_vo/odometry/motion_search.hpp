@@ -89,7 +89,8 @@ class MotionSearch {
   void countInliers(const MotionScene& scene, MotionHypothesis& found) const;
   std::vector<Correspondence> align(const MotionScene& scene, MotionHypothesis& found) const;
   std::optional<Eigen::Isometry3d> motionOfLasting(const StereoCamera& camera, const MotionHypothesis& found,
-                                                   const std::vector<Correspondence>& measured) const;
+                                                   const std::vector<Correspondence>& measured,
+                                                   double significant) const;
   void keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_lasting, const std::vector<Correspondence>& measured,
               MotionHypothesis& found) const;
   MotionHypothesis choose(const MotionScene& scene, std::vector<MotionHypothesis> hypotheses) const;
