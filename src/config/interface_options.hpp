@@ -52,7 +52,8 @@ struct OdometryOutputOptions {
              "place to look for the motion; empty: none");
     list.add("use_imu", use_imu,
              "look for the rotation where the gyro of topic imu has it, too; not with guess_frame_id");
-    list.add("guess_timeout", guess_timeout, {0.0, 1.0}, "s", "wall time to wait for either at each pair");
+    list.add("guess_timeout", guess_timeout, {0.0, 1.0}, "s",
+             "wall time to wait for either at each pair; seldom once it did not come in time");
     list.add("queue_size", queue_size, {1, 1000}, "",
              "feature messages that wait while one is processed; the newest win");
     list.add("max_path_length", max_path_length, {1, 10000000}, "", "poses kept in the path; the newest win");

@@ -71,7 +71,7 @@ std::string RigMonitor::diagnose(const cv::Mat& left, const cv::Mat& right,
   const int columns = static_cast<int>(std::ceil(0.25 * max_disparity_));
   const int rows = static_cast<int>(std::ceil(0.25 * options_.reach));
   std::vector<Sighting> sightings;
-  const std::size_t step = std::max<std::size_t>(1, corners.size() / static_cast<std::size_t>(options_.corners));
+  const std::size_t most = static_cast<std::size_t>(options_.corners), step = (corners.size() + most - 1) / most;
   for (std::size_t i = 0; i < corners.size(); i += step) {
     // Coarsely in all directions, swapped sides included, then around that to a pixel.
     const cv::Point small(cvRound(0.25f * corners[i].x - 0.375f), cvRound(0.25f * corners[i].y - 0.375f));

@@ -203,9 +203,10 @@ bool LocalMap::needsKeyframe() const {
 void LocalMap::forgetKeyframe() {
   const auto lasting = [&] { return frames_.size() - 1 - static_cast<std::size_t>(options_.keyframes); };
   const std::size_t leaving = lasting() - 1;
-  if (options_.remembered_keyframes > 0 && !frames_[leaving].is_recalled &&
-      !memory_.covers(camera_, keyframe(leaving, false)))
-    memory_.remember(camera_, keyframe(leaving, true));
+  if (frames_[leaving].id > last_left_) {
+    last_left_ = frames_[leaving].id;
+    if (options_.remembered_keyframes > 0 && !frames_[leaving].is_recalled) rememberKeyframe(leaving);
+  }
   const std::vector<int> shared = sharedPoints();
   const auto too_few = std::find_if(shared.begin(), shared.begin() + static_cast<std::ptrdiff_t>(lasting()),
                                     [&](int points) { return points < options_.lasting_points; });
@@ -220,6 +221,13 @@ void LocalMap::forgetKeyframe() {
     }
     removeFrame(least);
   }
+}
+
+/// Unless it sees too little to be recalled, or nothing new.
+void LocalMap::rememberKeyframe(std::size_t frame) {
+  const OldKeyframe without_looks = keyframe(frame, false);
+  if (without_looks.rows.count() < options_.lasting_points || memory_.covers(camera_, without_looks)) return;
+  memory_.remember(camera_, keyframe(frame, true));
 }
 
 /// With the points that another frame has seen as well: where they are, and what they look like if that is asked for.
@@ -384,12 +392,17 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   window.calibration_prior = prior;
 
   Adjustment adjustment;
+  // Without a point that another frame has seen, nothing holds the newest pose, and no covariance would say so.
+  constexpr int kFewest = 3;
+  const int newest = static_cast<int>(frames_.size()) - 1;
+  const auto of_newest_pair = std::count_if(window.observations.begin(), window.observations.end(),
+                                            [&](const WindowObservation& o) { return o.frame == newest; });
+  if (of_newest_pair < kFewest) return adjustment;
   const WindowSolution& solution = optimizer.optimize(window);
   if (!solution.success) return adjustment;
   adjustment.success = true;
   adjustment.calibration_information = solution.calibration_information;
   adjustment.common_disparity_square = solution.common_disparity_square;
-  const int newest = static_cast<int>(frames_.size()) - 1;
   const auto covariance = [&](int from, int to) -> Matrix6d {
     return motionCovariance(window, solution.pose_covariance, from, to);
   };

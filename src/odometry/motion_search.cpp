@@ -17,7 +17,6 @@
 namespace sdvo {
 namespace {
 
-constexpr int kEnoughLasting = 20;  // fewer matches of lasting points do not tell which motion is the camera's
 constexpr double kElsewhere = 0.6;  // px, of aligned positions; up to 0.5 where nothing moved
 // Chi-square of six, by which it is worth to look further, and to follow few points rather than all. Errors of
 // neighbouring points are not independent: up to 170 where nothing moved.
@@ -52,7 +51,7 @@ bool areOne(const StereoCamera& camera, const MotionHypothesis& a, const MotionH
 
 bool MotionHypothesis::isLasting(int match) const {
   constexpr int kPairs = 4;
-  return view.seen[matches[match].reference] >= kPairs;
+  return view->seen[matches[match].reference] >= kPairs;
 }
 
 std::vector<int> MotionHypothesis::inlierRows(const std::vector<int>& rejected) const {
@@ -90,18 +89,34 @@ MotionSearch::MotionSearch(const FeatureMatcherOptions& matcher, const MotionEst
       estimator_(motion) {}
 
 MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
+  const StereoCamera& camera = scene.features.camera;
+  const auto take = [](Alignment& aligned, MotionHypothesis& found) {
+    found.motion.T_current_reference = aligned.T_current_reference;
+    found.sightings = std::move(aligned.sightings);
+  };
+  Stopwatch stopwatch;
+  const ViewPtr view = std::make_shared<const LocalMap::View>(scene.map.view());
   const std::optional<Eigen::Isometry3d>& prior = scene.guess ? scene.guess : scene.T_current_reference;
-  MotionHypothesis found = searchNear(scene, prior);
+  const double view_time = stopwatch.lap();
+  MotionHypothesis found = searchNear(scene, view, prior);
+  found.match_time += view_time;
   if (found.verdict.trust == Trust::kSound && !scene.contested) {
-    const auto measured = align(scene, found);
-    if (!motionOfLasting(scene.features.camera, found, measured, kSuspicious)) return found;
-    found.sightings.clear();
+    stopwatch.lap();
+    Alignment aligned = align(scene, found);
+    const bool strays = motionOfLasting(camera, found, aligned, kSuspicious).has_value();
+    found.motion_time += stopwatch.lap();
+    if (!strays) {
+      take(aligned, found);
+      return found;
+    }
   }
 
   // The prior itself may be what misled the search, and what moves by itself may outnumber the world.
-  std::vector<MotionHypothesis> hypotheses = {std::move(found)};
-  if (scene.guess && scene.T_current_reference) hypotheses.push_back(searchNear(scene, scene.T_current_reference));
-  if (prior) hypotheses.push_back(search(matcher_, scene, std::nullopt));
+  std::vector<MotionHypothesis> hypotheses;
+  hypotheses.push_back(std::move(found));
+  if (scene.guess && scene.T_current_reference)
+    hypotheses.push_back(searchNear(scene, view, scene.T_current_reference));
+  if (prior) hypotheses.push_back(search(matcher_, scene, view, std::nullopt));
   const MotionHypothesis all = hypotheses.back();
   std::vector<int> lasting, rest;
   for (int i = 0; i < static_cast<int>(all.matches.size()); ++i) {
@@ -121,23 +136,26 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
   }
   found = choose(scene, std::move(hypotheses));
   if (found.verdict.trust == Trust::kNone) return found;
-  const auto measured = align(scene, found);
-  if (const auto T_lasting = motionOfLasting(scene.features.camera, found, measured, kCertain))
-    keepTo(scene, *T_lasting, measured, found);
+  stopwatch.lap();
+  Alignment aligned = align(scene, found);
+  const std::optional<Eigen::Isometry3d> T_lasting = motionOfLasting(camera, found, aligned, kCertain);
+  take(aligned, found);
+  if (T_lasting) keepTo(scene, *T_lasting, aligned.measured, found);
+  found.motion_time += stopwatch.lap();
   return found;
 }
 
 /// First where a good prediction has the points, then three times as far.
-MotionHypothesis MotionSearch::searchNear(const MotionScene& scene,
+MotionHypothesis MotionSearch::searchNear(const MotionScene& scene, const ViewPtr& view,
                                           const std::optional<Eigen::Isometry3d>& T_current_reference) const {
-  if (!T_current_reference || !matcher_.options().gating) return search(matcher_, scene, T_current_reference);
+  if (!T_current_reference || !matcher_.options().gating) return search(matcher_, scene, view, T_current_reference);
   double match_time = 0.0, motion_time = 0.0;
   if (!scene.contested) {
-    MotionHypothesis found = search(matcher_, scene, T_current_reference);
+    MotionHypothesis found = search(matcher_, scene, view, T_current_reference);
     if (found.verdict.trust == Trust::kSound && !leavesGate(scene, *T_current_reference, found)) return found;
     match_time = found.match_time, motion_time = found.motion_time;
   }
-  MotionHypothesis found = search(wide_matcher_, scene, T_current_reference);
+  MotionHypothesis found = search(wide_matcher_, scene, view, T_current_reference);
   found.match_time += match_time, found.motion_time += motion_time;
   return found;
 }
@@ -149,7 +167,7 @@ bool MotionSearch::leavesGate(const MotionScene& scene, const Eigen::Isometry3d&
   const StereoCamera& camera = scene.features.camera;
   const Eigen::Isometry3d& T_current_reference = found.motion.T_current_reference;
   std::size_t seen = 0, outside = 0;
-  for (const Eigen::Vector3d& point : found.view.rows.positions) {
+  for (const Eigen::Vector3d& point : found.view->rows.positions) {
     const Eigen::Vector3d here = T_current_reference * point, expected = predicted * point;
     if (here.z() <= 0.0 || expected.z() <= 0.0) continue;
     const Eigen::Vector3d pixel = camera.project(here);
@@ -160,15 +178,15 @@ bool MotionSearch::leavesGate(const MotionScene& scene, const Eigen::Isometry3d&
   return static_cast<double>(outside) > kGoodPart * static_cast<double>(seen);
 }
 
-MotionHypothesis MotionSearch::search(const FeatureMatcher& matcher, const MotionScene& scene,
+MotionHypothesis MotionSearch::search(const FeatureMatcher& matcher, const MotionScene& scene, const ViewPtr& view,
                                       const std::optional<Eigen::Isometry3d>& T_current_reference) const {
   MotionHypothesis found;
   found.guided = T_current_reference.has_value();
-  found.view = scene.map.view();
+  found.view = view;
   Stopwatch stopwatch;
-  found.matches = matcher.match(found.view.rows, scene.features, T_current_reference);
+  found.matches = matcher.match(view->rows, scene.features, T_current_reference);
   found.match_time = stopwatch.lap();
-  found.correspondences = correspond(found.view.rows, scene.features, found.matches, scene.calibration);
+  found.correspondences = correspond(view->rows, scene.features, found.matches, scene.calibration);
   found.motion = estimator_.estimate(scene.features.camera, found.correspondences, T_current_reference);
   weigh(scene, found);
   found.motion_time = stopwatch.lap();
@@ -221,48 +239,45 @@ void MotionSearch::countInliers(const MotionScene& scene, MotionHypothesis& foun
   evidence.motion = found.motion.T_current_reference.inverse();
 }
 
-/// Aligns the inliers' patches and refines the motion on them. Returns what the inliers measure now.
-std::vector<Correspondence> MotionSearch::align(const MotionScene& scene, MotionHypothesis& found) const {
+/// Aligns the inliers' patches and refines the motion on them.
+MotionSearch::Alignment MotionSearch::align(const MotionScene& scene, const MotionHypothesis& found) const {
   constexpr std::size_t kEnough = 30;  // fewer are no better than all corners together
-  Stopwatch stopwatch;
   const StereoFeatures& features = scene.features;
   const Eigen::Isometry3d T_camera_origin = found.motion.T_current_reference * scene.map.newestPose();
-  std::vector<Correspondence> measured, aligned;
-  measured.reserve(found.motion.inliers.size()), aligned.reserve(found.motion.inliers.size());
-  found.sightings.reserve(found.motion.inliers.size());
+  Alignment alignment{found.motion.T_current_reference, {}, {}};
+  std::vector<Correspondence> aligned;
+  for (auto* correspondences : {&alignment.measured, &aligned}) correspondences->reserve(found.motion.inliers.size());
+  alignment.sightings.reserve(found.motion.inliers.size());
   for (const int i : found.motion.inliers) {
     const FeatureMatch& match = found.matches[i];
     const LocalMap::Sighting sighting = scene.map.sight(alignment_options_, features, T_camera_origin,
-                                                        found.view.point[match.reference], match.current);
-    found.sightings.push_back(sighting);
-    measured.push_back(found.correspondences[i]);
+                                                        found.view->point[match.reference], match.current);
+    alignment.sightings.push_back(sighting);
+    alignment.measured.push_back(found.correspondences[i]);
     if (!sighting.aligned) continue;
     const Eigen::Vector2d corner(features.u[match.current], features.v[match.current]);
-    measured.back().measurement =
+    alignment.measured.back().measurement =
         measurementOf(features, match.current, scene.calibration, sighting.measurement.head<2>() - corner);
-    aligned.push_back(measured.back());
+    aligned.push_back(alignment.measured.back());
   }
-  if (aligned.size() >= kEnough)
-    refineMotion(features.camera, motion_options_, aligned, found.motion.T_current_reference);
-  found.motion_time += stopwatch.lap();
-  return measured;
+  if (aligned.size() >= kEnough) refineMotion(features.camera, motion_options_, aligned, alignment.T_current_reference);
+  return alignment;
 }
 
 /// The motion that the points which stood still so far tell when left alone, if it is another than that of all
 /// together: one that puts most of the others elsewhere, and that is not within their own error. Far points agree with
 /// nearly any step once a turn makes up for it, so their number says nothing.
 std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const StereoCamera& camera,
-                                                               const MotionHypothesis& found,
-                                                               const std::vector<Correspondence>& measured,
+                                                               const MotionHypothesis& found, const Alignment& aligned,
                                                                double significant) const {
   std::vector<Correspondence> lasting, others;
-  lasting.reserve(measured.size()), others.reserve(measured.size());
-  for (std::size_t k = 0; k < measured.size(); ++k)
-    (found.isLasting(found.motion.inliers[k]) ? lasting : others).push_back(measured[k]);
+  lasting.reserve(aligned.measured.size()), others.reserve(aligned.measured.size());
+  for (std::size_t k = 0; k < aligned.measured.size(); ++k)
+    (found.isLasting(found.motion.inliers[k]) ? lasting : others).push_back(aligned.measured[k]);
   if (static_cast<int>(lasting.size()) < kEnoughLasting || static_cast<int>(others.size()) < kEnoughLasting)
     return std::nullopt;
 
-  const Eigen::Isometry3d& T = found.motion.T_current_reference;
+  const Eigen::Isometry3d& T = aligned.T_current_reference;
   Eigen::Isometry3d T_lasting = T;
   const NormalEquations equations = refineMotion(camera, motion_options_, lasting, T_lasting);
   std::vector<int> all(others.size());
@@ -331,7 +346,8 @@ std::size_t MotionSearch::best(const MotionScene& scene, const std::vector<Motio
     if (a.motion.success != b.motion.success) return a.motion.success;
     if (std::abs(lasting_costs[i] - lasting_costs[j]) > kDecisive) return lasting_costs[i] < lasting_costs[j];
     // However many they are: a board that covers most of the view outnumbers what is left of the world.
-    const bool is_a_implausible = isImplausible(a.evidence), is_b_implausible = isImplausible(b.evidence);
+    const bool is_a_implausible = isImplausible(verdict_options_, a.evidence),
+               is_b_implausible = isImplausible(verdict_options_, b.evidence);
     if (is_a_implausible != is_b_implausible) return is_b_implausible;
     const bool comparable = b.evidence.inliers > leastOfRival(a.motion) && a.evidence.inliers > leastOfRival(b.motion);
     if (scene.velocity && comparable && !areSame(a, b)) return change(a) < change(b);
@@ -382,7 +398,7 @@ MotionHypothesis MotionSearch::choose(const MotionScene& scene, std::vector<Moti
   // Less than that is something small that moves, or a texture that repeats itself; unless it was larger just before.
   const double substantial_share = scene.contested ? 0.0 : 0.35;
   const bool substantial = static_cast<double>(of_rival.size()) >= substantial_share * chosen.evidence.inliers;
-  chosen.contested = lastingDisagree(chosen.evidence);
+  chosen.contested = lastingDisagree(verdict_options_, chosen.evidence);
   if (rival && (substantial ? chosen.verdict.trust != Trust::kNone : chosen.verdict.trust == Trust::kDoubtful)) {
     chosen.contested = true;
     chosen.T_current_reference_else = rival->motion.T_current_reference;
@@ -391,24 +407,11 @@ MotionHypothesis MotionSearch::choose(const MotionScene& scene, std::vector<Moti
                                             " matches: does something move before the camera?"};
   }
   // Rather what was expected than the motion of something that has come to cover most of the view.
-  if (scene.contested && scene.T_current_reference && isImplausible(chosen.evidence)) {
+  if (scene.contested && scene.T_current_reference && isImplausible(verdict_options_, chosen.evidence)) {
     chosen.verdict = {Trust::kNone, judgeChange(verdict_options_, chosen.evidence).reason +
                                         ", right after something else moved in view"};
   }
   return std::move(chosen);
-}
-
-bool MotionSearch::lastingDisagree(const PoseEvidence& evidence) const {
-  return evidence.lasting_matches >= kEnoughLasting &&
-         evidence.lasting_inliers < verdict_options_.doubtful_lasting_ratio * evidence.lasting_matches;
-}
-
-bool MotionSearch::lastingAgree(const PoseEvidence& evidence) const {
-  return evidence.lasting_matches >= kEnoughLasting && !lastingDisagree(evidence);
-}
-
-bool MotionSearch::isImplausible(const PoseEvidence& evidence) const {
-  return judgeChange(verdict_options_, evidence).trust == Trust::kDoubtful && !lastingAgree(evidence);
 }
 
 /// Fewer inliers than that are no rival of a motion.

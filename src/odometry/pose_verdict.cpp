@@ -8,8 +8,7 @@
 namespace sdvo {
 namespace {
 
-constexpr double kSigmas = 5.0;     // by which noise alone may exceed a limit
-constexpr int kEnoughLasting = 20;  // fewer matches of lasting points say nothing
+constexpr double kSigmas = 5.0;  // by which noise alone may exceed a limit
 
 template <class... Parts>
 PoseVerdict verdict(Trust trust, const Parts&... parts) {
@@ -44,8 +43,7 @@ PoseVerdict judgePose(const PoseVerdictOptions& options, int min_inliers, const 
     return verdict(Trust::kNone, "a rotation of ", angle / evidence.dt, " rad/s exceeds tracking/max_rotation_rate");
 
   // What a motion should not be.
-  if (evidence.lasting_matches >= kEnoughLasting &&
-      evidence.lasting_inliers < options.doubtful_lasting_ratio * evidence.lasting_matches)
+  if (lastingDisagree(options, evidence))
     return verdict(Trust::kDoubtful, "only ", evidence.lasting_inliers, " of ", evidence.lasting_matches,
                    " lasting points agree with the motion of ", evidence.inliers, " inliers");
   if (!evidence.confirmed && evidence.inliers < options.doubtful_inliers)
@@ -91,6 +89,19 @@ PoseVerdict judgeChange(const PoseVerdictOptions& options, const PoseEvidence& e
                     " s exceeds tracking/max_rotation_acceleration");
   doubt.of_rate = doubt.trust == Trust::kDoubtful;
   return doubt;
+}
+
+bool lastingDisagree(const PoseVerdictOptions& options, const PoseEvidence& evidence) {
+  return evidence.lasting_matches >= kEnoughLasting &&
+         evidence.lasting_inliers < options.doubtful_lasting_ratio * evidence.lasting_matches;
+}
+
+bool lastingAgree(const PoseVerdictOptions& options, const PoseEvidence& evidence) {
+  return evidence.lasting_matches >= kEnoughLasting && !lastingDisagree(options, evidence);
+}
+
+bool isImplausible(const PoseVerdictOptions& options, const PoseEvidence& evidence) {
+  return judgeChange(options, evidence).trust == Trust::kDoubtful && !lastingAgree(options, evidence);
 }
 
 bool isUnexpected(const PoseEvidence& evidence) {

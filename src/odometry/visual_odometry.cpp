@@ -86,15 +86,27 @@ void VisualOdometry::breakStream() {
   state_.velocity.reset();
 }
 
+void VisualOdometry::forgetTime() {
+  breakStream();
+  state_.last_stamp.reset();
+  state_.last_velocity.reset();
+}
+
 OdometryResult VisualOdometry::update(const StereoFeatures& features, const std::optional<MotionGuess>& guess) {
   refuse(features);
   const double dt = state_.last_stamp ? static_cast<double>(features.stamp - *state_.last_stamp) * 1e-9 : 0.0;
   const bool continued = state_.map && state_.map->continuedBy(features);
-  const bool frozen = isFrozen(features, dt);
+  const bool frozen = isFrozen(features, dt, guess);
   const MotionHypothesis found = continued && !frozen ? localise(features, dt, guess) : MotionHypothesis{};
 
   // Nothing has changed so far, and from here on nothing is refused.
   Stopwatch stopwatch;
+  if (state_.camera && *state_.camera != features.camera) {
+    // What was learnt of the rig is of another one.
+    state_.calibration = CalibrationFilter(options_.calibration);
+    state_.right_rotation = RightCameraRotation();
+  }
+  state_.camera = features.camera;
   state_.last_stamp = features.stamp;
   ++state_.pairs;
   const bool turned = state_.right_rotation.add(features);
@@ -179,7 +191,7 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
   }
   if (state_.started) {
     ++epoch_;
-    const double unseen = static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9;
+    const double unseen = std::max(0.0, static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9);
     state_.covariance.restart(
         travelCovariance(state_.last_velocity.value_or(Vector6d::Zero()), unseen, options_.tracking.max_speed));
     step.state = TrackingState::kDegraded;
@@ -198,103 +210,132 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
   return step;
 }
 
+/// The pair joins the map, which is adjusted with it. What the adjustment refutes leaves everything as it was.
 VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, double dt,
                                                const MotionHypothesis& found) {
-  LocalMap& map = *state_.map;
-  std::optional<LocalMap> before;  // for a motion that the adjustment may refute
-  if (found.verdict.trust != Trust::kSound) before = map;
-  const double since_newest = static_cast<double>(features.stamp - map.newestStamp()) * 1e-9;
-
-  const Eigen::Isometry3d newest_before = map.newestPose();
-  const Eigen::Isometry3d T_previous_measured =
-      (found.motion.T_current_reference * newest_before * state_.T_origin_camera).inverse();
-  RigCalibration calibration = state_.calibration.calibration();
-  map.insert(features, state_.pairs, found.motion.T_current_reference * map.newestPose(), found.sightings, calibration);
-  const Eigen::Isometry3d T_before_origin = map.poseBeforeNewest();
-  if (map.newestIsKeyframe() && found.verdict.trust == Trust::kSound) recall(features);
-  const CalibrationBelief prior = state_.calibration.prior(map.oldestId());
-  LocalMap::Adjustment adjustment = map.adjust(optimizer_, prior, calibration);
-  map.renewLooks(features, found.sightings);
-
-  Step step;
-  step.rejected_rows = adjustment.rejected_rows;
-  step.T_previous_current = (map.newestPose() * state_.T_origin_camera).inverse();
-  PoseEvidence evidence = found.evidence;
-  const std::vector<int> confirmed = found.inlierRows(step.rejected_rows);
-  evidence.inliers = static_cast<int>(confirmed.size());
-  evidence.coverage = coverage(features, confirmed);
-  // What the adjustment did to the map as a whole is no motion.
-  evidence.motion = newest_before * (T_before_origin.inverse() * map.poseBeforeNewest()) * map.newestPose().inverse();
-  evidence.lasting_inliers = found.lastingInliers(step.rejected_rows);
-  if (adjustment.success) {
-    adjustment.covariances.inflateNewest(excessOfFew(evidence.inliers, options_.tracking.doubtful_inliers));
-    evidence.deviation = std::sqrt(adjustment.covariances.since_keyframe.topLeftCorner<3, 3>().trace());
-  }
+  std::optional<std::pair<LocalMap, CalibrationFilter>> before;
+  if (found.verdict.trust != Trust::kSound) before.emplace(*state_.map, state_.calibration);
+  Extension extension = insert(features, found);
+  const PoseEvidence evidence = gatherEvidence(features, found, extension);
   PoseVerdict verdict = judgePose(options_.tracking, options_.motion.min_inliers, evidence);
   if (verdict.trust == Trust::kNone) {
     // Without a map to go back to, what it has become is of no use.
     if (before)
-      map = std::move(*before);
+      state_.map = std::move(before->first), state_.calibration = std::move(before->second);
     else
       breakStream();
     return predict(features, dt, verdict.reason + " after the adjustment");
   }
-  if (search_.lastingDisagree(evidence)) watch(kWatched);
   if (verdict.trust == Trust::kSound || found.T_current_reference_else) verdict = found.verdict;
-  // After a new start, or a motion of something else, it may be that which is followed.
-  if ((!state_.velocity || state_.contested_pairs > 0) && isUnexpected(evidence)) watch(kWatched);
-  const bool watched = verdict.trust == Trust::kSound && state_.contested_pairs > 0;
+  const bool watched = isWatched(evidence) && verdict.trust == Trust::kSound;
   if (watched)
     verdict = {Trust::kDoubtful,
                "a moment ago left and right disagreed, two motions were in view, or none was certain"};
 
-  if (adjustment.success) {
-    state_.calibration.note(map.newestId(), calibration, adjustment.calibration_information);
-    if (verdict.trust == Trust::kSound && adjustment.common_disparity_square)
-      state_.calibration.noteCommon(*adjustment.common_disparity_square);
-    adjustment.covariances.inflateNewest(state_.outlier_level.excess(kFewOutliers + outlierShare(evidence)));
-    step.covariance = state_.covariance.advance(*step.T_previous_current, adjustment.covariances);
-    // As a perturbation of the frame before, then of the newest one.
-    step.correction = adjoint(map.newestPose() * map.poseBeforeNewest().inverse()) *
-                      logSE3(T_before_origin * map.poseBeforeNewest().inverse());
-    cover(step);
-    // A view that changed in another way than expected was aligned from a worse start.
-    const Eigen::Isometry3d expected = expSE3(state_.velocity.value_or(Vector6d::Zero()) * dt);
-    step.covariance += kSurprise * kSurprise * disagreement(*step.T_previous_current, expected);
-  } else {
-    step.covariance = found.motion.covariance;
-    state_.covariance.advance(*step.T_previous_current, step.covariance);
-  }
-  const Matrix6d measured = step.covariance;
+  Step step;
   step.state = TrackingState::kTracking;
+  step.rejected_rows = extension.adjustment.rejected_rows;
+  step.T_previous_current = (state_.map->newestPose() * state_.T_origin_camera).inverse();
+  measure(dt, found, evidence, verdict.trust, extension, step);
+  const Matrix6d measured = step.covariance;
   if (verdict.trust == Trust::kSound) state_.last_doubt.setZero();
   if (verdict.trust == Trust::kDoubtful) {
-    const Matrix6d doubted = watched && !state_.last_doubt.isZero()
-                                 ? state_.last_doubt
-                                 : doubt(found, T_previous_measured, *step.T_previous_current, dt);
-    state_.last_doubt = doubted;
+    if (!watched || state_.last_doubt.isZero())
+      state_.last_doubt = doubt(found, extension, *step.T_previous_current, dt);
     step.state = TrackingState::kDegraded;
     step.reason = "doubtful: " + verdict.reason;
-    step.covariance += doubted;
+    step.covariance += state_.last_doubt;
     // Where the lasting points confirm the way, the stamps may be wrong, and only the speed is in doubt.
-    if (!verdict.of_rate || !search_.lastingAgree(evidence)) state_.covariance.doubt(doubted);
+    if (!verdict.of_rate || !lastingAgree(options_.tracking, evidence)) state_.covariance.doubt(state_.last_doubt);
   }
-  const Vector6d velocity = logSE3(found.motion.T_current_reference.inverse()) / since_newest;
-  // Stamps that lie too close make no velocity, nor does what may be the motion of something else.
-  if (!search_.isImplausible(evidence) && velocity.head<3>().norm() <= options_.tracking.max_speed &&
-      velocity.tail<3>().norm() <= options_.tracking.max_rotation_rate) {
-    state_.velocity = velocity;
-    state_.velocity_covariance = measured / (since_newest * since_newest);
-    // What is doubted predicts the next pair, but nothing is judged by it as long as there is something better.
-    const double age = static_cast<double>(features.stamp - state_.velocity_stamp) * 1e-9;
-    if (verdict.trust == Trust::kSound || !state_.last_velocity || age > kLately) {
-      state_.last_velocity = velocity;
-      state_.velocity_stamp = features.stamp;
-    }
-  }
+  noteVelocity(features.stamp, found, evidence, verdict.trust, measured);
   state_.predicted_pairs = 0;
-  if (map.newestIsKeyframe()) state_.covariance.markKeyframe();
+  if (state_.map->newestIsKeyframe()) state_.covariance.markKeyframe();
   return step;
+}
+
+VisualOdometry::Extension VisualOdometry::insert(const StereoFeatures& features, const MotionHypothesis& found) {
+  LocalMap& map = *state_.map;
+  Extension extension;
+  extension.T_previous_origin = map.newestPose();
+  extension.calibration = state_.calibration.calibration();
+  map.insert(features, state_.pairs, found.motion.T_current_reference * map.newestPose(), found.sightings,
+             extension.calibration);
+  extension.T_keyframe_origin = map.poseBeforeNewest();
+  if (map.newestIsKeyframe() && found.verdict.trust == Trust::kSound) recall(features);
+  const CalibrationBelief prior = state_.calibration.prior(map.oldestId());
+  extension.adjustment = map.adjust(optimizer_, prior, extension.calibration);
+  map.renewLooks(features, found.sightings);
+  return extension;
+}
+
+/// What speaks for the motion after the adjustment. Few inliers make that know less.
+PoseEvidence VisualOdometry::gatherEvidence(const StereoFeatures& features, const MotionHypothesis& found,
+                                            Extension& extension) const {
+  const LocalMap& map = *state_.map;
+  LocalMap::Adjustment& adjustment = extension.adjustment;
+  PoseEvidence evidence = found.evidence;
+  const std::vector<int> confirmed = found.inlierRows(adjustment.rejected_rows);
+  evidence.inliers = static_cast<int>(confirmed.size());
+  evidence.coverage = coverage(features, confirmed);
+  evidence.lasting_inliers = found.lastingInliers(adjustment.rejected_rows);
+  // What the adjustment did to the map as a whole is no motion.
+  const Eigen::Isometry3d T_before_after = extension.T_keyframe_origin.inverse() * map.poseBeforeNewest();
+  evidence.motion = extension.T_previous_origin * T_before_after * map.newestPose().inverse();
+  if (adjustment.success) {
+    adjustment.covariances.inflateNewest(excessOfFew(evidence.inliers, options_.tracking.doubtful_inliers));
+    evidence.deviation = std::sqrt(adjustment.covariances.since_keyframe.topLeftCorner<3, 3>().trace());
+  }
+  return evidence;
+}
+
+/// Whether a motion is doubted because of what was seen a moment ago, or of what this pair shows.
+bool VisualOdometry::isWatched(const PoseEvidence& evidence) {
+  if (lastingDisagree(options_.tracking, evidence)) watch(kWatched);
+  // After a new start, or a motion of something else, it may be that which is followed.
+  if ((!state_.velocity || state_.contested_pairs > 0) && isUnexpected(evidence)) watch(kWatched);
+  return state_.contested_pairs > 0;
+}
+
+/// The motion's covariance, and what the adjustment tells of the rig and of the poses before.
+void VisualOdometry::measure(double dt, const MotionHypothesis& found, const PoseEvidence& evidence, Trust trust,
+                             Extension& extension, Step& step) {
+  const LocalMap& map = *state_.map;
+  LocalMap::Adjustment& adjustment = extension.adjustment;
+  if (!adjustment.success) {
+    step.covariance = found.motion.covariance;
+    state_.covariance.advance(*step.T_previous_current, step.covariance);
+    return;
+  }
+  state_.calibration.note(map.newestId(), extension.calibration, adjustment.calibration_information);
+  if (trust == Trust::kSound && adjustment.common_disparity_square)
+    state_.calibration.noteCommon(*adjustment.common_disparity_square);
+  adjustment.covariances.inflateNewest(state_.outlier_level.excess(kFewOutliers + outlierShare(evidence)));
+  step.covariance = state_.covariance.advance(*step.T_previous_current, adjustment.covariances);
+  // As a perturbation of the frame before, then of the newest one.
+  step.correction = adjoint(map.newestPose() * map.poseBeforeNewest().inverse()) *
+                    logSE3(extension.T_keyframe_origin * map.poseBeforeNewest().inverse());
+  cover(step);
+  // A view that changed in another way than expected was aligned from a worse start.
+  const Eigen::Isometry3d expected = expSE3(state_.velocity.value_or(Vector6d::Zero()) * dt);
+  step.covariance += kSurprise * kSurprise * disagreement(*step.T_previous_current, expected);
+}
+
+/// The velocity since the map's newest pair before, for what comes next. Stamps that lie too close make none, nor does
+/// what may be the motion of something else.
+void VisualOdometry::noteVelocity(std::int64_t stamp, const MotionHypothesis& found, const PoseEvidence& evidence,
+                                  Trust trust, const Matrix6d& covariance) {
+  const Vector6d velocity = logSE3(found.motion.T_current_reference.inverse()) / evidence.dt;
+  if (isImplausible(options_.tracking, evidence) || !(velocity.head<3>().norm() <= options_.tracking.max_speed) ||
+      !(velocity.tail<3>().norm() <= options_.tracking.max_rotation_rate))
+    return;
+  state_.velocity = velocity;
+  state_.velocity_covariance = covariance / (evidence.dt * evidence.dt);
+  // What is doubted predicts the next pair, but nothing is judged by it as long as there is something better.
+  const double age = static_cast<double>(stamp - state_.velocity_stamp) * 1e-9;
+  if (trust != Trust::kSound && state_.last_velocity && age <= kLately) return;
+  state_.last_velocity = velocity;
+  state_.velocity_stamp = stamp;
 }
 
 /// A camera that comes back to where it was before is tied to the key frame that it left there.
@@ -357,8 +398,10 @@ void VisualOdometry::cover(Step& step) {
 
 /// How far a doubtful motion may be off: as far as what was expected, and as the hypothesis that speaks against it; and
 /// as far as the adjustment moved it.
-Matrix6d VisualOdometry::doubt(const MotionHypothesis& found, const Eigen::Isometry3d& T_previous_measured,
+Matrix6d VisualOdometry::doubt(const MotionHypothesis& found, const Extension& extension,
                                const Eigen::Isometry3d& T_previous_current, double dt) const {
+  const Eigen::Isometry3d T_previous_measured =
+      (found.motion.T_current_reference * extension.T_previous_origin * state_.T_origin_camera).inverse();
   const Eigen::Isometry3d predicted = expSE3(state_.last_velocity.value_or(Vector6d::Zero()) * dt);
   Matrix6d doubt = disagreement(T_previous_current, T_previous_measured) + disagreement(T_previous_current, predicted) +
                    predictionCovariance(dt);
@@ -419,7 +462,7 @@ OdometryResult VisualOdometry::report(const StereoFeatures& features, double dt,
 
   result.flow.reserve(found.matches.size());
   for (const FeatureMatch& match : found.matches) {
-    const cv::Point3f& previous = found.view.pixels[match.reference];
+    const cv::Point3f& previous = found.view->pixels[match.reference];
     result.flow.push_back({previous.x, previous.y, match.current, false});
   }
   const std::vector<int>& rejected = step.rejected_rows;
@@ -448,16 +491,19 @@ OdometryResult VisualOdometry::report(const StereoFeatures& features, double dt,
   return result;
 }
 
-/// A camera that repeats its images seems to stand. Whether it does, the motion before tells: where that would have
-/// moved the points, only the images stood still.
-bool VisualOdometry::isFrozen(const StereoFeatures& features, double dt) const {
+/// A camera that repeats its images seems to stand. Whether it does, the guess or the motion before tells: where that
+/// would have moved the points, only the images stood still.
+bool VisualOdometry::isFrozen(const StereoFeatures& features, double dt,
+                              const std::optional<MotionGuess>& guess) const {
   constexpr double kSeen = 1.0;  // px
   if (features.count() == 0 || state_.image[0] != features.u || state_.image[1] != features.v ||
       state_.image[2] != features.disparity)
     return false;
   if (state_.frozen) return true;
-  if (!state_.velocity) return false;
-  const Eigen::Isometry3d T_current_previous = expSE3(*state_.velocity * -dt);
+  const bool is_guessed = guess && !guess->rotation_only;
+  if (!is_guessed && !state_.velocity) return false;
+  const Eigen::Isometry3d T_current_previous =
+      is_guessed ? guess->T_previous_current.inverse() : expSE3(*state_.velocity * -dt);
   int moved = 0;
   for (int i = 0; i < features.count(); ++i) {
     const Eigen::Vector3d point = features.camera.backProject(features.u[i], features.v[i], features.disparity[i]);

@@ -352,17 +352,18 @@ WindowOptimizer& WindowOptimizer::operator=(WindowOptimizer&&) noexcept = defaul
 WindowOptimizer::~WindowOptimizer() = default;
 
 const WindowSolution& WindowOptimizer::optimize(Window& window) {
-  constexpr double kLargestDamping = 1e4;
+  constexpr double kUndamped = 1e-5, kLargestDamping = 1e4;
   auto& [solver, system, next, hessian, covariance, factor, step, squares, solution] = *memory_;
   solver.take(window);
   solution.success = false;
   solution.iterations = 0;
-  double damping = 1e-5;
+  double damping = kUndamped, damping_of_system = kUndamped;
   bool accepted = false;
   const int c = 6 * solver.poses();
   while (solution.iterations < options_.iterations && damping < kLargestDamping) {
     ++solution.iterations;
     solver.linearise(window, damping, system);
+    damping_of_system = damping;
     hessian = system.hessian;  // its lower triangle
     hessian.diagonal().head(c) *= 1.0 + damping;
     step = factor.compute(hessian).solve(system.gradient);
@@ -383,6 +384,8 @@ const WindowSolution& WindowOptimizer::optimize(Window& window) {
   }
 
   // Of the last linearisation, one step before the result: close enough for a covariance, and half of the work saved.
+  // But points held by damping would say too much.
+  if (damping_of_system > kUndamped) solver.linearise(window, kUndamped, system);
   factor.compute(system.hessian);
   if (factor.info() != Eigen::Success || !factor.isPositive()) return solution;
   covariance = factor.solve(Eigen::MatrixXd::Identity(solver.size(), solver.size()));

@@ -10,7 +10,8 @@
 
 namespace sdvo {
 
-/// Where the camera sits on the robot, as TF tells; read once for a camera. One thread asks, others may read.
+/// Where the camera sits on the robot, as TF tells; read once for a camera, until that is forgotten. One thread asks,
+/// others may read.
 class CameraMount {
  public:
   /// `timeout`, s of wall time: how long the first question waits, because static transforms and the first features
@@ -23,6 +24,9 @@ class CameraMount {
 
   /// Whether find() has it already.
   bool knows(const std::string& base_frame, const std::string& camera_frame) const;
+
+  /// find() asks TF again.
+  void forget() { camera_frame_.clear(); }
 
   /// What was found last. From any thread.
   std::optional<Eigen::Isometry3d> last() const;

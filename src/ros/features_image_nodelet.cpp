@@ -56,6 +56,7 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
     callbacks_.start();
   } catch (const std::exception& e) {
     NODELET_FATAL_STREAM("not started: " << e.what());
+    throw;  // the manager forgets the nodelet, and its loader ends with an error
   }
 
   void updateInputs() try {

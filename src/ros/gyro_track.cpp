@@ -20,7 +20,8 @@ double seconds(std::int64_t nanoseconds) {
 void GyroTrack::add(std::int64_t stamp, const Eigen::Vector3d& rate) {
   if (!rate.allFinite()) return;
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!measurements_.empty() && stamp <= measurements_.back().stamp) measurements_.clear();
+  if (!measurements_.empty() && stamp == measurements_.back().stamp) return;
+  if (!measurements_.empty() && stamp < measurements_.back().stamp) measurements_.clear();
   measurements_.push_back({stamp, rate});
   while (stamp - measurements_.front().stamp > kKept) measurements_.pop_front();
 }

@@ -12,8 +12,8 @@ namespace sdvo {
 /// several threads.
 class GyroTrack {
  public:
-  /// `rate`: rad/s in the gyro's axes; `stamp`: ns. What is not finite is left out; a stamp that does not increase
-  /// begins anew, as after a clock's jump.
+  /// `rate`: rad/s in the gyro's axes; `stamp`: ns. What is not finite is left out, and what has the stamp of the
+  /// last one; an earlier stamp begins anew, as after a clock's jump.
   void add(std::int64_t stamp, const Eigen::Vector3d& rate);
 
   /// R_from_to, as in v_from = R_from_to * v_to; nothing unless measurements reach from one time to the other without

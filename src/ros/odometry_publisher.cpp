@@ -18,6 +18,10 @@ OdometryPublisher::OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOp
   info_publisher_ = nh.advertise<stereo_descriptor_vo::VoInfo>("vo_info", kQueue);
   points_publisher_ = nh.advertise<sensor_msgs::PointCloud2>("points", 1);
   flow_publisher_ = nh.advertise<stereo_descriptor_vo::FeatureFlow>("feature_flow", kQueue);
+  path_timer_ = nh.createWallTimer(ros::WallDuration(kPathPeriod), [this](const ros::WallTimerEvent&) {
+    if (path_publisher_.getNumSubscribers() > 0 && path_changed_.exchange(false))
+      path_publisher_.publish(boost::make_shared<nav_msgs::Path>(path()));
+  });
 }
 
 void OdometryPublisher::publish(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera) {
@@ -75,11 +79,9 @@ nav_msgs::Path OdometryPublisher::path() const {
 }
 
 void OdometryPublisher::extendPath(const nav_msgs::Odometry& odometry) {
-  {
-    const std::lock_guard<std::mutex> lock(path_mutex_);
-    path_.push_back({odometry.header.stamp, odometry.pose.pose});  // in the place of the oldest once it is full
-  }
-  if (path_publisher_.getNumSubscribers() > 0) path_publisher_.publish(boost::make_shared<nav_msgs::Path>(path()));
+  const std::lock_guard<std::mutex> lock(path_mutex_);
+  path_.push_back({odometry.header.stamp, odometry.pose.pose});  // in the place of the oldest once it is full
+  path_changed_ = true;
 }
 
 }  // namespace sdvo

@@ -5,6 +5,7 @@
 #include <ros/node_handle.h>
 #include <tf2_ros/transform_broadcaster.h>
 
+#include <atomic>
 #include <boost/circular_buffer.hpp>
 #include <mutex>
 
@@ -13,7 +14,7 @@
 
 namespace sdvo {
 
-/// odom, TF, path, points, feature_flow and vo_info of one processed pair.
+/// odom, TF, points, feature_flow and vo_info of one processed pair, and the path, which is long, once in a second.
 class OdometryPublisher {
  public:
   OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOptions& options);
@@ -37,6 +38,8 @@ class OdometryPublisher {
     geometry_msgs::Pose pose;
   };
 
+  static constexpr double kPathPeriod = 1.0;  // s of wall time
+
   void extendPath(const nav_msgs::Odometry& odometry);
 
   OdometryOutputOptions options_;
@@ -47,6 +50,8 @@ class OdometryPublisher {
   Eigen::Isometry3d T_odom_start_ = Eigen::Isometry3d::Identity();
   mutable std::mutex path_mutex_;
   boost::circular_buffer<PathPose> path_;
+  std::atomic<bool> path_changed_{false};  ///< since it was published
+  ros::WallTimer path_timer_;
 };
 
 }  // namespace sdvo

@@ -37,6 +37,7 @@
 #include "robot_transforms.hpp"
 #include "stamps.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
+#include "waiting_stamps.hpp"
 #include "worker.hpp"
 
 namespace sdvo {
@@ -78,7 +79,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   /// Of the last pair observed.
   struct Last {
-    ros::Time stamp, session;
+    ros::Time stamp, now, session;
     std::uint32_t epoch;
     StereoCamera camera;
     DescriptorKind kind;
@@ -137,6 +138,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     slow_callbacks_.start();
   } catch (const std::exception& e) {
     NODELET_FATAL_STREAM("not started: " << e.what());
+    throw;  // the manager forgets the nodelet, and its loader ends with an error
   }
 
   /// With the places of the parameter's file. On a robot's first day there is none.
@@ -156,11 +158,17 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   // Input, in the callbacks' thread.
 
-  void subscribe() {
+  /// Anew: what waited is forgotten.
+  void synchronise() {
     synchroniser_ = std::make_unique<Synchroniser>(features_, odometry_, info_,
                                                    static_cast<std::uint32_t>(options_.output.sync_queue_size));
     synchroniser_->registerCallback(&PlaceRecognitionNodelet::onPair, this);
     synchroniser_->registerDropCallback(&PlaceRecognitionNodelet::onUnpaired, this);
+  }
+
+  void subscribe() {
+    waiting_ = std::make_unique<WaitingStamps>(static_cast<std::size_t>(options_.output.sync_queue_size));
+    synchronise();
     const auto queue = static_cast<std::uint32_t>(options_.output.sync_queue_size);
     subscribers_ = {
         nh_.subscribe<Features>("stereo_features", queue, [this](const Features::ConstPtr& m) { take(m, features_); }),
@@ -172,6 +180,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   void take(const boost::shared_ptr<const Message>& message, message_filters::PassThrough<Message>& input) try {
     const std::string problem = whyUnusable(message->header.stamp);
     if (!problem.empty()) throw std::invalid_argument(problem);
+    if (waiting_->shutOut(nanoseconds(message->header.stamp))) synchronise();
     input.add(message);
   } catch (const std::exception& e) {
     ++malformed_;
@@ -181,6 +190,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   void onPair(const Features::ConstPtr& features, const Odometry::ConstPtr& odometry, const Info::ConstPtr& info) {
     diagnostics_->notePair();
+    waiting_->complete(nanoseconds(features->header.stamp));
     if (options_.output.publish_tf)
       transforms_->claim({ros_conversions::cleanFrameId(options_.output.map_frame_id),
                           ros_conversions::cleanFrameId(odometry->header.frame_id)});
@@ -202,13 +212,19 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     const Eigen::Isometry3d T_odom_camera = ros_conversions::toPose(pair.odometry->pose.pose) * *T_base_camera;
 
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (session_->last && stamp < session_->last->stamp) restart("the clock jumped back");
+    const ros::Time now = ros::Time::now();
+    if (session_->last && stamp < session_->last->stamp) {
+      if (!ros::Time::isSimTime() && now < session_->last->now)
+        session_->continues = false;  // the system's clock was set back: the places are where they were
+      else
+        restart("the clock jumped back");
+    }
     Session& session = *session_;
     if (session.last && stamp == session.last->stamp) return;
     refuseOtherCamera(session, features.camera, features.kind());
     const CameraMotion motion = motionOf(pair, T_odom_camera, *T_base_camera);
     const std::optional<PlaceReport> report = session.recognition.observe(features, motion);
-    session.last = {stamp, pair.info->session, pair.info->epoch, features.camera, features.kind()};
+    session.last = {stamp, now, pair.info->session, pair.info->epoch, features.camera, features.kind()};
     session.continues = true;
     session.odom_frame = ros_conversions::cleanFrameId(pair.odometry->header.frame_id);
     session.stream = ros_conversions::streamOf(*pair.features);
@@ -473,6 +489,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   message_filters::PassThrough<Odometry> odometry_;
   message_filters::PassThrough<Info> info_;
   std::unique_ptr<Synchroniser> synchroniser_;
+  std::unique_ptr<WaitingStamps> waiting_;  // in it
   std::vector<ros::Subscriber> subscribers_;
 };
 

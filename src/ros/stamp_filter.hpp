@@ -17,7 +17,8 @@ class StampFilter {
  public:
   struct Passed {
     Item item;
-    int timeline;  ///< one more after every jump back
+    int timeline;     ///< one more after every jump back but these:
+    int clock_steps;  ///< one more after every jump back that the clock made, too
   };
 
   /// `now` is the clock's time at the item's arrival. Returns what may be processed, in order: usually the item itself.
@@ -69,9 +70,9 @@ class StampFilter {
   }
 
   Passed pass(Item item, const Arrival& arrival) {
-    if (last_ && arrival.stamp <= last_->stamp) ++timeline_;
+    if (last_ && arrival.stamp <= last_->stamp) ++(arrival.now < last_->now ? clock_steps_ : timeline_);
     last_ = arrival;
-    return {std::move(item), timeline_};
+    return {std::move(item), timeline_, clock_steps_};
   }
 
   void dropHeld() {
@@ -81,7 +82,7 @@ class StampFilter {
 
   std::optional<Arrival> last_;
   std::optional<std::pair<Item, Arrival>> held_;
-  int timeline_ = 0;
+  int timeline_ = 0, clock_steps_ = 0;
   std::uint64_t dropped_ = 0;
 };
 

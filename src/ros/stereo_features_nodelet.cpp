@@ -89,6 +89,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     callbacks_.start();
   } catch (const std::exception& e) {
     NODELET_FATAL_STREAM("not started: " << e.what());
+    throw;  // the manager forgets the nodelet, and its loader ends with an error
   }
 
   void updateInput() try {
@@ -164,7 +165,8 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     const StereoPairMessages& pair = passed.item;
     takeOverOptions();
     const ros::Time stamp = pair.left_image->header.stamp;
-    if (std::exchange(timeline_, passed.timeline) != passed.timeline) {
+    const bool restarted = std::exchange(timeline_, passed.timeline) != passed.timeline;
+    if (std::exchange(clock_steps_, passed.clock_steps) != passed.clock_steps || restarted) {
       NODELET_WARN_STREAM("the clock jumped back to " << stamp << ": a new stream begins");
       ++stream_epoch_;
     }
@@ -227,7 +229,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   // Only the worker's thread touches these.
   std::unique_ptr<FeatureExtractor> extractor_;
   PairDecoder decoder_;
-  int timeline_ = 0;
+  int timeline_ = 0, clock_steps_ = 0;
   std::uint32_t stream_epoch_ = 0;
   bool rig_refused_ = false;  // as reported last
 

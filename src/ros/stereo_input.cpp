@@ -22,17 +22,33 @@ std::array<std::string, ArrivalLog::kInputs> resolvedTopics(const ros::NodeHandl
 
 StereoInput::StereoInput(ros::NodeHandle& nh, StereoImageTransport& transport, const StereoInputOptions& options,
                          Callback callback, Refusal refuse)
-    : callback_(std::move(callback)), refuse_(std::move(refuse)), arrivals_(resolvedTopics(nh), options) {
+    : callback_(std::move(callback)),
+      refuse_(std::move(refuse)),
+      options_(options),
+      arrivals_(resolvedTopics(nh), options),
+      waiting_(static_cast<std::size_t>(options.sync_queue_size)) {
   const auto topics = resolvedTopics(nh);
   connect(left_image_, left_image_gate_, ArrivalLog::kLeftImage, topics[0]);
   connect(right_image_, right_image_gate_, ArrivalLog::kRightImage, topics[1]);
   connect(left_info_, left_info_gate_, ArrivalLog::kLeftInfo, topics[2]);
   connect(right_info_, right_info_gate_, ArrivalLog::kRightInfo, topics[3]);
 
-  const auto queue = static_cast<std::uint32_t>(options.sync_queue_size);
-  if (options.approximate_sync) {
+  synchronise();
+
+  const auto arrivals =
+      static_cast<std::uint32_t>(std::max({kArrivalQueue, options.sync_queue_size, options.queue_size}));
+  left_image_.subscribe(nh, topics[0], arrivals, transport.left(), transport.hints());
+  right_image_.subscribe(nh, topics[1], arrivals, transport.right(), transport.hints());
+  left_info_.subscribe(nh, topics[2], arrivals);
+  right_info_.subscribe(nh, topics[3], arrivals);
+}
+
+/// Anew: what waited is forgotten.
+void StereoInput::synchronise() {
+  const auto queue = static_cast<std::uint32_t>(options_.sync_queue_size);
+  if (options_.approximate_sync) {
     ApproximatePolicy policy(queue);
-    policy.setMaxIntervalDuration(ros::Duration(options.max_interval));
+    policy.setMaxIntervalDuration(ros::Duration(options_.max_interval));
     approximate_ = std::make_unique<message_filters::Synchronizer<ApproximatePolicy>>(
         static_cast<const ApproximatePolicy&>(policy), left_image_gate_, right_image_gate_, left_info_gate_,
         right_info_gate_);
@@ -42,13 +58,6 @@ StereoInput::StereoInput(ros::NodeHandle& nh, StereoImageTransport& transport, c
         ExactPolicy(queue), left_image_gate_, right_image_gate_, left_info_gate_, right_info_gate_);
     exact_->registerCallback(&StereoInput::onPair, this);
   }
-
-  const auto arrivals =
-      static_cast<std::uint32_t>(std::max({kArrivalQueue, options.sync_queue_size, options.queue_size}));
-  left_image_.subscribe(nh, topics[0], arrivals, transport.left(), transport.hints());
-  right_image_.subscribe(nh, topics[1], arrivals, transport.right(), transport.hints());
-  left_info_.subscribe(nh, topics[2], arrivals);
-  right_info_.subscribe(nh, topics[3], arrivals);
 }
 
 template <class Source, class Message>
@@ -59,10 +68,10 @@ void StereoInput::connect(Source& source, Gate<Message>& gate, ArrivalLog::Input
       const ros::Time& stamp = message->header.stamp;
       arrivals_.note(input, stamp, ros::SteadyTime::now().toSec());
       const std::string problem = whyUnusable(stamp);
-      if (problem.empty())
-        gate.signalMessage(message);
-      else
-        refuse_(topic, problem);
+      if (!problem.empty()) return refuse_(topic, problem);
+      // The policy of other stamps takes what waits longest in its queue for the oldest, whatever its stamp.
+      if (!options_.approximate_sync && waiting_.shutOut(nanoseconds(stamp))) synchronise();
+      gate.signalMessage(message);
     } catch (const std::exception& e) {
       refuse_(topic, e.what());
     }
@@ -74,6 +83,7 @@ void StereoInput::onPair(const sensor_msgs::ImageConstPtr& left_image, const sen
                          const sensor_msgs::CameraInfoConstPtr& left_info,
                          const sensor_msgs::CameraInfoConstPtr& right_info) {
   arrivals_.notePair();
+  waiting_.complete(nanoseconds(left_image->header.stamp));
   callback_({left_image, right_image, left_info, right_info});
 }
 

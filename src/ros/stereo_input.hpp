@@ -15,6 +15,7 @@
 #include "../config/interface_options.hpp"
 #include "arrival_log.hpp"
 #include "image_subscriber.hpp"
+#include "waiting_stamps.hpp"
 
 namespace sdvo {
 
@@ -54,12 +55,15 @@ class StereoInput {
   template <class Source, class Message>
   void connect(Source& source, Gate<Message>& gate, ArrivalLog::Input input, const std::string& topic);
 
+  void synchronise();
   void onPair(const sensor_msgs::ImageConstPtr& left_image, const sensor_msgs::ImageConstPtr& right_image,
               const sensor_msgs::CameraInfoConstPtr& left_info, const sensor_msgs::CameraInfoConstPtr& right_info);
 
   Callback callback_;
   Refusal refuse_;
+  const StereoInputOptions options_;
   ArrivalLog arrivals_;
+  WaitingStamps waiting_;
 
   // Destroyed in reverse order: first the subscribers, then the synchronisers, which let go of the gates.
   Gate<Image> left_image_gate_, right_image_gate_;

@@ -24,6 +24,7 @@
 #include "odometry_diagnostics.hpp"
 #include "odometry_publisher.hpp"
 #include "params.hpp"
+#include "patience.hpp"
 #include "reconfigure_server.hpp"
 #include "report_throttle.hpp"
 #include "robot_transforms.hpp"
@@ -68,6 +69,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
       NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect");
+    if (options_.output.use_imu && !options_.output.guess_frame_id.empty())
+      throw std::invalid_argument("use_imu and guess_frame_id exclude each other");
     T_odom_start_ = ros_conversions::toPose(options_.output.initial_pose);
     odometry_ = std::make_unique<VisualOdometry>(options_.odometry);
     publisher_ = std::make_unique<OdometryPublisher>(nh_, options_.output);
@@ -76,6 +79,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
       if (throttle_.allows(what)) NODELET_WARN_STREAM(what);
     });
     mount_ = std::make_unique<CameraMount>(*transforms_, options_.output.tf_timeout);
+    patience_ = Patience(options_.output.guess_timeout);
     diagnostics_ = std::make_unique<OdometryDiagnostics>(nh_, private_nh, getName(), nh_.resolveName("stereo_features"),
                                                          options_.output.max_silence);
     services_ = {private_nh.advertiseService("reset", &VisualOdometryNodelet::onReset, this),
@@ -88,8 +92,6 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     reconfigure_server_ =
         std::make_unique<ReconfigureServer>(private_nh, listOptions(reconfigured_), [this] { onReconfigure(); });
 
-    if (options_.output.use_imu && !options_.output.guess_frame_id.empty())
-      throw std::invalid_argument("use_imu and guess_frame_id exclude each other");
     if (options_.output.use_imu)
       imu_subscriber_ =
           nh_.subscribe<sensor_msgs::Imu>("imu", kImuQueue, [this](const sensor_msgs::ImuConstPtr& m) { onImu(*m); });
@@ -100,6 +102,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     callbacks_.start();
   } catch (const std::exception& e) {
     NODELET_FATAL_STREAM("not started: " << e.what());
+    throw;  // the manager forgets the nodelet, and its loader ends with an error
   }
 
   void subscribe() {
@@ -179,7 +182,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   void process(const FeaturesFilter::Passed& passed) try {
     const FeaturesMessage& message = *passed.item;
     takeOverOptions();
-    if (std::exchange(timeline_, passed.timeline) != passed.timeline) restart("the clock jumped back", T_odom_start_);
+    const bool restarted = std::exchange(timeline_, passed.timeline) != passed.timeline;
+    const bool clock_set = std::exchange(clock_steps_, passed.clock_steps) != passed.clock_steps;
+    if (restarted || (clock_set && ros::Time::isSimTime())) restart("the clock jumped back", T_odom_start_);
+    if (clock_set && !ros::Time::isSimTime()) forgetTime();
     if (const std::optional<Eigen::Isometry3d> start = takeRequestedStart()) restart("reset was called", *start);
     if (resumed_.exchange(false)) odometry_->breakStream();
     const std::string problem = findExtrinsic(ros_conversions::cleanFrameId(message.header.frame_id));
@@ -229,8 +235,16 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
         why << ": the odometry starts again from "
             << (T_odom_start.isApprox(Eigen::Isometry3d::Identity()) ? "the origin" : "the given pose"));
     odometry_->reset();
+    mount_->forget();
     publisher_->restart(T_odom_start);
     processed_epoch_.reset();
+    processed_stamp_.reset();
+  }
+
+  /// The system's clock was set back: the robot is where it was.
+  void forgetTime() {
+    NODELET_WARN_STREAM("the system's clock was set back: the odometry starts again from the last pose");
+    odometry_->forgetTime();
     processed_stamp_.reset();
   }
 
@@ -241,16 +255,19 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     if (!processed_stamp_ || (!of_frame && !options_.output.use_imu)) return std::nullopt;
     std::string problem;
     std::optional<MotionGuess> guess;
-    const auto give_up = ros::WallTime::now() + ros::WallDuration(options_.output.guess_timeout);
+    const double now = steadyTime(), give_up = now + patience_.timeout(now);
     for (;;) {
       guess = of_frame ? guessOfFrame(header.stamp, problem) : guessOfGyro(header, problem);
-      if (guess || ros::WallTime::now() >= give_up || stopping_ || !ros::ok()) break;
+      if (guess || steadyTime() >= give_up || stopping_ || !ros::ok()) break;
       ros::WallDuration(0.002).sleep();
     }
+    patience_.note(guess.has_value(), now);
     if (!guess && throttle_.allows("guess"))
       NODELET_WARN_STREAM("no guess of the motion until " << header.stamp << ", going on without: " << problem);
     return guess;
   }
+
+  static double steadyTime() { return ros::SteadyTime::now().toSec(); }
 
   std::optional<MotionGuess> guessOfFrame(const ros::Time& stamp, std::string& problem) const {
     const std::optional<Eigen::Isometry3d> T_before_now = transforms_->findMotion(
@@ -397,10 +414,11 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
 
   // Only the worker's thread touches these.
   std::unique_ptr<VisualOdometry> odometry_;
-  int timeline_ = 0;
+  int timeline_ = 0, clock_steps_ = 0;
   int epoch_ = 0;
   std::optional<std::uint32_t> processed_epoch_;
   std::optional<ros::Time> processed_stamp_;
+  Patience patience_{0.0};  // with guesses
 
   std::unique_ptr<Worker<FeaturesFilter::Passed>> worker_;
   ros::Subscriber subscriber_, imu_subscriber_;

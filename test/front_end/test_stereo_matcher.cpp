@@ -112,7 +112,7 @@ TEST(StereoMatcher, LucasKanadeMeasuresToo) {
   }
   const synthetic::Texture other(12, 5.0, 160.0);
   const cv::Mat unrelated = synthetic::render(kSize, [&](double u, double v) { return other.at(u, v); });
-  options.max_epipolar_residual = 10.0;
+  options.max_epipolar_residual = 4.0;
   const std::size_t loose = StereoMatcher(options).match(pair.left, unrelated, grid(20.0)).size();
   options.max_backward_error = 5.0;
   EXPECT_LT(2 * loose, StereoMatcher(options).match(pair.left, unrelated, grid(20.0)).size());

@@ -8,6 +8,7 @@
 
 #include "../synthetic_features.hpp"
 #include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/odometry/calibration_filter.hpp"
 #include "stereo_descriptor_vo/odometry/local_map.hpp"
 
 namespace sdvo {
@@ -50,6 +51,19 @@ Eigen::Vector3d ahead(int pair) {
 
 TEST(LocalMapKeyframes, StayWhereTheRigStays) {
   EXPECT_EQ(oldestAfter(LocalMapOptions(), 40, hovering), 1);
+}
+
+TEST(LocalMap, APairThatSharesNothingWithTheOthersIsNotAdjusted) {
+  SyntheticScene scene(3, 3000, 120.0);
+  LocalMap map{LocalMapOptions()};
+  WindowOptimizer optimizer{WindowOptimizerOptions()};
+  const CalibrationBelief prior = CalibrationFilter(CalibrationOptions()).prior(1);
+  RigCalibration calibration;
+  for (int id = 1; id <= 3; ++id)
+    see(map, scene.view(Eigen::Isometry3d::Identity(), id), id, Eigen::Isometry3d::Identity());
+  EXPECT_TRUE(map.adjust(optimizer, prior, calibration).success);
+  map.insert(scene.view(Eigen::Isometry3d::Identity(), 4), 4, Eigen::Isometry3d::Identity(), {}, calibration);
+  EXPECT_FALSE(map.adjust(optimizer, prior, calibration).success) << "its pose would be certain for want of residuals";
 }
 
 TEST(LocalMapKeyframes, GoByAgeWhenNoneLasts) {

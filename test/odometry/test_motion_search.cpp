@@ -300,23 +300,11 @@ TEST_F(MotionSearchTest, FailsWithAReason) {
   EXPECT_NE(found.verdict.reason.find("only 0 matches"), std::string::npos) << found.verdict.reason;
 }
 
-TEST_F(MotionSearchTest, LastingPointsAgreeOrDisagreeOrAreTooFew) {
-  const auto say = [&](int matches, int inliers) {
-    PoseEvidence evidence;
-    evidence.lasting_matches = matches, evidence.lasting_inliers = inliers;
-    const bool agree = search_.lastingAgree(evidence), disagree = search_.lastingDisagree(evidence);
-    EXPECT_FALSE(agree && disagree);
-    return agree - disagree;
-  };
-  EXPECT_EQ(say(20, 9), -1);
-  EXPECT_EQ(say(20, 10), 1) << "tracking/doubtful_lasting_ratio is a half";
-  EXPECT_EQ(say(19, 0), 0);
-  EXPECT_EQ(say(19, 19), 0);
-}
-
 TEST(MotionHypothesis, LeavesOutWhatWasRejected) {
   MotionHypothesis found;
-  found.view.seen = {4, 3, 4, 5};
+  LocalMap::View view;
+  view.seen = {4, 3, 4, 5};
+  found.view = std::make_shared<const LocalMap::View>(view);
   found.matches = {{0, 10, 0.f}, {1, 11, 0.f}, {2, 12, 0.f}, {3, 13, 0.f}};
   found.motion.inliers = {0, 1, 3};
   EXPECT_TRUE(found.isLasting(0));

@@ -170,5 +170,20 @@ TEST(PoseVerdict, TellsADoubtOfTheRateFromOneOfTheWay) {
   EXPECT_FALSE(judgePose({}, 12, soundEvidence()).of_rate);
 }
 
+TEST(PoseVerdict, LastingPointsAgreeOrDisagreeOrAreTooFew) {
+  const auto say = [&](int matches, int inliers) {
+    const PoseVerdictOptions options;
+    PoseEvidence evidence;
+    evidence.lasting_matches = matches, evidence.lasting_inliers = inliers;
+    const bool agree = lastingAgree(options, evidence), disagree = lastingDisagree(options, evidence);
+    EXPECT_FALSE(agree && disagree);
+    return agree - disagree;
+  };
+  EXPECT_EQ(say(20, 9), -1);
+  EXPECT_EQ(say(20, 10), 1) << "tracking/doubtful_lasting_ratio is a half";
+  EXPECT_EQ(say(19, 0), 0);
+  EXPECT_EQ(say(19, 19), 0);
+}
+
 }  // namespace
 }  // namespace sdvo

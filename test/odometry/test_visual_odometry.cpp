@@ -515,6 +515,8 @@ TEST(VisualOdometry, StartsAgainFromTheLastPoseWithAnotherCamera) {
   EXPECT_EQ(again.epoch, before.epoch + 1);
   EXPECT_TRUE(again.T_origin_camera.isApprox(before.T_origin_camera, 1e-9));
   EXPECT_GT(again.pose_covariance.trace(), before.pose_covariance.trace());
+  EXPECT_TRUE(std::isfinite(before.disparity_offset) && std::isfinite(before.right_rotation.norm()));
+  EXPECT_TRUE(std::isnan(again.disparity_offset_sigma)) << "what was learnt was of the other rig";
   const OdometryResult next = odometry.update(otherPair(7));
   EXPECT_EQ(next.state, TrackingState::kTracking) << next.reason;
   EXPECT_LT(distanceBetween(next.T_origin_camera, again.T_origin_camera * trueSinceStart(7, 6)), 1e-3);
@@ -561,6 +563,24 @@ TEST(VisualOdometry, BrokenStreamStartsAgainFromTheLastPose) {
   EXPECT_FALSE(again.has_motion);
   EXPECT_TRUE(again.T_origin_camera.isApprox(before.T_origin_camera, 1e-9));
   EXPECT_EQ(odometry.update(pairOf(10)).state, TrackingState::kTracking);
+}
+
+TEST(VisualOdometry, GoesOnFromTheLastPoseWhenTheClockIsSetBack) {
+  VisualOdometry odometry({});
+  const OdometryResult before = follow(odometry, 5);
+  odometry.forgetTime();
+  constexpr std::int64_t kHour = 3'600'000'000'000;  // ns
+  for (int i = 6; i <= 12; ++i) {
+    StereoFeatures features = pairOf(i);
+    features.stamp -= kHour;
+    const OdometryResult result = odometry.update(features);
+    EXPECT_EQ(result.epoch, before.epoch + 1);
+    EXPECT_EQ(result.state, i == 6 ? TrackingState::kDegraded : TrackingState::kTracking) << result.reason;
+    if (i == 6) {
+      EXPECT_TRUE(result.T_origin_camera.isApprox(before.T_origin_camera, 1e-9));
+    }
+    EXPECT_TRUE(result.pose_covariance.allFinite());
+  }
 }
 
 TEST(VisualOdometry, RefusesMotionsThatNoRobotMakes) {
@@ -795,6 +815,23 @@ TEST(VisualOdometry, ImagesThatRepeatThemselvesWhileItStandsAreAStandstill) {
     features.stamp = stampOf(i);
     EXPECT_EQ(odometry.update(features).state, TrackingState::kTracking) << i;
   }
+}
+
+TEST(VisualOdometry, ImagesThatRepeatThemselvesAreAStandstillWhereAGuessSaysSo) {
+  // A simulated robot that stops within a pair.
+  VisualOdometry odometry({});
+  const OdometryResult before = follow(odometry, 8);
+  StereoFeatures still = pairOf(8);
+  still.stamp = stampOf(9);
+  MotionGuess guess;
+  guess.rotation_only = true;
+  VisualOdometry told_of_the_turn_only({});
+  follow(told_of_the_turn_only, 8);
+  EXPECT_NE(told_of_the_turn_only.update(still, guess).reason.find("frozen"), std::string::npos);
+  guess.rotation_only = false;
+  const OdometryResult result = odometry.update(still, guess);
+  EXPECT_EQ(result.reason.find("frozen"), std::string::npos) << result.reason;
+  EXPECT_LT(distanceBetween(result.T_origin_camera, before.T_origin_camera), 1e-3);
 }
 
 /// What stands still around a camera at `x`, and a swarm of points that moves past it by 0.12 m a pair and is the

@@ -320,6 +320,15 @@ class Live(unittest.TestCase):
             self.assertEqual((info.state, info.epoch), ('TRACKING', self.info[0].epoch))
         self.assertEqual((len(self.info), info.dropped_pairs), (PAIRS, len(outliers) + 1))
 
+    def test_a_topic_in_the_future_does_not_keep_pairs_from_being_synchronised(self):
+        self.start()
+        self.assertEqual(self.feed(0).state, 'TRACKING')
+        for i in range(25):  # more than sync_queue_size
+            images, _ = self.camera.messages(1, time_of=50000 + i)
+            self.camera.images[0].publish(images[0])
+        for i in range(1, 4):
+            self.assertEqual(self.feed(i).state, 'TRACKING')
+
     def try_extreme_stamps(self, first):
         """Every subscriber of the pipeline gets them; pairs go on from `first`."""
         features = rospy.Publisher(self.namespace + '/stereo_features', StereoFeatures, queue_size=100)
@@ -665,6 +674,20 @@ class Live(unittest.TestCase):
         # A pair whose answer goes out before we are connected again is not answered a second time: each try has its own.
         times = itertools.count(10000)
         self.assertTrue(wait_until(lambda: self.is_answered(0, time_of=next(times))))
+        self.assert_alive()
+
+    def test_wrong_parameters_are_named_and_the_nodelet_is_not_loaded(self):
+        self.start()
+        load = rospy.ServiceProxy(self.pipeline.manager + '/load_nodelet', NodeletLoad)
+        for type_name, name, value in (('StereoFeatures', 'detector/max_features', -1),
+                                       ('VisualOdometry', 'initial_pose', 'here'),
+                                       ('PlaceRecognition', 'sync_queue_size', 'many')):
+            nodelet = self.namespace + '/wrong_' + type_name
+            rospy.set_param(nodelet + '/' + name, value)
+            self.assertFalse(load(nodelet, PACKAGE + '/' + type_name, [], [], [], '').success)
+            self.assertTrue(wait_until(lambda: self.rosout.said('not started', str(value) if name == 'initial_pose' else name)),
+                            self.rosout.errors)
+        self.assertEqual(self.feed(0).state, 'TRACKING')
         self.assert_alive()
 
     def test_features_image_is_drawn_while_someone_looks(self):

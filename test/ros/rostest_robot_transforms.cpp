@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "../../src/ros/camera_mount.hpp"
 #include "../../src/ros/robot_transforms.hpp"
 
 namespace sdvo {
@@ -75,6 +76,31 @@ class RobotTransformsTest : public ::testing::Test {
   std::vector<std::string> warnings_;
   int markers_ = 0;
 };
+
+TEST_F(RobotTransformsTest, TheCamerasPlaceIsReadOnceAndAgainWhenItIsForgotten) {
+  start();
+  CameraMount mount(*transforms_, 0.0);
+  std::string problem;
+  const auto place = [&] {
+    const auto found = mount.find("base_link", "camera", problem);
+    return found ? found->translation().x() : std::nan("");
+  };
+  const auto isKnownAt = [&](double x) {
+    return spinUntil([&] {
+      const auto known = transforms_->find("base_link", "camera", problem);
+      return known && known->translation().x() == x;
+    });
+  };
+  send(tf_static_, {transform("base_link", "camera", ros::Time::now(), 1.0)});
+  ASSERT_TRUE(isKnownAt(1.0));
+  EXPECT_EQ(place(), 1.0);
+  send(tf_static_, {transform("base_link", "camera", ros::Time::now(), 2.0)});
+  ASSERT_TRUE(isKnownAt(2.0));
+  EXPECT_EQ(place(), 1.0);
+  mount.forget();
+  EXPECT_EQ(mount.last()->translation().x(), 1.0) << "for who reads it meanwhile";
+  EXPECT_EQ(place(), 2.0);
+}
 
 TEST_F(RobotTransformsTest, TellsHowAFrameMovedBetweenTwoTimes) {
   start();

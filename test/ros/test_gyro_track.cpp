@@ -64,6 +64,14 @@ TEST(GyroTrack, BeginsAnewWhenTheClockJumpsBack) {
   EXPECT_NEAR(yaw(track, 500, 600), 0.055, 1e-12);
 }
 
+TEST(GyroTrack, AMeasurementThatComesTwiceCountsOnce) {
+  GyroTrack track;
+  fill(track, 1000, 1100);
+  track.add(1100 * kMillisecond, {0.0, 0.0, 5.0});
+  fill(track, 1110, 1200);
+  EXPECT_NEAR(yaw(track, 1000, 1200), 0.5 * (1.2 * 1.2 - 1.0), 1e-12);
+}
+
 TEST(GyroTrack, ForgetsWhatIsLongAgo) {
   GyroTrack track;
   fill(track, 0, 10500);

@@ -35,7 +35,7 @@ struct StereoMatcherOptions {
              "lk: levels above the full image; each doubles the disparity reached");
     list.add("max_backward_error", max_backward_error, {0.05, 5.0}, "px",
              "lk: largest distance between a corner and its track to the right image and back");
-    list.add("max_epipolar_residual", max_epipolar_residual, {0.1, 10.0}, "px",
+    list.add("max_epipolar_residual", max_epipolar_residual, {0.1, 4.0}, "px",
              "largest difference of the rows in both views; KITTI's rectification really leaves up to 1.3");
     list.add("min_disparity", min_disparity, {0.01, 50.0}, "px", "smallest disparity of a point at finite depth");
   }

@@ -170,6 +170,7 @@ class LocalMap {
 
   void pose(Problem& problem) const;
   void forgetKeyframe();
+  void rememberKeyframe(std::size_t frame);
   OldKeyframe keyframe(std::size_t frame, bool with_looks) const;
   std::vector<int> sharedPoints() const;
   double parallaxToPredecessor(std::size_t frame) const;
@@ -188,6 +189,7 @@ class LocalMap {
   std::vector<Point> points_;
   std::vector<Point> spare_;  ///< no points any more, but their memory
   KeyframeMemory memory_;
+  int last_left_ = -1;            ///< the last key frame that was not among the newest ones any more
   ResidualLevel residual_level_;  ///< of the newest pairs, each when it was new
   Problem problem_;               ///< empty once it is solved, so that a copy of the map is none of it
 };

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -34,10 +35,10 @@ struct MotionHypothesis {
   MotionEstimate motion;  ///< since the map's newest pair
   /// The same as another hypothesis has it that could not be ruled out.
   std::optional<Eigen::Isometry3d> T_current_reference_else;
-  bool guided = false;     ///< found with a prior
-  bool contested = false;  ///< by a motion of something else in view
-  LocalMap::View view;
-  std::vector<FeatureMatch> matches;  ///< rows of the view to rows of the pair
+  bool guided = false;                         ///< found with a prior
+  bool contested = false;                      ///< by a motion of something else in view
+  std::shared_ptr<const LocalMap::View> view;  ///< of the map; one for all hypotheses of a pair
+  std::vector<FeatureMatch> matches;           ///< rows of the view to rows of the pair
   std::vector<Correspondence> correspondences;
   std::vector<LocalMap::Sighting> sightings;   ///< of the motion's inliers
   double match_time = 0.0, motion_time = 0.0;  ///< s
@@ -66,19 +67,19 @@ class MotionSearch {
 
   MotionHypothesis find(const MotionScene& scene) const;
 
-  /// Whether a motion is not that of the points that stood still so far.
-  bool lastingDisagree(const PoseEvidence& evidence) const;
-
-  /// Whether it is that of enough of them. Too few neither agree nor disagree.
-  bool lastingAgree(const PoseEvidence& evidence) const;
-
-  /// Whether no camera moves so, as far as the velocity before tells, and the lasting points do not confirm it either.
-  bool isImplausible(const PoseEvidence& evidence) const;
-
  private:
-  MotionHypothesis searchNear(const MotionScene& scene,
+  using ViewPtr = std::shared_ptr<const LocalMap::View>;
+
+  /// A hypothesis' inliers as their patches have them, and the motion refined on these.
+  struct Alignment {
+    Eigen::Isometry3d T_current_reference;
+    std::vector<LocalMap::Sighting> sightings;
+    std::vector<Correspondence> measured;
+  };
+
+  MotionHypothesis searchNear(const MotionScene& scene, const ViewPtr& view,
                               const std::optional<Eigen::Isometry3d>& T_current_reference) const;
-  MotionHypothesis search(const FeatureMatcher& matcher, const MotionScene& scene,
+  MotionHypothesis search(const FeatureMatcher& matcher, const MotionScene& scene, const ViewPtr& view,
                           const std::optional<Eigen::Isometry3d>& T_current_reference) const;
   bool leavesGate(const MotionScene& scene, const Eigen::Isometry3d& predicted, const MotionHypothesis& found) const;
   MotionHypothesis searchAmong(const MotionScene& scene, const MotionHypothesis& all,
@@ -87,10 +88,9 @@ class MotionSearch {
                             const Eigen::Isometry3d& T_current_reference) const;
   void weigh(const MotionScene& scene, MotionHypothesis& found) const;
   void countInliers(const MotionScene& scene, MotionHypothesis& found) const;
-  std::vector<Correspondence> align(const MotionScene& scene, MotionHypothesis& found) const;
+  Alignment align(const MotionScene& scene, const MotionHypothesis& found) const;
   std::optional<Eigen::Isometry3d> motionOfLasting(const StereoCamera& camera, const MotionHypothesis& found,
-                                                   const std::vector<Correspondence>& measured,
-                                                   double significant) const;
+                                                   const Alignment& aligned, double significant) const;
   void keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_lasting, const std::vector<Correspondence>& measured,
               MotionHypothesis& found) const;
   MotionHypothesis choose(const MotionScene& scene, std::vector<MotionHypothesis> hypotheses) const;

@@ -77,6 +77,18 @@ PoseVerdict judgePose(const PoseVerdictOptions& options, int min_inliers, const 
 /// says about the same: sound or doubtful.
 PoseVerdict judgeChange(const PoseVerdictOptions& options, const PoseEvidence& evidence);
 
+/// Fewer matches of lasting points do not tell which motion is the camera's.
+inline constexpr int kEnoughLasting = 20;
+
+/// Whether a motion is not that of the points that stood still so far.
+bool lastingDisagree(const PoseVerdictOptions& options, const PoseEvidence& evidence);
+
+/// Whether it is that of enough of them. Too few neither agree nor disagree.
+bool lastingAgree(const PoseVerdictOptions& options, const PoseEvidence& evidence);
+
+/// Whether no camera moves so, as far as the velocity before tells, and the lasting points do not confirm it either.
+bool isImplausible(const PoseVerdictOptions& options, const PoseEvidence& evidence);
+
 /// Whether no vehicle comes to this motion in the time since its velocity was known for certain, though a single pair
 /// could be so fast.
 bool isUnexpected(const PoseEvidence& evidence);

@@ -85,8 +85,8 @@ struct OdometryResult {
   Vector6d correction = Vector6d::Zero();
 
   int features = 0, matches = 0, inliers = 0;
-  double coverage = 0.0;                       ///< share of an 8x4 grid's cells over the image that hold an inlier
-  double rms = 0.0;                            ///< reprojection error of the inliers, px per coordinate
+  double coverage = 0.0;  ///< share of an 8x4 grid's cells over the image that hold an inlier
+  double rms = 0.0;  ///< of the corners that agreed on the motion, before alignment and adjustment, px per coordinate
   double match_time = 0.0, motion_time = 0.0;  ///< s
   double distance = 0.0;                       ///< travelled since the start or reset, m
   int keyframe_id = 0;            ///< running number of the map's last key frame, this pair included; 0 without a map
@@ -125,7 +125,11 @@ class VisualOdometry {
   /// re-seeds from the last pose under a new epoch.
   void breakStream();
 
-  /// Takes other options over while running. Those of `map` and `calibration` take effect at the next start or reset.
+  /// Tells that the clock was set: as breakStream(), and the next stamp may be any.
+  void forgetTime();
+
+  /// Takes other options over while running. Those of `map` take effect at the next start, those of
+  /// `calibration` at the next reset.
   /// Throws std::invalid_argument, and keeps the old ones, when an option is out of its range.
   void configure(const VisualOdometryOptions& options);
 
@@ -143,15 +147,31 @@ class VisualOdometry {
     double time = 0.0;                       ///< s
   };
 
+  /// What became of the map with a pair.
+  struct Extension {
+    Eigen::Isometry3d T_previous_origin;  ///< of the map's newest pair before, as known then
+    Eigen::Isometry3d T_keyframe_origin;  ///< of the last key frame before the newest pair, before the adjustment
+    RigCalibration calibration;
+    LocalMap::Adjustment adjustment;
+  };
+
   void refuse(const StereoFeatures& features) const;
   void watch(int pairs);
   MotionHypothesis localise(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
   double velocityAge() const;
-  bool isFrozen(const StereoFeatures& features, double dt) const;
+  bool isFrozen(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
   Step seed(const StereoFeatures& features);
   Step extendMap(const StereoFeatures& features, double dt, const MotionHypothesis& found);
-  Matrix6d doubt(const MotionHypothesis& found, const Eigen::Isometry3d& T_previous_measured,
-                 const Eigen::Isometry3d& T_previous_current, double dt) const;
+  Extension insert(const StereoFeatures& features, const MotionHypothesis& found);
+  PoseEvidence gatherEvidence(const StereoFeatures& features, const MotionHypothesis& found,
+                              Extension& extension) const;
+  bool isWatched(const PoseEvidence& evidence);
+  void measure(double dt, const MotionHypothesis& found, const PoseEvidence& evidence, Trust trust,
+               Extension& extension, Step& step);
+  void noteVelocity(std::int64_t stamp, const MotionHypothesis& found, const PoseEvidence& evidence, Trust trust,
+                    const Matrix6d& covariance);
+  Matrix6d doubt(const MotionHypothesis& found, const Extension& extension, const Eigen::Isometry3d& T_previous_current,
+                 double dt) const;
   void recall(const StereoFeatures& features);
   void cover(Step& step);
   Step predict(const StereoFeatures& features, double dt, const std::string& failure);
@@ -172,6 +192,7 @@ class VisualOdometry {
     std::optional<LocalMap> map;
     CalibrationFilter calibration;
     RightCameraRotation right_rotation;
+    std::optional<StereoCamera> camera;
     std::optional<std::int64_t> last_stamp;
     Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
     PoseCovariance covariance;                        ///< of that pose
