@@ -684,7 +684,8 @@ class Live(unittest.TestCase):
                                        ('PlaceRecognition', 'sync_queue_size', 'many')):
             nodelet = self.namespace + '/wrong_' + type_name
             rospy.set_param(nodelet + '/' + name, value)
-            self.assertFalse(load(nodelet, PACKAGE + '/' + type_name, [], [], [], '').success)
+            with self.assertRaises(rospy.ServiceException):  # so nodelet says that it did not load
+                load(nodelet, PACKAGE + '/' + type_name, [], [], [], '')
             self.assertTrue(wait_until(lambda: self.rosout.said('not started', str(value) if name == 'initial_pose' else name)),
                             self.rosout.errors)
         self.assertEqual(self.feed(0).state, 'TRACKING')
