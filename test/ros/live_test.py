@@ -326,8 +326,10 @@ class Live(unittest.TestCase):
         for i in range(25):  # more than sync_queue_size
             images, _ = self.camera.messages(1, time_of=50000 + i)
             self.camera.images[0].publish(images[0])
-        for i in range(1, 4):
-            self.assertEqual(self.feed(i).state, 'TRACKING')
+        # They may come in the midst of a pair, which then makes room for them.
+        self.assertTrue(any(self.is_answered(i) for i in range(1, 6)))
+        for i in range(6, 9):
+            self.assertIn(self.feed(i).state, ('TRACKING', 'DEGRADED'))
 
     def try_extreme_stamps(self, first):
         """Every subscriber of the pipeline gets them; pairs go on from `first`."""
