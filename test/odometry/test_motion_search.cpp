@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <memory>
 
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/odometry/motion_search.hpp"

@@ -4,6 +4,7 @@
 #include <sensor_msgs/CameraInfo.h>
 
 #include <boost/make_shared.hpp>
+#include <memory>
 
 #include "../../src/ros/stamps.hpp"
 #include "../../src/ros/waiting_stamps.hpp"
