@@ -3,10 +3,12 @@
 watches the nodelet manager's memory. Stamps are even, as those of a triggered camera are, also where this program is late. A
 drive that ends where it began goes round; another one goes forwards and backwards in turn, which no vehicle does: at each end
 it is DEGRADED for 2 s. In the first minute the pairs of half a second come at once, five times: most of them are dropped, and
-the manager takes the room that so many need and keeps it. From then on exits 1 when memory grows, a pair that was published in
-time is dropped or gets no answer, an error is logged or the odometry does not track."""
+the manager takes the room that so many need and keeps it. From then on exits 1 when memory grows, a pair is dropped though it
+was published in time and the machine let the manager run, a pair gets no answer, an error is logged or the odometry does not
+track. What the machine withheld is printed for each drop."""
 import argparse
 import collections
+import glob
 import os
 import statistics
 import sys
@@ -71,12 +73,44 @@ def pid_of(node):
     return xmlrpc.client.ServerProxy(rosgraph.Master("/soak").lookupNode(node)).getPid("/soak")[2]
 
 
+class Withheld:
+    """What kept a process from running: processors that the hypervisor gave to others (steal), and threads that were ready to
+    run and had to wait for other programs of this machine."""
+
+    def __init__(self, pid):
+        self.pid, self.samples = pid, []  # (monotonic time, s; steal of each processor, s; wait of each thread, s)
+
+    def sample(self):
+        with open("/proc/stat") as file:
+            lines = (line.split() for line in file if line.startswith("cpu") and line[3].isdigit())
+            steal = [int(line[8]) / os.sysconf("SC_CLK_TCK") for line in lines]
+        waits = {}
+        for path in glob.glob(f"/proc/{self.pid}/task/*/schedstat"):
+            try:
+                with open(path) as file:
+                    waits[path] = 1e-9 * int(file.read().split()[1])
+            except OSError:  # the thread has ended
+                pass
+        self.samples.append((time.monotonic(), steal, waits))
+        if len(self.samples) > 1000:
+            del self.samples[:500]
+
+    def since(self, moment):
+        """(most steal of a processor, longest wait of a thread) from a moment to the last sample, s."""
+        window = [s for s in self.samples if s[0] >= moment]
+        (_, steal, waits), (_, last_steal, last_waits) = window[0], window[-1]
+        return (max(b - a for a, b in zip(steal, last_steal)),
+                max((wait - waits.get(thread, 0.0) for thread, wait in last_waits.items()), default=0.0))
+
+
 class Soak:
-    def __init__(self, drive, rate, closed):
+    def __init__(self, drive, rate, closed, manager):
         self.rate, self.closed = rate, closed
         self.pairs, self.projections = read_drive(drive)
         self.answers, self.last, self.errors, self.poses = [], VoInfo(), [], 0
         self.late, self.drops = [], []  # (monotonic time, s or number)
+        self.causes, self.seconds = [], []  # what Withheld says of the second before each drop, and of every second
+        self.manager = manager
         self.broadcaster = tf2_ros.StaticTransformBroadcaster()
         self.broadcaster.sendTransform(transform_of_camera())
         self.images = [rospy.Publisher(f"{s}/image_rect", sensor_msgs.msg.Image, queue_size=5) for s in SIDES]
@@ -116,17 +150,28 @@ class Soak:
             message.header = header
             self.images[side].publish(message)
 
-    def dropped_in_time(self, since):
-        """Pairs dropped after a moment though none of the second before was published late by a period or more."""
-        return sum(count for t, count in self.drops if t > since and not any(0.0 <= t - late < 1.0 for late, _ in self.late))
+    def published_late_before(self, moment):
+        return any(0.0 <= moment - late < 1.0 for late, _ in self.late)
 
-    def run(self, seconds, manager):
+    def dropped_without_cause(self, since):
+        """Pairs dropped after a moment though in the second before none was published late by a period or more, and the machine
+        kept no thread of the manager waiting, and no processor, for as long."""
+        return sum(count for (t, count), (steal, wait) in zip(self.drops, self.causes)
+                   if t > since and not self.published_late_before(t) and max(steal, wait) < 1.0 / self.rate)
+
+    def explain_drops(self, withheld):
+        withheld.sample()
+        for moment, _ in self.drops[len(self.causes):]:
+            self.causes.append(withheld.since(moment - 1.0))
+
+    def run(self, seconds):
         """Returns [(time, MB)] and the number of pairs published."""
         try:
             os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))  # a camera waits for no other program
         except PermissionError:
             print("not allowed to run as a real-time process: pairs may be published late")
-        pid, start, begin, memory, k = pid_of(manager), time.monotonic(), rospy.Time.now(), [], 0
+        pid = pid_of(self.manager)
+        withheld, start, begin, memory, k = Withheld(pid), time.monotonic(), rospy.Time.now(), [], 0
         while time.monotonic() - start < seconds and not rospy.is_shutdown():
             late = time.monotonic() - start - k / self.rate
             if late > 1.0 / self.rate:
@@ -134,6 +179,9 @@ class Soak:
             self.publish(k, begin + rospy.Duration(k / self.rate))
             k += 1
             memory.append((time.monotonic() - start, resident_memory(pid)))
+            self.explain_drops(withheld)
+            if k % round(self.rate) == 0:
+                self.seconds.append(withheld.since(time.monotonic() - 1.0))
             if k % (10 * int(self.rate)) == 0:
                 print(f"\r{memory[-1][0]:.0f} of {seconds:.0f} s, {k} pairs, {memory[-1][1]:.1f} MB ", end="", flush=True)
             time.sleep(max(0.0, start + k / self.rate - time.monotonic()))
@@ -141,6 +189,7 @@ class Soak:
                 time.sleep(BUNCH)
         print()
         time.sleep(2.0)
+        self.explain_drops(withheld)
         return memory, k
 
 
@@ -154,11 +203,11 @@ def main():
     parser.add_argument("--growth", type=float, default=1.0, help="%% that the memory may grow from the second quarter to the last")
     arguments = parser.parse_args(rospy.myargv()[1:])
     rospy.init_node("soak", disable_signals=True)
-    soak = Soak(arguments.drive, arguments.rate, arguments.closed)
+    soak = Soak(arguments.drive, arguments.rate, arguments.closed, arguments.manager)
     while not soak.is_connected():
         time.sleep(0.1)
     begin = time.monotonic()
-    memory, pairs = soak.run(60.0 * arguments.minutes, arguments.manager)
+    memory, pairs = soak.run(60.0 * arguments.minutes)
 
     quarter = len(memory) // 4
     before, after = (statistics.median(m for _, m in part) for part in (memory[quarter:2 * quarter], memory[-quarter:]))
@@ -175,10 +224,16 @@ def main():
           f"({100.0 * (after / before - 1.0):+.2f} %)")
     warm = begin + WARM_UP + 1.0
     late = [seconds for t, seconds in soak.late if t > warm]
-    dropped = sum(number for t, number in soak.drops if t > warm)
-    dropped_in_time = soak.dropped_in_time(warm)
-    print(f"after the first minute: {dropped} dropped, {dropped_in_time} of them though published in time; {len(late)} pairs published "
-          f"late by a period or more (at most {1e3 * max(late, default=0.0):.0f} ms)")
+    drops = [(*drop, *cause) for drop, cause in zip(soak.drops, soak.causes) if drop[0] > warm]
+    without_cause = soak.dropped_without_cause(warm)
+    print(f"after the first minute: {sum(drop[1] for drop in drops)} dropped, {without_cause} of them without a cause outside; "
+          f"{len(late)} pairs published late by a period or more (at most {1e3 * max(late, default=0.0):.0f} ms)")
+    print(f"seconds in which a processor was withheld for a period or more: {sum(s >= 1.0 / arguments.rate for s, _ in soak.seconds)}, "
+          f"in which a thread of the manager waited so long: {sum(w >= 1.0 / arguments.rate for _, w in soak.seconds)}, "
+          f"of {len(soak.seconds)}")
+    for t, number, steal, wait in drops:
+        print(f"{number} dropped at {t - begin:.1f} s: in the second before, the hypervisor withheld a processor for {1e3 * steal:.0f} ms, "
+              f"and a thread of the manager waited for {1e3 * wait:.0f} ms" + (", the feeder was late" if soak.published_late_before(t) else ""))
     minutes = [f"{m:.1f}" for (t, m), (next_t, _) in zip(memory, memory[1:]) if t // 60 < next_t // 60]
     print("memory after each minute:", ", ".join(minutes), "MB")
     untracked = collections.Counter((state, reason) for state, reason, _ in soak.answers if state != "TRACKING")
@@ -188,7 +243,7 @@ def main():
         print(error)
     # A busy machine may lose pairs before they come to be counted, in the queues of publisher and subscriber.
     good = (after / before - 1.0 <= 0.01 * arguments.growth and not soak.errors and answered >= 0.95 * pairs
-            and not dropped_in_time and states["TRACKING"] >= 0.99 * count > 0)
+            and not without_cause and states["TRACKING"] >= 0.99 * count > 0)
     return 0 if good else 1
 
 

@@ -35,12 +35,14 @@ std::array<Test, Brief::kBits> drawTests(double half_patch) {
 void Brief::describe(double u, double v, double size, std::uint8_t* row) const {
   static const std::array<Test, kBits> tests = drawTests(kHalfPatch);
   const double scale = size / kStandardSize;
-  const double half = std::max(kHalfBox * scale, 0.5);
+  const auto half = static_cast<float>(std::max(kHalfBox * scale, 0.5));
+  const auto mean = [&](double x, double y) {
+    return image_.boxMean(static_cast<float>(u + scale * x), static_cast<float>(v + scale * y), half);
+  };
   std::memset(row, 0, kBytes);
   for (int bit = 0; bit < kBits; ++bit) {
     const Test& test = tests[bit];
-    const bool brighter = image_.boxMean(u + scale * test.ax, v + scale * test.ay, half) >
-                          image_.boxMean(u + scale * test.bx, v + scale * test.by, half);
+    const bool brighter = mean(test.ax, test.ay) > mean(test.bx, test.by);
     row[bit / 8] = static_cast<std::uint8_t>(row[bit / 8] | brighter << (bit % 8));
   }
 }

@@ -34,7 +34,8 @@ std::array<Freak::Field, Freak::kFields> makePattern() {
     for (int k = 0; k < kFieldsOfRing[ring]; ++k) {
       // Every second ring is turned by half a step, so that the fields interlace.
       const double alpha = CV_2PI * k / kFieldsOfRing[ring] + (ring % 2) * CV_PI / 6.0;
-      fields[next++] = {kRadius[ring] * std::cos(alpha), kRadius[ring] * std::sin(alpha), sigma};
+      fields[next++] = {static_cast<float>(kRadius[ring] * std::cos(alpha)),
+                        static_cast<float>(kRadius[ring] * std::sin(alpha)), static_cast<float>(sigma)};
     }
   }
   return fields;
@@ -87,9 +88,9 @@ std::array<float, Freak::kFields> Freak::intensities(const FreakKeypoint& keypoi
   std::array<float, kFields> means;
   for (int i = 0; i < kFields; ++i) {
     const Field& field = pattern()[i];
-    const double x = keypoint.u + cosine * field.x - sine * field.y;
-    const double y = keypoint.v + sine * field.x + cosine * field.y;
-    const double half = std::max(field.sigma * scale, FreakPose::kSmallestHalfSide);
+    const float x = keypoint.u + cosine * field.x - sine * field.y;
+    const float y = keypoint.v + sine * field.x + cosine * field.y;
+    const float half = std::max(field.sigma * scale, FreakPose::kSmallestHalfSide);
     means[i] = image_.boxMean(x, y, half);
   }
   return means;

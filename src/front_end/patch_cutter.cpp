@@ -93,18 +93,23 @@ void cutPlain(const cv::Mat& integral, const Edges& columns, const Edges& rows, 
 /// Sums in a row at the edges, eight of them at once, with the operations of the plain form.
 class EightSums {
  public:
-  SDVO_AVX2 EightSums(const Edges& columns, int origin) : columns_(columns), origin_(_mm256_set1_epi32(origin)) {}
+  /// `registers`: how many hold the edges.
+  SDVO_AVX2 EightSums(const Edges& columns, int registers, int origin)
+      : columns_(columns),
+        neighbours_(areNeighbours(columns.index.data(), 8 * registers)),
+        origin_(_mm256_set1_epi32(origin)) {}
 
   SDVO_AVX2 __m256 inRow(const int* row, int r) const {
-    const __m256i index = _mm256_loadu_si256(reinterpret_cast<const __m256i*>(&columns_.index[8 * r]));
+    if (neighbours_) {  // as most are: edges a pixel apart
+      const int* begin = row + columns_.index[8 * r];
+      return between(load(begin), load(begin + 1), r);
+    }
     // As 0, 1, 4, 5, 2, 3, 6, 7, so that the shuffles leave them in order. Two neighbours come with one read.
-    const __m256i turned = _mm256_permute4x64_epi64(index, 0xd8);
+    const __m256i turned = _mm256_permute4x64_epi64(load(&columns_.index[8 * r]), 0xd8);
     const auto* pairs = reinterpret_cast<const long long*>(row);
     const __m256i low = _mm256_i32gather_epi64(pairs, _mm256_castsi256_si128(turned), sizeof(int));
     const __m256i high = _mm256_i32gather_epi64(pairs, _mm256_extracti128_si256(turned, 1), sizeof(int));
-    const __m256 first = sinceOrigin(shuffled<0x88>(low, high)), second = sinceOrigin(shuffled<0xdd>(low, high));
-    const __m256 share = _mm256_loadu_ps(&columns_.share[8 * r]);
-    return _mm256_add_ps(first, _mm256_mul_ps(share, _mm256_sub_ps(second, first)));
+    return between(shuffled<0x88>(low, high), shuffled<0xdd>(low, high), r);
   }
 
  private:
@@ -112,9 +117,23 @@ class EightSums {
   SDVO_AVX2 static __m256i shuffled(__m256i a, __m256i b) {
     return _mm256_castps_si256(_mm256_shuffle_ps(_mm256_castsi256_ps(a), _mm256_castsi256_ps(b), kChoice));
   }
+  SDVO_AVX2 static bool areNeighbours(const int* index, int count) {
+    bool all = true;
+    for (int k = 1; k < count; ++k) all &= index[k] == index[0] + k;
+    return all;
+  }
+  SDVO_AVX2 static __m256i load(const int* values) {
+    return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(values));
+  }
   SDVO_AVX2 __m256 sinceOrigin(__m256i sums) const { return _mm256_cvtepi32_ps(_mm256_sub_epi32(sums, origin_)); }
+  SDVO_AVX2 __m256 between(__m256i sums, __m256i next_sums, int r) const {
+    const __m256 first = sinceOrigin(sums), second = sinceOrigin(next_sums);
+    const __m256 share = _mm256_loadu_ps(&columns_.share[8 * r]);
+    return _mm256_add_ps(first, _mm256_mul_ps(share, _mm256_sub_ps(second, first)));
+  }
 
   const Edges& columns_;
+  bool neighbours_;
   __m256i origin_;
 };
 
@@ -125,28 +144,31 @@ SDVO_AVX2 inline void storeRounded(__m256 means, std::uint8_t* bytes) {
   _mm_storel_epi64(reinterpret_cast<__m128i*>(bytes), _mm_packus_epi16(words, words));
 }
 
-/// The same row by row, eight columns at once.
+/// What is at the next edge, where `here` holds eight edges and `behind` the eight after them.
+SDVO_AVX2 inline __m256 nextOf(__m256 here, __m256 behind) {
+  return _mm256_permutevar8x32_ps(_mm256_blend_ps(here, behind, 1), _mm256_setr_epi32(1, 2, 3, 4, 5, 6, 7, 0));
+}
+
+/// The same row by row, eight columns at once. `kRegisters` hold the edges.
+template <int kRegisters>
 SDVO_AVX2 void cutWithAvx2(const cv::Mat& integral, const Edges& columns, const Edges& rows, int side,
                            std::uint8_t* samples) {
-  const EightSums sums(columns, integral.ptr<int>(rows.index[0])[columns.index[0]]);
+  const EightSums sums(columns, kRegisters, integral.ptr<int>(rows.index[0])[columns.index[0]]);
   const __m256 zero = _mm256_setzero_ps();
-  const int registers = side / 8 + 1;  // that the edges need
-  __m256 upper[kMostEdges / 8], lower[kMostEdges / 8], above[kMostEdges / 8] = {zero, zero, zero};
-  std::array<float, kMostEdges + 8> across{};  // at the edges, and what a register reads beyond
-  std::array<std::uint8_t, PatchOptions::kMostSamples * PatchOptions::kMostSamples + 8> patch;
+  __m256 upper[kRegisters] = {}, lower[kRegisters] = {}, above[kRegisters] = {}, across[kRegisters];
+  std::array<std::uint8_t, PatchOptions::kMostSamples * PatchOptions::kMostSamples + 8 * kRegisters> patch;
   for (int j = 0; j <= side; ++j) {
     const int row = rows.index[j];
     // Where edges are a pixel apart, each row of the integral serves two of them.
     const bool known = j > 0 && row == rows.index[j - 1] + 1;
     const __m256 share = _mm256_set1_ps(rows.share[j]), height = _mm256_set1_ps(j > 0 ? rows.width[j - 1] : 0.f);
-    for (int r = 0; r < registers; ++r) {
+    for (int r = 0; r < kRegisters; ++r) {
       upper[r] = known ? lower[r] : sums.inRow(integral.ptr<int>(row), r);
       lower[r] = sums.inRow(integral.ptr<int>(row + 1), r);
-      _mm256_storeu_ps(&across[8 * r],
-                       _mm256_add_ps(upper[r], _mm256_mul_ps(share, _mm256_sub_ps(lower[r], upper[r]))));
+      across[r] = _mm256_add_ps(upper[r], _mm256_mul_ps(share, _mm256_sub_ps(lower[r], upper[r])));
     }
-    for (int r = 0; 8 * r < side; ++r) {
-      const __m256 upto = _mm256_sub_ps(_mm256_loadu_ps(&across[8 * r + 1]), _mm256_loadu_ps(&across[8 * r]));
+    for (int r = 0; r < kRegisters; ++r) {
+      const __m256 upto = _mm256_sub_ps(nextOf(across[r], across[std::min(r + 1, kRegisters - 1)]), across[r]);
       const __m256 inside = _mm256_sub_ps(upto, above[r]);
       above[r] = upto;
       if (j == 0) continue;
@@ -171,7 +193,10 @@ void PatchCutter::cut(float u, float v, float size, std::uint8_t* samples) const
   const Edges columns = edgesAround(u, layout_.side, spacing, integral_.cols);
   const Edges rows = edgesAround(v, layout_.side, spacing, integral_.rows);
 #ifdef SDVO_HAVE_AVX2
-  if (usesAvx2()) return cutWithAvx2(integral_, columns, rows, layout_.side, samples);
+  if (usesAvx2()) {
+    const auto cut = layout_.side < 8 ? cutWithAvx2<1> : layout_.side < 16 ? cutWithAvx2<2> : cutWithAvx2<3>;
+    return cut(integral_, columns, rows, layout_.side, samples);
+  }
 #endif
   cutPlain(integral_, columns, rows, layout_.side, samples);
 }

@@ -56,7 +56,7 @@ TEST(IntegralImage, HoldsLargeImages) {
   for (double u = 3700.0; u < 4000.0; u += 7.25) EXPECT_EQ(image.boxMean(u, 2150.0, 20.0), 255.f) << u;
   EXPECT_EQ(image.boxMean(4080.0, 2180.0, 5.0), 255.f);
   EXPECT_EQ(image.boxMean(4090.0, 2190.0, 0.5), 0.f);
-  EXPECT_NEAR(image.boxMean(4090.0, 2190.0, 2.5), 255.f * 24.f / 25.f, 1e-4);
+  EXPECT_NEAR(image.boxMean(4090.0, 2190.0, 2.5), 255.f * 24.f / 25.f, 1.0 / 512.0);
 }
 
 }  // namespace

@@ -32,8 +32,8 @@ class Freak {
 
   /// One receptive field in units of the pattern's radius.
   struct Field {
-    double x, y;
-    double sigma;  ///< half side of the box
+    float x, y;
+    float sigma;  ///< half side of the box
   };
 
   /// The published retina pattern, outermost ring first.
@@ -60,8 +60,7 @@ class Freak {
   /// Orientation in [0, 2 pi) from the intensity gradient over symmetric field pairs (section 4.4 there).
   float orientation(FreakKeypoint keypoint) const;
 
-  /// The image's sums.
-  const cv::Mat& integral() const { return image_.sums(); }
+  const IntegralImage& image() const { return image_; }
 
  private:
   static constexpr double kReachPerSize = 22.0 / 7.0;
@@ -71,15 +70,15 @@ class Freak {
 
 /// What a key point makes of the pattern: how much larger it is and how it is turned.
 struct FreakPose {
-  static constexpr double kSmallestHalfSide = 0.5;  ///< of a field's box: one pixel
+  static constexpr float kSmallestHalfSide = 0.5f;  ///< of a field's box: one pixel
 
   explicit FreakPose(const FreakKeypoint& keypoint)
-      : scale(Freak::reach(keypoint.size)),
-        cosine(keypoint.angle < 0.f ? scale : std::cos(static_cast<double>(keypoint.angle)) * scale),
-        sine(keypoint.angle < 0.f ? 0.0 : std::sin(static_cast<double>(keypoint.angle)) * scale) {}
+      : scale(static_cast<float>(Freak::reach(keypoint.size))),
+        cosine(keypoint.angle < 0.f ? scale : std::cos(keypoint.angle) * scale),
+        sine(keypoint.angle < 0.f ? 0.f : std::sin(keypoint.angle) * scale) {}
 
-  double scale;         ///< px
-  double cosine, sine;  ///< of the angle, times the scale
+  float scale;         ///< px
+  float cosine, sine;  ///< of the angle, times the scale
 };
 
 }  // namespace sdvo

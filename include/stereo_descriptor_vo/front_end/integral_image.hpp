@@ -1,62 +1,69 @@
 #pragma once
 
 #include <algorithm>
-#include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
 namespace sdvo {
 
 /// Mean intensities of boxes with real-valued position and side. Pixel p covers [p - 0.5, p + 0.5]; interpolating the
-/// integral linearly gives the exact area-weighted sum.
+/// integral linearly gives the area-weighted sum.
 class IntegralImage {
  public:
   /// `image` must be CV_8UC1; only its integral is kept.
   explicit IntegralImage(const cv::Mat& image) {
     CV_Assert(image.type() == CV_8UC1);
-    // Whole numbers either way: the same means. The 32 bits that make it fast hold 8.4 million white pixels.
-    constexpr std::size_t kFewPixels = std::numeric_limits<std::int32_t>::max() / 255;
-    cv::integral(image, integral_, image.total() <= kFewPixels ? CV_32S : CV_64F);
+    cv::integral(image, sums_, CV_32S);
   }
 
-  /// (rows + 1) x (columns + 1) sums, CV_32S or CV_64F.
-  const cv::Mat& sums() const { return integral_; }
+  /// (rows + 1) x (columns + 1) sums, CV_32S. Sums beyond 2^31 wrap around, differences of them do not.
+  const cv::Mat& sums() const { return sums_; }
 
   /// Mean grey level of the square around (u, v) with the given half side (all px). The square must lie inside the
-  /// image. Rounded to float: means that are equal must compare so, whatever the sums were rounded to on the way.
-  float boxMean(double u, double v, double half) const {
-    return integral_.depth() == CV_32S ? meanOf<std::int32_t>(u, v, half) : meanOf<double>(u, v, half);
+  /// image. To the nearest 1/256: means that are equal must compare so, whatever the sums were rounded to on the way.
+  float boxMean(float u, float v, float half) const {
+    const Edge left = edge(u - half, sums_.cols), right = edge(u + half, sums_.cols);
+    const Edge top = edge(v - half, sums_.rows), bottom = edge(v + half, sums_.rows);
+    const auto between = [&](int upper, int lower) { return sumBetween(upper, lower, left, right); };
+    const float sum = between(top.index, bottom.index) + bottom.share * between(bottom.index, bottom.index + 1) -
+                      top.share * between(top.index, top.index + 1);
+    // Not 4 half^2: the edges are rounded, too.
+    return sum / (width(left, right) * width(top, bottom)) + kRounding - kRounding;
   }
+
+  /// So large that a grey level added to it keeps eight bits behind the point.
+  static constexpr float kRounding = 1.5f * (1 << 15);
 
  private:
-  template <class Sum>
-  float meanOf(double u, double v, double half) const {
-    const Edge left = edge(u - half, integral_.cols), right = edge(u + half, integral_.cols);
-    const Edge top = edge(v - half, integral_.rows), bottom = edge(v + half, integral_.rows);
-    const auto between = [&](int row) {
-      const Sum* sums = integral_.ptr<Sum>(row);
-      return interpolated(sums[right.index], sums[right.index + 1], right.share) -
-             interpolated(sums[left.index], sums[left.index + 1], left.share);
-    };
-    return static_cast<float>((interpolated(between(bottom.index), between(bottom.index + 1), bottom.share) -
-                               interpolated(between(top.index), between(top.index + 1), top.share)) /
-                              (4.0 * half * half));
-  }
-
   /// A position between two columns or two rows of the integral.
   struct Edge {
     int index;
-    double share;  ///< of the second one
+    float share;  ///< of the second one
   };
-  static Edge edge(double position, int size) {
-    const int index = std::clamp(static_cast<int>(position + 0.5), 0, size - 2);
-    return {index, position + 0.5 - index};
+  static Edge edge(float position, int size) {
+    const float shifted = position + 0.5f;
+    const int index = std::clamp(static_cast<int>(shifted), 0, size - 2);
+    return {index, shifted - static_cast<float>(index)};
   }
-  static double interpolated(double a, double b, double share) { return a + share * (b - a); }
+  static float width(const Edge& first, const Edge& last) {
+    return static_cast<float>(last.index - first.index) + (last.share - first.share);
+  }
 
-  cv::Mat integral_;  ///< (rows + 1) x (cols + 1), CV_32S or CV_64F
+  /// Of the pixels between two rows of the integral, and two edges.
+  float sumBetween(int upper, int lower, const Edge& left, const Edge& right) const {
+    const auto column = [&](int x) {
+      return static_cast<unsigned>(sums_.at<std::int32_t>(lower, x)) -
+             static_cast<unsigned>(sums_.at<std::int32_t>(upper, x));
+    };
+    const auto across = [&](int from, int to) {
+      return static_cast<float>(static_cast<std::int32_t>(column(to) - column(from)));
+    };
+    return across(left.index, right.index) + right.share * across(right.index, right.index + 1) -
+           left.share * across(left.index, left.index + 1);
+  }
+
+  cv::Mat sums_;
 };
 
 }  // namespace sdvo
