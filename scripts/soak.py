@@ -125,7 +125,7 @@ class Soak:
 
     def on_info(self, info):
         # No messages: the garbage collector would look through all of them again and again.
-        self.answers.append((info.state, info.reason, 1e3 * info.latency))
+        self.answers.append((time.monotonic(), info.state, info.reason, 1e3 * info.latency))
         more = info.dropped_pairs + info.dropped_features - self.last.dropped_pairs - self.last.dropped_features
         if more:
             self.drops.append((time.monotonic(), more))
@@ -154,10 +154,10 @@ class Soak:
         return any(0.0 <= moment - late < 1.0 for late, _ in self.late)
 
     def dropped_without_cause(self, since):
-        """Pairs dropped after a moment though in the second before none was published late by a period or more, and the machine
-        kept no thread of the manager waiting, and no processor, for as long."""
-        return sum(count for (t, count), (steal, wait) in zip(self.drops, self.causes)
-                   if t > since and not self.published_late_before(t) and max(steal, wait) < 1.0 / self.rate)
+        """Pairs dropped after a moment though in the second before none was published late by a period or more, and no processor
+        was withheld for as long."""
+        return sum(count for (t, count), (steal, _) in zip(self.drops, self.causes)
+                   if t > since and not self.published_late_before(t) and steal < 1.0 / self.rate)
 
     def explain_drops(self, withheld):
         withheld.sample()
@@ -211,11 +211,11 @@ def main():
 
     quarter = len(memory) // 4
     before, after = (statistics.median(m for _, m in part) for part in (memory[quarter:2 * quarter], memory[-quarter:]))
-    states = collections.Counter(state for state, _, _ in soak.answers)
+    states = collections.Counter(state for _, state, _, _ in soak.answers)
     last, count = soak.last, len(soak.answers)
     answered = count + last.dropped_pairs + last.dropped_features
     # ms, of the same two quarters
-    latencies = [[latency for _, _, latency in part] or [float("nan")]
+    latencies = [[latency for *_, latency in part] or [float("nan")]
                  for part in (soak.answers[count // 4:count // 2], soak.answers[-(count // 4):])]
     first, last_quarter = ("%.0f (95 %% below %.0f)" % tuple(np.percentile(part, (50, 95))) for part in latencies)
     print(f"{arguments.minutes:g} minutes at {arguments.rate:g} Hz: {pairs} pairs, {count} answered, {last.dropped_pairs} dropped, "
@@ -228,15 +228,16 @@ def main():
     without_cause = soak.dropped_without_cause(warm)
     print(f"after the first minute: {sum(drop[1] for drop in drops)} dropped, {without_cause} of them without a cause outside; "
           f"{len(late)} pairs published late by a period or more (at most {1e3 * max(late, default=0.0):.0f} ms)")
-    print(f"seconds in which a processor was withheld for a period or more: {sum(s >= 1.0 / arguments.rate for s, _ in soak.seconds)}, "
-          f"in which a thread of the manager waited so long: {sum(w >= 1.0 / arguments.rate for _, w in soak.seconds)}, "
-          f"of {len(soak.seconds)}")
+    steals, waits = zip(*soak.seconds)
+    print(f"of each second the hypervisor withheld a processor for {1e3 * statistics.median(steals):.0f} ms (at most {1e3 * max(steals):.0f}), and "
+          f"a thread of the manager waited for {1e3 * statistics.median(waits):.0f} ms (at most {1e3 * max(waits):.0f})")
     for t, number, steal, wait in drops:
         print(f"{number} dropped at {t - begin:.1f} s: in the second before, the hypervisor withheld a processor for {1e3 * steal:.0f} ms, "
               f"and a thread of the manager waited for {1e3 * wait:.0f} ms" + (", the feeder was late" if soak.published_late_before(t) else ""))
     minutes = [f"{m:.1f}" for (t, m), (next_t, _) in zip(memory, memory[1:]) if t // 60 < next_t // 60]
     print("memory after each minute:", ", ".join(minutes), "MB")
-    untracked = collections.Counter((state, reason) for state, reason, _ in soak.answers if state != "TRACKING")
+    untracked = collections.Counter((state, reason) for _, state, reason, _ in soak.answers if state != "TRACKING")
+    print(f"after the first minute: {sum(t > warm and state != 'TRACKING' for t, state, _, _ in soak.answers)} pairs not TRACKING")
     for (state, reason), times in untracked.most_common(20):
         print(f"{times} pairs {state}: {reason}")
     for error in soak.errors[:5]:

@@ -19,10 +19,12 @@ constexpr double kFarthestDisparity = 0.05;  // px
 constexpr std::size_t kUsualSightings = 8;
 
 /// Covariance of the motion M = T_from_to between two frames, perturbed as M * exp(xi), from that of the left
-/// perturbations of all poses but the first: exp(f) M exp(-t) = M exp(Ad(M^-1) f - t) to first order.
-Matrix6d motionCovariance(const Window& window, const Eigen::MatrixXd& pose_covariance, int from, int to) {
+/// perturbations of `poses`, without the first: exp(f) M exp(-t) = M exp(Ad(M^-1) f - t) to first order.
+Matrix6d motionCovariance(const Window& window, const std::vector<int>& poses, const Eigen::MatrixXd& pose_covariance,
+                          int from, int to) {
   if (from == to) return Matrix6d::Zero();
-  const int t = 6 * (to - 1), f = 6 * (from - 1);
+  const auto row_of = [&](int pose) { return 6 * (std::find(poses.begin(), poses.end(), pose) - poses.begin()); };
+  const auto t = row_of(to), f = row_of(from);
   Matrix6d covariance = pose_covariance.block<6, 6>(t, t);
   if (from == 0) return covariance;  // held fixed
   const Matrix6d carried = adjoint(window.T_camera_origin[to] * window.T_camera_origin[from].inverse());
@@ -398,13 +400,16 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   const auto of_newest_pair = std::count_if(window.observations.begin(), window.observations.end(),
                                             [&](const WindowObservation& o) { return o.frame == newest; });
   if (of_newest_pair < kFewest) return adjustment;
-  const WindowSolution& solution = optimizer.optimize(window);
+  std::vector<int> poses = {newest};  // whose covariances are made use of below
+  for (const int pose : {newest - 1, 1})
+    if (pose > 0 && std::find(poses.begin(), poses.end(), pose) == poses.end()) poses.push_back(pose);
+  const WindowSolution& solution = optimizer.optimize(window, poses);
   if (!solution.success) return adjustment;
   adjustment.success = true;
   adjustment.calibration_information = solution.calibration_information;
   adjustment.common_disparity_square = solution.common_disparity_square;
   const auto covariance = [&](int from, int to) -> Matrix6d {
-    return motionCovariance(window, solution.pose_covariance, from, to);
+    return motionCovariance(window, poses, solution.pose_covariance, from, to);
   };
   const auto [square, disparity] = typicalOf(window, solution.residuals, newest);
   constexpr double kAlike = 1.15;  // errors of neighbouring points are not independent

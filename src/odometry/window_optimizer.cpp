@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "../common/median.hpp"
 #include "log_sum.hpp"
@@ -337,7 +338,7 @@ struct WindowOptimizer::Memory {
   Solver solver;
   ReducedSystem system;
   Window next;
-  Eigen::MatrixXd hessian, covariance;
+  Eigen::MatrixXd hessian, units, covariance;
   Eigen::LDLT<Eigen::MatrixXd> factor;
   Eigen::VectorXd step;
   std::vector<double> squares;
@@ -352,8 +353,14 @@ WindowOptimizer& WindowOptimizer::operator=(WindowOptimizer&&) noexcept = defaul
 WindowOptimizer::~WindowOptimizer() = default;
 
 const WindowSolution& WindowOptimizer::optimize(Window& window) {
+  std::vector<int> all(window.T_camera_origin.size() - 1);
+  std::iota(all.begin(), all.end(), 1);
+  return optimize(window, all);
+}
+
+const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vector<int>& covariance_of) {
   constexpr double kUndamped = 1e-5, kLargestDamping = 1e4;
-  auto& [solver, system, next, hessian, covariance, factor, step, squares, solution] = *memory_;
+  auto& [solver, system, next, hessian, units, covariance, factor, step, squares, solution] = *memory_;
   solver.take(window);
   solution.success = false;
   solution.iterations = 0;
@@ -388,11 +395,19 @@ const WindowSolution& WindowOptimizer::optimize(Window& window) {
   if (damping_of_system > kUndamped) solver.linearise(window, kUndamped, system);
   factor.compute(system.hessian);
   if (factor.info() != Eigen::Success || !factor.isPositive()) return solution;
-  covariance = factor.solve(Eigen::MatrixXd::Identity(solver.size(), solver.size()));
+  const int asked = static_cast<int>(covariance_of.size());
+  units.setZero(solver.size(), 6 * asked + kCalibration);
+  for (int a = 0; a < asked; ++a)
+    units.block<6, 6>(6 * (covariance_of[static_cast<std::size_t>(a)] - 1), 6 * a).setIdentity();
+  units.bottomRightCorner<kCalibration, kCalibration>().setIdentity();
+  covariance = factor.solve(units);
   const double points = static_cast<double>(window.points.size());
   const double degrees_of_freedom = std::max(3.0 * system.weight - 3.0 * points - c, 1.0);
   const double variance = system.weighted_square / degrees_of_freedom;
-  solution.pose_covariance = variance * covariance.topLeftCorner(c, c);
+  solution.pose_covariance.resize(6 * asked, 6 * asked);
+  for (int a = 0; a < asked; ++a)
+    solution.pose_covariance.middleRows<6>(6 * a) =
+        variance * covariance.block(6 * (covariance_of[static_cast<std::size_t>(a)] - 1), 0, 6, 6 * asked);
   solution.calibration_information =
       covariance.bottomRightCorner<kCalibration, kCalibration>().inverse() - window.calibration_prior.information;
 

@@ -143,6 +143,24 @@ TEST(WindowOptimizer, IsTheSameToTheBitWithAndWithoutAvx2) {
   EXPECT_EQ(with_avx2.residuals, without.residuals);
 }
 
+TEST(WindowOptimizer, TheCovarianceOfSomePosesIsPartOfThatOfAll) {
+  RigCalibration truth;
+  truth.value << 0.3, -1.0;
+  const Window disturbed = disturbedWindow(truth);
+  const std::vector<int> asked = {4, 2};
+  Window one = disturbed, another = disturbed;
+  const WindowSolution all = WindowOptimizer(WindowOptimizerOptions{}).optimize(one);
+  const WindowSolution some = WindowOptimizer(WindowOptimizerOptions{}).optimize(another, asked);
+  ASSERT_EQ(all.pose_covariance.rows(), 24);
+  ASSERT_EQ(some.pose_covariance.rows(), 12);
+  for (int a = 0; a < 2; ++a)
+    for (int b = 0; b < 2; ++b)
+      EXPECT_TRUE((some.pose_covariance.block<6, 6>(6 * a, 6 * b)
+                       .isApprox(all.pose_covariance.block<6, 6>(6 * (asked[a] - 1), 6 * (asked[b] - 1)), 1e-9)))
+          << a << ", " << b;
+  EXPECT_TRUE(some.calibration_information.isApprox(all.calibration_information, 1e-9));
+}
+
 TEST(WindowOptimizer, AWindowSaysTheSameWhateverWasOptimisedBefore) {
   RigCalibration truth;
   truth.value << 0.3, -1.0;

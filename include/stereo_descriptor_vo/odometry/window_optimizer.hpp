@@ -70,7 +70,7 @@ struct Window {
 struct WindowSolution {
   bool success = false;
   int iterations = 0;
-  Eigen::MatrixXd pose_covariance;  ///< of the left perturbations of all poses but the first, 6 rows each, m and rad
+  Eigen::MatrixXd pose_covariance;  ///< of the left perturbations of the poses asked for, 6 rows each, m and rad
   RigCalibration::Matrix calibration_information;  ///< of this window alone, the prior excluded, 1/px^2
   /// Median over the points of the squared error that all disparities of one share, px^2, as a variance; none where too
   /// few points are known better from their motion than from their disparities.
@@ -89,7 +89,10 @@ class WindowOptimizer {
   WindowOptimizer& operator=(WindowOptimizer&&) noexcept;
   ~WindowOptimizer();
 
-  /// The solution is there until the next one.
+  /// The solution is there until the next one. `covariance_of`: poses whose covariance is asked for, not the first one;
+  /// that of all takes as long as a fifth of the linearisation.
+  const WindowSolution& optimize(Window& window, const std::vector<int>& covariance_of);
+  /// With the covariance of all poses but the first.
   const WindowSolution& optimize(Window& window);
 
   const WindowOptimizerOptions& options() const { return options_; }
