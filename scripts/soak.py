@@ -4,8 +4,8 @@ watches the nodelet manager's memory. Stamps are even, as those of a triggered c
 drive that ends where it began goes round; another one goes forwards and backwards in turn, which no vehicle does: at each end
 it is DEGRADED for 2 s. In the first minute the pairs of half a second come at once, five times: most of them are dropped, and
 the manager takes the room that so many need and keeps it. From then on exits 1 when memory grows, a pair is dropped though it
-was published in time and the machine let the manager run, a pair gets no answer, an error is logged or the odometry does not
-track. What the machine withheld is printed for each drop."""
+was published in time and the hypervisor withheld no processor, a pair gets no answer, an error is logged or the odometry does
+not track. What was withheld is printed for each drop."""
 import argparse
 import collections
 import glob

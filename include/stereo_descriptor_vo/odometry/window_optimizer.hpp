@@ -90,7 +90,7 @@ class WindowOptimizer {
   ~WindowOptimizer();
 
   /// The solution is there until the next one. `covariance_of`: poses whose covariance is asked for, not the first one;
-  /// that of all takes as long as a fifth of the linearisation.
+  /// six columns are solved for each.
   const WindowSolution& optimize(Window& window, const std::vector<int>& covariance_of);
   /// With the covariance of all poses but the first.
   const WindowSolution& optimize(Window& window);
