@@ -400,8 +400,9 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   const auto of_newest_pair = std::count_if(window.observations.begin(), window.observations.end(),
                                             [&](const WindowObservation& o) { return o.frame == newest; });
   if (of_newest_pair < kFewest) return adjustment;
-  std::vector<int> poses = {newest};  // whose covariances are made use of below
-  for (const int pose : {newest - 1, 1})
+  std::vector<int> poses;  // whose covariances are made use of below
+  poses.reserve(3);
+  for (const int pose : {newest, newest - 1, 1})
     if (pose > 0 && std::find(poses.begin(), poses.end(), pose) == poses.end()) poses.push_back(pose);
   const WindowSolution& solution = optimizer.optimize(window, poses);
   if (!solution.success) return adjustment;
