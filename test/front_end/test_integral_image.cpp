@@ -59,5 +59,11 @@ TEST(IntegralImage, HoldsLargeImages) {
   EXPECT_NEAR(image.boxMean(4090.0, 2190.0, 2.5), 255.f * 24.f / 25.f, 1.0 / 512.0);
 }
 
+/// Far from the left border all that lies beside a box is more than a float can count.
+TEST(IntegralImage, AWideImageIsAsExact) {
+  const IntegralImage image(cv::Mat(40, 16000, CV_8U, cv::Scalar(255)));
+  for (float u = 15000.f; u < 15040.f; u += 1.25f) EXPECT_EQ(image.boxMean(u, 20.5f, 5.f), 255.f) << u;
+}
+
 }  // namespace
 }  // namespace sdvo
