@@ -372,12 +372,12 @@ void LocalMap::pose(Problem& problem) const {
   for (std::size_t p = 0; p < points_.size(); ++p) {
     const Point& point = points_[p];
     if (point.observations.size() < 2) continue;
+    int frame = 0;
     for (std::size_t k = 0; k < point.observations.size(); ++k) {
       const Observation& observation = point.observations[k];
-      const auto frame = std::lower_bound(problem.frame_ids.begin(), problem.frame_ids.end(), observation.frame_id);
-      window.observations.push_back({static_cast<int>(problem.points.size()),
-                                     static_cast<int>(frame - problem.frame_ids.begin()), observation.measurement,
-                                     observation.sigma});
+      while (frames_[static_cast<std::size_t>(frame)].id < observation.frame_id) ++frame;
+      window.observations.push_back(
+          {static_cast<int>(problem.points.size()), frame, observation.measurement, observation.sigma});
       problem.sources.emplace_back(static_cast<int>(p), static_cast<int>(k));
     }
     window.points.push_back(point.position);

@@ -7,29 +7,21 @@
 
 #include "../common/median.hpp"
 #include "log_sum.hpp"
-#include "pose_blocks.hpp"
+#include "stereo_descriptor_vo/odometry/point_elimination.hpp"
 
 namespace sdvo {
 namespace {
 
 constexpr int kCalibration = RigCalibration::kParameters;
 using CalibrationVector = RigCalibration::Vector;
-using PosePoint = Eigen::Matrix<double, 6, 3>;
 
 /// Normal equations of poses and calibration after the elimination of the points, and what is needed to get these back.
 struct ReducedSystem {
-  struct Point {
-    Eigen::Matrix3d inverse_hessian;
-    Eigen::Vector3d gradient;
-    int end;  ///< of its sightings; they begin where those of the point before end
-  };
-  Eigen::MatrixXd hessian;  ///< poses but the first, then the calibration
+  Eigen::MatrixXd hessian;  ///< poses but the first, then the calibration; its lower triangle
   Eigen::VectorXd gradient;
-  std::vector<Point> points;
-  std::vector<PosePoint> pose_point;  ///< for each sighting from a pose that may move
-  std::vector<int> pose;              ///< of it, from zero on
-  std::vector<Eigen::Matrix<double, kCalibration, 3>> calibration_point;  ///< for each point
-  std::vector<double> common_squares;                                     ///< of the points that tell, px^2
+  std::vector<EliminatedPoint> points;
+  std::vector<PoseFactor> factors;     ///< one point's after the other's
+  std::vector<double> common_squares;  ///< of the points that tell, px^2
   double cost = 0.0;
   double weight = 0.0;
   double weighted_square = 0.0;
@@ -40,57 +32,35 @@ class RelativePoses {
  public:
   /// In the memory of earlier poses. These must outlive their use.
   void take(const std::vector<Eigen::Isometry3d>& T_camera_origin) {
-    T_camera_origin_ = T_camera_origin.data();
-    T_camera_anchor_.resize(T_camera_origin.size());
-    known_.assign(T_camera_origin.size(), 0);
-    T_origin_anchor_.setIdentity();
+    T_camera_origin_ = &T_camera_origin;
+    T_origin_anchor_.reset();
   }
 
-  void setAnchor(const Eigen::Isometry3d& T_origin_anchor) {
-    if (T_origin_anchor.matrix() == T_origin_anchor_.matrix()) return;
-    T_origin_anchor_ = T_origin_anchor;
-    std::fill(known_.begin(), known_.end(), 0);
-  }
-  const Eigen::Isometry3d& at(int frame) {
-    const std::size_t f = static_cast<std::size_t>(frame);
-    if (!known_[f]) T_camera_anchor_[f] = T_camera_origin_[f] * T_origin_anchor_, known_[f] = 1;
-    return T_camera_anchor_[f];
+  const Eigen::Isometry3d* from(const Eigen::Isometry3d& T_origin_anchor) {
+    if (!T_origin_anchor_ || T_origin_anchor.matrix() != T_origin_anchor_->matrix()) {
+      T_origin_anchor_ = T_origin_anchor;
+      T_camera_anchor_.clear();
+      for (const Eigen::Isometry3d& T : *T_camera_origin_) T_camera_anchor_.push_back(T * T_origin_anchor);
+    }
+    return T_camera_anchor_.data();
   }
 
  private:
-  const Eigen::Isometry3d* T_camera_origin_ = nullptr;
-  Eigen::Isometry3d T_origin_anchor_;
+  const std::vector<Eigen::Isometry3d>* T_camera_origin_ = nullptr;
+  std::optional<Eigen::Isometry3d> T_origin_anchor_;
   std::vector<Eigen::Isometry3d> T_camera_anchor_;
-  std::vector<char> known_;
 };
 
-/// What all disparities of one point say beyond what its positions do.
-class DisparitiesOfPoint {
- public:
-  /// Residual and its derivatives by the point, both divided by the noise and times the root of the sighting's weight.
-  void add(double root, double residual, const Eigen::RowVector3d& by_point) {
-    ++count_;
-    weight_ += root * root;
-    residuals_ += root * residual;
-    by_point_ += root * by_point;
-  }
-
-  /// Square of their mean residual as a variance: what the point itself followed of it is made up for. None where that
-  /// is more than half.
-  std::optional<double> commonSquare(const Eigen::Matrix3d& covariance) const {
-    constexpr int kFewest = 4;
-    if (count_ < kFewest) return std::nullopt;
-    const double followed = by_point_.dot(covariance * by_point_.transpose()) / weight_;
-    if (followed > 0.5) return std::nullopt;
-    const double mean = residuals_ / weight_;
-    return mean * mean / (1.0 - followed);
-  }
-
- private:
-  int count_ = 0;
-  double weight_ = 0.0, residuals_ = 0.0;
-  Eigen::RowVector3d by_point_ = Eigen::RowVector3d::Zero();
-};
+/// What all disparities of one point say beyond what its positions do: the square of their mean residual as a variance.
+/// What the point itself followed of it is made up for; none where that is more than half.
+std::optional<double> commonSquare(const EliminatedPoint& point) {
+  constexpr int kFewest = 4;
+  if (point.sightings < kFewest) return std::nullopt;
+  const double followed = (point.R * point.disparity_by_point).squaredNorm() / point.weight;
+  if (followed > 0.5) return std::nullopt;
+  const double mean = point.disparity_residual / point.weight;
+  return mean * mean / (1.0 - followed);
+}
 
 /// Median of squares as the variance of a normal distribution; none of too few. Reorders them.
 std::optional<double> varianceOf(std::vector<double>& squares) {
@@ -99,9 +69,6 @@ std::optional<double> varianceOf(std::vector<double>& squares) {
   if (squares.size() < kFewest) return std::nullopt;
   return median(squares) / kMedianOfChiSquare;
 }
-
-/// A sighting of a point that is not in front of the camera costs as much as a very wrong one.
-constexpr double kBehindSquare = 1e4;
 
 /// Linear algebra of one window after the other, in the same memory.
 class Solver {
@@ -117,11 +84,19 @@ class Solver {
     for (std::size_t i = 0; i < observations.size(); ++i)
       if (i == 0 || observations[i].point != observations[i - 1].point) first_of_point_.push_back(static_cast<int>(i));
     first_of_point_.push_back(static_cast<int>(observations.size()));
-    sightings_.assign(window.points.size(), 0);
-    for (const WindowObservation& observation : observations) ++sightings_[static_cast<std::size_t>(observation.point)];
-    inverse_noise_.clear();
-    inverse_noise_.reserve(observations.size());
-    for (const WindowObservation& observation : observations) inverse_noise_.push_back(inverseNoise(observation));
+    sightings_.clear();
+    sightings_.reserve(observations.size());
+    for (std::size_t p = 0; p + 1 < first_of_point_.size(); ++p) {
+      const double inverse_disparity_sigma = inverseDisparitySigma(first_of_point_[p + 1] - first_of_point_[p]);
+      for (int i = first_of_point_[p]; i < first_of_point_[p + 1]; ++i) {
+        const WindowObservation& o = observations[static_cast<std::size_t>(i)];
+        const double inverse_sigma = 1.0 / o.sigma;
+        sightings_.push_back({{o.measurement.x(), o.measurement.y(), o.measurement.z(), 0.0},
+                              {inverse_sigma, inverse_sigma, inverse_disparity_sigma, 0.0},
+                              RigCalibration::shape(window.camera, o.measurement.x())[1],
+                              o.frame});
+      }
+    }
     poses_ = static_cast<int>(window.T_camera_origin.size()) - 1;
     size_ = 6 * poses_ + kCalibration;
   }
@@ -137,119 +112,45 @@ class Solver {
     return error.dot(window.calibration_prior.information * error);
   }
 
-  /// Normalised residual of observation i under another estimate of poses, points and calibration; the kernel is not
-  /// applied.
-  bool residual(const Window& window, std::size_t i, Eigen::Vector3d& residual, ObservationJacobians* jacobians) {
-    const WindowObservation& observation = window_->observations[i];
-    const AnchoredPoint& point = window.points[observation.point];
-    T_camera_anchor_.setAnchor(point.T_origin_anchor);
-    Eigen::Vector3d prediction;
-    if (!predictFromAnchor(window.camera, T_camera_anchor_.at(observation.frame), point.ray_and_inverse_depth,
-                           prediction, jacobians))
-      return false;
-    prediction.z() += window.calibration.disparityError(window.camera, observation.measurement.x());
-    residual = inverse_noise_[i].cwiseProduct(observation.measurement - prediction);
-    return true;
-  }
-
   /// Also gives the square of each observation's residual.
   double cost(const Window& window, std::vector<double>& squares) {
-    LogSum costs;
+    squares.resize(sightings_.size());
+    const WindowProjection projection(window.camera, window.calibration);
     T_camera_anchor_.take(window.T_camera_origin);
-    Eigen::Vector3d r;
-    squares.resize(window_->observations.size());
-    for (std::size_t i = 0; i < squares.size(); ++i) {
-      squares[i] = residual(window, i, r, nullptr) ? r.squaredNorm() : kBehindSquare;
-      costs.add(squares[i] / bend());
-    }
-    return priorCost(window) + bend() * costs.value();
+    for (std::size_t p = 0; p + 1 < first_of_point_.size(); ++p)
+      squareResiduals(projection, sightedPoint(window, p), squares.data() + first_of_point_[p]);
+    return costOf(window, squares);
   }
 
   /// In the memory that the system has of an earlier linearisation.
   void linearise(const Window& window, double damping, ReducedSystem& system) {
-    system.hessian.setZero(size_, size_);
-    system.gradient.setZero(size_);
-    system.pose_point.resize(window.observations.size());
-    system.pose.clear();
-    system.pose.reserve(window.observations.size());
-    system.weight = system.weighted_square = 0.0;
     const std::size_t points = first_of_point_.size() - 1;
+    system.points.resize(points);
+    system.factors.resize(sightings_.size());
     system.common_squares.clear();
     system.common_squares.reserve(points);
-    system.points.resize(points);
-    system.calibration_point.resize(points);
-    const int c = 6 * poses_;
-    auto calibration_hessian = system.hessian.block<kCalibration, kCalibration>(c, c);
-    auto calibration_gradient = system.gradient.segment<kCalibration>(c);
-    calibration_hessian += window.calibration_prior.information;
-    calibration_gradient +=
-        window.calibration_prior.information * (window.calibration_prior.mean - window.calibration.value);
-    LogSum costs;
-
+    squares_.resize(sightings_.size());
+    system.weight = system.weighted_square = 0.0;
+    equations_.setZero(poses_);
+    const WindowProjection projection(window.camera, window.calibration);
     T_camera_anchor_.take(window.T_camera_origin);
-    of_point_.resize(window.T_camera_origin.size());
-    scaled_.resize(of_point_.size());
+    PoseFactor* factors = system.factors.data();
     for (std::size_t p = 0; p < points; ++p) {
-      Eigen::Matrix3d hessian = Eigen::Matrix3d::Zero();
-      Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-      Eigen::Matrix<double, kCalibration, 3>& calibration_point = system.calibration_point[p];
-      calibration_point.setZero();
-      DisparitiesOfPoint disparities;
-      int seen = 0;
-      for (int i = first_of_point_[p]; i < first_of_point_[p + 1]; ++i) {
-        const WindowObservation& observation = window.observations[i];
-        Eigen::Vector3d r;
-        ObservationJacobians jacobians;
-        if (!residual(window, static_cast<std::size_t>(i), r, &jacobians)) {
-          costs.add(kBehindSquare / bend());
-          continue;
-        }
-        const double square = r.squaredNorm(), weight = 1.0 / (1.0 + square / bend());
-        costs.add(square / bend());
-        system.weight += weight;
-        system.weighted_square += weight * square;
-        const double root = std::sqrt(weight);
-        r *= root;
-        const Eigen::Vector3d scale = root * inverse_noise_[static_cast<std::size_t>(i)];
-        const Eigen::Matrix3d by_point = scale.asDiagonal() * jacobians.point;
-        const RigCalibration::RowVector by_calibration =
-            scale.z() * RigCalibration::shape(window.camera, observation.measurement.x());
-        hessian.noalias() += by_point.transpose() * by_point;
-        gradient.noalias() += by_point.transpose() * r;
-        calibration_point.noalias() += by_calibration.transpose() * by_point.row(2);
-        calibration_hessian.noalias() += by_calibration.transpose() * by_calibration;
-        calibration_gradient.noalias() += by_calibration.transpose() * r.z();
-        disparities.add(root, r.z(), by_point.row(2));
-        if (observation.frame == 0) continue;
-        WeightedSighting& sighting = of_point_[static_cast<std::size_t>(seen++)];
-        Eigen::Map<PosePoint> by_pose(sighting.by_pose);
-        by_pose = jacobians.pose.transpose() * scale.asDiagonal();
-        Eigen::Map<Eigen::Matrix3d>(sighting.by_point) = by_point;
-        Eigen::Map<Eigen::Vector3d>(sighting.residual) = r;
-        sighting.pose = observation.frame - 1;
-        system.pose.push_back(sighting.pose);
-        system.hessian.block<kCalibration, 6>(c, 6 * sighting.pose).noalias() +=
-            by_calibration.transpose() * by_pose.col(2).transpose();
-      }
-
-      hessian.diagonal() *= 1.0 + damping;
-      hessian.diagonal().array() += 1e-9;
-      const Eigen::Matrix3d inverse = hessian.inverse();
-      const int end = static_cast<int>(system.pose.size());
-      system.points[p] = {inverse, gradient, end};
-      const double sigma = 1.0 / inverse_noise_[static_cast<std::size_t>(first_of_point_[p])].z();
-      if (const auto square = disparities.commonSquare(inverse))
-        system.common_squares.push_back(sigma * sigma * *square);
-      const PointProducts products{inverse.data(), gradient.data(), system.pose_point[0].data() + 18 * (end - seen),
-                                   scaled_[0].data()};
-      addEliminatedPoint(of_point_.data(), seen, products, system.hessian.data(), size_, system.gradient.data());
-      for (int k = 0; k < seen; ++k)
-        system.hessian.block<kCalibration, 6>(c, 6 * of_point_[k].pose).noalias() -=
-            calibration_point * scaled_[k].transpose();
-      calibration_hessian.noalias() -= calibration_point * inverse * calibration_point.transpose();
-      calibration_gradient.noalias() -= calibration_point * inverse * gradient;
+      const int first = first_of_point_[p];
+      EliminatedPoint& point = system.points[p];
+      point = equations_.add(projection, sightedPoint(window, p), bend(), damping, factors, squares_.data() + first);
+      factors += point.factors;
+      system.weight += point.weight;
+      system.weighted_square += point.square;
+      const double inverse_sigma = sightings_[static_cast<std::size_t>(first)].inverse_sigma[2];
+      if (const auto square = commonSquare(point))
+        system.common_squares.push_back(*square / (inverse_sigma * inverse_sigma));
     }
-    system.cost = priorCost(window) + bend() * costs.value();
+    equations_.copyTo(system.hessian, system.gradient);
+    const CalibrationBelief& prior = window.calibration_prior;
+    system.hessian.bottomRightCorner<kCalibration, kCalibration>() += prior.information;
+    system.gradient.tail<kCalibration>() += prior.information * (prior.mean - window.calibration.value);
+    system.cost = costOf(window, squares_);
   }
 
   /// The next estimate of poses, points and calibration; observations stay those of the window.
@@ -263,54 +164,68 @@ class Solver {
       next.T_camera_origin[f + 1] = expSE3(step.segment<6>(6 * f)) * window_->T_camera_origin[f + 1];
     const CalibrationVector calibration = step.tail<kCalibration>();
     next.calibration.value += calibration;
-    int sighting = 0;
+    const PoseFactor* factor = system.factors.data();
     for (std::size_t p = 0; p + 1 < first_of_point_.size(); ++p) {
-      Eigen::Vector3d gradient = system.points[p].gradient - system.calibration_point[p].transpose() * calibration;
-      for (; sighting < system.points[p].end; ++sighting)
-        gradient -= system.pose_point[sighting].transpose() * step.segment<6>(6 * system.pose[sighting]);
+      const EliminatedPoint& point = system.points[p];
+      Eigen::Vector3d gradient = point.gradient - point.by_calibration.transpose() * calibration;
+      for (const PoseFactor* end = factor + point.factors; factor != end; ++factor)
+        for (int k = 0; k < 3; ++k)
+          gradient[k] -=
+              Eigen::Map<const Eigen::Vector3d>(factor->Y[k].translation).dot(step.segment<3>(6 * factor->pose)) +
+              Eigen::Map<const Eigen::Vector3d>(factor->Y[k].rotation).dot(step.segment<3>(6 * factor->pose + 3));
       next.points[window_->observations[first_of_point_[p]].point].ray_and_inverse_depth +=
-          system.points[p].inverse_hessian * gradient;
+          point.R.transpose() * gradient;
     }
   }
 
  private:
+  SightedPoint sightedPoint(const Window& window, std::size_t p) {
+    const int first = first_of_point_[p];
+    const AnchoredPoint& point = window.points[static_cast<std::size_t>(window_->observations[first].point)];
+    return {point.ray_and_inverse_depth, sightings_.data() + first, first_of_point_[p + 1] - first,
+            T_camera_anchor_.from(point.T_origin_anchor)};
+  }
+
+  double costOf(const Window& window, const std::vector<double>& squares) const {
+    LogSum costs;
+    for (const double square : squares) costs.add(square / bend());
+    return priorCost(window) + bend() * costs.value();
+  }
+
   /// Of n disparities of one point the mean has the variance sigma^2 / n + common^2, as if each by itself had n times
   /// that: more sightings do not average away what they share.
-  Eigen::Vector3d inverseNoise(const WindowObservation& observation) const {
-    const double variance = options_.disparity_sigma * options_.disparity_sigma +
-                            sightings_[static_cast<std::size_t>(observation.point)] * common_sigma_ * common_sigma_;
-    return {1.0 / observation.sigma, 1.0 / observation.sigma, 1.0 / std::sqrt(variance)};
+  double inverseDisparitySigma(int sightings) const {
+    return 1.0 /
+           std::sqrt(options_.disparity_sigma * options_.disparity_sigma + sightings * common_sigma_ * common_sigma_);
   }
 
   WindowOptimizerOptions options_;
   const Window* window_ = nullptr;
   double common_sigma_ = 0.0;
   std::vector<int> first_of_point_;
-  std::vector<int> sightings_;                  ///< of each point
-  std::vector<Eigen::Vector3d> inverse_noise_;  ///< of each observation
+  std::vector<PreparedSighting> sightings_;
   RelativePoses T_camera_anchor_;
-  std::vector<WeightedSighting> of_point_;
-  std::vector<PosePoint> scaled_;  ///< for each of them: by the pose and the point, times the point's inverse Hessian
+  PoseEquations equations_;
+  std::vector<double> squares_;
   int poses_ = 0, size_ = 0;
 };
 
 }  // namespace
 
-bool predictFromAnchor(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_anchor,
-                       const Eigen::Vector3d& ray_and_inverse_depth, Eigen::Vector3d& prediction,
-                       ObservationJacobians* jacobians) {
+bool predictObservation(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
+                        const AnchoredPoint& point, Eigen::Vector3d& prediction, ObservationJacobians* jacobians) {
   constexpr double kNearest = 1e-3;  // of the depth in the anchor
-  const auto R = T_camera_anchor.linear();
-  const auto t = T_camera_anchor.translation();
-  const double rho = ray_and_inverse_depth.z();
-  const Eigen::Vector3d P =
-      R.col(0) * ray_and_inverse_depth.x() + R.col(1) * ray_and_inverse_depth.y() + R.col(2) + rho * t;
+  const double rho = point.ray_and_inverse_depth.z();
+  const Eigen::Vector3d P = point.scaledPointIn(T_camera_origin);
   if (P.z() < kNearest) return false;
   const double iz = 1.0 / P.z();
   const double x = P.x() * iz, y = P.y() * iz, fb = camera.fx * camera.baseline;
   prediction = {camera.fx * x + camera.cx, camera.fy * y + camera.cy, fb * rho * iz};
   if (!jacobians) return true;
 
+  const Eigen::Isometry3d T_camera_anchor = T_camera_origin * point.T_origin_anchor;
+  const auto R = T_camera_anchor.linear();
+  const auto t = T_camera_anchor.translation();
   // By the scaled point, rho held: (a, 0, -a x), (0, b, -b y), (0, 0, -d). A turn moves the point by -skew(P).
   const double a = camera.fx * iz, b = camera.fy * iz, d = fb * rho * iz * iz;
   jacobians->pose << rho * a, 0.0, -rho * a * x, -a * x * P.y(), a * (P.z() + x * P.x()), -a * P.y(),  //
@@ -326,12 +241,6 @@ bool predictFromAnchor(const StereoCamera& camera, const Eigen::Isometry3d& T_ca
   return true;
 }
 
-bool predictObservation(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
-                        const AnchoredPoint& point, Eigen::Vector3d& prediction, ObservationJacobians* jacobians) {
-  return predictFromAnchor(camera, T_camera_origin * point.T_origin_anchor, point.ray_and_inverse_depth, prediction,
-                           jacobians);
-}
-
 struct WindowOptimizer::Memory {
   explicit Memory(const WindowOptimizerOptions& options) : solver(options) {}
 
@@ -339,7 +248,7 @@ struct WindowOptimizer::Memory {
   ReducedSystem system;
   Window next;
   Eigen::MatrixXd hessian, units, covariance;
-  Eigen::LDLT<Eigen::MatrixXd> factor;
+  Eigen::LLT<Eigen::MatrixXd> factor;
   Eigen::VectorXd step;
   std::vector<double> squares;
   WindowSolution solution;
@@ -373,8 +282,12 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
     damping_of_system = damping;
     hessian = system.hessian;  // its lower triangle
     hessian.diagonal().head(c) *= 1.0 + damping;
-    step = factor.compute(hessian).solve(system.gradient);
-    if (!step.allFinite()) return solution;
+    factor.compute(hessian);
+    if (factor.info() != Eigen::Success) {
+      accepted = false, damping *= 100.0;
+      continue;
+    }
+    step = factor.solve(system.gradient);
     solver.makeStep(system, step, next);
     const double next_cost = solver.cost(next, squares);
     accepted = next_cost <= system.cost;
@@ -394,7 +307,7 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
   // But points held by damping would say too much.
   if (damping_of_system > kUndamped) solver.linearise(window, kUndamped, system);
   factor.compute(system.hessian);
-  if (factor.info() != Eigen::Success || !factor.isPositive()) return solution;
+  if (factor.info() != Eigen::Success) return solution;
   const int asked = static_cast<int>(covariance_of.size());
   units.setZero(solver.size(), 6 * asked + kCalibration);
   for (int a = 0; a < asked; ++a)

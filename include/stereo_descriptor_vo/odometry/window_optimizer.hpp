@@ -114,9 +114,4 @@ struct ObservationJacobians {
 bool predictObservation(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
                         const AnchoredPoint& point, Eigen::Vector3d& prediction, ObservationJacobians* jacobians);
 
-/// The same of a point given in its anchor's frame.
-bool predictFromAnchor(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_anchor,
-                       const Eigen::Vector3d& ray_and_inverse_depth, Eigen::Vector3d& prediction,
-                       ObservationJacobians* jacobians);
-
 }  // namespace sdvo

@@ -1,0 +1,100 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/stereo_camera.hpp"
+#include "stereo_descriptor_vo/odometry/rig_calibration.hpp"
+
+namespace sdvo {
+
+/// A sighting of a point, ready to be compared with what is predicted of it; the fourth numbers are zero.
+struct alignas(32) PreparedSighting {
+  double measurement[4];    ///< (u_left, v_left, disparity), px, as measured
+  double inverse_sigma[4];  ///< of each, 1/px; that of the disparity is the same in all sightings of a point
+  double shape;             ///< derivative of the disparity's error by the calibration's bend
+  int frame;                ///< the first one, 0, is held fixed
+};
+
+/// How all points of a window are seen; the fourth numbers are zero.
+struct alignas(32) WindowProjection {
+  double focal[4];   ///< (fx, fy, fx * baseline), px, px, px m
+  double centre[4];  ///< (cx, cy, the disparity's error in the centre), px
+  double bend;       ///< of that error, px
+
+  WindowProjection(const StereoCamera& camera, const RigCalibration& calibration);
+};
+
+/// A point of a window with all its sightings, one at least.
+struct SightedPoint {
+  Eigen::Vector3d ray_and_inverse_depth;  ///< in its anchor
+  const PreparedSighting* sightings;      ///< in the order of their frames
+  int count;
+  const Eigen::Isometry3d* T_camera_anchor;  ///< of each frame
+};
+
+/// A sighting of a point that is not in front of the camera costs as much as a very wrong one.
+constexpr double kBehindSquare = 1e4;
+
+/// Squares of the sightings' normalised residuals; kBehindSquare where the point is not in front of the camera.
+void squareResiduals(const WindowProjection& projection, const SightedPoint& point, double* squares);
+
+/// Two halves of something that a pose's perturbation has six of, each in a register's room; the fourth numbers mean
+/// nothing.
+struct alignas(32) PoseVector {
+  double translation[4], rotation[4];
+};
+
+/// What a sighting says of its pose and its point, in three columns: products of these are what the elimination of the
+/// point takes away.
+struct PoseFactor {
+  PoseVector Y[3];
+  int pose;  ///< which of the poses that may move, from zero on
+};
+
+/// A point's own normal equations H x = g, as R = L^-1 of H = L L^T, and what else it is in, times R^T.
+struct EliminatedPoint {
+  Eigen::Matrix3d R;
+  Eigen::Vector3d gradient;
+  Eigen::Matrix<double, RigCalibration::kParameters, 3> by_calibration;
+  int factors;    ///< sightings in front of a camera that may move
+  int sightings;  ///< in front of any camera
+
+  // Weighted sums over these.
+  double weight;
+  double square;                       ///< of normalised residuals
+  double disparity_residual;           ///< normalised
+  Eigen::Vector3d disparity_by_point;  ///< its derivatives
+};
+
+/// Normal equations of a window's poses but the first, and of the rig's calibration.
+class PoseEquations {
+ public:
+  void setZero(int poses);
+
+  /// Adds what a point's sightings say, and takes away what the point itself can explain of it (Schur complement). A
+  /// square s costs bend * log(1 + s / bend); the point's H is damped by this share of its diagonal. Also gives a
+  /// factor for each sighting from a pose that may move, and the squares that squareResiduals() gives.
+  EliminatedPoint add(const WindowProjection& projection, const SightedPoint& point, double bend, double damping,
+                      PoseFactor* factors, double* squares);
+
+  /// `hessian`: its lower triangle. The poses by their left perturbations (m, rad), then the calibration.
+  void copyTo(Eigen::MatrixXd& hessian, Eigen::VectorXd& gradient) const;
+
+  /// Of two poses. Only that which is not above the diagonal of all is filled.
+  struct Block {
+    PoseVector columns[6];
+  };
+  /// A pose with the calibration's two numbers, and its gradient.
+  struct Border {
+    PoseVector columns[3];
+  };
+
+ private:
+  std::vector<Block> blocks_;    ///< row by row
+  std::vector<Border> borders_;  ///< for each pose
+  RigCalibration::Matrix calibration_hessian_;
+  RigCalibration::Vector calibration_gradient_;
+};
+
+}  // namespace sdvo
