@@ -394,12 +394,8 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   window.calibration_prior = prior;
 
   Adjustment adjustment;
-  // Without a point that another frame has seen, nothing holds the newest pose, and no covariance would say so.
-  constexpr int kFewest = 3;
   const int newest = static_cast<int>(frames_.size()) - 1;
-  const auto of_newest_pair = std::count_if(window.observations.begin(), window.observations.end(),
-                                            [&](const WindowObservation& o) { return o.frame == newest; });
-  if (of_newest_pair < kFewest) return adjustment;
+  if (newest == 0) return adjustment;
   std::vector<int> poses;  // whose covariances are made use of below
   poses.reserve(3);
   for (const int pose : {newest, newest - 1, 1})

@@ -48,16 +48,19 @@ struct Sight {
   Three P;           ///< scaled point in the camera's frame
   double inverse_z;  ///< 1 / P.z
   Three ray;         ///< (P.x / P.z, P.y / P.z, rho / P.z)
-  Three residual;    ///< normalised
+  Three inverse_noise;
+  Three residual;  ///< normalised
   double square;
 
-  SDVO_IN_KERNEL Sight(const WindowProjection& projection, const double* T, const double* point,
-                       const PreparedSighting& seen) {
+  SDVO_IN_KERNEL Sight(const WindowProjection& projection, const SightedPoint& sighted, const PreparedSighting& seen,
+                       const double* T) {
+    const double* point = sighted.ray_and_inverse_depth.data();
     P = loaded(T) * point[0] + loaded(T + 4) * point[1] + (loaded(T + 8) + loaded(T + 12) * point[2]);
     inverse_z = 1.0 / P[2];
     ray = Three{P[0], P[1], point[2], 0.0} * inverse_z;
     const Three centre = loaded(projection.centre) + kZ * (projection.bend * seen.shape);
-    residual = loaded(seen.inverse_sigma) * ((loaded(seen.measurement) - centre) - loaded(projection.focal) * ray);
+    inverse_noise = (kX + kY) * seen.measurement[3] + kZ * sighted.inverse_disparity_sigma;
+    residual = inverse_noise * ((loaded(seen.measurement) - centre) - loaded(projection.focal) * ray);
     square = isInFront() ? sumOf(residual * residual) : kBehindSquare;
   }
   SDVO_IN_KERNEL bool isInFront() const {
@@ -71,7 +74,7 @@ struct SquareResiduals {
     for (int i = 0; i < point->count; ++i) {
       const PreparedSighting& seen = point->sightings[i];
       const double* T = point->T_camera_anchor[seen.frame].data();
-      squares[i] = Sight(*projection, T, point->ray_and_inverse_depth.data(), seen).square;
+      squares[i] = Sight(*projection, *point, seen, T).square;
     }
   }
 };
@@ -82,8 +85,8 @@ struct Derivatives {
   Three aside, ahead;  ///< (a, b, 0) and (a x, b y, d)
   double by_rho;
 
-  SDVO_IN_KERNEL Derivatives(const WindowProjection& projection, const PreparedSighting& seen, const Sight& at) {
-    const Three scale = loaded(seen.inverse_sigma) * loaded(projection.focal) * at.inverse_z;
+  SDVO_IN_KERNEL Derivatives(const WindowProjection& projection, const Sight& at) {
+    const Three scale = at.inverse_noise * loaded(projection.focal) * at.inverse_z;
     aside = scale * (kX + kY);
     ahead = scale * at.ray;
     by_rho = scale[2];
@@ -197,11 +200,11 @@ struct AddPoint {
     for (int i = 0; i < point->count; ++i) {
       const PreparedSighting& seen = point->sightings[i];
       const double* T = point->T_camera_anchor[seen.frame].data();
-      const Sight at(*projection, T, point->ray_and_inverse_depth.data(), seen);
+      const Sight at(*projection, *point, seen, T);
       squares[i] = at.square;
       if (!at.isInFront()) continue;
       const double w = bend / (bend + at.square);
-      const Derivatives A(*projection, seen, at);
+      const Derivatives A(*projection, at);
       sums.add(at, w, seen.shape, A.times(T), A.times(T + 4), A.times(T + 12) + kZ * A.by_rho);
       if (seen.frame == 0) continue;
       PoseFactor& factor = factors[moving++];
@@ -212,7 +215,7 @@ struct AddPoint {
 
     // What the point is in, times R or R^T.
     const InverseRoot R(sums, damping);
-    const double disparity = point->sightings[0].inverse_sigma[2];
+    const double disparity = point->inverse_disparity_sigma;
     const Three gradient = R.times(sumOf(sums.g0), sumOf(sums.g1), sumOf(sums.g2));
     const Three by_offset = disparity * R.times(sums.by0[2], sums.by1[2], sums.by2[2]);
     const Three by_bend = disparity * R.times(sums.shaped0[2], sums.shaped1[2], sums.shaped2[2]);
@@ -267,7 +270,7 @@ struct AddPoint {
     addTo(block.columns[4].rotation, cross(P, P[2] * M.x - P[0] * M.z));
     addTo(block.columns[5].rotation, cross(P, P[0] * M.y - P[1] * M.x));
 
-    const Three of_disparity = kZ * (by_z * seen.inverse_sigma[2]);
+    const Three of_disparity = kZ * (by_z * at.inverse_noise[2]);
     lever.addProduct(of_disparity, 1.0, border.columns[0]);
     lever.addProduct(of_disparity, seen.shape, border.columns[1]);
     lever.addProduct(A.transposedTimes(w * at.residual), 1.0, border.columns[2]);

@@ -86,17 +86,10 @@ class Solver {
     first_of_point_.push_back(static_cast<int>(observations.size()));
     sightings_.clear();
     sightings_.reserve(observations.size());
-    for (std::size_t p = 0; p + 1 < first_of_point_.size(); ++p) {
-      const double inverse_disparity_sigma = inverseDisparitySigma(first_of_point_[p + 1] - first_of_point_[p]);
-      for (int i = first_of_point_[p]; i < first_of_point_[p + 1]; ++i) {
-        const WindowObservation& o = observations[static_cast<std::size_t>(i)];
-        const double inverse_sigma = 1.0 / o.sigma;
-        sightings_.push_back({{o.measurement.x(), o.measurement.y(), o.measurement.z(), 0.0},
-                              {inverse_sigma, inverse_sigma, inverse_disparity_sigma, 0.0},
-                              RigCalibration::shape(window.camera, o.measurement.x())[1],
-                              o.frame});
-      }
-    }
+    for (const WindowObservation& o : observations)
+      sightings_.push_back({{o.measurement.x(), o.measurement.y(), o.measurement.z(), 1.0 / o.sigma},
+                            RigCalibration::shape(window.camera, o.measurement.x())[1],
+                            o.frame});
     poses_ = static_cast<int>(window.T_camera_origin.size()) - 1;
     size_ = 6 * poses_ + kCalibration;
   }
@@ -142,9 +135,8 @@ class Solver {
       factors += point.factors;
       system.weight += point.weight;
       system.weighted_square += point.square;
-      const double inverse_sigma = sightings_[static_cast<std::size_t>(first)].inverse_sigma[2];
       if (const auto square = commonSquare(point))
-        system.common_squares.push_back(*square / (inverse_sigma * inverse_sigma));
+        system.common_squares.push_back(disparityVariance(first_of_point_[p + 1] - first) * *square);
     }
     equations_.copyTo(system.hessian, system.gradient);
     const CalibrationBelief& prior = window.calibration_prior;
@@ -180,9 +172,9 @@ class Solver {
 
  private:
   SightedPoint sightedPoint(const Window& window, std::size_t p) {
-    const int first = first_of_point_[p];
+    const int first = first_of_point_[p], count = first_of_point_[p + 1] - first;
     const AnchoredPoint& point = window.points[static_cast<std::size_t>(window_->observations[first].point)];
-    return {point.ray_and_inverse_depth, sightings_.data() + first, first_of_point_[p + 1] - first,
+    return {point.ray_and_inverse_depth, sightings_.data() + first, count, 1.0 / std::sqrt(disparityVariance(count)),
             T_camera_anchor_.from(point.T_origin_anchor)};
   }
 
@@ -194,9 +186,8 @@ class Solver {
 
   /// Of n disparities of one point the mean has the variance sigma^2 / n + common^2, as if each by itself had n times
   /// that: more sightings do not average away what they share.
-  double inverseDisparitySigma(int sightings) const {
-    return 1.0 /
-           std::sqrt(options_.disparity_sigma * options_.disparity_sigma + sightings * common_sigma_ * common_sigma_);
+  double disparityVariance(int sightings) const {
+    return options_.disparity_sigma * options_.disparity_sigma + sightings * common_sigma_ * common_sigma_;
   }
 
   WindowOptimizerOptions options_;
@@ -307,7 +298,7 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
   // But points held by damping would say too much.
   if (damping_of_system > kUndamped) solver.linearise(window, kUndamped, system);
   factor.compute(system.hessian);
-  if (factor.info() != Eigen::Success) return solution;
+  if (factor.info() != Eigen::Success) return solution;  // as when nothing holds one of the poses
   const int asked = static_cast<int>(covariance_of.size());
   units.setZero(solver.size(), 6 * asked + kCalibration);
   for (int a = 0; a < asked; ++a)

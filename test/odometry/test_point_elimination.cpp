@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kBend = 2.0, kDamping = 1e-3;
 constexpr double kLeastInformation = 1e-9;  // that a point is given of itself
+constexpr double kDisparitySigma = 0.25;    // px
 constexpr int kPoses = 4;                   // that may move
 
 /// A point seen by the cameras of a short drive, somewhere else than it is thought to be.
@@ -36,15 +37,14 @@ struct Scene {
       if (!predictObservation(camera, T_camera_origin[frame], point, seen, nullptr)) seen << 600.0, 180.0, 20.0;
       seen += Eigen::Vector3d(0.3 * std::sin(3.0 * frame), 0.4 * std::cos(5.0 * frame), 0.2 + 0.1 * frame);
       const double sigma = 0.1 + 0.05 * frame;
-      sightings.push_back({{seen.x(), seen.y(), seen.z(), 0.0},
-                           {1.0 / sigma, 1.0 / sigma, 4.0, 0.0},
-                           RigCalibration::shape(camera, seen.x())[1],
-                           frame});
+      sightings.push_back(
+          {{seen.x(), seen.y(), seen.z(), 1.0 / sigma}, RigCalibration::shape(camera, seen.x())[1], frame});
     }
   }
 
   SightedPoint sighted() const {
-    return {point.ray_and_inverse_depth, sightings.data(), static_cast<int>(sightings.size()), T_camera_anchor.data()};
+    return {point.ray_and_inverse_depth, sightings.data(), static_cast<int>(sightings.size()), 1.0 / kDisparitySigma,
+            T_camera_anchor.data()};
   }
 };
 
@@ -62,7 +62,8 @@ std::vector<Row> rowsOf(const Scene& scene) {
     ObservationJacobians jacobians;
     if (!predictObservation(scene.camera, scene.T_camera_origin[seen.frame], scene.point, prediction, &jacobians))
       continue;
-    const Eigen::Map<const Eigen::Vector3d> measured(seen.measurement), noise(seen.inverse_sigma);
+    const Eigen::Map<const Eigen::Vector3d> measured(seen.measurement);
+    const Eigen::Vector3d noise(seen.measurement[3], seen.measurement[3], 1.0 / kDisparitySigma);
     prediction.z() += scene.calibration.disparityError(scene.camera, measured.x());
     Row row;
     row.residual = noise.cwiseProduct(measured - prediction);

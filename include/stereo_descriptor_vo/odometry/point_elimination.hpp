@@ -8,12 +8,11 @@
 
 namespace sdvo {
 
-/// A sighting of a point, ready to be compared with what is predicted of it; the fourth numbers are zero.
-struct alignas(32) PreparedSighting {
-  double measurement[4];    ///< (u_left, v_left, disparity), px, as measured
-  double inverse_sigma[4];  ///< of each, 1/px; that of the disparity is the same in all sightings of a point
-  double shape;             ///< derivative of the disparity's error by the calibration's bend
-  int frame;                ///< the first one, 0, is held fixed
+/// A sighting of a point, ready to be compared with what is predicted of it.
+struct PreparedSighting {
+  double measurement[4];  ///< (u_left, v_left, disparity), px, as measured; and 1 / sigma of the first two, 1/px
+  double shape;           ///< derivative of the disparity's error by the calibration's bend
+  int frame;              ///< the first one, 0, is held fixed
 };
 
 /// How all points of a window are seen; the fourth numbers are zero.
@@ -30,6 +29,7 @@ struct SightedPoint {
   Eigen::Vector3d ray_and_inverse_depth;  ///< in its anchor
   const PreparedSighting* sightings;      ///< in the order of their frames
   int count;
+  double inverse_disparity_sigma;            ///< of each sighting, 1/px
   const Eigen::Isometry3d* T_camera_anchor;  ///< of each frame
 };
 
