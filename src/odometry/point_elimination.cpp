@@ -188,7 +188,7 @@ std::size_t indexOf(int row, int column) {
   return static_cast<std::size_t>(row * (row + 1) / 2 + column);
 }
 
-/// PoseEquations::add() without what concerns the calibration alone.
+/// PoseEquations::add().
 struct AddPoint {
   static SDVO_IN_KERNEL void run(const WindowProjection* projection, const SightedPoint* point, double bend,
                                  double damping, PoseFactor* factors, double* squares, PoseEquations::Block* blocks,
