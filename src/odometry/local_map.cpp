@@ -375,9 +375,13 @@ void LocalMap::pose(Problem& problem) const {
     int frame = 0;
     for (std::size_t k = 0; k < point.observations.size(); ++k) {
       const Observation& observation = point.observations[k];
-      while (frames_[static_cast<std::size_t>(frame)].id < observation.frame_id) ++frame;
-      window.observations.push_back(
-          {static_cast<int>(problem.points.size()), frame, observation.measurement, observation.sigma});
+      while (problem.frame_ids[static_cast<std::size_t>(frame)] < observation.frame_id) ++frame;
+      window.observations.emplace_back();
+      WindowObservation& posed = window.observations.back();
+      posed.point = static_cast<int>(problem.points.size());
+      posed.frame = frame;
+      posed.measurement = observation.measurement;
+      posed.sigma = observation.sigma;
       problem.sources.emplace_back(static_cast<int>(p), static_cast<int>(k));
     }
     window.points.push_back(point.position);

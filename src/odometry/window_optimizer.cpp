@@ -84,12 +84,13 @@ class Solver {
     for (std::size_t i = 0; i < observations.size(); ++i)
       if (i == 0 || observations[i].point != observations[i - 1].point) first_of_point_.push_back(static_cast<int>(i));
     first_of_point_.push_back(static_cast<int>(observations.size()));
-    sightings_.clear();
-    sightings_.reserve(observations.size());
-    for (const WindowObservation& o : observations)
-      sightings_.push_back({{o.measurement.x(), o.measurement.y(), o.measurement.z(), 1.0 / o.sigma},
-                            RigCalibration::shape(window.camera, o.measurement.x())[1],
-                            o.frame});
+    sightings_.resize(observations.size());
+    for (std::size_t i = 0; i < observations.size(); ++i) {
+      const WindowObservation& o = observations[i];
+      sightings_[i] = {{o.measurement.x(), o.measurement.y(), o.measurement.z(), 1.0 / o.sigma},
+                       RigCalibration::shape(window.camera, o.measurement.x())[1],
+                       o.frame};
+    }
     poses_ = static_cast<int>(window.T_camera_origin.size()) - 1;
     size_ = 6 * poses_ + kCalibration;
   }
