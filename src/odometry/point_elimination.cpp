@@ -63,10 +63,7 @@ struct Sight {
     residual = inverse_noise * ((loaded(seen.measurement) - centre) - loaded(projection.focal) * ray);
     square = isInFront() ? sumOf(residual * residual) : kBehindSquare;
   }
-  SDVO_IN_KERNEL bool isInFront() const {
-    constexpr double kNearest = 1e-3;  // of the depth in the anchor
-    return P[2] >= kNearest;
-  }
+  SDVO_IN_KERNEL bool isInFront() const { return P[2] >= kNearestScaled; }
 };
 
 struct SquareResiduals {

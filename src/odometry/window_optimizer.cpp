@@ -206,10 +206,9 @@ class Solver {
 
 bool predictObservation(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
                         const AnchoredPoint& point, Eigen::Vector3d& prediction, ObservationJacobians* jacobians) {
-  constexpr double kNearest = 1e-3;  // of the depth in the anchor
   const double rho = point.ray_and_inverse_depth.z();
   const Eigen::Vector3d P = point.scaledPointIn(T_camera_origin);
-  if (P.z() < kNearest) return false;
+  if (P.z() < kNearestScaled) return false;
   const double iz = 1.0 / P.z();
   const double x = P.x() * iz, y = P.y() * iz, fb = camera.fx * camera.baseline;
   prediction = {camera.fx * x + camera.cx, camera.fy * y + camera.cy, fb * rho * iz};

@@ -33,6 +33,9 @@ struct SightedPoint {
   const Eigen::Isometry3d* T_camera_anchor;  ///< of each frame
 };
 
+/// A scaled point whose z is smaller is not in front of the camera: a share of its depth in the anchor.
+constexpr double kNearestScaled = 1e-3;
+
 /// A sighting of a point that is not in front of the camera costs as much as a very wrong one.
 constexpr double kBehindSquare = 1e4;
 
