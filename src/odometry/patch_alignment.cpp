@@ -3,7 +3,6 @@
 #include <Eigen/LU>
 #include <array>
 #include <cmath>
-#include <utility>
 
 #include "../common/patch_products.hpp"
 #include "patch_samples.hpp"
@@ -45,41 +44,28 @@ float sumOfSquaredDifferences(int count, float contrast, const float* grey, cons
   return sum;
 }
 
-/// The square of this radius and the one that is a pixel larger on each side.
-const std::pair<SampleSquare, SampleSquare>& squaresOf(int radius) {
-  static const std::array<std::pair<SampleSquare, SampleSquare>, PatchAlignmentOptions::kLargestRadius + 1> squares =
-      [] {
-        std::array<std::pair<SampleSquare, SampleSquare>, PatchAlignmentOptions::kLargestRadius + 1> all;
-        for (int r = 0; r <= PatchAlignmentOptions::kLargestRadius; ++r)
-          all[static_cast<std::size_t>(r)] = {SampleSquare(r), SampleSquare(r + 1)};
-        return all;
-      }();
+const SampleSquare& squareOf(int radius) {
+  static const std::array<SampleSquare, PatchAlignmentOptions::kLargestRadius + 1> squares = [] {
+    std::array<SampleSquare, PatchAlignmentOptions::kLargestRadius + 1> all;
+    for (int r = 0; r <= PatchAlignmentOptions::kLargestRadius; ++r) all[static_cast<std::size_t>(r)] = SampleSquare(r);
+    return all;
+  }();
   return squares[static_cast<std::size_t>(radius)];
 }
 
 /// The reference's pixels and their derivatives, without their means.
 struct Template {
-  Samples grey{}, by_x{}, by_y{};
+  Samples grey, by_x, by_y;
   float square = 0.f;        ///< sum of the pixels' squares
   Eigen::Vector2f gradient;  ///< products of the derivatives with the pixels
   Eigen::Matrix2f hessian;
 };
 
-bool makeTemplate(const Patch& reference, const Eigen::Vector2f& centre, const SampleSquare& square,
-                  const SampleSquare& larger, Template& result) {
+bool makeTemplate(const NearPatch& reference, const Eigen::Vector2f& centre, const SampleSquare& square,
+                  Template& result) {
   constexpr float kFlat = 1.f;        // grey level: less contrast than this is noise
   constexpr float kOneSided = 1e-3f;  // of the hessian's two directions: an edge holds no position along itself
-  Samples around;
-  if (!larger.sample(reference, centre, Eigen::Matrix2f::Identity(), around)) return false;
-  const int side = square.side(), stride = larger.side();
-  for (int j = 0; j < side; ++j)
-    for (int i = 0; i < side; ++i) {
-      const float* here = around.data() + (j + 1) * stride + i + 1;
-      const std::size_t k = static_cast<std::size_t>(j * side + i);
-      result.grey[k] = here[0];
-      result.by_x[k] = 0.5f * (here[1] - here[-1]);
-      result.by_y[k] = 0.5f * (here[stride] - here[-stride]);
-    }
+  if (!square.sampleUpright(reference, centre, result.grey, result.by_x, result.by_y)) return false;
   for (Samples* values : {&result.grey, &result.by_x, &result.by_y}) removeMean(square, *values);
   const LaneProducts p = multiply(square.count(), result.by_x.data(), result.by_y.data(), result.grey.data());
   result.hessian << p.aa, p.ab, p.ab, p.bb;
@@ -95,18 +81,20 @@ std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const
                                      const Eigen::Vector2f& centre, const Patch& current, const Eigen::Matrix2f& warp) {
   constexpr int kIterations = 10;
   constexpr float kConverged = 0.02f;  // samples
-  const auto& [square, larger] = squaresOf(options.radius);
+  const SampleSquare& square = squareOf(options.radius);
+  thread_local NearPatch near_reference, near_current;
+  near_reference.take(reference), near_current.take(current);
   Template pattern;
-  if (!makeTemplate(reference, centre, square, larger, pattern)) return std::nullopt;
+  if (!makeTemplate(near_reference, centre, square, pattern)) return std::nullopt;
   const Eigen::Matrix2f inverse = pattern.hessian.inverse();
   const Eigen::Matrix2f grid = warp * (reference.spacing / current.spacing);
   const float largest = static_cast<float>(options.max_shift) / current.spacing;
 
   Eigen::Vector2f position = Eigen::Vector2f::Zero();
-  Samples grey{};
+  Samples grey;
   float contrast = 1.f;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
-    if (!square.sample(current, position, grid, grey)) return std::nullopt;
+    if (!square.sample(near_current, position, grid, grey)) return std::nullopt;
     // The pattern and its derivatives have no mean, so that of the current patch drops out.
     float product;
     Eigen::Vector2f products;

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "../common/kernel.hpp"
+#include "../common/lanes.hpp"
 
 #ifdef SDVO_HAVE_AVX2
 #include <immintrin.h>
@@ -16,6 +16,48 @@ namespace {
 /// Where the samples lie in a patch: the middle, and what a step along x and along y of the square changes.
 struct Placement {
   float x, y, x_by_x, x_by_y, y_by_x, y_by_y;
+};
+
+constexpr int kRow = 16;  // numbers of a row in registers: whole ones
+static_assert(kLargestSampledSide < kRow, "a pixel more than the samples is read");
+
+/// The square's values and derivatives, whose middle lies at (x, y) of the patch. All in a row lie between two pixels
+/// at the same share of the way.
+struct SampleUpright {
+  static SDVO_IN_KERNEL void run(const std::uint8_t* patch, int side, float x, float y, int radius, float* values,
+                                 float* by_x, float* by_y) {
+    const int last = side - 2, reach = radius + 1;
+    const int column = std::clamp(static_cast<int>(x - static_cast<float>(reach)), 0, last);
+    float a[kRow];
+    for (int i = 0; i < kRow; ++i) a[i] = (x + static_cast<float>(i - reach)) - static_cast<float>(column + i);
+    float around[kLargestSampledSide * kRow + kRow];
+    for (int j = 0; j <= 2 * reach; ++j) {
+      const float v = y + static_cast<float>(j - reach);
+      const int row = std::clamp(static_cast<int>(v), 0, last);
+      const float b = v - static_cast<float>(row);
+      const std::uint8_t *upper = patch + row * side + column, *lower = upper + side;
+      for (int i = 0; i < kRow; ++i) {
+        const float above = upper[i] + a[i] * static_cast<float>(upper[i + 1] - upper[i]);
+        const float below = lower[i] + a[i] * static_cast<float>(lower[i + 1] - lower[i]);
+        around[j * kRow + i] = above + b * (below - above);
+      }
+    }
+    std::fill_n(around + (2 * reach + 1) * kRow, kRow, 0.f);
+
+    // What is written beyond a row is overwritten by the next one.
+    const int columns = 2 * radius + 1;
+    for (int j = 0; j < columns; ++j)
+      for (int i = 0; i < kRow; i += 8) {
+        const float* here = around + (j + 1) * kRow + 1 + i;
+        Lanes centre, left, right, above, below;
+        load(here, centre), load(here - 1, left), load(here + 1, right);
+        load(here - kRow, above), load(here + kRow, below);
+        const int k = j * columns + i;
+        store(centre, values + k);
+        store(0.5f * (right - left), by_x + k), store(0.5f * (below - above), by_y + k);
+      }
+    for (float* of : {values, by_x, by_y}) std::fill(of + columns * columns, of + (columns - 1) * columns + kRow, 0.f);
+  }
 };
 
 void samplePlain(const std::uint8_t* patch, int side, const Placement& at, const float* dx, const float* dy,
@@ -85,18 +127,34 @@ SampleSquare::SampleSquare(int radius) : radius_(radius) {
     }
 }
 
-bool SampleSquare::sample(const Patch& patch, const Eigen::Vector2f& centre, const Eigen::Matrix2f& grid,
+void NearPatch::take(const Patch& patch) {
+  const std::size_t bytes = static_cast<std::size_t>(patch.side * patch.side);
+  samples_.resize(bytes + static_cast<std::size_t>(patch.side + 2 * kRow));
+  std::copy_n(patch.samples, bytes, samples_.begin());
+  side_ = patch.side;
+}
+
+bool SampleSquare::sample(const NearPatch& patch, const Eigen::Vector2f& centre, const Eigen::Matrix2f& grid,
                           Samples& values) const {
-  const float half = 0.5f * static_cast<float>(patch.side - 1);
+  const float half = 0.5f * static_cast<float>(patch.side() - 1);
   const Eigen::Vector2f reach = static_cast<float>(radius_) * grid.cwiseAbs().rowwise().sum();
   if (!((centre.cwiseAbs() + reach).maxCoeff() <= half)) return false;
   const Placement at{half + centre.x(), half + centre.y(), grid(0, 0), grid(0, 1), grid(1, 0), grid(1, 1)};
 #ifdef SDVO_HAVE_AVX2
   if (usesAvx2())
-    sampleAvx2(patch.samples, patch.side, at, x_.data(), y_.data(), mask_.data(), count(), values.data());
+    sampleAvx2(patch.samples(), patch.side(), at, x_.data(), y_.data(), mask_.data(), count(), values.data());
   else
 #endif
-    samplePlain(patch.samples, patch.side, at, x_.data(), y_.data(), mask_.data(), count(), values.data());
+    samplePlain(patch.samples(), patch.side(), at, x_.data(), y_.data(), mask_.data(), count(), values.data());
+  return true;
+}
+
+bool SampleSquare::sampleUpright(const NearPatch& patch, const Eigen::Vector2f& centre, Samples& values, Samples& by_x,
+                                 Samples& by_y) const {
+  const float half = 0.5f * static_cast<float>(patch.side() - 1);
+  if (!(centre.cwiseAbs().maxCoeff() + static_cast<float>(radius_ + 1) <= half)) return false;
+  runKernel<SampleUpright>(patch.samples(), patch.side(), half + centre.x(), half + centre.y(), radius_, values.data(),
+                           by_x.data(), by_y.data());
   return true;
 }
 
