@@ -66,6 +66,23 @@ TEST(PatchSamples, NeighboursMayNotLieOutside) {
     EXPECT_FALSE(square.sampleUpright(noise.patch, centre, values, by_x, by_y));
 }
 
+TEST(PatchSamples, NoCornerOfTheSquareMayLieOutside) {
+  std::mt19937 random(4);
+  const Noise noise(13, random);
+  Samples values;
+  const SampleSquare square(4);
+  const Eigen::Matrix2f identity = Eigen::Matrix2f::Identity();
+  Eigen::Matrix2f turned;
+  turned << 0.8f, -0.6f, 0.6f, 0.8f;
+  EXPECT_TRUE(square.sample(noise.patch, {2.f, -2.f}, identity, values));
+  EXPECT_FALSE(square.sample(noise.patch, {2.01f, 0.f}, identity, values));
+  EXPECT_FALSE(square.sample(noise.patch, {0.f, -2.01f}, identity, values));
+  EXPECT_TRUE(square.sample(noise.patch, {0.f, 0.f}, 1.5f * identity, values));
+  EXPECT_FALSE(square.sample(noise.patch, {0.f, 0.f}, 1.51f * identity, values));
+  EXPECT_TRUE(square.sample(noise.patch, {0.3f, 0.3f}, turned, values));
+  EXPECT_FALSE(square.sample(noise.patch, {0.5f, 0.f}, turned, values));
+}
+
 TEST(PatchSamples, AreTheSameToTheBitWithAndWithoutAvx2) {
   if (!usesAvx2()) GTEST_SKIP() << "this processor has no AVX2";
   std::mt19937 random(5);
