@@ -3,6 +3,8 @@
 #include <cmath>
 #include <optional>
 
+#include "stereo_descriptor_vo/odometry/correspondence_arrays.hpp"
+
 namespace sdvo {
 
 std::vector<FeatureMatch> matchByDescriptor(const StereoFeatures& reference, const StereoFeatures& current) {
@@ -15,7 +17,6 @@ std::vector<FeatureMatch> matchByDescriptor(const StereoFeatures& reference, con
 int countCorrect(const StereoFeatures& reference, const StereoFeatures& current,
                  const std::vector<FeatureMatch>& matches, const Eigen::Isometry3d& T_current_reference,
                  double tolerance) {
-  constexpr double kNearestDepth = 0.05;  // m
   int correct = 0;
   for (const FeatureMatch& match : matches) {
     const Eigen::Vector3d point = T_current_reference * reference.point(match.reference);

@@ -5,10 +5,10 @@
 #include <cstdint>
 #include <cstring>
 
+#include "fast_circle.hpp"
+
 namespace sdvo {
 namespace {
-
-constexpr int kCircle = 16;  // pixels on the circle, clockwise from above
 
 /// Sixteen pixels worked on at once: rows of four, of which three are of interest, and nothing.
 typedef std::uint8_t Pixels __attribute__((vector_size(16)));
@@ -37,12 +37,10 @@ Pixels neighbourhood(const std::uint8_t* first, std::size_t step) {
 
 /// Contrasts of the three rows of four pixels that begin at `first`.
 Pixels contrasts(const std::uint8_t* first, std::size_t step) {
-  constexpr std::array<int, kCircle> kX = {0, 1, 2, 3, 3, 3, 2, 1, 0, -1, -2, -3, -3, -3, -2, -1};
-  constexpr std::array<int, kCircle> kY = {-3, -3, -2, -1, 0, 1, 2, 3, 3, 3, 2, 1, 0, -1, -2, -3};
   // The least and the largest pixel of 1, 2, 4 and 8 in a row, from each one on.
   std::array<Pixels, kCircle> circle, least, largest;
   for (std::size_t i = 0; i < kCircle; ++i)
-    circle[i] = neighbourhood(first + kY[i] * static_cast<std::ptrdiff_t>(step) + kX[i], step);
+    circle[i] = neighbourhood(first + kCircleY[i] * static_cast<std::ptrdiff_t>(step) + kCircleX[i], step);
   least = largest = circle;
   for (const std::size_t length : {1, 2, 4}) {
     const auto least_before = least, largest_before = largest;

@@ -6,6 +6,7 @@
 #include <opencv2/features2d.hpp>
 
 #include "../common/kernel.hpp"
+#include "fast_circle.hpp"
 
 #ifdef SDVO_HAVE_AVX2
 #include <immintrin.h>
@@ -14,18 +15,15 @@
 namespace sdvo {
 namespace {
 
-constexpr int kRadius = 3;   // px, of the circle
-constexpr int kBlock = 32;   // pixels worked on at once
-constexpr int kCircle = 16;  // pixels on the circle, clockwise from above
+constexpr int kRadius = 3;  // px, of the circle
+constexpr int kBlock = 32;  // pixels worked on at once
 
 #ifdef SDVO_HAVE_AVX2
 using Offsets = std::array<std::ptrdiff_t, kCircle>;
 
 Offsets circleOffsets(std::ptrdiff_t step) {
-  constexpr int kX[kCircle] = {0, 1, 2, 3, 3, 3, 2, 1, 0, -1, -2, -3, -3, -3, -2, -1};
-  constexpr int kY[kCircle] = {-3, -3, -2, -1, 0, 1, 2, 3, 3, 3, 2, 1, 0, -1, -2, -3};
   Offsets offsets{};
-  for (std::size_t i = 0; i < kCircle; ++i) offsets[i] = kY[i] * step + kX[i];
+  for (std::size_t i = 0; i < kCircle; ++i) offsets[i] = kCircleY[i] * step + kCircleX[i];
   return offsets;
 }
 
@@ -54,21 +52,21 @@ SDVO_AVX2 inline __m256i contrast(const std::uint8_t* pixels, const Offsets& off
   // The least and the largest pixel of 2, 4, 8 and 9 in a row, from each one on.
   __m256i circle[kCircle], least[kCircle], largest[kCircle];
 #pragma GCC unroll 16
-  for (int i = 0; i < kCircle; ++i) circle[i] = load(pixels + offsets[static_cast<std::size_t>(i)]);
+  for (std::size_t i = 0; i < kCircle; ++i) circle[i] = load(pixels + offsets[i]);
 #pragma GCC unroll 16
-  for (int i = 0; i < kCircle; ++i) {
+  for (std::size_t i = 0; i < kCircle; ++i) {
     least[i] = _mm256_min_epu8(circle[i], circle[(i + 1) % kCircle]);
     largest[i] = _mm256_max_epu8(circle[i], circle[(i + 1) % kCircle]);
   }
   __m256i least_of_4[kCircle], largest_of_4[kCircle];
 #pragma GCC unroll 16
-  for (int i = 0; i < kCircle; ++i) {
+  for (std::size_t i = 0; i < kCircle; ++i) {
     least_of_4[i] = _mm256_min_epu8(least[i], least[(i + 2) % kCircle]);
     largest_of_4[i] = _mm256_max_epu8(largest[i], largest[(i + 2) % kCircle]);
   }
   __m256i brightest = zero, darkest = _mm256_set1_epi8(-1);
 #pragma GCC unroll 16
-  for (int i = 0; i < kCircle; ++i) {
+  for (std::size_t i = 0; i < kCircle; ++i) {
     const __m256i low = _mm256_min_epu8(least_of_4[i], least_of_4[(i + 4) % kCircle]);
     const __m256i high = _mm256_max_epu8(largest_of_4[i], largest_of_4[(i + 4) % kCircle]);
     brightest = _mm256_max_epu8(brightest, _mm256_min_epu8(low, circle[(i + 8) % kCircle]));

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 #include <limits>
 #include <unordered_map>
 #include <utility>
@@ -215,13 +214,8 @@ void LocalMap::forgetKeyframe() {
   const std::size_t unshared = static_cast<std::size_t>(too_few - shared.begin());
   if (unshared < lasting()) removeFrame(unshared);
   while (static_cast<int>(lasting()) > options_.lasting_keyframes) {
-    std::size_t least = 0;
-    double least_parallax = std::numeric_limits<double>::max();
-    for (std::size_t f = 1; f < lasting(); ++f) {
-      const double parallax = parallaxToPredecessor(f);
-      if (parallax < least_parallax) least = f, least_parallax = parallax;
-    }
-    removeFrame(least);
+    const std::vector<double> parallax = parallaxToPredecessors(lasting());
+    removeFrame(static_cast<std::size_t>(std::min_element(parallax.begin(), parallax.end()) - parallax.begin()));
   }
 }
 
@@ -319,16 +313,24 @@ std::vector<int> LocalMap::sharedPoints() const {
   return shared;
 }
 
-/// Median distance in px by which points moved since the frame before; infinite where none are shared.
-double LocalMap::parallaxToPredecessor(std::size_t frame) const {
-  std::vector<double> parallax;
-  for (const Point& point : points_)
-    for (std::size_t k = 1; k < point.observations.size(); ++k)
-      if (point.observations[k].frame_id == frames_[frame].id &&
-          point.observations[k - 1].frame_id == frames_[frame - 1].id)
-        parallax.push_back(
-            (point.observations[k].measurement - point.observations[k - 1].measurement).head<2>().norm());
-  return parallax.empty() ? std::numeric_limits<double>::infinity() : median(parallax);
+/// For each of the first frames the median distance in px by which points moved since the frame before; infinite for
+/// the very first, and where none are shared.
+std::vector<double> LocalMap::parallaxToPredecessors(std::size_t frames) const {
+  std::vector<std::vector<double>> distances(frames);
+  for (const Point& point : points_) {
+    std::size_t f = 0;
+    for (std::size_t k = 1; k < point.observations.size(); ++k) {
+      const Observation &before = point.observations[k - 1], &here = point.observations[k];
+      while (f < frames && frames_[f].id < here.frame_id) ++f;
+      if (f == frames) break;
+      if (frames_[f - 1].id == before.frame_id)
+        distances[f].push_back((here.measurement - before.measurement).head<2>().norm());
+    }
+  }
+  std::vector<double> parallax(frames, std::numeric_limits<double>::infinity());
+  for (std::size_t f = 0; f < frames; ++f)
+    if (!distances[f].empty()) parallax[f] = median(distances[f]);
+  return parallax;
 }
 
 void LocalMap::removeFrame(std::size_t index) {

@@ -37,8 +37,6 @@ class DepthScale {
   /// Key point diameter in px for a disparity in px.
   double size(double disparity) const;
 
-  const DepthScaleOptions& options() const { return options_; }
-
  private:
   DepthScaleOptions options_;
 };

@@ -173,7 +173,7 @@ class LocalMap {
   void rememberKeyframe(std::size_t frame);
   OldKeyframe keyframe(std::size_t frame, bool with_looks) const;
   std::vector<int> sharedPoints() const;
-  double parallaxToPredecessor(std::size_t frame) const;
+  std::vector<double> parallaxToPredecessors(std::size_t frames) const;
   void removeFrame(std::size_t index);
   void cutOff(const std::vector<double>& residuals, Adjustment& adjustment);
   bool needsKeyframe() const;
