@@ -336,19 +336,17 @@ std::vector<double> LocalMap::parallaxToPredecessors(std::size_t frames) const {
 void LocalMap::removeFrame(std::size_t index) {
   const int id = frames_[index].id;
   frames_.erase(frames_.begin() + static_cast<std::ptrdiff_t>(index));
+  auto kept = points_.begin();
   for (Point& point : points_) {
     const auto here = sightingIn(point.observations, id);
     if (here != point.observations.end()) point.observations.erase(here);
-  }
-  // The others close up in their order; what nothing sees any more keeps its memory for a new point.
-  auto kept = points_.begin();
-  for (auto point = points_.begin(); point != points_.end(); ++point) {
-    if (point->observations.empty()) {
+    // The others close up in their order; what nothing sees any more keeps its memory for a new point.
+    if (point.observations.empty()) {
       // Room for many sightings would stay with a point that will have few.
-      if (point->observations.capacity() > kUsualSightings) point->observations = std::vector<Observation>();
-      spare_.push_back(std::move(*point));
+      if (point.observations.capacity() > kUsualSightings) point.observations = std::vector<Observation>();
+      spare_.push_back(std::move(point));
     } else {
-      if (kept != point) *kept = std::move(*point);
+      if (&*kept != &point) *kept = std::move(point);
       ++kept;
     }
   }
