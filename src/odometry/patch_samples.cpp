@@ -20,6 +20,7 @@ struct Placement {
 
 constexpr int kRow = 16;  // numbers of a row in registers: whole ones
 static_assert(kLargestSampledSide < kRow, "a pixel more than the samples is read");
+static_assert((kLargestSampledSide - 2) * (kLargestSampledSide - 2) + kRow <= kMostSampled, "a row is written at once");
 
 /// The square's values and derivatives, whose middle lies at (x, y) of the patch. All in a row lie between two pixels
 /// at the same share of the way.
@@ -56,7 +57,7 @@ struct SampleUpright {
         store(centre, values + k);
         store(0.5f * (right - left), by_x + k), store(0.5f * (below - above), by_y + k);
       }
-    for (float* of : {values, by_x, by_y}) std::fill(of + columns * columns, of + (columns - 1) * columns + kRow, 0.f);
+    for (float* of : {values, by_x, by_y}) std::fill_n(of + columns * columns, kRow, 0.f);
   }
 };
 

@@ -39,6 +39,7 @@ TEST(PatchSamples, UprightOnesAreThoseOfAnyGrid) {
       for (int k = 0; k < 20; ++k) centres.emplace_back(free * uniform(random), free * uniform(random));
       for (const Eigen::Vector2f& centre : centres) {
         Samples expected, values, by_x, by_y;
+        for (Samples* of : {&expected, &values, &by_x, &by_y}) of->fill(77.f);
         ASSERT_TRUE(square.sample(noise.patch, centre, Eigen::Matrix2f::Identity(), expected));
         ASSERT_TRUE(square.sampleUpright(noise.patch, centre, values, by_x, by_y));
         for (int k = 0; k < square.count(); ++k) ASSERT_EQ(values[k], expected[k]) << side << " " << radius;
