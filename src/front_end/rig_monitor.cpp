@@ -46,6 +46,41 @@ void quarter(const cv::Mat& image, cv::Mat& small) {
   cv::resize(image, small, cv::Size(image.cols / 4, image.rows / 4), 0.0, 0.0, cv::INTER_AREA);
 }
 
+/// How the right image's rows lie against the left one's: dv by u, px.
+struct Rows {
+  double slope, offset;  ///< of the line through the medians, by the median of slopes between corners far apart
+  double scatter;        ///< median distance from that line
+};
+
+Rows fitRows(const std::vector<Sighting>& sightings, int columns) {
+  std::vector<double> slopes, rest;
+  for (std::size_t i = 0; i < sightings.size(); ++i)
+    for (std::size_t k = 0; k < i; ++k)
+      if (std::abs(sightings[i].u - sightings[k].u) > 0.1 * columns)
+        slopes.push_back((sightings[i].dv - sightings[k].dv) / (sightings[i].u - sightings[k].u));
+  Rows rows{median(slopes), 0.0, 0.0};
+  for (const Sighting& sighting : sightings) rest.push_back(sighting.dv - rows.slope * sighting.u);
+  rows.offset = median(rest);
+  for (double& value : rest) value = std::abs(value - rows.offset);
+  rows.scatter = median(rest);
+  return rows;
+}
+
+/// Share of the corners that lie further right in the right image.
+double swappedShare(const std::vector<Sighting>& sightings) {
+  const auto swapped =
+      std::count_if(sightings.begin(), sightings.end(), [](const Sighting& s) { return s.disparity < -1.0; });
+  return static_cast<double>(swapped) / static_cast<double>(sightings.size());
+}
+
+/// Everything that would be said against the rig is far from being true, of so many corners that it is not by chance.
+bool isClearlyInOrder(const std::vector<Sighting>& sightings, int columns, double max_dv) {
+  constexpr std::size_t kEnoughToClear = 12;
+  if (sightings.size() < kEnoughToClear || swappedShare(sightings) > 0.2) return false;
+  const auto [slope, offset, scatter] = fitRows(sightings, columns);
+  return std::max({scatter, std::abs(offset), 0.5 * columns * std::abs(slope)}) <= 0.5 * max_dv;
+}
+
 template <class... Parts>
 std::string sentence(const Parts&... parts) {
   std::ostringstream text;
@@ -84,26 +119,15 @@ std::string RigMonitor::diagnose(const cv::Mat& left, const cv::Mat& right,
     if (!fine) continue;
     sightings.push_back(
         {centre.x - 0.5 * left.cols, static_cast<double>(centre.x - fine->x), static_cast<double>(fine->y - centre.y)});
+    // A view with little to match is suspicious, too, pair after pair: a few corners clear its rig.
+    constexpr std::size_t kAtOnce = 4;
+    if (sightings.size() % kAtOnce == 0 && isClearlyInOrder(sightings, left.cols, max_dv_)) return "";
   }
   if (static_cast<int>(sightings.size()) < kEnough) return "";
 
-  const auto swapped =
-      std::count_if(sightings.begin(), sightings.end(), [](const Sighting& s) { return s.disparity < -1.0; });
-  if (static_cast<double>(swapped) > 0.6 * static_cast<double>(sightings.size()))
+  if (swappedShare(sightings) > 0.6)
     return "left and right images are swapped? Corners lie further right in the right image";
-
-  // Rows over columns: a line through the medians, by the median of slopes between corners far apart.
-  std::vector<double> slopes, rest;
-  for (std::size_t i = 0; i < sightings.size(); ++i)
-    for (std::size_t k = 0; k < i; ++k)
-      if (std::abs(sightings[i].u - sightings[k].u) > 0.1 * left.cols)
-        slopes.push_back((sightings[i].dv - sightings[k].dv) / (sightings[i].u - sightings[k].u));
-  const double slope = median(slopes);
-  for (const Sighting& sighting : sightings) rest.push_back(sighting.dv - slope * sighting.u);
-  const double offset = median(rest);
-  for (double& value : rest) value = std::abs(value - offset);
-  const double scatter = median(rest);
-
+  const auto [slope, offset, scatter] = fitRows(sightings, left.cols);
   if (scatter > std::max(max_dv_, 0.5 * std::abs(offset)))
     return sentence("rows of left and right differ by ", scatter,
                     " px here and there: not rectified, or not taken at the same moment?");

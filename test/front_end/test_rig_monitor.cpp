@@ -61,6 +61,28 @@ TEST(RigMonitor, SaysNothingOfARigInOrder) {
   EXPECT_EQ(diagnosis(leftImage(), rightImage(0.0, 0.0, 0.5)), "") << "gain is no fault of the rig";
 }
 
+// It takes milliseconds, and a view with little to match is suspicious pair after pair.
+TEST(RigMonitor, LooksNoFurtherOnceAFewCornersClearIt) {
+  // Rows agree in the left half only; of the corners in the right half nobody asks.
+  cv::Mat right = rightImage(0.0);
+  rightImage(6.0).colRange(kSize.width / 2, kSize.width).copyTo(right.colRange(kSize.width / 2, kSize.width));
+  std::vector<cv::Point2f> left_half, right_half;
+  for (const cv::Point2f& corner : corners())
+    (corner.x < 0.45f * static_cast<float>(kSize.width) ? left_half : right_half).push_back(corner);
+  const RigMonitor monitor({}, 1.5, 192.0);
+  const auto diagnose = [&](const auto& is_left) {
+    std::vector<cv::Point2f> mixed;
+    for (std::size_t i = 0; i < 120; ++i) {
+      const auto& half = is_left(i) ? left_half : right_half;
+      mixed.push_back(half[i % half.size()]);
+    }
+    return monitor.diagnose(leftImage(), right, mixed);
+  };
+  EXPECT_EQ(diagnose([](std::size_t i) { return i < 20; }), "");
+  EXPECT_NE(diagnose([](std::size_t i) { return i < 4; }), "") << "four are too few";
+  EXPECT_NE(diagnose([](std::size_t i) { return i % 3 == 0; }), "") << "there is a doubt from the beginning";
+}
+
 TEST(RigMonitor, NamesTheHeightOfTheRightImage) {
   expectSaid(diagnosis(leftImage(), rightImage(4.0)), "right image 4.0 px too low: not rectified?");
   expectSaid(diagnosis(leftImage(), rightImage(-5.0)), "right image 5.0 px too high: not rectified?");

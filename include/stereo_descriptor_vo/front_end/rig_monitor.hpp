@@ -35,7 +35,7 @@ class RigMonitor {
   bool isSuspicious(int corners, int found) const;
 
   /// The likely cause in words; empty when the rig is in order, or when too little is found to say (dark, covered or
-  /// out of focus). Images are CV_8U of one size.
+  /// out of focus). Images are CV_8U of one size. Corners that come first are looked at first.
   std::string diagnose(const cv::Mat& left, const cv::Mat& right, const std::vector<cv::Point2f>& corners) const;
 
  private:
