@@ -80,15 +80,15 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
   features.layout = options_.descriptor.layout;
   features.element_type = descriptor_.elementType();
   ExtractionReport& report = features.report;
-  measureImage(left, report.mean_intensity[0], report.sharpness[0]);
-  measureImage(right, report.mean_intensity[1], report.sharpness[1]);
 
   // Detect in the left image, where at least the smallest descriptor fits and nothing is masked.
   const int border = static_cast<int>(descriptor_.reach(depth_scale_.size(options_.stereo.min_disparity)));
   Stopwatch stopwatch;
   const std::vector<Corner> corners = detector_.detect(left, border, mask);
   report.detected = static_cast<int>(corners.size());
+  measureImage(left, report.mean_intensity[0], report.sharpness[0]);
   report.detect_time = stopwatch.lap();
+  measureImage(right, report.mean_intensity[1], report.sharpness[1]);
 
   // Find each feature in the right image, in images that are equally exposed.
   cv::Mat searched_left = left, searched_right = right;

@@ -99,15 +99,17 @@ class PositionGrid {
   /// Writes the rows to the front of `found`, which holds at least as many as there are features; returns their number.
   std::size_t findAround(float u, float v, std::vector<int>& found) const {
     std::size_t count = 0;
-    const int first = columns_.at(u - radius_), last = columns_.at(u + radius_);
-    for (int row = rows_.at(v - radius_); row <= rows_.at(v + radius_); ++row)
-      for (std::size_t i = begin_[cell(first, row)]; i < begin_[cell(last, row) + 1]; ++i) {
-        const Entry& entry = entries_[i];
-        const float du = entry.u - u, dv = entry.v - v;
+    const int first = columns_.at(u - radius_), last = columns_.at(u + radius_), last_row = rows_.at(v + radius_);
+    const float square = radius_ * radius_;
+    for (int row = rows_.at(v - radius_); row <= last_row; ++row) {
+      const Entry* const end = entries_.data() + begin_[cell(last, row) + 1];
+      for (const Entry* entry = entries_.data() + begin_[cell(first, row)]; entry < end; ++entry) {
+        const float du = entry->u - u, dv = entry->v - v;
         // Written in any case and counted if near: no branch, as none could be foreseen.
-        found[count] = entry.row;
-        count += du * du + dv * dv <= radius_ * radius_ ? 1 : 0;
+        found[count] = entry->row;
+        count += du * du + dv * dv <= square ? 1 : 0;
       }
+    }
     return count;
   }
 
@@ -124,15 +126,18 @@ class PositionGrid {
       constexpr double kMostCells = 256.0;
       const auto [low, high] = std::minmax_element(positions.begin(), positions.end());
       const double extent = static_cast<double>(*high) - *low;
-      cell_ = std::max(smallest_cell, extent / kMostCells);
-      origin_ = cell_ * std::floor(*low / cell_);
-      last_ = std::floor((*high - origin_) / cell_);
+      const double cell = std::max(smallest_cell, extent / kMostCells);
+      inverse_cell_ = 1.0 / cell;
+      origin_ = cell * std::floor(*low / cell);
+      last_ = std::floor((*high - origin_) * inverse_cell_);
     }
     int count() const { return static_cast<int>(last_) + 1; }
-    int at(double position) const { return static_cast<int>(std::clamp((position - origin_) / cell_, 0.0, last_)); }
+    int at(double position) const {
+      return static_cast<int>(std::min(std::max((position - origin_) * inverse_cell_, 0.0), last_));
+    }
 
    private:
-    double cell_, origin_, last_;
+    double inverse_cell_, origin_, last_;
   };
 
   std::size_t cell(int column, int row) const { return static_cast<std::size_t>(row) * columns_.count() + column; }
