@@ -33,15 +33,15 @@ Matrix6d motionCovariance(const Window& window, const std::vector<int>& poses, c
 }
 
 /// Medians of a frame's squared residuals and disparities (px).
-std::pair<double, double> typicalOf(const Window& window, const std::vector<double>& residuals, int frame) {
-  std::vector<double> squares, disparities;
-  squares.reserve(residuals.size()), disparities.reserve(residuals.size());
-  for (std::size_t i = 0; i < residuals.size(); ++i) {
+std::pair<double, double> typicalOf(const Window& window, const std::vector<double>& squares, int frame) {
+  std::vector<double> here, disparities;
+  here.reserve(window.points.size()), disparities.reserve(window.points.size());
+  for (std::size_t i = 0; i < squares.size(); ++i) {
     if (window.observations[i].frame != frame) continue;
-    squares.push_back(residuals[i] * residuals[i]);
+    here.push_back(squares[i]);
     disparities.push_back(window.observations[i].measurement.z());
   }
-  return {median(squares), median(disparities)};
+  return {median(here), median(disparities)};
 }
 
 /// A shift (px) of a whole image as a covariance of its pose: that of a camera which looks at points of this disparity.
@@ -412,7 +412,7 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   const auto covariance = [&](int from, int to) -> Matrix6d {
     return motionCovariance(window, poses, solution.pose_covariance, from, to);
   };
-  const auto [square, disparity] = typicalOf(window, solution.residuals, newest);
+  const auto [square, disparity] = typicalOf(window, solution.squares, newest);
   constexpr double kAlike = 1.15;  // errors of neighbouring points are not independent
   const double excess = kAlike * residual_level_.excess(square);
   const Matrix6d shift = shifted(camera_, optimizer.options().common_shift, disparity);
@@ -426,15 +426,15 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   for (std::size_t f = 0; f < frames_.size(); ++f)
     frames_[f].T_camera_origin = orthonormalised(window.T_camera_origin[f]);
   for (std::size_t i = 0; i < problem_.points.size(); ++i) points_[problem_.points[i]].position = window.points[i];
-  cutOff(solution.residuals, adjustment);
+  cutOff(solution.squares, adjustment);
   problem_.clear();
   return adjustment;
 }
 
-void LocalMap::cutOff(const std::vector<double>& residuals, Adjustment& adjustment) {
+void LocalMap::cutOff(const std::vector<double>& squares, Adjustment& adjustment) {
   constexpr double kRejected = 6.0;  // sigma
-  for (std::size_t i = 0; i < residuals.size(); ++i) {
-    if (residuals[i] <= kRejected) continue;
+  for (std::size_t i = 0; i < squares.size(); ++i) {
+    if (squares[i] <= kRejected * kRejected) continue;
     const auto& [point, k] = problem_.sources[i];
     auto& observations = points_[point].observations;
     const Observation& observation = observations[k];

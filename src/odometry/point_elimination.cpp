@@ -292,6 +292,30 @@ struct AddPoint {
   }
 };
 
+/// movePoints(). What a point is still off by, times R, goes back by R^T.
+struct MovePoints {
+  static SDVO_IN_KERNEL void run(const EliminatedPoint* points, std::size_t count, const PoseFactor* factor,
+                                 const PoseVector* pose_steps, const double* calibration_step, double* moved) {
+    for (std::size_t p = 0; p < count; ++p) {
+      const EliminatedPoint& point = points[p];
+      Three by_poses[3] = {};
+      for (const PoseFactor* end = factor + point.factors; factor != end; ++factor) {
+        const Three translation = loaded(pose_steps[factor->pose].translation);
+        const Three rotation = loaded(pose_steps[factor->pose].rotation);
+        for (int k = 0; k < 3; ++k)
+          by_poses[k] += loaded(factor->Y[k].translation) * translation + loaded(factor->Y[k].rotation) * rotation;
+      }
+      double off[3];
+      for (int k = 0; k < 3; ++k)
+        off[k] = point.gradient[k] - sumOf(by_poses[k]) -
+                 (point.by_calibration(0, k) * calibration_step[0] + point.by_calibration(1, k) * calibration_step[1]);
+      for (int k = 0; k < 3; ++k)
+        moved[3 * p + static_cast<std::size_t>(k)] +=
+            point.R(0, k) * off[0] + point.R(1, k) * off[1] + point.R(2, k) * off[2];
+    }
+  }
+};
+
 Vector6d bothHalves(const PoseVector& v) {
   Vector6d both;
   both << v.translation[0], v.translation[1], v.translation[2], v.rotation[0], v.rotation[1], v.rotation[2];
@@ -307,6 +331,20 @@ WindowProjection::WindowProjection(const StereoCamera& camera, const RigCalibrat
 
 void squareResiduals(const WindowProjection& projection, const SightedPoint& point, double* squares) {
   runKernel<SquareResiduals>(&projection, &point, squares);
+}
+
+void movePoints(const std::vector<EliminatedPoint>& points, const std::vector<PoseFactor>& factors,
+                const Eigen::VectorXd& pose_steps, const RigCalibration::Vector& calibration_step,
+                std::vector<Eigen::Vector3d>& ray_and_inverse_depth) {
+  if (points.empty()) return;
+  std::vector<PoseVector> steps(static_cast<std::size_t>(pose_steps.size() / 6));
+  for (std::size_t f = 0; f < steps.size(); ++f)
+    for (int k = 0; k < 3; ++k) {
+      steps[f].translation[k] = pose_steps[6 * static_cast<Eigen::Index>(f) + k];
+      steps[f].rotation[k] = pose_steps[6 * static_cast<Eigen::Index>(f) + 3 + k];
+    }
+  runKernel<MovePoints>(points.data(), points.size(), factors.data(), steps.data(), calibration_step.data(),
+                        ray_and_inverse_depth.data()->data());
 }
 
 void PoseEquations::setZero(int poses) {

@@ -27,28 +27,12 @@ struct ReducedSystem {
   double weighted_square = 0.0;
 };
 
-/// T_camera_anchor of all poses: points that one pair saw first lie next to each other and share them.
-class RelativePoses {
- public:
-  /// In the memory of earlier poses. These must outlive their use.
-  void take(const std::vector<Eigen::Isometry3d>& T_camera_origin) {
-    T_camera_origin_ = &T_camera_origin;
-    T_origin_anchor_.reset();
-  }
-
-  const Eigen::Isometry3d* from(const Eigen::Isometry3d& T_origin_anchor) {
-    if (!T_origin_anchor_ || T_origin_anchor.matrix() != T_origin_anchor_->matrix()) {
-      T_origin_anchor_ = T_origin_anchor;
-      T_camera_anchor_.clear();
-      for (const Eigen::Isometry3d& T : *T_camera_origin_) T_camera_anchor_.push_back(T * T_origin_anchor);
-    }
-    return T_camera_anchor_.data();
-  }
-
- private:
-  const std::vector<Eigen::Isometry3d>* T_camera_origin_ = nullptr;
-  std::optional<Eigen::Isometry3d> T_origin_anchor_;
-  std::vector<Eigen::Isometry3d> T_camera_anchor_;
+/// What is looked for: poses, points (ray and inverse depth of each that is seen, in the order of the observations) and
+/// calibration.
+struct Estimate {
+  std::vector<Eigen::Isometry3d> T_camera_origin;
+  std::vector<Eigen::Vector3d> points;
+  RigCalibration calibration;
 };
 
 /// What all disparities of one point say beyond what its positions do: the square of their mean residual as a variance.
@@ -75,24 +59,43 @@ class Solver {
  public:
   explicit Solver(const WindowOptimizerOptions& options) : options_(options) {}
 
-  /// Refers to the window from now on: every accepted step is linearised anew.
-  void take(const Window& window) {
+  /// Refers to the window from now on, whose values are the first estimate.
+  void take(const Window& window, Estimate& estimate) {
     window_ = &window;
     common_sigma_ = window.calibration_prior.common_sigma.value_or(options_.common_disparity_sigma);
     const auto& observations = window.observations;
     first_of_point_.clear();
-    for (std::size_t i = 0; i < observations.size(); ++i)
-      if (i == 0 || observations[i].point != observations[i - 1].point) first_of_point_.push_back(static_cast<int>(i));
-    first_of_point_.push_back(static_cast<int>(observations.size()));
+    anchors_.clear(), anchor_of_point_.clear(), estimate.points.clear();
     sightings_.resize(observations.size());
     for (std::size_t i = 0; i < observations.size(); ++i) {
       const WindowObservation& o = observations[i];
       sightings_[i] = {{o.measurement.x(), o.measurement.y(), o.measurement.z(), 1.0 / o.sigma},
                        RigCalibration::shape(window.camera, o.measurement.x())[1],
                        o.frame};
+      if (i > 0 && o.point == observations[i - 1].point) continue;
+      first_of_point_.push_back(static_cast<int>(i));
+      const AnchoredPoint& point = window.points[static_cast<std::size_t>(o.point)];
+      // Points that one pair saw first lie next to each other.
+      if (anchors_.empty() || point.T_origin_anchor.matrix() != anchors_.back().matrix())
+        anchors_.push_back(point.T_origin_anchor);
+      anchor_of_point_.push_back(anchors_.size() - 1);
+      estimate.points.push_back(point.ray_and_inverse_depth);
     }
+    first_of_point_.push_back(static_cast<int>(observations.size()));
+    estimate.T_camera_origin = window.T_camera_origin;
+    estimate.calibration = window.calibration;
     poses_ = static_cast<int>(window.T_camera_origin.size()) - 1;
     size_ = 6 * poses_ + kCalibration;
+  }
+
+  /// Moves the window, the one that was taken, to the estimate.
+  void give(const Estimate& estimate, Window& window) const {
+    window.T_camera_origin = estimate.T_camera_origin;
+    window.calibration = estimate.calibration;
+    for (std::size_t p = 0; p < estimate.points.size(); ++p) {
+      const WindowObservation& first = window.observations[static_cast<std::size_t>(first_of_point_[p])];
+      window.points[static_cast<std::size_t>(first.point)].ray_and_inverse_depth = estimate.points[p];
+    }
   }
 
   int poses() const { return poses_; }
@@ -101,24 +104,19 @@ class Solver {
   /// Square of the residual at which the Cauchy kernel bends: a square s costs bend * log(1 + s / bend).
   double bend() const { return options_.kernel_scale * options_.kernel_scale; }
 
-  double priorCost(const Window& window) const {
-    const CalibrationVector error = window.calibration.value - window.calibration_prior.mean;
-    return error.dot(window.calibration_prior.information * error);
-  }
-
   /// Also gives the square of each observation's residual.
-  double cost(const Window& window, std::vector<double>& squares) {
+  double cost(const Estimate& estimate, std::vector<double>& squares) {
     squares.resize(sightings_.size());
-    const WindowProjection projection(window.camera, window.calibration);
-    T_camera_anchor_.take(window.T_camera_origin);
-    for (std::size_t p = 0; p + 1 < first_of_point_.size(); ++p)
-      squareResiduals(projection, sightedPoint(window, p), squares.data() + first_of_point_[p]);
-    return costOf(window, squares);
+    const WindowProjection projection(window_->camera, estimate.calibration);
+    placeAnchors(estimate);
+    for (std::size_t p = 0; p < estimate.points.size(); ++p)
+      squareResiduals(projection, sightedPoint(estimate, p), squares.data() + first_of_point_[p]);
+    return costOf(estimate, squares);
   }
 
   /// In the memory that the system has of an earlier linearisation.
-  void linearise(const Window& window, double damping, ReducedSystem& system) {
-    const std::size_t points = first_of_point_.size() - 1;
+  void linearise(const Estimate& estimate, double damping, ReducedSystem& system) {
+    const std::size_t points = estimate.points.size();
     system.points.resize(points);
     system.factors.resize(sightings_.size());
     system.common_squares.clear();
@@ -126,13 +124,13 @@ class Solver {
     squares_.resize(sightings_.size());
     system.weight = system.weighted_square = 0.0;
     equations_.setZero(poses_);
-    const WindowProjection projection(window.camera, window.calibration);
-    T_camera_anchor_.take(window.T_camera_origin);
+    const WindowProjection projection(window_->camera, estimate.calibration);
+    placeAnchors(estimate);
     PoseFactor* factors = system.factors.data();
     for (std::size_t p = 0; p < points; ++p) {
       const int first = first_of_point_[p];
       EliminatedPoint& point = system.points[p];
-      point = equations_.add(projection, sightedPoint(window, p), bend(), damping, factors, squares_.data() + first);
+      point = equations_.add(projection, sightedPoint(estimate, p), bend(), damping, factors, squares_.data() + first);
       factors += point.factors;
       system.weight += point.weight;
       system.weighted_square += point.square;
@@ -140,49 +138,43 @@ class Solver {
         system.common_squares.push_back(disparityVariance(first_of_point_[p + 1] - first) * *square);
     }
     equations_.copyTo(system.hessian, system.gradient);
-    const CalibrationBelief& prior = window.calibration_prior;
+    const CalibrationBelief& prior = window_->calibration_prior;
     system.hessian.bottomRightCorner<kCalibration, kCalibration>() += prior.information;
-    system.gradient.tail<kCalibration>() += prior.information * (prior.mean - window.calibration.value);
-    system.cost = costOf(window, squares_);
+    system.gradient.tail<kCalibration>() += prior.information * (prior.mean - estimate.calibration.value);
+    system.cost = costOf(estimate, squares_);
   }
 
-  /// The next estimate of poses, points and calibration; observations stay those of the window.
-  void makeStep(const ReducedSystem& system, const Eigen::VectorXd& step, Window& next) const {
-    next.camera = window_->camera;
-    next.T_camera_origin = window_->T_camera_origin;
-    next.points = window_->points;
-    next.calibration = window_->calibration;
-    next.calibration_prior = window_->calibration_prior;
-    for (int f = 0; f < poses_; ++f)
-      next.T_camera_origin[f + 1] = expSE3(step.segment<6>(6 * f)) * window_->T_camera_origin[f + 1];
+  /// The estimate that is a step of poses and calibration away, and what the points make of it.
+  void makeStep(const Estimate& estimate, const ReducedSystem& system, const Eigen::VectorXd& step,
+                Estimate& next) const {
     const CalibrationVector calibration = step.tail<kCalibration>();
-    next.calibration.value += calibration;
-    const PoseFactor* factor = system.factors.data();
-    for (std::size_t p = 0; p + 1 < first_of_point_.size(); ++p) {
-      const EliminatedPoint& point = system.points[p];
-      Eigen::Vector3d gradient = point.gradient - point.by_calibration.transpose() * calibration;
-      for (const PoseFactor* end = factor + point.factors; factor != end; ++factor)
-        for (int k = 0; k < 3; ++k)
-          gradient[k] -=
-              Eigen::Map<const Eigen::Vector3d>(factor->Y[k].translation).dot(step.segment<3>(6 * factor->pose)) +
-              Eigen::Map<const Eigen::Vector3d>(factor->Y[k].rotation).dot(step.segment<3>(6 * factor->pose + 3));
-      next.points[window_->observations[first_of_point_[p]].point].ray_and_inverse_depth +=
-          point.R.transpose() * gradient;
-    }
+    next.calibration.value = estimate.calibration.value + calibration;
+    next.T_camera_origin = estimate.T_camera_origin;
+    for (int f = 0; f < poses_; ++f)
+      next.T_camera_origin[f + 1] = expSE3(step.segment<6>(6 * f)) * estimate.T_camera_origin[f + 1];
+    next.points = estimate.points;
+    movePoints(system.points, system.factors, step.head(6 * poses_), calibration, next.points);
   }
 
  private:
-  SightedPoint sightedPoint(const Window& window, std::size_t p) {
-    const int first = first_of_point_[p], count = first_of_point_[p + 1] - first;
-    const AnchoredPoint& point = window.points[static_cast<std::size_t>(window_->observations[first].point)];
-    return {point.ray_and_inverse_depth, sightings_.data() + first, count, 1.0 / std::sqrt(disparityVariance(count)),
-            T_camera_anchor_.from(point.T_origin_anchor)};
+  /// T_camera_anchor_, anchor by anchor those of all poses.
+  void placeAnchors(const Estimate& estimate) {
+    T_camera_anchor_.clear();
+    for (const Eigen::Isometry3d& T_origin_anchor : anchors_)
+      for (const Eigen::Isometry3d& T : estimate.T_camera_origin) T_camera_anchor_.push_back(T * T_origin_anchor);
   }
 
-  double costOf(const Window& window, const std::vector<double>& squares) const {
+  SightedPoint sightedPoint(const Estimate& estimate, std::size_t p) const {
+    const int first = first_of_point_[p], count = first_of_point_[p + 1] - first;
+    return {estimate.points[p], sightings_.data() + first, count, 1.0 / std::sqrt(disparityVariance(count)),
+            T_camera_anchor_.data() + anchor_of_point_[p] * estimate.T_camera_origin.size()};
+  }
+
+  double costOf(const Estimate& estimate, const std::vector<double>& squares) const {
     LogSum costs;
     for (const double square : squares) costs.add(square / bend());
-    return priorCost(window) + bend() * costs.value();
+    const CalibrationVector error = estimate.calibration.value - window_->calibration_prior.mean;
+    return error.dot(window_->calibration_prior.information * error) + bend() * costs.value();
   }
 
   /// Of n disparities of one point the mean has the variance sigma^2 / n + common^2, as if each by itself had n times
@@ -196,7 +188,8 @@ class Solver {
   double common_sigma_ = 0.0;
   std::vector<int> first_of_point_;
   std::vector<PreparedSighting> sightings_;
-  RelativePoses T_camera_anchor_;
+  std::vector<Eigen::Isometry3d> anchors_, T_camera_anchor_;
+  std::vector<std::size_t> anchor_of_point_;
   PoseEquations equations_;
   std::vector<double> squares_;
   int poses_ = 0, size_ = 0;
@@ -237,7 +230,7 @@ struct WindowOptimizer::Memory {
 
   Solver solver;
   ReducedSystem system;
-  Window next;
+  Estimate estimate, next;
   Eigen::MatrixXd hessian, units, covariance;
   Eigen::LLT<Eigen::MatrixXd> factor;
   Eigen::VectorXd step;
@@ -260,8 +253,8 @@ const WindowSolution& WindowOptimizer::optimize(Window& window) {
 
 const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vector<int>& covariance_of) {
   constexpr double kUndamped = 1e-5, kLargestDamping = 1e4;
-  auto& [solver, system, next, hessian, units, covariance, factor, step, squares, solution] = *memory_;
-  solver.take(window);
+  auto& [solver, system, estimate, next, hessian, units, covariance, factor, step, squares, solution] = *memory_;
+  solver.take(window, estimate);
   solution.success = false;
   solution.iterations = 0;
   double damping = kUndamped, damping_of_system = kUndamped;
@@ -269,7 +262,7 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
   const int c = 6 * solver.poses();
   while (solution.iterations < options_.iterations && damping < kLargestDamping) {
     ++solution.iterations;
-    solver.linearise(window, damping, system);
+    solver.linearise(estimate, damping, system);
     damping_of_system = damping;
     hessian = system.hessian;  // its lower triangle
     hessian.diagonal().head(c) *= 1.0 + damping;
@@ -279,14 +272,12 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
       continue;
     }
     step = factor.solve(system.gradient);
-    solver.makeStep(system, step, next);
+    solver.makeStep(estimate, system, step, next);
     const double next_cost = solver.cost(next, squares);
     accepted = next_cost <= system.cost;
     if (accepted) {
       const bool converged = system.cost - next_cost < 1e-4 * (system.cost + 1.0);
-      std::swap(window.T_camera_origin, next.T_camera_origin);
-      std::swap(window.points, next.points);
-      window.calibration = next.calibration;
+      std::swap(estimate, next);
       damping = std::max(0.1 * damping, 1e-8);
       if (converged) break;
     } else {
@@ -294,9 +285,11 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
     }
   }
 
+  solver.give(estimate, window);
+
   // Of the last linearisation, one step before the result: close enough for a covariance, and half of the work saved.
   // But points held by damping would say too much.
-  if (damping_of_system > kUndamped) solver.linearise(window, kUndamped, system);
+  if (damping_of_system > kUndamped) solver.linearise(estimate, kUndamped, system);
   factor.compute(system.hessian);
   if (factor.info() != Eigen::Success) return solution;  // as when nothing holds one of the poses
   const int asked = static_cast<int>(covariance_of.size());
@@ -315,9 +308,8 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
   solution.calibration_information =
       covariance.bottomRightCorner<kCalibration, kCalibration>().inverse() - window.calibration_prior.information;
 
-  if (!accepted) solver.cost(window, squares);  // those at hand belong to a refused step
-  solution.residuals.clear();
-  for (const double square : squares) solution.residuals.push_back(std::sqrt(square));
+  if (!accepted) solver.cost(estimate, squares);  // those at hand belong to a refused step
+  std::swap(solution.squares, squares);
   solution.common_disparity_square = varianceOf(system.common_squares);
   solution.success = solution.pose_covariance.allFinite();
   return solution;

@@ -151,25 +151,39 @@ TEST(PointElimination, SightingsFromBehindCostButDoNotPull) {
   for (int i = 2; i < 5; ++i) EXPECT_EQ(reduced.squares[i], kBehindSquare) << i;
 }
 
-TEST(PointElimination, TheFactorsGiveThePointBack) {
-  const Scene scene({0, 1, 2, 4});
-  const Whole whole(scene);
-  const Reduced reduced(scene);
-  // Whatever step the poses and the calibration take, the point follows as the whole equations say.
+/// Some step of the poses, then of the calibration.
+Eigen::VectorXd someStep() {
   Eigen::VectorXd step(6 * kPoses + 2);
   for (int i = 0; i < step.size(); ++i) step[i] = 0.01 * std::sin(1.0 + i);
-  const Eigen::Vector3d expected = whole.hessian.bottomRightCorner<3, 3>().llt().solve(
-      Eigen::Vector3d(whole.gradient.tail<3>() - whole.hessian.bottomLeftCorner(3, step.size()) * step));
-  ASSERT_EQ(reduced.point.factors, 3);
-  Eigen::Vector3d left = reduced.point.gradient - reduced.point.by_calibration.transpose() * step.tail<2>();
-  for (int i = 0; i < 3; ++i) {
-    const PoseFactor& factor = reduced.factors[i];
-    for (int k = 0; k < 3; ++k)
-      for (int axis = 0; axis < 3; ++axis)
-        left[k] -= factor.Y[k].translation[axis] * step[6 * factor.pose + axis] +
-                   factor.Y[k].rotation[axis] * step[6 * factor.pose + 3 + axis];
+  return step;
+}
+
+/// The points of several scenes after that step.
+std::vector<Eigen::Vector3d> movedPoints(const std::vector<Scene>& scenes) {
+  std::vector<EliminatedPoint> points;
+  std::vector<PoseFactor> factors;
+  std::vector<Eigen::Vector3d> moved;
+  for (const Scene& scene : scenes) {
+    const Reduced reduced(scene);
+    points.push_back(reduced.point);
+    factors.insert(factors.end(), reduced.factors.begin(), reduced.factors.begin() + reduced.point.factors);
+    moved.push_back(scene.point.ray_and_inverse_depth);
   }
-  expectNear(reduced.point.R.transpose() * left, expected, "point");
+  const Eigen::VectorXd step = someStep();
+  movePoints(points, factors, step.head(6 * kPoses), step.tail<2>(), moved);
+  return moved;
+}
+
+TEST(PointElimination, PointsFollowAsTheWholeEquationsSay) {
+  const std::vector<Scene> scenes = {Scene({0, 1, 2, 4}), Scene({0}), Scene({3, 4}, {-0.3, 0.1, 1.0 / 20.0})};
+  const std::vector<Eigen::Vector3d> moved = movedPoints(scenes);
+  const Eigen::VectorXd step = someStep();
+  for (std::size_t p = 0; p < scenes.size(); ++p) {
+    const Whole whole(scenes[p]);
+    const Eigen::Vector3d expected = whole.hessian.bottomRightCorner<3, 3>().llt().solve(
+        Eigen::Vector3d(whole.gradient.tail<3>() - whole.hessian.bottomLeftCorner(3, step.size()) * step));
+    expectNear(moved[p] - scenes[p].point.ray_and_inverse_depth, expected, "point");
+  }
 }
 
 TEST(PointElimination, SumsUpWhatItsSightingsSay) {
@@ -229,6 +243,12 @@ TEST(PointElimination, IsTheSameToTheBitWithAndWithoutAvx2) {
   EXPECT_TRUE(fast.point.R == plain.point.R);
   EXPECT_TRUE(fast.point.gradient == plain.point.gradient);
   EXPECT_TRUE(fast.point.by_calibration == plain.point.by_calibration);
+
+  const std::vector<Scene> scenes = {scene, Scene({1, 3})};
+  const std::vector<Eigen::Vector3d> moved = movedPoints(scenes);
+  allowAvx2(false);
+  EXPECT_EQ(moved, movedPoints(scenes));
+  allowAvx2(true);
 }
 
 }  // namespace

@@ -175,7 +175,7 @@ class LocalMap {
   std::vector<int> sharedPoints() const;
   std::vector<double> parallaxToPredecessors(std::size_t frames) const;
   void removeFrame(std::size_t index);
-  void cutOff(const std::vector<double>& residuals, Adjustment& adjustment);
+  void cutOff(const std::vector<double>& squares, Adjustment& adjustment);
   bool needsKeyframe() const;
   static void takeDescriptor(Point& point, const StereoFeatures& features, int row);
   void startPoint(const StereoFeatures& features, int row, int id, const Eigen::Isometry3d& T_camera_origin,

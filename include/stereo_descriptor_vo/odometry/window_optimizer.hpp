@@ -75,7 +75,7 @@ struct WindowSolution {
   /// Median over the points of the squared error that all disparities of one share, px^2, as a variance; none where too
   /// few points are known better from their motion than from their disparities.
   std::optional<double> common_disparity_square;
-  std::vector<double> residuals;  ///< normalised length for each observation, sigma
+  std::vector<double> squares;  ///< of each observation's normalised residual
 };
 
 /// Bundle adjustment of windows: poses, points and the rig's calibration, by Levenberg-Marquardt with the points
