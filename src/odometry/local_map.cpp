@@ -14,6 +14,9 @@ namespace {
 /// Disparity below which a point's distance is beyond measuring; it serves as a direction, far away.
 constexpr double kFarthestDisparity = 0.05;  // px
 
+/// Of many points a fixed number is shared for so long that the window would grow faster than they do.
+constexpr double kLastingShare = 0.125;
+
 /// Most points need no more memory than for these until it goes to another one.
 constexpr std::size_t kUsualSightings = 8;
 
@@ -209,8 +212,9 @@ void LocalMap::forgetKeyframe() {
     if (options_.remembered_keyframes > 0 && !frames_[leaving].is_recalled) rememberKeyframe(leaving);
   }
   const std::vector<int> shared = sharedPoints();
+  const int least = std::max(options_.lasting_points, static_cast<int>(kLastingShare * shared.back()));
   const auto too_few = std::find_if(shared.begin(), shared.begin() + static_cast<std::ptrdiff_t>(lasting()),
-                                    [&](int points) { return points < options_.lasting_points; });
+                                    [&](int points) { return points < least; });
   const std::size_t unshared = static_cast<std::size_t>(too_few - shared.begin());
   if (unshared < lasting()) removeFrame(unshared);
   while (static_cast<int>(lasting()) > options_.lasting_keyframes) {

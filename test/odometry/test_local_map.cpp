@@ -473,6 +473,39 @@ TEST(LocalMap, HoldsAsManyKeyframesAsItIsTold) {
   }
 }
 
+TEST(LocalMap, HoldsAnOldKeyframeWhileItSharesEnough) {
+  constexpr int kPoints = 80;
+  struct Case {
+    int lasting_points, shared;
+    bool stays;
+  };
+  for (const auto& [lasting_points, shared, stays] :
+       {Case{20, 20, true}, Case{20, 19, false}, Case{5, 10, true}, Case{5, 9, false}}) {
+    const synthetic::World world = someWorld(2 * kPoints);
+    LocalMapOptions options = everyPairAKeyframe();
+    options.keyframes = 2;
+    options.lasting_points = lasting_points;
+    LocalMap map(options);
+    add(map, see(world, kPoints, 2 * kPoints, translated(0.1, 0.0, 0.0)), 1, translated(0.1, 0.0, 0.0), {});
+    for (int id = 2; id <= 4; ++id) {
+      const Eigen::Isometry3d pose = translated(0.1 * id, 0.0, 0.0);
+      const StereoFeatures features = see(world, shared, kPoints + shared, pose);
+      const LocalMap::View view = map.view();
+      Sightings sightings;
+      for (int row = 0; row < kPoints; ++row) {
+        // Those of the first pair are the map's first; the second pair adds all others.
+        const int of_first = row - (kPoints - shared);
+        if (of_first >= 0)
+          sightings.push_back(sighting(map, view, of_first, features, row));
+        else if (id > 2)
+          sightings.push_back(sighting(map, view, kPoints + row, features, row));
+      }
+      add(map, features, id, pose, sightings);
+    }
+    EXPECT_EQ(map.oldestId(), stays ? 1 : 2) << shared << " of 80 points, " << lasting_points << " asked for";
+  }
+}
+
 TEST(LocalMap, LooksForAPointUntilEnoughFramesMissedIt) {
   const synthetic::World world = someWorld(20);
   LocalMapOptions options = everyPairAKeyframe();

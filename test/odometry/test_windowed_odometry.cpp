@@ -194,7 +194,7 @@ struct ThereAndBack {
 };
 
 ThereAndBack driveThereAndBack(int remembered_keyframes) {
-  SyntheticScene scene(7, 2500, 120.0);
+  SyntheticScene scene(8, 2500, 120.0);
   scene.patches = true;
   scene.position_noise = 0.8;
   scene.disparity_noise = 1.2;
