@@ -150,9 +150,9 @@ void removeMasked(const cv::Mat& mask, cv::Size size, std::vector<Corner>& corne
 }
 
 /// Ties are broken by position.
-bool isStronger(const Corner& a, const Corner& b) {
+constexpr auto isStronger = [](const Corner& a, const Corner& b) {
   return std::tie(b.response, a.position.y, a.position.x) < std::tie(a.response, b.position.y, b.position.x);
-}
+};
 
 }  // namespace
 

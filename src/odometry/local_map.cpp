@@ -35,16 +35,16 @@ Matrix6d motionCovariance(const Window& window, const std::vector<int>& poses, c
   return 0.5 * (covariance + covariance.transpose());
 }
 
-/// Medians of a frame's squared residuals and disparities (px).
-std::pair<double, double> typicalOf(const Window& window, const std::vector<double>& squares, int frame) {
-  std::vector<double> here, disparities;
-  here.reserve(window.points.size()), disparities.reserve(window.points.size());
-  for (std::size_t i = 0; i < squares.size(); ++i) {
-    if (window.observations[i].frame != frame) continue;
-    here.push_back(squares[i]);
+/// Medians of some observations' squared residuals and of their disparities (px).
+std::pair<double, double> typicalOf(const Window& window, const std::vector<double>& squares,
+                                    const std::vector<int>& observations) {
+  std::vector<double> of_these, disparities;
+  of_these.reserve(observations.size()), disparities.reserve(observations.size());
+  for (const int i : observations) {
+    of_these.push_back(squares[i]);
     disparities.push_back(window.observations[i].measurement.z());
   }
-  return {median(here), median(disparities)};
+  return {median(of_these), median(disparities)};
 }
 
 /// A shift (px) of a whole image as a covariance of its pose: that of a camera which looks at points of this disparity.
@@ -359,7 +359,7 @@ void LocalMap::removeFrame(std::size_t index) {
 
 void LocalMap::Problem::clear() {
   window.T_camera_origin.clear(), window.points.clear(), window.observations.clear();
-  frame_ids.clear(), points.clear(), sources.clear();
+  frame_ids.clear(), points.clear(), newest.clear();
 }
 
 void LocalMap::pose(Problem& problem) const {
@@ -368,7 +368,7 @@ void LocalMap::pose(Problem& problem) const {
   std::size_t sightings = 0;
   for (const Point& point : points_) sightings += point.observations.size();
   window.points.reserve(points_.size()), problem.points.reserve(points_.size());
-  window.observations.reserve(sightings), problem.sources.reserve(sightings);
+  window.observations.reserve(sightings);
   for (const Frame& frame : frames_) {
     window.T_camera_origin.push_back(frame.T_camera_origin);
     problem.frame_ids.push_back(frame.id);
@@ -377,8 +377,7 @@ void LocalMap::pose(Problem& problem) const {
     const Point& point = points_[p];
     if (point.observations.size() < 2) continue;
     int frame = 0;
-    for (std::size_t k = 0; k < point.observations.size(); ++k) {
-      const Observation& observation = point.observations[k];
+    for (const Observation& observation : point.observations) {
       while (problem.frame_ids[static_cast<std::size_t>(frame)] < observation.frame_id) ++frame;
       window.observations.emplace_back();
       WindowObservation& posed = window.observations.back();
@@ -386,8 +385,9 @@ void LocalMap::pose(Problem& problem) const {
       posed.frame = frame;
       posed.measurement = observation.measurement;
       posed.sigma = observation.sigma;
-      problem.sources.emplace_back(static_cast<int>(p), static_cast<int>(k));
     }
+    if (point.observations.back().frame_id == newestId())
+      problem.newest.push_back(static_cast<int>(window.observations.size()) - 1);
     window.points.push_back(point.position);
     problem.points.push_back(static_cast<int>(p));
   }
@@ -416,7 +416,7 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   const auto covariance = [&](int from, int to) -> Matrix6d {
     return motionCovariance(window, poses, solution.pose_covariance, from, to);
   };
-  const auto [square, disparity] = typicalOf(window, solution.squares, newest);
+  const auto [square, disparity] = typicalOf(window, solution.squares, problem_.newest);
   constexpr double kAlike = 1.15;  // errors of neighbouring points are not independent
   const double excess = kAlike * residual_level_.excess(square);
   const Matrix6d shift = shifted(camera_, optimizer.options().common_shift, disparity);
@@ -437,15 +437,12 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
 
 void LocalMap::cutOff(const std::vector<double>& squares, Adjustment& adjustment) {
   constexpr double kRejected = 6.0;  // sigma
-  for (std::size_t i = 0; i < squares.size(); ++i) {
+  for (const int i : problem_.newest) {
     if (squares[i] <= kRejected * kRejected) continue;
-    const auto& [point, k] = problem_.sources[i];
-    auto& observations = points_[point].observations;
-    const Observation& observation = observations[k];
-    if (observation.frame_id != newestId()) continue;
-    adjustment.rejected_rows.push_back(observation.row);
-    --points_[point].seen;
-    observations.pop_back();  // the newest sighting is the last one
+    Point& point = points_[problem_.points[problem_.window.observations[i].point]];
+    adjustment.rejected_rows.push_back(point.observations.back().row);
+    --point.seen;
+    point.observations.pop_back();
   }
 }
 

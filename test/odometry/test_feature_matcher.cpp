@@ -196,13 +196,13 @@ template <class Element>
 void expectShares(ElementType type) {
   // The second of each set are the alike ones: |a - b|^2 = 1 + 4, |a|^2 = 9 + 16, |b|^2 = 16 + 36.
   const StereoFeatures a = numbers<Element>(type, {{100, 0, 0}, {3, 4, 0}});
-  const StereoFeatures b = numbers<Element>(type, {{4, 6, 0}, {0, 0, 90}});
+  const StereoFeatures b = numbers<Element>(type, {{0, 0, 90}, {4, 6, 0}});
   FeatureMatcherOptions options = withoutGate();
   options.max_distance = 1.0;
   const auto matches = FeatureMatcher(options).match(a, b, std::nullopt);
   ASSERT_EQ(matches.size(), 1u);
   EXPECT_EQ(matches[0].reference, 1);
-  EXPECT_EQ(matches[0].current, 0);
+  EXPECT_EQ(matches[0].current, 1);
   EXPECT_NEAR(matches[0].distance, 5.0 / (25.0 + 52.0), 1e-6);
 }
 

@@ -163,8 +163,8 @@ class LocalMap {
   struct Problem {
     Window window;
     std::vector<int> frame_ids;
-    std::vector<int> points;                   ///< for each of the window's
-    std::vector<std::pair<int, int>> sources;  ///< point and its observation, for each of the window's observations
+    std::vector<int> points;  ///< for each of the window's
+    std::vector<int> newest;  ///< of the window's observations those in the newest frame
 
     void clear();
   };

@@ -42,9 +42,10 @@ struct AnchoredPoint {
 
   /// The point in a camera's frame, divided by the point's depth in the anchor: finite even for points at infinity.
   Eigen::Vector3d scaledPointIn(const Eigen::Isometry3d& T_camera_origin) const {
-    const Eigen::Isometry3d T = T_camera_origin * T_origin_anchor;
-    return T.linear() * Eigen::Vector3d(ray_and_inverse_depth.x(), ray_and_inverse_depth.y(), 1.0) +
-           ray_and_inverse_depth.z() * T.translation();
+    const Eigen::Vector3d ray(ray_and_inverse_depth.x(), ray_and_inverse_depth.y(), 1.0);
+    const double inverse_depth = ray_and_inverse_depth.z();
+    const Eigen::Vector3d in_origin = T_origin_anchor.linear() * ray + inverse_depth * T_origin_anchor.translation();
+    return T_camera_origin.linear() * in_origin + inverse_depth * T_camera_origin.translation();
   }
 };
 
