@@ -429,7 +429,8 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   calibration = window.calibration;
   for (std::size_t f = 0; f < frames_.size(); ++f)
     frames_[f].T_camera_origin = orthonormalised(window.T_camera_origin[f]);
-  for (std::size_t i = 0; i < problem_.points.size(); ++i) points_[problem_.points[i]].position = window.points[i];
+  for (std::size_t i = 0; i < problem_.points.size(); ++i)
+    points_[problem_.points[i]].position.ray_and_inverse_depth = window.points[i].ray_and_inverse_depth;
   cutOff(solution.squares, adjustment);
   problem_.clear();
   return adjustment;
