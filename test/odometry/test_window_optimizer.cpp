@@ -326,16 +326,8 @@ TEST(WindowOptimizer, PointsKnownByTheirDisparitiesAloneTellNothingOfCommonError
   EXPECT_FALSE(solution.common_disparity_square);
 }
 
-TEST(WindowOptimizer, ResidualsAreInUnitsOfWhatIsExpected) {
-  RigCalibration truth;
-  truth.value << 0.2, -0.5;
-  Window window = disturbedWindow(truth);
-  addNoise(window, 0.5, 0.5, 2);
-  for (std::size_t i = 0; i < window.observations.size(); i += 3) window.observations[i].sigma = 0.7;
-  WindowOptimizerOptions options;
-  options.iterations = 10;
-  const WindowSolution solution = WindowOptimizer(options).optimize(window);
-  ASSERT_TRUE(solution.success);
+/// The squares, each of five sightings of a point, as the window is now.
+void expectSquaresOf(const Window& window, const WindowOptimizerOptions& options, const WindowSolution& solution) {
   ASSERT_EQ(solution.squares.size(), window.observations.size());
   for (std::size_t i = 0; i < window.observations.size(); ++i) {
     const WindowObservation& observation = window.observations[i];
@@ -346,10 +338,36 @@ TEST(WindowOptimizer, ResidualsAreInUnitsOfWhatIsExpected) {
     predicted.z() += window.calibration.value[0] + window.calibration.value[1] * x * x;
     Eigen::Vector3d error = observation.measurement - predicted;
     error.head<2>() /= observation.sigma;
-    // Five sightings of each point: what they share does not average away.
+    // What the sightings share does not average away.
     error.z() /= std::sqrt(std::pow(options.disparity_sigma, 2) + 5.0 * std::pow(options.common_disparity_sigma, 2));
-    EXPECT_NEAR(std::sqrt(solution.squares[i]), error.norm(), 1e-9);
+    EXPECT_NEAR(std::sqrt(solution.squares[i]), error.norm(), 1e-9 * (1.0 + error.norm()));
   }
+}
+
+TEST(WindowOptimizer, ResidualsAreInUnitsOfWhatIsExpected) {
+  RigCalibration truth;
+  truth.value << 0.2, -0.5;
+  Window window = disturbedWindow(truth);
+  addNoise(window, 0.5, 0.5, 2);
+  for (std::size_t i = 0; i < window.observations.size(); i += 3) window.observations[i].sigma = 0.7;
+  WindowOptimizerOptions options;
+  options.iterations = 10;
+  const WindowSolution solution = WindowOptimizer(options).optimize(window);
+  ASSERT_TRUE(solution.success);
+  expectSquaresOf(window, options, solution);
+}
+
+TEST(WindowOptimizer, ResidualsAreThoseOfTheWindowWhereItsStepIsRefused) {
+  const WindowOptimizerOptions one_step;
+  ASSERT_EQ(one_step.iterations, 1);
+  Window window = disturbedWindow(RigCalibration{});
+  // Nearly right about the poses, and all wrong about the distances: a step goes beyond what it was linearised for.
+  for (AnchoredPoint& point : window.points) point.ray_and_inverse_depth.z() *= 0.1;
+  const Window before = window;
+  const WindowSolution solution = WindowOptimizer(one_step).optimize(window);
+  ASSERT_TRUE(solution.success);
+  ASSERT_TRUE(window.T_camera_origin[1].isApprox(before.T_camera_origin[1], 0.0)) << "the step has to be refused";
+  expectSquaresOf(window, one_step, solution);
 }
 
 TEST(WindowOptimizer, ASightingThatCannotBeIsNotUsed) {
