@@ -19,6 +19,7 @@ struct Shares {
   explicit Shares(int size) {
     constexpr double kNothing = 1e-3;  // of a pixel
     const int half = (size + 1) / 2;
+    for (auto* shares : {&before, &here, &after}) shares->reserve(static_cast<std::size_t>(half));
     const double width = static_cast<double>(size) / half;
     for (int k = 0; k < half; ++k) {
       const double begin = k * width, end = begin + width, covered = std::min(width, size - begin);

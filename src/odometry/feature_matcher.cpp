@@ -133,7 +133,7 @@ class PositionGrid {
     }
     int count() const { return static_cast<int>(last_) + 1; }
     int at(double position) const {
-      return static_cast<int>(std::min(std::max((position - origin_) * inverse_cell_, 0.0), last_));
+      return static_cast<int>(std::min(last_, std::max(0.0, (position - origin_) * inverse_cell_)));
     }
 
    private:

@@ -12,43 +12,66 @@
 
 namespace {
 
-std::int64_t allocations = 0;
+/// Blocks of memory since the last reset(): those that were asked for, and those of them that still live.
+struct Counter {
+  std::int64_t made = 0, kept = 0, first = 0;
+  void reset() {
+    first += made;
+    made = kept = 0;
+  }
+  void add(const Counter& other) {
+    made += other.made;
+    kept += other.kept;
+  }
+} counter;
+
+/// Before each block its number, in as many bytes as keep it aligned.
+constexpr std::size_t kHeader = alignof(std::max_align_t);
 
 }  // namespace
 
 void* operator new(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size)) return memory;
-  throw std::bad_alloc();
+  auto* header = static_cast<std::int64_t*>(std::malloc(kHeader + size));
+  if (!header) throw std::bad_alloc();
+  *header = counter.first + counter.made++;
+  ++counter.kept;
+  return reinterpret_cast<char*>(header) + kHeader;
 }
 void operator delete(void* memory) noexcept {
-  std::free(memory);
+  if (!memory) return;
+  void* header = static_cast<char*>(memory) - kHeader;
+  counter.kept -= *static_cast<std::int64_t*>(header) >= counter.first;
+  std::free(header);
 }
 void operator delete(void* memory, std::size_t) noexcept {
-  std::free(memory);
+  operator delete(memory);
 }
 
-/// Argument: a folder in KITTI layout. Prints the mean of image side and motion side over its second half.
+/// Argument: a folder in KITTI layout. Prints, for image side and motion side, the mean over its second half of the
+/// blocks that a pair asks for, and of those that live on in the result or in the map.
 int main(int argc, char** argv) {
   if (argc != 2) return 1;
   cv::setNumThreads(1);
   const sdvo::KittiSequence sequence(argv[1]);
   const sdvo::FeatureExtractor extractor{{}};
   sdvo::VisualOdometry odometry{{}};
-  double image_side = 0.0, motion_side = 0.0;
-  int counted = 0;
+  Counter image_side, motion_side;
+  int pairs = 0;
   for (int i = 0; i < sequence.size(); ++i) {
     const sdvo::ImagePair pair = sequence.load(i);
-    const std::int64_t before = allocations;
+    const bool counted = 2 * i >= sequence.size();
+    counter.reset();
     const sdvo::StereoFeatures features =
         extractor.extract(sequence.camera(), pair.left, pair.right, sequence.stamp(i));
-    const std::int64_t between = allocations;
+    if (counted) image_side.add(counter);
+    counter.reset();
     const sdvo::OdometryResult result = odometry.update(features);
-    if (2 * i < sequence.size()) continue;
-    image_side += static_cast<double>(between - before);
-    motion_side += static_cast<double>(allocations - between);
-    ++counted;
+    if (counted) motion_side.add(counter);
+    pairs += counted;
   }
-  std::cout << std::fixed << std::setprecision(0) << image_side / counted << " " << motion_side / counted << "\n";
+  std::cout << std::fixed << std::setprecision(0);
+  for (const Counter& side : {image_side, motion_side})
+    std::cout << static_cast<double>(side.made) / pairs << " " << static_cast<double>(side.kept) / pairs << " ";
+  std::cout << "\n";
   return 0;
 }
