@@ -4,14 +4,28 @@
 
 #include <algorithm>
 #include <stdexcept>
+#include <string_view>
 
 namespace sdvo {
 namespace {
 
+/// The file serves the launch files, too, and may hold what is of no concern here.
 bool belongsToNodelet(const std::string& path) {
+  constexpr std::string_view kTransport = "/image_transport";  // of image_transport itself
+  if (path.size() > kTransport.size() && path.compare(path.size() - kTransport.size(), path.npos, kTransport) == 0)
+    return true;
   InterfaceOptions options;
   const std::vector<Option> list = listOptions(options);
   return std::any_of(list.begin(), list.end(), [&](const Option& option) { return option.name == path; });
+}
+
+/// Booleans as ROS reads them: YAML 1.1 has more than true and false.
+std::string textOf(const YAML::Node& scalar) {
+  const std::string text = scalar.as<std::string>();
+  const bool is_quoted = scalar.Tag() == "!";
+  bool value = false;
+  if (is_quoted || text.size() < 2 || !YAML::convert<bool>::decode(scalar, value)) return text;
+  return value ? "true" : "false";
 }
 
 void apply(const YAML::Node& node, const std::string& path, std::vector<Option>& options) {
@@ -20,7 +34,7 @@ void apply(const YAML::Node& node, const std::string& path, std::vector<Option>&
       apply(child.second, (path.empty() ? "" : path + "/") + child.first.as<std::string>(), options);
     return;
   }
-  if (!belongsToNodelet(path)) setOption(options, path, node.as<std::string>());
+  if (!belongsToNodelet(path)) setOption(options, path, textOf(node));
 }
 
 }  // namespace

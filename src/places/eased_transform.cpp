@@ -1,7 +1,5 @@
 #include "stereo_descriptor_vo/places/eased_transform.hpp"
 
-#include <algorithm>
-
 namespace sdvo {
 
 void EasedTransform::moveTo(const Eigen::Isometry3d& target, double now) {
@@ -11,8 +9,9 @@ void EasedTransform::moveTo(const Eigen::Isometry3d& target, double now) {
 }
 
 Eigen::Isometry3d EasedTransform::at(double now) const {
-  if (now >= begin_ + duration_) return target_;
-  const double passed = std::clamp((now - begin_) / duration_, 0.0, 1.0);
+  // Before its begin: the clock was set back, and what was on its way has arrived.
+  if (now < begin_ || now >= begin_ + duration_) return target_;
+  const double passed = (now - begin_) / duration_;
   const double share = passed * passed * (3.0 - 2.0 * passed);
   const Eigen::Quaterniond from(from_.linear()), target(target_.linear());
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();

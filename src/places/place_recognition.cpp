@@ -73,7 +73,7 @@ std::optional<PlaceReport> PlaceRecognition::observe(const StereoFeatures& featu
   report.find_time = stopwatch.lap();
   recognise(here, report);
   report.verify_time = stopwatch.lap();
-  if (static_cast<int>(places_.size()) > options_.max_places) {
+  while (static_cast<int>(places_.size()) > options_.max_places) {
     const int oldest = places_.begin()->first;
     index_.remove(oldest);
     graph_.remove(oldest);

@@ -8,7 +8,7 @@ namespace sdvo {
 std::optional<Eigen::Isometry3d> CameraMount::find(const std::string& base_frame, const std::string& camera_frame,
                                                    std::string& problem) {
   if (knows(base_frame, camera_frame)) return last();
-  const auto give_up = ros::WallTime::now() + ros::WallDuration(has_waited_ ? 0.0 : timeout_);
+  const auto give_up = ros::SteadyTime::now() + ros::WallDuration(has_waited_ ? 0.0 : timeout_);
   has_waited_ = true;
   for (;;) {
     const std::optional<Eigen::Isometry3d> found = transforms_.find(base_frame, camera_frame, problem);
@@ -18,7 +18,7 @@ std::optional<Eigen::Isometry3d> CameraMount::find(const std::string& base_frame
       const std::lock_guard<std::mutex> lock(mutex_);
       return T_base_camera_ = found;
     }
-    if (ros::WallTime::now() >= give_up || stopping_ || !ros::ok()) return std::nullopt;
+    if (ros::SteadyTime::now() >= give_up || stopping_ || !ros::ok()) return std::nullopt;
     ros::WallDuration(0.01).sleep();
   }
 }

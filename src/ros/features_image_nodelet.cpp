@@ -1,6 +1,4 @@
 #include <image_transport/image_transport.h>
-#include <message_filters/subscriber.h>
-#include <message_filters/time_synchronizer.h>
 #include <nodelet/nodelet.h>
 #include <sensor_msgs/fill_image.h>
 #include <sensor_msgs/image_encodings.h>
@@ -14,6 +12,7 @@
 
 #include "callback_thread.hpp"
 #include "conversions.hpp"
+#include "exact_synchroniser.hpp"
 #include "features_image.hpp"
 #include "image_subscriber.hpp"
 #include "report_throttle.hpp"
@@ -31,19 +30,24 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
   using Flow = stereo_descriptor_vo::FeatureFlow;
 
   struct Inputs {
-    Inputs(ros::NodeHandle& nh, StereoImageTransport& transport) : sync(kQueue) {
-      sync.connectInput(left, right, features, flow);
-      left.subscribe(nh, "left/image_rect", kQueue, transport.left(), transport.hints());
-      right.subscribe(nh, "right/image_rect", kQueue, transport.right(), transport.hints());
-      features.subscribe(nh, "stereo_features", kQueue);
-      flow.subscribe(nh, "feature_flow", kQueue);
+    explicit Inputs(FeaturesImageNodelet& nodelet)
+        : synchroniser(kQueue, [&nodelet](const auto&... messages) { nodelet.draw(messages...); }) {
+      ros::NodeHandle& nh = nodelet.nh_;
+      StereoImageTransport& transport = *nodelet.transport_;
+      left.registerCallback<const Image::ConstPtr&>([&nodelet](const Image::ConstPtr& m) { nodelet.take<0>(m); });
+      right.registerCallback<const Image::ConstPtr&>([&nodelet](const Image::ConstPtr& m) { nodelet.take<1>(m); });
+      // Resolved, for a transport appends its own name to that of the topic.
+      left.subscribe(nh, nh.resolveName("left/image_rect"), kQueue, transport.left(), transport.hints());
+      right.subscribe(nh, nh.resolveName("right/image_rect"), kQueue, transport.right(), transport.hints());
+      features = nh.subscribe<Features>("stereo_features", kQueue,
+                                        [&nodelet](const Features::ConstPtr& m) { nodelet.take<2>(m); });
+      flow = nh.subscribe<Flow>("feature_flow", kQueue, [&nodelet](const Flow::ConstPtr& m) { nodelet.take<3>(m); });
     }
 
     static constexpr int kQueue = 10;
+    ExactSynchroniser<Image, Image, Features, Flow> synchroniser;
     ImageSubscriber left, right;
-    message_filters::Subscriber<Features> features;
-    message_filters::Subscriber<Flow> flow;
-    message_filters::TimeSynchronizer<Image, Image, Features, Flow> sync;
+    ros::Subscriber features, flow;
   };
 
   void onInit() override try {
@@ -64,11 +68,17 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
     if (publisher_.getNumSubscribers() == 0) {
       inputs_.reset();
     } else if (!inputs_) {
-      inputs_ = std::make_unique<Inputs>(nh_, *transport_);
-      inputs_->sync.registerCallback(&FeaturesImageNodelet::draw, this);
+      inputs_ = std::make_unique<Inputs>(*this);
     }
   } catch (const std::exception& e) {
     NODELET_ERROR_STREAM("cannot subscribe to what is to be drawn: " << e.what());
+  }
+
+  template <int input, class Message>
+  void take(const boost::shared_ptr<const Message>& message) try {
+    if (inputs_) inputs_->synchroniser.add<input>(message);
+  } catch (const std::exception& e) {
+    if (throttle_.allows(e.what())) NODELET_WARN_STREAM("a message for features_image is not used: " << e.what());
   }
 
   void draw(const sensor_msgs::ImageConstPtr& left, const sensor_msgs::ImageConstPtr& right,

@@ -45,8 +45,7 @@ std::vector<std::string> loadParams(const ros::NodeHandle& nh, std::vector<Optio
   for (const std::string& name : names) {
     if (name.compare(0, prefix.size(), prefix) != 0) continue;
     const std::string relative = name.substr(prefix.size());
-    // image_transport and diagnostic_updater keep their own choice under the same private namespace.
-    if (relative == "image_transport" || relative == "diagnostic_period") continue;
+    if (relative == "image_transport") continue;  // image_transport keeps its choice under the same private namespace
     const bool known = std::any_of(options.begin(), options.end(), [&](const Option& o) { return o.name == relative; });
     if (!known) unknown.push_back(name);
   }

@@ -1,5 +1,3 @@
-#include <message_filters/pass_through.h>
-#include <message_filters/time_synchronizer.h>
 #include <nav_msgs/Odometry.h>
 #include <nodelet/nodelet.h>
 #include <std_srvs/Empty.h>
@@ -27,6 +25,7 @@
 #include "callback_thread.hpp"
 #include "camera_mount.hpp"
 #include "conversions.hpp"
+#include "exact_synchroniser.hpp"
 #include "other_robot.hpp"
 #include "params.hpp"
 #include "place_conversions.hpp"
@@ -37,7 +36,6 @@
 #include "robot_transforms.hpp"
 #include "stamps.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
-#include "waiting_stamps.hpp"
 #include "worker.hpp"
 
 namespace sdvo {
@@ -104,8 +102,6 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     std::shared_ptr<Session> session;
   };
 
-  using Synchroniser = message_filters::TimeSynchronizer<Features, Odometry, Info>;
-
   void onInit() override try {
     nh_ = callbacks_.serve(getNodeHandle());
     ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
@@ -158,30 +154,21 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   // Input, in the callbacks' thread.
 
-  /// Anew: what waited is forgotten.
-  void synchronise() {
-    synchroniser_ = std::make_unique<Synchroniser>(features_, odometry_, info_,
-                                                   static_cast<std::uint32_t>(options_.output.sync_queue_size));
-    synchroniser_->registerCallback(&PlaceRecognitionNodelet::onPair, this);
-    synchroniser_->registerDropCallback(&PlaceRecognitionNodelet::onUnpaired, this);
-  }
-
   void subscribe() {
-    waiting_ = std::make_unique<WaitingStamps>(static_cast<std::size_t>(options_.output.sync_queue_size));
-    synchronise();
-    const auto queue = static_cast<std::uint32_t>(options_.output.sync_queue_size);
+    const int room = options_.output.sync_queue_size;
+    synchroniser_ = std::make_unique<ExactSynchroniser<Features, Odometry, Info>>(
+        room, [this](const auto&... messages) { onPair(messages...); },
+        [this](const auto&... messages) { onUnpaired(messages...); });
+    const auto queue = static_cast<std::uint32_t>(room);
     subscribers_ = {
-        nh_.subscribe<Features>("stereo_features", queue, [this](const Features::ConstPtr& m) { take(m, features_); }),
-        nh_.subscribe<Odometry>("odom", queue, [this](const Odometry::ConstPtr& m) { take(m, odometry_); }),
-        nh_.subscribe<Info>("vo_info", queue, [this](const Info::ConstPtr& m) { take(m, info_); })};
+        nh_.subscribe<Features>("stereo_features", queue, [this](const Features::ConstPtr& m) { take<0>(m); }),
+        nh_.subscribe<Odometry>("odom", queue, [this](const Odometry::ConstPtr& m) { take<1>(m); }),
+        nh_.subscribe<Info>("vo_info", queue, [this](const Info::ConstPtr& m) { take<2>(m); })};
   }
 
-  template <class Message>
-  void take(const boost::shared_ptr<const Message>& message, message_filters::PassThrough<Message>& input) try {
-    const std::string problem = whyUnusable(message->header.stamp);
-    if (!problem.empty()) throw std::invalid_argument(problem);
-    if (waiting_->shutOut(nanoseconds(message->header.stamp))) synchronise();
-    input.add(message);
+  template <int input, class Message>
+  void take(const boost::shared_ptr<const Message>& message) try {
+    synchroniser_->add<input>(message);
   } catch (const std::exception& e) {
     ++malformed_;
     if (throttle_.allows(e.what()))
@@ -190,7 +177,6 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   void onPair(const Features::ConstPtr& features, const Odometry::ConstPtr& odometry, const Info::ConstPtr& info) {
     diagnostics_->notePair();
-    waiting_->complete(nanoseconds(features->header.stamp));
     if (options_.output.publish_tf)
       transforms_->claim({ros_conversions::cleanFrameId(options_.output.map_frame_id),
                           ros_conversions::cleanFrameId(odometry->header.frame_id)});
@@ -485,11 +471,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   std::unique_ptr<OtherRobot> other_;
 
   // Only the callbacks' thread touches these.
-  message_filters::PassThrough<Features> features_;
-  message_filters::PassThrough<Odometry> odometry_;
-  message_filters::PassThrough<Info> info_;
-  std::unique_ptr<Synchroniser> synchroniser_;
-  std::unique_ptr<WaitingStamps> waiting_;  // in it
+  std::unique_ptr<ExactSynchroniser<Features, Odometry, Info>> synchroniser_;
   std::vector<ros::Subscriber> subscribers_;
 };
 

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "output_bag.hpp"
 #include "whole_file.hpp"
 
 namespace sdvo {
@@ -56,14 +57,14 @@ void savePlaces(const std::vector<Place>& places, const ros_conversions::MapStat
                 const ros_conversions::FeatureStream& stream, const std::string& robot, const std::string& map_frame,
                 const std::string& path) {
   writeWhole(path, [&](const std::string& partial) {
-    rosbag::Bag bag(partial, rosbag::bagmode::Write);
+    OutputBag bag(partial);
     ros::Time newest = ros::TIME_MIN;
     for (const Place& place : places) {
       const msgs::Place message = ros_conversions::toMessage(place, robot, stream);
       newest = std::max(newest, message.features.header.stamp);
-      bag.write(kPlaceTopic, message.features.header.stamp, message);
+      bag->write(kPlaceTopic, message.features.header.stamp, message);
     }
-    bag.write(kGraphTopic, newest, ros_conversions::toMessage(map, robot, map_frame));
+    bag->write(kGraphTopic, newest, ros_conversions::toMessage(map, robot, map_frame));
     bag.close();
   });
 }

@@ -9,12 +9,13 @@
 namespace sdvo {
 
 /// Lets a report of one kind through at most once in a period. ROS' own throttle shares its state between all nodelets
-/// of a manager, lets different errors hide each other and goes by simulated time, which may stand still.
+/// of a manager, lets different errors hide each other and goes by simulated time, which may stand still; the system's
+/// clock may be set back.
 class ReportThrottle {
  public:
   /// Whether to report `kind` now.
   bool allows(const std::string& kind) {
-    const ros::WallTime now = ros::WallTime::now();
+    const ros::SteadyTime now = ros::SteadyTime::now();
     const std::lock_guard<std::mutex> lock(mutex_);
     const auto [last, is_new] = last_.try_emplace(kind, now);
     if (!is_new && now - last->second < ros::WallDuration(kPeriod)) return false;
@@ -28,7 +29,7 @@ class ReportThrottle {
   static constexpr std::size_t kKinds = 100;  // remembered
 
   std::mutex mutex_;
-  std::map<std::string, ros::WallTime> last_;
+  std::map<std::string, ros::SteadyTime> last_;
 };
 
 }  // namespace sdvo

@@ -188,29 +188,33 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     if (clock_set && !ros::Time::isSimTime()) forgetTime();
     if (const std::optional<Eigen::Isometry3d> start = takeRequestedStart()) restart("reset was called", *start);
     if (resumed_.exchange(false)) odometry_->breakStream();
-    const std::string problem = findExtrinsic(ros_conversions::cleanFrameId(message.header.frame_id));
-    if (!problem.empty()) {
-      OdometryResult waiting;
-      waiting.reason = problem;
-      waiting.epoch = epoch_;
-      publishInfo(waiting, message);
-      return;
-    }
     const StereoFeatures features = ros_conversions::fromMessage(message);
-    if (processed_epoch_ && *processed_epoch_ != message.stream_epoch) odometry_->breakStream();
-    processed_epoch_ = message.stream_epoch;
-
-    const OdometryResult result = odometry_->update(features, findGuess(message.header));
-    processed_stamp_ = message.header.stamp;
-    epoch_ = result.epoch;
-    report(result, message.header.stamp);
-    publisher_->publish(result, *mount_->last());
+    const std::string problem = findExtrinsic(ros_conversions::cleanFrameId(message.header.frame_id));
+    const OdometryResult result = problem.empty() ? track(features, message) : waitFor(problem);
     publisher_->publishPoints(message);
     publisher_->publishFlow(result, features, message.header);
     publishInfo(result, message);
   } catch (const std::exception& e) {
     if (throttle_.allows(e.what()))
       NODELET_ERROR_STREAM("features at " << passed.item->header.stamp << " skipped: " << e.what());
+  }
+
+  OdometryResult track(const StereoFeatures& features, const FeaturesMessage& message) {
+    if (processed_epoch_ && *processed_epoch_ != message.stream_epoch) odometry_->breakStream();
+    processed_epoch_ = message.stream_epoch;
+    const OdometryResult result = odometry_->update(features, findGuess(message.header));
+    processed_stamp_ = message.header.stamp;
+    epoch_ = result.epoch;
+    report(result, message.header.stamp);
+    publisher_->publish(result, *mount_->last());
+    return result;
+  }
+
+  OdometryResult waitFor(const std::string& what) const {
+    OdometryResult waiting;
+    waiting.reason = what;
+    waiting.epoch = epoch_;
+    return waiting;
   }
 
   void publishInfo(const OdometryResult& result, const FeaturesMessage& message) {

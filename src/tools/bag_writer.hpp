@@ -1,14 +1,15 @@
 #pragma once
 
 #include <ros/message_traits.h>
-#include <rosbag/bag.h>
 
 #include <boost/make_shared.hpp>
 #include <filesystem>
-#include <memory>
+#include <optional>
 #include <stdexcept>
 #include <string>
 #include <system_error>
+
+#include "../ros/output_bag.hpp"
 
 namespace sdvo {
 
@@ -22,16 +23,11 @@ class BagWriter {
     // A device or a pipe would be replaced by the bag.
     if (std::filesystem::exists(final_) && !std::filesystem::is_regular_file(final_))
       throw std::runtime_error("--output '" + path + "' is no regular file");
-    guard("create (does its directory exist, may I write there?)",
-          [&] { bag_->open(partial_, rosbag::bagmode::Write); });
+    guard("create (does its directory exist, may I write there?)", [&] { bag_.emplace(partial_); });
   }
   ~BagWriter() {
     if (committed_) return;
-    // rosbag closes (writes an index) in its destructor and ends the process when that fails, as it would on a full
-    // disk; the process is about to end anyway, so the object is left behind instead, in reach:
-    // a leak would be reported.
-    [[maybe_unused]] static rosbag::Bag* volatile left_behind;
-    left_behind = bag_.release();
+    bag_.reset();
     std::error_code ignored;
     std::filesystem::remove(partial_, ignored);
   }
@@ -40,7 +36,7 @@ class BagWriter {
 
   template <class Message>
   void write(const std::string& topic, const ros::Time& time, const Message& message) {
-    guard("write", [&] { bag_->write(topic, time, message); });
+    guard("write", [&] { (*bag_)->write(topic, time, message); });
   }
 
   /// As write(), but `rosbag play` will latch the topic.
@@ -52,7 +48,7 @@ class BagWriter {
     (*header)["type"] = ros::message_traits::datatype<Message>();
     (*header)["md5sum"] = ros::message_traits::md5sum<Message>();
     (*header)["message_definition"] = ros::message_traits::definition<Message>();
-    guard("write", [&] { bag_->write(topic, time, message, header); });
+    guard("write", [&] { (*bag_)->write(topic, time, message, header); });
   }
 
   void commit() {
@@ -74,7 +70,7 @@ class BagWriter {
   }
 
   std::string final_, partial_, caller_;
-  std::unique_ptr<rosbag::Bag> bag_ = std::make_unique<rosbag::Bag>();
+  std::optional<OutputBag> bag_;
   bool committed_ = false;
 };
 

@@ -67,10 +67,16 @@ typename Message::ConstPtr instantiate(const rosbag::MessageInstance& instance) 
   return message;
 }
 
+/// What of a bag's messages made no pair.
+struct LeftOver {
+  int stamps = 0;  ///< that are not on all four topics, or cannot be used
+  std::string problem;
+};
+
 /// Calls `use(pair, time of arrival)` for each four messages of one stamp, in the order in which they are complete.
-/// Returns the stamps that were not.
 template <class Use>
-int forEachPair(const std::string& path, const std::string& camera, const Use& use) {
+LeftOver forEachPair(const std::string& path, const std::string& camera, const Use& use) {
+  constexpr std::size_t kWaiting = 100;  // stamps, of which none may ever be complete: images take memory
   const std::array<std::string, 4> topics = {camera + "/left/image_rect", camera + "/right/image_rect",
                                              camera + "/left/camera_info", camera + "/right/camera_info"};
   const rosbag::Bag bag(path, rosbag::bagmode::Read);
@@ -81,26 +87,35 @@ int forEachPair(const std::string& path, const std::string& camera, const Use& u
     if (recorded.count(topic) == 0) throw std::runtime_error("there is no " + topic + " in it");
 
   std::map<ros::Time, sdvo::StereoPairMessages> waiting;
-  int unpaired = 0;
+  LeftOver left_over{0, "no four stamps agree"};
   for (const rosbag::MessageInstance& instance : view) {
     const bool is_image = instance.getTopic() == topics[0] || instance.getTopic() == topics[1];
     const bool is_left = instance.getTopic() == topics[0] || instance.getTopic() == topics[2];
     const auto image = is_image ? instantiate<sensor_msgs::Image>(instance) : nullptr;
     const auto info = is_image ? nullptr : instantiate<sensor_msgs::CameraInfo>(instance);
     const ros::Time stamp = is_image ? image->header.stamp : info->header.stamp;
-    if (!sdvo::whyUnusable(stamp).empty()) continue;
+    if (const std::string problem = sdvo::whyUnusable(stamp); !problem.empty()) {
+      ++left_over.stamps;
+      left_over.problem = instance.getTopic() + ": " + problem;
+      continue;
+    }
     sdvo::StereoPairMessages& pair = waiting[stamp];
     if (is_image)
       (is_left ? pair.left_image : pair.right_image) = image;
     else
       (is_left ? pair.left_info : pair.right_info) = info;
-    if (!pair.left_image || !pair.right_image || !pair.left_info || !pair.right_info) continue;
-    use(pair, instance.getTime());
-    const auto end = std::next(waiting.find(stamp));
-    unpaired += static_cast<int>(std::distance(waiting.begin(), end)) - 1;
-    waiting.erase(waiting.begin(), end);
+    if (pair.left_image && pair.right_image && pair.left_info && pair.right_info) {
+      use(pair, instance.getTime());
+      const auto end = std::next(waiting.find(stamp));
+      left_over.stamps += static_cast<int>(std::distance(waiting.begin(), end)) - 1;
+      waiting.erase(waiting.begin(), end);
+    } else if (waiting.size() > kWaiting) {
+      ++left_over.stamps;
+      waiting.erase(waiting.begin());
+    }
   }
-  return unpaired + static_cast<int>(waiting.size());
+  left_over.stamps += static_cast<int>(waiting.size());
+  return left_over;
 }
 
 Row runBag(const fs::path& bag, const fs::path& output, const Arguments& arguments) {
@@ -121,16 +136,18 @@ Row runBag(const fs::path& bag, const fs::path& output, const Arguments& argumen
       refusal = e.what();
     }
   };
-  const int unpaired = forEachPair(bag.string(), arguments.camera, [&](const auto& pair, const ros::Time& arrival) {
-    const ros::Time stamp = pair.left_image->header.stamp;
-    for (const auto& passed : filter.add(pair, sdvo::nanoseconds(stamp), sdvo::nanoseconds(arrival))) {
-      if (passed.timeline > 0)
-        throw std::runtime_error("stamps jump back for good: these are several recordings, one bag for each is needed");
-      process(passed.item);
-    }
-  });
+  const LeftOver left_over =
+      forEachPair(bag.string(), arguments.camera, [&](const auto& pair, const ros::Time& arrival) {
+        const ros::Time stamp = pair.left_image->header.stamp;
+        for (const auto& passed : filter.add(pair, sdvo::nanoseconds(stamp), sdvo::nanoseconds(arrival))) {
+          if (passed.timeline > 0)
+            throw std::runtime_error(
+                "stamps jump back for good: these are several recordings, one bag for each is needed");
+          process(passed.item);
+        }
+      });
   if (run.pairs() == 0)
-    throw std::runtime_error("no pair can be used" + (refusal.empty() ? ": no four stamps agree" : ": " + refusal));
+    throw std::runtime_error("no pair can be used: " + (refusal.empty() ? left_over.problem : refusal));
 
   if (arguments.format == "kitti")
     sdvo::writeKittiPoses(output.string() + ".txt", run.poses());
@@ -139,7 +156,7 @@ Row runBag(const fs::path& bag, const fs::path& output, const Arguments& argumen
   run.writeTiming(output.string() + ".csv");
   std::ostringstream figures;
   figures << std::fixed << std::setprecision(1) << run.pairs() << "," << run.pairsWithoutPose() << ","
-          << run.discontinuities() << "," << unpaired + refused + static_cast<int>(filter.dropped()) << ","
+          << run.discontinuities() << "," << left_over.stamps + refused + static_cast<int>(filter.dropped()) << ","
           << run.distance() << "," << run.time(0.5) << "," << run.time(0.95) << "," << run.cpuTime() << ","
           << sdvo::hashOptions(sdvo::listOptions(options));
   return {figures.str(), ""};

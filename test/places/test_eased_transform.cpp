@@ -33,6 +33,15 @@ TEST(EasedTransform, ANewTargetOnTheWayIsNoJump) {
   EXPECT_TRUE(eased.at(3.0).isApprox(target(-4.0, 0.0)));
 }
 
+TEST(EasedTransform, AClockSetBackDoesNotTakeItBack) {
+  EasedTransform eased(2.0);
+  eased.moveTo(target(4.0, 1.0), 10.0);
+  EXPECT_TRUE(eased.at(12.0).isApprox(target(4.0, 1.0)));
+  EXPECT_TRUE(eased.at(3.0).isApprox(target(4.0, 1.0)));
+  eased.moveTo(target(6.0, 1.0), 3.0);
+  EXPECT_TRUE(eased.at(3.0).isApprox(target(4.0, 1.0))) << "goes on from there";
+}
+
 TEST(EasedTransform, ADurationOfZeroIsAtOnce) {
   EasedTransform eased(0.0);
   eased.moveTo(target(4.0, 0.5), 1.0);

@@ -240,6 +240,21 @@ TEST(PlaceRecognition, TheOldestPlacesGo) {
   EXPECT_EQ(loops(drive.go(kAround, kAround + 20)), 0) << "the beginning is forgotten";
 }
 
+TEST(PlaceRecognition, OfRestoredPlacesNoMoreAreKeptThanOfOthers) {
+  Drive mapping;
+  mapping.go(0, 60);
+  std::vector<Place> places;
+  for (const auto& [id, place] : mapping.recognition.places()) places.push_back(place);
+  PlaceRecognitionOptions options;
+  options.max_places = 10;
+  ASSERT_GT(places.size(), 15u);
+  Drive later(0.0, options);
+  later.recognition.restore(places, mapping.recognition.graph());
+  later.go(60, 64);
+  EXPECT_EQ(later.recognition.places().size(), 10u);
+  EXPECT_EQ(later.recognition.graph().nodes().size(), 10u);
+}
+
 TEST(PlaceRecognition, RefusesOtherDescriptorsAndKeepsItsState) {
   Drive drive;
   drive.go(0, 10);

@@ -24,7 +24,7 @@ from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
 from geometry_msgs.msg import Pose, TransformStamped
 from nav_msgs.msg import Odometry, Path
 from nodelet.srv import NodeletLoad, NodeletUnload
-from sensor_msgs.msg import Image, Imu
+from sensor_msgs.msg import Image, Imu, PointCloud2
 from std_srvs.srv import Empty, Trigger
 from tf2_msgs.msg import TFMessage
 
@@ -241,6 +241,10 @@ class Live(unittest.TestCase):
 
     def test_missing_transform(self):
         self.start()
+        points = self.keep(Collector(self.namespace + '/points', PointCloud2))
+        picture = self.keep(Collector(self.namespace + '/features_image', Image))
+        self.assertTrue(wait_until(lambda: self.pipeline.is_connected((points, picture)) and
+                                   ('in', self.namespace + '/feature_flow') in links(self.pipeline.manager)))
         frame = 'camera_without_transform'
         self.camera.publish(*self.camera.messages(0, frame=frame))
         self.assertTrue(wait_until(lambda: self.rosout.said("'%s'" % frame, "'base_link'")), self.rosout.errors)
@@ -252,6 +256,7 @@ class Live(unittest.TestCase):
             self.assertEqual((info.state, info.epoch), ('WAITING', 0))
             self.assertIn("'%s'" % frame, info.reason)
             self.assertGreater(info.detected, 0)
+        self.assertTrue(wait_until(lambda: (len(points), len(picture)) == (2, 2)), 'features are to be seen all the same')
         self.assertTrue(wait_until(lambda: self.diagnosis().message.startswith('WAITING: no transform')),
                         self.diagnosis().message)
         self.assertEqual(len(self.odometry), 0)

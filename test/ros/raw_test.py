@@ -24,7 +24,9 @@ from kitti_replay import PACKAGE, Collector, data_dir, links, matrix_of, run_too
 from stereo_descriptor_vo.msg import VoInfo
 
 MANAGER = '/stereo/stereo_vo_manager'
-TOPICS = ['/stereo/%s/%s' % (side, what) for side in ('left', 'right') for what in ('image_raw', 'camera_info')]
+# Of the bag, and as a camera may call them.
+NAMES = {'/stereo/%s/%s' % (side, what): '/%s/%s' % (camera, what)
+         for side, camera in (('left', 'cam0'), ('right', 'cam1')) for what in ('image_raw', 'camera_info')}
 
 
 def transports(node):
@@ -48,10 +50,11 @@ class Raw(unittest.TestCase):
         cls.odometry = Collector('/stereo/odom', Odometry)
         cls.info = Collector('/stereo/vo_info', VoInfo)
         needed = {('out', c.subscriber.resolved_name, rospy.get_name()) for c in (cls.odometry, cls.info)}
-        needed |= {('in', '/stereo/%s/%s' % (side, what)) for side in ('left', 'right')
-                   for what in ('image_raw', 'image_mono', 'image_rect', 'camera_info')}
+        needed |= {('in', '/stereo/%s/%s' % (side, what)) for side in ('left', 'right') for what in ('image_mono', 'image_rect')}
+        needed |= {('in', name) for name in NAMES.values()}
         player = subprocess.Popen(['rosbag', 'play', '--quiet', '--clock', '--wait-for-subscribers', '--rate',
-                                   str(rospy.get_param('~rate')), bag, '--topics'] + TOPICS + ['/tf_static'])
+                                   str(rospy.get_param('~rate')), bag, '--topics', *NAMES, '/tf_static'] +
+                                  ['%s:=%s' % names for names in NAMES.items()])
         try:
             cls.connected = wait_until(lambda: links(MANAGER) >= needed, 60)
             cls.transports = transports(MANAGER)

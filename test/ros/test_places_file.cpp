@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
 #include <std_msgs/Header.h>
+#include <sys/resource.h>
 
+#include <csignal>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -71,6 +73,25 @@ TEST_F(PlacesFile, PathsThatCannotBeWrittenAreRefused) {
   EXPECT_TRUE(contains(errorOf([&] { save("places.bag"); }), "'places.bag': the path must be absolute"));
   EXPECT_TRUE(contains(errorOf([&] { save(folder_.path()); }), "it is no regular file"));
   EXPECT_TRUE(contains(errorOf([&] { save(path_ + "/places.bag"); }), "cannot be written"));
+}
+
+/// As on a full disk. rosbag tries to write the end of a bag once more when it is destroyed.
+TEST_F(PlacesFile, WhereThereIsNoRoomTheProcessGoesOn) {
+  save(path_);
+  const auto size = fs::file_size(path_);
+  ASSERT_GT(size, 8192u);
+  rlimit before{};
+  ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
+  const auto signal_before = std::signal(SIGXFSZ, SIG_IGN);
+  const rlimit small{8192, before.rlim_max};
+  ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &small), 0);
+  const std::string error = errorOf([&] { save(path_); });
+  setrlimit(RLIMIT_FSIZE, &before);
+  std::signal(SIGXFSZ, signal_before);
+  EXPECT_TRUE(contains(error, "cannot be written")) << error;
+  EXPECT_FALSE(fs::exists(path_ + ".partial"));
+  EXPECT_EQ(fs::file_size(path_), size);
+  EXPECT_EQ(loadPlaces(path_, {}).places.size(), 3u);
 }
 
 TEST_F(PlacesFile, WhatCannotBeWrittenToItsEndLeavesTheFileOfBefore) {

@@ -1,4 +1,8 @@
 #include <gtest/gtest.h>
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/Image.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -336,13 +340,57 @@ TEST_F(Tools, ABagThatFailsIsNamedAndTheOthersAreNotRunAgain) {
               "motion/kernel");
 }
 
+/// Of all stamps that wait, images are held in memory, so only so many may.
+TEST_F(Tools, MessagesThatMakeNoPairDoNotKeepOthersFromIt) {
+  const fs::path good = root_ / "good.bag", mixed = root_ / "mixed.bag", results = root_ / "results";
+  ASSERT_EQ(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output " + good.string()).exit_code, 0);
+  constexpr int kAlone = 250;
+  {
+    rosbag::Bag out(mixed.string(), rosbag::bagmode::Write);
+    sensor_msgs::CameraInfo info;
+    for (int i = 0; i < kAlone; ++i) {
+      info.header.stamp = ros::Time(999999000, 1 + i);
+      out.write("/stereo/left/camera_info", ros::Time(999999000, 1 + i), info);
+    }
+    const rosbag::Bag in(good.string());
+    for (const rosbag::MessageInstance& message : rosbag::View(in))
+      out.write(message.getTopic(), message.getTime(), message, message.getConnectionHeader());
+  }
+  ASSERT_EQ(run("run_bag", mixed.string() + " --output " + results.string()).exit_code, 0);
+  const std::string row = linesOf(readText(results / "report.csv")).at(1);
+  EXPECT_EQ(row.rfind("mixed,4,0,0," + std::to_string(kAlone) + ",", 0), 0u) << row;
+}
+
+TEST_F(Tools, ABagWithoutTimesSaysSo) {
+  const fs::path bag = root_ / "zero.bag", results = root_ / "results";
+  {
+    rosbag::Bag out(bag.string(), rosbag::bagmode::Write);
+    for (const std::string side : {"left", "right"}) {
+      out.write("/stereo/" + side + "/image_rect", ros::Time(1.0), sensor_msgs::Image());
+      out.write("/stereo/" + side + "/camera_info", ros::Time(1.0), sensor_msgs::CameraInfo());
+    }
+  }
+  expectError(run("run_bag", bag.string() + " --output " + results.string()), "1 of 1 bags failed");
+  const std::string report = readText(results / "report.csv");
+  EXPECT_NE(report.find("no pair can be used: /stereo/"), std::string::npos) << report;
+  EXPECT_NE(report.find("zero stamp"), std::string::npos) << report;
+}
+
 TEST_F(Tools, HashTellsOptionsApart) {
   const auto hash = [this](const std::string& extra) { return linesOf(runSequence("--frames 1 " + extra).out).at(0); };
   const std::string defaults = hash("");
   EXPECT_EQ(hash(""), defaults);
   EXPECT_NE(hash("--param motion/seed=2"), defaults);
-  std::ofstream(root_ / "same.yaml") << "visual_odometry: {motion: {seed: 2}}\n";
+  // What is the nodelets' alone has no effect on the tools.
+  std::ofstream(root_ / "same.yaml") << "stereo_features: {image_transport: compressed}\n"
+                                        "features_image: {image_transport: compressed}\n"
+                                        "visual_odometry: {motion: {seed: 2}}\n";
   EXPECT_EQ(hash("--param motion/seed=2"), hash("--config " + (root_ / "same.yaml").string()));
+  // Booleans as the launch files' rosparam reads them.
+  std::ofstream(root_ / "upright.yaml") << "stereo_features: {descriptor: {oriented: False}}\n";
+  std::ofstream(root_ / "turned.yaml") << "stereo_features: {descriptor: {oriented: Yes}}\n";
+  EXPECT_EQ(hash("--config " + (root_ / "upright.yaml").string()), hash("--param descriptor/oriented=false"));
+  EXPECT_EQ(hash("--config " + (root_ / "turned.yaml").string()), hash("--param descriptor/oriented=true"));
 }
 
 TEST_F(Tools, PerfectTrajectoryHasNoError) {

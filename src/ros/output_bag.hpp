@@ -1,0 +1,50 @@
+#pragma once
+
+#include <rosbag/bag.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <system_error>
+
+namespace sdvo {
+
+/// A bag being written, which may be given up. rosbag's own destructor closes (writes an index) and ends the process
+/// when that fails, as it does on a full disk.
+class OutputBag {
+ public:
+  /// Throws rosbag::BagException when the file cannot be made.
+  explicit OutputBag(const std::string& path)
+      : path_(path), bag_(std::make_unique<rosbag::Bag>(path, rosbag::bagmode::Write)) {}
+
+  /// Without close() the file is left empty.
+  ~OutputBag() {
+    if (closed_) return;
+    std::error_code ignored;
+    std::filesystem::resize_file(path_, 0, ignored);  // what closing writes has room again
+    try {
+      bag_->close();
+    } catch (const std::exception&) {
+      // Left behind, in reach: a leak would be reported.
+      [[maybe_unused]] static rosbag::Bag* volatile left_behind;
+      left_behind = bag_.release();
+    }
+  }
+  OutputBag(const OutputBag&) = delete;
+  OutputBag& operator=(const OutputBag&) = delete;
+
+  rosbag::Bag* operator->() { return bag_.get(); }
+
+  /// Throws rosbag::BagException when the bag is not complete.
+  void close() {
+    bag_->close();
+    closed_ = true;
+  }
+
+ private:
+  std::string path_;
+  std::unique_ptr<rosbag::Bag> bag_;
+  bool closed_ = false;
+};
+
+}  // namespace sdvo
