@@ -72,7 +72,7 @@ class BriefDescriptor : public BaseDescriptor {
 /// is free.
 class OpenCvDescriptor : public BaseDescriptor {
  public:
-  using Impose = std::function<void(float size, cv::KeyPoint&)>;
+  using Impose = std::function<void(float size, cv::Size image, cv::KeyPoint&)>;
 
   OpenCvDescriptor(cv::Ptr<cv::Feature2D> feature, double reach_per_size, bool class_id_is_free, Impose impose)
       : feature_(std::move(feature)),
@@ -92,7 +92,7 @@ class OpenCvDescriptor : public BaseDescriptor {
       const float degrees = k.angle < 0.f ? 0.f : k.angle * static_cast<float>(180.0 / CV_PI);
       cv::KeyPoint keypoint(k.u, k.v, k.size, degrees, 0.f, 0,
                             class_id_is_free_ ? static_cast<int>(row_of.size()) : -1);
-      impose_(k.size, keypoint);
+      impose_(k.size, image.size(), keypoint);
       cv_keypoints.push_back(keypoint);
       row_of.push_back(i);
     }
@@ -138,7 +138,7 @@ class OpenCvDescriptor : public BaseDescriptor {
 #if SDVO_HAVE_SIFT
 /// OpenCV's SIFT samples the pyramid image named in the packed `octave` (octave in bits 0…7, layer in bits 8…15). A key
 /// point of diameter s has the blur s / 2 = 1.6 * 2^(octave + layer / 3), layer in 1…3 (Lowe 2004, section 3.3).
-void imposeSiftLayer(float size, cv::KeyPoint& keypoint) {
+void imposeSiftLayer(float size, cv::Size, cv::KeyPoint& keypoint) {
   constexpr int kLayers = 3;
   constexpr double kSigma = 1.6;
   const double scale = std::log2(size / 2.0 / kSigma);
@@ -161,7 +161,7 @@ std::unique_ptr<BaseDescriptor> makeSift() {
 std::unique_ptr<BaseDescriptor> makeOrb() {
   constexpr float kStep = 1.1f, kStandardSize = static_cast<float>(BaseDescriptor::kStandardSize);
   constexpr int kLevels = 24;
-  const auto impose = [](float size, cv::KeyPoint& keypoint) {
+  const auto impose = [](float size, cv::Size, cv::KeyPoint& keypoint) {
     const double level = std::log(size / kStandardSize) / std::log(kStep);
     keypoint.octave = std::clamp(static_cast<int>(std::lround(level)), 0, kLevels - 1);
   };
@@ -171,16 +171,18 @@ std::unique_ptr<BaseDescriptor> makeOrb() {
 
 /// BRISK reads the size itself.
 std::unique_ptr<BaseDescriptor> makeBrisk() {
-  return std::make_unique<OpenCvDescriptor>(cv::BRISK::create(), 2.0, true, [](float, cv::KeyPoint&) {});
+  return std::make_unique<OpenCvDescriptor>(cv::BRISK::create(), 2.0, true, [](float, cv::Size, cv::KeyPoint&) {});
 }
 
 /// AKAZE takes the evolution level, four to the octave from a blur of 1.6 px, from class_id; its own key points have a
-/// diameter of three times the blur.
+/// diameter of three times the blur. Octaves smaller than 80x40 px do not exist.
 std::unique_ptr<BaseDescriptor> makeAkaze() {
   constexpr int kOctaves = 4, kSublevels = 4;
-  const auto impose = [](float size, cv::KeyPoint& keypoint) {
+  const auto impose = [](float size, cv::Size image, cv::KeyPoint& keypoint) {
+    int octaves = 1;
+    while (octaves < kOctaves && image.width >> octaves >= 80 && image.height >> octaves >= 40) ++octaves;
     const double level = kSublevels * std::log2(size / 3.0 / 1.6);
-    keypoint.class_id = std::clamp(static_cast<int>(std::lround(level)), 0, kOctaves * kSublevels - 1);
+    keypoint.class_id = std::clamp(static_cast<int>(std::lround(level)), 0, octaves * kSublevels - 1);
     keypoint.octave = keypoint.class_id / kSublevels;
   };
   const auto akaze = cv::AKAZE::create(cv::AKAZE::DESCRIPTOR_MLDB_UPRIGHT, 0, 3, 0.001f, kOctaves, kSublevels);
@@ -191,7 +193,7 @@ std::unique_ptr<BaseDescriptor> makeSurf() {
 #ifdef SDVO_HAVE_XFEATURES2D
   try {
     return std::make_unique<OpenCvDescriptor>(cv::xfeatures2d::SURF::create(100, 4, 3, false, true), 10.0 * 1.2 / 9.0,
-                                              true, [](float, cv::KeyPoint&) {});
+                                              true, [](float, cv::Size, cv::KeyPoint&) {});
   } catch (const cv::Exception&) {
     refuse(DescriptorType::kSurf, "its xfeatures2d was built without OPENCV_ENABLE_NONFREE=ON");
   }

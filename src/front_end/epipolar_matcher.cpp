@@ -137,6 +137,7 @@ std::optional<cv::Point2f> EpipolarMatcher::align(const cv::Point2f& left_positi
   }
 
   const auto [product, square, other_square] = patch.similarity();
+  if (!(other_square > 0.f)) return std::nullopt;  // nothing but one grey level
   if (product < options_.min_correlation * std::sqrt(square) * std::sqrt(other_square)) return std::nullopt;
   return found;
 }

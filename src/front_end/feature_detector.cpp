@@ -108,7 +108,8 @@ std::vector<Corner> detectAll(const cv::Mat& image, const FeatureDetectorOptions
 /// To the intersection of the gradient lines. A corner that wanders off is not one point; its integer position is kept.
 /// Gradient detectors answer up to half their window inside of a corner, hence the limit.
 void refineByGradients(const cv::Mat& image, const FeatureDetectorOptions& options, std::vector<Corner>& corners) {
-  if (corners.empty()) return;
+  const int smallest_side = 2 * options.subpixel_radius + 5;  // of cv::cornerSubPix
+  if (corners.empty() || std::min(image.cols, image.rows) < smallest_side) return;
   const cv::Rect2f inside(0.f, 0.f, static_cast<float>(image.cols - 1), static_cast<float>(image.rows - 1));
   const float largest_shift = 0.5f * static_cast<float>(options.corner_block_size);
   std::vector<cv::Point2f> refined;
@@ -141,6 +142,7 @@ void refine(const cv::Mat& image, const FeatureDetectorOptions& options, std::ve
 }
 
 void removeMasked(const cv::Mat& mask, cv::Size size, std::vector<Corner>& corners) {
+  if (mask.type() != CV_8UC1) throw std::invalid_argument("the mask is not of one channel of eight bits");
   if (mask.size() != size)
     throw std::invalid_argument("the mask is " + std::to_string(mask.cols) + "x" + std::to_string(mask.rows) +
                                 ", the left image is " + std::to_string(size.width) + "x" +
@@ -249,7 +251,6 @@ FeatureDetector::FeatureDetector(const FeatureDetectorOptions& options) : option
 
 std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border, const cv::Mat& mask) const {
   CV_Assert(image.type() == CV_8UC1);
-  constexpr int kSmallestSide = 16;  // px, less is no image for the detectors
   const cv::Rect inner(border, border, image.cols - 2 * border, image.rows - 2 * border);
   if (inner.width < kSmallestSide || inner.height < kSmallestSide) return {};
   std::vector<Corner> corners = detectAll(image(inner), options_);

@@ -130,7 +130,7 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
 
   if (report.refused)
     report.status = refusal;
-  else if (2 * border >= std::min(left.rows, left.cols))
+  else if (2 * border + FeatureDetector::kSmallestSide > std::min(left.rows, left.cols))
     report.status =
         "every feature is too close to an image border for its descriptor: the image is too small for its size";
   else if (report.detected == 0)

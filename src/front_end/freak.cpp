@@ -41,8 +41,8 @@ std::array<Freak::Field, Freak::kFields> makePattern() {
   return fields;
 }
 
-/// The three diameters of every six-field ring that pass through the centre, and the sides of the triangles on it:
-/// 45 pairs symmetric about the centre.
+/// The three diameters of each of the five outer rings of six fields that pass through the centre, and the sides of the
+/// triangles on it: 45 pairs symmetric about the centre.
 std::vector<Freak::FieldPair> makeOrientationPairs() {
   std::vector<Freak::FieldPair> pairs;
   const auto add = [&](int a, int b) {

@@ -12,7 +12,7 @@
 namespace sdvo {
 namespace {
 
-constexpr int kEnough = 25;  // corners found that a judgement needs
+constexpr int kEnough = 25;  // corners found that a judgement needs: half of those that must be looked for
 
 /// A corner of the left image and where it is in the right one.
 struct Sighting {

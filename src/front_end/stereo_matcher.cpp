@@ -51,7 +51,7 @@ std::vector<StereoMatch> StereoMatcher::track(const cv::Mat& left, const cv::Mat
   std::vector<std::uint8_t> found, found_back;
   cv::calcOpticalFlowPyrLK(left_pyramid, right_pyramid, left_positions, right_positions, found, cv::noArray(), window,
                            levels, stop);
-  // The way back starts from the answer, so that only the full image is needed to see whether both agree.
+  // The way back starts from the answer, so that two levels are enough to see whether both agree.
   cv::calcOpticalFlowPyrLK(right_pyramid, left_pyramid, right_positions, returned, found_back, cv::noArray(), window, 1,
                            stop, cv::OPTFLOW_USE_INITIAL_FLOW);
 

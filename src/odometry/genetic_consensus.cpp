@@ -124,7 +124,8 @@ class GeneticSearch {
     }
   }
 
-  /// Each gene comes from either parent; the same gene twice is replaced at random.
+  /// Each gene comes from either parent, the father's where the child has not got it; a child like its mother gets a
+  /// random one.
   MinimalSample cross(const MinimalSample& mother, const MinimalSample& father) {
     MinimalSample child = mother;
     for (std::size_t g = 0; g < child.size(); ++g)

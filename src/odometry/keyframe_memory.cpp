@@ -19,8 +19,7 @@ int OldKeyframe::sharedWith(const StereoCamera& camera, const Eigen::Isometry3d&
   for (const Eigen::Vector3d& here : rows.positions) {
     const Eigen::Vector3d there = T_other_this * here;
     if (there.z() * kLargestRatio < here.z() || there.z() > kLargestRatio * here.z()) continue;
-    const Eigen::Vector3d pixel = camera.project(there);
-    if (pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() < camera.width && pixel.y() < camera.height) ++shared;
+    if (camera.sees(camera.project(there))) ++shared;
   }
   return shared;
 }

@@ -93,8 +93,7 @@ LocalMap::View LocalMap::view() const {
     if (observations.size() < 2 && observations.back().frame_id < oldest) continue;
     Eigen::Vector3d predicted;
     if (!predictObservation(camera_, newestPose(), points_[p].position, predicted, nullptr)) continue;
-    if (predicted.x() < 0.0 || predicted.y() < 0.0 || predicted.x() > camera_.width || predicted.y() > camera_.height)
-      continue;
+    if (!camera_.sees(predicted)) continue;
     view.point.push_back(static_cast<int>(p));
     view.seen.push_back(points_[p].seen);
     view.pixels.emplace_back(static_cast<float>(predicted.x()), static_cast<float>(predicted.y()),
@@ -111,8 +110,9 @@ LocalMap::View LocalMap::view() const {
   return view;
 }
 
-void LocalMap::insert(const StereoFeatures& features, int id, const Eigen::Isometry3d& T_camera_origin,
-                      const std::vector<Sighting>& sightings, const RigCalibration& calibration) {
+void LocalMap::insert(const PatchAlignmentOptions& alignment, const StereoFeatures& features, int id,
+                      const Eigen::Isometry3d& T_camera_origin, const std::vector<Sighting>& sightings,
+                      const RigCalibration& calibration) {
   newest_stamp_ = features.stamp;
   camera_ = features.camera;
   kind_ = features.kind();
@@ -127,8 +127,11 @@ void LocalMap::insert(const StereoFeatures& features, int id, const Eigen::Isome
   if (!frames_.empty() && !frames_.back().is_keyframe) removeFrame(frames_.size() - 1);
   frames_.push_back({id, T_camera_origin, false, false});
   frames_.back().is_keyframe = needsKeyframe();
+  // A corner that nothing is ever aligned with is no better than those seen later.
+  const double sigma =
+      alignment.canAlign(features.patch_layout.side) ? options_.reference_sigma : options_.corner_sigma;
   for (int row = 0; row < features.count(); ++row)
-    if (!recognised[row]) startPoint(features, row, id, T_camera_origin, calibration);
+    if (!recognised[row]) startPoint(features, row, id, T_camera_origin, calibration, sigma);
   if (static_cast<int>(frames_.size()) > options_.keyframes + 1) forgetKeyframe();
 }
 
@@ -165,10 +168,9 @@ void LocalMap::takeDescriptor(Point& point, const StereoFeatures& features, int 
 }
 
 void LocalMap::startPoint(const StereoFeatures& features, int row, int id, const Eigen::Isometry3d& T_camera_origin,
-                          const RigCalibration& calibration) {
+                          const RigCalibration& calibration, double sigma) {
   const StereoCamera& camera = features.camera;
   const double u = features.u[row], v = features.v[row];
-  const double sigma = features.hasPatches() ? options_.reference_sigma : options_.corner_sigma;
   const double disparity =
       std::max(features.disparity[row] - calibration.disparityError(camera, u), kFarthestDisparity);
   if (spare_.empty()) spare_.emplace_back();
@@ -395,21 +397,24 @@ void LocalMap::pose(Problem& problem) const {
 
 LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const CalibrationBelief& prior,
                                       RigCalibration& calibration) {
+  Adjustment adjustment;
+  const int newest = static_cast<int>(frames_.size()) - 1;
+  if (newest == 0) return adjustment;
   problem_.clear();
   pose(problem_);
   Window& window = problem_.window;
   window.calibration = calibration;
   window.calibration_prior = prior;
 
-  Adjustment adjustment;
-  const int newest = static_cast<int>(frames_.size()) - 1;
-  if (newest == 0) return adjustment;
   std::vector<int> poses;  // whose covariances are made use of below
   poses.reserve(3);
   for (const int pose : {newest, newest - 1, 1})
     if (pose > 0 && std::find(poses.begin(), poses.end(), pose) == poses.end()) poses.push_back(pose);
   const WindowSolution& solution = optimizer.optimize(window, poses);
-  if (!solution.success) return adjustment;
+  if (!solution.success) {
+    problem_.clear();
+    return adjustment;
+  }
   adjustment.success = true;
   adjustment.calibration_information = solution.calibration_information;
   adjustment.common_disparity_square = solution.common_disparity_square;

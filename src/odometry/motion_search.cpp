@@ -171,7 +171,7 @@ bool MotionSearch::leavesGate(const MotionScene& scene, const Eigen::Isometry3d&
     const Eigen::Vector3d here = T_current_reference * point, expected = predicted * point;
     if (here.z() <= 0.0 || expected.z() <= 0.0) continue;
     const Eigen::Vector3d pixel = camera.project(here);
-    if (pixel.x() < 0.0 || pixel.y() < 0.0 || pixel.x() > camera.width || pixel.y() > camera.height) continue;
+    if (!camera.sees(pixel)) continue;
     ++seen;
     outside += (pixel - camera.project(expected)).head<2>().norm() > matcher_.options().gate_radius;
   }

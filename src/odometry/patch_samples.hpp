@@ -33,7 +33,6 @@ class SampleSquare {
   SampleSquare() : SampleSquare(0) {}
   explicit SampleSquare(int radius);
 
-  int radius() const { return radius_; }
   int side() const { return 2 * radius_ + 1; }
   int pixels() const { return side() * side(); }
   /// Pixels and what fills the last register.

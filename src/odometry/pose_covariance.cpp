@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
+#include <cmath>
 
 namespace sdvo {
 namespace {
@@ -24,6 +25,19 @@ Matrix6d carriedBy(const Eigen::Isometry3d& motion, const Matrix6d& covariance) 
   const Matrix6d ad = adjoint(motion.inverse());
   const Matrix6d carried = ad * covariance * ad.transpose();
   return 0.5 * (carried + carried.transpose());
+}
+
+/// A covariance, its translation and its rotation each scaled up to the trace that they had before.
+Matrix6d noLessThan(const Matrix6d& before, Matrix6d covariance) {
+  for (const int first : {0, 3}) {
+    const double had = before.block<3, 3>(first, first).trace(), has = covariance.block<3, 3>(first, first).trace();
+    if (!(has < had)) continue;
+    if (!(has > 0.0)) return before;
+    const double factor = std::sqrt(had / has);
+    covariance.middleRows<3>(first) *= factor;
+    covariance.middleCols<3>(first) *= factor;
+  }
+  return covariance;
 }
 
 }  // namespace
@@ -73,7 +87,7 @@ Matrix6d PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, co
   const Matrix6d motion = carriedBy(T_previous_current, outdated(window)) + window.since_keyframe;
   carry(T_previous_current);
   const Matrix6d measured = keyframe_ + window.since_keyframe;
-  if (measured.trace() >= value_.trace()) value_ = measured;
+  value_ = noLessThan(value_, measured);
   since_keyframe_ = window.since_keyframe;
   last_is_keyframe_ = false;
   last_window_ = window;

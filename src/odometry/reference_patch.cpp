@@ -1,5 +1,7 @@
 #include "stereo_descriptor_vo/odometry/reference_patch.hpp"
 
+#include "stereo_descriptor_vo/odometry/point_elimination.hpp"
+
 namespace sdvo {
 
 ReferencePatch::ReferencePatch(const StereoFeatures& features, int row, const Eigen::Vector2d& position,
@@ -22,7 +24,7 @@ std::optional<ReferencePatch::Found> ReferencePatch::findIn(const PatchAlignment
                                                             const StereoFeatures& features, int row,
                                                             const Eigen::Isometry3d& T_now_origin,
                                                             const AnchoredPoint& point) const {
-  if (!options.enabled || !features.hasPatches() ||
+  if (!options.canAlign(features.patch_layout.side) ||
       samples.size() != static_cast<std::size_t>(features.patch_layout.bytes()))
     return std::nullopt;
 
@@ -30,8 +32,7 @@ std::optional<ReferencePatch::Found> ReferencePatch::findIn(const PatchAlignment
   // by an affine map, the ratio of the depths above all.
   const Eigen::Vector3d then = point.scaledPointIn(T_camera_origin);
   const Eigen::Vector3d now = point.scaledPointIn(T_now_origin);
-  constexpr double kNearest = 1e-3;  // of the depth where the point was first seen
-  if (then.z() < kNearest || now.z() < kNearest) return std::nullopt;
+  if (then.z() < kNearestScaled || now.z() < kNearestScaled) return std::nullopt;
   const Eigen::Matrix3d R = T_now_origin.linear() * T_camera_origin.linear().transpose();
   const Eigen::Vector2d ray = now.head<2>() / now.z();
   const double scale = then.z() / now.z();

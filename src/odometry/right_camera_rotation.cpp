@@ -59,7 +59,8 @@ bool RightCameraRotation::add(const StereoFeatures& features) {
 }
 
 double RightCameraRotation::change(const StereoFeatures& features) const {
-  if (features.count() == 0 || sums_.weight <= 0.0) return 0.0;
+  constexpr int kEnough = 20;  // fewer, which three angles fit nearly as they are, may be wrong matches
+  if (features.count() < kEnough || sums_.weight <= 0.0) return 0.0;
   const Sums now = sumUp(features, {});
   const Eigen::Vector3d change = now.rotation() - rotation();
   return std::sqrt(change.dot(now.information * change) / now.weight);

@@ -206,7 +206,8 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
   state_.predicted_pairs = 0;
   state_.outlier_level = {};
   state_.map.emplace(options_.map);
-  state_.map->insert(features, state_.pairs, state_.T_origin_camera.inverse(), {}, state_.calibration.calibration());
+  state_.map->insert(options_.alignment, features, state_.pairs, state_.T_origin_camera.inverse(), {},
+                     state_.calibration.calibration());
   return step;
 }
 
@@ -259,8 +260,8 @@ VisualOdometry::Extension VisualOdometry::insert(const StereoFeatures& features,
   Extension extension;
   extension.T_previous_origin = map.newestPose();
   extension.calibration = state_.calibration.calibration();
-  map.insert(features, state_.pairs, found.motion.T_current_reference * map.newestPose(), found.sightings,
-             extension.calibration);
+  map.insert(options_.alignment, features, state_.pairs, found.motion.T_current_reference * map.newestPose(),
+             found.sightings, extension.calibration);
   extension.T_keyframe_origin = map.poseBeforeNewest();
   if (map.newestIsKeyframe() && found.verdict.trust == Trust::kSound) recall(features);
   const CalibrationBelief prior = state_.calibration.prior(map.oldestId());
@@ -499,8 +500,8 @@ bool VisualOdometry::isFrozen(const StereoFeatures& features, double dt,
   if (features.count() == 0 || state_.image[0] != features.u || state_.image[1] != features.v ||
       state_.image[2] != features.disparity)
     return false;
-  if (state_.frozen) return true;
   const bool is_guessed = guess && !guess->rotation_only;
+  if (!is_guessed && state_.frozen) return true;
   if (!is_guessed && !state_.velocity) return false;
   const Eigen::Isometry3d T_current_previous =
       is_guessed ? guess->T_previous_current.inverse() : expSE3(*state_.velocity * -dt);

@@ -228,5 +228,20 @@ TEST(AkazeDescriptor, SamplesTheLevelOfTheSize) {
   }
 }
 
+/// OpenCV makes fewer levels of a small image than of a large one, and refuses a key point of one that is not there.
+TEST(AkazeDescriptor, SizesBeyondTheLevelsOfASmallImageAreDescribedOnTheLast) {
+  const synthetic::Texture texture(11, 6.0, 120.0);
+  for (const cv::Size size : {cv::Size(300, 300), cv::Size(170, 330), cv::Size(640, 330), cv::Size(161, 161)}) {
+    const cv::Mat image = synthetic::render(size, [&](double u, double v) { return texture.at(u, v); });
+    const auto akaze = makeBaseDescriptor(DescriptorType::kAkaze);
+    for (const float diameter : {6.f, 10.f, 14.f, 18.f, 20.f}) {
+      if (7.5f * diameter > 0.5f * static_cast<float>(std::min(size.width, size.height)) - 2.f) continue;
+      const ViewKeypoint middle{0.5f * static_cast<float>(size.width), 0.5f * static_cast<float>(size.height), diameter,
+                                -1.f};
+      EXPECT_TRUE(akaze->describe(image, {middle}).valid[0]) << size << ", " << diameter;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace sdvo

@@ -105,8 +105,20 @@ TEST(FeatureDetector, AMaskThatDoesNotFitIsNamed) {
   const cv::Mat image = unevenTexture();
   EXPECT_EQ(errorOf([&] { FeatureDetector(options).detect(image, 0, cv::Mat::zeros(100, 200, CV_8U)); }),
             "the mask is 200x100, the left image is 600x400");
+  EXPECT_EQ(errorOf([&] { FeatureDetector(options).detect(image, 0, cv::Mat::zeros(image.size(), CV_8UC3)); }),
+            "the mask is not of one channel of eight bits");
   options.mask = "/nowhere/mask.png";
   EXPECT_EQ(errorOf([&] { FeatureDetector{options}; }), "mask: cannot read a PNG from '/nowhere/mask.png'");
+}
+
+TEST(FeatureDetector, CornersOfAnImageTooSmallForTheRefinementStayWhereTheyAre) {
+  FeatureDetectorOptions options;
+  options.type = DetectorType::kGftt;
+  options.subpixel_radius = 15;
+  const cv::Mat small = unevenTexture()(cv::Rect(100, 100, 30, 30)).clone();
+  const std::vector<Corner> corners = FeatureDetector(options).detect(small);
+  ASSERT_FALSE(corners.empty());
+  for (const Corner& corner : corners) EXPECT_EQ(corner.position.x, std::round(corner.position.x));
 }
 
 TEST(SpreadOverBuckets, ServesEveryBucketBeforeASecondTime) {

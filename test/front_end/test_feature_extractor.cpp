@@ -187,6 +187,13 @@ TEST(FeatureExtractor, SaysWhyAPairGivesNothing) {
   const StereoFeatures outside = FeatureExtractor(huge).extract(camera, pair.left, pair.right, 5);
   EXPECT_EQ(outside.count(), 0);
   EXPECT_NE(outside.report.status.find("border"), std::string::npos) << outside.report.status;
+
+  // Of so few rows none is as far from both borders as a descriptor reaches.
+  StereoCamera flat = camera;
+  flat.height = 70;
+  const cv::Range rows(100, 100 + flat.height);
+  const StereoFeatures none = extractor.extract(flat, pair.left.rowRange(rows), pair.right.rowRange(rows), 5);
+  EXPECT_NE(none.report.status.find("the image is too small"), std::string::npos) << none.report.status;
 }
 
 TEST(FeatureExtractor, IsStateless) {

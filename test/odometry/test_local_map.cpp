@@ -30,7 +30,7 @@ void see(LocalMap& map, const StereoFeatures& features, int id, const Eigen::Iso
           sightings.push_back(map.sight(PatchAlignmentOptions(), features, T_camera_origin, view.point[i], row));
   }
   sightings.resize(std::min(sightings.size(), most));
-  map.insert(features, id, T_camera_origin, sightings, RigCalibration());
+  map.insert({}, features, id, T_camera_origin, sightings, RigCalibration());
 }
 
 /// The oldest key frame's id after a drive of `pairs` pairs.
@@ -144,7 +144,7 @@ class Wall {
 TEST(LocalMapSight, TakesOutTheDetectorsErrorAtAnotherDepth) {
   const Wall wall;
   LocalMap map{LocalMapOptions()};
-  map.insert(wall.view(10.0), 1, Wall::poseAt(10.0), {}, RigCalibration());
+  map.insert({}, wall.view(10.0), 1, Wall::poseAt(10.0), {}, RigCalibration());
   const StereoFeatures features = wall.view(8.0, {0.6, -0.5});
   const LocalMap::Sighting sighting = map.sight(PatchAlignmentOptions(), features, Wall::poseAt(8.0), 0, 0);
   EXPECT_TRUE(sighting.aligned);
@@ -181,7 +181,7 @@ TEST(LocalMapSight, KnowsWhatATurnedCameraMakesOfAPatch) {
       features.patches.at<std::uint8_t>(0, 13 * j + i) = static_cast<std::uint8_t>(grey + 0.5);
     }
   LocalMap map{LocalMapOptions()};
-  map.insert(Wall().view(10.0), 1, Eigen::Isometry3d::Identity(), {}, RigCalibration());
+  map.insert({}, Wall().view(10.0), 1, Eigen::Isometry3d::Identity(), {}, RigCalibration());
   const LocalMap::Sighting sighting = map.sight(PatchAlignmentOptions(), features, turned, 0, 0);
   ASSERT_TRUE(sighting.aligned);
   EXPECT_NEAR(sighting.measurement.x(), pixel.x(), 0.06);
@@ -192,7 +192,7 @@ TEST(LocalMapSight, KnowsWhatATurnedCameraMakesOfAPatch) {
 TEST(LocalMapSight, IsTheCornerWithoutAnAlignment) {
   const Wall wall;
   LocalMap map{LocalMapOptions()};
-  map.insert(wall.view(10.0), 1, Wall::poseAt(10.0), {}, RigCalibration());
+  map.insert({}, wall.view(10.0), 1, Wall::poseAt(10.0), {}, RigCalibration());
   const auto expectCorner = [&](const PatchAlignmentOptions& options, const StereoFeatures& features) {
     const LocalMap::Sighting sighting = map.sight(options, features, Wall::poseAt(10.0), 0, 0);
     EXPECT_FALSE(sighting.aligned);
@@ -215,13 +215,13 @@ TEST(LocalMapSight, IsTheCornerWithoutAnAlignment) {
 TEST(LocalMapSight, RenewsTheReferenceWhenTheScaleHasChangedAndKeepsThePoint) {
   const Wall wall;
   LocalMap map{LocalMapOptions()};
-  map.insert(wall.view(10.0), 1, Wall::poseAt(10.0), {}, RigCalibration());
+  map.insert({}, wall.view(10.0), 1, Wall::poseAt(10.0), {}, RigCalibration());
   int id = 1;
   const auto approach = [&](double distance, const Eigen::Vector2d& error) {
     const StereoFeatures features = wall.view(distance, error);
     const Eigen::Isometry3d pose = Wall::poseAt(distance);
     const LocalMap::Sighting sighting = map.sight(PatchAlignmentOptions(), features, pose, 0, 0);
-    map.insert(features, ++id, pose, {sighting}, RigCalibration());
+    map.insert({}, features, ++id, pose, {sighting}, RigCalibration());
     map.renewLooks(features, {sighting});
     return sighting;
   };
@@ -280,7 +280,7 @@ Sightings recognised(const LocalMap& map, const StereoFeatures& features, int co
 /// What an odometry does with a pair, without the adjustment.
 void add(LocalMap& map, const StereoFeatures& features, int id, const Eigen::Isometry3d& T_camera_origin,
          const Sightings& sightings, const RigCalibration& calibration = {}) {
-  map.insert(features, id, T_camera_origin, sightings, calibration);
+  map.insert({}, features, id, T_camera_origin, sightings, calibration);
   map.renewLooks(features, sightings);
 }
 
@@ -571,7 +571,7 @@ TEST(LocalMap, AdjustmentMovesTheNewestPairToWhereItsPointsSayItIs) {
   const StereoFeatures features = see(world, 0, 60, second);
   Vector6d error;
   error << 0.03, -0.02, 0.04, 0.002, -0.003, 0.004;
-  map.insert(features, 2, expSE3(error) * second, recognised(map, features, 60), {});
+  map.insert({}, features, 2, expSE3(error) * second, recognised(map, features, 60), {});
   RigCalibration calibration;
   WindowOptimizer optimizer = thorough();
   const LocalMap::Adjustment adjustment = map.adjust(optimizer, noRigError(), calibration);
@@ -579,6 +579,35 @@ TEST(LocalMap, AdjustmentMovesTheNewestPairToWhereItsPointsSayItIs) {
   EXPECT_TRUE(adjustment.rejected_rows.empty());
   EXPECT_LT(logSE3(map.newestPose() * second.inverse()).norm(), 1e-4);
   EXPECT_LT(calibration.value.norm(), 1e-6);
+}
+
+/// A corner that nothing is ever aligned with weighs as much as those seen later, whether it has a patch or not.
+TEST(LocalMap, PatchesThatAreNotAlignedChangeNothing) {
+  PatchAlignmentOptions alignment;
+  alignment.enabled = false;
+  const auto poseAfter = [&](bool has_patches, const PatchAlignmentOptions& options) {
+    const synthetic::World world = someWorld(60);
+    LocalMap map(everyPairAKeyframe());
+    const Eigen::Isometry3d first = Eigen::Isometry3d::Identity(), second = translated(0.1, 0.02, -0.5);
+    const auto seeNoisily = [&](const Eigen::Isometry3d& pose) {
+      StereoFeatures features = see(world, 0, 60, pose);
+      for (std::size_t i = 0; i < features.u.size(); ++i) features.u[i] += i % 3 == 0 ? 0.6f : -0.2f;
+      if (has_patches) {
+        features.patch_layout = {13, 1.f, 0.f};
+        features.patches = cv::Mat::zeros(features.count(), features.patch_layout.bytes(), CV_8U);
+      }
+      return features;
+    };
+    map.insert(options, seeNoisily(first), 1, first, {}, RigCalibration());
+    const StereoFeatures features = seeNoisily(second);
+    map.insert(options, features, 2, second, recognised(map, features, 60), {});
+    RigCalibration calibration;
+    WindowOptimizer optimizer = thorough();
+    EXPECT_TRUE(map.adjust(optimizer, noRigError(), calibration).success);
+    return map.newestPose().matrix();
+  };
+  EXPECT_EQ(poseAfter(true, alignment), poseAfter(false, alignment));
+  EXPECT_NE(poseAfter(true, PatchAlignmentOptions()), poseAfter(false, alignment));
 }
 
 TEST(LocalMap, APointKeepsItsLooksWhenASightingTurnsOutWrong) {
@@ -592,7 +621,7 @@ TEST(LocalMap, APointKeepsItsLooksWhenASightingTurnsOutWrong) {
   features.u[17] += 30.f;  // another thing, that looked like point 17
   std::memcpy(features.descriptors.ptr(17), strange.data(), strange.size());
   const Sightings sightings = recognised(map, features, 60);
-  map.insert(features, 2, second, sightings, {});
+  map.insert({}, features, 2, second, sightings, {});
   RigCalibration calibration;
   WindowOptimizer optimizer = thorough();
   const LocalMap::Adjustment adjustment = map.adjust(optimizer, noRigError(), calibration);
@@ -615,7 +644,7 @@ TEST(LocalMap, NoNumberOfPointsTellsWhatAllOfAnImageAreOffByAlike) {
     LocalMap map(everyPairAKeyframe());
     const StereoFeatures features = see(world, 0, 40, second);
     add(map, see(world, 0, 40, Eigen::Isometry3d::Identity()), 1, Eigen::Isometry3d::Identity(), {});
-    map.insert(features, 2, second, recognised(map, features, 40), {});
+    map.insert({}, features, 2, second, recognised(map, features, 40), {});
     WindowOptimizerOptions window;
     window.common_shift = common_shift;
     WindowOptimizer optimizer(window);
@@ -649,7 +678,7 @@ TEST(LocalMap, CovarianceBetweenTwoFramesDoesNotDependOnWhereTheFirstOneIs) {
 
   LocalMap alone(options);
   add(alone, of_second, 2, second, {});
-  alone.insert(of_third, 3, third, recognised(alone, of_third, 40), {});
+  alone.insert({}, of_third, 3, third, recognised(alone, of_third, 40), {});
   const LocalMap::Adjustment known = alone.adjust(optimizer, noRigError(), calibration);
   ASSERT_TRUE(known.success);
   EXPECT_EQ(known.covariances.first_id, 2);
@@ -673,7 +702,7 @@ TEST(LocalMap, CovarianceBetweenTwoFramesDoesNotDependOnWhereTheFirstOneIs) {
   ASSERT_EQ(view.rows.count(), 52);
   Sightings sightings;
   for (int i = 0; i < 40; ++i) sightings.push_back(sighting(map, view, 12 + i, of_third, i < 28 ? 12 + i : i - 28));
-  map.insert(of_third, 3, third, sightings, {});
+  map.insert({}, of_third, 3, third, sightings, {});
   const LocalMap::Adjustment adjustment = map.adjust(optimizer, noRigError(), calibration);
   ASSERT_TRUE(adjustment.success);
   const WindowCovariances& covariances = adjustment.covariances;

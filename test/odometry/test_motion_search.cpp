@@ -66,11 +66,11 @@ class MotionSearchTest : public ::testing::Test {
   }
 
   void begin(const StereoFeatures& features) {
-    map_.insert(features, ++pairs_, Eigen::Isometry3d::Identity(), {}, calibration_);
+    map_.insert({}, features, ++pairs_, Eigen::Isometry3d::Identity(), {}, calibration_);
   }
 
   void extend(const StereoFeatures& features, const MotionHypothesis& found) {
-    map_.insert(features, ++pairs_, found.motion.T_current_reference * map_.newestPose(), found.sightings,
+    map_.insert({}, features, ++pairs_, found.motion.T_current_reference * map_.newestPose(), found.sightings,
                 calibration_);
   }
 

@@ -111,6 +111,15 @@ Trial tryShifts(const Eigen::Matrix2d& truth, const Eigen::Matrix2d& told, doubl
   return trial;
 }
 
+TEST(PatchAlignment, APatchMustHoldTheSquareAndItsDerivatives) {
+  PatchAlignmentOptions options;
+  options.radius = 5;
+  EXPECT_TRUE(options.canAlign(13));
+  EXPECT_FALSE(options.canAlign(11));
+  options.enabled = false;
+  EXPECT_FALSE(options.canAlign(13));
+}
+
 TEST(PatchAlignment, FindsTheShiftAtEveryScaleRatioThatItIsTold) {
   for (const double ratio : {0.7, 0.85, 1.0, 1.15}) {
     Trial trial = tryShifts(scaled(ratio), scaled(ratio));

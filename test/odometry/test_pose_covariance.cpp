@@ -188,6 +188,17 @@ TEST(PoseCovariance, ADoubtedPoseIsReportedSoAndTheNextMotionContainsTheDoubt) {
   expectEqual(covariance.value(), diagonal(8.5, 2.25));
 }
 
+TEST(PoseCovariance, RotationDoesNotFallWhereTranslationGrows) {
+  PoseCovariance covariance;
+  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
+  covariance.advance(still, window(1, diagonal(0.5, 0.25)));
+  covariance.doubt(diagonal(0.0, 2.0));
+  covariance.advance(still, window(1, diagonal(9.0, 0.5)));
+  expectEqual(covariance.value(), diagonal(9.0, 2.25));
+  covariance.advance(still, window(1, diagonal(4.0, 3.0)));
+  expectEqual(covariance.value(), diagonal(9.0, 3.0));
+}
+
 TEST(PoseCovariance, StaysSymmetricAndPositive) {
   PoseCovariance covariance;
   Vector6d step;

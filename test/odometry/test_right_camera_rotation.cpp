@@ -90,6 +90,15 @@ TEST(RightCameraRotation, ATurnIsSaidOfARigThatWasSteady) {
   EXPECT_FALSE(filter.add(gridSeenWith(Eigen::Vector3d::Zero())));
 }
 
+TEST(RightCameraRotation, AFewFeaturesTellOfNoTurn) {
+  RightCameraRotation filter;
+  for (int k = 0; k < 20; ++k) filter.add(gridSeenWith(Eigen::Vector3d::Zero()));
+  StereoFeatures wrong = synthetic::noFeatures(synthetic::camera());
+  for (int i = 0; i < 3; ++i) wrong.append({200.f + 100.f * static_cast<float>(i), 150.f, 60.f, 1.4f, 10.f, -1.f, 1.f});
+  EXPECT_EQ(filter.change(wrong), 0.0);
+  EXPECT_FALSE(filter.add(wrong));
+}
+
 TEST(RightCameraRotation, ARigWhoseRowsAlwaysDisagreeIsNotSaidToTurn) {
   // Rows that say more and more of a rotation, as where what rectification left depends on the place in the image.
   RightCameraRotation filter;

@@ -832,6 +832,14 @@ TEST(VisualOdometry, ImagesThatRepeatThemselvesAreAStandstillWhereAGuessSaysSo) 
   const OdometryResult result = odometry.update(still, guess);
   EXPECT_EQ(result.reason.find("frozen"), std::string::npos) << result.reason;
   EXPECT_LT(distanceBetween(result.T_origin_camera, before.T_origin_camera), 1e-3);
+
+  // Also when the guess missed the first of these pairs.
+  VisualOdometry told_late({});
+  follow(told_late, 8);
+  EXPECT_NE(told_late.update(still).reason.find("frozen"), std::string::npos);
+  still.stamp = stampOf(10);
+  const OdometryResult late = told_late.update(still, guess);
+  EXPECT_EQ(late.reason.find("frozen"), std::string::npos) << late.reason;
 }
 
 /// What stands still around a camera at `x`, and a swarm of points that moves past it by 0.12 m a pair and is the

@@ -22,6 +22,11 @@ struct StereoCamera {
     return {u, fy * point.y() * inverse_depth + cy, u - fx * baseline * inverse_depth};
   }
 
+  /// Whether the left image shows a pixel of project().
+  bool sees(const Eigen::Vector3d& pixel) const {
+    return pixel.x() >= 0.0 && pixel.y() >= 0.0 && pixel.x() <= width && pixel.y() <= height;
+  }
+
   /// Derivative of project() with respect to the point, px/m.
   Eigen::Matrix3d projectionJacobian(const Eigen::Vector3d& point) const;
 

@@ -14,7 +14,7 @@ struct EpipolarMatcherOptions {
   double min_correlation = 0.8;
 
   void describe(OptionList& list) {
-    list.add("max_disparity", max_disparity, {4.0, 2000.0}, "px", "largest disparity looked for");
+    list.add("max_disparity", max_disparity, {4.0, 2000.0}, "px", "largest disparity looked for, before alignment");
     list.add("uniqueness", uniqueness, {0.1, 1.0}, "",
              "largest ratio between the difference of the best block and that of the best one elsewhere");
     list.add("patch_radius", patch_radius, {3, 20}, "px",
@@ -40,7 +40,8 @@ class EpipolarMatcher {
   EpipolarMatcher(const EpipolarMatcherOptions& options, double max_dv, const cv::Mat& left, const cv::Mat& right,
                   Images& scratch);
 
-  /// (disparity, dv) of a left position, px; nothing where no block stands out or the alignment leaves its pixel.
+  /// (disparity, dv) of a left position, px; nothing where no block stands out, the alignment leads
+  /// more than 2 px away or the aligned patches differ.
   std::optional<cv::Point2f> find(const cv::Point2f& left_position) const;
 
  private:

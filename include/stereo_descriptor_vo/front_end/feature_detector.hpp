@@ -35,7 +35,8 @@ struct FeatureDetectorOptions {
              "corners nearer than this to a stronger one are left out; 0: none is");
     list.add("fast_min_threshold", fast_min_threshold, {1, 100}, "grey levels",
              "fast, agast, orb: weakest corner considered; each bucket's own threshold adapts upwards from here");
-    list.add("corner_quality", corner_quality, {1e-6, 1.0}, "", "gftt, harris: weakest response relative to the best");
+    list.add("corner_quality", corner_quality, {1e-6, 1.0}, "",
+             "gftt: weakest response relative to the best; harris: its root");
     list.add("corner_block_size", corner_block_size, {3, 31}, "px", "gftt, harris: window of the gradient matrix");
     list.add("subpixel", subpixel, "fast, agast, gftt, harris: refine corners to sub-pixel positions");
     list.add("subpixel_radius", subpixel_radius, {1, 15}, "px", "gftt, harris: half side of the sub-pixel window");
@@ -57,9 +58,11 @@ class FeatureDetector {
   /// Throws std::invalid_argument when an option is out of its range, or names a mask that cannot be read.
   explicit FeatureDetector(const FeatureDetectorOptions& options);
 
+  static constexpr int kSmallestSide = 16;  ///< px within the border: less is no image for the detectors
+
   /// Corners of a CV_8U image, at most `max_features`, at least `border` px away from the image's borders and outside
-  /// of the mask's zeros: `mask` is CV_8U, or empty for the one of the options. Throws std::invalid_argument when the
-  /// mask has another size than the image.
+  /// of the mask's zeros, but for what the refinement moves them by; `mask` is CV_8U, or empty for the one of the
+  /// options. Throws std::invalid_argument when the mask has another type, or another size than the image.
   std::vector<Corner> detect(const cv::Mat& image, int border = 0, const cv::Mat& mask = cv::Mat()) const;
 
  private:

@@ -18,7 +18,7 @@ struct RigMonitorOptions {
     list.add("enabled", enabled, "refuse pairs whose rows do not agree, and say what is wrong with the rig");
     list.add("suspicious_share", suspicious_share, {0.0, 1.0}, "",
              "the rig is looked at when a smaller share of the corners is found in the right image");
-    list.add("corners", corners, {20, 10000}, "", "corners that are looked for then, in all directions");
+    list.add("corners", corners, {50, 10000}, "", "corners that are looked for then, in all directions");
     list.add("reach", reach, {4.0, 200.0}, "px", "rows above and below its own in which each is looked for");
   }
 };

@@ -103,8 +103,9 @@ class LocalMap {
 
   /// Adds a pair seen from `T_camera_origin` and what it recognised; every other row becomes a new point. The previous
   /// pair is forgotten unless it was a key frame.
-  void insert(const StereoFeatures& features, int id, const Eigen::Isometry3d& T_camera_origin,
-              const std::vector<Sighting>& sightings, const RigCalibration& calibration);
+  void insert(const PatchAlignmentOptions& alignment, const StereoFeatures& features, int id,
+              const Eigen::Isometry3d& T_camera_origin, const std::vector<Sighting>& sightings,
+              const RigCalibration& calibration);
 
   /// The remembered key frame whose place the newest pair has come back to; null where there is none, where it never
   /// left the map, and while another one is recalled.
@@ -180,7 +181,7 @@ class LocalMap {
   bool needsKeyframe() const;
   static void takeDescriptor(Point& point, const StereoFeatures& features, int row);
   void startPoint(const StereoFeatures& features, int row, int id, const Eigen::Isometry3d& T_camera_origin,
-                  const RigCalibration& calibration);
+                  const RigCalibration& calibration, double sigma);
 
   LocalMapOptions options_;
   std::int64_t newest_stamp_ = 0;  ///< of the newest pair, as are camera and kind

@@ -21,9 +21,12 @@ struct PatchAlignmentOptions {
              "half side of the part of the reference that is aligned");
     list.add("min_correlation", min_correlation, {0.0, 1.0}, "", "least correlation of the aligned patches");
     list.add("max_shift", max_shift, {0.1, 10.0}, "px", "largest correction of a corner's position");
-    list.add("min_sigma", min_sigma, {0.0, 10.0}, "px",
+    list.add("min_sigma", min_sigma, {0.001, 10.0}, "px",
              "standard deviation of an aligned position that no clarity of its patch takes away");
   }
+
+  /// Whether patches of so many samples a side can be aligned: the derivatives ask for one more all around.
+  bool canAlign(int patch_side) const { return enabled && patch_side >= 2 * (radius + 1) + 1; }
 
   static constexpr int kLargestRadius = 6;
 };

@@ -28,8 +28,8 @@ bool widen(Matrix6d& covariance, const Vector6d& deviation);
 /// Covariance of a pose that is reported again and again while later pairs improve what is known of it. What is
 /// reported stays true: a motion's covariance is that between two *reported* poses, so it contains what the earlier one
 /// lacked; and the pose's covariance grows from key frame to key frame, because all pairs since the last one were
-/// measured against it, but never falls below what was reported before. All covariances are of right perturbations,
-/// T * exp(xi), translation before rotation, in m and rad.
+/// measured against it, but neither its translation's nor its rotation's trace falls below what was reported before.
+/// All covariances are of right perturbations, T * exp(xi), translation before rotation, in m and rad.
 class PoseCovariance {
  public:
   /// Successive key frames see the same points, compensated with the same calibration: their errors are alike, not

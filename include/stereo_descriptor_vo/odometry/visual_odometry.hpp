@@ -59,7 +59,7 @@ enum class TrackingState { kWaiting, kTracking, kDegraded, kLost };
 
 const char* toString(TrackingState state);
 
-/// Where a matched feature was in the previous pair, as the local map tells, and where it is now.
+/// Where a matched feature was in the last pair that was measured, as the local map tells, and where it is now.
 struct FeatureFlow {
   float u_previous, v_previous;  ///< px, left image
   int current;                   ///< row of the pair's features
@@ -129,7 +129,7 @@ class VisualOdometry {
   void forgetTime();
 
   /// Takes other options over while running. Those of `map` take effect at the next start, those of
-  /// `calibration` at the next reset.
+  /// `calibration` when the estimate begins anew (a reset, another camera, a pair that the rig monitor refused).
   /// Throws std::invalid_argument, and keeps the old ones, when an option is out of its range.
   void configure(const VisualOdometryOptions& options);
 

@@ -96,7 +96,7 @@ class StereoFeaturesView {
     if (!indexOf(namesOf(DescriptorLayout{}), message_.layout)) refuse("unknown layout '" + message_.layout + "'");
     if (!indexOf(namesOf(ElementType{}), message_.element_type))
       refuse("unknown element_type '" + message_.element_type + "'");
-    constexpr std::uint32_t kLongestRow = 1u << 16;
+    constexpr std::uint32_t kLongestRow = 1u << 15;
     const std::uint32_t unit = (isFloat() ? 4u : 1u) * (hasRightHalf() ? 2u : 1u);
     if (message_.bytes_per_row == 0 || message_.bytes_per_row > kLongestRow || message_.bytes_per_row % unit != 0)
       refuse("bytes_per_row = " + std::to_string(message_.bytes_per_row) + " does not fit layout and element_type");
