@@ -15,8 +15,10 @@ OdometryPublisher::OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOp
   constexpr int kQueue = 10;
   odom_publisher_ = nh.advertise<nav_msgs::Odometry>("odom", kQueue);
   // Whoever comes late gets the path, too.
-  path_publisher_ =
-      nh.advertise<nav_msgs::Path>("path", 1, [this](const ros::SingleSubscriberPublisher&) { path_changed_ = true; });
+  path_publisher_ = nh.advertise<nav_msgs::Path>("path", 1, [this](const ros::SingleSubscriberPublisher&) {
+    const std::lock_guard<std::mutex> lock(path_mutex_);
+    path_changed_ = !path_.empty();
+  });
   info_publisher_ = nh.advertise<stereo_descriptor_vo::VoInfo>("vo_info", kQueue);
   points_publisher_ = nh.advertise<sensor_msgs::PointCloud2>("points", 1);
   flow_publisher_ = nh.advertise<stereo_descriptor_vo::FeatureFlow>("feature_flow", kQueue);
@@ -61,8 +63,8 @@ void OdometryPublisher::publishPoints(const stereo_descriptor_vo::StereoFeatures
 void OdometryPublisher::restart(const Eigen::Isometry3d& T_odom_start) {
   T_odom_start_ = T_odom_start;
   const std::lock_guard<std::mutex> lock(path_mutex_);
+  path_changed_ = !path_.empty();
   path_.clear();
-  path_changed_ = true;
 }
 
 nav_msgs::Path OdometryPublisher::path() const {

@@ -161,6 +161,16 @@ TEST_F(OdometryPublisherTest, AfterAResetThePathBeginsAnew) {
   EXPECT_EQ(path_->messages.back().poses[0].pose.position.z, 0.0);
 }
 
+TEST_F(OdometryPublisherTest, WhoeverSubscribesLateGetsThePath) {
+  start({});
+  publish(resultAt(1));
+  ASSERT_TRUE(spinUntil([&] { return !path_->messages.empty(); }));
+  path_.reset();
+  path_ = std::make_unique<Inbox<nav_msgs::Path>>(nh_, "path");
+  ASSERT_TRUE(spinUntil([&] { return !path_->messages.empty(); }));
+  EXPECT_EQ(path_->messages[0].poses.size(), 1u);
+}
+
 TEST_F(OdometryPublisherTest, StartsAgainFromAnyPlace) {
   start({});
   Eigen::Isometry3d T_odom_start = Eigen::Isometry3d::Identity();

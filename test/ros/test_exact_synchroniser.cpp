@@ -61,6 +61,15 @@ TEST_F(ExactSynchroniserTest, WhatOneInputLeftOverDoesNotOutliveAJumpBack) {
   EXPECT_EQ(sets_, (std::vector<double>{10.0, 11.0, 12.0}));
 }
 
+TEST_F(ExactSynchroniserTest, ALateMessageTakesNothingFromThoseThatWait) {
+  for (int i = 1; i <= 2 * kRoom; ++i) addBoth(i);
+  synchroniser_.add<0>(at<Image>(100.0));
+  synchroniser_.add<0>(at<Image>(1.5));
+  synchroniser_.add<1>(at<CameraInfo>(100.0));
+  EXPECT_EQ(sets_.size(), 2u * kRoom + 1);
+  EXPECT_EQ(sets_.back(), 100.0);
+}
+
 TEST_F(ExactSynchroniserTest, AStampThatCannotBeComparedIsRefused) {
   EXPECT_THROW(synchroniser_.add<0>(at<Image>(0.0)), std::invalid_argument);
   EXPECT_THROW(synchroniser_.add<1>(at<CameraInfo>(4e9)), std::invalid_argument);
