@@ -101,8 +101,8 @@ class LocalMap {
   Sighting sight(const PatchAlignmentOptions& options, const StereoFeatures& features,
                  const Eigen::Isometry3d& T_camera_origin, int point, int row) const;
 
-  /// Adds a pair seen from `T_camera_origin` and what it recognised; every other row becomes a new point. The previous
-  /// pair is forgotten unless it was a key frame.
+  /// Adds a pair seen from `T_camera_origin` and what it recognised; every other row becomes a new point, whose later
+  /// sightings `alignment` is for. The previous pair is forgotten unless it was a key frame.
   void insert(const PatchAlignmentOptions& alignment, const StereoFeatures& features, int id,
               const Eigen::Isometry3d& T_camera_origin, const std::vector<Sighting>& sightings,
               const RigCalibration& calibration);
