@@ -17,7 +17,7 @@ OdometryPublisher::OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOp
   // Whoever comes late gets the path, too.
   path_publisher_ = nh.advertise<nav_msgs::Path>("path", 1, [this](const ros::SingleSubscriberPublisher&) {
     const std::lock_guard<std::mutex> lock(path_mutex_);
-    path_changed_ = !path_.empty();
+    if (!path_.empty()) path_changed_ = true;
   });
   info_publisher_ = nh.advertise<stereo_descriptor_vo::VoInfo>("vo_info", kQueue);
   points_publisher_ = nh.advertise<sensor_msgs::PointCloud2>("points", 1);
@@ -63,7 +63,7 @@ void OdometryPublisher::publishPoints(const stereo_descriptor_vo::StereoFeatures
 void OdometryPublisher::restart(const Eigen::Isometry3d& T_odom_start) {
   T_odom_start_ = T_odom_start;
   const std::lock_guard<std::mutex> lock(path_mutex_);
-  path_changed_ = !path_.empty();
+  if (!path_.empty()) path_changed_ = true;
   path_.clear();
 }
 

@@ -172,11 +172,17 @@ TEST(PlaceRecognition, AfterAnUnknownMotionAKnownPlaceSaysWhereItIs) {
   EXPECT_LT(drive.error(), 0.3);
 }
 
+/// As they are saved.
+std::vector<Place> placesOf(const PlaceRecognition& recognition) {
+  std::vector<Place> places;
+  for (const auto& [id, place] : recognition.places()) places.push_back(place);
+  return places;
+}
+
 TEST(PlaceRecognition, RestoredPlacesLetANewSessionFindItself) {
   Drive mapping;
   mapping.go(0, 120);
-  std::vector<Place> places;
-  for (const auto& [id, place] : mapping.recognition.places()) places.push_back(place);
+  std::vector<Place> places = placesOf(mapping.recognition);
 
   Drive later;
   later.recognition.restore(places, mapping.recognition.graph());
@@ -202,8 +208,7 @@ TEST(PlaceRecognition, PlacesWithWildNumbersAreNotTakenUp) {
   mapping.go(0, 6);
   ASSERT_EQ(mapping.recognition.places().size(), 2u);
   const auto refusal = [&](int id, int segment) {
-    std::vector<Place> places;
-    for (const auto& [number, place] : mapping.recognition.places()) places.push_back(place);
+    std::vector<Place> places = placesOf(mapping.recognition);
     places[1].id = id;
     places[1].segment = segment;
     std::map<int, Eigen::Isometry3d> nodes = {{0, Eigen::Isometry3d::Identity()}, {id, Eigen::Isometry3d::Identity()}};
@@ -243,8 +248,7 @@ TEST(PlaceRecognition, TheOldestPlacesGo) {
 TEST(PlaceRecognition, OfRestoredPlacesNoMoreAreKeptThanOfOthers) {
   Drive mapping;
   mapping.go(0, 60);
-  std::vector<Place> places;
-  for (const auto& [id, place] : mapping.recognition.places()) places.push_back(place);
+  const std::vector<Place> places = placesOf(mapping.recognition);
   PlaceRecognitionOptions options;
   options.max_places = 10;
   ASSERT_GT(places.size(), 15u);
