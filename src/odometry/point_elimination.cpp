@@ -49,18 +49,23 @@ struct Sight {
   double inverse_z;  ///< 1 / P.z
   Three ray;         ///< (P.x / P.z, P.y / P.z, rho / P.z)
   Three inverse_noise;
+  double shape;    ///< derivative of the disparity's error by the calibration's bend: RigCalibration::shape()
   Three residual;  ///< normalised
   double square;
 
-  SDVO_IN_KERNEL Sight(const WindowProjection& projection, const SightedPoint& sighted, const PreparedSighting& seen,
+  SDVO_IN_KERNEL Sight(const WindowProjection& projection, const SightedPoint& sighted, const WindowObservation& seen,
                        const double* T) {
     const double* point = sighted.ray_and_inverse_depth.data();
     P = loaded(T) * point[0] + loaded(T + 4) * point[1] + (loaded(T + 8) + loaded(T + 12) * point[2]);
     inverse_z = 1.0 / P[2];
     ray = Three{P[0], P[1], point[2], 0.0} * inverse_z;
-    const Three centre = loaded(projection.centre) + kZ * (projection.bend * seen.shape);
-    inverse_noise = (kX + kY) * seen.measurement[3] + kZ * sighted.inverse_disparity_sigma;
-    residual = inverse_noise * ((loaded(seen.measurement) - centre) - loaded(projection.focal) * ray);
+    const double* measured = seen.measurement.data();
+    const double x = (measured[0] - projection.centre[0]) / projection.focal[0];
+    shape = x * x;
+    const Three centre = loaded(projection.centre) + kZ * (projection.bend * shape);
+    inverse_noise = (kX + kY) * (1.0 / seen.sigma) + kZ * sighted.inverse_disparity_sigma;
+    const Three measurement = {measured[0], measured[1], measured[2], 0.0};
+    residual = inverse_noise * ((measurement - centre) - loaded(projection.focal) * ray);
     square = isInFront() ? sumOf(residual * residual) : kBehindSquare;
   }
   SDVO_IN_KERNEL bool isInFront() const { return P[2] >= kNearestScaled; }
@@ -69,7 +74,7 @@ struct Sight {
 struct SquareResiduals {
   static SDVO_IN_KERNEL void run(const WindowProjection* projection, const SightedPoint* point, double* squares) {
     for (int i = 0; i < point->count; ++i) {
-      const PreparedSighting& seen = point->sightings[i];
+      const WindowObservation& seen = point->sightings[i];
       const double* T = point->T_camera_anchor[seen.frame].data();
       squares[i] = Sight(*projection, *point, seen, T).square;
     }
@@ -130,16 +135,15 @@ struct PointSums {
   int sightings = 0;
 
   /// J: columns of the derivatives by the point.
-  SDVO_IN_KERNEL void add(const Sight& at, double w, double bend_shape, const Three& J0, const Three& J1,
-                          const Three& J2) {
+  SDVO_IN_KERNEL void add(const Sight& at, double w, const Three& J0, const Three& J1, const Three& J2) {
     const Three w0 = w * J0, w1 = w * J1, w2 = w * J2;
     H00 += w0 * J0, H10 += w1 * J0, H11 += w1 * J1, H20 += w2 * J0, H21 += w2 * J1, H22 += w2 * J2;
     g0 += w0 * at.residual, g1 += w1 * at.residual, g2 += w2 * at.residual;
     by0 += w0, by1 += w1, by2 += w2;
-    shaped0 += bend_shape * w0, shaped1 += bend_shape * w1, shaped2 += bend_shape * w2;
-    const double w_shape = w * bend_shape;
+    shaped0 += at.shape * w0, shaped1 += at.shape * w1, shaped2 += at.shape * w2;
+    const double w_shape = w * at.shape;
     weight += w, square += w * at.square, residual += w * at.residual[2];
-    shape += w_shape, shape_square += w_shape * bend_shape, shape_residual += w_shape * at.residual[2];
+    shape += w_shape, shape_square += w_shape * at.shape, shape_residual += w_shape * at.residual[2];
     ++sightings;
   }
 };
@@ -195,19 +199,19 @@ struct AddPoint {
     PointSums sums;
     int moving = 0;
     for (int i = 0; i < point->count; ++i) {
-      const PreparedSighting& seen = point->sightings[i];
+      const WindowObservation& seen = point->sightings[i];
       const double* T = point->T_camera_anchor[seen.frame].data();
       const Sight at(*projection, *point, seen, T);
       squares[i] = at.square;
       if (!at.isInFront()) continue;
       const double w = bend / (bend + at.square);
       const Derivatives A(*projection, at);
-      sums.add(at, w, seen.shape, A.times(T), A.times(T + 4), A.times(T + 12) + kZ * A.by_rho);
+      sums.add(at, w, A.times(T), A.times(T + 4), A.times(T + 12) + kZ * A.by_rho);
       if (seen.frame == 0) continue;
       PoseFactor& factor = factors[moving++];
       factor.pose = seen.frame - 1;
-      addPose({at.P, point->ray_and_inverse_depth.z()}, A, at, w, seen, T, factor,
-              blocks[indexOf(factor.pose, factor.pose)], borders[factor.pose]);
+      addPose({at.P, point->ray_and_inverse_depth.z()}, A, at, w, T, factor, blocks[indexOf(factor.pose, factor.pose)],
+              borders[factor.pose]);
     }
 
     // What the point is in, times R or R^T.
@@ -250,8 +254,8 @@ struct AddPoint {
  private:
   /// What a sighting says of its pose, of that and the calibration, and of that and the point.
   static SDVO_IN_KERNEL void addPose(const Lever& lever, const Derivatives& A, const Sight& at, double w,
-                                     const PreparedSighting& seen, const double* T, PoseFactor& factor,
-                                     PoseEquations::Block& block, PoseEquations::Border& border) {
+                                     const double* T, PoseFactor& factor, PoseEquations::Block& block,
+                                     PoseEquations::Border& border) {
     const Information M(A, w);
     const double by_z = -w * A.ahead[2];  // the disparity by P.z
     lever.multiply(M.times(T), factor.Y[0]);
@@ -269,7 +273,7 @@ struct AddPoint {
 
     const Three of_disparity = kZ * (by_z * at.inverse_noise[2]);
     lever.addProduct(of_disparity, 1.0, border.columns[0]);
-    lever.addProduct(of_disparity, seen.shape, border.columns[1]);
+    lever.addProduct(of_disparity, at.shape, border.columns[1]);
     lever.addProduct(A.transposedTimes(w * at.residual), 1.0, border.columns[2]);
   }
 

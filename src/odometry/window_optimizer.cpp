@@ -66,15 +66,10 @@ class Solver {
     const auto& observations = window.observations;
     first_of_point_.clear();
     anchors_.clear(), anchor_of_point_.clear(), estimate.points.clear();
-    sightings_.resize(observations.size());
     for (std::size_t i = 0; i < observations.size(); ++i) {
-      const WindowObservation& o = observations[i];
-      sightings_[i] = {{o.measurement.x(), o.measurement.y(), o.measurement.z(), 1.0 / o.sigma},
-                       RigCalibration::shape(window.camera, o.measurement.x())[1],
-                       o.frame};
-      if (i > 0 && o.point == observations[i - 1].point) continue;
+      if (i > 0 && observations[i].point == observations[i - 1].point) continue;
       first_of_point_.push_back(static_cast<int>(i));
-      const AnchoredPoint& point = window.points[static_cast<std::size_t>(o.point)];
+      const AnchoredPoint& point = window.points[static_cast<std::size_t>(observations[i].point)];
       // Points that one pair saw first lie next to each other.
       if (anchors_.empty() || point.T_origin_anchor.matrix() != anchors_.back().matrix())
         anchors_.push_back(point.T_origin_anchor);
@@ -106,7 +101,7 @@ class Solver {
 
   /// Also gives the square of each observation's residual.
   double cost(const Estimate& estimate, std::vector<double>& squares) {
-    squares.resize(sightings_.size());
+    squares.resize(window_->observations.size());
     const WindowProjection projection(window_->camera, estimate.calibration);
     placeAnchors(estimate);
     for (std::size_t p = 0; p < estimate.points.size(); ++p)
@@ -118,10 +113,10 @@ class Solver {
   void linearise(const Estimate& estimate, double damping, ReducedSystem& system) {
     const std::size_t points = estimate.points.size();
     system.points.resize(points);
-    system.factors.resize(sightings_.size());
+    system.factors.resize(window_->observations.size());
     system.common_squares.clear();
     system.common_squares.reserve(points);
-    squares_.resize(sightings_.size());
+    squares_.resize(window_->observations.size());
     system.weight = system.weighted_square = 0.0;
     equations_.setZero(poses_);
     const WindowProjection projection(window_->camera, estimate.calibration);
@@ -166,7 +161,7 @@ class Solver {
 
   SightedPoint sightedPoint(const Estimate& estimate, std::size_t p) const {
     const int first = first_of_point_[p], count = first_of_point_[p + 1] - first;
-    return {estimate.points[p], sightings_.data() + first, count, 1.0 / std::sqrt(disparityVariance(count)),
+    return {estimate.points[p], window_->observations.data() + first, count, 1.0 / std::sqrt(disparityVariance(count)),
             T_camera_anchor_.data() + anchor_of_point_[p] * estimate.T_camera_origin.size()};
   }
 
@@ -187,7 +182,6 @@ class Solver {
   const Window* window_ = nullptr;
   double common_sigma_ = 0.0;
   std::vector<int> first_of_point_;
-  std::vector<PreparedSighting> sightings_;
   std::vector<Eigen::Isometry3d> anchors_, T_camera_anchor_;
   std::vector<std::size_t> anchor_of_point_;
   PoseEquations equations_;

@@ -24,7 +24,7 @@ struct Scene {
   RigCalibration calibration;
   AnchoredPoint point;
   std::vector<Eigen::Isometry3d> T_camera_origin, T_camera_anchor;
-  std::vector<PreparedSighting> sightings;
+  std::vector<WindowObservation> sightings;
 
   explicit Scene(const std::vector<int>& frames, const Eigen::Vector3d& where = {0.4, -0.2, 1.0 / 9.0}) {
     calibration.value << 0.2, -0.7;
@@ -36,9 +36,7 @@ struct Scene {
       Eigen::Vector3d seen;
       if (!predictObservation(camera, T_camera_origin[frame], point, seen, nullptr)) seen << 600.0, 180.0, 20.0;
       seen += Eigen::Vector3d(0.3 * std::sin(3.0 * frame), 0.4 * std::cos(5.0 * frame), 0.2 + 0.1 * frame);
-      const double sigma = 0.1 + 0.05 * frame;
-      sightings.push_back(
-          {{seen.x(), seen.y(), seen.z(), 1.0 / sigma}, RigCalibration::shape(camera, seen.x())[1], frame});
+      sightings.push_back({0, frame, seen, 0.1 + 0.05 * frame});
     }
   }
 
@@ -57,13 +55,13 @@ struct Row {
 
 std::vector<Row> rowsOf(const Scene& scene) {
   std::vector<Row> rows;
-  for (const PreparedSighting& seen : scene.sightings) {
+  for (const WindowObservation& seen : scene.sightings) {
     Eigen::Vector3d prediction;
     ObservationJacobians jacobians;
     if (!predictObservation(scene.camera, scene.T_camera_origin[seen.frame], scene.point, prediction, &jacobians))
       continue;
-    const Eigen::Map<const Eigen::Vector3d> measured(seen.measurement);
-    const Eigen::Vector3d noise(seen.measurement[3], seen.measurement[3], 1.0 / kDisparitySigma);
+    const Eigen::Vector3d& measured = seen.measurement;
+    const Eigen::Vector3d noise(1.0 / seen.sigma, 1.0 / seen.sigma, 1.0 / kDisparitySigma);
     prediction.z() += scene.calibration.disparityError(scene.camera, measured.x());
     Row row;
     row.residual = noise.cwiseProduct(measured - prediction);

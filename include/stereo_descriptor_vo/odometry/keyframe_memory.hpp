@@ -9,7 +9,7 @@
 
 #include "stereo_descriptor_vo/odometry/described_points.hpp"
 #include "stereo_descriptor_vo/odometry/reference_patch.hpp"
-#include "stereo_descriptor_vo/odometry/window_optimizer.hpp"
+#include "stereo_descriptor_vo/odometry/window.hpp"
 
 namespace sdvo {
 

@@ -5,15 +5,9 @@
 
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 #include "stereo_descriptor_vo/odometry/rig_calibration.hpp"
+#include "stereo_descriptor_vo/odometry/window.hpp"
 
 namespace sdvo {
-
-/// A sighting of a point, ready to be compared with what is predicted of it.
-struct PreparedSighting {
-  double measurement[4];  ///< (u_left, v_left, disparity), px, as measured; and 1 / sigma of the first two, 1/px
-  double shape;           ///< derivative of the disparity's error by the calibration's bend
-  int frame;              ///< the first one, 0, is held fixed
-};
 
 /// How all points of a window are seen; the fourth numbers are zero.
 struct alignas(32) WindowProjection {
@@ -27,10 +21,10 @@ struct alignas(32) WindowProjection {
 /// A point of a window with all its sightings, one at least.
 struct SightedPoint {
   Eigen::Vector3d ray_and_inverse_depth;  ///< in its anchor
-  const PreparedSighting* sightings;      ///< in the order of their frames
+  const WindowObservation* sightings;     ///< in the order of their frames
   int count;
   double inverse_disparity_sigma;            ///< of each sighting, 1/px
-  const Eigen::Isometry3d* T_camera_anchor;  ///< of each frame
+  const Eigen::Isometry3d* T_camera_anchor;  ///< of each frame; the first one, 0, is held fixed
 };
 
 /// A scaled point whose z is smaller is not in front of the camera: a share of its depth in the anchor.

@@ -7,7 +7,7 @@
 
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
-#include "stereo_descriptor_vo/odometry/window_optimizer.hpp"
+#include "stereo_descriptor_vo/odometry/window.hpp"
 
 namespace sdvo {
 
