@@ -218,7 +218,9 @@ std::vector<Corner> spreadOverBuckets(const std::vector<Corner>& corners, cv::Si
   for (std::size_t bucket = 0; bucket < buckets; ++bucket) {
     const auto first = sorted.begin() + static_cast<std::ptrdiff_t>(begin(bucket));
     const auto last = sorted.begin() + static_cast<std::ptrdiff_t>(end[bucket]);
-    std::partial_sort(first, first + std::min(static_cast<std::ptrdiff_t>(rounds), last - first), last, isStronger);
+    const auto asked = first + std::min(static_cast<std::ptrdiff_t>(rounds), last - first);
+    if (asked < last) std::nth_element(first, asked, last, isStronger);
+    std::sort(first, asked, isStronger);
   }
   std::vector<Corner> kept, served;
   kept.reserve(wanted + buckets);
