@@ -86,7 +86,7 @@ class Nearest {
 class PositionGrid {
  public:
   PositionGrid(const StereoFeatures& features, double radius)
-      : radius_(static_cast<float>(radius)), columns_(features.u, 0.5 * radius), rows_(features.v, 0.5 * radius) {
+      : radius_(static_cast<float>(radius)), columns_(features.u, 0.5 * radius), rows_(features.v, radius) {
     const auto cellOf = [&](int i) { return cell(columns_.at(features.u[i]), rows_.at(features.v[i])); };
     begin_.assign(static_cast<std::size_t>(columns_.count()) * rows_.count() + 1, 0);
     for (int i = 0; i < features.count(); ++i) ++begin_[cellOf(i) + 1];
