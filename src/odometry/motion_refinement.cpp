@@ -77,7 +77,7 @@ NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementO
                              const std::vector<Correspondence>& correspondences, const std::vector<int>& subset,
                              Eigen::Isometry3d& T) {
   constexpr double kSmallestStep = 1e-6;  // m and rad
-  constexpr double kSmallestGain = 1e-6;  // of the cost: a few hundredths of the result's standard deviation
+  constexpr double kSmallestGain = 1e-5;  // of the cost: a tenth of the result's standard deviation
   double damping = 1e-6;
   Lineariser problem(camera, options, correspondences, subset);
   NormalEquations equations = problem.at(T);
