@@ -35,6 +35,14 @@ unsigned leastOf(const unsigned* values, int begin, int end) {
   return least;
 }
 
+/// Where sums of absolute differences would be least, from the middle one of three, the least, on: they rise to both
+/// sides at the same rate.
+float valleyBetween(const unsigned* differences) {
+  const float before = static_cast<float>(differences[0]), after = static_cast<float>(differences[2]);
+  const float rise = std::max(before, after) - static_cast<float>(differences[1]);
+  return rise > 0.f ? 0.5f * (before - after) / rise : 0.f;
+}
+
 }  // namespace
 
 EpipolarMatcher::EpipolarMatcher(const EpipolarMatcherOptions& options, double max_dv, const cv::Mat& left,
@@ -51,7 +59,7 @@ EpipolarMatcher::EpipolarMatcher(const EpipolarMatcherOptions& options, double m
 std::optional<cv::Point2f> EpipolarMatcher::find(const cv::Point2f& left_position) const {
   const std::optional<int> disparity = searchRow(left_position);
   if (!disparity) return std::nullopt;
-  const cv::Point start = searchAround(cv::Point(cvRound(left_position.x), cvRound(left_position.y)), *disparity);
+  const cv::Point2f start = searchAround(cv::Point(cvRound(left_position.x), cvRound(left_position.y)), *disparity);
   return align(left_position, start);
 }
 
@@ -78,12 +86,12 @@ std::optional<int> EpipolarMatcher::searchRow(const cv::Point2f& left_position) 
   return 2 * (best - kNegative);
 }
 
-cv::Point EpipolarMatcher::searchAround(const cv::Point& left, int disparity) const {
+cv::Point2f EpipolarMatcher::searchAround(const cv::Point& left, int disparity) const {
   constexpr int kReach = 2;
   const int rows = std::min(2, static_cast<int>(std::ceil(max_dv_)));
   const std::uint8_t* block = images_.left.ptr(left.y + kMargin) + left.x + kMargin;
   const std::ptrdiff_t step = static_cast<std::ptrdiff_t>(images_.left.step[0]);
-  cv::Point best;
+  cv::Point2f best;
   unsigned least = std::numeric_limits<unsigned>::max();
   for (int dv = -rows; dv <= rows; ++dv) {
     const std::uint8_t* other = images_.right.ptr(left.y + dv + kMargin) + left.x - disparity + kReach + kMargin;
@@ -92,7 +100,10 @@ cv::Point EpipolarMatcher::searchAround(const cv::Point& left, int disparity) co
     for (int k = 0; k <= 2 * kReach; ++k) {
       const int d = disparity - kReach + k;
       if (left.x - d < 0 || left.x - d > images_.right.cols - 2 * kMargin) continue;
-      if (differences[k] < least) least = differences[k], best = cv::Point(d, dv);
+      if (differences[k] >= least) continue;
+      least = differences[k];
+      const float between = k > 0 && k < 2 * kReach ? valleyBetween(differences + k - 1) : 0.f;
+      best = {static_cast<float>(d) + between, static_cast<float>(dv)};
     }
   }
   return best;
@@ -103,8 +114,9 @@ cv::Point EpipolarMatcher::searchAround(const cv::Point& left, int disparity) co
 /// patch that moved as a whole would be half a pixel off there.
 std::optional<cv::Point2f> EpipolarMatcher::align(const cv::Point2f& left_position, const cv::Point2f& start) const {
   constexpr int kIterations = 10;
-  constexpr float kConverged = 0.03f, kLargestCorrection = 2.0f;  // px
-  constexpr float kSteepest = 0.8f;                               // px per row
+  constexpr float kConverged = 0.03f, kNextConverged = 0.015f;  // px, of a step and of what would be the next one
+  constexpr float kLargestCorrection = 2.0f;                    // px
+  constexpr float kSteepest = 0.8f;                             // px per row
   // Where the patch says little about its slant, upright is the better guess.
   constexpr float kNoise = 5.f, kUsualSlant = 0.2f;  // grey levels, px per row
   constexpr float kUpright = (kNoise / kUsualSlant) * (kNoise / kUsualSlant);
@@ -119,7 +131,7 @@ std::optional<cv::Point2f> EpipolarMatcher::align(const cv::Point2f& left_positi
   const Eigen::Matrix3f inverse = hessian.inverse();
 
   cv::Point2f found = start;
-  float slant = 0.f;
+  float slant = 0.f, step_before = 0.f;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     Eigen::Vector3f gradient =
         patch.compare(images_.right, kMargin, left_position.x - found.x, left_position.y + found.y, slant);
@@ -133,7 +145,10 @@ std::optional<cv::Point2f> EpipolarMatcher::align(const cv::Point2f& left_positi
     if (!(std::abs(slant) <= kSteepest)) return std::nullopt;
     const float u_right = left_position.x - found.x;
     if (u_right < 0.f || u_right > static_cast<float>(images_.right.cols - 2 * kMargin - 1)) return std::nullopt;
-    if (std::max(std::abs(step[0]), std::abs(step[1])) < kConverged) break;
+    // Each step is about as much shorter than the one before as that one was.
+    const float length = std::max(std::abs(step[0]), std::abs(step[1]));
+    if (length < kConverged || length * length < kNextConverged * step_before) break;
+    step_before = length;
   }
 
   const auto [product, square, other_square] = patch.similarity();

@@ -46,7 +46,7 @@ class EpipolarMatcher {
 
  private:
   std::optional<int> searchRow(const cv::Point2f& left_position) const;
-  cv::Point searchAround(const cv::Point& left, int disparity) const;
+  cv::Point2f searchAround(const cv::Point& left, int disparity) const;
   std::optional<cv::Point2f> align(const cv::Point2f& left_position, const cv::Point2f& start) const;
 
   EpipolarMatcherOptions options_;
