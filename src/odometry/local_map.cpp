@@ -86,11 +86,9 @@ LocalMap::View LocalMap::view() const {
   View view;
   view.rows.kind = kind_;
   view.point.reserve(points_.size()), view.seen.reserve(points_.size()), view.pixels.reserve(points_.size());
-  const std::size_t first_remembered = frames_.size() - std::min(frames_.size(), std::size_t(options_.remembered));
-  const int oldest = frames_[first_remembered].id;
+  const int since = lookedForSince();
   for (std::size_t p = 0; p < points_.size(); ++p) {
-    const auto& observations = points_[p].observations;
-    if (observations.size() < 2 && observations.back().frame_id < oldest) continue;
+    if (!isLookedFor(points_[p], since)) continue;
     Eigen::Vector3d predicted;
     if (!predictObservation(camera_, newestPose(), points_[p].position, predicted, nullptr)) continue;
     if (!camera_.sees(predicted)) continue;
@@ -339,17 +337,30 @@ std::vector<double> LocalMap::parallaxToPredecessors(std::size_t frames) const {
   return parallax;
 }
 
+/// The frame since which a point must have been seen if it was seen only once.
+int LocalMap::lookedForSince() const {
+  return frames_[frames_.size() - std::min(frames_.size(), std::size_t(options_.remembered))].id;
+}
+
+/// A place that was seen once and then missed is most often no place at all.
+bool LocalMap::isLookedFor(const Point& point, int since) {
+  const std::size_t sightings = point.observations.size();
+  return sightings >= 2 || (sightings == 1 && point.observations.back().frame_id >= since);
+}
+
 void LocalMap::removeFrame(std::size_t index) {
   const int id = frames_[index].id;
   frames_.erase(frames_.begin() + static_cast<std::ptrdiff_t>(index));
+  const int since = lookedForSince();
   auto kept = points_.begin();
   for (Point& point : points_) {
     const auto here = sightingIn(point.observations, id);
     if (here != point.observations.end()) point.observations.erase(here);
-    // The others close up in their order; what nothing sees any more keeps its memory for a new point.
-    if (point.observations.empty()) {
+    // The others close up in their order; what is not looked for any more keeps its memory for a new point.
+    if (!isLookedFor(point, since)) {
+      point.observations.clear();
       // Room for many sightings would stay with a point that will have few.
-      if (point.observations.capacity() > kUsualSightings) point.observations = std::vector<Observation>();
+      if (point.observations.capacity() > kUsualSightings) point.observations.shrink_to_fit();
       spare_.push_back(std::move(point));
     } else {
       if (&*kept != &point) *kept = std::move(point);
@@ -367,10 +378,6 @@ void LocalMap::Problem::clear() {
 void LocalMap::pose(Problem& problem) const {
   Window& window = problem.window;
   window.camera = camera_;
-  std::size_t sightings = 0;
-  for (const Point& point : points_) sightings += point.observations.size();
-  window.points.reserve(points_.size()), problem.points.reserve(points_.size());
-  window.observations.reserve(sightings);
   for (const Frame& frame : frames_) {
     window.T_camera_origin.push_back(frame.T_camera_origin);
     problem.frame_ids.push_back(frame.id);

@@ -176,6 +176,8 @@ class LocalMap {
   OldKeyframe keyframe(std::size_t frame, bool with_looks) const;
   std::vector<int> sharedPoints() const;
   std::vector<double> parallaxToPredecessors(std::size_t frames) const;
+  int lookedForSince() const;
+  static bool isLookedFor(const Point& point, int since);
   void removeFrame(std::size_t index);
   void cutOff(const std::vector<double>& squares, Adjustment& adjustment);
   bool needsKeyframe() const;
