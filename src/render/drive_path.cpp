@@ -3,98 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <stdexcept>
-
-#include "random.hpp"
+#include <utility>
 
 namespace sdvo::render {
 
-namespace {
-
-/// Smooth zero-mean signal with unit variance: a few sines of random phase between two frequencies (Hz).
-class Wobble {
- public:
-  Wobble(Random& random, double min_frequency, double max_frequency) {
-    for (Sine& sine : sines_) sine = {random.uniform(min_frequency, max_frequency), random.uniform(0.0, 2.0 * M_PI)};
-  }
-  double operator()(double time) const {
-    double sum = 0.0;
-    for (const Sine& sine : sines_) sum += std::sin(2.0 * M_PI * sine.frequency * time + sine.phase);
-    return sum * std::sqrt(2.0 / kCount);
-  }
-
- private:
-  static constexpr int kCount = 5;
-  struct Sine {
-    double frequency, phase;
-  };
-  Sine sines_[kCount];
-};
-
-/// A closed or open line in the ground plan by its curvature, integrated in small steps.
-struct PlanCurve {
-  std::vector<Eigen::Vector3d> samples;  ///< x, z, heading (rad, from +z towards +x), every kStep metres
-  static constexpr double kStep = 0.05;
-
-  void run(double length, double curvature) {
-    // Clothoids at both ends of an arc: nobody turns the wheel in an instant.
-    const double ramp = std::min(8.0, 0.5 * length);
-    const double plateau = curvature * length / (length - ramp);
-    for (double at = 0.5 * kStep; at < length; at += kStep) {
-      const double share = std::clamp(std::min(at, length - at) / ramp, 0.0, 1.0);
-      const Eigen::Vector3d last = samples.empty() ? Eigen::Vector3d::Zero() : samples.back();
-      const double heading = last.z() + kStep * (curvature == 0.0 ? 0.0 : plateau * share);
-      samples.emplace_back(last.x() + kStep * std::sin(heading), last.y() + kStep * std::cos(heading), heading);
-    }
-  }
-  double length() const { return kStep * static_cast<double>(samples.size()); }
-  Eigen::Vector3d at(double distance) const {
-    const double index = std::clamp(distance / kStep, 0.0, static_cast<double>(samples.size()) - 1.001);
-    const auto i = static_cast<std::size_t>(index);
-    return samples[i] + (index - static_cast<double>(i)) * (samples[i + 1] - samples[i]);
-  }
-};
-
-Eigen::Isometry3d poseFrom(double x, double y, double z, double heading, double pitch, double roll) {
-  Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-  pose.translation() << x, y, z;
-  pose.linear() =
-      (Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitX()) *
-       Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitZ()))
-          .toRotationMatrix();
-  return pose;
-}
-
-/// Distance after `time` along a way of `length` with `stops` stops of 3 s, at most `speed` and 1.5 m/s² of braking.
-double distanceWithStops(double time, double length, int stops, double speed) {
-  constexpr double kAcceleration = 1.5, kPause = 3.0;
-  const double leg = length / (stops + 1);
-  const double ramp_time = speed / kAcceleration, ramp_length = 0.5 * speed * ramp_time;
-  const double leg_time = 2.0 * ramp_time + (leg - 2.0 * ramp_length) / speed;
-  const int whole = static_cast<int>(time / (leg_time + kPause));
-  const double t = std::min(time - whole * (leg_time + kPause), leg_time);
-  const double within = t < ramp_time              ? 0.5 * kAcceleration * t * t
-                        : t < leg_time - ramp_time ? ramp_length + speed * (t - ramp_time)
-                                                   : leg - 0.5 * kAcceleration * (leg_time - t) * (leg_time - t);
-  return whole * leg + within;
-}
-
-std::vector<Eigen::Isometry3d> relativeToFirst(std::vector<Eigen::Isometry3d> poses) {
-  const Eigen::Isometry3d T_first_world = poses.front().inverse();
-  for (Eigen::Isometry3d& pose : poses) pose = T_first_world * pose;
-  return poses;
-}
-
-/// Shrinks the way along each axis to the side of a cube, m.
-void shrinkInto(double side, std::vector<Eigen::Isometry3d>& poses) {
-  Eigen::AlignedBox3d box;
-  for (const Eigen::Isometry3d& pose : poses) box.extend(pose.translation());
-  const Eigen::Array3d scale = side / box.sizes().array().max(side);
-  for (Eigen::Isometry3d& pose : poses) pose.translation().array() *= scale;
-}
-
-}  // namespace
-
-DrivePath::DrivePath(std::vector<Eigen::Isometry3d> poses, double rate) : poses_(std::move(poses)), rate_(rate) {
+DrivePath::DrivePath(std::vector<Eigen::Isometry3d> poses, double rate, int steps)
+    : poses_(std::move(poses)), rate_(rate), steps_(steps) {
   if (poses_.empty()) throw std::invalid_argument("a drive needs at least one pose");
   distances_.push_back(0.0);
   for (std::size_t i = 1; i < poses_.size(); ++i) {
@@ -104,101 +18,27 @@ DrivePath::DrivePath(std::vector<Eigen::Isometry3d> poses, double rate) : poses_
 }
 
 Eigen::Isometry3d DrivePath::poseAt(double time) const {
-  if (count() == 1) return poses_.front();
-  const double index = time * rate_;
-  const int i = std::clamp(static_cast<int>(std::floor(index)), 0, count() - 2);
+  const auto last = static_cast<int>(poses_.size()) - 1;
+  if (last == 0) return poses_.front();
+  const double index = time * rate_ * steps_;
+  const int i = std::clamp(static_cast<int>(std::floor(index)), 0, last - 1);
   const double share = index - i;
-  if (share == 0.0) return pose(i);
-  const Eigen::AngleAxisd turn(pose(i).linear().transpose() * pose(i + 1).linear());
-  Eigen::Isometry3d result = pose(i);
-  result.linear() = pose(i).linear() * Eigen::AngleAxisd(share * turn.angle(), turn.axis()).toRotationMatrix();
-  result.translation() += share * (pose(i + 1).translation() - pose(i).translation());
+  const Eigen::Isometry3d& before = poses_[static_cast<std::size_t>(i)];
+  const Eigen::Isometry3d& after = poses_[static_cast<std::size_t>(i) + 1];
+  if (share == 0.0) return before;
+  const Eigen::AngleAxisd turn(before.linear().transpose() * after.linear());
+  Eigen::Isometry3d result = before;
+  result.linear() = before.linear() * Eigen::AngleAxisd(share * turn.angle(), turn.axis()).toRotationMatrix();
+  result.translation() += share * (after.translation() - before.translation());
   return result;
 }
 
 double DrivePath::distanceAt(double time) const {
-  if (count() == 1) return 0.0;
-  const double index = std::clamp(time * rate_, 0.0, static_cast<double>(count() - 1));
-  const int i = std::min(static_cast<int>(index), count() - 2);
+  const auto last = static_cast<int>(poses_.size()) - 1;
+  if (last == 0) return 0.0;
+  const double index = std::clamp(time * rate_ * steps_, 0.0, static_cast<double>(last));
+  const int i = std::min(static_cast<int>(index), last - 1);
   return distances_[i] + (index - i) * (distances_[i + 1] - distances_[i]);
-}
-
-const std::vector<std::string>& presetNames() {
-  static const std::vector<std::string> names = {"straight", "figure_eight", "city_loop", "back_and_forth",
-                                                 "hover",    "hover_1m",     "still"};
-  return names;
-}
-
-DrivePath makePresetPath(const std::string& name, int frames, double rate, std::uint64_t seed) {
-  if (std::find(presetNames().begin(), presetNames().end(), name) == presetNames().end())
-    throw std::invalid_argument("there is no trajectory preset '" + name + "'");
-  Random random(seed, 20);
-  const Wobble bounce(random, 0.8, 2.5), nod(random, 0.8, 2.5), sway(random, 0.5, 1.5), drift(random, 0.02, 0.08);
-  std::vector<Eigen::Isometry3d> poses;
-
-  if (name == "still") {
-    poses.assign(static_cast<std::size_t>(frames > 0 ? frames : 100), Eigen::Isometry3d::Identity());
-  } else if (name == "back_and_forth") {
-    constexpr double kWay = 20.0, kPeriod = 13.0;  // m ahead, s for there and back
-    constexpr int kTimes = 5;
-    if (frames <= 0) frames = 1 + static_cast<int>(kTimes * kPeriod * rate);
-    for (int i = 0; i < frames; ++i) {
-      const double z = 0.5 * kWay * (1.0 - std::cos(2.0 * M_PI * i / (rate * kPeriod)));
-      poses.push_back(poseFrom(0.3 * std::sin(M_PI * z / kWay), 0.0, z, 0.0, 0.0, 0.0));
-    }
-  } else if (name == "hover" || name == "hover_1m") {
-    const Wobble x(random, 0.03, 0.15), y(random, 0.03, 0.2), z(random, 0.03, 0.15), yaw(random, 0.02, 0.1),
-        pitch(random, 0.1, 0.4), roll(random, 0.1, 0.4);
-    for (int i = 0; i < (frames > 0 ? frames : 400); ++i) {
-      const double t = i / rate;
-      poses.push_back(poseFrom(0.9 * x(t), 0.35 * y(t), 0.9 * z(t), 0.45 * yaw(t), 0.04 * pitch(t), 0.04 * roll(t)));
-    }
-    poses = relativeToFirst(std::move(poses));
-    if (name == "hover_1m") shrinkInto(1.0, poses);
-  } else {
-    PlanCurve curve;
-    double speed = 10.0;
-    int stops = 0;
-    const auto addLap = [&] {
-      if (name == "straight") {
-        curve.run(300.0, 0.0);
-      } else if (name == "figure_eight") {
-        speed = 7.0;
-        constexpr double kRadius = 28.0;
-        curve.run(2.0 * M_PI * kRadius, 1.0 / kRadius);
-        curve.run(2.0 * M_PI * kRadius, -1.0 / kRadius);
-      } else {
-        speed = 11.0;
-        stops = 3;
-        constexpr double kTurn = 14.0;  // radius of the corners, m
-        for (const double side : {310.0, 210.0, 310.0, 210.0}) {
-          curve.run(side, 0.0);
-          curve.run(0.5 * M_PI * kTurn, 1.0 / kTurn);
-        }
-      }
-    };
-    addLap();
-    const double lap = curve.length();
-    const auto distanceAt = [&](double t) { return stops > 0 ? distanceWithStops(t, lap, stops, speed) : speed * t; };
-    if (frames <= 0)
-      for (frames = 1; distanceAt(frames / rate) < lap - 1e-6; ++frames) continue;
-    while (curve.length() < distanceAt(frames / rate)) addLap();
-    const double hills = name == "figure_eight" ? 2.0 : name == "straight" ? 3.0 : 1.0;  // whole ones: laps must meet
-    for (int i = 0; i < frames; ++i) {
-      const double t = i / rate, distance = distanceAt(t);
-      // Bumps grow with the speed and vanish at a stop, where the picture has to stand still.
-      const double pace = std::min(1.0, (distanceAt(t + 0.05) - distanceAt(std::max(0.0, t - 0.05))) / (0.1 * speed));
-      const Eigen::Vector3d plan = curve.at(distance);
-      const double phase = 2.0 * M_PI * hills * distance / lap;
-      const double hill = 0.5 * (1.0 - std::cos(phase));
-      const double climb = std::atan(0.5 * std::sin(phase) * 2.0 * M_PI * hills / lap);
-      const double weave = name == "straight" ? 0.25 * drift(t) : 0.0;
-      poses.push_back(poseFrom(plan.x() + weave, hill + 0.008 * pace * bounce(t), plan.y(), plan.z(),
-                               -climb + 0.0025 * pace * nod(t), 0.003 * pace * sway(t)));
-    }
-    poses = relativeToFirst(std::move(poses));
-  }
-  return DrivePath(std::move(poses), rate);
 }
 
 }  // namespace sdvo::render

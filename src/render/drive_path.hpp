@@ -1,8 +1,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <cstdint>
-#include <string>
 #include <vector>
 
 namespace sdvo::render {
@@ -11,12 +9,16 @@ namespace sdvo::render {
 /// presets the first camera's): x right, y down, z forward, metres.
 class DrivePath {
  public:
-  /// `poses` are `1/rate` seconds apart; at least one, else std::invalid_argument.
-  DrivePath(std::vector<Eigen::Isometry3d> poses, double rate);
+  /// A frame is taken at every `steps`-th of the poses, which is `1/rate` seconds; at least one, else
+  /// std::invalid_argument.
+  DrivePath(std::vector<Eigen::Isometry3d> poses, double rate, int steps = 1);
 
-  int count() const { return static_cast<int>(poses_.size()); }
+  /// Number of frames.
+  int count() const { return (static_cast<int>(poses_.size()) - 1) / steps_ + 1; }
   double rate() const { return rate_; }
-  const Eigen::Isometry3d& pose(int index) const { return poses_[static_cast<std::size_t>(index)]; }
+  /// Of a frame.
+  const Eigen::Isometry3d& pose(int frame) const { return poses_[static_cast<std::size_t>(frame * steps_)]; }
+  /// All poses, those between the frames as well.
   const std::vector<Eigen::Isometry3d>& poses() const { return poses_; }
 
   /// Between poses, and a little beyond the ends, at constant velocity; `time` in seconds since the first pose.
@@ -28,15 +30,7 @@ class DrivePath {
   std::vector<Eigen::Isometry3d> poses_;
   std::vector<double> distances_;
   double rate_;
+  int steps_;
 };
-
-/// The names makePresetPath() knows.
-const std::vector<std::string>& presetNames();
-
-/// A preset at `rate` Hz: straight (10 m/s), figure_eight (two circles of 28 m radius), city_loop (1.1 km with three
-/// stops), back_and_forth (20 m, five times), hover (a drone in a room), hover_1m (the same, all of its way shrunk into
-/// 1 m^3) or still. `frames` = 0 asks for the preset's natural length. Drives shake a little as cars do. Throws
-/// std::invalid_argument for another name.
-DrivePath makePresetPath(const std::string& name, int frames, double rate, std::uint64_t seed);
 
 }  // namespace sdvo::render

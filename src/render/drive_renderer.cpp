@@ -25,21 +25,13 @@ void RenderOptions::describe(OptionList& list) {
   misalignment.describe(list);
 }
 
-StereoCamera kittiCamera() {
-  return {707.0912, 707.0912, 601.8873, 183.1104, 379.8145 / 707.0912, 1241, 376};
-}
-
-StereoCamera eurocCamera() {
-  return {436.2, 436.2, 367.2, 252.2, 0.110, 752, 480};
-}
-
 DriveRenderer::DriveRenderer(const DrivePath& path, Scenery scenery, const StereoCamera& camera,
                              const RenderOptions& options, int first, int count, int threads)
     : path_(path), camera_(camera), options_(options), first_(first), device_(threads) {
   camera_.check();
   checked(options_);
   const auto seed = static_cast<std::uint64_t>(options_.seed);
-  world_ = scenery == Scenery::kStreet ? makeStreetWorld(path_, seed) : makeRoomWorld(path_, seed);
+  world_ = makeWorld(scenery, path_, seed);
   caster_ = std::make_unique<RayCaster>(device_, world_.mesh);
   lightWorld(world_, *caster_, threads);
   if (world_.road) {
@@ -75,7 +67,7 @@ cv::Mat1f DriveRenderer::brightness(int side, double time, Worker& worker) const
     return image;
   }
   // One ray per pixel and moment; the rays' places within the pixel differ so that edges at rest are smooth as well.
-  const int moments = std::max(8, options_.samples);
+  const int moments = momentsOfExposure(time);
   for (int i = 0; i < moments; ++i) {
     const double moment = time + exposure * ((i + 0.5) / moments - 0.5);
     worker.place(traffic_.at(moment));
@@ -86,6 +78,16 @@ cv::Mat1f DriveRenderer::brightness(int side, double time, Worker& worker) const
                    image);
   }
   return image;
+}
+
+int DriveRenderer::momentsOfExposure(double time) const {
+  const double half = 0.5 * options_.effects.motion_blur;
+  const Eigen::Matrix3d turn = path_.poseAt(time - half).linear().transpose() * path_.poseAt(time + half).linear();
+  const double pixels = camera_.fx * Eigen::AngleAxisd(turn).angle();
+  // A power of two has no factor in common with the 5 that shuffles the rays.
+  int moments = std::max(8, options_.samples);
+  while (moments < pixels && moments < kMostMoments) moments *= 2;
+  return moments;
 }
 
 StereoPair DriveRenderer::render(int frame, Worker& worker) const {

@@ -43,15 +43,11 @@ struct Truth {
   cv::Mat1b moving;     ///< 1 on moving cars
 };
 
-/// KITTI's rig (sequences 04 to 10) and a rectified one like EuRoC's.
-StereoCamera kittiCamera();
-StereoCamera eurocCamera();
-
 /// A drive ready to be rendered: world, light and traffic around the whole trajectory. Rendering is const, depends on
 /// the seed and the frame alone and may run on many threads, each with its own Worker.
 class DriveRenderer {
  public:
-  enum class Scenery { kStreet, kRoom };
+  using Scenery = render::Scenery;
 
   /// Scratch space of a thread.
   using Worker = MovingScene;
@@ -75,9 +71,13 @@ class DriveRenderer {
  private:
   View view(int side, const Eigen::Isometry3d& T_world_left) const;
   cv::Mat1f brightness(int side, double time, Worker& worker) const;
+  /// How many images an exposure is the mean of: at least 8, and so many that a turn smears instead of repeating edges.
+  int momentsOfExposure(double time) const;
   double measureMovingShare(int first, int count) const;
   void tuneTraffic(int first, int count);
   void setDensity(double density);
+
+  static constexpr int kMostMoments = 64;
 
   DrivePath path_;
   StereoCamera camera_;

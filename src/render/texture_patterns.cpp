@@ -174,9 +174,10 @@ cv::Mat1f makeNoise(int side, double exponent, std::uint64_t seed) {
   return (noise - mean[0]) / deviation[0];
 }
 
-TextureSet::TextureSet(std::uint64_t seed) : textures_(static_cast<std::size_t>(Material::kFacade) + kFacadeCount) {
+TextureSet::TextureSet(std::uint64_t seed, double scale)
+    : textures_(static_cast<std::size_t>(Material::kFacade) + kFacadeCount) {
   const auto set = [&](Material material, const cv::Mat1f& image, double size) {
-    textures_[static_cast<std::size_t>(material)] = std::make_shared<Texture>(image, size);
+    textures_[static_cast<std::size_t>(material)] = std::make_shared<Texture>(image, scale * size);
   };
   set(Material::kAsphalt, asphalt(seed + 10), 10.24);
   set(Material::kGrass, grass(seed + 20), 7.0);
@@ -189,10 +190,12 @@ TextureSet::TextureSet(std::uint64_t seed) : textures_(static_cast<std::size_t>(
       3.0);
   set(Material::kPoster, poster(seed + 90), 4.0);
   set(Material::kCarSide, carSide(seed + 95), 3.0);
+  set(Material::kPlaster,
+      clamped(0.8 + 0.012 * makeNoise(512, 1.2, seed + 97) + 0.006 * makeNoise(512, 0.3, seed + 98)), 2.5);
   for (int style = 0; style < kFacadeCount; ++style)
     textures_[static_cast<std::size_t>(Material::kFacade) + style] =
-        std::make_shared<Texture>(facade(style, seed + 100 + 10 * style), 12.8);
-  detail_ = std::make_shared<Texture>(clamped(0.5 + 0.15 * makeNoise(512, 0.9, seed + 5)), 5.3);
+        std::make_shared<Texture>(facade(style, seed + 100 + 10 * style), scale * 12.8);
+  detail_ = std::make_shared<Texture>(clamped(0.5 + 0.15 * makeNoise(512, 0.9, seed + 5)), scale * 5.3);
 }
 
 TextureSet::TextureSet(const Texture& only) : textures_(static_cast<std::size_t>(Material::kFacade) + kFacadeCount) {

@@ -23,6 +23,7 @@ enum class Material : std::uint8_t {
   kConcrete,
   kPoster,
   kCarSide,
+  kPlaster,
   kFacade,  ///< the first of kFacadeCount
 };
 constexpr int kFacadeCount = 6;
@@ -30,7 +31,8 @@ constexpr int kFacadeCount = 6;
 /// The procedural textures of a world, all derived from the seed. Every one has a 1/f part, as photographs have.
 class TextureSet {
  public:
-  explicit TextureSet(std::uint64_t seed);
+  /// `scale` shrinks or stretches all of them; at 1 a brick is 25 cm long.
+  explicit TextureSet(std::uint64_t seed, double scale = 1.0);
   /// A set with the one texture given in every place, for tests.
   explicit TextureSet(const Texture& only);
 

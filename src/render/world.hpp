@@ -56,13 +56,21 @@ struct World {
   float irradiance(const Eigen::Vector3f& normal, float sun_share) const;
 };
 
-/// A street with houses, trees, poles and parked cars along the whole of `path`. Nothing stands on any part of it,
-/// so that ways that cross or repeat themselves stay drivable.
-World makeStreetWorld(const DrivePath& path, std::uint64_t seed);
+enum class Scenery { kStreet, kRoom, kCorridor, kDesk };
 
-/// A machine hall around `path` with pipes, crates and shelves that keep clear of it; throws std::invalid_argument when
-/// the path does not fit into 60 m.
+/// A world around `path`; throws std::invalid_argument when the path does not suit it.
+/// - street: houses, trees, poles and parked cars along the whole of the path. Nothing stands on any part of it, so
+/// that
+///   ways that cross or repeat themselves stay drivable.
+/// - room: a machine hall with pipes, crates and shelves that keep clear of the path, which must fit into 60 m.
+/// - corridor: plain walls with doors along the CorridorPlan of this seed, between whose walls the path must stay.
+/// - desk: things on a desk 0.3 to 1 m ahead of the path, which must fit into 1 m.
+World makeWorld(Scenery scenery, const DrivePath& path, std::uint64_t seed);
+
+World makeStreetWorld(const DrivePath& path, std::uint64_t seed);
 World makeRoomWorld(const DrivePath& path, std::uint64_t seed);
+World makeCorridorWorld(const DrivePath& path, std::uint64_t seed);
+World makeDeskWorld(const DrivePath& path, std::uint64_t seed);
 
 /// Finds which small surfaces lie in the shadow and bakes the sunlight on the ground.
 void lightWorld(World& world, const RayCaster& caster, int threads);

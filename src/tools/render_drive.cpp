@@ -8,6 +8,7 @@
 #include <exception>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <mutex>
 #include <stdexcept>
 #include <string>
@@ -18,6 +19,8 @@
 #include "../common/progress.hpp"
 #include "../data/kitti_layout.hpp"
 #include "../render/drive_renderer.hpp"
+#include "../render/preset_paths.hpp"
+#include "../render/rigs.hpp"
 #include "run_tool.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 #include "stereo_descriptor_vo/data/kitti_writer.hpp"
@@ -27,6 +30,8 @@ namespace fs = std::filesystem;
 using sdvo::render::DrivePath;
 using sdvo::render::DriveRenderer;
 using sdvo::render::RenderOptions;
+using sdvo::render::Rig;
+using sdvo::render::Scenery;
 
 namespace {
 
@@ -121,6 +126,15 @@ DrivePath makePath(const Request& request) {
                                       static_cast<std::uint64_t>(request.options.seed));
 }
 
+Scenery chooseScenery(const Request& request, const Rig& rig) {
+  static const std::map<std::string, Scenery> names = {{"street", Scenery::kStreet},
+                                                       {"room", Scenery::kRoom},
+                                                       {"corridor", Scenery::kCorridor},
+                                                       {"desk", Scenery::kDesk}};
+  if (request.world != "auto") return names.at(request.world);
+  return sdvo::render::presetScenery(request.trajectory).value_or(rig.indoors ? Scenery::kRoom : Scenery::kStreet);
+}
+
 double seconds(const std::chrono::steady_clock::time_point& since) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - since).count();
 }
@@ -130,16 +144,15 @@ double cpuSeconds() {
 }
 
 int renderDrive(Request request) {
-  const bool euroc = request.rig == "euroc";
-  if (request.rate == 0.0) request.rate = euroc ? 20.0 : 10.0;
+  const Rig& rig = sdvo::render::findRig(request.rig);
+  if (request.rate == 0.0) request.rate = rig.rate;
   if (request.threads == 0) request.threads = std::max(1u, std::thread::hardware_concurrency());
   if (request.options.samples != 1 && request.options.samples != 4 && request.options.samples != 16)
     throw std::invalid_argument("--samples must be 1, 4 or 16");
   if (request.calibration.empty() && !request.size.empty())
     throw std::invalid_argument("--size belongs to --calib; a rig preset has its own size");
-  const sdvo::StereoCamera camera = !request.calibration.empty() ? readCalibration(request.calibration, request.size)
-                                    : euroc                      ? sdvo::render::eurocCamera()
-                                                                 : sdvo::render::kittiCamera();
+  const sdvo::StereoCamera camera =
+      request.calibration.empty() ? rig.camera : readCalibration(request.calibration, request.size);
   const DrivePath path = makePath(request);
   if (request.start >= path.count())
     throw std::invalid_argument("--start " + std::to_string(request.start) + " is beyond the last pose " +
@@ -155,14 +168,12 @@ int renderDrive(Request request) {
                                     std::to_string(available) + " frames written");
   };
   checkTruthFrames(count);
-  const bool indoors = request.trajectory == "hover" || request.trajectory == "hover_1m";
-  const bool room = request.world == "room" || (request.world == "auto" && (euroc || indoors));
 
   sdvo::KittiWriter output(request.output);
   cv::setNumThreads(1);  // the frames are the parallel work
   const auto begin = std::chrono::steady_clock::now();
-  const DriveRenderer renderer(path, room ? DriveRenderer::Scenery::kRoom : DriveRenderer::Scenery::kStreet, camera,
-                               request.options, request.start, count, request.threads);
+  const DriveRenderer renderer(path, chooseScenery(request, rig), camera, request.options, request.start, count,
+                               request.threads);
   std::printf("world: %.1f million surfaces in %.1f s, moving share %.4f\n",
               1e-6 * static_cast<double>(renderer.world().mesh.quads.size()), seconds(begin), renderer.movingShare());
   std::fflush(stdout);
@@ -188,6 +199,30 @@ int renderDrive(Request request) {
   std::printf("%zu pairs of %dx%d px, %.1f pairs/s, %.2f CPU s per pair\n", frames.size(), camera.width, camera.height,
               pairs / std::max(1e-9, seconds(rendering)), (cpuSeconds() - cpu) / pairs);
   return 0;
+}
+
+std::string listed(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+std::vector<std::string> rigNames() {
+  std::vector<std::string> names;
+  for (const Rig& rig : sdvo::render::rigs()) names.push_back(rig.name);
+  return names;
+}
+
+/// Name, size, focal length and baseline of each rig.
+std::string rigsText() {
+  std::vector<std::string> texts;
+  for (const auto& [name, camera, rate, indoors] : sdvo::render::rigs()) {
+    char text[96];
+    std::snprintf(text, sizeof text, "%s (%dx%d, f %.4g px, %.2g m)", name.c_str(), camera.width, camera.height,
+                  camera.fx, camera.baseline);
+    texts.push_back(text);
+  }
+  return listed(texts);
 }
 
 /// One flag per field of the options, with the default, the unit and the range that the struct gives it.
@@ -219,24 +254,23 @@ void addOptions(CLI::App& app, RenderOptions& options) {
 int main(int argc, char** argv) {
   CLI::App app("Renders a stereo drive of any length with exact ground truth in KITTI layout.");
   Request request;
-  app.add_option("--trajectory", request.trajectory,
-                 "straight, figure_eight, city_loop, back_and_forth, hover, hover_1m, still, or a KITTI pose file")
+  app.add_option("--trajectory", request.trajectory, listed(sdvo::render::presetNames()) + ", or a KITTI pose file")
       ->required();
   app.add_option("--output", request.output, "Directory to create")->required();
   app.add_option("--frames", request.frames, "Pairs to render [default: all of the trajectory]")
       ->check(CLI::Range(1, 1000000));
   app.add_option("--start", request.start, "First pose to render [default 0]")->check(CLI::Range(0, 1000000));
-  app.add_option("--rate", request.rate, "Pairs per second, Hz [default: 10, with --rig euroc 20]")
+  app.add_option("--rate", request.rate, "Pairs per second, Hz [default: the rig's, 10 or indoors 20]")
       ->check(CLI::Range(0.1, 1000.0));
   app.add_option("--threads", request.threads, "Threads; they do not change the result [default: one per processor]")
       ->check(CLI::Range(1, 1024));
-  app.add_option("--rig", request.rig,
-                 "kitti (1241x376, f 707 px, 0.54 m) or euroc (752x480, f 436 px, 0.11 m, indoors)")
-      ->check(CLI::IsMember({"kitti", "euroc"}));
+  app.add_option("--rig", request.rig, rigsText())->check(CLI::IsMember(rigNames()));
   app.add_option("--calib", request.calibration, "A KITTI calib.txt (P0 and P1) instead of the rig; needs --size");
   app.add_option("--size", request.size, "WxH, image size in px for --calib");
-  app.add_option("--world", request.world, "street, room, or auto: a room for --rig euroc, hover and hover_1m")
-      ->check(CLI::IsMember({"auto", "street", "room"}));
+  app.add_option("--world", request.world,
+                 "street, room, corridor, desk, or auto: the trajectory's own, else a street for kitti and a room for "
+                 "other rigs")
+      ->check(CLI::IsMember({"auto", "street", "room", "corridor", "desk"}));
   app.add_option("--truth-frame", request.truth_frames,
                  "Number(s) of written frames whose exact depth, disparity, flow and moving pixels go to truth/*.npy");
   addOptions(app, request.options);

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "../../src/render/drive_renderer.hpp"
+#include "../../src/render/preset_paths.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
 
 namespace sdvo::render {

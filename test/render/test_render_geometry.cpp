@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "../../src/render/drive_renderer.hpp"
+#include "../../src/render/rigs.hpp"
 
 namespace sdvo::render {
 namespace {

@@ -5,6 +5,8 @@
 #include <vector>
 
 #include "../../src/render/drive_renderer.hpp"
+#include "../../src/render/preset_paths.hpp"
+#include "../../src/render/rigs.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
