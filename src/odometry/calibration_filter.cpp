@@ -47,11 +47,10 @@ RigCalibration::Vector CalibrationFilter::significantSpread() const {
   const RigCalibration::Matrix covariance = present_->information.inverse();
   const RigCalibration::Vector estimate = covariance * present_->information_mean;
   const RigCalibration::Vector prior(options_.prior_offset, options_.prior_bend);
-  const RigCalibration::Vector trust(options_.trust, options_.bend_trust);
-  const RigCalibration::Vector variance = covariance.diagonal().cwiseQuotient(trust.cwiseAbs2());
+  const RigCalibration::Vector chance = options_.significance * options_.significance * covariance.diagonal();
   for (int i = 0; i < RigCalibration::kParameters; ++i) {
     const double distance = estimate[i] - prior[i];
-    const double significant = std::sqrt(std::max(distance * distance - variance[i], 0.0));
+    const double significant = std::sqrt(std::max(distance * distance - chance[i], 0.0));
     spread[i] = std::clamp(significant, spread[i], options_.prior_sigma);
   }
   return spread;
@@ -65,16 +64,13 @@ void CalibrationFilter::noteCommon(double square) {
 void CalibrationFilter::note(int newest_id, const RigCalibration& calibration,
                              const RigCalibration::Matrix& information) {
   calibration_ = calibration;
-  present_ = Evidence{past_.information + information, {}};
-  present_->information_mean =
-      (prior_.information + present_->information) * calibration.value - prior_.information_mean;
-  if (!pending_)
-    pending_ = {newest_id, {information, present_->information_mean - past_.information_mean}};
+  const RigCalibration::Matrix known = past_.information + information;
+  present_ = Evidence{known, (prior_.information + known) * calibration.value - prior_.information_mean};
+  if (!pending_) pending_ = {newest_id, {information, present_->information_mean - past_.information_mean}};
 }
 
 RigCalibration::Vector CalibrationFilter::sigma() const {
-  if (!present_ || !options_.enabled)
-    return RigCalibration::Vector::Constant(std::numeric_limits<double>::quiet_NaN());
+  if (!present_ || !options_.enabled) return RigCalibration::Vector::Constant(std::numeric_limits<double>::quiet_NaN());
   const RigCalibration::Vector prior_sigma = RigCalibration::Vector::Constant(options_.prior_sigma);
   const RigCalibration::Matrix covariance = (informationOf(prior_sigma) + present_->information).inverse();
   return covariance.diagonal().cwiseSqrt() / options_.trust;

@@ -18,15 +18,15 @@ CalibrationOptions someOptions() {
   options.prior_bend = -1.0;
   options.prior_sigma = 2.0;
   options.trust = 0.25;
-  options.bend_trust = 0.5;
+  options.significance = 3.0;
   options.memory = 0.5;
   return options;
 }
 
 const Vector kPrior(0.5, -1.0);
 const Matrix kInformation = Vector(12.0, 5.0).asDiagonal();  // of a window
-// Standard deviations that a window of that information deserves, 1 / (trust * sqrt(information)).
-const double kOffsetSigma = 4.0 / std::sqrt(12.0), kBendSigma = 2.0 / std::sqrt(5.0);
+// Distances that are significant of a window of that information, three of its standard deviations.
+const double kOffset = 3.0 / std::sqrt(12.0), kBend = 3.0 / std::sqrt(5.0);
 
 /// Adds the window of these pairs that would find `own` without a prior.
 void addWindow(CalibrationFilter& filter, int oldest, int newest, const Vector& own,
@@ -52,7 +52,7 @@ TEST(CalibrationFilter, BeginsWithWhatTheOptionsSay) {
 
 TEST(CalibrationFilter, KeepsWhatTheOptionsSayWhereTheEvidenceIsNotSignificant) {
   CalibrationFilter filter(someOptions());
-  const Vector near = kPrior + Vector(0.9 * kOffsetSigma, -0.9 * kBendSigma);
+  const Vector near = kPrior + Vector(0.9 * kOffset, -0.9 * kBend);
   for (int newest = 9; newest < 17; ++newest) addWindow(filter, newest - 8, newest, near);
   EXPECT_LT((filter.calibration().value - kPrior).norm(), 1e-5);
   EXPECT_GT(filter.prior(8).information.diagonal().minCoeff(), 1e6);
@@ -60,17 +60,17 @@ TEST(CalibrationFilter, KeepsWhatTheOptionsSayWhereTheEvidenceIsNotSignificant) 
 
 TEST(CalibrationFilter, MovesAsFarAsTheEvidenceIsSignificant) {
   CalibrationFilter filter(someOptions());
-  const Vector far = kPrior + Vector(1.3 * kOffsetSigma, -1.5 * kBendSigma);
+  const Vector far = kPrior + Vector(1.3 * kOffset, -1.5 * kBend);
   addWindow(filter, 1, 9, far);
   // Variance of the truth: square of the distance less the estimate's own variance.
   const CalibrationBelief prior = filter.prior(2);
-  EXPECT_NEAR(prior.information(0, 0), informationOf(kOffsetSigma * std::sqrt(1.3 * 1.3 - 1.0)), 1e-3);
-  EXPECT_NEAR(prior.information(1, 1), informationOf(kBendSigma * std::sqrt(1.5 * 1.5 - 1.0)), 1e-3);
+  EXPECT_NEAR(prior.information(0, 0), informationOf(kOffset * std::sqrt(1.3 * 1.3 - 1.0)), 1e-3);
+  EXPECT_NEAR(prior.information(1, 1), informationOf(kBend * std::sqrt(1.5 * 1.5 - 1.0)), 1e-3);
   EXPECT_LT((prior.mean - kPrior).norm(), 1e-9) << "the window overlaps the next one";
   addWindow(filter, 2, 10, far);
   const Vector moved = filter.calibration().value - kPrior;
   EXPECT_GT(moved[0], 0.1);
-  EXPECT_LT(moved[0], 1.3 * kOffsetSigma);
+  EXPECT_LT(moved[0], 1.3 * kOffset);
   EXPECT_LT(moved[1], -0.1);
 }
 

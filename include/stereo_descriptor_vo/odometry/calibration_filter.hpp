@@ -13,7 +13,7 @@ struct CalibrationOptions {
   double prior_bend = 0.0;
   double prior_sigma = 1.0;
   double trust = 0.1;
-  double bend_trust = 0.3;
+  double significance = 4.0;
   double memory = 0.5;
 
   void describe(OptionList& list) {
@@ -25,19 +25,21 @@ struct CalibrationOptions {
              "standard deviation of what is known beforehand, in the centre and at 45 degrees from it");
     list.add("trust", trust, {0.01, 1.0}, "",
              "how far the window's own figure for its precision is believed: 1 / the factor on its standard deviation");
-    list.add("bend_trust", bend_trust, {0.01, 1.0}, "",
-             "the same where a bend is tested for significance: what all disparities share looks like an offset alone");
+    list.add(
+        "significance", significance, {0.0, 100.0}, "sigma",
+        "how many of the window's own standard deviations an estimate must differ from what is known beforehand to "
+        "move it");
     list.add("memory", memory, {0.0, 1.0}, "",
              "share of the earlier windows' information that one more window leaves; 1: forever");
   }
 };
 
-/// Gathers the estimates of successive windows. Windows overlap: a window's information counts as prior only for windows
-/// that share no pair with it, so that nothing is counted twice.
+/// Gathers the estimates of successive windows. Windows overlap: a window's information counts as prior only for
+/// windows that share no pair with it, so that nothing is counted twice.
 ///
 /// A window moves the calibration away from the options' prior only as far as the evidence is significant (empirical
-/// Bayes, as in Efron and Morris 1973): the prior's variance is the square of the estimate less the estimate's own
-/// variance. The rig of a simulator, or one that was calibrated well, keeps the prior to the digit.
+/// Bayes, as in Efron and Morris 1973): the prior's variance is the square of the estimate less what chance explains.
+/// The rig of a simulator, or one that was calibrated well, keeps the prior to the digit.
 class CalibrationFilter {
  public:
   explicit CalibrationFilter(const CalibrationOptions& options);
@@ -45,7 +47,8 @@ class CalibrationFilter {
   /// What is known from pairs before the window that begins with pair `oldest_id`.
   CalibrationBelief prior(int oldest_id);
 
-  /// Notes the result of the window that ends with pair `newest_id` and had the last prior(); `information` excludes it.
+  /// Notes the result of the window that ends with pair `newest_id` and had the last prior(); `information` excludes
+  /// it.
   void note(int newest_id, const RigCalibration& calibration, const RigCalibration::Matrix& information);
 
   /// Notes the square (px^2) of what a window found the calibration to leave at a point.
