@@ -22,6 +22,12 @@ void writeCovariance(std::ostream& file, const Matrix6d& covariance) {
   for (int i = 0; i < 36; ++i) file << "," << covariance(i / 6, i % 6);
 }
 
+/// A text as a field of a CSV that needs no quotes.
+std::string withoutCommas(std::string text) {
+  std::replace(text.begin(), text.end(), ',', ';');
+  return text;
+}
+
 }  // namespace
 
 OfflineRun::OfflineRun(const PipelineOptions& options)
@@ -121,14 +127,14 @@ StampedTrajectory OfflineRun::stampedPoses() const {
 void OfflineRun::writeTiming(const std::string& path) const {
   std::ofstream file(path);
   file << "frame,total_ms,detect_ms,stereo_ms,describe_ms,match_ms,motion_ms,detected,features,matches,inliers,rms_px,"
-          "coverage,state\n";
+          "coverage,state,reason\n";
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     const auto& [odometry, extraction, total_time] = frames_[i];
     file << i << "," << 1e3 * total_time << "," << 1e3 * extraction.detect_time << "," << 1e3 * extraction.stereo_time
          << "," << 1e3 * extraction.describe_time << "," << 1e3 * odometry.match_time << ","
          << 1e3 * odometry.motion_time << "," << extraction.detected << "," << odometry.features << ","
          << odometry.matches << "," << odometry.inliers << "," << odometry.rms << "," << odometry.coverage << ","
-         << toString(odometry.state) << "\n";
+         << toString(odometry.state) << "," << withoutCommas(odometry.reason) << "\n";
   }
   if (!file.flush()) throw std::runtime_error("cannot write " + path);
 }

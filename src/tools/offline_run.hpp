@@ -46,7 +46,7 @@ class OfflineRun {
   /// The poses there are, with their stamps.
   StampedTrajectory stampedPoses() const;
 
-  /// A CSV with a line for each pair: times, counts and state.
+  /// A CSV with a line for each pair: times, counts, state and its reason, in which semicolons stand for commas.
   void writeTiming(const std::string& path) const;
   /// A CSV with what a filter behind the odometry is told of each pair: state, covariances of motion and pose, reason.
   void writeStates(const std::string& path) const;

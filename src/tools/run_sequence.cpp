@@ -68,7 +68,7 @@ int main(int argc, char** argv) {
       ->capture_default_str()
       ->check(CLI::Range(1, 256));
   app.add_option("--poses", arguments.poses, "poses to write, 12 numbers a line")->required();
-  app.add_option("--timing", arguments.timing, "CSV to write, a line for each pair");
+  app.add_option("--timing", arguments.timing, "CSV to write, a line for each pair: times, counts, state and its reason");
   app.add_option("--states", arguments.states,
                  "CSV to write, a line for each pair: state, covariances of motion and pose, reason");
   return sdvo::runTool(app, argc, argv, [&] { return runSequence(arguments); });

@@ -247,6 +247,22 @@ TEST_F(Tools, OnePoseForEachPairAndTheDriveIsFollowed) {
   }
 }
 
+TEST_F(Tools, TimingEndsWithTheReasonWithoutCommas) {
+  // A grey right image refuses the pair, and the odometry says why.
+  cv::imwrite(image(1, 2).string(), cv::Mat1b(240, 320, std::uint8_t{90}));
+  const std::string timing = (root_ / "timing.csv").string(), states = (root_ / "states.csv").string();
+  ASSERT_EQ(runSequence("--timing " + timing + " --states " + states).exit_code, 0);
+  const std::vector<std::string> rows = linesOf(readText(timing)), stated = linesOf(readText(states));
+  const auto last = [](const std::string& row) { return row.substr(row.rfind(',') + 1); };
+  EXPECT_EQ(last(rows.front()), "reason");
+  EXPECT_EQ(last(rows[2]), "") << rows[2];
+  std::string reason = stated[3];
+  for (int field = 0; field < 78; ++field) reason.erase(0, reason.find(',') + 1);
+  std::replace(reason.begin(), reason.end(), ',', ';');
+  EXPECT_FALSE(reason.empty()) << stated[3];
+  EXPECT_EQ(last(rows[3]), reason) << rows[3];
+}
+
 TEST_F(Tools, StatesHaveTheCovariancesOfEachPair) {
   ASSERT_EQ(runSequence("--states " + (root_ / "states.csv").string()).exit_code, 0);
   const std::vector<std::string> rows = linesOf(readText(root_ / "states.csv"));
