@@ -105,13 +105,14 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
   if (report.refused) matches.clear();
   report.stereo_time = stopwatch.lap();
 
-  // Size from depth, then the descriptor of both views at that size.
+  // Size from depth, as far as the image has room for it, then the descriptor of both views at that size.
+  const double largest = descriptor_.largestSize(left.size());
   std::vector<StereoKeypoint> keypoints;
   keypoints.reserve(matches.size());
   for (const StereoMatch& match : matches) {
     const cv::Point2f& position = positions[match.left_index];
     keypoints.push_back({position.x, position.y, position.x - match.disparity, position.y + match.dv,
-                         static_cast<float>(depth_scale_.size(match.disparity))});
+                         static_cast<float>(std::min(depth_scale_.size(match.disparity), largest))});
   }
   const DescribedKeypoints described = descriptor_.describe(left, right, keypoints);
   features.reserve(static_cast<int>(described.index.size()));

@@ -43,6 +43,10 @@ double StereoDescriptor::reach(double size) const {
   return base_->reach(options_.extend_border ? std::min(size, BaseDescriptor::kStandardSize) : size);
 }
 
+double StereoDescriptor::largestSize(cv::Size image) const {
+  return 0.5 * std::min(image.width, image.height) / base_->reach(1.0);  // the reach is proportional to the size
+}
+
 DescribedKeypoints StereoDescriptor::describe(const cv::Mat& left_image, const cv::Mat& right_image,
                                               const std::vector<StereoKeypoint>& keypoints) const {
   cv::Mat left = left_image, right = right_image;

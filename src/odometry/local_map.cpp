@@ -82,7 +82,12 @@ bool LocalMap::continuedBy(const StereoFeatures& features) const {
   return features.camera == camera_ && (features.count() == 0 || features.kind() == kind_);
 }
 
-LocalMap::View LocalMap::view() const {
+LocalMap::View LocalMap::view(const std::optional<Eigen::Isometry3d>& T_next_newest) const {
+  const auto isSeenNext = [&](const Eigen::Vector3d& pixel) {
+    if (!T_next_newest) return false;
+    const Eigen::Vector3d next = *T_next_newest * camera_.backProject(pixel.x(), pixel.y(), pixel.z());
+    return next.z() > 0.0 && camera_.sees(camera_.project(next));
+  };
   View view;
   view.rows.kind = kind_;
   view.point.reserve(points_.size()), view.seen.reserve(points_.size()), view.pixels.reserve(points_.size());
@@ -91,11 +96,12 @@ LocalMap::View LocalMap::view() const {
     if (!isLookedFor(points_[p], since)) continue;
     Eigen::Vector3d predicted;
     if (!predictObservation(camera_, newestPose(), points_[p].position, predicted, nullptr)) continue;
-    if (!camera_.sees(predicted)) continue;
+    predicted.z() = std::max(predicted.z(), kFarthestDisparity);
+    if (!camera_.sees(predicted) && !isSeenNext(predicted)) continue;
     view.point.push_back(static_cast<int>(p));
     view.seen.push_back(points_[p].seen);
     view.pixels.emplace_back(static_cast<float>(predicted.x()), static_cast<float>(predicted.y()),
-                             static_cast<float>(std::max(predicted.z(), kFarthestDisparity)));
+                             static_cast<float>(predicted.z()));
   }
   view.rows.positions.reserve(view.point.size());
   view.rows.descriptors.create(static_cast<int>(view.point.size()), kind_.bytes, CV_8U);

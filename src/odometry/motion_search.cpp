@@ -95,8 +95,8 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
     found.sightings = std::move(aligned.sightings);
   };
   Stopwatch stopwatch;
-  const ViewPtr view = std::make_shared<const LocalMap::View>(scene.map.view());
   const std::optional<Eigen::Isometry3d>& prior = scene.guess ? scene.guess : scene.T_current_reference;
+  const ViewPtr view = std::make_shared<const LocalMap::View>(scene.map.view(prior));
   const double view_time = stopwatch.lap();
   MotionHypothesis found = searchNear(scene, view, prior);
   found.match_time += view_time;

@@ -395,6 +395,33 @@ TEST(LocalMap, DoesNotShowWhatLiesBehind) {
   EXPECT_EQ(map.view().rows.count(), shown) << "nor what lies beside the image";
 }
 
+TEST(LocalMap, ShowsWhatATurnBringsIntoTheNextImage) {
+  const synthetic::World world = someWorld(100);
+  LocalMap map(noFurtherKeyframe());
+  add(map, see(world, 0, 100, Eigen::Isometry3d::Identity()), 1, Eigen::Isometry3d::Identity(), {});
+  Eigen::Isometry3d away = Eigen::Isometry3d::Identity(), back = away;
+  away.linear() = Eigen::AngleAxisd(0.8, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  back.linear() = Eigen::AngleAxisd(-0.3, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  add(map, synthetic::noFeatures(synthetic::camera()), 2, away, {});
+  int now = 0, now_or_next = 0;
+  for (const Eigen::Vector3d& point : world.points) {
+    const auto isSeen = [&](const Eigen::Isometry3d& T_camera_origin) {
+      const Eigen::Vector3d here = T_camera_origin * point;
+      return here.z() > 0.0 && synthetic::camera().sees(synthetic::camera().project(here));
+    };
+    now += isSeen(away);
+    now_or_next += isSeen(away) || isSeen(back * away);
+  }
+  ASSERT_GT(now_or_next, now + 10);
+  EXPECT_EQ(map.view().rows.count(), now);
+  const LocalMap::View next = map.view(back);
+  EXPECT_EQ(next.rows.count(), now_or_next);
+  for (int row = 0; row < next.rows.count(); ++row) {
+    const Eigen::Vector3d& expected = world.points[static_cast<std::size_t>(next.point[row])];
+    EXPECT_LT((away.inverse() * next.rows.positions[row] - expected).norm(), 1e-3 * expected.norm());
+  }
+}
+
 TEST(LocalMap, ForgetsThePairBeforeUnlessItWasAKeyframe) {
   const synthetic::World world = someWorld(30);
   LocalMap map(noFurtherKeyframe());

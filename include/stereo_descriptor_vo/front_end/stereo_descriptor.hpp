@@ -47,6 +47,8 @@ class StereoDescriptor {
 
   /// Distance in px from its centre within which a key point of `size` px must find the image.
   double reach(double size) const;
+  /// Size in px whose neighbourhood is as wide as the image's shorter side; a larger one shows more border than image.
+  double largestSize(cv::Size image) const;
   ElementType elementType() const { return base_->elementType(); }
   const DescriptorOptions& options() const { return options_; }
 

@@ -79,12 +79,15 @@ class LocalMap {
   /// The map as the newest pair would see it, one row for each point still looked for: the points as now estimated,
   /// with the descriptors of their last sighting.
   struct View {
-    DescribedPoints rows;             ///< in the newest pair's left optical frame
-    std::vector<cv::Point3f> pixels;  ///< (u_left, v_left, disparity without the rig's error) in the newest pair, px
-    std::vector<int> point;           ///< what sightings call them
-    std::vector<int> seen;            ///< in how many pairs, the map's and forgotten ones
+    DescribedPoints rows;  ///< in the newest pair's left optical frame
+    /// (u_left, v_left, disparity without the rig's error) in the newest pair, px; beside its image where a point is
+    /// about to enter.
+    std::vector<cv::Point3f> pixels;
+    std::vector<int> point;  ///< what sightings call them
+    std::vector<int> seen;   ///< in how many pairs, the map's and forgotten ones
   };
-  View view() const;
+  /// Points in the image of the newest pair, and those that a turn of `T_next_newest` brings into the next one.
+  View view(const std::optional<Eigen::Isometry3d>& T_next_newest = std::nullopt) const;
 
   /// A point recognised in a pair, and where that saw it.
   struct Sighting {
