@@ -7,24 +7,26 @@
 namespace sdvo {
 namespace {
 
-bool processorHasAvx2() {
+bool processorHasVectors() {
 #ifdef SDVO_HAVE_AVX2
   return __builtin_cpu_supports("avx2");
+#elif defined(SDVO_HAVE_NEON)
+  return true;
 #else
   return false;
 #endif
 }
 
-std::atomic<bool> uses_avx2{processorHasAvx2()};
+std::atomic<bool> uses_vectors{processorHasVectors()};
 
 }  // namespace
 
-bool usesAvx2() {
-  return uses_avx2.load(std::memory_order_relaxed);
+bool usesVectorKernels() {
+  return uses_vectors.load(std::memory_order_relaxed);
 }
 
-void allowAvx2(bool allowed) {
-  uses_avx2 = allowed && processorHasAvx2();
+void allowVectorKernels(bool allowed) {
+  uses_vectors = allowed && processorHasVectors();
 }
 
 }  // namespace sdvo

@@ -4,6 +4,7 @@
 #include <cstdlib>
 
 #include "../common/kernel.hpp"
+#include "block_differences_neon.hpp"
 
 #ifdef SDVO_HAVE_AVX2
 #include <immintrin.h>
@@ -99,7 +100,10 @@ template <int kRows>
 void blockDifferences(const std::uint8_t* block, const std::uint8_t* others, std::ptrdiff_t step, int count,
                       unsigned* differences) {
 #ifdef SDVO_HAVE_AVX2
-  if (usesAvx2() && count >= kAtOnce) return blockDifferencesWithAvx2<kRows>(block, others, step, count, differences);
+  if (usesVectorKernels() && count >= kAtOnce)
+    return blockDifferencesWithAvx2<kRows>(block, others, step, count, differences);
+#elif defined(SDVO_HAVE_NEON)
+  if (usesVectorKernels()) return blockDifferencesWithNeon<kRows>(block, others, step, count, differences);
 #endif
   runKernel<BlockDifferences<kRows>>(block, others, step, count, differences);
 }

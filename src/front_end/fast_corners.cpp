@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
 #include <cstring>
 #include <opencv2/features2d.hpp>
 
@@ -136,7 +137,7 @@ std::vector<cv::KeyPoint> findFastCorners(const cv::Mat& image, int threshold) {
   CV_Assert(image.type() == CV_8UC1);
 #ifdef SDVO_HAVE_AVX2
   const bool large_enough = image.cols >= kBlock + 2 * kRadius && image.rows > 2 * kRadius;
-  if (usesAvx2() && large_enough) return findWithAvx2(image, threshold);
+  if (usesVectorKernels() && large_enough) return findWithAvx2(image, threshold);
 #endif
   std::vector<cv::KeyPoint> corners;
   cv::FAST(image, corners, threshold, true);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <numeric>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/features2d.hpp>

@@ -5,6 +5,7 @@
 #include <cstring>
 
 #include "../common/lanes.hpp"
+#include "freak_octet_neon.hpp"
 
 #ifdef SDVO_HAVE_AVX2
 #include <immintrin.h>
@@ -176,14 +177,18 @@ SDVO_AVX2 void compareWithAvx2(const OctetMeans& means, std::uint8_t* const* row
 
 void measureOctet(const Freak& freak, const FreakKeypoint* keypoints, OctetMeans& means) {
 #ifdef SDVO_HAVE_AVX2
-  if (usesAvx2()) return measureWithAvx2(freak.image().sums(), keypoints, means);
+  if (usesVectorKernels()) return measureWithAvx2(freak.image().sums(), keypoints, means);
+#elif defined(SDVO_HAVE_NEON)
+  if (usesVectorKernels()) return measureWithNeon(freak.image().sums(), keypoints, means);
 #endif
   measurePlain(freak, keypoints, means);
 }
 
 void compareOctet(const OctetMeans& means, std::uint8_t* const* rows) {
 #ifdef SDVO_HAVE_AVX2
-  if (usesAvx2()) return compareWithAvx2(means, rows);
+  if (usesVectorKernels()) return compareWithAvx2(means, rows);
+#elif defined(SDVO_HAVE_NEON)
+  if (usesVectorKernels()) return compareWithNeon(means, rows);
 #endif
   comparePlain(means, rows);
 }

@@ -1,6 +1,7 @@
 #include "stereo_descriptor_vo/front_end/image_margin.hpp"
 
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 
 namespace sdvo {

@@ -5,6 +5,8 @@
 #include <opencv2/imgproc.hpp>
 
 #include "../common/kernel.hpp"
+#include "patch_cutter_neon.hpp"
+#include "patch_edges.hpp"
 
 #ifdef SDVO_HAVE_AVX2
 #include <immintrin.h>
@@ -13,21 +15,10 @@
 namespace sdvo {
 namespace {
 
-/// The squares tile, so each edge serves two of them. Arrays go on to whole registers.
-constexpr int kMostEdges = (PatchOptions::kMostSamples + 1 + 7) / 8 * 8;
-using Floats = std::array<float, kMostEdges>;
-
-/// Positions between two columns or two rows of the integral.
-struct Edges {
-  std::array<int, kMostEdges> index;
-  Floats share;  ///< of the second one
-  Floats width;  ///< from here to the next edge; none behind the last one
-};
-
 /// `size`: columns or rows of the integral. Pixel p covers [p - 0.5, p + 0.5], and column p of the integral is its left
 /// edge.
 struct FindEdges {
-  static SDVO_IN_KERNEL void run(float centre, int side, float spacing, int size, Edges* edges) {
+  static SDVO_IN_KERNEL void run(float centre, int side, float spacing, int size, PatchEdges* edges) {
     const float middle = centre + 0.5f, last = static_cast<float>(size) - 1.001f;
     for (int k = 0; k < kMostEdges; ++k) {
       const float offset = (static_cast<float>(k) - 0.5f * static_cast<float>(side)) * spacing;
@@ -42,8 +33,8 @@ struct FindEdges {
   }
 };
 
-Edges edgesAround(float centre, int side, float spacing, int size) {
-  Edges edges;
+PatchEdges edgesAround(float centre, int side, float spacing, int size) {
+  PatchEdges edges;
   runKernel<FindEdges>(centre, side, spacing, size, &edges);
   return edges;
 }
@@ -52,7 +43,7 @@ Edges edgesAround(float centre, int side, float spacing, int size) {
 /// enough to be exact in single precision.
 class Sums {
  public:
-  Sums(const cv::Mat& integral, const Edges& columns, const Edges& rows)
+  Sums(const cv::Mat& integral, const PatchEdges& columns, const PatchEdges& rows)
       : integral_(integral), columns_(columns), origin_(integral.ptr<int>(rows.index[0])[columns.index[0]]) {}
 
   float at(int row, float share, int edge) const {
@@ -71,13 +62,14 @@ class Sums {
   }
 
   const cv::Mat& integral_;
-  const Edges& columns_;
+  const PatchEdges& columns_;
   int origin_;
 };
 
-void cutPlain(const cv::Mat& integral, const Edges& columns, const Edges& rows, int side, std::uint8_t* samples) {
+void cutPlain(const cv::Mat& integral, const PatchEdges& columns, const PatchEdges& rows, int side,
+              std::uint8_t* samples) {
   const Sums sums(integral, columns, rows);
-  Floats above{};  // all that lies above a row of squares, for each of its columns
+  PerEdge above{};  // all that lies above a row of squares, for each of its columns
   for (int j = 0; j <= side; ++j)
     for (int i = 0; i < side; ++i) {
       const float upto = sums.at(rows.index[j], rows.share[j], i + 1) - sums.at(rows.index[j], rows.share[j], i);
@@ -94,7 +86,7 @@ void cutPlain(const cv::Mat& integral, const Edges& columns, const Edges& rows, 
 class EightSums {
  public:
   /// `registers`: how many hold the edges.
-  SDVO_AVX2 EightSums(const Edges& columns, int registers, int origin)
+  SDVO_AVX2 EightSums(const PatchEdges& columns, int registers, int origin)
       : columns_(columns),
         neighbours_(areNeighbours(columns.index.data(), 8 * registers)),
         origin_(_mm256_set1_epi32(origin)) {}
@@ -132,7 +124,7 @@ class EightSums {
     return _mm256_add_ps(first, _mm256_mul_ps(share, _mm256_sub_ps(second, first)));
   }
 
-  const Edges& columns_;
+  const PatchEdges& columns_;
   bool neighbours_;
   __m256i origin_;
 };
@@ -151,7 +143,7 @@ SDVO_AVX2 inline __m256 nextOf(__m256 here, __m256 behind) {
 
 /// The same row by row, eight columns at once. `kRegisters` hold the edges.
 template <int kRegisters>
-SDVO_AVX2 void cutWithAvx2(const cv::Mat& integral, const Edges& columns, const Edges& rows, int side,
+SDVO_AVX2 void cutWithAvx2(const cv::Mat& integral, const PatchEdges& columns, const PatchEdges& rows, int side,
                            std::uint8_t* samples) {
   const EightSums sums(columns, kRegisters, integral.ptr<int>(rows.index[0])[columns.index[0]]);
   const __m256 zero = _mm256_setzero_ps();
@@ -190,13 +182,15 @@ PatchCutter::PatchCutter(const PatchLayout& layout, const cv::Mat& image) : layo
 
 void PatchCutter::cut(float u, float v, float size, std::uint8_t* samples) const {
   const float spacing = layout_.spacing(size);
-  const Edges columns = edgesAround(u, layout_.side, spacing, integral_.cols);
-  const Edges rows = edgesAround(v, layout_.side, spacing, integral_.rows);
+  const PatchEdges columns = edgesAround(u, layout_.side, spacing, integral_.cols);
+  const PatchEdges rows = edgesAround(v, layout_.side, spacing, integral_.rows);
 #ifdef SDVO_HAVE_AVX2
-  if (usesAvx2()) {
+  if (usesVectorKernels()) {
     const auto cut = layout_.side < 8 ? cutWithAvx2<1> : layout_.side < 16 ? cutWithAvx2<2> : cutWithAvx2<3>;
     return cut(integral_, columns, rows, layout_.side, samples);
   }
+#elif defined(SDVO_HAVE_NEON)
+  if (usesVectorKernels()) return cutWithNeon(integral_, columns, rows, layout_.side, samples);
 #endif
   cutPlain(integral_, columns, rows, layout_.side, samples);
 }

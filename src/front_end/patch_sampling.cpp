@@ -1,9 +1,11 @@
 #include "stereo_descriptor_vo/front_end/patch_sampling.hpp"
 
 #include <cstddef>
+#include <cstdint>
 #include <cstring>
 
-#include "../common/kernel.hpp"
+#include "../common/lanes.hpp"
+#include "patch_sampling_neon.hpp"
 
 #ifdef SDVO_HAVE_AVX2
 #include <immintrin.h>
@@ -61,32 +63,34 @@ void samplePlain(const std::uint8_t* image, std::size_t step, const Places& plac
 }
 
 #ifdef SDVO_HAVE_AVX2
-SDVO_AVX2 inline __m256 eightPixels(const std::uint8_t* pixels) {
+SDVO_AVX2 inline Lanes eightPixels(const std::uint8_t* pixels) {
   return _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(pixels))));
 }
 
-SDVO_AVX2 inline __m128 fourPixels(const std::uint8_t* pixels) {
+SDVO_AVX2 inline HalfLanes fourPixels(const std::uint8_t* pixels) {
   int four;
   std::memcpy(&four, pixels, sizeof four);
   return _mm_cvtepi32_ps(_mm_cvtepu8_epi32(_mm_cvtsi32_si128(four)));
 }
+#endif
 
+#ifdef SDVO_HAVE_VECTORS
 /// The same operations in the same order, eight columns at once, and the last ones one by one.
 template <class Vector, Vector (*kPixels)(const std::uint8_t*)>
-SDVO_AVX2 inline void sampleRow(const std::uint8_t* upper, const std::uint8_t* lower, Place place, float* values) {
+SDVO_VECTORS inline void sampleRow(const std::uint8_t* upper, const std::uint8_t* lower, Place place, float* values) {
   const Vector sum = place.w00 * kPixels(upper) + place.w01 * kPixels(upper + 1) + place.w10 * kPixels(lower) +
                      place.w11 * kPixels(lower + 1);
   std::memcpy(values, &sum, sizeof sum);
 }
 
-SDVO_AVX2 void sampleAvx2(const std::uint8_t* image, std::size_t step, const Places& places, int count, int columns,
-                          float* patch) {
+SDVO_VECTORS void sampleWithVectors(const std::uint8_t* image, std::size_t step, const Places& places, int count,
+                                    int columns, float* patch) {
   for (int j = 0; j < count; ++j, image += step, patch += columns) {
     const Place place{places.column[j], places.w00[j], places.w01[j], places.w10[j], places.w11[j]};
     const std::uint8_t *upper = image + place.column, *lower = upper + step;
     int i = 0;
-    for (; i + 8 <= columns; i += 8) sampleRow<__m256, eightPixels>(upper + i, lower + i, place, patch + i);
-    if (i + 4 <= columns) sampleRow<__m128, fourPixels>(upper + i, lower + i, place, patch + i), i += 4;
+    for (; i + 8 <= columns; i += 8) sampleRow<Lanes, eightPixels>(upper + i, lower + i, place, patch + i);
+    if (i + 4 <= columns) sampleRow<HalfLanes, fourPixels>(upper + i, lower + i, place, patch + i), i += 4;
     for (; i < columns; ++i)
       patch[i] = place.w00 * upper[i] + place.w01 * upper[i + 1] + place.w10 * lower[i] + place.w11 * lower[i + 1];
   }
@@ -95,8 +99,8 @@ SDVO_AVX2 void sampleAvx2(const std::uint8_t* image, std::size_t step, const Pla
 /// Eight or four columns of rows that lie right below each other: what is the lower row of one is the upper one of the
 /// next.
 template <class Vector, Vector (*kPixels)(const std::uint8_t*)>
-SDVO_AVX2 inline void sampleColumnsAvx2(const std::uint8_t* upper, std::size_t step, Place place, int count,
-                                        int columns, float* patch) {
+SDVO_VECTORS inline void sampleColumns(const std::uint8_t* upper, std::size_t step, Place place, int count, int columns,
+                                       float* patch) {
   Vector a = kPixels(upper), b = kPixels(upper + 1);
   const std::uint8_t* lower = upper + step;
   for (int j = 0; j < count; ++j, lower += step, patch += columns) {
@@ -108,13 +112,12 @@ SDVO_AVX2 inline void sampleColumnsAvx2(const std::uint8_t* upper, std::size_t s
 }
 
 /// For a number of columns that is a multiple of four.
-SDVO_AVX2 void sampleUprightAvx2(const std::uint8_t* image, std::size_t step, Place place, int count, int columns,
-                                 float* patch) {
+SDVO_VECTORS void sampleUpright(const std::uint8_t* image, std::size_t step, Place place, int count, int columns,
+                                float* patch) {
   image += place.column;
   int i = 0;
-  for (; i + 8 <= columns; i += 8)
-    sampleColumnsAvx2<__m256, eightPixels>(image + i, step, place, count, columns, patch + i);
-  if (i < columns) sampleColumnsAvx2<__m128, fourPixels>(image + i, step, place, count, columns, patch + i);
+  for (; i + 8 <= columns; i += 8) sampleColumns<Lanes, eightPixels>(image + i, step, place, count, columns, patch + i);
+  if (i < columns) sampleColumns<HalfLanes, fourPixels>(image + i, step, place, count, columns, patch + i);
 }
 #endif
 
@@ -126,14 +129,14 @@ void samplePatch(const cv::Mat& image, int margin, float x, float y, float slant
   const float b = y - static_cast<float>(row);
   const std::size_t step = image.step[0];
   const std::uint8_t* first = image.ptr(row - radius + margin) - radius + margin;
-#ifdef SDVO_HAVE_AVX2
-  if (slant == 0.f && usesAvx2() && columns % 4 == 0)
-    return sampleUprightAvx2(first, step, placeAt(x, b), count, columns, patch);
+#ifdef SDVO_HAVE_VECTORS
+  if (slant == 0.f && usesVectorKernels() && columns % 4 == 0)
+    return sampleUpright(first, step, placeAt(x, b), count, columns, patch);
 #endif
   Places places;
   runKernel<PlaceRows>(x, b, slant, radius, &places);
-#ifdef SDVO_HAVE_AVX2
-  if (usesAvx2()) return sampleAvx2(first, step, places, count, columns, patch);
+#ifdef SDVO_HAVE_VECTORS
+  if (usesVectorKernels()) return sampleWithVectors(first, step, places, count, columns, patch);
 #endif
   samplePlain(first, step, places, count, columns, patch);
 }

@@ -1,5 +1,6 @@
 #include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
 
+#include <cstdint>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/video/tracking.hpp>
 #include <optional>

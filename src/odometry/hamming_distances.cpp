@@ -3,6 +3,7 @@
 #include <cstring>
 
 #include "../common/kernel.hpp"
+#include "hamming_distances_neon.hpp"
 
 #ifdef SDVO_HAVE_AVX2
 #include <immintrin.h>
@@ -76,7 +77,10 @@ SDVO_VECTOR_POPCOUNT void distancesByRegisters(const std::uint8_t* row, const cv
 void hammingDistances(const std::uint8_t* row, const cv::Mat& others, const int* candidates, std::size_t count,
                       float* distances) {
 #ifdef SDVO_HAVE_AVX2
-  if (usesAvx2() && hasVectorPopcount()) return distancesByRegisters(row, others, candidates, count, distances);
+  if (usesVectorKernels() && hasVectorPopcount())
+    return distancesByRegisters(row, others, candidates, count, distances);
+#elif defined(SDVO_HAVE_NEON)
+  if (usesVectorKernels()) return distancesWithNeon(row, others, candidates, count, distances);
 #endif
   distancesByWords(row, others, candidates, count, distances);
 }

@@ -5,6 +5,8 @@
 #include <cstring>
 
 #include "../common/lanes.hpp"
+#include "patch_placement.hpp"
+#include "patch_samples_neon.hpp"
 
 #ifdef SDVO_HAVE_AVX2
 #include <immintrin.h>
@@ -12,11 +14,6 @@
 
 namespace sdvo {
 namespace {
-
-/// Where the samples lie in a patch: the middle, and what a step along x and along y of the square changes.
-struct Placement {
-  float x, y, x_by_x, x_by_y, y_by_x, y_by_y;
-};
 
 constexpr int kRow = 16;  // numbers of a row in registers: whole ones
 static_assert(kLargestSampledSide < kRow, "a pixel more than the samples is read");
@@ -61,7 +58,7 @@ struct SampleUpright {
   }
 };
 
-void samplePlain(const std::uint8_t* patch, int side, const Placement& at, const float* dx, const float* dy,
+void samplePlain(const std::uint8_t* patch, int side, const PatchPlacement& at, const float* dx, const float* dy,
                  const float* mask, int count, float* values) {
   const int last = side - 2;
   for (int k = 0; k < count; ++k) {
@@ -94,8 +91,8 @@ SDVO_AVX2 inline __m256 position(float middle, float by_x, float by_y, __m256 x,
 }
 
 /// The same operations in the same order, eight samples at once.
-SDVO_AVX2 void sampleAvx2(const std::uint8_t* patch, int side, const Placement& at, const float* dx, const float* dy,
-                          const float* mask, int count, float* values) {
+SDVO_AVX2 void sampleAvx2(const std::uint8_t* patch, int side, const PatchPlacement& at, const float* dx,
+                          const float* dy, const float* mask, int count, float* values) {
   const __m256i zero = _mm256_setzero_si256(), last = _mm256_set1_epi32(side - 2), width = _mm256_set1_epi32(side);
   const __m256i byte = _mm256_set1_epi32(255);
   for (int k = 0; k < count; k += 8) {
@@ -140,13 +137,14 @@ bool SampleSquare::sample(const NearPatch& patch, const Eigen::Vector2f& centre,
   const float half = 0.5f * static_cast<float>(patch.side() - 1);
   const Eigen::Vector2f reach = static_cast<float>(radius_) * grid.cwiseAbs().rowwise().sum();
   if (!((centre.cwiseAbs() + reach).maxCoeff() <= half)) return false;
-  const Placement at{half + centre.x(), half + centre.y(), grid(0, 0), grid(0, 1), grid(1, 0), grid(1, 1)};
+  const PatchPlacement at{half + centre.x(), half + centre.y(), grid(0, 0), grid(0, 1), grid(1, 0), grid(1, 1)};
+  auto sample = samplePlain;
 #ifdef SDVO_HAVE_AVX2
-  if (usesAvx2())
-    sampleAvx2(patch.samples(), patch.side(), at, x_.data(), y_.data(), mask_.data(), count(), values.data());
-  else
+  if (usesVectorKernels()) sample = sampleAvx2;
+#elif defined(SDVO_HAVE_NEON)
+  if (usesVectorKernels()) sample = sampleWithNeon;
 #endif
-    samplePlain(patch.samples(), patch.side(), at, x_.data(), y_.data(), mask_.data(), count(), values.data());
+  sample(patch.samples(), patch.side(), at, x_.data(), y_.data(), mask_.data(), count(), values.data());
   return true;
 }
 

@@ -1,6 +1,7 @@
 #include "stereo_descriptor_vo/odometry/sample_consensus.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <limits>
 
 namespace sdvo {

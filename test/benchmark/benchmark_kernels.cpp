@@ -21,11 +21,11 @@ namespace {
 const cv::Size kSize(1241, 376);  // KITTI's most frequent one, odd
 constexpr int kFeatures = 1100;
 
-/// Every benchmark runs twice: 0 is the plain form, 1 the one with AVX2.
-class WithOrWithoutAvx2 {
+/// Every benchmark runs twice: 0 is the plain form, 1 the one with vectors.
+class WithOrWithoutVectors {
  public:
-  explicit WithOrWithoutAvx2(const benchmark::State& state) { sdvo::allowAvx2(state.range(0) == 1); }
-  ~WithOrWithoutAvx2() { sdvo::allowAvx2(true); }
+  explicit WithOrWithoutVectors(const benchmark::State& state) { sdvo::allowVectorKernels(state.range(0) == 1); }
+  ~WithOrWithoutVectors() { sdvo::allowVectorKernels(true); }
 };
 
 /// Texture with structure of some pixels; the right view sees it 20.4 px further left.
@@ -48,7 +48,7 @@ std::vector<cv::Point2f> positions() {
 }
 
 void fastCorners(benchmark::State& state) {
-  const WithOrWithoutAvx2 version(state);
+  const WithOrWithoutVectors version(state);
   const cv::Mat image = view(false);
   for (auto _ : state) benchmark::DoNotOptimize(sdvo::findFastCorners(image, 12));
 }
@@ -68,14 +68,14 @@ void cornerPeaks(benchmark::State& state) {
 }
 
 void halfResolution(benchmark::State& state) {
-  const WithOrWithoutAvx2 version(state);
+  const WithOrWithoutVectors version(state);
   const cv::Mat image = view(false);
   cv::Mat half;
   for (auto _ : state) sdvo::halveImage(image, half);
 }
 
 void stereoMatch(benchmark::State& state) {
-  const WithOrWithoutAvx2 version(state);
+  const WithOrWithoutVectors version(state);
   const cv::Mat left = view(false), right = view(true);
   const auto corners = positions();
   sdvo::EpipolarMatcher::Images scratch;
@@ -86,7 +86,7 @@ void stereoMatch(benchmark::State& state) {
 }
 
 void freakInTwoViews(benchmark::State& state) {
-  const WithOrWithoutAvx2 version(state);
+  const WithOrWithoutVectors version(state);
   const cv::Mat left = view(false), right = view(true);
   std::vector<sdvo::FreakKeypoint> keypoints;
   cv::Mat rows(kFeatures, sdvo::Freak::kBytes, CV_8U);
@@ -100,7 +100,7 @@ void freakInTwoViews(benchmark::State& state) {
 }
 
 void patchSampling(benchmark::State& state) {
-  const WithOrWithoutAvx2 version(state);
+  const WithOrWithoutVectors version(state);
   const cv::Mat image = view(false);
   std::array<float, 13 * 16> patch;
   const auto corners = positions();
@@ -112,7 +112,7 @@ void patchSampling(benchmark::State& state) {
 }
 
 void patchAlignment(benchmark::State& state) {
-  const WithOrWithoutAvx2 version(state);
+  const WithOrWithoutVectors version(state);
   constexpr int kSide = 13;
   const cv::Mat image = view(false);
   std::vector<std::vector<std::uint8_t>> patches;

@@ -32,8 +32,8 @@ void expectSums(const cv::Mat& left, const cv::Mat& right, int count = 77) {
 }
 
 TEST(BlockDifferences, AreSumsOverWholeBlocks) {
-  for (const bool with_avx2 : {true, false}) {
-    allowAvx2(with_avx2);
+  for (const bool with_vectors : {true, false}) {
+    allowVectorKernels(with_vectors);
     for (const bool extreme : {false, true}) {
       expectSums<4>(noise(3, extreme), noise(5, extreme));
       expectSums<5>(noise(3, extreme), noise(5, extreme));
@@ -41,7 +41,7 @@ TEST(BlockDifferences, AreSumsOverWholeBlocks) {
     for (const int count : {1, 15, 16, 17, 32, 33}) expectSums<4>(noise(3, false), noise(5, false), count);
     expectSums<5>(cv::Mat(40, 131, CV_8U, cv::Scalar(0)), cv::Mat(40, 131, CV_8U, cv::Scalar(255)));
   }
-  allowAvx2(true);
+  allowVectorKernels(true);
 }
 
 }  // namespace

@@ -265,16 +265,16 @@ TEST(EpipolarMatcher, ScratchMayServeOneMatcherAfterAnother) {
   EXPECT_NEAR(EpipolarMatcher(options, kMaxDv, second.left, second.right, scratch).find({150.f, 80.f})->x, 20.5, 0.06);
 }
 
-TEST(EpipolarMatcher, FindsTheSameToTheBitWithAndWithoutAvx2) {
-  if (!usesAvx2()) GTEST_SKIP() << "this processor has no AVX2";
+TEST(EpipolarMatcher, FindsTheSameToTheBitWithAndWithoutVectors) {
+  if (!usesVectorKernels()) GTEST_SKIP() << "this processor has neither AVX2 nor NEON";
   const Pair pair = smoothPair(17.3, 0.6);
   int compared = 0;
   for (float v = 0.f; v < 160.f; v += 7.3f)
     for (float u = 0.f; u < 320.f; u += 5.7f) {
       const auto fast = find(pair, {u, v});
-      allowAvx2(false);
+      allowVectorKernels(false);
       const auto plain = find(pair, {u, v});
-      allowAvx2(true);
+      allowVectorKernels(true);
       ASSERT_EQ(fast.has_value(), plain.has_value()) << u << ", " << v;
       if (!fast) continue;
       ++compared;

@@ -50,10 +50,10 @@ TEST(FastCorners, AreThoseOfOpenCvInPartsOfImages) {
   expectCornersOfOpenCv(image(cv::Rect(13, 7, 101, 61)), 20);
 }
 
-TEST(FastCorners, AreTheSameWithoutAvx2) {
-  allowAvx2(false);
+TEST(FastCorners, AreTheSameWithoutVectors) {
+  allowVectorKernels(false);
   expectCornersOfOpenCv(noise({150, 80}, 7), 20);
-  allowAvx2(true);
+  allowVectorKernels(true);
 }
 
 }  // namespace

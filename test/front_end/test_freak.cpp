@@ -330,13 +330,13 @@ TEST(Freak, RowsOfManyKeypointsAreThoseOfEach) {
     described.emplace_back(1, Freak::kBytes, CV_8U);
     rows.push_back(described.back().ptr());
   }
-  for (const bool with_avx2 : {true, false}) {
-    allowAvx2(with_avx2);
+  for (const bool with_vectors : {true, false}) {
+    allowVectorKernels(with_vectors);
     freak.describe(keypoints, rows);
     for (std::size_t i = 0; i < keypoints.size(); ++i)
-      ASSERT_EQ(cv::norm(described[i], row(freak, keypoints[i]), cv::NORM_HAMMING), 0.0) << i << ", " << with_avx2;
+      ASSERT_EQ(cv::norm(described[i], row(freak, keypoints[i]), cv::NORM_HAMMING), 0.0) << i << ", " << with_vectors;
   }
-  allowAvx2(true);
+  allowVectorKernels(true);
 }
 
 }  // namespace

@@ -22,11 +22,11 @@ TEST(HalfImage, IsThatOfOpenCv) {
     for (const int height : {16, 19, 77, 370, 375, 376}) expectHalfOfOpenCv({width, height});
 }
 
-TEST(HalfImage, IsTheSameWithoutAvx2) {
-  allowAvx2(false);
+TEST(HalfImage, IsTheSameWithoutVectors) {
+  allowVectorKernels(false);
   expectHalfOfOpenCv({1241, 376});
   expectHalfOfOpenCv({127, 75});
-  allowAvx2(true);
+  allowVectorKernels(true);
 }
 
 }  // namespace

@@ -64,9 +64,9 @@ TEST(PatchCutter, AnyProcessorGivesTheSameBytes) {
       // Also beyond the borders.
       const float u = random.uniform(-5.f, 75.f), v = random.uniform(-5.f, 65.f), size = random.uniform(1.f, 40.f);
       const PatchLayout layout{side, k % 2 ? 1.f : 0.5f, 0.1f};
-      allowAvx2(false);
+      allowVectorKernels(false);
       const std::vector<std::uint8_t> plain = cut(image, layout, u, v, size);
-      allowAvx2(true);
+      allowVectorKernels(true);
       ASSERT_EQ(cut(image, layout, u, v, size), plain) << side << " samples, " << u << " " << v << " " << size;
     }
 }

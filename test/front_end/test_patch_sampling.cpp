@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <vector>
 
 #include "stereo_descriptor_vo/common/processor.hpp"
@@ -65,8 +66,8 @@ TEST(SamplePatch, SlantShiftsRowsFromTheCentre) {
   expectSampled(12.3f, 9.6f, -0.7f, 3, 8);
 }
 
-TEST(SamplePatch, IsTheSameToTheBitWithAndWithoutAvx2) {
-  if (!usesAvx2()) GTEST_SKIP() << "this processor has no AVX2";
+TEST(SamplePatch, IsTheSameToTheBitWithAndWithoutVectors) {
+  if (!usesVectorKernels()) GTEST_SKIP() << "this processor has neither AVX2 nor NEON";
   cv::Mat image(120, 150, CV_8U);
   cv::RNG(5).fill(image, cv::RNG::UNIFORM, 0, 256);
   cv::RNG random(7);
@@ -76,9 +77,9 @@ TEST(SamplePatch, IsTheSameToTheBitWithAndWithoutAvx2) {
     const int radius = 1 + trial % 20, columns = 2 * radius + 1 + trial % 7;
     std::vector<float> fast(static_cast<std::size_t>((2 * radius + 1) * columns)), plain = fast;
     samplePatch(image, kBorder, x, y, slant, radius, columns, fast.data());
-    allowAvx2(false);
+    allowVectorKernels(false);
     samplePatch(image, kBorder, x, y, slant, radius, columns, plain.data());
-    allowAvx2(true);
+    allowVectorKernels(true);
     ASSERT_EQ(fast, plain) << "radius " << radius << ", " << columns << " columns";
   }
 }

@@ -82,17 +82,17 @@ std::vector<float> everythingOf(const cv::Mat& left, const cv::Mat& right, int r
   return all;
 }
 
-TEST(SlantedPatch, IsTheSameToTheBitWithAndWithoutAvx2) {
-  if (!usesAvx2()) GTEST_SKIP() << "this processor has no AVX2";
+TEST(SlantedPatch, IsTheSameToTheBitWithAndWithoutVectors) {
+  if (!usesVectorKernels()) GTEST_SKIP() << "this processor has neither AVX2 nor NEON";
   const cv::Mat left = noise(7), right = noise(9);
   cv::RNG random(11);
   for (int trial = 0; trial < 200; ++trial) {
     const int radius = 3 + trial % 18;
     const float x = random.uniform(5.f, 70.f), y = random.uniform(0.f, 49.f), slant = random.uniform(-0.8f, 0.8f);
     const std::vector<float> fast = everythingOf(left, right, radius, x, y, slant);
-    allowAvx2(false);
+    allowVectorKernels(false);
     const std::vector<float> plain = everythingOf(left, right, radius, x, y, slant);
-    allowAvx2(true);
+    allowVectorKernels(true);
     ASSERT_EQ(fast, plain) << "radius " << radius;
   }
 }

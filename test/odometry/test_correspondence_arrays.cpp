@@ -85,12 +85,12 @@ TEST(CorrespondenceArrays, TakeASubset) {
   EXPECT_EQ(some.squares[2], all.squares[12]);
 }
 
-TEST(CorrespondenceArrays, GiveTheSameToTheBitWithAndWithoutAvx2) {
+TEST(CorrespondenceArrays, GiveTheSameToTheBitWithAndWithoutVectors) {
   const CorrespondenceArrays arrays(someCorrespondences());
   const Result fast = evaluate(arrays);
-  allowAvx2(false);
+  allowVectorKernels(false);
   const Result plain = evaluate(arrays);
-  allowAvx2(true);
+  allowVectorKernels(true);
   EXPECT_EQ(fast.squares, plain.squares);
   EXPECT_EQ(fast.hessian, plain.hessian);
   EXPECT_EQ(fast.gradient, plain.gradient);

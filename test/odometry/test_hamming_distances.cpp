@@ -16,8 +16,8 @@ TEST(HammingDistances, CountTheBitsThatDiffer) {
     cv::Mat rows(9, bytes, CV_8U);
     cv::RNG(static_cast<std::uint64_t>(bytes)).fill(rows, cv::RNG::UNIFORM, 0, 256);
     const cv::Mat row = rows.row(8), others = rows.rowRange(0, 8);
-    for (const bool with_avx2 : {true, false}) {
-      allowAvx2(with_avx2);
+    for (const bool with_vectors : {true, false}) {
+      allowVectorKernels(with_vectors);
       std::vector<float> distances(candidates.size());
       hammingDistances(row.ptr(), others, candidates.data(), candidates.size(), distances.data());
       for (std::size_t k = 0; k < candidates.size(); ++k) {
@@ -28,7 +28,7 @@ TEST(HammingDistances, CountTheBitsThatDiffer) {
       }
     }
   }
-  allowAvx2(true);
+  allowVectorKernels(true);
 }
 
 }  // namespace

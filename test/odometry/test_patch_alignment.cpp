@@ -298,8 +298,8 @@ TEST(PatchAlignment, RefusesWhatLiesOutside) {
   EXPECT_FALSE(align(reference, Eigen::Vector2f::Zero(), std::numeric_limits<float>::quiet_NaN()));
 }
 
-TEST(PatchAlignment, IsTheSameToTheBitWithAndWithoutAvx2) {
-  if (!usesAvx2()) GTEST_SKIP() << "this processor has no AVX2";
+TEST(PatchAlignment, IsTheSameToTheBitWithAndWithoutVectors) {
+  if (!usesVectorKernels()) GTEST_SKIP() << "this processor has neither AVX2 nor NEON";
   std::mt19937 random(23);
   std::uniform_real_distribution<double> part(-1.0, 1.0);
   int compared = 0;
@@ -316,9 +316,9 @@ TEST(PatchAlignment, IsTheSameToTheBitWithAndWithoutAvx2) {
       return alignPatch(options, patchOf(reference), centre, patchOf(current), warp.cast<float>());
     };
     const auto fast = align();
-    allowAvx2(false);
+    allowVectorKernels(false);
     const auto plain = align();
-    allowAvx2(true);
+    allowVectorKernels(true);
     ASSERT_EQ(fast.has_value(), plain.has_value()) << trial;
     if (!fast) continue;
     ++compared;

@@ -84,8 +84,8 @@ TEST(PatchSamples, NoCornerOfTheSquareMayLieOutside) {
   EXPECT_FALSE(square.sample(noise.patch, {0.5f, 0.f}, turned, values));
 }
 
-TEST(PatchSamples, AreTheSameToTheBitWithAndWithoutAvx2) {
-  if (!usesAvx2()) GTEST_SKIP() << "this processor has no AVX2";
+TEST(PatchSamples, AreTheSameToTheBitWithAndWithoutVectors) {
+  if (!usesVectorKernels()) GTEST_SKIP() << "this processor has neither AVX2 nor NEON";
   std::mt19937 random(5);
   std::uniform_real_distribution<float> uniform(-1.f, 1.f);
   const Noise noise(13, random);
@@ -100,9 +100,9 @@ TEST(PatchSamples, AreTheSameToTheBitWithAndWithoutAvx2) {
       return square.sample(noise.patch, centre, grid, of[3]);
     };
     const bool inside = sampleAll(fast);
-    allowAvx2(false);
+    allowVectorKernels(false);
     ASSERT_EQ(sampleAll(plain), inside);
-    allowAvx2(true);
+    allowVectorKernels(true);
     for (int s = 0; s < (inside ? 4 : 3); ++s)
       for (int k = 0; k < square.count(); ++k) ASSERT_EQ(fast[s][k], plain[s][k]) << s << " " << k;
   }

@@ -228,12 +228,12 @@ TEST(PointElimination, PointsAddUp) {
   expectNear(gradient, alone.gradient + other_alone.gradient, "gradient");
 }
 
-TEST(PointElimination, IsTheSameToTheBitWithAndWithoutAvx2) {
+TEST(PointElimination, IsTheSameToTheBitWithAndWithoutVectors) {
   const Scene scene({0, 1, 2, 3, 4});
   const Reduced fast(scene);
-  allowAvx2(false);
+  allowVectorKernels(false);
   const Reduced plain(scene);
-  allowAvx2(true);
+  allowVectorKernels(true);
   EXPECT_EQ(fast.squares, plain.squares);
   EXPECT_TRUE(fast.hessian.triangularView<Eigen::Lower>().toDenseMatrix() ==
               plain.hessian.triangularView<Eigen::Lower>().toDenseMatrix());
@@ -244,9 +244,9 @@ TEST(PointElimination, IsTheSameToTheBitWithAndWithoutAvx2) {
 
   const std::vector<Scene> scenes = {scene, Scene({1, 3})};
   const std::vector<Eigen::Vector3d> moved = movedPoints(scenes);
-  allowAvx2(false);
+  allowVectorKernels(false);
   EXPECT_EQ(moved, movedPoints(scenes));
-  allowAvx2(true);
+  allowVectorKernels(true);
 }
 
 }  // namespace

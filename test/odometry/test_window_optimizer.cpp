@@ -127,20 +127,20 @@ TEST(WindowOptimizer, FindsPosesAndCalibrationOfExactMeasurements) {
   EXPECT_NEAR(window.calibration.value[1], -1.0, 0.05);
 }
 
-TEST(WindowOptimizer, IsTheSameToTheBitWithAndWithoutAvx2) {
+TEST(WindowOptimizer, IsTheSameToTheBitWithAndWithoutVectors) {
   RigCalibration truth;
   truth.value << 0.3, -1.0;
   const Window disturbed = disturbedWindow(truth);
   Window fast = disturbed, plain = disturbed;
-  const WindowSolution with_avx2 = WindowOptimizer(WindowOptimizerOptions{}).optimize(fast);
-  allowAvx2(false);
+  const WindowSolution with_vectors = WindowOptimizer(WindowOptimizerOptions{}).optimize(fast);
+  allowVectorKernels(false);
   const WindowSolution without = WindowOptimizer(WindowOptimizerOptions{}).optimize(plain);
-  allowAvx2(true);
+  allowVectorKernels(true);
   for (std::size_t f = 0; f < fast.T_camera_origin.size(); ++f)
     EXPECT_EQ(fast.T_camera_origin[f].matrix(), plain.T_camera_origin[f].matrix()) << "pose " << f;
   EXPECT_EQ(fast.calibration.value, plain.calibration.value);
-  EXPECT_EQ(with_avx2.pose_covariance, without.pose_covariance);
-  EXPECT_EQ(with_avx2.squares, without.squares);
+  EXPECT_EQ(with_vectors.pose_covariance, without.pose_covariance);
+  EXPECT_EQ(with_vectors.squares, without.squares);
 }
 
 TEST(WindowOptimizer, TheCovarianceOfSomePosesIsPartOfThatOfAll) {

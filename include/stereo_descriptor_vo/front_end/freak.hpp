@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <utility>
 #include <vector>
