@@ -1,30 +1,54 @@
 #!/usr/bin/env python3
-"""Applies each patch of test/mutants, one at a time, to a copy of the package and sees whether a test notices.
+"""Makes small mistakes in a copy of the package, one at a time, and sees whether a test notices.
 
-The copy and its own catkin workspace lie in .catkin_ws/mutants and are kept: later runs build only what has changed. The
-tests of the file that is changed run first, then those of its room, then all others, the quick ones before the slow ones,
-until one fails. A patch that changes nothing a test could see is named with the reason in test/mutants/README.md.
-Exit code 1 when another one survives, does not apply or does not compile.
+    scripts/test_mutants.py --changed main             # in the lines that differ from a branch
+    scripts/test_mutants.py src/odometry/local_map.cpp # in a file; :120-140 after it: in these lines
+    scripts/test_mutants.py --sample 300 --seed 7      # drawn at random over all sources
+    scripts/test_mutants.py --semantic                 # the mistakes of thought in test/semantic_mutants.yaml
 
-With --check nothing is built: does each patch still apply to the sources as they are?
+The operators are those of scripts/mutation_operators.py. The tests that reach the file by what they include are asked, the
+nearest and quickest first, until one fails. For src/ros, ROS tests follow. test/equivalent_mutants.yaml names changes that no
+test could see. The copy and its own catkin workspace lie in .catkin_ws/mutants and are kept; the table is in report.md there.
+Exit code 1 when fewer than --least per cent are caught, or any of the semantic ones is not.
 """
 import argparse
-import fnmatch
+import collections
+import concurrent.futures
+import json
 import os
+import pathlib
+import queue
+import random
 import re
+import shlex
 import shutil
 import subprocess
 import sys
+import threading
 import time
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
-PATCHES = ROOT / "test" / "mutants"
-WORK = ROOT / ".catkin_ws" / "mutants"
-PACKAGE, WORKSPACE = WORK / "package", WORK / "workspace"
-BUILD, BINARIES = WORKSPACE / "build", WORKSPACE / "devel" / "lib" / "stereo_descriptor_vo"
-JOBS = os.environ.get("JOBS", str(os.cpu_count()))
+import yaml
+
+from mutation_operators import Mutant, mutants
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+WORK = ROOT / '.catkin_ws' / 'mutants'
+PACKAGE, WORKSPACE = WORK / 'package', WORK / 'workspace'
+BUILD, BINARIES = WORKSPACE / 'build', WORKSPACE / 'devel' / 'lib' / 'stereo_descriptor_vo'
+JOBS = int(os.environ.get('JOBS', str(os.cpu_count())))
 SLOW = 10  # times as long as without a mutant, and a test counts as failed: it hangs
+
+# What a rendered world looks like is a matter of taste: its numbers are no mistakes.
+SCENERY = re.compile(r'src/render/(building_site|foliage|gardens|ground_map|houses|room_world|street_\w+|texture\w*|trees|vehicles)\.cpp')
+# ROS tests, and the sources that they run.
+ROS_TESTS = {
+    'nouns.test': 'test/ros/rostest_*.cpp',
+    'places.test': 'src/ros/place_recognition_nodelet.cpp',
+    'split.test': 'src/ros/*_nodelet.cpp',
+    'live.test': 'src/ros/*_nodelet.cpp',
+}
+# Sources of gtests that are made of several.
+GTESTS = {'test_render': 'test/render/*.cpp', 'test_tools': 'src/tools/*.cpp'}
 
 
 class NotBuilt(Exception):
@@ -33,163 +57,336 @@ class NotBuilt(Exception):
 
 def run(command, log, timeout=None, **keywords):
     """Whether the command succeeds in time; its output goes to a file."""
-    with open(log, "w") as file:
+    with open(log, 'w') as file:
         try:
             return subprocess.run(command, stdout=file, stderr=subprocess.STDOUT, timeout=timeout, **keywords).returncode == 0
         except subprocess.TimeoutExpired:
             return False
 
 
-def copy_package():
-    """What git knows of the package and what it does not ignore; unchanged files keep their time and are not built."""
-    listing = subprocess.run(["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"], cwd=ROOT, check=True,
-                             stdout=subprocess.PIPE).stdout.decode()
-    files = {name for name in listing.split("\0") if name and (ROOT / name).is_file()}
-    for old in [f for f in PACKAGE.rglob("*") if f.is_file()]:
-        if str(old.relative_to(PACKAGE)) not in files:
-            old.unlink()
-    for name in files:
-        source, target = ROOT / name, PACKAGE / name
-        if target.exists() and source.read_bytes() == target.read_bytes():
-            continue
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy(source, target)
+class Sources:
+    """Which sources a test reaches: what it includes, what implements that, and so on."""
+
+    def __init__(self):
+        self._files = [path.relative_to(ROOT) for folder in ('include', 'src', 'test', 'examples')
+                       for path in (ROOT / folder).rglob('*.[ch]pp')]
+        known = set(self._files)
+        self._next = {}
+        own = collections.defaultdict(set)  # the sources of a header: they include it first
+        for path in self._files:
+            included = []
+            for name in re.findall(r'^#include [<"]([^>"]+)[>"]', (ROOT / path).read_text(), re.MULTILINE):
+                for folder in (pathlib.Path('include'), path.parent, pathlib.Path('src'), pathlib.Path('test')):
+                    found = pathlib.Path(os.path.normpath(folder / name))
+                    if found in known:
+                        included.append(found)
+                        break
+            self._next[path] = included
+            if path.suffix == '.cpp' and path.parts[0] == 'src' and included:
+                own[included[0]].add(path)
+        for header, sources in own.items():
+            self._next[header] = self._next[header] + sorted(sources)
+
+    def distances(self, pattern):
+        """Steps from the files of a test to all that it reaches."""
+        steps = {path: 0 for path in self._files if path.match(pattern)}
+        todo = collections.deque(steps)
+        while todo:
+            path = todo.popleft()
+            for following in self._next[path]:
+                if following not in steps:
+                    steps[following] = steps[path] + 1
+                    todo.append(following)
+        return steps
 
 
-def configure():
-    """Tests are linked to shared libraries: they need not be linked again when only a library has changed."""
-    return run([PACKAGE / "scripts" / "build", "-DCMAKE_LINK_DEPENDS_NO_SHARED=ON", "--force-cmake", "stereo_descriptor_vo_core"],
-               WORK / "build.log", env=dict(os.environ, WORKSPACE=str(WORKSPACE)))
+class Workspace:
+    """The copy of the package, built once, and its tests."""
+
+    def __init__(self):
+        WORK.mkdir(parents=True, exist_ok=True)
+        self._copy_package()
+        print('Building …', flush=True)
+        arguments = ['-DCMAKE_LINK_DEPENDS_NO_SHARED=ON', '-DCMAKE_EXPORT_COMPILE_COMMANDS=ON', '--force-cmake',
+                     '-DCMAKE_CXX_FLAGS_RELEASE=-O1 -DNDEBUG', 'all']
+        if shutil.which('ccache'):
+            arguments.insert(0, '-DCMAKE_CXX_COMPILER_LAUNCHER=ccache')
+        if not run([PACKAGE / 'scripts' / 'build', *arguments], WORK / 'build.log', env=dict(os.environ, WORKSPACE=str(WORKSPACE))):
+            sys.exit(f'error: the package does not build, see {WORK / "build.log"}')
+        self._commands = {os.path.relpath(os.path.realpath(entry['file']), PACKAGE): entry
+                          for entry in json.loads((BUILD / 'compile_commands.json').read_text())}
+        self._sources = Sources()
+        self._reach = {name: self._sources.distances(GTESTS.get(name, f'test/*/{name}.cpp')) for name in self._gtest_names()}
+        self.seconds = {}
+
+    @staticmethod
+    def _copy_package():
+        """What git knows of the package and what it does not ignore; unchanged files keep their time and are not built."""
+        listing = subprocess.run(['git', 'ls-files', '-z', '--cached', '--others', '--exclude-standard'], cwd=ROOT, check=True,
+                                 stdout=subprocess.PIPE).stdout.decode()
+        files = {name for name in listing.split('\0') if name and (ROOT / name).is_file()}
+        for old in [f for f in PACKAGE.rglob('*') if f.is_file()]:
+            if str(old.relative_to(PACKAGE)) not in files:
+                old.unlink()
+        for name in files:
+            source, target = ROOT / name, PACKAGE / name
+            if target.exists() and source.read_bytes() == target.read_bytes():
+                continue
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(source, target)
+
+    @staticmethod
+    def _gtest_names():
+        listing = subprocess.run(['make', 'help'], cwd=BUILD, check=True, stdout=subprocess.PIPE).stdout.decode()
+        return sorted(set(re.findall(r'^\.\.\. (test_\w+)$', listing, re.MULTILINE)))
+
+    def tests(self, file):
+        """The gtests that reach a file, the nearest first."""
+        path = pathlib.Path(file)
+        reached = {name: steps[path] for name, steps in self._reach.items() if path in steps}
+        return sorted(reached, key=lambda name: (reached[name] > 2, self.seconds.get(name, 0.0), name))
+
+    def measure(self, names):
+        """Builds the gtests and notes how long each takes as things are; none may fail."""
+        names = sorted(set(names) - set(self.seconds))
+        if names and not run(['make', '-k', '-j', str(JOBS), *names], WORK / 'build.log', cwd=BUILD):
+            sys.exit(f'error: the tests do not build, see {WORK / "build.log"}')
+        for name in names:
+            begin = time.monotonic()
+            if not run([BINARIES / name], WORK / 'test.log', cwd=WORK):
+                sys.exit(f'error: {name} fails without any mutant, see {WORK / "test.log"}')
+            self.seconds[name] = time.monotonic() - begin
+
+    def passes(self, name, folder, environment):
+        # Each has a home of its own: two mutants at once must not meet in files or under a name of ROS.
+        environment = dict(os.environ, **environment)
+        return run([BINARIES / name], folder / 'test.log', timeout=5 + SLOW * self.seconds[name], cwd=folder, env=environment)
+
+    def library_of(self, file):
+        """How the shared library that has the file is linked: its target's folder; None for what is linked otherwise."""
+        entry = self._commands.get(file)
+        if entry is None:
+            return None
+        target = re.search(r'-o (\S*CMakeFiles/(\w+)\.dir)/', entry['command'])
+        folder = pathlib.Path(entry['directory']) / target[1]
+        link = (folder / 'link.txt').read_text()
+        return folder if ' -shared ' in link and not target[2].endswith(('_ros', '_nodelets', '_examples')) else None
+
+    def mutated_library(self, mutant, folder):
+        """The library with the mutant, in a folder of its own: the workspace stays as it is."""
+        entry = self._commands[mutant.file]
+        text = (PACKAGE / mutant.file).read_text()
+        # Beside the original, for its includes; no other mutant has this name.
+        source = (PACKAGE / mutant.file).with_name(f'mutant_{folder.name}.cpp')
+        source.write_text(mutant.applied(text))
+        try:
+            command = shlex.split(entry['command'])
+            original = command[command.index('-o') + 1]
+            command[command.index('-o') + 1] = str(folder / 'mutant.o')
+            command[command.index('-c') + 1] = str(source)
+            if not run(command, folder / 'make.log', cwd=entry['directory']):
+                raise NotBuilt
+        finally:
+            source.unlink()
+        link = shlex.split((self.library_of(mutant.file) / 'link.txt').read_text())
+        output = link.index('-o') + 1
+        library = folder / pathlib.Path(link[output]).name
+        link[output] = str(library)
+        link[link.index(original)] = str(folder / 'mutant.o')
+        if not run(link, folder / 'make.log', cwd=entry['directory']):
+            raise NotBuilt
+        return library
+
+    def judge_beside(self, mutant, folder):
+        """The test that notices a mutant of a library, or None."""
+        library = self.mutated_library(mutant, folder)
+        for name in self.tests(mutant.file):
+            if not self.passes(name, folder, {'LD_PRELOAD': str(library)}):
+                return name
+        return None
+
+    def judge_in_place(self, mutant, folder, ros_tests):
+        """The same for what is compiled into many: headers, tools, nodelets."""
+        path = PACKAGE / mutant.file
+        original = path.read_text()
+        path.write_text(mutant.applied(original))
+        try:
+            for name in self.tests(mutant.file):
+                self._make(name, folder)
+                if not self.passes(name, folder, {}):
+                    return name
+            for name in self._ros_tests(mutant.file) if ros_tests else []:
+                self._make('all', folder)
+                if name == 'nouns.test':
+                    self._make('tests', folder)
+                command = f'set +u; . "{WORKSPACE}/devel/setup.sh"; exec rostest "{PACKAGE}/test/ros/{name}"'
+                if not run(['bash', '-c', command], folder / 'test.log', timeout=900):
+                    return name
+            return None
+        finally:
+            path.write_text(original)
+            os.utime(path)
+
+    def _ros_tests(self, file):
+        if not file.startswith('src/ros/') and '/ros/' not in file:
+            return []
+        return [name for name, pattern in ROS_TESTS.items() if pathlib.Path(file) in self._sources.distances(pattern)]
+
+    @staticmethod
+    def _make(target, folder):
+        if not run(['make', '-j', str(JOBS), target], folder / 'make.log', cwd=BUILD):
+            raise NotBuilt
 
 
-def make(target, log):
-    if not run(["make", "-j", JOBS, target], log, cwd=BUILD):
-        raise NotBuilt
+def semantic():
+    """The mistakes of thought."""
+    found = []
+    for entry in yaml.safe_load((ROOT / 'test' / 'semantic_mutants.yaml').read_text()):
+        text = (ROOT / entry['file']).read_text()
+        if text.count(entry['find']) != 1:
+            sys.exit(f'error: {entry["file"]} has not exactly one: {entry["find"]}')
+        offset = text.index(entry['find'])
+        found.append(Mutant(entry['file'], entry['find'], entry['replace'], offset, text.count('\n', 0, offset) + 1,
+                            entry['find'], entry['replace'], entry['why']))
+    return found
 
 
-def matches(name, patterns):
-    return any(fnmatch.fnmatch(name, pattern) for pattern in patterns)
+def sources():
+    return sorted(str(path.relative_to(ROOT)) for path in (ROOT / 'src').rglob('*.cpp'))
 
 
-def gtest_names():
-    listing = subprocess.run(["make", "help"], cwd=BUILD, check=True, stdout=subprocess.PIPE).stdout.decode()
-    return sorted(set(re.findall(r"^\.\.\. (test_\w+)$", listing, re.MULTILINE)))
+def of_file(file, lines=None):
+    text = (ROOT / file).read_text()
+    found = mutants(file, text, lines)
+    return [m for m in found if m.why != 'number'] if SCENERY.match(file) else found
 
 
-def run_gtest(name, timeout=None):
-    return run([BINARIES / name], WORK / "test.log", timeout=timeout, cwd=WORK)
+def changed_lines(revision):
+    """Numbers of the lines that differ from a revision, by file."""
+    diff = subprocess.run(['git', 'diff', '-U0', '--no-color', revision, '--', 'src', 'include'], cwd=ROOT, check=True,
+                          stdout=subprocess.PIPE).stdout.decode()
+    lines, file = {}, None
+    for row in diff.splitlines():
+        if row.startswith('+++ '):
+            file = row[6:] if row.startswith('+++ b/') else None
+        hunk = re.match(r'@@ -\S+ \+(\d+)(?:,(\d+))? @@', row)
+        if hunk and file and file.endswith(('.cpp', '.hpp')):
+            first, count = int(hunk[1]), int(hunk[2] or 1)
+            lines.setdefault(file, set()).update(range(first, first + count))
+    return lines
 
 
-def run_rostest(file):
-    command = f'set +u; . "{WORKSPACE}/devel/setup.sh"; exec rostest "{file}"'
-    return run(["bash", "-c", command], WORK / "test.log")
+def chosen(arguments):
+    if arguments.semantic:
+        return semantic()
+    found = []
+    if arguments.changed:
+        for file, lines in changed_lines(arguments.changed).items():
+            found += of_file(file, lines)
+    for name in arguments.files:
+        file, _, span = name.partition(':')
+        first, _, last = span.partition('-')
+        found += of_file(file, range(int(first), int(last or first) + 1) if span else None)
+    if not found and not arguments.changed and not arguments.files:
+        found = [mutant for file in sources() for mutant in of_file(file)]
+    if arguments.sample and arguments.sample < len(found):
+        found = random.Random(arguments.seed).sample(found, arguments.sample)
+    return found
 
 
-def measure(gtests):
-    """Seconds that each gtest takes as things are; none may fail."""
-    seconds = {}
-    for name in gtests:
-        make(name, WORK / "build.log")
+def equivalents():
+    entries = yaml.safe_load((ROOT / 'test' / 'equivalent_mutants.yaml').read_text()) or []
+    return {(entry['file'], entry['line'], entry['becomes']) for entry in entries}
+
+
+def judge_all(workspace, todo, ros_tests):
+    """Yields (mutant, verdict, test); those of libraries several at once, then the others."""
+    known = equivalents()
+    folders = queue.Queue()
+    for i in range(JOBS):
+        folder = WORK / f'mutant_{i}'
+        shutil.rmtree(folder, ignore_errors=True)
+        folder.mkdir()
+        folders.put(folder)
+    lock = threading.Lock()
+
+    def judged(mutant, judge):
+        folder = folders.get()
         begin = time.monotonic()
-        if not run_gtest(name):
-            sys.exit(f"error: {name} fails without any mutant, see {WORK / 'test.log'}")
-        seconds[name] = time.monotonic() - begin
-    return seconds
+        try:
+            if (mutant.file, mutant.before, mutant.after) in known:
+                verdict, test = 'equivalent', ''
+            else:
+                test = judge(mutant, folder)
+                verdict = 'caught' if test else 'survived'
+        except NotBuilt:
+            verdict, test = 'not compiled', ''
+        finally:
+            folders.put(folder)
+        with lock:
+            print(f'{verdict:12} {mutant}{" by " + test if test else ""} ({time.monotonic() - begin:.0f} s)', flush=True)
+        return mutant, verdict, test
+
+    beside = [m for m in todo if workspace.library_of(m.file)]
+    in_place = [m for m in todo if not workspace.library_of(m.file)]
+    with concurrent.futures.ThreadPoolExecutor(JOBS) as pool:
+        yield from pool.map(lambda m: judged(m, workspace.judge_beside), beside)
+    for mutant in in_place:
+        yield judged(mutant, lambda m, folder: workspace.judge_in_place(m, folder, ros_tests))
 
 
-def changed_file(patch):
-    return Path(re.search(r"^\+\+\+ b/(\S+)", patch.read_text(), re.MULTILINE)[1])
+def room(file):
+    parts = pathlib.Path(file).parts
+    return parts[2] if parts[0] == 'include' else parts[1]
 
 
-def tests_by_interest(file, seconds):
-    room = file.parent.name
-    of_room = {f.stem for f in (ROOT / "test" / room).glob("test_*.cpp")}
-    return sorted(seconds, key=lambda t: (t != f"test_{file.stem}", t not in of_room, seconds[t]))
+def table(results):
+    """Rows by room, a sum, and what survived."""
+    rows = ['| room | mutants | caught | survived | equivalent | caught of those that change something |', '| --- | --- | --- | --- | --- | --- |']
 
+    def row(name, verdicts):
+        n = collections.Counter(verdicts)
+        decided = n['caught'] + n['survived']
+        share = f'{100 * n["caught"] / decided:.0f} %' if decided else '–'
+        return f'| {name} | {decided + n["equivalent"]} | {n["caught"]} | {n["survived"]} | {n["equivalent"]} | {share} |'
 
-def who_notices(file, seconds, with_rostests):
-    """The test that fails, or None."""
-    for name in tests_by_interest(file, seconds):
-        make(name, WORK / "make.log")  # with the libraries that it needs
-        if not run_gtest(name, timeout=5 + SLOW * seconds[name]):
-            return name
-    if with_rostests:
-        make("all", WORK / "make.log")  # the nodelets, too
-        for test in sorted((PACKAGE / "test" / "ros").glob("*.test")):
-            if not run_rostest(test):
-                return test.name
-    return None
-
-
-def patched(patch, folder=PACKAGE, arguments=()):
-    command = ["patch", "-p1", "--silent", "--no-backup-if-mismatch", *arguments, "-i", str(patch)]
-    return subprocess.run(command, cwd=folder, stdout=subprocess.DEVNULL).returncode == 0
-
-
-def check(patches):
-    """Names the patches that the code has left behind."""
-    stale = [patch.stem for patch in patches if not patched(patch, ROOT, ["--dry-run"])]
-    for name in stale:
-        print(f"test/mutants/{name}.patch no longer applies: make the same mistake in the code as it is now, or remove it")
-    print(f"{len(patches) - len(stale)} of {len(patches)} mutants apply")
-    return not stale
-
-
-def judge(patch, seconds, with_rostests):
-    """What becomes of a mutant, and which test noticed it."""
-    file = changed_file(patch)
-    original = (PACKAGE / file).read_bytes()
-    if not patched(patch):
-        (PACKAGE / file).write_bytes(original)
-        return "does not apply", ""
-    try:
-        test = who_notices(file, seconds, with_rostests)
-    except NotBuilt:
-        return "does not compile", ""
-    finally:
-        (PACKAGE / file).write_bytes(original)
-    return ("caught", test) if test else ("survived", "")
+    by_room = collections.defaultdict(list)
+    for mutant, verdict, _ in results:
+        by_room[room(mutant.file)].append(verdict)
+    rows += [row(name, by_room[name]) for name in sorted(by_room)]
+    rows.append(row('all', [verdict for _, verdict, _ in results]))
+    survivors = [f'* `{mutant}`' for mutant, verdict, _ in results if verdict == 'survived']
+    return '\n'.join(rows + ([''] + ['Survived:', ''] + survivors if survivors else [])) + '\n'
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("patterns", nargs="*", default=["*"], help="of the patches' names, such as front_end_*")
-    parser.add_argument("--gtests", nargs="+", default=["*"], metavar="PATTERN", help="ask these gtests only")
-    parser.add_argument("--check", action="store_true", help="only see whether the patches apply")
-    parser.add_argument("--rostests", action="store_true", help="show to the ROS tests what the gtests do not notice")
+    parser.add_argument('files', nargs='*', help='sources, with :FIRST-LAST for some lines')
+    parser.add_argument('--changed', metavar='REVISION', help='lines of sources that differ from this revision')
+    parser.add_argument('--semantic', action='store_true', help='those of test/semantic_mutants.yaml')
+    parser.add_argument('--sample', type=int, help='so many of them, drawn at random')
+    parser.add_argument('--seed', type=int, default=1)
+    parser.add_argument('--no-ros', action='store_true', help='ask no ROS tests')
+    parser.add_argument('--list', action='store_true', help='only print the mutants')
+    parser.add_argument('--least', type=float, default=85.0, help='per cent to be caught (85)')
     arguments = parser.parse_args()
-    patches = [p for p in sorted(PATCHES.glob("*.patch")) if matches(p.stem, arguments.patterns)]
-    if not patches:
-        sys.exit(f"error: no patch in {PATCHES} is called {' or '.join(arguments.patterns)}")
-    if arguments.check:
-        sys.exit(0 if check(patches) else 1)
-    harmless = set(re.findall(r"^\| `(\w+)` \|", (PATCHES / "README.md").read_text(), re.MULTILINE))
-
-    WORK.mkdir(parents=True, exist_ok=True)
-    copy_package()
-    print("Building …", flush=True)
-    if not configure():
-        sys.exit(f"error: the package does not build, see {WORK / 'build.log'}")
-    chosen = [t for t in gtest_names() if matches(t, arguments.gtests)]
-    try:
-        seconds = measure(chosen)
-    except NotBuilt:
-        sys.exit(f"error: the tests do not build, see {WORK / 'build.log'}")
-    verdicts = {}
-    for patch in patches:
-        begin = time.monotonic()
-        verdict, test = judge(patch, seconds, arguments.rostests)
-        if verdict == "survived" and patch.stem in harmless:
-            verdict = "changes nothing"
-        verdicts[patch.stem] = verdict
-        print(f"{verdict:16} {patch.stem}{' by ' + test if test else ''} ({time.monotonic() - begin:.0f} s)", flush=True)
-
-    count = {verdict: list(verdicts.values()).count(verdict) for verdict in sorted(set(verdicts.values()))}
-    caught, all_of_them = count.get("caught", 0), len(verdicts)
-    print(f"{all_of_them} mutants: " + ", ".join(f"{n} {verdict}" for verdict, n in count.items()) +
-          f"; {100 * caught / max(1, all_of_them - count.get('changes nothing', 0)):.0f} % of those that change something are caught")
-    sys.exit(0 if set(count) <= {"caught", "changes nothing"} else 1)
+    todo = chosen(arguments)
+    if arguments.list or not todo:
+        print('\n'.join(map(str, todo)) or 'no mutant: no line of a source was changed')
+        return 0
+    workspace = Workspace()
+    workspace.measure(name for mutant in todo for name in workspace.tests(mutant.file))
+    results = list(judge_all(workspace, todo, not arguments.no_ros))
+    report = table(results)
+    (WORK / 'report.md').write_text(report)
+    print(report)
+    count = collections.Counter(verdict for _, verdict, _ in results)
+    decided = count['caught'] + count['survived']
+    share = 100 * count['caught'] / decided if decided else 100.0
+    print(f'{len(results)} mutants: ' + ', '.join(f'{n} {verdict}' for verdict, n in sorted(count.items())) +
+          f'; {share:.1f} % of those that change something are caught')
+    return 0 if share >= (100.0 if arguments.semantic else arguments.least) else 1
 
 
-if __name__ == "__main__":
-    main()
+if __name__ == '__main__':
+    sys.exit(main())

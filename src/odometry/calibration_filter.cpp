@@ -15,23 +15,45 @@ constexpr double kAlike = 1.4;           // on the variance: neighbouring points
 }  // namespace
 
 CalibrationFilter::CalibrationFilter(const CalibrationOptions& options) : options_(checked(options)) {
-  // The windows keep their nominal precision; weighing the prior up by 1/trust^2 says the same.
-  const double sigma = options_.enabled ? options_.trust * options_.prior_sigma : 1e-6;
-  option_information_ = RigCalibration::Matrix::Identity() / (sigma * sigma);
   calibration_.value << options_.prior_offset, options_.prior_bend;
-  option_information_mean_ = option_information_ * calibration_.value;
 }
 
 CalibrationBelief CalibrationFilter::prior(int oldest_id) {
   if (pending_ && pending_->newest_id < oldest_id) {
-    information_ = options_.memory * information_ + pending_->information;
-    information_mean_ = options_.memory * information_mean_ + pending_->information_mean;
+    past_.information = options_.memory * past_.information + pending_->evidence.information;
+    past_.information_mean = options_.memory * past_.information_mean + pending_->evidence.information_mean;
     pending_.reset();
   }
-  const RigCalibration::Matrix information = option_information_ + information_;
-  CalibrationBelief belief{information.inverse() * (option_information_mean_ + information_mean_), information};
+  const RigCalibration::Vector mean(options_.prior_offset, options_.prior_bend);
+  prior_.information = informationOf(significantSpread());
+  prior_.information_mean = prior_.information * mean;
+  const RigCalibration::Matrix information = prior_.information + past_.information;
+  CalibrationBelief belief{information.inverse() * (prior_.information_mean + past_.information_mean), information};
   if (commons_ >= kFewestCommons) belief.common_sigma = std::sqrt(kAlike * common_square_);
   return belief;
+}
+
+/// The windows keep the precision that they state; a prior weighed up by 1 / trust^2 is the same.
+RigCalibration::Matrix CalibrationFilter::informationOf(const RigCalibration::Vector& spread) const {
+  return (options_.trust * spread).cwiseAbs2().cwiseInverse().asDiagonal();
+}
+
+/// Standard deviation, px, of the rig around the options' prior: as much of the evidence's distance from it as chance
+/// does not explain.
+RigCalibration::Vector CalibrationFilter::significantSpread() const {
+  constexpr double kHeld = 1e-4;  // px: holds the calibration where the options put it
+  RigCalibration::Vector spread = RigCalibration::Vector::Constant(kHeld);
+  if (!options_.enabled || !present_) return spread;
+  const RigCalibration::Matrix covariance = present_->information.inverse();
+  const RigCalibration::Vector estimate = covariance * present_->information_mean;
+  const RigCalibration::Vector prior(options_.prior_offset, options_.prior_bend);
+  const RigCalibration::Vector chance = options_.significance * options_.significance * covariance.diagonal();
+  for (int i = 0; i < RigCalibration::kParameters; ++i) {
+    const double distance = estimate[i] - prior[i];
+    const double significant = std::sqrt(std::max(distance * distance - chance[i], 0.0));
+    spread[i] = std::clamp(significant, spread[i], options_.prior_sigma);
+  }
+  return spread;
 }
 
 void CalibrationFilter::noteCommon(double square) {
@@ -42,16 +64,16 @@ void CalibrationFilter::noteCommon(double square) {
 void CalibrationFilter::note(int newest_id, const RigCalibration& calibration,
                              const RigCalibration::Matrix& information) {
   calibration_ = calibration;
-  total_information_ = option_information_ + information_ + information;
-  if (!pending_)
-    pending_ = {newest_id, information,
-                *total_information_ * calibration.value - option_information_mean_ - information_mean_};
+  const RigCalibration::Matrix known = past_.information + information;
+  present_ = Evidence{known, (prior_.information + known) * calibration.value - prior_.information_mean};
+  if (!pending_) pending_ = {newest_id, {information, present_->information_mean - past_.information_mean}};
 }
 
 RigCalibration::Vector CalibrationFilter::sigma() const {
-  if (!total_information_ || !options_.enabled)
-    return RigCalibration::Vector::Constant(std::numeric_limits<double>::quiet_NaN());
-  return total_information_->inverse().diagonal().cwiseSqrt() / options_.trust;
+  if (!present_ || !options_.enabled) return RigCalibration::Vector::Constant(std::numeric_limits<double>::quiet_NaN());
+  const RigCalibration::Vector prior_sigma = RigCalibration::Vector::Constant(options_.prior_sigma);
+  const RigCalibration::Matrix covariance = (informationOf(prior_sigma) + present_->information).inverse();
+  return covariance.diagonal().cwiseSqrt() / options_.trust;
 }
 
 }  // namespace sdvo

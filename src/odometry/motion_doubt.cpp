@@ -15,7 +15,7 @@ Matrix6d covarianceOf(double translation, double rotation) {
 }  // namespace
 
 Matrix6d predictionCovariance(double dt) {
-  return covarianceOf(0.5 * kLastingAcceleration * dt * dt, 0.5 * kLastingTurnAcceleration * dt * dt);
+  return covarianceOf(kLastingAcceleration * dt * dt, kLastingTurnAcceleration * dt * dt);
 }
 
 Matrix6d travelCovariance(const Vector6d& velocity, double seconds, double max_speed) {

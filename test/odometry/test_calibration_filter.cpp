@@ -18,100 +18,114 @@ CalibrationOptions someOptions() {
   options.prior_bend = -1.0;
   options.prior_sigma = 2.0;
   options.trust = 0.25;
+  options.significance = 3.0;
   options.memory = 0.5;
   return options;
 }
 
-/// Of the options: trust makes it 1 / (0.25 * 2)^2.
-Matrix optionInformation() {
-  return 4.0 * Matrix::Identity();
+const Vector kPrior(0.5, -1.0);
+const Matrix kInformation = Vector(12.0, 5.0).asDiagonal();  // of a window
+// Distances that are significant of a window of that information, three of its standard deviations.
+const double kOffset = 3.0 / std::sqrt(12.0), kBend = 3.0 / std::sqrt(5.0);
+
+/// Adds the window of these pairs that would find `own` without a prior.
+void addWindow(CalibrationFilter& filter, int oldest, int newest, const Vector& own,
+               const Matrix& information = kInformation) {
+  const CalibrationBelief prior = filter.prior(oldest);
+  RigCalibration result;
+  result.value = (prior.information + information).inverse() * (prior.information * prior.mean + information * own);
+  filter.note(newest, result, information);
 }
 
-Matrix information(double offset, double bend) {
-  return Vector(offset, bend).asDiagonal();
-}
-
-RigCalibration calibrationOf(double offset, double bend) {
-  RigCalibration calibration;
-  calibration.value << offset, bend;
-  return calibration;
-}
-
-void expectBelief(const CalibrationBelief& belief, const Vector& mean, const Matrix& information) {
-  EXPECT_LT((belief.mean - mean).norm(), 1e-9) << belief.mean.transpose() << " for " << mean.transpose();
-  EXPECT_LT((belief.information - information).norm(), 1e-9) << belief.information << "\nfor\n" << information;
+/// What is left of a prior's standard deviation, as information in the windows' units.
+double informationOf(double spread) {
+  return 1.0 / std::pow(0.25 * spread, 2);
 }
 
 TEST(CalibrationFilter, BeginsWithWhatTheOptionsSay) {
   CalibrationFilter filter(someOptions());
-  expectBelief(filter.prior(1), {0.5, -1.0}, optionInformation());
-  EXPECT_EQ(filter.calibration().value, Vector(0.5, -1.0));
+  EXPECT_LT((filter.prior(1).mean - kPrior).norm(), 1e-9);
+  EXPECT_GT(filter.prior(1).information.diagonal().minCoeff(), 1e6) << "held until there is evidence";
+  EXPECT_EQ(filter.calibration().value, kPrior);
   EXPECT_TRUE(filter.sigma().array().isNaN().all());
 }
 
-TEST(CalibrationFilter, TellsTheLastWindowsResultAndHowWellItIsKnown) {
+TEST(CalibrationFilter, KeepsWhatTheOptionsSayWhereTheEvidenceIsNotSignificant) {
   CalibrationFilter filter(someOptions());
-  filter.note(5, calibrationOf(0.3, -0.7), information(12.0, 5.0));
-  EXPECT_EQ(filter.calibration().value, Vector(0.3, -0.7));
-  // Four times 1 / sqrt(4 + 12) and 1 / sqrt(4 + 5).
-  EXPECT_NEAR(filter.sigma()[0], 4.0 * 0.25, 1e-12);
-  EXPECT_NEAR(filter.sigma()[1], 4.0 / 3.0, 1e-12);
+  const Vector near = kPrior + Vector(0.9 * kOffset, -0.9 * kBend);
+  for (int newest = 9; newest < 17; ++newest) addWindow(filter, newest - 8, newest, near);
+  EXPECT_LT((filter.calibration().value - kPrior).norm(), 1e-5);
+  EXPECT_GT(filter.prior(8).information.diagonal().minCoeff(), 1e6);
 }
 
-TEST(CalibrationFilter, AWindowIsNoPriorForOneThatSharesAPairWithIt) {
+TEST(CalibrationFilter, MovesAsFarAsTheEvidenceIsSignificant) {
   CalibrationFilter filter(someOptions());
-  filter.note(5, calibrationOf(0.3, -0.7), information(12.0, 5.0));
-  expectBelief(filter.prior(5), {0.5, -1.0}, optionInformation());
-  // The window's result had the options' share in it already, which is not counted twice.
-  expectBelief(filter.prior(6), {0.3, -0.7}, optionInformation() + information(12.0, 5.0));
-  expectBelief(filter.prior(6), {0.3, -0.7}, optionInformation() + information(12.0, 5.0));
+  const Vector far = kPrior + Vector(1.3 * kOffset, -1.5 * kBend);
+  addWindow(filter, 1, 9, far);
+  // Variance of the truth: square of the distance less the estimate's own variance.
+  const CalibrationBelief prior = filter.prior(2);
+  EXPECT_NEAR(prior.information(0, 0), informationOf(kOffset * std::sqrt(1.3 * 1.3 - 1.0)), 1e-3);
+  EXPECT_NEAR(prior.information(1, 1), informationOf(kBend * std::sqrt(1.5 * 1.5 - 1.0)), 1e-3);
+  EXPECT_LT((prior.mean - kPrior).norm(), 1e-9) << "the window overlaps the next one";
+  addWindow(filter, 2, 10, far);
+  const Vector moved = filter.calibration().value - kPrior;
+  EXPECT_GT(moved[0], 0.1);
+  EXPECT_LT(moved[0], 1.3 * kOffset);
+  EXPECT_LT(moved[1], -0.1);
+}
+
+TEST(CalibrationFilter, TheOptionsSigmaIsTheLargestSpread) {
+  CalibrationFilter filter(someOptions());
+  addWindow(filter, 1, 9, {100.0, 100.0});
+  EXPECT_LT((filter.prior(2).information - informationOf(2.0) * Matrix::Identity()).norm(), 1e-6);
+}
+
+TEST(CalibrationFilter, SaysHowWellTheWindowsMeasure) {
+  CalibrationFilter filter(someOptions());
+  addWindow(filter, 1, 9, kPrior);
+  // Four times 1 / sqrt(4 + 12) and 1 / sqrt(4 + 5), 4 = 1 / (0.25 * 2)^2 being the options'.
+  EXPECT_NEAR(filter.sigma()[0], 4.0 * 0.25, 1e-9);
+  EXPECT_NEAR(filter.sigma()[1], 4.0 / 3.0, 1e-9);
 }
 
 TEST(CalibrationFilter, OfWindowsThatOverlapOneCounts) {
   CalibrationFilter filter(someOptions());
   for (const int newest : {5, 6, 7, 8}) {
-    filter.note(newest, calibrationOf(0.1 * newest, -0.7), information(12.0, 5.0));
-    expectBelief(filter.prior(newest - 4), {0.5, -1.0}, optionInformation());
+    addWindow(filter, newest - 4, newest, {100.0, -100.0});
+    EXPECT_LT((filter.prior(newest - 4).mean - kPrior).norm(), 1e-9);
   }
-  expectBelief(filter.prior(6), {0.5, -0.7}, optionInformation() + information(12.0, 5.0));
+  const CalibrationBelief belief = filter.prior(6);  // the first window has no pair in common with it
+  EXPECT_LT((belief.information - (informationOf(2.0) * Matrix::Identity() + kInformation)).norm(), 1e-6);
+  EXPECT_NEAR(belief.mean[0], (4.0 * 0.5 + 12.0 * 100.0) / 16.0, 1e-3);
+  EXPECT_NEAR(filter.prior(6).mean[0], belief.mean[0], 1e-12) << "counted once";
 }
 
 TEST(CalibrationFilter, EarlierWindowsFadeAndTheOptionsStay) {
   CalibrationFilter filter(someOptions());
-  filter.note(5, calibrationOf(0.3, -0.7), information(12.0, 5.0));
-  filter.prior(6);
-  filter.note(10, calibrationOf(0.4, -0.6), information(8.0, 2.0));
+  addWindow(filter, 1, 5, {100.0, -100.0});
+  addWindow(filter, 6, 10, {60.0, -60.0});
   const CalibrationBelief belief = filter.prior(11);
-  EXPECT_LT((belief.information - (optionInformation() + information(6.0 + 8.0, 2.5 + 2.0))).norm(), 1e-9);
-  // What each window added to its own prior: I * mean = (prior + I) * result - prior * its mean.
-  const double first = (4.0 + 12.0) * 0.3 - 4.0 * 0.5;
-  const double second = (4.0 + 12.0 + 8.0) * 0.4 - (4.0 + 12.0) * 0.3;
-  EXPECT_NEAR(belief.mean[0], (4.0 * 0.5 + 0.5 * first + second) / (4.0 + 6.0 + 8.0), 1e-9);
+  EXPECT_LT((belief.information - (informationOf(2.0) * Matrix::Identity() + 1.5 * kInformation)).norm(), 1e-6);
+  EXPECT_NEAR(belief.mean[0], (4.0 * 0.5 + 6.0 * 100.0 + 12.0 * 60.0) / 22.0, 1e-3);
+  EXPECT_NEAR(belief.mean[1], (4.0 * -1.0 - 2.5 * 100.0 - 5.0 * 60.0) / 11.5, 1e-3);
 }
 
 TEST(CalibrationFilter, AgreementOfManyWindowsWearsThePriorDown) {
   CalibrationFilter filter(someOptions());
-  // Every window measures (1, 0) with the same precision; its result is the mean weighted with its prior.
-  for (int k = 0; k < 50; ++k) {
-    const CalibrationBelief prior = filter.prior(10 * k + 1);
-    const Matrix own = information(40.0, 40.0);
-    RigCalibration result;
-    result.value = (prior.information + own).inverse() * (prior.information * prior.mean + own * Vector(1.0, 0.0));
-    filter.note(10 * k + 9, result, own);
-  }
+  const Matrix own = 40.0 * Matrix::Identity();
+  for (int k = 0; k < 50; ++k) addWindow(filter, 10 * k + 1, 10 * k + 9, {10.0, -10.0}, own);
   // In the end 40 of the window and 2 * 40 of the fading past stand against 4 of the options.
-  EXPECT_NEAR(filter.calibration().value[0], (4.0 * 0.5 + 120.0 * 1.0) / 124.0, 1e-6);
-  EXPECT_NEAR(filter.calibration().value[1], (4.0 * -1.0) / 124.0, 1e-6);
+  EXPECT_NEAR(filter.calibration().value[0], (4.0 * 0.5 + 120.0 * 10.0) / 124.0, 1e-3);
+  EXPECT_NEAR(filter.calibration().value[1], (4.0 * -1.0 - 120.0 * 10.0) / 124.0, 1e-3);
 }
 
 TEST(CalibrationFilter, HoldsThePriorWhenNotEnabled) {
   CalibrationOptions options = someOptions();
   options.enabled = false;
   CalibrationFilter filter(options);
-  const CalibrationBelief prior = filter.prior(1);
-  EXPECT_LT((prior.mean - Vector(0.5, -1.0)).norm(), 1e-9);
-  EXPECT_GE(prior.information.diagonal().minCoeff(), 1e11);
-  filter.note(5, calibrationOf(0.5, -1.0), information(12.0, 5.0));
+  addWindow(filter, 1, 9, {100.0, 100.0});
+  EXPECT_LT((filter.prior(10).mean - kPrior).norm(), 1e-3);
+  EXPECT_LT((filter.calibration().value - kPrior).norm(), 1e-3);
   EXPECT_TRUE(filter.sigma().array().isNaN().all());
 }
 

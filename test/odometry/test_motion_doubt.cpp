@@ -16,7 +16,8 @@ void expectDeviations(const Matrix6d& covariance, double translation, double rot
 }
 
 TEST(MotionDoubt, APredictionErrsByTheAcceleration) {
-  expectDeviations(predictionCovariance(0.2), 0.5 * 5.0 * 0.04, 0.5 * 2.0 * 0.04);
+  // A body at a constant 5 m/s^2 covers 5 * 0.2^2 m more in each interval of 0.2 s than in the one before.
+  expectDeviations(predictionCovariance(0.2), 5.0 * 0.04, 2.0 * 0.04);
 }
 
 TEST(MotionDoubt, UnseenTravelIsBoundedByTheSpeedAndByATurn) {

@@ -11,8 +11,8 @@ struct DepthScaleOptions {
   double slope = 0.72;
   double exponent = 1.0;
   double offset = 0.0;
-  double min_size = 10.0;
-  double max_size = 20.0;
+  double min_size = 4.0;
+  double max_size = 32.0;
   double constant_size = 7.0;
 
   void describe(OptionList& list) {

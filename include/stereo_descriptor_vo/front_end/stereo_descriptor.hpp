@@ -15,7 +15,7 @@ struct DescriptorOptions {
   DescriptorType type = DescriptorType::kFreak;
   DescriptorLayout layout = DescriptorLayout::kLeftAndRight;
   bool oriented = false;
-  bool extend_border = false;
+  bool extend_border = true;
 
   void describe(OptionList& list);
   /// Throws std::invalid_argument when the OpenCV at hand lacks the base descriptor.

@@ -13,6 +13,7 @@ struct CalibrationOptions {
   double prior_bend = 0.0;
   double prior_sigma = 1.0;
   double trust = 0.1;
+  double significance = 4.0;
   double memory = 0.5;
 
   void describe(OptionList& list) {
@@ -24,13 +25,21 @@ struct CalibrationOptions {
              "standard deviation of what is known beforehand, in the centre and at 45 degrees from it");
     list.add("trust", trust, {0.01, 1.0}, "",
              "how far the window's own figure for its precision is believed: 1 / the factor on its standard deviation");
+    list.add(
+        "significance", significance, {0.0, 100.0}, "sigma",
+        "how many of the window's own standard deviations an estimate must differ from what is known beforehand to "
+        "move it");
     list.add("memory", memory, {0.0, 1.0}, "",
              "share of the earlier windows' information that one more window leaves; 1: forever");
   }
 };
 
-/// Gathers what successive windows tell of the rig's calibration. Windows overlap: a window's information counts as
-/// prior only for windows that share no pair with it, so that nothing is counted twice.
+/// Gathers the estimates of successive windows. Windows overlap: a window's information counts as prior only for
+/// windows that share no pair with it, so that nothing is counted twice.
+///
+/// A window moves the calibration away from the options' prior only as far as the evidence is significant (empirical
+/// Bayes, as in Efron and Morris 1973): the prior's variance is the square of the estimate less what chance explains.
+/// The rig of a simulator, or one that was calibrated well, keeps the prior to the digit.
 class CalibrationFilter {
  public:
   explicit CalibrationFilter(const CalibrationOptions& options);
@@ -38,32 +47,38 @@ class CalibrationFilter {
   /// What is known from pairs before the window that begins with pair `oldest_id`.
   CalibrationBelief prior(int oldest_id);
 
-  /// Notes the result of the window that ends with pair `newest_id`; `information` excludes the prior.
+  /// Notes the result of the window that ends with pair `newest_id` and had the last prior(); `information` excludes
+  /// it.
   void note(int newest_id, const RigCalibration& calibration, const RigCalibration::Matrix& information);
 
   /// Notes the square (px^2) of what a window found the calibration to leave at a point.
   void noteCommon(double square);
 
   const RigCalibration& calibration() const { return calibration_; }
-  /// Standard deviations of (offset, bend) in px, NaN before the first window.
+  /// Standard deviations of (offset, bend) in px as the windows measure them, NaN before the first window.
   RigCalibration::Vector sigma() const;
 
  private:
+  /// Estimates of windows, the options' prior excluded, with the precision that the windows state.
+  struct Evidence {
+    RigCalibration::Matrix information = RigCalibration::Matrix::Zero();       ///< 1/px^2
+    RigCalibration::Vector information_mean = RigCalibration::Vector::Zero();  ///< information * mean
+  };
   struct Contribution {
     int newest_id;
-    RigCalibration::Matrix information;
-    RigCalibration::Vector information_mean;  ///< information * mean
+    Evidence evidence;
   };
+
+  RigCalibration::Matrix informationOf(const RigCalibration::Vector& spread) const;
+  RigCalibration::Vector significantSpread() const;
 
   CalibrationOptions options_;
   RigCalibration calibration_;
-  RigCalibration::Matrix option_information_;
-  RigCalibration::Vector option_information_mean_;                       ///< information * mean
-  RigCalibration::Matrix information_ = RigCalibration::Matrix::Zero();  ///< of windows before the present one
-  RigCalibration::Vector information_mean_ = RigCalibration::Vector::Zero();
+  Evidence prior_;                       ///< the options', as far as the evidence leaves it its weight
+  Evidence past_;                        ///< of windows before the present one
   std::optional<Contribution> pending_;  ///< the last window that shared no pair with those already counted
-  std::optional<RigCalibration::Matrix> total_information_;
-  int commons_ = 0;  ///< how many squares were noted
+  std::optional<Evidence> present_;      ///< of the past and the last window
+  int commons_ = 0;                      ///< how many squares were noted
   double common_square_ = 0.0;
 };
 

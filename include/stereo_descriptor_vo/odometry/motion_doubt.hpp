@@ -12,8 +12,8 @@ constexpr double kLastingTurnAcceleration = 2.0;  // rad/s^2
 
 /// Covariances, of right perturbations in m and rad, of motions that were not measured or not for certain.
 
-/// How much less a predicted motion is known than a measured one: constant velocity errs by the acceleration, for which
-/// the above stand; `dt` in s.
+/// Uncertainty that a prediction adds to the velocity it starts from, `dt` in s. The mean velocities of two intervals of
+/// `dt` differ by the acceleration above times `dt`, so the motions differ by that times `dt` once more.
 Matrix6d predictionCovariance(double dt);
 
 /// What could have been travelled unseen, by a vehicle that went on with its velocity, m/s and rad/s, and accelerated
