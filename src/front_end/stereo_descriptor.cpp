@@ -28,7 +28,7 @@ void DescriptorOptions::describe(OptionList& list) {
   list.add("oriented", oriented, "turn the pattern to the left view's orientation (both halves by the same angle)");
   list.add(
       "extend_border", extend_border,
-      "describe also what is too near to an image border for its size, if a size of 7 px fits: the image then goes on "
+      "describe also what is too near to an image border for its size, if a size of 5 px fits: the image then goes on "
       "as its outermost pixels");
 }
 
@@ -40,7 +40,7 @@ StereoDescriptor::StereoDescriptor(const DescriptorOptions& options)
     : options_(checked(options)), base_(makeBaseDescriptor(options_.type)) {}
 
 double StereoDescriptor::reach(double size) const {
-  return base_->reach(options_.extend_border ? std::min(size, BaseDescriptor::kStandardSize) : size);
+  return base_->reach(options_.extend_border ? std::min(size, DescriptorOptions::kInsideSize) : size);
 }
 
 double StereoDescriptor::largestSize(cv::Size image) const {
