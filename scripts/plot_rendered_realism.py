@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/env python3
 """Compares a rendered drive with a real one: grey-level gradients, disparities, corner counts, and the pictures."""
 
 import argparse
@@ -6,7 +6,10 @@ import sys
 from pathlib import Path
 
 import cv2
-import matplotlib
+try:
+    import matplotlib
+except ImportError:
+    sys.exit("error: drawing needs matplotlib (python3-matplotlib)")
 
 matplotlib.use("Agg")
 import matplotlib.pyplot as plt  # noqa: E402

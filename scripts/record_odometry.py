@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/env python3
 """Records a running odometry beside its ground truth: poses of both in KITTI format (base frame, equal stamps only) and one
 CSV line for each vo_info. Ends when nothing has come for a while after the first message."""
 import argparse

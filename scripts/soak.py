@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/env python3
 """Feeds a drive in KITTI layout to the running pipeline for some minutes, again and again while the stamps only grow, and
 watches the nodelet manager's memory. Stamps are even, as those of a triggered camera are, also where this program is late. A
 drive that ends where it began goes round; another one goes forwards and backwards in turn, which no vehicle does: at each end

@@ -1,6 +1,7 @@
 #include "consensus_experiment.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <ctime>
 #include <opencv2/core.hpp>
 #include <random>

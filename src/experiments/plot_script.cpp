@@ -43,8 +43,8 @@ int run(std::vector<std::string> command) {
 
 void runPlotScript(const std::string& script, const std::vector<std::string>& arguments) {
   const std::optional<fs::path> found = findScript(script);
-  // The system's own Python: one from elsewhere that comes first on PATH may lack matplotlib.
-  std::vector<std::string> command = {fs::exists("/usr/bin/python3") ? "/usr/bin/python3" : "python3",
+  // The Python of the build: one from elsewhere that comes first on PATH may lack matplotlib.
+  std::vector<std::string> command = {fs::exists(SDVO_PYTHON) ? SDVO_PYTHON : "python3",
                                       found ? found->string() : script};
   command.insert(command.end(), arguments.begin(), arguments.end());
   if (found && run(command) == 0) return;

@@ -57,15 +57,10 @@ RayCaster::RayCaster(const Device& device, const Mesh& mesh) : scene_(newScene(d
 }
 
 void RayCaster::cast(RayPacket& packet) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  rtcIntersect16(packet.valid, scene_.get(), &context, &packet.rays);
+  intersectTogether(scene_.get(), packet.valid, packet.rays);
 }
 
 bool RayCaster::occluded(const Eigen::Vector3f& origin, const Eigen::Vector3f& direction) const {
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
   RTCRay ray = {};
   ray.org_x = origin.x();
   ray.org_y = origin.y();
@@ -76,8 +71,7 @@ bool RayCaster::occluded(const Eigen::Vector3f& origin, const Eigen::Vector3f& d
   ray.tnear = 0.02f;
   ray.tfar = std::numeric_limits<float>::infinity();
   ray.mask = 0xffffffffu;
-  rtcOccluded1(scene_.get(), &context, &ray);
-  return ray.tfar < 0.0f;
+  return isOccluded(scene_.get(), ray);
 }
 
 MovingScene::MovingScene(const Device& device, const std::vector<RayCaster>& models)
@@ -104,10 +98,7 @@ void MovingScene::place(const std::vector<Traffic::Car>& cars) {
 
 void MovingScene::cast(RayPacket& packet) const {
   if (!scene_) return;
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  rtcIntersect16(packet.valid, scene_.get(), &context, &packet.rays);
+  intersectTogether(scene_.get(), packet.valid, packet.rays);
 }
 
 }  // namespace sdvo::render

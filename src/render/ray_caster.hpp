@@ -1,12 +1,11 @@
 #pragma once
 
-#include <embree3/rtcore.h>
-
 #include <Eigen/Geometry>
 #include <limits>
 #include <memory>
 #include <vector>
 
+#include "embree.hpp"
 #include "mesh.hpp"
 #include "vehicles.hpp"
 

@@ -4,6 +4,7 @@
 #include <message_filters/simple_filter.h>
 #include <sensor_msgs/Image.h>
 
+#include <cstdint>
 #include <memory>
 #include <pluginlib/class_loader.hpp>
 #include <string>

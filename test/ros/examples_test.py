@@ -1,5 +1,5 @@
-#!/usr/bin/python3
-"""The examples of subscribers, on made-up descriptors whose answers are known and on a converted KITTI sequence."""
+#!/usr/bin/env python3
+"""The examples of subscribers, on made-up descriptors whose answers are known and on a converted sequence."""
 
 import os
 import shutil
@@ -15,7 +15,7 @@ import rospy
 import rostest
 from std_msgs.msg import Float32
 
-from kitti_replay import PACKAGE, Collector, Rosout, kitti_dir, links, wait_until
+from kitti_replay import PACKAGE, Collector, Rosout, links, sequence_dir, wait_until
 from stereo_descriptor_vo.msg import StereoFeatures
 
 COUNT = 101  # odd: the median is one of them
@@ -122,9 +122,9 @@ class Examples(unittest.TestCase):
         self.assertTrue(wait_until(lambda: len(self.share) == 3))
         self.assertEqual(self.share[2].data, 0.0)
 
-    def test_answers_on_a_real_drive(self):
+    def test_answers_on_a_drive(self):
         pairs = 10
-        sequence = os.path.join(kitti_dir(), 'sequences', '06')
+        sequence = sequence_dir('06', pairs)
         directory = tempfile.mkdtemp(prefix='sdvo_examples_')
         self.addCleanup(shutil.rmtree, directory, ignore_errors=True)
         bag = os.path.join(directory, 'sequence.bag')

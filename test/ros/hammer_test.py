@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/env python3
 """All nodelets in one manager are unloaded, loaded, reconfigured, reset and asked for everything at once, while pairs come:
 nothing may break, hang or grow. What the answers are is left to the other tests."""
 

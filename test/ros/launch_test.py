@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/env python3
 """What the launch files set on the parameter server, what they refuse, and what they start again."""
 
 import os

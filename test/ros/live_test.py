@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/env python3
 """A camera that misbehaves in every way we know, on the launched pipeline. The test is the camera and the clock, and
 waits for the answer to each pair, so that nothing depends on the machine's speed."""
 

@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/env python3
 """Places recognised on made-up features: rounds through a ring of points, by an odometry that drifts. The test is the clock, the
 image side and the odometry, and waits for the answer to each pair; every pair is a key frame."""
 

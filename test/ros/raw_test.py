@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/env python3
 """Replays raw images of EuRoC through stereo_raw.launch: rectified in the odometry's own manager, without a copy, and the
 trajectory is that of the drone.
 

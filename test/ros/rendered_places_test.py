@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/env python3
 """A rendered figure eight, one lap and a bit, through the launched pipeline with loop closing: where it comes by again it is
 recognised, and nowhere else. Needs no data set."""
 

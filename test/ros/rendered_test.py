@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/env python3
 """Renders a drive with turns and a stop, converts it to a bag, replays it through the launched pipeline and compares what
 comes out with the exact ground truth. Needs no data set.
 

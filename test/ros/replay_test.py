@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/env python3
 """Replays a whole converted KITTI sequence through the launched pipeline and checks all that comes out.
 
 Parameters: ~sequence, for example "06"; ~rate of the replay."""

@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/env python3
 """Features on the robot, odometry in another process behind a link that is slow and breaks down."""
 
 import io

@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/env python3
 """scripts/fleet against a real slurmctld and slurmd of this machine, with a configuration of their own in a temporary folder. Needs
 slurm-wlm, munge, root (for slurmd), and the built tools render_drive, kitti_to_bag and run_bag."""
 import csv

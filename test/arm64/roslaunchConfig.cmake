@@ -1,0 +1,1 @@
+# See catkinConfig.cmake.
