@@ -119,7 +119,7 @@ TEST(Rooms, WhatRunsOnARobotReadsNoImageFilesWithOpenCv) {
 
 TEST(Rooms, TheSearchKnowsRosHeaders) {
   for (const char* line :
-       {"#include <ros/ros.h>", "#include \"../ros/conversions.hpp\"", "  #  include <ros/time.h>",
+       {"#include <ros/ros.h>", "#include \"../ros/pose_conversions.hpp\"", "  #  include <ros/time.h>",
         "#include <sensor_msgs/Image.h>", "#include <nav_msgs/Odometry.h>", "#include <tf2/utils.h>",
         "#include <tf2_ros/buffer.h>", "#include <nodelet/nodelet.h>", "#include <cv_bridge/cv_bridge.h>",
         "#include <message_filters/subscriber.h>", "#include <image_transport/image_transport.h>",

@@ -6,12 +6,47 @@
 
 namespace sdvo {
 
+/// Rates of input that diagnostics take for healthy: 5 to 60 Hz, with a tenth to either side.
+struct RateOptions {
+  double min_rate = 4.5;
+  double max_rate = 66.0;
+
+  void describe(OptionList& list) {
+    list.add("min_rate", min_rate, {0.0, 1000.0}, "Hz", "/diagnostics warn when pairs come less often (wall time)");
+    list.add("max_rate", max_rate, {0.0, 10000.0}, "Hz", "/diagnostics warn when pairs come more often (wall time)");
+  }
+};
+
+/// What diagnostics of the image side take for a fault.
+struct ImageThresholds {
+  double max_gap = 0.005;
+  double min_intensity = 20.0;
+  double max_intensity = 235.0;
+  int min_corners = 100;
+  double max_load = 0.9;
+
+  void describe(OptionList& list) {
+    list.add("max_gap", max_gap, {0.0, 1.0}, "s",
+             "/diagnostics warn when the stamps of left and right are farther apart");
+    list.add("min_intensity", min_intensity, {0.0, 255.0}, "", "/diagnostics warn below this mean grey level");
+    list.add("max_intensity", max_intensity, {0.0, 255.0}, "", "/diagnostics warn above this mean grey level");
+    list.add("min_corners", min_corners, {0, 100000}, "", "/diagnostics warn when fewer corners are detected");
+    list.add("max_load", max_load, {0.0, 1.0}, "",
+             "/diagnostics warn when the worker takes a larger share of one processor");
+  }
+};
+
 /// What the image side's nodelet needs beside the extractor's options.
 struct StereoInputOptions {
   bool approximate_sync = false;
   double max_interval = 0.01;
   int sync_queue_size = 20;
   int queue_size = 1;
+  double max_rate = 0.0;
+  int opencv_threads = -1;
+  double max_silence = 2.0;
+  RateOptions rates;
+  ImageThresholds thresholds;
 
   void describe(OptionList& list) {
     list.add("approximate_sync", approximate_sync, "pair images whose stamps differ; false: equal stamps only");
@@ -20,6 +55,13 @@ struct StereoInputOptions {
     list.add("sync_queue_size", sync_queue_size, {1, 1000}, "",
              "messages kept per input until those that belong to them have come");
     list.add("queue_size", queue_size, {1, 1000}, "", "pairs that wait while one is processed; the newest win");
+    list.add("max_rate", max_rate, {0.0, 1000.0}, "Hz", "pairs processed at most, by their stamps; 0: all");
+    list.add("opencv_threads", opencv_threads, {-1, 256}, "",
+             "OpenCV's threads, of the whole process; 0: none beside the caller's, -1: left as they are");
+    list.add("max_silence", max_silence, {0.1, 3600.0}, "s",
+             "/diagnostics report an error when no pair has come for longer (wall time)");
+    list.group("diagnostics", rates);
+    list.group("diagnostics", thresholds);
   }
 };
 
@@ -30,13 +72,18 @@ struct OdometryOutputOptions {
   std::string initial_pose = "0 0 0 0 0 0";
   bool publish_tf = true;
   bool invert_tf = false;
+  bool publish_null_when_lost = false;
   double tf_timeout = 2.0;
   std::string guess_frame_id;
   bool use_imu = false;
   double guess_timeout = 0.1;
   int queue_size = 1;
   int max_path_length = 20000;
+  int opencv_threads = -1;
   double max_silence = 2.0;
+  RateOptions rates;
+  double max_load = 0.9;
+  double max_latency = 0.5;
 
   void describe(OptionList& list) {
     list.add("odom_frame_id", odom_frame_id, "world-fixed frame of the odometry");
@@ -45,20 +92,31 @@ struct OdometryOutputOptions {
              "pose of the base in odom at the start and after a reset: 'x y z roll pitch yaw' (m, rad)");
     list.add("publish_tf", publish_tf, "publish odom -> base on /tf");
     list.add("invert_tf", invert_tf, "publish base -> odom instead, where base already has a parent");
+    list.add("publish_null_when_lost", publish_null_when_lost,
+             "while LOST publish odometry of zeros, quaternion included, with variances of 9999, as rtabmap does");
     list.add("tf_timeout", tf_timeout, {0.0, 60.0}, "s",
              "wall time to wait for the transform base <- camera at the start");
     list.add("guess_frame_id", guess_frame_id,
              "world-fixed frame of another odometry: where its guess_frame_id -> base on TF has the base is one more "
              "place to look for the motion; empty: none");
     list.add("use_imu", use_imu,
-             "look for the rotation where the gyro of topic imu has it, too; not with guess_frame_id");
+             "look for the rotation where the gyro of topic imu has it, too, and take roll and pitch of the first pose "
+             "from its "
+             "accelerometer while the robot stands; not with guess_frame_id");
     list.add("guess_timeout", guess_timeout, {0.0, 1.0}, "s",
              "wall time to wait for either at each pair; seldom once it did not come in time");
     list.add("queue_size", queue_size, {1, 1000}, "",
              "feature messages that wait while one is processed; the newest win");
     list.add("max_path_length", max_path_length, {1, 10000000}, "", "poses kept in the path; the newest win");
+    list.add("opencv_threads", opencv_threads, {-1, 256}, "",
+             "OpenCV's threads, of the whole process; 0: none beside the caller's, -1: left as they are");
     list.add("max_silence", max_silence, {0.1, 3600.0}, "s",
              "/diagnostics report an error when no pair has come for longer (wall time)");
+    list.group("diagnostics", rates);
+    list.add("diagnostics/max_load", max_load, {0.0, 1.0}, "",
+             "/diagnostics warn when the worker takes a larger share of one processor");
+    list.add("diagnostics/max_latency", max_latency, {0.0, 3600.0}, "s",
+             "/diagnostics warn when poses are later than their images by more");
   }
 };
 
@@ -73,6 +131,7 @@ struct PlaceOutputOptions {
   int sync_queue_size = 100;
   int queue_size = 10;
   double max_silence = 10.0;
+  int opencv_threads = -1;
   std::string places_file;
   std::string robot_name;
   double other_min_score = 0.05;
@@ -92,6 +151,8 @@ struct PlaceOutputOptions {
     list.add("queue_size", queue_size, {1, 10000}, "", "pairs that wait while one is processed; the newest win");
     list.add("max_silence", max_silence, {0.1, 3600.0}, "s",
              "/diagnostics warn when no pair with odometry has come for longer (wall time)");
+    list.add("opencv_threads", opencv_threads, {-1, 256}, "",
+             "OpenCV's threads, of the whole process; 0: none beside the caller's, -1: left as they are");
     list.add("places_file", places_file, "file of save_places to begin with (absolute path); empty: with no places");
     list.add("robot_name", robot_name, "what other robots know this one by; empty: the namespace");
     list.add("other_min_score", other_min_score, {0.0, 1.0}, "",

@@ -408,8 +408,19 @@ void LocalMap::pose(Problem& problem) const {
   }
 }
 
+std::vector<Eigen::Vector3d> LocalMap::positions() const {
+  constexpr double kFarthest = 1e-3;  // 1/m, of a point's depth where it was seen first
+  std::vector<Eigen::Vector3d> positions;
+  for (const Point& point : points_) {
+    const double inverse_depth = point.position.ray_and_inverse_depth.z();
+    if (inverse_depth > kFarthest)
+      positions.push_back(point.position.scaledPointIn(Eigen::Isometry3d::Identity()) / inverse_depth);
+  }
+  return positions;
+}
+
 LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const CalibrationBelief& prior,
-                                      RigCalibration& calibration) {
+                                      RigCalibration& calibration, const std::optional<Floor>& floor) {
   Adjustment adjustment;
   const int newest = static_cast<int>(frames_.size()) - 1;
   if (newest == 0) return adjustment;
@@ -418,6 +429,7 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   Window& window = problem_.window;
   window.calibration = calibration;
   window.calibration_prior = prior;
+  window.floor = floor;
 
   std::vector<int> poses;  // whose covariances are made use of below
   poses.reserve(3);

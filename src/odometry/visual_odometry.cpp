@@ -44,6 +44,13 @@ double excessOfFew(int inliers, int enough) {
   return std::max(1.0, times * times);
 }
 
+/// The pose of an optical frame (z ahead, x right) at the origin of a base (x ahead, z up).
+Eigen::Isometry3d lookingAhead() {
+  Eigen::Isometry3d T_base_camera = Eigen::Isometry3d::Identity();
+  T_base_camera.linear() << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
+  return T_base_camera;
+}
+
 }  // namespace
 
 const char* toString(TrackingState state) {
@@ -62,6 +69,7 @@ const char* toString(TrackingState state) {
 
 VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
     : options_(checked(options)),
+      T_base_camera_(lookingAhead()),
       search_(options.matcher, options.motion, options.alignment, options.tracking),
       matcher_(options.matcher.widened()),
       estimator_(options.motion),
@@ -249,6 +257,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
     // Where the lasting points confirm the way, the stamps may be wrong, and only the speed is in doubt.
     if (!verdict.of_rate || !lastingAgree(options_.tracking, evidence)) state_.covariance.doubt(state_.last_doubt);
   }
+  if (options_.planar.planar) noteFloor(step);
   noteVelocity(features.stamp, found, evidence, verdict.trust, measured);
   state_.predicted_pairs = 0;
   if (state_.map->newestIsKeyframe()) state_.covariance.markKeyframe();
@@ -265,7 +274,7 @@ VisualOdometry::Extension VisualOdometry::insert(const StereoFeatures& features,
   extension.T_keyframe_origin = map.poseBeforeNewest();
   if (map.newestIsKeyframe() && found.verdict.trust == Trust::kSound) recall(features);
   const CalibrationBelief prior = state_.calibration.prior(map.oldestId());
-  extension.adjustment = map.adjust(optimizer_, prior, extension.calibration);
+  extension.adjustment = map.adjust(optimizer_, prior, extension.calibration, floor());
   map.renewLooks(features, found.sightings);
   return extension;
 }
@@ -434,6 +443,40 @@ VisualOdometry::Step VisualOdometry::predict(const StereoFeatures& features, dou
   return step;
 }
 
+std::optional<Floor> VisualOdometry::floor() const {
+  if (!options_.planar.planar) return std::nullopt;
+  return Floor(options_.planar, T_base_camera_, state_.floor_height);
+}
+
+/// Whether the newest pose is on the floor: a ramp is told of, and a level stretch behind it is another floor.
+void VisualOdometry::noteFloor(Step& step) {
+  constexpr double kOff = 4.0;  // standard deviations
+  constexpr int kLevel = 10;    // pairs that make another floor
+  const Floor known = *floor();
+  const Eigen::Isometry3d& T_camera_origin = state_.map->newestPose();
+  const Eigen::Vector3d residual = known.residual(T_camera_origin);
+  const double height = known.base(T_camera_origin).translation().z();
+  const bool is_tilted = residual.tail<2>().norm() > kOff;
+  state_.on_floor = !is_tilted && std::abs(residual[0]) <= kOff;
+  state_.level_pairs = state_.on_floor || is_tilted ? 0 : state_.level_pairs + 1;
+  std::ostringstream reason;
+  if (is_tilted)
+    reason << "off the floor: tilted by " << (residual.tail<2>().norm() * options_.planar.planar_tilt_sigma)
+           << " degrees, a ramp?";
+  else if (!state_.on_floor)
+    reason << "off the floor: " << height - state_.floor_height << " m above it";
+  if (state_.level_pairs >= kLevel) {
+    reason << ", level: this is the floor from now on";
+    state_.floor_height = height;
+    state_.level_pairs = 0;
+  }
+  if (step.reason.empty()) step.reason = reason.str();
+}
+
+std::vector<Eigen::Vector3d> VisualOdometry::mapPoints() const {
+  return state_.map ? state_.map->positions() : std::vector<Eigen::Vector3d>();
+}
+
 void VisualOdometry::move(const Eigen::Isometry3d& T_previous_current) {
   state_.T_origin_camera = orthonormalised(state_.T_origin_camera * T_previous_current);
   state_.distance += T_previous_current.translation().norm();
@@ -453,6 +496,8 @@ OdometryResult VisualOdometry::report(const StereoFeatures& features, double dt,
     result.has_pose = true;
     result.T_origin_camera = state_.T_origin_camera;
     result.pose_covariance = state_.covariance.value();
+    if (options_.planar.planar && state_.on_floor)
+      result.pose_covariance = floor()->constrained(state_.T_origin_camera, result.pose_covariance);
   }
   if (step.T_previous_current) {
     result.has_motion = true;

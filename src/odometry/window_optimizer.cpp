@@ -136,6 +136,7 @@ class Solver {
     const CalibrationBelief& prior = window_->calibration_prior;
     system.hessian.bottomRightCorner<kCalibration, kCalibration>() += prior.information;
     system.gradient.tail<kCalibration>() += prior.information * (prior.mean - estimate.calibration.value);
+    if (window_->floor) holdToFloor(estimate, system);
     system.cost = costOf(estimate, squares_);
   }
 
@@ -169,7 +170,24 @@ class Solver {
     LogSum costs;
     for (const double square : squares) costs.add(square / bend());
     const CalibrationVector error = estimate.calibration.value - window_->calibration_prior.mean;
-    return error.dot(window_->calibration_prior.information * error) + bend() * costs.value();
+    return error.dot(window_->calibration_prior.information * error) + bend() * costs.value() + floorCost(estimate);
+  }
+
+  void holdToFloor(const Estimate& estimate, ReducedSystem& system) const {
+    Floor::Jacobian jacobian;
+    for (int f = 0; f < poses_; ++f) {
+      const Eigen::Vector3d residual = window_->floor->residual(estimate.T_camera_origin[f + 1], &jacobian);
+      const Eigen::Vector3d weights = residual.cwiseAbs2().unaryExpr(&Floor::weight);
+      system.hessian.block<6, 6>(6 * f, 6 * f) += jacobian.transpose() * weights.asDiagonal() * jacobian;
+      system.gradient.segment<6>(6 * f) -= jacobian.transpose() * weights.cwiseProduct(residual);
+    }
+  }
+
+  double floorCost(const Estimate& estimate) const {
+    double cost = 0.0;
+    for (int f = 0; window_->floor && f < poses_; ++f)
+      cost += window_->floor->residual(estimate.T_camera_origin[f + 1]).cwiseAbs2().unaryExpr(&Floor::cost).sum();
+    return cost;
   }
 
   /// Of n disparities of one point the mean has the variance sigma^2 / n + common^2, as if each by itself had n times

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <opencv2/core.hpp>
 #include <stdexcept>
@@ -63,23 +64,43 @@ std::optional<PlaceReport> PlaceRecognition::observe(const StereoFeatures& featu
   const PlaceSignature signature = index_.signature(kept);
   addKeyframe(kept, next_id_++);
   const Place& here = places_.at(report.id);
-  report.candidates = index_.find(signature, options_.candidates, [&](int id) {
-    const Place& place = places_.at(id);
-    return place.segment != here.segment ||
-           (static_cast<double>(here.features.stamp - place.features.stamp) * 1e-9 >= options_.min_age &&
-            here.travelled - place.travelled >= options_.min_travel);
-  });
-  index_.add(report.id, signature);
+  report.candidates =
+      index_.find(signature, options_.candidates, [&](int id) { return isCandidate(places_.at(id), here); });
+  if (!options_.localisation_only) index_.add(report.id, signature);
   report.find_time = stopwatch.lap();
   recognise(here, report);
   report.verify_time = stopwatch.lap();
-  while (static_cast<int>(places_.size()) > options_.max_places) {
-    const int oldest = places_.begin()->first;
-    index_.remove(oldest);
-    graph_.remove(oldest);
-    places_.erase(oldest);
-  }
+  forgetOldest();
   return report;
+}
+
+/// Whether a place may be the same as a new key frame.
+bool PlaceRecognition::isCandidate(const Place& place, const Place& here) const {
+  if (expectation_) {
+    const Eigen::Vector3d away =
+        graph_.nodes().at(place.id).translation() - (expectation_->T_map_odom * here.T_odom_camera).translation();
+    if (away.norm() > expectation_->radius) return false;
+  }
+  return place.segment != here.segment ||
+         (static_cast<double>(here.features.stamp - place.features.stamp) * 1e-9 >= options_.min_age &&
+          here.travelled - place.travelled >= options_.min_travel);
+}
+
+/// Beyond what is to be kept. Where places are only to be recognised, the newest key frames are kept for their way.
+void PlaceRecognition::forgetOldest() {
+  constexpr int kWay = 20;
+  if (options_.localisation_only) {
+    while (static_cast<int>(std::distance(places_.lower_bound(restored_), places_.end())) > kWay)
+      forget(places_.lower_bound(restored_)->first);
+    return;
+  }
+  while (static_cast<int>(places_.size()) > options_.max_places) forget(places_.begin()->first);
+}
+
+void PlaceRecognition::forget(int id) {
+  index_.remove(id);
+  graph_.remove(id);
+  places_.erase(id);
 }
 
 /// Whether the last pair is worth keeping: far enough from the last key frame, and with enough to be recognised by.
@@ -117,7 +138,8 @@ void PlaceRecognition::addKeyframe(const StereoFeatures& features, int id) {
     edge.from = places_.rbegin()->first;
     edge.to = id;
     edge.kind = GraphEdge::Kind::kBreak;
-    edge.T_from_to = graph_.nodes().at(edge.from).inverse() * T_map_odom() * place.T_odom_camera;
+    edge.T_from_to = graph_.nodes().at(edge.from).inverse() * (expectation_ ? expectation_->T_map_odom : T_map_odom()) *
+                     place.T_odom_camera;
     edge.covariance = unknown();
     graph_.extend(edge);
   }
@@ -150,6 +172,10 @@ void PlaceRecognition::recognise(const Place& here, PlaceReport& report) {
     const std::vector<GraphEdge> loops = agreement_.confirm(graph_, loop);
     for (const GraphEdge& trusted : loops) graph_.close(trusted);
     report.loop = !loops.empty();
+    if (report.loop) {
+      recognised_ = candidate.place;
+      expectation_.reset();
+    }
     report.reason = report.loop ? "" : "no neighbour has confirmed it yet";
     return;
   }
@@ -167,6 +193,20 @@ bool PlaceRecognition::isPossible(const GraphEdge& loop) const {
   const Eigen::Isometry3d T_from_to = graph_.nodes().at(loop.from).inverse() * graph_.nodes().at(loop.to);
   const Vector6d correction = logSE3(T_from_to.inverse() * loop.T_from_to);
   return correction.dot(covariance.ldlt().solve(correction)) <= kImpossible;
+}
+
+void PlaceRecognition::expect(const Eigen::Isometry3d& T_map_odom, double radius) {
+  if (places_.empty()) return;
+  expectation_ = {T_map_odom, radius};
+  way_.known = false;
+}
+
+std::optional<Matrix6d> PlaceRecognition::covariance() const {
+  constexpr double kShare = 0.1;  // of the largest drift, that edges give way by
+  if (!last_) return std::nullopt;
+  const GraphPath path = graph_.path(recognised_.value_or(places_.begin()->first), *last_);
+  if (!path.known) return std::nullopt;
+  return path.covariance + kShare * kShare * graph_.drift(path.length, path.turn);
 }
 
 Eigen::Isometry3d PlaceRecognition::T_map_odom() const {
@@ -225,7 +265,8 @@ void PlaceRecognition::restore(std::vector<Place> places, const PoseGraph& graph
   places_ = std::move(restored);
   index_ = std::move(index);
   graph_ = graph;
-  next_id_ = places_.rbegin()->first + 1;
+  next_id_ = restored_ = places_.rbegin()->first + 1;
+  if (options_.localisation_only) graph_.hold(restored_ - 1);
   way_.known = false;
 }
 

@@ -93,9 +93,12 @@ void PoseGraph::solve(Summary& summary) {
     problem.AddParameterBlock(pose.t.data(), 3);
     keepUnitLength(problem, pose.q.coeffs().data());
   }
-  NodePose& first = poses.begin()->second;
-  problem.SetParameterBlockConstant(first.q.coeffs().data());
-  problem.SetParameterBlockConstant(first.t.data());
+  const int last_held = held_.value_or(poses.begin()->first);
+  for (auto& [id, pose] : poses) {
+    if (id > last_held) break;
+    problem.SetParameterBlockConstant(pose.q.coeffs().data());
+    problem.SetParameterBlockConstant(pose.t.data());
+  }
   for (const GraphEdge& edge : edges_) {
     NodePose &from = poses.at(edge.from), &to = poses.at(edge.to);
     problem.AddResidualBlock(
@@ -120,6 +123,7 @@ void PoseGraph::solve(Summary& summary) {
   summary.time += solved.total_time_in_seconds;
   if (!solved.IsSolutionUsable()) return;
   for (auto& [id, T] : nodes_) {
+    if (id <= last_held) continue;
     const NodePose& pose = poses.at(id);
     T.linear() = pose.q.normalized().toRotationMatrix();
     T.translation() = pose.t;

@@ -7,13 +7,12 @@
 
 #include <algorithm>
 #include <memory>
-#include <mutex>
 #include <pluginlib/class_list_macros.hpp>
 
 #include "callback_thread.hpp"
-#include "conversions.hpp"
 #include "exact_synchroniser.hpp"
 #include "features_image.hpp"
+#include "image_conversions.hpp"
 #include "image_subscriber.hpp"
 #include "report_throttle.hpp"
 
@@ -37,8 +36,8 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
       left.registerCallback<const Image::ConstPtr&>([&nodelet](const Image::ConstPtr& m) { nodelet.take<0>(m); });
       right.registerCallback<const Image::ConstPtr&>([&nodelet](const Image::ConstPtr& m) { nodelet.take<1>(m); });
       // Resolved, for a transport appends its own name to that of the topic.
-      left.subscribe(nh, nh.resolveName("left/image_rect"), kQueue, transport.left(), transport.hints());
-      right.subscribe(nh, nh.resolveName("right/image_rect"), kQueue, transport.right(), transport.hints());
+      left.subscribe(nh, nh.resolveName("left/image_rect"), kQueue, transport.left);
+      right.subscribe(nh, nh.resolveName("right/image_rect"), kQueue, transport.right);
       features = nh.subscribe<Features>("stereo_features", kQueue,
                                         [&nodelet](const Features::ConstPtr& m) { nodelet.take<2>(m); });
       flow = nh.subscribe<Flow>("feature_flow", kQueue, [&nodelet](const Flow::ConstPtr& m) { nodelet.take<3>(m); });
@@ -55,7 +54,6 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
     transport_ = std::make_unique<StereoImageTransport>(getPrivateNodeHandle());
     const image_transport::SubscriberStatusCallback on_connect =
         [this](const image_transport::SingleSubscriberPublisher&) { updateInputs(); };
-    const std::lock_guard<std::mutex> lock(connect_mutex_);
     publisher_ = image_transport::ImageTransport(nh_).advertise("features_image", 1, on_connect, on_connect);
     callbacks_.start();
   } catch (const std::exception& e) {
@@ -64,7 +62,6 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
   }
 
   void updateInputs() try {
-    const std::lock_guard<std::mutex> lock(connect_mutex_);
     if (publisher_.getNumSubscribers() == 0) {
       inputs_.reset();
     } else if (!inputs_) {
@@ -101,7 +98,6 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
   ReportThrottle throttle_;
   std::unique_ptr<StereoImageTransport> transport_;
   image_transport::Publisher publisher_;
-  std::mutex connect_mutex_;
   std::unique_ptr<Inputs> inputs_;
 };
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 
 #include "stereo_descriptor_vo/common/se3.hpp"
 
@@ -17,13 +18,16 @@ double seconds(std::int64_t nanoseconds) {
 
 }  // namespace
 
-void GyroTrack::add(std::int64_t stamp, const Eigen::Vector3d& rate) {
+void GyroTrack::add(std::int64_t stamp, std::int64_t now, const Eigen::Vector3d& rate) {
   if (!rate.allFinite()) return;
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!measurements_.empty() && stamp == measurements_.back().stamp) return;
-  if (!measurements_.empty() && stamp < measurements_.back().stamp) measurements_.clear();
-  measurements_.push_back({stamp, rate});
-  while (stamp - measurements_.front().stamp > kKept) measurements_.pop_front();
+  for (const auto& passed : filter_.add({stamp, rate}, stamp, now)) {
+    const int restarts = passed.source_restarts + passed.clock_steps;
+    if (std::exchange(restarts_, restarts) != restarts) measurements_.clear();
+    measurements_.push_back(passed.item);
+  }
+  while (!measurements_.empty() && measurements_.back().stamp - measurements_.front().stamp > kKept)
+    measurements_.pop_front();
 }
 
 std::optional<Eigen::Matrix3d> GyroTrack::rotation(std::int64_t from, std::int64_t to) const {

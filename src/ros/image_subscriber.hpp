@@ -8,32 +8,39 @@
 #include <memory>
 #include <pluginlib/class_loader.hpp>
 #include <string>
-#include <utility>
 
 namespace sdvo {
+
+/// One camera's image transport. Each has a parameter namespace of its own: transports keep options there.
+struct ImageTransport {
+  using Plugin = image_transport::SubscriberPlugin;
+
+  image_transport::TransportHints hints;
+  pluginlib::UniquePtr<Plugin> plugin;
+};
 
 /// The transports of a stereo pair's images, as the private parameter `image_transport` names them. To be made in
 /// onInit(): image_transport's own subscribers load their plugin whenever they subscribe, which in a nodelet's thread
 /// races with the manager's loading of other nodelets and at times crashed it.
 class StereoImageTransport {
  public:
-  using Plugin = image_transport::SubscriberPlugin;
-
   /// Throws pluginlib::PluginlibException when there is no such transport.
   explicit StereoImageTransport(const ros::NodeHandle& private_nh)
-      : hints_("raw", ros::TransportHints(), private_nh),
-        loader_("image_transport", "image_transport::SubscriberPlugin"),
-        left_(loader_.createUniqueInstance(Plugin::getLookupName(hints_.getTransport()))),
-        right_(loader_.createUniqueInstance(Plugin::getLookupName(hints_.getTransport()))) {}
-
-  Plugin& left() { return *left_; }
-  Plugin& right() { return *right_; }
-  const image_transport::TransportHints& hints() const { return hints_; }
+      : loader_("image_transport", "image_transport::SubscriberPlugin"),
+        left(make(private_nh, "left_image")),
+        right(make(private_nh, "right_image")) {}
 
  private:
-  image_transport::TransportHints hints_;
-  pluginlib::ClassLoader<Plugin> loader_;  // outlives what it made
-  pluginlib::UniquePtr<Plugin> left_, right_;
+  ImageTransport make(const ros::NodeHandle& private_nh, const std::string& side) {
+    image_transport::TransportHints hints(private_nh.param<std::string>("image_transport", "raw"),
+                                          ros::TransportHints().tcpNoDelay(), ros::NodeHandle(private_nh, side));
+    return {hints, loader_.createUniqueInstance(ImageTransport::Plugin::getLookupName(hints.getTransport()))};
+  }
+
+  pluginlib::ClassLoader<ImageTransport::Plugin> loader_;  // outlives what it made
+
+ public:
+  ImageTransport left, right;
 };
 
 /// A message filter's source of images over a plugin that is there already; unsubscribes when destroyed.
@@ -46,12 +53,11 @@ class ImageSubscriber : public message_filters::SimpleFilter<sensor_msgs::Image>
     if (plugin_) plugin_->shutdown();
   }
 
-  /// `plugin` must outlive this subscriber and serve no other one meanwhile.
-  void subscribe(ros::NodeHandle& nh, const std::string& topic, std::uint32_t queue_size,
-                 image_transport::SubscriberPlugin& plugin, const image_transport::TransportHints& hints) {
-    plugin_ = &plugin;
+  /// `transport` must outlive this subscriber and serve no other one meanwhile.
+  void subscribe(ros::NodeHandle& nh, const std::string& topic, std::uint32_t queue_size, ImageTransport& transport) {
+    plugin_ = transport.plugin.get();
     const auto pass = [this](const sensor_msgs::ImageConstPtr& image) { signalMessage(image); };
-    plugin.subscribe(nh, topic, queue_size, pass, ros::VoidPtr(), hints);
+    plugin_->subscribe(nh, topic, queue_size, pass, ros::VoidPtr(), transport.hints);
   }
 
  private:

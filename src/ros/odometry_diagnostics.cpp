@@ -1,50 +1,34 @@
 #include "odometry_diagnostics.hpp"
 
 #include <cmath>
-#include <limits>
 
 namespace sdvo {
 
-using Level = diagnostic_msgs::DiagnosticStatus;
+using Level = WallUpdater::Level;
 
 OdometryDiagnostics::OdometryDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const std::string& name,
-                                         const std::string& input, double max_silence)
-    : input_(input),
-      max_silence_(max_silence),
-      min_rate_(0.0),
-      max_rate_(std::numeric_limits<double>::infinity()),
-      rate_(diagnostic_updater::FrequencyStatusParam(&min_rate_, &max_rate_), "input rate"),
+                                         const OdometryOutputOptions& options)
+    : max_latency_(options.max_latency),
+      input_("features", nh.resolveName("stereo_features"), options.max_silence, options.rates),
+      load_(options.max_load),
       updater_(nh, private_nh, name) {
-  updater_.setHardwareID("none");
   updater_.add("odometry", this, &OdometryDiagnostics::diagnose);
-  updater_.add(rate_);
-  // By wall time: the simulated one stands still when a bag has ended, which is what diagnostics are there to tell.
-  timer_ = nh.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { updater_.force_update(); });
+  updater_.add("input rate", &input_, &InputMonitor::diagnose);
+  updater_.add("load", &load_, &WorkLoad::diagnose);
+  updater_.add("latency", this, &OdometryDiagnostics::diagnoseLatency);
 }
 
 void OdometryDiagnostics::note(const stereo_descriptor_vo::VoInfo& info) {
-  rate_.tick();
+  input_.note();
+  load_.noteDropped(info.dropped_features);
   const std::lock_guard<std::mutex> lock(mutex_);
   last_ = info;
-  last_time_ = std::chrono::steady_clock::now();
-}
-
-void OdometryDiagnostics::notePaused(bool is_paused) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  is_paused_ = is_paused;
 }
 
 void OdometryDiagnostics::diagnose(Status& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (is_paused_) {
-    status.summary(Level::WARN, "paused");
-    return;
-  }
-  if (!last_) {
-    status.summary(Level::WARN, "no features yet on " + input_);
-    return;
-  }
   summarise(status);
+  if (!last_) return;
   status.add("epoch", last_->epoch);
   status.add("features", last_->features);
   status.add("matches", last_->matches);
@@ -59,13 +43,22 @@ void OdometryDiagnostics::diagnose(Status& status) {
   status.add("malformed", last_->malformed);
 }
 
+void OdometryDiagnostics::diagnoseLatency(Status& status) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (input_.silence() || !last_) {
+    status.summary(Level::OK, "no features");
+    return;
+  }
+  const bool is_late = last_->latency > max_latency_;
+  status.summaryf(is_late ? Level::WARN : Level::OK, "%.3f s from image to pose%s", last_->latency,
+                  is_late ? ": is the machine too slow, or are the clocks of two machines different?" : "");
+}
+
 /// Under the lock, as what follows.
 void OdometryDiagnostics::summarise(Status& status) const {
-  const double silence = std::chrono::duration<double>(std::chrono::steady_clock::now() - last_time_).count();
-  status.addf("age of the last pair [s]", "%.1f", silence);
-  if (silence > max_silence_) {
-    status.summaryf(Level::ERROR, "no features for %.0f s on %s; the last state was %s", silence, input_.c_str(),
-                    last_->state.c_str());
+  if (const auto silence = input_.silence()) {
+    const bool is_known = silence->level != Level::OK && last_;
+    status.summary(silence->level, silence->text + (is_known ? "; the last state was " + last_->state : ""));
     return;
   }
   const auto level = last_->state == "TRACKING" ? Level::OK : last_->state == "LOST" ? Level::ERROR : Level::WARN;

@@ -2,6 +2,8 @@
 
 #include <boost/make_shared.hpp>
 
+#include "feature_conversions.hpp"
+#include "frame_id.hpp"
 #include "stamps.hpp"
 
 namespace sdvo {
@@ -11,9 +13,12 @@ OdometryPublisher::OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOp
       frames_{ros_conversions::cleanFrameId(options.odom_frame_id),
               ros_conversions::cleanFrameId(options.base_frame_id)},
       session_(ros::Time().fromNSec(ros::WallTime::now().toNSec())),
+      transform_publisher_(nh),
       path_(static_cast<std::size_t>(options.max_path_length)) {
   constexpr int kQueue = 10;
   odom_publisher_ = nh.advertise<nav_msgs::Odometry>("odom", kQueue);
+  pose_publisher_ = nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", kQueue);
+  map_publisher_ = nh.advertise<sensor_msgs::PointCloud2>("map_points", 1);
   // Whoever comes late gets the path, too.
   path_publisher_ = nh.advertise<nav_msgs::Path>("path", 1, [this](const ros::SingleSubscriberPublisher&) {
     const std::lock_guard<std::mutex> lock(path_mutex_);
@@ -29,12 +34,21 @@ OdometryPublisher::OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOp
 }
 
 void OdometryPublisher::publish(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera) {
-  if (!result.has_pose) return;
+  if (!result.has_pose) {
+    if (options_.publish_null_when_lost && result.state == TrackingState::kLost)
+      odom_publisher_.publish(
+          ros_conversions::toNullOdometry(ros::Time().fromNSec(static_cast<std::uint64_t>(result.stamp)), frames_));
+    return;
+  }
   const auto odometry = boost::make_shared<nav_msgs::Odometry>(
       ros_conversions::toOdometry(result, T_base_camera, frames_, T_odom_start_));
   // TF first: whoever acts on the odometry finds the transform there.
-  if (options_.publish_tf) broadcaster_.sendTransform(ros_conversions::toTransform(*odometry, options_.invert_tf));
+  if (options_.publish_tf) transform_publisher_.send(ros_conversions::toTransform(*odometry, options_.invert_tf));
   odom_publisher_.publish(odometry);
+  const auto pose = boost::make_shared<geometry_msgs::PoseWithCovarianceStamped>();
+  pose->header = odometry->header;
+  pose->pose = odometry->pose;
+  pose_publisher_.publish(pose);
   extendPath(*odometry);
 }
 
@@ -55,7 +69,16 @@ void OdometryPublisher::publishFlow(const OdometryResult& result, const StereoFe
   flow_publisher_.publish(message);
 }
 
-void OdometryPublisher::publishPoints(const stereo_descriptor_vo::StereoFeatures& features) {
+void OdometryPublisher::publishMap(const std::vector<Eigen::Vector3d>& points, const Eigen::Isometry3d& T_base_camera,
+                                   const ros::Time& stamp) {
+  const auto cloud = boost::make_shared<sensor_msgs::PointCloud2>(
+      ros_conversions::toPointCloud(points, T_odom_start_ * T_base_camera));
+  cloud->header.stamp = stamp;
+  cloud->header.frame_id = frames_.odom;
+  map_publisher_.publish(cloud);
+}
+
+void OdometryPublisher::publishPoints(const StereoFeaturesView& features) {
   if (points_publisher_.getNumSubscribers() > 0)
     points_publisher_.publish(boost::make_shared<sensor_msgs::PointCloud2>(ros_conversions::toPointCloud(features)));
 }

@@ -3,28 +3,37 @@
 #include <geometry_msgs/Pose.h>
 #include <nav_msgs/Path.h>
 #include <ros/node_handle.h>
-#include <tf2_ros/transform_broadcaster.h>
 
 #include <atomic>
 #include <boost/circular_buffer.hpp>
 #include <mutex>
+#include <vector>
 
 #include "../config/interface_options.hpp"
-#include "conversions.hpp"
+#include "odometry_conversions.hpp"
+#include "stereo_descriptor_vo/ros/stereo_features_view.hpp"
+#include "transform_publisher.hpp"
 
 namespace sdvo {
 
-/// odom, TF, points, feature_flow and vo_info of one processed pair, and the path, which is long, once in a second.
+/// odom, pose, TF, points, map_points, feature_flow and vo_info of one processed pair, and the path, which is long,
+/// once in a second.
 class OdometryPublisher {
  public:
   OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOptions& options);
 
-  /// Publishes what the result's state allows: without a pose neither odom nor TF.
+  /// Publishes what the result's state allows: without a pose neither odom (but for zeros, where these are asked for)
+  /// nor TF.
   void publish(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera);
   /// Fills in header, session and latency; returns what was published.
   stereo_descriptor_vo::VoInfo publishInfo(stereo_descriptor_vo::VoInfo info, const ros::Time& stamp);
   void publishFlow(const OdometryResult& result, const StereoFeatures& features, const std_msgs::Header& header);
-  void publishPoints(const stereo_descriptor_vo::StereoFeatures& features);
+  void publishPoints(const StereoFeaturesView& features);
+  /// Whether somebody listens to map_points.
+  bool wantsMap() const { return map_publisher_.getNumSubscribers() > 0; }
+  /// `points` in the odometry's origin, the first left camera.
+  void publishMap(const std::vector<Eigen::Vector3d>& points, const Eigen::Isometry3d& T_base_camera,
+                  const ros::Time& stamp);
   /// The odometry has been reset: the path begins anew, and the base is here in odom.
   void restart(const Eigen::Isometry3d& T_odom_start);
 
@@ -45,8 +54,9 @@ class OdometryPublisher {
   OdometryOutputOptions options_;
   ros_conversions::OdometryFrames frames_;
   const ros::Time session_;
-  ros::Publisher odom_publisher_, path_publisher_, info_publisher_, points_publisher_, flow_publisher_;
-  tf2_ros::TransformBroadcaster broadcaster_;
+  ros::Publisher odom_publisher_, pose_publisher_, map_publisher_, path_publisher_, info_publisher_, points_publisher_,
+      flow_publisher_;
+  TransformPublisher transform_publisher_;
   Eigen::Isometry3d T_odom_start_ = Eigen::Isometry3d::Identity();
   mutable std::mutex path_mutex_;
   boost::circular_buffer<PathPose> path_;

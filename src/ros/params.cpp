@@ -25,6 +25,12 @@ void assign(const XmlRpc::XmlRpcValue& parameter, Option& option) {
   }
 }
 
+/// What image_transport and its plugins keep under the same private namespace, see StereoImageTransport.
+bool isOfImageTransport(const std::string& name) {
+  const auto beginsWith = [&](const std::string& side) { return name.compare(0, side.size(), side) == 0; };
+  return name == "image_transport" || beginsWith("left_image/") || beginsWith("right_image/");
+}
+
 }  // namespace
 
 std::vector<std::string> loadParams(const ros::NodeHandle& nh, std::vector<Option> options) {
@@ -45,7 +51,7 @@ std::vector<std::string> loadParams(const ros::NodeHandle& nh, std::vector<Optio
   for (const std::string& name : names) {
     if (name.compare(0, prefix.size(), prefix) != 0) continue;
     const std::string relative = name.substr(prefix.size());
-    if (relative == "image_transport") continue;  // image_transport keeps its choice under the same private namespace
+    if (isOfImageTransport(relative)) continue;
     const bool known = std::any_of(options.begin(), options.end(), [&](const Option& o) { return o.name == relative; });
     if (!known) unknown.push_back(name);
   }

@@ -1,24 +1,17 @@
 #pragma once
 
-#include <nav_msgs/Path.h>
-#include <stereo_descriptor_vo/MapGraph.h>
 #include <stereo_descriptor_vo/Place.h>
 #include <stereo_descriptor_vo/PlaceInfo.h>
 #include <stereo_descriptor_vo/PlaceMatch.h>
 #include <stereo_descriptor_vo/PlaceSignature.h>
 #include <stereo_descriptor_vo/StereoFeatures.h>
-#include <visualization_msgs/MarkerArray.h>
 
-#include <Eigen/Geometry>
-#include <cstdint>
-#include <map>
 #include <string>
 
 #include "stereo_descriptor_vo/front_end/depth_scale.hpp"
 #include "stereo_descriptor_vo/places/place.hpp"
 #include "stereo_descriptor_vo/places/place_index.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
-#include "stereo_descriptor_vo/places/pose_graph.hpp"
 
 /// Where messages and the types of places meet.
 namespace sdvo::ros_conversions {
@@ -34,25 +27,6 @@ stereo_descriptor_vo::Place toMessage(const Place& place, const std::string& rob
 /// Throws std::invalid_argument when the message does not hold together; the result owns its memory.
 Place fromMessage(const stereo_descriptor_vo::Place& message);
 
-/// Stamps of key frames by id, ns.
-using PlaceStamps = std::map<int, std::int64_t>;
-
-/// A map at one moment.
-struct MapState {
-  PoseGraph graph;
-  PlaceStamps stamps;
-};
-
-stereo_descriptor_vo::MapGraph toMessage(const MapState& map, const std::string& robot, const std::string& frame_id);
-/// Throws std::invalid_argument when the message does not hold together.
-PoseGraph fromMessage(const stereo_descriptor_vo::MapGraph& message, const PoseGraphOptions& options);
-
-/// Poses of the base at the key frames.
-nav_msgs::Path toPath(const MapState& map, const Eigen::Isometry3d& T_base_camera, const std::string& frame_id);
-
-/// The graph's edges as lines between the cameras, a marker for each kind.
-visualization_msgs::MarkerArray toMarkers(const MapState& map, const std::string& frame_id);
-
 /// What the report tells; header and counts are the caller's to fill.
 stereo_descriptor_vo::PlaceInfo toInfo(const PlaceReport& report);
 
@@ -66,11 +40,5 @@ PlaceSignature fromMessage(const stereo_descriptor_vo::PlaceSignature& message, 
 /// Names of robots are the caller's to fill.
 stereo_descriptor_vo::PlaceMatch toMessage(const PlaceMatch& match, const Place& mine, const Place& other,
                                            const std::string& frame_id);
-
-/// ROS' convention: covariance of the position, and of the rotation about the fixed axes, of the parent's frame. The
-/// core's is that of a right perturbation.
-geometry_msgs::PoseWithCovariance toMessage(const Eigen::Isometry3d& pose, const Matrix6d& covariance);
-/// Throws std::invalid_argument when it is no pose or a covariance no covariance.
-void fromMessage(const geometry_msgs::PoseWithCovariance& message, Eigen::Isometry3d& pose, Matrix6d& covariance);
 
 }  // namespace sdvo::ros_conversions

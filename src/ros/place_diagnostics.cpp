@@ -1,21 +1,15 @@
 #include "place_diagnostics.hpp"
 
+#include <algorithm>
+
 namespace sdvo {
 
-using Level = diagnostic_msgs::DiagnosticStatus;
+using Level = WallUpdater::Level;
 
 PlaceDiagnostics::PlaceDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const std::string& name,
                                    const std::string& input, double max_silence)
-    : input_(input), max_silence_(max_silence), updater_(nh, private_nh, name) {
-  updater_.setHardwareID("none");
+    : input_("pairs with odometry", input, max_silence, {}), updater_(nh, private_nh, name) {
   updater_.add("places", this, &PlaceDiagnostics::diagnose);
-  // By wall time: the simulated one stands still when a bag has ended, which is what diagnostics are there to tell.
-  timer_ = nh.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { updater_.force_update(); });
-}
-
-void PlaceDiagnostics::notePair() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  last_pair_ = std::chrono::steady_clock::now();
 }
 
 void PlaceDiagnostics::note(const stereo_descriptor_vo::PlaceInfo& info) {
@@ -26,11 +20,6 @@ void PlaceDiagnostics::note(const stereo_descriptor_vo::PlaceInfo& info) {
 void PlaceDiagnostics::restart() {
   const std::lock_guard<std::mutex> lock(mutex_);
   last_.reset();
-}
-
-void PlaceDiagnostics::notePaused(bool is_paused) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  is_paused_ = is_paused;
 }
 
 void PlaceDiagnostics::diagnose(Status& status) {
@@ -50,20 +39,10 @@ void PlaceDiagnostics::diagnose(Status& status) {
   status.add("malformed", last_->malformed);
 }
 
-/// Under the lock.
+/// Under the lock. Without odometry places can do nothing, but it is no fault of theirs.
 void PlaceDiagnostics::summarise(Status& status) const {
-  if (is_paused_) {
-    status.summary(Level::WARN, "paused");
-    return;
-  }
-  if (!last_pair_) {
-    status.summary(Level::WARN, "no pair yet on " + input_);
-    return;
-  }
-  const double silence = std::chrono::duration<double>(std::chrono::steady_clock::now() - *last_pair_).count();
-  status.addf("age of the last pair [s]", "%.1f", silence);
-  if (silence > max_silence_)
-    status.summaryf(Level::WARN, "no pair with odometry for %.0f s on %s", silence, input_.c_str());
+  if (const auto silence = input_.silence())
+    status.summary(std::min<int>(silence->level, Level::WARN), silence->text);
   else if (last_ && !last_->located)
     status.summary(Level::WARN, "none of the places that were loaded has been recognised yet: no map -> odom");
   else

@@ -5,22 +5,24 @@
 #include <boost/make_shared.hpp>
 #include <utility>
 
-#include "conversions.hpp"
+#include "frame_id.hpp"
 
 namespace sdvo {
 
 namespace msgs = stereo_descriptor_vo;
 
 PlacePublisher::PlacePublisher(ros::NodeHandle& nh, const PlaceOutputOptions& options, const std::string& robot,
-                               std::function<std::optional<Map>()> map)
+                               std::function<Map()> map)
     : options_(options),
       robot_(robot),
       map_frame_(ros_conversions::cleanFrameId(options.map_frame_id)),
-      map_(std::move(map)) {
+      map_(std::move(map)),
+      transform_publisher_(nh) {
   constexpr int kQueue = 10;
   info_publisher_ = nh.advertise<msgs::PlaceInfo>("place_info", kQueue);
   signature_publisher_ = nh.advertise<msgs::PlaceSignature>("place_signature", kQueue);
   match_publisher_ = nh.advertise<msgs::PlaceMatch>("other_matches", kQueue);
+  pose_publisher_ = nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("map_pose", kQueue);
   // Whoever comes late gets the map, too.
   const ros::SubscriberStatusCallback on_connect = [this](const ros::SingleSubscriberPublisher&) { noteChange(); };
   path_publisher_ = nh.advertise<nav_msgs::Path>("map_path", 1, on_connect);
@@ -65,7 +67,7 @@ void PlacePublisher::publishTransform() {
   transform.header.stamp = now + ros::Duration(options_.transform_tolerance);
   transform.header.frame_id = map_frame_;
   transform.child_frame_id = odom_frame_;
-  broadcaster_.sendTransform(transform);
+  transform_publisher_.send(transform);
 }
 
 void PlacePublisher::publishMap() {
@@ -77,17 +79,19 @@ void PlacePublisher::publishMap() {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (!std::exchange(changed_, false)) return;
   }
-  const std::optional<Map> map = map_();
-  if (!map) return;
-  if (path_wanted)
-    path_publisher_.publish(
-        boost::make_shared<nav_msgs::Path>(ros_conversions::toPath(map->state, map->T_base_camera, map_frame_)));
+  const Map map = map_();
   if (loops_wanted)
     loops_publisher_.publish(
-        boost::make_shared<visualization_msgs::MarkerArray>(ros_conversions::toMarkers(map->state, map_frame_)));
+        boost::make_shared<visualization_msgs::MarkerArray>(ros_conversions::toMarkers(map.state, map_frame_)));
   if (graph_wanted)
     graph_publisher_.publish(
-        boost::make_shared<msgs::MapGraph>(ros_conversions::toMessage(map->state, robot_, map_frame_)));
+        boost::make_shared<msgs::MapGraph>(ros_conversions::toMessage(map.state, robot_, map_frame_)));
+  // The path is the base's: it has to wait for the first pair.
+  if (path_wanted && map.T_base_camera)
+    path_publisher_.publish(
+        boost::make_shared<nav_msgs::Path>(ros_conversions::toPath(map.state, *map.T_base_camera, map_frame_)));
+  else if (path_wanted)
+    noteChange();
 }
 
 }  // namespace sdvo

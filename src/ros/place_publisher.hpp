@@ -1,8 +1,8 @@
 #pragma once
 
+#include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <ros/node_handle.h>
 #include <stereo_descriptor_vo/PlaceInfo.h>
-#include <tf2_ros/transform_broadcaster.h>
 
 #include <functional>
 #include <mutex>
@@ -10,25 +10,28 @@
 #include <string>
 
 #include "../config/interface_options.hpp"
+#include "map_conversions.hpp"
 #include "place_conversions.hpp"
 #include "stereo_descriptor_vo/places/eased_transform.hpp"
+#include "transform_publisher.hpp"
 
 namespace sdvo {
 
-/// TF map -> odom, place_info, place_signature, and the map: map_path, loops and map_graph.
+/// TF map -> odom, map_pose, place_info, place_signature, and the map: map_path, loops and map_graph.
 class PlacePublisher {
  public:
-  /// `map`: the map as it is and where the camera sits on the base; nothing while there is none. From a timer.
   struct Map {
     ros_conversions::MapState state;
-    Eigen::Isometry3d T_base_camera;
+    std::optional<Eigen::Isometry3d> T_base_camera;  ///< none before the first pair
   };
+  /// `map`: the map as it is; called from a timer.
   PlacePublisher(ros::NodeHandle& nh, const PlaceOutputOptions& options, const std::string& robot,
-                 std::function<std::optional<Map>()> map);
+                 std::function<Map()> map);
 
   void publish(const stereo_descriptor_vo::PlaceInfo& info) { info_publisher_.publish(info); }
   void publish(const stereo_descriptor_vo::PlaceSignature& signature) { signature_publisher_.publish(signature); }
   void publish(const stereo_descriptor_vo::PlaceMatch& match) { match_publisher_.publish(match); }
+  void publish(const geometry_msgs::PoseWithCovarianceStamped& pose) { pose_publisher_.publish(pose); }
 
   /// The map has changed: it is published soon, if somebody listens.
   void noteChange();
@@ -44,10 +47,10 @@ class PlacePublisher {
 
   const PlaceOutputOptions options_;
   const std::string robot_, map_frame_;
-  const std::function<std::optional<Map>()> map_;
-  ros::Publisher info_publisher_, signature_publisher_, match_publisher_, path_publisher_, loops_publisher_,
-      graph_publisher_;
-  tf2_ros::TransformBroadcaster broadcaster_;
+  const std::function<Map()> map_;
+  ros::Publisher info_publisher_, signature_publisher_, match_publisher_, pose_publisher_, path_publisher_,
+      loops_publisher_, graph_publisher_;
+  TransformPublisher transform_publisher_;
 
   std::mutex mutex_;
   bool changed_ = false;

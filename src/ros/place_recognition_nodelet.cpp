@@ -1,3 +1,4 @@
+#include <geometry_msgs/PoseWithCovarianceStamped.h>
 #include <nav_msgs/Odometry.h>
 #include <nodelet/nodelet.h>
 #include <std_srvs/Empty.h>
@@ -11,9 +12,11 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <mutex>
+#include <opencv2/core/utility.hpp>
 #include <optional>
 #include <pluginlib/class_list_macros.hpp>
 #include <stdexcept>
@@ -24,14 +27,16 @@
 #include "../config/interface_options.hpp"
 #include "callback_thread.hpp"
 #include "camera_mount.hpp"
-#include "conversions.hpp"
 #include "exact_synchroniser.hpp"
+#include "frame_id.hpp"
 #include "other_robot.hpp"
 #include "params.hpp"
 #include "place_conversions.hpp"
 #include "place_diagnostics.hpp"
 #include "place_publisher.hpp"
+#include "place_session.hpp"
 #include "places_file.hpp"
+#include "pose_conversions.hpp"
 #include "report_throttle.hpp"
 #include "robot_transforms.hpp"
 #include "stamps.hpp"
@@ -49,7 +54,6 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     // Nothing may arrive any more, and nothing be in work, when members go.
     callbacks_.stop();
     slow_callbacks_.stop();
-    if (other_) other_->stop();
     if (observer_) observer_->stop();
     if (optimiser_) optimiser_->stop();
   }
@@ -69,48 +73,28 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     }
   };
 
-  struct Pair {
-    Features::ConstPtr features;
-    Odometry::ConstPtr odometry;
-    Info::ConstPtr info;
-  };
-
-  /// Of the last pair observed.
-  struct Last {
-    ros::Time stamp, now, session;
-    std::uint32_t epoch;
-    StereoCamera camera;
-    DescriptorKind kind;
-  };
-
-  /// All that begins anew together.
-  struct Session {
-    explicit Session(const PlaceRecognitionOptions& options) : recognition(options) {}
-
-    PlaceRecognition recognition;
-    std::string odom_frame;
-    ros_conversions::FeatureStream stream;
-    std::optional<Last> last;
-    bool continues = false;  ///< the next pair's motion since the last one is known
-    int loaded = 0;          ///< places with smaller ids were loaded
-    bool located = true;     ///< one of these was recognised
-    double optimise_time = 0.0;
+  /// A pair of the session that was there when it arrived.
+  struct Arrived {
+    OdometryPair pair;
+    int generation;
   };
 
   struct Job {
     PoseGraph graph;
-    std::shared_ptr<Session> session;
+    std::shared_ptr<PlaceSession> session;
   };
 
   void onInit() override try {
     nh_ = callbacks_.serve(getNodeHandle());
     ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
     ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
+    ros::NodeHandle other_nh = slow_callbacks_.serve(getNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
       NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect");
     const PlaceOutputOptions& output = options_.output;
+    if (output.opencv_threads >= 0) cv::setNumThreads(output.opencv_threads);
     robot_ = output.robot_name.empty() ? nh_.getNamespace() : output.robot_name;
-    session_ = std::make_shared<Session>(options_.recognition);
+    session_ = std::make_shared<PlaceSession>(options_.recognition);
     if (!output.places_file.empty()) begin();
 
     transforms_ = std::make_unique<RobotTransforms>(nh_, std::nullopt, [this](const std::string& what) {
@@ -125,11 +109,14 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
                  slow_nh.advertiseService("save_places", &PlaceRecognitionNodelet::onSavePlaces, this),
                  slow_nh.advertiseService("load_places", &PlaceRecognitionNodelet::onLoadPlaces, this),
                  slow_nh.advertiseService("get_place", &PlaceRecognitionNodelet::onGetPlace, this)};
-    observer_ = std::make_unique<Worker<Pair>>(static_cast<std::size_t>(output.queue_size),
-                                               [this](const Pair& pair) { observe(pair); });
+    observer_ = std::make_unique<Worker<Arrived>>(static_cast<std::size_t>(output.queue_size),
+                                                  [this](const Arrived& arrived) { observe(arrived); });
     optimiser_ = std::make_unique<Worker<Job>>(1, [this](const Job& job) { optimise(job); });
-    other_ = std::make_unique<OtherRobot>(nh_, robot_, output.other_min_score, output.other_timeout, placesForOthers());
+    other_ =
+        std::make_unique<OtherRobot>(other_nh, robot_, output.other_min_score, output.other_timeout, placesForOthers());
     subscribe();
+    initial_pose_subscriber_ = nh_.subscribe<geometry_msgs::PoseWithCovarianceStamped>(
+        "/initialpose", 1, [this](const geometry_msgs::PoseWithCovarianceStamped::ConstPtr& m) { onInitialPose(*m); });
     callbacks_.start();
     slow_callbacks_.start();
   } catch (const std::exception& e) {
@@ -145,7 +132,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
       return;
     }
     session_ = load(path);
-    NODELET_INFO_STREAM(session_->recognition.places().size() << " places of '" << path << "'");
+    NODELET_INFO_STREAM(session_->recognition().places().size() << " places of '" << path << "'");
   }
 
   std::string inputs() const {
@@ -159,11 +146,32 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     synchroniser_ = std::make_unique<ExactSynchroniser<Features, Odometry, Info>>(
         room, [this](const auto&... messages) { onPair(messages...); },
         [this](const auto&... messages) { onUnpaired(messages...); });
-    const auto queue = static_cast<std::uint32_t>(room);
-    subscribers_ = {
-        nh_.subscribe<Features>("stereo_features", queue, [this](const Features::ConstPtr& m) { take<0>(m); }),
-        nh_.subscribe<Odometry>("odom", queue, [this](const Odometry::ConstPtr& m) { take<1>(m); }),
-        nh_.subscribe<Info>("vo_info", queue, [this](const Info::ConstPtr& m) { take<2>(m); })};
+    subscribers_ = {subscribe<0, Features>("stereo_features"), subscribe<1, Odometry>("odom"),
+                    subscribe<2, Info>("vo_info")};
+  }
+
+  /// A pose of the base in the map, such as rviz' "2D Pose Estimate".
+  void onInitialPose(const geometry_msgs::PoseWithCovarianceStamped& message) try {
+    constexpr double kLeast = 5.0, kSigmas = 3.0;  // m
+    const std::string frame = ros_conversions::cleanFrameId(message.header.frame_id);
+    const std::string map_frame = ros_conversions::cleanFrameId(options_.output.map_frame_id);
+    if (frame != map_frame)
+      throw std::invalid_argument("it is in frame '" + frame + "', not in the map's, '" + map_frame + "'");
+    const double variance = std::max(message.pose.covariance[0], message.pose.covariance[7]);
+    if (!std::isfinite(variance)) throw std::invalid_argument("its covariance is not finite");
+    const Eigen::Isometry3d T_map_base = ros_conversions::toPose(message.pose.pose);
+    const std::lock_guard<std::mutex> lock(mutex_);
+    session_->expect(T_map_base, kLeast + kSigmas * std::sqrt(std::max(0.0, variance)));
+  } catch (const std::exception& e) {
+    NODELET_WARN_STREAM("the pose on " << initial_pose_subscriber_.getTopic() << " is not used: " << e.what());
+  }
+
+  template <int input, class Message>
+  ros::Subscriber subscribe(const std::string& topic) {
+    return nh_.subscribe<Message>(
+        topic, static_cast<std::uint32_t>(options_.output.sync_queue_size),
+        [this](const boost::shared_ptr<const Message>& m) { take<input>(m); }, ros::VoidConstPtr(),
+        ros::TransportHints().tcpNoDelay());
   }
 
   template <int input, class Message>
@@ -176,11 +184,11 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   }
 
   void onPair(const Features::ConstPtr& features, const Odometry::ConstPtr& odometry, const Info::ConstPtr& info) {
-    diagnostics_->notePair();
+    diagnostics_->input().note();
     if (options_.output.publish_tf)
       transforms_->claim({ros_conversions::cleanFrameId(options_.output.map_frame_id),
                           ros_conversions::cleanFrameId(odometry->header.frame_id)});
-    observer_->push({features, odometry, info});
+    observer_->push({{features, odometry, info, resumes_}, generation_});
   }
 
   void onUnpaired(const Features::ConstPtr&, const Odometry::ConstPtr& odometry, const Info::ConstPtr& info) {
@@ -190,38 +198,26 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   // Recognition, in the observer's thread.
 
-  void observe(const Pair& pair) try {
+  void observe(const Arrived& arrived) try {
+    const OdometryPair& pair = arrived.pair;
     const ros::Time stamp = pair.features->header.stamp;
     const std::optional<Eigen::Isometry3d> T_base_camera = findExtrinsic(pair);
     if (!T_base_camera) return;
-    const StereoFeatures features = ros_conversions::fromMessage(*pair.features);
-    const Eigen::Isometry3d T_odom_camera = ros_conversions::toPose(pair.odometry->pose.pose) * *T_base_camera;
-
     const std::lock_guard<std::mutex> lock(mutex_);
-    const ros::Time now = ros::Time::now();
-    if (session_->last && stamp < session_->last->stamp) {
-      if (!ros::Time::isSimTime() && now < session_->last->now)
-        session_->continues = false;  // the system's clock was set back: the places are where they were
-      else
-        restart("the clock jumped back");
-    }
-    Session& session = *session_;
-    if (session.last && stamp == session.last->stamp) return;
-    refuseOtherCamera(session, features.camera, features.kind());
-    const CameraMotion motion = motionOf(pair, T_odom_camera, *T_base_camera);
-    const std::optional<PlaceReport> report = session.recognition.observe(features, motion);
-    session.last = {stamp, now, pair.info->session, pair.info->epoch, features.camera, features.kind()};
-    session.continues = true;
-    session.odom_frame = ros_conversions::cleanFrameId(pair.odometry->header.frame_id);
-    session.stream = ros_conversions::streamOf(*pair.features);
-    if (report) publish(*report, stamp);
+    if (arrived.generation != generation_) return;
+    const PlaceSession::Time time = session_->noteTime(stamp, ros::Time::now(), ros::Time::isSimTime());
+    if (time == PlaceSession::Time::kStands) return;
+    if (time == PlaceSession::Time::kBeganAnew) restart("the clock jumped back");
+    if (time == PlaceSession::Time::kFell)
+      NODELET_WARN_STREAM("stamps fell to " << stamp << ": the places stay, the way in between is unknown");
+    if (const std::optional<PlaceReport> report = session_->observe(pair, *T_base_camera)) publish(*report, stamp);
   } catch (const std::exception& e) {
     ++malformed_;
     if (throttle_.allows(e.what()))
-      NODELET_ERROR_STREAM("pair at " << pair.features->header.stamp << " skipped: " << e.what());
+      NODELET_ERROR_STREAM("pair at " << arrived.pair.features->header.stamp << " skipped: " << e.what());
   }
 
-  std::optional<Eigen::Isometry3d> findExtrinsic(const Pair& pair) {
+  std::optional<Eigen::Isometry3d> findExtrinsic(const OdometryPair& pair) {
     const std::string base_frame = ros_conversions::cleanFrameId(pair.odometry->child_frame_id);
     const std::string camera_frame = ros_conversions::cleanFrameId(pair.features->header.frame_id);
     std::string problem;
@@ -233,54 +229,29 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     return found;
   }
 
-  /// Under the lock, as what follows.
-  static void refuseOtherCamera(const Session& session, const StereoCamera& camera, const DescriptorKind& kind) {
-    const std::map<int, Place>& places = session.recognition.places();
-    if (places.empty()) return;
-    const StereoFeatures& known = places.begin()->second.features;
-    if (camera != known.camera)
-      throw std::invalid_argument(
-          "the places are of another camera, or of another calibration of this one: call reset, or load_places of "
-          "this");
-    if (kind != known.kind())
-      throw std::invalid_argument("the places are described by " + toString(known.kind()) + ", not by " +
-                                  toString(kind) + ": call reset, or load_places of these");
-  }
-
-  CameraMotion motionOf(const Pair& pair, const Eigen::Isometry3d& T_odom_camera,
-                        const Eigen::Isometry3d& T_base_camera) const {
-    CameraMotion motion;
-    motion.T_odom_camera = T_odom_camera;
-    const std::optional<Last>& last = session_->last;
-    motion.continuous =
-        session_->continues && last && pair.info->session == last->session && pair.info->epoch == last->epoch;
-    if (motion.continuous)
-      motion.covariance = ros_conversions::toMotionCovariance(
-          *pair.odometry, secondsBetween(last->stamp, pair.features->header.stamp), T_base_camera);
-    return motion;
-  }
-
+  /// Under the lock, as what follows. `report`: of the session's newest key frame.
   void publish(const PlaceReport& report, const ros::Time& stamp) {
-    Session& session = *session_;
-    const PlaceRecognition& recognition = session.recognition;
-    const bool was_located = session.located;
+    const PlaceSession& session = *session_;
+    const PlaceRecognition& recognition = session.recognition();
     if (report.loop) {
-      session.located |= *report.same < session.loaded;
       NODELET_INFO_STREAM("key frame " << report.id << " shows the place of key frame " << *report.same << ": a loop");
       optimiser_->push({recognition.graph(), session_});
     }
-    if (session.located) publisher_->correct(recognition.T_map_odom(), session.odom_frame, !was_located);
+    if (session.isPlaced())
+      publisher_->correct(recognition.T_map_odom(), session.odomFrame(), !was_located_ || !session.isLocated());
+    was_located_ = session.isLocated();
+    if (was_located_) publishPose(stamp);
     publisher_->noteChange();
 
     const auto place = recognition.places().find(report.id);
     if (place != recognition.places().end())
       publisher_->publish(ros_conversions::toMessage(recognition.signature(report.id), place->second,
-                                                     options_.recognition.index, robot_, session.stream.frame_id));
+                                                     options_.recognition.index, robot_, session.stream().frame_id));
     stereo_descriptor_vo::PlaceInfo info = ros_conversions::toInfo(report);
     info.header.stamp = stamp;
     info.header.frame_id = ros_conversions::cleanFrameId(options_.output.map_frame_id);
     info.optimise_time = static_cast<float>(session.optimise_time);
-    info.located = session.located;
+    info.located = session.isLocated();
     info.places = static_cast<std::uint32_t>(recognition.places().size());
     info.loops = static_cast<std::uint32_t>(recognition.graph().loops());
     info.bytes = recognition.bytes();
@@ -293,13 +264,29 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     diagnostics_->note(info);
   }
 
-  void restart(const char* why) {
-    NODELET_WARN_STREAM(why << ": " << session_->recognition.places().size() << " places are forgotten");
-    replace(std::make_shared<Session>(options_.recognition));
+  /// Of the base in the map, at the newest key frame.
+  void publishPose(const ros::Time& stamp) {
+    const PlaceRecognition& recognition = session_->recognition();
+    const std::optional<Matrix6d> of_camera = recognition.covariance();
+    const std::optional<Eigen::Isometry3d> T_base_camera = mount_->last();
+    if (!of_camera || !T_base_camera) return;
+    const Eigen::Isometry3d T_map_base = recognition.graph().nodes().rbegin()->second * T_base_camera->inverse();
+    const Matrix6d to_base = adjoint(*T_base_camera);
+    geometry_msgs::PoseWithCovarianceStamped pose;
+    pose.header.stamp = stamp;
+    pose.header.frame_id = ros_conversions::cleanFrameId(options_.output.map_frame_id);
+    pose.pose = ros_conversions::toMessage(T_map_base, to_base * *of_camera * to_base.transpose());
+    publisher_->publish(pose);
   }
 
-  void replace(std::shared_ptr<Session> session) {
+  void restart(const char* why) {
+    NODELET_WARN_STREAM(why << ": " << session_->recognition().places().size() << " places are forgotten");
+    replace(std::make_shared<PlaceSession>(options_.recognition));
+  }
+
+  void replace(std::shared_ptr<PlaceSession> session) {
     session_ = std::move(session);
+    was_located_ = session_->isLocated();
     publisher_->forget();
     diagnostics_->restart();
   }
@@ -310,51 +297,46 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     const PoseGraph::Summary summary = graph.optimise();
     const std::lock_guard<std::mutex> lock(mutex_);
     if (job.session != session_) return;
-    Session& session = *session_;
+    PlaceSession& session = *session_;
     session.optimise_time = summary.time;
-    if (!session.recognition.adopt(graph)) {
-      optimiser_->push({session.recognition.graph(), session_});
+    if (!session.recognition().adopt(graph)) {
+      optimiser_->push({session.recognition().graph(), session_});
       return;
     }
-    if (session.located) publisher_->correct(session.recognition.T_map_odom(), session.odom_frame, false);
+    if (session.isPlaced()) publisher_->correct(session.recognition().T_map_odom(), session.odomFrame(), false);
     publisher_->noteChange();
   } catch (const std::exception& e) {
     NODELET_ERROR_STREAM("the map was not optimised: " << e.what());
   }
 
   /// For the publisher.
-  std::optional<PlacePublisher::Map> map() {
-    const std::optional<Eigen::Isometry3d> T_base_camera = mount_->last();
-    if (!T_base_camera) return std::nullopt;
+  PlacePublisher::Map map() {
     const std::lock_guard<std::mutex> lock(mutex_);
-    return PlacePublisher::Map{mapState(), *T_base_camera};
+    return {session_->map(), mount_->last()};
   }
 
-  /// Under the lock.
-  ros_conversions::MapState mapState() const {
-    ros_conversions::MapState state{session_->recognition.graph(), {}};
-    for (const auto& [id, place] : session_->recognition.places()) state.stamps[id] = place.features.stamp;
-    return state;
-  }
-
-  // The other robot, in its thread.
+  // The other robot, in the thread of what takes its time.
 
   OtherRobot::Places placesForOthers() {
     OtherRobot::Places places;
     places.find = [this](const OtherRobot::SignatureMessage& signature) {
       const std::lock_guard<std::mutex> lock(mutex_);
-      const PlaceRecognition& recognition = session_->recognition;
+      const PlaceRecognition& recognition = session_->recognition();
       if (recognition.places().empty()) return std::vector<PlaceCandidate>();
       return recognition.find(ros_conversions::fromMessage(signature, options_.recognition.index,
                                                            recognition.places().begin()->second.features.kind()));
     };
     places.verify = [this](int id, const Place& other) -> std::optional<stereo_descriptor_vo::PlaceMatch> {
       const std::lock_guard<std::mutex> lock(mutex_);
-      const auto mine = session_->recognition.places().find(id);
-      if (mine == session_->recognition.places().end()) return std::nullopt;
-      const PlaceMatch match = session_->recognition.verify(id, other.features);
+      const auto mine = session_->recognition().places().find(id);
+      if (mine == session_->recognition().places().end()) return std::nullopt;
+      const PlaceMatch match = session_->recognition().verify(id, other.features);
       if (!match.same) return std::nullopt;
-      return ros_conversions::toMessage(match, mine->second, other, session_->stream.frame_id);
+      return ros_conversions::toMessage(match, mine->second, other, session_->stream().frame_id);
+    };
+    places.get = [this](int id) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      return session_->message(id, robot_);
     };
     places.publish = [this](const stereo_descriptor_vo::PlaceMatch& match) { publisher_->publish(match); };
     places.warn = [this](const std::string& what) { NODELET_WARN_STREAM(what); };
@@ -365,6 +347,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   bool onReset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
     const std::lock_guard<std::mutex> lock(mutex_);
+    ++generation_;
     restart("reset was called");
     return true;
   }
@@ -374,7 +357,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     response.success = true;
     response.message = subscribers_.empty() ? "was paused already" : "paused";
     subscribers_.clear();
-    diagnostics_->notePaused(true);
+    diagnostics_->input().noteIdle("paused");
     return true;
   }
 
@@ -382,24 +365,22 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     response.success = true;
     response.message = subscribers_.empty() ? "resumed; the way in between is unknown" : "was not paused";
     if (!subscribers_.empty()) return true;
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      session_->continues = false;
-    }
-    diagnostics_->notePaused(false);
+    ++resumes_;
+    diagnostics_->input().noteIdle("");
     subscribe();
     return true;
   }
 
   bool onSavePlaces(stereo_descriptor_vo::SavePlaces::Request& request,
                     stereo_descriptor_vo::SavePlaces::Response& response) try {
-    std::vector<Place> places;
     std::unique_lock<std::mutex> lock(mutex_);
-    for (const auto& [id, place] : session_->recognition.places()) places.push_back(place);
-    const ros_conversions::MapState state = mapState();
-    const ros_conversions::FeatureStream stream = session_->stream;
+    const std::vector<Place> places = session_->places();
+    const ros_conversions::MapState state = session_->map();
+    const ros_conversions::FeatureStream stream = session_->stream();
     lock.unlock();
     if (places.empty()) throw std::runtime_error("there is no place yet");
+    if (options_.recognition.localisation_only)
+      throw std::runtime_error("localisation_only: the map is still that of the file it was loaded from");
     savePlaces(places, state, stream, robot_, ros_conversions::cleanFrameId(options_.output.map_frame_id),
                request.path);
     response.success = true;
@@ -412,11 +393,12 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   bool onLoadPlaces(stereo_descriptor_vo::LoadPlaces::Request& request,
                     stereo_descriptor_vo::LoadPlaces::Response& response) try {
-    std::shared_ptr<Session> loaded = load(request.path);
+    std::shared_ptr<PlaceSession> loaded = load(request.path);
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (session_->last) refuseOtherCamera(*loaded, session_->last->camera, session_->last->kind);
-    response.message = std::to_string(loaded->recognition.places().size()) + " places; " +
-                       std::to_string(session_->recognition.places().size()) + " of before are forgotten";
+    loaded->refuseOtherCameraThan(*session_);
+    response.message = std::to_string(loaded->recognition().places().size()) + " places; " +
+                       std::to_string(session_->recognition().places().size()) + " of before are forgotten";
+    ++generation_;
     replace(std::move(loaded));
     response.success = true;
     return true;
@@ -426,27 +408,19 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   }
 
   /// A session that begins with the places of a file. Throws std::runtime_error or std::invalid_argument.
-  std::shared_ptr<Session> load(const std::string& path) const {
-    SavedPlaces saved = loadPlaces(path, options_.recognition.graph);
-    auto session = std::make_shared<Session>(options_.recognition);
-    session->stream = saved.stream;
-    session->recognition.restore(std::move(saved.places), saved.graph);
-    session->loaded = session->recognition.places().rbegin()->first + 1;
-    session->located = false;
-    return session;
+  std::shared_ptr<PlaceSession> load(const std::string& path) const {
+    return std::make_shared<PlaceSession>(options_.recognition, loadPlaces(path, options_.recognition.graph));
   }
 
   bool onGetPlace(stereo_descriptor_vo::GetPlace::Request& request,
                   stereo_descriptor_vo::GetPlace::Response& response) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    const std::map<int, Place>& places = session_->recognition.places();
-    const auto place = places.find(static_cast<int>(request.id));
-    if (place == places.end()) {
+    if (const auto place = session_->message(static_cast<int>(request.id), robot_)) {
+      response.place = *place;
+      response.success = true;
+    } else {
       response.message = "there is no place " + std::to_string(request.id);
-      return true;
     }
-    response.place = ros_conversions::toMessage(place->second, robot_, session_->stream);
-    response.success = true;
     return true;
   }
 
@@ -464,15 +438,18 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   std::atomic<std::uint64_t> unpaired_{0}, malformed_{0};
 
   std::mutex mutex_;
-  std::shared_ptr<Session> session_;  // and all in it: under mutex_
+  std::shared_ptr<PlaceSession> session_;        // and all in it: under mutex_
+  bool was_located_ = false;                     // … and map -> odom is published since then
+  std::atomic<int> generation_{0}, resumes_{0};  // sessions that a service began, and times of resuming
 
-  std::unique_ptr<Worker<Pair>> observer_;
+  std::unique_ptr<Worker<Arrived>> observer_;
   std::unique_ptr<Worker<Job>> optimiser_;
   std::unique_ptr<OtherRobot> other_;
 
   // Only the callbacks' thread touches these.
   std::unique_ptr<ExactSynchroniser<Features, Odometry, Info>> synchroniser_;
   std::vector<ros::Subscriber> subscribers_;
+  ros::Subscriber initial_pose_subscriber_;
 };
 
 }  // namespace sdvo

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "output_bag.hpp"
+#include "same_camera.hpp"
 #include "whole_file.hpp"
 
 namespace sdvo {
@@ -40,7 +41,7 @@ SavedPlaces read(const std::string& path, const PoseGraphOptions& options) {
       places.push_back(ros_conversions::fromMessage(*message));
       if (!stream) stream = ros_conversions::streamOf(message->features);
       const StereoFeatures &first = places.front().features, &last = places.back().features;
-      if (last.camera != first.camera)
+      if (!isSameCamera(last.camera, first.camera))
         throw std::invalid_argument("its places " + std::to_string(places.front().id) + " and " +
                                     std::to_string(places.back().id) + " are of different cameras");
     } else if (instance.getTopic() == kGraphTopic) {

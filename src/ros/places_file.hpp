@@ -3,6 +3,7 @@
 #include <string>
 #include <vector>
 
+#include "map_conversions.hpp"
 #include "place_conversions.hpp"
 
 namespace sdvo {

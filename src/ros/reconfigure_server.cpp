@@ -111,6 +111,7 @@ bool ReconfigureServer::onRequest(dynamic_reconfigure::Reconfigure::Request& req
   try {
     assign(request.config);
     if (texts() != before) apply_();
+    keepChanges(before);
   } catch (const std::exception& e) {
     for (std::size_t i = 0; i < options_.size(); ++i) options_[i].set(before[i]);
     ROS_WARN_STREAM(nh_.getNamespace() << ": nothing reconfigured: " << e.what());
@@ -118,6 +119,22 @@ bool ReconfigureServer::onRequest(dynamic_reconfigure::Reconfigure::Request& req
   response.config = currentConfig();
   updates_.publish(response.config);
   return true;
+}
+
+/// On the parameter server, where a nodelet that is loaded again, and rosparam, find what is in use.
+void ReconfigureServer::keepChanges(const std::vector<std::string>& before) {
+  for (std::size_t i = 0; i < options_.size(); ++i) {
+    const Option& option = options_[i];
+    if (option.text() == before[i]) continue;
+    if (const auto* b = std::get_if<bool*>(&option.value))
+      nh_.setParam(option.name, **b);
+    else if (const auto* number = std::get_if<int*>(&option.value))
+      nh_.setParam(option.name, **number);
+    else if (const auto* d = std::get_if<double*>(&option.value))
+      nh_.setParam(option.name, **d);
+    else
+      nh_.setParam(option.name, option.text());
+  }
 }
 
 void ReconfigureServer::assign(const Config& request) {

@@ -20,11 +20,13 @@ class ReconfigureServer {
   /// `options` refer to values that must outlive the server and that only the server writes. `apply` runs in a ROS
   /// callback, never twice at a time, after values have changed. A request is taken over as a whole or not at all: when
   /// a name or a value is wrong, or `apply` throws, all values are as before and the response shows these.
+  /// What has changed is set on the parameter server, too.
   ReconfigureServer(ros::NodeHandle private_nh, std::vector<Option> options, std::function<void()> apply);
 
  private:
   bool onRequest(dynamic_reconfigure::Reconfigure::Request& request,
                  dynamic_reconfigure::Reconfigure::Response& response);
+  void keepChanges(const std::vector<std::string>& before);
   void assign(const dynamic_reconfigure::Config& request);
   void set(const std::string& name, const std::string& text);
   std::vector<std::string> texts() const;

@@ -6,6 +6,7 @@
 #include <exception>
 #include <utility>
 
+#include "frame_id.hpp"
 #include "stamps.hpp"
 
 namespace sdvo {

@@ -11,7 +11,7 @@
 #include <string>
 #include <utility>
 
-#include "conversions.hpp"
+#include "odometry_frames.hpp"
 
 namespace sdvo {
 

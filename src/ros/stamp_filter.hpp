@@ -17,18 +17,28 @@ class StampFilter {
  public:
   struct Passed {
     Item item;
-    int timeline;     ///< one more after every jump back but these:
-    int clock_steps;  ///< one more after every jump back that the clock made, too
+    int source_restarts;  ///< one more after every jump back that the clock did not make: a driver that restarts
+    int clock_steps;      ///< one more after every jump back that the clock made, too
   };
 
   /// `now` is the clock's time at the item's arrival. Returns what may be processed, in order: usually the item itself.
   std::vector<Passed> add(Item item, std::int64_t stamp, std::int64_t now, bool announced = false) {
     const Arrival arrival{stamp, now};
+    // Nothing orders the clock and the items: either may jump first.
+    clock_fell_ |= last_now_ && now < *last_now_;
+    last_now_ = now;
     if (!last_) return {pass(std::move(item), arrival)};
     const std::int64_t step = stamp - last_->stamp;
     if (step > 0 && step <= kJump) {
       dropHeld();
       return {pass(std::move(item), arrival)};
+    }
+    if (held_ && goesOn(held_->second, arrival)) {
+      std::vector<Passed> both;
+      both.push_back(pass(std::move(held_->first), held_->second));
+      held_.reset();
+      both.push_back(pass(std::move(item), arrival));
+      return both;
     }
     const bool clock_jumped_back = step <= 0 && now < last_->now;
     if (announced || ((clock_jumped_back || std::llabs(step) >= kJump) && movedWithClock(*last_, arrival))) {
@@ -38,13 +48,6 @@ class StampFilter {
     if (step <= 0 && step > -kJump) {
       ++dropped_;
       return {};
-    }
-    if (held_ && goesOn(held_->second, arrival)) {
-      std::vector<Passed> both;
-      both.push_back(pass(std::move(held_->first), held_->second));
-      held_.reset();
-      both.push_back(pass(std::move(item), arrival));
-      return both;
     }
     dropHeld();
     held_.emplace(std::move(item), arrival);
@@ -70,9 +73,9 @@ class StampFilter {
   }
 
   Passed pass(Item item, const Arrival& arrival) {
-    if (last_ && arrival.stamp <= last_->stamp) ++(arrival.now < last_->now ? clock_steps_ : timeline_);
+    if (last_ && arrival.stamp <= last_->stamp) ++(std::exchange(clock_fell_, false) ? clock_steps_ : source_restarts_);
     last_ = arrival;
-    return {std::move(item), timeline_, clock_steps_};
+    return {std::move(item), source_restarts_, clock_steps_};
   }
 
   void dropHeld() {
@@ -82,7 +85,9 @@ class StampFilter {
 
   std::optional<Arrival> last_;
   std::optional<std::pair<Item, Arrival>> held_;
-  int timeline_ = 0, clock_steps_ = 0;
+  std::optional<std::int64_t> last_now_;
+  bool clock_fell_ = false;  ///< since the stamps did
+  int source_restarts_ = 0, clock_steps_ = 0;
   std::uint64_t dropped_ = 0;
 };
 

@@ -2,15 +2,21 @@
 
 #include <atomic>
 #include <boost/make_shared.hpp>
+#include <cmath>
 #include <memory>
 #include <mutex>
+#include <opencv2/core/utility.hpp>
 #include <pluginlib/class_list_macros.hpp>
 #include <stdexcept>
 #include <utility>
 
 #include "../config/interface_options.hpp"
 #include "callback_thread.hpp"
-#include "conversions.hpp"
+#include "feature_conversions.hpp"
+#include "frame_id.hpp"
+#include "image_conversions.hpp"
+#include "image_diagnostics.hpp"
+#include "pace.hpp"
 #include "pair_decoder.hpp"
 #include "params.hpp"
 #include "reconfigure_server.hpp"
@@ -45,6 +51,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   ~StereoFeaturesNodelet() override {
     // Nothing may arrive any more, and nothing be in work, when members go.
     callbacks_.stop();
+    slow_callbacks_.stop();
     if (worker_) worker_->stop();
   }
 
@@ -64,45 +71,50 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   void onInit() override try {
     nh_ = callbacks_.serve(getNodeHandle());
     ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
+    ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
       NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect");
     transport_ = std::make_unique<StereoImageTransport>(private_nh);
     extractor_ = std::make_unique<FeatureExtractor>(options_.extractor);
+    pace_ = Pace(options_.input.max_rate);
     worker_ =
         std::make_unique<Worker<PairFilter::Passed>>(static_cast<std::size_t>(options_.input.queue_size),
                                                      [this](const PairFilter::Passed& passed) { process(passed); });
+    if (options_.input.opencv_threads >= 0) cv::setNumThreads(options_.input.opencv_threads);
+    diagnostics_ = std::make_unique<ImageDiagnostics>(nh_, private_nh, getName(), options_.input);
+    diagnostics_->input().noteIdle(kNobodyListens);
     silence_timer_ = nh_.createWallTimer(ros::WallDuration(kSilencePeriod), [this](const ros::WallTimerEvent&) {
-      const std::lock_guard<std::mutex> lock(connect_mutex_);
       const std::string silence = input_ ? input_->explainSilence() : std::string();
       if (!silence.empty()) NODELET_WARN_STREAM(silence);
     });
 
     reconfigured_ = options_.extractor;
     reconfigure_server_ =
-        std::make_unique<ReconfigureServer>(private_nh, listOptions(reconfigured_), [this] { onReconfigure(); });
+        std::make_unique<ReconfigureServer>(slow_nh, listOptions(reconfigured_), [this] { onReconfigure(); });
 
-    // A subscriber may connect before advertise() returns: the mutex makes it wait until publisher_ is there.
+    // Called once the callbacks' thread has started, when publisher_ is there.
     const ros::SubscriberStatusCallback on_connect = [this](const ros::SingleSubscriberPublisher&) { updateInput(); };
-    const std::lock_guard<std::mutex> lock(connect_mutex_);
     publisher_ =
         nh_.advertise<stereo_descriptor_vo::StereoFeatures>("stereo_features", kPublishQueue, on_connect, on_connect);
     callbacks_.start();
+    slow_callbacks_.start();
   } catch (const std::exception& e) {
     NODELET_FATAL_STREAM("not started: " << e.what());
     throw;  // the manager forgets the nodelet, and its loader ends with an error
   }
 
   void updateInput() try {
-    const std::lock_guard<std::mutex> lock(connect_mutex_);
     if (publisher_.getNumSubscribers() == 0) {
       input_.reset();
       mask_subscriber_.shutdown();
+      diagnostics_->input().noteIdle(kNobodyListens);
     } else if (!input_) {
       input_ = std::make_unique<StereoInput>(
           nh_, *transport_, options_.input, [this](const StereoPairMessages& pair) { onPair(pair); },
           [this](const std::string& topic, const std::string& why) { onRefusal(topic, why); });
       mask_subscriber_ =
           nh_.subscribe<sensor_msgs::Image>("left/mask", 1, [this](const sensor_msgs::ImageConstPtr& m) { onMask(m); });
+      diagnostics_->input().noteIdle("");
     }
   } catch (const std::exception& e) {
     NODELET_ERROR_STREAM("cannot subscribe to the images: " << e.what());
@@ -129,10 +141,12 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
 
   void onPair(const StereoPairMessages& pair) {
     const ros::Time stamp = pair.left_image->header.stamp;
+    diagnostics_->notePair(std::abs(secondsBetween(stamp, pair.right_image->header.stamp)));
     const std::uint64_t dropped = filter_.dropped();
     for (PairFilter::Passed& passed : filter_.add(pair, nanoseconds(stamp), nanoseconds(ros::Time::now())))
-      worker_->push(std::move(passed));
+      if (pace_.isDue(nanoseconds(passed.item.left_image->header.stamp))) worker_->push(std::move(passed));
     out_of_order_ = filter_.dropped();
+    diagnostics_->noteUnused(refused_, out_of_order_);
     if (filter_.dropped() > dropped && throttle_.allows("late"))
       NODELET_WARN_STREAM("a pair near " << stamp << " is late, or its stamp leapt away for once: dropped ("
                                          << filter_.dropped() << " so far)");
@@ -163,11 +177,13 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   /// In the worker's thread.
   void process(const PairFilter::Passed& passed) try {
     const StereoPairMessages& pair = passed.item;
+    const WorkLoad::Item work(diagnostics_->load());
+    diagnostics_->load().noteDropped(worker_->dropped());
     takeOverOptions();
     const ros::Time stamp = pair.left_image->header.stamp;
-    const bool restarted = std::exchange(timeline_, passed.timeline) != passed.timeline;
-    if (std::exchange(clock_steps_, passed.clock_steps) != passed.clock_steps || restarted) {
-      NODELET_WARN_STREAM("the clock jumped back to " << stamp << ": a new stream begins");
+    if (std::exchange(jumps_, passed.source_restarts + passed.clock_steps) !=
+        passed.source_restarts + passed.clock_steps) {
+      NODELET_WARN_STREAM("the stamps jumped back to " << stamp << ": a new stream begins");
       ++stream_epoch_;
     }
     const int depth = decoder_.bitDepth();
@@ -182,6 +198,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
         NODELET_WARN_STREAM("camera_info changed: a new stream begins (" << stream_epoch_ << " so far)");
     }
 
+    diagnostics_->note(features);
     reportRig(features, stamp);
     const auto message = boost::make_shared<stereo_descriptor_vo::StereoFeatures>(
         ros_conversions::toMessage(features, extractor_->options().size_curve));
@@ -191,6 +208,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     message->dropped_pairs = worker_->dropped() + out_of_order_ + refused_;
     publisher_.publish(message);
   } catch (const std::exception& e) {
+    diagnostics_->noteFailure(e.what());
     if (throttle_.allows(e.what()))
       NODELET_ERROR_STREAM("pair at " << passed.item.left_image->header.stamp << " of "
                                       << passed.item.left_image->header.frame_id << " skipped: " << e.what());
@@ -209,31 +227,33 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
 
   static constexpr double kSilencePeriod = 10.0;  // s between explanations why nothing comes
   static constexpr int kPublishQueue = 10;
+  static constexpr const char* kNobodyListens = "nobody listens to stereo_features";
 
-  CallbackThread callbacks_;
+  CallbackThread callbacks_, slow_callbacks_;  // the second one of what takes its time
   ros::NodeHandle nh_;
   Options options_;
   FeatureExtractorOptions reconfigured_;  // the server's
   ReportThrottle throttle_;
   ros::Publisher publisher_;
   ros::WallTimer silence_timer_;
+  std::unique_ptr<ImageDiagnostics> diagnostics_;
 
   std::mutex pending_mutex_;
   std::unique_ptr<FeatureExtractor> pending_;
   cv::Mat mask_;  // of the topic; empty: none has come
   std::unique_ptr<ReconfigureServer> reconfigure_server_;
 
-  PairFilter filter_;  // only the callbacks' thread touches it
+  PairFilter filter_;  // only the input's callback touches it, and the next
+  Pace pace_{0.0};
   std::atomic<std::uint64_t> out_of_order_{0}, refused_{0};
 
   // Only the worker's thread touches these.
   std::unique_ptr<FeatureExtractor> extractor_;
   PairDecoder decoder_;
-  int timeline_ = 0, clock_steps_ = 0;
+  int jumps_ = 0;  // back, of the stamps
   std::uint32_t stream_epoch_ = 0;
   bool rig_refused_ = false;  // as reported last
 
-  std::mutex connect_mutex_;
   std::unique_ptr<Worker<PairFilter::Passed>> worker_;
   std::unique_ptr<StereoImageTransport> transport_;
   std::unique_ptr<StereoInput> input_;

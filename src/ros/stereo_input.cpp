@@ -12,6 +12,7 @@ namespace {
 
 /// Messages that wait for this node's own thread, which handles each in no time: long enough that none is lost there.
 constexpr int kArrivalQueue = 20;
+constexpr double kLeastPeriod = 0.01;  // s, of a camera
 
 std::array<std::string, ArrivalLog::kInputs> resolvedTopics(const ros::NodeHandle& nh) {
   return {nh.resolveName("left/image_rect"), nh.resolveName("right/image_rect"), nh.resolveName("left/camera_info"),
@@ -37,10 +38,12 @@ StereoInput::StereoInput(ros::NodeHandle& nh, StereoImageTransport& transport, c
 
   const auto arrivals =
       static_cast<std::uint32_t>(std::max({kArrivalQueue, options.sync_queue_size, options.queue_size}));
-  left_image_.subscribe(nh, topics[0], arrivals, transport.left(), transport.hints());
-  right_image_.subscribe(nh, topics[1], arrivals, transport.right(), transport.hints());
+  ros::NodeHandle right_nh = right_callbacks_.serve(nh);
+  left_image_.subscribe(nh, topics[0], arrivals, transport.left);
+  right_image_.subscribe(right_nh, topics[1], arrivals, transport.right);
   left_info_.subscribe(nh, topics[2], arrivals);
   right_info_.subscribe(nh, topics[3], arrivals);
+  right_callbacks_.start();
 }
 
 /// Anew: what waited is forgotten.
@@ -49,6 +52,10 @@ void StereoInput::synchronise() {
   if (options_.approximate_sync) {
     ApproximatePolicy policy(queue);
     policy.setMaxIntervalDuration(ros::Duration(options_.max_interval));
+    // Without a least time between images of one camera each pair would wait for the next one, to see that it is no
+    // better.
+    const ros::Duration least(std::min(options_.max_interval, kLeastPeriod));
+    for (int input = 0; input < ArrivalLog::kInputs; ++input) policy.setInterMessageLowerBound(input, least);
     approximate_ = std::make_unique<message_filters::Synchronizer<ApproximatePolicy>>(
         static_cast<const ApproximatePolicy&>(policy), left_image_gate_, right_image_gate_, left_info_gate_,
         right_info_gate_);
@@ -64,6 +71,7 @@ template <class Source, class Message>
 void StereoInput::connect(Source& source, Gate<Message>& gate, ArrivalLog::Input input, const std::string& topic) {
   using MessagePtr = boost::shared_ptr<const Message>;
   const boost::function<void(const MessagePtr&)> pass = [this, &gate, input, topic](const MessagePtr& message) {
+    const std::lock_guard<std::mutex> lock(mutex_);
     try {
       const ros::Time& stamp = message->header.stamp;
       arrivals_.note(input, stamp, ros::SteadyTime::now().toSec());

@@ -10,10 +10,12 @@
 
 #include <functional>
 #include <memory>
+#include <mutex>
 #include <string>
 
 #include "../config/interface_options.hpp"
 #include "arrival_log.hpp"
+#include "callback_thread.hpp"
 #include "image_subscriber.hpp"
 #include "waiting_stamps.hpp"
 
@@ -26,7 +28,8 @@ struct StereoPairMessages {
 };
 
 /// The four synchronised inputs of stereo processing under their usual names: left|right/image_rect and camera_info.
-/// Subscribed from construction to destruction.
+/// Subscribed from construction to destruction. The right images have a thread of their own, so that a transport
+/// decodes both sides at once; the callbacks never run at the same time.
 class StereoInput {
  public:
   using Callback = std::function<void(const StereoPairMessages&)>;
@@ -63,6 +66,7 @@ class StereoInput {
   Refusal refuse_;
   const StereoInputOptions options_;
   ArrivalLog arrivals_;
+  std::mutex mutex_;  // of what follows
   WaitingStamps waiting_;
 
   // Destroyed in reverse order: first the subscribers, then the synchronisers, which let go of the gates.
@@ -70,6 +74,7 @@ class StereoInput {
   Gate<Info> left_info_gate_, right_info_gate_;
   std::unique_ptr<message_filters::Synchronizer<ExactPolicy>> exact_;
   std::unique_ptr<message_filters::Synchronizer<ApproximatePolicy>> approximate_;
+  CallbackThread right_callbacks_;
   ImageSubscriber left_image_, right_image_;
   message_filters::Subscriber<Info> left_info_, right_info_;
 };

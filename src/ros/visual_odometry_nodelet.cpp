@@ -7,8 +7,10 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cmath>
 #include <memory>
 #include <mutex>
+#include <opencv2/core/utility.hpp>
 #include <optional>
 #include <pluginlib/class_list_macros.hpp>
 #include <stdexcept>
@@ -19,14 +21,18 @@
 #include "../config/interface_options.hpp"
 #include "callback_thread.hpp"
 #include "camera_mount.hpp"
-#include "conversions.hpp"
+#include "feature_conversions.hpp"
+#include "frame_id.hpp"
+#include "gravity_track.hpp"
 #include "gyro_track.hpp"
 #include "odometry_diagnostics.hpp"
 #include "odometry_publisher.hpp"
 #include "params.hpp"
 #include "patience.hpp"
+#include "pose_conversions.hpp"
 #include "reconfigure_server.hpp"
 #include "report_throttle.hpp"
+#include "requests.hpp"
 #include "robot_transforms.hpp"
 #include "stamp_filter.hpp"
 #include "stamps.hpp"
@@ -45,6 +51,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     if (mount_) mount_->stop();
     // Nothing may arrive any more, and nothing be in work, when members go.
     callbacks_.stop();
+    slow_callbacks_.stop();
     if (worker_) worker_->stop();
   }
 
@@ -62,11 +69,18 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     }
   };
 
-  using FeaturesFilter = StampFilter<FeaturesMessagePtr>;
+  /// Features as they arrived, and what services had asked for by then.
+  struct Arrived {
+    FeaturesMessagePtr message;
+    StereoFeaturesView view;
+    int starts, resumes;
+  };
+  using FeaturesFilter = StampFilter<Arrived>;
 
   void onInit() override try {
     nh_ = callbacks_.serve(getNodeHandle());
     ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
+    ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
       NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect");
     if (options_.output.use_imu && !options_.output.guess_frame_id.empty())
@@ -75,31 +89,34 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     odometry_ = std::make_unique<VisualOdometry>(options_.odometry);
     publisher_ = std::make_unique<OdometryPublisher>(nh_, options_.output);
     publisher_->restart(T_odom_start_);
+    to_be_levelled_ = options_.output.use_imu;
     transforms_ = std::make_unique<RobotTransforms>(nh_, publishedFrames(), [this](const std::string& what) {
       if (throttle_.allows(what)) NODELET_WARN_STREAM(what);
     });
     mount_ = std::make_unique<CameraMount>(*transforms_, options_.output.tf_timeout);
     patience_ = Patience(options_.output.guess_timeout);
-    diagnostics_ = std::make_unique<OdometryDiagnostics>(nh_, private_nh, getName(), nh_.resolveName("stereo_features"),
-                                                         options_.output.max_silence);
+    if (options_.output.opencv_threads >= 0) cv::setNumThreads(options_.output.opencv_threads);
+    diagnostics_ = std::make_unique<OdometryDiagnostics>(nh_, private_nh, getName(), options_.output);
     services_ = {private_nh.advertiseService("reset", &VisualOdometryNodelet::onReset, this),
                  private_nh.advertiseService("reset_to_pose", &VisualOdometryNodelet::onResetToPose, this),
                  private_nh.advertiseService("pause", &VisualOdometryNodelet::onPause, this),
                  private_nh.advertiseService("resume", &VisualOdometryNodelet::onResume, this),
-                 private_nh.advertiseService("save_trajectory", &VisualOdometryNodelet::onSaveTrajectory, this)};
+                 slow_nh.advertiseService("save_trajectory", &VisualOdometryNodelet::onSaveTrajectory, this)};
 
     reconfigured_ = options_.odometry;
     reconfigure_server_ =
-        std::make_unique<ReconfigureServer>(private_nh, listOptions(reconfigured_), [this] { onReconfigure(); });
+        std::make_unique<ReconfigureServer>(slow_nh, listOptions(reconfigured_), [this] { onReconfigure(); });
 
     if (options_.output.use_imu)
-      imu_subscriber_ =
-          nh_.subscribe<sensor_msgs::Imu>("imu", kImuQueue, [this](const sensor_msgs::ImuConstPtr& m) { onImu(*m); });
+      imu_subscriber_ = nh_.subscribe<sensor_msgs::Imu>(
+          "imu", kImuQueue, [this](const sensor_msgs::ImuConstPtr& m) { onImu(*m); }, ros::VoidConstPtr(),
+          ros::TransportHints().tcpNoDelay());
     worker_ = std::make_unique<Worker<FeaturesFilter::Passed>>(
         static_cast<std::size_t>(options_.output.queue_size),
         [this](const FeaturesFilter::Passed& passed) { process(passed); });
     subscribe();
     callbacks_.start();
+    slow_callbacks_.start();
   } catch (const std::exception& e) {
     NODELET_FATAL_STREAM("not started: " << e.what());
     throw;  // the manager forgets the nodelet, and its loader ends with an error
@@ -107,8 +124,9 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
 
   void subscribe() {
     const auto queue = static_cast<std::uint32_t>(std::max(kArrivalQueue, options_.output.queue_size));
-    subscriber_ = nh_.subscribe<FeaturesMessage>("stereo_features", queue,
-                                                 [this](const FeaturesMessagePtr& m) { onFeatures(m); });
+    subscriber_ = nh_.subscribe<FeaturesMessage>(
+        "stereo_features", queue, [this](const FeaturesMessagePtr& m) { onFeatures(m); }, ros::VoidConstPtr(),
+        ros::TransportHints().tcpNoDelay());
   }
 
   /// Parent and child of the transform that goes out on TF.
@@ -121,11 +139,11 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   }
 
   void onFeatures(const FeaturesMessagePtr& message) try {
-    check(*message);
+    Arrived arrived{message, check(*message), starts_.posted(), resumes_.posted()};
     const std::uint64_t dropped = filter_.dropped();
     const bool new_stream = stream_epoch_ && *stream_epoch_ != message->stream_epoch;
     for (FeaturesFilter::Passed& passed :
-         filter_.add(message, nanoseconds(message->header.stamp), nanoseconds(ros::Time::now()), new_stream))
+         filter_.add(std::move(arrived), nanoseconds(message->header.stamp), nanoseconds(ros::Time::now()), new_stream))
       worker_->push(std::move(passed));
     stream_epoch_ = message->stream_epoch;
     out_of_order_ = filter_.dropped();
@@ -148,14 +166,17 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
       const std::lock_guard<std::mutex> lock(pending_mutex_);
       imu_frame_ = ros_conversions::cleanFrameId(message.header.frame_id);
     }
-    gyro_.add(nanoseconds(message.header.stamp), {rate.x, rate.y, rate.z});
+    const auto& acceleration = message.linear_acceleration;
+    gyro_.add(nanoseconds(message.header.stamp), nanoseconds(ros::Time::now()), {rate.x, rate.y, rate.z});
+    gravity_.add(nanoseconds(message.header.stamp), {acceleration.x, acceleration.y, acceleration.z},
+                 {rate.x, rate.y, rate.z});
   }
 
   /// Throws for what cannot be used, before its stamp counts.
-  void check(const FeaturesMessage& message) try {
+  StereoFeaturesView check(const FeaturesMessage& message) try {
     const std::string problem = whyUnusable(message.header.stamp);
     if (!problem.empty()) throw std::invalid_argument(problem);
-    StereoFeaturesView{message};
+    return StereoFeaturesView(message);
   } catch (const std::invalid_argument&) {
     ++malformed_;
     throw;
@@ -180,23 +201,36 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
 
   /// In the worker's thread.
   void process(const FeaturesFilter::Passed& passed) try {
-    const FeaturesMessage& message = *passed.item;
+    const FeaturesMessage& message = *passed.item.message;
+    const WorkLoad::Item work(diagnostics_->load());
     takeOverOptions();
-    const bool restarted = std::exchange(timeline_, passed.timeline) != passed.timeline;
-    const bool clock_set = std::exchange(clock_steps_, passed.clock_steps) != passed.clock_steps;
-    if (restarted || (clock_set && ros::Time::isSimTime())) restart("the clock jumped back", T_odom_start_);
-    if (clock_set && !ros::Time::isSimTime()) forgetTime();
-    if (const std::optional<Eigen::Isometry3d> start = takeRequestedStart()) restart("reset was called", *start);
-    if (resumed_.exchange(false)) odometry_->breakStream();
-    const StereoFeatures features = ros_conversions::fromMessage(message);
-    const std::string problem = findExtrinsic(ros_conversions::cleanFrameId(message.header.frame_id));
+    noteJumps(passed);
+    if (const auto start = starts_.take(passed.item.starts))
+      restart("reset was called", start->value_or(T_odom_start_));
+    if (resumes_.take(passed.item.resumes)) odometry_->breakStream();
+    const StereoFeatures features = ros_conversions::fromMessage(passed.item.view);
+    std::string problem = findExtrinsic(ros_conversions::cleanFrameId(message.header.frame_id));
+    if (problem.empty() && to_be_levelled_) problem = level();
     const OdometryResult result = problem.empty() ? track(features, message) : waitFor(problem);
-    publisher_->publishPoints(message);
+    publisher_->publishPoints(passed.item.view);
     publisher_->publishFlow(result, features, message.header);
     publishInfo(result, message);
   } catch (const std::exception& e) {
     if (throttle_.allows(e.what()))
-      NODELET_ERROR_STREAM("features at " << passed.item->header.stamp << " skipped: " << e.what());
+      NODELET_ERROR_STREAM("features at " << passed.item.message->header.stamp << " skipped: " << e.what());
+  }
+
+  /// Only simulated time that jumps back, as when a bag is played again, begins anew. A driver that restarts and a
+  /// system's clock that is set back leave the robot where it is.
+  void noteJumps(const FeaturesFilter::Passed& passed) {
+    const bool source_restarted = std::exchange(source_restarts_, passed.source_restarts) != passed.source_restarts;
+    const bool clock_set = std::exchange(clock_steps_, passed.clock_steps) != passed.clock_steps;
+    if (clock_set && ros::Time::isSimTime()) return restart("the clock jumped back", T_odom_start_);
+    if (!clock_set && !source_restarted) return;
+    NODELET_WARN_STREAM((clock_set ? "the system's clock was set back" : "the stamps of the features fell")
+                        << " to " << passed.item.message->header.stamp << ": the odometry goes on from the last pose");
+    odometry_->forgetTime();
+    processed_stamp_.reset();
   }
 
   OdometryResult track(const StereoFeatures& features, const FeaturesMessage& message) {
@@ -208,11 +242,14 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
       NODELET_WARN_STREAM("patches of " << features.patch_layout.side << "x" << features.patch_layout.side
                                         << " samples are too small for alignment/radius " << alignment.radius
                                         << ": no match is aligned (descriptor/patch_side of stereo_features)");
+    odometry_->mountAt(*mount_->last());
     const OdometryResult result = odometry_->update(features, findGuess(message.header));
     processed_stamp_ = message.header.stamp;
     epoch_ = result.epoch;
     report(result, message.header.stamp);
     publisher_->publish(result, *mount_->last());
+    if (publisher_->wantsMap() && result.has_pose)
+      publisher_->publishMap(odometry_->mapPoints(), *mount_->last(), message.header.stamp);
     return result;
   }
 
@@ -247,14 +284,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     odometry_->reset();
     mount_->forget();
     publisher_->restart(T_odom_start);
+    to_be_levelled_ = false;
     processed_epoch_.reset();
-    processed_stamp_.reset();
-  }
-
-  /// The system's clock was set back: the robot is where it was.
-  void forgetTime() {
-    NODELET_WARN_STREAM("the system's clock was set back: the odometry starts again from the last pose");
-    odometry_->forgetTime();
     processed_stamp_.reset();
   }
 
@@ -295,18 +326,51 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
       problem = "topic " + imu_subscriber_.getTopic() + " has no measurements of that time";
       return std::nullopt;
     }
-    std::string imu_frame;
-    {
-      const std::lock_guard<std::mutex> lock(pending_mutex_);
-      imu_frame = imu_frame_;
-    }
     const std::optional<Eigen::Isometry3d> T_camera_imu =
-        transforms_->find(ros_conversions::cleanFrameId(header.frame_id), imu_frame, problem);
+        transforms_->find(ros_conversions::cleanFrameId(header.frame_id), imuFrame(), problem);
     if (!T_camera_imu) return std::nullopt;
     MotionGuess guess;
     guess.T_previous_current.linear() = T_camera_imu->linear() * *R_before_now * T_camera_imu->linear().transpose();
     guess.rotation_only = true;
     return guess;
+  }
+
+  /// Takes roll and pitch of the first pose from the accelerometer, if the robot stands; waits a moment for a second of
+  /// its measurements and says so, nothing when it is done.
+  std::string level() {
+    constexpr double kPatience = 2.0;  // s of wall time
+    const double now = steadyTime();
+    if (!levels_until_) levels_until_ = now + kPatience;
+    const std::optional<Eigen::Vector3d> up = gravity_.up();
+    if (!up && now < *levels_until_)
+      return "roll and pitch of the first pose: no second of gravity alone on " + imu_subscriber_.getTopic() + " yet";
+    to_be_levelled_ = false;
+    std::string problem = "the robot moves, or nothing comes on " + imu_subscriber_.getTopic();
+    const std::optional<Eigen::Isometry3d> T_base_imu =
+        up ? transforms_->find(ros_conversions::cleanFrameId(options_.output.base_frame_id), imuFrame(), problem)
+           : std::nullopt;
+    if (T_base_imu) {
+      T_odom_start_ = levelled(T_odom_start_, T_base_imu->linear() * *up);
+      publisher_->restart(T_odom_start_);
+    } else {
+      NODELET_WARN_STREAM("roll and pitch of the first pose are those of initial_pose: " << problem);
+    }
+    return "";
+  }
+
+  /// A pose with its position and yaw, and with roll and pitch such that `up`, in the axes of the frame, is the
+  /// parent's z.
+  static Eigen::Isometry3d levelled(const Eigen::Isometry3d& pose, const Eigen::Vector3d& up) {
+    const Eigen::Matrix3d& R = pose.linear();
+    return Eigen::Translation3d(pose.translation()) *
+           Eigen::AngleAxisd(std::atan2(R(1, 0), R(0, 0)), Eigen::Vector3d::UnitZ()) *
+           Eigen::AngleAxisd(std::atan2(-up.x(), std::hypot(up.y(), up.z())), Eigen::Vector3d::UnitY()) *
+           Eigen::AngleAxisd(std::atan2(up.y(), up.z()), Eigen::Vector3d::UnitX());
+  }
+
+  std::string imuFrame() {
+    const std::lock_guard<std::mutex> lock(pending_mutex_);
+    return imu_frame_;
   }
 
   /// Asks for the camera's place on the robot; says what is missing, nothing when it is known.
@@ -333,26 +397,16 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
                              "right, REP-103) was expected, the odometry will move along the wrong axes");
   }
 
-  // The services. The worker takes a new start over before its next message.
-
-  void requestStart(const Eigen::Isometry3d& T_odom_start) {
-    const std::lock_guard<std::mutex> lock(pending_mutex_);
-    requested_start_ = T_odom_start;
-  }
-
-  std::optional<Eigen::Isometry3d> takeRequestedStart() {
-    const std::lock_guard<std::mutex> lock(pending_mutex_);
-    return std::exchange(requested_start_, std::nullopt);
-  }
+  // The services. What they ask for holds for the features that arrive from now on.
 
   bool onReset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
-    requestStart(T_odom_start_);
+    starts_.post(std::nullopt);
     return true;
   }
 
   bool onResetToPose(stereo_descriptor_vo::ResetToPose::Request& request,
                      stereo_descriptor_vo::ResetToPose::Response& response) try {
-    requestStart(ros_conversions::toPose(request.pose));
+    starts_.post(ros_conversions::toPose(request.pose));
     response.success = true;
     return true;
   } catch (const std::invalid_argument& e) {
@@ -365,7 +419,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     response.success = true;
     response.message = subscriber_ ? "paused" : "was paused already";
     subscriber_.shutdown();
-    diagnostics_->notePaused(true);
+    diagnostics_->input().noteIdle("paused");
     return true;
   }
 
@@ -373,8 +427,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     response.success = true;
     response.message = subscriber_ ? "was not paused" : "resumed; the motion in between is unknown";
     if (subscriber_) return true;
-    resumed_ = true;
-    diagnostics_->notePaused(false);
+    resumes_.post({});
+    diagnostics_->input().noteIdle("");
     subscribe();
     return true;
   }
@@ -396,10 +450,9 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   static constexpr int kArrivalQueue = 20;
   static constexpr int kImuQueue = 1000;
 
-  CallbackThread callbacks_;
+  CallbackThread callbacks_, slow_callbacks_;  // the second one of services that take their time
   ros::NodeHandle nh_;
   Options options_;
-  Eigen::Isometry3d T_odom_start_;      // of a run
   VisualOdometryOptions reconfigured_;  // the server's
   std::mutex pending_mutex_;
   std::optional<VisualOdometryOptions> pending_;
@@ -410,25 +463,31 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   std::unique_ptr<OdometryPublisher> publisher_;
   std::unique_ptr<OdometryDiagnostics> diagnostics_;
   std::vector<ros::ServiceServer> services_;
-  std::optional<Eigen::Isometry3d> requested_start_;  // under pending_mutex_
-  std::atomic<bool> resumed_{false}, stopping_{false};
+  struct Resume {};
+  Requests<std::optional<Eigen::Isometry3d>> starts_;  // T_odom_base; none: where it began
+  Requests<Resume> resumes_;
+  std::atomic<bool> stopping_{false};
 
   // Only the callbacks' thread touches these.
   FeaturesFilter filter_;
   std::optional<std::uint32_t> stream_epoch_;
 
   GyroTrack gyro_;
+  GravityTrack gravity_;
   std::string imu_frame_;  // under pending_mutex_
 
   std::atomic<std::uint64_t> out_of_order_{0}, malformed_{0};
 
   // Only the worker's thread touches these.
   std::unique_ptr<VisualOdometry> odometry_;
-  int timeline_ = 0, clock_steps_ = 0;
+  Eigen::Isometry3d T_odom_start_;  // of a run
+  int source_restarts_ = 0, clock_steps_ = 0;
   int epoch_ = 0;
   std::optional<std::uint32_t> processed_epoch_;
   std::optional<ros::Time> processed_stamp_;
-  Patience patience_{0.0};  // with guesses
+  bool to_be_levelled_ = false;         // the first pose, by the accelerometer
+  std::optional<double> levels_until_;  // s, steady time
+  Patience patience_{0.0};              // with guesses
 
   std::unique_ptr<Worker<FeaturesFilter::Passed>> worker_;
   ros::Subscriber subscriber_, imu_subscriber_;

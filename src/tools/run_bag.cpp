@@ -140,7 +140,7 @@ Row runBag(const fs::path& bag, const fs::path& output, const Arguments& argumen
       forEachPair(bag.string(), arguments.camera, [&](const auto& pair, const ros::Time& arrival) {
         const ros::Time stamp = pair.left_image->header.stamp;
         for (const auto& passed : filter.add(pair, sdvo::nanoseconds(stamp), sdvo::nanoseconds(arrival))) {
-          if (passed.timeline > 0)
+          if (passed.source_restarts > 0)
             throw std::runtime_error(
                 "stamps jump back for good: these are several recordings, one bag for each is needed");
           process(passed.item);

@@ -3,7 +3,7 @@
 
 #include <stdexcept>
 
-#include "../../src/ros/conversions.hpp"
+#include "../../src/ros/camera_conversions.hpp"
 
 namespace {
 

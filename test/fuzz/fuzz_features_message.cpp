@@ -23,7 +23,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   features.check();
   features.stamp = stamp += 100000000;
   const OdometryResult result = odometry.update(features);
-  ros_conversions::toPointCloud(input);
+  ros_conversions::toPointCloud(StereoFeaturesView(input));
   ros_conversions::toFlow(result, features);
   ros_conversions::toInfo(result, input);
   if (result.has_pose && !result.T_origin_camera.matrix().allFinite()) __builtin_trap();

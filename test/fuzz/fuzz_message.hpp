@@ -5,7 +5,12 @@
 #include <cstddef>
 #include <string>
 
-#include "../../src/ros/conversions.hpp"
+#include "../../src/ros/camera_conversions.hpp"
+#include "../../src/ros/feature_conversions.hpp"
+#include "../../src/ros/frame_id.hpp"
+#include "../../src/ros/image_conversions.hpp"
+#include "../../src/ros/odometry_conversions.hpp"
+#include "../../src/ros/pose_conversions.hpp"
 
 namespace sdvo {
 

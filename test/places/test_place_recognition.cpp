@@ -202,6 +202,54 @@ TEST(PlaceRecognition, RestoredPlacesLetANewSessionFindItself) {
   EXPECT_TRUE(fresh.places().empty());
 }
 
+/// A drive in a map that was loaded and stays as it is.
+Drive localisingIn(const Drive& mapping) {
+  PlaceRecognitionOptions options = Drive::fewAndFast();
+  options.localisation_only = true;
+  Drive drive(0.001, options);
+  drive.recognition.restore(placesOf(mapping.recognition), mapping.recognition.graph());
+  drive.T_odom_camera = Eigen::Isometry3d::Identity();  // an origin of its own
+  return drive;
+}
+
+TEST(PlaceRecognition, AMapThatIsOnlyLocalisedInStaysAsItIs) {
+  Drive mapping;
+  mapping.go(0, 150);
+  Drive drive = localisingIn(mapping);
+  const auto before = drive.recognition.graph().nodes();
+  EXPECT_FALSE(drive.recognition.covariance()) << "nobody knows where it is";
+  EXPECT_GE(loops(drive.go(20, 140)), 20);
+  EXPECT_LT(drive.error(), 0.3);
+  for (const auto& [id, T] : before) EXPECT_EQ(drive.recognition.graph().nodes().at(id).matrix(), T.matrix()) << id;
+  EXPECT_EQ(drive.recognition.places().size(), before.size() + 20) << "the last part of its own way";
+  ASSERT_TRUE(drive.recognition.covariance());
+  const double deviation = std::sqrt(drive.recognition.covariance()->topLeftCorner<3, 3>().trace());
+  EXPECT_GT(deviation, 1e-4);
+  EXPECT_LT(deviation, 0.5);
+}
+
+TEST(PlaceRecognition, AHintSaysWhereItIsAndWhereNotToLook) {
+  Drive mapping;
+  mapping.go(0, 150);
+  // What the odometry has as its origin is 50 m along the circle.
+  const Eigen::Isometry3d true_hint = onCircle(50.0), wrong_hint = onCircle(120.0);
+  Drive right = localisingIn(mapping), wrong = localisingIn(mapping);
+  Eigen::Isometry3d inexact = true_hint;
+  inexact.translation() += Eigen::Vector3d(0.5, 0.0, 0.5);
+  right.recognition.expect(inexact, 5.0);
+  const auto first = right.go(50, 53);
+  ASSERT_EQ(first.size(), 1u);
+  EXPECT_LT(right.error(), 0.8) << "as told, before anything was recognised";
+  EXPECT_GT(right.error(), 0.6);
+  EXPECT_GE(loops(right.go(53, 80)), 1);
+  EXPECT_LT(right.error(), 0.3);
+
+  wrong.recognition.expect(wrong_hint, 5.0);
+  EXPECT_EQ(loops(wrong.go(50, 80)), 0);
+  wrong.recognition.expect(wrong_hint, 200.0);
+  EXPECT_GE(loops(wrong.go(80, 110)), 1) << "anywhere within the radius";
+}
+
 /// A file may say anything.
 TEST(PlaceRecognition, PlacesWithWildNumbersAreNotTakenUp) {
   Drive mapping;

@@ -22,9 +22,10 @@ from sensor_msgs.msg import Image
 from std_srvs.srv import Empty, Trigger
 
 from kitti_replay import FRAME, PACKAGE, Camera, Collector, Rosout, SimulatedClock, StereoSequence, node_pid, wait_until
-from live_test import PAIRS, camera_transform
-from stereo_descriptor_vo.msg import PlaceInfo, PlaceSignature, VoInfo
-from stereo_descriptor_vo.srv import GetPlace, GetPlaceResponse, LoadPlaces, ResetToPose, SavePlaces, SaveTrajectory
+from live_test import PAIRS
+from pipeline_case import camera_transform
+from stereo_descriptor_vo.msg import Place, PlaceInfo, PlaceRequest, PlaceSignature, VoInfo
+from stereo_descriptor_vo.srv import GetPlace, LoadPlaces, ResetToPose, SavePlaces, SaveTrajectory
 
 NAMESPACE = '/stereo'
 MANAGER = NAMESPACE + '/stereo_vo_manager'
@@ -87,7 +88,8 @@ class Hammer(unittest.TestCase):
 
     def reload(self, name):
         self.assertTrue(self.unload('%s/%s' % (NAMESPACE, name)).success)
-        remaps = ('other/place_signature', 'other/get_place'), ('/other/place_signature', '/other/place_recognition/get_place')
+        topics = 'place_signature', 'place_request', 'place_answer'
+        remaps = ['other/' + topic for topic in topics], ['/other/' + topic for topic in topics]
         self.assertTrue(self.load('%s/%s' % (NAMESPACE, name), '%s/%s' % (PACKAGE, NODELETS[name]),
                                   *(remaps if name == 'place_recognition' else ([], [])), [], '').success)
         self.assertEqual(node_pid(MANAGER), self.pid, 'the nodelet manager died')
@@ -168,15 +170,18 @@ class Hammer(unittest.TestCase):
                 self.other_signatures.publish(signature)
             time.sleep(0.2)
 
-        def place_of_other(request):
-            done['/other'] = done.get('/other', 0) + 1
-            try:
-                return rospy.ServiceProxy(NAMESPACE + '/place_recognition/get_place', GetPlace)(request.id)
-            except rospy.ServiceException:
-                return GetPlaceResponse()
+        answers = rospy.Publisher('/other/place_answer', Place, queue_size=10)
 
-        service = rospy.Service('/other/place_recognition/get_place', GetPlace, place_of_other)
-        self.addCleanup(service.shutdown)
+        def answer(request):
+            try:
+                place = rospy.ServiceProxy(NAMESPACE + '/place_recognition/get_place', GetPlace)(request.id).place
+            except rospy.ServiceException:
+                return
+            place.robot = request.robot
+            answers.publish(place)
+            done['/other'] = done.get('/other', 0) + 1
+        requests = rospy.Subscriber('/other/place_request', PlaceRequest, answer)
+        self.addCleanup(requests.unregister)
         self.other_signatures = rospy.Publisher('/other/place_signature', PlaceSignature, queue_size=10)
         failures = []
 

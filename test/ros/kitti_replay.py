@@ -198,11 +198,11 @@ class SimulatedClock:
 class Pipeline:
     """The two nodelets, launched as a user would."""
 
-    def __init__(self, namespace, **arguments):
+    def __init__(self, namespace, launch='stereo_vo.launch', **arguments):
         self.namespace = namespace
         self.manager = arguments.get('manager', namespace + '/stereo_vo_manager')
         arguments = ['%s:=%s' % item for item in arguments.items()] + ['namespace:=' + namespace.strip('/')]
-        self.process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch'] + arguments)
+        self.process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, launch] + arguments)
 
     def is_connected(self, listeners):
         """Whether the manager sends this node each topic of the collectors given, and its errors, and has its own inputs."""

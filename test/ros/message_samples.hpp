@@ -5,7 +5,12 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "../../src/ros/conversions.hpp"
+#include "../../src/ros/camera_conversions.hpp"
+#include "../../src/ros/feature_conversions.hpp"
+#include "../../src/ros/frame_id.hpp"
+#include "../../src/ros/image_conversions.hpp"
+#include "../../src/ros/odometry_conversions.hpp"
+#include "../../src/ros/pose_conversions.hpp"
 
 /// Messages and results to try the conversions on.
 namespace sdvo::ros_conversions {

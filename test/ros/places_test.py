@@ -8,7 +8,6 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 import unittest
 
@@ -25,9 +24,9 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
 from kitti_replay import FRAME, PACKAGE, Collector, Rosout, SimulatedClock, links, matrix_of, wait_until
-from live_test import camera_transform
-from stereo_descriptor_vo.msg import MapGraph, PlaceInfo, PlaceMatch, PlaceSignature, StereoFeatures, VoInfo
-from stereo_descriptor_vo.srv import GetPlace, GetPlaceResponse, LoadPlaces, SavePlaces
+from pipeline_case import camera_transform
+from stereo_descriptor_vo.msg import MapGraph, PlaceInfo, PlaceMatch, PlaceRequest, PlaceSignature, StereoFeatures, VoInfo
+from stereo_descriptor_vo.srv import GetPlace, LoadPlaces, SavePlaces
 
 WIDTH, HEIGHT, FOCAL, BASELINE = 640, 240, 320.0, 0.5
 RADIUS, STEP = 15.0, 3.2  # m
@@ -259,36 +258,41 @@ class Places(unittest.TestCase):
         self.another_camera(file)
         self.paused_and_resumed(robot, recognition)
         self.the_odometry_is_lost_and_restarted(robot, recognition)
+        self.the_source_restarts(robot, recognition)
         self.the_clock_jumps_back(robot, recognition)
 
     def another_robot_that_does_not_answer(self, recognition, namespace):
-        released = threading.Event()
-
-        def hang(_):
-            released.wait(60)
-            return GetPlaceResponse()
-        service = rospy.Service(namespace + '/place_recognition/get_place', GetPlace, hang)
+        """Nothing waits for it; that it was asked in vain is told with its next key frame."""
+        requests = Collector(namespace + '/place_request', PlaceRequest)
         publisher = rospy.Publisher(namespace + '/place_signature', PlaceSignature, queue_size=10)
         manager = recognition.namespace + '/places_manager'
-        self.assertTrue(wait_until(lambda: ('out', namespace + '/place_signature', manager) in links(rospy.get_name())))
+        self.assertTrue(wait_until(lambda: ('out', namespace + '/place_signature', manager) in links(rospy.get_name()) and
+                                   ('out', namespace + '/place_request', rospy.get_name()) in links(manager)))
         signature = recognition.signatures[3]
-        signature.robot = namespace
-        publisher.publish(signature)
-        self.assertTrue(wait_until(lambda: recognition.rosout.warned('gives no answer in time')), recognition.rosout.warnings)
+        signature.robot, first = namespace, signature.id
+
+        def is_told():
+            publisher.publish(signature)
+            time.sleep(0.5)
+            signature.id += 1
+            return recognition.rosout.warned('gives no answer')
+        self.assertTrue(wait_until(is_told), recognition.rosout.warnings)
+        self.assertEqual((requests[0].robot, requests[0].id, requests[0].requested_by),
+                         (namespace, first, recognition.namespace))
         signature.bits_per_word += 1
         publisher.publish(signature)
         self.assertTrue(wait_until(lambda: recognition.rosout.warned('PlaceSignature message refused')))
-        released.set()
-        service.shutdown()
         publisher.unregister()
+        requests.close()
 
     def another_robot_restarted_in_that_map(self, recognition, namespace, file):
         """It begins elsewhere and knows where it is when it recognises a place; the first robot learns that it was there."""
-        robot = Robot(namespace, self.ring, self.clock, start=10)
+        robot = Robot(namespace, self.ring, self.clock, start=10, focal=FOCAL + 1e-9)  # computed anew
         other = self.start(namespace, places_file=file)
-        to_the_first = ('out', namespace + '/place_signature', recognition.namespace + '/places_manager')
-        self.assertTrue(wait_until(lambda: other.is_connected() and to_the_first in links(namespace + '/places_manager'), 60),
-                        'it did not start')
+        first, manager = recognition.namespace + '/places_manager', namespace + '/places_manager'
+        to_the_first = {('out', '%s/%s' % (namespace, topic), first) for topic in ('place_signature', 'place_answer')}
+        self.assertTrue(wait_until(lambda: other.is_connected() and to_the_first <= links(manager) and
+                                   ('out', namespace + '/place_request', manager) in links(first), 60), 'it did not start')
         robot.drive()
         T_world_odom = robot.truth()
         self.assertTrue(wait_until(lambda: other.info.has(robot.stamp)))
@@ -351,6 +355,15 @@ class Places(unittest.TestCase):
         info = self.drive(robot, recognition, 1)
         self.assertEqual((info.places, info.unpaired), (before.places + 1, before.unpaired))
         self.assertTrue(wait_until(lambda: [edge.kind for edge in recognition.graph[-1].edges].count('break') == 2))
+        self.assertLess(np.linalg.norm(matrix_of(info.map_to_odom) - matrix_of(before.map_to_odom)), 1e-6)
+
+    def the_source_restarts(self, robot, recognition):
+        """Stamps begin again near zero, the clock goes on: the places stay."""
+        before, breaks = recognition.info[-1], [edge.kind for edge in recognition.graph[-1].edges].count('break')
+        robot.stamp = rospy.Time(5)
+        info = self.drive(robot, recognition, 2)
+        self.assertEqual(info.places, before.places + 2)
+        self.assertTrue(wait_until(lambda: [e.kind for e in recognition.graph[-1].edges].count('break') == breaks + 1))
         self.assertLess(np.linalg.norm(matrix_of(info.map_to_odom) - matrix_of(before.map_to_odom)), 1e-6)
 
     def the_clock_jumps_back(self, robot, recognition):

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 #include <ros/ros.h>
+#include <sensor_msgs/point_cloud2_iterator.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include <cmath>
@@ -73,7 +74,7 @@ class OdometryPublisherTest : public ::testing::Test {
         [&] { return info_->messages.size() > info && (!result.has_pose || odom_->messages.size() > odom); }));
   }
 
-  ros::NodeHandle nh_{"/odometry_publisher"};
+  ros::NodeHandle global_nh_, nh_{"/odometry_publisher"};
   Eigen::Isometry3d T_base_camera_ = Eigen::Isometry3d::Identity();
   std::unique_ptr<OdometryPublisher> publisher_;
   std::unique_ptr<Inbox<nav_msgs::Odometry>> odom_;
@@ -97,6 +98,71 @@ TEST_F(OdometryPublisherTest, OdometryTransformAndPathSayTheSame) {
     EXPECT_EQ(header.stamp.toNSec(), 1000000000300000007u);
     EXPECT_EQ(header.frame_id, "odom");
   }
+}
+
+TEST_F(OdometryPublisherTest, ThePoseIsThatOfTheOdometry) {
+  Inbox<geometry_msgs::PoseWithCovarianceStamped> poses(nh_, "pose");
+  start({});
+  ASSERT_TRUE(spinUntil([&] { return poses.isConnected(); }));
+  publish(resultAt(2));
+  ASSERT_TRUE(spinUntil([&] { return !poses.messages.empty(); }));
+  EXPECT_EQ(poses.messages[0].header.stamp, odom_->messages[0].header.stamp);
+  EXPECT_EQ(poses.messages[0].header.frame_id, "odom");
+  EXPECT_EQ(poses.messages[0].pose.pose.position.z, 2.0);
+  EXPECT_EQ(poses.messages[0].pose.covariance, odom_->messages[0].pose.covariance);
+}
+
+TEST_F(OdometryPublisherTest, MapPointsAreInOdom) {
+  Inbox<sensor_msgs::PointCloud2> clouds(nh_, "map_points");
+  start({});
+  ASSERT_TRUE(spinUntil([&] { return clouds.isConnected() && publisher_->wantsMap(); }));
+  Eigen::Isometry3d T_odom_start = Eigen::Isometry3d::Identity(), T_base_camera = T_odom_start;
+  T_odom_start.translation() << 10.0, 0.0, 0.0;
+  T_base_camera.linear() << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  T_base_camera.translation() << 0.0, 0.0, 0.5;
+  publisher_->restart(T_odom_start);
+  publisher_->publishMap({{1.0, 2.0, 3.0}}, T_base_camera, ros::Time(7));
+  ASSERT_TRUE(spinUntil([&] { return !clouds.messages.empty(); }));
+  const sensor_msgs::PointCloud2& cloud = clouds.messages[0];
+  EXPECT_EQ(cloud.header.frame_id, "odom");
+  EXPECT_EQ(cloud.header.stamp, ros::Time(7));
+  ASSERT_EQ(cloud.width * cloud.height, 1u);
+  sensor_msgs::PointCloud2ConstIterator<float> point(cloud, "x");
+  EXPECT_FLOAT_EQ(point[0], 13.0f);  // ahead
+  EXPECT_FLOAT_EQ(point[1], -1.0f);  // to the right
+  EXPECT_FLOAT_EQ(point[2], -1.5f);  // below
+}
+
+TEST_F(OdometryPublisherTest, WhileLostZerosAreThereWhereTheyAreAskedFor) {
+  OdometryOutputOptions options;
+  options.publish_null_when_lost = true;
+  start(options);
+  OdometryResult lost = resultAt(1), waiting = resultAt(2);
+  lost.has_pose = waiting.has_pose = false;
+  lost.state = TrackingState::kLost;
+  waiting.state = TrackingState::kWaiting;
+  publish(waiting);
+  publish(lost);
+  publish(resultAt(3));
+  ASSERT_TRUE(spinUntil([&] { return odom_->messages.size() == 2; }));
+  const nav_msgs::Odometry& null = odom_->messages[0];
+  EXPECT_EQ(null.header.stamp.toNSec(), 1000000000200000007u);
+  EXPECT_EQ(null.pose.pose.orientation.w, 0.0);
+  EXPECT_EQ(null.pose.covariance[0], 9999.0);
+  EXPECT_EQ(null.twist.covariance[35], 9999.0);
+  ASSERT_TRUE(spinUntil([&] { return !tf_->messages.empty(); }));
+  EXPECT_EQ(tf_->messages.size(), 1u) << "none of the zeros";
+}
+
+TEST_F(OdometryPublisherTest, TransformsGoWhereTheNodeHasThemRemapped) {
+  nh_ = ros::NodeHandle("/odometry_publisher", {{"/tf", "/robot/tf"}});
+  Inbox<tf2_msgs::TFMessage> process_tf(global_nh_, "/tf");
+  start({});
+  publish(resultAt(2));
+  ASSERT_TRUE(spinUntil([&] { return !tf_->messages.empty(); }));
+  ros::WallDuration(0.2).sleep();
+  ros::spinOnce();
+  EXPECT_TRUE(process_tf.messages.empty());
 }
 
 TEST_F(OdometryPublisherTest, WithoutAPoseThereIsNeitherOdometryNorPath) {

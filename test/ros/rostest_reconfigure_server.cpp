@@ -84,6 +84,34 @@ class ReconfigureServerTest : public ::testing::Test {
   ReconfigureServer server_;
 };
 
+TEST_F(ReconfigureServerTest, WhatWasSetIsOnTheParameterServerAndWhatWasRefusedIsNot) {
+  for (const char* name : {"flag", "low", "ratio", "kind"}) nh_.deleteParam(name);
+  Config config;
+  add(config.bools, "flag", true);
+  add(config.ints, "low", 4);
+  add(config.doubles, "ratio", 2.0);  // clamped
+  add(config.strs, "kind", std::string("b"));
+  request(config);
+  bool flag = false;
+  int low = 0;
+  double ratio = 0.0;
+  std::string kind;
+  EXPECT_TRUE(nh_.getParam("flag", flag) && flag);
+  EXPECT_TRUE(nh_.getParam("low", low));
+  EXPECT_EQ(low, 4);
+  EXPECT_TRUE(nh_.getParam("ratio", ratio));
+  EXPECT_EQ(ratio, 1.0);
+  EXPECT_TRUE(nh_.getParam("kind", kind));
+  EXPECT_EQ(kind, "b");
+  EXPECT_FALSE(nh_.hasParam("high")) << "nobody has set it";
+
+  Config wrong;
+  add(wrong.ints, "low", 9);  // exceeds high
+  request(wrong);
+  EXPECT_TRUE(nh_.getParam("low", low));
+  EXPECT_EQ(low, 4);
+}
+
 TEST_F(ReconfigureServerTest, SetsEachTypeAndAnswersWithTheWholeSet) {
   Config config;
   add(config.bools, "flag", true);

@@ -16,7 +16,7 @@ import tf2_ros
 from nav_msgs.msg import Odometry
 
 from kitti_replay import FRAME, PACKAGE, Camera, Collector, SimulatedClock, StereoSequence, links, matrix_of, wait_until
-from live_test import camera_transform
+from pipeline_case import camera_transform
 from stereo_descriptor_vo.msg import StereoFeatures, VoInfo
 
 PAIRS = 24

@@ -13,7 +13,7 @@ constexpr std::int64_t kMillisecond = 1000000;
 
 /// Every 10 ms from `begin` to `end`, ms, a rate about z that grows by 1 rad/s in a second.
 void fill(GyroTrack& track, int begin, int end) {
-  for (int t = begin; t <= end; t += 10) track.add(t * kMillisecond, {0.0, 0.0, 1e-3 * t});
+  for (int t = begin; t <= end; t += 10) track.add(t * kMillisecond, t * kMillisecond, {0.0, 0.0, 1e-3 * t});
 }
 
 double yaw(const GyroTrack& track, int from, int to) {
@@ -33,10 +33,10 @@ TEST(GyroTrack, IntegratesTheRateBetweenTwoTimes) {
 
 TEST(GyroTrack, TurnsAboutItsOwnAxes) {
   GyroTrack track;
-  track.add(0, {0.5 * M_PI / 0.05, 0.0, 0.0});
-  track.add(50 * kMillisecond, {0.5 * M_PI / 0.05, 0.0, 0.0});
-  track.add(50 * kMillisecond + 1, {0.0, 0.5 * M_PI / 0.05, 0.0});
-  track.add(100 * kMillisecond + 1, {0.0, 0.5 * M_PI / 0.05, 0.0});
+  track.add(0, 0, {0.5 * M_PI / 0.05, 0.0, 0.0});
+  track.add(50 * kMillisecond, 50 * kMillisecond, {0.5 * M_PI / 0.05, 0.0, 0.0});
+  track.add(50 * kMillisecond + 1, 50 * kMillisecond + 1, {0.0, 0.5 * M_PI / 0.05, 0.0});
+  track.add(100 * kMillisecond + 1, 100 * kMillisecond + 1, {0.0, 0.5 * M_PI / 0.05, 0.0});
   const auto R = track.rotation(0, 100 * kMillisecond + 1);
   ASSERT_TRUE(R);
   EXPECT_LT((*R - expSO3({0.5 * M_PI, 0.0, 0.0}) * expSO3({0.0, 0.5 * M_PI, 0.0})).norm(), 1e-6);
@@ -52,7 +52,7 @@ TEST(GyroTrack, SaysNothingOfWhatItDidNotMeasure) {
   EXPECT_FALSE(track.rotation(1050 * kMillisecond, 1250 * kMillisecond)) << "a pause";
   EXPECT_FALSE(track.rotation(1050 * kMillisecond, 1040 * kMillisecond));
   EXPECT_TRUE(track.rotation(1200 * kMillisecond, 1300 * kMillisecond));
-  track.add(1305 * kMillisecond, {0.0, std::numeric_limits<double>::quiet_NaN(), 0.0});
+  track.add(1305 * kMillisecond, 1305 * kMillisecond, {0.0, std::numeric_limits<double>::quiet_NaN(), 0.0});
   EXPECT_FALSE(track.rotation(1200 * kMillisecond, 1305 * kMillisecond));
 }
 
@@ -64,10 +64,27 @@ TEST(GyroTrack, BeginsAnewWhenTheClockJumpsBack) {
   EXPECT_NEAR(yaw(track, 500, 600), 0.055, 1e-12);
 }
 
+TEST(GyroTrack, WhatIsLateOrWildIsLeftOutAndErasesNothing) {
+  GyroTrack track;
+  fill(track, 1000, 1100);
+  for (const std::int64_t stamp : {1095, 900, 1'000'000, -1'000'000})
+    track.add(stamp * kMillisecond, 1101 * kMillisecond, {0.0, 0.0, 50.0});
+  fill(track, 1110, 1200);
+  EXPECT_NEAR(yaw(track, 1000, 1200), 0.5 * (1.2 * 1.2 - 1.0), 1e-12);
+}
+
+TEST(GyroTrack, BeginsAnewWhenItsOwnStampsStayBehind) {
+  GyroTrack track;
+  fill(track, 5000, 5100);
+  for (int t = 0; t <= 100; t += 10) track.add((1000 + t) * kMillisecond, (5110 + t) * kMillisecond, {0.0, 0.0, 1.0});
+  EXPECT_FALSE(track.rotation(5000 * kMillisecond, 5100 * kMillisecond));
+  EXPECT_NEAR(yaw(track, 1000, 1100), 0.1, 1e-12);
+}
+
 TEST(GyroTrack, AMeasurementThatComesTwiceCountsOnce) {
   GyroTrack track;
   fill(track, 1000, 1100);
-  track.add(1100 * kMillisecond, {0.0, 0.0, 5.0});
+  track.add(1100 * kMillisecond, 1100 * kMillisecond, {0.0, 0.0, 5.0});
   fill(track, 1110, 1200);
   EXPECT_NEAR(yaw(track, 1000, 1200), 0.5 * (1.2 * 1.2 - 1.0), 1e-12);
 }

@@ -15,11 +15,11 @@ constexpr std::int64_t kSecond = 1000000000;
 /// A stream whose items are their own running numbers.
 class StampFilterTest : public ::testing::Test {
  protected:
-  /// Items passed on, with their timelines. Times in s.
+  /// Items passed on, with the restarts of their source. Times in s.
   std::vector<std::pair<int, int>> add(double stamp, double now, bool announced = false) {
     std::vector<std::pair<int, int>> passed;
     for (const auto& item : filter_.add(next_++, toNanoseconds(stamp), toNanoseconds(now), announced))
-      passed.emplace_back(item.item, item.timeline), clock_steps_ = item.clock_steps;
+      passed.emplace_back(item.item, item.source_restarts), clock_steps_ = item.clock_steps;
     return passed;
   }
 
@@ -70,7 +70,7 @@ TEST_F(StampFilterTest, OutliersOneAfterTheOtherAreDropped) {
   EXPECT_EQ(filter_.dropped(), 3u);
 }
 
-TEST_F(StampFilterTest, ALastingJumpBackIsANewTimelineAndLosesNothing) {
+TEST_F(StampFilterTest, ALastingJumpBackIsARestartOfTheSourceAndLosesNothing) {
   add(100.0, 50.0);
   EXPECT_EQ(add(70.0, 50.1), Passed{});
   EXPECT_EQ(add(70.1, 50.2), (Passed{{1, 1}, {2, 1}}));
@@ -78,7 +78,7 @@ TEST_F(StampFilterTest, ALastingJumpBackIsANewTimelineAndLosesNothing) {
   EXPECT_EQ(filter_.dropped(), 0u);
 }
 
-TEST_F(StampFilterTest, ALastingJumpAheadStaysInItsTimeline) {
+TEST_F(StampFilterTest, ALastingJumpAheadIsNoRestart) {
   add(100.0, 50.0);
   EXPECT_EQ(add(130.0, 50.1), Passed{});
   EXPECT_EQ(add(130.1, 50.2), (Passed{{1, 0}, {2, 0}}));
@@ -95,6 +95,20 @@ TEST_F(StampFilterTest, AJumpThatTheClockMadeIsBelievedAtOnceAndCountedByItself)
   EXPECT_EQ(add(100.0, 100.0), (Passed{{4, 0}}));  // a bag shorter than a second
   EXPECT_EQ(clock_steps_, 2);
   EXPECT_EQ(filter_.dropped(), 0u);
+}
+
+TEST_F(StampFilterTest, AJumpOfTheClockIsKnownWhetherItOrTheItemComesFirst) {
+  add(160.0, 160.0);
+  EXPECT_EQ(add(100.0, 160.0), Passed{});  // before the clock
+  EXPECT_EQ(add(100.1, 100.1), (Passed{{1, 0}, {2, 0}}));
+  EXPECT_EQ(clock_steps_, 1);
+  EXPECT_EQ(add(100.2, 50.0), (Passed{{3, 0}}));  // of before, after the clock
+  EXPECT_EQ(add(50.0, 50.1), Passed{});
+  EXPECT_EQ(add(50.1, 50.2), (Passed{{4, 0}, {5, 0}}));
+  EXPECT_EQ(clock_steps_, 2);
+  EXPECT_EQ(add(10.0, 50.3), Passed{});
+  EXPECT_EQ(add(10.1, 50.4), (Passed{{6, 1}, {7, 1}}));  // the source alone
+  EXPECT_EQ(clock_steps_, 2);
 }
 
 TEST_F(StampFilterTest, AJumpThatTheSourceAnnouncesIsBelievedAtOnce) {

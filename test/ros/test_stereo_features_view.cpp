@@ -196,7 +196,7 @@ TEST(StereoFeaturesViewTest, PointFollowsFromDisparity) {
   EXPECT_NEAR(point.y, -0.5, 1e-12);
   EXPECT_NEAR(point.z, 10.0, 1e-12);
 
-  const sensor_msgs::PointCloud2 cloud = toPointCloud(message);
+  const sensor_msgs::PointCloud2 cloud = toPointCloud(StereoFeaturesView(message));
   EXPECT_EQ(cloud.header.frame_id, "left_optical");
   EXPECT_EQ(cloud.header.stamp, message.header.stamp);
   ASSERT_EQ(cloud.width * cloud.height, 5u);
@@ -209,7 +209,8 @@ TEST(StereoFeaturesViewTest, PointFollowsFromDisparity) {
 }
 
 TEST(StereoFeaturesViewTest, NoFeaturesMakeAnEmptyCloud) {
-  const sensor_msgs::PointCloud2 cloud = toPointCloud(toMessage(someFeatures().select({}), DepthScaleOptions()));
+  const sensor_msgs::PointCloud2 cloud =
+      toPointCloud(StereoFeaturesView(toMessage(someFeatures().select({}), DepthScaleOptions())));
   EXPECT_EQ(cloud.width * cloud.height, 0u);
   EXPECT_EQ(cloud.fields.size(), 4u);
 }

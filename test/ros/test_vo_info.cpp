@@ -32,6 +32,7 @@ TEST(ToInfo, TellsResultAndImageSide) {
   features.dropped_pairs = 6;
   const stereo_descriptor_vo::VoInfo info = toInfo(result, features);
   EXPECT_EQ(info.state, "DEGRADED");
+  EXPECT_EQ(info.state_id, stereo_descriptor_vo::VoInfo::DEGRADED);
   EXPECT_EQ(info.reason, "motion predicted");
   EXPECT_EQ(info.epoch, 3u);
   EXPECT_EQ(info.detected, 1234u);

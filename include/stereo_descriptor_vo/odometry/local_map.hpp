@@ -136,7 +136,11 @@ class LocalMap {
     std::optional<double> common_disparity_square;  ///< px^2, see WindowSolution
     std::vector<int> rejected_rows;                 ///< of the newest pair
   };
-  Adjustment adjust(WindowOptimizer& optimizer, const CalibrationBelief& prior, RigCalibration& calibration);
+  Adjustment adjust(WindowOptimizer& optimizer, const CalibrationBelief& prior, RigCalibration& calibration,
+                    const std::optional<Floor>& floor = std::nullopt);
+
+  /// The points at a finite distance, in the map's origin, m.
+  std::vector<Eigen::Vector3d> positions() const;
 
   /// The newest pair's sightings that were not cut off renew what their points look like: the descriptors, and a
   /// reference patch that has become too small or too large.

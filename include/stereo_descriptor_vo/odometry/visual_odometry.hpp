@@ -12,6 +12,7 @@
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/odometry/calibration_filter.hpp"
 #include "stereo_descriptor_vo/odometry/feature_matcher.hpp"
+#include "stereo_descriptor_vo/odometry/floor.hpp"
 #include "stereo_descriptor_vo/odometry/local_map.hpp"
 #include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
 #include "stereo_descriptor_vo/odometry/motion_search.hpp"
@@ -43,8 +44,10 @@ struct VisualOdometryOptions {
   WindowOptimizerOptions window;
   CalibrationOptions calibration;
   TrackingOptions tracking;
+  PlanarOptions planar;
 
   void describe(OptionList& list) {
+    list.collect(planar);
     list.group("matcher", matcher);
     list.group("motion", motion);
     list.group("alignment", alignment);
@@ -135,6 +138,12 @@ class VisualOdometry {
 
   const VisualOdometryOptions& options() const { return options_; }
 
+  /// Where the camera sits on the base, whose floor `planar` is about; until then at the base's origin, looking ahead.
+  void mountAt(const Eigen::Isometry3d& T_base_camera) { T_base_camera_ = T_base_camera; }
+
+  /// The local map's points at a finite distance, in the origin, m; empty while there is no map.
+  std::vector<Eigen::Vector3d> mapPoints() const;
+
  private:
   /// What becomes of the pose with a pair.
   struct Step {
@@ -175,11 +184,14 @@ class VisualOdometry {
   void recall(const StereoFeatures& features);
   void cover(Step& step);
   Step predict(const StereoFeatures& features, double dt, const std::string& failure);
+  std::optional<Floor> floor() const;
+  void noteFloor(Step& step);
   void move(const Eigen::Isometry3d& T_previous_current);
   OdometryResult report(const StereoFeatures& features, double dt, const MotionHypothesis& found,
                         const Step& step) const;
 
   VisualOdometryOptions options_;
+  Eigen::Isometry3d T_base_camera_;
   MotionSearch search_;
   FeatureMatcher matcher_;  ///< of recalled key frames, as is the next
   MotionEstimator estimator_;
@@ -205,6 +217,9 @@ class VisualOdometry {
     int predicted_pairs = 0;
     int pairs = 0;
     bool started = false;
+    double floor_height = 0.0;                    ///< m, in the axes of the base's first pose
+    bool on_floor = true;                         ///< the last pose
+    int level_pairs = 0;                          ///< at another height, one after the other
     ResidualLevel outlier_level;                  ///< shares of the last pairs' matches that did not agree
     Matrix6d last_doubt = Matrix6d::Zero();       ///< of a doubtful motion
     Vector6d correction_left = Vector6d::Zero();  ///< by the map, which the next motion is expected to contain

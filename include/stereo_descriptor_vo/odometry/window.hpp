@@ -1,9 +1,11 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <optional>
 #include <vector>
 
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
+#include "stereo_descriptor_vo/odometry/floor.hpp"
 #include "stereo_descriptor_vo/odometry/rig_calibration.hpp"
 
 namespace sdvo {
@@ -39,6 +41,7 @@ struct Window {
   std::vector<WindowObservation> observations;  ///< sorted by point
   RigCalibration calibration;
   CalibrationBelief calibration_prior;
+  std::optional<Floor> floor;  ///< on which the base of every pose but the first is held
 };
 
 }  // namespace sdvo

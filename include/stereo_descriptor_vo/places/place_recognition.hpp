@@ -27,6 +27,7 @@ struct PlaceRecognitionOptions {
   double min_age = 20.0;
   double min_travel = 30.0;
   int candidates = 1;
+  bool localisation_only = false;
   PlaceIndexOptions index;
   PlaceVerifierOptions verifier;
   LoopAgreementOptions agreement;
@@ -42,6 +43,8 @@ struct PlaceRecognitionOptions {
              "no place is looked for among key frames younger than that, unless there was a break since");
     list.add("min_travel", min_travel, {0.0, 10000.0}, "m", "… or from which the way here is shorter");
     list.add("candidates", candidates, {1, 100}, "", "places that geometry looks at for each key frame");
+    list.add("localisation_only", localisation_only,
+             "a map that was loaded stays as it is: no places are added, none is moved");
     list.group("index", index);
     list.group("verifier", verifier);
     list.group("agreement", agreement);
@@ -87,6 +90,14 @@ class PlaceRecognition {
   /// What the map says of the odometry's origin, by the last key frame.
   Eigen::Isometry3d T_map_odom() const;
 
+  /// How well that is known: of a right perturbation of the last key frame's camera in the map, since the place that
+  /// was recognised last; none where no way without a break leads there.
+  std::optional<Matrix6d> covariance() const;
+
+  /// Somebody says where the odometry is in the map: the next key frame is put there, after a break, and until a place
+  /// is recognised only those within `radius` (m) of the camera are looked at. Without places nothing happens.
+  void expect(const Eigen::Isometry3d& T_map_odom, double radius);
+
   /// Places of which rows are kept, by id.
   const std::map<int, Place>& places() const { return places_; }
   PlaceSignature signature(int place) const;
@@ -106,6 +117,9 @@ class PlaceRecognition {
   void addKeyframe(const StereoFeatures& features, int id);
   void recognise(const Place& here, PlaceReport& report);
   bool isPossible(const GraphEdge& loop) const;
+  bool isCandidate(const Place& place, const Place& here) const;
+  void forgetOldest();
+  void forget(int id);
 
   PlaceRecognitionOptions options_;
   PlaceIndex index_;
@@ -113,7 +127,14 @@ class PlaceRecognition {
   LoopAgreement agreement_;
   PoseGraph graph_;
   std::map<int, Place> places_;
-  std::optional<int> last_;  ///< key frame of this session
+  std::optional<int> last_;        ///< key frame of this session
+  std::optional<int> recognised_;  ///< the place of the last loop
+  int restored_ = 0;               ///< places with smaller numbers were taken up
+  struct Expectation {
+    Eigen::Isometry3d T_map_odom;
+    double radius;  ///< m
+  };
+  std::optional<Expectation> expectation_;
   int next_id_ = 0;
   int segment_ = 0;
 

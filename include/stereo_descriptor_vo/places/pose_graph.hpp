@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <map>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -63,6 +64,9 @@ class PoseGraph {
   /// The first node, which stays where it is.
   void start(int id, const Eigen::Isometry3d& T_map_node);
 
+  /// The nodes up to this one stay where they are in every optimisation.
+  void hold(int last) { held_ = last; }
+
   /// A new node `edge.to`, placed by its edge from one that is there.
   void extend(const GraphEdge& edge);
 
@@ -118,6 +122,7 @@ class PoseGraph {
   std::map<int, Eigen::Isometry3d> nodes_;  ///< T_map_node
   std::vector<GraphEdge> edges_;
   int moved_parts_ = 0;
+  std::optional<int> held_;
   double turn_error_ = 0.0;
   double slack_ = 0.1;  ///< share of the largest drift that edges give way by
 };

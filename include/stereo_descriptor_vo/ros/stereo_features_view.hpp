@@ -24,6 +24,7 @@ class StereoFeaturesView {
     checkNumbers();
   }
 
+  const stereo_descriptor_vo::StereoFeatures& message() const { return message_; }
   int count() const { return static_cast<int>(message_.u.size()); }
   bool hasRightHalf() const { return message_.layout == nameOf(DescriptorLayout::kLeftAndRight); }
 

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <Eigen/Geometry>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/common/se3.hpp"
+
+namespace sdvo {
+
+struct PlanarOptions {
+  bool planar = false;
+  double planar_height_sigma = 0.01;
+  double planar_tilt_sigma = 0.3;
+
+  void describe(OptionList& list) {
+    list.add("planar", planar,
+             "the base drives on a flat floor: its height, roll and pitch are constrained in the adjustment");
+    list.add("planar_height_sigma", planar_height_sigma, {1e-4, 10.0}, "m",
+             "planar: standard deviation of the base's height over the floor");
+    list.add("planar_tilt_sigma", planar_tilt_sigma, {1e-3, 90.0}, "deg",
+             "planar: standard deviation of the base's roll and pitch");
+  }
+};
+
+/// The floor that a base drives on, in the axes of the base's first pose: at z = height, level.
+struct Floor {
+  using Jacobian = Eigen::Matrix<double, 3, 6>;
+
+  Eigen::Isometry3d T_base_camera;
+  double height = 0.0;                              ///< m
+  Eigen::Vector3d sigma = Eigen::Vector3d::Ones();  ///< of height (m) and of the two tilts (rad)
+
+  Floor(const PlanarOptions& options, const Eigen::Isometry3d& T_base_camera, double height);
+
+  /// T_floor_base of a camera's pose in the odometry's origin, which is the first left camera.
+  Eigen::Isometry3d base(const Eigen::Isometry3d& T_camera_origin) const;
+
+  /// Height over the floor and two tilts of the base, in standard deviations, and their derivatives by the left
+  /// perturbation of T_camera_origin.
+  Eigen::Vector3d residual(const Eigen::Isometry3d& T_camera_origin, Jacobian* jacobian = nullptr) const;
+
+  /// Of a squared residual of one of the three: it bends as Cauchy's kernel does, because a ramp is no floor.
+  static double cost(double square);
+  static double weight(double square);
+
+  /// What is left of a pose's covariance (of a right perturbation of T_origin_camera) on this floor.
+  Matrix6d constrained(const Eigen::Isometry3d& T_origin_camera, const Matrix6d& covariance) const;
+};
+
+}  // namespace sdvo

@@ -1,0 +1,57 @@
+#include "stereo_descriptor_vo/odometry/floor.hpp"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <opencv2/core.hpp>
+
+namespace sdvo {
+namespace {
+
+constexpr double kBend = 9.0;  // square of the residual, in standard deviations, at which the kernel bends
+
+}  // namespace
+
+Floor::Floor(const PlanarOptions& options, const Eigen::Isometry3d& T_base_from_camera, double height_of_base)
+    : T_base_camera(T_base_from_camera), height(height_of_base) {
+  const double tilt = options.planar_tilt_sigma * CV_PI / 180.0;
+  sigma = {options.planar_height_sigma, tilt, tilt};
+}
+
+Eigen::Isometry3d Floor::base(const Eigen::Isometry3d& T_camera_origin) const {
+  return T_base_camera * T_camera_origin.inverse() * T_base_camera.inverse();
+}
+
+Eigen::Vector3d Floor::residual(const Eigen::Isometry3d& T_camera_origin, Jacobian* jacobian) const {
+  const Eigen::Isometry3d T_floor_base = base(T_camera_origin);
+  const Eigen::Matrix3d& R = T_floor_base.linear();
+  const Eigen::Vector3d weights = sigma.cwiseInverse();
+  if (jacobian) {
+    // exp(xi) T_camera_origin is T_floor_base exp(-Ad(T_base_camera) xi); a turn eta moves the base's z by R (eta x z).
+    Jacobian by_base = Jacobian::Zero();
+    by_base.block<1, 3>(0, 0) = R.row(2);
+    by_base.block<2, 1>(1, 3) = -R.block<2, 1>(0, 1);
+    by_base.block<2, 1>(1, 4) = R.block<2, 1>(0, 0);
+    *jacobian = weights.asDiagonal() * by_base * -adjoint(T_base_camera);
+  }
+  return weights.cwiseProduct(Eigen::Vector3d(T_floor_base.translation().z() - height, R(0, 2), R(1, 2)));
+}
+
+double Floor::cost(double square) {
+  return kBend * std::log1p(square / kBend);
+}
+
+double Floor::weight(double square) {
+  return 1.0 / (1.0 + square / kBend);
+}
+
+Matrix6d Floor::constrained(const Eigen::Isometry3d& T_origin_camera, const Matrix6d& covariance) const {
+  Jacobian by_left;
+  residual(T_origin_camera.inverse(), &by_left);
+  // T_origin_camera exp(xi) inverted is exp(-xi) T_camera_origin; the sign does not matter to a covariance.
+  const Eigen::Matrix3d innovation = by_left * covariance * by_left.transpose() + Eigen::Matrix3d::Identity();
+  const Eigen::Matrix<double, 6, 3> gain = innovation.ldlt().solve(by_left * covariance).transpose();
+  const Matrix6d left = covariance - gain * by_left * covariance;
+  return 0.5 * (left + left.transpose());
+}
+
+}  // namespace sdvo

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <optional>
+
+namespace sdvo {
+
+/// Which way is up, as an accelerometer that stands measures it. May be used by several threads.
+class GravityTrack {
+ public:
+  /// `acceleration`: m/s^2, and `rate`: rad/s, in the sensor's axes; `stamp`: ns. What is not finite is left out; a
+  /// stamp that is not later than the last one begins anew.
+  void add(std::int64_t stamp, const Eigen::Vector3d& acceleration, const Eigen::Vector3d& rate);
+
+  /// Unit vector in the sensor's axes, the mean of the last second; nothing unless that second is there, the sensor
+  /// stood and measured gravity alone.
+  std::optional<Eigen::Vector3d> up() const;
+
+ private:
+  struct Measurement {
+    std::int64_t stamp;
+    Eigen::Vector3d acceleration, rate;
+  };
+
+  mutable std::mutex mutex_;
+  std::deque<Measurement> measurements_;  ///< of the last second
+};
+
+}  // namespace sdvo

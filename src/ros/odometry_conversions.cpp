@@ -1,0 +1,181 @@
+#include "odometry_conversions.hpp"
+
+#include <sensor_msgs/point_cloud2_iterator.h>
+#include <tf2_eigen/tf2_eigen.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <stdexcept>
+#include <utility>
+
+namespace sdvo::ros_conversions {
+namespace {
+
+/// Variance of what is not known at all, and the floor that keeps every covariance positive.
+constexpr double kUnknownVariance = 1e6;
+constexpr double kVarianceFloor = 1e-9;
+
+/// Over a gap the mean velocity, which is all that is measured, says little of that at its end: meanwhile a vehicle may
+/// accelerate by 5 m/s^2 and 2 rad/s^2.
+Matrix6d unsteadiness(double dt) {
+  constexpr double kSteady = 0.2;  // s
+  const double gap = std::max(0.0, dt - kSteady);
+  Vector6d deviation;
+  deviation << Eigen::Vector3d::Constant(0.5 * 5.0 * gap), Eigen::Vector3d::Constant(0.5 * 2.0 * gap);
+  return deviation.cwiseAbs2().asDiagonal();
+}
+
+template <class Covariance>
+void fillCovariance(const Matrix6d& covariance, Covariance& message) {
+  Matrix6d symmetric = 0.5 * (covariance + covariance.transpose());
+  symmetric.diagonal().array() += kVarianceFloor;
+  for (int row = 0; row < 6; ++row)
+    for (int column = 0; column < 6; ++column) message[6 * row + column] = symmetric(row, column);
+}
+
+}  // namespace
+
+nav_msgs::Odometry toOdometry(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera,
+                              const OdometryFrames& frames, const Eigen::Isometry3d& T_odom_start) {
+  nav_msgs::Odometry odometry;
+  odometry.header.stamp.fromNSec(static_cast<std::uint64_t>(result.stamp));
+  odometry.header.frame_id = frames.odom;
+  odometry.child_frame_id = frames.base;
+
+  // The base starts where the core's origin, the camera's first pose, puts it.
+  const Eigen::Isometry3d T_odom_base =
+      orthonormalised(T_odom_start * T_base_camera * result.T_origin_camera * T_base_camera.inverse());
+  odometry.pose.pose = tf2::toMsg(T_odom_base);
+
+  // Perturbations of the camera, in its own axes, become those of the base; then the axes of odom.
+  const Matrix6d to_base = adjoint(T_base_camera);
+  Matrix6d to_odom_axes = Matrix6d::Zero();
+  to_odom_axes.topLeftCorner<3, 3>() = T_odom_base.linear();
+  to_odom_axes.bottomRightCorner<3, 3>() = T_odom_base.linear();
+  const Matrix6d to_pose = to_odom_axes * to_base;
+  fillCovariance(to_pose * result.pose_covariance * to_pose.transpose(), odometry.pose.covariance);
+
+  if (!result.has_motion || !(result.dt > 0.0)) {
+    fillCovariance(kUnknownVariance * Matrix6d::Identity(), odometry.twist.covariance);
+    return odometry;
+  }
+  const Vector6d twist = logSE3(T_base_camera * result.T_previous_current * T_base_camera.inverse()) / result.dt;
+  odometry.twist.twist.linear.x = twist[0];
+  odometry.twist.twist.linear.y = twist[1];
+  odometry.twist.twist.linear.z = twist[2];
+  odometry.twist.twist.angular.x = twist[3];
+  odometry.twist.twist.angular.y = twist[4];
+  odometry.twist.twist.angular.z = twist[5];
+  fillCovariance(
+      to_base * result.motion_covariance * to_base.transpose() / (result.dt * result.dt) + unsteadiness(result.dt),
+      odometry.twist.covariance);
+  return odometry;
+}
+
+nav_msgs::Odometry toNullOdometry(const ros::Time& stamp, const OdometryFrames& frames) {
+  constexpr double kNoOdometry = 9999.0;
+  nav_msgs::Odometry odometry;
+  odometry.header.stamp = stamp;
+  odometry.header.frame_id = frames.odom;
+  odometry.child_frame_id = frames.base;
+  odometry.pose.pose.orientation.w = 0.0;
+  for (std::size_t axis = 0; axis < 6; ++axis)
+    odometry.pose.covariance[7 * axis] = odometry.twist.covariance[7 * axis] = kNoOdometry;
+  return odometry;
+}
+
+Matrix6d toMotionCovariance(const nav_msgs::Odometry& odometry, double dt, const Eigen::Isometry3d& T_base_camera) {
+  Matrix6d twist;
+  for (int row = 0; row < 6; ++row)
+    for (int column = 0; column < 6; ++column) twist(row, column) = odometry.twist.covariance[6 * row + column];
+  if (!twist.allFinite()) throw std::invalid_argument("the twist's covariance is not finite");
+  const Matrix6d steady = twist - unsteadiness(dt);
+  // Of a fused odometry it never was a part.
+  if (steady.llt().info() == Eigen::Success) twist = steady;
+  const Matrix6d to_camera = adjoint(T_base_camera.inverse());
+  return to_camera * twist * to_camera.transpose() * dt * dt;
+}
+
+geometry_msgs::TransformStamped toTransform(const nav_msgs::Odometry& odometry, bool inverted) {
+  Eigen::Isometry3d T_odom_base;
+  tf2::fromMsg(odometry.pose.pose, T_odom_base);
+  geometry_msgs::TransformStamped transform = tf2::eigenToTransform(inverted ? T_odom_base.inverse() : T_odom_base);
+  transform.header = odometry.header;
+  transform.child_frame_id = odometry.child_frame_id;
+  if (inverted) std::swap(transform.header.frame_id, transform.child_frame_id);
+  return transform;
+}
+
+// The constants of the message are the values of the enum.
+static_assert(static_cast<int>(TrackingState::kWaiting) == stereo_descriptor_vo::VoInfo::WAITING);
+static_assert(static_cast<int>(TrackingState::kTracking) == stereo_descriptor_vo::VoInfo::TRACKING);
+static_assert(static_cast<int>(TrackingState::kDegraded) == stereo_descriptor_vo::VoInfo::DEGRADED);
+static_assert(static_cast<int>(TrackingState::kLost) == stereo_descriptor_vo::VoInfo::LOST);
+
+stereo_descriptor_vo::VoInfo toInfo(const OdometryResult& result,
+                                    const stereo_descriptor_vo::StereoFeatures& features) {
+  stereo_descriptor_vo::VoInfo info;
+  info.state = toString(result.state);
+  info.state_id = static_cast<std::uint8_t>(result.state);
+  info.reason = result.reason;
+  info.epoch = static_cast<std::uint32_t>(result.epoch);
+  info.detected = features.detected;
+  info.features = static_cast<std::uint32_t>(result.features);
+  info.matches = static_cast<std::uint32_t>(result.matches);
+  info.inliers = static_cast<std::uint32_t>(result.inliers);
+  info.inlier_ratio =
+      result.matches > 0 ? static_cast<float>(result.inliers) / static_cast<float>(result.matches) : 0.f;
+  info.coverage = static_cast<float>(result.coverage);
+  info.rms_reprojection_error = static_cast<float>(result.rms);
+  info.detect_time = features.detect_time;
+  info.stereo_time = features.stereo_time;
+  info.describe_time = features.describe_time;
+  info.match_time = static_cast<float>(result.match_time);
+  info.motion_time = static_cast<float>(result.motion_time);
+  info.dropped_pairs = features.dropped_pairs;
+  info.correction_translation = static_cast<float>(result.correction.head<3>().norm());
+  info.correction_rotation = static_cast<float>(result.correction.tail<3>().norm());
+  info.distance = result.distance;
+  info.keyframe_id = static_cast<std::uint32_t>(result.keyframe_id);
+  info.disparity_offset = static_cast<float>(result.disparity_offset);
+  info.disparity_offset_sigma = static_cast<float>(result.disparity_offset_sigma);
+  info.disparity_bend = static_cast<float>(result.disparity_bend);
+  info.disparity_bend_sigma = static_cast<float>(result.disparity_bend_sigma);
+  for (int axis = 0; axis < 3; ++axis) {
+    info.right_rotation[axis] = static_cast<float>(result.right_rotation[axis]);
+    info.right_rotation_sigma[axis] = static_cast<float>(result.right_rotation_sigma[axis]);
+  }
+  return info;
+}
+
+stereo_descriptor_vo::FeatureFlow toFlow(const OdometryResult& result, const StereoFeatures& features) {
+  stereo_descriptor_vo::FeatureFlow message;
+  for (const FeatureFlow& flow : result.flow) {
+    message.u_reference.push_back(flow.u_previous);
+    message.v_reference.push_back(flow.v_previous);
+    message.u.push_back(features.u[flow.current]);
+    message.v.push_back(features.v[flow.current]);
+    message.inlier.push_back(flow.inlier);
+  }
+  return message;
+}
+
+sensor_msgs::PointCloud2 toPointCloud(const std::vector<Eigen::Vector3d>& points,
+                                      const Eigen::Isometry3d& T_cloud_points) {
+  sensor_msgs::PointCloud2 cloud;
+  sensor_msgs::PointCloud2Modifier modifier(cloud);
+  modifier.setPointCloud2FieldsByString(1, "xyz");
+  modifier.resize(points.size());
+  if (points.empty()) return cloud;  // of which the iterator would take the first byte
+  sensor_msgs::PointCloud2Iterator<float> out(cloud, "x");
+  for (const Eigen::Vector3d& point : points) {
+    const Eigen::Vector3f position = (T_cloud_points * point).cast<float>();
+    for (int axis = 0; axis < 3; ++axis) out[axis] = position[axis];
+    ++out;
+  }
+  return cloud;
+}
+
+}  // namespace sdvo::ros_conversions

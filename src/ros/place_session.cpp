@@ -1,0 +1,90 @@
+#include "place_session.hpp"
+
+#include <map>
+#include <stdexcept>
+#include <utility>
+
+#include "feature_conversions.hpp"
+#include "frame_id.hpp"
+#include "odometry_conversions.hpp"
+#include "pose_conversions.hpp"
+#include "same_camera.hpp"
+#include "stamps.hpp"
+
+namespace sdvo {
+
+PlaceSession::PlaceSession(const PlaceRecognitionOptions& options, SavedPlaces saved)
+    : recognition_(options), stream_(saved.stream), located_(false) {
+  recognition_.restore(std::move(saved.places), saved.graph);
+  loaded_ = recognition_.places().rbegin()->first + 1;
+}
+
+PlaceSession::Time PlaceSession::noteTime(const ros::Time& stamp, const ros::Time& now, bool is_simulated) {
+  clock_fell_ |= last_now_ && now < *last_now_;
+  last_now_ = now;
+  if (!last_ || stamp > last_->stamp) return Time::kGoesOn;
+  if (stamp == last_->stamp) return Time::kStands;
+  continues_ = false;
+  return std::exchange(clock_fell_, false) && is_simulated ? Time::kBeganAnew : Time::kFell;
+}
+
+std::optional<PlaceReport> PlaceSession::observe(const OdometryPair& pair, const Eigen::Isometry3d& T_base_camera) {
+  const StereoFeatures features = ros_conversions::fromMessage(*pair.features);
+  refuse(features.camera, features.kind());
+  const ros::Time stamp = pair.features->header.stamp;
+  const Eigen::Isometry3d T_odom_base = ros_conversions::toPose(pair.odometry->pose.pose);
+  if (const auto expected = std::exchange(expected_, std::nullopt); expected && !recognition_.places().empty()) {
+    recognition_.expect(expected->T_map_base * T_odom_base.inverse(), expected->radius);
+    located_ = false;
+    told_ = true;
+  }
+  CameraMotion motion;
+  motion.T_odom_camera = T_odom_base * T_base_camera;
+  motion.continuous = continues_ && last_ && pair.info->session == last_->session && pair.info->epoch == last_->epoch &&
+                      pair.resumes == last_->resumes;
+  if (motion.continuous)
+    motion.covariance =
+        ros_conversions::toMotionCovariance(*pair.odometry, secondsBetween(last_->stamp, stamp), T_base_camera);
+  std::optional<PlaceReport> report = recognition_.observe(features, motion);
+  last_ = {stamp, pair.info->session, pair.info->epoch, pair.resumes, features.camera, features.kind()};
+  continues_ = true;
+  odom_frame_ = ros_conversions::cleanFrameId(pair.odometry->header.frame_id);
+  stream_ = ros_conversions::streamOf(*pair.features);
+  if (report && report->loop) located_ |= loaded_ == 0 || *report->same < loaded_;
+  return report;
+}
+
+void PlaceSession::refuseOtherCameraThan(const PlaceSession& session) const {
+  if (session.last_) refuse(session.last_->camera, session.last_->kind);
+}
+
+void PlaceSession::refuse(const StereoCamera& camera, const DescriptorKind& kind) const {
+  if (recognition_.places().empty()) return;
+  const StereoFeatures& known = recognition_.places().begin()->second.features;
+  if (!isSameCamera(camera, known.camera))
+    throw std::invalid_argument(
+        "the places are of another camera, or of another calibration of this one: call reset, or load_places of this");
+  if (kind != known.kind())
+    throw std::invalid_argument("the places are described by " + toString(known.kind()) + ", not by " + toString(kind) +
+                                ": call reset, or load_places of these");
+}
+
+ros_conversions::MapState PlaceSession::map() const {
+  ros_conversions::MapState state{recognition_.graph(), {}};
+  for (const auto& [id, place] : recognition_.places()) state.stamps[id] = place.features.stamp;
+  return state;
+}
+
+std::vector<Place> PlaceSession::places() const {
+  std::vector<Place> places;
+  for (const auto& [id, place] : recognition_.places()) places.push_back(place);
+  return places;
+}
+
+std::optional<stereo_descriptor_vo::Place> PlaceSession::message(int id, const std::string& robot) const {
+  const auto place = recognition_.places().find(id);
+  if (place == recognition_.places().end()) return std::nullopt;
+  return ros_conversions::toMessage(place->second, robot, stream_);
+}
+
+}  // namespace sdvo

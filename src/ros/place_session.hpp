@@ -1,0 +1,95 @@
+#pragma once
+
+#include <nav_msgs/Odometry.h>
+#include <stereo_descriptor_vo/StereoFeatures.h>
+#include <stereo_descriptor_vo/VoInfo.h>
+
+#include <Eigen/Geometry>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "map_conversions.hpp"
+#include "place_conversions.hpp"
+#include "places_file.hpp"
+#include "stereo_descriptor_vo/places/place_recognition.hpp"
+
+namespace sdvo {
+
+/// What the topics give for one pair, stamps equal.
+struct OdometryPair {
+  stereo_descriptor_vo::StereoFeatures::ConstPtr features;
+  nav_msgs::Odometry::ConstPtr odometry;
+  stereo_descriptor_vo::VoInfo::ConstPtr info;
+  int resumes = 0;  ///< of the subscription, until it arrived
+};
+
+/// The places and all that begins anew with them. Not for several threads at once.
+class PlaceSession {
+ public:
+  explicit PlaceSession(const PlaceRecognitionOptions& options) : recognition_(options) {}
+
+  /// Begins with the places of an earlier session. Throws std::invalid_argument when they do not belong together.
+  PlaceSession(const PlaceRecognitionOptions& options, SavedPlaces saved);
+
+  /// What a pair does to time. Stamps that fall are a new beginning with simulated time that jumped back, and nothing
+  /// but an unknown way in between when a driver restarted or the system's clock was set back.
+  enum class Time { kGoesOn, kStands, kFell, kBeganAnew };
+  Time noteTime(const ros::Time& stamp, const ros::Time& now, bool is_simulated);
+
+  /// Takes the next pair; a report where it became a key frame. Throws std::invalid_argument for another camera than
+  /// that of the places, other descriptors, and messages that do not hold together.
+  std::optional<PlaceReport> observe(const OdometryPair& pair, const Eigen::Isometry3d& T_base_camera);
+
+  /// Somebody says where the base is in the map; from the next pair on the odometry is there, and only places within
+  /// `radius` (m) of it are looked at until one is recognised.
+  void expect(const Eigen::Isometry3d& T_map_base, double radius) { expected_ = {T_map_base, radius}; }
+
+  /// Throws std::invalid_argument where the places are not of the camera and the descriptors that `session` saw last.
+  void refuseOtherCameraThan(const PlaceSession& session) const;
+
+  PlaceRecognition& recognition() { return recognition_; }
+  const PlaceRecognition& recognition() const { return recognition_; }
+  ros_conversions::MapState map() const;
+  std::vector<Place> places() const;
+  const ros_conversions::FeatureStream& stream() const { return stream_; }
+  const std::string& odomFrame() const { return odom_frame_; }
+  std::optional<stereo_descriptor_vo::Place> message(int id, const std::string& robot) const;
+
+  /// Whether it is known where in the places that were loaded the odometry is; true when none were.
+  bool isLocated() const { return located_; }
+  /// … or somebody said where.
+  bool isPlaced() const { return located_ || told_; }
+  /// Of the last optimisation, s.
+  double optimise_time = 0.0;
+
+ private:
+  /// Of the last pair observed.
+  struct Last {
+    ros::Time stamp, session;
+    std::uint32_t epoch;
+    int resumes;
+    StereoCamera camera;
+    DescriptorKind kind;
+  };
+
+  void refuse(const StereoCamera& camera, const DescriptorKind& kind) const;
+
+  PlaceRecognition recognition_;
+  std::string odom_frame_;
+  ros_conversions::FeatureStream stream_;
+  std::optional<Last> last_;
+  std::optional<ros::Time> last_now_;
+  bool clock_fell_ = false;  ///< since the stamps did
+  bool continues_ = false;   ///< the next pair's motion since the last one is known
+  int loaded_ = 0;           ///< places with smaller ids were loaded
+  bool located_ = true;
+  bool told_ = false;
+  struct Expectation {
+    Eigen::Isometry3d T_map_base;
+    double radius;
+  };
+  std::optional<Expectation> expected_;
+};
+
+}  // namespace sdvo

@@ -1,0 +1,103 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr double kStep = 0.8;  // m between pairs
+constexpr double kDegree = M_PI / 180.0;
+
+/// Poses of a camera that looks ahead, its way turned by `pitch(i)` (rad, upwards) and `yaw(i)` a pair.
+template <class Pitch, class Yaw>
+std::vector<Eigen::Isometry3d> drive(int pairs, const Pitch& pitch, const Yaw& yaw) {
+  std::vector<Eigen::Isometry3d> poses(1, Eigen::Isometry3d::Identity());
+  double heading = 0.0;
+  for (int i = 1; i < pairs; ++i) {
+    heading += yaw(i);
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    pose.linear() =
+        (Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(pitch(i), Eigen::Vector3d::UnitX()))
+            .toRotationMatrix();
+    pose.translation() = poses.back().translation() + pose.linear() * Eigen::Vector3d(0.0, 0.0, kStep);
+    poses.push_back(pose);
+  }
+  return poses;
+}
+
+std::vector<OdometryResult> follow(const std::vector<Eigen::Isometry3d>& poses, bool planar) {
+  static const synthetic::World world = synthetic::randomWorld(3, 25000, {-60.0, -8.0, -10.0}, {60.0, 4.0, 130.0});
+  VisualOdometryOptions options;
+  options.planar.planar = planar;
+  VisualOdometry odometry(options);
+  std::vector<OdometryResult> results;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    synthetic::Sighting sighting;
+    sighting.noise = 0.4;
+    sighting.strangers = 40;
+    sighting.max_depth = 25.0;
+    sighting.seed = 100 + static_cast<unsigned>(i);
+    results.push_back(
+        odometry.update(synthetic::observe(world, synthetic::camera(), poses[i].inverse(),
+                                           1000000000 + static_cast<std::int64_t>(i) * 100000000, sighting)));
+  }
+  return results;
+}
+
+double largestHeight(const std::vector<OdometryResult>& results) {
+  double largest = 0.0;
+  for (const OdometryResult& result : results)
+    largest = std::max(largest, std::abs(result.T_origin_camera.translation().y()));
+  return largest;
+}
+
+double errorAtEnd(const std::vector<OdometryResult>& results, const std::vector<Eigen::Isometry3d>& poses) {
+  return (results.back().T_origin_camera.translation() - poses.back().translation()).norm();
+}
+
+TEST(PlanarOdometry, OnAFlatFloorTheHeightStaysAndTheRestIsNoWorse) {
+  const auto poses = drive(
+      130, [](int) { return 0.0; }, [](int i) { return 0.01 * std::sin(0.1 * i); });
+  const auto planar = follow(poses, true), free = follow(poses, false);
+  EXPECT_LT(largestHeight(planar), 0.01) << "m, after 100 m";
+  EXPECT_LT(largestHeight(planar), 0.5 * largestHeight(free));
+  EXPECT_LT(errorAtEnd(planar, poses), errorAtEnd(free, poses) + 0.02);
+  for (const OdometryResult& result : planar) EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
+  // What the constraint gives is in the covariance: y of the camera is down.
+  const PlanarOptions options;
+  EXPECT_LT(std::sqrt(planar.back().pose_covariance(1, 1)), options.planar_height_sigma);
+  EXPECT_LT(planar.back().pose_covariance(3, 3), free.back().pose_covariance(3, 3));
+  EXPECT_GT(std::sqrt(planar.back().pose_covariance(2, 2)), 1e-3) << "of the way it says nothing";
+}
+
+TEST(PlanarOdometry, ARampIsToldOfAndALevelStretchBehindItIsAnotherFloor) {
+  const auto onRamp = [](int i) { return i >= 40 && i < 60; };
+  const auto poses = drive(
+      110, [&](int i) { return onRamp(i) ? 5.0 * kDegree : 0.0; }, [](int) { return 0.0; });
+  const auto results = follow(poses, true);
+  const double height = poses.back().translation().y();
+  ASSERT_LT(height, -1.0) << "upwards";
+  EXPECT_LT(errorAtEnd(results, poses), 0.1);
+  int floors = 0;
+  for (int i = 1; i < 110; ++i) {
+    const OdometryResult& result = results[static_cast<std::size_t>(i)];
+    ASSERT_TRUE(result.has_pose) << i << ": " << result.reason;
+    EXPECT_LT((result.T_origin_camera.translation() - poses[static_cast<std::size_t>(i)].translation()).norm(), 0.15)
+        << i;
+    if (i > 42 && i < 60) {
+      EXPECT_NE(result.reason.find("off the floor"), std::string::npos) << i << ": " << result.reason;
+      EXPECT_GT(result.pose_covariance(1, 1), 0.0);
+    }
+    floors += result.reason.find("this is the floor from now on") != std::string::npos;
+  }
+  EXPECT_EQ(floors, 1);
+  EXPECT_EQ(results.back().reason, "");
+}
+
+}  // namespace
+}  // namespace sdvo

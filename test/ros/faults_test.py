@@ -1,0 +1,357 @@
+#!/usr/bin/python3
+"""What operators meet, without a data set: a camera that moves past made-up walls, with a clock of its own beside the system's."""
+
+import itertools
+import os
+import shutil
+import socket
+import sys
+import tempfile
+import threading
+import time
+
+import dynamic_reconfigure.client
+import numpy as np
+import rospy
+import rostest
+from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nodelet.srv import NodeletLoad, NodeletUnload
+from sensor_msgs.msg import Imu, PointCloud2
+from std_srvs.srv import Empty, Trigger
+from tf2_msgs.msg import TFMessage
+
+from kitti_replay import EPOCH, PACKAGE, Collector, matrix_of, wait_until
+from made_up_sequence import STEP, MadeUpSequence
+from pipeline_case import PipelineCase
+from stereo_descriptor_vo.msg import MapGraph, PlaceInfo, StereoFeatures, VoInfo
+from stereo_descriptor_vo.srv import SavePlaces, SaveTrajectory
+
+PAIRS = 40
+
+
+class Faults(PipelineCase):
+    begin = 0  # of the diagnostics looked at
+
+    @classmethod
+    def setUpClass(cls):
+        super().setUpClass(MadeUpSequence(PAIRS))
+
+    def config(self, text):
+        """A file of parameters."""
+        file = tempfile.NamedTemporaryFile('w', suffix='.yaml')
+        self.addCleanup(file.close)
+        file.write(text)
+        file.flush()
+        return file.name
+
+    def folder(self):
+        directory = tempfile.mkdtemp(prefix='sdvo_faults_')
+        self.addCleanup(shutil.rmtree, directory, ignore_errors=True)
+        return directory
+
+    def call(self, name, service_type, *arguments):
+        return rospy.ServiceProxy('%s/%s' % (self.namespace, name), service_type)(*arguments)
+
+    def position(self, k=-1):
+        return matrix_of(self.odometry[k].pose.pose)[:3, 3]
+
+    def test_a_driver_that_restarts_keeps_pose_and_places(self):
+        """Its stamps begin again near zero while the system's clock goes on, and a map is loaded."""
+        file = os.path.join(self.folder(), 'map.bag')
+        config = self.config('place_recognition: {keyframe_distance: 0.1, keyframe_angle: 5.0}\n')
+        self.start(config=config, loop_closing='true', queue_size=5, odometry_queue_size=5)
+        places = self.keep(Collector(self.namespace + '/place_info', PlaceInfo))
+        self.assertTrue(wait_until(lambda: self.pipeline.is_connected((places, ))))
+        for i in range(30):
+            self.feed(i)
+        self.assertTrue(wait_until(lambda: len(places) >= 5), len(places))
+        self.assertTrue(self.call('place_recognition/save_places', SavePlaces, file).success)
+        self.tearDown()
+        self.setUp()
+
+        self.start(config=config, loop_closing='true', places_file=file, queue_size=5, odometry_queue_size=5)
+        places = self.keep(Collector(self.namespace + '/place_info', PlaceInfo))
+        self.assertTrue(wait_until(lambda: self.pipeline.is_connected((places, ))))
+        for i in range(20):
+            self.assertEqual(self.feed(i).state, 'TRACKING')
+        self.assertTrue(wait_until(lambda: len(places) >= 3), len(places))
+        known, epoch, answered, last = places[-1].places, self.info[-1].epoch, len(self.info), self.position()
+        self.assertGreater(known, 5)
+        self.assertGreater(np.linalg.norm(last), 15 * STEP)
+
+        # The first pair of another time waits for the second one to confirm it.
+        boot = -10 * EPOCH + 2.0  # in tenths of a second
+        self.camera.publish(*self.camera.messages(20, time_of=boot))
+        self.camera.publish(*self.camera.messages(21, time_of=boot + 1))
+        self.assertTrue(wait_until(lambda: len(self.info) == answered + 2), self.rosout.warnings)
+        for i in range(22, 30):
+            self.feed(i, time_of=boot + i - 20)
+        self.assertEqual({info.epoch for info in self.info[answered:]}, {epoch + 1})
+        self.assertLess(self.info[-1].header.stamp, rospy.Time(10))
+        self.assertTrue(wait_until(lambda: len(self.odometry) == answered + 10))
+        np.testing.assert_allclose(self.position(answered), last, atol=1e-9)
+        self.assertAlmostEqual(np.linalg.norm(self.position() - self.position(answered)), 9 * STEP, delta=STEP)
+        self.assertTrue(wait_until(lambda: len(places) > 0 and places[-1].header.stamp < rospy.Time(10)))
+        self.assertGreater(places[-1].places, known)
+        self.assertEqual([w for w in self.rosout.warnings if 'forgotten' in w or 'starts again' in w], [])
+        self.assertEqual(self.rosout.errors, [])
+        self.assert_alive()
+
+    def test_a_slow_disk_does_not_hold_pairs_up(self):
+        self.start()
+        for i in range(3):
+            self.feed(i)
+        path = os.path.join(self.folder(), 'poses.txt')
+        os.mkfifo(path + '.partial')  # whoever writes to it waits for a reader
+        answers = []
+        writer = threading.Thread(target=lambda: answers.append(
+            self.call('visual_odometry/save_trajectory', SaveTrajectory, path, 'tum')), daemon=True)
+        writer.start()
+        try:
+            self.assertFalse(wait_until(lambda: answers, 0.5))
+            for i in range(3, 6):
+                self.assertEqual(self.feed(i).state, 'TRACKING')
+        finally:
+            with open(path + '.partial') as reader:
+                lines = reader.readlines()
+            writer.join(10)
+        self.assertEqual((len(lines), answers[0].success), (3, True), answers)
+
+    def test_approximate_pairs_are_not_one_frame_late(self):
+        self.start(approximate_sync='true')
+        for i in range(4):
+            images, infos = self.camera.messages(i)
+            for message in (images[1], infos[1]):
+                message.header.stamp += rospy.Duration.from_sec(0.002)
+            self.assertEqual(self.feed_messages(images, infos).state, 'TRACKING')
+
+    def test_nothing_waits_for_a_full_packet(self):
+        """TCP_NODELAY, as a subscriber on another machine asks for."""
+        publisher = rospy.Publisher(self.namespace + '/stereo_features', StereoFeatures, queue_size=1)
+        self.addCleanup(publisher.unregister)
+        self.start(loop_closing='true')
+
+        def delays():
+            return [not connection.socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
+                    for connection in publisher.impl.connections if connection.endpoint_id == self.pipeline.manager]
+        self.assertTrue(wait_until(lambda: len(delays()) == 1 and self.is_sent_to_pipeline(publisher)))
+        self.assertEqual(delays(), [False])
+
+    def test_a_map_that_was_loaded_is_shown_before_the_first_pair(self):
+        file = os.path.join(self.folder(), 'map.bag')
+        config = self.config('place_recognition: {keyframe_distance: 0.1, keyframe_angle: 5.0}\n')
+        self.start(config=config, loop_closing='true')
+        for i in range(12):
+            self.feed(i)
+        self.assertTrue(wait_until(lambda: self.call('place_recognition/save_places', SavePlaces, file).success))
+        self.tearDown()
+        self.setUp()
+        graph = self.keep(Collector(self.namespace + '/map_graph', MapGraph))
+        self.start(config=config, loop_closing='true', places_file=file)
+        self.assertTrue(wait_until(lambda: len(graph) > 0))
+        self.assertGreater(len(graph[0].nodes), 1)
+
+    def statuses(self, node, task):
+        """Those of that name on /diagnostics since the last run began."""
+        name = '%s/%s: %s' % (self.namespace[1:], node, task)
+        return [(status.level, status.message) for array in list(self.diagnostics)[self.begin:] for status in array.status
+                if status.name.endswith(name)]
+
+    def expect(self, node, task, level, *words):
+        self.assertTrue(wait_until(lambda: any(found == level and all(word in message for word in words)
+                                               for found, message in self.statuses(node, task))), self.statuses(node, task))
+
+    def run_for(self, seconds, damage=lambda images: None):
+        """Pairs at 10 Hz of wall time, there and back, until the time is over."""
+        end, self.begin = time.time() + seconds, len(self.diagnostics)
+        while time.time() < end:
+            k = self.shown = getattr(self, 'shown', -1) + 1
+            i = k % (2 * PAIRS - 2)
+            images, infos = self.camera.messages(min(i, 2 * PAIRS - 2 - i), time_of=k)
+            damage(images)
+            self.camera.publish(images, infos)
+            time.sleep(0.1)
+
+    def test_diagnostics_name_the_cause(self):
+        ok, warn, error = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
+        self.start(config=self.config('{stereo_features: {max_silence: 3.0, diagnostics: {max_load: 1.0}}, '
+                                      'visual_odometry: {max_silence: 3.0, diagnostics: {max_load: 1.0, max_latency: 3600.0}}}\n'))
+        self.expect('stereo_features', 'input rate', warn, 'no pairs yet on', 'left/image_rect')
+        self.expect('visual_odometry', 'input rate', warn, 'no features yet on')
+        self.expect('stereo_features', 'input rate', error, 'no pairs yet on')
+
+        self.run_for(6.0)
+        for task in ('input rate', 'synchronisation', 'exposure', 'features'):
+            self.expect('stereo_features', task, ok)
+        self.expect('visual_odometry', 'input rate', ok, 'features a second')
+        self.expect('visual_odometry', 'odometry', ok, 'TRACKING')
+
+        def darken(images):
+            for image in images:
+                image.data = bytes(byte // 32 for byte in image.data)
+        self.run_for(3.0, darken)
+        self.expect('stereo_features', 'exposure', warn, 'too dark')
+        self.expect('stereo_features', 'features', warn)
+
+        def swap(images):
+            images[0].data, images[1].data = images[1].data, images[0].data
+        self.run_for(3.0, swap)
+        self.expect('stereo_features', 'features', error, 'not a rectified pair')
+        self.expect('stereo_features', 'exposure', ok)
+
+        self.expect('stereo_features', 'input rate', error, 'no pairs for')
+        self.expect('visual_odometry', 'odometry', error, 'no features for', 'the last state was')
+        self.assertTrue(self.call('visual_odometry/pause', Trigger).success)
+        for task in ('odometry', 'input rate'):
+            self.expect('visual_odometry', task, ok, 'paused')
+        self.features.close()
+        self.expect('stereo_features', 'input rate', ok, 'nobody listens')
+
+    def test_what_was_reconfigured_holds_after_a_respawn(self):
+        self.start()
+        before = self.feed(0)
+        client = dynamic_reconfigure.client.Client(self.namespace + '/stereo_features', timeout=60)
+        client.update_configuration({'detector/max_features': 200})
+        client.close()
+        self.assertEqual(rospy.get_param(self.namespace + '/stereo_features/detector/max_features'), 200)
+        name = self.namespace + '/stereo_features'
+        self.assertTrue(rospy.ServiceProxy(self.pipeline.manager + '/unload_nodelet', NodeletUnload)(name).success)
+        self.assertTrue(wait_until(lambda: not self.camera.has_subscribers()))
+        load = rospy.ServiceProxy(self.pipeline.manager + '/load_nodelet', NodeletLoad)
+        self.assertTrue(load(name, PACKAGE + '/StereoFeatures', [], [], [], '').success)
+        self.assertTrue(wait_until(lambda: self.camera.is_subscribed() and self.pipeline.is_connected((self.features, ))))
+        times = itertools.count(1)
+        self.assertTrue(wait_until(lambda: self.is_answered(1, time_of=next(times))))
+        self.assertGreater(before.detected, 250)
+        self.assertEqual(self.info[-1].detected, 200)
+
+    def test_at_most_so_many_pairs_a_second(self):
+        self.start(config=self.config('stereo_features: {max_rate: 5.0, opencv_threads: 1}\n'))
+        for i in range(0, 20, 2):
+            self.feed(i)
+            self.camera.publish(*self.camera.messages(i + 1))
+        self.assertFalse(wait_until(lambda: len(self.info) > 10, 0.5))
+        self.assertEqual({info.dropped_pairs for info in self.info}, {0})
+
+    def test_states_and_the_map_are_there_for_others(self):
+        self.start(config=self.config('visual_odometry: {publish_null_when_lost: true}\n'))
+        pose = self.keep(Collector(self.namespace + '/pose', PoseWithCovarianceStamped))
+        cloud = self.keep(Collector(self.namespace + '/map_points', PointCloud2))
+        self.assertTrue(wait_until(lambda: self.pipeline.is_connected((pose, cloud))))
+        for i in range(5):
+            self.assertEqual(self.feed(i).state_id, VoInfo.TRACKING)
+        self.assertTrue(wait_until(lambda: len(pose) == 5 and len(cloud) > 0 and cloud[-1].header.stamp == pose[-1].header.stamp))
+        self.assertEqual(pose[-1].pose.covariance, self.odometry[-1].pose.covariance)
+        self.assertEqual(cloud[-1].header.frame_id, 'odom')
+        # Two walls across the way ahead, 2 and 4 m away; the camera looks along x.
+        ahead = np.frombuffer(cloud[-1].data, np.float32).reshape(-1, cloud[-1].point_step // 4)[:, 0]
+        self.assertGreater(len(ahead), 200)
+        self.assertGreater(np.mean((abs(ahead - 2) < 0.1) | (abs(ahead - 4) < 0.2)), 0.9)
+
+        for k in range(5, 9):
+            images, infos = self.camera.messages(5, time_of=k)
+            for image in images:
+                image.data = bytes(len(image.data))
+            self.camera.publish(images, infos)
+            self.assertTrue(wait_until(lambda: self.info.has(images[0].header.stamp)))
+        self.assertEqual(self.info[-1].state_id, VoInfo.LOST)
+        self.assertTrue(wait_until(lambda: self.odometry.has(self.info[-1].header.stamp)))
+        null = self.odometry[-1]
+        self.assertEqual((null.pose.pose.orientation.w, null.pose.covariance[0]), (0.0, 9999.0))
+
+    def test_the_first_pose_has_roll_and_pitch_of_gravity(self):
+        self.start(config=self.config('visual_odometry: {use_imu: true}\n'))
+        imu = rospy.Publisher(self.namespace + '/imu', Imu, queue_size=500)
+        self.addCleanup(imu.unregister)
+        self.assertTrue(wait_until(lambda: self.is_sent_to_pipeline(imu)))
+        roll = 0.1
+        for k in range(111):
+            message = Imu()
+            message.header.frame_id = 'base_link'
+            message.header.stamp = rospy.Time.from_sec(EPOCH - 1.1 + 0.01 * k)
+            message.linear_acceleration.y, message.linear_acceleration.z = 9.81 * np.sin(roll), 9.81 * np.cos(roll)
+            imu.publish(message)
+        times = itertools.count(0)
+        self.assertTrue(wait_until(lambda: self.is_answered(0, time_of=next(times)) and len(self.odometry) > 0))
+        up = matrix_of(self.odometry[0].pose.pose)[:3, :3].T @ [0, 0, 1]
+        np.testing.assert_allclose(up, [0, np.sin(roll), np.cos(roll)], atol=1e-3)
+        self.assertNotIn('those of initial_pose', ' '.join(self.rosout.warnings))
+
+    def test_a_map_is_only_localised_in_and_a_pose_is_a_hint(self):
+        file = os.path.join(self.folder(), 'map.bag')
+        small = '{keyframe_distance: 0.1, keyframe_angle: 5.0%s}\n'
+        self.start(config=self.config('place_recognition: ' + small % ''), loop_closing='true')
+        for i in range(40):
+            self.feed(i)
+        self.assertTrue(wait_until(lambda: self.call('place_recognition/save_places', SavePlaces, file).success))
+        self.tearDown()
+        self.setUp()
+        places = self.keep(Collector(self.namespace + '/place_info', PlaceInfo))
+        pose = self.keep(Collector(self.namespace + '/map_pose', PoseWithCovarianceStamped))
+        graph = self.keep(Collector(self.namespace + '/map_graph', MapGraph))
+        tf = self.keep(Collector('/tf', TFMessage))
+        self.start(config=self.config('place_recognition: ' + small % ', localisation_only: true'), loop_closing='true',
+                   places_file=file, odom_frame_id='odom_2')
+        self.assertTrue(wait_until(lambda: self.pipeline.is_connected((places, pose, graph)) and len(graph) > 0))
+        nodes = {node.id: node.pose for node in graph[0].nodes}
+
+        def map_to_odom():
+            found = [t for m in list(tf) for t in m.transforms if t.child_frame_id == 'odom_2']
+            return matrix_of(found[-1].transform) if found else None
+        # Half a metre to the side of where the first session began; told wrong by some centimetres.
+        first = round(0.2 / STEP)
+        hint = PoseWithCovarianceStamped()
+        hint.header.frame_id = 'map'
+        hint.pose.pose.position.y = -0.2 + 0.05
+        hint.pose.pose.orientation.w = 1.0
+        publisher = rospy.Publisher('/initialpose', PoseWithCovarianceStamped, queue_size=1)
+        self.addCleanup(publisher.unregister)
+        self.assertTrue(wait_until(lambda: self.is_sent_to_pipeline(publisher)))
+        publisher.publish(hint)
+        time.sleep(0.5)
+        self.feed(first)
+        self.assertTrue(wait_until(lambda: map_to_odom() is not None))
+        self.assertFalse(places[0].located)
+        np.testing.assert_allclose(map_to_odom()[:3, 3], [0, -0.15, 0], atol=1e-6)
+        for i in range(first + 1, 40):
+            self.feed(i)
+        self.assertTrue(wait_until(lambda: places[-1].located), [(p.same, p.reason) for p in places])
+        self.assertTrue(wait_until(lambda: len(pose) > 0 and pose[-1].header.stamp == places[-1].header.stamp))
+        true = -STEP * round((pose[-1].header.stamp.to_sec() - EPOCH) * 10)
+        self.assertAlmostEqual(pose[-1].pose.pose.position.y, true, delta=0.02)
+        covariance = np.array(pose[-1].pose.covariance).reshape(6, 6)
+        self.assertTrue(0 < covariance[1, 1] < 0.1**2, covariance[1, 1])
+        # What was loaded has not moved, and cannot be saved anew.
+        self.assertTrue(wait_until(lambda: len(graph[-1].nodes) > len(nodes)))
+        for node in graph[-1].nodes:
+            if node.id in nodes:
+                self.assertEqual(node.pose, nodes[node.id])
+        answer = self.call('place_recognition/save_places', SavePlaces, file)
+        self.assertFalse(answer.success)
+        self.assertIn('localisation_only', answer.message)
+
+    def test_what_a_flight_controller_is_sent(self):
+        """As mavros' odometry plugin takes it: REP-147's frames, pose in the parent, twist in the child, both covariances."""
+        self.start(odom='/drone/mavros/odometry/out', launch='mavros.launch', mavros='/drone/mavros')
+        for i in range(4):
+            info = self.feed(i)
+        message = self.odometry[-1]
+        self.assertEqual((message.header.frame_id, message.child_frame_id), ('odom', 'base_link'))
+        self.assertEqual(message.header.stamp, self.camera.messages(3)[0][0].header.stamp)
+        # To the right of the way ahead: -y of both frames.
+        self.assertAlmostEqual(message.pose.pose.position.y, -3 * STEP, delta=0.2 * STEP)
+        self.assertAlmostEqual(message.twist.twist.linear.y, -STEP / 0.1, delta=0.2)
+        for covariance in (message.pose.covariance, message.twist.covariance):
+            matrix = np.array(covariance).reshape(6, 6)
+            np.testing.assert_allclose(matrix, matrix.T)
+            self.assertGreater(np.linalg.eigvalsh(matrix)[0], 0.0)
+        # The reset counter: one more after every discontinuity.
+        self.call('visual_odometry/reset', Empty)
+        self.assertEqual(self.feed(4).epoch, info.epoch + 1)
+        self.assertEqual(self.odometry[-1].pose.pose.position.y, 0.0)
+
+
+if __name__ == '__main__':
+    rospy.init_node('faults_test')
+    rostest.rosrun(PACKAGE, 'faults', Faults, sys.argv)

@@ -1,0 +1,111 @@
+"""The launched pipeline with a camera that is the test itself: what the tests of its faults share."""
+
+import time
+import unittest
+
+import rospy
+import tf2_ros
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from geometry_msgs.msg import TransformStamped
+from nav_msgs.msg import Odometry
+
+from kitti_replay import FRAME, Camera, Collector, Pipeline, Rosout, SimulatedClock, links, wait_until
+from stereo_descriptor_vo.msg import StereoFeatures, VoInfo
+
+SILENCE = 1.0  # s; a pair takes a tenth of it
+
+
+def camera_transform(frame):
+    """Of a camera that looks ahead, at the base's origin."""
+    transform = TransformStamped()
+    transform.header.frame_id = 'base_link'
+    transform.child_frame_id = frame
+    q = transform.transform.rotation
+    q.x, q.y, q.z, q.w = -0.5, 0.5, -0.5, 0.5  # optical: z forward, x right
+    return transform
+
+
+class PipelineCase(unittest.TestCase):
+    """Every test has a namespace and a pipeline of its own."""
+
+    tests = 0
+
+    @classmethod
+    def setUpClass(cls, sequence):
+        cls.sequence = sequence
+        cls.clock = SimulatedClock()
+        cls.broadcaster = tf2_ros.StaticTransformBroadcaster()
+        cls.broadcaster.sendTransform(camera_transform(FRAME))
+
+    def setUp(self):
+        PipelineCase.tests += 1
+        self.namespace = '/case_%d' % PipelineCase.tests
+        self.closeables = []
+
+    def tearDown(self):
+        for closeable in reversed(self.closeables):
+            closeable.close()
+
+    def keep(self, closeable):
+        self.closeables.append(closeable)
+        return closeable
+
+    def start(self, odom=None, **arguments):
+        """Launches the pipeline and returns when everything is connected to it. `odom`: the topic's name, where it is another."""
+        self.odometry = self.keep(Collector(odom or self.namespace + '/odom', Odometry))
+        self.info = self.keep(Collector(self.namespace + '/vo_info', VoInfo))
+        self.features = self.keep(Collector(self.namespace + '/stereo_features', StereoFeatures))
+        self.diagnostics = self.keep(Collector('/diagnostics', DiagnosticArray))
+        self.rosout = self.keep(Rosout(self.namespace))
+        self.camera = self.keep(Camera(self.namespace, self.sequence, self.clock))
+        self.pipeline = self.keep(Pipeline(self.namespace, **arguments))
+        self.assertTrue(wait_until(lambda: self.camera.is_subscribed() and
+                                   self.pipeline.is_connected((self.odometry, self.info, self.features)), 60),
+                        'the pipeline did not start')
+        self.pid = self.pipeline.pid()
+        self.assertIsNotNone(self.pid)
+
+    def feed(self, i, **options):
+        """Publishes pair i and returns the VoInfo it gives."""
+        return self.feed_messages(*self.camera.messages(i, **options))
+
+    def is_answered(self, i, **options):
+        """Whether pair i gives a VoInfo within a while."""
+        images, infos = self.camera.messages(i, **options)
+        self.camera.publish(images, infos)
+        return wait_until(lambda: self.info.has(images[0].header.stamp), SILENCE)
+
+    def feed_messages(self, images, infos):
+        """Returns when all that belongs to the pair has arrived: topics are ordered in themselves, not among each other."""
+        stamp = images[0].header.stamp
+        answers, features, poses = len(self.info), len(self.features), len(self.odometry)
+        self.camera.publish(images, infos)
+        self.assertTrue(wait_until(lambda: len(self.info) > answers), 'the pair at %.1f s got no answer' % stamp.to_sec())
+        info = self.info[answers]
+        self.assertEqual(info.header.stamp, stamp)
+        self.assertTrue(wait_until(lambda: any(m.header.stamp == stamp for m in self.features[features:])))
+        if info.state in ('TRACKING', 'DEGRADED'):
+            self.assertTrue(wait_until(lambda: len(self.odometry) > poses))
+        return info
+
+    def expect_error(self, publish, *words):
+        """What `publish` sends must be answered by an error that holds these words, and by nothing else."""
+        features, odometry = len(self.features), len(self.odometry)
+        publish()
+        self.assertTrue(wait_until(lambda: self.rosout.said(*words)), 'no error on /rosout with %s, only %s' %
+                        (words, self.rosout.errors))
+        time.sleep(0.2)
+        self.assertEqual((len(self.features), len(self.odometry)), (features, odometry))
+
+    def diagnosis(self, task='odometry'):
+        """The newest status of a task of ours on /diagnostics."""
+        name = '%s/visual_odometry: %s' % (self.namespace, task)
+        found = [status for array in list(self.diagnostics) for status in array.status if status.name.endswith(name[1:])]
+        return found[-1] if found else DiagnosticStatus()
+
+    def is_sent_to_pipeline(self, publisher):
+        """Whether the messages of a publisher of ours reach the nodelets."""
+        return ('out', publisher.resolved_name, self.pipeline.manager) in links(rospy.get_name())
+
+    def assert_alive(self):
+        self.assertEqual(self.pipeline.pid(), self.pid, 'the nodelet manager died')

@@ -1,0 +1,57 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "../../src/ros/gravity_track.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr std::int64_t kMillisecond = 1000000;
+const Eigen::Vector3d kStill = Eigen::Vector3d::Zero();
+
+/// A second and a bit of 100 Hz, with noise that averages out.
+void stand(GravityTrack& track, const Eigen::Vector3d& acceleration, const Eigen::Vector3d& rate = kStill) {
+  for (int i = 0; i <= 110; ++i)
+    track.add((5000 + 10 * i) * kMillisecond, acceleration + Eigen::Vector3d::Constant(i % 2 ? 0.1 : -0.1), rate);
+}
+
+TEST(GravityTrack, WhatIsMeasuredWhileStandingIsUp) {
+  GravityTrack track;
+  const Eigen::Vector3d tilted = 9.81 * Eigen::Vector3d(0.0, std::sin(0.2), std::cos(0.2));
+  stand(track, tilted);
+  ASSERT_TRUE(track.up());
+  EXPECT_LT((*track.up() - tilted.normalized()).norm(), 1e-3);
+}
+
+TEST(GravityTrack, SaysNothingOfLessThanASecond) {
+  GravityTrack track;
+  EXPECT_FALSE(track.up());
+  for (int i = 0; i < 100; ++i) track.add(10 * i * kMillisecond, {0.0, 0.0, 9.81}, kStill);
+  EXPECT_FALSE(track.up());
+  track.add(1000 * kMillisecond, {0.0, 0.0, 9.81}, kStill);
+  EXPECT_TRUE(track.up());
+  track.add(0, {0.0, 0.0, 9.81}, kStill);  // begins anew
+  EXPECT_FALSE(track.up());
+}
+
+TEST(GravityTrack, SaysNothingOfASensorThatMoves) {
+  GravityTrack turns, accelerates, shakes, is_broken;
+  stand(turns, {0.0, 0.0, 9.81}, {0.0, 0.0, 0.3});
+  stand(accelerates, {4.0, 0.0, 9.81});
+  for (int i = 0; i <= 110; ++i) shakes.add(10 * i * kMillisecond, {i % 2 ? 2.0 : -2.0, 0.0, 9.81}, kStill);
+  stand(is_broken, Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
+  for (const GravityTrack* track : {&turns, &accelerates, &shakes, &is_broken}) EXPECT_FALSE(track->up());
+}
+
+TEST(GravityTrack, GoesByTheLastSecond) {
+  GravityTrack track;
+  for (int i = 0; i <= 100; ++i) track.add(10 * i * kMillisecond, {0.0, 0.0, 9.81}, {0.0, 0.0, 1.0});
+  EXPECT_FALSE(track.up());
+  for (int i = 101; i <= 205; ++i) track.add(10 * i * kMillisecond, {0.0, 0.0, 9.81}, kStill);
+  EXPECT_TRUE(track.up());
+}
+
+}  // namespace
+}  // namespace sdvo

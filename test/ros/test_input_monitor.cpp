@@ -1,0 +1,75 @@
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <string>
+#include <thread>
+
+#include "../../src/ros/input_monitor.hpp"
+#include "message_samples.hpp"
+
+namespace sdvo {
+namespace {
+
+using Level = WallUpdater::Level;
+using ros_conversions::contains;
+
+struct Diagnosis {
+  int level;
+  std::string text;
+};
+
+Diagnosis diagnose(InputMonitor& monitor) {
+  WallUpdater::Status status;
+  monitor.diagnose(status);
+  return {status.level, status.message};
+}
+
+void sleep(double seconds) {
+  std::this_thread::sleep_for(std::chrono::duration<double>(seconds));
+}
+
+TEST(InputMonitor, WarnsAtTheStartUntilItShouldHaveCome) {
+  InputMonitor monitor("pairs", "/left", 0.2, {});
+  EXPECT_EQ(diagnose(monitor).level, Level::WARN);
+  EXPECT_TRUE(contains(diagnose(monitor).text, "no pairs yet on /left"));
+  sleep(0.25);
+  EXPECT_EQ(diagnose(monitor).level, Level::ERROR);
+  monitor.note();
+  EXPECT_EQ(diagnose(monitor).level, Level::OK);
+  sleep(0.25);
+  EXPECT_EQ(diagnose(monitor).level, Level::ERROR);
+  EXPECT_TRUE(contains(diagnose(monitor).text, "no pairs for"));
+}
+
+TEST(InputMonitor, SilenceIsNoFaultWhileNobodyWantsInput) {
+  InputMonitor monitor("pairs", "/left", 0.05, {});
+  monitor.note();
+  monitor.noteIdle("paused");
+  sleep(0.1);
+  EXPECT_EQ(diagnose(monitor).level, Level::OK);
+  EXPECT_EQ(diagnose(monitor).text, "paused");
+  monitor.noteIdle("");
+  EXPECT_EQ(diagnose(monitor).level, Level::WARN) << "as at the start";
+}
+
+TEST(InputMonitor, RatesOutOfTheRangeAreWarnedOf) {
+  RateOptions slow, fast, fits;
+  slow.min_rate = 1e5, slow.max_rate = 1e9;
+  fast.min_rate = 0.0, fast.max_rate = 0.1;
+  fits.min_rate = 0.0, fits.max_rate = 1e9;
+  InputMonitor is_slow("pairs", "/left", 5.0, slow), is_fast("pairs", "/left", 5.0, fast),
+      is_fine("pairs", "/left", 5.0, fits);
+  for (InputMonitor* monitor : {&is_slow, &is_fast, &is_fine})
+    for (int i = 0; i < 3; ++i) {
+      monitor->note();
+      sleep(0.01);
+    }
+  EXPECT_EQ(diagnose(is_slow).level, Level::WARN);
+  EXPECT_TRUE(contains(diagnose(is_slow).text, "only"));
+  EXPECT_EQ(diagnose(is_fast).level, Level::WARN);
+  EXPECT_TRUE(contains(diagnose(is_fast).text, "at most"));
+  EXPECT_EQ(diagnose(is_fine).level, Level::OK);
+}
+
+}  // namespace
+}  // namespace sdvo
