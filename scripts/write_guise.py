@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/env python3
 """Writes a stereo drive in KITTI layout in another guise: the same images in another order, turned, cut or spoilt, with the
 calibration and the truth that follow from the drive's own. An odometry should not care.
 

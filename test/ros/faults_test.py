@@ -1,4 +1,4 @@
-#!/usr/bin/python3
+#!/usr/bin/env python3
 """What operators meet, without a data set: a camera that moves past made-up walls, with a clock of its own beside the system's."""
 
 import itertools
