@@ -29,6 +29,9 @@ CalibrationBelief CalibrationFilter::prior(int oldest_id) {
   prior_.information_mean = prior_.information * mean;
   const RigCalibration::Matrix information = prior_.information + past_.information;
   CalibrationBelief belief{information.inverse() * (prior_.information_mean + past_.information_mean), information};
+  if (options_.enabled)
+    belief.certain_information =
+        informationOf(RigCalibration::Vector::Constant(options_.prior_sigma)) + past_.information;
   if (commons_ >= kFewestCommons) belief.common_sigma = std::sqrt(kAlike * common_square_);
   return belief;
 }

@@ -302,6 +302,9 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
   // Of the last linearisation, one step before the result: close enough for a covariance, and half of the work saved.
   // But points held by damping would say too much.
   if (damping_of_system > kUndamped) solver.linearise(estimate, kUndamped, system);
+  const CalibrationBelief& prior = window.calibration_prior;
+  const RigCalibration::Matrix certain = prior.certain_information.value_or(prior.information);
+  system.hessian.bottomRightCorner<kCalibration, kCalibration>() += certain - prior.information;
   factor.compute(system.hessian);
   if (factor.info() != Eigen::Success) return solution;  // as when nothing holds one of the poses
   const int asked = static_cast<int>(covariance_of.size());
@@ -318,7 +321,7 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
     solution.pose_covariance.middleRows<6>(6 * a) =
         variance * covariance.block(6 * (covariance_of[static_cast<std::size_t>(a)] - 1), 0, 6, 6 * asked);
   solution.calibration_information =
-      covariance.bottomRightCorner<kCalibration, kCalibration>().inverse() - window.calibration_prior.information;
+      covariance.bottomRightCorner<kCalibration, kCalibration>().inverse() - certain;
 
   if (!accepted) solver.cost(estimate, squares);  // those at hand belong to a refused step
   std::swap(solution.squares, squares);

@@ -112,6 +112,7 @@ TEST(FeatureExtractor, DetectsWhereTheSmallestDescriptorFits) {
   options.size_curve.slope = 0.3;
   options.size_curve.min_size = 10.0;
   options.size_curve.max_size = 40.0;
+  options.descriptor.extend_border = false;
   const double reach = Freak::reach(10.0);
   const StereoCamera camera = synthetic::camera();
   const Pair pair = planeAt(10.0);  // disparity 20 px
@@ -184,13 +185,14 @@ TEST(FeatureExtractor, SaysWhyAPairGivesNothing) {
   FeatureExtractorOptions huge = fewFeatures();
   huge.size_curve.min_size = 150.0;  // reaches 471 px
   huge.size_curve.max_size = 150.0;
+  huge.descriptor.extend_border = false;
   const StereoFeatures outside = FeatureExtractor(huge).extract(camera, pair.left, pair.right, 5);
   EXPECT_EQ(outside.count(), 0);
   EXPECT_NE(outside.report.status.find("border"), std::string::npos) << outside.report.status;
 
   // Of so few rows none is as far from both borders as a descriptor reaches.
   StereoCamera flat = camera;
-  flat.height = 70;
+  flat.height = 36;
   const cv::Range rows(100, 100 + flat.height);
   const StereoFeatures none = extractor.extract(flat, pair.left.rowRange(rows), pair.right.rowRange(rows), 5);
   EXPECT_NE(none.report.status.find("the image is too small"), std::string::npos) << none.report.status;

@@ -76,18 +76,19 @@ TEST(StereoDescriptor, ExtendsTheBorder) {
   cv::Mat large_left, large_right;
   cv::copyMakeBorder(left, large_left, kMargin, kMargin, kMargin, kMargin, cv::BORDER_REPLICATE);
   cv::copyMakeBorder(right, large_right, kMargin, kMargin, kMargin, kMargin, cv::BORDER_REPLICATE);
-  // Inside, beyond the left view's top, beyond the right view's left, and two that not even a reach of 22 px fits.
+  // Inside, beyond the left view's top, beyond the right view's left, and two that not even a size of 5 px, a reach of 15.7 px, fits.
   const std::vector<StereoKeypoint> keypoints = {{160.25f, 95.f, 150.f, 95.4f, 20.f},
-                                                 {200.f, 22.f, 180.f, 22.f, 20.f},
-                                                 {50.5f, 90.f, 22.f, 90.5f, 30.f},
-                                                 {200.f, 21.f, 180.f, 21.f, 20.f},
-                                                 {50.f, 90.f, 21.f, 90.f, 8.f}};
+                                                 {200.f, 16.f, 180.f, 16.f, 20.f},
+                                                 {50.5f, 90.f, 16.f, 90.5f, 30.f},
+                                                 {200.f, 15.f, 180.f, 15.f, 20.f},
+                                                 {50.f, 90.f, 15.f, 90.f, 8.f}};
   for (const bool oriented : {false, true}) {
     DescriptorOptions options = withLayout(DescriptorLayout::kLeftAndRight, oriented);
     options.extend_border = true;
     const DescribedKeypoints described = StereoDescriptor(options).describe(left, right, keypoints);
     ASSERT_EQ(described.index, (std::vector<int>{0, 1, 2}));
-    const StereoDescriptor plain(withLayout(DescriptorLayout::kLeftAndRight, oriented));
+    options.extend_border = false;
+    const StereoDescriptor plain(options);
     for (int row = 0; row < described.rows.rows; ++row) {
       StereoKeypoint k = keypoints[static_cast<std::size_t>(row)];
       k.u_left += kMargin, k.v_left += kMargin, k.u_right += kMargin, k.v_right += kMargin;

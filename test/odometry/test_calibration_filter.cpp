@@ -74,6 +74,15 @@ TEST(CalibrationFilter, MovesAsFarAsTheEvidenceIsSignificant) {
   EXPECT_LT(moved[1], -0.1);
 }
 
+TEST(CalibrationFilter, ACalibrationThatIsHeldIsNotKnownForThat) {
+  CalibrationFilter filter(someOptions());
+  addWindow(filter, 1, 9, kPrior);
+  EXPECT_GT(filter.prior(2).information.diagonal().minCoeff(), 1e6);
+  const std::optional<Matrix> certain = filter.prior(2).certain_information;
+  ASSERT_TRUE(certain);
+  EXPECT_LT((*certain - informationOf(2.0) * Matrix::Identity()).norm(), 1e-6);
+}
+
 TEST(CalibrationFilter, TheOptionsSigmaIsTheLargestSpread) {
   CalibrationFilter filter(someOptions());
   addWindow(filter, 1, 9, {100.0, 100.0});

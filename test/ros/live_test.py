@@ -387,7 +387,7 @@ class Live(PipelineCase):
         # Fewer features are described as before: nothing begins anew.
         self.assertEqual((after.state, after.epoch), ('TRACKING', before.epoch))
         # Nor with the same value.
-        client.update_configuration({'size_curve/max_size': 20.0})
+        client.update_configuration({'size_curve/max_size': 32.0})
         after = self.feed(2)
         self.assertEqual((after.state, after.epoch), ('TRACKING', before.epoch))
         # Rows of another size do not continue the old ones.
@@ -517,7 +517,8 @@ class Live(PipelineCase):
         # It is awaited for gravity, for a moment.
         times = itertools.count(-100)
         self.assertTrue(wait_until(lambda: self.feed(0, time_of=next(times)).state == 'TRACKING'))
-        self.feed(0)
+        for time_of in range(next(times), 1):  # a leap of the stamps would be held back
+            self.feed(0, time_of=time_of)
         images, infos = self.camera.messages(1)
         turn(images)
         self.assertEqual(self.feed_messages(images, infos).state, 'TRACKING')

@@ -364,7 +364,9 @@ class Places(unittest.TestCase):
         info = self.drive(robot, recognition, 2)
         self.assertEqual(info.places, before.places + 2)
         self.assertTrue(wait_until(lambda: [e.kind for e in recognition.graph[-1].edges].count('break') == breaks + 1))
-        self.assertLess(np.linalg.norm(matrix_of(info.map_to_odom) - matrix_of(before.map_to_odom)), 1e-6)
+        # Odom stays where it is in the map, but for what a loop tells: that of a lost odometry was not known.
+        moved = np.linalg.norm(matrix_of(info.map_to_odom) - matrix_of(before.map_to_odom))
+        self.assertTrue(moved < 1e-6 or info.loops > before.loops, '%.3f m without a loop' % moved)
 
     def the_clock_jumps_back(self, robot, recognition):
         self.clock.jump_to(recognition.info[0].header.stamp + rospy.Duration.from_sec(0.5))
