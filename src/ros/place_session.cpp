@@ -22,8 +22,11 @@ PlaceSession::PlaceSession(const PlaceRecognitionOptions& options, SavedPlaces s
 PlaceSession::Time PlaceSession::noteTime(const ros::Time& stamp, const ros::Time& now, bool is_simulated) {
   clock_fell_ |= last_now_ && now < *last_now_;
   last_now_ = now;
-  if (!last_ || stamp > last_->stamp) return Time::kGoesOn;
-  if (stamp == last_->stamp) return Time::kStands;
+  if (last_ && stamp == last_->stamp) return Time::kStands;
+  const bool falls = last_ && stamp < last_->stamp;
+  // A pair that waited while the clock jumped back is still of the time before, ahead of the new one.
+  const bool is_of_new_time = falls || stamp <= now + ros::Duration(1.0);
+  if (!last_ || !(falls || (clock_fell_ && is_simulated && is_of_new_time))) return Time::kGoesOn;
   continues_ = false;
   return std::exchange(clock_fell_, false) && is_simulated ? Time::kBeganAnew : Time::kFell;
 }
