@@ -198,6 +198,20 @@ TEST(FeatureExtractor, SaysWhyAPairGivesNothing) {
   EXPECT_NE(none.report.status.find("the image is too small"), std::string::npos) << none.report.status;
 }
 
+TEST(FeatureExtractor, DescribesMostOfASmallImage) {
+  // A near plane, disparity 40 px: every size is near its upper limit, 28.8 px, whose pattern is 181 px wide.
+  StereoCamera small = synthetic::camera();
+  small.width = 424, small.height = 240;
+  small.cx -= 100.0, small.cy -= 100.0;
+  const Pair pair = planeAt(5.0);
+  const cv::Range rows(100, 340), columns(100, 524);
+  const StereoFeatures features = FeatureExtractor(FeatureExtractorOptions())
+                                      .extract(small, pair.left(rows, columns), pair.right(rows, columns), 0);
+  ASSERT_GT(features.report.stereo_matched, 100);
+  EXPECT_GT(features.count(), 0.85 * features.report.stereo_matched);
+  for (const float size : features.size) EXPECT_NEAR(size, 28.8f, 0.5f);
+}
+
 TEST(FeatureExtractor, IsStateless) {
   const StereoCamera camera = synthetic::camera();
   const FeatureExtractor extractor(fewFeatures());
