@@ -17,7 +17,7 @@ struct RateOptions {
   }
 };
 
-/// What diagnostics of the image side take for a fault.
+/// Limits beyond which diagnostics of the image side report a fault.
 struct ImageThresholds {
   double max_gap = 0.005;
   double min_intensity = 20.0;

@@ -43,7 +43,7 @@ struct Floor {
   static double cost(double square);
   static double weight(double square);
 
-  /// What is left of a pose's covariance (of a right perturbation of T_origin_camera) on this floor.
+  /// Covariance of a pose (of a right perturbation of T_origin_camera) after the constraint to this floor.
   Matrix6d constrained(const Eigen::Isometry3d& T_origin_camera, const Matrix6d& covariance) const;
 };
 
