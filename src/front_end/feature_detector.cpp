@@ -152,6 +152,11 @@ void removeMasked(const cv::Mat& mask, cv::Size size, std::vector<Corner>& corne
   corners.erase(std::remove_if(corners.begin(), corners.end(), is_masked), corners.end());
 }
 
+int largestCount(cv::Size image, const FeatureDetectorOptions& options) {
+  return options.area_per_feature == 0 ? options.max_features
+                                       : std::min(options.max_features, image.area() / options.area_per_feature);
+}
+
 /// Ties are broken by position.
 constexpr auto isStronger = [](const Corner& a, const Corner& b) {
   return std::tie(b.response, a.position.y, a.position.x) < std::tie(a.response, b.position.y, b.position.x);
@@ -261,7 +266,7 @@ std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border, co
   const cv::Mat& valid = mask.empty() ? mask_ : mask;
   if (!valid.empty()) removeMasked(valid, image.size(), corners);
   corners = keepApart(std::move(corners), options_.min_spacing);
-  corners = spreadOverBuckets(corners, image.size(), options_.bucket_size, options_.max_features);
+  corners = spreadOverBuckets(corners, image.size(), options_.bucket_size, largestCount(image.size(), options_));
   if (options_.subpixel) refine(image, options_, corners);
   return corners;
 }

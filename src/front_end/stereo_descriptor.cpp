@@ -20,6 +20,18 @@ void orient(const cv::Mat& image, std::vector<ViewKeypoint>& keypoints) {
   }
 }
 
+/// px by which the furthest pattern goes beyond its image; both images have the same `size`.
+int overhang(const BaseDescriptor& base, cv::Size size, const std::vector<StereoKeypoint>& keypoints) {
+  const float last_column = static_cast<float>(size.width - 1), last_row = static_cast<float>(size.height - 1);
+  double furthest = 0.0;
+  for (const StereoKeypoint& k : keypoints) {
+    const float to_border = std::min({k.u_left, k.u_right, last_column - k.u_left, last_column - k.u_right, k.v_left,
+                                      k.v_right, last_row - k.v_left, last_row - k.v_right});
+    furthest = std::max(furthest, base.reach(k.size) - to_border);
+  }
+  return static_cast<int>(std::ceil(furthest)) + 1;
+}
+
 }  // namespace
 
 void DescriptorOptions::describe(OptionList& list) {
@@ -52,9 +64,7 @@ DescribedKeypoints StereoDescriptor::describe(const cv::Mat& left_image, const c
   cv::Mat left = left_image, right = right_image;
   float shift = 0.f;
   if (options_.extend_border && !keypoints.empty()) {
-    const auto smaller = [](const StereoKeypoint& a, const StereoKeypoint& b) { return a.size < b.size; };
-    const float largest = std::max_element(keypoints.begin(), keypoints.end(), smaller)->size;
-    const int margin = static_cast<int>(std::ceil(base_->reach(largest)));
+    const int margin = overhang(*base_, left_image.size(), keypoints);
     cv::Mat larger_left, larger_right;
     addMargin(left_image, margin, larger_left);
     addMargin(right_image, margin, larger_right);

@@ -222,6 +222,7 @@ TEST(FeatureDetector, KeepsCornersApart) {
   FeatureDetectorOptions options;
   options.subpixel = false;
   options.max_features = 5000;
+  options.area_per_feature = 0;
   const std::vector<Corner> all = FeatureDetector(options).detect(unevenTexture());
   options.min_spacing = 6.0;
   const std::vector<Corner> apart = FeatureDetector(options).detect(unevenTexture());
@@ -240,6 +241,7 @@ TEST(FeatureDetector, BorderLeavesPositionsWhereTheyAre) {
   const cv::Mat image = unevenTexture();
   FeatureDetectorOptions options;
   options.max_features = 20000;
+  options.area_per_feature = 0;
   options.subpixel = false;
   std::set<std::pair<float, float>> of_image;
   for (const Corner& corner : FeatureDetector(options).detect(image))
@@ -339,6 +341,18 @@ TEST_P(EveryDetector, RespectsTheLargestNumber) {
     few.max_features = max_features;
     EXPECT_EQ(FeatureDetector(few).detect(image).size(), static_cast<std::size_t>(max_features));
   }
+}
+
+TEST_P(EveryDetector, KeepsFewerInASmallImage) {
+  const cv::Mat image = unevenTexture()(cv::Rect(280, 0, 200, 150));
+  FeatureDetectorOptions dense = options(), sparse = options();
+  dense.max_features = sparse.max_features = 20000;
+  dense.area_per_feature = 0;
+  sparse.area_per_feature = 1000;
+  EXPECT_GT(FeatureDetector(dense).detect(image).size(), 30u);
+  EXPECT_EQ(FeatureDetector(sparse).detect(image).size(), 30u);
+  sparse.max_features = 20;
+  EXPECT_EQ(FeatureDetector(sparse).detect(image).size(), 20u);
 }
 
 TEST_P(EveryDetector, FindsNothingInABlankImage) {
