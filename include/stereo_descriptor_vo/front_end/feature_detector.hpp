@@ -32,8 +32,8 @@ struct FeatureDetectorOptions {
     list.add("type", type, "corner detector");
     list.add("max_features", max_features, {1, 20000}, "", "corners kept per left image");
     list.add("area_per_feature", area_per_feature, {0, 10000}, "px^2",
-             "fewer corners are kept in an image that has less than this area for each; 169: that of a 13x13 px patch, "
-             "for neighbours that share pixels share errors; 0: max_features alone");
+             "an image with less than this area for each keeps fewer corners, but at least 600; 169: the area of a 13x13 "
+             "px patch, as neighbours that share pixels share errors; 0: max_features alone");
     list.add("bucket_size", bucket_size, {8, 4096}, "px", "side of the square buckets that share the corners evenly");
     list.add("min_spacing", min_spacing, {0.0, 100.0}, "px",
              "corners nearer than this to a stronger one are left out; 0: none is");
@@ -56,6 +56,9 @@ struct Corner {
   float response;        ///< detector's own score, comparable within one image only
 };
 
+/// Corners to keep of a whole image of `size`: `max_features`, or fewer by `area_per_feature`.
+int largestCount(cv::Size size, const FeatureDetectorOptions& options);
+
 /// Finds corners and spreads them evenly over the image. Stateless: the same image gives the same corners.
 class FeatureDetector {
  public:
@@ -64,7 +67,7 @@ class FeatureDetector {
 
   static constexpr int kSmallestSide = 16;  ///< px within the border: less is no image for the detectors
 
-  /// Corners of a CV_8U image, at most `max_features` and one per `area_per_feature`, at least `border` px away from the image's borders and outside
+  /// Corners of a CV_8U image, at most `largestCount`, at least `border` px away from the image's borders and outside
   /// of the mask's zeros, but for what the refinement moves them by; `mask` is CV_8U, or empty for the one of the
   /// options. Throws std::invalid_argument when the mask has another type, or another size than the image.
   std::vector<Corner> detect(const cv::Mat& image, int border = 0, const cv::Mat& mask = cv::Mat()) const;
