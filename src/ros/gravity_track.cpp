@@ -38,4 +38,12 @@ std::optional<Eigen::Vector3d> GravityTrack::up() const {
   return mean.normalized();
 }
 
+Eigen::Isometry3d levelled(const Eigen::Isometry3d& pose, const Eigen::Vector3d& up) {
+  const Eigen::Matrix3d& R = pose.linear();
+  return Eigen::Translation3d(pose.translation()) *
+         Eigen::AngleAxisd(std::atan2(R(1, 0), R(0, 0)), Eigen::Vector3d::UnitZ()) *
+         Eigen::AngleAxisd(std::atan2(-up.x(), std::hypot(up.y(), up.z())), Eigen::Vector3d::UnitY()) *
+         Eigen::AngleAxisd(std::atan2(up.y(), up.z()), Eigen::Vector3d::UnitX());
+}
+
 }  // namespace sdvo

@@ -1,6 +1,6 @@
 #pragma once
 
-#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <deque>
 #include <mutex>
@@ -28,5 +28,9 @@ class GravityTrack {
   mutable std::mutex mutex_;
   std::deque<Measurement> measurements_;  ///< of the last second
 };
+
+/// `pose` with its position and yaw, and with roll and pitch such that `up`, in the axes of its child frame, is its
+/// parent's z.
+Eigen::Isometry3d levelled(const Eigen::Isometry3d& pose, const Eigen::Vector3d& up);
 
 }  // namespace sdvo

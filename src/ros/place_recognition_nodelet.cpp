@@ -1,18 +1,12 @@
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
-#include <nav_msgs/Odometry.h>
 #include <nodelet/nodelet.h>
 #include <std_srvs/Empty.h>
 #include <std_srvs/Trigger.h>
 #include <stereo_descriptor_vo/GetPlace.h>
 #include <stereo_descriptor_vo/LoadPlaces.h>
 #include <stereo_descriptor_vo/SavePlaces.h>
-#include <stereo_descriptor_vo/StereoFeatures.h>
-#include <stereo_descriptor_vo/VoInfo.h>
-#include <tf2_eigen/tf2_eigen.h>
 
-#include <algorithm>
 #include <atomic>
-#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <mutex>
@@ -27,19 +21,16 @@
 #include "../config/interface_options.hpp"
 #include "callback_thread.hpp"
 #include "camera_mount.hpp"
-#include "exact_synchroniser.hpp"
 #include "frame_id.hpp"
+#include "odometry_pair_input.hpp"
 #include "other_robot.hpp"
 #include "params.hpp"
-#include "place_conversions.hpp"
 #include "place_diagnostics.hpp"
 #include "place_publisher.hpp"
 #include "place_session.hpp"
 #include "places_file.hpp"
-#include "pose_conversions.hpp"
 #include "report_throttle.hpp"
 #include "robot_transforms.hpp"
-#include "stamps.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
 #include "worker.hpp"
 
@@ -59,10 +50,6 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   }
 
  private:
-  using Features = stereo_descriptor_vo::StereoFeatures;
-  using Odometry = nav_msgs::Odometry;
-  using Info = stereo_descriptor_vo::VoInfo;
-
   struct Options {
     PlaceOutputOptions output;
     PlaceRecognitionOptions recognition;
@@ -102,7 +89,6 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     });
     mount_ = std::make_unique<CameraMount>(*transforms_, output.tf_timeout);
     publisher_ = std::make_unique<PlacePublisher>(nh_, output, robot_, [this] { return map(); });
-    diagnostics_ = std::make_unique<PlaceDiagnostics>(nh_, private_nh, getName(), inputs(), output.max_silence);
     services_ = {private_nh.advertiseService("reset", &PlaceRecognitionNodelet::onReset, this),
                  private_nh.advertiseService("pause", &PlaceRecognitionNodelet::onPause, this),
                  private_nh.advertiseService("resume", &PlaceRecognitionNodelet::onResume, this),
@@ -114,7 +100,13 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     optimiser_ = std::make_unique<Worker<Job>>(1, [this](const Job& job) { optimise(job); });
     other_ =
         std::make_unique<OtherRobot>(other_nh, robot_, output.other_min_score, output.other_timeout, placesForOthers());
-    subscribe();
+    input_ = std::make_unique<OdometryPairInput>(
+        nh_, output.sync_queue_size, [this](const OdometryPair& pair) { onPair(pair); },
+        [this](const ros::Time& stamp, const std::string& why) {
+          if (throttle_.allows(why)) NODELET_ERROR_STREAM("message at " << stamp << " skipped: " << why);
+        });
+    diagnostics_ =
+        std::make_unique<PlaceDiagnostics>(nh_, private_nh, getName(), input_->topics(), output.max_silence);
     initial_pose_subscriber_ = nh_.subscribe<geometry_msgs::PoseWithCovarianceStamped>(
         "/initialpose", 1, [this](const geometry_msgs::PoseWithCovarianceStamped::ConstPtr& m) { onInitialPose(*m); });
     callbacks_.start();
@@ -135,65 +127,21 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     NODELET_INFO_STREAM(session_->recognition().places().size() << " places of '" << path << "'");
   }
 
-  std::string inputs() const {
-    return nh_.resolveName("stereo_features") + ", " + nh_.resolveName("odom") + " and " + nh_.resolveName("vo_info");
-  }
-
   // Input, in the callbacks' thread.
 
-  void subscribe() {
-    const int room = options_.output.sync_queue_size;
-    synchroniser_ = std::make_unique<ExactSynchroniser<Features, Odometry, Info>>(
-        room, [this](const auto&... messages) { onPair(messages...); },
-        [this](const auto&... messages) { onUnpaired(messages...); });
-    subscribers_ = {subscribe<0, Features>("stereo_features"), subscribe<1, Odometry>("odom"),
-                    subscribe<2, Info>("vo_info")};
-  }
-
-  /// A pose of the base in the map, such as rviz' "2D Pose Estimate".
   void onInitialPose(const geometry_msgs::PoseWithCovarianceStamped& message) try {
-    constexpr double kLeast = 5.0, kSigmas = 3.0;  // m
-    const std::string frame = ros_conversions::cleanFrameId(message.header.frame_id);
-    const std::string map_frame = ros_conversions::cleanFrameId(options_.output.map_frame_id);
-    if (frame != map_frame)
-      throw std::invalid_argument("it is in frame '" + frame + "', not in the map's, '" + map_frame + "'");
-    const double variance = std::max(message.pose.covariance[0], message.pose.covariance[7]);
-    if (!std::isfinite(variance)) throw std::invalid_argument("its covariance is not finite");
-    const Eigen::Isometry3d T_map_base = ros_conversions::toPose(message.pose.pose);
     const std::lock_guard<std::mutex> lock(mutex_);
-    session_->expect(T_map_base, kLeast + kSigmas * std::sqrt(std::max(0.0, variance)));
+    session_->expect(message, ros_conversions::cleanFrameId(options_.output.map_frame_id));
   } catch (const std::exception& e) {
     NODELET_WARN_STREAM("the pose on " << initial_pose_subscriber_.getTopic() << " is not used: " << e.what());
   }
 
-  template <int input, class Message>
-  ros::Subscriber subscribe(const std::string& topic) {
-    return nh_.subscribe<Message>(
-        topic, static_cast<std::uint32_t>(options_.output.sync_queue_size),
-        [this](const boost::shared_ptr<const Message>& m) { take<input>(m); }, ros::VoidConstPtr(),
-        ros::TransportHints().tcpNoDelay());
-  }
-
-  template <int input, class Message>
-  void take(const boost::shared_ptr<const Message>& message) try {
-    synchroniser_->add<input>(message);
-  } catch (const std::exception& e) {
-    ++malformed_;
-    if (throttle_.allows(e.what()))
-      NODELET_ERROR_STREAM("message at " << message->header.stamp << " skipped: " << e.what());
-  }
-
-  void onPair(const Features::ConstPtr& features, const Odometry::ConstPtr& odometry, const Info::ConstPtr& info) {
+  void onPair(const OdometryPair& pair) {
     diagnostics_->input().note();
     if (options_.output.publish_tf)
       transforms_->claim({ros_conversions::cleanFrameId(options_.output.map_frame_id),
-                          ros_conversions::cleanFrameId(odometry->header.frame_id)});
-    observer_->push({{features, odometry, info, resumes_}, generation_});
-  }
-
-  void onUnpaired(const Features::ConstPtr&, const Odometry::ConstPtr& odometry, const Info::ConstPtr& info) {
-    const bool has_odometry = !info || (info->state != "LOST" && info->state != "WAITING");
-    if (odometry || has_odometry) ++unpaired_;
+                          ros_conversions::cleanFrameId(pair.odometry->header.frame_id)});
+    observer_->push({pair, generation_});
   }
 
   // Recognition, in the observer's thread.
@@ -212,7 +160,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
       NODELET_WARN_STREAM("stamps fell to " << stamp << ": the places stay, the way in between is unknown");
     if (const std::optional<PlaceReport> report = session_->observe(pair, *T_base_camera)) publish(*report, stamp);
   } catch (const std::exception& e) {
-    ++malformed_;
+    ++refused_;
     if (throttle_.allows(e.what()))
       NODELET_ERROR_STREAM("pair at " << arrived.pair.features->header.stamp << " skipped: " << e.what());
   }
@@ -240,43 +188,22 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     if (session.isPlaced())
       publisher_->correct(recognition.T_map_odom(), session.odomFrame(), !was_located_ || !session.isLocated());
     was_located_ = session.isLocated();
-    if (was_located_) publishPose(stamp);
+    const std::string map_frame = ros_conversions::cleanFrameId(options_.output.map_frame_id);
+    if (auto pose = was_located_ ? session.basePose(*mount_->last()) : std::nullopt) {
+      pose->header.stamp = stamp;
+      pose->header.frame_id = map_frame;
+      publisher_->publish(*pose);
+    }
     publisher_->noteChange();
-
-    const auto place = recognition.places().find(report.id);
-    if (place != recognition.places().end())
-      publisher_->publish(ros_conversions::toMessage(recognition.signature(report.id), place->second,
-                                                     options_.recognition.index, robot_, session.stream().frame_id));
-    stereo_descriptor_vo::PlaceInfo info = ros_conversions::toInfo(report);
+    if (const auto signature = session.signature(report.id, robot_)) publisher_->publish(*signature);
+    stereo_descriptor_vo::PlaceInfo info = session.info(report);
     info.header.stamp = stamp;
-    info.header.frame_id = ros_conversions::cleanFrameId(options_.output.map_frame_id);
-    info.optimise_time = static_cast<float>(session.optimise_time);
-    info.located = session.isLocated();
-    info.places = static_cast<std::uint32_t>(recognition.places().size());
-    info.loops = static_cast<std::uint32_t>(recognition.graph().loops());
-    info.bytes = recognition.bytes();
-    info.turn_error = static_cast<float>(recognition.graph().turnError());
-    info.map_to_odom = tf2::eigenToTransform(recognition.T_map_odom()).transform;
+    info.header.frame_id = map_frame;
     info.dropped_pairs = observer_->dropped();
-    info.unpaired = unpaired_;
-    info.malformed = malformed_;
+    info.unpaired = input_->unpaired();
+    info.malformed = input_->refused() + refused_;
     publisher_->publish(info);
     diagnostics_->note(info);
-  }
-
-  /// Of the base in the map, at the newest key frame.
-  void publishPose(const ros::Time& stamp) {
-    const PlaceRecognition& recognition = session_->recognition();
-    const std::optional<Matrix6d> of_camera = recognition.covariance();
-    const std::optional<Eigen::Isometry3d> T_base_camera = mount_->last();
-    if (!of_camera || !T_base_camera) return;
-    const Eigen::Isometry3d T_map_base = recognition.graph().nodes().rbegin()->second * T_base_camera->inverse();
-    const Matrix6d to_base = adjoint(*T_base_camera);
-    geometry_msgs::PoseWithCovarianceStamped pose;
-    pose.header.stamp = stamp;
-    pose.header.frame_id = ros_conversions::cleanFrameId(options_.output.map_frame_id);
-    pose.pose = ros_conversions::toMessage(T_map_base, to_base * *of_camera * to_base.transpose());
-    publisher_->publish(pose);
   }
 
   void restart(const char* why) {
@@ -321,18 +248,11 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     OtherRobot::Places places;
     places.find = [this](const OtherRobot::SignatureMessage& signature) {
       const std::lock_guard<std::mutex> lock(mutex_);
-      const PlaceRecognition& recognition = session_->recognition();
-      if (recognition.places().empty()) return std::vector<PlaceCandidate>();
-      return recognition.find(ros_conversions::fromMessage(signature, options_.recognition.index,
-                                                           recognition.places().begin()->second.features.kind()));
+      return session_->find(signature);
     };
-    places.verify = [this](int id, const Place& other) -> std::optional<stereo_descriptor_vo::PlaceMatch> {
+    places.verify = [this](int id, const Place& other) {
       const std::lock_guard<std::mutex> lock(mutex_);
-      const auto mine = session_->recognition().places().find(id);
-      if (mine == session_->recognition().places().end()) return std::nullopt;
-      const PlaceMatch match = session_->recognition().verify(id, other.features);
-      if (!match.same) return std::nullopt;
-      return ros_conversions::toMessage(match, mine->second, other, session_->stream().frame_id);
+      return session_->verify(id, other);
     };
     places.get = [this](int id) {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -352,22 +272,18 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     return true;
   }
 
-  /// A paused nodelet subscribes to nothing: the image side has one listener less.
   bool onPause(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
     response.success = true;
-    response.message = subscribers_.empty() ? "was paused already" : "paused";
-    subscribers_.clear();
+    response.message = input_->pause() ? "paused" : "was paused already";
     diagnostics_->input().noteIdle("paused");
     return true;
   }
 
   bool onResume(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
     response.success = true;
-    response.message = subscribers_.empty() ? "resumed; the way in between is unknown" : "was not paused";
-    if (!subscribers_.empty()) return true;
-    ++resumes_;
-    diagnostics_->input().noteIdle("");
-    subscribe();
+    const bool resumed = input_->resume();
+    response.message = resumed ? "resumed; the way in between is unknown" : "was not paused";
+    if (resumed) diagnostics_->input().noteIdle("");
     return true;
   }
 
@@ -435,20 +351,18 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   std::unique_ptr<PlaceDiagnostics> diagnostics_;
   std::vector<ros::ServiceServer> services_;
 
-  std::atomic<std::uint64_t> unpaired_{0}, malformed_{0};
-
   std::mutex mutex_;
   std::shared_ptr<PlaceSession> session_;        // and all in it: under mutex_
   bool was_located_ = false;                     // … and map -> odom is published since then
-  std::atomic<int> generation_{0}, resumes_{0};  // sessions that a service began, and times of resuming
+  std::atomic<int> generation_{0};  // sessions that a service began
+  std::uint64_t refused_ = 0;       // pairs; only the observer's thread touches it
 
   std::unique_ptr<Worker<Arrived>> observer_;
   std::unique_ptr<Worker<Job>> optimiser_;
   std::unique_ptr<OtherRobot> other_;
 
   // Only the callbacks' thread touches these.
-  std::unique_ptr<ExactSynchroniser<Features, Odometry, Info>> synchroniser_;
-  std::vector<ros::Subscriber> subscribers_;
+  std::unique_ptr<OdometryPairInput> input_;
   ros::Subscriber initial_pose_subscriber_;
 };
 

@@ -1,5 +1,9 @@
 #include "place_session.hpp"
 
+#include <tf2_eigen/tf2_eigen.h>
+
+#include <algorithm>
+#include <cmath>
 #include <map>
 #include <stdexcept>
 #include <utility>
@@ -14,7 +18,7 @@
 namespace sdvo {
 
 PlaceSession::PlaceSession(const PlaceRecognitionOptions& options, SavedPlaces saved)
-    : recognition_(options), stream_(saved.stream), located_(false) {
+    : index_(options.index), recognition_(options), stream_(saved.stream), located_(false) {
   recognition_.restore(std::move(saved.places), saved.graph);
   loaded_ = recognition_.places().rbegin()->first + 1;
 }
@@ -57,6 +61,16 @@ std::optional<PlaceReport> PlaceSession::observe(const OdometryPair& pair, const
   return report;
 }
 
+void PlaceSession::expect(const geometry_msgs::PoseWithCovarianceStamped& pose, const std::string& map_frame) {
+  constexpr double kLeast = 5.0, kSigmas = 3.0;  // m
+  const std::string frame = ros_conversions::cleanFrameId(pose.header.frame_id);
+  if (frame != map_frame)
+    throw std::invalid_argument("it is in frame '" + frame + "', not in the map's, '" + map_frame + "'");
+  const double variance = std::max(pose.pose.covariance[0], pose.pose.covariance[7]);
+  if (!std::isfinite(variance)) throw std::invalid_argument("its covariance is not finite");
+  expected_ = {ros_conversions::toPose(pose.pose.pose), kLeast + kSigmas * std::sqrt(std::max(0.0, variance))};
+}
+
 void PlaceSession::refuseOtherCameraThan(const PlaceSession& session) const {
   if (session.last_) refuse(session.last_->camera, session.last_->kind);
 }
@@ -88,6 +102,49 @@ std::optional<stereo_descriptor_vo::Place> PlaceSession::message(int id, const s
   const auto place = recognition_.places().find(id);
   if (place == recognition_.places().end()) return std::nullopt;
   return ros_conversions::toMessage(place->second, robot, stream_);
+}
+
+std::optional<stereo_descriptor_vo::PlaceSignature> PlaceSession::signature(int id, const std::string& robot) const {
+  const auto place = recognition_.places().find(id);
+  if (place == recognition_.places().end()) return std::nullopt;
+  return ros_conversions::toMessage(recognition_.signature(id), place->second, index_, robot, stream_.frame_id);
+}
+
+stereo_descriptor_vo::PlaceInfo PlaceSession::info(const PlaceReport& report) const {
+  stereo_descriptor_vo::PlaceInfo info = ros_conversions::toInfo(report);
+  info.optimise_time = static_cast<float>(optimise_time);
+  info.located = located_;
+  info.places = static_cast<std::uint32_t>(recognition_.places().size());
+  info.loops = static_cast<std::uint32_t>(recognition_.graph().loops());
+  info.bytes = recognition_.bytes();
+  info.turn_error = static_cast<float>(recognition_.graph().turnError());
+  info.map_to_odom = tf2::eigenToTransform(recognition_.T_map_odom()).transform;
+  return info;
+}
+
+std::optional<geometry_msgs::PoseWithCovarianceStamped> PlaceSession::basePose(
+    const Eigen::Isometry3d& T_base_camera) const {
+  const std::optional<Matrix6d> of_camera = recognition_.covariance();
+  if (!of_camera) return std::nullopt;
+  const Eigen::Isometry3d T_map_base = recognition_.graph().nodes().rbegin()->second * T_base_camera.inverse();
+  const Matrix6d to_base = adjoint(T_base_camera);
+  geometry_msgs::PoseWithCovarianceStamped pose;
+  pose.pose = ros_conversions::toMessage(T_map_base, to_base * *of_camera * to_base.transpose());
+  return pose;
+}
+
+std::vector<PlaceCandidate> PlaceSession::find(const stereo_descriptor_vo::PlaceSignature& signature) const {
+  if (recognition_.places().empty()) return {};
+  const DescriptorKind kind = recognition_.places().begin()->second.features.kind();
+  return recognition_.find(ros_conversions::fromMessage(signature, index_, kind));
+}
+
+std::optional<stereo_descriptor_vo::PlaceMatch> PlaceSession::verify(int id, const Place& other) const {
+  const auto mine = recognition_.places().find(id);
+  if (mine == recognition_.places().end()) return std::nullopt;
+  const PlaceMatch match = recognition_.verify(id, other.features);
+  if (!match.same) return std::nullopt;
+  return ros_conversions::toMessage(match, mine->second, other, stream_.frame_id);
 }
 
 }  // namespace sdvo

@@ -1,8 +1,7 @@
 #pragma once
 
-#include <nav_msgs/Odometry.h>
-#include <stereo_descriptor_vo/StereoFeatures.h>
-#include <stereo_descriptor_vo/VoInfo.h>
+#include <geometry_msgs/PoseWithCovarianceStamped.h>
+#include <stereo_descriptor_vo/PlaceInfo.h>
 
 #include <Eigen/Geometry>
 #include <optional>
@@ -10,24 +9,17 @@
 #include <vector>
 
 #include "map_conversions.hpp"
+#include "odometry_pair_input.hpp"
 #include "place_conversions.hpp"
 #include "places_file.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
 
 namespace sdvo {
 
-/// What the topics give for one pair, stamps equal.
-struct OdometryPair {
-  stereo_descriptor_vo::StereoFeatures::ConstPtr features;
-  nav_msgs::Odometry::ConstPtr odometry;
-  stereo_descriptor_vo::VoInfo::ConstPtr info;
-  int resumes = 0;  ///< of the subscription, until it arrived
-};
-
 /// The places and all that begins anew with them. Not for several threads at once.
 class PlaceSession {
  public:
-  explicit PlaceSession(const PlaceRecognitionOptions& options) : recognition_(options) {}
+  explicit PlaceSession(const PlaceRecognitionOptions& options) : index_(options.index), recognition_(options) {}
 
   /// Begins with the places of an earlier session. Throws std::invalid_argument when they do not belong together.
   PlaceSession(const PlaceRecognitionOptions& options, SavedPlaces saved);
@@ -41,9 +33,10 @@ class PlaceSession {
   /// that of the places, other descriptors, and messages that do not hold together.
   std::optional<PlaceReport> observe(const OdometryPair& pair, const Eigen::Isometry3d& T_base_camera);
 
-  /// Somebody says where the base is in the map; from the next pair on the odometry is there, and only places within
-  /// `radius` (m) of it are looked at until one is recognised.
-  void expect(const Eigen::Isometry3d& T_map_base, double radius) { expected_ = {T_map_base, radius}; }
+  /// Somebody says where the base is in the map, as with rviz' "2D Pose Estimate". From the next pair on the odometry is
+  /// there, and until a place is recognised only those nearby are looked at. Throws std::invalid_argument for a pose that
+  /// is not of `map_frame`, and for numbers that are not finite.
+  void expect(const geometry_msgs::PoseWithCovarianceStamped& pose, const std::string& map_frame);
 
   /// Throws std::invalid_argument where the places are not of the camera and the descriptors that `session` saw last.
   void refuseOtherCameraThan(const PlaceSession& session) const;
@@ -55,6 +48,17 @@ class PlaceSession {
   const ros_conversions::FeatureStream& stream() const { return stream_; }
   const std::string& odomFrame() const { return odom_frame_; }
   std::optional<stereo_descriptor_vo::Place> message(int id, const std::string& robot) const;
+  std::optional<stereo_descriptor_vo::PlaceSignature> signature(int id, const std::string& robot) const;
+  /// But for the header and the counts of what came in.
+  stereo_descriptor_vo::PlaceInfo info(const PlaceReport& report) const;
+  /// Of the base in the map, at the newest key frame; none while its covariance is unknown. Frame and stamp are the
+  /// caller's to fill.
+  std::optional<geometry_msgs::PoseWithCovarianceStamped> basePose(const Eigen::Isometry3d& T_base_camera) const;
+
+  /// Places that look like another robot's, the best first. Throws std::invalid_argument where words differ in kind.
+  std::vector<PlaceCandidate> find(const stereo_descriptor_vo::PlaceSignature& signature) const;
+  /// What geometry says of place `id` and another robot's; none while it is not the same place.
+  std::optional<stereo_descriptor_vo::PlaceMatch> verify(int id, const Place& other) const;
 
   /// Whether it is known where in the places that were loaded the odometry is; true when none were.
   bool isLocated() const { return located_; }
@@ -75,6 +79,7 @@ class PlaceSession {
 
   void refuse(const StereoCamera& camera, const DescriptorKind& kind) const;
 
+  const PlaceIndexOptions index_;
   PlaceRecognition recognition_;
   std::string odom_frame_;
   ros_conversions::FeatureStream stream_;

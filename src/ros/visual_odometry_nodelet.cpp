@@ -1,5 +1,4 @@
 #include <nodelet/nodelet.h>
-#include <sensor_msgs/Imu.h>
 #include <std_srvs/Empty.h>
 #include <std_srvs/Trigger.h>
 #include <stereo_descriptor_vo/ResetToPose.h>
@@ -24,7 +23,7 @@
 #include "feature_conversions.hpp"
 #include "frame_id.hpp"
 #include "gravity_track.hpp"
-#include "gyro_track.hpp"
+#include "imu_input.hpp"
 #include "odometry_diagnostics.hpp"
 #include "odometry_publisher.hpp"
 #include "params.hpp"
@@ -90,9 +89,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     publisher_ = std::make_unique<OdometryPublisher>(nh_, options_.output);
     publisher_->restart(T_odom_start_);
     to_be_levelled_ = options_.output.use_imu;
-    transforms_ = std::make_unique<RobotTransforms>(nh_, publishedFrames(), [this](const std::string& what) {
-      if (throttle_.allows(what)) NODELET_WARN_STREAM(what);
-    });
+    transforms_ = std::make_unique<RobotTransforms>(nh_, publishedFrames(), [this](const std::string& what) { warn(what); });
     mount_ = std::make_unique<CameraMount>(*transforms_, options_.output.tf_timeout);
     patience_ = Patience(options_.output.guess_timeout);
     if (options_.output.opencv_threads >= 0) cv::setNumThreads(options_.output.opencv_threads);
@@ -108,9 +105,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
         std::make_unique<ReconfigureServer>(slow_nh, listOptions(reconfigured_), [this] { onReconfigure(); });
 
     if (options_.output.use_imu)
-      imu_subscriber_ = nh_.subscribe<sensor_msgs::Imu>(
-          "imu", kImuQueue, [this](const sensor_msgs::ImuConstPtr& m) { onImu(*m); }, ros::VoidConstPtr(),
-          ros::TransportHints().tcpNoDelay());
+      imu_ = std::make_unique<ImuInput>(nh_, *transforms_, [this](const std::string& what) { warn(what); });
     worker_ = std::make_unique<Worker<FeaturesFilter::Passed>>(
         static_cast<std::size_t>(options_.output.queue_size),
         [this](const FeaturesFilter::Passed& passed) { process(passed); });
@@ -120,6 +115,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   } catch (const std::exception& e) {
     NODELET_FATAL_STREAM("not started: " << e.what());
     throw;  // the manager forgets the nodelet, and its loader ends with an error
+  }
+
+  void warn(const std::string& what) {
+    if (throttle_.allows(what)) NODELET_WARN_STREAM(what);
   }
 
   void subscribe() {
@@ -153,23 +152,6 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   } catch (const std::exception& e) {
     if (throttle_.allows(e.what()))
       NODELET_ERROR_STREAM("features at " << message->header.stamp << " skipped: " << e.what());
-  }
-
-  void onImu(const sensor_msgs::Imu& message) {
-    const std::string problem = whyUnusable(message.header.stamp);
-    if (!problem.empty()) {
-      if (throttle_.allows("imu")) NODELET_WARN_STREAM("a message of the IMU is not used: " << problem);
-      return;
-    }
-    const auto& rate = message.angular_velocity;
-    {
-      const std::lock_guard<std::mutex> lock(pending_mutex_);
-      imu_frame_ = ros_conversions::cleanFrameId(message.header.frame_id);
-    }
-    const auto& acceleration = message.linear_acceleration;
-    gyro_.add(nanoseconds(message.header.stamp), nanoseconds(ros::Time::now()), {rate.x, rate.y, rate.z});
-    gravity_.add(nanoseconds(message.header.stamp), {acceleration.x, acceleration.y, acceleration.z},
-                 {rate.x, rate.y, rate.z});
   }
 
   /// Throws for what cannot be used, before its stamp counts.
@@ -319,18 +301,12 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     return MotionGuess{T_base_camera.inverse() * *T_before_now * T_base_camera};
   }
 
-  std::optional<MotionGuess> guessOfGyro(const std_msgs::Header& header, std::string& problem) {
+  std::optional<MotionGuess> guessOfGyro(const std_msgs::Header& header, std::string& problem) const {
     const std::optional<Eigen::Matrix3d> R_before_now =
-        gyro_.rotation(nanoseconds(*processed_stamp_), nanoseconds(header.stamp));
-    if (!R_before_now) {
-      problem = "topic " + imu_subscriber_.getTopic() + " has no measurements of that time";
-      return std::nullopt;
-    }
-    const std::optional<Eigen::Isometry3d> T_camera_imu =
-        transforms_->find(ros_conversions::cleanFrameId(header.frame_id), imuFrame(), problem);
-    if (!T_camera_imu) return std::nullopt;
+        imu_->rotation(ros_conversions::cleanFrameId(header.frame_id), *processed_stamp_, header.stamp, problem);
+    if (!R_before_now) return std::nullopt;
     MotionGuess guess;
-    guess.T_previous_current.linear() = T_camera_imu->linear() * *R_before_now * T_camera_imu->linear().transpose();
+    guess.T_previous_current.linear() = *R_before_now;
     guess.rotation_only = true;
     return guess;
   }
@@ -341,36 +317,19 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     constexpr double kPatience = 2.0;  // s of wall time
     const double now = steadyTime();
     if (!levels_until_) levels_until_ = now + kPatience;
-    const std::optional<Eigen::Vector3d> up = gravity_.up();
+    std::string problem;
+    const std::optional<Eigen::Vector3d> up =
+        imu_->up(ros_conversions::cleanFrameId(options_.output.base_frame_id), problem);
     if (!up && now < *levels_until_)
-      return "roll and pitch of the first pose: no second of gravity alone on " + imu_subscriber_.getTopic() + " yet";
+      return "roll and pitch of the first pose: no second of gravity alone on " + imu_->topic() + " yet";
     to_be_levelled_ = false;
-    std::string problem = "the robot moves, or nothing comes on " + imu_subscriber_.getTopic();
-    const std::optional<Eigen::Isometry3d> T_base_imu =
-        up ? transforms_->find(ros_conversions::cleanFrameId(options_.output.base_frame_id), imuFrame(), problem)
-           : std::nullopt;
-    if (T_base_imu) {
-      T_odom_start_ = levelled(T_odom_start_, T_base_imu->linear() * *up);
+    if (up) {
+      T_odom_start_ = levelled(T_odom_start_, *up);
       publisher_->restart(T_odom_start_);
     } else {
       NODELET_WARN_STREAM("roll and pitch of the first pose are those of initial_pose: " << problem);
     }
     return "";
-  }
-
-  /// A pose with its position and yaw, and with roll and pitch such that `up`, in the axes of the frame, is the
-  /// parent's z.
-  static Eigen::Isometry3d levelled(const Eigen::Isometry3d& pose, const Eigen::Vector3d& up) {
-    const Eigen::Matrix3d& R = pose.linear();
-    return Eigen::Translation3d(pose.translation()) *
-           Eigen::AngleAxisd(std::atan2(R(1, 0), R(0, 0)), Eigen::Vector3d::UnitZ()) *
-           Eigen::AngleAxisd(std::atan2(-up.x(), std::hypot(up.y(), up.z())), Eigen::Vector3d::UnitY()) *
-           Eigen::AngleAxisd(std::atan2(up.y(), up.z()), Eigen::Vector3d::UnitX());
-  }
-
-  std::string imuFrame() {
-    const std::lock_guard<std::mutex> lock(pending_mutex_);
-    return imu_frame_;
   }
 
   /// Asks for the camera's place on the robot; says what is missing, nothing when it is known.
@@ -448,7 +407,6 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
 
   /// Messages that wait for this node's own thread, which handles each in no time.
   static constexpr int kArrivalQueue = 20;
-  static constexpr int kImuQueue = 1000;
 
   CallbackThread callbacks_, slow_callbacks_;  // the second one of services that take their time
   ros::NodeHandle nh_;
@@ -460,6 +418,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   ReportThrottle throttle_;
   std::unique_ptr<RobotTransforms> transforms_;
   std::unique_ptr<CameraMount> mount_;
+  std::unique_ptr<ImuInput> imu_;  // none without use_imu
   std::unique_ptr<OdometryPublisher> publisher_;
   std::unique_ptr<OdometryDiagnostics> diagnostics_;
   std::vector<ros::ServiceServer> services_;
@@ -471,10 +430,6 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   // Only the callbacks' thread touches these.
   FeaturesFilter filter_;
   std::optional<std::uint32_t> stream_epoch_;
-
-  GyroTrack gyro_;
-  GravityTrack gravity_;
-  std::string imu_frame_;  // under pending_mutex_
 
   std::atomic<std::uint64_t> out_of_order_{0}, malformed_{0};
 
@@ -490,7 +445,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   Patience patience_{0.0};              // with guesses
 
   std::unique_ptr<Worker<FeaturesFilter::Passed>> worker_;
-  ros::Subscriber subscriber_, imu_subscriber_;
+  ros::Subscriber subscriber_;
 };
 
 }  // namespace sdvo

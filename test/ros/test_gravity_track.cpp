@@ -53,5 +53,16 @@ TEST(GravityTrack, GoesByTheLastSecond) {
   EXPECT_TRUE(track.up());
 }
 
+TEST(Levelled, KeepsPositionAndYawAndTurnsUpToTheParentsZ) {
+  const Eigen::Isometry3d pose = Eigen::Translation3d(1.0, -2.0, 3.0) *
+                                 Eigen::AngleAxisd(2.5, Eigen::Vector3d::UnitZ()) *
+                                 Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitY());
+  const Eigen::Vector3d up = Eigen::Vector3d(0.3, -0.2, 0.9).normalized();
+  const Eigen::Isometry3d level = levelled(pose, up);
+  EXPECT_EQ(level.translation(), pose.translation());
+  EXPECT_LT((level.linear() * up - Eigen::Vector3d::UnitZ()).norm(), 1e-12);
+  EXPECT_NEAR(std::atan2(level.linear()(1, 0), level.linear()(0, 0)), 2.5, 1e-12);
+}
+
 }  // namespace
 }  // namespace sdvo

@@ -1,0 +1,71 @@
+#pragma once
+
+#include <nav_msgs/Odometry.h>
+#include <ros/node_handle.h>
+#include <stereo_descriptor_vo/StereoFeatures.h>
+#include <stereo_descriptor_vo/VoInfo.h>
+
+#include <atomic>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "exact_synchroniser.hpp"
+
+namespace sdvo {
+
+/// Messages of one pair, stamps equal.
+struct OdometryPair {
+  stereo_descriptor_vo::StereoFeatures::ConstPtr features;
+  nav_msgs::Odometry::ConstPtr odometry;
+  stereo_descriptor_vo::VoInfo::ConstPtr info;
+  int resumes = 0;  ///< of the subscription, until it arrived
+};
+
+/// The features of a pair and what the odometry said of it: topics `stereo_features`, `odom` and `vo_info`. Its
+/// functions are called where callbacks run; counts may be read anywhere.
+class OdometryPairInput {
+ public:
+  using Callback = std::function<void(const OdometryPair&)>;
+  /// Of a message that is not used, and why.
+  using Refusal = std::function<void(const ros::Time& stamp, const std::string& why)>;
+
+  /// `queue_size`: pairs that wait for their other messages.
+  OdometryPairInput(const ros::NodeHandle& nh, int queue_size, Callback callback, Refusal refuse);
+
+  /// Without subscriptions the image side has one listener less. False where that was so already.
+  bool pause();
+  /// False where it was not paused.
+  bool resume();
+
+  /// Names of the topics, for people.
+  std::string topics() const;
+  /// Pairs with odometry whose other messages did not come.
+  std::uint64_t unpaired() const { return unpaired_; }
+  std::uint64_t refused() const { return refused_; }
+
+ private:
+  using Features = stereo_descriptor_vo::StereoFeatures;
+  using Odometry = nav_msgs::Odometry;
+  using Info = stereo_descriptor_vo::VoInfo;
+  using Synchroniser = ExactSynchroniser<Features, Odometry, Info>;
+
+  void subscribe();
+  template <int input, class Message>
+  ros::Subscriber subscribe(const std::string& topic);
+  template <int input, class Message>
+  void take(const boost::shared_ptr<const Message>& message);
+
+  ros::NodeHandle nh_;
+  const int queue_size_;
+  const Callback callback_;
+  const Refusal refuse_;
+  int resumes_ = 0;
+  std::atomic<std::uint64_t> unpaired_{0}, refused_{0};
+  std::unique_ptr<Synchroniser> synchroniser_;
+  std::vector<ros::Subscriber> subscribers_;
+};
+
+}  // namespace sdvo
