@@ -44,13 +44,25 @@ double Floor::weight(double square) {
   return 1.0 / (1.0 + square / kBend);
 }
 
+Eigen::Matrix<double, 6, 3> Floor::gain(const Jacobian& jacobian, const Matrix6d& covariance) const {
+  const Eigen::Matrix3d innovation = jacobian * covariance * jacobian.transpose() + Eigen::Matrix3d::Identity();
+  return innovation.ldlt().solve(jacobian * covariance).transpose();
+}
+
+Eigen::Isometry3d Floor::settled(const Eigen::Isometry3d& T_camera_origin, const Matrix6d& covariance) const {
+  Jacobian jacobian;
+  const Eigen::Vector3d found = residual(T_camera_origin, &jacobian);
+  if (!isOn(found)) return T_camera_origin;
+  const Eigen::Isometry3d T_origin_camera = T_camera_origin.inverse();
+  const Vector6d step = gain(jacobian, constrained(T_origin_camera, covariance)) * found;
+  return expSE3(-step) * T_camera_origin;
+}
+
 Matrix6d Floor::constrained(const Eigen::Isometry3d& T_origin_camera, const Matrix6d& covariance) const {
   Jacobian by_left;
   residual(T_origin_camera.inverse(), &by_left);
   // T_origin_camera exp(xi) inverted is exp(-xi) T_camera_origin; the sign does not matter to a covariance.
-  const Eigen::Matrix3d innovation = by_left * covariance * by_left.transpose() + Eigen::Matrix3d::Identity();
-  const Eigen::Matrix<double, 6, 3> gain = innovation.ldlt().solve(by_left * covariance).transpose();
-  const Matrix6d left = covariance - gain * by_left * covariance;
+  const Matrix6d left = covariance - gain(by_left, covariance) * by_left * covariance;
   return 0.5 * (left + left.transpose());
 }
 

@@ -274,7 +274,10 @@ VisualOdometry::Extension VisualOdometry::insert(const StereoFeatures& features,
   extension.T_keyframe_origin = map.poseBeforeNewest();
   if (map.newestIsKeyframe() && found.verdict.trust == Trust::kSound) recall(features);
   const CalibrationBelief prior = state_.calibration.prior(map.oldestId());
-  extension.adjustment = map.adjust(optimizer_, prior, extension.calibration, floor());
+  const std::optional<Floor> floor = this->floor();
+  extension.adjustment = map.adjust(optimizer_, prior, extension.calibration, floor);
+  // The window's first pose does not move in the adjustment: what it carries in height and tilt goes with the whole map.
+  if (floor) map.moveTo(floor->settled(map.newestPose(), state_.covariance.value()));
   map.renewLooks(features, found.sightings);
   return extension;
 }
@@ -450,14 +453,13 @@ std::optional<Floor> VisualOdometry::floor() const {
 
 /// Whether the newest pose is on the floor: a ramp is told of, and a level stretch behind it is another floor.
 void VisualOdometry::noteFloor(Step& step) {
-  constexpr double kOff = 4.0;  // standard deviations
   constexpr int kLevel = 10;    // pairs that make another floor
   const Floor known = *floor();
   const Eigen::Isometry3d& T_camera_origin = state_.map->newestPose();
   const Eigen::Vector3d residual = known.residual(T_camera_origin);
   const double height = known.base(T_camera_origin).translation().z();
-  const bool is_tilted = residual.tail<2>().norm() > kOff;
-  state_.on_floor = !is_tilted && std::abs(residual[0]) <= kOff;
+  const bool is_tilted = !Floor::isLevel(residual);
+  state_.on_floor = Floor::isOn(residual);
   state_.level_pairs = state_.on_floor || is_tilted ? 0 : state_.level_pairs + 1;
   std::ostringstream reason;
   if (is_tilted)

@@ -58,6 +58,21 @@ TEST(Floor, DerivativesAreThoseOfDifferences) {
   }
 }
 
+TEST(Floor, APoseSettlesByAsMuchAsItsCovarianceLeavesRoomFor) {
+  const Floor floor({}, mount(), 0.0);
+  const Eigen::Isometry3d lifted = cameraOf(Eigen::Translation3d(3.0, -2.0, 0.02) *
+                                            Eigen::AngleAxisd(1.1, Eigen::Vector3d::UnitZ()));
+  const double before = floor.residual(lifted).norm();
+  const Matrix6d certain = 1e-12 * Matrix6d::Identity(), uncertain = 4.0 * Matrix6d::Identity();
+  EXPECT_NEAR(floor.residual(floor.settled(lifted, certain)).norm(), before, 1e-3);
+  // The pose's own covariance is never wider than the floor's, so half of the way is left.
+  EXPECT_LT(floor.residual(floor.settled(lifted, uncertain)).norm(), 0.6 * before);
+  EXPECT_GT(floor.residual(floor.settled(lifted, uncertain)).norm(), 0.4 * before);
+  const Eigen::Isometry3d on_a_ramp = cameraOf(Eigen::Translation3d(3.0, -2.0, 0.02) *
+                                               Eigen::AngleAxisd(-0.1, Eigen::Vector3d::UnitY()));
+  EXPECT_TRUE(floor.settled(on_a_ramp, uncertain).isApprox(on_a_ramp, 0.0));
+}
+
 TEST(Floor, TheCovarianceIsNoLargerThanTheFloorAllows) {
   PlanarOptions options;
   const Floor floor(options, mount(), 0.0);

@@ -65,9 +65,8 @@ TEST(PlanarOdometry, OnAFlatFloorTheHeightStaysAndTheRestIsNoWorse) {
       130, [](int) { return 0.0; }, [](int i) { return 0.01 * std::sin(0.1 * i); });
   const auto planar = follow(poses, true), free = follow(poses, false);
   const PlanarOptions options;
-  EXPECT_LT(largestHeight(planar), 3.0 * options.planar_height_sigma) << "m, on 100 m";
+  EXPECT_LT(largestHeight(planar), options.planar_height_sigma) << "m, on 100 m";
   ASSERT_GT(largestHeight(free), 3.0 * options.planar_height_sigma);
-  EXPECT_LT(largestHeight(planar), 0.5 * largestHeight(free));
   EXPECT_LT(errorAtEnd(planar, poses), errorAtEnd(free, poses) + 0.02);
   for (const OdometryResult& result : planar) EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
   // What the constraint gives is in the covariance: y of the camera is down.

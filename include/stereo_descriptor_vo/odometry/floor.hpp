@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <cmath>
 
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
@@ -43,8 +44,22 @@ struct Floor {
   static double cost(double square);
   static double weight(double square);
 
+  /// Whether a base with this residual drives on the floor: it is level, and at most four standard deviations over it.
+  static bool isLevel(const Eigen::Vector3d& residual) { return residual.tail<2>().norm() <= kOff; }
+  static bool isOn(const Eigen::Vector3d& residual) { return isLevel(residual) && std::abs(residual[0]) <= kOff; }
+
+  /// T_camera_origin nearer to the floor, by as much as the pose's covariance (of a right perturbation of
+  /// T_origin_camera) leaves room for; unchanged where the base is off the floor.
+  Eigen::Isometry3d settled(const Eigen::Isometry3d& T_camera_origin, const Matrix6d& covariance) const;
+
   /// Covariance of a pose (of a right perturbation of T_origin_camera) after the constraint to this floor.
   Matrix6d constrained(const Eigen::Isometry3d& T_origin_camera, const Matrix6d& covariance) const;
+
+ private:
+  static constexpr double kOff = 4.0;  // standard deviations
+
+  /// Of the residual's three numbers on a right perturbation of T_origin_camera.
+  Eigen::Matrix<double, 6, 3> gain(const Jacobian& jacobian, const Matrix6d& covariance) const;
 };
 
 }  // namespace sdvo
