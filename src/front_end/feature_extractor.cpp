@@ -67,6 +67,13 @@ FeatureExtractor::FeatureExtractor(const FeatureExtractorOptions& options)
       depth_scale_(options.size_curve),
       descriptor_(options.descriptor) {}
 
+DepthScaleOptions FeatureExtractor::sizeCurve(cv::Size image) const {
+  DepthScaleOptions curve = options_.size_curve;
+  const double largest = descriptor_.largestSize(image);
+  for (double* size : {&curve.min_size, &curve.max_size, &curve.constant_size}) *size = std::min(*size, largest);
+  return curve;
+}
+
 StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
                                          std::int64_t stamp, const cv::Mat& mask) const {
   camera.check();

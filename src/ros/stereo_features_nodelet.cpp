@@ -201,7 +201,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     diagnostics_->note(features);
     reportRig(features, stamp);
     const auto message = boost::make_shared<stereo_descriptor_vo::StereoFeatures>(
-        ros_conversions::toMessage(features, extractor_->options().size_curve));
+        ros_conversions::toMessage(features, extractor_->sizeCurve(decoded.left.size())));
     message->header.stamp = stamp;
     message->header.frame_id = ros_conversions::cleanFrameId(pair.left_image->header.frame_id);
     message->stream_epoch = stream_epoch_;

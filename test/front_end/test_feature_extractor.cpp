@@ -212,6 +212,25 @@ TEST(FeatureExtractor, DescribesMostOfASmallImage) {
   for (const float size : features.size) EXPECT_NEAR(size, 28.8f, 0.5f);
 }
 
+TEST(FeatureExtractor, SizeCurveIsThatOfEverySizeAlsoInALowImage) {
+  // The near plane's sizes, 28.8 px, have no room in 150 rows.
+  StereoCamera low = synthetic::camera();
+  low.height = 150;
+  low.cy -= 100.0;
+  const Pair pair = planeAt(5.0);
+  const cv::Range rows(100, 250);
+  const FeatureExtractor extractor{FeatureExtractorOptions()};
+  const StereoFeatures features = extractor.extract(low, pair.left.rowRange(rows), pair.right.rowRange(rows), 0);
+  ASSERT_GT(features.count(), 50);
+  const DepthScaleOptions curve = extractor.sizeCurve({low.width, low.height});
+  EXPECT_LT(curve.max_size, 28.0);
+  for (int i = 0; i < features.count(); ++i) {
+    const std::size_t k = static_cast<std::size_t>(i);
+    EXPECT_NEAR(features.size[k], DepthScale(curve).size(features.disparity[k]), 1e-4);
+  }
+  EXPECT_EQ(extractor.sizeCurve({640, 480}).max_size, extractor.options().size_curve.max_size);
+}
+
 TEST(FeatureExtractor, IsStateless) {
   const StereoCamera camera = synthetic::camera();
   const FeatureExtractor extractor(fewFeatures());

@@ -46,6 +46,9 @@ class FeatureExtractor {
   StereoFeatures extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp,
                          const cv::Mat& mask = cv::Mat()) const;
 
+  /// The size curve of features in images of this size (px): no size exceeds what the image has room for.
+  DepthScaleOptions sizeCurve(cv::Size image) const;
+
   const FeatureExtractorOptions& options() const { return options_; }
 
  private:
