@@ -42,7 +42,7 @@ class Compressed(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.clock = SimulatedClock()
-        cls.sequence = StereoSequence('06', PAIRS)
+        cls.sequence = StereoSequence(PAIRS)
 
     def run_pipeline(self, namespace, camera):
         """The features of all pairs."""

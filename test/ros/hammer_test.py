@@ -45,7 +45,7 @@ class Hammer(unittest.TestCase):
         cls.clock = SimulatedClock()
         cls.broadcaster = tf2_ros.StaticTransformBroadcaster()
         cls.broadcaster.sendTransform(camera_transform(FRAME))
-        cls.camera = Camera(NAMESPACE, StereoSequence('06', PAIRS), cls.clock)
+        cls.camera = Camera(NAMESPACE, StereoSequence(PAIRS), cls.clock)
         cls.info = Collector(NAMESPACE + '/vo_info', VoInfo)
         cls.places = Collector(NAMESPACE + '/place_info', PlaceInfo)
         cls.signatures = Collector(NAMESPACE + '/place_signature', PlaceSignature)

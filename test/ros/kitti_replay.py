@@ -1,10 +1,7 @@
 """What the ROS tests share: stereo pairs, the pipeline as a user launches it, and the wait for what must happen."""
 
-import atexit
 import os
-import shutil
 import subprocess
-import tempfile
 import time
 import unittest
 import xmlrpc.client
@@ -14,6 +11,7 @@ import numpy as np
 import rosgraph
 import roslib.packages
 import rospy
+from catkin.find_in_workspaces import find_in_workspaces
 from cv_bridge import CvBridge
 from rosgraph_msgs.msg import Clock, Log
 from sensor_msgs.msg import CameraInfo, Image
@@ -44,19 +42,14 @@ def run_tool(name, *arguments):
     subprocess.run([executable] + list(arguments), check=True, stdout=subprocess.DEVNULL)
 
 
-def sequence_dir(name, count):
-    """A sequence in KITTI layout of at least `count` pairs: KITTI's own, or without KITTI_DIR a rendered street, as fast
-    straight ahead as KITTI's 06 begins. The test is skipped, loudly, where there is neither."""
-    if os.environ.get('KITTI_DIR') or not roslib.packages.find_node(PACKAGE, 'render_drive'):
-        return os.path.join(kitti_dir(), 'sequences', name)
-    directory = tempfile.mkdtemp(prefix='sdvo_street_')
-    atexit.register(shutil.rmtree, directory, ignore_errors=True)
-    poses, drive = os.path.join(directory, 'poses.txt'), os.path.join(directory, 'drive')
-    ahead = np.tile(np.eye(3, 4), (count, 1, 1))
-    ahead[:, 2, 3] = 1.2 * np.arange(count)
-    np.savetxt(poses, ahead.reshape(count, 12))
-    run_tool('render_drive', '--trajectory', poses, '--output', drive)
-    return drive
+def street_dir():
+    """The rendered street in KITTI layout: 60 pairs, a metre straight ahead from each to the next (target
+    stereo_descriptor_vo_street). Where it cannot be rendered, the beginning of KITTI 06, which is much the same; the test is
+    skipped, loudly, where there is neither."""
+    for directory in find_in_workspaces(['share'], PACKAGE, 'street'):
+        if os.path.isfile(os.path.join(directory, 'poses.txt')):
+            return directory
+    return os.path.join(kitti_dir(), 'sequences', '06')
 
 
 def wait_until(condition, timeout=30.0):
@@ -113,10 +106,10 @@ class Collector:
 
 
 class StereoSequence:
-    """The first pairs of a sequence in memory."""
+    """The first pairs of the street in memory."""
 
-    def __init__(self, name, count):
-        directory = sequence_dir(name, count)
+    def __init__(self, count):
+        directory = street_dir()
         paths = [[os.path.join(directory, 'image_%d' % side, '%06d.png' % i) for side in range(2)]
                  for i in range(count)]
         self.pairs = [[cv2.imread(path, cv2.IMREAD_GRAYSCALE) for path in pair] for pair in paths]

@@ -154,7 +154,8 @@ class Launch(unittest.TestCase):
                 return subprocess.run(['roslaunch'] + list(arguments[1:]) + [PACKAGE, 'kitti.launch', 'rviz:=false',
                                                                              'bag:=' + arguments[0]],
                                       cwd=directory, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
-            self.assertEqual(launch(good, '--dump-params').stderr, b'')
+            outcome = launch(good, '--dump-params')
+            self.assertEqual(outcome.returncode, 0, outcome.stderr)
             for bag in (bad, os.path.join(directory, 'missing.bag'), 'good.bag'):  # the player has another directory
                 outcome = launch(bag)
                 self.assertNotEqual(outcome.returncode, 0, bag)

@@ -140,12 +140,16 @@ class Recognition:
         arguments = ['%s:=%s' % item for item in arguments.items()] + ['namespace:=' + namespace.strip('/')]
         self.process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'place_recognition.launch'] + arguments)
 
+    def inputs(self):
+        """Its subscriptions as our end has them."""
+        return {('out', '%s/%s' % (self.namespace, topic), self.namespace + '/places_manager')
+                for topic in ('stereo_features', 'odom', 'vo_info')}
+
     def is_connected(self):
-        manager, topics = self.namespace + '/places_manager', ('stereo_features', 'odom', 'vo_info')
         needed = {('out', c.subscriber.resolved_name, rospy.get_name())
                   for c in (self.info, self.signatures, self.path, self.graph, self.loops, self.matches, self.rosout)}
-        sent = {('out', '%s/%s' % (self.namespace, topic), manager) for topic in topics}
-        return links(manager) >= needed | {('in', '/tf_static')} and links(rospy.get_name()) >= sent
+        return (links(self.namespace + '/places_manager') >= needed | {('in', '/tf_static')} and
+                links(rospy.get_name()) >= self.inputs())
 
     def call(self, name, service, *arguments):
         name = '%s/place_recognition/%s' % (self.namespace, name)
@@ -337,14 +341,14 @@ class Places(unittest.TestCase):
 
     def paused_and_resumed(self, robot, recognition):
         self.assertTrue(recognition.call('pause', Trigger).success)
+        self.assertTrue(wait_until(lambda: not recognition.inputs() & links(rospy.get_name())))
         answered = len(recognition.info)
         robot.stamp = self.clock.now
         robot.drive()
-        time.sleep(0.5)
-        self.assertEqual(len(recognition.info), answered)
         self.assertTrue(recognition.call('resume', Trigger).success)
         self.assertTrue(wait_until(recognition.is_connected))
         self.drive(robot, recognition, 1)
+        self.assertEqual(len(recognition.info), answered + 1)
         self.assertTrue(wait_until(lambda: 'break' in {edge.kind for edge in recognition.graph[-1].edges}))
 
     def the_odometry_is_lost_and_restarted(self, robot, recognition):

@@ -23,7 +23,7 @@ from stereo_descriptor_vo.msg import VoInfo
 RATE = 10.0  # Hz
 STOP = range(150, 200)  # pairs during which the car stands still
 # A quarter of KITTI's pixels, for the sake of time.
-CALIBRATION = 'P0: 353.5 0 310 0 0 353.5 93.5 0 0 0 1 0\nP1: 353.5 0 310 -189.9 0 353.5 93.5 0 0 0 1 0\n'
+CALIBRATION = os.path.join(os.path.dirname(os.path.realpath(__file__)), 'street_calib.txt')
 SIZE = '620x188'
 
 
@@ -53,11 +53,9 @@ class RenderedDrive(unittest.TestCase):
     def setUpClass(cls):
         cls.directory = tempfile.mkdtemp(prefix='sdvo_rendered_')
         drive = os.path.join(cls.directory, 'drive')
-        poses, calibration = os.path.join(cls.directory, 'plan.txt'), os.path.join(cls.directory, 'calib.txt')
+        poses = os.path.join(cls.directory, 'plan.txt')
         np.savetxt(poses, planned_drive().reshape(-1, 12))
-        with open(calibration, 'w') as file:
-            file.write(CALIBRATION)
-        run_tool('render_drive', '--trajectory', poses, '--rate', str(RATE), '--calib', calibration, '--size', SIZE,
+        run_tool('render_drive', '--trajectory', poses, '--rate', str(RATE), '--calib', CALIBRATION, '--size', SIZE,
                  '--output', drive)
         bag = os.path.join(cls.directory, 'drive.bag')
         run_tool('kitti_to_bag', '--sequence', drive, '--output', bag)

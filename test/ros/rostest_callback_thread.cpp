@@ -3,6 +3,8 @@
 #include <std_msgs/Int32.h>
 
 #include <atomic>
+#include <functional>
+#include <string>
 #include <thread>
 
 #include "../../src/ros/callback_thread.hpp"
@@ -22,6 +24,24 @@ std_msgs::Int32 message(int data) {
   return message;
 }
 
+/// Another subscriber of the same topic, on the global queue: a message that it got has come to all in this process.
+class Witness {
+ public:
+  Witness(ros::NodeHandle& nh, const std::string& topic)
+      : subscriber_(nh.subscribe<std_msgs::Int32>(topic, 100, [this](const std_msgs::Int32::ConstPtr& m) { last_ = m->data; })) {}
+
+  bool gets(int data) {
+    return waitUntil([&] {
+      ros::spinOnce();
+      return last_ == data;
+    });
+  }
+
+ private:
+  int last_ = -1;
+  ros::Subscriber subscriber_;
+};
+
 /// What the threads that all nodelets share are to us here: nobody serves the global queue.
 TEST(CallbackThread, NeedsNobodyElsesThreads) {
   std::atomic<int> last{0};
@@ -35,9 +55,10 @@ TEST(CallbackThread, NeedsNobodyElsesThreads) {
     thread = std::hash<std::thread::id>()(std::this_thread::get_id());
   };
   ros::Subscriber subscriber = served.subscribe<std_msgs::Int32>("numbers", 100, receive);
+  Witness witness(nh, "numbers");
   ASSERT_TRUE(waitUntil([&] { return publisher.getNumSubscribers() > 0; }));
   publisher.publish(message(1));
-  ros::WallDuration(0.1).sleep();
+  ASSERT_TRUE(witness.gets(1));
   EXPECT_EQ(last, 0) << "called before start()";
   callbacks.start();
   EXPECT_TRUE(waitUntil([&] { return last == 1; }));
@@ -61,6 +82,7 @@ TEST(CallbackThread, AfterStopNoCallbackRuns) {
     is_running = false;
   };
   ros::Subscriber subscriber = served.subscribe<std_msgs::Int32>("more_numbers", 100, receive);
+  Witness witness(nh, "more_numbers");
   callbacks.start();
   ASSERT_TRUE(waitUntil([&] { return publisher.getNumSubscribers() > 0; }));
   for (int i = 0; i < 20; ++i) publisher.publish(message(i));
@@ -70,7 +92,7 @@ TEST(CallbackThread, AfterStopNoCallbackRuns) {
   const int calls_then = calls;
   EXPECT_FALSE(is_running);
   publisher.publish(message(99));
-  ros::WallDuration(0.2).sleep();
+  ASSERT_TRUE(witness.gets(99));
   EXPECT_EQ(calls, calls_then);
   EXPECT_FALSE(ran_late);
 }

@@ -160,9 +160,7 @@ TEST_F(OdometryPublisherTest, TransformsGoWhereTheNodeHasThemRemapped) {
   start({});
   publish(resultAt(2));
   ASSERT_TRUE(spinUntil([&] { return !tf_->messages.empty(); }));
-  ros::WallDuration(0.2).sleep();
-  ros::spinOnce();
-  EXPECT_TRUE(process_tf.messages.empty());
+  EXPECT_FALSE(process_tf.isConnected()) << "nobody announces transforms there";
 }
 
 TEST_F(OdometryPublisherTest, WithoutAPoseThereIsNeitherOdometryNorPath) {
