@@ -13,6 +13,7 @@ import roslib.packages
 import rospy
 from catkin.find_in_workspaces import find_in_workspaces
 from cv_bridge import CvBridge
+from nodelet.srv import NodeletList
 from rosgraph_msgs.msg import Clock, Log
 from sensor_msgs.msg import CameraInfo, Image
 
@@ -203,6 +204,14 @@ class Pipeline:
         inputs = ('stereo_features', 'left/image_rect', 'right/image_rect', 'left/camera_info', 'right/camera_info')
         needed |= {('in', '%s/%s' % (self.namespace, topic)) for topic in inputs}
         return links(self.manager) >= needed | {('in', '/tf_static')}
+
+    def has_loaded(self, *names):
+        """Whether these nodelets are in the manager and have subscribed all: two of them share what goes in."""
+        try:
+            loaded = rospy.ServiceProxy(self.manager + '/list', NodeletList)().nodelets
+        except (rospy.ServiceException, rospy.exceptions.TransportException):
+            return False  # it is not there yet
+        return all('%s/%s' % (self.namespace, name) in loaded for name in names)
 
     def pid(self):
         """Of the nodelet manager; None when it is gone."""

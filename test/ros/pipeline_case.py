@@ -58,7 +58,8 @@ class PipelineCase(unittest.TestCase):
         self.rosout = self.keep(Rosout(self.namespace))
         self.camera = self.keep(Camera(self.namespace, self.sequence, self.clock))
         self.pipeline = self.keep(Pipeline(self.namespace, **arguments))
-        self.assertTrue(wait_until(lambda: self.camera.is_subscribed() and
+        nodelets = ['stereo_features', 'visual_odometry'] + ['place_recognition'] * (arguments.get('loop_closing') == 'true')
+        self.assertTrue(wait_until(lambda: self.camera.is_subscribed() and self.pipeline.has_loaded(*nodelets) and
                                    self.pipeline.is_connected((self.odometry, self.info, self.features)), 60),
                         'the pipeline did not start')
         self.pid = self.pipeline.pid()
