@@ -1,5 +1,6 @@
 """What the ROS tests share: stereo pairs, the pipeline as a user launches it, and the wait for what must happen."""
 
+import copy
 import os
 import subprocess
 import time
@@ -118,6 +119,14 @@ class StereoSequence:
         with open(os.path.join(directory, 'calib.txt')) as file:
             rows = dict(line.split(':') for line in file if line.strip())
         self.projections = [[float(x) for x in rows['P%d' % side].split()] for side in range(2)]
+
+    def scaled(self, factor):
+        """The same as a camera with more or fewer pixels would see it."""
+        other = copy.copy(self)
+        other.pairs = [[cv2.resize(image, None, fx=factor, fy=factor, interpolation=cv2.INTER_AREA) for image in pair]
+                       for pair in self.pairs]
+        other.projections = [[factor * p if k < 8 else p for k, p in enumerate(row)] for row in self.projections]
+        return other
 
     def camera_info(self, side):
         p = self.projections[side]

@@ -557,6 +557,7 @@ class Live(PipelineCase):
         self.assertTrue(wait_until(is_named), self.rosout.warnings)
 
     def test_overload_drops_whole_pairs_and_keeps_the_newest(self):
+        self.sequence = self.sequence.scaled(2.0)
         self.start()
         last = PAIRS - 1
         # All pairs at once, each of which takes its time; stamps as of a fast camera, whose gaps are no jumps.
@@ -762,11 +763,7 @@ class Live(PipelineCase):
 
     def test_two_cameras_in_one_manager(self):
         self.start()
-        smaller = copy.copy(self.sequence)
-        smaller.pairs = [[cv2.resize(image, None, fx=0.75, fy=0.75, interpolation=cv2.INTER_AREA) for image in pair]
-                         for pair in self.sequence.pairs]
-        smaller.projections = [[0.75 * p if k < 8 else p for k, p in enumerate(row)] for row in self.sequence.projections]
-        other_camera, other_info, other_odometry, other_features = self.start_another(smaller)
+        other_camera, other_info, other_odometry, other_features = self.start_another(self.sequence.scaled(0.75))
         for i in range(6):
             other_camera.publish(*other_camera.messages(i))
             self.feed(i)
