@@ -385,7 +385,7 @@ class Live(PipelineCase):
         self.assertEqual(answer['stereo/min_disparity'], 50.0)  # the end of its range
         client.update_configuration({'stereo/min_disparity': 0.5})
         after = self.feed(1)
-        self.assertGreater(before.detected, 1000)
+        self.assertGreater(before.detected, 400)
         self.assertEqual(after.detected, 200)
         # Fewer features are described as before: nothing begins anew.
         self.assertEqual((after.state, after.epoch), ('TRACKING', before.epoch))
@@ -413,7 +413,7 @@ class Live(PipelineCase):
             self.assertNotEqual(answer['detector/max_features'], 300)
             self.assertTrue(wait_until(lambda: len(self.rosout.warnings) == i + 1), self.rosout.warnings)
             self.assertIn('nothing reconfigured', self.rosout.warnings[i])
-            self.assertGreater(self.feed(i + 1).detected, 1000)
+            self.assertGreater(self.feed(i + 1).detected, 400)
         # What comes next and is right takes effect.
         client.update_configuration({'detector/max_features': 200})
         self.assertEqual(self.feed(4).detected, 200)
@@ -445,7 +445,7 @@ class Live(PipelineCase):
                 image.data = (pixels.astype(np.uint16) * 16).astype('>u2' if i % 2 else '<u2').tobytes()
             info = self.feed_messages(images, infos)
             self.assertEqual(info.state, 'TRACKING')
-            self.assertGreater(info.features, 500)
+            self.assertGreater(info.features, 300)
 
     def test_diagnostics_tell_state_latency_and_silence(self):
         config = tempfile.NamedTemporaryFile('w', suffix='.yaml')
