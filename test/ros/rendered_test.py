@@ -65,13 +65,16 @@ class RenderedDrive(unittest.TestCase):
 
         cls.odometry = Collector('/stereo/odom', Odometry)
         cls.info = Collector('/stereo/vo_info', VoInfo)
+        cls.planar = Collector('/planar/odom', Odometry)
         cls.ground_truth = [Collector('/ground_truth/odom', Odometry), Collector('/ground_truth/path', Path)]
         needed = {('out', c.subscriber.resolved_name, rospy.get_name()) for c in (cls.odometry, cls.info)}
         needed.add(('in', '/stereo/stereo_features'))
         assert wait_until(lambda: links('/stereo/stereo_vo_manager') >= needed, 60), 'the nodelets are not connected'
+        needed = {('out', '/planar/odom', rospy.get_name()), ('in', '/stereo/stereo_features')}
+        assert wait_until(lambda: links('/planar/odometry_manager') >= needed, 60), 'the planar nodelet is not connected'
         subprocess.run(['rosbag', 'play', '--quiet', '--clock', '--wait-for-subscribers', '--rate',
                         str(rospy.get_param('~rate')), bag], check=True)
-        wait_until(lambda: len(cls.odometry) >= len(cls.stamps) and len(cls.info) >= len(cls.stamps))
+        wait_until(lambda: min(map(len, (cls.odometry, cls.info, cls.planar))) >= len(cls.stamps))
         cls.estimated = [matrix_of(message.pose.pose) for message in cls.odometry]
         cls.true = [matrix_of(cls.truth[stamp].pose.pose) for stamp in cls.stamps]
 
@@ -98,6 +101,17 @@ class RenderedDrive(unittest.TestCase):
             error = np.linalg.norm(self.estimated[k][:3, 3] - self.true[k][:3, 3])
             self.assertLess(error, 0.05 + 0.015 * travelled, 'pair %d' % k)
         self.assertGreater(travelled, 100.0)
+
+    def test_a_planar_robot_stays_on_its_floor(self):
+        self.assertEqual([message.header.stamp for message in self.planar], self.stamps)
+        planar = [matrix_of(message.pose.pose) for message in self.planar]
+        for pose, message in zip(planar, self.planar):
+            self.assertLess(abs(pose[2, 3]), 0.01, 'height at %s' % message.header.stamp)
+            self.assertLessEqual(message.pose.covariance[14], 0.01 ** 2 + 1e-9)
+
+        def largest_error(poses):
+            return max(np.linalg.norm(pose[:2, 3] - true[:2, 3]) for pose, true in zip(poses, self.true))
+        self.assertLess(largest_error(planar), largest_error(self.estimated) + 0.05)
 
     def test_standing_still_is_standing_still(self):
         # The first pairs of the stop still refine what was measured while driving.
