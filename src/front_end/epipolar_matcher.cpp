@@ -1,7 +1,6 @@
 #include "stereo_descriptor_vo/front_end/epipolar_matcher.hpp"
 
 #include <Eigen/Core>
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -41,6 +40,21 @@ float valleyBetween(const unsigned* differences) {
   const float before = static_cast<float>(differences[0]), after = static_cast<float>(differences[2]);
   const float rise = std::max(before, after) - static_cast<float>(differences[1]);
   return rise > 0.f ? 0.5f * (before - after) / rise : 0.f;
+}
+
+/// Eigen sums three products in an order that depends on the processor: here it is written down.
+float sumOfProducts(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
+  return a[0] * b[0] + (a[1] * b[1] + a[2] * b[2]);
+}
+
+Eigen::Matrix3f inverseOfSymmetric(const Eigen::Matrix3f& m) {
+  const Eigen::Vector3f first(m(1, 1) * m(2, 2) - m(1, 2) * m(1, 2), m(1, 2) * m(0, 2) - m(2, 2) * m(0, 1),
+                              m(0, 1) * m(1, 2) - m(0, 2) * m(1, 1));
+  const float factor = 1.f / sumOfProducts(first, m.col(0));
+  const float a = first[0] * factor, b = first[1] * factor, c = first[2] * factor;
+  const float d = (m(2, 2) * m(0, 0) - m(0, 2) * m(0, 2)) * factor, e = (m(0, 2) * m(0, 1) - m(0, 0) * m(1, 2)) * factor;
+  const float f = (m(0, 0) * m(1, 1) - m(0, 1) * m(0, 1)) * factor;
+  return (Eigen::Matrix3f() << a, b, c, b, d, e, c, e, f).finished();
 }
 
 }  // namespace
@@ -128,7 +142,7 @@ std::optional<cv::Point2f> EpipolarMatcher::align(const cv::Point2f& left_positi
   const float dd = hessian(0, 0), dv = hessian(0, 1), vv = hessian(1, 1);
   if (dd * vv - dv * dv < 1e-3f * dd * vv || dd < static_cast<float>(patch.pixels())) return std::nullopt;
   hessian(2, 2) += kUpright;
-  const Eigen::Matrix3f inverse = hessian.inverse();
+  const Eigen::Matrix3f inverse = inverseOfSymmetric(hessian);
 
   cv::Point2f found = start;
   float slant = 0.f, step_before = 0.f;
@@ -136,7 +150,8 @@ std::optional<cv::Point2f> EpipolarMatcher::align(const cv::Point2f& left_positi
     Eigen::Vector3f gradient =
         patch.compare(images_.right, kMargin, left_position.x - found.x, left_position.y + found.y, slant);
     gradient[2] -= kUpright * slant;
-    const Eigen::Vector3f step = inverse * gradient;
+    Eigen::Vector3f step;
+    for (int i = 0; i < 3; ++i) step[i] = sumOfProducts(inverse.col(i), gradient);
     slant += step[2];
     found.x += step[0] + slant * step[1];
     found.y += step[1];

@@ -171,7 +171,7 @@ INSTANTIATE_TEST_SUITE_P(RealDrives, Guises,
                                           testing::Values("as_recorded", "every_2nd", "every_3rd", "backwards",
                                                           "mirrored", "upside_down", "half", "middle_70", "dark_noise",
                                                           "saturated")),
-                         [](const auto& info) { return std::get<0>(info.param) + "_" + std::get<1>(info.param); });
+                         [](const auto& tested) { return std::get<0>(tested.param) + "_" + std::get<1>(tested.param); });
 
 }  // namespace
 }  // namespace sdvo
