@@ -524,9 +524,9 @@ class Live(PipelineCase):
         for k in range(90):
             still.header.stamp = self.camera.messages(0)[0][0].header.stamp - rospy.Duration.from_sec(0.015 * (90 - k))
             imu.publish(still)
-        time.sleep(0.5)
-        self.assertEqual(self.feed(0).state, 'TRACKING')
-        images, infos = self.camera.messages(1)
+        times = itertools.count()
+        self.assertTrue(wait_until(lambda: self.feed(0, time_of=next(times)).state == 'TRACKING'), self.info[-1].reason)
+        images, infos = self.camera.messages(1, time_of=next(times))
         turn(images)
         self.assertEqual(self.feed_messages(images, infos).state, 'TRACKING')
         self.assertTrue(wait_until(lambda: self.rosout.warned('no guess of the motion', 'gyro')), self.rosout.warnings)
@@ -536,7 +536,7 @@ class Live(PipelineCase):
         q.x, q.y, q.z, q.w = 1.0, 0.0, 0.0, 0.0
         self.broadcaster.sendTransform([camera_transform(FRAME), transform])  # what is latched replaces what was
         for i in range(2, 6):
-            images, infos = self.camera.messages(i)
+            images, infos = self.camera.messages(i, time_of=next(times))
             turn(images)
             self.assertEqual(self.feed_messages(images, infos).state, 'TRACKING')
 
