@@ -8,13 +8,20 @@
 namespace sdvo {
 namespace {
 
+/// OpenCV fuses products and sums on ARM, we never: there a mean near the middle of two grey levels may become the other one.
+#ifdef __aarch64__
+constexpr double kRounding = 1.0;  // grey levels
+#else
+constexpr double kRounding = 0.0;
+#endif
+
 void expectHalfOfOpenCv(cv::Size size) {
   cv::Mat image(size, CV_8U), expected, half;
   cv::RNG(static_cast<unsigned>(size.area())).fill(image, cv::RNG::UNIFORM, 0, 256);
   cv::resize(image, expected, cv::Size((size.width + 1) / 2, (size.height + 1) / 2), 0.0, 0.0, cv::INTER_AREA);
   halveImage(image, half);
   ASSERT_EQ(half.size(), expected.size());
-  ASSERT_EQ(cv::norm(half, expected, cv::NORM_INF), 0.0) << size;
+  ASSERT_LE(cv::norm(half, expected, cv::NORM_INF), kRounding) << size;
 }
 
 TEST(HalfImage, IsThatOfOpenCv) {
