@@ -175,8 +175,29 @@ def plot_consensus(folder):
     save(figure, folder, "consensus.png")
 
 
+def plot_scale_change(folder):
+    """Correct matches against the change of scale, of each method; and its time."""
+    rows = read_table(folder, "scale_change.csv")
+    figure, axis = plt.subplots(figsize=(7.0, 4.6))
+    for method in unique(row["method"] for row in rows):
+        chosen = [r for r in rows if r["method"] == method]
+        scales = unique(r["scale"] for r in chosen)
+        share = [100.0 * sum(number(r["correct"]) for r in chosen if r["scale"] == s)
+                 / max(1.0, sum(number(r["visible"]) for r in chosen if r["scale"] == s)) for s in scales]
+        ms = sum(number(r["ms_per_pair"]) for r in chosen) / len(chosen)
+        style = {"freak": "C0", "sift": "C1", "orb": "C2"}[method.split()[0].rstrip(",")]
+        style += "o-" if "depth" in method else "s:" if "constant" in method else "^--"
+        axis.plot([float(s) for s in scales], share, style, label="%s (%.0f ms)" % (method, ms))
+    axis.set_xlabel("change of scale between the views")
+    axis.set_ylabel("correct matches, % of the features in view")
+    axis.set_xticks([1.0, 1.5, 2.0, 3.0, 4.0])
+    axis.grid(linestyle=":")
+    axis.legend(fontsize=8)
+    save(figure, folder, "scale_change.png")
+
+
 PLOTS = {"matching": plot_matching, "robustness": plot_robustness, "accuracy": plot_accuracy,
-         "consensus": plot_consensus}
+         "consensus": plot_consensus, "scale_change": plot_scale_change}
 
 
 def main():

@@ -202,9 +202,8 @@ std::vector<ShapeFit> fitShapes(const std::vector<SizeSample>& samples) {
           fitShape(samples, "a*d^b", true, false), fitShape(samples, "a*d^b+c", true, true)};
 }
 
-std::vector<SlopeTrial> trySlopes(const std::vector<ReferenceSequence>& sequences, const PipelineOptions& options,
-                                  const ShapeFit& shape, const std::vector<double>& slopes,
-                                  const std::vector<double>& min_sizes, double max_size, int features) {
+std::vector<CurveTrial> tryCurves(const std::vector<ReferenceSequence>& sequences, const PipelineOptions& options,
+                                  const std::vector<DepthScaleOptions>& curves, int features) {
   constexpr int kStride = 10, kSteps[] = {1, 4, 7, 10};
   constexpr double kTolerance = 3.0;  // px
   const FeatureExtractorOptions& extraction = options.stereo_features;
@@ -212,43 +211,40 @@ std::vector<SlopeTrial> trySlopes(const std::vector<ReferenceSequence>& sequence
   left_view.layout = DescriptorLayout::kLeft;
   const StereoDescriptor descriptor(left_view);
   const Reach reach = [&](double size) { return descriptor.reach(size); };
-  std::vector<DepthScale> curves;
-  std::vector<SlopeTrial> trials;
-  for (const double min_size : min_sizes) {
-    for (const double slope : slopes) {
-      DepthScaleOptions curve;
-      curve.slope = slope;
-      curve.exponent = shape.exponent;
-      curve.offset = slope * shape.offset;
-      curve.min_size = min_size;
-      curve.max_size = max_size;
-      curves.emplace_back(curve);
-      trials.push_back({slope, min_size, 0.0});
-    }
-  }
+  DepthScaleOptions standard;
+  standard.scale_normalisation = false;
+  std::vector<DepthScale> all = {DepthScale(standard)};
+  for (const DepthScaleOptions& curve : curves) all.emplace_back(curve);
+
+  std::vector<double> total(all.size(), 0.0), gain(all.size(), 0.0);
   int pairs = 0;
   for (const ReferenceSequence& sequence : sequences) {
-    Progress progress("trying slopes " + sequence.name, sequence.frames / kStride + 1);
-    for (int t = 0; t < sequence.frames; t += kStride, progress.step()) {
+    std::vector<double> correct(all.size(), 0.0);
+    Progress progress("trying curves " + sequence.name, sequence.frames / kStride + 1);
+    for (int t = 0; t + 1 < sequence.frames; t += kStride, progress.step()) {
       const auto describe = [&](int i) {
         const KeypointSet set = findKeypoints(sequence.images, i, extraction.detector, extraction.stereo);
-        const auto chosen = selectKeypoints(set, curves, reach, extraction.detector.bucket_size, features);
-        std::vector<StereoFeatures> described;
-        for (const DepthScale& curve : curves) described.push_back(describeKeypoints(set, chosen, curve, descriptor));
-        return described;
+        const auto chosen = selectKeypoints(set, all, reach, extraction.detector.bucket_size, features);
+        return describeKeypoints(set, chosen, all, descriptor);
       };
       const std::vector<StereoFeatures> first = describe(t);
       for (const int step : kSteps) {
         if (t + step >= sequence.frames) continue;
         const std::vector<StereoFeatures> later = describe(t + step);
-        for (std::size_t k = 0; k < trials.size(); ++k)
-          trials[k].correct += countCorrect(first[k], later[k], matchByDescriptor(first[k], later[k]),
-                                            sequence.motion(t, t + step), kTolerance);
+        for (std::size_t k = 0; k < all.size(); ++k)
+          correct[k] += countCorrect(first[k], later[k], matchByDescriptor(first[k], later[k]),
+                                     sequence.motion(t, t + step), kTolerance);
         ++pairs;
       }
     }
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      total[k] += correct[k];
+      gain[k] += 100.0 * (correct[k] / correct[0] - 1.0) / static_cast<double>(sequences.size());
+    }
   }
-  for (SlopeTrial& trial : trials) trial.correct /= std::max(pairs, 1);
+  std::vector<CurveTrial> trials;
+  for (std::size_t k = 0; k < curves.size(); ++k)
+    trials.push_back({curves[k], total[k + 1] / std::max(pairs, 1), gain[k + 1]});
   return trials;
 }
 

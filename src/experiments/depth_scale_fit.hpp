@@ -42,16 +42,16 @@ struct ShapeFit {
 /// std::runtime_error when there are fewer than 30 samples.
 std::vector<ShapeFit> fitShapes(const std::vector<SizeSample>& samples);
 
-/// What a factor and smallest size achieve in matching.
-struct SlopeTrial {
-  double slope, min_size;  ///< px
-  double correct;          ///< correct matches of a pair, mean
+/// A size curve and its effect on matching.
+struct CurveTrial {
+  DepthScaleOptions curve;
+  double correct;  ///< correct matches of a pair, mean
+  double gain;     ///< on those of the standard size, %, mean over the sequences
 };
 
 /// Correct matches (as in experiment A) over pairs 1, 4, 7 and 10 steps apart, which stand for its ten steps, for every
-/// factor and smallest size of the shape.
-std::vector<SlopeTrial> trySlopes(const std::vector<ReferenceSequence>& sequences, const PipelineOptions& options,
-                                  const ShapeFit& shape, const std::vector<double>& slopes,
-                                  const std::vector<double>& min_sizes, double max_size, int features);
+/// curve on the same key points. Needs at least two pairs in each sequence.
+std::vector<CurveTrial> tryCurves(const std::vector<ReferenceSequence>& sequences, const PipelineOptions& options,
+                                  const std::vector<DepthScaleOptions>& curves, int features);
 
 }  // namespace sdvo

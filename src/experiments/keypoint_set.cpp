@@ -44,30 +44,40 @@ std::vector<int> selectKeypoints(const KeypointSet& set, const std::vector<Depth
   return chosen;
 }
 
-StereoFeatures describeKeypoints(const KeypointSet& set, const std::vector<int>& chosen, const DepthScale& curve,
-                                 const StereoDescriptor& descriptor) {
-  StereoFeatures features;
-  features.stamp = set.stamp;
-  features.camera = set.camera;
-  features.descriptor = nameOf(descriptor.options().type);
-  features.layout = descriptor.options().layout;
-  features.element_type = descriptor.elementType();
+std::vector<StereoFeatures> describeKeypoints(const KeypointSet& set, const std::vector<int>& chosen,
+                                              const std::vector<DepthScale>& curves,
+                                              const StereoDescriptor& descriptor) {
   std::vector<StereoKeypoint> keypoints;
-  for (const int i : chosen) {
-    const auto& [corner, match] = set.corners[static_cast<std::size_t>(i)];
-    const cv::Point2f& p = corner.position;
-    const float size = static_cast<float>(curve.size(match.disparity));
-    keypoints.push_back({p.x, p.y, p.x - match.disparity, p.y + match.dv, size});
-    features.append({p.x, p.y, match.disparity, match.dv, size, -1.f, corner.response});
-  }
+  for (const DepthScale& curve : curves)
+    for (const int i : chosen) {
+      const auto& [corner, match] = set.corners[static_cast<std::size_t>(i)];
+      const cv::Point2f& p = corner.position;
+      keypoints.push_back({p.x, p.y, p.x - match.disparity, p.y + match.dv,
+                           static_cast<float>(curve.size(match.disparity))});
+    }
   const DescribedKeypoints described = descriptor.describe(set.images.left, set.images.right, keypoints);
-  if (described.index.size() != chosen.size())
-    throw std::runtime_error("descriptor " + features.descriptor + " left out " +
-                             std::to_string(chosen.size() - described.index.size()) + " of " +
-                             std::to_string(chosen.size()) + " key points that lie inside both images");
-  features.angle = described.angle;
-  features.descriptors = described.rows;
-  return features;
+  if (described.index.size() != keypoints.size())
+    throw std::runtime_error("descriptor " + nameOf(descriptor.options().type) + " left out " +
+                             std::to_string(keypoints.size() - described.index.size()) + " of " +
+                             std::to_string(keypoints.size()) + " key points that lie inside both images");
+
+  std::vector<StereoFeatures> of_curve;
+  for (std::size_t c = 0, row = 0; c < curves.size(); ++c) {
+    StereoFeatures& features = of_curve.emplace_back();
+    features.stamp = set.stamp;
+    features.camera = set.camera;
+    features.descriptor = nameOf(descriptor.options().type);
+    features.layout = descriptor.options().layout;
+    features.element_type = descriptor.elementType();
+    features.descriptors = described.rows.rowRange(static_cast<int>(row), static_cast<int>(row + chosen.size())).clone();
+    for (const int i : chosen) {
+      const auto& [corner, match] = set.corners[static_cast<std::size_t>(i)];
+      features.append({corner.position.x, corner.position.y, match.disparity, match.dv, keypoints[row].size,
+                       described.angle[row], corner.response});
+      ++row;
+    }
+  }
+  return of_curve;
 }
 
 StereoFeatures cutPatches(const KeypointSet& set, const std::vector<int>& chosen, const DepthScale& curve,

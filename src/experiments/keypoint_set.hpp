@@ -42,10 +42,11 @@ using Reach = std::function<double(double size)>;
 std::vector<int> selectKeypoints(const KeypointSet& set, const std::vector<DepthScale>& curves, const Reach& reach,
                                  int bucket_size, int count);
 
-/// Describes the chosen corners with sizes by `curve`, one row each in the order of `chosen`. Throws std::runtime_error
-/// when the descriptor leaves one of them out.
-StereoFeatures describeKeypoints(const KeypointSet& set, const std::vector<int>& chosen, const DepthScale& curve,
-                                 const StereoDescriptor& descriptor);
+/// Describes the chosen corners with sizes by each of `curves`, one row each in the order of `chosen`. All sizes are
+/// described in one call, so that a pyramid is made once. Throws std::runtime_error when the descriptor leaves one out.
+std::vector<StereoFeatures> describeKeypoints(const KeypointSet& set, const std::vector<int>& chosen,
+                                              const std::vector<DepthScale>& curves,
+                                              const StereoDescriptor& descriptor);
 
 /// The chosen corners with grey patches of the left view instead of descriptors, sized by `curve`.
 StereoFeatures cutPatches(const KeypointSet& set, const std::vector<int>& chosen, const DepthScale& curve,

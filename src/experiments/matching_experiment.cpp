@@ -28,7 +28,9 @@ struct Side {
   DepthScale curve;
 };
 
-std::vector<Side> makeSides(const DepthScaleOptions& options, const MatchingExperiment& experiment) {
+std::vector<Side> makeSides(const FeatureExtractorOptions& extraction, DescriptorType type,
+                            const MatchingExperiment& experiment) {
+  const DepthScaleOptions options = extraction.size_curve.completedFor(type);
   DepthScaleOptions normalised = options;
   normalised.scale_normalisation = true;
   std::vector<Side> sides = {{"scale_normalised", 0.0, DepthScale(normalised)}};
@@ -117,10 +119,11 @@ struct DescribedFrame {
 class SequenceMatching {
  public:
   SequenceMatching(const ReferenceSequence& sequence, const MatchingExperiment& experiment,
-                   const PipelineOptions& options, const std::vector<Side>& sides)
-      : sequence_(sequence), experiment_(experiment), options_(options), sides_(sides) {
-    for (const Side& side : sides) curves_.push_back(side.curve);
+                   const PipelineOptions& options)
+      : sequence_(sequence), experiment_(experiment), options_(options) {
     for (const DescriptorType type : experiment.descriptors) {
+      std::vector<DepthScale>& curves = curves_.emplace_back();
+      for (const Side& side : makeSides(options.stereo_features, type, experiment)) curves.push_back(side.curve);
       DescriptorOptions descriptor = options.stereo_features.descriptor;
       descriptor.type = type;
       descriptor.layout = DescriptorLayout::kLeftAndRight;  // the left layout is its left half
@@ -161,20 +164,19 @@ class SequenceMatching {
     const std::vector<int>& counts = experiment_.feature_counts;
     const int most = *std::max_element(counts.begin(), counts.end());
     const Reach reach = [&](double size) { return descriptors_[d].reach(size); };
-    const std::vector<int> chosen = selectKeypoints(set, curves_, reach, bucket, most);
+    const std::vector<int> chosen = selectKeypoints(set, curves_[d], reach, bucket, most);
     DescribedFrame frame;
-    for (const Side& side : sides_)
-      frame.of_side.push_back(describeKeypoints(set, chosen, side.curve, descriptors_[d]));
+    frame.of_side = describeKeypoints(set, chosen, curves_[d], descriptors_[d]);
     for (const int count : counts) {
       std::vector<int>& rows = frame.rows_of_count[count];
-      for (const int i : selectKeypoints(set, curves_, reach, bucket, count)) {
+      for (const int i : selectKeypoints(set, curves_[d], reach, bucket, count)) {
         const auto row = std::lower_bound(chosen.begin(), chosen.end(), i);
         if (row != chosen.end() && *row == i) rows.push_back(static_cast<int>(row - chosen.begin()));
       }
       for (const DescriptorLayout layout : experiment_.layouts)
         for (const double tolerance : experiment_.tolerances) {
           CaseScores& scores = scores_[{experiment_.descriptors[d], layout, count, tolerance}];
-          scores.of_side.resize(sides_.size());
+          scores.of_side.resize(curves_[d].size());
           scores.described += static_cast<double>(rows.size());
           ++scores.frames;
         }
@@ -188,7 +190,7 @@ class SequenceMatching {
     const std::size_t step = static_cast<std::size_t>(to - from - 1);
     for (const int count : experiment_.feature_counts) {
       for (const DescriptorLayout layout : experiment_.layouts) {
-        for (std::size_t s = 0; s < sides_.size(); ++s) {
+        for (std::size_t s = 0; s < reference.of_side.size(); ++s) {
           const StereoFeatures a = selectRows(reference.of_side[s], reference.rows_of_count.at(count), layout);
           const StereoFeatures b = selectRows(current.of_side[s], current.rows_of_count.at(count), layout);
           const std::vector<FeatureMatch> matches = matchByDescriptor(a, b);
@@ -205,8 +207,7 @@ class SequenceMatching {
   const ReferenceSequence& sequence_;
   const MatchingExperiment& experiment_;
   const PipelineOptions& options_;
-  const std::vector<Side>& sides_;
-  std::vector<DepthScale> curves_;
+  std::vector<std::vector<DepthScale>> curves_;  ///< [descriptor][side]
   std::vector<StereoDescriptor> descriptors_;
   Scores scores_;
 };
@@ -302,13 +303,13 @@ class Report {
 
 std::string runMatching(const ExperimentSetup& setup, const MatchingExperiment& experiment) {
   PipelineOptions options = setup.options();
-  const std::vector<Side> sides = makeSides(options.stereo_features.size_curve, experiment);
+  const std::vector<Side> sides = makeSides(options.stereo_features, DescriptorType::kFreak, experiment);  // their names
   Report report(sides, setup, hashOptions(listOptions(options)));
   Scores total;
   std::map<Case, std::vector<Improvements>> improvements;
   for (const std::string& name : setup.sequences) {
     const ReferenceSequence sequence = openSequence(setup, name, setup.reference);
-    const Scores of_sequence = SequenceMatching(sequence, experiment, options, sides).run();
+    const Scores of_sequence = SequenceMatching(sequence, experiment, options).run();
     for (const auto& [c, scores] : of_sequence) {
       report.addRow(sequence.name, c, of_sequence);
       improvements[c].push_back(report.latest());

@@ -16,7 +16,7 @@ const std::vector<OdometrySystem>& odometrySystems() {
 DescribedSequence describeSequence(const ReferenceSequence& sequence, const PipelineOptions& options,
                                    double standard_size, int count) {
   const FeatureExtractorOptions& extraction = options.stereo_features;
-  DepthScaleOptions normalised = extraction.size_curve, constant = extraction.size_curve;
+  DepthScaleOptions normalised = extraction.sizeCurve(), constant = extraction.sizeCurve();
   normalised.scale_normalisation = true;
   constant.scale_normalisation = false;
   constant.constant_size = standard_size;
@@ -28,6 +28,7 @@ DescribedSequence describeSequence(const ReferenceSequence& sequence, const Pipe
 
   const PatchLayout by_depth = PatchOptions().layout(), constant_layout{by_depth.side, by_depth.min_spacing, 0.f};
 
+  const DepthScale odometry_curve(FeatureExtractorOptions().sizeCurve());
   DescribedSequence described;
   described.of_system.resize(odometrySystems().size());
   Progress progress("describing " + sequence.name, sequence.frames);
@@ -36,14 +37,12 @@ DescribedSequence describeSequence(const ReferenceSequence& sequence, const Pipe
     const std::vector<int> chosen = selectKeypoints(set, curves, reach, extraction.detector.bucket_size, count);
     std::vector<int> all_rows;
     for (std::size_t k = 0; k < chosen.size(); ++k) all_rows.push_back(static_cast<int>(k));
-    std::vector<StereoFeatures> of_curve;
-    for (const DepthScale& curve : curves) of_curve.push_back(describeKeypoints(set, chosen, curve, descriptor));
+    const std::vector<StereoFeatures> of_curve = describeKeypoints(set, chosen, curves, descriptor);
     for (std::size_t s = 0; s < odometrySystems().size(); ++s) {
       const OdometrySystem& system = odometrySystems()[s];
       described.of_system[s].push_back(
           selectRows(of_curve[system.scale_normalisation ? 1 : 0], all_rows, system.layout));
     }
-    const DepthScale odometry_curve(DepthScaleOptions{});
     described.patches.constant.push_back(cutPatches(set, chosen, odometry_curve, constant_layout));
     described.patches.by_depth.push_back(cutPatches(set, chosen, odometry_curve, by_depth));
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
+#include <string>
 
 #include "../common/kernel.hpp"
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
@@ -58,17 +59,25 @@ cv::Mat cutPatches(const cv::Mat& image, const StereoFeatures& features) {
 
 }  // namespace
 
+void FeatureExtractorOptions::check() const {
+  try {
+    DepthScale{sizeCurve()};
+  } catch (const std::invalid_argument& e) {
+    throw std::invalid_argument(std::string("size_curve/") + e.what());
+  }
+}
+
 FeatureExtractor::FeatureExtractor(const FeatureExtractorOptions& options)
     : options_(checked(options)),
       detector_(options.detector),
       exposure_balance_(options.exposure_balance),
       stereo_matcher_(options.stereo),
       rig_monitor_(options.rig_monitor, options.stereo.max_epipolar_residual, options.stereo.epipolar.max_disparity),
-      depth_scale_(options.size_curve),
+      depth_scale_(options.sizeCurve()),
       descriptor_(options.descriptor) {}
 
 DepthScaleOptions FeatureExtractor::sizeCurve(cv::Size image) const {
-  DepthScaleOptions curve = options_.size_curve;
+  DepthScaleOptions curve = options_.sizeCurve();
   const double largest = descriptor_.largestSize(image);
   for (double* size : {&curve.min_size, &curve.max_size, &curve.constant_size}) *size = std::min(*size, largest);
   return curve;

@@ -34,6 +34,7 @@ namespace {
 bool describeAlike(const FeatureExtractorOptions& a, const FeatureExtractorOptions& b) {
   const auto texts = [](FeatureExtractorOptions options) {
     OptionList list;
+    options.size_curve = options.sizeCurve();
     options.size_curve.describe(list);
     options.descriptor.describe(list);
     std::vector<std::string> values;

@@ -20,7 +20,9 @@ struct Arguments {
   sdvo::SizeSampling sampling;
   std::string output, plot, model;
   int features = 2320;
-  double max_size = 60.0;
+  std::vector<double> sizes = {4.0, 7.0, 10.0, 14.0, 20.0};  ///< px at a disparity of 20 px
+  std::vector<double> min_sizes = {4.0, 7.0, 10.0, 14.0}, max_sizes = {32.0};  ///< px
+  std::vector<double> constant_sizes = {5.0, 7.0, 10.0, 14.0};                 ///< px
 };
 
 void writeSamples(const std::string& path, const std::vector<sdvo::SizeSample>& samples) {
@@ -42,41 +44,47 @@ const sdvo::ShapeFit& choose(const std::vector<sdvo::ShapeFit>& fits, const std:
   return *best;
 }
 
-/// A shape with its factor and smallest size.
-struct Choice {
-  sdvo::ShapeFit shape;
-  sdvo::SlopeTrial trial{0.0, 0.0, 0.0};
-};
-
-/// The factor and the smallest size of a shape that match best; all that were tried are added to the table.
-Choice tryShape(const std::vector<sdvo::ReferenceSequence>& sequences, const sdvo::PipelineOptions& options,
-                const sdvo::ShapeFit& shape, const Arguments& arguments, sdvo::CsvTable& tried) {
-  constexpr double kReferenceDisparity = 20.0;  // px
-  std::vector<double> slopes;
-  for (const double size : {10.0, 12.0, 14.0, 17.0, 20.0, 24.0, 28.0})
-    slopes.push_back(size / shape.value(kReferenceDisparity));
-  Choice choice{shape, {0.0, 0.0, 0.0}};
-  for (const sdvo::SlopeTrial& trial : sdvo::trySlopes(sequences, options, shape, slopes, {8.0, 10.0, 12.0, 14.0},
-                                                       arguments.max_size, arguments.features)) {
-    tried.add(shape.model, trial.slope, trial.min_size, trial.correct);
-    if (trial.correct > choice.trial.correct) choice.trial = trial;
-  }
-  return choice;
+/// Curves of a shape: every factor with every smallest and largest size.
+std::vector<sdvo::DepthScaleOptions> curvesOf(const sdvo::ShapeFit& shape, const Arguments& arguments) {
+  constexpr double kReferenceDisparity = 20.0;  // px, at which the factor is given as a size
+  std::vector<sdvo::DepthScaleOptions> curves;
+  for (const double max_size : arguments.max_sizes)
+    for (const double min_size : arguments.min_sizes)
+      for (const double size : arguments.sizes) {
+        if (min_size > max_size) continue;
+        sdvo::DepthScaleOptions& curve = curves.emplace_back();
+        curve.slope = size / shape.value(kReferenceDisparity);
+        curve.exponent = shape.exponent;
+        curve.offset = curve.slope * shape.offset;
+        curve.min_size = min_size;
+        curve.max_size = max_size;
+      }
+  return curves;
 }
 
-void writeYaml(const std::string& path, const Choice& choice, const Arguments& arguments, std::size_t samples) {
-  const sdvo::ShapeFit& shape = choice.shape;
-  const sdvo::SlopeTrial& best = choice.trial;
+/// The same size at every depth.
+std::vector<sdvo::DepthScaleOptions> constantCurves(const Arguments& arguments) {
+  std::vector<sdvo::DepthScaleOptions> curves;
+  for (const double size : arguments.constant_sizes) {
+    sdvo::DepthScaleOptions& curve = curves.emplace_back();
+    curve.slope = size;
+    curve.min_size = curve.max_size = size;
+  }
+  return curves;
+}
+
+void writeYaml(const std::string& path, const sdvo::ShapeFit& shape, const sdvo::DepthScaleOptions& curve,
+               const Arguments& arguments, std::size_t samples) {
   std::ofstream file(path);
   file << "# Written by fit_depth_scale: " << shape.model << " on " << samples << " samples of "
        << arguments.setup.sequences.size() << " sequence(s), median residual " << shape.median_residual << " octaves.\n"
        << "stereo_features:\n"
        << "  size_curve:\n"
-       << "    slope: " << best.slope << "\n"
-       << "    exponent: " << shape.exponent << "\n"
-       << "    offset: " << best.slope * shape.offset << "\n"
-       << "    min_size: " << best.min_size << "\n"
-       << "    max_size: " << arguments.max_size << "\n";
+       << "    slope: " << curve.slope << "\n"
+       << "    exponent: " << curve.exponent << "\n"
+       << "    offset: " << curve.offset << "\n"
+       << "    min_size: " << curve.min_size << "\n"
+       << "    max_size: " << curve.max_size << "\n";
   if (!file.flush()) throw std::runtime_error("cannot write " + path);
 }
 
@@ -84,14 +92,20 @@ int run(const Arguments& arguments) {
   cv::setNumThreads(1);
   const sdvo::PipelineOptions options = arguments.setup.options();
   std::vector<sdvo::ReferenceSequence> sequences;
-  std::vector<sdvo::SizeSample> samples;
-  for (const std::string& name : arguments.setup.sequences) {
+  for (const std::string& name : arguments.setup.sequences)
     sequences.push_back(sdvo::openSequence(arguments.setup, name, arguments.setup.reference));
-    const auto of_sequence = sdvo::sampleSizes(sequences.back(), options, arguments.sampling);
-    samples.insert(samples.end(), of_sequence.begin(), of_sequence.end());
-  }
 
-  const std::vector<sdvo::ShapeFit> fits = sdvo::fitShapes(samples);
+  // A fixed circle in the world has nothing to fit.
+  std::vector<sdvo::SizeSample> samples;
+  std::vector<sdvo::ShapeFit> fits(1);
+  fits.front().model = "a*d";
+  if (arguments.model != fits.front().model) {
+    for (const sdvo::ReferenceSequence& sequence : sequences) {
+      const auto of_sequence = sdvo::sampleSizes(sequence, options, arguments.sampling);
+      samples.insert(samples.end(), of_sequence.begin(), of_sequence.end());
+    }
+    fits = sdvo::fitShapes(samples);
+  }
   sdvo::CsvTable shapes({"model", "exponent", "offset_over_slope", "median_residual_octaves", "robust_cost"});
   for (const sdvo::ShapeFit& fit : fits)
     shapes.add(fit.model, fit.exponent, fit.offset, fit.median_residual, fit.robust_cost);
@@ -99,21 +113,35 @@ int run(const Arguments& arguments) {
   std::cout << samples.size() << " samples\n" << shapes.aligned() << "chosen: " << shape.model << "\n";
 
   // Ratios do not tell the curve's factor: how large a neighbourhood is worth describing shows in matching. Neither do
-  // they tell what a shape is worth there, so the simplest one, a fixed circle in the world, competes with the chosen.
-  std::vector<sdvo::ShapeFit> candidates = {shape};
-  if (arguments.model.empty() && shape.model != fits.front().model) candidates.insert(candidates.begin(), fits.front());
-  sdvo::CsvTable tried({"model", "slope", "min_size", "correct_per_pair"});
-  Choice choice;
-  for (const sdvo::ShapeFit& candidate : candidates) {
-    const Choice best = tryShape(sequences, options, candidate, arguments, tried);
-    constexpr double kClearlyBetter = 1.005;  // in correct matches; less is within chance
-    if (best.trial.correct > kClearlyBetter * choice.trial.correct) choice = best;
+  // they tell what a shape is worth there: a fixed circle in the world and constant sizes compete with it.
+  std::vector<sdvo::DepthScaleOptions> curves = constantCurves(arguments);
+  std::vector<const sdvo::ShapeFit*> shape_of(curves.size(), &fits.front());
+  std::vector<const sdvo::ShapeFit*> candidates = {&shape};
+  if (arguments.model.empty() && &shape != &fits.front()) candidates.insert(candidates.begin(), &fits.front());
+  for (const sdvo::ShapeFit* candidate : candidates) {
+    const std::vector<sdvo::DepthScaleOptions> of_shape = curvesOf(*candidate, arguments);
+    curves.insert(curves.end(), of_shape.begin(), of_shape.end());
+    shape_of.resize(curves.size(), candidate);
   }
+  const std::vector<sdvo::CurveTrial> trials = sdvo::tryCurves(sequences, options, curves, arguments.features);
+  sdvo::CsvTable tried({"model", "slope", "min_size", "max_size", "correct_per_pair", "gain_percent"});
+  std::size_t best = 0;
+  for (std::size_t k = 0; k < trials.size(); ++k) {
+    const auto& [curve, correct, gain] = trials[k];
+    const std::string model = k < arguments.constant_sizes.size() ? "constant" : shape_of[k]->model;
+    tried.add(model, curve.slope, curve.min_size, curve.max_size, correct, gain);
+    // Simpler ones come first: constant sizes, then the fixed circle.
+    constexpr double kWithinChance = 0.5;  // % of correct matches
+    const bool simpler = shape_of[best] != shape_of[k] ||
+                         (best < arguments.constant_sizes.size() && k >= arguments.constant_sizes.size());
+    if (gain > trials[best].gain + (simpler ? kWithinChance : 0.0)) best = k;
+  }
+  const sdvo::DepthScaleOptions& curve = trials[best].curve;
   std::cout << tried.aligned();
-  writeYaml(arguments.output, choice, arguments, samples.size());
-  std::cout << "size = clamp(" << choice.trial.slope << " * disparity^" << choice.shape.exponent << " + "
-            << choice.trial.slope * choice.shape.offset << ", " << choice.trial.min_size << ", " << arguments.max_size
-            << ") px, written to " << arguments.output << std::endl;
+  writeYaml(arguments.output, *shape_of[best], curve, arguments, samples.size());
+  std::cout << "size = clamp(" << curve.slope << " * disparity^" << curve.exponent << " + " << curve.offset << ", "
+            << curve.min_size << ", " << curve.max_size << ") px, " << trials[best].gain
+            << " % more correct matches than the standard size, written to " << arguments.output << std::endl;
 
   if (!arguments.plot.empty()) {
     const std::string csv = std::filesystem::path(arguments.plot).replace_extension(".csv").string();
@@ -128,22 +156,27 @@ int run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   CLI::App app("Fits the size-from-disparity curve to features followed over sequences in KITTI layout");
   Arguments arguments;
-  app.add_option("--sequence", arguments.setup.sequences, "directories in KITTI layout, separated by commas")
+  app.add_option("--sequence", arguments.setup.sequences, "directories in KITTI layout, or numbers below --kitti, separated by commas")
       ->required()
       ->delimiter(',');
+  app.add_option("--kitti", arguments.setup.kitti, "directory of the KITTI odometry data");
   app.add_option("--output", arguments.output, "YAML file to write, as the nodelets load it")->required();
   app.add_option("--plot", arguments.plot, "PNG of samples and curve to draw; the samples go to a CSV file beside it");
   sdvo::addChoice(app, "--reference", arguments.setup.reference, "motion taken for true");
-  app.add_option("--model", arguments.model, "a*d, a*d+b, a*d^b or a*d^b+c instead of the one that fits best")
+  app.add_option("--model", arguments.model, "a*d, which needs no samples, a*d+b, a*d^b or a*d^b+c instead of the one that fits best")
       ->check(CLI::IsMember({"a*d", "a*d+b", "a*d^b", "a*d^b+c"}));
   app.add_option("--frames", arguments.setup.frames, "use only the first N pairs of each sequence")
       ->check(CLI::Range(3, 1000000));
   app.add_option("--features", arguments.features, "features of a pair when slopes are tried")
       ->capture_default_str()
       ->check(CLI::Range(50, 10000));
-  app.add_option("--max-size", arguments.max_size, "largest key point diameter, px")
-      ->capture_default_str()
-      ->check(CLI::Range(10.0, 400.0));
+  const auto addSizes = [&app](const char* flag, std::vector<double>& sizes, const char* meaning) {
+    app.add_option(flag, sizes, meaning)->capture_default_str()->delimiter(',')->check(CLI::Range(2.0, 400.0));
+  };
+  addSizes("--sizes", arguments.sizes, "factors to try, as sizes at a disparity of 20 px");
+  addSizes("--min-sizes", arguments.min_sizes, "smallest key point diameters to try, px");
+  addSizes("--max-sizes", arguments.max_sizes, "largest key point diameters to try, px");
+  addSizes("--constant-sizes", arguments.constant_sizes, "sizes without depth to try, px");
   app.add_option("--param", arguments.setup.settings,
                  "option as name=value, for example descriptor/type=sift; repeatable")
       ->allow_extra_args(false);

@@ -7,11 +7,13 @@
 #include <stdexcept>
 
 #include "../experiments/accuracy_experiment.hpp"
+#include "../experiments/all_experiments.hpp"
 #include "../experiments/consensus_experiment.hpp"
 #include "../experiments/matching_experiment.hpp"
 #include "../experiments/odometry_systems.hpp"
 #include "../experiments/plot_script.hpp"
 #include "../experiments/robustness_experiment.hpp"
+#include "../experiments/scale_experiment.hpp"
 #include "named_choice.hpp"
 #include "run_tool.hpp"
 
@@ -23,6 +25,8 @@ struct Arguments {
   sdvo::RobustnessExperiment robustness;
   sdvo::AccuracyExperiment accuracy;
   sdvo::ConsensusExperiment consensus;
+  sdvo::ScaleExperiment scale;
+  sdvo::AllExperiments all;
   bool plot = true;
 };
 
@@ -43,6 +47,7 @@ void addSequences(CLI::App& app, Arguments& arguments) {
       ->delimiter(',');
   app.add_option("--frames", arguments.setup.frames, "use only the first N pairs of each sequence")
       ->check(CLI::Range(2, 1000000));
+  sdvo::addChoice(app, "--setup", arguments.setup.setup, "the nodelets' defaults, or what the paper did");
   addOutput(app, arguments);
 }
 
@@ -120,6 +125,39 @@ CLI::App* addConsensus(CLI::App& app, Arguments& arguments) {
   return command;
 }
 
+CLI::App* addScaleChange(CLI::App& app, Arguments& arguments) {
+  CLI::App* command = app.add_subcommand("scale_change", "correct matches against the change of a feature's scale");
+  addSequences(*command, arguments);
+  sdvo::addChoice(*command, "--reference", arguments.setup.reference, "motion taken for true");
+  command->add_option("--features", arguments.scale.features, "of each view and method")
+      ->capture_default_str()
+      ->check(CLI::Range(10, 10000));
+  command->add_option("--steps", arguments.scale.steps, "pairs between two views, separated by commas")
+      ->capture_default_str()
+      ->delimiter(',')
+      ->check(CLI::Range(1, 1000));
+  command->add_option("--stride", arguments.scale.stride, "pairs between two first views")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 10000));
+  return command;
+}
+
+CLI::App* addAll(CLI::App& app, Arguments& arguments) {
+  CLI::App* command = app.add_subcommand("all", "everything that docs/experiments.md shows");
+  command->add_option("--kitti", arguments.all.kitti, "directory of the KITTI odometry data: sequences 01, 04, 06, poses/")
+      ->required()
+      ->check(CLI::ExistingDirectory);
+  command->add_option("--karlsruhe", arguments.all.karlsruhe, "Karlsruhe 2010_03_09_drive_0019 as sequences/19")
+      ->check(CLI::ExistingDirectory);
+  command->add_option("--euroc", arguments.all.euroc, "directory of MH_01_half and MH_01_moving")
+      ->check(CLI::ExistingDirectory);
+  command->add_option("--output", arguments.all.output, "directory to write to; made when missing")->required();
+  command->add_option("--jobs", arguments.all.jobs, "programs that run at a time")
+      ->capture_default_str()
+      ->check(CLI::Range(1, 256));
+  return command;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -130,8 +168,14 @@ int main(int argc, char** argv) {
   CLI::App* robustness = addRobustness(app, arguments);
   CLI::App* accuracy = addAccuracy(app, arguments);
   CLI::App* consensus = addConsensus(app, arguments);
+  CLI::App* scale_change = addScaleChange(app, arguments);
+  CLI::App* all = addAll(app, arguments);
   return sdvo::runTool(app, argc, argv, [&] {
     cv::setNumThreads(1);  // experiments are compared with each other: no race may change them
+    if (*all) {
+      std::cout << sdvo::runAll(arguments.all) << "written to " << arguments.all.output << std::endl;
+      return 0;
+    }
     const std::string& output = arguments.setup.output;
     const sdvo::PipelineOptions options = arguments.setup.options();  // refuses bad settings before the work begins
     std::error_code failure;
@@ -147,6 +191,9 @@ int main(int argc, char** argv) {
     } else if (*accuracy) {
       name = "accuracy";
       table = sdvo::runAccuracy(arguments.setup, arguments.accuracy);
+    } else if (*scale_change) {
+      name = "scale_change";
+      table = sdvo::runScaleChange(arguments.setup, arguments.scale);
     } else if (*consensus) {
       name = "consensus";
       arguments.consensus.options = options.visual_odometry.motion;

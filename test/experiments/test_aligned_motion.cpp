@@ -44,7 +44,7 @@ class AlignedMotion : public testing::Test {
     }
     const bool by_depth = warp == PatchWarp::kByDepth;
     const PatchLayout layout{13, 1.f, by_depth ? 0.1f : 0.f};
-    const DepthScale curve(DepthScaleOptions{});
+    const DepthScale curve(DepthScaleOptions{}.completedFor(DescriptorType::kFreak));
     const StereoFeatures reference = cutPatches(wallFrom(0.0, first), rows, curve, layout);
     const StereoFeatures current = cutPatches(wallFrom(forward, second), rows, curve, layout);
     Eigen::Isometry3d T_current_reference = Eigen::Isometry3d::Identity();

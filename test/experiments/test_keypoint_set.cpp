@@ -54,8 +54,15 @@ TEST(KeypointSet, ChosenKeyPointsFitBothViewsAtEverySize) {
     EXPECT_GE(p.y, margin - 0.51);
     EXPECT_LE(p.y + 0.25, 479.51 - margin);
   }
-  for (const DepthScale& curve : curves)
-    EXPECT_EQ(describeKeypoints(set, chosen, curve, StereoDescriptor({})).count(), static_cast<int>(chosen.size()));
+  // Together they are described as each one is alone.
+  const std::vector<StereoFeatures> together = describeKeypoints(set, chosen, curves, StereoDescriptor({}));
+  ASSERT_EQ(together.size(), curves.size());
+  for (std::size_t c = 0; c < curves.size(); ++c) {
+    const StereoFeatures alone = describeKeypoints(set, chosen, {curves[c]}, StereoDescriptor({})).front();
+    EXPECT_EQ(together[c].count(), static_cast<int>(chosen.size()));
+    EXPECT_EQ(together[c].size, alone.size);
+    EXPECT_TRUE(synthetic::equalMats(together[c].descriptors, alone.descriptors));
+  }
 }
 
 TEST(KeypointSet, SmallerSetsAreSubsetsOfLargerOnes) {
@@ -73,8 +80,8 @@ TEST(KeypointSet, RowsOfOneViewAreTheLeftHalves) {
   const std::vector<int> chosen = selectKeypoints(set, {constantSize(9.0)}, Freak::reach, 50, 120);
   DescriptorOptions left_view;
   left_view.layout = DescriptorLayout::kLeft;
-  const StereoFeatures both = describeKeypoints(set, chosen, constantSize(9.0), StereoDescriptor({}));
-  const StereoFeatures left = describeKeypoints(set, chosen, constantSize(9.0), StereoDescriptor(left_view));
+  const StereoFeatures both = describeKeypoints(set, chosen, {constantSize(9.0)}, StereoDescriptor({})).front();
+  const StereoFeatures left = describeKeypoints(set, chosen, {constantSize(9.0)}, StereoDescriptor(left_view)).front();
   std::vector<int> rows;
   for (int i = 0; i < both.count(); i += 3) rows.push_back(i);
   const StereoFeatures halves = selectRows(both, rows, DescriptorLayout::kLeft);

@@ -63,5 +63,37 @@ TEST(DepthScale, RefusesBoundsThatLeaveNoSize) {
   EXPECT_THROW(DepthScale{options}, std::invalid_argument);
 }
 
+TEST(DepthScale, RefusesWhatNoDescriptorCompleted) {
+  for (double DepthScaleOptions::*field :
+       {&DepthScaleOptions::slope, &DepthScaleOptions::min_size, &DepthScaleOptions::max_size}) {
+    DepthScaleOptions options = plainCurve();
+    options.*field = 0.0;
+    EXPECT_THROW(DepthScale{options}, std::invalid_argument);
+    options.scale_normalisation = false;  // which reads none of them
+    EXPECT_EQ(DepthScale(options).size(1.0), 9.0);
+  }
+}
+
+TEST(DepthScale, EveryDescriptorCompletesTheCurveAndWhatIsSetStays) {
+  const DepthScaleOptions set = plainCurve();
+  for (int type = 0; type < static_cast<int>(namesOf(DescriptorType{}).size()); ++type) {
+    const auto own = DepthScaleOptions{}.completedFor(static_cast<DescriptorType>(type));
+    EXPECT_NO_THROW(DepthScale{own}) << nameOf(static_cast<DescriptorType>(type));
+    const DepthScaleOptions completed = set.completedFor(static_cast<DescriptorType>(type));
+    EXPECT_EQ(completed.slope, set.slope);
+    EXPECT_EQ(completed.min_size, set.min_size);
+    EXPECT_EQ(completed.max_size, set.max_size);
+  }
+}
+
+/// The smallest fields of FREAK are a pixel wide at 4 px, and docs/how_it_works.md names the depths of both limits.
+TEST(DepthScale, FreakFollowsDisparitiesOfThreeOctaves) {
+  const DepthScale freak(DepthScaleOptions{}.completedFor(DescriptorType::kFreak));
+  EXPECT_EQ(freak.size(5.0), 4.0);
+  EXPECT_NEAR(freak.size(10.0), 7.2, 1e-12);
+  EXPECT_NEAR(freak.size(44.0), 31.68, 1e-12);
+  EXPECT_EQ(freak.size(50.0), 32.0);
+}
+
 }  // namespace
 }  // namespace sdvo

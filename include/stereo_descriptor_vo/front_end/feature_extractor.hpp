@@ -32,6 +32,11 @@ struct FeatureExtractorOptions {
     list.group("descriptor", descriptor);
     list.group("descriptor", patch);
   }
+  /// Throws std::invalid_argument when the size curve leaves no size.
+  void check() const;
+
+  /// The size curve with the descriptor's own values where the options leave them open.
+  DepthScaleOptions sizeCurve() const { return size_curve.completedFor(descriptor.type); }
 };
 
 /// From a rectified stereo pair to its depth-scaled stereo descriptors. Stateless: equal input gives equal output.
