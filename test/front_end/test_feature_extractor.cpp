@@ -198,6 +198,34 @@ TEST(FeatureExtractor, SaysWhyAPairGivesNothing) {
   EXPECT_NE(none.report.status.find("the image is too small"), std::string::npos) << none.report.status;
 }
 
+TEST(FeatureExtractor, SizesFollowTheDescriptorUnlessSet) {
+  const StereoCamera camera = synthetic::camera();
+  const Pair pair = planeAt(8.0);
+  for (const DescriptorType type : {DescriptorType::kFreak, DescriptorType::kBrief, DescriptorType::kOrb}) {
+    FeatureExtractorOptions options = fewFeatures();
+    options.descriptor.type = type;
+    const DepthScale own(DepthScaleOptions{}.completedFor(type));
+    const StereoFeatures features = FeatureExtractor(options).extract(camera, pair.left, pair.right, 1);
+    ASSERT_GE(features.count(), 200) << nameOf(type);
+    for (std::size_t k = 0; k < features.size.size(); ++k)
+      ASSERT_NEAR(features.size[k], own.size(features.disparity[k]), 1e-4) << nameOf(type);
+
+    options.size_curve.min_size = options.size_curve.max_size = 12.0;
+    const StereoFeatures set = FeatureExtractor(options).extract(camera, pair.left, pair.right, 1);
+    ASSERT_GE(set.count(), 200) << nameOf(type);
+    for (const float size : set.size) ASSERT_EQ(size, 12.f) << nameOf(type);
+  }
+}
+
+/// Alone each value is in its range; together with the descriptor's own they leave no size.
+TEST(FeatureExtractor, RefusesALimitThatTheDescriptorsOwnContradicts) {
+  FeatureExtractorOptions options;
+  options.size_curve.max_size = 3.0;
+  const std::string error = synthetic::errorOf([&] { FeatureExtractor{options}; });
+  for (const char* part : {"size_curve/min_size", "4 px", "3 px"})
+    EXPECT_NE(error.find(part), std::string::npos) << error;
+}
+
 TEST(FeatureExtractor, DescribesMostOfASmallImage) {
   // A near plane, disparity 40 px: every size is near its upper limit, 28.8 px, whose pattern is 181 px wide.
   StereoCamera small = synthetic::camera();
