@@ -27,6 +27,7 @@ inline const std::vector<std::string>& namesOf(Setup) {
 struct SetupDifference {
   std::string name;
   std::vector<std::string> with, without;  ///< name=value
+  bool of_freak = false;                   ///< does not concern another base descriptor
 };
 
 /// Differences of the paper's set-up from the product's.
@@ -48,6 +49,9 @@ struct ExperimentSetup {
   /// The nodelets' options, but for a detector that finds enough corners for the largest feature set; the differences
   /// of the set-up; and, above all, `settings`.
   PipelineOptions options() const;
+
+  /// The same with another base descriptor.
+  ExperimentSetup withDescriptor(DescriptorType type) const;
 };
 
 }  // namespace sdvo

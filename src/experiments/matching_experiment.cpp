@@ -28,9 +28,8 @@ struct Side {
   DepthScale curve;
 };
 
-std::vector<Side> makeSides(const FeatureExtractorOptions& extraction, DescriptorType type,
-                            const MatchingExperiment& experiment) {
-  const DepthScaleOptions options = extraction.size_curve.completedFor(type);
+std::vector<Side> makeSides(const ExperimentSetup& setup, DescriptorType type, const MatchingExperiment& experiment) {
+  const DepthScaleOptions options = setup.withDescriptor(type).options().stereo_features.sizeCurve();
   DepthScaleOptions normalised = options;
   normalised.scale_normalisation = true;
   std::vector<Side> sides = {{"scale_normalised", 0.0, DepthScale(normalised)}};
@@ -119,11 +118,11 @@ struct DescribedFrame {
 class SequenceMatching {
  public:
   SequenceMatching(const ReferenceSequence& sequence, const MatchingExperiment& experiment,
-                   const PipelineOptions& options)
+                   const ExperimentSetup& setup, const PipelineOptions& options)
       : sequence_(sequence), experiment_(experiment), options_(options) {
     for (const DescriptorType type : experiment.descriptors) {
       std::vector<DepthScale>& curves = curves_.emplace_back();
-      for (const Side& side : makeSides(options.stereo_features, type, experiment)) curves.push_back(side.curve);
+      for (const Side& side : makeSides(setup, type, experiment)) curves.push_back(side.curve);
       DescriptorOptions descriptor = options.stereo_features.descriptor;
       descriptor.type = type;
       descriptor.layout = DescriptorLayout::kLeftAndRight;  // the left layout is its left half
@@ -303,13 +302,13 @@ class Report {
 
 std::string runMatching(const ExperimentSetup& setup, const MatchingExperiment& experiment) {
   PipelineOptions options = setup.options();
-  const std::vector<Side> sides = makeSides(options.stereo_features, DescriptorType::kFreak, experiment);  // their names
+  const std::vector<Side> sides = makeSides(setup, DescriptorType::kFreak, experiment);  // their names
   Report report(sides, setup, hashOptions(listOptions(options)));
   Scores total;
   std::map<Case, std::vector<Improvements>> improvements;
   for (const std::string& name : setup.sequences) {
     const ReferenceSequence sequence = openSequence(setup, name, setup.reference);
-    const Scores of_sequence = SequenceMatching(sequence, experiment, options).run();
+    const Scores of_sequence = SequenceMatching(sequence, experiment, setup, options).run();
     for (const auto& [c, scores] : of_sequence) {
       report.addRow(sequence.name, c, of_sequence);
       improvements[c].push_back(report.latest());

@@ -29,14 +29,13 @@ double cpuMs() {
 using Methods = std::map<std::string, TimedFeatures>;
 
 /// Sizes by depth and constant ones on the same corners.
-void describeBySize(const KeypointSet& set, double detection_ms, const PipelineOptions& options, DescriptorType type,
+void describeBySize(const KeypointSet& set, double detection_ms, const ExperimentSetup& setup, DescriptorType type,
                     const ScaleExperiment& experiment, Methods& methods) {
-  const FeatureExtractorOptions& extraction = options.stereo_features;
+  const FeatureExtractorOptions extraction = setup.withDescriptor(type).options().stereo_features;
   DescriptorOptions left_view = extraction.descriptor;
-  left_view.type = type;
   left_view.layout = DescriptorLayout::kLeft;
   const StereoDescriptor descriptor(left_view);
-  DepthScaleOptions by_depth = extraction.size_curve.completedFor(type), constant = by_depth;
+  DepthScaleOptions by_depth = extraction.sizeCurve(), constant = by_depth;
   constant.scale_normalisation = false;
   constant.constant_size = experiment.standard_size;
   const std::vector<DepthScale> curves = {DepthScale(by_depth), DepthScale(constant)};
@@ -75,20 +74,20 @@ void describeByImage(const KeypointSet& set, const cv::Ptr<cv::Feature2D>& featu
   timed.ms = cpuMs() - begin;
 }
 
-Methods describeAll(const ReferenceSequence& sequence, int i, const PipelineOptions& options,
+Methods describeAll(const ReferenceSequence& sequence, int i, const ExperimentSetup& setup,
                     const ScaleExperiment& experiment) {
-  const FeatureExtractorOptions& extraction = options.stereo_features;
+  const FeatureExtractorOptions extraction = setup.options().stereo_features;
   const double begin = cpuMs();
   const KeypointSet set = findKeypoints(sequence.images, i, extraction.detector, extraction.stereo);
   const double detection = cpuMs() - begin;
   Methods methods;
   // What the detectors find is thinned by the stereo matching; so they get a quarter more than the corners' number.
   const int wanted = experiment.features * 5 / 4;
-  describeBySize(set, detection, options, DescriptorType::kFreak, experiment, methods);
-  describeBySize(set, detection, options, DescriptorType::kOrb, experiment, methods);
+  describeBySize(set, detection, setup, DescriptorType::kFreak, experiment, methods);
+  describeBySize(set, detection, setup, DescriptorType::kOrb, experiment, methods);
   describeByImage(set, cv::ORB::create(wanted), "orb", extraction.stereo, "orb, own pyramid", methods);
 #if SDVO_HAVE_SIFT
-  describeBySize(set, detection, options, DescriptorType::kSift, experiment, methods);
+  describeBySize(set, detection, setup, DescriptorType::kSift, experiment, methods);
   describeByImage(set, cv::SIFT::create(wanted), "sift", extraction.stereo, "sift, own scale", methods);
 #endif
   return methods;
@@ -150,7 +149,7 @@ std::string runScaleChange(const ExperimentSetup& setup, const ScaleExperiment& 
     std::map<std::string, MethodScore> scores;
     const auto describe = [&](int i) -> const Methods& {
       if (described.count(i) == 0) {
-        described[i] = describeAll(sequence, i, options, experiment);
+        described[i] = describeAll(sequence, i, setup, experiment);
         for (const auto& [method, timed] : described[i]) {
           MethodScore& score = scores[method];
           ++score.views, score.ms += timed.ms, score.features += timed.features.count();

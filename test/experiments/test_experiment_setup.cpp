@@ -15,6 +15,7 @@ TEST(ExperimentSetup, ProductHasTheNodeletsDefaultsAndMoreCorners) {
   FeatureDetectorOptions& detector = product.stereo_features.detector;
   EXPECT_GT(detector.max_features, 2 * 2320);
   detector.max_features = defaults.stereo_features.detector.max_features;
+  detector.area_per_feature = defaults.stereo_features.detector.area_per_feature;
   detector.fast_min_threshold = defaults.stereo_features.detector.fast_min_threshold;
   detector.corner_quality = defaults.stereo_features.detector.corner_quality;
   EXPECT_EQ(hashOf(product), hashOf(defaults));
@@ -44,6 +45,17 @@ TEST(ExperimentSetup, EveryDifferenceChangesBothSetups) {
       restored.settings = difference.without.empty() ? difference.with : difference.without;
       EXPECT_NE(hashOf(paper.options()), hashOf(restored.options())) << difference.name;
     }
+}
+
+/// FREAK's sizes would cost another descriptor its matches.
+TEST(ExperimentSetup, SizesForMatchingAreFreaksAlone) {
+  ExperimentSetup paper;
+  paper.setup = Setup::kPaper;
+  EXPECT_EQ(paper.options().stereo_features.sizeCurve().max_size, 60.0);
+  const FeatureExtractorOptions brief = paper.withDescriptor(DescriptorType::kBrief).options().stereo_features;
+  EXPECT_EQ(brief.descriptor.type, DescriptorType::kBrief);
+  EXPECT_TRUE(brief.descriptor.oriented);
+  EXPECT_EQ(brief.sizeCurve().max_size, DepthScaleOptions{}.completedFor(DescriptorType::kBrief).max_size);
 }
 
 TEST(ExperimentSetup, SettingsWinOverTheSetup) {
