@@ -4,6 +4,7 @@
 A table stands in a page between the lines <!-- NAME --> and <!-- /NAME -->. Intervals are 95 % percentile intervals by bootstrap over drives."""
 import argparse
 import csv
+import math
 import os
 import random
 import re
@@ -60,8 +61,8 @@ def chosen(rows, **wanted):
 
 
 def of_drives(rows, drives, column):
-    """A column's values, one of each drive that is there."""
-    return [number(r[column]) for r in rows if r["sequence"] in drives and number(r[column]) == number(r[column])]
+    """A column's finite values, one of each drive that is there."""
+    return [number(r[column]) for r in rows if r["sequence"] in drives and math.isfinite(number(r[column]))]
 
 
 def freak(folder, setup, features="2320", tolerance="3.000", layout="left"):
