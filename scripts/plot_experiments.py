@@ -185,7 +185,7 @@ def plot_scale_change(folder):
         share = [100.0 * sum(number(r["correct"]) for r in chosen if r["scale"] == s)
                  / max(1.0, sum(number(r["visible"]) for r in chosen if r["scale"] == s)) for s in scales]
         ms = sum(number(r["ms_per_pair"]) for r in chosen) / len(chosen)
-        style = {"freak": "C0", "sift": "C1", "orb": "C2"}[method.split()[0].rstrip(",")]
+        style = {"freak": "C0", "sift": "C1", "orb": "C2"}[method.split()[0]]
         style += "o-" if "depth" in method else "s:" if "constant" in method else "^--"
         axis.plot([float(s) for s in scales], share, style, label="%s (%.0f ms)" % (method, ms))
     axis.set_xlabel("change of scale between the views")

@@ -85,10 +85,10 @@ Methods describeAll(const ReferenceSequence& sequence, int i, const ExperimentSe
   const int wanted = experiment.features * 5 / 4;
   describeBySize(set, detection, setup, DescriptorType::kFreak, experiment, methods);
   describeBySize(set, detection, setup, DescriptorType::kOrb, experiment, methods);
-  describeByImage(set, cv::ORB::create(wanted), "orb", extraction.stereo, "orb, own pyramid", methods);
+  describeByImage(set, cv::ORB::create(wanted), "orb", extraction.stereo, "orb own pyramid", methods);
 #if SDVO_HAVE_SIFT
   describeBySize(set, detection, setup, DescriptorType::kSift, experiment, methods);
-  describeByImage(set, cv::SIFT::create(wanted), "sift", extraction.stereo, "sift, own scale", methods);
+  describeByImage(set, cv::SIFT::create(wanted), "sift", extraction.stereo, "sift own scale", methods);
 #endif
   return methods;
 }
