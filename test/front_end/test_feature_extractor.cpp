@@ -256,7 +256,7 @@ TEST(FeatureExtractor, SizeCurveIsThatOfEverySizeAlsoInALowImage) {
     const std::size_t k = static_cast<std::size_t>(i);
     EXPECT_NEAR(features.size[k], DepthScale(curve).size(features.disparity[k]), 1e-4);
   }
-  EXPECT_EQ(extractor.sizeCurve({640, 480}).max_size, extractor.options().size_curve.max_size);
+  EXPECT_EQ(extractor.sizeCurve({640, 480}).max_size, extractor.options().sizeCurve().max_size);
 }
 
 TEST(FeatureExtractor, IsStateless) {
