@@ -116,6 +116,8 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features, const std:
   }
   state_.camera = features.camera;
   state_.last_stamp = features.stamp;
+  constexpr double kForgotten = 0.2;  // of the interval, by each pair
+  if (dt <= options_.tracking.max_gap) state_.interval = std::max(dt, (1.0 - kForgotten) * state_.interval);
   ++state_.pairs;
   const bool turned = state_.right_rotation.add(features);
   state_.frozen = frozen;
@@ -440,8 +442,12 @@ VisualOdometry::Step VisualOdometry::predict(const StereoFeatures& features, dou
   step.state = TrackingState::kDegraded;
   step.reason = "motion predicted: " + step.reason;
   step.T_previous_current = expSE3(*state_.velocity * dt);
-  // What is predicted from a motion that is known badly, or doubtful, is so, too.
-  step.covariance = predictionCovariance(dt) + dt * dt * state_.velocity_covariance + state_.last_doubt;
+  // Stamps of a burst are closer together than the moments at which its pairs were taken.
+  const double time = std::max(dt, state_.interval);
+  const Vector6d missed = *state_.velocity * (time - dt);
+  // A motion that is known badly, or doubtful, predicts badly, too.
+  step.covariance = predictionCovariance(time) + missed * missed.transpose() +
+                    time * time * state_.velocity_covariance + state_.last_doubt;
   state_.covariance.advance(*step.T_previous_current, step.covariance);
   return step;
 }

@@ -214,6 +214,7 @@ class VisualOdometry {
     Matrix6d velocity_covariance = Matrix6d::Zero();  ///< of the velocity as it was measured, 1/s^2
     std::int64_t last_pose_stamp = 0;                 ///< ns
     double distance = 0.0;
+    double interval = 0.0;  ///< the longest time between two of the last pairs, s
     int predicted_pairs = 0;
     int pairs = 0;
     bool started = false;
