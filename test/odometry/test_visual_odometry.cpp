@@ -214,6 +214,19 @@ TEST(VisualOdometry, BridgesOneFailedPairByPrediction) {
   }
 }
 
+TEST(VisualOdometry, APredictionContainsTheMotionOfAPairWhoseStampIsThatOfABurst) {
+  VisualOdometry odometry({});
+  const OdometryResult before = follow(odometry, 5);
+  StereoFeatures burst = blindPair(6);
+  burst.stamp = pairOf(5).stamp + 1000000;  // ns
+  const OdometryResult predicted = odometry.update(burst);
+  ASSERT_TRUE(predicted.has_motion) << predicted.reason;
+  const Eigen::Isometry3d moved = trueSinceStart(5).inverse() * trueSinceStart(6);
+  const Vector6d error = logSE3(predicted.T_previous_current.inverse() * moved);
+  EXPECT_GT(error.norm(), 0.5 * kStep) << "a millisecond's way is predicted";
+  EXPECT_LT(error.dot(predicted.motion_covariance.ldlt().solve(error)), 25.0);
+}
+
 TEST(VisualOdometry, WhatFollowsAMotionThatManyAgreedOnThoughItCouldNotBeIsWatched) {
   VisualOdometryOptions options;
   options.tracking.max_speed = 10.0;
