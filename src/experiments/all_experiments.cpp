@@ -157,15 +157,13 @@ class Plan {
   Words everyDrive() const {
     Words drives = {"01", "04", "06"};
     if (!all_.karlsruhe.empty()) drives.push_back(all_.karlsruhe + "/sequences/19");
-    if (!all_.euroc.empty()) drives.insert(drives.end(), {all_.euroc + "/MH_01_half", moving().string()});
-    const Words more = rendered();
-    drives.insert(drives.end(), more.begin(), more.end());
-    return drives;
+    return withEurocAndRendered(drives);
   }
 
   /// The ground truth of KITTI 01 and of Karlsruhe 19 has lengths that are wrong by several per cent.
-  Words drivesWithTrueLengths() const {
-    Words drives = {"04", "06"};
+  Words drivesWithTrueLengths() const { return withEurocAndRendered({"04", "06"}); }
+
+  Words withEurocAndRendered(Words drives) const {
     if (!all_.euroc.empty()) drives.insert(drives.end(), {all_.euroc + "/MH_01_half", moving().string()});
     const Words more = rendered();
     drives.insert(drives.end(), more.begin(), more.end());

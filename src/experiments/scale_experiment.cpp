@@ -81,7 +81,7 @@ Methods describeAll(const ReferenceSequence& sequence, int i, const ExperimentSe
   const KeypointSet set = findKeypoints(sequence.images, i, extraction.detector, extraction.stereo);
   const double detection = cpuMs() - begin;
   Methods methods;
-  // What the detectors find is thinned by the stereo matching; so they get a quarter more than the corners' number.
+  // Stereo matching thins the key points of OpenCV's detectors: a quarter more leaves about as many (chosen).
   const int wanted = experiment.features * 5 / 4;
   describeBySize(set, detection, setup, DescriptorType::kFreak, experiment, methods);
   describeBySize(set, detection, setup, DescriptorType::kOrb, experiment, methods);
@@ -105,7 +105,7 @@ struct MethodScore {
 
 void compare(const StereoFeatures& first, const StereoFeatures& later, const Eigen::Isometry3d& T_later_first,
              MethodScore& score) {
-  constexpr double kTolerance = 3.0;  // px
+  constexpr double kTolerance = 3.0;  // px, as in experiment A
   std::vector<int> match_of(static_cast<std::size_t>(first.count()), -1);
   for (const FeatureMatch& match : matchByDescriptor(first, later))
     match_of[static_cast<std::size_t>(match.reference)] = match.current;

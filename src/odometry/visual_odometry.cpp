@@ -116,7 +116,7 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features, const std:
   }
   state_.camera = features.camera;
   state_.last_stamp = features.stamp;
-  constexpr double kForgotten = 0.2;  // of the interval, by each pair
+  constexpr double kForgotten = 0.2;  // ratio of the interval, by each pair: it outlives bursts of three (chosen)
   if (dt <= options_.tracking.max_gap) state_.interval = std::max(dt, (1.0 - kForgotten) * state_.interval);
   ++state_.pairs;
   const bool turned = state_.right_rotation.add(features);

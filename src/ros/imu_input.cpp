@@ -9,7 +9,7 @@ namespace sdvo {
 
 ImuInput::ImuInput(ros::NodeHandle& nh, const RobotTransforms& transforms, Report warn)
     : transforms_(transforms), warn_(std::move(warn)) {
-  constexpr int kQueue = 1000;
+  constexpr int kQueue = 1000;  // messages, a second of the fastest IMUs
   subscriber_ = nh.subscribe<sensor_msgs::Imu>(
       "imu", kQueue, [this](const sensor_msgs::ImuConstPtr& message) { take(*message); }, ros::VoidConstPtr(),
       ros::TransportHints().tcpNoDelay());

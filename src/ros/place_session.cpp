@@ -62,7 +62,8 @@ std::optional<PlaceReport> PlaceSession::observe(const OdometryPair& pair, const
 }
 
 void PlaceSession::expect(const geometry_msgs::PoseWithCovarianceStamped& pose, const std::string& map_frame) {
-  constexpr double kLeast = 5.0, kSigmas = 3.0;  // m
+  constexpr double kLeast = 5.0;   // m: a click in rviz is no better (chosen)
+  constexpr double kSigmas = 3.0;  // standard deviations
   const std::string frame = ros_conversions::cleanFrameId(pose.header.frame_id);
   if (frame != map_frame)
     throw std::invalid_argument("it is in frame '" + frame + "', not in the map's, '" + map_frame + "'");

@@ -33,8 +33,8 @@ class PlaceSession {
   /// that of the places, other descriptors, and messages that do not hold together.
   std::optional<PlaceReport> observe(const OdometryPair& pair, const Eigen::Isometry3d& T_base_camera);
 
-  /// Somebody says where the base is in the map, as with rviz' "2D Pose Estimate". From the next pair on the odometry is
-  /// there, and until a place is recognised only those nearby are looked at. Throws std::invalid_argument for a pose that
+  /// Takes a pose of the base in the map, as from rviz' "2D Pose Estimate". From the next pair on the odometry is there,
+  /// and until a place is recognised only those nearby are looked at. Throws std::invalid_argument for a pose that
   /// is not of `map_frame`, and for numbers that are not finite.
   void expect(const geometry_msgs::PoseWithCovarianceStamped& pose, const std::string& map_frame);
 
@@ -57,7 +57,7 @@ class PlaceSession {
 
   /// Places that look like another robot's, the best first. Throws std::invalid_argument where words differ in kind.
   std::vector<PlaceCandidate> find(const stereo_descriptor_vo::PlaceSignature& signature) const;
-  /// What geometry says of place `id` and another robot's; none while it is not the same place.
+  /// The geometric match of place `id` with another robot's; none where they are not the same place.
   std::optional<stereo_descriptor_vo::PlaceMatch> verify(int id, const Place& other) const;
 
   /// Whether it is known where in the places that were loaded the odometry is; true when none were.
