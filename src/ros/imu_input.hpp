@@ -29,6 +29,9 @@ class ImuInput {
   std::optional<Eigen::Matrix3d> rotation(const std::string& frame, const ros::Time& from, const ros::Time& to,
                                           std::string& problem) const;
 
+  /// Whether the last second is there and shows gravity alone.
+  bool stands() const { return gravity_.up().has_value(); }
+
   /// Unit vector away from the earth in the axes of `frame`, as the last second has it; none, and why, unless the robot
   /// stood in that second.
   std::optional<Eigen::Vector3d> up(const std::string& frame, std::string& problem) const;

@@ -317,13 +317,11 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     constexpr double kPatience = 2.0;  // s of wall time
     const double now = steadyTime();
     if (!levels_until_) levels_until_ = now + kPatience;
-    std::string problem;
-    const std::optional<Eigen::Vector3d> up =
-        imu_->up(ros_conversions::cleanFrameId(options_.output.base_frame_id), problem);
-    if (!up && now < *levels_until_)
+    if (!imu_->stands() && now < *levels_until_)
       return "roll and pitch of the first pose: no second of gravity alone on " + imu_->topic() + " yet";
     to_be_levelled_ = false;
-    if (up) {
+    std::string problem;
+    if (const auto up = imu_->up(ros_conversions::cleanFrameId(options_.output.base_frame_id), problem)) {
       T_odom_start_ = levelled(T_odom_start_, *up);
       publisher_->restart(T_odom_start_);
     } else {
