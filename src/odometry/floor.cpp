@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <sstream>
 
 namespace sdvo {
 namespace {
@@ -64,6 +65,27 @@ Matrix6d Floor::constrained(const Eigen::Isometry3d& T_origin_camera, const Matr
   // T_origin_camera exp(xi) inverted is exp(-xi) T_camera_origin; the sign does not matter to a covariance.
   const Matrix6d left = covariance - gain(by_left, covariance) * by_left * covariance;
   return 0.5 * (left + left.transpose());
+}
+
+std::string FloorBelief::note(const Floor& known, const Eigen::Isometry3d& T_camera_origin) {
+  constexpr int kLevel = 10;  // pairs that make another floor (chosen: a second at 10 Hz)
+  const Eigen::Vector3d residual = known.residual(T_camera_origin);
+  const double height = known.base(T_camera_origin).translation().z();
+  const bool is_tilted = !Floor::isLevel(residual);
+  on_floor_ = Floor::isOn(residual);
+  level_pairs_ = on_floor_ || is_tilted ? 0 : level_pairs_ + 1;
+  std::ostringstream reason;
+  if (is_tilted)
+    reason << "off the floor: tilted by " << residual.tail<2>().cwiseProduct(known.sigma.tail<2>()).norm() * 180.0 / CV_PI
+           << " degrees, a ramp?";
+  else if (!on_floor_)
+    reason << "off the floor: " << height - height_ << " m above it";
+  if (level_pairs_ >= kLevel) {
+    reason << ", level: this is the floor from now on";
+    height_ = height;
+    level_pairs_ = 0;
+  }
+  return reason.str();
 }
 
 }  // namespace sdvo

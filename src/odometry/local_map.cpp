@@ -35,26 +35,6 @@ Matrix6d motionCovariance(const Window& window, const std::vector<int>& poses, c
   return 0.5 * (covariance + covariance.transpose());
 }
 
-/// Medians of some observations' squared residuals and of their disparities (px).
-std::pair<double, double> typicalOf(const Window& window, const std::vector<double>& squares,
-                                    const std::vector<int>& observations) {
-  std::vector<double> of_these, disparities;
-  of_these.reserve(observations.size()), disparities.reserve(observations.size());
-  for (const int i : observations) {
-    of_these.push_back(squares[i]);
-    disparities.push_back(window.observations[i].measurement.z());
-  }
-  return {median(of_these), median(disparities)};
-}
-
-/// A shift (px) of a whole image as a covariance of its pose: that of a camera which looks at points of this disparity.
-Matrix6d shifted(const StereoCamera& camera, double shift, double disparity) {
-  const double rotation = shift / camera.fx, translation = shift * camera.baseline / std::max(disparity, 1.0);
-  Vector6d variances;
-  variances << Eigen::Vector3d::Constant(translation * translation), Eigen::Vector3d::Constant(rotation * rotation);
-  return variances.asDiagonal();
-}
-
 /// Of observations in the order of their frames the one in this frame, or their end.
 template <class Observations>
 auto sightingIn(Observations& observations, int frame_id) {
@@ -432,9 +412,8 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   window.floor = floor;
 
   std::vector<int> poses;  // whose covariances are made use of below
-  poses.reserve(3);
-  for (const int pose : {newest, newest - 1, 1})
-    if (pose > 0 && std::find(poses.begin(), poses.end(), pose) == poses.end()) poses.push_back(pose);
+  for (const int pose : {newest, newest - 1})
+    if (pose > 0) poses.push_back(pose);
   const WindowSolution& solution = optimizer.optimize(window, poses);
   if (!solution.success) {
     problem_.clear();
@@ -443,19 +422,11 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   adjustment.success = true;
   adjustment.calibration_information = solution.calibration_information;
   adjustment.common_disparity_square = solution.common_disparity_square;
-  const auto covariance = [&](int from, int to) -> Matrix6d {
-    return motionCovariance(window, poses, solution.pose_covariance, from, to);
-  };
-  const auto [square, disparity] = typicalOf(window, solution.squares, problem_.newest);
-  constexpr double kAlike = 1.15;  // errors of neighbouring points are not independent
-  const double excess = kAlike * residual_level_.excess(square);
-  const Matrix6d shift = shifted(camera_, optimizer.options().common_shift, disparity);
-  const auto of_newest = [&](int from) -> Matrix6d {
-    if (from == newest) return Matrix6d::Zero();
-    return excess * covariance(from, newest) + shift;
-  };
-  adjustment.covariances = {frames_.front().id, of_newest(newest - 1), of_newest(0), of_newest(1),
-                            covariance(0, newest - 1)};
+  // Errors of neighbouring points are positively correlated: this factor makes the motions' NEES an honest 6 (measured
+  // by scripts/measure_covariance).
+  constexpr double kCorrelated = 1.7;
+  adjustment.since_keyframe =
+      kCorrelated * motionCovariance(window, poses, solution.pose_covariance, newest - 1, newest);
   calibration = window.calibration;
   for (std::size_t f = 0; f < frames_.size(); ++f)
     frames_[f].T_camera_origin = orthonormalised(window.T_camera_origin[f]);

@@ -125,7 +125,10 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
   }
   hypotheses.push_back(searchAmong(scene, all, lasting));
   // A compromise between two motions may have more inliers than the one that goes on as before.
-  if (prior) hypotheses.push_back(searchAmong(scene, all, agreeing(scene, all, *prior)));
+  if (prior) {
+    hypotheses.push_back(searchAmong(scene, all, agreeing(scene, all, *prior)));
+    hypotheses.back().guided = true;
+  }
   // What moves by itself may have left copies of itself in the map, each with a motion of its own.
   constexpr int kMotions = 4;
   MotionEstimate peeled = all.motion;
@@ -299,7 +302,9 @@ void MotionSearch::keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_l
     inliers.push_back(motion.inliers[k]);
     sightings.push_back(found.sightings[k]);
   }
-  if (!found.T_current_reference_else) found.T_current_reference_else = motion.T_current_reference;
+  // The other motion explains the rest, so that does not speak against this one.
+  found.evidence.matches -= static_cast<int>(motion.inliers.size() - inliers.size());
+  if (!found.rival) found.rival = motion.T_current_reference;
   motion.T_current_reference = T_lasting;
   motion.inliers = std::move(inliers);
   found.sightings = std::move(sightings);
@@ -341,26 +346,35 @@ std::size_t MotionSearch::best(const MotionScene& scene, const std::vector<Motio
   const auto change = [&](const MotionHypothesis& of) {
     return (expSE3(*scene.velocity * -of.evidence.dt) * of.evidence.motion).translation().norm();
   };
-  const auto isBetter = [&](std::size_t i, std::size_t j) {
-    const MotionHypothesis &a = hypotheses[i], &b = hypotheses[j];
-    if (a.motion.success != b.motion.success) return a.motion.success;
-    if (std::abs(lasting_costs[i] - lasting_costs[j]) > kDecisive) return lasting_costs[i] < lasting_costs[j];
-    // However many they are: a board that covers most of the view outnumbers what is left of the world.
-    const bool is_a_implausible = isImplausible(verdict_options_, a.evidence),
-               is_b_implausible = isImplausible(verdict_options_, b.evidence);
-    if (is_a_implausible != is_b_implausible) return is_b_implausible;
-    const bool comparable = b.evidence.inliers > leastOfRival(a.motion) && a.evidence.inliers > leastOfRival(b.motion);
-    if (scene.velocity && comparable && !areSame(a, b)) return change(a) < change(b);
-    return a.evidence.inliers > b.evidence.inliers;
+  // Each step keeps some of those that are left, whatever their order.
+  std::vector<std::size_t> left;
+  const auto keep = [&](const auto& isKept) {
+    std::vector<std::size_t> kept;
+    std::copy_if(left.begin(), left.end(), std::back_inserter(kept), isKept);
+    if (!kept.empty()) left = std::move(kept);
   };
-  std::size_t best = 0;
-  for (std::size_t k = 1; k < hypotheses.size(); ++k) {
-    // Of one motion the first will do, unless it was drawn away by what moves a little differently.
-    const bool same = hypotheses[best].verdict.trust == Trust::kSound && areSame(hypotheses[best], hypotheses[k]) &&
-                      lasting_costs[best] - lasting_costs[k] <= kDecisive;
-    if (!same && isBetter(k, best)) best = k;
+  const auto inliers = [&](std::size_t k) { return hypotheses[k].evidence.inliers; };
+  left.resize(hypotheses.size());
+  std::iota(left.begin(), left.end(), std::size_t{0});
+  keep([&](std::size_t k) { return hypotheses[k].motion.success; });
+  const auto by_cost = [&](std::size_t a, std::size_t b) { return lasting_costs[a] < lasting_costs[b]; };
+  const double least_cost = lasting_costs[*std::min_element(left.begin(), left.end(), by_cost)];
+  keep([&](std::size_t k) { return lasting_costs[k] <= least_cost + kDecisive; });
+  // However many they are: a board that covers most of the view outnumbers what is left of the world.
+  keep([&](std::size_t k) { return !isImplausible(verdict_options_, hypotheses[k].evidence); });
+  const auto by_inliers = [&](std::size_t a, std::size_t b) { return inliers(a) < inliers(b); };
+  const std::size_t largest = *std::max_element(left.begin(), left.end(), by_inliers);
+  if (scene.velocity) {
+    keep([&](std::size_t k) { return k == largest || inliers(k) > leastOfRival(hypotheses[largest].motion); });
+    const auto by_change = [&](std::size_t a, std::size_t b) { return change(hypotheses[a]) < change(hypotheses[b]); };
+    const std::size_t steadiest = *std::min_element(left.begin(), left.end(), by_change);
+    keep([&](std::size_t k) { return k == steadiest || areSame(hypotheses[k], hypotheses[steadiest]); });
   }
-  return best;
+  // Of one motion the first that is sound will do.
+  const auto sound = std::find_if(left.begin(), left.end(), [&](std::size_t k) {
+    return hypotheses[k].verdict.trust == Trust::kSound;
+  });
+  return sound != left.end() ? *sound : *std::max_element(left.begin(), left.end(), by_inliers);
 }
 
 /// Takes the best hypothesis. What the others say confirms it or speaks against it.
@@ -395,13 +409,12 @@ MotionHypothesis MotionSearch::choose(const MotionScene& scene, std::vector<Moti
         return std::binary_search(of_rivals.begin(), of_rivals.end(), match.current);
       }));
   chosen.verdict = judgePose(verdict_options_, motion_options_.min_inliers, chosen.evidence);
-  // Less than that is something small that moves, or a texture that repeats itself; unless it was larger just before.
-  const double substantial_share = scene.contested ? 0.0 : 0.35;
-  const bool substantial = static_cast<double>(of_rival.size()) >= substantial_share * chosen.evidence.inliers;
+  constexpr double kSubstantial = 0.35;  // ratio: less is something small that moves, or a texture that repeats itself
+  const bool substantial = static_cast<double>(of_rival.size()) >= kSubstantial * chosen.evidence.inliers;
   chosen.contested = lastingDisagree(verdict_options_, chosen.evidence);
   if (rival && (substantial ? chosen.verdict.trust != Trust::kNone : chosen.verdict.trust == Trust::kDoubtful)) {
     chosen.contested = true;
-    chosen.T_current_reference_else = rival->motion.T_current_reference;
+    chosen.rival = rival->motion.T_current_reference;
     chosen.verdict = {Trust::kDoubtful, "two motions in view, of " + std::to_string(own.size()) + " and " +
                                             std::to_string(of_rival.size()) +
                                             " matches: does something move before the camera?"};

@@ -1,7 +1,6 @@
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <cmath>
 
 namespace sdvo {
@@ -12,12 +11,6 @@ Matrix6d discontinuity() {
   Vector6d variance;
   variance << Eigen::Vector3d::Constant(100.0), Eigen::Vector3d::Constant(0.25);
   return variance.asDiagonal();
-}
-
-/// The nearest positive semi-definite matrix to a symmetric one.
-Matrix6d positivePart(const Matrix6d& matrix) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(matrix);
-  return solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).asDiagonal() * solver.eigenvectors().transpose();
 }
 
 /// The covariance of a pose T as that of T * M: T exp(xi) M = T M exp(Ad(M^-1) xi).
@@ -59,56 +52,39 @@ void PoseCovariance::cover(const Vector6d& correction) {
 void PoseCovariance::restart(const Matrix6d& travelled) {
   value_ += discontinuity() + travelled;
   since_keyframe_.setZero();
-  last_window_.reset();
+  unmeasured_.setZero();
   markKeyframe();
 }
 
 void PoseCovariance::markKeyframe() {
-  if (last_window_) value_ += (kAlike - 1.0) * last_window_->since_keyframe;
+  value_ += (kAlike - 1.0) * since_keyframe_;
   keyframe_ = value_;
-  last_is_keyframe_ = true;
 }
 
 void PoseCovariance::carry(const Eigen::Isometry3d& T_previous_current) {
-  value_ = carriedBy(T_previous_current, value_);
-  keyframe_ = carriedBy(T_previous_current, keyframe_);
+  for (Matrix6d* covariance : {&value_, &keyframe_, &unmeasured_}) *covariance = carriedBy(T_previous_current, *covariance);
 }
 
 void PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance) {
   carry(T_previous_current);
   value_ += covariance;
-  since_keyframe_ =
-      covariance + (last_is_keyframe_ ? Matrix6d(Matrix6d::Zero()) : carriedBy(T_previous_current, since_keyframe_));
-  last_is_keyframe_ = false;
-  last_window_.reset();
+  unmeasured_ += covariance;
+  since_keyframe_.setZero();
 }
 
-Matrix6d PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, const WindowCovariances& window) {
-  const Matrix6d motion = carriedBy(T_previous_current, outdated(window)) + window.since_keyframe;
+Matrix6d PoseCovariance::measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe) {
   carry(T_previous_current);
-  const Matrix6d measured = keyframe_ + window.since_keyframe;
-  value_ = noLessThan(value_, measured);
-  since_keyframe_ = window.since_keyframe;
-  last_is_keyframe_ = false;
-  last_window_ = window;
+  const Matrix6d motion = unmeasured_ + since_keyframe;
+  value_ = noLessThan(value_, keyframe_ + since_keyframe);
+  since_keyframe_ = since_keyframe;
+  unmeasured_.setZero();
   return motion;
 }
 
 void PoseCovariance::doubt(const Matrix6d& covariance) {
   value_ += covariance;
-  since_keyframe_ += covariance;
-  last_window_.reset();
-}
-
-/// What the last pose lacked when it was reported, seen from the key frame that the new pair is measured from.
-Matrix6d PoseCovariance::outdated(const WindowCovariances& window) const {
-  if (!last_is_keyframe_ || !last_window_) return since_keyframe_;
-  if (window.first_id < last_window_->first_id)
-    return since_keyframe_;  // an older frame was recalled: nothing in common
-  // It is that key frame itself: this window knows it better than its own did.
-  const Matrix6d& then =
-      window.first_id == last_window_->first_id ? last_window_->since_first : last_window_->since_second;
-  return positivePart(then - window.keyframe_since_first);
+  unmeasured_ += covariance;
+  since_keyframe_.setZero();
 }
 
 }  // namespace sdvo

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "stereo_descriptor_vo/odometry/motion_doubt.hpp"
+#include "stereo_descriptor_vo/odometry/motion_belief.hpp"
 
 namespace sdvo {
 namespace {
@@ -20,6 +20,34 @@ PoseVerdict verdict(Trust trust, const Parts&... parts) {
 /// Standard deviation of a motion's translation (0) or rotation (3) in its worst direction, or a little more.
 double deviation(const Matrix6d& covariance, int first) {
   return std::sqrt(covariance.block<3, 3>(first, first).trace());
+}
+
+/// Difference of two motions.
+struct Change {
+  double distance, angle;  ///< m, rad
+};
+
+Change changeOf(const Vector6d& difference) {
+  return {difference.head<3>().norm(), difference.tail<3>().norm()};
+}
+
+Change changeOf(const Eigen::Isometry3d& difference) {
+  return changeOf(logSE3(difference));
+}
+
+/// From the motion that the velocity before predicts.
+Change changeSinceVelocity(const PoseEvidence& evidence) {
+  return changeOf(logSE3(evidence.motion) - *evidence.velocity * evidence.dt);
+}
+
+/// By which a motion can differ from the predicted one when the velocity changes by so much (m/s, rad/s). The stamps of
+/// both velocities may be wrong, and the motion has noise.
+Change largestChange(const PoseVerdictOptions& options, const PoseEvidence& evidence, double speed_change,
+                     double rate_change) {
+  const double time = evidence.dt + options.stamp_tolerance, forgiven = 2.0 * options.stamp_tolerance;
+  const Change before = changeOf(*evidence.velocity);
+  return {speed_change * time + before.distance * forgiven + kSigmas * deviation(evidence.covariance, 0),
+          rate_change * time + before.angle * forgiven + kSigmas * deviation(evidence.covariance, 3)};
 }
 
 }  // namespace
@@ -54,38 +82,32 @@ PoseVerdict judgePose(const PoseVerdictOptions& options, int min_inliers, const 
     return verdict(Trust::kDoubtful, "inliers in only ", std::round(100.0 * evidence.coverage), " % of the image");
   if (!evidence.confirmed && evidence.rms > options.doubtful_rms)
     return verdict(Trust::kDoubtful, "a reprojection error of ", evidence.rms, " px");
-  constexpr double kShare = 0.03;
-  if (evidence.deviation > options.doubtful_deviation + kShare * way)
-    return verdict(Trust::kDoubtful, "a way of ", way, " m known to ", evidence.deviation,
-                   " m exceeds tracking/doubtful_deviation");
+  constexpr double kRatio = 0.03;  // of the distance (chosen)
+  if (evidence.deviation > options.doubtful_deviation + kRatio * evidence.distance)
+    return verdict(Trust::kDoubtful, "a distance of ", evidence.distance, " m with a standard deviation of ",
+                   evidence.deviation, " m exceeds tracking/doubtful_deviation");
   return judgeChange(options, evidence);
 }
 
 PoseVerdict judgeChange(const PoseVerdictOptions& options, const PoseEvidence& evidence) {
   if (!evidence.velocity) return {};
-  const Vector6d& before = *evidence.velocity;
-  const double time = evidence.dt + options.stamp_tolerance;
-  // The velocity before rests on stamps that may be wrong, too. What is long ago may have changed since.
-  const double forgiven = 2.0 * options.stamp_tolerance;
-  const double speed_change = options.max_acceleration * time + kLastingAcceleration * evidence.velocity_age;
-  const double rate_change =
-      options.max_rotation_acceleration * time + kLastingTurnAcceleration * evidence.velocity_age;
-  const double most =
-      speed_change * time + before.head<3>().norm() * forgiven + kSigmas * deviation(evidence.covariance, 0);
-  const double most_turn =
-      rate_change * time + before.tail<3>().norm() * forgiven + kSigmas * deviation(evidence.covariance, 3);
+  // What is long ago may have changed since.
+  const Change most = largestChange(options, evidence,
+                                    options.max_acceleration * (evidence.dt + options.stamp_tolerance) +
+                                        kLastingAcceleration * evidence.velocity_age,
+                                    options.max_rotation_acceleration * (evidence.dt + options.stamp_tolerance) +
+                                        kLastingTurnAcceleration * evidence.velocity_age);
   if (evidence.guess) {
-    const Vector6d aside = logSE3(evidence.guess->inverse() * evidence.motion);
-    if (aside.head<3>().norm() <= most && aside.tail<3>().norm() <= most_turn) return {};
+    const Change aside = changeOf(evidence.guess->inverse() * evidence.motion);
+    if (aside.distance <= most.distance && aside.angle <= most.angle) return {};
   }
-  const Vector6d change = logSE3(evidence.motion) - before * evidence.dt;
-  const double way = change.head<3>().norm(), angle = change.tail<3>().norm();
+  const Change change = changeSinceVelocity(evidence);
   PoseVerdict doubt;
-  if (way > most)
-    doubt = verdict(Trust::kDoubtful, "a change of the motion by ", way, " m in ", evidence.dt,
+  if (change.distance > most.distance)
+    doubt = verdict(Trust::kDoubtful, "a change of the motion by ", change.distance, " m in ", evidence.dt,
                     " s exceeds tracking/max_acceleration");
-  else if (angle > most_turn)
-    doubt = verdict(Trust::kDoubtful, "a change of the rotation by ", angle, " rad in ", evidence.dt,
+  else if (change.angle > most.angle)
+    doubt = verdict(Trust::kDoubtful, "a change of the rotation by ", change.angle, " rad in ", evidence.dt,
                     " s exceeds tracking/max_rotation_acceleration");
   doubt.of_rate = doubt.trust == Trust::kDoubtful;
   return doubt;
@@ -104,12 +126,13 @@ bool isImplausible(const PoseVerdictOptions& options, const PoseEvidence& eviden
   return judgeChange(options, evidence).trust == Trust::kDoubtful && !lastingAgree(options, evidence);
 }
 
-bool isUnexpected(const PoseEvidence& evidence) {
+bool isUnexpected(const PoseVerdictOptions& options, const PoseEvidence& evidence) {
   if (!evidence.velocity) return false;
-  const double age = evidence.velocity_age + evidence.dt;
-  const Vector6d change = logSE3(evidence.motion) - evidence.dt * *evidence.velocity;
-  return change.head<3>().norm() > kLastingAcceleration * age * evidence.dt ||
-         change.tail<3>().norm() > kLastingTurnAcceleration * age * evidence.dt;
+  const double age = evidence.velocity_age + evidence.dt + options.stamp_tolerance;
+  const Change most =
+      largestChange(options, evidence, kLastingAcceleration * age, kLastingTurnAcceleration * age);
+  const Change change = changeSinceVelocity(evidence);
+  return change.distance > most.distance || change.angle > most.angle;
 }
 
 }  // namespace sdvo

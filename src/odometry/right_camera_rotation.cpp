@@ -17,8 +17,9 @@ constexpr double kCorrelatedSightings = 10.0;
 
 // A turn of the camera.
 constexpr double kTurned = 0.6;   // px: undisturbed, KITTI's and EuRoC's rigs change by less than 0.2
-constexpr double kUnusual = 3.0;  // times the usual change, which grows slowly where rectification left more than …
-constexpr double kUsualMemory = 0.9;  // … a rotation and features come to lie elsewhere: Karlsruhe's rig has 0.5 px
+constexpr double kUnusual = 3.0;  // times the usual change. That grows where rectification left more than a rotation
+                                  // (Karlsruhe's rig: 0.5 px), or where the shutters are apart while the camera turns.
+constexpr double kUsualMemory = 0.9;  // ratio of the usual change's square that a pair leaves: some ten pairs
 
 Eigen::RowVector3d effect(const StereoCamera& camera, double u_right, double v) {
   const double x = (u_right - camera.cx) / camera.fx, y = (v - camera.cy) / camera.fy;
@@ -50,12 +51,14 @@ RightCameraRotation::Sums RightCameraRotation::sumUp(const StereoFeatures& featu
 bool RightCameraRotation::add(const StereoFeatures& features) {
   if (features.count() == 0) return false;
   const double disagreement = change(features);
-  const bool turned = disagreement > std::max(kTurned, kUnusual * std::sqrt(usual_square_));
-  if (!turned) usual_square_ += (1.0 - kUsualMemory) * (disagreement * disagreement - usual_square_);
+  const double limit = std::max(kTurned, kUnusual * std::sqrt(usual_square_));
+  // A knock is one large change. What changes in many pairs is the rig's way, so each counts up to the limit.
+  const double counted = std::min(disagreement, limit);
+  usual_square_ += (1.0 - kUsualMemory) * (counted * counted - usual_square_);
   const Sums past{kMemory * sums_.information, kMemory * sums_.gradient, kMemory * sums_.square,
                   kMemory * sums_.weight};
   sums_ = sumUp(features, past);
-  return turned;
+  return disagreement > limit;
 }
 
 double RightCameraRotation::change(const StereoFeatures& features) const {

@@ -1,48 +1,17 @@
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
 
-#include "../common/median.hpp"
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
-#include "stereo_descriptor_vo/odometry/correspondences.hpp"
-#include "stereo_descriptor_vo/odometry/motion_doubt.hpp"
 
 namespace sdvo {
 namespace {
 
-constexpr int kWatched = 5;           // pairs after a motion was contested or could not be, or a pair refused
-constexpr int kWatchedLong = 20;      // … after many matches agreed on none at all
-constexpr int kManyMatches = 100;     // of one pair
-constexpr double kFewOutliers = 0.1;  // share of the matches whose twofold says nothing
-constexpr double kLately = 2.0;       // s that a motion nobody doubted tells what may be expected
-constexpr double kSurprise = 0.003;   // share of what was not expected of a motion that its measurement misses
-
-double outlierShare(const PoseEvidence& evidence) {
-  return 1.0 - static_cast<double>(evidence.inliers) / std::max(evidence.matches, 1);
-}
-
-/// Median distance in the left image, px, between where correspondences were seen and where a motion puts them.
-double medianMiss(const StereoCamera& camera, const Eigen::Isometry3d& T_current_reference,
-                  const std::vector<Correspondence>& correspondences) {
-  std::vector<double> misses;
-  misses.reserve(correspondences.size());
-  for (const Correspondence& c : correspondences) {
-    const Eigen::Vector3d expected = camera.project(T_current_reference * c.point);
-    misses.push_back((expected - c.measurement).head<2>().norm());
-  }
-  return median(misses);
-}
-
-/// How many times larger the variance is than the adjustment says, where few inliers let a wrong one weigh more.
-double excessOfFew(int inliers, int enough) {
-  const double times = static_cast<double>(enough) / std::max(inliers, 1);
-  return std::max(1.0, times * times);
-}
+constexpr int kManyMatches = 100;  // of one pair: agreement on no motion is then no lack of points (chosen)
 
 /// The pose of an optical frame (z ahead, x right) at the origin of a base (x ahead, z up).
 Eigen::Isometry3d lookingAhead() {
@@ -71,16 +40,14 @@ VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
     : options_(checked(options)),
       T_base_camera_(lookingAhead()),
       search_(options.matcher, options.motion, options.alignment, options.tracking),
-      matcher_(options.matcher.widened()),
-      estimator_(options.motion),
+      revisit_(options.matcher, options.motion, options.alignment),
       optimizer_(options.window),
       state_(options.calibration) {}
 
 void VisualOdometry::configure(const VisualOdometryOptions& options) {
   options_ = checked(options);
   search_ = MotionSearch(options.matcher, options.motion, options.alignment, options.tracking);
-  matcher_ = FeatureMatcher(options.matcher.widened());
-  estimator_ = MotionEstimator(options.motion);
+  revisit_ = Revisit(options.matcher, options.motion, options.alignment);
   optimizer_ = WindowOptimizer(options.window);
 }
 
@@ -91,13 +58,13 @@ void VisualOdometry::reset() {
 
 void VisualOdometry::breakStream() {
   state_.map.reset();
-  state_.velocity.reset();
+  state_.belief.interrupt();
 }
 
 void VisualOdometry::forgetTime() {
   breakStream();
   state_.last_stamp.reset();
-  state_.last_velocity.reset();
+  state_.belief.forget();
 }
 
 OdometryResult VisualOdometry::update(const StereoFeatures& features, const std::optional<MotionGuess>& guess) {
@@ -105,56 +72,28 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features, const std:
   const double dt = state_.last_stamp ? static_cast<double>(features.stamp - *state_.last_stamp) * 1e-9 : 0.0;
   const bool continued = state_.map && state_.map->continuedBy(features);
   const bool frozen = isFrozen(features, dt, guess);
-  const MotionHypothesis found = continued && !frozen ? localise(features, dt, guess) : MotionHypothesis{};
+  const MotionHypothesis found = continued && !frozen ? propose(features, dt, guess) : MotionHypothesis{};
 
   // Nothing has changed so far, and from here on nothing is refused.
   Stopwatch stopwatch;
-  if (state_.camera && *state_.camera != features.camera) {
-    // What was learnt of the rig is of another one.
-    state_.calibration = CalibrationFilter(options_.calibration);
-    state_.right_rotation = RightCameraRotation();
-  }
-  state_.camera = features.camera;
-  state_.last_stamp = features.stamp;
-  constexpr double kForgotten = 0.2;  // ratio of the interval, by each pair: it outlives bursts of three (chosen)
-  if (dt <= options_.tracking.max_gap) state_.interval = std::max(dt, (1.0 - kForgotten) * state_.interval);
-  ++state_.pairs;
-  const bool turned = state_.right_rotation.add(features);
-  state_.frozen = frozen;
-  state_.contested_pairs = std::max(found.contested ? kWatched : 0, state_.contested_pairs - 1);
-  if (features.report.refused) {
-    // What the pairs before told of the rig may be wrong already, and those after may be refused again.
-    state_.calibration = CalibrationFilter(options_.calibration);
-    watch(kWatched);
-  }
-  // The map is of another rig than this pair.
-  if (turned) watch(kWatched);
-  state_.image = {features.u, features.v, features.disparity};
+  begin(features, dt);
   Step step;
   if (frozen)
     step = predict(features, dt, "the images are those of the pair before, though the camera moved: is it frozen?");
   else if (!continued)
     step = seed(features);
-  else if (found.verdict.trust != Trust::kNone)
-    step = extendMap(features, dt, found);
-  else
+  else if (found.verdict.trust == Trust::kNone)
     step = predict(features, dt, found.verdict.reason);
-  const bool unexplained = continued && !frozen && (step.state == TrackingState::kLost || state_.predicted_pairs > 0);
-  // Many agreed on a motion that could not be: what comes next may be wrong in the same way.
-  if (unexplained && found.evidence.inliers >= options_.tracking.doubtful_inliers) watch(kWatched);
-  // Where many agree on none, and it is not that the camera went unseen, the views may not be of one rigid world, and
-  // the next map would be as wrong.
-  if (unexplained && found.evidence.matches >= kManyMatches && dt <= options_.tracking.max_gap) watch(kWatchedLong);
+  else
+    step = extendMap(features, dt, found);
+  if (continued && !frozen) suspect(dt, found, step);
+  state_.suspicion.pass();
+  state_.images.remember(features, frozen);
   if (step.T_previous_current) move(*step.T_previous_current);
   if (step.state == TrackingState::kTracking || step.state == TrackingState::kDegraded)
     state_.last_pose_stamp = features.stamp;
   step.time = stopwatch.lap();
   return report(features, dt, found, step);
-}
-
-/// The motions of the next pairs are doubted, if nothing else tells that they are right.
-void VisualOdometry::watch(int pairs) {
-  state_.contested_pairs = std::max(state_.contested_pairs, pairs);
 }
 
 void VisualOdometry::refuse(const StereoFeatures& features) const {
@@ -164,30 +103,72 @@ void VisualOdometry::refuse(const StereoFeatures& features) const {
                                 std::to_string(*state_.last_stamp) + " ns");
 }
 
+/// A camera that repeats its images seems to stand. The guess, or the motion before, shows whether it does.
+bool VisualOdometry::isFrozen(const StereoFeatures& features, double dt,
+                              const std::optional<MotionGuess>& guess) const {
+  if (guess && !guess->rotation_only) return state_.images.areFrozen(features, guess->T_previous_current, true);
+  std::optional<Eigen::Isometry3d> predicted;
+  if (state_.belief.velocity()) predicted = state_.belief.predicted(dt);
+  return state_.images.areFrozen(features, predicted, false);
+}
+
 /// Looks for the pair in the map.
-MotionHypothesis VisualOdometry::localise(const StereoFeatures& features, double dt,
-                                          const std::optional<MotionGuess>& guess) const {
+MotionHypothesis VisualOdometry::propose(const StereoFeatures& features, double dt,
+                                         const std::optional<MotionGuess>& guess) const {
+  const MotionBelief& belief = state_.belief;
   const RigCalibration calibration = state_.calibration.calibration();
-  MotionScene scene{*state_.map,   calibration,          features,
-                    std::nullopt,  state_.last_velocity, state_.contested_pairs > 0,
-                    velocityAge(), std::nullopt};
+  MotionScene scene{*state_.map,
+                    calibration,
+                    features,
+                    std::nullopt,
+                    belief.trusted(),
+                    state_.suspicion.isRaised(),
+                    belief.trustedAge(state_.map->newestStamp()),
+                    std::nullopt};
   // The motion since the map's newest pair: what was already covered by predicted pairs, and from there on the velocity
   // or the guess.
   const Eigen::Isometry3d T_reference_previous = state_.map->newestPose() * state_.T_origin_camera;
-  if (state_.velocity && dt <= options_.tracking.max_gap)
-    scene.T_current_reference = (T_reference_previous * expSE3(*state_.velocity * dt)).inverse();
+  if (belief.velocity() && dt <= options_.tracking.max_gap)
+    scene.T_current_reference = (T_reference_previous * belief.predicted(dt)).inverse();
   if (guess) {
     Eigen::Isometry3d T_previous_current = guess->T_previous_current;
     if (guess->rotation_only)
-      T_previous_current.translation() = state_.velocity.value_or(Vector6d::Zero()).head<3>() * dt;
+      T_previous_current.translation() = belief.velocity().value_or(Vector6d::Zero()).head<3>() * dt;
     scene.guess = (T_reference_previous * T_previous_current).inverse();
   }
   return search_.find(scene);
 }
 
-/// How old the last velocity was when the map's newest pair was taken, s.
-double VisualOdometry::velocityAge() const {
-  return static_cast<double>(state_.map->newestStamp() - state_.velocity_stamp) * 1e-9;
+/// Takes note of the pair, whatever becomes of its motion.
+void VisualOdometry::begin(const StereoFeatures& features, double dt) {
+  if (state_.camera && *state_.camera != features.camera) {
+    // What was learnt of the rig is of another one.
+    state_.calibration = CalibrationFilter(options_.calibration);
+    state_.right_rotation = RightCameraRotation();
+  }
+  state_.camera = features.camera;
+  state_.last_stamp = features.stamp;
+  ++state_.pairs;
+  if (dt <= options_.tracking.max_gap) state_.belief.pass(dt);
+  // The map is of another rig than this pair.
+  if (state_.right_rotation.add(features)) state_.suspicion.raise("the right camera seems to have turned");
+  if (features.report.refused) {
+    // What the pairs before told of the rig may be wrong already, and those after may be refused again.
+    state_.calibration = CalibrationFilter(options_.calibration);
+    state_.suspicion.raise("left and right did not fit together");
+  }
+}
+
+/// What this pair showed may mislead the next ones, too.
+void VisualOdometry::suspect(double dt, const MotionHypothesis& found, const Step& step) {
+  Suspicion& suspicion = state_.suspicion;
+  if (step.state != TrackingState::kLost && state_.predicted_pairs == 0) return;
+  const PoseEvidence& evidence = found.evidence;
+  if (evidence.inliers >= options_.tracking.doubtful_inliers) suspicion.raise("many points agreed on a wrong motion");
+  // Unless the camera went unseen, the views may not be of one rigid world, and the next map would be as wrong.
+  const bool agree = evidence.inliers >= options_.tracking.doubtful_ratio * evidence.matches;
+  if (evidence.matches >= kManyMatches && !agree && dt <= options_.tracking.max_gap)
+    suspicion.raise("many matches agreed on no motion", Suspicion::kLong);
 }
 
 VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
@@ -202,8 +183,8 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
   if (state_.started) {
     ++epoch_;
     const double unseen = std::max(0.0, static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9);
-    state_.covariance.restart(
-        travelCovariance(state_.last_velocity.value_or(Vector6d::Zero()), unseen, options_.tracking.max_speed));
+    state_.covariance.restart(travelCovariance(state_.belief.trusted().value_or(Vector6d::Zero()), unseen,
+                                               options_.tracking.max_speed));
     step.state = TrackingState::kDegraded;
     step.reason = "started again from the last pose; the motion in between is unknown";
   } else {
@@ -211,227 +192,157 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
     step.reason = "first pair";
   }
   state_.started = true;
-  state_.last_doubt.setZero();
-  state_.correction_left.setZero();
+  state_.belief.doubt(Matrix6d::Zero());
   state_.predicted_pairs = 0;
-  state_.outlier_level = {};
   state_.map.emplace(options_.map);
   state_.map->insert(options_.alignment, features, state_.pairs, state_.T_origin_camera.inverse(), {},
                      state_.calibration.calibration());
   return step;
 }
 
-/// The pair joins the map, which is adjusted with it. What the adjustment refutes leaves everything as it was.
+/// The pair joins the map unless the adjustment refutes its motion.
 VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, double dt,
                                                const MotionHypothesis& found) {
-  std::optional<std::pair<LocalMap, CalibrationFilter>> before;
-  if (found.verdict.trust != Trust::kSound) before.emplace(*state_.map, state_.calibration);
-  Extension extension = insert(features, found);
-  const PoseEvidence evidence = gatherEvidence(features, found, extension);
-  PoseVerdict verdict = judgePose(options_.tracking, options_.motion.min_inliers, evidence);
-  if (verdict.trust == Trust::kNone) {
-    // Without a map to go back to, what it has become is of no use.
-    if (before)
-      state_.map = std::move(before->first), state_.calibration = std::move(before->second);
-    else
-      breakStream();
-    return predict(features, dt, verdict.reason + " after the adjustment");
-  }
-  if (verdict.trust == Trust::kSound || found.T_current_reference_else) verdict = found.verdict;
-  const bool watched = isWatched(evidence) && verdict.trust == Trust::kSound;
-  if (watched)
-    verdict = {Trust::kDoubtful,
-               "a moment ago left and right disagreed, two motions were in view, or none was certain"};
+  if (found.contested) state_.suspicion.raise("something else moved in view");
+  const Candidate candidate = adjust(features, found);
+  if (candidate.verdict.trust == Trust::kNone)
+    return predict(features, dt, candidate.verdict.reason + " after the adjustment");
+  const Eigen::Isometry3d T_previous_measured =
+      (found.motion.T_current_reference * state_.map->newestPose() * state_.T_origin_camera).inverse();
+  commit(candidate);
 
-  Step step;
-  step.state = TrackingState::kTracking;
-  step.rejected_rows = extension.adjustment.rejected_rows;
-  step.T_previous_current = (state_.map->newestPose() * state_.T_origin_camera).inverse();
-  measure(dt, found, evidence, verdict.trust, extension, step);
+  Step step = measure(found, candidate);
+  PoseVerdict verdict = candidate.verdict;
+  // After a new start, or a motion of something else, it may be that which is followed.
+  const PoseEvidence& evidence = candidate.evidence;
+  if ((!state_.belief.velocity() || state_.suspicion.isRaised()) && isUnexpected(options_.tracking, evidence))
+    state_.suspicion.raise("the motion changed as no vehicle's does");
+  if (lastingDisagree(options_.tracking, evidence)) state_.suspicion.raise("points that stood still so far moved");
+  if (verdict.trust == Trust::kSound && state_.suspicion.isRaised())
+    verdict = {Trust::kDoubtful, "a moment ago " + state_.suspicion.cause()};
   const Matrix6d measured = step.covariance;
-  if (verdict.trust == Trust::kSound) state_.last_doubt.setZero();
+  Matrix6d doubt = Matrix6d::Zero();
   if (verdict.trust == Trust::kDoubtful) {
-    if (!watched || state_.last_doubt.isZero())
-      state_.last_doubt = doubt(found, extension, *step.T_previous_current, dt);
+    doubt = this->doubt(found, T_previous_measured, *step.T_previous_current, dt);
     step.state = TrackingState::kDegraded;
     step.reason = "doubtful: " + verdict.reason;
-    step.covariance += state_.last_doubt;
-    // Where the lasting points confirm the way, the stamps may be wrong, and only the speed is in doubt.
-    if (!verdict.of_rate || !lastingAgree(options_.tracking, evidence)) state_.covariance.doubt(state_.last_doubt);
+    step.covariance += doubt;
+    // Where the lasting points confirm the motion, the stamps may be wrong, and only the speed is in doubt.
+    if (!verdict.of_rate || !lastingAgree(options_.tracking, evidence)) state_.covariance.doubt(doubt);
   }
-  if (options_.planar.planar) noteFloor(step);
-  noteVelocity(features.stamp, found, evidence, verdict.trust, measured);
+  state_.belief.doubt(doubt);
+  noteVelocity(features.stamp, found, evidence, verdict.trust == Trust::kSound, measured);
+  if (options_.planar.planar) {
+    const std::string off = state_.floor.note(*floor(), state_.map->newestPose());
+    if (step.reason.empty()) step.reason = off;
+  }
   state_.predicted_pairs = 0;
   if (state_.map->newestIsKeyframe()) state_.covariance.markKeyframe();
   return step;
 }
 
-VisualOdometry::Extension VisualOdometry::insert(const StereoFeatures& features, const MotionHypothesis& found) {
-  LocalMap& map = *state_.map;
-  Extension extension;
-  extension.T_previous_origin = map.newestPose();
-  extension.calibration = state_.calibration.calibration();
-  map.insert(options_.alignment, features, state_.pairs, found.motion.T_current_reference * map.newestPose(),
-             found.sightings, extension.calibration);
-  extension.T_keyframe_origin = map.poseBeforeNewest();
-  if (map.newestIsKeyframe() && found.verdict.trust == Trust::kSound) recall(features);
-  const CalibrationBelief prior = state_.calibration.prior(map.oldestId());
+/// Adjusts a copy of the map with the pair in it, and judges the motion that this leaves.
+VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features, const MotionHypothesis& found) {
+  const Eigen::Isometry3d T_previous_origin = state_.map->newestPose();
+  state_.candidate = state_.map;
+  LocalMap& map = *state_.candidate;
+  Candidate candidate;
+  candidate.calibration = state_.calibration.calibration();
+  map.insert(options_.alignment, features, state_.pairs, found.motion.T_current_reference * T_previous_origin,
+             found.sightings, candidate.calibration);
+  candidate.T_keyframe_origin = map.poseBeforeNewest();
+  if (map.newestIsKeyframe() && found.verdict.trust == Trust::kSound)
+    revisit_.recall(features, candidate.calibration, map);
   const std::optional<Floor> floor = this->floor();
-  extension.adjustment = map.adjust(optimizer_, prior, extension.calibration, floor);
+  candidate.adjustment =
+      map.adjust(optimizer_, state_.calibration.prior(map.oldestId()), candidate.calibration, floor);
   // The window's first pose does not move in the adjustment: what it carries in height and tilt goes with the whole map.
   if (floor) map.moveTo(floor->settled(map.newestPose(), state_.covariance.value()));
   map.renewLooks(features, found.sightings);
-  return extension;
-}
 
-/// What speaks for the motion after the adjustment. Few inliers make that know less.
-PoseEvidence VisualOdometry::gatherEvidence(const StereoFeatures& features, const MotionHypothesis& found,
-                                            Extension& extension) const {
-  const LocalMap& map = *state_.map;
-  LocalMap::Adjustment& adjustment = extension.adjustment;
-  PoseEvidence evidence = found.evidence;
+  const LocalMap::Adjustment& adjustment = candidate.adjustment;
+  PoseEvidence& evidence = candidate.evidence = found.evidence;
   const std::vector<int> confirmed = found.inlierRows(adjustment.rejected_rows);
   evidence.inliers = static_cast<int>(confirmed.size());
   evidence.coverage = coverage(features, confirmed);
   evidence.lasting_inliers = found.lastingInliers(adjustment.rejected_rows);
   // What the adjustment did to the map as a whole is no motion.
-  const Eigen::Isometry3d T_before_after = extension.T_keyframe_origin.inverse() * map.poseBeforeNewest();
-  evidence.motion = extension.T_previous_origin * T_before_after * map.newestPose().inverse();
-  if (adjustment.success) {
-    adjustment.covariances.inflateNewest(excessOfFew(evidence.inliers, options_.tracking.doubtful_inliers));
-    evidence.deviation = std::sqrt(adjustment.covariances.since_keyframe.topLeftCorner<3, 3>().trace());
-  }
-  return evidence;
+  const Eigen::Isometry3d T_before_after = candidate.T_keyframe_origin.inverse() * map.poseBeforeNewest();
+  evidence.motion = T_previous_origin * T_before_after * map.newestPose().inverse();
+  evidence.distance = (map.poseBeforeNewest() * map.newestPose().inverse()).translation().norm();
+  if (adjustment.success) evidence.deviation = std::sqrt(adjustment.since_keyframe.topLeftCorner<3, 3>().trace());
+  candidate.verdict = judge(found, evidence);
+  return candidate;
 }
 
-/// Whether a motion is doubted because of what was seen a moment ago, or of what this pair shows.
-bool VisualOdometry::isWatched(const PoseEvidence& evidence) {
-  if (lastingDisagree(options_.tracking, evidence)) watch(kWatched);
-  // After a new start, or a motion of something else, it may be that which is followed.
-  if ((!state_.velocity || state_.contested_pairs > 0) && isUnexpected(evidence)) watch(kWatched);
-  return state_.contested_pairs > 0;
+/// The adjustment can refute a motion or cast doubt on it, but takes back no doubt of the search.
+PoseVerdict VisualOdometry::judge(const MotionHypothesis& found, const PoseEvidence& evidence) const {
+  PoseVerdict verdict = judgePose(options_.tracking, options_.motion.min_inliers, evidence);
+  return verdict.trust == Trust::kSound || (verdict.trust == Trust::kDoubtful && found.rival) ? found.verdict : verdict;
 }
 
-/// The motion's covariance, and what the adjustment tells of the rig and of the poses before.
-void VisualOdometry::measure(double dt, const MotionHypothesis& found, const PoseEvidence& evidence, Trust trust,
-                             Extension& extension, Step& step) {
+void VisualOdometry::commit(const Candidate& candidate) {
+  std::swap(state_.map, state_.candidate);
+  const LocalMap::Adjustment& adjustment = candidate.adjustment;
+  if (!adjustment.success) return;
+  state_.calibration.note(state_.map->newestId(), candidate.calibration, adjustment.calibration_information);
+  const bool is_sound = candidate.verdict.trust == Trust::kSound && !state_.suspicion.isRaised();
+  if (is_sound && adjustment.common_disparity_square)
+    state_.calibration.noteCommon(*adjustment.common_disparity_square);
+}
+
+/// The motion between the two poses, and its covariance.
+VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, const Candidate& candidate) {
   const LocalMap& map = *state_.map;
-  LocalMap::Adjustment& adjustment = extension.adjustment;
-  if (!adjustment.success) {
+  Step step;
+  step.state = TrackingState::kTracking;
+  step.rejected_rows = candidate.adjustment.rejected_rows;
+  step.T_previous_current = (map.newestPose() * state_.T_origin_camera).inverse();
+  if (!candidate.adjustment.success) {
     step.covariance = found.motion.covariance;
     state_.covariance.advance(*step.T_previous_current, step.covariance);
-    return;
+    return step;
   }
-  state_.calibration.note(map.newestId(), extension.calibration, adjustment.calibration_information);
-  if (trust == Trust::kSound && adjustment.common_disparity_square)
-    state_.calibration.noteCommon(*adjustment.common_disparity_square);
-  adjustment.covariances.inflateNewest(state_.outlier_level.excess(kFewOutliers + outlierShare(evidence)));
-  step.covariance = state_.covariance.advance(*step.T_previous_current, adjustment.covariances);
-  // As a perturbation of the frame before, then of the newest one.
+  step.covariance = state_.covariance.measure(*step.T_previous_current, candidate.adjustment.since_keyframe);
+  // The motion between two reported poses contains what the map has learnt of the first one meanwhile: a perturbation
+  // of the key frame before, then of the newest pair.
   step.correction = adjoint(map.newestPose() * map.poseBeforeNewest().inverse()) *
-                    logSE3(extension.T_keyframe_origin * map.poseBeforeNewest().inverse());
-  cover(step);
-  // A view that changed in another way than expected was aligned from a worse start.
-  const Eigen::Isometry3d expected = expSE3(state_.velocity.value_or(Vector6d::Zero()) * dt);
-  step.covariance += kSurprise * kSurprise * disagreement(*step.T_previous_current, expected);
-}
-
-/// The velocity since the map's newest pair before, for what comes next. Stamps that lie too close make none, nor does
-/// what may be the motion of something else.
-void VisualOdometry::noteVelocity(std::int64_t stamp, const MotionHypothesis& found, const PoseEvidence& evidence,
-                                  Trust trust, const Matrix6d& covariance) {
-  const Vector6d velocity = logSE3(found.motion.T_current_reference.inverse()) / evidence.dt;
-  if (isImplausible(options_.tracking, evidence) || !(velocity.head<3>().norm() <= options_.tracking.max_speed) ||
-      !(velocity.tail<3>().norm() <= options_.tracking.max_rotation_rate))
-    return;
-  state_.velocity = velocity;
-  state_.velocity_covariance = covariance / (evidence.dt * evidence.dt);
-  // What is doubted predicts the next pair, but nothing is judged by it as long as there is something better.
-  const double age = static_cast<double>(stamp - state_.velocity_stamp) * 1e-9;
-  if (trust != Trust::kSound && state_.last_velocity && age <= kLately) return;
-  state_.last_velocity = velocity;
-  state_.velocity_stamp = stamp;
-}
-
-/// A camera that comes back to where it was before is tied to the key frame that it left there.
-void VisualOdometry::recall(const StereoFeatures& features) {
-  LocalMap& map = *state_.map;
-  const OldKeyframe* old = map.revisited();
-  if (!old) return;
-  const Eigen::Isometry3d expected = map.newestPose() * old->T_camera_origin.inverse();
-  const auto matches = matcher_.match(old->rows, features, expected);
-  const RigCalibration calibration = state_.calibration.calibration();
-  const auto correspondences = correspond(old->rows, features, matches, calibration);
-  MotionEstimate motion = estimator_.estimate(features.camera, correspondences, expected);
-  if (!motion.success) return;
-
-  std::vector<LocalMap::Tie> ties;
-  std::vector<Correspondence> aligned;
-  for (const int i : motion.inliers) {
-    const FeatureMatch& match = matches[i];
-    const OldKeyframe::Point& point = old->points[match.reference];
-    const auto found = old->reference(match.reference)
-                           .findIn(options_.alignment, features, match.current,
-                                   motion.T_current_reference * old->T_camera_origin, point.position);
-    if (!found) continue;
-    const Eigen::Vector3d& then = old->rows.positions[match.reference];
-    const Eigen::Vector3d measurement = measurementOf(features, match.current, calibration, found->shift);
-    const double scale = then.z() / (motion.T_current_reference * then).z();
-    ties.push_back({match.reference, match.current, measurement.head<2>(), found->sigma, scale});
-    aligned.push_back({then, measurement});
-  }
-  if (static_cast<int>(ties.size()) < options_.map.lasting_points) return;
-  refineMotion(features.camera, options_.motion, aligned, motion.T_current_reference);
-  // A rig whose rectification is not exact sees a place differently once it is elsewhere in the image.
-  constexpr double kSameWorld = 0.3;  // px; up to 0.25 where rectification is exact
-  if (medianMiss(features.camera, motion.T_current_reference, aligned) > kSameWorld) return;
-
-  // What the map lost since then, it lost as a whole: the adjustment would take so large an offset for outliers.
-  constexpr double kSignificant = 16.8;  // chi-square of six, 99 %
-  const Eigen::Isometry3d T_camera_origin = motion.T_current_reference * old->T_camera_origin;
-  const Vector6d offset = logSE3(T_camera_origin * map.newestPose().inverse());
-  if (offset.dot(motion.covariance.ldlt().solve(offset)) > kSignificant) map.moveTo(T_camera_origin);
-  map.recall(*old, ties);
-}
-
-/// A motion between two reported poses contains what the map has learnt of the first one meanwhile. Where its
-/// square is more than half of what the covariances of the motion and of the pose expect on average, they are widened
-/// by it, and beyond chance the reason says so. The adjustment takes one step a pair: part of so large a correction is
-/// left for the next ones.
-void VisualOdometry::cover(Step& step) {
-  constexpr double kLeft = 0.25;
-  step.covariance += state_.correction_left * state_.correction_left.transpose();
-  state_.correction_left *= kLeft;
+                    logSE3(candidate.T_keyframe_origin * map.poseBeforeNewest().inverse());
   state_.covariance.cover(step.correction);
-  if (!widen(step.covariance, step.correction)) return;
-  state_.correction_left = kLeft * step.correction;
+  if (!widen(step.covariance, step.correction)) return step;
   std::ostringstream reason;
   reason << "the map corrected the pose by " << step.correction.head<3>().norm() << " m and "
          << step.correction.tail<3>().norm() << " rad";
   step.reason = reason.str();
+  return step;
 }
 
-/// How far a doubtful motion may be off: as far as what was expected, and as the hypothesis that speaks against it; and
-/// as far as the adjustment moved it.
-Matrix6d VisualOdometry::doubt(const MotionHypothesis& found, const Extension& extension,
+/// Covariance of a doubtful motion: as far off as what was expected, as the rival, and as the adjustment moved it.
+Matrix6d VisualOdometry::doubt(const MotionHypothesis& found, const Eigen::Isometry3d& T_previous_measured,
                                const Eigen::Isometry3d& T_previous_current, double dt) const {
-  const Eigen::Isometry3d T_previous_measured =
-      (found.motion.T_current_reference * extension.T_previous_origin * state_.T_origin_camera).inverse();
-  const Eigen::Isometry3d predicted = expSE3(state_.last_velocity.value_or(Vector6d::Zero()) * dt);
-  Matrix6d doubt = disagreement(T_previous_current, T_previous_measured) + disagreement(T_previous_current, predicted) +
-                   predictionCovariance(dt);
-  if (found.T_current_reference_else) {
-    // Both hypotheses start from the same pair of the map.
-    const Eigen::Isometry3d T_else_found = found.motion.T_current_reference * found.T_current_reference_else->inverse();
-    doubt += disagreement(Eigen::Isometry3d::Identity(), T_else_found);
-  }
+  Matrix6d doubt = disagreement(T_previous_current, T_previous_measured) +
+                   disagreement(T_previous_current, state_.belief.expected(dt)) + predictionCovariance(dt);
+  // Both hypotheses start from the same pair of the map.
+  if (found.rival)
+    doubt += disagreement(Eigen::Isometry3d::Identity(), found.motion.T_current_reference * found.rival->inverse());
   return doubt;
+}
+
+/// The velocity since the map's newest pair before. Stamps that lie too close make none, nor does what may be the motion
+/// of something else.
+void VisualOdometry::noteVelocity(std::int64_t stamp, const MotionHypothesis& found, const PoseEvidence& evidence,
+                                  bool is_trusted, const Matrix6d& covariance) {
+  const Vector6d velocity = logSE3(found.motion.T_current_reference.inverse()) / evidence.dt;
+  if (isImplausible(options_.tracking, evidence) || !(velocity.head<3>().norm() <= options_.tracking.max_speed) ||
+      !(velocity.tail<3>().norm() <= options_.tracking.max_rotation_rate))
+    return;
+  state_.belief.measure(stamp, velocity, evidence.dt, covariance, is_trusted);
 }
 
 VisualOdometry::Step VisualOdometry::predict(const StereoFeatures& features, double dt, const std::string& failure) {
   Step step;
   step.reason = failure + (features.report.status.empty() ? "" : "; " + features.report.status);
-  const bool can_predict = state_.velocity && dt <= options_.tracking.max_gap &&
+  const bool can_predict = state_.belief.velocity() && dt <= options_.tracking.max_gap &&
                            state_.predicted_pairs < options_.tracking.max_predicted_pairs;
   if (!can_predict) {
     breakStream();
@@ -441,44 +352,15 @@ VisualOdometry::Step VisualOdometry::predict(const StereoFeatures& features, dou
   ++state_.predicted_pairs;
   step.state = TrackingState::kDegraded;
   step.reason = "motion predicted: " + step.reason;
-  step.T_previous_current = expSE3(*state_.velocity * dt);
-  // Stamps of a burst are closer together than the moments at which its pairs were taken.
-  const double time = std::max(dt, state_.interval);
-  const Vector6d missed = *state_.velocity * (time - dt);
-  // A motion that is known badly, or doubtful, predicts badly, too.
-  step.covariance = predictionCovariance(time) + missed * missed.transpose() +
-                    time * time * state_.velocity_covariance + state_.last_doubt;
+  step.T_previous_current = state_.belief.predicted(dt);
+  step.covariance = state_.belief.predictedCovariance(dt);
   state_.covariance.advance(*step.T_previous_current, step.covariance);
   return step;
 }
 
 std::optional<Floor> VisualOdometry::floor() const {
   if (!options_.planar.planar) return std::nullopt;
-  return Floor(options_.planar, T_base_camera_, state_.floor_height);
-}
-
-/// Whether the newest pose is on the floor: a ramp is told of, and a level stretch behind it is another floor.
-void VisualOdometry::noteFloor(Step& step) {
-  constexpr int kLevel = 10;    // pairs that make another floor
-  const Floor known = *floor();
-  const Eigen::Isometry3d& T_camera_origin = state_.map->newestPose();
-  const Eigen::Vector3d residual = known.residual(T_camera_origin);
-  const double height = known.base(T_camera_origin).translation().z();
-  const bool is_tilted = !Floor::isLevel(residual);
-  state_.on_floor = Floor::isOn(residual);
-  state_.level_pairs = state_.on_floor || is_tilted ? 0 : state_.level_pairs + 1;
-  std::ostringstream reason;
-  if (is_tilted)
-    reason << "off the floor: tilted by " << (residual.tail<2>().norm() * options_.planar.planar_tilt_sigma)
-           << " degrees, a ramp?";
-  else if (!state_.on_floor)
-    reason << "off the floor: " << height - state_.floor_height << " m above it";
-  if (state_.level_pairs >= kLevel) {
-    reason << ", level: this is the floor from now on";
-    state_.floor_height = height;
-    state_.level_pairs = 0;
-  }
-  if (step.reason.empty()) step.reason = reason.str();
+  return Floor(options_.planar, T_base_camera_, state_.floor.height());
 }
 
 std::vector<Eigen::Vector3d> VisualOdometry::mapPoints() const {
@@ -504,7 +386,7 @@ OdometryResult VisualOdometry::report(const StereoFeatures& features, double dt,
     result.has_pose = true;
     result.T_origin_camera = state_.T_origin_camera;
     result.pose_covariance = state_.covariance.value();
-    if (options_.planar.planar && state_.on_floor)
+    if (options_.planar.planar && state_.floor.isOnFloor())
       result.pose_covariance = floor()->constrained(state_.T_origin_camera, result.pose_covariance);
   }
   if (step.T_previous_current) {
@@ -543,28 +425,6 @@ OdometryResult VisualOdometry::report(const StereoFeatures& features, double dt,
   result.right_rotation = state_.right_rotation.rotation();
   result.right_rotation_sigma = state_.right_rotation.sigma();
   return result;
-}
-
-/// A camera that repeats its images seems to stand. Whether it does, the guess or the motion before tells: where that
-/// would have moved the points, only the images stood still.
-bool VisualOdometry::isFrozen(const StereoFeatures& features, double dt,
-                              const std::optional<MotionGuess>& guess) const {
-  constexpr double kSeen = 1.0;  // px
-  if (features.count() == 0 || state_.image[0] != features.u || state_.image[1] != features.v ||
-      state_.image[2] != features.disparity)
-    return false;
-  const bool is_guessed = guess && !guess->rotation_only;
-  if (!is_guessed && state_.frozen) return true;
-  if (!is_guessed && !state_.velocity) return false;
-  const Eigen::Isometry3d T_current_previous =
-      is_guessed ? guess->T_previous_current.inverse() : expSE3(*state_.velocity * -dt);
-  int moved = 0;
-  for (int i = 0; i < features.count(); ++i) {
-    const Eigen::Vector3d point = features.camera.backProject(features.u[i], features.v[i], features.disparity[i]);
-    const Eigen::Vector3d now = features.camera.project(T_current_previous * point);
-    moved += std::hypot(now.x() - features.u[i], now.y() - features.v[i]) > kSeen;
-  }
-  return 2 * moved > features.count();
 }
 
 }  // namespace sdvo

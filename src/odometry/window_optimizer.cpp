@@ -23,8 +23,6 @@ struct ReducedSystem {
   std::vector<PoseFactor> factors;     ///< one point's after the other's
   std::vector<double> common_squares;  ///< of the points that tell, px^2
   double cost = 0.0;
-  double weight = 0.0;
-  double weighted_square = 0.0;
 };
 
 /// What is looked for: poses, points (ray and inverse depth of each that is seen, in the order of the observations) and
@@ -109,6 +107,23 @@ class Solver {
     return costOf(estimate, squares);
   }
 
+  /// Factor from the inverse of the last linearisation's normal equations, the sum of w J^T J, to a covariance. It is
+  /// that of an M-estimator with psi = w r (Huber, Robust Statistics, section 7.6) for isotropic residuals r of three
+  /// components and squares s: E[psi psi^T] / E[dpsi/dr]^2. The squares are smaller than the noise by the degrees of
+  /// freedom that poses and points take; a sighting counts as one by its weight.
+  double covarianceFactor() const {
+    double weight = 0.0, psi_square = 0.0;
+    int count = 0;
+    for (const double square : squares_) {
+      if (!std::isfinite(square)) continue;  // behind the camera
+      const double w = bend() / (bend() + square);
+      weight += w, psi_square += w * w * square, ++count;
+    }
+    const double slope = weight - 2.0 / 3.0 * psi_square / bend();
+    const double observed = 3.0 * weight, fitted = 3.0 * static_cast<double>(window_->points.size()) + 6.0 * poses_;
+    return psi_square / 3.0 * weight / (slope * slope) * observed / std::max(observed - fitted, 1.0);
+  }
+
   /// In the memory that the system has of an earlier linearisation.
   void linearise(const Estimate& estimate, double damping, ReducedSystem& system) {
     const std::size_t points = estimate.points.size();
@@ -117,7 +132,6 @@ class Solver {
     system.common_squares.clear();
     system.common_squares.reserve(points);
     squares_.resize(window_->observations.size());
-    system.weight = system.weighted_square = 0.0;
     equations_.setZero(poses_);
     const WindowProjection projection(window_->camera, estimate.calibration);
     placeAnchors(estimate);
@@ -127,8 +141,6 @@ class Solver {
       EliminatedPoint& point = system.points[p];
       point = equations_.add(projection, sightedPoint(estimate, p), bend(), damping, factors, squares_.data() + first);
       factors += point.factors;
-      system.weight += point.weight;
-      system.weighted_square += point.square;
       if (const auto square = commonSquare(point))
         system.common_squares.push_back(disparityVariance(first_of_point_[p + 1] - first) * *square);
     }
@@ -272,8 +284,8 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
   double damping = kUndamped, damping_of_system = kUndamped;
   bool accepted = false;
   const int c = 6 * solver.poses();
+  // A refused step is tried again with more damping.
   while (solution.iterations < options_.iterations && damping < kLargestDamping) {
-    ++solution.iterations;
     solver.linearise(estimate, damping, system);
     damping_of_system = damping;
     hessian = system.hessian;  // its lower triangle
@@ -288,6 +300,7 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
     const double next_cost = solver.cost(next, squares);
     accepted = next_cost <= system.cost;
     if (accepted) {
+      ++solution.iterations;
       const bool converged = system.cost - next_cost < 1e-4 * (system.cost + 1.0);
       std::swap(estimate, next);
       damping = std::max(0.1 * damping, 1e-8);
@@ -313,9 +326,7 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
     units.block<6, 6>(6 * (covariance_of[static_cast<std::size_t>(a)] - 1), 6 * a).setIdentity();
   units.bottomRightCorner<kCalibration, kCalibration>().setIdentity();
   covariance = factor.solve(units);
-  const double points = static_cast<double>(window.points.size());
-  const double degrees_of_freedom = std::max(3.0 * system.weight - 3.0 * points - c, 1.0);
-  const double variance = system.weighted_square / degrees_of_freedom;
+  const double variance = solver.covarianceFactor();
   solution.pose_covariance.resize(6 * asked, 6 * asked);
   for (int a = 0; a < asked; ++a)
     solution.pose_covariance.middleRows<6>(6 * a) =

@@ -153,8 +153,8 @@ TEST_F(MotionSearchTest, WhatStoodStillSoFarOutvotesAMajority) {
   EXPECT_TRUE(found.contested);
   EXPECT_EQ(found.verdict.trust, Trust::kDoubtful);
   EXPECT_NE(found.verdict.reason.find("two motions"), std::string::npos) << found.verdict.reason;
-  ASSERT_TRUE(found.T_current_reference_else);
-  EXPECT_NEAR(found.T_current_reference_else->translation().x(), 0.4, 1e-3) << "as if the swarm stood";
+  ASSERT_TRUE(found.rival);
+  EXPECT_NEAR(found.rival->translation().x(), 0.4, 1e-3) << "as if the swarm stood";
 }
 
 TEST_F(MotionSearchTest, WhatMovesByLessThanCornersErrIsLeftAside) {
@@ -177,8 +177,8 @@ TEST_F(MotionSearchTest, WhatMovesByLessThanCornersErrIsLeftAside) {
   EXPECT_EQ(found.evidence.inliers, static_cast<int>(found.motion.inliers.size()));
   EXPECT_EQ(found.evidence.inliers, found.lastingInliers()) << "the board is no longer among them";
   EXPECT_EQ(found.sightings.size(), found.motion.inliers.size());
-  ASSERT_TRUE(found.T_current_reference_else) << "the covariance has to hold what all inliers together say";
-  const Eigen::Isometry3d aside = *found.T_current_reference_else * found.motion.T_current_reference.inverse();
+  ASSERT_TRUE(found.rival) << "the covariance has to hold what all inliers together say";
+  const Eigen::Isometry3d aside = *found.rival * found.motion.T_current_reference.inverse();
   EXPECT_GT(aside.translation().norm(), 0.005);
 }
 

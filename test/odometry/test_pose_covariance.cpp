@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <random>
 
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
 
@@ -32,13 +33,6 @@ Matrix6d afterForward(double translation, double rotation) {
   return covariance;
 }
 
-WindowCovariances window(int first_id, const Matrix6d& since_keyframe) {
-  WindowCovariances covariances;
-  covariances.first_id = first_id;
-  covariances.since_keyframe = since_keyframe;
-  return covariances;
-}
-
 void expectEqual(const Matrix6d& actual, const Matrix6d& expected) {
   EXPECT_LT((actual - expected).cwiseAbs().maxCoeff(), 1e-12) << actual << "\n\nexpected\n" << expected;
 }
@@ -58,20 +52,35 @@ TEST(PoseCovariance, AddsMotionsThatAreKnownByThemselves) {
 TEST(PoseCovariance, DoesNotGrowBetweenPairsMeasuredFromOneKeyframe) {
   PoseCovariance covariance;
   const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
-  expectEqual(covariance.advance(still, window(1, diagonal(0.5, 0.25))), diagonal(0.5, 0.25));
+  expectEqual(covariance.measure(still, diagonal(0.5, 0.25)), diagonal(0.5, 0.25));
   expectEqual(covariance.value(), diagonal(0.5, 0.25));
-  // The motion is between two poses, each known as well as the key frame tells.
-  expectEqual(covariance.advance(still, window(1, diagonal(0.75, 0.25))), diagonal(1.25, 0.5));
+  expectEqual(covariance.measure(still, diagonal(0.75, 0.25)), diagonal(0.75, 0.25));
   expectEqual(covariance.value(), diagonal(0.75, 0.25));
   // A better pose does not take back what was reported.
-  expectEqual(covariance.advance(still, window(1, diagonal(0.125, 0.125))), diagonal(0.875, 0.375));
+  covariance.measure(still, diagonal(0.125, 0.125));
   expectEqual(covariance.value(), diagonal(0.75, 0.25));
+}
+
+TEST(PoseCovariance, TheErrorOfTheKeyframeCancelsInTheMotion) {
+  // Poses along a line, each the key frame's sightings (their error `common`) against its own (error `own`).
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  double motion_square = 0.0, pose_square = 0.0;
+  constexpr int kTrials = 20000;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const double common = normal(random), before = common + normal(random), now = common + normal(random);
+    motion_square += (now - before) * (now - before) / kTrials, pose_square += now * now / kTrials;
+  }
+  PoseCovariance covariance;
+  covariance.measure(Eigen::Isometry3d::Identity(), diagonal(pose_square, 0.0));
+  const Matrix6d motion = covariance.measure(Eigen::Isometry3d::Identity(), diagonal(pose_square, 0.0));
+  EXPECT_NEAR(motion(0, 0), motion_square, 0.05 * motion_square);
 }
 
 TEST(PoseCovariance, ContainsWhatASecondThoughtMoved) {
   PoseCovariance covariance;
   const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
-  covariance.advance(still, window(1, diagonal(0.0001, 0.0001)));
+  covariance.measure(still, diagonal(0.0001, 0.0001));
   Vector6d correction = Vector6d::Zero();
   correction[0] = 0.015;
   covariance.cover(correction);
@@ -88,29 +97,22 @@ TEST(PoseCovariance, ContainsWhatASecondThoughtMoved) {
   covariance.cover(correction);
   expectEqual(covariance.value(), expected);
   // What is measured from the same key frame later has that error, too.
-  covariance.advance(still, window(1, diagonal(1.0, 1.0)));
+  covariance.measure(still, diagonal(1.0, 1.0));
   Matrix6d later = diagonal(1.0, 1.0);
   later(0, 0) += 0.2504;
   expectEqual(covariance.value(), later);
 }
 
-TEST(PoseCovariance, CarriesWhatEarlierPosesLackedIntoTheNewOne) {
-  PoseCovariance covariance;
-  covariance.advance(forward(), window(1, diagonal(0.5, 0.25)));
-  expectEqual(covariance.advance(forward(), window(1, diagonal(9.0, 9.0))),
-              afterForward(0.5, 0.25) + diagonal(9.0, 9.0));
-}
-
 TEST(PoseCovariance, GrowsFromKeyframeToKeyframe) {
   PoseCovariance covariance;
-  covariance.advance(forward(), window(1, diagonal(0.5, 0.25)));
+  covariance.measure(forward(), diagonal(0.5, 0.25));
   covariance.markKeyframe();
   const double translation = PoseCovariance::kAlike * 0.5, rotation = PoseCovariance::kAlike * 0.25;
   expectEqual(covariance.value(), diagonal(translation, rotation));
-  covariance.advance(forward(), window(1, diagonal(0.125, 0.0)));
+  covariance.measure(forward(), diagonal(0.125, 0.0));
   expectEqual(covariance.value(), afterForward(translation, rotation) + diagonal(0.125, 0.0));
   // Still from that key frame, which is now two steps behind.
-  covariance.advance(forward(), window(1, diagonal(0.25, 0.0)));
+  covariance.measure(forward(), diagonal(0.25, 0.0));
   Matrix6d expected = diagonal(translation + 0.25, rotation);
   for (const int axis : {0, 1}) expected(axis, axis) += 4.0 * kForward * kForward * rotation;
   expected(0, 4) = expected(4, 0) = 2.0 * kForward * rotation;
@@ -118,56 +120,40 @@ TEST(PoseCovariance, GrowsFromKeyframeToKeyframe) {
   expectEqual(covariance.value(), expected);
 }
 
-TEST(PoseCovariance, AKeyframeLackedWhatItsOwnWindowKnewLess) {
-  for (const bool slid : {false, true}) {
-    PoseCovariance covariance;
-    WindowCovariances then = window(1, diagonal(4.0, 4.0));
-    then.since_first = diagonal(3.0, 1.0);
-    then.since_second = diagonal(2.5, 0.5);
-    covariance.advance(forward(), then);
-    covariance.markKeyframe();
-    WindowCovariances now = window(slid ? 2 : 1, diagonal(0.125, 0.0));
-    now.keyframe_since_first = diagonal(2.0, 0.75);
-    // In rotation the second window knows less than the first did from the second frame on: nothing was lacking.
-    expectEqual(covariance.advance(forward(), now),
-                (slid ? afterForward(0.5, 0.0) : afterForward(1.0, 0.25)) + diagonal(0.125, 0.0));
-  }
-}
-
 TEST(PoseCovariance, APredictedPairAddsToTheNextOnesMotion) {
-  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
   for (const bool from_keyframe : {false, true}) {
     PoseCovariance covariance;
-    covariance.advance(still, window(1, diagonal(0.5, 0.25)));
+    covariance.measure(forward(), diagonal(0.5, 0.25));
     if (from_keyframe) covariance.markKeyframe();
-    const Matrix6d before = covariance.value();
-    covariance.advance(still, diagonal(8.0, 2.0));
-    expectEqual(covariance.value(), before + diagonal(8.0, 2.0));
-    const Matrix6d lacked = from_keyframe ? diagonal(8.0, 2.0) : diagonal(8.5, 2.25);
-    expectEqual(covariance.advance(still, window(1, diagonal(0.75, 0.25))), lacked + diagonal(0.75, 0.25));
-    expectEqual(covariance.value(), before + diagonal(8.0, 2.0));
+    const double alike = from_keyframe ? PoseCovariance::kAlike : 1.0;
+    covariance.advance(forward(), diagonal(8.0, 2.0));
+    const Matrix6d predicted = afterForward(alike * 0.5, alike * 0.25) + diagonal(8.0, 2.0);
+    expectEqual(covariance.value(), predicted);
+    expectEqual(covariance.measure(forward(), diagonal(0.75, 0.25)), afterForward(8.0, 2.0) + diagonal(0.75, 0.25));
+    // Only once.
+    expectEqual(covariance.measure(forward(), diagonal(0.75, 0.25)), diagonal(0.75, 0.25));
   }
 }
 
-TEST(PoseCovariance, AKeyframeThatNoWindowMeasuredLackedAllSinceTheOneBefore) {
+TEST(PoseCovariance, AKeyframeThatWasPredictedOrDoubtedHasNoMeasurementToBeAlike) {
   PoseCovariance covariance;
   const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
-  covariance.advance(still, window(1, diagonal(0.5, 0.25)));
+  covariance.measure(still, diagonal(0.5, 0.25));
   covariance.advance(still, diagonal(8.0, 2.0));
   covariance.markKeyframe();
-  expectEqual(covariance.advance(still, window(1, diagonal(0.125, 0.125))), diagonal(8.625, 2.375));
+  expectEqual(covariance.value(), diagonal(8.5, 2.25));
+  expectEqual(covariance.measure(still, diagonal(0.125, 0.125)), diagonal(8.125, 2.125));
 }
 
 TEST(PoseCovariance, RestartsFromTheLastPoseWithMetresAndAGoodPartOfARightAngle) {
   PoseCovariance covariance;
-  WindowCovariances before = window(1, diagonal(0.5, 0.25));
-  before.since_first = before.since_second = diagonal(0.5, 0.25);
-  covariance.advance(forward(), before);
+  covariance.measure(forward(), diagonal(0.5, 0.25));
+  covariance.doubt(diagonal(1.0, 1.0));
   covariance.restart();
-  expectEqual(covariance.value(), diagonal(100.5, 0.5));
-  // The window before the gap has no part in the first motion after it.
-  expectEqual(covariance.advance(forward(), window(7, diagonal(0.125, 0.0))), diagonal(0.125, 0.0));
-  expectEqual(covariance.value(), afterForward(100.5, 0.5) + diagonal(0.125, 0.0));
+  expectEqual(covariance.value(), diagonal(101.5, 1.5));
+  // Neither the measurement nor the doubt before the gap has a part in the first motion after it.
+  expectEqual(covariance.measure(forward(), diagonal(0.125, 0.0)), diagonal(0.125, 0.0));
+  expectEqual(covariance.value(), afterForward(101.5, 1.5) + diagonal(0.125, 0.0));
 }
 
 TEST(PoseCovariance, WhatMayHaveBeenTravelledUnseenIsAddedAtARestart) {
@@ -179,11 +165,10 @@ TEST(PoseCovariance, WhatMayHaveBeenTravelledUnseenIsAddedAtARestart) {
 TEST(PoseCovariance, ADoubtedPoseIsReportedSoAndTheNextMotionContainsTheDoubt) {
   PoseCovariance covariance;
   const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
-  WindowCovariances measured = window(1, diagonal(0.5, 0.25));
-  covariance.advance(still, measured);
+  covariance.measure(still, diagonal(0.5, 0.25));
   covariance.doubt(diagonal(8.0, 2.0));
   expectEqual(covariance.value(), diagonal(8.5, 2.25));
-  expectEqual(covariance.advance(still, measured), diagonal(9.0, 2.5));
+  expectEqual(covariance.measure(still, diagonal(0.5, 0.25)), diagonal(8.5, 2.25));
   // What was reported stays true.
   expectEqual(covariance.value(), diagonal(8.5, 2.25));
 }
@@ -191,11 +176,11 @@ TEST(PoseCovariance, ADoubtedPoseIsReportedSoAndTheNextMotionContainsTheDoubt) {
 TEST(PoseCovariance, RotationDoesNotFallWhereTranslationGrows) {
   PoseCovariance covariance;
   const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
-  covariance.advance(still, window(1, diagonal(0.5, 0.25)));
+  covariance.measure(still, diagonal(0.5, 0.25));
   covariance.doubt(diagonal(0.0, 2.0));
-  covariance.advance(still, window(1, diagonal(9.0, 0.5)));
+  covariance.measure(still, diagonal(9.0, 0.5));
   expectEqual(covariance.value(), diagonal(9.0, 2.25));
-  covariance.advance(still, window(1, diagonal(4.0, 3.0)));
+  covariance.measure(still, diagonal(4.0, 3.0));
   expectEqual(covariance.value(), diagonal(9.0, 3.0));
 }
 
@@ -204,25 +189,14 @@ TEST(PoseCovariance, StaysSymmetricAndPositive) {
   Vector6d step;
   step << 0.1, -0.05, 1.0, 0.02, -0.3, 0.1;
   for (int i = 0; i < 1000; ++i) {
-    WindowCovariances measured = window(i / 10, diagonal(1e-4, 1e-6) * (1 + i % 7));
-    measured.since_first = measured.since_second = 2.0 * measured.since_keyframe;
-    measured.keyframe_since_first = measured.since_keyframe;
-    const Matrix6d motion = covariance.advance(expSE3(step), measured);
+    const Matrix6d motion = covariance.measure(expSE3(step), diagonal(1e-4, 1e-6) * (1 + i % 7));
     if (i % 3 == 0) covariance.markKeyframe();
+    if (i % 11 == 0) covariance.doubt(diagonal(1e-2, 1e-4));
     for (const Matrix6d& matrix : {motion, covariance.value()}) {
       EXPECT_EQ(matrix, matrix.transpose());
       EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(matrix).eigenvalues().minCoeff(), 0.0) << i;
     }
   }
-}
-
-TEST(WindowCovariances, OnlyTheNewestFrameIsInflated) {
-  WindowCovariances window;
-  window.since_keyframe = window.since_first = window.since_second = window.keyframe_since_first = Matrix6d::Identity();
-  window.inflateNewest(3.0);
-  for (const Matrix6d& covariance : {window.since_keyframe, window.since_first, window.since_second})
-    EXPECT_TRUE(covariance.isApprox(3.0 * Matrix6d::Identity()));
-  EXPECT_TRUE(window.keyframe_since_first.isApprox(Matrix6d::Identity()));
 }
 
 }  // namespace

@@ -153,10 +153,29 @@ TEST(PoseVerdict, AccelerationsAreJudgedAgainstTheVelocityBefore) {
 TEST(PoseVerdict, AWayThatIsKnownBadlyIsDoubtedWhateverConfirmsIt) {
   PoseEvidence evidence = soundEvidence();
   evidence.confirmed = true;
-  evidence.deviation = 0.05 + 0.03 - 0.001;  // of 1 m
+  evidence.distance = 2.0;  // from the last key frame, of which this pair's motion is a part
+  evidence.deviation = 0.05 + 0.03 * 2.0 - 0.001;
   EXPECT_EQ(trustIn(evidence), Trust::kSound);
-  evidence.deviation = 0.05 + 0.03 + 0.001;
+  evidence.deviation = 0.05 + 0.03 * 2.0 + 0.001;
   EXPECT_EQ(trustIn(evidence), Trust::kDoubtful);
+}
+
+TEST(PoseVerdict, AChangeIsUnexpectedBeyondALastingAccelerationAndTheStamps) {
+  const PoseVerdictOptions options;
+  PoseEvidence evidence = soundEvidence();
+  const double time = evidence.dt + options.stamp_tolerance;
+  const double allowed = 5.0 * time * time + 10.0 * 2.0 * options.stamp_tolerance;
+  evidence.motion.translation().z() = 1.0 + allowed - 0.001;
+  EXPECT_FALSE(isUnexpected(options, evidence));
+  evidence.motion.translation().z() = 1.0 + allowed + 0.001;
+  EXPECT_TRUE(isUnexpected(options, evidence));
+  // 0.2 m while the stamps of a burst say a millisecond at 10 m/s.
+  evidence.dt = 0.001;
+  evidence.motion.translation().z() = 0.2;
+  EXPECT_FALSE(isUnexpected(options, evidence));
+  evidence.velocity.reset();
+  evidence.motion.translation().z() = 100.0;
+  EXPECT_FALSE(isUnexpected(options, evidence)) << "nothing was expected";
 }
 
 TEST(PoseVerdict, TellsADoubtOfTheRateFromOneOfTheWay) {

@@ -141,5 +141,18 @@ TEST(RightCameraRotation, SigmaIsThatOfLeastSquaresForCorrelatedSightings) {
       << filter.sigma().transpose() << " for " << expected.transpose();
 }
 
+TEST(RightCameraRotation, ShuttersThatAreApartWhileTheCameraTurnsAreTheRigsWay) {
+  // A millisecond apart at 1 rad/s up and down: 1e-3 rad, 0.7 px at f = 700 px, in every pair.
+  RightCameraRotation filter;
+  int turned = 0, turned_late = 0;
+  for (int i = 0; i < 60; ++i) {
+    const bool said = filter.add(gridSeenWith({i % 8 < 4 ? 1e-3 : -1e-3, 0.0, 0.0}));
+    turned += said, turned_late += said && i >= 20;
+  }
+  EXPECT_GT(turned, 0);
+  EXPECT_EQ(turned_late, 0);
+  EXPECT_TRUE(filter.add(gridSeenWith({0.0, 0.0, 20e-3}))) << "a knock is still found";
+}
+
 }  // namespace
 }  // namespace sdvo

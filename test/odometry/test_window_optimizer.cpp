@@ -227,6 +227,38 @@ TEST(WindowOptimizer, CovariancesAreThoseOfTheErrors) {
   EXPECT_NEAR(calibration_nees, 2.0, 0.6);
 }
 
+TEST(WindowOptimizer, CovariancesAreThoseOfTheErrorsWhereTheKernelBendsAtTheNoise) {
+  constexpr int kTrials = 200;
+  WindowOptimizerOptions options = leastSquares();
+  options.kernel_scale = 1.0;
+  options.iterations = 50;
+  double nees = 0.0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    Window window = disturbedWindow({});
+    addNoise(window, kPositionSigma, options.disparity_sigma, 900 + static_cast<std::uint32_t>(trial));
+    const WindowSolution solution = WindowOptimizer(options).optimize(window);
+    ASSERT_TRUE(solution.success);
+    const Vector6d error = logSE3(syntheticPose(4).inverse() * window.T_camera_origin[4].inverse());
+    nees += error.dot(solution.pose_covariance.bottomRightCorner<6, 6>().ldlt().solve(error)) / kTrials;
+  }
+  // The inverse of the normal equations alone, as if the weights were given, has 3.3 here.
+  EXPECT_NEAR(nees, 6.0, 1.5);
+}
+
+TEST(WindowOptimizer, ARefusedStepIsTriedAgainWithMoreDamping) {
+  // So far off that a whole Gauss-Newton step overshoots.
+  WindowOptimizerOptions options;
+  options.iterations = 1;
+  Window window = disturbedWindow({});
+  Vector6d far;
+  far << 4.0, -3.0, 5.0, 0.5, -0.6, 0.4;
+  window.T_camera_origin[4] = expSE3(far) * window.T_camera_origin[4];
+  const Eigen::Isometry3d before = window.T_camera_origin[4];
+  const WindowSolution solution = WindowOptimizer(options).optimize(window);
+  EXPECT_EQ(solution.iterations, 1);
+  EXPECT_GT(logSE3(window.T_camera_origin[4] * before.inverse()).norm(), 1e-3) << "the step of a refused pair is none";
+}
+
 TEST(WindowOptimizer, InformationOfTheCalibrationIsWithoutThePrior) {
   RigCalibration truth;
   truth.value << 0.2, -0.5;

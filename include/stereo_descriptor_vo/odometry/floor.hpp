@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <string>
 
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
@@ -60,6 +61,21 @@ struct Floor {
 
   /// Of the residual's three numbers on a right perturbation of T_origin_camera.
   Eigen::Matrix<double, 6, 3> gain(const Jacobian& jacobian, const Matrix6d& covariance) const;
+};
+
+/// Which floor a planar base is on: a ramp leads to another one.
+class FloorBelief {
+ public:
+  double height() const { return height_; }  ///< m, in the axes of the base's first pose
+  bool isOnFloor() const { return on_floor_; }
+
+  /// Takes note of a pose. `known` is the floor at height(). Returns in words where the base is if it is off the floor.
+  std::string note(const Floor& known, const Eigen::Isometry3d& T_camera_origin);
+
+ private:
+  double height_ = 0.0;
+  bool on_floor_ = true;  ///< at the last pose
+  int level_pairs_ = 0;   ///< in a row, level and at another height
 };
 
 }  // namespace sdvo

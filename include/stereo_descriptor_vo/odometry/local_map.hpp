@@ -13,9 +13,7 @@
 #include "stereo_descriptor_vo/odometry/described_points.hpp"
 #include "stereo_descriptor_vo/odometry/keyframe_memory.hpp"
 #include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
-#include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
 #include "stereo_descriptor_vo/odometry/reference_patch.hpp"
-#include "stereo_descriptor_vo/odometry/residual_level.hpp"
 #include "stereo_descriptor_vo/odometry/window_optimizer.hpp"
 
 namespace sdvo {
@@ -60,6 +58,8 @@ struct LocalMapOptions {
 class LocalMap {
  public:
   explicit LocalMap(const LocalMapOptions& options);
+
+  const LocalMapOptions& options() const { return options_; }
 
   std::int64_t newestStamp() const { return newest_stamp_; }
 
@@ -131,7 +131,7 @@ class LocalMap {
   /// Bundle adjustment over all frames; sightings that do not agree with it are cut off from their points.
   struct Adjustment {
     bool success = false;
-    WindowCovariances covariances;
+    Matrix6d since_keyframe = Matrix6d::Zero();  ///< covariance of the newest pose since the key frame before it
     RigCalibration::Matrix calibration_information = RigCalibration::Matrix::Zero();
     std::optional<double> common_disparity_square;  ///< px^2, see WindowSolution
     std::vector<int> rejected_rows;                 ///< of the newest pair
@@ -201,7 +201,6 @@ class LocalMap {
   std::vector<Point> spare_;  ///< no points any more, but their memory
   KeyframeMemory memory_;
   int last_left_ = -1;            ///< the last key frame that was not among the newest ones any more
-  ResidualLevel residual_level_;  ///< of the newest pairs, each when it was new
   Problem problem_;               ///< empty once it is solved, so that a copy of the map is none of it
 };
 

@@ -33,8 +33,7 @@ struct MotionHypothesis {
   PoseEvidence evidence;
   PoseVerdict verdict;
   MotionEstimate motion;  ///< since the map's newest pair
-  /// The same as another hypothesis has it that could not be ruled out.
-  std::optional<Eigen::Isometry3d> T_current_reference_else;
+  std::optional<Eigen::Isometry3d> rival;  ///< T_current_reference of a hypothesis that could not be rejected
   bool guided = false;                         ///< found with a prior
   bool contested = false;                      ///< by a motion of something else in view
   std::shared_ptr<const LocalMap::View> view;  ///< of the map; one for all hypotheses of a pair

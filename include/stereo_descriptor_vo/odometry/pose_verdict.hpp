@@ -51,7 +51,8 @@ struct PoseEvidence {
   double coverage = 1.0;                         ///< share of the image's cells that hold an inlier
   bool confirmed = false;                        ///< found likewise without a prior: few inliers are no doubt then
   double rms = 0.0;                              ///< reprojection error of the inliers, px per coordinate
-  double deviation = 0.0;                        ///< of the way, standard, as the map's adjustment knows it, m
+  double distance = 0.0;                         ///< from the last key frame, m
+  double deviation = 0.0;                        ///< standard, of that distance by the map's adjustment, m
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();  ///< since the last measured pair
   Matrix6d covariance = Matrix6d::Zero();                    ///< of that motion, m and rad
   double dt = 0.0;                                           ///< since the last measured pair, s
@@ -91,6 +92,6 @@ bool isImplausible(const PoseVerdictOptions& options, const PoseEvidence& eviden
 
 /// Whether no vehicle comes to this motion in the time since its velocity was known for certain, though a single pair
 /// could be so fast.
-bool isUnexpected(const PoseEvidence& evidence);
+bool isUnexpected(const PoseVerdictOptions& options, const PoseEvidence& evidence);
 
 }  // namespace sdvo

@@ -39,7 +39,7 @@ class RightCameraRotation {
   Sums sumUp(const StereoFeatures& features, const Sums& past) const;
 
   Sums sums_;
-  double usual_square_ = 0.0;  ///< of the change of pairs before which it did not turn, px^2
+  double usual_square_ = 0.0;  ///< of the changes of the last pairs, px^2
 };
 
 }  // namespace sdvo

@@ -18,10 +18,9 @@ struct WindowOptimizerOptions {
   double kernel_scale = 1.0;
   double disparity_sigma = 0.1;
   double common_disparity_sigma = 0.3;
-  double common_shift = 0.01;
 
   void describe(OptionList& list) {
-    list.add("iterations", iterations, {1, 100}, "", "Levenberg-Marquardt steps at most, for each pair");
+    list.add("iterations", iterations, {1, 100}, "", "Levenberg-Marquardt steps at most, for each pair; refused ones do not count");
     list.add("kernel_scale", kernel_scale, {0.1, 20.0}, "sigma",
              "normalised residual at which the Cauchy kernel bends");
     list.add("disparity_sigma", disparity_sigma, {0.01, 10.0}, "px",
@@ -30,15 +29,13 @@ struct WindowOptimizerOptions {
         "common_disparity_sigma", common_disparity_sigma, {0.0, 10.0}, "px",
         "standard deviation of the error that all disparities of one point share: what the calibration's two terms "
         "leave of the rig's, and what its texture does to the matching; until 20 windows told more of it");
-    list.add("common_shift", common_shift, {0.0, 1.0}, "px",
-             "what all patches of an image may be off by alike, and more of them do not tell: in covariances only");
   }
 };
 
 /// What is known after the optimisation, besides the window's new values.
 struct WindowSolution {
   bool success = false;
-  int iterations = 0;
+  int iterations = 0;               ///< accepted steps
   Eigen::MatrixXd pose_covariance;  ///< of the left perturbations of the poses asked for, 6 rows each, m and rad
   RigCalibration::Matrix calibration_information;  ///< of this window alone, the prior excluded, 1/px^2
   /// Median over the points of the squared error that all disparities of one share, px^2, as a variance; none where too

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/se3.hpp"
+
+namespace sdvo {
+
+enum class TrackingState { kWaiting, kTracking, kDegraded, kLost };
+
+const char* toString(TrackingState state);
+
+/// Where a matched feature was in the last measured pair, as predicted by the local map, and where it is now.
+struct FeatureFlow {
+  float u_previous, v_previous;  ///< px, left image
+  int current;                   ///< row of the pair's features
+  bool inlier;                   ///< agrees with the motion that was found, used or not, and with the map
+};
+
+/// What one pair did to the odometry. Everything published is derived from this one object.
+struct OdometryResult {
+  TrackingState state = TrackingState::kWaiting;
+  std::string reason;      ///< in words, for every state but plain tracking
+  std::int64_t stamp = 0;  ///< of the left image, ns
+  int epoch = 0;           ///< one more after every discontinuity of the pose
+
+  bool has_pose = false;  ///< false while waiting or lost: nothing may be published then
+  Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();  ///< origin: the first left camera
+  Matrix6d pose_covariance = Matrix6d::Zero();  ///< of a right perturbation: T_origin_camera * exp(xi), m and rad
+
+  bool has_motion = false;  ///< false for the first pair and right after a discontinuity
+  double dt = 0.0;          ///< s since the previous pair
+  Eigen::Isometry3d T_previous_current = Eigen::Isometry3d::Identity();
+  Matrix6d motion_covariance = Matrix6d::Zero();  ///< of a right perturbation of T_previous_current
+  /// The part of that motion which is the map's second thought about the previous pose: another right perturbation.
+  Vector6d correction = Vector6d::Zero();
+
+  int features = 0, matches = 0, inliers = 0;
+  double coverage = 0.0;  ///< share of an 8x4 grid's cells over the image that hold an inlier
+  double rms = 0.0;  ///< of the corners that agreed on the motion, before alignment and adjustment, px per coordinate
+  double match_time = 0.0, motion_time = 0.0;  ///< s
+  double distance = 0.0;                       ///< travelled since the start or reset, m
+  int keyframe_id = 0;            ///< running number of the map's last key frame, this pair included; 0 without a map
+  std::vector<FeatureFlow> flow;  ///< of all matches
+
+  /// The rig's residual errors as estimated so far, with standard deviations; NaN until there is an estimate.
+  double disparity_offset = std::numeric_limits<double>::quiet_NaN();        ///< in the image centre, px; compensated
+  double disparity_offset_sigma = std::numeric_limits<double>::quiet_NaN();  ///< px
+  double disparity_bend = std::numeric_limits<double>::quiet_NaN();  ///< its change at 45 degrees, px; compensated
+  double disparity_bend_sigma = std::numeric_limits<double>::quiet_NaN();                                      ///< px
+  Eigen::Vector3d right_rotation = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());        ///< rad
+  Eigen::Vector3d right_rotation_sigma = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());  ///< rad
+};
+
+}  // namespace sdvo

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/odometry/feature_matcher.hpp"
+#include "stereo_descriptor_vo/odometry/local_map.hpp"
+#include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
+#include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
+#include "stereo_descriptor_vo/odometry/rig_calibration.hpp"
+
+namespace sdvo {
+
+/// Links the map's newest pair to a remembered key frame of the same place, so that drift since then is taken back.
+class Revisit {
+ public:
+  Revisit(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion,
+          const PatchAlignmentOptions& alignment);
+
+  /// Recalls the key frame whose place the newest pair has come back to. Returns whether there was one that enough
+  /// aligned points confirm. The map is as before otherwise.
+  bool recall(const StereoFeatures& features, const RigCalibration& calibration, LocalMap& map) const;
+
+ private:
+  MotionEstimatorOptions motion_options_;
+  PatchAlignmentOptions alignment_options_;
+  FeatureMatcher matcher_;
+  MotionEstimator estimator_;
+};
+
+}  // namespace sdvo
