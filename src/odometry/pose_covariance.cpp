@@ -73,9 +73,10 @@ void PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, const 
 }
 
 Matrix6d PoseCovariance::measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe) {
+  const Matrix6d before = value_;
   carry(T_previous_current);
   const Matrix6d motion = unmeasured_ + since_keyframe;
-  value_ = noLessThan(value_, keyframe_ + since_keyframe);
+  value_ = noLessThan(before, keyframe_ + since_keyframe);
   since_keyframe_ = since_keyframe;
   unmeasured_.setZero();
   return motion;

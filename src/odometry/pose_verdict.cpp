@@ -126,13 +126,12 @@ bool isImplausible(const PoseVerdictOptions& options, const PoseEvidence& eviden
   return judgeChange(options, evidence).trust == Trust::kDoubtful && !lastingAgree(options, evidence);
 }
 
-bool isUnexpected(const PoseVerdictOptions& options, const PoseEvidence& evidence) {
+bool isUnexpected(const PoseEvidence& evidence) {
   if (!evidence.velocity) return false;
-  const double age = evidence.velocity_age + evidence.dt + options.stamp_tolerance;
-  const Change most =
-      largestChange(options, evidence, kLastingAcceleration * age, kLastingTurnAcceleration * age);
+  const double age = evidence.velocity_age + evidence.dt;
   const Change change = changeSinceVelocity(evidence);
-  return change.distance > most.distance || change.angle > most.angle;
+  return change.distance > kLastingAcceleration * age * evidence.dt ||
+         change.angle > kLastingTurnAcceleration * age * evidence.dt;
 }
 
 }  // namespace sdvo

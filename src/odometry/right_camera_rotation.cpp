@@ -52,9 +52,10 @@ bool RightCameraRotation::add(const StereoFeatures& features) {
   if (features.count() == 0) return false;
   const double disagreement = change(features);
   const double limit = std::max(kTurned, kUnusual * std::sqrt(usual_square_));
-  // A knock is one large change. What changes in many pairs is the rig's way, so each counts up to the limit.
+  // A knock is one large change. What changes in many pairs is the rig's way: each counts up to the limit, and slowly.
   const double counted = std::min(disagreement, limit);
-  usual_square_ += (1.0 - kUsualMemory) * (counted * counted - usual_square_);
+  const double memory = disagreement > limit ? kMemory : kUsualMemory;
+  usual_square_ += (1.0 - memory) * (counted * counted - usual_square_);
   const Sums past{kMemory * sums_.information, kMemory * sums_.gradient, kMemory * sums_.square,
                   kMemory * sums_.weight};
   sums_ = sumUp(features, past);

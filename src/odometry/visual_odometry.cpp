@@ -215,7 +215,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
   PoseVerdict verdict = candidate.verdict;
   // After a new start, or a motion of something else, it may be that which is followed.
   const PoseEvidence& evidence = candidate.evidence;
-  if ((!state_.belief.velocity() || state_.suspicion.isRaised()) && isUnexpected(options_.tracking, evidence))
+  if ((!state_.belief.velocity() || state_.suspicion.isRaised()) && isUnexpected(evidence))
     state_.suspicion.raise("the motion changed as no vehicle's does");
   if (lastingDisagree(options_.tracking, evidence)) state_.suspicion.raise("points that stood still so far moved");
   if (verdict.trust == Trust::kSound && state_.suspicion.isRaised())

@@ -147,7 +147,7 @@ TEST(RightCameraRotation, ShuttersThatAreApartWhileTheCameraTurnsAreTheRigsWay) 
   int turned = 0, turned_late = 0;
   for (int i = 0; i < 60; ++i) {
     const bool said = filter.add(gridSeenWith({i % 8 < 4 ? 1e-3 : -1e-3, 0.0, 0.0}));
-    turned += said, turned_late += said && i >= 20;
+    turned += said, turned_late += said && i >= 30;  // 3 s
   }
   EXPECT_GT(turned, 0);
   EXPECT_EQ(turned_late, 0);

