@@ -76,8 +76,8 @@ std::string FloorBelief::note(const Floor& known, const Eigen::Isometry3d& T_cam
   level_pairs_ = on_floor_ || is_tilted ? 0 : level_pairs_ + 1;
   std::ostringstream reason;
   if (is_tilted)
-    reason << "off the floor: tilted by " << residual.tail<2>().cwiseProduct(known.sigma.tail<2>()).norm() * 180.0 / CV_PI
-           << " degrees, a ramp?";
+    reason << "off the floor: tilted by "
+           << residual.tail<2>().cwiseProduct(known.sigma.tail<2>()).norm() * 180.0 / CV_PI << " degrees, a ramp?";
   else if (!on_floor_)
     reason << "off the floor: " << height - height_ << " m above it";
   if (level_pairs_ >= kLevel) {

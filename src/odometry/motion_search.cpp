@@ -371,9 +371,8 @@ std::size_t MotionSearch::best(const MotionScene& scene, const std::vector<Motio
     keep([&](std::size_t k) { return k == steadiest || areSame(hypotheses[k], hypotheses[steadiest]); });
   }
   // Of one motion the first that is sound will do.
-  const auto sound = std::find_if(left.begin(), left.end(), [&](std::size_t k) {
-    return hypotheses[k].verdict.trust == Trust::kSound;
-  });
+  const auto sound = std::find_if(left.begin(), left.end(),
+                                  [&](std::size_t k) { return hypotheses[k].verdict.trust == Trust::kSound; });
   return sound != left.end() ? *sound : *std::max_element(left.begin(), left.end(), by_inliers);
 }
 

@@ -62,7 +62,8 @@ void PoseCovariance::markKeyframe() {
 }
 
 void PoseCovariance::carry(const Eigen::Isometry3d& T_previous_current) {
-  for (Matrix6d* covariance : {&value_, &keyframe_, &unmeasured_}) *covariance = carriedBy(T_previous_current, *covariance);
+  for (Matrix6d* covariance : {&value_, &keyframe_, &unmeasured_})
+    *covariance = carriedBy(T_previous_current, *covariance);
 }
 
 void PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance) {

@@ -92,11 +92,11 @@ PoseVerdict judgePose(const PoseVerdictOptions& options, int min_inliers, const 
 PoseVerdict judgeChange(const PoseVerdictOptions& options, const PoseEvidence& evidence) {
   if (!evidence.velocity) return {};
   // What is long ago may have changed since.
-  const Change most = largestChange(options, evidence,
-                                    options.max_acceleration * (evidence.dt + options.stamp_tolerance) +
-                                        kLastingAcceleration * evidence.velocity_age,
-                                    options.max_rotation_acceleration * (evidence.dt + options.stamp_tolerance) +
-                                        kLastingTurnAcceleration * evidence.velocity_age);
+  const Change most = largestChange(
+      options, evidence,
+      options.max_acceleration * (evidence.dt + options.stamp_tolerance) + kLastingAcceleration * evidence.velocity_age,
+      options.max_rotation_acceleration * (evidence.dt + options.stamp_tolerance) +
+          kLastingTurnAcceleration * evidence.velocity_age);
   if (evidence.guess) {
     const Change aside = changeOf(evidence.guess->inverse() * evidence.motion);
     if (aside.distance <= most.distance && aside.angle <= most.angle) return {};

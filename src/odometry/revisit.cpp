@@ -58,8 +58,8 @@ bool Revisit::recall(const StereoFeatures& features, const RigCalibration& calib
   if (medianMiss(features.camera, motion.T_current_reference, aligned) > kSameWorld) return false;
 
   // Drift since that key frame is a rigid offset: shift the map first, or the robust kernel rejects the links. Small
-  // offsets, within the covariance of the corners, are left to the adjustment: to shift these, too, doubles the error on
-  // a desk (0.019 to 0.041 %).
+  // offsets, within the covariance of the corners, are left to the adjustment: to shift these, too, doubles the error
+  // on a desk (0.019 to 0.041 %).
   constexpr double kSignificant = 16.8;  // chi-square of six, 99 %
   const Eigen::Isometry3d T_camera_origin = motion.T_current_reference * old->T_camera_origin;
   const Vector6d offset = logSE3(T_camera_origin * map.newestPose().inverse());

@@ -183,8 +183,8 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
   if (state_.started) {
     ++epoch_;
     const double unseen = std::max(0.0, static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9);
-    state_.covariance.restart(travelCovariance(state_.belief.trusted().value_or(Vector6d::Zero()), unseen,
-                                               options_.tracking.max_speed));
+    state_.covariance.restart(
+        travelCovariance(state_.belief.trusted().value_or(Vector6d::Zero()), unseen, options_.tracking.max_speed));
     step.state = TrackingState::kDegraded;
     step.reason = "started again from the last pose; the motion in between is unknown";
   } else {
@@ -254,9 +254,9 @@ VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features,
   if (map.newestIsKeyframe() && found.verdict.trust == Trust::kSound)
     revisit_.recall(features, candidate.calibration, map);
   const std::optional<Floor> floor = this->floor();
-  candidate.adjustment =
-      map.adjust(optimizer_, state_.calibration.prior(map.oldestId()), candidate.calibration, floor);
-  // The window's first pose does not move in the adjustment: what it carries in height and tilt goes with the whole map.
+  candidate.adjustment = map.adjust(optimizer_, state_.calibration.prior(map.oldestId()), candidate.calibration, floor);
+  // The window's first pose does not move in the adjustment: what it carries in height and tilt goes with the whole
+  // map.
   if (floor) map.moveTo(floor->settled(map.newestPose(), state_.covariance.value()));
   map.renewLooks(features, found.sightings);
 
@@ -328,8 +328,8 @@ Matrix6d VisualOdometry::doubt(const MotionHypothesis& found, const Eigen::Isome
   return doubt;
 }
 
-/// The velocity since the map's newest pair before. Stamps that lie too close make none, nor does what may be the motion
-/// of something else.
+/// The velocity since the map's newest pair before. Stamps that lie too close make none, nor does what may be the
+/// motion of something else.
 void VisualOdometry::noteVelocity(std::int64_t stamp, const MotionHypothesis& found, const PoseEvidence& evidence,
                                   bool is_trusted, const Matrix6d& covariance) {
   const Vector6d velocity = logSE3(found.motion.T_current_reference.inverse()) / evidence.dt;

@@ -331,8 +331,7 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
   for (int a = 0; a < asked; ++a)
     solution.pose_covariance.middleRows<6>(6 * a) =
         variance * covariance.block(6 * (covariance_of[static_cast<std::size_t>(a)] - 1), 0, 6, 6 * asked);
-  solution.calibration_information =
-      covariance.bottomRightCorner<kCalibration, kCalibration>().inverse() - certain;
+  solution.calibration_information = covariance.bottomRightCorner<kCalibration, kCalibration>().inverse() - certain;
 
   if (!accepted) solver.cost(estimate, squares);  // those at hand belong to a refused step
   std::swap(solution.squares, squares);

@@ -59,7 +59,8 @@ TEST(MotionBelief, APredictionWithinABurstIsAsUncertainAsTheIntervalBefore) {
   belief.measure(kSecond, ahead(3.0), 0.1, Matrix6d::Zero(), true);
   belief.pass(0.1);
   belief.pass(0.001);
-  EXPECT_NEAR(belief.predictedCovariance(0.001)(2, 2), std::pow(5.0 * 0.08 * 0.08, 2) + std::pow(3.0 * 0.079, 2), 1e-12);
+  EXPECT_NEAR(belief.predictedCovariance(0.001)(2, 2), std::pow(5.0 * 0.08 * 0.08, 2) + std::pow(3.0 * 0.079, 2),
+              1e-12);
   for (int i = 0; i < 100; ++i) belief.pass(0.001);
   EXPECT_LT(belief.predictedCovariance(0.001)(2, 2), 1e-9);
 }

@@ -939,11 +939,6 @@ TEST(VisualOdometry, WhatIsInDoubtTellsNothingOfWhatMayBeExpected) {
   ASSERT_EQ(doubtful.state, TrackingState::kDegraded) << doubtful.reason;
   EXPECT_NEAR(doubtful.T_previous_current.translation().z(), 0.4, 0.2);
   EXPECT_GT(std::sqrt(doubtful.motion_covariance(2, 2)), 0.25);
-
-  OdometryResult later;
-  for (int i = 13; i <= 30; ++i) later = odometry.update(slowPair(i));
-  ASSERT_EQ(later.state, TrackingState::kDegraded) << later.reason;
-  EXPECT_LT(std::sqrt(later.motion_covariance(2, 2)), 0.2) << "by now there is nothing better";
 }
 
 /// Some rows of pair i, most of them too high or too low by what the search accepts and the adjustment refutes.

@@ -200,8 +200,8 @@ class LocalMap {
   std::vector<Point> points_;
   std::vector<Point> spare_;  ///< no points any more, but their memory
   KeyframeMemory memory_;
-  int last_left_ = -1;            ///< the last key frame that was not among the newest ones any more
-  Problem problem_;               ///< empty once it is solved, so that a copy of the map is none of it
+  int last_left_ = -1;  ///< the last key frame that was not among the newest ones any more
+  Problem problem_;     ///< empty once it is solved, so that a copy of the map is none of it
 };
 
 }  // namespace sdvo

@@ -8,15 +8,15 @@
 
 namespace sdvo {
 
-/// Accelerations that a vehicle exceeds for moments only (chosen: a car that brakes hard, a robot that turns fast). They
-/// are the process noise of a predicted motion.
+/// Accelerations that a vehicle exceeds for moments only (chosen: a car that brakes hard, a robot that turns fast).
+/// They are the process noise of a predicted motion.
 constexpr double kLastingAcceleration = 5.0;      // m/s^2
 constexpr double kLastingTurnAcceleration = 2.0;  // rad/s^2
 
 /// Covariances, of right perturbations in m and rad, of motions that were not measured or not for certain.
 
-/// Uncertainty that a prediction adds to the velocity it starts from, `dt` in s. The mean velocities of two intervals of
-/// `dt` differ by the acceleration above times `dt`, so the motions differ by that times `dt` once more.
+/// Uncertainty that a prediction adds to the velocity it starts from, `dt` in s. The mean velocities of two intervals
+/// of `dt` differ by the acceleration above times `dt`, so the motions differ by that times `dt` once more.
 Matrix6d predictionCovariance(double dt);
 
 /// Of an unseen motion that began with this velocity, m/s and rad/s, and accelerated as above. Its speed is at most
@@ -26,8 +26,8 @@ Matrix6d travelCovariance(const Vector6d& velocity, double seconds, double max_s
 /// As large in every direction as two motions differ.
 Matrix6d disagreement(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b);
 
-/// How the camera is believed to move. The velocity of the last measured pair predicts the next motion. The last trusted
-/// velocity, which was not in doubt, is what later motions are compared with.
+/// How the camera is believed to move. The velocity of the last measured pair predicts the next motion. The last
+/// trusted velocity, which was not in doubt, is what later motions are compared with.
 class MotionBelief {
  public:
   /// Takes note of the time since the pair before, s. Gaps longer than that over which motions are predicted are none.
@@ -61,7 +61,7 @@ class MotionBelief {
 
  private:
   std::optional<Vector6d> velocity_, trusted_;
-  std::int64_t trusted_stamp_ = 0;                  ///< ns
+  std::int64_t trusted_stamp_ = 0;                   ///< ns
   Matrix6d velocity_covariance_ = Matrix6d::Zero();  ///< 1/s^2
   Matrix6d doubt_ = Matrix6d::Zero();
   double interval_ = 0.0;  ///< the longest time between two of the last pairs, s

@@ -34,10 +34,10 @@ class PoseCovariance {
   /// The pose moved on by a motion with a covariance of its own, as a predicted one.
   void advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance);
 
-  /// The pose moved on and was measured against the key frame with this covariance. Returns the covariance of the motion
-  /// between the two reported poses. Of `since_keyframe` half is the noise of the newest pair and half that of the key
-  /// frame, whose points have been seen as often. The pose before has the same half from the key frame, which cancels,
-  /// and a half of its own. What it was predicted or doubted by comes on top.
+  /// The pose moved on and was measured against the key frame with this covariance. Returns the covariance of the
+  /// motion between the two reported poses. Of `since_keyframe` half is the noise of the newest pair and half that of
+  /// the key frame, whose points have been seen as often. The pose before has the same half from the key frame, which
+  /// cancels, and a half of its own. What it was predicted or doubted by comes on top.
   Matrix6d measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe);
 
   /// The last pose may be off by more than its measurement says.

@@ -20,7 +20,8 @@ struct WindowOptimizerOptions {
   double common_disparity_sigma = 0.3;
 
   void describe(OptionList& list) {
-    list.add("iterations", iterations, {1, 100}, "", "Levenberg-Marquardt steps at most, for each pair; refused ones do not count");
+    list.add("iterations", iterations, {1, 100}, "",
+             "Levenberg-Marquardt steps at most, for each pair; refused ones do not count");
     list.add("kernel_scale", kernel_scale, {0.1, 20.0}, "sigma",
              "normalised residual at which the Cauchy kernel bends");
     list.add("disparity_sigma", disparity_sigma, {0.01, 10.0}, "px",
