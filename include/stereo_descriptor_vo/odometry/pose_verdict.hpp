@@ -30,8 +30,7 @@ struct PoseVerdictOptions {
              "a larger acceleration of the rotation is doubted");
     list.add("stamp_tolerance", stamp_tolerance, {0.0, 1.0}, "s",
              "error of the time between two stamps that speeds, rates and accelerations are forgiven");
-    list.add("doubtful_inliers", doubtful_inliers, {0, 10000}, "",
-             "fewer inliers are doubted, and what they tell is known worse: by the square of this number over theirs");
+    list.add("doubtful_inliers", doubtful_inliers, {0, 10000}, "", "fewer inliers are doubted");
     list.add("doubtful_ratio", doubtful_ratio, {0.0, 1.0}, "",
              "a smaller share of inliers among the matches is doubted; a third of it is no motion");
     list.add("doubtful_lasting_ratio", doubtful_lasting_ratio, {0.0, 1.0}, "",
