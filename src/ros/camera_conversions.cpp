@@ -39,6 +39,17 @@ std::string describe(const cv::Size& size) {
   return std::to_string(size.width) + "x" + std::to_string(size.height);
 }
 
+/// What to do about a baseline that is not positive.
+std::string remedy(const image_geometry::PinholeCameraModel& left, const image_geometry::PinholeCameraModel& right) {
+  if (left.Tx() == right.Tx())
+    return "no baseline in P: P[3] of the right camera_info must be -fx * baseline (old camera drivers leave it out)";
+  if (left.Tx() < 0.0 && right.Tx() == 0.0)
+    return "are left and right swapped? Swap the topics; with depthai_ros_driver set "
+           "stereo_i_reverse_stereo_socket_order to true";
+  if (right.Tx() > 0.0) return "P[3] of the right camera_info has the wrong sign, it must be -fx * baseline";
+  return "are left and right swapped?";
+}
+
 }  // namespace
 
 StereoCamera toStereoCamera(const sensor_msgs::CameraInfo& left, const sensor_msgs::CameraInfo& right) {
@@ -68,7 +79,7 @@ StereoCamera toStereoCamera(const sensor_msgs::CameraInfo& left, const sensor_ms
   camera.height = size.height;
   if (!(camera.baseline > 0.0))
     throw std::invalid_argument("baseline = " + std::to_string(camera.baseline) + " m is not positive (left " +
-                                describeP(left) + "; right " + describeP(right) + "): are left and right swapped?");
+                                describeP(left) + "; right " + describeP(right) + "): " + remedy(left_model, right_model));
   camera.check();
   return camera;
 }

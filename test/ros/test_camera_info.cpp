@@ -84,7 +84,13 @@ TEST(ToStereoCamera, RefusesWhatIsNoRectifiedPair) {
   EXPECT_TRUE(contains(swapped, "baseline")) << swapped;
   EXPECT_TRUE(contains(swapped, "Tx = -350")) << swapped;
   EXPECT_TRUE(contains(swapped, "Tx = 0")) << swapped;
-  EXPECT_TRUE(contains(refusal(left, left), "baseline"));
+  EXPECT_TRUE(contains(swapped, "swapped")) << swapped;
+  EXPECT_TRUE(contains(swapped, "stereo_i_reverse_stereo_socket_order")) << swapped;
+  const std::string without_tx = refusal(left, left);
+  EXPECT_TRUE(contains(without_tx, "no baseline in P")) << without_tx;
+  EXPECT_FALSE(contains(without_tx, "swapped")) << without_tx;
+  const std::string wrong_sign = refusal(left, cameraInfo(350.0));
+  EXPECT_TRUE(contains(wrong_sign, "wrong sign")) << wrong_sign;
 
   EXPECT_TRUE(contains(refusal(left, cameraInfo(-350.0, 701.0)), "not rectified"));
   // Rectified without CALIB_ZERO_DISPARITY: depth would be wrong everywhere.

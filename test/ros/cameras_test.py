@@ -1,0 +1,102 @@
+#!/usr/bin/env python3
+"""Each launch file of launch/cameras with its driver: odometry, and what is said of a camera_info that does not fit."""
+
+import dataclasses
+import sys
+import unittest
+
+import rospy
+import rostest
+from nav_msgs.msg import Odometry
+
+import fake_driver
+from kitti_replay import PACKAGE, Collector, Pipeline, Rosout, StereoSequence, links, wait_until
+from stereo_descriptor_vo.msg import VoInfo
+
+PAIRS = 6  # a metre straight ahead from each to the next
+
+
+class Cameras(unittest.TestCase):
+    tests = 0
+
+    @classmethod
+    def setUpClass(cls):
+        cls.sequence = StereoSequence(PAIRS)
+
+    def start(self, habits):
+        """The driver in a namespace of its own, and the launch file as a user would start it."""
+        Cameras.tests += 1
+        namespace = '%s_%d' % (habits.namespace, Cameras.tests)
+        root, frames = habits.root, habits.frames
+        if root == 'camera_link':  # the driver's prefix
+            root, frames = namespace + '_link', tuple('%s_%s' % (namespace, frame) for frame in frames)
+        elif root == 'base_link' or not root:
+            frames = tuple('%s_%s' % (namespace, frame) for frame in frames)
+        habits = dataclasses.replace(habits, namespace=namespace, root=root, frames=frames)
+        self.driver = fake_driver.FakeDriver(habits, self.sequence)
+        self.addCleanup(self.driver.close)
+        collectors = [Collector('/%s/odom' % namespace, Odometry), Collector('/%s/vo_info' % namespace, VoInfo)]
+        self.odometry, self.info = collectors
+        self.rosout = Rosout('/' + namespace)
+        arguments = {'publish_tf': 'false'}  # the next test's robot has the same base
+        if habits.raw:
+            arguments['left_frame_id'] = frames[0]
+        pipeline = Pipeline('/' + namespace, habits.launch, **arguments)
+        for closeable in collectors + [self.rosout, pipeline]:
+            self.addCleanup(closeable.close)
+        topics = self.driver.topics()
+        if habits.raw:
+            topics += ['/%s/%s/%s' % (namespace, side, what) for side in habits.sides for what in ('image_mono', 'image_rect')]
+        needed = {('in', topic) for topic in topics + ['/tf_static']}
+        needed |= {('out', c.subscriber.resolved_name, rospy.get_name()) for c in collectors}
+        needed.add(('out', '/rosout', rospy.get_name()))
+        self.assertTrue(wait_until(lambda: links(pipeline.manager) >= needed, 60),
+                        'not connected: %s' % (needed - links(pipeline.manager)))
+
+    def drive(self, habits):
+        self.start(habits)
+        for i in range(PAIRS):
+            stamp = self.driver.publish(i)
+            self.assertTrue(wait_until(lambda: self.info.has(stamp)), 'no answer to pair %d: %s' % (i, self.rosout.errors))
+        self.assertTrue(wait_until(lambda: self.odometry.has(stamp)), self.rosout.errors)
+        self.assertEqual({info.state for info in self.info[1:]}, {'TRACKING'})
+        position = self.odometry[-1].pose.pose.position
+        self.assertAlmostEqual(position.x, PAIRS - 1, delta=0.1)
+        self.assertAlmostEqual(position.y, 0.0, delta=0.1)
+        self.assertAlmostEqual(position.z, 0.0, delta=0.1)
+        self.assertEqual(self.rosout.errors, [])
+
+    def test_realsense(self):
+        self.drive(fake_driver.REALSENSE)
+
+    def test_oak(self):
+        self.drive(fake_driver.OAK)
+
+    def test_zed(self):
+        self.drive(fake_driver.ZED)
+
+    def test_two_cameras_plumb_bob(self):
+        self.drive(fake_driver.TWO)
+
+    def test_two_cameras_rational(self):
+        self.drive(dataclasses.replace(fake_driver.TWO, model='rational_polynomial'))
+
+    def test_two_cameras_equidistant(self):
+        self.drive(dataclasses.replace(fake_driver.TWO, model='equidistant'))
+
+    def refuses(self, habits, words):
+        self.start(habits)
+        self.driver.publish(0)
+        self.assertTrue(wait_until(lambda: self.rosout.said(words)), self.rosout.errors)
+        self.assertEqual(len(self.odometry), 0)
+
+    def test_reversed_oak_names_the_switch_of_its_driver(self):
+        self.refuses(dataclasses.replace(fake_driver.OAK, reversed_pair=True), 'stereo_i_reverse_stereo_socket_order')
+
+    def test_realsense_of_an_old_driver_has_no_baseline(self):
+        self.refuses(dataclasses.replace(fake_driver.REALSENSE, without_tx=True), 'no baseline in P')
+
+
+if __name__ == '__main__':
+    rospy.init_node('cameras_test')
+    rostest.rosrun(PACKAGE, 'cameras', Cameras, sys.argv)
