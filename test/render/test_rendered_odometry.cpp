@@ -83,7 +83,7 @@ TEST(RenderedOdometry, MotionsAndPosesLieInTheirCovariancesAndTheRigIsCalibrated
     EXPECT_GE(offsets / (kFrames - kSettled), 0.5 * disparity_offset) << "seed " << seed;
   }
   EXPECT_GE(static_cast<double>(inside) / total, 0.90);
-  // Wide on purpose: faults must not exceed five standard deviations (docs/reliability.md), but not more than two and a
+  // Wide on purpose: faults must not exceed five standard deviations (docs/faults.md), but not more than two and a
   // half times.
   constexpr double kWidest = 6.0 / (2.5 * 2.5);
   EXPECT_GE(sum / total, kWidest);
