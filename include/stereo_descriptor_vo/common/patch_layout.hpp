@@ -4,9 +4,9 @@
 
 namespace sdvo {
 
-/// Where the samples of the grey patches lie that travel with features: side x side of them around the feature's
-/// position in the left image, row by row, each the mean of a square as wide as their spacing. The spacing follows the
-/// feature's size, and so its depth: two patches of one point differ by a shift and by what little the sizes' limits
+/// Positions of a grey patch's samples: side x side of them around the feature's position in the left image, row by
+/// row. Each is the mean of a square as wide as their spacing. The spacing follows the
+/// feature's size, and so its depth. Two patches of one point differ by a shift and by what little the sizes' limits
 /// leave of the scale.
 struct PatchLayout {
   int side = 0;                 ///< samples; 0: no patches

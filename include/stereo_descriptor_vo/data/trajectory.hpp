@@ -69,8 +69,8 @@ std::vector<double> kittiLengths();
 /// Distance travelled until each pose, m: starts with 0, as long as the trajectory.
 std::vector<double> distancesTravelled(const Trajectory& poses);
 
-/// Errors as in the KITTI development kit: a sub-path starts at every frame (step 1) and ends at the first frame at
-/// which the distance along the ground truth reaches the length; its error is inv(delta_truth) * delta_estimate,
+/// Errors as in the KITTI development kit. A sub-path starts at every frame (step 1) and ends at the first frame at
+/// which the distance along the ground truth reaches the length. Its error is inv(delta_truth) * delta_estimate,
 /// divided by the nominal length. The mean is over sub-paths, not over lengths, and comes last, with length 0. Throws
 /// std::invalid_argument when a length is not positive or the trajectories cannot be compared (see below).
 std::vector<SubPathErrors> subPathErrors(const Trajectory& ground_truth, const Trajectory& estimate,

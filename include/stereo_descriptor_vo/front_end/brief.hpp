@@ -8,8 +8,8 @@
 
 namespace sdvo {
 
-/// Binary Robust Independent Elementary Features (Calonder et al., ECCV 2010), 256 bits, at any real-valued size: tests
-/// between smoothed points drawn from an isotropic Gaussian (their sampling G II), patch side and smoothing in
+/// Binary Robust Independent Elementary Features (Calonder et al., ECCV 2010), 256 bits, at any real-valued size. Tests
+/// are between smoothed points drawn from an isotropic Gaussian (their sampling G II), patch side and smoothing in
 /// proportion to the key point size. At a size of 7 px the patch is 48 px wide and the smoothing box 9 px, as in their
 /// implementation.
 class Brief {

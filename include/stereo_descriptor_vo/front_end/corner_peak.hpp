@@ -10,7 +10,7 @@ namespace sdvo {
 /// maximum and where the circles of its eight neighbours leave the image.
 ///
 /// That is far more repeatable than the intersection of the gradient lines (cv::cornerSubPix), which wanders off from
-/// the many of FAST's corners that are spots and no corners (docs/accuracy_log.md).
+/// the many of FAST's corners that are spots and no corners (docs/log/accuracy.md).
 cv::Point2f cornerPeak(const cv::Mat& image, const cv::Point& pixel);
 
 }  // namespace sdvo

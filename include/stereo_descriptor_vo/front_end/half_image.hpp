@@ -4,7 +4,7 @@
 
 namespace sdvo {
 
-/// A CV_8U image at half its resolution, odd sizes rounded up: the same pixels as by cv::resize with INTER_AREA, which
+/// A CV_8U image at half its resolution, odd sizes rounded up. The pixels are those of cv::resize with INTER_AREA, which
 /// takes forty times longer for odd sizes than for even ones.
 void halveImage(const cv::Mat& image, cv::Mat& half);
 

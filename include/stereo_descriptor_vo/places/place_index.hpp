@@ -33,7 +33,7 @@ struct PlaceCandidate {
 };
 
 /// Finds places by what they look like: an inverted index over words made of descriptors' bits. There is no trained
-/// vocabulary: a word is some of a row's bits as they are, always the same ones, and rows that look alike share some of
+/// vocabulary: a word is some of a row's bits as they are, always the same ones. Rows that look alike share some of
 /// their words (locality-sensitive hashing by sampled bits, Indyk and Motwani 1998; weights as in text retrieval,
 /// Sivic and Zisserman 2003).
 class PlaceIndex {

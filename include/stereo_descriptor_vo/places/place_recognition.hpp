@@ -81,7 +81,7 @@ class PlaceRecognition {
   /// Takes the next pair of the odometry. A report where it became a key frame. The graph is not optimised here: that
   /// takes long and may be done on a copy meanwhile (graph(), PoseGraph::optimise(), adopt()). Throws
   /// std::invalid_argument, and adds no place, for features that are no rows of bits or of another kind than those
-  /// before; that the camera is the same is the caller's to see to.
+  /// before. The caller ensures that the camera is the same.
   std::optional<PlaceReport> observe(const StereoFeatures& features, const CameraMotion& motion);
 
   const PoseGraph& graph() const { return graph_; }
@@ -90,12 +90,12 @@ class PlaceRecognition {
   /// What the map says of the odometry's origin, by the last key frame.
   Eigen::Isometry3d T_map_odom() const;
 
-  /// How well that is known: of a right perturbation of the last key frame's camera in the map, since the place that
-  /// was recognised last; none where no way without a break leads there.
+  /// Covariance of T_map_odom(): of a right perturbation of the last key frame's camera in the map, since the place that
+  /// was recognised last. None where no way without a break leads there.
   std::optional<Matrix6d> covariance() const;
 
-  /// Somebody says where the odometry is in the map: the next key frame is put there, after a break, and until a place
-  /// is recognised only those within `radius` (m) of the camera are looked at. Without places nothing happens.
+  /// A hint of the odometry's pose in the map. The next key frame is put there, after a break. Until a place
+  /// is recognised, only those within `radius` (m) of the camera are looked at. Without places nothing happens.
   void expect(const Eigen::Isometry3d& T_map_odom, double radius);
 
   /// Places of which rows are kept, by id.
