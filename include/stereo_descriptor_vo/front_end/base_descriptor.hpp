@@ -23,8 +23,8 @@ struct ViewDescriptors {
   std::vector<std::uint8_t> valid;  ///< 0 where the neighbourhood leaves the image
 };
 
-/// A descriptor of one view. Whatever the implementation reads (size, octave, level), a key point of twice the size is
-/// described on a neighbourhood of twice the size, and at 7 px, the size of a FAST corner, it is the published one.
+/// A descriptor of one view. A key point of twice the size is described on a neighbourhood of twice the size, whatever
+/// the implementation reads (size, octave, level). At 7 px, the size of a FAST corner, it is the published descriptor.
 class BaseDescriptor {
  public:
   static constexpr double kStandardSize = 7.0;  ///< px

@@ -23,8 +23,8 @@ struct EpipolarMatcherOptions {
   }
 };
 
-/// Finds left positions in the right image: blocks are compared along the row at half resolution, then around the best
-/// at full resolution, and the patch is aligned there to sub-pixel precision in both directions.
+/// Finds left positions in the right image. Blocks are compared along the row at half resolution, then around the best
+/// one at full resolution. There the patch is aligned to sub-pixel precision in both directions.
 class EpipolarMatcher {
  public:
   /// What the matcher works on. Memory of this size is slow to get from the system for every pair; kept by the caller,

@@ -17,9 +17,9 @@ struct ExposureBalanceOptions {
   }
 };
 
-/// Makes a pair equally exposed for the search from left to right, which compares grey levels: the darker image takes
-/// those of the brighter one, level by level, so that equal shares of both are darker (histogram specification). That
-/// holds for a gain, an offset, another response curve, and where the brighter one is saturated. Stateless.
+/// Makes a pair equally exposed for the search from left to right, which compares grey levels. The darker image takes
+/// the levels of the brighter one, so that equal ratios of both are darker (histogram specification). That holds for a
+/// gain, an offset, another response curve, and where the brighter one is saturated. Stateless.
 class ExposureBalance {
  public:
   /// Throws std::invalid_argument when an option is out of its range.

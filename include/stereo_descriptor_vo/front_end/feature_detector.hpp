@@ -67,9 +67,9 @@ class FeatureDetector {
 
   static constexpr int kSmallestSide = 16;  ///< px within the border: less is no image for the detectors
 
-  /// Corners of a CV_8U image, at most `largestCount`, at least `border` px away from the image's borders and outside
-  /// of the mask's zeros, but for what the refinement moves them by; `mask` is CV_8U, or empty for the one of the
-  /// options. Throws std::invalid_argument when the mask has another type, or another size than the image.
+  /// Corners of a CV_8U image, at most `largestCount`. They lie at least `border` px away from the image's borders and
+  /// outside of the mask's zeros, but for what the refinement moves them by. `mask` is CV_8U, or empty for the one of
+  /// the options. Throws std::invalid_argument when the mask has another type, or another size than the image.
   std::vector<Corner> detect(const cv::Mat& image, int border = 0, const cv::Mat& mask = cv::Mat()) const;
 
  private:

@@ -23,9 +23,8 @@ struct RigMonitorOptions {
   }
 };
 
-/// Tells what is wrong with a rig from where corners really are in the right image, when few are found where they
-/// should be: on their own row, at positive disparity. It searches in all directions, blind to gain and brightness,
-/// and takes some milliseconds. Stateless.
+/// Finds out what is wrong with a rig when few corners are found on their own row at positive disparity. It searches
+/// for them in all directions of the right image, blind to gain and brightness, and takes some milliseconds. Stateless.
 class RigMonitor {
  public:
   /// `max_dv` in px: rows may differ by that. Throws std::invalid_argument when an option is out of its range.

@@ -6,7 +6,7 @@
 
 namespace sdvo {
 
-/// A square patch of the left image that is compared with the right one, blind to a difference of brightness: with
+/// A square patch of the left image that is compared with the right one, blind to a difference of brightness. It has
 /// derivatives by disparity, by dv and by the slant (px of disparity per row). Images are CV_8U with a border of
 /// `margin` px around the picture, to whose pixels positions refer.
 class SlantedPatch {

@@ -38,8 +38,8 @@ struct CalibrationOptions {
 /// windows that share no pair with it, so that nothing is counted twice.
 ///
 /// A window moves the calibration away from the options' prior only as far as the evidence is significant (empirical
-/// Bayes, as in Efron and Morris 1973): the prior's variance is the square of the estimate less what chance explains.
-/// The rig of a simulator, or one that was calibrated well, keeps the prior to the digit.
+/// Bayes, Efron and Morris 1973). The prior's variance is the square of the estimate less what chance explains. A
+/// simulated or well calibrated rig keeps the prior to the digit.
 class CalibrationFilter {
  public:
   explicit CalibrationFilter(const CalibrationOptions& options);

@@ -30,8 +30,9 @@ class CorrespondenceArrays {
   static constexpr int kLanes = 4;
   static int roundedUp(int count) { return (count + kLanes - 1) / kLanes * kLanes; }
 
-  /// Squared lengths of the residuals (measurement - projection) of `count` of them from `first` on, both multiples of
-  /// kLanes, under T_current_reference, px^2; infinite for a point that is not in front of the camera.
+  /// Squared lengths, px^2, of the residuals (measurement - projection) under T_current_reference of `count`
+  /// correspondences from `first` on. Both are multiples of kLanes. Infinite for a point that is not in front of the
+  /// camera.
   void squareResiduals(const StereoCamera& camera, const Eigen::Isometry3d& T_current_reference, int first, int count,
                        double* squares) const;
 

@@ -29,10 +29,10 @@ struct GeneticResult {
 };
 
 /// Genetic algorithm sample consensus. An individual is a minimal sample, its genes are the correspondences, its
-/// fitness is the consensus of the pose that it gives. With `adaptive` false the rates are fixed (GASAC, Rodehorst and
-/// Hellwich 2006); with `adaptive` true unfit individuals are mutated and the search learns for each gene how good a
-/// replacement it is (as good as the best pose it agrees with), so that mutation moves from exploring at random to
-/// exploiting what was learnt (Shojaedini, Majd, Safabakhsh 2017).
+/// fitness is the consensus of its pose. With `adaptive` false the rates are fixed (GASAC, Rodehorst and Hellwich
+/// 2006). With `adaptive` true unfit individuals are mutated. The search learns for each gene how good a replacement it
+/// is: as good as the best pose it agrees with. Mutation so moves from random exploration to exploitation (Shojaedini,
+/// Majd, Safabakhsh 2017).
 GeneticResult searchGenetically(const PoseProblem& problem, const GeneticConsensusOptions& options, bool adaptive,
                                 SampleBudget budget, std::mt19937& random);
 

@@ -47,8 +47,8 @@ class KeyframeMemory {
   /// Keeps a key frame unless an older one sees the same.
   void remember(const StereoCamera& camera, OldKeyframe keyframe);
 
-  /// Of the key frames that share most of their points with a view, and at least so many, the one taken nearest to it,
-  /// a few baselines away at most; null where there is none. Seen from farther away, the points' depths err too much.
+  /// The key frame nearest to a view, of those that share most of their points with it, and at least so many. It is a
+  /// few baselines away at most: seen from farther, the points' depths err too much. Null where there is none.
   const OldKeyframe* nearest(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin, int least) const;
 
   int count() const { return static_cast<int>(keyframes_.size()); }

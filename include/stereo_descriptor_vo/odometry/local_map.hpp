@@ -98,9 +98,9 @@ class LocalMap {
     double scale = 1.0;           ///< how much larger the point appears than in its reference patch
   };
 
-  /// What the pair's row says of a point when seen from about `T_camera_origin`: its patch is aligned with the point's
-  /// reference, which is warped by what the poses and the point's depth say of both views. Without patches, or where
-  /// they do not agree, it is the corner as detected.
+  /// Measurement of a point by the pair's row, seen from about `T_camera_origin`. The row's patch is aligned with the
+  /// point's reference, which is warped by the poses and the point's depth. Without patches, or where they do not
+  /// agree, it is the corner as detected.
   Sighting sight(const PatchAlignmentOptions& options, const StereoFeatures& features,
                  const Eigen::Isometry3d& T_camera_origin, int point, int row) const;
 

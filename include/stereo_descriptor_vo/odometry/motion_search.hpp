@@ -55,10 +55,9 @@ struct MotionHypothesis {
 /// Share of an 8x4 grid's cells over the image that hold one of the pair's rows.
 double coverage(const StereoFeatures& features, const std::vector<int>& rows);
 
-/// Finds the motion of a pair since the map's newest pair among hypotheses. The first rests on what was guessed, else
-/// on what was expected. Where that is in doubt, it competes with the other one, with one that expects nothing, with
-/// the motion of the points that stood still so far, and with that of the other outliers, among which something that
-/// moves by itself may be.
+/// Finds the motion of a pair since the map's newest pair among hypotheses. The first one rests on the guess, else on
+/// the prediction. Where it is in doubt, others compete: the prediction's, one without a prediction, one of the lasting
+/// points, and those of the outliers, which may be of a mover.
 class MotionSearch {
  public:
   MotionSearch(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion,

@@ -45,11 +45,11 @@ struct PatchShift {
   float correlation;      ///< of the two patches there
 };
 
-/// Finds the point that lies at `centre` (samples from its middle) of the reference patch in the current one, by
-/// inverse compositional alignment (Baker and Matthews 2004) that is blind to brightness and contrast. `warp` takes
-/// offsets in the reference image to offsets in the current one, px: the ratio of the depths above all. The search
-/// starts in the current patch's middle. Nothing where the patches differ (an occluding edge, another point), where
-/// they show too little, or where the answer lies outside.
+/// Finds a point of the reference patch in the current one. The point lies at `centre` (samples from the middle of the
+/// reference). The search begins in the current patch's middle. It is an inverse compositional alignment (Baker and
+/// Matthews 2004), blind to brightness and contrast. `warp` takes offsets in the reference image to offsets in the
+/// current one, px: the ratio of the depths above all. Nothing where the patches differ (an occluding edge, another
+/// point), show too little, or where the answer lies outside.
 std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const Patch& reference,
                                      const Eigen::Vector2f& centre, const Patch& current, const Eigen::Matrix2f& warp);
 

@@ -64,8 +64,8 @@ struct EliminatedPoint {
   Eigen::Vector3d disparity_by_point;  ///< its derivatives
 };
 
-/// Moves points (ray and inverse depth) to where they fit best after a step of the poses, six numbers (m, rad) for each
-/// that may move, and of the calibration (px). `factors`: one point's after the other's.
+/// Moves points (ray and inverse depth) to where they fit best after a step of poses and calibration. The step has six
+/// numbers (m, rad) for each pose that may move; the calibration's is in px. `factors`: one point's after the other's.
 void movePoints(const std::vector<EliminatedPoint>& points, const std::vector<PoseFactor>& factors,
                 const Eigen::VectorXd& pose_steps, const RigCalibration::Vector& calibration_step,
                 std::vector<Eigen::Vector3d>& ray_and_inverse_depth);

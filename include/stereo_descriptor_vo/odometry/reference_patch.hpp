@@ -32,8 +32,8 @@ struct ReferencePatch {
     double sigma;           ///< of each coordinate, px
     double scale;           ///< how much larger the point appears than in the reference
   };
-  /// The row's patch, of a pair seen from about `T_camera_origin`, aligned with this one, which is warped by what the
-  /// poses and the point's depth say of both views; nothing without patches or where they do not agree.
+  /// Aligns the row's patch with this one, which is warped by the poses and the point's depth. The pair is seen from
+  /// about `T_camera_origin`. Nothing without patches or where they do not agree.
   std::optional<Found> findIn(const PatchAlignmentOptions& options, const StereoFeatures& features, int row,
                               const Eigen::Isometry3d& T_camera_origin, const AnchoredPoint& point) const;
 };

@@ -7,10 +7,11 @@
 
 namespace sdvo {
 
-/// What is left of a stereo rig's misalignment after rectification, as an error of its disparities that varies smoothly
-/// over the image: measured disparity = true disparity + offset + bend * x^2, x = (u - cx) / fx. An offset is what an
-/// error of the convergence or of a principal point leaves in the centre; its change towards the sides has the shape
-/// that a turn about the vertical axis gives.
+/// Misalignment of a stereo rig after rectification, as an error of its disparities that varies smoothly over the
+/// image:
+///   measured disparity = true disparity + offset + bend * x^2,  x = (u - cx) / fx.
+/// The offset is the error in the centre, of the convergence or of a principal point. Its change towards the sides has
+/// the shape that a turn about the vertical axis gives.
 struct RigCalibration {
   static constexpr int kParameters = 2;
   using Vector = Eigen::Matrix<double, kParameters, 1>;  ///< (offset, bend), px

@@ -6,11 +6,12 @@
 
 namespace sdvo {
 
-/// Rotation of the right camera that rectification left behind, from the vertical disparities of all features: a small
-/// rotation w (rad, about the axes of the left optical frame) moves the right view by
-///   dv = f * (w_x * (1 + y^2) - w_z * x - w_y * x * y),  x and y normalised coordinates in the right image.
-/// It is reported, so that a rig in need of calibration is noticed, and a pair that contradicts it is doubted; the
-/// motion is measured with rows of the left view alone and does not depend on it.
+/// Rotation of the right camera that rectification left behind, from the vertical disparities of all features. A small
+/// rotation w (rad, about the axes of the left optical frame) moves the right view vertically. With x and y as
+/// normalised coordinates in the right image it is:
+///   dv = f * (w_x * (1 + y^2) - w_z * x - w_y * x * y).
+/// It is reported, so that a rig in need of calibration is noticed. A pair that contradicts it is doubted. The motion is
+/// measured with rows of the left view alone and does not depend on it.
 class RightCameraRotation {
  public:
   /// Takes in one pair; old pairs are forgotten slowly. Returns whether the camera turned before it: its change is more

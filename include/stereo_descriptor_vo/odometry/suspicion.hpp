@@ -6,8 +6,8 @@
 
 namespace sdvo {
 
-/// Why the motions of some pairs are doubted although nothing in these pairs speaks against them: the world, the rig or
-/// the map may still be as wrong as it was a moment ago. While it lasts, all hypotheses of a motion are looked at.
+/// Why pairs are doubted that look sound: the world, the rig or the map may still be as wrong as it was a moment ago.
+/// While a suspicion lasts, all hypotheses of a motion are searched.
 class Suspicion {
  public:
   static constexpr int kShort = 4;  // pairs (chosen: points seen by so many count as lasting)

@@ -65,8 +65,8 @@ struct MotionGuess {
   bool rotation_only = false;  ///< a gyro's: of the translation it says nothing
 };
 
-/// Stereo odometry on stereo features alone: every pair is matched to a local map of the points around the camera,
-/// found among its outliers by sample consensus, and adjusted together with the last key frames.
+/// Stereo odometry on stereo features alone. Every pair is matched to a local map of the points around the camera,
+/// separated from outliers by sample consensus, and adjusted together with the last key frames.
 class VisualOdometry {
  public:
   /// Throws std::invalid_argument when an option is out of its range.
