@@ -50,7 +50,8 @@ class Cameras(unittest.TestCase):
         needed = {('in', topic) for topic in topics + ['/tf_static']}
         needed |= {('out', c.subscriber.resolved_name, rospy.get_name()) for c in collectors}
         needed.add(('out', '/rosout', rospy.get_name()))
-        self.assertTrue(wait_until(lambda: links(pipeline.manager) >= needed, 60),
+        # Both ends of each connection must have it, or the first pair is lost on the way.
+        self.assertTrue(wait_until(lambda: self.driver.is_subscribed() and links(pipeline.manager) >= needed, 60),
                         'not connected: %s' % (needed - links(pipeline.manager)))
 
     def drive(self, habits):

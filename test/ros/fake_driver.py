@@ -78,6 +78,9 @@ class FakeDriver:
     def topics(self):
         return [publisher.resolved_name for publisher in self.images + self.infos]
 
+    def is_subscribed(self):
+        return all(publisher.get_num_connections() > 0 for publisher in self.images + self.infos)
+
     def info(self, side):
         info = self.sequence.camera_info(side)
         info.distortion_model = self.habits.model
