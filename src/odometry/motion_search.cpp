@@ -408,7 +408,7 @@ MotionHypothesis MotionSearch::choose(const MotionScene& scene, std::vector<Moti
         return std::binary_search(of_rivals.begin(), of_rivals.end(), match.current);
       }));
   chosen.verdict = judgePose(verdict_options_, motion_options_.min_inliers, chosen.evidence);
-  constexpr double kSubstantial = 0.35;  // ratio: less is something small that moves, or a texture that repeats itself
+  constexpr double kSubstantial = 0.35;  // ratio (chosen): less is a small mover or repeated texture
   const bool substantial = static_cast<double>(of_rival.size()) >= kSubstantial * chosen.evidence.inliers;
   chosen.contested = lastingDisagree(verdict_options_, chosen.evidence);
   if (rival && (substantial ? chosen.verdict.trust != Trust::kNone : chosen.verdict.trust == Trust::kDoubtful)) {

@@ -6,7 +6,7 @@ namespace sdvo {
 
 bool RepeatedImages::areFrozen(const StereoFeatures& features,
                                const std::optional<Eigen::Isometry3d>& T_previous_current, bool is_measured) const {
-  constexpr double kSeen = 1.0;  // px by which most points should have moved
+  constexpr double kSeen = 1.0;  // px (chosen: beyond the noise of corners) by which most points should have moved
   if (features.count() == 0 || features_[0] != features.u || features_[1] != features.v ||
       features_[2] != features.disparity)
     return false;

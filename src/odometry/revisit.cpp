@@ -54,7 +54,7 @@ bool Revisit::recall(const StereoFeatures& features, const RigCalibration& calib
   if (static_cast<int>(ties.size()) < map.options().lasting_points) return false;
   refineMotion(features.camera, motion_options_, aligned, motion.T_current_reference);
   // If no motion fits to that, the rectification differs over the image, and a link would bend the map.
-  constexpr double kSameWorld = 0.3;  // px, median; up to 0.25 where rectification is exact
+  constexpr double kSameWorld = 0.3;  // px, median (chosen; up to 0.25 where rectification is exact)
   if (medianMiss(features.camera, motion.T_current_reference, aligned) > kSameWorld) return false;
 
   // Drift since that key frame is a rigid offset: shift the map first, or the robust kernel rejects the links. Small

@@ -16,9 +16,10 @@ constexpr double kPrior = 1e-3;       // keeps the first pairs' equations solvab
 constexpr double kCorrelatedSightings = 10.0;
 
 // A turn of the camera.
-constexpr double kTurned = 0.6;   // px: undisturbed, KITTI's and EuRoC's rigs change by less than 0.2
-constexpr double kUnusual = 3.0;  // times the usual change. That grows where rectification left more than a rotation
-                                  // (Karlsruhe's rig: 0.5 px), or where the shutters are apart while the camera turns.
+constexpr double kTurned = 0.6;  // px: undisturbed, KITTI's and EuRoC's rigs change by less than 0.2
+constexpr double kUnusual =
+    3.0;  // times the usual change (chosen). That grows where rectification left more than a rotation
+          // (Karlsruhe's rig: 0.5 px), or where the shutters are apart while the camera turns.
 constexpr double kUsualMemory = 0.9;  // ratio of the usual change's square that a pair leaves: some ten pairs
 
 Eigen::RowVector3d effect(const StereoCamera& camera, double u_right, double v) {

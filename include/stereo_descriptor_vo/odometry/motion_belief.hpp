@@ -46,8 +46,8 @@ class MotionBelief {
   Eigen::Isometry3d predicted(double dt) const;
   Matrix6d predictedCovariance(double dt) const;
 
-  /// Takes over a measured velocity with the covariance of its motion over `dt` s. What is in doubt predicts the next
-  /// pair, but does not replace a trusted velocity of the last two seconds.
+  /// Takes over a measured velocity with the covariance of its motion over `dt` s. A velocity in doubt predicts the
+  /// next pair, but does not replace a trusted one of the last two seconds.
   void measure(std::int64_t stamp, const Vector6d& velocity, double dt, const Matrix6d& covariance, bool is_trusted);
 
   /// Covariance of what the last measured motion is doubted by; zero where it is not.

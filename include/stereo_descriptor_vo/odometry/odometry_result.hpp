@@ -21,7 +21,7 @@ struct FeatureFlow {
   bool inlier;                   ///< agrees with the motion that was found, used or not, and with the map
 };
 
-/// What one pair did to the odometry. Everything published is derived from this one object.
+/// State, pose and motion after one pair. Everything published is derived from this one object.
 struct OdometryResult {
   TrackingState state = TrackingState::kWaiting;
   std::string reason;      ///< in words, for every state but plain tracking
