@@ -23,14 +23,15 @@ const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"data", {"common"}},
     {"render", {"common"}},
     {"config", {"common", "front_end", "odometry", "places"}},
+    {"check", {"common", "front_end", "odometry"}},
     {"ros", {"common", "front_end", "odometry", "places", "config"}},
     {"experiments", {"common", "front_end", "odometry", "data", "config"}},
-    {"tools", {"common", "front_end", "odometry", "places", "data", "config", "experiments", "render", "ros"}},
+    {"tools", {"common", "front_end", "odometry", "places", "data", "config", "experiments", "render", "check", "ros"}},
 };
 
 /// Rooms that a program without ROS can use.
 const std::set<std::string> kWithoutRos = {"common", "front_end", "odometry", "places",
-                                           "data",   "render",    "config",   "experiments"};
+                                           "data",   "render",    "config",   "experiments", "check"};
 
 struct Include {
   fs::path file;

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "../common/quantile.hpp"
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
 
 namespace sdvo {
@@ -92,11 +93,9 @@ double OfflineRun::distance() const {
 }
 
 double OfflineRun::time(double quantile) const {
-  if (frames_.empty()) return 0.0;
   std::vector<double> times;
   for (const Frame& frame : frames_) times.push_back(1e3 * frame.total_time);
-  std::sort(times.begin(), times.end());
-  return times[static_cast<std::size_t>(quantile * static_cast<double>(times.size() - 1) + 0.5)];
+  return sdvo::quantile(std::move(times), quantile);
 }
 
 double OfflineRun::cpuTime() const {

@@ -1,0 +1,87 @@
+#include "emitter_check.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "../common/quantile.hpp"
+#include "../common/text.hpp"
+
+namespace sdvo {
+namespace {
+
+/// Small bright spots: brighter than all around them, and by kContrast grey levels than the mean there.
+cv::Mat findDots(const cv::Mat& image) {
+  constexpr double kContrast = 8.0;
+  cv::Mat highest, mean, dots;
+  cv::dilate(image, highest, cv::Mat::ones(3, 3, CV_8U));
+  cv::blur(image, mean, cv::Size(7, 7));
+  cv::bitwise_and(image == highest, image > mean + kContrast, dots);
+  return dots / 255;
+}
+
+/// Share of the dots in `part` of `before` that are seen within a pixel of where they were, moved by `offset` px.
+double shareFound(const cv::Mat& before, const cv::Mat& around, const cv::Rect& part, cv::Point offset) {
+  const cv::Rect moved = (part + offset) & cv::Rect(0, 0, before.cols, before.rows);
+  const cv::Mat from = before(moved - offset);
+  cv::Mat both;
+  cv::bitwise_and(from, around(moved), both);
+  return cv::sum(both)[0] / std::max(cv::sum(from)[0], 1.0);
+}
+
+}  // namespace
+
+void EmitterCheck::add(const cv::Mat& image) {
+  constexpr int kOldest = 20;  // pairs after which the light may be another
+  CoarseView view(image);
+  cv::Mat dots = findDots(image);
+  bool moved = false;
+  if (!view_.empty() && dots.size() == dots_.size()) compare(view, dots, moved);
+  if (view_.empty() || moved || ++age_ > kOldest) {
+    view_ = std::move(view);
+    dots_ = std::move(dots);
+    age_ = 0;
+  }
+}
+
+/// Part by part, for near and far things move differently.
+void EmitterCheck::compare(const CoarseView& view, const cv::Mat& dots, bool& moved) {
+  constexpr int kColumns = 3, kRows = 2;
+  constexpr double kMoved = 0.012;  // of the width; 5 px of 424, more than a dot's neighbourhood
+  constexpr double kDots = 30.0;    // fewer tell nothing
+  const cv::Size coarse(view.size().width / kColumns, view.size().height / kRows);
+  const cv::Size fine(dots.cols / kColumns, dots.rows / kRows);
+  cv::Mat around;
+  cv::dilate(dots, around, cv::Mat::ones(3, 3, CV_8U));
+  for (int row = 0; row < kRows; ++row)
+    for (int column = 0; column < kColumns; ++column) {
+      const cv::Point at(column, row);
+      const auto motion = view.motionSince(view_, {cv::Point(at.x * coarse.width, at.y * coarse.height), coarse});
+      if (!motion || std::hypot(motion->x, motion->y) < kMoved) continue;
+      moved = true;
+      const cv::Rect part(cv::Point(at.x * fine.width, at.y * fine.height), fine);
+      if (cv::sum(dots_(part))[0] < kDots) {
+        stayed_.push_back(0.0);
+        continue;
+      }
+      double chance = 0.0;
+      for (const cv::Point& offset : {cv::Point(5, 7), cv::Point(-7, 5), cv::Point(7, -5), cv::Point(-5, -7)})
+        chance += 0.25 * shareFound(dots_, around, part, offset);
+      stayed_.push_back((shareFound(dots_, around, part, cv::Point()) - chance) / std::max(1.0 - chance, 0.1));
+    }
+}
+
+Finding EmitterCheck::judge() const {
+  constexpr std::size_t kEnough = 12;  // parts that moved
+  constexpr double kPattern = 0.3;
+  const std::string step = "emitter";
+  if (stayed_.size() < kEnough) return {step, Verdict::kOpen, "the camera did not move enough", "turn and walk with it"};
+  const double stayed = quantile(stayed_, 0.5);
+  const std::string what = text(0, 100.0 * std::max(stayed, 0.0), " % of the bright dots move with the camera");
+  if (stayed > kPattern)
+    return {step, Verdict::kFail, what,
+            "switch the pattern projector off (RealSense: emitter_enabled 0): its dots say that nothing moves"};
+  return {step, Verdict::kOk, what, ""};
+}
+
+}  // namespace sdvo

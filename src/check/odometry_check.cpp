@@ -1,0 +1,36 @@
+#include "odometry_check.hpp"
+
+#include <algorithm>
+
+#include "../common/quantile.hpp"
+#include "../common/text.hpp"
+
+namespace sdvo {
+
+void OdometryCheck::add(const OdometryResult& result) {
+  if (result.state == TrackingState::kWaiting) return;
+  (result.state == TrackingState::kTracking ? tracking_ : result.state == TrackingState::kLost ? lost_ : degraded_)++;
+  if (result.state != TrackingState::kTracking) ++reasons_[result.reason];
+  distance_ = result.distance;
+  if (!result.has_motion) return;
+  inliers_.push_back(result.inliers);
+  rotations_.push_back(Eigen::AngleAxisd(result.T_previous_current.rotation()).angle() * 180.0 / EIGEN_PI);
+}
+
+Finding OdometryCheck::judge() const {
+  constexpr double kFew = 0.02, kMany = 0.2;  // chosen: shares of the pairs
+  const std::string step = "odometry";
+  const int pairs = lost_ + degraded_ + tracking_;
+  if (pairs < 2) return {step, Verdict::kOpen, "too few pairs", ""};
+  std::string what = text(0, tracking_, " of ", pairs, " pairs TRACKING, ", degraded_, " DEGRADED, ", lost_, " LOST; ",
+                          quantile(inliers_, 0.5), " inliers (median)") +
+                     text(1, "; ", distance_, " m");
+  const auto often = std::max_element(reasons_.begin(), reasons_.end(),
+                                      [](const auto& a, const auto& b) { return a.second < b.second; });
+  const double bad = static_cast<double>(lost_ + degraded_) / pairs;
+  if (bad <= kFew && lost_ == 0) return {step, Verdict::kOk, what, ""};
+  return {step, static_cast<double>(lost_) / pairs > kMany ? Verdict::kFail : Verdict::kWarn, what,
+          "most often: " + often->first + " (docs/troubleshooting.md)"};
+}
+
+}  // namespace sdvo

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "finding.hpp"
+#include "stereo_descriptor_vo/odometry/odometry_result.hpp"
+
+namespace sdvo {
+
+/// How the odometry fared: states, inliers, rotation from pair to pair.
+class OdometryCheck {
+ public:
+  void add(const OdometryResult& result);
+
+  Finding judge() const;
+
+  const std::vector<double>& rotations() const { return rotations_; }  ///< deg, of each measured motion
+
+ private:
+  int lost_ = 0, degraded_ = 0, tracking_ = 0;
+  double distance_ = 0.0;  ///< m
+  std::vector<double> inliers_, rotations_;
+  std::map<std::string, int> reasons_;  ///< of what is not tracked
+};
+
+}  // namespace sdvo

@@ -1,0 +1,82 @@
+#include "block_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+namespace sdvo {
+namespace {
+
+/// Where the block around `centre` looks most alike within `area`, a rectangle of block centres. Nothing where the best
+/// correlation lacks more of 1 than `uniqueness` times what the best one elsewhere lacks: texture that repeats itself,
+/// or a point whose true match lies outside of the area.
+std::optional<cv::Point> findBlock(const cv::Mat& from, const cv::Mat& in, cv::Point centre, cv::Size half,
+                                   cv::Rect area, double uniqueness) {
+  constexpr double kAlike = 0.85;  // least correlation
+  constexpr double kFlat = 3.0;    // grey levels; the correlation of flat blocks means nothing
+  constexpr int kSame = 2;         // px around the best that count as the same place
+  const cv::Rect block(centre.x - half.width, centre.y - half.height, 2 * half.width + 1, 2 * half.height + 1);
+  const cv::Rect whole(0, 0, from.cols, from.rows);
+  const cv::Rect reach =
+      cv::Rect(area.x - half.width, area.y - half.height, area.width + 2 * half.width, area.height + 2 * half.height) &
+      whole;
+  if ((block & whole) != block || reach.width < block.width || reach.height < block.height) return std::nullopt;
+  cv::Scalar mean, deviation;
+  cv::meanStdDev(from(block), mean, deviation);
+  if (deviation[0] < kFlat) return std::nullopt;
+  cv::Mat correlation;
+  cv::matchTemplate(in(reach), from(block), correlation, cv::TM_CCOEFF_NORMED);
+  double best = 0.0, elsewhere = 0.0;
+  cv::Point at;
+  cv::minMaxLoc(correlation, nullptr, &best, nullptr, &at);
+  if (!(best >= kAlike)) return std::nullopt;
+  const cv::Rect same(at.x - kSame, at.y - kSame, 2 * kSame + 1, 2 * kSame + 1);
+  correlation(same & cv::Rect(0, 0, correlation.cols, correlation.rows)).setTo(-1.0);
+  cv::minMaxLoc(correlation, nullptr, &elsewhere);
+  if (1.0 - best > uniqueness * (1.0 - elsewhere)) return std::nullopt;
+  return cv::Point(reach.x + at.x + half.width, reach.y + at.y + half.height);
+}
+
+/// The same where the way back leads to where it began.
+std::optional<cv::Point> findMutually(const cv::Mat& left, const cv::Mat& right, cv::Point centre, cv::Size half,
+                                      cv::Size reach) {
+  constexpr double kUnique = 0.7;
+  const auto around = [&](cv::Point middle) {
+    return cv::Rect(middle.x - reach.width, middle.y - reach.height, 2 * reach.width + 1, 2 * reach.height + 1);
+  };
+  const auto there = findBlock(left, right, centre, half, around(centre), kUnique);
+  if (!there) return std::nullopt;
+  const auto back = findBlock(right, left, *there, half, around(*there), kUnique);
+  if (!back || std::max(std::abs(back->x - centre.x), std::abs(back->y - centre.y)) > 1) return std::nullopt;
+  return there;
+}
+
+cv::Mat quarter(const cv::Mat& image) {
+  cv::Mat small;
+  cv::resize(image, small, cv::Size(image.cols / 4, image.rows / 4), 0.0, 0.0, cv::INTER_AREA);
+  return small;
+}
+
+}  // namespace
+
+BlockSearch::BlockSearch(const cv::Mat& left, const cv::Mat& right, double max_disparity, double reach)
+    : left_(left),
+      right_(right),
+      small_left_(quarter(left)),
+      small_right_(quarter(right)),
+      reach_(static_cast<int>(std::ceil(0.25 * max_disparity)), static_cast<int>(std::ceil(0.25 * reach))) {}
+
+std::optional<Sighting> BlockSearch::find(const cv::Point2f& corner) const {
+  // Coarsely in all directions, swapped sides included, then around that to a pixel.
+  const cv::Point small(cvRound(0.25f * corner.x - 0.375f), cvRound(0.25f * corner.y - 0.375f));
+  const auto coarse = findMutually(small_left_, small_right_, small, {5, 4}, reach_);
+  if (!coarse) return std::nullopt;
+  const cv::Point centre(cvRound(corner.x), cvRound(corner.y));
+  const cv::Point guess = centre + 4 * (*coarse - small);
+  const auto fine = findBlock(left_, right_, centre, {7, 7}, {guess.x - 4, guess.y - 4, 9, 9}, 1.0);
+  if (!fine) return std::nullopt;
+  const auto at = [](int pixel) { return static_cast<double>(pixel); };
+  return Sighting{at(centre.x), at(centre.y), at(centre.x - fine->x), at(fine->y - centre.y)};
+}
+
+}  // namespace sdvo

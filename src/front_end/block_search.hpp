@@ -1,0 +1,31 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <optional>
+
+namespace sdvo {
+
+/// A corner of the left image and where it is in the right one.
+struct Sighting {
+  double u, v;       ///< px, in the left image
+  double disparity;  ///< u_left - u_right, px; negative where the sides are swapped
+  double dv;         ///< v_right - v_left, px
+};
+
+/// Looks for corners of the left image in all directions of the right one, to a pixel, blind to gain and brightness.
+class BlockSearch {
+ public:
+  /// Images are CV_8U of one size and must outlive the search. `max_disparity`, px to either side; `reach`, rows above
+  /// and below.
+  BlockSearch(const cv::Mat& left, const cv::Mat& right, double max_disparity, double reach);
+
+  /// Nothing where texture is flat or repeats itself, or where the way back leads elsewhere.
+  std::optional<Sighting> find(const cv::Point2f& corner) const;
+
+ private:
+  const cv::Mat left_, right_;
+  cv::Mat small_left_, small_right_;  ///< a quarter of the size
+  cv::Size reach_;                    ///< px of these
+};
+
+}  // namespace sdvo

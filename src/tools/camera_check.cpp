@@ -1,0 +1,102 @@
+#include "camera_check.hpp"
+
+#include <opencv2/core.hpp>
+#include <stdexcept>
+
+#include "../common/text.hpp"
+#include "../ros/stamps.hpp"
+
+namespace sdvo {
+
+CameraCheck::CameraCheck(const PipelineOptions& options)
+    : options_(options),
+      run_(options),
+      rows_(options.stereo_features.stereo.max_epipolar_residual, options.stereo_features.stereo.epipolar.max_disparity,
+            options.stereo_features.rig_monitor.reach) {}
+
+void CameraCheck::add(const StereoPairMessages& pair) try {
+  const std::int64_t stamp = nanoseconds(pair.left_image->header.stamp);
+  if (stamp <= last_stamp_) return;  // the stamps' own step says it
+  const DecodedPair decoded = decoder_.decode(pair);
+  const StereoFeatures features = run_.process(decoded.camera, decoded.left, decoded.right, stamp);
+  decoder_.accept(decoded.camera);
+  last_stamp_ = stamp;
+  camera_ = decoded.camera;
+  model_ = pair.left_info->distortion_model;
+  ++used_;
+  if (features.report.refused) {
+    ++refused_;
+    refusal_ = features.report.status;
+  }
+  rows_.add(decoded.left, decoded.right, stamp);
+  images_.add(decoded.left, decoded.right, features.report);
+  emitter_.add(decoded.left);
+  odometry_.add(run_.last());
+  cv::vconcat(decoded.left, decoded.right, picture_);
+} catch (const std::invalid_argument& e) {
+  ++unusable_;
+  problem_ = e.what();
+}
+
+std::vector<Finding> CameraCheck::findings(const Finding& topics, const Finding& stamps, const Finding& transform,
+                                           double rate) const {
+  std::vector<Finding> findings;
+  std::string fault;
+  const auto append = [&](Finding finding) {
+    if (!fault.empty())
+      finding = {finding.step, Verdict::kOpen, "not judged: mend '" + fault + "' first", ""};
+    else if (finding.verdict == Verdict::kFail)
+      fault = finding.step;
+    findings.push_back(finding);
+  };
+  append(topics);
+  append(stamps);
+  append(calibration());
+  append(images_.exposure(thresholds_.min_intensity, thresholds_.max_intensity));
+  append(rows_.sameMoment());
+  append(rows_.rectification());
+  append(rig());
+  append(images_.texture(thresholds_.min_corners, options_.stereo_features.rig_monitor.suspicious_share));
+  append(images_.blur());
+  append(emitter_.judge());
+  append(images_.frameRate(odometry_.rotations()));
+  append(odometry_.judge());
+  append(load(rate));
+  findings.push_back(transform);  // which no other step needs
+  return findings;
+}
+
+Finding CameraCheck::calibration() const {
+  const std::string step = "calibration";
+  if (unusable_ > 0 || used_ == 0)
+    return {step, used_ == 0 && unusable_ == 0 ? Verdict::kOpen : Verdict::kFail, problem_.empty() ? "no pairs" : problem_,
+            unusable_ > 0 ? "see docs/cameras.md, 'What a wrong camera_info looks like'" : ""};
+  const std::string what = text(1, camera_.width, "x", camera_.height, ", f ", camera_.fx, " px, baseline ",
+                                1e3 * camera_.baseline, " mm, ", model_.empty() ? "no lens model" : model_);
+  // Of stereo cameras that robots carry: a lens of 20 to 150 deg, a baseline of 1 cm to 2 m.
+  const double width = camera_.width / camera_.fx;
+  if (width < 0.35 || width > 7.5) return {step, Verdict::kWarn, what, "is the focal length that of these images' size?"};
+  if (camera_.baseline < 0.01 || camera_.baseline > 2.0)
+    return {step, Verdict::kWarn, what, "is the baseline in metres? P[3] of the right camera_info is -fx * baseline"};
+  return {step, Verdict::kOk, what, ""};
+}
+
+Finding CameraCheck::rig() const {
+  constexpr double kFew = 0.1;  // share of the pairs
+  const std::string step = "rig monitor";
+  const std::string what = text(0, refused_, " of ", used_, " pairs refused") + (refusal_.empty() ? "" : ": " + refusal_);
+  if (refused_ > kFew * used_) return {step, Verdict::kFail, what, "look at both images: sides, mounting, calibration"};
+  return {step, refused_ > 0 ? Verdict::kWarn : Verdict::kOk, what, ""};
+}
+
+Finding CameraCheck::load(double rate) const {
+  const std::string step = "load";
+  const double share = 1e-3 * run_.cpuTime() * rate;
+  const std::string what = text(1, run_.cpuTime(), " ms of CPU time a pair, ", 100.0 * share, " % of one processor; done after ",
+                                run_.time(0.5), " ms (median), ", run_.time(0.95), " ms (95 %)");
+  if (share > thresholds_.max_load)
+    return {step, Verdict::kWarn, what, "fewer detector/max_features, smaller images or max_rate"};
+  return {step, Verdict::kOk, what, ""};
+}
+
+}  // namespace sdvo

@@ -1,0 +1,53 @@
+#include "camera_input.hpp"
+
+#include <tf2_eigen/tf2_eigen.h>
+
+#include <utility>
+
+#include "../common/text.hpp"
+#include "../ros/frame_id.hpp"
+
+namespace sdvo {
+
+CameraInput::CameraInput(const Topics& topics, std::function<void(const StereoPairMessages&)> use)
+    : stamps_(topics),
+      arrivals_(topics, StereoInputOptions()),
+      pairs_(StereoInputOptions().sync_queue_size,
+             [this, use = std::move(use)](const sensor_msgs::ImageConstPtr& left, const sensor_msgs::ImageConstPtr& right,
+                                          const sensor_msgs::CameraInfoConstPtr& left_info,
+                                          const sensor_msgs::CameraInfoConstPtr& right_info) {
+               stamps_.notePair(nanoseconds(left->header.stamp));
+               arrivals_.notePair();
+               use({left, right, left_info, right_info});
+             }) {}
+
+void CameraInput::add(const tf2_msgs::TFMessage& message, bool is_static) {
+  for (const geometry_msgs::TransformStamped& transform : message.transforms)
+    if (transform.header.stamp.isZero() || whyUnusable(transform.header.stamp).empty())
+      transforms_.setTransform(transform, "check_camera", is_static);
+}
+
+Finding CameraInput::topics() {
+  const RateOptions rates;
+  return stamps_.topics(rates.min_rate, rates.max_rate, arrivals_.explainSilence());
+}
+
+Finding CameraInput::transform(const std::string& base_frame) const {
+  const std::string step = "TF", camera = ros_conversions::cleanFrameId(frame_);
+  if (frame_.empty()) return {step, Verdict::kOpen, "the images name no frame", "set frame_id in the driver"};
+  try {
+    const Eigen::Isometry3d T_base_camera = tf2::transformToEigen(transforms_.lookupTransform(base_frame, camera, ros::Time(0)));
+    const Eigen::Vector3d at = T_base_camera.translation(), ahead = T_base_camera.rotation().col(2);
+    const std::string what = text(2, camera, " is at ", at.x(), " ", at.y(), " ", at.z(), " m of ", base_frame,
+                                  " and looks along ", ahead.x(), " ", ahead.y(), " ", ahead.z());
+    if (T_base_camera.rotation().isIdentity(1e-3))
+      return {step, Verdict::kWarn, what,
+              "these are the axes of a body (x ahead), not of a camera (z ahead): give the images their optical frame"};
+    return {step, Verdict::kOk, what, ""};
+  } catch (const tf2::TransformException& e) {
+    return {step, Verdict::kFail, "no transform from " + camera + " to " + base_frame + ": " + e.what(),
+            "publish it: URDF, or static_transform_publisher; launch/cameras has an argument mount"};
+  }
+}
+
+}  // namespace sdvo
