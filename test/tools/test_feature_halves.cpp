@@ -45,8 +45,9 @@ TEST(FeatureHalves, HaveEveryFeatureOnceAndCoverTheImage) {
 }
 
 TEST(FeatureHalves, KeepNeighboursTogether) {
-  // Fields are an eighth of 240 px wide.
-  const std::vector<int> half = halves(FeatureHalves().split(featuresAt({{31, 31}, {58, 58}, {62, 31}, {31, 62}}), {}));
+  // Fields are a quarter of 240 px wide.
+  const std::vector<int> half =
+      halves(FeatureHalves().split(featuresAt({{62, 62}, {118, 118}, {122, 62}, {62, 122}}), {}));
   EXPECT_EQ(half[0], half[1]);
   EXPECT_NE(half[0], half[2]);
   EXPECT_NE(half[0], half[3]);
@@ -54,14 +55,14 @@ TEST(FeatureHalves, KeepNeighboursTogether) {
 
 TEST(FeatureHalves, APointStaysInItsHalfWhereverItMoves) {
   FeatureHalves features;
-  const std::vector<int> before = halves(features.split(featuresAt({{45, 45}, {75, 45}}), {}));
+  const std::vector<int> before = halves(features.split(featuresAt({{30, 45}, {90, 45}}), {}));
   // Each moves on by a field. The second one is not matched, the third one is said to come from where nothing was.
-  const StereoFeatures next = featuresAt({{75, 45}, {105, 45}, {135, 45}});
-  const std::vector<int> after = halves(features.split(next, {{45.5f, 44.5f, 0, true}, {135.f, 60.f, 2, true}}));
+  const StereoFeatures next = featuresAt({{90, 45}, {150, 45}, {210, 45}});
+  const std::vector<int> after = halves(features.split(next, {{30.5f, 44.5f, 0, true}, {210.f, 60.f, 2, true}}));
   EXPECT_EQ(after[0], before[0]);
   EXPECT_NE(after[1], before[1]);
   EXPECT_NE(after[2], after[1]) << "the fields of a row alternate";
-  const std::vector<int> last = halves(features.split(featuresAt({{105, 75}}), {{75.f, 45.f, 0, true}}));
+  const std::vector<int> last = halves(features.split(featuresAt({{210, 45}}), {{90.f, 45.f, 0, true}}));
   EXPECT_EQ(last[0], before[0]);
 }
 
