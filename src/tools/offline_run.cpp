@@ -38,7 +38,7 @@ StereoFeatures OfflineRun::process(const StereoCamera& camera, const cv::Mat& le
                                    std::int64_t stamp) {
   const double cpu_before = cpuSeconds();
   Stopwatch stopwatch;
-  const Extracted pair{camera, extractor_.extract(camera, left, right, stamp), 0.0};
+  const Extracted pair{extractor_.extract(camera, left, right, stamp), 0.0};
   track(pair);
   frames_.back().total_time = stopwatch.lap();
   cpu_time_ += cpuSeconds() - cpu_before;
@@ -53,7 +53,7 @@ void OfflineRun::processBeside(const StereoCamera& camera, const cv::Mat& left, 
   const std::optional<Extracted> before = std::exchange(waiting_, std::nullopt);
   std::future<void> odometry;
   if (before) odometry = std::async(std::launch::async, [&] { track(*before); });
-  Extracted pair{camera, extractor_.extract(camera, left, right, stamp), 0.0};
+  Extracted pair{extractor_.extract(camera, left, right, stamp), 0.0};
   if (odometry.valid()) odometry.get();
   pair.time = stopwatch.lap();
   waiting_ = std::move(pair);
@@ -70,12 +70,16 @@ void OfflineRun::finish() {
   cpu_time_ += cpuSeconds() - cpu_before;
 }
 
+void OfflineRun::processFeatures(const StereoFeatures& features) {
+  track({features, 0.0});
+}
+
 void OfflineRun::track(const Extracted& pair) {
-  if (camera_ && *camera_ != pair.camera) odometry_.breakStream();
-  camera_ = pair.camera;
+  const StereoCamera& camera = pair.features.camera;
+  if (camera_ && *camera_ != camera) odometry_.breakStream();
+  camera_ = camera;
   Frame frame{odometry_.update(pair.features), pair.features.report, pair.time};
-  frame.odometry.flow.clear();  // by far the largest part of it
-  frame.odometry.flow.shrink_to_fit();
+  if (!frames_.empty()) std::vector<FeatureFlow>().swap(frames_.back().odometry.flow);  // by far the largest part of it
   frames_.push_back(std::move(frame));
 }
 

@@ -27,7 +27,10 @@ class OfflineRun {
   void processBeside(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
   void finish();
 
-  /// Of the last pair; its flow is not kept.
+  /// The next pair from its features alone, which were extracted elsewhere.
+  void processFeatures(const StereoFeatures& features);
+
+  /// Of the last pair; only there the flow is kept.
   const OdometryResult& last() const { return frames_.back().odometry; }
 
   int pairs() const { return static_cast<int>(frames_.size()); }
@@ -60,7 +63,6 @@ class OfflineRun {
 
   /// A pair between extractor and odometry.
   struct Extracted {
-    StereoCamera camera;
     StereoFeatures features;
     double time;  ///< s, since the pair before
   };

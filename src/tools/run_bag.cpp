@@ -1,17 +1,10 @@
 // Runs the odometry on recorded bags without a ROS master: the same core as the nodelets, every pair processed.
-#include <rosbag/bag.h>
-#include <rosbag/view.h>
-#include <sensor_msgs/CameraInfo.h>
-#include <sensor_msgs/Image.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
-#include <array>
 #include <cerrno>
-#include <cstdint>
-#include <cstdio>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -20,17 +13,13 @@
 #include <iterator>
 #include <map>
 #include <opencv2/core/utility.hpp>
-#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "../config/pipeline_options.hpp"
-#include "../ros/pair_decoder.hpp"
-#include "../ros/stamp_filter.hpp"
-#include "../ros/stamps.hpp"
-#include "offline_run.hpp"
+#include "bag_run.hpp"
 #include "run_tool.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
 
@@ -42,7 +31,7 @@ struct Arguments {
   std::vector<std::string> inputs, settings;
   std::string output, config, format = "tum", camera = "/stereo";
   int jobs = 1, threads = 1;
-  bool resume = false;
+  bool resume = false, shuttle = false, halves = false;
 };
 
 const char kColumns[] =
@@ -57,108 +46,41 @@ struct Row {
   }
 };
 
-/// A message of the type that its topic must have.
-template <class Message>
-typename Message::ConstPtr instantiate(const rosbag::MessageInstance& instance) {
-  const typename Message::ConstPtr message = instance.instantiate<Message>();
-  if (!message)
-    throw std::runtime_error(instance.getTopic() + " holds " + instance.getDataType() + ", expected " +
-                             ros::message_traits::datatype<Message>());
-  return message;
+/// `output`: the folder of the results with the bag's name.
+fs::path selfCheckFile(const fs::path& output) {
+  return output.string() + ".self_check.csv";
 }
 
-/// What of a bag's messages made no pair.
-struct LeftOver {
-  int stamps = 0;  ///< that are not on all four topics, or cannot be used
-  std::string problem;
-};
-
-/// Calls `use(pair, time of arrival)` for each four messages of one stamp, in the order in which they are complete.
-template <class Use>
-LeftOver forEachPair(const std::string& path, const std::string& camera, const Use& use) {
-  constexpr std::size_t kWaiting = 100;  // stamps, of which none may ever be complete: images take memory
-  const std::array<std::string, 4> topics = {camera + "/left/image_rect", camera + "/right/image_rect",
-                                             camera + "/left/camera_info", camera + "/right/camera_info"};
-  const rosbag::Bag bag(path, rosbag::bagmode::Read);
-  rosbag::View view(bag, rosbag::TopicQuery(std::vector<std::string>(topics.begin(), topics.end())));
-  std::set<std::string> recorded;
-  for (const rosbag::ConnectionInfo* connection : view.getConnections()) recorded.insert(connection->topic);
-  for (const std::string& topic : topics)
-    if (recorded.count(topic) == 0) throw std::runtime_error("there is no " + topic + " in it");
-
-  std::map<ros::Time, sdvo::StereoPairMessages> waiting;
-  LeftOver left_over{0, "no four stamps agree"};
-  for (const rosbag::MessageInstance& instance : view) {
-    const bool is_image = instance.getTopic() == topics[0] || instance.getTopic() == topics[1];
-    const bool is_left = instance.getTopic() == topics[0] || instance.getTopic() == topics[2];
-    const auto image = is_image ? instantiate<sensor_msgs::Image>(instance) : nullptr;
-    const auto info = is_image ? nullptr : instantiate<sensor_msgs::CameraInfo>(instance);
-    const ros::Time stamp = is_image ? image->header.stamp : info->header.stamp;
-    if (const std::string problem = sdvo::whyUnusable(stamp); !problem.empty()) {
-      ++left_over.stamps;
-      left_over.problem = instance.getTopic() + ": " + problem;
-      continue;
-    }
-    sdvo::StereoPairMessages& pair = waiting[stamp];
-    if (is_image)
-      (is_left ? pair.left_image : pair.right_image) = image;
-    else
-      (is_left ? pair.left_info : pair.right_info) = info;
-    if (pair.left_image && pair.right_image && pair.left_info && pair.right_info) {
-      use(pair, instance.getTime());
-      const auto end = std::next(waiting.find(stamp));
-      left_over.stamps += static_cast<int>(std::distance(waiting.begin(), end)) - 1;
-      waiting.erase(waiting.begin(), end);
-    } else if (waiting.size() > kWaiting) {
-      ++left_over.stamps;
-      waiting.erase(waiting.begin());
-    }
+/// Writes NAME.self_check.csv and says the same in sentences.
+void checkItself(const sdvo::BagRun& bag, const fs::path& output, const Arguments& arguments) {
+  std::vector<sdvo::SelfCheck> checks;
+  if (arguments.shuttle) checks.push_back(bag.shuttle());
+  if (arguments.halves) checks.push_back(bag.halves());
+  if (checks.empty()) return;
+  std::ofstream file(selfCheckFile(output));
+  file << sdvo::SelfCheck::columns() << "\n";
+  for (const sdvo::SelfCheck& check : checks) {
+    file << check.row() << "\n";
+    std::cout << output.filename().string() + ": " + check.text() + "\n" << std::flush;
   }
-  left_over.stamps += static_cast<int>(waiting.size());
-  return left_over;
+  if (!file.flush()) throw std::runtime_error("cannot write " + selfCheckFile(output).string());
 }
 
 Row runBag(const fs::path& bag, const fs::path& output, const Arguments& arguments) {
   sdvo::PipelineOptions options = sdvo::readPipelineOptions(arguments.config, arguments.settings);
   cv::setNumThreads(arguments.threads);
-  sdvo::OfflineRun run(options);
-  sdvo::PairDecoder decoder;
-  sdvo::StampFilter<sdvo::StereoPairMessages> filter;
-  int refused = 0;
-  std::string refusal;
-  const auto process = [&](const sdvo::StereoPairMessages& pair) {
-    try {
-      const sdvo::DecodedPair decoded = decoder.decode(pair);
-      run.process(decoded.camera, decoded.left, decoded.right, sdvo::nanoseconds(pair.left_image->header.stamp));
-      decoder.accept(decoded.camera);
-    } catch (const std::invalid_argument& e) {
-      ++refused;
-      refusal = e.what();
-    }
-  };
-  const LeftOver left_over =
-      forEachPair(bag.string(), arguments.camera, [&](const auto& pair, const ros::Time& arrival) {
-        const ros::Time stamp = pair.left_image->header.stamp;
-        for (const auto& passed : filter.add(pair, sdvo::nanoseconds(stamp), sdvo::nanoseconds(arrival))) {
-          if (passed.source_restarts > 0)
-            throw std::runtime_error(
-                "stamps jump back for good: these are several recordings, one bag for each is needed");
-          process(passed.item);
-        }
-      });
-  if (run.pairs() == 0)
-    throw std::runtime_error("no pair can be used: " + (refusal.empty() ? left_over.problem : refusal));
-
+  const sdvo::BagRun of_bag(bag.string(), arguments.camera, options, arguments.halves);
+  const sdvo::OfflineRun& run = of_bag.whole();
   if (arguments.format == "kitti")
     sdvo::writeKittiPoses(output.string() + ".txt", run.poses());
   else
     sdvo::writeTumPoses(output.string() + ".txt", run.stampedPoses());
   run.writeTiming(output.string() + ".csv");
+  checkItself(of_bag, output, arguments);
   std::ostringstream figures;
   figures << std::fixed << std::setprecision(1) << run.pairs() << "," << run.pairsWithoutPose() << ","
-          << run.discontinuities() << "," << left_over.stamps + refused + static_cast<int>(filter.dropped()) << ","
-          << run.distance() << "," << run.time(0.5) << "," << run.time(0.95) << "," << run.cpuTime() << ","
-          << sdvo::hashOptions(sdvo::listOptions(options));
+          << run.discontinuities() << "," << of_bag.leftOut() << "," << run.distance() << "," << run.time(0.5) << ","
+          << run.time(0.95) << "," << run.cpuTime() << "," << sdvo::hashOptions(sdvo::listOptions(options));
   return {figures.str(), ""};
 }
 
@@ -186,6 +108,14 @@ std::string readRow(const fs::path& output, const std::string& name) {
 
 bool isFinished(const std::string& row) {
   return !row.empty() && row.back() == ',';
+}
+
+/// Whether the self-checks that are asked for are among the bag's results.
+bool hasSelfChecks(const std::string& name, const Arguments& arguments) {
+  std::ifstream file(selfCheckFile(fs::path(arguments.output) / name));
+  const std::string lines((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
+  return (!arguments.shuttle || lines.find("\nshuttle,") != std::string::npos) &&
+         (!arguments.halves || lines.find("\nhalves,") != std::string::npos);
 }
 
 /// In a process of its own: a bag that ends it is no harm to the others.
@@ -250,8 +180,9 @@ int runAll(const Arguments& arguments) {
   fs::create_directories(arguments.output);
   std::map<pid_t, std::string> at_work;
   for (const auto& [name, bag] : bags) {
-    if (arguments.resume && isFinished(readRow(arguments.output, name))) continue;
+    if (arguments.resume && isFinished(readRow(arguments.output, name)) && hasSelfChecks(name, arguments)) continue;
     fs::remove(rowFile(arguments.output, name));
+    fs::remove(selfCheckFile(fs::path(arguments.output) / name));
     while (static_cast<int>(at_work.size()) >= arguments.jobs) finishOne(at_work, arguments);
     at_work[start(bag, name, arguments)] = name;
   }
@@ -292,6 +223,10 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"tum", "kitti"}));
   app.add_option("--jobs", arguments.jobs, "bags at a time")->capture_default_str()->check(CLI::Range(1, 256));
   app.add_flag("--resume", arguments.resume, "leave bags alone whose results are there");
+  app.add_flag("--shuttle", arguments.shuttle,
+               "plays each bag backwards, too: NAME.self_check.csv says how far from its start it ends");
+  app.add_flag("--halves", arguments.halves,
+               "runs on two halves of the features, too: NAME.self_check.csv says how far they differ");
   app.add_option("--config", arguments.config, "YAML file as the nodelets load it");
   app.add_option("--param", arguments.settings,
                  "option as name=value, for example detector/max_features=800; repeatable")

@@ -356,6 +356,84 @@ TEST_F(Tools, ABagThatFailsIsNamedAndTheOthersAreNotRunAgain) {
               "motion/kernel");
 }
 
+TEST_F(Tools, BagsCheckThemselves) {
+  const fs::path bag = root_ / "a.bag", results = root_ / "results", checks = results / "a.self_check.csv";
+  ASSERT_EQ(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output " + bag.string()).exit_code, 0);
+  const std::string command = bag.string() + " --resume --output " + results.string();
+  ASSERT_EQ(run("run_bag", command).exit_code, 0);
+  EXPECT_FALSE(fs::exists(checks));
+  const std::string poses_alone = readText(results / "a.txt");
+
+  // Results without the checks are not all that is asked for now.
+  const Outcome outcome = run("run_bag", command + " --shuttle --halves");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(readText(results / "a.txt"), poses_alone);
+  const std::vector<std::string> lines = linesOf(readText(checks));
+  ASSERT_EQ(lines.size(), 3u);
+  EXPECT_EQ(lines[0].rfind("check,pairs,distance_m,end_m,", 0), 0u);
+  for (const std::size_t i : {1u, 2u}) {
+    std::istringstream row(lines[i]);
+    std::vector<std::string> fields;
+    for (std::string field; std::getline(row, field, ',');) fields.push_back(field);
+    ASSERT_GE(fields.size(), 11u) << lines[i];
+    EXPECT_EQ(fields[0], i == 1 ? "shuttle" : "halves");
+    EXPECT_EQ(fields[1], std::to_string(kPairs));
+    EXPECT_NEAR(std::stod(fields[2]), (kPairs - 1) * kStep, 0.02);
+    EXPECT_GT(std::stod(fields[3]), 0.0);
+    EXPECT_LT(std::stod(fields[3]), 0.03);
+    EXPECT_NE(outcome.out.find("a: " + fields[0] + ": error about "), std::string::npos) << outcome.out;
+  }
+
+  const fs::file_time_type finished = fs::last_write_time(checks);
+  ASSERT_EQ(run("run_bag", command + " --halves").exit_code, 0);
+  EXPECT_EQ(fs::last_write_time(checks), finished);
+  ASSERT_EQ(run("run_bag", bag.string() + " --output " + results.string()).exit_code, 0);
+  EXPECT_FALSE(fs::exists(checks)) << "of another run than the poses beside it";
+}
+
+/// The way back finds the messages of a pair by when they were recorded, which need not be one after the other.
+TEST_F(Tools, AShuttleFindsPairsHoweverTheyWereRecorded) {
+  const fs::path plain = root_ / "plain.bag", at_once = root_ / "at_once.bag", late = root_ / "late.bag";
+  ASSERT_EQ(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output " + plain.string()).exit_code, 0);
+  {
+    const rosbag::Bag in(plain.string());
+    rosbag::Bag out_at_once(at_once.string(), rosbag::bagmode::Write), out_late(late.string(), rosbag::bagmode::Write);
+    for (const rosbag::MessageInstance& message : rosbag::View(
+             in,
+             rosbag::TopicQuery(std::vector<std::string>{"/stereo/left/image_rect", "/stereo/right/image_rect",
+                                                         "/stereo/left/camera_info", "/stereo/right/camera_info"}))) {
+      out_at_once.write(message.getTopic(), ros::Time(1000000009.0), message, message.getConnectionHeader());
+      const bool is_late = message.getTopic() == "/stereo/right/image_rect";
+      out_late.write(message.getTopic(), message.getTime() + ros::Duration(is_late ? 0.25 : 0.0), message,
+                     message.getConnectionHeader());
+    }
+  }
+  const fs::path results = root_ / "results";
+  for (const fs::path& bag : {plain, at_once, late}) {
+    const Outcome outcome = run("run_bag", bag.string() + " --shuttle --output " + results.string());
+    EXPECT_EQ(outcome.exit_code, 0) << bag << ": " << outcome.err;
+  }
+  const std::string expected = readText(results / "plain.self_check.csv");
+  EXPECT_NE(expected.find("shuttle,4,"), std::string::npos);
+  EXPECT_EQ(readText(results / "at_once.self_check.csv"), expected);
+  EXPECT_EQ(readText(results / "late.self_check.csv"), expected);
+}
+
+TEST_F(Tools, ALostBagDoesNotPassItsSelfChecks) {
+  for (int i = 1; i < kPairs; ++i)
+    for (int side = 0; side < 2; ++side)
+      cv::imwrite(image(side, i).string(), cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
+  const fs::path bag = root_ / "dark.bag", results = root_ / "results";
+  ASSERT_EQ(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output " + bag.string()).exit_code, 0);
+  const Outcome outcome = run("run_bag", bag.string() + " --shuttle --halves --output " + results.string());
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  for (const char* check : {"shuttle", "halves"}) {
+    EXPECT_NE(outcome.out.find(std::string("dark: ") + check + ": no figure"), std::string::npos) << outcome.out;
+    EXPECT_NE(readText(results / "dark.self_check.csv").find(std::string("\n") + check + ",4,"), std::string::npos);
+  }
+  EXPECT_NE(outcome.out.find("pairs have no pose"), std::string::npos) << outcome.out;
+}
+
 /// Of all stamps that wait, images are held in memory, so only so many may.
 TEST_F(Tools, MessagesThatMakeNoPairDoNotKeepOthersFromIt) {
   const fs::path good = root_ / "good.bag", mixed = root_ / "mixed.bag", results = root_ / "results";
