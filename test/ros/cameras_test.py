@@ -2,6 +2,7 @@
 """Each launch file of launch/cameras with its driver: odometry, and what is said of a camera_info that does not fit."""
 
 import dataclasses
+import subprocess
 import sys
 import unittest
 
@@ -23,8 +24,8 @@ class Cameras(unittest.TestCase):
     def setUpClass(cls):
         cls.sequence = StereoSequence(PAIRS)
 
-    def start(self, habits):
-        """The driver in a namespace of its own, and the launch file as a user would start it."""
+    def start_driver(self, habits, sequence):
+        """The driver in a namespace of its own."""
         Cameras.tests += 1
         namespace = '%s_%d' % (habits.namespace, Cameras.tests)
         root, frames = habits.root, habits.frames
@@ -33,8 +34,14 @@ class Cameras(unittest.TestCase):
         elif root == 'base_link' or not root:
             frames = tuple('%s_%s' % (namespace, frame) for frame in frames)
         habits = dataclasses.replace(habits, namespace=namespace, root=root, frames=frames)
-        self.driver = fake_driver.FakeDriver(habits, self.sequence)
+        self.driver = fake_driver.FakeDriver(habits, sequence)
         self.addCleanup(self.driver.close)
+        return habits
+
+    def start(self, habits):
+        """The driver, and the launch file as a user would start it."""
+        habits = self.start_driver(habits, self.sequence)
+        namespace, frames = habits.namespace, habits.frames
         collectors = [Collector('/%s/odom' % namespace, Odometry), Collector('/%s/vo_info' % namespace, VoInfo)]
         self.odometry, self.info = collectors
         self.rosout = Rosout('/' + namespace)
@@ -96,6 +103,32 @@ class Cameras(unittest.TestCase):
 
     def test_realsense_of_an_old_driver_has_no_baseline(self):
         self.refuses(dataclasses.replace(fake_driver.REALSENSE, without_tx=True), 'no baseline in P')
+
+    def check_camera(self, habits):
+        """Exit code and lines of check_camera beside the driver."""
+        pairs = 40
+        habits = self.start_driver(habits, StereoSequence(pairs))
+        tool = subprocess.Popen(['rosrun', PACKAGE, 'check_camera', '--seconds', '8', '--camera', '/' + habits.namespace,
+                                 '--left', habits.sides[0], '--right', habits.sides[1], '--image', habits.image,
+                                 '--base-frame', habits.root], stdout=subprocess.PIPE, universal_newlines=True)
+        self.assertTrue(wait_until(self.driver.is_subscribed, 30))
+        for i in range(pairs):
+            self.driver.publish(i)
+            rospy.sleep(0.1)
+        lines = tool.communicate()[0].splitlines()
+        return tool.returncode, {line[5:19].strip(): line[:5].strip() for line in lines if not line.startswith(' ')}, lines
+
+    def test_check_camera_listens_to_a_driver(self):
+        code, verdicts, lines = self.check_camera(fake_driver.REALSENSE)
+        self.assertEqual(code, 0, lines)
+        for step in ('topics', 'calibration', 'rectification', 'exposure', 'texture', 'odometry', 'TF'):
+            self.assertEqual(verdicts[step], 'OK', lines)
+        self.assertEqual(verdicts['stamps'], 'WARN', 'a clock of its own: %s' % lines)
+
+    def test_check_camera_names_the_calibration(self):
+        code, verdicts, lines = self.check_camera(dataclasses.replace(fake_driver.REALSENSE, without_tx=True))
+        self.assertEqual((code, verdicts['calibration']), (2, 'FAIL'), lines)
+        self.assertIn('no baseline in P', ' '.join(lines))
 
 
 if __name__ == '__main__':

@@ -1,0 +1,41 @@
+#include <gtest/gtest.h>
+
+#include <random>
+#include <vector>
+
+#include "../../src/check/emitter_check.hpp"
+#include "../synthetic_scene.hpp"
+
+namespace sdvo {
+namespace {
+
+const cv::Size kSize(424, 240);
+
+/// A scene that moves `step` px to the left with each pair, under `dots` bright dots that do not move with it.
+Finding judged(double step, int dots, int dot_step = 0) {
+  const synthetic::Texture texture(3, 8.0, 160.0);
+  std::mt19937 random(9);
+  std::vector<cv::Point> pattern;
+  for (int i = 0; i < dots; ++i)
+    pattern.emplace_back(std::uniform_int_distribution<int>(0, 2000)(random),
+                         std::uniform_int_distribution<int>(1, kSize.height - 2)(random));
+  EmitterCheck check;
+  for (int i = 0; i < 12; ++i) {
+    cv::Mat image = synthetic::render(kSize, [&](double u, double v) { return 0.5 * texture.at(u + i * step, v); });
+    for (const cv::Point& dot : pattern)
+      if (const int u = dot.x - i * dot_step; u > 0 && u < kSize.width - 1) image.at<std::uint8_t>(dot.y, u) = 200;
+    check.add(image);
+  }
+  return check.judge();
+}
+
+TEST(EmitterCheck, FindsDotsThatMoveWithTheCamera) { EXPECT_EQ(judged(8.0, 6000).verdict, Verdict::kFail); }
+
+TEST(EmitterCheck, TakesAMovingSceneForWhatItIs) { EXPECT_EQ(judged(8.0, 0).verdict, Verdict::kOk); }
+
+TEST(EmitterCheck, DotsOfTheSceneMoveWithIt) { EXPECT_EQ(judged(8.0, 6000, 8).verdict, Verdict::kOk); }
+
+TEST(EmitterCheck, ACameraThatStandsProvesNothing) { EXPECT_EQ(judged(0.0, 6000).verdict, Verdict::kOpen); }
+
+}  // namespace
+}  // namespace sdvo

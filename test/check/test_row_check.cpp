@@ -1,0 +1,82 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "../../src/check/row_check.hpp"
+#include "../synthetic_scene.hpp"
+
+namespace sdvo {
+namespace {
+
+const cv::Size kSize(320, 240);
+constexpr double kDisparity = 12.0, kPeriod = 0.1;  // px, s
+
+/// Rows of a plane that nods: how far it is down at a time, px.
+double nod(double time) { return 12.0 * std::sin(2.0 * time); }
+
+/// The view `down` px lower, `dv` by place lower still.
+template <class Rows>
+cv::Mat view(double down, double disparity, const Rows& dv) {
+  static const synthetic::Texture texture(7, 6.0, 120.0);
+  return synthetic::render(
+      kSize, [&](double u, double v) { return texture.at(u + disparity, v - down - dv(u, v)); });
+}
+
+/// 40 pairs whose right image is `delay` (s) later.
+template <class Rows>
+RowCheck checked(double delay, double motion, const Rows& dv) {
+  RowCheck check(1.5, 48.0, 24.0);
+  for (int i = 0; i < 60; ++i) {
+    const double time = i * kPeriod;
+    check.add(view(motion * nod(time), 0.0, [](double, double) { return 0.0; }),
+              view(motion * nod(time + delay), kDisparity, dv), static_cast<std::int64_t>(1e9 * (time + 1.0)));
+  }
+  return check;
+}
+
+double none(double, double) { return 0.0; }
+
+TEST(RowCheck, RectifiedPairsOfOneMomentAreInOrder) {
+  const RowCheck check = checked(0.0, 1.0, none);
+  EXPECT_EQ(check.rectification().verdict, Verdict::kOk) << check.rectification().what;
+  EXPECT_EQ(check.sameMoment().verdict, Verdict::kOk) << check.sameMoment().what;
+}
+
+TEST(RowCheck, MeasuresADelayWithoutBlamingTheRectification) {
+  const RowCheck check = checked(0.03, 1.0, none);
+  const Finding moment = check.sameMoment();
+  EXPECT_EQ(moment.verdict, Verdict::kFail) << moment.what;
+  double late = 0.0;
+  ASSERT_EQ(std::sscanf(moment.what.c_str(), "right image %lf", &late), 1);
+  EXPECT_NEAR(late, 30.0, 2.0) << "ms; a row goes 24 px/s, so that 2 ms are 0.05 px";
+  EXPECT_EQ(check.rectification().verdict, Verdict::kOk) << check.rectification().what;
+}
+
+TEST(RowCheck, MapsTheRowsOfABadRectificationWithoutBlamingTheMoment) {
+  const auto tilted = [](double u, double) { return 0.02 * (u - 160.0); };
+  const RowCheck check = checked(0.0, 1.0, tilted);
+  EXPECT_EQ(check.rectification().verdict, Verdict::kFail) << check.rectification().what;
+  EXPECT_EQ(check.sameMoment().verdict, Verdict::kOk) << check.sameMoment().what;
+  const cv::Mat map = check.map();
+  ASSERT_EQ(map.size(), cv::Size(RowCheck::kColumns, RowCheck::kRows));
+  const double width = static_cast<double>(kSize.width) / RowCheck::kColumns;
+  // Corners lie anywhere in their part, 27 px to either side of its middle; half of that is more than their median errs.
+  for (int column = 1; column < RowCheck::kColumns - 1; ++column)
+    EXPECT_NEAR(map.at<double>(1, column), tilted((column + 0.5) * width - kDisparity, 0.0), 0.27) << column;
+}
+
+TEST(RowCheck, DoesNotJudgeTheMomentOfACameraThatStands) {
+  EXPECT_EQ(checked(0.03, 0.0, none).sameMoment().verdict, Verdict::kOpen);
+}
+
+TEST(RowCheck, JudgesNothingWithoutTexture) {
+  RowCheck check(1.5, 48.0, 24.0);
+  for (int i = 0; i < 60; ++i)
+    check.add(cv::Mat(kSize, CV_8U, cv::Scalar(90)), cv::Mat(kSize, CV_8U, cv::Scalar(90)), (i + 1) * 100000000LL);
+  EXPECT_EQ(check.rectification().verdict, Verdict::kOpen);
+  EXPECT_EQ(check.sameMoment().verdict, Verdict::kOpen);
+  EXPECT_TRUE(std::isnan(check.map().at<double>(0)));
+}
+
+}  // namespace
+}  // namespace sdvo
