@@ -25,6 +25,7 @@ ROOMS = {
     "config": ("all options in one place", 0.5),
     "ros": ("nodelets; messages meet the core", 0.5),
     "experiments": ("the paper's experiments", 1.6),
+    "check": ("steps of a camera's check", 2.6),
     "tools": ("command lines", 2.3),
 }
 WIDTH, GAP, MARGIN, LINE = 250, 30, 15, 15
