@@ -1,7 +1,7 @@
 #include "camera_check.hpp"
 
+#include <exception>
 #include <opencv2/core.hpp>
-#include <stdexcept>
 
 #include "../common/text.hpp"
 #include "../ros/stamps.hpp"
@@ -33,7 +33,7 @@ void CameraCheck::add(const StereoPairMessages& pair) try {
   emitter_.add(decoded.left);
   odometry_.add(run_.last());
   cv::vconcat(decoded.left, decoded.right, picture_);
-} catch (const std::invalid_argument& e) {
+} catch (const std::exception& e) {
   ++unusable_;
   problem_ = e.what();
 }
