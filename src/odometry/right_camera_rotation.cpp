@@ -15,6 +15,8 @@ constexpr double kPrior = 1e-3;       // keeps the first pairs' equations solvab
 /// of independent features.
 constexpr double kCorrelatedSightings = 10.0;
 
+constexpr int kEnough = 20;  // features; fewer, which three angles fit nearly as they are, may be wrong matches
+
 // A turn of the camera.
 constexpr double kTurned = 0.6;  // px: undisturbed, KITTI's and EuRoC's rigs change by less than 0.2
 constexpr double kUnusual =
@@ -51,23 +53,37 @@ RightCameraRotation::Sums RightCameraRotation::sumUp(const StereoFeatures& featu
 
 bool RightCameraRotation::add(const StereoFeatures& features) {
   if (features.count() == 0) return false;
-  const double disagreement = change(features);
-  const double limit = std::max(kTurned, kUnusual * std::sqrt(usual_square_));
-  // A knock is one large change. What changes in many pairs is the rig's way: each counts up to the limit, and slowly.
-  const double counted = std::min(disagreement, limit);
-  const double memory = disagreement > limit ? kMemory : kUsualMemory;
-  usual_square_ += (1.0 - memory) * (counted * counted - usual_square_);
+  // A camera that turned disagrees with the memory. Back in its place it agrees again, but not with the pair before.
+  bool turned = false;
+  if (features.count() >= kEnough) {
+    const Sums now = sumUp(features, {});
+    // Against the memory a knock counts in many pairs, so each of these counts little.
+    turned = against_memory_.isExceededBy(distance(now, sums_), kMemory);
+    turned |= against_last_.isExceededBy(distance(now, last_), kUsualMemory);
+    last_ = now;
+  }
   const Sums past{kMemory * sums_.information, kMemory * sums_.gradient, kMemory * sums_.square,
                   kMemory * sums_.weight};
   sums_ = sumUp(features, past);
-  return disagreement > limit;
+  return turned;
+}
+
+bool RightCameraRotation::UsualChange::isExceededBy(double change, double memory_of_large) {
+  const double limit = std::max(kTurned, kUnusual * std::sqrt(square));
+  // A knock is one large change. What changes in many pairs is the rig's way: each counts up to the limit.
+  const double counted = std::min(change, limit);
+  const double memory = change > limit ? memory_of_large : kUsualMemory;
+  square += (1.0 - memory) * (counted * counted - square);
+  return change > limit;
 }
 
 double RightCameraRotation::change(const StereoFeatures& features) const {
-  constexpr int kEnough = 20;  // fewer, which three angles fit nearly as they are, may be wrong matches
-  if (features.count() < kEnough || sums_.weight <= 0.0) return 0.0;
-  const Sums now = sumUp(features, {});
-  const Eigen::Vector3d change = now.rotation() - rotation();
+  return features.count() >= kEnough ? distance(sumUp(features, {}), sums_) : 0.0;
+}
+
+double RightCameraRotation::distance(const Sums& now, const Sums& before) {
+  if (now.weight <= 0.0 || before.weight <= 0.0) return 0.0;
+  const Eigen::Vector3d change = now.rotation() - before.rotation();
   return std::sqrt(change.dot(now.information * change) / now.weight);
 }
 

@@ -87,6 +87,16 @@ TEST(RightCameraRotation, ATurnIsSaidOfARigThatWasSteady) {
   for (int k = 0; k < 20; ++k) EXPECT_FALSE(filter.add(gridSeenWith(Eigen::Vector3d::Zero())));
   EXPECT_GT(filter.change(gridSeenWith(turn)), 0.6);
   for (int k = 0; k < 5; ++k) EXPECT_TRUE(filter.add(gridSeenWith(turn))) << "a turn does not become usual by lasting";
+}
+
+// The memory holds a part of both places then, and is near enough to either.
+TEST(RightCameraRotation, AReturnToWhereItWasIsATurn) {
+  const Eigen::Vector3d turn(0.0, 0.0, 0.005);
+  RightCameraRotation filter;
+  for (int i = 0; i < 60; ++i) filter.add(gridSeenWith(Eigen::Vector3d::Zero()));
+  EXPECT_TRUE(filter.add(gridSeenWith(turn)));
+  for (int i = 0; i < 15; ++i) filter.add(gridSeenWith(turn));
+  EXPECT_TRUE(filter.add(gridSeenWith(Eigen::Vector3d::Zero())));
   EXPECT_FALSE(filter.add(gridSeenWith(Eigen::Vector3d::Zero())));
 }
 

@@ -39,8 +39,20 @@ class RightCameraRotation {
   /// Those of the past and of one pair, whose wrong matches have no weight.
   Sums sumUp(const StereoFeatures& features, const Sums& past) const;
 
-  Sums sums_;
-  double usual_square_ = 0.0;  ///< of the changes of the last pairs, px^2
+  /// What turning from the rotation of the one to that of the other does to the rows of the first, px, root mean square.
+  static double distance(const Sums& now, const Sums& before);
+
+  /// Learns how large a rig's changes are as a rule.
+  struct UsualChange {
+    double square = 0.0;  ///< of the changes of the last pairs, px^2
+
+    /// Takes in a change (px). Whether it is larger than a rig shows, and larger than this rig shows as a rule.
+    /// `memory_of_large`: ratio of the square that such a change leaves.
+    bool isExceededBy(double change, double memory_of_large);
+  };
+
+  Sums sums_, last_;  ///< of all pairs, and of the last one alone
+  UsualChange against_memory_, against_last_;
 };
 
 }  // namespace sdvo
