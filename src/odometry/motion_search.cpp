@@ -310,9 +310,9 @@ void MotionSearch::keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_l
   found.sightings = std::move(sightings);
   countInliers(scene, found);
   found.contested = true;
-  found.verdict = {Trust::kDoubtful, "the points that stood still so far tell another motion than all " +
+  found.verdict = {Trust::kDoubtful, "points that stood still so far show another motion than all " +
                                          std::to_string(measured.size()) +
-                                         " inliers: does something move before the camera?"};
+                                         " inliers: does something move in front of the camera?"};
 }
 
 /// Half the squared residuals, in standard deviations, of the matches of lasting points under each hypothesis,
@@ -416,7 +416,7 @@ MotionHypothesis MotionSearch::choose(const MotionScene& scene, std::vector<Moti
     chosen.rival = rival->motion.T_current_reference;
     chosen.verdict = {Trust::kDoubtful, "two motions in view, of " + std::to_string(own.size()) + " and " +
                                             std::to_string(of_rival.size()) +
-                                            " matches: does something move before the camera?"};
+                                            " matches: does something move in front of the camera?"};
   }
   // Rather what was expected than the motion of something that has come to cover most of the view.
   if (scene.contested && scene.T_current_reference && isImplausible(verdict_options_, chosen.evidence)) {

@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "../data/text_file.hpp"
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
 
 namespace sdvo {
@@ -136,7 +137,7 @@ void OfflineRun::writeTiming(const std::string& path) const {
          << odometry.matches << "," << odometry.inliers << "," << odometry.rms << "," << odometry.coverage << ","
          << toString(odometry.state) << "," << withoutCommas(odometry.reason) << "\n";
   }
-  if (!file.flush()) throw std::runtime_error("cannot write " + path);
+  finishTextFile(file, path);
 }
 
 void OfflineRun::writeStates(const std::string& path) const {
@@ -154,7 +155,7 @@ void OfflineRun::writeStates(const std::string& path) const {
     writeCovariance(file, odometry.pose_covariance);
     file << "," << odometry.reason << "\n";
   }
-  if (!file.flush()) throw std::runtime_error("cannot write " + path);
+  finishTextFile(file, path);
 }
 
 }  // namespace sdvo
