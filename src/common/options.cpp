@@ -126,7 +126,8 @@ void setOption(std::vector<Option>& options, const std::string& name, const std:
            (path.size() > suffix.size() && path.compare(path.size() - suffix.size(), suffix.size(), suffix) == 0);
   };
   const auto found = std::find_if(options.begin(), options.end(), matches);
-  if (found == options.end()) throw std::invalid_argument("there is no option '" + name + "'");
+  if (found == options.end())
+    throw std::invalid_argument("there is no option '" + name + "': list_parameters prints all");
   if (std::find_if(found + 1, options.end(), matches) != options.end())
     throw std::invalid_argument("option '" + name + "' is ambiguous, give its full path such as " + found->name);
   const std::string before = found->text();

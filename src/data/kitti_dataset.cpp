@@ -166,7 +166,8 @@ StereoCamera readKittiCalibration(const std::string& path, KittiCameras cameras)
 
 cv::Mat readGreyPng(const std::string& path) {
   std::ifstream file(path, std::ios::binary);
-  if (!file || fs::is_directory(path)) throw std::runtime_error("cannot read image '" + path + "'");
+  if (!file || fs::is_directory(path))
+    throw std::runtime_error("cannot read image '" + path + "': does it exist, may I read it?");
   const std::vector<unsigned char> bytes((std::istreambuf_iterator<char>(file)), std::istreambuf_iterator<char>());
   const std::string signature = "\x89PNG\r\n\x1a\n";
   if (bytes.size() < signature.size() ||

@@ -29,6 +29,12 @@ inline std::ifstream openTextFile(const std::string& path) {
   return file;
 }
 
+/// Closes a file written to; throws std::runtime_error that names it when it was not opened or not written to its end.
+inline void finishTextFile(std::ofstream& file, const std::string& path) {
+  file.close();
+  if (!file) throw std::runtime_error("cannot write file '" + path + "': does its directory exist, is the disk full?");
+}
+
 /// Words of a line separated by white space; a carriage return at its end counts as such.
 inline std::vector<std::string> splitWords(const std::string& line) {
   std::istringstream stream(line);

@@ -36,10 +36,9 @@ struct RenderedDrive {
 };
 
 const std::vector<RenderedDrive>& streets() {
-  static const std::vector<RenderedDrive> drives = {{"d00", "00", "100", "11"}, {"d01", "01", "400", "18"},
-                                                    {"d02", "02", "500", "12"}, {"d03", "03", "200", "13"},
-                                                    {"d05", "05", "300", "14"}, {"d08", "08", "400", "15"},
-                                                    {"d09", "09", "200", "16"}, {"d10", "10", "100", "17"}};
+  static const std::vector<RenderedDrive> drives = {
+      {"d00", "00", "100", "11"}, {"d01", "01", "400", "18"}, {"d02", "02", "500", "12"}, {"d03", "03", "200", "13"},
+      {"d05", "05", "300", "14"}, {"d08", "08", "400", "15"}, {"d09", "09", "200", "16"}, {"d10", "10", "100", "17"}};
   return drives;
 }
 
@@ -98,43 +97,62 @@ class Plan {
         if (fs::exists(directory / "poses.txt")) continue;
         const bool preset = !std::all_of(drive.trajectory.begin(), drive.trajectory.end(), ::isdigit);
         const std::string trajectory = preset ? drive.trajectory : all_.kitti + "/poses/" + drive.trajectory + ".txt";
-        Words command = {tool("render_drive"), "--trajectory", trajectory, "--start", drive.start, "--frames", "31",
-                         "--seed", drive.seed, "--rig", drive.rig, "--noise", "2", "--exposure", "0.3", "--threads", "1",
-                         "--output", directory.string()};
+        Words command = {tool("render_drive"),
+                         "--trajectory",
+                         trajectory,
+                         "--start",
+                         drive.start,
+                         "--frames",
+                         "31",
+                         "--seed",
+                         drive.seed,
+                         "--rig",
+                         drive.rig,
+                         "--noise",
+                         "2",
+                         "--exposure",
+                         "0.3",
+                         "--threads",
+                         "1",
+                         "--output",
+                         directory.string()};
         if (!preset) command.insert(command.end(), {"--moving-share", "0.02"});
         if (!drive.rate.empty()) command.insert(command.end(), {"--rate", drive.rate});
         jobs.push_back({directory.string() + ".log", command});
       }
     if (!all_.euroc.empty() && !fs::exists(moving() / "poses.txt"))
-      jobs.push_back({moving().string() + ".log",
-                      {tool("euroc_to_kitti"), "--input", all_.euroc + "/MH_01_moving/mav0", "--output", moving().string()}});
+      jobs.push_back(
+          {moving().string() + ".log",
+           {tool("euroc_to_kitti"), "--input", all_.euroc + "/MH_01_moving/mav0", "--output", moving().string()}});
     return jobs;
   }
 
+  /// Those of `only`, or all.
   std::vector<Job> experiments() const {
     std::vector<Job> jobs;
+    const auto wanted = [&](const std::string& name) { return all_.only.empty() || all_.only == name; };
     const std::vector<std::string>& setups = namesOf(Setup{});
-    for (const std::string& setup : setups)
-      jobs.push_back(matching(setup, setup, everyDrive(), "21",
-                              {"--descriptors", "freak", "--features", "310,1350,2320", "--constant-sizes", "14"}));
-    for (const std::string& setup : setups) jobs.push_back(ablation(setup, "as it is", {}));
-    for (const SetupDifference& difference : paperDifferences()) {
-      jobs.push_back(ablation("product", "with " + difference.name, difference.with));
-      jobs.push_back(ablation("paper", "without " + difference.name, difference.without));
-    }
-    for (const SetupDifference& difference : otherDifferences())
-      for (const std::string& setup : setups) jobs.push_back(ablation(setup, "with " + difference.name, difference.with));
+    if (wanted("matching"))
+      for (const std::string& setup : setups)
+        jobs.push_back(matching(setup, setup, everyDrive(), "21",
+                                {"--descriptors", "freak", "--features", "310,1350,2320", "--constant-sizes", "14"}));
+    if (wanted("ablation")) addAblations(jobs);
     for (const std::string& setup : setups) {
-      jobs.push_back(run("robustness", setup, setup, everyDrive(), "11", {"--stride", "5"}));
-      jobs.push_back(matching(setup, setup + "/sift", everyDrive(), "11",
-                              {"--descriptors", "sift", "--features", "2320", "--layouts", "left", "--tolerances", "3",
-                               "--constant-sizes", "5"}));
+      if (wanted("robustness")) jobs.push_back(run("robustness", setup, setup, everyDrive(), "11", {"--stride", "5"}));
+      if (wanted("sift"))
+        jobs.push_back(matching(setup, setup + "/sift", everyDrive(), "11",
+                                {"--descriptors", "sift", "--features", "2320", "--layouts", "left", "--tolerances",
+                                 "3", "--constant-sizes", "5"}));
     }
-    jobs.push_back(run("scale_change", "product", "scale_change", withScaleChange(), "31", {}));
-    jobs.push_back({log("consensus", "consensus"),
-                    {tool("run_experiments"), "consensus", "--seeds", "100", "--output", (output_ / "consensus").string()}});
-    for (const std::string& setup : setups)
-      jobs.push_back(run("accuracy", setup, setup, drivesWithTrueLengths(), "11", {"--features", "400"}));
+    if (wanted("scale_change"))
+      jobs.push_back(run("scale_change", "product", "scale_change", withScaleChange(), "31", {}));
+    if (wanted("consensus"))
+      jobs.push_back(
+          {log("consensus", "consensus"),
+           {tool("run_experiments"), "consensus", "--seeds", "100", "--output", (output_ / "consensus").string()}});
+    if (wanted("accuracy"))
+      for (const std::string& setup : setups)
+        jobs.push_back(run("accuracy", setup, setup, drivesWithTrueLengths(), "11", {"--features", "400"}));
     return jobs;
   }
 
@@ -180,8 +198,9 @@ class Plan {
 
   Job run(const std::string& experiment, const std::string& setup, const std::string& folder, const Words& drives,
           const std::string& frames, const Words& options) const {
-    Words command = {tool("run_experiments"), experiment, "--setup", setup, "--kitti", all_.kitti, "--sequences",
-                     joined(drives), "--frames", frames, "--output", (output_ / folder).string()};
+    Words command = {
+        tool("run_experiments"), experiment,     "--setup",  setup,  "--kitti",  all_.kitti,
+        "--sequences",           joined(drives), "--frames", frames, "--output", (output_ / folder).string()};
     command.insert(command.end(), options.begin(), options.end());
     return {log(folder, experiment), command};
   }
@@ -191,9 +210,21 @@ class Plan {
     return run("matching", setup, folder, drives, frames, options);
   }
 
+  void addAblations(std::vector<Job>& jobs) const {
+    const std::vector<std::string>& setups = namesOf(Setup{});
+    for (const std::string& setup : setups) jobs.push_back(ablation(setup, "as it is", {}));
+    for (const SetupDifference& difference : paperDifferences()) {
+      jobs.push_back(ablation("product", "with " + difference.name, difference.with));
+      jobs.push_back(ablation("paper", "without " + difference.name, difference.without));
+    }
+    for (const SetupDifference& difference : otherDifferences())
+      for (const std::string& setup : setups)
+        jobs.push_back(ablation(setup, "with " + difference.name, difference.with));
+  }
+
   Job ablation(const std::string& setup, const std::string& name, const Words& settings) const {
-    Words options = {"--descriptors", "freak", "--features", "2320", "--layouts", "left", "--constant-sizes", "14",
-                     "--no-plot"};
+    Words options = {"--descriptors",    "freak", "--features", "2320", "--layouts", "left",
+                     "--constant-sizes", "14",    "--no-plot"};
     for (const std::string& setting : settings) options.insert(options.end(), {"--param", setting});
     return matching(setup, "ablation/" + setup + " " + name, {"01", "04", "06"}, "11", options);
   }
@@ -204,11 +235,18 @@ class Plan {
 
 }  // namespace
 
+const std::vector<std::string>& experimentNames() {
+  static const std::vector<std::string> names = {"matching",     "ablation",  "robustness", "sift",
+                                                 "scale_change", "consensus", "accuracy"};
+  return names;
+}
+
 std::string runAll(const AllExperiments& all) {
   const Plan plan(all);
   runJobs(plan.drives(), all.jobs);
   runJobs(plan.experiments(), all.jobs);
-  runPlotScript("plot_experiments.py", {"scale_change", all.output + "/scale_change"});
+  if (all.only.empty() || all.only == "scale_change")
+    runPlotScript("plot_experiments.py", {"scale_change", all.output + "/scale_change"});
   const std::string tables = all.output + "/tables.md";
   runPlotScript("experiment_tables.py", {all.output, "--output", tables});
   std::ifstream file(tables);

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "../data/text_file.hpp"
+
 namespace sdvo {
 
 /// Rows of a CSV file, also shown as an aligned table.
@@ -27,7 +29,7 @@ class CsvTable {
     std::ofstream file(path);
     for (const auto& row : rows_)
       for (std::size_t c = 0; c < row.size(); ++c) file << row[c] << (c + 1 < row.size() ? "," : "\n");
-    if (!file.flush()) throw std::runtime_error("cannot write " + path);
+    finishTextFile(file, path);
   }
 
   std::string aligned() const {

@@ -143,11 +143,11 @@ void refine(const cv::Mat& image, const FeatureDetectorOptions& options, std::ve
 }
 
 void removeMasked(const cv::Mat& mask, cv::Size size, std::vector<Corner>& corners) {
-  if (mask.type() != CV_8UC1) throw std::invalid_argument("the mask is not of one channel of eight bits");
+  if (mask.type() != CV_8UC1) throw std::invalid_argument("the mask must have one channel of eight bits");
   if (mask.size() != size)
     throw std::invalid_argument("the mask is " + std::to_string(mask.cols) + "x" + std::to_string(mask.rows) +
                                 ", the left image is " + std::to_string(size.width) + "x" +
-                                std::to_string(size.height));
+                                std::to_string(size.height) + ": make it of the rectified left image");
   const auto is_masked = [&](const Corner& corner) { return mask.at<std::uint8_t>(cv::Point(corner.position)) == 0; };
   corners.erase(std::remove_if(corners.begin(), corners.end(), is_masked), corners.end());
 }

@@ -10,7 +10,8 @@ namespace sdvo {
 
 void StereoMatcherOptions::check() const {
   if (method == StereoMethod::kEpipolar && min_disparity >= epipolar.max_disparity)
-    throw std::invalid_argument("min_disparity is not below epipolar/max_disparity, no disparity is left");
+    throw std::invalid_argument(
+        "min_disparity is not below epipolar/max_disparity: no disparity is left, lower the first or raise the second");
 }
 
 StereoMatcher::StereoMatcher(const StereoMatcherOptions& options) : options_(checked(options)) {}

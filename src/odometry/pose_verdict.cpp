@@ -73,7 +73,7 @@ PoseVerdict judgePose(const PoseVerdictOptions& options, int min_inliers, const 
   // What a motion should not be.
   if (lastingDisagree(options, evidence))
     return verdict(Trust::kDoubtful, "only ", evidence.lasting_inliers, " of ", evidence.lasting_matches,
-                   " lasting points agree with the motion of ", evidence.inliers, " inliers");
+                   " lasting points (seen by four pairs) agree with the motion of ", evidence.inliers, " inliers");
   if (!evidence.confirmed && evidence.inliers < options.doubtful_inliers)
     return verdict(Trust::kDoubtful, "only ", evidence.inliers, " inliers");
   if (!evidence.confirmed && ratio < options.doubtful_ratio)

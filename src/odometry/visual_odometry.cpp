@@ -79,7 +79,8 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features, const std:
   begin(features, dt);
   Step step;
   if (frozen)
-    step = predict(features, dt, "the images are those of the pair before, though the camera moved: is it frozen?");
+    step = predict(features, dt,
+                   "the images repeat those of the previous pair although the camera moved: is the driver frozen?");
   else if (!continued)
     step = seed(features);
   else if (found.verdict.trust == Trust::kNone)
@@ -155,7 +156,7 @@ void VisualOdometry::begin(const StereoFeatures& features, double dt) {
   if (features.report.refused) {
     // What the pairs before told of the rig may be wrong already, and those after may be refused again.
     state_.calibration = CalibrationFilter(options_.calibration);
-    state_.suspicion.raise("left and right did not fit together");
+    state_.suspicion.raise("left and right did not belong together");
   }
 }
 
@@ -216,7 +217,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
   // After a new start, or a motion of something else, it may be that which is followed.
   const PoseEvidence& evidence = candidate.evidence;
   if ((!state_.belief.velocity() || state_.suspicion.isRaised()) && isUnexpected(evidence))
-    state_.suspicion.raise("the motion changed as no vehicle's does");
+    state_.suspicion.raise("the motion changed faster than a vehicle's can");
   if (lastingDisagree(options_.tracking, evidence)) state_.suspicion.raise("points that stood still so far moved");
   if (verdict.trust == Trust::kSound && state_.suspicion.isRaised())
     verdict = {Trust::kDoubtful, "a moment ago " + state_.suspicion.cause()};

@@ -153,7 +153,7 @@ void PlaceRecognition::addKeyframe(const StereoFeatures& features, int id) {
 /// Looks at the candidates one after the other until geometry says that one is the same place; a neighbour that said
 /// so, too, makes it a loop.
 void PlaceRecognition::recognise(const Place& here, PlaceReport& report) {
-  report.reason = "nothing looks alike";
+  report.reason = "no place looks similar";
   for (const PlaceCandidate& candidate : report.candidates) {
     report.match = verifier_.verify(places_.at(candidate.place).features, here.features);
     report.reason = report.match.reason;
@@ -176,7 +176,7 @@ void PlaceRecognition::recognise(const Place& here, PlaceReport& report) {
       recognised_ = candidate.place;
       expectation_.reset();
     }
-    report.reason = report.loop ? "" : "no neighbour has confirmed it yet";
+    report.reason = report.loop ? "" : "no other key frame nearby has confirmed it yet";
     return;
   }
 }

@@ -58,9 +58,9 @@ PlaceMatch PlaceVerifier::verify(const StereoFeatures& place, const StereoFeatur
   if (match.inliers < options_.min_inliers || match.inliers < options_.min_inlier_ratio * match.matches)
     match.reason = "only " + inliers + " agree";
   else if (match.coverage < options_.min_coverage)
-    match.reason = inliers + " agree, but in a corner of the image alone";
+    match.reason = inliers + " agree, but only in a small part of the image";
   else if (match.rms > options_.max_rms)
-    match.reason = inliers + " agree, but not well";
+    match.reason = inliers + " agree, but with residuals above verifier/max_rms";
   match.same = match.reason.empty();
   return match;
 }

@@ -68,14 +68,16 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
       inputs_ = std::make_unique<Inputs>(*this);
     }
   } catch (const std::exception& e) {
-    NODELET_ERROR_STREAM("cannot subscribe to what is to be drawn: " << e.what());
+    NODELET_ERROR_STREAM("features_image: cannot subscribe to images, stereo_features and feature_flow: " << e.what());
   }
 
   template <int input, class Message>
   void take(const boost::shared_ptr<const Message>& message) try {
     if (inputs_) inputs_->synchroniser.add<input>(message);
   } catch (const std::exception& e) {
-    if (throttle_.allows(e.what())) NODELET_WARN_STREAM("a message for features_image is not used: " << e.what());
+    if (throttle_.allows(e.what()))
+      NODELET_WARN_STREAM("features_image: a message of type " << ros::message_traits::datatype<Message>()
+                                                               << " is not used: " << e.what());
   }
 
   void draw(const sensor_msgs::ImageConstPtr& left, const sensor_msgs::ImageConstPtr& right,

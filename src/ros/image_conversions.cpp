@@ -65,7 +65,8 @@ cv::Mat toGrey(const sensor_msgs::ImageConstPtr& message, int bits) {
   const auto colour = colours.find(message->encoding);
   if (colour == colours.end())
     throw std::invalid_argument("encoding '" + message->encoding +
-                                "' is not supported: mono8, 8UC1, mono16, bgr8, rgb8, bgra8 and rgba8 are");
+                                "' is not supported: mono8, 8UC1, mono16, bgr8, rgb8, bgra8 and rgba8 are; "
+                                "stereo_raw.launch converts Bayer images");
   cv::cvtColor(pixelsOf(*message, encodings::numChannels(message->encoding)), grey, colour->second);
   return grey;
 }

@@ -59,13 +59,14 @@ void ImageDiagnostics::diagnoseSynchronisation(Status& status) {
   const std::uint64_t unused = refused_ + out_of_order_;
   status.addf("largest gap [ms]", "%.2f", 1e3 * gap);
   status.add("refused messages", refused_);
-  status.add("late or with wild stamps", out_of_order_);
+  status.add("late or with wrong stamps", out_of_order_);
   const std::uint64_t lately = unused - std::exchange(reported_, unused);
   if (isIdle(status)) return;
   if (gap > thresholds_.max_gap)
-    status.summaryf(Level::WARN, "left and right are %.1f ms apart", 1e3 * gap);
+    status.summaryf(Level::WARN, "left and right are %.1f ms apart: are the cameras triggered together?", 1e3 * gap);
   else if (lately > 0)
-    status.summaryf(Level::WARN, "%d messages were late, or their stamps cannot be used", static_cast<int>(lately));
+    status.summaryf(Level::WARN, "%d messages were late or had wrong stamps: check the driver's stamps",
+                    static_cast<int>(lately));
   else
     status.summary(Level::OK, "left and right belong together");
 }
@@ -77,9 +78,10 @@ void ImageDiagnostics::diagnoseExposure(Status& status) {
   status.addf("mean grey level", "%.1f left, %.1f right", left, right);
   status.addf("sharpness [grey levels a px]", "%.2f left, %.2f right", last_->sharpness[0], last_->sharpness[1]);
   if (std::min(left, right) < thresholds_.min_intensity)
-    status.summaryf(Level::WARN, "too dark: mean grey levels of %.0f and %.0f", left, right);
+    status.summaryf(Level::WARN, "too dark, expose longer or add light: mean grey levels of %.0f and %.0f", left,
+                    right);
   else if (std::max(left, right) > thresholds_.max_intensity)
-    status.summaryf(Level::WARN, "too bright: mean grey levels of %.0f and %.0f", left, right);
+    status.summaryf(Level::WARN, "too bright, expose less: mean grey levels of %.0f and %.0f", left, right);
   else
     status.summaryf(Level::OK, "mean grey levels of %.0f and %.0f", left, right);
 }
@@ -97,7 +99,7 @@ void ImageDiagnostics::diagnoseFeatures(Status& status) {
   else if (refused > 0)
     status.summary(Level::ERROR, "left and right are not a rectified pair: " + last_->status);
   else if (last_ && last_->detected < thresholds_.min_corners)
-    status.summaryf(Level::WARN, "only %d corners", last_->detected);
+    status.summaryf(Level::WARN, "only %d corners: little texture, darkness, or out of focus?", last_->detected);
   else if (last_ && !last_->status.empty())
     status.summary(Level::WARN, last_->status);
   else

@@ -17,7 +17,7 @@ ImuInput::ImuInput(ros::NodeHandle& nh, const RobotTransforms& transforms, Repor
 
 void ImuInput::take(const sensor_msgs::Imu& message) {
   const std::string problem = whyUnusable(message.header.stamp);
-  if (!problem.empty()) return warn_("a message of the IMU is not used: " + problem);
+  if (!problem.empty()) return warn_(topic() + ": a message of the IMU is not used: " + problem);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     frame_ = ros_conversions::cleanFrameId(message.header.frame_id);
@@ -42,7 +42,7 @@ std::optional<Eigen::Matrix3d> ImuInput::rotation(const std::string& frame, cons
                                                   std::string& problem) const {
   const std::optional<Eigen::Matrix3d> of_imu = gyro_.rotation(nanoseconds(from), nanoseconds(to));
   if (!of_imu) {
-    problem = "topic " + topic() + " has no measurements of that time";
+    problem = "topic " + topic() + " has no measurements of that time: does it come, and is its clock the cameras'?";
     return std::nullopt;
   }
   const std::optional<Eigen::Matrix3d> R_frame_imu = axesIn(frame, problem);
@@ -53,7 +53,7 @@ std::optional<Eigen::Matrix3d> ImuInput::rotation(const std::string& frame, cons
 std::optional<Eigen::Vector3d> ImuInput::up(const std::string& frame, std::string& problem) const {
   const std::optional<Eigen::Vector3d> of_imu = gravity_.up();
   if (!of_imu) {
-    problem = "the robot moves, or nothing comes on " + topic();
+    problem = "the robot moved, or nothing came on " + topic() + ": start while it stands";
     return std::nullopt;
   }
   const std::optional<Eigen::Matrix3d> R_frame_imu = axesIn(frame, problem);

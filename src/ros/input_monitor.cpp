@@ -67,13 +67,15 @@ void InputMonitor::diagnose(WallUpdater::Status& status) {
   if (const auto silent = silence())
     status.summary(silent->level, silent->text);
   else if (!measured)
-    status.summary(WallUpdater::Level::OK, "begins");
+    status.summary(WallUpdater::Level::OK, "just started, no rate is measured yet");
   else if (*measured < rates_.min_rate)
-    status.summaryf(WallUpdater::Level::WARN, "only %.2f %s a second, at least %g are expected", *measured,
-                    what_.c_str(), rates_.min_rate);
+    status.summaryf(
+        WallUpdater::Level::WARN,
+        "only %.2f %s a second, at least %g are expected (diagnostics/min_rate): driver or network too slow?",
+        *measured, what_.c_str(), rates_.min_rate);
   else if (*measured > rates_.max_rate)
-    status.summaryf(WallUpdater::Level::WARN, "%.2f %s a second, at most %g are expected", *measured, what_.c_str(),
-                    rates_.max_rate);
+    status.summaryf(WallUpdater::Level::WARN, "%.2f %s a second, at most %g are expected (diagnostics/max_rate)",
+                    *measured, what_.c_str(), rates_.max_rate);
   else
     status.summaryf(WallUpdater::Level::OK, "%.2f %s a second", *measured, what_.c_str());
 }

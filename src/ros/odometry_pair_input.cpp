@@ -30,7 +30,9 @@ bool OdometryPairInput::resume() {
 
 void OdometryPairInput::subscribe() {
   const auto onPair = [this](const Features::ConstPtr& features, const Odometry::ConstPtr& odometry,
-                             const Info::ConstPtr& info) { callback_({features, odometry, info, resumes_}); };
+                             const Info::ConstPtr& info) {
+    callback_({features, odometry, info, resumes_});
+  };
   const auto onUnpaired = [this](const Features::ConstPtr&, const Odometry::ConstPtr& odometry,
                                  const Info::ConstPtr& info) {
     const bool has_odometry = !info || (info->state != "LOST" && info->state != "WAITING");
@@ -45,16 +47,16 @@ template <int input, class Message>
 ros::Subscriber OdometryPairInput::subscribe(const std::string& topic) {
   return nh_.subscribe<Message>(
       topic, static_cast<std::uint32_t>(queue_size_),
-      [this](const boost::shared_ptr<const Message>& message) { take<input>(message); }, ros::VoidConstPtr(),
-      ros::TransportHints().tcpNoDelay());
+      [this, topic](const boost::shared_ptr<const Message>& message) { take<input>(topic, message); },
+      ros::VoidConstPtr(), ros::TransportHints().tcpNoDelay());
 }
 
 template <int input, class Message>
-void OdometryPairInput::take(const boost::shared_ptr<const Message>& message) try {
+void OdometryPairInput::take(const std::string& topic, const boost::shared_ptr<const Message>& message) try {
   synchroniser_->add<input>(message);
 } catch (const std::exception& e) {
   ++refused_;
-  refuse_(message->header.stamp, e.what());
+  refuse_(nh_.resolveName(topic), message->header.stamp, e.what());
 }
 
 }  // namespace sdvo

@@ -30,7 +30,7 @@ class OdometryPairInput {
  public:
   using Callback = std::function<void(const OdometryPair&)>;
   /// Of a message that is not used, and why.
-  using Refusal = std::function<void(const ros::Time& stamp, const std::string& why)>;
+  using Refusal = std::function<void(const std::string& topic, const ros::Time& stamp, const std::string& why)>;
 
   /// `queue_size`: pairs that wait for their other messages.
   OdometryPairInput(const ros::NodeHandle& nh, int queue_size, Callback callback, Refusal refuse);
@@ -56,7 +56,7 @@ class OdometryPairInput {
   template <int input, class Message>
   ros::Subscriber subscribe(const std::string& topic);
   template <int input, class Message>
-  void take(const boost::shared_ptr<const Message>& message);
+  void take(const std::string& topic, const boost::shared_ptr<const Message>& message);
 
   ros::NodeHandle nh_;
   const int queue_size_;

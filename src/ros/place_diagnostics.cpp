@@ -44,7 +44,10 @@ void PlaceDiagnostics::summarise(Status& status) const {
   if (const auto silence = input_.silence())
     status.summary(std::min<int>(silence->level, Level::WARN), silence->text);
   else if (last_ && !last_->located)
-    status.summary(Level::WARN, "none of the places that were loaded has been recognised yet: no map -> odom");
+    status.summary(
+        Level::WARN,
+        "none of the places that were loaded has been recognised yet, so there is no map -> odom: drive where the "
+        "robot has been, or give a pose on /initialpose");
   else
     status.summary(Level::OK, last_ ? "recognising places" : "no key frame yet");
 }

@@ -77,7 +77,8 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
     ros::NodeHandle other_nh = slow_callbacks_.serve(getNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
-      NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect");
+      NODELET_WARN_STREAM("parameter " << name
+                                       << " is unknown and has no effect: misspelt? docs/parameters.md has all names");
     const PlaceOutputOptions& output = options_.output;
     if (output.opencv_threads >= 0) cv::setNumThreads(output.opencv_threads);
     robot_ = output.robot_name.empty() ? nh_.getNamespace() : output.robot_name;
@@ -102,11 +103,11 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
         std::make_unique<OtherRobot>(other_nh, robot_, output.other_min_score, output.other_timeout, placesForOthers());
     input_ = std::make_unique<OdometryPairInput>(
         nh_, output.sync_queue_size, [this](const OdometryPair& pair) { onPair(pair); },
-        [this](const ros::Time& stamp, const std::string& why) {
-          if (throttle_.allows(why)) NODELET_ERROR_STREAM("message at " << stamp << " skipped: " << why);
+        [this](const std::string& topic, const ros::Time& stamp, const std::string& why) {
+          if (throttle_.allows(topic + why))
+            NODELET_ERROR_STREAM(topic << ": message at " << stamp << " skipped: " << why);
         });
-    diagnostics_ =
-        std::make_unique<PlaceDiagnostics>(nh_, private_nh, getName(), input_->topics(), output.max_silence);
+    diagnostics_ = std::make_unique<PlaceDiagnostics>(nh_, private_nh, getName(), input_->topics(), output.max_silence);
     initial_pose_subscriber_ = nh_.subscribe<geometry_msgs::PoseWithCovarianceStamped>(
         "/initialpose", 1, [this](const geometry_msgs::PoseWithCovarianceStamped::ConstPtr& m) { onInitialPose(*m); });
     callbacks_.start();
@@ -120,7 +121,8 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   void begin() {
     const std::string& path = options_.output.places_file;
     if (!std::filesystem::exists(path)) {
-      NODELET_WARN_STREAM("places_file '" << path << "' does not exist: begins without places");
+      NODELET_WARN_STREAM("places_file '" << path
+                                          << "' does not exist: begins without places, save_places writes such a file");
       return;
     }
     session_ = load(path);
@@ -157,7 +159,8 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     if (time == PlaceSession::Time::kStands) return;
     if (time == PlaceSession::Time::kBeganAnew) restart("the clock jumped back");
     if (time == PlaceSession::Time::kFell)
-      NODELET_WARN_STREAM("stamps fell to " << stamp << ": the places stay, the way in between is unknown");
+      NODELET_WARN_STREAM("the stamps of the features jumped back to "
+                          << stamp << " (camera driver restarted?): the places stay, the motion in between is unknown");
     if (const std::optional<PlaceReport> report = session_->observe(pair, *T_base_camera)) publish(*report, stamp);
   } catch (const std::exception& e) {
     ++refused_;
@@ -233,7 +236,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     if (session.isPlaced()) publisher_->correct(session.recognition().T_map_odom(), session.odomFrame(), false);
     publisher_->noteChange();
   } catch (const std::exception& e) {
-    NODELET_ERROR_STREAM("the map was not optimised: " << e.what());
+    NODELET_ERROR_STREAM("the map was not optimised, its poses stay as they are: " << e.what());
   }
 
   /// For the publisher.
@@ -294,9 +297,11 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     const ros_conversions::MapState state = session_->map();
     const ros_conversions::FeatureStream stream = session_->stream();
     lock.unlock();
-    if (places.empty()) throw std::runtime_error("there is no place yet");
+    if (places.empty())
+      throw std::runtime_error("there is no place to save yet: a key frame needs a pair with odometry");
     if (options_.recognition.localisation_only)
-      throw std::runtime_error("localisation_only: the map is still that of the file it was loaded from");
+      throw std::runtime_error(
+          "not saved: localisation_only keeps the map as it is in the file that it was loaded from");
     savePlaces(places, state, stream, robot_, ros_conversions::cleanFrameId(options_.output.map_frame_id),
                request.path);
     response.success = true;
@@ -352,10 +357,10 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   std::vector<ros::ServiceServer> services_;
 
   std::mutex mutex_;
-  std::shared_ptr<PlaceSession> session_;        // and all in it: under mutex_
-  bool was_located_ = false;                     // … and map -> odom is published since then
-  std::atomic<int> generation_{0};  // sessions that a service began
-  std::uint64_t refused_ = 0;       // pairs; only the observer's thread touches it
+  std::shared_ptr<PlaceSession> session_;  // and all in it: under mutex_
+  bool was_located_ = false;               // … and map -> odom is published since then
+  std::atomic<int> generation_{0};         // sessions that a service began
+  std::uint64_t refused_ = 0;              // pairs; only the observer's thread touches it
 
   std::unique_ptr<Worker<Arrived>> observer_;
   std::unique_ptr<Worker<Job>> optimiser_;

@@ -66,7 +66,8 @@ void PlaceSession::expect(const geometry_msgs::PoseWithCovarianceStamped& pose, 
   constexpr double kSigmas = 3.0;  // standard deviations
   const std::string frame = ros_conversions::cleanFrameId(pose.header.frame_id);
   if (frame != map_frame)
-    throw std::invalid_argument("it is in frame '" + frame + "', not in the map's, '" + map_frame + "'");
+    throw std::invalid_argument("it is in frame '" + frame + "'; publish it in the map's, '" + map_frame +
+                                "' (rviz: Fixed Frame)");
   const double variance = std::max(pose.pose.covariance[0], pose.pose.covariance[7]);
   if (!std::isfinite(variance)) throw std::invalid_argument("its covariance is not finite");
   expected_ = {ros_conversions::toPose(pose.pose.pose), kLeast + kSigmas * std::sqrt(std::max(0.0, variance))};

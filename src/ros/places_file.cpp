@@ -25,8 +25,9 @@ template <class Message>
 typename Message::ConstPtr read(const rosbag::MessageInstance& instance) {
   const typename Message::ConstPtr message = instance.instantiate<Message>();
   if (!message)
-    throw std::invalid_argument("its messages on " + instance.getTopic() + " are of another type or version (" +
-                                instance.getDataType() + ", " + instance.getMD5Sum() + ")");
+    throw std::invalid_argument("its messages on " + instance.getTopic() +
+                                " are of another type or version of this package (" + instance.getDataType() + ", " +
+                                instance.getMD5Sum() + ")");
   return message;
 }
 
@@ -48,7 +49,8 @@ SavedPlaces read(const std::string& path, const PoseGraphOptions& options) {
       graph = ros_conversions::fromMessage(*read<msgs::MapGraph>(instance), options);
     }
   }
-  if (places.empty() || !graph) throw std::invalid_argument("it holds no places, or no graph of them");
+  if (places.empty() || !graph)
+    throw std::invalid_argument("it holds no places, or no graph of them: a file of save_places is expected");
   return {std::move(places), std::move(*graph), std::move(*stream)};
 }
 

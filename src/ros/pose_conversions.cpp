@@ -26,7 +26,7 @@ Eigen::Isometry3d toPose(const std::string& text) {
   stream.imbue(std::locale::classic());
   double x, y, z, roll, pitch, yaw;
   if (!(stream >> x >> y >> z >> roll >> pitch >> yaw) || !(stream >> std::ws).eof())
-    throw std::invalid_argument("'" + text + "' is no pose: six numbers 'x y z roll pitch yaw' (m, rad) are");
+    throw std::invalid_argument("'" + text + "' is no pose: six numbers 'x y z roll pitch yaw' (m, rad) are expected");
   return Eigen::Translation3d(x, y, z) * Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
          Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX());
 }

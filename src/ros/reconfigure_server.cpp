@@ -114,7 +114,7 @@ bool ReconfigureServer::onRequest(dynamic_reconfigure::Reconfigure::Request& req
     keepChanges(before);
   } catch (const std::exception& e) {
     for (std::size_t i = 0; i < options_.size(); ++i) options_[i].set(before[i]);
-    ROS_WARN_STREAM(nh_.getNamespace() << ": nothing reconfigured: " << e.what());
+    ROS_WARN_STREAM(nh_.getNamespace() << ": nothing reconfigured, all values stay: " << e.what());
   }
   response.config = currentConfig();
   updates_.publish(response.config);
@@ -151,11 +151,12 @@ void ReconfigureServer::assign(const Config& request) {
 
 void ReconfigureServer::set(const std::string& name, const std::string& text) {
   const auto option = std::find_if(options_.begin(), options_.end(), [&](const Option& o) { return o.name == name; });
-  if (option == options_.end()) throw std::invalid_argument("there is no option '" + name + "'");
+  if (option == options_.end())
+    throw std::invalid_argument("there is no option '" + name + "': list_parameters prints all");
   option->set(text);
   if (option->clamp())
-    ROS_WARN_STREAM(nh_.getNamespace() << "/" << name << " = " << text << " is out of range, " << option->text()
-                                       << " is used");
+    ROS_WARN_STREAM(nh_.getNamespace() << "/" << name << " = " << text << " is outside of its range, the nearest value "
+                                       << option->text() << " is used");
   option->check();
 }
 

@@ -74,7 +74,8 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
     ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
-      NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect");
+      NODELET_WARN_STREAM("parameter " << name
+                                       << " is unknown and has no effect: misspelt? docs/parameters.md has all names");
     transport_ = std::make_unique<StereoImageTransport>(private_nh);
     extractor_ = std::make_unique<FeatureExtractor>(options_.extractor);
     pace_ = Pace(options_.input.max_rate);
@@ -149,8 +150,8 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     out_of_order_ = filter_.dropped();
     diagnostics_->noteUnused(refused_, out_of_order_);
     if (filter_.dropped() > dropped && throttle_.allows("late"))
-      NODELET_WARN_STREAM("a pair near " << stamp << " is late, or its stamp leapt away for once: dropped ("
-                                         << filter_.dropped() << " so far)");
+      NODELET_WARN_STREAM("a pair near " << stamp << " is late or has a wrong stamp: dropped (" << filter_.dropped()
+                                         << " so far); if this goes on, check the driver's stamps");
   }
 
   /// In a ROS callback; the worker takes the new extractor over before its next pair. Throws when the options do not go
@@ -172,7 +173,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     extractor_ = std::move(pending);
     if (same_rows) return;
     ++stream_epoch_;  // rows of another kind or size do not continue the old ones
-    NODELET_INFO("options reconfigured, descriptors are others: a new stream begins");
+    NODELET_INFO("reconfigured: descriptors of another kind or size, so a new stream begins (epoch + 1)");
   }
 
   /// In the worker's thread.
@@ -184,19 +185,20 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     const ros::Time stamp = pair.left_image->header.stamp;
     if (std::exchange(jumps_, passed.source_restarts + passed.clock_steps) !=
         passed.source_restarts + passed.clock_steps) {
-      NODELET_WARN_STREAM("the stamps jumped back to " << stamp << ": a new stream begins");
+      NODELET_WARN_STREAM("the stamps of the images jumped back to " << stamp << ": a new stream begins (epoch + 1)");
       ++stream_epoch_;
     }
     const int depth = decoder_.bitDepth();
     const DecodedPair decoded = decoder_.decode(pair);
-    if (decoder_.bitDepth() > depth) NODELET_INFO_STREAM("mono16 images hold " << decoder_.bitDepth() << " bits");
+    if (decoder_.bitDepth() > depth)
+      NODELET_INFO_STREAM("mono16 images hold " << decoder_.bitDepth() << " bits, scaled to 8");
     const StereoFeatures features =
         extractor_->extract(decoded.camera, decoded.left, decoded.right, nanoseconds(stamp), mask());
     // Only now: a calibration that does not fit the images was refused and is no new stream.
     if (decoder_.accept(decoded.camera)) {
       ++stream_epoch_;
       if (throttle_.allows("camera_info"))
-        NODELET_WARN_STREAM("camera_info changed: a new stream begins (" << stream_epoch_ << " so far)");
+        NODELET_WARN_STREAM("camera_info changed: a new stream begins (epoch + 1; " << stream_epoch_ << " so far)");
     }
 
     diagnostics_->note(features);
@@ -223,7 +225,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     if (refused)
       NODELET_WARN_STREAM("pairs from " << stamp << " on are refused: " << features.report.status);
     else
-      NODELET_WARN_STREAM("rows of left and right agree again: pairs are used");
+      NODELET_WARN_STREAM("rows of left and right agree again: pairs from " << stamp << " on are used");
   }
 
   static constexpr double kSilencePeriod = 10.0;  // s between explanations why nothing comes

@@ -81,15 +81,17 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
     ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
-      NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect");
+      NODELET_WARN_STREAM("parameter " << name
+                                       << " is unknown and has no effect: misspelt? docs/parameters.md has all names");
     if (options_.output.use_imu && !options_.output.guess_frame_id.empty())
-      throw std::invalid_argument("use_imu and guess_frame_id exclude each other");
+      throw std::invalid_argument("use_imu and guess_frame_id exclude each other: set one of them");
     T_odom_start_ = ros_conversions::toPose(options_.output.initial_pose);
     odometry_ = std::make_unique<VisualOdometry>(options_.odometry);
     publisher_ = std::make_unique<OdometryPublisher>(nh_, options_.output);
     publisher_->restart(T_odom_start_);
     to_be_levelled_ = options_.output.use_imu;
-    transforms_ = std::make_unique<RobotTransforms>(nh_, publishedFrames(), [this](const std::string& what) { warn(what); });
+    transforms_ =
+        std::make_unique<RobotTransforms>(nh_, publishedFrames(), [this](const std::string& what) { warn(what); });
     mount_ = std::make_unique<CameraMount>(*transforms_, options_.output.tf_timeout);
     patience_ = Patience(options_.output.guess_timeout);
     if (options_.output.opencv_threads >= 0) cv::setNumThreads(options_.output.opencv_threads);
@@ -147,8 +149,9 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     stream_epoch_ = message->stream_epoch;
     out_of_order_ = filter_.dropped();
     if (filter_.dropped() > dropped && throttle_.allows("late"))
-      NODELET_WARN_STREAM("features near " << message->header.stamp << " are late, or their stamp leapt away for once: "
-                                           << "dropped (" << filter_.dropped() << " so far)");
+      NODELET_WARN_STREAM("features near " << message->header.stamp << " are late or have a wrong stamp: dropped ("
+                                           << filter_.dropped()
+                                           << " so far); if this goes on, check the driver's stamps");
   } catch (const std::exception& e) {
     if (throttle_.allows(e.what()))
       NODELET_ERROR_STREAM("features at " << message->header.stamp << " skipped: " << e.what());
@@ -209,7 +212,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     const bool clock_set = std::exchange(clock_steps_, passed.clock_steps) != passed.clock_steps;
     if (clock_set && ros::Time::isSimTime()) return restart("the clock jumped back", T_odom_start_);
     if (!clock_set && !source_restarted) return;
-    NODELET_WARN_STREAM((clock_set ? "the system's clock was set back" : "the stamps of the features fell")
+    NODELET_WARN_STREAM((clock_set ? "the system's clock was set back" : "the stamps of the features jumped back")
                         << " to " << passed.item.message->header.stamp << ": the odometry goes on from the last pose");
     odometry_->forgetTime();
     processed_stamp_.reset();
@@ -221,9 +224,11 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     const PatchAlignmentOptions& alignment = odometry_->options().alignment;
     if (alignment.enabled && features.hasPatches() && !alignment.canAlign(features.patch_layout.side) &&
         throttle_.allows("patches"))
-      NODELET_WARN_STREAM("patches of " << features.patch_layout.side << "x" << features.patch_layout.side
-                                        << " samples are too small for alignment/radius " << alignment.radius
-                                        << ": no match is aligned (descriptor/patch_side of stereo_features)");
+      NODELET_WARN_STREAM(
+          "patches of " << features.patch_layout.side << "x" << features.patch_layout.side
+                        << " samples are too small for alignment/radius " << alignment.radius
+                        << ": no match is aligned; set descriptor/patch_side of stereo_features to at least "
+                        << 2 * (alignment.radius + 1) + 1);
     odometry_->mountAt(*mount_->last());
     const OdometryResult result = odometry_->update(features, findGuess(message.header));
     processed_stamp_ = message.header.stamp;
@@ -348,10 +353,12 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   /// An optical frame looks along +z; on a robot that is horizontal more often than up or down.
   void warnIfNotOptical(const std::string& camera_frame, const Eigen::Isometry3d& T_base_camera) {
     if (T_base_camera.linear().isIdentity(1e-3))
-      NODELET_WARN_STREAM("camera frame '"
-                          << camera_frame
-                          << "' has the axes of the base (x forward): an optical frame (z forward, x "
-                             "right, REP-103) was expected, the odometry will move along the wrong axes");
+      NODELET_WARN_STREAM(
+          "camera frame '"
+          << camera_frame
+          << "' has the axes of the base (x forward): an optical frame (z forward, x "
+             "right, REP-103) was expected, the odometry will move along the wrong axes; name that frame as "
+             "frame_id of the images");
   }
 
   // The services. What they ask for holds for the features that arrive from now on.
@@ -393,7 +400,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   bool onSaveTrajectory(stereo_descriptor_vo::SaveTrajectory::Request& request,
                         stereo_descriptor_vo::SaveTrajectory::Response& response) try {
     const nav_msgs::Path path = publisher_->path();
-    if (path.poses.empty()) throw std::runtime_error("there is no pose yet");
+    if (path.poses.empty()) throw std::runtime_error("there is no pose to save yet: reason of vo_info says why");
     saveTrajectory(path, *mount_->last(), request.format, request.path);
     response.success = true;
     response.message = std::to_string(path.poses.size()) + " poses";

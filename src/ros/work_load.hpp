@@ -47,8 +47,9 @@ class WorkLoad {
     status.addf("CPU time [share of one processor]", "%.2f", load);
     status.add("dropped since the start", dropped_);
     if (dropped > 0)
-      status.summaryf(WallUpdater::Level::WARN, "too slow: %d pairs dropped in %.0f s", static_cast<int>(dropped),
-                      period);
+      status.summaryf(WallUpdater::Level::WARN,
+                      "too slow: %d pairs dropped in %.0f s; set fewer detector/max_features or a max_rate",
+                      static_cast<int>(dropped), period);
     else if (load > max_load_)
       status.summaryf(WallUpdater::Level::WARN, "%.0f %% of one processor's time", 100.0 * load);
     else

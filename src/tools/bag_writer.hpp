@@ -22,7 +22,7 @@ class BagWriter {
       throw std::runtime_error("--output '" + path + "' is a directory, not a file name");
     // A device or a pipe would be replaced by the bag.
     if (std::filesystem::exists(final_) && !std::filesystem::is_regular_file(final_))
-      throw std::runtime_error("--output '" + path + "' is no regular file");
+      throw std::runtime_error("--output '" + path + "' is no regular file: choose another name");
     guard("create (does its directory exist, may I write there?)", [&] { bag_.emplace(partial_); });
   }
   ~BagWriter() {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "../data/text_file.hpp"
 #include "run_tool.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
 
@@ -91,8 +92,7 @@ void writeJson(const std::string& path, const TrajectoryErrors& errors) {
   field("largest_drift_deg", errors.largest_drift_deg);
   field("scale", errors.scale);
   file << "\n}\n";
-  file.close();
-  if (!file) throw std::runtime_error("cannot write --json file '" + path + "'");
+  sdvo::finishTextFile(file, path);
 }
 
 }  // namespace

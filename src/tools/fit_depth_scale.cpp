@@ -7,6 +7,7 @@
 #include <opencv2/core/utility.hpp>
 #include <stdexcept>
 
+#include "../data/text_file.hpp"
 #include "../experiments/csv_table.hpp"
 #include "../experiments/depth_scale_fit.hpp"
 #include "../experiments/plot_script.hpp"
@@ -20,7 +21,7 @@ struct Arguments {
   sdvo::SizeSampling sampling;
   std::string output, plot, model;
   int features = 2320;
-  std::vector<double> sizes = {4.0, 7.0, 10.0, 14.0, 20.0};  ///< px at a disparity of 20 px
+  std::vector<double> sizes = {4.0, 7.0, 10.0, 14.0, 20.0};                    ///< px at a disparity of 20 px
   std::vector<double> min_sizes = {4.0, 7.0, 10.0, 14.0}, max_sizes = {32.0};  ///< px
   std::vector<double> constant_sizes = {5.0, 7.0, 10.0, 14.0};                 ///< px
 };
@@ -85,7 +86,7 @@ void writeYaml(const std::string& path, const sdvo::ShapeFit& shape, const sdvo:
        << "    offset: " << curve.offset << "\n"
        << "    min_size: " << curve.min_size << "\n"
        << "    max_size: " << curve.max_size << "\n";
-  if (!file.flush()) throw std::runtime_error("cannot write " + path);
+  sdvo::finishTextFile(file, path);
 }
 
 int run(const Arguments& arguments) {
@@ -156,14 +157,16 @@ int run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   CLI::App app("Fits the size-from-disparity curve to features followed over sequences in KITTI layout");
   Arguments arguments;
-  app.add_option("--sequence", arguments.setup.sequences, "directories in KITTI layout, or numbers below --kitti, separated by commas")
+  app.add_option("--sequence", arguments.setup.sequences,
+                 "directories in KITTI layout, or numbers below --kitti, separated by commas")
       ->required()
       ->delimiter(',');
   app.add_option("--kitti", arguments.setup.kitti, "directory of the KITTI odometry data");
   app.add_option("--output", arguments.output, "YAML file to write, as the nodelets load it")->required();
   app.add_option("--plot", arguments.plot, "PNG of samples and curve to draw; the samples go to a CSV file beside it");
   sdvo::addChoice(app, "--reference", arguments.setup.reference, "motion taken for true");
-  app.add_option("--model", arguments.model, "a*d, which needs no samples, a*d+b, a*d^b or a*d^b+c instead of the one that fits best")
+  app.add_option("--model", arguments.model,
+                 "a*d, which needs no samples, a*d+b, a*d^b or a*d^b+c instead of the one that fits best")
       ->check(CLI::IsMember({"a*d", "a*d+b", "a*d^b", "a*d^b+c"}));
   app.add_option("--frames", arguments.setup.frames, "use only the first N pairs of each sequence")
       ->check(CLI::Range(3, 1000000));

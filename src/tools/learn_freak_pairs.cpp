@@ -12,6 +12,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "../data/text_file.hpp"
 #include "run_tool.hpp"
 #include "stereo_descriptor_vo/front_end/feature_detector.hpp"
 #include "stereo_descriptor_vo/front_end/freak.hpp"
@@ -45,7 +46,7 @@ std::vector<std::array<float, Freak::kFields>> sampleKeypoints(const std::vector
   std::vector<std::array<float, Freak::kFields>> samples;
   for (const std::string& file : files) {
     const cv::Mat image = cv::imread(file, cv::IMREAD_GRAYSCALE);
-    if (image.empty()) throw std::runtime_error(file + " is no readable image");
+    if (image.empty()) throw std::runtime_error("'" + file + "' is no image that OpenCV can read");
     const Freak freak(image);
     for (const sdvo::Corner& corner : detector.detect(image)) {
       const double fraction = static_cast<double>(random()) / static_cast<double>(std::mt19937::max());
@@ -103,7 +104,8 @@ struct Arguments {
 int run(Arguments arguments) {
   const auto samples = sampleKeypoints(arguments.images, arguments.per_image, arguments.seed);
   if (samples.size() < 1000)
-    throw std::runtime_error("only " + std::to_string(samples.size()) + " key points, too few");
+    throw std::runtime_error("only " + std::to_string(samples.size()) +
+                             " key points were found, too few: give more images");
   const std::vector<Column> chosen =
       choose(makeColumns(samples), static_cast<double>(samples.size()), arguments.max_correlation);
 
@@ -114,7 +116,7 @@ int run(Arguments arguments) {
     file << "{" << int{chosen[i].pair.first} << ", " << int{chosen[i].pair.second} << "},"
          << (i % 12 == 11 ? "\n" : " ");
   file << "\n";
-  if (!file.flush()) throw std::runtime_error("cannot write " + arguments.output);
+  sdvo::finishTextFile(file, arguments.output);
   std::cout << samples.size() << " key points, largest correlation " << arguments.max_correlation
             << ", mean of the last pair " << chosen.back().mean << ", written to " << arguments.output << "\n";
   return 0;

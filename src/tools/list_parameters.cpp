@@ -1,7 +1,9 @@
 // Prints the parameters of the nodelets as Markdown tables, from the option structs that hold them.
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <iostream>
 #include <sstream>
+#include <stdexcept>
 
 #include "../config/pipeline_options.hpp"
 #include "run_tool.hpp"
@@ -11,6 +13,7 @@ namespace {
 std::string rangeOf(const sdvo::Option& option) {
   std::ostringstream text;
   if (std::holds_alternative<bool*>(option.value)) return "true, false";
+  if (std::holds_alternative<std::string*>(option.value)) return "text";
   for (const std::string& choice : option.choices) text << (text.tellp() > 0 ? ", " : "") << choice;
   if (!option.isText()) text << option.range.min << " … " << option.range.max;
   return text.str();
@@ -22,13 +25,57 @@ std::string cell(std::string text) {
   return text;
 }
 
+/// A parameter that users change early, and the reason to do so.
+struct FirstChoice {
+  std::string name;  ///< with its nodelet
+  std::string when;
+};
+
+const std::vector<FirstChoice>& firstChoices() {
+  static const std::vector<FirstChoice> choices = {
+      {"visual_odometry/base_frame_id", "the robot's URDF has another name for it, such as base_footprint"},
+      {"visual_odometry/odom_frame_id", "several robots share one TF tree"},
+      {"visual_odometry/publish_tf", "a filter such as robot_localization publishes odom -> base"},
+      {"stereo_features/approximate_sync", "the cameras have no common trigger"},
+      {"stereo_features/detector/mask", "parts of the robot are in view"},
+      {"stereo_features/detector/max_features", "dropped_pairs grows: fewer need less time"},
+      {"stereo_features/max_rate", "the processor is needed for other work, or the camera is very fast"},
+      {"stereo_features/queue_size", "every pair of a recording counts: 300, for both nodelets"},
+      {"visual_odometry/planar", "the floor is flat and the camera's pitch on TF is right"},
+      {"visual_odometry/use_imu", "turns exceed 20 degrees a pair, or the robot starts on a slope"}};
+  return choices;
+}
+
+bool isFirstChoice(const sdvo::Option& option) {
+  const auto& choices = firstChoices();
+  return std::any_of(choices.begin(), choices.end(), [&](const FirstChoice& c) { return c.name == option.name; });
+}
+
+/// Default, unit, range and meaning as cells.
+std::string cells(const sdvo::Option& option) {
+  return " | " + option.text() + " | " + option.unit + " | " + rangeOf(option) + " | " + cell(option.meaning) + " |";
+}
+
+void printFirstChoices(const std::vector<sdvo::Option>& options) {
+  std::cout << "| parameter | nodelet | default | unit | range | meaning | change it when |\n"
+               "| --- | --- | --- | --- | --- | --- | --- |\n";
+  for (const FirstChoice& choice : firstChoices()) {
+    const auto option =
+        std::find_if(options.begin(), options.end(), [&](const sdvo::Option& o) { return o.name == choice.name; });
+    if (option == options.end()) throw std::logic_error("no nodelet has the parameter " + choice.name);
+    const std::size_t slash = choice.name.find('/');
+    std::cout << "| `" << choice.name.substr(slash + 1) << "` | " << choice.name.substr(0, slash) << cells(*option)
+              << " " << choice.when << " |\n";
+  }
+}
+
 void printTable(const std::string& nodelet, const std::vector<sdvo::Option>& options) {
   const std::string prefix = nodelet + "/";
-  std::cout << "| parameter | default | unit | range | meaning |\n| --- | --- | --- | --- | --- |\n";
+  std::cout << "\n## " << nodelet
+            << "\n| parameter | default | unit | range | meaning |\n| --- | --- | --- | --- | --- |\n";
   for (const sdvo::Option& option : options)
-    if (option.name.compare(0, prefix.size(), prefix) == 0)
-      std::cout << "| `" << option.name.substr(prefix.size()) << "` | " << option.text() << " | " << option.unit
-                << " | " << rangeOf(option) << " | " << cell(option.meaning) << " |\n";
+    if (option.name.compare(0, prefix.size(), prefix) == 0 && !isFirstChoice(option))
+      std::cout << "| `" << option.name.substr(prefix.size()) << "`" << cells(option) << "\n";
 }
 
 int run() {
@@ -37,15 +84,11 @@ int run() {
   std::vector<sdvo::Option> options = sdvo::listOptions(nodelets);
   for (const sdvo::Option& option : sdvo::listOptions(core)) options.push_back(option);
 
-  std::cout
-      << "# Parameters\n\nPrivate parameters of the nodelets, made by `rosrun stereo_descriptor_vo "
-         "list_parameters > docs/parameters.md` from the\noption structs, the only place where defaults stand.\n\n"
-         "## stereo_features\n\n";
-  printTable("stereo_features", options);
-  std::cout << "\n## visual_odometry\n\n";
-  printTable("visual_odometry", options);
-  std::cout << "\n## place_recognition\n\n";
-  printTable("place_recognition", options);
+  std::cout << "# Parameters\n\n"
+               "Private parameters of the nodelets: first the ten that most users change, then all others. Made by "
+               "`rosrun stereo_descriptor_vo list_parameters > docs/parameters.md`.\n\n";
+  printFirstChoices(options);
+  for (const char* nodelet : {"stereo_features", "visual_odometry", "place_recognition"}) printTable(nodelet, options);
   return 0;
 }
 

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "../common/quantile.hpp"
+#include "../data/text_file.hpp"
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
 
 namespace sdvo {
@@ -139,7 +140,7 @@ void OfflineRun::writeTiming(const std::string& path) const {
          << odometry.matches << "," << odometry.inliers << "," << odometry.rms << "," << odometry.coverage << ","
          << toString(odometry.state) << "," << withoutCommas(odometry.reason) << "\n";
   }
-  if (!file.flush()) throw std::runtime_error("cannot write " + path);
+  finishTextFile(file, path);
 }
 
 void OfflineRun::writeStates(const std::string& path) const {
@@ -157,7 +158,7 @@ void OfflineRun::writeStates(const std::string& path) const {
     writeCovariance(file, odometry.pose_covariance);
     file << "," << odometry.reason << "\n";
   }
-  if (!file.flush()) throw std::runtime_error("cannot write " + path);
+  finishTextFile(file, path);
 }
 
 }  // namespace sdvo

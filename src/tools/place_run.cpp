@@ -8,6 +8,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "../data/text_file.hpp"
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
 
 namespace sdvo {
@@ -78,7 +79,9 @@ bool PlaceRun::isRevisit(const Trajectory& truth, const Keyframe& keyframe) cons
 PlaceErrors PlaceRun::errors(const Trajectory& truth) const {
   constexpr double kWrong = 1.0, kWrongAngle = 5.0;  // m, deg
   const std::size_t pairs = pairs_.size() - first_pair_;
-  if (truth.size() < pairs) throw std::invalid_argument("fewer true poses than pairs");
+  if (truth.size() < pairs)
+    throw std::invalid_argument("--poses has " + std::to_string(truth.size()) + " poses for " + std::to_string(pairs) +
+                                " pairs");
   PlaceErrors errors;
   std::map<int, int> pair_of;
   for (auto keyframe = ownKeyframes(); keyframe != keyframes_.end(); ++keyframe)
@@ -138,7 +141,7 @@ void PlaceRun::writeViews(const std::string& path, const Trajectory& truth) cons
       file << first->report.id << "," << id << "," << distance << "," << angle(T_true) << "," << match.matches << ","
            << match.inliers << "," << match.same << "," << error.translation().norm() << "," << angle(error) << "\n";
     }
-  if (!file.flush()) throw std::runtime_error("cannot write " + path);
+  finishTextFile(file, path);
 }
 
 void PlaceRun::writeKeyframes(const std::string& path) const {
@@ -153,7 +156,7 @@ void PlaceRun::writeKeyframes(const std::string& path) const {
          << report.match.rms << "," << report.loop << "," << 1e3 * report.find_time << "," << 1e3 * report.verify_time
          << "," << report.reason << "\n";
   }
-  if (!file.flush()) throw std::runtime_error("cannot write " + path);
+  finishTextFile(file, path);
 }
 
 }  // namespace sdvo

@@ -152,6 +152,8 @@ CLI::App* addAll(CLI::App& app, Arguments& arguments) {
   command->add_option("--euroc", arguments.all.euroc, "directory of MH_01_half and MH_01_moving")
       ->check(CLI::ExistingDirectory);
   command->add_option("--output", arguments.all.output, "directory to write to; made when missing")->required();
+  command->add_option("--only", arguments.all.only, "one experiment instead of all")
+      ->check(CLI::IsMember(sdvo::experimentNames()));
   command->add_option("--jobs", arguments.all.jobs, "programs that run at a time")
       ->capture_default_str()
       ->check(CLI::Range(1, 256));

@@ -104,9 +104,9 @@ TEST(FeatureDetector, AMaskThatDoesNotFitIsNamed) {
   FeatureDetectorOptions options;
   const cv::Mat image = unevenTexture();
   EXPECT_EQ(errorOf([&] { FeatureDetector(options).detect(image, 0, cv::Mat::zeros(100, 200, CV_8U)); }),
-            "the mask is 200x100, the left image is 600x400");
+            "the mask is 200x100, the left image is 600x400: make it of the rectified left image");
   EXPECT_EQ(errorOf([&] { FeatureDetector(options).detect(image, 0, cv::Mat::zeros(image.size(), CV_8UC3)); }),
-            "the mask is not of one channel of eight bits");
+            "the mask must have one channel of eight bits");
   options.mask = "/nowhere/mask.png";
   EXPECT_EQ(errorOf([&] { FeatureDetector{options}; }), "mask: cannot read a PNG from '/nowhere/mask.png'");
 }
