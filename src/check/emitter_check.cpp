@@ -75,7 +75,8 @@ Finding EmitterCheck::judge() const {
   constexpr std::size_t kEnough = 12;  // parts that moved
   constexpr double kPattern = 0.3;
   const std::string step = "emitter";
-  if (stayed_.size() < kEnough) return {step, Verdict::kOpen, "the camera did not move enough", "turn and walk with it"};
+  if (stayed_.size() < kEnough)
+    return {step, Verdict::kOpen, "the camera did not move enough", "turn and walk with it"};
   const double stayed = quantile(stayed_, 0.5);
   const std::string what = text(0, 100.0 * std::max(stayed, 0.0), " % of the bright dots move with the camera");
   if (stayed > kPattern)

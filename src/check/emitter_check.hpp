@@ -19,9 +19,9 @@ class EmitterCheck {
  private:
   void compare(const CoarseView& view, const cv::Mat& dots, bool& moved);
 
-  CoarseView view_;  ///< where the scene was last compared
-  cv::Mat dots_;     ///< CV_8U, 1 where a dot is
-  int age_ = 0;      ///< pairs since then
+  CoarseView view_;             ///< where the scene was last compared
+  cv::Mat dots_;                ///< CV_8U, 1 where a dot is
+  int age_ = 0;                 ///< pairs since then
   std::vector<double> stayed_;  ///< of each comparison, share of the dots that stayed beyond chance
 };
 

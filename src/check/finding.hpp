@@ -8,10 +8,14 @@ enum class Verdict { kOk, kWarn, kFail, kOpen };
 
 inline const char* toString(Verdict verdict) {
   switch (verdict) {
-    case Verdict::kOk: return "OK";
-    case Verdict::kWarn: return "WARN";
-    case Verdict::kFail: return "FAIL";
-    case Verdict::kOpen: break;
+    case Verdict::kOk:
+      return "OK";
+    case Verdict::kWarn:
+      return "WARN";
+    case Verdict::kFail:
+      return "FAIL";
+    case Verdict::kOpen:
+      break;
   }
   return "-";
 }

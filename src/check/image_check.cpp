@@ -35,7 +35,8 @@ Finding ImageCheck::exposure(double min_intensity, double max_intensity) const {
   const double dark = quantile(dark_, 0.1), bright = quantile(bright_, 0.9), white = quantile(saturated_, 0.9);
   const std::string what = text(0, "mean grey level ", dark, " to ", bright, ", ", 100.0 * white, " % white");
   if (bright < min_intensity || dark < min_intensity)
-    return {step, bright < min_intensity ? Verdict::kFail : Verdict::kWarn, what, "too dark: light, longer exposure or more gain"};
+    return {step, bright < min_intensity ? Verdict::kFail : Verdict::kWarn, what,
+            "too dark: light, longer exposure or more gain"};
   if (bright > max_intensity || white > kMuchWhite)
     return {step, Verdict::kWarn, what, "too bright: shorter exposure, less gain"};
   return {step, Verdict::kOk, what, ""};
@@ -50,14 +51,15 @@ Finding ImageCheck::texture(int min_corners, double min_share) const {
     return {step, Verdict::kFail, what, "focus, light, or a scene with texture; a lower detector/fast_min_threshold"};
   if (few < min_corners) return {step, Verdict::kWarn, what, "some views have hardly any texture"};
   if (share < min_share)
-    return {step, Verdict::kWarn, what, "the scene is nearer than stereo/epipolar/max_disparity reaches, or repeats itself"};
+    return {step, Verdict::kWarn, what,
+            "the scene is nearer than stereo/epipolar/max_disparity reaches, or repeats itself"};
   return {step, Verdict::kOk, what, ""};
 }
 
 Finding ImageCheck::blur() const {
   constexpr double kMoving = 0.01;    // of the width a pair
   constexpr std::size_t kEnough = 8;  // pairs of either kind
-  constexpr double kBlurred = 0.6;    // chosen: half of the gradient is gone, and with it half of the corners
+  constexpr double kBlurred = 0.6;    // chosen: healthy rigs keep 0.74 and more
   const std::string step = "motion blur";
   std::vector<double> still, moving;
   const double slow = quantile(moved_, 0.25), fast = std::max(quantile(moved_, 0.75), kMoving);

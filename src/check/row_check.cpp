@@ -7,8 +7,8 @@
 #include <opencv2/video/tracking.hpp>
 
 #include "../common/median.hpp"
-#include "../front_end/block_search.hpp"
 #include "../common/text.hpp"
+#include "../front_end/block_search.hpp"
 
 namespace sdvo {
 namespace {
@@ -26,7 +26,9 @@ std::vector<std::uint8_t> track(const cv::Mat& from, const cv::Mat& to, const st
   return found;
 }
 
-double distance(const cv::Point2f& a, const cv::Point2f& b) { return std::hypot(a.x - b.x, a.y - b.y); }
+double distance(const cv::Point2f& a, const cv::Point2f& b) {
+  return std::hypot(a.x - b.x, a.y - b.y);
+}
 
 }  // namespace
 
@@ -48,7 +50,8 @@ void RowCheck::add(const cv::Mat& left, const cv::Mat& right, std::int64_t stamp
   for (const cv::Point2f& corner : corners)
     if (const auto sighting = search.find(corner)) {
       points.push_back(corner);
-      in_right.emplace_back(corner.x - static_cast<float>(sighting->disparity), corner.y + static_cast<float>(sighting->dv));
+      in_right.emplace_back(corner.x - static_cast<float>(sighting->disparity),
+                            corner.y + static_cast<float>(sighting->dv));
     }
   if (points.empty()) return;
 
@@ -148,13 +151,14 @@ Finding RowCheck::rectification() const {
   }
   if (4 * known < static_cast<int>(kCells)) {
     if (corners_ > 1000 && static_cast<int>(samples_.size()) < corners_ / 20)
-      return {step, Verdict::kFail, text(0, "of ", corners_, " corners ", samples_.size(), " are found in the right image"),
+      return {step, Verdict::kFail,
+              text(0, "of ", corners_, " corners ", samples_.size(), " are found in the right image"),
               "left and right do not show the same scene: look at both"};
     return {step, Verdict::kOpen, "too few corners are found in both images", "show it a scene with texture"};
   }
   const double rms = std::sqrt(square / known);
-  const std::string what =
-      text(2, "rows differ by ", rms, " px (RMS over the image), ", worst, " at worst, in ", known, " of ", kCells, " parts");
+  const std::string what = text(2, "rows differ by ", rms, " px (RMS over the image), ", worst, " at worst, in ", known,
+                                " of ", kCells, " parts");
   const std::string remedy = "raw images under the name of rectified ones? Else calibrate the pair again";
   if (10 * bad > known) return {step, Verdict::kFail, what, remedy};
   if (rms > 0.35 * max_dv_) return {step, Verdict::kWarn, what, remedy};

@@ -9,9 +9,9 @@
 
 namespace sdvo {
 
-/// Rows of both images over a whole recording: how far the rectification leaves them apart, and how much later the right
-/// image was taken. A point that moves up or down in the image at v' px/s is seen v' * delay px lower by a camera that
-/// is late, while an error of the rectification stays where it is.
+/// Rows of both images over a whole recording: how far the rectification leaves them apart, and how much later the
+/// right image was taken. A point that moves up or down in the image at v' px/s is seen v' * delay px lower by a camera
+/// that is late, while an error of the rectification stays where it is.
 class RowCheck {
  public:
   static constexpr int kColumns = 6, kRows = 4;

@@ -15,7 +15,8 @@ constexpr double kFew = 0.02;
 /// Between successive pairs, s.
 std::vector<double> periods(const std::vector<std::int64_t>& stamps) {
   std::vector<double> periods;
-  for (std::size_t i = 1; i < stamps.size(); ++i) periods.push_back(1e-9 * static_cast<double>(stamps[i] - stamps[i - 1]));
+  for (std::size_t i = 1; i < stamps.size(); ++i)
+    periods.push_back(1e-9 * static_cast<double>(stamps[i] - stamps[i - 1]));
   return periods;
 }
 
@@ -25,7 +26,9 @@ void StampCheck::note(std::size_t input, std::int64_t stamp, double arrival) {
   arrivals_[input].push_back({stamp, arrival});
 }
 
-void StampCheck::notePair(std::int64_t stamp) { pairs_.push_back(stamp); }
+void StampCheck::notePair(std::int64_t stamp) {
+  pairs_.push_back(stamp);
+}
 
 double StampCheck::rate() const {
   const double period = quantile(periods(pairs_), 0.5);
@@ -42,7 +45,7 @@ Finding StampCheck::topics(double min_rate, double max_rate, const std::string& 
   if (pairs_.size() < 2) return {step, Verdict::kOpen, "one pair alone", "take more of them"};
   const std::string what = text(1, pairs_.size(), " pairs, ", rate(), " Hz");
   if (rate() < min_rate || rate() > max_rate)
-    return {step, Verdict::kWarn, what, text(1, "5 to 60 Hz suit; 15 or more for fast turns")};
+    return {step, Verdict::kWarn, what, "5 to 60 Hz suit, 15 Hz or more for fast turns"};
   return {step, Verdict::kOk, what, ""};
 }
 
@@ -59,18 +62,20 @@ Finding StampCheck::stamps() const {
   std::vector<double> delays;
   for (const Arrival& image : arrivals_[0]) delays.push_back(image.arrival - 1e-9 * static_cast<double>(image.stamp));
   const double delay = quantile(delays, 0.5);
-  const std::string what =
-      text(1, "longest gap ", 1e3 * longest, " ms, ", 100.0 * alone, " % without partner");
+  const std::string what = text(1, "longest gap ", 1e3 * longest, " ms, ", 100.0 * alone, " % without partner");
 
   if (share([](double step_time) { return step_time <= 0.0; }) > 0.0)
-    return {step, Verdict::kWarn, "stamps fall; " + what, "one recording at a time, and a driver that does not restart"};
+    return {step, Verdict::kWarn, "stamps fall; " + what,
+            "one recording at a time, and a driver that does not restart"};
   if (std::abs(delay) > 1.0)
-    return {step, Verdict::kWarn, text(0, "stamps are ", std::abs(delay), " s ", delay > 0.0 ? "behind" : "ahead of",
-                                       " the clock of arrivals: another clock"),
+    return {step, Verdict::kWarn,
+            text(0, "stamps are ", std::abs(delay), " s ", delay > 0.0 ? "behind" : "ahead of",
+                 " the clock of arrivals: another clock"),
             "let the driver stamp with the system's clock: TF and filters compare stamps of several sources"};
   if (alone > kFew)
-    return {step, Verdict::kWarn, what, "some images have no partner of the same stamp: trigger both cameras together, "
-                                        "or look for losses on the way (network, USB)"};
+    return {step, Verdict::kWarn, what,
+            "some images have no partner of the same stamp: trigger both cameras together, "
+            "or look for losses on the way (network, USB)"};
   if (share([&](double step_time) { return step_time > 1.5 * usual; }) > kFew)
     return {step, Verdict::kWarn, what, "pairs are missing: look for losses on the way (USB, network, processor)"};
   return {step, Verdict::kOk, what, ""};

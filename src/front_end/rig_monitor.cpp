@@ -14,8 +14,8 @@ constexpr int kEnough = 25;  // corners found that a judgement needs: half of th
 
 /// How the right image's rows lie against the left one's: dv by u, px.
 struct Rows {
-  double slope;   ///< median of the slopes between corners far apart
-  double offset;  ///< median in the middle of the image, once the slope is taken away
+  double slope;    ///< median of the slopes between corners far apart
+  double offset;   ///< median in the middle of the image, once the slope is taken away
   double scatter;  ///< median distance from that line
 };
 
@@ -26,8 +26,7 @@ Rows fitRows(const std::vector<Sighting>& sightings, int columns) {
       if (std::abs(sightings[i].u - sightings[k].u) > 0.1 * columns)
         slopes.push_back((sightings[i].dv - sightings[k].dv) / (sightings[i].u - sightings[k].u));
   Rows rows{median(slopes), 0.0, 0.0};
-  for (const Sighting& sighting : sightings)
-    rest.push_back(sighting.dv - rows.slope * (sighting.u - 0.5 * columns));
+  for (const Sighting& sighting : sightings) rest.push_back(sighting.dv - rows.slope * (sighting.u - 0.5 * columns));
   rows.offset = median(rest);
   for (double& value : rest) value = std::abs(value - rows.offset);
   rows.scatter = median(rest);
@@ -78,12 +77,12 @@ std::string RigMonitor::diagnose(const cv::Mat& left, const cv::Mat& right,
   const auto [slope, offset, scatter] = fitRows(sightings, left.cols);
   if (scatter > std::max(max_dv_, 0.5 * std::abs(offset)))
     return text(1, "rows of left and right differ by ", scatter,
-                    " px here and there: not rectified, or not taken at the same moment?");
+                " px here and there: not rectified, or not taken at the same moment?");
   if (std::abs(offset) > max_dv_)
     return text(1, "right image ", std::abs(offset), " px too ", offset > 0.0 ? "low" : "high", ": not rectified?");
   if (0.5 * left.cols * std::abs(slope) > 2.0 * max_dv_)
     return text(1, "right image turned by ", std::abs(std::atan(slope)) * 180.0 / CV_PI, " degrees ",
-                    slope > 0.0 ? "clockwise" : "counterclockwise", ": not rectified?");
+                slope > 0.0 ? "clockwise" : "counterclockwise", ": not rectified?");
   return "";
 }
 

@@ -33,7 +33,7 @@ bool areOne(const StereoCamera& camera, const MotionHypothesis& a, const MotionH
 /// Half the squared residuals, in standard deviations, of the matches of lasting points under each hypothesis,
 /// whichever hypothesis matched them: the smaller, the likelier.
 std::vector<double> HypothesisChoice::lastingCosts(const MotionScene& scene,
-                                               const std::vector<MotionHypothesis>& hypotheses) const {
+                                                   const std::vector<MotionHypothesis>& hypotheses) const {
   constexpr double kSigma = 0.7;    // px, of a corner and of the map's point
   constexpr double kOutlier = 3.0;  // sigma
   std::set<std::pair<int, int>> seen;
@@ -135,8 +135,8 @@ MotionHypothesis HypothesisChoice::choose(const MotionScene& scene, std::vector<
   }
   // Rather what was expected than the motion of something that has come to cover most of the view.
   if (scene.contested && scene.T_current_reference && isImplausible(options_, chosen.evidence)) {
-    chosen.verdict = {Trust::kNone, judgeChange(options_, chosen.evidence).reason +
-                                        ", right after something else moved in view"};
+    chosen.verdict = {Trust::kNone,
+                      judgeChange(options_, chosen.evidence).reason + ", right after something else moved in view"};
   }
   return std::move(chosen);
 }
@@ -144,8 +144,7 @@ MotionHypothesis HypothesisChoice::choose(const MotionScene& scene, std::vector<
 /// Fewer inliers than that are no rival of a motion.
 int HypothesisChoice::leastOfRival(const MotionEstimate& motion) const {
   constexpr double kLeast = 0.1;
-  return std::max(2 * min_inliers_,
-                  static_cast<int>(kLeast * static_cast<double>(motion.inliers.size())));
+  return std::max(2 * min_inliers_, static_cast<int>(kLeast * static_cast<double>(motion.inliers.size())));
 }
 
 }  // namespace sdvo

@@ -69,13 +69,15 @@ std::vector<Finding> CameraCheck::findings(const Finding& topics, const Finding&
 Finding CameraCheck::calibration() const {
   const std::string step = "calibration";
   if (unusable_ > 0 || used_ == 0)
-    return {step, used_ == 0 && unusable_ == 0 ? Verdict::kOpen : Verdict::kFail, problem_.empty() ? "no pairs" : problem_,
+    return {step, used_ == 0 && unusable_ == 0 ? Verdict::kOpen : Verdict::kFail,
+            problem_.empty() ? "no pairs" : problem_,
             unusable_ > 0 ? "see docs/cameras.md, 'What a wrong camera_info looks like'" : ""};
   const std::string what = text(1, camera_.width, "x", camera_.height, ", f ", camera_.fx, " px, baseline ",
                                 1e3 * camera_.baseline, " mm, ", model_.empty() ? "no lens model" : model_);
   // Of stereo cameras that robots carry: a lens of 20 to 150 deg, a baseline of 1 cm to 2 m.
   const double width = camera_.width / camera_.fx;
-  if (width < 0.35 || width > 7.5) return {step, Verdict::kWarn, what, "is the focal length that of these images' size?"};
+  if (width < 0.35 || width > 7.5)
+    return {step, Verdict::kWarn, what, "is the focal length that of these images' size?"};
   if (camera_.baseline < 0.01 || camera_.baseline > 2.0)
     return {step, Verdict::kWarn, what, "is the baseline in metres? P[3] of the right camera_info is -fx * baseline"};
   return {step, Verdict::kOk, what, ""};
@@ -84,7 +86,8 @@ Finding CameraCheck::calibration() const {
 Finding CameraCheck::rig() const {
   constexpr double kFew = 0.1;  // share of the pairs
   const std::string step = "rig monitor";
-  const std::string what = text(0, refused_, " of ", used_, " pairs refused") + (refusal_.empty() ? "" : ": " + refusal_);
+  const std::string what =
+      text(0, refused_, " of ", used_, " pairs refused") + (refusal_.empty() ? "" : ": " + refusal_);
   if (refused_ > kFew * used_) return {step, Verdict::kFail, what, "look at both images: sides, mounting, calibration"};
   return {step, refused_ > 0 ? Verdict::kWarn : Verdict::kOk, what, ""};
 }
@@ -92,8 +95,9 @@ Finding CameraCheck::rig() const {
 Finding CameraCheck::load(double rate) const {
   const std::string step = "load";
   const double share = 1e-3 * run_.cpuTime() * rate;
-  const std::string what = text(1, run_.cpuTime(), " ms of CPU time a pair, ", 100.0 * share, " % of one processor; done after ",
-                                run_.time(0.5), " ms (median), ", run_.time(0.95), " ms (95 %)");
+  const std::string what =
+      text(1, run_.cpuTime(), " ms of CPU time a pair, ", 100.0 * share, " % of one processor; done after ",
+           run_.time(0.5), " ms (median), ", run_.time(0.95), " ms (95 %)");
   if (share > thresholds_.max_load)
     return {step, Verdict::kWarn, what, "fewer detector/max_features, smaller images or max_rate"};
   return {step, Verdict::kOk, what, ""};

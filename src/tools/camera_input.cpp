@@ -13,9 +13,9 @@ CameraInput::CameraInput(const Topics& topics, std::function<void(const StereoPa
     : stamps_(topics),
       arrivals_(topics, StereoInputOptions()),
       pairs_(StereoInputOptions().sync_queue_size,
-             [this, use = std::move(use)](const sensor_msgs::ImageConstPtr& left, const sensor_msgs::ImageConstPtr& right,
-                                          const sensor_msgs::CameraInfoConstPtr& left_info,
-                                          const sensor_msgs::CameraInfoConstPtr& right_info) {
+             [this, use = std::move(use)](
+                 const sensor_msgs::ImageConstPtr& left, const sensor_msgs::ImageConstPtr& right,
+                 const sensor_msgs::CameraInfoConstPtr& left_info, const sensor_msgs::CameraInfoConstPtr& right_info) {
                stamps_.notePair(nanoseconds(left->header.stamp));
                arrivals_.notePair();
                use({left, right, left_info, right_info});
@@ -36,7 +36,8 @@ Finding CameraInput::transform(const std::string& base_frame) const {
   const std::string step = "TF", camera = ros_conversions::cleanFrameId(frame_);
   if (frame_.empty()) return {step, Verdict::kOpen, "the images name no frame", "set frame_id in the driver"};
   try {
-    const Eigen::Isometry3d T_base_camera = tf2::transformToEigen(transforms_.lookupTransform(base_frame, camera, ros::Time(0)));
+    const Eigen::Isometry3d T_base_camera =
+        tf2::transformToEigen(transforms_.lookupTransform(base_frame, camera, ros::Time(0)));
     const Eigen::Vector3d at = T_base_camera.translation(), ahead = T_base_camera.rotation().col(2);
     const std::string what = text(2, camera, " is at ", at.x(), " ", at.y(), " ", at.z(), " m of ", base_frame,
                                   " and looks along ", ahead.x(), " ", ahead.y(), " ", ahead.z());

@@ -16,8 +16,8 @@
 
 namespace sdvo {
 
-/// Messages of a stereo camera as they arrive, from a bag or from topics: what their stamps look like, which make a pair,
-/// and where TF has the camera. One thread calls it.
+/// Messages of a stereo camera as they arrive, from a bag or from topics: what their stamps look like, which make a
+/// pair, and where TF has the camera. One thread calls it.
 class CameraInput {
  public:
   using Topics = std::array<std::string, ArrivalLog::kInputs>;  ///< in the order of ArrivalLog::Input

@@ -71,9 +71,11 @@ void listen(const Arguments& arguments, sdvo::CameraInput& input) {
       topics[1], kQueue,
       [&](const sensor_msgs::ImageConstPtr& m) { input.add<ArrivalLog::kRightImage>(m, ros::Time::now()); }, {}, hints);
   const auto left_info = nh.subscribe<sensor_msgs::CameraInfo>(
-      topics[2], kQueue, [&](const sensor_msgs::CameraInfoConstPtr& m) { input.add<ArrivalLog::kLeftInfo>(m, ros::Time::now()); });
+      topics[2], kQueue,
+      [&](const sensor_msgs::CameraInfoConstPtr& m) { input.add<ArrivalLog::kLeftInfo>(m, ros::Time::now()); });
   const auto right_info = nh.subscribe<sensor_msgs::CameraInfo>(
-      topics[3], kQueue, [&](const sensor_msgs::CameraInfoConstPtr& m) { input.add<ArrivalLog::kRightInfo>(m, ros::Time::now()); });
+      topics[3], kQueue,
+      [&](const sensor_msgs::CameraInfoConstPtr& m) { input.add<ArrivalLog::kRightInfo>(m, ros::Time::now()); });
   const auto transforms = nh.subscribe<tf2_msgs::TFMessage>(
       "/tf", kQueue, [&](const tf2_msgs::TFMessageConstPtr& m) { input.add(*m, false); });
   const auto static_transforms = nh.subscribe<tf2_msgs::TFMessage>(
@@ -93,8 +95,9 @@ int check(const Arguments& arguments) {
     bool failed = false;
     for (const sdvo::Finding& finding : findings) {
       failed |= finding.verdict == sdvo::Verdict::kFail;
-      std::cout << std::left << std::setw(5) << toString(finding.verdict) << std::setw(14) << finding.step << finding.what
-                << (finding.remedy.empty() ? "" : "\n" + std::string(19, ' ') + "-> " + finding.remedy) << "\n";
+      std::cout << std::left << std::setw(5) << toString(finding.verdict) << std::setw(14) << finding.step
+                << finding.what << (finding.remedy.empty() ? "" : "\n" + std::string(19, ' ') + "-> " + finding.remedy)
+                << "\n";
     }
     if (!arguments.page.empty())
       sdvo::writeCheckPage(arguments.page, arguments.topics()[0], findings, check.rows(), check.picture());
@@ -106,7 +109,8 @@ int check(const Arguments& arguments) {
     return report(input);
   }
   constexpr std::size_t kWaiting = 100;  // pairs
-  sdvo::Worker<sdvo::StereoPairMessages> worker(kWaiting, [&](const sdvo::StereoPairMessages& pair) { check.add(pair); });
+  sdvo::Worker<sdvo::StereoPairMessages> worker(kWaiting,
+                                                [&](const sdvo::StereoPairMessages& pair) { check.add(pair); });
   sdvo::CameraInput input(arguments.topics(), [&](const sdvo::StereoPairMessages& pair) { worker.push(pair); });
   listen(arguments, input);
   worker.stop();
@@ -117,18 +121,22 @@ int check(const Arguments& arguments) {
 
 int main(int argc, char** argv) {
   ros::init(argc, argv, "check_camera", ros::init_options::AnonymousName);  // takes ROS's arguments away
-  ros::Time::init();  // for bags, which need no master
+  ros::Time::init();                                                        // for bags, which need no master
   CLI::App app(
-      "Checks a rectified stereo camera step by step, live or in a bag: topics, stamps, calibration, images, motion. Exit "
+      "Checks a rectified stereo camera step by step, live or in a bag: topics, stamps, calibration, images, motion. "
+      "Exit "
       "code 2: a step FAILs. For 30 s of a camera that is held still, walked, turned and tilted");
   Arguments arguments;
   app.add_option("--bag", arguments.bag, "recorded bag; empty: listen to the topics")->check(CLI::ExistingFile);
   app.add_option("--camera", arguments.camera, "namespace of both sides")->capture_default_str();
   app.add_option("--left", arguments.left, "name of the left side, such as infra1")->capture_default_str();
   app.add_option("--right", arguments.right, "name of the right side")->capture_default_str();
-  app.add_option("--image", arguments.image, "name of the rectified images, such as image_rect_raw")->capture_default_str();
+  app.add_option("--image", arguments.image, "name of the rectified images, such as image_rect_raw")
+      ->capture_default_str();
   app.add_option("--base-frame", arguments.base_frame, "the robot's frame on TF")->capture_default_str();
-  app.add_option("--seconds", arguments.seconds, "how long to listen, s")->capture_default_str()->check(CLI::Range(1.0, 3600.0));
+  app.add_option("--seconds", arguments.seconds, "how long to listen, s")
+      ->capture_default_str()
+      ->check(CLI::Range(1.0, 3600.0));
   app.add_option("--transport", arguments.transport, "image transport to listen by")->capture_default_str();
   app.add_option("--page", arguments.page, "HTML page with the table, the map of the rows and a pair");
   app.add_option("--config", arguments.config, "YAML file as the nodelets load it");

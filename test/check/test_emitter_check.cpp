@@ -29,13 +29,21 @@ Finding judged(double step, int dots, int dot_step = 0) {
   return check.judge();
 }
 
-TEST(EmitterCheck, FindsDotsThatMoveWithTheCamera) { EXPECT_EQ(judged(8.0, 6000).verdict, Verdict::kFail); }
+TEST(EmitterCheck, FindsDotsThatMoveWithTheCamera) {
+  EXPECT_EQ(judged(8.0, 6000).verdict, Verdict::kFail);
+}
 
-TEST(EmitterCheck, TakesAMovingSceneForWhatItIs) { EXPECT_EQ(judged(8.0, 0).verdict, Verdict::kOk); }
+TEST(EmitterCheck, TakesAMovingSceneForWhatItIs) {
+  EXPECT_EQ(judged(8.0, 0).verdict, Verdict::kOk);
+}
 
-TEST(EmitterCheck, DotsOfTheSceneMoveWithIt) { EXPECT_EQ(judged(8.0, 6000, 8).verdict, Verdict::kOk); }
+TEST(EmitterCheck, DotsOfTheSceneMoveWithIt) {
+  EXPECT_EQ(judged(8.0, 6000, 8).verdict, Verdict::kOk);
+}
 
-TEST(EmitterCheck, ACameraThatStandsProvesNothing) { EXPECT_EQ(judged(0.0, 6000).verdict, Verdict::kOpen); }
+TEST(EmitterCheck, ACameraThatStandsProvesNothing) {
+  EXPECT_EQ(judged(0.0, 6000).verdict, Verdict::kOpen);
+}
 
 }  // namespace
 }  // namespace sdvo

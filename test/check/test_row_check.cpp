@@ -12,14 +12,15 @@ const cv::Size kSize(320, 240);
 constexpr double kDisparity = 12.0, kPeriod = 0.1;  // px, s
 
 /// Rows of a plane that nods: how far it is down at a time, px.
-double nod(double time) { return 12.0 * std::sin(2.0 * time); }
+double nod(double time) {
+  return 12.0 * std::sin(2.0 * time);
+}
 
 /// The view `down` px lower, `dv` by place lower still.
 template <class Rows>
 cv::Mat view(double down, double disparity, const Rows& dv) {
   static const synthetic::Texture texture(7, 6.0, 120.0);
-  return synthetic::render(
-      kSize, [&](double u, double v) { return texture.at(u + disparity, v - down - dv(u, v)); });
+  return synthetic::render(kSize, [&](double u, double v) { return texture.at(u + disparity, v - down - dv(u, v)); });
 }
 
 /// 40 pairs whose right image is `delay` (s) later.
@@ -34,7 +35,9 @@ RowCheck checked(double delay, double motion, const Rows& dv) {
   return check;
 }
 
-double none(double, double) { return 0.0; }
+double none(double, double) {
+  return 0.0;
+}
 
 TEST(RowCheck, RectifiedPairsOfOneMomentAreInOrder) {
   const RowCheck check = checked(0.0, 1.0, none);
@@ -60,7 +63,8 @@ TEST(RowCheck, MapsTheRowsOfABadRectificationWithoutBlamingTheMoment) {
   const cv::Mat map = check.map();
   ASSERT_EQ(map.size(), cv::Size(RowCheck::kColumns, RowCheck::kRows));
   const double width = static_cast<double>(kSize.width) / RowCheck::kColumns;
-  // Corners lie anywhere in their part, 27 px to either side of its middle; half of that is more than their median errs.
+  // Corners lie anywhere in their part, 27 px to either side of its middle; half of that is more than their median
+  // errs.
   for (int column = 1; column < RowCheck::kColumns - 1; ++column)
     EXPECT_NEAR(map.at<double>(1, column), tilted((column + 0.5) * width - kDisparity, 0.0), 0.27) << column;
 }

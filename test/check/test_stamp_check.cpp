@@ -55,7 +55,9 @@ TEST(StampCheck, WarnsOfAnotherClock) {
   expectSaid(recording(40, -1600000000000000000).stamps(), Verdict::kWarn, "another clock");
 }
 
-TEST(StampCheck, WarnsOfMissingPairs) { expectSaid(recording(60, 0, 10).stamps(), Verdict::kWarn, "missing"); }
+TEST(StampCheck, WarnsOfMissingPairs) {
+  expectSaid(recording(60, 0, 10).stamps(), Verdict::kWarn, "missing");
+}
 
 TEST(StampCheck, WarnsOfImagesWithoutPartner) {
   StampCheck check = recording(40);
@@ -69,7 +71,9 @@ TEST(StampCheck, WarnsOfStampsThatFall) {
   expectSaid(check.stamps(), Verdict::kWarn, "fall");
 }
 
-TEST(StampCheck, JudgesNoStampsWithoutPairs) { EXPECT_EQ(recording(1).stamps().verdict, Verdict::kOpen); }
+TEST(StampCheck, JudgesNoStampsWithoutPairs) {
+  EXPECT_EQ(recording(1).stamps().verdict, Verdict::kOpen);
+}
 
 }  // namespace
 }  // namespace sdvo

@@ -10,8 +10,8 @@ namespace sdvo {
 /// rotation w (rad, about the axes of the left optical frame) moves the right view vertically. With x and y as
 /// normalised coordinates in the right image it is:
 ///   dv = f * (w_x * (1 + y^2) - w_z * x - w_y * x * y).
-/// It is reported, so that a rig in need of calibration is noticed. A pair that contradicts it is doubted. The motion is
-/// measured with rows of the left view alone and does not depend on it.
+/// It is reported, so that a rig in need of calibration is noticed. A pair that contradicts it is doubted. The motion
+/// is measured with rows of the left view alone and does not depend on it.
 class RightCameraRotation {
  public:
   /// Takes in one pair; old pairs are forgotten slowly. Returns whether the camera turned before it: its change is more
@@ -39,7 +39,8 @@ class RightCameraRotation {
   /// Those of the past and of one pair, whose wrong matches have no weight.
   Sums sumUp(const StereoFeatures& features, const Sums& past) const;
 
-  /// What turning from the rotation of the one to that of the other does to the rows of the first, px, root mean square.
+  /// What turning from the rotation of the one to that of the other does to the rows of the first, px, root mean
+  /// square.
   static double distance(const Sums& now, const Sums& before);
 
   /// Learns how large a rig's changes are as a rule.
