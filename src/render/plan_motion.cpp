@@ -26,17 +26,18 @@ double SpeedPulse::way(double time) const {
 }
 
 PlanMotion::State PlanMotion::at(double time) {
-  while (kStep * static_cast<double>(positions_.size() - 1) <= time) {  // Simpson's rule
+  while (kStep * static_cast<double>(positions_.size() - 1) <= std::max(0.0, time)) {  // Simpson's rule
     const double begin = kStep * static_cast<double>(positions_.size() - 1);
     positions_.push_back(positions_.back() +
                          kStep / 6.0 *
                              (velocity(begin) + 4.0 * velocity(begin + 0.5 * kStep) + velocity(begin + kStep)));
   }
-  const auto i = static_cast<std::size_t>(std::max(0.0, time) / kStep);
+  // Right before a step the quotient may be rounded up to it.
+  const auto i = std::min(static_cast<std::size_t>(std::max(0.0, time) / kStep), positions_.size() - 2);
   const double begin = kStep * static_cast<double>(i), s = (time - begin) / kStep;
   // Hermite's cubic through both ends and velocities.
   const Eigen::Vector2d position =
-      (1.0 + 2.0 * s) * (1.0 - s) * (1.0 - s) * positions_[i] + s * s * (3.0 - 2.0 * s) * positions_[i + 1] +
+      (1.0 + 2.0 * s) * (1.0 - s) * (1.0 - s) * positions_[i] + s * s * (3.0 - 2.0 * s) * positions_.at(i + 1) +
       kStep * (s * (1.0 - s) * (1.0 - s) * velocity(begin) - s * s * (1.0 - s) * velocity(begin + kStep));
   State state{position.x(), position.y(), heading(time), 0.0, 0.0};
   for (const SpeedPulse& pulse : advances_) state.speed += pulse.speed(time);

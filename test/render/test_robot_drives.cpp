@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "../../src/render/drive_renderer.hpp"
+#include "../../src/render/plan_motion.hpp"
 #include "../../src/render/preset_paths.hpp"
 #include "../../src/render/rigs.hpp"
 
@@ -67,6 +68,17 @@ TEST(RobotRigs, AreThoseOfTheirDataSheets) {
     EXPECT_TRUE(findRig(sheet.name).indoors);
   }
   EXPECT_THROW(findRig("nothing"), std::invalid_argument);
+}
+
+// There the quotient of time and step is rounded up, to a position that is not there yet.
+TEST(PlanMotion, GoesOnRightBeforeAStep) {
+  constexpr double kStep = 0.002, kSpeed = 0.8;
+  for (int k = 1; k < 300; ++k) {
+    PlanMotion motion;
+    motion.advance({0.0, kSpeed, 0.5, 1e7});
+    const double time = k * kStep, before = motion.at(std::nextafter(time, 0.0)).z;
+    EXPECT_NEAR(before, PlanMotion(motion).at(time).z, 1e-12) << k;
+  }
 }
 
 TEST(RobotMotions, StartAtRestAndAccelerateWithoutJumps) {

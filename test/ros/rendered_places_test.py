@@ -27,10 +27,8 @@ class RenderedPlaces(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.directory = tempfile.mkdtemp(prefix='sdvo_rendered_places_')
-        drive, calibration = os.path.join(cls.directory, 'drive'), os.path.join(cls.directory, 'calib.txt')
-        with open(calibration, 'w') as file:
-            file.write(CALIBRATION)
-        run_tool('render_drive', '--trajectory', 'figure_eight', '--rate', str(RATE), '--frames', str(PAIRS), '--calib', calibration,
+        drive = os.path.join(cls.directory, 'drive')
+        run_tool('render_drive', '--trajectory', 'figure_eight', '--rate', str(RATE), '--frames', str(PAIRS), '--calib', CALIBRATION,
                  '--size', SIZE, '--output', drive)
         bag = os.path.join(cls.directory, 'drive.bag')
         run_tool('kitti_to_bag', '--sequence', drive, '--output', bag)
