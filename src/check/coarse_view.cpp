@@ -14,7 +14,7 @@ CoarseView::CoarseView(const cv::Mat& image) {
 }
 
 std::optional<cv::Point2d> CoarseView::motionSince(const CoarseView& before, const cv::Rect& part) const {
-  // Share of the spectrum's energy at the peak; unrelated views give less than 0.1, moved ones mostly more than 0.3.
+  // Share of the spectrum's energy at the peak (chosen); a lower one is taken for unrelated views.
   constexpr double kRelated = 0.15;
   cv::Mat window;
   cv::createHanningWindow(window, part.size(), CV_64F);

@@ -20,7 +20,7 @@ inline const char* toString(Verdict verdict) {
   return "-";
 }
 
-/// What one step of the check of a camera found. kOpen: the recording does not show it.
+/// The result of one step of a camera's check. kOpen: the recording does not show it.
 struct Finding {
   std::string step;
   Verdict verdict;

@@ -62,7 +62,7 @@ void RowCheck::add(const cv::Mat& left, const cv::Mat& right, std::int64_t stamp
   const auto returned = track(before, left, in_before, back, 0);
   ++pairs_;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    constexpr double kBlock = 1.5, kReturn = 0.5;  // px
+    constexpr double kBlock = 1.5, kReturn = 0.5;  // px: a block is found to a pixel, a track returns (chosen)
     if (!refined[i] || distance(in_right[i], blocks[i]) > kBlock) continue;
     if (!followed[i] || !returned[i] || distance(back[i], points[i]) > kReturn) continue;
     const int column = std::min(static_cast<int>(points[i].x) * kColumns / size_.width, kColumns - 1);
@@ -75,8 +75,8 @@ void RowCheck::add(const cv::Mat& left, const cv::Mat& right, std::int64_t stamp
 /// Least squares on what differs from each cell's mean, so that no error of the rectification counts; with the weights
 /// of a Huber kernel. Errors of one pair may be alike, so its standard deviation is that of whole pairs.
 std::optional<RowCheck::Delay> RowCheck::delay() const {
-  constexpr std::size_t kEnough = 300;  // samples
-  constexpr double kKernel = 0.5;       // px
+  constexpr std::size_t kEnough = 300;  // samples (chosen): a dozen a part
+  constexpr double kKernel = 0.5;       // px (chosen): errors of healthy rows are smaller
   constexpr double kMoving = 10.0;      // px/s (RMS); 10 ms are a tenth of a pixel then
   constexpr double kUseful = 0.005;     // s; a delay that is not known better than that is not judged
   if (samples_.size() < kEnough) return std::nullopt;

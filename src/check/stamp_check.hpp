@@ -26,7 +26,6 @@ class StampCheck {
   /// Whether stamps are those of a camera: of the system's clock, rising, without gaps, each with its partner.
   Finding stamps() const;
 
-  int pairs() const { return static_cast<int>(pairs_.size()); }
   double rate() const;  ///< of the pairs by their stamps, Hz; zero when it is not known
 
  private:

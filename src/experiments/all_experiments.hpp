@@ -15,7 +15,7 @@ struct AllExperiments {
   std::string only;       ///< one of experimentNames(); empty: all of them
 };
 
-/// What can be run alone.
+/// The experiments that can be run alone.
 const std::vector<std::string>& experimentNames();
 
 /// Renders the drives that `output`/drives lacks, runs the experiments, each in a program of its own, and writes their

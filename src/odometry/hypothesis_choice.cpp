@@ -91,7 +91,7 @@ std::size_t HypothesisChoice::best(const MotionScene& scene, const std::vector<M
   return sound != left.end() ? *sound : *std::max_element(left.begin(), left.end(), by_inliers);
 }
 
-/// Takes the best hypothesis. What the others say confirms it or speaks against it.
+/// Takes the best hypothesis. The others confirm or contradict it.
 MotionHypothesis HypothesisChoice::choose(const MotionScene& scene, std::vector<MotionHypothesis> hypotheses) const {
   MotionHypothesis& chosen = hypotheses[best(scene, hypotheses)];
   double match_time = 0.0, motion_time = 0.0;
@@ -143,7 +143,7 @@ MotionHypothesis HypothesisChoice::choose(const MotionScene& scene, std::vector<
 
 /// Fewer inliers than that are no rival of a motion.
 int HypothesisChoice::leastOfRival(const MotionEstimate& motion) const {
-  constexpr double kLeast = 0.1;
+  constexpr double kLeast = 0.1;  // ratio of the inliers (chosen)
   return std::max(2 * min_inliers_, static_cast<int>(kLeast * static_cast<double>(motion.inliers.size())));
 }
 

@@ -84,7 +84,7 @@ Finding CameraCheck::calibration() const {
 }
 
 Finding CameraCheck::rig() const {
-  constexpr double kFew = 0.1;  // share of the pairs
+  constexpr double kFew = 0.1;  // share of the pairs (chosen)
   const std::string step = "rig monitor";
   const std::string what =
       text(0, refused_, " of ", used_, " pairs refused") + (refusal_.empty() ? "" : ": " + refusal_);

@@ -59,11 +59,10 @@ void listen(const Arguments& arguments, sdvo::CameraInput& input) {
   if (!ros::master::check())
     throw std::runtime_error("no ROS master at " + ros::master::getURI() + ": start the camera, or give a --bag");
   ros::NodeHandle nh;
-  const image_transport::ImageTransport transport(nh);
   const image_transport::TransportHints hints(arguments.transport);
-  constexpr std::uint32_t kQueue = 50;
+  constexpr std::uint32_t kQueue = 50;  // messages: a second of a fast camera
   const auto topics = arguments.topics();
-  image_transport::ImageTransport images(transport);
+  image_transport::ImageTransport images(nh);
   const auto left = images.subscribe(
       topics[0], kQueue,
       [&](const sensor_msgs::ImageConstPtr& m) { input.add<ArrivalLog::kLeftImage>(m, ros::Time::now()); }, {}, hints);
@@ -124,8 +123,7 @@ int main(int argc, char** argv) {
   ros::Time::init();                                                        // for bags, which need no master
   CLI::App app(
       "Checks a rectified stereo camera step by step, live or in a bag: topics, stamps, calibration, images, motion. "
-      "Exit "
-      "code 2: a step FAILs. For 30 s of a camera that is held still, walked, turned and tilted");
+      "Exit code 2: a step FAILs. For 30 s of a camera that is held still, walked, turned and tilted");
   Arguments arguments;
   app.add_option("--bag", arguments.bag, "recorded bag; empty: listen to the topics")->check(CLI::ExistingFile);
   app.add_option("--camera", arguments.camera, "namespace of both sides")->capture_default_str();

@@ -15,7 +15,7 @@
 
 namespace sdvo {
 
-/// What a pair's motion is looked for in. The references must outlive it.
+/// The input of a search for a pair's motion. The references must outlive it.
 struct MotionScene {
   const LocalMap& map;
   const RigCalibration& calibration;

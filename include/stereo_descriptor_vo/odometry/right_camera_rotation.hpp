@@ -39,8 +39,7 @@ class RightCameraRotation {
   /// Those of the past and of one pair, whose wrong matches have no weight.
   Sums sumUp(const StereoFeatures& features, const Sums& past) const;
 
-  /// What turning from the rotation of the one to that of the other does to the rows of the first, px, root mean
-  /// square.
+  /// Difference of two rotations as a shift of the rows of `now`, px, root mean square.
   static double distance(const Sums& now, const Sums& before);
 
   /// Learns how large a rig's changes are as a rule.
