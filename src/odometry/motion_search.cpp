@@ -19,6 +19,9 @@ constexpr double kElsewhere = 0.6;  // px, of aligned positions; up to 0.5 where
 // Chi-square of six, by which it is worth to look further, and to follow few points rather than all. Errors of
 // neighbouring points are not independent: up to 170 where nothing moved.
 constexpr double kSuspicious = 100.0, kCertain = 200.0;
+// The same for each point: a part of its noise is common to many, and the sum of that grows with their number (up to
+// 1.5 where nothing moved; movers have 2 to 14).
+constexpr double kCertainOfOne = 1.5;
 
 }  // namespace
 
@@ -231,7 +234,8 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const StereoCamer
   std::iota(all.begin(), all.end(), 0);
   if (agree(camera, others, all, T, T_lasting, kElsewhere)) return std::nullopt;
   const Vector6d difference = logSE3(T_lasting * T.inverse());
-  if (difference.dot(equations.hessian * difference) <= significant * equations.variance()) return std::nullopt;
+  const double least = std::max(significant, kCertainOfOne * static_cast<double>(lasting.size()));
+  if (difference.dot(equations.hessian * difference) <= least * equations.variance()) return std::nullopt;
   return T_lasting;
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <memory>
+#include <random>
 
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/odometry/motion_search.hpp"
@@ -180,6 +181,29 @@ TEST_F(MotionSearchTest, WhatMovesByLessThanCornersErrIsLeftAside) {
   ASSERT_TRUE(found.rival) << "the covariance has to hold what all inliers together say";
   const Eigen::Isometry3d aside = *found.rival * found.motion.T_current_reference.inverse();
   EXPECT_GT(aside.translation().norm(), 0.005);
+}
+
+TEST_F(MotionSearchTest, AnErrorThatLastingPointsShareIsNoMover) {
+  // Nothing moves. All lasting points are off by as much as the camera would be 7 mm further, half a pixel at most; new
+  // ones are not.
+  const synthetic::World still = synthetic::randomWorld(27, 700, {-10.0, -4.0, 6.0}, {10.0, 3.0, 12.0});
+  const synthetic::World arrived = synthetic::randomWorld(28, 300, {-2.0, -1.5, 3.9}, {2.0, 1.5, 4.1});
+  std::mt19937 random(29);
+  std::normal_distribution<float> noise(0.f, 0.1f);
+  const auto see = [&](double error, bool all) {
+    StereoFeatures features = synthetic::noFeatures(synthetic::camera(), stamp());
+    Street::add(features, still, error);
+    if (all) Street::add(features, arrived, 0.0);
+    for (auto* numbers : {&features.u, &features.v, &features.disparity})
+      for (float& number : *numbers) number += noise(random);
+    return features;
+  };
+  begin(see(0.0, false));
+  while (pairs_ < 5) extend(see(0.0, false), find(see(0.0, false), 0.0));
+  extend(see(0.0, true), find(see(0.0, true), 0.0));
+  const MotionHypothesis found = find(see(0.007, true), 0.0);
+  EXPECT_EQ(found.verdict.trust, Trust::kSound) << found.verdict.reason;
+  EXPECT_FALSE(found.contested);
 }
 
 TEST_F(MotionSearchTest, FarPointsThatAgreeWithAnyStepAreNoMajority) {
