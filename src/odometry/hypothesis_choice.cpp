@@ -91,7 +91,7 @@ std::size_t HypothesisChoice::best(const MotionScene& scene, const std::vector<M
   return sound != left.end() ? *sound : *std::max_element(left.begin(), left.end(), by_inliers);
 }
 
-/// Takes the best hypothesis. The others confirm or contradict it.
+/// Takes the best hypothesis. The others may contradict it.
 MotionHypothesis HypothesisChoice::choose(const MotionScene& scene, std::vector<MotionHypothesis> hypotheses) const {
   MotionHypothesis& chosen = hypotheses[best(scene, hypotheses)];
   double match_time = 0.0, motion_time = 0.0;
@@ -105,11 +105,7 @@ MotionHypothesis HypothesisChoice::choose(const MotionScene& scene, std::vector<
   std::vector<int> of_rival, of_rivals;  // rows that the largest rival, or any, explains and the chosen one does not
   const std::vector<int> own = sorted(chosen.inlierRows());
   for (const MotionHypothesis& other : hypotheses) {
-    if (&other == &chosen || !other.motion.success) continue;
-    if (areOne(scene.map.camera(), chosen, other)) {
-      chosen.evidence.confirmed |= chosen.guided != other.guided;  // from matches of their own
-      continue;
-    }
+    if (&other == &chosen || !other.motion.success || areOne(scene.map.camera(), chosen, other)) continue;
     std::vector<int> rows = without(sorted(other.inlierRows()), own);
     if (static_cast<int>(rows.size()) < leastOfRival(chosen.motion)) continue;
     std::vector<int> both;

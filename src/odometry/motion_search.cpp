@@ -72,10 +72,7 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
   }
   hypotheses.push_back(searchAmong(scene, all, lasting));
   // A compromise between two motions may have more inliers than the one that goes on as before.
-  if (prior) {
-    hypotheses.push_back(searchAmong(scene, all, agreeing(scene, all, *prior)));
-    hypotheses.back().guided = true;
-  }
+  if (prior) hypotheses.push_back(searchAmong(scene, all, agreeing(scene, all, *prior)));
   // What moves by itself may have left copies of itself in the map, each with a motion of its own.
   constexpr int kMotions = 4;
   MotionEstimate peeled = all.motion;
@@ -131,7 +128,6 @@ bool MotionSearch::leavesGate(const MotionScene& scene, const Eigen::Isometry3d&
 MotionHypothesis MotionSearch::search(const FeatureMatcher& matcher, const MotionScene& scene, const ViewPtr& view,
                                       const std::optional<Eigen::Isometry3d>& T_current_reference) const {
   MotionHypothesis found;
-  found.guided = T_current_reference.has_value();
   found.view = view;
   Stopwatch stopwatch;
   found.matches = matcher.match(view->rows, scene.features, T_current_reference);
@@ -170,8 +166,7 @@ void MotionSearch::weigh(const MotionScene& scene, MotionHypothesis& found) cons
   evidence = {};
   evidence.matches = static_cast<int>(found.matches.size());
   for (int i = 0; i < evidence.matches; ++i) evidence.lasting_matches += found.isLasting(i);
-  countInliers(scene, found);
-  evidence.rms = found.motion.rms;
+  countInliers(found);
   evidence.covariance = found.motion.covariance;
   evidence.dt = static_cast<double>(scene.features.stamp - scene.map.newestStamp()) * 1e-9;
   evidence.velocity = scene.velocity;
@@ -181,11 +176,10 @@ void MotionSearch::weigh(const MotionScene& scene, MotionHypothesis& found) cons
                                        : PoseVerdict{Trust::kNone, found.motion.reason};
 }
 
-void MotionSearch::countInliers(const MotionScene& scene, MotionHypothesis& found) const {
+void MotionSearch::countInliers(MotionHypothesis& found) {
   PoseEvidence& evidence = found.evidence;
   evidence.inliers = static_cast<int>(found.motion.inliers.size());
   evidence.lasting_inliers = found.lastingInliers();
-  evidence.coverage = coverage(scene.features, found.inlierRows());
   evidence.motion = found.motion.T_current_reference.inverse();
 }
 
@@ -256,7 +250,7 @@ void MotionSearch::keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_l
   motion.T_current_reference = T_lasting;
   motion.inliers = std::move(inliers);
   found.sightings = std::move(sightings);
-  countInliers(scene, found);
+  countInliers(found);
   found.contested = true;
   found.verdict = {Trust::kDoubtful, "points that stood still so far show another motion than all " +
                                          std::to_string(measured.size()) +

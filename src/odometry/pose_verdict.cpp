@@ -74,14 +74,10 @@ PoseVerdict judgePose(const PoseVerdictOptions& options, int min_inliers, const 
   if (lastingDisagree(options, evidence))
     return verdict(Trust::kDoubtful, "only ", evidence.lasting_inliers, " of ", evidence.lasting_matches,
                    " lasting points (seen by four pairs) agree with the motion of ", evidence.inliers, " inliers");
-  if (!evidence.confirmed && evidence.inliers < options.doubtful_inliers)
+  if (evidence.inliers < options.doubtful_inliers)
     return verdict(Trust::kDoubtful, "only ", evidence.inliers, " inliers");
-  if (!evidence.confirmed && ratio < options.doubtful_ratio)
+  if (ratio < options.doubtful_ratio)
     return verdict(Trust::kDoubtful, "only ", evidence.inliers, " of ", evidence.matches, " matches are inliers");
-  if (!evidence.confirmed && evidence.coverage < options.doubtful_coverage)
-    return verdict(Trust::kDoubtful, "inliers in only ", std::round(100.0 * evidence.coverage), " % of the image");
-  if (!evidence.confirmed && evidence.rms > options.doubtful_rms)
-    return verdict(Trust::kDoubtful, "a reprojection error of ", evidence.rms, " px");
   constexpr double kRatio = 0.03;  // of the distance (chosen)
   if (evidence.deviation > options.doubtful_deviation + kRatio * evidence.distance)
     return verdict(Trust::kDoubtful, "a distance of ", evidence.distance, " m with a standard deviation of ",

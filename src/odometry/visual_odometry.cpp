@@ -162,14 +162,12 @@ void VisualOdometry::begin(const StereoFeatures& features, double dt) {
 
 /// What this pair showed may mislead the next ones, too.
 void VisualOdometry::suspect(double dt, const MotionHypothesis& found, const Step& step) {
-  Suspicion& suspicion = state_.suspicion;
-  if (step.state != TrackingState::kLost && state_.predicted_pairs == 0) return;
   const PoseEvidence& evidence = found.evidence;
-  if (evidence.inliers >= options_.tracking.doubtful_inliers) suspicion.raise("many points agreed on a wrong motion");
-  // Unless the camera went unseen, the views may not be of one rigid world, and the next map would be as wrong.
   const bool agree = evidence.inliers >= options_.tracking.doubtful_ratio * evidence.matches;
+  if (step.state != TrackingState::kLost && state_.predicted_pairs == 0) return;
+  // Unless the camera went unseen, the views may not be of one rigid world, and the next map would be as wrong.
   if (evidence.matches >= kManyMatches && !agree && dt <= options_.tracking.max_gap)
-    suspicion.raise("many matches agreed on no motion", Suspicion::kLong);
+    state_.suspicion.raise("many matches agreed on no motion", Suspicion::kLong);
 }
 
 VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
@@ -263,9 +261,7 @@ VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features,
 
   const LocalMap::Adjustment& adjustment = candidate.adjustment;
   PoseEvidence& evidence = candidate.evidence = found.evidence;
-  const std::vector<int> confirmed = found.inlierRows(adjustment.rejected_rows);
-  evidence.inliers = static_cast<int>(confirmed.size());
-  evidence.coverage = coverage(features, confirmed);
+  evidence.inliers = static_cast<int>(found.inlierRows(adjustment.rejected_rows).size());
   evidence.lasting_inliers = found.lastingInliers(adjustment.rejected_rows);
   // What the adjustment did to the map as a whole is no motion.
   const Eigen::Isometry3d T_before_after = candidate.T_keyframe_origin.inverse() * map.poseBeforeNewest();

@@ -33,7 +33,6 @@ struct MotionHypothesis {
   PoseVerdict verdict;
   MotionEstimate motion;                       ///< since the map's newest pair
   std::optional<Eigen::Isometry3d> rival;      ///< T_current_reference of a hypothesis that could not be rejected
-  bool guided = false;                         ///< found with a prior
   bool contested = false;                      ///< by a motion of something else in view
   std::shared_ptr<const LocalMap::View> view;  ///< of the map; one for all hypotheses of a pair
   std::vector<FeatureMatch> matches;           ///< rows of the view to rows of the pair

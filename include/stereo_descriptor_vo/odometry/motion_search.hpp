@@ -46,7 +46,7 @@ class MotionSearch {
   std::vector<int> agreeing(const MotionScene& scene, const MotionHypothesis& all,
                             const Eigen::Isometry3d& T_current_reference) const;
   void weigh(const MotionScene& scene, MotionHypothesis& found) const;
-  void countInliers(const MotionScene& scene, MotionHypothesis& found) const;
+  static void countInliers(MotionHypothesis& found);
   Alignment align(const MotionScene& scene, const MotionHypothesis& found) const;
   std::optional<Eigen::Isometry3d> motionOfLasting(const StereoCamera& camera, const MotionHypothesis& found,
                                                    const Alignment& aligned, double significant) const;

@@ -18,8 +18,6 @@ struct PoseVerdictOptions {
   int doubtful_inliers = 40;
   double doubtful_ratio = 0.4;
   double doubtful_lasting_ratio = 0.5;
-  double doubtful_coverage = 0.4;
-  double doubtful_rms = 1.2;
   double doubtful_deviation = 0.05;
 
   void describe(OptionList& list) {
@@ -35,9 +33,6 @@ struct PoseVerdictOptions {
              "a smaller share of inliers among the matches is doubted; a third of it is no motion");
     list.add("doubtful_lasting_ratio", doubtful_lasting_ratio, {0.0, 1.0}, "",
              "the same among the matches of points that four pairs saw");
-    list.add("doubtful_coverage", doubtful_coverage, {0.0, 1.0}, "",
-             "inliers in a smaller share of the image's cells are doubted");
-    list.add("doubtful_rms", doubtful_rms, {0.0, 20.0}, "px", "a larger reprojection error of the inliers is doubted");
     list.add("doubtful_deviation", doubtful_deviation, {0.001, 1000.0}, "m",
              "a way whose standard deviation is larger than this and 3 % of it is doubted");
   }
@@ -47,9 +42,6 @@ struct PoseVerdictOptions {
 struct PoseEvidence {
   int matches = 0, inliers = 0;
   int lasting_matches = 0, lasting_inliers = 0;  ///< of points that at least four pairs saw
-  double coverage = 1.0;                         ///< share of the image's cells that hold an inlier
-  bool confirmed = false;                        ///< found likewise without a prior: few inliers are no doubt then
-  double rms = 0.0;                              ///< reprojection error of the inliers, px per coordinate
   double distance = 0.0;                         ///< from the last key frame, m
   double deviation = 0.0;                        ///< standard, of that distance by the map's adjustment, m
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();  ///< since the last measured pair
