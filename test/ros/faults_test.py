@@ -109,14 +109,15 @@ class Faults(PipelineCase):
             self.call('visual_odometry/save_trajectory', SaveTrajectory, path, 'tum')), daemon=True)
         writer.start()
         try:
-            self.assertFalse(wait_until(lambda: answers, 0.5))
-            for i in range(3, 6):
+            for i in range(3, 20):
                 self.assertEqual(self.feed(i).state, 'TRACKING')
+            self.assertEqual(answers, [])
         finally:
             with open(path + '.partial') as reader:
                 lines = reader.readlines()
             writer.join(10)
-        self.assertEqual((len(lines), answers[0].success), (3, True), answers)
+        self.assertTrue(answers[0].success)
+        self.assertIn(len(lines), range(3, 20), 'no pair was answered while the file waited')
 
     def test_approximate_pairs_are_not_one_frame_late(self):
         self.start(approximate_sync='true')

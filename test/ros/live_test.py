@@ -30,7 +30,7 @@ from tf2_msgs.msg import TFMessage
 
 from kitti_replay import (EPOCH, FRAME, PACKAGE, Camera, Collector, Pipeline, StereoSequence, links, matrix_of,
                           wait_until)
-from pipeline_case import SILENCE, PipelineCase, camera_transform
+from pipeline_case import PipelineCase, camera_transform
 from stereo_descriptor_vo.msg import FeatureFlow, PlaceInfo, StereoFeatures, VoInfo
 from stereo_descriptor_vo.srv import ResetToPose, SaveTrajectory
 
@@ -44,16 +44,16 @@ class Live(PipelineCase):
 
     def test_images_are_subscribed_only_while_someone_listens(self):
         camera = self.keep(Camera(self.namespace, self.sequence, self.clock))
+        self.diagnostics = self.keep(Collector('/diagnostics', DiagnosticArray))
         executable = roslib.packages.find_node(PACKAGE, 'stereo_features_node')[0]
         process = subprocess.Popen([executable, '__ns:=' + self.namespace])
         try:
-            master = rospy.get_master()
-            topic = self.namespace + '/stereo_features'
-            self.assertTrue(wait_until(lambda: any(topic == name for name, _ in master.getPublishedTopics('')[2])))
-            time.sleep(SILENCE)
-            self.assertFalse(camera.has_subscribers())
+            topic = node = self.namespace + '/stereo_features'
+            # By then it has started and would have told the master of a subscription.
+            self.assertTrue(wait_until(lambda: 'nobody listens' in self.diagnosis('input rate', 'stereo_features').message))
+            subscribed = {name for name, nodes in rospy.get_master().getSystemState()[2][1] if node in nodes}
+            self.assertFalse({publisher.resolved_name for publisher in camera.images + camera.infos} & subscribed)
             listener = Collector(topic, StereoFeatures)
-            node = self.namespace + '/stereo_features'
             self.assertTrue(wait_until(lambda: camera.is_subscribed() and ('out', topic, rospy.get_name()) in links(node)))
             camera.publish(*camera.messages(0))
             self.assertTrue(wait_until(lambda: len(listener) == 1))
@@ -196,8 +196,11 @@ class Live(PipelineCase):
         path = self.keep(Collector(self.namespace + '/path', Path))
         self.assertTrue(wait_until(lambda: self.pipeline.is_connected((path, ))))
         first = [self.feed(i) for i in range(PAIRS)]
+        diagnosed = len(self.diagnostics)
         self.clock.jump_to(self.info[0].header.stamp)
-        time.sleep(SILENCE)  # nothing orders the clock and the images
+        # Nothing orders the clock and the images. Diagnostics have the time that the pipeline has.
+        self.assertTrue(wait_until(lambda: any(array.header.stamp == self.clock.now and self.is_ours(array)
+                                               for array in list(self.diagnostics)[diagnosed:])))
         second = [self.feed(i) for i in range(PAIRS)]
         self.assert_same_drives(first, second)
         self.assertTrue(wait_until(lambda: len(path) > 0 and path[-1].header.stamp == second[-1].header.stamp))
@@ -206,11 +209,10 @@ class Live(PipelineCase):
     def test_lasting_jump_of_the_stamps_goes_on_from_the_last_pose_and_loses_nothing(self):
         self.start(queue_size=2, odometry_queue_size=2)  # the pair held back and the next one come at once
         first = [self.feed(i) for i in range(PAIRS)]
-        # The clock goes on: the first pair after the jump waits for the next one to confirm it.
-        self.camera.publish(*self.camera.messages(0))
-        time.sleep(SILENCE)
-        self.assertEqual(len(self.info), PAIRS)
-        self.camera.publish(*self.camera.messages(1))
+        # The clock goes on: the first pair after the jump waits for the next one to confirm it, as one that is not confirmed is
+        # never answered (the next test).
+        for i in range(2):
+            self.camera.publish(*self.camera.messages(i))
         self.assertTrue(wait_until(lambda: len(self.info) == PAIRS + 2 and len(self.odometry) == PAIRS + 2))
         for i in range(2, PAIRS):
             self.feed(i)
@@ -276,17 +278,19 @@ class Live(PipelineCase):
             tf.publish(TFMessage([transform]))
             tf_static.publish(TFMessage([transform]))
             self.broadcaster.sendTransform(camera_transform(FRAME))  # latched again
-            time.sleep(0.2)
-            self.assert_alive()
-        for i in range(first + 1, first + 4):
+        # Who answers a pair has taken the images before it. Three features are counted as unusable once all have come.
+        for i in range(first + 1, PAIRS):
             self.assertTrue(wait_until(lambda: self.is_answered(i)), 'pair %d after %s' % (i, info.header.stamp))
             self.assertEqual((self.info[-1].state, self.info[-1].epoch), ('TRACKING', info.epoch))
+            if i >= first + 3 and self.info[-1].malformed == info.malformed + 3:
+                break
+        self.assertEqual(self.info[-1].malformed, info.malformed + 3)
         for publisher in publishers:
             publisher.unregister()
         self.assert_alive()
 
     def test_extreme_stamps(self):
-        self.start()
+        self.start(odometry_queue_size=100)  # none pushes another one out
         self.try_extreme_stamps(0)
 
     def test_extreme_stamps_with_approximate_sync(self):
@@ -299,8 +303,12 @@ class Live(PipelineCase):
             for publisher, message in zip(self.camera.infos + self.camera.images, infos + images):
                 message.header.stamp = rospy.Time(seconds, 999999999)
                 publisher.publish(message)
-            time.sleep(0.2)
-            self.assert_alive()
+        # Topics keep their order: who answers a later pair has taken these.
+        for i in range(6, PAIRS):
+            self.camera.publish(*self.camera.messages(i))
+        later = self.camera.messages(6)[0][0].header.stamp
+        self.assertTrue(wait_until(lambda: self.info[-1].header.stamp >= later), self.info[-1].header.stamp)
+        self.assert_alive()
 
     def test_reset_service_goes_back_to_the_initial_pose(self):
         self.start(initial_pose='10 5 0 0 0 1.5707963267948966')

@@ -100,9 +100,13 @@ class PipelineCase(unittest.TestCase):
         for collector in (self.info, self.features, self.odometry):
             self.assertEqual([message.header.stamp for message in collector], stamps)
 
-    def diagnosis(self, task='odometry'):
+    def is_ours(self, diagnostics):
+        """Whether a message of /diagnostics is of this namespace."""
+        return any(status.name.startswith(self.namespace[1:] + '/') for status in diagnostics.status)
+
+    def diagnosis(self, task='odometry', node='visual_odometry'):
         """The newest status of a task of ours on /diagnostics."""
-        name = '%s/visual_odometry: %s' % (self.namespace, task)
+        name = '%s/%s: %s' % (self.namespace, node, task)
         found = [status for array in list(self.diagnostics) for status in array.status if status.name.endswith(name[1:])]
         return found[-1] if found else DiagnosticStatus()
 
