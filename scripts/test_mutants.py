@@ -7,10 +7,11 @@
     scripts/test_mutants.py --semantic                 # the mistakes of thought in test/semantic_mutants.yaml
 
 The operators are those of scripts/mutation_operators.py. The tests that reach the file by what they include are asked, the
-nearest and quickest first, until one fails. For src/ros, ROS tests follow; one of them has to fail twice.
+nearest and quickest first, until one fails. ROS tests follow for src/ros, test/check_camera_check for src/check and src/tools;
+one of these has to fail twice.
 test/equivalent_mutants.yaml names changes that no test could see. The copy and its own catkin workspace lie in .catkin_ws/mutants
-and are kept. Mutants are judged by the score in the order drawn, and report.md there has the table so far: what a stopped run
-judged is a random sample.
+and are kept. Mutants are judged in the order drawn, and report.md there has the table so far: what a stopped run judged is a
+random sample.
 Exit code 1 when fewer than --least per cent are caught, or any of the semantic ones is not.
 """
 import argparse
@@ -41,17 +42,19 @@ WORKSPACE = PACKAGE / '.catkin_ws'  # as the package's own: ccache then has the 
 BUILD, BINARIES = WORKSPACE / 'build', WORKSPACE / 'devel' / 'lib' / 'stereo_descriptor_vo'
 JOBS = int(os.environ.get('JOBS', str(os.cpu_count())))
 SLOW = 10  # times as long as without a mutant, and a test counts as failed: it hangs
-SCORE = 20  # mutants, after which the report is written
-ROS_LIMIT = 1800  # s, beyond the time limits in test/ros/*.test, which end the nodes as well
+BATCH = 1 if JOBS == 1 else 20  # mutants, after which the report is written
+NEAR = 2  # steps: the test includes the header that the file implements
+SLOW_LIMIT = 1800  # s, beyond the time limits in test/ros/*.test, which end the nodes as well
 
 # What a rendered world looks like is a matter of taste: its numbers are no mistakes.
 SCENERY = re.compile(r'src/render/(building_site|foliage|gardens|ground_map|houses|room_world|street_\w+|texture\w*|trees|vehicles)\.cpp')
-# ROS tests, and the sources that they run.
-ROS_TESTS = {
-    'nouns.test': 'test/ros/rostest_*.cpp',
-    'places.test': 'src/ros/place_recognition_nodelet.cpp',
-    'split.test': 'src/ros/*_nodelet.cpp',
-    'live.test': 'src/ros/*_nodelet.cpp',
+# ROS tests and checks, which take minutes: the rooms whose mutants they are asked for, and the sources that they run.
+SLOW_TESTS = {
+    'ros/nouns.test': (('ros', ), 'test/ros/rostest_*.cpp'),
+    'ros/places.test': (('ros', ), 'src/ros/place_recognition_nodelet.cpp'),
+    'ros/split.test': (('ros', ), 'src/ros/*_nodelet.cpp'),
+    'ros/live.test': (('ros', ), 'src/ros/*_nodelet.cpp'),
+    'check_camera_check': (('check', 'tools'), 'src/tools/check_camera.cpp'),
 }
 # Sources of gtests that are made of several.
 GTESTS = {'test_render': 'test/render/*.cpp', 'test_tools': 'src/tools/*.cpp'}
@@ -68,6 +71,12 @@ def run(command, log, timeout=None, **keywords):
             return subprocess.run(command, stdout=file, stderr=subprocess.STDOUT, timeout=timeout, **keywords).returncode == 0
         except subprocess.TimeoutExpired:
             return False
+
+
+def replace(path, text):
+    """Writes what differs: an unchanged file is not built again."""
+    if path.read_text() != text:
+        path.write_text(text)
 
 
 class Sources:
@@ -122,8 +131,9 @@ class Workspace:
         self._commands = {os.path.relpath(os.path.realpath(entry['file']), PACKAGE): entry
                           for entry in json.loads((BUILD / 'compile_commands.json').read_text())}
         self._sources = Sources()
-        self._reach = {name: self._sources.distances(GTESTS.get(name, f'test/*/{name}.cpp')) for name in self._gtest_names()}
-        self.seconds = {}
+        self._reach = {name: self._sources.distances(GTESTS.get(name, f'test/*/{name}.cpp')) for name in self._targets('test_')}
+        self.seconds = {}  # of a test without a mutant; infinite for a slow one that fails then
+        self._lock = threading.Lock()
         self._stale = set()  # targets that were built with a mutant
 
     @staticmethod
@@ -143,24 +153,25 @@ class Workspace:
             shutil.copy(source, target)
 
     @staticmethod
-    def _gtest_names():
+    def _targets(prefix):
         listing = subprocess.run(['make', 'help'], cwd=BUILD, check=True, stdout=subprocess.PIPE).stdout.decode()
-        return sorted(set(re.findall(r'^\.\.\. (test_\w+)$', listing, re.MULTILINE)))
+        return sorted(set(re.findall(rf'^\.\.\. ({prefix}\w+)$', listing, re.MULTILINE)))
 
-    def tests(self, file):
-        """The gtests that reach a file, the nearest first."""
+    def tests(self, file, quick):
+        """The gtests that reach a file, the nearest first; only these when it has to be quick."""
         path = pathlib.Path(file)
-        reached = {name: steps[path] for name, steps in self._reach.items() if path in steps}
-        return sorted(reached, key=lambda name: (reached[name] > 2, self.seconds.get(name, 0.0), name))
+        reached = {name: steps[path] for name, steps in self._reach.items()
+                   if path in steps and (steps[path] <= NEAR or not quick)}
+        return sorted(reached, key=lambda name: (reached[name] > NEAR, name not in self.seconds, self.seconds.get(name, 0.0),
+                                                 reached[name], name))
 
-    def measure(self, names):
-        """Builds the gtests and notes how long each takes as things are; none may fail."""
-        names = sorted(set(names) - set(self.seconds))
-        if names:
-            print(f'Building {len(names)} tests …', flush=True)
-        if names and not run(['make', '-k', '-j', str(JOBS), *names], WORK / 'build.log', cwd=BUILD):
-            sys.exit(f'error: the tests do not build, see {WORK / "build.log"}')
-        for name in names:
+    def measure(self, name):
+        """Builds a gtest where it was not asked yet, and notes how long it takes as things are, which it has to pass."""
+        with self._lock:
+            if name in self.seconds:
+                return
+            if not run(['make', '-j', str(JOBS), name], WORK / 'build.log', cwd=BUILD):
+                sys.exit(f'error: {name} does not build, see {WORK / "build.log"}')
             begin = time.monotonic()
             if not run([BINARIES / name], WORK / 'test.log', cwd=WORK):
                 sys.exit(f'error: {name} fails without any mutant, see {WORK / "test.log"}')
@@ -168,7 +179,7 @@ class Workspace:
 
     def passes(self, name, folder, environment):
         # Each has a home of its own: two mutants at once must not meet in files or under a name of ROS.
-        environment = dict(os.environ, **environment)
+        environment = dict(os.environ, GTEST_FAIL_FAST='1', **environment)
         return run([BINARIES / name], folder / 'test.log', timeout=5 + SLOW * self.seconds[name], cwd=folder, env=environment)
 
     def library_of(self, file):
@@ -206,61 +217,70 @@ class Workspace:
             raise NotBuilt
         return library
 
-    def judge_beside(self, mutant, folder):
+    def judge_beside(self, mutant, folder, quick):
         """The test that notices a mutant of a library, or None."""
-        library = self.mutated_library(mutant, folder)
-        for name in self.tests(mutant.file):
+        library = None
+        for name in self.tests(mutant.file, quick):
+            self.measure(name)  # the first one makes the library's other objects
+            library = library or self.mutated_library(mutant, folder)
             if not self.passes(name, folder, {'LD_PRELOAD': str(library)}):
                 return name
         return None
 
-    def judge_in_place(self, mutant, folder, ros_tests):
+    def judge_in_place(self, mutant, folder, quick):
         """The same for what is compiled into many: headers, tools, nodelets."""
         path = PACKAGE / mutant.file
         original = path.read_text()
-        path.write_text(mutant.applied(original))
         try:
-            for name in self.tests(mutant.file):
+            for name in self.tests(mutant.file, quick):
+                if name not in self.seconds:
+                    replace(path, original)
+                    self.measure(name)
+                replace(path, mutant.applied(original))
                 self._make(name, folder)
                 if not self.passes(name, folder, {}):
                     return name
-            measured = [name for name in self.ros_tests(mutant.file) if name in self.seconds] if ros_tests else []
-            for name in sorted(measured, key=self.seconds.get):
-                self._make_for_ros(name, folder)
+            for name in [] if quick else self.slow_tests(mutant.file):
+                if name not in self.seconds:
+                    replace(path, original)
+                    self.measure_slow(name)
+                if math.isinf(self.seconds[name]):
+                    continue
+                replace(path, mutant.applied(original))
+                self._make_for_slow(name, folder)
                 # Their times depend on what else the machine does: one failure is no proof.
-                if not self._passes_ros(name, folder) and not self._passes_ros(name, folder):
+                if not self._passes_slow(name, folder) and not self._passes_slow(name, folder):
                     return name
             return None
         finally:
-            path.write_text(original)
-            os.utime(path)
+            replace(path, original)
 
-    def ros_tests(self, file):
-        """The ROS tests that run a file."""
-        if not file.startswith('src/ros/') and '/ros/' not in file:
-            return []
-        return [name for name, pattern in ROS_TESTS.items() if pathlib.Path(file) in self._sources.distances(pattern)]
+    def slow_tests(self, file):
+        """Those that run a file, the quickest first."""
+        reached = [name for name, (rooms, pattern) in SLOW_TESTS.items()
+                   if room(file) in rooms and pathlib.Path(file) in self._sources.distances(pattern)]
+        return sorted(reached, key=lambda name: self.seconds.get(name, math.inf))
 
-    def measure_ros(self, names):
-        """Builds and runs ROS tests as things are. One that fails then cannot judge and is left out."""
-        for name in sorted(set(names)):
-            print(f'Running {name} …', flush=True)
-            self._make_for_ros(name, WORK)
-            begin = time.monotonic()
-            if self._passes_ros(name, WORK):
-                self.seconds[name] = time.monotonic() - begin
-            else:
-                print(f'warning: {name} is left out, as it fails without any mutant, see {WORK / "test.log"}', flush=True)
+    def measure_slow(self, name):
+        """As measure(). One that fails as things are cannot judge and is left out."""
+        self._make_for_slow(name, WORK)
+        begin = time.monotonic()
+        if self._passes_slow(name, WORK):
+            self.seconds[name] = time.monotonic() - begin
+        else:
+            self.seconds[name] = math.inf
+            print(f'warning: {name} is left out, as it fails without any mutant, see {WORK / "test.log"}', flush=True)
 
-    def _make_for_ros(self, name, folder):
-        self._make('all', folder)
-        if name == 'nouns.test':
-            self._make('tests', folder)
+    def _make_for_slow(self, name, folder):
+        needed = ['stereo_descriptor_vo_slow_nodelet', 'stereo_descriptor_vo_street'] if name.startswith('ros/') else []
+        for target in ['all'] + needed + (self._targets('rostest_') if name == 'ros/nouns.test' else []):
+            self._make(target, folder)
 
     @staticmethod
-    def _passes_ros(name, folder):
-        command = f'set +u; . "{WORKSPACE}/devel/setup.sh"; exec rostest "{PACKAGE}/test/ros/{name}"'
-        return run(['bash', '-c', command], folder / 'test.log', timeout=ROS_LIMIT)
+    def _passes_slow(name, folder):
+        test = shlex.quote(str(PACKAGE / 'test' / name))
+        command = f'set +u; . "{WORKSPACE}/devel/setup.sh"; exec {"rostest " if name.endswith(".test") else ""}{test}'
+        return run(['bash', '-c', command], folder / 'test.log', timeout=SLOW_LIMIT)
 
     def _make(self, target, folder):
         self._stale.add(target)
@@ -335,8 +355,8 @@ def equivalents():
     return {(entry['file'], entry['line'], entry['becomes']) for entry in entries}
 
 
-def judge_all(workspace, todo, ros_tests):
-    """Yields the list of (mutant, verdict, test) so far; of a score, those of libraries several at once, then the others."""
+def judge_all(workspace, todo, quick):
+    """Yields the list of (mutant, verdict, test) so far; of a batch, those of libraries several at once, then the others."""
     known, results = equivalents(), []
     folders = queue.Queue()
     for i in range(JOBS):
@@ -363,13 +383,14 @@ def judge_all(workspace, todo, ros_tests):
             print(f'{verdict:12} {mutant}{" by " + test if test else ""} ({time.monotonic() - begin:.0f} s)', flush=True)
         return mutant, verdict, test
 
-    for i in range(0, len(todo), SCORE):
-        beside = [m for m in todo[i:i + SCORE] if workspace.library_of(m.file)]
-        in_place = [m for m in todo[i:i + SCORE] if not workspace.library_of(m.file)]
+    for i in range(0, len(todo), BATCH):
+        beside = [m for m in todo[i:i + BATCH] if workspace.library_of(m.file)]
+        in_place = [m for m in todo[i:i + BATCH] if not workspace.library_of(m.file)]
+        if beside:
+            workspace.restore()
         with concurrent.futures.ThreadPoolExecutor(JOBS) as pool:
-            results += pool.map(lambda m: judged(m, workspace.judge_beside), beside)
-        results += [judged(m, lambda m, folder: workspace.judge_in_place(m, folder, ros_tests)) for m in in_place]
-        workspace.restore()
+            results += pool.map(lambda m: judged(m, lambda m, folder: workspace.judge_beside(m, folder, quick)), beside)
+        results += [judged(m, lambda m, folder: workspace.judge_in_place(m, folder, quick)) for m in in_place]
         yield results
 
 
@@ -414,7 +435,7 @@ def main():
     parser.add_argument('--semantic', action='store_true', help='those of test/semantic_mutants.yaml')
     parser.add_argument('--sample', type=int, help='so many of them, drawn at random')
     parser.add_argument('--seed', type=int, default=1)
-    parser.add_argument('--no-ros', action='store_true', help='ask no ROS tests')
+    parser.add_argument('--quick', action='store_true', help='ask the nearest gtests only')
     parser.add_argument('--list', action='store_true', help='only print the mutants')
     parser.add_argument('--least', type=float, default=85.0, help='per cent to be caught (85)')
     arguments = parser.parse_args()
@@ -423,10 +444,7 @@ def main():
         print('\n'.join(map(str, todo)) or 'no mutant: no line of a source was changed')
         return 0
     workspace = Workspace()
-    workspace.measure(name for mutant in todo for name in workspace.tests(mutant.file))
-    if not arguments.no_ros:
-        workspace.measure_ros(name for mutant in todo for name in workspace.ros_tests(mutant.file))
-    for results in judge_all(workspace, todo, not arguments.no_ros):
+    for results in judge_all(workspace, todo, arguments.quick):
         (WORK / 'report.md').write_text(table(results))
     print(table(results))
     count = collections.Counter(verdict for _, verdict, _ in results)
