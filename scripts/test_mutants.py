@@ -53,6 +53,7 @@ SLOW_TESTS = {
     'ros/nouns.test': (('ros', ), 'test/ros/rostest_*.cpp'),
     'ros/places.test': (('ros', ), 'src/ros/place_recognition_nodelet.cpp'),
     'ros/split.test': (('ros', ), 'src/ros/*_nodelet.cpp'),
+    'ros/faults.test': (('ros', ), 'src/ros/*_nodelet.cpp'),
     'ros/live.test': (('ros', ), 'src/ros/*_nodelet.cpp'),
     'check_camera_check': (('check', 'tools'), 'src/tools/check_camera.cpp'),
 }

@@ -114,6 +114,8 @@ TEST_F(EurocDataset, WhatDoesNotHoldTogetherIsNamed) {
   EXPECT_NE(errorOf(open).find("resolution"), std::string::npos);
   writeCamera("cam1", 0.2, {1000});
   EXPECT_NE(errorOf(open).find("no stamp in common"), std::string::npos);
+  writeCamera("cam1", 0.2, {});
+  EXPECT_NE(errorOf(open).find("lists no images"), std::string::npos);
   fs::remove_all(root_ / "cam1");
   EXPECT_NE(errorOf(open).find("cam1' is missing"), std::string::npos);
 }
