@@ -264,6 +264,8 @@ TEST(RenderDrive, PresetsHaveTheirShape) {
   EXPECT_GT(length(loop), 1000.0);
   const Eigen::Vector3d gap = loop.pose(loop.count() - 1).translation();
   EXPECT_LT(gap.norm(), 3.0) << "a loop comes back";
+  const DrivePath eight = makePresetPath("figure_eight", 0, 10.0, 1);
+  EXPECT_NEAR(eight.count(), 10.0 * 2.0 * 2.0 * M_PI * 28.0 / 7.0, 1.0) << "two circles of 28 m radius at 7 m/s";
   int standing = 0;
   for (int i = 1; i < loop.count(); ++i)
     standing += (loop.pose(i).translation() - loop.pose(i - 1).translation()).norm() < 1e-9;
