@@ -187,6 +187,9 @@ class Faults(PipelineCase):
             self.expect('stereo_features', task, ok)
         self.expect('visual_odometry', 'input rate', ok, 'features a second')
         self.expect('visual_odometry', 'odometry', ok, 'TRACKING')
+        self.expect('visual_odometry', 'latency', warn, 'are the clocks of two machines different?')
+        self.camera.publish(*self.camera.messages(0, time_of=self.shown - 2))
+        self.expect('stereo_features', 'synchronisation', warn, '1 messages were late')
 
         def darken(images):
             for image in images:

@@ -113,6 +113,8 @@ TEST_F(LoadParams, NamesWhatIsNoOption) {
   nh_.setParam("cuont", 5);
   nh_.setParam("inner/rate", 5);
   nh_.setParam("image_transport", "raw");
+  nh_.setParam("left_image/compressed/mode", "color");
+  nh_.setParam("right_image/compressed/mode", "color");
   ros::NodeHandle("/load_params_of_another").setParam("other", 1);
   Sample sample;
   std::vector<std::string> unknown = loadParams(nh_, sample);
