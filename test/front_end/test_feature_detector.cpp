@@ -121,6 +121,18 @@ TEST(FeatureDetector, CornersOfAnImageTooSmallForTheRefinementStayWhereTheyAre) 
   for (const Corner& corner : corners) EXPECT_EQ(corner.position.x, std::round(corner.position.x));
 }
 
+TEST(FeatureDetector, TheSmallestImageIsSearchedAndASmallerOneIsNot) {
+  constexpr int kSide = FeatureDetector::kSmallestSide, kMiddle = kSide / 2;
+  cv::Mat image(kSide, kSide, CV_8U, cv::Scalar(50));
+  image(cv::Rect(kMiddle, kMiddle, kSide - kMiddle, kSide - kMiddle)).setTo(200);
+  FeatureDetectorOptions options;
+  options.type = DetectorType::kGftt;
+  const FeatureDetector detector(options);
+  EXPECT_FALSE(detector.detect(image).empty());
+  EXPECT_TRUE(detector.detect(image.colRange(1, kSide)).empty());
+  EXPECT_TRUE(detector.detect(image.rowRange(1, kSide)).empty());
+}
+
 TEST(SpreadOverBuckets, ServesEveryBucketBeforeASecondTime) {
   std::mt19937 random(1);
   std::vector<Corner> corners;
