@@ -1,4 +1,5 @@
 #include <gtest/gtest.h>
+#include <nav_msgs/Odometry.h>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
 #include <sensor_msgs/CameraInfo.h>
@@ -14,6 +15,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iomanip>
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
@@ -487,13 +489,48 @@ TEST_F(Tools, HashTellsOptionsApart) {
   EXPECT_EQ(hash("--config " + (root_ / "turned.yaml").string()), hash("--param descriptor/oriented=true"));
 }
 
+/// A circle to the left: the camera's z points ahead and its x to the right, the base's x ahead and its z upwards.
+TEST_F(Tools, TheTwistOfTheGroundTruthIsThatOfTheBase) {
+  constexpr double kSpeed = 2.0, kTurn = 0.5;  // m/s, rad/s
+  {
+    std::ofstream poses(root_ / "circle.txt");
+    poses << std::setprecision(15);
+    for (int i = 0; i < kPairs; ++i) {
+      const double c = std::cos(0.1 * i * kTurn), s = std::sin(0.1 * i * kTurn), radius = kSpeed / kTurn;
+      poses << c << " 0 " << -s << " " << radius * (c - 1.0) << " 0 1 0 0 " << s << " 0 " << c << " " << radius * s
+            << "\n";
+    }
+  }
+  const fs::path file = root_ / "circle.bag";
+  ASSERT_EQ(run("kitti_to_bag", "--sequence " + sequence_.string() + " --poses " + (root_ / "circle.txt").string() +
+                                    " --output " + file.string())
+                .exit_code,
+            0);
+  const rosbag::Bag bag(file.string());
+  rosbag::View view(bag, rosbag::TopicQuery("/ground_truth/odom"));
+  EXPECT_EQ(view.size(), static_cast<std::uint32_t>(kPairs));
+  for (const rosbag::MessageInstance& message : view) {
+    const geometry_msgs::Twist twist = message.instantiate<nav_msgs::Odometry>()->twist.twist;
+    EXPECT_NEAR(twist.linear.x, kSpeed, 1e-6);
+    EXPECT_NEAR(twist.linear.y, 0.0, 1e-6);
+    EXPECT_NEAR(twist.linear.z, 0.0, 1e-6);
+    EXPECT_NEAR(twist.angular.x, 0.0, 1e-6);
+    EXPECT_NEAR(twist.angular.y, 0.0, 1e-6);
+    EXPECT_NEAR(twist.angular.z, kTurn, 1e-6);
+  }
+}
+
 TEST_F(Tools, PerfectTrajectoryHasNoError) {
   const std::string truth = (root_ / "truth.txt").string();
   const fs::path json = root_ / "errors.json";
   const Outcome outcome = run("evaluate_trajectory", "--ground-truth " + truth + " --estimate " + truth +
                                                          " --lengths 0.2,0.4 --json " + json.string());
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_FALSE(readText(json).empty());
+  const cv::FileStorage errors(json.string(), cv::FileStorage::READ | cv::FileStorage::FORMAT_JSON);
+  const cv::FileNode per_length = errors["per_length"];
+  ASSERT_EQ(per_length.size(), 2u);
+  EXPECT_DOUBLE_EQ(static_cast<double>(per_length[1]["length_m"]), 0.4);
+  EXPECT_NEAR(static_cast<double>(per_length[1]["translation_percent"]), 0.0, 1e-9);
   expectError(run("evaluate_trajectory", "--ground-truth " + truth + " --estimate " + (root_ / "none").string()),
               (root_ / "none").string());
 }
