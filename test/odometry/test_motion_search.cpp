@@ -174,6 +174,7 @@ TEST_F(MotionSearchTest, WhatMovesByLessThanCornersErrIsLeftAside) {
   EXPECT_NEAR(moved(found), 0.0, 1e-4);
   EXPECT_EQ(found.evidence.inliers, static_cast<int>(found.motion.inliers.size()));
   EXPECT_EQ(found.evidence.inliers, found.lastingInliers()) << "the board is no longer among them";
+  EXPECT_LT(found.evidence.matches, 1.1 * found.evidence.inliers) << "nor does it count against them";
   EXPECT_EQ(found.sightings.size(), found.motion.inliers.size());
   ASSERT_TRUE(found.rival) << "the covariance has to hold what all inliers together say";
   const Eigen::Isometry3d aside = *found.rival * found.motion.T_current_reference.inverse();
