@@ -8,10 +8,9 @@
 
 The operators are those of scripts/mutation_operators.py. The tests that reach the file by what they include are asked, the
 nearest and quickest first, until one fails. ROS tests follow for src/ros, test/check_camera_check for src/check and src/tools;
-one of these has to fail twice.
-test/equivalent_mutants.yaml names changes that no test could see. The copy and its own catkin workspace lie in .catkin_ws/mutants
-and are kept. Mutants are judged in the order drawn, and report.md there has the table so far: what a stopped run judged is a
-random sample.
+one of these has to fail twice. test/equivalent_mutants.yaml names changes that no test could see. The copy and its own catkin
+workspace lie in .catkin_ws/mutants and are kept. Mutants are judged in the order drawn, and report.md there has the table so
+far: what a stopped run judged is a random sample.
 Exit code 1 when fewer than --least per cent are caught, or any of the semantic ones is not.
 """
 import argparse
