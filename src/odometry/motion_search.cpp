@@ -19,8 +19,9 @@ constexpr double kElsewhere = 0.6;  // px, of aligned positions; up to 0.5 where
 // Chi-square of six, by which it is worth to look further, and to follow few points rather than all. Errors of
 // neighbouring points are not independent: up to 170 where nothing moved.
 constexpr double kSuspicious = 100.0, kCertain = 200.0;
-// The same for each point: a part of its noise is common to many, and the sum of that grows with their number (up to
-// 1.5 where nothing moved; movers have 2 to 14).
+// The same for each point, in variances of its residual: a part of its noise is common to many, so the sum grows with
+// their number. Measured where the sum exceeds kCertain: up to 1.5 where nothing moved, 1.7 and more with faults
+// (docs/log/odometry.md).
 constexpr double kCertainOfOne = 1.5;
 
 }  // namespace
