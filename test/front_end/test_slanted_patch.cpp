@@ -76,7 +76,8 @@ std::vector<float> everythingOf(const cv::Mat& left, const cv::Mat& right, int r
   SlantedPatch patch(radius);
   patch.take(left, kMargin, x, y);
   std::vector<float> all(patch.hessian().data(), patch.hessian().data() + 9);
-  for (const float product : patch.compare(right, kMargin, x - 3.f, y + 0.5f, slant)) all.push_back(product);
+  const Eigen::Vector3f products = patch.compare(right, kMargin, x - 3.f, y + 0.5f, slant);
+  all.insert(all.end(), products.data(), products.data() + 3);
   const auto [product, square, other_square] = patch.similarity();
   all.insert(all.end(), {product, square, other_square});
   return all;
