@@ -6,11 +6,12 @@
     scripts/test_mutants.py --sample 300 --seed 7      # drawn at random over all sources
     scripts/test_mutants.py --semantic                 # the mistakes of thought in test/semantic_mutants.yaml
 
-The operators are those of scripts/mutation_operators.py. The tests that reach the file by what they include are asked, the
-nearest and quickest first, until one fails. ROS tests follow for src/ros, test/check_camera_check for src/check and src/tools;
-one of these has to fail twice. test/equivalent_mutants.yaml names changes that no test could see. The copy and its own catkin
-workspace lie in .catkin_ws/mutants and are kept. Mutants are judged in the order drawn, and report.md there has the table so
-far: what a stopped run judged is a random sample.
+The operators are those of scripts/mutation_operators.py. The tests that reach the file by what they include are asked until
+one fails: first the nearest for all mutants, then the others for those that nobody noticed. ROS tests follow for src/ros,
+test/check_camera_check for src/check and src/tools; one of these has to fail twice. A mutant is equivalent where the compiler makes the same code of it (which is also that of other
+processors), or by test/equivalent_mutants.yaml, which names changes that no test could see. The copy and its own catkin
+workspace lie in .catkin_ws/mutants and are kept. Each time mutants are judged in the order drawn, and report.md there has the
+table so far: what a stopped run judged is a random sample.
 Exit code 1 when fewer than --least per cent are caught, or any of the semantic ones is not.
 """
 import argparse
@@ -46,7 +47,7 @@ NEAR = 2  # steps: the test includes the header that the file implements
 SLOW_LIMIT = 1800  # s, beyond the time limits in test/ros/*.test, which end the nodes as well
 
 # What a rendered world looks like is a matter of taste: its numbers are no mistakes.
-SCENERY = re.compile(r'src/render/(building_site|foliage|gardens|ground_map|houses|room_world|street_\w+|texture\w*|trees|vehicles)\.cpp')
+SCENERY = re.compile(r'src/render/(building_site|foliage|gardens|ground_map|houses|street_\w+|texture\w*|trees|vehicles|\w+_world)\.cpp')
 # ROS tests and checks, which take minutes: the rooms whose mutants they are asked for, and the sources that they run.
 SLOW_TESTS = {
     'ros/nouns.test': (('ros', ), 'test/ros/rostest_*.cpp'),
@@ -62,6 +63,17 @@ GTESTS = {'test_render': 'test/render/*.cpp', 'test_tools': 'src/tools/*.cpp'}
 
 class NotBuilt(Exception):
     pass
+
+
+class Equivalent(Exception):
+    pass
+
+
+def code(path, folder):
+    """What an object file has but for the name of its source."""
+    stripped = folder / 'stripped.o'
+    subprocess.run(['objcopy', '--strip-unneeded', path, stripped], check=True)
+    return stripped.read_bytes()
 
 
 def run(command, log, timeout=None, **keywords):
@@ -157,13 +169,11 @@ class Workspace:
         listing = subprocess.run(['make', 'help'], cwd=BUILD, check=True, stdout=subprocess.PIPE).stdout.decode()
         return sorted(set(re.findall(rf'^\.\.\. ({prefix}\w+)$', listing, re.MULTILINE)))
 
-    def tests(self, file, quick):
-        """The gtests that reach a file, the nearest first; only these when it has to be quick."""
+    def tests(self, file, near):
+        """The gtests that reach a file and are near it, or are not; the quickest first."""
         path = pathlib.Path(file)
-        reached = {name: steps[path] for name, steps in self._reach.items()
-                   if path in steps and (steps[path] <= NEAR or not quick)}
-        return sorted(reached, key=lambda name: (reached[name] > NEAR, name not in self.seconds, self.seconds.get(name, 0.0),
-                                                 reached[name], name))
+        reached = {name: steps[path] for name, steps in self._reach.items() if path in steps and (steps[path] <= NEAR) == near}
+        return sorted(reached, key=lambda name: (name not in self.seconds, self.seconds.get(name, 0.0), reached[name], name))
 
     def measure(self, name):
         """Builds a gtest where it was not asked yet, and notes how long it takes as things are, which it has to pass."""
@@ -192,22 +202,29 @@ class Workspace:
         link = (folder / 'link.txt').read_text()
         return folder if ' -shared ' in link and not target[2].endswith(('_ros', '_nodelets', '_examples')) else None
 
-    def mutated_library(self, mutant, folder):
-        """The library with the mutant, in a folder of its own: the workspace stays as it is."""
-        entry = self._commands[mutant.file]
-        text = (PACKAGE / mutant.file).read_text()
+    def _compile(self, file, text, output):
+        """Text in place of a source's, compiled as that is; the workspace stays as it is."""
+        entry = self._commands[file]
         # Beside the original, for its includes; no other mutant has this name.
-        source = (PACKAGE / mutant.file).with_name(f'mutant_{folder.name}.cpp')
-        source.write_text(mutant.applied(text))
+        source = (PACKAGE / file).with_name(f'mutant_{output.parent.name}.cpp')
+        source.write_text(text)
         try:
             command = shlex.split(entry['command'])
-            original = command[command.index('-o') + 1]
-            command[command.index('-o') + 1] = str(folder / 'mutant.o')
+            command[command.index('-o') + 1] = str(output)
             command[command.index('-c') + 1] = str(source)
-            if not run(command, folder / 'make.log', cwd=entry['directory']):
+            if not run(command, output.with_suffix('.log'), cwd=entry['directory']):
                 raise NotBuilt
         finally:
             source.unlink()
+
+    def mutated_library(self, mutant, folder):
+        """The library with the mutant, in a folder of its own."""
+        entry = self._commands[mutant.file]
+        command = shlex.split(entry['command'])
+        original = command[command.index('-o') + 1]
+        self._compile(mutant.file, mutant.applied((PACKAGE / mutant.file).read_text()), folder / 'mutant.o')
+        if code(folder / 'mutant.o', folder) == code(pathlib.Path(entry['directory']) / original, folder):
+            raise Equivalent
         link = shlex.split((self.library_of(mutant.file) / 'link.txt').read_text())
         output = link.index('-o') + 1
         library = folder / pathlib.Path(link[output]).name
@@ -217,22 +234,22 @@ class Workspace:
             raise NotBuilt
         return library
 
-    def judge_beside(self, mutant, folder, quick):
+    def judge_beside(self, mutant, folder, near):
         """The test that notices a mutant of a library, or None."""
         library = None
-        for name in self.tests(mutant.file, quick):
+        for name in self.tests(mutant.file, near):
             self.measure(name)  # the first one makes the library's other objects
             library = library or self.mutated_library(mutant, folder)
             if not self.passes(name, folder, {'LD_PRELOAD': str(library)}):
                 return name
         return None
 
-    def judge_in_place(self, mutant, folder, quick):
+    def judge_in_place(self, mutant, folder, near):
         """The same for what is compiled into many: headers, tools, nodelets."""
         path = PACKAGE / mutant.file
         original = path.read_text()
         try:
-            for name in self.tests(mutant.file, quick):
+            for name in self.tests(mutant.file, near):
                 if name not in self.seconds:
                     replace(path, original)
                     self.measure(name)
@@ -240,7 +257,7 @@ class Workspace:
                 self._make(name, folder)
                 if not self.passes(name, folder, {}):
                     return name
-            for name in [] if quick else self.slow_tests(mutant.file):
+            for name in [] if near else self.slow_tests(mutant.file):
                 if name not in self.seconds:
                     replace(path, original)
                     self.measure_slow(name)
@@ -251,9 +268,14 @@ class Workspace:
                 # Their times depend on what else the machine does: one failure is no proof.
                 if not self._passes_slow(name, folder) and not self._passes_slow(name, folder):
                     return name
-            return None
         finally:
             replace(path, original)
+        if mutant.file in self._commands:
+            self._compile(mutant.file, original, folder / 'original.o')
+            self._compile(mutant.file, mutant.applied(original), folder / 'mutant.o')
+            if code(folder / 'original.o', folder) == code(folder / 'mutant.o', folder):
+                raise Equivalent
+        return None
 
     def slow_tests(self, file):
         """Those that run a file, the quickest first."""
@@ -357,7 +379,7 @@ def equivalents():
 
 def judge_all(workspace, todo, quick):
     """Yields the list of (mutant, verdict, test) so far; of a batch, those of libraries several at once, then the others."""
-    known, results = equivalents(), []
+    known, results = equivalents(), {}
     folders = queue.Queue()
     for i in range(JOBS):
         folder = WORK / f'mutant_{i}'
@@ -366,32 +388,36 @@ def judge_all(workspace, todo, quick):
         folders.put(folder)
     lock = threading.Lock()
 
-    def judged(mutant, judge):
+    def judge(mutant, judges, near):
         folder = folders.get()
         begin = time.monotonic()
         try:
             if (mutant.file, mutant.before, mutant.after) in known:
                 verdict, test = 'equivalent', ''
             else:
-                test = judge(mutant, folder)
+                test = judges(mutant, folder, near)
                 verdict = 'caught' if test else 'survived'
-        except NotBuilt:
-            verdict, test = 'not compiled', ''
+        except (Equivalent, NotBuilt) as exception:
+            verdict, test = 'equivalent' if isinstance(exception, Equivalent) else 'not compiled', ''
         finally:
             folders.put(folder)
         with lock:
+            results[mutant] = verdict, test
             print(f'{verdict:12} {mutant}{" by " + test if test else ""} ({time.monotonic() - begin:.0f} s)', flush=True)
-        return mutant, verdict, test
 
-    for i in range(0, len(todo), BATCH):
-        beside = [m for m in todo[i:i + BATCH] if workspace.library_of(m.file)]
-        in_place = [m for m in todo[i:i + BATCH] if not workspace.library_of(m.file)]
-        if beside:
-            workspace.restore()
-        with concurrent.futures.ThreadPoolExecutor(JOBS) as pool:
-            results += pool.map(lambda m: judged(m, lambda m, folder: workspace.judge_beside(m, folder, quick)), beside)
-        results += [judged(m, lambda m, folder: workspace.judge_in_place(m, folder, quick)) for m in in_place]
-        yield results
+    for near in [True] if quick else [True, False]:
+        waiting = [mutant for mutant in todo if near or results[mutant][0] == 'survived']
+        print('The nearest tests …' if near else f'The other tests, for {len(waiting)} mutants …', flush=True)
+        for i in range(0, len(waiting), BATCH):
+            beside = [m for m in waiting[i:i + BATCH] if workspace.library_of(m.file)]
+            in_place = [m for m in waiting[i:i + BATCH] if not workspace.library_of(m.file)]
+            if beside:
+                workspace.restore()
+            with concurrent.futures.ThreadPoolExecutor(JOBS) as pool:
+                list(pool.map(lambda m: judge(m, workspace.judge_beside, near), beside))
+            for mutant in in_place:
+                judge(mutant, workspace.judge_in_place, near)
+            yield [(mutant, *results[mutant]) for mutant in todo if mutant in results]
 
 
 def wilson(successes, trials):
