@@ -45,6 +45,7 @@ TOKENS = [
 ]
 NUMBER = r'(?<![\w.<])(\d+\.\d*(?:e-?\d+)?f?|\d+(?:e-?\d+)?u?)(?![\w.>])'
 CALL = r'\b([\w:.]+)\(([\w.\->\[\]]+), ([\w.\->\[\]]+)([,)])'
+SYMMETRIC = r'(?:std::)?(?:min|max|hypot)|_mm\d*_(?:add|and|avg|cmpeq|max|min|mul|mullo|or|sad|xor)_\w+'  # in two arguments
 KEYWORDS = r'(?:return|using|typedef|const|auto|static|constexpr|struct|class|enum|namespace|throw|break|continue|case|public|' \
            r'private|if|for|while|else|do|template|friend|delete|explicit|inline|extern|default|switch|try|catch)\b'
 STATEMENT = r'(?:\+\+|--)?[\w:.\->\[\]()*]+(?:\(.*\)| (?:[+*/|&^-]|<<|>>)?= .*|\+\+|--)?;'
@@ -77,8 +78,9 @@ def condition(line):
 
 
 def is_statement(stripped, previous):
-    """Whether a line is a statement of its own that a compiler would not miss."""
+    """Whether a line is a statement of its own that a compiler would not miss, and does more than to reserve memory."""
     return (re.fullmatch(STATEMENT, stripped) and not re.match(KEYWORDS, stripped) and balanced(stripped)
+            and '.reserve(' not in stripped
             and re.search(r'(?:[{};:)]|\belse)$', previous) and '(' + stripped != '(;')
 
 
@@ -93,7 +95,7 @@ def replacements(line, previous):
     for match in re.finditer(NUMBER, line):
         yield 'number', match.start(1), match.end(1), changed_number(match[1])
     for match in re.finditer(CALL, line):
-        if match[2] != match[3]:
+        if match[2] != match[3] and not re.fullmatch(SYMMETRIC, match[1]):
             yield 'arguments', match.start(2), match.end(3), f'{match[3]}, {match[2]}'
     stripped = line.strip()
     if is_statement(stripped, previous):
