@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <cmath>
 #include <cstdlib>
+#include <opencv2/core/eigen.hpp>
 #include <opencv2/imgproc.hpp>
 #include <string>
 
@@ -179,14 +181,32 @@ TEST(RenderDrive, MisalignmentMovesTheRightImageOnly) {
   const cv::Rect window(6, 0, 294, 94), shifted(4, 0, 294, 94);
   EXPECT_LT(meanDifference(right_way.right(window), offset.right(shifted)),
             0.4 * meanDifference(right_way.right(window), offset.right(window)));
-  options.misalignment.disparity_offset = 0.0;
-  // Looking up by one row's angle: near the centre everything moves down by one row.
-  options.misalignment.rotation_x = std::atan(1.0 / 176.77) * 180.0 / M_PI;
-  const StereoPair turned = renderOne(street(path, options), 0);
-  const cv::Rect middle(90, 25, 120, 40), below(90, 26, 120, 40), above(90, 24, 120, 40);
-  const double unmoved = meanDifference(right_way.right(middle), turned.right(middle));
-  EXPECT_LT(meanDifference(right_way.right(middle), turned.right(below)), 0.6 * unmoved);
-  EXPECT_GT(meanDifference(right_way.right(middle), turned.right(above)), unmoved);
+}
+
+TEST(RenderDrive, ATurnedRightCameraSeesWhatItsHomographySays) {
+  const DrivePath path = makePresetPath("still", 1, 10.0, 1);
+  RenderOptions options = plainOptions();
+  const cv::Mat straight = renderOne(street(path, options), 0).right;
+  Misalignment& wrong = options.misalignment;
+  wrong.rotation_x = 0.5, wrong.rotation_y = -1.0, wrong.rotation_z = 1.5;
+  const cv::Mat turned = renderOne(street(path, options), 0).right;
+
+  // Turned by R, it sees at u what it saw at K R K^-1 u.
+  const auto turn = [](double degrees, const Eigen::Vector3d& axis) {
+    return Eigen::AngleAxisd(degrees * M_PI / 180.0, axis);
+  };
+  const Eigen::Matrix3d R = (turn(wrong.rotation_z, Eigen::Vector3d::UnitZ()) *
+                             turn(wrong.rotation_y, Eigen::Vector3d::UnitY()) *
+                             turn(wrong.rotation_x, Eigen::Vector3d::UnitX()))
+                                .toRotationMatrix();
+  const StereoCamera camera = smallCamera();
+  Eigen::Matrix3d K;
+  K << camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0;
+  cv::Mat homography, expected;
+  cv::eigen2cv(Eigen::Matrix3d(K * R * K.inverse()), homography);
+  cv::warpPerspective(straight, expected, homography, straight.size(), cv::INTER_LINEAR | cv::WARP_INVERSE_MAP);
+  const cv::Rect window(20, 15, 270, 64);
+  EXPECT_LT(meanDifference(turned(window), expected(window)), 0.3 * meanDifference(turned(window), straight(window)));
 }
 
 TEST(RenderDrive, StandingStillGivesOneImageAgainAndAgain) {
