@@ -195,10 +195,10 @@ TEST(RenderDrive, ATurnedRightCameraSeesWhatItsHomographySays) {
   const auto turn = [](double degrees, const Eigen::Vector3d& axis) {
     return Eigen::AngleAxisd(degrees * M_PI / 180.0, axis);
   };
-  const Eigen::Matrix3d R = (turn(wrong.rotation_z, Eigen::Vector3d::UnitZ()) *
-                             turn(wrong.rotation_y, Eigen::Vector3d::UnitY()) *
-                             turn(wrong.rotation_x, Eigen::Vector3d::UnitX()))
-                                .toRotationMatrix();
+  const Eigen::Matrix3d R =
+      (turn(wrong.rotation_z, Eigen::Vector3d::UnitZ()) * turn(wrong.rotation_y, Eigen::Vector3d::UnitY()) *
+       turn(wrong.rotation_x, Eigen::Vector3d::UnitX()))
+          .toRotationMatrix();
   const StereoCamera camera = smallCamera();
   Eigen::Matrix3d K;
   K << camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0;
