@@ -249,6 +249,35 @@ TEST_F(Tools, OnePoseForEachPairAndTheDriveIsFollowed) {
   }
 }
 
+TEST_F(Tools, KeyFramesOfADriveAreComparedTwoByTwo) {
+  const std::string truth = (root_ / "truth.txt").string(), views = (root_ / "views.csv").string();
+  const Outcome outcome =
+      run("run_places", sequence_.string() + " --poses " + poses().string() + " --keyframes " +
+                            (root_ / "keyframes.csv").string() + " --ground-truth " + truth + " --views " + views +
+                            " --param place_recognition/keyframe_distance=0.15");  // m, less than a step
+  if (outcome.err.find("without Ceres") != std::string::npos) GTEST_SKIP() << outcome.err;
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(linesOf(readText(poses())).size(), static_cast<std::size_t>(kPairs));
+  EXPECT_EQ(linesOf(readText(root_ / "keyframes.csv")).size(), static_cast<std::size_t>(kPairs) + 1);
+
+  const std::vector<std::string> rows = linesOf(readText(views));
+  ASSERT_EQ(rows.size(), 1u + kPairs * (kPairs - 1) / 2);
+  std::size_t row = 1;
+  for (int first = 0; first < kPairs; ++first)
+    for (int second = first + 1; second < kPairs; ++second, ++row) {
+      std::istringstream stream(rows[row]);
+      std::vector<double> numbers;
+      for (std::string cell; std::getline(stream, cell, ',');) numbers.push_back(std::stod(cell));
+      ASSERT_EQ(numbers.size(), 9u) << rows[row];
+      EXPECT_EQ(numbers[0], first) << rows[row];
+      EXPECT_EQ(numbers[1], second) << rows[row];
+      EXPECT_NEAR(numbers[2], kStep * (second - first), 1e-6) << rows[row];
+      EXPECT_NEAR(numbers[3], 0.0, 1e-6) << "degrees; " << rows[row];
+      EXPECT_GT(numbers[5], 100) << "inliers; " << rows[row];
+      EXPECT_LT(numbers[7], 0.05) << "m; " << rows[row];
+    }
+}
+
 TEST_F(Tools, TimingEndsWithTheReasonWithoutCommas) {
   // A grey right image refuses the pair, and the odometry says why.
   cv::imwrite(image(1, 2).string(), cv::Mat1b(240, 320, std::uint8_t{90}));
