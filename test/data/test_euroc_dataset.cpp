@@ -4,9 +4,11 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "../temporary_folder.hpp"
@@ -100,6 +102,20 @@ TEST_F(EurocDataset, PosesAreRelativeToTheFirst) {
   ASSERT_EQ(poses.size(), 2u);
   EXPECT_TRUE(poses[0].isApprox(Eigen::Isometry3d::Identity()));
   EXPECT_TRUE(poses[1].translation().isApprox(Eigen::Vector3d(0, 0, 1.5)));
+}
+
+TEST_F(EurocDataset, CamerasOfAnotherModelAreNamed) {
+  const std::pair<std::string, std::string> others[] = {{"pinhole", "omni"}, {"radial-tangential", "equidistant"}};
+  for (const auto& [supported, other] : others) {
+    const fs::path path = root_ / "cam0" / "sensor.yaml";
+    std::ifstream file(path);
+    const std::string sound{std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
+    std::ofstream(path) << std::string(sound).replace(sound.find(supported), supported.size(), other);
+    const std::string error = errorOf([this] { EurocSequence(root_.string()); });
+    EXPECT_NE(error.find("'" + other + "' is not supported, only '" + supported + "' is"), std::string::npos) << error;
+    EXPECT_NE(error.find(path.string()), std::string::npos) << error;
+    std::ofstream(path) << sound;
+  }
 }
 
 TEST_F(EurocDataset, WhatDoesNotHoldTogetherIsNamed) {
