@@ -8,10 +8,10 @@
 
 The operators are those of scripts/mutation_operators.py. The tests that reach the file by what they include are asked until
 one fails: first the nearest for all mutants, then the others for those that nobody noticed. ROS tests follow for src/ros,
-test/check_camera_check for src/check and src/tools; one of these has to fail twice. A mutant is equivalent where the compiler makes the same code of it (which is also that of other
-processors), or by test/equivalent_mutants.yaml, which names changes that no test could see. The copy and its own catkin
-workspace lie in .catkin_ws/mutants and are kept. Each time mutants are judged in the order drawn, and report.md there has the
-table so far: what a stopped run judged is a random sample.
+test/check_camera_check for src/check and src/tools; one of these has to fail twice. A mutant is equivalent where the compiler
+makes the same code of it, as of lines for other processors, or by test/equivalent_mutants.yaml, which names changes that no
+test could see. The copy and its own catkin workspace lie in .catkin_ws/mutants and are kept. Each time mutants are judged in
+the order drawn, and report.md there has the table so far: what a stopped run judged is a random sample.
 Exit code 1 when fewer than --least per cent are caught, or any of the semantic ones is not.
 """
 import argparse
