@@ -1,70 +1,85 @@
 #pragma once
 
-#include <message_filters/sync_policies/exact_time.h>
-#include <message_filters/synchronizer.h>
-
+#include <algorithm>
+#include <boost/shared_ptr.hpp>
 #include <cstddef>
-#include <cstdint>
+#include <deque>
 #include <functional>
-#include <memory>
 #include <stdexcept>
 #include <string>
 #include <tuple>
 #include <utility>
 
 #include "stamps.hpp"
-#include "waiting_stamps.hpp"
 
 namespace sdvo {
 
-/// message_filters' synchroniser of equal stamps, which begins anew where stamps that wait for ever would shut out
-/// whatever comes next (WaitingStamps). One thread calls it.
+/// Puts messages of equal stamps together, one of each input. What waits is kept in the order in which it came and not
+/// in that of the stamps, as in message_filters' ExactTime: there a stamp of the future throws away what came after it,
+/// and some of them shut out whatever comes next. One thread at a time calls it.
 template <class... Messages>
 class ExactSynchroniser {
  public:
   using Callback = std::function<void(const boost::shared_ptr<const Messages>&...)>;
 
-  /// `capacity`: sets that wait. `on_unpaired`, unless empty, is told of sets that are given up, null for what is
-  /// missing.
+  /// `capacity`: messages of each input that wait. `on_unpaired`, unless empty, is told of sets that are given up, null
+  /// for what is missing.
   ExactSynchroniser(int capacity, Callback on_set, Callback on_unpaired = {})
-      : capacity_(static_cast<std::uint32_t>(capacity)),
-        on_set_(std::move(on_set)),
-        on_unpaired_(std::move(on_unpaired)),
-        waiting_(static_cast<std::size_t>(capacity)) {
-    begin();
-  }
+      : capacity_(capacity), on_set_(std::move(on_set)), on_unpaired_(std::move(on_unpaired)) {}
 
   /// Of the input of this number. Throws std::invalid_argument for a stamp that ROS cannot compare.
   template <int input, class Message>
   void add(const boost::shared_ptr<const Message>& message) {
-    const ros::Time& stamp = message->header.stamp;
-    const std::string problem = whyUnusable(stamp);
+    const std::string problem = whyUnusable(message->header.stamp);
     if (!problem.empty()) throw std::invalid_argument(problem);
-    if (waiting_.shutOut(nanoseconds(stamp))) begin();
-    synchroniser_->template add<input>(message);
+    const std::size_t at = setOf(message->header.stamp);
+    std::get<input>(waiting_[at].messages) = message;
+    if (std::apply([](const auto&... all) { return (... && all); }, waiting_[at].messages)) {
+      // Inputs keep their order: of what came before, something was lost.
+      for (std::size_t k = 0; k < at; ++k) giveUp(0);
+      const MessageSet complete = take(0);
+      std::apply(on_set_, complete);
+      return;
+    }
+    const auto has_input = [](const Waiting& set) { return std::get<input>(set.messages) != nullptr; };
+    if (std::count_if(waiting_.begin(), waiting_.end(), has_input) > capacity_) {
+      const auto first = std::find_if(waiting_.begin(), waiting_.end(), has_input);
+      giveUp(static_cast<std::size_t>(first - waiting_.begin()));
+    }
   }
 
  private:
-  using Policy = message_filters::sync_policies::ExactTime<Messages...>;
+  using MessageSet = std::tuple<boost::shared_ptr<const Messages>...>;
 
-  /// What waited is forgotten.
-  void begin() {
-    synchroniser_ = std::make_unique<message_filters::Synchronizer<Policy>>(Policy(capacity_));
-    synchroniser_->registerCallback(&ExactSynchroniser::onSet, this);
-    if (on_unpaired_) synchroniser_->registerDropCallback(&ExactSynchroniser::onUnpaired, this);
+  struct Waiting {
+    ros::Time stamp;
+    MessageSet messages;
+  };
+
+  /// The place of the set with a stamp, which is a new one where nothing of it came before.
+  std::size_t setOf(const ros::Time& stamp) {
+    const auto found =
+        std::find_if(waiting_.begin(), waiting_.end(), [&](const Waiting& set) { return set.stamp == stamp; });
+    const auto at = static_cast<std::size_t>(found - waiting_.begin());
+    if (found == waiting_.end()) waiting_.push_back({stamp, {}});
+    return at;
   }
 
-  void onSet(const boost::shared_ptr<const Messages>&... messages) {
-    waiting_.complete(nanoseconds(std::get<0>(std::tie(messages...))->header.stamp));
-    on_set_(messages...);
+  MessageSet take(std::size_t at) {
+    const auto set = waiting_.begin() + static_cast<std::ptrdiff_t>(at);
+    MessageSet messages = std::move(set->messages);
+    waiting_.erase(set);
+    return messages;
   }
 
-  void onUnpaired(const boost::shared_ptr<const Messages>&... messages) { on_unpaired_(messages...); }
+  void giveUp(std::size_t at) {
+    const MessageSet incomplete = take(at);
+    if (on_unpaired_) std::apply(on_unpaired_, incomplete);
+  }
 
-  std::uint32_t capacity_;
+  std::ptrdiff_t capacity_;
   Callback on_set_, on_unpaired_;
-  WaitingStamps waiting_;
-  std::unique_ptr<message_filters::Synchronizer<Policy>> synchroniser_;
+  std::deque<Waiting> waiting_;  ///< in the order in which the first message of each came
 };
 
 }  // namespace sdvo

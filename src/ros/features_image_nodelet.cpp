@@ -33,11 +33,11 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
         : synchroniser(kQueue, [&nodelet](const auto&... messages) { nodelet.draw(messages...); }) {
       ros::NodeHandle& nh = nodelet.nh_;
       StereoImageTransport& transport = *nodelet.transport_;
-      left.registerCallback<const Image::ConstPtr&>([&nodelet](const Image::ConstPtr& m) { nodelet.take<0>(m); });
-      right.registerCallback<const Image::ConstPtr&>([&nodelet](const Image::ConstPtr& m) { nodelet.take<1>(m); });
       // Resolved, for a transport appends its own name to that of the topic.
-      left.subscribe(nh, nh.resolveName("left/image_rect"), kQueue, transport.left);
-      right.subscribe(nh, nh.resolveName("right/image_rect"), kQueue, transport.right);
+      left.subscribe(nh, nh.resolveName("left/image_rect"), kQueue, transport.left,
+                     [&nodelet](const Image::ConstPtr& m) { nodelet.take<0>(m); });
+      right.subscribe(nh, nh.resolveName("right/image_rect"), kQueue, transport.right,
+                      [&nodelet](const Image::ConstPtr& m) { nodelet.take<1>(m); });
       features = nh.subscribe<Features>("stereo_features", kQueue,
                                         [&nodelet](const Features::ConstPtr& m) { nodelet.take<2>(m); });
       flow = nh.subscribe<Flow>("feature_flow", kQueue, [&nodelet](const Flow::ConstPtr& m) { nodelet.take<3>(m); });

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <image_transport/subscriber_plugin.h>
-#include <message_filters/simple_filter.h>
 #include <sensor_msgs/Image.h>
 
 #include <cstdint>
@@ -43,8 +42,8 @@ class StereoImageTransport {
   ImageTransport left, right;
 };
 
-/// A message filter's source of images over a plugin that is there already; unsubscribes when destroyed.
-class ImageSubscriber : public message_filters::SimpleFilter<sensor_msgs::Image> {
+/// A subscription to images over a plugin that is there already, as long as it lives.
+class ImageSubscriber {
  public:
   ImageSubscriber() = default;
   ImageSubscriber(const ImageSubscriber&) = delete;
@@ -54,10 +53,10 @@ class ImageSubscriber : public message_filters::SimpleFilter<sensor_msgs::Image>
   }
 
   /// `transport` must outlive this subscriber and serve no other one meanwhile.
-  void subscribe(ros::NodeHandle& nh, const std::string& topic, std::uint32_t queue_size, ImageTransport& transport) {
+  void subscribe(ros::NodeHandle& nh, const std::string& topic, std::uint32_t queue_size, ImageTransport& transport,
+                 const boost::function<void(const sensor_msgs::ImageConstPtr&)>& callback) {
     plugin_ = transport.plugin.get();
-    const auto pass = [this](const sensor_msgs::ImageConstPtr& image) { signalMessage(image); };
-    plugin_->subscribe(nh, topic, queue_size, pass, ros::VoidPtr(), transport.hints);
+    plugin_->subscribe(nh, topic, queue_size, callback, ros::VoidPtr(), transport.hints);
   }
 
  private:

@@ -25,73 +25,58 @@ StereoInput::StereoInput(ros::NodeHandle& nh, StereoImageTransport& transport, c
                          Callback callback, Refusal refuse)
     : callback_(std::move(callback)),
       refuse_(std::move(refuse)),
-      options_(options),
-      arrivals_(resolvedTopics(nh), options),
-      waiting_(static_cast<std::size_t>(options.sync_queue_size)) {
-  const auto topics = resolvedTopics(nh);
-  connect(left_image_, left_image_gate_, ArrivalLog::kLeftImage, topics[0]);
-  connect(right_image_, right_image_gate_, ArrivalLog::kRightImage, topics[1]);
-  connect(left_info_, left_info_gate_, ArrivalLog::kLeftInfo, topics[2]);
-  connect(right_info_, right_info_gate_, ArrivalLog::kRightInfo, topics[3]);
-
-  synchronise();
-
+      topics_(resolvedTopics(nh)),
+      arrivals_(topics_, options),
+      exact_(options.sync_queue_size, [this](const auto&... messages) { onPair(messages...); }) {
+  if (options.approximate_sync) synchroniseApproximately(options);
   const auto arrivals =
       static_cast<std::uint32_t>(std::max({kArrivalQueue, options.sync_queue_size, options.queue_size}));
   ros::NodeHandle right_nh = right_callbacks_.serve(nh);
-  left_image_.subscribe(nh, topics[0], arrivals, transport.left);
-  right_image_.subscribe(right_nh, topics[1], arrivals, transport.right);
-  left_info_.subscribe(nh, topics[2], arrivals);
-  right_info_.subscribe(nh, topics[3], arrivals);
+  left_image_.subscribe(nh, topics_[ArrivalLog::kLeftImage], arrivals, transport.left,
+                        [this](const Image::ConstPtr& m) { take<ArrivalLog::kLeftImage>(m); });
+  right_image_.subscribe(right_nh, topics_[ArrivalLog::kRightImage], arrivals, transport.right,
+                         [this](const Image::ConstPtr& m) { take<ArrivalLog::kRightImage>(m); });
+  left_info_ = nh.subscribe<Info>(topics_[ArrivalLog::kLeftInfo], arrivals,
+                                  [this](const Info::ConstPtr& m) { take<ArrivalLog::kLeftInfo>(m); });
+  right_info_ = nh.subscribe<Info>(topics_[ArrivalLog::kRightInfo], arrivals,
+                                   [this](const Info::ConstPtr& m) { take<ArrivalLog::kRightInfo>(m); });
   right_callbacks_.start();
 }
 
-/// Anew: what waited is forgotten.
-void StereoInput::synchronise() {
-  const auto queue = static_cast<std::uint32_t>(options_.sync_queue_size);
-  if (options_.approximate_sync) {
-    ApproximatePolicy policy(queue);
-    policy.setMaxIntervalDuration(ros::Duration(options_.max_interval));
-    // Without a least time between images of one camera each pair would wait for the next one, to see that it is no
-    // better.
-    const ros::Duration least(std::min(options_.max_interval, kLeastPeriod));
-    for (int input = 0; input < ArrivalLog::kInputs; ++input) policy.setInterMessageLowerBound(input, least);
-    approximate_ = std::make_unique<message_filters::Synchronizer<ApproximatePolicy>>(
-        static_cast<const ApproximatePolicy&>(policy), left_image_gate_, right_image_gate_, left_info_gate_,
-        right_info_gate_);
-    approximate_->registerCallback(&StereoInput::onPair, this);
-  } else {
-    exact_ = std::make_unique<message_filters::Synchronizer<ExactPolicy>>(
-        ExactPolicy(queue), left_image_gate_, right_image_gate_, left_info_gate_, right_info_gate_);
-    exact_->registerCallback(&StereoInput::onPair, this);
-  }
+void StereoInput::synchroniseApproximately(const StereoInputOptions& options) {
+  ApproximatePolicy policy(static_cast<std::uint32_t>(options.sync_queue_size));
+  policy.setMaxIntervalDuration(ros::Duration(options.max_interval));
+  // Without a least time between images of one camera each pair would wait for the next one, to see that it is no
+  // better.
+  const ros::Duration least(std::min(options.max_interval, kLeastPeriod));
+  for (int input = 0; input < ArrivalLog::kInputs; ++input) policy.setInterMessageLowerBound(input, least);
+  approximate_ =
+      std::make_unique<message_filters::Synchronizer<ApproximatePolicy>>(static_cast<const ApproximatePolicy&>(policy));
+  approximate_->registerCallback(&StereoInput::onPair, this);
 }
 
-template <class Source, class Message>
-void StereoInput::connect(Source& source, Gate<Message>& gate, ArrivalLog::Input input, const std::string& topic) {
-  using MessagePtr = boost::shared_ptr<const Message>;
-  const boost::function<void(const MessagePtr&)> pass = [this, &gate, input, topic](const MessagePtr& message) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    try {
-      const ros::Time& stamp = message->header.stamp;
-      arrivals_.note(input, stamp, ros::SteadyTime::now().toSec());
-      const std::string problem = whyUnusable(stamp);
-      if (!problem.empty()) return refuse_(topic, problem);
-      // The policy of other stamps takes what waits longest in its queue for the oldest, whatever its stamp.
-      if (!options_.approximate_sync && waiting_.shutOut(nanoseconds(stamp))) synchronise();
-      gate.signalMessage(message);
-    } catch (const std::exception& e) {
-      refuse_(topic, e.what());
+template <ArrivalLog::Input input, class Message>
+void StereoInput::take(const boost::shared_ptr<const Message>& message) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  try {
+    const ros::Time& stamp = message->header.stamp;
+    arrivals_.note(input, stamp, ros::SteadyTime::now().toSec());
+    const std::string problem = whyUnusable(stamp);
+    if (!problem.empty()) return refuse_(topics_[input], problem);
+    if (approximate_) {
+      approximate_->add<input>(message);
+    } else {
+      exact_.add<input>(message);
     }
-  };
-  source.template registerCallback<const MessagePtr&>(pass);
+  } catch (const std::exception& e) {
+    refuse_(topics_[input], e.what());
+  }
 }
 
 void StereoInput::onPair(const sensor_msgs::ImageConstPtr& left_image, const sensor_msgs::ImageConstPtr& right_image,
                          const sensor_msgs::CameraInfoConstPtr& left_info,
                          const sensor_msgs::CameraInfoConstPtr& right_info) {
   arrivals_.notePair();
-  waiting_.complete(nanoseconds(left_image->header.stamp));
   callback_({left_image, right_image, left_info, right_info});
 }
 

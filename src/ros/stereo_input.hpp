@@ -1,13 +1,12 @@
 #pragma once
 
-#include <message_filters/subscriber.h>
 #include <message_filters/sync_policies/approximate_time.h>
-#include <message_filters/sync_policies/exact_time.h>
 #include <message_filters/synchronizer.h>
 #include <ros/node_handle.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
 
+#include <array>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -16,8 +15,8 @@
 #include "../config/interface_options.hpp"
 #include "arrival_log.hpp"
 #include "callback_thread.hpp"
+#include "exact_synchroniser.hpp"
 #include "image_subscriber.hpp"
-#include "waiting_stamps.hpp"
 
 namespace sdvo {
 
@@ -46,37 +45,27 @@ class StereoInput {
  private:
   using Image = sensor_msgs::Image;
   using Info = sensor_msgs::CameraInfo;
-  using ExactPolicy = message_filters::sync_policies::ExactTime<Image, Image, Info, Info>;
+  using ExactPolicy = ExactSynchroniser<Image, Image, Info, Info>;
   using ApproximatePolicy = message_filters::sync_policies::ApproximateTime<Image, Image, Info, Info>;
 
-  /// Lets messages through that the synchroniser can take: it throws at some stamps.
-  template <class Message>
-  struct Gate : message_filters::SimpleFilter<Message> {
-    using message_filters::SimpleFilter<Message>::signalMessage;
-  };
-
-  template <class Source, class Message>
-  void connect(Source& source, Gate<Message>& gate, ArrivalLog::Input input, const std::string& topic);
-
-  void synchronise();
+  void synchroniseApproximately(const StereoInputOptions& options);
+  template <ArrivalLog::Input input, class Message>
+  void take(const boost::shared_ptr<const Message>& message);
   void onPair(const sensor_msgs::ImageConstPtr& left_image, const sensor_msgs::ImageConstPtr& right_image,
               const sensor_msgs::CameraInfoConstPtr& left_info, const sensor_msgs::CameraInfoConstPtr& right_info);
 
   Callback callback_;
   Refusal refuse_;
-  const StereoInputOptions options_;
+  const std::array<std::string, ArrivalLog::kInputs> topics_;
   ArrivalLog arrivals_;
   std::mutex mutex_;  // of what follows
-  WaitingStamps waiting_;
+  ExactPolicy exact_;
+  std::unique_ptr<message_filters::Synchronizer<ApproximatePolicy>> approximate_;  // null where stamps are equal
 
-  // Destroyed in reverse order: first the subscribers, then the synchronisers, which let go of the gates.
-  Gate<Image> left_image_gate_, right_image_gate_;
-  Gate<Info> left_info_gate_, right_info_gate_;
-  std::unique_ptr<message_filters::Synchronizer<ExactPolicy>> exact_;
-  std::unique_ptr<message_filters::Synchronizer<ApproximatePolicy>> approximate_;
+  // Destroyed in reverse order: first the subscribers.
   CallbackThread right_callbacks_;
   ImageSubscriber left_image_, right_image_;
-  message_filters::Subscriber<Info> left_info_, right_info_;
+  ros::Subscriber left_info_, right_info_;
 };
 
 }  // namespace sdvo

@@ -61,6 +61,31 @@ TEST_F(ExactSynchroniserTest, WhatOneInputLeftOverDoesNotOutliveAJumpBack) {
   EXPECT_EQ(sets_, (std::vector<double>{10.0, 11.0, 12.0}));
 }
 
+TEST_F(ExactSynchroniserTest, TheFutureShutsNothingOut) {
+  for (int i = 0; i < 2 * kRoom; ++i) synchroniser_.add<0>(at<Image>(5000.0 + i));
+  for (int i = 0; i < 50; ++i) addBoth(100.0 + i);
+  EXPECT_EQ(sets_.size(), 50u);
+  EXPECT_EQ(without_info_, 2 * kRoom);
+}
+
+TEST_F(ExactSynchroniserTest, ASetOfTheFutureTakesNothingFromThoseThatCameAfterIt) {
+  synchroniser_.add<0>(at<Image>(5000.0));
+  synchroniser_.add<0>(at<Image>(1.0));
+  synchroniser_.add<1>(at<CameraInfo>(5000.0));
+  synchroniser_.add<1>(at<CameraInfo>(1.0));
+  EXPECT_EQ(sets_, (std::vector<double>{5000.0, 1.0}));
+  EXPECT_EQ(without_info_ + without_image_, 0);
+}
+
+TEST_F(ExactSynchroniserTest, WhatComesTooLateTakesNothingFromTheRest) {
+  for (int i = 0; i < 10; ++i) synchroniser_.add<0>(at<Image>(1.0 + i));
+  EXPECT_EQ(without_info_, 10 - kRoom);
+  for (int i = 0; i < 10; ++i) synchroniser_.add<1>(at<CameraInfo>(1.0 + i));
+  EXPECT_EQ(sets_, (std::vector<double>{7.0, 8.0, 9.0, 10.0})) << "the images that wait";
+  addBoth(11.0);
+  EXPECT_EQ(without_image_, 10 - kRoom);
+}
+
 TEST_F(ExactSynchroniserTest, ALateMessageTakesNothingFromThoseThatWait) {
   for (int i = 1; i <= 2 * kRoom; ++i) addBoth(i);
   synchroniser_.add<0>(at<Image>(100.0));
