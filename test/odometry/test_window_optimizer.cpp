@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <random>
 
 #include "../synthetic_features.hpp"
@@ -82,14 +83,14 @@ TEST(PredictObservation, JacobiansAgreeWithFiniteDifferences) {
 constexpr double kPositionSigma = 0.2;  // px
 
 /// Five poses, sixty points, measurements without noise but with the rig's error; poses and points start off the truth.
-Window disturbedWindow(const RigCalibration& truth) {
+Window disturbedWindow(const RigCalibration& truth, const std::function<Eigen::Isometry3d(int)>& pose = syntheticPose) {
   std::mt19937 random(7);
   const auto uniform = [&](double low, double high) {
     return low + (high - low) * static_cast<double>(random()) / static_cast<double>(std::mt19937::max());
   };
   Window window;
   window.camera = someCamera();
-  for (int f = 0; f < 5; ++f) window.T_camera_origin.push_back(syntheticPose(f).inverse());
+  for (int f = 0; f < 5; ++f) window.T_camera_origin.push_back(pose(f).inverse());
   for (int p = 0; p < 60; ++p) {
     AnchoredPoint point;
     point.ray_and_inverse_depth = {uniform(-0.6, 0.6), uniform(-0.2, 0.2), 1.0 / uniform(8.0, 40.0)};
@@ -243,6 +244,37 @@ TEST(WindowOptimizer, CovariancesAreThoseOfTheErrorsWhereTheKernelBendsAtTheNois
   }
   // The weights depend on the residuals, so the inverse of the normal equations alone would be too large.
   EXPECT_NEAR(nees, 6.0, 1.5);
+}
+
+TEST(WindowOptimizer, AFloorAddsItsInformationToThatOfEachPose) {
+  Eigen::Isometry3d T_base_camera = Eigen::Isometry3d::Identity();
+  T_base_camera.linear() << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+  T_base_camera.translation() << 0.3, 0.1, 0.5;
+  const auto driven = [&](int f) -> Eigen::Isometry3d {
+    const Eigen::Isometry3d T_floor_base =
+        Eigen::Translation3d(0.5 * f, 0.02 * f * f, 0.0) * Eigen::AngleAxisd(0.04 * f, Eigen::Vector3d::UnitZ());
+    return T_base_camera.inverse() * T_floor_base * T_base_camera;
+  };
+  PlanarOptions options;
+  options.planar_height_sigma = 1e-3;
+  options.planar_tilt_sigma = 0.05;
+  WindowOptimizerOptions least_squares = leastSquares();
+  least_squares.disparity_sigma = 1.0;  // so coarse that the floor tells as much as the measurements
+  WindowOptimizer optimizer(least_squares);
+  Window window = disturbedWindow({}, driven);
+  for (WindowObservation& observation : window.observations) observation.sigma = 2.0;
+  addNoise(window, 2.0, 1.0, 100);
+  const Eigen::MatrixXd free = optimizer.optimize(window).pose_covariance.inverse();
+  window.floor.emplace(options, T_base_camera, 0.0);
+  const Eigen::MatrixXd added = optimizer.optimize(window).pose_covariance.inverse() - free;
+  Eigen::MatrixXd expected = Eigen::MatrixXd::Zero(24, 24);
+  for (int f = 1; f < 5; ++f) {
+    Floor::Jacobian jacobian;
+    window.floor->residual(window.T_camera_origin[f], &jacobian);
+    expected.block<6, 6>(6 * (f - 1), 6 * (f - 1)) = jacobian.transpose() * jacobian;
+  }
+  // The noise found, and with it the scale of all covariances, is a little different with the floor.
+  EXPECT_LT((added - expected).norm(), 0.2 * expected.norm());
 }
 
 TEST(WindowOptimizer, InformationOfTheCalibrationIsWithoutThePrior) {
