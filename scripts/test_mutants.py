@@ -7,8 +7,9 @@
     scripts/test_mutants.py --semantic                 # the mistakes of thought in test/semantic_mutants.yaml
 
 The operators are those of scripts/mutation_operators.py. The tests that reach the file by what they include are asked until
-one fails: first the nearest for all mutants, then the others for those that nobody noticed. ROS tests follow for src/ros,
-test/check_camera_check for src/check and src/tools; one of these has to fail twice. A mutant is equivalent where the compiler
+one fails: first the nearest gtests for all mutants, then the others for those that nobody noticed, several at once, as only
+the mutant's library is linked anew. Tests of programs follow one by one, ROS tests for src/ros and test/check_camera_check for
+src/check and src/tools; one of these two has to fail twice. A mutant is equivalent where the compiler
 makes the same code of it, as of lines for other processors, or by test/equivalent_mutants.yaml, which names changes that no
 test could see. The copy and its own catkin workspace lie in .catkin_ws/mutants and are kept. Each time mutants are judged in
 the order drawn, and report.md there has the table so far: what a stopped run judged is a random sample.
@@ -146,7 +147,6 @@ class Workspace:
         self._reach = {name: self._sources.distances(GTESTS.get(name, f'test/*/{name}.cpp')) for name in self._targets('test_')}
         self.seconds = {}  # of a test without a mutant; infinite for a slow one that fails then
         self._lock = threading.Lock()
-        self._stale = set()  # targets that were built with a mutant
 
     @staticmethod
     def _copy_package():
@@ -187,20 +187,27 @@ class Workspace:
                 sys.exit(f'error: {name} fails without any mutant, see {WORK / "test.log"}')
             self.seconds[name] = time.monotonic() - begin
 
-    def passes(self, name, folder, environment):
+    def passes(self, name, folder, environment, program):
         # Each has a home of its own: two mutants at once must not meet in files or under a name of ROS.
         environment = dict(os.environ, GTEST_FAIL_FAST='1', **environment)
-        return run([BINARIES / name], folder / 'test.log', timeout=5 + SLOW * self.seconds[name], cwd=folder, env=environment)
+        return run([program], folder / 'test.log', timeout=5 + SLOW * self.seconds[name], cwd=folder, env=environment)
 
     def library_of(self, file):
-        """How the shared library that has the file is linked: its target's folder; None for what is linked otherwise."""
+        """The folder of the target that has the file, and whether that is a 'shared' or a 'static' library, or None."""
         entry = self._commands.get(file)
         if entry is None:
-            return None
+            return None, None
         target = re.search(r'-o (\S*CMakeFiles/(\w+)\.dir)/', entry['command'])
         folder = pathlib.Path(entry['directory']) / target[1]
         link = (folder / 'link.txt').read_text()
-        return folder if ' -shared ' in link and not target[2].endswith(('_ros', '_nodelets', '_examples')) else None
+        if ' -shared ' in link:
+            return folder, None if target[2].endswith(('_nodelets', '_examples')) else 'shared'
+        return folder, 'static' if ' qc ' in link else None
+
+    def is_beside(self, file, name):
+        """Whether a gtest can be asked without a change to the workspace: what test_tools runs has static libraries inside."""
+        kind = self.library_of(file)[1]
+        return kind == 'shared' or (kind == 'static' and name != 'test_tools')
 
     def _compile(self, file, text, output):
         """Text in place of a source's, compiled as that is; the workspace stays as it is."""
@@ -217,47 +224,62 @@ class Workspace:
         finally:
             source.unlink()
 
-    def mutated_library(self, mutant, folder):
-        """The library with the mutant, in a folder of its own."""
-        entry = self._commands[mutant.file]
-        command = shlex.split(entry['command'])
-        original = command[command.index('-o') + 1]
-        self._compile(mutant.file, mutant.applied((PACKAGE / mutant.file).read_text()), folder / 'mutant.o')
-        if code(folder / 'mutant.o', folder) == code(pathlib.Path(entry['directory']) / original, folder):
-            raise Equivalent
-        link = shlex.split((self.library_of(mutant.file) / 'link.txt').read_text())
-        output = link.index('-o') + 1
-        library = folder / pathlib.Path(link[output]).name
-        link[output] = str(library)
-        link[link.index(original)] = str(folder / 'mutant.o')
-        if not run(link, folder / 'make.log', cwd=entry['directory']):
+    def _original_object(self, file):
+        command = shlex.split(self._commands[file]['command'])
+        return command[command.index('-o') + 1]
+
+    def _link(self, target, output, changed, folder):
+        """What a target's folder links, made elsewhere, by a command that was changed before."""
+        link = shlex.split((target / 'link.txt').read_text())
+        link[link.index('-o') + 1] = str(output)
+        if not run(changed(link), folder / 'make.log', cwd=target.parent.parent):
             raise NotBuilt
-        return library
+        return output
+
+    def _mutated_object(self, mutant, folder):
+        self._compile(mutant.file, mutant.applied((PACKAGE / mutant.file).read_text()), folder / 'mutant.o')
+        original = pathlib.Path(self._commands[mutant.file]['directory']) / self._original_object(mutant.file)
+        if code(folder / 'mutant.o', folder) == code(original, folder):
+            raise Equivalent
+        return str(folder / 'mutant.o')
 
     def judge_beside(self, mutant, folder, near):
-        """The test that notices a mutant of a library, or None."""
-        library = None
+        """The gtest that notices a mutant of a library, which is loaded or linked before the library's own; or None."""
+        target, kind = self.library_of(mutant.file)
+        original = self._original_object(mutant.file)
+        mutated, environment = None, {}
         for name in self.tests(mutant.file, near):
+            if not self.is_beside(mutant.file, name):
+                continue
             self.measure(name)  # the first one makes the library's other objects
-            library = library or self.mutated_library(mutant, folder)
-            if not self.passes(name, folder, {'LD_PRELOAD': str(library)}):
+            if mutated is None:
+                mutated = self._mutated_object(mutant, folder)
+                if kind == 'shared':
+                    library = self._link(target, folder / 'mutated.so', lambda link: [mutated if arg == original else arg for arg in link],
+                                         folder)
+                    environment = {'LD_PRELOAD': str(library)}
+            program = BINARIES / name
+            if kind == 'static':
+                program = self._link(target.with_name(f'{name}.dir'), folder / name, lambda link: [link[0], mutated] + link[1:], folder)
+            if not self.passes(name, folder, environment, program):
                 return name
         return None
 
-    def judge_in_place(self, mutant, folder, near):
-        """The same for what is compiled into many: headers, tools, nodelets."""
+    def judge_in_place(self, mutant, folder, quick):
+        """The test that notices a mutant in the workspace itself, of those that cannot be asked beside it, or None."""
         path = PACKAGE / mutant.file
         original = path.read_text()
+        names = self.tests(mutant.file, near=True) + ([] if quick else self.tests(mutant.file, near=False))
         try:
-            for name in self.tests(mutant.file, near):
+            for name in [name for name in names if not self.is_beside(mutant.file, name)]:
                 if name not in self.seconds:
                     replace(path, original)
                     self.measure(name)
                 replace(path, mutant.applied(original))
                 self._make(name, folder)
-                if not self.passes(name, folder, {}):
+                if not self.passes(name, folder, {}, BINARIES / name):
                     return name
-            for name in [] if near else self.slow_tests(mutant.file):
+            for name in [] if quick else self.slow_tests(mutant.file):
                 if name not in self.seconds:
                     replace(path, original)
                     self.measure_slow(name)
@@ -270,7 +292,7 @@ class Workspace:
                     return name
         finally:
             replace(path, original)
-        if mutant.file in self._commands:
+        if mutant.file in self._commands and not self.library_of(mutant.file)[1]:
             self._compile(mutant.file, original, folder / 'original.o')
             self._compile(mutant.file, mutant.applied(original), folder / 'mutant.o')
             if code(folder / 'original.o', folder) == code(folder / 'mutant.o', folder):
@@ -305,15 +327,8 @@ class Workspace:
         return run(['bash', '-c', command], folder / 'test.log', timeout=SLOW_LIMIT)
 
     def _make(self, target, folder):
-        self._stale.add(target)
         if not run(['make', '-j', str(JOBS), target], folder / 'make.log', cwd=BUILD):
             raise NotBuilt
-
-    def restore(self):
-        """Builds again, as things are, what was built with a mutant."""
-        if self._stale and not run(['make', '-j', str(JOBS), *sorted(self._stale)], WORK / 'build.log', cwd=BUILD):
-            sys.exit(f'error: the package does not build, see {WORK / "build.log"}')
-        self._stale.clear()
 
 
 def semantic():
@@ -378,7 +393,7 @@ def equivalents():
 
 
 def judge_all(workspace, todo, quick):
-    """Yields the list of (mutant, verdict, test) so far; of a batch, those of libraries several at once, then the others."""
+    """Yields the list of (mutant, verdict, test) so far, in the order drawn; first what can be asked several at once."""
     known, results = equivalents(), {}
     folders = queue.Queue()
     for i in range(JOBS):
@@ -388,14 +403,14 @@ def judge_all(workspace, todo, quick):
         folders.put(folder)
     lock = threading.Lock()
 
-    def judge(mutant, judges, near):
+    def judge(mutant, judges, scope):
         folder = folders.get()
         begin = time.monotonic()
         try:
             if (mutant.file, mutant.before, mutant.after) in known:
                 verdict, test = 'equivalent', ''
             else:
-                test = judges(mutant, folder, near)
+                test = judges(mutant, folder, scope)
                 verdict = 'caught' if test else 'survived'
         except (Equivalent, NotBuilt) as exception:
             verdict, test = 'equivalent' if isinstance(exception, Equivalent) else 'not compiled', ''
@@ -405,19 +420,24 @@ def judge_all(workspace, todo, quick):
             results[mutant] = verdict, test
             print(f'{verdict:12} {mutant}{" by " + test if test else ""} ({time.monotonic() - begin:.0f} s)', flush=True)
 
+    def survivors():
+        return [mutant for mutant in todo if results.get(mutant, ('survived', ))[0] == 'survived']
+
+    def so_far():
+        return [(mutant, *results[mutant]) for mutant in todo if mutant in results]
+
     for near in [True] if quick else [True, False]:
-        waiting = [mutant for mutant in todo if near or results[mutant][0] == 'survived']
-        print('The nearest tests …' if near else f'The other tests, for {len(waiting)} mutants …', flush=True)
+        waiting = [mutant for mutant in survivors() if workspace.library_of(mutant.file)[1]]
+        print(f'{"The nearest" if near else "The other"} gtests, for {len(waiting)} mutants of libraries …', flush=True)
         for i in range(0, len(waiting), BATCH):
-            beside = [m for m in waiting[i:i + BATCH] if workspace.library_of(m.file)]
-            in_place = [m for m in waiting[i:i + BATCH] if not workspace.library_of(m.file)]
-            if beside:
-                workspace.restore()
             with concurrent.futures.ThreadPoolExecutor(JOBS) as pool:
-                list(pool.map(lambda m: judge(m, workspace.judge_beside, near), beside))
-            for mutant in in_place:
-                judge(mutant, workspace.judge_in_place, near)
-            yield [(mutant, *results[mutant]) for mutant in todo if mutant in results]
+                list(pool.map(lambda m: judge(m, workspace.judge_beside, near), waiting[i:i + BATCH]))
+            yield so_far()
+    waiting = survivors()
+    print(f'Programs, nodelets and ROS tests, for {len(waiting)} mutants, one by one …', flush=True)
+    for mutant in waiting:
+        judge(mutant, workspace.judge_in_place, quick)
+        yield so_far()
 
 
 def wilson(successes, trials):
