@@ -69,6 +69,18 @@ TEST(RowCheck, MapsTheRowsOfABadRectificationWithoutBlamingTheMoment) {
     EXPECT_NEAR(map.at<double>(1, column), tilted((column + 0.5) * width - kDisparity, 0.0), 0.27) << column;
 }
 
+TEST(RowCheck, WarnsOfRowsThatDifferByLessThanMatchingAllows) {
+  const auto low = [](double, double) { return 0.7; };  // px; 1.5 are allowed, 0.35 of it on the mean over the image
+  const Finding rows = checked(0.0, 0.0, low).rectification();
+  EXPECT_EQ(rows.verdict, Verdict::kWarn) << rows.what;
+}
+
+TEST(RowCheck, FailsWhereMoreThanATenthOfTheImageIsOutOfReach) {
+  const auto right_edge = [](double u, double) { return u > 260.0 ? 2.5 : 0.0; };  // px, in a fifth of the image
+  const Finding rows = checked(0.0, 0.0, right_edge).rectification();
+  EXPECT_EQ(rows.verdict, Verdict::kFail) << rows.what;
+}
+
 TEST(RowCheck, DoesNotJudgeTheMomentOfACameraThatStands) {
   EXPECT_EQ(checked(0.03, 0.0, none).sameMoment().verdict, Verdict::kOpen);
 }

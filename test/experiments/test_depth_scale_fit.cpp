@@ -1,14 +1,19 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <filesystem>
 #include <functional>
 #include <random>
 
 #include "../../src/experiments/depth_scale_fit.hpp"
 #include "../synthetic_scene.hpp"
+#include "../temporary_folder.hpp"
+#include "stereo_descriptor_vo/data/kitti_writer.hpp"
 
 namespace sdvo {
 namespace {
+
+namespace fs = std::filesystem;
 
 /// Samples of a known curve with noise, a fifth of them wrong altogether.
 std::vector<SizeSample> samplesOf(const std::function<double(double)>& curve, double noise_octaves) {
@@ -55,6 +60,44 @@ TEST(DepthScaleFit, ACircleOfFixedSizeInTheWorldNeedsNeither) {
 TEST(DepthScaleFit, RefusesAHandfulOfSamples) {
   const std::string error = synthetic::errorOf([] { fitShapes({{5.0, 10.0, 2.0}}); });
   EXPECT_NE(error.find("only 1 features"), std::string::npos) << error;
+}
+
+/// A drive towards a textured wall, which is 8 m away at first, by `step` (m) from pair to pair.
+ReferenceSequence towardsAWall(const fs::path& folder, int pairs, double step) {
+  constexpr double kDepth = 8.0;  // m
+  const StereoCamera camera = synthetic::camera();
+  const synthetic::Texture texture(2, 8.0 * kDepth / camera.fx, 60.0 * kDepth / camera.fx);
+  KittiWriter writer(folder);
+  std::vector<std::int64_t> stamps;
+  Trajectory trajectory;
+  for (int i = 0; i < pairs; ++i) {
+    for (int side = 0; side < 2; ++side)
+      writer.writeImage(side, i, synthetic::renderPlane(texture, camera, kDepth - i * step, side * camera.baseline));
+    trajectory.push_back(Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.0, i * step)));
+    stamps.push_back(i * 100000000LL);
+  }
+  writer.finish(camera, stamps, {});
+  return {folder.filename(), KittiSequence(folder), pairs, trajectory};
+}
+
+TEST(TryCurves, CountsCorrectMatchesOfAPairAndComparesThemWithTheStandardSize) {
+  const TemporaryFolder folder;
+  const ReferenceSequence near = towardsAWall(folder.path() / "near", 2, 0.1);  // one pair of views
+  const ReferenceSequence far = towardsAWall(folder.path() / "far", 5, 0.7);    // two: one and four steps apart
+  DepthScaleOptions standard, small;
+  standard.scale_normalisation = small.scale_normalisation = false;
+  small.constant_size = 4.0;
+  const std::vector<DepthScaleOptions> curves = {standard, small,
+                                                 DepthScaleOptions{}.completedFor(DescriptorType::kFreak)};
+  const auto of_near = tryCurves({near}, {}, curves, 150), of_far = tryCurves({far}, {}, curves, 150);
+  const auto of_both = tryCurves({near, far}, {}, curves, 150);
+  for (std::size_t k = 0; k < curves.size(); ++k) {
+    EXPECT_NEAR(of_near[k].gain, 100.0 * (of_near[k].correct / of_near[0].correct - 1.0), 1e-9) << k;
+    EXPECT_NEAR(of_both[k].correct, (of_near[k].correct + 2.0 * of_far[k].correct) / 3.0, 1e-9) << k;
+    EXPECT_NEAR(of_both[k].gain, (of_near[k].gain + of_far[k].gain) / 2.0, 1e-9) << k;
+  }
+  EXPECT_GT(of_near[0].correct, 75.0) << "most of 150, as little changes";
+  EXPECT_GT(of_far[2].gain, 0.0) << "sizes that follow the depth are for views that differ in scale";
 }
 
 }  // namespace
