@@ -47,7 +47,7 @@ BATCH = 1 if JOBS == 1 else 20  # mutants, after which the report is written
 NEAR = 2  # steps: the test includes the header that the file implements
 SLOW_LIMIT = 1800  # s, beyond the time limits in test/ros/*.test, which end the nodes as well
 
-# What a rendered world looks like is a matter of taste: its numbers are no mistakes.
+# What a rendered world looks like is a matter of taste: its numbers are no mistakes, and it has a row of its own.
 SCENERY = re.compile(r'src/render/(building_site|foliage|gardens|ground_map|houses|street_\w+|texture\w*|trees|vehicles|\w+_world)\.cpp')
 # ROS tests and checks, which take minutes: the rooms whose mutants they are asked for, and the sources that they run.
 SLOW_TESTS = {
@@ -450,6 +450,8 @@ def wilson(successes, trials):
 
 
 def room(file):
+    if SCENERY.match(file):
+        return 'scenery'
     parts = pathlib.Path(file).parts
     return parts[2] if parts[0] == 'include' else parts[1]
 

@@ -14,8 +14,9 @@ CoarseView::CoarseView(const cv::Mat& image) {
 }
 
 std::optional<cv::Point2d> CoarseView::motionSince(const CoarseView& before, const cv::Rect& part) const {
-  // Share of the spectrum's energy at the peak (chosen); a lower one is taken for unrelated views.
-  constexpr double kRelated = 0.15;
+  // Share of the spectrum's energy at the peak; a lower one is taken for unrelated views. Those of noise stay below 0.25
+  // in 95 of 100 cases; two pairs in a row of KITTI, Karlsruhe and EuRoC have more than 0.36, views 30 % apart 0.29.
+  constexpr double kRelated = 0.28;
   cv::Mat window;
   cv::createHanningWindow(window, part.size(), CV_64F);
   double response = 0.0;

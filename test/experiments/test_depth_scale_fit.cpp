@@ -8,7 +8,7 @@
 #include "../../src/experiments/depth_scale_fit.hpp"
 #include "../synthetic_scene.hpp"
 #include "../temporary_folder.hpp"
-#include "stereo_descriptor_vo/data/kitti_writer.hpp"
+#include "wall_drive.hpp"
 
 namespace sdvo {
 namespace {
@@ -62,21 +62,8 @@ TEST(DepthScaleFit, RefusesAHandfulOfSamples) {
   EXPECT_NE(error.find("only 1 features"), std::string::npos) << error;
 }
 
-/// A drive towards a textured wall, which is 8 m away at first, by `step` (m) from pair to pair.
 ReferenceSequence towardsAWall(const fs::path& folder, int pairs, double step) {
-  constexpr double kDepth = 8.0;  // m
-  const StereoCamera camera = synthetic::camera();
-  const synthetic::Texture texture(2, 8.0 * kDepth / camera.fx, 60.0 * kDepth / camera.fx);
-  KittiWriter writer(folder);
-  std::vector<std::int64_t> stamps;
-  Trajectory trajectory;
-  for (int i = 0; i < pairs; ++i) {
-    for (int side = 0; side < 2; ++side)
-      writer.writeImage(side, i, synthetic::renderPlane(texture, camera, kDepth - i * step, side * camera.baseline));
-    trajectory.push_back(Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.0, i * step)));
-    stamps.push_back(i * 100000000LL);
-  }
-  writer.finish(camera, stamps, {});
+  const Trajectory trajectory = synthetic::writeWallDrive(folder, pairs, step);
   return {folder.filename(), KittiSequence(folder), pairs, trajectory};
 }
 
@@ -91,6 +78,7 @@ TEST(TryCurves, CountsCorrectMatchesOfAPairAndComparesThemWithTheStandardSize) {
                                                  DepthScaleOptions{}.completedFor(DescriptorType::kFreak)};
   const auto of_near = tryCurves({near}, {}, curves, 150), of_far = tryCurves({far}, {}, curves, 150);
   const auto of_both = tryCurves({near, far}, {}, curves, 150);
+  ASSERT_EQ(of_both.size(), curves.size());
   for (std::size_t k = 0; k < curves.size(); ++k) {
     EXPECT_NEAR(of_near[k].gain, 100.0 * (of_near[k].correct / of_near[0].correct - 1.0), 1e-9) << k;
     EXPECT_NEAR(of_both[k].correct, (of_near[k].correct + 2.0 * of_far[k].correct) / 3.0, 1e-9) << k;

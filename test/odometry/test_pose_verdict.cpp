@@ -158,6 +158,12 @@ TEST(PoseVerdict, AChangeIsUnexpectedBeyondALastingAcceleration) {
   EXPECT_FALSE(isUnexpected(evidence));
   evidence.motion.translation().z() = 1.0 + allowed + 0.001;
   EXPECT_TRUE(isUnexpected(evidence));
+  evidence.motion.translation().z() = 1.0;
+  const double turn = 2.0 * (evidence.velocity_age + 0.1) * 0.1;  // rad/s^2, over the age, for one pair
+  evidence.motion.linear() = expSO3({0.0, turn - 0.001, 0.0});
+  EXPECT_FALSE(isUnexpected(evidence));
+  evidence.motion.linear() = expSO3({0.0, turn + 0.001, 0.0});
+  EXPECT_TRUE(isUnexpected(evidence));
   evidence.velocity.reset();
   EXPECT_FALSE(isUnexpected(evidence)) << "nothing was expected";
 }

@@ -1,0 +1,127 @@
+#include <gtest/gtest.h>
+
+#include <cstdio>
+#include <opencv2/imgproc.hpp>
+#include <string>
+
+#include "../../src/check/image_check.hpp"
+
+namespace sdvo {
+namespace {
+
+const cv::Size kSize(212, 120);
+
+/// What extraction says of a good pair with these mean grey levels.
+ExtractionReport goodReport(double left = 100.0, double right = 110.0) {
+  ExtractionReport report;
+  report.detected = 500, report.stereo_matched = 400;
+  report.mean_intensity[0] = left, report.mean_intensity[1] = right;
+  report.sharpness[0] = report.sharpness[1] = 10.0;
+  return report;
+}
+
+cv::Mat grey(int level) {
+  return cv::Mat(kSize, CV_8U, cv::Scalar(level));
+}
+
+/// Ten pairs with one report.
+ImageCheck checked(const ExtractionReport& report, const cv::Mat& left = grey(100), const cv::Mat& right = grey(100)) {
+  ImageCheck check;
+  for (int i = 0; i < 10; ++i) check.add(left, right, report);
+  return check;
+}
+
+void expectSaid(const Finding& finding, Verdict verdict, const std::string& words) {
+  EXPECT_EQ(finding.verdict, verdict) << finding.what;
+  EXPECT_NE((finding.what + finding.remedy).find(words), std::string::npos) << finding.what << "; " << finding.remedy;
+}
+
+TEST(ImageCheck, ExposureIsThatOfTheDarkerAndOfTheBrighterSide) {
+  const auto exposure = [](double left, double right) {
+    return checked(goodReport(left, right)).exposure(30.0, 220.0);
+  };
+  expectSaid(exposure(40.0, 210.0), Verdict::kOk, "mean grey level 40 to 210, 0 % white");
+  expectSaid(exposure(210.0, 29.0), Verdict::kWarn, "too dark");
+  expectSaid(exposure(29.0, 28.0), Verdict::kFail, "too dark");
+  expectSaid(exposure(100.0, 221.0), Verdict::kWarn, "too bright");
+}
+
+TEST(ImageCheck, WhiteInAQuarterOfBothImagesIsTooBright) {
+  const auto withWhite = [](int columns) {
+    cv::Mat left = grey(100);
+    left.colRange(0, columns) = 255;
+    return checked(goodReport(), left, grey(100)).exposure(30.0, 220.0);
+  };
+  expectSaid(withWhite(kSize.width / 4), Verdict::kOk, "12 % white");
+  expectSaid(withWhite(kSize.width * 3 / 5), Verdict::kWarn, "too bright");
+}
+
+TEST(ImageCheck, TextureIsCornersThatAreFoundInBothImages) {
+  const auto texture = [](int corners, int matched) {
+    ExtractionReport report = goodReport();
+    report.detected = corners, report.stereo_matched = matched;
+    return checked(report).texture(100, 0.5);
+  };
+  expectSaid(texture(100, 50), Verdict::kOk, "100 corners, 90 % of the pairs have more than 100; 50 % are found");
+  expectSaid(texture(99, 90), Verdict::kFail, "scene with texture");
+  expectSaid(texture(100, 49), Verdict::kWarn, "max_disparity");
+  expectSaid(texture(0, 0), Verdict::kFail, "0 % are found");
+  ImageCheck check = checked(goodReport());
+  ExtractionReport bare = goodReport();
+  bare.detected = bare.stereo_matched = 20;
+  for (int i = 0; i < 2; ++i) check.add(grey(100), grey(100), bare);
+  expectSaid(check.texture(100, 0.5), Verdict::kWarn, "some views");
+}
+
+/// A view of a scene, `right` px further right; its pixels are those of the coarse view, too.
+cv::Mat view(int right) {
+  static const cv::Mat scene = [] {
+    cv::Mat noise(kSize.height, 3000, CV_8U);
+    cv::RNG(3).fill(noise, cv::RNG::UNIFORM, 0, 256);
+    cv::blur(noise, noise, cv::Size(5, 5));
+    return noise;
+  }();
+  return scene.colRange(right, right + kSize.width).clone();
+}
+
+/// 15 pairs that stand still and 15 that move by `motion` px each, `sharpness` (grey levels) while moving.
+ImageCheck swept(int motion, double sharpness) {
+  ImageCheck check;
+  int right = 0;
+  for (int i = 0; i < 31; ++i) {
+    ExtractionReport report = goodReport();
+    if (i > 15) right += motion, report.sharpness[0] = sharpness;
+    check.add(view(right), view(right), report);
+  }
+  return check;
+}
+
+TEST(ImageCheck, BlurIsWhatMotionTakesOfTheSharpness) {
+  expectSaid(swept(10, 7.5).blur(), Verdict::kOk, "75 % of the sharpness");
+  expectSaid(swept(10, 5.0).blur(), Verdict::kWarn, "fast views have 50 % of the sharpness");
+  expectSaid(swept(1, 5.0).blur(), Verdict::kOpen, "did not move enough");
+}
+
+/// That the view moves by from pair to pair as the check says it, %.
+double shareOfView(const ImageCheck& check) {
+  double turn = 0.0, share = 0.0;
+  std::sscanf(check.frameRate({0.0}).what.c_str(), "up to %lf deg and %lf", &turn, &share);
+  return share;
+}
+
+TEST(ImageCheck, TheFrameRateIsTooLowWhereThePairsHaveTooLittleInCommon) {
+  EXPECT_EQ(ImageCheck().frameRate({}).verdict, Verdict::kOpen);
+  const ImageCheck slow = swept(21, 10.0), fast = swept(64, 10.0);
+  ImageCheck unrelated;
+  for (int i = 0; i < 10; ++i) unrelated.add(view(i * kSize.width), view(i * kSize.width), goodReport());
+  expectSaid(slow.frameRate({4.0}), Verdict::kOk, "up to 4.0 deg and ");
+  EXPECT_NEAR(shareOfView(slow), 100.0 * 21 / 212, 1.0) << "to a pixel of a hundred columns";
+  expectSaid(slow.frameRate({11.0}), Verdict::kWarn, "a higher frame rate");
+  expectSaid(slow.frameRate({21.0}), Verdict::kFail, "a higher frame rate");
+  expectSaid(fast.frameRate({4.0}), Verdict::kWarn, "a higher frame rate");
+  EXPECT_NEAR(shareOfView(fast), 100.0 * 64 / 212, 1.0);
+  expectSaid(unrelated.frameRate({4.0}), Verdict::kFail, "a higher frame rate");
+}
+
+}  // namespace
+}  // namespace sdvo
