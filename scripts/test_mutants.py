@@ -9,10 +9,10 @@
 The operators are those of scripts/mutation_operators.py. The tests that reach the file by what they include are asked until
 one fails: first the nearest gtests for all mutants, then the others for those that nobody noticed, several at once, as only
 the mutant's library is linked anew. Tests of programs follow one by one, ROS tests for src/ros and test/check_camera_check for
-src/check and src/tools; one of these two has to fail twice. A mutant is equivalent where the compiler
-makes the same code of it, as of lines for other processors, or by test/equivalent_mutants.yaml, which names changes that no
-test could see. The copy and its own catkin workspace lie in .catkin_ws/mutants and are kept. Each time mutants are judged in
-the order drawn, and report.md there has the table so far: what a stopped run judged is a random sample.
+src/check and src/tools; one of these two has to fail twice. A mutant is equivalent where the compiler makes the same code of
+it, as of lines for other processors, or by test/equivalent_mutants.yaml, which names changes that no test could see. The copy
+and its own catkin workspace lie in .catkin_ws/mutants and are kept. Each time mutants are judged in the order drawn, and
+report.md there has the table so far: what a stopped run judged is a random sample.
 Exit code 1 when fewer than --least per cent are caught, or any of the semantic ones is not.
 """
 import argparse
@@ -171,7 +171,8 @@ class Workspace:
     def tests(self, file, near):
         """The gtests that reach a file and are near it, or are not; the quickest first."""
         path = pathlib.Path(file)
-        reached = {name: steps[path] for name, steps in self._reach.items() if path in steps and (steps[path] <= NEAR) == near}
+        reached = {name: steps[path] for name, steps in self._reach.items()
+                   if path in steps and (steps[path] <= NEAR) == near and self._links(name, file)}
         return sorted(reached, key=lambda name: (name not in self.seconds, self.seconds.get(name, 0.0), reached[name], name))
 
     def measure(self, name):
@@ -202,6 +203,13 @@ class Workspace:
         if ' -shared ' in link:
             return folder, None if target[2].endswith(('_nodelets', '_examples')) else 'shared'
         return folder, 'static' if ' qc ' in link else None
+
+    def _links(self, name, file):
+        """False where what a gtest includes is in a static library that it does without."""
+        target, kind = self.library_of(file)
+        if kind != 'static' or name == 'test_tools':
+            return True
+        return f'lib{target.stem}.a' in (target.with_name(f'{name}.dir') / 'link.txt').read_text()
 
     def is_beside(self, file, name):
         """Whether a gtest can be asked without a change to the workspace: what test_tools runs has static libraries inside."""
