@@ -299,7 +299,7 @@ class Workspace:
                     return name
         finally:
             replace(path, original)
-        if mutant.file in self._commands and not self.library_of(mutant.file)[1]:
+        if mutant.file in self._commands:
             self._compile(mutant.file, original, folder / 'original.o')
             self._compile(mutant.file, mutant.applied(original), folder / 'mutant.o')
             if code(folder / 'original.o', folder) == code(folder / 'mutant.o', folder):
