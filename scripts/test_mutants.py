@@ -44,7 +44,7 @@ BUILD, BINARIES = WORKSPACE / 'build', WORKSPACE / 'devel' / 'lib' / 'stereo_des
 JOBS = int(os.environ.get('JOBS', str(os.cpu_count())))
 SLOW = 10  # times as long as without a mutant, and a test counts as failed: it hangs
 BATCH = 1 if JOBS == 1 else 20  # mutants, after which the report is written
-NEAR = 2  # steps: the test includes the header that the file implements
+NEAR = 2  # steps: the test includes the header that the file implements, or has its name
 SLOW_LIMIT = 1800  # s, beyond the time limits in test/ros/*.test, which end the nodes as well
 
 # What a rendered world looks like is a matter of taste: its numbers are no mistakes, and it has a row of its own.
@@ -99,7 +99,7 @@ class Sources:
                        for path in (ROOT / folder).rglob('*.[ch]pp')]
         known = set(self._files)
         self._next = {}
-        own = collections.defaultdict(set)  # the sources of a header: they include it first
+        own = collections.defaultdict(set)  # the sources of a header: they have its name or include it first
         for path in self._files:
             included = []
             for name in re.findall(r'^#include [<"]([^>"]+)[>"]', (ROOT / path).read_text(), re.MULTILINE):
@@ -110,7 +110,7 @@ class Sources:
                         break
             self._next[path] = included
             if path.suffix == '.cpp' and path.parts[0] == 'src' and included:
-                own[included[0]].add(path)
+                own[next((header for header in included if header.stem == path.stem), included[0])].add(path)
         for header, sources in own.items():
             self._next[header] = self._next[header] + sorted(sources)
 
@@ -172,7 +172,7 @@ class Workspace:
         """The gtests that reach a file and are near it, or are not; the quickest first."""
         path = pathlib.Path(file)
         reached = {name: steps[path] for name, steps in self._reach.items()
-                   if path in steps and (steps[path] <= NEAR) == near and self._links(name, file)}
+                   if path in steps and (steps[path] <= NEAR or name == f'test_{path.stem}') == near and self._links(name, file)}
         return sorted(reached, key=lambda name: (name not in self.seconds, self.seconds.get(name, 0.0), reached[name], name))
 
     def measure(self, name):
