@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 #include <ros/serialization.h>
+#include <sensor_msgs/point_cloud2_iterator.h>
 
 #include <cstdint>
 #include <string>
@@ -52,6 +53,19 @@ TEST(FeaturesMessageTest, RoundTripIsExactAlsoOverTheWire) {
       ros::serialization::deserialize(in, received);
       expectSame(fromMessage(received), someFeatures(type, layout));
     }
+}
+
+TEST(FeaturesMessageTest, TheCloudHasThePointsAndTheirDisparities) {
+  const FeaturesMessage message = someMessage();
+  const StereoFeatures features = someFeatures();
+  const sensor_msgs::PointCloud2 cloud = toPointCloud(StereoFeaturesView(message));
+  EXPECT_EQ(cloud.header.stamp, message.header.stamp);
+  ASSERT_EQ(cloud.width, static_cast<std::uint32_t>(features.count()));
+  sensor_msgs::PointCloud2ConstIterator<float> field(cloud, "x");
+  for (int i = 0; i < features.count(); ++i, ++field) {
+    EXPECT_LT((Eigen::Vector3f(field[0], field[1], field[2]) - features.point(i).cast<float>()).norm(), 1e-5f) << i;
+    EXPECT_EQ(field[3], features.disparity[static_cast<std::size_t>(i)]) << i;
+  }
 }
 
 TEST(FeaturesMessageTest, NamesItsContents) {
