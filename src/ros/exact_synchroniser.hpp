@@ -14,9 +14,9 @@
 
 namespace sdvo {
 
-/// Puts messages of equal stamps together, one of each input. What waits is kept in the order in which it came and not
-/// in that of the stamps, as in message_filters' ExactTime: there a stamp of the future throws away what came after it,
-/// and some of them shut out whatever comes next. One thread at a time calls it.
+/// Puts messages of equal stamps together, one of each input. Incomplete sets wait in the order of their arrival.
+/// message_filters' ExactTime orders them by stamp instead: a complete set with a future stamp discards sets that
+/// arrived after it, and a queue full of future stamps discards every new message. Not for several threads at once.
 template <class... Messages>
 class ExactSynchroniser {
  public:
@@ -35,7 +35,7 @@ class ExactSynchroniser {
     const std::size_t at = setOf(message->header.stamp);
     std::get<input>(waiting_[at].messages) = message;
     if (std::apply([](const auto&... all) { return (... && all); }, waiting_[at].messages)) {
-      // Inputs keep their order: of what came before, something was lost.
+      // Each input keeps its order, so a message of every earlier set was lost.
       for (std::size_t k = 0; k < at; ++k) giveUp(0);
       const MessageSet complete = take(0);
       std::apply(on_set_, complete);

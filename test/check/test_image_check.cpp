@@ -11,7 +11,7 @@ namespace {
 
 const cv::Size kSize(212, 120);
 
-/// What extraction says of a good pair with these mean grey levels.
+/// The extraction's report of a good pair with these mean grey levels.
 ExtractionReport goodReport(double left = 100.0, double right = 110.0) {
   ExtractionReport report;
   report.detected = 500, report.stereo_matched = 400;
@@ -73,7 +73,7 @@ TEST(ImageCheck, TextureIsCornersThatAreFoundInBothImages) {
   expectSaid(check.texture(100, 0.5), Verdict::kWarn, "some views");
 }
 
-/// A view of a scene, `right` px further right; its pixels are those of the coarse view, too.
+/// A view of a scene of noise, moved to the right by `right` px.
 cv::Mat view(int right) {
   static const cv::Mat scene = [] {
     cv::Mat noise(kSize.height, 3000, CV_8U);
@@ -102,7 +102,7 @@ TEST(ImageCheck, BlurIsWhatMotionTakesOfTheSharpness) {
   expectSaid(swept(1, 5.0).blur(), Verdict::kOpen, "did not move enough");
 }
 
-/// That the view moves by from pair to pair as the check says it, %.
+/// Motion of the view from pair to pair that the check reports, % of the width.
 double shareOfView(const ImageCheck& check) {
   double turn = 0.0, share = 0.0;
   std::sscanf(check.frameRate({0.0}).what.c_str(), "up to %lf deg and %lf", &turn, &share);
