@@ -8,7 +8,7 @@
 #include "stereo_descriptor_vo/front_end/base_descriptor.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_base_descriptor {
 
 /// The descriptors that the OpenCV at hand has.
 std::vector<std::string> availableDescriptors() {
@@ -243,5 +243,5 @@ TEST(AkazeDescriptor, SizesBeyondTheLevelsOfASmallImageAreDescribedOnTheLast) {
   }
 }
 
-}  // namespace
+}  // namespace test_base_descriptor
 }  // namespace sdvo

@@ -12,7 +12,7 @@
 #include "stereo_descriptor_vo/front_end/feature_detector.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_feature_detector {
 
 using synthetic::errorOf;
 
@@ -501,5 +501,5 @@ INSTANTIATE_TEST_SUITE_P(Types, EveryDetector, testing::Values("fast", "agast", 
 INSTANTIATE_TEST_SUITE_P(Types, CornerDetector, testing::Values("fast", "agast", "gftt", "harris"));
 INSTANTIATE_TEST_SUITE_P(Types, GradientDetector, testing::Values("gftt", "harris"));
 
-}  // namespace
+}  // namespace test_feature_detector
 }  // namespace sdvo

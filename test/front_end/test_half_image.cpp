@@ -6,7 +6,7 @@
 #include "stereo_descriptor_vo/front_end/half_image.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_half_image {
 
 /// OpenCV fuses products and sums on ARM, we never: there a mean near the middle of two grey levels may become the other one.
 #ifdef __aarch64__
@@ -36,5 +36,5 @@ TEST(HalfImage, IsTheSameWithoutVectors) {
   allowVectorKernels(true);
 }
 
-}  // namespace
+}  // namespace test_half_image
 }  // namespace sdvo

@@ -8,7 +8,7 @@
 #include "stereo_descriptor_vo/front_end/patch_sampling.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_patch_sampling {
 
 constexpr int kMargin = 5, kWidth = 30, kHeight = 20;
 
@@ -92,5 +92,5 @@ TEST(PatchStride, IsTheSideRoundedUpToWholeRegisters) {
   }
 }
 
-}  // namespace
+}  // namespace test_patch_sampling
 }  // namespace sdvo

@@ -10,7 +10,7 @@
 #include "../../src/ros/callback_thread.hpp"
 
 namespace sdvo {
-namespace {
+namespace rostest_callback_thread {
 
 bool waitUntil(const std::function<bool()>& condition) {
   const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(10.0);
@@ -97,12 +97,5 @@ TEST(CallbackThread, AfterStopNoCallbackRuns) {
   EXPECT_FALSE(ran_late);
 }
 
-}  // namespace
+}  // namespace rostest_callback_thread
 }  // namespace sdvo
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "callback_thread_test");
-  ros::NodeHandle keeps_ros_alive;
-  return RUN_ALL_TESTS();
-}

@@ -7,7 +7,7 @@
 #include "stereo_descriptor_vo/common/se3.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_gyro_track {
 
 constexpr std::int64_t kMillisecond = 1000000;
 
@@ -96,5 +96,5 @@ TEST(GyroTrack, ForgetsWhatIsLongAgo) {
   EXPECT_TRUE(track.rotation(500 * kMillisecond, 600 * kMillisecond));
 }
 
-}  // namespace
+}  // namespace test_gyro_track
 }  // namespace sdvo

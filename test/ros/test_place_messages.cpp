@@ -12,7 +12,7 @@
 #include "message_samples.hpp"
 
 namespace sdvo::ros_conversions {
-namespace {
+namespace test_place_messages {
 
 using synthetic::equalMats;
 using synthetic::errorOf;
@@ -255,5 +255,5 @@ TEST(MotionCovariance, IsThatOfTheCamera) {
   }
 }
 
-}  // namespace
+}  // namespace test_place_messages
 }  // namespace sdvo::ros_conversions

@@ -15,7 +15,7 @@
 #include "message_samples.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_places_file {
 
 namespace fs = std::filesystem;
 using ros_conversions::contains;
@@ -129,5 +129,5 @@ TEST_F(PlacesFile, ATruncatedFileIsRefused) {
   refusal(path_);
 }
 
-}  // namespace
+}  // namespace test_places_file
 }  // namespace sdvo

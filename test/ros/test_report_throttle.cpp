@@ -3,7 +3,7 @@
 #include "../../src/ros/report_throttle.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_report_throttle {
 
 TEST(ReportThrottle, LetsAKindThroughOnce) {
   ReportThrottle throttle;
@@ -23,5 +23,5 @@ TEST(ReportThrottle, NumbersMakeNoOtherKind) {
   EXPECT_FALSE(throttle.allows("left image is 752x480"));
 }
 
-}  // namespace
+}  // namespace test_report_throttle
 }  // namespace sdvo

@@ -13,7 +13,7 @@
 #include "message_samples.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_trajectory_file {
 
 namespace fs = std::filesystem;
 using ros_conversions::contains;
@@ -82,5 +82,5 @@ TEST_F(TrajectoryFile, RefusesWhatIsNoFileOfTheUsers) {
   EXPECT_FALSE(fs::exists(directory_ / "file.txt"));
 }
 
-}  // namespace
+}  // namespace test_trajectory_file
 }  // namespace sdvo

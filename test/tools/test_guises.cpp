@@ -17,7 +17,7 @@
 #include "stereo_descriptor_vo/data/trajectory.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_guises {
 
 namespace fs = std::filesystem;
 
@@ -173,5 +173,5 @@ INSTANTIATE_TEST_SUITE_P(RealDrives, Guises,
                                                           "saturated")),
                          [](const auto& tested) { return std::get<0>(tested.param) + "_" + std::get<1>(tested.param); });
 
-}  // namespace
+}  // namespace test_guises
 }  // namespace sdvo

@@ -26,7 +26,7 @@
 #include "../temporary_folder.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_tools {
 
 namespace fs = std::filesystem;
 
@@ -564,5 +564,5 @@ TEST_F(Tools, PerfectTrajectoryHasNoError) {
               (root_ / "none").string());
 }
 
-}  // namespace
+}  // namespace test_tools
 }  // namespace sdvo

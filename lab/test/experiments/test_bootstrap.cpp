@@ -6,7 +6,7 @@
 #include "../../experiments/bootstrap.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_bootstrap {
 
 TEST(Bootstrap, CoversTheTrueMeanAboutAsOftenAsItSays) {
   std::mt19937 random(7);
@@ -43,5 +43,5 @@ TEST(Bootstrap, OneUnitTellsNothingOfItsSpread) {
   EXPECT_TRUE(std::isnan(bootstrapMean({}).high));
 }
 
-}  // namespace
+}  // namespace test_bootstrap
 }  // namespace sdvo

@@ -12,7 +12,7 @@
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_rendered_odometry {
 
 constexpr double kRate = 10.0;  // Hz
 constexpr int kThreads = 2;
@@ -102,5 +102,5 @@ TEST(RenderedOdometry, TheNumberOfThreadsChangesNoBit) {
   for (std::size_t k = 0; k < poses[0].size(); ++k) EXPECT_EQ(poses[0][k], poses[1][k]) << "pair " << k;
 }
 
-}  // namespace
+}  // namespace test_rendered_odometry
 }  // namespace sdvo
