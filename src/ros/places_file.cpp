@@ -8,9 +8,8 @@
 #include <stdexcept>
 #include <utility>
 
-#include "output_bag.hpp"
-#include "same_camera.hpp"
-#include "whole_file.hpp"
+#include "camera_conversions.hpp"
+#include "output_files.hpp"
 
 namespace sdvo {
 namespace {

@@ -4,7 +4,6 @@
 #include <cstdint>
 #include <stdexcept>
 
-#include "../ros/stamp_filter.hpp"
 #include "../ros/stamps.hpp"
 
 namespace sdvo {

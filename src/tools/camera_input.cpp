@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "../common/text.hpp"
-#include "../ros/frame_id.hpp"
+#include "../ros/frames.hpp"
 
 namespace sdvo {
 

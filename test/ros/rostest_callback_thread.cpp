@@ -7,7 +7,7 @@
 #include <string>
 #include <thread>
 
-#include "../../src/ros/callback_thread.hpp"
+#include "../../src/ros/threads.hpp"
 
 namespace sdvo {
 namespace rostest_callback_thread {
@@ -28,7 +28,8 @@ std_msgs::Int32 message(int data) {
 class Witness {
  public:
   Witness(ros::NodeHandle& nh, const std::string& topic)
-      : subscriber_(nh.subscribe<std_msgs::Int32>(topic, 100, [this](const std_msgs::Int32::ConstPtr& m) { last_ = m->data; })) {}
+      : subscriber_(nh.subscribe<std_msgs::Int32>(topic, 100,
+                                                  [this](const std_msgs::Int32::ConstPtr& m) { last_ = m->data; })) {}
 
   bool gets(int data) {
     return waitUntil([&] {

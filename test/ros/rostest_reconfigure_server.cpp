@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "../../src/ros/reconfigure_server.hpp"
+#include "../../src/ros/params.hpp"
 
 namespace sdvo {
 namespace rostest_reconfigure_server {

@@ -9,8 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "../../src/ros/camera_mount.hpp"
-#include "../../src/ros/robot_transforms.hpp"
+#include "../../src/ros/transforms.hpp"
 
 namespace sdvo {
 namespace rostest_robot_transforms {

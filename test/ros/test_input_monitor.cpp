@@ -4,7 +4,7 @@
 #include <string>
 #include <thread>
 
-#include "../../src/ros/input_monitor.hpp"
+#include "../../src/ros/diagnostic_tasks.hpp"
 #include "message_samples.hpp"
 
 namespace sdvo {

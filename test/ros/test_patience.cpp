@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "../../src/ros/patience.hpp"
+#include "../../src/ros/throttles.hpp"
 
 namespace sdvo {
 namespace test_patience {

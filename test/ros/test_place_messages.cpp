@@ -5,7 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "../../src/ros/map_conversions.hpp"
 #include "../../src/ros/place_conversions.hpp"
 #include "../../src/ros/pose_conversions.hpp"
 #include "../synthetic_scene.hpp"

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "../../src/ros/report_throttle.hpp"
+#include "../../src/ros/throttles.hpp"
 
 namespace sdvo {
 namespace test_report_throttle {

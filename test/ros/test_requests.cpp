@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "../../src/ros/requests.hpp"
+#include "../../src/ros/threads.hpp"
 
 namespace sdvo {
 namespace test_requests {

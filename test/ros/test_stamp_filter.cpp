@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "../../src/ros/stamp_filter.hpp"
+#include "../../src/ros/stamps.hpp"
 
 namespace sdvo {
 namespace test_stamp_filter {

@@ -7,7 +7,7 @@
 #include <sstream>
 #include <string>
 
-#include "../../src/ros/trajectory_file.hpp"
+#include "../../src/ros/output_files.hpp"
 #include "../synthetic_scene.hpp"
 #include "../temporary_folder.hpp"
 #include "message_samples.hpp"

@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "../../src/ros/worker.hpp"
+#include "../../src/ros/threads.hpp"
 
 namespace sdvo {
 namespace test_worker {

@@ -1,15 +1,43 @@
 #pragma once
 
+#include <ros/callback_queue.h>
+#include <ros/node_handle.h>
+#include <ros/spinner.h>
+
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <functional>
 #include <mutex>
+#include <optional>
 #include <thread>
 #include <utility>
 
 namespace sdvo {
+
+/// A callback queue with a thread of its own. Nodelets of one manager share its threads: those of others that are slow
+/// would let ours wait. To be declared before, that is destroyed after, all that has callbacks in it.
+class CallbackThread {
+ public:
+  CallbackThread() : spinner_(1, &queue_) {}
+  CallbackThread(const CallbackThread&) = delete;
+  CallbackThread& operator=(const CallbackThread&) = delete;
+
+  /// The same node handle, whose callbacks run here.
+  ros::NodeHandle serve(ros::NodeHandle nh) {
+    nh.setCallbackQueue(&queue_);
+    return nh;
+  }
+
+  void start() { spinner_.start(); }
+  /// Returns when no callback runs any more; none will begin.
+  void stop() { spinner_.stop(); }
+
+ private:
+  ros::CallbackQueue queue_;
+  ros::AsyncSpinner spinner_;
+};
 
 /// One thread that handles items in order, behind a queue of bounded length: when it is full the oldest item is dropped
 /// and counted, so that latency cannot grow and callbacks never wait. The handler must not throw.
@@ -74,6 +102,36 @@ class Worker {
   std::uint64_t dropped_ = 0;
   bool stopping_ = false;
   std::thread thread_;  // last: it starts when everything else is there
+};
+
+/// What a service asks of the thread that handles a stream of items: it holds for items that arrive after the request,
+/// not for those that wait in a queue already. The newest request wins. For any thread.
+template <class Request>
+class Requests {
+ public:
+  void post(Request request) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++posted_;
+    pending_ = std::move(request);
+  }
+
+  /// Requests so far: to be noted with each item that arrives.
+  int posted() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return posted_;
+  }
+
+  /// The request that holds for an item and has not been taken; `posted` as noted when that arrived.
+  std::optional<Request> take(int posted) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (posted < posted_) return std::nullopt;
+    return std::exchange(pending_, std::nullopt);
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::optional<Request> pending_;
+  int posted_ = 0;
 };
 
 }  // namespace sdvo

@@ -1,4 +1,4 @@
-#include "input_monitor.hpp"
+#include "diagnostic_tasks.hpp"
 
 #include <cstdio>
 #include <utility>

@@ -1,14 +1,79 @@
 #pragma once
 
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <ros/node_handle.h>
 #include <time.h>
 
 #include <chrono>
 #include <cstdint>
+#include <deque>
 #include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
 
-#include "wall_updater.hpp"
+#include "../config/interface_options.hpp"
 
 namespace sdvo {
+
+/// /diagnostics once a second of wall time: simulated time stands still when a bag has ended, which is what diagnostics
+/// are there to tell. To be declared after what its tasks refer to.
+class WallUpdater {
+ public:
+  using Status = diagnostic_updater::DiagnosticStatusWrapper;
+  using Level = diagnostic_msgs::DiagnosticStatus;
+
+  WallUpdater(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const std::string& name)
+      : updater_(nh, private_nh, name) {
+    updater_.setHardwareID("none");
+    timer_ =
+        nh.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { updater_.force_update(); });
+  }
+
+  template <class Owner>
+  void add(const std::string& task, Owner* owner, void (Owner::*diagnose)(Status&)) {
+    updater_.add(task, owner, diagnose);
+  }
+
+ private:
+  diagnostic_updater::Updater updater_;
+  ros::WallTimer timer_;
+};
+
+/// Whether input comes, and how often, for /diagnostics. By wall time; for any thread.
+class InputMonitor {
+ public:
+  /// `what`: of the input, in the plural. `topics`: where it comes from. `max_silence`: s.
+  InputMonitor(std::string what, std::string topics, double max_silence, const RateOptions& rates);
+
+  void note();
+  /// While nobody wants input, silence is no fault; `why`, such as "paused", is empty otherwise. Begins anew.
+  void noteIdle(const std::string& why);
+
+  struct Silence {
+    std::uint8_t level;
+    std::string text;
+  };
+  /// Nothing while input comes.
+  std::optional<Silence> silence() const;
+
+  /// The task "input rate".
+  void diagnose(WallUpdater::Status& status);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  static double secondsSince(Clock::time_point time);
+  std::optional<double> rate() const;
+
+  const std::string what_, topics_;
+  const double max_silence_;
+  const RateOptions rates_;
+  mutable std::mutex mutex_;
+  std::string idle_;
+  Clock::time_point begin_ = Clock::now();
+  std::deque<Clock::time_point> arrivals_;  ///< of the last seconds, and the newest one
+};
 
 /// How much of a processor one worker's thread takes, and what it had to leave out, for /diagnostics. What OpenCV does
 /// in threads of its own is not in it.

@@ -1,13 +1,21 @@
 #pragma once
 
+#include <nav_msgs/Path.h>
 #include <rosbag/bag.h>
 
+#include <Eigen/Geometry>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <string>
 #include <system_error>
 
 namespace sdvo {
+
+/// Has a file written that appears whole or not at all: `write` is given the path of a partial one, and throws when it
+/// cannot. Throws std::runtime_error that names the file, and leaves it as it was, then and when the path is not
+/// absolute or leads to something else than a file.
+void writeWhole(const std::string& path, const std::function<void(const std::string& partial)>& write);
 
 /// A bag being written, which may be given up. rosbag's own destructor closes (writes an index) and ends the process
 /// when that fails, as it does on a full disk.
@@ -46,5 +54,11 @@ class OutputBag {
   std::unique_ptr<rosbag::Bag> bag_;
   bool closed_ = false;
 };
+
+/// Writes the poses of the base as SaveTrajectory.srv describes it. A file appears whole or not at all. Throws
+/// std::runtime_error that names the file, and leaves it as it was, when the format is unknown, the path is not
+/// absolute, leads to something else than a file, or may not be written.
+void saveTrajectory(const nav_msgs::Path& poses, const Eigen::Isometry3d& T_base_camera, const std::string& format,
+                    const std::string& path);
 
 }  // namespace sdvo
