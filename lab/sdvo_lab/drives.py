@@ -43,6 +43,12 @@ class Drive:
         return [numpy.array(rows[name].split(), float).reshape(3, 4) for name in ("P0", "P1")]
 
     @functools.cached_property
+    def camera(self):
+        """Focal length and principal point, px, and baseline, m."""
+        f, _, cx, t, _, _, cy = self.projections[1].ravel()[:7]
+        return f, cx, cy, -t / f
+
+    @functools.cached_property
     def poses(self):
         return poses.read(self.truth, len(self.stamps))
 
