@@ -1,7 +1,7 @@
 """Measures the errors of the present build and prints them as tables of docs/precision.md; some minutes, most of them to render:
 
     lab/run accuracy                                 # all of it
-    lab/run accuracy drives --record                 # recorded drives, and what changed since docs/accuracy.csv, which is then written
+    lab/run accuracy drives --record                 # recorded drives, and what changed since lab/docs/accuracy.csv, which is then written
     lab/run accuracy guises robots --write           # puts these tables between the marks of docs/precision.md
 
 drives: every sequence of the data sets that has a ground truth. guises: some of them, and a rendered one, turned, cut, spoilt
@@ -14,7 +14,7 @@ from . import drives, marks, odometry, programs
 from .drives import ROOM, TABLE
 from .guises import GUISES, write_guise
 
-RECORD = programs.ROOT / "docs/accuracy.csv"
+RECORD = programs.ROOT / "lab/docs/accuracy.csv"
 EFFECTS = {"noise": 2, "exposure": 0.3, "motion_blur": 0.01}
 # Rendered drives of robots: trajectory, rig, seed, first pose, pairs, lengths. A corridor's first corner comes after 7 s or more.
 ROBOTS = [(trajectory, rig, seed, start, pairs, lengths) for trajectory, rigs, seeds, start, pairs, lengths in (
@@ -104,7 +104,7 @@ def options(parser):
     parser.add_argument("tables", nargs="*", metavar="drives|guises|robots", help="[default: all]")
     programs.add_params(parser)
     parser.add_argument("--frames", help="pairs of each drive [default: all]")
-    parser.add_argument("--record", action="store_true", help="writes docs/accuracy.csv")
+    parser.add_argument("--record", action="store_true", help="writes lab/docs/accuracy.csv")
     marks.add_write(parser, marks.ACCURACY)
     drives.add_rendered(parser)
 

@@ -203,6 +203,6 @@ def main(arguments):
         found = render_all(arguments.drives, folder, arguments.pairs, arguments.standing_pairs, names)
         tries = {name: [pool.submit(try_fault, name, seed, drive, work, programs.params(arguments))
                         for seed, drive in found[name in STANDING_FAULTS]] for name in names}
-        marks.show(rows(), arguments.write, "fault campaign")
+        marks.show(rows(), arguments.write, "faults")
     print(f"{len(names)} faults, {len(bad)} bad" + (": " + ", ".join(bad) if bad else ""))
     return 1 if bad else 0
