@@ -31,7 +31,10 @@ def main():
     parser = argparse.ArgumentParser(prog=f"lab/run {chosen}", description=module.__doc__,
                                      formatter_class=argparse.RawDescriptionHelpFormatter)
     module.options(parser)
-    return module.main(parser.parse_args(sys.argv[2:]))
+    arguments, arguments.rest = parser.parse_known_args(sys.argv[2:])
+    if arguments.rest and not hasattr(module, "PASSES_ON"):
+        parser.error("unrecognized arguments: " + " ".join(arguments.rest))
+    return module.main(arguments)
 
 
 if __name__ == "__main__":

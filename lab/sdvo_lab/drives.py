@@ -85,15 +85,15 @@ def recorded(kind, name, folder=None):
     return Drive(title, directory, directory / "poses.txt", lengths)
 
 
-def rendered(folder, trajectory, rig, seed, start=0, pairs=120, lengths=ROOM, **options):
-    """A rendered drive, kept in `folder` under a name that has everything in it but the renderer's version. `options` are
-    those of render_drive, such as noise=2."""
+def rendered(folder, trajectory, rig, seed, start=0, pairs=120, lengths=ROOM, name=None, **options):
+    """A rendered drive, kept in `folder` under a name that has everything in it but the renderer's version, unless another one is
+    given. `options` are those of render_drive, such as noise=2."""
     words = {name.replace("_", "-"): str(value) for name, value in options.items()}
-    name = "_".join(map(str, [pathlib.Path(trajectory).stem, rig, seed, start, pairs, *(f"{n}{v}" for n, v in words.items())]))
+    name = name or "_".join(map(str, [pathlib.Path(trajectory).stem, rig, seed, start, pairs, *(f"{word}{value}" for word, value in words.items())]))
     directory = folder / name
     if not (directory / "poses.txt").exists():
         run("render_drive", "--trajectory", trajectory, "--rig", rig, "--seed", seed, "--start", start, "--frames", pairs,
-            *(word for name, value in words.items() for word in ("--" + name, value)), "--output", directory)
+            *(part for word, value in words.items() for part in ("--" + word, value)), "--output", directory)
     return Drive(f"{trajectory}, {rig}, seed {seed}", directory, directory / "poses.txt", lengths)
 
 

@@ -23,8 +23,8 @@ def between(text, name, block):
     """The text with other lines between <!-- name --> and the next <!-- end -->."""
     new = f"<!-- {name} -->\n" + "\n".join(block) + "\n<!-- end -->"
     text, count = re.subn(rf"<!-- {re.escape(name)} -->\n.*?<!-- end -->", lambda _: new, text, flags=re.DOTALL)
-    if count != 1:
-        sys.exit(f"error: the page has the mark <!-- {name} --> {count} times")
+    if count == 0:
+        print(f"not written: the page has no mark <!-- {name} -->", file=sys.stderr)
     return text
 
 
