@@ -10,12 +10,14 @@ COMMANDS = {
     "faults": ("faults", "faults put into drives: what the odometry says of them"),
     "ablate": ("ablate", "the odometry without one of its mechanisms"),
     "benchmark": ("benchmark", "time of kernels, drives and nodelets"),
+    "places": ("places", "recognised revisits and false loops of long drives"),
     "self-check": ("self_check", "the self-checks of run_bag against the ground truth"),
     "experiments": ("experiments", "the paper's experiments"),
     "tables": ("tables", "tables of the paper's experiments from their CSV files"),
     "golden": ("golden", "poses, states and covariances of two builds"),
     "guises": ("guises", "a drive turned, cut, spoilt or in another order"),
     "report": ("report", "picture of one drive: trajectory, errors, features, times"),
+    "layout": ("layout", "picture of the rooms of the sources"),
     "mistakes": ("mistakes", "mistakes of thought put into the sources: does a test notice?"),
 }
 

@@ -1,16 +1,19 @@
 """Measures the errors of the present build and prints them as tables of docs/precision.md; some minutes, most of them to render:
 
-    lab/run accuracy                                 # all of it
+    lab/run accuracy                                 # drives, guises and robots
     lab/run accuracy drives --record                 # recorded drives, and what changed since lab/docs/accuracy.csv, which is then written
     lab/run accuracy guises robots --write           # puts these tables between the marks of docs/precision.md
 
 drives: every sequence of the data sets that has a ground truth. guises: some of them, and a rendered one, turned, cut, spoilt
-and in other orders (lab/run guises). robots: rendered drives of small rigs."""
+and in other orders (lab/run guises). robots: rendered drives of small rigs. long: rendered drives of 0.7 to 2.5 km along KITTI's ways,
+and a minute each of robots, an hour or more. still: how far the odometry walks while a rendered rig stands for a minute."""
 import csv
 import dataclasses
 import re
 
-from . import drives, marks, odometry, programs
+import numpy
+
+from . import drives, marks, odometry, poses, programs
 from .drives import ROOM, TABLE
 from .guises import GUISES, write_guise
 
@@ -23,6 +26,11 @@ ROBOTS = [(trajectory, rig, seed, start, pairs, lengths) for trajectory, rigs, s
     ("turn_in_place", ("d435_small",), (1,), 0, 160, TABLE),
     ("corridor", ("d435_small",), (1,), 130, 160, ROOM),
     ("desk", ("d435_small", "oak_d"), (1,), 20, 100, TABLE)) for rig in rigs for seed in seeds]
+
+# Rendered drives along KITTI's ways: name, pairs, seed; and minutes of robots, 20 pairs a second: trajectory, rig, seed.
+LONG = [("06", 1101, 4), ("07", 1101, 5), ("00", 1700, 1), ("05", 1600, 2), ("09", 1591, 3), ("01", 1101, 6)]
+MINUTES = [("hand_held", "d435_small", 11), ("turn_in_place", "d435_small", 12), ("corridor", "zed_mini", 13), ("desk", "oak_d", 14)]
+LONG_EFFECTS = {"noise": 2, "exposure": 0.3, "moving_share": 0.02}
 
 
 @dataclasses.dataclass
@@ -100,20 +108,47 @@ def robot_table(folder, extra):
         yield [drive.name, e.pairs, f"{e.t:.2f}", f"{e.r:.4f}", e.not_tracking, e.lost, e.refused]
 
 
+def along(folder, way, pairs, seed, lengths="100,200,300,400,500,600,700,800"):
+    poses_file = drives.data_set("kitti") / "poses" / f"{way}.txt"
+    return drives.rendered(folder, poses_file, "kitti", seed, 0, pairs, lengths, **LONG_EFFECTS)
+
+
+def long_table(folder, extra, frames):
+    yield ["drive", "pairs", "m", "translation [%]", "rotation [deg/m]", "at the end [m]", "[% of length]", "pairs not tracked"]
+    chosen = [(f"along KITTI {way}", along(folder, way, frames or pairs, seed, *(["5,10,20"] if frames else []))) for way, pairs, seed in LONG]
+    chosen += [(f"{path}, {rig}", drives.rendered(folder, path, rig, seed, 0, frames or 1200, "0.5,1,2,5,10", motion_blur=0.01, **LONG_EFFECTS))
+               for path, rig, seed in MINUTES]
+    for name, drive in chosen:
+        run = odometry.run(drive.directory, *extra)
+        e = odometry.errors(drive.truth, run.poses, drive.lengths)
+        yield [name, e["frames"], f"{e['path_length_m']:.0f}", f"{e['mean']['translation_percent']:.4f}",
+               f"{e['mean']['rotation_deg_per_m']:.5f}", f"{e['final_drift_m']:.4f}", f"{e['final_drift_percent']:.4f}",
+               sum(state.state != "TRACKING" for state in run.states)]
+
+
+def still_table(folder, extra, frames):
+    yield ["pairs", "largest way [mm]", "[deg]", "at the end [mm]", "[deg]"]
+    drive = drives.rendered(folder, "still", "kitti", 1, 0, frames or 600, **LONG_EFFECTS)
+    walked = [poses.logarithm(pose) for pose in odometry.run(drive.directory, *extra).poses]
+    ways = numpy.array([[1e3 * numpy.linalg.norm(xi[:3]), numpy.degrees(numpy.linalg.norm(xi[3:]))] for xi in walked])
+    yield [len(ways), *(f"{value:.{digits}f}" for way in (ways.max(axis=0), ways[-1]) for value, digits in zip(way, (1, 4)))]
+
+
 def options(parser):
-    parser.add_argument("tables", nargs="*", metavar="drives|guises|robots", help="[default: all]")
+    parser.add_argument("tables", nargs="*", metavar="drives|guises|robots|long|still", help="[default: the first three]")
     programs.add_params(parser)
-    parser.add_argument("--frames", help="pairs of each drive [default: all]")
+    parser.add_argument("--frames", type=int, help="pairs of each drive [default: all]")
     parser.add_argument("--record", action="store_true", help="writes lab/docs/accuracy.csv")
     marks.add_write(parser, marks.ACCURACY)
     drives.add_rendered(parser)
 
 
 def main(arguments):
-    extra = programs.params(arguments) + (["--frames", arguments.frames] if arguments.frames else [])
+    extra = programs.params(arguments) + (["--frames", str(arguments.frames)] if arguments.frames else [])
     with drives.folders(arguments) as (work, folder):
         tables = {"drives": lambda: recorded_table(work, extra, arguments.record),
-                  "guises": lambda: guise_table(work, folder, extra), "robots": lambda: robot_table(folder, extra)}
+                  "guises": lambda: guise_table(work, folder, extra), "robots": lambda: robot_table(folder, extra),
+                  "long": lambda: long_table(folder, extra, arguments.frames), "still": lambda: still_table(folder, extra, arguments.frames)}
         marks.check_names(arguments.tables, tables)
-        for name in arguments.tables or tables:
-            marks.show(tables[name](), arguments.write if name != "drives" else None, name)
+        for name in arguments.tables or ("drives", "guises", "robots"):
+            marks.show(tables[name](), arguments.write if name in ("guises", "robots") else None, name)

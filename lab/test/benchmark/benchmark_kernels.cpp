@@ -1,4 +1,4 @@
-// Times each kernel beside its plain twin: scripts/benchmark runs this.
+// Times each kernel beside its plain twin: lab/run benchmark runs this.
 #include <benchmark/benchmark.h>
 
 #include <array>

@@ -1,15 +1,12 @@
-#!/usr/bin/env python3
 """Draws the rooms of the sources and which includes which: docs/images/layout.svg, from the #include lines alone.
 
-An arrow means "includes"; arrows that follow from others are left out. --check says whether the picture is up to date.
-"""
-import argparse
+An arrow means "includes"; arrows that follow from others are left out."""
 import re
 import sys
 import textwrap
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+from .programs import ROOT
+
 PICTURE = ROOT / "docs" / "images" / "layout.svg"
 HEADERS, SOURCES = ROOT / "include" / "stereo_descriptor_vo", ROOT / "src"
 INCLUDE = re.compile(r'^\s*#\s*include\s*[<"](?:\.\./|stereo_descriptor_vo/)([a-z_]+)/')
@@ -21,12 +18,10 @@ ROOMS = {
     "odometry": ("motion side: features to poses", 1.0),
     "places": ("places recognised by features", 1.0),
     "data": ("files of data sets", 2.0),
-    "render": ("rendered drives", 3.0),
     "config": ("all options in one place", 0.5),
     "ros": ("nodelets; messages meet the core", 0.5),
-    "experiments": ("the paper's experiments", 1.6),
     "check": ("steps of a camera's check", 2.6),
-    "tools": ("command lines", 2.3),
+    "tools": ("command lines", 1.6),
 }
 WIDTH, GAP, MARGIN, LINE = 250, 30, 15, 15
 COLOURS = {"front_end": "#dcebfa", "odometry": "#dcebfa", "places": "#dcebfa", "common": "#e3e0f7", "ros": "#eef6e6"}
@@ -49,7 +44,7 @@ def picture():
     rooms = sorted({d.name for parent in (HEADERS, SOURCES) for d in parent.iterdir() if d.is_dir()})
     unknown = [room for room in rooms if room not in ROOMS]
     if unknown:
-        sys.exit(f"error: give {', '.join(unknown)} a place in ROOMS of {Path(__file__).name}")
+        sys.exit(f"error: give {', '.join(unknown)} a place in ROOMS")
     includes = {room: includes_of(room, rooms) for room in rooms}
     level = {room: 0 for room in rooms}
     for _ in rooms:  # the longest way down
@@ -91,16 +86,13 @@ def picture():
     return "\n".join(svg + ["</svg>", ""])
 
 
-def main():
-    parser = argparse.ArgumentParser(description=__doc__)
+def options(parser):
     parser.add_argument("--check", action="store_true", help="write nothing; exit code 1 when the picture is old")
-    arguments = parser.parse_args()
+
+
+def main(arguments):
     new = picture()
     if not arguments.check:
         PICTURE.write_text(new)
-    elif not PICTURE.exists() or PICTURE.read_text() != new:
-        sys.exit(f"{PICTURE.relative_to(ROOT)} is old: scripts/plot_layout.py")
-
-
-if __name__ == "__main__":
-    main()
+    elif PICTURE.read_text() != new:
+        sys.exit(f"error: {PICTURE} is old: lab/run layout")

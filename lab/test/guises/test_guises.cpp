@@ -12,7 +12,7 @@
 #include <tuple>
 #include <vector>
 
-#include "../temporary_folder.hpp"
+#include "../../../test/temporary_folder.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
 
@@ -77,7 +77,7 @@ Account runOdometry(const fs::path& drive, const fs::path& work) {
 }
 
 void writeGuise(const fs::path& drive, const std::string& guise, const fs::path& output, const std::string& more = "") {
-  call(std::string(SDVO_SCRIPT_DIR) + "/write_guise.py " + drive.string() + " " + guise + " " + output.string() + more);
+  call(std::string(SDVO_LAB_RUN) + " guises " + drive.string() + " " + guise + " " + output.string() + more);
 }
 
 /// A real drive's excerpt, run as it was recorded.

@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Compiles every source and test without making code, by another compiler or against another OpenCV; any warning is a failure.
 
-    scripts/test_compilers.py --compiler clang++-14
-    scripts/test_compilers.py --opencv DIR/usr/include/opencv4    # where libopencv-*-dev of another release are unpacked
+    lab/test/compilers.py --compiler clang++-14
+    lab/test/compilers.py --opencv DIR/usr/include/opencv4    # where libopencv-*-dev of another release are unpacked
 
 The flags are those of the package (-Wall -Wextra -Wpedantic -Wshadow). Only the messages' headers are built.
 """
@@ -15,7 +15,7 @@ import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 WORKSPACE = ROOT / ".catkin_ws"
 JOBS = int(os.environ.get("JOBS", str(os.cpu_count())))
 
