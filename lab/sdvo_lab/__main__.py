@@ -18,7 +18,6 @@ COMMANDS = {
     "guises": ("guises", "a drive turned, cut, spoilt or in another order"),
     "report": ("report", "picture of one drive: trajectory, errors, features, times"),
     "layout": ("layout", "picture of the rooms of the sources"),
-    "mistakes": ("mistakes", "mistakes of thought put into the sources: does a test notice?"),
 }
 
 

@@ -105,7 +105,7 @@ def run_all(output, only):
         done = [pool.submit(run, output / folder, experiment, arguments) for folder, experiment, arguments in plan.runs]
         for (folder, experiment, _), rows in zip(plan.runs, done):
             print(f"{folder}: {experiment}, {len(rows.result())} rows", flush=True)
-            if "ablation" not in folder:
+            if experiment in figures.FIGURES and "ablation" not in folder:
                 figures.FIGURES[experiment](output / folder, rows.result())
     lines = [f"{name}\n\n" + "\n".join(table) + "\n" for name, table in tables.tables_of(output).items()]
     (output / "tables.md").write_text("\n".join(lines))
@@ -130,4 +130,5 @@ def main(arguments):
         return figures.draw_depth_scale(samples, curve, output / "size_curve.png")
     rows = run(output, arguments.experiment, arguments.rest)
     print(rows.to_string(index=False))
-    figures.FIGURES[arguments.experiment](output, rows)
+    if arguments.experiment in figures.FIGURES:
+        figures.FIGURES[arguments.experiment](output, rows)

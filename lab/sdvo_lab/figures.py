@@ -77,34 +77,6 @@ def draw_robustness(folder, rows):
     finish(figure, folder / "robustness_inliers.png", xlabel="step", ylabel="mean inliers")
 
 
-LINES = (("standard", "refined", "C0o:"), ("stereo", "refined", "C1o:"), ("standard", "aligned", "C0s--"),
-         ("standard", "aligned_by_depth", "C0^-"), ("stereo", "aligned_by_depth", "C1^-"))
-GAINS = (("refined", "gain_percent", "C1o:", "refined, on standard refined"),
-         ("aligned_by_depth", "gain_percent", "C1^-", "aligned by depth, on standard aligned by depth"),
-         ("aligned_by_depth", "gain_on_plain_percent", "C2s--", "aligned by depth, on standard aligned"))
-
-
-def draw_accuracy(folder, rows):
-    """Translation error of a pair against the step, by what was done to the matches; and the gain of stereo."""
-    counts = rows.features.unique()
-    figure, axes = grid(len(counts), 2, 5.5, 4.2)
-    for (errors, gains), count in zip(axes, counts):
-        chosen = select(rows, features=count, method=rows.method[0])
-        for system, model, style in LINES:
-            errors.plot(*with_interval(select(chosen, system=system, model=model), "step", "pair_percent")[:2], style,
-                        label=f"{system}, {model.replace('_', ' ')}")
-        for k, (model, column, style, label) in enumerate(GAINS):
-            x, means, ends = with_interval(select(chosen, system="stereo", model=model), "step", column)
-            gains.errorbar(numpy.array(x) + 0.08 * (k - 1), means, yerr=ends, fmt=style[:3], capsize=3, label=label)
-        errors.set_yscale("log")
-        errors.set_ylabel("translation error, % of the way")
-        gains.axhline(0.0, color="grey", linewidth=0.6)
-        gains.set_ylabel("gain of stereo, %")
-        for axis in (errors, gains):
-            axis.set_title(f"{count} features")
-    finish(figure, folder / "accuracy_steps.png", xlabel="step", xticks=range(1, 6))
-
-
 def draw_consensus(folder, rows):
     """Success, inliers and time of the outlier rejection methods against the share of outliers."""
     columns = {"success_percent": "right motions, %", "inliers_of_true_percent": "inliers, % of the true motion's",
@@ -133,8 +105,7 @@ def draw_scale_change(folder, rows):
            ylabel="correct matches, % of the features in view", xticks=[1.0, 1.5, 2.0, 3.0, 4.0])
 
 
-FIGURES = {"matching": draw_matching, "robustness": draw_robustness, "accuracy": draw_accuracy, "consensus": draw_consensus,
-           "scale_change": draw_scale_change}
+FIGURES = {"matching": draw_matching, "robustness": draw_robustness, "consensus": draw_consensus, "scale_change": draw_scale_change}
 
 
 def medians(x, y, edges):

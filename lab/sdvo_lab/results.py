@@ -3,13 +3,9 @@ import pathlib
 
 import pandas
 
-# Table 1 of the paper, improvement of SN-FREAK, %; its figure 7 by the size of the feature set; figure 5, inliers by step; table 2,
-# error of the best, mean and worst run, %.
-PUBLISHED_BY_DRIVE = {"00": 29.34, "01": 18.42, "02": 28.81, "03": 22.39, "04": 32.25, "05": 34.69, "06": 28.23, "07": 34.64, "08": 36.40,
-                      "09": 24.53, "10": 25.34}
+# Figure 7 of the paper, improvement of SN-FREAK by the size of the feature set, %; its figure 5, inliers by step.
 PUBLISHED_BY_COUNT = {310: 11.58, 1350: 15.37, 2320: 26.41}
 PUBLISHED_INLIERS = {"stereo": (133.0, 103.0, 62.0, 40.0, 27.0), "standard": (126.0, 91.5, 51.0, 33.0, 22.0)}
-PUBLISHED_ERRORS = {"standard": (3.43, 4.78, 8.8), "stereo": (2.47, 3.5, 4.29)}
 
 
 def read(path):

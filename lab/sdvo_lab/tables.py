@@ -46,9 +46,8 @@ def read(folder, name):
     return [results.read(folder / setup / name) for setup in SETUPS]
 
 
-def freak(folder, features=2320, tolerance=3.0, layout="left"):
-    return [select(rows, descriptor="freak", features=features, tolerance_px=tolerance, layout=layout)
-            for rows in read(folder, "matching.csv")]
+def freak(folder):
+    return [select(rows, descriptor="freak", features=2320, tolerance_px=3.0, layout="left") for rows in read(folder, "matching.csv")]
 
 
 def sift(folder):
@@ -77,52 +76,12 @@ def headline_table(folder):
         yield [claim, paper, *(percent(found[(claim, *column)]) for column in columns)]
 
 
-def group_rows(rows, columns):
-    for name, drives in GROUPS.items():
-        yield [name, *cells(rows, columns, [drives])]
-
-
 def group_table(folder):
     yield ["drives", "number", "paper set-up, on 7 px", "on the better of 7 and 14 px", "product set-up, on 7 px", "on the better of 7 and 14 px"]
     rows = freak(folder)
-    for row in group_rows(rows, ("improvement_percent", "improvement_on_best_percent")):
-        yield [row[0], len(of_drives(rows[0], GROUPS[row[0]], "improvement_percent")), *row[1:]]
-
-
-def drive_table(folder):
-    yield ["drive", "paper set-up: by depth", "7 px", "improvement", "product set-up: by depth", "7 px", "improvement", "paper"]
-    rows = freak(folder)
-    for drive in ALL:
-        found = [row for of_setup in rows for row in select(of_setup, sequence=drive).itertuples()]
-        if found:
-            yield [drive, *(cell for row in found for cell in (f"{row.scale_normalised:.1f}", f"{row.standard:.1f}",
-                                                              f"{row.improvement_percent:+.1f} %")),
-                   f"+{results.PUBLISHED_BY_DRIVE[drive]:.1f} %" if drive in results.PUBLISHED_BY_DRIVE else "–"]
-
-
-IN_BOTH_SETUPS = ["paper set-up, KITTI", "all drives", "product set-up, KITTI", "all drives"]
-
-
-def tolerance_table(folder):
-    yield ["tolerance", *IN_BOTH_SETUPS]
-    for tolerance in (1.0, 2.0, 3.0):
-        yield [f"{tolerance:.0f} px", *cells(freak(folder, tolerance=tolerance), ["improvement_percent"])]
-
-
-def count_table(folder):
-    yield ["N", "paper", *IN_BOTH_SETUPS]
-    for features, paper in results.PUBLISHED_BY_COUNT.items():
-        yield [features, f"+{paper:.1f} %", *cells(freak(folder, features), ["improvement_percent"])]
-
-
-def stereo_table(folder):
-    yield ["drives", "paper set-up", "product set-up"]
-    yield from group_rows(freak(folder, layout="left+right"), ["improvement_on_standard_left_percent"])
-
-
-def sift_table(folder):
-    yield ["drives", "paper set-up, on 7 px", "on the better of 5 and 7 px", "product set-up, on 7 px", "on the better of 5 and 7 px"]
-    yield from group_rows(sift(folder), ("improvement_percent", "improvement_on_best_percent"))
+    for name, drives in GROUPS.items():
+        yield [name, len(of_drives(rows[0], drives, "improvement_percent")),
+               *cells(rows, ("improvement_percent", "improvement_on_best_percent"), [drives])]
 
 
 def ablation_table(folder):
@@ -137,7 +96,7 @@ def ablation_table(folder):
 
 
 def robustness_table(folder):
-    yield ["step", "paper", *IN_BOTH_SETUPS]
+    yield ["step", "paper", "paper set-up, KITTI", "all drives", "product set-up, KITTI", "all drives"]
     paper = [results.gain(*of_step) for of_step in zip(*results.PUBLISHED_INLIERS.values())]
     for step, text in zip((*STEPS, "1-5"), (*(f"+{value:.1f} %" for value in paper), "+12.8 % (text: +19 %)")):
         yield [step.replace("-", "…"), text, *cells(inliers(folder, step), ["gain_percent"])]
@@ -155,18 +114,6 @@ def accuracy_table(folder):
             yield row
 
 
-def path_table(folder):
-    """Errors of sub-paths of 5 m and more, of drives that are long enough."""
-    yield ["set-up", "system", "drives", "best", "mean", "worst", "paper: best / mean / worst"]
-    for setup, rows in zip(SETUPS, read(folder, "accuracy_summary.csv")):
-        for system, paper in results.PUBLISHED_ERRORS.items():
-            found = select(rows, step="1", model="refined", system=system)
-            errors = [of_drives(found, ALL, f"{name}_path_percent") for name in ("best", "mean", "worst")]
-            if all(errors):
-                yield [setup, system, len(errors[0]), *(f"{bootstrap.mean(values):.2f}" for values in errors),
-                       " / ".join(f"{value:.2f}" for value in paper)]
-
-
 def scale_table(folder):
     yield ["drives", "method", "scale 1", "1.5", "2", "3", "4", "features a view", "CPU time a view"]
     found = results.read(folder / "scale_change/scale_change.csv")
@@ -178,18 +125,8 @@ def scale_table(folder):
                    f"{of_method.features.mean():.0f}", f"{of_method.ms_per_pair.mean():.0f} ms"]
 
 
-def consensus_table(folder):
-    found = results.read(folder / "consensus/consensus.csv")
-    yield ["samples", "outliers", *(method.replace("_", " ") for method in found.method.unique())]
-    for (budget, share), rows in found.sort_values("max_iterations", kind="stable").groupby(["max_iterations", "outlier_percent"], sort=False):
-        yield [budget, f"{share} %", *(f"{row.success_percent:.0f} / {row.inliers_of_true_percent:.0f} / {row.cpu_ms_per_call:.2f}"
-                                       for row in rows.itertuples())]
-
-
-TABLES = {"headlines": headline_table, "matching by group": group_table, "matching by drive": drive_table,
-          "tolerance": tolerance_table, "feature set size": count_table, "stereo on standard": stereo_table,
-          "sift": sift_table, "ablation": ablation_table, "robustness": robustness_table, "accuracy": accuracy_table,
-          "paths": path_table, "scale change": scale_table, "consensus": consensus_table}
+TABLES = {"headlines": headline_table, "matching by group": group_table, "ablation": ablation_table, "robustness": robustness_table,
+          "accuracy": accuracy_table, "scale change": scale_table}
 
 
 def tables_of(folder):

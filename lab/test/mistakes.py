@@ -1,19 +1,24 @@
-"""Makes the mistakes of thought in lab/mistakes.yaml, one at a time, in a copy of the last commit that stays in .catkin_ws/mistakes: a gtest
+#!/usr/bin/env python3
+"""Makes the mistakes of thought in lab/test/mistakes.yaml, one at a time, in a copy of the last commit that stays in .catkin_ws/mistakes: a gtest
 must notice each. First that of the file's room is asked, then those of the other rooms. Exits 1 when one is not noticed.
 
-    lab/run mistakes                             # all of them
-    lab/run mistakes src/places                  # those in these files or folders
-    lab/run mistakes --check                     # no test: does each still have its place, and each of lab/ablations.yaml?"""
+    lab/test/mistakes.py                         # all of them
+    lab/test/mistakes.py src/places              # those in these files or folders
+    lab/test/mistakes.py --check                 # no test: does each still have its place, and each of lab/ablations.yaml?"""
+import argparse
 import pathlib
 import subprocess
+import sys
 import time
 
 import yaml
 
-from . import marks, programs
-from .build_copy import BuildCopy, replaced
+LAB = pathlib.Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(LAB))
+from sdvo_lab import marks, programs  # noqa: E402
+from sdvo_lab.build_copy import BuildCopy, replaced  # noqa: E402
 
-LIST, ABLATIONS = programs.ROOT / "lab/mistakes.yaml", programs.ROOT / "lab/ablations.yaml"
+LIST, ABLATIONS = LAB / "test/mistakes.yaml", LAB / "ablations.yaml"
 ROOMS = ("odometry", "front_end", "common", "places", "data", "check", "ros")
 HANGS = 10  # times as long as without a mistake, and a test counts as failed
 
@@ -58,12 +63,11 @@ def rows(entries, copy, missed):
         yield [entry["file"], entry["why"], noticed or "**none**"]
 
 
-def options(parser):
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("files", nargs="*", help="or folders [default: all]")
     parser.add_argument("--check", action="store_true", help="only whether each has its place")
-
-
-def main(arguments):
+    arguments = parser.parse_args()
     if arguments.check:
         return check()
     entries = [entry for entry in yaml.safe_load(LIST.read_text())
@@ -72,3 +76,7 @@ def main(arguments):
     marks.show(rows(entries, BuildCopy("mistakes"), missed))
     print(f"{len(entries)} mistakes, {len(missed)} not noticed")
     return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
