@@ -114,6 +114,8 @@ def latency(_):
 
 TABLES = {"drives": drive_table, "small_images": small_images, "growth": growth, "allocations": allocations, "latency": latency}
 
+PRINTED_ALONE = ("kernels", "allocations")  # no page has them
+
 
 def options(parser):
     parser.add_argument("tables", nargs="*", metavar="|".join(["machine", "kernels", *TABLES]), help="[default: all]")
@@ -131,4 +133,5 @@ def main(arguments):
                 if arguments.write:
                     marks.put(arguments.write, name, machine())
             else:
-                marks.show(kernels() if name == "kernels" else TABLES[name](folder), arguments.write, name)
+                page = arguments.write if name not in PRINTED_ALONE else None
+                marks.show(kernels() if name == "kernels" else TABLES[name](folder), page, name)
