@@ -149,9 +149,9 @@ def try_fault(name, seed, drive, work, extra):
         return verdict_of(pairs, drive, directory, extra)
 
 
-HEAD = ["fault", "TRACKING/DEGRADED/LOST", "lost after [s]", "back after [s]", "error [mm]", "[sigma]",
+HEAD = ["fault", "TRACKING/DEGRADED/LOST", "lost after [s]", "back after [s]", "error [sigma]", "[mm]",
         "[deg]", "pairs beyond 5 sigma", "[sigma] degraded", "drift [mm]", "NEES", "verdict"]
-OF_THE_PAGE = 6  # columns
+OF_THE_PAGE = 5  # columns
 
 
 def row_of(name, verdicts):
@@ -163,7 +163,7 @@ def row_of(name, verdicts):
     words = sorted({verdict.words() for verdict in verdicts} - {"ok"})
     return [name, "/".join(str(sum(verdict.counts[letter] for verdict in verdicts)) for letter in verdicts[0].counts),
             "–" if numpy.isinf(lost) else f"{lost:.1f}", "never" if numpy.isinf(back) else f"{back:.1f}",
-            f"{1e3 * largest('error'):.0f}", f"{largest('sigmas'):.1f}", f"{largest('angle'):.2f}",
+            f"{largest('sigmas'):.1f}", f"{1e3 * largest('error'):.0f}", f"{largest('angle'):.2f}",
             f"{sum(v.beyond for v in verdicts)}", f"{largest('degraded_sigmas'):.1f}", f"{1e3 * largest('drift'):.0f}",
             f"{numpy.nanmean([v.nees for v in verdicts]):.1f}", ", ".join(words) or "ok"]
 
