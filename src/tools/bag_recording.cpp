@@ -9,7 +9,6 @@
 #include <stdexcept>
 
 #include "../ros/pair_decoder.hpp"
-#include "../ros/stamp_filter.hpp"
 #include "../ros/stamps.hpp"
 
 namespace sdvo {
