@@ -16,9 +16,7 @@ from . import drives, marks, odometry, programs
 KERNELS = {
     "fastCorners": "FAST corners of an image (plain: cv::FAST)",
     "cornerPeaks": "sub-pixel positions of 1100 corners (plain: cv::cornerSubPix)",
-    "halfResolution": "half resolution of an image",
     "stereoMatch": "stereo match of 1100 corners, all of it",
-    "patchSampling": "sampling of 1100 patches of 13x13 px",
     "freakInTwoViews": "FREAK of 1100 key points in two views, with the integral images",
     "patchAlignment": "alignment of 1100 patches between pairs",
 }
