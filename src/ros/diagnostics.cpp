@@ -150,9 +150,14 @@ void OdometryDiagnostics::diagnoseLatency(Status& status) {
     status.summary(Level::OK, "no features");
     return;
   }
-  const bool is_late = last_->latency > max_latency_;
-  status.summaryf(is_late ? Level::WARN : Level::OK, "%.3f s from image to pose%s", last_->latency,
-                  is_late ? ": is the machine too slow, or are the clocks of two machines different?" : "");
+  // Of a simulated clock that comes ten times a second or more often (chosen).
+  constexpr double kEarly = 0.1;  // s
+  const bool is_late = last_->latency > max_latency_, is_early = last_->latency < -kEarly;
+  status.summaryf(is_late || is_early ? Level::WARN : Level::OK, "%.3f s from image to pose%s", last_->latency,
+                  is_late    ? ": is the machine too slow, or are the clocks of two machines different?"
+                  : is_early ? ": the images are stamped in the future, where TF has nothing yet: does the driver's "
+                               "clock go ahead of this machine's?"
+                             : "");
 }
 
 /// Under the lock, as what follows.
