@@ -136,8 +136,10 @@ class ApproximateSynchroniser {
 
   void beginAnew() {
     synchroniser_ = std::make_unique<message_filters::Synchronizer<Policy>>(static_cast<const Policy&>(policy_));
-    synchroniser_->registerCallback(boost::function<void(const boost::shared_ptr<const Messages>&...)>(on_set_));
+    synchroniser_->registerCallback(&ApproximateSynchroniser::onSet, this);
   }
+
+  void onSet(const boost::shared_ptr<const Messages>&... messages) { on_set_(messages...); }
 
   Policy policy_;
   Callback on_set_;
