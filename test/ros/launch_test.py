@@ -41,7 +41,7 @@ FOLDER = os.path.join(rospkg.RosPack().get_path(PACKAGE), 'launch')
 
 
 def load(file, **arguments):
-    """What roslaunch makes of a launch file, or of a text, beside its own parameters."""
+    """A launch file, or a text, as roslaunch reads it, beside its own parameters."""
     given = ['%s:=%s' % item for item in arguments.items()]
     texts, files = ([file], []) if file.startswith('<') else (None, [(os.path.join(FOLDER, file), given)])
     config = roslaunch.config.load_config_default(files, None, roslaunch_strs=texts)
