@@ -1,6 +1,6 @@
 """Measures the time of the kernels, of whole drives and of the nodelets, and writes it between the marks of docs/precision.md, some
 five minutes on a machine that has nothing else to do. Needs scripts/build run_sequence evaluate_trajectory count_allocations
-benchmark_kernels measure_latency euroc_to_kitti render_drive; for the kernels Google Benchmark (Debian and Ubuntu: libbenchmark-dev;
+benchmark_kernels measure_latency convert render_drive; for the kernels Google Benchmark (Debian and Ubuntu: libbenchmark-dev;
 then scripts/build --force-cmake); for drives KITTI_DIR and EUROC_DIR."""
 import json
 import os
