@@ -95,8 +95,8 @@ class VisualOdometry {
   const VisualOdometryOptions& options() const { return options_; }
 
   /// Where the camera sits on the base, whose floor `planar` is about; until then at the base's origin, looking ahead.
-  /// Another place on the way is that of another camera: the odometry goes on from the base's last pose under a new
-  /// epoch, and the origin is where this camera was in the beginning.
+  /// Another place on the way is that of another camera. The odometry goes on from the base's last pose under a new
+  /// epoch. The origin is where this camera was in the beginning.
   void mountAt(const Eigen::Isometry3d& T_base_camera);
 
   /// The local map's points at a finite distance, in the origin, m; empty while there is no map.
