@@ -9,6 +9,7 @@
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "camera_finder.hpp"
 #include "exact_synchroniser.hpp"
 #include "features_image.hpp"
 #include "image_conversions.hpp"
@@ -31,7 +32,8 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
   struct Inputs {
     explicit Inputs(FeaturesImageNodelet& nodelet)
         : synchroniser(kQueue, [&nodelet](const auto&... messages) { nodelet.draw(messages...); }) {
-      ros::NodeHandle& nh = nodelet.nh_;
+      std::string ignored;
+      ros::NodeHandle nh(nodelet.nh_, "", findOnlyStereoCamera(nodelet.nh_, ignored).value_or(ros::M_string()));
       StereoImageTransport& transport = *nodelet.transport_;
       // Resolved, for a transport appends its own name to that of the topic.
       left.subscribe(nh, nh.resolveName("left/image_rect"), kQueue, transport.left,

@@ -1,13 +1,16 @@
 #pragma once
 
 #include <ros/callback_queue.h>
+#include <ros/console.h>
 #include <ros/node_handle.h>
 #include <ros/spinner.h>
 
+#include <boost/make_shared.hpp>
 #include <condition_variable>
 #include <cstddef>
 #include <cstdint>
 #include <deque>
+#include <exception>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -17,7 +20,8 @@
 namespace sdvo {
 
 /// A callback queue with a thread of its own. Nodelets of one manager share its threads: those of others that are slow
-/// would let ours wait. To be declared before, that is destroyed after, all that has callbacks in it.
+/// would let ours wait. An exception that a callback does not catch is reported and ends that call alone, not the
+/// process. To be declared before, that is destroyed after, all that has callbacks in it.
 class CallbackThread {
  public:
   CallbackThread() : spinner_(1, &queue_) {}
@@ -35,7 +39,24 @@ class CallbackThread {
   void stop() { spinner_.stop(); }
 
  private:
-  ros::CallbackQueue queue_;
+  struct Guarded : ros::CallbackInterface {
+    explicit Guarded(ros::CallbackInterfacePtr callback) : inner(std::move(callback)) {}
+    bool ready() override { return inner->ready(); }
+    CallResult call() override try { return inner->call(); } catch (const std::exception& e) {
+      ROS_ERROR_STREAM("a message, a service call or a timer was not handled: " << e.what());
+      return Success;
+    }
+
+    const ros::CallbackInterfacePtr inner;
+  };
+
+  struct Queue : ros::CallbackQueue {
+    void addCallback(const ros::CallbackInterfacePtr& callback, std::uint64_t owner) override {
+      ros::CallbackQueue::addCallback(boost::make_shared<Guarded>(callback), owner);
+    }
+  };
+
+  Queue queue_;
   ros::AsyncSpinner spinner_;
 };
 

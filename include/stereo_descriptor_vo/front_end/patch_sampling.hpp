@@ -2,6 +2,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 /// Half side of the largest patch, px.
