@@ -34,7 +34,7 @@ inline bool isAlike(const std::string& a, const std::string& b) {
   for (std::size_t i = 0; i < from.size(); ++i) {
     std::size_t diagonal = std::exchange(row[0], i + 1);
     for (std::size_t j = 0; j < to.size(); ++j)
-      diagonal = std::exchange(row[j + 1], std::min({row[j], row[j + 1], diagonal - (from[i] == to[j])}) + 1);
+      diagonal = std::exchange(row[j + 1], std::min(std::min(row[j], row[j + 1]) + 1, diagonal + (from[i] != to[j])));
   }
   return 5 * row.back() <= to.size();  // two of the ten and more letters of this package's names
 }
