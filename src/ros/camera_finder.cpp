@@ -47,7 +47,7 @@ std::vector<ros::M_string> findStereoCameras(const std::string& ns, const ros::m
   return found;
 }
 
-std::optional<ros::M_string> findOnlyStereoCamera(const ros::NodeHandle& nh, std::string& problem) {
+std::optional<ros::NodeHandle> findOnlyStereoCamera(const ros::NodeHandle& nh, std::string& problem) {
   const std::string ns = nh.getNamespace() == "/" ? "/" : nh.getNamespace() + "/";
   ros::master::V_TopicInfo topics;
   if (!ros::master::getTopics(topics)) return std::nullopt;
@@ -57,7 +57,11 @@ std::optional<ros::M_string> findOnlyStereoCamera(const ros::NodeHandle& nh, std
     if (is_ours || nh.resolveName(name) != ns + name) return std::nullopt;
   }
   const std::vector<ros::M_string> cameras = findStereoCameras(ns, topics);
-  if (cameras.size() == 1) return cameras.front();
+  if (cameras.size() == 1) {
+    ros::NodeHandle found(nh.getNamespace(), cameras.front());  // not of `nh`, whose remappings would win
+    found.setCallbackQueue(nh.getCallbackQueue());
+    return found;
+  }
   for (const ros::M_string& camera : cameras)
     problem += (problem.empty() ? "several stereo cameras: " : ", ") + camera.at("left/image_rect");
   return std::nullopt;

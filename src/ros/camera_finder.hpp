@@ -13,8 +13,8 @@ namespace sdvo {
 /// right named alike. Each as remappings of left|right/image_rect and left|right/camera_info.
 std::vector<ros::M_string> findStereoCameras(const std::string& ns, const ros::master::V_TopicInfo& topics);
 
-/// The only one under the node's namespace, where its images have no other names and nobody publishes them; says in
-/// `problem` where there are several.
-std::optional<ros::M_string> findOnlyStereoCamera(const ros::NodeHandle& nh, std::string& problem);
+/// A handle with the names of the only one under the node's namespace, where its images have no other names and nobody
+/// publishes them; says in `problem` where there are several. Callbacks run where those of `nh` do.
+std::optional<ros::NodeHandle> findOnlyStereoCamera(const ros::NodeHandle& nh, std::string& problem);
 
 }  // namespace sdvo

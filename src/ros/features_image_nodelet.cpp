@@ -33,12 +33,13 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
     explicit Inputs(FeaturesImageNodelet& nodelet)
         : synchroniser(kQueue, [&nodelet](const auto&... messages) { nodelet.draw(messages...); }) {
       std::string ignored;
-      ros::NodeHandle nh(nodelet.nh_, "", findOnlyStereoCamera(nodelet.nh_, ignored).value_or(ros::M_string()));
+      ros::NodeHandle& nh = nodelet.nh_;
+      ros::NodeHandle image_nh = findOnlyStereoCamera(nh, ignored).value_or(nh);
       StereoImageTransport& transport = *nodelet.transport_;
       // Resolved, for a transport appends its own name to that of the topic.
-      left.subscribe(nh, nh.resolveName("left/image_rect"), kQueue, transport.left,
+      left.subscribe(image_nh, image_nh.resolveName("left/image_rect"), kQueue, transport.left,
                      [&nodelet](const Image::ConstPtr& m) { nodelet.take<0>(m); });
-      right.subscribe(nh, nh.resolveName("right/image_rect"), kQueue, transport.right,
+      right.subscribe(image_nh, image_nh.resolveName("right/image_rect"), kQueue, transport.right,
                       [&nodelet](const Image::ConstPtr& m) { nodelet.take<1>(m); });
       features = nh.subscribe<Features>("stereo_features", kQueue,
                                         [&nodelet](const Features::ConstPtr& m) { nodelet.take<2>(m); });

@@ -109,12 +109,12 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   void findCamera() {
     if (!input_ || has_pairs_) return;
     std::string problem;
-    const std::optional<ros::M_string> camera = findOnlyStereoCamera(image_nh_, problem);
+    const std::optional<ros::NodeHandle> camera = findOnlyStereoCamera(image_nh_, problem);
     if (!problem.empty() && throttle_.allows("cameras"))
       NODELET_WARN_STREAM("nobody publishes " << nh_.resolveName("left/image_rect") << ", and there are " << problem
                                               << ": set the topics of one of them, see stereo_vo.launch");
     if (!camera) return;
-    image_nh_ = ros::NodeHandle(nh_, "", *camera);
+    image_nh_ = *camera;
     NODELET_WARN_STREAM("nobody publishes " << nh_.resolveName("left/image_rect") << ": the only stereo camera in "
                                             << nh_.getNamespace() << " is taken, with "
                                             << image_nh_.resolveName("left/image_rect") << " and "
