@@ -16,9 +16,7 @@ from . import drives, marks, odometry, programs
 KERNELS = {
     "fastCorners": "FAST corners of an image (plain: cv::FAST)",
     "cornerPeaks": "sub-pixel positions of 1100 corners (plain: cv::cornerSubPix)",
-    "halfResolution": "half resolution of an image",
     "stereoMatch": "stereo match of 1100 corners, all of it",
-    "patchSampling": "sampling of 1100 patches of 13x13 px",
     "freakInTwoViews": "FREAK of 1100 key points in two views, with the integral images",
     "patchAlignment": "alignment of 1100 patches between pairs",
 }
@@ -114,6 +112,8 @@ def latency(_):
 
 TABLES = {"drives": drive_table, "small_images": small_images, "growth": growth, "allocations": allocations, "latency": latency}
 
+PRINTED_ALONE = ("kernels", "allocations")  # no page has them
+
 
 def options(parser):
     parser.add_argument("tables", nargs="*", metavar="|".join(["machine", "kernels", *TABLES]), help="[default: all]")
@@ -131,4 +131,5 @@ def main(arguments):
                 if arguments.write:
                     marks.put(arguments.write, name, machine())
             else:
-                marks.show(kernels() if name == "kernels" else TABLES[name](folder), arguments.write, name)
+                page = arguments.write if name not in PRINTED_ALONE else None
+                marks.show(kernels() if name == "kernels" else TABLES[name](folder), page, name)

@@ -149,8 +149,9 @@ def try_fault(name, seed, drive, work, extra):
         return verdict_of(pairs, drive, directory, extra)
 
 
-HEAD = ["fault", "pairs TRACKING, DEGRADED, LOST", "lost after [s]", "back after [s]", "error [mm]", "[deg]", "[sigma]",
-        "pairs beyond 5 sigma", "[sigma] degraded", "drift [mm]", "NEES", "verdict"]
+HEAD = ["fault", "TRACKING/DEGRADED/LOST", "lost after [s]", "back after [s]", "error [sigma]", "[mm]",
+        "[deg]", "pairs beyond 5 sigma", "[sigma] degraded", "drift [mm]", "NEES", "verdict"]
+OF_THE_PAGE = 5  # columns
 
 
 def row_of(name, verdicts):
@@ -160,9 +161,9 @@ def row_of(name, verdicts):
 
     lost, back = largest("lost_after"), largest("back_after")
     words = sorted({verdict.words() for verdict in verdicts} - {"ok"})
-    return [name, " · ".join(" ".join(f"{letter}{n}" for letter, n in verdict.counts.items()) for verdict in verdicts),
+    return [name, "/".join(str(sum(verdict.counts[letter] for verdict in verdicts)) for letter in verdicts[0].counts),
             "–" if numpy.isinf(lost) else f"{lost:.1f}", "never" if numpy.isinf(back) else f"{back:.1f}",
-            f"{1e3 * largest('error'):.0f}", f"{largest('angle'):.2f}", f"{largest('sigmas'):.1f}",
+            f"{largest('sigmas'):.1f}", f"{1e3 * largest('error'):.0f}", f"{largest('angle'):.2f}",
             f"{sum(v.beyond for v in verdicts)}", f"{largest('degraded_sigmas'):.1f}", f"{1e3 * largest('drift'):.0f}",
             f"{numpy.nanmean([v.nees for v in verdicts]):.1f}", ", ".join(words) or "ok"]
 
@@ -185,7 +186,7 @@ def main(arguments):
     marks.check_names(names, [*FAULTS, *STANDING_FAULTS])
     if min(arguments.pairs, arguments.standing_pairs) < LAST + AFTER:
         raise SystemExit(f"error: a drive needs {LAST + AFTER} pairs at least")
-    bad = []
+    bad, of_the_page = [], [HEAD[:OF_THE_PAGE]]
 
     def rows():
         yield HEAD
@@ -193,6 +194,7 @@ def main(arguments):
             verdicts = [result.result() for result in tries[name]]
             row = row_of(name, verdicts)
             yield row
+            of_the_page.append(row[:OF_THE_PAGE])
             if row[-1] != "ok":
                 bad.append(name)
             if arguments.reasons:
@@ -203,6 +205,8 @@ def main(arguments):
         found = render_all(arguments.drives, folder, arguments.pairs, arguments.standing_pairs, names)
         tries = {name: [pool.submit(try_fault, name, seed, drive, work, programs.params(arguments))
                         for seed, drive in found[name in STANDING_FAULTS]] for name in names}
-        marks.show(rows(), arguments.write, "faults")
+        marks.show(rows())
+    if arguments.write:
+        marks.put(arguments.write, "faults", marks.lines(of_the_page))
     print(f"{len(names)} faults, {len(bad)} bad" + (": " + ", ".join(bad) if bad else ""))
     return 1 if bad else 0

@@ -72,12 +72,10 @@ def show(name, chosen, arguments):
     ratios = {(check, kind): [] for check in (*CHECKS, LARGER) for kind in "tr"}
     without = dict.fromkeys((*CHECKS, LARGER), 0)
     measured = ((drive, measure(drive, programs.params(arguments))) for drive in chosen)
-    lines = marks.show(drive_rows(measured, ratios, without))
+    marks.show(drive_rows(measured, ratios, without))
     print()
-    lines += ["", *marks.show(ratio_rows(ratios, without))]
+    marks.show(ratio_rows(ratios, without), arguments.write if name == "rendered" else None, name)
     print()
-    if arguments.write:
-        marks.put(arguments.write, name, lines)
 
 
 def options(parser):

@@ -12,7 +12,6 @@
 #include <utility>
 
 #include "../common/bag_records.hpp"
-#include "camera_conversions.hpp"
 #include "output_files.hpp"
 
 namespace sdvo {
@@ -74,7 +73,7 @@ SavedPlaces read(const std::string& path, const PoseGraphOptions& options) {
       places.push_back(ros_conversions::fromMessage(place));
       if (!stream) stream = ros_conversions::streamOf(place.features);
       const StereoFeatures &first = places.front().features, &last = places.back().features;
-      if (!isSameCamera(last.camera, first.camera))
+      if (!first.camera.isLike(last.camera))
         throw std::invalid_argument("its places " + std::to_string(places.front().id) + " and " +
                                     std::to_string(places.back().id) + " are of different cameras");
     } else if (topic == kGraphTopic) {

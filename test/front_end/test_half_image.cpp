@@ -2,13 +2,13 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/front_end/half_image.hpp"
 
 namespace sdvo {
 namespace test_half_image {
 
-/// OpenCV fuses products and sums on ARM, we never: there a mean near the middle of two grey levels may become the other one.
+/// OpenCV fuses products and sums on ARM, we never: there a mean near the middle of two grey levels may become the
+/// other one.
 #ifdef __aarch64__
 constexpr double kRounding = 1.0;  // grey levels
 #else
@@ -27,13 +27,6 @@ void expectHalfOfOpenCv(cv::Size size) {
 TEST(HalfImage, IsThatOfOpenCv) {
   for (const int width : {16, 17, 31, 64, 125, 641, 1226, 1241, 1242})
     for (const int height : {16, 19, 77, 370, 375, 376}) expectHalfOfOpenCv({width, height});
-}
-
-TEST(HalfImage, IsTheSameWithoutVectors) {
-  allowVectorKernels(false);
-  expectHalfOfOpenCv({1241, 376});
-  expectHalfOfOpenCv({127, 75});
-  allowVectorKernels(true);
 }
 
 }  // namespace test_half_image
