@@ -123,9 +123,10 @@ class Launch(unittest.TestCase):
             self.assertIn(['odom', '/uav1/mavros/odometry/out'], found['/uav1/stereo/' + node].remap_args)
 
     def test_a_mount_is_published_where_it_is_given(self):
-        for file in ('oak_d', 'realsense_d400', 'two_cameras'):
+        for file, needed in (('oak_d', {}), ('realsense_d400', {}), ('two_cameras', {}),
+                             ('side_by_side', {'left_info': '/left.yaml', 'right_info': '/right.yaml'})):
             def publishers(**arguments):
-                config = load('cameras/%s.launch' % file, **arguments)
+                config = load('cameras/%s.launch' % file, **needed, **arguments)
                 return sorted(node.args for node in config.nodes if node.type == 'static_transform_publisher')
             self.assertEqual(publishers(), [])
             self.assertEqual(publishers(base_frame_id='camera_link', namespace='camera'), [])
