@@ -8,6 +8,8 @@
 #include <optional>
 #include <string>
 
+#include "stamp_filter.hpp"
+
 namespace sdvo {
 
 /// Which way is up, as an accelerometer that stands measures it. May be used by several threads.

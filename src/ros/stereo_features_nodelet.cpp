@@ -10,6 +10,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "../common/stamp_filter.hpp"
 #include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
 #include "camera_conversions.hpp"

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "../common/imu_tracks.hpp"
+#include "../common/stamp_filter.hpp"
 #include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
 #include "diagnostics.hpp"
