@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 /// A rectified stereo pair: both views share one pinhole model, the right camera sits `baseline` metres along +x.

@@ -2,6 +2,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 /// Values that a row of a sampled patch takes: the square's side rounded up, so that whole registers can be worked on.

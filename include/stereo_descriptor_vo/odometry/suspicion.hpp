@@ -4,6 +4,8 @@
 #include <string>
 #include <utility>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 /// Why pairs are doubted that look sound: the world, the rig or the map may still be as wrong as it was a moment ago.
