@@ -146,6 +146,11 @@ void LocalMap::renewLooks(const StereoFeatures& features, const std::vector<Sigh
   }
 }
 
+void LocalMap::doubtNewest() {
+  for (Point& point : points_)
+    if (point.observations.size() > 1 && point.observations.back().frame_id == newestId()) --point.seen;
+}
+
 void LocalMap::takeDescriptor(Point& point, const StereoFeatures& features, int row) {
   const std::uint8_t* bytes = features.descriptors.ptr(row);
   point.descriptor.assign(bytes, bytes + features.descriptors.cols);
