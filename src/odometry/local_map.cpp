@@ -146,9 +146,9 @@ void LocalMap::renewLooks(const StereoFeatures& features, const std::vector<Sigh
   }
 }
 
-void LocalMap::doubtNewest() {
+void LocalMap::weighNewest(double probability) {
   for (Point& point : points_)
-    if (point.observations.size() > 1 && point.observations.back().frame_id == newestId()) --point.seen;
+    if (point.observations.size() > 1 && point.observations.back().frame_id == newestId()) point.seen -= static_cast<float>(1.0 - probability);
 }
 
 void LocalMap::takeDescriptor(Point& point, const StereoFeatures& features, int row) {

@@ -36,6 +36,13 @@ bool areOne(const StereoCamera& camera, const MotionHypothesis& a, const MotionH
          agree(camera, b.correspondences, b.motion.inliers, T_a, T_b, kSameMotion);
 }
 
+/// Whether a motion would do as well as another one that is so far `apart`.
+bool isTolerable(const MotionScene& scene, const Eigen::Isometry3d& motion, const Eigen::Isometry3d& apart) {
+  constexpr double kAngle = 0.02;  // rad (chosen: about a degree)
+  return apart.translation().norm() <= scene.tolerance + kTolerableRatio * motion.translation().norm() &&
+         logSO3(apart.linear()).norm() <= kAngle + kTolerableRatio * logSO3(motion.linear()).norm();
+}
+
 /// The prior's logarithm, relative to its best motion, is bounded by the probability that it is wrong.
 double logPrior(const MotionHypothesis& hypothesis) {
   return std::max(-0.5 * hypothesis.innovation, std::log(kTailProbability));
@@ -90,9 +97,9 @@ double probabilityOf(double log_odds) {
   return 1.0 / (1.0 + std::exp(-log_odds));
 }
 
-int MotionHypothesis::sightingsOf(int match) const {
-  return std::min(view->seen[static_cast<std::size_t>(matches[static_cast<std::size_t>(match)].reference)],
-                  kLastingSightings);
+double MotionHypothesis::sightingsOf(int match) const {
+  return std::min<double>(view->seen[static_cast<std::size_t>(matches[static_cast<std::size_t>(match)].reference)],
+                          kLastingSightings);
 }
 
 std::vector<int> MotionHypothesis::inlierRows(const std::vector<int>& rejected) const {
@@ -179,6 +186,8 @@ MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::v
   while (!hypotheses.back().motion.success) hypotheses.pop_back();
 
   const std::vector<double> weights = logWeights(scene, threshold, hypotheses);
+  if (getenv("DBG")) for (std::size_t k = 0; k < hypotheses.size(); ++k) { int lm=hypotheses[k].agreement.lasting_matches, li=hypotheses[k].agreement.lasting_inliers; const Vector6d x=logSE3(hypotheses[k].motion.T_current_reference.inverse());
+    fprintf(stderr, "   h%zu w %.2f innov %.1f in %d/%d lasting %d/%d  t %.3f %.3f %.3f r %.3f %.3f %.3f rms %.2f gate %.0f\n", k, weights[k], hypotheses[k].innovation, hypotheses[k].agreement.inliers, hypotheses[k].agreement.matches, li, lm, x[0],x[1],x[2],x[3],x[4],x[5], hypotheses[k].motion.rms, hypotheses[k].gate);}
   std::size_t best = static_cast<std::size_t>(std::max_element(weights.begin(), weights.end()) - weights.begin());
   const double largest = weights[best];
   // Of one motion the estimate with the most inliers.
@@ -218,13 +227,14 @@ MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::v
     rivals.emplace_back(k, std::exp(weights[k] - largest));
   }
   for (const auto& rival : rivals) total += rival.second;
-  chosen.probability = 1.0 / total;
   double likeliest = 0.0;
   for (const auto& [k, weight] : rivals) {
     const MotionHypothesis& other = hypotheses[k];
     // Both start from the same pair of the map.
     const Eigen::Isometry3d apart = chosen.motion.T_current_reference * other.motion.T_current_reference.inverse();
     chosen.rivals_moment += weight / total * momentOf(logSE3(apart));
+    if (isTolerable(scene, chosen.motion.T_current_reference, apart)) continue;
+    chosen.probability -= weight / total;
     if (weight <= likeliest) continue;
     likeliest = weight;
     std::vector<int> rows = other.inlierRows();

@@ -126,7 +126,7 @@ MotionScene VisualOdometry::sceneOf(const StereoFeatures& features, double dt,
                                     const std::optional<MotionGuess>& guess) const {
   const MotionPrior& prior = state_.prior;
   MotionScene scene{*state_.map, state_.calibration.calibration(), features, {}, {}, {}, state_.usual_agreement,
-                    state_.doubt.logOdds() > largestDoubt()};
+                    state_.doubt.logOdds() > largestDoubt(), options_.tracking.doubtful_deviation};
   const Eigen::Isometry3d T_reference_previous = state_.map->newestPose() * state_.T_origin_camera;
   const double since = secondsSinceMap(features);
   if (const auto confirmed = prior.confirmed(state_.map->newestStamp(), since)) scene.prior.push_back(*confirmed);
@@ -203,6 +203,7 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
 VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, const MotionScene& scene,
                                                MotionHypothesis& found, double dt) {
   const double since = secondsSinceMap(features);
+  if (getenv("DBG")) fprintf(stderr, "pair %d P %.4f carried %.2f now %.2f usual %.2f in %d/%d lasting %d/%d innov %.1f rms %.2f\n", state_.pairs-1, doubtOf(scene, found).probability, state_.doubt.logOdds(), logOddsMisled(scene, found), state_.usual_agreement, found.agreement.inliers, found.agreement.matches, found.agreement.lasting_inliers, found.agreement.lasting_matches, found.innovation, found.motion.rms);
   const Eigen::Isometry3d T_reference_current = found.motion.T_current_reference.inverse();
   std::string refutation = state_.prior.tooFast(T_reference_current, found.motion.covariance, since);
   // What is followed was likely something else already, and this is no motion of the camera: the prior's is likelier.
@@ -222,7 +223,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
 
   const Doubt doubt = doubtOf(scene, found);
   state_.doubt.raise(doubt.log_odds, doubt.cause);
-  commit(candidate, doubt.probability >= options_.tracking.probability);
+  commit(candidate, doubt.probability);
   Step step = measure(found, candidate);
   judge(scene, found, candidate, doubt, step);
   const bool is_confirmed = step.state == TrackingState::kTracking;
@@ -326,9 +327,8 @@ void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& fou
     reason.str("");
     reason << doubt.reason;
   } else {
-    constexpr double kRatio = 0.03;  // of the distance (chosen)
     const double deviation = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
-    if (!(deviation > options_.tracking.doubtful_deviation + kRatio * candidate.distance)) return;
+    if (!(deviation > options_.tracking.doubtful_deviation + kTolerableRatio * candidate.distance)) return;
     if (reason.str().empty())
       reason << "a distance of " << candidate.distance << " m with a standard deviation of " << deviation
              << " m exceeds tracking/doubtful_deviation";
@@ -337,13 +337,13 @@ void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& fou
   step.reason = "doubtful: " + reason.str();
 }
 
-void VisualOdometry::commit(const Candidate& candidate, bool is_confirmed) {
+void VisualOdometry::commit(const Candidate& candidate, double probability) {
   std::swap(state_.map, state_.candidate);
-  if (!is_confirmed) state_.map->doubtNewest();
+  state_.map->weighNewest(probability);
   const LocalMap::Adjustment& adjustment = candidate.adjustment;
   if (!adjustment.success) return;
   state_.calibration.note(state_.map->newestId(), candidate.calibration, adjustment.calibration_information);
-  if (is_confirmed && adjustment.common_disparity_square)
+  if (probability >= options_.tracking.probability && adjustment.common_disparity_square)
     state_.calibration.noteCommon(*adjustment.common_disparity_square);
 }
 

@@ -35,6 +35,7 @@ struct MotionScene {
   std::vector<ExpectedMotion> prior;  ///< of T_reference_current: a mixture; without any, all motions are as likely
   double usual_agreement = 0.9;       ///< ratio of lasting matches that agree with the camera's motion on this rig
   bool is_doubted = false;            ///< what is followed was likely not the camera's motion a moment ago
+  double tolerance = 0.05;            ///< m: motions that differ by less than this and 3 % are equally good
 };
 
 /// A motion that competes for being the camera's, and what speaks for it.
@@ -49,8 +50,8 @@ struct MotionHypothesis {
 
   Agreement agreement;       ///< without the matches that rivals explain
   double innovation = 0.0;   ///< square from the prior, in standard deviations; zero without prior
-  double probability = 1.0;  ///< of being the camera's motion, among all hypotheses
-  /// The likeliest motion that is another one.
+  double probability = 1.0;  ///< among all hypotheses, of the camera's motion being within tolerance of this one
+  /// The likeliest motion beyond tolerance.
   struct Rival {
     Eigen::Isometry3d T_current_reference;
     double probability;
@@ -60,8 +61,8 @@ struct MotionHypothesis {
   Matrix6d rivals_moment = Matrix6d::Zero();  ///< second moment of the rivals around the motion, m and rad
 
   /// Of a match: confirmed sightings of its point, four at most.
-  int sightingsOf(int match) const;
-  bool isLasting(int match) const { return sightingsOf(match) >= kLastingSightings; }
+  double sightingsOf(int match) const;
+  bool isLasting(int match) const { return sightingsOf(match) > kLastingSightings - 0.5; }
 
   /// Rows of the pair that the inliers matched, but for the rejected ones.
   std::vector<int> inlierRows(const std::vector<int>& rejected = {}) const;
@@ -71,8 +72,11 @@ struct MotionHypothesis {
   /// Counts the inliers without these rows of the pair.
   void reject(const std::vector<int>& rows);
 
-  static constexpr int kLastingSightings = 4;
+  static constexpr double kLastingSightings = 4.0;
 };
+
+/// Ratio of a motion by which it may be off.
+constexpr double kTolerableRatio = 0.03;
 
 /// Whether chance explains the agreement with a motion (a contrario, Moisan and Stival 2004): the expected number of
 /// motions with as many inliers among matches each of which agrees by `chance`. Its logarithm.

@@ -146,7 +146,7 @@ class VisualOdometry {
   std::string innovationWords(const MotionHypothesis& found) const;
   void judge(const MotionScene& scene, const MotionHypothesis& found, const Candidate& candidate, const Doubt& doubt,
              Step& step);
-  void commit(const Candidate& candidate, bool is_confirmed);
+  void commit(const Candidate& candidate, double probability);
   Step measure(const MotionHypothesis& found, const Candidate& candidate);
   Step hold(double dt);
   Step predict(const StereoFeatures& features, double dt, const std::string& failure);
