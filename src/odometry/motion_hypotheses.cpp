@@ -4,7 +4,7 @@
 #include <bitset>
 #include <cmath>
 #include <cstddef>
-#include <map>
+#include <set>
 #include <utility>
 
 #include "ascending_rows.hpp"
@@ -48,43 +48,100 @@ double logPrior(const MotionHypothesis& hypothesis) {
   return std::max(-0.5 * hypothesis.innovation, std::log(kTailProbability));
 }
 
-double sum(const std::vector<double>& values) {
-  double total = 0.0;
-  for (const double value : values) total += value;
-  return total;
+std::vector<int> sorted(std::vector<int> values) {
+  std::sort(values.begin(), values.end());
+  return values;
 }
 
 /// Logarithm of prior times likelihood of each hypothesis. Whatever hypothesis matched a point counts for all of them;
 /// what none of them explains speaks against none.
 std::vector<double> logWeights(const MotionScene& scene, double threshold,
                                const std::vector<MotionHypothesis>& hypotheses) {
-  std::map<std::pair<int, int>, double> seen;
+  std::set<std::pair<int, int>> pairs;
   std::vector<Correspondence> matches;
   std::vector<double> sightings;
   for (const MotionHypothesis& hypothesis : hypotheses)
-    for (int i = 0; i < static_cast<int>(hypothesis.matches.size()); ++i) {
-      const FeatureMatch& match = hypothesis.matches[static_cast<std::size_t>(i)];
-      if (!seen.emplace(std::make_pair(match.reference, match.current), 0.0).second) continue;
-      matches.push_back(hypothesis.correspondences[static_cast<std::size_t>(i)]);
-      sightings.push_back(hypothesis.sightingsOf(i));
+    for (std::size_t i = 0; i < hypothesis.matches.size(); ++i) {
+      const FeatureMatch& match = hypothesis.matches[i];
+      if (!pairs.emplace(match.reference, match.current).second) continue;
+      matches.push_back(hypothesis.correspondences[i]);
+      sightings.push_back(hypothesis.sightingsOf(static_cast<int>(i)));
     }
   const PoseProblem problem(scene.features.camera, matches, threshold);
-  std::vector<std::vector<int>> agreeing;
+  std::vector<double> own(hypotheses.size(), 0.0);
   std::vector<bool> is_explained(matches.size(), false);
-  for (const MotionHypothesis& hypothesis : hypotheses) {
-    agreeing.push_back(problem.inliers(hypothesis.motion.T_current_reference));
-    for (const int i : agreeing.back()) is_explained[static_cast<std::size_t>(i)] = true;
-  }
+  for (std::size_t k = 0; k < hypotheses.size(); ++k)
+    for (const int i : problem.inliers(hypotheses[k].motion.T_current_reference)) {
+      own[k] += sightings[static_cast<std::size_t>(i)];
+      is_explained[static_cast<std::size_t>(i)] = true;
+    }
+  double all = 0.0;
   int points = 0;
-  for (std::size_t i = 0; i < matches.size(); ++i) points += is_explained[i], sightings[i] *= is_explained[i];
-  const double all = sum(sightings);
+  for (std::size_t i = 0; i < matches.size(); ++i)
+    if (is_explained[i]) all += sightings[i], ++points;
   std::vector<double> weights;
-  for (std::size_t k = 0; k < hypotheses.size(); ++k) {
-    double own = 0.0;
-    for (const int i : agreeing[k]) own += sightings[static_cast<std::size_t>(i)];
-    weights.push_back(logPrior(hypotheses[k]) + logLikelihood(all - own, points));
-  }
+  for (std::size_t k = 0; k < hypotheses.size(); ++k)
+    weights.push_back(logPrior(hypotheses[k]) + logLikelihood(all - own[k], points));
   return weights;
+}
+
+/// A motion that explains a part of the pair that the chosen one does not, and that chance does not either.
+struct Competitor {
+  const MotionHypothesis* hypothesis;
+  double log_weight;
+  std::vector<int> rows;  ///< of the pair, that it explains alone
+};
+
+/// Each motion once.
+std::vector<Competitor> rivalsOf(const MotionScene& scene, double threshold, const MotionHypothesis& chosen,
+                                 const std::vector<MotionHypothesis>& hypotheses, const std::vector<double>& weights) {
+  const StereoCamera& camera = scene.features.camera;
+  const std::vector<int> own = sorted(chosen.inlierRows());
+  const int left = chosen.agreement.matches - chosen.agreement.inliers;
+  std::vector<Competitor> rivals;
+  for (std::size_t k = 0; k < hypotheses.size(); ++k) {
+    const MotionHypothesis& other = hypotheses[k];
+    if (areOne(camera, chosen, other)) continue;
+    Competitor rival{&other, weights[k], without(sorted(other.inlierRows()), own)};
+    const int rows = static_cast<int>(rival.rows.size());
+    const double chance = chanceOfAgreement(threshold, other.gate);
+    if (logFalseAlarms(std::max(left, rows), rows, chance) > std::log(kTailProbability)) continue;
+    const auto same = std::find_if(rivals.begin(), rivals.end(),
+                                   [&](const Competitor& before) { return areOne(camera, *before.hypothesis, other); });
+    if (same == rivals.end())
+      rivals.push_back(std::move(rival));
+    else if (same->log_weight < rival.log_weight)
+      *same = std::move(rival);
+  }
+  return rivals;
+}
+
+/// The chosen motion's probability, and the moment of the rivals around it.
+void compare(const MotionScene& scene, const std::vector<Competitor>& rivals, double log_weight,
+             MotionHypothesis& chosen) {
+  double total = 1.0;
+  for (const Competitor& rival : rivals) total += std::exp(rival.log_weight - log_weight);
+  std::vector<int> explained;
+  for (const Competitor& rival : rivals) {
+    explained.insert(explained.end(), rival.rows.begin(), rival.rows.end());
+    const Eigen::Isometry3d& T = rival.hypothesis->motion.T_current_reference;
+    const double probability = std::exp(rival.log_weight - log_weight) / total;
+    // Both start from the same pair of the map.
+    const Eigen::Isometry3d apart = chosen.motion.T_current_reference * T.inverse();
+    chosen.rivals_moment += probability * momentOf(logSE3(apart));
+    if (isTolerable(scene, chosen.motion.T_current_reference, apart)) continue;
+    chosen.probability -= probability;
+    if (!chosen.rival || chosen.rival->probability < probability)
+      chosen.rival = {T, probability, static_cast<int>(rival.rows.size())};
+  }
+  // What rivals explain does not speak against the chosen one.
+  explained = sorted(std::move(explained));
+  for (int i = 0; i < static_cast<int>(chosen.matches.size()); ++i) {
+    const int row = chosen.matches[static_cast<std::size_t>(i)].current;
+    if (!std::binary_search(explained.begin(), explained.end(), row)) continue;
+    --chosen.agreement.matches;
+    chosen.agreement.lasting_matches -= chosen.isLasting(i);
+  }
 }
 
 }  // namespace
@@ -129,7 +186,9 @@ void MotionHypothesis::reject(const std::vector<int>& rows) {
 double logFalseAlarms(int matches, int inliers, double chance) {
   constexpr int kSample = 3;
   if (inliers <= kSample) return 0.0;
-  const auto logChoose = [](int n, int k) { return std::lgamma(n + 1.0) - std::lgamma(k + 1.0) - std::lgamma(n - k + 1.0); };
+  const auto logChoose = [](int n, int k) {
+    return std::lgamma(n + 1.0) - std::lgamma(k + 1.0) - std::lgamma(n - k + 1.0);
+  };
   return std::log(matches - kSample) + logChoose(matches, inliers) + logChoose(inliers, kSample) +
          (inliers - kSample) * std::log(chance);
 }
@@ -169,87 +228,31 @@ double logOddsMisled(const MotionScene& scene, const MotionHypothesis& hypothesi
 }
 
 MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::vector<MotionHypothesis> hypotheses) {
-  const StereoCamera& camera = scene.features.camera;
   double match_time = 0.0, motion_time = 0.0;
   for (const MotionHypothesis& hypothesis : hypotheses)
     match_time += hypothesis.match_time, motion_time += hypothesis.motion_time;
   const auto by_inliers = [](const MotionHypothesis& a, const MotionHypothesis& b) {
     return a.motion.inliers.size() < b.motion.inliers.size();
   };
-  // Of failures the largest has the best reason.
-  std::stable_partition(hypotheses.begin(), hypotheses.end(), [](const auto& h) { return h.motion.success; });
-  if (!hypotheses.front().motion.success) {
-    MotionHypothesis& failed = *std::max_element(hypotheses.begin(), hypotheses.end(), by_inliers);
-    failed.match_time = match_time, failed.motion_time = motion_time;
-    return std::move(failed);
+  const auto failures = std::stable_partition(hypotheses.begin(), hypotheses.end(),
+                                              [](const MotionHypothesis& h) { return h.motion.success; });
+  MotionHypothesis chosen;
+  if (failures == hypotheses.begin()) {
+    // The largest failure has the best reason.
+    chosen = *std::max_element(hypotheses.begin(), hypotheses.end(), by_inliers);
+  } else {
+    hypotheses.erase(failures, hypotheses.end());
+    const std::vector<double> weights = logWeights(scene, threshold, hypotheses);
+    const auto likeliest = std::max_element(weights.begin(), weights.end());
+    const MotionHypothesis& first = hypotheses[static_cast<std::size_t>(likeliest - weights.begin())];
+    // Of one motion the estimate with the most inliers.
+    chosen = first;
+    for (const MotionHypothesis& other : hypotheses)
+      if (by_inliers(chosen, other) && areOne(scene.features.camera, first, other)) chosen = other;
+    compare(scene, rivalsOf(scene, threshold, chosen, hypotheses, weights), *likeliest, chosen);
   }
-  while (!hypotheses.back().motion.success) hypotheses.pop_back();
-
-  const std::vector<double> weights = logWeights(scene, threshold, hypotheses);
-  if (getenv("DBG")) for (std::size_t k = 0; k < hypotheses.size(); ++k) { int lm=hypotheses[k].agreement.lasting_matches, li=hypotheses[k].agreement.lasting_inliers; const Vector6d x=logSE3(hypotheses[k].motion.T_current_reference.inverse());
-    fprintf(stderr, "   h%zu w %.2f innov %.1f in %d/%d lasting %d/%d  t %.3f %.3f %.3f r %.3f %.3f %.3f rms %.2f gate %.0f\n", k, weights[k], hypotheses[k].innovation, hypotheses[k].agreement.inliers, hypotheses[k].agreement.matches, li, lm, x[0],x[1],x[2],x[3],x[4],x[5], hypotheses[k].motion.rms, hypotheses[k].gate);}
-  std::size_t best = static_cast<std::size_t>(std::max_element(weights.begin(), weights.end()) - weights.begin());
-  const double largest = weights[best];
-  // Of one motion the estimate with the most inliers.
-  std::vector<bool> is_same;
-  for (const MotionHypothesis& other : hypotheses)
-    is_same.push_back(&other == &hypotheses[best] || areOne(camera, hypotheses[best], other));
-  for (std::size_t k = 0; k < hypotheses.size(); ++k)
-    if (is_same[k] && by_inliers(hypotheses[best], hypotheses[k])) best = k;
-  MotionHypothesis& chosen = hypotheses[best];
   chosen.match_time = match_time, chosen.motion_time = motion_time;
-
-  // Rivals explain a part of the pair that the chosen one does not, and that chance does not either.
-  std::vector<int> own = chosen.inlierRows(), of_rivals;
-  std::sort(own.begin(), own.end());
-  const int left = chosen.agreement.matches - chosen.agreement.inliers;
-  double total = 1.0;
-  std::vector<std::pair<std::size_t, double>> rivals;
-  for (std::size_t k = 0; k < hypotheses.size(); ++k) {
-    const MotionHypothesis& other = hypotheses[k];
-    if (is_same[k]) continue;
-    std::vector<int> rows = other.inlierRows();
-    std::sort(rows.begin(), rows.end());
-    rows = without(std::move(rows), own);
-    const int count = static_cast<int>(rows.size());
-    if (logFalseAlarms(std::max(left, count), count, chanceOfAgreement(threshold, other.gate)) >
-        std::log(kTailProbability))
-      continue;
-    // Hypotheses of one rival count once.
-    const auto same = std::find_if(rivals.begin(), rivals.end(), [&](const auto& rival) {
-      return areOne(camera, hypotheses[rival.first], other);
-    });
-    of_rivals.insert(of_rivals.end(), rows.begin(), rows.end());
-    if (same != rivals.end()) {
-      if (weights[k] > weights[same->first]) *same = {k, std::exp(weights[k] - largest)};
-      continue;
-    }
-    rivals.emplace_back(k, std::exp(weights[k] - largest));
-  }
-  for (const auto& rival : rivals) total += rival.second;
-  double likeliest = 0.0;
-  for (const auto& [k, weight] : rivals) {
-    const MotionHypothesis& other = hypotheses[k];
-    // Both start from the same pair of the map.
-    const Eigen::Isometry3d apart = chosen.motion.T_current_reference * other.motion.T_current_reference.inverse();
-    chosen.rivals_moment += weight / total * momentOf(logSE3(apart));
-    if (isTolerable(scene, chosen.motion.T_current_reference, apart)) continue;
-    chosen.probability -= weight / total;
-    if (weight <= likeliest) continue;
-    likeliest = weight;
-    std::vector<int> rows = other.inlierRows();
-    std::sort(rows.begin(), rows.end());
-    chosen.rival = {other.motion.T_current_reference, weight / total,
-                    static_cast<int>(without(std::move(rows), own).size())};
-  }
-  // What rivals explain does not speak against the chosen one.
-  std::sort(of_rivals.begin(), of_rivals.end());
-  for (int i = 0; i < static_cast<int>(chosen.matches.size()); ++i) {
-    if (!std::binary_search(of_rivals.begin(), of_rivals.end(), chosen.matches[i].current)) continue;
-    --chosen.agreement.matches;
-    chosen.agreement.lasting_matches -= chosen.isLasting(i);
-  }
-  return std::move(chosen);
+  return chosen;
 }
 
 void CarriedDoubt::raise(double log_odds, const std::string& cause) {

@@ -95,8 +95,7 @@ void MotionPrior::measure(std::int64_t stamp, const Eigen::Isometry3d& motion, d
   doubt_ = doubt;
   const Vector6d velocity = logSE3(motion) / dt;
   // A motion may be that fast within the error of its stamps, but no other one after it.
-  if (!(velocity.head<3>().norm() <= options_.max_speed) ||
-      !(velocity.tail<3>().norm() <= options_.max_rotation_rate))
+  if (!(velocity.head<3>().norm() <= options_.max_speed) || !(velocity.tail<3>().norm() <= options_.max_rotation_rate))
     return;
   velocity_ = velocity;
   velocity_covariance_ = covariance / (dt * dt);

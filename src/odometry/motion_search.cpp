@@ -17,9 +17,9 @@ namespace sdvo {
 namespace {
 
 constexpr double kElsewhere = 0.6;  // px, of aligned positions; up to 0.5 where nothing moved
-// Chi-square of six by which the lasting points' motion is another one. Errors of neighbouring points are not
-// independent: up to 170 where nothing moved.
-constexpr double kOther = 200.0;
+// Chi-square of six by which the lasting points' motion may be another one, so that it is worth to look further, and by
+// which it is. Errors of neighbouring points are not independent: up to 170 where nothing moved.
+constexpr double kPerhapsOther = 100.0, kOther = 200.0;
 // The same for each point, in variances of its residual: a part of its noise is common to many, so the sum grows with
 // their number. Measured where the sum exceeds kOther: up to 1.5 where nothing moved, 1.7 and more with faults
 // (docs/log/odometry.md).
@@ -45,12 +45,15 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene, double max_doubt) 
   MotionHypothesis found = searchNear(scene, view, expected, max_doubt);
   found.match_time += view_time;
   for (bool is_chosen = false;; is_chosen = true) {
-    if (is_chosen) found = chooseMotion(scene, motion_options_.inlier_threshold, compete(scene, view, std::move(found)));
-    else if (scene.is_doubted || !isBeyondDoubt(scene, found, max_doubt)) continue;
+    if (is_chosen)
+      found = chooseMotion(scene, motion_options_.inlier_threshold, compete(scene, view, std::move(found)));
+    else if (scene.is_doubted || !isBeyondDoubt(scene, found, max_doubt))
+      continue;
     if (!found.motion.success) return found;
     stopwatch.lap();
     Alignment aligned = align(scene, found);
-    const std::optional<Eigen::Isometry3d> T_lasting = motionOfLasting(camera, found, aligned);
+    const std::optional<Eigen::Isometry3d> T_lasting =
+        motionOfLasting(camera, found, aligned, is_chosen ? kOther : kPerhapsOther);
     found.motion_time += stopwatch.lap();
     if (T_lasting && !is_chosen) continue;
     found.motion.T_current_reference = aligned.T_current_reference;
@@ -138,9 +141,8 @@ MotionHypothesis MotionSearch::search(const FeatureMatcher& matcher, const Motio
   MotionHypothesis found;
   found.view = view;
   const StereoCamera& camera = scene.features.camera;
-  found.gate = T_current_reference && matcher.options().gating
-                   ? matcher.options().gate_radius
-                   : std::sqrt(camera.width * camera.height / CV_PI);
+  found.gate = T_current_reference && matcher.options().gating ? matcher.options().gate_radius
+                                                               : std::sqrt(camera.width * camera.height / CV_PI);
   Stopwatch stopwatch;
   found.matches = matcher.match(view->rows, scene.features, T_current_reference);
   found.match_time = stopwatch.lap();
@@ -189,10 +191,11 @@ void MotionSearch::weigh(const MotionScene& scene, MotionHypothesis& found) cons
 void MotionSearch::testAgainstChance(MotionHypothesis& found) const {
   const auto& [matches, inliers, lasting_matches, lasting_inliers] = found.agreement;
   const double chance = chanceOfAgreement(motion_options_.inlier_threshold, found.gate);
-  if (logFalseAlarms(matches, inliers, chance) <= std::log(kTailProbability)) return;
+  if (inliers >= motion_options_.min_inliers && logFalseAlarms(matches, inliers, chance) <= std::log(kTailProbability))
+    return;
   found.motion.success = false;
   found.motion.reason = "only " + std::to_string(inliers) + " of " + std::to_string(matches) +
-                        " matches agree on one motion, which chance explains";
+                        " matches agree on one motion: too few, or as many as chance gives";
 }
 
 /// Aligns the inliers' patches and refines the motion on them.
@@ -224,8 +227,8 @@ MotionSearch::Alignment MotionSearch::align(const MotionScene& scene, const Moti
 /// together: one that puts most of the others elsewhere, and that is not within their own error. Far points agree with
 /// nearly any step once a turn makes up for it, so their number says nothing.
 std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const StereoCamera& camera,
-                                                               const MotionHypothesis& found,
-                                                               const Alignment& aligned) const {
+                                                               const MotionHypothesis& found, const Alignment& aligned,
+                                                               double significant) const {
   std::vector<Correspondence> lasting, others;
   lasting.reserve(aligned.measured.size()), others.reserve(aligned.measured.size());
   for (std::size_t k = 0; k < aligned.measured.size(); ++k)
@@ -239,7 +242,7 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const StereoCamer
   std::iota(all.begin(), all.end(), 0);
   if (agree(camera, others, all, T, T_lasting, kElsewhere)) return std::nullopt;
   const Vector6d difference = logSE3(T_lasting * T.inverse());
-  const double least = std::max(kOther, kOtherOfOne * static_cast<double>(lasting.size()));
+  const double least = std::max(significant, kOtherOfOne * static_cast<double>(lasting.size()));
   if (difference.dot(equations.hessian * difference) <= least * equations.variance()) return std::nullopt;
   return T_lasting;
 }

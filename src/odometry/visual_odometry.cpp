@@ -125,8 +125,15 @@ bool VisualOdometry::isFrozen(const StereoFeatures& features, double dt,
 MotionScene VisualOdometry::sceneOf(const StereoFeatures& features, double dt,
                                     const std::optional<MotionGuess>& guess) const {
   const MotionPrior& prior = state_.prior;
-  MotionScene scene{*state_.map, state_.calibration.calibration(), features, {}, {}, {}, state_.usual_agreement,
-                    state_.doubt.logOdds() > largestDoubt(), options_.tracking.doubtful_deviation};
+  MotionScene scene{*state_.map,
+                    state_.calibration.calibration(),
+                    features,
+                    {},
+                    {},
+                    {},
+                    state_.usual_agreement,
+                    state_.doubt.logOdds() > largestDoubt(),
+                    options_.tracking.doubtful_deviation};
   const Eigen::Isometry3d T_reference_previous = state_.map->newestPose() * state_.T_origin_camera;
   const double since = secondsSinceMap(features);
   if (const auto confirmed = prior.confirmed(state_.map->newestStamp(), since)) scene.prior.push_back(*confirmed);
@@ -203,7 +210,6 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
 VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, const MotionScene& scene,
                                                MotionHypothesis& found, double dt) {
   const double since = secondsSinceMap(features);
-  if (getenv("DBG")) fprintf(stderr, "pair %d P %.4f carried %.2f now %.2f usual %.2f in %d/%d lasting %d/%d innov %.1f rms %.2f\n", state_.pairs-1, doubtOf(scene, found).probability, state_.doubt.logOdds(), logOddsMisled(scene, found), state_.usual_agreement, found.agreement.inliers, found.agreement.matches, found.agreement.lasting_inliers, found.agreement.lasting_matches, found.innovation, found.motion.rms);
   const Eigen::Isometry3d T_reference_current = found.motion.T_current_reference.inverse();
   std::string refutation = state_.prior.tooFast(T_reference_current, found.motion.covariance, since);
   // What is followed was likely something else already, and this is no motion of the camera: the prior's is likelier.
@@ -225,6 +231,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   state_.doubt.raise(doubt.log_odds, doubt.cause);
   commit(candidate, doubt.probability);
   Step step = measure(found, candidate);
+  const Matrix6d measured = step.covariance;
   judge(scene, found, candidate, doubt, step);
   const bool is_confirmed = step.state == TrackingState::kTracking;
   if (is_confirmed && found.agreement.lasting_matches > 0) {
@@ -234,8 +241,8 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   }
   // A motion that is likely something else's predicts nothing.
   if (doubt.probability >= 0.5)
-    state_.prior.measure(features.stamp, T_reference_current, since, found.motion.covariance, is_confirmed,
-                         doubt.moment);
+    state_.prior.measure(features.stamp, T_reference_current, since, measured, is_confirmed,
+                         step.covariance - measured);
   if (options_.planar.planar) {
     const std::string off = state_.floor.note(*floor(), state_.map->newestPose());
     if (step.reason.empty()) step.reason = off;
@@ -315,8 +322,7 @@ void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& fou
   Matrix6d covariance = candidate.adjustment.since_keyframe;
   if (found.innovation > kInnovationGate) {
     // The stamps may be wrong, or the camera did what none does; points cannot tell.
-    const Vector6d innovation =
-        scene.prior.front().innovation(found.motion.T_current_reference.inverse());
+    const Vector6d innovation = scene.prior.front().innovation(found.motion.T_current_reference.inverse());
     covariance += innovation * innovation.transpose();
     step.covariance += innovation * innovation.transpose();
     reason << innovationWords(found);

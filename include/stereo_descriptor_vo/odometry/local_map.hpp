@@ -83,7 +83,7 @@ class LocalMap {
     /// (u_left, v_left, disparity without the rig's error) in the newest pair, px; beside its image where a point is
     /// about to enter.
     std::vector<cv::Point3f> pixels;
-    std::vector<int> point;  ///< what sightings call them
+    std::vector<int> point;   ///< what sightings call them
     std::vector<float> seen;  ///< in how many pairs, the map's and forgotten ones, each by its probability
   };
   /// Points in the image of the newest pair, and those that a turn of `T_next_newest` brings into the next one.

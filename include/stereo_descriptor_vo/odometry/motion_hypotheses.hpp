@@ -90,8 +90,8 @@ bool agree(const StereoCamera& camera, const std::vector<Correspondence>& corres
            const std::vector<int>& points, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double within);
 
 /// Logarithm of the likelihood, up to a constant, of a motion that leaves some of the `points` to other motions as
-/// moving things; those have so many confirmed sightings in sum. Points are no independent witnesses, because what moves
-/// has many of them: the sum is tempered by their effective number.
+/// moving things; those have so many confirmed sightings in sum. Points are no independent witnesses, because what
+/// moves has many of them: the sum is tempered by their effective number.
 double logLikelihood(double of_others, int points);
 
 /// Log-odds that a motion is not the camera's, by the pair itself: the prior against the agreement of lasting points.

@@ -16,7 +16,7 @@ struct MotionPriorOptions {
   double max_rotation_rate = 6.3;
   double acceleration = 2.2;
   double rotation_acceleration = 1.4;
-  double stamp_sigma = 0.01;
+  double stamp_sigma = 0.005;
 
   void describe(OptionList& list) {
     list.add("max_speed", max_speed, {0.1, 1000.0}, "m/s", "a faster motion is a wrong one");

@@ -52,7 +52,7 @@ class MotionSearch {
   void weigh(const MotionScene& scene, MotionHypothesis& found) const;
   Alignment align(const MotionScene& scene, const MotionHypothesis& found) const;
   std::optional<Eigen::Isometry3d> motionOfLasting(const StereoCamera& camera, const MotionHypothesis& found,
-                                                   const Alignment& aligned) const;
+                                                   const Alignment& aligned, double significant) const;
   void keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_lasting, const std::vector<Correspondence>& measured,
               MotionHypothesis& found) const;
 

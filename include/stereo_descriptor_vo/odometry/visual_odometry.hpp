@@ -36,8 +36,9 @@ struct TrackingOptions : MotionPriorOptions {
     list.add("max_gap", max_gap, {0.01, 60.0}, "s", "longest time between pairs over which the motion is predicted");
     list.add("probability", probability, {0.5, 0.999}, "",
              "a motion is doubtful that is the camera's with a smaller probability");
-    list.add("doubtful_deviation", doubtful_deviation, {0.001, 1000.0}, "m",
-             "a motion is doubtful whose translation has a larger standard deviation than this and 3 % of its distance");
+    list.add(
+        "doubtful_deviation", doubtful_deviation, {0.001, 1000.0}, "m",
+        "a motion is doubtful whose translation has a larger standard deviation than this and 3 % of its distance");
     MotionPriorOptions::describe(list);
   }
 };
@@ -163,8 +164,7 @@ class VisualOdometry {
 
   // State between pairs; reset() is the assignment of a new one.
   struct State {
-    explicit State(const VisualOdometryOptions& options)
-        : calibration(options.calibration), prior(options.tracking) {}
+    explicit State(const VisualOdometryOptions& options) : calibration(options.calibration), prior(options.tracking) {}
 
     std::optional<LocalMap> map;
     std::optional<LocalMap> candidate;  ///< the map with the pair; between pairs only its memory matters
