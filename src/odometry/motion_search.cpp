@@ -92,14 +92,23 @@ std::vector<MotionHypothesis> MotionSearch::compete(const MotionScene& scene, co
   return hypotheses;
 }
 
-/// The majority agrees with the motion, so that no rival outweighs it, and neither prior nor lasting points contradict.
+/// Neither prior nor lasting points contradict, the majority agrees with the motion, and lasting points that lack more
+/// than usual would be no serious rival even if they moved together.
 bool MotionSearch::isBeyondDoubt(const MotionScene& scene, const MotionHypothesis& found, double max_doubt) const {
   if (!found.motion.success || found.innovation > kInnovationGate || logOddsMisled(scene, found) > max_doubt)
     return false;
-  int all = 0, own = 0;
+  double all = 0.0, own = 0.0;
   for (int i = 0; i < static_cast<int>(found.matches.size()); ++i) all += found.sightingsOf(i);
   for (const int i : found.motion.inliers) own += found.sightingsOf(i);
-  return 2 * own >= all;
+  const double agree = found.agreement.lasting_inliers;
+  const double lacking = scene.usual_agreement * found.agreement.lasting_matches - agree;
+  if (lacking >= motion_options_.min_inliers) {
+    constexpr double kSightings = MotionHypothesis::kLastingSightings;
+    const int points = static_cast<int>(agree + lacking);
+    if (logLikelihood(kSightings * agree, points) - logLikelihood(kSightings * lacking, points) > max_doubt)
+      return false;
+  }
+  return 2.0 * own >= all;
 }
 
 /// First where a good prediction has the points, then three times as far.
@@ -219,7 +228,8 @@ MotionSearch::Alignment MotionSearch::align(const MotionScene& scene, const Moti
         measurementOf(features, match.current, scene.calibration, sighting.measurement.head<2>() - corner);
     aligned.push_back(alignment.measured.back());
   }
-  if (aligned.size() >= kEnough) refineMotion(features.camera, motion_options_, aligned, alignment.T_current_reference);
+  refineMotion(features.camera, motion_options_, aligned.size() >= kEnough ? aligned : alignment.measured,
+               alignment.T_current_reference);
   return alignment;
 }
 

@@ -98,6 +98,7 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features, const std:
   if (step.T_previous_current) move(*step.T_previous_current);
   if (step.state == TrackingState::kTracking || step.state == TrackingState::kDegraded)
     state_.last_pose_stamp = features.stamp;
+  if (getenv("DBG")) fprintf(stderr, "pair %d state %d carried %.2f  %s\n", state_.pairs - 1, int(step.state), state_.doubt.logOdds(), step.reason.c_str());
   step.time = stopwatch.lap();
   return report(features, dt, found, step);
 }
