@@ -98,7 +98,6 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features, const std:
   if (step.T_previous_current) move(*step.T_previous_current);
   if (step.state == TrackingState::kTracking || step.state == TrackingState::kDegraded)
     state_.last_pose_stamp = features.stamp;
-  if (getenv("DBG")) fprintf(stderr, "pair %d state %d carried %.2f  %s\n", state_.pairs - 1, int(step.state), state_.doubt.logOdds(), step.reason.c_str());
   step.time = stopwatch.lap();
   return report(features, dt, found, step);
 }
@@ -335,7 +334,7 @@ void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& fou
     reason << doubt.reason;
   } else {
     const double deviation = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
-    if (!(deviation > options_.tracking.doubtful_deviation + kTolerableRatio * candidate.distance)) return;
+    if (deviation <= options_.tracking.doubtful_deviation + kTolerableRatio * candidate.distance) return;
     if (reason.str().empty())
       reason << "a distance of " << candidate.distance << " m with a standard deviation of " << deviation
              << " m exceeds tracking/doubtful_deviation";
