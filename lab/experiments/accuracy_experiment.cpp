@@ -12,7 +12,6 @@
 
 #include "../../src/common/progress.hpp"
 #include "aligned_motion.hpp"
-#include "bootstrap.hpp"
 #include "correct_matches.hpp"
 #include "csv_table.hpp"
 #include "odometry_systems.hpp"
@@ -30,7 +29,7 @@ constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 enum Model { kSample, kRefined, kAligned, kAlignedByDepth, kModels };
 constexpr std::array<const char*, kModels> kModelNames = {"sample", "refined", "aligned", "aligned_by_depth"};
 
-/// A row of the summary.
+/// What rows of the table are about.
 struct Case {
   std::string sequence;
   int features, step;
@@ -52,16 +51,6 @@ struct Run {
   double failures = 0.0;      ///< pairs
   double pairs = 0.0;
 };
-
-constexpr std::array<double Run::*, 5> kErrors = {&Run::pair_percent, &Run::path_percent, &Run::pair_degrees,
-                                                  &Run::failures, &Run::pairs};
-
-Run meanOf(const std::vector<Run>& runs) {
-  Run mean;
-  for (const Run& run : runs)
-    for (const auto error : kErrors) mean.*error += run.*error / static_cast<double>(runs.size());
-  return mean;
-}
 
 std::vector<double> lengths() {
   std::vector<double> all;
@@ -144,15 +133,6 @@ void takeOut(const RigCalibration& rig, std::vector<StereoFeatures>& pairs) {
     }
 }
 
-/// Table 2 of the paper: best, mean, worst.
-std::array<double, 3> published(const Case& c) {
-  if (c.sequence == "mean" && c.step == 1 && c.method == ConsensusMethod::kAdaptiveGasac) {
-    if (c.system == "stereo") return {2.47, 3.5, 4.29};
-    if (c.system == "standard") return {3.43, 4.78, 8.8};
-  }
-  return {kUnknown, kUnknown, kUnknown};
-}
-
 using Results = std::map<Case, std::vector<Run>>;  // one run for each seed
 
 /// Runs over one drive.
@@ -214,33 +194,9 @@ class DriveAccuracy {
   Results results_;
 };
 
-/// How much smaller the pairs' error of a case is than that of another one, drive by drive, %.
-std::vector<double> gains(const Results& results, const std::vector<std::string>& drives, Case c, Case standard) {
-  std::vector<double> of_drive;
-  for (const std::string& drive : drives) {
-    c.sequence = standard.sequence = drive;
-    of_drive.push_back(100.0 * (1.0 - meanOf(results.at(c)).pair_percent / meanOf(results.at(standard)).pair_percent));
-  }
-  return of_drive;
-}
-
-/// The mean over the drives, seed by seed.
-Results meansOver(const Results& results, int drives) {
-  Results means;
-  for (const auto& [c, of_seed] : results) {
-    Case mean = c;
-    mean.sequence = "mean";
-    std::vector<Run>& total = means[mean];
-    total.resize(of_seed.size());
-    for (std::size_t k = 0; k < of_seed.size(); ++k)
-      for (const auto error : kErrors) total[k].*error += of_seed[k].*error / drives;
-  }
-  return means;
-}
-
 }  // namespace
 
-std::string runAccuracy(const ExperimentSetup& setup, const AccuracyExperiment& experiment) {
+void runAccuracy(const ExperimentSetup& setup, const AccuracyExperiment& experiment) {
   if (std::count(experiment.systems.begin(), experiment.systems.end(), "standard") == 0)
     throw std::invalid_argument("the system 'standard' is missing: the others are compared with it");
   PipelineOptions options = setup.options();
@@ -248,73 +204,16 @@ std::string runAccuracy(const ExperimentSetup& setup, const AccuracyExperiment& 
   const std::string descriptor = nameOf(options.stereo_features.descriptor.type);
   CsvTable runs({"sequence", "descriptor", "features", "step", "model", "method", "system", "seed", "pair_percent",
                  "path_percent", "pair_degrees", "failures", "pairs", "rig_offset_px", "options"});
-  Results results;
-  std::vector<std::string> drives;
   for (const std::string& name : setup.sequences) {
     const ReferenceSequence sequence = openSequence(setup, name, ReferenceMotion::kGroundTruth);
     const RigCalibration rig = experiment.without_rig_error ? estimateRig(sequence) : RigCalibration{};
-    const Results of_drive = DriveAccuracy(sequence, rig, experiment, options).run();
-    drives.push_back(sequence.name);
-    for (const auto& [c, of_seed] : of_drive)
+    for (const auto& [c, of_seed] : DriveAccuracy(sequence, rig, experiment, options).run())
       for (std::size_t k = 0; k < of_seed.size(); ++k)
         runs.add(c.sequence, descriptor, c.features, c.step, kModelNames[c.model], nameOf(c.method), c.system,
                  static_cast<int>(k) + 1, of_seed[k].pair_percent, of_seed[k].path_percent, of_seed[k].pair_degrees,
                  of_seed[k].failures, of_seed[k].pairs, rig.value[0], hash);
-    results.insert(of_drive.begin(), of_drive.end());
-  }
-  Results shown = results;
-  shown.merge(meansOver(results, static_cast<int>(drives.size())));
-
-  CsvTable summary({"sequence",
-                    "descriptor",
-                    "features",
-                    "step",
-                    "model",
-                    "method",
-                    "system",
-                    "seeds",
-                    "pair_percent",
-                    "gain_percent",
-                    "gain_low",
-                    "gain_high",
-                    "gain_on_plain_percent",
-                    "gain_on_plain_low",
-                    "gain_on_plain_high",
-                    "pair_degrees",
-                    "failure_percent",
-                    "best_path_percent",
-                    "mean_path_percent",
-                    "worst_path_percent",
-                    "paper_best",
-                    "paper_mean",
-                    "paper_worst",
-                    "options"});
-  for (const auto& [c, of_seed] : shown) {
-    std::vector<double> path;
-    for (const Run& run : of_seed) path.push_back(run.path_percent);
-    const auto [best, worst] = std::minmax_element(path.begin(), path.end());
-    const Run mean = meanOf(of_seed);
-    // On the standard descriptor with the same treatment, and with the best that needs no depth.
-    const std::vector<std::string> compared = c.sequence == "mean" ? drives : std::vector<std::string>{c.sequence};
-    const auto gainOn = [&, key = c](Model model) {
-      Case standard = key;
-      standard.model = model;
-      standard.system = "standard";
-      const std::vector<double> of_drive = gains(results, compared, key, standard);
-      const double total = std::accumulate(of_drive.begin(), of_drive.end(), 0.0);
-      return std::make_pair(total / static_cast<double>(of_drive.size()), bootstrapMean(of_drive));
-    };
-    const auto [gain, interval] = gainOn(c.model);
-    const auto [gain_on_plain, interval_on_plain] = gainOn(kAligned);
-    const auto paper = published(c);
-    summary.add(c.sequence, descriptor, c.features, c.step, kModelNames[c.model], nameOf(c.method), c.system,
-                static_cast<int>(of_seed.size()), mean.pair_percent, gain, interval.low, interval.high, gain_on_plain,
-                interval_on_plain.low, interval_on_plain.high, mean.pair_degrees, 100.0 * mean.failures / mean.pairs,
-                *best, mean.path_percent, *worst, paper[0], paper[1], paper[2], hash);
   }
   runs.write(setup.output + "/accuracy.csv");
-  summary.write(setup.output + "/accuracy_summary.csv");
-  return summary.aligned();
 }
 
 }  // namespace sdvo

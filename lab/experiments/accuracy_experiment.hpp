@@ -15,8 +15,7 @@ struct AccuracyExperiment {
   bool without_rig_error = false;  ///< take out of the disparities what the package's odometry says of the rig's error
 };
 
-/// Writes accuracy.csv (a row for each run) and accuracy_summary.csv (table 2) to the output directory; returns the
-/// latter as text. Errors are against the ground truth.
-std::string runAccuracy(const ExperimentSetup& setup, const AccuracyExperiment& experiment);
+/// Writes accuracy.csv, a row for each run, to the output directory. Errors are against the ground truth.
+void runAccuracy(const ExperimentSetup& setup, const AccuracyExperiment& experiment);
 
 }  // namespace sdvo

@@ -75,7 +75,7 @@ struct Method {
 
 }  // namespace
 
-std::string runConsensus(const ConsensusExperiment& experiment, const std::string& output) {
+void runConsensus(const ConsensusExperiment& experiment, const std::string& output) {
   std::vector<Method> methods;
   for (const std::string& name : namesOf(ConsensusMethod{}))
     methods.push_back({name, valueOf<ConsensusMethod>(name), true});
@@ -121,7 +121,6 @@ std::string runConsensus(const ConsensusExperiment& experiment, const std::strin
     }
   }
   table.write(output + "/consensus.csv");
-  return table.aligned();
 }
 
 }  // namespace sdvo

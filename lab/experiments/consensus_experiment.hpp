@@ -17,8 +17,8 @@ struct ConsensusExperiment {
   std::vector<int> budgets = {100, 500};  ///< most samples
 };
 
-/// Writes consensus.csv to `output`; returns it as text. A search succeeds when 95 % of the true inliers are within the
+/// Writes consensus.csv to `output`. A search succeeds when 95 % of the true inliers are within the
 /// threshold of its refined pose and the pose is within 2 % of the motion's length and 0.2 deg.
-std::string runConsensus(const ConsensusExperiment& experiment, const std::string& output);
+void runConsensus(const ConsensusExperiment& experiment, const std::string& output);
 
 }  // namespace sdvo

@@ -16,7 +16,7 @@ class CsvTable {
  public:
   explicit CsvTable(std::vector<std::string> columns) { rows_.push_back(std::move(columns)); }
 
-  /// Cells of one row, numbers with four significant digits at least; as many as there are columns.
+  /// Cells of one row, numbers with six significant digits; as many as there are columns.
   template <class... Cells>
   void add(const Cells&... cells) {
     std::vector<std::string> row{text(cells)...};
@@ -52,7 +52,7 @@ class CsvTable {
   static std::string text(double cell) {
     if (!(cell == cell)) return "";  // not a number: an empty cell
     std::ostringstream out;
-    out << std::fixed << std::setprecision(cell < 10.0 && cell > -10.0 ? 3 : 2) << cell;
+    out << cell;
     return out.str();
   }
 

@@ -25,6 +25,19 @@ const std::vector<SetupDifference>& otherDifferences() {
   return differences;
 }
 
+std::vector<Ablation> ablations() {
+  std::vector<Ablation> all;
+  for (const Setup setup : {Setup::kProduct, Setup::kPaper}) all.push_back({setup, "as it is", {}});
+  for (const SetupDifference& difference : paperDifferences()) {
+    all.push_back({Setup::kProduct, "with " + difference.name, difference.with});
+    all.push_back({Setup::kPaper, "without " + difference.name, difference.without});
+  }
+  for (const SetupDifference& difference : otherDifferences())
+    for (const Setup setup : {Setup::kProduct, Setup::kPaper})
+      all.push_back({setup, "with " + difference.name, difference.with});
+  return all;
+}
+
 PipelineOptions ExperimentSetup::options() const {
   const auto read = [this](bool freak) {
     // A loose threshold, as in the paper: weak corners belong to the large feature sets.

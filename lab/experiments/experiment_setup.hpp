@@ -36,6 +36,15 @@ const std::vector<SetupDifference>& paperDifferences();
 /// Further differences whose effect the ablation measures; neither set-up has them.
 const std::vector<SetupDifference>& otherDifferences();
 
+/// A set-up with one thing changed.
+struct Ablation {
+  Setup setup;
+  std::string change;                 ///< "as it is", "with NAME", "without NAME"
+  std::vector<std::string> settings;  ///< name=value
+};
+
+std::vector<Ablation> ablations();
+
 /// What all experiments on sequences share.
 struct ExperimentSetup {
   std::string kitti;                   ///< directory that holds sequences/NN

@@ -14,8 +14,7 @@ struct MatchingExperiment {
   std::vector<double> constant_sizes = {10.0, 14.0, 20.0};  ///< px, candidates beside the standard for the best one
 };
 
-/// Writes matching.csv (the layout of table 1) and matching_steps.csv to the output directory; returns the former as
-/// text.
-std::string runMatching(const ExperimentSetup& setup, const MatchingExperiment& experiment);
+/// Writes matching_steps.csv, correct matches of each sequence, size and step, to the output directory.
+void runMatching(const ExperimentSetup& setup, const MatchingExperiment& experiment);
 
 }  // namespace sdvo

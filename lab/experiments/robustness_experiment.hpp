@@ -12,7 +12,7 @@ struct RobustnessExperiment {
   int seeds = 1;               ///< runs of the sample consensus, seeded 1, 2, …
 };
 
-/// Writes robustness.csv (figure 5) to the output directory; returns it as text.
-std::string runRobustness(const ExperimentSetup& setup, const RobustnessExperiment& experiment);
+/// Writes robustness_steps.csv, sums over the runs of each sequence, system and step, to the output directory.
+void runRobustness(const ExperimentSetup& setup, const RobustnessExperiment& experiment);
 
 }  // namespace sdvo

@@ -138,7 +138,7 @@ int scaleIndex(double ratio) {
   return static_cast<int>(index);
 }
 
-std::string runScaleChange(const ExperimentSetup& setup, const ScaleExperiment& experiment) {
+void runScaleChange(const ExperimentSetup& setup, const ScaleExperiment& experiment) {
   PipelineOptions options = setup.options();
   const std::string hash = hashOptions(listOptions(options));
   CsvTable table({"sequence", "method", "scale", "visible", "correct", "percent", "pairs", "features", "ms_per_pair",
@@ -174,7 +174,6 @@ std::string runScaleChange(const ExperimentSetup& setup, const ScaleExperiment& 
       }
   }
   table.write(setup.output + "/scale_change.csv");
-  return table.aligned();
 }
 
 }  // namespace sdvo

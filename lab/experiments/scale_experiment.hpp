@@ -7,10 +7,10 @@ namespace sdvo {
 /// Correct matches against the change of a feature's scale between two views of one place, for sizes by depth, constant
 /// sizes, and for detectors that find the scale in the image.
 struct ScaleExperiment {
-  int features = 1000;                 ///< of each view and method
+  int features = 1000;                   ///< of each view and method
   std::vector<int> steps = {5, 10, 15};  ///< pairs between two views
-  int stride = 5;                      ///< pairs between two first views
-  double standard_size = 7.0;          ///< px, of the constant sizes
+  int stride = 5;                        ///< pairs between two first views
+  double standard_size = 7.0;            ///< px, of the constant sizes
 };
 
 /// Scale changes of the table; a feature counts for the nearest one (by its logarithm).
@@ -22,8 +22,8 @@ inline const std::vector<double>& scaleChanges() {
 /// Index of the nearest of scaleChanges() to a ratio of depths, -1 beyond half a step outside of them.
 int scaleIndex(double ratio);
 
-/// Writes scale_change.csv to the output directory; returns it as text. A feature of the first view counts where its
+/// Writes scale_change.csv to the output directory. A feature of the first view counts where its
 /// 3-D point, moved by the reference motion, lies in the later image; its match is correct within 3 px of that place.
-std::string runScaleChange(const ExperimentSetup& setup, const ScaleExperiment& experiment);
+void runScaleChange(const ExperimentSetup& setup, const ScaleExperiment& experiment);
 
 }  // namespace sdvo

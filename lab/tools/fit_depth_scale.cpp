@@ -8,18 +8,17 @@
 #include <stdexcept>
 
 #include "../../src/data/text_file.hpp"
-#include "../experiments/csv_table.hpp"
-#include "../experiments/depth_scale_fit.hpp"
-#include "../experiments/plot_script.hpp"
 #include "../../src/tools/named_choice.hpp"
 #include "../../src/tools/run_tool.hpp"
+#include "../experiments/csv_table.hpp"
+#include "../experiments/depth_scale_fit.hpp"
 
 namespace {
 
 struct Arguments {
   sdvo::ExperimentSetup setup;
   sdvo::SizeSampling sampling;
-  std::string output, plot, model;
+  std::string output, samples, model;
   int features = 2320;
   std::vector<double> sizes = {4.0, 7.0, 10.0, 14.0, 20.0};                    ///< px at a disparity of 20 px
   std::vector<double> min_sizes = {4.0, 7.0, 10.0, 14.0}, max_sizes = {32.0};  ///< px
@@ -144,11 +143,7 @@ int run(const Arguments& arguments) {
             << curve.min_size << ", " << curve.max_size << ") px, " << trials[best].gain
             << " % more correct matches than the standard size, written to " << arguments.output << std::endl;
 
-  if (!arguments.plot.empty()) {
-    const std::string csv = std::filesystem::path(arguments.plot).replace_extension(".csv").string();
-    writeSamples(csv, samples);
-    sdvo::runPlotScript("plot_depth_scale.py", {csv, arguments.output, arguments.plot});
-  }
+  if (!arguments.samples.empty()) writeSamples(arguments.samples, samples);
   return 0;
 }
 
@@ -163,7 +158,7 @@ int main(int argc, char** argv) {
       ->delimiter(',');
   app.add_option("--kitti", arguments.setup.kitti, "directory of the KITTI odometry data");
   app.add_option("--output", arguments.output, "YAML file to write, as the nodelets load it")->required();
-  app.add_option("--plot", arguments.plot, "PNG of samples and curve to draw; the samples go to a CSV file beside it");
+  app.add_option("--samples", arguments.samples, "CSV file of the samples to write");
   sdvo::addChoice(app, "--reference", arguments.setup.reference, "motion taken for true");
   app.add_option("--model", arguments.model,
                  "a*d, which needs no samples, a*d+b, a*d^b or a*d^b+c instead of the one that fits best")

@@ -1,4 +1,5 @@
-// The paper's experiments (section "Experimental Results") on sequences in KITTI layout, as CSV, PNG and text.
+// The paper's experiments (section "Experimental Results") on sequences in KITTI layout, as CSV: sums and single runs,
+// without means over drives.
 #include <CLI/CLI.hpp>
 #include <filesystem>
 #include <iostream>
@@ -6,16 +7,14 @@
 #include <opencv2/core/utility.hpp>
 #include <stdexcept>
 
+#include "../../src/tools/named_choice.hpp"
+#include "../../src/tools/run_tool.hpp"
 #include "../experiments/accuracy_experiment.hpp"
-#include "../experiments/all_experiments.hpp"
 #include "../experiments/consensus_experiment.hpp"
 #include "../experiments/matching_experiment.hpp"
 #include "../experiments/odometry_systems.hpp"
-#include "../experiments/plot_script.hpp"
 #include "../experiments/robustness_experiment.hpp"
 #include "../experiments/scale_experiment.hpp"
-#include "../../src/tools/named_choice.hpp"
-#include "../../src/tools/run_tool.hpp"
 
 namespace {
 
@@ -26,8 +25,6 @@ struct Arguments {
   sdvo::AccuracyExperiment accuracy;
   sdvo::ConsensusExperiment consensus;
   sdvo::ScaleExperiment scale;
-  sdvo::AllExperiments all;
-  bool plot = true;
 };
 
 void addOutput(CLI::App& app, Arguments& arguments) {
@@ -35,7 +32,6 @@ void addOutput(CLI::App& app, Arguments& arguments) {
   app.add_option("--param", arguments.setup.settings,
                  "option as name=value, for example size_curve/slope=0.8; repeatable")
       ->allow_extra_args(false);
-  app.add_flag("!--no-plot", arguments.plot, "write the CSV files only");
 }
 
 void addSequences(CLI::App& app, Arguments& arguments) {
@@ -142,28 +138,21 @@ CLI::App* addScaleChange(CLI::App& app, Arguments& arguments) {
   return command;
 }
 
-CLI::App* addAll(CLI::App& app, Arguments& arguments) {
-  CLI::App* command = app.add_subcommand("all", "everything that docs/experiments.md shows");
-  command->add_option("--kitti", arguments.all.kitti, "directory of the KITTI odometry data: sequences 01, 04, 06, poses/")
-      ->required()
-      ->check(CLI::ExistingDirectory);
-  command->add_option("--karlsruhe", arguments.all.karlsruhe, "Karlsruhe 2010_03_09_drive_0019 as sequences/19")
-      ->check(CLI::ExistingDirectory);
-  command->add_option("--euroc", arguments.all.euroc, "directory of MH_01_half and MH_01_moving")
-      ->check(CLI::ExistingDirectory);
-  command->add_option("--output", arguments.all.output, "directory to write to; made when missing")->required();
-  command->add_option("--only", arguments.all.only, "one experiment instead of all")
-      ->check(CLI::IsMember(sdvo::experimentNames()));
-  command->add_option("--jobs", arguments.all.jobs, "programs that run at a time")
-      ->capture_default_str()
-      ->check(CLI::Range(1, 256));
-  return command;
+/// A line for each: set-up, change and settings with tabs between.
+void printAblations() {
+  for (const sdvo::Ablation& ablation : sdvo::ablations()) {
+    std::cout << sdvo::nameOf(ablation.setup) << "\t" << ablation.change;
+    for (const std::string& setting : ablation.settings) std::cout << "\t" << setting;
+    std::cout << "\n";
+  }
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("The paper's experiments on sequences in KITTI layout: tables as CSV, figures as PNG");
+  CLI::App app(
+      "The paper's experiments on sequences in KITTI layout: as CSV; lab/run experiments makes tables and figures of "
+      "them");
   app.require_subcommand(1);
   Arguments arguments;
   CLI::App* matching = addMatching(app, arguments);
@@ -171,11 +160,11 @@ int main(int argc, char** argv) {
   CLI::App* accuracy = addAccuracy(app, arguments);
   CLI::App* consensus = addConsensus(app, arguments);
   CLI::App* scale_change = addScaleChange(app, arguments);
-  CLI::App* all = addAll(app, arguments);
+  CLI::App* ablations = app.add_subcommand("ablations", "lists the set-ups of the ablation and their settings");
   return sdvo::runTool(app, argc, argv, [&] {
     cv::setNumThreads(1);  // experiments are compared with each other: no race may change them
-    if (*all) {
-      std::cout << sdvo::runAll(arguments.all) << "written to " << arguments.all.output << std::endl;
+    if (*ablations) {
+      printAblations();
       return 0;
     }
     const std::string& output = arguments.setup.output;
@@ -183,26 +172,19 @@ int main(int argc, char** argv) {
     std::error_code failure;
     std::filesystem::create_directories(output, failure);
     if (failure) throw std::runtime_error("cannot make the directory " + output + ": " + failure.message());
-    std::string table, name;
     if (*matching) {
-      name = "matching";
-      table = sdvo::runMatching(arguments.setup, arguments.matching);
+      sdvo::runMatching(arguments.setup, arguments.matching);
     } else if (*robustness) {
-      name = "robustness";
-      table = sdvo::runRobustness(arguments.setup, arguments.robustness);
+      sdvo::runRobustness(arguments.setup, arguments.robustness);
     } else if (*accuracy) {
-      name = "accuracy";
-      table = sdvo::runAccuracy(arguments.setup, arguments.accuracy);
+      sdvo::runAccuracy(arguments.setup, arguments.accuracy);
     } else if (*scale_change) {
-      name = "scale_change";
-      table = sdvo::runScaleChange(arguments.setup, arguments.scale);
+      sdvo::runScaleChange(arguments.setup, arguments.scale);
     } else if (*consensus) {
-      name = "consensus";
       arguments.consensus.options = options.visual_odometry.motion;
-      table = sdvo::runConsensus(arguments.consensus, output);
+      sdvo::runConsensus(arguments.consensus, output);
     }
-    std::cout << table << "written to " << output << std::endl;
-    if (arguments.plot) sdvo::runPlotScript("plot_experiments.py", {name, output});
+    std::cout << "written to " << output << std::endl;
     return 0;
   });
 }

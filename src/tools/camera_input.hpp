@@ -5,14 +5,14 @@
 #include <tf2/buffer_core.h>
 #include <tf2_msgs/TFMessage.h>
 
-#include <array>
 #include <functional>
 #include <string>
 
 #include "../check/stamp_check.hpp"
 #include "../ros/arrival_log.hpp"
-#include "../ros/exact_synchroniser.hpp"
 #include "../ros/stereo_input.hpp"
+#include "../ros/synchronisers.hpp"
+#include "stereo_messages.hpp"
 
 namespace sdvo {
 
@@ -20,12 +20,11 @@ namespace sdvo {
 /// pair, and where TF has the camera. One thread calls it.
 class CameraInput {
  public:
-  using Topics = std::array<std::string, ArrivalLog::kInputs>;  ///< in the order of ArrivalLog::Input
-
-  CameraInput(const Topics& topics, std::function<void(const StereoPairMessages&)> use);
+  CameraInput(const StereoTopics& topics, std::function<void(const StereoPairMessages&)> use);
 
   template <ArrivalLog::Input input, class Message>
   void add(const boost::shared_ptr<const Message>& message, const ros::Time& arrival);
+  void add(const StereoMessage& message, const ros::Time& arrival);
   void add(const tf2_msgs::TFMessage& message, bool is_static);
 
   Finding topics();
@@ -37,7 +36,7 @@ class CameraInput {
  private:
   StampCheck stamps_;
   ArrivalLog arrivals_;
-  ExactSynchroniser<sensor_msgs::Image, sensor_msgs::Image, sensor_msgs::CameraInfo, sensor_msgs::CameraInfo> pairs_;
+  TriggerSynchroniser<sensor_msgs::Image, sensor_msgs::Image, sensor_msgs::CameraInfo, sensor_msgs::CameraInfo> pairs_;
   tf2::BufferCore transforms_;
   std::string frame_;  ///< of the left images
 };

@@ -8,7 +8,7 @@
 #include "stereo_descriptor_vo/odometry/motion_hypotheses.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_motion_hypotheses {
 
 Eigen::Isometry3d moved(double x) {
   return Eigen::Isometry3d(Eigen::Translation3d(x, 0.0, 0.0));
@@ -194,5 +194,5 @@ TEST(Coverage, CountsCellsOfEightColumnsAndFourRows) {
   EXPECT_EQ(coverage(features, {}), 0.0);
 }
 
-}  // namespace
+}  // namespace test_motion_hypotheses
 }  // namespace sdvo

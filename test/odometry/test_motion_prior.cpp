@@ -7,7 +7,7 @@
 #include "stereo_descriptor_vo/odometry/motion_prior.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_motion_prior {
 
 constexpr std::int64_t kSecond = 1000000000;  // ns
 
@@ -124,5 +124,5 @@ TEST(MotionPrior, NoiseAndStampsMayExceedTheLargestSpeed) {
   EXPECT_EQ(prior.tooFast(ahead(0.01, 0.01), Matrix6d::Zero(), 0.001), "") << "stamps of a burst";
 }
 
-}  // namespace
+}  // namespace test_motion_prior
 }  // namespace sdvo

@@ -7,7 +7,7 @@
 #include "stereo_descriptor_vo/odometry/motion_search.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_motion_search {
 
 /// What a camera sees that stands still or moves along x, of a world that stands and of a swarm that moves along x,
 /// too.
@@ -319,5 +319,5 @@ TEST_F(MotionSearchTest, FailsWithAReason) {
   EXPECT_NE(found.motion.reason.find("only 0 matches"), std::string::npos) << found.motion.reason;
 }
 
-}  // namespace
+}  // namespace test_motion_search
 }  // namespace sdvo

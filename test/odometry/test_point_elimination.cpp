@@ -11,7 +11,7 @@
 #include "stereo_descriptor_vo/odometry/window_optimizer.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_point_elimination {
 
 constexpr double kDamping = 1e-3;
 constexpr Linearisation kLeastSquares = {2.0, kDamping};
@@ -271,5 +271,5 @@ TEST(PointElimination, IsTheSameToTheBitWithAndWithoutVectors) {
   allowVectorKernels(true);
 }
 
-}  // namespace
+}  // namespace test_point_elimination
 }  // namespace sdvo

@@ -10,7 +10,7 @@
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_visual_odometry {
 
 constexpr std::int64_t kPeriod = 100000000;  // ns between pairs
 constexpr double kStep = 0.8;                // m between pairs
@@ -515,6 +515,24 @@ TEST(VisualOdometry, ResetReturnsToTheOriginUnderANewEpoch) {
   }
 }
 
+TEST(VisualOdometry, GoesOnWithALensThatFocuses) {
+  VisualOdometry odometry({});
+  for (int i = 0; i <= 20; ++i) {
+    StereoCamera camera = synthetic::camera();
+    const double change = 0.04 * std::sin(i);  // up to 20 px of the focal length, each pair another one
+    camera.fx *= 1.0 + change;
+    camera.fy *= 1.0 + 0.9 * change;
+    camera.cx += 100.0 * change;
+    camera.cy -= 50.0 * change;
+    camera.baseline *= 1.0 - change;
+    const OdometryResult result =
+        odometry.update(synthetic::observe(street(), camera, drivePose(i).inverse(), stampOf(i)));
+    ASSERT_EQ(result.state, TrackingState::kTracking) << i << ": " << result.reason;
+    EXPECT_EQ(result.epoch, 0);
+    EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(i)), 1e-3) << i;
+  }
+}
+
 TEST(VisualOdometry, StartsAgainFromTheLastPoseWithAnotherCamera) {
   VisualOdometry odometry({});
   const OdometryResult before = follow(odometry, 5);
@@ -533,6 +551,29 @@ TEST(VisualOdometry, StartsAgainFromTheLastPoseWithAnotherCamera) {
   const OdometryResult next = odometry.update(otherPair(7));
   EXPECT_EQ(next.state, TrackingState::kTracking) << next.reason;
   EXPECT_LT(distanceBetween(next.T_origin_camera, again.T_origin_camera * trueSinceStart(7, 6)), 1e-3);
+}
+
+TEST(VisualOdometry, AnotherCameraOfTheRobotGoesOnFromTheBasesPose) {
+  const Eigen::Isometry3d T_base_a = Eigen::Translation3d(0.4, 0.1, 0.5) * Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5);
+  const Eigen::Isometry3d T_a_b =
+      Eigen::Translation3d(-0.2, 0.1, -0.3) * Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitY());
+  const Eigen::Isometry3d T_base_b = T_base_a * T_a_b;
+  VisualOdometry odometry({});
+  odometry.mountAt(T_base_a);
+  const OdometryResult before = follow(odometry, 5);
+  for (int i = 6; i <= 10; ++i) {
+    odometry.mountAt(T_base_b);
+    const OdometryResult after = odometry.update(
+        synthetic::observe(street(), synthetic::camera(), (drivePose(i) * T_a_b).inverse(), stampOf(i)));
+    EXPECT_EQ(after.epoch, before.epoch + 1) << i;
+    EXPECT_EQ(after.has_motion, i > 6) << i;
+    EXPECT_GT(after.pose_covariance.trace(), before.pose_covariance.trace());
+    // The base stays where it was, and moves from there as both cameras see it.
+    const Eigen::Isometry3d expected = T_base_a * before.T_origin_camera * trueSinceStart(i, 6) * T_base_a.inverse();
+    const Eigen::Isometry3d base = T_base_b * after.T_origin_camera * T_base_b.inverse();
+    EXPECT_LT(distanceBetween(base, expected), 2e-3) << i;
+    EXPECT_LT(angleBetween(base, expected), 1e-3) << i;
+  }
 }
 
 TEST(VisualOdometry, StartsAgainFromTheLastPoseWithAnotherDescriptor) {
@@ -1127,5 +1168,5 @@ TEST(VisualOdometry, NamesItsStates) {
   EXPECT_STREQ(toString(TrackingState::kLost), "LOST");
 }
 
-}  // namespace
+}  // namespace test_visual_odometry
 }  // namespace sdvo

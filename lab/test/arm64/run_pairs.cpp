@@ -1,4 +1,4 @@
-// The first pairs of a folder in KITTI layout in one thread, with vectors or in plain C++: scripts/test_arm64 counts what it executes.
+// The first pairs of a folder in KITTI layout in one thread, with vectors or in plain C++: lab/test/arm64/run counts what it executes.
 #include <cstdlib>
 #include <iostream>
 #include <opencv2/core/utility.hpp>

@@ -1,4 +1,4 @@
-// Times each kernel beside its plain twin: scripts/benchmark runs this.
+// Times each kernel beside its plain twin: lab/run benchmark runs this.
 #include <benchmark/benchmark.h>
 
 #include <array>
@@ -12,8 +12,6 @@
 #include "stereo_descriptor_vo/front_end/epipolar_matcher.hpp"
 #include "stereo_descriptor_vo/front_end/fast_corners.hpp"
 #include "stereo_descriptor_vo/front_end/freak.hpp"
-#include "stereo_descriptor_vo/front_end/half_image.hpp"
-#include "stereo_descriptor_vo/front_end/patch_sampling.hpp"
 #include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
 
 namespace {
@@ -67,13 +65,6 @@ void cornerPeaks(benchmark::State& state) {
     }
 }
 
-void halfResolution(benchmark::State& state) {
-  const WithOrWithoutVectors version(state);
-  const cv::Mat image = view(false);
-  cv::Mat half;
-  for (auto _ : state) sdvo::halveImage(image, half);
-}
-
 void stereoMatch(benchmark::State& state) {
   const WithOrWithoutVectors version(state);
   const cv::Mat left = view(false), right = view(true);
@@ -99,18 +90,6 @@ void freakInTwoViews(benchmark::State& state) {
     for (const cv::Mat& image : {left, right}) sdvo::Freak(image).describe(keypoints, row);
 }
 
-void patchSampling(benchmark::State& state) {
-  const WithOrWithoutVectors version(state);
-  const cv::Mat image = view(false);
-  std::array<float, 13 * 16> patch;
-  const auto corners = positions();
-  for (auto _ : state)
-    for (const cv::Point2f& p : corners) {
-      sdvo::samplePatch(image, 0, p.x, p.y, 0.1f, 6, 16, patch.data());
-      benchmark::DoNotOptimize(patch);
-    }
-}
-
 void patchAlignment(benchmark::State& state) {
   const WithOrWithoutVectors version(state);
   constexpr int kSide = 13;
@@ -131,10 +110,8 @@ void patchAlignment(benchmark::State& state) {
 
 BENCHMARK(fastCorners)->Arg(0)->Arg(1);
 BENCHMARK(cornerPeaks)->Arg(0)->Arg(1);
-BENCHMARK(halfResolution)->Arg(0)->Arg(1);
 BENCHMARK(stereoMatch)->Arg(0)->Arg(1);
 BENCHMARK(freakInTwoViews)->Arg(0)->Arg(1);
-BENCHMARK(patchSampling)->Arg(0)->Arg(1);
 BENCHMARK(patchAlignment)->Arg(0)->Arg(1);
 
 }  // namespace

@@ -1,4 +1,4 @@
-// Counts the allocations of memory by operator new, pair by pair: scripts/benchmark runs this.
+// Counts the allocations of memory by operator new, pair by pair: lab/run benchmark runs this.
 #include <cstdint>
 #include <cstdlib>
 #include <iomanip>

@@ -1,5 +1,5 @@
 // Plays a drive to both nodelets, which live in this process as they would in a camera's manager, and tells how long
-// odometry takes from the stamp, and how much of that is the core's own work: scripts/benchmark runs this.
+// odometry takes from the stamp, and how much of that is the core's own work: lab/run benchmark runs this.
 #include <nav_msgs/Odometry.h>
 #include <nodelet/loader.h>
 #include <ros/ros.h>

@@ -5,7 +5,7 @@
 #include "../../../test/synthetic_scene.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_aligned_motion {
 
 constexpr double kDepth = 8.0;  // m
 
@@ -80,5 +80,5 @@ TEST_F(AlignedMotion, TooFewPatchesLeaveTheMotionAsItWas) {
   EXPECT_EQ(T.translation(), start_);
 }
 
-}  // namespace
+}  // namespace test_aligned_motion
 }  // namespace sdvo

@@ -11,7 +11,7 @@
 #include "wall_drive.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_depth_scale_fit {
 
 namespace fs = std::filesystem;
 
@@ -88,5 +88,5 @@ TEST(TryCurves, CountsCorrectMatchesOfAPairAndComparesThemWithTheStandardSize) {
   EXPECT_GT(of_far[2].gain, 0.0) << "sizes that follow the depth are for views that differ in scale";
 }
 
-}  // namespace
+}  // namespace test_depth_scale_fit
 }  // namespace sdvo

@@ -3,7 +3,7 @@
 #include "../../experiments/experiment_setup.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_experiment_setup {
 
 std::string hashOf(PipelineOptions options) {
   return hashOptions(listOptions(options));
@@ -66,5 +66,5 @@ TEST(ExperimentSetup, SettingsWinOverTheSetup) {
   EXPECT_FALSE(setup.options().stereo_features.detector.subpixel);
 }
 
-}  // namespace
+}  // namespace test_experiment_setup
 }  // namespace sdvo

@@ -11,7 +11,7 @@
 #include "wall_drive.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_scale_experiment {
 
 /// Geometric means of neighbours part the scale changes 1, 1.5, 2, 3, 4.
 TEST(ScaleExperiment, AFeatureCountsForTheNearestScaleChange) {
@@ -78,5 +78,5 @@ TEST(ScaleExperiment, SizesByDepthFindMoreOfAWallAtHalfTheDistanceThanConstantOn
   EXPECT_LT(percent["freak constant"], 10.0) << "a pattern of 7 px covers another part of the wall";
 }
 
-}  // namespace
+}  // namespace test_scale_experiment
 }  // namespace sdvo

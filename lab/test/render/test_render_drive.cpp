@@ -12,7 +12,7 @@
 #include "stereo_descriptor_vo/data/trajectory.hpp"
 
 namespace sdvo::render {
-namespace {
+namespace test_render_drive {
 
 StereoCamera smallCamera() {
   return {176.77, 176.77, 150.0, 45.0, 0.5371, 310, 94};
@@ -313,5 +313,5 @@ TEST(RenderDrive, PresetsHaveTheirShape) {
   EXPECT_THROW(makePresetPath("nowhere", 10, 10.0, 1), std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_render_drive
 }  // namespace sdvo::render

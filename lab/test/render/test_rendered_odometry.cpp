@@ -12,7 +12,7 @@
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_rendered_odometry {
 
 constexpr double kRate = 10.0;  // Hz
 constexpr int kThreads = 2;
@@ -80,7 +80,7 @@ TEST(RenderedOdometry, MotionsAndPosesLieInTheirCovariancesAndTheRigIsCalibrated
   const auto mean = [](const std::vector<double>& values) {
     return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
   };
-  // Chi-square of six numbers has the mean 6. Bounds as of scripts/measure_covariance; the poses of one drive err together.
+  // Chi-square of six numbers has the mean 6. Bounds as of lab/run covariance; the poses of one drive err together.
   EXPECT_GE(mean(motions), 4.0);
   EXPECT_LE(mean(motions), 9.0);
   EXPECT_LE(mean(poses), 12.0);
@@ -102,5 +102,5 @@ TEST(RenderedOdometry, TheNumberOfThreadsChangesNoBit) {
   for (std::size_t k = 0; k < poses[0].size(); ++k) EXPECT_EQ(poses[0][k], poses[1][k]) << "pair " << k;
 }
 
-}  // namespace
+}  // namespace test_rendered_odometry
 }  // namespace sdvo
