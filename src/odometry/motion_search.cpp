@@ -195,7 +195,8 @@ std::vector<int> MotionSearch::agreeing(const MotionScene& scene, const MotionHy
 void MotionSearch::weigh(const MotionScene& scene, MotionHypothesis& found) const {
   found.countAgreement();
   if (!found.motion.success) return;
-  testAgainstChance(found);
+  found.motion.reason = chanceWords(found);
+  found.motion.success = found.motion.reason.empty();
   const Eigen::Isometry3d T_reference_current = found.motion.T_current_reference.inverse();
   double least = std::numeric_limits<double>::infinity();
   for (const ExpectedMotion& expected : scene.prior)
@@ -203,14 +204,13 @@ void MotionSearch::weigh(const MotionScene& scene, MotionHypothesis& found) cons
   found.innovation = scene.prior.empty() ? 0.0 : least;
 }
 
-void MotionSearch::testAgainstChance(MotionHypothesis& found) const {
-  const auto& [matches, inliers, lasting_matches, lasting_inliers] = found.agreement;
+std::string MotionSearch::chanceWords(const MotionHypothesis& found) const {
+  const int matches = found.agreement.matches, inliers = found.agreement.inliers;
   const double chance = chanceOfAgreement(motion_options_.inlier_threshold, found.gate);
   if (inliers >= motion_options_.min_inliers && logFalseAlarms(matches, inliers, chance) <= std::log(kTailProbability))
-    return;
-  found.motion.success = false;
-  found.motion.reason = "only " + std::to_string(inliers) + " of " + std::to_string(matches) +
-                        " matches agree on one motion: too few, or as many as chance gives";
+    return "";
+  return "only " + std::to_string(inliers) + " of " + std::to_string(matches) +
+         " matches agree on one motion: too few, or as many as chance gives";
 }
 
 /// Aligns the inliers' patches and refines the motion on them.

@@ -236,13 +236,9 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   const bool is_sound = doubtOf(scene, found).probability >= options_.tracking.probability;
   const Candidate candidate = adjust(features, found, is_sound);
   found.reject(candidate.adjustment.rejected_rows);
-  search_.testAgainstChance(found);
-  refutation = found.motion.success ? state_.prior.tooFast(candidate.motion, found.motion.covariance, since)
-                                    : found.motion.reason;
-  if (!refutation.empty()) {
-    found.motion.success = true;
-    return predict(features, dt, refutation + " after the adjustment");
-  }
+  refutation = search_.chanceWords(found);
+  if (refutation.empty()) refutation = state_.prior.tooFast(candidate.motion, found.motion.covariance, since);
+  if (!refutation.empty()) return predict(features, dt, refutation + " after the adjustment");
 
   const Doubt doubt = doubtOf(scene, found);
   state_.doubt.raise(doubt.log_odds, doubt.cause);
@@ -251,11 +247,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   const Matrix6d measured = step.covariance;
   judge(scene, found, candidate, doubt, step);
   const bool is_confirmed = step.state == TrackingState::kTracking;
-  if (is_confirmed && found.agreement.lasting_matches > 0) {
-    constexpr double kMemory = 0.9;  // ratio of the past that a pair leaves (chosen)
-    const double ratio = static_cast<double>(found.agreement.lasting_inliers) / found.agreement.lasting_matches;
-    state_.usual_agreement += (1.0 - kMemory) * (std::min(ratio, 0.95) - state_.usual_agreement);
-  }
+  if (is_confirmed) learn(found.agreement);
   // A motion that is likely something else's predicts nothing.
   if (doubt.probability >= 0.5)
     state_.prior.measure(features.stamp, T_reference_current, since, measured, is_confirmed,
@@ -268,6 +260,15 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   state_.unseen = 0.0;
   if (state_.map->newestIsKeyframe()) state_.covariance.markKeyframe();
   return step;
+}
+
+/// Learns what agreement is usual on this rig.
+void VisualOdometry::learn(const Agreement& agreement) {
+  constexpr double kMemory = 0.9;  // ratio of the past that a pair leaves (chosen)
+  constexpr double kMost = 0.95;   // even if all agree, a few need not in the next pair (chosen)
+  if (agreement.lasting_matches == 0) return;
+  const double ratio = static_cast<double>(agreement.lasting_inliers) / agreement.lasting_matches;
+  state_.usual_agreement += (1.0 - kMemory) * (std::min(ratio, kMost) - state_.usual_agreement);
 }
 
 /// Adjusts a copy of the map with the pair in it.
@@ -467,6 +468,22 @@ OdometryResult VisualOdometry::report(const StereoFeatures& features, double dt,
     result.correction = step.correction;
   }
 
+  reportMatches(features, found, step, result);
+  const RigCalibration::Vector sigma = state_.calibration.sigma();
+  if (sigma.allFinite()) {
+    result.disparity_offset = state_.calibration.calibration().value[0];
+    result.disparity_bend = state_.calibration.calibration().value[1];
+    result.disparity_offset_sigma = sigma[0];
+    result.disparity_bend_sigma = sigma[1];
+  }
+  result.right_rotation = state_.right_rotation.rotation();
+  result.right_rotation_sigma = state_.right_rotation.sigma();
+  return result;
+}
+
+/// The matches, which of them are inliers, and what follows from these.
+void VisualOdometry::reportMatches(const StereoFeatures& features, const MotionHypothesis& found, const Step& step,
+                                   OdometryResult& result) const {
   result.flow.reserve(found.matches.size());
   for (const FeatureMatch& match : found.matches) {
     const cv::Point3f& previous = found.view->pixels[match.reference];
@@ -485,17 +502,6 @@ OdometryResult VisualOdometry::report(const StereoFeatures& features, double dt,
   result.rms = found.motion.rms;
   result.match_time = found.match_time;
   result.motion_time = found.motion_time + step.time;
-
-  const RigCalibration::Vector sigma = state_.calibration.sigma();
-  if (sigma.allFinite()) {
-    result.disparity_offset = state_.calibration.calibration().value[0];
-    result.disparity_bend = state_.calibration.calibration().value[1];
-    result.disparity_offset_sigma = sigma[0];
-    result.disparity_bend_sigma = sigma[1];
-  }
-  result.right_rotation = state_.right_rotation.rotation();
-  result.right_rotation_sigma = state_.right_rotation.sigma();
-  return result;
 }
 
 }  // namespace sdvo

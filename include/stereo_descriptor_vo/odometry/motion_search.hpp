@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
@@ -25,8 +26,8 @@ class MotionSearch {
   /// `max_doubt`: log-odds of being misled up to which a motion that the majority agrees with is taken at once.
   MotionHypothesis find(const MotionScene& scene, double max_doubt) const;
 
-  /// The same hypothesis with success withdrawn if chance explains its inliers.
-  void testAgainstChance(MotionHypothesis& found) const;
+  /// In words, if there are too few inliers for a motion, or as many as chance gives.
+  std::string chanceWords(const MotionHypothesis& found) const;
 
  private:
   using ViewPtr = std::shared_ptr<const LocalMap::View>;

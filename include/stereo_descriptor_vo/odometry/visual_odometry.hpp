@@ -146,6 +146,7 @@ class VisualOdometry {
   double largestDoubt() const;
   double secondsSinceMap(const StereoFeatures& features) const;
   Step extendMap(const StereoFeatures& features, const MotionScene& scene, MotionHypothesis& found, double dt);
+  void learn(const Agreement& agreement);
   Candidate adjust(const StereoFeatures& features, const MotionHypothesis& found, bool may_recall);
   Doubt doubtOf(const MotionScene& scene, const MotionHypothesis& found) const;
   std::string innovationWords(const MotionHypothesis& found) const;
@@ -159,6 +160,8 @@ class VisualOdometry {
   void move(const Eigen::Isometry3d& T_previous_current);
   OdometryResult report(const StereoFeatures& features, double dt, const MotionHypothesis& found,
                         const Step& step) const;
+  void reportMatches(const StereoFeatures& features, const MotionHypothesis& found, const Step& step,
+                     OdometryResult& result) const;
 
   VisualOdometryOptions options_;
   Eigen::Isometry3d T_base_camera_;
