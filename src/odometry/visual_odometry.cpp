@@ -187,8 +187,8 @@ void VisualOdometry::begin(const StereoFeatures& features, double dt) {
   ++state_.pairs;
   if (dt <= options_.tracking.max_gap) state_.prior.pass(dt);
   // The map is of another rig than this pair.
-  if (state_.right_rotation.add(features))
-    state_.doubt.raise(CarriedDoubt::kCertain, "the right camera seems to have turned");
+  const double turned = state_.right_rotation.add(features);
+  state_.doubt.raise(CarriedDoubt::kUnsuspected + 0.5 * turned * turned, "the right camera seems to have turned");
   if (features.report.refused) {
     // What the pairs before told of the rig may be wrong already, and those after may be refused again.
     state_.calibration = CalibrationFilter(options_.calibration);
