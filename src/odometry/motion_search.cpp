@@ -21,16 +21,10 @@ constexpr double kElsewhere = 0.6;  // px, of aligned positions; up to 0.5 where
 // which it is. Errors of neighbouring points are not independent: up to 170 where nothing moved.
 constexpr double kPerhapsOther = 100.0, kOther = 200.0;
 // The same for each point, in variances of its residual: a part of its noise is common to many, so the sum grows with
-<<<<<<< HEAD
 // their number. Measured where the sum exceeds kOther: up to 1.5 where nothing moved, 1.7 and more with faults
-// (docs/log/odometry.md).
+// (docs/decisions.md).
 constexpr double kOtherOfOne = 1.5;
 constexpr std::size_t kFewestOfMotion = 20;  // points that tell a motion of their own from noise (chosen)
-=======
-// their number. Measured where the sum exceeds kCertain: up to 1.5 where nothing moved, 1.7 and more with faults
-// (docs/decisions.md).
-constexpr double kCertainOfOne = 1.5;
->>>>>>> main
 
 }  // namespace
 
