@@ -4,7 +4,7 @@
 
 #include "stereo_descriptor_vo/odometry/correspondences.hpp"
 #include "stereo_descriptor_vo/odometry/described_points.hpp"
-#include "stereo_descriptor_vo/odometry/motion_hypothesis.hpp"
+#include "stereo_descriptor_vo/odometry/motion_hypotheses.hpp"
 
 namespace sdvo {
 namespace {
