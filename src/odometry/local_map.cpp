@@ -146,10 +146,10 @@ void LocalMap::renewLooks(const StereoFeatures& features, const std::vector<Sigh
   }
 }
 
-void LocalMap::weighNewest(double probability) {
+void LocalMap::discountNewest() {
   for (Point& point : points_)
     if (point.observations.size() > 1 && point.observations.back().frame_id == newestId())
-      point.seen -= static_cast<float>(1.0 - probability);
+      --point.seen;
 }
 
 void LocalMap::takeDescriptor(Point& point, const StereoFeatures& features, int row) {

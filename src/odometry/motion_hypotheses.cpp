@@ -154,9 +154,9 @@ double probabilityOf(double log_odds) {
   return 1.0 / (1.0 + std::exp(-log_odds));
 }
 
-double MotionHypothesis::sightingsOf(int match) const {
-  return std::min<double>(view->seen[static_cast<std::size_t>(matches[static_cast<std::size_t>(match)].reference)],
-                          kLastingSightings);
+int MotionHypothesis::sightingsOf(int match) const {
+  return std::min(view->seen[static_cast<std::size_t>(matches[static_cast<std::size_t>(match)].reference)],
+                  kLastingSightings);
 }
 
 std::vector<int> MotionHypothesis::inlierRows(const std::vector<int>& rejected) const {

@@ -97,18 +97,18 @@ std::vector<MotionHypothesis> MotionSearch::compete(const MotionScene& scene, co
 bool MotionSearch::isBeyondDoubt(const MotionScene& scene, const MotionHypothesis& found, double max_doubt) const {
   if (!found.motion.success || found.innovation > kInnovationGate || logOddsMisled(scene, found) > max_doubt)
     return false;
-  double all = 0.0, own = 0.0;
+  int all = 0, own = 0;
   for (int i = 0; i < static_cast<int>(found.matches.size()); ++i) all += found.sightingsOf(i);
   for (const int i : found.motion.inliers) own += found.sightingsOf(i);
   const double agree = found.agreement.lasting_inliers;
   const double lacking = scene.usual_agreement * found.agreement.lasting_matches - agree;
   if (lacking >= motion_options_.min_inliers) {
-    constexpr double kSightings = MotionHypothesis::kLastingSightings;
+    constexpr int kSightings = MotionHypothesis::kLastingSightings;
     const int points = static_cast<int>(agree + lacking);
     if (logLikelihood(kSightings * agree, points) - logLikelihood(kSightings * lacking, points) > max_doubt)
       return false;
   }
-  return 2.0 * own >= all;
+  return 2 * own >= all;
 }
 
 /// First where a good prediction has the points, then three times as far.

@@ -363,7 +363,8 @@ void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& fou
 
 void VisualOdometry::commit(const Candidate& candidate, double probability) {
   std::swap(state_.map, state_.candidate);
-  state_.map->weighNewest(probability);
+  // In doubt, what is followed agrees with itself whatever it is.
+  if (probability < options_.tracking.probability) state_.map->discountNewest();
   const LocalMap::Adjustment& adjustment = candidate.adjustment;
   if (!adjustment.success) return;
   state_.calibration.note(state_.map->newestId(), candidate.calibration, adjustment.calibration_information);

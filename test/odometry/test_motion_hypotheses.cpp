@@ -17,7 +17,7 @@ Eigen::Isometry3d moved(double x) {
 /// A pair that matches some points of the world and some of a thing that moved by `thing_x`, m.
 class Competition : public ::testing::Test {
  protected:
-  void add(int count, double x, float sightings) {
+  void add(int count, double x, int sightings) {
     std::mt19937 random(static_cast<unsigned>(view_->seen.size()));
     std::uniform_real_distribution<double> uniform(-1.0, 1.0);
     for (int i = 0; i < count; ++i) {
@@ -59,7 +59,7 @@ class Competition : public ::testing::Test {
 };
 
 TEST_F(Competition, WithoutARivalTheMotionIsCertain) {
-  add(100, 0.0, 4.f);
+  add(100, 0.0, 4);
   const MotionHypothesis found = choose({0.0, 0.001});
   EXPECT_EQ(found.probability, 1.0);
   EXPECT_FALSE(found.rival);
@@ -67,7 +67,7 @@ TEST_F(Competition, WithoutARivalTheMotionIsCertain) {
 }
 
 TEST_F(Competition, LastingPointsOutweighAMajorityOfNewOnes) {
-  add(100, 0.0, 4.f), add(200, 0.5, 1.f);
+  add(100, 0.0, 4), add(200, 0.5, 1);
   const MotionHypothesis found = choose({0.5, 0.0});
   EXPECT_NEAR(found.motion.T_current_reference.translation().x(), 0.0, 1e-12);
   ASSERT_TRUE(found.rival);
@@ -78,16 +78,16 @@ TEST_F(Competition, LastingPointsOutweighAMajorityOfNewOnes) {
 
 TEST_F(Competition, ProbabilitiesFollowTheShareAndNotTheNumber) {
   // Ten times the points are not ten times the evidence: they are the same two things.
-  add(60, 0.0, 4.f), add(40, 0.5, 4.f);
+  add(60, 0.0, 4), add(40, 0.5, 4);
   const double few = choose({0.0, 0.5}).probability;
   EXPECT_LT(few, 0.95);
   EXPECT_GT(few, 0.6);
-  add(540, 0.0, 4.f), add(360, 0.5, 4.f);
+  add(540, 0.0, 4), add(360, 0.5, 4);
   EXPECT_NEAR(choose({0.0, 0.5}).probability, few, 0.01);
 }
 
 TEST_F(Competition, EqualHypothesesAreDecidedByThePrior) {
-  add(100, 0.0, 1.f), add(100, 0.5, 1.f);
+  add(100, 0.0, 1), add(100, 0.5, 1);
   scene_.prior = {{moved(0.0), 0.01 * Matrix6d::Identity()}};
   EXPECT_NEAR(choose({0.5, 0.0}).motion.T_current_reference.translation().x(), 0.0, 1e-12);
   scene_.prior = {{moved(-0.5), 0.01 * Matrix6d::Identity()}};
@@ -95,13 +95,13 @@ TEST_F(Competition, EqualHypothesesAreDecidedByThePrior) {
 }
 
 TEST_F(Competition, TheMomentIsThatOfTheMixture) {
-  add(60, 0.0, 4.f), add(40, 0.5, 4.f);
+  add(60, 0.0, 4), add(40, 0.5, 4);
   const MotionHypothesis found = choose({0.0, 0.5});
   EXPECT_NEAR(found.rivals_moment(0, 0), (1.0 - found.probability) * 0.25, 1e-9);
 }
 
 TEST_F(Competition, MotionsWithinToleranceAreNoDoubtButWidenTheCovariance) {
-  add(60, 0.0, 4.f), add(40, 0.06, 4.f);
+  add(60, 0.0, 4), add(40, 0.06, 4);
   scene_.tolerance = 0.1;
   const MotionHypothesis found = choose({0.0, 0.06});
   EXPECT_EQ(found.probability, 1.0);
@@ -111,12 +111,12 @@ TEST_F(Competition, MotionsWithinToleranceAreNoDoubtButWidenTheCovariance) {
 }
 
 TEST_F(Competition, WhatChanceExplainsIsNoRival) {
-  add(300, 0.0, 4.f), add(5, 0.5, 4.f);
+  add(300, 0.0, 4), add(5, 0.5, 4);
   EXPECT_FALSE(choose({0.0, 0.5}).rival);
 }
 
 TEST_F(Competition, OfFailuresTheLargestIsReturned) {
-  add(30, 0.0, 1.f);
+  add(30, 0.0, 1);
   MotionHypothesis small = hypothesis(5.0), large = hypothesis(0.0);
   small.motion.success = large.motion.success = false;
   large.motion.reason = "the largest";
@@ -125,23 +125,23 @@ TEST_F(Competition, OfFailuresTheLargestIsReturned) {
 
 TEST_F(Competition, AnImprobableMotionMisleadsUnlessLastingPointsConfirmIt) {
   scene_.prior = {{moved(2.0), 0.01 * Matrix6d::Identity()}};
-  add(100, 0.0, 1.f);
+  add(100, 0.0, 1);
   EXPECT_GT(logOddsMisled(scene_, hypothesis(0.0)), 0.0);
-  view_->seen.assign(100, 4.f);
+  view_->seen.assign(100, 4);
   EXPECT_LT(logOddsMisled(scene_, hypothesis(0.0)), logOdds(0.05));
   scene_.prior.clear();
   EXPECT_LT(logOddsMisled(scene_, hypothesis(0.0)), CarriedDoubt::kUnsuspected);
 }
 
 TEST_F(Competition, LastingPointsThatDisagreeAreMoreSuspiciousThanUsual) {
-  add(25, 0.0, 4.f), add(75, 0.5, 4.f);
+  add(25, 0.0, 4), add(75, 0.5, 4);
   EXPECT_GT(logOddsMisled(scene_, hypothesis(0.0)), CarriedDoubt::kUnsuspected + 2.0);
   scene_.usual_agreement = 0.5;
   EXPECT_LT(logOddsMisled(scene_, hypothesis(0.0)), CarriedDoubt::kUnsuspected + 1.0) << "a rig that always does so";
 }
 
 TEST_F(Competition, RejectedRowsAreNoInliers) {
-  add(10, 0.0, 4.f), add(10, 0.0, 1.f);
+  add(10, 0.0, 4), add(10, 0.0, 1);
   MotionHypothesis found = hypothesis(0.0);
   EXPECT_EQ(found.agreement.lasting_matches, 10);
   found.reject({3, 12});

@@ -61,8 +61,8 @@ struct MotionHypothesis {
   Matrix6d rivals_moment = Matrix6d::Zero();  ///< second moment of the rivals around the motion, m and rad
 
   /// Of a match: confirmed sightings of its point, four at most.
-  double sightingsOf(int match) const;
-  bool isLasting(int match) const { return sightingsOf(match) > kLastingSightings - 0.5; }
+  int sightingsOf(int match) const;
+  bool isLasting(int match) const { return sightingsOf(match) >= kLastingSightings; }
 
   /// Rows of the pair that the inliers matched, but for the rejected ones.
   std::vector<int> inlierRows(const std::vector<int>& rejected = {}) const;
@@ -72,7 +72,7 @@ struct MotionHypothesis {
   /// Counts the inliers without these rows of the pair.
   void reject(const std::vector<int>& rows);
 
-  static constexpr double kLastingSightings = 4.0;
+  static constexpr int kLastingSightings = 4;
 };
 
 /// Ratio of a motion by which it may be off.
