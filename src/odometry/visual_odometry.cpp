@@ -40,6 +40,7 @@ VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
     : options_(checked(options)),
       T_base_camera_(lookingAhead()),
       search_(options.matcher, options.motion, options.alignment, options.tracking),
+      reacquisition_(options.matcher, options.motion),
       revisit_(options.matcher, options.motion, options.alignment),
       optimizer_(options.window),
       state_(options.calibration) {}
@@ -47,6 +48,7 @@ VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
 void VisualOdometry::configure(const VisualOdometryOptions& options) {
   options_ = checked(options);
   search_ = MotionSearch(options.matcher, options.motion, options.alignment, options.tracking);
+  reacquisition_ = Reacquisition(options.matcher, options.motion);
   revisit_ = Revisit(options.matcher, options.motion, options.alignment);
   optimizer_ = WindowOptimizer(options.window);
 }
@@ -57,12 +59,13 @@ void VisualOdometry::reset() {
 }
 
 void VisualOdometry::breakStream() {
-  state_.map.reset();
+  state_.interrupted = true;
   state_.belief.interrupt();
 }
 
 void VisualOdometry::forgetTime() {
   breakStream();
+  state_.map.reset();  // how long ago it was seen is unknown
   state_.last_stamp.reset();
   state_.belief.forget();
 }
@@ -72,7 +75,8 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features, const std:
   const double dt = state_.last_stamp ? static_cast<double>(features.stamp - *state_.last_stamp) * 1e-9 : 0.0;
   const bool continued = state_.map && state_.map->continuedBy(features);
   const bool frozen = isFrozen(features, dt, guess);
-  const MotionHypothesis found = continued && !frozen ? propose(features, dt, guess) : MotionHypothesis{};
+  MotionHypothesis found;
+  if (continued && !frozen) found = state_.interrupted ? reacquire(features) : propose(features, dt, guess);
 
   // Nothing has changed so far, and from here on nothing is refused.
   Stopwatch stopwatch;
@@ -81,7 +85,7 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features, const std:
   if (frozen)
     step = predict(features, dt,
                    "the images repeat those of the previous pair although the camera moved: is the driver frozen?");
-  else if (!continued)
+  else if (!continued || (state_.interrupted && found.verdict.trust == Trust::kNone))
     step = seed(features);
   else if (found.verdict.trust == Trust::kNone)
     step = predict(features, dt, found.verdict.reason);
@@ -90,11 +94,12 @@ OdometryResult VisualOdometry::update(const StereoFeatures& features, const std:
   if (continued && !frozen) suspect(dt, found, step);
   state_.suspicion.pass();
   state_.images.remember(features, frozen);
+  step.dt = step.T_previous_current ? static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9 : dt;
   if (step.T_previous_current) move(*step.T_previous_current);
   if (step.state == TrackingState::kTracking || step.state == TrackingState::kDegraded)
     state_.last_pose_stamp = features.stamp;
   step.time = stopwatch.lap();
-  return report(features, dt, found, step);
+  return report(features, found, step);
 }
 
 void VisualOdometry::refuse(const StereoFeatures& features) const {
@@ -138,6 +143,16 @@ MotionHypothesis VisualOdometry::propose(const StereoFeatures& features, double 
     scene.guess = (T_reference_previous * T_previous_current).inverse();
   }
   return search_.find(scene);
+}
+
+/// Looks for the pair in the map from before an outage. How the camera moved meanwhile is unknown.
+MotionHypothesis VisualOdometry::reacquire(const StereoFeatures& features) const {
+  const RigCalibration calibration = state_.calibration.calibration();
+  const auto T_current_newest = reacquisition_.find(*state_.map, features, calibration);
+  MotionHypothesis nothing;
+  nothing.verdict.trust = Trust::kNone;
+  if (!T_current_newest) return nothing;
+  return search_.find({*state_.map, calibration, features, T_current_newest, {}, false, 0.0, {}});
 }
 
 /// Takes note of the pair, whatever becomes of its motion.
@@ -191,6 +206,7 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
     step.reason = "first pair";
   }
   state_.started = true;
+  state_.interrupted = false;
   state_.belief.doubt(Matrix6d::Zero());
   state_.predicted_pairs = 0;
   state_.map.emplace(options_.map);
@@ -204,6 +220,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
                                                const MotionHypothesis& found) {
   if (found.contested) state_.suspicion.raise("something else moved in view");
   const Candidate candidate = adjust(features, found);
+  if (candidate.verdict.trust == Trust::kNone && state_.interrupted) return seed(features);
   if (candidate.verdict.trust == Trust::kNone)
     return predict(features, dt, candidate.verdict.reason + " after the adjustment");
   const Eigen::Isometry3d T_previous_measured =
@@ -236,6 +253,9 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
     if (step.reason.empty()) step.reason = off;
   }
   state_.predicted_pairs = 0;
+  if (std::exchange(state_.interrupted, false))
+    step.reason = "re-acquired by " + std::to_string(evidence.inliers) + " points of the map" +
+                  (step.reason.empty() ? "" : "; " + step.reason);
   if (state_.map->newestIsKeyframe()) state_.covariance.markKeyframe();
   return step;
 }
@@ -369,14 +389,14 @@ void VisualOdometry::move(const Eigen::Isometry3d& T_previous_current) {
   state_.distance += T_previous_current.translation().norm();
 }
 
-OdometryResult VisualOdometry::report(const StereoFeatures& features, double dt, const MotionHypothesis& found,
+OdometryResult VisualOdometry::report(const StereoFeatures& features, const MotionHypothesis& found,
                                       const Step& step) const {
   OdometryResult result;
   result.state = step.state;
   result.reason = step.reason;
   result.stamp = features.stamp;
   result.epoch = epoch_;
-  result.dt = dt;
+  result.dt = step.dt;
   result.distance = state_.distance;
   result.keyframe_id = state_.map ? state_.map->lastKeyframeId() : 0;
   if (step.state == TrackingState::kTracking || step.state == TrackingState::kDegraded) {

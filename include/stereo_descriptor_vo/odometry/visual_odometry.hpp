@@ -18,6 +18,7 @@
 #include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
 #include "stereo_descriptor_vo/odometry/pose_verdict.hpp"
+#include "stereo_descriptor_vo/odometry/reacquisition.hpp"
 #include "stereo_descriptor_vo/odometry/repeated_images.hpp"
 #include "stereo_descriptor_vo/odometry/revisit.hpp"
 #include "stereo_descriptor_vo/odometry/right_camera_rotation.hpp"
@@ -79,8 +80,8 @@ class VisualOdometry {
   /// Back to the initial pose and a new epoch; nothing is remembered.
   void reset();
 
-  /// Tells that the next pair does not continue the last one (another calibration, a restarted source): the odometry
-  /// re-seeds from the last pose under a new epoch.
+  /// Tells that the next pair does not continue the last one (a pause, a restarted source): the odometry goes on where
+  /// it finds the pair in its map, else from the last pose under a new epoch.
   void breakStream();
 
   /// Tells that the clock was set: as breakStream(), and the next stamp may be any.
@@ -108,6 +109,7 @@ class VisualOdometry {
     Matrix6d covariance = Matrix6d::Zero();  ///< of that motion
     Vector6d correction = Vector6d::Zero();  ///< the part of it that the map corrects
     std::vector<int> rejected_rows;          ///< matched rows of the pair that the adjustment does not confirm
+    double dt = 0.0;                         ///< over which that motion is, else since the previous pair, s
     double time = 0.0;                       ///< s
   };
 
@@ -123,6 +125,7 @@ class VisualOdometry {
   void refuse(const StereoFeatures& features) const;
   MotionHypothesis propose(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
   bool isFrozen(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
+  MotionHypothesis reacquire(const StereoFeatures& features) const;
   void begin(const StereoFeatures& features, double dt);
   void suspect(double dt, const MotionHypothesis& found, const Step& step);
   Step seed(const StereoFeatures& features);
@@ -138,12 +141,12 @@ class VisualOdometry {
   Step predict(const StereoFeatures& features, double dt, const std::string& failure);
   std::optional<Floor> floor() const;
   void move(const Eigen::Isometry3d& T_previous_current);
-  OdometryResult report(const StereoFeatures& features, double dt, const MotionHypothesis& found,
-                        const Step& step) const;
+  OdometryResult report(const StereoFeatures& features, const MotionHypothesis& found, const Step& step) const;
 
   VisualOdometryOptions options_;
   Eigen::Isometry3d T_base_camera_;
   MotionSearch search_;
+  Reacquisition reacquisition_;
   Revisit revisit_;
   WindowOptimizer optimizer_;
 
@@ -168,6 +171,7 @@ class VisualOdometry {
     int predicted_pairs = 0;
     int pairs = 0;
     bool started = false;
+    bool interrupted = false;  ///< where in the map the camera is is unknown
   } state_;
   int epoch_ = 0;
 };
