@@ -21,17 +21,15 @@ const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"odometry", {"common"}},
     {"places", {"common", "odometry"}},
     {"data", {"common"}},
-    {"render", {"common"}},
     {"config", {"common", "front_end", "odometry", "places"}},
     {"check", {"common", "front_end", "odometry"}},
     {"ros", {"common", "front_end", "odometry", "places", "config"}},
-    {"experiments", {"common", "front_end", "odometry", "data", "config"}},
-    {"tools", {"common", "front_end", "odometry", "places", "data", "config", "experiments", "render", "check", "ros"}},
+    {"tools", {"common", "front_end", "odometry", "places", "data", "config", "check", "ros"}},
 };
 
 /// Rooms that a program without ROS can use.
 const std::set<std::string> kWithoutRos = {"common", "front_end", "odometry", "places",
-                                           "data",   "render",    "config",   "experiments", "check"};
+                                           "data", "config", "check"};
 
 struct Include {
   fs::path file;
@@ -99,6 +97,18 @@ TEST(Rooms, EachIncludesOnlyWhatItMay) {
       EXPECT_EQ(others.count(other), 1u) << include.file.string() << ":" << include.line << " includes "
                                          << include.header;
     }
+  }
+}
+
+/// The lab measures the product; the product builds and runs without it.
+TEST(Rooms, TheProductIncludesNothingOfTheLab) {
+  for (const auto& [room, others] : kMayInclude)
+    for (const Include& include : includesOf(room))
+      EXPECT_EQ(include.header.find("lab/"), std::string::npos)
+          << include.file.string() << ":" << include.line << " includes " << include.header;
+  for (const std::string room : {"render", "experiments"}) {
+    EXPECT_TRUE(fs::exists(kSource / "lab" / room)) << room;
+    EXPECT_EQ(kMayInclude.count(room), 0u) << room;
   }
 }
 

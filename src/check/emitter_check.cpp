@@ -73,7 +73,7 @@ void EmitterCheck::compare(const CoarseView& view, const cv::Mat& dots, bool& mo
 
 Finding EmitterCheck::judge() const {
   constexpr std::size_t kEnough = 12;  // parts that moved: each of the six twice
-  constexpr double kPattern = 0.3;     // ratio; test/check_camera_check: 0.5 with a projector, 0.04 without
+  constexpr double kPattern = 0.3;     // ratio; lab/test/check_camera_check: 0.5 with a projector, 0.04 without
   const std::string step = "emitter";
   if (stayed_.size() < kEnough)
     return {step, Verdict::kOpen, "the camera did not move enough", "turn and walk with it"};

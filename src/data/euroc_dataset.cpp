@@ -9,6 +9,7 @@
 #include <map>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
+#include <opencv2/imgproc.hpp>
 #include <stdexcept>
 
 #include "text_file.hpp"
@@ -141,6 +142,10 @@ EurocSequence::EurocSequence(const std::string& mav0) : directory_(mav0) {
   rectification_ = rectify(cameras_[0], cameras_[1]);
   if (!(rectification_.camera.baseline > 0.0))
     throw std::runtime_error("'" + mav0 + "': T_BS does not put cam1 to the right of cam0: are the cameras swapped?");
+  for (int side = 0; side < 2; ++side)
+    cv::initUndistortRectifyMap(cameras_[side].intrinsics, cameras_[side].distortion, rectification_.rotations[side],
+                                rectification_.projections[side], cameras_[side].size, CV_32FC1, map_x_[side],
+                                map_y_[side]);
   for (const auto& [stamp, file] : files[0])
     if (const auto partner = files[1].find(stamp); partner != files[1].end())
       frames_.push_back({stamp, {file, partner->second}});
@@ -157,6 +162,14 @@ ImagePair EurocSequence::load(int i) const {
   };
   const Frame& frame = frames_.at(static_cast<std::size_t>(i));
   return {read(frame.files[0]), read(frame.files[1])};
+}
+
+ImagePair EurocSequence::loadRectified(int i) const {
+  const ImagePair raw = load(i);
+  ImagePair pair;
+  cv::remap(raw.left, pair.left, map_x_[0], map_y_[0], cv::INTER_LINEAR);
+  cv::remap(raw.right, pair.right, map_x_[1], map_y_[1], cv::INTER_LINEAR);
+  return pair;
 }
 
 Trajectory EurocSequence::rectifiedPoses(std::string& problem) const {
@@ -181,6 +194,12 @@ Trajectory EurocSequence::rectifiedPoses(std::string& problem) const {
   const Eigen::Isometry3d T_first_world = poses.front().inverse();
   for (Eigen::Isometry3d& pose : poses) pose = T_first_world * pose;
   return poses;
+}
+
+std::optional<std::string> findMav0(const std::string& folder) {
+  for (const fs::path& candidate : {fs::path(folder), fs::path(folder) / "mav0"})
+    if (fs::is_directory(candidate / "cam0")) return candidate.string();
+  return std::nullopt;
 }
 
 }  // namespace sdvo

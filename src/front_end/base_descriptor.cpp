@@ -68,17 +68,13 @@ class BriefDescriptor : public BaseDescriptor {
 };
 
 /// A descriptor of OpenCV's. They differ in what they take the neighbourhood's size from, and some drop and reorder
-/// rows; `impose` sets the fields that one reads so that `size` has its effect, and class_id carries the row where it
-/// is free.
+/// rows; `impose` sets the fields that one reads so that `size` has its effect, and class_id carries the row.
 class OpenCvDescriptor : public BaseDescriptor {
  public:
-  using Impose = std::function<void(float size, cv::Size image, cv::KeyPoint&)>;
+  using Impose = std::function<void(float size, cv::KeyPoint&)>;
 
-  OpenCvDescriptor(cv::Ptr<cv::Feature2D> feature, double reach_per_size, bool class_id_is_free, Impose impose)
-      : feature_(std::move(feature)),
-        reach_per_size_(reach_per_size),
-        class_id_is_free_(class_id_is_free),
-        impose_(std::move(impose)) {}
+  OpenCvDescriptor(cv::Ptr<cv::Feature2D> feature, double reach_per_size, Impose impose)
+      : feature_(std::move(feature)), reach_per_size_(reach_per_size), impose_(std::move(impose)) {}
 
   double reach(double size) const override { return reach_per_size_ * size; }
 
@@ -90,23 +86,19 @@ class OpenCvDescriptor : public BaseDescriptor {
       const ViewKeypoint& k = keypoints[i];
       if (!liesInside(k.u, k.v, reach(k.size), image.size())) continue;
       const float degrees = k.angle < 0.f ? 0.f : k.angle * static_cast<float>(180.0 / CV_PI);
-      cv::KeyPoint keypoint(k.u, k.v, k.size, degrees, 0.f, 0,
-                            class_id_is_free_ ? static_cast<int>(row_of.size()) : -1);
-      impose_(k.size, image.size(), keypoint);
+      cv::KeyPoint keypoint(k.u, k.v, k.size, degrees, 0.f, 0, static_cast<int>(row_of.size()));
+      impose_(k.size, keypoint);
       cv_keypoints.push_back(keypoint);
       row_of.push_back(i);
     }
     if (cv_keypoints.empty()) return described;
 
-    const std::size_t given = cv_keypoints.size();
     cv::Mat rows;
     feature_->compute(image, cv_keypoints, rows);
-    if (!class_id_is_free_ && cv_keypoints.size() != given)
-      throw std::runtime_error("a descriptor of OpenCV dropped rows that cannot be told apart");
     if (rows.type() == CV_32F && elementType() == ElementType::kUint8) rows.convertTo(rows, CV_8U);
     const cv::Mat row_bytes(rows.rows, static_cast<int>(rows.cols * rows.elemSize()), CV_8U, rows.data, rows.step);
     for (std::size_t k = 0; k < cv_keypoints.size(); ++k) {
-      const std::size_t i = row_of[class_id_is_free_ ? static_cast<std::size_t>(cv_keypoints[k].class_id) : k];
+      const std::size_t i = row_of[static_cast<std::size_t>(cv_keypoints[k].class_id)];
       row_bytes.row(static_cast<int>(k)).copyTo(described.rows.row(static_cast<int>(i)));
       described.valid[i] = 1;
     }
@@ -127,7 +119,6 @@ class OpenCvDescriptor : public BaseDescriptor {
  private:
   cv::Ptr<cv::Feature2D> feature_;
   double reach_per_size_;
-  bool class_id_is_free_;
   Impose impose_;
 };
 
@@ -138,7 +129,7 @@ class OpenCvDescriptor : public BaseDescriptor {
 #if SDVO_HAVE_SIFT
 /// OpenCV's SIFT samples the pyramid image named in the packed `octave` (octave in bits 0…7, layer in bits 8…15). A key
 /// point of diameter s has the blur s / 2 = 1.6 * 2^(octave + layer / 3), layer in 1…3 (Lowe 2004, section 3.3).
-void imposeSiftLayer(float size, cv::Size, cv::KeyPoint& keypoint) {
+void imposeSiftLayer(float size, cv::KeyPoint& keypoint) {
   constexpr int kLayers = 3;
   constexpr double kSigma = 1.6;
   const double scale = std::log2(size / 2.0 / kSigma);
@@ -151,7 +142,7 @@ void imposeSiftLayer(float size, cv::Size, cv::KeyPoint& keypoint) {
 
 std::unique_ptr<BaseDescriptor> makeSift() {
 #if SDVO_HAVE_SIFT
-  return std::make_unique<OpenCvDescriptor>(cv::SIFT::create(), 3.0, true, imposeSiftLayer);
+  return std::make_unique<OpenCvDescriptor>(cv::SIFT::create(), 3.0, imposeSiftLayer);
 #else
   refuse(DescriptorType::kSift, "OpenCV 4.4 and later have it in features2d");
 #endif
@@ -161,39 +152,24 @@ std::unique_ptr<BaseDescriptor> makeSift() {
 std::unique_ptr<BaseDescriptor> makeOrb() {
   constexpr float kStep = 1.1f, kStandardSize = static_cast<float>(BaseDescriptor::kStandardSize);
   constexpr int kLevels = 24;
-  const auto impose = [](float size, cv::Size, cv::KeyPoint& keypoint) {
+  const auto impose = [](float size, cv::KeyPoint& keypoint) {
     const double level = std::log(size / kStandardSize) / std::log(kStep);
     keypoint.octave = std::clamp(static_cast<int>(std::lround(level)), 0, kLevels - 1);
   };
   const auto orb = cv::ORB::create(500, kStep, kLevels, 1, 0, 2, cv::ORB::HARRIS_SCORE, 31, 20);
-  return std::make_unique<OpenCvDescriptor>(orb, 19.0 / kStandardSize, true, impose);
+  return std::make_unique<OpenCvDescriptor>(orb, 19.0 / kStandardSize, impose);
 }
 
 /// BRISK reads the size itself.
 std::unique_ptr<BaseDescriptor> makeBrisk() {
-  return std::make_unique<OpenCvDescriptor>(cv::BRISK::create(), 2.0, true, [](float, cv::Size, cv::KeyPoint&) {});
-}
-
-/// AKAZE takes the evolution level, four to the octave from a blur of 1.6 px, from class_id; its own key points have a
-/// diameter of three times the blur. Octaves smaller than 80x40 px do not exist.
-std::unique_ptr<BaseDescriptor> makeAkaze() {
-  constexpr int kOctaves = 4, kSublevels = 4;
-  const auto impose = [](float size, cv::Size image, cv::KeyPoint& keypoint) {
-    int octaves = 1;
-    while (octaves < kOctaves && image.width >> octaves >= 80 && image.height >> octaves >= 40) ++octaves;
-    const double level = kSublevels * std::log2(size / 3.0 / 1.6);
-    keypoint.class_id = std::clamp(static_cast<int>(std::lround(level)), 0, octaves * kSublevels - 1);
-    keypoint.octave = keypoint.class_id / kSublevels;
-  };
-  const auto akaze = cv::AKAZE::create(cv::AKAZE::DESCRIPTOR_MLDB_UPRIGHT, 0, 3, 0.001f, kOctaves, kSublevels);
-  return std::make_unique<OpenCvDescriptor>(akaze, 7.5, false, impose);
+  return std::make_unique<OpenCvDescriptor>(cv::BRISK::create(), 2.0, [](float, cv::KeyPoint&) {});
 }
 
 std::unique_ptr<BaseDescriptor> makeSurf() {
 #ifdef SDVO_HAVE_XFEATURES2D
   try {
     return std::make_unique<OpenCvDescriptor>(cv::xfeatures2d::SURF::create(100, 4, 3, false, true), 10.0 * 1.2 / 9.0,
-                                              true, [](float, cv::Size, cv::KeyPoint&) {});
+                                              [](float, cv::KeyPoint&) {});
   } catch (const cv::Exception&) {
     refuse(DescriptorType::kSurf, "its xfeatures2d was built without OPENCV_ENABLE_NONFREE=ON");
   }
@@ -206,8 +182,6 @@ std::unique_ptr<BaseDescriptor> makeSurf() {
 
 std::unique_ptr<BaseDescriptor> makeBaseDescriptor(DescriptorType type) {
   switch (type) {
-    case DescriptorType::kAkaze:
-      return makeAkaze();
     case DescriptorType::kBrief:
       return std::make_unique<BriefDescriptor>();
     case DescriptorType::kBrisk:

@@ -12,9 +12,9 @@ struct OwnCurve {
   double slope, min_size, max_size;  ///< px
 };
 
-/// Chosen by fit_depth_scale on drives that are not reported: docs/experiments.md, "The size curve of each descriptor".
+/// Chosen by fit_depth_scale on drives that are not reported: lab/docs/experiments.md, "The size curve of each descriptor".
 OwnCurve ownCurve(DescriptorType type) {
-  constexpr double kLargest = 32.0;                          // px, of all: three octaves above FREAK's smallest
+  constexpr double kLargest = 32.0;                            // px, of all: three octaves above FREAK's smallest
   constexpr double kStandard = BaseDescriptor::kStandardSize;  // the smallest that ORB and BRISK tell apart
   switch (type) {
     case DescriptorType::kFreak:
@@ -27,8 +27,7 @@ OwnCurve ownCurve(DescriptorType type) {
       return {0.7, kStandard, kLargest};
     case DescriptorType::kOrb:
       return {0.5, kStandard, kLargest};
-    case DescriptorType::kAkaze:  // depth costs it matches
-    case DescriptorType::kSurf:   // not in the OpenCV at hand
+    case DescriptorType::kSurf:  // not in the OpenCV at hand
       return {0.72, kStandard, kStandard};
   }
   throw std::invalid_argument("there is no such base descriptor");

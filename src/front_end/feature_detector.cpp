@@ -32,13 +32,6 @@ std::vector<Corner> detectFast(const cv::Mat& image, const FeatureDetectorOption
   return toCorners(findFastCorners(image, options.fast_min_threshold));
 }
 
-/// The same for AGAST, whose score has the same meaning.
-std::vector<Corner> detectAgast(const cv::Mat& image, const FeatureDetectorOptions& options) {
-  std::vector<cv::KeyPoint> keypoints;
-  cv::AGAST(image, keypoints, options.fast_min_threshold, true);
-  return toCorners(keypoints);
-}
-
 /// Detectors of OpenCV's with a scale space of their own: positions and scores are taken, the sizes come from the
 /// depth. More are asked for than wanted, so that the buckets have a choice.
 constexpr int kChoice = 4;
@@ -62,22 +55,15 @@ std::vector<Corner> detectSift(const cv::Mat& image, const FeatureDetectorOption
   return toCorners(keypoints);
 }
 
-/// Local maxima of the gradient matrix' smaller eigenvalue (gftt) or of Harris' measure, as in cv::goodFeaturesToTrack,
-/// but with the response kept for the buckets.
+/// Local maxima of the gradient matrix' smaller eigenvalue as in cv::goodFeaturesToTrack, but with the response kept
+/// for the buckets.
 std::vector<Corner> detectGradientCorners(const cv::Mat& image, const FeatureDetectorOptions& options) {
-  constexpr double kHarrisK = 0.04;
   cv::Mat response, neighbourhood_maximum;
-  double quality = options.corner_quality;
-  if (options.type == DetectorType::kHarris) {
-    cv::cornerHarris(image, response, options.corner_block_size, 3, kHarrisK);
-    quality *= quality;  // Harris' measure is of the order of the eigenvalue squared
-  } else {
-    cv::cornerMinEigenVal(image, response, options.corner_block_size, 3);
-  }
+  cv::cornerMinEigenVal(image, response, options.corner_block_size, 3);
   cv::dilate(response, neighbourhood_maximum, cv::Mat());
   double strongest = 0.0;
   cv::minMaxLoc(response, nullptr, &strongest);
-  const float weakest = static_cast<float>(strongest * quality);
+  const float weakest = static_cast<float>(strongest * options.corner_quality);
 
   std::vector<Corner> corners;
   for (int y = 1; y + 1 < image.rows; ++y) {
@@ -93,10 +79,7 @@ std::vector<Corner> detectAll(const cv::Mat& image, const FeatureDetectorOptions
   switch (options.type) {
     case DetectorType::kFast:
       return detectFast(image, options);
-    case DetectorType::kAgast:
-      return detectAgast(image, options);
     case DetectorType::kGftt:
-    case DetectorType::kHarris:
       return detectGradientCorners(image, options);
     case DetectorType::kOrb:
       return detectOrb(image, options);
@@ -129,11 +112,9 @@ void refineByGradients(const cv::Mat& image, const FeatureDetectorOptions& optio
 void refine(const cv::Mat& image, const FeatureDetectorOptions& options, std::vector<Corner>& corners) {
   switch (options.type) {
     case DetectorType::kFast:
-    case DetectorType::kAgast:
       for (Corner& corner : corners) corner.position += cornerPeak(image, cv::Point(corner.position));
       break;
     case DetectorType::kGftt:
-    case DetectorType::kHarris:
       refineByGradients(image, options, corners);
       break;
     case DetectorType::kOrb:

@@ -7,8 +7,6 @@
 #include <utility>
 #include <vector>
 
-#include "../common/kernel.hpp"
-
 namespace sdvo {
 namespace {
 
@@ -32,33 +30,12 @@ struct Shares {
   }
 };
 
-struct HalveRow {
-  /// `pixels` may be read one before the first and one after the last.
-  static SDVO_IN_KERNEL void run(const float* pixels, const float* before, const float* here, const float* after,
-                                 int count, float* half) {
-    for (int k = 0; k < count; ++k)
-      half[k] = pixels[2 * k - 1] * before[k] + pixels[2 * k] * here[k] + pixels[2 * k + 1] * after[k];
-  }
-};
-
-/// Also rounds to the nearest whole number, the even one of two, as cv::saturate_cast has it: means lie within 0…255
-/// but for their own rounding.
-struct AddRows {
-  static SDVO_IN_KERNEL void run(const float* above, const float* middle, const float* below, float share_above,
-                                 float share_middle, float share_below, int count, std::uint8_t* half) {
-    constexpr float kUnitsOnly = 12582912.f;  // 1.5 * 2^23: what is added to it loses its fraction
-    for (int k = 0; k < count; ++k) {
-      const float sum = above[k] * share_above + middle[k] * share_middle + below[k] * share_below;
-      half[k] = static_cast<std::uint8_t>(static_cast<int>((sum + kUnitsOnly) - kUnitsOnly));
-    }
-  }
-};
-
-struct ToFloat {
-  static SDVO_IN_KERNEL void run(const std::uint8_t* pixels, int count, float* values) {
-    for (int k = 0; k < count; ++k) values[k] = static_cast<float>(pixels[k]);
-  }
-};
+/// `pixels` may be read one before the first and one after the last.
+void halveRow(const float* pixels, const Shares& columns, std::vector<float>& half) {
+  for (int k = 0; k < static_cast<int>(half.size()); ++k)
+    half[k] =
+        pixels[2 * k - 1] * columns.before[k] + pixels[2 * k] * columns.here[k] + pixels[2 * k + 1] * columns.after[k];
+}
 
 }  // namespace
 
@@ -70,19 +47,20 @@ void halveImage(const cv::Mat& image, cv::Mat& half) {
   const Shares columns(image.cols), rows(image.rows);
   const std::size_t width = static_cast<std::size_t>(size.width);
   std::vector<float> pixels(2 * width + 2, 0.f), above(width, 0.f), middle(width), below(width);
-  const auto halveRow = [&](int row, std::vector<float>& result) {
+  const auto halve = [&](int row, std::vector<float>& result) {
     if (row >= image.rows) return std::fill(result.begin(), result.end(), 0.f);
-    runKernel<ToFloat>(image.ptr(row), image.cols, pixels.data() + 1);
-    runKernel<HalveRow>(pixels.data() + 1, columns.before.data(), columns.here.data(), columns.after.data(), size.width,
-                        result.data());
+    std::copy_n(image.ptr(row), image.cols, pixels.begin() + 1);
+    halveRow(pixels.data() + 1, columns, result);
   };
   half.create(size, CV_8U);
   for (int k = 0; k < size.height; ++k) {
-    halveRow(2 * k, middle);
-    halveRow(2 * k + 1, below);
-    const std::size_t row = static_cast<std::size_t>(k);
-    runKernel<AddRows>(above.data(), middle.data(), below.data(), rows.before[row], rows.here[row], rows.after[row],
-                       size.width, half.ptr(k));
+    halve(2 * k, middle);
+    halve(2 * k + 1, below);
+    const float share_above = rows.before[k], share_middle = rows.here[k], share_below = rows.after[k];
+    std::uint8_t* result = half.ptr(k);
+    for (std::size_t i = 0; i < width; ++i)
+      result[i] =
+          cv::saturate_cast<std::uint8_t>(above[i] * share_above + middle[i] * share_middle + below[i] * share_below);
     std::swap(above, below);
   }
 }

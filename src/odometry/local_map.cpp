@@ -440,7 +440,7 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   adjustment.calibration_information = solution.calibration_information;
   adjustment.common_disparity_square = solution.common_disparity_square;
   // Errors of neighbouring points are positively correlated: this factor makes the motions' NEES an honest 6 (measured
-  // by scripts/measure_covariance).
+  // by lab/run covariance).
   constexpr double kCorrelated = 1.7;
   adjustment.since_keyframe =
       kCorrelated * motionCovariance(window, poses, solution.pose_covariance, newest - 1, newest);

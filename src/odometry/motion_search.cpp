@@ -21,7 +21,7 @@ constexpr double kElsewhere = 0.6;  // px, of aligned positions; up to 0.5 where
 constexpr double kSuspicious = 100.0, kCertain = 200.0;
 // The same for each point, in variances of its residual: a part of its noise is common to many, so the sum grows with
 // their number. Measured where the sum exceeds kCertain: up to 1.5 where nothing moved, 1.7 and more with faults
-// (docs/log/odometry.md).
+// (docs/decisions.md).
 constexpr double kCertainOfOne = 1.5;
 
 }  // namespace

@@ -79,7 +79,8 @@ StereoCamera toStereoCamera(const sensor_msgs::CameraInfo& left, const sensor_ms
   camera.height = size.height;
   if (!(camera.baseline > 0.0))
     throw std::invalid_argument("baseline = " + std::to_string(camera.baseline) + " m is not positive (left " +
-                                describeP(left) + "; right " + describeP(right) + "): " + remedy(left_model, right_model));
+                                describeP(left) + "; right " + describeP(right) +
+                                "): " + remedy(left_model, right_model));
   camera.check();
   return camera;
 }

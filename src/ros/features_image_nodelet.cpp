@@ -9,12 +9,12 @@
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 
-#include "callback_thread.hpp"
 #include "exact_synchroniser.hpp"
 #include "features_image.hpp"
 #include "image_conversions.hpp"
 #include "image_subscriber.hpp"
-#include "report_throttle.hpp"
+#include "threads.hpp"
+#include "throttles.hpp"
 
 namespace sdvo {
 

@@ -2,7 +2,7 @@
 
 #include <utility>
 
-#include "frame_id.hpp"
+#include "frames.hpp"
 #include "stamps.hpp"
 
 namespace sdvo {

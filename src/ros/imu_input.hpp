@@ -9,9 +9,8 @@
 #include <optional>
 #include <string>
 
-#include "gravity_track.hpp"
-#include "gyro_track.hpp"
-#include "robot_transforms.hpp"
+#include "imu_tracks.hpp"
+#include "transforms.hpp"
 
 namespace sdvo {
 

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "odometry_frames.hpp"
+#include "frames.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
 namespace sdvo::ros_conversions {

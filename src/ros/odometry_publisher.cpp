@@ -3,7 +3,7 @@
 #include <boost/make_shared.hpp>
 
 #include "feature_conversions.hpp"
-#include "frame_id.hpp"
+#include "frames.hpp"
 #include "stamps.hpp"
 
 namespace sdvo {

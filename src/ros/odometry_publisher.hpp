@@ -12,7 +12,7 @@
 #include "../config/interface_options.hpp"
 #include "odometry_conversions.hpp"
 #include "stereo_descriptor_vo/ros/stereo_features_view.hpp"
-#include "transform_publisher.hpp"
+#include "transforms.hpp"
 
 namespace sdvo {
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "place_conversions.hpp"
-#include "report_throttle.hpp"
+#include "throttles.hpp"
 
 namespace sdvo {
 

@@ -4,7 +4,6 @@
 
 #include "camera_conversions.hpp"
 #include "image_conversions.hpp"
-#include "same_camera.hpp"
 
 namespace sdvo {
 

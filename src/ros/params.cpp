@@ -1,7 +1,11 @@
 #include "params.hpp"
 
+#include <dynamic_reconfigure/ConfigDescription.h>
+
 #include <algorithm>
+#include <sstream>
 #include <stdexcept>
+#include <utility>
 
 namespace sdvo {
 namespace {
@@ -56,6 +60,171 @@ std::vector<std::string> loadParams(const ros::NodeHandle& nh, std::vector<Optio
     if (!known) unknown.push_back(name);
   }
   return unknown;
+}
+
+namespace {
+
+using dynamic_reconfigure::Config;
+
+dynamic_reconfigure::GroupState onlyGroup() {
+  dynamic_reconfigure::GroupState group;
+  group.name = "Default";
+  group.state = true;
+  return group;
+}
+
+template <class Parameter, class Value>
+Parameter makeParameter(const std::string& name, const Value& value) {
+  Parameter parameter;
+  parameter.name = name;
+  parameter.value = value;
+  return parameter;
+}
+
+void add(Config& config, const Option& option, const std::string& text) {
+  if (std::holds_alternative<bool*>(option.value))
+    config.bools.push_back(makeParameter<dynamic_reconfigure::BoolParameter>(option.name, text == "true"));
+  else if (std::holds_alternative<int*>(option.value))
+    config.ints.push_back(makeParameter<dynamic_reconfigure::IntParameter>(option.name, std::stoi(text)));
+  else if (std::holds_alternative<double*>(option.value))
+    config.doubles.push_back(makeParameter<dynamic_reconfigure::DoubleParameter>(option.name, std::stod(text)));
+  else
+    config.strs.push_back(makeParameter<dynamic_reconfigure::StrParameter>(option.name, text));
+}
+
+/// The limits that dynamic_reconfigure states for every parameter, also where there are none.
+void addLimits(Config& min, Config& max, const Option& option) {
+  const auto number = [&](double limit) {
+    std::ostringstream text;
+    text.precision(17);
+    text << limit;
+    return text.str();
+  };
+  if (std::holds_alternative<bool*>(option.value)) {
+    add(min, option, "false");
+    add(max, option, "true");
+  } else if (option.isText()) {
+    add(min, option, "");
+    add(max, option, "");
+  } else {
+    add(min, option, number(option.range.min));
+    add(max, option, number(option.range.max));
+  }
+}
+
+const char* typeName(const Option& option) {
+  if (std::holds_alternative<bool*>(option.value)) return "bool";
+  if (std::holds_alternative<int*>(option.value)) return "int";
+  if (std::holds_alternative<double*>(option.value)) return "double";
+  return "str";
+}
+
+/// The list to choose from, in the form of a Python literal that rqt_reconfigure reads.
+std::string editMethod(const Option& option) {
+  if (option.choices.empty()) return "";
+  std::string entries;
+  for (const std::string& choice : option.choices)
+    entries +=
+        (entries.empty() ? "" : ", ") + ("{'name': '" + choice + "', 'value': '" + choice + "', 'type': 'str', ") +
+        "'description': '', 'srcline': 0, 'srcfile': '', 'ctype': 'std::string', 'cconsttype': 'const char * const'}";
+  return "{'enum_description': '', 'enum': [" + entries + "]}";
+}
+
+}  // namespace
+
+ReconfigureServer::ReconfigureServer(ros::NodeHandle private_nh, std::vector<Option> options,
+                                     std::function<void()> apply)
+    : nh_(std::move(private_nh)), options_(std::move(options)), apply_(std::move(apply)) {
+  dynamic_reconfigure::ConfigDescription description;
+  dynamic_reconfigure::Group group;
+  group.name = "Default";
+  for (const Option& option : options_) {
+    dynamic_reconfigure::ParamDescription parameter;
+    parameter.name = option.name;
+    parameter.type = typeName(option);
+    parameter.description = option.meaning + (option.unit.empty() ? "" : " [" + option.unit + "]");
+    parameter.edit_method = editMethod(option);
+    group.parameters.push_back(parameter);
+    add(description.dflt, option, option.text());
+    addLimits(description.min, description.max, option);
+  }
+  description.groups.push_back(group);
+  for (Config* config : {&description.dflt, &description.min, &description.max}) config->groups.push_back(onlyGroup());
+
+  descriptions_ = nh_.advertise<dynamic_reconfigure::ConfigDescription>("parameter_descriptions", 1, true);
+  updates_ = nh_.advertise<Config>("parameter_updates", 1, true);
+  descriptions_.publish(description);
+  updates_.publish(currentConfig());
+  service_ = nh_.advertiseService("set_parameters", &ReconfigureServer::onRequest, this);
+}
+
+bool ReconfigureServer::onRequest(dynamic_reconfigure::Reconfigure::Request& request,
+                                  dynamic_reconfigure::Reconfigure::Response& response) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::vector<std::string> before = texts();
+  try {
+    assign(request.config);
+    if (texts() != before) apply_();
+    keepChanges(before);
+  } catch (const std::exception& e) {
+    for (std::size_t i = 0; i < options_.size(); ++i) options_[i].set(before[i]);
+    ROS_WARN_STREAM(nh_.getNamespace() << ": nothing reconfigured, all values stay: " << e.what());
+  }
+  response.config = currentConfig();
+  updates_.publish(response.config);
+  return true;
+}
+
+/// On the parameter server, where a nodelet that is loaded again, and rosparam, find what is in use.
+void ReconfigureServer::keepChanges(const std::vector<std::string>& before) {
+  for (std::size_t i = 0; i < options_.size(); ++i) {
+    const Option& option = options_[i];
+    if (option.text() == before[i]) continue;
+    if (const auto* b = std::get_if<bool*>(&option.value))
+      nh_.setParam(option.name, **b);
+    else if (const auto* number = std::get_if<int*>(&option.value))
+      nh_.setParam(option.name, **number);
+    else if (const auto* d = std::get_if<double*>(&option.value))
+      nh_.setParam(option.name, **d);
+    else
+      nh_.setParam(option.name, option.text());
+  }
+}
+
+void ReconfigureServer::assign(const Config& request) {
+  for (const auto& parameter : request.bools) set(parameter.name, parameter.value ? "true" : "false");
+  for (const auto& parameter : request.ints) set(parameter.name, std::to_string(parameter.value));
+  for (const auto& parameter : request.strs) set(parameter.name, parameter.value);
+  for (const auto& parameter : request.doubles) {
+    std::ostringstream text;
+    text.precision(17);
+    text << parameter.value;
+    set(parameter.name, text.str());
+  }
+}
+
+void ReconfigureServer::set(const std::string& name, const std::string& text) {
+  const auto option = std::find_if(options_.begin(), options_.end(), [&](const Option& o) { return o.name == name; });
+  if (option == options_.end())
+    throw std::invalid_argument("there is no option '" + name + "': list_parameters prints all");
+  option->set(text);
+  if (option->clamp())
+    ROS_WARN_STREAM(nh_.getNamespace() << "/" << name << " = " << text << " is outside of its range, the nearest value "
+                                       << option->text() << " is used");
+  option->check();
+}
+
+std::vector<std::string> ReconfigureServer::texts() const {
+  std::vector<std::string> texts;
+  for (const Option& option : options_) texts.push_back(option.text());
+  return texts;
+}
+
+Config ReconfigureServer::currentConfig() const {
+  Config config;
+  for (const Option& option : options_) add(config, option, option.text());
+  config.groups.push_back(onlyGroup());
+  return config;
 }
 
 }  // namespace sdvo

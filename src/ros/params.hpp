@@ -1,7 +1,11 @@
 #pragma once
 
+#include <dynamic_reconfigure/Config.h>
+#include <dynamic_reconfigure/Reconfigure.h>
 #include <ros/node_handle.h>
 
+#include <functional>
+#include <mutex>
 #include <string>
 #include <vector>
 
@@ -18,5 +22,32 @@ template <class Options>
 std::vector<std::string> loadParams(const ros::NodeHandle& nh, Options& options) {
   return loadParams(nh, listOptions(options));
 }
+
+/// Serves options through dynamic_reconfigure's messages, for dynparam and rqt_reconfigure. Names, ranges, defaults and
+/// meanings come from the options themselves; a .cfg file would state each of them a second time.
+class ReconfigureServer {
+ public:
+  /// `options` refer to values that must outlive the server and that only the server writes. `apply` runs in a ROS
+  /// callback, never twice at a time, after values have changed. A request is taken over as a whole or not at all: when
+  /// a name or a value is wrong, or `apply` throws, all values are as before and the response shows these.
+  /// What has changed is set on the parameter server, too.
+  ReconfigureServer(ros::NodeHandle private_nh, std::vector<Option> options, std::function<void()> apply);
+
+ private:
+  bool onRequest(dynamic_reconfigure::Reconfigure::Request& request,
+                 dynamic_reconfigure::Reconfigure::Response& response);
+  void keepChanges(const std::vector<std::string>& before);
+  void assign(const dynamic_reconfigure::Config& request);
+  void set(const std::string& name, const std::string& text);
+  std::vector<std::string> texts() const;
+  dynamic_reconfigure::Config currentConfig() const;
+
+  ros::NodeHandle nh_;
+  std::vector<Option> options_;
+  std::function<void()> apply_;
+  std::mutex mutex_;
+  ros::Publisher descriptions_, updates_;
+  ros::ServiceServer service_;
+};
 
 }  // namespace sdvo

@@ -5,7 +5,7 @@
 #include <boost/make_shared.hpp>
 #include <utility>
 
-#include "frame_id.hpp"
+#include "frames.hpp"
 
 namespace sdvo {
 

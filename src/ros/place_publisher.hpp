@@ -10,10 +10,9 @@
 #include <string>
 
 #include "../config/interface_options.hpp"
-#include "map_conversions.hpp"
 #include "place_conversions.hpp"
 #include "stereo_descriptor_vo/places/eased_transform.hpp"
-#include "transform_publisher.hpp"
+#include "transforms.hpp"
 
 namespace sdvo {
 

@@ -19,20 +19,18 @@
 #include <vector>
 
 #include "../config/interface_options.hpp"
-#include "callback_thread.hpp"
-#include "camera_mount.hpp"
-#include "frame_id.hpp"
+#include "diagnostics.hpp"
+#include "frames.hpp"
 #include "odometry_pair_input.hpp"
 #include "other_robot.hpp"
 #include "params.hpp"
-#include "place_diagnostics.hpp"
 #include "place_publisher.hpp"
 #include "place_session.hpp"
 #include "places_file.hpp"
-#include "report_throttle.hpp"
-#include "robot_transforms.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
-#include "worker.hpp"
+#include "threads.hpp"
+#include "throttles.hpp"
+#include "transforms.hpp"
 
 namespace sdvo {
 

@@ -8,11 +8,11 @@
 #include <stdexcept>
 #include <utility>
 
+#include "camera_conversions.hpp"
 #include "feature_conversions.hpp"
-#include "frame_id.hpp"
+#include "frames.hpp"
 #include "odometry_conversions.hpp"
 #include "pose_conversions.hpp"
-#include "same_camera.hpp"
 #include "stamps.hpp"
 
 namespace sdvo {

@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "map_conversions.hpp"
 #include "odometry_pair_input.hpp"
 #include "place_conversions.hpp"
 #include "places_file.hpp"
@@ -33,9 +32,9 @@ class PlaceSession {
   /// that of the places, other descriptors, and messages that do not hold together.
   std::optional<PlaceReport> observe(const OdometryPair& pair, const Eigen::Isometry3d& T_base_camera);
 
-  /// Takes a pose of the base in the map, as from rviz' "2D Pose Estimate". From the next pair on the odometry is there,
-  /// and until a place is recognised only those nearby are looked at. Throws std::invalid_argument for a pose that
-  /// is not of `map_frame`, and for numbers that are not finite.
+  /// Takes a pose of the base in the map, as from rviz' "2D Pose Estimate". From the next pair on the odometry is
+  /// there, and until a place is recognised only those nearby are looked at. Throws std::invalid_argument for a pose
+  /// that is not of `map_frame`, and for numbers that are not finite.
   void expect(const geometry_msgs::PoseWithCovarianceStamped& pose, const std::string& map_frame);
 
   /// Throws std::invalid_argument where the places are not of the camera and the descriptors that `session` saw last.

@@ -3,7 +3,6 @@
 #include <string>
 #include <vector>
 
-#include "map_conversions.hpp"
 #include "place_conversions.hpp"
 
 namespace sdvo {

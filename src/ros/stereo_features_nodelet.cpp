@@ -11,21 +11,17 @@
 #include <utility>
 
 #include "../config/interface_options.hpp"
-#include "callback_thread.hpp"
+#include "diagnostics.hpp"
 #include "feature_conversions.hpp"
-#include "frame_id.hpp"
+#include "frames.hpp"
 #include "image_conversions.hpp"
-#include "image_diagnostics.hpp"
-#include "pace.hpp"
 #include "pair_decoder.hpp"
 #include "params.hpp"
-#include "reconfigure_server.hpp"
-#include "report_throttle.hpp"
-#include "stamp_filter.hpp"
 #include "stamps.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 #include "stereo_input.hpp"
-#include "worker.hpp"
+#include "threads.hpp"
+#include "throttles.hpp"
 
 namespace sdvo {
 namespace {

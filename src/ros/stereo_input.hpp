@@ -14,9 +14,9 @@
 
 #include "../config/interface_options.hpp"
 #include "arrival_log.hpp"
-#include "callback_thread.hpp"
 #include "exact_synchroniser.hpp"
 #include "image_subscriber.hpp"
+#include "threads.hpp"
 
 namespace sdvo {
 

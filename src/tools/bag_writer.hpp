@@ -9,7 +9,7 @@
 #include <string>
 #include <system_error>
 
-#include "../ros/output_bag.hpp"
+#include "../ros/output_files.hpp"
 
 namespace sdvo {
 

@@ -5,11 +5,11 @@
 #include <utility>
 
 #include "../common/text.hpp"
-#include "../ros/frame_id.hpp"
+#include "../ros/frames.hpp"
 
 namespace sdvo {
 
-CameraInput::CameraInput(const Topics& topics, std::function<void(const StereoPairMessages&)> use)
+CameraInput::CameraInput(const StereoTopics& topics, std::function<void(const StereoPairMessages&)> use)
     : stamps_(topics),
       arrivals_(topics, StereoInputOptions()),
       pairs_(StereoInputOptions().sync_queue_size,
@@ -20,6 +20,19 @@ CameraInput::CameraInput(const Topics& topics, std::function<void(const StereoPa
                arrivals_.notePair();
                use({left, right, left_info, right_info});
              }) {}
+
+void CameraInput::add(const StereoMessage& message, const ros::Time& arrival) {
+  switch (message.input) {
+    case ArrivalLog::kLeftImage:
+      return add<ArrivalLog::kLeftImage>(message.image, arrival);
+    case ArrivalLog::kRightImage:
+      return add<ArrivalLog::kRightImage>(message.image, arrival);
+    case ArrivalLog::kLeftInfo:
+      return add<ArrivalLog::kLeftInfo>(message.info, arrival);
+    default:
+      return add<ArrivalLog::kRightInfo>(message.info, arrival);
+  }
+}
 
 void CameraInput::add(const tf2_msgs::TFMessage& message, bool is_static) {
   for (const geometry_msgs::TransformStamped& transform : message.transforms)

@@ -5,7 +5,6 @@
 #include <tf2/buffer_core.h>
 #include <tf2_msgs/TFMessage.h>
 
-#include <array>
 #include <functional>
 #include <string>
 
@@ -13,6 +12,7 @@
 #include "../ros/arrival_log.hpp"
 #include "../ros/exact_synchroniser.hpp"
 #include "../ros/stereo_input.hpp"
+#include "stereo_messages.hpp"
 
 namespace sdvo {
 
@@ -20,12 +20,11 @@ namespace sdvo {
 /// pair, and where TF has the camera. One thread calls it.
 class CameraInput {
  public:
-  using Topics = std::array<std::string, ArrivalLog::kInputs>;  ///< in the order of ArrivalLog::Input
-
-  CameraInput(const Topics& topics, std::function<void(const StereoPairMessages&)> use);
+  CameraInput(const StereoTopics& topics, std::function<void(const StereoPairMessages&)> use);
 
   template <ArrivalLog::Input input, class Message>
   void add(const boost::shared_ptr<const Message>& message, const ros::Time& arrival);
+  void add(const StereoMessage& message, const ros::Time& arrival);
   void add(const tf2_msgs::TFMessage& message, bool is_static);
 
   Finding topics();

@@ -14,45 +14,31 @@
 #include <vector>
 
 #include "../check/check_page.hpp"
-#include "../ros/worker.hpp"
+#include "../ros/threads.hpp"
 #include "camera_check.hpp"
 #include "camera_input.hpp"
 #include "run_tool.hpp"
+#include "stereo_messages.hpp"
 
 namespace {
 
 using sdvo::ArrivalLog;
 
 struct Arguments {
-  std::string bag, camera = "/stereo", left = "left", right = "right", image = "image_rect", base_frame = "base_link",
-                   transport = "raw", page, config;
+  std::string bag, base_frame = "base_link", transport = "raw", page, config;
+  sdvo::StereoNames names;
   std::vector<std::string> settings;
   double seconds = 30.0;
-
-  sdvo::CameraInput::Topics topics() const {
-    return {camera + "/" + left + "/" + image, camera + "/" + right + "/" + image, camera + "/" + left + "/camera_info",
-            camera + "/" + right + "/camera_info"};
-  }
 };
 
-void readBag(const Arguments& arguments, sdvo::CameraInput& input) {
-  const auto topics = arguments.topics();
+void readBag(const rosbag::Bag& bag, const sdvo::StereoTopics& topics, sdvo::CameraInput& input) {
   std::vector<std::string> wanted(topics.begin(), topics.end());
   wanted.insert(wanted.end(), {"/tf", "/tf_static"});
-  const rosbag::Bag bag(arguments.bag, rosbag::bagmode::Read);
-  for (const rosbag::MessageInstance& instance : rosbag::View(bag, rosbag::TopicQuery(wanted))) {
-    const std::string& topic = instance.getTopic();
+  for (const rosbag::MessageInstance& instance : rosbag::View(bag, rosbag::TopicQuery(wanted)))
     if (const auto transforms = instance.instantiate<tf2_msgs::TFMessage>())
-      input.add(*transforms, topic == "/tf_static");
-    else if (const sensor_msgs::ImageConstPtr image = instance.instantiate<sensor_msgs::Image>())
-      topic == topics[0] ? input.add<ArrivalLog::kLeftImage>(image, instance.getTime())
-                         : input.add<ArrivalLog::kRightImage>(image, instance.getTime());
-    else if (const sensor_msgs::CameraInfoConstPtr info = instance.instantiate<sensor_msgs::CameraInfo>())
-      topic == topics[2] ? input.add<ArrivalLog::kLeftInfo>(info, instance.getTime())
-                         : input.add<ArrivalLog::kRightInfo>(info, instance.getTime());
+      input.add(*transforms, instance.getTopic() == "/tf_static");
     else
-      throw std::runtime_error(topic + " holds " + instance.getDataType() + ", which is no image, camera_info or TF");
-  }
+      input.add(sdvo::readStereoMessage(instance, topics), instance.getTime());
 }
 
 void listen(const Arguments& arguments, sdvo::CameraInput& input) {
@@ -61,7 +47,7 @@ void listen(const Arguments& arguments, sdvo::CameraInput& input) {
   ros::NodeHandle nh;
   const image_transport::TransportHints hints(arguments.transport);
   constexpr std::uint32_t kQueue = 50;  // messages: a second of a fast camera
-  const auto topics = arguments.topics();
+  const sdvo::StereoTopics topics = arguments.names.topics();
   image_transport::ImageTransport images(nh);
   const auto left = images.subscribe(
       topics[0], kQueue,
@@ -99,18 +85,20 @@ int check(const Arguments& arguments) {
                 << "\n";
     }
     if (!arguments.page.empty())
-      sdvo::writeCheckPage(arguments.page, arguments.topics()[0], findings, check.rows(), check.picture());
+      sdvo::writeCheckPage(arguments.page, arguments.names.topics()[0], findings, check.rows(), check.picture());
     return failed ? 2 : 0;
   };
   if (!arguments.bag.empty()) {
-    sdvo::CameraInput input(arguments.topics(), [&](const sdvo::StereoPairMessages& pair) { check.add(pair); });
-    readBag(arguments, input);
+    const rosbag::Bag bag(arguments.bag, rosbag::bagmode::Read);
+    const sdvo::StereoTopics topics = sdvo::topicsIn(bag, arguments.names);
+    sdvo::CameraInput input(topics, [&](const sdvo::StereoPairMessages& pair) { check.add(pair); });
+    readBag(bag, topics, input);
     return report(input);
   }
   constexpr std::size_t kWaiting = 100;  // pairs
   sdvo::Worker<sdvo::StereoPairMessages> worker(kWaiting,
                                                 [&](const sdvo::StereoPairMessages& pair) { check.add(pair); });
-  sdvo::CameraInput input(arguments.topics(), [&](const sdvo::StereoPairMessages& pair) { worker.push(pair); });
+  sdvo::CameraInput input(arguments.names.topics(), [&](const sdvo::StereoPairMessages& pair) { worker.push(pair); });
   listen(arguments, input);
   worker.stop();
   return report(input);
@@ -126,11 +114,7 @@ int main(int argc, char** argv) {
       "Exit code 2: a step FAILs. For 30 s of a camera that is held still, walked, turned and tilted");
   Arguments arguments;
   app.add_option("--bag", arguments.bag, "recorded bag; empty: listen to the topics")->check(CLI::ExistingFile);
-  app.add_option("--camera", arguments.camera, "namespace of both sides")->capture_default_str();
-  app.add_option("--left", arguments.left, "name of the left side, such as infra1")->capture_default_str();
-  app.add_option("--right", arguments.right, "name of the right side")->capture_default_str();
-  app.add_option("--image", arguments.image, "name of the rectified images, such as image_rect_raw")
-      ->capture_default_str();
+  arguments.names.addTo(app);
   app.add_option("--base-frame", arguments.base_frame, "the robot's frame on TF")->capture_default_str();
   app.add_option("--seconds", arguments.seconds, "how long to listen, s")
       ->capture_default_str()

@@ -126,24 +126,6 @@ double PlaceRun::cpuTime() const {
   return pairs_.empty() ? 0.0 : cpu_time_ / static_cast<double>(pairs_.size());
 }
 
-void PlaceRun::writeViews(const std::string& path, const Trajectory& truth) const {
-  constexpr double kFarthest = 30.0, kLargestAngle = 60.0;  // m, deg
-  std::ofstream file(path);
-  file << "first,second,distance_m,angle_deg,matches,inliers,same,error_m,error_deg\n";
-  for (auto first = ownKeyframes(); first != keyframes_.end(); ++first)
-    for (auto second = first + 1; second != keyframes_.end(); ++second) {
-      const Eigen::Isometry3d T_true = truth[first->pair].inverse() * truth[second->pair];
-      const double distance = T_true.translation().norm();
-      if (distance > kFarthest || angle(T_true) > kLargestAngle) continue;
-      const int id = second->report.id;
-      const PlaceMatch match = recognition_.verify(first->report.id, recognition_.places().at(id).features);
-      const Eigen::Isometry3d error = T_true.inverse() * match.T_place_camera;
-      file << first->report.id << "," << id << "," << distance << "," << angle(T_true) << "," << match.matches << ","
-           << match.inliers << "," << match.same << "," << error.translation().norm() << "," << angle(error) << "\n";
-    }
-  finishTextFile(file, path);
-}
-
 void PlaceRun::writeKeyframes(const std::string& path) const {
   std::ofstream file(path);
   file << "id,pair,stamp_ns,features,best,score,same,matches,inliers,coverage,rms_px,loop,find_ms,verify_ms,reason\n";

@@ -43,10 +43,6 @@ class PlaceRun {
   double longestOptimisation() const { return longest_optimisation_; }  ///< ms
   double cpuTime() const;                                               ///< ms a pair, mean, all included
 
-  /// A CSV with a line for each two key frames whose views overlap, not more than 30 m and 60 degrees apart: what
-  /// geometry says of them, and how far that is off.
-  void writeViews(const std::string& path, const Trajectory& truth) const;
-
   /// A CSV with a line for each key frame.
   void writeKeyframes(const std::string& path) const;
 

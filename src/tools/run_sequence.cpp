@@ -1,63 +1,265 @@
-// Runs the odometry on a sequence in KITTI layout without ROS: the same core as the nodelets, every pair processed.
+// Runs the odometry on recorded drives without a ROS master: the same core as the nodelets, every pair processed.
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <filesystem>
+#include <fstream>
 #include <iomanip>
 #include <iostream>
+#include <limits>
+#include <map>
 #include <opencv2/core/utility.hpp>
+#include <optional>
+#include <sstream>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "../common/progress.hpp"
 #include "../config/pipeline_options.hpp"
+#include "../data/text_file.hpp"
+#include "feature_halves.hpp"
 #include "offline_run.hpp"
+#include "place_run.hpp"
+#include "recording.hpp"
 #include "run_tool.hpp"
-#include "stereo_descriptor_vo/data/kitti_dataset.hpp"
+#include "self_check.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
+
+namespace fs = std::filesystem;
 
 namespace {
 
+constexpr int kAll = std::numeric_limits<int>::max();
+
 struct Arguments {
-  std::string sequence, config, poses, timing, states;
-  std::vector<std::string> settings;
-  int frames = 0;
-  int threads = 1;
+  std::vector<std::string> inputs, before, settings;
+  std::string config, format, poses, timing, states, output, odometry, keyframes, truth;
+  sdvo::StereoNames names;
+  int frames = kAll, threads = 1;
+  bool places = false, shuttle = false, halves = false;
 };
 
-int runSequence(const Arguments& arguments) {
-  sdvo::PipelineOptions options = sdvo::readPipelineOptions(arguments.config, arguments.settings);
-  const sdvo::KittiSequence sequence(arguments.sequence);
-  const int count = arguments.frames > 0 ? std::min(arguments.frames, sequence.size()) : sequence.size();
-  cv::setNumThreads(arguments.threads);
-  sdvo::OfflineRun run(options);
-  {
-    sdvo::Progress progress("odometry", count);
-    for (int i = 0; i < count; ++i, progress.step()) {
-      const sdvo::ImagePair pair = sequence.load(i);
-      if (arguments.threads > 1)
-        run.processBeside(sequence.camera(), pair.left, pair.right, sequence.stamp(i));
-      else
-        run.process(sequence.camera(), pair.left, pair.right, sequence.stamp(i));
-    }
-    run.finish();
-  }
-  sdvo::writeKittiPoses(arguments.poses, run.poses());
-  if (!arguments.timing.empty()) run.writeTiming(arguments.timing);
-  if (!arguments.states.empty()) run.writeStates(arguments.states);
+/// The odometry on a recording, and on two halves of its features.
+struct Drive {
+  sdvo::OfflineRun whole, first, second;
+  int left_out = 0;  ///< stamps without a usable pair
 
-  std::cout << std::fixed << std::setprecision(1) << "options " << sdvo::hashOptions(sdvo::listOptions(options)) << "\n"
-            << count << " pairs, " << run.pairsWithoutPose() << " without a pose, " << run.distance()
+  explicit Drive(const sdvo::PipelineOptions& options) : whole(options), first(options), second(options) {}
+};
+
+void follow(sdvo::Recording& recording, const Arguments& arguments, Drive& drive, sdvo::PlaceRun* places) {
+  sdvo::FeatureHalves halves;
+  std::optional<sdvo::Progress> progress;
+  const int count = std::min(arguments.frames, recording.size());
+  if (arguments.output.empty()) progress.emplace(places ? "places" : "odometry", count);
+  drive.left_out = recording.forEach(arguments.frames, [&](const sdvo::RecordedPair& pair) {
+    if (arguments.threads > 1 && !places && !arguments.halves) {
+      drive.whole.processBeside(pair.camera, pair.left, pair.right, pair.stamp);
+    } else {
+      const sdvo::StereoFeatures features = drive.whole.process(pair.camera, pair.left, pair.right, pair.stamp);
+      if (places) places->process(features, drive.whole.last());
+      if (arguments.halves) {
+        const auto rows = halves.split(features, drive.whole.last().flow);
+        drive.first.processFeatures(features.select(rows[0]));
+        drive.second.processFeatures(features.select(rows[1]));
+      }
+    }
+    if (progress) progress->step();
+  });
+  drive.whole.finish();
+}
+
+std::vector<sdvo::SelfCheck> checkItself(const sdvo::Recording& recording, const Drive& drive,
+                                         const sdvo::PipelineOptions& options, const Arguments& arguments) {
+  std::vector<sdvo::SelfCheck> checks;
+  if (arguments.shuttle) {
+    sdvo::OfflineRun back(options);
+    recording.forEachBackwards(
+        [&](const sdvo::RecordedPair& pair) { back.process(pair.camera, pair.left, pair.right, pair.stamp); });
+    checks.push_back(checkShuttle(drive.whole, back));
+  }
+  if (arguments.halves) checks.push_back(checkHalves(drive.whole, drive.first, drive.second));
+  return checks;
+}
+
+void writePoses(const std::string& path, const std::string& format, const sdvo::OfflineRun& run) {
+  format == "tum" ? sdvo::writeTumPoses(path, run.stampedPoses()) : sdvo::writeKittiPoses(path, run.poses());
+}
+
+void printSummary(const sdvo::OfflineRun& run, sdvo::PipelineOptions options) {
+  std::cout << "options " << sdvo::hashOptions(sdvo::listOptions(options)) << "\n"
+            << run.pairs() << " pairs, " << run.pairsWithoutPose() << " without a pose, " << run.distance()
             << " m travelled\n"
             << "time per pair: median " << run.time(0.5) << " ms, p95 " << run.time(0.95) << " ms, CPU "
             << run.cpuTime() << " ms (decoding excluded)\n";
+}
+
+/// `way`: m, of all recordings.
+void printSummary(const sdvo::OfflineRun& run, const sdvo::PlaceRun& places, double way) {
+  const sdvo::PlaceRecognition& recognition = places.recognition();
+  const auto kept = static_cast<double>(std::max<std::size_t>(recognition.places().size(), 1));
+  const double bytes = static_cast<double>(recognition.bytes()) / kept;
+  std::cout << run.pairs() << " pairs, " << run.distance() << " m, " << recognition.places().size() << " key frames of "
+            << bytes / 1e3 << " kB, " << way / kept * 1e6 / bytes << " km per GB, " << recognition.graph().loops()
+            << " loops, turns measured too small by " << std::setprecision(2) << 100.0 * recognition.graph().turnError()
+            << " %\n"
+            << "time per key frame: median " << places.keyframeTime(0.5) << " ms, p95 " << places.keyframeTime(0.95)
+            << " ms; longest optimisation " << places.longestOptimisation() << " ms; CPU per pair, all included, "
+            << places.cpuTime() << " ms\n";
+}
+
+void printErrors(const sdvo::PlaceErrors& errors) {
+  std::cout << std::setprecision(3) << "revisits " << errors.revisits << ", recognised " << errors.recognised
+            << "; loops " << errors.loops << ", false " << errors.false_loops << ", worst " << errors.worst_translation
+            << " m " << errors.worst_rotation << " deg\n"
+            << "ATE before " << errors.ate_before << " m, after " << errors.ate_after << " m\n";
+}
+
+int runOne(const Arguments& arguments) {
+  if (arguments.inputs.size() > 1) throw std::runtime_error("several recordings need --output (see --help)");
+  const sdvo::PipelineOptions options = sdvo::readPipelineOptions(arguments.config, arguments.settings);
+  std::optional<sdvo::PlaceRun> places;
+  if (arguments.places) places.emplace(options.place_recognition);
+  double way = 0.0;  // m, of all recordings
+  for (const std::string& before : arguments.before) {
+    Arguments whole = arguments;
+    whole.frames = kAll;
+    Drive drive(options);
+    follow(*sdvo::openRecording(before, arguments.names), whole, drive, &*places);
+    way += drive.whole.distance();
+    places->startSequence();
+  }
+  const auto recording = sdvo::openRecording(arguments.inputs.front(), arguments.names);
+  Drive drive(options);
+  follow(*recording, arguments, drive, places ? &*places : nullptr);
+  const sdvo::OfflineRun& run = drive.whole;
+  if (places)
+    sdvo::writeKittiPoses(arguments.poses, places->poses());
+  else
+    writePoses(arguments.poses, arguments.format, run);
+  if (!arguments.odometry.empty()) writePoses(arguments.odometry, arguments.format, run);
+  if (!arguments.timing.empty()) run.writeTiming(arguments.timing);
+  if (!arguments.states.empty()) run.writeStates(arguments.states);
+  if (!arguments.keyframes.empty()) places->writeKeyframes(arguments.keyframes);
+
+  std::cout << std::fixed << std::setprecision(1);
+  places ? printSummary(run, *places, way + run.distance()) : printSummary(run, options);
+  if (!arguments.truth.empty()) printErrors(places->errors(sdvo::readKittiPoses(arguments.truth)));
+  if (drive.left_out > 0) std::cout << drive.left_out << " stamps without a usable pair\n";
+  for (const sdvo::SelfCheck& check : checkItself(*recording, drive, options, arguments))
+    std::cout << check.text() << "\n";
   return 0;
+}
+
+/// What --output has a line of for each recording.
+const char kColumns[] =
+    "bag,pairs,without_pose,discontinuities,left_out,distance_m,median_ms,p95_ms,cpu_ms,options,problem\n";
+
+/// Writes the results of a recording to files that begin with `output`. Returns the figures of its line.
+std::string runOneOfMany(const fs::path& input, const std::string& output, sdvo::PipelineOptions options,
+                         const Arguments& arguments) {
+  const std::string self_check = output + ".self_check.csv";
+  fs::remove(self_check);
+  const auto recording = sdvo::openRecording(input.string(), arguments.names);
+  Drive drive(options);
+  follow(*recording, arguments, drive, nullptr);
+  const sdvo::OfflineRun& run = drive.whole;
+  writePoses(output + ".txt", arguments.format.empty() ? "tum" : arguments.format, run);
+  run.writeTiming(output + ".csv");
+  if (const auto checks = checkItself(*recording, drive, options, arguments); !checks.empty()) {
+    std::ofstream file(self_check);
+    file << sdvo::SelfCheck::columns() << "\n";
+    for (const sdvo::SelfCheck& check : checks) {
+      file << check.row() << "\n";
+      std::cout << fs::path(output).filename().string() << ": " << check.text() << std::endl;
+    }
+    sdvo::finishTextFile(file, self_check);
+  }
+  std::ostringstream figures;
+  figures << std::fixed << std::setprecision(1) << run.pairs() << "," << run.pairsWithoutPose() << ","
+          << run.discontinuities() << "," << drive.left_out << "," << run.distance() << "," << run.time(0.5) << ","
+          << run.time(0.95) << "," << run.cpuTime() << "," << sdvo::hashOptions(sdvo::listOptions(options)) << ",";
+  return figures.str();
+}
+
+/// The recordings by name: that of a bag without ".bag", that of a folder.
+std::map<std::string, fs::path> findRecordings(const std::vector<std::string>& inputs) {
+  std::map<std::string, fs::path> recordings;
+  const auto add = [&](const std::string& name, const fs::path& path) {
+    if (!recordings.emplace(name, path).second)
+      throw std::runtime_error("two recordings are called " + name + ", and so would be their results");
+  };
+  for (const std::string& input : inputs) {
+    if (!fs::exists(input)) throw std::runtime_error("there is no '" + input + "'");
+    if (!fs::is_directory(input)) {
+      add(fs::path(input).stem().string(), input);
+    } else if (sdvo::isRecording(input)) {
+      fs::path folder = fs::absolute(input).lexically_normal();
+      while (folder.filename().empty() || folder.filename() == "mav0") folder = folder.parent_path();
+      add(folder.filename().string(), input);
+    } else {
+      for (const fs::directory_entry& entry : fs::directory_iterator(input))
+        if (entry.path().extension() == ".bag") add(entry.path().stem().string(), entry.path());
+    }
+  }
+  if (recordings.empty()) throw std::runtime_error("there is no bag in '" + inputs.front() + "'");
+  return recordings;
+}
+
+int runMany(const Arguments& arguments) {
+  const sdvo::PipelineOptions options = sdvo::readPipelineOptions(arguments.config, arguments.settings);
+  const auto recordings = findRecordings(arguments.inputs);
+  fs::create_directories(arguments.output);
+  std::string report = kColumns;
+  int failed = 0;
+  for (const auto& [name, input] : recordings) {
+    std::string figures = ",,,,,,,,,", problem;
+    try {
+      figures = runOneOfMany(input, (fs::path(arguments.output) / name).string(), options, arguments);
+    } catch (const std::exception& e) {
+      ++failed;
+      problem = e.what();
+      std::replace(problem.begin(), problem.end(), '\n', ' ');
+    }
+    report += name + "," + figures + problem + "\n";  // which stands last, for it may hold commas
+    std::cerr << name << ": " << (problem.empty() ? "done" : "failed") << std::endl;
+  }
+  std::ofstream file(fs::path(arguments.output) / "report.csv");
+  file << report;
+  sdvo::finishTextFile(file, arguments.output + "/report.csv");
+  std::cout << report;
+  if (failed > 0)
+    throw std::runtime_error(std::to_string(failed) + " of " + std::to_string(recordings.size()) +
+                             " recordings failed, see the report");
+  return 0;
+}
+
+int run(const Arguments& arguments) {
+  const bool is_of_places = !(arguments.before.empty() && arguments.odometry.empty() && arguments.keyframes.empty() &&
+                              arguments.truth.empty());
+  if (is_of_places && !arguments.places)
+    throw std::runtime_error("--before, --odometry, --keyframes and --ground-truth need --places");
+  cv::setNumThreads(arguments.threads);
+  if (arguments.poses.empty() == arguments.output.empty() || (arguments.places && arguments.poses.empty()))
+    throw std::runtime_error(arguments.places ? "--places needs --poses, not --output"
+                                              : "either --poses or --output is needed (see --help)");
+  return arguments.output.empty() ? runOne(arguments) : runMany(arguments);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Stereo odometry of a sequence in KITTI layout; writes poses of the left camera in KITTI format");
+  CLI::App app(
+      "Stereo odometry of recorded drives, every pair: bags of rectified images, folders in KITTI's layout, EuRoC "
+      "folders (rectified here). Of one drive it writes the files that are asked for; with --output, of each drive "
+      "NAME: "
+      "NAME.txt (poses of the left camera), NAME.csv (a line for each pair), and report.csv with a line for each "
+      "drive");
   Arguments arguments;
-  app.add_option("sequence", arguments.sequence, "directory with image_0, image_1, calib.txt, times.txt")->required();
+  arguments.places = fs::path(argv[0]).filename() == "run_places";
+  app.add_option("recordings", arguments.inputs,
+                 "bag, folder with image_0, image_1, calib.txt, times.txt, folder with mav0; or folders of bags")
+      ->required();
   app.add_option("--config", arguments.config, "YAML file as the nodelets load it");
   app.add_option("--param", arguments.settings,
                  "option as name=value, for example detector/max_features=800; repeatable")
@@ -67,9 +269,33 @@ int main(int argc, char** argv) {
                  "threads of OpenCV; more than one: odometry of a pair beside the features of the next")
       ->capture_default_str()
       ->check(CLI::Range(1, 256));
-  app.add_option("--poses", arguments.poses, "poses to write, 12 numbers a line")->required();
-  app.add_option("--timing", arguments.timing, "CSV to write, a line for each pair: times, counts, state and its reason");
+  arguments.names.addTo(app);
+
+  app.add_option("--poses", arguments.poses, "poses to write, 12 numbers a line");
+  app.add_option(
+         "--format", arguments.format,
+         "of the poses: tum (those there are, with stamps; default of --output) or kitti (12 numbers a line for "
+         "each pair; default of --poses)")
+      ->check(CLI::IsMember({"tum", "kitti"}));
+  app.add_option("--timing", arguments.timing,
+                 "CSV to write, a line for each pair: times, counts, state and its reason");
   app.add_option("--states", arguments.states,
                  "CSV to write, a line for each pair: state, covariances of motion and pose, reason");
-  return sdvo::runTool(app, argc, argv, [&] { return runSequence(arguments); });
+  app.add_option("--output", arguments.output, "folder of the results, made where it is missing")
+      ->excludes(app.get_option("--timing"))
+      ->excludes(app.get_option("--states"));
+  app.add_flag("--shuttle", arguments.shuttle,
+               "runs each drive backwards, too: says how far from its start it ends (NAME.self_check.csv)");
+  app.add_flag("--halves", arguments.halves,
+               "runs on two halves of the features, too: says how far they differ (NAME.self_check.csv)");
+
+  app.add_flag("--places", arguments.places,
+               "recognises places, too: --poses are those in the map; run_places is run_sequence --places");
+  app.add_option("--before", arguments.before, "places: recordings of other places driven before; repeatable")
+      ->allow_extra_args(false);
+  app.add_option("--odometry", arguments.odometry, "places: poses of the odometry to write, 12 numbers a line");
+  app.add_option("--keyframes", arguments.keyframes, "places: CSV to write, a line for each key frame");
+  app.add_option("--ground-truth", arguments.truth,
+                 "places: true poses; prints how many revisits were found and what is false");
+  return sdvo::runTool(app, argc, argv, [&] { return run(arguments); });
 }

@@ -7,7 +7,7 @@
 #include "../synthetic_scene.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_emitter_check {
 
 const cv::Size kSize(424, 240);
 
@@ -45,5 +45,5 @@ TEST(EmitterCheck, ACameraThatStandsProvesNothing) {
   EXPECT_EQ(judged(0.0, 6000).verdict, Verdict::kOpen);
 }
 
-}  // namespace
+}  // namespace test_emitter_check
 }  // namespace sdvo

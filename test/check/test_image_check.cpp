@@ -7,7 +7,7 @@
 #include "../../src/check/image_check.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_image_check {
 
 const cv::Size kSize(212, 120);
 
@@ -123,5 +123,5 @@ TEST(ImageCheck, TheFrameRateIsTooLowWhereThePairsHaveTooLittleInCommon) {
   expectSaid(unrelated.frameRate({4.0}), Verdict::kFail, "a higher frame rate");
 }
 
-}  // namespace
+}  // namespace test_image_check
 }  // namespace sdvo

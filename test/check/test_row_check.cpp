@@ -6,7 +6,7 @@
 #include "../synthetic_scene.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_row_check {
 
 const cv::Size kSize(320, 240);
 constexpr double kDisparity = 12.0, kPeriod = 0.1;  // px, s
@@ -98,5 +98,5 @@ TEST(RowCheck, JudgesNothingWithoutTexture) {
   EXPECT_TRUE(std::isnan(check.map().at<double>(0)));
 }
 
-}  // namespace
+}  // namespace test_row_check
 }  // namespace sdvo

@@ -5,7 +5,7 @@
 #include "../../src/check/stamp_check.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_stamp_check {
 
 constexpr std::int64_t kPeriod = 50000000;  // ns, 20 Hz
 constexpr std::int64_t kBegin = 1700000000000000000;
@@ -75,5 +75,5 @@ TEST(StampCheck, JudgesNoStampsWithoutPairs) {
   EXPECT_EQ(recording(1).stamps().verdict, Verdict::kOpen);
 }
 
-}  // namespace
+}  // namespace test_stamp_check
 }  // namespace sdvo

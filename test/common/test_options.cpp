@@ -10,7 +10,7 @@
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_options {
 
 using synthetic::errorOf;
 
@@ -260,5 +260,5 @@ TEST(Options, HashTellsOptionsApart) {
   expectNew([](Outer& o) { o.height = std::nextafter(3.0, 4.0); });
 }
 
-}  // namespace
+}  // namespace test_options
 }  // namespace sdvo

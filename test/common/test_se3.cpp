@@ -5,7 +5,7 @@
 #include "stereo_descriptor_vo/common/se3.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_se3 {
 
 Vector6d vector6(double x, double y, double z, double rx, double ry, double rz) {
   Vector6d xi;
@@ -85,5 +85,5 @@ TEST(Se3, OrthonormalisedRestoresARotation) {
   EXPECT_EQ(repaired.translation(), clean.translation());
 }
 
-}  // namespace
+}  // namespace test_se3
 }  // namespace sdvo

@@ -6,7 +6,7 @@
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_stereo_camera {
 
 using synthetic::errorOf;
 
@@ -85,5 +85,5 @@ TEST(StereoCamera, EqualityLooksAtEveryField) {
   }
 }
 
-}  // namespace
+}  // namespace test_stereo_camera
 }  // namespace sdvo

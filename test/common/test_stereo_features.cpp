@@ -6,7 +6,7 @@
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_stereo_features {
 
 using synthetic::errorOf;
 
@@ -153,5 +153,5 @@ TEST(StereoFeatures, RefusesACameraThatIsNone) {
   EXPECT_NE(errorOf([&] { features.check(); }).find("baseline"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace test_stereo_features
 }  // namespace sdvo

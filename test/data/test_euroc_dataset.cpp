@@ -15,7 +15,7 @@
 #include "stereo_descriptor_vo/data/euroc_dataset.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_euroc_dataset {
 
 namespace fs = std::filesystem;
 
@@ -136,5 +136,5 @@ TEST_F(EurocDataset, WhatDoesNotHoldTogetherIsNamed) {
   EXPECT_NE(errorOf(open).find("cam1' is missing"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace test_euroc_dataset
 }  // namespace sdvo

@@ -12,7 +12,7 @@
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_kitti_dataset {
 
 namespace fs = std::filesystem;
 
@@ -266,5 +266,5 @@ TEST(KittiRealData, Sequence04) {
   EXPECT_TRUE(findKittiPoses(directory));
 }
 
-}  // namespace
+}  // namespace test_kitti_dataset
 }  // namespace sdvo

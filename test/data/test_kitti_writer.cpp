@@ -10,7 +10,7 @@
 #include "stereo_descriptor_vo/data/kitti_writer.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_kitti_writer {
 
 namespace fs = std::filesystem;
 
@@ -95,5 +95,5 @@ TEST_F(KittiWriterTest, RefusesPosesOfAnotherNumberAndImagesThatCannotBeWritten)
   EXPECT_THROW(writer.writeImage(2, 0, image(0, 0)), std::runtime_error);  // there is no image_2
 }
 
-}  // namespace
+}  // namespace test_kitti_writer
 }  // namespace sdvo

@@ -12,7 +12,7 @@
 #include "stereo_descriptor_vo/data/trajectory.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_trajectory {
 
 namespace fs = std::filesystem;
 
@@ -310,5 +310,5 @@ TEST(KittiGroundTruth, HasTheKnownLength) {
   EXPECT_NEAR(errors.sub_paths.rotation_deg_per_m, 0.0, 1e-9);
 }
 
-}  // namespace
+}  // namespace test_trajectory
 }  // namespace sdvo

@@ -8,7 +8,7 @@
 #include "stereo_descriptor_vo/front_end/base_descriptor.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_base_descriptor {
 
 /// The descriptors that the OpenCV at hand has.
 std::vector<std::string> availableDescriptors() {
@@ -136,7 +136,7 @@ INSTANTIATE_TEST_SUITE_P(Available, EveryDescriptor, testing::ValuesIn(available
 
 TEST(BaseDescriptor, WhatOpenCvLacksIsOneClearError) {
   const std::vector<std::string> available = availableDescriptors();
-  for (const char* always : {"freak", "brief", "orb", "brisk", "akaze"})
+  for (const char* always : {"freak", "brief", "orb", "brisk"})
     EXPECT_EQ(std::count(available.begin(), available.end(), always), 1) << always;
   for (const std::string& name : namesOf(DescriptorType{})) {
     if (std::count(available.begin(), available.end(), name)) continue;
@@ -199,49 +199,5 @@ TEST(SiftDescriptor, IsMostAlikeAtTheSizeOfTheDistance) {
 }
 #endif
 
-/// The same for AKAZE, whose key points know the evolution level they were found in.
-TEST(AkazeDescriptor, SamplesTheLevelOfTheSize) {
-  const synthetic::Texture texture(11, 6.0, 120.0);
-  const cv::Mat image = synthetic::render({640, 480}, [&](double u, double v) { return texture.at(u, v); });
-  const cv::Ptr<cv::AKAZE> akaze = cv::AKAZE::create(cv::AKAZE::DESCRIPTOR_MLDB_UPRIGHT, 0, 3, 0.001f, 4, 4);
-  std::vector<cv::KeyPoint> detected, kept;
-  akaze->detect(image, detected);
-  std::vector<ViewKeypoint> keypoints;
-  int levels[16] = {};
-  for (const cv::KeyPoint& k : detected) {
-    const float margin = 8.f * k.size;
-    if (k.pt.x < margin || k.pt.y < margin || k.pt.x > 639.f - margin || k.pt.y > 479.f - margin) continue;
-    kept.push_back(k);
-    kept.back().angle = 0.f;
-    keypoints.push_back({k.pt.x, k.pt.y, k.size, -1.f});
-    ++levels[k.class_id];
-  }
-  ASSERT_GT(keypoints.size(), 50u);
-  EXPECT_GT(std::count_if(std::begin(levels), std::end(levels), [](int count) { return count > 3; }), 2);
-  cv::Mat expected;
-  akaze->compute(image, kept, expected);
-  const ViewDescriptors described = makeBaseDescriptor(DescriptorType::kAkaze)->describe(image, keypoints);
-  ASSERT_EQ(expected.rows, described.rows.rows);
-  for (int i = 0; i < expected.rows; ++i) {
-    ASSERT_TRUE(described.valid[static_cast<std::size_t>(i)]);
-    EXPECT_TRUE(synthetic::equalMats(described.rows.row(i), expected.row(i))) << kept[static_cast<std::size_t>(i)].size;
-  }
-}
-
-/// OpenCV makes fewer levels of a small image than of a large one, and refuses a key point of one that is not there.
-TEST(AkazeDescriptor, SizesBeyondTheLevelsOfASmallImageAreDescribedOnTheLast) {
-  const synthetic::Texture texture(11, 6.0, 120.0);
-  for (const cv::Size size : {cv::Size(300, 300), cv::Size(170, 330), cv::Size(640, 330), cv::Size(161, 161)}) {
-    const cv::Mat image = synthetic::render(size, [&](double u, double v) { return texture.at(u, v); });
-    const auto akaze = makeBaseDescriptor(DescriptorType::kAkaze);
-    for (const float diameter : {6.f, 10.f, 14.f, 18.f, 20.f}) {
-      if (7.5f * diameter > 0.5f * static_cast<float>(std::min(size.width, size.height)) - 2.f) continue;
-      const ViewKeypoint middle{0.5f * static_cast<float>(size.width), 0.5f * static_cast<float>(size.height), diameter,
-                                -1.f};
-      EXPECT_TRUE(akaze->describe(image, {middle}).valid[0]) << size << ", " << diameter;
-    }
-  }
-}
-
-}  // namespace
+}  // namespace test_base_descriptor
 }  // namespace sdvo

@@ -8,7 +8,7 @@
 #include "stereo_descriptor_vo/front_end/block_differences.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_block_differences {
 
 cv::Mat noise(unsigned seed, bool extreme) {
   cv::Mat image(40, 131, CV_8U);
@@ -44,5 +44,5 @@ TEST(BlockDifferences, AreSumsOverWholeBlocks) {
   allowVectorKernels(true);
 }
 
-}  // namespace
+}  // namespace test_block_differences
 }  // namespace sdvo

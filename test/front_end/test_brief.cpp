@@ -8,7 +8,7 @@
 #include "stereo_descriptor_vo/front_end/brief.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_brief {
 
 using Row = std::array<std::uint8_t, Brief::kBytes>;
 
@@ -117,5 +117,5 @@ TEST(Brief, SeesItsReachAndNothingBeyond) {
   EXPECT_NE(describe(image, 150.0, 150.0, size), describe(centre, 150.0, 150.0, size));
 }
 
-}  // namespace
+}  // namespace test_brief
 }  // namespace sdvo

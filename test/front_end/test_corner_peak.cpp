@@ -11,7 +11,7 @@
 #include "stereo_descriptor_vo/front_end/corner_peak.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_corner_peak {
 
 /// Blurred noise.
 cv::Mat texture(cv::Size size, int seed) {
@@ -129,5 +129,5 @@ TEST(CornerPeak, IsThePixelItselfWhereCirclesLeaveTheImage) {
   EXPECT_GT(moved, 1000);
 }
 
-}  // namespace
+}  // namespace test_corner_peak
 }  // namespace sdvo

@@ -5,7 +5,7 @@
 #include "stereo_descriptor_vo/front_end/depth_scale.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_depth_scale {
 
 DepthScaleOptions plainCurve() {
   DepthScaleOptions options;
@@ -95,5 +95,5 @@ TEST(DepthScale, FreakFollowsDisparitiesOfThreeOctaves) {
   EXPECT_EQ(freak.size(50.0), 32.0);
 }
 
-}  // namespace
+}  // namespace test_depth_scale
 }  // namespace sdvo

@@ -8,7 +8,7 @@
 #include "stereo_descriptor_vo/front_end/epipolar_matcher.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_epipolar_matcher {
 
 const cv::Size kSize(320, 160);
 constexpr double kMaxDv = 2.5;  // px
@@ -283,5 +283,5 @@ TEST(EpipolarMatcher, FindsTheSameToTheBitWithAndWithoutVectors) {
   EXPECT_GT(compared, 500);
 }
 
-}  // namespace
+}  // namespace test_epipolar_matcher
 }  // namespace sdvo

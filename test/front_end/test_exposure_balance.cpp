@@ -5,7 +5,7 @@
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_exposure_balance {
 
 struct Pair {
   cv::Mat left, right;
@@ -100,5 +100,5 @@ TEST(ExposureBalance, RefusesOptionsOutOfRange) {
   EXPECT_THROW(ExposureBalance{options}, std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_exposure_balance
 }  // namespace sdvo

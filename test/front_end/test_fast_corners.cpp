@@ -7,7 +7,7 @@
 #include "stereo_descriptor_vo/front_end/fast_corners.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_fast_corners {
 
 void expectCornersOfOpenCv(const cv::Mat& image, int threshold) {
   std::vector<cv::KeyPoint> expected;
@@ -56,5 +56,5 @@ TEST(FastCorners, AreTheSameWithoutVectors) {
   allowVectorKernels(true);
 }
 
-}  // namespace
+}  // namespace test_fast_corners
 }  // namespace sdvo

@@ -7,7 +7,7 @@
 #include "stereo_descriptor_vo/front_end/freak.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_feature_extractor {
 
 using synthetic::errorOf;
 
@@ -279,5 +279,5 @@ TEST(FeatureExtractor, LeavesItsImagesAlone) {
   EXPECT_TRUE(synthetic::equalMats(pair.right, right));
 }
 
-}  // namespace
+}  // namespace test_feature_extractor
 }  // namespace sdvo

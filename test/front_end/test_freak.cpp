@@ -8,7 +8,7 @@
 #include "stereo_descriptor_vo/front_end/freak.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_freak {
 
 cv::Mat row(const Freak& freak, const FreakKeypoint& keypoint) {
   cv::Mat bits(1, Freak::kBytes, CV_8U);
@@ -339,5 +339,5 @@ TEST(Freak, RowsOfManyKeypointsAreThoseOfEach) {
   allowVectorKernels(true);
 }
 
-}  // namespace
+}  // namespace test_freak
 }  // namespace sdvo

@@ -2,13 +2,13 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/front_end/half_image.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_half_image {
 
-/// OpenCV fuses products and sums on ARM, we never: there a mean near the middle of two grey levels may become the other one.
+/// OpenCV fuses products and sums on ARM, we never: there a mean near the middle of two grey levels may become the
+/// other one.
 #ifdef __aarch64__
 constexpr double kRounding = 1.0;  // grey levels
 #else
@@ -29,12 +29,5 @@ TEST(HalfImage, IsThatOfOpenCv) {
     for (const int height : {16, 19, 77, 370, 375, 376}) expectHalfOfOpenCv({width, height});
 }
 
-TEST(HalfImage, IsTheSameWithoutVectors) {
-  allowVectorKernels(false);
-  expectHalfOfOpenCv({1241, 376});
-  expectHalfOfOpenCv({127, 75});
-  allowVectorKernels(true);
-}
-
-}  // namespace
+}  // namespace test_half_image
 }  // namespace sdvo

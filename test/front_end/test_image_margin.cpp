@@ -5,7 +5,7 @@
 #include "stereo_descriptor_vo/front_end/image_margin.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_image_margin {
 
 TEST(ImageMargin, IsTheReplicatedBorderOfOpenCv) {
   cv::Mat whole(40, 60, CV_8U);
@@ -22,5 +22,5 @@ TEST(ImageMargin, IsTheReplicatedBorderOfOpenCv) {
     }
 }
 
-}  // namespace
+}  // namespace test_image_margin
 }  // namespace sdvo

@@ -7,7 +7,7 @@
 #include "stereo_descriptor_vo/front_end/patch_cutter.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_patch_cutter {
 
 constexpr PatchLayout kLayout{5, 1.f, 0.1f};
 
@@ -93,5 +93,5 @@ TEST(PatchCutter, AcrossTheBorderSquaresInsideAreWhole) {
   }
 }
 
-}  // namespace
+}  // namespace test_patch_cutter
 }  // namespace sdvo

@@ -4,11 +4,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/front_end/patch_sampling.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_patch_sampling {
 
 constexpr int kMargin = 5, kWidth = 30, kHeight = 20;
 
@@ -66,24 +65,6 @@ TEST(SamplePatch, SlantShiftsRowsFromTheCentre) {
   expectSampled(12.3f, 9.6f, -0.7f, 3, 8);
 }
 
-TEST(SamplePatch, IsTheSameToTheBitWithAndWithoutVectors) {
-  if (!usesVectorKernels()) GTEST_SKIP() << "this processor has neither AVX2 nor NEON";
-  cv::Mat image(120, 150, CV_8U);
-  cv::RNG(5).fill(image, cv::RNG::UNIFORM, 0, 256);
-  cv::RNG random(7);
-  constexpr int kBorder = 50;
-  for (int trial = 0; trial < 500; ++trial) {
-    const float x = random.uniform(0.f, 49.f), y = random.uniform(0.f, 19.f), slant = random.uniform(-0.8f, 0.8f);
-    const int radius = 1 + trial % 20, columns = 2 * radius + 1 + trial % 7;
-    std::vector<float> fast(static_cast<std::size_t>((2 * radius + 1) * columns)), plain = fast;
-    samplePatch(image, kBorder, x, y, slant, radius, columns, fast.data());
-    allowVectorKernels(false);
-    samplePatch(image, kBorder, x, y, slant, radius, columns, plain.data());
-    allowVectorKernels(true);
-    ASSERT_EQ(fast, plain) << "radius " << radius << ", " << columns << " columns";
-  }
-}
-
 TEST(PatchStride, IsTheSideRoundedUpToWholeRegisters) {
   for (int radius = 1; radius <= 20; ++radius) {
     EXPECT_GE(patchStride(radius), 2 * radius + 1);
@@ -92,5 +73,5 @@ TEST(PatchStride, IsTheSideRoundedUpToWholeRegisters) {
   }
 }
 
-}  // namespace
+}  // namespace test_patch_sampling
 }  // namespace sdvo

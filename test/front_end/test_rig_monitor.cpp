@@ -6,7 +6,7 @@
 #include "stereo_descriptor_vo/front_end/rig_monitor.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_rig_monitor {
 
 const cv::Size kSize(640, 400);
 constexpr double kDisparity = 17.0;  // px
@@ -114,5 +114,5 @@ TEST(RigMonitor, SaysNothingWhereNothingIsFound) {
   EXPECT_EQ(RigMonitor({}, 1.5, 192.0).diagnose(leftImage(), rightImage(4.0), {}), "");
 }
 
-}  // namespace
+}  // namespace test_rig_monitor
 }  // namespace sdvo

@@ -8,7 +8,7 @@
 #include "stereo_descriptor_vo/front_end/slanted_patch.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_slanted_patch {
 
 constexpr int kMargin = 40;
 
@@ -98,5 +98,5 @@ TEST(SlantedPatch, IsTheSameToTheBitWithAndWithoutVectors) {
   }
 }
 
-}  // namespace
+}  // namespace test_slanted_patch
 }  // namespace sdvo

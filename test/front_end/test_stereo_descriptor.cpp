@@ -7,7 +7,7 @@
 #include "stereo_descriptor_vo/front_end/stereo_descriptor.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_stereo_descriptor {
 
 const cv::Size kSize(320, 200);
 
@@ -162,5 +162,5 @@ TEST(StereoDescriptor, OptionsKnowWhatTheOpenCvAtHandLacks) {
   }
 }
 
-}  // namespace
+}  // namespace test_stereo_descriptor
 }  // namespace sdvo

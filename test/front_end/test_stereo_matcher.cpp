@@ -4,7 +4,7 @@
 #include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_stereo_matcher {
 
 const cv::Size kSize(640, 400);  // four pyramid levels still hold a window
 
@@ -161,5 +161,5 @@ TEST(StereoMatcher, RefusesOptionsOutOfRange) {
   EXPECT_THROW(StereoMatcher{options}, std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_stereo_matcher
 }  // namespace sdvo

@@ -2,7 +2,6 @@
 // std::invalid_argument, or it can be compared with the places known here, and what comes out is finite.
 #include <stdexcept>
 
-#include "../../src/ros/map_conversions.hpp"
 #include "../../src/ros/place_conversions.hpp"
 #include "../../src/ros/pose_conversions.hpp"
 #include "fuzz_message.hpp"

@@ -7,7 +7,7 @@
 #include "stereo_descriptor_vo/odometry/calibration_filter.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_calibration_filter {
 
 using Matrix = RigCalibration::Matrix;
 using Vector = RigCalibration::Vector;
@@ -157,5 +157,5 @@ TEST(CalibrationFilter, WhatIsLeftAtAPointMayChange) {
   EXPECT_NEAR(*filter.prior(1).common_sigma, std::sqrt(1.4 * 0.09), 1e-3);
 }
 
-}  // namespace
+}  // namespace test_calibration_filter
 }  // namespace sdvo

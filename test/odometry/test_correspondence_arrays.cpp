@@ -9,7 +9,7 @@
 #include "stereo_descriptor_vo/odometry/pose_problem.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_correspondence_arrays {
 
 Eigen::Isometry3d someMotion() {
   Vector6d xi;
@@ -96,5 +96,5 @@ TEST(CorrespondenceArrays, GiveTheSameToTheBitWithAndWithoutVectors) {
   EXPECT_EQ(fast.gradient, plain.gradient);
 }
 
-}  // namespace
+}  // namespace test_correspondence_arrays
 }  // namespace sdvo

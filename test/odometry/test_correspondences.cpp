@@ -4,7 +4,7 @@
 #include "stereo_descriptor_vo/odometry/correspondences.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_correspondences {
 
 StereoFeatures twoFeatures() {
   StereoFeatures features = synthetic::noFeatures(synthetic::camera(), 0);
@@ -35,5 +35,5 @@ TEST(Correspondences, AreInTheOrderOfTheMatches) {
   EXPECT_EQ(correspondences[1].measurement, measurementOf(features, 1, {}));
 }
 
-}  // namespace
+}  // namespace test_correspondences
 }  // namespace sdvo

@@ -7,7 +7,7 @@
 #include "stereo_descriptor_vo/odometry/feature_matcher.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_feature_matcher {
 
 using synthetic::addFeature;
 using synthetic::noFeatures;
@@ -268,5 +268,5 @@ TEST(FeatureMatcher, TakesEmptySets) {
   EXPECT_TRUE(matcher.match(none, none, Eigen::Isometry3d::Identity()).empty());
 }
 
-}  // namespace
+}  // namespace test_feature_matcher
 }  // namespace sdvo

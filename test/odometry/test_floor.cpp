@@ -6,7 +6,7 @@
 #include "stereo_descriptor_vo/odometry/floor.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_floor {
 
 /// Looks ahead and down a little, from half a metre above the base.
 Eigen::Isometry3d mount() {
@@ -92,5 +92,5 @@ TEST(Floor, TheCovarianceIsNoLargerThanTheFloorAllows) {
   EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(of_camera).eigenvalues().minCoeff(), 0.0);
 }
 
-}  // namespace
+}  // namespace test_floor
 }  // namespace sdvo

@@ -4,7 +4,7 @@
 #include "stereo_descriptor_vo/odometry/genetic_consensus.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_genetic_consensus {
 
 /// Correspondences of which a share is measured at random places.
 struct Scene {
@@ -119,5 +119,5 @@ TEST(GeneticSearch, RatesAreFixedInGasacAlone) {
   EXPECT_TRUE(equal(search(scene, {}, true, 300, 1), search(scene, restless, true, 300, 1)));
 }
 
-}  // namespace
+}  // namespace test_genetic_consensus
 }  // namespace sdvo

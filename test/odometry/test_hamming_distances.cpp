@@ -8,7 +8,7 @@
 #include "stereo_descriptor_vo/odometry/hamming_distances.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_hamming_distances {
 
 TEST(HammingDistances, CountTheBitsThatDiffer) {
   const std::vector<int> candidates = {7, 0, 3, 3};
@@ -31,5 +31,5 @@ TEST(HammingDistances, CountTheBitsThatDiffer) {
   allowVectorKernels(true);
 }
 
-}  // namespace
+}  // namespace test_hamming_distances
 }  // namespace sdvo

@@ -3,7 +3,7 @@
 #include "stereo_descriptor_vo/odometry/keyframe_memory.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_keyframe_memory {
 
 StereoCamera rig() {
   return {400.0, 400.0, 320.0, 240.0, 0.5, 640, 480};
@@ -114,5 +114,5 @@ TEST(KeyframeMemory, OfNoCapacityRemembersNothing) {
   EXPECT_EQ(memory.count(), 0);
 }
 
-}  // namespace
+}  // namespace test_keyframe_memory
 }  // namespace sdvo

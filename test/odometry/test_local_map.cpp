@@ -13,7 +13,7 @@
 #include "stereo_descriptor_vo/odometry/local_map.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_local_map {
 
 /// Adds a pair seen from a known pose; points, `most` of them, are recognised by their descriptors, which are all
 /// different.
@@ -712,5 +712,5 @@ TEST(LocalMap, CovarianceBetweenTwoFramesDoesNotDependOnWhereTheFirstOneIs) {
   EXPECT_LT((ratio / factor - Matrix6d::Identity()).norm(), 0.05) << ratio;
 }
 
-}  // namespace
+}  // namespace test_local_map
 }  // namespace sdvo

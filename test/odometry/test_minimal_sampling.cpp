@@ -5,7 +5,7 @@
 #include "stereo_descriptor_vo/odometry/minimal_sampling.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_minimal_sampling {
 
 TEST(DrawSample, GivesDifferentIndicesAndLeavesNoneOut) {
   std::mt19937 random(1);
@@ -46,5 +46,5 @@ TEST(SampleBudget, KeepsItsLimits) {
   }
 }
 
-}  // namespace
+}  // namespace test_minimal_sampling
 }  // namespace sdvo

@@ -6,7 +6,7 @@
 #include "stereo_descriptor_vo/odometry/motion_belief.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_motion_belief {
 
 /// A standard deviation of translation and one of rotation, the same in all directions.
 void expectDeviations(const Matrix6d& covariance, double translation, double rotation) {
@@ -94,5 +94,5 @@ TEST(MotionBelief, AnInterruptionLeavesTheTrustedVelocity) {
   EXPECT_FALSE(belief.trusted());
 }
 
-}  // namespace
+}  // namespace test_motion_belief
 }  // namespace sdvo

@@ -8,7 +8,7 @@
 #include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_motion_estimator {
 
 using Correspondences = std::vector<Correspondence>;
 
@@ -330,5 +330,5 @@ TEST(MotionEstimator, RefusesOptionsOutOfRange) {
   EXPECT_THROW(MotionEstimator{options}, std::invalid_argument);
 }
 
-}  // namespace
+}  // namespace test_motion_estimator
 }  // namespace sdvo

@@ -7,7 +7,7 @@
 #include "stereo_descriptor_vo/odometry/motion_refinement.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_motion_refinement {
 
 Eigen::Isometry3d trueMotion() {
   Vector6d xi;
@@ -183,5 +183,5 @@ TEST(RefineMotion, ReturnsToALargeMotionInAFewSteps) {
   }
 }
 
-}  // namespace
+}  // namespace test_motion_refinement
 }  // namespace sdvo

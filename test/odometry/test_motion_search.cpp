@@ -8,7 +8,7 @@
 #include "stereo_descriptor_vo/odometry/motion_search.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_motion_search {
 
 /// What a camera sees that stands still or moves along x, of a world that stands and of a swarm that moves along x,
 /// too.
@@ -347,5 +347,5 @@ TEST(Coverage, CountsCellsOfEightColumnsAndFourRows) {
   EXPECT_EQ(coverage(features, {}), 0.0);
 }
 
-}  // namespace
+}  // namespace test_motion_search
 }  // namespace sdvo

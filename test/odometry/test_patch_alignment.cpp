@@ -12,7 +12,7 @@
 #include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_patch_alignment {
 
 constexpr int kSide = 13;
 constexpr double kNoise = 2.0;  // grey levels
@@ -329,5 +329,5 @@ TEST(PatchAlignment, IsTheSameToTheBitWithAndWithoutVectors) {
   EXPECT_GT(compared, 100);
 }
 
-}  // namespace
+}  // namespace test_patch_alignment
 }  // namespace sdvo

@@ -7,7 +7,7 @@
 #include "stereo_descriptor_vo/common/processor.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_patch_samples {
 
 /// A patch of noise.
 struct Noise {
@@ -108,5 +108,5 @@ TEST(PatchSamples, AreTheSameToTheBitWithAndWithoutVectors) {
   }
 }
 
-}  // namespace
+}  // namespace test_patch_samples
 }  // namespace sdvo

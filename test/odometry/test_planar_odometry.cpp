@@ -8,7 +8,7 @@
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_planar_odometry {
 
 constexpr double kStep = 0.8;  // m between pairs
 constexpr double kDegree = M_PI / 180.0;
@@ -101,5 +101,5 @@ TEST(PlanarOdometry, ARampIsToldOfAndALevelStretchBehindItIsAnotherFloor) {
   EXPECT_EQ(results.back().reason, "");
 }
 
-}  // namespace
+}  // namespace test_planar_odometry
 }  // namespace sdvo

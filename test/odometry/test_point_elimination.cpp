@@ -11,7 +11,7 @@
 #include "stereo_descriptor_vo/odometry/window_optimizer.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_point_elimination {
 
 constexpr double kBend = 2.0, kDamping = 1e-3;
 constexpr double kLeastInformation = 1e-9;  // that a point is given of itself
@@ -249,5 +249,5 @@ TEST(PointElimination, IsTheSameToTheBitWithAndWithoutVectors) {
   allowVectorKernels(true);
 }
 
-}  // namespace
+}  // namespace test_point_elimination
 }  // namespace sdvo

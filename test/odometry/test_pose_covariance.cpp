@@ -6,7 +6,7 @@
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_pose_covariance {
 
 constexpr double kForward = 2.0;  // m
 
@@ -199,5 +199,5 @@ TEST(PoseCovariance, StaysSymmetricAndPositive) {
   }
 }
 
-}  // namespace
+}  // namespace test_pose_covariance
 }  // namespace sdvo

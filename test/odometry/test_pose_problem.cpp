@@ -5,7 +5,7 @@
 #include "stereo_descriptor_vo/odometry/pose_problem.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_pose_problem {
 
 constexpr double kThreshold = 2.0;  // px
 
@@ -75,5 +75,5 @@ TEST(PoseProblem, OneOfTheSolutionsOfAnExactSampleIsTheTruth) {
   }
 }
 
-}  // namespace
+}  // namespace test_pose_problem
 }  // namespace sdvo

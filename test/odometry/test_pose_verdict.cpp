@@ -3,7 +3,7 @@
 #include "stereo_descriptor_vo/odometry/pose_verdict.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_pose_verdict {
 
 constexpr int kMinInliers = 12;
 
@@ -194,5 +194,5 @@ TEST(PoseVerdict, LastingPointsAgreeOrDisagreeOrAreTooFew) {
   EXPECT_EQ(say(19, 19), 0);
 }
 
-}  // namespace
+}  // namespace test_pose_verdict
 }  // namespace sdvo

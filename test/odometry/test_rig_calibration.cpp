@@ -3,7 +3,7 @@
 #include "stereo_descriptor_vo/odometry/rig_calibration.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_rig_calibration {
 
 TEST(RigCalibration, IsAnOffsetAndABendThatGrowsToBothSides) {
   const StereoCamera camera{400.0, 410.0, 320.0, 240.0, 0.5, 1120, 480};
@@ -27,5 +27,5 @@ TEST(RigCalibration, ShapeIsTheDerivative) {
   }
 }
 
-}  // namespace
+}  // namespace test_rig_calibration
 }  // namespace sdvo

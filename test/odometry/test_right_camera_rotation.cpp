@@ -9,7 +9,7 @@
 #include "stereo_descriptor_vo/odometry/right_camera_rotation.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_right_camera_rotation {
 
 /// A grid of features with large disparities, whose vertical ones come from turning the right camera by `rotation`: the
 /// rays themselves are turned.
@@ -164,5 +164,5 @@ TEST(RightCameraRotation, ShuttersThatAreApartWhileTheCameraTurnsAreTheRigsWay) 
   EXPECT_TRUE(filter.add(gridSeenWith({0.0, 0.0, 20e-3}))) << "a knock is still found";
 }
 
-}  // namespace
+}  // namespace test_right_camera_rotation
 }  // namespace sdvo

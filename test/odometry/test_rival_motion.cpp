@@ -6,7 +6,7 @@
 #include "stereo_descriptor_vo/odometry/rival_motion.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_rival_motion {
 
 /// `first` points that moved by one motion, then `second` that moved by another.
 std::vector<Correspondence> twoMotions(int first, int second, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
@@ -57,5 +57,5 @@ TEST(RivalMotion, MotionsAgreeThatProjectToTheSamePixel) {
   EXPECT_FALSE(agree(synthetic::camera(), correspondences, all, moved(0.0), moved(0.01), 0.3));
 }
 
-}  // namespace
+}  // namespace test_rival_motion
 }  // namespace sdvo

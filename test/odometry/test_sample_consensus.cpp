@@ -7,7 +7,7 @@
 #include "stereo_descriptor_vo/odometry/sample_consensus.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_sample_consensus {
 
 struct Scene {
   StereoCamera camera = synthetic::camera();
@@ -171,5 +171,5 @@ TEST(SampleConsensus, LocalOptimisationUsesTheKernelOfTheRefinement) {
   EXPECT_NE(cauchy, poseWith(RobustKernel::kHuber, 1.0));
 }
 
-}  // namespace
+}  // namespace test_sample_consensus
 }  // namespace sdvo

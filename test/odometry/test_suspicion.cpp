@@ -3,7 +3,7 @@
 #include "stereo_descriptor_vo/odometry/suspicion.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_suspicion {
 
 /// Pairs that are suspected, this one included.
 int lasting(Suspicion suspicion) {
@@ -42,5 +42,5 @@ TEST(Suspicion, NamesTheFirstCauseThatLasts) {
   EXPECT_EQ(suspicion.cause(), "a mover");
 }
 
-}  // namespace
+}  // namespace test_suspicion
 }  // namespace sdvo

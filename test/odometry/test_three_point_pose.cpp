@@ -12,7 +12,7 @@
 #include "stereo_descriptor_vo/odometry/three_point_pose.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_three_point_pose {
 
 /// Three points some metres in front of a camera that has moved a little, as between two pairs.
 struct Sample {
@@ -114,5 +114,5 @@ TEST(ThreePointPose, PointsOnALineGiveNone) {
   EXPECT_EQ(solveThreePointPose({points[0], points[0], points[1]}, {rays[0], rays[0], rays[1]}).size(), 0u);
 }
 
-}  // namespace
+}  // namespace test_three_point_pose
 }  // namespace sdvo

@@ -10,7 +10,7 @@
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_visual_odometry {
 
 constexpr std::int64_t kPeriod = 100000000;  // ns between pairs
 constexpr double kStep = 0.8;                // m between pairs
@@ -1062,5 +1062,5 @@ TEST(VisualOdometry, NamesItsStates) {
   EXPECT_STREQ(toString(TrackingState::kLost), "LOST");
 }
 
-}  // namespace
+}  // namespace test_visual_odometry
 }  // namespace sdvo

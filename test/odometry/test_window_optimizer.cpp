@@ -11,7 +11,7 @@
 #include "stereo_descriptor_vo/odometry/window_optimizer.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_window_optimizer {
 
 StereoCamera someCamera() {
   return SyntheticScene(1, 0, 10.0).camera;
@@ -453,5 +453,5 @@ TEST(WindowOptimizer, OneWrongSightingDoesNotMoveTheRest) {
   EXPECT_LT(logSE3(window.T_camera_origin[4] * syntheticPose(4)).norm(), 0.01);
 }
 
-}  // namespace
+}  // namespace test_window_optimizer
 }  // namespace sdvo

@@ -6,7 +6,7 @@
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_windowed_odometry {
 
 constexpr std::int64_t kPeriod = 100000000;  // ns
 
@@ -272,5 +272,5 @@ TEST(WindowedOdometry, TakesNoMoreMemoryTheLongerItRuns) {
   EXPECT_LT(late, 1.03 * early);
 }
 
-}  // namespace
+}  // namespace test_windowed_odometry
 }  // namespace sdvo

@@ -3,7 +3,7 @@
 #include "stereo_descriptor_vo/places/loop_agreement.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_loop_agreement {
 
 Eigen::Isometry3d ahead(double z, double x = 0.0) {
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
@@ -73,5 +73,5 @@ TEST(LoopAgreement, OutlivesTheNodesOfItsProposals) {
   EXPECT_TRUE(agreement.confirm(graph, proposal(1, 51, ahead(0.0))).empty());
 }
 
-}  // namespace
+}  // namespace test_loop_agreement
 }  // namespace sdvo

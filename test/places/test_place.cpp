@@ -7,7 +7,7 @@
 #include "stereo_descriptor_vo/places/place.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_place {
 
 /// Features of rising response, nine tenths of them in the top left corner of the image.
 StereoFeatures crowded() {
@@ -65,5 +65,5 @@ TEST(Place, TellsItsMemory) {
   EXPECT_EQ(place.bytes(), sizeof(Place) + rows);
 }
 
-}  // namespace
+}  // namespace test_place
 }  // namespace sdvo

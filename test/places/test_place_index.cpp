@@ -8,7 +8,7 @@
 #include "stereo_descriptor_vo/places/place_index.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_place_index {
 
 using synthetic::errorOf;
 
@@ -137,5 +137,5 @@ TEST(PlaceIndex, RefusesWhatItCannotMakeWordsOf) {
   EXPECT_NE(errorOf([&] { twice.add(1, {}); }).find("place 1"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace test_place_index
 }  // namespace sdvo

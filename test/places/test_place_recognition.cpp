@@ -11,7 +11,7 @@
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_place_recognition {
 
 constexpr double kPi = 3.14159265358979323846;
 
@@ -321,5 +321,5 @@ TEST(PlaceRecognition, RefusesOtherDescriptorsAndKeepsItsState) {
   EXPECT_EQ(drive.recognition.places().size(), known);
 }
 
-}  // namespace
+}  // namespace test_place_recognition
 }  // namespace sdvo

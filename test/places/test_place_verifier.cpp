@@ -6,7 +6,7 @@
 #include "stereo_descriptor_vo/places/place_verifier.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_place_verifier {
 
 using synthetic::camera;
 
@@ -79,5 +79,5 @@ TEST(PlaceVerifier, NothingToSeeIsNoError) {
   EXPECT_FALSE(verifier.verify(some, nothing).same);
 }
 
-}  // namespace
+}  // namespace test_place_verifier
 }  // namespace sdvo

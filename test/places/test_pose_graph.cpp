@@ -8,7 +8,7 @@
 #include "stereo_descriptor_vo/places/pose_graph.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_pose_graph {
 
 constexpr double kPi = 3.14159265358979323846;
 
@@ -255,5 +255,5 @@ TEST(PoseGraph, IsMadeOfItsPartsAgainAndRefusesPartsThatDoNotFit) {
             std::string::npos);
 }
 
-}  // namespace
+}  // namespace test_pose_graph
 }  // namespace sdvo

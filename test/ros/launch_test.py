@@ -2,17 +2,21 @@
 """What the launch files set on the parameter server, what they refuse, and what they start again."""
 
 import os
+import shlex
 import signal
 import subprocess
 import sys
 import tempfile
 import time
 import unittest
+import xml.etree.ElementTree
 import xmlrpc.client
 
 import rosbag
 import rosgraph
+import roslaunch.config
 import rosnode
+import rospkg
 import rospy
 import rosservice
 import rostest
@@ -33,6 +37,33 @@ IN_YAML = {'odom_frame_id': 'world', 'base_frame_id': 'robot', 'initial_pose': '
            'queue_size': 7, 'odometry_queue_size': 8}
 
 
+FOLDER = os.path.join(rospkg.RosPack().get_path(PACKAGE), 'launch')
+
+
+def load(file, **arguments):
+    """What roslaunch makes of a launch file, or of a text, beside its own parameters."""
+    given = ['%s:=%s' % item for item in arguments.items()]
+    texts, files = ([file], []) if file.startswith('<') else (None, [(os.path.join(FOLDER, file), given)])
+    config = roslaunch.config.load_config_default(files, None, roslaunch_strs=texts)
+    config.params = {name: p.value for name, p in config.params.items() if name not in ('/rosdistro', '/rosversion')}
+    return config
+
+
+def nodes(config):
+    return {node.namespace + node.name: node for node in config.nodes}
+
+
+def launch_files():
+    return [os.path.relpath(os.path.join(folder, file), FOLDER)
+            for folder, _, files in os.walk(FOLDER) for file in files if file.endswith('.launch')]
+
+
+def arguments_of(file):
+    """Attributes of the arguments that a user may give, by name."""
+    root = xml.etree.ElementTree.parse(os.path.join(FOLDER, file)).getroot()
+    return {arg.get('name'): arg.attrib for arg in root.findall('arg') if arg.get('value') is None}
+
+
 def parameters(**arguments):
     """Of stereo_vo.launch, relative to its namespace."""
     command = ['roslaunch', '--dump-params', PACKAGE, 'stereo_vo.launch'] + ['%s:=%s' % item for item in arguments.items()]
@@ -41,6 +72,95 @@ def parameters(**arguments):
 
 
 class Launch(unittest.TestCase):
+    def test_including_files_have_all_arguments_of_the_inner_ones(self):
+        for file in launch_files():
+            root = xml.etree.ElementTree.parse(os.path.join(FOLDER, file)).getroot()
+            outer = arguments_of(file)
+            for include in root.iter('include'):
+                inner = arguments_of(include.get('file').replace('$(find %s)/launch/' % PACKAGE, ''))
+                set_here = {arg.get('name') for arg in include.findall('arg')}
+                what = '%s includes %s' % (file, include.get('file'))
+                self.assertEqual(include.get('pass_all_args'), 'true', what)
+                self.assertEqual(set(inner) - set_here - set(outer), set(), what)
+                for name in set(inner) & set(outer) - set_here:
+                    # Another default than the inner one has a word about it.
+                    if 'doc' not in outer[name] and 'default' in inner[name]:
+                        self.assertEqual(outer[name]['default'], inner[name]['default'], '%s: %s' % (what, name))
+
+    def test_parameters_that_users_change_first_are_arguments(self):
+        with open(os.path.join(FOLDER, '..', 'docs', 'parameters.md')) as text:
+            first = text.read().split('\n| --- |')[1].split('\n\n')[0]
+        names = [line.split('`')[1].split('/')[-1] for line in first.splitlines() if '`' in line]
+        self.assertEqual(len(names), 10)
+        self.assertEqual(set(names) - set(arguments_of('stereo_vo.launch')), set())
+        given = load('stereo_vo.launch', max_features='700', max_rate='15', planar='true', use_imu='true').params
+        self.assertEqual({name: given['/stereo/' + name] for name in
+                          ('stereo_features/detector/max_features', 'stereo_features/max_rate', 'visual_odometry/planar',
+                           'visual_odometry/use_imu')},
+                         {'stereo_features/detector/max_features': 700, 'stereo_features/max_rate': 15,
+                          'visual_odometry/planar': True, 'visual_odometry/use_imu': True})
+
+    def test_a_filter_that_publishes_tf_gets_all_of_it(self):
+        for file in ('stereo_vo.launch', 'stereo_raw.launch', 'mavros.launch', 'cameras/oak_d.launch'):
+            for both, map_alone, expected in (('false', '', False), ('false', 'true', True), ('true', '', True)):
+                given = {'publish_map_tf': map_alone} if map_alone else {}
+                config = load(file, loop_closing='true', publish_tf=both, **given)
+                name = next(name for name in config.params if name.endswith('/place_recognition/publish_tf'))
+                self.assertEqual(config.params[name], expected, (file, given))
+
+    def test_rviz_on_demand(self):
+        for file in ('stereo_vo.launch', 'mavros.launch', 'cameras/zed.launch'):
+            self.assertEqual([name for name in nodes(load(file)) if 'rviz' in name], [])
+            found = load(file, rviz='true', namespace='front', loop_closing='true', map_frame_id='site')
+            rviz = nodes(found)['/front/rviz']
+            self.assertTrue(rviz.args.endswith('/places.rviz" -f site'), rviz.args)
+
+    def test_a_group_keeps_all_its_names_to_itself(self):
+        found = nodes(load('<launch><group ns="uav1"><include file="$(find %s)/launch/mavros.launch">'
+                           '<arg name="mavros" value="/uav1/mavros"/><arg name="loop_closing" value="true"/>'
+                           '</include></group></launch>' % PACKAGE))
+        for node in ('visual_odometry', 'place_recognition'):
+            self.assertIn(['odom', '/uav1/mavros/odometry/out'], found['/uav1/stereo/' + node].remap_args)
+
+    def test_a_mount_is_published_where_it_is_given(self):
+        for file in ('oak_d', 'realsense_d400', 'two_cameras'):
+            def publishers(**arguments):
+                config = load('cameras/%s.launch' % file, **arguments)
+                return sorted(node.args for node in config.nodes if node.type == 'static_transform_publisher')
+            self.assertEqual(publishers(), [])
+            self.assertEqual(publishers(base_frame_id='camera_link', namespace='camera'), [])
+            given = publishers(mount='1 2 3 0 0 0')
+            self.assertTrue(given and given[-1].startswith('1 2 3 0 0 0 base_link '), given)
+        same = load('cameras/realsense_d400.launch', mount='0 0 0 0 0 0', base_frame_id='camera_link')
+        self.assertEqual([node for node in same.nodes if node.name == 'camera_mount'], [])
+
+    def test_blocks_and_values_that_are_left_empty_are_none(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, 'my config.yaml')
+            for text, expected in (('stereo_features:\nvisual_odometry:\n  tracking: {max_speed: 3}\n',
+                                    {'/stereo/visual_odometry/tracking/max_speed': 3}),
+                                   ('stereo_features:\n  detector:\n    max_features:\n    bucket_size: 40\n',
+                                    {'/stereo/stereo_features/detector/bucket_size': 40}), ('', {}), ('# none\n', {})):
+                with open(path, 'w') as config:
+                    config.write(text)
+                self.assertEqual(load('odometry.launch', config=path).params, expected, text)
+            with open(path, 'w') as config:
+                config.write('- no blocks')
+            with self.assertRaisesRegex(roslaunch.core.RLException, 'my config.yaml'):
+                load('stereo_vo.launch', config=path)
+
+    def test_nothing_is_set_that_nobody_reads(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = os.path.join(folder, 'my first.bag')
+            with rosbag.Bag(path, 'w') as bag:
+                bag.write('/stereo/left/camera_info', CameraInfo(), rospy.Time(1))
+            for file, expected in (('kitti.launch', ['/use_sim_time']),
+                                   ('example_robot.launch', ['/robot_description', '/use_sim_time'])):
+                config = load(file, bag=path, rviz='false')
+                self.assertEqual([name for name in sorted(config.params) if '/stereo/' not in name], expected)
+                player = next(node for node in config.nodes if node.type == 'play')
+                self.assertEqual(shlex.split(player.args)[0], path)
+
     def test_without_arguments_nothing_is_set(self):
         self.assertEqual({name: value for name, value in parameters().items() if value != {}}, {})
 
@@ -71,14 +191,14 @@ class Launch(unittest.TestCase):
                           (('map_frame_id', 'site'), ('publish_tf', False), ('places_file', '/site.bag'), ('robot_name', 'one'),
                            ('sync_queue_size', 40), ('queue_size', 40))})
 
-    def test_parameters_of_an_earlier_run_are_forgotten_on_demand(self):
+    def test_parameters_of_an_earlier_run_are_forgotten_unless_they_are_wanted(self):
         stale, other = '/stereo/visual_odometry/publish_tf', '/stereo/camera/exposure'
-        for clear in ('false', 'true'):
+        for clear in ('false', None):
             rospy.set_param(stale, False)
             rospy.set_param(other, 5)
             # Without a manager the nodelets wait: nothing is started.
             process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch', 'start_manager:=false',
-                                        'base_frame_id:=robot', 'clear_params:=' + clear])
+                                        'base_frame_id:=robot'] + (['clear_params:=' + clear] if clear else []))
             try:
                 end = time.time() + 30
                 while not rospy.has_param('/stereo/visual_odometry/base_frame_id') and time.time() < end:

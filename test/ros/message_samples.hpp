@@ -7,7 +7,7 @@
 
 #include "../../src/ros/camera_conversions.hpp"
 #include "../../src/ros/feature_conversions.hpp"
-#include "../../src/ros/frame_id.hpp"
+#include "../../src/ros/frames.hpp"
 #include "../../src/ros/image_conversions.hpp"
 #include "../../src/ros/odometry_conversions.hpp"
 #include "../../src/ros/pose_conversions.hpp"

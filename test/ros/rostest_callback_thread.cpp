@@ -7,10 +7,10 @@
 #include <string>
 #include <thread>
 
-#include "../../src/ros/callback_thread.hpp"
+#include "../../src/ros/threads.hpp"
 
 namespace sdvo {
-namespace {
+namespace rostest_callback_thread {
 
 bool waitUntil(const std::function<bool()>& condition) {
   const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(10.0);
@@ -28,7 +28,8 @@ std_msgs::Int32 message(int data) {
 class Witness {
  public:
   Witness(ros::NodeHandle& nh, const std::string& topic)
-      : subscriber_(nh.subscribe<std_msgs::Int32>(topic, 100, [this](const std_msgs::Int32::ConstPtr& m) { last_ = m->data; })) {}
+      : subscriber_(nh.subscribe<std_msgs::Int32>(topic, 100,
+                                                  [this](const std_msgs::Int32::ConstPtr& m) { last_ = m->data; })) {}
 
   bool gets(int data) {
     return waitUntil([&] {
@@ -97,12 +98,5 @@ TEST(CallbackThread, AfterStopNoCallbackRuns) {
   EXPECT_FALSE(ran_late);
 }
 
-}  // namespace
+}  // namespace rostest_callback_thread
 }  // namespace sdvo
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "callback_thread_test");
-  ros::NodeHandle keeps_ros_alive;
-  return RUN_ALL_TESTS();
-}

@@ -4,7 +4,7 @@
 #include "../../src/ros/image_subscriber.hpp"
 
 namespace sdvo {
-namespace {
+namespace rostest_image_transport {
 
 TEST(StereoImageTransport, EachSideKeepsItsOptionsInANamespaceOfItsOwn) {
   ros::NodeHandle nh("/image_transport_test");
@@ -23,12 +23,5 @@ TEST(StereoImageTransport, AnUnknownOneIsRefused) {
   EXPECT_THROW(StereoImageTransport{nh}, pluginlib::PluginlibException);
 }
 
-}  // namespace
+}  // namespace rostest_image_transport
 }  // namespace sdvo
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "rostest_image_transport");
-  ros::NodeHandle keep;
-  return RUN_ALL_TESTS();
-}

@@ -13,7 +13,7 @@
 #include "message_samples.hpp"
 
 namespace sdvo {
-namespace {
+namespace rostest_odometry_publisher {
 
 using ros_conversions::trackedResult;
 
@@ -266,12 +266,5 @@ TEST_F(OdometryPublisherTest, InfoTellsLatencyAndSession) {
   EXPECT_LT(publisher_->publishInfo({}, ros::Time(0xffffffffu, 0)).latency, -1e9f);
 }
 
-}  // namespace
+}  // namespace rostest_odometry_publisher
 }  // namespace sdvo
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "odometry_publisher_test");
-  ros::NodeHandle keeps_ros_alive;
-  return RUN_ALL_TESTS();
-}

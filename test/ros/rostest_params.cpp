@@ -8,7 +8,7 @@
 #include "../synthetic_scene.hpp"
 
 namespace sdvo {
-namespace {
+namespace rostest_params {
 
 using synthetic::errorOf;
 
@@ -122,12 +122,5 @@ TEST_F(LoadParams, NamesWhatIsNoOption) {
   EXPECT_EQ(unknown, (std::vector<std::string>{"/load_params/cuont", "/load_params/inner/rate"}));
 }
 
-}  // namespace
+}  // namespace rostest_params
 }  // namespace sdvo
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "params_test");
-  ros::NodeHandle keeps_ros_alive;
-  return RUN_ALL_TESTS();
-}

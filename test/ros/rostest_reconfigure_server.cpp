@@ -10,10 +10,10 @@
 #include <thread>
 #include <vector>
 
-#include "../../src/ros/reconfigure_server.hpp"
+#include "../../src/ros/params.hpp"
 
 namespace sdvo {
-namespace {
+namespace rostest_reconfigure_server {
 
 enum class Kind { kA, kB };
 
@@ -199,12 +199,5 @@ TEST_F(ReconfigureServerTest, DescribesRangesAndDefaults) {
   EXPECT_NE(description->groups[0].parameters[4].edit_method.find("'value': 'b'"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace rostest_reconfigure_server
 }  // namespace sdvo
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "reconfigure_server_test");
-  ros::NodeHandle keeps_ros_alive;
-  return RUN_ALL_TESTS();
-}

@@ -9,11 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "../../src/ros/camera_mount.hpp"
-#include "../../src/ros/robot_transforms.hpp"
+#include "../../src/ros/transforms.hpp"
 
 namespace sdvo {
-namespace {
+namespace rostest_robot_transforms {
 
 bool contains(const std::string& text, const std::string& part) {
   return text.find(part) != std::string::npos;
@@ -181,12 +180,5 @@ TEST_F(RobotTransformsTest, WithoutATransformOfOursThereIsNoContention) {
   EXPECT_TRUE(warnings_.empty());
 }
 
-}  // namespace
+}  // namespace rostest_robot_transforms
 }  // namespace sdvo
-
-int main(int argc, char** argv) {
-  testing::InitGoogleTest(&argc, argv);
-  ros::init(argc, argv, "robot_transforms_test");
-  ros::NodeHandle keeps_ros_alive;
-  return RUN_ALL_TESTS();
-}

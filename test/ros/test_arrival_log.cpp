@@ -6,7 +6,7 @@
 #include "message_samples.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_arrival_log {
 
 using ros_conversions::contains;
 
@@ -95,5 +95,5 @@ TEST_F(ApproximateArrivalLogTest, DoesNotAdviseWhatIsSetAlready) {
   EXPECT_TRUE(contains(log_.explainSilence(), "0.02 s (larger than max_interval)"));
 }
 
-}  // namespace
+}  // namespace test_arrival_log
 }  // namespace sdvo

@@ -6,7 +6,7 @@
 #include "message_samples.hpp"
 
 namespace sdvo::ros_conversions {
-namespace {
+namespace test_camera_info {
 
 using synthetic::errorOf;
 
@@ -119,5 +119,5 @@ TEST(ToStereoCamera, RefusesWhatIsNoRectifiedPair) {
   EXPECT_TRUE(contains(refusal(left, distorted), "right camera_info"));
 }
 
-}  // namespace
+}  // namespace test_camera_info
 }  // namespace sdvo::ros_conversions

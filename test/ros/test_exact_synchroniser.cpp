@@ -8,7 +8,7 @@
 #include "../../src/ros/exact_synchroniser.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_exact_synchroniser {
 
 using sensor_msgs::CameraInfo;
 using sensor_msgs::Image;
@@ -102,5 +102,5 @@ TEST_F(ExactSynchroniserTest, AStampThatCannotBeComparedIsRefused) {
   EXPECT_EQ(sets_.size(), 1u);
 }
 
-}  // namespace
+}  // namespace test_exact_synchroniser
 }  // namespace sdvo

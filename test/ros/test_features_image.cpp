@@ -7,7 +7,7 @@
 #include "message_samples.hpp"
 
 namespace sdvo::ros_conversions {
-namespace {
+namespace test_features_image {
 
 /// Pixels that are not grey any more.
 int colouredPixels(const cv::Mat& picture) {
@@ -64,5 +64,5 @@ TEST(DrawFeatures, SurvivesFlowOfUnequalLengths) {
   EXPECT_NO_THROW(drawFeatures(grey, grey, someMessage(), flow));
 }
 
-}  // namespace
+}  // namespace test_features_image
 }  // namespace sdvo::ros_conversions

@@ -10,7 +10,7 @@
 #include "message_samples.hpp"
 
 namespace sdvo::ros_conversions {
-namespace {
+namespace test_features_message {
 
 void expectSame(const StereoFeatures& a, const StereoFeatures& b) {
   EXPECT_EQ(a.stamp, b.stamp);
@@ -130,5 +130,5 @@ TEST(FeaturesMessageTest, APairThatTheRigMonitorRefusedIsKnownAsOne) {
   EXPECT_EQ(received.report.status, refused.report.status);
 }
 
-}  // namespace
+}  // namespace test_features_message
 }  // namespace sdvo::ros_conversions

@@ -3,10 +3,10 @@
 #include <cmath>
 #include <limits>
 
-#include "../../src/ros/gravity_track.hpp"
+#include "../../src/ros/imu_tracks.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_gravity_track {
 
 constexpr std::int64_t kMillisecond = 1000000;
 const Eigen::Vector3d kStill = Eigen::Vector3d::Zero();
@@ -64,5 +64,5 @@ TEST(Levelled, KeepsPositionAndYawAndTurnsUpToTheParentsZ) {
   EXPECT_NEAR(std::atan2(level.linear()(1, 0), level.linear()(0, 0)), 2.5, 1e-12);
 }
 
-}  // namespace
+}  // namespace test_gravity_track
 }  // namespace sdvo

@@ -9,7 +9,7 @@
 #include "message_samples.hpp"
 
 namespace sdvo::ros_conversions {
-namespace {
+namespace test_grey_image {
 
 using synthetic::errorOf;
 
@@ -118,5 +118,5 @@ TEST(ToGrey, RefusesOtherEncodingsAndMalformedImages) {
   }
 }
 
-}  // namespace
+}  // namespace test_grey_image
 }  // namespace sdvo::ros_conversions

@@ -3,11 +3,11 @@
 #include <cstdint>
 #include <limits>
 
-#include "../../src/ros/gyro_track.hpp"
+#include "../../src/ros/imu_tracks.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_gyro_track {
 
 constexpr std::int64_t kMillisecond = 1000000;
 
@@ -96,5 +96,5 @@ TEST(GyroTrack, ForgetsWhatIsLongAgo) {
   EXPECT_TRUE(track.rotation(500 * kMillisecond, 600 * kMillisecond));
 }
 
-}  // namespace
+}  // namespace test_gyro_track
 }  // namespace sdvo

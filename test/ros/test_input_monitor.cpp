@@ -4,11 +4,11 @@
 #include <string>
 #include <thread>
 
-#include "../../src/ros/input_monitor.hpp"
+#include "../../src/ros/diagnostic_tasks.hpp"
 #include "message_samples.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_input_monitor {
 
 using Level = WallUpdater::Level;
 using ros_conversions::contains;
@@ -71,5 +71,5 @@ TEST(InputMonitor, RatesOutOfTheRangeAreWarnedOf) {
   EXPECT_EQ(diagnose(is_fine).level, Level::OK);
 }
 
-}  // namespace
+}  // namespace test_input_monitor
 }  // namespace sdvo

@@ -1,9 +1,9 @@
 #include <gtest/gtest.h>
 
-#include "../../src/ros/pace.hpp"
+#include "../../src/ros/throttles.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_pace {
 
 constexpr std::int64_t kMillisecond = 1000000;
 
@@ -35,5 +35,5 @@ TEST(Pace, StampsThatFallBeginAnew) {
   EXPECT_FALSE(pace.isDue(1010 * kMillisecond));
 }
 
-}  // namespace
+}  // namespace test_pace
 }  // namespace sdvo

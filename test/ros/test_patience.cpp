@@ -1,9 +1,9 @@
 #include <gtest/gtest.h>
 
-#include "../../src/ros/patience.hpp"
+#include "../../src/ros/throttles.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_patience {
 
 TEST(Patience, WaitsAsLongAsItIsThere) {
   Patience patience(0.1);
@@ -38,5 +38,5 @@ TEST(Patience, IsBackWhenItComesAgain) {
   EXPECT_EQ(patience.timeout(101.7), 0.1) << "rests for a second again";
 }
 
-}  // namespace
+}  // namespace test_patience
 }  // namespace sdvo

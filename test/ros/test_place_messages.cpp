@@ -5,14 +5,13 @@
 #include <string>
 #include <vector>
 
-#include "../../src/ros/map_conversions.hpp"
 #include "../../src/ros/place_conversions.hpp"
 #include "../../src/ros/pose_conversions.hpp"
 #include "../synthetic_scene.hpp"
 #include "message_samples.hpp"
 
 namespace sdvo::ros_conversions {
-namespace {
+namespace test_place_messages {
 
 using synthetic::equalMats;
 using synthetic::errorOf;
@@ -255,5 +254,5 @@ TEST(MotionCovariance, IsThatOfTheCamera) {
   }
 }
 
-}  // namespace
+}  // namespace test_place_messages
 }  // namespace sdvo::ros_conversions

@@ -4,8 +4,11 @@
 #include <sys/resource.h>
 
 #include <csignal>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -15,7 +18,7 @@
 #include "message_samples.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_places_file {
 
 namespace fs = std::filesystem;
 using ros_conversions::contains;
@@ -43,6 +46,10 @@ class PlacesFile : public ::testing::Test {
     stream_.frame_id = "left_optical";
   }
 
+  void expectNoPartialFile() const {
+    EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator()), 1);
+  }
+
   void save(const std::string& path) { savePlaces(places_, map_, stream_, "/robot", "map", path); }
 
   static std::string refusal(const std::string& path) {
@@ -59,7 +66,7 @@ class PlacesFile : public ::testing::Test {
 
 TEST_F(PlacesFile, WhatIsSavedIsLoaded) {
   save(path_);
-  EXPECT_FALSE(fs::exists(path_ + ".partial"));
+  expectNoPartialFile();
   const SavedPlaces loaded = loadPlaces(path_, {});
   ASSERT_EQ(loaded.places.size(), 3u);
   EXPECT_EQ(loaded.places[2].id, 2);
@@ -89,7 +96,7 @@ TEST_F(PlacesFile, WhereThereIsNoRoomTheProcessGoesOn) {
   setrlimit(RLIMIT_FSIZE, &before);
   std::signal(SIGXFSZ, signal_before);
   EXPECT_TRUE(contains(error, "cannot be written")) << error;
-  EXPECT_FALSE(fs::exists(path_ + ".partial"));
+  expectNoPartialFile();
   EXPECT_EQ(fs::file_size(path_), size);
   EXPECT_EQ(loadPlaces(path_, {}).places.size(), 3u);
 }
@@ -98,7 +105,7 @@ TEST_F(PlacesFile, WhatCannotBeWrittenToItsEndLeavesTheFileOfBefore) {
   save(path_);
   places_[2].features.stamp = 0;
   EXPECT_TRUE(contains(errorOf([&] { save(path_); }), "cannot be written"));
-  EXPECT_FALSE(fs::exists(path_ + ".partial"));
+  expectNoPartialFile();
   EXPECT_EQ(loadPlaces(path_, {}).places.size(), 3u);
 }
 
@@ -129,5 +136,45 @@ TEST_F(PlacesFile, ATruncatedFileIsRefused) {
   refusal(path_);
 }
 
+<<<<<<< HEAD
+}  // namespace test_places_file
+=======
+/// Whatever length, count or offset in it is wrong: a record's, a chunk's, an array's within a message.
+TEST_F(PlacesFile, AFileThatAnnouncesMuchTakesLittle) {
+  places_.resize(1);
+  map_ = {PoseGraph(PoseGraphOptions(), {{0, Eigen::Isometry3d::Identity()}}, {}), {{0, places_[0].features.stamp}}};
+  save(path_);
+  std::stringstream text;
+  text << std::ifstream(path_, std::ios::binary).rdbuf();
+  const std::string good = text.str();
+  const auto peak = [] {  // B, of the process so far
+    rusage usage{};
+    getrusage(RUSAGE_SELF, &usage);
+    return 1024L * usage.ru_maxrss;
+  };
+  const long before = peak();
+  for (const std::uint32_t announced : {900u << 20, 0xfffffff0u, 1u << 30}) {
+    for (std::size_t at = 13; at + sizeof announced <= good.size(); ++at) {
+      std::uint32_t length = 0;
+      std::memcpy(&length, &good[at], sizeof length);
+      if (length == 0 || at + sizeof length + length > good.size()) continue;  // it is none
+      std::string bad = good;
+      std::memcpy(&bad[at], &announced, sizeof announced);
+      std::ofstream(path_, std::ios::binary) << bad;
+      errorOf([&] { loadPlaces(path_, {}); });
+      ASSERT_LT(peak() - before, 64 << 20) << announced << " at byte " << at;
+    }
+  }
+}
+
+TEST_F(PlacesFile, CompressedChunksAreRefusedWithTheRemedy) {
+  rosbag::Bag bag(path_, rosbag::bagmode::Write);
+  bag.setCompression(rosbag::compression::BZ2);
+  bag.write("place", ros::Time(1), std_msgs::Header());
+  bag.close();
+  EXPECT_TRUE(contains(refusal(path_), "rosbag decompress"));
+}
+
 }  // namespace
+>>>>>>> 7d3a5db (Launch files pass all arguments on, relative names, no mount and no junk parameters; files reach the disk whole, maps are walked before memory is taken)
 }  // namespace sdvo

@@ -1,9 +1,9 @@
 #include <gtest/gtest.h>
 
-#include "../../src/ros/report_throttle.hpp"
+#include "../../src/ros/throttles.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_report_throttle {
 
 TEST(ReportThrottle, LetsAKindThroughOnce) {
   ReportThrottle throttle;
@@ -23,5 +23,5 @@ TEST(ReportThrottle, NumbersMakeNoOtherKind) {
   EXPECT_FALSE(throttle.allows("left image is 752x480"));
 }
 
-}  // namespace
+}  // namespace test_report_throttle
 }  // namespace sdvo

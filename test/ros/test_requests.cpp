@@ -1,9 +1,9 @@
 #include <gtest/gtest.h>
 
-#include "../../src/ros/requests.hpp"
+#include "../../src/ros/threads.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_requests {
 
 TEST(Requests, HoldForWhatArrivesLaterAndOnce) {
   Requests<char> requests;
@@ -24,5 +24,5 @@ TEST(Requests, TheNewestWins) {
   EXPECT_EQ(requests.take(requests.posted()), 'b');
 }
 
-}  // namespace
+}  // namespace test_requests
 }  // namespace sdvo

@@ -5,10 +5,10 @@
 #include <utility>
 #include <vector>
 
-#include "../../src/ros/stamp_filter.hpp"
+#include "../../src/ros/stamps.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_stamp_filter {
 
 constexpr std::int64_t kSecond = 1000000000;
 
@@ -131,5 +131,5 @@ TEST_F(StampFilterTest, SurvivesEveryStamp) {
   EXPECT_EQ(next.back().first, next_ - 1);
 }
 
-}  // namespace
+}  // namespace test_stamp_filter
 }  // namespace sdvo

@@ -13,7 +13,7 @@
 #include "stereo_descriptor_vo/ros/stereo_features_view.hpp"
 
 namespace sdvo::ros_conversions {
-namespace {
+namespace test_stereo_features_view {
 
 /// A change to a message that makes it invalid, and what the refusal must speak of.
 struct Damage {
@@ -215,5 +215,5 @@ TEST(StereoFeaturesViewTest, NoFeaturesMakeAnEmptyCloud) {
   EXPECT_EQ(cloud.fields.size(), 4u);
 }
 
-}  // namespace
+}  // namespace test_stereo_features_view
 }  // namespace sdvo::ros_conversions

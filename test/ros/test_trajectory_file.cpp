@@ -7,13 +7,13 @@
 #include <sstream>
 #include <string>
 
-#include "../../src/ros/trajectory_file.hpp"
+#include "../../src/ros/output_files.hpp"
 #include "../synthetic_scene.hpp"
 #include "../temporary_folder.hpp"
 #include "message_samples.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_trajectory_file {
 
 namespace fs = std::filesystem;
 using ros_conversions::contains;
@@ -36,10 +36,14 @@ class TrajectoryFile : public ::testing::Test {
     poses_.poses.push_back(pose);
   }
 
+  void expectNoPartialFile() const {
+    for (const auto& entry : fs::directory_iterator(directory_)) EXPECT_EQ(entry.path(), directory_ / "file.txt");
+  }
+
   std::string save(const std::string& format) {
     const std::string path = (directory_ / "file.txt").string();
     saveTrajectory(poses_, T_base_camera_, format, path);
-    EXPECT_FALSE(fs::exists(path + ".partial"));
+    expectNoPartialFile();
     std::stringstream text;
     text << std::ifstream(path).rdbuf();
     return text.str();
@@ -47,7 +51,7 @@ class TrajectoryFile : public ::testing::Test {
 
   std::string refusal(const std::string& path, const std::string& format = "tum") {
     EXPECT_THROW(saveTrajectory(poses_, T_base_camera_, format, path), std::runtime_error) << path;
-    EXPECT_FALSE(fs::exists(path + ".partial"));
+    expectNoPartialFile();
     return errorOf([&] { saveTrajectory(poses_, T_base_camera_, format, path); });
   }
 
@@ -82,5 +86,5 @@ TEST_F(TrajectoryFile, RefusesWhatIsNoFileOfTheUsers) {
   EXPECT_FALSE(fs::exists(directory_ / "file.txt"));
 }
 
-}  // namespace
+}  // namespace test_trajectory_file
 }  // namespace sdvo

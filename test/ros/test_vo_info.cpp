@@ -7,7 +7,7 @@
 #include "message_samples.hpp"
 
 namespace sdvo::ros_conversions {
-namespace {
+namespace test_vo_info {
 
 TEST(ToInfo, TellsResultAndImageSide) {
   OdometryResult result = trackedResult();
@@ -83,5 +83,5 @@ TEST(ToFlow, LeadsFromThePreviousPositionToThePresentOne) {
   EXPECT_FALSE(flow.inlier[1]);
 }
 
-}  // namespace
+}  // namespace test_vo_info
 }  // namespace sdvo::ros_conversions

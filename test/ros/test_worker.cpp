@@ -8,10 +8,10 @@
 #include <thread>
 #include <vector>
 
-#include "../../src/ros/worker.hpp"
+#include "../../src/ros/threads.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_worker {
 
 using namespace std::chrono_literals;
 
@@ -110,5 +110,5 @@ TEST(Worker, EndsWithoutEverHavingHadAnItem) {
   for (int i = 0; i < 50; ++i) Worker<int>(1, [](const int&) {});
 }
 
-}  // namespace
+}  // namespace test_worker
 }  // namespace sdvo

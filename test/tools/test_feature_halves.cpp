@@ -10,7 +10,7 @@
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_feature_halves {
 
 StereoFeatures featuresAt(const std::vector<cv::Point2f>& positions) {
   StereoFeatures features;
@@ -92,5 +92,5 @@ TEST(FeatureHalves, FollowTheMatchesOfAnOdometry) {
   EXPECT_GT(kept, 9 * all / 10);
 }
 
-}  // namespace
+}  // namespace test_feature_halves
 }  // namespace sdvo

@@ -8,7 +8,7 @@
 #include "../synthetic_features.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_self_check {
 
 constexpr std::int64_t kPeriod = 100000000;  // ns
 constexpr int kPairs = 40;
@@ -143,5 +143,5 @@ TEST(SelfCheck, APairAloneHasNoMotion) {
   EXPECT_NE(checkShuttle(run, run).problem.find("one pair"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace test_self_check
 }  // namespace sdvo

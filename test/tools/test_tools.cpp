@@ -3,6 +3,7 @@
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
 #include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
@@ -17,6 +18,7 @@
 #include <functional>
 #include <iomanip>
 #include <iterator>
+#include <map>
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 #include <string>
@@ -26,7 +28,7 @@
 #include "../temporary_folder.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_tools {
 
 namespace fs = std::filesystem;
 
@@ -46,6 +48,13 @@ std::vector<std::string> linesOf(const std::string& text) {
   std::vector<std::string> lines;
   for (std::string line; std::getline(stream, line);) lines.push_back(line);
   return lines;
+}
+
+std::vector<std::string> cellsOf(const std::string& row) {
+  std::istringstream stream(row);
+  std::vector<std::string> cells;
+  for (std::string cell; std::getline(stream, cell, ',');) cells.push_back(cell);
+  return cells;
 }
 
 std::vector<std::string> errorLines(const Outcome& outcome) {
@@ -101,6 +110,17 @@ class Tools : public testing::Test {
   }
   fs::path poses() const { return root_ / "poses.txt"; }
 
+  /// The drive as a bag.
+  fs::path bag(const std::string& name) const {
+    const fs::path bag = root_ / (name + ".bag");
+    const Outcome outcome = run("convert", sequence_.string() + " --output " + bag.string());
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    return bag;
+  }
+  Outcome runBags(const std::string& bags, const std::string& extra = "") const {
+    return run("run_bag", bags + " --output " + results_.string() + " " + extra);
+  }
+
   /// Bad input ends with one line that says what is wrong, and never with a signal or an exit code of zero.
   static void expectError(const Outcome& outcome, const std::string& said) {
     SCOPED_TRACE("stdout: " + outcome.out + "\nstderr: " + outcome.err);
@@ -112,7 +132,7 @@ class Tools : public testing::Test {
   }
 
   const TemporaryFolder folder_;
-  const fs::path root_ = folder_.path(), sequence_ = root_ / "sequences" / "09";
+  const fs::path root_ = folder_.path(), sequence_ = root_ / "sequences" / "09", results_ = root_ / "results";
 };
 
 /// The tools that read a sequence, with arguments for a sound run.
@@ -249,33 +269,24 @@ TEST_F(Tools, OnePoseForEachPairAndTheDriveIsFollowed) {
   }
 }
 
-TEST_F(Tools, KeyFramesOfADriveAreComparedTwoByTwo) {
-  const std::string truth = (root_ / "truth.txt").string(), views = (root_ / "views.csv").string();
-  const Outcome outcome =
-      run("run_places", sequence_.string() + " --poses " + poses().string() + " --keyframes " +
-                            (root_ / "keyframes.csv").string() + " --ground-truth " + truth + " --views " + views +
-                            " --param place_recognition/keyframe_distance=0.15");  // m, less than a step
-  if (outcome.err.find("without Ceres") != std::string::npos) GTEST_SKIP() << outcome.err;
-  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_EQ(linesOf(readText(poses())).size(), static_cast<std::size_t>(kPairs));
-  EXPECT_EQ(linesOf(readText(root_ / "keyframes.csv")).size(), static_cast<std::size_t>(kPairs) + 1);
-
-  const std::vector<std::string> rows = linesOf(readText(views));
-  ASSERT_EQ(rows.size(), 1u + kPairs * (kPairs - 1) / 2);
-  std::size_t row = 1;
-  for (int first = 0; first < kPairs; ++first)
-    for (int second = first + 1; second < kPairs; ++second, ++row) {
-      std::istringstream stream(rows[row]);
-      std::vector<double> numbers;
-      for (std::string cell; std::getline(stream, cell, ',');) numbers.push_back(std::stod(cell));
-      ASSERT_EQ(numbers.size(), 9u) << rows[row];
-      EXPECT_EQ(numbers[0], first) << rows[row];
-      EXPECT_EQ(numbers[1], second) << rows[row];
-      EXPECT_NEAR(numbers[2], kStep * (second - first), 1e-6) << rows[row];
-      EXPECT_NEAR(numbers[3], 0.0, 1e-6) << "degrees; " << rows[row];
-      EXPECT_GT(numbers[5], 100) << "inliers; " << rows[row];
-      EXPECT_LT(numbers[7], 0.05) << "m; " << rows[row];
-    }
+TEST_F(Tools, PlacesByASwitchOrByTheName) {
+  const auto arguments = [this](const std::string& name) {
+    return sequence_.string() + " --poses " + (root_ / (name + ".txt")).string() + " --odometry " + poses().string() +
+           " --keyframes " + (root_ / (name + ".csv")).string() + " --ground-truth " + (root_ / "truth.txt").string() +
+           " --before " + sequence_.string() + " --param place_recognition/keyframe_distance=0.15";  // m, below a step
+  };
+  const Outcome named = run("run_places", arguments("named"));
+  if (named.err.find("without Ceres") != std::string::npos) GTEST_SKIP() << named.err;
+  ASSERT_EQ(named.exit_code, 0) << named.err;
+  EXPECT_NE(named.out.find("\nrevisits "), std::string::npos) << named.out;
+  EXPECT_EQ(linesOf(readText(root_ / "named.txt")).size(), static_cast<std::size_t>(kPairs));
+  EXPECT_EQ(linesOf(readText(root_ / "named.csv")).size(), 2u * kPairs + 1u);
+  const std::string odometry = readText(poses());
+  ASSERT_EQ(run("run_sequence", "--places " + arguments("switched")).exit_code, 0);
+  EXPECT_EQ(readText(root_ / "switched.txt"), readText(root_ / "named.txt"));
+  ASSERT_EQ(runSequence().exit_code, 0);
+  EXPECT_EQ(readText(poses()), odometry);
+  expectError(run("run_sequence", arguments("neither")), "need --places");
 }
 
 TEST_F(Tools, TimingEndsWithTheReasonWithoutCommas) {
@@ -300,9 +311,7 @@ TEST_F(Tools, StatesHaveTheCovariancesOfEachPair) {
   ASSERT_EQ(rows.size(), static_cast<std::size_t>(kPairs) + 1);
   EXPECT_EQ(rows.front().rfind("frame,stamp_ns,state,epoch,has_pose,has_motion,motion_00,", 0), 0u);
   for (int i = 0; i < kPairs; ++i) {
-    std::vector<std::string> fields;
-    std::istringstream stream(rows[static_cast<std::size_t>(i) + 1]);
-    for (std::string field; std::getline(stream, field, ',');) fields.push_back(field);
+    const std::vector<std::string> fields = cellsOf(rows[static_cast<std::size_t>(i) + 1]);
     ASSERT_GE(fields.size(), 78u);
     EXPECT_EQ(fields[0], std::to_string(i));
     EXPECT_EQ(fields[1], std::to_string(i * 100000000));
@@ -332,80 +341,182 @@ TEST_F(Tools, ResultsAreBitIdenticalInEveryRunAndWithAnyThreads) {
 }
 
 TEST_F(Tools, BagsGiveWhatTheirSequencesGive) {
-  const fs::path bags = root_ / "bags", results = root_ / "results";
-  fs::create_directories(bags);
   ASSERT_EQ(runSequence().exit_code, 0);
-  for (const char* name : {"a.bag", "b.bag"})
-    ASSERT_EQ(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output " + (bags / name).string()).exit_code,
-              0);
-  const std::string command = bags.string() + " --output " + results.string() + " --format kitti --jobs 2";
-  const Outcome outcome = run("run_bag", command);
+  const std::string expected = readText(poses());
+  bag("a"), bag("b");
+  const Outcome outcome = runBags(root_.string() + " " + sequence_.string(), "--format kitti");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  const std::vector<std::string> report = linesOf(readText(results / "report.csv"));
-  ASSERT_EQ(report.size(), 3u);
-  EXPECT_EQ(report[1].rfind("a,4,0,0,0,", 0), 0u) << report[1];
-  EXPECT_EQ(report[2].rfind("b,4,0,0,0,", 0), 0u) << report[2];
-  EXPECT_EQ(readText(results / "a.txt"), readText(poses()));
-  EXPECT_EQ(readText(results / "b.txt"), readText(poses()));
-  EXPECT_EQ(linesOf(readText(results / "a.csv")).size(), static_cast<std::size_t>(kPairs) + 1);
+  const std::vector<std::string> report = linesOf(readText(results_ / "report.csv"));
+  ASSERT_EQ(report.size(), 4u);
+  for (const auto& [row, name] : std::map<int, std::string>{{1, "09"}, {2, "a"}, {3, "b"}}) {
+    EXPECT_EQ(report[static_cast<std::size_t>(row)].rfind(name + ",4,0,0,0,", 0), 0u) << report[1];
+    EXPECT_EQ(readText(results_ / (name + ".txt")), expected);
+    EXPECT_EQ(linesOf(readText(results_ / (name + ".csv"))).size(), static_cast<std::size_t>(kPairs) + 1);
+  }
+  ASSERT_EQ(run("run_sequence", (root_ / "a.bag").string() + " --poses " + poses().string() + " --threads 2").exit_code,
+            0);
+  EXPECT_EQ(readText(poses()), expected);
 
   // TUM's format has the stamps: times.txt plus 1e9 s.
-  const std::string one = (bags / "a.bag").string() + " --output " + (root_ / "one").string();
-  ASSERT_EQ(run("run_bag", one).exit_code, 0);
-  const std::vector<std::string> lines = linesOf(readText(root_ / "one" / "a.txt"));
+  ASSERT_EQ(runBags((root_ / "a.bag").string()).exit_code, 0);
+  const std::vector<std::string> lines = linesOf(readText(results_ / "a.txt"));
   ASSERT_EQ(lines.size(), static_cast<std::size_t>(kPairs) + 1);  // and a comment
   EXPECT_EQ(lines[1].rfind("1000000000.000000000 ", 0), 0u) << lines[1];
   EXPECT_EQ(lines[4].rfind("1000000000.300000000 ", 0), 0u) << lines[4];
 }
 
-TEST_F(Tools, ABagThatFailsIsNamedAndTheOthersAreNotRunAgain) {
-  const fs::path bags = root_ / "bags", results = root_ / "results";
-  fs::create_directories(bags);
-  const std::string convert = "--sequence " + sequence_.string() + " --output ";
-  ASSERT_EQ(run("kitti_to_bag", convert + (bags / "good.bag").string()).exit_code, 0);
-  fs::copy(bags / "good.bag", bags / "cut.bag");
-  fs::resize_file(bags / "cut.bag", fs::file_size(bags / "cut.bag") / 2);
-  const std::string command = bags.string() + " --output " + results.string() + " --resume";
-  expectError(run("run_bag", command), "1 of 2 bags failed");
-  std::vector<std::string> report = linesOf(readText(results / "report.csv"));
+/// As a RealSense D400 names its topics, with images as image_transport compresses them.
+TEST_F(Tools, BagsOfOtherNamesAndCompressedImages) {
+  const fs::path renamed = root_ / "renamed.bag";
+  {
+    sensor_msgs::CameraInfo infos[2];
+    const rosbag::Bag in(bag("plain").string());
+    rosbag::Bag out(renamed.string(), rosbag::bagmode::Write);
+    for (const rosbag::MessageInstance& message : rosbag::View(in)) {
+      const int side = message.getTopic().find("/left/") == std::string::npos ? 1 : 0;
+      const std::string topic = "/camera/infra" + std::to_string(1 + side);
+      if (const auto info = message.instantiate<sensor_msgs::CameraInfo>())
+        out.write(topic + "/camera_info", message.getTime(), infos[side] = *info);
+      const auto image = message.instantiate<sensor_msgs::Image>();
+      if (!image) continue;
+      sensor_msgs::CompressedImage compressed;
+      compressed.header = image->header;
+      compressed.format = "mono8; png compressed mono8";
+      cv::imencode(".png", cv::Mat(240, 320, CV_8U, const_cast<std::uint8_t*>(image->data.data())), compressed.data);
+      out.write(topic + "/image_rect_raw/compressed", message.getTime(), compressed);
+    }
+    sensor_msgs::CompressedImage torn;  // whose pair is left out
+    torn.header.stamp = ros::Time(1000000001.0);
+    for (const int side : {0, 1}) {
+      const std::string topic = "/camera/infra" + std::to_string(1 + side);
+      out.write(topic + "/image_rect_raw/compressed", torn.header.stamp, torn);
+      infos[side].header.stamp = torn.header.stamp;
+      out.write(topic + "/camera_info", torn.header.stamp, infos[side]);
+    }
+  }
+  const std::string names = " --camera /camera --left infra1 --right infra2 --image image_rect_raw";
+  ASSERT_EQ(runSequence().exit_code, 0);
+  const Outcome outcome = runBags(renamed.string(), "--format kitti --shuttle" + names);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(readText(results_ / "renamed.txt"), readText(poses()));
+  EXPECT_EQ(linesOf(readText(results_ / "report.csv")).at(1).rfind("renamed,4,0,0,1,", 0), 0u);
+  EXPECT_NE(outcome.out.find("shuttle: error about "), std::string::npos) << outcome.out;
+  expectError(runBags(renamed.string()), "1 of 1");
+  EXPECT_NE(readText(results_ / "report.csv").find("there is no /stereo/left/image_rect in it"), std::string::npos);
+
+  const std::string checked = run("check_camera", "--bag " + renamed.string() + names).out;
+  EXPECT_EQ(checked.rfind("OK   topics", 0), 0u) << checked;
+  EXPECT_NE(checked.find("malformed image: 0 bytes"), std::string::npos) << checked;
+}
+
+/// The drive as a raw folder of EuRoC's is rectified on the fly, or by convert.
+TEST_F(Tools, RawFoldersOfEuroc) {
+  const fs::path asl = root_ / "asl";
+  for (int side = 0; side < 2; ++side) {
+    const fs::path camera = asl / "mav0" / ("cam" + std::to_string(side));
+    fs::create_directories(camera / "data");
+    std::ofstream list(camera / "data.csv");
+    for (int i = 0; i < kPairs; ++i) {
+      const std::string stamp = std::to_string(1400000000000000000 + i * 100000000);
+      list << stamp << "," << stamp << ".png\n";
+      fs::copy(image(side, i), camera / "data" / (stamp + ".png"));
+    }
+    std::ofstream(camera / "sensor.yaml")
+        << "camera_model: pinhole\ndistortion_model: radial-tangential\nresolution: [320, 240]\n"
+        << "intrinsics: [300, 300, 160, 120]\ndistortion_coefficients: [0.01, 0, 0, 0]\n"
+        << "T_BS: {data: [1, 0, 0, " << side * kBaseline << ", 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1]}\n";
+  }
+  const fs::path raw = root_ / "raw.txt", rectified = root_ / "rectified";
+  const Outcome outcome = run("run_sequence", asl.string() + " --format tum --poses " + raw.string());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  ASSERT_EQ(run("euroc_to_kitti", "--input " + (asl / "mav0").string() + " --output " + rectified.string()).exit_code,
+            0);
+  ASSERT_EQ(run("run_sequence", rectified.string() + " --poses " + poses().string()).exit_code, 0);
+  const std::vector<std::string> lines = linesOf(readText(raw)), expected = linesOf(readText(poses()));
+  ASSERT_EQ(lines.size(), static_cast<std::size_t>(kPairs) + 1);  // and a comment
+  for (std::size_t i = 0; i < kPairs; ++i) {
+    std::istringstream line(lines[i + 1]), other(expected[i]);
+    const std::vector<double> pose((std::istream_iterator<double>(line)), std::istream_iterator<double>());
+    const std::vector<double> same((std::istream_iterator<double>(other)), std::istream_iterator<double>());
+    for (const std::size_t axis : {0u, 1u, 2u}) EXPECT_NEAR(pose.at(1 + axis), same.at(3 + 4 * axis), 1e-6);
+    EXPECT_NEAR(pose[0], 1.4e9 + 0.1 * static_cast<double>(i), 1e-6);
+    EXPECT_NEAR(pose[3], kStep * static_cast<double>(i), 0.05);
+  }
+
+  const fs::path bag = root_ / "raw.bag";
+  ASSERT_EQ(run("convert", asl.string() + " --frames 3 --output " + bag.string()).exit_code, 0);
+  rosbag::Bag in(bag.string());
+  EXPECT_EQ(rosbag::View(in, rosbag::TopicQuery("/stereo/right/image_raw")).size(), 3u);
+}
+
+TEST_F(Tools, ABagBecomesAFolder) {
+  const fs::path folder = root_ / "folder";
+  ASSERT_EQ(
+      run("convert", bag("a").string() + " --poses " + (root_ / "truth.txt").string() + " --output " + folder.string())
+          .exit_code,
+      0);
+  ASSERT_EQ(runSequence().exit_code, 0);
+  const std::string expected = readText(poses());
+  ASSERT_EQ(run("run_sequence", folder.string() + " --poses " + poses().string()).exit_code, 0);
+  EXPECT_EQ(readText(poses()), expected);
+  EXPECT_EQ(linesOf(readText(folder / "poses.txt")).size(), static_cast<std::size_t>(kPairs));
+}
+
+TEST_F(Tools, ABagThatFailsIsNamedAndTheOthersAreRun) {
+  const fs::path good = bag("good"), cut = root_ / "cut.bag";
+  fs::copy(good, cut);
+  fs::resize_file(cut, fs::file_size(cut) / 2);
+  expectError(runBags(root_.string()), "1 of 2 recordings failed");
+  const std::vector<std::string> report = linesOf(readText(results_ / "report.csv"));
   ASSERT_EQ(report.size(), 3u);
   EXPECT_EQ(report[1].rfind("cut,,,,,,,,,,", 0), 0u) << report[1];
   EXPECT_GT(report[1].size(), std::string("cut,,,,,,,,,,").size());
   EXPECT_EQ(report[2].rfind("good,4,", 0), 0u) << report[2];
-
-  const fs::file_time_type finished = fs::last_write_time(results / "good.txt");
-  fs::remove(bags / "cut.bag");
-  ASSERT_EQ(run("kitti_to_bag", convert + (bags / "cut.bag").string()).exit_code, 0);
-  EXPECT_EQ(run("run_bag", command).exit_code, 0);
-  EXPECT_EQ(readText(results / "cut.txt"), readText(results / "good.txt"));
-  EXPECT_EQ(fs::last_write_time(results / "good.txt"), finished);
-
-  expectError(run("run_bag", (bags / "good.bag").string() + " --camera /other --output " + results.string()), "1 of 1");
-  EXPECT_NE(readText(results / "report.csv").find("there is no /other/left/image_rect"), std::string::npos);
-  expectError(run("run_bag", (bags / "none.bag").string() + " --output " + results.string()), "none.bag");
-  expectError(run("run_bag", bags.string() + " --output " + results.string() + " --param motion/kernel=square"),
-              "motion/kernel");
+  EXPECT_TRUE(fs::exists(results_ / "good.txt"));
+  expectError(runBags((root_ / "none.bag").string()), "none.bag");
+  expectError(runBags(root_.string(), "--param motion/kernel=square"), "motion/kernel");
+  expectError(run("run_sequence", good.string()), "--output");
+  expectError(run("run_sequence", good.string() + " " + good.string() + " --poses " + poses().string()), "--output");
 }
 
-TEST_F(Tools, BagsCheckThemselves) {
-  const fs::path bag = root_ / "a.bag", results = root_ / "results", checks = results / "a.self_check.csv";
-  ASSERT_EQ(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output " + bag.string()).exit_code, 0);
-  const std::string command = bag.string() + " --resume --output " + results.string();
-  ASSERT_EQ(run("run_bag", command).exit_code, 0);
-  EXPECT_FALSE(fs::exists(checks));
-  const std::string poses_alone = readText(results / "a.txt");
+/// Many recordings, a process for each: what is finished stays.
+TEST_F(Tools, ManyRecordings) {
+  const fs::path good = bag("good"), bad = root_ / "bad.bag";
+  std::ofstream(bad) << "no bag";
+  const auto runMany = [&](const std::string& arguments) {
+    return run("run_many", root_.string() + " --jobs 2 --output " + results_.string() + arguments);
+  };
+  Outcome outcome = runMany(" -- --format kitti");
+  EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
+  EXPECT_EQ(outcome.out.rfind("bad,,,,,,,,,,", 0), 0u) << outcome.out;
+  EXPECT_NE(outcome.out.find("1 of 2 recordings are finished"), std::string::npos) << outcome.out;
+  const fs::path result = results_ / "good" / "good.txt";
+  EXPECT_EQ(linesOf(readText(result)).size(), static_cast<std::size_t>(kPairs));
+  const fs::file_time_type finished = fs::last_write_time(result);
+  EXPECT_EQ(runMany("").exit_code, 1);  // other arguments
 
-  // Results without the checks are not all that is asked for now.
-  const Outcome outcome = run("run_bag", command + " --shuttle --halves");
+  fs::remove(bad);
+  fs::copy(good, bad);
+  outcome = runMany(" -- --format kitti");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.out << outcome.err;
+  EXPECT_EQ(fs::last_write_time(result), finished);
+  EXPECT_EQ(linesOf(readText(results_ / "report.csv")).size(), 3u);
+}
+
+TEST_F(Tools, RecordingsCheckThemselves) {
+  const fs::path checks = results_ / "a.self_check.csv", a = bag("a");
+  ASSERT_EQ(runBags(a.string()).exit_code, 0);
+  EXPECT_FALSE(fs::exists(checks));
+  const std::string poses_alone = readText(results_ / "a.txt");
+
+  const Outcome outcome = runBags(a.string(), "--shuttle --halves");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_EQ(readText(results / "a.txt"), poses_alone);
+  EXPECT_EQ(readText(results_ / "a.txt"), poses_alone);
   const std::vector<std::string> lines = linesOf(readText(checks));
   ASSERT_EQ(lines.size(), 3u);
   EXPECT_EQ(lines[0].rfind("check,pairs,distance_m,end_m,", 0), 0u);
   for (const std::size_t i : {1u, 2u}) {
-    std::istringstream row(lines[i]);
-    std::vector<std::string> fields;
-    for (std::string field; std::getline(row, field, ',');) fields.push_back(field);
+    const std::vector<std::string> fields = cellsOf(lines[i]);
     ASSERT_GE(fields.size(), 11u) << lines[i];
     EXPECT_EQ(fields[0], i == 1 ? "shuttle" : "halves");
     EXPECT_EQ(fields[1], std::to_string(kPairs));
@@ -414,61 +525,53 @@ TEST_F(Tools, BagsCheckThemselves) {
     EXPECT_LT(std::stod(fields[3]), 0.03);
     EXPECT_NE(outcome.out.find("a: " + fields[0] + ": error about "), std::string::npos) << outcome.out;
   }
+  // The images of a folder are those of its bag.
+  const std::string said = runSequence("--shuttle --halves").out;
+  for (const std::string& line : linesOf(outcome.out))
+    if (line.rfind("a: ", 0) == 0) EXPECT_NE(said.find("\n" + line.substr(3) + "\n"), std::string::npos) << said;
 
-  const fs::file_time_type finished = fs::last_write_time(checks);
-  ASSERT_EQ(run("run_bag", command + " --halves").exit_code, 0);
-  EXPECT_EQ(fs::last_write_time(checks), finished);
-  ASSERT_EQ(run("run_bag", bag.string() + " --output " + results.string()).exit_code, 0);
+  ASSERT_EQ(runBags(a.string()).exit_code, 0);
   EXPECT_FALSE(fs::exists(checks)) << "of another run than the poses beside it";
 }
 
 /// The way back finds the messages of a pair by when they were recorded, which need not be one after the other.
 TEST_F(Tools, AShuttleFindsPairsHoweverTheyWereRecorded) {
-  const fs::path plain = root_ / "plain.bag", at_once = root_ / "at_once.bag", late = root_ / "late.bag";
-  ASSERT_EQ(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output " + plain.string()).exit_code, 0);
+  const fs::path plain = bag("plain"), at_once = root_ / "at_once.bag", late = root_ / "late.bag";
   {
     const rosbag::Bag in(plain.string());
     rosbag::Bag out_at_once(at_once.string(), rosbag::bagmode::Write), out_late(late.string(), rosbag::bagmode::Write);
-    for (const rosbag::MessageInstance& message : rosbag::View(
-             in,
-             rosbag::TopicQuery(std::vector<std::string>{"/stereo/left/image_rect", "/stereo/right/image_rect",
-                                                         "/stereo/left/camera_info", "/stereo/right/camera_info"}))) {
+    for (const rosbag::MessageInstance& message : rosbag::View(in)) {
+      if (message.getTopic().rfind("/stereo/", 0) != 0) continue;
       out_at_once.write(message.getTopic(), ros::Time(1000000009.0), message, message.getConnectionHeader());
       const bool is_late = message.getTopic() == "/stereo/right/image_rect";
       out_late.write(message.getTopic(), message.getTime() + ros::Duration(is_late ? 0.25 : 0.0), message,
                      message.getConnectionHeader());
     }
   }
-  const fs::path results = root_ / "results";
-  for (const fs::path& bag : {plain, at_once, late}) {
-    const Outcome outcome = run("run_bag", bag.string() + " --shuttle --output " + results.string());
-    EXPECT_EQ(outcome.exit_code, 0) << bag << ": " << outcome.err;
-  }
-  const std::string expected = readText(results / "plain.self_check.csv");
+  const Outcome outcome = runBags(root_.string(), "--shuttle");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  const std::string expected = readText(results_ / "plain.self_check.csv");
   EXPECT_NE(expected.find("shuttle,4,"), std::string::npos);
-  EXPECT_EQ(readText(results / "at_once.self_check.csv"), expected);
-  EXPECT_EQ(readText(results / "late.self_check.csv"), expected);
+  EXPECT_EQ(readText(results_ / "at_once.self_check.csv"), expected);
+  EXPECT_EQ(readText(results_ / "late.self_check.csv"), expected);
 }
 
-TEST_F(Tools, ALostBagDoesNotPassItsSelfChecks) {
+TEST_F(Tools, ALostDriveDoesNotPassItsSelfChecks) {
   for (int i = 1; i < kPairs; ++i)
     for (int side = 0; side < 2; ++side)
       cv::imwrite(image(side, i).string(), cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
-  const fs::path bag = root_ / "dark.bag", results = root_ / "results";
-  ASSERT_EQ(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output " + bag.string()).exit_code, 0);
-  const Outcome outcome = run("run_bag", bag.string() + " --shuttle --halves --output " + results.string());
+  const Outcome outcome = runBags(sequence_.string(), "--shuttle --halves");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   for (const char* check : {"shuttle", "halves"}) {
-    EXPECT_NE(outcome.out.find(std::string("dark: ") + check + ": no figure"), std::string::npos) << outcome.out;
-    EXPECT_NE(readText(results / "dark.self_check.csv").find(std::string("\n") + check + ",4,"), std::string::npos);
+    EXPECT_NE(outcome.out.find(std::string("09: ") + check + ": no figure"), std::string::npos) << outcome.out;
+    EXPECT_NE(readText(results_ / "09.self_check.csv").find(std::string("\n") + check + ",4,"), std::string::npos);
   }
   EXPECT_NE(outcome.out.find("pairs have no pose"), std::string::npos) << outcome.out;
 }
 
 /// Of all stamps that wait, images are held in memory, so only so many may.
 TEST_F(Tools, MessagesThatMakeNoPairDoNotKeepOthersFromIt) {
-  const fs::path good = root_ / "good.bag", mixed = root_ / "mixed.bag", results = root_ / "results";
-  ASSERT_EQ(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output " + good.string()).exit_code, 0);
+  const fs::path mixed = root_ / "mixed.bag";
   constexpr int kAlone = 250;
   {
     rosbag::Bag out(mixed.string(), rosbag::bagmode::Write);
@@ -477,17 +580,17 @@ TEST_F(Tools, MessagesThatMakeNoPairDoNotKeepOthersFromIt) {
       info.header.stamp = ros::Time(999999000, 1 + i);
       out.write("/stereo/left/camera_info", ros::Time(999999000, 1 + i), info);
     }
-    const rosbag::Bag in(good.string());
+    const rosbag::Bag in(bag("good").string());
     for (const rosbag::MessageInstance& message : rosbag::View(in))
       out.write(message.getTopic(), message.getTime(), message, message.getConnectionHeader());
   }
-  ASSERT_EQ(run("run_bag", mixed.string() + " --output " + results.string()).exit_code, 0);
-  const std::string row = linesOf(readText(results / "report.csv")).at(1);
+  ASSERT_EQ(runBags(mixed.string()).exit_code, 0);
+  const std::string row = linesOf(readText(results_ / "report.csv")).at(1);
   EXPECT_EQ(row.rfind("mixed,4,0,0," + std::to_string(kAlone) + ",", 0), 0u) << row;
 }
 
 TEST_F(Tools, ABagWithoutTimesSaysSo) {
-  const fs::path bag = root_ / "zero.bag", results = root_ / "results";
+  const fs::path bag = root_ / "zero.bag";
   {
     rosbag::Bag out(bag.string(), rosbag::bagmode::Write);
     for (const std::string side : {"left", "right"}) {
@@ -495,10 +598,9 @@ TEST_F(Tools, ABagWithoutTimesSaysSo) {
       out.write("/stereo/" + side + "/camera_info", ros::Time(1.0), sensor_msgs::CameraInfo());
     }
   }
-  expectError(run("run_bag", bag.string() + " --output " + results.string()), "1 of 1 bags failed");
-  const std::string report = readText(results / "report.csv");
-  EXPECT_NE(report.find("no pair can be used: /stereo/"), std::string::npos) << report;
-  EXPECT_NE(report.find("zero stamp"), std::string::npos) << report;
+  expectError(run("run_sequence", bag.string() + " --poses " + poses().string()), "no pair can be used: /stereo/");
+  expectError(runBags(bag.string()), "1 of 1 recordings failed");
+  EXPECT_NE(readText(results_ / "report.csv").find("zero stamp"), std::string::npos);
 }
 
 TEST_F(Tools, HashTellsOptionsApart) {
@@ -564,5 +666,5 @@ TEST_F(Tools, PerfectTrajectoryHasNoError) {
               (root_ / "none").string());
 }
 
-}  // namespace
+}  // namespace test_tools
 }  // namespace sdvo

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -45,6 +46,8 @@ class EurocSequence {
 
   /// Decodes frame i as recorded, not rectified.
   ImagePair load(int i) const;
+  /// The views of frame i that rectification().camera has.
+  ImagePair loadRectified(int i) const;
 
   /// Poses of the rectified left camera relative to its first one, from cam0_ground_truth.txt (lines "stamp[ns] r11 r12
   /// r13 tx r21 … tz" of the raw camera). Empty when there are not some for each frame; `problem` then says why.
@@ -59,8 +62,12 @@ class EurocSequence {
   std::string directory_;
   EurocCamera cameras_[2];
   StereoRectification rectification_;
+  cv::Mat map_x_[2], map_y_[2];  ///< raw pixel of each rectified one
   std::vector<Frame> frames_;
   int unpaired_ = 0;
 };
+
+/// The folder with cam0 and cam1: `folder` itself or the mav0 in it.
+std::optional<std::string> findMav0(const std::string& folder);
 
 }  // namespace sdvo

@@ -42,10 +42,10 @@ class BaseDescriptor {
 };
 
 /// The base descriptors, also those that the OpenCV at hand lacks.
-enum class DescriptorType { kAkaze, kBrief, kBrisk, kFreak, kOrb, kSift, kSurf };
+enum class DescriptorType { kBrief, kBrisk, kFreak, kOrb, kSift, kSurf };
 
 inline const std::vector<std::string>& namesOf(DescriptorType) {
-  static const std::vector<std::string> names = {"akaze", "brief", "brisk", "freak", "orb", "sift", "surf"};
+  static const std::vector<std::string> names = {"brief", "brisk", "freak", "orb", "sift", "surf"};
   return names;
 }
 

@@ -10,7 +10,7 @@ namespace sdvo {
 /// zero where the contrast has no maximum, and where the circles of the eight neighbours leave the image.
 ///
 /// Such corners are far more repeatable than those of cv::cornerSubPix, the intersection of gradient lines. Many of
-/// FAST's corners are spots, from which that wanders off (docs/log/accuracy.md).
+/// FAST's corners are spots, from which that wanders off (docs/decisions.md).
 cv::Point2f cornerPeak(const cv::Mat& image, const cv::Point& pixel);
 
 }  // namespace sdvo

@@ -8,10 +8,10 @@
 
 namespace sdvo {
 
-enum class DetectorType { kFast, kAgast, kGftt, kHarris, kOrb, kSift };
+enum class DetectorType { kFast, kGftt, kOrb, kSift };
 
 inline const std::vector<std::string>& namesOf(DetectorType) {
-  static const std::vector<std::string> names = {"fast", "agast", "gftt", "harris", "orb", "sift"};
+  static const std::vector<std::string> names = {"fast", "gftt", "orb", "sift"};
   return names;
 }
 
@@ -31,19 +31,19 @@ struct FeatureDetectorOptions {
   void describe(OptionList& list) {
     list.add("type", type, "corner detector");
     list.add("max_features", max_features, {1, 20000}, "", "corners kept per left image");
-    list.add("area_per_feature", area_per_feature, {0, 10000}, "px^2",
-             "an image with less than this area for each keeps fewer corners, but at least 600; 169: the area of a 13x13 "
-             "px patch, as neighbours that share pixels share errors; 0: max_features alone");
+    list.add(
+        "area_per_feature", area_per_feature, {0, 10000}, "px^2",
+        "an image with less than this area for each keeps fewer corners, but at least 600; 169: the area of a 13x13 "
+        "px patch, as neighbours that share pixels share errors; 0: max_features alone");
     list.add("bucket_size", bucket_size, {8, 4096}, "px", "side of the square buckets that share the corners evenly");
     list.add("min_spacing", min_spacing, {0.0, 100.0}, "px",
              "corners nearer than this to a stronger one are left out; 0: none is");
     list.add("fast_min_threshold", fast_min_threshold, {1, 100}, "grey levels",
-             "fast, agast, orb: weakest corner considered; each bucket's own threshold adapts upwards from here");
-    list.add("corner_quality", corner_quality, {1e-6, 1.0}, "",
-             "gftt: weakest response relative to the best; harris: its root");
-    list.add("corner_block_size", corner_block_size, {3, 31}, "px", "gftt, harris: window of the gradient matrix");
-    list.add("subpixel", subpixel, "fast, agast, gftt, harris: refine corners to sub-pixel positions");
-    list.add("subpixel_radius", subpixel_radius, {1, 15}, "px", "gftt, harris: half side of the sub-pixel window");
+             "fast, orb: weakest corner considered; each bucket's own threshold adapts upwards from here");
+    list.add("corner_quality", corner_quality, {1e-6, 1.0}, "", "gftt: weakest response relative to the best");
+    list.add("corner_block_size", corner_block_size, {3, 31}, "px", "gftt: window of the gradient matrix");
+    list.add("subpixel", subpixel, "fast, gftt: refine corners to sub-pixel positions");
+    list.add("subpixel_radius", subpixel_radius, {1, 15}, "px", "gftt: half side of the sub-pixel window");
     list.add("mask", mask, "PNG (absolute path) of the left image's size: no corners where it is black; empty: none");
   }
   /// Throws std::invalid_argument when the OpenCV at hand lacks the detector.

@@ -4,9 +4,6 @@
 
 namespace sdvo {
 
-/// Half side of the largest patch, px.
-constexpr int kLargestPatchRadius = 32;
-
 /// Values that a row of a sampled patch takes: the square's side rounded up, so that whole registers can be worked on.
 constexpr int patchStride(int radius) {
   return (2 * radius + 4) / 4 * 4;

@@ -18,7 +18,7 @@ bool widen(Matrix6d& covariance, const Vector6d& deviation);
 class PoseCovariance {
  public:
   /// Errors of successive key frames are positively correlated, because these see the same points. The variance of
-  /// their sum exceeds the sum of their variances by this factor (measured by scripts/measure_covariance).
+  /// their sum exceeds the sum of their variances by this factor (measured by lab/run covariance).
   static constexpr double kAlike = 2.0;
 
   /// Of the last pose; zero in the beginning.

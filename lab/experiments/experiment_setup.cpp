@@ -1,0 +1,62 @@
+#include "experiment_setup.hpp"
+
+namespace sdvo {
+
+const std::vector<SetupDifference>& paperDifferences() {
+  // The paper fits its sizes to matching alone; these find most matches of FREAK on drives that are not reported.
+  static const std::vector<SetupDifference> differences = {
+      {"whole pixels", {"detector/subpixel=false"}, {"detector/subpixel=true"}},
+      {"tracking", {"stereo/method=lk"}, {"stereo/method=epipolar"}},
+      {"orientation", {"descriptor/oriented=true"}, {"descriptor/oriented=false"}},
+      {"sizes for matching",
+       {"size_curve/slope=0.7", "size_curve/min_size=14", "size_curve/max_size=60"},
+       {"size_curve/slope=0", "size_curve/min_size=0", "size_curve/max_size=0"},
+       true},
+  };
+  return differences;
+}
+
+const std::vector<SetupDifference>& otherDifferences() {
+  static const std::vector<SetupDifference> differences = {
+      {"spacing 4 px", {"detector/min_spacing=4"}, {}},
+      {"inside the image", {"descriptor/extend_border=false"}, {}},
+      {"strong corners", {"detector/fast_min_threshold=12"}, {}},
+  };
+  return differences;
+}
+
+std::vector<Ablation> ablations() {
+  std::vector<Ablation> all;
+  for (const Setup setup : {Setup::kProduct, Setup::kPaper}) all.push_back({setup, "as it is", {}});
+  for (const SetupDifference& difference : paperDifferences()) {
+    all.push_back({Setup::kProduct, "with " + difference.name, difference.with});
+    all.push_back({Setup::kPaper, "without " + difference.name, difference.without});
+  }
+  for (const SetupDifference& difference : otherDifferences())
+    for (const Setup setup : {Setup::kProduct, Setup::kPaper})
+      all.push_back({setup, "with " + difference.name, difference.with});
+  return all;
+}
+
+PipelineOptions ExperimentSetup::options() const {
+  const auto read = [this](bool freak) {
+    // A loose threshold, as in the paper: weak corners belong to the large feature sets.
+    std::vector<std::string> all = {"stereo_features/detector/max_features=5000", "detector/area_per_feature=0",
+                                    "detector/fast_min_threshold=3", "detector/corner_quality=0.0002"};
+    if (setup == Setup::kPaper)
+      for (const SetupDifference& difference : paperDifferences())
+        if (freak || !difference.of_freak) all.insert(all.end(), difference.with.begin(), difference.with.end());
+    all.insert(all.end(), settings.begin(), settings.end());
+    return readPipelineOptions("", all);
+  };
+  const bool freak = read(true).stereo_features.descriptor.type == DescriptorType::kFreak;
+  return read(freak);
+}
+
+ExperimentSetup ExperimentSetup::withDescriptor(DescriptorType type) const {
+  ExperimentSetup other = *this;
+  other.settings.push_back("descriptor/type=" + nameOf(type));
+  return other;
+}
+
+}  // namespace sdvo

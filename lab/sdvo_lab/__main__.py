@@ -1,0 +1,42 @@
+"""What measures the odometry, one subcommand each; lab/run SUBCOMMAND --help says more."""
+import argparse
+import importlib
+import sys
+
+# Subcommand: module and what it is for. A module has options(parser) and main(arguments).
+COMMANDS = {
+    "accuracy": ("accuracy", "errors of recorded, disguised and rendered drives"),
+    "covariance": ("covariance", "covariances against errors"),
+    "faults": ("faults", "faults put into drives: what the odometry says of them"),
+    "ablate": ("ablate", "the odometry without one of its mechanisms"),
+    "benchmark": ("benchmark", "time of kernels, drives and nodelets"),
+    "places": ("places", "recognised revisits and false loops of long drives"),
+    "self-check": ("self_check", "the self-checks of run_bag against the ground truth"),
+    "experiments": ("experiments", "the paper's experiments"),
+    "tables": ("tables", "tables of the paper's experiments from their CSV files"),
+    "golden": ("golden", "poses, states and covariances of two builds"),
+    "guises": ("guises", "a drive turned, cut, spoilt or in another order"),
+    "report": ("report", "picture of one drive: trajectory, errors, features, times"),
+    "layout": ("layout", "picture of the rooms of the sources"),
+}
+
+
+def main():
+    parser = argparse.ArgumentParser(prog="lab/run", description=__doc__)
+    commands = parser.add_subparsers(dest="command", metavar="SUBCOMMAND")
+    commands.required = True
+    for name, (_, purpose) in COMMANDS.items():
+        commands.add_parser(name, help=purpose, add_help=False)
+    chosen = parser.parse_args(sys.argv[1:2]).command
+    module = importlib.import_module("." + COMMANDS[chosen][0], __package__)
+    parser = argparse.ArgumentParser(prog=f"lab/run {chosen}", description=module.__doc__,
+                                     formatter_class=argparse.RawDescriptionHelpFormatter)
+    module.options(parser)
+    arguments, arguments.rest = parser.parse_known_args(sys.argv[2:])
+    if arguments.rest and not hasattr(module, "PASSES_ON"):
+        parser.error("unrecognized arguments: " + " ".join(arguments.rest))
+    return module.main(arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,135 @@
+"""Measures the time of the kernels, of whole drives and of the nodelets, and writes it between the marks of docs/precision.md, some
+five minutes on a machine that has nothing else to do. Needs scripts/build run_sequence evaluate_trajectory count_allocations
+benchmark_kernels measure_latency euroc_to_kitti render_drive; for the kernels Google Benchmark (Debian and Ubuntu: libbenchmark-dev;
+then scripts/build --force-cmake); for drives KITTI_DIR and EUROC_DIR."""
+import json
+import os
+import pathlib
+import re
+import signal
+import statistics
+import subprocess
+import tempfile
+
+from . import drives, marks, odometry, programs
+
+KERNELS = {
+    "fastCorners": "FAST corners of an image (plain: cv::FAST)",
+    "cornerPeaks": "sub-pixel positions of 1100 corners (plain: cv::cornerSubPix)",
+    "stereoMatch": "stereo match of 1100 corners, all of it",
+    "freakInTwoViews": "FREAK of 1100 key points in two views, with the integral images",
+    "patchAlignment": "alignment of 1100 patches between pairs",
+}
+
+
+def machine():
+    def first(*command):
+        return subprocess.run(command, check=True, stdout=subprocess.PIPE, universal_newlines=True).stdout.splitlines()[0]
+
+    model = re.search(r"^model name\s*: (.*)", pathlib.Path("/proc/cpuinfo").read_text(), re.MULTILINE)
+    commit = first("git", "-C", str(programs.ROOT), "rev-parse", "--short", "HEAD")
+    return [f"{model.group(1) if model else os.uname().machine}, {os.cpu_count()} processors; {first('c++', '--version')}; "
+            f"commit {commit}; load {os.getloadavg()[0]:.1f} at the start."]
+
+
+def kernels():
+    report = json.loads(programs.run("benchmark_kernels", "--benchmark_format=json", "--benchmark_repetitions=7",
+                                     "--benchmark_min_time=0.2", "--benchmark_report_aggregates_only=true",
+                                     "--benchmark_enable_random_interleaving=true"))
+    median = {run["run_name"]: run["cpu_time"] * 1e-6 for run in report["benchmarks"] if run["aggregate_name"] == "median"}
+    yield ["kernel, images of 1241x376", "plain [ms]", "vectors [ms]", "ratio"]
+    for name, words in KERNELS.items():
+        if f"{name}/1" in median:
+            plain, vectors = median[f"{name}/0"], median[f"{name}/1"]
+            yield [words, f"{plain:.2f}", f"{vectors:.2f}", f"{plain / vectors:.1f}"]
+
+
+def timed(drive, *arguments, runs=3):
+    """Medians over some runs of CPU, median and 95th percentile of the wall time (ms a pair), and the last run."""
+    all_runs = [odometry.run(drive.directory, *arguments) for _ in range(runs)]
+    times = [[float(x) for x in re.search(r"median ([\d.]+) ms, p95 ([\d.]+) ms, CPU ([\d.]+)", run.said).groups()] for run in all_runs]
+    wall, p95, cpu = (statistics.median(column) for column in zip(*times))
+    return (cpu, wall, p95), all_runs[-1]
+
+
+def cells(times):
+    return [f"{time:.1f}" for time in times]
+
+
+def drive_table(folder):
+    yield ["drive", "threads", "CPU [ms a pair]", "wall, median", "wall, p95"]
+    names = [("kitti", "06"), ("kitti", "01"), *(("euroc", name) for name in drives.recorded_names("euroc"))]
+    for drive in (drives.recorded(kind, name, folder) for kind, name in names):
+        for threads in (1, 2):
+            yield [drive.name, threads, *cells(timed(drive, "--threads", threads)[0])]
+
+
+def small_images(folder):
+    """Somebody walks through a room with the cameras that robots carry."""
+    yield ["drive", "CPU [ms a pair]", "wall, median", "wall, p95", "CPU by that of KITTI 06", "p95 by median"]
+    chosen = {"KITTI 06, 1226x370": drives.recorded("kitti", "06")}
+    for rig, size in (("d435_small", "424x240"), ("oak_d", "640x400")):
+        chosen[f"hand_held, {rig}, {size}"] = drives.rendered(folder, "hand_held", rig, 1, pairs=100, noise=2, exposure=0.3, motion_blur=0.01)
+    whole = None
+    for name, drive in chosen.items():
+        (cpu, wall, p95), _ = timed(drive)
+        whole = whole or cpu
+        yield [name, *cells((cpu, wall, p95)), f"{cpu / whole:.2f}", f"{p95 / wall:.2f}"]
+
+
+def growth(_):
+    yield ["corners", "CPU [ms a pair]", "wall, median", "wall, p95", "t [%]", "r [deg/m]"]
+    drive = drives.recorded("kitti", "06")
+    for count in (250, 500, 1000, 1100, 2000, 4000):
+        times, run = timed(drive, "--param", f"detector/max_features={count}", "--param", "detector/area_per_feature=0", runs=1)
+        mean = odometry.errors(drive.truth, run.poses, drive.lengths)["mean"]
+        yield [count, *cells(times), f"{mean['translation_percent']:.3f}", f"{mean['rotation_deg_per_m']:.4f}"]
+
+
+def allocations(_):
+    yield ["KITTI", "image side", "… kept", "motion side", "… kept"]
+    for name in ("06", "01"):
+        yield [name, *programs.run("count_allocations", drives.recorded("kitti", name).directory).split()]
+
+
+def latency(_):
+    """Both nodelets in one process with the camera, as they would be in its manager."""
+    yield ["Hz", "pairs", "poses", "dropped", "core, median [ms]", "stamp → odom", "over the core", "… p95"]
+    setup, port = programs.ROOT / ".catkin_ws/devel/setup.sh", 11399
+    command, sequence = programs.program("measure_latency"), drives.recorded("kitti", "06").directory
+    with tempfile.TemporaryDirectory() as home:
+        environment = dict(os.environ, ROS_MASTER_URI=f"http://localhost:{port}", ROS_HOME=home)
+        master = subprocess.Popen(["roscore", "-p", str(port)], env=environment, stdout=subprocess.DEVNULL)
+        try:
+            for rate in (10, 30, 60):
+                printed = subprocess.run(["bash", "-c", f". {setup}; exec {command} {sequence} {rate} 10"], check=True, env=environment,
+                                         stdout=subprocess.PIPE, universal_newlines=True).stdout
+                yield printed.splitlines()[-1].split()
+        finally:
+            master.send_signal(signal.SIGINT)
+            master.wait()
+
+
+TABLES = {"drives": drive_table, "small_images": small_images, "growth": growth, "allocations": allocations, "latency": latency}
+
+PRINTED_ALONE = ("kernels", "allocations")  # no page has them
+
+
+def options(parser):
+    parser.add_argument("tables", nargs="*", metavar="|".join(["machine", "kernels", *TABLES]), help="[default: all]")
+    drives.add_rendered(parser)
+    marks.add_write(parser, marks.PERFORMANCE)
+
+
+def main(arguments):
+    known = ["machine", "kernels", *(TABLES if drives.data_set("kitti") else ())]
+    marks.check_names(arguments.tables, known)
+    with drives.folders(arguments) as (_, folder):
+        for name in arguments.tables or known:
+            if name == "machine":
+                print("\n".join(machine()))
+                if arguments.write:
+                    marks.put(arguments.write, name, machine())
+            else:
+                page = arguments.write if name not in PRINTED_ALONE else None
+                marks.show(kernels() if name == "kernels" else TABLES[name](folder), page, name)

@@ -1,0 +1,284 @@
+"""Every fault that images and stamps can have, as functions of a part's pairs, the drive and random numbers, that change the list or
+its pairs."""
+import dataclasses
+import pathlib
+
+import cv2
+import numpy
+
+from . import drives
+
+cv2.setNumThreads(1)
+
+# Pairs that a fault touches, out of every so many, and those after it without which there is none.
+FIRST, LAST, EVERY, AFTER = 30, 45, 80, 15
+PERIOD = 0.1  # s
+
+
+@dataclasses.dataclass
+class Pair:
+    """What the odometry gets, and the number of the rendered pair whose pose is the truth. An image is a path (it is
+    linked) or an array (it is written)."""
+    left: object
+    right: object
+    stamp: float
+    truth: int
+
+
+def pairs_of(drive):
+    return [Pair(drive.path(0, i), drive.path(1, i), stamp, i) for i, stamp in enumerate(drive.stamps)]
+
+
+def pixels(image):
+    return drives.pixels(image) if isinstance(image, pathlib.Path) else image
+
+
+def parts(pairs):
+    """A long drive is hit again and again."""
+    return [pairs[i:i + EVERY] for i in range(0, len(pairs), EVERY)]
+
+
+def is_hit(part):
+    return len(part) >= LAST + AFTER
+
+
+def touched(pairs):
+    return pairs[FIRST:LAST]
+
+
+def images(change, sides=(0, 1)):
+    """A fault that changes the pixels of some sides."""
+    def fault(pairs, drive, random):
+        for pair in touched(pairs):
+            if 0 in sides:
+                pair.left = change(pixels(pair.left), drive, random)
+            if 1 in sides:
+                pair.right = change(pixels(pair.right), drive, random)
+        return pairs
+    return fault
+
+
+def shifted(dx, dy):
+    def change(image, drive, random):
+        return cv2.warpAffine(image, numpy.float32([[1, 0, dx], [0, 1, dy]]), image.shape[::-1], borderMode=cv2.BORDER_REPLICATE)
+    return images(change, sides=(1,))
+
+
+def rotated(degrees):
+    def change(image, drive, random):
+        _, cx, cy, _ = drive.camera
+        matrix = cv2.getRotationMatrix2D((cx, cy), degrees, 1.0)
+        return cv2.warpAffine(image, matrix, image.shape[::-1], borderMode=cv2.BORDER_REPLICATE)
+    return images(change, sides=(1,))
+
+
+def distorted(image, drive, random):
+    """As a lens with k1 = -0.3 would show it, right where the sides differ a little."""
+    f, cx, cy, _ = drive.camera
+    rows, columns = image.shape
+    u, v = numpy.meshgrid(numpy.arange(columns, dtype=numpy.float32), numpy.arange(rows, dtype=numpy.float32))
+    x, y = (u - cx) / f, (v - cy) / f
+    scale = 1 + 0.3 * (x * x + y * y)
+    return cv2.remap(image, numpy.float32(f * x * scale + cx), numpy.float32(f * y * scale + cy),
+                     cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
+
+
+def unrectified(pairs, drive, random):
+    """Raw images: distorted, and the right camera mounted half a degree off and 3 px down."""
+    for pair in touched(pairs):
+        pair.left = distorted(pixels(pair.left), drive, random)
+        pair.right = distorted(pixels(pair.right), drive, random)
+    return rotated(0.5)(shifted(0, 3)(pairs, drive, random), drive, random)
+
+
+def gained(gain):
+    return lambda image, drive, random: numpy.uint8(numpy.clip(image * gain, 0, 255))
+
+
+def grey(level):
+    return lambda image, drive, random: numpy.full_like(image, level)
+
+
+def noisy(sigma):
+    return lambda image, drive, random: numpy.uint8(numpy.clip(image + random.normal(0, sigma, image.shape), 0, 255))
+
+
+def salted(image, drive, random):
+    image, chance = image.copy(), random.random(image.shape)
+    image[chance < 0.025], image[chance > 0.975] = 0, 255
+    return image
+
+
+def rained(image, drive, random):
+    """Streaks anywhere, others in each image."""
+    image = image.copy()
+    for _ in range(600):
+        x, y, length = random.integers(image.shape[1]), random.integers(image.shape[0]), random.integers(5, 25)
+        cv2.line(image, (int(x), int(y)), (int(x) + 2, int(y + length)), int(random.integers(150, 255)), 1)
+    return image
+
+
+def blurred(image, drive, random):
+    return cv2.GaussianBlur(image, (0, 0), 4.0)
+
+
+def smeared(image, drive, random):
+    return cv2.blur(image, (31, 1))
+
+
+def compressed(image, drive, random):
+    return cv2.imdecode(cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, 10])[1], cv2.IMREAD_GRAYSCALE)
+
+
+def frozen(pairs, drive, random):
+    """Both cameras repeat their images while stamps and truth go on."""
+    for pair in touched(pairs):
+        pair.left, pair.right = pairs[FIRST - 1].left, pairs[FIRST - 1].right
+    return pairs
+
+
+def frozen_right(pairs, drive, random):
+    for pair in touched(pairs):
+        pair.right = pairs[FIRST - 1].right
+    return pairs
+
+
+def right_late(pairs, drive, random):
+    rights = [pair.right for pair in pairs]
+    for i in range(FIRST, LAST):
+        pairs[i].right = rights[i - 1]
+    return pairs
+
+
+def swapped(pairs, drive, random):
+    for pair in touched(pairs):
+        pair.left, pair.right = pair.right, pair.left
+    return pairs
+
+
+def duplicated(pairs, drive, random):
+    """Every second pair shows the images of the one before."""
+    for before, pair in zip(pairs[FIRST:LAST:2], pairs[FIRST + 1:LAST:2]):
+        pair.left, pair.right = before.left, before.right
+    return pairs
+
+
+def out_of_order(pairs, drive, random):
+    """Images of neighbouring pairs have changed places."""
+    for a, b in zip(pairs[FIRST:LAST - 1:2], pairs[FIRST + 1:LAST:2]):
+        (a.left, a.right, a.truth), (b.left, b.right, b.truth) = (b.left, b.right, b.truth), (a.left, a.right, a.truth)
+    return pairs
+
+
+def gap(seconds):
+    def fault(pairs, drive, random):
+        return pairs[:FIRST] + pairs[FIRST + round(seconds / PERIOD) - 1:]
+    return fault
+
+
+def sparse(pairs, drive, random):
+    return [pair for i, pair in enumerate(pairs) if i < FIRST or i >= LAST or random.random() > 0.4]
+
+
+def jittered(pairs, drive, random):
+    for pair in touched(pairs):
+        pair.stamp += random.uniform(-0.04, 0.04)
+    return pairs
+
+
+def uneven(pairs, drive, random):
+    """Stamps 10 and 190 ms apart of pairs taken evenly."""
+    for pair in pairs[FIRST:LAST:2]:
+        pair.stamp += 0.9 * PERIOD
+    return pairs
+
+
+def bursts(pairs, drive, random):
+    """Pairs taken evenly arrive by threes and are stamped on arrival, 1 ms apart."""
+    for i in range(FIRST, LAST):
+        pairs[i].stamp = pairs[i - i % 3].stamp + 0.001 * (i % 3)
+    return pairs
+
+
+def surface(random, rows, columns):
+    """Something textured, grey level by grey level different."""
+    texture = sum(cv2.resize(numpy.float32(random.normal(0, 1, (rows // s + 2, columns // s + 2))), (columns, rows),
+                             interpolation=cv2.INTER_CUBIC) * s ** 0.5 for s in (3, 6, 12, 24))
+    return numpy.clip(120 + 14 * texture, 0, 255)
+
+
+def covered(share, velocity, depth=4.0):
+    """A textured board parallel to the image `depth` m ahead that covers a share of it and moves by `velocity` (m/s, right
+    and ahead); at zero it is fixed to the camera. Both cameras see it as geometry says."""
+    def fault(pairs, drive, random):
+        f, cx, cy, baseline = drive.camera
+        rows, columns = pixels(pairs[0].left).shape
+        board = surface(random, 2 * rows, 3 * columns)
+        for k, pair in enumerate(touched(pairs)):
+            away = depth + velocity[1] * PERIOD * k
+            scale = depth / away
+            for side in (0, 1):
+                # Image of the board's texel (a, b): its middle lies ahead at the beginning.
+                x = velocity[0] * PERIOD * k - side * baseline
+                matrix = numpy.float32([[scale, 0, cx + f * x / away - scale * 1.5 * columns],
+                                        [0, scale, cy - scale * rows]])
+                drawn = cv2.warpAffine(board, matrix, (columns, rows), flags=cv2.INTER_AREA)
+                drawn = numpy.clip(drawn + random.normal(0, 1.5, drawn.shape), 0, 255)
+                # It ends at the same column of its own in both views, and of the left image on average as asked.
+                edge = round(share * columns - side * f * baseline / away)
+                image = pixels(pair.right if side else pair.left).copy()
+                image[:, :max(edge, 0)] = drawn[:, :max(edge, 0)]
+                if side:
+                    pair.right = image
+                else:
+                    pair.left = image
+        return pairs
+    return fault
+
+
+FAULTS = {
+    "none": lambda pairs, drive, random: pairs,
+    "frozen": frozen, "frozen_right": frozen_right, "right_100_ms_late": right_late, "swapped": swapped,
+    "duplicated": duplicated, "out_of_order": out_of_order,
+    "gap_0.5_s": gap(0.5), "gap_1.5_s": gap(1.5), "gap_3_s": gap(3.0), "dropped_40_percent": sparse,
+    "stamps_jitter_40_ms": jittered, "stamps_10_190_ms": uneven, "bursts_1_ms": bursts,
+    "right_down_1_px": shifted(0, 1), "right_down_3_px": shifted(0, 3), "right_down_5_px": shifted(0, 5),
+    "right_up_4_px": shifted(0, -4), "right_rotated_0.5_deg": rotated(0.5), "right_rotated_2_deg": rotated(2.0),
+    "raw_images": unrectified,
+    "right_gain_1.6": images(gained(1.6), (1,)), "right_gain_3": images(gained(3.0), (1,)),
+    "right_gain_0.4": images(gained(0.4), (1,)), "gain_3": images(gained(3.0)),
+    "darkness": images(grey(2)), "white": images(grey(255)), "left_black": images(grey(0), (0,)),
+    "right_black": images(grey(0), (1,)),
+    "noise_10": images(noisy(10)), "noise_30": images(noisy(30)), "salt_and_pepper": images(salted), "rain": images(rained),
+    "blur_4_px": images(blurred), "right_blur_4_px": images(blurred, (1,)), "motion_blur_31_px": images(smeared),
+    "jpeg_10": images(compressed),
+    "occluder_40": covered(0.4, (0.0, 0.0)), "occluder_70": covered(0.7, (0.0, 0.0)),
+    "mover_40": covered(0.4, (1.0, 0.0)), "mover_55": covered(0.55, (1.0, 0.0)), "mover_70": covered(0.7, (1.0, 0.0)),
+}
+# With a standing camera.
+STANDING_FAULTS = {
+    "standing": FAULTS["none"], "standing_frozen": frozen, "standing_bursts_1_ms": bursts, "standing_noise_10": FAULTS["noise_10"],
+    "standing_mover_40": covered(0.4, (1.0, 0.0)), "standing_mover_55": covered(0.55, (1.0, 0.0)),
+    "standing_mover_70": covered(0.7, (1.0, 0.0)), "standing_approached_40": covered(0.4, (0.0, 1.0)),
+    "standing_approached_70": covered(0.7, (0.0, 1.0)), "standing_dark": FAULTS["darkness"],
+}
+
+
+def faulty_pairs(name, seed, drive):
+    fault = STANDING_FAULTS.get(name) or FAULTS[name]
+    random = numpy.random.default_rng(seed)
+    return [pair for part in parts(pairs_of(drive)) for pair in (fault(part, drive, random) if is_hit(part) else part)]
+
+
+def write_sequence(pairs, drive, directory):
+    for side in (0, 1):
+        (directory / f"image_{side}").mkdir(parents=True)
+    (directory / "calib.txt").write_text((drive.directory / "calib.txt").read_text())
+    (directory / "times.txt").write_text("".join(f"{pair.stamp:.9f}\n" for pair in pairs))
+    for i, pair in enumerate(pairs):
+        for side, image in enumerate((pair.left, pair.right)):
+            path = directory / f"image_{side}" / f"{i:06d}.png"
+            if isinstance(image, pathlib.Path):
+                path.symlink_to(image)
+            else:
+                cv2.imwrite(str(path), image, [cv2.IMWRITE_PNG_COMPRESSION, 0])

@@ -1,0 +1,54 @@
+"""Tables in Markdown: printed row by row as they are measured, and put between the marks of a page."""
+import re
+import sys
+
+from .programs import ROOT
+
+ACCURACY = PERFORMANCE = SELF_CHECK = ROOT / "docs/precision.md"
+FAULTS = ROOT / "docs/troubleshooting.md"
+EXPERIMENTS = ROOT / "lab/docs/experiments.md"
+
+
+def line(cells):
+    return "| " + " | ".join(map(str, cells)) + " |"
+
+
+def lines(rows):
+    """Of a table whose first row is its head."""
+    head, *body = rows
+    return [line(head), line(["---"] * len(head)), *map(line, body)]
+
+
+def between(text, name, block):
+    """The text with other lines between <!-- name --> and the next <!-- end -->."""
+    new = f"<!-- {name} -->\n" + "\n".join(block) + "\n<!-- end -->"
+    text, count = re.subn(rf"<!-- {re.escape(name)} -->\n.*?<!-- end -->", lambda _: new, text, flags=re.DOTALL)
+    if count == 0:
+        print(f"not written: the page has no mark <!-- {name} -->", file=sys.stderr)
+    return text
+
+
+def put(page, name, block):
+    page.write_text(between(page.read_text(), name, block))
+
+
+def show(rows, page=None, name=""):
+    """Prints the rows of a table, each as soon as it comes, and puts them into a page if there is one. Returns all lines."""
+    shown = []
+    for row in rows:
+        new = [line(row)] if shown else lines([row])
+        print("\n".join(new), flush=True)
+        shown += new
+    if page:
+        put(page, name, shown)
+    return shown
+
+
+def add_write(parser, page):
+    parser.add_argument("--write", action="store_const", const=page, help=f"puts the tables between the marks of {page.relative_to(ROOT)}")
+
+
+def check_names(names, known):
+    unknown = [name for name in names if name not in known]
+    if unknown:
+        sys.exit(f"error: no such names: {', '.join(unknown)}; there are {', '.join(known)}")

@@ -1,0 +1,70 @@
+#include <gtest/gtest.h>
+
+#include "../../experiments/experiment_setup.hpp"
+
+namespace sdvo {
+namespace test_experiment_setup {
+
+std::string hashOf(PipelineOptions options) {
+  return hashOptions(listOptions(options));
+}
+
+TEST(ExperimentSetup, ProductHasTheNodeletsDefaultsAndMoreCorners) {
+  PipelineOptions product = ExperimentSetup().options();
+  const PipelineOptions defaults;
+  FeatureDetectorOptions& detector = product.stereo_features.detector;
+  EXPECT_GT(detector.max_features, 2 * 2320);
+  detector.max_features = defaults.stereo_features.detector.max_features;
+  detector.area_per_feature = defaults.stereo_features.detector.area_per_feature;
+  detector.fast_min_threshold = defaults.stereo_features.detector.fast_min_threshold;
+  detector.corner_quality = defaults.stereo_features.detector.corner_quality;
+  EXPECT_EQ(hashOf(product), hashOf(defaults));
+}
+
+TEST(ExperimentSetup, PaperIsTheProductWithAllDifferencesAndWithoutThemTheProduct) {
+  ExperimentSetup paper, with, without;
+  paper.setup = without.setup = Setup::kPaper;
+  for (const SetupDifference& difference : paperDifferences()) {
+    with.settings.insert(with.settings.end(), difference.with.begin(), difference.with.end());
+    without.settings.insert(without.settings.end(), difference.without.begin(), difference.without.end());
+  }
+  EXPECT_EQ(hashOf(paper.options()), hashOf(with.options()));
+  EXPECT_EQ(hashOf(without.options()), hashOf(ExperimentSetup().options()));
+  EXPECT_NE(hashOf(paper.options()), hashOf(without.options()));
+}
+
+/// A row of the ablation that changed nothing would be no row.
+TEST(ExperimentSetup, EveryDifferenceChangesBothSetups) {
+  for (const auto* differences : {&paperDifferences(), &otherDifferences()})
+    for (const SetupDifference& difference : *differences) {
+      ExperimentSetup product, changed;
+      changed.settings = difference.with;
+      EXPECT_NE(hashOf(product.options()), hashOf(changed.options())) << difference.name;
+      ExperimentSetup paper, restored;
+      paper.setup = restored.setup = Setup::kPaper;
+      restored.settings = difference.without.empty() ? difference.with : difference.without;
+      EXPECT_NE(hashOf(paper.options()), hashOf(restored.options())) << difference.name;
+    }
+}
+
+/// FREAK's sizes would cost another descriptor its matches.
+TEST(ExperimentSetup, SizesForMatchingAreFreaksAlone) {
+  ExperimentSetup paper;
+  paper.setup = Setup::kPaper;
+  EXPECT_EQ(paper.options().stereo_features.sizeCurve().max_size, 60.0);
+  const FeatureExtractorOptions brief = paper.withDescriptor(DescriptorType::kBrief).options().stereo_features;
+  EXPECT_EQ(brief.descriptor.type, DescriptorType::kBrief);
+  EXPECT_TRUE(brief.descriptor.oriented);
+  EXPECT_EQ(brief.sizeCurve().max_size, DepthScaleOptions{}.completedFor(DescriptorType::kBrief).max_size);
+}
+
+TEST(ExperimentSetup, SettingsWinOverTheSetup) {
+  ExperimentSetup setup;
+  setup.setup = Setup::kPaper;
+  setup.settings = {"descriptor/oriented=false"};
+  EXPECT_FALSE(setup.options().stereo_features.descriptor.oriented);
+  EXPECT_FALSE(setup.options().stereo_features.detector.subpixel);
+}
+
+}  // namespace test_experiment_setup
+}  // namespace sdvo

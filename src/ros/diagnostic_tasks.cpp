@@ -1,0 +1,83 @@
+#include "diagnostic_tasks.hpp"
+
+#include <cstdio>
+#include <utility>
+
+namespace sdvo {
+namespace {
+
+constexpr double kWindow = 5.0;  // s, of the rate
+
+std::string format(const char* text, double number) {
+  char buffer[64];
+  std::snprintf(buffer, sizeof buffer, text, number);
+  return buffer;
+}
+
+}  // namespace
+
+InputMonitor::InputMonitor(std::string what, std::string topics, double max_silence, const RateOptions& rates)
+    : what_(std::move(what)), topics_(std::move(topics)), max_silence_(max_silence), rates_(rates) {}
+
+double InputMonitor::secondsSince(Clock::time_point time) {
+  return std::chrono::duration<double>(Clock::now() - time).count();
+}
+
+void InputMonitor::note() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  arrivals_.push_back(Clock::now());
+  while (secondsSince(arrivals_.front()) > kWindow) arrivals_.pop_front();
+}
+
+void InputMonitor::noteIdle(const std::string& why) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  idle_ = why;
+  begin_ = Clock::now();
+  arrivals_.clear();
+}
+
+std::optional<InputMonitor::Silence> InputMonitor::silence() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!idle_.empty()) return Silence{WallUpdater::Level::OK, idle_};
+  const double silence = secondsSince(arrivals_.empty() ? begin_ : arrivals_.back());
+  const std::string age = format("%.0f s", silence);
+  if (arrivals_.empty() && silence <= max_silence_)
+    return Silence{WallUpdater::Level::WARN, "no " + what_ + " yet on " + topics_};
+  if (arrivals_.empty())
+    return Silence{WallUpdater::Level::ERROR, "no " + what_ + " yet on " + topics_ + ", for " + age};
+  if (silence > max_silence_)
+    return Silence{WallUpdater::Level::ERROR, "no " + what_ + " for " + age + " on " + topics_};
+  return std::nullopt;
+}
+
+/// Hz; none of too few.
+std::optional<double> InputMonitor::rate() const {
+  constexpr std::size_t kFewest = 3;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (arrivals_.size() < kFewest) return std::nullopt;
+  const double time = std::chrono::duration<double>(arrivals_.back() - arrivals_.front()).count();
+  return static_cast<double>(arrivals_.size() - 1) / std::max(time, 1e-9);
+}
+
+void InputMonitor::diagnose(WallUpdater::Status& status) {
+  const std::optional<double> measured = rate();
+  status.addf("rate [Hz]", "%.2f", measured.value_or(0.0));
+  status.addf("expected [Hz]", "%g to %g", rates_.min_rate, rates_.max_rate);
+  status.add("topics", topics_);
+  if (const auto silent = silence())
+    status.summary(silent->level, silent->text);
+  else if (!measured)
+    status.summary(WallUpdater::Level::OK, "just started, no rate is measured yet");
+  else if (*measured < rates_.min_rate)
+    status.summaryf(
+        WallUpdater::Level::WARN,
+        "only %.2f %s a second, at least %g are expected (diagnostics/min_rate): driver or network too slow?",
+        *measured, what_.c_str(), rates_.min_rate);
+  else if (*measured > rates_.max_rate)
+    status.summaryf(WallUpdater::Level::WARN, "%.2f %s a second, at most %g are expected (diagnostics/max_rate)",
+                    *measured, what_.c_str(), rates_.max_rate);
+  else
+    status.summaryf(WallUpdater::Level::OK, "%.2f %s a second", *measured, what_.c_str());
+}
+
+}  // namespace sdvo

@@ -1,0 +1,150 @@
+#pragma once
+
+#include <diagnostic_updater/diagnostic_updater.h>
+#include <ros/node_handle.h>
+#include <time.h>
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "../config/interface_options.hpp"
+
+namespace sdvo {
+
+/// /diagnostics once a second of wall time: simulated time stands still when a bag has ended, which is what diagnostics
+/// are there to tell. To be declared after what its tasks refer to.
+class WallUpdater {
+ public:
+  using Status = diagnostic_updater::DiagnosticStatusWrapper;
+  using Level = diagnostic_msgs::DiagnosticStatus;
+
+  WallUpdater(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const std::string& name)
+      : updater_(nh, private_nh, name) {
+    updater_.setHardwareID("none");
+    timer_ =
+        nh.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { updater_.force_update(); });
+  }
+
+  template <class Owner>
+  void add(const std::string& task, Owner* owner, void (Owner::*diagnose)(Status&)) {
+    updater_.add(task, owner, diagnose);
+  }
+
+ private:
+  diagnostic_updater::Updater updater_;
+  ros::WallTimer timer_;
+};
+
+/// Whether input comes, and how often, for /diagnostics. By wall time; for any thread.
+class InputMonitor {
+ public:
+  /// `what`: of the input, in the plural. `topics`: where it comes from. `max_silence`: s.
+  InputMonitor(std::string what, std::string topics, double max_silence, const RateOptions& rates);
+
+  void note();
+  /// While nobody wants input, silence is no fault; `why`, such as "paused", is empty otherwise. Begins anew.
+  void noteIdle(const std::string& why);
+
+  struct Silence {
+    std::uint8_t level;
+    std::string text;
+  };
+  /// Nothing while input comes.
+  std::optional<Silence> silence() const;
+
+  /// The task "input rate".
+  void diagnose(WallUpdater::Status& status);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  static double secondsSince(Clock::time_point time);
+  std::optional<double> rate() const;
+
+  const std::string what_, topics_;
+  const double max_silence_;
+  const RateOptions rates_;
+  mutable std::mutex mutex_;
+  std::string idle_;
+  Clock::time_point begin_ = Clock::now();
+  std::deque<Clock::time_point> arrivals_;  ///< of the last seconds, and the newest one
+};
+
+/// How much of a processor one worker's thread takes, and what it had to leave out, for /diagnostics. What OpenCV does
+/// in threads of its own is not in it.
+class WorkLoad {
+ public:
+  /// `max_load`: share of one processor's time.
+  explicit WorkLoad(double max_load) : max_load_(max_load) {}
+
+  /// CPU time of this thread from construction to destruction counts as that of one item.
+  class Item {
+   public:
+    explicit Item(WorkLoad& load) : load_(load), begin_(threadTime()) {}
+    Item(const Item&) = delete;
+    Item& operator=(const Item&) = delete;
+    ~Item() { load_.note(threadTime() - begin_); }
+
+   private:
+    WorkLoad& load_;
+    const double begin_;
+  };
+
+  /// Of items that were left out because the thread was busy, since the start.
+  void noteDropped(std::uint64_t dropped) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    dropped_ = dropped;
+  }
+
+  /// The task "load", of the time since it was asked last.
+  void diagnose(WallUpdater::Status& status) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    const auto now = std::chrono::steady_clock::now();
+    const double period = std::chrono::duration<double>(now - last_).count();
+    const double load = period > 0.0 ? time_ / period : 0.0;
+    const std::uint64_t dropped = dropped_ - reported_;
+    status.addf("CPU time [ms a pair]", "%.2f", items_ > 0 ? 1e3 * time_ / items_ : 0.0);
+    status.addf("CPU time [share of one processor]", "%.2f", load);
+    status.add("dropped since the start", dropped_);
+    if (dropped > 0)
+      status.summaryf(WallUpdater::Level::WARN,
+                      "too slow: %d pairs dropped in %.0f s; set fewer detector/max_features or a max_rate",
+                      static_cast<int>(dropped), period);
+    else if (load > max_load_)
+      status.summaryf(WallUpdater::Level::WARN, "%.0f %% of one processor's time", 100.0 * load);
+    else
+      status.summaryf(WallUpdater::Level::OK, "%.0f %% of one processor's time", 100.0 * load);
+    last_ = now;
+    reported_ = dropped_;
+    time_ = 0.0;
+    items_ = 0;
+  }
+
+ private:
+  /// CPU time of this thread, s.
+  static double threadTime() {
+    timespec time{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  }
+
+  void note(double time) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    time_ += time;
+    ++items_;
+  }
+
+  const double max_load_;
+  std::mutex mutex_;
+  std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
+  std::uint64_t dropped_ = 0, reported_ = 0;
+  double time_ = 0.0;  ///< s
+  int items_ = 0;
+};
+
+}  // namespace sdvo

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <nav_msgs/Path.h>
+#include <rosbag/bag.h>
+
+#include <Eigen/Geometry>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <system_error>
+
+namespace sdvo {
+
+/// Has a file written that appears whole or not at all, and is on the disk on return: `write` is given the path of a
+/// partial one beside it, of this call alone, and throws when it cannot. Links stay and lead to the new file. Throws
+/// std::runtime_error that names the file, and leaves it as it was, then and when the path is not absolute or leads to
+/// something else than a file.
+void writeWhole(const std::string& path, const std::function<void(const std::string& partial)>& write);
+
+/// A bag being written, which may be given up. rosbag's own destructor closes (writes an index) and ends the process
+/// when that fails, as it does on a full disk.
+class OutputBag {
+ public:
+  /// Throws rosbag::BagException when the file cannot be made.
+  explicit OutputBag(const std::string& path)
+      : path_(path), bag_(std::make_unique<rosbag::Bag>(path, rosbag::bagmode::Write)) {}
+
+  /// Without close() the file is left empty.
+  ~OutputBag() {
+    if (closed_) return;
+    std::error_code ignored;
+    std::filesystem::resize_file(path_, 0, ignored);  // what closing writes has room again
+    try {
+      bag_->close();
+    } catch (const std::exception&) {
+      // Left behind, in reach: a leak would be reported.
+      [[maybe_unused]] static rosbag::Bag* volatile left_behind;
+      left_behind = bag_.release();
+    }
+  }
+  OutputBag(const OutputBag&) = delete;
+  OutputBag& operator=(const OutputBag&) = delete;
+
+  rosbag::Bag* operator->() { return bag_.get(); }
+
+  /// Throws rosbag::BagException when the bag is not complete.
+  void close() {
+    bag_->close();
+    closed_ = true;
+  }
+
+ private:
+  std::string path_;
+  std::unique_ptr<rosbag::Bag> bag_;
+  bool closed_ = false;
+};
+
+/// Writes the poses of the base as SaveTrajectory.srv describes it. A file appears whole or not at all. Throws
+/// std::runtime_error that names the file, and leaves it as it was, when the format is unknown, the path is not
+/// absolute, leads to something else than a file, or may not be written.
+void saveTrajectory(const nav_msgs::Path& poses, const Eigen::Isometry3d& T_base_camera, const std::string& format,
+                    const std::string& path);
+
+}  // namespace sdvo

@@ -1,0 +1,117 @@
+#include "transforms.hpp"
+
+#include <ros/init.h>
+#include <ros/this_node.h>
+#include <ros/time.h>
+#include <tf2_eigen/tf2_eigen.h>
+
+#include <exception>
+#include <utility>
+
+#include "frames.hpp"
+#include "stamps.hpp"
+
+namespace sdvo {
+
+using ros_conversions::cleanFrameId;
+
+RobotTransforms::RobotTransforms(ros::NodeHandle& nh, std::optional<ros_conversions::OdometryFrames> ours, Report warn)
+    : ours_(std::move(ours)), warn_(std::move(warn)) {
+  constexpr int kQueue = 100;  // as tf2_ros' listener
+  const auto subscribe = [&](const std::string& topic, bool is_static) {
+    const boost::function<void(const Event&)> receiver = [this, is_static](const Event& event) {
+      receive(event, is_static);
+    };
+    return nh.subscribe<tf2_msgs::TFMessage>(topic, kQueue, receiver);
+  };
+  dynamic_ = subscribe("/tf", false);
+  static_ = subscribe("/tf_static", true);
+}
+
+std::optional<Eigen::Isometry3d> RobotTransforms::find(const std::string& parent, const std::string& child,
+                                                       std::string& problem) const try {
+  return tf2::transformToEigen(buffer_.lookupTransform(parent, child, ros::Time(0)));
+} catch (const std::exception& e) {
+  problem = e.what();
+  return std::nullopt;
+}
+
+std::optional<Eigen::Isometry3d> RobotTransforms::findMotion(const std::string& fixed, const std::string& child,
+                                                             const ros::Time& from, const ros::Time& to,
+                                                             std::string& problem) const try {
+  return tf2::transformToEigen(buffer_.lookupTransform(child, from, child, to, fixed));
+} catch (const std::exception& e) {
+  problem = e.what();
+  return std::nullopt;
+}
+
+void RobotTransforms::receive(const Event& event, bool is_static) {
+  const ros::Time now = ros::Time::now();
+  if (now < last_update_) buffer_.clear();  // the clock jumped back: static transforms stay
+  last_update_ = now;
+  const std::string& publisher = event.getPublisherName();
+  for (const geometry_msgs::TransformStamped& transform : event.getMessage()->transforms) try {
+      const bool is_timeless = transform.header.stamp.isZero();
+      if (!is_timeless && !whyUnusable(transform.header.stamp).empty()) continue;
+      buffer_.setTransform(transform, publisher, is_static);
+      watch(transform, publisher);
+    } catch (const std::exception& e) {
+      warn_("TF: transform " + transform.header.frame_id + " -> " + transform.child_frame_id + " of " + publisher +
+            " is left out: " + e.what());
+    }
+}
+
+void RobotTransforms::watch(const geometry_msgs::TransformStamped& transform, const std::string& publisher) {
+  if (!ours_) return;
+  const std::string parent = cleanFrameId(transform.header.frame_id);
+  const std::string child = cleanFrameId(transform.child_frame_id);
+  const std::string& us = ros::this_node::getName();
+  if (publisher == us && parent == ours_->odom && child == ours_->base) return;
+  if (!watched_.insert(publisher + " " + parent + " " + child).second) return;
+  const std::string contention = "TF: " + publisher + " publishes " + parent + " -> " + child + ", " + us +
+                                 " publishes " + ours_->odom + " -> " + ours_->base;
+  if (child == ours_->base)
+    warn_(contention + ": frame '" + child + "' jumps between the two; set publish_tf to false in one of them");
+  else if ((child == ours_->odom || hasAncestor(ours_->odom, child)) &&
+           (parent == ours_->base || hasAncestor(parent, ours_->base)))
+    warn_(contention + ": a cycle; nothing can be looked up on TF. Swap frames, or set publish_tf to false here");
+}
+
+bool RobotTransforms::hasAncestor(const std::string& frame, const std::string& ancestor) const {
+  constexpr int kLongestChain = 1000;  // of tf2
+  std::string at = frame, parent;
+  for (int i = 0; i < kLongestChain && buffer_._getParent(at, ros::Time(0), parent); ++i) {
+    if (cleanFrameId(parent) == ancestor) return true;
+    at = parent;
+  }
+  return false;
+}
+
+std::optional<Eigen::Isometry3d> CameraMount::find(const std::string& base_frame, const std::string& camera_frame,
+                                                   std::string& problem) {
+  if (knows(base_frame, camera_frame)) return last();
+  const auto give_up = ros::SteadyTime::now() + ros::WallDuration(has_waited_ ? 0.0 : timeout_);
+  has_waited_ = true;
+  for (;;) {
+    const std::optional<Eigen::Isometry3d> found = transforms_.find(base_frame, camera_frame, problem);
+    if (found) {
+      base_frame_ = base_frame;
+      camera_frame_ = camera_frame;
+      const std::lock_guard<std::mutex> lock(mutex_);
+      return T_base_camera_ = found;
+    }
+    if (ros::SteadyTime::now() >= give_up || stopping_ || !ros::ok()) return std::nullopt;
+    ros::WallDuration(0.01).sleep();
+  }
+}
+
+bool CameraMount::knows(const std::string& base_frame, const std::string& camera_frame) const {
+  return last() && base_frame == base_frame_ && camera_frame == camera_frame_;
+}
+
+std::optional<Eigen::Isometry3d> CameraMount::last() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return T_base_camera_;
+}
+
+}  // namespace sdvo

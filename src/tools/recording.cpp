@@ -1,0 +1,73 @@
+#include "recording.hpp"
+
+#include <algorithm>
+#include <filesystem>
+#include <stdexcept>
+
+#include "bag_recording.hpp"
+#include "stereo_descriptor_vo/data/euroc_dataset.hpp"
+#include "stereo_descriptor_vo/data/kitti_dataset.hpp"
+
+namespace fs = std::filesystem;
+
+namespace sdvo {
+namespace {
+
+/// The rectified views.
+class RectifiedEuroc : public EurocSequence {
+ public:
+  using EurocSequence::EurocSequence;
+  const StereoCamera& camera() const { return rectification().camera; }
+  ImagePair load(int i) const { return loadRectified(i); }
+};
+
+int unpaired(const KittiSequence&) {
+  return 0;
+}
+int unpaired(const RectifiedEuroc& sequence) {
+  return sequence.unpaired();
+}
+
+/// A folder, of which every pair is usable.
+template <class Sequence>
+class FolderRecording : public Recording {
+ public:
+  explicit FolderRecording(const std::string& folder) : sequence_(folder) {}
+
+  int size() const override { return sequence_.size(); }
+
+  int forEach(int limit, const Use& use) override {
+    used_ = std::min(limit, size());
+    for (int i = 0; i < used_; ++i) give(i, sequence_.stamp(i), use);
+    return unpaired(sequence_);
+  }
+
+  void forEachBackwards(const Use& use) const override {
+    const std::int64_t ends = sequence_.stamp(0) + sequence_.stamp(used_ - 1);
+    for (int i = used_ - 1; i >= 0; --i) give(i, ends - sequence_.stamp(i), use);
+  }
+
+ private:
+  void give(int i, std::int64_t stamp, const Use& use) const {
+    const ImagePair pair = sequence_.load(i);
+    use({sequence_.camera(), pair.left, pair.right, stamp});
+  }
+
+  const Sequence sequence_;
+  int used_ = 0;
+};
+
+}  // namespace
+
+bool isRecording(const std::string& folder) {
+  const auto has = [&](const char* name) { return fs::is_directory(fs::path(folder) / name); };
+  return has("cam0") || has("mav0") || has("image_0") || has("image_2");
+}
+
+std::unique_ptr<Recording> openRecording(const std::string& path, const StereoNames& names) {
+  if (fs::is_regular_file(path)) return std::make_unique<BagRecording>(path, names);
+  if (const auto mav0 = findMav0(path)) return std::make_unique<FolderRecording<RectifiedEuroc>>(*mav0);
+  return std::make_unique<FolderRecording<KittiSequence>>(path);
+}
+
+}  // namespace sdvo

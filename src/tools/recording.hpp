@@ -1,0 +1,47 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <opencv2/core.hpp>
+#include <string>
+
+#include "stereo_descriptor_vo/common/stereo_camera.hpp"
+#include "stereo_messages.hpp"
+
+namespace sdvo {
+
+/// A rectified pair of a recording.
+struct RecordedPair {
+  StereoCamera camera;
+  cv::Mat left, right;  ///< CV_8U grey; valid as long as the call that it is given to
+  std::int64_t stamp;   ///< ns
+};
+
+/// A recorded drive. Its images stay on disk.
+class Recording {
+ public:
+  using Use = std::function<void(const RecordedPair&)>;
+
+  virtual ~Recording() = default;
+
+  /// Pairs at most.
+  virtual int size() const = 0;
+
+  /// Calls `use` for the first `limit` pairs in the order of their stamps. Returns how many stamps gave no usable pair.
+  /// Throws std::runtime_error where the recording cannot be read or no pair is usable.
+  virtual int forEach(int limit, const Use& use) = 0;
+
+  /// Calls `use` for the pairs of forEach() backwards. Mirrored stamps increase, and the time between pairs is the
+  /// same.
+  virtual void forEachBackwards(const Use& use) const = 0;
+};
+
+/// A bag, a folder in KITTI's layout, or a raw folder of EuRoC's (ASL), whose images are rectified. Throws
+/// std::runtime_error that names what is wrong.
+std::unique_ptr<Recording> openRecording(const std::string& path, const StereoNames& names);
+
+/// Whether a folder is itself a recording, not one of bags.
+bool isRecording(const std::string& folder);
+
+}  // namespace sdvo

@@ -1,0 +1,84 @@
+#include "stereo_messages.hpp"
+
+#include <rosbag/view.h>
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/image_encodings.h>
+
+#include <algorithm>
+#include <boost/make_shared.hpp>
+#include <cstdint>
+#include <opencv2/imgcodecs.hpp>
+#include <stdexcept>
+
+namespace sdvo {
+namespace {
+
+/// Empty for what is no camera's.
+std::string encodingOf(const cv::Mat& pixels) {
+  namespace encodings = sensor_msgs::image_encodings;
+  switch (pixels.type()) {
+    case CV_8UC1:
+      return encodings::MONO8;
+    case CV_16UC1:
+      return encodings::MONO16;
+    case CV_8UC3:
+      return encodings::BGR8;
+    case CV_8UC4:
+      return encodings::BGRA8;
+    default:
+      return "";
+  }
+}
+
+sensor_msgs::ImageConstPtr decode(const sensor_msgs::CompressedImage& compressed) {
+  const cv::Mat pixels = compressed.data.empty() ? cv::Mat() : cv::imdecode(compressed.data, cv::IMREAD_UNCHANGED);
+  const auto image = boost::make_shared<sensor_msgs::Image>();
+  image->header = compressed.header;
+  image->encoding = encodingOf(pixels);
+  image->height = static_cast<std::uint32_t>(pixels.rows);
+  image->width = static_cast<std::uint32_t>(pixels.cols);
+  image->step = static_cast<std::uint32_t>(pixels.cols * pixels.elemSize());
+  image->data.assign(pixels.datastart, pixels.dataend);
+  return image;
+}
+
+}  // namespace
+
+void StereoNames::addTo(CLI::App& app) {
+  app.add_option("--camera", camera, "bags: namespace of both sides")->capture_default_str();
+  app.add_option("--left", left, "bags: name of the left side, such as infra1")->capture_default_str();
+  app.add_option("--right", right, "bags: name of the right side")->capture_default_str();
+  app.add_option("--image", image, "bags: name of the rectified images, such as image_rect_raw; raw or …/compressed")
+      ->capture_default_str();
+}
+
+StereoTopics StereoNames::topics() const {
+  const std::string of_left = camera + "/" + left + "/", of_right = camera + "/" + right + "/";
+  return {of_left + image, of_right + image, of_left + "camera_info", of_right + "camera_info"};
+}
+
+StereoTopics topicsIn(const rosbag::Bag& bag, const StereoNames& names) {
+  StereoTopics topics = names.topics();
+  const auto has = [&bag](const std::string& topic) { return rosbag::View(bag, rosbag::TopicQuery(topic)).size() > 0; };
+  for (const std::size_t image : {0u, 1u})
+    if (!has(topics[image]) && has(topics[image] + "/compressed")) topics[image] += "/compressed";
+  return topics;
+}
+
+StereoMessage readStereoMessage(const rosbag::MessageInstance& instance, const StereoTopics& topics) {
+  const auto input =
+      static_cast<std::size_t>(std::find(topics.begin(), topics.end(), instance.getTopic()) - topics.begin());
+  StereoMessage message{input, nullptr, nullptr};
+  if (input >= 2)
+    message.info = instance.instantiate<sensor_msgs::CameraInfo>();
+  else if (const auto compressed = instance.instantiate<sensor_msgs::CompressedImage>())
+    message.image = decode(*compressed);
+  else
+    message.image = instance.instantiate<sensor_msgs::Image>();
+  if (!message.image && !message.info)
+    throw std::runtime_error(instance.getTopic() + " holds " + instance.getDataType() + ", expected " +
+                             (input < 2 ? "sensor_msgs/Image or CompressedImage" : "sensor_msgs/CameraInfo"));
+  return message;
+}
+
+}  // namespace sdvo

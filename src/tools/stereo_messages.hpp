@@ -1,0 +1,43 @@
+#pragma once
+
+#include <rosbag/bag.h>
+#include <rosbag/message_instance.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/Image.h>
+
+#include <CLI/CLI.hpp>
+#include <array>
+#include <cstddef>
+#include <string>
+
+namespace sdvo {
+
+/// Topics of a rectified stereo camera: left and right image, left and right calibration (the order of
+/// ArrivalLog::Input).
+using StereoTopics = std::array<std::string, 4>;
+
+/// The names that the topics are made of, as options of a command line.
+struct StereoNames {
+  std::string camera = "/stereo", left = "left", right = "right", image = "image_rect";
+
+  void addTo(CLI::App& app);
+  StereoTopics topics() const;
+};
+
+/// The topics as a bag has them: …/compressed where an image is recorded in that form alone.
+StereoTopics topicsIn(const rosbag::Bag& bag, const StereoNames& names);
+
+/// A message of one of the topics: an image or a calibration.
+struct StereoMessage {
+  std::size_t input;  ///< which of the topics
+  sensor_msgs::ImageConstPtr image;
+  sensor_msgs::CameraInfoConstPtr info;
+
+  const std_msgs::Header& header() const { return image ? image->header : info->header; }
+};
+
+/// A compressed image becomes a raw one; without pixels where it cannot be decoded. Throws std::runtime_error for
+/// another type of message.
+StereoMessage readStereoMessage(const rosbag::MessageInstance& instance, const StereoTopics& topics);
+
+}  // namespace sdvo
