@@ -11,7 +11,7 @@
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
 namespace sdvo {
-namespace {
+namespace test_reacquisition {
 
 constexpr std::int64_t kPeriod = 50'000'000;  // ns between pairs
 constexpr int kSeen = 10;                     // pairs before an outage
@@ -224,5 +224,5 @@ TEST_F(Outage, ANewClockIsANewStart) {
   expectStartedAgain();
 }
 
-}  // namespace
+}  // namespace test_reacquisition
 }  // namespace sdvo
