@@ -12,7 +12,7 @@ COMMANDS = {
     "ablate": ("ablate", "the odometry without one of its mechanisms"),
     "benchmark": ("benchmark", "time of kernels, drives and nodelets"),
     "places": ("places", "recognised revisits and false loops of long drives"),
-    "self-check": ("self_check", "the self-checks of run_bag against the ground truth"),
+    "self-check": ("self_check", "the self-checks of run_sequence against the ground truth"),
     "experiments": ("experiments", "the paper's experiments"),
     "tables": ("tables", "tables of the paper's experiments from their CSV files"),
     "golden": ("golden", "poses, states and covariances of two builds"),

@@ -81,7 +81,7 @@ def recorded(kind, name, folder=None):
     if (directory / "mav0").exists():
         raw, directory, lengths = directory / "mav0", folder / name, TABLE
         if not directory.exists():
-            run("euroc_to_kitti", "--input", raw, "--output", directory)
+            run("convert", raw, "--output", directory)
     return Drive(title, directory, directory / "poses.txt", lengths)
 
 

@@ -1,4 +1,4 @@
-"""Which revisits run_places recognises, what is a false loop and what drift is taken back, on long rendered drives along KITTI's ways
+"""Which revisits are recognised, what is a false loop and what drift is taken back, on long rendered drives along KITTI's ways
 and on the recorded ones: a table of docs/places.md. The rendered ones also as if of cameras with a focal length 1 % longer: turns come
 out too small."""
 import re
@@ -22,7 +22,7 @@ def with_wrong_focal_length(drive, work):
 
 def recognise(name, directory, truth):
     with tempfile.TemporaryDirectory() as work:
-        said = programs.run("run_places", directory, "--ground-truth", truth, "--poses", f"{work}/poses.txt", "--keyframes", f"{work}/keyframes.csv")
+        said = programs.run("run_sequence", directory, "--places", "--ground-truth", truth, "--poses", f"{work}/poses.txt", "--keyframes", f"{work}/keyframes.csv")
     pairs, length = re.search(r"(\S+) pairs, (\S+) m, ", said).groups()
     longest, cpu = re.search(r"longest optimisation (\S+) ms; CPU per pair, all included, (\S+) ms", said).groups()
     *counts, t, r = re.search(r"revisits (\S+), recognised (\S+); loops (\S+), false (\S+), worst (\S+) m (\S+) deg", said).groups()

@@ -1,4 +1,4 @@
-"""Holds the self-checks of run_bag against the ground truth, and prints the tables of docs/precision.md; some ten minutes, most of
+"""Holds the self-checks of run_sequence against the ground truth, and prints the tables of docs/precision.md; some ten minutes, most of
 them to render drives.
 
 rendered: drives whose ground truth is exact. recorded: sequences of KITTI, where KITTI_DIR is set. Both errors are the mean over all
@@ -25,12 +25,12 @@ def measure(drive, extra):
     """Rows of the self-checks by name, and the true errors of the same sub-paths, in % and in deg/m, or None."""
     with tempfile.TemporaryDirectory() as work:
         work = pathlib.Path(work)
-        programs.run("kitti_to_bag", "--sequence", drive.directory, "--output", work / "drive.bag")
-        programs.run("run_bag", work / "drive.bag", "--output", work, "--format", "kitti", "--shuttle", "--halves", *extra)
-        with open(work / "drive.self_check.csv") as file:
+        programs.run("run_sequence", drive.directory, "--output", work, "--format", "kitti", "--shuttle", "--halves", *extra)
+        name = drive.directory.name
+        with open(work / f"{name}.self_check.csv") as file:
             checks = {row["check"]: row for row in csv.DictReader(file)}
         length = next((row["sub_path_m"] for row in checks.values() if row["sub_path_m"]), None)
-        mean = odometry.errors(drive.truth, work / "drive.txt", length)["mean"] if length else {}
+        mean = odometry.errors(drive.truth, work / f"{name}.txt", length)["mean"] if length else {}
     return checks, mean.get("translation_percent"), mean.get("rotation_deg_per_m")
 
 

@@ -29,6 +29,13 @@ Eigen::Matrix3d StereoCamera::projectionJacobian(const Eigen::Vector3d& point) c
   return jacobian;
 }
 
+bool StereoCamera::isLike(const StereoCamera& other) const {
+  constexpr double kShare = 0.05;
+  const auto near = [](double a, double b, double whole) { return std::abs(a - b) <= kShare * whole; };
+  return width == other.width && height == other.height && near(fx, other.fx, fx) && near(fy, other.fy, fy) &&
+         near(cx, other.cx, fx) && near(cy, other.cy, fy) && near(baseline, other.baseline, baseline);
+}
+
 bool StereoCamera::operator==(const StereoCamera& o) const {
   const auto tie = [](const StereoCamera& c) {
     return std::tie(c.fx, c.fy, c.cx, c.cy, c.baseline, c.width, c.height);

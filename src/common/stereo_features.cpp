@@ -58,6 +58,20 @@ StereoFeatures StereoFeatures::select(const std::vector<int>& rows) const {
   return selected;
 }
 
+StereoFeatures StereoFeatures::seenBy(const StereoCamera& other) const {
+  StereoFeatures seen = *this;
+  seen.camera = other;
+  const double x = other.fx / camera.fx, y = other.fy / camera.fy, depth = x * other.baseline / camera.baseline;
+  for (std::size_t i = 0; i < u.size(); ++i) {
+    seen.u[i] = static_cast<float>(other.cx + x * (u[i] - camera.cx));
+    seen.v[i] = static_cast<float>(other.cy + y * (v[i] - camera.cy));
+    seen.disparity[i] = static_cast<float>(depth * disparity[i]);
+    seen.dv[i] = static_cast<float>(y * dv[i]);
+    seen.size[i] = static_cast<float>(x * size[i]);
+  }
+  return seen;
+}
+
 void StereoFeatures::check() const {
   camera.check();
   const std::size_t n = u.size();

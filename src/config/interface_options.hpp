@@ -38,6 +38,7 @@ struct ImageThresholds {
 
 /// What the image side's nodelet needs beside the extractor's options.
 struct StereoInputOptions {
+  double sync_tolerance = 0.001;
   bool approximate_sync = false;
   double max_interval = 0.01;
   int sync_queue_size = 20;
@@ -49,7 +50,10 @@ struct StereoInputOptions {
   ImageThresholds thresholds;
 
   void describe(OptionList& list) {
-    list.add("approximate_sync", approximate_sync, "pair images whose stamps differ; false: equal stamps only");
+    list.add("sync_tolerance", sync_tolerance, {0.0, 0.1}, "s",
+             "largest difference of stamps of one trigger (less than half of a period); 0: equal stamps only");
+    list.add("approximate_sync", approximate_sync,
+             "pair images of cameras that are not triggered together, whose stamps differ by up to max_interval");
     list.add("max_interval", max_interval, {1e-4, 1.0}, "s",
              "approximate_sync: largest difference of stamps in a pair");
     list.add("sync_queue_size", sync_queue_size, {1, 1000}, "",

@@ -70,8 +70,24 @@ void VisualOdometry::forgetTime() {
   state_.belief.forget();
 }
 
-OdometryResult VisualOdometry::update(const StereoFeatures& features, const std::optional<MotionGuess>& guess) {
-  refuse(features);
+void VisualOdometry::mountAt(const Eigen::Isometry3d& T_base_camera) {
+  const Eigen::Isometry3d T_before_now = T_base_camera_.inverse() * T_base_camera;
+  const bool is_same = T_base_camera.matrix() == T_base_camera_.matrix();
+  T_base_camera_ = T_base_camera;
+  if (is_same || !state_.started) return;
+  breakStream();
+  state_.map.reset();  // it is in the old camera's axes
+  forgetRig();
+  state_.T_origin_camera = orthonormalised(T_before_now.inverse() * state_.T_origin_camera * T_before_now);
+  state_.covariance.advance(T_before_now, Matrix6d::Zero());
+}
+
+OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::optional<MotionGuess>& guess) {
+  refuse(given);
+  // A lens that focuses changes the camera with every pair; the pixels of one map are those of one camera.
+  const bool is_refocused = state_.camera && *state_.camera != given.camera && state_.camera->isLike(given.camera);
+  const StereoFeatures converted = is_refocused ? given.seenBy(*state_.camera) : StereoFeatures();
+  const StereoFeatures& features = is_refocused ? converted : given;
   const double dt = state_.last_stamp ? static_cast<double>(features.stamp - *state_.last_stamp) * 1e-9 : 0.0;
   const bool continued = state_.map && state_.map->continuedBy(features);
   const bool frozen = isFrozen(features, dt, guess);
@@ -155,13 +171,15 @@ MotionHypothesis VisualOdometry::reacquire(const StereoFeatures& features) const
   return search_.find({*state_.map, calibration, features, T_current_newest, {}, false, 0.0, {}});
 }
 
+/// What was learnt is of another rig.
+void VisualOdometry::forgetRig() {
+  state_.calibration = CalibrationFilter(options_.calibration);
+  state_.right_rotation = RightCameraRotation();
+}
+
 /// Takes note of the pair, whatever becomes of its motion.
 void VisualOdometry::begin(const StereoFeatures& features, double dt) {
-  if (state_.camera && *state_.camera != features.camera) {
-    // What was learnt of the rig is of another one.
-    state_.calibration = CalibrationFilter(options_.calibration);
-    state_.right_rotation = RightCameraRotation();
-  }
+  if (state_.camera && *state_.camera != features.camera) forgetRig();
   state_.camera = features.camera;
   state_.last_stamp = features.stamp;
   ++state_.pairs;

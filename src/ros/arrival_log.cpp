@@ -60,7 +60,7 @@ ArrivalLog::Comparison ArrivalLog::compareWithLeftImage(const Topic& topic) cons
     for (const Arrival& other : topic.arrivals) {
       const double gap = 1e-9 * std::abs(static_cast<double>(left.stamp - other.stamp));
       comparison.smallest_gap = std::min(comparison.smallest_gap, gap);
-      if (gap <= (options_.approximate_sync ? options_.max_interval : 0.0))
+      if (gap <= largestGap())
         comparison.largest_delay = std::max(comparison.largest_delay, std::abs(left.now - other.now));
     }
   return comparison;
@@ -68,7 +68,6 @@ ArrivalLog::Comparison ArrivalLog::compareWithLeftImage(const Topic& topic) cons
 
 std::string ArrivalLog::advise() const {
   const std::deque<Arrival>& left = topics_[kLeftImage].arrivals;
-  const double largest_gap = options_.approximate_sync ? options_.max_interval : 0.0;
   std::ostringstream text;
   const Topic* latest = nullptr;
   double delay = 0.0;
@@ -76,11 +75,12 @@ std::string ArrivalLog::advise() const {
     if (&topic == &topics_[kLeftImage]) continue;
     const Comparison comparison = compareWithLeftImage(topic);
     if (!std::isfinite(comparison.smallest_gap)) return text.str();  // the counts say it
-    if (comparison.smallest_gap > largest_gap) {
+    if (comparison.smallest_gap > largestGap()) {
       if (&topic == &topics_[kRightImage])
-        text << "; smallest gap between a left and a right image stamp " << comparison.smallest_gap << " s ("
-             << (options_.approximate_sync ? "larger than max_interval)"
-                                           : "set approximate_sync if the cameras are not triggered together)");
+        text << "; smallest gap between a left and a right image stamp " << comparison.smallest_gap
+             << " s, larger than " << (options_.approximate_sync ? "max_interval (" : "sync_tolerance (")
+             << largestGap() << " s)"
+             << (options_.approximate_sync ? "" : ": set approximate_sync if the cameras are not triggered together");
       else
         text << "; the stamps of " << topic.name << " are not those of the left images, at best "
              << comparison.smallest_gap << " s off";

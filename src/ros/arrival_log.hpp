@@ -45,6 +45,8 @@ class ArrivalLog {
     double largest_delay;  ///< s, between the arrivals of messages of equal stamps
   };
 
+  /// Of stamps in a pair, s.
+  double largestGap() const { return options_.approximate_sync ? options_.max_interval : options_.sync_tolerance; }
   Comparison compareWithLeftImage(const Topic& topic) const;
   std::string advise() const;
 

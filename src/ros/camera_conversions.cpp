@@ -1,88 +1,141 @@
 #include "camera_conversions.hpp"
 
-#include <image_geometry/pinhole_camera_model.h>
-
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
-#include <opencv2/core.hpp>
+#include <cstdint>
 #include <sstream>
 #include <stdexcept>
-#include <string>
 
 namespace sdvo::ros_conversions {
 namespace {
 
-image_geometry::PinholeCameraModel toCameraModel(const sensor_msgs::CameraInfo& info, const char* side) {
-  const std::string name = std::string(side) + " camera_info";
-  if (info.width == 0 || info.height == 0) throw std::invalid_argument(name + " has no image size");
-  for (std::size_t i = 0; i < info.P.size(); ++i)
-    if (!std::isfinite(info.P[i])) throw std::invalid_argument(name + ": P[" + std::to_string(i) + "] is not a number");
-  if (info.K[0] == 0.0 || info.P[0] == 0.0)
-    throw std::invalid_argument(name + ": K or P is zero, the camera is not calibrated (REP-104)");
-  image_geometry::PinholeCameraModel model;
-  try {
-    model.fromCameraInfo(info);
-    model.reducedResolution();  // rectifies the region of interest, which fails for some distortions
-  } catch (const std::exception& e) {
-    throw std::invalid_argument(name + ": " + e.what());
-  }
-  return model;
+using sensor_msgs::CameraInfo;
+
+constexpr std::uint32_t kLargestSide = 1u << 14;  // px, as feature messages have it
+
+/// One side's rectified image. (tx, ty): P[3] and P[7] over the focal lengths, m.
+struct View {
+  double fx, fy, cx, cy, tx, ty;
+  int width, height;
+};
+
+/// Pixels of an image that was `all` wide or high and then cut (a part of 0: all that is left) and binned.
+int sizeOf(const std::string& name, std::uint32_t all, std::uint32_t offset, std::uint32_t part, double binning) {
+  const double pixels = part == 0 ? static_cast<double>(all) - offset : part;
+  if (pixels < binning || pixels > kLargestSide)
+    throw std::invalid_argument(name + " has no image size: " + std::to_string(all) + " px, region of interest of " +
+                                std::to_string(part) + " px from " + std::to_string(offset) + " on");
+  return static_cast<int>(pixels / binning);
 }
 
-std::string describeP(const sensor_msgs::CameraInfo& info) {
+View viewOf(const CameraInfo& info, const std::string& side) {
+  const std::string name = side + " camera_info";
+  for (std::size_t i = 0; i < info.P.size(); ++i)
+    if (!std::isfinite(info.P[i])) throw std::invalid_argument(name + ": P[" + std::to_string(i) + "] is not a number");
+  if (info.K[0] == 0.0 || info.P[0] == 0.0 || info.P[5] == 0.0)
+    throw std::invalid_argument(name + ": K or P is zero, the camera is not calibrated (REP-104)");
+  const double x = std::max(1u, info.binning_x), y = std::max(1u, info.binning_y);
+  return {info.P[0] / x,
+          info.P[5] / y,
+          (info.P[2] - info.roi.x_offset) / x,
+          (info.P[6] - info.roi.y_offset) / y,
+          info.P[3] / info.P[0],
+          info.P[7] / info.P[5],
+          sizeOf(name, info.width, info.roi.x_offset, info.roi.width, x),
+          sizeOf(name, info.height, info.roi.y_offset, info.roi.height, y)};
+}
+
+std::string describeP(const CameraInfo& info) {
   std::ostringstream text;
   text << "fx = " << info.P[0] << ", fy = " << info.P[5] << ", cx = " << info.P[2] << ", cy = " << info.P[6]
-       << ", Tx = " << info.P[3];
+       << ", Tx = " << info.P[3] << ", Ty = " << info.P[7];
   return text.str();
 }
 
-std::string describe(const cv::Size& size) {
-  return std::to_string(size.width) + "x" + std::to_string(size.height);
-}
-
 /// What to do about a baseline that is not positive.
-std::string remedy(const image_geometry::PinholeCameraModel& left, const image_geometry::PinholeCameraModel& right) {
-  if (left.Tx() == right.Tx())
+std::string remedy(const View& left, const View& right) {
+  if (left.tx == right.tx)
     return "no baseline in P: P[3] of the right camera_info must be -fx * baseline (old camera drivers leave it out)";
-  if (left.Tx() < 0.0 && right.Tx() == 0.0)
+  if (left.tx < 0.0 && right.tx == 0.0)
     return "are left and right swapped? Swap the topics; with depthai_ros_driver set "
            "stereo_i_reverse_stereo_socket_order to true";
-  if (right.Tx() > 0.0) return "P[3] of the right camera_info has the wrong sign, it must be -fx * baseline";
+  if (right.tx > 0.0) return "P[3] of the right camera_info has the wrong sign, it must be -fx * baseline";
   return "are left and right swapped?";
+}
+
+/// A lens model without any distortion, of which image_proc hands the images on as they are.
+bool isWithoutDistortion(const CameraInfo& info) {
+  return std::all_of(info.D.begin(), info.D.end(), [](double d) { return d == 0.0; });
+}
+
+/// Of the rectification, rad; 0 where R is left out.
+double rotation(const CameraInfo& info) {
+  using Rows = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+  const Eigen::Map<const Rows> R(info.R.data());
+  return (R.transpose() * R).isIdentity(1e-3) ? Eigen::AngleAxisd(Eigen::Matrix3d(R)).angle() : 0.0;
 }
 
 }  // namespace
 
-StereoCamera toStereoCamera(const sensor_msgs::CameraInfo& left, const sensor_msgs::CameraInfo& right) {
-  const image_geometry::PinholeCameraModel left_model = toCameraModel(left, "left");
-  const image_geometry::PinholeCameraModel right_model = toCameraModel(right, "right");
-  const cv::Size size = left_model.reducedResolution(), right_size = right_model.reducedResolution();
-  if (size != right_size)
-    throw std::invalid_argument("left and right camera_info have different image sizes (left " + describe(size) +
-                                ", right " + describe(right_size) + ")");
+StereoCamera toStereoCamera(const CameraInfo& left_info, const CameraInfo& right_info) {
+  const View left = viewOf(left_info, "left"), right = viewOf(right_info, "right");
+  const auto size = [](const View& view) { return std::to_string(view.width) + "x" + std::to_string(view.height); };
+  const auto both = [&] { return " (left " + describeP(left_info) + "; right " + describeP(right_info) + ")"; };
+  if (left.width != right.width || left.height != right.height)
+    throw std::invalid_argument("left and right camera_info have different image sizes (left " + size(left) +
+                                ", right " + size(right) + ")");
   constexpr double kSame = 1e-3;  // px
   const auto differ = [](double a, double b) { return !(std::abs(a - b) <= kSame); };
-  if (differ(left_model.fx(), right_model.fx()) || differ(left_model.fy(), right_model.fy()))
-    throw std::invalid_argument("left and right camera_info have different focal lengths (left " + describeP(left) +
-                                "; right " + describeP(right) + "), the pair is not rectified");
+  if (differ(left.fx, right.fx) || differ(left.fy, right.fy))
+    throw std::invalid_argument("left and right camera_info have different focal lengths" + both() +
+                                ", the pair is not rectified");
   // A rectification without CALIB_ZERO_DISPARITY; every depth would be wrong.
-  if (differ(left_model.cx(), right_model.cx()) || differ(left_model.cy(), right_model.cy()))
-    throw std::invalid_argument("left and right camera_info have different principal points (left " + describeP(left) +
-                                "; right " + describeP(right) + "), rectify with zero disparity at infinity");
-  StereoCamera camera;
-  camera.fx = left_model.fx();
-  camera.fy = left_model.fy();
-  camera.cx = left_model.cx();
-  camera.cy = left_model.cy();
+  if (differ(left.cx, right.cx) || differ(left.cy, right.cy))
+    throw std::invalid_argument("left and right camera_info have different principal points" + both() +
+                                ", rectify with zero disparity at infinity, and cut the same region out of both");
   // The left P may have a Tx of its own (KITTI's colour pair), so that the baseline is a difference.
-  camera.baseline = left_model.Tx() / left_model.fx() - right_model.Tx() / right_model.fx();
-  camera.width = size.width;
-  camera.height = size.height;
-  if (!(camera.baseline > 0.0))
-    throw std::invalid_argument("baseline = " + std::to_string(camera.baseline) + " m is not positive (left " +
-                                describeP(left) + "; right " + describeP(right) +
-                                "): " + remedy(left_model, right_model));
+  const double baseline = left.tx - right.tx, vertical = left.ty - right.ty;
+  if (std::abs(vertical) > std::abs(baseline))
+    throw std::invalid_argument(
+        "the baseline of " + std::to_string(std::abs(vertical)) + " m is vertical (P[7])" + both() +
+        ": only a horizontal pair can be used. Turn images and camera_info of both cameras counter-clockwise by 90 "
+        "degrees, the upper camera, now the " +
+        (vertical > 0.0 ? "left" : "right") + " one, is the left one then: docs/cameras.md, 'A vertical pair'");
+  if (!(baseline > 0.0))
+    throw std::invalid_argument("baseline = " + std::to_string(baseline) + " m is not positive" + both() + ": " +
+                                remedy(left, right));
+  const StereoCamera camera{left.fx, left.fy, left.cx, left.cy, baseline, left.width, left.height};
   camera.check();
   return camera;
+}
+
+std::string doubtOf(const StereoCamera& camera) {
+  // Of stereo cameras that robots carry: a lens of 20 to 150 deg, a baseline of 1 cm to 2 m.
+  constexpr double kNarrowest = 0.35, kWidest = 7.5, kShortest = 0.01, kLongest = 2.0;
+  const double width = camera.width / camera.fx;
+  std::ostringstream text;
+  if (width < kNarrowest || width > kWidest)
+    text << "fx = " << camera.fx << " px at a width of " << camera.width
+         << " px: is the focal length that of these images' size?";
+  else if (camera.baseline > kLongest)
+    text << "baseline = " << camera.baseline
+         << " m: is P[3] of the right camera_info in pixels times mm or cm? It must "
+         << "be -fx * baseline with the baseline in metres";
+  else if (camera.baseline < kShortest)
+    text << "baseline = " << 1e3 * camera.baseline << " mm: does P[3] of the right camera_info lack the factor fx? It "
+         << "must be -fx * baseline with the baseline in metres";
+  return text.str();
+}
+
+std::string whyUnrectified(const CameraInfo& left, const CameraInfo& right) {
+  constexpr double kRows = 0.5;  // px, which the rig monitor sees
+  for (const CameraInfo* info : {&left, &right})
+    if (isWithoutDistortion(*info) && rotation(*info) * info->P[5] > kRows)
+      return "D of camera_info is zero and R is not the identity: image_proc does not rectify such images, it hands "
+             "them "
+             "on; let the driver rectify, or give D a coefficient other than zero (1e-9)";
+  return "";
 }
 
 }  // namespace sdvo::ros_conversions

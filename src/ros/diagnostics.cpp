@@ -144,15 +144,24 @@ void OdometryDiagnostics::diagnose(Status& status) {
   status.add("malformed", last_->malformed);
 }
 
+std::string doubtOfLatency(double latency, double max_latency) {
+  constexpr double kAhead = 0.1;  // s, a step of the slowest simulated clocks (chosen)
+  if (latency > max_latency) return ": is the machine too slow, or are the clocks of two machines different?";
+  if (latency < -kAhead)
+    return ": the images are stamped in the future, where TF knows nothing yet: is the camera's clock that of this "
+           "machine?";
+  return "";
+}
+
 void OdometryDiagnostics::diagnoseLatency(Status& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (input_.silence() || !last_) {
     status.summary(Level::OK, "no features");
     return;
   }
-  const bool is_late = last_->latency > max_latency_;
-  status.summaryf(is_late ? Level::WARN : Level::OK, "%.3f s from image to pose%s", last_->latency,
-                  is_late ? ": is the machine too slow, or are the clocks of two machines different?" : "");
+  const std::string doubt = doubtOfLatency(last_->latency, max_latency_);
+  status.summaryf(doubt.empty() ? Level::OK : Level::WARN, "%.3f s from image to pose%s", last_->latency,
+                  doubt.c_str());
 }
 
 /// Under the lock, as what follows.

@@ -55,6 +55,10 @@ class ImageDiagnostics {
   WallUpdater updater_;
 };
 
+/// What is wrong with poses that come so late (s; negative: before their time), as the end of a sentence; empty:
+/// nothing.
+std::string doubtOfLatency(double latency, double max_latency);
+
 /// /diagnostics of the odometry: its state as vo_info tells it, the rate of its input, its load and how late it is.
 class OdometryDiagnostics {
  public:

@@ -5,14 +5,13 @@
 #include <stereo_descriptor_vo/FeatureFlow.h>
 #include <stereo_descriptor_vo/StereoFeatures.h>
 
-#include <algorithm>
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 
-#include "exact_synchroniser.hpp"
 #include "features_image.hpp"
 #include "image_conversions.hpp"
 #include "image_subscriber.hpp"
+#include "synchronisers.hpp"
 #include "threads.hpp"
 #include "throttles.hpp"
 
@@ -30,7 +29,7 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
 
   struct Inputs {
     explicit Inputs(FeaturesImageNodelet& nodelet)
-        : synchroniser(kQueue, [&nodelet](const auto&... messages) { nodelet.draw(messages...); }) {
+        : synchroniser(kQueue, kTolerance, [&nodelet](const auto&... messages) { nodelet.draw(messages...); }) {
       ros::NodeHandle& nh = nodelet.nh_;
       StereoImageTransport& transport = *nodelet.transport_;
       // Resolved, for a transport appends its own name to that of the topic.
@@ -44,7 +43,8 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
     }
 
     static constexpr int kQueue = 10;
-    ExactSynchroniser<Image, Image, Features, Flow> synchroniser;
+    static constexpr double kTolerance = 0.01;  // s, of the right images: as much as two cameras may be apart
+    TriggerSynchroniser<Image, Image, Features, Flow> synchroniser;
     ImageSubscriber left, right;
     ros::Subscriber features, flow;
   };
@@ -82,9 +82,9 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
 
   void draw(const sensor_msgs::ImageConstPtr& left, const sensor_msgs::ImageConstPtr& right,
             const Features::ConstPtr& features, const Flow::ConstPtr& flow) try {
-    const int depth = std::max(ros_conversions::bitDepth(*left), ros_conversions::bitDepth(*right));
-    const cv::Mat drawn =
-        drawFeatures(ros_conversions::toGrey(left, depth), ros_conversions::toGrey(right, depth), *features, *flow);
+    grey_.add(*left, *right);
+    const cv::Mat drawn = drawFeatures(ros_conversions::toGrey(left, grey_.range()),
+                                       ros_conversions::toGrey(right, grey_.range()), *features, *flow);
     const auto picture = boost::make_shared<sensor_msgs::Image>();
     picture->header = left->header;
     sensor_msgs::fillImage(*picture, sensor_msgs::image_encodings::BGR8, static_cast<std::uint32_t>(drawn.rows),
@@ -100,6 +100,7 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
   ReportThrottle throttle_;
   std::unique_ptr<StereoImageTransport> transport_;
   image_transport::Publisher publisher_;
+  ros_conversions::GreyRangeTracker grey_;
   std::unique_ptr<Inputs> inputs_;
 };
 

@@ -2,12 +2,17 @@
 
 #include <sensor_msgs/image_encodings.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <map>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
 #include <string>
+#include <vector>
+
+#include "../common/quantile.hpp"
 
 namespace sdvo::ros_conversions {
 namespace {
@@ -40,22 +45,48 @@ cv::Mat pixelsOf16Bits(const sensor_msgs::Image& message) {
   return cv::Mat(swapped.rows, swapped.cols, CV_16U, swapped.data, swapped.step).clone();
 }
 
-}  // namespace
-
-int bitDepth(const sensor_msgs::Image& message) {
-  if (message.encoding != encodings::MONO16) return 8;
-  double brightest = 0.0;
-  cv::minMaxLoc(pixelsOf16Bits(message), nullptr, &brightest);
-  for (int bits = 8; bits < 16; bits += 2)
-    if (brightest < (1 << bits)) return bits;
-  return 16;
+/// Appends some thousand pixels, evenly spread over the image.
+void sample(const cv::Mat& pixels, std::vector<double>& counts) {
+  constexpr double kSamples = 4096;
+  const int step = std::max(1, static_cast<int>(std::sqrt(pixels.total() / kSamples)));
+  for (int row = step / 2; row < pixels.rows; row += step)
+    for (int column = step / 2; column < pixels.cols; column += step)
+      counts.push_back(pixels.at<std::uint16_t>(row, column));
 }
 
-cv::Mat toGrey(const sensor_msgs::ImageConstPtr& message, int bits) {
+}  // namespace
+
+bool GreyRangeTracker::add(const sensor_msgs::Image& left, const sensor_msgs::Image& right) {
+  constexpr std::size_t kPairs = 5;    // whose median counts: two in a row may be damaged
+  constexpr double kShare = 0.02;      // of the pixels, beyond the range at either end (chosen)
+  constexpr double kMargin = 0.25;     // of the spread, on either side of it (chosen)
+  constexpr double kLeastSpread = 64;  // counts: less is noise more than a scene (chosen)
+  constexpr double kMostUnused = 3.0;  // times the spread, before a range is too wide; it begins at 1.5
+  if (left.encoding != encodings::MONO16 || right.encoding != encodings::MONO16) return false;
+  std::vector<double> counts;
+  for (const sensor_msgs::Image* image : {&left, &right}) sample(pixelsOf16Bits(*image), counts);
+  last_.push_back({quantile(counts, kShare), quantile(counts, 1.0 - kShare)});
+  if (last_.size() > kPairs) last_.pop_front();
+  const auto median = [this](std::size_t end) {
+    std::vector<double> values;
+    for (const auto& pair : last_) values.push_back(pair[end]);
+    return quantile(values, 0.5);
+  };
+  const double dark = median(0), bright = median(1), spread = std::max(bright - dark, kLeastSpread);
+  if (last_.size() > 1 && dark >= range_.black && bright <= range_.white &&
+      range_.white - range_.black <= kMostUnused * spread)
+    return false;
+  const double white = std::min(dark + (1.0 + kMargin) * spread, 65535.0);
+  range_ = {std::max(0.0, std::min(dark - kMargin * spread, white - kLeastSpread)), white};
+  return true;
+}
+
+cv::Mat toGrey(const sensor_msgs::ImageConstPtr& message, const GreyRange& range) {
   if (message->encoding == encodings::MONO8 || message->encoding == encodings::TYPE_8UC1) return pixelsOf(*message, 1);
   cv::Mat grey;
   if (message->encoding == encodings::MONO16) {
-    pixelsOf16Bits(*message).convertTo(grey, CV_8U, 255.0 / ((1 << bits) - 1));
+    const double scale = 255.0 / (range.white - range.black);
+    pixelsOf16Bits(*message).convertTo(grey, CV_8U, scale, -scale * range.black);
     return grey;
   }
   static const std::map<std::string, cv::ColorConversionCodes> colours = {{encodings::BGR8, cv::COLOR_BGR2GRAY},

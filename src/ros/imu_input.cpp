@@ -6,6 +6,12 @@
 #include "stamps.hpp"
 
 namespace sdvo {
+namespace {
+
+const std::string kNoRates = " measures no rates (angular_velocity_covariance[0] is -1)";
+const std::string kNoAccelerations = " measures no accelerations (linear_acceleration_covariance[0] is -1)";
+
+}  // namespace
 
 ImuInput::ImuInput(ros::NodeHandle& nh, const RobotTransforms& transforms, Report warn)
     : transforms_(transforms), warn_(std::move(warn)) {
@@ -22,11 +28,16 @@ void ImuInput::take(const sensor_msgs::Imu& message) {
     const std::lock_guard<std::mutex> lock(mutex_);
     frame_ = ros_conversions::cleanFrameId(message.header.frame_id);
   }
+  constexpr double kNotThere = -1.0;  // sensor_msgs/Imu: first element of the covariance of what is not measured
   const auto& rate = message.angular_velocity;
   const auto& acceleration = message.linear_acceleration;
-  gyro_.add(nanoseconds(message.header.stamp), nanoseconds(ros::Time::now()), {rate.x, rate.y, rate.z});
-  gravity_.add(nanoseconds(message.header.stamp), {acceleration.x, acceleration.y, acceleration.z},
-               {rate.x, rate.y, rate.z});
+  const std::int64_t stamp = nanoseconds(message.header.stamp);
+  has_accelerations_ = message.linear_acceleration_covariance[0] != kNotThere;
+  const bool has_rates = message.angular_velocity_covariance[0] != kNotThere;
+  if (has_rates_.exchange(has_rates) && !has_rates) warn_(topic() + kNoRates + ": no guess of the rotation");
+  if (has_rates) gyro_.add(stamp, nanoseconds(ros::Time::now()), {rate.x, rate.y, rate.z});
+  if (has_accelerations_)
+    gravity_.add(stamp, {acceleration.x, acceleration.y, acceleration.z}, {rate.x, rate.y, rate.z});
 }
 
 std::optional<Eigen::Matrix3d> ImuInput::axesIn(const std::string& frame, std::string& problem) const {
@@ -40,9 +51,9 @@ std::optional<Eigen::Matrix3d> ImuInput::axesIn(const std::string& frame, std::s
 
 std::optional<Eigen::Matrix3d> ImuInput::rotation(const std::string& frame, const ros::Time& from, const ros::Time& to,
                                                   std::string& problem) const {
-  const std::optional<Eigen::Matrix3d> of_imu = gyro_.rotation(nanoseconds(from), nanoseconds(to));
+  const std::optional<Eigen::Matrix3d> of_imu = gyro_.rotation(nanoseconds(from), nanoseconds(to), &problem);
   if (!of_imu) {
-    problem = "topic " + topic() + " has no measurements of that time: does it come, and is its clock the cameras'?";
+    problem = topic() + (has_rates_ ? ": " + problem : kNoRates);
     return std::nullopt;
   }
   const std::optional<Eigen::Matrix3d> R_frame_imu = axesIn(frame, problem);
@@ -51,9 +62,9 @@ std::optional<Eigen::Matrix3d> ImuInput::rotation(const std::string& frame, cons
 }
 
 std::optional<Eigen::Vector3d> ImuInput::up(const std::string& frame, std::string& problem) const {
-  const std::optional<Eigen::Vector3d> of_imu = gravity_.up();
+  const std::optional<Eigen::Vector3d> of_imu = gravity_.up(&problem);
   if (!of_imu) {
-    problem = "the robot moved, or nothing came on " + topic() + ": start while it stands";
+    problem = topic() + (has_accelerations_ ? ": " + problem : kNoAccelerations);
     return std::nullopt;
   }
   const std::optional<Eigen::Matrix3d> R_frame_imu = axesIn(frame, problem);

@@ -4,6 +4,7 @@
 #include <sensor_msgs/Imu.h>
 
 #include <Eigen/Core>
+#include <atomic>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -28,8 +29,8 @@ class ImuInput {
   std::optional<Eigen::Matrix3d> rotation(const std::string& frame, const ros::Time& from, const ros::Time& to,
                                           std::string& problem) const;
 
-  /// Whether the last second is there and shows gravity alone.
-  bool stands() const { return gravity_.up().has_value(); }
+  /// False once messages say that they hold no rates: the topic is an accelerometer's.
+  bool hasRates() const { return has_rates_; }
 
   /// Unit vector away from the earth in the axes of `frame`, as the last second has it; none, and why, unless the robot
   /// stood in that second.
@@ -41,6 +42,7 @@ class ImuInput {
 
   const RobotTransforms& transforms_;
   const Report warn_;
+  std::atomic<bool> has_rates_{true}, has_accelerations_{true};  ///< by the newest message
   GyroTrack gyro_;
   GravityTrack gravity_;
   mutable std::mutex mutex_;

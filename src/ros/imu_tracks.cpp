@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <utility>
 
+#include "../common/text.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 
 namespace sdvo {
@@ -33,18 +34,28 @@ void GravityTrack::add(std::int64_t stamp, const Eigen::Vector3d& acceleration, 
   while (measurements_.size() > 1 && stamp - measurements_[1].stamp >= kPeriod) measurements_.pop_front();
 }
 
-std::optional<Eigen::Vector3d> GravityTrack::up() const {
+std::optional<Eigen::Vector3d> GravityTrack::up(std::string* problem) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (measurements_.size() < kFewest || measurements_.back().stamp - measurements_.front().stamp < kPeriod)
+  const auto refuse = [problem](const auto&... what) {
+    if (problem) *problem = text(1, what...);
     return std::nullopt;
+  };
+  if (measurements_.empty()) return refuse("no acceleration has come");
+  if (measurements_.size() < kFewest || measurements_.back().stamp - measurements_.front().stamp < kPeriod)
+    return refuse("less than a second of accelerations has come");
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const Measurement& m : measurements_) mean += m.acceleration / static_cast<double>(measurements_.size());
-  double square = 0.0;
+  double square = 0.0, rate = 0.0;
   for (const Measurement& m : measurements_) {
-    if (m.rate.norm() > kStandsRate) return std::nullopt;
+    rate = std::max(rate, m.rate.norm());
     square += (m.acceleration - mean).squaredNorm() / static_cast<double>(measurements_.size());
   }
-  if (std::sqrt(square) > kStandsAcceleration || std::abs(mean.norm() - kGravity) > kBias) return std::nullopt;
+  if (std::abs(mean.norm() - 1.0) < kBias / kGravity)
+    return refuse("|acceleration| = ", mean.norm(), ": is it in g? sensor_msgs/Imu wants m/s^2");
+  if (rate > kStandsRate) return refuse("the robot turns, by ", rate, " rad/s: start while it stands");
+  if (std::sqrt(square) > kStandsAcceleration) return refuse("the robot shakes or accelerates: start while it stands");
+  if (std::abs(mean.norm() - kGravity) > kBias)
+    return refuse("|acceleration| = ", mean.norm(), " m/s^2 is not that of gravity, ", kGravity);
   return mean.normalized();
 }
 
@@ -68,16 +79,27 @@ void GyroTrack::add(std::int64_t stamp, std::int64_t now, const Eigen::Vector3d&
     measurements_.pop_front();
 }
 
-std::optional<Eigen::Matrix3d> GyroTrack::rotation(std::int64_t from, std::int64_t to) const {
+std::optional<Eigen::Matrix3d> GyroTrack::rotation(std::int64_t from, std::int64_t to, std::string* problem) const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (from > to || measurements_.empty() || measurements_.front().stamp > from || measurements_.back().stamp < to)
+  const auto refuse = [problem](const auto&... what) {
+    if (problem) *problem = text(3, what...);
     return std::nullopt;
+  };
+  if (measurements_.empty()) return refuse("no rate has come");
+  if (from > to) return refuse("the images' stamps fall");
+  if (measurements_.back().stamp < to)
+    return refuse("its newest rate is ", seconds(to - measurements_.back().stamp),
+                  " s older than the image: does it come late, or by another clock?");
+  if (measurements_.front().stamp > from)
+    return refuse("its oldest rate is ", seconds(measurements_.front().stamp - from),
+                  " s newer than the image before: did it just start, or is its clock another one?");
   Eigen::Matrix3d R_from_to = Eigen::Matrix3d::Identity();
   for (std::size_t k = 1; k < measurements_.size(); ++k) {
     const Measurement &a = measurements_[k - 1], &b = measurements_[k];
     const std::int64_t begin = std::max(a.stamp, from), end = std::min(b.stamp, to);
     if (begin >= end) continue;
-    if (b.stamp - a.stamp >= kLongest) return std::nullopt;
+    if (b.stamp - a.stamp >= kLongest)
+      return refuse("a pause of ", seconds(b.stamp - a.stamp), " s between two of its rates");
     // The rate in the middle, which is linear between the two.
     const double share = 0.5 * seconds(begin - a.stamp + end - a.stamp) / seconds(b.stamp - a.stamp);
     R_from_to = R_from_to * expSO3((a.rate + share * (b.rate - a.rate)) * seconds(end - begin));

@@ -6,6 +6,7 @@
 #include <deque>
 #include <mutex>
 #include <optional>
+#include <string>
 
 #include "stamps.hpp"
 
@@ -18,9 +19,9 @@ class GravityTrack {
   /// stamp that is not later than the last one begins anew.
   void add(std::int64_t stamp, const Eigen::Vector3d& acceleration, const Eigen::Vector3d& rate);
 
-  /// Unit vector in the sensor's axes, the mean of the last second; nothing unless that second is there, the sensor
-  /// stood and measured gravity alone.
-  std::optional<Eigen::Vector3d> up() const;
+  /// Unit vector in the sensor's axes, the mean of the last second; nothing, and why, unless that second is there, the
+  /// sensor stood and measured gravity alone.
+  std::optional<Eigen::Vector3d> up(std::string* problem = nullptr) const;
 
  private:
   struct Measurement {
@@ -44,9 +45,9 @@ class GyroTrack {
   /// what is late or has a wild stamp; stamps that stay behind begin anew.
   void add(std::int64_t stamp, std::int64_t now, const Eigen::Vector3d& rate);
 
-  /// R_from_to, as in v_from = R_from_to * v_to; nothing unless measurements reach from one time to the other without
-  /// a pause of a tenth of a second.
-  std::optional<Eigen::Matrix3d> rotation(std::int64_t from, std::int64_t to) const;
+  /// R_from_to, as in v_from = R_from_to * v_to; nothing, and why, unless measurements reach from one time to the other
+  /// without a pause of a tenth of a second.
+  std::optional<Eigen::Matrix3d> rotation(std::int64_t from, std::int64_t to, std::string* problem = nullptr) const;
 
  private:
   struct Measurement {

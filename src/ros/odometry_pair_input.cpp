@@ -38,7 +38,8 @@ void OdometryPairInput::subscribe() {
     const bool has_odometry = !info || (info->state != "LOST" && info->state != "WAITING");
     if (odometry || has_odometry) ++unpaired_;
   };
-  synchroniser_ = std::make_unique<Synchroniser>(queue_size_, onPair, onUnpaired);
+  constexpr double kEqual = 0.0;  // s: all three have the stamp of the left image
+  synchroniser_ = std::make_unique<Synchroniser>(queue_size_, kEqual, onPair, onUnpaired);
   subscribers_ = {subscribe<0, Features>("stereo_features"), subscribe<1, Odometry>("odom"),
                   subscribe<2, Info>("vo_info")};
 }

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "exact_synchroniser.hpp"
+#include "synchronisers.hpp"
 
 namespace sdvo {
 
@@ -50,7 +50,7 @@ class OdometryPairInput {
   using Features = stereo_descriptor_vo::StereoFeatures;
   using Odometry = nav_msgs::Odometry;
   using Info = stereo_descriptor_vo::VoInfo;
-  using Synchroniser = ExactSynchroniser<Features, Odometry, Info>;
+  using Synchroniser = TriggerSynchroniser<Features, Odometry, Info>;
 
   void subscribe();
   template <int input, class Message>

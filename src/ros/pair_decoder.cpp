@@ -1,24 +1,21 @@
 #include "pair_decoder.hpp"
 
-#include <algorithm>
+#include <utility>
 
 #include "camera_conversions.hpp"
-#include "image_conversions.hpp"
 
 namespace sdvo {
 
 DecodedPair PairDecoder::decode(const StereoPairMessages& pair) {
-  const StereoCamera given = ros_conversions::toStereoCamera(*pair.left_info, *pair.right_info);
-  bit_depth_ =
-      std::max({bit_depth_, ros_conversions::bitDepth(*pair.left_image), ros_conversions::bitDepth(*pair.right_image)});
-  return {camera_ && isSameCamera(*camera_, given) ? *camera_ : given,
-          ros_conversions::toGrey(pair.left_image, bit_depth_), ros_conversions::toGrey(pair.right_image, bit_depth_)};
+  const StereoCamera camera = ros_conversions::toStereoCamera(*pair.left_info, *pair.right_info);
+  const bool new_range = grey_.add(*pair.left_image, *pair.right_image);
+  return {camera, ros_conversions::toGrey(pair.left_image, grey_.range()),
+          ros_conversions::toGrey(pair.right_image, grey_.range()), new_range};
 }
 
-bool PairDecoder::accept(const StereoCamera& camera) {
-  const bool changed = camera_ && *camera_ != camera;
-  camera_ = camera;
-  return changed;
+PairDecoder::Change PairDecoder::accept(const StereoCamera& camera) {
+  if (camera_ && camera_->isLike(camera)) return Change::kNone;
+  return std::exchange(camera_, camera) ? Change::kOther : Change::kFirst;
 }
 
 }  // namespace sdvo

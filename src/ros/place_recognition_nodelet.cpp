@@ -169,6 +169,9 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   std::optional<Eigen::Isometry3d> findExtrinsic(const OdometryPair& pair) {
     const std::string base_frame = ros_conversions::cleanFrameId(pair.odometry->child_frame_id);
     const std::string camera_frame = ros_conversions::cleanFrameId(pair.features->header.frame_id);
+    // A new epoch may follow a reset, with which the odometry takes the mount anew.
+    const std::pair<ros::Time, std::uint32_t> of{pair.info->session, pair.info->epoch};
+    if (std::exchange(mount_of_, of) != of) mount_->forget();
     std::string problem;
     const std::optional<Eigen::Isometry3d> found = mount_->find(base_frame, camera_frame, problem);
     if (!found && throttle_.allows("extrinsic"))
@@ -358,7 +361,9 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   std::shared_ptr<PlaceSession> session_;  // and all in it: under mutex_
   bool was_located_ = false;               // … and map -> odom is published since then
   std::atomic<int> generation_{0};         // sessions that a service began
-  std::uint64_t refused_ = 0;              // pairs; only the observer's thread touches it
+  // Only the observer's thread touches these.
+  std::uint64_t refused_ = 0;                     // pairs
+  std::pair<ros::Time, std::uint32_t> mount_of_;  // session and epoch
 
   std::unique_ptr<Worker<Arrived>> observer_;
   std::unique_ptr<Worker<Job>> optimiser_;

@@ -8,7 +8,6 @@
 #include <stdexcept>
 #include <utility>
 
-#include "camera_conversions.hpp"
 #include "feature_conversions.hpp"
 #include "frames.hpp"
 #include "odometry_conversions.hpp"
@@ -80,9 +79,8 @@ void PlaceSession::refuseOtherCameraThan(const PlaceSession& session) const {
 void PlaceSession::refuse(const StereoCamera& camera, const DescriptorKind& kind) const {
   if (recognition_.places().empty()) return;
   const StereoFeatures& known = recognition_.places().begin()->second.features;
-  if (!isSameCamera(camera, known.camera))
-    throw std::invalid_argument(
-        "the places are of another camera, or of another calibration of this one: call reset, or load_places of this");
+  if (!known.camera.isLike(camera))
+    throw std::invalid_argument("the places are of another camera: call reset, or load_places of this one");
   if (kind != known.kind())
     throw std::invalid_argument("the places are described by " + toString(known.kind()) + ", not by " + toString(kind) +
                                 ": call reset, or load_places of these");

@@ -14,7 +14,6 @@
 #include <string_view>
 #include <utility>
 
-#include "camera_conversions.hpp"
 #include "output_files.hpp"
 
 namespace sdvo {
@@ -124,7 +123,7 @@ SavedPlaces read(const std::string& path, const PoseGraphOptions& options) {
       places.push_back(ros_conversions::fromMessage(place));
       if (!stream) stream = ros_conversions::streamOf(place.features);
       const StereoFeatures &first = places.front().features, &last = places.back().features;
-      if (!isSameCamera(last.camera, first.camera))
+      if (!first.camera.isLike(last.camera))
         throw std::invalid_argument("its places " + std::to_string(places.front().id) + " and " +
                                     std::to_string(places.back().id) + " are of different cameras");
     } else if (topic == kGraphTopic) {

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "../config/interface_options.hpp"
+#include "camera_conversions.hpp"
 #include "diagnostics.hpp"
 #include "feature_conversions.hpp"
 #include "frames.hpp"
@@ -184,18 +185,16 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
       NODELET_WARN_STREAM("the stamps of the images jumped back to " << stamp << ": a new stream begins (epoch + 1)");
       ++stream_epoch_;
     }
-    const int depth = decoder_.bitDepth();
     const DecodedPair decoded = decoder_.decode(pair);
-    if (decoder_.bitDepth() > depth)
-      NODELET_INFO_STREAM("mono16 images hold " << decoder_.bitDepth() << " bits, scaled to 8");
-    const StereoFeatures features =
+    if (decoded.new_range && throttle_.allows("mono16"))
+      NODELET_INFO_STREAM("mono16 images: " << decoder_.greyRange().black << " to " << decoder_.greyRange().white
+                                            << " are black to white");
+    StereoFeatures features =
         extractor_->extract(decoded.camera, decoded.left, decoded.right, nanoseconds(stamp), mask());
     // Only now: a calibration that does not fit the images was refused and is no new stream.
-    if (decoder_.accept(decoded.camera)) {
-      ++stream_epoch_;
-      if (throttle_.allows("camera_info"))
-        NODELET_WARN_STREAM("camera_info changed: a new stream begins (epoch + 1; " << stream_epoch_ << " so far)");
-    }
+    const std::string unrectified = ros_conversions::whyUnrectified(*pair.left_info, *pair.right_info);
+    noteCamera(decoded.camera, unrectified);
+    if (features.report.refused && !unrectified.empty()) features.report.status = unrectified;
 
     diagnostics_->note(features);
     reportRig(features, stamp);
@@ -211,6 +210,17 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     if (throttle_.allows(e.what()))
       NODELET_ERROR_STREAM("pair at " << passed.item.left_image->header.stamp << " of "
                                       << passed.item.left_image->header.frame_id << " skipped: " << e.what());
+  }
+
+  void noteCamera(const StereoCamera& camera, const std::string& unrectified) {
+    const PairDecoder::Change change = decoder_.accept(camera);
+    if (change == PairDecoder::Change::kNone) return;
+    for (const std::string& doubt : {ros_conversions::doubtOf(camera), unrectified})
+      if (!doubt.empty()) NODELET_WARN_STREAM("camera_info: " << doubt);
+    if (change == PairDecoder::Change::kFirst) return;
+    ++stream_epoch_;
+    if (throttle_.allows("camera_info"))
+      NODELET_WARN_STREAM("camera_info changed: a new stream begins (epoch + 1; " << stream_epoch_ << " so far)");
   }
 
   /// What the rig monitor says, when it says something else than before. A pair without features (dark) says nothing.

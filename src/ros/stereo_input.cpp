@@ -12,7 +12,6 @@ namespace {
 
 /// Messages that wait for this node's own thread, which handles each in no time: long enough that none is lost there.
 constexpr int kArrivalQueue = 20;
-constexpr double kLeastPeriod = 0.01;  // s, of a camera
 
 std::array<std::string, ArrivalLog::kInputs> resolvedTopics(const ros::NodeHandle& nh) {
   return {nh.resolveName("left/image_rect"), nh.resolveName("right/image_rect"), nh.resolveName("left/camera_info"),
@@ -27,8 +26,11 @@ StereoInput::StereoInput(ros::NodeHandle& nh, StereoImageTransport& transport, c
       refuse_(std::move(refuse)),
       topics_(resolvedTopics(nh)),
       arrivals_(topics_, options),
-      exact_(options.sync_queue_size, [this](const auto&... messages) { onPair(messages...); }) {
-  if (options.approximate_sync) synchroniseApproximately(options);
+      exact_(options.sync_queue_size, options.sync_tolerance,
+             [this](const auto&... messages) { onPair(messages...); }) {
+  if (options.approximate_sync)
+    approximate_ = std::make_unique<ApproximateSynchroniser<Image, Image, Info, Info>>(
+        options.sync_queue_size, options.max_interval, [this](const auto&... messages) { onPair(messages...); });
   const auto arrivals =
       static_cast<std::uint32_t>(std::max({kArrivalQueue, options.sync_queue_size, options.queue_size}));
   ros::NodeHandle right_nh = right_callbacks_.serve(nh);
@@ -41,18 +43,6 @@ StereoInput::StereoInput(ros::NodeHandle& nh, StereoImageTransport& transport, c
   right_info_ = nh.subscribe<Info>(topics_[ArrivalLog::kRightInfo], arrivals,
                                    [this](const Info::ConstPtr& m) { take<ArrivalLog::kRightInfo>(m); });
   right_callbacks_.start();
-}
-
-void StereoInput::synchroniseApproximately(const StereoInputOptions& options) {
-  ApproximatePolicy policy(static_cast<std::uint32_t>(options.sync_queue_size));
-  policy.setMaxIntervalDuration(ros::Duration(options.max_interval));
-  // Without a least time between images of one camera each pair would wait for the next one, to see that it is no
-  // better.
-  const ros::Duration least(std::min(options.max_interval, kLeastPeriod));
-  for (int input = 0; input < ArrivalLog::kInputs; ++input) policy.setInterMessageLowerBound(input, least);
-  approximate_ =
-      std::make_unique<message_filters::Synchronizer<ApproximatePolicy>>(static_cast<const ApproximatePolicy&>(policy));
-  approximate_->registerCallback(&StereoInput::onPair, this);
 }
 
 template <ArrivalLog::Input input, class Message>

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <message_filters/sync_policies/approximate_time.h>
-#include <message_filters/synchronizer.h>
 #include <ros/node_handle.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
@@ -14,8 +12,8 @@
 
 #include "../config/interface_options.hpp"
 #include "arrival_log.hpp"
-#include "exact_synchroniser.hpp"
 #include "image_subscriber.hpp"
+#include "synchronisers.hpp"
 #include "threads.hpp"
 
 namespace sdvo {
@@ -45,10 +43,7 @@ class StereoInput {
  private:
   using Image = sensor_msgs::Image;
   using Info = sensor_msgs::CameraInfo;
-  using ExactPolicy = ExactSynchroniser<Image, Image, Info, Info>;
-  using ApproximatePolicy = message_filters::sync_policies::ApproximateTime<Image, Image, Info, Info>;
 
-  void synchroniseApproximately(const StereoInputOptions& options);
   template <ArrivalLog::Input input, class Message>
   void take(const boost::shared_ptr<const Message>& message);
   void onPair(const sensor_msgs::ImageConstPtr& left_image, const sensor_msgs::ImageConstPtr& right_image,
@@ -59,8 +54,8 @@ class StereoInput {
   const std::array<std::string, ArrivalLog::kInputs> topics_;
   ArrivalLog arrivals_;
   std::mutex mutex_;  // of what follows
-  ExactPolicy exact_;
-  std::unique_ptr<message_filters::Synchronizer<ApproximatePolicy>> approximate_;  // null where stamps are equal
+  TriggerSynchroniser<Image, Image, Info, Info> exact_;
+  std::unique_ptr<ApproximateSynchroniser<Image, Image, Info, Info>> approximate_;  // null unless asked for
 
   // Destroyed in reverse order: first the subscribers.
   CallbackThread right_callbacks_;

@@ -5,9 +5,11 @@
 #include <ros/time.h>
 #include <tf2_eigen/tf2_eigen.h>
 
+#include <cmath>
 #include <exception>
 #include <utility>
 
+#include "../common/text.hpp"
 #include "frames.hpp"
 #include "stamps.hpp"
 
@@ -97,12 +99,26 @@ std::optional<Eigen::Isometry3d> CameraMount::find(const std::string& base_frame
     if (found) {
       base_frame_ = base_frame;
       camera_frame_ = camera_frame;
+      change_is_told_ = false;
       const std::lock_guard<std::mutex> lock(mutex_);
       return T_base_camera_ = found;
     }
     if (ros::SteadyTime::now() >= give_up || stopping_ || !ros::ok()) return std::nullopt;
     ros::WallDuration(0.01).sleep();
   }
+}
+
+std::string CameraMount::change() {
+  constexpr double kNear = 0.005, kAlike = 0.5 * M_PI / 180.0;  // m, rad: more than joints and masts give way (chosen)
+  std::string ignored;
+  if (change_is_told_ || camera_frame_.empty()) return "";
+  const std::optional<Eigen::Isometry3d> now = transforms_.find(base_frame_, camera_frame_, ignored);
+  if (!now) return "";
+  const Eigen::Isometry3d moved = last()->inverse() * *now;
+  const double way = moved.translation().norm(), angle = Eigen::AngleAxisd(moved.linear()).angle();
+  if (way <= kNear && angle <= kAlike) return "";
+  change_is_told_ = true;
+  return text(3, base_frame_, " -> ", camera_frame_, " has changed by ", way, " m and ", 180.0 / M_PI * angle, " deg");
 }
 
 bool CameraMount::knows(const std::string& base_frame, const std::string& camera_frame) const {

@@ -54,8 +54,8 @@ class RobotTransforms {
   ros::Subscriber dynamic_, static_;
 };
 
-/// Where the camera sits on the robot, as TF tells; read once for a camera, until that is forgotten. One thread asks,
-/// others may read.
+/// Where the camera sits on the robot, as TF tells; read once for a camera, until that is forgotten, for the pose goes
+/// through it to the odometry's origin. One thread asks, others may read.
 class CameraMount {
  public:
   /// `timeout`, s of wall time: how long the first question waits, because static transforms and the first features
@@ -68,6 +68,9 @@ class CameraMount {
 
   /// Whether find() has it already.
   bool knows(const std::string& base_frame, const std::string& camera_frame) const;
+
+  /// What TF has by now instead of what find() found, in words; empty while that is the same, and when it was said.
+  std::string change();
 
   /// find() asks TF again.
   void forget() { camera_frame_.clear(); }
@@ -84,6 +87,7 @@ class CameraMount {
   bool has_waited_ = false;
   std::atomic<bool> stopping_{false};
   std::string base_frame_, camera_frame_;
+  bool change_is_told_ = false;
   mutable std::mutex mutex_;
   std::optional<Eigen::Isometry3d> T_base_camera_;
 };

@@ -196,7 +196,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     if (resumes_.take(passed.item.resumes)) odometry_->breakStream();
     const StereoFeatures features = ros_conversions::fromMessage(passed.item.view);
     std::string problem = findExtrinsic(ros_conversions::cleanFrameId(message.header.frame_id));
-    if (problem.empty() && to_be_levelled_) problem = level();
+    if (problem.empty() && to_be_levelled_ && !given_start_) problem = level();
     const OdometryResult result = problem.empty() ? track(features, message) : waitFor(problem);
     publisher_->publishPoints(passed.item.view);
     publisher_->publishFlow(result, features, message.header);
@@ -211,7 +211,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   void noteJumps(const FeaturesFilter::Passed& passed) {
     const bool source_restarted = std::exchange(source_restarts_, passed.source_restarts) != passed.source_restarts;
     const bool clock_set = std::exchange(clock_steps_, passed.clock_steps) != passed.clock_steps;
-    if (clock_set && ros::Time::isSimTime()) return restart("the clock jumped back", T_odom_start_);
+    if (clock_set && ros::Time::isSimTime()) return restart("the clock jumped back");
     if (!clock_set && !source_restarted) return;
     NODELET_WARN_STREAM((clock_set ? "the system's clock was set back" : "the stamps of the features jumped back")
                         << " to " << passed.item.message->header.stamp << ": the odometry goes on from the last pose");
@@ -265,14 +265,17 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
                           << " at " << stamp << ", epoch " << result.epoch << ": " << result.reason);
   }
 
-  void restart(const char* why, const Eigen::Isometry3d& T_odom_start) {
+  /// At a given pose, or where it began.
+  void restart(const char* why, const std::optional<Eigen::Isometry3d>& given = std::nullopt) {
+    const Eigen::Isometry3d T_odom_start = given.value_or(T_odom_start_);
     NODELET_WARN_STREAM(
         why << ": the odometry starts again from "
             << (T_odom_start.isApprox(Eigen::Isometry3d::Identity()) ? "the origin" : "the given pose"));
     odometry_->reset();
     mount_->forget();
     publisher_->restart(T_odom_start);
-    to_be_levelled_ = false;
+    given_start_ = given.has_value();
+    levels_until_.reset();
     processed_epoch_.reset();
     processed_stamp_.reset();
   }
@@ -281,7 +284,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   /// for or knows it.
   std::optional<MotionGuess> findGuess(const std_msgs::Header& header) {
     const bool of_frame = !options_.output.guess_frame_id.empty();
-    if (!processed_stamp_ || (!of_frame && !options_.output.use_imu)) return std::nullopt;
+    if (!processed_stamp_ || (!of_frame && !(imu_ && imu_->hasRates()))) return std::nullopt;
     std::string problem;
     std::optional<MotionGuess> guess;
     const double now = steadyTime(), give_up = now + patience_.timeout(now);
@@ -323,11 +326,11 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     constexpr double kPatience = 2.0;  // s of wall time
     const double now = steadyTime();
     if (!levels_until_) levels_until_ = now + kPatience;
-    if (!imu_->stands() && now < *levels_until_)
-      return "roll and pitch of the first pose: no second of gravity alone on " + imu_->topic() + " yet";
-    to_be_levelled_ = false;
     std::string problem;
-    if (const auto up = imu_->up(ros_conversions::cleanFrameId(options_.output.base_frame_id), problem)) {
+    const auto up = imu_->up(ros_conversions::cleanFrameId(options_.output.base_frame_id), problem);
+    if (!up && now < *levels_until_) return "roll and pitch of the first pose: " + problem;
+    to_be_levelled_ = false;
+    if (up) {
       T_odom_start_ = levelled(T_odom_start_, *up);
       publisher_->restart(T_odom_start_);
     } else {
@@ -339,10 +342,21 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   /// Asks for the camera's place on the robot; says what is missing, nothing when it is known.
   std::string findExtrinsic(const std::string& camera_frame) {
     const std::string base_frame = ros_conversions::cleanFrameId(options_.output.base_frame_id);
-    if (mount_->knows(base_frame, camera_frame)) return "";
+    if (mount_->knows(base_frame, camera_frame)) {
+      if (const std::string change = mount_->change(); !change.empty())
+        NODELET_WARN_STREAM("TF: " << change << "; the odometry holds on to the transform that it began with. A camera "
+                                   << "on a joint needs a base_frame_id that moves with it; after a new calibration of "
+                                   << "the mount call reset");
+      return "";
+    }
     std::string problem;
     if (const std::optional<Eigen::Isometry3d> found = mount_->find(base_frame, camera_frame, problem)) {
       warnIfNotOptical(camera_frame, *found);
+      if (!camera_frame_.empty() && camera_frame_ != camera_frame)
+        NODELET_WARN_STREAM("the images' frame was '" << camera_frame_ << "' and is '" << camera_frame
+                                                      << "' now: another camera goes on from the base's last pose "
+                                                      << "(epoch + 1)");
+      camera_frame_ = camera_frame;
       return "";
     }
     const std::string report = "no transform from camera frame '" + camera_frame + "' to base frame '" + base_frame +
@@ -367,7 +381,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   void startAgain(const std::optional<Eigen::Isometry3d>& T_odom_base = std::nullopt) {
     const std::lock_guard<std::mutex> lock(work_mutex_);
     ++starts_;
-    restart("reset was called", T_odom_base.value_or(T_odom_start_));
+    restart("reset was called", T_odom_base);
   }
 
   bool onReset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
@@ -406,6 +420,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     odometry_->takePose(to_camera * covariance * to_camera.transpose());
     const Eigen::Isometry3d T_start_base = *T_base_camera * odometry_->lastPose() * T_base_camera->inverse();
     publisher_->restart(T_odom_base * T_start_base.inverse());
+    given_start_ = true;
     return "";
   } catch (const std::invalid_argument& e) {
     return e.what();
@@ -478,9 +493,11 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   Eigen::Isometry3d T_odom_start_;  // of a run
   int source_restarts_ = 0, clock_steps_ = 0;
   int epoch_ = 0;
+  std::string camera_frame_;
   std::optional<std::uint32_t> processed_epoch_;
   std::optional<ros::Time> processed_stamp_;
-  bool to_be_levelled_ = false;         // the first pose, by the accelerometer
+  bool to_be_levelled_ = false;         // T_odom_start_, by the accelerometer
+  bool given_start_ = false;            // a service gave this run's first pose, which stays as it is
   std::optional<double> levels_until_;  // s, steady time
   Patience patience_{0.0};              // with guesses
 

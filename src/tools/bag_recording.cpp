@@ -3,13 +3,13 @@
 #include <rosbag/view.h>
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
 #include <map>
 #include <set>
 #include <stdexcept>
 
 #include "../ros/pair_decoder.hpp"
-#include "../ros/stamp_filter.hpp"
 #include "../ros/stamps.hpp"
 
 namespace sdvo {
@@ -23,6 +23,11 @@ void put(const StereoMessage& message, StereoPairMessages& pair) {
     (message.input == 0 ? pair.left_image : pair.right_image) = message.image;
   else
     (message.input == 2 ? pair.left_info : pair.right_info) = message.info;
+}
+
+/// Whether both are stamps of one trigger, as the nodelet has it by default.
+bool areOne(const ros::Time& a, const ros::Time& b) {
+  return std::abs(secondsBetween(a, b)) <= StereoInputOptions().sync_tolerance;
 }
 
 bool isComplete(const StereoPairMessages& pair) {
@@ -85,12 +90,15 @@ int BagRecording::forEach(int limit, const Use& use) {
       problem = instance->getTopic() + ": " + why;
       continue;
     }
-    Part& pair = waiting[stamp];
+    const auto waits =
+        std::find_if(waiting.begin(), waiting.end(), [&](const auto& p) { return areOne(p.first, stamp); });
+    const auto found = waits != waiting.end() ? waits : waiting.emplace(stamp, Part()).first;
+    Part& pair = found->second;
     put(message, pair.messages);
     pair.recorded[message.input] = instance->getTime();
     if (isComplete(pair.messages)) {
       filterStamps(pair, instance->getTime());
-      const auto end = std::next(waiting.find(stamp));
+      const auto end = std::next(found);
       unpaired += static_cast<int>(std::distance(waiting.begin(), end)) - 1;
       waiting.erase(waiting.begin(), end);
     } else if (waiting.size() > kWaiting) {
@@ -119,7 +127,8 @@ StereoPairMessages BagRecording::read(const Used& pair) const {
   for (std::size_t input = 0; input < topics_.size(); ++input) {
     rosbag::View view(bag_, rosbag::TopicQuery(topics_[input]), pair.recorded[input], pair.recorded[input]);
     for (const rosbag::MessageInstance& instance : view)
-      if (const StereoMessage message = readStereoMessage(instance, topics_); message.header().stamp == pair.stamp)
+      if (const StereoMessage message = readStereoMessage(instance, topics_);
+          areOne(message.header().stamp, pair.stamp))
         put(message, messages);
   }
   return messages;

@@ -4,6 +4,7 @@
 #include <opencv2/core.hpp>
 
 #include "../common/text.hpp"
+#include "../ros/camera_conversions.hpp"
 #include "../ros/stamps.hpp"
 
 namespace sdvo {
@@ -74,12 +75,8 @@ Finding CameraCheck::calibration() const {
             unusable_ > 0 ? "see docs/cameras.md, 'What a wrong camera_info looks like'" : ""};
   const std::string what = text(1, camera_.width, "x", camera_.height, ", f ", camera_.fx, " px, baseline ",
                                 1e3 * camera_.baseline, " mm, ", model_.empty() ? "no lens model" : model_);
-  // Of stereo cameras that robots carry: a lens of 20 to 150 deg, a baseline of 1 cm to 2 m.
-  const double width = camera_.width / camera_.fx;
-  if (width < 0.35 || width > 7.5)
-    return {step, Verdict::kWarn, what, "is the focal length that of these images' size?"};
-  if (camera_.baseline < 0.01 || camera_.baseline > 2.0)
-    return {step, Verdict::kWarn, what, "is the baseline in metres? P[3] of the right camera_info is -fx * baseline"};
+  const std::string doubt = ros_conversions::doubtOf(camera_);
+  if (!doubt.empty()) return {step, Verdict::kWarn, what, doubt};
   return {step, Verdict::kOk, what, ""};
 }
 

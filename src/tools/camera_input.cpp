@@ -12,7 +12,7 @@ namespace sdvo {
 CameraInput::CameraInput(const StereoTopics& topics, std::function<void(const StereoPairMessages&)> use)
     : stamps_(topics),
       arrivals_(topics, StereoInputOptions()),
-      pairs_(StereoInputOptions().sync_queue_size,
+      pairs_(StereoInputOptions().sync_queue_size, StereoInputOptions().sync_tolerance,
              [this, use = std::move(use)](
                  const sensor_msgs::ImageConstPtr& left, const sensor_msgs::ImageConstPtr& right,
                  const sensor_msgs::CameraInfoConstPtr& left_info, const sensor_msgs::CameraInfoConstPtr& right_info) {

@@ -10,8 +10,8 @@
 
 #include "../check/stamp_check.hpp"
 #include "../ros/arrival_log.hpp"
-#include "../ros/exact_synchroniser.hpp"
 #include "../ros/stereo_input.hpp"
+#include "../ros/synchronisers.hpp"
 #include "stereo_messages.hpp"
 
 namespace sdvo {
@@ -36,7 +36,7 @@ class CameraInput {
  private:
   StampCheck stamps_;
   ArrivalLog arrivals_;
-  ExactSynchroniser<sensor_msgs::Image, sensor_msgs::Image, sensor_msgs::CameraInfo, sensor_msgs::CameraInfo> pairs_;
+  TriggerSynchroniser<sensor_msgs::Image, sensor_msgs::Image, sensor_msgs::CameraInfo, sensor_msgs::CameraInfo> pairs_;
   tf2::BufferCore transforms_;
   std::string frame_;  ///< of the left images
 };

@@ -34,6 +34,18 @@ TEST(StereoFeatures, MeasurementAndPointAgree) {
     EXPECT_LT((features.camera.project(features.point(i)) - features.measurement(i)).norm(), 1e-9);
 }
 
+TEST(StereoFeatures, SeenByAnotherCameraTheyAreTheSamePoints) {
+  const StereoFeatures features = threeFeatures();
+  const StereoCamera other{410.0, 405.0, 300.0, 250.0, 0.48, features.camera.width, features.camera.height};
+  const StereoFeatures seen = features.seenBy(other);
+  EXPECT_EQ(seen.camera, other);
+  for (int i = 0; i < features.count(); ++i) {
+    EXPECT_LT((seen.point(i) - features.point(i)).norm(), 1e-5 * features.point(i).norm());
+    EXPECT_LT((seen.measurement(i) - other.project(features.point(i))).norm(), 1e-3);
+    EXPECT_NEAR(seen.size[i] / features.size[i], 410.0 / 400.0, 1e-6);
+  }
+}
+
 TEST(StereoFeatures, NamesTheArrayOfAnotherLength) {
   const auto expectNamed = [](const std::string& name, const std::function<void(StereoFeatures&)>& damage) {
     StereoFeatures features = threeFeatures();

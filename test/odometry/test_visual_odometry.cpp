@@ -46,6 +46,12 @@ StereoFeatures pairOf(int i, double noise = 0.0) {
   return synthetic::observe(street(), synthetic::camera(), drivePose(i).inverse(), stampOf(i), sighting);
 }
 
+/// Pair i of the same drive in another street, of which no map was made.
+StereoFeatures pairElsewhere(int i) {
+  static const synthetic::World other = synthetic::randomWorld(2, 5000, {-40.0, -4.0, -5.0}, {30.0, 3.0, 70.0});
+  return synthetic::observe(other, synthetic::camera(), drivePose(i).inverse(), stampOf(i));
+}
+
 /// Pair i in which nothing is seen.
 StereoFeatures blindPair(int i) {
   return synthetic::noFeatures(synthetic::camera(), stampOf(i));
@@ -275,7 +281,7 @@ TEST(VisualOdometry, IsLostAfterTheSecondFailureAndStartsAgainFromTheLastPose) {
     EXPECT_FALSE(lost.reason.empty()) << i;
     expectHealthy(lost);
   }
-  const OdometryResult again = odometry.update(pairOf(10));
+  const OdometryResult again = odometry.update(pairElsewhere(10));
   EXPECT_TRUE(again.has_pose);
   EXPECT_FALSE(again.has_motion);
   EXPECT_FALSE(again.reason.empty());
@@ -286,7 +292,7 @@ TEST(VisualOdometry, IsLostAfterTheSecondFailureAndStartsAgainFromTheLastPose) {
   expectHealthy(again);
 
   for (int i = 11; i <= 14; ++i) {
-    const OdometryResult result = odometry.update(pairOf(i));
+    const OdometryResult result = odometry.update(pairElsewhere(i));
     EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
     EXPECT_EQ(result.epoch, before.epoch + 1);
     EXPECT_LT(distanceBetween(result.T_origin_camera, again.T_origin_camera * trueSinceStart(i, 10)), 1e-3);
@@ -517,6 +523,24 @@ TEST(VisualOdometry, ResetReturnsToTheOriginUnderANewEpoch) {
   }
 }
 
+TEST(VisualOdometry, GoesOnWithALensThatFocuses) {
+  VisualOdometry odometry({});
+  for (int i = 0; i <= 20; ++i) {
+    StereoCamera camera = synthetic::camera();
+    const double change = 0.04 * std::sin(i);  // up to 20 px of the focal length, each pair another one
+    camera.fx *= 1.0 + change;
+    camera.fy *= 1.0 + 0.9 * change;
+    camera.cx += 100.0 * change;
+    camera.cy -= 50.0 * change;
+    camera.baseline *= 1.0 - change;
+    const OdometryResult result =
+        odometry.update(synthetic::observe(street(), camera, drivePose(i).inverse(), stampOf(i)));
+    ASSERT_EQ(result.state, TrackingState::kTracking) << i << ": " << result.reason;
+    EXPECT_EQ(result.epoch, 0);
+    EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(i)), 1e-3) << i;
+  }
+}
+
 TEST(VisualOdometry, StartsAgainFromTheLastPoseWithAnotherCamera) {
   VisualOdometry odometry({});
   const OdometryResult before = follow(odometry, 5);
@@ -535,6 +559,29 @@ TEST(VisualOdometry, StartsAgainFromTheLastPoseWithAnotherCamera) {
   const OdometryResult next = odometry.update(otherPair(7));
   EXPECT_EQ(next.state, TrackingState::kTracking) << next.reason;
   EXPECT_LT(distanceBetween(next.T_origin_camera, again.T_origin_camera * trueSinceStart(7, 6)), 1e-3);
+}
+
+TEST(VisualOdometry, AnotherCameraOfTheRobotGoesOnFromTheBasesPose) {
+  const Eigen::Isometry3d T_base_a = Eigen::Translation3d(0.4, 0.1, 0.5) * Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5);
+  const Eigen::Isometry3d T_a_b =
+      Eigen::Translation3d(-0.2, 0.1, -0.3) * Eigen::AngleAxisd(0.4, Eigen::Vector3d::UnitY());
+  const Eigen::Isometry3d T_base_b = T_base_a * T_a_b;
+  VisualOdometry odometry({});
+  odometry.mountAt(T_base_a);
+  const OdometryResult before = follow(odometry, 5);
+  for (int i = 6; i <= 10; ++i) {
+    odometry.mountAt(T_base_b);
+    const OdometryResult after = odometry.update(
+        synthetic::observe(street(), synthetic::camera(), (drivePose(i) * T_a_b).inverse(), stampOf(i)));
+    EXPECT_EQ(after.epoch, before.epoch + 1) << i;
+    EXPECT_EQ(after.has_motion, i > 6) << i;
+    EXPECT_GT(after.pose_covariance.trace(), before.pose_covariance.trace());
+    // The base stays where it was, and moves from there as both cameras see it.
+    const Eigen::Isometry3d expected = T_base_a * before.T_origin_camera * trueSinceStart(i, 6) * T_base_a.inverse();
+    const Eigen::Isometry3d base = T_base_b * after.T_origin_camera * T_base_b.inverse();
+    EXPECT_LT(distanceBetween(base, expected), 2e-3) << i;
+    EXPECT_LT(angleBetween(base, expected), 1e-3) << i;
+  }
 }
 
 TEST(VisualOdometry, StartsAgainFromTheLastPoseWithAnotherDescriptor) {
@@ -573,11 +620,11 @@ TEST(VisualOdometry, BrokenStreamStartsAgainFromTheLastPose) {
   VisualOdometry odometry({});
   const OdometryResult before = follow(odometry, 5);
   odometry.breakStream();
-  const OdometryResult again = odometry.update(pairOf(9));
+  const OdometryResult again = odometry.update(pairElsewhere(9));
   EXPECT_EQ(again.epoch, before.epoch + 1);
   EXPECT_FALSE(again.has_motion);
   EXPECT_TRUE(again.T_origin_camera.isApprox(before.T_origin_camera, 1e-9));
-  EXPECT_EQ(odometry.update(pairOf(10)).state, TrackingState::kTracking);
+  EXPECT_EQ(odometry.update(pairElsewhere(10)).state, TrackingState::kTracking);
 }
 
 TEST(VisualOdometry, GoesOnFromTheLastPoseWhenTheClockIsSetBack) {

@@ -16,7 +16,7 @@ import rosbag
 import rosgraph
 import roslaunch.config
 import rosnode
-import rospkg
+import roslib.packages
 import rospy
 import rosservice
 import rostest
@@ -37,11 +37,11 @@ IN_YAML = {'odom_frame_id': 'world', 'base_frame_id': 'robot', 'initial_pose': '
            'queue_size': 7, 'odometry_queue_size': 8}
 
 
-FOLDER = os.path.join(rospkg.RosPack().get_path(PACKAGE), 'launch')
+FOLDER = os.path.join(roslib.packages.get_pkg_dir(PACKAGE), 'launch')
 
 
 def load(file, **arguments):
-    """What roslaunch makes of a launch file, or of a text, beside its own parameters."""
+    """A launch file, or a text, read by roslaunch, beside its own parameters."""
     given = ['%s:=%s' % item for item in arguments.items()]
     texts, files = ([file], []) if file.startswith('<') else (None, [(os.path.join(FOLDER, file), given)])
     config = roslaunch.config.load_config_default(files, None, roslaunch_strs=texts)

@@ -561,6 +561,69 @@ class Live(PipelineCase):
             turn(images)
             self.assertEqual(self.feed_messages(images, infos).state, 'TRACKING')
 
+    def test_an_accelerometer_levels_after_a_reset_and_is_no_gyro(self):
+        config = tempfile.NamedTemporaryFile('w', suffix='.yaml')
+        self.addCleanup(config.close)
+        config.write('visual_odometry: {use_imu: true}\n')
+        config.flush()
+        self.start(config=config.name)
+        imu = rospy.Publisher(self.namespace + '/imu', Imu, queue_size=100)
+        self.addCleanup(imu.unregister)
+        self.assertTrue(wait_until(lambda: self.is_sent_to_pipeline(imu)))
+        self.assertIn('no acceleration has come', self.feed(0).reason)
+        rospy.ServiceProxy(self.namespace + '/visual_odometry/reset', Empty)()
+        tilt = np.radians(10.0)
+        still = Imu()
+        still.header.frame_id = 'base_link'
+        still.linear_acceleration.x, still.linear_acceleration.z = 9.81 * np.sin(tilt), 9.81 * np.cos(tilt)
+        still.angular_velocity_covariance[0] = -1.0
+        for k in range(90):
+            still.header.stamp = self.camera.messages(0)[0][0].header.stamp - rospy.Duration.from_sec(0.015 * (90 - k))
+            imu.publish(still)
+        times = itertools.count(1)
+        self.assertTrue(wait_until(lambda: self.feed(0, time_of=next(times)).state == 'TRACKING'), self.info[-1].reason)
+        up = matrix_of(self.odometry[-1].pose.pose)[:3, :3] @ [np.sin(tilt), 0.0, np.cos(tilt)]
+        self.assertAlmostEqual(up[2], 1.0, delta=1e-3)
+        for i in range(1, 4):
+            self.assertEqual(self.feed(i, time_of=next(times)).state, 'TRACKING')
+        self.assertTrue(self.rosout.warned('measures no rates'), self.rosout.warnings)
+        self.assertFalse(self.rosout.warned('no guess of the motion'), self.rosout.warnings)
+
+    def test_another_image_frame_goes_on_from_the_last_pose_of_the_base(self):
+        side = camera_transform('side')
+        side.transform.translation.x = 0.7
+        q = side.transform.rotation
+        q.x, q.y, q.z, q.w = 0.0, np.sqrt(0.5), -np.sqrt(0.5), 0.0  # looks to the right
+        self.broadcaster.sendTransform([camera_transform(FRAME), side])
+        self.start()
+        for i in range(5):
+            self.feed(i)
+        before, there = self.info[-1], matrix_of(self.odometry[-1].pose.pose)
+        after = self.feed(5, frame='side')
+        self.assertEqual((after.state, after.epoch), ('DEGRADED', before.epoch + 1))
+        np.testing.assert_allclose(matrix_of(self.odometry[-1].pose.pose), there, atol=1e-6)
+        self.assertTrue(self.rosout.warned(FRAME, "is 'side' now"), self.rosout.warnings)
+        self.assertEqual(self.feed(6, frame='side').epoch, after.epoch)
+        moved = np.linalg.inv(there) @ matrix_of(self.odometry[-1].pose.pose)
+        self.assertLess(moved[1, 3], -0.1)
+        self.assertLess(abs(moved[0, 3]), 0.2 * abs(moved[1, 3]))
+
+    def test_a_mount_that_changes_is_said_once_and_taken_over_by_a_reset(self):
+        self.addCleanup(self.broadcaster.sendTransform, camera_transform(FRAME))
+        self.start()
+        for i in range(3):
+            self.feed(i)
+        moved = camera_transform(FRAME)
+        moved.transform.translation.z = 0.25
+        self.broadcaster.sendTransform(moved)
+        times = itertools.count(3)
+        self.assertTrue(wait_until(lambda: self.feed(3, time_of=next(times)) and
+                                   self.rosout.warned('has changed by 0.250 m and 0.000 deg', 'call reset')))
+        for i in range(4, 7):
+            self.feed(i, time_of=next(times))
+        self.assertEqual(sum('has changed by' in warning for warning in self.rosout.warnings), 1)
+        self.assertEqual(self.info[-1].epoch, 0)
+
     def test_another_publisher_of_the_same_transform_is_named(self):
         self.start()
         self.feed(0)

@@ -48,8 +48,8 @@ TEST_F(ArrivalLogTest, TheGapIsThatBetweenLeftAndRightNotWithinOneSide) {
   for (int i = 0; i < 10; ++i) note(ArrivalLog::kLeftImage, 10.0 + 0.001 * i, 0.0);
   note(ArrivalLog::kRightImage, 10.259, 0.0);
   EXPECT_TRUE(contains(log_.explainSilence(),
-                       "smallest gap between a left and a right image stamp 0.25 s (set "
-                       "approximate_sync"));
+                       "smallest gap between a left and a right image stamp 0.25 s, larger than sync_tolerance "
+                       "(0.001 s): set approximate_sync"));
 }
 
 TEST_F(ArrivalLogTest, ExtremeStampsAreCompared) {
@@ -92,7 +92,7 @@ struct ApproximateArrivalLogTest : ArrivalLogTest {
 TEST_F(ApproximateArrivalLogTest, DoesNotAdviseWhatIsSetAlready) {
   note(ArrivalLog::kLeftImage, 10.0, 0.0);
   note(ArrivalLog::kRightImage, 10.02, 0.0);
-  EXPECT_TRUE(contains(log_.explainSilence(), "0.02 s (larger than max_interval)"));
+  EXPECT_TRUE(contains(log_.explainSilence(), "0.02 s, larger than max_interval (0.01 s)"));
 }
 
 }  // namespace test_arrival_log

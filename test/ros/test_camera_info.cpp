@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <string>
+#include <vector>
 
 #include "../synthetic_scene.hpp"
 #include "message_samples.hpp"
@@ -109,14 +111,82 @@ TEST(ToStereoCamera, RefusesWhatIsNoRectifiedPair) {
   sensor_msgs::CameraInfo smaller = right;
   smaller.width = 640;
   EXPECT_TRUE(contains(refusal(left, smaller), "left 1200x360, right 640x360"));
-  // A region of interest is rectified with the distortion, of which OpenCV does not take every number of coefficients.
-  sensor_msgs::CameraInfo distorted = right;
-  distorted.roi.x_offset = 10;
-  distorted.roi.width = 600;
-  distorted.roi.height = 200;
-  distorted.roi.do_rectify = true;
-  distorted.D.assign(3, 0.1);
-  EXPECT_TRUE(contains(refusal(left, distorted), "right camera_info"));
+  for (sensor_msgs::CameraInfo* info : {&smaller, &shifted}) *info = right;
+  smaller.roi.x_offset = 1200;
+  EXPECT_TRUE(contains(refusal(left, smaller), "right camera_info has no image size"));
+  shifted.roi.x_offset = 8;
+  shifted.roi.width = left.width;
+  EXPECT_TRUE(contains(refusal(left, shifted), "the same region"));
+}
+
+TEST(ToStereoCamera, TheLensChangesNothingOfARegionOfInterest) {
+  // A window out of the raw image (do_rectify, as CameraInfo.msg asks) is the same window of the rectified one:
+  // image_proc publishes as many pixels. So are those that crop_decimate cuts out of rectified images.
+  for (const bool do_rectify : {false, true})
+    for (const std::vector<double>& lens : {std::vector<double>{}, {-0.28, 0.07, 2e-4, 2e-5, 0.0}, {0.1, 0.1, 0.1}}) {
+      sensor_msgs::CameraInfo left = cameraInfo(0.0), right = cameraInfo(-350.0);
+      for (sensor_msgs::CameraInfo* info : {&left, &right}) {
+        info->D = lens;
+        info->roi.x_offset = 41;
+        info->roi.y_offset = 30;
+        info->roi.width = 641;
+        info->roi.height = 303;
+        info->roi.do_rectify = do_rectify;
+        info->binning_x = 2;
+        info->binning_y = 4;
+      }
+      const StereoCamera camera = toStereoCamera(left, right);
+      EXPECT_EQ(camera, (StereoCamera{350.0, 175.0, (600.0 - 41.0) / 2.0, (180.0 - 30.0) / 4.0, 0.5, 320, 75}));
+    }
+}
+
+TEST(ToStereoCamera, ARegionWithoutASizeIsWhatIsLeft) {
+  sensor_msgs::CameraInfo left = cameraInfo(0.0), right = cameraInfo(-350.0);
+  for (sensor_msgs::CameraInfo* info : {&left, &right}) info->roi.x_offset = 200;
+  const StereoCamera camera = toStereoCamera(left, right);
+  EXPECT_EQ(camera.width, 1000);
+  EXPECT_EQ(camera.height, 360);
+  EXPECT_EQ(camera.cx, 400.0);
+}
+
+TEST(ToStereoCamera, AVerticalPairIsToldHowToTurn) {
+  const sensor_msgs::CameraInfo first = cameraInfo(0.0);
+  sensor_msgs::CameraInfo second = first;
+  for (const double ty : {-35.0, 35.0}) {  // below, above: 5 cm
+    second.P[7] = ty;
+    const std::string why = errorOf([&] { toStereoCamera(first, second); });
+    EXPECT_TRUE(contains(why, "baseline of 0.050000 m is vertical (P[7])")) << why;
+    EXPECT_TRUE(contains(why, "counter-clockwise by 90 degrees")) << why;
+    EXPECT_TRUE(contains(why, ty < 0.0 ? "now the left one" : "now the right one")) << why;
+    EXPECT_FALSE(contains(why, "P[3]")) << why;
+  }
+}
+
+TEST(DoubtOf, ABaselineInOtherUnitsIsNamed) {
+  const auto doubt = [](double tx) { return doubtOf(toStereoCamera(cameraInfo(0.0), cameraInfo(tx))); };
+  EXPECT_EQ(doubt(-700.0 * 0.05), "");
+  EXPECT_TRUE(
+      contains(doubt(-700.0 * 50), "baseline = 50 m: is P[3] of the right camera_info in pixels times mm or cm"));
+  EXPECT_TRUE(contains(doubt(-700.0 * 5), "baseline = 5 m"));
+  EXPECT_TRUE(contains(doubt(-0.168), "baseline = 0.24 mm: does P[3] of the right camera_info lack the factor fx"));
+  sensor_msgs::CameraInfo left = cameraInfo(0.0, 200.0), right = cameraInfo(-350.0, 200.0);
+  left.width = right.width = 2000;
+  EXPECT_TRUE(contains(doubtOf(toStereoCamera(left, right)), "focal length"));
+}
+
+TEST(WhyUnrectified, ARotationWithoutDistortionIsNotTakenOutByImageProc) {
+  sensor_msgs::CameraInfo left = cameraInfo(0.0), right = cameraInfo(-350.0);
+  EXPECT_EQ(whyUnrectified(left, right), "");
+  const double angle = 0.01;  // 7 px
+  right.R = {1.0, 0.0, 0.0, 0.0, std::cos(angle), -std::sin(angle), 0.0, std::sin(angle), std::cos(angle)};
+  EXPECT_TRUE(contains(whyUnrectified(left, right), "D of camera_info is zero and R is not the identity"));
+  right.D.clear();
+  EXPECT_NE(whyUnrectified(left, right), "");
+  right.D.assign(5, 1e-9);
+  EXPECT_EQ(whyUnrectified(left, right), "");
+  right.D.assign(5, 0.0);
+  right.R.assign(0.0);
+  EXPECT_EQ(whyUnrectified(left, right), "") << "R was left out";
 }
 
 }  // namespace test_camera_info

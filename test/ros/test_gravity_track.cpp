@@ -45,6 +45,26 @@ TEST(GravityTrack, SaysNothingOfASensorThatMoves) {
   for (const GravityTrack* track : {&turns, &accelerates, &shakes, &is_broken}) EXPECT_FALSE(track->up());
 }
 
+TEST(GravityTrack, NamesTheCause) {
+  GravityTrack nothing, turns, shakes, in_g, free_of_gravity;
+  stand(turns, {0.0, 0.0, 9.81}, {0.0, 0.0, 0.3});
+  for (int i = 0; i <= 110; ++i) shakes.add(10 * i * kMillisecond, {i % 2 ? 2.0 : -2.0, 0.0, 9.81}, kStill);
+  for (int i = 0; i <= 110; ++i) in_g.add(10 * i * kMillisecond, {0.0, 0.6, 0.8}, kStill);
+  stand(free_of_gravity, {0.0, 0.0, 0.0});
+  const auto cause = [](const GravityTrack& track) {
+    std::string problem;
+    EXPECT_FALSE(track.up(&problem));
+    return problem;
+  };
+  EXPECT_EQ(cause(nothing), "no acceleration has come");
+  nothing.add(0, {0.0, 0.0, 9.81}, kStill);
+  EXPECT_EQ(cause(nothing), "less than a second of accelerations has come");
+  EXPECT_EQ(cause(turns), "the robot turns, by 0.3 rad/s: start while it stands");
+  EXPECT_EQ(cause(shakes), "the robot shakes or accelerates: start while it stands");
+  EXPECT_EQ(cause(in_g), "|acceleration| = 1.0: is it in g? sensor_msgs/Imu wants m/s^2");
+  EXPECT_EQ(cause(free_of_gravity), "|acceleration| = 0.0 m/s^2 is not that of gravity, 9.8");
+}
+
 TEST(GravityTrack, GoesByTheLastSecond) {
   GravityTrack track;
   for (int i = 0; i <= 100; ++i) track.add(10 * i * kMillisecond, {0.0, 0.0, 9.81}, {0.0, 0.0, 1.0});

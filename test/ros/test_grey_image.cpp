@@ -59,27 +59,89 @@ TEST(ToGrey, SixteenBitsOfEitherOrderOfBytes) {
 TEST(ToGrey, CamerasOfFewerBitsFillTheRange) {
   // 1023 and 341 of 10 bits.
   const auto message = image("mono16", 2, 1, {0xff, 0x03, 0x55, 0x01});
-  const cv::Mat grey = toGrey(message, 10);
+  const cv::Mat grey = toGrey(message, {0.0, 1023.0});
   EXPECT_EQ(grey.at<std::uint8_t>(0, 0), 255);
   EXPECT_EQ(grey.at<std::uint8_t>(0, 1), 85);
-  EXPECT_EQ(toGrey(message, 12).at<std::uint8_t>(0, 0), 64);
+  EXPECT_EQ(toGrey(message, {0.0, 4095.0}).at<std::uint8_t>(0, 0), 64);
+  EXPECT_EQ(toGrey(message, {341.0, 1023.0}).at<std::uint8_t>(0, 1), 0);
 }
 
-TEST(BitDepth, IsThatOfTheBrightestPixel) {
-  const auto depthOf = [](int value) {
-    const auto low = static_cast<std::uint8_t>(value & 0xff), high = static_cast<std::uint8_t>(value >> 8);
-    return bitDepth(*image("mono16", 2, 1, {0, 0, low, high}));
-  };
-  EXPECT_EQ(depthOf(0), 8);
-  EXPECT_EQ(depthOf(255), 8);
-  EXPECT_EQ(depthOf(256), 10);
-  EXPECT_EQ(depthOf(1023), 10);
-  EXPECT_EQ(depthOf(1024), 12);
-  EXPECT_EQ(depthOf(4095), 12);
-  EXPECT_EQ(depthOf(16383), 14);
-  EXPECT_EQ(depthOf(65535), 16);
-  EXPECT_EQ(bitDepth(*image("mono8", 2, 1, {255, 255})), 8);
-  EXPECT_THROW(bitDepth(*image("mono16", 2, 2, {0, 0, 0, 0})), std::invalid_argument);
+/// A scene whose counts rise evenly from `dark` to `bright` across the image.
+sensor_msgs::ImagePtr ramp(int dark, int bright) {
+  constexpr int kWidth = 200, kHeight = 120;
+  std::vector<std::uint8_t> data;
+  for (int row = 0; row < kHeight; ++row)
+    for (int column = 0; column < kWidth; ++column) {
+      const int count = dark + (bright - dark) * column / (kWidth - 1);
+      data.push_back(static_cast<std::uint8_t>(count & 0xff));
+      data.push_back(static_cast<std::uint8_t>(count >> 8));
+    }
+  return image("mono16", kWidth, kHeight, data);
+}
+
+/// A lamp of the brightest count on a square of so many pixels.
+sensor_msgs::ImagePtr withLamp(const sensor_msgs::ImagePtr& message, std::uint32_t side) {
+  for (std::uint32_t row = 10; row < 10 + side; ++row)
+    for (std::uint32_t byte = 20; byte < 20 + 2 * side; ++byte) message->data[row * message->step + byte] = 0xff;
+  return message;
+}
+
+void expectFits(const GreyRange& range, int dark, int bright) {
+  const double spread = bright - dark;
+  EXPECT_LE(range.black, dark);
+  EXPECT_GE(range.white, bright);
+  EXPECT_GE(spread / (range.white - range.black), 0.5) << range.black << " to " << range.white;
+}
+
+TEST(GreyRangeTracker, AnyDepthAndOffsetFillsTheGreyLevels) {
+  for (const auto& [dark, bright] : std::vector<std::pair<int, int>>{
+           {0, 1023}, {30, 3500}, {100, 60000}, {7800, 8310}, {20000, 20100}, {64000, 65535}}) {
+    GreyRangeTracker tracker;
+    EXPECT_TRUE(tracker.add(*ramp(dark, bright), *ramp(dark, bright)));
+    expectFits(tracker.range(), dark, bright);
+  }
+}
+
+TEST(GreyRangeTracker, ALampOrADeadPixelChangesNothing) {
+  GreyRangeTracker tracker, from_the_start;
+  EXPECT_TRUE(from_the_start.add(*withLamp(ramp(0, 1000), 20), *ramp(0, 1000)));
+  expectFits(from_the_start.range(), 0, 1000);
+  tracker.add(*ramp(0, 1000), *ramp(0, 1000));
+  for (const std::uint32_t side : {1u, 1u, 4u, 20u, 20u, 20u, 20u, 20u, 20u})
+    EXPECT_FALSE(tracker.add(*withLamp(ramp(0, 1000), side), *withLamp(ramp(0, 1000), side))) << side;
+}
+
+TEST(GreyRangeTracker, TwoDamagedPairsChangeNothing) {
+  GreyRangeTracker tracker;
+  for (int i = 0; i < 5; ++i) tracker.add(*ramp(0, 1000), *ramp(0, 1000));
+  for (int i = 0; i < 2; ++i) EXPECT_FALSE(tracker.add(*ramp(65535, 65535), *ramp(65535, 65535)));
+  EXPECT_FALSE(tracker.add(*ramp(0, 1000), *ramp(0, 1000)));
+}
+
+TEST(GreyRangeTracker, StaysWhileTheCountsFitAndFollowsThemUpAndDown) {
+  GreyRangeTracker tracker;
+  tracker.add(*ramp(0, 1000), *ramp(0, 1000));
+  for (const int bright : {1100, 900, 1150, 700, 1000, 800})
+    EXPECT_FALSE(tracker.add(*ramp(0, bright), *ramp(20, bright)));
+  for (const int bright : {16000, 300}) {
+    int changes = 0;
+    for (int i = 0; i < 10; ++i) changes += tracker.add(*ramp(0, bright), *ramp(0, bright));
+    EXPECT_EQ(changes, 1) << bright;
+    expectFits(tracker.range(), 0, bright);
+  }
+}
+
+TEST(GreyRangeTracker, NoiseIsNotStretchedToAScene) {
+  GreyRangeTracker tracker;
+  tracker.add(*ramp(500, 505), *ramp(500, 505));
+  EXPECT_GE(tracker.range().white - tracker.range().black, 64.0);
+}
+
+TEST(GreyRangeTracker, NotesNothingOfOtherEncodings) {
+  GreyRangeTracker tracker;
+  EXPECT_FALSE(tracker.add(*image("mono8", 2, 1, {255, 255}), *image("mono8", 2, 1, {255, 255})));
+  EXPECT_EQ(tracker.range().white, 65535.0);
+  EXPECT_THROW(tracker.add(*image("mono16", 2, 2, {0, 0, 0, 0}), *ramp(0, 9)), std::invalid_argument);
 }
 
 TEST(ToGrey, ColoursByLuminance) {

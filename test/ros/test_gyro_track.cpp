@@ -56,6 +56,23 @@ TEST(GyroTrack, SaysNothingOfWhatItDidNotMeasure) {
   EXPECT_FALSE(track.rotation(1200 * kMillisecond, 1305 * kMillisecond));
 }
 
+TEST(GyroTrack, NamesTheCause) {
+  GyroTrack track;
+  const auto cause = [&](int from, int to) {
+    std::string problem;
+    EXPECT_FALSE(track.rotation(from * kMillisecond, to * kMillisecond, &problem));
+    return problem;
+  };
+  EXPECT_EQ(cause(0, 0), "no rate has come");
+  fill(track, 1000, 1100);
+  fill(track, 1200, 1300);
+  EXPECT_EQ(cause(1250, 1800),
+            "its newest rate is 0.500 s older than the image: does it come late, or by another clock?");
+  EXPECT_EQ(cause(700, 1250),
+            "its oldest rate is 0.300 s newer than the image before: did it just start, or is its clock another one?");
+  EXPECT_EQ(cause(1050, 1250), "a pause of 0.100 s between two of its rates");
+}
+
 TEST(GyroTrack, BeginsAnewWhenTheClockJumpsBack) {
   GyroTrack track;
   fill(track, 1000, 1100);

@@ -39,6 +39,10 @@ struct StereoCamera {
   double depth(double disparity) const { return fx * baseline / disparity; }
   double disparity(double depth) const { return fx * baseline / depth; }
 
+  /// Whether `other` can be this rig with another focus, or calibrated anew while it runs: images of one size, and
+  /// numbers that differ by at most 5 % (autofocus changes a focal length by 1 to 4 %).
+  bool isLike(const StereoCamera& other) const;
+
   bool operator==(const StereoCamera& other) const;
   bool operator!=(const StereoCamera& other) const { return !(*this == other); }
 };

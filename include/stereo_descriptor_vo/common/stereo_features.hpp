@@ -80,6 +80,9 @@ struct StereoFeatures {
   /// The same pair with some of its rows, in the order given.
   StereoFeatures select(const std::vector<int>& rows) const;
 
+  /// The same points in pixels of another camera: their rays and depths stay.
+  StereoFeatures seenBy(const StereoCamera& other) const;
+
   /// (u_left, v_left, u_right) of feature i, px.
   Eigen::Vector3d measurement(int i) const { return {u[i], v[i], static_cast<double>(u[i]) - disparity[i]}; }
 

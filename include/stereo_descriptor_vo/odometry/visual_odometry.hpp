@@ -75,6 +75,7 @@ class VisualOdometry {
 
   /// Processes the next pair. Stamps must increase and the features must pass check(), else std::invalid_argument and
   /// the state is as before. `guess` is one more place to look for the motion; it is never taken for a measurement.
+  /// Each pair may have a camera of its own: one that isLike() the first one's goes on, another one starts a new epoch.
   OdometryResult update(const StereoFeatures& features, const std::optional<MotionGuess>& guess = std::nullopt);
 
   /// Back to the initial pose and a new epoch; nothing is remembered.
@@ -95,7 +96,9 @@ class VisualOdometry {
   const VisualOdometryOptions& options() const { return options_; }
 
   /// Where the camera sits on the base, whose floor `planar` is about; until then at the base's origin, looking ahead.
-  void mountAt(const Eigen::Isometry3d& T_base_camera) { T_base_camera_ = T_base_camera; }
+  /// Another place on the way is that of another camera: the odometry goes on from the base's last pose under a new
+  /// epoch, and the origin is where this camera was in the beginning.
+  void mountAt(const Eigen::Isometry3d& T_base_camera);
 
   /// The local map's points at a finite distance, in the origin, m; empty while there is no map.
   std::vector<Eigen::Vector3d> mapPoints() const;
@@ -126,6 +129,7 @@ class VisualOdometry {
   MotionHypothesis propose(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
   bool isFrozen(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
   MotionHypothesis reacquire(const StereoFeatures& features) const;
+  void forgetRig();
   void begin(const StereoFeatures& features, double dt);
   void suspect(double dt, const MotionHypothesis& found, const Step& step);
   Step seed(const StereoFeatures& features);

@@ -5,19 +5,20 @@
 #include <boost/make_shared.hpp>
 #include <vector>
 
-#include "../../src/ros/exact_synchroniser.hpp"
+#include "../../src/ros/synchronisers.hpp"
 
 namespace sdvo {
-namespace test_exact_synchroniser {
+namespace test_synchronisers {
 
 using sensor_msgs::CameraInfo;
 using sensor_msgs::Image;
 
-class ExactSynchroniserTest : public ::testing::Test {
+class TriggerSynchroniserTest : public ::testing::Test {
  protected:
   static constexpr int kRoom = 4;
+  static constexpr double kTolerance = 0.001;  // s
 
-  ExactSynchroniserTest() { ros::Time::init(); }
+  TriggerSynchroniserTest() { ros::Time::init(); }
 
   template <class Message>
   static boost::shared_ptr<const Message> at(double stamp) {
@@ -33,10 +34,10 @@ class ExactSynchroniserTest : public ::testing::Test {
 
   std::vector<double> sets_;
   int without_info_ = 0, without_image_ = 0;
-  ExactSynchroniser<Image, CameraInfo> synchroniser_{
-      kRoom,
+  TriggerSynchroniser<Image, CameraInfo> synchroniser_{
+      kRoom, kTolerance,
       [this](const Image::ConstPtr& image, const CameraInfo::ConstPtr& info) {
-        EXPECT_EQ(image->header.stamp, info->header.stamp);
+        EXPECT_LE(std::abs(secondsBetween(image->header.stamp, info->header.stamp)), kTolerance);
         sets_.push_back(image->header.stamp.toSec());
       },
       [this](const Image::ConstPtr& image, const CameraInfo::ConstPtr& info) {
@@ -45,7 +46,7 @@ class ExactSynchroniserTest : public ::testing::Test {
       }};
 };
 
-TEST_F(ExactSynchroniserTest, WhatHasOneStampIsASet) {
+TEST_F(TriggerSynchroniserTest, WhatHasOneStampIsASet) {
   addBoth(1.0);
   synchroniser_.add<0>(at<Image>(2.0));
   EXPECT_EQ(sets_, (std::vector<double>{1.0}));
@@ -55,20 +56,41 @@ TEST_F(ExactSynchroniserTest, WhatHasOneStampIsASet) {
   EXPECT_EQ(without_image_, 0);
 }
 
-TEST_F(ExactSynchroniserTest, WhatOneInputLeftOverDoesNotOutliveAJumpBack) {
+TEST_F(TriggerSynchroniserTest, StampsOfOneTriggerThatDifferALittleAreASet) {
+  for (const double gap : {5e-5, -5e-5, 9e-4, -9e-4}) {
+    sets_.clear();
+    for (int i = 1; i <= 20; ++i) {
+      synchroniser_.add<0>(at<Image>(0.003 * i));  // the fastest cameras
+      synchroniser_.add<1>(at<CameraInfo>(0.003 * i + gap));
+    }
+    EXPECT_EQ(sets_.size(), 20u) << gap;
+  }
+  synchroniser_.add<0>(at<Image>(5.0));
+  synchroniser_.add<1>(at<CameraInfo>(5.0011));
+  EXPECT_NE(sets_.back(), 5.0) << "beyond the tolerance";
+}
+
+TEST_F(TriggerSynchroniserTest, OfSeveralWithinTheToleranceTheNearestIsThePartner) {
+  synchroniser_.add<0>(at<Image>(1.0));
+  synchroniser_.add<0>(at<Image>(1.0008));
+  synchroniser_.add<1>(at<CameraInfo>(1.0007));
+  EXPECT_EQ(sets_, (std::vector<double>{1.0008}));
+}
+
+TEST_F(TriggerSynchroniserTest, WhatOneInputLeftOverDoesNotOutliveAJumpBack) {
   for (int i = 0; i < 2 * kRoom; ++i) synchroniser_.add<0>(at<Image>(100.0 + i));
   for (int i = 0; i < 3; ++i) addBoth(10.0 + i);
   EXPECT_EQ(sets_, (std::vector<double>{10.0, 11.0, 12.0}));
 }
 
-TEST_F(ExactSynchroniserTest, TheFutureShutsNothingOut) {
+TEST_F(TriggerSynchroniserTest, TheFutureShutsNothingOut) {
   for (int i = 0; i < 2 * kRoom; ++i) synchroniser_.add<0>(at<Image>(5000.0 + i));
   for (int i = 0; i < 50; ++i) addBoth(100.0 + i);
   EXPECT_EQ(sets_.size(), 50u);
   EXPECT_EQ(without_info_, 2 * kRoom);
 }
 
-TEST_F(ExactSynchroniserTest, ASetOfTheFutureTakesNothingFromThoseThatCameAfterIt) {
+TEST_F(TriggerSynchroniserTest, ASetOfTheFutureTakesNothingFromThoseThatCameAfterIt) {
   synchroniser_.add<0>(at<Image>(5000.0));
   synchroniser_.add<0>(at<Image>(1.0));
   synchroniser_.add<1>(at<CameraInfo>(5000.0));
@@ -77,7 +99,7 @@ TEST_F(ExactSynchroniserTest, ASetOfTheFutureTakesNothingFromThoseThatCameAfterI
   EXPECT_EQ(without_info_ + without_image_, 0);
 }
 
-TEST_F(ExactSynchroniserTest, WhatComesTooLateTakesNothingFromTheRest) {
+TEST_F(TriggerSynchroniserTest, WhatComesTooLateTakesNothingFromTheRest) {
   for (int i = 0; i < 10; ++i) synchroniser_.add<0>(at<Image>(1.0 + i));
   EXPECT_EQ(without_info_, 10 - kRoom);
   for (int i = 0; i < 10; ++i) synchroniser_.add<1>(at<CameraInfo>(1.0 + i));
@@ -86,7 +108,7 @@ TEST_F(ExactSynchroniserTest, WhatComesTooLateTakesNothingFromTheRest) {
   EXPECT_EQ(without_image_, 10 - kRoom);
 }
 
-TEST_F(ExactSynchroniserTest, ALateMessageTakesNothingFromThoseThatWait) {
+TEST_F(TriggerSynchroniserTest, ALateMessageTakesNothingFromThoseThatWait) {
   for (int i = 1; i <= 2 * kRoom; ++i) addBoth(i);
   synchroniser_.add<0>(at<Image>(100.0));
   synchroniser_.add<0>(at<Image>(1.5));
@@ -95,12 +117,36 @@ TEST_F(ExactSynchroniserTest, ALateMessageTakesNothingFromThoseThatWait) {
   EXPECT_EQ(sets_.back(), 100.0);
 }
 
-TEST_F(ExactSynchroniserTest, AStampThatCannotBeComparedIsRefused) {
+TEST_F(TriggerSynchroniserTest, AStampThatCannotBeComparedIsRefused) {
   EXPECT_THROW(synchroniser_.add<0>(at<Image>(0.0)), std::invalid_argument);
   EXPECT_THROW(synchroniser_.add<1>(at<CameraInfo>(4e9)), std::invalid_argument);
   addBoth(1.0);
   EXPECT_EQ(sets_.size(), 1u);
 }
 
-}  // namespace test_exact_synchroniser
+TEST(ApproximateSynchroniser, BeginsAnewWhenStampsFall) {
+  std::vector<double> sets;
+  ApproximateSynchroniser<Image, CameraInfo> synchroniser(
+      20, 0.01,
+      [&](const Image::ConstPtr& image, const CameraInfo::ConstPtr&) { sets.push_back(image->header.stamp.toSec()); });
+  const auto play = [&](double begin) {
+    for (int i = 0; i < 20; ++i) {
+      const auto image = boost::make_shared<Image>();
+      image->header.stamp = ros::Time(begin + 0.05 * i);
+      synchroniser.add<0>(Image::ConstPtr(image));
+      const auto info = boost::make_shared<CameraInfo>();
+      info->header.stamp = ros::Time(begin + 0.05 * i + 0.004);
+      if (i % 5 != 4) synchroniser.add<1>(CameraInfo::ConstPtr(info));  // some are lost, so that partners wait
+    }
+    const auto size = sets.size();
+    sets.clear();
+    return size;
+  };
+  const std::size_t first = play(1000.0);
+  EXPECT_GE(first, 15u);
+  EXPECT_EQ(play(100.0), first);
+  EXPECT_EQ(play(5000.0), first);
+}
+
+}  // namespace test_synchronisers
 }  // namespace sdvo
