@@ -32,9 +32,8 @@ int partsWithPoints(ExpectedPoint* first, ExpectedPoint* last, int parts) {
   const Eigen::Array2d extent = high - low;
   const int axis = extent.y() > extent.x() ? 1 : 0;
   ExpectedPoint* const middle = first + (last - first) * (parts / 2) / parts;
-  std::nth_element(first, middle, last, [&](const ExpectedPoint& a, const ExpectedPoint& b) {
-    return a.pixel[axis] < b.pixel[axis];
-  });
+  std::nth_element(first, middle, last,
+                   [&](const ExpectedPoint& a, const ExpectedPoint& b) { return a.pixel[axis] < b.pixel[axis]; });
   return partsWithPoints(first, middle, parts / 2) + partsWithPoints(middle, last, parts - parts / 2);
 }
 
@@ -68,7 +67,8 @@ bool showsSamePlace(std::vector<ExpectedPoint> points) {
   constexpr int kInPart = 3;             // points found: if they are spread evenly, 5 % of the parts have none
   constexpr double kRepeated = 0.5;      // probability that a part of another place shows what stands in both
   constexpr double kFalseAlarms = 0.01;  // of such places
-  const auto found = std::count_if(points.begin(), points.end(), [](const ExpectedPoint& point) { return point.found; });
+  const auto found =
+      std::count_if(points.begin(), points.end(), [](const ExpectedPoint& point) { return point.found; });
   const int parts = static_cast<int>(found) / kInPart;
   if (parts == 0) return false;
   const int agreeing = partsWithPoints(points.data(), points.data() + points.size(), parts);

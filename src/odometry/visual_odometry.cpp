@@ -82,6 +82,38 @@ void VisualOdometry::mountAt(const Eigen::Isometry3d& T_base_camera) {
   state_.covariance.advance(T_before_now, Matrix6d::Zero());
 }
 
+void VisualOdometry::takePose(const Matrix6d& covariance) {
+  state_.covariance.assume(covariance);
+  ++epoch_;
+  if (!state_.interrupted) return;
+  state_.map.reset();
+  state_.started = false;
+}
+
+/// The part of a scale error that a longer way adds.
+Matrix6d GuessedMotion::add(const MotionGuess& guess) {
+  constexpr double kLeast = 1e-3;  // m and rad (chosen): no odometry stands still to less
+  const Vector6d motion = logSE3(guess.T_previous_current);
+  const auto grow = [&](double& way, double by) {
+    const double before = way;
+    way += std::max(by, kLeast);
+    return guess.error * guess.error * (way * way - before * before);
+  };
+  Vector6d variance;
+  variance.head<3>().setConstant(grow(distance_, motion.head<3>().norm()));
+  variance.tail<3>().setConstant(grow(angle_, motion.tail<3>().norm()));
+  return variance.asDiagonal();
+}
+
+/// Takes note of a guess, or that there is none, for as long as there is no pose.
+void VisualOdometry::follow(const std::optional<MotionGuess>& guess) {
+  if (!guess || guess->rotation_only) state_.unseen.reset();
+  if (!state_.unseen) return;
+  const Matrix6d carried = adjoint(guess->T_previous_current.inverse());
+  state_.unseen->motion = state_.unseen->motion * guess->T_previous_current;
+  state_.unseen->covariance = carried * state_.unseen->covariance * carried.transpose() + state_.guessed.add(*guess);
+}
+
 OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::optional<MotionGuess>& guess) {
   refuse(given);
   // A lens that focuses changes the camera with every pair; the pixels of one map are those of one camera.
@@ -97,6 +129,7 @@ OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::op
   // Nothing has changed so far, and from here on nothing is refused.
   Stopwatch stopwatch;
   begin(features, dt);
+  follow(guess);
   Step step;
   if (frozen)
     step = predict(features, dt,
@@ -113,7 +146,7 @@ OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::op
   step.dt = step.T_previous_current ? static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9 : dt;
   if (step.T_previous_current) move(*step.T_previous_current);
   if (step.state == TrackingState::kTracking || step.state == TrackingState::kDegraded)
-    state_.last_pose_stamp = features.stamp;
+    state_.last_pose_stamp = features.stamp, state_.unseen = State::Unseen();
   step.time = stopwatch.lap();
   return report(features, found, step);
 }
@@ -212,7 +245,14 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
                   (features.report.status.empty() ? "" : ": " + features.report.status);
     return step;
   }
-  if (state_.started) {
+  if (state_.started && state_.unseen) {
+    step.state = TrackingState::kDegraded;
+    step.reason = "started again where the guess has the camera";
+    step.T_previous_current = state_.unseen->motion;
+    step.covariance = state_.unseen->covariance;
+    state_.covariance.advance(*step.T_previous_current, step.covariance);
+    state_.covariance.assume(state_.covariance.value());
+  } else if (state_.started) {
     ++epoch_;
     const double unseen = std::max(0.0, static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9);
     state_.covariance.restart(
@@ -228,8 +268,9 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
   state_.belief.doubt(Matrix6d::Zero());
   state_.predicted_pairs = 0;
   state_.map.emplace(options_.map);
-  state_.map->insert(options_.alignment, features, state_.pairs, state_.T_origin_camera.inverse(), {},
-                     state_.calibration.calibration());
+  const Eigen::Isometry3d T_previous_current = step.T_previous_current.value_or(Eigen::Isometry3d::Identity());
+  state_.map->insert(options_.alignment, features, state_.pairs,
+                     (state_.T_origin_camera * T_previous_current).inverse(), {}, state_.calibration.calibration());
   return step;
 }
 
@@ -271,6 +312,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, d
     if (step.reason.empty()) step.reason = off;
   }
   state_.predicted_pairs = 0;
+  state_.guessed = GuessedMotion();
   if (std::exchange(state_.interrupted, false))
     step.reason = "re-acquired by " + std::to_string(evidence.inliers) + " points of the map" +
                   (step.reason.empty() ? "" : "; " + step.reason);
@@ -364,19 +406,34 @@ Matrix6d VisualOdometry::doubt(const MotionHypothesis& found, const Eigen::Isome
 }
 
 /// The velocity since the map's newest pair before. Stamps that lie too close make none, nor does what may be the
-/// motion of something else.
+/// motion of something else, nor the mean over a gap.
 void VisualOdometry::noteVelocity(std::int64_t stamp, const MotionHypothesis& found, const PoseEvidence& evidence,
                                   bool is_trusted, const Matrix6d& covariance) {
   const Vector6d velocity = logSE3(found.motion.T_current_reference.inverse()) / evidence.dt;
-  if (isImplausible(options_.tracking, evidence) || !(velocity.head<3>().norm() <= options_.tracking.max_speed) ||
+  if (isImplausible(options_.tracking, evidence) || evidence.dt > options_.tracking.max_gap ||
+      !(velocity.head<3>().norm() <= options_.tracking.max_speed) ||
       !(velocity.tail<3>().norm() <= options_.tracking.max_rotation_rate))
     return;
   state_.belief.measure(stamp, velocity, evidence.dt, covariance, is_trusted);
 }
 
+/// Whether a guess has the motion of a pair that shows nothing, not too long after the last one that did.
+bool VisualOdometry::canFollow(const StereoFeatures& features) const {
+  if (!state_.map || !state_.unseen || features.count() >= options_.motion.min_inliers) return false;
+  return static_cast<double>(features.stamp - state_.map->newestStamp()) * 1e-9 <= options_.tracking.max_guessed;
+}
+
 VisualOdometry::Step VisualOdometry::predict(const StereoFeatures& features, double dt, const std::string& failure) {
   Step step;
   step.reason = failure + (features.report.status.empty() ? "" : "; " + features.report.status);
+  if (canFollow(features)) {
+    step.state = TrackingState::kDegraded;
+    step.reason = "motion by the guess: " + step.reason;
+    step.T_previous_current = state_.unseen->motion;
+    step.covariance = state_.unseen->covariance;
+    state_.covariance.advance(*step.T_previous_current, step.covariance);
+    return step;
+  }
   const bool can_predict = state_.belief.velocity() && dt <= options_.tracking.max_gap &&
                            state_.predicted_pairs < options_.tracking.max_predicted_pairs;
   if (!can_predict) {
@@ -416,7 +473,7 @@ OdometryResult VisualOdometry::report(const StereoFeatures& features, const Moti
   result.epoch = epoch_;
   result.dt = step.dt;
   result.distance = state_.distance;
-  result.keyframe_id = state_.map ? state_.map->lastKeyframeId() : 0;
+  result.keyframe_id = state_.map && !state_.interrupted ? state_.map->lastKeyframeId() : 0;
   if (step.state == TrackingState::kTracking || step.state == TrackingState::kDegraded) {
     result.has_pose = true;
     result.T_origin_camera = state_.T_origin_camera;

@@ -307,7 +307,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
         ros_conversions::cleanFrameId(options_.output.base_frame_id), *processed_stamp_, stamp, problem);
     if (!T_before_now) return std::nullopt;
     const Eigen::Isometry3d T_base_camera = *mount_->last();
-    return MotionGuess{T_base_camera.inverse() * *T_before_now * T_base_camera};
+    return MotionGuess{T_base_camera.inverse() * *T_before_now * T_base_camera, false, options_.output.guess_error};
   }
 
   std::optional<MotionGuess> guessOfGyro(const std_msgs::Header& header, std::string& problem) const {

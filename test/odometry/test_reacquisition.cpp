@@ -18,7 +18,7 @@ constexpr int kSeen = 10;                     // pairs before an outage
 
 TEST(BinomialTail, AddsUpTheProbabilities) {
   EXPECT_NEAR(binomialTail(3, 0, 0.3), 1.0, 1e-12);
-  EXPECT_NEAR(binomialTail(3, 2, 0.5), 0.5, 1e-12);            // 3 and 1 of 8
+  EXPECT_NEAR(binomialTail(3, 2, 0.5), 0.5, 1e-12);  // 3 and 1 of 8
   EXPECT_NEAR(binomialTail(4, 4, 0.25), 1.0 / 256.0, 1e-12);
   EXPECT_EQ(binomialTail(4, 5, 0.25), 0.0);
 }
@@ -91,7 +91,7 @@ class Outage : public ::testing::Test {
     const Vector6d error = logSE3(T_origin_camera.inverse() * result_.T_origin_camera);
     EXPECT_LT(error.head<3>().norm(), 0.01);
     EXPECT_LT(error.dot(result_.pose_covariance.ldlt().solve(error)), 25.0);
-    EXPECT_LT(result_.pose_covariance.topLeftCorner<3, 3>().trace(), 0.1) << "that of a restart is larger by far";
+    EXPECT_LT((result_.pose_covariance.topLeftCorner<3, 3>().trace()), 0.1) << "that of a restart is larger by far";
   }
 
   void expectStartedAgain() const {
@@ -222,6 +222,91 @@ TEST_F(Outage, ANewClockIsANewStart) {
   features.stamp -= 3'600'000'000'000;
   result_ = odometry_.update(features);
   expectStartedAgain();
+}
+
+/// What wheels tell: the true motion since the pair before, too long by a twentieth.
+MotionGuess wheels(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to) {
+  return {expSE3(1.05 * logSE3(from.inverse() * to)), false, 0.1};
+}
+
+TEST_F(Outage, ThePoseGoesOnByTheGuessWhileItIsDark) {
+  drive();
+  for (int i = kSeen; i < kSeen + 20; ++i) {
+    result_ =
+        odometry_.update(synthetic::noFeatures(synthetic::camera(), i * kPeriod), wheels(poseAt(i - 1), poseAt(i)));
+    EXPECT_EQ(result_.state, TrackingState::kDegraded) << i;
+    EXPECT_EQ(result_.epoch, 0);
+    const Vector6d error = logSE3(poseAt(i).inverse() * result_.T_origin_camera);
+    EXPECT_LT(error.dot(result_.pose_covariance.ldlt().solve(error)), 12.6) << i;
+  }
+  EXPECT_GT((result_.pose_covariance.topLeftCorner<3, 3>().trace()), 0.001) << "5 % of 0.75 m";
+  // The map corrects it.
+  result_ =
+      odometry_.update(pairOf(room_, kSeen + 20, poseAt(kSeen + 20)), wheels(poseAt(kSeen + 19), poseAt(kSeen + 20)));
+  EXPECT_EQ(result_.epoch, 0);
+  EXPECT_LT((result_.T_origin_camera.translation() - poseAt(kSeen + 20).translation()).norm(), 0.01);
+}
+
+TEST_F(Outage, AfterTheLongestTimeTheGuessCarriesThePoseToTheNextStart) {
+  VisualOdometryOptions options;
+  options.tracking.max_guessed = 0.5;
+  odometry_.configure(options);
+  drive();
+  constexpr int kPairs = 20;
+  for (int i = kSeen; i < kSeen + kPairs; ++i)
+    result_ =
+        odometry_.update(synthetic::noFeatures(synthetic::camera(), i * kPeriod), wheels(poseAt(i - 1), poseAt(i)));
+  EXPECT_EQ(result_.state, TrackingState::kLost);
+  const int next = kSeen + kPairs;
+  result_ = odometry_.update(pairOf(room(2), next, poseAt(next)), wheels(poseAt(next - 1), poseAt(next)));
+  EXPECT_EQ(result_.state, TrackingState::kDegraded) << result_.reason;
+  EXPECT_EQ(result_.epoch, 0);
+  const Vector6d error = logSE3(poseAt(next).inverse() * result_.T_origin_camera);
+  EXPECT_LT(error.head<3>().norm(), 0.1);
+  EXPECT_LT(error.dot(result_.pose_covariance.ldlt().solve(error)), 12.6);
+  for (int i = next + 1; i < next + 4; ++i) {
+    result_ = odometry_.update(pairOf(room(2), i, poseAt(i)), wheels(poseAt(i - 1), poseAt(i)));
+    EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
+    EXPECT_LT((result_.T_origin_camera.translation() - poseAt(i).translation()).norm(), 0.1);
+  }
+}
+
+TEST_F(Outage, AGuessThatEndsCarriesNoPose) {
+  drive();
+  for (int i = kSeen; i < kSeen + 5; ++i) {
+    std::optional<MotionGuess> guess;
+    if (i == kSeen) guess = wheels(poseAt(i - 1), poseAt(i));
+    result_ = odometry_.update(synthetic::noFeatures(synthetic::camera(), i * kPeriod), guess);
+  }
+  EXPECT_EQ(result_.state, TrackingState::kLost);
+  const int next = kSeen + 5;
+  result_ = odometry_.update(pairOf(room(2), next, poseAt(next)), wheels(poseAt(next - 1), poseAt(next)));
+  expectStartedAgain();
+}
+
+TEST_F(Outage, APoseFromElsewhereIsANewEpochOfTheSameMap) {
+  drive();
+  const Matrix6d covariance = 0.01 * Matrix6d::Identity();
+  odometry_.takePose(covariance);
+  EXPECT_TRUE(odometry_.lastPose().isApprox(result_.T_origin_camera));
+  result_ = odometry_.update(pairOf(room_, kSeen, poseAt(kSeen)));
+  EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
+  EXPECT_EQ(result_.epoch, 1);
+  EXPECT_TRUE(result_.has_motion);
+  EXPECT_LT((result_.T_origin_camera.translation() - poseAt(kSeen).translation()).norm(), 0.01);
+  EXPECT_NEAR(result_.pose_covariance.trace(), covariance.trace(), 0.01 * covariance.trace());
+}
+
+TEST_F(Outage, APoseFromElsewhereEndsTheSearchOfALostCamera) {
+  drive();
+  const int i = blind(5);
+  const Eigen::Isometry3d last = odometry_.lastPose();
+  odometry_.takePose(0.01 * Matrix6d::Identity());
+  result_ = odometry_.update(pairOf(room_, i, poseAt(i)));
+  EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
+  EXPECT_EQ(result_.epoch, 1);
+  EXPECT_TRUE(result_.T_origin_camera.isApprox(last));
+  EXPECT_NEAR(result_.pose_covariance.trace(), 0.06, 1e-9);
 }
 
 }  // namespace test_reacquisition

@@ -16,11 +16,11 @@ struct ExpectedPoint {
   bool found;             ///< in the pair, at that place
 };
 
-/// Whether a pair shows the place of a map. Matches of another place agree on no motion, so chance is no danger. A thing
-/// that stands in both places is one (a poster, a chair, a part of the robot), but it fills a part of the view only.
-/// Hence the view is divided into parts with equally many expected points each, and so many parts that three of the
-/// points found fall into each if they are spread evenly. In another place a part holds any with a probability of one
-/// half at most.
+/// Whether a pair shows the place of a map. Matches of another place agree on no motion, so chance is no danger. A
+/// thing that stands in both places is one (a poster, a chair, a part of the robot), but it fills a part of the view
+/// only. Hence the view is divided into parts with equally many expected points each, and so many parts that three of
+/// the points found fall into each if they are spread evenly. In another place a part holds any with a probability of
+/// one half at most.
 bool showsSamePlace(std::vector<ExpectedPoint> points);
 
 /// Finds a pair in the map from before an outage, wherever the camera went meanwhile.

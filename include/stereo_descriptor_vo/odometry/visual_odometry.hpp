@@ -29,11 +29,14 @@ namespace sdvo {
 struct TrackingOptions : PoseVerdictOptions {
   int max_predicted_pairs = 1;
   double max_gap = 1.0;
+  double max_guessed = 10.0;
 
   void describe(OptionList& list) {
     list.add("max_predicted_pairs", max_predicted_pairs, {0, 100}, "",
              "pairs in a row whose motion may be predicted before the odometry is lost");
     list.add("max_gap", max_gap, {0.01, 60.0}, "s", "longest time between pairs over which the motion is predicted");
+    list.add("max_guessed", max_guessed, {0.0, 1000.0}, "s",
+             "longest time without usable images over which the pose goes on by the guess of another odometry");
     PoseVerdictOptions::describe(list);
   }
 };
@@ -64,6 +67,18 @@ struct VisualOdometryOptions {
 struct MotionGuess {
   Eigen::Isometry3d T_previous_current = Eigen::Isometry3d::Identity();
   bool rotation_only = false;  ///< a gyro's: of the translation it says nothing
+  double error =
+      0.1;  ///< standard deviation of distance and turn, as ratios of them; it is a scale: all guesses share it
+};
+
+/// Motion since the last measured pose, as guesses have it.
+class GuessedMotion {
+ public:
+  /// The covariance of the guess, a right perturbation in m and rad, that comes on top of those before it.
+  Matrix6d add(const MotionGuess& guess);
+
+ private:
+  double distance_ = 0.0, angle_ = 0.0;  ///< m, rad
 };
 
 /// Stereo odometry on stereo features alone. Every pair is matched to a local map of the points around the camera,
@@ -84,6 +99,13 @@ class VisualOdometry {
   /// Tells that the next pair does not continue the last one (a pause, a restarted source): the odometry goes on where
   /// it finds the pair in its map, else from the last pose under a new epoch.
   void breakStream();
+
+  /// Tells that something else has the last pose, with this covariance (of its right perturbation): a new epoch begins.
+  /// The map is kept, unless the camera's place in it is unknown: then the next pair starts a map at the last pose.
+  void takePose(const Matrix6d& covariance);
+
+  /// T_origin_camera of the last pair that had a pose.
+  const Eigen::Isometry3d& lastPose() const { return state_.T_origin_camera; }
 
   /// Tells that the clock was set: as breakStream(), and the next stamp may be any.
   void forgetTime();
@@ -143,6 +165,8 @@ class VisualOdometry {
   void noteVelocity(std::int64_t stamp, const MotionHypothesis& found, const PoseEvidence& evidence, bool is_trusted,
                     const Matrix6d& covariance);
   Step predict(const StereoFeatures& features, double dt, const std::string& failure);
+  void follow(const std::optional<MotionGuess>& guess);
+  bool canFollow(const StereoFeatures& features) const;
   std::optional<Floor> floor() const;
   void move(const Eigen::Isometry3d& T_previous_current);
   OdometryResult report(const StereoFeatures& features, const MotionHypothesis& found, const Step& step) const;
@@ -174,6 +198,13 @@ class VisualOdometry {
     double distance = 0.0;
     int predicted_pairs = 0;
     int pairs = 0;
+    /// Since the last pose, as guesses have it, and its covariance; nothing while one is missing.
+    struct Unseen {
+      Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+      Matrix6d covariance = Matrix6d::Zero();
+    };
+    std::optional<Unseen> unseen = Unseen();
+    GuessedMotion guessed;
     bool started = false;
     bool interrupted = false;  ///< where in the map the camera is is unknown
   } state_;
