@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -28,8 +30,7 @@ const std::map<std::string, std::set<std::string>> kMayInclude = {
 };
 
 /// Rooms that a program without ROS can use.
-const std::set<std::string> kWithoutRos = {"common", "front_end", "odometry", "places",
-                                           "data", "config", "check"};
+const std::set<std::string> kWithoutRos = {"common", "front_end", "odometry", "places", "data", "config", "check"};
 
 struct Include {
   fs::path file;
@@ -126,6 +127,33 @@ TEST(Rooms, WhatRunsOnARobotReadsNoImageFilesWithOpenCv) {
       EXPECT_TRUE(include.header != "opencv2/imgcodecs.hpp" && include.header != "opencv2/highgui.hpp" &&
                   include.header != "opencv2/opencv.hpp" && include.header.rfind("cv_bridge/", 0) != 0)
           << include.file.string() << ":" << include.line << " includes " << include.header;
+}
+
+/// With one sentence, before anything that only C++17 has. Headers that include another one of ours leave it to that
+/// one.
+TEST(Rooms, EveryPublicHeaderRefusesOlderStandards) {
+  const fs::path include = kSource / "include";
+  std::set<std::string> public_headers, guarded;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(include))
+    if (entry.path().extension() == ".hpp") public_headers.insert(entry.path().lexically_relative(include).string());
+  for (const std::string& header : public_headers) {
+    std::ifstream stream(include / header);
+    std::string line;
+    while (std::getline(stream, line))
+      if (public_headers.count(headerOf(line)) > 0) guarded.insert(header);
+  }
+  guarded.insert("stereo_descriptor_vo/common/cpp17.hpp");
+  EXPECT_EQ(guarded, public_headers);
+
+  const std::string command = "c++ -std=c++14 -fsyntax-only -x c++ -I '" + include.string() +
+                              "' -include stereo_descriptor_vo/common/options.hpp /dev/null 2>&1";
+  FILE* compiler = ::popen(command.c_str(), "r");
+  ASSERT_NE(compiler, nullptr);
+  std::string said;
+  for (int c = 0; (c = std::fgetc(compiler)) != EOF;) said += static_cast<char>(c);
+  EXPECT_NE(::pclose(compiler), 0);
+  EXPECT_NE(said.find("error: #error stereo_descriptor_vo needs C++17"), std::string::npos) << said;
+  EXPECT_LT(std::count(said.begin(), said.end(), '\n'), 12) << said;
 }
 
 TEST(Rooms, TheSearchKnowsRosHeaders) {

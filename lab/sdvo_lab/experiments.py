@@ -3,7 +3,7 @@
     lab/run experiments all --output out                    # everything in lab/docs/experiments.md; some ten minutes
     lab/run experiments all --output out --only robustness  # one of matching, ablation, robustness, sift, scale_change, consensus, accuracy
     lab/run experiments matching --output out ARGUMENT …    # one run of run_experiments, with its arguments
-    lab/run experiments size_curve --output out ARGUMENT …  # one run of fit_depth_scale, with its arguments
+    lab/run experiments size_curve --output out ARGUMENT …  # one run of learn size-curve, with its arguments
 
 `all` takes the drives of KITTI_DIR, and those of KARLSRUHE_DIR and EUROC_DIR where they are set; it renders the drives that out/drives
 lacks. Results do not depend on JOBS, the number of programs that run at a time."""
@@ -126,7 +126,7 @@ def main(arguments):
     from . import figures
     if arguments.experiment == "size_curve":
         samples, curve = output / "size_curve.csv", output / "size_curve.yaml"
-        print(programs.run("fit_depth_scale", "--output", curve, "--samples", samples, *arguments.rest))
+        print(programs.run("learn", "size-curve", "--output", curve, "--samples", samples, *arguments.rest))
         return figures.draw_depth_scale(samples, curve, output / "size_curve.png")
     rows = run(output, arguments.experiment, arguments.rest)
     print(rows.to_string(index=False))

@@ -115,7 +115,7 @@ def medians(x, y, edges):
 
 
 def draw_depth_scale(samples, curve_file, output):
-    """Samples and curve of fit_depth_scale."""
+    """Samples and curve of learn size-curve."""
     rows = pandas.read_csv(samples)
     first, later, ratio = (rows[name].to_numpy() for name in ("first_disparity", "disparity", "ratio"))
     with open(curve_file) as file:

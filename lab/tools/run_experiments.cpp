@@ -7,7 +7,6 @@
 #include <opencv2/core/utility.hpp>
 #include <stdexcept>
 
-#include "../../src/tools/named_choice.hpp"
 #include "../../src/tools/run_tool.hpp"
 #include "../experiments/accuracy_experiment.hpp"
 #include "../experiments/consensus_experiment.hpp"
@@ -15,6 +14,7 @@
 #include "../experiments/odometry_systems.hpp"
 #include "../experiments/robustness_experiment.hpp"
 #include "../experiments/scale_experiment.hpp"
+#include "named_choice.hpp"
 
 namespace {
 

@@ -34,6 +34,7 @@ void apply(const YAML::Node& node, const std::string& path, std::vector<Option>&
       apply(child.second, (path.empty() ? "" : path + "/") + child.first.as<std::string>(), options);
     return;
   }
+  if (node.IsNull()) return;  // left empty: as launch/copy_config.py has it, it is not there
   if (!belongsToNodelet(path)) setOption(options, path, textOf(node));
 }
 
@@ -43,8 +44,7 @@ PipelineOptions readPipelineOptions(const std::string& yaml_file, const std::vec
   PipelineOptions options;
   std::vector<Option> list = listOptions(options);
   if (!yaml_file.empty()) try {
-      const YAML::Node root = YAML::LoadFile(yaml_file);
-      if (!root.IsNull()) apply(root, "", list);
+      apply(YAML::LoadFile(yaml_file), "", list);
     } catch (const std::exception& e) {
       throw std::runtime_error(yaml_file + ": " + e.what());
     }

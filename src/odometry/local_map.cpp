@@ -163,6 +163,12 @@ void LocalMap::renewLooks(const StereoFeatures& features, const std::vector<Sigh
   }
 }
 
+void LocalMap::weighNewest(double probability) {
+  for (Point& point : points_)
+    if (point.observations.size() > 1 && point.observations.back().frame_id == newestId())
+      point.seen -= static_cast<float>(1.0 - probability);
+}
+
 void LocalMap::takeDescriptor(Point& point, const StereoFeatures& features, int row) {
   const std::uint8_t* bytes = features.descriptors.ptr(row);
   point.descriptor.assign(bytes, bytes + features.descriptors.cols);
@@ -439,11 +445,7 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   adjustment.success = true;
   adjustment.calibration_information = solution.calibration_information;
   adjustment.common_disparity_square = solution.common_disparity_square;
-  // Errors of neighbouring points are positively correlated: this factor makes the motions' NEES an honest 6 (measured
-  // by lab/run covariance).
-  constexpr double kCorrelated = 1.7;
-  adjustment.since_keyframe =
-      kCorrelated * motionCovariance(window, poses, solution.pose_covariance, newest - 1, newest);
+  adjustment.since_keyframe = motionCovariance(window, poses, solution.pose_covariance, newest - 1, newest);
   calibration = window.calibration;
   for (std::size_t f = 0; f < frames_.size(); ++f)
     frames_[f].T_camera_origin = orthonormalised(window.T_camera_origin[f]);

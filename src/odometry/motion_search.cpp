@@ -3,68 +3,75 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <numeric>
+#include <opencv2/core.hpp>
 #include <string>
 #include <utility>
 
 #include "ascending_rows.hpp"
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
 #include "stereo_descriptor_vo/odometry/correspondences.hpp"
-#include "stereo_descriptor_vo/odometry/rival_motion.hpp"
 
 namespace sdvo {
 namespace {
 
 constexpr double kElsewhere = 0.6;  // px, of aligned positions; up to 0.5 where nothing moved
-// Chi-square of six, by which it is worth to look further, and to follow few points rather than all. Errors of
-// neighbouring points are not independent: up to 170 where nothing moved.
-constexpr double kSuspicious = 100.0, kCertain = 200.0;
+// Chi-square of six by which the lasting points' motion may be another one, so that it is worth to look further, and by
+// which it is. Errors of neighbouring points are not independent: up to 170 where nothing moved.
+constexpr double kPerhapsOther = 100.0, kOther = 200.0;
 // The same for each point, in variances of its residual: a part of its noise is common to many, so the sum grows with
-// their number. Measured where the sum exceeds kCertain: up to 1.5 where nothing moved, 1.7 and more with faults
+// their number. Measured where the sum exceeds kOther: up to 1.5 where nothing moved, 1.7 and more with faults
 // (docs/decisions.md).
-constexpr double kCertainOfOne = 1.5;
+constexpr double kOtherOfOne = 1.5;
+constexpr std::size_t kFewestOfMotion = 20;  // points that tell a motion of their own from noise (chosen)
 
 }  // namespace
 
 MotionSearch::MotionSearch(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion,
-                           const PatchAlignmentOptions& alignment, const PoseVerdictOptions& verdict)
+                           const PatchAlignmentOptions& alignment)
     : motion_options_(motion),
       alignment_options_(alignment),
-      verdict_options_(verdict),
       matcher_(matcher),
       wide_matcher_(matcher.widened()),
-      estimator_(motion),
-      choice_(verdict, motion.min_inliers) {}
+      estimator_(motion) {}
 
-MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
+MotionHypothesis MotionSearch::find(const MotionScene& scene, double max_doubt) const {
   const StereoCamera& camera = scene.features.camera;
-  const auto take = [](Alignment& aligned, MotionHypothesis& found) {
-    found.motion.T_current_reference = aligned.T_current_reference;
-    found.sightings = std::move(aligned.sightings);
-  };
   Stopwatch stopwatch;
-  const std::optional<Eigen::Isometry3d>& prior = scene.guess ? scene.guess : scene.T_current_reference;
-  const ViewPtr view = std::make_shared<const LocalMap::View>(scene.map.view(prior));
+  const std::optional<Eigen::Isometry3d>& expected = scene.guess ? scene.guess : scene.T_current_reference;
+  const ViewPtr view = std::make_shared<const LocalMap::View>(scene.map.view(expected));
   const double view_time = stopwatch.lap();
-  MotionHypothesis found = searchNear(scene, view, prior);
+  MotionHypothesis found = searchNear(scene, view, expected, max_doubt);
   found.match_time += view_time;
-  if (found.verdict.trust == Trust::kSound && !scene.contested) {
+  for (bool is_chosen = false;; is_chosen = true) {
+    if (is_chosen)
+      found = chooseMotion(scene, motion_options_.inlier_threshold, compete(scene, view, std::move(found)));
+    else if (scene.is_doubted || !isBeyondDoubt(scene, found, max_doubt))
+      continue;
+    if (!found.motion.success) return found;
     stopwatch.lap();
     Alignment aligned = align(scene, found);
-    const bool strays = motionOfLasting(camera, found, aligned, kSuspicious).has_value();
+    const std::optional<Eigen::Isometry3d> T_lasting =
+        motionOfLasting(camera, found, aligned, is_chosen ? kOther : kPerhapsOther);
     found.motion_time += stopwatch.lap();
-    if (!strays) {
-      take(aligned, found);
-      return found;
-    }
+    if (T_lasting && !is_chosen) continue;
+    found.motion.T_current_reference = aligned.T_current_reference;
+    found.sightings = std::move(aligned.sightings);
+    if (T_lasting) keepTo(scene, *T_lasting, aligned.measured, found);
+    return found;
   }
+}
 
-  // The prior itself may be what misled the search, and what moves by itself may outnumber the world.
+/// The expectation itself may be what misled the search, and what moves by itself may outnumber the world.
+std::vector<MotionHypothesis> MotionSearch::compete(const MotionScene& scene, const ViewPtr& view,
+                                                    MotionHypothesis first) const {
+  const std::optional<Eigen::Isometry3d>& expected = scene.guess ? scene.guess : scene.T_current_reference;
   std::vector<MotionHypothesis> hypotheses;
-  hypotheses.push_back(std::move(found));
+  hypotheses.push_back(std::move(first));
   if (scene.guess && scene.T_current_reference)
-    hypotheses.push_back(searchNear(scene, view, scene.T_current_reference));
-  if (prior) hypotheses.push_back(search(matcher_, scene, view, std::nullopt));
+    hypotheses.push_back(search(wide_matcher_, scene, view, scene.T_current_reference));
+  if (expected) hypotheses.push_back(search(matcher_, scene, view, std::nullopt));
   const MotionHypothesis all = hypotheses.back();
   std::vector<int> lasting, rest;
   for (int i = 0; i < static_cast<int>(all.matches.size()); ++i) {
@@ -73,7 +80,7 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
   }
   hypotheses.push_back(searchAmong(scene, all, lasting));
   // A compromise between two motions may have more inliers than the one that goes on as before.
-  if (prior) hypotheses.push_back(searchAmong(scene, all, agreeing(scene, all, *prior)));
+  if (expected) hypotheses.push_back(searchAmong(scene, all, agreeing(scene, all, *expected)));
   // What moves by itself may have left copies of itself in the map, each with a motion of its own.
   constexpr int kMotions = 4;
   MotionEstimate peeled = all.motion;
@@ -82,25 +89,37 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene) const {
     hypotheses.push_back(searchAmong(scene, all, rest));
     peeled = hypotheses.back().motion;
   }
-  found = choice_.choose(scene, std::move(hypotheses));
-  if (found.verdict.trust == Trust::kNone) return found;
-  stopwatch.lap();
-  Alignment aligned = align(scene, found);
-  const std::optional<Eigen::Isometry3d> T_lasting = motionOfLasting(camera, found, aligned, kCertain);
-  take(aligned, found);
-  if (T_lasting) keepTo(scene, *T_lasting, aligned.measured, found);
-  found.motion_time += stopwatch.lap();
-  return found;
+  return hypotheses;
+}
+
+/// Neither prior nor lasting points contradict, the majority agrees with the motion, and lasting points that lack more
+/// than usual would be no serious rival even if they moved together.
+bool MotionSearch::isBeyondDoubt(const MotionScene& scene, const MotionHypothesis& found, double max_doubt) const {
+  if (!found.motion.success || found.innovation > kInnovationGate || logOddsMisled(scene, found) > max_doubt)
+    return false;
+  double all = 0.0, own = 0.0;
+  for (int i = 0; i < static_cast<int>(found.matches.size()); ++i) all += found.sightingsOf(i);
+  for (const int i : found.motion.inliers) own += found.sightingsOf(i);
+  const double agree = found.agreement.lasting_inliers;
+  const double lacking = scene.usual_agreement * found.agreement.lasting_matches - agree;
+  if (lacking >= motion_options_.min_inliers) {
+    constexpr double kSightings = MotionHypothesis::kLastingSightings;
+    const int points = static_cast<int>(agree + lacking);
+    if (logLikelihood(kSightings * agree, points) - logLikelihood(kSightings * lacking, points) > max_doubt)
+      return false;
+  }
+  return 2.0 * own >= all;
 }
 
 /// First where a good prediction has the points, then three times as far.
 MotionHypothesis MotionSearch::searchNear(const MotionScene& scene, const ViewPtr& view,
-                                          const std::optional<Eigen::Isometry3d>& T_current_reference) const {
+                                          const std::optional<Eigen::Isometry3d>& T_current_reference,
+                                          double max_doubt) const {
   if (!T_current_reference || !matcher_.options().gating) return search(matcher_, scene, view, T_current_reference);
   double match_time = 0.0, motion_time = 0.0;
-  if (!scene.contested) {
+  if (!scene.is_doubted) {
     MotionHypothesis found = search(matcher_, scene, view, T_current_reference);
-    if (found.verdict.trust == Trust::kSound && !leavesGate(scene, *T_current_reference, found)) return found;
+    if (isBeyondDoubt(scene, found, max_doubt) && !leavesGate(scene, *T_current_reference, found)) return found;
     match_time = found.match_time, motion_time = found.motion_time;
   }
   MotionHypothesis found = search(wide_matcher_, scene, view, T_current_reference);
@@ -130,11 +149,14 @@ MotionHypothesis MotionSearch::search(const FeatureMatcher& matcher, const Motio
                                       const std::optional<Eigen::Isometry3d>& T_current_reference) const {
   MotionHypothesis found;
   found.view = view;
+  const StereoCamera& camera = scene.features.camera;
+  found.gate = T_current_reference && matcher.options().gating ? matcher.options().gate_radius
+                                                               : std::sqrt(camera.width * camera.height / CV_PI);
   Stopwatch stopwatch;
   found.matches = matcher.match(view->rows, scene.features, T_current_reference);
   found.match_time = stopwatch.lap();
   found.correspondences = correspond(view->rows, scene.features, found.matches, scene.calibration);
-  found.motion = estimator_.estimate(scene.features.camera, found.correspondences, T_current_reference);
+  found.motion = estimator_.estimate(camera, found.correspondences, T_current_reference);
   weigh(scene, found);
   found.motion_time = stopwatch.lap();
   return found;
@@ -144,10 +166,12 @@ MotionHypothesis MotionSearch::search(const FeatureMatcher& matcher, const Motio
 MotionHypothesis MotionSearch::searchAmong(const MotionScene& scene, const MotionHypothesis& all,
                                            const std::vector<int>& subset) const {
   Stopwatch stopwatch;
-  const StereoCamera& camera = scene.features.camera;
   MotionHypothesis found = all;
   found.match_time = 0.0;
-  found.motion = estimateAmong(estimator_, camera, all.correspondences, subset);
+  std::vector<Correspondence> some;
+  some.reserve(subset.size());
+  for (const int i : subset) some.push_back(all.correspondences[static_cast<std::size_t>(i)]);
+  found.motion = estimator_.estimate(scene.features.camera, some);
   if (found.motion.success) found.motion.inliers = agreeing(scene, all, found.motion.T_current_reference);
   weigh(scene, found);
   found.motion_time = stopwatch.lap();
@@ -161,27 +185,26 @@ std::vector<int> MotionSearch::agreeing(const MotionScene& scene, const MotionHy
       .inliers(T_current_reference);
 }
 
-/// Gathers what speaks for the motion found and judges it.
+/// Gathers what speaks for the motion found.
 void MotionSearch::weigh(const MotionScene& scene, MotionHypothesis& found) const {
-  PoseEvidence& evidence = found.evidence;
-  evidence = {};
-  evidence.matches = static_cast<int>(found.matches.size());
-  for (int i = 0; i < evidence.matches; ++i) evidence.lasting_matches += found.isLasting(i);
-  countInliers(found);
-  evidence.covariance = found.motion.covariance;
-  evidence.dt = static_cast<double>(scene.features.stamp - scene.map.newestStamp()) * 1e-9;
-  evidence.velocity = scene.velocity;
-  evidence.velocity_age = scene.velocity_age;
-  if (scene.guess) evidence.guess = scene.guess->inverse();
-  found.verdict = found.motion.success ? judgePose(verdict_options_, motion_options_.min_inliers, evidence)
-                                       : PoseVerdict{Trust::kNone, found.motion.reason};
+  found.countAgreement();
+  if (!found.motion.success) return;
+  found.motion.reason = chanceWords(found);
+  found.motion.success = found.motion.reason.empty();
+  const Eigen::Isometry3d T_reference_current = found.motion.T_current_reference.inverse();
+  double least = std::numeric_limits<double>::infinity();
+  for (const ExpectedMotion& expected : scene.prior)
+    least = std::min(least, expected.normalisedSquare(T_reference_current, found.motion.covariance));
+  found.innovation = scene.prior.empty() ? 0.0 : least;
 }
 
-void MotionSearch::countInliers(MotionHypothesis& found) {
-  PoseEvidence& evidence = found.evidence;
-  evidence.inliers = static_cast<int>(found.motion.inliers.size());
-  evidence.lasting_inliers = found.lastingInliers();
-  evidence.motion = found.motion.T_current_reference.inverse();
+std::string MotionSearch::chanceWords(const MotionHypothesis& found) const {
+  const int matches = found.agreement.matches, inliers = found.agreement.inliers;
+  const double chance = chanceOfAgreement(motion_options_.inlier_threshold, found.gate);
+  if (inliers >= motion_options_.min_inliers && logFalseAlarms(matches, inliers, chance) <= std::log(kTailProbability))
+    return "";
+  return "only " + std::to_string(inliers) + " of " + std::to_string(matches) +
+         " matches agree on one motion: too few, or as many as chance gives";
 }
 
 /// Aligns the inliers' patches and refines the motion on them.
@@ -205,7 +228,8 @@ MotionSearch::Alignment MotionSearch::align(const MotionScene& scene, const Moti
         measurementOf(features, match.current, scene.calibration, sighting.measurement.head<2>() - corner);
     aligned.push_back(alignment.measured.back());
   }
-  if (aligned.size() >= kEnough) refineMotion(features.camera, motion_options_, aligned, alignment.T_current_reference);
+  refineMotion(features.camera, motion_options_, aligned.size() >= kEnough ? aligned : alignment.measured,
+               alignment.T_current_reference);
   return alignment;
 }
 
@@ -219,8 +243,7 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const StereoCamer
   lasting.reserve(aligned.measured.size()), others.reserve(aligned.measured.size());
   for (std::size_t k = 0; k < aligned.measured.size(); ++k)
     (found.isLasting(found.motion.inliers[k]) ? lasting : others).push_back(aligned.measured[k]);
-  if (static_cast<int>(lasting.size()) < kEnoughLasting || static_cast<int>(others.size()) < kEnoughLasting)
-    return std::nullopt;
+  if (std::min(lasting.size(), others.size()) < kFewestOfMotion) return std::nullopt;
 
   const Eigen::Isometry3d& T = aligned.T_current_reference;
   Eigen::Isometry3d T_lasting = T;
@@ -229,7 +252,7 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const StereoCamer
   std::iota(all.begin(), all.end(), 0);
   if (agree(camera, others, all, T, T_lasting, kElsewhere)) return std::nullopt;
   const Vector6d difference = logSE3(T_lasting * T.inverse());
-  const double least = std::max(significant, kCertainOfOne * static_cast<double>(lasting.size()));
+  const double least = std::max(significant, kOtherOfOne * static_cast<double>(lasting.size()));
   if (difference.dot(equations.hessian * difference) <= least * equations.variance()) return std::nullopt;
   return T_lasting;
 }
@@ -239,23 +262,30 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const StereoCamer
 void MotionSearch::keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_lasting,
                           const std::vector<Correspondence>& measured, MotionHypothesis& found) const {
   MotionEstimate& motion = found.motion;
+  double own = 0.0, of_others = 0.0;
+  std::vector<int> kept = PoseProblem(scene.features.camera, measured, kElsewhere).inliers(T_lasting);
   std::vector<int> inliers;
   std::vector<LocalMap::Sighting> sightings;
-  for (const int k : PoseProblem(scene.features.camera, measured, kElsewhere).inliers(T_lasting)) {
-    inliers.push_back(motion.inliers[k]);
-    sightings.push_back(found.sightings[k]);
+  for (int k = 0; k < static_cast<int>(measured.size()); ++k) {
+    const int i = motion.inliers[static_cast<std::size_t>(k)];
+    const bool is_kept = std::binary_search(kept.begin(), kept.end(), k);
+    (is_kept ? own : of_others) += found.sightingsOf(i);
+    if (!is_kept) continue;
+    inliers.push_back(i);
+    sightings.push_back(found.sightings[static_cast<std::size_t>(k)]);
   }
-  // The other motion explains the rest, so that does not speak against this one.
-  found.evidence.matches -= static_cast<int>(motion.inliers.size() - inliers.size());
-  if (!found.rival) found.rival = motion.T_current_reference;
+  const int left = static_cast<int>(motion.inliers.size() - inliers.size());
+  const int points = static_cast<int>(motion.inliers.size());
+  const double probability = probabilityOf(logLikelihood(of_others, points) - logLikelihood(own, points));
+  const Eigen::Isometry3d apart = T_lasting * motion.T_current_reference.inverse();
+  found.rivals_moment += (1.0 - probability) * momentOf(logSE3(apart));
+  found.probability *= probability;
+  found.rival = {motion.T_current_reference, 1.0 - probability, left};
   motion.T_current_reference = T_lasting;
   motion.inliers = std::move(inliers);
   found.sightings = std::move(sightings);
-  countInliers(found);
-  found.contested = true;
-  found.verdict = {Trust::kDoubtful, "points that stood still so far show another motion than all " +
-                                         std::to_string(measured.size()) +
-                                         " inliers: does something move in front of the camera?"};
+  found.countAgreement();
+  found.agreement.matches -= left;
 }
 
 }  // namespace sdvo

@@ -18,7 +18,7 @@ constexpr double kCorrelatedSightings = 10.0;
 constexpr int kEnough = 20;  // features; fewer, which three angles fit nearly as they are, may be wrong matches
 
 // A turn of the camera.
-constexpr double kTurned = 0.6;  // px: undisturbed, KITTI's and EuRoC's rigs change by less than 0.2
+constexpr double kUsualOfRigs = 0.2;  // px: undisturbed, KITTI's and EuRoC's rigs change by less
 constexpr double kUnusual =
     3.0;  // times the usual change (chosen). That grows where rectification left more than a rotation
           // (Karlsruhe's rig: 0.5 px), or where the shutters are apart while the camera turns.
@@ -51,15 +51,15 @@ RightCameraRotation::Sums RightCameraRotation::sumUp(const StereoFeatures& featu
   return sums;
 }
 
-bool RightCameraRotation::add(const StereoFeatures& features) {
-  if (features.count() == 0) return false;
+double RightCameraRotation::add(const StereoFeatures& features) {
+  if (features.count() == 0) return 0.0;
   // A camera that turned disagrees with the memory. Back in its place it agrees again, but not with the pair before.
-  bool turned = false;
+  double turned = 0.0;
   if (features.count() >= kEnough) {
     const Sums now = sumUp(features, {});
     // Against the memory a knock counts in many pairs, so each of these counts little.
-    turned = against_memory_.isExceededBy(distance(now, sums_), kMemory);
-    turned |= against_last_.isExceededBy(distance(now, last_), kUsualMemory);
+    turned = std::max(against_memory_.exceededBy(distance(now, sums_), kMemory),
+                      against_last_.exceededBy(distance(now, last_), kUsualMemory));
     last_ = now;
   }
   const Sums past{kMemory * sums_.information, kMemory * sums_.gradient, kMemory * sums_.square,
@@ -68,13 +68,13 @@ bool RightCameraRotation::add(const StereoFeatures& features) {
   return turned;
 }
 
-bool RightCameraRotation::UsualChange::isExceededBy(double change, double memory_of_large) {
-  const double limit = std::max(kTurned, kUnusual * std::sqrt(square));
+double RightCameraRotation::UsualChange::exceededBy(double change, double memory_of_large) {
+  const double usual = std::max(kUsualOfRigs, std::sqrt(square)), limit = kUnusual * usual;
   // A knock is one large change. What changes in many pairs is the rig's way: each counts up to the limit.
   const double counted = std::min(change, limit);
   const double memory = change > limit ? memory_of_large : kUsualMemory;
   square += (1.0 - memory) * (counted * counted - square);
-  return change > limit;
+  return change / usual;
 }
 
 double RightCameraRotation::change(const StereoFeatures& features) const {

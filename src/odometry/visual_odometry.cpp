@@ -39,35 +39,36 @@ const char* toString(TrackingState state) {
 VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
     : options_(checked(options)),
       T_base_camera_(lookingAhead()),
-      search_(options.matcher, options.motion, options.alignment, options.tracking),
+      search_(options.matcher, options.motion, options.alignment),
       reacquisition_(options.matcher, options.motion),
       revisit_(options.matcher, options.motion, options.alignment),
       optimizer_(options.window),
-      state_(options.calibration) {}
+      state_(options) {}
 
 void VisualOdometry::configure(const VisualOdometryOptions& options) {
   options_ = checked(options);
-  search_ = MotionSearch(options.matcher, options.motion, options.alignment, options.tracking);
+  search_ = MotionSearch(options.matcher, options.motion, options.alignment);
   reacquisition_ = Reacquisition(options.matcher, options.motion);
   revisit_ = Revisit(options.matcher, options.motion, options.alignment);
   optimizer_ = WindowOptimizer(options.window);
+  state_.prior.configure(options.tracking);
 }
 
 void VisualOdometry::reset() {
-  state_ = State(options_.calibration);
+  state_ = State(options_);
   ++epoch_;
 }
 
 void VisualOdometry::breakStream() {
   state_.interrupted = true;
-  state_.belief.interrupt();
+  state_.prior.interrupt();
 }
 
 void VisualOdometry::forgetTime() {
   breakStream();
   state_.map.reset();  // how long ago it was seen is unknown
   state_.last_stamp.reset();
-  state_.belief.forget();
+  state_.prior.forget();
 }
 
 void VisualOdometry::mountAt(const Eigen::Isometry3d& T_base_camera) {
@@ -107,11 +108,12 @@ Matrix6d GuessedMotion::add(const MotionGuess& guess) {
 
 /// Takes note of a guess, or that there is none, for as long as there is no pose.
 void VisualOdometry::follow(const std::optional<MotionGuess>& guess) {
-  if (!guess || guess->rotation_only) state_.unseen.reset();
-  if (!state_.unseen) return;
+  if (!guess || guess->rotation_only) state_.followed.reset();
+  if (!state_.followed) return;
   const Matrix6d carried = adjoint(guess->T_previous_current.inverse());
-  state_.unseen->motion = state_.unseen->motion * guess->T_previous_current;
-  state_.unseen->covariance = carried * state_.unseen->covariance * carried.transpose() + state_.guessed.add(*guess);
+  state_.followed->motion = state_.followed->motion * guess->T_previous_current;
+  state_.followed->covariance =
+      carried * state_.followed->covariance * carried.transpose() + state_.guessed.add(*guess);
 }
 
 OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::optional<MotionGuess>& guess) {
@@ -122,31 +124,35 @@ OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::op
   const StereoFeatures& features = is_refocused ? converted : given;
   const double dt = state_.last_stamp ? static_cast<double>(features.stamp - *state_.last_stamp) * 1e-9 : 0.0;
   const bool continued = state_.map && state_.map->continuedBy(features);
-  const bool frozen = isFrozen(features, dt, guess);
+  const bool frozen = !state_.interrupted && isFrozen(features, dt, guess);
+  const std::optional<MotionScene> scene = !continued || frozen ? std::nullopt
+                                           : state_.interrupted ? reacquire(features)
+                                                                : std::optional(sceneOf(features, dt, guess));
   MotionHypothesis found;
-  if (continued && !frozen) found = state_.interrupted ? reacquire(features) : propose(features, dt, guess);
+  if (scene) found = search_.find(*scene, largestDoubt());
 
   // Nothing has changed so far, and from here on nothing is refused.
   Stopwatch stopwatch;
   begin(features, dt);
   follow(guess);
   Step step;
-  if (frozen)
-    step = predict(features, dt,
-                   "the images repeat those of the previous pair although the camera moved: is the driver frozen?");
-  else if (!continued || (state_.interrupted && found.verdict.trust == Trust::kNone))
+  if (!continued || (state_.interrupted && !found.motion.success))
     step = seed(features);
-  else if (found.verdict.trust == Trust::kNone)
-    step = predict(features, dt, found.verdict.reason);
+  else if (frozen)
+    step = hold(dt);
+  else if (!found.motion.success)
+    step = predict(features, dt, found.motion.reason);
   else
-    step = extendMap(features, dt, found);
-  if (continued && !frozen) suspect(dt, found, step);
-  state_.suspicion.pass();
+    step = extendMap(features, *scene, found, dt);
+  // Unless the camera went unseen, the views may not be of one rigid world, and the next map would be as wrong.
+  if (scene && !found.motion.success && found.agreement.matches >= kManyMatches && dt <= options_.tracking.max_gap)
+    state_.doubt.raise(CarriedDoubt::kCertain, "many matches agreed on no motion");
+  state_.doubt.pass();
   state_.images.remember(features, frozen);
   step.dt = step.T_previous_current ? static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9 : dt;
   if (step.T_previous_current) move(*step.T_previous_current);
   if (step.state == TrackingState::kTracking || step.state == TrackingState::kDegraded)
-    state_.last_pose_stamp = features.stamp, state_.unseen = State::Unseen();
+    state_.last_pose_stamp = features.stamp, state_.followed = State::Followed();
   step.time = stopwatch.lap();
   return report(features, found, step);
 }
@@ -162,46 +168,59 @@ void VisualOdometry::refuse(const StereoFeatures& features) const {
 bool VisualOdometry::isFrozen(const StereoFeatures& features, double dt,
                               const std::optional<MotionGuess>& guess) const {
   if (guess && !guess->rotation_only) return state_.images.areFrozen(features, guess->T_previous_current, true);
+  Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
+  if (guess) turn.linear() = guess->T_previous_current.linear();
   std::optional<Eigen::Isometry3d> predicted;
-  if (state_.belief.velocity()) predicted = state_.belief.predicted(dt);
-  return state_.images.areFrozen(features, predicted, false);
+  if (state_.prior.velocity()) predicted = state_.prior.predicted(dt).motion;
+  return state_.images.areFrozen(features, turn, true) || state_.images.areFrozen(features, predicted, false);
 }
 
-/// Looks for the pair in the map.
-MotionHypothesis VisualOdometry::propose(const StereoFeatures& features, double dt,
-                                         const std::optional<MotionGuess>& guess) const {
-  const MotionBelief& belief = state_.belief;
-  const RigCalibration calibration = state_.calibration.calibration();
+/// The map, the pair, and the motion between them as it is expected: what was already covered by predicted pairs, and
+/// from there on the velocity or the guess.
+MotionScene VisualOdometry::sceneOf(const StereoFeatures& features, double dt,
+                                    const std::optional<MotionGuess>& guess) const {
+  const MotionPrior& prior = state_.prior;
   MotionScene scene{*state_.map,
-                    calibration,
+                    state_.calibration.calibration(),
                     features,
-                    std::nullopt,
-                    belief.trusted(),
-                    state_.suspicion.isRaised(),
-                    belief.trustedAge(state_.map->newestStamp()),
-                    std::nullopt};
-  // The motion since the map's newest pair: what was already covered by predicted pairs, and from there on the velocity
-  // or the guess.
+                    {},
+                    {},
+                    {},
+                    state_.usual_agreement,
+                    state_.doubt.logOdds() > largestDoubt(),
+                    options_.tracking.doubtful_deviation};
   const Eigen::Isometry3d T_reference_previous = state_.map->newestPose() * state_.T_origin_camera;
-  if (belief.velocity() && dt <= options_.tracking.max_gap)
-    scene.T_current_reference = (T_reference_previous * belief.predicted(dt)).inverse();
+  const double since = secondsSinceMap(features);
+  if (const auto confirmed = prior.confirmed(state_.map->newestStamp(), since)) scene.prior.push_back(*confirmed);
+  if (prior.velocity() && dt <= options_.tracking.max_gap)
+    scene.T_current_reference = (T_reference_previous * prior.predicted(dt).motion).inverse();
   if (guess) {
     Eigen::Isometry3d T_previous_current = guess->T_previous_current;
     if (guess->rotation_only)
-      T_previous_current.translation() = belief.velocity().value_or(Vector6d::Zero()).head<3>() * dt;
+      T_previous_current.translation() = prior.velocity().value_or(Vector6d::Zero()).head<3>() * dt;
     scene.guess = (T_reference_previous * T_previous_current).inverse();
+    if (!scene.prior.empty()) scene.prior.push_back(prior.around(scene.guess->inverse(), since));
   }
-  return search_.find(scene);
+  return scene;
+}
+
+/// Log-odds of being misled above which a motion is doubtful.
+double VisualOdometry::largestDoubt() const {
+  return logOdds(1.0 - options_.tracking.probability);
+}
+
+double VisualOdometry::secondsSinceMap(const StereoFeatures& features) const {
+  return static_cast<double>(features.stamp - state_.map->newestStamp()) * 1e-9;
 }
 
 /// Looks for the pair in the map from before an outage. How the camera moved meanwhile is unknown.
-MotionHypothesis VisualOdometry::reacquire(const StereoFeatures& features) const {
-  const RigCalibration calibration = state_.calibration.calibration();
-  const auto T_current_newest = reacquisition_.find(*state_.map, features, calibration);
-  MotionHypothesis nothing;
-  nothing.verdict.trust = Trust::kNone;
-  if (!T_current_newest) return nothing;
-  return search_.find({*state_.map, calibration, features, T_current_newest, {}, false, 0.0, {}});
+std::optional<MotionScene> VisualOdometry::reacquire(const StereoFeatures& features) const {
+  const auto T_current_newest = reacquisition_.find(*state_.map, features, state_.calibration.calibration());
+  if (!T_current_newest) return std::nullopt;
+  MotionScene scene = sceneOf(features, 0.0, std::nullopt);
+  scene.prior.clear();
+  scene.T_current_reference = T_current_newest;
+  return scene;
 }
 
 /// What was learnt is of another rig.
@@ -216,24 +235,15 @@ void VisualOdometry::begin(const StereoFeatures& features, double dt) {
   state_.camera = features.camera;
   state_.last_stamp = features.stamp;
   ++state_.pairs;
-  if (dt <= options_.tracking.max_gap) state_.belief.pass(dt);
+  if (dt <= options_.tracking.max_gap) state_.prior.pass(dt);
   // The map is of another rig than this pair.
-  if (state_.right_rotation.add(features)) state_.suspicion.raise("the right camera seems to have turned");
+  const double turned = state_.right_rotation.add(features);
+  state_.doubt.raise(CarriedDoubt::kUnsuspected + 0.5 * turned * turned, "the right camera seems to have turned");
   if (features.report.refused) {
     // What the pairs before told of the rig may be wrong already, and those after may be refused again.
     state_.calibration = CalibrationFilter(options_.calibration);
-    state_.suspicion.raise("left and right did not belong together");
+    state_.doubt.raise(CarriedDoubt::kCertain, "left and right did not belong together");
   }
-}
-
-/// What this pair showed may mislead the next ones, too.
-void VisualOdometry::suspect(double dt, const MotionHypothesis& found, const Step& step) {
-  const PoseEvidence& evidence = found.evidence;
-  const bool agree = evidence.inliers >= options_.tracking.doubtful_ratio * evidence.matches;
-  if (step.state != TrackingState::kLost && state_.predicted_pairs == 0) return;
-  // Unless the camera went unseen, the views may not be of one rigid world, and the next map would be as wrong.
-  if (evidence.matches >= kManyMatches && !agree && dt <= options_.tracking.max_gap)
-    state_.suspicion.raise("many matches agreed on no motion", Suspicion::kLong);
 }
 
 VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
@@ -245,18 +255,17 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
                   (features.report.status.empty() ? "" : ": " + features.report.status);
     return step;
   }
-  if (state_.started && state_.unseen) {
+  if (state_.started && state_.followed) {
     step.state = TrackingState::kDegraded;
     step.reason = "started again where the guess has the camera";
-    step.T_previous_current = state_.unseen->motion;
-    step.covariance = state_.unseen->covariance;
+    step.T_previous_current = state_.followed->motion;
+    step.covariance = state_.followed->covariance;
     state_.covariance.advance(*step.T_previous_current, step.covariance);
     state_.covariance.assume(state_.covariance.value());
   } else if (state_.started) {
     ++epoch_;
     const double unseen = std::max(0.0, static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9);
-    state_.covariance.restart(
-        travelCovariance(state_.belief.trusted().value_or(Vector6d::Zero()), unseen, options_.tracking.max_speed));
+    state_.covariance.restart(state_.prior.unseen(unseen));
     step.state = TrackingState::kDegraded;
     step.reason = "started again from the last pose; the motion in between is unknown";
   } else {
@@ -265,7 +274,6 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
   }
   state_.started = true;
   state_.interrupted = false;
-  state_.belief.doubt(Matrix6d::Zero());
   state_.predicted_pairs = 0;
   state_.map.emplace(options_.map);
   const Eigen::Isometry3d T_previous_current = step.T_previous_current.value_or(Eigen::Isometry3d::Identity());
@@ -275,53 +283,63 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
 }
 
 /// The pair joins the map unless the adjustment refutes its motion.
-VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, double dt,
-                                               const MotionHypothesis& found) {
-  if (found.contested) state_.suspicion.raise("something else moved in view");
-  const Candidate candidate = adjust(features, found);
-  if (candidate.verdict.trust == Trust::kNone && state_.interrupted) return seed(features);
-  if (candidate.verdict.trust == Trust::kNone)
-    return predict(features, dt, candidate.verdict.reason + " after the adjustment");
-  const Eigen::Isometry3d T_previous_measured =
-      (found.motion.T_current_reference * state_.map->newestPose() * state_.T_origin_camera).inverse();
-  commit(candidate);
+VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, const MotionScene& scene,
+                                               MotionHypothesis& found, double dt) {
+  const auto refute = [&](const std::string& why) {
+    return state_.interrupted ? seed(features) : predict(features, dt, why);
+  };
+  const double since = secondsSinceMap(features);
+  const Eigen::Isometry3d T_reference_current = found.motion.T_current_reference.inverse();
+  std::string refutation = state_.prior.tooFast(T_reference_current, found.motion.covariance, since);
+  // What is followed was likely something else already, and this is no motion of the camera: the prior's is likelier.
+  if (refutation.empty() && scene.is_doubted && scene.T_current_reference && logOddsMisled(scene, found) > 0.0)
+    refutation = innovationWords(found) + ", right after " + state_.doubt.cause();
+  if (!refutation.empty()) return refute(refutation);
+  const bool is_sound = doubtOf(scene, found).probability >= options_.tracking.probability;
+  const Candidate candidate = adjust(features, found, is_sound);
+  found.reject(candidate.adjustment.rejected_rows);
+  refutation = search_.chanceWords(found);
+  if (refutation.empty()) refutation = state_.prior.tooFast(candidate.motion, found.motion.covariance, since);
+  if (!refutation.empty()) return refute(refutation + " after the adjustment");
 
+  const Doubt doubt = doubtOf(scene, found);
+  state_.doubt.raise(doubt.log_odds, doubt.cause);
+  commit(candidate, doubt.probability);
   Step step = measure(found, candidate);
-  PoseVerdict verdict = candidate.verdict;
-  // After a new start, or a motion of something else, it may be that which is followed.
-  const PoseEvidence& evidence = candidate.evidence;
-  if ((!state_.belief.velocity() || state_.suspicion.isRaised()) && isUnexpected(evidence))
-    state_.suspicion.raise("the motion changed faster than a vehicle's can");
-  if (lastingDisagree(options_.tracking, evidence)) state_.suspicion.raise("points that stood still so far moved");
-  if (verdict.trust == Trust::kSound && state_.suspicion.isRaised())
-    verdict = {Trust::kDoubtful, "a moment ago " + state_.suspicion.cause()};
   const Matrix6d measured = step.covariance;
-  Matrix6d doubt = Matrix6d::Zero();
-  if (verdict.trust == Trust::kDoubtful) {
-    doubt = this->doubt(found, T_previous_measured, *step.T_previous_current, dt);
-    step.state = TrackingState::kDegraded;
-    step.reason = "doubtful: " + verdict.reason;
-    step.covariance += doubt;
-    // Where the lasting points confirm the motion, the stamps may be wrong, and only the speed is in doubt.
-    if (!verdict.of_rate || !lastingAgree(options_.tracking, evidence)) state_.covariance.doubt(doubt);
-  }
-  state_.belief.doubt(doubt);
-  noteVelocity(features.stamp, found, evidence, verdict.trust == Trust::kSound, measured);
+  judge(scene, found, candidate, doubt, step);
+  const bool is_confirmed = step.state == TrackingState::kTracking;
+  if (is_confirmed) learn(found.agreement);
+  // A motion that is likely something else's predicts nothing.
+  if (doubt.probability >= 0.5)
+    state_.prior.measure(features.stamp, T_reference_current, since, measured, is_confirmed,
+                         step.covariance - measured);
   if (options_.planar.planar) {
     const std::string off = state_.floor.note(*floor(), state_.map->newestPose());
     if (step.reason.empty()) step.reason = off;
   }
   state_.predicted_pairs = 0;
+  state_.unseen = 0.0;
   state_.guessed = GuessedMotion();
   if (std::exchange(state_.interrupted, false))
-    step.reason = "re-acquired by " + std::to_string(evidence.inliers) + " points of the map" +
+    step.reason = "re-acquired by " + std::to_string(found.agreement.inliers) + " points of the map" +
                   (step.reason.empty() ? "" : "; " + step.reason);
   if (state_.map->newestIsKeyframe()) state_.covariance.markKeyframe();
   return step;
 }
 
-/// Adjusts a copy of the map with the pair in it, and judges the motion that this leaves.
-VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features, const MotionHypothesis& found) {
+/// Learns what agreement is usual on this rig.
+void VisualOdometry::learn(const Agreement& agreement) {
+  constexpr double kMemory = 0.9;  // ratio of the past that a pair leaves (chosen)
+  constexpr double kMost = 0.95;   // even if all agree, a few need not in the next pair (chosen)
+  if (agreement.lasting_matches == 0) return;
+  const double ratio = static_cast<double>(agreement.lasting_inliers) / agreement.lasting_matches;
+  state_.usual_agreement += (1.0 - kMemory) * (std::min(ratio, kMost) - state_.usual_agreement);
+}
+
+/// Adjusts a copy of the map with the pair in it.
+VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features, const MotionHypothesis& found,
+                                                 bool may_recall) {
   const Eigen::Isometry3d T_previous_origin = state_.map->newestPose();
   state_.candidate = state_.map;
   LocalMap& map = *state_.candidate;
@@ -330,41 +348,92 @@ VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features,
   map.insert(options_.alignment, features, state_.pairs, found.motion.T_current_reference * T_previous_origin,
              found.sightings, candidate.calibration);
   candidate.T_keyframe_origin = map.poseBeforeNewest();
-  if (map.newestIsKeyframe() && found.verdict.trust == Trust::kSound)
-    revisit_.recall(features, candidate.calibration, map);
+  if (map.newestIsKeyframe() && may_recall) revisit_.recall(features, candidate.calibration, map);
   const std::optional<Floor> floor = this->floor();
   candidate.adjustment = map.adjust(optimizer_, state_.calibration.prior(map.oldestId()), candidate.calibration, floor);
   // The window's first pose does not move in the adjustment: what it carries in height and tilt goes with the whole
   // map.
   if (floor) map.moveTo(floor->settled(map.newestPose(), state_.covariance.value()));
   map.renewLooks(features, found.sightings);
-
-  const LocalMap::Adjustment& adjustment = candidate.adjustment;
-  PoseEvidence& evidence = candidate.evidence = found.evidence;
-  evidence.inliers = static_cast<int>(found.inlierRows(adjustment.rejected_rows).size());
-  evidence.lasting_inliers = found.lastingInliers(adjustment.rejected_rows);
   // What the adjustment did to the map as a whole is no motion.
   const Eigen::Isometry3d T_before_after = candidate.T_keyframe_origin.inverse() * map.poseBeforeNewest();
-  evidence.motion = T_previous_origin * T_before_after * map.newestPose().inverse();
-  evidence.distance = (map.poseBeforeNewest() * map.newestPose().inverse()).translation().norm();
-  if (adjustment.success) evidence.deviation = std::sqrt(adjustment.since_keyframe.topLeftCorner<3, 3>().trace());
-  candidate.verdict = judge(found, evidence);
+  candidate.motion = T_previous_origin * T_before_after * map.newestPose().inverse();
+  candidate.distance = (map.poseBeforeNewest() * map.newestPose().inverse()).translation().norm();
   return candidate;
 }
 
-/// The adjustment can refute a motion or cast doubt on it, but takes back no doubt of the search.
-PoseVerdict VisualOdometry::judge(const MotionHypothesis& found, const PoseEvidence& evidence) const {
-  PoseVerdict verdict = judgePose(options_.tracking, options_.motion.min_inliers, evidence);
-  return verdict.trust == Trust::kSound || (verdict.trust == Trust::kDoubtful && found.rival) ? found.verdict : verdict;
+/// The probability that a motion is not the camera's: it is a rival's, the pair itself misleads, or a pair before did.
+VisualOdometry::Doubt VisualOdometry::doubtOf(const MotionScene& scene, const MotionHypothesis& found) const {
+  const double rivals = 1.0 / found.probability - 1.0, misled = std::exp(logOddsMisled(scene, found));
+  const double carried = std::exp(state_.doubt.logOdds());
+  Doubt doubt;
+  doubt.log_odds = std::log(rivals + misled);
+  doubt.probability = 1.0 / (1.0 + rivals + misled + carried);
+  doubt.moment = found.rivals_moment;
+  if (!scene.prior.empty()) {
+    const ExpectedMotion& expected = scene.prior.front();
+    const Vector6d innovation = expected.innovation(found.motion.T_current_reference.inverse());
+    doubt.moment += (misled + carried) * doubt.probability * (momentOf(innovation) + expected.covariance);
+  }
+  std::ostringstream reason;
+  if (found.rival && rivals >= std::max(misled, carried)) {
+    reason << "two motions in view, of " << found.agreement.inliers << " and " << found.rival->matches
+           << " matches, the second with a probability of " << found.rival->probability
+           << ": does something move in front of the camera?";
+    doubt.cause = "something else moved in view";
+  } else {
+    reason << (misled >= carried ? innovationWords(found) : "a moment ago " + state_.doubt.cause())
+           << ": followed with a probability of " << 1.0 - doubt.probability << " is something else";
+    doubt.cause = "the motion changed faster than a vehicle's can";
+  }
+  doubt.reason = reason.str();
+  return doubt;
 }
 
-void VisualOdometry::commit(const Candidate& candidate) {
+/// The pair's own evidence against its motion.
+std::string VisualOdometry::innovationWords(const MotionHypothesis& found) const {
+  std::ostringstream words;
+  words << "the motion differs from the prior by " << std::sqrt(found.innovation)
+        << " standard deviations (tracking/acceleration), " << found.agreement.lasting_inliers << " of "
+        << found.agreement.lasting_matches << " lasting points agree";
+  return words.str();
+}
+
+/// Doubtful is a motion that is the camera's with too small a probability, or that has too large a covariance.
+void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& found, const Candidate& candidate,
+                           const Doubt& doubt, Step& step) {
+  std::ostringstream reason;
+  Matrix6d covariance = candidate.adjustment.since_keyframe;
+  if (found.innovation > kInnovationGate) {
+    // The stamps may be wrong, or the camera did what none does; points cannot tell.
+    const Vector6d innovation = scene.prior.front().innovation(found.motion.T_current_reference.inverse());
+    covariance += innovation * innovation.transpose();
+    step.covariance += innovation * innovation.transpose();
+    reason << innovationWords(found);
+  }
+  if (doubt.probability < options_.tracking.probability) {
+    step.covariance += doubt.moment;
+    state_.covariance.doubt(doubt.moment);
+    reason.str("");
+    reason << doubt.reason;
+  } else {
+    const double deviation = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
+    if (deviation <= options_.tracking.doubtful_deviation + kTolerableRatio * candidate.distance) return;
+    if (reason.str().empty())
+      reason << "a distance of " << candidate.distance << " m with a standard deviation of " << deviation
+             << " m exceeds tracking/doubtful_deviation";
+  }
+  step.state = TrackingState::kDegraded;
+  step.reason = "doubtful: " + reason.str();
+}
+
+void VisualOdometry::commit(const Candidate& candidate, double probability) {
   std::swap(state_.map, state_.candidate);
+  state_.map->weighNewest(probability);
   const LocalMap::Adjustment& adjustment = candidate.adjustment;
   if (!adjustment.success) return;
   state_.calibration.note(state_.map->newestId(), candidate.calibration, adjustment.calibration_information);
-  const bool is_sound = candidate.verdict.trust == Trust::kSound && !state_.suspicion.isRaised();
-  if (is_sound && adjustment.common_disparity_square)
+  if (probability >= options_.tracking.probability && adjustment.common_disparity_square)
     state_.calibration.noteCommon(*adjustment.common_disparity_square);
 }
 
@@ -394,32 +463,22 @@ VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, cons
   return step;
 }
 
-/// Covariance of a doubtful motion: as far off as what was expected, as the rival, and as the adjustment moved it.
-Matrix6d VisualOdometry::doubt(const MotionHypothesis& found, const Eigen::Isometry3d& T_previous_measured,
-                               const Eigen::Isometry3d& T_previous_current, double dt) const {
-  Matrix6d doubt = disagreement(T_previous_current, T_previous_measured) +
-                   disagreement(T_previous_current, state_.belief.expected(dt)) + predictionCovariance(dt);
-  // Both hypotheses start from the same pair of the map.
-  if (found.rival)
-    doubt += disagreement(Eigen::Isometry3d::Identity(), found.motion.T_current_reference * found.rival->inverse());
-  return doubt;
-}
-
-/// The velocity since the map's newest pair before. Stamps that lie too close make none, nor does what may be the
-/// motion of something else, nor the mean over a gap.
-void VisualOdometry::noteVelocity(std::int64_t stamp, const MotionHypothesis& found, const PoseEvidence& evidence,
-                                  bool is_trusted, const Matrix6d& covariance) {
-  const Vector6d velocity = logSE3(found.motion.T_current_reference.inverse()) / evidence.dt;
-  if (isImplausible(options_.tracking, evidence) || evidence.dt > options_.tracking.max_gap ||
-      !(velocity.head<3>().norm() <= options_.tracking.max_speed) ||
-      !(velocity.tail<3>().norm() <= options_.tracking.max_rotation_rate))
-    return;
-  state_.belief.measure(stamp, velocity, evidence.dt, covariance, is_trusted);
+/// Images that repeat themselves show no motion: the pose stays, as uncertain as the prior makes it meanwhile.
+VisualOdometry::Step VisualOdometry::hold(double dt) {
+  Step step;
+  step.state = TrackingState::kDegraded;
+  step.reason = "the images repeat those of the previous pair although the camera moved: is the driver frozen?";
+  step.T_previous_current = Eigen::Isometry3d::Identity();
+  step.covariance = state_.prior.unseen(state_.unseen + dt) - state_.prior.unseen(state_.unseen);
+  state_.unseen += dt;
+  state_.covariance.advance(*step.T_previous_current, step.covariance);
+  state_.prior.interrupt();
+  return step;
 }
 
 /// Whether a guess has the motion of a pair that shows nothing, not too long after the last one that did.
 bool VisualOdometry::canFollow(const StereoFeatures& features) const {
-  if (!state_.map || !state_.unseen || features.count() >= options_.motion.min_inliers) return false;
+  if (!state_.map || !state_.followed || features.count() >= options_.motion.min_inliers) return false;
   return static_cast<double>(features.stamp - state_.map->newestStamp()) * 1e-9 <= options_.tracking.max_guessed;
 }
 
@@ -429,12 +488,12 @@ VisualOdometry::Step VisualOdometry::predict(const StereoFeatures& features, dou
   if (canFollow(features)) {
     step.state = TrackingState::kDegraded;
     step.reason = "motion by the guess: " + step.reason;
-    step.T_previous_current = state_.unseen->motion;
-    step.covariance = state_.unseen->covariance;
+    step.T_previous_current = state_.followed->motion;
+    step.covariance = state_.followed->covariance;
     state_.covariance.advance(*step.T_previous_current, step.covariance);
     return step;
   }
-  const bool can_predict = state_.belief.velocity() && dt <= options_.tracking.max_gap &&
+  const bool can_predict = state_.prior.velocity() && dt <= options_.tracking.max_gap &&
                            state_.predicted_pairs < options_.tracking.max_predicted_pairs;
   if (!can_predict) {
     breakStream();
@@ -444,8 +503,9 @@ VisualOdometry::Step VisualOdometry::predict(const StereoFeatures& features, dou
   ++state_.predicted_pairs;
   step.state = TrackingState::kDegraded;
   step.reason = "motion predicted: " + step.reason;
-  step.T_previous_current = state_.belief.predicted(dt);
-  step.covariance = state_.belief.predictedCovariance(dt);
+  const ExpectedMotion predicted = state_.prior.predicted(dt);
+  step.T_previous_current = predicted.motion;
+  step.covariance = predicted.covariance;
   state_.covariance.advance(*step.T_previous_current, step.covariance);
   return step;
 }
@@ -488,6 +548,22 @@ OdometryResult VisualOdometry::report(const StereoFeatures& features, const Moti
     result.correction = step.correction;
   }
 
+  reportMatches(features, found, step, result);
+  const RigCalibration::Vector sigma = state_.calibration.sigma();
+  if (sigma.allFinite()) {
+    result.disparity_offset = state_.calibration.calibration().value[0];
+    result.disparity_bend = state_.calibration.calibration().value[1];
+    result.disparity_offset_sigma = sigma[0];
+    result.disparity_bend_sigma = sigma[1];
+  }
+  result.right_rotation = state_.right_rotation.rotation();
+  result.right_rotation_sigma = state_.right_rotation.sigma();
+  return result;
+}
+
+/// The matches, which of them are inliers, and what follows from these.
+void VisualOdometry::reportMatches(const StereoFeatures& features, const MotionHypothesis& found, const Step& step,
+                                   OdometryResult& result) const {
   result.flow.reserve(found.matches.size());
   for (const FeatureMatch& match : found.matches) {
     const cv::Point3f& previous = found.view->pixels[match.reference];
@@ -506,17 +582,6 @@ OdometryResult VisualOdometry::report(const StereoFeatures& features, const Moti
   result.rms = found.motion.rms;
   result.match_time = found.match_time;
   result.motion_time = found.motion_time + step.time;
-
-  const RigCalibration::Vector sigma = state_.calibration.sigma();
-  if (sigma.allFinite()) {
-    result.disparity_offset = state_.calibration.calibration().value[0];
-    result.disparity_bend = state_.calibration.calibration().value[1];
-    result.disparity_offset_sigma = sigma[0];
-    result.disparity_bend_sigma = sigma[1];
-  }
-  result.right_rotation = state_.right_rotation.rotation();
-  result.right_rotation_sigma = state_.right_rotation.sigma();
-  return result;
 }
 
 }  // namespace sdvo

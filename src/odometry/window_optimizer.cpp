@@ -20,8 +20,7 @@ struct ReducedSystem {
   Eigen::MatrixXd hessian;  ///< poses but the first, then the calibration; its lower triangle
   Eigen::VectorXd gradient;
   std::vector<EliminatedPoint> points;
-  std::vector<PoseFactor> factors;     ///< one point's after the other's
-  std::vector<double> common_squares;  ///< of the points that tell, px^2
+  std::vector<PoseFactor> factors;  ///< one point's after the other's
   double cost = 0.0;
 };
 
@@ -107,49 +106,52 @@ class Solver {
     return costOf(estimate, squares);
   }
 
-  /// Factor from the inverse of the last linearisation's normal equations, the sum of w J^T J, to a covariance. It is
-  /// that of an M-estimator with psi = w r (Huber, Robust Statistics, section 7.6) for isotropic residuals r of three
-  /// components and squares s: E[psi psi^T] / E[dpsi/dr]^2. The squares are smaller than the noise by the degrees of
-  /// freedom that poses and points take; a sighting counts as one by its weight.
-  double covarianceFactor() const {
-    double weight = 0.0, psi_square = 0.0;
-    int count = 0;
-    for (const double square : squares_) {
-      if (!std::isfinite(square)) continue;  // behind the camera
-      const double w = bend() / (bend() + square);
-      weight += w, psi_square += w * w * square, ++count;
-    }
-    const double slope = weight - 2.0 / 3.0 * psi_square / bend();
-    const double observed = 3.0 * weight, fitted = 3.0 * static_cast<double>(window_->points.size()) + 6.0 * poses_;
-    return psi_square / 3.0 * weight / (slope * slope) * observed / std::max(observed - fitted, 1.0);
-  }
-
   /// In the memory that the system has of an earlier linearisation.
   void linearise(const Estimate& estimate, double damping, ReducedSystem& system) {
-    const std::size_t points = estimate.points.size();
-    system.points.resize(points);
-    system.factors.resize(window_->observations.size());
-    system.common_squares.clear();
-    system.common_squares.reserve(points);
-    squares_.resize(window_->observations.size());
-    equations_.setZero(poses_);
-    const WindowProjection projection(window_->camera, estimate.calibration);
-    placeAnchors(estimate);
-    PoseFactor* factors = system.factors.data();
-    for (std::size_t p = 0; p < points; ++p) {
-      const int first = first_of_point_[p];
-      EliminatedPoint& point = system.points[p];
-      point = equations_.add(projection, sightedPoint(estimate, p), bend(), damping, factors, squares_.data() + first);
-      factors += point.factors;
-      if (const auto square = commonSquare(point))
-        system.common_squares.push_back(disparityVariance(first_of_point_[p + 1] - first) * *square);
-    }
+    eliminatePoints(estimate, {bend(), damping}, system);
     equations_.copyTo(system.hessian, system.gradient);
     const CalibrationBelief& prior = window_->calibration_prior;
     system.hessian.bottomRightCorner<kCalibration, kCalibration>() += prior.information;
     system.gradient.tail<kCalibration>() += prior.information * (prior.mean - estimate.calibration.value);
     if (window_->floor) holdToFloor(estimate, system);
     system.cost = costOf(estimate, squares_);
+  }
+
+  /// Squares (px^2) of the errors that all disparities of one point share, of the points that show them.
+  void findCommonSquares(const std::vector<EliminatedPoint>& points, std::vector<double>& squares) const {
+    squares.clear();
+    for (std::size_t p = 0; p < points.size(); ++p)
+      if (const auto square = commonSquare(points[p]))
+        squares.push_back(disparityVariance(first_of_point_[p + 1] - first_of_point_[p]) * *square);
+  }
+
+  /// Covariance of a minimum of robust costs (Huber, Robust Statistics, section 7.6): A^-1 B A^-1, A the cost's second
+  /// derivatives, B the sum of the gradients' products over what errs independently. Whole points do, not their
+  /// sightings (Liang and Zeger 1986): their disparities share errors. Of B only its size beside A is taken from the
+  /// gradients, since few points leave the rest to chance. What the poses took of the gradients is made up for by the
+  /// degrees of freedom. `columns`: unit vectors of what is asked for. The system was linearised before.
+  bool covariance(const Estimate& estimate, const Eigen::MatrixXd& columns, ReducedSystem& system,
+                  Eigen::LLT<Eigen::MatrixXd>& factor, Eigen::MatrixXd& covariance) {
+    const Eigen::MatrixXd known = knownInformation(estimate, system);
+    for (const bool is_exact : {true, false}) {  // all the second derivatives together may have no minimum
+      eliminatePoints(estimate, {bend(), 0.0, is_exact}, system);
+      equations_.copyTo(system.hessian, system.gradient);
+      system.hessian += known;
+      factor.compute(system.hessian);
+      if (factor.info() == Eigen::Success) break;
+    }
+    if (factor.info() != Eigen::Success) return false;
+    const Eigen::MatrixXd solved = factor.solve(columns);
+    const Eigen::MatrixXd of_known = solved.transpose() * known.selfadjointView<Eigen::Lower>() * solved;
+    const Eigen::MatrixXd of_points = columns.transpose() * solved - of_known;
+    covariance = errorsOverInformation(system, solved, of_points) * of_points + of_known;
+    return true;
+  }
+
+  /// Of the calibration before the window, where it is held for want of evidence, too.
+  RigCalibration::Matrix certainInformation() const {
+    const CalibrationBelief& prior = window_->calibration_prior;
+    return prior.certain_information.value_or(prior.information);
   }
 
   /// The estimate that is a step of poses and calibration away, and what the points make of it.
@@ -165,6 +167,53 @@ class Solver {
   }
 
  private:
+  /// Of the calibration and by the floor, without the points.
+  Eigen::MatrixXd knownInformation(const Estimate& estimate, ReducedSystem& system) const {
+    system.hessian.setZero();
+    system.hessian.bottomRightCorner<kCalibration, kCalibration>() = certainInformation();
+    if (window_->floor) holdToFloor(estimate, system);
+    return system.hessian;
+  }
+
+  /// Mean ratio of two covariances: by the gradients of single points, and as the second derivatives have it.
+  double errorsOverInformation(const ReducedSystem& system, const Eigen::MatrixXd& solved,
+                               const Eigen::MatrixXd& covariance) const {
+    Eigen::MatrixXd products = Eigen::MatrixXd::Zero(solved.cols(), solved.cols());
+    Eigen::VectorXd moved(solved.cols());
+    double freedom = 0.0;
+    const PoseFactor* sighting = system.factors.data();
+    for (const EliminatedPoint& point : system.points) {
+      if (point.factors == 0) continue;
+      moved.noalias() = solved.bottomRows<kCalibration>().transpose() * point.calibration_gradient;
+      for (const PoseFactor* end = sighting + point.factors; sighting != end; ++sighting) {
+        const auto of_pose = solved.middleRows<6>(6 * sighting->pose);
+        const Eigen::Map<const Eigen::Vector3d> t(sighting->gradient.translation), r(sighting->gradient.rotation);
+        moved.noalias() += of_pose.topRows<3>().transpose() * t;
+        moved.noalias() += of_pose.bottomRows<3>().transpose() * r;
+      }
+      products.selfadjointView<Eigen::Lower>().rankUpdate(moved);
+      freedom += 2.0 * point.sightings - 2.0;  // u, v and one disparity against a position
+    }
+    products = products.selfadjointView<Eigen::Lower>();
+    const double ratio = covariance.ldlt().solve(products).trace() / static_cast<double>(solved.cols());
+    return ratio * freedom / std::max(freedom - 6.0 * poses_, 1.0);
+  }
+
+  void eliminatePoints(const Estimate& estimate, const Linearisation& linearisation, ReducedSystem& system) {
+    system.points.resize(estimate.points.size());
+    system.factors.resize(window_->observations.size());
+    squares_.resize(window_->observations.size());
+    equations_.setZero(poses_);
+    const WindowProjection projection(window_->camera, estimate.calibration);
+    placeAnchors(estimate);
+    PoseFactor* factors = system.factors.data();
+    for (std::size_t p = 0; p < estimate.points.size(); ++p) {
+      equations_.add(projection, sightedPoint(estimate, p), linearisation, factors,
+                     squares_.data() + first_of_point_[p], system.points[p]);
+      factors += system.points[p].factors;
+    }
+  }
+
   /// T_camera_anchor_, anchor by anchor those of all poses.
   void placeAnchors(const Estimate& estimate) {
     T_camera_anchor_.clear();
@@ -258,7 +307,7 @@ struct WindowOptimizer::Memory {
   Eigen::MatrixXd hessian, units, covariance;
   Eigen::LLT<Eigen::MatrixXd> factor;
   Eigen::VectorXd step;
-  std::vector<double> squares;
+  std::vector<double> squares, common_squares;
   WindowSolution solution;
 };
 
@@ -277,7 +326,8 @@ const WindowSolution& WindowOptimizer::optimize(Window& window) {
 
 const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vector<int>& covariance_of) {
   constexpr double kUndamped = 1e-5, kLargestDamping = 1e4;
-  auto& [solver, system, estimate, next, hessian, units, covariance, factor, step, squares, solution] = *memory_;
+  auto& [solver, system, estimate, next, hessian, units, covariance, factor, step, squares, common_squares, solution] =
+      *memory_;
   solver.take(window, estimate);
   solution.success = false;
   solution.iterations = 0;
@@ -312,30 +362,28 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
 
   solver.give(estimate, window);
 
-  // Of the last linearisation, one step before the result: close enough for a covariance, and half of the work saved.
-  // But points held by damping would say too much.
+  // Of the last linearisation, one step before the result: half of the work saved. But points held by damping would
+  // say too much.
   if (damping_of_system > kUndamped) solver.linearise(estimate, kUndamped, system);
-  const CalibrationBelief& prior = window.calibration_prior;
-  const RigCalibration::Matrix certain = prior.certain_information.value_or(prior.information);
-  system.hessian.bottomRightCorner<kCalibration, kCalibration>() += certain - prior.information;
+  solver.findCommonSquares(system.points, common_squares);
+  solution.common_disparity_square = varianceOf(common_squares);
+  const RigCalibration::Matrix certain = solver.certainInformation();
+  system.hessian.bottomRightCorner<kCalibration, kCalibration>() += certain - window.calibration_prior.information;
   factor.compute(system.hessian);
   if (factor.info() != Eigen::Success) return solution;  // as when nothing holds one of the poses
+  units.setZero(solver.size(), kCalibration);
+  units.bottomRows<kCalibration>().setIdentity();
+  covariance = factor.solve(units);
+  solution.calibration_information = covariance.bottomRightCorner<kCalibration, kCalibration>().inverse() - certain;
+
   const int asked = static_cast<int>(covariance_of.size());
-  units.setZero(solver.size(), 6 * asked + kCalibration);
+  units.setZero(solver.size(), 6 * asked);
   for (int a = 0; a < asked; ++a)
     units.block<6, 6>(6 * (covariance_of[static_cast<std::size_t>(a)] - 1), 6 * a).setIdentity();
-  units.bottomRightCorner<kCalibration, kCalibration>().setIdentity();
-  covariance = factor.solve(units);
-  const double variance = solver.covarianceFactor();
-  solution.pose_covariance.resize(6 * asked, 6 * asked);
-  for (int a = 0; a < asked; ++a)
-    solution.pose_covariance.middleRows<6>(6 * a) =
-        variance * covariance.block(6 * (covariance_of[static_cast<std::size_t>(a)] - 1), 0, 6, 6 * asked);
-  solution.calibration_information = covariance.bottomRightCorner<kCalibration, kCalibration>().inverse() - certain;
+  if (!solver.covariance(estimate, units, system, factor, solution.pose_covariance)) return solution;
 
   if (!accepted) solver.cost(estimate, squares);  // those at hand belong to a refused step
   std::swap(solution.squares, squares);
-  solution.common_disparity_square = varianceOf(system.common_squares);
   solution.success = solution.pose_covariance.allFinite();
   return solution;
 }

@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "stereo_descriptor_vo/odometry/described_points.hpp"
-#include "stereo_descriptor_vo/odometry/motion_hypothesis.hpp"
+#include "stereo_descriptor_vo/odometry/motion_hypotheses.hpp"
 
 namespace sdvo {
 namespace {

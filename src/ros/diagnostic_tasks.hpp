@@ -4,6 +4,7 @@
 #include <ros/node_handle.h>
 #include <time.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdint>
 #include <deque>
@@ -95,6 +96,14 @@ class WorkLoad {
     const double begin_;
   };
 
+  /// Time that an item took while the thread had nothing to do but wait for `what`, s.
+  void noteWait(const std::string& what, double time) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    wait_ += time;
+    if (time > longest_wait_) awaited_ = what;
+    longest_wait_ = std::max(longest_wait_, time);
+  }
+
   /// Of items that were left out because the thread was busy, since the start.
   void noteDropped(std::uint64_t dropped) {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -111,7 +120,10 @@ class WorkLoad {
     status.addf("CPU time [ms a pair]", "%.2f", items_ > 0 ? 1e3 * time_ / items_ : 0.0);
     status.addf("CPU time [share of one processor]", "%.2f", load);
     status.add("dropped since the start", dropped_);
-    if (dropped > 0)
+    if (dropped > 0 && wait_ > time_)
+      status.summaryf(WallUpdater::Level::WARN, "%d pairs dropped in %.0f s, while it waited for %s",
+                      static_cast<int>(dropped), period, awaited_.c_str());
+    else if (dropped > 0)
       status.summaryf(WallUpdater::Level::WARN,
                       "too slow: %d pairs dropped in %.0f s; set fewer detector/max_features or a max_rate",
                       static_cast<int>(dropped), period);
@@ -121,7 +133,7 @@ class WorkLoad {
       status.summaryf(WallUpdater::Level::OK, "%.0f %% of one processor's time", 100.0 * load);
     last_ = now;
     reported_ = dropped_;
-    time_ = 0.0;
+    time_ = wait_ = longest_wait_ = 0.0;
     items_ = 0;
   }
 
@@ -143,7 +155,8 @@ class WorkLoad {
   std::mutex mutex_;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
   std::uint64_t dropped_ = 0, reported_ = 0;
-  double time_ = 0.0;  ///< s
+  double time_ = 0.0, wait_ = 0.0, longest_wait_ = 0.0;  ///< s
+  std::string awaited_;                                  ///< the longest
   int items_ = 0;
 };
 

@@ -34,6 +34,7 @@ void ImageDiagnostics::note(const StereoFeatures& features) {
   last_count_ = features.count();
   ++pairs_;
   refused_pairs_ += features.report.refused;
+  if (features.report.refused) refused_status_ = features.report.status;
 }
 
 void ImageDiagnostics::noteFailure(const std::string& why) {
@@ -74,7 +75,8 @@ void ImageDiagnostics::diagnoseSynchronisation(Status& status) {
 
 void ImageDiagnostics::diagnoseExposure(Status& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (isIdle(status) || !last_) return;
+  if (isIdle(status)) return;
+  if (!last_ || (pairs_ == 0 && !failure_.empty())) return status.summary(Level::OK, "no pair was used");
   const double left = last_->mean_intensity[0], right = last_->mean_intensity[1];
   status.addf("mean grey level", "%.1f left, %.1f right", left, right);
   status.addf("sharpness [grey levels a px]", "%.2f left, %.2f right", last_->sharpness[0], last_->sharpness[1]);
@@ -98,7 +100,7 @@ void ImageDiagnostics::diagnoseFeatures(Status& status) {
   if (!failure.empty())
     status.summary(Level::ERROR, failure);
   else if (refused > 0)
-    status.summary(Level::ERROR, "left and right are not a rectified pair: " + last_->status);
+    status.summary(Level::ERROR, "left and right are not a rectified pair: " + refused_status_);
   else if (last_ && last_->detected < thresholds_.min_corners)
     status.summaryf(Level::WARN, "only %d corners: little texture, darkness, or out of focus?", last_->detected);
   else if (last_ && !last_->status.empty())
@@ -107,10 +109,17 @@ void ImageDiagnostics::diagnoseFeatures(Status& status) {
     status.summaryf(Level::OK, "%d features", last_count_);
 }
 
+/// The image side may be told to leave pairs out; with a tenth to either side, as RateOptions.
+static RateOptions expectedRates(const ros::NodeHandle& nh, RateOptions rates) {
+  const double limit = nh.param("stereo_features/max_rate", 0.0);
+  if (limit > 0.0) rates.min_rate = std::min(rates.min_rate, 0.9 * limit);
+  return rates;
+}
+
 OdometryDiagnostics::OdometryDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const std::string& name,
                                          const OdometryOutputOptions& options)
     : max_latency_(options.max_latency),
-      input_("features", nh.resolveName("stereo_features"), options.max_silence, options.rates),
+      input_("features", nh.resolveName("stereo_features"), options.max_silence, expectedRates(nh, options.rates)),
       load_(options.max_load),
       updater_(nh, private_nh, name) {
   updater_.add("odometry", this, &OdometryDiagnostics::diagnose);
@@ -226,7 +235,7 @@ void PlaceDiagnostics::summarise(Status& status) const {
     status.summary(
         Level::WARN,
         "none of the places that were loaded has been recognised yet, so there is no map -> odom: drive where the "
-        "robot has been, or give a pose on /initialpose");
+        "robot has been, or give a pose on initialpose");
   else
     status.summary(Level::OK, last_ ? "recognising places" : "no key frame yet");
 }

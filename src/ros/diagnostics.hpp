@@ -49,7 +49,7 @@ class ImageDiagnostics {
   std::uint64_t refused_ = 0, out_of_order_ = 0, reported_ = 0;
   std::optional<ExtractionReport> last_;
   int last_count_ = 0;  ///< of features
-  std::string failure_;
+  std::string failure_, refused_status_;
   int pairs_ = 0, refused_pairs_ = 0;  ///< since the task was asked last
 
   WallUpdater updater_;

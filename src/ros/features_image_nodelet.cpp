@@ -8,6 +8,7 @@
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "camera_finder.hpp"
 #include "features_image.hpp"
 #include "image_conversions.hpp"
 #include "image_subscriber.hpp"
@@ -30,12 +31,14 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
   struct Inputs {
     explicit Inputs(FeaturesImageNodelet& nodelet)
         : synchroniser(kQueue, kTolerance, [&nodelet](const auto&... messages) { nodelet.draw(messages...); }) {
+      std::string ignored;
       ros::NodeHandle& nh = nodelet.nh_;
+      ros::NodeHandle image_nh = findOnlyStereoCamera(nh, ignored).value_or(nh);
       StereoImageTransport& transport = *nodelet.transport_;
       // Resolved, for a transport appends its own name to that of the topic.
-      left.subscribe(nh, nh.resolveName("left/image_rect"), kQueue, transport.left,
+      left.subscribe(image_nh, image_nh.resolveName("left/image_rect"), kQueue, transport.left,
                      [&nodelet](const Image::ConstPtr& m) { nodelet.take<0>(m); });
-      right.subscribe(nh, nh.resolveName("right/image_rect"), kQueue, transport.right,
+      right.subscribe(image_nh, image_nh.resolveName("right/image_rect"), kQueue, transport.right,
                       [&nodelet](const Image::ConstPtr& m) { nodelet.take<1>(m); });
       features = nh.subscribe<Features>("stereo_features", kQueue,
                                         [&nodelet](const Features::ConstPtr& m) { nodelet.take<2>(m); });

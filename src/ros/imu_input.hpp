@@ -10,7 +10,7 @@
 #include <optional>
 #include <string>
 
-#include "imu_tracks.hpp"
+#include "../common/imu_tracks.hpp"
 #include "transforms.hpp"
 
 namespace sdvo {

@@ -69,12 +69,11 @@ void OdometryPublisher::publishFlow(const OdometryResult& result, const StereoFe
   flow_publisher_.publish(message);
 }
 
-void OdometryPublisher::publishMap(const std::vector<Eigen::Vector3d>& points, const Eigen::Isometry3d& T_base_camera,
-                                   const ros::Time& stamp) {
-  const auto cloud = boost::make_shared<sensor_msgs::PointCloud2>(
-      ros_conversions::toPointCloud(points, T_odom_start_ * T_base_camera));
-  cloud->header.stamp = stamp;
-  cloud->header.frame_id = frames_.odom;
+void OdometryPublisher::publishMap(const std::vector<Eigen::Vector3d>& points, const Eigen::Isometry3d& T_origin_camera,
+                                   const std_msgs::Header& header) {
+  const auto cloud =
+      boost::make_shared<sensor_msgs::PointCloud2>(ros_conversions::toPointCloud(points, T_origin_camera.inverse()));
+  cloud->header = header;
   map_publisher_.publish(cloud);
 }
 

@@ -31,9 +31,10 @@ class OdometryPublisher {
   void publishPoints(const StereoFeaturesView& features);
   /// Whether somebody listens to map_points.
   bool wantsMap() const { return map_publisher_.getNumSubscribers() > 0; }
-  /// `points` in the odometry's origin, the first left camera.
-  void publishMap(const std::vector<Eigen::Vector3d>& points, const Eigen::Isometry3d& T_base_camera,
-                  const ros::Time& stamp);
+  /// `points` in the odometry's origin, the first left camera. They go out in the camera's frame of the header: far
+  /// from the origin of odom, as in UTM coordinates, their floats would have steps of half a metre.
+  void publishMap(const std::vector<Eigen::Vector3d>& points, const Eigen::Isometry3d& T_origin_camera,
+                  const std_msgs::Header& header);
   /// The odometry has been reset: the path begins anew, and the base is here in odom.
   void restart(const Eigen::Isometry3d& T_odom_start);
 

@@ -73,9 +73,11 @@ void OtherRobot::onAnswer(const PlaceMessage& answer) try {
   if (throttle_.allows(e.what())) places_.warn("key frame of " + answer.robot + " skipped: " + e.what());
 }
 
-void OtherRobot::onRequest(const msgs::PlaceRequest& request) {
+void OtherRobot::onRequest(const msgs::PlaceRequest& request) try {
   if (request.robot != robot_) return;
   if (const std::optional<PlaceMessage> place = places_.get(static_cast<int>(request.id))) answers_.publish(*place);
+} catch (const std::exception& e) {
+  if (throttle_.allows(e.what())) places_.warn("key frame " + std::to_string(request.id) + " is not sent: " + e.what());
 }
 
 }  // namespace sdvo

@@ -1,95 +1,14 @@
 #include "output_files.hpp"
 
-#include <fcntl.h>
-#include <sys/stat.h>
 #include <tf2_eigen/tf2_eigen.h>
-#include <unistd.h>
 
 #include <cerrno>
 #include <cstring>
-#include <filesystem>
 #include <fstream>
 #include <iomanip>
 #include <stdexcept>
-#include <system_error>
-
-namespace fs = std::filesystem;
 
 namespace sdvo {
-
-namespace {
-
-void check(bool succeeded) {
-  if (!succeeded) throw std::system_error(errno, std::generic_category());
-}
-
-/// Closed with its owner; synchronise() returns once the disk has what was written.
-class Descriptor {
- public:
-  explicit Descriptor(int file) : file_(file) { check(file >= 0); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() { ::close(file_); }
-  void synchronise() const { check(::fsync(file_) == 0 || errno == EINVAL); }  // EINVAL: a file system without it
-  void allow(mode_t mode) const { check(::fchmod(file_, mode) == 0); }
-
- private:
-  const int file_;
-};
-
-/// The file that `path` leads to, over links that may lead to nothing yet.
-fs::path followLinks(fs::path path) {
-  constexpr int kMostLinks = 40;  // the kernel's own limit
-  std::error_code ignored;
-  for (int links = 0; fs::is_symlink(path, ignored); ++links) {
-    if (links == kMostLinks) throw std::system_error(ELOOP, std::generic_category());
-    path = path.parent_path() / fs::read_symlink(path);
-  }
-  return path;
-}
-
-/// Of the file that is replaced, else as any program's new file.
-mode_t modeOf(const fs::path& path) {
-  static const mode_t mask = [] {
-    const mode_t found = ::umask(077);  // it can only be read by setting it
-    ::umask(found);
-    return found;
-  }();
-  struct stat status {};
-  return ::stat(path.c_str(), &status) == 0 ? status.st_mode & 07777 : 0666 & ~mask;
-}
-
-void replace(const fs::path& path, const std::function<void(const std::string& partial)>& write) {
-  std::string partial = path.string() + ".partial-XXXXXX";
-  const Descriptor file(::mkstemp(partial.data()));
-  try {
-    write(partial);
-    file.allow(modeOf(path));
-    file.synchronise();
-    fs::rename(partial, path);
-  } catch (...) {
-    std::error_code ignored;
-    fs::remove(partial, ignored);
-    throw;
-  }
-  Descriptor(::open(path.parent_path().c_str(), O_RDONLY | O_DIRECTORY)).synchronise();
-}
-
-}  // namespace
-
-void writeWhole(const std::string& path, const std::function<void(const std::string& partial)>& write) {
-  const auto fail = [&](const std::string& why) { throw std::runtime_error("'" + path + "': " + why); };
-  if (!fs::path(path).is_absolute()) fail("the path must be absolute");
-  std::error_code ignored;
-  if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored)) fail("it is no regular file");
-  try {
-    replace(followLinks(path), write);
-  } catch (const std::system_error& e) {
-    fail("cannot be written: " + e.code().message());
-  } catch (const std::exception& e) {
-    fail(std::string("cannot be written: ") + e.what());
-  }
-}
 
 namespace {
 

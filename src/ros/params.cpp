@@ -1,11 +1,14 @@
 #include "params.hpp"
 
 #include <dynamic_reconfigure/ConfigDescription.h>
+#include <ros/master.h>
 
 #include <algorithm>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
+
+#include "../common/text.hpp"
 
 namespace sdvo {
 namespace {
@@ -35,12 +38,46 @@ bool isOfImageTransport(const std::string& name) {
   return name == "image_transport" || beginsWith("left_image/") || beginsWith("right_image/");
 }
 
+void setParam(const ros::NodeHandle& nh, const Option& option) {
+  if (const auto* b = std::get_if<bool*>(&option.value))
+    nh.setParam(option.name, **b);
+  else if (const auto* number = std::get_if<int*>(&option.value))
+    nh.setParam(option.name, **number);
+  else if (const auto* d = std::get_if<double*>(&option.value))
+    nh.setParam(option.name, **d);
+  else
+    nh.setParam(option.name, option.text());
+}
+
+/// Whether a parameter beside our namespace was most likely meant for it: its block is called alike, or it ends as an
+/// option of a group does; and it is in no block of this package's nodelets and of no node that runs.
+bool isAstray(const std::string& name, const std::string& prefix, const std::vector<Option>& options) {
+  const std::size_t parent = prefix.rfind('/', prefix.size() - 2) + 1,
+                    end = std::min(name.find('/', parent), name.size());
+  if (name.compare(0, parent, prefix, 0, parent) != 0) return false;
+  for (const char* nodelet : {"/stereo_features/", "/visual_odometry/", "/place_recognition/"})
+    if (name.find(nodelet) != std::string::npos) return false;
+  const auto isMeant = [&](const Option& option) {
+    const std::string path = "/" + option.name;
+    return option.name.find('/') != std::string::npos && name.size() > path.size() &&
+           name.compare(name.size() - path.size(), path.size(), path) == 0;
+  };
+  if (!isAlike(name.substr(parent, end - parent), prefix.substr(parent)) &&
+      std::none_of(options.begin(), options.end(), isMeant))
+    return false;
+  ros::V_string nodes;
+  return !ros::master::getNodes(nodes) || std::count(nodes.begin(), nodes.end(), name.substr(0, end)) == 0;
+}
+
 }  // namespace
 
 std::vector<std::string> loadParams(const ros::NodeHandle& nh, std::vector<Option> options) {
   for (Option& option : options) {
     XmlRpc::XmlRpcValue value;
-    if (!nh.getParam(option.name, value)) continue;
+    if (!nh.getParam(option.name, value)) {
+      setParam(nh, option);
+      continue;
+    }
     try {
       assign(value, option);
       option.check();
@@ -53,7 +90,10 @@ std::vector<std::string> loadParams(const ros::NodeHandle& nh, std::vector<Optio
   nh.getParamNames(names);
   const std::string prefix = nh.getNamespace() + "/";
   for (const std::string& name : names) {
-    if (name.compare(0, prefix.size(), prefix) != 0) continue;
+    if (name.compare(0, prefix.size(), prefix) != 0) {
+      if (isAstray(name, prefix, options)) unknown.push_back(name);
+      continue;
+    }
     const std::string relative = name.substr(prefix.size());
     if (isOfImageTransport(relative)) continue;
     const bool known = std::any_of(options.begin(), options.end(), [&](const Option& o) { return o.name == relative; });
@@ -66,11 +106,24 @@ namespace {
 
 using dynamic_reconfigure::Config;
 
-dynamic_reconfigure::GroupState onlyGroup() {
-  dynamic_reconfigure::GroupState group;
-  group.name = "Default";
-  group.state = true;
-  return group;
+std::string groupOf(const Option& option) {
+  const std::size_t slash = option.name.rfind('/');
+  return slash == std::string::npos ? "Default" : option.name.substr(0, slash);
+}
+
+/// One of each component's options; the first, of those that are in none, is there always.
+std::vector<dynamic_reconfigure::GroupState> groupsOf(const std::vector<Option>& options) {
+  std::vector<dynamic_reconfigure::GroupState> groups;
+  const auto add = [&](const std::string& name) {
+    if (std::any_of(groups.begin(), groups.end(), [&](const auto& group) { return group.name == name; })) return;
+    groups.emplace_back();
+    groups.back().name = name;
+    groups.back().state = true;
+    groups.back().id = static_cast<int>(groups.size()) - 1;
+  };
+  add("Default");
+  for (const Option& option : options) add(groupOf(option));
+  return groups;
 }
 
 template <class Parameter, class Value>
@@ -133,23 +186,27 @@ std::string editMethod(const Option& option) {
 }  // namespace
 
 ReconfigureServer::ReconfigureServer(ros::NodeHandle private_nh, std::vector<Option> options,
-                                     std::function<void()> apply)
+                                     std::function<void()> apply, const std::vector<Option>& defaults)
     : nh_(std::move(private_nh)), options_(std::move(options)), apply_(std::move(apply)) {
   dynamic_reconfigure::ConfigDescription description;
-  dynamic_reconfigure::Group group;
-  group.name = "Default";
+  for (const dynamic_reconfigure::GroupState& state : groupsOf(options_)) {
+    description.groups.emplace_back();
+    description.groups.back().name = state.name;
+    description.groups.back().id = state.id;
+  }
   for (const Option& option : options_) {
     dynamic_reconfigure::ParamDescription parameter;
     parameter.name = option.name;
     parameter.type = typeName(option);
     parameter.description = option.meaning + (option.unit.empty() ? "" : " [" + option.unit + "]");
     parameter.edit_method = editMethod(option);
-    group.parameters.push_back(parameter);
-    add(description.dflt, option, option.text());
+    std::find_if(description.groups.begin(), description.groups.end(), [&](const auto& group) {
+      return group.name == groupOf(option);
+    })->parameters.push_back(parameter);
     addLimits(description.min, description.max, option);
   }
-  description.groups.push_back(group);
-  for (Config* config : {&description.dflt, &description.min, &description.max}) config->groups.push_back(onlyGroup());
+  for (const Option& option : defaults) add(description.dflt, option, option.text());
+  for (Config* config : {&description.dflt, &description.min, &description.max}) config->groups = groupsOf(options_);
 
   descriptions_ = nh_.advertise<dynamic_reconfigure::ConfigDescription>("parameter_descriptions", 1, true);
   updates_ = nh_.advertise<Config>("parameter_updates", 1, true);
@@ -177,18 +234,8 @@ bool ReconfigureServer::onRequest(dynamic_reconfigure::Reconfigure::Request& req
 
 /// On the parameter server, where a nodelet that is loaded again, and rosparam, find what is in use.
 void ReconfigureServer::keepChanges(const std::vector<std::string>& before) {
-  for (std::size_t i = 0; i < options_.size(); ++i) {
-    const Option& option = options_[i];
-    if (option.text() == before[i]) continue;
-    if (const auto* b = std::get_if<bool*>(&option.value))
-      nh_.setParam(option.name, **b);
-    else if (const auto* number = std::get_if<int*>(&option.value))
-      nh_.setParam(option.name, **number);
-    else if (const auto* d = std::get_if<double*>(&option.value))
-      nh_.setParam(option.name, **d);
-    else
-      nh_.setParam(option.name, option.text());
-  }
+  for (std::size_t i = 0; i < options_.size(); ++i)
+    if (options_[i].text() != before[i]) setParam(nh_, options_[i]);
 }
 
 void ReconfigureServer::assign(const Config& request) {
@@ -223,7 +270,7 @@ std::vector<std::string> ReconfigureServer::texts() const {
 Config ReconfigureServer::currentConfig() const {
   Config config;
   for (const Option& option : options_) add(config, option, option.text());
-  config.groups.push_back(onlyGroup());
+  config.groups = groupsOf(options_);
   return config;
 }
 

@@ -13,9 +13,10 @@
 
 namespace sdvo {
 
-/// Reads each option from the parameter of the same name in `nh`'s namespace; absent ones keep their value. Throws
-/// std::invalid_argument naming the parameter when one has the wrong type or is outside its range. Returns the
-/// parameters in that namespace that are no option: most likely spelling mistakes.
+/// Reads each option from the parameter of the same name in `nh`'s namespace; absent ones keep their value and are set,
+/// so that the server shows what is in use. Throws std::invalid_argument naming the parameter when one has the wrong
+/// type or is outside its range. Returns the parameters in that namespace that are no option, and options that stand
+/// beside it in no nodelet's namespace: most likely spelling mistakes.
 std::vector<std::string> loadParams(const ros::NodeHandle& nh, std::vector<Option> options);
 
 template <class Options>
@@ -30,8 +31,9 @@ class ReconfigureServer {
   /// `options` refer to values that must outlive the server and that only the server writes. `apply` runs in a ROS
   /// callback, never twice at a time, after values have changed. A request is taken over as a whole or not at all: when
   /// a name or a value is wrong, or `apply` throws, all values are as before and the response shows these.
-  /// What has changed is set on the parameter server, too.
-  ReconfigureServer(ros::NodeHandle private_nh, std::vector<Option> options, std::function<void()> apply);
+  /// What has changed is set on the parameter server, too. `defaults`: the same options of a struct left as it is.
+  ReconfigureServer(ros::NodeHandle private_nh, std::vector<Option> options, std::function<void()> apply,
+                    const std::vector<Option>& defaults);
 
  private:
   bool onRequest(dynamic_reconfigure::Reconfigure::Request& request,

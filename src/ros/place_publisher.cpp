@@ -70,7 +70,8 @@ void PlacePublisher::publishTransform() {
   transform_publisher_.send(transform);
 }
 
-void PlacePublisher::publishMap() {
+/// Of a timer, which an exception would end for good.
+void PlacePublisher::publishMap() try {
   const bool path_wanted = path_publisher_.getNumSubscribers() > 0;
   const bool loops_wanted = loops_publisher_.getNumSubscribers() > 0;
   const bool graph_wanted = graph_publisher_.getNumSubscribers() > 0;
@@ -92,6 +93,8 @@ void PlacePublisher::publishMap() {
         boost::make_shared<nav_msgs::Path>(ros_conversions::toPath(map.state, *map.T_base_camera, map_frame_)));
   else if (path_wanted)
     noteChange();
+} catch (const std::exception& e) {
+  ROS_ERROR_STREAM("the map of places is not published: " << e.what());
 }
 
 }  // namespace sdvo

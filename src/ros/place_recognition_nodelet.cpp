@@ -18,6 +18,7 @@
 #include <utility>
 #include <vector>
 
+#include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
 #include "diagnostics.hpp"
 #include "frames.hpp"
@@ -81,7 +82,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     if (output.opencv_threads >= 0) cv::setNumThreads(output.opencv_threads);
     robot_ = output.robot_name.empty() ? nh_.getNamespace() : output.robot_name;
     session_ = std::make_shared<PlaceSession>(options_.recognition);
-    if (!output.places_file.empty()) begin();
+    if (!output.places_file.empty()) begin(output.places_file);
 
     transforms_ = std::make_unique<RobotTransforms>(nh_, std::nullopt, [this](const std::string& what) {
       if (throttle_.allows(what)) NODELET_WARN_STREAM(what);
@@ -106,8 +107,11 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
             NODELET_ERROR_STREAM(topic << ": message at " << stamp << " skipped: " << why);
         });
     diagnostics_ = std::make_unique<PlaceDiagnostics>(nh_, private_nh, getName(), input_->topics(), output.max_silence);
-    initial_pose_subscriber_ = nh_.subscribe<geometry_msgs::PoseWithCovarianceStamped>(
-        "/initialpose", 1, [this](const geometry_msgs::PoseWithCovarianceStamped::ConstPtr& m) { onInitialPose(*m); });
+    // Ours, and the robot's: that of an rviz beside the camera's namespace.
+    for (const std::string& topic :
+         {std::string("initialpose"), ros::names::parentNamespace(nh_.getNamespace()) + "/initialpose"})
+      initial_pose_subscribers_.push_back(nh_.subscribe<geometry_msgs::PoseWithCovarianceStamped>(
+          topic, 1, [this](const geometry_msgs::PoseWithCovarianceStamped::ConstPtr& m) { onInitialPose(*m); }));
     callbacks_.start();
     slow_callbacks_.start();
   } catch (const std::exception& e) {
@@ -116,9 +120,9 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   }
 
   /// With the places of the parameter's file. On a robot's first day there is none.
-  void begin() {
-    const std::string& path = options_.output.places_file;
-    if (!std::filesystem::exists(path)) {
+  void begin(const std::string& path) {
+    map_file_ = path;
+    if (std::filesystem::path(path).is_absolute() && !std::filesystem::exists(path)) {
       NODELET_WARN_STREAM("places_file '" << path
                                           << "' does not exist: begins without places, save_places writes such a file");
       return;
@@ -133,7 +137,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     const std::lock_guard<std::mutex> lock(mutex_);
     session_->expect(message, ros_conversions::cleanFrameId(options_.output.map_frame_id));
   } catch (const std::exception& e) {
-    NODELET_WARN_STREAM("the pose on " << initial_pose_subscriber_.getTopic() << " is not used: " << e.what());
+    NODELET_WARN_STREAM("the pose on initialpose is not used: " << e.what());
   }
 
   void onPair(const OdometryPair& pair) {
@@ -155,7 +159,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     if (arrived.generation != generation_) return;
     const PlaceSession::Time time = session_->noteTime(stamp, ros::Time::now(), ros::Time::isSimTime());
     if (time == PlaceSession::Time::kStands) return;
-    if (time == PlaceSession::Time::kBeganAnew) restart("the clock jumped back");
+    if (time == PlaceSession::Time::kBeganAnew) restart("the clock jumped back", map_file_);
     if (time == PlaceSession::Time::kFell)
       NODELET_WARN_STREAM("the stamps of the features jumped back to "
                           << stamp << " (camera driver restarted?): the places stay, the motion in between is unknown");
@@ -210,9 +214,12 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     diagnostics_->note(info);
   }
 
-  void restart(const char* why) {
-    NODELET_WARN_STREAM(why << ": " << session_->recognition().places().size() << " places are forgotten");
-    replace(std::make_shared<PlaceSession>(options_.recognition));
+  /// With the places of `file` alone; empty: with none.
+  void restart(const char* why, const std::string& file) {
+    NODELET_WARN_STREAM(why << ": " << session_->recognition().places().size() << " places are forgotten"
+                            << (file.empty() ? "" : ", but for those of '" + file + "'"));
+    map_file_ = file;
+    replace(std::filesystem::exists(file) ? load(file) : std::make_shared<PlaceSession>(options_.recognition));
   }
 
   void replace(std::shared_ptr<PlaceSession> session) {
@@ -272,7 +279,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   bool onReset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++generation_;
-    restart("reset was called");
+    restart("reset was called", "");
     return true;
   }
 
@@ -322,6 +329,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
                        std::to_string(session_->recognition().places().size()) + " of before are forgotten";
     ++generation_;
     replace(std::move(loaded));
+    map_file_ = request.path;
     response.success = true;
     return true;
   } catch (const std::exception& e) {
@@ -335,7 +343,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   }
 
   bool onGetPlace(stereo_descriptor_vo::GetPlace::Request& request,
-                  stereo_descriptor_vo::GetPlace::Response& response) {
+                  stereo_descriptor_vo::GetPlace::Response& response) try {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (const auto place = session_->message(static_cast<int>(request.id), robot_)) {
       response.place = *place;
@@ -343,6 +351,9 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     } else {
       response.message = "there is no place " + std::to_string(request.id);
     }
+    return true;
+  } catch (const std::exception& e) {
+    response.message = e.what();
     return true;
   }
 
@@ -359,6 +370,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   std::mutex mutex_;
   std::shared_ptr<PlaceSession> session_;  // and all in it: under mutex_
+  std::string map_file_;                   // that its first places are from; empty: none
   bool was_located_ = false;               // … and map -> odom is published since then
   std::atomic<int> generation_{0};         // sessions that a service began
   // Only the observer's thread touches these.
@@ -371,7 +383,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   // Only the callbacks' thread touches these.
   std::unique_ptr<OdometryPairInput> input_;
-  ros::Subscriber initial_pose_subscriber_;
+  std::vector<ros::Subscriber> initial_pose_subscribers_;
 };
 
 }  // namespace sdvo

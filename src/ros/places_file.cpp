@@ -5,15 +5,13 @@
 
 #include <boost/interprocess/file_mapping.hpp>
 #include <boost/interprocess/mapped_region.hpp>
-#include <cstring>
 #include <filesystem>
-#include <functional>
-#include <map>
 #include <optional>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
 
+#include "../common/bag_records.hpp"
 #include "output_files.hpp"
 
 namespace sdvo {
@@ -24,55 +22,11 @@ namespace msgs = stereo_descriptor_vo;
 constexpr const char* kPlaceTopic = "place";
 constexpr const char* kGraphTopic = "map_graph";
 
-// A bag of version 2.0, read in the order of its bytes. rosbag's own reader trusts every length, count and offset that
-// a file announces: it allocates as much, or reads beyond what it holds.
-
-using Bytes = std::string_view;
-using Fields = std::map<Bytes, Bytes>;
-
-/// The next bytes, as many as the length before them (little endian) says.
-Bytes take(Bytes& from) {
-  std::uint32_t length = 0;
-  if (from.size() >= sizeof length) std::memcpy(&length, from.data(), sizeof length);
-  if (from.size() < sizeof length + length) throw std::invalid_argument("it ends early, or a length in it is wrong");
-  const Bytes taken = from.substr(sizeof length, length);
-  from.remove_prefix(sizeof length + length);
-  return taken;
-}
-
-Fields takeFields(Bytes header) {
-  Fields fields;
-  while (!header.empty()) {
-    const Bytes field = take(header);
-    fields[field.substr(0, field.find('='))] = field.substr(std::min(field.size(), field.find('=') + 1));
-  }
-  return fields;
-}
-
-struct BagMessage {
-  Fields connection;  ///< topic, type, md5sum
-  Bytes data;
-};
-
-void readRecords(Bytes records, bool in_chunk, std::map<Bytes, Fields>& connections,
-                 const std::function<void(const BagMessage&)>& use) {
-  constexpr Bytes kMessage = "\x02", kChunk = "\x05", kConnection = "\x07";
-  while (!records.empty()) {
-    Fields header = takeFields(take(records));
-    const Bytes data = take(records), kind = header["op"];
-    if (kind == kChunk && (in_chunk || header["compression"] != "none"))
-      throw std::invalid_argument("its chunks are compressed: `rosbag decompress` makes a file that can be read");
-    if (kind == kChunk) readRecords(data, true, connections, use);
-    if (kind == kConnection) (connections[header["conn"]] = takeFields(data))["topic"] = header["topic"];
-    if (kind == kMessage) use({connections[header["conn"]], data});
-  }
-}
-
 /// Refuses an array longer than the rest of its message; ROS' own stream makes room for it before it looks.
 struct CheckedStream : ros::serialization::Stream {
   static const ros::serialization::StreamType stream_type = ros::serialization::stream_types::Input;
 
-  explicit CheckedStream(Bytes bytes)
+  explicit CheckedStream(std::string_view bytes)
       : Stream(reinterpret_cast<std::uint8_t*>(const_cast<char*>(bytes.data())),
                static_cast<std::uint32_t>(bytes.size())) {}
 
@@ -95,7 +49,7 @@ struct CheckedStream : ros::serialization::Stream {
 /// Throws std::invalid_argument for a message of another definition.
 template <class Message>
 Message parse(BagMessage in_bag) {
-  Fields& connection = in_bag.connection;
+  auto& connection = in_bag.connection;
   if (connection["md5sum"] != ros::message_traits::md5sum<Message>())
     throw std::invalid_argument("its messages on " + std::string(connection["topic"]) +
                                 " are of another type or version of this package (" + std::string(connection["type"]) +
@@ -107,17 +61,13 @@ Message parse(BagMessage in_bag) {
 
 SavedPlaces read(const std::string& path, const PoseGraphOptions& options) {
   namespace ipc = boost::interprocess;
-  constexpr Bytes kMagic = "#ROSBAG V2.0\n";
-  if (std::filesystem::file_size(path) < kMagic.size()) throw std::invalid_argument("it is no bag");
+  if (std::filesystem::is_empty(path)) throw std::invalid_argument("it is empty");
   const ipc::mapped_region region(ipc::file_mapping(path.c_str(), ipc::read_only), ipc::read_only);
-  const Bytes bytes(static_cast<const char*>(region.get_address()), region.get_size());
-  if (bytes.substr(0, kMagic.size()) != kMagic) throw std::invalid_argument("it is no bag of version 2.0");
   std::vector<Place> places;
   std::optional<PoseGraph> graph;
   std::optional<ros_conversions::FeatureStream> stream;
-  std::map<Bytes, Fields> connections;
-  readRecords(bytes.substr(kMagic.size()), false, connections, [&](BagMessage message) {
-    const Bytes topic = message.connection["topic"];
+  readBag({static_cast<const char*>(region.get_address()), region.get_size()}, [&](BagMessage message) {
+    const std::string_view topic = message.connection["topic"];
     if (topic == kPlaceTopic) {
       const auto place = parse<msgs::Place>(message);
       places.push_back(ros_conversions::fromMessage(place));

@@ -3,11 +3,7 @@
 #include <ros/time.h>
 
 #include <cstdint>
-#include <cstdlib>
-#include <optional>
 #include <string>
-#include <utility>
-#include <vector>
 
 namespace sdvo {
 
@@ -28,88 +24,5 @@ inline std::string whyUnusable(const ros::Time& stamp) {
   if (stamp.sec >= (1u << 31)) return "stamp of " + std::to_string(stamp.sec) + " s lies beyond what ROS can compare";
   return "";
 }
-
-/// Keeps a stream of stamped items in order. What is late by less than a second was overtaken and is dropped. A jump,
-/// to either side, is believed at once when the clock made it too (a bag started again, a camera paused) or the source
-/// announced it; else the item is held back until the next one tells: that one goes on from the item, or from before
-/// it, in which case the item was an outlier and is dropped. Stamps and times in ns.
-template <class Item>
-class StampFilter {
- public:
-  struct Passed {
-    Item item;
-    int source_restarts;  ///< one more after every jump back that the clock did not make: a driver that restarts
-    int clock_steps;      ///< one more after every jump back that the clock made, too
-  };
-
-  /// `now` is the clock's time at the item's arrival. Returns what may be processed, in order: usually the item itself.
-  std::vector<Passed> add(Item item, std::int64_t stamp, std::int64_t now, bool announced = false) {
-    const Arrival arrival{stamp, now};
-    // Nothing orders the clock and the items: either may jump first.
-    clock_fell_ |= last_now_ && now < *last_now_;
-    last_now_ = now;
-    if (!last_) return {pass(std::move(item), arrival)};
-    const std::int64_t step = stamp - last_->stamp;
-    if (step > 0 && step <= kJump) {
-      dropHeld();
-      return {pass(std::move(item), arrival)};
-    }
-    if (held_ && goesOn(held_->second, arrival)) {
-      std::vector<Passed> both;
-      both.push_back(pass(std::move(held_->first), held_->second));
-      held_.reset();
-      both.push_back(pass(std::move(item), arrival));
-      return both;
-    }
-    const bool clock_jumped_back = step <= 0 && now < last_->now;
-    if (announced || ((clock_jumped_back || std::llabs(step) >= kJump) && movedWithClock(*last_, arrival))) {
-      dropHeld();
-      return {pass(std::move(item), arrival)};
-    }
-    if (step <= 0 && step > -kJump) {
-      ++dropped_;
-      return {};
-    }
-    dropHeld();
-    held_.emplace(std::move(item), arrival);
-    return {};
-  }
-
-  /// Late items and outliers so far.
-  std::uint64_t dropped() const { return dropped_; }
-
- private:
-  struct Arrival {
-    std::int64_t stamp, now;
-  };
-
-  static constexpr std::int64_t kJump = 1000000000;
-
-  static bool movedWithClock(const Arrival& from, const Arrival& to) {
-    return std::llabs((to.stamp - from.stamp) - (to.now - from.now)) < kJump;
-  }
-
-  static bool goesOn(const Arrival& from, const Arrival& to) {
-    return to.stamp > from.stamp && (to.stamp - from.stamp <= kJump || movedWithClock(from, to));
-  }
-
-  Passed pass(Item item, const Arrival& arrival) {
-    if (last_ && arrival.stamp <= last_->stamp) ++(std::exchange(clock_fell_, false) ? clock_steps_ : source_restarts_);
-    last_ = arrival;
-    return {std::move(item), source_restarts_, clock_steps_};
-  }
-
-  void dropHeld() {
-    if (held_) ++dropped_;
-    held_.reset();
-  }
-
-  std::optional<Arrival> last_;
-  std::optional<std::pair<Item, Arrival>> held_;
-  std::optional<std::int64_t> last_now_;
-  bool clock_fell_ = false;  ///< since the stamps did
-  int source_restarts_ = 0, clock_steps_ = 0;
-  std::uint64_t dropped_ = 0;
-};
 
 }  // namespace sdvo

@@ -10,8 +10,11 @@
 #include <stdexcept>
 #include <utility>
 
+#include "../common/stamp_filter.hpp"
+#include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
 #include "camera_conversions.hpp"
+#include "camera_finder.hpp"
 #include "diagnostics.hpp"
 #include "feature_conversions.hpp"
 #include "frames.hpp"
@@ -67,7 +70,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   using PairFilter = StampFilter<StereoPairMessages>;
 
   void onInit() override try {
-    nh_ = callbacks_.serve(getNodeHandle());
+    nh_ = image_nh_ = callbacks_.serve(getNodeHandle());
     ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
     ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
@@ -87,9 +90,12 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
       if (!silence.empty()) NODELET_WARN_STREAM(silence);
     });
 
+    FeatureExtractorOptions defaults;
+    camera_timer_ = nh_.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { findCamera(); });
+
     reconfigured_ = options_.extractor;
-    reconfigure_server_ =
-        std::make_unique<ReconfigureServer>(slow_nh, listOptions(reconfigured_), [this] { onReconfigure(); });
+    reconfigure_server_ = std::make_unique<ReconfigureServer>(
+        slow_nh, listOptions(reconfigured_), [this] { onReconfigure(); }, listOptions(defaults));
 
     // Called once the callbacks' thread has started, when publisher_ is there.
     const ros::SubscriberStatusCallback on_connect = [this](const ros::SingleSubscriberPublisher&) { updateInput(); };
@@ -102,6 +108,24 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     throw;  // the manager forgets the nodelet, and its loader ends with an error
   }
 
+  /// Takes the names of the only stereo camera in the namespace while nobody publishes images under ours.
+  void findCamera() {
+    if (!input_ || has_pairs_) return;
+    std::string problem;
+    const std::optional<ros::NodeHandle> camera = findOnlyStereoCamera(image_nh_, problem);
+    if (!problem.empty() && throttle_.allows("cameras"))
+      NODELET_WARN_STREAM("nobody publishes " << nh_.resolveName("left/image_rect") << ", and there are " << problem
+                                              << ": set the topics of one of them, see stereo_vo.launch");
+    if (!camera) return;
+    image_nh_ = *camera;
+    NODELET_WARN_STREAM("nobody publishes " << nh_.resolveName("left/image_rect") << ": the only stereo camera in "
+                                            << nh_.getNamespace() << " is taken, with "
+                                            << image_nh_.resolveName("left/image_rect") << " and "
+                                            << image_nh_.resolveName("right/image_rect"));
+    input_.reset();
+    updateInput();
+  }
+
   void updateInput() try {
     if (publisher_.getNumSubscribers() == 0) {
       input_.reset();
@@ -109,7 +133,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
       diagnostics_->input().noteIdle(kNobodyListens);
     } else if (!input_) {
       input_ = std::make_unique<StereoInput>(
-          nh_, *transport_, options_.input, [this](const StereoPairMessages& pair) { onPair(pair); },
+          image_nh_, *transport_, options_.input, [this](const StereoPairMessages& pair) { onPair(pair); },
           [this](const std::string& topic, const std::string& why) { onRefusal(topic, why); });
       mask_subscriber_ =
           nh_.subscribe<sensor_msgs::Image>("left/mask", 1, [this](const sensor_msgs::ImageConstPtr& m) { onMask(m); });
@@ -120,7 +144,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   }
 
   void onRefusal(const std::string& topic, const std::string& why) {
-    if (topic == nh_.resolveName("left/image_rect")) ++refused_;
+    if (topic == image_nh_.resolveName("left/image_rect")) ++refused_;
     if (throttle_.allows(topic)) NODELET_ERROR_STREAM(topic << ": a message is not used: " << why);
   }
 
@@ -140,6 +164,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
 
   void onPair(const StereoPairMessages& pair) {
     const ros::Time stamp = pair.left_image->header.stamp;
+    has_pairs_ = true;
     diagnostics_->notePair(std::abs(secondsBetween(stamp, pair.right_image->header.stamp)));
     const std::uint64_t dropped = filter_.dropped();
     for (PairFilter::Passed& passed : filter_.add(pair, nanoseconds(stamp), nanoseconds(ros::Time::now())))
@@ -239,12 +264,13 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   static constexpr const char* kNobodyListens = "nobody listens to stereo_features";
 
   CallbackThread callbacks_, slow_callbacks_;  // the second one of what takes its time
-  ros::NodeHandle nh_;
+  ros::NodeHandle nh_, image_nh_;              // the second one with the camera's names
   Options options_;
   FeatureExtractorOptions reconfigured_;  // the server's
   ReportThrottle throttle_;
   ros::Publisher publisher_;
-  ros::WallTimer silence_timer_;
+  ros::WallTimer silence_timer_, camera_timer_;
+  std::atomic<bool> has_pairs_{false};
   std::unique_ptr<ImageDiagnostics> diagnostics_;
 
   std::mutex pending_mutex_;

@@ -72,8 +72,12 @@ void RobotTransforms::watch(const geometry_msgs::TransformStamped& transform, co
   if (!watched_.insert(publisher + " " + parent + " " + child).second) return;
   const std::string contention = "TF: " + publisher + " publishes " + parent + " -> " + child + ", " + us +
                                  " publishes " + ours_->odom + " -> " + ours_->base;
-  if (child == ours_->base)
+  if (child == ours_->base && parent == ours_->odom)
     warn_(contention + ": frame '" + child + "' jumps between the two; set publish_tf to false in one of them");
+  else if (child == ours_->base)
+    warn_(contention + ": '" + child + "' has a parent already, '" + parent +
+          "'. If that is a part of the robot, set " + "base_frame_id:=" + parent +
+          " (or invert_tf), else set publish_tf to false in one of them");
   else if ((child == ours_->odom || hasAncestor(ours_->odom, child)) &&
            (parent == ours_->base || hasAncestor(parent, ours_->base)))
     warn_(contention + ": a cycle; nothing can be looked up on TF. Swap frames, or set publish_tf to false here");

@@ -18,12 +18,14 @@
 #include <utility>
 #include <vector>
 
+#include "../common/imu_tracks.hpp"
+#include "../common/stamp_filter.hpp"
+#include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
 #include "diagnostics.hpp"
 #include "feature_conversions.hpp"
 #include "frames.hpp"
 #include "imu_input.hpp"
-#include "imu_tracks.hpp"
 #include "odometry_publisher.hpp"
 #include "output_files.hpp"
 #include "params.hpp"
@@ -103,9 +105,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
           if (!problem.empty()) NODELET_ERROR_STREAM("set_pose: " << problem);
         });
 
+    VisualOdometryOptions defaults;
     reconfigured_ = options_.odometry;
-    reconfigure_server_ =
-        std::make_unique<ReconfigureServer>(slow_nh, listOptions(reconfigured_), [this] { onReconfigure(); });
+    reconfigure_server_ = std::make_unique<ReconfigureServer>(
+        slow_nh, listOptions(reconfigured_), [this] { onReconfigure(); }, listOptions(defaults));
 
     if (options_.output.use_imu)
       imu_ = std::make_unique<ImuInput>(nh_, *transforms_, [this](const std::string& what) { warn(what); });
@@ -187,23 +190,33 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
 
   /// In the worker's thread.
   void process(const FeaturesFilter::Passed& passed) try {
-    const FeaturesMessage& message = *passed.item.message;
     const std::lock_guard<std::mutex> lock(work_mutex_);
     if (passed.item.starts != starts_) return;
     const WorkLoad::Item work(diagnostics_->load());
+    publishInfo(estimate(passed), *passed.item.message);
+  } catch (const std::exception& e) {
+    NODELET_ERROR_STREAM("features at " << passed.item.message->header.stamp << ": no vo_info: " << e.what());
+  }
+
+  /// What there is to publish, but for vo_info, is.
+  OdometryResult estimate(const FeaturesFilter::Passed& passed) try {
+    const FeaturesMessage& message = *passed.item.message;
     takeOverOptions();
     noteJumps(passed);
     if (resumes_.take(passed.item.resumes)) odometry_->breakStream();
     const StereoFeatures features = ros_conversions::fromMessage(passed.item.view);
+    const double begin = steadyTime();
     std::string problem = findExtrinsic(ros_conversions::cleanFrameId(message.header.frame_id));
+    diagnostics_->load().noteWait("the transform base <- camera", steadyTime() - begin);
     if (problem.empty() && to_be_levelled_ && !given_start_) problem = level();
     const OdometryResult result = problem.empty() ? track(features, message) : waitFor(problem);
     publisher_->publishPoints(passed.item.view);
     publisher_->publishFlow(result, features, message.header);
-    publishInfo(result, message);
+    return result;
   } catch (const std::exception& e) {
     if (throttle_.allows(e.what()))
       NODELET_ERROR_STREAM("features at " << passed.item.message->header.stamp << " skipped: " << e.what());
+    return waitFor(std::string("features skipped: ") + e.what());
   }
 
   /// Only simulated time that jumps back, as when a bag is played again, begins anew. A driver that restarts and a
@@ -237,8 +250,14 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     report(result, message.header.stamp);
     publisher_->publish(result, *mount_->last());
     if (publisher_->wantsMap() && result.has_pose)
-      publisher_->publishMap(odometry_->mapPoints(), *mount_->last(), message.header.stamp);
+      publisher_->publishMap(odometry_->mapPoints(), result.T_origin_camera, cleanHeader(message));
     return result;
+  }
+
+  static std_msgs::Header cleanHeader(const FeaturesMessage& message) {
+    std_msgs::Header header = message.header;
+    header.frame_id = ros_conversions::cleanFrameId(header.frame_id);
+    return header;
   }
 
   OdometryResult waitFor(const std::string& what) const {
@@ -294,6 +313,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
       ros::WallDuration(0.002).sleep();
     }
     patience_.note(guess.has_value(), now);
+    diagnostics_->load().noteWait("the guess of the motion", steadyTime() - now);
     if (!guess && throttle_.allows("guess"))
       NODELET_WARN_STREAM("no guess of the motion until " << header.stamp << ", going on without: " << problem);
     return guess;

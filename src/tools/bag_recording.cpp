@@ -9,6 +9,7 @@
 #include <set>
 #include <stdexcept>
 
+#include "../common/stamp_filter.hpp"
 #include "../ros/pair_decoder.hpp"
 #include "../ros/stamps.hpp"
 

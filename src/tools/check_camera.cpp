@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "../check/check_page.hpp"
-#include "../ros/threads.hpp"
+#include "../common/worker.hpp"
 #include "camera_check.hpp"
 #include "camera_input.hpp"
 #include "run_tool.hpp"

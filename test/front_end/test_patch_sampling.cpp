@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/front_end/patch_sampling.hpp"
 
 namespace sdvo {
@@ -63,6 +64,24 @@ TEST(SamplePatch, SlantShiftsRowsFromTheCentre) {
   expectSampled(12.f, 9.f, 1.f, 2, 5);  // by whole pixels
   expectSampled(12.3f, 9.6f, 0.3f, 3, 8);
   expectSampled(12.3f, 9.6f, -0.7f, 3, 8);
+}
+
+TEST(SamplePatch, IsTheSameToTheBitWithAndWithoutVectors) {
+  if (!usesVectorKernels()) GTEST_SKIP() << "this processor has neither AVX2 nor NEON";
+  cv::Mat image(120, 150, CV_8U);
+  cv::RNG(5).fill(image, cv::RNG::UNIFORM, 0, 256);
+  cv::RNG random(7);
+  constexpr int kBorder = 50;
+  for (int trial = 0; trial < 500; ++trial) {
+    const float x = random.uniform(0.f, 49.f), y = random.uniform(0.f, 19.f), slant = random.uniform(-0.8f, 0.8f);
+    const int radius = 1 + trial % 20, columns = 2 * radius + 1 + trial % 7;
+    std::vector<float> fast(static_cast<std::size_t>((2 * radius + 1) * columns)), plain = fast;
+    samplePatch(image, kBorder, x, y, slant, radius, columns, fast.data());
+    allowVectorKernels(false);
+    samplePatch(image, kBorder, x, y, slant, radius, columns, plain.data());
+    allowVectorKernels(true);
+    ASSERT_EQ(fast, plain) << "radius " << radius << ", " << columns << " columns";
+  }
 }
 
 TEST(PatchStride, IsTheSideRoundedUpToWholeRegisters) {

@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <memory>
 #include <random>
 
 #include "../synthetic_scene.hpp"
@@ -44,26 +43,28 @@ constexpr std::int64_t kPeriod = 100000000;  // ns
 class MotionSearchTest : public ::testing::Test {
  protected:
   /// The pair's motion since the map's newest pair; `expected` is how far along x the camera is expected to go.
-  MotionHypothesis find(const StereoFeatures& features, std::optional<double> expected, bool contested = false) const {
-    MotionScene scene{map_, calibration_, features, std::nullopt, std::nullopt, contested, 0.0, {}};
-    if (expected) {
-      scene.T_current_reference = Eigen::Isometry3d(Eigen::Translation3d(-*expected, 0.0, 0.0));
-      scene.velocity = Vector6d::Zero();
-      (*scene.velocity)[0] = *expected / 0.1;
-    }
-    return search_.find(scene);
+  MotionHypothesis find(const StereoFeatures& features, std::optional<double> expected, bool is_doubted = false) const {
+    return search_.find(sceneOf(features, expected, expected, is_doubted), kLargestDoubt);
   }
 
-  /// Where no velocity tells that the camera cannot have been that fast.
+  /// Where no prior tells that the camera cannot have been that fast.
   MotionHypothesis findAround(const StereoFeatures& features, double expected) const {
-    return search_.find({map_,
-                         calibration_,
-                         features,
-                         Eigen::Isometry3d(Eigen::Translation3d(-expected, 0.0, 0.0)),
-                         std::nullopt,
-                         false,
-                         0.0,
-                         {}});
+    return search_.find(sceneOf(features, expected, std::nullopt, false), kLargestDoubt);
+  }
+
+  MotionScene sceneOf(const StereoFeatures& features, std::optional<double> expected, std::optional<double> prior,
+                      bool is_doubted) const {
+    MotionScene scene{map_, calibration_, features, {}, {}, {}};
+    scene.is_doubted = is_doubted;
+    if (expected) scene.T_current_reference = Eigen::Isometry3d(Eigen::Translation3d(-*expected, 0.0, 0.0));
+    if (prior)
+      scene.prior.push_back(MotionPrior({}).around(Eigen::Isometry3d(Eigen::Translation3d(*prior, 0.0, 0.0)), 0.1));
+    return scene;
+  }
+
+  /// Log-odds of being misled by a pair that was found so.
+  double doubtOf(const StereoFeatures& features, const MotionHypothesis& found, double prior) const {
+    return logOddsMisled(sceneOf(features, {}, prior, false), found);
   }
 
   void begin(const StereoFeatures& features) {
@@ -90,18 +91,19 @@ class MotionSearchTest : public ::testing::Test {
   Street street_;
   LocalMap map_{LocalMapOptions()};
   RigCalibration calibration_;
-  MotionSearch search_{{}, {}, {}, {}};
+  MotionSearch search_{{}, {}, {}};
+  const double kLargestDoubt = logOdds(0.05);
   int pairs_ = 0;
 };
 
 TEST_F(MotionSearchTest, TakesASoundMotionThatWasExpected) {
   start(2);
   const MotionHypothesis found = find(street_.see(0.1, 0.0, stamp(), true, false), 0.1);
-  EXPECT_EQ(found.verdict.trust, Trust::kSound) << found.verdict.reason;
-  EXPECT_FALSE(found.contested);
+  ASSERT_TRUE(found.motion.success) << found.motion.reason;
+  EXPECT_EQ(found.probability, 1.0);
   EXPECT_NEAR(moved(found), 0.1, 1e-3);
-  EXPECT_NEAR(found.evidence.dt, 0.1, 1e-12);
-  EXPECT_EQ(found.evidence.inliers, static_cast<int>(found.motion.inliers.size()));
+  EXPECT_LT(found.innovation, 1.0);
+  EXPECT_EQ(found.agreement.inliers, static_cast<int>(found.motion.inliers.size()));
   EXPECT_EQ(found.sightings.size(), found.motion.inliers.size());
 }
 
@@ -110,7 +112,7 @@ TEST_F(MotionSearchTest, AWrongExpectationIsOneHypothesisAmongOthers) {
   // Points 5 m away were expected 120 px beside where they are, beyond the gate.
   const MotionHypothesis found = find(street_.see(0.1, 0.0, stamp(), true, false), 1.6);
   EXPECT_NEAR(moved(found), 0.1, 1e-3);
-  EXPECT_GT(found.evidence.inliers, 100);
+  EXPECT_GT(found.agreement.inliers, 100);
   EXPECT_EQ(found.sightings.size(), found.motion.inliers.size());
 }
 
@@ -118,9 +120,10 @@ TEST_F(MotionSearchTest, AnExpectationThatIsALittleWrongIsLookedAroundFurther) {
   start(2);
   // Points 6 to 12 m away were expected 27 to 53 px beside where they are: beyond the gate, not three times as far.
   const MotionHypothesis found = findAround(street_.see(0.1, 0.0, stamp(), true, false), 0.9);
-  EXPECT_EQ(found.verdict.trust, Trust::kSound) << found.verdict.reason;
+  ASSERT_TRUE(found.motion.success) << found.motion.reason;
+  EXPECT_EQ(found.probability, 1.0);
   EXPECT_NEAR(moved(found), 0.1, 1e-3);
-  EXPECT_GT(found.evidence.inliers, 100);
+  EXPECT_GT(found.agreement.inliers, 100);
 }
 
 TEST_F(MotionSearchTest, WhatWasFoundNearTheExpectationMustNotLeaveThatOut) {
@@ -148,11 +151,10 @@ TEST_F(MotionSearchTest, WhatStoodStillSoFarOutvotesAMajority) {
   const MotionHypothesis found = find(street_.see(0.0, 0.4, stamp()), 0.0, true);
   ASSERT_TRUE(found.motion.success) << found.motion.reason;
   EXPECT_NEAR(moved(found), 0.0, 1e-3);
-  EXPECT_TRUE(found.contested);
-  EXPECT_EQ(found.verdict.trust, Trust::kDoubtful);
-  EXPECT_NE(found.verdict.reason.find("two motions"), std::string::npos) << found.verdict.reason;
   ASSERT_TRUE(found.rival);
-  EXPECT_NEAR(found.rival->translation().x(), 0.4, 1e-3) << "as if the swarm stood";
+  EXPECT_NEAR(found.rival->T_current_reference.translation().x(), 0.4, 1e-3) << "as if the swarm stood";
+  EXPECT_LT(found.rival->probability, 0.05) << "what goes on as before is confirmed by lasting points";
+  EXPECT_GT(found.rivals_moment(0, 0), 0.9 * found.rival->probability * 0.16);
 }
 
 TEST_F(MotionSearchTest, WhatMovesByLessThanCornersErrIsLeftAside) {
@@ -169,15 +171,13 @@ TEST_F(MotionSearchTest, WhatMovesByLessThanCornersErrIsLeftAside) {
   extend(see(0.0), find(see(0.0), 0.0));
   // The board moves by 0.7 px: inliers of any motion are all there is.
   const MotionHypothesis found = find(see(0.007), 0.0);
-  ASSERT_EQ(found.verdict.trust, Trust::kDoubtful);
-  EXPECT_TRUE(found.contested);
   EXPECT_NEAR(moved(found), 0.0, 1e-4);
-  EXPECT_EQ(found.evidence.inliers, static_cast<int>(found.motion.inliers.size()));
-  EXPECT_EQ(found.evidence.inliers, found.lastingInliers()) << "the board is no longer among them";
-  EXPECT_LT(found.evidence.matches, 1.1 * found.evidence.inliers) << "nor does it count against them";
+  EXPECT_EQ(found.agreement.inliers, static_cast<int>(found.motion.inliers.size()));
+  EXPECT_EQ(found.agreement.inliers, found.agreement.lasting_inliers) << "the board is no longer among them";
+  EXPECT_LT(found.agreement.matches, 1.1 * found.agreement.inliers) << "nor does it count against them";
   EXPECT_EQ(found.sightings.size(), found.motion.inliers.size());
   ASSERT_TRUE(found.rival) << "the covariance has to hold what all inliers together say";
-  const Eigen::Isometry3d aside = *found.rival * found.motion.T_current_reference.inverse();
+  const Eigen::Isometry3d aside = found.rival->T_current_reference * found.motion.T_current_reference.inverse();
   EXPECT_GT(aside.translation().norm(), 0.005);
 }
 
@@ -200,8 +200,8 @@ TEST_F(MotionSearchTest, AnErrorThatLastingPointsShareIsNoMover) {
   while (pairs_ < 5) extend(see(0.0, false), find(see(0.0, false), 0.0));
   extend(see(0.0, true), find(see(0.0, true), 0.0));
   const MotionHypothesis found = find(see(0.007, true), 0.0);
-  EXPECT_EQ(found.verdict.trust, Trust::kSound) << found.verdict.reason;
-  EXPECT_FALSE(found.contested);
+  ASSERT_TRUE(found.motion.success) << found.motion.reason;
+  EXPECT_FALSE(found.rival);
 }
 
 TEST_F(MotionSearchTest, FarPointsThatAgreeWithAnyStepAreNoMajority) {
@@ -223,8 +223,7 @@ TEST_F(MotionSearchTest, FarPointsThatAgreeWithAnyStepAreNoMajority) {
   extend(arrived, find(arrived, 0.0));
   const MotionHypothesis found = find(see(0.1, true), 0.0);
   EXPECT_NEAR(moved(found), 0.0, 0.01);
-  EXPECT_EQ(found.verdict.trust, Trust::kDoubtful);
-  EXPECT_TRUE(found.contested);
+  EXPECT_TRUE(found.rival);
 }
 
 TEST_F(MotionSearchTest, MotionsThatOnlyFarPointsConfuseAreTwo) {
@@ -242,7 +241,7 @@ TEST_F(MotionSearchTest, MotionsThatOnlyFarPointsConfuseAreTwo) {
   begin(see(0.0));
   const MotionHypothesis found = find(see(0.15), 0.0, true);
   EXPECT_NEAR(moved(found), 0.0, 0.01);
-  EXPECT_EQ(found.verdict.trust, Trust::kDoubtful) << "it may be the board that stands";
+  EXPECT_LT(found.probability, 0.95) << "it may be the board that stands";
 }
 
 TEST_F(MotionSearchTest, WhatGoesOnAsBeforeIsAHypothesisAlsoWhereACompromiseExplainsMore) {
@@ -259,7 +258,7 @@ TEST_F(MotionSearchTest, WhatGoesOnAsBeforeIsAHypothesisAlsoWhereACompromiseExpl
   EXPECT_LT(moved(findAround(see(0.15), 0.0)), -0.1) << "most agree with the compromise";
   const MotionHypothesis found = find(see(0.15), 0.0, true);
   EXPECT_NEAR(moved(found), 0.0, 0.02);
-  EXPECT_EQ(found.verdict.trust, Trust::kDoubtful) << found.verdict.reason;
+  EXPECT_LT(found.probability, 0.95);
 }
 
 TEST_F(MotionSearchTest, WithoutLastingPointsTheOneThatGoesOnAsBeforeWins) {
@@ -279,11 +278,9 @@ class CoveredView : public MotionSearchTest {
     return features;
   }
 
-  /// Where no prior tells the copies of the board in the map from the board.
+  /// Where no prediction tells the copies of the board in the map from the board.
   MotionHypothesis findUnguided(const StereoFeatures& features) const {
-    Vector6d velocity = Vector6d::Zero();
-    velocity[0] = kStep / 0.1;
-    return search_.find({map_, calibration_, features, std::nullopt, velocity, true, 0.0, {}});
+    return search_.find(sceneOf(features, std::nullopt, kStep, true), kLargestDoubt);
   }
 
   static constexpr double kStep = 1.2;  // m between pairs: no camera stops from there
@@ -301,50 +298,25 @@ TEST_F(CoveredView, WhatNoCameraDoesIsNotTheCamerasHoweverManyAgree) {
     const MotionHypothesis found = find(features, kStep, x > kStep);
     ASSERT_TRUE(found.motion.success) << found.motion.reason;
     EXPECT_NEAR(moved(found), kStep, 0.02) << x;
-    EXPECT_LT(found.evidence.inliers, 40);
-    EXPECT_EQ(found.verdict.trust, Trust::kDoubtful) << found.verdict.reason;
-    EXPECT_TRUE(found.contested);
+    EXPECT_LT(found.agreement.inliers, 40);
+    EXPECT_EQ(found.rival.has_value(), x > kStep) << "the board is not looked for until something is in doubt";
     EXPECT_NEAR(moved(findUnguided(features)), kStep, 0.02) << x;
     extend(features, found);
   }
 }
 
-TEST_F(CoveredView, WhereNothingElseIsSeenThereIsRatherNoMotion) {
+TEST_F(CoveredView, WhereNothingElseIsSeenTheMotionIsLikelyNotTheCameras) {
   begin(see(0.0, false));
-  EXPECT_EQ(find(see(0.0, false), kStep, true).verdict.trust, Trust::kNone);
-  EXPECT_EQ(find(see(0.0, false), kStep, false).verdict.trust, Trust::kDoubtful) << "a stamp may be wrong";
-  EXPECT_EQ(find(see(0.0, false), 0.0, true).verdict.trust, Trust::kSound);
+  const StereoFeatures features = see(0.0, false);
+  EXPECT_GT(doubtOf(features, find(features, kStep, true), kStep), 0.0);
+  EXPECT_LT(doubtOf(features, find(features, 0.0, true), 0.0), kLargestDoubt);
 }
 
 TEST_F(MotionSearchTest, FailsWithAReason) {
   start(2);
   const MotionHypothesis found = find(synthetic::noFeatures(synthetic::camera(), stamp()), 0.0);
-  EXPECT_EQ(found.verdict.trust, Trust::kNone);
-  EXPECT_NE(found.verdict.reason.find("only 0 matches"), std::string::npos) << found.verdict.reason;
-}
-
-TEST(MotionHypothesis, LeavesOutWhatWasRejected) {
-  MotionHypothesis found;
-  LocalMap::View view;
-  view.seen = {4, 3, 4, 5};
-  found.view = std::make_shared<const LocalMap::View>(view);
-  found.matches = {{0, 10, 0.f}, {1, 11, 0.f}, {2, 12, 0.f}, {3, 13, 0.f}};
-  found.motion.inliers = {0, 1, 3};
-  EXPECT_TRUE(found.isLasting(0));
-  EXPECT_FALSE(found.isLasting(1));
-  EXPECT_EQ(found.inlierRows(), std::vector<int>({10, 11, 13}));
-  EXPECT_EQ(found.inlierRows({13, 12}), std::vector<int>({10, 11}));
-  EXPECT_EQ(found.lastingInliers(), 2);
-  EXPECT_EQ(found.lastingInliers({13}), 1);
-}
-
-TEST(Coverage, CountsCellsOfEightColumnsAndFourRows) {
-  StereoFeatures features = synthetic::noFeatures(synthetic::camera());
-  for (const auto& [u, v] : {std::pair(10.0, 10.0), {70.0, 110.0}, {85.0, 10.0}, {630.0, 470.0}})
-    synthetic::addFeature(features, u, v, 5.0, std::vector<std::uint8_t>(128, 0));
-  EXPECT_EQ(coverage(features, {0, 1}), 1.0 / 32.0);
-  EXPECT_EQ(coverage(features, {0, 1, 2, 3}), 3.0 / 32.0);
-  EXPECT_EQ(coverage(features, {}), 0.0);
+  EXPECT_FALSE(found.motion.success);
+  EXPECT_NE(found.motion.reason.find("only 0 matches"), std::string::npos) << found.motion.reason;
 }
 
 }  // namespace test_motion_search

@@ -13,7 +13,10 @@
 namespace sdvo {
 namespace test_point_elimination {
 
-constexpr double kBend = 2.0, kDamping = 1e-3;
+constexpr double kDamping = 1e-3;
+constexpr Linearisation kLeastSquares = {2.0, kDamping};
+// Second derivatives where residuals lie within the kernel's bend.
+constexpr Linearisation kExact = {500.0, kDamping, true};
 constexpr double kLeastInformation = 1e-9;  // that a point is given of itself
 constexpr double kDisparitySigma = 0.25;    // px
 constexpr int kPoses = 4;                   // that may move
@@ -53,7 +56,7 @@ struct Row {
   double weight, square;
 };
 
-std::vector<Row> rowsOf(const Scene& scene) {
+std::vector<Row> rowsOf(const Scene& scene, double bend = kLeastSquares.bend) {
   std::vector<Row> rows;
   for (const WindowObservation& seen : scene.sightings) {
     Eigen::Vector3d prediction;
@@ -66,7 +69,7 @@ std::vector<Row> rowsOf(const Scene& scene) {
     Row row;
     row.residual = noise.cwiseProduct(measured - prediction);
     row.square = row.residual.squaredNorm();
-    row.weight = 1.0 / (1.0 + row.square / kBend);
+    row.weight = 1.0 / (1.0 + row.square / bend);
     row.jacobian.setZero(3, 6 * kPoses + 5);
     if (seen.frame > 0) row.jacobian.middleCols<6>(6 * (seen.frame - 1)) = jacobians.pose;
     row.jacobian.row(2).segment<2>(6 * kPoses) = RigCalibration::shape(scene.camera, measured.x());
@@ -82,9 +85,12 @@ struct Whole {
   Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(6 * kPoses + 5, 6 * kPoses + 5);
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(6 * kPoses + 5);
 
-  explicit Whole(const Scene& scene) {
-    for (const Row& row : rowsOf(scene)) {
-      hessian += row.weight * row.jacobian.transpose() * row.jacobian;
+  explicit Whole(const Scene& scene, const Linearisation& linearisation = kLeastSquares) {
+    for (const Row& row : rowsOf(scene, linearisation.bend)) {
+      Eigen::Matrix3d weights = row.weight * Eigen::Matrix3d::Identity();
+      if (linearisation.is_exact)
+        weights -= 2.0 * row.weight * row.weight / linearisation.bend * row.residual * row.residual.transpose();
+      hessian += row.jacobian.transpose() * weights * row.jacobian;
       gradient += row.weight * row.jacobian.transpose() * row.residual;
     }
     hessian.bottomRightCorner<3, 3>().diagonal() *= 1.0 + kDamping;
@@ -101,10 +107,14 @@ struct Reduced {
   Eigen::MatrixXd hessian;
   Eigen::VectorXd gradient;
 
-  explicit Reduced(const Scene& scene) : factors(scene.sightings.size()), squares(scene.sightings.size()) {
-    equations.setZero(kPoses);
-    point = equations.add({scene.camera, scene.calibration}, scene.sighted(), kBend, kDamping, factors.data(),
-                          squares.data());
+  explicit Reduced(const Scene& scene, const Linearisation& linearisation = kLeastSquares)
+      : factors(scene.sightings.size()), squares(scene.sightings.size()) {
+    for (const bool is_exact : {false, true}) {
+      if (is_exact && !linearisation.is_exact) break;
+      equations.setZero(kPoses);
+      equations.add({scene.camera, scene.calibration}, scene.sighted(), {linearisation.bend, kDamping, is_exact},
+                    factors.data(), squares.data(), point);
+    }
     equations.copyTo(hessian, gradient);
   }
 };
@@ -114,9 +124,9 @@ void expectNear(const Eigen::MatrixXd& value, const Eigen::MatrixXd& expected, c
   EXPECT_LT((value - expected).cwiseAbs().maxCoeff(), 1e-9 * (1.0 + expected.cwiseAbs().maxCoeff())) << what;
 }
 
-void expectSchurComplement(const Scene& scene) {
-  const Whole whole(scene);
-  const Reduced reduced(scene);
+void expectSchurComplement(const Scene& scene, const Linearisation& linearisation = kLeastSquares) {
+  const Whole whole(scene, linearisation);
+  const Reduced reduced(scene, linearisation);
   const int n = 6 * kPoses + 2;
   const Eigen::Matrix3d inverse = whole.hessian.bottomRightCorner<3, 3>().inverse();
   const Eigen::MatrixXd with_point = whole.hessian.topRightCorner(n, 3);
@@ -131,6 +141,19 @@ TEST(PointElimination, IsTheSchurComplementOfTheNormalEquations) {
   expectSchurComplement(Scene({1, 3, 4}));
   expectSchurComplement(Scene({0, 2}));
   expectSchurComplement(Scene({4}));
+}
+
+TEST(PointElimination, IsTheSchurComplementOfTheSecondDerivatives) {
+  expectSchurComplement(Scene({0, 1, 2, 3, 4}), kExact);
+  expectSchurComplement(Scene({1, 3, 4}), kExact);
+}
+
+TEST(PointElimination, APointBetweenTwoMinimaSaysNothingByItsSecondDerivatives) {
+  Scene scene({0, 2});
+  scene.sightings[0].measurement.y() += 8.0, scene.sightings[1].measurement.y() -= 8.0;
+  const Reduced reduced(scene, {1.0, kDamping, true});
+  EXPECT_EQ(reduced.point.factors, 0);
+  EXPECT_LT(reduced.hessian.norm(), 1e-9 * Reduced(scene).hessian.norm());
 }
 
 TEST(PointElimination, AFarPointIsADirection) {
@@ -187,18 +210,16 @@ TEST(PointElimination, PointsFollowAsTheWholeEquationsSay) {
 TEST(PointElimination, SumsUpWhatItsSightingsSay) {
   const Scene scene({0, 1, 3});
   const Reduced reduced(scene);
-  double weight = 0.0, square = 0.0, residual = 0.0;
+  double weight = 0.0, residual = 0.0;
   Eigen::Vector3d by_point = Eigen::Vector3d::Zero();
   const std::vector<Row> rows = rowsOf(scene);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     weight += rows[i].weight;
-    square += rows[i].weight * rows[i].square;
     residual += rows[i].weight * rows[i].residual.z();
     by_point += rows[i].weight * rows[i].jacobian.row(2).tail<3>().transpose();
     EXPECT_NEAR(reduced.squares[i], rows[i].square, 1e-9 * rows[i].square) << i;
   }
   EXPECT_NEAR(reduced.point.weight, weight, 1e-9);
-  EXPECT_NEAR(reduced.point.square, square, 1e-9);
   EXPECT_NEAR(reduced.point.disparity_residual, residual, 1e-9);
   expectNear(reduced.point.disparity_by_point, by_point, "derivatives of the disparities");
 }
@@ -216,9 +237,10 @@ TEST(PointElimination, PointsAddUp) {
   equations.setZero(kPoses);
   std::vector<PoseFactor> factors(4);
   std::vector<double> squares(4);
+  EliminatedPoint point;
   for (const Scene* scene : {&one, &other})
-    equations.add({scene->camera, scene->calibration}, scene->sighted(), kBend, kDamping, factors.data(),
-                  squares.data());
+    equations.add({scene->camera, scene->calibration}, scene->sighted(), kLeastSquares, factors.data(), squares.data(),
+                  point);
   Eigen::MatrixXd hessian;
   Eigen::VectorXd gradient;
   equations.copyTo(hessian, gradient);

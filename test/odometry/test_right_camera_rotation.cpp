@@ -84,9 +84,9 @@ TEST(RightCameraRotation, ChangeIsWhatTheRowsOfAPairSayAgainstThoseBefore) {
 TEST(RightCameraRotation, ATurnIsSaidOfARigThatWasSteady) {
   const Eigen::Vector3d turn(0.0, 0.0, 9e-3);
   RightCameraRotation filter;
-  for (int k = 0; k < 20; ++k) EXPECT_FALSE(filter.add(gridSeenWith(Eigen::Vector3d::Zero())));
+  for (int k = 0; k < 20; ++k) EXPECT_LT(filter.add(gridSeenWith(Eigen::Vector3d::Zero())), 3.0);
   EXPECT_GT(filter.change(gridSeenWith(turn)), 0.6);
-  for (int k = 0; k < 5; ++k) EXPECT_TRUE(filter.add(gridSeenWith(turn))) << "a turn does not become usual by lasting";
+  for (int k = 0; k < 5; ++k) EXPECT_GT(filter.add(gridSeenWith(turn)), 3.0) << "a turn does not become usual by lasting";
 }
 
 // The memory holds a part of both places then, and is near enough to either.
@@ -94,10 +94,10 @@ TEST(RightCameraRotation, AReturnToWhereItWasIsATurn) {
   const Eigen::Vector3d turn(0.0, 0.0, 0.005);
   RightCameraRotation filter;
   for (int i = 0; i < 60; ++i) filter.add(gridSeenWith(Eigen::Vector3d::Zero()));
-  EXPECT_TRUE(filter.add(gridSeenWith(turn)));
+  EXPECT_GT(filter.add(gridSeenWith(turn)), 3.0);
   for (int i = 0; i < 15; ++i) filter.add(gridSeenWith(turn));
-  EXPECT_TRUE(filter.add(gridSeenWith(Eigen::Vector3d::Zero())));
-  EXPECT_FALSE(filter.add(gridSeenWith(Eigen::Vector3d::Zero())));
+  EXPECT_GT(filter.add(gridSeenWith(Eigen::Vector3d::Zero())), 3.0);
+  EXPECT_LT(filter.add(gridSeenWith(Eigen::Vector3d::Zero())), 3.0);
 }
 
 TEST(RightCameraRotation, AFewFeaturesTellOfNoTurn) {
@@ -106,7 +106,7 @@ TEST(RightCameraRotation, AFewFeaturesTellOfNoTurn) {
   StereoFeatures wrong = synthetic::noFeatures(synthetic::camera());
   for (int i = 0; i < 3; ++i) wrong.append({200.f + 100.f * static_cast<float>(i), 150.f, 60.f, 1.4f, 10.f, -1.f, 1.f});
   EXPECT_EQ(filter.change(wrong), 0.0);
-  EXPECT_FALSE(filter.add(wrong));
+  EXPECT_LT(filter.add(wrong), 3.0);
 }
 
 TEST(RightCameraRotation, ARigWhoseRowsAlwaysDisagreeIsNotSaidToTurn) {
@@ -116,10 +116,10 @@ TEST(RightCameraRotation, ARigWhoseRowsAlwaysDisagreeIsNotSaidToTurn) {
   for (int k = 0; k < 100; ++k) {
     const StereoFeatures features = gridSeenWith(Eigen::Vector3d(0.0, 0.0, 6e-3 * std::sin(0.1 * k)));
     largest = std::max(largest, filter.change(features));
-    EXPECT_FALSE(filter.add(features)) << "pair " << k;
+    EXPECT_LT(filter.add(features), 3.0) << "pair " << k;
   }
   EXPECT_GT(largest, 0.6) << "more than a steady rig may show";
-  EXPECT_TRUE(filter.add(gridSeenWith(Eigen::Vector3d(0.0, 0.0, 60e-3))));
+  EXPECT_GT(filter.add(gridSeenWith(Eigen::Vector3d(0.0, 0.0, 60e-3))), 3.0);
 }
 
 TEST(RightCameraRotation, SigmaIsThatOfLeastSquaresForCorrelatedSightings) {
@@ -156,12 +156,12 @@ TEST(RightCameraRotation, ShuttersThatAreApartWhileTheCameraTurnsAreTheRigsWay) 
   RightCameraRotation filter;
   int turned = 0, turned_late = 0;
   for (int i = 0; i < 60; ++i) {
-    const bool said = filter.add(gridSeenWith({i % 8 < 4 ? 1e-3 : -1e-3, 0.0, 0.0}));
+    const bool said = filter.add(gridSeenWith({i % 8 < 4 ? 1e-3 : -1e-3, 0.0, 0.0})) > 3.0;
     turned += said, turned_late += said && i >= 30;  // 3 s
   }
   EXPECT_GT(turned, 0);
   EXPECT_EQ(turned_late, 0);
-  EXPECT_TRUE(filter.add(gridSeenWith({0.0, 0.0, 20e-3}))) << "a knock is still found";
+  EXPECT_GT(filter.add(gridSeenWith({0.0, 0.0, 20e-3})), 3.0) << "a knock is still found";
 }
 
 }  // namespace test_right_camera_rotation

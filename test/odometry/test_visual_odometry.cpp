@@ -357,9 +357,7 @@ TEST_F(GuessedTurn, AWrongGuessDoesNoHarm) {
 
 TEST(VisualOdometry, DoubtsAfterALossWhatNoCameraWithTheVelocityBeforeDoes) {
   // Something that is fixed to the camera comes to cover the whole view.
-  VisualOdometryOptions options;
-  options.tracking.max_acceleration = 10.0;
-  VisualOdometry odometry(options);
+  VisualOdometry odometry({});
   follow(odometry, 5);
   OdometryResult result;
   for (int i = 6; i <= 10; ++i) {
@@ -373,14 +371,14 @@ TEST(VisualOdometry, DoubtsAfterALossWhatNoCameraWithTheVelocityBeforeDoes) {
     EXPECT_LT(error.dot(result.motion_covariance.ldlt().solve(error)), 20.0) << i;
   }
   EXPECT_TRUE(result.has_motion);
-  EXPECT_NE(result.reason.find("max_acceleration"), std::string::npos) << result.reason;
+  EXPECT_NE(result.reason.find("the prior"), std::string::npos) << result.reason;
 }
 
 TEST(VisualOdometry, DoesNotTrustAStandstillRightAfterALossOnTheWay) {
   // The same, and 8 m/s could be gone in a pair or two, but hardly ever are.
   VisualOdometry odometry({});
   follow(odometry, 5);
-  for (int i = 6; i <= 20; ++i) {
+  for (int i = 6; i <= 15; ++i) {
     StereoFeatures covered = strangePair(0);
     covered.stamp = stampOf(i);
     for (float& u : covered.u) u += 0.01f * static_cast<float>(i);
@@ -392,7 +390,7 @@ TEST(VisualOdometry, DoesNotTrustAStandstillRightAfterALossOnTheWay) {
   }
   // It does not last for ever: it may have stopped after all.
   OdometryResult result;
-  for (int i = 21; i <= 40; ++i) {
+  for (int i = 16; i <= 40; ++i) {
     StereoFeatures still = strangePair(0);
     still.stamp = stampOf(i);
     for (float& u : still.u) u += 0.01f * static_cast<float>(i);
@@ -406,7 +404,7 @@ TEST(VisualOdometry, DoubtsTheNextMapWhereManyMatchesAgreedOnNoMotion) {
   VisualOdometry odometry({});
   follow(odometry, 5);
   int lost = 0, degraded = 0;
-  for (int i = 6; i <= 20; ++i) {
+  for (int i = 6; i <= 10; ++i) {
     StereoFeatures late = pairOf(i);
     for (float& disparity : late.disparity) disparity *= 1.5f;
     const OdometryResult result = odometry.update(late);
@@ -418,7 +416,7 @@ TEST(VisualOdometry, DoubtsTheNextMapWhereManyMatchesAgreedOnNoMotion) {
     EXPECT_LT(error.dot(result.motion_covariance.ldlt().solve(error)), 20.0) << i;
   }
   EXPECT_GE(lost, 1);
-  EXPECT_GE(degraded, 10) << "a map of the wrong depths explains one another's pairs";
+  EXPECT_GE(degraded, 3) << "a map of the wrong depths explains one another's pairs";
 }
 
 TEST(VisualOdometry, DoesNotDoubtForLongWhatComesAfterAGap) {
@@ -681,7 +679,7 @@ TEST(VisualOdometry, VelocityAfterAPredictedPairIsTheTrueOne) {
   const OdometryResult seen = odometry.update(standing(7));
   // From 8 m/s: more than a robot's brakes can do.
   EXPECT_EQ(seen.state, TrackingState::kDegraded);
-  EXPECT_NE(seen.reason.find("max_acceleration"), std::string::npos) << seen.reason;
+  EXPECT_NE(seen.reason.find("the prior"), std::string::npos) << seen.reason;
   ASSERT_LT(distanceBetween(seen.T_origin_camera, trueSinceStart(5)), 0.01);
   const OdometryResult predicted = odometry.update(blindPair(8));
   ASSERT_EQ(predicted.state, TrackingState::kDegraded);
@@ -712,7 +710,7 @@ TEST(VisualOdometry, MeasuresASuddenTurnAgainstThePredictedOne) {
 TEST(VisualOdometry, RefusesRotationsThatNoRobotMakes) {
   VisualOdometryOptions options;
   options.tracking.max_rotation_rate = 1.0;
-  options.tracking.max_acceleration = 1000.0;  // it stops at once
+  options.tracking.acceleration = 1000.0;  // it stops at once
   VisualOdometry odometry(options);
   const auto pairTurnedBy = [&](double yaw, int i) {
     Eigen::Isometry3d pose = drivePose(4);
@@ -754,8 +752,9 @@ TEST(VisualOdometry, APredictedPairIsAsUncertainAsAVehicleMayAccelerate) {
     const OdometryResult predicted = odometry.update(blindPair(5 + missed));
     const double dt = 0.1 * missed;
     Vector6d variance;
-    variance << Eigen::Vector3d::Constant(std::pow(5.0 * dt * dt, 2)),
-        Eigen::Vector3d::Constant(std::pow(2.0 * dt * dt, 2));
+    const MotionPriorOptions options;
+    variance << Eigen::Vector3d::Constant(std::pow(options.acceleration, 2) * 2.0 / 3.0 * std::pow(dt, 3)),
+        Eigen::Vector3d::Constant(std::pow(options.rotation_acceleration, 2) * 2.0 / 3.0 * std::pow(dt, 3));
     // As far off as the velocity before was, and by what a vehicle may accelerate.
     const Matrix6d expected = Matrix6d(variance.asDiagonal()) + missed * missed * before.motion_covariance;
     EXPECT_LT((predicted.motion_covariance - expected).norm(), 1e-12);
@@ -811,7 +810,7 @@ TEST(VisualOdometry, WhatIsPredictedFromADoubtfulMotionIsDoubtful) {
   VisualOdometry sound({});
   follow(sound, 5);
   EXPECT_LT(std::sqrt(sound.update(blindPair(6)).motion_covariance(2, 2)), 0.06)
-      << "5 m/s^2 times (0.1 s)^2, and the velocity's own";
+      << "white acceleration, and the velocity's own";
 }
 
 TEST(VisualOdometry, RotationsOfABurstAreMeasured) {
@@ -857,14 +856,61 @@ TEST(VisualOdometry, ImagesThatRepeatThemselvesWhileItMovesAreNoStandstill) {
     StereoFeatures frozen = pairOf(8);
     frozen.stamp = stampOf(i);
     const OdometryResult result = odometry.update(frozen);
-    EXPECT_EQ(result.state, i == 9 ? TrackingState::kDegraded : TrackingState::kLost) << i;
+    EXPECT_EQ(result.state, TrackingState::kDegraded) << i;
     EXPECT_NE(result.reason.find("frozen"), std::string::npos) << result.reason;
+    const Vector6d error = logSE3(result.T_origin_camera.inverse() * trueSinceStart(i));
+    EXPECT_LT(error.dot(result.pose_covariance.ldlt().solve(error)), 20.0) << i << ": it may have gone on";
   }
+  // The map still shows where it went meanwhile.
   const OdometryResult again = odometry.update(pairOf(15));
-  EXPECT_NE(again.reason.find("re-acquired"), std::string::npos) << again.reason;
   EXPECT_EQ(again.epoch, before.epoch);
-  EXPECT_LT(distanceBetween(again.T_origin_camera, trueSinceStart(15)), 0.01);
-  EXPECT_EQ(odometry.update(pairOf(16)).state, TrackingState::kTracking);
+  const Vector6d error = logSE3(again.T_origin_camera.inverse() * trueSinceStart(15));
+  EXPECT_LT(error.dot(again.pose_covariance.ldlt().solve(error)), 20.0);
+  for (int i = 16; i <= 18; ++i) odometry.update(pairOf(i));
+  EXPECT_EQ(odometry.update(pairOf(19)).state, TrackingState::kTracking);
+}
+
+TEST(VisualOdometry, ASimulatedCameraThatStopsDeadIsNotLost) {
+  VisualOdometry odometry({});
+  const OdometryResult before = follow(odometry, 8);
+  double trace = before.pose_covariance.trace();
+  for (int i = 9; i < 309; ++i) {
+    StereoFeatures still = pairOf(8);
+    still.stamp = stampOf(i);
+    const OdometryResult result = odometry.update(still);
+    ASSERT_EQ(result.state, TrackingState::kDegraded) << i;
+    ASSERT_TRUE(result.T_origin_camera.isApprox(before.T_origin_camera, 1e-9)) << i;
+    ASSERT_GT(result.pose_covariance.trace(), trace) << i;
+    ASSERT_EQ(result.reason,
+              "the images repeat those of the previous pair although the camera moved: is the driver frozen?");
+    trace = result.pose_covariance.trace();
+  }
+  // It moves on slowly.
+  OdometryResult result;
+  for (int i = 309; i < 315; ++i) {
+    synthetic::Sighting sighting;
+    sighting.max_depth = 25.0;
+    Eigen::Isometry3d pose = drivePose(8);
+    pose.translation() += 0.05 * (i - 308) * pose.linear().col(2);
+    result = odometry.update(synthetic::observe(street(), synthetic::camera(), pose.inverse(), stampOf(i), sighting));
+    EXPECT_EQ(result.epoch, before.epoch);
+    EXPECT_LT(distanceBetween(result.T_origin_camera, drivePose(0).inverse() * pose), 0.01) << i;
+  }
+  EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
+}
+
+TEST(VisualOdometry, ImagesThatRepeatThemselvesWhileAGyroTurnsAreNoStandstill) {
+  // It stood when the driver froze; only the gyro says that it turns.
+  VisualOdometry odometry({});
+  MotionGuess guess;
+  guess.rotation_only = true;
+  for (int i = 0; i <= 12; ++i) {
+    StereoFeatures features = pairOf(0);
+    features.stamp = stampOf(i);
+    if (i > 4) guess.T_previous_current.linear() = expSO3({0.0, 0.1, 0.0});  // 57 deg/s
+    const OdometryResult result = odometry.update(features, guess);
+    EXPECT_EQ(result.state, i <= 4 ? TrackingState::kTracking : TrackingState::kDegraded) << i;
+  }
 }
 
 TEST(VisualOdometry, ImagesThatRepeatThemselvesWhileItStandsAreAStandstill) {
@@ -932,24 +978,44 @@ TEST(VisualOdometry, DoesNotFollowWhatMovesBeforeAStandingCamera) {
     if (result.state != TrackingState::kDegraded) continue;
     ++degraded;
     EXPECT_NE(result.reason.find("two motions"), std::string::npos) << result.reason;
-    // It may be the others that stand: the disagreement of 0.12 m is in the covariance.
-    EXPECT_GT(std::sqrt(result.motion_covariance(0, 0)), 0.08) << i;
+    // It may be the others that stand: the difference of 0.12 m is within five standard deviations.
+    EXPECT_GT(std::sqrt(result.motion_covariance(0, 0)), 0.12 / 5.0) << i;
   }
   EXPECT_GE(degraded, 10);
 }
 
-TEST(VisualOdometry, AContestedMotionIsAlsoAsUncertainAsItIsUnexpected) {
-  // It stops at once: 0.1 m were expected, and the swarm speaks for a motion of 0.12 m against it.
-  const auto sigmaAfter = [](double step) {
-    VisualOdometry odometry({});
-    for (int i = 0; i <= 6; ++i) odometry.update(crowdedPair(i, step * i));
-    const OdometryResult result = odometry.update(crowdedPair(7, step * 6));
-    EXPECT_NE(result.reason.find("two motions"), std::string::npos) << result.reason;
-    return std::sqrt(result.motion_covariance(0, 0));
-  };
-  const double contested = sigmaAfter(0.0);
-  EXPECT_GT(contested, 0.1);
-  EXPECT_GT(sigmaAfter(0.1), std::hypot(contested, 0.08));
+/// Half of what stood still so far begins to move, as a train beside the one in which the camera is.
+StereoFeatures partingPair(int i) {
+  synthetic::Sighting sighting;
+  sighting.noise = 0.1;
+  sighting.max_depth = 25.0;
+  sighting.seed = 300 + static_cast<unsigned>(i);
+  StereoFeatures features = synthetic::noFeatures(synthetic::camera(), stampOf(i));
+  for (const bool moves : {false, true}) {
+    synthetic::World world =
+        synthetic::randomWorld(moves ? 22 : 21, 200, {moves ? 0.5 : -6.0, -2.0, 5.0}, {moves ? 6.0 : -0.5, 2.0, 9.0});
+    if (moves)
+      for (Eigen::Vector3d& point : world.points) point.x() += 0.15 * std::max(i - 8, 0);
+    const StereoFeatures seen =
+        synthetic::observe(world, synthetic::camera(), Eigen::Isometry3d::Identity(), stampOf(i), sighting);
+    for (int row = 0; row < seen.count(); ++row)
+      synthetic::addFeature(features, seen.u[row], seen.v[row], seen.disparity[row],
+                            {seen.descriptors.ptr(row), seen.descriptors.ptr(row) + seen.descriptors.cols});
+  }
+  return features;
+}
+
+TEST(VisualOdometry, EitherHalfOfTheViewMayStandStill) {
+  VisualOdometry odometry({});
+  for (int i = 0; i <= 8; ++i) ASSERT_EQ(odometry.update(partingPair(i)).state, TrackingState::kTracking);
+  const OdometryResult result = odometry.update(partingPair(9));
+  ASSERT_EQ(result.state, TrackingState::kDegraded);
+  EXPECT_NE(result.reason.find("two motions"), std::string::npos) << result.reason;
+  for (const double x : {0.0, -0.15}) {
+    Vector6d error = logSE3(result.T_previous_current);
+    error[0] -= x;
+    EXPECT_LT(error.dot(result.motion_covariance.ldlt().solve(error)), 25.0) << "either motion is within covariance";
+  }
 }
 
 TEST(VisualOdometry, WhatIsInDoubtTellsNothingOfWhatMayBeExpected) {
@@ -984,7 +1050,7 @@ TEST(VisualOdometry, WhatIsInDoubtTellsNothingOfWhatMayBeExpected) {
   const OdometryResult doubtful = odometry.update(slowPair(12));
   ASSERT_EQ(doubtful.state, TrackingState::kDegraded) << doubtful.reason;
   EXPECT_NEAR(doubtful.T_previous_current.translation().z(), 0.4, 0.2);
-  EXPECT_GT(std::sqrt(doubtful.motion_covariance(2, 2)), 0.25);
+  EXPECT_GT(std::sqrt(doubtful.motion_covariance(2, 2)), 0.4 / 5.0) << "it may still go 0.8 m a pair";
 }
 
 /// Some rows of pair i, most of them too high or too low by what the search accepts and the adjustment refutes.
@@ -1001,12 +1067,10 @@ StereoFeatures loosePair(int i) {
 }
 
 TEST(VisualOdometry, WhatTheAdjustmentRefutesLeavesTheMapAsItWas) {
-  for (const bool doubted_before : {false, true}) {
+  {
     VisualOdometryOptions options;
     options.motion.inlier_threshold = 8.0;
     options.motion.min_inliers = 18;
-    options.tracking.doubtful_inliers = 18;
-    options.tracking.doubtful_lasting_ratio = doubted_before ? 1.0 : 0.0;
     VisualOdometry odometry(options), blind(options);
     follow(odometry, 8), follow(blind, 8);
     for (int i = 9; i <= 13; i += 2) {

@@ -154,10 +154,13 @@ TEST(WindowOptimizer, TheCovarianceOfSomePosesIsPartOfThatOfAll) {
   const WindowSolution some = WindowOptimizer(WindowOptimizerOptions{}).optimize(another, asked);
   ASSERT_EQ(all.pose_covariance.rows(), 24);
   ASSERT_EQ(some.pose_covariance.rows(), 12);
+  // But for a factor: the noise is measured by how it moves the poses asked for.
+  const double factor = some.pose_covariance(0, 0) / all.pose_covariance(18, 18);
   for (int a = 0; a < 2; ++a)
     for (int b = 0; b < 2; ++b)
-      EXPECT_TRUE((some.pose_covariance.block<6, 6>(6 * a, 6 * b)
-                       .isApprox(all.pose_covariance.block<6, 6>(6 * (asked[a] - 1), 6 * (asked[b] - 1)), 1e-9)))
+      EXPECT_TRUE(
+          (some.pose_covariance.block<6, 6>(6 * a, 6 * b)
+               .isApprox(factor * all.pose_covariance.block<6, 6>(6 * (asked[a] - 1), 6 * (asked[b] - 1)), 1e-9)))
           << a << ", " << b;
   EXPECT_TRUE(some.calibration_information.isApprox(all.calibration_information, 1e-9));
 }
@@ -246,6 +249,92 @@ TEST(WindowOptimizer, CovariancesAreThoseOfTheErrorsWhereTheKernelBendsAtTheNois
   EXPECT_NEAR(nees, 6.0, 1.5);
 }
 
+/// Points of a room, each seen from some pairs in turn by a camera that goes ahead and turns. All that a sighting errs
+/// by is as the shipped options have it, but positions err `factor` times as much as stated; a share are outliers.
+Window windowOfTheModel(int frames, double factor, double outliers, std::uint32_t seed) {
+  const WindowOptimizerOptions shipped;
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  Window window;
+  window.camera.fx = window.camera.fy = 350.0, window.camera.cx = 320.0, window.camera.cy = 240.0;
+  window.camera.width = 640, window.camera.height = 480, window.camera.baseline = 0.1;
+  for (int f = 0; f < frames; ++f) {
+    Vector6d motion;
+    motion << 0.05 * f, 0.01 * f, 0.1 * f, 0.0, 0.02 * f, 0.0;
+    window.T_camera_origin.push_back(expSE3(motion).inverse());
+  }
+  for (int start = -7; start < frames - 1; ++start)
+    for (int k = 0; k < 100; ++k) {
+      const int first = std::max(start, 0);
+      int last = start + 1;
+      while (uniform(random) < 0.7) ++last;
+      AnchoredPoint point;
+      point.T_origin_anchor = window.T_camera_origin[static_cast<std::size_t>(first)].inverse();
+      point.ray_and_inverse_depth << 1.6 * uniform(random) - 0.8, uniform(random) - 0.5,
+          1.0 / (1.0 + 7.0 * uniform(random));
+      const double common = shipped.common_disparity_sigma * normal(random);
+      std::vector<WindowObservation> seen;
+      for (int f = first; f <= std::min(last, frames - 1); ++f) {
+        Eigen::Vector3d pixel;
+        if (!predictObservation(window.camera, window.T_camera_origin[static_cast<std::size_t>(f)], point, pixel,
+                                nullptr) ||
+            !window.camera.sees(pixel))
+          continue;
+        const double sigma = factor * kPositionSigma * (uniform(random) < outliers ? 20.0 : 1.0);
+        pixel += Eigen::Vector3d(sigma * normal(random), sigma * normal(random),
+                                 common + shipped.disparity_sigma * normal(random));
+        seen.push_back({static_cast<int>(window.points.size()), f, pixel, kPositionSigma});
+      }
+      if (seen.size() < 2) continue;
+      window.points.push_back(point);
+      window.observations.insert(window.observations.end(), seen.begin(), seen.end());
+    }
+  window.calibration_prior.information = 1e8 * RigCalibration::Matrix::Identity();
+  return window;
+}
+
+/// Mean NEES of the newest pose relative to the one before, over a hundred windows.
+double neesOfTheNewestMotion(int frames, double factor, double outliers) {
+  constexpr int kTrials = 100;
+  WindowOptimizerOptions options;
+  options.iterations = 20;
+  double nees = 0.0;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    Window window = windowOfTheModel(frames, factor, outliers, static_cast<std::uint32_t>(1000 * frames + trial));
+    const Eigen::Isometry3d T_origin_before = window.T_camera_origin[static_cast<std::size_t>(frames - 2)].inverse();
+    const Eigen::Isometry3d truth = window.T_camera_origin.back() * T_origin_before;
+    const WindowSolution solution = WindowOptimizer(options).optimize(window);
+    if (!solution.success) return -1.0;
+    const Eigen::Isometry3d found =
+        window.T_camera_origin.back() * window.T_camera_origin[static_cast<std::size_t>(frames - 2)].inverse();
+    const Eigen::Index size = solution.pose_covariance.rows();
+    Eigen::MatrixXd by_poses = Eigen::MatrixXd::Zero(6, size);
+    by_poses.rightCols<6>().setIdentity();
+    if (frames > 2) by_poses.middleCols<6>(size - 12) = -adjoint(found);
+    const Vector6d error = logSE3(found * truth.inverse());
+    nees += error.dot((by_poses * solution.pose_covariance * by_poses.transpose()).ldlt().solve(error)) / kTrials;
+  }
+  return nees;
+}
+
+TEST(WindowOptimizer, CovariancesAreThoseOfTheErrorsWithTheShippedOptions) {
+  for (const int frames : {2, 3, 5, 8}) {
+    // A chi square of six; the mean of a hundred varies by 0.35.
+    EXPECT_NEAR(neesOfTheNewestMotion(frames, 1.0, 0.0), 6.0, 1.5) << frames << " frames";
+  }
+}
+
+TEST(WindowOptimizer, CovariancesAreThoseOfTheErrorsWhateverIsStatedOfTheNoise) {
+  EXPECT_NEAR(neesOfTheNewestMotion(2, 0.5, 0.0), 6.0, 1.5);
+  EXPECT_NEAR(neesOfTheNewestMotion(5, 0.5, 0.0), 6.0, 1.5);
+  EXPECT_NEAR(neesOfTheNewestMotion(3, 2.0, 0.0), 6.0, 2.0);
+}
+
+TEST(WindowOptimizer, CovariancesAreThoseOfTheErrorsAmongOutliers) {
+  for (const int frames : {2, 5}) EXPECT_NEAR(neesOfTheNewestMotion(frames, 1.0, 0.2), 6.0, 1.5) << frames << " frames";
+}
+
 TEST(WindowOptimizer, AFloorAddsItsInformationToThatOfEachPose) {
   Eigen::Isometry3d T_base_camera = Eigen::Isometry3d::Identity();
   T_base_camera.linear() << 0, 0, 1, -1, 0, 0, 0, -1, 0;
@@ -274,7 +363,7 @@ TEST(WindowOptimizer, AFloorAddsItsInformationToThatOfEachPose) {
     expected.block<6, 6>(6 * (f - 1), 6 * (f - 1)) = jacobian.transpose() * jacobian;
   }
   // The noise found, and with it the scale of all covariances, is a little different with the floor.
-  EXPECT_LT((added - expected).norm(), 0.2 * expected.norm());
+  EXPECT_LT((added - expected).norm(), 0.3 * expected.norm());
 }
 
 TEST(WindowOptimizer, InformationOfTheCalibrationIsWithoutThePrior) {

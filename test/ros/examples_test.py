@@ -12,6 +12,8 @@ import numpy as np
 import roslib.packages
 import rospy
 import rostest
+import yaml
+from sensor_msgs.msg import CameraInfo, Image
 from std_msgs.msg import Float32
 
 from kitti_replay import PACKAGE, Collector, Rosout, links, street_dir, wait_until
@@ -115,6 +117,46 @@ class Examples(unittest.TestCase):
         self.assertEqual([m.data for m in self.share[2:]], [0.0])
         self.assertEqual(len(rosout.errors), len(nodes), rosout.errors)
         self.assertTrue(all('StereoFeatures message refused' in error for error in rosout.errors), rosout.errors)
+
+    def test_side_by_side_images_become_a_pair(self):
+        directory = tempfile.mkdtemp(prefix='sdvo_split_')
+        self.addCleanup(shutil.rmtree, directory, ignore_errors=True)
+        arguments = []
+        for side, tx in (('left', 0.0), ('right', -50.0)):
+            path = os.path.join(directory, side + ' info.yaml')
+            with open(path, 'w') as file:
+                def matrix(rows, cols, data):
+                    return {'rows': rows, 'cols': cols, 'data': data}
+                yaml.safe_dump({'image_width': 4, 'image_height': 3, 'camera_name': side, 'distortion_model': 'plumb_bob',
+                                'distortion_coefficients': matrix(1, 5, [0.1, 0.0, 0.0, 0.0, 0.0]),
+                                'camera_matrix': matrix(3, 3, [500.0, 0, 2, 0, 500, 1.5, 0, 0, 1]),
+                                'rectification_matrix': matrix(3, 3, [1.0, 0, 0, 0, 1, 0, 0, 0, 1]),
+                                'projection_matrix': matrix(3, 4, [500.0, 0, 2, tx, 0, 500, 1.5, 0, 0, 0, 1, 0])}, file)
+            arguments.append('_%s_camera_info:=%s' % (side, path))
+        loader = subprocess.Popen(['rosrun', 'nodelet', 'nodelet', 'load', PACKAGE + '/SideBySideSplitter', '/split/manager',
+                                   '--no-bond', '__ns:=/split', '__name:=splitter', '_frame_id:=left_optical'] + arguments)
+        self.addCleanup(loader.wait)
+        self.addCleanup(loader.terminate)
+        images = [Collector('/split/%s/image_raw' % side, Image) for side in ('left', 'right')]
+        infos = [Collector('/split/%s/camera_info' % side, CameraInfo) for side in ('left', 'right')]
+        for collector in images + infos:
+            self.addCleanup(collector.close)
+        publisher = rospy.Publisher('/split/image_raw', Image, queue_size=10)
+        self.assertTrue(wait_until(lambda: is_connected('/split/manager', *(images + infos)) and
+                                   ('in', '/split/image_raw') in links('/split/manager')))
+        for count, (encoding, size) in enumerate((('mono8', 1), ('bgr8', 3), ('mono16', 2), ('yuv422', 2))):
+            whole = np.random.default_rng(1).integers(0, 256, (3, 8, size), dtype=np.uint8)
+            padded = np.concatenate((whole.reshape(3, -1), np.zeros((3, 5), np.uint8)), axis=1)
+            message = Image(height=3, width=8, encoding=encoding, step=padded.shape[1], data=padded.tobytes())
+            message.header.stamp, message.header.frame_id = rospy.Time(7, count), 'camera'
+            publisher.publish(message)
+            self.assertTrue(wait_until(lambda: all(len(c) == count + 1 for c in images + infos)), encoding)
+            for half, image, info in zip((whole[:, :4], whole[:, 4:]), images, infos):
+                self.assertEqual(np.frombuffer(image[-1].data, np.uint8).tolist(), half.ravel().tolist(), encoding)
+                self.assertEqual((image[-1].width, image[-1].height, image[-1].encoding, image[-1].step), (4, 3, encoding, 4 * size))
+                for header in (image[-1].header, info[-1].header):
+                    self.assertEqual((header.stamp, header.frame_id), (message.header.stamp, 'left_optical'))
+        self.assertEqual((infos[0][0].width, infos[0][0].D[0], infos[1][0].P[3]), (4, 0.1, -50.0))
 
     def test_answers_on_a_drive(self):
         pairs = 10

@@ -5,10 +5,12 @@ import itertools
 import os
 import shutil
 import socket
+import subprocess
 import sys
 import tempfile
 import threading
 import time
+from unittest import mock
 
 import dynamic_reconfigure.client
 import numpy as np
@@ -98,12 +100,21 @@ class Faults(PipelineCase):
         self.assertEqual(self.rosout.errors, [])
         self.assert_alive()
 
+    def busy_disk(self):
+        """(library, file): who preloads the library waits in fsync() as long as the file is there."""
+        library, file = (os.path.join(self.folder(), name) for name in ('busy_disk.so', 'busy'))
+        subprocess.run(['cc', '-shared', '-fPIC', '-x', 'c', '-', '-o', library], check=True, universal_newlines=True,
+                       input='#include <unistd.h>\nint fsync(int f) { while (!access("%s", F_OK)) usleep(1000); return 0 * f; }\n' % file)
+        open(file, 'w').close()
+        return library, file
+
     def test_a_slow_disk_does_not_hold_pairs_up(self):
-        self.start()
+        library, busy = self.busy_disk()
+        with mock.patch.dict(os.environ, LD_PRELOAD=library):
+            self.start()
         for i in range(3):
             self.feed(i)
         path = os.path.join(self.folder(), 'poses.txt')
-        os.mkfifo(path + '.partial')  # whoever writes to it waits for a reader
         answers = []
         writer = threading.Thread(target=lambda: answers.append(
             self.call('visual_odometry/save_trajectory', SaveTrajectory, path, 'tum')), daemon=True)
@@ -112,12 +123,13 @@ class Faults(PipelineCase):
             for i in range(3, 20):
                 self.assertEqual(self.feed(i).state, 'TRACKING')
             self.assertEqual(answers, [])
+            self.assertFalse(os.path.exists(path))
         finally:
-            with open(path + '.partial') as reader:
-                lines = reader.readlines()
+            os.remove(busy)
             writer.join(10)
         self.assertTrue(answers[0].success)
-        self.assertIn(len(lines), range(3, 20), 'no pair was answered while the file waited')
+        with open(path) as file:
+            self.assertIn(len(file.readlines()), range(3, 20), 'no pair was answered while the file waited')
 
     def test_approximate_pairs_are_not_one_frame_late(self):
         self.start(approximate_sync='true', config=self.config('stereo_features: {diagnostics: {max_gap: 0.001}}\n'))

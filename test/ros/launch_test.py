@@ -15,8 +15,8 @@ import xmlrpc.client
 import rosbag
 import rosgraph
 import roslaunch.config
-import rosnode
 import roslib.packages
+import rosnode
 import rospy
 import rosservice
 import rostest
@@ -41,7 +41,7 @@ FOLDER = os.path.join(roslib.packages.get_pkg_dir(PACKAGE), 'launch')
 
 
 def load(file, **arguments):
-    """A launch file, or a text, read by roslaunch, beside its own parameters."""
+    """A launch file, or a text of one, as it is read, without the parameters of ROS itself."""
     given = ['%s:=%s' % item for item in arguments.items()]
     texts, files = ([file], []) if file.startswith('<') else (None, [(os.path.join(FOLDER, file), given)])
     config = roslaunch.config.load_config_default(files, None, roslaunch_strs=texts)
@@ -123,9 +123,10 @@ class Launch(unittest.TestCase):
             self.assertIn(['odom', '/uav1/mavros/odometry/out'], found['/uav1/stereo/' + node].remap_args)
 
     def test_a_mount_is_published_where_it_is_given(self):
-        for file in ('oak_d', 'realsense_d400', 'two_cameras'):
+        for file, needed in (('oak_d', {}), ('realsense_d400', {}), ('two_cameras', {}),
+                             ('side_by_side', {'left_info': '/left.yaml', 'right_info': '/right.yaml'})):
             def publishers(**arguments):
-                config = load('cameras/%s.launch' % file, **arguments)
+                config = load('cameras/%s.launch' % file, **needed, **arguments)
                 return sorted(node.args for node in config.nodes if node.type == 'static_transform_publisher')
             self.assertEqual(publishers(), [])
             self.assertEqual(publishers(base_frame_id='camera_link', namespace='camera'), [])

@@ -263,7 +263,7 @@ class Places(unittest.TestCase):
         self.paused_and_resumed(robot, recognition)
         self.the_odometry_is_lost_and_restarted(robot, recognition)
         self.the_source_restarts(robot, recognition)
-        self.the_clock_jumps_back(robot, recognition)
+        self.the_clock_jumps_back(robot, recognition, file)
 
     def another_robot_that_does_not_answer(self, recognition, namespace):
         """Nothing waits for it; that it was asked in vain is told with its next key frame."""
@@ -372,12 +372,20 @@ class Places(unittest.TestCase):
         moved = np.linalg.norm(matrix_of(info.map_to_odom) - matrix_of(before.map_to_odom))
         self.assertTrue(moved < 1e-6 or info.loops > before.loops, '%.3f m without a loop' % moved)
 
-    def the_clock_jumps_back(self, robot, recognition):
+    def the_clock_jumps_back(self, robot, recognition, file):
         self.clock.jump_to(recognition.info[0].header.stamp + rospy.Duration.from_sec(0.5))
         robot.stamp = self.clock.now
         info = self.drive(robot, recognition, 1)
         self.assertEqual((info.places, info.loops), (1, 0))
         self.assertEqual(len([w for w in recognition.rosout.warnings if 'the clock jumped back' in w]), 1)
+        # A map that was loaded stays, and nothing else.
+        answer = recognition.call('load_places', LoadPlaces, file)
+        self.assertTrue(answer.success, answer.message)
+        self.drive(robot, recognition, 2)
+        self.clock.jump_to(recognition.info[0].header.stamp + rospy.Duration.from_sec(0.5))
+        robot.stamp = self.clock.now
+        info = self.drive(robot, recognition, 1)
+        self.assertEqual(info.places, int(answer.message.split()[0]) + 1)
         self.assertEqual(recognition.rosout.errors, [])
 
 

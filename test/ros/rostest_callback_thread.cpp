@@ -4,6 +4,7 @@
 
 #include <atomic>
 #include <functional>
+#include <stdexcept>
 #include <string>
 #include <thread>
 
@@ -96,6 +97,23 @@ TEST(CallbackThread, AfterStopNoCallbackRuns) {
   ASSERT_TRUE(witness.gets(99));
   EXPECT_EQ(calls, calls_then);
   EXPECT_FALSE(ran_late);
+}
+
+TEST(CallbackThread, WhatACallbackThrowsEndsThatCallAlone) {
+  std::atomic<int> last{0};
+  ros::NodeHandle nh;
+  ros::Publisher publisher = nh.advertise<std_msgs::Int32>("bad_numbers", 100);
+  CallbackThread callbacks;
+  ros::NodeHandle served = callbacks.serve(nh);
+  const boost::function<void(const std_msgs::Int32::ConstPtr&)> receive = [&](const std_msgs::Int32::ConstPtr& m) {
+    if (m->data % 2 == 0) throw std::runtime_error("an even number");
+    last = m->data;
+  };
+  ros::Subscriber subscriber = served.subscribe<std_msgs::Int32>("bad_numbers", 100, receive);
+  callbacks.start();
+  ASSERT_TRUE(waitUntil([&] { return publisher.getNumSubscribers() > 0; }));
+  for (int i = 1; i <= 5; ++i) publisher.publish(message(i));
+  EXPECT_TRUE(waitUntil([&] { return last == 5; }));
 }
 
 }  // namespace rostest_callback_thread

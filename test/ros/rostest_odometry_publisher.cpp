@@ -112,25 +112,29 @@ TEST_F(OdometryPublisherTest, ThePoseIsThatOfTheOdometry) {
   EXPECT_EQ(poses.messages[0].pose.covariance, odom_->messages[0].pose.covariance);
 }
 
-TEST_F(OdometryPublisherTest, MapPointsAreInOdom) {
+/// To a millimetre, wherever on earth odom begins.
+TEST_F(OdometryPublisherTest, MapPointsAreInTheCamerasFrame) {
   Inbox<sensor_msgs::PointCloud2> clouds(nh_, "map_points");
   start({});
   ASSERT_TRUE(spinUntil([&] { return clouds.isConnected() && publisher_->wantsMap(); }));
-  Eigen::Isometry3d T_odom_start = Eigen::Isometry3d::Identity(), T_base_camera = T_odom_start;
-  T_odom_start.translation() << 10.0, 0.0, 0.0;
-  T_base_camera.linear() << 0, 0, 1, -1, 0, 0, 0, -1, 0;
-  T_base_camera.translation() << 0.0, 0.0, 0.5;
+  Eigen::Isometry3d T_odom_start = Eigen::Isometry3d::Identity(), T_origin_camera = T_odom_start;
+  T_odom_start.translation() << 500000.25, 5400000.5, 100.0;
+  T_origin_camera.linear() << 0, 0, 1, 0, 1, 0, -1, 0, 0;  // turned to the right
+  T_origin_camera.translation() << 1.0, 0.0, 2.0;
+  std_msgs::Header header;
+  header.frame_id = "left_optical";
+  header.stamp = ros::Time(7);
   publisher_->restart(T_odom_start);
-  publisher_->publishMap({{1.0, 2.0, 3.0}}, T_base_camera, ros::Time(7));
+  publisher_->publishMap({{4.001, 2.0, 3.0}}, T_origin_camera, header);
   ASSERT_TRUE(spinUntil([&] { return !clouds.messages.empty(); }));
   const sensor_msgs::PointCloud2& cloud = clouds.messages[0];
-  EXPECT_EQ(cloud.header.frame_id, "odom");
+  EXPECT_EQ(cloud.header.frame_id, "left_optical");
   EXPECT_EQ(cloud.header.stamp, ros::Time(7));
   ASSERT_EQ(cloud.width * cloud.height, 1u);
   sensor_msgs::PointCloud2ConstIterator<float> point(cloud, "x");
-  EXPECT_FLOAT_EQ(point[0], 13.0f);  // ahead
-  EXPECT_FLOAT_EQ(point[1], -1.0f);  // to the right
-  EXPECT_FLOAT_EQ(point[2], -1.5f);  // below
+  EXPECT_FLOAT_EQ(point[0], -1.0f);
+  EXPECT_FLOAT_EQ(point[1], 2.0f);
+  EXPECT_FLOAT_EQ(point[2], 3.001f);
 }
 
 TEST_F(OdometryPublisherTest, WhileLostZerosAreThereWhereTheyAreAskedFor) {

@@ -27,6 +27,8 @@ struct Sample {
   int low = 2, high = 8;
   double ratio = 0.5;
   Kind kind = Kind::kA;
+  int size = 1;
+  double share = 0.25;
 
   void describe(OptionList& list) {
     list.add("flag", flag, "a switch");
@@ -34,6 +36,8 @@ struct Sample {
     list.add("high", high, {0, 10}, "px", "larger than low");
     list.add("ratio", ratio, {0.0, 1.0}, "", "a number");
     list.add("kind", kind, "a choice");
+    list.add("inner/size", size, {1, 5}, "", "of a component");
+    list.add("inner/most/share", share, {0.0, 1.0}, "", "of a component of that");
   }
 };
 
@@ -41,7 +45,12 @@ class ReconfigureServerTest : public ::testing::Test {
  protected:
   using Config = dynamic_reconfigure::Config;
 
-  ReconfigureServerTest() : spinner_(2), server_(nh_, listOptions(sample_), [this] { apply(); }) { spinner_.start(); }
+  ReconfigureServerTest()
+      : spinner_(2),
+        server_(
+            nh_, listOptions(sample_), [this] { apply(); }, listOptions(defaults_)) {
+    spinner_.start();
+  }
   ~ReconfigureServerTest() override { spinner_.stop(); }
 
   void apply() {
@@ -71,12 +80,12 @@ class ReconfigureServerTest : public ::testing::Test {
   void expectLimits(const Config& response, int low, int high) {
     EXPECT_EQ(sample_.low, low);
     EXPECT_EQ(sample_.high, high);
-    ASSERT_EQ(response.ints.size(), 2u);
+    ASSERT_EQ(response.ints.size(), 3u);
     EXPECT_EQ(response.ints[0].value, low);
     EXPECT_EQ(response.ints[1].value, high);
   }
 
-  Sample sample_;
+  Sample sample_, defaults_;
   std::atomic<int> applied_{0}, inside_{0};
   double pause_ = 0.0;  // s
   ros::AsyncSpinner spinner_;
@@ -191,12 +200,38 @@ TEST_F(ReconfigureServerTest, DescribesRangesAndDefaults) {
   const auto description =
       ros::topic::waitForMessage<dynamic_reconfigure::ConfigDescription>("/reconfigure_server/parameter_descriptions");
   ASSERT_TRUE(description);
-  ASSERT_EQ(description->groups.size(), 1u);
+  ASSERT_EQ(description->groups.size(), 3u);
   ASSERT_EQ(description->groups[0].parameters.size(), 5u);
   EXPECT_EQ(description->groups[0].parameters[1].description, "smaller than high [px]");
   EXPECT_EQ(description->max.ints.at(0).value, 10);
   EXPECT_EQ(description->dflt.ints.at(1).value, 8);
   EXPECT_NE(description->groups[0].parameters[4].edit_method.find("'value': 'b'"), std::string::npos);
+}
+
+/// As rqt_reconfigure shows them: a tab for each component, and beside a value the one to go back to.
+TEST_F(ReconfigureServerTest, ComponentsAreGroupsAndDefaultsStayWhatTheyAre) {
+  const dynamic_reconfigure::ConfigDescription before =
+      *ros::topic::waitForMessage<dynamic_reconfigure::ConfigDescription>("/reconfigure_server/parameter_descriptions");
+  const auto namesOfGroups = [](const auto& groups) {
+    std::vector<std::string> names;
+    for (const auto& group : groups)
+      names.push_back(group.name + " " + std::to_string(group.id) + " of " + std::to_string(group.parent));
+    return names;
+  };
+  const std::vector<std::string> expected = {"Default 0 of 0", "inner 1 of 0", "inner/most 2 of 0"};
+  EXPECT_EQ(namesOfGroups(before.groups), expected);
+  EXPECT_EQ(before.groups[1].parameters.at(0).name, "inner/size");
+  EXPECT_EQ(before.groups[2].parameters.at(0).name, "inner/most/share");
+  for (const Config& config : {before.dflt, before.min, before.max, request(Config())})
+    EXPECT_EQ(namesOfGroups(config.groups), expected);
+  Sample loaded;
+  loaded.high = 6;
+  ReconfigureServer server(
+      ros::NodeHandle("/loaded"), listOptions(loaded), [] {}, listOptions(defaults_));
+  const auto description =
+      ros::topic::waitForMessage<dynamic_reconfigure::ConfigDescription>("/loaded/parameter_descriptions");
+  EXPECT_EQ(description->dflt.ints.at(1).value, 8);
+  EXPECT_EQ(ros::topic::waitForMessage<Config>("/loaded/parameter_updates")->ints.at(1).value, 6);
 }
 
 }  // namespace rostest_reconfigure_server

@@ -152,6 +152,17 @@ TEST_F(RobotTransformsTest, AnotherPublisherOfOurChildIsNamed) {
   EXPECT_TRUE(contains(warnings_[0], ros::this_node::getName() + " publishes odom -> base_link")) << warnings_[0];
 }
 
+/// As on a TurtleBot.
+TEST_F(RobotTransformsTest, ARobotsOwnFrameAboveTheBaseIsNamedAsTheOneToMove) {
+  start(ros_conversions::OdometryFrames{"odom", "base_link"});
+  send(tf_static_, {transform("base_footprint", "base_link", ros::Time::now())});
+  waitForMarker(tf_static_);
+  send(tf_, {transform("odom", "base_link", ros::Time::now() + ros::Duration(1.0))});
+  waitForMarker(tf_);
+  ASSERT_EQ(warnings_.size(), 1u);
+  EXPECT_TRUE(contains(warnings_[0], "set base_frame_id:=base_footprint (or invert_tf)")) << warnings_[0];
+}
+
 TEST_F(RobotTransformsTest, ACycleIsNamed) {
   start(ros_conversions::OdometryFrames{"odom", "base_link"});
   send(tf_, {transform("map", "odom", ros::Time::now()), transform("base_link", "camera", ros::Time::now())});

@@ -125,7 +125,7 @@ TEST_F(PlacesFile, FilesThatAreNoneAreRefused) {
 }
 
 TEST_F(PlacesFile, PlacesOfTwoCamerasAreRefused) {
-  places_[1].features.camera.fx += 1.0;
+  places_[1].features.camera.fx *= 1.1;
   save(path_);
   EXPECT_TRUE(contains(refusal(path_), "its places 0 and 1 are of different cameras"));
 }

@@ -613,6 +613,10 @@ TEST_F(Tools, HashTellsOptionsApart) {
                                         "features_image: {image_transport: compressed}\n"
                                         "visual_odometry: {motion: {seed: 2}}\n";
   EXPECT_EQ(hash("--param motion/seed=2"), hash("--config " + (root_ / "same.yaml").string()));
+  // A block or a value that is left empty, as where all its lines are comments, is none.
+  std::ofstream(root_ / "empty.yaml") << "stereo_features:\n  # image_transport: compressed\n"
+                                         "visual_odometry:\n  motion:\n    seed:\n";
+  EXPECT_EQ(hash("--config " + (root_ / "empty.yaml").string()), defaults);
   // Booleans as the launch files' rosparam reads them.
   std::ofstream(root_ / "upright.yaml") << "stereo_features: {descriptor: {oriented: False}}\n";
   std::ofstream(root_ / "turned.yaml") << "stereo_features: {descriptor: {oriented: Yes}}\n";

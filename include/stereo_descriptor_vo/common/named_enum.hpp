@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 /// Enums are for the inside, their names for files, messages and people. Such an enum counts up from 0 and has a

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 /// Positions of a grey patch's samples: side x side of them around the feature's position in the left image, row by

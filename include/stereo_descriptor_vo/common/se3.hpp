@@ -3,6 +3,8 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;  ///< (translation, rotation), the order of ROS' 6x6 covariances

@@ -2,6 +2,8 @@
 
 #include <Eigen/Core>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 /// A rectified stereo pair: both views share one pinhole model, the right camera sits `baseline` metres along +x.
@@ -39,8 +41,8 @@ struct StereoCamera {
   double depth(double disparity) const { return fx * baseline / disparity; }
   double disparity(double depth) const { return fx * baseline / depth; }
 
-  /// Whether `other` can be this rig with another focus, or calibrated anew while it runs: images of one size, and
-  /// numbers that differ by at most 5 % (autofocus changes a focal length by 1 to 4 %).
+  /// Whether `other` can be this rig with another focus, or calibrated anew while it runs. Images have one size, and
+  /// numbers differ by at most 5 % (autofocus changes a focal length by 1 to 4 %).
   bool isLike(const StereoCamera& other) const;
 
   bool operator==(const StereoCamera& other) const;

@@ -2,6 +2,8 @@
 
 #include <chrono>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 /// Wall time between two laps.

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 /// Poses T_world_camera in the order of the frames; translations in m.

@@ -2,6 +2,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 /// Offset, px, from `pixel` to the place of its FAST corner between the pixels of a CV_8U image. It is the maximum of

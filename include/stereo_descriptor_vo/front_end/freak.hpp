@@ -41,7 +41,7 @@ class Freak {
   static const std::array<Field, kFields>& pattern();
   /// All 903 unordered pairs of fields, the candidates for bits.
   static const std::vector<FieldPair>& candidatePairs();
-  /// The 512 pairs in use, learnt by tools/learn_freak_pairs.
+  /// The 512 pairs in use, learnt by `learn freak-pairs`.
   static const std::array<FieldPair, kBits>& pairs();
 
   /// Distance from the centre, in px, that the pattern reaches for a key point size in px.

@@ -2,10 +2,12 @@
 
 #include <opencv2/core.hpp>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
-/// A CV_8U image at half its resolution, odd sizes rounded up. The pixels are those of cv::resize with INTER_AREA, which
-/// takes forty times longer for odd sizes than for even ones.
+/// A CV_8U image at half its resolution, odd sizes rounded up. The pixels are those of cv::resize with INTER_AREA,
+/// which takes forty times longer for odd sizes than for even ones.
 void halveImage(const cv::Mat& image, cv::Mat& half);
 
 }  // namespace sdvo

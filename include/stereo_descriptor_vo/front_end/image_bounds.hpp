@@ -2,6 +2,8 @@
 
 #include <opencv2/core/types.hpp>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 /// Whether everything within `reach` px of (u, v) lies inside an image. Pixel p covers [p - 0.5, p + 0.5].

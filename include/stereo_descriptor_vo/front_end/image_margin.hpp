@@ -2,6 +2,8 @@
 
 #include <opencv2/core.hpp>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 /// A CV_8U image that goes on as its outermost pixels for `margin` px on every side: cv::copyMakeBorder with

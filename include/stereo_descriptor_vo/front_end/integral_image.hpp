@@ -5,6 +5,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 /// Mean intensities of boxes with real-valued position and side. Pixel p covers [p - 0.5, p + 0.5]; interpolating the

@@ -2,7 +2,12 @@
 
 #include <opencv2/core.hpp>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
+
+/// Half side of the largest patch, px.
+constexpr int kLargestPatchRadius = 32;
 
 /// Values that a row of a sampled patch takes: the square's side rounded up, so that whole registers can be worked on.
 constexpr int patchStride(int radius) {

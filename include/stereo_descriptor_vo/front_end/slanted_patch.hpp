@@ -4,6 +4,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 /// A square patch of the left image that is compared with the right one, blind to a difference of brightness. It has

@@ -83,8 +83,8 @@ class LocalMap {
     /// (u_left, v_left, disparity without the rig's error) in the newest pair, px; beside its image where a point is
     /// about to enter.
     std::vector<cv::Point3f> pixels;
-    std::vector<int> point;  ///< what sightings call them
-    std::vector<int> seen;   ///< in how many pairs, the map's and forgotten ones
+    std::vector<int> point;   ///< what sightings call them
+    std::vector<float> seen;  ///< in how many pairs, the map's and forgotten ones, each by its probability
   };
   /// Points in the image of the newest pair, and those that a turn of `T_next_newest` brings into the next one.
   View view(const std::optional<Eigen::Isometry3d>& T_next_newest = std::nullopt) const;
@@ -145,6 +145,9 @@ class LocalMap {
   /// The points at a finite distance, in the map's origin, m.
   std::vector<Eigen::Vector3d> positions() const;
 
+  /// The newest pair's sightings count as far as its motion is the camera's, by this probability.
+  void weighNewest(double probability);
+
   /// The newest pair's sightings that were not cut off renew what their points look like: the descriptors, and a
   /// reference patch that has become too small or too large.
   void renewLooks(const StereoFeatures& features, const std::vector<Sighting>& sightings);
@@ -167,7 +170,7 @@ class LocalMap {
     std::vector<Observation> observations;  ///< in the order of the frames
     std::vector<std::uint8_t> descriptor;
     ReferencePatch reference;
-    int seen = 1;  ///< pairs, those included that the map has forgotten
+    float seen = 1.f;  ///< pairs, each by its probability, those included that the map has forgotten
   };
 
   /// The map as the optimizer takes it, and what of the map it is made of.

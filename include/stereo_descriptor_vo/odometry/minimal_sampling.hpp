@@ -3,6 +3,8 @@
 #include <array>
 #include <random>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 /// Indices of the correspondences that a minimal solver takes.

@@ -46,7 +46,8 @@ struct alignas(32) PoseVector {
 /// point takes away.
 struct PoseFactor {
   PoseVector Y[3];
-  int pose;  ///< which of the poses that may move, from zero on
+  PoseVector gradient;  ///< the point's part of the pose's
+  int pose;             ///< which of the poses that may move, from zero on
 };
 
 /// A point's own normal equations H x = g, as R = L^-1 of H = L L^T, and what else it is in, times R^T.
@@ -54,14 +55,23 @@ struct EliminatedPoint {
   Eigen::Matrix3d R;
   Eigen::Vector3d gradient;
   Eigen::Matrix<double, RigCalibration::kParameters, 3> by_calibration;
-  int factors;    ///< sightings in front of a camera that may move
-  int sightings;  ///< in front of any camera
+  RigCalibration::Vector calibration_gradient;  ///< the point's part of it
+  int factors;                                  ///< sightings in front of a camera that may move
+  int sightings;                                ///< in front of any camera
 
   // Weighted sums over these.
   double weight;
-  double square;                       ///< of normalised residuals
   double disparity_residual;           ///< normalised
   Eigen::Vector3d disparity_by_point;  ///< its derivatives
+};
+
+/// What normal equations are made of costs. A square s costs bend * log(1 + s / bend).
+struct Linearisation {
+  double bend;
+  double damping = 0.0;  ///< share of its diagonal that is added to a point's H
+  /// By the cost's second derivatives in place of weighted least squares, by which the point was eliminated before. A
+  /// point whose second derivatives have no clear minimum is left out.
+  bool is_exact = false;
 };
 
 /// Moves points (ray and inverse depth) to where they fit best after a step of poses and calibration. The step has six
@@ -75,11 +85,10 @@ class PoseEquations {
  public:
   void setZero(int poses);
 
-  /// Adds what a point's sightings say, and takes away what the point itself can explain of it (Schur complement). A
-  /// square s costs bend * log(1 + s / bend); the point's H is damped by this share of its diagonal. Also gives a
-  /// factor for each sighting from a pose that may move, and the squares that squareResiduals() gives.
-  EliminatedPoint add(const WindowProjection& projection, const SightedPoint& point, double bend, double damping,
-                      PoseFactor* factors, double* squares);
+  /// Adds what a point's sightings say, and takes away what the point itself can explain of it (Schur complement). Also
+  /// gives a factor for each sighting from a pose that may move, and the squares that squareResiduals() gives.
+  void add(const WindowProjection& projection, const SightedPoint& point, const Linearisation& linearisation,
+           PoseFactor* factors, double* squares, EliminatedPoint& eliminated);
 
   /// `hessian`: its lower triangle. The poses by their left perturbations (m, rad), then the calibration.
   void copyTo(Eigen::MatrixXd& hessian, Eigen::VectorXd& gradient) const;

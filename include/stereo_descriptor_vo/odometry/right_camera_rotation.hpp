@@ -14,9 +14,9 @@ namespace sdvo {
 /// is measured with rows of the left view alone and does not depend on it.
 class RightCameraRotation {
  public:
-  /// Takes in one pair; old pairs are forgotten slowly. Returns whether the camera turned before it: its change is more
-  /// than a rig shows, and more than this rig shows as a rule.
-  bool add(const StereoFeatures& features);
+  /// Takes in one pair; old pairs are forgotten slowly. Returns by how many times what is usual the camera turned before
+  /// it: usual on rigs, and on this one.
+  double add(const StereoFeatures& features);
 
   /// rad; NaN before the first pair with features.
   Eigen::Vector3d rotation() const;
@@ -46,9 +46,9 @@ class RightCameraRotation {
   struct UsualChange {
     double square = 0.0;  ///< of the changes of the last pairs, px^2
 
-    /// Takes in a change (px). Whether it is larger than a rig shows, and larger than this rig shows as a rule.
-    /// `memory_of_large`: ratio of the square that such a change leaves.
-    bool isExceededBy(double change, double memory_of_large);
+    /// Takes in a change (px) and returns how many times the usual one it is. `memory_of_large`: ratio of the square that
+    /// a large change leaves.
+    double exceededBy(double change, double memory_of_large);
   };
 
   Sums sums_, last_;  ///< of all pairs, and of the last one alone

@@ -4,6 +4,8 @@
 #include <array>
 #include <cstddef>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 /// Up to four poses.

@@ -12,24 +12,25 @@
 #include "stereo_descriptor_vo/odometry/feature_matcher.hpp"
 #include "stereo_descriptor_vo/odometry/floor.hpp"
 #include "stereo_descriptor_vo/odometry/local_map.hpp"
-#include "stereo_descriptor_vo/odometry/motion_belief.hpp"
+#include "stereo_descriptor_vo/odometry/motion_hypotheses.hpp"
+#include "stereo_descriptor_vo/odometry/motion_prior.hpp"
 #include "stereo_descriptor_vo/odometry/motion_search.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
 #include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
-#include "stereo_descriptor_vo/odometry/pose_verdict.hpp"
 #include "stereo_descriptor_vo/odometry/reacquisition.hpp"
 #include "stereo_descriptor_vo/odometry/repeated_images.hpp"
 #include "stereo_descriptor_vo/odometry/revisit.hpp"
 #include "stereo_descriptor_vo/odometry/right_camera_rotation.hpp"
-#include "stereo_descriptor_vo/odometry/suspicion.hpp"
 
 namespace sdvo {
 
-struct TrackingOptions : PoseVerdictOptions {
+struct TrackingOptions : MotionPriorOptions {
   int max_predicted_pairs = 1;
   double max_gap = 1.0;
   double max_guessed = 10.0;
+  double probability = 0.95;
+  double doubtful_deviation = 0.05;
 
   void describe(OptionList& list) {
     list.add("max_predicted_pairs", max_predicted_pairs, {0, 100}, "",
@@ -37,7 +38,12 @@ struct TrackingOptions : PoseVerdictOptions {
     list.add("max_gap", max_gap, {0.01, 60.0}, "s", "longest time between pairs over which the motion is predicted");
     list.add("max_guessed", max_guessed, {0.0, 1000.0}, "s",
              "longest time without usable images over which the pose goes on by the guess of another odometry");
-    PoseVerdictOptions::describe(list);
+    list.add("probability", probability, {0.5, 0.999}, "",
+             "a motion is doubtful that is the camera's with a smaller probability");
+    list.add(
+        "doubtful_deviation", doubtful_deviation, {0.001, 1000.0}, "m",
+        "a motion is doubtful whose translation has a larger standard deviation than this and 3 % of its distance");
+    MotionPriorOptions::describe(list);
   }
 };
 
@@ -118,8 +124,8 @@ class VisualOdometry {
   const VisualOdometryOptions& options() const { return options_; }
 
   /// Where the camera sits on the base, whose floor `planar` is about; until then at the base's origin, looking ahead.
-  /// Another place on the way is that of another camera: the odometry goes on from the base's last pose under a new
-  /// epoch, and the origin is where this camera was in the beginning.
+  /// Another place on the way is that of another camera. The odometry goes on from the base's last pose under a new
+  /// epoch. The origin is where this camera was in the beginning.
   void mountAt(const Eigen::Isometry3d& T_base_camera);
 
   /// The local map's points at a finite distance, in the origin, m; empty while there is no map.
@@ -142,34 +148,46 @@ class VisualOdometry {
   struct Candidate {
     RigCalibration calibration;
     LocalMap::Adjustment adjustment;
-    PoseEvidence evidence;  ///< after the adjustment
-    PoseVerdict verdict;
+    Eigen::Isometry3d motion;             ///< T_reference_current after the adjustment
     Eigen::Isometry3d T_keyframe_origin;  ///< of the key frame before the pair, before the adjustment
+    double distance = 0.0;                ///< from that key frame, m
+  };
+
+  /// Whether a motion is the camera's.
+  struct Doubt {
+    double probability = 1.0;            ///< that it is
+    double log_odds = 0.0;               ///< that it is not, by the pair alone
+    Matrix6d moment = Matrix6d::Zero();  ///< of the alternatives around the motion, by their probabilities, m and rad
+    std::string reason, cause;           ///< in words, of the likeliest alternative, for this pair and for the next
   };
 
   void refuse(const StereoFeatures& features) const;
-  MotionHypothesis propose(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
   bool isFrozen(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
-  MotionHypothesis reacquire(const StereoFeatures& features) const;
+  std::optional<MotionScene> reacquire(const StereoFeatures& features) const;
   void forgetRig();
   void begin(const StereoFeatures& features, double dt);
-  void suspect(double dt, const MotionHypothesis& found, const Step& step);
   Step seed(const StereoFeatures& features);
-  Step extendMap(const StereoFeatures& features, double dt, const MotionHypothesis& found);
-  Candidate adjust(const StereoFeatures& features, const MotionHypothesis& found);
-  PoseVerdict judge(const MotionHypothesis& found, const PoseEvidence& evidence) const;
-  void commit(const Candidate& candidate);
+  MotionScene sceneOf(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
+  double largestDoubt() const;
+  double secondsSinceMap(const StereoFeatures& features) const;
+  Step extendMap(const StereoFeatures& features, const MotionScene& scene, MotionHypothesis& found, double dt);
+  void learn(const Agreement& agreement);
+  Candidate adjust(const StereoFeatures& features, const MotionHypothesis& found, bool may_recall);
+  Doubt doubtOf(const MotionScene& scene, const MotionHypothesis& found) const;
+  std::string innovationWords(const MotionHypothesis& found) const;
+  void judge(const MotionScene& scene, const MotionHypothesis& found, const Candidate& candidate, const Doubt& doubt,
+             Step& step);
+  void commit(const Candidate& candidate, double probability);
   Step measure(const MotionHypothesis& found, const Candidate& candidate);
-  Matrix6d doubt(const MotionHypothesis& found, const Eigen::Isometry3d& T_previous_measured,
-                 const Eigen::Isometry3d& T_previous_current, double dt) const;
-  void noteVelocity(std::int64_t stamp, const MotionHypothesis& found, const PoseEvidence& evidence, bool is_trusted,
-                    const Matrix6d& covariance);
+  Step hold(double dt);
   Step predict(const StereoFeatures& features, double dt, const std::string& failure);
   void follow(const std::optional<MotionGuess>& guess);
   bool canFollow(const StereoFeatures& features) const;
   std::optional<Floor> floor() const;
   void move(const Eigen::Isometry3d& T_previous_current);
   OdometryResult report(const StereoFeatures& features, const MotionHypothesis& found, const Step& step) const;
+  void reportMatches(const StereoFeatures& features, const MotionHypothesis& found, const Step& step,
+                     OdometryResult& result) const;
 
   VisualOdometryOptions options_;
   Eigen::Isometry3d T_base_camera_;
@@ -180,7 +198,7 @@ class VisualOdometry {
 
   // State between pairs; reset() is the assignment of a new one.
   struct State {
-    explicit State(const CalibrationOptions& options) : calibration(options) {}
+    explicit State(const VisualOdometryOptions& options) : calibration(options.calibration), prior(options.tracking) {}
 
     std::optional<LocalMap> map;
     std::optional<LocalMap> candidate;  ///< the map with the pair; between pairs only its memory matters
@@ -190,20 +208,22 @@ class VisualOdometry {
     std::optional<std::int64_t> last_stamp;
     Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
     PoseCovariance covariance;  ///< of that pose
-    MotionBelief belief;
-    Suspicion suspicion;
+    MotionPrior prior;
+    CarriedDoubt doubt;
+    double usual_agreement = 0.9;  ///< ratio of lasting matches that agree with confirmed motions
     FloorBelief floor;
     RepeatedImages images;
     std::int64_t last_pose_stamp = 0;  ///< ns
     double distance = 0.0;
     int predicted_pairs = 0;
+    double unseen = 0.0;  ///< s, during which the images repeated themselves
     int pairs = 0;
     /// Since the last pose, as guesses have it, and its covariance; nothing while one is missing.
-    struct Unseen {
+    struct Followed {
       Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
       Matrix6d covariance = Matrix6d::Zero();
     };
-    std::optional<Unseen> unseen = Unseen();
+    std::optional<Followed> followed = Followed();
     GuessedMotion guessed;
     bool started = false;
     bool interrupted = false;  ///< where in the map the camera is is unknown

@@ -9,6 +9,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
 #include "stereo_descriptor_vo/common/descriptor_format.hpp"
 
 namespace sdvo {

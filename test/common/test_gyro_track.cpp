@@ -3,7 +3,7 @@
 #include <cstdint>
 #include <limits>
 
-#include "../../src/ros/imu_tracks.hpp"
+#include "../../src/common/imu_tracks.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 
 namespace sdvo {

@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <utility>
 
-#include "../common/text.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
+#include "text.hpp"
 
 namespace sdvo {
 namespace {

@@ -9,15 +9,15 @@
 #include <string>
 #include <vector>
 
-#include "../../src/ros/output_files.hpp"
+#include "../../src/common/whole_file.hpp"
 #include "../synthetic_scene.hpp"
 #include "../temporary_folder.hpp"
 
-namespace {
+namespace sdvo::test_whole_file {
 
 std::vector<std::string> synchronised;  ///< in the order of the calls, and with what had been written by then
 
-}  // namespace
+}  // namespace sdvo::test_whole_file
 
 /// In the place of libc's.
 extern "C" int fsync(int file) {
@@ -26,12 +26,13 @@ extern "C" int fsync(int file) {
   if (::readlink(link.c_str(), name, sizeof name - 1) < 0) return -1;
   struct stat status {};
   ::fstat(file, &status);
-  synchronised.push_back(S_ISDIR(status.st_mode) ? name : std::to_string(status.st_size) + " bytes");
+  sdvo::test_whole_file::synchronised.push_back(S_ISDIR(status.st_mode) ? name
+                                                                        : std::to_string(status.st_size) + " bytes");
   return 0;
 }
 
 namespace sdvo {
-namespace {
+namespace test_whole_file {
 
 namespace fs = std::filesystem;
 using synthetic::errorOf;
@@ -129,5 +130,5 @@ TEST_F(WholeFile, WhoCannotWriteLeavesNothing) {
   EXPECT_EQ(names(), std::set<std::string>{"map.bag"});
 }
 
-}  // namespace
+}  // namespace test_whole_file
 }  // namespace sdvo

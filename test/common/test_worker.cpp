@@ -8,7 +8,7 @@
 #include <thread>
 #include <vector>
 
-#include "../../src/ros/threads.hpp"
+#include "../../src/common/worker.hpp"
 
 namespace sdvo {
 namespace test_worker {

@@ -1,17 +1,17 @@
 // Finds the size-from-depth curve of the paper's section 4.1 by sampling: features are followed over pairs, the size at
 // which each is most similar to its first view is searched, and curves in disparity are fitted to these samples.
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <fstream>
 #include <iostream>
+#include <memory>
 #include <opencv2/core/utility.hpp>
 #include <stdexcept>
 
 #include "../../src/data/text_file.hpp"
-#include "../../src/tools/named_choice.hpp"
-#include "../../src/tools/run_tool.hpp"
 #include "../experiments/csv_table.hpp"
 #include "../experiments/depth_scale_fit.hpp"
+#include "learn.hpp"
+#include "named_choice.hpp"
 
 namespace {
 
@@ -76,7 +76,7 @@ std::vector<sdvo::DepthScaleOptions> constantCurves(const Arguments& arguments) 
 void writeYaml(const std::string& path, const sdvo::ShapeFit& shape, const sdvo::DepthScaleOptions& curve,
                const Arguments& arguments, std::size_t samples) {
   std::ofstream file(path);
-  file << "# Written by fit_depth_scale: " << shape.model << " on " << samples << " samples of "
+  file << "# Written by learn size-curve: " << shape.model << " on " << samples << " samples of "
        << arguments.setup.sequences.size() << " sequence(s), median residual " << shape.median_residual << " octaves.\n"
        << "stereo_features:\n"
        << "  size_curve:\n"
@@ -149,9 +149,11 @@ int run(const Arguments& arguments) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  CLI::App app("Fits the size-from-disparity curve to features followed over sequences in KITTI layout");
-  Arguments arguments;
+namespace sdvo {
+
+Learning addSizeCurve(CLI::App& app) {
+  const auto of_command = std::make_shared<Arguments>();
+  Arguments& arguments = *of_command;
   app.add_option("--sequence", arguments.setup.sequences,
                  "directories in KITTI layout, or numbers below --kitti, separated by commas")
       ->required()
@@ -178,5 +180,7 @@ int main(int argc, char** argv) {
   app.add_option("--param", arguments.setup.settings,
                  "option as name=value, for example descriptor/type=sift; repeatable")
       ->allow_extra_args(false);
-  return sdvo::runTool(app, argc, argv, [&] { return run(arguments); });
+  return [of_command] { return run(*of_command); };
 }
+
+}  // namespace sdvo

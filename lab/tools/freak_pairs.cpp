@@ -1,19 +1,19 @@
 // Learns which of the 903 field pairs become FREAK's 512 bits, by the procedure of Alahi et al. 2012, section 4.2:
 // pairs are ranked by how evenly they split a large set of key points, then taken greedily if they correlate little
 // with those already taken.
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <fstream>
 #include <iostream>
+#include <memory>
 #include <numeric>
 #include <opencv2/imgcodecs.hpp>
 #include <random>
 #include <stdexcept>
 
 #include "../../src/data/text_file.hpp"
-#include "../../src/tools/run_tool.hpp"
+#include "learn.hpp"
 #include "stereo_descriptor_vo/front_end/feature_detector.hpp"
 #include "stereo_descriptor_vo/front_end/freak.hpp"
 
@@ -110,7 +110,7 @@ int run(Arguments arguments) {
       choose(makeColumns(samples), static_cast<double>(samples.size()), arguments.max_correlation);
 
   std::ofstream file(arguments.output);
-  file << "// Learnt by tools/learn_freak_pairs from " << samples.size() << " key points in " << arguments.images.size()
+  file << "// Learnt by learn freak-pairs from " << samples.size() << " key points in " << arguments.images.size()
        << " images; largest correlation " << arguments.max_correlation << ".\n";
   for (std::size_t i = 0; i < chosen.size(); ++i)
     file << "{" << int{chosen[i].pair.first} << ", " << int{chosen[i].pair.second} << "},"
@@ -124,9 +124,11 @@ int run(Arguments arguments) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
-  CLI::App app("Learns FREAK's 512 field pairs from images and writes them as a C++ initialiser list");
-  Arguments arguments;
+namespace sdvo {
+
+Learning addFreakPairs(CLI::App& app) {
+  const auto of_command = std::make_shared<Arguments>();
+  Arguments& arguments = *of_command;
   app.add_option("images", arguments.images, "training images")->required();
   app.add_option("--output", arguments.output, "file to write, src/front_end/freak_pairs.inc of this package")
       ->required();
@@ -137,5 +139,7 @@ int main(int argc, char** argv) {
       ->capture_default_str()
       ->check(CLI::Range(0.1, 1.0));
   app.add_option("--seed", arguments.seed, "seed of the sizes")->capture_default_str();
-  return sdvo::runTool(app, argc, argv, [&] { return run(arguments); });
+  return [of_command] { return run(*of_command); };
 }
+
+}  // namespace sdvo

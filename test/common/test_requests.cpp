@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "../../src/ros/threads.hpp"
+#include "../../src/common/worker.hpp"
 
 namespace sdvo {
 namespace test_requests {

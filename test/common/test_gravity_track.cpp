@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "../../src/ros/imu_tracks.hpp"
+#include "../../src/common/imu_tracks.hpp"
 
 namespace sdvo {
 namespace test_gravity_track {

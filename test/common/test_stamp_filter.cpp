@@ -5,7 +5,7 @@
 #include <utility>
 #include <vector>
 
-#include "../../src/ros/stamps.hpp"
+#include "../../src/common/stamp_filter.hpp"
 
 namespace sdvo {
 namespace test_stamp_filter {

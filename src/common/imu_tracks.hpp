@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "stamps.hpp"
+#include "stamp_filter.hpp"
 
 namespace sdvo {
 

@@ -1,0 +1,15 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <functional>
+
+namespace sdvo {
+
+/// What a subcommand does: returns the exit code.
+using Learning = std::function<int()>;
+
+/// Add their options to a subcommand.
+Learning addSizeCurve(CLI::App& app);
+Learning addFreakPairs(CLI::App& app);
+
+}  // namespace sdvo

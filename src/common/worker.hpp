@@ -1,0 +1,110 @@
+#pragma once
+
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+namespace sdvo {
+
+/// One thread that handles items in order, behind a queue of bounded length: when it is full the oldest item is dropped
+/// and counted, so that latency cannot grow and callbacks never wait. The handler must not throw.
+template <class Item>
+class Worker {
+ public:
+  Worker(std::size_t capacity, std::function<void(const Item&)> handle)
+      : capacity_(capacity), handle_(std::move(handle)), thread_([this] { run(); }) {}
+
+  ~Worker() { stop(); }
+
+  Worker(const Worker&) = delete;
+  Worker& operator=(const Worker&) = delete;
+
+  void push(Item item) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      if (queue_.size() == capacity_) {
+        queue_.pop_front();
+        ++dropped_;
+      }
+      queue_.push_back(std::move(item));
+    }
+    wake_.notify_one();
+  }
+
+  /// Waits for the item in work; those that wait are left. For an owner whose handler refers to this worker: the
+  /// pointer to it must stay until then.
+  void stop() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      stopping_ = true;
+    }
+    wake_.notify_one();
+    if (thread_.joinable()) thread_.join();
+  }
+
+  /// Items dropped since the start.
+  std::uint64_t dropped() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return dropped_;
+  }
+
+ private:
+  void run() {
+    for (;;) {
+      std::unique_lock<std::mutex> lock(mutex_);
+      wake_.wait(lock, [this] { return stopping_ || !queue_.empty(); });
+      if (stopping_) return;
+      const Item item = std::move(queue_.front());
+      queue_.pop_front();
+      lock.unlock();
+      handle_(item);
+    }
+  }
+
+  const std::size_t capacity_;
+  const std::function<void(const Item&)> handle_;
+  mutable std::mutex mutex_;
+  std::condition_variable wake_;
+  std::deque<Item> queue_;
+  std::uint64_t dropped_ = 0;
+  bool stopping_ = false;
+  std::thread thread_;  // last: it starts when everything else is there
+};
+
+/// What a service asks of the thread that handles a stream of items: it holds for items that arrive after the request,
+/// not for those that wait in a queue already. The newest request wins. For any thread.
+template <class Request>
+class Requests {
+ public:
+  void post(Request request) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++posted_;
+    pending_ = std::move(request);
+  }
+
+  /// Requests so far: to be noted with each item that arrives.
+  int posted() const {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return posted_;
+  }
+
+  /// The request that holds for an item and has not been taken; `posted` as noted when that arrived.
+  std::optional<Request> take(int posted) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (posted < posted_) return std::nullopt;
+    return std::exchange(pending_, std::nullopt);
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  std::optional<Request> pending_;
+  int posted_ = 0;
+};
+
+}  // namespace sdvo

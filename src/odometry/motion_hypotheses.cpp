@@ -1,0 +1,279 @@
+#include "stereo_descriptor_vo/odometry/motion_hypotheses.hpp"
+
+#include <algorithm>
+#include <bitset>
+#include <cmath>
+#include <cstddef>
+#include <set>
+#include <utility>
+
+#include "ascending_rows.hpp"
+#include "stereo_descriptor_vo/odometry/pose_problem.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr double kLogOddsOfSighting = 0.75;  // that a point stands still, by each confirmed sighting (chosen)
+constexpr double kHalfLife = 2.5;            // pairs: a certain doubt then lasts for four (chosen)
+constexpr double kSameMotion = 1.0;          // px: noise of a corner and of the map's point
+
+/// Of n observations that are correlated by this coefficient (Kish 1965, the design effect): 2.5 at most. Points of one
+/// object move together, and a view has few objects.
+double effectiveNumber(double n) {
+  constexpr double kCorrelation = 0.4;
+  return n > 0.0 ? n / (1.0 + (n - 1.0) * kCorrelation) : 0.0;
+}
+
+bool contains(const std::vector<int>& values, int value) {
+  return std::find(values.begin(), values.end(), value) != values.end();
+}
+
+/// Whether two hypotheses mean one motion, for what the one explains and for what the other does: far points alone do
+/// not tell a turn from a step.
+bool areOne(const StereoCamera& camera, const MotionHypothesis& a, const MotionHypothesis& b) {
+  const Eigen::Isometry3d &T_a = a.motion.T_current_reference, &T_b = b.motion.T_current_reference;
+  return agree(camera, a.correspondences, a.motion.inliers, T_a, T_b, kSameMotion) &&
+         agree(camera, b.correspondences, b.motion.inliers, T_a, T_b, kSameMotion);
+}
+
+/// Whether a motion would do as well as another one that is so far `apart`.
+bool isTolerable(const MotionScene& scene, const Eigen::Isometry3d& motion, const Eigen::Isometry3d& apart) {
+  constexpr double kAngle = 0.02;  // rad (chosen: about a degree)
+  return apart.translation().norm() <= scene.tolerance + kTolerableRatio * motion.translation().norm() &&
+         logSO3(apart.linear()).norm() <= kAngle + kTolerableRatio * logSO3(motion.linear()).norm();
+}
+
+/// The prior's logarithm, relative to its best motion, is bounded by the probability that it is wrong.
+double logPrior(const MotionHypothesis& hypothesis) {
+  return std::max(-0.5 * hypothesis.innovation, std::log(kTailProbability));
+}
+
+std::vector<int> sorted(std::vector<int> values) {
+  std::sort(values.begin(), values.end());
+  return values;
+}
+
+/// Logarithm of prior times likelihood of each hypothesis. Whatever hypothesis matched a point counts for all of them;
+/// what none of them explains speaks against none.
+std::vector<double> logWeights(const MotionScene& scene, double threshold,
+                               const std::vector<MotionHypothesis>& hypotheses) {
+  std::set<std::pair<int, int>> pairs;
+  std::vector<Correspondence> matches;
+  std::vector<double> sightings;
+  for (const MotionHypothesis& hypothesis : hypotheses)
+    for (std::size_t i = 0; i < hypothesis.matches.size(); ++i) {
+      const FeatureMatch& match = hypothesis.matches[i];
+      if (!pairs.emplace(match.reference, match.current).second) continue;
+      matches.push_back(hypothesis.correspondences[i]);
+      sightings.push_back(hypothesis.sightingsOf(static_cast<int>(i)));
+    }
+  const PoseProblem problem(scene.features.camera, matches, threshold);
+  std::vector<double> own(hypotheses.size(), 0.0);
+  std::vector<bool> is_explained(matches.size(), false);
+  for (std::size_t k = 0; k < hypotheses.size(); ++k)
+    for (const int i : problem.inliers(hypotheses[k].motion.T_current_reference)) {
+      own[k] += sightings[static_cast<std::size_t>(i)];
+      is_explained[static_cast<std::size_t>(i)] = true;
+    }
+  double all = 0.0;
+  int points = 0;
+  for (std::size_t i = 0; i < matches.size(); ++i)
+    if (is_explained[i]) all += sightings[i], ++points;
+  std::vector<double> weights;
+  for (std::size_t k = 0; k < hypotheses.size(); ++k)
+    weights.push_back(logPrior(hypotheses[k]) + logLikelihood(all - own[k], points));
+  return weights;
+}
+
+/// A motion that explains a part of the pair that the chosen one does not, and that chance does not either.
+struct Competitor {
+  const MotionHypothesis* hypothesis;
+  double log_weight;
+  std::vector<int> rows;  ///< of the pair, that it explains alone
+};
+
+/// Each motion once.
+std::vector<Competitor> rivalsOf(const MotionScene& scene, double threshold, const MotionHypothesis& chosen,
+                                 const std::vector<MotionHypothesis>& hypotheses, const std::vector<double>& weights) {
+  const StereoCamera& camera = scene.features.camera;
+  const std::vector<int> own = sorted(chosen.inlierRows());
+  const int left = chosen.agreement.matches - chosen.agreement.inliers;
+  std::vector<Competitor> rivals;
+  for (std::size_t k = 0; k < hypotheses.size(); ++k) {
+    const MotionHypothesis& other = hypotheses[k];
+    if (areOne(camera, chosen, other)) continue;
+    Competitor rival{&other, weights[k], without(sorted(other.inlierRows()), own)};
+    const int rows = static_cast<int>(rival.rows.size());
+    const double chance = chanceOfAgreement(threshold, other.gate);
+    if (logFalseAlarms(std::max(left, rows), rows, chance) > std::log(kTailProbability)) continue;
+    const auto same = std::find_if(rivals.begin(), rivals.end(),
+                                   [&](const Competitor& before) { return areOne(camera, *before.hypothesis, other); });
+    if (same == rivals.end())
+      rivals.push_back(std::move(rival));
+    else if (same->log_weight < rival.log_weight)
+      *same = std::move(rival);
+  }
+  return rivals;
+}
+
+/// The chosen motion's probability, and the moment of the rivals around it.
+void compare(const MotionScene& scene, const std::vector<Competitor>& rivals, double log_weight,
+             MotionHypothesis& chosen) {
+  double total = 1.0;
+  for (const Competitor& rival : rivals) total += std::exp(rival.log_weight - log_weight);
+  std::vector<int> explained;
+  for (const Competitor& rival : rivals) {
+    explained.insert(explained.end(), rival.rows.begin(), rival.rows.end());
+    const Eigen::Isometry3d& T = rival.hypothesis->motion.T_current_reference;
+    const double probability = std::exp(rival.log_weight - log_weight) / total;
+    // Both start from the same pair of the map.
+    const Eigen::Isometry3d apart = chosen.motion.T_current_reference * T.inverse();
+    chosen.rivals_moment += probability * momentOf(logSE3(apart));
+    if (isTolerable(scene, chosen.motion.T_current_reference, apart)) continue;
+    chosen.probability -= probability;
+    if (!chosen.rival || chosen.rival->probability < probability)
+      chosen.rival = {T, probability, static_cast<int>(rival.rows.size())};
+  }
+  // What rivals explain does not speak against the chosen one.
+  explained = sorted(std::move(explained));
+  for (int i = 0; i < static_cast<int>(chosen.matches.size()); ++i) {
+    const int row = chosen.matches[static_cast<std::size_t>(i)].current;
+    if (!std::binary_search(explained.begin(), explained.end(), row)) continue;
+    --chosen.agreement.matches;
+    chosen.agreement.lasting_matches -= chosen.isLasting(i);
+  }
+}
+
+}  // namespace
+
+double logOdds(double probability) {
+  return std::log(probability / (1.0 - probability));
+}
+
+double probabilityOf(double log_odds) {
+  return 1.0 / (1.0 + std::exp(-log_odds));
+}
+
+double MotionHypothesis::sightingsOf(int match) const {
+  return std::min<double>(view->seen[static_cast<std::size_t>(matches[static_cast<std::size_t>(match)].reference)],
+                          kLastingSightings);
+}
+
+std::vector<int> MotionHypothesis::inlierRows(const std::vector<int>& rejected) const {
+  std::vector<int> rows;
+  rows.reserve(motion.inliers.size());
+  for (const int i : motion.inliers)
+    if (!contains(rejected, matches[i].current)) rows.push_back(matches[i].current);
+  return rows;
+}
+
+void MotionHypothesis::countAgreement() {
+  agreement.matches = static_cast<int>(matches.size());
+  agreement.lasting_matches = 0;
+  for (int i = 0; i < agreement.matches; ++i) agreement.lasting_matches += isLasting(i);
+  reject({});
+}
+
+void MotionHypothesis::reject(const std::vector<int>& rows) {
+  agreement.inliers = agreement.lasting_inliers = 0;
+  for (const int i : motion.inliers) {
+    if (contains(rows, matches[i].current)) continue;
+    ++agreement.inliers;
+    agreement.lasting_inliers += isLasting(i);
+  }
+}
+
+double logFalseAlarms(int matches, int inliers, double chance) {
+  constexpr int kSample = 3;
+  if (inliers <= kSample) return 0.0;
+  const auto logChoose = [](int n, int k) {
+    return std::lgamma(n + 1.0) - std::lgamma(k + 1.0) - std::lgamma(n - k + 1.0);
+  };
+  return std::log(matches - kSample) + logChoose(matches, inliers) + logChoose(inliers, kSample) +
+         (inliers - kSample) * std::log(chance);
+}
+
+double chanceOfAgreement(double threshold, double gate) {
+  // A ball of (u_left, v_left, u_right) in a cylinder as deep as it is wide.
+  return std::min(2.0 / 3.0 * std::pow(threshold / gate, 3), 0.5);
+}
+
+bool agree(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
+           const std::vector<int>& points, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double within) {
+  const auto same = std::count_if(points.begin(), points.end(), [&](int i) {
+    const Eigen::Vector3d in_a = a * correspondences[i].point, in_b = b * correspondences[i].point;
+    if (in_a.z() <= 0.0 || in_b.z() <= 0.0) return false;
+    return (camera.project(in_a) - camera.project(in_b)).norm() < within;
+  });
+  return 2 * static_cast<std::size_t>(same) > points.size();
+}
+
+double logLikelihood(double of_others, int points) {
+  if (points == 0) return 0.0;
+  return -effectiveNumber(points) * kLogOddsOfSighting * of_others / points;
+}
+
+double logOddsMisled(const MotionScene& scene, const MotionHypothesis& hypothesis) {
+  const Agreement& agreement = hypothesis.agreement;
+  double confirmed = 0.0;
+  if (agreement.lasting_matches > 0) {
+    // Agreement with the camera's motion against agreement with one of something that moves.
+    const double by_chance = probabilityOf(-kLogOddsOfSighting * MotionHypothesis::kLastingSightings);
+    const double usual = std::max(scene.usual_agreement, 0.5);
+    const double ratio = static_cast<double>(agreement.lasting_inliers) / agreement.lasting_matches;
+    confirmed = effectiveNumber(agreement.lasting_matches) *
+                (ratio * std::log(usual / by_chance) + (1.0 - ratio) * std::log((1.0 - usual) / (1.0 - by_chance)));
+  }
+  return CarriedDoubt::kUnsuspected - logPrior(hypothesis) - confirmed;
+}
+
+MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::vector<MotionHypothesis> hypotheses) {
+  double match_time = 0.0, motion_time = 0.0;
+  for (const MotionHypothesis& hypothesis : hypotheses)
+    match_time += hypothesis.match_time, motion_time += hypothesis.motion_time;
+  const auto by_inliers = [](const MotionHypothesis& a, const MotionHypothesis& b) {
+    return a.motion.inliers.size() < b.motion.inliers.size();
+  };
+  const auto failures = std::stable_partition(hypotheses.begin(), hypotheses.end(),
+                                              [](const MotionHypothesis& h) { return h.motion.success; });
+  MotionHypothesis chosen;
+  if (failures == hypotheses.begin()) {
+    // The largest failure has the best reason.
+    chosen = *std::max_element(hypotheses.begin(), hypotheses.end(), by_inliers);
+  } else {
+    hypotheses.erase(failures, hypotheses.end());
+    const std::vector<double> weights = logWeights(scene, threshold, hypotheses);
+    const auto likeliest = std::max_element(weights.begin(), weights.end());
+    const MotionHypothesis& first = hypotheses[static_cast<std::size_t>(likeliest - weights.begin())];
+    // Of one motion the estimate with the most inliers.
+    chosen = first;
+    for (const MotionHypothesis& other : hypotheses)
+      if (by_inliers(chosen, other) && areOne(scene.features.camera, first, other)) chosen = other;
+    compare(scene, rivalsOf(scene, threshold, chosen, hypotheses, weights), *likeliest, chosen);
+  }
+  chosen.match_time = match_time, chosen.motion_time = motion_time;
+  return chosen;
+}
+
+void CarriedDoubt::raise(double log_odds, const std::string& cause) {
+  if (log_odds <= log_odds_) return;
+  log_odds_ = std::min(log_odds, kCertain);
+  cause_ = cause;
+}
+
+void CarriedDoubt::pass() {
+  log_odds_ = kUnsuspected + (log_odds_ - kUnsuspected) * std::exp2(-1.0 / kHalfLife);
+}
+
+double coverage(const StereoFeatures& features, const std::vector<int>& rows) {
+  constexpr int kColumns = 8, kRows = 4;
+  std::bitset<kColumns * kRows> cells;
+  for (const int i : rows) {
+    const int column = static_cast<int>(features.u[i] * kColumns / features.camera.width);
+    const int row = static_cast<int>(features.v[i] * kRows / features.camera.height);
+    cells.set(static_cast<std::size_t>(std::clamp(row, 0, kRows - 1) * kColumns + std::clamp(column, 0, kColumns - 1)));
+  }
+  return static_cast<double>(cells.count()) / (kColumns * kRows);
+}
+
+}  // namespace sdvo

@@ -1,0 +1,64 @@
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "../../src/ros/camera_finder.hpp"
+
+namespace sdvo {
+namespace test_camera_finder {
+
+ros::master::V_TopicInfo topics(const std::vector<std::string>& folders, const std::vector<std::string>& images) {
+  ros::master::V_TopicInfo topics;
+  for (const std::string& folder : folders) {
+    topics.emplace_back(folder + "camera_info", "sensor_msgs/CameraInfo");
+    for (const std::string& image : images) {
+      topics.emplace_back(folder + image, "sensor_msgs/Image");
+      topics.emplace_back(folder + image + "/compressed", "sensor_msgs/CompressedImage");
+    }
+  }
+  return topics;
+}
+
+/// What the drivers of docs/cameras.md publish.
+TEST(CameraFinder, KnowsTheDriversNames) {
+  const auto realsense = findStereoCameras(
+      "/camera/", topics({"/camera/infra1/", "/camera/infra2/", "/camera/depth/"}, {"image_rect_raw", "image_raw"}));
+  ASSERT_EQ(realsense.size(), 1u);
+  EXPECT_EQ(realsense[0].at("left/image_rect"), "/camera/infra1/image_rect_raw");
+  EXPECT_EQ(realsense[0].at("right/image_rect"), "/camera/infra2/image_rect_raw");
+  EXPECT_EQ(realsense[0].at("left/camera_info"), "/camera/infra1/camera_info");
+  EXPECT_EQ(realsense[0].at("right/camera_info"), "/camera/infra2/camera_info");
+  const auto zed =
+      findStereoCameras("/zed2/", topics({"/zed2/zed_node/left/", "/zed2/zed_node/right/", "/zed2/zed_node/rgb/"},
+                                         {"image_rect_color", "image_rect_gray"}));
+  ASSERT_EQ(zed.size(), 1u);
+  EXPECT_EQ(zed[0].at("right/image_rect"), "/zed2/zed_node/right/image_rect_gray");
+}
+
+TEST(CameraFinder, TheNamespacesOwnNameIsNoSide) {
+  const auto found = findStereoCameras("/left/", topics({"/left/cam0/", "/left/cam1/"}, {"image_rect"}));
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0].at("right/image_rect"), "/left/cam1/image_rect");
+}
+
+TEST(CameraFinder, WhatIsNoRectifiedPairIsNone) {
+  EXPECT_TRUE(findStereoCameras("/stereo/", topics({"/stereo/left/", "/stereo/right/"}, {"image_raw"})).empty());
+  EXPECT_TRUE(findStereoCameras("/stereo/", topics({"/stereo/left/"}, {"image_rect"})).empty());
+  EXPECT_TRUE(findStereoCameras("/stereo/", topics({"/other/left/", "/other/right/"}, {"image_rect"})).empty());
+  auto uncalibrated = topics({"/stereo/left/", "/stereo/right/"}, {"image_rect"});
+  uncalibrated.erase(uncalibrated.begin());
+  EXPECT_TRUE(findStereoCameras("/stereo/", uncalibrated).empty());
+}
+
+TEST(CameraFinder, EachOfSeveralIsFound) {
+  const auto found = findStereoCameras(
+      "/robot/",
+      topics({"/robot/front/left/", "/robot/front/right/", "/robot/back/left/", "/robot/back/right/"}, {"image_rect"}));
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_EQ(found[0].at("left/image_rect"), "/robot/back/left/image_rect");
+  EXPECT_EQ(found[1].at("left/image_rect"), "/robot/front/left/image_rect");
+}
+
+}  // namespace test_camera_finder
+}  // namespace sdvo
