@@ -8,6 +8,7 @@ COMMANDS = {
     "accuracy": ("accuracy", "errors of recorded, disguised and rendered drives"),
     "covariance": ("covariance", "covariances against errors"),
     "faults": ("faults", "faults put into drives: what the odometry says of them"),
+    "outages": ("outages", "drives blinded for a while: is the map found again, and only there?"),
     "ablate": ("ablate", "the odometry without one of its mechanisms"),
     "benchmark": ("benchmark", "time of kernels, drives and nodelets"),
     "places": ("places", "recognised revisits and false loops of long drives"),

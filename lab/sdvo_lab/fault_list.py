@@ -236,6 +236,37 @@ def covered(share, velocity, depth=4.0):
     return fault
 
 
+def blackened(pair):
+    return dataclasses.replace(pair, left=numpy.zeros_like(pixels(pair.left)), right=numpy.zeros_like(pixels(pair.right)))
+
+
+def black(count):
+    def fault(pairs, drive, random):
+        return pairs[:FIRST] + [blackened(pair) for pair in pairs[FIRST:FIRST + count]] + pairs[FIRST + count:]
+    return fault
+
+
+def paused_in_the_dark(count):
+    """The drive stops for so many black pairs."""
+    def fault(pairs, drive, random):
+        last = pairs[FIRST - 1]
+        dark = [dataclasses.replace(blackened(last), stamp=last.stamp + k * PERIOD) for k in range(1, count + 1)]
+        return pairs[:FIRST] + dark + [dataclasses.replace(pair, stamp=pair.stamp + count * PERIOD) for pair in pairs[FIRST:]]
+    return fault
+
+
+def every_100th_black(pairs, drive, random):
+    return [blackened(pair) if pair.truth % 100 == FIRST else pair for pair in pairs]
+
+
+def carried_in_the_dark(pairs, drive, random):
+    """Five black pairs, after which the camera is where it would be ten pairs later."""
+    stamps = [pair.stamp for pair in pairs]
+    pairs = black(5)(pairs, drive, random)
+    pairs = pairs[:FIRST + 5] + pairs[FIRST + 15:]
+    return [dataclasses.replace(pair, stamp=stamp) for pair, stamp in zip(pairs, stamps)]
+
+
 FAULTS = {
     "none": lambda pairs, drive, random: pairs,
     "frozen": frozen, "frozen_right": frozen_right, "right_100_ms_late": right_late, "swapped": swapped,
@@ -249,6 +280,8 @@ FAULTS = {
     "right_gain_0.4": images(gained(0.4), (1,)), "gain_3": images(gained(3.0)),
     "darkness": images(grey(2)), "white": images(grey(255)), "left_black": images(grey(0), (0,)),
     "right_black": images(grey(0), (1,)),
+    "black_1": black(1), "black_5": black(5), "black_20": black(20), "black_100": paused_in_the_dark(100),
+    "every_100th_black": every_100th_black, "carried_in_the_dark": carried_in_the_dark,
     "noise_10": images(noisy(10)), "noise_30": images(noisy(30)), "salt_and_pepper": images(salted), "rain": images(rained),
     "blur_4_px": images(blurred), "right_blur_4_px": images(blurred, (1,)), "motion_blur_31_px": images(smeared),
     "jpeg_10": images(compressed),
@@ -261,6 +294,7 @@ STANDING_FAULTS = {
     "standing_mover_40": covered(0.4, (1.0, 0.0)), "standing_mover_55": covered(0.55, (1.0, 0.0)),
     "standing_mover_70": covered(0.7, (1.0, 0.0)), "standing_approached_40": covered(0.4, (0.0, 1.0)),
     "standing_approached_70": covered(0.7, (0.0, 1.0)), "standing_dark": FAULTS["darkness"],
+    **{f"standing_{name}": FAULTS[name] for name in ("black_1", "black_5", "black_20", "black_100", "every_100th_black", "gap_3_s")},
 }
 
 

@@ -54,12 +54,12 @@ class Step:
 
 def steps_of(states, estimate, pairs, drive):
     """Steps of a run, with the errors of their motions."""
-    steps = []
+    steps, last = [], 0  # pair with a pose, at which the next motion begins
     for i, state in enumerate(states):
         step = Step(state.state, pairs[i].stamp, state.reason, state.moved)
         if step.moved:
-            true = poses.relative(drive.poses[pairs[i - 1].truth], drive.poses[pairs[i].truth])
-            xi = poses.logarithm(poses.relative(poses.relative(estimate[i - 1], estimate[i]), true))
+            true = poses.relative(drive.poses[pairs[last].truth], drive.poses[pairs[i].truth])
+            xi = poses.logarithm(poses.relative(poses.relative(estimate[last], estimate[i]), true))
             step.error, step.angle = numpy.linalg.norm(xi[:3]), numpy.degrees(numpy.linalg.norm(xi[3:]))
             sigmas = [poses.square(xi[part], state.motion[part, part]) ** 0.5 for part in (slice(0, 3), slice(3, 6))]
             step.sigmas = max(sigmas)
@@ -69,6 +69,8 @@ def steps_of(states, estimate, pairs, drive):
             step.is_wrong = any(part > SIGMAS and matter for part, matter in zip(sigmas, matters))
             step.nees = poses.square(xi, state.motion)
         steps.append(step)
+        if state.state in ("TRACKING", "DEGRADED"):
+            last = i
     return steps
 
 

@@ -81,6 +81,7 @@ struct OdometryOutputOptions {
   std::string guess_frame_id;
   bool use_imu = false;
   double guess_timeout = 0.1;
+  double guess_error = 0.1;
   int queue_size = 1;
   int max_path_length = 20000;
   int opencv_threads = -1;
@@ -107,6 +108,9 @@ struct OdometryOutputOptions {
              "look for the rotation where the gyro of topic imu has it, too, and take roll and pitch of the first pose "
              "from its "
              "accelerometer while the robot stands; not with guess_frame_id");
+    list.add("guess_error", guess_error, {0.001, 1.0}, "ratio",
+             "standard deviation of the guess's motions, of their distance and turn: the pose goes on by them while no "
+             "images help");
     list.add("guess_timeout", guess_timeout, {0.0, 1.0}, "s",
              "wall time to wait for either at each pair; seldom once it did not come in time");
     list.add("queue_size", queue_size, {1, 1000}, "",

@@ -94,6 +94,23 @@ LocalMap::View LocalMap::view(const std::optional<Eigen::Isometry3d>& T_next_new
   return view;
 }
 
+DescribedPoints LocalMap::points() const {
+  const double farthest = kFarthestDisparity / (camera_.fx * camera_.baseline);  // 1/m
+  const int since = lookedForSince();
+  DescribedPoints rows;
+  rows.kind = kind_;
+  rows.positions.reserve(points_.size());
+  rows.descriptors.create(static_cast<int>(points_.size()), kind_.bytes, CV_8U);
+  for (const Point& point : points_) {
+    if (!isLookedFor(point, since)) continue;
+    std::copy(point.descriptor.begin(), point.descriptor.end(), rows.descriptors.ptr(rows.count()));
+    const double inverse_depth = std::max(point.position.ray_and_inverse_depth.z(), farthest);
+    rows.positions.push_back(point.position.scaledPointIn(newestPose()) / inverse_depth);
+  }
+  rows.descriptors = rows.descriptors.rowRange(0, rows.count());
+  return rows;
+}
+
 void LocalMap::insert(const PatchAlignmentOptions& alignment, const StereoFeatures& features, int id,
                       const Eigen::Isometry3d& T_camera_origin, const std::vector<Sighting>& sightings,
                       const RigCalibration& calibration) {

@@ -25,15 +25,13 @@ double medianMiss(const StereoCamera& camera, const Eigen::Isometry3d& T_current
 
 Revisit::Revisit(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion,
                  const PatchAlignmentOptions& alignment)
-    : motion_options_(motion), alignment_options_(alignment), matcher_(matcher.widened()), estimator_(motion) {}
+    : motion_options_(motion), alignment_options_(alignment), views_(matcher.widened(), motion) {}
 
 bool Revisit::recall(const StereoFeatures& features, const RigCalibration& calibration, LocalMap& map) const {
   const OldKeyframe* old = map.revisited();
   if (!old) return false;
   const Eigen::Isometry3d expected = map.newestPose() * old->T_camera_origin.inverse();
-  const auto matches = matcher_.match(old->rows, features, expected);
-  const auto correspondences = correspond(old->rows, features, matches, calibration);
-  MotionEstimate motion = estimator_.estimate(features.camera, correspondences, expected);
+  auto [matches, correspondences, motion] = views_.match(old->rows, features, calibration, expected);
   if (!motion.success) return false;
 
   std::vector<LocalMap::Tie> ties;

@@ -40,6 +40,7 @@ VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
     : options_(checked(options)),
       T_base_camera_(lookingAhead()),
       search_(options.matcher, options.motion, options.alignment),
+      reacquisition_(options.matcher, options.motion),
       revisit_(options.matcher, options.motion, options.alignment),
       optimizer_(options.window),
       state_(options) {}
@@ -47,6 +48,7 @@ VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
 void VisualOdometry::configure(const VisualOdometryOptions& options) {
   options_ = checked(options);
   search_ = MotionSearch(options.matcher, options.motion, options.alignment);
+  reacquisition_ = Reacquisition(options.matcher, options.motion);
   revisit_ = Revisit(options.matcher, options.motion, options.alignment);
   optimizer_ = WindowOptimizer(options.window);
   state_.prior.configure(options.tracking);
@@ -58,12 +60,13 @@ void VisualOdometry::reset() {
 }
 
 void VisualOdometry::breakStream() {
-  state_.map.reset();
+  state_.interrupted = true;
   state_.prior.interrupt();
 }
 
 void VisualOdometry::forgetTime() {
   breakStream();
+  state_.map.reset();  // how long ago it was seen is unknown
   state_.last_stamp.reset();
   state_.prior.forget();
 }
@@ -74,9 +77,43 @@ void VisualOdometry::mountAt(const Eigen::Isometry3d& T_base_camera) {
   T_base_camera_ = T_base_camera;
   if (is_same || !state_.started) return;
   breakStream();
+  state_.map.reset();  // it is in the old camera's axes
   forgetRig();
   state_.T_origin_camera = orthonormalised(T_before_now.inverse() * state_.T_origin_camera * T_before_now);
   state_.covariance.advance(T_before_now, Matrix6d::Zero());
+}
+
+void VisualOdometry::takePose(const Matrix6d& covariance) {
+  state_.covariance.assume(covariance);
+  ++epoch_;
+  if (!state_.interrupted) return;
+  state_.map.reset();
+  state_.started = false;
+}
+
+/// The part of a scale error that a longer way adds.
+Matrix6d GuessedMotion::add(const MotionGuess& guess) {
+  constexpr double kLeast = 1e-3;  // m and rad (chosen): no odometry stands still to less
+  const Vector6d motion = logSE3(guess.T_previous_current);
+  const auto grow = [&](double& way, double by) {
+    const double before = way;
+    way += std::max(by, kLeast);
+    return guess.error * guess.error * (way * way - before * before);
+  };
+  Vector6d variance;
+  variance.head<3>().setConstant(grow(distance_, motion.head<3>().norm()));
+  variance.tail<3>().setConstant(grow(angle_, motion.tail<3>().norm()));
+  return variance.asDiagonal();
+}
+
+/// Takes note of a guess, or that there is none, for as long as there is no pose.
+void VisualOdometry::follow(const std::optional<MotionGuess>& guess) {
+  if (!guess || guess->rotation_only) state_.followed.reset();
+  if (!state_.followed) return;
+  const Matrix6d carried = adjoint(guess->T_previous_current.inverse());
+  state_.followed->motion = state_.followed->motion * guess->T_previous_current;
+  state_.followed->covariance =
+      carried * state_.followed->covariance * carried.transpose() + state_.guessed.add(*guess);
 }
 
 OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::optional<MotionGuess>& guess) {
@@ -87,17 +124,19 @@ OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::op
   const StereoFeatures& features = is_refocused ? converted : given;
   const double dt = state_.last_stamp ? static_cast<double>(features.stamp - *state_.last_stamp) * 1e-9 : 0.0;
   const bool continued = state_.map && state_.map->continuedBy(features);
-  const bool frozen = isFrozen(features, dt, guess);
-  std::optional<MotionScene> scene;
-  if (continued && !frozen) scene.emplace(sceneOf(features, dt, guess));
+  const bool frozen = !state_.interrupted && isFrozen(features, dt, guess);
+  const std::optional<MotionScene> scene = !continued || frozen ? std::nullopt
+                                           : state_.interrupted ? reacquire(features)
+                                                                : std::optional(sceneOf(features, dt, guess));
   MotionHypothesis found;
   if (scene) found = search_.find(*scene, largestDoubt());
 
   // Nothing has changed so far, and from here on nothing is refused.
   Stopwatch stopwatch;
   begin(features, dt);
+  follow(guess);
   Step step;
-  if (!continued)
+  if (!continued || (state_.interrupted && !found.motion.success))
     step = seed(features);
   else if (frozen)
     step = hold(dt);
@@ -110,11 +149,12 @@ OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::op
     state_.doubt.raise(CarriedDoubt::kCertain, "many matches agreed on no motion");
   state_.doubt.pass();
   state_.images.remember(features, frozen);
+  step.dt = step.T_previous_current ? static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9 : dt;
   if (step.T_previous_current) move(*step.T_previous_current);
   if (step.state == TrackingState::kTracking || step.state == TrackingState::kDegraded)
-    state_.last_pose_stamp = features.stamp;
+    state_.last_pose_stamp = features.stamp, state_.followed = State::Followed();
   step.time = stopwatch.lap();
-  return report(features, dt, found, step);
+  return report(features, found, step);
 }
 
 void VisualOdometry::refuse(const StereoFeatures& features) const {
@@ -173,6 +213,16 @@ double VisualOdometry::secondsSinceMap(const StereoFeatures& features) const {
   return static_cast<double>(features.stamp - state_.map->newestStamp()) * 1e-9;
 }
 
+/// Looks for the pair in the map from before an outage. How the camera moved meanwhile is unknown.
+std::optional<MotionScene> VisualOdometry::reacquire(const StereoFeatures& features) const {
+  const auto T_current_newest = reacquisition_.find(*state_.map, features, state_.calibration.calibration());
+  if (!T_current_newest) return std::nullopt;
+  MotionScene scene = sceneOf(features, 0.0, std::nullopt);
+  scene.prior.clear();
+  scene.T_current_reference = T_current_newest;
+  return scene;
+}
+
 /// What was learnt is of another rig.
 void VisualOdometry::forgetRig() {
   state_.calibration = CalibrationFilter(options_.calibration);
@@ -205,7 +255,14 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
                   (features.report.status.empty() ? "" : ": " + features.report.status);
     return step;
   }
-  if (state_.started) {
+  if (state_.started && state_.followed) {
+    step.state = TrackingState::kDegraded;
+    step.reason = "started again where the guess has the camera";
+    step.T_previous_current = state_.followed->motion;
+    step.covariance = state_.followed->covariance;
+    state_.covariance.advance(*step.T_previous_current, step.covariance);
+    state_.covariance.assume(state_.covariance.value());
+  } else if (state_.started) {
     ++epoch_;
     const double unseen = std::max(0.0, static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9);
     state_.covariance.restart(state_.prior.unseen(unseen));
@@ -216,29 +273,34 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
     step.reason = "first pair";
   }
   state_.started = true;
+  state_.interrupted = false;
   state_.predicted_pairs = 0;
   state_.map.emplace(options_.map);
-  state_.map->insert(options_.alignment, features, state_.pairs, state_.T_origin_camera.inverse(), {},
-                     state_.calibration.calibration());
+  const Eigen::Isometry3d T_previous_current = step.T_previous_current.value_or(Eigen::Isometry3d::Identity());
+  state_.map->insert(options_.alignment, features, state_.pairs,
+                     (state_.T_origin_camera * T_previous_current).inverse(), {}, state_.calibration.calibration());
   return step;
 }
 
 /// The pair joins the map unless the adjustment refutes its motion.
 VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, const MotionScene& scene,
                                                MotionHypothesis& found, double dt) {
+  const auto refute = [&](const std::string& why) {
+    return state_.interrupted ? seed(features) : predict(features, dt, why);
+  };
   const double since = secondsSinceMap(features);
   const Eigen::Isometry3d T_reference_current = found.motion.T_current_reference.inverse();
   std::string refutation = state_.prior.tooFast(T_reference_current, found.motion.covariance, since);
   // What is followed was likely something else already, and this is no motion of the camera: the prior's is likelier.
   if (refutation.empty() && scene.is_doubted && scene.T_current_reference && logOddsMisled(scene, found) > 0.0)
     refutation = innovationWords(found) + ", right after " + state_.doubt.cause();
-  if (!refutation.empty()) return predict(features, dt, refutation);
+  if (!refutation.empty()) return refute(refutation);
   const bool is_sound = doubtOf(scene, found).probability >= options_.tracking.probability;
   const Candidate candidate = adjust(features, found, is_sound);
   found.reject(candidate.adjustment.rejected_rows);
   refutation = search_.chanceWords(found);
   if (refutation.empty()) refutation = state_.prior.tooFast(candidate.motion, found.motion.covariance, since);
-  if (!refutation.empty()) return predict(features, dt, refutation + " after the adjustment");
+  if (!refutation.empty()) return refute(refutation + " after the adjustment");
 
   const Doubt doubt = doubtOf(scene, found);
   state_.doubt.raise(doubt.log_odds, doubt.cause);
@@ -258,6 +320,10 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   }
   state_.predicted_pairs = 0;
   state_.unseen = 0.0;
+  state_.guessed = GuessedMotion();
+  if (std::exchange(state_.interrupted, false))
+    step.reason = "re-acquired by " + std::to_string(found.agreement.inliers) + " points of the map" +
+                  (step.reason.empty() ? "" : "; " + step.reason);
   if (state_.map->newestIsKeyframe()) state_.covariance.markKeyframe();
   return step;
 }
@@ -411,9 +477,23 @@ VisualOdometry::Step VisualOdometry::hold(double dt) {
   return step;
 }
 
+/// Whether a guess has the motion of a pair that shows nothing, not too long after the last one that did.
+bool VisualOdometry::canFollow(const StereoFeatures& features) const {
+  if (!state_.map || !state_.followed || features.count() >= options_.motion.min_inliers) return false;
+  return static_cast<double>(features.stamp - state_.map->newestStamp()) * 1e-9 <= options_.tracking.max_guessed;
+}
+
 VisualOdometry::Step VisualOdometry::predict(const StereoFeatures& features, double dt, const std::string& failure) {
   Step step;
   step.reason = failure + (features.report.status.empty() ? "" : "; " + features.report.status);
+  if (canFollow(features)) {
+    step.state = TrackingState::kDegraded;
+    step.reason = "motion by the guess: " + step.reason;
+    step.T_previous_current = state_.followed->motion;
+    step.covariance = state_.followed->covariance;
+    state_.covariance.advance(*step.T_previous_current, step.covariance);
+    return step;
+  }
   const bool can_predict = state_.prior.velocity() && dt <= options_.tracking.max_gap &&
                            state_.predicted_pairs < options_.tracking.max_predicted_pairs;
   if (!can_predict) {
@@ -445,16 +525,16 @@ void VisualOdometry::move(const Eigen::Isometry3d& T_previous_current) {
   state_.distance += T_previous_current.translation().norm();
 }
 
-OdometryResult VisualOdometry::report(const StereoFeatures& features, double dt, const MotionHypothesis& found,
+OdometryResult VisualOdometry::report(const StereoFeatures& features, const MotionHypothesis& found,
                                       const Step& step) const {
   OdometryResult result;
   result.state = step.state;
   result.reason = step.reason;
   result.stamp = features.stamp;
   result.epoch = epoch_;
-  result.dt = dt;
+  result.dt = step.dt;
   result.distance = state_.distance;
-  result.keyframe_id = state_.map ? state_.map->lastKeyframeId() : 0;
+  result.keyframe_id = state_.map && !state_.interrupted ? state_.map->lastKeyframeId() : 0;
   if (step.state == TrackingState::kTracking || step.state == TrackingState::kDegraded) {
     result.has_pose = true;
     result.T_origin_camera = state_.T_origin_camera;

@@ -2,7 +2,6 @@
 
 #include <vector>
 
-#include "stereo_descriptor_vo/odometry/correspondences.hpp"
 #include "stereo_descriptor_vo/odometry/described_points.hpp"
 #include "stereo_descriptor_vo/odometry/motion_hypotheses.hpp"
 
@@ -27,19 +26,16 @@ MotionEstimatorOptions estimatorOptions(const PlaceVerifierOptions& options) {
 }  // namespace
 
 PlaceVerifier::PlaceVerifier(const PlaceVerifierOptions& options)
-    : options_(checked(options)), matcher_(matcherOptions(options)), estimator_(estimatorOptions(options)) {}
+    : options_(checked(options)), views_(matcherOptions(options), estimatorOptions(options)) {}
 
 PlaceMatch PlaceVerifier::verify(const StereoFeatures& place, const StereoFeatures& current) const {
-  const DescribedPoints points(place);
-  const std::vector<FeatureMatch> matches = matcher_.match(points, current, std::nullopt);
-  const std::vector<Correspondence> correspondences = correspond(points, current, matches, RigCalibration());
+  const auto [matches, correspondences, motion] = views_.match(place, current, RigCalibration());
   PlaceMatch match;
   match.matches = static_cast<int>(matches.size());
   if (match.matches < options_.min_inliers) {
     match.reason = "only " + std::to_string(match.matches) + " matches";
     return match;
   }
-  const MotionEstimate motion = estimator_.estimate(current.camera, correspondences);
   if (!motion.success) {
     match.reason = motion.reason;
     return match;

@@ -3,6 +3,7 @@
 #include <std_srvs/Trigger.h>
 #include <stereo_descriptor_vo/ResetToPose.h>
 #include <stereo_descriptor_vo/SaveTrajectory.h>
+#include <stereo_descriptor_vo/SetPose.h>
 
 #include <algorithm>
 #include <atomic>
@@ -64,7 +65,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     }
   };
 
-  /// Features as they arrived, and what services had asked for by then.
+  /// Features as they arrived, and how often services had started the odometry again or resumed by then.
   struct Arrived {
     FeaturesMessagePtr message;
     StereoFeaturesView view;
@@ -92,11 +93,17 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     patience_ = Patience(options_.output.guess_timeout);
     if (options_.output.opencv_threads >= 0) cv::setNumThreads(options_.output.opencv_threads);
     diagnostics_ = std::make_unique<OdometryDiagnostics>(nh_, private_nh, getName(), options_.output);
-    services_ = {private_nh.advertiseService("reset", &VisualOdometryNodelet::onReset, this),
-                 private_nh.advertiseService("reset_to_pose", &VisualOdometryNodelet::onResetToPose, this),
+    services_ = {slow_nh.advertiseService("reset", &VisualOdometryNodelet::onReset, this),
+                 slow_nh.advertiseService("reset_to_pose", &VisualOdometryNodelet::onResetToPose, this),
+                 slow_nh.advertiseService("set_pose", &VisualOdometryNodelet::onSetPose, this),
                  private_nh.advertiseService("pause", &VisualOdometryNodelet::onPause, this),
                  private_nh.advertiseService("resume", &VisualOdometryNodelet::onResume, this),
                  slow_nh.advertiseService("save_trajectory", &VisualOdometryNodelet::onSaveTrajectory, this)};
+    pose_subscriber_ = slow_nh.subscribe<geometry_msgs::PoseWithCovarianceStamped>(
+        "set_pose", 1, [this](const geometry_msgs::PoseWithCovarianceStampedConstPtr& pose) {
+          const std::string problem = setPose(*pose);
+          if (!problem.empty()) NODELET_ERROR_STREAM("set_pose: " << problem);
+        });
 
     VisualOdometryOptions defaults;
     reconfigured_ = options_.odometry;
@@ -137,7 +144,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   }
 
   void onFeatures(const FeaturesMessagePtr& message) try {
-    Arrived arrived{message, check(*message), starts_.posted(), resumes_.posted()};
+    Arrived arrived{message, check(*message), starts_, resumes_.posted()};
     const std::uint64_t dropped = filter_.dropped();
     const bool new_stream = stream_epoch_ && *stream_epoch_ != message->stream_epoch;
     for (FeaturesFilter::Passed& passed :
@@ -183,6 +190,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
 
   /// In the worker's thread.
   void process(const FeaturesFilter::Passed& passed) try {
+    const std::lock_guard<std::mutex> lock(work_mutex_);
+    if (passed.item.starts != starts_) return;
     const WorkLoad::Item work(diagnostics_->load());
     publishInfo(estimate(passed), *passed.item.message);
   } catch (const std::exception& e) {
@@ -194,7 +203,6 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     const FeaturesMessage& message = *passed.item.message;
     takeOverOptions();
     noteJumps(passed);
-    if (const auto start = starts_.take(passed.item.starts)) restart("reset was called", *start);
     if (resumes_.take(passed.item.resumes)) odometry_->breakStream();
     const StereoFeatures features = ros_conversions::fromMessage(passed.item.view);
     const double begin = steadyTime();
@@ -319,7 +327,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
         ros_conversions::cleanFrameId(options_.output.base_frame_id), *processed_stamp_, stamp, problem);
     if (!T_before_now) return std::nullopt;
     const Eigen::Isometry3d T_base_camera = *mount_->last();
-    return MotionGuess{T_base_camera.inverse() * *T_before_now * T_base_camera};
+    return MotionGuess{T_base_camera.inverse() * *T_before_now * T_base_camera, false, options_.output.guess_error};
   }
 
   std::optional<MotionGuess> guessOfGyro(const std_msgs::Header& header, std::string& problem) const {
@@ -388,21 +396,54 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
              "frame_id of the images");
   }
 
-  // The services. What they ask for holds for the features that arrive from now on.
+  // The services. What they ask for has happened when they answer, and features that still wait are dropped.
+
+  void startAgain(const std::optional<Eigen::Isometry3d>& T_odom_base = std::nullopt) {
+    const std::lock_guard<std::mutex> lock(work_mutex_);
+    ++starts_;
+    restart("reset was called", T_odom_base);
+  }
 
   bool onReset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
-    starts_.post(std::nullopt);
+    startAgain();
     return true;
   }
 
   bool onResetToPose(stereo_descriptor_vo::ResetToPose::Request& request,
                      stereo_descriptor_vo::ResetToPose::Response& response) try {
-    starts_.post(ros_conversions::toPose(request.pose));
+    startAgain(ros_conversions::toPose(request.pose));
     response.success = true;
     return true;
   } catch (const std::invalid_argument& e) {
     response.message = e.what();
     return true;
+  }
+
+  bool onSetPose(stereo_descriptor_vo::SetPose::Request& request, stereo_descriptor_vo::SetPose::Response& response) {
+    response.message = setPose(request.pose);
+    response.success = response.message.empty();
+    return true;
+  }
+
+  /// The base is there in odom, with this covariance, at the newest pair. Returns why not.
+  std::string setPose(const geometry_msgs::PoseWithCovarianceStamped& message) try {
+    const std::string frame = ros_conversions::cleanFrameId(message.header.frame_id);
+    if (frame != ros_conversions::cleanFrameId(options_.output.odom_frame_id))
+      return "the pose is in frame '" + frame + "', not in odom_frame_id";
+    Eigen::Isometry3d T_odom_base;
+    Matrix6d covariance;
+    ros_conversions::fromMessage(message.pose, T_odom_base, covariance);
+    const std::lock_guard<std::mutex> lock(work_mutex_);
+    const std::optional<Eigen::Isometry3d> T_base_camera = mount_->last();
+    if (!T_base_camera) return "there is no pose yet: set initial_pose, or wait for the first pair";
+    const Matrix6d to_camera = adjoint(T_base_camera->inverse());
+    odometry_->takePose(to_camera * covariance * to_camera.transpose());
+    const Eigen::Isometry3d T_start_base = *T_base_camera * odometry_->lastPose() * T_base_camera->inverse();
+    publisher_->restart(T_odom_base * T_start_base.inverse());
+    given_start_ = true;
+    return "";
+  } catch (const std::invalid_argument& e) {
+    return e.what();
   }
 
   /// Without a subscriber the image side rests too.
@@ -454,8 +495,9 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   std::unique_ptr<OdometryPublisher> publisher_;
   std::unique_ptr<OdometryDiagnostics> diagnostics_;
   std::vector<ros::ServiceServer> services_;
+  ros::Subscriber pose_subscriber_;
   struct Resume {};
-  Requests<std::optional<Eigen::Isometry3d>> starts_;  // T_odom_base; none: where it began
+  std::atomic<int> starts_{0};  // by services
   Requests<Resume> resumes_;
   std::atomic<bool> stopping_{false};
 
@@ -465,7 +507,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
 
   std::atomic<std::uint64_t> out_of_order_{0}, malformed_{0};
 
-  // Only the worker's thread touches these.
+  // The worker's thread touches these, and services do.
+  std::mutex work_mutex_;
   std::unique_ptr<VisualOdometry> odometry_;
   Eigen::Isometry3d T_odom_start_;  // of a run
   int source_restarts_ = 0, clock_steps_ = 0;

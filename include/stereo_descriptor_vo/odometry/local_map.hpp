@@ -89,6 +89,9 @@ class LocalMap {
   /// Points in the image of the newest pair, and those that a turn of `T_next_newest` brings into the next one.
   View view(const std::optional<Eigen::Isometry3d>& T_next_newest = std::nullopt) const;
 
+  /// All points still looked for, wherever they are, in the newest pair's left optical frame.
+  DescribedPoints points() const;
+
   /// A point recognised in a pair, and where that saw it.
   struct Sighting {
     int point, row;

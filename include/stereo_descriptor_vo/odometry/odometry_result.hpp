@@ -33,7 +33,7 @@ struct OdometryResult {
   Matrix6d pose_covariance = Matrix6d::Zero();  ///< of a right perturbation: T_origin_camera * exp(xi), m and rad
 
   bool has_motion = false;  ///< false for the first pair and right after a discontinuity
-  double dt = 0.0;          ///< s since the previous pair
+  double dt = 0.0;          ///< s, over which the motion is: since the last pose; else since the previous pair
   Eigen::Isometry3d T_previous_current = Eigen::Isometry3d::Identity();
   Matrix6d motion_covariance = Matrix6d::Zero();  ///< of a right perturbation of T_previous_current
   /// The part of that motion which is the map's second thought about the previous pose: another right perturbation.

@@ -31,6 +31,12 @@ class PoseCovariance {
   /// of what may have been travelled unseen.
   void restart(const Matrix6d& travelled = Matrix6d::Zero());
 
+  /// The last pose is another one now, with this covariance: the key frame of a new drive.
+  void assume(const Matrix6d& covariance) {
+    *this = PoseCovariance();
+    value_ = keyframe_ = covariance;
+  }
+
   /// The pose moved on by a motion with a covariance of its own, as a predicted one.
   void advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance);
 

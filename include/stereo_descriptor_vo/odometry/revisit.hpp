@@ -4,11 +4,10 @@
 #include <vector>
 
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/odometry/feature_matcher.hpp"
 #include "stereo_descriptor_vo/odometry/local_map.hpp"
-#include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
 #include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
 #include "stereo_descriptor_vo/odometry/rig_calibration.hpp"
+#include "stereo_descriptor_vo/odometry/view_matcher.hpp"
 
 namespace sdvo {
 
@@ -25,8 +24,7 @@ class Revisit {
  private:
   MotionEstimatorOptions motion_options_;
   PatchAlignmentOptions alignment_options_;
-  FeatureMatcher matcher_;
-  MotionEstimator estimator_;
+  ViewMatcher views_;
 };
 
 }  // namespace sdvo

@@ -18,6 +18,7 @@
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
 #include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
+#include "stereo_descriptor_vo/odometry/reacquisition.hpp"
 #include "stereo_descriptor_vo/odometry/repeated_images.hpp"
 #include "stereo_descriptor_vo/odometry/revisit.hpp"
 #include "stereo_descriptor_vo/odometry/right_camera_rotation.hpp"
@@ -27,6 +28,7 @@ namespace sdvo {
 struct TrackingOptions : MotionPriorOptions {
   int max_predicted_pairs = 1;
   double max_gap = 1.0;
+  double max_guessed = 10.0;
   double probability = 0.95;
   double doubtful_deviation = 0.05;
 
@@ -34,6 +36,8 @@ struct TrackingOptions : MotionPriorOptions {
     list.add("max_predicted_pairs", max_predicted_pairs, {0, 100}, "",
              "pairs in a row whose motion may be predicted before the odometry is lost");
     list.add("max_gap", max_gap, {0.01, 60.0}, "s", "longest time between pairs over which the motion is predicted");
+    list.add("max_guessed", max_guessed, {0.0, 1000.0}, "s",
+             "longest time without usable images over which the pose goes on by the guess of another odometry");
     list.add("probability", probability, {0.5, 0.999}, "",
              "a motion is doubtful that is the camera's with a smaller probability");
     list.add(
@@ -69,6 +73,18 @@ struct VisualOdometryOptions {
 struct MotionGuess {
   Eigen::Isometry3d T_previous_current = Eigen::Isometry3d::Identity();
   bool rotation_only = false;  ///< a gyro's: of the translation it says nothing
+  double error =
+      0.1;  ///< standard deviation of distance and turn, as ratios of them; it is a scale: all guesses share it
+};
+
+/// Motion since the last measured pose, as guesses have it.
+class GuessedMotion {
+ public:
+  /// The covariance of the guess, a right perturbation in m and rad, that comes on top of those before it.
+  Matrix6d add(const MotionGuess& guess);
+
+ private:
+  double distance_ = 0.0, angle_ = 0.0;  ///< m, rad
 };
 
 /// Stereo odometry on stereo features alone. Every pair is matched to a local map of the points around the camera,
@@ -86,9 +102,16 @@ class VisualOdometry {
   /// Back to the initial pose and a new epoch; nothing is remembered.
   void reset();
 
-  /// Tells that the next pair does not continue the last one (another calibration, a restarted source): the odometry
-  /// re-seeds from the last pose under a new epoch.
+  /// Tells that the next pair does not continue the last one (a pause, a restarted source): the odometry goes on where
+  /// it finds the pair in its map, else from the last pose under a new epoch.
   void breakStream();
+
+  /// Tells that something else has the last pose, with this covariance (of its right perturbation): a new epoch begins.
+  /// The map is kept, unless the camera's place in it is unknown: then the next pair starts a map at the last pose.
+  void takePose(const Matrix6d& covariance);
+
+  /// T_origin_camera of the last pair that had a pose.
+  const Eigen::Isometry3d& lastPose() const { return state_.T_origin_camera; }
 
   /// Tells that the clock was set: as breakStream(), and the next stamp may be any.
   void forgetTime();
@@ -117,6 +140,7 @@ class VisualOdometry {
     Matrix6d covariance = Matrix6d::Zero();  ///< of that motion
     Vector6d correction = Vector6d::Zero();  ///< the part of it that the map corrects
     std::vector<int> rejected_rows;          ///< matched rows of the pair that the adjustment does not confirm
+    double dt = 0.0;                         ///< over which that motion is, else since the previous pair, s
     double time = 0.0;                       ///< s
   };
 
@@ -139,6 +163,7 @@ class VisualOdometry {
 
   void refuse(const StereoFeatures& features) const;
   bool isFrozen(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
+  std::optional<MotionScene> reacquire(const StereoFeatures& features) const;
   void forgetRig();
   void begin(const StereoFeatures& features, double dt);
   Step seed(const StereoFeatures& features);
@@ -156,16 +181,18 @@ class VisualOdometry {
   Step measure(const MotionHypothesis& found, const Candidate& candidate);
   Step hold(double dt);
   Step predict(const StereoFeatures& features, double dt, const std::string& failure);
+  void follow(const std::optional<MotionGuess>& guess);
+  bool canFollow(const StereoFeatures& features) const;
   std::optional<Floor> floor() const;
   void move(const Eigen::Isometry3d& T_previous_current);
-  OdometryResult report(const StereoFeatures& features, double dt, const MotionHypothesis& found,
-                        const Step& step) const;
+  OdometryResult report(const StereoFeatures& features, const MotionHypothesis& found, const Step& step) const;
   void reportMatches(const StereoFeatures& features, const MotionHypothesis& found, const Step& step,
                      OdometryResult& result) const;
 
   VisualOdometryOptions options_;
   Eigen::Isometry3d T_base_camera_;
   MotionSearch search_;
+  Reacquisition reacquisition_;
   Revisit revisit_;
   WindowOptimizer optimizer_;
 
@@ -191,7 +218,15 @@ class VisualOdometry {
     int predicted_pairs = 0;
     double unseen = 0.0;  ///< s, during which the images repeated themselves
     int pairs = 0;
+    /// Since the last pose, as guesses have it, and its covariance; nothing while one is missing.
+    struct Followed {
+      Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
+      Matrix6d covariance = Matrix6d::Zero();
+    };
+    std::optional<Followed> followed = Followed();
+    GuessedMotion guessed;
     bool started = false;
+    bool interrupted = false;  ///< where in the map the camera is is unknown
   } state_;
   int epoch_ = 0;
 };

@@ -6,8 +6,7 @@
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/odometry/feature_matcher.hpp"
-#include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
+#include "stereo_descriptor_vo/odometry/view_matcher.hpp"
 
 namespace sdvo {
 
@@ -52,8 +51,7 @@ class PlaceVerifier {
 
  private:
   PlaceVerifierOptions options_;
-  FeatureMatcher matcher_;
-  MotionEstimator estimator_;
+  ViewMatcher views_;
 };
 
 }  // namespace sdvo
