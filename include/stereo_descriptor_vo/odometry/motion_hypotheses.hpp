@@ -78,8 +78,8 @@ struct MotionHypothesis {
 /// Ratio of a motion by which it may be off.
 constexpr double kTolerableRatio = 0.03;
 
-/// Whether chance explains the agreement with a motion (a contrario, Moisan and Stival 2004): the expected number of
-/// motions with as many inliers among matches each of which agrees by `chance`. Its logarithm.
+/// Logarithm of the number of false alarms (a contrario, Moisan and Stival 2004): the expected number of motions with as
+/// many inliers, if each match agrees by `chance`.
 double logFalseAlarms(int matches, int inliers, double chance);
 
 /// Chance that a wrong match, anywhere within `gate` px of its prediction, is within `threshold` px of a motion.
@@ -89,8 +89,8 @@ double chanceOfAgreement(double threshold, double gate);
 bool agree(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
            const std::vector<int>& points, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double within);
 
-/// Logarithm of the likelihood, up to a constant, of a motion that leaves some of the `points` to other motions as
-/// moving things; those have so many confirmed sightings in sum. Points are no independent witnesses, because what
+/// Logarithm of the likelihood, up to a constant, of a motion that leaves some of the `points` to other motions.
+/// `of_others`: the sum of their confirmed sightings. Points are no independent witnesses, because what
 /// moves has many of them: the sum is tempered by their effective number.
 double logLikelihood(double of_others, int points);
 

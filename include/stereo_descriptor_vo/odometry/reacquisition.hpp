@@ -18,8 +18,8 @@ struct ExpectedPoint {
 
 /// Whether a pair shows the place of a map. Matches of another place agree on no motion, so chance is no danger. A
 /// thing that stands in both places is one (a poster, a chair, a part of the robot), but it fills a part of the view
-/// only. Hence the view is divided into parts with equally many expected points each, and so many parts that three of
-/// the points found fall into each if they are spread evenly. In another place a part holds any with a probability of
+/// only. Hence the view is divided into parts with equally many expected points each. There are so many parts that three
+/// of the points found fall into each if they are spread evenly. In another place a part holds any with a probability of
 /// one half at most.
 bool showsSamePlace(std::vector<ExpectedPoint> points);
 

@@ -102,7 +102,7 @@ class VisualOdometry {
   /// Back to the initial pose and a new epoch; nothing is remembered.
   void reset();
 
-  /// Tells that the next pair does not continue the last one (a pause, a restarted source): the odometry goes on where
+  /// Tells that the next pair does not continue the last one (a pause, a restarted source). The odometry goes on where
   /// it finds the pair in its map, else from the last pose under a new epoch.
   void breakStream();
 
