@@ -282,7 +282,8 @@ void VisualOdometry::commit(const Candidate& candidate) {
   std::swap(state_.map, state_.candidate);
   const LocalMap::Adjustment& adjustment = candidate.adjustment;
   if (!adjustment.success) return;
-  state_.calibration.note(state_.map->newestId(), candidate.calibration, adjustment.calibration_information);
+  state_.calibration.note(state_.map->oldestId(), state_.map->newestId(), candidate.calibration,
+                          adjustment.calibration_information);
   const bool is_sound = candidate.verdict.trust == Trust::kSound && !state_.suspicion.isRaised();
   if (is_sound && adjustment.common_disparity_square)
     state_.calibration.noteCommon(*adjustment.common_disparity_square);
