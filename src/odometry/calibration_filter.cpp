@@ -10,7 +10,6 @@ namespace {
 
 constexpr int kFewestCommons = 20;       // windows that must tell of what is left at a point
 constexpr int kRememberedCommons = 200;  // of which the mean is taken
-constexpr double kAlike = 1.4;           // on the variance: neighbouring points err alike, so many tell less
 
 }  // namespace
 
@@ -18,21 +17,26 @@ CalibrationFilter::CalibrationFilter(const CalibrationOptions& options) : option
   calibration_.value << options_.prior_offset, options_.prior_bend;
 }
 
-CalibrationBelief CalibrationFilter::prior(int oldest_id) {
-  if (pending_ && pending_->newest_id < oldest_id) {
-    past_.information = options_.memory * past_.information + pending_->evidence.information;
-    past_.information_mean = options_.memory * past_.information_mean + pending_->evidence.information_mean;
-    pending_.reset();
-  }
-  const RigCalibration::Vector mean(options_.prior_offset, options_.prior_bend);
-  prior_.information = informationOf(significantSpread());
-  prior_.information_mean = prior_.information * mean;
-  const RigCalibration::Matrix information = prior_.information + past_.information;
-  CalibrationBelief belief{information.inverse() * (prior_.information_mean + past_.information_mean), information};
+CalibrationFilter::Evidence CalibrationFilter::pastBefore(int oldest_id) const {
+  if (!pending_ || pending_->newest_id >= oldest_id) return past_;
+  return {options_.memory * past_.information + pending_->evidence.information,
+          options_.memory * past_.information_mean + pending_->evidence.information_mean};
+}
+
+/// What the options say beforehand, as far as the evidence leaves it its weight.
+CalibrationFilter::Evidence CalibrationFilter::beforehand() const {
+  const RigCalibration::Matrix information = informationOf(significantSpread());
+  return {information, information * RigCalibration::Vector(options_.prior_offset, options_.prior_bend)};
+}
+
+CalibrationBelief CalibrationFilter::prior(int oldest_id) const {
+  const Evidence past = pastBefore(oldest_id), held = beforehand();
+  const RigCalibration::Matrix information = held.information + past.information;
+  CalibrationBelief belief{information.inverse() * (held.information_mean + past.information_mean), information};
   if (options_.enabled)
     belief.certain_information =
-        informationOf(RigCalibration::Vector::Constant(options_.prior_sigma)) + past_.information;
-  if (commons_ >= kFewestCommons) belief.common_sigma = std::sqrt(kAlike * common_square_);
+        informationOf(RigCalibration::Vector::Constant(options_.prior_sigma)) + past.information;
+  if (commons_ >= kFewestCommons) belief.common_sigma = std::sqrt(std::max(common_square_, 0.0));
   return belief;
 }
 
@@ -64,11 +68,14 @@ void CalibrationFilter::noteCommon(double square) {
   common_square_ += (square - common_square_) / commons_;
 }
 
-void CalibrationFilter::note(int newest_id, const RigCalibration& calibration,
+void CalibrationFilter::note(int oldest_id, int newest_id, const RigCalibration& calibration,
                              const RigCalibration::Matrix& information) {
+  const Evidence held = beforehand();
+  past_ = pastBefore(oldest_id);
+  if (pending_ && pending_->newest_id < oldest_id) pending_.reset();
   calibration_ = calibration;
   const RigCalibration::Matrix known = past_.information + information;
-  present_ = Evidence{known, (prior_.information + known) * calibration.value - prior_.information_mean};
+  present_ = Evidence{known, (held.information + known) * calibration.value - held.information_mean};
   if (!pending_) pending_ = {newest_id, {information, present_->information_mean - past_.information_mean}};
 }
 

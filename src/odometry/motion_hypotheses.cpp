@@ -268,11 +268,13 @@ void CarriedDoubt::pass() {
 double coverage(const StereoFeatures& features, const std::vector<int>& rows) {
   constexpr int kColumns = 8, kRows = 4;
   std::bitset<kColumns * kRows> cells;
-  for (const int i : rows) {
-    const int column = static_cast<int>(features.u[i] * kColumns / features.camera.width);
-    const int row = static_cast<int>(features.v[i] * kRows / features.camera.height);
-    cells.set(static_cast<std::size_t>(std::clamp(row, 0, kRows - 1) * kColumns + std::clamp(column, 0, kColumns - 1)));
-  }
+  // Clamped before it becomes an integer, which a position far outside of the image overflows.
+  const auto cell = [](double position, int size, int count) {
+    return static_cast<std::size_t>(std::clamp(position * count / size, 0.0, count - 1.0));
+  };
+  for (const int i : rows)
+    cells.set(cell(features.v[i], features.camera.height, kRows) * kColumns +
+              cell(features.u[i], features.camera.width, kColumns));
   return static_cast<double>(cells.count()) / (kColumns * kRows);
 }
 

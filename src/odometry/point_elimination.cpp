@@ -29,9 +29,6 @@ SDVO_IN_KERNEL void addTo(double* values, const Three& v) {
 SDVO_IN_KERNEL double sumOf(const Three& v) {
   return v[0] + v[1] + v[2];
 }
-SDVO_IN_KERNEL double sumOfFour(const Three& v) {
-  return sumOf(v) + v[3];
-}
 /// (y, z, x)
 SDVO_IN_KERNEL Three rotated(const Three& v) {
 #ifdef __clang__
@@ -100,29 +97,20 @@ struct Derivatives {
   SDVO_IN_KERNEL Three transposedTimes(const Three& v) const { return aside * v - kZ * sumOf(ahead * v); }
 };
 
-/// Weights of a sighting's residual r: its normal equations are those of W = w I - bent r r^T. Without `bent` they are
-/// those of weighted least squares, with it they are the cost's second derivatives.
+/// A sighting's weights in the normal equations.
 struct Weights {
-  double w, bent;
-
-  static SDVO_IN_KERNEL Weights leastSquares(const Sight& at, double bend) { return {bend / (bend + at.square), 0.0}; }
-  static SDVO_IN_KERNEL Weights exact(const Sight& at, double bend) {
-    const double w = bend / (bend + at.square);
-    return {w, 2.0 * w * w / bend};
-  }
+  double of_hessian, of_gradient;
 };
 
-/// Columns of A^T W A: what a sighting says of P; and A^T W (0, 0, 1), what it says of P and its disparity.
+/// Columns of w A^T A: what a sighting says of P.
 struct Information {
-  Three x, y, z, by_disparity;
+  Three x, y, z;
 
-  /// along: A^T r.
-  SDVO_IN_KERNEL Information(const Derivatives& A, const Weights& W, const Three& along, const Sight& at) {
-    const Three square = W.w * A.aside * A.aside, mixed = W.w * A.aside * A.ahead, bent = W.bent * along;
-    x = kX * square - kZ * mixed[0] - bent * along[0];
-    y = kY * square - kZ * mixed[1] - bent * along[1];
-    z = kZ * (W.w * sumOf(A.ahead * A.ahead)) - mixed - bent * along[2];
-    by_disparity = kZ * (-W.w * A.ahead[2]) - bent * at.residual[2];
+  SDVO_IN_KERNEL Information(const Derivatives& A, double w) {
+    const Three square = w * A.aside * A.aside, mixed = w * A.aside * A.ahead;
+    x = kX * square - kZ * mixed[0];
+    y = kY * square - kZ * mixed[1];
+    z = kZ * (w * sumOf(A.ahead * A.ahead)) - mixed;
   }
   SDVO_IN_KERNEL Three times(const double* v) const { return x * v[0] + y * v[1] + z * v[2]; }
 };
@@ -142,8 +130,7 @@ struct Lever {
   }
 };
 
-/// A point's sums over its sightings, those of vectors part by part of the residual; of the hessian the fourth part is
-/// what the kernel's bend takes away.
+/// A point's sums over its sightings, those of vectors part by part of the residual.
 struct PointSums {
   Three H00{}, H10{}, H11{}, H20{}, H21{}, H22{}, g0{}, g1{}, g2{};
   Three by0{}, by1{}, by2{};              ///< derivatives
@@ -153,20 +140,16 @@ struct PointSums {
   int sightings = 0;
 
   /// J: columns of the derivatives by the point.
-  SDVO_IN_KERNEL void add(const Sight& at, const Weights& W, Three J0, Three J1, Three J2) {
-    const Three r = at.residual;
-    J0[3] = sumOf(r * J0), J1[3] = sumOf(r * J1), J2[3] = sumOf(r * J2);
-    const Three parts = {W.w, W.w, W.w, -W.bent};
-    const Three w0 = parts * J0, w1 = parts * J1, w2 = parts * J2;
+  SDVO_IN_KERNEL void add(const Sight& at, const Weights& weights, const Three& J0, const Three& J1, const Three& J2) {
+    const double w = weights.of_hessian;
+    const Three w0 = w * J0, w1 = w * J1, w2 = w * J2, pull = weights.of_gradient * at.residual;
     H00 += w0 * J0, H10 += w1 * J0, H11 += w1 * J1, H20 += w2 * J0, H21 += w2 * J1, H22 += w2 * J2;
-    g0 += w0 * r, g1 += w1 * r, g2 += w2 * r;
-    const Three z0 = w0 + kZ * (w0[3] * r[2]), z1 = w1 + kZ * (w1[3] * r[2]), z2 = w2 + kZ * (w2[3] * r[2]);
-    by0 += z0, by1 += z1, by2 += z2;
-    shaped0 += at.shape * z0, shaped1 += at.shape * z1, shaped2 += at.shape * z2;
-    const double of_disparity = W.w - W.bent * r[2] * r[2];
-    weight += of_disparity, residual += W.w * r[2];
-    shape += of_disparity * at.shape, shape_square += of_disparity * at.shape * at.shape;
-    shape_residual += W.w * at.shape * r[2];
+    g0 += pull * J0, g1 += pull * J1, g2 += pull * J2;
+    by0 += w0, by1 += w1, by2 += w2;
+    shaped0 += at.shape * w0, shaped1 += at.shape * w1, shaped2 += at.shape * w2;
+    const double w_shape = w * at.shape;
+    weight += w, residual += pull[2];
+    shape += w_shape, shape_square += w_shape * at.shape, shape_residual += pull[2] * at.shape;
     ++sightings;
   }
 };
@@ -178,23 +161,17 @@ struct InverseRoot {
   SDVO_IN_KERNEL InverseRoot(const PointSums& sums, double damping) {
     constexpr double kLeast = 1e-9;  // of what nothing is known of
     const double damped = 1.0 + damping;
-    const double R00 = 1.0 / std::sqrt(sumOfFour(sums.H00) * damped + kLeast);
-    const double L10 = sumOfFour(sums.H10) * R00, L20 = sumOfFour(sums.H20) * R00;
-    const double R11 = 1.0 / std::sqrt(sumOfFour(sums.H11) * damped + kLeast - L10 * L10);
-    const double L21 = (sumOfFour(sums.H21) - L20 * L10) * R11;
-    const double R22 = 1.0 / std::sqrt(sumOfFour(sums.H22) * damped + kLeast - L20 * L20 - L21 * L21);
+    const double R00 = 1.0 / std::sqrt(sumOf(sums.H00) * damped + kLeast);
+    const double L10 = sumOf(sums.H10) * R00, L20 = sumOf(sums.H20) * R00;
+    const double R11 = 1.0 / std::sqrt(sumOf(sums.H11) * damped + kLeast - L10 * L10);
+    const double L21 = (sumOf(sums.H21) - L20 * L10) * R11;
+    const double R22 = 1.0 / std::sqrt(sumOf(sums.H22) * damped + kLeast - L20 * L20 - L21 * L21);
     const double R10 = -L10 * R00 * R11;
     column0 = Three{R00, R10, -(L20 * R00 + L21 * R10) * R22, 0.0};
     column1 = Three{0.0, R11, -L21 * R11 * R22, 0.0};
     column2 = Three{0.0, 0.0, R22, 0.0};
   }
   SDVO_IN_KERNEL Three times(double x, double y, double z) const { return column0 * x + column1 * y + column2 * z; }
-
-  /// Whether H is positive definite, and no pivot a smaller share than this of what it is by R of another H.
-  SDVO_IN_KERNEL bool keeps(double share, const Eigen::Matrix3d& R) const {
-    const auto isKept = [&](double own, double other) { return own * own * share < other * other; };
-    return isKept(column0[0], R(0, 0)) && isKept(column1[1], R(1, 1)) && isKept(column2[2], R(2, 2));
-  }
 };
 
 /// A factor's columns in registers.
@@ -220,17 +197,12 @@ std::size_t indexOf(int row, int column) {
 
 /// PoseEquations::add().
 struct AddPoint {
-  /// Of a point's hessian by weighted least squares that its second derivatives must keep: with less, its residuals lie
-  /// between two minima of the cost.
-  static constexpr double kLeastShare = 0.2;
-
   static SDVO_IN_KERNEL void run(const WindowProjection* projection, const SightedPoint* point,
                                  const Linearisation* linearisation, PoseFactor* factors, double* squares,
                                  PoseEquations::Block* blocks, PoseEquations::Border* borders,
                                  EliminatedPoint* eliminated, RigCalibration::Matrix* calibration_hessian,
                                  RigCalibration::Vector* calibration_gradient) {
     PointSums sums;
-    const double bend = linearisation->bend;
     int moving = 0;
     for (int i = 0; i < point->count; ++i) {
       const WindowObservation& seen = point->sightings[i];
@@ -238,23 +210,19 @@ struct AddPoint {
       const Sight at(*projection, *point, seen, T);
       squares[i] = at.square;
       if (!at.isInFront()) continue;
-      const Weights W = linearisation->is_exact ? Weights::exact(at, bend) : Weights::leastSquares(at, bend);
+      const double w = linearisation->bend / (linearisation->bend + at.square);
+      const Weights weights = {linearisation->of_errors ? w * w : w, w};
       const Derivatives A(*projection, at);
-      sums.add(at, W, A.times(T), A.times(T + 4), A.times(T + 12) + kZ * A.by_rho);
+      sums.add(at, weights, A.times(T), A.times(T + 4), A.times(T + 12) + kZ * A.by_rho);
       if (seen.frame == 0) continue;
       PoseFactor& factor = factors[moving++];
       factor.pose = seen.frame - 1;
-      addPose({at.P, point->ray_and_inverse_depth.z()}, A, at, W, T, factor, blocks[indexOf(factor.pose, factor.pose)],
-              borders[factor.pose]);
+      addPose({at.P, point->ray_and_inverse_depth.z()}, A, at, weights, T, factor,
+              blocks[indexOf(factor.pose, factor.pose)], borders[factor.pose]);
     }
 
     // What the point is in, times R or R^T.
     const InverseRoot R(sums, linearisation->damping);
-    if (linearisation->is_exact && !R.keeps(kLeastShare, eliminated->R)) {
-      takeAway(*projection, *point, bend, blocks, borders);
-      eliminated->factors = 0;
-      return;
-    }
     const double disparity = point->inverse_disparity_sigma;
     const Three gradient = R.times(sumOf(sums.g0), sumOf(sums.g1), sumOf(sums.g2));
     const Three by_offset = disparity * R.times(sums.by0[2], sums.by1[2], sums.by2[2]);
@@ -295,15 +263,15 @@ struct AddPoint {
 
  private:
   /// What a sighting says of its pose, of that and the calibration, and of that and the point.
-  static SDVO_IN_KERNEL void addPose(const Lever& lever, const Derivatives& A, const Sight& at, const Weights& W,
+  static SDVO_IN_KERNEL void addPose(const Lever& lever, const Derivatives& A, const Sight& at, const Weights& weights,
                                      const double* T, PoseFactor& factor, PoseEquations::Block& block,
                                      PoseEquations::Border& border) {
-    const Three along = A.transposedTimes(at.residual);
-    const Information M(A, W, along, at);
+    const double w = weights.of_hessian;
+    const Information M(A, w);
+    const double by_z = -w * A.ahead[2];  // the disparity by P.z
     lever.multiply(M.times(T), factor.Y[0]);
     lever.multiply(M.times(T + 4), factor.Y[1]);
-    lever.multiply(M.times(T + 12) + M.by_disparity * A.by_rho, factor.Y[2]);
-    lever.multiply(W.w * along, factor.gradient);
+    lever.multiply(M.times(T + 12) + kZ * (by_z * A.by_rho), factor.Y[2]);
 
     // Of the block's upper right part nobody asks.
     const Three& P = lever.P;
@@ -314,27 +282,10 @@ struct AddPoint {
     addTo(block.columns[4].rotation, cross(P, P[2] * M.x - P[0] * M.z));
     addTo(block.columns[5].rotation, cross(P, P[0] * M.y - P[1] * M.x));
 
-    const Three of_disparity = M.by_disparity * at.inverse_noise[2];
+    const Three of_disparity = kZ * (by_z * at.inverse_noise[2]);
     lever.addProduct(of_disparity, 1.0, border.columns[0]);
     lever.addProduct(of_disparity, at.shape, border.columns[1]);
-  }
-
-  /// What sightings told of their poses by the second derivatives. Where these have no clear minimum for the point, it
-  /// tells nothing.
-  static SDVO_IN_KERNEL void takeAway(const WindowProjection& projection, const SightedPoint& point, double bend,
-                                      PoseEquations::Block* blocks, PoseEquations::Border* borders) {
-    PoseFactor unused;
-    for (int i = 0; i < point.count; ++i) {
-      const WindowObservation& seen = point.sightings[i];
-      if (seen.frame == 0) continue;
-      const double* T = point.T_camera_anchor[seen.frame].data();
-      const Sight at(projection, point, seen, T);
-      if (!at.isInFront()) continue;
-      const Weights W = Weights::exact(at, bend);
-      const std::size_t pose = static_cast<std::size_t>(seen.frame - 1);
-      addPose({at.P, point.ray_and_inverse_depth.z()}, Derivatives(projection, at), at, {-W.w, -W.bent}, T, unused,
-              blocks[indexOf(seen.frame - 1, seen.frame - 1)], borders[pose]);
-    }
+    lever.multiply(A.transposedTimes(weights.of_gradient * at.residual), factor.gradient);
   }
 
   /// A factor by R^T from the right.
@@ -418,11 +369,12 @@ void PoseEquations::setZero(int poses) {
   calibration_gradient_.setZero();
 }
 
-void PoseEquations::add(const WindowProjection& projection, const SightedPoint& point,
-                        const Linearisation& linearisation, PoseFactor* factors, double* squares,
-                        EliminatedPoint& eliminated) {
+EliminatedPoint PoseEquations::add(const WindowProjection& projection, const SightedPoint& point,
+                                   const Linearisation& linearisation, PoseFactor* factors, double* squares) {
+  EliminatedPoint eliminated;
   runKernel<AddPoint>(&projection, &point, &linearisation, factors, squares, blocks_.data(), borders_.data(),
                       &eliminated, &calibration_hessian_, &calibration_gradient_);
+  return eliminated;
 }
 
 void PoseEquations::copyTo(Eigen::MatrixXd& hessian, Eigen::VectorXd& gradient) const {

@@ -51,13 +51,11 @@ void PoseCovariance::cover(const Vector6d& correction) {
 
 void PoseCovariance::restart(const Matrix6d& travelled) {
   value_ += discontinuity() + travelled;
-  since_keyframe_.setZero();
   unmeasured_.setZero();
   markKeyframe();
 }
 
 void PoseCovariance::markKeyframe() {
-  value_ += (kAlike - 1.0) * since_keyframe_;
   keyframe_ = value_;
 }
 
@@ -70,7 +68,6 @@ void PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, const 
   carry(T_previous_current);
   value_ += covariance;
   unmeasured_ += covariance;
-  since_keyframe_.setZero();
 }
 
 Matrix6d PoseCovariance::measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe) {
@@ -78,7 +75,6 @@ Matrix6d PoseCovariance::measure(const Eigen::Isometry3d& T_previous_current, co
   carry(T_previous_current);
   const Matrix6d motion = unmeasured_ + since_keyframe;
   value_ = noLessThan(before, keyframe_ + since_keyframe);
-  since_keyframe_ = since_keyframe;
   unmeasured_.setZero();
   return motion;
 }
@@ -86,7 +82,6 @@ Matrix6d PoseCovariance::measure(const Eigen::Isometry3d& T_previous_current, co
 void PoseCovariance::doubt(const Matrix6d& covariance) {
   value_ += covariance;
   unmeasured_ += covariance;
-  since_keyframe_.setZero();
 }
 
 }  // namespace sdvo

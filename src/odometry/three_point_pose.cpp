@@ -58,6 +58,38 @@ bool splitIntoPlanes(const Eigen::Matrix3d& form, Eigen::Vector3d& first, Eigen:
   return true;
 }
 
+/// Without memory of their own: thousands of triangles are solved for a pair.
+struct Distances {
+  std::array<Eigen::Vector3d, 4> values;
+  std::size_t count = 0;
+
+  void add(double l1, double l2, double l3) { values[count++] = {l1, l2, l3}; }
+};
+
+/// Distances along the rays on one of the planes, four at most with those of the other.
+void appendDistances(const Triangle& t, const Eigen::Vector3d& plane, Distances& distances) {
+  const auto secondDistance = [&](double ratio) { return std::sqrt(t.a23 / (1.0 + ratio * (ratio - 2.0 * t.b23))); };
+  constexpr double kParallel = 1e-9;  // the plane holds the first axis: a symmetric triangle
+  if (std::abs(plane[0]) < kParallel * plane.norm()) {
+    const double ratio = -plane[1] / plane[2], l2 = secondDistance(ratio);
+    const double half = std::sqrt(t.a12 - l2 * l2 * (1.0 - t.b12 * t.b12));
+    for (const double l1 : {t.b12 * l2 - half, t.b12 * l2 + half}) distances.add(l1, l2, ratio * l2);
+    return;
+  }
+  // lambda1 = w0 lambda2 + w1 lambda3, and the ratio lambda3 / lambda2 from sides 12 and 13.
+  const double w0 = -plane[1] / plane[0], w1 = -plane[2] / plane[0];
+  const double a = (t.a13 - t.a12) * w1 * w1 + 2.0 * t.a12 * t.b13 * w1 - t.a12;
+  const double b = (t.a13 - t.a12) * w0 * w1 - t.a13 * t.b12 * w1 + t.a12 * t.b13 * w0;
+  const double c = (t.a13 - t.a12) * w0 * w0 - 2.0 * t.a13 * t.b12 * w0 + t.a13;
+  const double discriminant = b * b - a * c;
+  if (!(discriminant >= 0.0)) return;
+  const double q = -(b + std::copysign(std::sqrt(discriminant), b));
+  for (const double ratio : {q / a, c / q}) {
+    const double l2 = secondDistance(ratio);
+    distances.add((w0 + w1 * ratio) * l2, l2, ratio * l2);
+  }
+}
+
 /// Gauss-Newton steps on the three equations.
 void polish(const Triangle& t, Eigen::Vector3d& lambda) {
   constexpr int kSteps = 2;
@@ -105,38 +137,32 @@ PoseCandidates solveThreePointPose(const std::array<Eigen::Vector3d, 3>& points,
       determinant(first, second, second) + determinant(second, first, second) + determinant(second, second, first);
   const double c1 =
       determinant(second, first, first) + determinant(first, second, first) + determinant(first, first, second);
-  const double gamma = cubicRoot(c2 / c3, c1 / c3, c0 / c3);
+  // Symmetric triangles have no cubic term: the roots' inverses are those of second + first / gamma.
+  const bool is_inverse = std::abs(c3) < std::abs(c0);
+  const double root = is_inverse ? cubicRoot(c1 / c0, c2 / c0, c3 / c0) : cubicRoot(c2 / c3, c1 / c3, c0 / c3);
+  const Eigen::Matrix3d degenerate = is_inverse ? second + root * first : first + root * second;
   std::array<Eigen::Vector3d, 2> planes;
-  if (!std::isfinite(gamma) || !splitIntoPlanes(first + gamma * second, planes[0], planes[1])) return candidates;
+  if (!std::isfinite(root) || !splitIntoPlanes(degenerate, planes[0], planes[1])) return candidates;
 
   Eigen::Matrix3d in_reference;
   in_reference << side12, side13, normal;
   const Eigen::Matrix3d from_reference = in_reference.inverse();
-  for (const Eigen::Vector3d& plane : planes) {
-    // lambda1 = w0 lambda2 + w1 lambda3, and the ratio lambda3 / lambda2 from sides 12 and 13.
-    const double w0 = -plane[1] / plane[0], w1 = -plane[2] / plane[0];
-    const double a = (t.a13 - t.a12) * w1 * w1 + 2.0 * t.a12 * t.b13 * w1 - t.a12;
-    const double b = (t.a13 - t.a12) * w0 * w1 - t.a13 * t.b12 * w1 + t.a12 * t.b13 * w0;
-    const double c = (t.a13 - t.a12) * w0 * w0 - 2.0 * t.a13 * t.b12 * w0 + t.a13;
-    const double discriminant = b * b - a * c;
-    if (!(discriminant >= 0.0)) continue;
-    const double q = -(b + std::copysign(std::sqrt(discriminant), b));
-    for (const double ratio : {q / a, c / q}) {
-      if (!(ratio > 0.0) || !std::isfinite(ratio)) continue;
-      const double lambda2 = std::sqrt(t.a23 / (1.0 + ratio * (ratio - 2.0 * t.b23)));
-      Eigen::Vector3d lambda((w0 + w1 * ratio) * lambda2, lambda2, ratio * lambda2);
-      if (!(lambda[0] > 0.0)) continue;
-      polish(t, lambda);
-      if (!lambda.allFinite() || lambda.minCoeff() <= 0.0) continue;
-      const Eigen::Vector3d seen = lambda[0] * rays[0];
-      const Eigen::Vector3d seen12 = seen - lambda[1] * rays[1], seen13 = seen - lambda[2] * rays[2];
-      Eigen::Matrix3d in_camera;
-      in_camera << seen12, seen13, seen12.cross(seen13);
-      Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-      T.linear() = in_camera * from_reference;
-      T.translation() = seen - T.linear() * points[0];
-      candidates.add(T);
-    }
+  Distances distances;
+  for (const Eigen::Vector3d& plane : planes) appendDistances(t, plane, distances);
+  const auto isAhead = [](const Eigen::Vector3d& lambda) { return lambda.allFinite() && lambda.minCoeff() > 0.0; };
+  for (std::size_t k = 0; k < distances.count; ++k) {
+    Eigen::Vector3d& lambda = distances.values[k];
+    if (!isAhead(lambda)) continue;
+    polish(t, lambda);
+    if (!isAhead(lambda)) continue;
+    const Eigen::Vector3d seen = lambda[0] * rays[0];
+    const Eigen::Vector3d seen12 = seen - lambda[1] * rays[1], seen13 = seen - lambda[2] * rays[2];
+    Eigen::Matrix3d in_camera;
+    in_camera << seen12, seen13, seen12.cross(seen13);
+    Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+    T.linear() = in_camera * from_reference;
+    T.translation() = seen - T.linear() * points[0];
+    candidates.add(T);
   }
   return candidates;
 }

@@ -433,7 +433,8 @@ void VisualOdometry::commit(const Candidate& candidate, double probability) {
   if (probability < options_.tracking.probability) state_.map->discountNewest();
   const LocalMap::Adjustment& adjustment = candidate.adjustment;
   if (!adjustment.success) return;
-  state_.calibration.note(state_.map->newestId(), candidate.calibration, adjustment.calibration_information);
+  state_.calibration.note(state_.map->oldestId(), state_.map->newestId(), candidate.calibration,
+                          adjustment.calibration_information);
   if (probability >= options_.tracking.probability && adjustment.common_disparity_square)
     state_.calibration.noteCommon(*adjustment.common_disparity_square);
 }

@@ -117,29 +117,33 @@ class Solver {
     system.cost = costOf(estimate, squares_);
   }
 
-  /// Squares (px^2) of the errors that all disparities of one point share, of the points that show them.
-  void findCommonSquares(const std::vector<EliminatedPoint>& points, std::vector<double>& squares) const {
+  /// Variance, px^2, of the error that all disparities of one point share. `squares`: memory.
+  std::optional<double> commonVariance(const std::vector<EliminatedPoint>& points, std::vector<double>& squares) const {
+    double of_means = 0.0;  // what the mean of a point's disparities has of the noise that is new in each of them
     squares.clear();
-    for (std::size_t p = 0; p < points.size(); ++p)
-      if (const auto square = commonSquare(points[p]))
-        squares.push_back(disparityVariance(first_of_point_[p + 1] - first_of_point_[p]) * *square);
+    for (std::size_t p = 0; p < points.size(); ++p) {
+      const int sightings = first_of_point_[p + 1] - first_of_point_[p];
+      const auto square = commonSquare(points[p]);
+      if (!square) continue;
+      squares.push_back(disparityVariance(sightings) * *square);
+      of_means += options_.disparity_sigma * options_.disparity_sigma / sightings;
+    }
+    const auto variance = varianceOf(squares);
+    if (!variance) return std::nullopt;
+    return *variance - of_means / static_cast<double>(squares.size());
   }
 
   /// Covariance of a minimum of robust costs (Huber, Robust Statistics, section 7.6): A^-1 B A^-1, A the cost's second
   /// derivatives, B the sum of the gradients' products over what errs independently. Whole points do, not their
   /// sightings (Liang and Zeger 1986): their disparities share errors. Of B only its size beside A is taken from the
-  /// gradients, since few points leave the rest to chance. What the poses took of the gradients is made up for by the
-  /// degrees of freedom. `columns`: unit vectors of what is asked for. The system was linearised before.
+  /// gradients, since few points leave the rest to chance. `columns`: unit vectors of what is asked for.
   bool covariance(const Estimate& estimate, const Eigen::MatrixXd& columns, ReducedSystem& system,
                   Eigen::LLT<Eigen::MatrixXd>& factor, Eigen::MatrixXd& covariance) {
     const Eigen::MatrixXd known = knownInformation(estimate, system);
-    for (const bool is_exact : {true, false}) {  // all the second derivatives together may have no minimum
-      eliminatePoints(estimate, {bend(), 0.0, is_exact}, system);
-      equations_.copyTo(system.hessian, system.gradient);
-      system.hessian += known;
-      factor.compute(system.hessian);
-      if (factor.info() == Eigen::Success) break;
-    }
+    eliminatePoints(estimate, {bend(), 0.0, true}, system);
+    equations_.copyTo(system.hessian, system.gradient);
+    system.hessian += known;
+    factor.compute(system.hessian);
     if (factor.info() != Eigen::Success) return false;
     const Eigen::MatrixXd solved = factor.solve(columns);
     const Eigen::MatrixXd of_known = solved.transpose() * known.selfadjointView<Eigen::Lower>() * solved;
@@ -175,7 +179,8 @@ class Solver {
     return system.hessian;
   }
 
-  /// Mean ratio of two covariances: by the gradients of single points, and as the second derivatives have it.
+  /// Mean ratio of two covariances: by the gradients of single points, and as the second derivatives have it. What the
+  /// poses took of the gradients is made up for by the degrees of freedom.
   double errorsOverInformation(const ReducedSystem& system, const Eigen::MatrixXd& solved,
                                const Eigen::MatrixXd& covariance) const {
     Eigen::MatrixXd products = Eigen::MatrixXd::Zero(solved.cols(), solved.cols());
@@ -183,7 +188,6 @@ class Solver {
     double freedom = 0.0;
     const PoseFactor* sighting = system.factors.data();
     for (const EliminatedPoint& point : system.points) {
-      if (point.factors == 0) continue;
       moved.noalias() = solved.bottomRows<kCalibration>().transpose() * point.calibration_gradient;
       for (const PoseFactor* end = sighting + point.factors; sighting != end; ++sighting) {
         const auto of_pose = solved.middleRows<6>(6 * sighting->pose);
@@ -208,8 +212,8 @@ class Solver {
     placeAnchors(estimate);
     PoseFactor* factors = system.factors.data();
     for (std::size_t p = 0; p < estimate.points.size(); ++p) {
-      equations_.add(projection, sightedPoint(estimate, p), linearisation, factors,
-                     squares_.data() + first_of_point_[p], system.points[p]);
+      system.points[p] = equations_.add(projection, sightedPoint(estimate, p), linearisation, factors,
+                                        squares_.data() + first_of_point_[p]);
       factors += system.points[p].factors;
     }
   }
@@ -365,8 +369,7 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
   // Of the last linearisation, one step before the result: half of the work saved. But points held by damping would
   // say too much.
   if (damping_of_system > kUndamped) solver.linearise(estimate, kUndamped, system);
-  solver.findCommonSquares(system.points, common_squares);
-  solution.common_disparity_square = varianceOf(common_squares);
+  solution.common_disparity_square = solver.commonVariance(system.points, common_squares);
   const RigCalibration::Matrix certain = solver.certainInformation();
   system.hessian.bottomRightCorner<kCalibration, kCalibration>() += certain - window.calibration_prior.information;
   factor.compute(system.hessian);

@@ -34,7 +34,7 @@ void addWindow(CalibrationFilter& filter, int oldest, int newest, const Vector& 
   const CalibrationBelief prior = filter.prior(oldest);
   RigCalibration result;
   result.value = (prior.information + information).inverse() * (prior.information * prior.mean + information * own);
-  filter.note(newest, result, information);
+  filter.note(oldest, newest, result, information);
 }
 
 /// What is left of a prior's standard deviation, as information in the windows' units.
@@ -145,16 +145,28 @@ TEST(CalibrationFilter, WhatIsLeftAtAPointIsKnownOnceTwentyWindowsToldOfIt) {
   filter.noteCommon(0.02);
   ASSERT_TRUE(filter.prior(1).common_sigma);
   // Their mean is 0.04 px^2, and neighbours err alike.
-  EXPECT_NEAR(*filter.prior(1).common_sigma, std::sqrt(1.4 * 0.04), 1e-9);
+  EXPECT_NEAR(*filter.prior(1).common_sigma, std::sqrt(0.04), 1e-9);
 }
 
 TEST(CalibrationFilter, WhatIsLeftAtAPointMayChange) {
   CalibrationFilter filter(someOptions());
   for (int window = 0; window < 1000; ++window) filter.noteCommon(0.01);
   for (int window = 0; window < 200; ++window) filter.noteCommon(0.09);
-  EXPECT_GT(*filter.prior(1).common_sigma, std::sqrt(1.4 * 0.05));
+  EXPECT_GT(*filter.prior(1).common_sigma, std::sqrt(0.05));
   for (int window = 0; window < 2000; ++window) filter.noteCommon(0.09);
-  EXPECT_NEAR(*filter.prior(1).common_sigma, std::sqrt(1.4 * 0.09), 1e-3);
+  EXPECT_NEAR(*filter.prior(1).common_sigma, std::sqrt(0.09), 1e-3);
+}
+
+/// A window that is refused after all asks for its prior as well.
+TEST(CalibrationFilter, AskingForAPriorChangesNothing) {
+  CalibrationFilter asked{CalibrationOptions{}}, other{CalibrationOptions{}};
+  RigCalibration found;
+  found.value << 0.3, -0.5;
+  for (CalibrationFilter* filter : {&asked, &other}) filter->note(0, 4, found, 1e4 * Matrix::Identity());
+  asked.prior(5);
+  for (CalibrationFilter* filter : {&asked, &other}) filter->note(4, 8, found, 1e4 * Matrix::Identity());
+  EXPECT_EQ(asked.prior(6).information, other.prior(6).information);
+  EXPECT_EQ(asked.prior(6).mean, other.prior(6).mean);
 }
 
 }  // namespace test_calibration_filter

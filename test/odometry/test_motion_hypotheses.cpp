@@ -192,6 +192,9 @@ TEST(Coverage, CountsCellsOfEightColumnsAndFourRows) {
   EXPECT_EQ(coverage(features, {0, 1}), 1.0 / 32.0);
   EXPECT_EQ(coverage(features, {0, 1, 2, 3}), 3.0 / 32.0);
   EXPECT_EQ(coverage(features, {}), 0.0);
+  features.u[0] = 1e20f, features.v[0] = 10.f;
+  features.u[1] = 630.f, features.v[1] = 10.f;
+  EXPECT_EQ(coverage(features, {0, 1}), 1.0 / 32.0) << "far outside on the right";
 }
 
 }  // namespace test_motion_hypotheses

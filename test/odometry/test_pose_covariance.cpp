@@ -107,7 +107,7 @@ TEST(PoseCovariance, GrowsFromKeyframeToKeyframe) {
   PoseCovariance covariance;
   covariance.measure(forward(), diagonal(0.5, 0.25));
   covariance.markKeyframe();
-  const double translation = PoseCovariance::kAlike * 0.5, rotation = PoseCovariance::kAlike * 0.25;
+  const double translation = 0.5, rotation = 0.25;
   expectEqual(covariance.value(), diagonal(translation, rotation));
   covariance.measure(forward(), diagonal(0.125, 0.0));
   expectEqual(covariance.value(), afterForward(translation, rotation) + diagonal(0.125, 0.0));
@@ -125,9 +125,8 @@ TEST(PoseCovariance, APredictedPairAddsToTheNextOnesMotion) {
     PoseCovariance covariance;
     covariance.measure(forward(), diagonal(0.5, 0.25));
     if (from_keyframe) covariance.markKeyframe();
-    const double alike = from_keyframe ? PoseCovariance::kAlike : 1.0;
     covariance.advance(forward(), diagonal(8.0, 2.0));
-    const Matrix6d predicted = afterForward(alike * 0.5, alike * 0.25) + diagonal(8.0, 2.0);
+    const Matrix6d predicted = afterForward(0.5, 0.25) + diagonal(8.0, 2.0);
     expectEqual(covariance.value(), predicted);
     expectEqual(covariance.measure(forward(), diagonal(0.75, 0.25)), afterForward(8.0, 2.0) + diagonal(0.75, 0.25));
     // Only once.
@@ -135,7 +134,7 @@ TEST(PoseCovariance, APredictedPairAddsToTheNextOnesMotion) {
   }
 }
 
-TEST(PoseCovariance, AKeyframeThatWasPredictedOrDoubtedHasNoMeasurementToBeAlike) {
+TEST(PoseCovariance, AKeyframeThatWasPredictedOrDoubtedCarriesThat) {
   PoseCovariance covariance;
   const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
   covariance.measure(still, diagonal(0.5, 0.25));

@@ -105,6 +105,23 @@ TEST(ThreePointPose, FindsWhatOpenCvFinds) {
   EXPECT_LE(missing, 2);
 }
 
+/// Sides 12 and 23 and their angles alike: the cubic has no cubic term.
+TEST(ThreePointPose, SymmetricTrianglesAreSolved) {
+  for (const double apart : {0.5, 1.0, 2.0}) {
+    const std::array<Eigen::Vector3d, 3> points = {Eigen::Vector3d(-apart, 0.0, 5.0), Eigen::Vector3d(0.0, 1.0, 5.0),
+                                                   Eigen::Vector3d(apart, 0.0, 5.0)};
+    for (const int first : {0, 1, 2}) {
+      std::array<Eigen::Vector3d, 3> turned, rays;
+      for (std::size_t k = 0; k < 3; ++k) {
+        turned[k] = points[(k + static_cast<std::size_t>(first)) % 3];
+        rays[k] = turned[k].normalized();
+      }
+      const PoseCandidates candidates = solveThreePointPose(turned, rays);
+      EXPECT_LT(distanceToNearest(candidates, Eigen::Isometry3d::Identity()), 1e-4) << apart << ", from " << first;
+    }
+  }
+}
+
 TEST(ThreePointPose, PointsOnALineGiveNone) {
   const std::array<Eigen::Vector3d, 3> points = {Eigen::Vector3d(0.0, 0.0, 5.0), Eigen::Vector3d(1.0, 1.0, 6.0),
                                                  Eigen::Vector3d(2.0, 2.0, 7.0)};

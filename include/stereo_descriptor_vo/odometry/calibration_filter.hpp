@@ -45,11 +45,11 @@ class CalibrationFilter {
   explicit CalibrationFilter(const CalibrationOptions& options);
 
   /// What is known from pairs before the window that begins with pair `oldest_id`.
-  CalibrationBelief prior(int oldest_id);
+  CalibrationBelief prior(int oldest_id) const;
 
-  /// Notes the result of the window that ends with pair `newest_id` and had the last prior(); `information` excludes
-  /// it.
-  void note(int newest_id, const RigCalibration& calibration, const RigCalibration::Matrix& information);
+  /// Notes the result of the window from pair `oldest_id` to `newest_id`, which had its prior(); `information` excludes
+  /// that.
+  void note(int oldest_id, int newest_id, const RigCalibration& calibration, const RigCalibration::Matrix& information);
 
   /// Notes the square (px^2) of what a window found the calibration to leave at a point.
   void noteCommon(double square);
@@ -69,12 +69,13 @@ class CalibrationFilter {
     Evidence evidence;
   };
 
+  Evidence pastBefore(int oldest_id) const;
+  Evidence beforehand() const;
   RigCalibration::Matrix informationOf(const RigCalibration::Vector& spread) const;
   RigCalibration::Vector significantSpread() const;
 
   CalibrationOptions options_;
   RigCalibration calibration_;
-  Evidence prior_;                       ///< the options', as far as the evidence leaves it its weight
   Evidence past_;                        ///< of windows before the present one
   std::optional<Contribution> pending_;  ///< the last window that shared no pair with those already counted
   std::optional<Evidence> present_;      ///< of the past and the last window

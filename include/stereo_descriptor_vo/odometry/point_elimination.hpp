@@ -46,7 +46,7 @@ struct alignas(32) PoseVector {
 /// point takes away.
 struct PoseFactor {
   PoseVector Y[3];
-  PoseVector gradient;  ///< the point's part of the pose's
+  PoseVector gradient;  ///< the sighting's part of the pose's, less what the point explains
   int pose;             ///< which of the poses that may move, from zero on
 };
 
@@ -65,13 +65,13 @@ struct EliminatedPoint {
   Eigen::Vector3d disparity_by_point;  ///< its derivatives
 };
 
-/// What normal equations are made of costs. A square s costs bend * log(1 + s / bend).
+/// What normal equations are made of costs: a square s costs bend * log(1 + s / bend).
 struct Linearisation {
   double bend;
   double damping = 0.0;  ///< share of its diagonal that is added to a point's H
-  /// By the cost's second derivatives in place of weighted least squares, by which the point was eliminated before. A
-  /// point whose second derivatives have no clear minimum is left out.
-  bool is_exact = false;
+  /// Of errors: by the cost's second derivatives, on average over two directions of a residual, w - w^2 s / bend = w^2.
+  /// Of steps: by the weights w = 1 / (1 + s / bend), which lead to the minimum from farther away.
+  bool of_errors = false;
 };
 
 /// Moves points (ray and inverse depth) to where they fit best after a step of poses and calibration. The step has six
@@ -87,8 +87,8 @@ class PoseEquations {
 
   /// Adds what a point's sightings say, and takes away what the point itself can explain of it (Schur complement). Also
   /// gives a factor for each sighting from a pose that may move, and the squares that squareResiduals() gives.
-  void add(const WindowProjection& projection, const SightedPoint& point, const Linearisation& linearisation,
-           PoseFactor* factors, double* squares, EliminatedPoint& eliminated);
+  EliminatedPoint add(const WindowProjection& projection, const SightedPoint& point, const Linearisation& linearisation,
+                      PoseFactor* factors, double* squares);
 
   /// `hessian`: its lower triangle. The poses by their left perturbations (m, rad), then the calibration.
   void copyTo(Eigen::MatrixXd& hessian, Eigen::VectorXd& gradient) const;

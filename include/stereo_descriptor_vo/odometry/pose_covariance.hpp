@@ -17,10 +17,6 @@ bool widen(Matrix6d& covariance, const Vector6d& deviation);
 /// pair. It grows from key frame to key frame. The traces of its translation and its rotation never shrink in between.
 class PoseCovariance {
  public:
-  /// Errors of successive key frames are positively correlated, because these see the same points. The variance of
-  /// their sum exceeds the sum of their variances by this factor (measured by lab/run covariance).
-  static constexpr double kAlike = 2.0;
-
   /// Of the last pose; zero in the beginning.
   const Matrix6d& value() const { return value_; }
 
@@ -56,9 +52,8 @@ class PoseCovariance {
   void carry(const Eigen::Isometry3d& T_previous_current);
 
   Matrix6d value_ = Matrix6d::Zero();
-  Matrix6d keyframe_ = Matrix6d::Zero();        ///< of the key frame, as a perturbation of the last pose
-  Matrix6d since_keyframe_ = Matrix6d::Zero();  ///< of the last pose's measurement; zero if there is none
-  Matrix6d unmeasured_ = Matrix6d::Zero();      ///< of what the last pose was predicted or doubted by
+  Matrix6d keyframe_ = Matrix6d::Zero();    ///< of the key frame, as a perturbation of the last pose
+  Matrix6d unmeasured_ = Matrix6d::Zero();  ///< of what the last pose was predicted or doubted by
 };
 
 }  // namespace sdvo
