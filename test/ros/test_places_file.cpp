@@ -136,9 +136,6 @@ TEST_F(PlacesFile, ATruncatedFileIsRefused) {
   refusal(path_);
 }
 
-<<<<<<< HEAD
-}  // namespace test_places_file
-=======
 /// Whatever length, count or offset in it is wrong: a record's, a chunk's, an array's within a message.
 TEST_F(PlacesFile, AFileThatAnnouncesMuchTakesLittle) {
   places_.resize(1);
@@ -175,6 +172,5 @@ TEST_F(PlacesFile, CompressedChunksAreRefusedWithTheRemedy) {
   EXPECT_TRUE(contains(refusal(path_), "rosbag decompress"));
 }
 
-}  // namespace
->>>>>>> 7d3a5db (Launch files pass all arguments on, relative names, no mount and no junk parameters; files reach the disk whole, maps are walked before memory is taken)
+}  // namespace test_places_file
 }  // namespace sdvo

@@ -69,7 +69,7 @@ struct EliminatedPoint {
 struct Linearisation {
   double bend;
   double damping = 0.0;  ///< share of its diagonal that is added to a point's H
-  /// Of errors: by the cost's second derivatives, on average over two directions of a residual, w - w^2 s / bend = w^2.
+  /// Of errors: by the cost's second derivatives. On average over two directions of a residual: w - w^2 s / bend = w^2.
   /// Of steps: by the weights w = 1 / (1 + s / bend), which lead to the minimum from farther away.
   bool of_errors = false;
 };

@@ -39,8 +39,8 @@ struct WindowSolution {
   int iterations = 0;               ///< accepted steps
   Eigen::MatrixXd pose_covariance;  ///< of the left perturbations of the poses asked for, 6 rows each, m and rad
   RigCalibration::Matrix calibration_information;  ///< of this window alone, the prior excluded, 1/px^2
-  /// Variance, px^2, of the error that all disparities of one point share: from the median of its squares over the
-  /// points; below zero by chance. None where too few points are known better from their motion than from their
+  /// Variance, px^2, of the error that all disparities of one point share. It comes from the median of its squares over
+  /// the points, and is below zero by chance. None where too few points are known better from their motion than from their
   /// disparities.
   std::optional<double> common_disparity_square;
   std::vector<double> squares;  ///< of each observation's normalised residual
