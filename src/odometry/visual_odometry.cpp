@@ -147,6 +147,8 @@ OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::op
   // Unless the camera went unseen, the views may not be of one rigid world, and the next map would be as wrong.
   if (scene && !found.motion.success && found.agreement.matches >= kManyMatches && dt <= options_.tracking.max_gap)
     state_.doubt.raise(CarriedDoubt::kCertain, "many matches agreed on no motion");
+  // The depths of its points may be those of a wrong rig.
+  if (features.report.refused && step.state == TrackingState::kLost) state_.map.reset();
   state_.doubt.pass();
   state_.images.remember(features, frozen);
   step.dt = step.T_previous_current ? static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9 : dt;
