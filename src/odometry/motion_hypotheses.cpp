@@ -14,7 +14,7 @@ namespace sdvo {
 namespace {
 
 constexpr double kLogOddsOfSighting = 0.75;  // that a point stands still, by each confirmed sighting (chosen)
-constexpr double kHalfLife = 2.5;            // pairs: a certain doubt then lasts for four (chosen)
+constexpr double kHalfLife = 2.5;            // pairs: a certain doubt then lasts for three more (chosen)
 constexpr double kSameMotion = 1.0;          // px: noise of a corner and of the map's point
 
 /// Of n observations that are correlated by this coefficient (Kish 1965, the design effect): 2.5 at most. Points of one

@@ -124,7 +124,7 @@ TEST(SelfCalibrationReport, WhatARigTaughtBeforeItWasFoundToBeWrongIsForgotten) 
   OdometryResult result;
   for (int k = 22; k < 46; ++k) {
     result = odometry.update(scene.view(syntheticPose(k), (k + 1) * kPeriod));
-    if (k < 26) {
+    if (k < 25) {
       EXPECT_EQ(result.state, TrackingState::kDegraded) << k << ": it may be refused again";
     }
   }
