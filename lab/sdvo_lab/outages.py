@@ -232,7 +232,7 @@ def is_same(places, run, k):
     place_of = {place.first + j: place for place in places for j in range(EXCERPT)}
     last = max((j for j in place_of if j < k and run.states[j].state in ("TRACKING", "DEGRADED")), default=k)
     before, after = place_of[last], place_of[k]
-    if before.drive != after.drive or not before.drive.truth.exists() or {before.change, after.change} != {as_it_is}:
+    if before.drive != after.drive or not before.drive.truth.exists() or {before.change, after.change} & {mirrored, swapped}:
         return False
     true = poses.relative(*(before.drive.poses[place.numbers[j - place.first]] for place, j in ((before, last), (after, k))))
     xi = poses.logarithm(poses.relative(true, poses.relative(run.poses[last], run.poses[k])))
