@@ -202,7 +202,7 @@ class Launch(unittest.TestCase):
                                         'base_frame_id:=robot'] + (['clear_params:=' + clear] if clear else []))
             try:
                 end = time.time() + 30
-                while not rospy.has_param('/stereo/visual_odometry/base_frame_id') and time.time() < end:
+                while rospy.get_param('/stereo/visual_odometry/base_frame_id', '') != 'robot' and time.time() < end:
                     time.sleep(0.05)
                 self.assertEqual(rospy.get_param('/stereo/visual_odometry/base_frame_id', ''), 'robot')
                 self.assertEqual(rospy.has_param(stale), clear == 'false')

@@ -45,8 +45,9 @@ class Live(PipelineCase):
     def test_images_are_subscribed_only_while_someone_listens(self):
         camera = self.keep(Camera(self.namespace, self.sequence, self.clock))
         self.diagnostics = self.keep(Collector('/diagnostics', DiagnosticArray))
-        executable = roslib.packages.find_node(PACKAGE, 'stereo_features_node')[0]
-        process = subprocess.Popen([executable, '__ns:=' + self.namespace])
+        executable = roslib.packages.find_node('nodelet', 'nodelet')[0]
+        process = subprocess.Popen([executable, 'standalone', PACKAGE + '/StereoFeatures', '__ns:=' + self.namespace,
+                                    '__name:=stereo_features'])
         try:
             topic = node = self.namespace + '/stereo_features'
             # By then it has started and would have told the master of a subscription.
@@ -354,8 +355,9 @@ class Live(PipelineCase):
         self.assertTrue(self.service('resume', Trigger).success)
         self.assertTrue(wait_until(lambda: self.camera.is_subscribed() and self.pipeline.is_connected(())))
         after = [self.feed_alone(i) for i in range(4, 7)]
-        self.assertEqual([info.state for info in after], ['DEGRADED', 'TRACKING', 'TRACKING'])
-        self.assertEqual({info.epoch for info in after}, {before[-1].epoch + 1})
+        self.assertEqual([info.state for info in after], ['TRACKING'] * 3)
+        self.assertIn('re-acquired', after[0].reason)
+        self.assertEqual({info.epoch for info in after}, {before[-1].epoch})
         self.assertEqual(list(self.info), before + after)
 
     def feed_alone(self, i):
@@ -401,10 +403,11 @@ class Live(PipelineCase):
         client.update_configuration({'size_curve/max_size': 32.0})
         after = self.feed(2)
         self.assertEqual((after.state, after.epoch), ('TRACKING', before.epoch))
-        # Rows of another size do not continue the old ones.
+        # Rows of another size do not continue the old ones, but the map is found again by them.
         client.update_configuration({'size_curve/max_size': 25.0})
         after = self.feed(3)
-        self.assertEqual((after.state, after.epoch), ('DEGRADED', before.epoch + 1))
+        self.assertEqual((after.state, after.epoch), ('TRACKING', before.epoch))
+        self.assertIn('re-acquired', after.reason)
         self.assertEqual(self.feed(4).state, 'TRACKING')
         self.assert_alive()
 
@@ -452,7 +455,7 @@ class Live(PipelineCase):
         self.assertEqual({features.stream_epoch for features in self.features}, {self.features[0].stream_epoch})
         images, infos = self.camera.messages(PAIRS - 1)
         for info in infos:
-            info.P = [1.01 * p if k < 8 else p for k, p in enumerate(info.P)]
+            info.P = [1.1 * p if k < 8 else p for k, p in enumerate(info.P)]
         self.assertEqual(self.feed_messages(images, infos).epoch, self.info[0].epoch + 1)
 
     def test_images_of_twelve_bits(self):
@@ -775,27 +778,28 @@ class Live(PipelineCase):
         for i in range(4):
             self.assertEqual(self.feed(i).state, 'TRACKING')
         states = []
-        for k in range(10):
-            images, infos = self.camera.messages(4, time_of=4 + k)
+        for i in range(4, 10):
+            images, infos = self.camera.messages(i)
             for image in images:
                 image.data = bytes(len(image.data))
             info = self.feed_messages(images, infos)
             states.append(info.state)
             if info.state == 'LOST':
                 self.assertNotEqual(info.reason, '')
-        self.assertEqual(states[1:], ['LOST'] * 9)
+        self.assertEqual(states[1:], ['LOST'] * 5)
         self.assertIn(states[0], ('DEGRADED', 'LOST'))
         predicted = states.count('DEGRADED')
         self.assertEqual(len(self.odometry), 4 + predicted)  # nothing while LOST
 
-        light = [self.feed(i, time_of=i + 10) for i in (4, 5, 6)]
-        self.assertEqual(light[-1].state, 'TRACKING')
-        self.assertEqual(light[-1].epoch, self.info[0].epoch + 1)
+        light = [self.feed(i) for i in (10, 11, 12)]
+        self.assertIn('re-acquired', light[0].reason)
+        self.assertEqual(light[-1].state, 'TRACKING', light[-1].reason)
+        self.assertEqual({info.epoch for info in light}, {self.info[0].epoch})
         self.assertEqual(len(self.odometry), 7 + predicted)
-        # It goes on from the last pose, less certain of it.
-        resumed, last = self.odometry[4 + predicted], self.odometry[3 + predicted]
-        np.testing.assert_allclose(matrix_of(resumed.pose.pose), matrix_of(last.pose.pose), atol=1e-9)
-        self.assertGreater(resumed.pose.covariance[0], last.pose.covariance[0])
+        # It is where the camera is: seven steps of the street further than before.
+        positions = [matrix_of(m.pose.pose)[:3, 3] for m in self.odometry]
+        step = np.linalg.norm(positions[3] - positions[2])
+        self.assertLess(abs(np.linalg.norm(positions[4 + predicted] - positions[3]) - 7 * step), 0.2 * step)
 
     def test_rows_that_do_not_agree_are_named_once(self):
         self.start()
