@@ -23,7 +23,7 @@ from sensor_msgs.msg import Imu, PointCloud2
 from std_srvs.srv import Empty, Trigger
 from tf2_msgs.msg import TFMessage
 
-from kitti_replay import EPOCH, PACKAGE, Collector, matrix_of, wait_until
+from kitti_replay import EPOCH, FRAME, PACKAGE, Collector, matrix_of, wait_until
 from made_up_sequence import STEP, MadeUpSequence
 from pipeline_case import PipelineCase
 from stereo_descriptor_vo.msg import MapGraph, PlaceInfo, StereoFeatures, VoInfo
@@ -262,9 +262,9 @@ class Faults(PipelineCase):
             self.assertEqual(self.feed(i).state_id, VoInfo.TRACKING)
         self.assertTrue(wait_until(lambda: len(pose) == 5 and len(cloud) > 0 and cloud[-1].header.stamp == pose[-1].header.stamp))
         self.assertEqual(pose[-1].pose.covariance, self.odometry[-1].pose.covariance)
-        self.assertEqual(cloud[-1].header.frame_id, 'odom')
-        # Two walls across the way ahead, 2 and 4 m away; the camera looks along x.
-        ahead = np.frombuffer(cloud[-1].data, np.float32).reshape(-1, cloud[-1].point_step // 4)[:, 0]
+        self.assertEqual(cloud[-1].header.frame_id, FRAME)
+        # Two walls across the way ahead, 2 and 4 m away; the camera's z is ahead.
+        ahead = np.frombuffer(cloud[-1].data, np.float32).reshape(-1, cloud[-1].point_step // 4)[:, 2]
         self.assertGreater(len(ahead), 200)
         self.assertGreater(np.mean((abs(ahead - 2) < 0.1) | (abs(ahead - 4) < 0.2)), 0.9)
 
