@@ -577,8 +577,8 @@ TEST_F(Tools, MessagesThatMakeNoPairDoNotKeepOthersFromIt) {
     rosbag::Bag out(mixed.string(), rosbag::bagmode::Write);
     sensor_msgs::CameraInfo info;
     for (int i = 0; i < kAlone; ++i) {
-      info.header.stamp = ros::Time(999999000, 1 + i);
-      out.write("/stereo/left/camera_info", ros::Time(999999000, 1 + i), info);
+      info.header.stamp = ros::Time(999999000 + i, 0);
+      out.write("/stereo/left/camera_info", ros::Time(999999000 + i, 0), info);
     }
     const rosbag::Bag in(bag("good").string());
     for (const rosbag::MessageInstance& message : rosbag::View(in))
