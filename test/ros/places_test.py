@@ -382,7 +382,7 @@ class Places(unittest.TestCase):
         answer = recognition.call('load_places', LoadPlaces, file)
         self.assertTrue(answer.success, answer.message)
         self.drive(robot, recognition, 2)
-        self.clock.jump_to(recognition.info[0].header.stamp + rospy.Duration.from_sec(0.5))
+        self.clock.jump_to(recognition.info[0].header.stamp + rospy.Duration.from_sec(0.7))  # a stamp that had no answer yet
         robot.stamp = self.clock.now
         info = self.drive(robot, recognition, 1)
         self.assertEqual(info.places, int(answer.message.split()[0]) + 1)
