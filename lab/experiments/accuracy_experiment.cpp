@@ -29,7 +29,7 @@ constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 enum Model { kSample, kRefined, kAligned, kAlignedByDepth, kModels };
 constexpr std::array<const char*, kModels> kModelNames = {"sample", "refined", "aligned", "aligned_by_depth"};
 
-/// What rows of the table are about.
+/// Subject of a row.
 struct Case {
   std::string sequence;
   int features, step;

@@ -45,7 +45,7 @@ struct Score {
   std::vector<int> pairs = std::vector<int>(kSteps, 0);
 };
 
-/// What rows of the table are about.
+/// Subject of a row.
 struct Case {
   DescriptorType descriptor;
   DescriptorLayout layout;

@@ -5,7 +5,7 @@
 
 namespace sdvo {
 
-/// What a subcommand does: returns the exit code.
+/// A subcommand; returns the exit code.
 using Learning = std::function<int()>;
 
 /// Add their options to a subcommand.

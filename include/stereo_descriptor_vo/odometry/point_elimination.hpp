@@ -65,7 +65,7 @@ struct EliminatedPoint {
   Eigen::Vector3d disparity_by_point;  ///< its derivatives
 };
 
-/// What normal equations are made of costs: a square s costs bend * log(1 + s / bend).
+/// Weights of the normal equations: a residual's square s costs bend * log(1 + s / bend).
 struct Linearisation {
   double bend;
   double damping = 0.0;  ///< share of its diagonal that is added to a point's H
