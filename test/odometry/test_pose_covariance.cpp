@@ -77,6 +77,23 @@ TEST(PoseCovariance, TheErrorOfTheKeyframeCancelsInTheMotion) {
   EXPECT_NEAR(motion(0, 0), motion_square, 0.05 * motion_square);
 }
 
+TEST(PoseCovariance, AMotionIsThatOfTheLastTwoPosesToEachOther) {
+  // Along a line: the key frame errs by `common`, a pair by its own error against it. A weak pair, then a good one.
+  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
+  constexpr double kCommon = 1.0, kWeak = 9.0, kGood = 1.0;
+  PoseCovariance covariance;
+  covariance.measure(still, diagonal(kCommon + kWeak, 0.25));
+  Matrix6d motion = covariance.measure(still, diagonal(kCommon + kGood, 0.25));
+  EXPECT_NEAR(motion(0, 0), kWeak + kGood, 1e-9) << "both pairs' own errors, not the key frame's";
+  motion = covariance.measure(still, diagonal(kCommon + kGood, 0.25));
+  EXPECT_NEAR(motion(0, 0), kGood + kGood, 1e-9) << "the weak pair has no part in it";
+  // Where the pair before is the key frame, its error is what the new one is measured against.
+  covariance.measure(still, diagonal(kCommon + kWeak, 0.25));
+  covariance.markKeyframe();
+  motion = covariance.measure(still, diagonal(kCommon + kGood, 0.25));
+  EXPECT_NEAR(motion(0, 0), kCommon + kGood, 1e-9);
+}
+
 TEST(PoseCovariance, ContainsWhatASecondThoughtMoved) {
   PoseCovariance covariance;
   const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();

@@ -23,10 +23,6 @@ class RightCameraRotation {
   /// Standard deviation, rad; NaN as above.
   Eigen::Vector3d sigma() const;
 
-  /// How far a pair disagrees with those before: what the rotation that its own rows tell does to them beyond what
-  /// rotation() does, px, root mean square. Zero before the first pair and without features.
-  double change(const StereoFeatures& features) const;
-
  private:
   struct Sums {
     Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< in units of the residuals, 1/px^2
