@@ -4,7 +4,6 @@
     lab/run outages kitti:03 euroc:MH_01_half --black 3,10 --places 5      # ... at so many places of each drive
     lab/run outages euroc:MH_01_still --repeated 30 --black 30             # a camera that stands: its first pairs to and fro
     lab/run outages kitti:04 kitti:06 --elsewhere 200                      # excerpts joined by black pairs, so many times
-    lab/run outages kitti:03 --write                                       # puts the table into docs/troubleshooting.md
 
 The pose after an outage is compared with that of the same pair in the undisturbed run, in standard deviations of its motion since
 the last pose. Exits 1 where it is off by more than 5, where no map was found though a third of the points was in view, or where
@@ -36,7 +35,6 @@ def options(parser):
     parser.add_argument("--seed", type=int, default=1, help="of the excerpts [default: %(default)s]")
     programs.add_params(parser)
     drives.add_rendered(parser)
-    marks.add_write(parser, marks.FAULTS)
 
 
 class Sequence:
@@ -180,7 +178,7 @@ def measure_black(all_drives, work, arguments):
     found = []
     marks.show(itertools.chain([HEAD], (found.append(outage) or outage.row() for outage in outages(all_drives, work, arguments))))
     print()
-    marks.show(summary(found), arguments.write, "outages")
+    marks.show(summary(found))
     return sum(outage.is_wrong for outage in found)
 
 
