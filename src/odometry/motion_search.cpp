@@ -85,8 +85,7 @@ std::vector<MotionHypothesis> MotionSearch::compete(const MotionScene& scene, co
 /// Neither prior nor lasting points contradict, the majority agrees with the motion, and lasting points that lack more
 /// than usual would be no serious rival even if they moved together.
 bool MotionSearch::isBeyondDoubt(const MotionScene& scene, const MotionHypothesis& found, double max_doubt) const {
-  if (!found.motion.success || found.innovation > noiseGate(6) || logOddsMisled(scene, found) > max_doubt)
-    return false;
+  if (!found.motion.success || found.innovation > noiseGate(6) || logOddsMisled(scene, found) > max_doubt) return false;
   int all = 0, own = 0;
   for (int i = 0; i < static_cast<int>(found.matches.size()); ++i) all += found.sightingsOf(i);
   for (const int i : found.motion.inliers) own += found.sightingsOf(i);

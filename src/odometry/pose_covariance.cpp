@@ -78,7 +78,8 @@ void PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, const 
 Matrix6d PoseCovariance::measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe) {
   const Matrix6d before = value_ - predicted_;
   carry(T_previous_current);
-  const Matrix6d motion = unmeasured_ + (since_keyframe_ ? noLessThan(*since_keyframe_, since_keyframe) : since_keyframe);
+  const Matrix6d motion =
+      unmeasured_ + (since_keyframe_ ? noLessThan(*since_keyframe_, since_keyframe) : since_keyframe);
   since_keyframe_ = since_keyframe;
   value_ = noLessThan(before, keyframe_ + since_keyframe);
   predicted_.setZero();

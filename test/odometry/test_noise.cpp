@@ -48,12 +48,5 @@ TEST(Noise, MotionsAreOneWithinTheNoiseOfACorner) {
   EXPECT_NEAR(noise.sameMotion(), std::sqrt(square), 0.01);
 }
 
-TEST(Noise, ErrorsThatPointsShareDoNotAverageOut) {
-  const Noise noise(0.4, 0.1, 0.3);
-  EXPECT_EQ(noise.otherMotion(1), noiseGate(6));
-  EXPECT_GT(noise.otherMotion(100), 170.0) << "seen where nothing moved";
-  EXPECT_NEAR((noise.otherMotion(1000) - noise.otherMotion(500)) / 500.0, 1.5, 0.1);
-}
-
 }  // namespace test_noise
 }  // namespace sdvo

@@ -92,7 +92,8 @@ TEST(RightCameraRotation, ATurnIsSaidOfARigThatWasSteady) {
   RightCameraRotation filter;
   for (int k = 0; k < 20; ++k) EXPECT_LT(filter.add(gridSeenWith(Eigen::Vector3d::Zero())), 3.0);
   EXPECT_GT(changeOf(filter, gridSeenWith(turn)), 0.6);
-  for (int k = 0; k < 5; ++k) EXPECT_GT(filter.add(gridSeenWith(turn)), 3.0) << "a turn does not become usual by lasting";
+  for (int k = 0; k < 5; ++k)
+    EXPECT_GT(filter.add(gridSeenWith(turn)), 3.0) << "a turn does not become usual by lasting";
 }
 
 // The memory holds a part of both places then, and is near enough to either.

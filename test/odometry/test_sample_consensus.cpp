@@ -71,8 +71,8 @@ TEST_P(EveryMethod, RecoversTheMotionAmongSixtyPercentOutliers) {
     EXPECT_LT(logSO3(error.linear()).norm(), 0.01) << "seed " << seed;
     const std::vector<int> inliers = inliersOf(consensus, scene);
     std::vector<int> right;
-    std::set_intersection(inliers.begin(), inliers.end(), scene.true_inliers.begin(),
-                          scene.true_inliers.end(), std::back_inserter(right));
+    std::set_intersection(inliers.begin(), inliers.end(), scene.true_inliers.begin(), scene.true_inliers.end(),
+                          std::back_inserter(right));
     EXPECT_GE(right.size(), 60u) << "seed " << seed;
     EXPECT_LE(inliers.size() - right.size(), 3u) << "seed " << seed;
   }

@@ -80,8 +80,8 @@ struct MotionHypothesis {
 /// Ratio of a motion by which it may be off.
 constexpr double kTolerableRatio = 0.03;
 
-/// Logarithm of the number of false alarms (a contrario, Moisan and Stival 2004): the expected number of motions with as
-/// many inliers, if each match agrees by `chance`.
+/// Logarithm of the number of false alarms (a contrario, Moisan and Stival 2004): the expected number of motions with
+/// as many inliers, if each match agrees by `chance`.
 double logFalseAlarms(int matches, int inliers, double chance);
 
 /// Chance that a wrong match, anywhere within `gate` px of its prediction, is within `threshold` px of a motion.

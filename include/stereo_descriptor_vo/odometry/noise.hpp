@@ -24,7 +24,7 @@ class Noise {
   /// Takes in what the inliers of a confirmed motion were off by (rms of u_left, v_left and u_right, px). Slow and
   /// bounded: one pair may be blurred, and what the inliers are depends on the scale itself.
   void learn(double rms) {
-    constexpr double kMemory = 0.9;             // ratio of the past that a pair leaves (chosen)
+    constexpr double kMemory = 0.9;              // ratio of the past that a pair leaves (chosen)
     constexpr double kLeast = 0.5, kMost = 2.0;  // (chosen)
     const double expected = std::sqrt(2.0 * corner_ * corner_ + disparity_ * disparity_ / 3.0);
     scale_ = std::clamp(kMemory * scale_ + (1.0 - kMemory) * rms / expected, kLeast, kMost);
@@ -40,12 +40,12 @@ class Noise {
   /// px: two aligned positions that are further apart are not of one point.
   double elsewhere() const { return std::sqrt(2.0 * noiseGate(2)) * aligned_; }
 
-  /// Chi-square of six, by the sum over so many points, beyond which two motions are not one. Points share a part of
-  /// their errors, which therefore does not average out.
+  /// Chi-square of six, by the sum over so many points, beyond which two motions are not one. Neighbours share a part of
+  /// their errors, which does not average out.
   double otherMotion(std::size_t points) const {
-    constexpr double kShared = 0.055;  // ratio of a variance (measured): 1.5 for each point where nothing moved, 1.7 and
-                                       // more with faults
-    return noiseGate(6) * (1.0 + kShared * (static_cast<double>(points) - 1.0));
+    constexpr double kOther = 250.0;     // measured: up to 205 where nothing moved
+    constexpr double kOtherOfOne = 1.5;  // the same for each point; 1.7 and more with faults
+    return std::max(kOther, kOtherOfOne * static_cast<double>(points));
   }
 
  private:

@@ -14,8 +14,8 @@ namespace sdvo {
 /// is measured with rows of the left view alone and does not depend on it.
 class RightCameraRotation {
  public:
-  /// Takes in one pair; old pairs are forgotten slowly. Returns by how many times what is usual the camera turned before
-  /// it: usual on rigs, and on this one.
+  /// Takes in one pair; old pairs are forgotten slowly. Returns by how many times what is usual the camera turned
+  /// before it: usual on rigs, and on this one.
   double add(const StereoFeatures& features);
 
   /// rad; NaN before the first pair with features.
@@ -42,8 +42,8 @@ class RightCameraRotation {
   struct UsualChange {
     double square = 0.0;  ///< of the changes of the last pairs, px^2
 
-    /// Takes in a change (px) and returns how many times the usual one it is. `memory_of_large`: ratio of the square that
-    /// a large change leaves.
+    /// Takes in a change (px) and returns how many times the usual one it is. `memory_of_large`: ratio of the square
+    /// that a large change leaves.
     double exceededBy(double change, double memory_of_large);
   };
 
