@@ -50,13 +50,13 @@ class Cameras(unittest.TestCase):
             arguments['mount'] = '0 0 0 0 0 0'
         if habits.raw:
             arguments['left_frame_id'] = frames[0]
-        if habits.emitter_on_off:
+        if habits.emitter == 'on_off':
             arguments['emitter_on_off'] = 'true'
         pipeline = Pipeline('/' + namespace, habits.launch, **arguments)
         for closeable in collectors + [self.rosout, pipeline]:
             self.addCleanup(closeable.close)
         topics = self.driver.topics()
-        if habits.emitter_on_off:
+        if habits.emitter == 'on_off':
             left, unlit = self.driver.infos[0].resolved_name, '/%s/infra1/unlit/camera_info' % namespace
             self.assertTrue(wait_until(lambda: links('/%s/infra1/unlit_camera_info' % namespace) >= {
                 ('in', left), ('in', self.driver.metadata.resolved_name), ('out', unlit, pipeline.manager)}, 60))
@@ -87,7 +87,7 @@ class Cameras(unittest.TestCase):
         self.drive(fake_driver.REALSENSE)
 
     def test_pairs_that_the_projector_lights_are_left_out(self):
-        self.start(dataclasses.replace(fake_driver.REALSENSE, emitter_on_off=True))
+        self.start(dataclasses.replace(fake_driver.REALSENSE, emitter='on_off'))
         stamps = []
         for i in range(PAIRS):
             stamps.append(self.driver.publish(i))
@@ -97,6 +97,14 @@ class Cameras(unittest.TestCase):
         self.assertTrue(wait_until(lambda: self.odometry.has(stamps[4])))
         self.assertAlmostEqual(self.odometry[-1].pose.pose.position.x, 4.0, delta=0.1)
         self.assertFalse(self.rosout.warned('emitter'), self.rosout.warnings)
+
+    def test_a_projector_that_is_on_is_named(self):
+        self.sequence = StereoSequence(2 * PAIRS)
+        self.start(dataclasses.replace(fake_driver.REALSENSE, emitter='on'))
+        for i in range(2 * PAIRS):
+            stamp = self.driver.publish(i)
+            self.assertTrue(wait_until(lambda: self.info.has(stamp)), self.rosout.errors)
+        self.assertTrue(wait_until(lambda: self.rosout.warned('emitter: ', 'switch the pattern projector off')), self.rosout.warnings)
 
     def test_oak(self):
         self.drive(fake_driver.OAK)

@@ -45,7 +45,7 @@ class Habits:
     raw: bool = False
     reversed_pair: bool = False  # Tx in the left camera_info, not in the right one
     without_tx: bool = False
-    emitter_on_off: bool = False  # dots in every second pair, from the second one on, as the metadata of the left side tell
+    emitter: str = 'off'  # or 'on'; 'on_off': dots in every second pair, from the second one on, as the left side's metadata tell
 
 
 REALSENSE = Habits('realsense_d400.launch', 'camera', ('infra1', 'infra2'), 'image_rect_raw',
@@ -74,9 +74,9 @@ class FakeDriver:
         names = ['/%s/%s/' % (habits.namespace, side) for side in habits.sides]
         self.images = [rospy.Publisher(name + habits.image, Image, queue_size=100) for name in names]
         self.infos = [rospy.Publisher(name + 'camera_info', CameraInfo, queue_size=100) for name in names]
-        self.metadata = rospy.Publisher(names[0] + 'metadata', Metadata, queue_size=100) if habits.emitter_on_off else None
-        dots = np.random.default_rng(1).random(sequence.pairs[0][0].shape) < 0.02
-        self.dots = cv2.dilate(np.uint8(dots), np.ones((2, 2), np.uint8)).astype(bool)
+        self.metadata = rospy.Publisher(names[0] + 'metadata', Metadata, queue_size=100) if habits.emitter == 'on_off' else None
+        dots = np.random.default_rng(1).random(sequence.pairs[0][0].shape) < 0.01
+        self.dots = 100 * cv2.dilate(np.uint8(dots), np.ones((2, 2), np.uint8))  # grey levels
         p = sequence.projections[0]
         k = np.array([[p[0], 0, p[2]], [0, p[5], p[6]], [0, 0, 1.0]])
         self.map = raw_map(habits.model, k, sequence.pairs[0][0].shape[::-1]) if habits.raw else None
@@ -113,7 +113,7 @@ class FakeDriver:
     def image(self, i, side):
         image = self.sequence.pairs[i][side]
         if self.is_lit(i):
-            image = np.where(self.dots, 255, image).astype(np.uint8)
+            image = cv2.add(image, self.dots)
         if self.map is not None:
             image = cv2.remap(image, self.map, None, cv2.INTER_LINEAR)
         if self.habits.encoding == 'bgr8':
@@ -121,7 +121,7 @@ class FakeDriver:
         return self.bridge.cv2_to_imgmsg(image, self.habits.encoding)
 
     def is_lit(self, i):
-        return self.habits.emitter_on_off and i % 2 == 1
+        return self.habits.emitter == 'on' or self.habits.emitter == 'on_off' and i % 2 == 1
 
     def publish(self, i):
         """Pair i of a 10 Hz camera; returns its stamp."""

@@ -520,6 +520,12 @@ class Live(PipelineCase):
         for info in infos:
             info.P = [1.1 * p if k < 8 else p for k, p in enumerate(info.P)]
         self.assertEqual(self.feed_messages(images, infos).epoch, self.info[0].epoch + 1)
+        # A baseline in mm is named as check_camera does, with each new stream.
+        self.assertFalse(self.rosout.warned('calibration: '), self.rosout.warnings)
+        images, infos = self.camera.messages(PAIRS - 1, time_of=PAIRS)
+        infos[1].P = [1000 * p if k == 3 else p for k, p in enumerate(infos[1].P)]
+        self.feed_messages(images, infos)
+        self.assertTrue(wait_until(lambda: self.rosout.warned('calibration: ', 'in pixels times mm or cm')), self.rosout.warnings)
 
     def test_images_of_twelve_bits(self):
         self.start()
