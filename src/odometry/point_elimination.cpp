@@ -97,11 +97,6 @@ struct Derivatives {
   SDVO_IN_KERNEL Three transposedTimes(const Three& v) const { return aside * v - kZ * sumOf(ahead * v); }
 };
 
-/// A sighting's weights in the normal equations.
-struct Weights {
-  double of_hessian, of_gradient;
-};
-
 /// Columns of w A^T A: what a sighting says of P.
 struct Information {
   Three x, y, z;
@@ -135,20 +130,20 @@ struct PointSums {
   Three H00{}, H10{}, H11{}, H20{}, H21{}, H22{}, g0{}, g1{}, g2{};
   Three by0{}, by1{}, by2{};              ///< derivatives
   Three shaped0{}, shaped1{}, shaped2{};  ///< … times the calibration's shape
-  double weight = 0.0, residual = 0.0;
+  double weight = 0.0, weight_square = 0.0, weight_fourth = 0.0, residual = 0.0;
   double shape = 0.0, shape_square = 0.0, shape_residual = 0.0;
   int sightings = 0;
 
   /// J: columns of the derivatives by the point.
-  SDVO_IN_KERNEL void add(const Sight& at, const Weights& weights, const Three& J0, const Three& J1, const Three& J2) {
-    const double w = weights.of_hessian;
-    const Three w0 = w * J0, w1 = w * J1, w2 = w * J2, pull = weights.of_gradient * at.residual;
+  SDVO_IN_KERNEL void add(const Sight& at, double w, const Three& J0, const Three& J1, const Three& J2) {
+    const Three w0 = w * J0, w1 = w * J1, w2 = w * J2, pull = w * at.residual;
     H00 += w0 * J0, H10 += w1 * J0, H11 += w1 * J1, H20 += w2 * J0, H21 += w2 * J1, H22 += w2 * J2;
     g0 += pull * J0, g1 += pull * J1, g2 += pull * J2;
     by0 += w0, by1 += w1, by2 += w2;
     shaped0 += at.shape * w0, shaped1 += at.shape * w1, shaped2 += at.shape * w2;
     const double w_shape = w * at.shape;
-    weight += w, residual += pull[2];
+    const double square = w * w;
+    weight += w, weight_square += square, weight_fourth += square * square, residual += pull[2];
     shape += w_shape, shape_square += w_shape * at.shape, shape_residual += pull[2] * at.shape;
     ++sightings;
   }
@@ -211,14 +206,13 @@ struct AddPoint {
       squares[i] = at.square;
       if (!at.isInFront()) continue;
       const double w = linearisation->bend / (linearisation->bend + at.square);
-      const Weights weights = {linearisation->of_errors ? w * w : w, w};
       const Derivatives A(*projection, at);
-      sums.add(at, weights, A.times(T), A.times(T + 4), A.times(T + 12) + kZ * A.by_rho);
+      sums.add(at, w, A.times(T), A.times(T + 4), A.times(T + 12) + kZ * A.by_rho);
       if (seen.frame == 0) continue;
       PoseFactor& factor = factors[moving++];
       factor.pose = seen.frame - 1;
-      addPose({at.P, point->ray_and_inverse_depth.z()}, A, at, weights, T, factor,
-              blocks[indexOf(factor.pose, factor.pose)], borders[factor.pose]);
+      addPose({at.P, point->ray_and_inverse_depth.z()}, A, at, w, T, factor, blocks[indexOf(factor.pose, factor.pose)],
+              borders[factor.pose]);
     }
 
     // What the point is in, times R or R^T.
@@ -257,16 +251,17 @@ struct AddPoint {
     eliminated->factors = moving;
     eliminated->sightings = sums.sightings;
     eliminated->weight = sums.weight;
+    eliminated->weight_square = sums.weight_square;
+    eliminated->weight_fourth = sums.weight_fourth;
     eliminated->disparity_residual = sums.residual;
     eliminated->disparity_by_point << sums.by0[2], sums.by1[2], sums.by2[2];
   }
 
  private:
   /// What a sighting says of its pose, of that and the calibration, and of that and the point.
-  static SDVO_IN_KERNEL void addPose(const Lever& lever, const Derivatives& A, const Sight& at, const Weights& weights,
+  static SDVO_IN_KERNEL void addPose(const Lever& lever, const Derivatives& A, const Sight& at, double w,
                                      const double* T, PoseFactor& factor, PoseEquations::Block& block,
                                      PoseEquations::Border& border) {
-    const double w = weights.of_hessian;
     const Information M(A, w);
     const double by_z = -w * A.ahead[2];  // the disparity by P.z
     lever.multiply(M.times(T), factor.Y[0]);
@@ -285,7 +280,7 @@ struct AddPoint {
     const Three of_disparity = kZ * (by_z * at.inverse_noise[2]);
     lever.addProduct(of_disparity, 1.0, border.columns[0]);
     lever.addProduct(of_disparity, at.shape, border.columns[1]);
-    lever.multiply(A.transposedTimes(weights.of_gradient * at.residual), factor.gradient);
+    lever.multiply(A.transposedTimes(w * at.residual), factor.gradient);
   }
 
   /// A factor by R^T from the right.
