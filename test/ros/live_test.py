@@ -533,26 +533,25 @@ class Live(PipelineCase):
         self.addCleanup(imu.unregister)
         self.assertTrue(wait_until(lambda: self.is_sent_to_pipeline(imu)))
 
-        def turn(images):
-            """What the gyro measured in the tenth of a second before a pair: it stands on its head and turns a little."""
-            for k in range(11):
+        def measure(stamp, duration, rate):
+            """What the IMU measures up to `stamp`, without a gap: it stands on its head and turns a little."""
+            for k in range(round(duration / 0.01)):
                 message = Imu()
                 message.header.frame_id = 'gyro'
-                message.header.stamp = images[0].header.stamp - rospy.Duration.from_sec(0.01 * (10 - k))
-                message.angular_velocity.z = 0.02
+                message.header.stamp = stamp - rospy.Duration.from_sec(duration) + rospy.Duration.from_sec(0.01 * (k + 1))
+                message.angular_velocity.z, message.linear_acceleration.z = rate, 9.81
                 imu.publish(message)
+
+        times = itertools.count(1)
+
+        def feed(i, rate):
+            images, infos = self.camera.messages(i, time_of=next(times))
+            measure(images[0].header.stamp, 0.1, rate)
+            return self.feed_messages(images, infos)
         # A robot that stands tells gravity; nothing begins before that is here.
-        still = Imu()
-        still.header.frame_id = 'gyro'
-        still.linear_acceleration.z = 9.81
-        for k in range(90):
-            still.header.stamp = self.camera.messages(0)[0][0].header.stamp - rospy.Duration.from_sec(0.015 * (90 - k))
-            imu.publish(still)
-        times = itertools.count()
-        self.assertTrue(wait_until(lambda: self.feed(0, time_of=next(times)).state == 'TRACKING'), self.info[-1].reason)
-        images, infos = self.camera.messages(1, time_of=next(times))
-        turn(images)
-        self.assertEqual(self.feed_messages(images, infos).state, 'TRACKING')
+        measure(self.camera.messages(0, time_of=0)[0][0].header.stamp, 1.5, 0.0)
+        self.assertTrue(wait_until(lambda: feed(0, 0.0).state == 'TRACKING'), self.info[-1].reason)
+        self.assertEqual(feed(1, 0.02).state, 'TRACKING')
         self.assertTrue(wait_until(lambda: self.rosout.warned('no guess of the motion', 'gyro')), self.rosout.warnings)
 
         transform = camera_transform('gyro')
@@ -560,9 +559,7 @@ class Live(PipelineCase):
         q.x, q.y, q.z, q.w = 1.0, 0.0, 0.0, 0.0
         self.broadcaster.sendTransform([camera_transform(FRAME), transform])  # what is latched replaces what was
         for i in range(2, 6):
-            images, infos = self.camera.messages(i, time_of=next(times))
-            turn(images)
-            self.assertEqual(self.feed_messages(images, infos).state, 'TRACKING')
+            self.assertEqual(feed(i, 0.02).state, 'TRACKING')
 
     def test_an_accelerometer_levels_after_a_reset_and_is_no_gyro(self):
         config = tempfile.NamedTemporaryFile('w', suffix='.yaml')
