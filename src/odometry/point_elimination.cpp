@@ -130,7 +130,7 @@ struct PointSums {
   Three H00{}, H10{}, H11{}, H20{}, H21{}, H22{}, g0{}, g1{}, g2{};
   Three by0{}, by1{}, by2{};              ///< derivatives
   Three shaped0{}, shaped1{}, shaped2{};  ///< … times the calibration's shape
-  double weight = 0.0, weight_square = 0.0, weight_fourth = 0.0, residual = 0.0;
+  double weight = 0.0, residual = 0.0;
   double shape = 0.0, shape_square = 0.0, shape_residual = 0.0;
   int sightings = 0;
 
@@ -142,8 +142,7 @@ struct PointSums {
     by0 += w0, by1 += w1, by2 += w2;
     shaped0 += at.shape * w0, shaped1 += at.shape * w1, shaped2 += at.shape * w2;
     const double w_shape = w * at.shape;
-    const double square = w * w;
-    weight += w, weight_square += square, weight_fourth += square * square, residual += pull[2];
+    weight += w, residual += pull[2];
     shape += w_shape, shape_square += w_shape * at.shape, shape_residual += pull[2] * at.shape;
     ++sightings;
   }
@@ -251,8 +250,6 @@ struct AddPoint {
     eliminated->factors = moving;
     eliminated->sightings = sums.sightings;
     eliminated->weight = sums.weight;
-    eliminated->weight_square = sums.weight_square;
-    eliminated->weight_fourth = sums.weight_fourth;
     eliminated->disparity_residual = sums.residual;
     eliminated->disparity_by_point << sums.by0[2], sums.by1[2], sums.by2[2];
   }

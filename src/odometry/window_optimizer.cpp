@@ -95,6 +95,7 @@ class Solver {
 
   /// Square of the residual at which the Cauchy kernel bends: a square s costs bend * log(1 + s / bend).
   double bend() const { return options_.kernel_scale * options_.kernel_scale; }
+  double weight(double square) const { return bend() / (bend() + square); }
 
   /// Also gives the square of each observation's residual.
   double cost(const Estimate& estimate, std::vector<double>& squares) {
@@ -136,16 +137,16 @@ class Solver {
   /// Covariances at a minimum of robust costs (Huber, Robust Statistics, section 7.6): A^-1 B A^-1, A the cost's second
   /// derivatives, B the sum of the gradients' products over what errs independently. Whole points do, not their
   /// sightings (Liang and Zeger 1986): their disparities share errors. Of B only its size beside A is taken from the
-  /// gradients, since few points leave the rest to chance. All of it is of the last linearisation. `poses`: those that
-  /// are asked for.
-  bool covariances(const Estimate& estimate, const std::vector<int>& poses, ReducedSystem& system,
-                   WindowSolution& solution) {
+  /// gradients, since few points leave the rest to chance. All of it is of the last linearisation, but for `squares`:
+  /// the residuals' now. `poses`: those that are asked for.
+  bool covariances(const Estimate& estimate, const std::vector<double>& squares, const std::vector<int>& poses,
+                   ReducedSystem& system, WindowSolution& solution) {
     const RigCalibration::Matrix certain = certainInformation();
     equations_.copyTo(system.hessian, system.gradient);
     known_.setZero(size_, size_);  // without the points
     known_.bottomRightCorner<kCalibration, kCalibration>() = certain;
     if (window_->floor) holdToFloor(estimate, known_, system.gradient);
-    const double derivatives = derivativesOverWeights(system.points);
+    const auto [derivatives, gradient_products] = sinceLinearised(squares);
     system.hessian = derivatives * system.hessian + known_;
     factor_.compute(system.hessian);
     if (factor_.info() != Eigen::Success) return false;  // as when nothing holds one of the poses
@@ -161,7 +162,8 @@ class Solver {
     const auto of_poses = solved_.leftCols(asked);
     const Eigen::MatrixXd of_known = of_poses.transpose() * known_.selfadjointView<Eigen::Lower>() * of_poses;
     const Eigen::MatrixXd of_points = units_.leftCols(asked).transpose() * of_poses - of_known;
-    solution.pose_covariance = errorsOverInformation(system, of_poses, of_points) * of_points + of_known;
+    solution.pose_covariance =
+        gradient_products * errorsOverInformation(system, of_poses, of_points) * of_points + of_known;
     return solution.pose_covariance.allFinite();
   }
 
@@ -184,17 +186,25 @@ class Solver {
   }
 
  private:
+  /// The last linearisation in units of how things are now.
+  struct SinceLinearised {
+    double derivatives;        ///< the cost's second derivatives now by the normal equations
+    double gradient_products;  ///< now by then
+  };
   /// Of a residual the cost's second derivatives are w - w^2 s / bend = w^2 on average over two directions, where the
-  /// normal equations have its weight w, which leads to the minimum from farther away. Of a point's sightings i its
-  /// elimination leaves w_i - w_i^2 / sum(w): compared are the sums of that.
-  static double derivativesOverWeights(const std::vector<EliminatedPoint>& points) {
-    double weights = 0.0, derivatives = 0.0;
-    for (const EliminatedPoint& point : points) {
-      if (point.sightings < 2) continue;
-      weights += point.weight - point.weight_square / point.weight;
-      derivatives += point.weight_square - point.weight_fourth / point.weight_square;
+  /// normal equations have its weight w, which leads to the minimum from farther away. Products of gradients have w^2,
+  /// too. Of a point's sightings i its elimination leaves w_i - w_i^2 / sum(w). Compared are the sums of that.
+  SinceLinearised sinceLinearised(const std::vector<double>& squares) const {
+    double weights = 0.0, before = 0.0, now = 0.0;
+    for (std::size_t p = 0; p + 1 < first_of_point_.size(); ++p) {
+      double w1 = 0.0, w2 = 0.0, w4 = 0.0, now2 = 0.0, now4 = 0.0;  // powers
+      for (int i = first_of_point_[p]; i < first_of_point_[p + 1]; ++i) {
+        const double w = weight(squares_[i]), square = w * w, w_now = weight(squares[i]), now_square = w_now * w_now;
+        w1 += w, w2 += square, w4 += square * square, now2 += now_square, now4 += now_square * now_square;
+      }
+      weights += w1 - w2 / w1, before += w2 - w4 / w2, now += now2 - now4 / now2;
     }
-    return derivatives / std::max(weights, 1e-12);
+    return {now / std::max(weights, 1e-12), now / std::max(before, 1e-12)};
   }
 
   /// Mean ratio of two covariances: by the gradients of single points, and as the second derivatives have it. What the
@@ -387,9 +397,8 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
   // say too much.
   if (damping_of_system > kUndamped) solver.linearise(estimate, kUndamped, system);
   solution.common_disparity_square = solver.commonVariance(system.points, common_squares);
-  if (!solver.covariances(estimate, covariance_of, system, solution)) return solution;
-
   if (!accepted) solver.cost(estimate, squares);  // those at hand belong to a refused step
+  if (!solver.covariances(estimate, squares, covariance_of, system, solution)) return solution;
   std::swap(solution.squares, squares);
   solution.success = true;
   return solution;

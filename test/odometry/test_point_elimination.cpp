@@ -202,18 +202,16 @@ TEST(PointElimination, PointsFollowAsTheWholeEquationsSay) {
 TEST(PointElimination, SumsUpWhatItsSightingsSay) {
   const Scene scene({0, 1, 3});
   const Reduced reduced(scene);
-  double weight = 0.0, weight_square = 0.0, residual = 0.0;
+  double weight = 0.0, residual = 0.0;
   Eigen::Vector3d by_point = Eigen::Vector3d::Zero();
   const std::vector<Row> rows = rowsOf(scene);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     weight += rows[i].weight;
-    weight_square += rows[i].weight * rows[i].weight;
     residual += rows[i].weight * rows[i].residual.z();
     by_point += rows[i].weight * rows[i].jacobian.row(2).tail<3>().transpose();
     EXPECT_NEAR(reduced.squares[i], rows[i].square, 1e-9 * rows[i].square) << i;
   }
   EXPECT_NEAR(reduced.point.weight, weight, 1e-9);
-  EXPECT_NEAR(reduced.point.weight_square, weight_square, 1e-9);
   EXPECT_NEAR(reduced.point.disparity_residual, residual, 1e-9);
   expectNear(reduced.point.disparity_by_point, by_point, "derivatives of the disparities");
 }

@@ -60,9 +60,9 @@ struct EliminatedPoint {
   int sightings;                                ///< in front of any camera
 
   // Weighted sums over these.
-  double weight, weight_square, weight_fourth;  ///< of the weights, their squares and fourth powers
-  double disparity_residual;                    ///< normalised
-  Eigen::Vector3d disparity_by_point;           ///< its derivatives
+  double weight;
+  double disparity_residual;           ///< normalised
+  Eigen::Vector3d disparity_by_point;  ///< its derivatives
 };
 
 /// A residual's square s costs bend * log(1 + s / bend) and weighs 1 / (1 + s / bend) in the normal equations.
