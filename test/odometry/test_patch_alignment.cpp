@@ -169,7 +169,7 @@ TEST(PatchAlignment, ErrorsAreAsLargeAsToldBySigmaAtEachScale) {
   for (const double ratio : {0.67, 0.85, 1.0, 1.2, 1.5}) {
     const Trial trial = tryShifts(scaled(ratio), scaled(ratio), 1.0, options);
     EXPECT_GT(trial.found, 100) << ratio;
-    EXPECT_NEAR(trial.normalisedRms(), 0.95, 0.1) << ratio;
+    EXPECT_NEAR(trial.normalisedRms(), 0.95, 0.15) << ratio;
   }
 }
 

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <cmath>
 #include <random>
 
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
@@ -145,9 +146,12 @@ TEST(PoseCovariance, APredictedPairAddsToTheNextOnesMotion) {
     covariance.advance(forward(), diagonal(8.0, 2.0));
     const Matrix6d predicted = afterForward(0.5, 0.25) + diagonal(8.0, 2.0);
     expectEqual(covariance.value(), predicted);
-    expectEqual(covariance.measure(forward(), diagonal(0.75, 0.25)), afterForward(8.0, 2.0) + diagonal(0.75, 0.25));
+    // The last measured pose's own, two motions ago: its turn has moved the camera by twice as much.
+    const double own = from_keyframe ? 0.75 : 0.5 + 2.0 * std::pow(2.0 * kForward, 2) * 0.25 / 3.0;
+    expectEqual(covariance.measure(forward(), diagonal(0.75, 0.25)), afterForward(8.0, 2.0) + diagonal(own, 0.25));
     // Only once.
-    expectEqual(covariance.measure(forward(), diagonal(0.75, 0.25)), diagonal(0.75, 0.25));
+    const double next = 0.75 + 2.0 * std::pow(kForward, 2) * 0.25 / 3.0;
+    expectEqual(covariance.measure(forward(), diagonal(0.75, 0.25)), diagonal(next, 0.25));
   }
 }
 
