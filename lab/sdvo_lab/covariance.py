@@ -22,13 +22,15 @@ def measure(drive, extra):
     """Squares of the motions' errors while TRACKING and of the poses' errors, in standard deviations, and the number of
     pairs that were not TRACKING."""
     run, truth = odometry.run(drive.directory, *extra), drive.poses
-    motions, of_poses = [], []
+    motions, of_poses, last = [], [], 0
     for i, state in enumerate(run.states):
         if state.moved and state.state == "TRACKING":
-            motion, true = (poses.relative(stack[i - 1], stack[i]) for stack in (run.poses, truth))
+            motion, true = (poses.relative(stack[last], stack[i]) for stack in (run.poses, truth))
             motions.append(poses.square(poses.logarithm(poses.relative(motion, true)), state.motion))
             true = poses.relative(truth[0], truth[i])
             of_poses.append(poses.square(poses.logarithm(poses.relative(run.poses[i], true)), state.pose))
+        if state.has_pose:  # the next motion begins here
+            last = i
     others = sum(state.state != "TRACKING" for state in run.states)
     return motions[SETTLED if drive.name.startswith("still") else 0:], of_poses, others
 

@@ -62,7 +62,7 @@ def steps_of(states, estimate, pairs, drive):
             true = poses.relative(drive.poses[pairs[last].truth], drive.poses[pairs[i].truth])
             xi = poses.logarithm(poses.relative(poses.relative(estimate[last], estimate[i]), true))
             step.error, step.angle = numpy.linalg.norm(xi[:3]), numpy.degrees(numpy.linalg.norm(xi[3:]))
-            sigmas = [poses.square(xi[part], state.motion[part, part]) ** 0.5 for part in (slice(0, 3), slice(3, 6))]
+            sigmas = poses.sigmas(xi, state.motion)
             step.sigmas = max(sigmas)
             motion = poses.logarithm(true)
             matters = (step.error > 0.01 + 0.03 * numpy.linalg.norm(motion[:3]),
@@ -70,7 +70,7 @@ def steps_of(states, estimate, pairs, drive):
             step.is_wrong = any(part > SIGMAS and matter for part, matter in zip(sigmas, matters))
             step.nees = poses.square(xi, state.motion)
         steps.append(step)
-        if state.state in ("TRACKING", "DEGRADED"):
+        if state.has_pose:
             last = i
     return steps
 

@@ -20,6 +20,10 @@ class State:
     pose: numpy.ndarray
     reason: str
 
+    @property
+    def has_pose(self):
+        return self.state in ("TRACKING", "DEGRADED")
+
 
 def read_states(path):
     with open(path) as file:

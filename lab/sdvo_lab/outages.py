@@ -9,6 +9,7 @@ The pose after an outage is compared with that of the same pair in the undisturb
 the last pose. Exits 1 where it is off by more than 5, where no map was found though a third of the points was in view, or where
 another place was taken for the map. Another build's run_sequence: TOOLS=DIRECTORY."""
 import dataclasses
+import itertools
 import pathlib
 import shutil
 import tempfile
@@ -16,7 +17,7 @@ import tempfile
 import cv2
 import numpy
 
-from . import drives, odometry, poses, programs
+from . import drives, marks, odometry, poses, programs
 
 SIGMAS = 5.0       # standard deviations that no error may exceed
 IN_VIEW = 1 / 3    # share of the points from which on an outage has to cost nothing
@@ -121,13 +122,22 @@ class Outage:
         return self.sigmas > SIGMAS if self.restarts == 0 else self.in_view >= IN_VIEW
 
     def row(self):
-        return (f"{self.name:28s} {self.first:5d} {self.black:5d} {self.in_view:7.2f} {self.lost:5d} {self.restarts:8d} "
-                f"{1e3 * self.offset:10.1f} {self.sigmas:7.1f} {self.error:7.3f} {self.undisturbed_error:11.3f}  "
-                f"{'WRONG ' if self.is_wrong else ''}{self.reason}")
+        return [self.name, self.first, self.black, f"{self.in_view:.2f}", self.lost, self.restarts, f"{1e3 * self.offset:.1f}",
+                f"{self.sigmas:.1f}", f"{self.error:.3f}", f"{self.undisturbed_error:.3f}", f"{'WRONG ' if self.is_wrong else ''}{self.reason}"]
 
 
-HEAD = (f"{'drive':28s} {'first':>5s} {'black':>5s} {'in view':>7s} {'LOST':>5s} {'restarts':>8s} {'offset/mm':>10s} {'sigma':>7s} "
-        f"{'error/%':>7s} {'undisturbed':>11s}  first pose after it")
+HEAD = ["drive", "first", "black", "in view", "LOST", "restarts", "offset [mm]", "sigma", "error [%]", "undisturbed", "first pose after it"]
+
+
+def summary(outages):
+    """A row for each drive and length."""
+    yield ["drive", "black pairs", "outages", "a third in view", "of these found", "restarts", "largest offset [sigma]", "error [%]", "undisturbed [%]"]
+    for name, black in dict.fromkeys((outage.name, outage.black) for outage in outages):
+        some = [outage for outage in outages if (outage.name, outage.black) == (name, black)]
+        seen = [outage for outage in some if outage.in_view >= IN_VIEW]
+        yield [name, black, len(some), len(seen), sum(outage.restarts == 0 for outage in seen), sum(outage.restarts for outage in some),
+               f"{max((outage.sigmas for outage in some if outage.restarts == 0), default=numpy.nan):.1f}",
+               *(f"{numpy.mean([getattr(outage, error) for outage in some]):.3f}" for error in ("error", "undisturbed_error"))]
 
 
 def drift(estimate, truth):
@@ -139,10 +149,10 @@ def drift(estimate, truth):
 
 def outage(drive, numbers, first, count, undisturbed, folder, arguments):
     run = with_black(drive, numbers, first, count, folder).run(arguments)
-    after = next((k for k in range(first + count, len(numbers)) if run.states[k].state in ("TRACKING", "DEGRADED")), len(numbers) - 1)
+    after = next((k for k in range(first + count, len(numbers)) if run.states[k].has_pose), len(numbers) - 1)
     xi = poses.logarithm(poses.relative(undisturbed.poses[after], run.poses[after]))
     C = run.states[after].motion
-    sigmas = max(poses.square(xi[part], C[part, part]) ** 0.5 for part in (slice(0, 3), slice(3, 6))) if C.any() else numpy.nan
+    sigmas = max(poses.sigmas(xi, C)) if C.any() else numpy.nan
     truth = drive.poses[numbers] if drive.truth.exists() else None
     shown = [k for k in range(len(numbers)) if not first <= k < first + count]
     errors = [drift(estimate[shown], truth[shown]) if truth is not None else numpy.nan for estimate in (run.poses, undisturbed.poses)]
@@ -152,9 +162,7 @@ def outage(drive, numbers, first, count, undisturbed, folder, arguments):
                   f"{run.states[after].state}: {run.states[after].reason}", numpy.linalg.norm(xi[:3]), sigmas, *errors)
 
 
-def measure_black(all_drives, work, arguments):
-    wrong = 0
-    print(HEAD, flush=True)
+def outages(all_drives, work, arguments):
     for drive in all_drives:
         numbers = numbers_of(drive, arguments.repeated)
         undisturbed = with_black(drive, numbers, 0, 0, work / "undisturbed").run(arguments)
@@ -162,11 +170,16 @@ def measure_black(all_drives, work, arguments):
         for count in map(int, arguments.black.split(",")):
             ends = numpy.linspace(10, len(numbers) - count - 5, arguments.places + 1)
             for first in map(int, arguments.at.split(",") if arguments.at else ends[:-1]):
-                found = outage(drive, numbers, first, count, undisturbed, work / "black", arguments)
+                yield outage(drive, numbers, first, count, undisturbed, work / "black", arguments)
                 shutil.rmtree(work / "black")
-                print(found.row(), flush=True)
-                wrong += found.is_wrong
-    return wrong
+
+
+def measure_black(all_drives, work, arguments):
+    found = []
+    marks.show(itertools.chain([HEAD], (found.append(outage) or outage.row() for outage in outages(all_drives, work, arguments))))
+    print()
+    marks.show(summary(found))
+    return sum(outage.is_wrong for outage in found)
 
 
 # --- Another place -----------------------------------------------------------------------------------------------------
@@ -227,30 +240,31 @@ def join(all_drives, trials, random, sequence):
     return places
 
 
-def is_same(places, run, k):
+def is_same(places, run, k, poses_of):
     """Whether the pose of the sequence's pair k is right: it was last seen in the same drive, which knows its poses."""
     place_of = {place.first + j: place for place in places for j in range(EXCERPT)}
-    last = max((j for j in place_of if j < k and run.states[j].state in ("TRACKING", "DEGRADED")), default=k)
+    last = max((j for j in place_of if j < k and run.states[j].has_pose), default=k)
     before, after = place_of[last], place_of[k]
-    if before.drive != after.drive or not before.drive.truth.exists() or {before.change, after.change} & {mirrored, swapped}:
+    if before.drive != after.drive or {before.change, after.change} & {mirrored, swapped}:
         return False
-    true = poses.relative(*(before.drive.poses[place.numbers[j - place.first]] for place, j in ((before, last), (after, k))))
+    true = poses.relative(*(poses_of[before.drive][place.numbers[j - place.first]] for place, j in ((before, last), (after, k))))
     xi = poses.logarithm(poses.relative(true, poses.relative(run.poses[last], run.poses[k])))
-    C = run.states[k].motion
-    return max(poses.square(xi[part], C[part, part]) ** 0.5 for part in (slice(0, 3), slice(3, 6))) <= SIGMAS
+    return max(poses.sigmas(xi, run.states[k].motion)) <= SIGMAS
 
 
 def measure_elsewhere(all_drives, work, arguments):
     sequence = Sequence(work / "joined", all_drives[0])
     places = join(all_drives, arguments.elsewhere, numpy.random.default_rng(arguments.seed), sequence)
     run = sequence.run(arguments)
+    # Without ground truth the poses are those of the odometry, undisturbed.
+    poses_of = {drive: drive.poses if drive.truth.exists() else odometry.run(drive.directory).poses for drive in all_drives}
     tried, right, wrong = dict.fromkeys(CHANGES, 0), 0, 0
     for before, after in zip(places, places[1:]):
         tried[after.change] += 1
         for k in range(after.first, after.first + EXCERPT):
             if "re-acquired" not in run.states[k].reason:
                 continue
-            same = is_same(places, run, k)
+            same = is_same(places, run, k, poses_of)
             right, wrong = right + same, wrong + (not same)
             print(f"{'the same place' if same else 'WRONG'}: {before.drive.name} {before.numbers[-1]} -> {after.drive.name} "
                   f"{after.numbers[0]} {after.change.__name__}, pair {k}: {run.states[k].state}: {run.states[k].reason}")

@@ -38,3 +38,8 @@ def logarithm(T):
 def square(error, covariance):
     """An error's square in standard deviations."""
     return float(error @ numpy.linalg.solve(covariance, error))
+
+
+def sigmas(error, covariance):
+    """A motion's error in translation and in rotation, in standard deviations."""
+    return [square(error[part], covariance[part, part]) ** 0.5 for part in (slice(0, 3), slice(3, 6))]

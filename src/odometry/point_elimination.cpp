@@ -97,11 +97,6 @@ struct Derivatives {
   SDVO_IN_KERNEL Three transposedTimes(const Three& v) const { return aside * v - kZ * sumOf(ahead * v); }
 };
 
-/// A sighting's weights in the normal equations.
-struct Weights {
-  double of_hessian, of_gradient;
-};
-
 /// Columns of w A^T A: what a sighting says of P.
 struct Information {
   Three x, y, z;
@@ -140,9 +135,8 @@ struct PointSums {
   int sightings = 0;
 
   /// J: columns of the derivatives by the point.
-  SDVO_IN_KERNEL void add(const Sight& at, const Weights& weights, const Three& J0, const Three& J1, const Three& J2) {
-    const double w = weights.of_hessian;
-    const Three w0 = w * J0, w1 = w * J1, w2 = w * J2, pull = weights.of_gradient * at.residual;
+  SDVO_IN_KERNEL void add(const Sight& at, double w, const Three& J0, const Three& J1, const Three& J2) {
+    const Three w0 = w * J0, w1 = w * J1, w2 = w * J2, pull = w * at.residual;
     H00 += w0 * J0, H10 += w1 * J0, H11 += w1 * J1, H20 += w2 * J0, H21 += w2 * J1, H22 += w2 * J2;
     g0 += pull * J0, g1 += pull * J1, g2 += pull * J2;
     by0 += w0, by1 += w1, by2 += w2;
@@ -211,14 +205,13 @@ struct AddPoint {
       squares[i] = at.square;
       if (!at.isInFront()) continue;
       const double w = linearisation->bend / (linearisation->bend + at.square);
-      const Weights weights = {linearisation->of_errors ? w * w : w, w};
       const Derivatives A(*projection, at);
-      sums.add(at, weights, A.times(T), A.times(T + 4), A.times(T + 12) + kZ * A.by_rho);
+      sums.add(at, w, A.times(T), A.times(T + 4), A.times(T + 12) + kZ * A.by_rho);
       if (seen.frame == 0) continue;
       PoseFactor& factor = factors[moving++];
       factor.pose = seen.frame - 1;
-      addPose({at.P, point->ray_and_inverse_depth.z()}, A, at, weights, T, factor,
-              blocks[indexOf(factor.pose, factor.pose)], borders[factor.pose]);
+      addPose({at.P, point->ray_and_inverse_depth.z()}, A, at, w, T, factor, blocks[indexOf(factor.pose, factor.pose)],
+              borders[factor.pose]);
     }
 
     // What the point is in, times R or R^T.
@@ -263,10 +256,9 @@ struct AddPoint {
 
  private:
   /// What a sighting says of its pose, of that and the calibration, and of that and the point.
-  static SDVO_IN_KERNEL void addPose(const Lever& lever, const Derivatives& A, const Sight& at, const Weights& weights,
+  static SDVO_IN_KERNEL void addPose(const Lever& lever, const Derivatives& A, const Sight& at, double w,
                                      const double* T, PoseFactor& factor, PoseEquations::Block& block,
                                      PoseEquations::Border& border) {
-    const double w = weights.of_hessian;
     const Information M(A, w);
     const double by_z = -w * A.ahead[2];  // the disparity by P.z
     lever.multiply(M.times(T), factor.Y[0]);
@@ -285,7 +277,7 @@ struct AddPoint {
     const Three of_disparity = kZ * (by_z * at.inverse_noise[2]);
     lever.addProduct(of_disparity, 1.0, border.columns[0]);
     lever.addProduct(of_disparity, at.shape, border.columns[1]);
-    lever.multiply(A.transposedTimes(weights.of_gradient * at.residual), factor.gradient);
+    lever.multiply(A.transposedTimes(w * at.residual), factor.gradient);
   }
 
   /// A factor by R^T from the right.

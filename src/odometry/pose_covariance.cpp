@@ -57,24 +57,27 @@ void PoseCovariance::restart(const Matrix6d& travelled) {
 
 void PoseCovariance::markKeyframe() {
   keyframe_ = value_;
+  predicted_.setZero();
 }
 
 void PoseCovariance::carry(const Eigen::Isometry3d& T_previous_current) {
-  for (Matrix6d* covariance : {&value_, &keyframe_, &unmeasured_})
+  for (Matrix6d* covariance : {&value_, &keyframe_, &predicted_, &unmeasured_})
     *covariance = carriedBy(T_previous_current, *covariance);
 }
 
 void PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance) {
   carry(T_previous_current);
   value_ += covariance;
+  predicted_ += covariance;
   unmeasured_ += covariance;
 }
 
 Matrix6d PoseCovariance::measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe) {
-  const Matrix6d before = value_;
+  const Matrix6d before = value_ - predicted_;
   carry(T_previous_current);
   const Matrix6d motion = unmeasured_ + since_keyframe;
   value_ = noLessThan(before, keyframe_ + since_keyframe);
+  predicted_.setZero();
   unmeasured_.setZero();
   return motion;
 }

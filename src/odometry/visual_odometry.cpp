@@ -106,14 +106,30 @@ Matrix6d GuessedMotion::add(const MotionGuess& guess) {
   return variance.asDiagonal();
 }
 
+/// The motion of a guess. The translation that a gyro lacks is the prior's.
+Eigen::Isometry3d VisualOdometry::motionOf(const MotionGuess& guess, double dt) const {
+  Eigen::Isometry3d motion = guess.T_previous_current;
+  if (guess.rotation_only) motion.translation() = state_.prior.velocity().value_or(Vector6d::Zero()).head<3>() * dt;
+  return motion;
+}
+
+/// The covariance by which an unseen motion grew over the last `dt` s.
+Matrix6d VisualOdometry::unseen(double dt) const {
+  return state_.prior.unseen(state_.unseen) - state_.prior.unseen(state_.unseen - dt);
+}
+
 /// Takes note of a guess, or that there is none, for as long as there is no pose.
-void VisualOdometry::follow(const std::optional<MotionGuess>& guess) {
-  if (!guess || guess->rotation_only) state_.followed.reset();
+void VisualOdometry::follow(const std::optional<MotionGuess>& guess, double dt) {
+  if (!guess) state_.followed.reset();
   if (!state_.followed) return;
-  const Matrix6d carried = adjoint(guess->T_previous_current.inverse());
-  state_.followed->motion = state_.followed->motion * guess->T_previous_current;
-  state_.followed->covariance =
-      carried * state_.followed->covariance * carried.transpose() + state_.guessed.add(*guess);
+  State::Followed& followed = *state_.followed;
+  const Eigen::Isometry3d motion = motionOf(*guess, dt);
+  const Matrix6d carried = adjoint(motion.inverse());
+  Matrix6d covariance = state_.guessed.add(*guess);
+  if (guess->rotation_only) covariance.topLeftCorner<3, 3>() = unseen(dt).topLeftCorner<3, 3>();
+  followed.motion = followed.motion * motion;
+  followed.covariance = carried * followed.covariance * carried.transpose() + covariance;
+  followed.rotation_only |= guess->rotation_only;
 }
 
 OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::optional<MotionGuess>& guess) {
@@ -137,7 +153,7 @@ OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::op
   // Nothing has changed so far, and from here on nothing is refused.
   Stopwatch stopwatch;
   begin(features, dt);
-  follow(guess);
+  follow(guess, dt);
   watchShutters(taken, dt, found);
   Step step;
   if (!continued || (state_.interrupted && !found.motion.success))
@@ -204,10 +220,7 @@ MotionScene VisualOdometry::sceneOf(const StereoFeatures& features, double dt,
   if (prior.velocity() && dt <= options_.tracking.max_gap)
     scene.T_current_reference = (T_reference_previous * prior.predicted(dt).motion).inverse();
   if (guess) {
-    Eigen::Isometry3d T_previous_current = guess->T_previous_current;
-    if (guess->rotation_only)
-      T_previous_current.translation() = prior.velocity().value_or(Vector6d::Zero()).head<3>() * dt;
-    scene.guess = (T_reference_previous * T_previous_current).inverse();
+    scene.guess = (T_reference_previous * motionOf(*guess, dt)).inverse();
     if (!scene.prior.empty()) scene.prior.push_back(prior.around(scene.guess->inverse(), since));
   }
   return scene;
@@ -276,6 +289,7 @@ void VisualOdometry::begin(const StereoFeatures& features, double dt) {
   if (state_.camera && *state_.camera != features.camera) forgetRig();
   state_.camera = features.camera;
   state_.last_stamp = features.stamp;
+  state_.unseen += dt;
   ++state_.pairs;
   if (dt <= options_.tracking.max_gap) state_.prior.pass(dt);
   // The map is of another rig than this pair.
@@ -286,6 +300,13 @@ void VisualOdometry::begin(const StereoFeatures& features, double dt) {
     state_.calibration = CalibrationFilter(options_.calibration);
     state_.doubt.raise(CarriedDoubt::kCertain, "left and right did not belong together");
   }
+}
+
+/// What pairs without a measurement have added up begins anew.
+void VisualOdometry::endOutage() {
+  state_.predicted_pairs = 0;
+  state_.unseen = 0.0;
+  state_.guessed = GuessedMotion();
 }
 
 VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
@@ -299,7 +320,9 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
   }
   if (state_.started && state_.followed) {
     step.state = TrackingState::kDegraded;
-    step.reason = "started again where the guess has the camera";
+    step.reason = state_.followed->rotation_only ? "started again as the gyro turned; the translation is predicted"
+                                                 : "started again where the guess has the camera";
+    if (state_.followed->rotation_only) ++epoch_;
     step.T_previous_current = state_.followed->motion;
     step.covariance = state_.followed->covariance;
     state_.covariance.advance(*step.T_previous_current, step.covariance);
@@ -316,7 +339,7 @@ VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
   }
   state_.started = true;
   state_.interrupted = false;
-  state_.predicted_pairs = 0;
+  endOutage();
   state_.map.emplace(options_.map);
   const Eigen::Isometry3d T_previous_current = step.T_previous_current.value_or(Eigen::Isometry3d::Identity());
   state_.map->insert(options_.alignment, features, state_.pairs,
@@ -360,9 +383,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
     const std::string off = state_.floor.note(*floor(), state_.map->newestPose());
     if (step.reason.empty()) step.reason = off;
   }
-  state_.predicted_pairs = 0;
-  state_.unseen = 0.0;
-  state_.guessed = GuessedMotion();
+  endOutage();
   if (std::exchange(state_.interrupted, false))
     step.reason = "re-acquired by " + std::to_string(found.agreement.inliers) + " points of the map" +
                   (step.reason.empty() ? "" : "; " + step.reason);
@@ -513,8 +534,7 @@ VisualOdometry::Step VisualOdometry::hold(double dt) {
   step.state = TrackingState::kDegraded;
   step.reason = "the images repeat those of the previous pair although the camera moved: is the driver frozen?";
   step.T_previous_current = Eigen::Isometry3d::Identity();
-  step.covariance = state_.prior.unseen(state_.unseen + dt) - state_.prior.unseen(state_.unseen);
-  state_.unseen += dt;
+  step.covariance = unseen(dt);
   state_.covariance.advance(*step.T_previous_current, step.covariance);
   state_.prior.interrupt();
   return step;
@@ -523,13 +543,17 @@ VisualOdometry::Step VisualOdometry::hold(double dt) {
 /// Whether a guess has the motion of a pair that shows nothing, not too long after the last one that did.
 bool VisualOdometry::canFollow(const StereoFeatures& features) const {
   if (!state_.map || !state_.followed || features.count() >= options_.motion.min_inliers) return false;
-  return static_cast<double>(features.stamp - state_.map->newestStamp()) * 1e-9 <= options_.tracking.max_guessed;
+  const TrackingOptions& tracking = options_.tracking;
+  return secondsSinceMap(features) <= (state_.followed->rotation_only ? tracking.max_gap : tracking.max_guessed);
 }
 
 VisualOdometry::Step VisualOdometry::predict(const StereoFeatures& features, double dt, const std::string& failure) {
   Step step;
   step.reason = failure + (features.report.status.empty() ? "" : "; " + features.report.status);
-  if (canFollow(features)) {
+  const bool can_predict = state_.prior.velocity() && dt <= options_.tracking.max_gap &&
+                           state_.predicted_pairs < options_.tracking.max_predicted_pairs;
+  // The prior's translation over one pair is better than that around a standstill, which a gyro needs.
+  if (canFollow(features) && !(can_predict && state_.followed->rotation_only)) {
     step.state = TrackingState::kDegraded;
     step.reason = "motion by the guess: " + step.reason;
     step.T_previous_current = state_.followed->motion;
@@ -537,8 +561,6 @@ VisualOdometry::Step VisualOdometry::predict(const StereoFeatures& features, dou
     state_.covariance.advance(*step.T_previous_current, step.covariance);
     return step;
   }
-  const bool can_predict = state_.prior.velocity() && dt <= options_.tracking.max_gap &&
-                           state_.predicted_pairs < options_.tracking.max_predicted_pairs;
   if (!can_predict) {
     breakStream();
     step.state = TrackingState::kLost;

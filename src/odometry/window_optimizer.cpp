@@ -95,6 +95,7 @@ class Solver {
 
   /// Square of the residual at which the Cauchy kernel bends: a square s costs bend * log(1 + s / bend).
   double bend() const { return options_.kernel_scale * options_.kernel_scale; }
+  double weight(double square) const { return bend() / (bend() + square); }
 
   /// Also gives the square of each observation's residual.
   double cost(const Estimate& estimate, std::vector<double>& squares) {
@@ -113,7 +114,7 @@ class Solver {
     const CalibrationBelief& prior = window_->calibration_prior;
     system.hessian.bottomRightCorner<kCalibration, kCalibration>() += prior.information;
     system.gradient.tail<kCalibration>() += prior.information * (prior.mean - estimate.calibration.value);
-    if (window_->floor) holdToFloor(estimate, system);
+    if (window_->floor) holdToFloor(estimate, system.hessian, system.gradient);
     system.cost = costOf(estimate, squares_);
   }
 
@@ -133,23 +134,37 @@ class Solver {
     return *variance - of_means / static_cast<double>(squares.size());
   }
 
-  /// Covariance of a minimum of robust costs (Huber, Robust Statistics, section 7.6): A^-1 B A^-1, A the cost's second
+  /// Covariances at a minimum of robust costs (Huber, Robust Statistics, section 7.6): A^-1 B A^-1, A the cost's second
   /// derivatives, B the sum of the gradients' products over what errs independently. Whole points do, not their
   /// sightings (Liang and Zeger 1986): their disparities share errors. Of B only its size beside A is taken from the
-  /// gradients, since few points leave the rest to chance. `columns`: unit vectors of what is asked for.
-  bool covariance(const Estimate& estimate, const Eigen::MatrixXd& columns, ReducedSystem& system,
-                  Eigen::LLT<Eigen::MatrixXd>& factor, Eigen::MatrixXd& covariance) {
-    const Eigen::MatrixXd known = knownInformation(estimate, system);
-    eliminatePoints(estimate, {bend(), 0.0, true}, system);
+  /// gradients, since few points leave the rest to chance. All of it is of the last linearisation, but for `squares`:
+  /// the residuals' now. `poses`: those that are asked for.
+  bool covariances(const Estimate& estimate, const std::vector<double>& squares, const std::vector<int>& poses,
+                   ReducedSystem& system, WindowSolution& solution) {
+    const RigCalibration::Matrix certain = certainInformation();
     equations_.copyTo(system.hessian, system.gradient);
-    system.hessian += known;
-    factor.compute(system.hessian);
-    if (factor.info() != Eigen::Success) return false;
-    const Eigen::MatrixXd solved = factor.solve(columns);
-    const Eigen::MatrixXd of_known = solved.transpose() * known.selfadjointView<Eigen::Lower>() * solved;
-    const Eigen::MatrixXd of_points = columns.transpose() * solved - of_known;
-    covariance = errorsOverInformation(system, solved, of_points) * of_points + of_known;
-    return true;
+    known_.setZero(size_, size_);  // without the points
+    known_.bottomRightCorner<kCalibration, kCalibration>() = certain;
+    if (window_->floor) holdToFloor(estimate, known_, system.gradient);
+    const auto [derivatives, gradient_products] = sinceLinearised(squares);
+    system.hessian = derivatives * system.hessian + known_;
+    factor_.compute(system.hessian);
+    if (factor_.info() != Eigen::Success) return false;  // as when nothing holds one of the poses
+
+    const int asked = 6 * static_cast<int>(poses.size());
+    units_.setZero(size_, asked + kCalibration);
+    for (int k = 0; k < asked; ++k) units_(6 * (poses[static_cast<std::size_t>(k / 6)] - 1) + k % 6, k) = 1.0;
+    units_.bottomRightCorner<kCalibration, kCalibration>().setIdentity();
+    solved_ = factor_.solve(units_);
+    const RigCalibration::Matrix of_calibration = solved_.bottomRightCorner<kCalibration, kCalibration>();
+    solution.calibration_information = (of_calibration.inverse() - certain) / derivatives;
+
+    const auto of_poses = solved_.leftCols(asked);
+    const Eigen::MatrixXd of_known = of_poses.transpose() * known_.selfadjointView<Eigen::Lower>() * of_poses;
+    const Eigen::MatrixXd of_points = units_.leftCols(asked).transpose() * of_poses - of_known;
+    solution.pose_covariance =
+        gradient_products * errorsOverInformation(system, of_poses, of_points) * of_points + of_known;
+    return solution.pose_covariance.allFinite();
   }
 
   /// Of the calibration before the window, where it is held for want of evidence, too.
@@ -171,36 +186,47 @@ class Solver {
   }
 
  private:
-  /// Of the calibration and by the floor, without the points.
-  Eigen::MatrixXd knownInformation(const Estimate& estimate, ReducedSystem& system) const {
-    system.hessian.setZero();
-    system.hessian.bottomRightCorner<kCalibration, kCalibration>() = certainInformation();
-    if (window_->floor) holdToFloor(estimate, system);
-    return system.hessian;
+  /// The last linearisation in units of how things are now.
+  struct SinceLinearised {
+    double derivatives;        ///< the cost's second derivatives now by the normal equations
+    double gradient_products;  ///< now by then
+  };
+  /// Of a residual the cost's second derivatives are w - w^2 s / bend = w^2 on average over two directions, where the
+  /// normal equations have its weight w, which leads to the minimum from farther away. Products of gradients have w^2,
+  /// too. Of a point's sightings i its elimination leaves w_i - w_i^2 / sum(w). Compared are the sums of that.
+  SinceLinearised sinceLinearised(const std::vector<double>& squares) const {
+    double weights = 0.0, before = 0.0, now = 0.0;
+    for (std::size_t p = 0; p + 1 < first_of_point_.size(); ++p) {
+      double w1 = 0.0, w2 = 0.0, w4 = 0.0, now2 = 0.0, now4 = 0.0;  // powers
+      for (int i = first_of_point_[p]; i < first_of_point_[p + 1]; ++i) {
+        const double w = weight(squares_[i]), square = w * w, w_now = weight(squares[i]), now_square = w_now * w_now;
+        w1 += w, w2 += square, w4 += square * square, now2 += now_square, now4 += now_square * now_square;
+      }
+      weights += w1 - w2 / w1, before += w2 - w4 / w2, now += now2 - now4 / now2;
+    }
+    return {now / std::max(weights, 1e-12), now / std::max(before, 1e-12)};
   }
 
   /// Mean ratio of two covariances: by the gradients of single points, and as the second derivatives have it. What the
   /// poses took of the gradients is made up for by the degrees of freedom.
-  double errorsOverInformation(const ReducedSystem& system, const Eigen::MatrixXd& solved,
+  double errorsOverInformation(const ReducedSystem& system, const Eigen::Ref<const Eigen::MatrixXd>& solved,
                                const Eigen::MatrixXd& covariance) const {
-    Eigen::MatrixXd products = Eigen::MatrixXd::Zero(solved.cols(), solved.cols());
+    // The trace of covariance^-1 times the sum of outer products.
+    const Eigen::MatrixXd whitened = covariance.llt().matrixL().solve(solved.transpose());
+    double square = 0.0, freedom = 0.0;
     Eigen::VectorXd moved(solved.cols());
-    double freedom = 0.0;
     const PoseFactor* sighting = system.factors.data();
     for (const EliminatedPoint& point : system.points) {
-      moved.noalias() = solved.bottomRows<kCalibration>().transpose() * point.calibration_gradient;
+      moved.noalias() = whitened.rightCols<kCalibration>().lazyProduct(point.calibration_gradient);
       for (const PoseFactor* end = sighting + point.factors; sighting != end; ++sighting) {
-        const auto of_pose = solved.middleRows<6>(6 * sighting->pose);
         const Eigen::Map<const Eigen::Vector3d> t(sighting->gradient.translation), r(sighting->gradient.rotation);
-        moved.noalias() += of_pose.topRows<3>().transpose() * t;
-        moved.noalias() += of_pose.bottomRows<3>().transpose() * r;
+        moved.noalias() += whitened.middleCols<3>(6 * sighting->pose).lazyProduct(t);
+        moved.noalias() += whitened.middleCols<3>(6 * sighting->pose + 3).lazyProduct(r);
       }
-      products.selfadjointView<Eigen::Lower>().rankUpdate(moved);
+      square += moved.squaredNorm();
       freedom += 2.0 * point.sightings - 2.0;  // u, v and one disparity against a position
     }
-    products = products.selfadjointView<Eigen::Lower>();
-    const double ratio = covariance.ldlt().solve(products).trace() / static_cast<double>(solved.cols());
-    return ratio * freedom / std::max(freedom - 6.0 * poses_, 1.0);
+    return square / static_cast<double>(solved.cols()) * freedom / std::max(freedom - 6.0 * poses_, 1.0);
   }
 
   void eliminatePoints(const Estimate& estimate, const Linearisation& linearisation, ReducedSystem& system) {
@@ -238,13 +264,13 @@ class Solver {
     return error.dot(window_->calibration_prior.information * error) + bend() * costs.value() + floorCost(estimate);
   }
 
-  void holdToFloor(const Estimate& estimate, ReducedSystem& system) const {
+  void holdToFloor(const Estimate& estimate, Eigen::MatrixXd& hessian, Eigen::VectorXd& gradient) const {
     Floor::Jacobian jacobian;
     for (int f = 0; f < poses_; ++f) {
       const Eigen::Vector3d residual = window_->floor->residual(estimate.T_camera_origin[f + 1], &jacobian);
       const Eigen::Vector3d weights = residual.cwiseAbs2().unaryExpr(&Floor::weight);
-      system.hessian.block<6, 6>(6 * f, 6 * f) += jacobian.transpose() * weights.asDiagonal() * jacobian;
-      system.gradient.segment<6>(6 * f) -= jacobian.transpose() * weights.cwiseProduct(residual);
+      hessian.block<6, 6>(6 * f, 6 * f) += jacobian.transpose() * weights.asDiagonal() * jacobian;
+      gradient.segment<6>(6 * f) -= jacobian.transpose() * weights.cwiseProduct(residual);
     }
   }
 
@@ -269,6 +295,8 @@ class Solver {
   std::vector<std::size_t> anchor_of_point_;
   PoseEquations equations_;
   std::vector<double> squares_;
+  Eigen::MatrixXd known_, units_, solved_;
+  Eigen::LLT<Eigen::MatrixXd> factor_;
   int poses_ = 0, size_ = 0;
 };
 
@@ -308,7 +336,7 @@ struct WindowOptimizer::Memory {
   Solver solver;
   ReducedSystem system;
   Estimate estimate, next;
-  Eigen::MatrixXd hessian, units, covariance;
+  Eigen::MatrixXd hessian;
   Eigen::LLT<Eigen::MatrixXd> factor;
   Eigen::VectorXd step;
   std::vector<double> squares, common_squares;
@@ -330,8 +358,7 @@ const WindowSolution& WindowOptimizer::optimize(Window& window) {
 
 const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vector<int>& covariance_of) {
   constexpr double kUndamped = 1e-5, kLargestDamping = 1e4;
-  auto& [solver, system, estimate, next, hessian, units, covariance, factor, step, squares, common_squares, solution] =
-      *memory_;
+  auto& [solver, system, estimate, next, hessian, factor, step, squares, common_squares, solution] = *memory_;
   solver.take(window, estimate);
   solution.success = false;
   solution.iterations = 0;
@@ -370,24 +397,10 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
   // say too much.
   if (damping_of_system > kUndamped) solver.linearise(estimate, kUndamped, system);
   solution.common_disparity_square = solver.commonVariance(system.points, common_squares);
-  const RigCalibration::Matrix certain = solver.certainInformation();
-  system.hessian.bottomRightCorner<kCalibration, kCalibration>() += certain - window.calibration_prior.information;
-  factor.compute(system.hessian);
-  if (factor.info() != Eigen::Success) return solution;  // as when nothing holds one of the poses
-  units.setZero(solver.size(), kCalibration);
-  units.bottomRows<kCalibration>().setIdentity();
-  covariance = factor.solve(units);
-  solution.calibration_information = covariance.bottomRightCorner<kCalibration, kCalibration>().inverse() - certain;
-
-  const int asked = static_cast<int>(covariance_of.size());
-  units.setZero(solver.size(), 6 * asked);
-  for (int a = 0; a < asked; ++a)
-    units.block<6, 6>(6 * (covariance_of[static_cast<std::size_t>(a)] - 1), 6 * a).setIdentity();
-  if (!solver.covariance(estimate, units, system, factor, solution.pose_covariance)) return solution;
-
   if (!accepted) solver.cost(estimate, squares);  // those at hand belong to a refused step
+  if (!solver.covariances(estimate, squares, covariance_of, system, solution)) return solution;
   std::swap(solution.squares, squares);
-  solution.success = solution.pose_covariance.allFinite();
+  solution.success = true;
   return solution;
 }
 

@@ -108,7 +108,12 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     VisualOdometryOptions defaults;
     reconfigured_ = options_.odometry;
     reconfigure_server_ = std::make_unique<ReconfigureServer>(
-        slow_nh, listOptions(reconfigured_), [this] { onReconfigure(); }, listOptions(defaults));
+        slow_nh, listOptions(reconfigured_),
+        [this] {
+          VisualOdometry{reconfigured_};  // throws when they do not go together
+          reconfigurations_.post(reconfigured_);
+        },
+        listOptions(defaults));
 
     if (options_.output.use_imu)
       imu_ = std::make_unique<ImuInput>(nh_, *transforms_, [this](const std::string& what) { warn(what); });
@@ -171,23 +176,6 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     throw;
   }
 
-  /// In a ROS callback; the worker takes the new options over before its next message. Throws when the options do not
-  /// go together.
-  void onReconfigure() {
-    VisualOdometry{reconfigured_};
-    const std::lock_guard<std::mutex> lock(pending_mutex_);
-    pending_ = reconfigured_;
-  }
-
-  void takeOverOptions() {
-    std::optional<VisualOdometryOptions> pending;
-    {
-      const std::lock_guard<std::mutex> lock(pending_mutex_);
-      pending.swap(pending_);
-    }
-    if (pending) odometry_->configure(*pending);
-  }
-
   /// In the worker's thread.
   void process(const FeaturesFilter::Passed& passed) try {
     const std::lock_guard<std::mutex> lock(work_mutex_);
@@ -201,7 +189,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   /// What there is to publish, but for vo_info, is.
   OdometryResult estimate(const FeaturesFilter::Passed& passed) try {
     const FeaturesMessage& message = *passed.item.message;
-    takeOverOptions();
+    if (const auto options = reconfigurations_.take()) odometry_->configure(*options);
     noteJumps(passed);
     if (resumes_.take(passed.item.resumes)) odometry_->breakStream();
     const StereoFeatures features = ros_conversions::fromMessage(passed.item.view);
@@ -379,8 +367,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
       camera_frame_ = camera_frame;
       return "";
     }
-    const std::string report = "no transform from camera frame '" + camera_frame + "' to base frame '" + base_frame +
-                               "' on TF, no odometry without it: publish it (static) or set base_frame_id";
+    const std::string report = transforms_->explainMissing(base_frame, camera_frame);
     if (throttle_.allows("extrinsic")) NODELET_ERROR_STREAM(report << ". " << problem);
     return report;
   }
@@ -485,8 +472,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   ros::NodeHandle nh_;
   Options options_;
   VisualOdometryOptions reconfigured_;  // the server's
-  std::mutex pending_mutex_;
-  std::optional<VisualOdometryOptions> pending_;
+  Requests<VisualOdometryOptions> reconfigurations_;
   std::unique_ptr<ReconfigureServer> reconfigure_server_;
   ReportThrottle throttle_;
   std::unique_ptr<RobotTransforms> transforms_;

@@ -14,8 +14,7 @@ namespace sdvo {
 namespace test_point_elimination {
 
 constexpr double kDamping = 1e-3;
-constexpr Linearisation kOfSteps = {2.0, kDamping};
-constexpr Linearisation kOfErrors = {2.0, kDamping, true};
+constexpr Linearisation kLinearisation = {2.0, kDamping};
 constexpr double kLeastInformation = 1e-9;  // that a point is given of itself
 constexpr double kDisparitySigma = 0.25;    // px
 constexpr int kPoses = 4;                   // that may move
@@ -55,7 +54,7 @@ struct Row {
   double weight, square;
 };
 
-std::vector<Row> rowsOf(const Scene& scene, double bend = kOfSteps.bend) {
+std::vector<Row> rowsOf(const Scene& scene, double bend = kLinearisation.bend) {
   std::vector<Row> rows;
   for (const WindowObservation& seen : scene.sightings) {
     Eigen::Vector3d prediction;
@@ -84,12 +83,9 @@ struct Whole {
   Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(6 * kPoses + 5, 6 * kPoses + 5);
   Eigen::VectorXd gradient = Eigen::VectorXd::Zero(6 * kPoses + 5);
 
-  explicit Whole(const Scene& scene, const Linearisation& linearisation = kOfSteps) {
-    for (const Row& row : rowsOf(scene, linearisation.bend)) {
-      // The gradient's derivative along a residual and across it.
-      const double across = row.weight, along = across - 2.0 * across * across * row.square / linearisation.bend;
-      const double weight = linearisation.of_errors ? 0.5 * (along + across) : row.weight;
-      hessian += weight * row.jacobian.transpose() * row.jacobian;
+  explicit Whole(const Scene& scene) {
+    for (const Row& row : rowsOf(scene)) {
+      hessian += row.weight * row.jacobian.transpose() * row.jacobian;
       gradient += row.weight * row.jacobian.transpose() * row.residual;
     }
     hessian.bottomRightCorner<3, 3>().diagonal() *= 1.0 + kDamping;
@@ -106,10 +102,9 @@ struct Reduced {
   Eigen::MatrixXd hessian;
   Eigen::VectorXd gradient;
 
-  explicit Reduced(const Scene& scene, const Linearisation& linearisation = kOfSteps)
-      : factors(scene.sightings.size()), squares(scene.sightings.size()) {
+  explicit Reduced(const Scene& scene) : factors(scene.sightings.size()), squares(scene.sightings.size()) {
     equations.setZero(kPoses);
-    point = equations.add({scene.camera, scene.calibration}, scene.sighted(), linearisation, factors.data(),
+    point = equations.add({scene.camera, scene.calibration}, scene.sighted(), kLinearisation, factors.data(),
                           squares.data());
     equations.copyTo(hessian, gradient);
   }
@@ -120,9 +115,9 @@ void expectNear(const Eigen::MatrixXd& value, const Eigen::MatrixXd& expected, c
   EXPECT_LT((value - expected).cwiseAbs().maxCoeff(), 1e-9 * (1.0 + expected.cwiseAbs().maxCoeff())) << what;
 }
 
-void expectSchurComplement(const Scene& scene, const Linearisation& linearisation = kOfSteps) {
-  const Whole whole(scene, linearisation);
-  const Reduced reduced(scene, linearisation);
+void expectSchurComplement(const Scene& scene) {
+  const Whole whole(scene);
+  const Reduced reduced(scene);
   const int n = 6 * kPoses + 2;
   const Eigen::Matrix3d inverse = whole.hessian.bottomRightCorner<3, 3>().inverse();
   const Eigen::MatrixXd with_point = whole.hessian.topRightCorner(n, 3);
@@ -139,13 +134,8 @@ TEST(PointElimination, IsTheSchurComplementOfTheNormalEquations) {
   expectSchurComplement(Scene({4}));
 }
 
-TEST(PointElimination, IsTheSchurComplementOfTheMeanSecondDerivatives) {
-  expectSchurComplement(Scene({0, 1, 2, 3, 4}), kOfErrors);
-  expectSchurComplement(Scene({1, 3, 4}), kOfErrors);
-}
-
 TEST(PointElimination, GradientsOfSightingsAndPointsAddUp) {
-  const Reduced reduced(Scene({0, 1, 2, 4}), kOfErrors);
+  const Reduced reduced(Scene({0, 1, 2, 4}));
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(reduced.gradient.size());
   for (int k = 0; k < reduced.point.factors; ++k) {
     const PoseFactor& factor = reduced.factors[static_cast<std::size_t>(k)];
@@ -240,7 +230,8 @@ TEST(PointElimination, PointsAddUp) {
   std::vector<PoseFactor> factors(4);
   std::vector<double> squares(4);
   for (const Scene* scene : {&one, &other})
-    equations.add({scene->camera, scene->calibration}, scene->sighted(), kOfSteps, factors.data(), squares.data());
+    equations.add({scene->camera, scene->calibration}, scene->sighted(), kLinearisation, factors.data(),
+                  squares.data());
   Eigen::MatrixXd hessian;
   Eigen::VectorXd gradient;
   equations.copyTo(hessian, gradient);

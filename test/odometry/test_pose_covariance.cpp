@@ -134,6 +134,15 @@ TEST(PoseCovariance, APredictedPairAddsToTheNextOnesMotion) {
   }
 }
 
+TEST(PoseCovariance, APredictionEndsWithTheNextMeasuredPose) {
+  PoseCovariance covariance;
+  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
+  covariance.measure(still, diagonal(0.5, 0.25));
+  for (int i = 0; i < 1000; ++i) covariance.advance(still, diagonal(8.0, 2.0));
+  covariance.measure(still, diagonal(0.5, 0.25));
+  expectEqual(covariance.value(), diagonal(0.5, 0.25));
+}
+
 TEST(PoseCovariance, AKeyframeThatWasPredictedOrDoubtedCarriesThat) {
   PoseCovariance covariance;
   const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();

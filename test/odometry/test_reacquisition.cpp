@@ -203,6 +203,23 @@ TEST_F(Outage, AMirroredPlaceIsANewStart) {
   expectStartedAgain();
 }
 
+TEST_F(Outage, ARigThatWasRefusedIsANewStart) {
+  // Its map may have wrong depths, however well it is recognised.
+  for (const int refused : {2, 5}) {
+    odometry_ = VisualOdometry({});
+    drive();
+    for (int i = kSeen; i < kSeen + refused; ++i) {
+      StereoFeatures swapped = synthetic::noFeatures(synthetic::camera(), i * kPeriod);
+      swapped.report.refused = true;
+      result_ = odometry_.update(swapped);
+    }
+    EXPECT_EQ(result_.state, TrackingState::kLost);
+    const int i = kSeen + refused;
+    result_ = odometry_.update(pairOf(room_, i, poseAt(i)));
+    expectStartedAgain();
+  }
+}
+
 TEST_F(Outage, APlaceTooFarForTheTimeIsANewStart) {
   VisualOdometryOptions options;
   options.tracking.max_speed = 2.0;  // 0.9 m in 6 pairs
@@ -245,6 +262,42 @@ TEST_F(Outage, ThePoseGoesOnByTheGuessWhileItIsDark) {
       odometry_.update(pairOf(room_, kSeen + 20, poseAt(kSeen + 20)), wheels(poseAt(kSeen + 19), poseAt(kSeen + 20)));
   EXPECT_EQ(result_.epoch, 0);
   EXPECT_LT((result_.T_origin_camera.translation() - poseAt(kSeen + 20).translation()).norm(), 0.01);
+  EXPECT_LT((result_.pose_covariance.topLeftCorner<3, 3>().trace()), 0.001);
+}
+
+/// What a gyro tells: the rotation, too large by a twentieth.
+MotionGuess gyro(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to) {
+  Vector6d motion = 1.05 * logSE3(from.inverse() * to);
+  motion.head<3>().setConstant(100.0);  // nothing is to look at it
+  return {expSE3(motion), true, 0.1};
+}
+
+/// The drive, turning much faster from the outage on.
+Eigen::Isometry3d turningAt(int i) {
+  return expSE3(
+      (Vector6d() << 0.03 * i, 0.01 * i, 0.02 * i, 0.0, 0.005 * i + 0.05 * std::max(i - kSeen, 0), 0.0).finished());
+}
+
+TEST_F(Outage, AGyroCarriesThePoseForAsLongAsTheTranslationIsPredicted) {
+  drive();
+  for (int i = kSeen; i < kSeen + 40; ++i) {
+    result_ =
+        odometry_.update(synthetic::noFeatures(synthetic::camera(), i * kPeriod), gyro(turningAt(i - 1), turningAt(i)));
+    const bool is_short = (i - (kSeen - 1)) * kPeriod <= 1'000'000'000;  // tracking/max_gap
+    EXPECT_EQ(result_.state, is_short ? TrackingState::kDegraded : TrackingState::kLost) << i << ": " << result_.reason;
+    EXPECT_EQ(result_.epoch, 0);
+    if (!is_short) continue;
+    const Vector6d error = logSE3(turningAt(i).inverse() * result_.T_origin_camera);
+    EXPECT_LT(error.dot(result_.pose_covariance.ldlt().solve(error)), 12.6) << i;
+  }
+  // The room is another one; the turn is known.
+  const int next = kSeen + 40;
+  result_ = odometry_.update(pairOf(room(2), next, turningAt(next)), gyro(turningAt(next - 1), turningAt(next)));
+  expectStartedAgain();
+  const Vector6d error = logSE3(turningAt(next).inverse() * result_.T_origin_camera);
+  EXPECT_LT(error.tail<3>().norm(), 0.2) << "of a turn by 2 rad";
+  EXPECT_LT((result_.pose_covariance.bottomRightCorner<3, 3>().trace()), 0.2);
+  EXPECT_LT(error.dot(result_.pose_covariance.ldlt().solve(error)), 12.6);
 }
 
 TEST_F(Outage, AfterTheLongestTimeTheGuessCarriesThePoseToTheNextStart) {

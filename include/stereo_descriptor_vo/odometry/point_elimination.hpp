@@ -65,13 +65,10 @@ struct EliminatedPoint {
   Eigen::Vector3d disparity_by_point;  ///< its derivatives
 };
 
-/// Weights of the normal equations: a residual's square s costs bend * log(1 + s / bend).
+/// A residual's square s costs bend * log(1 + s / bend) and weighs 1 / (1 + s / bend) in the normal equations.
 struct Linearisation {
   double bend;
   double damping = 0.0;  ///< share of its diagonal that is added to a point's H
-  /// Of errors: by the cost's second derivatives. On average over two directions of a residual: w - w^2 s / bend = w^2.
-  /// Of steps: by the weights w = 1 / (1 + s / bend), which lead to the minimum from farther away.
-  bool of_errors = false;
 };
 
 /// Moves points (ray and inverse depth) to where they fit best after a step of poses and calibration. The step has six

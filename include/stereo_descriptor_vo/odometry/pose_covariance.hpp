@@ -14,7 +14,8 @@ bool widen(Matrix6d& covariance, const Vector6d& deviation);
 /// perturbations, T * exp(xi), translation before rotation, in m and rad.
 ///
 /// Each pair is measured against the last key frame, so the pose's covariance is that of the key frame plus that of the
-/// pair. It grows from key frame to key frame. The traces of its translation and its rotation never shrink in between.
+/// pair. It grows from key frame to key frame. The traces of its translation and its rotation shrink only when a
+/// pose is measured after a predicted one.
 class PoseCovariance {
  public:
   /// Of the last pose; zero in the beginning.
@@ -53,7 +54,8 @@ class PoseCovariance {
 
   Matrix6d value_ = Matrix6d::Zero();
   Matrix6d keyframe_ = Matrix6d::Zero();    ///< of the key frame, as a perturbation of the last pose
-  Matrix6d unmeasured_ = Matrix6d::Zero();  ///< of what the last pose was predicted or doubted by
+  Matrix6d predicted_ = Matrix6d::Zero();   ///< of motions since the last measured pose
+  Matrix6d unmeasured_ = Matrix6d::Zero();  ///< of these, and of what the last pose was doubted by
 };
 
 }  // namespace sdvo

@@ -38,8 +38,10 @@ struct TrackingOptions : MotionPriorOptions {
     list.add("max_predicted_pairs", max_predicted_pairs, {0, 100}, "",
              "pairs in a row whose motion may be predicted before the odometry is lost");
     list.add("max_gap", max_gap, {0.01, 60.0}, "s", "longest time between pairs over which the motion is predicted");
-    list.add("max_guessed", max_guessed, {0.0, 1000.0}, "s",
-             "longest time without usable images over which the pose goes on by the guess of another odometry");
+    list.add(
+        "max_guessed", max_guessed, {0.0, 1000.0}, "s",
+        "longest time without usable images over which the pose goes on by the guess of another odometry; by a gyro "
+        "over max_gap");
     list.add("probability", probability, {0.5, 0.999}, "",
              "a motion is doubtful that is the camera's with a smaller probability");
     list.add(
@@ -168,6 +170,7 @@ class VisualOdometry {
   std::optional<MotionScene> reacquire(const StereoFeatures& features) const;
   void forgetRig();
   void begin(const StereoFeatures& features, double dt);
+  void endOutage();
   Step seed(const StereoFeatures& features);
   MotionScene sceneOf(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
   StereoFeatures inStep(const StereoFeatures& taken, double dt, const std::optional<MotionGuess>& guess) const;
@@ -185,7 +188,9 @@ class VisualOdometry {
   Step measure(const MotionHypothesis& found, const Candidate& candidate);
   Step hold(double dt);
   Step predict(const StereoFeatures& features, double dt, const std::string& failure);
-  void follow(const std::optional<MotionGuess>& guess);
+  Eigen::Isometry3d motionOf(const MotionGuess& guess, double dt) const;
+  Matrix6d unseen(double dt) const;
+  void follow(const std::optional<MotionGuess>& guess, double dt);
   bool canFollow(const StereoFeatures& features) const;
   std::optional<Floor> floor() const;
   void move(const Eigen::Isometry3d& T_previous_current);
@@ -222,12 +227,13 @@ class VisualOdometry {
     std::int64_t last_pose_stamp = 0;  ///< ns
     double distance = 0.0;
     int predicted_pairs = 0;
-    double unseen = 0.0;  ///< s, during which the images repeated themselves
+    double unseen = 0.0;  ///< s since the last measured motion
     int pairs = 0;
     /// Since the last pose, as guesses have it, and its covariance; nothing while one is missing.
     struct Followed {
       Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
       Matrix6d covariance = Matrix6d::Zero();
+      bool rotation_only = false;  ///< the translation is the prior's
     };
     std::optional<Followed> followed = Followed();
     GuessedMotion guessed;
