@@ -69,17 +69,17 @@ double misfit(const StereoFeatures& features, double delay, const Vector6d& velo
   return sum / static_cast<double>(rest.size());
 }
 
-/// The delay of one interval, either way, that explains the rows, which have no other explanation.
-double partnerOf(const StereoFeatures& features, double dt, const Vector6d& velocity) {
+/// The delay of one interval, either way, that explains the rows, or zero; `known` while they do not decide.
+double partnerOf(const StereoFeatures& features, double dt, const Vector6d& velocity, double known) {
   constexpr int kEnough = 20;      // features (chosen)
   constexpr double kUsual = 0.2;   // px: rows of rectified rigs differ by less
-  constexpr double kBetter = 0.5;  // ratio of the misfit that is left (chosen)
-  if (features.count() < kEnough || !(dt > 0.0)) return 0.0;
+  constexpr double kBetter = 0.5;  // ratio of the misfit that is left (chosen), a half of that to take it back
+  if (features.count() < kEnough || !(dt > 0.0)) return known;
   const double in_step = misfit(features, 0.0, velocity);
-  if (in_step < kUsual * kUsual) return 0.0;
-  for (const double delay : {-dt, dt})
-    if (misfit(features, delay, velocity) < kBetter * in_step) return delay;
-  return 0.0;
+  if (in_step > kUsual * kUsual)
+    for (const double delay : {-dt, dt})
+      if (misfit(features, delay, velocity) < kBetter * in_step) return delay;
+  return known != 0.0 && in_step > 0.5 * kBetter * misfit(features, known, velocity) ? known : 0.0;
 }
 
 constexpr double kLeastTurning = 2.0;  // px/s: rotations from images err by less
@@ -89,7 +89,7 @@ constexpr double kLeastTurning = 2.0;  // px/s: rotations from images err by les
 RightCameraDelay::RightCameraDelay(double prior) : prior_(prior), rows_(kMemory, kLeastTurning) {}
 
 void RightCameraDelay::measure(const StereoFeatures& features, double dt, const Vector6d& velocity) {
-  partner_ = partnerOf(features, dt, velocity);
+  partner_ = partnerOf(features, dt, velocity, partner_);
   expose(features, dt * velocity.head<3>().norm(), velocity.tail<3>().norm());
   pairs_.push_back({features, velocity});
   if (pairs_.size() < 4) return;

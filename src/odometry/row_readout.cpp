@@ -48,7 +48,7 @@ void RowReadout::add(const StereoCamera& camera, const Eigen::Isometry3d& T_curr
 }
 
 std::optional<RowReadout::Estimate> RowReadout::estimate() const {
-  constexpr double kEnough = 10.0;   // pairs (chosen), whose spread tells the standard deviation
+  constexpr double kEnough = 25.0;   // pairs (chosen), whose spread tells the standard deviation
   constexpr double kUseful = 0.005;  // s
   if (pairs_ < kEnough || !(information_ > 0.0)) return std::nullopt;
   const double value = product_ / information_;
