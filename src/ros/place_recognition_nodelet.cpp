@@ -76,8 +76,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
     ros::NodeHandle other_nh = slow_callbacks_.serve(getNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
-      NODELET_WARN_STREAM("parameter " << name
-                                       << " is unknown and has no effect: misspelt? docs/parameters.md has all names");
+      NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect: misspelt? See docs/parameters.md");
     const PlaceOutputOptions& output = options_.output;
     if (output.opencv_threads >= 0) cv::setNumThreads(output.opencv_threads);
     robot_ = output.robot_name.empty() ? nh_.getNamespace() : output.robot_name;

@@ -76,8 +76,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
     ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
-      NODELET_WARN_STREAM("parameter " << name
-                                       << " is unknown and has no effect: misspelt? docs/parameters.md has all names");
+      NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect: misspelt? See docs/parameters.md");
     transport_ = std::make_unique<StereoImageTransport>(private_nh);
     extractor_ = std::make_unique<FeatureExtractor>(options_.extractor);
     pace_ = Pace(options_.input.max_rate);
@@ -212,6 +211,11 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
       warnOf(emitter_.judge());
     }
     if (features.report.refused && !unrectified.empty()) features.report.status = unrectified;
+    if (!first_ || first_->data != pair.left_image->data) first_ = pair.left_image;
+    if (features.report.status.empty() && secondsBetween(first_->header.stamp, stamp) > kRepeats)
+      features.report.status =
+          "the left images repeat each other bit by bit: is the driver frozen? A simulated camera "
+          "that stands needs noise";
 
     diagnostics_->note(features);
     reportRig(features, stamp);
@@ -255,6 +259,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
       NODELET_WARN_STREAM("rows of left and right agree again: pairs from " << stamp << " on are used");
   }
 
+  static constexpr double kRepeats = 1.0;         // s (chosen): no real camera's images are equal for so long
   static constexpr double kSilencePeriod = 10.0;  // s between explanations why nothing comes
   static constexpr int kPublishQueue = 10;
   static constexpr const char* kNobodyListens = "nobody listens to stereo_features";
@@ -280,7 +285,8 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   // Only the worker's thread touches these.
   std::unique_ptr<FeatureExtractor> extractor_;
   PairDecoder decoder_;
-  cv::Mat mask_;  // of the topic; empty: none has come
+  sensor_msgs::ImageConstPtr first_;  // of the newest left images that are equal
+  cv::Mat mask_;                      // of the topic; empty: none has come
   EmitterCheck emitter_;
   int jumps_ = 0;  // back, of the stamps
   std::uint32_t stream_epoch_ = 0;

@@ -78,8 +78,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
     ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
-      NODELET_WARN_STREAM("parameter " << name
-                                       << " is unknown and has no effect: misspelt? docs/parameters.md has all names");
+      NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect: misspelt? See docs/parameters.md");
     if (options_.output.use_imu && !options_.output.guess_frame_id.empty())
       throw std::invalid_argument("use_imu and guess_frame_id exclude each other: set one of them");
     T_odom_start_ = ros_conversions::toPose(options_.output.initial_pose);
@@ -238,14 +237,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     report(result, message.header.stamp);
     publisher_->publish(result, *mount_->last());
     if (publisher_->wantsMap() && result.has_pose)
-      publisher_->publishMap(odometry_->mapPoints(), result.T_origin_camera, cleanHeader(message));
+      publisher_->publishMap(odometry_->mapPoints(), result.T_origin_camera, message.header);
     return result;
-  }
-
-  static std_msgs::Header cleanHeader(const FeaturesMessage& message) {
-    std_msgs::Header header = message.header;
-    header.frame_id = ros_conversions::cleanFrameId(header.frame_id);
-    return header;
   }
 
   OdometryResult waitFor(const std::string& what) const {

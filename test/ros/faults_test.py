@@ -242,6 +242,14 @@ class Faults(PipelineCase):
         self.expect('stereo_features', 'exposure', warn, 'too dark')
         self.expect('stereo_features', 'features', warn)
 
+        frozen = [image.data for image in self.camera.messages(0)[0]]
+
+        def freeze(images):
+            for image, data in zip(images, frozen):
+                image.data = data
+        self.run_for(3.0, freeze)
+        self.expect('stereo_features', 'features', warn, 'the left images repeat each other bit by bit')
+
         def swap(images):
             images[0].data, images[1].data = images[1].data, images[0].data
         self.run_for(3.0, swap)
