@@ -18,7 +18,8 @@ void Misalignment::describe(OptionList& list) {
 
 void Shutters::describe(OptionList& list) {
   list.add("right_delay", right_delay, {-1.0, 1.0}, "s", "the right image is taken that much later than the left one");
-  list.add("readout", readout, {0.0, 0.1}, "s", "rolling shutters: the last row is taken that much later than the first");
+  list.add("readout", readout, {0.0, 0.1}, "s",
+           "rolling shutters: the last row is taken that much later than the first");
 }
 
 void RenderOptions::describe(OptionList& list) {

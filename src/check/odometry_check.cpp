@@ -38,7 +38,8 @@ Finding OdometryCheck::judge() const {
 Finding OdometryCheck::shutter() const {
   const std::string step = "shutter";
   if (!std::isfinite(readout_.sigma)) return {step, Verdict::kOpen, "too few pairs with a motion that changes", "turn"};
-  const std::string what = text(1, "last row ", 1e3 * readout_.value, " ms later than the first, +- ", 1e3 * readout_.sigma);
+  const std::string what =
+      text(1, "last row ", 1e3 * readout_.value, " ms later than the first, +- ", 1e3 * readout_.sigma);
   if (readout_.isRolling()) return {step, Verdict::kWarn, what, "a rolling shutter: take cameras with a global one"};
   return {step, Verdict::kOk, what, ""};
 }

@@ -24,7 +24,7 @@ class OdometryCheck {
 
  private:
   int lost_ = 0, degraded_ = 0, tracking_ = 0;
-  double distance_ = 0.0;             ///< m
+  double distance_ = 0.0;  ///< m
   RowReadout::Estimate readout_{0.0, std::numeric_limits<double>::infinity()};
   std::vector<double> inliers_, rotations_;
   std::map<std::string, int> reasons_;  ///< of what is not tracked

@@ -24,8 +24,8 @@ class RowCheck {
   Finding rectification() const;
   Finding sameMoment() const;
 
-  /// Median of v_right - v_left (px) in each cell of the image, delay removed; a cell a part of RowDelay, CV_64F, NaN where
-  /// fewer than ten corners were found.
+  /// Median of v_right - v_left (px) in each cell of the image, delay removed; a cell a part of RowDelay, CV_64F, NaN
+  /// where fewer than ten corners were found.
   cv::Mat map() const;
 
  private:

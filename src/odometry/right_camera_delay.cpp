@@ -40,8 +40,8 @@ InStep inStep(const StereoFeatures& features, int i, double delay, const Vector6
   InStep result{features.disparity[i], Eigen::Vector2d::Zero()};
   for (int iteration = 0; iteration < 2; ++iteration) {
     // In the middle of the delay.
-    const RightFlow flow = rightFlow(features.camera, velocity, u - 0.5 * delay * result.flow.x(),
-                                     v - 0.5 * delay * result.flow.y());
+    const RightFlow flow =
+        rightFlow(features.camera, velocity, u - 0.5 * delay * result.flow.x(), v - 0.5 * delay * result.flow.y());
     result.disparity = (features.disparity[i] + delay * flow.far.x()) / (1.0 - delay * flow.near.x());
     result.flow = flow.far + result.disparity * flow.near;
   }

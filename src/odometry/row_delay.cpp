@@ -60,7 +60,7 @@ void RowDelay::Sums::add(double w, const Eigen::Vector3d& moved, double lower) {
 /// Least squares on the means of each part, with the weights of a Huber kernel. Differences within a part are left out:
 /// on a road they have the same pattern in all pairs, as has the rectification's error.
 void RowDelay::add(const std::vector<Row>& pair) {
-  constexpr double kKernel = 0.5;   // px (chosen): errors of healthy rows are smaller
+  constexpr double kKernel = 0.5;  // px (chosen): errors of healthy rows are smaller
   constexpr int kReweightings = 3;
   double square = 0.0;
   for (const Row& row : pair) square += row.turning * row.turning;

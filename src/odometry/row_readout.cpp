@@ -23,8 +23,7 @@ void RowReadout::add(const StereoCamera& camera, const Eigen::Isometry3d& T_curr
     const Correspondence& point = correspondences[i];
     const auto residual = reprojectionResidual(camera, T_current_reference, point);
     if (!residual) continue;
-    const Eigen::Matrix<double, 2, 6> jacobian =
-        motionJacobian(camera, T_current_reference, point.point).topRows<2>();
+    const Eigen::Matrix<double, 2, 6> jacobian = motionJacobian(camera, T_current_reference, point.point).topRows<2>();
     // A static point moves in the camera's frame by the inverse of the camera's motion.
     const Eigen::Vector2d shift = (point.measurement.y() - camera.cy) / camera.height * (jacobian * -change);
     const Eigen::Vector2d rest = residual->head<2>();

@@ -240,13 +240,19 @@ StereoFeatures VisualOdometry::inStep(const StereoFeatures& taken, double dt,
                                    logSE3(found.motion.T_current_reference.inverse()) / secondsSinceMap(taken));
 }
 
-/// Whether all rows of both images are of one moment.
+/// Whether all rows of both images are of one moment, and the pairs in their order.
 void VisualOdometry::watchShutters(const StereoFeatures& taken, double dt, const MotionHypothesis& found) {
   if (!found.motion.success || state_.interrupted || !(dt > 0.0)) return state_.right_delay.interrupt();
   const Vector6d velocity = logSE3(found.motion.T_current_reference.inverse()) / secondsSinceMap(taken);
   state_.readout.add(taken.camera, found.motion.T_current_reference, found.correspondences, found.motion.inliers,
                      velocity);
   state_.right_delay.measure(taken, dt, velocity);
+  // Of neighbours that changed places the second goes back by half of the first one's motion, which was twice too
+  // large.
+  constexpr double kAlike = 0.2;  // ratio of that (chosen)
+  if (const auto& last = state_.prior.velocity();
+      last && found.innovation > kInnovationGate && (velocity + 0.5 * *last).norm() < kAlike * last->norm())
+    state_.doubt.raise(CarriedDoubt::kCertain, "neighbouring pairs seemed to have changed places");
   constexpr double kAnother = 0.5;  // of the interval: the right image is nearer to another pair's
   const double known = state_.right_delay.compensated();
   const double delay = std::abs(known) > kAnother * dt ? known : state_.right_delay.partner();

@@ -45,7 +45,8 @@ RightCameraDelay watched(double delay, int pairs) {
   RightCameraDelay right_delay;
   for (int k = 0; k < pairs; ++k) {
     const double noise = 0.1;  // px
-    right_delay.measure(seen(velocityAt(kPeriod * k + 0.5 * delay), delay, noise, 10u + static_cast<unsigned>(k)), kPeriod, before(k));
+    right_delay.measure(seen(velocityAt(kPeriod * k + 0.5 * delay), delay, noise, 10u + static_cast<unsigned>(k)),
+                        kPeriod, before(k));
   }
   return right_delay;
 }
@@ -85,7 +86,8 @@ TEST(RightCameraDelay, FindsADelayAndCompensatesIt) {
 TEST(RightCameraDelay, WhatIsKnownBeforehandHoldsUntilItIsContradicted) {
   RightCameraDelay known(-0.003);
   EXPECT_EQ(known.compensated(), -0.003);
-  for (int k = 0; k < 60; ++k) known.measure(seen(velocityAt(kPeriod * k), 0.0, 0.1, 10u + static_cast<unsigned>(k)), kPeriod, before(k));
+  for (int k = 0; k < 60; ++k)
+    known.measure(seen(velocityAt(kPeriod * k), 0.0, 0.1, 10u + static_cast<unsigned>(k)), kPeriod, before(k));
   EXPECT_NEAR(known.compensated(), 0.0, 5e-4);
 }
 

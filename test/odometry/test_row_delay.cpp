@@ -63,7 +63,8 @@ TEST(RowDelay, ProvesNoneOnARigInStep) {
 }
 
 TEST(RowDelay, IsUnknownWhereTheViewHardlyTurns) {
-  EXPECT_FALSE(ofNods(kDelay, 1.0, 10.0).estimate()) << "rows move as the depth has it, and so does a bad rectification";
+  EXPECT_FALSE(ofNods(kDelay, 1.0, 10.0).estimate())
+      << "rows move as the depth has it, and so does a bad rectification";
   EXPECT_FALSE(RowDelay(0.995, 2.0).estimate());
 }
 

@@ -17,7 +17,8 @@ class RightCameraDelay {
   /// `prior`, s: what is known beforehand.
   explicit RightCameraDelay(double prior = 0.0);
 
-  /// Takes note of a pair, as taken, with the camera's mean velocity (its own frame, m/s and rad/s) over the `dt` s before it.
+  /// Takes note of a pair, as taken, with the camera's mean velocity (its own frame, m/s and rad/s) over the `dt` s
+  /// before it.
   void measure(const StereoFeatures& features, double dt, const Vector6d& velocity);
   /// The next pair does not continue the last one.
   void interrupt() { pairs_.clear(); }

@@ -16,8 +16,9 @@ namespace sdvo {
 /// bound.
 class RowReadout {
  public:
-  static constexpr double kSignificant = 4.0;  ///< standard deviations beyond which a rolling shutter is proved (chosen)
-  static constexpr double kWarn = 0.003;       ///< s
+  static constexpr double kSignificant =
+      4.0;                                ///< standard deviations beyond which a rolling shutter is proved (chosen)
+  static constexpr double kWarn = 0.003;  ///< s
 
   struct Estimate {
     double value, sigma;  ///< s

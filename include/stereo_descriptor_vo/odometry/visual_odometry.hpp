@@ -207,7 +207,8 @@ class VisualOdometry {
 
   // State between pairs; reset() is the assignment of a new one.
   struct State {
-    explicit State(const VisualOdometryOptions& options) : calibration(options.calibration), right_delay(options.calibration.right_delay), prior(options.tracking) {}
+    explicit State(const VisualOdometryOptions& options)
+        : calibration(options.calibration), right_delay(options.calibration.right_delay), prior(options.tracking) {}
 
     std::optional<LocalMap> map;
     std::optional<LocalMap> candidate;  ///< the map with the pair; between pairs only its memory matters
