@@ -262,7 +262,7 @@ void VisualOdometry::watchShutters(const StereoFeatures& taken, double dt, const
   // large.
   constexpr double kAlike = 0.2;  // ratio of that (chosen)
   if (const auto& last = state_.prior.velocity();
-      last && found.innovation > kInnovationGate && (velocity + 0.5 * *last).norm() < kAlike * last->norm())
+      last && found.innovation > noiseGate(6) && (velocity + 0.5 * *last).norm() < kAlike * last->norm())
     state_.doubt.raise(CarriedDoubt::kCertain, "neighbouring pairs seemed to have changed places");
   constexpr double kAnother = 0.5;  // of the interval: the right image is nearer to another pair's
   const double known = state_.right_delay.compensated();
