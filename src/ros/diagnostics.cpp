@@ -4,6 +4,10 @@
 #include <cmath>
 #include <utility>
 
+#include "../common/text.hpp"
+#include "stereo_descriptor_vo/odometry/row_delay.hpp"
+#include "stereo_descriptor_vo/odometry/row_readout.hpp"
+
 namespace sdvo {
 
 using Level = WallUpdater::Level;
@@ -173,6 +177,18 @@ void OdometryDiagnostics::diagnoseLatency(Status& status) {
                   doubt.c_str());
 }
 
+/// In words, if the rows of both images are not of one moment.
+std::string doubtOfShutters(const stereo_descriptor_vo::VoInfo& info) {
+  if (RowReadout::Estimate{info.readout, info.readout_sigma}.isRolling())
+    return text(0, "rows are taken one after the other, in ", 1e3 * info.readout,
+                " ms at least: the cameras need a global shutter");
+  const double late = RowDelay::Estimate{info.right_delay, info.right_delay_sigma}.proved();
+  if (!(std::abs(late) > RowDelay::kWarn)) return "";
+  return text(1, "right images are taken ", 1e3 * std::abs(info.right_delay), " +- ", 1e3 * info.right_delay_sigma,
+              " ms ", late > 0.0 ? "after" : "before",
+              " left ones: trigger both cameras together; calibration/right_delay takes a known delay");
+}
+
 /// Under the lock, as what follows.
 void OdometryDiagnostics::summarise(Status& status) const {
   if (const auto silence = input_.silence()) {
@@ -182,6 +198,7 @@ void OdometryDiagnostics::summarise(Status& status) const {
   }
   const auto level = last_->state == "TRACKING" ? Level::OK : last_->state == "LOST" ? Level::ERROR : Level::WARN;
   status.summary(level, last_->state + (last_->reason.empty() ? "" : ": " + last_->reason));
+  if (const std::string doubt = doubtOfShutters(*last_); !doubt.empty()) status.mergeSummary(Level::WARN, doubt);
 }
 
 void OdometryDiagnostics::addCalibration(Status& status) const {
@@ -189,6 +206,10 @@ void OdometryDiagnostics::addCalibration(Status& status) const {
     status.addf(
         "calibration", "disparities are off by %.2f +- %.2f px in the centre, another %.2f +- %.2f px at 45 degrees",
         last_->disparity_offset, last_->disparity_offset_sigma, last_->disparity_bend, last_->disparity_bend_sigma);
+  if (std::isfinite(last_->right_delay))
+    status.addf("right camera delay [ms]", "%.2f +- %.2f", 1e3 * last_->right_delay, 1e3 * last_->right_delay_sigma);
+  if (std::isfinite(last_->readout))
+    status.addf("readout [ms]", "%.1f +- %.1f", 1e3 * last_->readout, 1e3 * last_->readout_sigma);
   if (std::isfinite(last_->right_rotation[0]))
     status.addf("right camera rotation [mrad]", "%.2f %.2f %.2f", 1e3 * last_->right_rotation[0],
                 1e3 * last_->right_rotation[1], 1e3 * last_->right_rotation[2]);

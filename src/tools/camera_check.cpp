@@ -57,6 +57,7 @@ std::vector<Finding> CameraCheck::findings(const Finding& topics, const Finding&
   append(calibration());
   append(images_.exposure(thresholds_.min_intensity, thresholds_.max_intensity));
   append(rows_.sameMoment());
+  append(odometry_.shutter());
   append(rows_.rectification());
   append(rig());
   append(images_.texture(thresholds_.min_corners, options_.stereo_features.rig_monitor.suspicious_share));
