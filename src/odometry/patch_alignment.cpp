@@ -82,7 +82,8 @@ std::string PatchAlignmentOptions::complaint(int patch_side) const {
   if (!enabled || patch_side == 0 || canAlign(patch_side)) return "";
   const std::string side = std::to_string(patch_side);
   return "patches of " + side + "x" + side + " samples are too small for alignment/radius " + std::to_string(radius) +
-         ": no match is aligned; set descriptor/patch_side to at least " + std::to_string(leastSide());
+         ": no match is aligned; descriptor/patch_side of stereo_features must be " + std::to_string(leastSide()) +
+         " or more";
 }
 
 std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const Patch& reference,
@@ -124,8 +125,8 @@ std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const
   found.correlation = p.ab / std::sqrt(pattern.square * p.aa);
   if (!(found.correlation >= static_cast<float>(options.min_correlation))) return std::nullopt;
   // What is left of the difference is noise of the images, four parameters fitted, and so tells the position's. It is
-  // about one image's, because values between samples are smooth. The reference's appears as large as this does. That of
-  // a current patch in which the point appears smaller does not shrink: its samples are taken more than once.
+  // about one image's, because values between samples are smooth. The reference's appears as large as this does. That
+  // of a current patch in which the point appears smaller does not shrink: its samples are taken more than once.
   const float left = sumOfSquaredDifferences(square.count(), contrast, grey.data(), pattern.grey.data());
   const float noise = left / static_cast<float>(square.pixels() - 4);
   const float warped = (grid * inverse * grid.transpose()).trace(), own = std::max(warped, inverse.trace());

@@ -4,9 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "../common/text.hpp"
-#include "stereo_descriptor_vo/odometry/row_delay.hpp"
-#include "stereo_descriptor_vo/odometry/row_readout.hpp"
+#include "../check/shutter_check.hpp"
 
 namespace sdvo {
 
@@ -177,18 +175,6 @@ void OdometryDiagnostics::diagnoseLatency(Status& status) {
                   doubt.c_str());
 }
 
-/// In words, if the rows of both images are not of one moment.
-std::string doubtOfShutters(const stereo_descriptor_vo::VoInfo& info) {
-  if (RowReadout::Estimate{info.readout, info.readout_sigma}.isRolling())
-    return text(0, "rows are taken one after the other, in ", 1e3 * info.readout,
-                " ms at least: the cameras need a global shutter");
-  const double late = RowDelay::Estimate{info.right_delay, info.right_delay_sigma}.proved();
-  if (!(std::abs(late) > RowDelay::kWarn)) return "";
-  return text(1, "right images are taken ", 1e3 * std::abs(info.right_delay), " +- ", 1e3 * info.right_delay_sigma,
-              " ms ", late > 0.0 ? "after" : "before",
-              " left ones: trigger both cameras together; calibration/right_delay takes a known delay");
-}
-
 /// Under the lock, as what follows.
 void OdometryDiagnostics::summarise(Status& status) const {
   if (const auto silence = input_.silence()) {
@@ -198,7 +184,9 @@ void OdometryDiagnostics::summarise(Status& status) const {
   }
   const auto level = last_->state == "TRACKING" ? Level::OK : last_->state == "LOST" ? Level::ERROR : Level::WARN;
   status.summary(level, last_->state + (last_->reason.empty() ? "" : ": " + last_->reason));
-  if (const std::string doubt = doubtOfShutters(*last_); !doubt.empty()) status.mergeSummary(Level::WARN, doubt);
+  const std::string doubt =
+      doubtOfShutters({last_->right_delay, last_->right_delay_sigma}, {last_->readout, last_->readout_sigma});
+  if (!doubt.empty()) status.mergeSummary(Level::WARN, doubt);
 }
 
 void OdometryDiagnostics::addCalibration(Status& status) const {

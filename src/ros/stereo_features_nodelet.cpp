@@ -213,9 +213,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     if (features.report.refused && !unrectified.empty()) features.report.status = unrectified;
     if (!first_ || first_->data != pair.left_image->data) first_ = pair.left_image;
     if (features.report.status.empty() && secondsBetween(first_->header.stamp, stamp) > kRepeats)
-      features.report.status =
-          "the left images repeat each other bit by bit: is the driver frozen? A simulated camera "
-          "that stands needs noise";
+      features.report.status = "the left images repeat bit by bit: is the driver frozen? A simulated one needs noise";
 
     diagnostics_->note(features);
     reportRig(features, stamp);

@@ -346,7 +346,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     }
     std::string problem;
     if (const std::optional<Eigen::Isometry3d> found = mount_->find(base_frame, camera_frame, problem)) {
-      warnIfNotOptical(camera_frame, *found);
+      if (found->linear().isIdentity(1e-3))  // an optical frame looks along +z, on a robot seldom up
+        NODELET_WARN_STREAM("camera frame '" << camera_frame
+                                             << "' has the axes of the base (x forward): an optical frame "
+                                             << "(x right, z forward) was expected; name it as the images' frame_id");
       if (!camera_frame_.empty() && camera_frame_ != camera_frame)
         NODELET_WARN_STREAM("the images' frame was '" << camera_frame_ << "' and is '" << camera_frame
                                                       << "' now: another camera goes on from the base's last pose "
@@ -357,17 +360,6 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     const std::string report = transforms_->explainMissing(base_frame, camera_frame);
     if (throttle_.allows("extrinsic")) NODELET_ERROR_STREAM(report << ". " << problem);
     return report;
-  }
-
-  /// An optical frame looks along +z; on a robot that is horizontal more often than up or down.
-  void warnIfNotOptical(const std::string& camera_frame, const Eigen::Isometry3d& T_base_camera) {
-    if (T_base_camera.linear().isIdentity(1e-3))
-      NODELET_WARN_STREAM(
-          "camera frame '"
-          << camera_frame
-          << "' has the axes of the base (x forward): an optical frame (z forward, x "
-             "right, REP-103) was expected, the odometry will move along the wrong axes; name that frame as "
-             "frame_id of the images");
   }
 
   // The services. What they ask for has happened when they answer, and features that still wait are dropped.
