@@ -82,11 +82,12 @@ double partnerOf(const StereoFeatures& features, double dt, const Vector6d& velo
   return known != 0.0 && in_step > 0.5 * kBetter * misfit(features, known, velocity) ? known : 0.0;
 }
 
+constexpr int kSamePoints = 8;         // pairs in which a point is seen (chosen)
 constexpr double kLeastTurning = 2.0;  // px/s: rotations from images err by less
 
 }  // namespace
 
-RightCameraDelay::RightCameraDelay(double prior) : prior_(prior), rows_(kMemory, kLeastTurning) {}
+RightCameraDelay::RightCameraDelay(double prior) : prior_(prior), rows_(kMemory, kLeastTurning, kSamePoints) {}
 
 void RightCameraDelay::measure(const StereoFeatures& features, double dt, const Vector6d& velocity) {
   partner_ = partnerOf(features, dt, velocity, partner_);

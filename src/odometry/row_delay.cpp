@@ -94,17 +94,21 @@ void RowDelay::add(const std::vector<Row>& pair) {
       weights[i] = std::min(1.0, kKernel / std::max(std::abs(rest(cell, motionOf(pair[i]), pair[i].dv)), 1e-9));
     }
   }
-  spread_ = memory_ * memory_ * spread_ + gradient * gradient.transpose();
-  pairs_ = memory_ * pairs_ + 1.0;
+  block_ += gradient;
+  if (++pairs_ % pairs_of_block_ != 0) return;
+  const double memory = std::pow(memory_, pairs_of_block_);
+  spread_ = memory * memory * spread_ + block_ * block_.transpose();
+  blocks_ = memory * blocks_ + 1.0;
+  block_.setZero();
 }
 
 std::optional<RowDelay::Estimate> RowDelay::estimate() const {
-  constexpr double kEnough = 5.0;    // pairs (chosen), whose spread tells the standard deviation
+  constexpr double kEnough = 4.5;    // blocks (chosen), whose spread tells the standard deviation
   constexpr double kUseful = 0.005;  // s; a delay that is not known better than that is not judged
-  if (pairs_ < kEnough) return std::nullopt;
+  if (blocks_ < kEnough) return std::nullopt;
   const Fit fit = this->fit(cells_);
   const Eigen::Matrix2d inverse = fit.information.inverse();
-  const double few = pairs_ / (pairs_ - 2.0);  // the spread around what it fits itself; heavy tails of a few pairs
+  const double few = blocks_ / (blocks_ - 2.0);  // the spread around what it fits itself; heavy tails of a few
   const Estimate estimate{fit.value[0], std::sqrt(few * (inverse * spread_ * inverse.transpose())(0, 0))};
   if (!(estimate.sigma < kUseful)) return std::nullopt;
   return estimate;

@@ -8,8 +8,8 @@
 
 namespace sdvo {
 
-/// How much later the right image of a rig is taken, from rows. A point that moves down in the right image at v' px/s is
-/// seen v' * delay px lower by a camera that is late. Errors of the rectification stay in their part of the image. A
+/// How much later the right image of a rig is taken, from rows. A point that moves down in the right image at v' px/s
+/// is seen v' * delay px lower by a camera that is late. Errors of the rectification stay in their part of the image. A
 /// right camera that sits lower shifts rows by a ratio of the disparity. Neither counts as a delay.
 class RowDelay {
  public:
@@ -37,7 +37,9 @@ class RowDelay {
 
   /// `memory`: ratio of the past that a pair leaves. Pairs are left out where the instrument is below `least_turning`
   /// (px/s, RMS): errors of the velocity must be smaller.
-  RowDelay(double memory, double least_turning) : memory_(memory), least_turning_(least_turning) {}
+  /// `block`: pairs in a row that may see the same points, whose errors are then alike.
+  RowDelay(double memory, double least_turning, int block = 1)
+      : memory_(memory), least_turning_(least_turning), pairs_of_block_(block) {}
 
   void add(const std::vector<Row>& pair);
 
@@ -67,9 +69,12 @@ class RowDelay {
   static Fit fit(const Cells& cells);
 
   double memory_, least_turning_;
+  int pairs_of_block_;
   Cells cells_;
-  Eigen::Matrix2d spread_ = Eigen::Matrix2d::Zero();  ///< of the gradients of whole pairs, whose errors may be alike
-  double pairs_ = 0.0;
+  Eigen::Matrix2d spread_ = Eigen::Matrix2d::Zero();  ///< of the gradients of whole blocks
+  Eigen::Vector2d block_ = Eigen::Vector2d::Zero();   ///< gradients of the pairs of the one that has begun
+  int pairs_ = 0;
+  double blocks_ = 0.0;
 };
 
 }  // namespace sdvo
