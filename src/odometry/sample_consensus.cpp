@@ -62,10 +62,8 @@ Consensus findConsensus(const PoseProblem& problem, const SampleConsensusOptions
   const bool genetic =
       options.consensus == ConsensusMethod::kGasac || options.consensus == ConsensusMethod::kAdaptiveGasac;
   const SampleBudget budget(options.min_iterations, options.max_iterations, options.confidence);
-  Consensus consensus = genetic ? searchByGenes(problem, options, budget, random)
-                                : searchAtRandom(problem, options, refinement, budget, random);
-  if (consensus.found) consensus.inliers = problem.inliers(consensus.T_current_reference);
-  return consensus;
+  return genetic ? searchByGenes(problem, options, budget, random)
+                 : searchAtRandom(problem, options, refinement, budget, random);
 }
 
 }  // namespace sdvo

@@ -43,8 +43,7 @@ struct SampleConsensusOptions {
 struct Consensus {
   bool found = false;
   Eigen::Isometry3d T_current_reference = Eigen::Isometry3d::Identity();
-  std::vector<int> inliers;  ///< ascending
-  int iterations = 0;        ///< minimal samples solved
+  int iterations = 0;  ///< minimal samples solved
 };
 
 /// Searches by the method named in the options; all of them share solver, scoring and the bound on samples. Where the
