@@ -25,7 +25,7 @@ const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"data", {"common"}},
     {"config", {"common", "front_end", "odometry", "places"}},
     {"check", {"common", "front_end", "odometry"}},
-    {"ros", {"common", "front_end", "odometry", "places", "config"}},
+    {"ros", {"common", "front_end", "odometry", "places", "config", "check"}},
     {"tools", {"common", "front_end", "odometry", "places", "data", "config", "check", "ros"}},
 };
 

@@ -16,6 +16,12 @@ void Misalignment::describe(OptionList& list) {
   list.add("right_rotation_z", rotation_z, {-5.0, 5.0}, "deg", "rotation about z (clockwise)" + unknown);
 }
 
+void Shutters::describe(OptionList& list) {
+  list.add("right_delay", right_delay, {-1.0, 1.0}, "s", "the right image is taken that much later than the left one");
+  list.add("readout", readout, {0.0, 0.1}, "s",
+           "rolling shutters: the last row is taken that much later than the first");
+}
+
 void RenderOptions::describe(OptionList& list) {
   list.add("samples", samples, {1, 16}, "rays", "rays per pixel: 1, 4 or 16");
   list.add("moving_share", moving_share, {0.0, 0.6}, "fraction", "share of pixels on moving cars, mean over the drive");
@@ -23,6 +29,7 @@ void RenderOptions::describe(OptionList& list) {
   list.add("seed", seed, {0, 2147483647}, "", "everything random follows from it");
   effects.describe(list);
   misalignment.describe(list);
+  shutters.describe(list);
 }
 
 DriveRenderer::DriveRenderer(const DrivePath& path, Scenery scenery, const StereoCamera& camera,
@@ -59,12 +66,31 @@ View DriveRenderer::view(int side, const Eigen::Isometry3d& T_world_left) const 
 }
 
 cv::Mat1f DriveRenderer::brightness(int side, double time, Worker& worker) const {
+  constexpr int kTogether = 4;  // rows (chosen): during a readout of 25 ms a turn of 100 deg/s moves them by 0.1 px
   cv::Mat1f image(camera_.height, camera_.width, 0.0f);
+  const double readout = options_.shutters.readout;
+  const int step = readout > 0.0 ? kTogether : camera_.height;
+  for (int top = 0; top < camera_.height; top += step) {
+    const int bottom = std::min(top + step, camera_.height);
+    const double middle = 0.5 * (top + bottom) / camera_.height;
+    addRows(side, time + readout * (middle - 0.5), worker, top, image.rowRange(top, bottom));
+  }
+  return image;
+}
+
+/// The rows of an image from `top` on.
+void DriveRenderer::addRows(int side, double time, Worker& worker, int top, cv::Mat1f rows) const {
+  const auto rowsView = [&](double moment) {
+    View rows_view = view(side, path_.poseAt(moment));
+    rows_view.cy -= top;
+    rows_view.height = rows.rows;
+    return rows_view;
+  };
   const double exposure = options_.effects.motion_blur;
   if (exposure <= 0.0) {
     worker.place(traffic_.at(time));
-    renderer_->add(view(side, path_.poseAt(time)), worker, options_.samples, 0.0f, 0.0f, 1.0f, image);
-    return image;
+    renderer_->add(rowsView(time), worker, options_.samples, 0.0f, 0.0f, 1.0f, rows);
+    return;
   }
   // One ray per pixel and moment; the rays' places within the pixel differ so that edges at rest are smooth as well.
   const int moments = momentsOfExposure(time);
@@ -74,10 +100,8 @@ cv::Mat1f DriveRenderer::brightness(int side, double time, Worker& worker) const
     const int shuffled = i * 5 % moments;
     const float across = (static_cast<float>(i) + 0.5f) / static_cast<float>(moments) - 0.5f;
     const float down = (static_cast<float>(shuffled) + 0.5f) / static_cast<float>(moments) - 0.5f;
-    renderer_->add(view(side, path_.poseAt(moment)), worker, 1, across, down, 1.0f / static_cast<float>(moments),
-                   image);
+    renderer_->add(rowsView(moment), worker, 1, across, down, 1.0f / static_cast<float>(moments), rows);
   }
-  return image;
 }
 
 int DriveRenderer::momentsOfExposure(double time) const {
@@ -94,9 +118,11 @@ StereoPair DriveRenderer::render(int frame, Worker& worker) const {
   const double time = frame / path_.rate();
   const auto seed = static_cast<std::uint64_t>(options_.seed);
   StereoPair pair;
-  for (int side = 0; side < 2; ++side)
-    (side == 0 ? pair.left : pair.right) = options_.effects.apply(brightness(side, time, worker), time, seed,
+  for (int side = 0; side < 2; ++side) {
+    const double taken = side == 0 ? time : time + options_.shutters.right_delay;
+    (side == 0 ? pair.left : pair.right) = options_.effects.apply(brightness(side, taken, worker), taken, seed,
                                                                   2 * static_cast<std::uint64_t>(frame) + side);
+  }
   return pair;
 }
 

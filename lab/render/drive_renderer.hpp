@@ -19,6 +19,14 @@ struct Misalignment {
   void describe(OptionList& list);
 };
 
+/// When the rows of both images are taken, which stamps do not tell.
+struct Shutters {
+  double right_delay = 0.0;  ///< of the right image, s
+  double readout = 0.0;      ///< of a rolling shutter, from the first row to the last, s; the middle row has the stamp
+
+  void describe(OptionList& list);
+};
+
 struct RenderOptions {
   int samples = 4;              ///< rays per pixel
   double moving_share = 0.01;   ///< of the pixels that see a moving car, on average over the drive
@@ -26,6 +34,7 @@ struct RenderOptions {
   int seed = 1;
   CameraEffects effects;
   Misalignment misalignment;
+  Shutters shutters;
 
   void describe(OptionList& list);
 };
@@ -71,6 +80,7 @@ class DriveRenderer {
  private:
   View view(int side, const Eigen::Isometry3d& T_world_left) const;
   cv::Mat1f brightness(int side, double time, Worker& worker) const;
+  void addRows(int side, double time, Worker& worker, int top, cv::Mat1f rows) const;
   /// How many images an exposure is the mean of: at least 8, and so many that a turn smears instead of repeating edges.
   int momentsOfExposure(double time) const;
   double measureMovingShare(int first, int count) const;

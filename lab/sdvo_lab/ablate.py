@@ -83,6 +83,6 @@ def main(arguments):
 
     with drives.folders(arguments) as (work, folder), programs.pool() as pool:
         found = faults.render_all(arguments.drives, folder, arguments.pairs, LAST + AFTER, names)
-        cases = list(pool.map(lambda of: Case(*of, work), [(name, *of) for name in names for of in found[name in STANDING_FAULTS]]))
+        cases = list(pool.map(lambda of: Case(*of, work), [(name, *of) for name in names for of in found[name]]))
         recorded = [drives.recorded(kind, name) for kind in ("kitti", "karlsruhe") for name in drives.recorded_names(kind)]
         marks.show(rows())

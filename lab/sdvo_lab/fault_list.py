@@ -150,6 +150,28 @@ def right_late(pairs, drive, random):
     return pairs
 
 
+def right_one_pair_late(pairs, drive, random):
+    """From the first pair to the last."""
+    rights = [pair.right for pair in pairs]
+    for pair, right in zip(pairs[1:], rights):
+        pair.right = right
+    return pairs
+
+
+def torn(share, sides=(0, 1)):
+    """From some row on, every third image is still that of the pair before."""
+    def fault(pairs, drive, random):
+        for i in range(FIRST, LAST, 3):
+            old, new = pairs[i - 1], pairs[i]
+            for name in ("left", "right")[sides[0]:sides[-1] + 1]:
+                image, before = pixels(getattr(new, name)).copy(), pixels(getattr(old, name))
+                row = round((1 - share) * len(image))
+                image[row:] = before[row:]
+                setattr(new, name, image)
+        return pairs
+    return fault
+
+
 def swapped(pairs, drive, random):
     for pair in touched(pairs):
         pair.left, pair.right = pair.right, pair.left
@@ -269,7 +291,7 @@ def carried_in_the_dark(pairs, drive, random):
 
 FAULTS = {
     "none": lambda pairs, drive, random: pairs,
-    "frozen": frozen, "frozen_right": frozen_right, "right_100_ms_late": right_late, "swapped": swapped,
+    "frozen": frozen, "frozen_right": frozen_right, "right_100_ms_late": right_late, "right_one_pair_late": right_one_pair_late, "swapped": swapped,
     "duplicated": duplicated, "out_of_order": out_of_order,
     "gap_0.5_s": gap(0.5), "gap_1.5_s": gap(1.5), "gap_3_s": gap(3.0), "dropped_40_percent": sparse,
     "stamps_jitter_40_ms": jittered, "stamps_10_190_ms": uneven, "bursts_1_ms": bursts,
@@ -288,6 +310,13 @@ FAULTS = {
     "occluder_40": covered(0.4, (0.0, 0.0)), "occluder_70": covered(0.7, (0.0, 0.0)),
     "mover_40": covered(0.4, (1.0, 0.0)), "mover_55": covered(0.55, (1.0, 0.0)), "mover_70": covered(0.7, (1.0, 0.0)),
 }
+for percent in (30, 50, 70):
+    FAULTS.update({f"torn_{percent}": torn(percent / 100), f"left_torn_{percent}": torn(percent / 100, (0,)),
+                   f"right_torn_{percent}": torn(percent / 100, (1,))})
+# Of the whole drive, as options of render_drive.
+RENDERED = {**{f"right_early_{ms}_ms": {"right_delay": -1e-3 * ms} for ms in (1, 3, 6, 16)},
+            **{f"readout_{ms}_ms": {"readout": 1e-3 * ms} for ms in (10, 25)}}
+FAULTS.update({name: FAULTS["none"] for name in RENDERED})
 # With a standing camera.
 STANDING_FAULTS = {
     "standing": FAULTS["none"], "standing_frozen": frozen, "standing_bursts_1_ms": bursts, "standing_noise_10": FAULTS["noise_10"],

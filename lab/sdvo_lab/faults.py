@@ -13,28 +13,29 @@ import tempfile
 import numpy
 
 from . import drives, marks, odometry, poses, programs
-from .fault_list import (AFTER, EVERY, FAULTS, FIRST, LAST, PERIOD, STANDING_FAULTS, faulty_pairs, is_hit, parts, write_sequence)
+from .fault_list import (AFTER, EVERY, FAULTS, FIRST, LAST, PERIOD, RENDERED, STANDING_FAULTS, faulty_pairs, is_hit, parts,
+                         write_sequence)
 
 SIGMAS = 5.0  # standard deviations that no error may exceed
 
 
-def render(folder, trajectory, rig, seed, pairs):
+def render(folder, trajectory, rig, seed, pairs, **options):
     """The same drive starts elsewhere and in another world with each seed."""
-    start = 0 if trajectory == "still" else 60 * (seed - 1)
-    return drives.rendered(folder, trajectory, rig, seed, start, pairs, rate=1 / PERIOD, moving_share=0.01)
+    start = 0 if trajectory in ("still", "hand_held", "turn_in_place") else 60 * (seed - 1)
+    return drives.rendered(folder, trajectory, rig, seed, start, pairs, rate=1 / PERIOD, moving_share=0.01, **options)
 
 
 def render_all(text, folder, pairs, standing_pairs, faults):
-    """Seeds and drives of --drives, moving ones and, under True, standing ones; only those that the faults need."""
-    found = {False: [], True: []}
+    """For each fault the seeds and drives of --drives, of a standing camera where that is the fault's."""
+    found = {name: [] for name in faults}
     for word in text.split(","):
         fields = word.split(":")
         if len(fields) != 3 or not fields[2].isdigit():
             raise SystemExit("error: --drives are TRAJECTORY:RIG:SEED, with commas between")
         (trajectory, rig), seed = fields[:2], int(fields[2])
-        for standing, path, count in ((False, trajectory, pairs), (True, "still", standing_pairs)):
-            if any((name in STANDING_FAULTS) == standing for name in faults):
-                found[standing].append((seed, render(folder, path, rig, seed, count)))
+        for name in faults:
+            path, count = ("still", standing_pairs) if name in STANDING_FAULTS else (trajectory, pairs)
+            found[name].append((seed, render(folder, path, rig, seed, count, **RENDERED.get(name, {}))))
     return found
 
 
@@ -206,7 +207,7 @@ def main(arguments):
     with drives.folders(arguments) as (work, folder), programs.pool() as pool:
         found = render_all(arguments.drives, folder, arguments.pairs, arguments.standing_pairs, names)
         tries = {name: [pool.submit(try_fault, name, seed, drive, work, programs.params(arguments))
-                        for seed, drive in found[name in STANDING_FAULTS]] for name in names}
+                        for seed, drive in found[name]] for name in names}
         marks.show(rows())
     if arguments.write:
         marks.put(arguments.write, "faults", marks.lines(of_the_page))

@@ -29,46 +29,42 @@ double shareFound(const cv::Mat& before, const cv::Mat& around, const cv::Rect& 
   return cv::sum(both)[0] / std::max(cv::sum(from)[0], 1.0);
 }
 
-}  // namespace
-
-void EmitterCheck::add(const cv::Mat& image) {
-  constexpr int kOldest = 20;  // pairs after which the light may be another
-  CoarseView view(image);
-  cv::Mat dots = findDots(image);
-  bool moved = false;
-  if (!view_.empty() && dots.size() == dots_.size()) compare(view, dots, moved);
-  if (view_.empty() || moved || ++age_ > kOldest) {
-    view_ = std::move(view);
-    dots_ = std::move(dots);
-    age_ = 0;
-  }
+/// Share of the dots in `part` of `before` that stayed beyond chance.
+double shareStayed(const cv::Mat& before, const cv::Mat& around, const cv::Rect& part) {
+  constexpr double kDots = 30.0;  // fewer tell nothing
+  if (cv::sum(before(part))[0] < kDots) return 0.0;
+  double chance = 0.0;
+  for (const cv::Point& offset : {cv::Point(5, 7), cv::Point(-7, 5), cv::Point(7, -5), cv::Point(-5, -7)})
+    chance += 0.25 * shareFound(before, around, part, offset);
+  return (shareFound(before, around, part, cv::Point()) - chance) / std::max(1.0 - chance, 0.1);
 }
 
-/// Part by part, for near and far things move differently.
-void EmitterCheck::compare(const CoarseView& view, const cv::Mat& dots, bool& moved) {
+}  // namespace
+
+/// Part by part, for near and far things move differently. Dots are looked for only where there is motion.
+void EmitterCheck::add(const cv::Mat& image) {
+  constexpr int kOldest = 20;  // pairs after which the light may be another
   constexpr int kColumns = 3, kRows = 2;
   constexpr double kMoved = 0.012;  // of the width; 5 px of 424, more than a dot's neighbourhood
-  constexpr double kDots = 30.0;    // fewer tell nothing
+  CoarseView view(image);
+  const bool is_comparable = !view_.empty() && dots_.size() == image.size();
   const cv::Size coarse(view.size().width / kColumns, view.size().height / kRows);
-  const cv::Size fine(dots.cols / kColumns, dots.rows / kRows);
-  cv::Mat around;
-  cv::dilate(dots, around, cv::Mat::ones(3, 3, CV_8U));
-  for (int row = 0; row < kRows; ++row)
-    for (int column = 0; column < kColumns; ++column) {
-      const cv::Point at(column, row);
-      const auto motion = view.motionSince(view_, {cv::Point(at.x * coarse.width, at.y * coarse.height), coarse});
-      if (!motion || std::hypot(motion->x, motion->y) < kMoved) continue;
-      moved = true;
-      const cv::Rect part(cv::Point(at.x * fine.width, at.y * fine.height), fine);
-      if (cv::sum(dots_(part))[0] < kDots) {
-        stayed_.push_back(0.0);
-        continue;
-      }
-      double chance = 0.0;
-      for (const cv::Point& offset : {cv::Point(5, 7), cv::Point(-7, 5), cv::Point(7, -5), cv::Point(-5, -7)})
-        chance += 0.25 * shareFound(dots_, around, part, offset);
-      stayed_.push_back((shareFound(dots_, around, part, cv::Point()) - chance) / std::max(1.0 - chance, 0.1));
+  const cv::Size fine(image.cols / kColumns, image.rows / kRows);
+  cv::Mat dots, around;
+  for (int part = 0; is_comparable && part < kColumns * kRows; ++part) {
+    const cv::Point at(part % kColumns, part / kColumns);
+    const auto motion = view.motionSince(view_, {cv::Point(at.x * coarse.width, at.y * coarse.height), coarse});
+    if (!motion || std::hypot(motion->x, motion->y) < kMoved) continue;
+    if (dots.empty()) {
+      dots = findDots(image);
+      cv::dilate(dots, around, cv::Mat::ones(3, 3, CV_8U));
     }
+    stayed_.push_back(shareStayed(dots_, around, {cv::Point(at.x * fine.width, at.y * fine.height), fine}));
+  }
+  if (is_comparable && dots.empty() && ++age_ <= kOldest) return;
+  view_ = std::move(view);
+  dots_ = dots.empty() ? findDots(image) : dots;
+  age_ = 0;
 }
 
 Finding EmitterCheck::judge() const {

@@ -11,14 +11,12 @@ namespace sdvo {
 /// Finds the dots of a pattern projector: they stay where they are in the image while the scene moves.
 class EmitterCheck {
  public:
-  /// The left image of the next pair, CV_8UC1.
+  /// The left image of the next pair, CV_8UC1. Cheap while nothing moves.
   void add(const cv::Mat& image);
 
   Finding judge() const;
 
  private:
-  void compare(const CoarseView& view, const cv::Mat& dots, bool& moved);
-
   CoarseView view_;             ///< where the scene was last compared
   cv::Mat dots_;                ///< CV_8U, 1 where a dot is
   int age_ = 0;                 ///< pairs since then

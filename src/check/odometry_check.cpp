@@ -1,6 +1,7 @@
 #include "odometry_check.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "../common/quantile.hpp"
 #include "../common/text.hpp"
@@ -12,6 +13,7 @@ void OdometryCheck::add(const OdometryResult& result) {
   (result.state == TrackingState::kTracking ? tracking_ : result.state == TrackingState::kLost ? lost_ : degraded_)++;
   if (result.state != TrackingState::kTracking) ++reasons_[result.reason];
   distance_ = result.distance;
+  if (std::isfinite(result.readout)) readout_ = {result.readout, result.readout_sigma};
   if (!result.has_motion) return;
   inliers_.push_back(result.inliers);
   rotations_.push_back(Eigen::AngleAxisd(result.T_previous_current.rotation()).angle() * 180.0 / EIGEN_PI);
@@ -31,6 +33,15 @@ Finding OdometryCheck::judge() const {
   if (bad <= kFew && lost_ == 0) return {step, Verdict::kOk, what, ""};
   return {step, static_cast<double>(lost_) / pairs > kMany ? Verdict::kFail : Verdict::kWarn, what,
           "most often: " + often->first + " (docs/troubleshooting.md)"};
+}
+
+Finding OdometryCheck::shutter() const {
+  const std::string step = "shutter";
+  if (!std::isfinite(readout_.sigma)) return {step, Verdict::kOpen, "too few pairs with a motion that changes", "turn"};
+  const std::string what =
+      text(1, "last row ", 1e3 * readout_.value, " ms later than the first, +- ", 1e3 * readout_.sigma);
+  if (readout_.isRolling()) return {step, Verdict::kWarn, what, "a rolling shutter: take cameras with a global one"};
+  return {step, Verdict::kOk, what, ""};
 }
 
 }  // namespace sdvo

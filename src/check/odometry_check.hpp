@@ -1,11 +1,13 @@
 #pragma once
 
+#include <limits>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "finding.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
+#include "stereo_descriptor_vo/odometry/row_readout.hpp"
 
 namespace sdvo {
 
@@ -15,12 +17,15 @@ class OdometryCheck {
   void add(const OdometryResult& result);
 
   Finding judge() const;
+  /// Whether all rows of an image are taken at one moment.
+  Finding shutter() const;
 
   const std::vector<double>& rotations() const { return rotations_; }  ///< deg, of each measured motion
 
  private:
   int lost_ = 0, degraded_ = 0, tracking_ = 0;
   double distance_ = 0.0;  ///< m
+  RowReadout::Estimate readout_{0.0, std::numeric_limits<double>::infinity()};
   std::vector<double> inliers_, rotations_;
   std::map<std::string, int> reasons_;  ///< of what is not tracked
 };

@@ -13,7 +13,7 @@
 namespace sdvo {
 namespace {
 
-constexpr std::size_t kCells = static_cast<std::size_t>(RowCheck::kColumns) * RowCheck::kRows;
+constexpr std::size_t kCells = static_cast<std::size_t>(RowDelay::kColumns) * RowDelay::kRows;
 
 /// Where points went, to a fraction of a pixel; `guess` in, result out. Whether each was found.
 std::vector<std::uint8_t> track(const cv::Mat& from, const cv::Mat& to, const std::vector<cv::Point2f>& points,
@@ -60,78 +60,28 @@ void RowCheck::add(const cv::Mat& left, const cv::Mat& right, std::int64_t stamp
   const auto refined = track(left, right, points, in_right, 0), followed = track(left, before, points, in_before, 4);
   back = in_before;
   const auto returned = track(before, left, in_before, back, 0);
-  ++pairs_;
+  std::vector<RowDelay::Row> rows;
   for (std::size_t i = 0; i < points.size(); ++i) {
     constexpr double kBlock = 1.5, kReturn = 0.5;  // px: a block is found to a pixel, a track returns (chosen)
     if (!refined[i] || distance(in_right[i], blocks[i]) > kBlock) continue;
     if (!followed[i] || !returned[i] || distance(back[i], points[i]) > kReturn) continue;
-    const int column = std::min(static_cast<int>(points[i].x) * kColumns / size_.width, kColumns - 1);
-    const int row = std::min(static_cast<int>(points[i].y) * kRows / size_.height, kRows - 1);
-    samples_.push_back({pairs_, row * kColumns + column, static_cast<double>(in_right[i].y - points[i].y),
-                        static_cast<double>(points[i].y - in_before[i].y) / dt});
+    const int cell = RowDelay::cellOf(points[i].x, points[i].y, size_.width, size_.height);
+    const double velocity = static_cast<double>(points[i].y - in_before[i].y) / dt;
+    rows.push_back({cell, static_cast<double>(in_right[i].y - points[i].y), velocity, velocity,
+                    static_cast<double>(points[i].x - in_right[i].x)});
+    samples_.push_back({cell, rows.back().dv, velocity});
   }
-}
-
-/// Least squares on what differs from each cell's mean, so that no error of the rectification counts; with the weights
-/// of a Huber kernel. Errors of one pair may be alike, so its standard deviation is that of whole pairs.
-std::optional<RowCheck::Delay> RowCheck::delay() const {
-  constexpr std::size_t kEnough = 300;  // samples (chosen): a dozen a part
-  constexpr double kKernel = 0.5;       // px (chosen): errors of healthy rows are smaller
-  constexpr double kMoving = 10.0;      // px/s (RMS); 10 ms are a tenth of a pixel then
-  constexpr double kUseful = 0.005;     // s; a delay that is not known better than that is not judged
-  if (samples_.size() < kEnough) return std::nullopt;
-  std::vector<double> weights(samples_.size(), 1.0);
-  Delay delay{0.0, 0.0};
-  for (int iteration = 0; iteration < 10; ++iteration) {
-    std::vector<double> weight(kCells, 0.0), dv(kCells, 0.0), velocity(kCells, 0.0);
-    for (std::size_t i = 0; i < samples_.size(); ++i) {
-      const auto cell = static_cast<std::size_t>(samples_[i].cell);
-      weight[cell] += weights[i];
-      dv[cell] += weights[i] * samples_[i].dv;
-      velocity[cell] += weights[i] * samples_[i].velocity;
-    }
-    const auto centred = [&](const Sample& sample) {
-      const auto cell = static_cast<std::size_t>(sample.cell);
-      return cv::Point2d(sample.velocity - velocity[cell] / weight[cell], sample.dv - dv[cell] / weight[cell]);
-    };
-    double total = 0.0, square = 0.0, product = 0.0;
-    for (std::size_t i = 0; i < samples_.size(); ++i) {
-      const cv::Point2d sample = centred(samples_[i]);
-      total += weights[i];
-      square += weights[i] * sample.x * sample.x;
-      product += weights[i] * sample.x * sample.y;
-    }
-    if (!(square > kMoving * kMoving * total)) return std::nullopt;
-    delay.value = product / square;
-    std::vector<double> by_pair(static_cast<std::size_t>(pairs_) + 1, 0.0);
-    for (std::size_t i = 0; i < samples_.size(); ++i) {
-      const cv::Point2d sample = centred(samples_[i]);
-      const double rest = sample.y - delay.value * sample.x;
-      by_pair[static_cast<std::size_t>(samples_[i].pair)] += weights[i] * sample.x * rest;
-      weights[i] = std::min(1.0, kKernel / std::max(std::abs(rest), 1e-9));
-    }
-    double spread = 0.0;
-    for (const double sum : by_pair) spread += sum * sum;
-    delay.sigma = std::sqrt(spread) / square;
-  }
-  if (!(delay.sigma < kUseful)) return std::nullopt;
-  return delay;
-}
-
-/// A delay that is proved, s; else zero.
-double RowCheck::compensation() const {
-  constexpr double kSignificant = 4.0;  // standard deviations
-  const auto found = delay();
-  return found && std::abs(found->value) > kSignificant * found->sigma ? found->value : 0.0;
+  delay_.add(rows);
 }
 
 cv::Mat RowCheck::map() const {
   constexpr std::size_t kEnough = 10;
-  const double late = compensation();
+  const auto found = delay_.estimate();
+  const double late = found ? found->proved() : 0.0;
   std::vector<std::vector<double>> cells(kCells);
   for (const Sample& sample : samples_)
     cells[static_cast<std::size_t>(sample.cell)].push_back(sample.dv - late * sample.velocity);
-  cv::Mat map(kRows, kColumns, CV_64F, cv::Scalar(std::numeric_limits<double>::quiet_NaN()));
+  cv::Mat map(RowDelay::kRows, RowDelay::kColumns, CV_64F, cv::Scalar(std::numeric_limits<double>::quiet_NaN()));
   for (std::size_t cell = 0; cell < kCells; ++cell)
     if (cells[cell].size() >= kEnough) map.at<double>(static_cast<int>(cell)) = median(cells[cell]);
   return map;
@@ -166,15 +116,14 @@ Finding RowCheck::rectification() const {
 }
 
 Finding RowCheck::sameMoment() const {
-  constexpr double kWarn = 0.002, kFail = 0.01;  // s; 2 ms is 2 cm at 10 m/s, and 0.4 px at 100 deg/s and f = 120 px
   const std::string step = "same moment";
-  const auto found = delay();
+  const auto found = delay_.estimate();
   if (!found) return {step, Verdict::kOpen, "rows hardly moved", "tilt the camera up and down"};
   const std::string what = text(1, "right image ", 1e3 * found->value, " ms later than left, +- ", 1e3 * found->sigma);
-  const double late = std::abs(compensation());
+  const double late = std::abs(found->proved());
   const std::string remedy = "trigger both cameras together, and stamp each image with its own time";
-  if (late > kFail) return {step, Verdict::kFail, what, remedy};
-  if (late > kWarn) return {step, Verdict::kWarn, what, remedy};
+  if (late > RowDelay::kFail) return {step, Verdict::kFail, what, remedy};
+  if (late > RowDelay::kWarn) return {step, Verdict::kWarn, what, remedy};
   return {step, Verdict::kOk, what, ""};
 }
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <functional>
+#include <limits>
 #include <mutex>
 #include <optional>
 #include <thread>
@@ -94,8 +95,8 @@ class Requests {
     return posted_;
   }
 
-  /// The request that holds for an item and has not been taken; `posted` as noted when that arrived.
-  std::optional<Request> take(int posted) {
+  /// The request that holds for an item and has not been taken; `posted` as noted when that arrived, or any request.
+  std::optional<Request> take(int posted = std::numeric_limits<int>::max()) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (posted < posted_) return std::nullopt;
     return std::exchange(pending_, std::nullopt);

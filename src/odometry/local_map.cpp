@@ -94,7 +94,7 @@ LocalMap::View LocalMap::view(const std::optional<Eigen::Isometry3d>& T_next_new
   return view;
 }
 
-DescribedPoints LocalMap::points() const {
+DescribedPoints LocalMap::points(int sightings) const {
   const double farthest = kFarthestDisparity / (camera_.fx * camera_.baseline);  // 1/m
   const int since = lookedForSince();
   DescribedPoints rows;
@@ -102,7 +102,7 @@ DescribedPoints LocalMap::points() const {
   rows.positions.reserve(points_.size());
   rows.descriptors.create(static_cast<int>(points_.size()), kind_.bytes, CV_8U);
   for (const Point& point : points_) {
-    if (!isLookedFor(point, since)) continue;
+    if (point.seen < sightings || !isLookedFor(point, since)) continue;
     std::copy(point.descriptor.begin(), point.descriptor.end(), rows.descriptors.ptr(rows.count()));
     const double inverse_depth = std::max(point.position.ray_and_inverse_depth.z(), farthest);
     rows.positions.push_back(point.position.scaledPointIn(newestPose()) / inverse_depth);

@@ -80,9 +80,10 @@ Reacquisition::Reacquisition(const FeatureMatcherOptions& matcher, const MotionE
 
 std::optional<Eigen::Isometry3d> Reacquisition::find(const LocalMap& map, const StereoFeatures& features,
                                                      const RigCalibration& calibration) const {
-  const DescribedPoints points = map.points();
-  const MotionEstimate motion = anywhere_.match(points, features, calibration).motion;
+  // Without a gate each point costs as much as all features; half of the points were seen once, and few of these again.
+  const MotionEstimate motion = anywhere_.match(map.points(2), features, calibration).motion;
   if (!motion.success) return std::nullopt;
+  const DescribedPoints points = map.points(1);
   const ViewMatch view = near_.match(points, features, calibration, motion.T_current_reference);
   if (!view.motion.success || !showsSamePlace(expectedPoints(points, features, view))) return std::nullopt;
   return view.motion.T_current_reference;

@@ -1,6 +1,9 @@
 #include "stereo_descriptor_vo/odometry/repeated_images.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <numeric>
+#include <utility>
 
 namespace sdvo {
 
@@ -20,6 +23,36 @@ bool RepeatedImages::areFrozen(const StereoFeatures& features,
     moved += std::hypot(now.x() - features.u[i], now.y() - features.v[i]) > kSeen;
   }
   return 2 * moved > features.count();
+}
+
+std::vector<int> RepeatedImages::newRows(const StereoFeatures& features) const {
+  constexpr int kEnough = 20;        // features of either part (chosen)
+  constexpr double kExplains = 0.9;  // ratio of the features that lie in their part (chosen); matches err at the tear
+  std::vector<int> rows(features.u.size());
+  std::iota(rows.begin(), rows.end(), 0);
+  std::vector<std::pair<float, float>> before;
+  for (std::size_t i = 0; i < features_[0].size(); ++i) before.emplace_back(features_[0][i], features_[1][i]);
+  std::sort(before.begin(), before.end());
+  std::vector<bool> repeated;
+  for (const int i : rows)
+    repeated.push_back(std::binary_search(before.begin(), before.end(), std::pair(features.u[i], features.v[i])));
+  const int count = features.count(), all_old = static_cast<int>(std::count(repeated.begin(), repeated.end(), true));
+  if (all_old < kEnough || count - all_old < kEnough) return rows;
+  std::vector<int> order = rows;
+  std::sort(order.begin(), order.end(), [&](int a, int b) { return features.v[a] < features.v[b]; });
+  std::vector<int> old{0};  // among the first so many from above
+  for (const int i : order) old.push_back(old.back() + repeated[static_cast<std::size_t>(i)]);
+  int best = 0, border = 0;
+  bool is_above = false;  // the old part
+  for (int k = 0; k <= count; ++k) {
+    const int below = k - old[k] + all_old - old[k], above = count - below;
+    if (std::max(below, above) <= best) continue;
+    best = std::max(below, above), border = k, is_above = above > below;
+  }
+  if (best < kExplains * count) return rows;
+  rows.assign(is_above ? order.begin() + border : order.begin(), is_above ? order.end() : order.begin() + border);
+  std::sort(rows.begin(), rows.end());
+  return rows;
 }
 
 void RepeatedImages::remember(const StereoFeatures& features, bool frozen) {

@@ -136,11 +136,14 @@ OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::op
   refuse(given);
   // A lens that focuses changes the camera with every pair; the pixels of one map are those of one camera.
   const bool is_refocused = state_.camera && *state_.camera != given.camera && state_.camera->isLike(given.camera);
-  const StereoFeatures converted = is_refocused ? given.seenBy(*state_.camera) : StereoFeatures();
-  const StereoFeatures& features = is_refocused ? converted : given;
-  const double dt = state_.last_stamp ? static_cast<double>(features.stamp - *state_.last_stamp) * 1e-9 : 0.0;
-  const bool continued = state_.map && state_.map->continuedBy(features);
-  const bool frozen = !state_.interrupted && isFrozen(features, dt, guess);
+  const StereoFeatures whole = is_refocused ? given.seenBy(*state_.camera) : given;
+  const std::vector<int> new_rows = state_.images.newRows(whole);
+  const bool is_torn = static_cast<int>(new_rows.size()) < whole.count();
+  const StereoFeatures taken = is_torn ? whole.select(new_rows) : whole;
+  const double dt = state_.last_stamp ? static_cast<double>(taken.stamp - *state_.last_stamp) * 1e-9 : 0.0;
+  const bool continued = state_.map && state_.map->continuedBy(taken);
+  const bool frozen = !state_.interrupted && isFrozen(taken, dt, guess);
+  const StereoFeatures features = continued && !frozen ? inStep(taken, dt, guess) : taken;
   const std::optional<MotionScene> scene = !continued || frozen ? std::nullopt
                                            : state_.interrupted ? reacquire(features)
                                                                 : std::optional(sceneOf(features, dt, guess));
@@ -151,6 +154,7 @@ OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::op
   Stopwatch stopwatch;
   begin(features, dt);
   follow(guess, dt);
+  watchShutters(taken, dt, found);
   Step step;
   if (!continued || (state_.interrupted && !found.motion.success))
     step = seed(features);
@@ -166,13 +170,16 @@ OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::op
   // The depths of its points may be those of a wrong rig.
   if (features.report.refused && step.state == TrackingState::kLost) state_.map.reset();
   state_.doubt.pass();
-  state_.images.remember(features, frozen);
+  state_.images.remember(whole, frozen);
+  if (is_torn && step.reason.empty()) step.reason = "a part of the left image repeats that of the previous pair";
   step.dt = step.T_previous_current ? static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9 : dt;
   if (step.T_previous_current) move(*step.T_previous_current);
   if (step.state == TrackingState::kTracking || step.state == TrackingState::kDegraded)
     state_.last_pose_stamp = features.stamp, state_.followed = State::Followed();
   step.time = stopwatch.lap();
-  return report(features, found, step);
+  OdometryResult result = report(features, found, step);
+  for (FeatureFlow& flow : result.flow) flow.current = new_rows[static_cast<std::size_t>(flow.current)];
+  return result;
 }
 
 void VisualOdometry::refuse(const StereoFeatures& features) const {
@@ -219,6 +226,43 @@ MotionScene VisualOdometry::sceneOf(const StereoFeatures& features, double dt,
   return scene;
 }
 
+/// The features as of one moment, if the right camera is known to be late: by the velocity that is expected, then by
+/// the one that these show.
+StereoFeatures VisualOdometry::inStep(const StereoFeatures& taken, double dt,
+                                      const std::optional<MotionGuess>& guess) const {
+  const std::optional<Vector6d>& velocity = state_.prior.velocity();
+  if (state_.right_delay.compensated() == 0.0 || !velocity || dt > options_.tracking.max_gap) return taken;
+  StereoFeatures features = state_.right_delay.inStep(taken, dt, *velocity);
+  if (state_.interrupted) return features;
+  const MotionHypothesis found = search_.find(sceneOf(features, dt, guess), largestDoubt());
+  if (!found.motion.success) return features;
+  return state_.right_delay.inStep(taken, dt,
+                                   logSE3(found.motion.T_current_reference.inverse()) / secondsSinceMap(taken));
+}
+
+/// Whether all rows of both images are of one moment, and the pairs in their order.
+void VisualOdometry::watchShutters(const StereoFeatures& taken, double dt, const MotionHypothesis& found) {
+  if (!found.motion.success || state_.interrupted || !(dt > 0.0)) return state_.right_delay.interrupt();
+  const Vector6d velocity = logSE3(found.motion.T_current_reference.inverse()) / secondsSinceMap(taken);
+  state_.readout.add(taken.camera, found.motion.T_current_reference, found.correspondences, found.motion.inliers,
+                     velocity);
+  state_.right_delay.measure(taken, dt, velocity);
+  // Of neighbours that changed places the second goes back by half of the first one's motion, which was twice too
+  // large.
+  constexpr double kAlike = 0.2;  // ratio of that (chosen)
+  if (const auto& last = state_.prior.velocity();
+      last && found.innovation > kInnovationGate && (velocity + 0.5 * *last).norm() < kAlike * last->norm())
+    state_.doubt.raise(CarriedDoubt::kCertain, "neighbouring pairs seemed to have changed places");
+  constexpr double kAnother = 0.5;  // of the interval: the right image is nearer to another pair's
+  const double known = state_.right_delay.compensated();
+  const double delay = std::abs(known) > kAnother * dt ? known : state_.right_delay.partner();
+  if (delay == 0.0) return;
+  std::ostringstream cause;
+  cause << "the right image seemed to be that of another pair, taken " << std::round(1e3 * std::abs(delay)) << " ms "
+        << (delay < 0.0 ? "earlier" : "later");
+  state_.doubt.raise(CarriedDoubt::kCertain, cause.str());
+}
+
 /// Log-odds of being misled above which a motion is doubtful.
 double VisualOdometry::largestDoubt() const {
   return logOdds(1.0 - options_.tracking.probability);
@@ -242,6 +286,8 @@ std::optional<MotionScene> VisualOdometry::reacquire(const StereoFeatures& featu
 void VisualOdometry::forgetRig() {
   state_.calibration = CalibrationFilter(options_.calibration);
   state_.right_rotation = RightCameraRotation();
+  state_.right_delay = RightCameraDelay(options_.calibration.right_delay);
+  state_.readout = RowReadout();
 }
 
 /// Takes note of the pair, whatever becomes of its motion.
@@ -564,6 +610,8 @@ OdometryResult VisualOdometry::report(const StereoFeatures& features, const Moti
     result.has_pose = true;
     result.T_origin_camera = state_.T_origin_camera;
     result.pose_covariance = state_.covariance.value();
+    const double drift = state_.right_delay.drift();
+    result.pose_covariance.topLeftCorner<3, 3>() += drift * drift * Eigen::Matrix3d::Identity();
     if (options_.planar.planar && state_.floor.isOnFloor())
       result.pose_covariance = floor()->constrained(state_.T_origin_camera, result.pose_covariance);
   }
@@ -582,6 +630,10 @@ OdometryResult VisualOdometry::report(const StereoFeatures& features, const Moti
     result.disparity_offset_sigma = sigma[0];
     result.disparity_bend_sigma = sigma[1];
   }
+  if (const auto delay = state_.right_delay.estimate())
+    result.right_delay = delay->value, result.right_delay_sigma = delay->sigma;
+  if (const auto readout = state_.readout.estimate())
+    result.readout = readout->value, result.readout_sigma = readout->sigma;
   result.right_rotation = state_.right_rotation.rotation();
   result.right_rotation_sigma = state_.right_rotation.sigma();
   return result;

@@ -110,31 +110,12 @@ StereoCamera toStereoCamera(const CameraInfo& left_info, const CameraInfo& right
   return camera;
 }
 
-std::string doubtOf(const StereoCamera& camera) {
-  // Of stereo cameras that robots carry: a lens of 20 to 150 deg, a baseline of 1 cm to 2 m.
-  constexpr double kNarrowest = 0.35, kWidest = 7.5, kShortest = 0.01, kLongest = 2.0;
-  const double width = camera.width / camera.fx;
-  std::ostringstream text;
-  if (width < kNarrowest || width > kWidest)
-    text << "fx = " << camera.fx << " px at a width of " << camera.width
-         << " px: is the focal length that of these images' size?";
-  else if (camera.baseline > kLongest)
-    text << "baseline = " << camera.baseline
-         << " m: is P[3] of the right camera_info in pixels times mm or cm? It must "
-         << "be -fx * baseline with the baseline in metres";
-  else if (camera.baseline < kShortest)
-    text << "baseline = " << 1e3 * camera.baseline << " mm: does P[3] of the right camera_info lack the factor fx? It "
-         << "must be -fx * baseline with the baseline in metres";
-  return text.str();
-}
-
 std::string whyUnrectified(const CameraInfo& left, const CameraInfo& right) {
   constexpr double kRows = 0.5;  // px, which the rig monitor sees
   for (const CameraInfo* info : {&left, &right})
     if (isWithoutDistortion(*info) && rotation(*info) * info->P[5] > kRows)
       return "D of camera_info is zero and R is not the identity: image_proc does not rectify such images, it hands "
-             "them "
-             "on; let the driver rectify, or give D a coefficient other than zero (1e-9)";
+             "them on; let the driver rectify, or give D a coefficient other than zero (1e-9)";
   return "";
 }
 

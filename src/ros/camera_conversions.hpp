@@ -13,9 +13,6 @@ namespace sdvo::ros_conversions {
 /// Throws std::invalid_argument when the cameras are uncalibrated, differ, or the baseline is not positive.
 StereoCamera toStereoCamera(const sensor_msgs::CameraInfo& left, const sensor_msgs::CameraInfo& right);
 
-/// A doubt about a camera that can be used; empty: none.
-std::string doubtOf(const StereoCamera& camera);
-
 /// Why images are most likely not rectified although camera_info is that of a rectified pair; empty: nothing speaks for
 /// it.
 std::string whyUnrectified(const sensor_msgs::CameraInfo& left, const sensor_msgs::CameraInfo& right);

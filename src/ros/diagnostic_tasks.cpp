@@ -17,7 +17,7 @@ std::string format(const char* text, double number) {
 }  // namespace
 
 InputMonitor::InputMonitor(std::string what, std::string topics, double max_silence, const RateOptions& rates)
-    : what_(std::move(what)), topics_(std::move(topics)), max_silence_(max_silence), rates_(rates) {}
+    : what_(std::move(what)), max_silence_(max_silence), rates_(rates), topics_(std::move(topics)) {}
 
 double InputMonitor::secondsSince(Clock::time_point time) {
   return std::chrono::duration<double>(Clock::now() - time).count();
@@ -27,6 +27,11 @@ void InputMonitor::note() {
   const std::lock_guard<std::mutex> lock(mutex_);
   arrivals_.push_back(Clock::now());
   while (secondsSince(arrivals_.front()) > kWindow) arrivals_.pop_front();
+}
+
+void InputMonitor::noteTopics(const std::string& topics) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  topics_ = topics;
 }
 
 void InputMonitor::noteIdle(const std::string& why) {
@@ -63,7 +68,10 @@ void InputMonitor::diagnose(WallUpdater::Status& status) {
   const std::optional<double> measured = rate();
   status.addf("rate [Hz]", "%.2f", measured.value_or(0.0));
   status.addf("expected [Hz]", "%g to %g", rates_.min_rate, rates_.max_rate);
-  status.add("topics", topics_);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status.add("topics", topics_);
+  }
   if (const auto silent = silence())
     status.summary(silent->level, silent->text);
   else if (!measured)

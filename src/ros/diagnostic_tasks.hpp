@@ -48,6 +48,8 @@ class InputMonitor {
   InputMonitor(std::string what, std::string topics, double max_silence, const RateOptions& rates);
 
   void note();
+  /// Input comes from elsewhere now.
+  void noteTopics(const std::string& topics);
   /// While nobody wants input, silence is no fault; `why`, such as "paused", is empty otherwise. Begins anew.
   void noteIdle(const std::string& why);
 
@@ -67,11 +69,11 @@ class InputMonitor {
   static double secondsSince(Clock::time_point time);
   std::optional<double> rate() const;
 
-  const std::string what_, topics_;
+  const std::string what_;
   const double max_silence_;
   const RateOptions rates_;
   mutable std::mutex mutex_;
-  std::string idle_;
+  std::string topics_, idle_;
   Clock::time_point begin_ = Clock::now();
   std::deque<Clock::time_point> arrivals_;  ///< of the last seconds, and the newest one
 };

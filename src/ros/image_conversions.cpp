@@ -54,6 +54,12 @@ void sample(const cv::Mat& pixels, std::vector<double>& counts) {
       counts.push_back(pixels.at<std::uint16_t>(row, column));
 }
 
+/// Whether a count is the largest of a sensor of 8 and more bits, whichever bits of the pixel it fills: 0x0fff, 0xfff0.
+bool isFullScale(double count) {
+  const auto bits = static_cast<std::uint32_t>(count), lowest = bits & (~bits + 1u);
+  return bits > 0 && bits / lowest >= 255 && (bits & (bits + lowest)) == 0;
+}
+
 }  // namespace
 
 bool GreyRangeTracker::add(const sensor_msgs::Image& left, const sensor_msgs::Image& right) {
@@ -65,7 +71,7 @@ bool GreyRangeTracker::add(const sensor_msgs::Image& left, const sensor_msgs::Im
   if (left.encoding != encodings::MONO16 || right.encoding != encodings::MONO16) return false;
   std::vector<double> counts;
   for (const sensor_msgs::Image* image : {&left, &right}) sample(pixelsOf16Bits(*image), counts);
-  last_.push_back({quantile(counts, kShare), quantile(counts, 1.0 - kShare)});
+  last_.push_back({quantile(counts, kShare), quantile(counts, 1.0 - kShare), quantile(counts, 1.0)});
   if (last_.size() > kPairs) last_.pop_front();
   const auto median = [this](std::size_t end) {
     std::vector<double> values;
@@ -76,7 +82,9 @@ bool GreyRangeTracker::add(const sensor_msgs::Image& left, const sensor_msgs::Im
   if (last_.size() > 1 && dark >= range_.black && bright <= range_.white &&
       range_.white - range_.black <= kMostUnused * spread)
     return false;
-  const double white = std::min(dark + (1.0 + kMargin) * spread, 65535.0);
+  // What is saturated is white, so that over-exposure is seen as such.
+  const double white =
+      bright >= median(2) && isFullScale(bright) ? bright : std::min(dark + (1.0 + kMargin) * spread, 65535.0);
   range_ = {std::max(0.0, std::min(dark - kMargin * spread, white - kLeastSpread)), white};
   return true;
 }

@@ -29,7 +29,8 @@ class GreyRangeTracker {
   const GreyRange& range() const { return range_; }
 
  private:
-  std::deque<std::array<double, 2>> last_;  ///< counts below and above which 2 % of a pair's pixels lie
+  std::deque<std::array<double, 3>>
+      last_;  ///< counts below and above which 2 % of a pair's pixels lie, and the largest
   GreyRange range_;
 };
 

@@ -74,6 +74,7 @@ void OdometryPublisher::publishMap(const std::vector<Eigen::Vector3d>& points, c
   const auto cloud =
       boost::make_shared<sensor_msgs::PointCloud2>(ros_conversions::toPointCloud(points, T_origin_camera.inverse()));
   cloud->header = header;
+  cloud->header.frame_id = ros_conversions::cleanFrameId(header.frame_id);
   map_publisher_.publish(cloud);
 }
 

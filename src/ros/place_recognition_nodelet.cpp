@@ -76,8 +76,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
     ros::NodeHandle other_nh = slow_callbacks_.serve(getNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
-      NODELET_WARN_STREAM("parameter " << name
-                                       << " is unknown and has no effect: misspelt? docs/parameters.md has all names");
+      NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect: misspelt? See docs/parameters.md");
     const PlaceOutputOptions& output = options_.output;
     if (output.opencv_threads >= 0) cv::setNumThreads(output.opencv_threads);
     robot_ = output.robot_name.empty() ? nh_.getNamespace() : output.robot_name;
@@ -173,15 +172,16 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   std::optional<Eigen::Isometry3d> findExtrinsic(const OdometryPair& pair) {
     const std::string base_frame = ros_conversions::cleanFrameId(pair.odometry->child_frame_id);
     const std::string camera_frame = ros_conversions::cleanFrameId(pair.features->header.frame_id);
-    // A new epoch may follow a reset, with which the odometry takes the mount anew.
-    const std::pair<ros::Time, std::uint32_t> of{pair.info->session, pair.info->epoch};
-    if (std::exchange(mount_of_, of) != of) mount_->forget();
+    // As the odometry does: at a reset, where the distance travelled falls. Other epochs keep the mount.
+    const stereo_descriptor_vo::VoInfo::ConstPtr before = std::exchange(mount_of_, pair.info);
+    const double since_reset = pair.info->distance;
+    if (before && (before->session != pair.info->session ||
+                   (before->epoch != pair.info->epoch && (since_reset <= 0.0 || since_reset < before->distance))))
+      mount_->forget();
     std::string problem;
     const std::optional<Eigen::Isometry3d> found = mount_->find(base_frame, camera_frame, problem);
     if (!found && throttle_.allows("extrinsic"))
-      NODELET_ERROR_STREAM("no transform from camera frame '" << camera_frame << "' to base frame '" << base_frame
-                                                              << "' on TF, no places without it: publish it (static). "
-                                                              << problem);
+      NODELET_ERROR_STREAM(transforms_->explainMissing(base_frame, camera_frame) << ". " << problem);
     return found;
   }
 
@@ -374,8 +374,8 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   bool was_located_ = false;               // … and map -> odom is published since then
   std::atomic<int> generation_{0};         // sessions that a service began
   // Only the observer's thread touches these.
-  std::uint64_t refused_ = 0;                     // pairs
-  std::pair<ros::Time, std::uint32_t> mount_of_;  // session and epoch
+  std::uint64_t refused_ = 0;  // pairs
+  stereo_descriptor_vo::VoInfo::ConstPtr mount_of_;
 
   std::unique_ptr<Worker<Arrived>> observer_;
   std::unique_ptr<Worker<Job>> optimiser_;

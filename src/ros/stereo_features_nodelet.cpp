@@ -4,12 +4,14 @@
 #include <boost/make_shared.hpp>
 #include <cmath>
 #include <memory>
-#include <mutex>
 #include <opencv2/core/utility.hpp>
+#include <optional>
 #include <pluginlib/class_list_macros.hpp>
 #include <stdexcept>
 #include <utility>
 
+#include "../check/calibration_check.hpp"
+#include "../check/emitter_check.hpp"
 #include "../common/stamp_filter.hpp"
 #include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
@@ -74,8 +76,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
     ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
-      NODELET_WARN_STREAM("parameter " << name
-                                       << " is unknown and has no effect: misspelt? docs/parameters.md has all names");
+      NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect: misspelt? See docs/parameters.md");
     transport_ = std::make_unique<StereoImageTransport>(private_nh);
     extractor_ = std::make_unique<FeatureExtractor>(options_.extractor);
     pace_ = Pace(options_.input.max_rate);
@@ -95,7 +96,8 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
 
     reconfigured_ = options_.extractor;
     reconfigure_server_ = std::make_unique<ReconfigureServer>(
-        slow_nh, listOptions(reconfigured_), [this] { onReconfigure(); }, listOptions(defaults));
+        slow_nh, listOptions(reconfigured_),
+        [this] { extractors_.post(std::make_unique<FeatureExtractor>(reconfigured_)); }, listOptions(defaults));
 
     // Called once the callbacks' thread has started, when publisher_ is there.
     const ros::SubscriberStatusCallback on_connect = [this](const ros::SingleSubscriberPublisher&) { updateInput(); };
@@ -119,11 +121,13 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     if (!camera) return;
     image_nh_ = *camera;
     NODELET_WARN_STREAM("nobody publishes " << nh_.resolveName("left/image_rect") << ": the only stereo camera in "
-                                            << nh_.getNamespace() << " is taken, with "
-                                            << image_nh_.resolveName("left/image_rect") << " and "
-                                            << image_nh_.resolveName("right/image_rect"));
+                                            << nh_.getNamespace() << " is taken, with " << imageTopics());
     input_.reset();
     updateInput();
+  }
+
+  std::string imageTopics() const {
+    return image_nh_.resolveName("left/image_rect") + " and " + image_nh_.resolveName("right/image_rect");
   }
 
   void updateInput() try {
@@ -135,6 +139,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
       input_ = std::make_unique<StereoInput>(
           image_nh_, *transport_, options_.input, [this](const StereoPairMessages& pair) { onPair(pair); },
           [this](const std::string& topic, const std::string& why) { onRefusal(topic, why); });
+      diagnostics_->input().noteTopics(imageTopics());
       mask_subscriber_ =
           nh_.subscribe<sensor_msgs::Image>("left/mask", 1, [this](const sensor_msgs::ImageConstPtr& m) { onMask(m); });
       diagnostics_->input().noteIdle("");
@@ -150,16 +155,9 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
 
   /// The newest mask holds, whatever its stamp, until the next one comes.
   void onMask(const sensor_msgs::ImageConstPtr& message) try {
-    const cv::Mat mask = ros_conversions::toGrey(message).clone();
-    const std::lock_guard<std::mutex> lock(pending_mutex_);
-    mask_ = mask;
+    masks_.post(ros_conversions::toGrey(message).clone());
   } catch (const std::exception& e) {
     onRefusal(nh_.resolveName("left/mask"), e.what());
-  }
-
-  cv::Mat mask() {
-    const std::lock_guard<std::mutex> lock(pending_mutex_);
-    return mask_;
   }
 
   void onPair(const StereoPairMessages& pair) {
@@ -176,23 +174,11 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
                                          << " so far); if this goes on, check the driver's stamps");
   }
 
-  /// In a ROS callback; the worker takes the new extractor over before its next pair. Throws when the options do not go
-  /// together.
-  void onReconfigure() {
-    auto extractor = std::make_unique<FeatureExtractor>(reconfigured_);
-    const std::lock_guard<std::mutex> lock(pending_mutex_);
-    pending_ = std::move(extractor);
-  }
-
   void takeOverOptions() {
-    std::unique_ptr<FeatureExtractor> pending;
-    {
-      const std::lock_guard<std::mutex> lock(pending_mutex_);
-      pending.swap(pending_);
-    }
+    auto pending = extractors_.take();
     if (!pending) return;
-    const bool same_rows = describeAlike(extractor_->options(), pending->options());
-    extractor_ = std::move(pending);
+    const bool same_rows = describeAlike(extractor_->options(), (*pending)->options());
+    extractor_ = *std::move(pending);
     if (same_rows) return;
     ++stream_epoch_;  // rows of another kind or size do not continue the old ones
     NODELET_INFO("reconfigured: descriptors of another kind or size, so a new stream begins (epoch + 1)");
@@ -210,16 +196,24 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
       NODELET_WARN_STREAM("the stamps of the images jumped back to " << stamp << ": a new stream begins (epoch + 1)");
       ++stream_epoch_;
     }
+    if (const auto mask = masks_.take()) mask_ = *mask;
     const DecodedPair decoded = decoder_.decode(pair);
     if (decoded.new_range && throttle_.allows("mono16"))
       NODELET_INFO_STREAM("mono16 images: " << decoder_.greyRange().black << " to " << decoder_.greyRange().white
                                             << " are black to white");
     StereoFeatures features =
-        extractor_->extract(decoded.camera, decoded.left, decoded.right, nanoseconds(stamp), mask());
+        extractor_->extract(decoded.camera, decoded.left, decoded.right, nanoseconds(stamp), mask_);
     // Only now: a calibration that does not fit the images was refused and is no new stream.
     const std::string unrectified = ros_conversions::whyUnrectified(*pair.left_info, *pair.right_info);
-    noteCamera(decoded.camera, unrectified);
+    noteCamera(decoded.camera, pair.left_info->distortion_model, unrectified);
+    if (emitter_.judge().verdict == Verdict::kOpen) {  // until the camera has moved enough
+      emitter_.add(decoded.left);
+      warnOf(emitter_.judge());
+    }
     if (features.report.refused && !unrectified.empty()) features.report.status = unrectified;
+    if (!first_ || first_->data != pair.left_image->data) first_ = pair.left_image;
+    if (features.report.status.empty() && secondsBetween(first_->header.stamp, stamp) > kRepeats)
+      features.report.status = "the left images repeat bit by bit: is the driver frozen? A simulated one needs noise";
 
     diagnostics_->note(features);
     reportRig(features, stamp);
@@ -237,15 +231,19 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
                                       << passed.item.left_image->header.frame_id << " skipped: " << e.what());
   }
 
-  void noteCamera(const StereoCamera& camera, const std::string& unrectified) {
+  void noteCamera(const StereoCamera& camera, const std::string& lens, const std::string& unrectified) {
     const PairDecoder::Change change = decoder_.accept(camera);
     if (change == PairDecoder::Change::kNone) return;
-    for (const std::string& doubt : {ros_conversions::doubtOf(camera), unrectified})
-      if (!doubt.empty()) NODELET_WARN_STREAM("camera_info: " << doubt);
+    warnOf(checkCalibration(camera, lens, unrectified));
     if (change == PairDecoder::Change::kFirst) return;
     ++stream_epoch_;
     if (throttle_.allows("camera_info"))
       NODELET_WARN_STREAM("camera_info changed: a new stream begins (epoch + 1; " << stream_epoch_ << " so far)");
+  }
+
+  void warnOf(const Finding& finding) {
+    if (finding.verdict == Verdict::kWarn || finding.verdict == Verdict::kFail)
+      NODELET_WARN_STREAM(finding.step << ": " << finding.what << ": " << finding.remedy);
   }
 
   /// What the rig monitor says, when it says something else than before. A pair without features (dark) says nothing.
@@ -259,6 +257,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
       NODELET_WARN_STREAM("rows of left and right agree again: pairs from " << stamp << " on are used");
   }
 
+  static constexpr double kRepeats = 1.0;         // s (chosen): no real camera's images are equal for so long
   static constexpr double kSilencePeriod = 10.0;  // s between explanations why nothing comes
   static constexpr int kPublishQueue = 10;
   static constexpr const char* kNobodyListens = "nobody listens to stereo_features";
@@ -273,9 +272,8 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   std::atomic<bool> has_pairs_{false};
   std::unique_ptr<ImageDiagnostics> diagnostics_;
 
-  std::mutex pending_mutex_;
-  std::unique_ptr<FeatureExtractor> pending_;
-  cv::Mat mask_;  // of the topic; empty: none has come
+  Requests<std::unique_ptr<FeatureExtractor>> extractors_;
+  Requests<cv::Mat> masks_;
   std::unique_ptr<ReconfigureServer> reconfigure_server_;
 
   PairFilter filter_;  // only the input's callback touches it, and the next
@@ -285,6 +283,9 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   // Only the worker's thread touches these.
   std::unique_ptr<FeatureExtractor> extractor_;
   PairDecoder decoder_;
+  sensor_msgs::ImageConstPtr first_;  // of the newest left images that are equal
+  cv::Mat mask_;                      // of the topic; empty: none has come
+  EmitterCheck emitter_;
   int jumps_ = 0;  // back, of the stamps
   std::uint32_t stream_epoch_ = 0;
   bool rig_refused_ = false;  // as reported last

@@ -5,6 +5,7 @@
 #include <ros/time.h>
 #include <tf2_eigen/tf2_eigen.h>
 
+#include <algorithm>
 #include <cmath>
 #include <exception>
 #include <utility>
@@ -83,14 +84,27 @@ void RobotTransforms::watch(const geometry_msgs::TransformStamped& transform, co
     warn_(contention + ": a cycle; nothing can be looked up on TF. Swap frames, or set publish_tf to false here");
 }
 
+/// From the parent on.
+std::vector<std::string> RobotTransforms::ancestors(const std::string& frame) const {
+  constexpr std::size_t kLongestChain = 1000;  // of tf2
+  std::vector<std::string> found;
+  std::string parent;
+  while (found.size() < kLongestChain && buffer_._getParent(found.empty() ? frame : found.back(), ros::Time(0), parent))
+    found.push_back(parent);
+  return found;
+}
+
 bool RobotTransforms::hasAncestor(const std::string& frame, const std::string& ancestor) const {
-  constexpr int kLongestChain = 1000;  // of tf2
-  std::string at = frame, parent;
-  for (int i = 0; i < kLongestChain && buffer_._getParent(at, ros::Time(0), parent); ++i) {
-    if (cleanFrameId(parent) == ancestor) return true;
-    at = parent;
-  }
-  return false;
+  const std::vector<std::string> all = ancestors(frame);
+  return std::any_of(all.begin(), all.end(), [&](const auto& each) { return cleanFrameId(each) == ancestor; });
+}
+
+std::string RobotTransforms::explainMissing(const std::string& base_frame, const std::string& camera_frame) const {
+  const std::vector<std::string> above = ancestors(camera_frame);
+  const std::string root = above.empty() ? camera_frame : cleanFrameId(above.back());
+  return "no transform from camera frame '" + camera_frame + "' to base frame '" + base_frame + "' on TF: publish " +
+         base_frame + " -> " + root + " (static; `mount` of the camera's launch file), or set base_frame_id" +
+         (above.empty() ? "" : " to '" + root + "', where TF has the camera");
 }
 
 std::optional<Eigen::Isometry3d> CameraMount::find(const std::string& base_frame, const std::string& camera_frame,

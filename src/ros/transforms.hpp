@@ -13,6 +13,7 @@
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "frames.hpp"
 
@@ -35,6 +36,9 @@ class RobotTransforms {
   std::optional<Eigen::Isometry3d> find(const std::string& parent, const std::string& child,
                                         std::string& problem) const;
 
+  /// Why there is none, and what to publish.
+  std::string explainMissing(const std::string& base_frame, const std::string& camera_frame) const;
+
   /// T_child(from)_child(to), as `fixed` has it: how a frame moved between two times.
   std::optional<Eigen::Isometry3d> findMotion(const std::string& fixed, const std::string& child, const ros::Time& from,
                                               const ros::Time& to, std::string& problem) const;
@@ -44,6 +48,7 @@ class RobotTransforms {
 
   void receive(const Event& event, bool is_static);
   void watch(const geometry_msgs::TransformStamped& transform, const std::string& publisher);
+  std::vector<std::string> ancestors(const std::string& frame) const;
   bool hasAncestor(const std::string& frame, const std::string& ancestor) const;
 
   std::optional<ros_conversions::OdometryFrames> ours_;

@@ -78,8 +78,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
     ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
-      NODELET_WARN_STREAM("parameter " << name
-                                       << " is unknown and has no effect: misspelt? docs/parameters.md has all names");
+      NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect: misspelt? See docs/parameters.md");
     if (options_.output.use_imu && !options_.output.guess_frame_id.empty())
       throw std::invalid_argument("use_imu and guess_frame_id exclude each other: set one of them");
     T_odom_start_ = ros_conversions::toPose(options_.output.initial_pose);
@@ -108,7 +107,12 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     VisualOdometryOptions defaults;
     reconfigured_ = options_.odometry;
     reconfigure_server_ = std::make_unique<ReconfigureServer>(
-        slow_nh, listOptions(reconfigured_), [this] { onReconfigure(); }, listOptions(defaults));
+        slow_nh, listOptions(reconfigured_),
+        [this] {
+          VisualOdometry{reconfigured_};  // throws when they do not go together
+          reconfigurations_.post(reconfigured_);
+        },
+        listOptions(defaults));
 
     if (options_.output.use_imu)
       imu_ = std::make_unique<ImuInput>(nh_, *transforms_, [this](const std::string& what) { warn(what); });
@@ -171,23 +175,6 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     throw;
   }
 
-  /// In a ROS callback; the worker takes the new options over before its next message. Throws when the options do not
-  /// go together.
-  void onReconfigure() {
-    VisualOdometry{reconfigured_};
-    const std::lock_guard<std::mutex> lock(pending_mutex_);
-    pending_ = reconfigured_;
-  }
-
-  void takeOverOptions() {
-    std::optional<VisualOdometryOptions> pending;
-    {
-      const std::lock_guard<std::mutex> lock(pending_mutex_);
-      pending.swap(pending_);
-    }
-    if (pending) odometry_->configure(*pending);
-  }
-
   /// In the worker's thread.
   void process(const FeaturesFilter::Passed& passed) try {
     const std::lock_guard<std::mutex> lock(work_mutex_);
@@ -201,7 +188,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   /// What there is to publish, but for vo_info, is.
   OdometryResult estimate(const FeaturesFilter::Passed& passed) try {
     const FeaturesMessage& message = *passed.item.message;
-    takeOverOptions();
+    if (const auto options = reconfigurations_.take()) odometry_->configure(*options);
     noteJumps(passed);
     if (resumes_.take(passed.item.resumes)) odometry_->breakStream();
     const StereoFeatures features = ros_conversions::fromMessage(passed.item.view);
@@ -238,11 +225,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     const PatchAlignmentOptions& alignment = odometry_->options().alignment;
     if (alignment.enabled && features.hasPatches() && !alignment.canAlign(features.patch_layout.side) &&
         throttle_.allows("patches"))
-      NODELET_WARN_STREAM(
-          "patches of " << features.patch_layout.side << "x" << features.patch_layout.side
-                        << " samples are too small for alignment/radius " << alignment.radius
-                        << ": no match is aligned; set descriptor/patch_side of stereo_features to at least "
-                        << 2 * (alignment.radius + 1) + 1);
+      NODELET_WARN_STREAM("patches of " << features.patch_layout.side << "x" << features.patch_layout.side
+                                        << " samples are too small for alignment/radius " << alignment.radius
+                                        << ": no match is aligned; descriptor/patch_side of stereo_features must be "
+                                        << 2 * (alignment.radius + 1) + 1 << " or more");
     odometry_->mountAt(*mount_->last());
     const OdometryResult result = odometry_->update(features, findGuess(message.header));
     processed_stamp_ = message.header.stamp;
@@ -250,14 +236,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     report(result, message.header.stamp);
     publisher_->publish(result, *mount_->last());
     if (publisher_->wantsMap() && result.has_pose)
-      publisher_->publishMap(odometry_->mapPoints(), result.T_origin_camera, cleanHeader(message));
+      publisher_->publishMap(odometry_->mapPoints(), result.T_origin_camera, message.header);
     return result;
-  }
-
-  static std_msgs::Header cleanHeader(const FeaturesMessage& message) {
-    std_msgs::Header header = message.header;
-    header.frame_id = ros_conversions::cleanFrameId(header.frame_id);
-    return header;
   }
 
   OdometryResult waitFor(const std::string& what) const {
@@ -371,7 +351,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     }
     std::string problem;
     if (const std::optional<Eigen::Isometry3d> found = mount_->find(base_frame, camera_frame, problem)) {
-      warnIfNotOptical(camera_frame, *found);
+      if (found->linear().isIdentity(1e-3))  // an optical frame looks along +z, on a robot seldom up
+        NODELET_WARN_STREAM("camera frame '" << camera_frame
+                                             << "' has the axes of the base (x forward): an optical frame "
+                                             << "(x right, z forward) was expected; name it as the images' frame_id");
       if (!camera_frame_.empty() && camera_frame_ != camera_frame)
         NODELET_WARN_STREAM("the images' frame was '" << camera_frame_ << "' and is '" << camera_frame
                                                       << "' now: another camera goes on from the base's last pose "
@@ -379,21 +362,9 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
       camera_frame_ = camera_frame;
       return "";
     }
-    const std::string report = "no transform from camera frame '" + camera_frame + "' to base frame '" + base_frame +
-                               "' on TF, no odometry without it: publish it (static) or set base_frame_id";
+    const std::string report = transforms_->explainMissing(base_frame, camera_frame);
     if (throttle_.allows("extrinsic")) NODELET_ERROR_STREAM(report << ". " << problem);
     return report;
-  }
-
-  /// An optical frame looks along +z; on a robot that is horizontal more often than up or down.
-  void warnIfNotOptical(const std::string& camera_frame, const Eigen::Isometry3d& T_base_camera) {
-    if (T_base_camera.linear().isIdentity(1e-3))
-      NODELET_WARN_STREAM(
-          "camera frame '"
-          << camera_frame
-          << "' has the axes of the base (x forward): an optical frame (z forward, x "
-             "right, REP-103) was expected, the odometry will move along the wrong axes; name that frame as "
-             "frame_id of the images");
   }
 
   // The services. What they ask for has happened when they answer, and features that still wait are dropped.
@@ -485,8 +456,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   ros::NodeHandle nh_;
   Options options_;
   VisualOdometryOptions reconfigured_;  // the server's
-  std::mutex pending_mutex_;
-  std::optional<VisualOdometryOptions> pending_;
+  Requests<VisualOdometryOptions> reconfigurations_;
   std::unique_ptr<ReconfigureServer> reconfigure_server_;
   ReportThrottle throttle_;
   std::unique_ptr<RobotTransforms> transforms_;

@@ -3,6 +3,7 @@
 #include <exception>
 #include <opencv2/core.hpp>
 
+#include "../check/calibration_check.hpp"
 #include "../common/text.hpp"
 #include "../ros/camera_conversions.hpp"
 #include "../ros/stamps.hpp"
@@ -23,7 +24,8 @@ void CameraCheck::add(const StereoPairMessages& pair) try {
   decoder_.accept(decoded.camera);
   last_stamp_ = stamp;
   camera_ = decoded.camera;
-  model_ = pair.left_info->distortion_model;
+  lens_ = pair.left_info->distortion_model;
+  unrectified_ = ros_conversions::whyUnrectified(*pair.left_info, *pair.right_info);
   ++used_;
   if (features.report.refused) {
     ++refused_;
@@ -55,6 +57,7 @@ std::vector<Finding> CameraCheck::findings(const Finding& topics, const Finding&
   append(calibration());
   append(images_.exposure(thresholds_.min_intensity, thresholds_.max_intensity));
   append(rows_.sameMoment());
+  append(odometry_.shutter());
   append(rows_.rectification());
   append(rig());
   append(images_.texture(thresholds_.min_corners, options_.stereo_features.rig_monitor.suspicious_share));
@@ -73,11 +76,7 @@ Finding CameraCheck::calibration() const {
     return {step, used_ == 0 && unusable_ == 0 ? Verdict::kOpen : Verdict::kFail,
             problem_.empty() ? "no pairs" : problem_,
             unusable_ > 0 ? "see docs/cameras.md, 'What a wrong camera_info looks like'" : ""};
-  const std::string what = text(1, camera_.width, "x", camera_.height, ", f ", camera_.fx, " px, baseline ",
-                                1e3 * camera_.baseline, " mm, ", model_.empty() ? "no lens model" : model_);
-  const std::string doubt = ros_conversions::doubtOf(camera_);
-  if (!doubt.empty()) return {step, Verdict::kWarn, what, doubt};
-  return {step, Verdict::kOk, what, ""};
+  return checkCalibration(camera_, lens_, unrectified_);
 }
 
 Finding CameraCheck::rig() const {

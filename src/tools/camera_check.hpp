@@ -48,7 +48,7 @@ class CameraCheck {
   OdometryCheck odometry_;
   std::int64_t last_stamp_ = 0;  ///< ns
   int used_ = 0, unusable_ = 0, refused_ = 0;
-  std::string problem_, refusal_, model_;
+  std::string problem_, refusal_, lens_, unrectified_;
   StereoCamera camera_;
   cv::Mat picture_;
 };

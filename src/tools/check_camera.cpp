@@ -13,10 +13,10 @@
 #include <string>
 #include <vector>
 
-#include "../check/check_page.hpp"
 #include "../common/worker.hpp"
 #include "camera_check.hpp"
 #include "camera_input.hpp"
+#include "check_page.hpp"
 #include "run_tool.hpp"
 #include "stereo_messages.hpp"
 

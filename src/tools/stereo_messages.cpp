@@ -9,6 +9,9 @@
 #include <cstdint>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
+#include <vector>
+
+#include "../ros/camera_finder.hpp"
 
 namespace sdvo {
 namespace {
@@ -59,6 +62,19 @@ StereoTopics StereoNames::topics() const {
 
 StereoTopics topicsIn(const rosbag::Bag& bag, const StereoNames& names) {
   StereoTopics topics = names.topics();
+  ros::master::V_TopicInfo recorded;
+  rosbag::View all(bag);
+  for (const rosbag::ConnectionInfo* connection : all.getConnections()) {
+    const bool is_compressed = connection->datatype == "sensor_msgs/CompressedImage";
+    recorded.emplace_back(connection->topic.substr(0, is_compressed ? connection->topic.rfind('/') : std::string::npos),
+                          is_compressed ? "sensor_msgs/Image" : connection->datatype);
+  }
+  const bool is_there =
+      std::any_of(recorded.begin(), recorded.end(), [&](const auto& t) { return t.name == topics[0]; });
+  const std::vector<ros::M_string> cameras = findStereoCameras("/", recorded);
+  if (!is_there && topics == StereoNames().topics() && cameras.size() == 1)
+    topics = {cameras[0].at("left/image_rect"), cameras[0].at("right/image_rect"), cameras[0].at("left/camera_info"),
+              cameras[0].at("right/camera_info")};
   const auto has = [&bag](const std::string& topic) { return rosbag::View(bag, rosbag::TopicQuery(topic)).size() > 0; };
   for (const std::size_t image : {0u, 1u})
     if (!has(topics[image]) && has(topics[image] + "/compressed")) topics[image] += "/compressed";

@@ -24,7 +24,8 @@ struct StereoNames {
   StereoTopics topics() const;
 };
 
-/// The topics as a bag has them: …/compressed where an image is recorded in that form alone.
+/// The topics as a bag has them: …/compressed where an image is recorded in that form alone. Where it has none of the
+/// usual names, those of its only stereo camera.
 StereoTopics topicsIn(const rosbag::Bag& bag, const StereoNames& names);
 
 /// A message of one of the topics: an image or a calibration.

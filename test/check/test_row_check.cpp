@@ -61,13 +61,13 @@ TEST(RowCheck, MapsTheRowsOfABadRectificationWithoutBlamingTheMoment) {
   EXPECT_EQ(check.rectification().verdict, Verdict::kFail) << check.rectification().what;
   EXPECT_EQ(check.sameMoment().verdict, Verdict::kOk) << check.sameMoment().what;
   const cv::Mat map = check.map();
-  ASSERT_EQ(map.size(), cv::Size(RowCheck::kColumns, RowCheck::kRows));
-  const double width = static_cast<double>(kSize.width) / RowCheck::kColumns;
-  const double height = static_cast<double>(kSize.height) / RowCheck::kRows;
+  ASSERT_EQ(map.size(), cv::Size(RowDelay::kColumns, RowDelay::kRows));
+  const double width = static_cast<double>(kSize.width) / RowDelay::kColumns;
+  const double height = static_cast<double>(kSize.height) / RowDelay::kRows;
   // Corners lie anywhere in their part, 27 px to either side of its middle and as far above and below; half of that is
   // more than their median errs. The view nods by 12 px.
-  for (int row = 0; row < RowCheck::kRows; ++row)
-    for (int column = 1; column < RowCheck::kColumns - 1; ++column)
+  for (int row = 0; row < RowDelay::kRows; ++row)
+    for (int column = 1; column < RowDelay::kColumns - 1; ++column)
       EXPECT_NEAR(map.at<double>(row, column), tilted((column + 0.5) * width - kDisparity, (row + 0.5) * height),
                   0.01 * width + 0.005 * height)
           << row << " " << column;

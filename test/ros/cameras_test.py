@@ -50,10 +50,17 @@ class Cameras(unittest.TestCase):
             arguments['mount'] = '0 0 0 0 0 0'
         if habits.raw:
             arguments['left_frame_id'] = frames[0]
+        if habits.emitter == 'on_off':
+            arguments['emitter_on_off'] = 'true'
         pipeline = Pipeline('/' + namespace, habits.launch, **arguments)
         for closeable in collectors + [self.rosout, pipeline]:
             self.addCleanup(closeable.close)
         topics = self.driver.topics()
+        if habits.emitter == 'on_off':
+            left, unlit = self.driver.infos[0].resolved_name, '/%s/infra1/unlit/camera_info' % namespace
+            self.assertTrue(wait_until(lambda: links('/%s/infra1/unlit_camera_info' % namespace) >= {
+                ('in', left), ('in', self.driver.metadata.resolved_name), ('out', unlit, pipeline.manager)}, 60))
+            topics = [unlit if topic == left else topic for topic in topics]
         if habits.raw:
             topics += ['/%s/%s/%s' % (namespace, side, what) for side in habits.sides for what in ('image_mono', 'image_rect')]
         needed = {('in', topic) for topic in topics + ['/tf_static']}
@@ -78,6 +85,26 @@ class Cameras(unittest.TestCase):
 
     def test_realsense(self):
         self.drive(fake_driver.REALSENSE)
+
+    def test_pairs_that_the_projector_lights_are_left_out(self):
+        self.start(dataclasses.replace(fake_driver.REALSENSE, emitter='on_off'))
+        stamps = []
+        for i in range(PAIRS):
+            stamps.append(self.driver.publish(i))
+            self.assertTrue(wait_until(lambda: self.info.has(stamps[i - i % 2])), self.rosout.errors)
+        self.assertEqual([info.header.stamp for info in self.info], stamps[::2])
+        self.assertEqual({info.state for info in self.info}, {'TRACKING'})
+        self.assertTrue(wait_until(lambda: self.odometry.has(stamps[4])))
+        self.assertAlmostEqual(self.odometry[-1].pose.pose.position.x, 4.0, delta=0.1)
+        self.assertFalse(self.rosout.warned('emitter'), self.rosout.warnings)
+
+    def test_a_projector_that_is_on_is_named(self):
+        self.sequence = StereoSequence(2 * PAIRS)
+        self.start(dataclasses.replace(fake_driver.REALSENSE, emitter='on'))
+        for i in range(2 * PAIRS):
+            stamp = self.driver.publish(i)
+            self.assertTrue(wait_until(lambda: self.info.has(stamp)), self.rosout.errors)
+        self.assertTrue(wait_until(lambda: self.rosout.warned('emitter: ', 'switch the pattern projector off')), self.rosout.warnings)
 
     def test_oak(self):
         self.drive(fake_driver.OAK)

@@ -1,8 +1,10 @@
 """Drivers of stereo cameras, as their topics look: rendered pairs under each driver's names, frames and camera_info habits."""
 
 import dataclasses
+import json
 
 import cv2
+import genpy.dynamic
 import numpy as np
 import rospy
 import tf2_ros
@@ -11,6 +13,17 @@ from geometry_msgs.msg import TransformStamped
 from sensor_msgs.msg import CameraInfo, Image
 
 DEVICE_CLOCK = 1000.0  # s; far from the system's
+
+# The message of realsense2_camera 2.3, whose package need not be there.
+METADATA = 'realsense2_camera/Metadata'
+Metadata = genpy.dynamic.generate_dynamic(METADATA, """std_msgs/Header header
+string json_data
+================================================================================
+MSG: std_msgs/Header
+uint32 seq
+time stamp
+string frame_id
+""")[METADATA]
 
 # Lenses of raw images: coefficients in the order of their model.
 LENSES = {'plumb_bob': [-0.2, 0.05, 0.001, -0.001, 0.0],
@@ -32,6 +45,7 @@ class Habits:
     raw: bool = False
     reversed_pair: bool = False  # Tx in the left camera_info, not in the right one
     without_tx: bool = False
+    emitter: str = 'off'  # or 'on'; 'on_off': dots in every second pair, from the second one on, as the left side's metadata tell
 
 
 REALSENSE = Habits('realsense_d400.launch', 'camera', ('infra1', 'infra2'), 'image_rect_raw',
@@ -60,6 +74,9 @@ class FakeDriver:
         names = ['/%s/%s/' % (habits.namespace, side) for side in habits.sides]
         self.images = [rospy.Publisher(name + habits.image, Image, queue_size=100) for name in names]
         self.infos = [rospy.Publisher(name + 'camera_info', CameraInfo, queue_size=100) for name in names]
+        self.metadata = rospy.Publisher(names[0] + 'metadata', Metadata, queue_size=100) if habits.emitter == 'on_off' else None
+        dots = np.random.default_rng(1).random(sequence.pairs[0][0].shape) < 0.01
+        self.dots = 100 * cv2.dilate(np.uint8(dots), np.ones((2, 2), np.uint8))  # grey levels
         p = sequence.projections[0]
         k = np.array([[p[0], 0, p[2]], [0, p[5], p[6]], [0, 0, 1.0]])
         self.map = raw_map(habits.model, k, sequence.pairs[0][0].shape[::-1]) if habits.raw else None
@@ -95,11 +112,16 @@ class FakeDriver:
 
     def image(self, i, side):
         image = self.sequence.pairs[i][side]
+        if self.is_lit(i):
+            image = cv2.add(image, self.dots)
         if self.map is not None:
             image = cv2.remap(image, self.map, None, cv2.INTER_LINEAR)
         if self.habits.encoding == 'bgr8':
             image = cv2.cvtColor(image, cv2.COLOR_GRAY2BGR)
         return self.bridge.cv2_to_imgmsg(image, self.habits.encoding)
+
+    def is_lit(self, i):
+        return self.habits.emitter == 'on' or self.habits.emitter == 'on_off' and i % 2 == 1
 
     def publish(self, i):
         """Pair i of a 10 Hz camera; returns its stamp."""
@@ -108,8 +130,12 @@ class FakeDriver:
             for publisher, message in ((self.infos[side], self.info(side)), (self.images[side], self.image(i, side))):
                 message.header.stamp, message.header.frame_id = stamp, self.habits.frames[side]
                 publisher.publish(message)
+        if self.metadata:
+            metadata = Metadata(json_data=json.dumps({'frame_number': i, 'frame_laser_power': 150 * self.is_lit(i)}))
+            metadata.header.stamp = stamp
+            self.metadata.publish(metadata)
         return stamp
 
     def close(self):
-        for publisher in self.images + self.infos:
+        for publisher in self.images + self.infos + [self.metadata] * bool(self.metadata):
             publisher.unregister()

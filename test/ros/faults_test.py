@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """What operators meet, without a data set: a camera that moves past made-up walls, with a clock of its own beside the system's."""
 
+import copy
 import itertools
 import os
 import shutil
@@ -131,6 +132,36 @@ class Faults(PipelineCase):
         with open(path) as file:
             self.assertIn(len(file.readlines()), range(3, 20), 'no pair was answered while the file waited')
 
+    def test_a_pair_that_throws_is_answered(self):
+        """Memory for the descriptors of one message cannot be had; OpenCV throws in the midst of that pair."""
+        rows, row = 333, 128
+        library = os.path.join(self.folder(), 'full_memory.so')
+        subprocess.run(['cc', '-shared', '-fPIC', '-x', 'c', '-', '-o', library], check=True, universal_newlines=True,
+                       input='#include <errno.h>\n#include <malloc.h>\nint posix_memalign(void** p, size_t alignment, size_t size) {\n'
+                       'if (size == %d) return ENOMEM; *p = memalign(alignment, size); return *p ? 0 : ENOMEM; }\n' % (rows * row))
+        with mock.patch.dict(os.environ, LD_PRELOAD=library, OPENCV_ENABLE_MEMALIGN='1'):
+            self.start()
+        for i in range(3):
+            self.assertEqual(self.feed(i).state, 'TRACKING')
+        publisher = rospy.Publisher(self.namespace + '/stereo_features', StereoFeatures, queue_size=1)
+        self.addCleanup(publisher.unregister)
+        self.assertTrue(wait_until(lambda: self.is_sent_to_pipeline(publisher)))
+        message = copy.deepcopy(self.features[2])
+        message.header.stamp += rospy.Duration.from_sec(0.05)
+        for name in ('u', 'v', 'disparity', 'dv', 'size', 'angle', 'response'):
+            setattr(message, name, getattr(message, name)[:rows])
+        message.descriptors, message.patches = message.descriptors[:rows * row], message.patches[:rows * message.patch_side**2]
+        self.assertEqual(len(message.descriptors), rows * row)
+        publisher.publish(message)
+        self.assertTrue(wait_until(lambda: self.info.has(message.header.stamp)), self.rosout.errors)
+        answer = self.info[-1]
+        self.assertEqual((answer.state, answer.epoch), ('WAITING', self.info[0].epoch))
+        self.assertIn('features skipped', answer.reason)
+        self.assertTrue(wait_until(lambda: self.rosout.said('skipped', 'Failed to allocate')), self.rosout.errors)
+        after = self.feed(3)
+        self.assertEqual((after.state, after.epoch), ('TRACKING', answer.epoch))
+        self.assert_alive()
+
     def test_approximate_pairs_are_not_one_frame_late(self):
         self.start(approximate_sync='true', config=self.config('stereo_features: {diagnostics: {max_gap: 0.001}}\n'))
         for i in range(4):
@@ -210,6 +241,14 @@ class Faults(PipelineCase):
         self.run_for(3.0, darken)
         self.expect('stereo_features', 'exposure', warn, 'too dark')
         self.expect('stereo_features', 'features', warn)
+
+        frozen = [image.data for image in self.camera.messages(0)[0]]
+
+        def freeze(images):
+            for image, data in zip(images, frozen):
+                image.data = data
+        self.run_for(3.0, freeze)
+        self.expect('stereo_features', 'features', warn, 'the left images repeat bit by bit')
 
         def swap(images):
             images[0].data, images[1].data = images[1].data, images[0].data

@@ -21,7 +21,7 @@ import rospy
 import rostest
 import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
-from geometry_msgs.msg import Pose, TransformStamped
+from geometry_msgs.msg import Pose, PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import Odometry, Path
 from nodelet.srv import NodeletLoad, NodeletUnload
 from sensor_msgs.msg import Image, Imu, PointCloud2
@@ -32,7 +32,7 @@ from kitti_replay import (EPOCH, FRAME, PACKAGE, Camera, Collector, Pipeline, St
                           wait_until)
 from pipeline_case import PipelineCase, camera_transform
 from stereo_descriptor_vo.msg import FeatureFlow, PlaceInfo, StereoFeatures, VoInfo
-from stereo_descriptor_vo.srv import ResetToPose, SaveTrajectory
+from stereo_descriptor_vo.srv import ResetToPose, SaveTrajectory, SetPose
 
 PAIRS = 14  # 1.3 s: a jump back to the first one is no mere lateness
 
@@ -343,6 +343,69 @@ class Live(PipelineCase):
         self.assertEqual(self.odometry[1].pose.pose, place)
         self.assertGreater(self.odometry[-1].pose.pose.position.x, 11.0)
 
+    def test_set_pose(self):
+        """By the service and by the topic: the base is there at the newest pair, the map stays, `epoch` counts it."""
+        self.start()
+        path = self.keep(Collector(self.namespace + '/path', Path))
+        self.assertTrue(wait_until(lambda: self.pipeline.is_connected((path, ))))
+        place = PoseWithCovarianceStamped()
+        place.header.frame_id = 'odom'
+        place.pose.pose.position.x, place.pose.pose.position.y = 10.0, 5.0
+        q = place.pose.pose.orientation
+        q.z = q.w = np.sqrt(0.5)  # looks along y
+        place.pose.covariance = np.diag([0.04, 0.09, 0.01, 1e-4, 1e-4, 4e-4]).flatten().tolist()
+
+        def refusal(**fields):
+            wrong = copy.deepcopy(place)
+            for name, value in fields.items():
+                setattr(wrong.header if name == 'frame_id' else wrong.pose, name, value)
+            answer = self.service('set_pose', SetPose, wrong)
+            self.assertFalse(answer.success)
+            return answer.message
+        self.assertIn('no pose yet', refusal())
+        before = [self.feed(i) for i in range(3)][-1]
+        step = self.odometry[2].pose.pose.position.x - self.odometry[1].pose.pose.position.x
+        self.assertIn("'map'", refusal(frame_id='map'))
+        self.assertIn('quaternion', refusal(pose=Pose()))
+        self.assertIn('covariance', refusal(covariance=[float('nan')] * 36))
+        self.assertEqual(self.feed(3).epoch, before.epoch, 'what is refused changes nothing')
+
+        answer = self.service('set_pose', SetPose, place)
+        self.assertTrue(answer.success, answer.message)
+        after = self.feed(4)
+        self.assertEqual((after.state, after.epoch), ('TRACKING', before.epoch + 1))
+        self.assertGreater(after.distance, before.distance)
+        pose = matrix_of(self.odometry[-1].pose.pose)
+        np.testing.assert_allclose(pose[:3, 3], [10.0, 5.0 + step, 0.0], atol=0.1)
+        np.testing.assert_allclose(pose[:3, 0], [0.0, 1.0, 0.0], atol=0.01)
+        # That of the pose, turned by a step's lever: sigma of the yaw is 20 mrad.
+        covariance = np.array(self.odometry[-1].pose.covariance).reshape(6, 6)
+        np.testing.assert_allclose(np.diag(covariance)[:3], [0.04 + 4e-4 * step**2, 0.09, 0.01 + 1e-4 * step**2], rtol=0.05)
+        np.testing.assert_allclose(np.diag(covariance)[3:], [1e-4, 1e-4, 4e-4], rtol=0.05)
+
+        publisher = rospy.Publisher(self.namespace + '/visual_odometry/set_pose', PoseWithCovarianceStamped, queue_size=1)
+        self.addCleanup(publisher.unregister)
+        self.assertTrue(wait_until(lambda: self.is_sent_to_pipeline(publisher)))
+        place.pose.pose.position.x = -3.0
+        publisher.publish(place)
+        times = itertools.count(5)  # nothing orders it before a pair
+        self.assertTrue(wait_until(lambda: self.feed(4, time_of=next(times)).epoch == before.epoch + 2))
+        self.assertAlmostEqual(self.odometry[-1].pose.pose.position.x, -3.0, delta=0.1)
+        self.assertTrue(wait_until(lambda: path.has(self.info[-1].header.stamp)))
+
+        # While it is lost the next pair begins there.
+        while self.info[-1].state != 'LOST':
+            images, infos = self.camera.messages(4, time_of=next(times))
+            for image in images:
+                image.data = bytes(len(image.data))
+            self.feed_messages(images, infos)
+        place.pose.pose.position.x = 70.0
+        self.assertTrue(self.service('set_pose', SetPose, place).success)
+        after = self.feed(8, time_of=next(times))
+        self.assertEqual(after.epoch, before.epoch + 3)
+        self.assertAlmostEqual(self.odometry[-1].pose.pose.position.x, 70.0, delta=1e-6)
+        self.assert_alive()
+
     def test_pause_and_resume(self):
         self.start()
         self.features.close()
@@ -457,6 +520,12 @@ class Live(PipelineCase):
         for info in infos:
             info.P = [1.1 * p if k < 8 else p for k, p in enumerate(info.P)]
         self.assertEqual(self.feed_messages(images, infos).epoch, self.info[0].epoch + 1)
+        # A baseline in mm is named as check_camera does, with each new stream.
+        self.assertFalse(self.rosout.warned('calibration: '), self.rosout.warnings)
+        images, infos = self.camera.messages(PAIRS - 1, time_of=PAIRS)
+        infos[1].P = [1000 * p if k == 3 else p for k, p in enumerate(infos[1].P)]
+        self.feed_messages(images, infos)
+        self.assertTrue(wait_until(lambda: self.rosout.warned('calibration: ', 'in pixels times mm or cm')), self.rosout.warnings)
 
     def test_images_of_twelve_bits(self):
         self.start()
@@ -499,14 +568,16 @@ class Live(PipelineCase):
     def test_another_odometry_tells_of_a_motion_that_was_not_to_be_expected(self):
         config = tempfile.NamedTemporaryFile('w', suffix='.yaml')
         self.addCleanup(config.close)
-        config.write('visual_odometry: {guess_frame_id: wheels, publish_tf: false}\n')
+        config.write('visual_odometry: {guess_frame_id: wheels, guess_timeout: 0.5, publish_tf: false}\n')
         config.flush()
         self.start(config=config.name)
         for i in range(4):
             self.feed(i)
         self.assertTrue(wait_until(lambda: self.rosout.warned('no guess of the motion')), self.rosout.warnings)
 
-        # From one pair to the next as far as in six.
+        # From one pair to the next as far as in six. Nothing orders TF and images: the pair waits for it, once the rest after a
+        # missing guess is over.
+        time.sleep(1.0)
         tf = self.keep(tf2_ros.TransformBroadcaster())
         tf.close = tf.pub_tf.unregister
         self.assertTrue(wait_until(lambda: self.is_sent_to_pipeline(tf.pub_tf)))
@@ -586,7 +657,7 @@ class Live(PipelineCase):
         self.assertAlmostEqual(up[2], 1.0, delta=1e-3)
         for i in range(1, 4):
             self.assertEqual(self.feed(i, time_of=next(times)).state, 'TRACKING')
-        self.assertTrue(self.rosout.warned('measures no rates'), self.rosout.warnings)
+        self.assertTrue(wait_until(lambda: self.rosout.warned('measures no rates')), self.rosout.warnings)
         self.assertFalse(self.rosout.warned('no guess of the motion'), self.rosout.warnings)
 
     def test_another_image_frame_goes_on_from_the_last_pose_of_the_base(self):
@@ -602,7 +673,7 @@ class Live(PipelineCase):
         after = self.feed(5, frame='side')
         self.assertEqual((after.state, after.epoch), ('DEGRADED', before.epoch + 1))
         np.testing.assert_allclose(matrix_of(self.odometry[-1].pose.pose), there, atol=1e-6)
-        self.assertTrue(self.rosout.warned(FRAME, "is 'side' now"), self.rosout.warnings)
+        self.assertTrue(wait_until(lambda: self.rosout.warned(FRAME, "is 'side' now")), self.rosout.warnings)
         self.assertEqual(self.feed(6, frame='side').epoch, after.epoch)
         moved = np.linalg.inv(there) @ matrix_of(self.odometry[-1].pose.pose)
         self.assertLess(moved[1, 3], -0.1)
@@ -807,6 +878,7 @@ class Live(PipelineCase):
             images[1].data = self.camera.bridge.cv2_to_imgmsg(np.roll(self.sequence.pairs[i][1], 5, axis=0)).data
             info = self.feed_messages(images, infos)
             self.assertIn('px too low', info.reason)
+        self.assertTrue(wait_until(lambda: self.rosout.warned('pairs from')))
         named = [warning for warning in self.rosout.warnings if 'pairs from' in warning]
         self.assertEqual(len(named), 1, self.rosout.warnings)
         self.assertIn('are refused: right image', named[0])

@@ -372,18 +372,26 @@ class Places(unittest.TestCase):
         moved = np.linalg.norm(matrix_of(info.map_to_odom) - matrix_of(before.map_to_odom))
         self.assertTrue(moved < 1e-6 or info.loops > before.loops, '%.3f m without a loop' % moved)
 
+    def jump_to(self, stamp, robot, recognition):
+        """Returns when the nodelet has the new time: nothing orders the clock and the features."""
+        diagnosed, name = len(self.diagnostics), recognition.namespace[1:] + '/'
+        self.clock.jump_to(stamp)
+        robot.stamp = stamp
+        self.assertTrue(wait_until(lambda: any(array.header.stamp == stamp and array.status[0].name.startswith(name)
+                                               for array in list(self.diagnostics)[diagnosed:])))
+
     def the_clock_jumps_back(self, robot, recognition, file):
-        self.clock.jump_to(recognition.info[0].header.stamp + rospy.Duration.from_sec(0.5))
-        robot.stamp = self.clock.now
+        self.jump_to(recognition.info[0].header.stamp + rospy.Duration.from_sec(0.5), robot, recognition)
         info = self.drive(robot, recognition, 1)
         self.assertEqual((info.places, info.loops), (1, 0))
+        self.assertTrue(wait_until(lambda: recognition.rosout.warned('the clock jumped back')))
         self.assertEqual(len([w for w in recognition.rosout.warnings if 'the clock jumped back' in w]), 1)
         # A map that was loaded stays, and nothing else.
         answer = recognition.call('load_places', LoadPlaces, file)
         self.assertTrue(answer.success, answer.message)
         self.drive(robot, recognition, 2)
-        self.clock.jump_to(recognition.info[0].header.stamp + rospy.Duration.from_sec(0.7))  # a stamp that had no answer yet
-        robot.stamp = self.clock.now
+        # A stamp that had no answer yet.
+        self.jump_to(recognition.info[0].header.stamp + rospy.Duration.from_sec(0.7), robot, recognition)
         info = self.drive(robot, recognition, 1)
         self.assertEqual(info.places, int(answer.message.split()[0]) + 1)
         self.assertEqual(recognition.rosout.errors, [])

@@ -76,6 +76,19 @@ class RobotTransformsTest : public ::testing::Test {
   int markers_ = 0;
 };
 
+TEST_F(RobotTransformsTest, AMissingTransformIsNamedFromWhereTfHasTheCamera) {
+  start();
+  send(tf_static_, {transform("oak_base", "oak_body", ros::Time()), transform("oak_body", "oak_left", ros::Time())});
+  waitForMarker(tf_static_);
+  const std::string within = transforms_->explainMissing("base_link", "oak_left");
+  EXPECT_TRUE(contains(within, "'oak_left' to base frame 'base_link'")) << within;
+  EXPECT_TRUE(contains(within, "publish base_link -> oak_base (static")) << within;
+  EXPECT_TRUE(contains(within, "set base_frame_id to 'oak_base'")) << within;
+  const std::string alone = transforms_->explainMissing("base_link", "nowhere");
+  EXPECT_TRUE(contains(alone, "publish base_link -> nowhere (static")) << alone;
+  EXPECT_FALSE(contains(alone, "where TF has")) << alone;
+}
+
 TEST_F(RobotTransformsTest, TheCamerasPlaceIsReadOnceAndAgainWhenItIsForgotten) {
   start();
   CameraMount mount(*transforms_, 0.0);

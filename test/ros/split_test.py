@@ -78,9 +78,10 @@ class Split(unittest.TestCase):
             process.wait()
 
     def is_answered(self, i):
+        """Whether a pair gives a VoInfo and a pose, in whatever order they come."""
         images, infos = self.camera.messages(i)
         self.camera.publish(images, infos)
-        return wait_until(lambda: self.info.has(images[0].header.stamp), 5.0)
+        return wait_until(lambda: all(c.has(images[0].header.stamp) for c in (self.info, self.odometry)), 5.0)
 
     def send(self, pairs):
         """Returns when the image side is done with them."""

@@ -162,18 +162,6 @@ TEST(ToStereoCamera, AVerticalPairIsToldHowToTurn) {
   }
 }
 
-TEST(DoubtOf, ABaselineInOtherUnitsIsNamed) {
-  const auto doubt = [](double tx) { return doubtOf(toStereoCamera(cameraInfo(0.0), cameraInfo(tx))); };
-  EXPECT_EQ(doubt(-700.0 * 0.05), "");
-  EXPECT_TRUE(
-      contains(doubt(-700.0 * 50), "baseline = 50 m: is P[3] of the right camera_info in pixels times mm or cm"));
-  EXPECT_TRUE(contains(doubt(-700.0 * 5), "baseline = 5 m"));
-  EXPECT_TRUE(contains(doubt(-0.168), "baseline = 0.24 mm: does P[3] of the right camera_info lack the factor fx"));
-  sensor_msgs::CameraInfo left = cameraInfo(0.0, 200.0), right = cameraInfo(-350.0, 200.0);
-  left.width = right.width = 2000;
-  EXPECT_TRUE(contains(doubtOf(toStereoCamera(left, right)), "focal length"));
-}
-
 TEST(WhyUnrectified, ARotationWithoutDistortionIsNotTakenOutByImageProc) {
   sensor_msgs::CameraInfo left = cameraInfo(0.0), right = cameraInfo(-350.0);
   EXPECT_EQ(whyUnrectified(left, right), "");

@@ -137,6 +137,20 @@ TEST(GreyRangeTracker, NoiseIsNotStretchedToAScene) {
   EXPECT_GE(tracker.range().white - tracker.range().black, 64.0);
 }
 
+TEST(GreyRangeTracker, WhatIsSaturatedIsWhiteAndACoveredLensIsNot) {
+  for (const int full : {1023, 4095, 65535, 4080, 65472}) {
+    GreyRangeTracker tracker;
+    for (int i = 0; i < 5; ++i) tracker.add(*ramp(0, full / 2), *ramp(0, full / 2));
+    for (int i = 0; i < 5; ++i) tracker.add(*ramp(full, full), *ramp(full, full));
+    EXPECT_GT(cv::mean(toGrey(ramp(full, full), tracker.range()))[0], 250.0) << full;
+  }
+  for (const int covered : {0, 60, 64, 240}) {
+    GreyRangeTracker tracker;
+    tracker.add(*ramp(covered, covered + 1), *ramp(covered, covered + 1));
+    EXPECT_LT(cv::mean(toGrey(ramp(covered, covered + 1), tracker.range()))[0], 100.0) << covered;
+  }
+}
+
 TEST(GreyRangeTracker, NotesNothingOfOtherEncodings) {
   GreyRangeTracker tracker;
   EXPECT_FALSE(tracker.add(*image("mono8", 2, 1, {255, 255}), *image("mono8", 2, 1, {255, 255})));

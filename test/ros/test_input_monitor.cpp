@@ -41,6 +41,15 @@ TEST(InputMonitor, WarnsAtTheStartUntilItShouldHaveCome) {
   EXPECT_TRUE(contains(diagnose(monitor).text, "no pairs for"));
 }
 
+TEST(InputMonitor, NamesTheTopicsThatInputComesFromNow) {
+  InputMonitor monitor("pairs", "/left", 0.05, {});
+  monitor.noteTopics("/infra1");
+  WallUpdater::Status status;
+  monitor.diagnose(status);
+  EXPECT_TRUE(contains(status.message, "no pairs yet on /infra1")) << status.message;
+  EXPECT_EQ(status.values.back().value, "/infra1");
+}
+
 TEST(InputMonitor, SilenceIsNoFaultWhileNobodyWantsInput) {
   InputMonitor monitor("pairs", "/left", 0.05, {});
   monitor.note();

@@ -12,6 +12,7 @@ struct CalibrationOptions {
   double prior_offset = 0.0;
   double prior_bend = 0.0;
   double prior_sigma = 1.0;
+  double right_delay = 0.0;
   double trust = 0.1;
   double significance = 4.0;
   double memory = 0.5;
@@ -23,6 +24,8 @@ struct CalibrationOptions {
     list.add("prior_bend", prior_bend, {-20.0, 20.0}, "px", "the same for its change at 45 degrees from the centre");
     list.add("prior_sigma", prior_sigma, {1e-4, 10.0}, "px",
              "standard deviation of what is known beforehand, in the centre and at 45 degrees from it");
+    list.add("right_delay", right_delay, {-0.1, 0.1}, "s",
+             "time by which right images are known to be later than left ones; a significant difference is found");
     list.add("trust", trust, {0.01, 1.0}, "",
              "how far the window's own figure for its precision is believed: 1 / the factor on its standard deviation");
     list.add(

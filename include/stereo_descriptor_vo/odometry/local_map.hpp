@@ -89,8 +89,9 @@ class LocalMap {
   /// Points in the image of the newest pair, and those that a turn of `T_next_newest` brings into the next one.
   View view(const std::optional<Eigen::Isometry3d>& T_next_newest = std::nullopt) const;
 
-  /// All points still looked for, wherever they are, in the newest pair's left optical frame.
-  DescribedPoints points() const;
+  /// The points still looked for that at least so many pairs saw, wherever they are, in the newest pair's left optical
+  /// frame.
+  DescribedPoints points(int sightings) const;
 
   /// A point recognised in a pair, and where that saw it.
   struct Sighting {

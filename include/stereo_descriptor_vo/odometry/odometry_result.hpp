@@ -51,7 +51,11 @@ struct OdometryResult {
   double disparity_offset = std::numeric_limits<double>::quiet_NaN();        ///< in the image centre, px; compensated
   double disparity_offset_sigma = std::numeric_limits<double>::quiet_NaN();  ///< px
   double disparity_bend = std::numeric_limits<double>::quiet_NaN();  ///< its change at 45 degrees, px; compensated
-  double disparity_bend_sigma = std::numeric_limits<double>::quiet_NaN();                                      ///< px
+  double disparity_bend_sigma = std::numeric_limits<double>::quiet_NaN();  ///< px
+  double right_delay = std::numeric_limits<double>::quiet_NaN();           ///< of its images, s; compensated
+  double right_delay_sigma = std::numeric_limits<double>::quiet_NaN();     ///< s
+  double readout = std::numeric_limits<double>::quiet_NaN();               ///< of a rolling shutter, s; a lower bound
+  double readout_sigma = std::numeric_limits<double>::quiet_NaN();         ///< s
   Eigen::Vector3d right_rotation = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());        ///< rad
   Eigen::Vector3d right_rotation_sigma = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());  ///< rad
 };

@@ -18,6 +18,10 @@ class RepeatedImages {
   bool areFrozen(const StereoFeatures& features, const std::optional<Eigen::Isometry3d>& T_previous_current,
                  bool is_measured) const;
 
+  /// Rows of the features whose part of the image is new. From some row of a torn image on, or up to it, the left image
+  /// is still that of the pair before: features stand where they stood, to the digit.
+  std::vector<int> newRows(const StereoFeatures& features) const;
+
   /// Takes note of the pair and of what was said of it.
   void remember(const StereoFeatures& features, bool frozen);
 

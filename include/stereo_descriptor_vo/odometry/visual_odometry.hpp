@@ -21,7 +21,9 @@
 #include "stereo_descriptor_vo/odometry/reacquisition.hpp"
 #include "stereo_descriptor_vo/odometry/repeated_images.hpp"
 #include "stereo_descriptor_vo/odometry/revisit.hpp"
+#include "stereo_descriptor_vo/odometry/right_camera_delay.hpp"
 #include "stereo_descriptor_vo/odometry/right_camera_rotation.hpp"
+#include "stereo_descriptor_vo/odometry/row_readout.hpp"
 
 namespace sdvo {
 
@@ -171,6 +173,8 @@ class VisualOdometry {
   void endOutage();
   Step seed(const StereoFeatures& features);
   MotionScene sceneOf(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
+  StereoFeatures inStep(const StereoFeatures& taken, double dt, const std::optional<MotionGuess>& guess) const;
+  void watchShutters(const StereoFeatures& taken, double dt, const MotionHypothesis& found);
   double largestDoubt() const;
   double secondsSinceMap(const StereoFeatures& features) const;
   Step extendMap(const StereoFeatures& features, const MotionScene& scene, MotionHypothesis& found, double dt);
@@ -203,12 +207,15 @@ class VisualOdometry {
 
   // State between pairs; reset() is the assignment of a new one.
   struct State {
-    explicit State(const VisualOdometryOptions& options) : calibration(options.calibration), prior(options.tracking) {}
+    explicit State(const VisualOdometryOptions& options)
+        : calibration(options.calibration), right_delay(options.calibration.right_delay), prior(options.tracking) {}
 
     std::optional<LocalMap> map;
     std::optional<LocalMap> candidate;  ///< the map with the pair; between pairs only its memory matters
     CalibrationFilter calibration;
     RightCameraRotation right_rotation;
+    RightCameraDelay right_delay;
+    RowReadout readout;
     std::optional<StereoCamera> camera;
     std::optional<std::int64_t> last_stamp;
     Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "finding.hpp"
+#include "../check/finding.hpp"
 
 namespace sdvo {
 

@@ -1,0 +1,75 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <vector>
+
+namespace sdvo {
+
+/// How much later the right image of a rig is taken, from rows. A point that moves down in the right image at v' px/s
+/// is seen v' * delay px lower by a camera that is late. Errors of the rectification stay in their part of the image,
+/// and a right camera that sits lower shifts rows by a ratio of the disparity: neither counts as a delay.
+class RowDelay {
+ public:
+  static constexpr int kColumns = 6, kRows = 4;  ///< parts of the image
+  static constexpr double kSignificant = 4.0;    ///< standard deviations beyond which a delay is proved (chosen)
+  // 2 ms is 2 cm at 10 m/s, and 0.4 px at 100 deg/s and f = 120 px.
+  static constexpr double kWarn = 0.002, kFail = 0.01;  ///< s
+
+  /// A point that both views show.
+  struct Row {
+    int cell;          ///< part of the image, row by row
+    double dv;         ///< v_right - v_left, px
+    double velocity;   ///< of its row in the right image, px/s
+    double turning;    ///< instrument: the part of that which the camera's slow rotation gives; else the same, px/s
+    double disparity;  ///< px
+  };
+  static int cellOf(double u, double v, int width, int height);
+
+  struct Estimate {
+    double value, sigma;  ///< s
+
+    /// By how much it differs from `expected`, s, as far as chance does not explain that.
+    double proved(double expected = 0.0) const;
+  };
+
+  /// `memory`: ratio of the past that a pair leaves. Pairs are left out where the instrument is below `least_turning`
+  /// (px/s, RMS): errors of the velocity must be smaller.
+  RowDelay(double memory, double least_turning) : memory_(memory), least_turning_(least_turning) {}
+
+  void add(const std::vector<Row>& pair);
+
+  /// None while it is not known to 5 ms.
+  std::optional<Estimate> estimate() const;
+
+ private:
+  struct Sums {
+    double weight = 0.0;
+    Eigen::Vector3d motion = Eigen::Vector3d::Zero();  ///< of turning, velocity (px/s) and disparity (px)
+    double dv = 0.0;                                   ///< px
+    Eigen::Matrix3d square = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d product = Eigen::Vector3d::Zero();  ///< of motion and dv
+
+    void add(double weight, const Eigen::Vector3d& motion, double dv);
+    Eigen::Vector3d meanMotion() const { return motion / weight; }
+    double meanDv() const { return dv / weight; }
+  };
+  using Cells = std::array<Sums, static_cast<std::size_t>(kColumns) * kRows>;
+
+  /// The normal equations of what differs from each part's mean: velocity's factor is the delay. Its instrument is the
+  /// part that rotations give: of a translation, rows move as the depth has it, and so do errors of the rectification.
+  struct Fit {
+    Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
+    Eigen::Vector2d value = Eigen::Vector2d::Zero();
+  };
+  static Fit fit(const Cells& cells);
+
+  double memory_, least_turning_;
+  Cells cells_;
+  Eigen::Matrix2d spread_ = Eigen::Matrix2d::Zero();  ///< of the gradients of whole pairs, whose errors may be alike
+  double pairs_ = 0.0;
+};
+
+}  // namespace sdvo

@@ -1,0 +1,38 @@
+#include "calibration_check.hpp"
+
+#include <sstream>
+
+#include "../common/text.hpp"
+
+namespace sdvo {
+namespace {
+
+/// What is implausible about the camera; empty: nothing.
+std::string doubtOf(const StereoCamera& camera) {
+  // Of stereo cameras that robots carry: a lens of 20 to 150 deg, a baseline of 1 cm to 2 m.
+  constexpr double kNarrowest = 0.35, kWidest = 7.5, kShortest = 0.01, kLongest = 2.0;
+  const double width = camera.width / camera.fx;
+  std::ostringstream doubt;
+  if (width < kNarrowest || width > kWidest)
+    doubt << "fx = " << camera.fx << " px at a width of " << camera.width
+          << " px: is the focal length that of these images' size?";
+  else if (camera.baseline > kLongest)
+    doubt << "baseline = " << camera.baseline << " m: is P[3] of the right camera_info in pixels times mm or cm? It "
+          << "must be -fx * baseline with the baseline in metres";
+  else if (camera.baseline < kShortest)
+    doubt << "baseline = " << 1e3 * camera.baseline << " mm: does P[3] of the right camera_info lack the factor fx? It "
+          << "must be -fx * baseline with the baseline in metres";
+  return doubt.str();
+}
+
+}  // namespace
+
+Finding checkCalibration(const StereoCamera& camera, const std::string& lens, const std::string& unrectified) {
+  const std::string what = text(1, camera.width, "x", camera.height, ", f ", camera.fx, " px, baseline ",
+                                1e3 * camera.baseline, " mm, ", lens.empty() ? "no lens model" : lens);
+  const std::string doubt = doubtOf(camera);
+  const std::string remedy = doubt + (doubt.empty() || unrectified.empty() ? "" : "; ") + unrectified;
+  return {"calibration", remedy.empty() ? Verdict::kOk : Verdict::kWarn, what, remedy};
+}
+
+}  // namespace sdvo
