@@ -120,8 +120,9 @@ def judge(steps, estimate, pairs, drive):
     hits = [part for part in parts(list(drive.stamps)) if is_hit(part)]
     tracking, degraded = ([step for step in steps if step.state == state and step.moved] for state in ("TRACKING", "DEGRADED"))
     lost_after, back_after = [], []
-    for part in hits:
-        began, ended, over = part[FIRST] - 1e-6, part[LAST] - 1e-6, part[-1] + 1e-6
+    ends = [part[-1] for part in hits[:-1]] + [steps[-1].stamp]  # a fault may lengthen the drive
+    for part, end in zip(hits, ends):
+        began, ended, over = part[FIRST] - 1e-6, part[LAST] - 1e-6, end + 1e-6
         lost_after += [s.stamp - began for s in steps if s.state == "LOST" and began <= s.stamp < over][:1]
         back_after += ([max(s.stamp - ended, 0.0) for s in steps if s.state == "TRACKING" and ended <= s.stamp < over] +
                        [numpy.inf])[:1]

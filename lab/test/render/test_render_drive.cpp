@@ -41,6 +41,33 @@ double meanDifference(const cv::Mat& a, const cv::Mat& b) {
   return cv::mean(difference)[0];
 }
 
+TEST(RenderDrive, TheRightCameraCanBeLate) {
+  const DrivePath path = makePresetPath("straight", 4, 10.0, 1);
+  RenderOptions options = plainOptions();
+  const StereoPair before = renderOne(street(path, options), 1), after = renderOne(street(path, options), 2);
+  options.shutters.right_delay = 0.1;
+  const StereoPair late = renderOne(street(path, options), 1);
+  EXPECT_EQ(0.0, cv::norm(late.left, before.left, cv::NORM_INF));
+  EXPECT_EQ(0.0, cv::norm(late.right, after.right, cv::NORM_INF));
+}
+
+TEST(RenderDrive, ARollingShutterTakesTheFirstRowsEarlierAndTheLastOnesLater) {
+  const DrivePath path = makePresetPath("straight", 4, 10.0, 1);
+  RenderOptions options = plainOptions();
+  const StereoPair now = renderOne(street(path, options), 1), after = renderOne(street(path, options), 2);
+  options.shutters.readout = 0.1;
+  const StereoPair rolling = renderOne(street(path, options), 1);
+  const cv::Range middle(45, 49), last(86, 94);  // of 94 rows; half of the readout later are the last ones
+  EXPECT_LT(meanDifference(rolling.left.rowRange(middle), now.left.rowRange(middle)),
+            0.5 * meanDifference(after.left.rowRange(middle), now.left.rowRange(middle)));
+  EXPECT_GT(meanDifference(rolling.left.rowRange(last), now.left.rowRange(last)), 1.0);
+  options.shutters.readout = 0.0;
+  options.shutters.right_delay = 0.05;
+  const StereoPair half = renderOne(street(path, options), 1);
+  EXPECT_LT(meanDifference(rolling.right.rowRange(last), half.right.rowRange(last)),
+            0.5 * meanDifference(rolling.right.rowRange(last), now.right.rowRange(last)));
+}
+
 TEST(RenderDrive, IsTheSameForAnyNumberOfThreadsAndDiffersByTheSeed) {
   const DrivePath path = makePresetPath("straight", 10, 10.0, 1);
   RenderOptions options;
