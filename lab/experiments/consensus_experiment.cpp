@@ -107,9 +107,8 @@ void runConsensus(const ConsensusExperiment& experiment, const std::string& outp
           const Consensus consensus = findConsensus(pose_problem, options, options);
           time += static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
           // Against the inliers of the true motion: noise alone puts some correct matches beyond the threshold.
-          if (consensus.found)
-            inliers += static_cast<double>(pose_problem.inliers(consensus.T_current_reference).size()) /
-                       static_cast<double>(pose_problem.inliers(problem.T_current_reference).size());
+          inliers += static_cast<double>(pose_problem.inliers(consensus.T_current_reference).size()) /
+                     static_cast<double>(pose_problem.inliers(problem.T_current_reference).size());
           samples += consensus.iterations;
           successes +=
               isRight(problem, MotionEstimator(options).estimate(camera, problem.correspondences), pose_problem);

@@ -10,9 +10,6 @@ namespace {
 
 constexpr int kFewestCommons = 20;       // windows that must tell of what is left at a point
 constexpr int kRememberedCommons = 200;  // of which the mean is taken
-// On the variance that windows find: their kernel bends at the noise and hides that share of what points have in
-// common (WindowOptimizer.ABentKernelHidesLittleOfTheCommonErrors finds 0.165 of 0.2 px).
-constexpr double kHidden = 1.4;
 
 }  // namespace
 
@@ -39,7 +36,7 @@ CalibrationBelief CalibrationFilter::prior(int oldest_id) const {
   if (options_.enabled)
     belief.certain_information =
         informationOf(RigCalibration::Vector::Constant(options_.prior_sigma)) + past.information;
-  if (commons_ >= kFewestCommons) belief.common_sigma = std::sqrt(kHidden * std::max(common_square_, 0.0));
+  if (commons_ >= kFewestCommons) belief.common_sigma = std::sqrt(std::max(common_square_, 0.0));
   return belief;
 }
 

@@ -22,7 +22,8 @@ void refineWidely(const PoseProblem& problem, const MotionRefinementOptions& opt
 MotionEstimator::MotionEstimator(const MotionEstimatorOptions& options) : options_(checked(options)) {}
 
 MotionEstimate MotionEstimator::estimate(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
-                                         const std::optional<Eigen::Isometry3d>& expected) const {
+                                         const std::optional<Eigen::Isometry3d>& expected, double noise) const {
+  const MotionEstimatorOptions options = options_.scaled(noise);
   MotionEstimate estimate;
   const auto failed = [&](const std::string& reason) {
     estimate.success = false;
@@ -30,25 +31,25 @@ MotionEstimate MotionEstimator::estimate(const StereoCamera& camera, const std::
     return estimate;
   };
   const std::size_t count = correspondences.size();
-  if (static_cast<int>(count) < options_.min_inliers)
-    return failed("only " + std::to_string(count) + " matches, at least " + std::to_string(options_.min_inliers) +
+  if (static_cast<int>(count) < options.min_inliers)
+    return failed("only " + std::to_string(count) + " matches, at least " + std::to_string(options.min_inliers) +
                   " are needed");
 
   // Reject outliers.
-  const PoseProblem problem(camera, correspondences, options_.inlier_threshold);
-  const Consensus consensus = findConsensus(problem, options_, options_);
+  const PoseProblem problem(camera, correspondences, options.inlier_threshold);
+  const Consensus consensus = findConsensus(problem, options, options);
   estimate.iterations = consensus.iterations;
   Eigen::Isometry3d& T = estimate.T_current_reference = consensus.T_current_reference;
-  if (consensus.found) refineWidely(problem, options_, consensus.T_current_reference, T);
-  if (expected) refineWidely(problem, options_, *expected, T);
+  if (consensus.found) refineWidely(problem, options, consensus.T_current_reference, T);
+  if (expected) refineWidely(problem, options, *expected, T);
   estimate.inliers = problem.inliers(T);
-  if (static_cast<int>(estimate.inliers.size()) < options_.min_inliers)
+  if (static_cast<int>(estimate.inliers.size()) < options.min_inliers)
     return failed("only " + std::to_string(estimate.inliers.size()) + " of " + std::to_string(count) +
                   " matches agree on one motion");
 
-  const NormalEquations equations = refineMotion(camera, options_, correspondences, estimate.inliers, T);
+  const NormalEquations equations = refineMotion(camera, options, correspondences, estimate.inliers, T);
   estimate.inliers = problem.inliers(T);
-  if (static_cast<int>(estimate.inliers.size()) < options_.min_inliers)
+  if (static_cast<int>(estimate.inliers.size()) < options.min_inliers)
     return failed("only " + std::to_string(estimate.inliers.size()) + " matches agree with the refined motion");
 
   double square = 0.0;

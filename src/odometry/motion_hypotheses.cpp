@@ -15,7 +15,6 @@ namespace {
 
 constexpr double kLogOddsOfSighting = 0.75;  // that a point stands still, by each confirmed sighting (chosen)
 constexpr double kHalfLife = 2.5;            // pairs: a certain doubt then lasts for three more (chosen)
-constexpr double kSameMotion = 1.0;          // px: noise of a corner and of the map's point
 
 /// Of n observations that are correlated by this coefficient (Kish 1965, the design effect): 2.5 at most. Points of one
 /// object move together, and a view has few objects.
@@ -30,10 +29,12 @@ bool contains(const std::vector<int>& values, int value) {
 
 /// Whether two hypotheses mean one motion, for what the one explains and for what the other does: far points alone do
 /// not tell a turn from a step.
-bool areOne(const StereoCamera& camera, const MotionHypothesis& a, const MotionHypothesis& b) {
+bool areOne(const MotionScene& scene, const MotionHypothesis& a, const MotionHypothesis& b) {
+  const StereoCamera& camera = scene.features.camera;
+  const double within = scene.noise.sameMotion();
   const Eigen::Isometry3d &T_a = a.motion.T_current_reference, &T_b = b.motion.T_current_reference;
-  return agree(camera, a.correspondences, a.motion.inliers, T_a, T_b, kSameMotion) &&
-         agree(camera, b.correspondences, b.motion.inliers, T_a, T_b, kSameMotion);
+  return agree(camera, a.correspondences, a.motion.inliers, T_a, T_b, within) &&
+         agree(camera, b.correspondences, b.motion.inliers, T_a, T_b, within);
 }
 
 /// Whether a motion would do as well as another one that is so far `apart`.
@@ -95,19 +96,18 @@ struct Competitor {
 /// Each motion once.
 std::vector<Competitor> rivalsOf(const MotionScene& scene, double threshold, const MotionHypothesis& chosen,
                                  const std::vector<MotionHypothesis>& hypotheses, const std::vector<double>& weights) {
-  const StereoCamera& camera = scene.features.camera;
   const std::vector<int> own = sorted(chosen.inlierRows());
   const int left = chosen.agreement.matches - chosen.agreement.inliers;
   std::vector<Competitor> rivals;
   for (std::size_t k = 0; k < hypotheses.size(); ++k) {
     const MotionHypothesis& other = hypotheses[k];
-    if (areOne(camera, chosen, other)) continue;
+    if (areOne(scene, chosen, other)) continue;
     Competitor rival{&other, weights[k], without(sorted(other.inlierRows()), own)};
     const int rows = static_cast<int>(rival.rows.size());
     const double chance = chanceOfAgreement(threshold, other.gate);
     if (logFalseAlarms(std::max(left, rows), rows, chance) > std::log(kTailProbability)) continue;
     const auto same = std::find_if(rivals.begin(), rivals.end(),
-                                   [&](const Competitor& before) { return areOne(camera, *before.hypothesis, other); });
+                                   [&](const Competitor& before) { return areOne(scene, *before.hypothesis, other); });
     if (same == rivals.end())
       rivals.push_back(std::move(rival));
     else if (same->log_weight < rival.log_weight)
@@ -248,7 +248,7 @@ MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::v
     // Of one motion the estimate with the most inliers.
     chosen = first;
     for (const MotionHypothesis& other : hypotheses)
-      if (by_inliers(chosen, other) && areOne(scene.features.camera, first, other)) chosen = other;
+      if (by_inliers(chosen, other) && areOne(scene, first, other)) chosen = other;
     compare(scene, rivalsOf(scene, threshold, chosen, hypotheses, weights), *likeliest, chosen);
   }
   chosen.match_time = match_time, chosen.motion_time = motion_time;

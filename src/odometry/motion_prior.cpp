@@ -78,9 +78,9 @@ Matrix6d MotionPrior::unseen(double seconds) const {
 }
 
 std::string MotionPrior::tooFast(const Eigen::Isometry3d& motion, const Matrix6d& covariance, double dt) const {
-  constexpr double kSigmas = 4.0;  // normal distribution: about kTailProbability
-  const double time = dt + kSigmas * options_.stamp_sigma;
-  const auto noise = [&](int first) { return kSigmas * std::sqrt(covariance.block<3, 3>(first, first).trace()); };
+  const double sigmas = std::sqrt(noiseGate(1));
+  const double time = dt + sigmas * options_.stamp_sigma;
+  const auto noise = [&](int first) { return sigmas * std::sqrt(covariance.block<3, 3>(first, first).trace()); };
   const double distance = motion.translation().norm(), angle = logSO3(motion.linear()).norm();
   std::ostringstream words;
   if (!(distance <= options_.max_speed * time + noise(0)))

@@ -16,14 +16,6 @@
 namespace sdvo {
 namespace {
 
-constexpr double kElsewhere = 0.6;  // px, of aligned positions; up to 0.5 where nothing moved
-// Chi-square of six by which the lasting points' motion may be another one, so that it is worth to look further, and by
-// which it is. Errors of neighbouring points are not independent: up to 170 where nothing moved.
-constexpr double kPerhapsOther = 100.0, kOther = 200.0;
-// The same for each point, in variances of its residual: a part of its noise is common to many, so the sum grows with
-// their number. Measured where the sum exceeds kOther: up to 1.5 where nothing moved, 1.7 and more with faults
-// (docs/decisions.md).
-constexpr double kOtherOfOne = 1.5;
 constexpr std::size_t kFewestOfMotion = 20;  // points that tell a motion of their own from noise (chosen)
 
 }  // namespace
@@ -37,7 +29,6 @@ MotionSearch::MotionSearch(const FeatureMatcherOptions& matcher, const MotionEst
       estimator_(motion) {}
 
 MotionHypothesis MotionSearch::find(const MotionScene& scene, double max_doubt) const {
-  const StereoCamera& camera = scene.features.camera;
   Stopwatch stopwatch;
   const std::optional<Eigen::Isometry3d>& expected = scene.guess ? scene.guess : scene.T_current_reference;
   const ViewPtr view = std::make_shared<const LocalMap::View>(scene.map.view(expected));
@@ -46,14 +37,13 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene, double max_doubt) 
   found.match_time += view_time;
   for (bool is_chosen = false;; is_chosen = true) {
     if (is_chosen)
-      found = chooseMotion(scene, motion_options_.inlier_threshold, compete(scene, view, std::move(found)));
+      found = chooseMotion(scene, options(scene).inlier_threshold, compete(scene, view, std::move(found)));
     else if (scene.is_doubted || !isBeyondDoubt(scene, found, max_doubt))
       continue;
     if (!found.motion.success) return found;
     stopwatch.lap();
     Alignment aligned = align(scene, found);
-    const std::optional<Eigen::Isometry3d> T_lasting =
-        motionOfLasting(camera, found, aligned, is_chosen ? kOther : kPerhapsOther);
+    const std::optional<Eigen::Isometry3d> T_lasting = motionOfLasting(scene, found, aligned);
     found.motion_time += stopwatch.lap();
     if (T_lasting && !is_chosen) continue;
     found.motion.T_current_reference = aligned.T_current_reference;
@@ -95,8 +85,7 @@ std::vector<MotionHypothesis> MotionSearch::compete(const MotionScene& scene, co
 /// Neither prior nor lasting points contradict, the majority agrees with the motion, and lasting points that lack more
 /// than usual would be no serious rival even if they moved together.
 bool MotionSearch::isBeyondDoubt(const MotionScene& scene, const MotionHypothesis& found, double max_doubt) const {
-  if (!found.motion.success || found.innovation > kInnovationGate || logOddsMisled(scene, found) > max_doubt)
-    return false;
+  if (!found.motion.success || found.innovation > noiseGate(6) || logOddsMisled(scene, found) > max_doubt) return false;
   int all = 0, own = 0;
   for (int i = 0; i < static_cast<int>(found.matches.size()); ++i) all += found.sightingsOf(i);
   for (const int i : found.motion.inliers) own += found.sightingsOf(i);
@@ -156,7 +145,7 @@ MotionHypothesis MotionSearch::search(const FeatureMatcher& matcher, const Motio
   found.matches = matcher.match(view->rows, scene.features, T_current_reference);
   found.match_time = stopwatch.lap();
   found.correspondences = correspond(view->rows, scene.features, found.matches, scene.calibration);
-  found.motion = estimator_.estimate(camera, found.correspondences, T_current_reference);
+  found.motion = estimator_.estimate(camera, found.correspondences, T_current_reference, scene.noise.scale());
   weigh(scene, found);
   found.motion_time = stopwatch.lap();
   return found;
@@ -171,7 +160,7 @@ MotionHypothesis MotionSearch::searchAmong(const MotionScene& scene, const Motio
   std::vector<Correspondence> some;
   some.reserve(subset.size());
   for (const int i : subset) some.push_back(all.correspondences[static_cast<std::size_t>(i)]);
-  found.motion = estimator_.estimate(scene.features.camera, some);
+  found.motion = estimator_.estimate(scene.features.camera, some, std::nullopt, scene.noise.scale());
   if (found.motion.success) found.motion.inliers = agreeing(scene, all, found.motion.T_current_reference);
   weigh(scene, found);
   found.motion_time = stopwatch.lap();
@@ -181,7 +170,7 @@ MotionHypothesis MotionSearch::searchAmong(const MotionScene& scene, const Motio
 /// Matches of a hypothesis that agree with a motion.
 std::vector<int> MotionSearch::agreeing(const MotionScene& scene, const MotionHypothesis& all,
                                         const Eigen::Isometry3d& T_current_reference) const {
-  return PoseProblem(scene.features.camera, all.correspondences, motion_options_.inlier_threshold)
+  return PoseProblem(scene.features.camera, all.correspondences, options(scene).inlier_threshold)
       .inliers(T_current_reference);
 }
 
@@ -189,7 +178,7 @@ std::vector<int> MotionSearch::agreeing(const MotionScene& scene, const MotionHy
 void MotionSearch::weigh(const MotionScene& scene, MotionHypothesis& found) const {
   found.countAgreement();
   if (!found.motion.success) return;
-  found.motion.reason = chanceWords(found);
+  found.motion.reason = chanceWords(scene, found);
   found.motion.success = found.motion.reason.empty();
   const Eigen::Isometry3d T_reference_current = found.motion.T_current_reference.inverse();
   double least = std::numeric_limits<double>::infinity();
@@ -198,9 +187,13 @@ void MotionSearch::weigh(const MotionScene& scene, MotionHypothesis& found) cons
   found.innovation = scene.prior.empty() ? 0.0 : least;
 }
 
-std::string MotionSearch::chanceWords(const MotionHypothesis& found) const {
+MotionEstimatorOptions MotionSearch::options(const MotionScene& scene) const {
+  return motion_options_.scaled(scene.noise.scale());
+}
+
+std::string MotionSearch::chanceWords(const MotionScene& scene, const MotionHypothesis& found) const {
   const int matches = found.agreement.matches, inliers = found.agreement.inliers;
-  const double chance = chanceOfAgreement(motion_options_.inlier_threshold, found.gate);
+  const double chance = chanceOfAgreement(options(scene).inlier_threshold, found.gate);
   if (inliers >= motion_options_.min_inliers && logFalseAlarms(matches, inliers, chance) <= std::log(kTailProbability))
     return "";
   return "only " + std::to_string(inliers) + " of " + std::to_string(matches) +
@@ -228,7 +221,7 @@ MotionSearch::Alignment MotionSearch::align(const MotionScene& scene, const Moti
         measurementOf(features, match.current, scene.calibration, sighting.measurement.head<2>() - corner);
     aligned.push_back(alignment.measured.back());
   }
-  refineMotion(features.camera, motion_options_, aligned.size() >= kEnough ? aligned : alignment.measured,
+  refineMotion(features.camera, options(scene), aligned.size() >= kEnough ? aligned : alignment.measured,
                alignment.T_current_reference);
   return alignment;
 }
@@ -236,9 +229,9 @@ MotionSearch::Alignment MotionSearch::align(const MotionScene& scene, const Moti
 /// The motion that the points which stood still so far tell when left alone, if it is another than that of all
 /// together: one that puts most of the others elsewhere, and that is not within their own error. Far points agree with
 /// nearly any step once a turn makes up for it, so their number says nothing.
-std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const StereoCamera& camera,
-                                                               const MotionHypothesis& found, const Alignment& aligned,
-                                                               double significant) const {
+std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene& scene, const MotionHypothesis& found,
+                                                               const Alignment& aligned) const {
+  const StereoCamera& camera = scene.features.camera;
   std::vector<Correspondence> lasting, others;
   lasting.reserve(aligned.measured.size()), others.reserve(aligned.measured.size());
   for (std::size_t k = 0; k < aligned.measured.size(); ++k)
@@ -247,13 +240,13 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const StereoCamer
 
   const Eigen::Isometry3d& T = aligned.T_current_reference;
   Eigen::Isometry3d T_lasting = T;
-  const NormalEquations equations = refineMotion(camera, motion_options_, lasting, T_lasting);
+  const NormalEquations equations = refineMotion(camera, options(scene), lasting, T_lasting);
   std::vector<int> all(others.size());
   std::iota(all.begin(), all.end(), 0);
-  if (agree(camera, others, all, T, T_lasting, kElsewhere)) return std::nullopt;
+  if (agree(camera, others, all, T, T_lasting, scene.noise.elsewhere())) return std::nullopt;
   const Vector6d difference = logSE3(T_lasting * T.inverse());
-  const double least = std::max(significant, kOtherOfOne * static_cast<double>(lasting.size()));
-  if (difference.dot(equations.hessian * difference) <= least * equations.variance()) return std::nullopt;
+  const double square = difference.dot(equations.hessian * difference) / equations.variance();
+  if (square <= scene.noise.otherMotion(lasting.size())) return std::nullopt;
   return T_lasting;
 }
 
@@ -263,7 +256,7 @@ void MotionSearch::keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_l
                           const std::vector<Correspondence>& measured, MotionHypothesis& found) const {
   MotionEstimate& motion = found.motion;
   double own = 0.0, of_others = 0.0;
-  std::vector<int> kept = PoseProblem(scene.features.camera, measured, kElsewhere).inliers(T_lasting);
+  std::vector<int> kept = PoseProblem(scene.features.camera, measured, scene.noise.elsewhere()).inliers(T_lasting);
   std::vector<int> inliers;
   std::vector<LocalMap::Sighting> sightings;
   for (int k = 0; k < static_cast<int>(measured.size()); ++k) {

@@ -1,6 +1,7 @@
 #include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -77,6 +78,14 @@ bool makeTemplate(const NearPatch& reference, const Eigen::Vector2f& centre, con
 
 }  // namespace
 
+std::string PatchAlignmentOptions::complaint(int patch_side) const {
+  if (!enabled || patch_side == 0 || canAlign(patch_side)) return "";
+  const std::string side = std::to_string(patch_side);
+  return "patches of " + side + "x" + side + " samples are too small for alignment/radius " + std::to_string(radius) +
+         ": no match is aligned; descriptor/patch_side of stereo_features must be " + std::to_string(leastSide()) +
+         " or more";
+}
+
 std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const Patch& reference,
                                      const Eigen::Vector2f& centre, const Patch& current, const Eigen::Matrix2f& warp) {
   constexpr int kIterations = 10;
@@ -115,12 +124,14 @@ std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const
   found.shift = current.spacing * position;
   found.correlation = p.ab / std::sqrt(pattern.square * p.aa);
   if (!(found.correlation >= static_cast<float>(options.min_correlation))) return std::nullopt;
-  // What is left of the difference is noise of the images, four parameters fitted, and so tells the position's.
+  // What is left of the difference is noise of the images, four parameters fitted, and so tells the position's. It is
+  // about one image's, because values between samples are smooth. The reference's appears as large as this does. That
+  // of a current patch in which the point appears smaller does not shrink: its samples are taken more than once.
   const float left = sumOfSquaredDifferences(square.count(), contrast, grey.data(), pattern.grey.data());
   const float noise = left / static_cast<float>(square.pixels() - 4);
-  const float scale = reference.spacing * reference.spacing;
-  const float floor = static_cast<float>(options.min_sigma);
-  found.sigma = std::sqrt(0.5f * noise * inverse.trace() * scale + floor * floor);
+  const float warped = (grid * inverse * grid.transpose()).trace(), own = std::max(warped, inverse.trace());
+  found.sigma =
+      std::hypot(current.spacing * std::sqrt(0.5f * noise * (warped + own)), static_cast<float>(options.min_sigma));
   return found;
 }
 

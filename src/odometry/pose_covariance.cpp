@@ -3,6 +3,8 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "stereo_descriptor_vo/odometry/noise.hpp"
+
 namespace sdvo {
 namespace {
 
@@ -36,11 +38,10 @@ Matrix6d noLessThan(const Matrix6d& before, Matrix6d covariance) {
 }  // namespace
 
 bool widen(Matrix6d& covariance, const Vector6d& deviation) {
-  constexpr double kExpected = 3.0, kByChance = 12.6;  // chi-square of six: half its mean, for a deviation is a part of
-                                                       // the whole error only, and 95 %
+  constexpr double kExpected = 3.0;  // chi-square of six: half its mean, for a deviation is a part of the error only
   const double square = deviation.dot(covariance.ldlt().solve(deviation));
   if (square > kExpected) covariance += deviation * deviation.transpose();
-  return square > kByChance;
+  return square > noiseGate(6);
 }
 
 void PoseCovariance::cover(const Vector6d& correction) {
@@ -58,11 +59,13 @@ void PoseCovariance::restart(const Matrix6d& travelled) {
 void PoseCovariance::markKeyframe() {
   keyframe_ = value_;
   predicted_.setZero();
+  since_keyframe_.reset();
 }
 
 void PoseCovariance::carry(const Eigen::Isometry3d& T_previous_current) {
   for (Matrix6d* covariance : {&value_, &keyframe_, &predicted_, &unmeasured_})
     *covariance = carriedBy(T_previous_current, *covariance);
+  if (since_keyframe_) since_keyframe_ = carriedBy(T_previous_current, *since_keyframe_);
 }
 
 void PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance) {
@@ -75,7 +78,9 @@ void PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, const 
 Matrix6d PoseCovariance::measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe) {
   const Matrix6d before = value_ - predicted_;
   carry(T_previous_current);
-  const Matrix6d motion = unmeasured_ + since_keyframe;
+  const Matrix6d motion =
+      unmeasured_ + (since_keyframe_ ? noLessThan(*since_keyframe_, since_keyframe) : since_keyframe);
+  since_keyframe_ = since_keyframe;
   value_ = noLessThan(before, keyframe_ + since_keyframe);
   predicted_.setZero();
   unmeasured_.setZero();

@@ -5,6 +5,7 @@
 #include "../common/median.hpp"
 #include "stereo_descriptor_vo/odometry/correspondences.hpp"
 #include "stereo_descriptor_vo/odometry/motion_refinement.hpp"
+#include "stereo_descriptor_vo/odometry/noise.hpp"
 
 namespace sdvo {
 namespace {
@@ -58,10 +59,9 @@ bool Revisit::recall(const StereoFeatures& features, const RigCalibration& calib
   // Drift since that key frame is a rigid offset: shift the map first, or the robust kernel rejects the links. Small
   // offsets, within the covariance of the corners, are left to the adjustment: to shift these, too, doubles the error
   // on a desk (0.019 to 0.041 %).
-  constexpr double kSignificant = 16.8;  // chi-square of six, 99 %
   const Eigen::Isometry3d T_camera_origin = motion.T_current_reference * old->T_camera_origin;
   const Vector6d offset = logSE3(T_camera_origin * map.newestPose().inverse());
-  if (offset.dot(motion.covariance.ldlt().solve(offset)) > kSignificant) map.moveTo(T_camera_origin);
+  if (offset.dot(motion.covariance.ldlt().solve(offset)) > noiseGate(6)) map.moveTo(T_camera_origin);
   map.recall(*old, ties);
   return true;
 }

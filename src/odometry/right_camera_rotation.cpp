@@ -77,10 +77,6 @@ double RightCameraRotation::UsualChange::exceededBy(double change, double memory
   return change / usual;
 }
 
-double RightCameraRotation::change(const StereoFeatures& features) const {
-  return features.count() >= kEnough ? distance(sumUp(features, {}), sums_) : 0.0;
-}
-
 double RightCameraRotation::distance(const Sums& now, const Sums& before) {
   if (now.weight <= 0.0 || before.weight <= 0.0) return 0.0;
   const Eigen::Vector3d change = now.rotation() - before.rotation();

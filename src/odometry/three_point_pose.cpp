@@ -58,6 +58,32 @@ bool splitIntoPlanes(const Eigen::Matrix3d& form, Eigen::Vector3d& first, Eigen:
   return true;
 }
 
+/// The planes that hold the distances along the rays. False where there are none.
+bool findPlanes(const Triangle& t, std::array<Eigen::Vector3d, 2>& planes) {
+  // The equations of sides 12 and 13, each without what it has in common with that of side 23.
+  Eigen::Matrix3d first, second;
+  first << t.a23, -t.a23 * t.b12, 0.0,               //
+      -t.a23 * t.b12, t.a23 - t.a12, t.a12 * t.b23,  //
+      0.0, t.a12 * t.b23, -t.a12;
+  second << t.a23, 0.0, -t.a23 * t.b13,  //
+      0.0, -t.a13, t.a13 * t.b23,        //
+      -t.a23 * t.b13, t.a13 * t.b23, t.a23 - t.a13;
+  // det(first + gamma second) is a cubic of gamma.
+  const auto determinant = [](const Eigen::Matrix3d& a, const Eigen::Matrix3d& b, const Eigen::Matrix3d& c) {
+    return a.col(0).dot(b.col(1).cross(c.col(2)));
+  };
+  const double c3 = second.determinant(), c0 = first.determinant();
+  const double c2 =
+      determinant(first, second, second) + determinant(second, first, second) + determinant(second, second, first);
+  const double c1 =
+      determinant(second, first, first) + determinant(first, second, first) + determinant(first, first, second);
+  // Symmetric triangles have no cubic term: the roots' inverses are those of second + first / gamma.
+  const bool is_inverse = std::abs(c3) < std::abs(c0);
+  const double root = is_inverse ? cubicRoot(c1 / c0, c2 / c0, c3 / c0) : cubicRoot(c2 / c3, c1 / c3, c0 / c3);
+  const Eigen::Matrix3d degenerate = is_inverse ? second + root * first : first + root * second;
+  return std::isfinite(root) && splitIntoPlanes(degenerate, planes[0], planes[1]);
+}
+
 /// Without memory of their own: thousands of triangles are solved for a pair.
 struct Distances {
   std::array<Eigen::Vector3d, 4> values;
@@ -90,32 +116,6 @@ void appendDistances(const Triangle& t, const Eigen::Vector3d& plane, Distances&
   }
 }
 
-/// A combination of the equations that has two planes of distances as its solutions.
-Eigen::Matrix3d degenerateEquation(const Triangle& t) {
-  // The equations of sides 12 and 13, each without what it has in common with that of side 23.
-  Eigen::Matrix3d first, second;
-  first << t.a23, -t.a23 * t.b12, 0.0,               //
-      -t.a23 * t.b12, t.a23 - t.a12, t.a12 * t.b23,  //
-      0.0, t.a12 * t.b23, -t.a12;
-  second << t.a23, 0.0, -t.a23 * t.b13,  //
-      0.0, -t.a13, t.a13 * t.b23,        //
-      -t.a23 * t.b13, t.a13 * t.b23, t.a23 - t.a13;
-  // det(first + gamma second) is a cubic of gamma.
-  const auto determinant = [](const Eigen::Matrix3d& a, const Eigen::Matrix3d& b, const Eigen::Matrix3d& c) {
-    return a.col(0).dot(b.col(1).cross(c.col(2)));
-  };
-  const double c3 = second.determinant(), c0 = first.determinant();
-  const double c2 =
-      determinant(first, second, second) + determinant(second, first, second) + determinant(second, second, first);
-  const double c1 =
-      determinant(second, first, first) + determinant(first, second, first) + determinant(first, first, second);
-  // Symmetric triangles have no cubic term: the roots' inverses are those of second + first / gamma.
-  const bool is_inverse = std::abs(c3) < std::abs(c0);
-  const double root = is_inverse ? cubicRoot(c1 / c0, c2 / c0, c3 / c0) : cubicRoot(c2 / c3, c1 / c3, c0 / c3);
-  if (is_inverse) return second + root * first;
-  return first + root * second;
-}
-
 /// Gauss-Newton steps on the three equations.
 void polish(const Triangle& t, Eigen::Vector3d& lambda) {
   constexpr int kSteps = 2;
@@ -146,9 +146,8 @@ PoseCandidates solveThreePointPose(const std::array<Eigen::Vector3d, 3>& points,
   constexpr double kFlat = 1e-12;  // square of the sine at the first point
   if (!(normal.squaredNorm() > kFlat * t.a12 * t.a13)) return candidates;
 
-  const Eigen::Matrix3d degenerate = degenerateEquation(t);
   std::array<Eigen::Vector3d, 2> planes;
-  if (!degenerate.allFinite() || !splitIntoPlanes(degenerate, planes[0], planes[1])) return candidates;
+  if (!findPlanes(t, planes)) return candidates;
 
   Eigen::Matrix3d in_reference;
   in_reference << side12, side13, normal;

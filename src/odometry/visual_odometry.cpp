@@ -20,6 +20,10 @@ Eigen::Isometry3d lookingAhead() {
   return T_base_camera;
 }
 
+Noise noiseOf(const VisualOdometryOptions& options) {
+  return {options.map.corner_sigma, options.map.reference_sigma, options.window.common_disparity_sigma};
+}
+
 }  // namespace
 
 const char* toString(TrackingState state) {
@@ -35,6 +39,12 @@ const char* toString(TrackingState state) {
   }
   return "UNKNOWN";
 }
+
+VisualOdometry::State::State(const VisualOdometryOptions& options)
+    : calibration(options.calibration),
+      right_delay(options.calibration.right_delay),
+      prior(options.tracking),
+      noise(noiseOf(options)) {}
 
 VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
     : options_(checked(options)),
@@ -213,7 +223,8 @@ MotionScene VisualOdometry::sceneOf(const StereoFeatures& features, double dt,
                     {},
                     state_.usual_agreement,
                     state_.doubt.logOdds() > largestDoubt(),
-                    options_.tracking.doubtful_deviation};
+                    options_.tracking.doubtful_deviation,
+                    state_.noise};
   const Eigen::Isometry3d T_reference_previous = state_.map->newestPose() * state_.T_origin_camera;
   const double since = secondsSinceMap(features);
   if (const auto confirmed = prior.confirmed(state_.map->newestStamp(), since)) scene.prior.push_back(*confirmed);
@@ -251,7 +262,7 @@ void VisualOdometry::watchShutters(const StereoFeatures& taken, double dt, const
   // large.
   constexpr double kAlike = 0.2;  // ratio of that (chosen)
   if (const auto& last = state_.prior.velocity();
-      last && found.innovation > kInnovationGate && (velocity + 0.5 * *last).norm() < kAlike * last->norm())
+      last && found.innovation > noiseGate(6) && (velocity + 0.5 * *last).norm() < kAlike * last->norm())
     state_.doubt.raise(CarriedDoubt::kCertain, "neighbouring pairs seemed to have changed places");
   constexpr double kAnother = 0.5;  // of the interval: the right image is nearer to another pair's
   const double known = state_.right_delay.compensated();
@@ -286,6 +297,7 @@ std::optional<MotionScene> VisualOdometry::reacquire(const StereoFeatures& featu
 void VisualOdometry::forgetRig() {
   state_.calibration = CalibrationFilter(options_.calibration);
   state_.right_rotation = RightCameraRotation();
+  state_.noise = noiseOf(options_);
   state_.right_delay = RightCameraDelay(options_.calibration.right_delay);
   state_.readout = RowReadout();
 }
@@ -369,7 +381,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   const bool is_sound = doubtOf(scene, found).probability >= options_.tracking.probability;
   const Candidate candidate = adjust(features, found, is_sound);
   found.reject(candidate.adjustment.rejected_rows);
-  refutation = search_.chanceWords(found);
+  refutation = search_.chanceWords(scene, found);
   if (refutation.empty()) refutation = state_.prior.tooFast(candidate.motion, found.motion.covariance, since);
   if (!refutation.empty()) return refute(refutation + " after the adjustment");
 
@@ -380,7 +392,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   const Matrix6d measured = step.covariance;
   judge(scene, found, candidate, doubt, step);
   const bool is_confirmed = step.state == TrackingState::kTracking;
-  if (is_confirmed) learn(found.agreement);
+  if (is_confirmed) learn(found);
   // A motion that is likely something else's predicts nothing.
   if (doubt.probability >= 0.5)
     state_.prior.measure(features.stamp, T_reference_current, since, measured, is_confirmed,
@@ -397,10 +409,12 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   return step;
 }
 
-/// Learns what agreement is usual on this rig.
-void VisualOdometry::learn(const Agreement& agreement) {
+/// Learns what agreement and what noise are usual on this rig.
+void VisualOdometry::learn(const MotionHypothesis& confirmed) {
   constexpr double kMemory = 0.9;  // ratio of the past that a pair leaves (chosen)
   constexpr double kMost = 0.95;   // even if all agree, a few need not in the next pair (chosen)
+  state_.noise.learn(confirmed.motion.rms);
+  const Agreement& agreement = confirmed.agreement;
   if (agreement.lasting_matches == 0) return;
   const double ratio = static_cast<double>(agreement.lasting_inliers) / agreement.lasting_matches;
   state_.usual_agreement += (1.0 - kMemory) * (std::min(ratio, kMost) - state_.usual_agreement);
@@ -473,7 +487,7 @@ void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& fou
                            const Doubt& doubt, Step& step) {
   std::ostringstream reason;
   Matrix6d covariance = candidate.adjustment.since_keyframe;
-  if (found.innovation > kInnovationGate) {
+  if (found.innovation > noiseGate(6)) {
     // The stamps may be wrong, or the camera did what none does; points cannot tell.
     const Vector6d innovation = scene.prior.front().innovation(found.motion.T_current_reference.inverse());
     covariance += innovation * innovation.transpose();

@@ -222,13 +222,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   OdometryResult track(const StereoFeatures& features, const FeaturesMessage& message) {
     if (processed_epoch_ && *processed_epoch_ != message.stream_epoch) odometry_->breakStream();
     processed_epoch_ = message.stream_epoch;
-    const PatchAlignmentOptions& alignment = odometry_->options().alignment;
-    if (alignment.enabled && features.hasPatches() && !alignment.canAlign(features.patch_layout.side) &&
-        throttle_.allows("patches"))
-      NODELET_WARN_STREAM("patches of " << features.patch_layout.side << "x" << features.patch_layout.side
-                                        << " samples are too small for alignment/radius " << alignment.radius
-                                        << ": no match is aligned; descriptor/patch_side of stereo_features must be "
-                                        << 2 * (alignment.radius + 1) + 1 << " or more");
+    const std::string complaint = odometry_->options().alignment.complaint(features.patch_layout.side);
+    if (!complaint.empty() && throttle_.allows("patches")) NODELET_WARN_STREAM(complaint);
     odometry_->mountAt(*mount_->last());
     const OdometryResult result = odometry_->update(features, findGuess(message.header));
     processed_stamp_ = message.header.stamp;

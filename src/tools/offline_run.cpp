@@ -33,7 +33,11 @@ std::string withoutCommas(std::string text) {
 }  // namespace
 
 OfflineRun::OfflineRun(const PipelineOptions& options)
-    : extractor_(options.stereo_features), odometry_(options.visual_odometry) {}
+    : extractor_(options.stereo_features), odometry_(options.visual_odometry) {
+  const int side = options.stereo_features.patch.layout().side;
+  const std::string complaint = options.visual_odometry.alignment.complaint(side);
+  if (!complaint.empty()) throw std::invalid_argument(complaint);
+}
 
 StereoFeatures OfflineRun::process(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
                                    std::int64_t stamp) {

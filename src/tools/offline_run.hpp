@@ -17,6 +17,7 @@ namespace sdvo {
 /// The pipeline of both nodelets without ROS: every pair it is given is processed, and all that comes out is kept.
 class OfflineRun {
  public:
+  /// Throws std::invalid_argument when an option is out of its range, or the patches are too small to be aligned.
   explicit OfflineRun(const PipelineOptions& options);
 
   /// Stamps (ns) must increase. Another camera than before begins a new stream. Returns the pair's features.

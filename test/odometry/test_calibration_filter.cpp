@@ -144,17 +144,17 @@ TEST(CalibrationFilter, WhatIsLeftAtAPointIsKnownOnceTwentyWindowsToldOfIt) {
   EXPECT_FALSE(filter.prior(1).common_sigma);
   filter.noteCommon(0.02);
   ASSERT_TRUE(filter.prior(1).common_sigma);
-  // Their mean is 0.04 px^2, and neighbours err alike.
-  EXPECT_NEAR(*filter.prior(1).common_sigma, std::sqrt(1.4 * 0.04), 1e-9);
+  // Their mean is 0.04 px^2.
+  EXPECT_NEAR(*filter.prior(1).common_sigma, 0.2, 1e-9);
 }
 
 TEST(CalibrationFilter, WhatIsLeftAtAPointMayChange) {
   CalibrationFilter filter(someOptions());
   for (int window = 0; window < 1000; ++window) filter.noteCommon(0.01);
   for (int window = 0; window < 200; ++window) filter.noteCommon(0.09);
-  EXPECT_GT(*filter.prior(1).common_sigma, std::sqrt(1.4 * 0.05));
+  EXPECT_GT(*filter.prior(1).common_sigma, std::sqrt(0.05));
   for (int window = 0; window < 2000; ++window) filter.noteCommon(0.09);
-  EXPECT_NEAR(*filter.prior(1).common_sigma, std::sqrt(1.4 * 0.09), 1e-3);
+  EXPECT_NEAR(*filter.prior(1).common_sigma, 0.3, 1e-3);
 }
 
 /// A window that is refused after all asks for its prior as well.

@@ -167,6 +167,27 @@ TEST(MotionEstimator, CovarianceIsCalibrated) {
   EXPECT_NEAR(rotation, 3.03, 0.65);
 }
 
+TEST(MotionEstimator, CovarianceIsCalibratedWhereTheKernelBends) {
+  constexpr int kTrials = 300, kPoints = 80;
+  MotionEstimatorOptions options;
+  for (const RobustKernel kernel : {RobustKernel::kCauchy, RobustKernel::kHuber})
+    for (const double noise : {0.3, 0.6, 0.9}) {
+      options.kernel = kernel;
+      options.inlier_threshold = 6.0 * noise;
+      double mean = 0.0;
+      for (unsigned trial = 0; trial < kTrials; ++trial) {
+        const Problem problem = randomProblem(1000 + trial, kPoints, noise, 0.0);
+        const MotionEstimate estimate = MotionEstimator(options).estimate(synthetic::camera(), problem.correspondences);
+        ASSERT_TRUE(estimate.success) << estimate.reason;
+        const Vector6d error = motionError(estimate);
+        mean += error.dot(estimate.covariance.llt().solve(error)) / kTrials;
+      }
+      // Where the kernel bends within the noise it says too little rather than too much.
+      EXPECT_GT(mean, 4.0) << namesOf(kernel)[static_cast<std::size_t>(kernel)] << ", " << noise << " px";
+      EXPECT_LT(mean, 6.97) << namesOf(kernel)[static_cast<std::size_t>(kernel)] << ", " << noise << " px";
+    }
+}
+
 TEST(MotionEstimator, CovarianceGrowsWithTheNoise) {
   MotionEstimatorOptions options;
   options.inlier_threshold = 10.0;

@@ -99,12 +99,6 @@ TEST(MotionPrior, InnovationsAreSquaredInStandardDeviations) {
       << "a turn counts as well, and what the motion itself is uncertain by";
 }
 
-TEST(MotionPrior, TheGateIsExceededByChanceAsOftenAsStated) {
-  // The tail of chi-square of six in closed form.
-  const double half = 0.5 * kInnovationGate;
-  EXPECT_NEAR(std::exp(-half) * (1.0 + half + half * half / 2.0) / kTailProbability, 1.0, 0.01);
-}
-
 TEST(MotionPrior, AnUnseenMotionIsBoundedByTheSpeedAndByATurn) {
   MotionPrior prior = moving({});
   const double second = std::sqrt(prior.unseen(1.0)(0, 0));

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
+#include <cmath>
 #include <random>
 
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
@@ -77,6 +78,23 @@ TEST(PoseCovariance, TheErrorOfTheKeyframeCancelsInTheMotion) {
   EXPECT_NEAR(motion(0, 0), motion_square, 0.05 * motion_square);
 }
 
+TEST(PoseCovariance, AMotionIsThatOfTheLastTwoPosesToEachOther) {
+  // Along a line: the key frame errs by `common`, a pair by its own error against it. A weak pair, then a good one.
+  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
+  constexpr double kCommon = 1.0, kWeak = 9.0, kGood = 1.0;
+  PoseCovariance covariance;
+  covariance.measure(still, diagonal(kCommon + kWeak, 0.25));
+  Matrix6d motion = covariance.measure(still, diagonal(kCommon + kGood, 0.25));
+  EXPECT_NEAR(motion(0, 0), kWeak + kGood, 1e-9) << "both pairs' own errors, not the key frame's";
+  motion = covariance.measure(still, diagonal(kCommon + kGood, 0.25));
+  EXPECT_NEAR(motion(0, 0), kGood + kGood, 1e-9) << "the weak pair has no part in it";
+  // Where the pair before is the key frame, its error is what the new one is measured against.
+  covariance.measure(still, diagonal(kCommon + kWeak, 0.25));
+  covariance.markKeyframe();
+  motion = covariance.measure(still, diagonal(kCommon + kGood, 0.25));
+  EXPECT_NEAR(motion(0, 0), kCommon + kGood, 1e-9);
+}
+
 TEST(PoseCovariance, ContainsWhatASecondThoughtMoved) {
   PoseCovariance covariance;
   const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
@@ -128,9 +146,12 @@ TEST(PoseCovariance, APredictedPairAddsToTheNextOnesMotion) {
     covariance.advance(forward(), diagonal(8.0, 2.0));
     const Matrix6d predicted = afterForward(0.5, 0.25) + diagonal(8.0, 2.0);
     expectEqual(covariance.value(), predicted);
-    expectEqual(covariance.measure(forward(), diagonal(0.75, 0.25)), afterForward(8.0, 2.0) + diagonal(0.75, 0.25));
+    // The last measured pose's own, two motions ago: its turn has moved the camera by twice as much.
+    const double own = from_keyframe ? 0.75 : 0.5 + 2.0 * std::pow(2.0 * kForward, 2) * 0.25 / 3.0;
+    expectEqual(covariance.measure(forward(), diagonal(0.75, 0.25)), afterForward(8.0, 2.0) + diagonal(own, 0.25));
     // Only once.
-    expectEqual(covariance.measure(forward(), diagonal(0.75, 0.25)), diagonal(0.75, 0.25));
+    const double next = 0.75 + 2.0 * std::pow(kForward, 2) * 0.25 / 3.0;
+    expectEqual(covariance.measure(forward(), diagonal(0.75, 0.25)), diagonal(next, 0.25));
   }
 }
 

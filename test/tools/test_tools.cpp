@@ -229,6 +229,9 @@ TEST_F(Tools, OptionsThatDoNotExistOrAreOutOfRange) {
   expectError(runSequence("--param motion/max_iterations=many"), "motion/max_iterations");
   expectError(runSequence("--param motion/kernel=square"), "motion/kernel");
   expectError(runSequence("--param motion/confidence"), "name=value");
+  // Each in its range, but nothing would be aligned.
+  for (const char* option : {"alignment/radius=6", "descriptor/patch_side=9"})
+    expectError(runSequence("--param " + std::string(option)), "descriptor/patch_side");
   expectError(runSequence("--frames 0"), "--frames");
 
   const fs::path config = root_ / "config.yaml";

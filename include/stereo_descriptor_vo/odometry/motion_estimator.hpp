@@ -20,6 +20,13 @@ struct MotionEstimatorOptions : SampleConsensusOptions, MotionRefinementOptions 
     MotionRefinementOptions::describe(list);
     list.add("min_inliers", min_inliers, {4, 10000}, "", "fewer are no motion");
   }
+
+  /// For measurements that err by so many times more.
+  MotionEstimatorOptions scaled(double noise) const {
+    MotionEstimatorOptions options = *this;
+    options.inlier_threshold *= noise, options.kernel_scale *= noise;
+    return options;
+  }
 };
 
 struct MotionEstimate {
@@ -40,9 +47,9 @@ class MotionEstimator {
   explicit MotionEstimator(const MotionEstimatorOptions& options);
 
   /// `expected`, T_current_reference as predicted, is one more start of the refinement: it wins where it ends at a pose
-  /// that the correspondences agree with better.
+  /// that the correspondences agree with better. `noise`: how many times more than the options say measurements err.
   MotionEstimate estimate(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
-                          const std::optional<Eigen::Isometry3d>& expected = std::nullopt) const;
+                          const std::optional<Eigen::Isometry3d>& expected = std::nullopt, double noise = 1.0) const;
 
  private:
   MotionEstimatorOptions options_;

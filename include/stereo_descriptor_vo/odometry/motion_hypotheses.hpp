@@ -12,6 +12,7 @@
 #include "stereo_descriptor_vo/odometry/local_map.hpp"
 #include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
 #include "stereo_descriptor_vo/odometry/motion_prior.hpp"
+#include "stereo_descriptor_vo/odometry/noise.hpp"
 
 namespace sdvo {
 
@@ -36,6 +37,7 @@ struct MotionScene {
   double usual_agreement = 0.9;       ///< ratio of lasting matches that agree with the camera's motion on this rig
   bool is_doubted = false;            ///< what is followed was likely not the camera's motion a moment ago
   double tolerance = 0.05;            ///< m: motions that differ by less than this and 3 % are equally good
+  Noise noise = {0.4, 0.1, 0.3};
 };
 
 /// A motion that competes for being the camera's, and what speaks for it.
@@ -78,8 +80,8 @@ struct MotionHypothesis {
 /// Ratio of a motion by which it may be off.
 constexpr double kTolerableRatio = 0.03;
 
-/// Logarithm of the number of false alarms (a contrario, Moisan and Stival 2004): the expected number of motions with as
-/// many inliers, if each match agrees by `chance`.
+/// Logarithm of the number of false alarms (a contrario, Moisan and Stival 2004): the expected number of motions with
+/// as many inliers, if each match agrees by `chance`.
 double logFalseAlarms(int matches, int inliers, double chance);
 
 /// Chance that a wrong match, anywhere within `gate` px of its prediction, is within `threshold` px of a motion.

@@ -8,6 +8,7 @@
 
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
+#include "stereo_descriptor_vo/odometry/noise.hpp"
 
 namespace sdvo {
 
@@ -40,11 +41,6 @@ struct ExpectedMotion {
   /// The square of that in standard deviations: chi-square of six where it is such a motion.
   double normalisedSquare(const Eigen::Isometry3d& measured, const Matrix6d& measured_covariance) const;
 };
-
-/// Probability that chance exceeds the limits of this package, for normal distributions as well as for agreement.
-constexpr double kTailProbability = 1e-4;
-/// Chi-square of six that is exceeded with that probability.
-constexpr double kInnovationGate = 27.86;
 
 /// How the camera goes on: constant velocity with white acceleration, stamps with an error, and velocities that are
 /// less certain the older they are. The velocity of the last measured pair predicts the next motion; the last confirmed

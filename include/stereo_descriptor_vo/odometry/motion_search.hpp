@@ -27,9 +27,12 @@ class MotionSearch {
   MotionHypothesis find(const MotionScene& scene, double max_doubt) const;
 
   /// In words, if there are too few inliers for a motion, or as many as chance gives.
-  std::string chanceWords(const MotionHypothesis& found) const;
+  std::string chanceWords(const MotionScene& scene, const MotionHypothesis& found) const;
 
  private:
+  /// With the noise that was learnt of the rig.
+  MotionEstimatorOptions options(const MotionScene& scene) const;
+
   using ViewPtr = std::shared_ptr<const LocalMap::View>;
 
   /// A hypothesis' inliers as their patches have them, and the motion refined on these.
@@ -52,8 +55,8 @@ class MotionSearch {
                             const Eigen::Isometry3d& T_current_reference) const;
   void weigh(const MotionScene& scene, MotionHypothesis& found) const;
   Alignment align(const MotionScene& scene, const MotionHypothesis& found) const;
-  std::optional<Eigen::Isometry3d> motionOfLasting(const StereoCamera& camera, const MotionHypothesis& found,
-                                                   const Alignment& aligned, double significant) const;
+  std::optional<Eigen::Isometry3d> motionOfLasting(const MotionScene& scene, const MotionHypothesis& found,
+                                                   const Alignment& aligned) const;
   void keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_lasting, const std::vector<Correspondence>& measured,
               MotionHypothesis& found) const;
 

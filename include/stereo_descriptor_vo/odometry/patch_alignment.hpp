@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>
+#include <string>
 
 #include "stereo_descriptor_vo/common/options.hpp"
 
@@ -26,9 +27,14 @@ struct PatchAlignmentOptions {
   }
 
   /// Whether patches of so many samples a side can be aligned: the derivatives ask for one more all around.
-  bool canAlign(int patch_side) const { return enabled && patch_side >= 2 * (radius + 1) + 1; }
+  bool canAlign(int patch_side) const { return enabled && patch_side >= leastSide(); }
+  /// In words, if patches that are meant to be aligned cannot be; without patches there is nothing to align.
+  std::string complaint(int patch_side) const;
 
   static constexpr int kLargestRadius = 6;
+
+ private:
+  int leastSide() const { return 2 * (radius + 1) + 1; }
 };
 
 /// A grey patch as it travels with a feature: side x side samples, row by row.

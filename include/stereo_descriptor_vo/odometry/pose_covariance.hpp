@@ -1,13 +1,14 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <optional>
 
 #include "stereo_descriptor_vo/common/se3.hpp"
 
 namespace sdvo {
 
 /// Adds the outer product of a deviation to a covariance if its square exceeds half of the expected one (chi-square of
-/// six). Returns whether it exceeds the 95 % quantile.
+/// six). Returns whether chance does not explain it.
 bool widen(Matrix6d& covariance, const Vector6d& deviation);
 
 /// Covariance of a pose that is reported pair by pair while the map behind it improves. All covariances are of right
@@ -38,9 +39,10 @@ class PoseCovariance {
   void advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance);
 
   /// The pose moved on and was measured against the key frame with this covariance. Returns the covariance of the
-  /// motion between the two reported poses. Of `since_keyframe` half is the noise of the newest pair and half that of
-  /// the key frame, whose points have been seen as often. The pose before has the same half from the key frame, which
-  /// cancels, and a half of its own. What it was predicted or doubted by comes on top.
+  /// motion between the two reported poses. If the pose before is that of the key frame, it is `since_keyframe`. Else
+  /// the key frame's own noise is in both poses and cancels. It is as large as that of the better pose, because its
+  /// points have been seen as often. So the sum less twice this is the larger one of the two covariances. What the
+  /// pose before was predicted or doubted by comes on top.
   Matrix6d measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe);
 
   /// The last pose may be off by more than its measurement says.
@@ -54,6 +56,7 @@ class PoseCovariance {
 
   Matrix6d value_ = Matrix6d::Zero();
   Matrix6d keyframe_ = Matrix6d::Zero();    ///< of the key frame, as a perturbation of the last pose
+  std::optional<Matrix6d> since_keyframe_;  ///< of the last pose, as it was measured; none where it is the key frame
   Matrix6d predicted_ = Matrix6d::Zero();   ///< of motions since the last measured pose
   Matrix6d unmeasured_ = Matrix6d::Zero();  ///< of these, and of what the last pose was doubted by
 };

@@ -14,18 +14,14 @@ namespace sdvo {
 /// is measured with rows of the left view alone and does not depend on it.
 class RightCameraRotation {
  public:
-  /// Takes in one pair; old pairs are forgotten slowly. Returns by how many times what is usual the camera turned before
-  /// it: usual on rigs, and on this one.
+  /// Takes in one pair; old pairs are forgotten slowly. Returns by how many times what is usual the camera turned
+  /// before it: usual on rigs, and on this one.
   double add(const StereoFeatures& features);
 
   /// rad; NaN before the first pair with features.
   Eigen::Vector3d rotation() const;
   /// Standard deviation, rad; NaN as above.
   Eigen::Vector3d sigma() const;
-
-  /// How far a pair disagrees with those before: what the rotation that its own rows tell does to them beyond what
-  /// rotation() does, px, root mean square. Zero before the first pair and without features.
-  double change(const StereoFeatures& features) const;
 
  private:
   struct Sums {
@@ -46,8 +42,8 @@ class RightCameraRotation {
   struct UsualChange {
     double square = 0.0;  ///< of the changes of the last pairs, px^2
 
-    /// Takes in a change (px) and returns how many times the usual one it is. `memory_of_large`: ratio of the square that
-    /// a large change leaves.
+    /// Takes in a change (px) and returns how many times the usual one it is. `memory_of_large`: ratio of the square
+    /// that a large change leaves.
     double exceededBy(double change, double memory_of_large);
   };
 

@@ -15,6 +15,7 @@
 #include "stereo_descriptor_vo/odometry/motion_hypotheses.hpp"
 #include "stereo_descriptor_vo/odometry/motion_prior.hpp"
 #include "stereo_descriptor_vo/odometry/motion_search.hpp"
+#include "stereo_descriptor_vo/odometry/noise.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
 #include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
@@ -178,7 +179,7 @@ class VisualOdometry {
   double largestDoubt() const;
   double secondsSinceMap(const StereoFeatures& features) const;
   Step extendMap(const StereoFeatures& features, const MotionScene& scene, MotionHypothesis& found, double dt);
-  void learn(const Agreement& agreement);
+  void learn(const MotionHypothesis& confirmed);
   Candidate adjust(const StereoFeatures& features, const MotionHypothesis& found, bool may_recall);
   Doubt doubtOf(const MotionScene& scene, const MotionHypothesis& found) const;
   std::string innovationWords(const MotionHypothesis& found) const;
@@ -207,8 +208,7 @@ class VisualOdometry {
 
   // State between pairs; reset() is the assignment of a new one.
   struct State {
-    explicit State(const VisualOdometryOptions& options)
-        : calibration(options.calibration), right_delay(options.calibration.right_delay), prior(options.tracking) {}
+    explicit State(const VisualOdometryOptions& options);
 
     std::optional<LocalMap> map;
     std::optional<LocalMap> candidate;  ///< the map with the pair; between pairs only its memory matters
@@ -222,6 +222,7 @@ class VisualOdometry {
     PoseCovariance covariance;  ///< of that pose
     MotionPrior prior;
     CarriedDoubt doubt;
+    Noise noise;
     double usual_agreement = 0.9;  ///< ratio of lasting matches that agree with confirmed motions
     FloorBelief floor;
     RepeatedImages images;

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+namespace sdvo {
+
+/// Probability that chance exceeds the limits of this package, for normal distributions as well as for agreement.
+constexpr double kTailProbability = 1e-4;
+
+/// Square, in standard deviations, that so many normally distributed numbers exceed with that probability (chi-square).
+constexpr double noiseGate(int numbers) {
+  constexpr double gates[] = {15.14, 18.42, 21.11, 23.51, 25.74, 27.86};
+  return gates[numbers - 1];
+}
+
+/// What measurements err by, and which differences of motions follow from that. Standard deviations in px.
+class Noise {
+ public:
+  /// Of a detected corner and of a position by its patch, in each direction, and of a disparity.
+  Noise(double corner, double aligned, double disparity) : corner_(corner), aligned_(aligned), disparity_(disparity) {}
+
+  /// Takes in what the inliers of a confirmed motion were off by (rms of u_left, v_left and u_right, px). Slow and
+  /// bounded: one pair may be blurred, and what the inliers are depends on the scale itself.
+  void learn(double rms) {
+    constexpr double kMemory = 0.9;              // ratio of the past that a pair leaves (chosen)
+    constexpr double kLeast = 0.5, kMost = 2.0;  // (chosen)
+    const double expected = std::sqrt(2.0 * corner_ * corner_ + disparity_ * disparity_ / 3.0);
+    scale_ = std::clamp(kMemory * scale_ + (1.0 - kMemory) * rms / expected, kLeast, kMost);
+  }
+
+  /// By how much this rig's corners err more than expected.
+  double scale() const { return scale_; }
+
+  /// px: root mean square length (u_left, v_left, u_right) between a corner and the map's point. Motions that are
+  /// closer at most points are one.
+  double sameMotion() const { return scale_ * std::sqrt(6.0) * corner_; }
+
+  /// px: two aligned positions that are further apart are not of one point.
+  double elsewhere() const { return std::sqrt(2.0 * noiseGate(2)) * aligned_; }
+
+  /// Chi-square of six, by the sum over so many points, beyond which two motions are not one. Neighbours share a part of
+  /// their errors, which does not average out.
+  double otherMotion(std::size_t points) const {
+    constexpr double kOther = 250.0;     // measured: up to 205 where nothing moved
+    constexpr double kOtherOfOne = 1.5;  // the same for each point; 1.7 and more with faults
+    return std::max(kOther, kOtherOfOne * static_cast<double>(points));
+  }
+
+ private:
+  double corner_, aligned_, disparity_, scale_ = 1.0;
+};
+
+}  // namespace sdvo

@@ -1,0 +1,52 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "stereo_descriptor_vo/odometry/noise.hpp"
+
+namespace sdvo {
+namespace test_noise {
+
+TEST(Noise, GatesAreExceededByChanceAsOftenAsStated) {
+  // Tails of chi-square in closed form: of one number, of two, of four and of six.
+  const auto half = [](int numbers) { return 0.5 * noiseGate(numbers); };
+  EXPECT_NEAR(std::erfc(std::sqrt(half(1))) / kTailProbability, 1.0, 0.01);
+  EXPECT_NEAR(std::exp(-half(2)) / kTailProbability, 1.0, 0.01);
+  EXPECT_NEAR(std::exp(-half(4)) * (1.0 + half(4)) / kTailProbability, 1.0, 0.01);
+  EXPECT_NEAR(std::exp(-half(6)) * (1.0 + half(6) + half(6) * half(6) / 2.0) / kTailProbability, 1.0, 0.01);
+}
+
+TEST(Noise, FollowsTheResidualsSlowly) {
+  Noise noise(0.4, 0.1, 0.3);
+  const double expected = std::sqrt((2.0 * 0.4 * 0.4 + 2.0 * 0.4 * 0.4 + 2.0 * 0.4 * 0.4 + 0.3 * 0.3) / 3.0);
+  EXPECT_EQ(noise.scale(), 1.0);
+  for (int pair = 0; pair < 100; ++pair) noise.learn(expected);
+  EXPECT_NEAR(noise.scale(), 1.0, 1e-9) << "two positions in each direction, and a disparity on the right";
+  noise.learn(1.5 * expected);
+  EXPECT_LT(noise.scale(), 1.1) << "one pair says little";
+  for (int pair = 0; pair < 100; ++pair) noise.learn(1.5 * expected);
+  EXPECT_NEAR(noise.scale(), 1.5, 1e-3);
+}
+
+TEST(Noise, IsBounded) {
+  Noise noise(0.4, 0.1, 0.3);
+  for (int pair = 0; pair < 1000; ++pair) noise.learn(100.0);
+  EXPECT_EQ(noise.scale(), 2.0);
+  for (int pair = 0; pair < 1000; ++pair) noise.learn(0.0);
+  EXPECT_EQ(noise.scale(), 0.5);
+}
+
+TEST(Noise, MotionsAreOneWithinTheNoiseOfACorner) {
+  std::mt19937 random(1);
+  std::normal_distribution<double> normal;
+  const Noise noise(0.4, 0.1, 0.3);
+  double square = 0.0;
+  constexpr int kTrials = 20000;
+  for (int trial = 0; trial < kTrials; ++trial)
+    for (int k = 0; k < 3; ++k) square += std::pow(0.4 * normal(random) - 0.4 * normal(random), 2) / kTrials;
+  EXPECT_NEAR(noise.sameMotion(), std::sqrt(square), 0.01);
+}
+
+}  // namespace test_noise
+}  // namespace sdvo
