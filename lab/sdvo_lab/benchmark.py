@@ -1,7 +1,7 @@
 """Measures the time of the kernels, of whole drives and of the nodelets, and writes it between the marks of docs/precision.md, some
-five minutes on a machine that has nothing else to do. Needs scripts/build run_sequence evaluate_trajectory count_allocations
-benchmark_kernels measure_latency convert render_drive; for the kernels Google Benchmark (Debian and Ubuntu: libbenchmark-dev;
-then scripts/build --force-cmake); for drives KITTI_DIR and EUROC_DIR."""
+five minutes on a machine that has nothing else to do. Instructions are counted, whatever else runs. Needs scripts/build run_sequence
+evaluate_trajectory count_allocations benchmark_kernels measure_latency convert render_drive; for the kernels Google Benchmark (Debian
+and Ubuntu: libbenchmark-dev; then scripts/build --force-cmake); for instructions valgrind; for drives KITTI_DIR and EUROC_DIR."""
 import json
 import os
 import pathlib
@@ -9,6 +9,7 @@ import re
 import signal
 import statistics
 import subprocess
+import sys
 import tempfile
 
 from . import drives, marks, odometry, programs
@@ -63,17 +64,59 @@ def drive_table(folder):
             yield [drive.name, threads, *cells(timed(drive, "--threads", threads)[0])]
 
 
-def small_images(folder):
+def in_a_room(folder):
     """Somebody walks through a room with the cameras that robots carry."""
+    return {f"hand_held, {rig}, {size}": drives.rendered(folder, "hand_held", rig, 1, pairs=100, noise=2, exposure=0.3, motion_blur=0.01)
+            for rig, size in (("d435_small", "424x240"), ("oak_d", "640x400"))}
+
+
+def small_images(folder):
     yield ["drive", "CPU [ms a pair]", "wall, median", "wall, p95", "CPU by that of KITTI 06", "p95 by median"]
-    chosen = {"KITTI 06, 1226x370": drives.recorded("kitti", "06")}
-    for rig, size in (("d435_small", "424x240"), ("oak_d", "640x400")):
-        chosen[f"hand_held, {rig}, {size}"] = drives.rendered(folder, "hand_held", rig, 1, pairs=100, noise=2, exposure=0.3, motion_blur=0.01)
+    chosen = {"KITTI 06, 1226x370": drives.recorded("kitti", "06"), **in_a_room(folder)}
     whole = None
     for name, drive in chosen.items():
         (cpu, wall, p95), _ = timed(drive)
         whole = whole or cpu
         yield [name, *cells((cpu, wall, p95)), f"{cpu / whole:.2f}", f"{p95 / wall:.2f}"]
+
+
+def counted(drive, side):
+    """Instructions on one side, a function, of the pairs from the third to the thirtieth."""
+    with tempfile.TemporaryDirectory() as work:
+        subprocess.run(["valgrind", "--tool=callgrind", f"--callgrind-out-file={work}/part", f"--toggle-collect={side}",
+                        "--dump-before=sdvo::OfflineRun::process(*", programs.program("run_sequence"), drive.directory, "--frames", "30",
+                        "--poses", f"{work}/poses.txt"],
+                       check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        # The first part ends before the first pair, the last one has no number.
+        parts = sorted(pathlib.Path(work).glob("part.*"), key=lambda part: int(part.suffix[1:]))[1:] + [pathlib.Path(work) / "part"]
+        return [int(re.search(r"^totals: (\d+)", part.read_text(), re.MULTILINE).group(1)) for part in parts][2:]
+
+
+def stored(name):
+    """The figures that the page has of this table, by the first cell of their rows."""
+    rows = re.search(rf"<!-- {name} -->\n(.*?)<!-- end -->", marks.PERFORMANCE.read_text(), re.DOTALL).group(1).splitlines()[2:]
+    return {cells[0]: cells for cells in ([cell.strip() for cell in row.strip("| ").split("|")] for row in rows)}
+
+
+def instructions(folder):
+    """Millions of a pair, and their ratio to what the page had before."""
+    yield ["drive", "image side", "motion side", "a pair", "p95 by median", "by the figure before"]
+    before = stored("instructions")
+    chosen = {"KITTI 06": drives.recorded("kitti", "06"), "EuRoC MH_01_half": drives.recorded("euroc", "MH_01_half", folder), **in_a_room(folder)}
+    for name, drive in chosen.items():
+        counts = [counted(drive, side) for side in ("sdvo::FeatureExtractor::extract(*", "sdvo::VisualOdometry::update(*")]
+        sides = [statistics.mean(side) * 1e-6 for side in counts]
+        whole = sorted(map(sum, zip(*counts)))
+        ratio = sum(sides) / float(before[name][3]) if name in before else 1.0
+        yield [name, *(f"{million:.1f}" for million in (*sides, sum(sides))), f"{whole[int(0.95 * len(whole))] / statistics.median(whole):.2f}",
+               f"{ratio:.2f}"]
+
+
+def guard(rows):
+    """Fails where a drive takes more than 5 % more instructions than the page has."""
+    grown = [line for line in rows[2:] if float(line.strip("| ").split("|")[-1]) > 1.05]
+    if grown:
+        sys.exit("error: more instructions than before\n" + "\n".join(grown))
 
 
 def growth(_):
@@ -109,7 +152,7 @@ def latency(_):
             master.wait()
 
 
-TABLES = {"drives": drive_table, "small_images": small_images, "growth": growth, "allocations": allocations, "latency": latency}
+TABLES = {"instructions": instructions, "drives": drive_table, "small_images": small_images, "growth": growth, "allocations": allocations, "latency": latency}
 
 PRINTED_ALONE = ("kernels", "allocations")  # no page has them
 
@@ -131,4 +174,6 @@ def main(arguments):
                     marks.put(arguments.write, name, machine())
             else:
                 page = arguments.write if name not in PRINTED_ALONE else None
-                marks.show(kernels() if name == "kernels" else TABLES[name](folder), page, name)
+                rows = marks.show(kernels() if name == "kernels" else TABLES[name](folder), page, name)
+                if name == "instructions" and not arguments.write:
+                    guard(rows)

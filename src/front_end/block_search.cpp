@@ -2,10 +2,59 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <numeric>
 #include <opencv2/imgproc.hpp>
+#include <vector>
+
+#include "../common/kernel.hpp"
 
 namespace sdvo {
 namespace {
+
+/// Sums over `count` blocks, one from each pixel of a row on: of their products with another block, and over their
+/// columns of grey levels and of their squares.
+struct SumBlocks {
+  static SDVO_IN_KERNEL void run(const cv::Mat* block, const cv::Mat* image, int y, int count, int* products, int* sums,
+                                 int* squares) {
+    const int wide = count + block->cols - 1;
+    std::fill(products, products + count, 0);
+    std::fill(sums, sums + wide, 0);
+    std::fill(squares, squares + wide, 0);
+    for (int r = 0; r < block->rows; ++r) {
+      const std::uint8_t* row = image->data + image->step[0] * static_cast<std::size_t>(y + r);
+      const std::uint8_t* other = block->data + block->step[0] * static_cast<std::size_t>(r);
+      for (int k = 0; k < wide; ++k) sums[k] += row[k], squares[k] += row[k] * row[k];
+      for (int c = 0; c < block->cols; ++c)
+        for (int k = 0; k < count; ++k) products[k] += other[c] * row[k + c];
+    }
+  }
+};
+
+/// Correlation of a block with those of its size in an image, by the position of their corner. Without the Fourier
+/// transforms of cv::matchTemplate, which so small images do not repay: half of the instructions.
+cv::Mat correlationOf(const cv::Mat& block, const cv::Mat& image) {
+  cv::Mat correlation(image.rows - block.rows + 1, image.cols - block.cols + 1, CV_32F);
+  std::vector<int> products(static_cast<std::size_t>(correlation.cols)), sums(static_cast<std::size_t>(image.cols)),
+      squares(static_cast<std::size_t>(image.cols));
+  const double pixels = static_cast<double>(block.total());
+  const double sum = cv::sum(block)[0], square = block.dot(block), variance = pixels * square - sum * sum;
+  for (int y = 0; y < correlation.rows; ++y) {
+    runKernel<SumBlocks>(&block, &image, y, correlation.cols, products.data(), sums.data(), squares.data());
+    int of_others = std::accumulate(sums.begin(), sums.begin() + block.cols - 1, 0);
+    int of_squares = std::accumulate(squares.begin(), squares.begin() + block.cols - 1, 0);
+    for (int x = 0; x < correlation.cols; ++x) {
+      const std::size_t first = static_cast<std::size_t>(x), last = static_cast<std::size_t>(x + block.cols - 1);
+      of_others += sums[last], of_squares += squares[last];
+      const double other = of_others, other_variance = pixels * of_squares - other * other;
+      const double covariance = pixels * products[first] - sum * other;
+      correlation.at<float>(y, x) =
+          other_variance > 0.0 ? static_cast<float>(covariance / std::sqrt(variance * other_variance)) : 0.f;
+      of_others -= sums[first], of_squares -= squares[first];
+    }
+  }
+  return correlation;
+}
 
 /// Where the block around `centre` looks most alike within `area`, a rectangle of block centres. Nothing where the best
 /// correlation lacks more of 1 than `uniqueness` times what the best one elsewhere lacks: texture that repeats itself,
@@ -24,8 +73,7 @@ std::optional<cv::Point> findBlock(const cv::Mat& from, const cv::Mat& in, cv::P
   cv::Scalar mean, deviation;
   cv::meanStdDev(from(block), mean, deviation);
   if (deviation[0] < kFlat) return std::nullopt;
-  cv::Mat correlation;
-  cv::matchTemplate(in(reach), from(block), correlation, cv::TM_CCOEFF_NORMED);
+  cv::Mat correlation = correlationOf(from(block), in(reach));
   double best = 0.0, elsewhere = 0.0;
   cv::Point at;
   cv::minMaxLoc(correlation, nullptr, &best, nullptr, &at);

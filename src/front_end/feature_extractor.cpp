@@ -50,6 +50,18 @@ void measureImage(const cv::Mat& image, double& mean_intensity, double& sharpnes
   sharpness = static_cast<double>(gradient) / static_cast<double>(std::max<std::int64_t>(pixels, 1));
 }
 
+/// Why there are no features, if there are none.
+std::string wordsOn(const StereoFeatures& features, const std::string& refusal, bool is_too_small) {
+  if (features.report.refused) return refusal;
+  if (is_too_small)
+    return "every feature is too close to an image border for its descriptor: the image is too small for its size";
+  if (features.report.detected == 0)
+    return "no corners: the left image has no texture (dark, covered, masked or out of focus?)";
+  if (features.report.stereo_matched == 0)
+    return "no stereo matches: left and right do not show the same scene, are swapped or not rectified";
+  return features.count() == 0 ? "every feature is too close to an image border for its descriptor" : "";
+}
+
 cv::Mat cutPatches(const cv::Mat& image, const StereoFeatures& features) {
   const PatchCutter cutter(features.patch_layout, image);
   cv::Mat patches(features.count(), features.patch_layout.bytes(), CV_8U);
@@ -81,6 +93,28 @@ DepthScaleOptions FeatureExtractor::sizeCurve(cv::Size image) const {
   const double largest = descriptor_.largestSize(image);
   for (double* size : {&curve.min_size, &curve.max_size, &curve.constant_size}) *size = std::min(*size, largest);
   return curve;
+}
+
+void FeatureExtractor::describe(const cv::Mat& left, const cv::Mat& right, const std::vector<Corner>& corners,
+                                const std::vector<StereoMatch>& matches, StereoFeatures& features) const {
+  // Size from depth, as far as the image has room for it, then the descriptor of both views at that size.
+  const double largest = descriptor_.largestSize(left.size());
+  std::vector<StereoKeypoint> keypoints;
+  keypoints.reserve(matches.size());
+  for (const StereoMatch& match : matches) {
+    const cv::Point2f& position = corners[match.left_index].position;
+    keypoints.push_back({position.x, position.y, position.x - match.disparity, position.y + match.dv,
+                         static_cast<float>(std::min(depth_scale_.size(match.disparity), largest))});
+  }
+  const DescribedKeypoints described = descriptor_.describe(left, right, keypoints);
+  features.reserve(static_cast<int>(described.index.size()));
+  for (std::size_t row = 0; row < described.index.size(); ++row) {
+    const int i = described.index[row];
+    const Corner& corner = corners[matches[i].left_index];
+    features.append({corner.position.x, corner.position.y, matches[i].disparity, matches[i].dv, keypoints[i].size,
+                     described.angle[row], corner.response});
+  }
+  features.descriptors = described.rows;
 }
 
 StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
@@ -121,41 +155,15 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
   if (report.refused) matches.clear();
   report.stereo_time = stopwatch.lap();
 
-  // Size from depth, as far as the image has room for it, then the descriptor of both views at that size.
-  const double largest = descriptor_.largestSize(left.size());
-  std::vector<StereoKeypoint> keypoints;
-  keypoints.reserve(matches.size());
-  for (const StereoMatch& match : matches) {
-    const cv::Point2f& position = positions[match.left_index];
-    keypoints.push_back({position.x, position.y, position.x - match.disparity, position.y + match.dv,
-                         static_cast<float>(std::min(depth_scale_.size(match.disparity), largest))});
-  }
-  const DescribedKeypoints described = descriptor_.describe(left, right, keypoints);
-  features.reserve(static_cast<int>(described.index.size()));
-  for (std::size_t row = 0; row < described.index.size(); ++row) {
-    const int i = described.index[row];
-    const Corner& corner = corners[matches[i].left_index];
-    features.append({corner.position.x, corner.position.y, matches[i].disparity, matches[i].dv, keypoints[i].size,
-                     described.angle[row], corner.response});
-  }
-  features.descriptors = described.rows;
+  describe(left, right, corners, matches, features);
 
   // A patch at that size, too, by which the feature can be aligned between pairs.
   features.patch_layout = options_.patch.layout();
   if (features.hasPatches()) features.patches = cutPatches(left, features);
   report.describe_time = stopwatch.lap();
 
-  if (report.refused)
-    report.status = refusal;
-  else if (2 * border + FeatureDetector::kSmallestSide > std::min(left.rows, left.cols))
-    report.status =
-        "every feature is too close to an image border for its descriptor: the image is too small for its size";
-  else if (report.detected == 0)
-    report.status = "no corners: the left image has no texture (dark, covered, masked or out of focus?)";
-  else if (report.stereo_matched == 0)
-    report.status = "no stereo matches: left and right do not show the same scene, are swapped or not rectified";
-  else if (features.count() == 0)
-    report.status = "every feature is too close to an image border for its descriptor";
+  const bool is_too_small = 2 * border + FeatureDetector::kSmallestSide > std::min(left.rows, left.cols);
+  report.status = wordsOn(features, refusal, is_too_small);
   return features;
 }
 

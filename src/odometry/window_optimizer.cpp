@@ -211,22 +211,30 @@ class Solver {
   /// poses took of the gradients is made up for by the degrees of freedom.
   double errorsOverInformation(const ReducedSystem& system, const Eigen::Ref<const Eigen::MatrixXd>& solved,
                                const Eigen::MatrixXd& covariance) const {
-    // The trace of covariance^-1 times the sum of outer products.
+    double freedom = 0.0, trace = 0.0;  // of covariance^-1 times the sum of outer products
+    for (const EliminatedPoint& point : system.points)
+      freedom += 2.0 * point.sightings - 2.0;  // u, v and one disparity against a position
     const Eigen::MatrixXd whitened = covariance.llt().matrixL().solve(solved.transpose());
-    double square = 0.0, freedom = 0.0;
-    Eigen::VectorXd moved(solved.cols());
+    for (Eigen::Index row = 0; row < whitened.rows(); row += 6)
+      trace += squareOfGradients(system, whitened.middleRows<6>(row));
+    return trace / static_cast<double>(solved.cols()) * freedom / std::max(freedom - 6.0 * poses_, 1.0);
+  }
+
+  /// Sum over the points.
+  static double squareOfGradients(const ReducedSystem& system, const Eigen::Matrix<double, 6, Eigen::Dynamic>& by) {
+    double sum = 0.0;
     const PoseFactor* sighting = system.factors.data();
     for (const EliminatedPoint& point : system.points) {
-      moved.noalias() = whitened.rightCols<kCalibration>().lazyProduct(point.calibration_gradient);
+      Vector6d moved = by.rightCols<kCalibration>().lazyProduct(point.calibration_gradient);
       for (const PoseFactor* end = sighting + point.factors; sighting != end; ++sighting) {
-        const Eigen::Map<const Eigen::Vector3d> t(sighting->gradient.translation), r(sighting->gradient.rotation);
-        moved.noalias() += whitened.middleCols<3>(6 * sighting->pose).lazyProduct(t);
-        moved.noalias() += whitened.middleCols<3>(6 * sighting->pose + 3).lazyProduct(r);
+        const double *t = sighting->gradient.translation, *r = sighting->gradient.rotation;
+        const auto pose = by.middleCols<6>(6 * sighting->pose);
+        moved += pose.col(0) * t[0] + pose.col(1) * t[1] + pose.col(2) * t[2] +  //
+                 pose.col(3) * r[0] + pose.col(4) * r[1] + pose.col(5) * r[2];
       }
-      square += moved.squaredNorm();
-      freedom += 2.0 * point.sightings - 2.0;  // u, v and one disparity against a position
+      sum += moved.squaredNorm();
     }
-    return square / static_cast<double>(solved.cols()) * freedom / std::max(freedom - 6.0 * poses_, 1.0);
+    return sum;
   }
 
   void eliminatePoints(const Estimate& estimate, const Linearisation& linearisation, ReducedSystem& system) {

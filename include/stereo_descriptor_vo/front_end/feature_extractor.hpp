@@ -57,6 +57,10 @@ class FeatureExtractor {
   const FeatureExtractorOptions& options() const { return options_; }
 
  private:
+  /// Appends what both views describe of the matched corners.
+  void describe(const cv::Mat& left, const cv::Mat& right, const std::vector<Corner>& corners,
+                const std::vector<StereoMatch>& matches, StereoFeatures& features) const;
+
   FeatureExtractorOptions options_;
   FeatureDetector detector_;
   ExposureBalance exposure_balance_;
