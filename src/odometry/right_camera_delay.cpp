@@ -11,7 +11,7 @@ namespace sdvo {
 namespace {
 
 /// Of the moving pairs before, a pair leaves this ratio: some 200 pairs, over which clocks of cameras hardly drift.
-constexpr double kMemory = 0.995;
+constexpr double kMemoryOfRows = 0.995;
 
 /// Velocity (px/s) of a point in the right image: at infinity, and for each px of disparity.
 struct RightFlow {
@@ -87,12 +87,16 @@ constexpr double kLeastTurning = 2.0;  // px/s: rotations from images err by les
 
 }  // namespace
 
-RightCameraDelay::RightCameraDelay(double prior) : prior_(prior), rows_(kMemory, kLeastTurning, kSamePoints) {}
+RightCameraDelay::RightCameraDelay(double prior) : prior_(prior), rows_(kMemoryOfRows, kLeastTurning, kSamePoints) {}
 
 void RightCameraDelay::measure(const StereoFeatures& features, double dt, const Vector6d& velocity) {
   partner_ = partnerOf(features, dt, velocity, partner_);
   expose(features, dt * velocity.head<3>().norm(), velocity.tail<3>().norm());
-  pairs_.push_back({features, velocity});
+  StereoFeatures positions;
+  positions.camera = features.camera;
+  positions.u = features.u, positions.v = features.v;
+  positions.disparity = features.disparity, positions.dv = features.dv;
+  pairs_.push_back({std::move(positions), velocity});
   if (pairs_.size() < 4) return;
   addRows(dt);
   pairs_.pop_front();

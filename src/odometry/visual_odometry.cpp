@@ -146,14 +146,16 @@ OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::op
   refuse(given);
   // A lens that focuses changes the camera with every pair; the pixels of one map are those of one camera.
   const bool is_refocused = state_.camera && *state_.camera != given.camera && state_.camera->isLike(given.camera);
-  const StereoFeatures whole = is_refocused ? given.seenBy(*state_.camera) : given;
+  StereoFeatures refocused, new_part;
+  const StereoFeatures& whole = is_refocused ? refocused = given.seenBy(*state_.camera) : given;
   const std::vector<int> new_rows = state_.images.newRows(whole);
   const bool is_torn = static_cast<int>(new_rows.size()) < whole.count();
-  const StereoFeatures taken = is_torn ? whole.select(new_rows) : whole;
+  const StereoFeatures& taken = is_torn ? new_part = whole.select(new_rows) : whole;
   const double dt = state_.last_stamp ? static_cast<double>(taken.stamp - *state_.last_stamp) * 1e-9 : 0.0;
   const bool continued = state_.map && state_.map->continuedBy(taken);
   const bool frozen = !state_.interrupted && isFrozen(taken, dt, guess);
-  const StereoFeatures features = continued && !frozen ? inStep(taken, dt, guess) : taken;
+  const std::optional<StereoFeatures> in_step = continued && !frozen ? inStep(taken, dt, guess) : std::nullopt;
+  const StereoFeatures& features = in_step ? *in_step : taken;
   const std::optional<MotionScene> scene = !continued || frozen ? std::nullopt
                                            : state_.interrupted ? reacquire(features)
                                                                 : std::optional(sceneOf(features, dt, guess));
@@ -239,10 +241,10 @@ MotionScene VisualOdometry::sceneOf(const StereoFeatures& features, double dt,
 
 /// The features as of one moment, if the right camera is known to be late: by the velocity that is expected, then by
 /// the one that these show.
-StereoFeatures VisualOdometry::inStep(const StereoFeatures& taken, double dt,
-                                      const std::optional<MotionGuess>& guess) const {
+std::optional<StereoFeatures> VisualOdometry::inStep(const StereoFeatures& taken, double dt,
+                                                     const std::optional<MotionGuess>& guess) const {
   const std::optional<Vector6d>& velocity = state_.prior.velocity();
-  if (state_.right_delay.compensated() == 0.0 || !velocity || dt > options_.tracking.max_gap) return taken;
+  if (state_.right_delay.compensated() == 0.0 || !velocity || dt > options_.tracking.max_gap) return std::nullopt;
   StereoFeatures features = state_.right_delay.inStep(taken, dt, *velocity);
   if (state_.interrupted) return features;
   const MotionHypothesis found = search_.find(sceneOf(features, dt, guess), largestDoubt());

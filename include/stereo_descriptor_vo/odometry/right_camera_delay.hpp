@@ -40,7 +40,7 @@ class RightCameraDelay {
 
  private:
   struct Pair {
-    StereoFeatures features;
+    StereoFeatures features;  ///< their positions alone
     Vector6d velocity;  ///< over the time before it
   };
   void addRows(double dt);

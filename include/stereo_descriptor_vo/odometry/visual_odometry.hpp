@@ -174,7 +174,8 @@ class VisualOdometry {
   void endOutage();
   Step seed(const StereoFeatures& features);
   MotionScene sceneOf(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
-  StereoFeatures inStep(const StereoFeatures& taken, double dt, const std::optional<MotionGuess>& guess) const;
+  std::optional<StereoFeatures> inStep(const StereoFeatures& taken, double dt,
+                                       const std::optional<MotionGuess>& guess) const;
   void watchShutters(const StereoFeatures& taken, double dt, const MotionHypothesis& found);
   double largestDoubt() const;
   double secondsSinceMap(const StereoFeatures& features) const;
