@@ -71,8 +71,11 @@ StereoTopics topicsIn(const rosbag::Bag& bag, const StereoNames& names) {
   }
   const bool is_there =
       std::any_of(recorded.begin(), recorded.end(), [&](const auto& t) { return t.name == topics[0]; });
-  const std::vector<ros::M_string> cameras = findStereoCameras("/", recorded);
-  if (!is_there && topics == StereoNames().topics() && cameras.size() == 1)
+  StereoNames usual;
+  const std::string folder = names.camera == usual.camera ? "/" : names.camera + "/";
+  usual.camera = names.camera;
+  const std::vector<ros::M_string> cameras = findStereoCameras(folder, recorded);
+  if (!is_there && topics == usual.topics() && cameras.size() == 1)
     topics = {cameras[0].at("left/image_rect"), cameras[0].at("right/image_rect"), cameras[0].at("left/camera_info"),
               cameras[0].at("right/camera_info")};
   const auto has = [&bag](const std::string& topic) { return rosbag::View(bag, rosbag::TopicQuery(topic)).size() > 0; };

@@ -25,7 +25,7 @@ struct StereoNames {
 };
 
 /// The topics as a bag has them: …/compressed where an image is recorded in that form alone. Where it has none of the
-/// usual names, those of its only stereo camera.
+/// usual names, those of its only stereo camera, or of the only one in the namespace that is given.
 StereoTopics topicsIn(const rosbag::Bag& bag, const StereoNames& names);
 
 /// A message of one of the topics: an image or a calibration.

@@ -406,6 +406,7 @@ TEST_F(Tools, BagsOfOtherNamesAndCompressedImages) {
   EXPECT_NE(outcome.out.find("shuttle: error about "), std::string::npos) << outcome.out;
   fs::remove(results_ / "renamed.txt");
   ASSERT_EQ(runBags(renamed.string(), "--format kitti").exit_code, 0) << "the bag's only stereo camera";
+  EXPECT_EQ(runBags(renamed.string(), "--format kitti --camera /camera").exit_code, 0) << "the only one in a namespace";
   EXPECT_EQ(readText(results_ / "renamed.txt"), readText(poses()));
   expectError(runBags(renamed.string(), "--camera /other"), "1 of 1");
   EXPECT_NE(readText(results_ / "report.csv").find("there is no /other/left/image_rect in it"), std::string::npos);
