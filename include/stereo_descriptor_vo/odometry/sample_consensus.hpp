@@ -30,7 +30,8 @@ struct SampleConsensusOptions {
   void describe(OptionList& list) {
     list.add("consensus", consensus, "outlier rejection; adaptive_gasac is the paper's");
     list.add("inlier_threshold", inlier_threshold, {0.1, 20.0}, "px",
-             "largest length of the stereo reprojection error (u_left, v_left, u_right) of an inlier");
+             "largest length of the stereo reprojection error (u_left, v_left, u_right) of an inlier; times the scale "
+             "of the noise that is learnt");
     list.add("confidence", confidence, {0.5, 0.999999}, "", "probability that one sample without outliers is drawn");
     list.add("min_iterations", min_iterations, {1, 100000}, "", "samples drawn at least");
     list.add("max_iterations", max_iterations, {1, 100000}, "", "samples drawn at most");
