@@ -82,7 +82,7 @@ double partnerOf(const StereoFeatures& features, double dt, const Vector6d& velo
   return known != 0.0 && in_step > 0.5 * kBetter * misfit(features, known, velocity) ? known : 0.0;
 }
 
-constexpr int kSamePoints = 8;         // pairs in which a point is seen (chosen)
+constexpr int kSamePoints = 2;         // pairs in a row whose errors are alike (chosen)
 constexpr double kLeastTurning = 2.0;  // px/s: rotations from images err by less
 
 }  // namespace

@@ -108,7 +108,9 @@ std::optional<RowDelay::Estimate> RowDelay::estimate() const {
   if (blocks_ < kEnough) return std::nullopt;
   const Fit fit = this->fit(cells_);
   const Eigen::Matrix2d inverse = fit.information.inverse();
-  const double few = blocks_ / (blocks_ - 2.0);  // the spread around what it fits itself; heavy tails of a few
+  // Student's distribution: few blocks tell their own spread badly (Wallace's bound of its quantiles).
+  constexpr double kSquare = kSignificant * kSignificant;
+  const double freedom = blocks_ - 2.0, few = freedom / kSquare * std::expm1(kSquare / freedom);
   const Estimate estimate{fit.value[0], std::sqrt(few * (inverse * spread_ * inverse.transpose())(0, 0))};
   if (!(estimate.sigma < kUseful)) return std::nullopt;
   return estimate;
