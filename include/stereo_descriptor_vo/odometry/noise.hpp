@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 /// Probability that chance exceeds the limits of this package, for normal distributions as well as for agreement.

@@ -6,6 +6,8 @@
 #include <optional>
 #include <vector>
 
+#include "stereo_descriptor_vo/common/cpp17.hpp"
+
 namespace sdvo {
 
 /// How much later the right image of a rig is taken, from rows. A point that moves down in the right image at v' px/s
