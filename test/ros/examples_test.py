@@ -143,7 +143,8 @@ class Examples(unittest.TestCase):
             self.addCleanup(collector.close)
         publisher = rospy.Publisher('/split/image_raw', Image, queue_size=10)
         self.assertTrue(wait_until(lambda: is_connected('/split/manager', *(images + infos)) and
-                                   ('in', '/split/image_raw') in links('/split/manager')))
+                                   ('in', '/split/image_raw') in links('/split/manager') and
+                                   ('out', '/split/image_raw', '/split/manager') in links(rospy.get_name())))
         for count, (encoding, size) in enumerate((('mono8', 1), ('bgr8', 3), ('mono16', 2), ('yuv422', 2))):
             whole = np.random.default_rng(1).integers(0, 256, (3, 8, size), dtype=np.uint8)
             padded = np.concatenate((whole.reshape(3, -1), np.zeros((3, 5), np.uint8)), axis=1)

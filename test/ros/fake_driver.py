@@ -96,7 +96,8 @@ class FakeDriver:
         return [publisher.resolved_name for publisher in self.images + self.infos]
 
     def is_subscribed(self):
-        return all(publisher.get_num_connections() > 0 for publisher in self.images + self.infos)
+        publishers = self.images + self.infos + [self.metadata] * (self.metadata is not None)
+        return all(publisher.get_num_connections() > 0 for publisher in publishers)
 
     def info(self, side):
         info = self.sequence.camera_info(side)
