@@ -7,7 +7,7 @@
 namespace sdvo {
 namespace {
 
-/// What is implausible about the camera; empty: nothing.
+/// An implausible value of the camera, in words; empty: there is none.
 std::string doubtOf(const StereoCamera& camera) {
   // Of stereo cameras that robots carry: a lens of 20 to 150 deg, a baseline of 1 cm to 2 m.
   constexpr double kNarrowest = 0.35, kWidest = 7.5, kShortest = 0.01, kLongest = 2.0;

@@ -124,7 +124,7 @@ std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const
   found.shift = current.spacing * position;
   found.correlation = p.ab / std::sqrt(pattern.square * p.aa);
   if (!(found.correlation >= static_cast<float>(options.min_correlation))) return std::nullopt;
-  // What is left of the difference is noise of the images, four parameters fitted, and so tells the position's. It is
+  // The remaining difference is noise of the images, four parameters fitted, and so tells the position's. It is
   // about one image's, because values between samples are smooth. The reference's appears as large as this does. That
   // of a current patch in which the point appears smaller does not shrink: its samples are taken more than once.
   const float left = sumOfSquaredDifferences(square.count(), contrast, grey.data(), pattern.grey.data());

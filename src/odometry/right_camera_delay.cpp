@@ -123,8 +123,8 @@ double RightCameraDelay::drift() const {
 void RightCameraDelay::addRows(double dt) {
   const StereoFeatures& features = pairs_[1].features;
   const double delay = compensated();
-  // The value at the border of two intervals by the means of four, to the fourth order. What shakes faster than the
-  // rate of the pairs shows is not in it, so the instrument has none of that.
+  // The value at the border of two intervals by the means of four, to the fourth order. Motions too fast for
+  // the rate of the pairs are not in it, so the instrument has none of them.
   const Vector6d near = pairs_[1].velocity + pairs_[2].velocity, far = pairs_[0].velocity + pairs_[3].velocity;
   const Vector6d at = (7.0 * near - far) / 12.0;
   const Vector6d during = velocityDuring(delay, dt, pairs_[1].velocity, at, pairs_[2].velocity);

@@ -322,7 +322,7 @@ void VisualOdometry::begin(const StereoFeatures& features, double dt) {
   }
 }
 
-/// What pairs without a measurement have added up begins anew.
+/// The sums over pairs without a measurement begin anew.
 void VisualOdometry::endOutage() {
   state_.predicted_pairs = 0;
   state_.unseen = 0.0;

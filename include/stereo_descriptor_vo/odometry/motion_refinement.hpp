@@ -26,7 +26,7 @@ struct MotionRefinementOptions {
   void describe(OptionList& list) {
     list.add("kernel", kernel, "robust kernel of the refinement");
     list.add("kernel_scale", kernel_scale, {0.05, 20.0}, "px",
-             "residual at which the kernel starts to bend; times that scale");
+             "residual at which the kernel starts to bend; times the scale of the noise that is learnt");
     list.add("refinement_iterations", refinement_iterations, {1, 200}, "", "Levenberg-Marquardt steps at most");
   }
 };

@@ -17,7 +17,7 @@ constexpr double noiseGate(int numbers) {
   return gates[numbers - 1];
 }
 
-/// What measurements err by, and which differences of motions follow from that. Standard deviations in px.
+/// The errors of measurements, and the differences of motions that follow from them. Standard deviations in px.
 class Noise {
  public:
   /// Of a detected corner and of a position by its patch, in each direction, and of a disparity.
@@ -42,8 +42,8 @@ class Noise {
   /// px: two aligned positions that are further apart are not of one point.
   double elsewhere() const { return std::sqrt(2.0 * noiseGate(2)) * aligned_; }
 
-  /// Chi-square of six, by the sum over so many points, beyond which two motions are not one. Neighbours share a part of
-  /// their errors, which does not average out.
+  /// Chi-square of six, by the sum over so many points, beyond which two motions are not one. Neighbours share a part
+  /// of their errors, which does not average out.
   double otherMotion(std::size_t points) const {
     constexpr double kOther = 250.0;     // measured: up to 205 where nothing moved
     constexpr double kOtherOfOne = 1.5;  // the same for each point; 1.7 and more with faults
