@@ -107,11 +107,10 @@ cv::Point2f EpipolarMatcher::searchAround(const cv::Point& left, int disparity) 
   const std::ptrdiff_t step = static_cast<std::ptrdiff_t>(images_.left.step[0]);
   cv::Point2f best;
   unsigned least = std::numeric_limits<unsigned>::max();
-  const auto isBetter = [&](int dv) {
+  for (int dv = -rows; dv <= rows; ++dv) {
     const std::uint8_t* other = images_.right.ptr(left.y + dv + kMargin) + left.x - disparity + kReach + kMargin;
     unsigned differences[2 * kReach + 1];
     blockDifferences<kFullRows>(block, other, step, 2 * kReach + 1, differences);
-    const unsigned least_before = least;
     for (int k = 0; k <= 2 * kReach; ++k) {
       const int d = disparity - kReach + k;
       if (left.x - d < 0 || left.x - d > images_.right.cols - 2 * kMargin) continue;
@@ -120,11 +119,7 @@ cv::Point2f EpipolarMatcher::searchAround(const cv::Point& left, int disparity) 
       const float between = k > 0 && k < 2 * kReach ? valleyBetween(differences + k - 1) : 0.f;
       best = {static_cast<float>(d) + between, static_cast<float>(dv)};
     }
-    return least < least_before;
-  };
-  isBetter(0);
-  for (const int direction : {-1, 1})
-    for (int row = 1; row <= rows && isBetter(direction * row);) ++row;
+  }
   return best;
 }
 
