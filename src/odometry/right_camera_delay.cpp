@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <utility>
 #include <vector>
 
@@ -38,7 +39,8 @@ struct InStep {
 InStep inStep(const StereoFeatures& features, int i, double delay, const Vector6d& velocity) {
   const double u = features.u[i] - features.disparity[i], v = features.v[i] + features.dv[i];
   InStep result{features.disparity[i], Eigen::Vector2d::Zero()};
-  for (int iteration = 0; iteration < 2; ++iteration) {
+  const int iterations = delay == 0.0 ? 1 : 2;
+  for (int iteration = 0; iteration < iterations; ++iteration) {
     // In the middle of the delay.
     const RightFlow flow =
         rightFlow(features.camera, velocity, u - 0.5 * delay * result.flow.x(), v - 0.5 * delay * result.flow.y());
@@ -100,6 +102,16 @@ void RightCameraDelay::measure(const StereoFeatures& features, double dt, const 
   if (pairs_.size() < 4) return;
   addRows(dt);
   pairs_.pop_front();
+}
+
+std::string RightCameraDelay::partnerWords(double dt) const {
+  constexpr double kAnother = 0.5;  // of the interval: the right image is nearer to another pair's
+  const double known = compensated(), delay = std::abs(known) > kAnother * dt ? known : partner_;
+  if (delay == 0.0) return "";
+  std::ostringstream words;
+  words << "the right image seemed to be that of another pair, taken " << std::round(1e3 * std::abs(delay)) << " ms "
+        << (delay < 0.0 ? "earlier" : "later");
+  return words.str();
 }
 
 void RightCameraDelay::expose(const StereoFeatures& features, double distance, double rate) {
