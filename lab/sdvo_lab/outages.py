@@ -262,15 +262,19 @@ def join(all_drives, trials, random, sequence):
 
 
 def is_same(places, run, k, poses_of):
-    """Whether the pose of the sequence's pair k is right: it was last seen in the same drive, which knows its poses."""
+    """Whether the pose of the sequence's pair k is right: it was last seen in the same drive, which knows its poses. One of the
+    place's pairs will do: an object that goes along with the camera misleads those after it."""
     place_of = {place.first + j: place for place in places for j in range(EXCERPT)}
     last = max((j for j in place_of if j < k and run.states[j].has_pose), default=k)
     before, after = place_of[last], place_of[k]
     if before.drive != after.drive or {before.change, after.change} & {mirrored, swapped}:
         return False
-    true = poses.relative(*(poses_of[before.drive][place.numbers[j - place.first]] for place, j in ((before, last), (after, k))))
-    xi = poses.logarithm(poses.relative(true, poses.relative(run.poses[last], run.poses[k])))
-    return max(poses.sigmas(xi, run.states[k].motion)) <= SIGMAS
+
+    def sigmas(j):
+        true = poses.relative(*(poses_of[before.drive][place.numbers[i - place.first]] for place, i in ((before, j), (after, k))))
+        return max(poses.sigmas(poses.logarithm(poses.relative(true, poses.relative(run.poses[j], run.poses[k]))), run.states[k].motion))
+
+    return min(sigmas(j) for j in range(before.first, last + 1) if run.states[j].has_pose) <= SIGMAS
 
 
 def measure_elsewhere(all_drives, work, arguments):
