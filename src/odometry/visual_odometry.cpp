@@ -24,6 +24,18 @@ Noise noiseOf(const VisualOdometryOptions& options) {
   return {options.map.corner_sigma, options.map.reference_sigma, options.window.common_disparity_sigma};
 }
 
+/// Of the motion's inliers over the last `dt` s, as the motion has them: corners have more noise.
+std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHypothesis& found, double dt) {
+  std::vector<RowMotion> rows;
+  rows.reserve(found.motion.inliers.size());
+  for (const int i : found.motion.inliers) {
+    const auto [reference, current, distance] = found.matches[static_cast<std::size_t>(i)];
+    const Eigen::Vector3d now = found.motion.T_current_reference * found.view->rows.positions[reference];
+    rows.push_back({(features.camera.project(now).y() - found.view->pixels[reference].y) / dt, features.dv[current]});
+  }
+  return rows;
+}
+
 }  // namespace
 
 const char* toString(TrackingState state) {
@@ -256,16 +268,14 @@ std::optional<StereoFeatures> VisualOdometry::inStep(const StereoFeatures& taken
 /// Whether all rows of both images are of one moment, and the pairs in their order.
 void VisualOdometry::watchShutters(const StereoFeatures& taken, double dt, const MotionHypothesis& found) {
   if (!found.motion.success || state_.interrupted || !(dt > 0.0)) return state_.right_delay.interrupt();
-  const Vector6d velocity = logSE3(found.motion.T_current_reference.inverse()) / secondsSinceMap(taken);
+  const double since = secondsSinceMap(taken);
+  const Eigen::Isometry3d T_reference_current = found.motion.T_current_reference.inverse();
+  const Vector6d velocity = logSE3(T_reference_current) / since;
   state_.readout.add(taken.camera, found.motion.T_current_reference, found.correspondences, found.motion.inliers,
                      velocity);
-  state_.right_delay.measure(taken, dt, velocity);
-  // Of neighbours that changed places the second goes back by half of the first one's motion, which was twice too
-  // large.
-  constexpr double kAlike = 0.2;  // ratio of that (chosen)
-  if (const auto& last = state_.prior.velocity();
-      last && found.innovation > noiseGate(6) && (velocity + 0.5 * *last).norm() < kAlike * last->norm())
-    state_.doubt.raise(CarriedDoubt::kCertain, "neighbouring pairs seemed to have changed places");
+  state_.right_delay.measure(taken, rowMotions(taken, found, since), dt, velocity);
+  state_.doubt.raise(CarriedDoubt::kUnsuspected + state_.prior.logRatioOfSwap(T_reference_current, since),
+                     "neighbouring pairs seemed to have changed places");
   constexpr double kAnother = 0.5;  // of the interval: the right image is nearer to another pair's
   const double known = state_.right_delay.compensated();
   const double delay = std::abs(known) > kAnother * dt ? known : state_.right_delay.partner();

@@ -95,6 +95,16 @@ TEST(PoseCovariance, AMotionIsThatOfTheLastTwoPosesToEachOther) {
   EXPECT_NEAR(motion(0, 0), kCommon + kGood, 1e-9);
 }
 
+TEST(PoseCovariance, AMotionIsAsUncertainInEachDirectionAsTheWorseOfTheTwoPoses) {
+  PoseCovariance covariance;
+  Matrix6d sideways = diagonal(0.1, 0.01), ahead = sideways;
+  sideways(0, 0) = 0.9, ahead(2, 2) = 0.9;
+  covariance.measure(Eigen::Isometry3d::Identity(), sideways);
+  Matrix6d both = sideways;
+  both(2, 2) = 0.9;
+  expectEqual(covariance.measure(Eigen::Isometry3d::Identity(), ahead), both);
+}
+
 TEST(PoseCovariance, ContainsWhatASecondThoughtMoved) {
   PoseCovariance covariance;
   const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();

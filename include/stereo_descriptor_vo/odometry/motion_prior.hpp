@@ -66,6 +66,10 @@ class MotionPrior {
   /// The same around a motion that another source measured, whose error is as a prediction's within one pair.
   ExpectedMotion around(const Eigen::Isometry3d& motion, double dt) const;
 
+  /// Logarithm of how much likelier the last motion and this one, over `dt` s, are if the two pairs changed places: the
+  /// first one then seems twice as far, and the second one behind it.
+  double logRatioOfSwap(const Eigen::Isometry3d& motion, double dt) const;
+
   /// Of an unseen motion around a standstill, m and rad: its speed was that of the confirmed velocity, and is bounded.
   Matrix6d unseen(double seconds) const;
 
@@ -78,7 +82,7 @@ class MotionPrior {
                bool is_confirmed, const Matrix6d& doubt);
 
   /// The next pair does not continue the last one: no motion is predicted. The confirmed velocity stays.
-  void interrupt() { velocity_.reset(), doubt_.setZero(); }
+  void interrupt() { velocity_.reset(), before_.reset(), doubt_.setZero(); }
   void forget();
 
  private:
@@ -86,7 +90,7 @@ class MotionPrior {
   Matrix6d stampNoise(const Vector6d& velocity) const;
 
   MotionPriorOptions options_;
-  std::optional<Vector6d> velocity_, confirmed_;  ///< m/s and rad/s
+  std::optional<Vector6d> velocity_, before_, confirmed_;  ///< m/s and rad/s; `before_` is of the motion before the last
   Matrix6d velocity_covariance_ = Matrix6d::Zero(), confirmed_covariance_ = Matrix6d::Zero();
   Matrix6d doubt_ = Matrix6d::Zero();  ///< of the last measured motion, m and rad
   std::int64_t confirmed_stamp_ = 0;   ///< ns

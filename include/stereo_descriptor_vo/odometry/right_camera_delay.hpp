@@ -3,12 +3,19 @@
 #include <Eigen/Core>
 #include <deque>
 #include <optional>
+#include <vector>
 
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/odometry/row_delay.hpp"
 
 namespace sdvo {
+
+/// A point that agrees with the motion.
+struct RowMotion {
+  double velocity;  ///< down in the left image, px/s
+  double dv;        ///< v_right - v_left, px
+};
 
 /// The time by which the right image is taken later than the left one, and what it does to the features. A turn shifts
 /// all disparities of such a rig by f * rate * delay: 1 px for 3 ms at 100 deg/s and f = 212 px.
@@ -18,8 +25,8 @@ class RightCameraDelay {
   explicit RightCameraDelay(double prior = 0.0);
 
   /// Takes note of a pair, as taken, with the camera's mean velocity (its own frame, m/s and rad/s) over the `dt` s
-  /// before it.
-  void measure(const StereoFeatures& features, double dt, const Vector6d& velocity);
+  /// before it. `rows` are of its points.
+  void measure(const StereoFeatures& features, const std::vector<RowMotion>& rows, double dt, const Vector6d& velocity);
   /// The next pair does not continue the last one.
   void interrupt() { pairs_.clear(); }
 
