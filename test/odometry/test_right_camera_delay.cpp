@@ -35,8 +35,7 @@ std::vector<RowMotion> rowsOf(const StereoFeatures& features, const Vector6d& ve
   std::vector<RowMotion> rows;
   constexpr double kStep = 1e-3;  // s
   const StereoFeatures later = seen(velocity, kStep), now = seen(velocity, 0.0);
-  for (int i = 0; i < features.count(); ++i)
-    rows.push_back({(later.dv[i] - now.dv[i]) / kStep, features.dv[i]});
+  for (int i = 0; i < features.count(); ++i) rows.push_back({(later.dv[i] - now.dv[i]) / kStep, features.dv[i]});
   return rows;
 }
 

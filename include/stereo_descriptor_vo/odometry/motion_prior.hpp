@@ -90,7 +90,8 @@ class MotionPrior {
   Matrix6d stampNoise(const Vector6d& velocity) const;
 
   MotionPriorOptions options_;
-  std::optional<Vector6d> velocity_, before_, confirmed_;  ///< m/s and rad/s; `before_` is of the motion before the last
+  std::optional<Vector6d> velocity_, before_,
+      confirmed_;  ///< m/s and rad/s; `before_` is of the motion before the last
   Matrix6d velocity_covariance_ = Matrix6d::Zero(), confirmed_covariance_ = Matrix6d::Zero();
   Matrix6d doubt_ = Matrix6d::Zero();  ///< of the last measured motion, m and rad
   std::int64_t confirmed_stamp_ = 0;   ///< ns
