@@ -71,8 +71,10 @@ ExpectedMotion MotionPrior::around(const Eigen::Isometry3d& motion, double dt) c
 double MotionPrior::logRatioOfSwap(const Eigen::Isometry3d& motion, double dt) const {
   if (!velocity_ || !before_) return 0.0;
   const Vector6d now = logSE3(motion) / dt, first = *velocity_ + now;
+  // Bounded by the probability that the prior is wrong.
   const auto cost = [&](const Vector6d& from, const Vector6d& to) {
-    return 0.5 * around(expSE3(from * dt), dt).normalisedSquare(expSE3(to * dt), Matrix6d::Zero());
+    const double square = around(expSE3(from * dt), dt).normalisedSquare(expSE3(to * dt), Matrix6d::Zero());
+    return std::min(0.5 * square, -std::log(kTailProbability));
   };
   return cost(*before_, *velocity_) + cost(*velocity_, now) - cost(*before_, first) - cost(first, -now);
 }

@@ -39,7 +39,8 @@ Matrix6d noLessThan(const Matrix6d& before, Matrix6d covariance) {
 /// No less than either in any direction.
 Matrix6d covering(const Matrix6d& a, const Matrix6d& b) {
   const Eigen::SelfAdjointEigenSolver<Matrix6d> more(a - b);
-  return b + more.eigenvectors() * more.eigenvalues().cwiseMax(0.0).asDiagonal() * more.eigenvectors().transpose();
+  const Matrix6d roots = more.eigenvectors() * more.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  return b + Matrix6d((roots * roots.transpose()).selfadjointView<Eigen::Lower>());
 }
 
 }  // namespace

@@ -100,8 +100,14 @@ TEST(MotionPrior, APairThatGoesBackAfterOneThatWentTwiceAsFarChangedPlacesWithIt
   prior.measure(kSecond + kSecond / 10, ahead(0.18), kStep, Matrix6d::Zero(), true, Matrix6d::Zero());
   EXPECT_GT(prior.logRatioOfSwap(ahead(kBack), kStep), 6.9) << "a thousand times as likely";
   EXPECT_LT(prior.logRatioOfSwap(ahead(0.18), kStep), 0.0) << "it became faster";
-  EXPECT_LT(prior.logRatioOfSwap(ahead(0.0), kStep), 0.0) << "it stopped";
   EXPECT_LT(prior.logRatioOfSwap(ahead(0.09), kStep), 0.0);
+}
+
+TEST(MotionPrior, ATurnThatIsReversedIsNoSwap) {
+  MotionPrior prior({});
+  for (int i = 0; i < 2; ++i)
+    prior.measure((1 + i) * kSecond, ahead(0.0, 0.2), 0.1, Matrix6d::Zero(), true, Matrix6d::Zero());
+  EXPECT_LT(prior.logRatioOfSwap(ahead(0.0, -0.2), 0.1), 0.0) << "both would be beyond what a camera does";
 }
 
 TEST(MotionPrior, InnovationsAreSquaredInStandardDeviations) {
