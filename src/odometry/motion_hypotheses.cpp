@@ -8,13 +8,13 @@
 #include <utility>
 
 #include "ascending_rows.hpp"
+#include "stereo_descriptor_vo/odometry/motion_doubt.hpp"
 #include "stereo_descriptor_vo/odometry/pose_problem.hpp"
 
 namespace sdvo {
 namespace {
 
 constexpr double kLogOddsOfSighting = 0.75;  // that a point stands still, by each confirmed sighting (chosen)
-constexpr double kHalfLife = 2.5;            // pairs: a certain doubt then lasts for three more (chosen)
 
 /// Of n observations that are correlated by this coefficient (Kish 1965, the design effect): 2.5 at most. Points of one
 /// object move together, and a view has few objects.
@@ -253,16 +253,6 @@ MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::v
   }
   chosen.match_time = match_time, chosen.motion_time = motion_time;
   return chosen;
-}
-
-void CarriedDoubt::raise(double log_odds, const std::string& cause) {
-  if (log_odds <= log_odds_) return;
-  log_odds_ = std::min(log_odds, kCertain);
-  cause_ = cause;
-}
-
-void CarriedDoubt::pass() {
-  log_odds_ = kUnsuspected + (log_odds_ - kUnsuspected) * std::exp2(-1.0 / kHalfLife);
 }
 
 double coverage(const StereoFeatures& features, const std::vector<int>& rows) {

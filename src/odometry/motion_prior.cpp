@@ -90,6 +90,11 @@ std::string MotionPrior::tooFast(const Eigen::Isometry3d& motion, const Matrix6d
   return words.str();
 }
 
+bool MotionPrior::seemsSwapped(const Vector6d& velocity) const {
+  constexpr double kAlike = 0.2;  // ratio of the velocity before (chosen)
+  return velocity_ && (velocity + 0.5 * *velocity_).norm() < kAlike * velocity_->norm();
+}
+
 void MotionPrior::measure(std::int64_t stamp, const Eigen::Isometry3d& motion, double dt, const Matrix6d& covariance,
                           bool is_confirmed, const Matrix6d& doubt) {
   doubt_ = doubt;

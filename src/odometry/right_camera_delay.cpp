@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <sstream>
 #include <utility>
 #include <vector>
 
@@ -100,6 +101,16 @@ void RightCameraDelay::measure(const StereoFeatures& features, double dt, const 
   if (pairs_.size() < 4) return;
   addRows(dt);
   pairs_.pop_front();
+}
+
+std::string RightCameraDelay::partnerWords(double dt) const {
+  constexpr double kAnother = 0.5;  // of the interval: the right image is nearer to another pair's
+  const double known = compensated(), delay = std::abs(known) > kAnother * dt ? known : partner_;
+  if (delay == 0.0) return "";
+  std::ostringstream words;
+  words << "the right image seemed to be that of another pair, taken " << std::round(1e3 * std::abs(delay)) << " ms "
+        << (delay < 0.0 ? "earlier" : "later");
+  return words.str();
 }
 
 void RightCameraDelay::expose(const StereoFeatures& features, double distance, double rate) {

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
+#include "stereo_descriptor_vo/odometry/unmeasured_step.hpp"
 
 namespace sdvo {
 namespace {
@@ -20,31 +21,7 @@ Eigen::Isometry3d lookingAhead() {
   return T_base_camera;
 }
 
-Noise noiseOf(const VisualOdometryOptions& options) {
-  return {options.map.corner_sigma, options.map.reference_sigma, options.window.common_disparity_sigma};
-}
-
 }  // namespace
-
-const char* toString(TrackingState state) {
-  switch (state) {
-    case TrackingState::kWaiting:
-      return "WAITING";
-    case TrackingState::kTracking:
-      return "TRACKING";
-    case TrackingState::kDegraded:
-      return "DEGRADED";
-    case TrackingState::kLost:
-      return "LOST";
-  }
-  return "UNKNOWN";
-}
-
-VisualOdometry::State::State(const VisualOdometryOptions& options)
-    : calibration(options.calibration),
-      right_delay(options.calibration.right_delay),
-      prior(options.tracking),
-      noise(noiseOf(options)) {}
 
 VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
     : options_(checked(options)),
@@ -53,7 +30,7 @@ VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
       reacquisition_(options.matcher, options.motion),
       revisit_(options.matcher, options.motion, options.alignment),
       optimizer_(options.window),
-      state_(options) {}
+      state_(options, 0) {}
 
 void VisualOdometry::configure(const VisualOdometryOptions& options) {
   options_ = checked(options);
@@ -65,13 +42,11 @@ void VisualOdometry::configure(const VisualOdometryOptions& options) {
 }
 
 void VisualOdometry::reset() {
-  state_ = State(options_);
-  ++epoch_;
+  state_ = OdometryState(options_, state_.epoch + 1);
 }
 
 void VisualOdometry::breakStream() {
-  state_.interrupted = true;
-  state_.prior.interrupt();
+  state_.interrupt();
 }
 
 void VisualOdometry::forgetTime() {
@@ -88,110 +63,45 @@ void VisualOdometry::mountAt(const Eigen::Isometry3d& T_base_camera) {
   if (is_same || !state_.started) return;
   breakStream();
   state_.map.reset();  // it is in the old camera's axes
-  forgetRig();
+  state_.forgetRig(options_);
   state_.T_origin_camera = orthonormalised(T_before_now.inverse() * state_.T_origin_camera * T_before_now);
   state_.covariance.advance(T_before_now, Matrix6d::Zero());
 }
 
 void VisualOdometry::takePose(const Matrix6d& covariance) {
   state_.covariance.assume(covariance);
-  ++epoch_;
+  ++state_.epoch;
   if (!state_.interrupted) return;
   state_.map.reset();
   state_.started = false;
 }
 
-/// The part of a scale error that a longer way adds.
-Matrix6d GuessedMotion::add(const MotionGuess& guess) {
-  constexpr double kLeast = 1e-3;  // m and rad (chosen): no odometry stands still to less
-  const Vector6d motion = logSE3(guess.T_previous_current);
-  const auto grow = [&](double& way, double by) {
-    const double before = way;
-    way += std::max(by, kLeast);
-    return guess.error * guess.error * (way * way - before * before);
-  };
-  Vector6d variance;
-  variance.head<3>().setConstant(grow(distance_, motion.head<3>().norm()));
-  variance.tail<3>().setConstant(grow(angle_, motion.tail<3>().norm()));
-  return variance.asDiagonal();
-}
-
-/// The motion of a guess. The translation that a gyro lacks is the prior's.
-Eigen::Isometry3d VisualOdometry::motionOf(const MotionGuess& guess, double dt) const {
-  Eigen::Isometry3d motion = guess.T_previous_current;
-  if (guess.rotation_only) motion.translation() = state_.prior.velocity().value_or(Vector6d::Zero()).head<3>() * dt;
-  return motion;
-}
-
-/// The covariance by which an unseen motion grew over the last `dt` s.
-Matrix6d VisualOdometry::unseen(double dt) const {
-  return state_.prior.unseen(state_.unseen) - state_.prior.unseen(state_.unseen - dt);
-}
-
-/// Takes note of a guess, or that there is none, for as long as there is no pose.
-void VisualOdometry::follow(const std::optional<MotionGuess>& guess, double dt) {
-  if (!guess) state_.followed.reset();
-  if (!state_.followed) return;
-  State::Followed& followed = *state_.followed;
-  const Eigen::Isometry3d motion = motionOf(*guess, dt);
-  const Matrix6d carried = adjoint(motion.inverse());
-  Matrix6d covariance = state_.guessed.add(*guess);
-  if (guess->rotation_only) covariance.topLeftCorner<3, 3>() = unseen(dt).topLeftCorner<3, 3>();
-  followed.motion = followed.motion * motion;
-  followed.covariance = carried * followed.covariance * carried.transpose() + covariance;
-  followed.rotation_only |= guess->rotation_only;
-}
-
 OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::optional<MotionGuess>& guess) {
   refuse(given);
-  // A lens that focuses changes the camera with every pair; the pixels of one map are those of one camera.
-  const bool is_refocused = state_.camera && *state_.camera != given.camera && state_.camera->isLike(given.camera);
-  StereoFeatures refocused, new_part;
-  const StereoFeatures& whole = is_refocused ? refocused = given.seenBy(*state_.camera) : given;
-  const std::vector<int> new_rows = state_.images.newRows(whole);
-  const bool is_torn = static_cast<int>(new_rows.size()) < whole.count();
-  const StereoFeatures& taken = is_torn ? new_part = whole.select(new_rows) : whole;
-  const double dt = state_.last_stamp ? static_cast<double>(taken.stamp - *state_.last_stamp) * 1e-9 : 0.0;
-  const bool continued = state_.map && state_.map->continuedBy(taken);
-  const bool frozen = !state_.interrupted && isFrozen(taken, dt, guess);
-  const std::optional<StereoFeatures> in_step = continued && !frozen ? inStep(taken, dt, guess) : std::nullopt;
-  const StereoFeatures& features = in_step ? *in_step : taken;
-  const std::optional<MotionScene> scene = !continued || frozen ? std::nullopt
-                                           : state_.interrupted ? reacquire(features)
-                                                                : std::optional(sceneOf(features, dt, guess));
+  const Pair pair = usable(given, guess);
+  const StereoFeatures& features = pair.features();
+  const std::optional<MotionScene> scene = !pair.continued || pair.frozen ? std::nullopt
+                                           : state_.interrupted           ? reacquire(features)
+                                                                : std::optional(sceneOf(features, pair.dt, guess));
   MotionHypothesis found;
   if (scene) found = search_.find(*scene, largestDoubt());
 
   // Nothing has changed so far, and from here on nothing is refused.
   Stopwatch stopwatch;
-  begin(features, dt);
-  follow(guess, dt);
-  watchShutters(taken, dt, found);
+  begin(pair, guess);
+  watchShutters(pair, found);
   Step step;
-  if (!continued || (state_.interrupted && !found.motion.success))
-    step = seed(features);
-  else if (frozen)
-    step = hold(dt);
+  if (!pair.continued || (state_.interrupted && !found.motion.success))
+    step = startMap(options_, features, state_);
+  else if (pair.frozen)
+    step = holdPose(pair.dt, state_);
   else if (!found.motion.success)
-    step = predict(features, dt, found.motion.reason);
+    step = predictMotion(options_, features, pair.dt, found.motion.reason, state_);
   else
-    step = extendMap(features, *scene, found, dt);
-  // Unless the camera went unseen, the views may not be of one rigid world, and the next map would be as wrong.
-  if (scene && !found.motion.success && found.agreement.matches >= kManyMatches && dt <= options_.tracking.max_gap)
-    state_.doubt.raise(CarriedDoubt::kCertain, "many matches agreed on no motion");
-  // The depths of its points may be those of a wrong rig.
-  if (features.report.refused && step.state == TrackingState::kLost) state_.map.reset();
-  state_.doubt.pass();
-  state_.images.remember(whole, frozen);
-  if (is_torn && step.reason.empty()) step.reason = "a part of the left image repeats that of the previous pair";
-  step.dt = step.T_previous_current ? static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9 : dt;
-  if (step.T_previous_current) move(*step.T_previous_current);
-  if (step.state == TrackingState::kTracking || step.state == TrackingState::kDegraded)
-    state_.last_pose_stamp = features.stamp, state_.followed = State::Followed();
+    step = extendMap(features, *scene, found, pair.dt);
+  finish(pair, scene ? &found : nullptr, step);
   step.time = stopwatch.lap();
-  OdometryResult result = report(features, found, step);
-  for (FeatureFlow& flow : result.flow) flow.current = new_rows[static_cast<std::size_t>(flow.current)];
-  return result;
+  return state_.report(features, pair.new_rows, found, step, floor());
 }
 
 void VisualOdometry::refuse(const StereoFeatures& features) const {
@@ -199,6 +109,23 @@ void VisualOdometry::refuse(const StereoFeatures& features) const {
   if (state_.last_stamp && features.stamp <= *state_.last_stamp)
     throw std::invalid_argument("stamp " + std::to_string(features.stamp) + " ns is not later than the last one, " +
                                 std::to_string(*state_.last_stamp) + " ns");
+}
+
+/// The pair as the motion is searched with it.
+VisualOdometry::Pair VisualOdometry::usable(const StereoFeatures& given,
+                                            const std::optional<MotionGuess>& guess) const {
+  Pair pair{given};
+  // A lens that focuses changes the camera with every pair; the pixels of one map are those of one camera.
+  if (state_.camera && *state_.camera != given.camera && state_.camera->isLike(given.camera))
+    pair.refocused = given.seenBy(*state_.camera);
+  pair.new_rows = state_.images.newRows(pair.whole());
+  if (static_cast<int>(pair.new_rows.size()) < given.count()) pair.new_part = pair.whole().select(pair.new_rows);
+  const StereoFeatures& taken = pair.taken();
+  if (state_.last_stamp) pair.dt = static_cast<double>(taken.stamp - *state_.last_stamp) * 1e-9;
+  pair.continued = state_.map && state_.map->continuedBy(taken);
+  pair.frozen = !state_.interrupted && isFrozen(taken, pair.dt, guess);
+  if (pair.continued && !pair.frozen) pair.in_step = inStep(taken, pair.dt, guess);
+  return pair;
 }
 
 /// A camera that repeats its images seems to stand. The guess, or the motion before, shows whether it does.
@@ -218,22 +145,22 @@ MotionScene VisualOdometry::sceneOf(const StereoFeatures& features, double dt,
                                     const std::optional<MotionGuess>& guess) const {
   const MotionPrior& prior = state_.prior;
   MotionScene scene{*state_.map,
-                    state_.calibration.calibration(),
+                    state_.rig.calibration.calibration(),
                     features,
                     {},
                     {},
                     {},
-                    state_.usual_agreement,
+                    state_.rig.usual_agreement,
                     state_.doubt.logOdds() > largestDoubt(),
                     options_.tracking.doubtful_deviation,
-                    state_.noise};
+                    state_.rig.noise};
   const Eigen::Isometry3d T_reference_previous = state_.map->newestPose() * state_.T_origin_camera;
-  const double since = secondsSinceMap(features);
+  const double since = state_.secondsSinceMap(features);
   if (const auto confirmed = prior.confirmed(state_.map->newestStamp(), since)) scene.prior.push_back(*confirmed);
   if (prior.velocity() && dt <= options_.tracking.max_gap)
     scene.T_current_reference = (T_reference_previous * prior.predicted(dt).motion).inverse();
   if (guess) {
-    scene.guess = (T_reference_previous * motionOf(*guess, dt)).inverse();
+    scene.guess = (T_reference_previous * guess->motion(prior, dt)).inverse();
     if (!scene.prior.empty()) scene.prior.push_back(prior.around(scene.guess->inverse(), since));
   }
   return scene;
@@ -244,36 +171,28 @@ MotionScene VisualOdometry::sceneOf(const StereoFeatures& features, double dt,
 std::optional<StereoFeatures> VisualOdometry::inStep(const StereoFeatures& taken, double dt,
                                                      const std::optional<MotionGuess>& guess) const {
   const std::optional<Vector6d>& velocity = state_.prior.velocity();
-  if (state_.right_delay.compensated() == 0.0 || !velocity || dt > options_.tracking.max_gap) return std::nullopt;
-  StereoFeatures features = state_.right_delay.inStep(taken, dt, *velocity);
+  if (state_.rig.right_delay.compensated() == 0.0 || !velocity || dt > options_.tracking.max_gap) return std::nullopt;
+  StereoFeatures features = state_.rig.right_delay.inStep(taken, dt, *velocity);
   if (state_.interrupted) return features;
   const MotionHypothesis found = search_.find(sceneOf(features, dt, guess), largestDoubt());
   if (!found.motion.success) return features;
-  return state_.right_delay.inStep(taken, dt,
-                                   logSE3(found.motion.T_current_reference.inverse()) / secondsSinceMap(taken));
+  return state_.rig.right_delay.inStep(
+      taken, dt, logSE3(found.motion.T_current_reference.inverse()) / state_.secondsSinceMap(taken));
 }
 
 /// Whether all rows of both images are of one moment, and the pairs in their order.
-void VisualOdometry::watchShutters(const StereoFeatures& taken, double dt, const MotionHypothesis& found) {
-  if (!found.motion.success || state_.interrupted || !(dt > 0.0)) return state_.right_delay.interrupt();
-  const Vector6d velocity = logSE3(found.motion.T_current_reference.inverse()) / secondsSinceMap(taken);
-  state_.readout.add(taken.camera, found.motion.T_current_reference, found.correspondences, found.motion.inliers,
-                     velocity);
-  state_.right_delay.measure(taken, dt, velocity);
-  // Of neighbours that changed places the second goes back by half of the first one's motion, which was twice too
-  // large.
-  constexpr double kAlike = 0.2;  // ratio of that (chosen)
-  if (const auto& last = state_.prior.velocity();
-      last && found.innovation > noiseGate(6) && (velocity + 0.5 * *last).norm() < kAlike * last->norm())
+void VisualOdometry::watchShutters(const Pair& pair, const MotionHypothesis& found) {
+  LearntRig& rig = state_.rig;
+  const StereoFeatures& taken = pair.taken();
+  if (!found.motion.success || state_.interrupted || !(pair.dt > 0.0)) return rig.right_delay.interrupt();
+  const Vector6d velocity = logSE3(found.motion.T_current_reference.inverse()) / state_.secondsSinceMap(taken);
+  rig.readout.add(taken.camera, found.motion.T_current_reference, found.correspondences, found.motion.inliers,
+                  velocity);
+  rig.right_delay.measure(taken, pair.dt, velocity);
+  if (found.innovation > noiseGate(6) && state_.prior.seemsSwapped(velocity))
     state_.doubt.raise(CarriedDoubt::kCertain, "neighbouring pairs seemed to have changed places");
-  constexpr double kAnother = 0.5;  // of the interval: the right image is nearer to another pair's
-  const double known = state_.right_delay.compensated();
-  const double delay = std::abs(known) > kAnother * dt ? known : state_.right_delay.partner();
-  if (delay == 0.0) return;
-  std::ostringstream cause;
-  cause << "the right image seemed to be that of another pair, taken " << std::round(1e3 * std::abs(delay)) << " ms "
-        << (delay < 0.0 ? "earlier" : "later");
-  state_.doubt.raise(CarriedDoubt::kCertain, cause.str());
+  const std::string cause = rig.right_delay.partnerWords(pair.dt);
+  if (!cause.empty()) state_.doubt.raise(CarriedDoubt::kCertain, cause);
 }
 
 /// Log-odds of being misled above which a motion is doubtful.
@@ -281,13 +200,9 @@ double VisualOdometry::largestDoubt() const {
   return logOdds(1.0 - options_.tracking.probability);
 }
 
-double VisualOdometry::secondsSinceMap(const StereoFeatures& features) const {
-  return static_cast<double>(features.stamp - state_.map->newestStamp()) * 1e-9;
-}
-
 /// Looks for the pair in the map from before an outage. How the camera moved meanwhile is unknown.
 std::optional<MotionScene> VisualOdometry::reacquire(const StereoFeatures& features) const {
-  const auto T_current_newest = reacquisition_.find(*state_.map, features, state_.calibration.calibration());
+  const auto T_current_newest = reacquisition_.find(*state_.map, features, state_.rig.calibration.calibration());
   if (!T_current_newest) return std::nullopt;
   MotionScene scene = sceneOf(features, 0.0, std::nullopt);
   scene.prior.clear();
@@ -295,106 +210,73 @@ std::optional<MotionScene> VisualOdometry::reacquire(const StereoFeatures& featu
   return scene;
 }
 
-/// What was learnt is of another rig.
-void VisualOdometry::forgetRig() {
-  state_.calibration = CalibrationFilter(options_.calibration);
-  state_.right_rotation = RightCameraRotation();
-  state_.noise = noiseOf(options_);
-  state_.right_delay = RightCameraDelay(options_.calibration.right_delay);
-  state_.readout = RowReadout();
-}
-
 /// Takes note of the pair, whatever becomes of its motion.
-void VisualOdometry::begin(const StereoFeatures& features, double dt) {
-  if (state_.camera && *state_.camera != features.camera) forgetRig();
+void VisualOdometry::begin(const Pair& pair, const std::optional<MotionGuess>& guess) {
+  const StereoFeatures& features = pair.features();
+  if (state_.camera && *state_.camera != features.camera) state_.forgetRig(options_);
   state_.camera = features.camera;
   state_.last_stamp = features.stamp;
-  state_.unseen += dt;
   ++state_.pairs;
-  if (dt <= options_.tracking.max_gap) state_.prior.pass(dt);
+  if (pair.dt <= options_.tracking.max_gap) state_.prior.pass(pair.dt);
+  state_.outage.pass(pair.dt, guess, state_.prior);
   // The map is of another rig than this pair.
-  const double turned = state_.right_rotation.add(features);
+  const double turned = state_.rig.right_rotation.add(features);
   state_.doubt.raise(CarriedDoubt::kUnsuspected + 0.5 * turned * turned, "the right camera seems to have turned");
   if (features.report.refused) {
     // What the pairs before told of the rig may be wrong already, and those after may be refused again.
-    state_.calibration = CalibrationFilter(options_.calibration);
+    state_.rig.calibration = CalibrationFilter(options_.calibration);
     state_.doubt.raise(CarriedDoubt::kCertain, "left and right did not belong together");
   }
 }
 
-/// The sums over pairs without a measurement begin anew.
-void VisualOdometry::endOutage() {
-  state_.predicted_pairs = 0;
-  state_.unseen = 0.0;
-  state_.guessed = GuessedMotion();
-}
-
-VisualOdometry::Step VisualOdometry::seed(const StereoFeatures& features) {
-  Step step;
-  breakStream();
-  if (features.count() < options_.motion.min_inliers) {
-    step.state = state_.started ? TrackingState::kLost : TrackingState::kWaiting;
-    step.reason = "only " + std::to_string(features.count()) + " features" +
-                  (features.report.status.empty() ? "" : ": " + features.report.status);
-    return step;
-  }
-  if (state_.started && state_.followed) {
-    step.state = TrackingState::kDegraded;
-    step.reason = state_.followed->rotation_only ? "started again as the gyro turned; the translation is predicted"
-                                                 : "started again where the guess has the camera";
-    if (state_.followed->rotation_only) ++epoch_;
-    step.T_previous_current = state_.followed->motion;
-    step.covariance = state_.followed->covariance;
-    state_.covariance.advance(*step.T_previous_current, step.covariance);
-    state_.covariance.assume(state_.covariance.value());
-  } else if (state_.started) {
-    ++epoch_;
-    const double unseen = std::max(0.0, static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9);
-    state_.covariance.restart(state_.prior.unseen(unseen));
-    step.state = TrackingState::kDegraded;
-    step.reason = "started again from the last pose; the motion in between is unknown";
-  } else {
-    step.state = TrackingState::kTracking;
-    step.reason = "first pair";
-  }
-  state_.started = true;
-  state_.interrupted = false;
-  endOutage();
-  state_.map.emplace(options_.map);
-  const Eigen::Isometry3d T_previous_current = step.T_previous_current.value_or(Eigen::Isometry3d::Identity());
-  state_.map->insert(options_.alignment, features, state_.pairs,
-                     (state_.T_origin_camera * T_previous_current).inverse(), {}, state_.calibration.calibration());
-  return step;
+/// Takes note of what became of the pair. `found`: the motion that was searched.
+void VisualOdometry::finish(const Pair& pair, const MotionHypothesis* found, Step& step) {
+  const StereoFeatures& features = pair.features();
+  // Unless the camera went unseen, the views may not be of one rigid world, and the next map would be as wrong.
+  if (found && !found->motion.success && found->agreement.matches >= kManyMatches &&
+      pair.dt <= options_.tracking.max_gap)
+    state_.doubt.raise(CarriedDoubt::kCertain, "many matches agreed on no motion");
+  // The depths of its points may be those of a wrong rig.
+  if (features.report.refused && step.state == TrackingState::kLost) state_.map.reset();
+  state_.doubt.pass();
+  state_.images.remember(pair.whole(), pair.frozen);
+  if (pair.new_part && step.reason.empty()) step.reason = "a part of the left image repeats that of the previous pair";
+  step.dt = step.T_previous_current ? static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9 : pair.dt;
+  if (step.T_previous_current) state_.move(*step.T_previous_current);
+  if (!step.hasPose()) return;
+  state_.last_pose_stamp = features.stamp;
+  state_.outage.havePose();
 }
 
 /// The pair joins the map unless the adjustment refutes its motion.
 VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, const MotionScene& scene,
                                                MotionHypothesis& found, double dt) {
   const auto refute = [&](const std::string& why) {
-    return state_.interrupted ? seed(features) : predict(features, dt, why);
+    return state_.interrupted ? startMap(options_, features, state_)
+                              : predictMotion(options_, features, dt, why, state_);
   };
-  const double since = secondsSinceMap(features);
+  const double since = state_.secondsSinceMap(features);
   const Eigen::Isometry3d T_reference_current = found.motion.T_current_reference.inverse();
   std::string refutation = state_.prior.tooFast(T_reference_current, found.motion.covariance, since);
   // What is followed was likely something else already, and this is no motion of the camera: the prior's is likelier.
   if (refutation.empty() && scene.is_doubted && scene.T_current_reference && logOddsMisled(scene, found) > 0.0)
     refutation = innovationWords(found) + ", right after " + state_.doubt.cause();
   if (!refutation.empty()) return refute(refutation);
-  const bool is_sound = doubtOf(scene, found).probability >= options_.tracking.probability;
+  const bool is_sound = MotionDoubt(scene, found, state_.doubt).probability >= options_.tracking.probability;
   const Candidate candidate = adjust(features, found, is_sound);
   found.reject(candidate.adjustment.rejected_rows);
   refutation = search_.chanceWords(scene, found);
   if (refutation.empty()) refutation = state_.prior.tooFast(candidate.motion, found.motion.covariance, since);
   if (!refutation.empty()) return refute(refutation + " after the adjustment");
 
-  const Doubt doubt = doubtOf(scene, found);
+  const MotionDoubt doubt(scene, found, state_.doubt);
   state_.doubt.raise(doubt.log_odds, doubt.cause);
   commit(candidate, doubt.probability);
   Step step = measure(found, candidate);
   const Matrix6d measured = step.covariance;
   judge(scene, found, candidate, doubt, step);
   const bool is_confirmed = step.state == TrackingState::kTracking;
-  if (is_confirmed) learn(found);
+  if (is_confirmed) state_.rig.learn(found);
   // A motion that is likely something else's predicts nothing.
   if (doubt.probability >= 0.5)
     state_.prior.measure(features.stamp, T_reference_current, since, measured, is_confirmed,
@@ -403,23 +285,12 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
     const std::string off = state_.floor.note(*floor(), state_.map->newestPose());
     if (step.reason.empty()) step.reason = off;
   }
-  endOutage();
+  state_.outage.end();
   if (std::exchange(state_.interrupted, false))
     step.reason = "re-acquired by " + std::to_string(found.agreement.inliers) + " points of the map" +
                   (step.reason.empty() ? "" : "; " + step.reason);
   if (state_.map->newestIsKeyframe()) state_.covariance.markKeyframe();
   return step;
-}
-
-/// Learns what agreement and what noise are usual on this rig.
-void VisualOdometry::learn(const MotionHypothesis& confirmed) {
-  constexpr double kMemory = 0.9;  // ratio of the past that a pair leaves (chosen)
-  constexpr double kMost = 0.95;   // even if all agree, a few need not in the next pair (chosen)
-  state_.noise.learn(confirmed.motion.rms);
-  const Agreement& agreement = confirmed.agreement;
-  if (agreement.lasting_matches == 0) return;
-  const double ratio = static_cast<double>(agreement.lasting_inliers) / agreement.lasting_matches;
-  state_.usual_agreement += (1.0 - kMemory) * (std::min(ratio, kMost) - state_.usual_agreement);
 }
 
 /// Adjusts a copy of the map with the pair in it.
@@ -429,13 +300,14 @@ VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features,
   state_.candidate = state_.map;
   LocalMap& map = *state_.candidate;
   Candidate candidate;
-  candidate.calibration = state_.calibration.calibration();
+  candidate.calibration = state_.rig.calibration.calibration();
   map.insert(options_.alignment, features, state_.pairs, found.motion.T_current_reference * T_previous_origin,
              found.sightings, candidate.calibration);
   candidate.T_keyframe_origin = map.poseBeforeNewest();
   if (map.newestIsKeyframe() && may_recall) revisit_.recall(features, candidate.calibration, map);
   const std::optional<Floor> floor = this->floor();
-  candidate.adjustment = map.adjust(optimizer_, state_.calibration.prior(map.oldestId()), candidate.calibration, floor);
+  candidate.adjustment =
+      map.adjust(optimizer_, state_.rig.calibration.prior(map.oldestId()), candidate.calibration, floor);
   // The window's first pose does not move in the adjustment: what it carries in height and tilt goes with the whole
   // map.
   if (floor) map.moveTo(floor->settled(map.newestPose(), state_.covariance.value()));
@@ -447,46 +319,9 @@ VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features,
   return candidate;
 }
 
-/// The probability that a motion is not the camera's: it is a rival's, the pair itself misleads, or a pair before did.
-VisualOdometry::Doubt VisualOdometry::doubtOf(const MotionScene& scene, const MotionHypothesis& found) const {
-  const double rivals = 1.0 / found.probability - 1.0, misled = std::exp(logOddsMisled(scene, found));
-  const double carried = std::exp(state_.doubt.logOdds());
-  Doubt doubt;
-  doubt.log_odds = std::log(rivals + misled);
-  doubt.probability = 1.0 / (1.0 + rivals + misled + carried);
-  doubt.moment = found.rivals_moment;
-  if (!scene.prior.empty()) {
-    const ExpectedMotion& expected = scene.prior.front();
-    const Vector6d innovation = expected.innovation(found.motion.T_current_reference.inverse());
-    doubt.moment += (misled + carried) * doubt.probability * (momentOf(innovation) + expected.covariance);
-  }
-  std::ostringstream reason;
-  if (found.rival && rivals >= std::max(misled, carried)) {
-    reason << "two motions in view, of " << found.agreement.inliers << " and " << found.rival->matches
-           << " matches, the second with a probability of " << found.rival->probability
-           << ": does something move in front of the camera?";
-    doubt.cause = "something else moved in view";
-  } else {
-    reason << (misled >= carried ? innovationWords(found) : "a moment ago " + state_.doubt.cause())
-           << ": followed with a probability of " << 1.0 - doubt.probability << " is something else";
-    doubt.cause = "the motion changed faster than a vehicle's can";
-  }
-  doubt.reason = reason.str();
-  return doubt;
-}
-
-/// The pair's own evidence against its motion.
-std::string VisualOdometry::innovationWords(const MotionHypothesis& found) const {
-  std::ostringstream words;
-  words << "the motion differs from the prior by " << std::sqrt(found.innovation)
-        << " standard deviations (tracking/acceleration), " << found.agreement.lasting_inliers << " of "
-        << found.agreement.lasting_matches << " lasting points agree";
-  return words.str();
-}
-
 /// Doubtful is a motion that is the camera's with too small a probability, or that has too large a covariance.
 void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& found, const Candidate& candidate,
-                           const Doubt& doubt, Step& step) {
+                           const MotionDoubt& doubt, Step& step) {
   std::ostringstream reason;
   Matrix6d covariance = candidate.adjustment.since_keyframe;
   if (found.innovation > noiseGate(6)) {
@@ -518,10 +353,10 @@ void VisualOdometry::commit(const Candidate& candidate, double probability) {
   if (probability < options_.tracking.probability) state_.map->discountNewest();
   const LocalMap::Adjustment& adjustment = candidate.adjustment;
   if (!adjustment.success) return;
-  state_.calibration.note(state_.map->oldestId(), state_.map->newestId(), candidate.calibration,
-                          adjustment.calibration_information);
+  state_.rig.calibration.note(state_.map->oldestId(), state_.map->newestId(), candidate.calibration,
+                              adjustment.calibration_information);
   if (probability >= options_.tracking.probability && adjustment.common_disparity_square)
-    state_.calibration.noteCommon(*adjustment.common_disparity_square);
+    state_.rig.calibration.noteCommon(*adjustment.common_disparity_square);
 }
 
 /// The motion between the two poses, and its covariance.
@@ -550,54 +385,6 @@ VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, cons
   return step;
 }
 
-/// Images that repeat themselves show no motion: the pose stays, as uncertain as the prior makes it meanwhile.
-VisualOdometry::Step VisualOdometry::hold(double dt) {
-  Step step;
-  step.state = TrackingState::kDegraded;
-  step.reason = "the images repeat those of the previous pair although the camera moved: is the driver frozen?";
-  step.T_previous_current = Eigen::Isometry3d::Identity();
-  step.covariance = unseen(dt);
-  state_.covariance.advance(*step.T_previous_current, step.covariance);
-  state_.prior.interrupt();
-  return step;
-}
-
-/// Whether a guess has the motion of a pair that shows nothing, not too long after the last one that did.
-bool VisualOdometry::canFollow(const StereoFeatures& features) const {
-  if (!state_.map || !state_.followed || features.count() >= options_.motion.min_inliers) return false;
-  const TrackingOptions& tracking = options_.tracking;
-  return secondsSinceMap(features) <= (state_.followed->rotation_only ? tracking.max_gap : tracking.max_guessed);
-}
-
-VisualOdometry::Step VisualOdometry::predict(const StereoFeatures& features, double dt, const std::string& failure) {
-  Step step;
-  step.reason = failure + (features.report.status.empty() ? "" : "; " + features.report.status);
-  const bool can_predict = state_.prior.velocity() && dt <= options_.tracking.max_gap &&
-                           state_.predicted_pairs < options_.tracking.max_predicted_pairs;
-  // The prior's translation over one pair is better than that around a standstill, which a gyro needs.
-  if (canFollow(features) && !(can_predict && state_.followed->rotation_only)) {
-    step.state = TrackingState::kDegraded;
-    step.reason = "motion by the guess: " + step.reason;
-    step.T_previous_current = state_.followed->motion;
-    step.covariance = state_.followed->covariance;
-    state_.covariance.advance(*step.T_previous_current, step.covariance);
-    return step;
-  }
-  if (!can_predict) {
-    breakStream();
-    step.state = TrackingState::kLost;
-    return step;
-  }
-  ++state_.predicted_pairs;
-  step.state = TrackingState::kDegraded;
-  step.reason = "motion predicted: " + step.reason;
-  const ExpectedMotion predicted = state_.prior.predicted(dt);
-  step.T_previous_current = predicted.motion;
-  step.covariance = predicted.covariance;
-  state_.covariance.advance(*step.T_previous_current, step.covariance);
-  return step;
-}
-
 std::optional<Floor> VisualOdometry::floor() const {
   if (!options_.planar.planar) return std::nullopt;
   return Floor(options_.planar, T_base_camera_, state_.floor.height());
@@ -605,77 +392,6 @@ std::optional<Floor> VisualOdometry::floor() const {
 
 std::vector<Eigen::Vector3d> VisualOdometry::mapPoints() const {
   return state_.map ? state_.map->positions() : std::vector<Eigen::Vector3d>();
-}
-
-void VisualOdometry::move(const Eigen::Isometry3d& T_previous_current) {
-  state_.T_origin_camera = orthonormalised(state_.T_origin_camera * T_previous_current);
-  state_.distance += T_previous_current.translation().norm();
-}
-
-OdometryResult VisualOdometry::report(const StereoFeatures& features, const MotionHypothesis& found,
-                                      const Step& step) const {
-  OdometryResult result;
-  result.state = step.state;
-  result.reason = step.reason;
-  result.stamp = features.stamp;
-  result.epoch = epoch_;
-  result.dt = step.dt;
-  result.distance = state_.distance;
-  result.keyframe_id = state_.map && !state_.interrupted ? state_.map->lastKeyframeId() : 0;
-  if (step.state == TrackingState::kTracking || step.state == TrackingState::kDegraded) {
-    result.has_pose = true;
-    result.T_origin_camera = state_.T_origin_camera;
-    result.pose_covariance = state_.covariance.value();
-    const double drift = state_.right_delay.drift();
-    result.pose_covariance.topLeftCorner<3, 3>() += drift * drift * Eigen::Matrix3d::Identity();
-    if (options_.planar.planar && state_.floor.isOnFloor())
-      result.pose_covariance = floor()->constrained(state_.T_origin_camera, result.pose_covariance);
-  }
-  if (step.T_previous_current) {
-    result.has_motion = true;
-    result.T_previous_current = *step.T_previous_current;
-    result.motion_covariance = step.covariance;
-    result.correction = step.correction;
-  }
-
-  reportMatches(features, found, step, result);
-  const RigCalibration::Vector sigma = state_.calibration.sigma();
-  if (sigma.allFinite()) {
-    result.disparity_offset = state_.calibration.calibration().value[0];
-    result.disparity_bend = state_.calibration.calibration().value[1];
-    result.disparity_offset_sigma = sigma[0];
-    result.disparity_bend_sigma = sigma[1];
-  }
-  if (const auto delay = state_.right_delay.estimate())
-    result.right_delay = delay->value, result.right_delay_sigma = delay->sigma;
-  if (const auto readout = state_.readout.estimate())
-    result.readout = readout->value, result.readout_sigma = readout->sigma;
-  result.right_rotation = state_.right_rotation.rotation();
-  result.right_rotation_sigma = state_.right_rotation.sigma();
-  return result;
-}
-
-/// The matches, which of them are inliers, and what follows from these.
-void VisualOdometry::reportMatches(const StereoFeatures& features, const MotionHypothesis& found, const Step& step,
-                                   OdometryResult& result) const {
-  result.flow.reserve(found.matches.size());
-  for (const FeatureMatch& match : found.matches) {
-    const cv::Point3f& previous = found.view->pixels[match.reference];
-    result.flow.push_back({previous.x, previous.y, match.current, false});
-  }
-  const std::vector<int>& rejected = step.rejected_rows;
-  for (const int i : found.motion.inliers) {
-    FeatureFlow& flow = result.flow[i];
-    flow.inlier = std::find(rejected.begin(), rejected.end(), flow.current) == rejected.end();
-  }
-  const std::vector<int> inliers = found.inlierRows(rejected);
-  result.features = features.count();
-  result.matches = static_cast<int>(found.matches.size());
-  result.inliers = static_cast<int>(inliers.size());
-  result.coverage = coverage(features, inliers);
-  result.rms = found.motion.rms;
-  result.match_time = found.match_time;
-  result.motion_time = found.motion_time + step.time;
 }
 
 }  // namespace sdvo

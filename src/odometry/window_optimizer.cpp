@@ -135,10 +135,10 @@ class Solver {
   }
 
   /// Covariances at a minimum of robust costs (Huber, Robust Statistics, section 7.6): A^-1 B A^-1, A the cost's second
-  /// derivatives, B the sum of the gradients' products over what errs independently. Whole points do, not their
-  /// sightings (Liang and Zeger 1986): their disparities share errors. Of B only its size beside A is taken from the
-  /// gradients, since few points leave the rest to chance. All of it is of the last linearisation, but for `squares`:
-  /// the residuals' now. `poses`: those that are asked for.
+  /// derivatives, B the sum of the gradients' products over what errs independently. Parts of the image do (Liang and
+  /// Zeger 1986): sightings of a point share errors of its disparity, neighbours those of patches and rectification. Of
+  /// B only its size beside A is taken from the gradients, since few points leave the rest to chance. All of it is of
+  /// the last linearisation, but for `squares`: the residuals' now. `poses`: those that are asked for.
   bool covariances(const Estimate& estimate, const std::vector<double>& squares, const std::vector<int>& poses,
                    ReducedSystem& system, WindowSolution& solution) {
     const RigCalibration::Matrix certain = certainInformation();
@@ -163,7 +163,7 @@ class Solver {
     const Eigen::MatrixXd of_known = of_poses.transpose() * known_.selfadjointView<Eigen::Lower>() * of_poses;
     const Eigen::MatrixXd of_points = units_.leftCols(asked).transpose() * of_poses - of_known;
     solution.pose_covariance =
-        gradient_products * errorsOverInformation(system, of_poses, of_points) * of_points + of_known;
+        gradient_products * errorsOverInformation(system, estimate, of_poses, of_points) * of_points + of_known;
     return solution.pose_covariance.allFinite();
   }
 
@@ -209,31 +209,39 @@ class Solver {
 
   /// Mean ratio of two covariances: by the gradients of single points, and as the second derivatives have it. What the
   /// poses took of the gradients is made up for by the degrees of freedom.
-  double errorsOverInformation(const ReducedSystem& system, const Eigen::Ref<const Eigen::MatrixXd>& solved,
-                               const Eigen::MatrixXd& covariance) const {
+  double errorsOverInformation(const ReducedSystem& system, const Estimate& estimate,
+                               const Eigen::Ref<const Eigen::MatrixXd>& solved, const Eigen::MatrixXd& covariance) {
     double freedom = 0.0, trace = 0.0;  // of covariance^-1 times the sum of outer products
     for (const EliminatedPoint& point : system.points)
       freedom += 2.0 * point.sightings - 2.0;  // u, v and one disparity against a position
     const Eigen::MatrixXd whitened = covariance.llt().matrixL().solve(solved.transpose());
     for (Eigen::Index row = 0; row < whitened.rows(); row += 6)
-      trace += squareOfGradients(system, whitened.middleRows<6>(row));
+      trace += squareOfGradients(system, estimate, whitened.middleRows<6>(row));
     return trace / static_cast<double>(solved.cols()) * freedom / std::max(freedom - 6.0 * poses_, 1.0);
   }
 
-  /// Sum over the points.
-  static double squareOfGradients(const ReducedSystem& system, const Eigen::Matrix<double, 6, Eigen::Dynamic>& by) {
-    double sum = 0.0;
+  /// Sum over parts of the image in which the points were seen first.
+  double squareOfGradients(const ReducedSystem& system, const Estimate& estimate,
+                           const Eigen::Matrix<double, 6, Eigen::Dynamic>& by) {
+    constexpr double kPart = 24.0;  // px: patches and rectification err alike within it
+    constexpr int kParts = 64;      // in a row at most
+    parts_.assign(kParts * kParts, Vector6d::Zero());
+    const double scale = window_->camera.fx / kPart;
+    const auto part = [&](double ray) { return std::clamp(static_cast<int>(ray * scale + kParts / 2), 0, kParts - 1); };
     const PoseFactor* sighting = system.factors.data();
-    for (const EliminatedPoint& point : system.points) {
-      Vector6d moved = by.rightCols<kCalibration>().lazyProduct(point.calibration_gradient);
+    for (std::size_t p = 0; p < system.points.size(); ++p) {
+      const EliminatedPoint& point = system.points[p];
+      Vector6d& moved = parts_[part(estimate.points[p].y()) * kParts + part(estimate.points[p].x())];
+      moved += by.rightCols<kCalibration>().lazyProduct(point.calibration_gradient);
       for (const PoseFactor* end = sighting + point.factors; sighting != end; ++sighting) {
         const double *t = sighting->gradient.translation, *r = sighting->gradient.rotation;
         const auto pose = by.middleCols<6>(6 * sighting->pose);
         moved += pose.col(0) * t[0] + pose.col(1) * t[1] + pose.col(2) * t[2] +  //
                  pose.col(3) * r[0] + pose.col(4) * r[1] + pose.col(5) * r[2];
       }
-      sum += moved.squaredNorm();
     }
+    double sum = 0.0;
+    for (const Vector6d& moved : parts_) sum += moved.squaredNorm();
     return sum;
   }
 
@@ -303,6 +311,7 @@ class Solver {
   std::vector<std::size_t> anchor_of_point_;
   PoseEquations equations_;
   std::vector<double> squares_;
+  std::vector<Vector6d> parts_;
   Eigen::MatrixXd known_, units_, solved_;
   Eigen::LLT<Eigen::MatrixXd> factor_;
   int poses_ = 0, size_ = 0;

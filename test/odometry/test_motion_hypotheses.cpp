@@ -5,6 +5,7 @@
 #include <random>
 
 #include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/odometry/motion_doubt.hpp"
 #include "stereo_descriptor_vo/odometry/motion_hypotheses.hpp"
 
 namespace sdvo {
@@ -157,20 +158,6 @@ TEST(FalseAlarms, AreThoseOfRandomMatches) {
   EXPECT_LT(logFalseAlarms(300, 12, chanceOfAgreement(3.0, 200.0)), std::log(kTailProbability))
       << "anywhere in the image less is needed";
   EXPECT_GE(logFalseAlarms(4, 3, 0.01), 0.0) << "three points determine a motion";
-}
-
-TEST(CarriedDoubt, FadesByHalves) {
-  CarriedDoubt doubt;
-  EXPECT_NEAR(probabilityOf(doubt.logOdds()), 0.001, 1e-4);
-  doubt.raise(CarriedDoubt::kCertain, "a knock");
-  EXPECT_NEAR(probabilityOf(doubt.logOdds()), 0.99, 1e-3);
-  doubt.raise(0.0, "less");
-  EXPECT_EQ(doubt.cause(), "a knock");
-  int doubtful = 0;
-  for (; doubt.logOdds() > logOdds(0.05); ++doubtful) doubt.pass();
-  EXPECT_EQ(doubtful, 4) << "as many pairs as make a point a lasting one";
-  doubt.raise(50.0, "anything");
-  EXPECT_LE(doubt.logOdds(), CarriedDoubt::kCertain);
 }
 
 TEST(SameMotion, ProjectsToTheSamePixels) {

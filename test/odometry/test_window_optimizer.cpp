@@ -5,7 +5,9 @@
 #include <cmath>
 #include <functional>
 #include <limits>
+#include <map>
 #include <random>
+#include <tuple>
 
 #include "../synthetic_features.hpp"
 #include "stereo_descriptor_vo/common/processor.hpp"
@@ -252,7 +254,7 @@ TEST(WindowOptimizer, CovariancesAreThoseOfTheErrorsWhereTheKernelBendsAtTheNois
 
 /// Points of a room, each seen from some pairs in turn by a camera that goes ahead and turns. All that a sighting errs
 /// by is as the shipped options have it, but positions err `factor` times as much as stated; a share are outliers.
-Window windowOfTheModel(int frames, double factor, double outliers, std::uint32_t seed) {
+Window windowOfTheModel(int frames, double factor, double outliers, double shared, std::uint32_t seed) {
   const WindowOptimizerOptions shipped;
   std::mt19937 random(seed);
   std::normal_distribution<double> normal;
@@ -265,6 +267,7 @@ Window windowOfTheModel(int frames, double factor, double outliers, std::uint32_
     motion << 0.05 * f, 0.01 * f, 0.1 * f, 0.0, 0.02 * f, 0.0;
     window.T_camera_origin.push_back(expSE3(motion).inverse());
   }
+  std::map<std::tuple<int, int, int>, Eigen::Vector2d> of_parts;  // of one frame
   for (int start = -7; start < frames - 1; ++start)
     for (int k = 0; k < 100; ++k) {
       const int first = std::max(start, 0);
@@ -285,6 +288,12 @@ Window windowOfTheModel(int frames, double factor, double outliers, std::uint32_
         const double sigma = factor * kPositionSigma * (uniform(random) < outliers ? 20.0 : 1.0);
         pixel += Eigen::Vector3d(sigma * normal(random), sigma * normal(random),
                                  common + shipped.disparity_sigma * normal(random));
+        if (shared > 0.0) {
+          const auto part = [](double ray) { return static_cast<int>(std::floor(350.0 * ray / 24.0)); };
+          const auto& ray = point.ray_and_inverse_depth;
+          const Eigen::Vector2d error(shared * normal(random), shared * normal(random));
+          pixel.head<2>() += of_parts.try_emplace({f, part(ray.x()), part(ray.y())}, error).first->second;
+        }
         seen.push_back({static_cast<int>(window.points.size()), f, pixel, kPositionSigma});
       }
       if (seen.size() < 2) continue;
@@ -296,13 +305,14 @@ Window windowOfTheModel(int frames, double factor, double outliers, std::uint32_
 }
 
 /// Mean NEES of the newest pose relative to the one before, over a hundred windows.
-double neesOfTheNewestMotion(int frames, double factor, double outliers) {
+double neesOfTheNewestMotion(int frames, double factor, double outliers, double shared = 0.0) {
   constexpr int kTrials = 100;
   WindowOptimizerOptions options;
   options.iterations = 20;
   double nees = 0.0;
   for (int trial = 0; trial < kTrials; ++trial) {
-    Window window = windowOfTheModel(frames, factor, outliers, static_cast<std::uint32_t>(1000 * frames + trial));
+    Window window =
+        windowOfTheModel(frames, factor, outliers, shared, static_cast<std::uint32_t>(1000 * frames + trial));
     const Eigen::Isometry3d T_origin_before = window.T_camera_origin[static_cast<std::size_t>(frames - 2)].inverse();
     const Eigen::Isometry3d truth = window.T_camera_origin.back() * T_origin_before;
     const WindowSolution solution = WindowOptimizer(options).optimize(window);
@@ -335,6 +345,11 @@ TEST(WindowOptimizer, CovariancesAreThoseOfTheErrorsWhateverIsStatedOfTheNoise) 
 
 TEST(WindowOptimizer, CovariancesAreThoseOfTheErrorsAmongOutliers) {
   for (const int frames : {2, 5}) EXPECT_NEAR(neesOfTheNewestMotion(frames, 1.0, 0.2), 6.0, 1.5) << frames << " frames";
+}
+
+TEST(WindowOptimizer, CovariancesAreThoseOfTheErrorsWhereNeighboursErrAlike) {
+  for (const int frames : {2, 5})
+    EXPECT_NEAR(neesOfTheNewestMotion(frames, 0.5, 0.0, 0.85 * kPositionSigma), 6.0, 1.5) << frames << " frames";
 }
 
 TEST(WindowOptimizer, AFloorAddsItsInformationToThatOfEachPose) {

@@ -103,28 +103,6 @@ double logOddsMisled(const MotionScene& scene, const MotionHypothesis& hypothesi
 /// returned has the rivals and the times of all. `threshold`, px, of an inlier.
 MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::vector<MotionHypothesis> hypotheses);
 
-/// Log-odds that what is followed is not the camera's motion, or not in a sound map. They fade from pair to pair.
-class CarriedDoubt {
- public:
-  double logOdds() const { return log_odds_; }
-  /// In words, of the largest doubt that lasts.
-  const std::string& cause() const { return cause_; }
-
-  /// Evidence of this pair.
-  void raise(double log_odds, const std::string& cause);
-  /// A pair is over.
-  void pass();
-
-  /// Of a pair that nothing speaks against.
-  static constexpr double kUnsuspected = -6.9;  // probability of 0.001 (chosen)
-  /// Of an event that leaves a wrong map or a wrong rig.
-  static constexpr double kCertain = 4.6;  // 0.99 (chosen)
-
- private:
-  double log_odds_ = kUnsuspected;
-  std::string cause_;
-};
-
 /// Ratio of an 8x4 grid's cells over the image that hold one of the pair's rows.
 double coverage(const StereoFeatures& features, const std::vector<int>& rows);
 

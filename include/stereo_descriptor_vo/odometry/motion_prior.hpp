@@ -72,6 +72,10 @@ class MotionPrior {
   /// In words, if no motion may be as fast, noise and stamps considered.
   std::string tooFast(const Eigen::Isometry3d& motion, const Matrix6d& covariance, double dt) const;
 
+  /// Whether the camera went back by half of what the pair before seemed to move: of neighbours that changed places the
+  /// first one's motion was twice too large.
+  bool seemsSwapped(const Vector6d& velocity) const;
+
   /// Takes over the velocity of a measured motion. One in doubt predicts the next pair, but confirms nothing; what it
   /// is doubted by makes the prediction as uncertain.
   void measure(std::int64_t stamp, const Eigen::Isometry3d& motion, double dt, const Matrix6d& covariance,

@@ -12,7 +12,10 @@ namespace sdvo {
 
 enum class TrackingState { kWaiting, kTracking, kDegraded, kLost };
 
-const char* toString(TrackingState state);
+inline const char* toString(TrackingState state) {
+  constexpr const char* words[] = {"WAITING", "TRACKING", "DEGRADED", "LOST"};
+  return words[static_cast<int>(state)];
+}
 
 /// Where a matched feature was in the last measured pair, as predicted by the local map, and where it is now.
 struct FeatureFlow {

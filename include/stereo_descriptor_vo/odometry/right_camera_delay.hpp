@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <deque>
 #include <optional>
+#include <string>
 
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
@@ -29,6 +30,8 @@ class RightCameraDelay {
 
   /// The delay of the last pair, s, if its right image is that of a neighbouring pair; else zero.
   double partner() const { return partner_; }
+  /// In words, if the right image is nearer to another pair of a stream with one every `dt` s.
+  std::string partnerWords(double dt) const;
 
   /// Standard deviation of the position, m, from turns whose features were not compensated as they would be now, and
   /// from the error of what is known. A rig in step has none.
@@ -41,7 +44,7 @@ class RightCameraDelay {
  private:
   struct Pair {
     StereoFeatures features;  ///< their positions alone
-    Vector6d velocity;  ///< over the time before it
+    Vector6d velocity;        ///< over the time before it
   };
   void addRows(double dt);
   void expose(const StereoFeatures& features, double distance, double rate);

@@ -1,0 +1,30 @@
+#pragma once
+
+#include "stereo_descriptor_vo/odometry/calibration_filter.hpp"
+#include "stereo_descriptor_vo/odometry/motion_hypotheses.hpp"
+#include "stereo_descriptor_vo/odometry/noise.hpp"
+#include "stereo_descriptor_vo/odometry/odometry_result.hpp"
+#include "stereo_descriptor_vo/odometry/right_camera_delay.hpp"
+#include "stereo_descriptor_vo/odometry/right_camera_rotation.hpp"
+#include "stereo_descriptor_vo/odometry/row_readout.hpp"
+
+namespace sdvo {
+
+/// What pairs showed of the rig.
+struct LearntRig {
+  CalibrationFilter calibration;
+  RightCameraRotation right_rotation;
+  RightCameraDelay right_delay;
+  RowReadout readout;
+  Noise noise;
+  double usual_agreement = 0.9;  ///< ratio of lasting matches that agree with confirmed motions
+
+  LearntRig(const CalibrationOptions& options, const Noise& assumed);
+
+  /// Takes in what agreement and what noise a confirmed motion has.
+  void learn(const MotionHypothesis& confirmed);
+
+  void report(OdometryResult& result) const;
+};
+
+}  // namespace sdvo

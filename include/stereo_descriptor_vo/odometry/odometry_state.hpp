@@ -1,0 +1,76 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/odometry/floor.hpp"
+#include "stereo_descriptor_vo/odometry/learnt_rig.hpp"
+#include "stereo_descriptor_vo/odometry/local_map.hpp"
+#include "stereo_descriptor_vo/odometry/motion_doubt.hpp"
+#include "stereo_descriptor_vo/odometry/motion_hypotheses.hpp"
+#include "stereo_descriptor_vo/odometry/motion_prior.hpp"
+#include "stereo_descriptor_vo/odometry/odometry_result.hpp"
+#include "stereo_descriptor_vo/odometry/outage.hpp"
+#include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
+#include "stereo_descriptor_vo/odometry/repeated_images.hpp"
+#include "stereo_descriptor_vo/odometry/visual_odometry_options.hpp"
+
+namespace sdvo {
+
+/// What becomes of the pose with a pair.
+struct OdometryStep {
+  TrackingState state = TrackingState::kWaiting;
+  std::string reason;
+  std::optional<Eigen::Isometry3d> T_previous_current;
+  Matrix6d covariance = Matrix6d::Zero();  ///< of that motion
+  Vector6d correction = Vector6d::Zero();  ///< the part of it that the map corrects
+  std::vector<int> rejected_rows;          ///< matched rows of the pair that the adjustment does not confirm
+  double dt = 0.0;                         ///< over which that motion is, else since the previous pair, s
+  double time = 0.0;                       ///< s
+
+  bool hasPose() const { return state == TrackingState::kTracking || state == TrackingState::kDegraded; }
+};
+
+/// What the odometry remembers from pair to pair.
+struct OdometryState {
+  std::optional<LocalMap> map;
+  std::optional<LocalMap> candidate;  ///< the map with the pair; between pairs only its memory matters
+  LearntRig rig;
+  MotionPrior prior;
+  CarriedDoubt doubt;
+  Outage outage;
+  RepeatedImages images;
+  FloorBelief floor;
+  std::optional<StereoCamera> camera;
+  std::optional<std::int64_t> last_stamp;
+  Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
+  PoseCovariance covariance;         ///< of that pose
+  std::int64_t last_pose_stamp = 0;  ///< ns
+  double distance = 0.0;             ///< m
+  int pairs = 0;
+  int epoch = 0;
+  bool started = false;
+  bool interrupted = false;  ///< where in the map the camera is is unknown
+
+  OdometryState(const VisualOdometryOptions& options, int first_epoch);
+
+  /// What was learnt is of another rig.
+  void forgetRig(const VisualOdometryOptions& options);
+
+  /// The next pair does not continue the last one.
+  void interrupt();
+
+  double secondsSinceMap(const StereoFeatures& features) const;
+
+  void move(const Eigen::Isometry3d& T_previous_current);
+
+  /// Of a pair's rows; `all_rows` are those in the pair as it was given.
+  OdometryResult report(const StereoFeatures& features, const std::vector<int>& all_rows, const MotionHypothesis& found,
+                        const OdometryStep& step, const std::optional<Floor>& known_floor) const;
+};
+
+}  // namespace sdvo

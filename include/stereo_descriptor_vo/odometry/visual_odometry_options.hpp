@@ -1,0 +1,61 @@
+#pragma once
+
+#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/odometry/calibration_filter.hpp"
+#include "stereo_descriptor_vo/odometry/feature_matcher.hpp"
+#include "stereo_descriptor_vo/odometry/floor.hpp"
+#include "stereo_descriptor_vo/odometry/local_map.hpp"
+#include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
+#include "stereo_descriptor_vo/odometry/motion_prior.hpp"
+#include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
+#include "stereo_descriptor_vo/odometry/window_optimizer.hpp"
+
+namespace sdvo {
+
+struct TrackingOptions : MotionPriorOptions {
+  int max_predicted_pairs = 1;
+  double max_gap = 1.0;
+  double max_guessed = 10.0;
+  double probability = 0.95;
+  double doubtful_deviation = 0.05;
+
+  void describe(OptionList& list) {
+    list.add("max_predicted_pairs", max_predicted_pairs, {0, 100}, "",
+             "pairs in a row whose motion may be predicted before the odometry is lost");
+    list.add("max_gap", max_gap, {0.01, 60.0}, "s", "longest time between pairs over which the motion is predicted");
+    list.add(
+        "max_guessed", max_guessed, {0.0, 1000.0}, "s",
+        "longest time without usable images over which the pose goes on by the guess of another odometry; by a gyro "
+        "over max_gap");
+    list.add("probability", probability, {0.5, 0.999}, "",
+             "a motion is doubtful that is the camera's with a smaller probability");
+    list.add(
+        "doubtful_deviation", doubtful_deviation, {0.001, 1000.0}, "m",
+        "a motion is doubtful whose translation has a larger standard deviation than this and 3 % of its distance");
+    MotionPriorOptions::describe(list);
+  }
+};
+
+struct VisualOdometryOptions {
+  FeatureMatcherOptions matcher;
+  MotionEstimatorOptions motion;
+  PatchAlignmentOptions alignment;
+  LocalMapOptions map;
+  WindowOptimizerOptions window;
+  CalibrationOptions calibration;
+  TrackingOptions tracking;
+  PlanarOptions planar;
+
+  void describe(OptionList& list) {
+    list.collect(planar);
+    list.group("matcher", matcher);
+    list.group("motion", motion);
+    list.group("alignment", alignment);
+    list.group("map", map);
+    list.group("window", window);
+    list.group("calibration", calibration);
+    list.group("tracking", tracking);
+  }
+};
+
+}  // namespace sdvo

@@ -1,0 +1,88 @@
+#include "stereo_descriptor_vo/odometry/odometry_state.hpp"
+
+#include <algorithm>
+#include <cstddef>
+
+namespace sdvo {
+namespace {
+
+LearntRig unknownRig(const VisualOdometryOptions& options) {
+  return {options.calibration,
+          {options.map.corner_sigma, options.map.reference_sigma, options.window.common_disparity_sigma}};
+}
+
+/// The matches, which of them are inliers, and what follows from these.
+void reportMatches(const StereoFeatures& features, const std::vector<int>& all_rows, const MotionHypothesis& found,
+                   const std::vector<int>& rejected, OdometryResult& result) {
+  result.flow.reserve(found.matches.size());
+  for (const FeatureMatch& match : found.matches) {
+    const cv::Point3f& previous = found.view->pixels[match.reference];
+    result.flow.push_back({previous.x, previous.y, all_rows[static_cast<std::size_t>(match.current)], false});
+  }
+  for (const int i : found.motion.inliers)
+    result.flow[i].inlier = std::find(rejected.begin(), rejected.end(), found.matches[i].current) == rejected.end();
+  const std::vector<int> inliers = found.inlierRows(rejected);
+  result.features = features.count();
+  result.matches = static_cast<int>(found.matches.size());
+  result.inliers = static_cast<int>(inliers.size());
+  result.coverage = coverage(features, inliers);
+  result.rms = found.motion.rms;
+}
+
+}  // namespace
+
+OdometryState::OdometryState(const VisualOdometryOptions& options, int first_epoch)
+    : rig(unknownRig(options)), prior(options.tracking), epoch(first_epoch) {}
+
+void OdometryState::forgetRig(const VisualOdometryOptions& options) {
+  rig = unknownRig(options);
+}
+
+void OdometryState::interrupt() {
+  interrupted = true;
+  prior.interrupt();
+}
+
+double OdometryState::secondsSinceMap(const StereoFeatures& features) const {
+  return static_cast<double>(features.stamp - map->newestStamp()) * 1e-9;
+}
+
+void OdometryState::move(const Eigen::Isometry3d& T_previous_current) {
+  T_origin_camera = orthonormalised(T_origin_camera * T_previous_current);
+  distance += T_previous_current.translation().norm();
+}
+
+OdometryResult OdometryState::report(const StereoFeatures& features, const std::vector<int>& all_rows,
+                                     const MotionHypothesis& found, const OdometryStep& step,
+                                     const std::optional<Floor>& known_floor) const {
+  OdometryResult result;
+  result.state = step.state;
+  result.reason = step.reason;
+  result.stamp = features.stamp;
+  result.epoch = epoch;
+  result.dt = step.dt;
+  result.distance = distance;
+  result.keyframe_id = map && !interrupted ? map->lastKeyframeId() : 0;
+  if (step.hasPose()) {
+    result.has_pose = true;
+    result.T_origin_camera = T_origin_camera;
+    result.pose_covariance = covariance.value();
+    const double drift = rig.right_delay.drift();
+    result.pose_covariance.topLeftCorner<3, 3>() += drift * drift * Eigen::Matrix3d::Identity();
+    if (known_floor && floor.isOnFloor())
+      result.pose_covariance = known_floor->constrained(T_origin_camera, result.pose_covariance);
+  }
+  if (step.T_previous_current) {
+    result.has_motion = true;
+    result.T_previous_current = *step.T_previous_current;
+    result.motion_covariance = step.covariance;
+    result.correction = step.correction;
+  }
+  reportMatches(features, all_rows, found, step.rejected_rows, result);
+  result.match_time = found.match_time;
+  result.motion_time = found.motion_time + step.time;
+  rig.report(result);
+  return result;
+}
+
+}  // namespace sdvo

@@ -1,0 +1,50 @@
+#include "stereo_descriptor_vo/odometry/outage.hpp"
+
+#include <algorithm>
+
+namespace sdvo {
+
+Eigen::Isometry3d MotionGuess::motion(const MotionPrior& prior, double dt) const {
+  Eigen::Isometry3d motion = T_previous_current;
+  if (rotation_only) motion.translation() = prior.velocity().value_or(Vector6d::Zero()).head<3>() * dt;
+  return motion;
+}
+
+void Outage::pass(double dt, const std::optional<MotionGuess>& guess, const MotionPrior& prior) {
+  seconds_ += dt;
+  if (!guess) followed_.reset();
+  if (!followed_) return;
+  const Eigen::Isometry3d motion = guess->motion(prior, dt);
+  const Matrix6d carried = adjoint(motion.inverse());
+  Matrix6d covariance = covarianceOf(*guess);
+  if (guess->rotation_only) covariance.topLeftCorner<3, 3>() = growth(prior, dt).topLeftCorner<3, 3>();
+  followed_->motion = followed_->motion * motion;
+  followed_->covariance = carried * followed_->covariance * carried.transpose() + covariance;
+  followed_->rotation_only |= guess->rotation_only;
+}
+
+/// Of the guess, on top of those before it: the part of a scale error that a longer way adds.
+Matrix6d Outage::covarianceOf(const MotionGuess& guess) {
+  constexpr double kLeast = 1e-3;  // m and rad (chosen): no odometry stands still to less
+  const Vector6d motion = logSE3(guess.T_previous_current);
+  const auto grow = [&](double& way, double by) {
+    const double before = way;
+    way += std::max(by, kLeast);
+    return guess.error * guess.error * (way * way - before * before);
+  };
+  Vector6d variance;
+  variance.head<3>().setConstant(grow(distance_, motion.head<3>().norm()));
+  variance.tail<3>().setConstant(grow(angle_, motion.tail<3>().norm()));
+  return variance.asDiagonal();
+}
+
+Matrix6d Outage::growth(const MotionPrior& prior, double dt) const {
+  return prior.unseen(seconds_) - prior.unseen(seconds_ - dt);
+}
+
+void Outage::end() {
+  distance_ = angle_ = seconds_ = 0.0;
+  predicted_pairs_ = 0;
+}
+
+}  // namespace sdvo
