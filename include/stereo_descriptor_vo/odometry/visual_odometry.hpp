@@ -68,8 +68,8 @@ class VisualOdometry {
   /// A pair as it is searched: of the map's camera, without rows of the pair before, both images of one moment.
   struct Pair {
     const StereoFeatures& given;
-    std::optional<StereoFeatures> refocused, new_part, in_step;
-    std::vector<int> new_rows;
+    std::optional<StereoFeatures> refocused{}, new_part{}, in_step{};
+    std::vector<int> new_rows{};
     double dt = 0.0;         ///< since the previous pair, s
     bool continued = false;  ///< the map is of this stream
     bool frozen = false;     ///< repeats the images of the previous pair
