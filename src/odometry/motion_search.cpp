@@ -11,14 +11,10 @@
 
 #include "ascending_rows.hpp"
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
+#include "stereo_descriptor_vo/odometry/correspondence_arrays.hpp"
 #include "stereo_descriptor_vo/odometry/correspondences.hpp"
 
 namespace sdvo {
-namespace {
-
-constexpr std::size_t kFewestOfMotion = 20;  // points that tell a motion of their own from noise (chosen)
-
-}  // namespace
 
 MotionSearch::MotionSearch(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion,
                            const PatchAlignmentOptions& alignment)
@@ -125,7 +121,7 @@ bool MotionSearch::leavesGate(const MotionScene& scene, const Eigen::Isometry3d&
   std::size_t seen = 0, outside = 0;
   for (const Eigen::Vector3d& point : found.view->rows.positions) {
     const Eigen::Vector3d here = T_current_reference * point, expected = predicted * point;
-    if (here.z() <= 0.0 || expected.z() <= 0.0) continue;
+    if (here.z() < kNearestDepth || expected.z() < kNearestDepth) continue;
     const Eigen::Vector3d pixel = camera.project(here);
     if (!camera.sees(pixel)) continue;
     ++seen;
@@ -202,7 +198,6 @@ std::string MotionSearch::chanceWords(const MotionScene& scene, const MotionHypo
 
 /// Aligns the inliers' patches and refines the motion on them.
 MotionSearch::Alignment MotionSearch::align(const MotionScene& scene, const MotionHypothesis& found) const {
-  constexpr std::size_t kEnough = 30;  // fewer are no better than all corners together
   const StereoFeatures& features = scene.features;
   const Eigen::Isometry3d T_camera_origin = found.motion.T_current_reference * scene.map.newestPose();
   Alignment alignment{found.motion.T_current_reference, {}, {}};
@@ -221,7 +216,7 @@ MotionSearch::Alignment MotionSearch::align(const MotionScene& scene, const Moti
         measurementOf(features, match.current, scene.calibration, sighting.measurement.head<2>() - corner);
     aligned.push_back(alignment.measured.back());
   }
-  refineMotion(features.camera, options(scene), aligned.size() >= kEnough ? aligned : alignment.measured,
+  refineMotion(features.camera, options(scene), aligned.size() >= kFewestMeasured ? aligned : alignment.measured,
                alignment.T_current_reference);
   return alignment;
 }
@@ -236,7 +231,7 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene
   lasting.reserve(aligned.measured.size()), others.reserve(aligned.measured.size());
   for (std::size_t k = 0; k < aligned.measured.size(); ++k)
     (found.isLasting(found.motion.inliers[k]) ? lasting : others).push_back(aligned.measured[k]);
-  if (std::min(lasting.size(), others.size()) < kFewestOfMotion) return std::nullopt;
+  if (std::min(lasting.size(), others.size()) < kFewestMeasured) return std::nullopt;
 
   const Eigen::Isometry3d& T = aligned.T_current_reference;
   Eigen::Isometry3d T_lasting = T;

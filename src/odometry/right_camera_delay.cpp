@@ -7,12 +7,10 @@
 #include <vector>
 
 #include "../common/median.hpp"
+#include "stereo_descriptor_vo/odometry/noise.hpp"
 
 namespace sdvo {
 namespace {
-
-/// Of the moving pairs before, a pair leaves this ratio: some 200 pairs, over which clocks of cameras hardly drift.
-constexpr double kMemoryOfRows = 0.995;
 
 /// Velocity (px/s) of a point in the right image: at infinity, and for each px of disparity.
 struct RightFlow {
@@ -58,7 +56,7 @@ Vector6d velocityDuring(double delay, double dt, const Vector6d& before, const V
 /// Mean square (px^2, cut off) of what the rows differ from those of a right image that is late by `delay`, and lower
 /// by a constant.
 double misfit(const StereoFeatures& features, double delay, const Vector6d& velocity) {
-  constexpr double kCut = 1.0;  // px: rows further off are matched wrongly
+  constexpr double kCut = 2.0 * RowDelay::kKernel;  // rows further off are matched wrongly
   std::vector<double> rest;
   rest.reserve(features.u.size());
   for (int i = 0; i < features.count(); ++i)
@@ -72,12 +70,10 @@ double misfit(const StereoFeatures& features, double delay, const Vector6d& velo
 
 /// The delay of one interval, either way, that explains the rows, or zero; `known` while they do not decide.
 double partnerOf(const StereoFeatures& features, double dt, const Vector6d& velocity, double known) {
-  constexpr int kEnough = 20;      // features (chosen)
-  constexpr double kUsual = 0.2;   // px: rows of rectified rigs differ by less
   constexpr double kBetter = 0.5;  // ratio of the misfit that is left (chosen), a half of that to take it back
-  if (features.count() < kEnough || !(dt > 0.0)) return known;
+  if (features.count() < kFewestMeasured || !(dt > 0.0)) return known;
   const double in_step = misfit(features, 0.0, velocity);
-  if (in_step > kUsual * kUsual)
+  if (in_step > RowDelay::kUsual * RowDelay::kUsual)
     for (const double delay : {-dt, dt})
       if (misfit(features, delay, velocity) < kBetter * in_step) return delay;
   return known != 0.0 && in_step > 0.5 * kBetter * misfit(features, known, velocity) ? known : 0.0;
@@ -88,7 +84,8 @@ constexpr double kLeastTurning = 2.0;  // px/s: rotations from images err by les
 
 }  // namespace
 
-RightCameraDelay::RightCameraDelay(double prior) : prior_(prior), rows_(kMemoryOfRows, kLeastTurning, kSamePoints) {}
+RightCameraDelay::RightCameraDelay(double prior)
+    : prior_(prior), rows_(RowDelay::kMemory, kLeastTurning, kSamePoints) {}
 
 void RightCameraDelay::measure(const StereoFeatures& features, double dt, const Vector6d& velocity) {
   partner_ = partnerOf(features, dt, velocity, partner_);

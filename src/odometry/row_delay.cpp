@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "stereo_descriptor_vo/odometry/noise.hpp"
+
 namespace sdvo {
 
 namespace {
@@ -29,8 +31,8 @@ int RowDelay::cellOf(double u, double v, int width, int height) {
 }
 
 double RowDelay::Estimate::proved(double expected) const {
-  const double distance = value - expected, chance = kSignificant * sigma;
-  return std::copysign(std::sqrt(std::max(distance * distance - chance * chance, 0.0)), distance);
+  const double distance = value - expected, chance = noiseGate(1) * sigma * sigma;
+  return std::copysign(std::sqrt(std::max(distance * distance - chance, 0.0)), distance);
 }
 
 RowDelay::Fit RowDelay::fit(const Cells& cells) {
@@ -60,7 +62,6 @@ void RowDelay::Sums::add(double w, const Eigen::Vector3d& moved, double lower) {
 /// Least squares on the means of each part, with the weights of a Huber kernel. Differences within a part are left out:
 /// on a road they have the same pattern in all pairs, as has the rectification's error.
 void RowDelay::add(const std::vector<Row>& pair) {
-  constexpr double kKernel = 0.5;  // px (chosen): errors of healthy rows are smaller
   constexpr int kReweightings = 3;
   double square = 0.0;
   for (const Row& row : pair) square += row.turning * row.turning;
@@ -103,13 +104,12 @@ void RowDelay::add(const std::vector<Row>& pair) {
 }
 
 std::optional<RowDelay::Estimate> RowDelay::estimate() const {
-  constexpr double kEnough = 4.5;    // blocks (chosen), whose spread tells the standard deviation
-  constexpr double kUseful = 0.005;  // s; a delay that is not known better than that is not judged
+  constexpr double kEnough = 4.5;  // blocks (chosen), whose spread tells the standard deviation
   if (blocks_ < kEnough) return std::nullopt;
   const Fit fit = this->fit(cells_);
   const Eigen::Matrix2d inverse = fit.information.inverse();
   // Student's distribution: few blocks tell their own spread badly (Wallace's bound of its quantiles).
-  constexpr double kSquare = kSignificant * kSignificant;
+  constexpr double kSquare = noiseGate(1);
   const double freedom = blocks_ - 2.0, few = freedom / kSquare * std::expm1(kSquare / freedom);
   const Estimate estimate{fit.value[0], std::sqrt(few * (inverse * spread_ * inverse.transpose())(0, 0))};
   if (!(estimate.sigma < kUseful)) return std::nullopt;

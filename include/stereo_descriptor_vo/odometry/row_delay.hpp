@@ -16,7 +16,11 @@ namespace sdvo {
 class RowDelay {
  public:
   static constexpr int kColumns = 6, kRows = 4;  ///< parts of the image
-  static constexpr double kSignificant = 4.0;    ///< standard deviations beyond which a delay is proved (chosen)
+  static constexpr double kMemory =
+      0.995;                              ///< ratio of the past that a pair leaves: clocks hardly drift over 200 pairs
+  static constexpr double kKernel = 0.5;  ///< px (chosen): errors of healthy rows are smaller
+  static constexpr double kUsual = 0.2;   ///< px: rows of rectified rigs differ by less (KITTI, EuRoC)
+  static constexpr double kUseful = 0.005;  ///< s; what is not known better than that is not judged
   // 2 ms is 2 cm at 10 m/s, and 0.4 px at 100 deg/s and f = 120 px.
   static constexpr double kWarn = 0.002, kFail = 0.01;  ///< s
 
@@ -37,7 +41,7 @@ class RowDelay {
     double proved(double expected = 0.0) const;
   };
 
-  /// `memory`: ratio of the past that a pair leaves. Pairs are left out where the instrument is below `least_turning`
+  /// Pairs are left out where the instrument is below `least_turning`
   /// (px/s, RMS): errors of the velocity must be smaller.
   /// `block`: pairs in a row that may see the same points, whose errors are then alike.
   RowDelay(double memory, double least_turning, int block = 1)
@@ -45,7 +49,7 @@ class RowDelay {
 
   void add(const std::vector<Row>& pair);
 
-  /// None while it is not known to 5 ms.
+  /// None while it is not known to kUseful.
   std::optional<Estimate> estimate() const;
 
  private:

@@ -6,6 +6,7 @@
 
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
+#include "stereo_descriptor_vo/odometry/noise.hpp"
 #include "stereo_descriptor_vo/odometry/pose_problem.hpp"
 
 namespace sdvo {
@@ -16,14 +17,12 @@ namespace sdvo {
 /// bound.
 class RowReadout {
  public:
-  static constexpr double kSignificant =
-      4.0;                                ///< standard deviations beyond which a rolling shutter is proved (chosen)
   static constexpr double kWarn = 0.003;  ///< s
 
   struct Estimate {
     double value, sigma;  ///< s
 
-    bool isRolling() const { return value > kWarn && value > kSignificant * sigma; }
+    bool isRolling() const { return value > kWarn && value * value > noiseGate(1) * sigma * sigma; }
   };
 
   /// A pair's motion since the reference, with the correspondences that agree with it, and the mean velocity (m/s and
