@@ -21,7 +21,7 @@ namespace sdvo {
 namespace {
 
 ViewDescriptors emptyRows(std::size_t count, int bytes) {
-  return {cv::Mat::zeros(static_cast<int>(count), bytes, CV_8U), std::vector<std::uint8_t>(count, 0)};
+  return {cv::Mat(static_cast<int>(count), bytes, CV_8U), std::vector<std::uint8_t>(count, 0)};
 }
 
 class FreakDescriptor : public BaseDescriptor {

@@ -37,23 +37,25 @@ Pixels neighbourhood(const std::uint8_t* first, std::size_t step) {
 
 /// Contrasts of the three rows of four pixels that begin at `first`.
 Pixels contrasts(const std::uint8_t* first, std::size_t step) {
-  // The least and the largest pixel of 1, 2, 4 and 8 in a row, from each one on.
+  // The arc of nine that begins at an odd pixel and the one that begins right before it share eight pixels: the least
+  // and the largest of 1, 2, 4 and 8 in a row are needed from each odd pixel on alone.
   std::array<Pixels, kCircle> circle, least, largest;
   for (std::size_t i = 0; i < kCircle; ++i)
     circle[i] = neighbourhood(first + kCircleY[i] * static_cast<std::ptrdiff_t>(step) + kCircleX[i], step);
   least = largest = circle;
   for (const std::size_t length : {1, 2, 4}) {
     const auto least_before = least, largest_before = largest;
-    for (std::size_t i = 0; i < kCircle; ++i) {
+    for (std::size_t i = 1; i < kCircle; i += 2) {
       least[i] = smaller(least_before[i], least_before[(i + length) % kCircle]);
       largest[i] = larger(largest_before[i], largest_before[(i + length) % kCircle]);
     }
   }
   const Pixels centre = neighbourhood(first, step);
   Pixels brightest = centre, darkest = centre;
-  for (std::size_t i = 0; i < kCircle; ++i) {
-    brightest = larger(brightest, smaller(least[i], circle[(i + 8) % kCircle]));
-    darkest = smaller(darkest, larger(largest[i], circle[(i + 8) % kCircle]));
+  for (std::size_t i = 1; i < kCircle; i += 2) {
+    const Pixels &before = circle[i - 1], &behind = circle[(i + 8) % kCircle];
+    brightest = larger(brightest, smaller(least[i], larger(before, behind)));
+    darkest = smaller(darkest, larger(largest[i], smaller(before, behind)));
   }
   return larger(brightest - centre, centre - darkest);
 }

@@ -50,28 +50,29 @@ SDVO_AVX2 inline __m256i contrast(const std::uint8_t* pixels, const Offsets& off
   const __m256i possible = _mm256_subs_epu8(bound, threshold);
   if (_mm256_testz_si256(possible, possible)) return zero;
 
-  // The least and the largest pixel of 2, 4, 8 and 9 in a row, from each one on.
-  __m256i circle[kCircle], least[kCircle], largest[kCircle];
+  // The arc of nine that begins at an odd pixel and the one that begins right before it share eight pixels: the least
+  // and the largest of 2, 4 and 8 in a row are needed from each odd pixel on alone.
+  __m256i circle[kCircle], least[kCircle], largest[kCircle], least_of_4[kCircle], largest_of_4[kCircle];
 #pragma GCC unroll 16
   for (std::size_t i = 0; i < kCircle; ++i) circle[i] = load(pixels + offsets[i]);
-#pragma GCC unroll 16
-  for (std::size_t i = 0; i < kCircle; ++i) {
+#pragma GCC unroll 8
+  for (std::size_t i = 1; i < kCircle; i += 2) {
     least[i] = _mm256_min_epu8(circle[i], circle[(i + 1) % kCircle]);
     largest[i] = _mm256_max_epu8(circle[i], circle[(i + 1) % kCircle]);
   }
-  __m256i least_of_4[kCircle], largest_of_4[kCircle];
-#pragma GCC unroll 16
-  for (std::size_t i = 0; i < kCircle; ++i) {
+#pragma GCC unroll 8
+  for (std::size_t i = 1; i < kCircle; i += 2) {
     least_of_4[i] = _mm256_min_epu8(least[i], least[(i + 2) % kCircle]);
     largest_of_4[i] = _mm256_max_epu8(largest[i], largest[(i + 2) % kCircle]);
   }
   __m256i brightest = zero, darkest = _mm256_set1_epi8(-1);
-#pragma GCC unroll 16
-  for (std::size_t i = 0; i < kCircle; ++i) {
+#pragma GCC unroll 8
+  for (std::size_t i = 1; i < kCircle; i += 2) {
+    const __m256i before = circle[i - 1], behind = circle[(i + 8) % kCircle];
     const __m256i low = _mm256_min_epu8(least_of_4[i], least_of_4[(i + 4) % kCircle]);
     const __m256i high = _mm256_max_epu8(largest_of_4[i], largest_of_4[(i + 4) % kCircle]);
-    brightest = _mm256_max_epu8(brightest, _mm256_min_epu8(low, circle[(i + 8) % kCircle]));
-    darkest = _mm256_min_epu8(darkest, _mm256_max_epu8(high, circle[(i + 8) % kCircle]));
+    brightest = _mm256_max_epu8(brightest, _mm256_min_epu8(low, _mm256_max_epu8(before, behind)));
+    darkest = _mm256_min_epu8(darkest, _mm256_max_epu8(high, _mm256_min_epu8(before, behind)));
   }
   const __m256i found = excess(brightest, darkest, centre);
   return _mm256_andnot_si256(_mm256_cmpeq_epi8(_mm256_subs_epu8(found, threshold), zero), found);

@@ -126,8 +126,9 @@ SDVO_AVX2 void measureWithAvx2(const cv::Mat& sums, const FreakKeypoint* keypoin
   }
   const __m256 u = _mm256_load_ps(us), v = _mm256_load_ps(vs), scale = _mm256_load_ps(scales);
   const __m256 cosine = _mm256_load_ps(cosines), sine = _mm256_load_ps(sines);
+  const auto& pattern = Freak::pattern();
   for (std::size_t i = 0; i < Freak::kFields; ++i) {
-    const Freak::Field& field = Freak::pattern()[i];
+    const Freak::Field& field = pattern[i];
     const __m256 fx = _mm256_set1_ps(field.x), fy = _mm256_set1_ps(field.y);
     const __m256 x = _mm256_sub_ps(_mm256_add_ps(u, _mm256_mul_ps(cosine, fx)), _mm256_mul_ps(sine, fy));
     const __m256 y = _mm256_add_ps(_mm256_add_ps(v, _mm256_mul_ps(sine, fx)), _mm256_mul_ps(cosine, fy));
@@ -157,6 +158,7 @@ void comparePlain(const OctetMeans& means, std::uint8_t* const* rows) {
 SDVO_AVX2 void compareWithAvx2(const OctetMeans& means, std::uint8_t* const* rows) {
   const auto& pairs = Freak::pairs();
   alignas(32) std::uint8_t bit_of_rows[Freak::kBits];
+#pragma GCC unroll 8
   for (std::size_t bit = 0; bit < Freak::kBits; ++bit) {
     const __m256 a = _mm256_loadu_ps(means[pairs[bit].first].data());
     const __m256 b = _mm256_loadu_ps(means[pairs[bit].second].data());

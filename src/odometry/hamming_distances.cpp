@@ -23,18 +23,19 @@ namespace {
 
 SDVO_POPCOUNT void distancesByWords(const std::uint8_t* row, const cv::Mat& others, const int* candidates,
                                     std::size_t count, float* distances) {
-  const int words = others.cols / 8;
+  constexpr int kBytes = 32;  // of these every base descriptor has a multiple
   for (std::size_t k = 0; k < count; ++k) {
     const std::uint8_t* other = others.ptr(candidates[k]);
-    int distance = 0;
-    for (int w = 0; w < words; ++w) {
-      std::uint64_t a, b;
-      std::memcpy(&a, row + 8 * w, 8);
-      std::memcpy(&b, other + 8 * w, 8);
-      distance += __builtin_popcountll(a ^ b);
-    }
-    for (int byte = 8 * words; byte < others.cols; ++byte)
-      distance += __builtin_popcount(static_cast<unsigned>(row[byte] ^ other[byte]));
+    int distance = 0, byte = 0;
+    for (; byte + kBytes <= others.cols; byte += kBytes)
+#pragma GCC unroll 4
+      for (int word = byte; word < byte + kBytes; word += 8) {
+        std::uint64_t a, b;
+        std::memcpy(&a, row + word, 8);
+        std::memcpy(&b, other + word, 8);
+        distance += __builtin_popcountll(a ^ b);
+      }
+    for (; byte < others.cols; ++byte) distance += __builtin_popcount(static_cast<unsigned>(row[byte] ^ other[byte]));
     distances[k] = static_cast<float>(distance);
   }
 }

@@ -180,15 +180,15 @@ void LocalMap::startPoint(const StereoFeatures& features, int row, int id, const
   const double u = features.u[row], v = features.v[row];
   const double disparity =
       std::max(features.disparity[row] - calibration.disparityError(camera, u), kFarthestDisparity);
-  if (spare_.empty()) spare_.emplace_back();
-  points_.push_back(std::move(spare_.back()));
-  spare_.pop_back();
-  Point& point = points_.back();
+  Point& point = points_.add();
   point.seen = 1;
   point.position.T_origin_anchor = T_camera_origin.inverse();
   point.position.ray_and_inverse_depth = {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy,
                                           1.0 / camera.depth(disparity)};
   point.reference.take(features, row, {u, v}, T_camera_origin);
+  point.observations.clear();
+  // Room for many sightings would stay with a point that will have few.
+  if (point.observations.capacity() > kUsualSightings) point.observations.shrink_to_fit();
   point.observations.reserve(kUsualSightings);
   point.observations.push_back({id, row, {u, v, features.disparity[row]}, sigma});
   takeDescriptor(point, features, row);
@@ -360,23 +360,11 @@ bool LocalMap::isLookedFor(const Point& point, int since) {
 void LocalMap::removeFrame(std::size_t index) {
   const int id = frames_[index].id;
   frames_.erase(frames_.begin() + static_cast<std::ptrdiff_t>(index));
-  const int since = lookedForSince();
-  auto kept = points_.begin();
-  for (Point& point : points_) {
+  points_.removeIf([&, since = lookedForSince()](Point& point) {
     const auto here = sightingIn(point.observations, id);
     if (here != point.observations.end()) point.observations.erase(here);
-    // The others close up in their order; what is not looked for any more keeps its memory for a new point.
-    if (!isLookedFor(point, since)) {
-      point.observations.clear();
-      // Room for many sightings would stay with a point that will have few.
-      if (point.observations.capacity() > kUsualSightings) point.observations.shrink_to_fit();
-      spare_.push_back(std::move(point));
-    } else {
-      if (&*kept != &point) *kept = std::move(point);
-      ++kept;
-    }
-  }
-  points_.erase(kept, points_.end());
+    return !isLookedFor(point, since);
+  });
 }
 
 void LocalMap::Problem::clear() {

@@ -37,7 +37,8 @@ struct InStep {
 InStep inStep(const StereoFeatures& features, int i, double delay, const Vector6d& velocity) {
   const double u = features.u[i] - features.disparity[i], v = features.v[i] + features.dv[i];
   InStep result{features.disparity[i], Eigen::Vector2d::Zero()};
-  for (int iteration = 0; iteration < 2; ++iteration) {
+  const int iterations = delay == 0.0 ? 1 : 2;
+  for (int iteration = 0; iteration < iterations; ++iteration) {
     // In the middle of the delay.
     const RightFlow flow =
         rightFlow(features.camera, velocity, u - 0.5 * delay * result.flow.x(), v - 0.5 * delay * result.flow.y());

@@ -21,7 +21,7 @@ class SlantedPatch {
 
   int radius() const { return radius_; }
   int pixels() const { return side() * side(); }
-  /// Products of the three derivatives with each other.
+  /// Products of the three derivatives with each other, without their means.
   const Eigen::Matrix3f& hessian() const { return hessian_; }
 
   /// Products of the derivatives with the difference between an image around (x, y), its rows shifted by the slant, and
@@ -41,6 +41,8 @@ class SlantedPatch {
   std::vector<float> mask_, row_;  ///< one within the square, zero beyond; rows from its centre
   std::vector<float> wide_;        ///< the square with one pixel more on each side
   std::vector<float> grey_, by_disparity_, by_dv_, by_slant_, difference_;
+  float grey_sum_ = 0.f;
+  Eigen::Vector3f mean_;  ///< of the derivatives
   Eigen::Matrix3f hessian_;
 };
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/common/recycled.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/odometry/described_points.hpp"
 #include "stereo_descriptor_vo/odometry/keyframe_memory.hpp"
@@ -204,8 +205,7 @@ class LocalMap {
   StereoCamera camera_;
   DescriptorKind kind_;
   std::deque<Frame> frames_;
-  std::vector<Point> points_;
-  std::vector<Point> spare_;  ///< no points any more, but their memory
+  Recycled<Point> points_;
   KeyframeMemory memory_;
   int last_left_ = -1;  ///< the last key frame that was not among the newest ones any more
   Problem problem_;     ///< empty once it is solved, so that a copy of the map is none of it
