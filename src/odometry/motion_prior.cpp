@@ -5,6 +5,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 #include <sstream>
+#include <utility>
 
 namespace sdvo {
 namespace {
@@ -65,6 +66,17 @@ ExpectedMotion MotionPrior::around(const Eigen::Isometry3d& motion, double dt) c
   return {motion, processNoise(dt + 2.0 * options_.stamp_sigma, 0.0)};
 }
 
+double MotionPrior::logRatioOfSwap(const Eigen::Isometry3d& motion, double dt) const {
+  if (!velocity_ || !before_) return 0.0;
+  const Vector6d now = logSE3(motion) / dt, first = *velocity_ + now;
+  // Bounded by the probability that the prior is wrong.
+  const auto cost = [&](const Vector6d& from, const Vector6d& to) {
+    const double square = around(expSE3(from * dt), dt).normalisedSquare(expSE3(to * dt), Matrix6d::Zero());
+    return std::min(0.5 * square, -std::log(kTailProbability));
+  };
+  return cost(*before_, *velocity_) + cost(*velocity_, now) - cost(*before_, first) - cost(first, -now);
+}
+
 Matrix6d MotionPrior::unseen(double seconds) const {
   const Vector6d velocity = confirmed_.value_or(Vector6d::Zero());
   const auto spread = [&](double speed, double acceleration, double most) {
@@ -88,11 +100,6 @@ std::string MotionPrior::tooFast(const Eigen::Isometry3d& motion, const Matrix6d
   return words.str();
 }
 
-bool MotionPrior::seemsSwapped(const Vector6d& velocity) const {
-  constexpr double kAlike = 0.2;  // ratio of the velocity before (chosen)
-  return velocity_ && (velocity + 0.5 * *velocity_).norm() < kAlike * velocity_->norm();
-}
-
 void MotionPrior::measure(std::int64_t stamp, const Eigen::Isometry3d& motion, double dt, const Matrix6d& covariance,
                           bool is_confirmed, const Matrix6d& doubt) {
   doubt_ = doubt;
@@ -100,7 +107,7 @@ void MotionPrior::measure(std::int64_t stamp, const Eigen::Isometry3d& motion, d
   // A motion may be that fast within the error of its stamps, but no other one after it.
   if (!(velocity.head<3>().norm() <= options_.max_speed) || !(velocity.tail<3>().norm() <= options_.max_rotation_rate))
     return;
-  velocity_ = velocity;
+  before_ = std::exchange(velocity_, velocity);
   velocity_covariance_ = covariance / (dt * dt);
   if (!is_confirmed && confirmed_) return;
   confirmed_ = velocity;

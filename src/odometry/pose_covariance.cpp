@@ -1,6 +1,7 @@
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
 
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <cmath>
 
 #include "stereo_descriptor_vo/odometry/noise.hpp"
@@ -33,6 +34,13 @@ Matrix6d noLessThan(const Matrix6d& before, Matrix6d covariance) {
     covariance.middleCols<3>(first) *= factor;
   }
   return covariance;
+}
+
+/// No less than either in any direction.
+Matrix6d covering(const Matrix6d& a, const Matrix6d& b) {
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> more(a - b);
+  const Matrix6d roots = more.eigenvectors() * more.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  return b + Matrix6d((roots * roots.transpose()).selfadjointView<Eigen::Lower>());
 }
 
 }  // namespace
@@ -78,8 +86,7 @@ void PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, const 
 Matrix6d PoseCovariance::measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe) {
   const Matrix6d before = value_ - predicted_;
   carry(T_previous_current);
-  const Matrix6d motion =
-      unmeasured_ + (since_keyframe_ ? noLessThan(*since_keyframe_, since_keyframe) : since_keyframe);
+  const Matrix6d motion = unmeasured_ + (since_keyframe_ ? covering(*since_keyframe_, since_keyframe) : since_keyframe);
   since_keyframe_ = since_keyframe;
   value_ = noLessThan(before, keyframe_ + since_keyframe);
   predicted_.setZero();

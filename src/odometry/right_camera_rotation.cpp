@@ -18,6 +18,7 @@ constexpr double kPrior = 1e-3;   // keeps the first pairs' equations solvable, 
 constexpr double kCorrelatedSightings = 10.0;
 
 // A turn of the camera.
+constexpr double kUsualOfRigs = 0.2;  // px: undisturbed, KITTI's and EuRoC's rigs change by less
 constexpr double kUnusual =
     3.0;  // times the usual change (chosen). That grows where rectification left more than a rotation
           // (Karlsruhe's rig: 0.5 px), or where the shutters are apart while the camera turns.
@@ -67,7 +68,7 @@ double RightCameraRotation::add(const StereoFeatures& features) {
 }
 
 double RightCameraRotation::UsualChange::exceededBy(double change, double memory_of_large) {
-  const double usual = std::max(RowDelay::kUsual, std::sqrt(square)), limit = kUnusual * usual;
+  const double usual = std::max(kUsualOfRigs, std::sqrt(square)), limit = kUnusual * usual;
   // A knock is one large change. What changes in many pairs is the rig's way: each counts up to the limit.
   const double counted = std::min(change, limit);
   const double memory = change > limit ? memory_of_large : kUsualMemory;

@@ -21,6 +21,18 @@ Eigen::Isometry3d lookingAhead() {
   return T_base_camera;
 }
 
+/// Of the motion's inliers over the last `dt` s, as the motion has them: corners have more noise.
+std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHypothesis& found, double dt) {
+  std::vector<RowMotion> rows;
+  rows.reserve(found.motion.inliers.size());
+  for (const int i : found.motion.inliers) {
+    const auto [reference, current, distance] = found.matches[static_cast<std::size_t>(i)];
+    const Eigen::Vector3d now = found.motion.T_current_reference * found.view->rows.positions[reference];
+    rows.push_back({(features.camera.project(now).y() - found.view->pixels[reference].y) / dt, features.dv[current]});
+  }
+  return rows;
+}
+
 }  // namespace
 
 VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
@@ -185,12 +197,14 @@ void VisualOdometry::watchShutters(const Pair& pair, const MotionHypothesis& fou
   LearntRig& rig = state_.rig;
   const StereoFeatures& taken = pair.taken();
   if (!found.motion.success || state_.interrupted || !(pair.dt > 0.0)) return rig.right_delay.interrupt();
-  const Vector6d velocity = logSE3(found.motion.T_current_reference.inverse()) / state_.secondsSinceMap(taken);
+  const double since = state_.secondsSinceMap(taken);
+  const Eigen::Isometry3d T_reference_current = found.motion.T_current_reference.inverse();
+  const Vector6d velocity = logSE3(T_reference_current) / since;
   rig.readout.add(taken.camera, found.motion.T_current_reference, found.correspondences, found.motion.inliers,
                   velocity);
-  rig.right_delay.measure(taken, pair.dt, velocity);
-  if (found.innovation > noiseGate(6) && state_.prior.seemsSwapped(velocity))
-    state_.doubt.raise(CarriedDoubt::kCertain, "neighbouring pairs seemed to have changed places");
+  rig.right_delay.measure(taken, rowMotions(taken, found, since), pair.dt, velocity);
+  state_.doubt.raise(CarriedDoubt::kUnsuspected + state_.prior.logRatioOfSwap(T_reference_current, since),
+                     "neighbouring pairs seemed to have changed places");
   const std::string cause = rig.right_delay.partnerWords(pair.dt);
   if (!cause.empty()) state_.doubt.raise(CarriedDoubt::kCertain, cause);
 }

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "stereo_descriptor_vo/odometry/motion_doubt.hpp"
 
 namespace sdvo {
@@ -17,6 +19,19 @@ TEST(CarriedDoubt, FadesByHalves) {
   EXPECT_EQ(doubtful, 4) << "as many pairs as make a point a lasting one";
   doubt.raise(50.0, "anything");
   EXPECT_LE(doubt.logOdds(), CarriedDoubt::kCertain);
+}
+
+TEST(MotionDoubt, WhereNothingIsExpectedTheMotionIsAsUncertainAsItIsLong) {
+  const LocalMap map({});
+  const StereoFeatures features;
+  const MotionScene scene{map, {}, features, {}, {}, {}};
+  MotionHypothesis found;
+  found.motion.T_current_reference.translation().z() = -2.0;
+  CarriedDoubt before;
+  before.raise(CarriedDoubt::kCertain, "a knock");
+  const MotionDoubt doubt(scene, found, before);
+  EXPECT_NEAR(doubt.probability, 0.01, 0.002);
+  EXPECT_NEAR(std::sqrt(doubt.moment(2, 2)), 2.0, 0.1);
 }
 
 }  // namespace test_motion_doubt

@@ -92,6 +92,24 @@ TEST(MotionPrior, ADoubtfulMotionPredictsAndConfirmsNothing) {
   EXPECT_FALSE(prior.confirmed(2 * kSecond, 0.1));
 }
 
+TEST(MotionPrior, APairThatGoesBackAfterOneThatWentTwiceAsFarChangedPlacesWithIt) {
+  constexpr double kStep = 0.1, kBack = -0.09;  // s; m, what a walker goes meanwhile
+  MotionPrior prior({});
+  EXPECT_EQ(prior.logRatioOfSwap(ahead(kBack), kStep), 0.0);
+  prior.measure(kSecond, ahead(0.09), kStep, Matrix6d::Zero(), true, Matrix6d::Zero());
+  prior.measure(kSecond + kSecond / 10, ahead(0.18), kStep, Matrix6d::Zero(), true, Matrix6d::Zero());
+  EXPECT_GT(prior.logRatioOfSwap(ahead(kBack), kStep), 6.9) << "a thousand times as likely";
+  EXPECT_LT(prior.logRatioOfSwap(ahead(0.18), kStep), 0.0) << "it became faster";
+  EXPECT_LT(prior.logRatioOfSwap(ahead(0.09), kStep), 0.0);
+}
+
+TEST(MotionPrior, ATurnThatIsReversedIsNoSwap) {
+  MotionPrior prior({});
+  for (int i = 0; i < 2; ++i)
+    prior.measure((1 + i) * kSecond, ahead(0.0, 0.2), 0.1, Matrix6d::Zero(), true, Matrix6d::Zero());
+  EXPECT_LT(prior.logRatioOfSwap(ahead(0.0, -0.2), 0.1), 0.0) << "both would be beyond what a camera does";
+}
+
 TEST(MotionPrior, InnovationsAreSquaredInStandardDeviations) {
   ExpectedMotion expected{ahead(0.3), 0.04 * Matrix6d::Identity()};
   EXPECT_NEAR(expected.normalisedSquare(ahead(0.9), Matrix6d::Zero()), 9.0, 1e-9);

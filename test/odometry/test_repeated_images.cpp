@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 #include <vector>
 
@@ -15,7 +16,7 @@ StereoFeatures seen(unsigned seed) {
   std::uniform_real_distribution<float> uniform;
   for (int i = 0; i < 200; ++i)
     features.append(
-        {640.f * uniform(random), 480.f * uniform(random), 5.f + 20.f * uniform(random), 0.f, 10.f, -1.f, 1.f});
+        {640.f * uniform(random), 480.f * uniform(random), 5.f + 20.f * uniform(random), 0.f, 0.f, -1.f, 1.f});
   return features;
 }
 
@@ -26,7 +27,7 @@ StereoFeatures mixed(const StereoFeatures& before, const StereoFeatures& now, co
   for (const StereoFeatures* from : {&now, &before})
     for (int i = 0; i < from->count(); ++i)
       if (is_old(from->u[i], from->v[i]) == (from == &before))
-        features.append({from->u[i], from->v[i], from->disparity[i], 0.f, 10.f, -1.f, 1.f});
+        features.append({from->u[i], from->v[i], from->disparity[i], 0.f, 0.f, -1.f, 1.f});
   return features;
 }
 
@@ -39,6 +40,20 @@ void expectNewRows(const IsOld& is_old) {
   for (int i = 0; i < torn.count(); ++i)
     if (!is_old(torn.u[i], torn.v[i])) expected.push_back(i);
   EXPECT_EQ(images.newRows(torn), expected);
+}
+
+TEST(RepeatedImages, LeavesOutWhatIsDescribedAcrossTheTear) {
+  const StereoFeatures before = seen(1);
+  StereoFeatures torn = mixed(before, seen(2), [](float, float v) { return v > 240.f; });
+  for (const float v : {200.f, 225.f, 239.f, 240.f}) torn.append({320.f, v, 10.f, 0.f, 40.f, -1.f, 1.f});
+  RepeatedImages images;
+  images.remember(before, false);
+  const std::vector<int> rows = images.newRows(torn);
+  const auto has = [&](int from_last) {
+    return std::find(rows.begin(), rows.end(), torn.count() - from_last) != rows.end();
+  };
+  EXPECT_TRUE(has(4)) << "40 px above, and described within 20 px";
+  for (const int from_last : {3, 2, 1}) EXPECT_FALSE(has(from_last));
 }
 
 TEST(RepeatedImages, LeavesOutTheOldPartOfATornImage) {

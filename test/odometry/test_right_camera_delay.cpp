@@ -30,6 +30,15 @@ StereoFeatures seen(const Vector6d& velocity, double delay, double noise = 0.0, 
   return features;
 }
 
+/// As the points move in the left image, in step.
+std::vector<RowMotion> rowsOf(const StereoFeatures& features, const Vector6d& velocity) {
+  std::vector<RowMotion> rows;
+  constexpr double kStep = 1e-3;  // s
+  const StereoFeatures later = seen(velocity, kStep), now = seen(velocity, 0.0);
+  for (int i = 0; i < features.count(); ++i) rows.push_back({(later.dv[i] - now.dv[i]) / kStep, features.dv[i]});
+  return rows;
+}
+
 Vector6d velocityAt(double time) {
   Vector6d velocity;
   velocity << 0.3, 0.1, 0.8, 0.5 * std::sin(5.0 * time), 1.0 + 0.3 * std::cos(3.0 * time), 0.2 * std::sin(4.0 * time);
@@ -45,7 +54,7 @@ RightCameraDelay watched(double delay, int pairs) {
   RightCameraDelay right_delay;
   for (int k = 0; k < pairs; ++k) {
     const double noise = 0.1;  // px
-    right_delay.measure(seen(velocityAt(kPeriod * k + 0.5 * delay), delay, noise, 10u + static_cast<unsigned>(k)),
+    right_delay.measure(seen(velocityAt(kPeriod * k + 0.5 * delay), delay, noise, 10u + static_cast<unsigned>(k)), {},
                         kPeriod, before(k));
   }
   return right_delay;
@@ -87,7 +96,7 @@ TEST(RightCameraDelay, WhatIsKnownBeforehandHoldsUntilItIsContradicted) {
   RightCameraDelay known(-0.003);
   EXPECT_EQ(known.compensated(), -0.003);
   for (int k = 0; k < 60; ++k)
-    known.measure(seen(velocityAt(kPeriod * k), 0.0, 0.1, 10u + static_cast<unsigned>(k)), kPeriod, before(k));
+    known.measure(seen(velocityAt(kPeriod * k), 0.0, 0.1, 10u + static_cast<unsigned>(k)), {}, kPeriod, before(k));
   EXPECT_NEAR(known.compensated(), 0.0, 5e-4);
 }
 
@@ -102,7 +111,8 @@ TEST(RightCameraDelay, KnowsThePartnerOfAnotherPair) {
   for (const double delay : {-kPeriod, 0.0, kPeriod, -0.003}) {
     RightCameraDelay right_delay;
     const Vector6d velocity = velocityAt(1.0);
-    right_delay.measure(seen(velocity, delay, 0.15), kPeriod, velocity);
+    const StereoFeatures features = seen(velocity, delay, 0.15);
+    right_delay.measure(features, rowsOf(features, velocity), kPeriod, velocity);
     EXPECT_EQ(right_delay.partner(), std::abs(delay) == kPeriod ? delay : 0.0);
   }
 }

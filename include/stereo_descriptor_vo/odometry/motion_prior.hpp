@@ -66,15 +66,15 @@ class MotionPrior {
   /// The same around a motion that another source measured, whose error is as a prediction's within one pair.
   ExpectedMotion around(const Eigen::Isometry3d& motion, double dt) const;
 
+  /// By how much (logarithm of the ratio) the last motion and this one, over `dt` s, are likelier if their pairs changed
+  /// places. The first one then seems twice as far, and the second one behind it.
+  double logRatioOfSwap(const Eigen::Isometry3d& motion, double dt) const;
+
   /// Of an unseen motion around a standstill, m and rad: its speed was that of the confirmed velocity, and is bounded.
   Matrix6d unseen(double seconds) const;
 
   /// In words, if no motion may be as fast, noise and stamps considered.
   std::string tooFast(const Eigen::Isometry3d& motion, const Matrix6d& covariance, double dt) const;
-
-  /// Whether the camera went back by half of what the pair before seemed to move: of neighbours that changed places the
-  /// first one's motion was twice too large.
-  bool seemsSwapped(const Vector6d& velocity) const;
 
   /// Takes over the velocity of a measured motion. One in doubt predicts the next pair, but confirms nothing; what it
   /// is doubted by makes the prediction as uncertain.
@@ -82,7 +82,7 @@ class MotionPrior {
                bool is_confirmed, const Matrix6d& doubt);
 
   /// The next pair does not continue the last one: no motion is predicted. The confirmed velocity stays.
-  void interrupt() { velocity_.reset(), doubt_.setZero(); }
+  void interrupt() { velocity_.reset(), before_.reset(), doubt_.setZero(); }
   void forget();
 
  private:
@@ -90,7 +90,8 @@ class MotionPrior {
   Matrix6d stampNoise(const Vector6d& velocity) const;
 
   MotionPriorOptions options_;
-  std::optional<Vector6d> velocity_, confirmed_;  ///< m/s and rad/s
+  std::optional<Vector6d> velocity_, before_,
+      confirmed_;  ///< m/s and rad/s; `before_` is of the motion before the last
   Matrix6d velocity_covariance_ = Matrix6d::Zero(), confirmed_covariance_ = Matrix6d::Zero();
   Matrix6d doubt_ = Matrix6d::Zero();  ///< of the last measured motion, m and rad
   std::int64_t confirmed_stamp_ = 0;   ///< ns

@@ -4,6 +4,7 @@
 #include <deque>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
@@ -11,16 +12,22 @@
 
 namespace sdvo {
 
-/// The time by which the right image is taken later than the left one, and what it does to the features. A turn shifts
-/// all disparities of such a rig by f * rate * delay: 1 px for 3 ms at 100 deg/s and f = 212 px.
+/// A point that agrees with the motion.
+struct RowMotion {
+  double velocity;  ///< down in the left image, px/s
+  double dv;        ///< v_right - v_left, px
+};
+
+/// The time by which the right image is taken later than the left one, and what it does to the features. A turn
+/// shifts all disparities of such a rig by f * rate * delay: 1 px for 3 ms at 100 deg/s and f = 212 px.
 class RightCameraDelay {
  public:
   /// `prior`, s: what is known beforehand.
   explicit RightCameraDelay(double prior = 0.0);
 
   /// Takes note of a pair, as taken, with the camera's mean velocity (its own frame, m/s and rad/s) over the `dt` s
-  /// before it.
-  void measure(const StereoFeatures& features, double dt, const Vector6d& velocity);
+  /// before it. `rows` are of its points.
+  void measure(const StereoFeatures& features, const std::vector<RowMotion>& rows, double dt, const Vector6d& velocity);
   /// The next pair does not continue the last one.
   void interrupt() { pairs_.clear(); }
 
@@ -37,8 +44,8 @@ class RightCameraDelay {
   /// from the error of what is known. A rig in step has none.
   double drift() const;
 
-  /// The features as the right camera would have seen them at the left one's moment. `velocity`: the mean over the `dt`
-  /// s before the pair.
+  /// The features as the right camera would have seen them at the left one's moment. `velocity`: the mean over the
+  /// `dt` s before the pair.
   StereoFeatures inStep(const StereoFeatures& features, double dt, const Vector6d& velocity) const;
 
  private:

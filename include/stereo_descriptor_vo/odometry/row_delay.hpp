@@ -19,7 +19,6 @@ class RowDelay {
   static constexpr double kMemory =
       0.995;                              ///< ratio of the past that a pair leaves: clocks hardly drift over 200 pairs
   static constexpr double kKernel = 0.5;  ///< px (chosen): errors of healthy rows are smaller
-  static constexpr double kUsual = 0.2;   ///< px: rows of rectified rigs differ by less (KITTI, EuRoC)
   static constexpr double kUseful = 0.005;  ///< s; what is not known better than that is not judged
   // 2 ms is 2 cm at 10 m/s, and 0.4 px at 100 deg/s and f = 120 px.
   static constexpr double kWarn = 0.002, kFail = 0.01;  ///< s
