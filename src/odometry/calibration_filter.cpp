@@ -55,7 +55,7 @@ RigCalibration::Vector CalibrationFilter::significantSpread() const {
   const RigCalibration::Matrix covariance = present_->information.inverse();
   const RigCalibration::Vector estimate = covariance * present_->information_mean;
   const RigCalibration::Vector prior(options_.prior_offset, options_.prior_bend);
-  const RigCalibration::Vector chance = noiseGate(1) * covariance.diagonal();
+  const RigCalibration::Vector chance = options_.significance * options_.significance * covariance.diagonal();
   for (int i = 0; i < RigCalibration::kParameters; ++i) {
     const double distance = estimate[i] - prior[i];
     const double significant = std::sqrt(std::max(distance * distance - chance[i], 0.0));

@@ -145,22 +145,28 @@ LocalMap::Sighting LocalMap::sight(const PatchAlignmentOptions& options, const S
   sighting.measurement.head<2>() += found->shift;
   sighting.sigma = found->sigma;
   sighting.aligned = true;
+  sighting.scale = found->scale;
   return sighting;
 }
 
 void LocalMap::renewLooks(const StereoFeatures& features, const std::vector<Sighting>& sightings) {
-  std::vector<bool> is_sighted(features.u.size(), false);
-  for (const Sighting& sighting : sightings) is_sighted[sighting.row] = true;
+  std::vector<const Sighting*> of_row(features.u.size(), nullptr);
+  for (const Sighting& sighting : sightings) of_row[sighting.row] = &sighting;
   for (Point& point : points_) {
     const Observation& last = point.observations.back();
-    // Else it is not seen, cut off or just started.
-    if (last.frame_id == newestId() && is_sighted[last.row]) takeDescriptor(point, features, last.row);
+    const Sighting* sighting = last.frame_id == newestId() ? of_row[last.row] : nullptr;
+    if (!sighting) continue;  // not seen, cut off or just started
+    takeDescriptor(point, features, last.row);
+    const double change = std::max(sighting->scale, 1.0 / sighting->scale);
+    if (sighting->aligned && change > options_.renewal_scale)
+      point.reference.take(features, last.row, sighting->measurement.head<2>(), newestPose());
   }
 }
 
 void LocalMap::discountNewest() {
   for (Point& point : points_)
-    if (point.observations.size() > 1 && point.observations.back().frame_id == newestId()) --point.seen;
+    if (point.observations.size() > 1 && point.observations.back().frame_id == newestId())
+      --point.seen;
 }
 
 void LocalMap::takeDescriptor(Point& point, const StereoFeatures& features, int row) {

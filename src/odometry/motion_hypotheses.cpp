@@ -8,7 +8,6 @@
 #include <utility>
 
 #include "ascending_rows.hpp"
-#include "stereo_descriptor_vo/odometry/correspondence_arrays.hpp"
 #include "stereo_descriptor_vo/odometry/motion_doubt.hpp"
 #include "stereo_descriptor_vo/odometry/pose_problem.hpp"
 
@@ -203,7 +202,7 @@ bool agree(const StereoCamera& camera, const std::vector<Correspondence>& corres
            const std::vector<int>& points, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double within) {
   const auto same = std::count_if(points.begin(), points.end(), [&](int i) {
     const Eigen::Vector3d in_a = a * correspondences[i].point, in_b = b * correspondences[i].point;
-    if (in_a.z() < kNearestDepth || in_b.z() < kNearestDepth) return false;
+    if (in_a.z() <= 0.0 || in_b.z() <= 0.0) return false;
     return (camera.project(in_a) - camera.project(in_b)).norm() < within;
   });
   return 2 * static_cast<std::size_t>(same) > points.size();
@@ -214,16 +213,12 @@ double logLikelihood(double of_others, int points) {
   return -effectiveNumber(points) * kLogOddsOfSighting * of_others / points;
 }
 
-double lastingProbability() {
-  return probabilityOf(kLogOddsOfSighting * MotionHypothesis::kLastingSightings);
-}
-
 double logOddsMisled(const MotionScene& scene, const MotionHypothesis& hypothesis) {
   const Agreement& agreement = hypothesis.agreement;
   double confirmed = 0.0;
   if (agreement.lasting_matches > 0) {
     // Agreement with the camera's motion against agreement with one of something that moves.
-    const double by_chance = 1.0 - lastingProbability();
+    const double by_chance = probabilityOf(-kLogOddsOfSighting * MotionHypothesis::kLastingSightings);
     const double usual = std::max(scene.usual_agreement, 0.5);
     const double ratio = static_cast<double>(agreement.lasting_inliers) / agreement.lasting_matches;
     confirmed = effectiveNumber(agreement.lasting_matches) *

@@ -11,7 +11,6 @@
 
 #include "ascending_rows.hpp"
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
-#include "stereo_descriptor_vo/odometry/correspondence_arrays.hpp"
 #include "stereo_descriptor_vo/odometry/correspondences.hpp"
 
 namespace sdvo {
@@ -121,7 +120,7 @@ bool MotionSearch::leavesGate(const MotionScene& scene, const Eigen::Isometry3d&
   std::size_t seen = 0, outside = 0;
   for (const Eigen::Vector3d& point : found.view->rows.positions) {
     const Eigen::Vector3d here = T_current_reference * point, expected = predicted * point;
-    if (here.z() < kNearestDepth || expected.z() < kNearestDepth) continue;
+    if (here.z() <= 0.0 || expected.z() <= 0.0) continue;
     const Eigen::Vector3d pixel = camera.project(here);
     if (!camera.sees(pixel)) continue;
     ++seen;
@@ -198,6 +197,7 @@ std::string MotionSearch::chanceWords(const MotionScene& scene, const MotionHypo
 
 /// Aligns the inliers' patches and refines the motion on them.
 MotionSearch::Alignment MotionSearch::align(const MotionScene& scene, const MotionHypothesis& found) const {
+  constexpr std::size_t kEnough = 30;  // fewer are no better than all corners together
   const StereoFeatures& features = scene.features;
   const Eigen::Isometry3d T_camera_origin = found.motion.T_current_reference * scene.map.newestPose();
   Alignment alignment{found.motion.T_current_reference, {}, {}};
@@ -216,7 +216,7 @@ MotionSearch::Alignment MotionSearch::align(const MotionScene& scene, const Moti
         measurementOf(features, match.current, scene.calibration, sighting.measurement.head<2>() - corner);
     aligned.push_back(alignment.measured.back());
   }
-  refineMotion(features.camera, options(scene), aligned.size() >= kFewestMeasured ? aligned : alignment.measured,
+  refineMotion(features.camera, options(scene), aligned.size() >= kEnough ? aligned : alignment.measured,
                alignment.T_current_reference);
   return alignment;
 }

@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stereo_descriptor_vo/odometry/noise.hpp"
-
 namespace sdvo {
 
 namespace {
@@ -31,8 +29,8 @@ int RowDelay::cellOf(double u, double v, int width, int height) {
 }
 
 double RowDelay::Estimate::proved(double expected) const {
-  const double distance = value - expected, chance = noiseGate(1) * sigma * sigma;
-  return std::copysign(std::sqrt(std::max(distance * distance - chance, 0.0)), distance);
+  const double distance = value - expected, chance = kSignificant * sigma;
+  return std::copysign(std::sqrt(std::max(distance * distance - chance * chance, 0.0)), distance);
 }
 
 RowDelay::Fit RowDelay::fit(const Cells& cells) {
@@ -109,7 +107,7 @@ std::optional<RowDelay::Estimate> RowDelay::estimate() const {
   const Fit fit = this->fit(cells_);
   const Eigen::Matrix2d inverse = fit.information.inverse();
   // Student's distribution: few blocks tell their own spread badly (Wallace's bound of its quantiles).
-  constexpr double kSquare = noiseGate(1);
+  constexpr double kSquare = kSignificant * kSignificant;
   const double freedom = blocks_ - 2.0, few = freedom / kSquare * std::expm1(kSquare / freedom);
   const Estimate estimate{fit.value[0], std::sqrt(few * (inverse * spread_ * inverse.transpose())(0, 0))};
   if (!(estimate.sigma < kUseful)) return std::nullopt;

@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "stereo_descriptor_vo/odometry/calibration_filter.hpp"
-#include "stereo_descriptor_vo/odometry/noise.hpp"
 
 namespace sdvo {
 namespace test_calibration_filter {
@@ -19,14 +18,15 @@ CalibrationOptions someOptions() {
   options.prior_bend = -1.0;
   options.prior_sigma = 2.0;
   options.trust = 0.25;
+  options.significance = 3.0;
   options.memory = 0.5;
   return options;
 }
 
 const Vector kPrior(0.5, -1.0);
 const Matrix kInformation = Vector(12.0, 5.0).asDiagonal();  // of a window
-// Distances that are significant of a window of that information.
-const double kOffset = std::sqrt(noiseGate(1) / 12.0), kBend = std::sqrt(noiseGate(1) / 5.0);
+// Distances that are significant of a window of that information, three of its standard deviations.
+const double kOffset = 3.0 / std::sqrt(12.0), kBend = 3.0 / std::sqrt(5.0);
 
 /// Adds the window of these pairs that would find `own` without a prior.
 void addWindow(CalibrationFilter& filter, int oldest, int newest, const Vector& own,

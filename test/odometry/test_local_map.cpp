@@ -151,6 +151,7 @@ TEST(LocalMapSight, TakesOutTheDetectorsErrorAtAnotherDepth) {
   EXPECT_NEAR(sighting.measurement.x(), 320.0, 0.06);
   EXPECT_NEAR(sighting.measurement.y(), 240.0, 0.06);
   EXPECT_NEAR(sighting.measurement.z(), features.disparity[0], 1e-6);
+  EXPECT_NEAR(sighting.scale, 1.25, 1e-6);
   EXPECT_LT(sighting.sigma, 0.1);
 }
 
@@ -209,6 +210,29 @@ TEST(LocalMapSight, IsTheCornerWithoutAnAlignment) {
   features.patch_layout.side = 0;
   features.patches.release();
   expectCorner(PatchAlignmentOptions(), features);
+}
+
+TEST(LocalMapSight, RenewsTheReferenceWhenTheScaleHasChangedAndKeepsThePoint) {
+  const Wall wall;
+  LocalMap map{LocalMapOptions()};
+  map.insert({}, wall.view(10.0), 1, Wall::poseAt(10.0), {}, RigCalibration());
+  int id = 1;
+  const auto approach = [&](double distance, const Eigen::Vector2d& error) {
+    const StereoFeatures features = wall.view(distance, error);
+    const Eigen::Isometry3d pose = Wall::poseAt(distance);
+    const LocalMap::Sighting sighting = map.sight(PatchAlignmentOptions(), features, pose, 0, 0);
+    map.insert({}, features, ++id, pose, {sighting}, RigCalibration());
+    map.renewLooks(features, {sighting});
+    return sighting;
+  };
+  // A little larger: the first reference serves on. 1.25 times: from then on that view is the reference.
+  EXPECT_NEAR(approach(9.0, {0.3, 0.2}).scale, 10.0 / 9.0, 1e-3);
+  EXPECT_NEAR(approach(8.0, {-0.2, 0.3}).scale, 1.25, 1e-3);
+  const LocalMap::Sighting last = approach(7.5, {0.4, -0.3});
+  EXPECT_NEAR(last.scale, 8.0 / 7.5, 1e-3);
+  EXPECT_TRUE(last.aligned);
+  EXPECT_NEAR(last.measurement.x(), 320.0, 0.1) << "the new reference's own error does not move the point";
+  EXPECT_NEAR(last.measurement.y(), 240.0, 0.1);
 }
 
 using Sightings = std::vector<LocalMap::Sighting>;

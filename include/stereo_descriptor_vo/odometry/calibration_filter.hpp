@@ -14,6 +14,7 @@ struct CalibrationOptions {
   double prior_sigma = 1.0;
   double right_delay = 0.0;
   double trust = 0.1;
+  double significance = 4.0;
   double memory = 0.5;
 
   void describe(OptionList& list) {
@@ -27,6 +28,10 @@ struct CalibrationOptions {
              "time by which right images are known to be later than left ones; a significant difference is found");
     list.add("trust", trust, {0.01, 1.0}, "",
              "how far the window's own figure for its precision is believed: 1 / the factor on its standard deviation");
+    list.add(
+        "significance", significance, {0.0, 100.0}, "sigma",
+        "how many of the window's own standard deviations an estimate must differ from what is known beforehand to "
+        "move it");
     list.add("memory", memory, {0.0, 1.0}, "",
              "share of the earlier windows' information that one more window leaves; 1: forever");
   }

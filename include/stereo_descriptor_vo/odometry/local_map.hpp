@@ -29,6 +29,7 @@ struct LocalMapOptions {
   double keyframe_overlap = 0.6;
   double corner_sigma = 0.4;
   double reference_sigma = 0.1;
+  double renewal_scale = 1.2;
 
   void describe(OptionList& list) {
     list.add("keyframes", keyframes, {2, 50}, "", "newest key frames, which the map holds whatever they see");
@@ -48,6 +49,9 @@ struct LocalMapOptions {
              "standard deviation of a corner's position, where no patch was aligned");
     list.add("reference_sigma", reference_sigma, {0.01, 10.0}, "px",
              "the same of the position that a point's reference patch defines");
+    list.add(
+        "renewal_scale", renewal_scale, {1.0, 100.0}, "",
+        "a point takes a new reference patch once it appears larger or smaller than in the old one by this factor");
   }
 };
 
@@ -96,6 +100,7 @@ class LocalMap {
     Eigen::Vector3d measurement;  ///< (u_left, v_left, disparity), px
     double sigma;                 ///< of u_left and of v_left, px
     bool aligned = false;         ///< by its patch: the position is not the corner's but that of the reference's middle
+    double scale = 1.0;           ///< how much larger the point appears than in its reference patch
   };
 
   /// Measurement of a point by the pair's row, seen from about `T_camera_origin`. The row's patch is aligned with the
@@ -145,7 +150,8 @@ class LocalMap {
   /// The newest pair's sightings confirm no points: its motion may be something else's.
   void discountNewest();
 
-  /// The newest pair's sightings that were not cut off renew their points' descriptors.
+  /// The newest pair's sightings that were not cut off renew what their points look like: the descriptors, and a
+  /// reference patch that has become too small or too large.
   void renewLooks(const StereoFeatures& features, const std::vector<Sighting>& sightings);
 
  private:

@@ -97,9 +97,6 @@ bool agree(const StereoCamera& camera, const std::vector<Correspondence>& corres
 /// moves has many of them: the sum is tempered by their effective number.
 double logLikelihood(double of_others, int points);
 
-/// That a lasting point stands still.
-double lastingProbability();
-
 /// Log-odds that a motion is not the camera's, by the pair itself: the prior against the agreement of lasting points.
 double logOddsMisled(const MotionScene& scene, const MotionHypothesis& hypothesis);
 

@@ -16,10 +16,10 @@ namespace sdvo {
 class RowDelay {
  public:
   static constexpr int kColumns = 6, kRows = 4;  ///< parts of the image
-  static constexpr double kMemory =
-      0.995;                              ///< ratio of the past that a pair leaves: clocks hardly drift over 200 pairs
-  static constexpr double kKernel = 0.5;  ///< px (chosen): errors of healthy rows are smaller
-  static constexpr double kUseful = 0.005;  ///< s; what is not known better than that is not judged
+  static constexpr double kSignificant = 4.0;    ///< standard deviations beyond which a delay is proved (chosen)
+  static constexpr double kMemory = 0.995;       ///< ratio of the past that a pair leaves: some 200 pairs
+  static constexpr double kKernel = 0.5;         ///< px (chosen): errors of healthy rows are smaller
+  static constexpr double kUseful = 0.005;       ///< s; what is not known better than that is not judged
   // 2 ms is 2 cm at 10 m/s, and 0.4 px at 100 deg/s and f = 120 px.
   static constexpr double kWarn = 0.002, kFail = 0.01;  ///< s
 
@@ -40,7 +40,7 @@ class RowDelay {
     double proved(double expected = 0.0) const;
   };
 
-  /// Pairs are left out where the instrument is below `least_turning`
+  /// `memory`: ratio of the past that a pair leaves. Pairs are left out where the instrument is below `least_turning`
   /// (px/s, RMS): errors of the velocity must be smaller.
   /// `block`: pairs in a row that may see the same points, whose errors are then alike.
   RowDelay(double memory, double least_turning, int block = 1)

@@ -6,8 +6,8 @@
 
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
-#include "stereo_descriptor_vo/odometry/noise.hpp"
 #include "stereo_descriptor_vo/odometry/pose_problem.hpp"
+#include "stereo_descriptor_vo/odometry/row_delay.hpp"
 
 namespace sdvo {
 
@@ -17,12 +17,13 @@ namespace sdvo {
 /// bound.
 class RowReadout {
  public:
-  static constexpr double kWarn = 0.003;  ///< s
+  static constexpr double kSignificant = RowDelay::kSignificant;  ///< standard deviations that prove a rolling shutter
+  static constexpr double kWarn = 0.003;                          ///< s
 
   struct Estimate {
     double value, sigma;  ///< s
 
-    bool isRolling() const { return value > kWarn && value * value > noiseGate(1) * sigma * sigma; }
+    bool isRolling() const { return value > kWarn && value > kSignificant * sigma; }
   };
 
   /// A pair's motion since the reference, with the correspondences that agree with it, and the mean velocity (m/s and
