@@ -73,6 +73,8 @@ std::string ArrivalLog::advise() const {
   double delay = 0.0;
   for (const Topic& topic : topics_) {
     if (&topic == &topics_[kLeftImage]) continue;
+    if (!left.empty() && topic.count == 0 && &topic != &topics_[kRightImage])
+      text << "; " << topic.name << " must have a message for each image, with the image's stamp";
     const Comparison comparison = compareWithLeftImage(topic);
     if (!std::isfinite(comparison.smallest_gap)) return text.str();  // the counts say it
     if (comparison.smallest_gap > largestGap()) {

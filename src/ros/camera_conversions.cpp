@@ -35,6 +35,7 @@ View viewOf(const CameraInfo& info, const std::string& side) {
     if (!std::isfinite(info.P[i])) throw std::invalid_argument(name + ": P[" + std::to_string(i) + "] is not a number");
   if (info.K[0] == 0.0 || info.P[0] == 0.0 || info.P[5] == 0.0)
     throw std::invalid_argument(name + ": K or P is zero, the camera is not calibrated (REP-104)");
+  if (info.P[0] < 0.0 || info.P[5] < 0.0) throw std::invalid_argument(name + ": a focal length in P is negative");
   const double x = std::max(1u, info.binning_x), y = std::max(1u, info.binning_y);
   return {info.P[0] / x,
           info.P[5] / y,
@@ -57,16 +58,10 @@ std::string describeP(const CameraInfo& info) {
 std::string remedy(const View& left, const View& right) {
   if (left.tx == right.tx)
     return "no baseline in P: P[3] of the right camera_info must be -fx * baseline (old camera drivers leave it out)";
-  if (left.tx < 0.0 && right.tx == 0.0)
+  if (left.tx < 0.0)
     return "are left and right swapped? Swap the topics; with depthai_ros_driver set "
            "stereo_i_reverse_stereo_socket_order to true";
-  if (right.tx > 0.0) return "P[3] of the right camera_info has the wrong sign, it must be -fx * baseline";
-  return "are left and right swapped?";
-}
-
-/// A lens model without any distortion, of which image_proc hands the images on as they are.
-bool isWithoutDistortion(const CameraInfo& info) {
-  return std::all_of(info.D.begin(), info.D.end(), [](double d) { return d == 0.0; });
+  return "P[3] of the right camera_info has the wrong sign, it must be -fx * baseline";
 }
 
 /// Of the rectification, rad; 0 where R is left out.
@@ -113,7 +108,8 @@ StereoCamera toStereoCamera(const CameraInfo& left_info, const CameraInfo& right
 std::string whyUnrectified(const CameraInfo& left, const CameraInfo& right) {
   constexpr double kRows = 0.5;  // px, which the rig monitor sees
   for (const CameraInfo* info : {&left, &right})
-    if (isWithoutDistortion(*info) && rotation(*info) * info->P[5] > kRows)
+    if (std::all_of(info->D.begin(), info->D.end(), [](double d) { return d == 0.0; }) &&
+        rotation(*info) * info->P[5] > kRows)
       return "D of camera_info is zero and R is not the identity: image_proc does not rectify such images, it hands "
              "them on; let the driver rectify, or give D a coefficient other than zero (1e-9)";
   return "";

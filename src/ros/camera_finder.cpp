@@ -18,14 +18,26 @@ std::string replaced(std::string text, const std::string& from, const std::strin
   return text;
 }
 
+bool isAmong(const ros::master::V_TopicInfo& topics, const std::string& name) {
+  return std::any_of(topics.begin(), topics.end(), [&](const auto& topic) { return topic.name == name; });
+}
+
 }  // namespace
 
+std::string explainUnpublished(const std::vector<std::string>& names, const ros::master::V_TopicInfo& topics) {
+  std::string text;
+  for (const std::string& name : names) {
+    if (isAmong(topics, name)) continue;
+    text += "; nobody publishes " + name;
+    if (isAmong(topics, name + "/compressed"))
+      text +=
+          ", but its /compressed: set stereo_features/image_transport to compressed, for one side alone "
+          "stereo_features/left_image/image_transport or right_image/image_transport";
+  }
+  return text;
+}
+
 std::vector<ros::M_string> findStereoCameras(const std::string& ns, const ros::master::V_TopicInfo& topics) {
-  const auto isPublished = [&](const std::string& name, const std::string& type) {
-    return std::any_of(topics.begin(), topics.end(), [&](const auto& topic) {
-      return topic.name == name && topic.datatype == "sensor_msgs/" + type;
-    });
-  };
   std::map<std::string, ros::M_string> cameras;  // by the folder of the left one
   for (const std::string& image : kImages)
     for (const ros::master::TopicInfo& topic : topics)
@@ -35,8 +47,9 @@ std::vector<ros::M_string> findStereoCameras(const std::string& ns, const ros::m
           continue;
         const std::string here = topic.name.substr(0, folder);
         const std::string there = ns + replaced(here.substr(ns.size()), left, right);
-        if (here != there && isPublished(here + image, "Image") && isPublished(there + image, "Image") &&
-            isPublished(here + "camera_info", "CameraInfo") && isPublished(there + "camera_info", "CameraInfo"))
+        const bool is_whole = isAmong(topics, there + image) && isAmong(topics, here + "camera_info") &&
+                              isAmong(topics, there + "camera_info");
+        if (here != there && is_whole)
           cameras.try_emplace(here, ros::M_string{{"left/image_rect", here + image},
                                                   {"right/image_rect", there + image},
                                                   {"left/camera_info", here + "camera_info"},

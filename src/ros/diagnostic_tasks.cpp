@@ -1,18 +1,13 @@
 #include "diagnostic_tasks.hpp"
 
-#include <cstdio>
 #include <utility>
+
+#include "../common/text.hpp"
 
 namespace sdvo {
 namespace {
 
 constexpr double kWindow = 5.0;  // s, of the rate
-
-std::string format(const char* text, double number) {
-  char buffer[64];
-  std::snprintf(buffer, sizeof buffer, text, number);
-  return buffer;
-}
 
 }  // namespace
 
@@ -45,7 +40,7 @@ std::optional<InputMonitor::Silence> InputMonitor::silence() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!idle_.empty()) return Silence{WallUpdater::Level::OK, idle_};
   const double silence = secondsSince(arrivals_.empty() ? begin_ : arrivals_.back());
-  const std::string age = format("%.0f s", silence);
+  const std::string age = text(0, silence, " s");
   if (arrivals_.empty() && silence <= max_silence_)
     return Silence{WallUpdater::Level::WARN, "no " + what_ + " yet on " + topics_};
   if (arrivals_.empty())

@@ -157,6 +157,7 @@ void OdometryDiagnostics::diagnose(Status& status) {
 
 std::string doubtOfLatency(double latency, double max_latency) {
   constexpr double kAhead = 0.1;  // s, a step of the slowest simulated clocks (chosen)
+  if (std::isnan(latency)) return ": use_sim_time is true, and nobody publishes /clock: rosbag play needs --clock";
   if (latency > max_latency) return ": is the machine too slow, or are the clocks of two machines different?";
   if (latency < -kAhead)
     return ": the images are stamped in the future, where TF knows nothing yet: is the camera's clock that of this "
@@ -166,10 +167,7 @@ std::string doubtOfLatency(double latency, double max_latency) {
 
 void OdometryDiagnostics::diagnoseLatency(Status& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (input_.silence() || !last_) {
-    status.summary(Level::OK, "no features");
-    return;
-  }
+  if (input_.silence() || !last_ || last_->state == "WAITING") return status.summary(Level::OK, "no pose");
   const std::string doubt = doubtOfLatency(last_->latency, max_latency_);
   status.summaryf(doubt.empty() ? Level::OK : Level::WARN, "%.3f s from image to pose%s", last_->latency,
                   doubt.c_str());

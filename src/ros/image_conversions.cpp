@@ -100,11 +100,12 @@ cv::Mat toGrey(const sensor_msgs::ImageConstPtr& message, const GreyRange& range
   static const std::map<std::string, cv::ColorConversionCodes> colours = {{encodings::BGR8, cv::COLOR_BGR2GRAY},
                                                                           {encodings::RGB8, cv::COLOR_RGB2GRAY},
                                                                           {encodings::BGRA8, cv::COLOR_BGRA2GRAY},
-                                                                          {encodings::RGBA8, cv::COLOR_RGBA2GRAY}};
+                                                                          {encodings::RGBA8, cv::COLOR_RGBA2GRAY},
+                                                                          {encodings::YUV422, cv::COLOR_YUV2GRAY_UYVY}};
   const auto colour = colours.find(message->encoding);
   if (colour == colours.end())
     throw std::invalid_argument("encoding '" + message->encoding +
-                                "' is not supported: mono8, 8UC1, mono16, bgr8, rgb8, bgra8 and rgba8 are; "
+                                "' is not supported: mono8, 8UC1, mono16, bgr8, rgb8, bgra8, rgba8 and yuv422 are; "
                                 "stereo_raw.launch converts Bayer images");
   cv::cvtColor(pixelsOf(*message, encodings::numChannels(message->encoding)), grey, colour->second);
   return grey;

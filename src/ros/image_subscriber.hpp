@@ -59,6 +59,9 @@ class ImageSubscriber {
     plugin_->subscribe(nh, topic, queue_size, callback, ros::VoidPtr(), transport.hints);
   }
 
+  /// With the transport's ending.
+  std::string topic() const { return plugin_->getTopic(); }
+
  private:
   image_transport::SubscriberPlugin* plugin_ = nullptr;
 };

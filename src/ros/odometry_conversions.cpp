@@ -31,8 +31,7 @@ template <class Covariance>
 void fillCovariance(const Matrix6d& covariance, Covariance& message) {
   Matrix6d symmetric = 0.5 * (covariance + covariance.transpose());
   symmetric.diagonal().array() += kVarianceFloor;
-  for (int row = 0; row < 6; ++row)
-    for (int column = 0; column < 6; ++column) message[6 * row + column] = symmetric(row, column);
+  Eigen::Map<Matrix6d>(message.data()) = symmetric;
 }
 
 }  // namespace
@@ -87,9 +86,7 @@ nav_msgs::Odometry toNullOdometry(const ros::Time& stamp, const OdometryFrames& 
 }
 
 Matrix6d toMotionCovariance(const nav_msgs::Odometry& odometry, double dt, const Eigen::Isometry3d& T_base_camera) {
-  Matrix6d twist;
-  for (int row = 0; row < 6; ++row)
-    for (int column = 0; column < 6; ++column) twist(row, column) = odometry.twist.covariance[6 * row + column];
+  Matrix6d twist = Eigen::Map<const Matrix6d>(odometry.twist.covariance.data()).transpose();  // it has rows
   if (!twist.allFinite()) throw std::invalid_argument("the twist's covariance is not finite");
   const Matrix6d steady = twist - unsteadiness(dt);
   // Of a fused odometry it never was a part.

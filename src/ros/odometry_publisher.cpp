@@ -1,6 +1,7 @@
 #include "odometry_publisher.hpp"
 
 #include <boost/make_shared.hpp>
+#include <limits>
 
 #include "feature_conversions.hpp"
 #include "frames.hpp"
@@ -56,7 +57,9 @@ stereo_descriptor_vo::VoInfo OdometryPublisher::publishInfo(stereo_descriptor_vo
   info.header.stamp = stamp;
   info.header.frame_id = frames_.odom;
   info.session = session_;
-  info.latency = static_cast<float>(secondsBetween(stamp, ros::Time::now()));
+  const ros::Time now = ros::Time::now();  // zero: simulated, and nobody has published it so far
+  info.latency =
+      now.isZero() ? std::numeric_limits<float>::quiet_NaN() : static_cast<float>(secondsBetween(stamp, now));
   info_publisher_.publish(boost::make_shared<stereo_descriptor_vo::VoInfo>(info));
   return info;
 }

@@ -145,24 +145,19 @@ void add(Config& config, const Option& option, const std::string& text) {
     config.strs.push_back(makeParameter<dynamic_reconfigure::StrParameter>(option.name, text));
 }
 
+/// As precise as it is.
+std::string textOf(double number) {
+  std::ostringstream text;
+  text.precision(17);
+  text << number;
+  return text.str();
+}
+
 /// The limits that dynamic_reconfigure states for every parameter, also where there are none.
 void addLimits(Config& min, Config& max, const Option& option) {
-  const auto number = [&](double limit) {
-    std::ostringstream text;
-    text.precision(17);
-    text << limit;
-    return text.str();
-  };
-  if (std::holds_alternative<bool*>(option.value)) {
-    add(min, option, "false");
-    add(max, option, "true");
-  } else if (option.isText()) {
-    add(min, option, "");
-    add(max, option, "");
-  } else {
-    add(min, option, number(option.range.min));
-    add(max, option, number(option.range.max));
-  }
+  const bool is_bool = std::holds_alternative<bool*>(option.value);
+  add(min, option, is_bool ? "false" : option.isText() ? "" : textOf(option.range.min));
+  add(max, option, is_bool ? "true" : option.isText() ? "" : textOf(option.range.max));
 }
 
 const char* typeName(const Option& option) {
@@ -242,12 +237,7 @@ void ReconfigureServer::assign(const Config& request) {
   for (const auto& parameter : request.bools) set(parameter.name, parameter.value ? "true" : "false");
   for (const auto& parameter : request.ints) set(parameter.name, std::to_string(parameter.value));
   for (const auto& parameter : request.strs) set(parameter.name, parameter.value);
-  for (const auto& parameter : request.doubles) {
-    std::ostringstream text;
-    text.precision(17);
-    text << parameter.value;
-    set(parameter.name, text.str());
-  }
+  for (const auto& parameter : request.doubles) set(parameter.name, textOf(parameter.value));
 }
 
 void ReconfigureServer::set(const std::string& name, const std::string& text) {

@@ -17,7 +17,15 @@
 #include "pose_conversions.hpp"
 #include "stamps.hpp"
 
-namespace sdvo::ros_conversions {
+namespace sdvo {
+
+static const std::vector<std::string>& namesOf(GraphEdge::Kind) {
+  using Edge = stereo_descriptor_vo::MapEdge;
+  static const std::vector<std::string> names = {Edge::ODOMETRY, Edge::LOOP, Edge::BREAK};
+  return names;
+}
+
+namespace ros_conversions {
 namespace msgs = stereo_descriptor_vo;
 namespace {
 
@@ -155,29 +163,9 @@ msgs::PlaceMatch toMessage(const PlaceMatch& match, const Place& mine, const Pla
 
 namespace {
 
-const std::vector<std::pair<GraphEdge::Kind, std::string>>& kindsOfEdges() {
-  static const std::vector<std::pair<GraphEdge::Kind, std::string>> kinds = {
-      {GraphEdge::Kind::kOdometry, msgs::MapEdge::ODOMETRY},
-      {GraphEdge::Kind::kLoop, msgs::MapEdge::LOOP},
-      {GraphEdge::Kind::kBreak, msgs::MapEdge::BREAK}};
-  return kinds;
-}
-
-std::string nameOfKind(GraphEdge::Kind kind) {
-  for (const auto& [value, name] : kindsOfEdges())
-    if (value == kind) return name;
-  throw std::logic_error("an edge of no known kind");
-}
-
-GraphEdge::Kind kindOfName(const std::string& text) {
-  for (const auto& [value, name] : kindsOfEdges())
-    if (name == text) return value;
-  throw std::invalid_argument("unknown kind of edge '" + text + "'");
-}
-
 msgs::MapEdge edgeMessage(const GraphEdge& edge) {
   msgs::MapEdge message;
-  message.kind = nameOfKind(edge.kind);
+  message.kind = nameOf(edge.kind);
   message.from_id = static_cast<std::uint32_t>(edge.from);
   message.to_id = static_cast<std::uint32_t>(edge.to);
   message.motion = toMessage(edge.T_from_to, edge.covariance);
@@ -188,7 +176,7 @@ msgs::MapEdge edgeMessage(const GraphEdge& edge) {
 
 GraphEdge edgeOf(const msgs::MapEdge& message) {
   GraphEdge edge;
-  edge.kind = kindOfName(message.kind);
+  edge.kind = valueOf<GraphEdge::Kind>(message.kind);
   edge.from = toInt(message.from_id, "id");
   edge.to = toInt(message.to_id, "id");
   fromMessage(message.motion, edge.T_from_to, edge.covariance);
@@ -288,4 +276,5 @@ visualization_msgs::MarkerArray toMarkers(const MapState& map, const std::string
   return array;
 }
 
-}  // namespace sdvo::ros_conversions
+}  // namespace ros_conversions
+}  // namespace sdvo

@@ -47,19 +47,13 @@ geometry_msgs::PoseWithCovariance toMessage(const Eigen::Isometry3d& pose, const
   geometry_msgs::PoseWithCovariance message;
   message.pose = tf2::toMsg(pose);
   const Matrix6d in_parent = rotation(pose) * covariance * rotation(pose).transpose();
-  for (int row = 0; row < 6; ++row)
-    for (int column = 0; column < 6; ++column)
-      message.covariance[static_cast<std::size_t>(6 * row + column)] =
-          0.5 * (in_parent(row, column) + in_parent(column, row));
+  Eigen::Map<Matrix6d>(message.covariance.data()) = 0.5 * (in_parent + in_parent.transpose());
   return message;
 }
 
 void fromMessage(const geometry_msgs::PoseWithCovariance& message, Eigen::Isometry3d& pose, Matrix6d& covariance) {
   pose = toPose(message.pose);
-  Matrix6d in_parent;
-  for (int row = 0; row < 6; ++row)
-    for (int column = 0; column < 6; ++column)
-      in_parent(row, column) = message.covariance[static_cast<std::size_t>(6 * row + column)];
+  const Matrix6d in_parent = Eigen::Map<const Matrix6d>(message.covariance.data()).transpose();  // it has rows
   if (!in_parent.allFinite() || in_parent.llt().info() != Eigen::Success)
     throw std::invalid_argument("a covariance is not finite or not positive");
   covariance = rotation(pose).transpose() * in_parent * rotation(pose);

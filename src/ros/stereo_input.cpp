@@ -5,6 +5,7 @@
 #include <exception>
 #include <utility>
 
+#include "camera_finder.hpp"
 #include "stamps.hpp"
 
 namespace sdvo {
@@ -43,6 +44,14 @@ StereoInput::StereoInput(ros::NodeHandle& nh, StereoImageTransport& transport, c
   right_info_ = nh.subscribe<Info>(topics_[ArrivalLog::kRightInfo], arrivals,
                                    [this](const Info::ConstPtr& m) { take<ArrivalLog::kRightInfo>(m); });
   right_callbacks_.start();
+}
+
+std::string StereoInput::explainSilence() {
+  const std::string text = arrivals_.explainSilence();
+  ros::master::V_TopicInfo topics;
+  if (text.empty() || !ros::master::getTopics(topics)) return text;
+  return text + explainUnpublished(
+                    {left_image_.topic(), right_image_.topic(), left_info_.getTopic(), right_info_.getTopic()}, topics);
 }
 
 template <ArrivalLog::Input input, class Message>

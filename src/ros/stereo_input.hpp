@@ -37,8 +37,8 @@ class StereoInput {
   StereoInput(ros::NodeHandle& nh, StereoImageTransport& transport, const StereoInputOptions& options,
               Callback callback, Refusal refuse);
 
-  /// See ArrivalLog.
-  std::string explainSilence() { return arrivals_.explainSilence(); }
+  /// See ArrivalLog, and which topics have no publisher.
+  std::string explainSilence();
 
  private:
   using Image = sensor_msgs::Image;

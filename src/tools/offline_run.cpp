@@ -80,9 +80,6 @@ void OfflineRun::processFeatures(const StereoFeatures& features) {
 }
 
 void OfflineRun::track(const Extracted& pair) {
-  const StereoCamera& camera = pair.features.camera;
-  if (camera_ && *camera_ != camera) odometry_.breakStream();
-  camera_ = camera;
   Frame frame{odometry_.update(pair.features), pair.features.report, pair.time};
   if (!frames_.empty()) std::vector<FeatureFlow>().swap(frames_.back().odometry.flow);  // by far the largest part of it
   frames_.push_back(std::move(frame));

@@ -20,7 +20,7 @@ class OfflineRun {
   /// Throws std::invalid_argument when an option is out of its range, or the patches are too small to be aligned.
   explicit OfflineRun(const PipelineOptions& options);
 
-  /// Stamps (ns) must increase. Another camera than before begins a new stream. Returns the pair's features.
+  /// Stamps (ns) must increase. Returns the pair's features.
   StereoFeatures process(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
 
   /// The same, but the odometry of the pair before runs beside the extraction of this one, as it does between the
@@ -72,7 +72,6 @@ class OfflineRun {
   FeatureExtractor extractor_;
   VisualOdometry odometry_;
   std::optional<Extracted> waiting_;  ///< for its odometry
-  std::optional<StereoCamera> camera_;
   std::vector<Frame> frames_;
   double cpu_time_ = 0.0;  ///< s
 };

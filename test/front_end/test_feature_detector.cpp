@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <numeric>
 #include <opencv2/imgcodecs.hpp>
 #include <set>
@@ -109,6 +110,10 @@ TEST(FeatureDetector, AMaskThatDoesNotFitIsNamed) {
             "the mask must have one channel of eight bits");
   options.mask = "/nowhere/mask.png";
   EXPECT_EQ(errorOf([&] { FeatureDetector{options}; }), "mask: cannot read a PNG from '/nowhere/mask.png'");
+  // Where a nodelet's folder is not the user's.
+  options.mask = "~/mask.png";
+  EXPECT_EQ(errorOf([&] { FeatureDetector{options}; }),
+            "mask: cannot read a PNG from '" + std::filesystem::current_path().string() + "/~/mask.png'");
 }
 
 TEST(FeatureDetector, CornersOfAnImageTooSmallForTheRefinementStayWhereTheyAre) {

@@ -85,7 +85,7 @@ class ExampleRobot(unittest.TestCase):
         try:
             needed = {('out', topic, rospy.get_name()) for topic in ('/stereo/odom', '/stereo/vo_info', '/tf')}
             needed.add(('in', '/stereo/stereo_features'))
-            assert wait_until(lambda: links('/stereo/stereo_vo_manager') >= needed and
+            assert wait_until(lambda: links('/stereo/kitti_manager') >= needed and
                               ('out', '/tf_static', rospy.get_name()) in links('/robot_state_publisher'), 60), 'not connected'
             # The player waits for these.
             cls.ground_truth = [Collector('/ground_truth/odom', Odometry), Collector('/ground_truth/path', Path)]

@@ -22,7 +22,7 @@ import rosservice
 import rostest
 import yaml
 from rosgraph_msgs.msg import Log
-from sensor_msgs.msg import CameraInfo
+from sensor_msgs.msg import CameraInfo, Image
 
 from stereo_descriptor_vo.msg import StereoFeatures, VoInfo
 
@@ -262,6 +262,26 @@ class Launch(unittest.TestCase):
             process.terminate()
             process.wait()
             listener.unregister()
+
+    def test_a_recording_takes_over_from_a_pipeline_of_the_same_namespace(self):
+        self.addCleanup(rospy.delete_param, '/use_sim_time')
+        with tempfile.TemporaryDirectory() as directory:
+            path = os.path.join(directory, 'a recording.bag')
+            with rosbag.Bag(path, 'w') as bag:
+                for i in range(3):
+                    for side in ('left', 'right'):
+                        for name, message in (('camera_info', CameraInfo()), ('image_rect', Image())):
+                            message.header.stamp = rospy.Time(10 + i)
+                            bag.write('/stereo/%s/%s' % (side, name), message, message.header.stamp)
+            process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch'])
+            try:
+                rospy.wait_for_service('/stereo/visual_odometry/reset', 60)
+                # Ends with the bag, which waits for subscribers to the images.
+                play = ['timeout', '-s', 'INT', '60', 'roslaunch', PACKAGE, 'kitti.launch', 'rviz:=false', 'camera_tf:=false']
+                self.assertEqual(subprocess.run(play + ['bag:=' + path]).returncode, 0)
+            finally:
+                process.terminate()
+                process.wait()
 
     def test_kitti_launch_fails_for_a_bag_that_cannot_be_read(self):
         with tempfile.TemporaryDirectory() as directory:

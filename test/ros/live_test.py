@@ -134,7 +134,7 @@ class Live(PipelineCase):
             images[0].data = images[0].data[:-1000]
 
         cases = ((zero_k, ('calibrated', )), (swapped, ('baseline', 'swapped', 'Tx')),
-                 (other_size, ('640x480', )), (other_encoding, ("'bayer_rggb8'", )), (truncated, ('malformed', )))
+                 (other_size, ('640x480', )), (other_encoding, ('left image', "'bayer_rggb8'")), (truncated, ('malformed', )))
         for time_of, (damage, words) in enumerate(cases):
             with self.subTest(damage.__name__):
                 def publish():

@@ -93,7 +93,7 @@ class Robot:
         self.pair, self.odom_frame = -1, namespace.strip('/') + '_odom'
         self.odometry = np.eye(4)
         self.stamp = clock.now
-        self.session = rospy.Time(7)
+        self.session, self.epoch = rospy.Time(7), 0
         self.features, self.odom, self.info = (
             rospy.Publisher('%s/%s' % (namespace, topic), message, queue_size=100)
             for topic, message in (('stereo_features', StereoFeatures), ('odom', Odometry), ('vo_info', VoInfo)))
@@ -119,7 +119,7 @@ class Robot:
         p.x, p.y, p.z = self.odometry[:3, 3]
         q.x, q.y, q.z, q.w = quaternion_of(self.odometry)
         odometry.twist.covariance = np.diag([1e-3] * 3 + [1e-5] * 3).flatten()
-        info = VoInfo(state='LOST' if is_lost else 'TRACKING', session=self.session)
+        info = VoInfo(state='LOST' if is_lost else 'TRACKING', session=self.session, epoch=self.epoch)
         info.header.stamp, info.header.frame_id = self.stamp, self.odom_frame
         self.features.publish(self.ring.seen_from(self.truth(), self.stamp, self.focal))
         if not is_lost:
@@ -395,6 +395,25 @@ class Places(unittest.TestCase):
         info = self.drive(robot, recognition, 1)
         self.assertEqual(info.places, int(answer.message.split()[0]) + 1)
         self.assertEqual(recognition.rosout.errors, [])
+
+    def test_a_reset_takes_the_mount_anew(self):
+        self.addCleanup(self.broadcaster.sendTransform, camera_transform(FRAME))
+        robot = Robot('/places_d', self.ring, self.clock)
+        recognition = self.start('/places_d')
+        self.assertTrue(wait_until(recognition.is_connected, 60), 'it did not start')
+        self.drive(robot, recognition, 2)
+        moved = camera_transform(FRAME)
+        moved.transform.translation.z = 0.25
+        self.broadcaster.sendTransform(moved)
+
+        def height_after_a_reset():
+            robot.epoch, robot.odometry = robot.epoch + 1, np.eye(4)
+            info = self.drive(robot, recognition, 1)
+            self.assertTrue(wait_until(lambda: recognition.graph and len(recognition.graph[-1].nodes) == info.places))
+            return recognition.graph[-1].nodes[-1].pose.position.z
+        # Nothing orders the transform and the features.
+        self.assertTrue(wait_until(lambda: robot.pair > 12 or abs(height_after_a_reset() - 0.25) < 1e-6))
+        self.assertLess(robot.pair, 13, 'a reset keeps the old mount')
 
 
 if __name__ == '__main__':

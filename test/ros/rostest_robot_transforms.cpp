@@ -87,6 +87,7 @@ TEST_F(RobotTransformsTest, AMissingTransformIsNamedFromWhereTfHasTheCamera) {
   const std::string alone = transforms_->explainMissing("base_link", "nowhere");
   EXPECT_TRUE(contains(alone, "publish base_link -> nowhere (static")) << alone;
   EXPECT_FALSE(contains(alone, "where TF has")) << alone;
+  EXPECT_TRUE(contains(transforms_->explainMissing("base_link", ""), "no frame_id"));
 }
 
 TEST_F(RobotTransformsTest, TheCamerasPlaceIsReadOnceAndAgainWhenItIsForgotten) {

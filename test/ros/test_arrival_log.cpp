@@ -89,6 +89,16 @@ struct ApproximateArrivalLogTest : ArrivalLogTest {
   ApproximateArrivalLogTest() : ArrivalLogTest(true) {}
 };
 
+/// A driver that publishes it once, latched.
+TEST_F(ArrivalLogTest, CameraInfoThatComesOnceIsNamed) {
+  for (int i = 0; i < 3; ++i)
+    for (const auto input : {ArrivalLog::kLeftImage, ArrivalLog::kRightImage, ArrivalLog::kRightInfo})
+      log_.note(input, ros::Time(10.0 + i), 0.0);
+  const std::string text = log_.explainSilence();
+  EXPECT_TRUE(contains(text, "; /l/info must have a message for each image")) << text;
+  EXPECT_FALSE(contains(text, "; /r/info must")) << text;
+}
+
 TEST_F(ApproximateArrivalLogTest, DoesNotAdviseWhatIsSetAlready) {
   note(ArrivalLog::kLeftImage, 10.0, 0.0);
   note(ArrivalLog::kRightImage, 10.02, 0.0);

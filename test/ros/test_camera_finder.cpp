@@ -51,6 +51,19 @@ TEST(CameraFinder, WhatIsNoRectifiedPairIsNone) {
   EXPECT_TRUE(findStereoCameras("/stereo/", uncalibrated).empty());
 }
 
+TEST(CameraFinder, TopicsWithoutAPublisherAreNamed) {
+  auto published = topics({"/stereo/left/", "/stereo/right/"}, {"image_rect"});
+  const std::vector<std::string> names = {"/stereo/left/image_rect", "/stereo/right/image_rect",
+                                          "/stereo/left/camera_info"};
+  EXPECT_EQ(explainUnpublished(names, published), "");
+  EXPECT_EQ(explainUnpublished({"/other/image_rect"}, published), "; nobody publishes /other/image_rect");
+  published.erase(published.begin() + 1);
+  const std::string only_compressed = explainUnpublished(names, published);
+  EXPECT_EQ(only_compressed.find("; nobody publishes /stereo/left/image_rect, but its /compressed: set "), 0u);
+  EXPECT_NE(only_compressed.find("left_image/image_transport"), std::string::npos) << only_compressed;
+  EXPECT_EQ(only_compressed.find("/stereo/right"), std::string::npos) << only_compressed;
+}
+
 TEST(CameraFinder, EachOfSeveralIsFound) {
   const auto found = findStereoCameras(
       "/robot/",

@@ -88,6 +88,10 @@ TEST(ToStereoCamera, RefusesWhatIsNoRectifiedPair) {
   EXPECT_TRUE(contains(swapped, "Tx = 0")) << swapped;
   EXPECT_TRUE(contains(swapped, "swapped")) << swapped;
   EXPECT_TRUE(contains(swapped, "stereo_i_reverse_stereo_socket_order")) << swapped;
+  const std::string both_have_one = refusal(cameraInfo(-700.0), cameraInfo(-350.0));
+  EXPECT_TRUE(contains(both_have_one, "Swap the topics")) << both_have_one;
+  const std::string negative = refusal(cameraInfo(0.0, -700.0), cameraInfo(-350.0, -700.0));
+  EXPECT_TRUE(contains(negative, "left camera_info: a focal length in P is negative")) << negative;
   const std::string without_tx = refusal(left, left);
   EXPECT_TRUE(contains(without_tx, "no baseline in P")) << without_tx;
   EXPECT_FALSE(contains(without_tx, "swapped")) << without_tx;

@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <string>
+
 #include "../../src/ros/diagnostics.hpp"
 
 namespace sdvo {
@@ -10,6 +13,7 @@ TEST(DoubtOfLatency, StampsOfTheFutureAndThePast) {
   EXPECT_NE(doubtOfLatency(0.6, 0.5).find("too slow"), std::string::npos);
   for (const double latency : {-0.3, -5.0})
     EXPECT_NE(doubtOfLatency(latency, 0.5).find("stamped in the future"), std::string::npos) << latency;
+  EXPECT_NE(doubtOfLatency(std::nan(""), 0.5).find("--clock"), std::string::npos);
 }
 
 }  // namespace test_diagnostics

@@ -175,10 +175,13 @@ TEST(ToGrey, ColoursByLuminance) {
   expectPixels(toGrey(image("bgr8", 4, 1, three)), kBlue, kRed, "bgr8");
   expectPixels(toGrey(image("rgba8", 4, 1, four)), kRed, kBlue, "rgba8");
   expectPixels(toGrey(image("bgra8", 4, 1, four)), kBlue, kRed, "bgra8");
+  // U, Y, V, Y of two pixels.
+  const std::vector<std::uint8_t> luminance = {90, kRed, 240, kGreen, 9, kBlue, 240, 40};
+  expectPixels(toGrey(image("yuv422", 4, 1, luminance)), kRed, kBlue, "yuv422");
 }
 
 TEST(ToGrey, RefusesOtherEncodingsAndMalformedImages) {
-  for (const char* encoding : {"", "bayer_rggb8", "32FC1", "8UC3", "yuv422", "16UC1", "nonsense"}) {
+  for (const char* encoding : {"", "bayer_rggb8", "32FC1", "8UC3", "16UC1", "nonsense"}) {
     const auto message = image(encoding, 2, 1, std::vector<std::uint8_t>(8, 0));
     EXPECT_THROW(toGrey(message), std::invalid_argument) << encoding;
     EXPECT_TRUE(contains(errorOf([&] { toGrey(message); }), std::string("'") + encoding + "'")) << encoding;

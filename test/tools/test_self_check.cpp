@@ -136,6 +136,19 @@ TEST(SelfCheck, ACameraThatStandsHasNoErrorForEachMetre) {
   EXPECT_EQ(std::count(row.begin(), row.end(), ','), std::count(columns.begin(), columns.end(), ','));
 }
 
+/// As some drivers publish it of a lens that focuses: the drive goes on, as it does on a robot.
+TEST(OfflineRun, ACameraThatChangesALittleIsTheSame) {
+  SyntheticScene scene(40, 2500, 120.0);
+  OfflineRun run{PipelineOptions{}};
+  for (int k = 0; k < 10; ++k) {
+    StereoFeatures pair = scene.view(syntheticPose(k), (k + 1) * kPeriod);
+    pair.camera.fx *= 1.0 + 1e-4 * (k % 3);
+    run.processFeatures(pair);
+    EXPECT_EQ(run.last().state, TrackingState::kTracking) << run.last().reason;
+  }
+  EXPECT_EQ(run.discontinuities(), 0);
+}
+
 TEST(SelfCheck, APairAloneHasNoMotion) {
   SyntheticScene scene(39, 2500, 120.0);
   OfflineRun run{PipelineOptions{}};
