@@ -3,6 +3,7 @@
     lab/run outages hover:d435:511 hover:d435:512 --black 5,20 --at 60     # black pairs at a pair
     lab/run outages kitti:03 euroc:MH_01_half --black 3,10 --places 5      # ... at so many places of each drive
     lab/run outages euroc:MH_01_still --repeated 30 --black 30             # a camera that stands: its first pairs to and fro
+    lab/run outages hover:d435_small:1101:0:1200 --every 100               # every 100th pair black
     lab/run outages kitti:04 kitti:06 --elsewhere 200                      # excerpts joined by black pairs, so many times
 
 The pose after an outage is compared with that of the same pair in the undisturbed run, in standard deviations of its motion since
@@ -30,6 +31,7 @@ def options(parser):
     parser.add_argument("--black", default="3,10", help="lengths of outages, pairs [default: %(default)s]")
     parser.add_argument("--at", help="pairs at which they begin [default: --places of them, evenly]")
     parser.add_argument("--places", type=int, default=5, help="outages of each length in a drive [default: %(default)s]")
+    parser.add_argument("--every", type=int, metavar="PAIRS", help="blackens every so many's last one instead")
     parser.add_argument("--repeated", type=int, help="the drive is its first so many pairs, to and fro, six times")
     parser.add_argument("--elsewhere", type=int, metavar="TRIALS", help="joins excerpts instead")
     parser.add_argument("--seed", type=int, default=1, help="of the excerpts [default: %(default)s]")
@@ -81,10 +83,10 @@ def numbers_of(drive, repeated):
     return 3 * (there + there[::-1])
 
 
-def with_black(drive, numbers, first, count, folder):
+def with_black(drive, numbers, black, folder):
     sequence = Sequence(folder, drive)
     for k, i in enumerate(numbers):
-        sequence.add(*([BLACK, BLACK] if first <= k < first + count else pair_of(drive, i)))
+        sequence.add(*([BLACK, BLACK] if k in black else pair_of(drive, i)))
     return sequence
 
 
@@ -147,31 +149,50 @@ def drift(estimate, truth):
     return 100 * numpy.sqrt(numpy.mean(numpy.sum((estimate[:, :3, 3] - truth) ** 2, axis=1))) / max(distance, 1e-9)
 
 
-def outage(drive, numbers, first, count, undisturbed, folder, arguments):
-    run = with_black(drive, numbers, first, count, folder).run(arguments)
-    after = next((k for k in range(first + count, len(numbers)) if run.states[k].has_pose), len(numbers) - 1)
-    xi = poses.logarithm(poses.relative(undisturbed.poses[after], run.poses[after]))
+def offset(run, undisturbed, black):
+    """The first pair after an outage that has a pose; how far that is from the undisturbed run's, which began alike, m and sigma."""
+    before = black[0] - 1
+    after = next((k for k in range(black.stop, len(run.states)) if run.states[k].has_pose), len(run.states) - 1)
+    xi = poses.logarithm(poses.relative(*(poses.relative(some.poses[before], some.poses[after]) for some in (undisturbed, run))))
     C = run.states[after].motion
-    sigmas = max(poses.sigmas(xi, C)) if C.any() else numpy.nan
+    return after, numpy.linalg.norm(xi[:3]), max(poses.sigmas(xi, C)) if C.any() else numpy.nan
+
+
+def outage(drive, numbers, blacks, undisturbed, folder, arguments):
+    """Of one drive, or several as its worst."""
+    dark = {k for black in blacks for k in black}
+    run = with_black(drive, numbers, dark, folder).run(arguments)
+    after, distance, sigmas = zip(*(offset(run, undisturbed, black) for black in blacks))
+    worst = int(numpy.argmax(sigmas))
     truth = drive.poses[numbers] if drive.truth.exists() else None
-    shown = [k for k in range(len(numbers)) if not first <= k < first + count]
+    shown = [k for k in range(len(numbers)) if k not in dark]
     errors = [drift(estimate[shown], truth[shown]) if truth is not None else numpy.nan for estimate in (run.poses, undisturbed.poses)]
-    return Outage(drive.name, first, count,
-                  share_in_view(drive, numbers[first - 1], numbers[after], poses.relative(undisturbed.poses[first - 1], undisturbed.poses[after])),
-                  sum(state.state == "LOST" for state in run.states[first:]), run.states[-1].epoch - undisturbed.states[-1].epoch,
-                  f"{run.states[after].state}: {run.states[after].reason}", numpy.linalg.norm(xi[:3]), sigmas, *errors)
+    first, a = blacks[worst][0], after[worst]
+    return Outage(drive.name, first, len(dark),
+                  share_in_view(drive, numbers[first - 1], numbers[a], poses.relative(undisturbed.poses[first - 1], undisturbed.poses[a])),
+                  sum(state.state == "LOST" for state in run.states[min(dark):]), run.states[-1].epoch - undisturbed.states[-1].epoch,
+                  f"{run.states[a].state}: {run.states[a].reason}", distance[worst], sigmas[worst], *errors)
+
+
+def planned(count, arguments):
+    """The outages of each run, as ranges of so many pairs."""
+    if arguments.every:
+        yield [range(k, k + 1) for k in range(arguments.every - 1, count - 1, arguments.every)]
+        return
+    for black in map(int, arguments.black.split(",")):
+        ends = numpy.linspace(10, count - black - 5, arguments.places + 1)
+        for first in map(int, arguments.at.split(",") if arguments.at else ends[:-1]):
+            yield [range(first, first + black)]
 
 
 def outages(all_drives, work, arguments):
     for drive in all_drives:
         numbers = numbers_of(drive, arguments.repeated)
-        undisturbed = with_black(drive, numbers, 0, 0, work / "undisturbed").run(arguments)
+        undisturbed = with_black(drive, numbers, (), work / "undisturbed").run(arguments)
         shutil.rmtree(work / "undisturbed")
-        for count in map(int, arguments.black.split(",")):
-            ends = numpy.linspace(10, len(numbers) - count - 5, arguments.places + 1)
-            for first in map(int, arguments.at.split(",") if arguments.at else ends[:-1]):
-                yield outage(drive, numbers, first, count, undisturbed, work / "black", arguments)
-                shutil.rmtree(work / "black")
+        for blacks in planned(len(numbers), arguments):
+            yield outage(drive, numbers, blacks, undisturbed, work / "black", arguments)
+            shutil.rmtree(work / "black")
 
 
 def measure_black(all_drives, work, arguments):
@@ -241,15 +262,19 @@ def join(all_drives, trials, random, sequence):
 
 
 def is_same(places, run, k, poses_of):
-    """Whether the pose of the sequence's pair k is right: it was last seen in the same drive, which knows its poses."""
+    """Whether the pose of the sequence's pair k is right: it was last seen in the same drive, which knows its poses. One of the
+    place's pairs will do: an object that goes along with the camera misleads those after it."""
     place_of = {place.first + j: place for place in places for j in range(EXCERPT)}
     last = max((j for j in place_of if j < k and run.states[j].has_pose), default=k)
     before, after = place_of[last], place_of[k]
     if before.drive != after.drive or {before.change, after.change} & {mirrored, swapped}:
         return False
-    true = poses.relative(*(poses_of[before.drive][place.numbers[j - place.first]] for place, j in ((before, last), (after, k))))
-    xi = poses.logarithm(poses.relative(true, poses.relative(run.poses[last], run.poses[k])))
-    return max(poses.sigmas(xi, run.states[k].motion)) <= SIGMAS
+
+    def sigmas(j):
+        true = poses.relative(*(poses_of[before.drive][place.numbers[i - place.first]] for place, i in ((before, j), (after, k))))
+        return max(poses.sigmas(poses.logarithm(poses.relative(true, poses.relative(run.poses[j], run.poses[k]))), run.states[k].motion))
+
+    return min(sigmas(j) for j in range(before.first, last + 1) if run.states[j].has_pose) <= SIGMAS
 
 
 def measure_elsewhere(all_drives, work, arguments):

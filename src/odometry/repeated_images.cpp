@@ -31,12 +31,12 @@ std::vector<int> RepeatedImages::newRows(const StereoFeatures& features) const {
   constexpr double kExplains = 0.9;  // ratio of the features that lie in their part (chosen); matches err at the tear
   std::vector<int> rows(features.u.size());
   std::iota(rows.begin(), rows.end(), 0);
-  std::vector<std::pair<float, float>> before;
-  for (std::size_t i = 0; i < features_[0].size(); ++i) before.emplace_back(features_[0][i], features_[1][i]);
+  std::vector<std::pair<float, float>> before(features_[0].size());
+  for (std::size_t i = 0; i < before.size(); ++i) before[i] = {features_[0][i], features_[1][i]};
   std::sort(before.begin(), before.end());
-  std::vector<bool> repeated;
-  for (const int i : rows)
-    repeated.push_back(std::binary_search(before.begin(), before.end(), std::pair(features.u[i], features.v[i])));
+  std::vector<bool> repeated(rows.size());
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    repeated[i] = std::binary_search(before.begin(), before.end(), std::pair(features.u[i], features.v[i]));
   const int count = features.count(), all_old = static_cast<int>(std::count(repeated.begin(), repeated.end(), true));
   if (all_old < kFewestMeasured || count - all_old < kFewestMeasured) return rows;
   std::vector<int> order = rows;
