@@ -2,7 +2,7 @@
 
     lab/run outages hover:d435:511 hover:d435:512 --black 5,20 --at 60     # black pairs at a pair
     lab/run outages kitti:03 euroc:MH_01_half --black 3,10 --places 5      # ... at so many places of each drive
-    lab/run outages euroc:MH_01_still --repeated 30 --black 30             # a camera that stands: its first pairs to and fro
+    lab/run outages euroc:MH_01_still --repeated 15 --black 30             # a camera that stands: its first pairs to and fro
     lab/run outages hover:d435_small:1101:0:1200 --every 100               # every 100th pair black
     lab/run outages kitti:04 kitti:06 --elsewhere 200                      # excerpts joined by black pairs, so many times
 

@@ -13,16 +13,14 @@ namespace sdvo {
 /// A point of a map in the image of a pair that may see it.
 struct ExpectedPoint {
   Eigen::Vector2d pixel;  ///< in the left image, px
-  bool has_feature;       ///< the pair has one there, whatever it shows
-  bool found;             ///< … and it is the point
+  bool found;             ///< in the pair, at that place
 };
 
 /// Whether a pair shows the place of a map. Matches of another place agree on no motion, so chance is no danger. A
 /// thing that stands in both places is one (a poster, a chair, a part of the robot), but it fills a part of the view
-/// only. Hence the view is divided into parts with equally many expected points each. There are so many parts that
-/// three of the points found fall into each if they are spread evenly. In another place a part shows any with a
-/// probability of one half at most. In the same one a part shows none only by chance, which features without their
-/// points make less likely. A part without features (dark, covered, blurred) tells nothing.
+/// only. Hence the view is divided into parts with equally many expected points each. There are so many parts that three
+/// of the points found fall into each if they are spread evenly. In another place a part holds any with a probability of
+/// one half at most.
 bool showsSamePlace(std::vector<ExpectedPoint> points);
 
 /// Finds a pair in the map from before an outage, wherever the camera went meanwhile.
@@ -35,9 +33,7 @@ class Reacquisition {
                                         const RigCalibration& calibration) const;
 
  private:
-  ViewMatcher anywhere_;
-  FeatureMatcherOptions gated_;
-  ViewMatcher near_;
+  ViewMatcher anywhere_, near_;
 };
 
 }  // namespace sdvo
