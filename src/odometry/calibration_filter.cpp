@@ -5,11 +5,12 @@
 #include <cmath>
 #include <limits>
 
+#include "stereo_descriptor_vo/odometry/noise.hpp"
+
 namespace sdvo {
 namespace {
 
-constexpr int kFewestCommons = 20;       // windows that must tell of what is left at a point
-constexpr int kRememberedCommons = 200;  // of which the mean is taken
+constexpr int kRememberedCommons = 200;  // windows over which the mean of what is left at a point is taken
 
 }  // namespace
 
@@ -36,7 +37,7 @@ CalibrationBelief CalibrationFilter::prior(int oldest_id) const {
   if (options_.enabled)
     belief.certain_information =
         informationOf(RigCalibration::Vector::Constant(options_.prior_sigma)) + past.information;
-  if (commons_ >= kFewestCommons) belief.common_sigma = std::sqrt(std::max(common_square_, 0.0));
+  if (commons_ >= kFewestMeasured) belief.common_sigma = std::sqrt(std::max(common_square_, 0.0));
   return belief;
 }
 

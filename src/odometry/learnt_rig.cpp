@@ -8,13 +8,12 @@ LearntRig::LearntRig(const CalibrationOptions& options, const Noise& assumed)
     : calibration(options), right_delay(options.right_delay), noise(assumed) {}
 
 void LearntRig::learn(const MotionHypothesis& confirmed) {
-  constexpr double kMemory = 0.9;  // ratio of the past that a pair leaves (chosen)
-  constexpr double kMost = 0.95;   // even if all agree, a few need not in the next pair (chosen)
+  constexpr double kMost = 0.95;  // even if all agree, a few need not in the next pair (chosen)
   noise.learn(confirmed.motion.rms);
   const Agreement& agreement = confirmed.agreement;
   if (agreement.lasting_matches == 0) return;
   const double ratio = static_cast<double>(agreement.lasting_inliers) / agreement.lasting_matches;
-  usual_agreement += (1.0 - kMemory) * (std::min(ratio, kMost) - usual_agreement);
+  usual_agreement += (1.0 - kUsualMemory) * (std::min(ratio, kMost) - usual_agreement);
 }
 
 void LearntRig::report(OdometryResult& result) const {

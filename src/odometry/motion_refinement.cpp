@@ -10,32 +10,22 @@
 namespace sdvo {
 namespace {
 
-/// The robust kernel by name, its costs added up.
+/// Cauchy's kernel, its costs added up.
 class Kernel {
  public:
-  explicit Kernel(const MotionRefinementOptions& options)
-      : huber_(options.kernel == RobustKernel::kHuber),
-        scale_(options.kernel_scale),
-        inverse_square_(1.0 / (scale_ * scale_)) {}
+  explicit Kernel(double scale) : square_(scale * scale), inverse_square_(1.0 / square_) {}
 
   /// Adds the cost of a squared residual and returns its weight.
   double add(double square) {
-    if (huber_) {
-      const double residual = std::sqrt(square), ratio = residual / scale_;
-      huber_cost_ += ratio <= 1.0 ? square : scale_ * (2.0 * residual - scale_);
-      return ratio <= 1.0 ? 1.0 : 1.0 / ratio;
-    }
     const double ratio_square = square * inverse_square_;
-    cauchy_cost_.add(ratio_square);
+    costs_.add(ratio_square);
     return 1.0 / (1.0 + ratio_square);
   }
-  double cost() const { return huber_ ? huber_cost_ : scale_ * scale_ * cauchy_cost_.value(); }
+  double cost() const { return square_ * costs_.value(); }
 
  private:
-  bool huber_;
-  double scale_, inverse_square_;
-  double huber_cost_ = 0.0;
-  LogSum cauchy_cost_;
+  double square_, inverse_square_;
+  LogSum costs_;
 };
 
 /// The problem around one pose after the other.
@@ -43,13 +33,13 @@ class Lineariser {
  public:
   Lineariser(const StereoCamera& camera, const MotionRefinementOptions& options,
              const std::vector<Correspondence>& correspondences, const std::vector<int>& subset)
-      : camera_(camera), options_(options), arrays_(correspondences, subset) {
+      : camera_(camera), kernel_scale_(options.kernel_scale), arrays_(correspondences, subset) {
     weights_.resize(static_cast<std::size_t>(CorrespondenceArrays::roundedUp(arrays_.count())));
   }
 
   NormalEquations at(const Eigen::Isometry3d& T) {
     NormalEquations equations;
-    Kernel kernel(options_);
+    Kernel kernel(kernel_scale_);
     arrays_.squareResiduals(camera_, T, 0, static_cast<int>(weights_.size()), weights_.data());
     const auto beyond = weights_.begin() + arrays_.count();
     for (auto at = weights_.begin(); at != beyond; ++at) {
@@ -66,7 +56,7 @@ class Lineariser {
 
  private:
   const StereoCamera& camera_;
-  const MotionRefinementOptions& options_;
+  double kernel_scale_;
   CorrespondenceArrays arrays_;
   std::vector<double> weights_;  ///< the squared residuals at first
 };

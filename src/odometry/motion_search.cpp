@@ -14,11 +14,6 @@
 #include "stereo_descriptor_vo/odometry/correspondences.hpp"
 
 namespace sdvo {
-namespace {
-
-constexpr std::size_t kFewestOfMotion = 20;  // points that tell a motion of their own from noise (chosen)
-
-}  // namespace
 
 MotionSearch::MotionSearch(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion,
                            const PatchAlignmentOptions& alignment)
@@ -236,7 +231,7 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene
   lasting.reserve(aligned.measured.size()), others.reserve(aligned.measured.size());
   for (std::size_t k = 0; k < aligned.measured.size(); ++k)
     (found.isLasting(found.motion.inliers[k]) ? lasting : others).push_back(aligned.measured[k]);
-  if (std::min(lasting.size(), others.size()) < kFewestOfMotion) return std::nullopt;
+  if (std::min(lasting.size(), others.size()) < kFewestMeasured) return std::nullopt;
 
   const Eigen::Isometry3d& T = aligned.T_current_reference;
   Eigen::Isometry3d T_lasting = T;

@@ -5,6 +5,8 @@
 #include <numeric>
 #include <utility>
 
+#include "stereo_descriptor_vo/odometry/noise.hpp"
+
 namespace sdvo {
 
 bool RepeatedImages::areFrozen(const StereoFeatures& features,
@@ -26,7 +28,6 @@ bool RepeatedImages::areFrozen(const StereoFeatures& features,
 }
 
 std::vector<int> RepeatedImages::newRows(const StereoFeatures& features) const {
-  constexpr int kEnough = 20;        // features of either part (chosen)
   constexpr double kExplains = 0.9;  // ratio of the features that lie in their part (chosen); matches err at the tear
   std::vector<int> rows(features.u.size());
   std::iota(rows.begin(), rows.end(), 0);
@@ -37,7 +38,7 @@ std::vector<int> RepeatedImages::newRows(const StereoFeatures& features) const {
   for (std::size_t i = 0; i < rows.size(); ++i)
     repeated[i] = std::binary_search(before.begin(), before.end(), std::pair(features.u[i], features.v[i]));
   const int count = features.count(), all_old = static_cast<int>(std::count(repeated.begin(), repeated.end(), true));
-  if (all_old < kEnough || count - all_old < kEnough) return rows;
+  if (all_old < kFewestMeasured || count - all_old < kFewestMeasured) return rows;
   std::vector<int> order = rows;
   std::sort(order.begin(), order.end(), [&](int a, int b) { return features.v[a] < features.v[b]; });
   std::vector<int> old{0};  // among the first so many from above

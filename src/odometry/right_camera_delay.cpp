@@ -7,12 +7,10 @@
 #include <vector>
 
 #include "../common/median.hpp"
+#include "stereo_descriptor_vo/odometry/noise.hpp"
 
 namespace sdvo {
 namespace {
-
-/// Of the moving pairs before, a pair leaves this ratio: some 200 pairs, over which clocks of cameras hardly drift.
-constexpr double kMemoryOfRows = 0.995;
 
 /// Velocity (px/s) of a point in the right image: at infinity, and for each px of disparity.
 struct RightFlow {
@@ -59,7 +57,7 @@ Vector6d velocityDuring(double delay, double dt, const Vector6d& before, const V
 /// Mean square (px^2, cut off) of what the rows differ from those of a right image that is late by `delay`, and lower
 /// by a constant.
 double misfit(const std::vector<RowMotion>& rows, double delay) {
-  constexpr double kCut = 1.0;  // px: rows further off are matched wrongly
+  constexpr double kCut = 2.0 * RowDelay::kKernel;  // rows further off are matched wrongly
   std::vector<double> rest;
   rest.reserve(rows.size());
   for (const RowMotion& row : rows) rest.push_back(row.dv - delay * row.velocity);
@@ -72,12 +70,11 @@ double misfit(const std::vector<RowMotion>& rows, double delay) {
 
 /// The delay of one interval, either way, that explains the rows, or zero; `known` while they do not decide.
 double partnerOf(const std::vector<RowMotion>& rows, double dt, double known) {
-  constexpr std::size_t kEnough = 20;  // points (chosen)
   // Ratio of the misfit that is left. In a rig in step the rectification's error would need a correlation of 0.7 with
   // the motion. Measured: 0.95 and more; 0.1 to 0.5 with another pair's image.
   constexpr double kBetter = 0.5;
   constexpr double kAgain = 0.25;  // the same to take it back (chosen)
-  if (rows.size() < kEnough || !(dt > 0.0)) return known;
+  if (rows.size() < kFewestMeasured || !(dt > 0.0)) return known;
   const double in_step = misfit(rows, 0.0);
   for (const double delay : {-dt, dt})
     if (misfit(rows, delay) < kBetter * in_step) return delay;
@@ -89,7 +86,8 @@ constexpr double kLeastTurning = 2.0;  // px/s: rotations from images err by les
 
 }  // namespace
 
-RightCameraDelay::RightCameraDelay(double prior) : prior_(prior), rows_(kMemoryOfRows, kLeastTurning, kSamePoints) {}
+RightCameraDelay::RightCameraDelay(double prior)
+    : prior_(prior), rows_(RowDelay::kMemory, kLeastTurning, kSamePoints) {}
 
 void RightCameraDelay::measure(const StereoFeatures& features, const std::vector<RowMotion>& rows, double dt,
                                const Vector6d& velocity) {

@@ -5,24 +5,23 @@
 #include <cmath>
 #include <limits>
 
+#include "stereo_descriptor_vo/odometry/noise.hpp"
+#include "stereo_descriptor_vo/odometry/row_delay.hpp"
+
 namespace sdvo {
 namespace {
 
-constexpr double kMemory = 0.98;      // share of the past that a pair leaves: some fifty pairs
-constexpr double kKernelScale = 0.5;  // px: a vertical disparity further off is a wrong match
-constexpr double kPrior = 1e-3;       // keeps the first pairs' equations solvable, 1/px^2 at one radian
+constexpr double kMemory = 0.98;  // share of the past that a pair leaves: some fifty pairs
+constexpr double kPrior = 1e-3;   // keeps the first pairs' equations solvable, 1/px^2 at one radian
 /// The same scene points are seen again in the next pairs, so that their errors average out much more slowly than those
 /// of independent features.
 constexpr double kCorrelatedSightings = 10.0;
-
-constexpr int kEnough = 20;  // features; fewer, which three angles fit nearly as they are, may be wrong matches
 
 // A turn of the camera.
 constexpr double kUsualOfRigs = 0.2;  // px: undisturbed, KITTI's and EuRoC's rigs change by less
 constexpr double kUnusual =
     3.0;  // times the usual change (chosen). That grows where rectification left more than a rotation
           // (Karlsruhe's rig: 0.5 px), or where the shutters are apart while the camera turns.
-constexpr double kUsualMemory = 0.9;  // ratio of the usual change's square that a pair leaves: some ten pairs
 
 Eigen::RowVector3d effect(const StereoCamera& camera, double u_right, double v) {
   const double x = (u_right - camera.cx) / camera.fx, y = (v - camera.cy) / camera.fy;
@@ -40,7 +39,7 @@ RightCameraRotation::Sums RightCameraRotation::sumUp(const StereoFeatures& featu
     for (int i = 0; i < features.count(); ++i) {
       const Eigen::RowVector3d row = effect(features.camera, features.u[i] - features.disparity[i], features.v[i]);
       const double residual = features.dv[i] - row.dot(estimate);
-      const double w = 1.0 / (1.0 + residual * residual / (kKernelScale * kKernelScale));
+      const double w = 1.0 / (1.0 + residual * residual / (RowDelay::kKernel * RowDelay::kKernel));
       sums.information.noalias() += w * row.transpose() * row;
       sums.gradient.noalias() += w * row.transpose() * features.dv[i];
       sums.square += w * residual * residual;
@@ -55,7 +54,7 @@ double RightCameraRotation::add(const StereoFeatures& features) {
   if (features.count() == 0) return 0.0;
   // A camera that turned disagrees with the memory. Back in its place it agrees again, but not with the pair before.
   double turned = 0.0;
-  if (features.count() >= kEnough) {
+  if (features.count() >= kFewestMeasured) {
     const Sums now = sumUp(features, {});
     // Against the memory a knock counts in many pairs, so each of these counts little.
     turned = std::max(against_memory_.exceededBy(distance(now, sums_), kMemory),

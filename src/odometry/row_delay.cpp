@@ -60,7 +60,6 @@ void RowDelay::Sums::add(double w, const Eigen::Vector3d& moved, double lower) {
 /// Least squares on the means of each part, with the weights of a Huber kernel. Differences within a part are left out:
 /// on a road they have the same pattern in all pairs, as has the rectification's error.
 void RowDelay::add(const std::vector<Row>& pair) {
-  constexpr double kKernel = 0.5;  // px (chosen): errors of healthy rows are smaller
   constexpr int kReweightings = 3;
   double square = 0.0;
   for (const Row& row : pair) square += row.turning * row.turning;
@@ -103,8 +102,7 @@ void RowDelay::add(const std::vector<Row>& pair) {
 }
 
 std::optional<RowDelay::Estimate> RowDelay::estimate() const {
-  constexpr double kEnough = 4.5;    // blocks (chosen), whose spread tells the standard deviation
-  constexpr double kUseful = 0.005;  // s; a delay that is not known better than that is not judged
+  constexpr double kEnough = 4.5;  // blocks (chosen), whose spread tells the standard deviation
   if (blocks_ < kEnough) return std::nullopt;
   const Fit fit = this->fit(cells_);
   const Eigen::Matrix2d inverse = fit.information.inverse();

@@ -3,14 +3,14 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
+#include "stereo_descriptor_vo/odometry/noise.hpp"
+
 namespace sdvo {
 
 void RowReadout::add(const StereoCamera& camera, const Eigen::Isometry3d& T_current_reference,
                      const std::vector<Correspondence>& correspondences, const std::vector<int>& inliers,
                      const Vector6d& velocity) {
-  constexpr double kMemory = 0.995;  // ratio of the past that a pair leaves
-  constexpr int kEnough = 20;        // inliers (chosen)
-  if (static_cast<int>(inliers.size()) < kEnough) return;
+  if (static_cast<int>(inliers.size()) < kFewestMeasured) return;
   constexpr double kUsual = 0.8;  // ratio of the past that a pair leaves of the velocity that the points were seen at
   const Vector6d change = velocity - usual_velocity_;
   usual_velocity_ += (1.0 - kUsual) * change;
@@ -37,7 +37,7 @@ void RowReadout::add(const StereoCamera& camera, const Eigen::Isometry3d& T_curr
   const double information = shift_square - by_shift.dot(solver.solve(by_shift));
   product -= by_shift.dot(solver.solve(by_rest));
   if (!std::isfinite(information) || !std::isfinite(product)) return;
-  constexpr double kForget = kMemory * kMemory;
+  constexpr double kMemory = RowDelay::kMemory, kForget = kMemory * kMemory;
   information_ = kMemory * information_ + information;
   product_ = kMemory * product_ + product;
   information_square_ = kForget * information_square_ + information * information;
@@ -47,13 +47,12 @@ void RowReadout::add(const StereoCamera& camera, const Eigen::Isometry3d& T_curr
 }
 
 std::optional<RowReadout::Estimate> RowReadout::estimate() const {
-  constexpr double kEnough = 25.0;   // pairs (chosen), whose spread tells the standard deviation
-  constexpr double kUseful = 0.005;  // s
+  constexpr double kEnough = 25.0;  // pairs (chosen), whose spread tells the standard deviation
   if (pairs_ < kEnough || !(information_ > 0.0)) return std::nullopt;
   const double value = product_ / information_;
   const double spread = product_square_ - 2.0 * value * mixed_ + value * value * information_square_;
   const Estimate estimate{value, std::sqrt(std::max(spread, 0.0)) / information_};
-  if (!(estimate.sigma < kUseful)) return std::nullopt;
+  if (!(estimate.sigma < RowDelay::kUseful)) return std::nullopt;
   return estimate;
 }
 

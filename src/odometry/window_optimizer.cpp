@@ -7,6 +7,7 @@
 
 #include "../common/median.hpp"
 #include "log_sum.hpp"
+#include "stereo_descriptor_vo/odometry/noise.hpp"
 #include "stereo_descriptor_vo/odometry/point_elimination.hpp"
 
 namespace sdvo {
@@ -45,9 +46,8 @@ std::optional<double> commonSquare(const EliminatedPoint& point) {
 
 /// Median of squares as the variance of a normal distribution; none of too few. Reorders them.
 std::optional<double> varianceOf(std::vector<double>& squares) {
-  constexpr std::size_t kFewest = 20;
   constexpr double kMedianOfChiSquare = 0.4549;  // of one degree of freedom
-  if (squares.size() < kFewest) return std::nullopt;
+  if (squares.size() < kFewestMeasured) return std::nullopt;
   return median(squares) / kMedianOfChiSquare;
 }
 

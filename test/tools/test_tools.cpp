@@ -227,7 +227,7 @@ TEST_F(Tools, OptionsThatDoNotExistOrAreOutOfRange) {
   expectError(runSequence("--param detector/no_such_option=1"), "detector/no_such_option");
   expectError(runSequence("--param motion/confidence=1.5"), "motion/confidence");
   expectError(runSequence("--param motion/max_iterations=many"), "motion/max_iterations");
-  expectError(runSequence("--param motion/kernel=square"), "motion/kernel");
+  expectError(runSequence("--param motion/consensus=square"), "motion/consensus");
   expectError(runSequence("--param motion/confidence"), "name=value");
   // Each in its range, but nothing would be aligned.
   for (const char* option : {"alignment/radius=6", "descriptor/patch_side=9"})
@@ -481,7 +481,7 @@ TEST_F(Tools, ABagThatFailsIsNamedAndTheOthersAreRun) {
   EXPECT_EQ(report[2].rfind("good,4,", 0), 0u) << report[2];
   EXPECT_TRUE(fs::exists(results_ / "good.txt"));
   expectError(runBags((root_ / "none.bag").string()), "none.bag");
-  expectError(runBags(root_.string(), "--param motion/kernel=square"), "motion/kernel");
+  expectError(runBags(root_.string(), "--param motion/consensus=square"), "motion/consensus");
   expectError(run("run_sequence", good.string()), "--output");
   expectError(run("run_sequence", good.string() + " " + good.string() + " --poses " + poses().string()), "--output");
 }

@@ -12,7 +12,7 @@
 namespace sdvo {
 
 struct FeatureMatcherOptions {
-  bool gating = true;
+  bool gating = true;  ///< compare only near the position that the predicted motion gives
   double gate_radius = 20.0;
   double max_distance = 0.3;
 
@@ -25,7 +25,6 @@ struct FeatureMatcherOptions {
   }
 
   void describe(OptionList& list) {
-    list.add("gating", gating, "compare only near the position that the predicted motion gives");
     list.add("gate_radius", gate_radius, {1.0, kWidestGate}, "px",
              "radius of that search around the predicted left position; three times as far where that finds no certain "
              "motion, or one that leads out of it");

@@ -11,12 +11,11 @@ namespace sdvo {
 struct GeneticConsensusOptions {
   int population = 24;
   double mutation_rate = 0.1;
-  bool learning = true;
+  bool learning = true;  ///< adaptive: how good a replacement each gene is
 
   void describe(OptionList& list) {
     list.add("population", population, {4, 1000}, "", "gasac: individuals of a generation");
     list.add("mutation_rate", mutation_rate, {0.0, 1.0}, "", "gasac: share of a child's genes replaced at random");
-    list.add("learning", learning, "adaptive_gasac: learn for each gene how good a replacement it is");
   }
 };
 

@@ -10,24 +10,14 @@
 
 namespace sdvo {
 
-/// What residuals cost that are larger than noise.
-enum class RobustKernel { kCauchy, kHuber };
-
-inline const std::vector<std::string>& namesOf(RobustKernel) {
-  static const std::vector<std::string> names = {"cauchy", "huber"};
-  return names;
-}
-
 struct MotionRefinementOptions {
-  RobustKernel kernel = RobustKernel::kCauchy;
   double kernel_scale = 1.0;
-  int refinement_iterations = 20;
+  int refinement_iterations = 20;  ///< Levenberg-Marquardt steps at most
 
   void describe(OptionList& list) {
-    list.add("kernel", kernel, "robust kernel of the refinement");
     list.add("kernel_scale", kernel_scale, {0.05, 20.0}, "px",
-             "residual at which the kernel starts to bend; times the scale of the noise that is learnt");
-    list.add("refinement_iterations", refinement_iterations, {1, 200}, "", "Levenberg-Marquardt steps at most");
+             "residual at which the Cauchy kernel of the refinement starts to bend; times the scale of the noise that "
+             "is learnt");
   }
 };
 

@@ -11,6 +11,12 @@ namespace sdvo {
 /// Probability that chance exceeds the limits of this package, for normal distributions as well as for agreement.
 constexpr double kTailProbability = 1e-4;
 
+/// Fewer measurements tell neither their spread nor a motion of their own from noise (chosen).
+constexpr int kFewestMeasured = 20;
+
+/// Of what is usual: ratio of the past that a pair leaves, which are some ten pairs (chosen).
+constexpr double kUsualMemory = 0.9;
+
 /// Square, in standard deviations, that so many normally distributed numbers exceed with that probability (chi-square).
 constexpr double noiseGate(int numbers) {
   constexpr double gates[] = {15.14, 18.42, 21.11, 23.51, 25.74, 27.86};
@@ -26,10 +32,9 @@ class Noise {
   /// Takes in what the inliers of a confirmed motion were off by (rms of u_left, v_left and u_right, px). Slow and
   /// bounded: one pair may be blurred, and what the inliers are depends on the scale itself.
   void learn(double rms) {
-    constexpr double kMemory = 0.9;              // ratio of the past that a pair leaves (chosen)
     constexpr double kLeast = 0.5, kMost = 2.0;  // (chosen)
     const double expected = std::sqrt(2.0 * corner_ * corner_ + disparity_ * disparity_ / 3.0);
-    scale_ = std::clamp(kMemory * scale_ + (1.0 - kMemory) * rms / expected, kLeast, kMost);
+    scale_ = std::clamp(kUsualMemory * scale_ + (1.0 - kUsualMemory) * rms / expected, kLeast, kMost);
   }
 
   /// By how much this rig's corners err more than expected.

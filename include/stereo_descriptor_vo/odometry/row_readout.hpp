@@ -7,6 +7,7 @@
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 #include "stereo_descriptor_vo/odometry/pose_problem.hpp"
+#include "stereo_descriptor_vo/odometry/row_delay.hpp"
 
 namespace sdvo {
 
@@ -16,8 +17,7 @@ namespace sdvo {
 /// bound.
 class RowReadout {
  public:
-  static constexpr double kSignificant =
-      4.0;  ///< standard deviations beyond which a rolling shutter is proved (chosen)
+  static constexpr double kSignificant = RowDelay::kSignificant;  ///< standard deviations that prove a rolling shutter
   /// s. Global shutters give up to 2.8 ms (MH_01, proved by its deviation), and one of 3 ms makes 5 sigma of position.
   static constexpr double kWarn = 0.003;
 

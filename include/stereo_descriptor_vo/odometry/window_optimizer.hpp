@@ -14,16 +14,12 @@
 namespace sdvo {
 
 struct WindowOptimizerOptions {
-  int iterations = 1;
-  double kernel_scale = 1.0;
+  int iterations = 1;         ///< Levenberg-Marquardt steps at most, for each pair; refused ones do not count
+  double kernel_scale = 1.0;  ///< sigma: normalised residual at which the Cauchy kernel bends
   double disparity_sigma = 0.1;
   double common_disparity_sigma = 0.3;
 
   void describe(OptionList& list) {
-    list.add("iterations", iterations, {1, 100}, "",
-             "Levenberg-Marquardt steps at most, for each pair; refused ones do not count");
-    list.add("kernel_scale", kernel_scale, {0.1, 20.0}, "sigma",
-             "normalised residual at which the Cauchy kernel bends");
     list.add("disparity_sigma", disparity_sigma, {0.01, 10.0}, "px",
              "standard deviation of a disparity's noise, which is new in every sighting");
     list.add(
@@ -40,8 +36,8 @@ struct WindowSolution {
   Eigen::MatrixXd pose_covariance;  ///< of the left perturbations of the poses asked for, 6 rows each, m and rad
   RigCalibration::Matrix calibration_information;  ///< of this window alone, the prior excluded, 1/px^2
   /// Variance, px^2, of the error that all disparities of one point share. It comes from the median of its squares over
-  /// the points, and is below zero by chance. None where too few points are known better from their motion than from their
-  /// disparities.
+  /// the points, and is below zero by chance. None where too few points are known better from their motion than from
+  /// their disparities.
   std::optional<double> common_disparity_square;
   std::vector<double> squares;  ///< of each observation's normalised residual
 };
