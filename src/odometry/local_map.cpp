@@ -165,8 +165,7 @@ void LocalMap::renewLooks(const StereoFeatures& features, const std::vector<Sigh
 
 void LocalMap::discountNewest() {
   for (Point& point : points_)
-    if (point.observations.size() > 1 && point.observations.back().frame_id == newestId())
-      --point.seen;
+    if (point.observations.size() > 1 && point.observations.back().frame_id == newestId()) --point.seen;
 }
 
 void LocalMap::takeDescriptor(Point& point, const StereoFeatures& features, int row) {

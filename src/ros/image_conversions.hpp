@@ -13,9 +13,9 @@ struct GreyRange {
   double black = 0.0, white = 65535.0;
 };
 
-/// CV_8U grey pixels of mono8, 8UC1, mono16, bgr8, rgb8, bgra8, rgba8 and yuv422; shares the message's memory where it can, so
-/// that the message must outlive the result. `range`: of mono16 only.
-/// Throws std::invalid_argument for any other encoding and for images whose size and data disagree.
+/// CV_8U grey pixels of mono8, 8UC1, mono16, bgr8, rgb8, bgra8, rgba8 and yuv422; shares the message's memory where it
+/// can, so that the message must outlive the result. `range`: of mono16 only. Throws std::invalid_argument for any
+/// other encoding and for images whose size and data disagree.
 cv::Mat toGrey(const sensor_msgs::ImageConstPtr& message, const GreyRange& range = {});
 
 /// The grey range of a stream of mono16 pairs, which cameras of any depth and offset send: follows the counts between

@@ -66,8 +66,8 @@ class MotionPrior {
   /// The same around a motion that another source measured, whose error is as a prediction's within one pair.
   ExpectedMotion around(const Eigen::Isometry3d& motion, double dt) const;
 
-  /// By how much (logarithm of the ratio) the last motion and this one, over `dt` s, are likelier if their pairs changed
-  /// places. The first one then seems twice as far, and the second one behind it.
+  /// By how much (logarithm of the ratio) the last motion and this one, over `dt` s, are likelier if their pairs
+  /// changed places. The first one then seems twice as far, and the second one behind it.
   double logRatioOfSwap(const Eigen::Isometry3d& motion, double dt) const;
 
   /// Of an unseen motion around a standstill, m and rad: its speed was that of the confirmed velocity, and is bounded.
