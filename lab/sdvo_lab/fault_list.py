@@ -326,6 +326,9 @@ STANDING_FAULTS = {
     **{f"standing_{name}": FAULTS[name] for name in ("black_1", "black_5", "black_20", "black_100", "every_100th_black", "gap_3_s")},
 }
 
+# These make a drive longer, so they come once.
+LENGTHENING_FAULTS = ("black_100", "standing_black_100")
+
 
 def faulty_pairs(name, seed, drive):
     fault = STANDING_FAULTS.get(name) or FAULTS[name]

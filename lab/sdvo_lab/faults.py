@@ -13,8 +13,8 @@ import tempfile
 import numpy
 
 from . import drives, marks, odometry, poses, programs
-from .fault_list import (AFTER, EVERY, FAULTS, FIRST, LAST, PERIOD, RENDERED, STANDING_FAULTS, faulty_pairs, is_hit, parts,
-                         write_sequence)
+from .fault_list import (AFTER, EVERY, FAULTS, FIRST, LAST, LENGTHENING_FAULTS, PERIOD, RENDERED, STANDING_FAULTS,
+                         faulty_pairs, is_hit, parts, write_sequence)
 
 SIGMAS = 5.0  # standard deviations that no error may exceed
 
@@ -35,6 +35,8 @@ def render_all(text, folder, pairs, standing_pairs, faults):
         (trajectory, rig), seed = fields[:2], int(fields[2])
         for name in faults:
             path, count = ("still", standing_pairs) if name in STANDING_FAULTS else (trajectory, pairs)
+            if name in LENGTHENING_FAULTS:
+                count = min(count, EVERY)
             found[name].append((seed, render(folder, path, rig, seed, count, **RENDERED.get(name, {}))))
     return found
 
