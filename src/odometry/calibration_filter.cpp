@@ -10,7 +10,7 @@
 namespace sdvo {
 namespace {
 
-constexpr int kRememberedCommons = 200;  // windows over which the mean of what is left at a point is taken
+constexpr int kRememberedCommons = 200;  // windows (chosen) over which the mean of what is left at a point is taken
 
 }  // namespace
 

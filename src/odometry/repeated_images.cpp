@@ -54,7 +54,7 @@ std::vector<int> RepeatedImages::newRows(const StereoFeatures& features) const {
   const float tear =
       features.v[order[static_cast<std::size_t>(std::clamp(is_above ? border : border - 1, 0, count - 1))]];
   rows.assign(is_above ? order.begin() + border : order.begin(), is_above ? order.end() : order.begin() + border);
-  // What is described across the tear is no point of the scene.
+  // A descriptor across the tear shows no point of the scene.
   const auto is_torn = [&](int i) { return std::abs(features.v[i] - tear) < 0.5f * features.size[i]; };
   rows.erase(std::remove_if(rows.begin(), rows.end(), is_torn), rows.end());
   std::sort(rows.begin(), rows.end());

@@ -11,7 +11,7 @@
 namespace sdvo {
 namespace {
 
-constexpr double kMemory = 0.98;  // share of the past that a pair leaves: some fifty pairs
+constexpr double kMemory = 0.98;  // share of the past that a pair leaves: some fifty pairs (chosen)
 constexpr double kPrior = 1e-3;   // keeps the first pairs' equations solvable, 1/px^2 at one radian
 /// The same scene points are seen again in the next pairs, so that their errors average out much more slowly than those
 /// of independent features.

@@ -10,7 +10,7 @@
 
 namespace sdvo {
 
-/// What pairs showed of the rig.
+/// Calibration, delay, readout and noise of the rig, estimated from its pairs.
 struct LearntRig {
   CalibrationFilter calibration;
   RightCameraRotation right_rotation;

@@ -21,7 +21,7 @@
 
 namespace sdvo {
 
-/// What becomes of the pose with a pair.
+/// State and motion that a pair adds to the pose.
 struct OdometryStep {
   TrackingState state = TrackingState::kWaiting;
   std::string reason;
@@ -35,7 +35,7 @@ struct OdometryStep {
   bool hasPose() const { return state == TrackingState::kTracking || state == TrackingState::kDegraded; }
 };
 
-/// What the odometry remembers from pair to pair.
+/// The memory of the odometry from pair to pair.
 struct OdometryState {
   std::optional<LocalMap> map;
   std::optional<LocalMap> candidate;  ///< the map with the pair; between pairs only its memory matters
@@ -58,7 +58,7 @@ struct OdometryState {
 
   OdometryState(const VisualOdometryOptions& options, int first_epoch);
 
-  /// What was learnt is of another rig.
+  /// Another rig: its estimates start anew.
   void forgetRig(const VisualOdometryOptions& options);
 
   /// The next pair does not continue the last one.

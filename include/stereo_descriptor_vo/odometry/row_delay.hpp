@@ -16,10 +16,10 @@ namespace sdvo {
 class RowDelay {
  public:
   static constexpr int kColumns = 6, kRows = 4;  ///< parts of the image
-  static constexpr double kSignificant = 4.0;    ///< standard deviations beyond which a delay is proved (chosen).
-  static constexpr double kMemory = 0.995;       ///< ratio of the past that a pair leaves: some 200 pairs
+  static constexpr double kSignificant = 4.0;    ///< standard deviations beyond which a delay is proved (chosen)
+  static constexpr double kMemory = 0.995;       ///< ratio of the past that a pair leaves: some 200 pairs (chosen)
   static constexpr double kKernel = 0.5;         ///< px (chosen): errors of healthy rows are smaller
-  static constexpr double kUseful = 0.005;       ///< s; what is not known better than that is not judged
+  static constexpr double kUseful = 0.005;       ///< s (chosen); an estimate with a larger sigma is not used
   /// s. 2 ms is 2 cm at 10 m/s, and 0.4 px at 100 deg/s and f = 120 px. Of rigs in step (twelve drives) at most 0.2 ms
   /// are proved. 10 ms is 3.7 px at 100 deg/s and f = 212 px: beyond 3 m a rig of 5 cm then has negative disparities.
   static constexpr double kWarn = 0.002, kFail = 0.01;
