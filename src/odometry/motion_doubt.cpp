@@ -5,12 +5,6 @@
 #include <sstream>
 
 namespace sdvo {
-namespace {
-
-constexpr double kHalfLife = 2.5;  // pairs: a certain doubt then lasts for three more (chosen)
-
-}  // namespace
-
 void CarriedDoubt::raise(double log_odds, const std::string& cause) {
   if (log_odds <= log_odds_) return;
   log_odds_ = std::min(log_odds, kCertain);
@@ -18,6 +12,8 @@ void CarriedDoubt::raise(double log_odds, const std::string& cause) {
 }
 
 void CarriedDoubt::pass() {
+  // Pairs: once that many have made points lasting ones, they can speak for themselves.
+  constexpr double kHalfLife = 0.5 * MotionHypothesis::kLastingSightings;
   log_odds_ = kUnsuspected + (log_odds_ - kUnsuspected) * std::exp2(-1.0 / kHalfLife);
 }
 

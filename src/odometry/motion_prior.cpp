@@ -10,8 +10,6 @@
 namespace sdvo {
 namespace {
 
-constexpr double kForgotten = 0.2;  // ratio of the longest interval, by each pair: it outlives bursts of three (chosen)
-
 Matrix6d isotropic(double translation_variance, double rotation_variance) {
   Vector6d variance;
   variance << Eigen::Vector3d::Constant(translation_variance), Eigen::Vector3d::Constant(rotation_variance);
@@ -43,7 +41,7 @@ Matrix6d MotionPrior::stampNoise(const Vector6d& velocity) const {
 }
 
 void MotionPrior::pass(double dt) {
-  interval_ = std::max(dt, (1.0 - kForgotten) * interval_);
+  interval_ = std::max(dt, kUsualMemory * interval_);
 }
 
 ExpectedMotion MotionPrior::predicted(double dt) const {

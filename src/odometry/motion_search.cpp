@@ -67,13 +67,12 @@ std::vector<MotionHypothesis> MotionSearch::compete(const MotionScene& scene, co
   // A compromise between two motions may have more inliers than the one that goes on as before.
   if (expected) hypotheses.push_back(searchAmong(scene, all, agreeing(scene, all, *expected)));
   // What moves by itself may have left copies of itself in the map, each with a motion of its own.
-  constexpr int kMotions = 4;
   MotionEstimate peeled = all.motion;
-  for (int k = 0; k < kMotions && (k == 0 || peeled.success); ++k) {
+  do {
     rest = without(rest, peeled.inliers);
     hypotheses.push_back(searchAmong(scene, all, rest));
     peeled = hypotheses.back().motion;
-  }
+  } while (peeled.success);
   return hypotheses;
 }
 
@@ -111,22 +110,20 @@ MotionHypothesis MotionSearch::searchNear(const MotionScene& scene, const ViewPt
   return found;
 }
 
-/// Whether the motion found has a good part of the points where the search did not look for them.
+/// Whether the motion found has as many points as make a motion where the search did not look for them.
 bool MotionSearch::leavesGate(const MotionScene& scene, const Eigen::Isometry3d& predicted,
                               const MotionHypothesis& found) const {
-  constexpr double kGoodPart = 0.1;
   const StereoCamera& camera = scene.features.camera;
   const Eigen::Isometry3d& T_current_reference = found.motion.T_current_reference;
-  std::size_t seen = 0, outside = 0;
+  int outside = 0;
   for (const Eigen::Vector3d& point : found.view->rows.positions) {
     const Eigen::Vector3d here = T_current_reference * point, expected = predicted * point;
     if (here.z() <= 0.0 || expected.z() <= 0.0) continue;
     const Eigen::Vector3d pixel = camera.project(here);
-    if (!camera.sees(pixel)) continue;
-    ++seen;
-    outside += (pixel - camera.project(expected)).head<2>().norm() > matcher_.options().gate_radius;
+    outside +=
+        camera.sees(pixel) && (pixel - camera.project(expected)).head<2>().norm() > matcher_.options().gate_radius;
   }
-  return static_cast<double>(outside) > kGoodPart * static_cast<double>(seen);
+  return outside >= motion_options_.min_inliers;
 }
 
 MotionHypothesis MotionSearch::search(const FeatureMatcher& matcher, const MotionScene& scene, const ViewPtr& view,
@@ -197,7 +194,6 @@ std::string MotionSearch::chanceWords(const MotionScene& scene, const MotionHypo
 
 /// Aligns the inliers' patches and refines the motion on them.
 MotionSearch::Alignment MotionSearch::align(const MotionScene& scene, const MotionHypothesis& found) const {
-  constexpr std::size_t kEnough = 30;  // fewer are no better than all corners together
   const StereoFeatures& features = scene.features;
   const Eigen::Isometry3d T_camera_origin = found.motion.T_current_reference * scene.map.newestPose();
   Alignment alignment{found.motion.T_current_reference, {}, {}};
@@ -216,7 +212,7 @@ MotionSearch::Alignment MotionSearch::align(const MotionScene& scene, const Moti
         measurementOf(features, match.current, scene.calibration, sighting.measurement.head<2>() - corner);
     aligned.push_back(alignment.measured.back());
   }
-  refineMotion(features.camera, options(scene), aligned.size() >= kEnough ? aligned : alignment.measured,
+  refineMotion(features.camera, options(scene), aligned.size() >= kFewestMeasured ? aligned : alignment.measured,
                alignment.T_current_reference);
   return alignment;
 }

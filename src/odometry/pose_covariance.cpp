@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "stereo_descriptor_vo/odometry/motion_hypotheses.hpp"
 #include "stereo_descriptor_vo/odometry/noise.hpp"
 
 namespace sdvo {
@@ -48,7 +49,8 @@ Matrix6d covering(const Matrix6d& a, const Matrix6d& b) {
 bool widen(Matrix6d& covariance, const Vector6d& deviation) {
   constexpr double kExpected = 3.0;  // chi-square of six: half its mean, for a deviation is a part of the error only
   const double square = deviation.dot(covariance.ldlt().solve(deviation));
-  if (square > kExpected) covariance += deviation * deviation.transpose();
+  if (square > kExpected)
+    covariance += deviation * deviation.transpose() + kTolerableRatio * kTolerableRatio * momentOf(deviation);
   return square > noiseGate(6);
 }
 

@@ -337,8 +337,8 @@ VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features,
 /// Doubtful is a motion that is the camera's with too small a probability, or that has too large a covariance.
 void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& found, const Candidate& candidate,
                            const MotionDoubt& doubt, Step& step) {
-  std::ostringstream reason;
-  Matrix6d covariance = candidate.adjustment.since_keyframe;
+  std::string reason = step.reason;
+  Matrix6d covariance = candidate.adjustment.since_keyframe + step.correction * step.correction.transpose();
   const auto add = [&](const Matrix6d& moment) { step.covariance += moment, state_.covariance.doubt(moment); };
   add(found.rivals_moment);
   if (found.innovation > noiseGate(6)) {
@@ -346,21 +346,23 @@ void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& fou
     const Vector6d innovation = scene.prior.front().innovation(found.motion.T_current_reference.inverse());
     covariance += innovation * innovation.transpose();
     step.covariance += innovation * innovation.transpose();
-    reason << innovationWords(found);
+    reason = innovationWords(found);
   }
   if (doubt.probability < options_.tracking.probability) {
     add(doubt.moment);
-    reason.str("");
-    reason << doubt.reason;
+    reason = doubt.reason;
   } else {
     const double deviation = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
     if (deviation <= options_.tracking.doubtful_deviation + kTolerableRatio * candidate.distance) return;
-    if (reason.str().empty())
-      reason << "a distance of " << candidate.distance << " m with a standard deviation of " << deviation
-             << " m exceeds tracking/doubtful_deviation";
+    if (reason.empty()) {
+      std::ostringstream words;
+      words << "a distance of " << candidate.distance << " m with a standard deviation of " << deviation
+            << " m exceeds tracking/doubtful_deviation";
+      reason = words.str();
+    }
   }
   step.state = TrackingState::kDegraded;
-  step.reason = "doubtful: " + reason.str();
+  step.reason = "doubtful: " + reason;
 }
 
 void VisualOdometry::commit(const Candidate& candidate, double probability) {

@@ -11,7 +11,7 @@ TEST(CarriedDoubt, FadesByHalves) {
   CarriedDoubt doubt;
   EXPECT_NEAR(probabilityOf(doubt.logOdds()), 0.001, 1e-4);
   doubt.raise(CarriedDoubt::kCertain, "a knock");
-  EXPECT_NEAR(probabilityOf(doubt.logOdds()), 0.99, 1e-3);
+  EXPECT_NEAR(probabilityOf(doubt.logOdds()), 0.999, 1e-4);
   doubt.raise(0.0, "less");
   EXPECT_EQ(doubt.cause(), "a knock");
   int doubtful = 0;
@@ -41,7 +41,7 @@ TEST(MotionDoubt, WhereNothingIsExpectedTheMotionIsAsUncertainAsItIsLong) {
   CarriedDoubt before;
   before.raise(CarriedDoubt::kCertain, "a knock");
   const MotionDoubt doubt(scene, found, before);
-  EXPECT_NEAR(doubt.probability, 0.01, 0.002);
+  EXPECT_NEAR(doubt.probability, 0.001, 1e-4);
   EXPECT_NEAR(std::sqrt(doubt.moment(2, 2)), 2.0, 0.1);
 }
 

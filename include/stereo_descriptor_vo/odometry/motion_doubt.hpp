@@ -25,7 +25,7 @@ class CarriedDoubt {
   /// Of a pair that nothing speaks against.
   static constexpr double kUnsuspected = -6.9;  // probability of 0.001 (chosen)
   /// Of an event that leaves a wrong map or a wrong rig.
-  static constexpr double kCertain = 4.6;  // 0.99 (chosen)
+  static constexpr double kCertain = -kUnsuspected;
 
  private:
   double log_odds_ = kUnsuspected;

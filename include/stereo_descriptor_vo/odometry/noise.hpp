@@ -32,9 +32,9 @@ class Noise {
   /// Takes in what the inliers of a confirmed motion were off by (rms of u_left, v_left and u_right, px). Slow and
   /// bounded: one pair may be blurred, and what the inliers are depends on the scale itself.
   void learn(double rms) {
-    constexpr double kLeast = 0.5, kMost = 2.0;  // (chosen)
+    constexpr double kMost = 2.0;  // (chosen)
     const double expected = std::sqrt(2.0 * corner_ * corner_ + disparity_ * disparity_ / 3.0);
-    scale_ = std::clamp(kUsualMemory * scale_ + (1.0 - kUsualMemory) * rms / expected, kLeast, kMost);
+    scale_ = std::clamp(kUsualMemory * scale_ + (1.0 - kUsualMemory) * rms / expected, 1.0 / kMost, kMost);
   }
 
   /// By how much this rig's corners err more than expected.
@@ -56,8 +56,9 @@ class Noise {
   double shared() const { return std::max(shared_, 1.0); }
 
  private:
+  static constexpr double kUnknownRig = 4.0;  // measured on a dozen rigs: 1 to 19
   double corner_, aligned_, disparity_, scale_ = 1.0;
-  double shared_ = 4.0;  // measured on a dozen rigs: 1 to 19
+  double shared_ = kUnknownRig;
 };
 
 }  // namespace sdvo

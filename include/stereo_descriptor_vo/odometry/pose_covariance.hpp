@@ -8,7 +8,7 @@
 namespace sdvo {
 
 /// Adds the outer product of a deviation to a covariance if its square exceeds half of the expected one (chi-square of
-/// six). Returns whether chance does not explain it.
+/// six), and the ratio by which that may be off in every direction. Returns whether chance does not explain it.
 bool widen(Matrix6d& covariance, const Vector6d& deviation);
 
 /// Covariance of a pose that is reported pair by pair while the map behind it improves. All covariances are of right
