@@ -50,16 +50,17 @@ class Noise {
   /// px: two aligned positions that are further apart are not of one point.
   double elsewhere() const { return std::sqrt(2.0 * noiseGate(2)) * aligned_; }
 
-  /// Chi-square of six, by the sum over so many points, beyond which two motions are not one. Neighbours share a part
-  /// of their errors, which does not average out.
-  double otherMotion(std::size_t points) const {
-    constexpr double kOther = 250.0;     // measured: up to 205 where nothing moved
-    constexpr double kOtherOfOne = 1.5;  // the same for each point; 1.7 and more with faults
-    return std::max(kOther, kOtherOfOne * static_cast<double>(points));
-  }
+  /// Takes in the square, in standard deviations (chi-square of six), by which the motions of two parts of a confirmed
+  /// motion's inliers differ.
+  void learnShared(double square) { shared_ += (1.0 - kUsualMemory) * (square / 6.0 - shared_); }
+
+  /// How many times larger than by points that err independently the variance of a motion by many of them is:
+  /// neighbours share a part of their errors, which does not average out.
+  double shared() const { return std::max(shared_, 1.0); }
 
  private:
   double corner_, aligned_, disparity_, scale_ = 1.0;
+  double shared_ = 4.0;  // measured on a dozen rigs: 1 to 19
 };
 
 }  // namespace sdvo
