@@ -206,8 +206,8 @@ void VisualOdometry::watchShutters(const Pair& pair, const MotionHypothesis& fou
   rig.right_delay.measure(taken, rowMotions(taken, found, since), pair.dt, velocity);
   state_.doubt.raise(CarriedDoubt::kUnsuspected + state_.prior.logRatioOfSwap(T_reference_current, since),
                      "neighbouring pairs seemed to have changed places");
-  const std::string cause = rig.right_delay.partnerWords(pair.dt);
-  if (!cause.empty()) state_.doubt.raise(CarriedDoubt::kCertain, cause);
+  const RightCameraDelay::Partner partner = rig.right_delay.partner(pair.dt);
+  state_.doubt.raise(partner.log_odds, partner.words());
 }
 
 /// Log-odds of being misled above which a motion is doubtful.

@@ -17,6 +17,9 @@ constexpr int kFewestMeasured = 20;
 /// Of what is usual: ratio of the past that a pair leaves, which are some ten pairs (chosen).
 constexpr double kUsualMemory = 0.9;
 
+/// px (chosen): patches and rectification err alike within such a part of the image.
+constexpr double kPart = 24.0;
+
 /// Square, in standard deviations, that so many normally distributed numbers exceed with that probability (chi-square).
 constexpr double noiseGate(int numbers) {
   constexpr double gates[] = {15.14, 18.42, 21.11, 23.51, 25.74, 27.86};
