@@ -120,20 +120,23 @@ TEST(PoseCovariance, ContainsWhatASecondThoughtMoved) {
   expectEqual(covariance.value(), diagonal(0.0001, 0.0001));  // one and a half standard deviations are expected
   correction[0] = 0.02;
   covariance.cover(correction);
-  Matrix6d expected = diagonal(0.0001, 0.0001);
-  expected(0, 0) += 0.0004;
-  expectEqual(covariance.value(), expected);
+  // All of the correction along itself, and 3 % of it in each direction.
+  Matrix6d added = Matrix6d::Zero();
+  const auto add = [&](double square) {
+    added(0, 0) += square;
+    added.topLeftCorner<3, 3>().diagonal().array() += 9e-4 * square;
+  };
+  add(0.0004);
+  expectEqual(covariance.value(), diagonal(0.0001, 0.0001) + added);
   correction[0] = 0.5;
   covariance.cover(correction);
-  expected(0, 0) += 0.25;
-  expectEqual(covariance.value(), expected);
+  add(0.25);
+  expectEqual(covariance.value(), diagonal(0.0001, 0.0001) + added);
   covariance.cover(correction);
-  expectEqual(covariance.value(), expected);
+  expectEqual(covariance.value(), diagonal(0.0001, 0.0001) + added);
   // What is measured from the same key frame later has that error, too.
   covariance.measure(still, diagonal(1.0, 1.0));
-  Matrix6d later = diagonal(1.0, 1.0);
-  later(0, 0) += 0.2504;
-  expectEqual(covariance.value(), later);
+  expectEqual(covariance.value(), diagonal(1.0, 1.0) + added);
 }
 
 TEST(PoseCovariance, GrowsFromKeyframeToKeyframe) {
