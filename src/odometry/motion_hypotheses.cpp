@@ -48,55 +48,73 @@ std::vector<int> sorted(std::vector<int> values) {
   return values;
 }
 
-/// Logarithm of prior times likelihood of each hypothesis. Whatever hypothesis matched a point counts for all of them;
-/// what none of them explains speaks against none.
-std::vector<double> logWeights(const MotionScene& scene, double threshold,
-                               const std::vector<MotionHypothesis>& hypotheses) {
-  std::set<std::pair<int, int>> pairs;
-  std::vector<Correspondence> matches;
-  std::vector<double> sightings;
-  for (const MotionHypothesis& hypothesis : hypotheses)
-    for (std::size_t i = 0; i < hypothesis.matches.size(); ++i) {
-      const FeatureMatch& match = hypothesis.matches[i];
-      if (!pairs.emplace(match.reference, match.current).second) continue;
-      matches.push_back(hypothesis.correspondences[i]);
-      sightings.push_back(hypothesis.sightingsOf(static_cast<int>(i)));
+/// What the hypotheses of a pair explain. Whatever hypothesis matched a point counts for all of them.
+class Explanations {
+ public:
+  Explanations(const MotionScene& scene, double threshold, const std::vector<MotionHypothesis>& hypotheses)
+      : hypotheses_(hypotheses) {
+    std::set<std::pair<int, int>> pairs;
+    std::vector<Correspondence> matches;
+    for (const MotionHypothesis& hypothesis : hypotheses)
+      for (std::size_t i = 0; i < hypothesis.matches.size(); ++i) {
+        const FeatureMatch& match = hypothesis.matches[i];
+        if (!pairs.emplace(match.reference, match.current).second) continue;
+        matches.push_back(hypothesis.correspondences[i]);
+        sightings_.push_back(hypothesis.sightingsOf(static_cast<int>(i)));
+      }
+    const PoseProblem problem(scene.features.camera, matches, threshold);
+    for (const MotionHypothesis& hypothesis : hypotheses) {
+      explained_.emplace_back(matches.size(), false);
+      for (const int i : problem.inliers(hypothesis.motion.T_current_reference))
+        explained_.back()[static_cast<std::size_t>(i)] = true;
     }
-  const PoseProblem problem(scene.features.camera, matches, threshold);
-  std::vector<double> own(hypotheses.size(), 0.0);
-  std::vector<bool> is_explained(matches.size(), false);
-  for (std::size_t k = 0; k < hypotheses.size(); ++k)
-    for (const int i : problem.inliers(hypotheses[k].motion.T_current_reference)) {
-      own[k] += sightings[static_cast<std::size_t>(i)];
-      is_explained[static_cast<std::size_t>(i)] = true;
+  }
+
+  /// Logarithm of how many times likelier one hypothesis is than another one, by prior and by the points that they do
+  /// not agree on.
+  double logRatio(std::size_t a, std::size_t b) const {
+    double of_a = 0.0, of_b = 0.0;
+    int points = 0;
+    for (std::size_t i = 0; i < sightings_.size(); ++i) {
+      if (explained_[a][i] == explained_[b][i]) continue;
+      (explained_[a][i] ? of_a : of_b) += sightings_[i];
+      ++points;
     }
-  double all = 0.0;
-  int points = 0;
-  for (std::size_t i = 0; i < matches.size(); ++i)
-    if (is_explained[i]) all += sightings[i], ++points;
-  std::vector<double> weights;
-  for (std::size_t k = 0; k < hypotheses.size(); ++k)
-    weights.push_back(logPrior(hypotheses[k]) + logLikelihood(all - own[k], points));
-  return weights;
-}
+    return logPrior(hypotheses_[a]) - logPrior(hypotheses_[b]) + logLikelihood(of_b, points) -
+           logLikelihood(of_a, points);
+  }
+
+  std::size_t likeliest() const {
+    std::size_t best = 0;
+    for (std::size_t k = 1; k < hypotheses_.size(); ++k)
+      if (logRatio(k, best) > 0.0) best = k;
+    return best;
+  }
+
+ private:
+  const std::vector<MotionHypothesis>& hypotheses_;
+  std::vector<double> sightings_;             ///< of each match
+  std::vector<std::vector<bool>> explained_;  ///< by each hypothesis
+};
 
 /// A motion that explains a part of the pair that the chosen one does not, and that chance does not either.
 struct Competitor {
   const MotionHypothesis* hypothesis;
-  double log_weight;
+  double log_ratio;       ///< by how much it is likelier than the chosen one
   std::vector<int> rows;  ///< of the pair, that it explains alone
 };
 
 /// Each motion once.
 std::vector<Competitor> rivalsOf(const MotionScene& scene, double threshold, const MotionHypothesis& chosen,
-                                 const std::vector<MotionHypothesis>& hypotheses, const std::vector<double>& weights) {
+                                 const std::vector<MotionHypothesis>& hypotheses, const Explanations& explanations,
+                                 std::size_t likeliest) {
   const std::vector<int> own = sorted(chosen.inlierRows());
   const int left = chosen.agreement.matches - chosen.agreement.inliers;
   std::vector<Competitor> rivals;
   for (std::size_t k = 0; k < hypotheses.size(); ++k) {
     const MotionHypothesis& other = hypotheses[k];
     if (areOne(scene, chosen, other)) continue;
-    Competitor rival{&other, weights[k], without(sorted(other.inlierRows()), own)};
+    Competitor rival{&other, explanations.logRatio(k, likeliest), without(sorted(other.inlierRows()), own)};
     const int rows = static_cast<int>(rival.rows.size());
     if (rows < kFewestMeasured) continue;
     const double chance = chanceOfAgreement(threshold, other.gate);
@@ -105,22 +123,21 @@ std::vector<Competitor> rivalsOf(const MotionScene& scene, double threshold, con
                                    [&](const Competitor& before) { return areOne(scene, *before.hypothesis, other); });
     if (same == rivals.end())
       rivals.push_back(std::move(rival));
-    else if (same->log_weight < rival.log_weight)
+    else if (same->log_ratio < rival.log_ratio)
       *same = std::move(rival);
   }
   return rivals;
 }
 
 /// The chosen motion's probability, and the moment of the rivals around it.
-void compare(const MotionScene& scene, const std::vector<Competitor>& rivals, double log_weight,
-             MotionHypothesis& chosen) {
+void compare(const MotionScene& scene, const std::vector<Competitor>& rivals, MotionHypothesis& chosen) {
   double total = 1.0;
-  for (const Competitor& rival : rivals) total += std::exp(rival.log_weight - log_weight);
+  for (const Competitor& rival : rivals) total += std::exp(rival.log_ratio);
   std::vector<int> explained;
   for (const Competitor& rival : rivals) {
     explained.insert(explained.end(), rival.rows.begin(), rival.rows.end());
     const Eigen::Isometry3d& T = rival.hypothesis->motion.T_current_reference;
-    const double probability = std::exp(rival.log_weight - log_weight) / total;
+    const double probability = std::exp(rival.log_ratio) / total;
     // Both start from the same pair of the map.
     const Eigen::Isometry3d apart = chosen.motion.T_current_reference * T.inverse();
     chosen.rivals_moment += probability * momentOf(logSE3(apart));
@@ -152,6 +169,21 @@ double probabilityOf(double log_odds) {
 int MotionHypothesis::sightingsOf(int match) const {
   return std::min(view->seen[static_cast<std::size_t>(matches[static_cast<std::size_t>(match)].reference)],
                   kLastingSightings);
+}
+
+void MotionHypothesis::follow(const MotionScene& scene, const Eigen::Isometry3d& T_current_reference,
+                              const std::vector<int>& left) {
+  const Eigen::Isometry3d T_found = std::exchange(motion.T_current_reference, T_current_reference);
+  const int points = static_cast<int>(motion.inliers.size()), of_other = static_cast<int>(left.size());
+  if (of_other < kFewestMeasured) return;
+  double own = 0.0, others = 0.0;
+  for (const int i : motion.inliers) (contains(left, matches[i].current) ? others : own) += sightingsOf(i);
+  const double misled = probabilityOf(logLikelihood(own, points) - logLikelihood(others, points));
+  const Eigen::Isometry3d apart = T_current_reference * T_found.inverse();
+  rivals_moment += misled * momentOf(logSE3(apart));
+  if (isTolerable(scene, T_current_reference, apart)) return;
+  probability *= 1.0 - misled;
+  rival = {T_found, misled, of_other};
 }
 
 std::vector<int> MotionHypothesis::inlierRows(const std::vector<int>& rejected) const {
@@ -250,14 +282,14 @@ MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::v
     chosen = *std::max_element(hypotheses.begin(), hypotheses.end(), by_inliers);
   } else {
     hypotheses.erase(failures, hypotheses.end());
-    const std::vector<double> weights = logWeights(scene, threshold, hypotheses);
-    const auto likeliest = std::max_element(weights.begin(), weights.end());
-    const MotionHypothesis& first = hypotheses[static_cast<std::size_t>(likeliest - weights.begin())];
+    const Explanations explanations(scene, threshold, hypotheses);
+    const std::size_t likeliest = explanations.likeliest();
+    const MotionHypothesis& first = hypotheses[likeliest];
     // Of one motion the estimate with the most inliers.
     chosen = first;
     for (const MotionHypothesis& other : hypotheses)
       if (by_inliers(chosen, other) && areOne(scene, first, other)) chosen = other;
-    compare(scene, rivalsOf(scene, threshold, chosen, hypotheses, weights), *likeliest, chosen);
+    compare(scene, rivalsOf(scene, threshold, chosen, hypotheses, explanations, likeliest), chosen);
   }
   chosen.match_time = match_time, chosen.motion_time = motion_time;
   return chosen;

@@ -244,33 +244,24 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene
 /// all away. Aligned positions tell it from the points that stood still so far.
 void MotionSearch::keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_lasting,
                           const std::vector<Correspondence>& measured, MotionHypothesis& found) const {
-  MotionEstimate& motion = found.motion;
-  double own = 0.0, of_others = 0.0;
-  std::vector<int> kept = PoseProblem(scene.features.camera, measured, scene.noise.elsewhere()).inliers(T_lasting);
-  std::vector<int> inliers;
+  const std::vector<int> kept =
+      PoseProblem(scene.features.camera, measured, scene.noise.elsewhere()).inliers(T_lasting);
+  std::vector<int> inliers, left;
   std::vector<LocalMap::Sighting> sightings;
   for (int k = 0; k < static_cast<int>(measured.size()); ++k) {
-    const int i = motion.inliers[static_cast<std::size_t>(k)];
-    const bool is_kept = std::binary_search(kept.begin(), kept.end(), k);
-    (is_kept ? own : of_others) += found.sightingsOf(i);
-    if (!is_kept) continue;
+    const int i = found.motion.inliers[static_cast<std::size_t>(k)];
+    if (!std::binary_search(kept.begin(), kept.end(), k)) {
+      left.push_back(found.matches[static_cast<std::size_t>(i)].current);
+      continue;
+    }
     inliers.push_back(i);
     sightings.push_back(found.sightings[static_cast<std::size_t>(k)]);
   }
-  const int left = static_cast<int>(motion.inliers.size() - inliers.size());
-  const int points = static_cast<int>(motion.inliers.size());
-  const double probability = probabilityOf(logLikelihood(of_others, points) - logLikelihood(own, points));
-  const Eigen::Isometry3d apart = T_lasting * motion.T_current_reference.inverse();
-  found.rivals_moment += (1.0 - probability) * momentOf(logSE3(apart));
-  if (!isTolerable(scene, T_lasting, apart)) {
-    found.probability *= probability;
-    found.rival = {motion.T_current_reference, 1.0 - probability, left};
-  }
-  motion.T_current_reference = T_lasting;
-  motion.inliers = std::move(inliers);
+  found.follow(scene, T_lasting, left);
+  found.motion.inliers = std::move(inliers);
   found.sightings = std::move(sightings);
   found.countAgreement();
-  found.agreement.matches -= left;
+  found.agreement.matches -= static_cast<int>(left.size());
 }
 
 }  // namespace sdvo

@@ -279,6 +279,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   if (!refutation.empty()) return refute(refutation);
   const bool is_sound = MotionDoubt(scene, found, state_.doubt).probability >= options_.tracking.probability;
   const Candidate candidate = adjust(features, found, is_sound);
+  found.follow(scene, candidate.motion.inverse(), candidate.adjustment.rejected_rows);
   found.reject(candidate.adjustment.rejected_rows);
   refutation = search_.chanceWords(scene, found);
   if (refutation.empty()) refutation = state_.prior.tooFast(candidate.motion, found.motion.covariance, since);

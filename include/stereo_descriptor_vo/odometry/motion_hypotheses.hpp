@@ -76,6 +76,8 @@ struct MotionHypothesis {
 
   /// Of all matches and of the motion's inliers.
   void countAgreement();
+  /// The motion is this one, which leaves some of the inliers, by their rows of the pair, to the one that was found.
+  void follow(const MotionScene& scene, const Eigen::Isometry3d& T_current_reference, const std::vector<int>& left);
   /// Counts the inliers without these rows of the pair.
   void reject(const std::vector<int>& rows);
 
