@@ -153,6 +153,7 @@ void compare(const MotionScene& scene, const std::vector<Competitor>& rivals, Mo
     if (!std::binary_search(explained.begin(), explained.end(), row)) continue;
     --chosen.agreement.matches;
     chosen.agreement.lasting_matches -= chosen.isLasting(i);
+    chosen.agreement.sightings -= chosen.sightingsOf(i);
   }
 }
 
@@ -174,12 +175,11 @@ int MotionHypothesis::sightingsOf(int match) const {
 void MotionHypothesis::follow(const MotionScene& scene, const Eigen::Isometry3d& T_current_reference,
                               const std::vector<int>& left) {
   const Eigen::Isometry3d T_found = std::exchange(motion.T_current_reference, T_current_reference);
+  const Eigen::Isometry3d apart = T_current_reference * T_found.inverse();
   const int points = static_cast<int>(motion.inliers.size()), of_other = static_cast<int>(left.size());
-  if (of_other < kFewestMeasured) return;
   double own = 0.0, others = 0.0;
   for (const int i : motion.inliers) (contains(left, matches[i].current) ? others : own) += sightingsOf(i);
   const double misled = probabilityOf(logLikelihood(own, points) - logLikelihood(others, points));
-  const Eigen::Isometry3d apart = T_current_reference * T_found.inverse();
   rivals_moment += misled * momentOf(logSE3(apart));
   if (isTolerable(scene, T_current_reference, apart)) return;
   probability *= 1.0 - misled;
@@ -196,17 +196,19 @@ std::vector<int> MotionHypothesis::inlierRows(const std::vector<int>& rejected) 
 
 void MotionHypothesis::countAgreement() {
   agreement.matches = static_cast<int>(matches.size());
-  agreement.lasting_matches = 0;
-  for (int i = 0; i < agreement.matches; ++i) agreement.lasting_matches += isLasting(i);
+  agreement.lasting_matches = agreement.sightings = 0;
+  for (int i = 0; i < agreement.matches; ++i)
+    agreement.lasting_matches += isLasting(i), agreement.sightings += sightingsOf(i);
   reject({});
 }
 
 void MotionHypothesis::reject(const std::vector<int>& rows) {
-  agreement.inliers = agreement.lasting_inliers = 0;
+  agreement.inliers = agreement.lasting_inliers = agreement.inlier_sightings = 0;
   for (const int i : motion.inliers) {
     if (contains(rows, matches[i].current)) continue;
     ++agreement.inliers;
     agreement.lasting_inliers += isLasting(i);
+    agreement.inlier_sightings += sightingsOf(i);
   }
 }
 

@@ -80,9 +80,6 @@ std::vector<MotionHypothesis> MotionSearch::compete(const MotionScene& scene, co
 /// than usual would be no serious rival even if they moved together.
 bool MotionSearch::isBeyondDoubt(const MotionScene& scene, const MotionHypothesis& found, double max_doubt) const {
   if (!found.motion.success || found.innovation > noiseGate(6) || logOddsMisled(scene, found) > max_doubt) return false;
-  int all = 0, own = 0;
-  for (int i = 0; i < static_cast<int>(found.matches.size()); ++i) all += found.sightingsOf(i);
-  for (const int i : found.motion.inliers) own += found.sightingsOf(i);
   const double agree = found.agreement.lasting_inliers;
   const double lacking = scene.usual_agreement * found.agreement.lasting_matches - agree;
   if (lacking >= motion_options_.min_inliers) {
@@ -91,7 +88,7 @@ bool MotionSearch::isBeyondDoubt(const MotionScene& scene, const MotionHypothesi
     if (logLikelihood(kSightings * agree, points) - logLikelihood(kSightings * lacking, points) > max_doubt)
       return false;
   }
-  return 2 * own >= all;
+  return 2 * found.agreement.inlier_sightings >= found.agreement.sightings;
 }
 
 /// First where a good prediction has the points, then three times as far.
@@ -247,11 +244,13 @@ void MotionSearch::keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_l
   const std::vector<int> kept =
       PoseProblem(scene.features.camera, measured, scene.noise.elsewhere()).inliers(T_lasting);
   std::vector<int> inliers, left;
+  int left_sightings = 0;
   std::vector<LocalMap::Sighting> sightings;
   for (int k = 0; k < static_cast<int>(measured.size()); ++k) {
     const int i = found.motion.inliers[static_cast<std::size_t>(k)];
     if (!std::binary_search(kept.begin(), kept.end(), k)) {
       left.push_back(found.matches[static_cast<std::size_t>(i)].current);
+      left_sightings += found.sightingsOf(i);
       continue;
     }
     inliers.push_back(i);
@@ -262,6 +261,7 @@ void MotionSearch::keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_l
   found.sightings = std::move(sightings);
   found.countAgreement();
   found.agreement.matches -= static_cast<int>(left.size());
+  found.agreement.sightings -= left_sightings;
 }
 
 }  // namespace sdvo

@@ -271,16 +271,13 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
                               : predictMotion(options_, features, dt, why, state_);
   };
   const double since = state_.secondsSinceMap(features);
-  const Eigen::Isometry3d T_reference_current = found.motion.T_current_reference.inverse();
-  std::string refutation = state_.prior.tooFast(T_reference_current, found.motion.covariance, since);
+  std::string refutation =
+      state_.prior.tooFast(found.motion.T_current_reference.inverse(), found.motion.covariance, since);
   // What is followed was likely something else already, and this is no motion of the camera: the prior's is likelier.
   if (refutation.empty() && scene.is_doubted && scene.T_current_reference && logOddsMisled(scene, found) > 0.0)
     refutation = innovationWords(found) + ", right after " + state_.doubt.cause();
   if (!refutation.empty()) return refute(refutation);
-  const bool is_sound = MotionDoubt(scene, found, state_.doubt).probability >= options_.tracking.probability;
-  const Candidate candidate = adjust(features, found, is_sound);
-  found.follow(scene, candidate.motion.inverse(), candidate.adjustment.rejected_rows);
-  found.reject(candidate.adjustment.rejected_rows);
+  const Candidate candidate = adjustBeyondDoubt(features, scene, found);
   refutation = search_.chanceWords(scene, found);
   if (refutation.empty()) refutation = state_.prior.tooFast(candidate.motion, found.motion.covariance, since);
   if (!refutation.empty()) return refute(refutation + " after the adjustment");
@@ -295,7 +292,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   if (is_confirmed) state_.rig.learn(found);
   // A motion that is likely something else's predicts nothing.
   if (doubt.probability >= 0.5)
-    state_.prior.measure(features.stamp, T_reference_current, since, measured, is_confirmed,
+    state_.prior.measure(features.stamp, found.motion.T_current_reference.inverse(), since, measured, is_confirmed,
                          step.covariance - measured);
   if (options_.planar.planar) {
     const std::string off = state_.floor.note(*floor(), state_.map->newestPose());
@@ -307,6 +304,24 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
                   (step.reason.empty() ? "" : "; " + step.reason);
   if (state_.map->newestIsKeyframe()) state_.covariance.markKeyframe();
   return step;
+}
+
+/// Adjusts the map with the pair, which may refute most of what was inliers by corners. Then all hypotheses compete.
+VisualOdometry::Candidate VisualOdometry::adjustBeyondDoubt(const StereoFeatures& features, const MotionScene& scene,
+                                                            MotionHypothesis& found) {
+  const bool is_sound = MotionDoubt(scene, found, state_.doubt).probability >= options_.tracking.probability;
+  const bool was_beyond_doubt = search_.isBeyondDoubt(scene, found, largestDoubt());
+  Candidate candidate = adjust(features, found, is_sound);
+  found.reject(candidate.adjustment.rejected_rows);
+  if (!was_beyond_doubt || search_.isBeyondDoubt(scene, found, largestDoubt())) return candidate;
+  MotionScene suspected = scene;
+  suspected.is_suspected = true;
+  MotionHypothesis chosen = search_.find(suspected, largestDoubt());
+  if (!chosen.motion.success) return candidate;
+  found = std::move(chosen);
+  candidate = adjust(features, found, is_sound);
+  found.reject(candidate.adjustment.rejected_rows);
+  return candidate;
 }
 
 /// Adjusts a copy of the map with the pair in it.

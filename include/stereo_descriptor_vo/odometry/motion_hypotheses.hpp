@@ -20,6 +20,7 @@ namespace sdvo {
 struct Agreement {
   int matches = 0, inliers = 0;
   int lasting_matches = 0, lasting_inliers = 0;
+  int sightings = 0, inlier_sightings = 0;  ///< confirmed ones of their points, four at most for each
 };
 
 /// Probabilities as log-odds: log(p / (1 - p)).

@@ -26,6 +26,9 @@ class MotionSearch {
   /// `max_doubt`: log-odds of being misled up to which a motion that the majority agrees with is taken at once.
   MotionHypothesis find(const MotionScene& scene, double max_doubt) const;
 
+  /// Whether no other hypothesis needs to compete with it.
+  bool isBeyondDoubt(const MotionScene& scene, const MotionHypothesis& found, double max_doubt) const;
+
   /// In words, if there are too few inliers for a motion, or as many as chance gives.
   std::string chanceWords(const MotionScene& scene, const MotionHypothesis& found) const;
 
@@ -43,7 +46,6 @@ class MotionSearch {
   };
 
   std::vector<MotionHypothesis> compete(const MotionScene& scene, const ViewPtr& view, MotionHypothesis first) const;
-  bool isBeyondDoubt(const MotionScene& scene, const MotionHypothesis& found, double max_doubt) const;
   MotionHypothesis searchNear(const MotionScene& scene, const ViewPtr& view,
                               const std::optional<Eigen::Isometry3d>& T_current_reference, double max_doubt) const;
   MotionHypothesis search(const FeatureMatcher& matcher, const MotionScene& scene, const ViewPtr& view,

@@ -101,6 +101,7 @@ class VisualOdometry {
   void begin(const Pair& pair, const std::optional<MotionGuess>& guess);
   void watchShutters(const Pair& pair, const MotionHypothesis& found);
   Step extendMap(const StereoFeatures& features, const MotionScene& scene, MotionHypothesis& found, double dt);
+  Candidate adjustBeyondDoubt(const StereoFeatures& features, const MotionScene& scene, MotionHypothesis& found);
   Candidate adjust(const StereoFeatures& features, const MotionHypothesis& found, bool may_recall);
   void commit(const Candidate& candidate, double probability);
   Step measure(const MotionHypothesis& found, const Candidate& candidate);
