@@ -17,7 +17,7 @@ namespace sdvo {
 /// bound.
 class RowReadout {
  public:
-  /// s. Global shutters give up to 2.8 ms (MH_01, proved by its deviation), and one of 3 ms makes 5 sigma of position.
+  /// s. Global shutters give up to 2 ms (MH_01, proved by its deviation), and one of 3 ms makes 5 sigma of position.
   static constexpr double kWarn = 0.003;
 
   struct Estimate {
