@@ -76,7 +76,7 @@ TEST(LocalMap, APairThatSharesHardlyAnythingWithTheOthersIsNotAdjusted) {
 
 TEST(LocalMapKeyframes, GoByAgeWhenNoneLasts) {
   LocalMapOptions options;
-  options.lasting_keyframes = 0;
+  options.lasting_points = 10000;
   EXPECT_GT(oldestAfter(options, 40, hovering), 20);
 }
 
@@ -193,23 +193,23 @@ TEST(LocalMapSight, IsTheCornerWithoutAnAlignment) {
   const Wall wall;
   LocalMap map{LocalMapOptions()};
   map.insert({}, wall.view(10.0), 1, Wall::poseAt(10.0), {}, RigCalibration());
-  const auto expectCorner = [&](const PatchAlignmentOptions& options, const StereoFeatures& features) {
+  const auto expectCorner = [&](const PatchAlignmentOptions& options, const StereoFeatures& features, double sigma) {
     const LocalMap::Sighting sighting = map.sight(options, features, Wall::poseAt(10.0), 0, 0);
     EXPECT_FALSE(sighting.aligned);
     EXPECT_EQ(sighting.measurement.x(), features.u[0]);
     EXPECT_EQ(sighting.measurement.y(), features.v[0]);
-    EXPECT_EQ(sighting.sigma, LocalMapOptions().corner_sigma);
+    EXPECT_EQ(sighting.sigma, sigma);
   };
   StereoFeatures features = wall.view(10.0, {0.6, -0.5});
   PatchAlignmentOptions off;
   off.enabled = false;
-  expectCorner(off, features);
+  expectCorner(off, features, NoiseOptions().corner);
   StereoFeatures unlike = features;
   cv::RNG(1).fill(unlike.patches, cv::RNG::UNIFORM, 0, 256);
-  expectCorner(PatchAlignmentOptions(), unlike);
+  expectCorner(PatchAlignmentOptions(), unlike, NoiseOptions().unconfirmed());
   features.patch_layout.side = 0;
   features.patches.release();
-  expectCorner(PatchAlignmentOptions(), features);
+  expectCorner(PatchAlignmentOptions(), features, NoiseOptions().corner);
 }
 
 TEST(LocalMapSight, RenewsTheReferenceWhenTheScaleHasChangedAndKeepsThePoint) {
@@ -489,7 +489,7 @@ TEST(LocalMap, HoldsAsManyKeyframesAsItIsTold) {
   const synthetic::World world = someWorld(20);
   LocalMapOptions options = everyPairAKeyframe();
   options.keyframes = 3;
-  options.lasting_keyframes = 0;
+  options.lasting_points = 21;  // more than there are
   LocalMap map(options);
   for (int id = 1; id <= 6; ++id) {
     const Eigen::Isometry3d pose = translated(0.1 * id, 0.0, 0.0);
@@ -507,7 +507,7 @@ TEST(LocalMap, HoldsAnOldKeyframeWhileItSharesEnough) {
     bool stays;
   };
   for (const auto& [lasting_points, shared, stays] :
-       {Case{20, 20, true}, Case{20, 19, false}, Case{5, 10, true}, Case{5, 9, false}}) {
+       {Case{20, 20, true}, Case{20, 19, false}, Case{5, 5, true}, Case{5, 4, false}}) {
     const synthetic::World world = someWorld(2 * kPoints);
     LocalMapOptions options = everyPairAKeyframe();
     options.keyframes = 2;
@@ -567,7 +567,7 @@ TEST(LocalMap, TakesTheLooksOfTheLastSighting) {
 TEST(LocalMap, WithoutPatchesASightingIsTheCorner) {
   const synthetic::World world = someWorld(3);
   LocalMapOptions options;
-  options.corner_sigma = 0.7;
+  options.noise.corner = 0.7;
   LocalMap map(options);
   const StereoFeatures features = see(world, 0, 3, Eigen::Isometry3d::Identity());
   add(map, features, 1, Eigen::Isometry3d::Identity(), {});
@@ -670,9 +670,9 @@ TEST(LocalMap, CovarianceBetweenTwoFramesDoesNotDependOnWhereTheFirstOneIs) {
   step << 0.4, -0.2, -0.6, 0.03, 0.12, -0.05;
   const Eigen::Isometry3d second = translated(0.2, 0.0, -0.5), third = expSE3(step) * second;
   LocalMapOptions options = everyPairAKeyframe();
-  options.corner_sigma = 0.05;
+  options.noise.corner = 0.05;
   WindowOptimizerOptions window;
-  window.common_disparity_sigma = 0.0;
+  window.noise.common_disparity = 0.0;
   WindowOptimizer optimizer(window);
   RigCalibration calibration;
   constexpr double kNoise = 0.05;  // px

@@ -37,8 +37,7 @@ struct MotionScene {
   double usual_agreement = 0.9;       ///< ratio of lasting matches that agree with the camera's motion on this rig
   bool is_doubted = false;            ///< what is followed was likely not the camera's motion a moment ago
   double tolerance = 0.05;            ///< m: motions that differ by less than this and 3 % are equally good
-  Noise noise = {LocalMapOptions().corner_sigma, LocalMapOptions().reference_sigma,
-                 WindowOptimizerOptions().common_disparity_sigma};
+  Noise noise{NoiseOptions()};
 };
 
 /// A motion that competes for being the camera's, and what speaks for it.
