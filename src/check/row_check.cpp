@@ -13,7 +13,7 @@
 namespace sdvo {
 namespace {
 
-constexpr std::size_t kCells = static_cast<std::size_t>(RowDelay::kColumns) * RowDelay::kRows;
+constexpr std::size_t kCells = RowDelay::kParts;
 
 /// Where points went, to a fraction of a pixel; `guess` in, result out. Whether each was found.
 std::vector<std::uint8_t> track(const cv::Mat& from, const cv::Mat& to, const std::vector<cv::Point2f>& points,

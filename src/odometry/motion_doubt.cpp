@@ -26,11 +26,10 @@ MotionDoubt::MotionDoubt(const MotionScene& scene, const MotionHypothesis& found
   const double carried = std::exp(before.logOdds());
   log_odds = std::log(rivals + misled);
   probability = 1.0 / (1.0 + rivals + misled + carried);
-  moment = found.rivals_moment;
   // Where nothing is expected, the camera may as well have stood.
   const ExpectedMotion expected = scene.prior.empty() ? ExpectedMotion() : scene.prior.front();
   const Vector6d innovation = expected.innovation(found.motion.T_current_reference.inverse());
-  moment += (misled + carried) * probability * (momentOf(innovation) + expected.covariance);
+  moment = (misled + carried) * probability * (momentOf(innovation) + expected.covariance);
   std::ostringstream words;
   if (found.rival && rivals >= std::max(misled, carried)) {
     words << "two motions in view, of " << found.agreement.inliers << " and " << found.rival->matches

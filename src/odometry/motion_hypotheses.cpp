@@ -1,5 +1,6 @@
 #include "stereo_descriptor_vo/odometry/motion_hypotheses.hpp"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <bitset>
 #include <cmath>
@@ -35,13 +36,6 @@ bool areOne(const MotionScene& scene, const MotionHypothesis& a, const MotionHyp
   const Eigen::Isometry3d &T_a = a.motion.T_current_reference, &T_b = b.motion.T_current_reference;
   return agree(camera, a.correspondences, a.motion.inliers, T_a, T_b, within) &&
          agree(camera, b.correspondences, b.motion.inliers, T_a, T_b, within);
-}
-
-/// Whether a motion would do as well as another one that is so far `apart`.
-bool isTolerable(const MotionScene& scene, const Eigen::Isometry3d& motion, const Eigen::Isometry3d& apart) {
-  constexpr double kAngle = 0.02;  // rad (chosen: about a degree)
-  return apart.translation().norm() <= scene.tolerance + kTolerableRatio * motion.translation().norm() &&
-         logSO3(apart.linear()).norm() <= kAngle + kTolerableRatio * logSO3(motion.linear()).norm();
 }
 
 /// The prior's logarithm, relative to its best motion, is bounded by the probability that it is wrong.
@@ -181,6 +175,19 @@ void MotionHypothesis::reject(const std::vector<int>& rows) {
     ++agreement.inliers;
     agreement.lasting_inliers += isLasting(i);
   }
+}
+
+bool isTolerable(const MotionScene& scene, const Eigen::Isometry3d& motion, const Eigen::Isometry3d& apart) {
+  constexpr double kAngle = 0.02;  // rad (chosen: about a degree)
+  return apart.translation().norm() <= scene.tolerance + kTolerableRatio * motion.translation().norm() &&
+         logSO3(apart.linear()).norm() <= kAngle + kTolerableRatio * logSO3(motion.linear()).norm();
+}
+
+double logBayesFactor(const Vector6d& measured, const Matrix6d& information, const Matrix6d& covariance) {
+  // With A = I + H P the measurement's variance is H^-1 + P = A^T H^-1, so its inverse is H A^-T = A^-1 H.
+  const Eigen::PartialPivLU<Matrix6d> factor(Matrix6d::Identity() + information * covariance);
+  const Vector6d weighted = information * measured;
+  return 0.5 * (measured.dot(weighted) - measured.dot(factor.solve(weighted)) - std::log(factor.determinant()));
 }
 
 double logFalseAlarms(int matches, int inliers, double chance) {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
-#include <numeric>
 #include <opencv2/core.hpp>
 #include <string>
 #include <utility>
@@ -12,6 +11,7 @@
 #include "ascending_rows.hpp"
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
 #include "stereo_descriptor_vo/odometry/correspondences.hpp"
+#include "stereo_descriptor_vo/odometry/motion_doubt.hpp"
 
 namespace sdvo {
 
@@ -33,12 +33,12 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene, double max_doubt) 
   for (bool is_chosen = false;; is_chosen = true) {
     if (is_chosen)
       found = chooseMotion(scene, options(scene).inlier_threshold, compete(scene, view, std::move(found)));
-    else if (scene.is_doubted || !isBeyondDoubt(scene, found, max_doubt))
+    else if (scene.is_suspected || !isBeyondDoubt(scene, found, max_doubt))
       continue;
     if (!found.motion.success) return found;
     stopwatch.lap();
     Alignment aligned = align(scene, found);
-    const std::optional<Eigen::Isometry3d> T_lasting = motionOfLasting(scene, found, aligned);
+    const std::optional<Eigen::Isometry3d> T_lasting = motionOfLasting(scene, aligned, found);
     found.motion_time += stopwatch.lap();
     if (T_lasting && !is_chosen) continue;
     found.motion.T_current_reference = aligned.T_current_reference;
@@ -221,28 +221,27 @@ MotionSearch::Alignment MotionSearch::align(const MotionScene& scene, const Moti
   return alignment;
 }
 
-/// The motion that the points which stood still so far tell when left alone, if it is another than that of all
-/// together: one that puts most of the others elsewhere, and that is not within their own error. Far points agree with
-/// nearly any step once a turn makes up for it, so their number says nothing.
-std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene& scene, const MotionHypothesis& found,
-                                                               const Alignment& aligned) const {
+/// The motion that the points which stood still so far tell when left alone, if it is likelier another than that of all
+/// together: what moves by itself differs from it as a prediction does, the world by what the points of this rig err.
+std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene& scene, const Alignment& aligned,
+                                                               MotionHypothesis& found) const {
   const StereoCamera& camera = scene.features.camera;
   std::vector<Correspondence> lasting, others;
   lasting.reserve(aligned.measured.size()), others.reserve(aligned.measured.size());
   for (std::size_t k = 0; k < aligned.measured.size(); ++k)
     (found.isLasting(found.motion.inliers[k]) ? lasting : others).push_back(aligned.measured[k]);
-  if (std::min(lasting.size(), others.size()) < kFewestMeasured) return std::nullopt;
+  if (std::min(lasting.size(), others.size()) < kFewestMeasured || scene.prior.empty()) return std::nullopt;
 
   const Eigen::Isometry3d& T = aligned.T_current_reference;
   Eigen::Isometry3d T_lasting = T;
   const NormalEquations equations = refineMotion(camera, options(scene), lasting, T_lasting);
-  std::vector<int> all(others.size());
-  std::iota(all.begin(), all.end(), 0);
-  if (agree(camera, others, all, T, T_lasting, scene.noise.elsewhere())) return std::nullopt;
   const Vector6d difference = logSE3(T_lasting * T.inverse());
-  const double square = difference.dot(equations.hessian * difference) / equations.variance();
-  if (square <= scene.noise.otherMotion(lasting.size())) return std::nullopt;
-  return T_lasting;
+  const Matrix6d information = equations.hessian / equations.variance();
+  const double log_factor =
+      logBayesFactor(difference, information / scene.noise.shared(), scene.prior.front().covariance);
+  if (CarriedDoubt::kUnsuspected + log_factor > 0.0) return T_lasting;
+  found.lasting_square = difference.dot(information * difference);
+  return std::nullopt;
 }
 
 /// Something that moves by less than what corners may err by is among the inliers of every hypothesis and draws them
@@ -267,8 +266,10 @@ void MotionSearch::keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_l
   const double probability = probabilityOf(logLikelihood(of_others, points) - logLikelihood(own, points));
   const Eigen::Isometry3d apart = T_lasting * motion.T_current_reference.inverse();
   found.rivals_moment += (1.0 - probability) * momentOf(logSE3(apart));
-  found.probability *= probability;
-  found.rival = {motion.T_current_reference, 1.0 - probability, left};
+  if (!isTolerable(scene, T_lasting, apart)) {
+    found.probability *= probability;
+    found.rival = {motion.T_current_reference, 1.0 - probability, left};
+  }
   motion.T_current_reference = T_lasting;
   motion.inliers = std::move(inliers);
   found.sightings = std::move(sightings);

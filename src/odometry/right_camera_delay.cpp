@@ -58,6 +58,7 @@ Vector6d velocityDuring(double delay, double dt, const Vector6d& before, const V
 /// by a constant.
 double misfit(const std::vector<RowMotion>& rows, double delay) {
   constexpr double kCut = 2.0 * RowDelay::kKernel;  // rows further off are matched wrongly
+  constexpr double kSmallest = 1e-6;                // px^2: simulated rows have no noise
   std::vector<double> rest;
   rest.reserve(rows.size());
   for (const RowMotion& row : rows) rest.push_back(row.dv - delay * row.velocity);
@@ -65,20 +66,14 @@ double misfit(const std::vector<RowMotion>& rows, double delay) {
   const double middle = median(sorted);
   double sum = 0.0;
   for (const double each : rest) sum += std::min((each - middle) * (each - middle), kCut * kCut);
-  return sum / static_cast<double>(rest.size());
+  return sum / static_cast<double>(rest.size()) + kSmallest;
 }
 
-/// The delay of one interval, either way, that explains the rows, or zero; `known` while they do not decide.
-double partnerOf(const std::vector<RowMotion>& rows, double dt, double known) {
-  // Ratio of the misfit that is left. In a rig in step the rectification's error would need a correlation of 0.7 with
-  // the motion. Measured: 0.95 and more; 0.1 to 0.5 with another pair's image.
-  constexpr double kBetter = 0.5;
-  constexpr double kAgain = 0.25;  // the same to take it back (chosen)
-  if (rows.size() < kFewestMeasured || !(dt > 0.0)) return known;
-  const double in_step = misfit(rows, 0.0);
-  for (const double delay : {-dt, dt})
-    if (misfit(rows, delay) < kBetter * in_step) return delay;
-  return known != 0.0 && in_step > kAgain * misfit(rows, known) ? known : 0.0;
+/// By how much (logarithm of the ratio) the rows are likelier if the right image is late by `delay` than in step. Their
+/// variance is unknown, and errors within a part of the image are alike.
+double logRatioOfPartner(const std::vector<RowMotion>& rows, double delay) {
+  const double parts = std::min<double>(static_cast<double>(rows.size()), RowDelay::kParts);
+  return 0.5 * parts * std::log(misfit(rows, 0.0) / misfit(rows, delay));
 }
 
 constexpr int kSamePoints = 2;         // pairs in a row whose errors are alike (chosen)
@@ -91,7 +86,10 @@ RightCameraDelay::RightCameraDelay(double prior)
 
 void RightCameraDelay::measure(const StereoFeatures& features, const std::vector<RowMotion>& rows, double dt,
                                const Vector6d& velocity) {
-  partner_ = partnerOf(rows, dt, partner_);
+  if (rows.size() >= kFewestMeasured && dt > 0.0)
+    for (auto* partner : {&earlier_, &later_})
+      *partner = std::clamp(*partner + logRatioOfPartner(rows, partner == &earlier_ ? -dt : dt),
+                            CarriedDoubt::kUnsuspected, CarriedDoubt::kCertain);
   expose(features, dt * velocity.head<3>().norm(), velocity.tail<3>().norm());
   StereoFeatures positions;
   positions.camera = features.camera;
@@ -103,10 +101,13 @@ void RightCameraDelay::measure(const StereoFeatures& features, const std::vector
   pairs_.pop_front();
 }
 
-std::string RightCameraDelay::partnerWords(double dt) const {
-  constexpr double kAnother = 0.5;  // of the interval: the right image is nearer to another pair's
-  const double known = compensated(), delay = std::abs(known) > kAnother * dt ? known : partner_;
-  if (delay == 0.0) return "";
+RightCameraDelay::Partner RightCameraDelay::partner(double dt) const {
+  const double known = compensated();
+  if (2.0 * std::abs(known) > dt) return {known, CarriedDoubt::kCertain};
+  return earlier_ > later_ ? Partner{-dt, earlier_} : Partner{dt, later_};
+}
+
+std::string RightCameraDelay::Partner::words() const {
   std::ostringstream words;
   words << "the right image seemed to be that of another pair, taken " << std::round(1e3 * std::abs(delay)) << " ms "
         << (delay < 0.0 ? "earlier" : "later");

@@ -3,6 +3,7 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <limits>
 
 #include "stereo_descriptor_vo/odometry/noise.hpp"
@@ -11,21 +12,15 @@
 namespace sdvo {
 namespace {
 
-constexpr double kMemory = 0.98;  // share of the past that a pair leaves: some fifty pairs (chosen)
-constexpr double kPrior = 1e-3;   // keeps the first pairs' equations solvable, 1/px^2 at one radian
-/// The same scene points are seen again in the next pairs, so that their errors average out much more slowly than those
-/// of independent features.
-constexpr double kCorrelatedSightings = 10.0;
-
-// A turn of the camera.
-constexpr double kUsualOfRigs = 0.2;  // px: undisturbed, KITTI's and EuRoC's rigs change by less
-constexpr double kUnusual =
-    3.0;  // times the usual change (chosen). That grows where rectification left more than a rotation
-          // (Karlsruhe's rig: 0.5 px), or where the shutters are apart while the camera turns.
-
-Eigen::RowVector3d effect(const StereoCamera& camera, double u_right, double v) {
-  const double x = (u_right - camera.cx) / camera.fx, y = (v - camera.cy) / camera.fy;
+Eigen::RowVector3d effect(const StereoFeatures& features, int i) {
+  const StereoCamera& camera = features.camera;
+  const double x = (features.u[i] - features.disparity[i] - camera.cx) / camera.fx;
+  const double y = (features.v[i] - camera.cy) / camera.fy;
   return camera.fy * Eigen::RowVector3d(1.0 + y * y, -x * y, -x);
+}
+
+Eigen::Vector3d unknown() {
+  return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
 }
 
 }  // namespace
@@ -36,44 +31,57 @@ RightCameraRotation::Sums RightCameraRotation::sumUp(const StereoFeatures& featu
   Sums sums;
   for (int pass = 0; pass < kReweightings; ++pass) {
     sums = past;
-    for (int i = 0; i < features.count(); ++i) {
-      const Eigen::RowVector3d row = effect(features.camera, features.u[i] - features.disparity[i], features.v[i]);
-      const double residual = features.dv[i] - row.dot(estimate);
-      const double w = 1.0 / (1.0 + residual * residual / (RowDelay::kKernel * RowDelay::kKernel));
-      sums.information.noalias() += w * row.transpose() * row;
-      sums.gradient.noalias() += w * row.transpose() * features.dv[i];
-      sums.square += w * residual * residual;
-      sums.weight += w;
-    }
+    for (int i = 0; i < features.count(); ++i) sums.add(effect(features, i), features.dv[i], estimate);
     estimate = sums.rotation();
   }
   return sums;
 }
 
+void RightCameraRotation::addToParts(const StereoFeatures& features) {
+  const auto last = [](int size) { return std::floor(size / kPart); };
+  const double columns = last(features.camera.width), rows = last(features.camera.height);
+  parts_.resize(static_cast<std::size_t>((columns + 1.0) * (rows + 1.0)));
+  for (Sums& part : parts_) part.forget();
+  const Eigen::Vector3d estimate = rotation();
+  for (int i = 0; i < features.count(); ++i) {
+    // Clamped before it becomes an integer, which a position far outside of the image overflows.
+    const double column = std::clamp(std::floor(features.u[i] / kPart), 0.0, columns);
+    const double row = std::clamp(std::floor(features.v[i] / kPart), 0.0, rows);
+    Sums& part = parts_[static_cast<std::size_t>(row * (columns + 1.0) + column)];
+    part.add(effect(features, i), features.dv[i], estimate);
+  }
+}
+
 double RightCameraRotation::add(const StereoFeatures& features) {
   if (features.count() == 0) return 0.0;
   // A camera that turned disagrees with the memory. Back in its place it agrees again, but not with the pair before.
-  double turned = 0.0;
+  against_memory_.last = against_last_.last = 0.0;
   if (features.count() >= kFewestMeasured) {
     const Sums now = sumUp(features, {});
-    // Against the memory a knock counts in many pairs, so each of these counts little.
-    turned = std::max(against_memory_.exceededBy(distance(now, sums_), kMemory),
-                      against_last_.exceededBy(distance(now, last_), kUsualMemory));
+    against_memory_.last = distance(now, sums_);
+    against_last_.last = distance(now, last_);
     last_ = now;
   }
-  const Sums past{kMemory * sums_.information, kMemory * sums_.gradient, kMemory * sums_.square,
-                  kMemory * sums_.weight};
+  Sums past = sums_;
+  past.forget();
   sums_ = sumUp(features, past);
-  return turned;
+  addToParts(features);
+  return std::max(against_memory_.timesUsual(), against_last_.timesUsual());
 }
 
-double RightCameraRotation::UsualChange::exceededBy(double change, double memory_of_large) {
-  const double usual = std::max(kUsualOfRigs, std::sqrt(square)), limit = kUnusual * usual;
-  // A knock is one large change. What changes in many pairs is the rig's way: each counts up to the limit.
-  const double counted = std::min(change, limit);
-  const double memory = change > limit ? memory_of_large : kUsualMemory;
-  square += (1.0 - memory) * (counted * counted - square);
-  return change / usual;
+void RightCameraRotation::learn() {
+  against_memory_.learn();
+  against_last_.learn();
+}
+
+double RightCameraRotation::Change::timesUsual() const {
+  constexpr double kUsualOfRigs = 0.2;  // px: undisturbed, KITTI's and EuRoC's rigs change by less
+  return last / std::max(kUsualOfRigs, std::sqrt(square));
+}
+
+/// They are large where rectification left more than a rotation (Karlsruhe's rig: 0.5 px).
+void RightCameraRotation::Change::learn() {
+  square += (1.0 - kUsualMemory) * (last * last - square);
 }
 
 double RightCameraRotation::distance(const Sums& now, const Sums& before) {
@@ -82,19 +90,37 @@ double RightCameraRotation::distance(const Sums& now, const Sums& before) {
   return std::sqrt(change.dot(now.information * change) / now.weight);
 }
 
-Eigen::Vector3d RightCameraRotation::Sums::rotation() const {
-  return (information + kPrior * Eigen::Matrix3d::Identity()).inverse() * gradient;
+void RightCameraRotation::Sums::add(const Eigen::RowVector3d& row, double dv, const Eigen::Vector3d& estimate) {
+  const double residual = (dv - row.dot(estimate)) / RowDelay::kKernel, w = 1.0 / (1.0 + residual * residual);
+  information.noalias() += w * row.transpose() * row;
+  gradient.noalias() += w * dv * row.transpose();
+  weight += w, curvature += w * (2.0 * w - 1.0);
+}
+
+void RightCameraRotation::Sums::forget() {
+  for (double* sum : {&weight, &curvature}) *sum *= RowDelay::kMemory;
+  information *= RowDelay::kMemory, gradient *= RowDelay::kMemory;
+}
+
+Eigen::Matrix3d RightCameraRotation::Sums::covariance() const {
+  constexpr double kPrior = 1e-3;  // keeps the first pairs' equations solvable, 1/px^2 at one radian
+  return (information + kPrior * Eigen::Matrix3d::Identity()).inverse();
 }
 
 Eigen::Vector3d RightCameraRotation::rotation() const {
-  if (sums_.weight <= 0.0) return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
-  return sums_.rotation();
+  return sums_.weight > 0.0 ? sums_.rotation() : unknown();
 }
 
 Eigen::Vector3d RightCameraRotation::sigma() const {
-  if (sums_.weight <= 0.0) return Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
-  const Eigen::Matrix3d covariance = (sums_.information + kPrior * Eigen::Matrix3d::Identity()).inverse();
-  return (kCorrelatedSightings * sums_.square / sums_.weight * covariance.diagonal()).cwiseSqrt();
+  if (sums_.weight <= 0.0) return unknown();
+  const Eigen::Vector3d rotation = sums_.rotation();
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  for (const Sums& part : parts_) {
+    const Eigen::Vector3d rest = part.gradient - part.information * rotation;
+    spread.noalias() += rest * rest.transpose();
+  }
+  const Eigen::Matrix3d covariance = sums_.weight / std::max(sums_.curvature, 0.0) * sums_.covariance();
+  return (covariance * spread * covariance).diagonal().cwiseSqrt();
 }
 
 }  // namespace sdvo

@@ -23,9 +23,11 @@ Eigen::Vector2d instruments(const Eigen::Vector3d& motion) {
 }  // namespace
 
 int RowDelay::cellOf(double u, double v, int width, int height) {
-  const int column = std::clamp(static_cast<int>(u * kColumns / width), 0, kColumns - 1);
-  const int row = std::clamp(static_cast<int>(v * kRows / height), 0, kRows - 1);
-  return row * kColumns + column;
+  // Clamped before it becomes an integer, which a position far outside of the image overflows.
+  const auto part = [](double position, int size, int count) {
+    return static_cast<int>(std::clamp(position * count / size, 0.0, count - 1.0));
+  };
+  return part(v, height, kRows) * kColumns + part(u, width, kColumns);
 }
 
 double RowDelay::Estimate::proved(double expected) const {

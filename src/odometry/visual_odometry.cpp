@@ -163,6 +163,7 @@ MotionScene VisualOdometry::sceneOf(const StereoFeatures& features, double dt,
                     {},
                     {},
                     state_.rig.usual_agreement,
+                    state_.doubt.lasts(),
                     state_.doubt.logOdds() > largestDoubt(),
                     options_.tracking.doubtful_deviation,
                     state_.rig.noise};
@@ -205,8 +206,8 @@ void VisualOdometry::watchShutters(const Pair& pair, const MotionHypothesis& fou
   rig.right_delay.measure(taken, rowMotions(taken, found, since), pair.dt, velocity);
   state_.doubt.raise(CarriedDoubt::kUnsuspected + state_.prior.logRatioOfSwap(T_reference_current, since),
                      "neighbouring pairs seemed to have changed places");
-  const std::string cause = rig.right_delay.partnerWords(pair.dt);
-  if (!cause.empty()) state_.doubt.raise(CarriedDoubt::kCertain, cause);
+  const RightCameraDelay::Partner partner = rig.right_delay.partner(pair.dt);
+  state_.doubt.raise(partner.log_odds, partner.words());
 }
 
 /// Log-odds of being misled above which a motion is doubtful.
@@ -338,6 +339,8 @@ void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& fou
                            const MotionDoubt& doubt, Step& step) {
   std::ostringstream reason;
   Matrix6d covariance = candidate.adjustment.since_keyframe;
+  const auto add = [&](const Matrix6d& moment) { step.covariance += moment, state_.covariance.doubt(moment); };
+  add(found.rivals_moment);
   if (found.innovation > noiseGate(6)) {
     // The stamps may be wrong, or the camera did what none does; points cannot tell.
     const Vector6d innovation = scene.prior.front().innovation(found.motion.T_current_reference.inverse());
@@ -346,8 +349,7 @@ void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& fou
     reason << innovationWords(found);
   }
   if (doubt.probability < options_.tracking.probability) {
-    step.covariance += doubt.moment;
-    state_.covariance.doubt(doubt.moment);
+    add(doubt.moment);
     reason.str("");
     reason << doubt.reason;
   } else {

@@ -223,8 +223,7 @@ class Solver {
   /// Sum over parts of the image in which the points were seen first.
   double squareOfGradients(const ReducedSystem& system, const Estimate& estimate,
                            const Eigen::Matrix<double, 6, Eigen::Dynamic>& by) {
-    constexpr double kPart = 24.0;  // px (chosen): patches and rectification err alike within it
-    constexpr int kParts = 64;      // in a row at most
+    constexpr int kParts = 64;  // in a row at most
     parts_.assign(kParts * kParts, Vector6d::Zero());
     const double scale = window_->camera.fx / kPart;
     const auto part = [&](double ray) { return std::clamp(static_cast<int>(ray * scale + kParts / 2), 0, kParts - 1); };

@@ -21,6 +21,17 @@ TEST(CarriedDoubt, FadesByHalves) {
   EXPECT_LE(doubt.logOdds(), CarriedDoubt::kCertain);
 }
 
+TEST(CarriedDoubt, LastsUntilItSaysNothing) {
+  CarriedDoubt doubt;
+  EXPECT_FALSE(doubt.lasts());
+  doubt.raise(logOdds(0.05), "a knock");
+  EXPECT_TRUE(doubt.lasts());
+  int pairs = 0;
+  for (; doubt.lasts(); ++pairs) doubt.pass();
+  EXPECT_NEAR(probabilityOf(doubt.logOdds()), 0.0015, 0.0005);
+  EXPECT_GT(pairs, 4) << "longer than it makes a motion doubtful";
+}
+
 TEST(MotionDoubt, WhereNothingIsExpectedTheMotionIsAsUncertainAsItIsLong) {
   const LocalMap map({});
   const StereoFeatures features;

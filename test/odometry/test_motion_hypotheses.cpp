@@ -59,6 +59,25 @@ class Competition : public ::testing::Test {
   MotionScene scene_{map_, {}, features_, {}, {}, {}};
 };
 
+TEST(BayesFactor, IsTheRatioOfTheTwoDensities) {
+  // Of independent numbers: N(x; 0, s + p) / N(x; 0, s).
+  Vector6d measured, information, covariance;
+  measured << 0.1, 0.0, -0.2, 0.3, 0.0, 0.01;
+  information << 1e2, 1e4, 1e3, 50.0, 1e5, 1e6;
+  covariance << 0.01, 0.04, 1e-3, 0.0, 2e-3, 0.5;
+  double expected = 0.0;
+  for (int i = 0; i < 6; ++i) {
+    const double noise = 1.0 / information[i], both = noise + covariance[i], square = measured[i] * measured[i];
+    expected += 0.5 * (square / noise - square / both + std::log(noise / both));
+  }
+  EXPECT_NEAR(logBayesFactor(measured, information.asDiagonal(), covariance.asDiagonal()), expected, 1e-9);
+  // The same in other axes.
+  const Matrix6d axes = adjoint(Eigen::Isometry3d(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1.0, 2.0, 3.0).normalized())));
+  const Matrix6d P = axes * covariance.asDiagonal() * axes.transpose();
+  const Matrix6d H = axes * information.asDiagonal() * axes.transpose();
+  EXPECT_NEAR(logBayesFactor(axes * measured, H, P), expected, 1e-6);
+}
+
 TEST_F(Competition, WithoutARivalTheMotionIsCertain) {
   add(100, 0.0, 4);
   const MotionHypothesis found = choose({0.0, 0.001});

@@ -65,6 +65,15 @@ TEST(Noise, WhatItsPatchDoesNotConfirmIsAnywhereWithinTheGate) {
   EXPECT_NEAR(NoiseOptions().unconfirmed(), std::sqrt(square / within), 0.01);
 }
 
+TEST(Noise, WhatPointsErrAlikeIsLearntAndAtLeastWhatTheyErrByThemselves) {
+  Noise noise{NoiseOptions()};
+  EXPECT_GT(noise.shared(), 1.0) << "of a rig that nothing is known of";
+  for (int pair = 0; pair < 200; ++pair) noise.learnShared(60.0);
+  EXPECT_NEAR(noise.shared(), 10.0, 1e-6) << "chi-square of six is six on average";
+  for (int pair = 0; pair < 200; ++pair) noise.learnShared(0.0);
+  EXPECT_EQ(noise.shared(), 1.0);
+}
+
 TEST(Noise, MotionsAreOneWithinTheNoiseOfACorner) {
   std::mt19937 random(1);
   std::normal_distribution<double> normal;

@@ -113,8 +113,26 @@ TEST(RightCameraDelay, KnowsThePartnerOfAnotherPair) {
     const Vector6d velocity = velocityAt(1.0);
     const StereoFeatures features = seen(velocity, delay, 0.15);
     right_delay.measure(features, rowsOf(features, velocity), kPeriod, velocity);
-    EXPECT_EQ(right_delay.partner(), std::abs(delay) == kPeriod ? delay : 0.0);
+    const bool is_another = std::abs(delay) == kPeriod;
+    EXPECT_EQ(right_delay.partner(kPeriod).log_odds > 0.0, is_another) << delay;
+    if (is_another) {
+      EXPECT_EQ(right_delay.partner(kPeriod).delay, delay);
+    }
   }
+}
+
+TEST(RightCameraDelay, KnowsThePartnerUntilRowsInStepSayOtherwise) {
+  RightCameraDelay right_delay;
+  const Vector6d velocity = velocityAt(1.0);
+  const auto measure = [&](const StereoFeatures& features, const Vector6d& moved) {
+    right_delay.measure(features, rowsOf(features, moved), kPeriod, moved);
+    return right_delay.partner(kPeriod).log_odds;
+  };
+  const StereoFeatures late = seen(velocity, kPeriod, 0.15);
+  EXPECT_GT(measure(late, velocity), 0.0);
+  EXPECT_GT(measure(seen(Vector6d::Zero(), kPeriod, 0.15), Vector6d::Zero()), 0.0) << "a camera that stands";
+  EXPECT_GT(measure(seen(velocity, 0.0, 0.5), 0.1 * velocityAt(2.0)), -2.9) << "rows that neither explains";
+  EXPECT_LT(measure(seen(velocity, 0.0, 0.15), velocity), 0.0);
 }
 
 }  // namespace test_right_camera_delay

@@ -3,6 +3,8 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <random>
+#include <vector>
 
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
@@ -57,13 +59,21 @@ TEST(RightCameraRotation, AWrongMatchDoesNotMatter) {
   EXPECT_LT((filter.rotation() - truth).norm(), 3e-5);
 }
 
+/// What the odometry makes of a pair: one that contradicts the rig is doubted, others are confirmed.
+double confirmOrDoubt(RightCameraRotation& filter, const StereoFeatures& features) {
+  constexpr double kDoubtful = 2.8;  // times the usual change: e^(2.8^2 / 2 - 6.9) is 0.05
+  const double turned = filter.add(features);
+  if (turned < kDoubtful) filter.learn();
+  return turned;
+}
+
 TEST(RightCameraRotation, FollowsARigThatChangesAndForgetsSlowly) {
   const Eigen::Vector3d before(1e-3, 0.0, 0.0), after(-1e-3, 0.0, 0.0);
   RightCameraRotation filter;
   for (int k = 0; k < 100; ++k) filter.add(gridSeenWith(before));
   filter.add(gridSeenWith(after));
   EXPECT_LT((filter.rotation() - before).norm(), 0.2e-3) << "one pair counts as one of fifty";
-  for (int k = 0; k < 300; ++k) filter.add(gridSeenWith(after));
+  for (int k = 0; k < 1000; ++k) filter.add(gridSeenWith(after));
   EXPECT_LT((filter.rotation() - after).norm(), 0.05e-3);
 }
 
@@ -87,13 +97,12 @@ TEST(RightCameraRotation, ChangeIsWhatTheRowsOfAPairSayAgainstThoseBefore) {
   EXPECT_LT((filter.rotation() - before).norm(), 5e-6);
 }
 
-TEST(RightCameraRotation, ATurnIsSaidOfARigThatWasSteady) {
+TEST(RightCameraRotation, ATurnIsSaidOfARigThatWasSteadyForAsLongAsItLasts) {
   const Eigen::Vector3d turn(0.0, 0.0, 9e-3);
   RightCameraRotation filter;
-  for (int k = 0; k < 20; ++k) EXPECT_LT(filter.add(gridSeenWith(Eigen::Vector3d::Zero())), 3.0);
+  for (int k = 0; k < 20; ++k) EXPECT_LT(confirmOrDoubt(filter, gridSeenWith(Eigen::Vector3d::Zero())), 2.8);
   EXPECT_GT(changeOf(filter, gridSeenWith(turn)), 0.6);
-  for (int k = 0; k < 5; ++k)
-    EXPECT_GT(filter.add(gridSeenWith(turn)), 3.0) << "a turn does not become usual by lasting";
+  for (int k = 0; k < 50; ++k) EXPECT_GT(confirmOrDoubt(filter, gridSeenWith(turn)), 2.8) << "pair " << k;
 }
 
 // The memory holds a part of both places then, and is near enough to either.
@@ -124,52 +133,36 @@ TEST(RightCameraRotation, ARigWhoseRowsAlwaysDisagreeIsNotSaidToTurn) {
   for (int k = 0; k < 100; ++k) {
     const StereoFeatures features = gridSeenWith(Eigen::Vector3d(0.0, 0.0, 6e-3 * std::sin(0.1 * k)));
     largest = std::max(largest, changeOf(steady, features));
-    EXPECT_LT(filter.add(features), 3.0) << "pair " << k;
+    EXPECT_LT(confirmOrDoubt(filter, features), 2.8) << "pair " << k;
   }
   EXPECT_GT(largest, 0.6) << "more than a steady rig may show";
-  EXPECT_GT(filter.add(gridSeenWith(Eigen::Vector3d(0.0, 0.0, 60e-3))), 3.0);
+  EXPECT_GT(filter.add(gridSeenWith(Eigen::Vector3d(0.0, 0.0, 60e-3))), 2.8);
 }
 
-TEST(RightCameraRotation, SigmaIsThatOfLeastSquaresForCorrelatedSightings) {
-  // Every feature twice, off by the same amount to either side: the residuals are known and do not move the result.
-  constexpr double kError = 0.2;  // px
-  StereoFeatures features = gridSeenWith(Eigen::Vector3d::Zero());
-  const int count = features.count();
-  for (int i = 0; i < count; ++i) {
-    features.dv[i] = kError;
-    features.append({features.u[i], features.v[i], features.disparity[i], -kError, 10.f, -1.f, 1.f});
+/// Mean square of the rotation's error in standard deviations, 3 where sigma is right, of rigs whose rows err by 0.2
+/// px, in each pair anew or always alike at the same place.
+double meanSquareInSigmas(bool is_alike) {
+  constexpr int kRigs = 60, kPairs = 20;
+  std::mt19937 random(1);
+  std::normal_distribution<float> normal(0.f, 0.2f);
+  const StereoFeatures exact = gridSeenWith(Eigen::Vector3d::Zero());
+  double sum = 0.0;
+  for (int rig = 0; rig < kRigs; ++rig) {
+    RightCameraRotation filter;
+    StereoFeatures features = exact;
+    for (int pair = 0; pair < kPairs; ++pair) {
+      for (float& dv : features.dv)
+        if (pair == 0 || !is_alike) dv = normal(random);
+      filter.add(features);
+    }
+    sum += filter.rotation().cwiseQuotient(filter.sigma()).squaredNorm() / kRigs;
   }
-  RightCameraRotation filter;
-  filter.add(features);
-  EXPECT_LT(filter.rotation().norm(), 1e-9);
-
-  const StereoCamera& camera = features.camera;
-  const double weight = 1.0 / (1.0 + kError * kError / (0.5 * 0.5));
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-  for (int i = 0; i < features.count(); ++i) {
-    const double x = (features.u[i] - features.disparity[i] - camera.cx) / camera.fx;
-    const double y = (features.v[i] - camera.cy) / camera.fy;
-    const Eigen::Vector3d effect = camera.fy * Eigen::Vector3d(1.0 + y * y, -x * y, -x);
-    information += weight * effect * effect.transpose();
-  }
-  // Ten sightings in a row are worth one.
-  const Eigen::Vector3d expected =
-      std::sqrt(10.0) * kError * Eigen::Vector3d(information.inverse().diagonal().cwiseSqrt());
-  EXPECT_LT((filter.sigma() - expected).norm(), 1e-3 * expected.norm())
-      << filter.sigma().transpose() << " for " << expected.transpose();
+  return sum;
 }
 
-TEST(RightCameraRotation, ShuttersThatAreApartWhileTheCameraTurnsAreTheRigsWay) {
-  // A millisecond apart at 1 rad/s up and down: 1e-3 rad, 0.7 px at f = 700 px, in every pair.
-  RightCameraRotation filter;
-  int turned = 0, turned_late = 0;
-  for (int i = 0; i < 60; ++i) {
-    const bool said = filter.add(gridSeenWith({i % 8 < 4 ? 1e-3 : -1e-3, 0.0, 0.0})) > 3.0;
-    turned += said, turned_late += said && i >= 30;  // 3 s
-  }
-  EXPECT_GT(turned, 0);
-  EXPECT_EQ(turned_late, 0);
-  EXPECT_GT(filter.add(gridSeenWith({0.0, 0.0, 20e-3})), 3.0) << "a knock is still found";
+TEST(RightCameraRotation, SigmaIsThatOfTheErrorsHoweverAlikeTheyAre) {
+  EXPECT_NEAR(meanSquareInSigmas(false), 3.0, 1.2);
+  EXPECT_NEAR(meanSquareInSigmas(true), 3.0, 1.2);
 }
 
 }  // namespace test_right_camera_rotation

@@ -21,7 +21,7 @@ struct LearntRig {
 
   LearntRig(const CalibrationOptions& options, const Noise& assumed);
 
-  /// Takes in what agreement and what noise a confirmed motion has.
+  /// Takes in what agreement and what noise a confirmed motion has, and how its rig changed.
   void learn(const MotionHypothesis& confirmed);
 
   void report(OdometryResult& result) const;

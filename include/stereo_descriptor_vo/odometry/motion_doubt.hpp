@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <string>
 
 #include "stereo_descriptor_vo/common/se3.hpp"
@@ -11,6 +12,8 @@ namespace sdvo {
 class CarriedDoubt {
  public:
   double logOdds() const { return log_odds_; }
+  /// Whether it is still twice as likely as without a cause.
+  bool lasts() const { return log_odds_ > kUnsuspected + std::log(2.0); }
   /// In words, of the largest doubt that lasts.
   const std::string& cause() const { return cause_; }
 
@@ -31,10 +34,11 @@ class CarriedDoubt {
 
 /// Whether a motion is the camera's: it may be a rival's, the pair itself may mislead, or a pair before did.
 struct MotionDoubt {
-  double probability = 1.0;            ///< that it is
-  double log_odds = 0.0;               ///< that it is not, by the pair alone
-  Matrix6d moment = Matrix6d::Zero();  ///< of the alternatives around the motion, by their probabilities, m and rad
-  std::string reason, cause;           ///< in words, of the likeliest alternative, for this pair and for the next
+  double probability = 1.0;  ///< that it is
+  double log_odds = 0.0;     ///< that it is not, by the pair alone
+  Matrix6d moment =
+      Matrix6d::Zero();       ///< of what is expected around the motion, by the probability that it misleads, m and rad
+  std::string reason, cause;  ///< in words, of the likeliest alternative, for this pair and for the next
 
   MotionDoubt(const MotionScene& scene, const MotionHypothesis& found, const CarriedDoubt& before);
 };

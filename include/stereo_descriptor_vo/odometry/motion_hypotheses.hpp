@@ -35,7 +35,8 @@ struct MotionScene {
   std::optional<Eigen::Isometry3d> guess;                ///< the same as something else than images has it
   std::vector<ExpectedMotion> prior;  ///< of T_reference_current: a mixture; without any, all motions are as likely
   double usual_agreement = 0.9;       ///< ratio of lasting matches that agree with the camera's motion on this rig
-  bool is_doubted = false;            ///< what is followed was likely not the camera's motion a moment ago
+  bool is_suspected = false;          ///< what is followed may not be the camera's motion by the pairs before
+  bool is_doubted = false;            ///< … and likely is not
   double tolerance = 0.05;            ///< m: motions that differ by less than this and 3 % are equally good
   Noise noise{NoiseOptions()};
 };
@@ -61,6 +62,9 @@ struct MotionHypothesis {
   };
   std::optional<Rival> rival;
   Matrix6d rivals_moment = Matrix6d::Zero();  ///< second moment of the rivals around the motion, m and rad
+  /// Square, in standard deviations of points that err independently, between the motion of the lasting inliers and
+  /// that of all, if it is taken for noise.
+  std::optional<double> lasting_square;
 
   /// Of a match: confirmed sightings of its point, four at most.
   int sightingsOf(int match) const;
@@ -79,6 +83,13 @@ struct MotionHypothesis {
 
 /// Ratio of a motion by which it may be off.
 constexpr double kTolerableRatio = 0.03;
+
+/// Whether a motion would do as well as another one that is so far `apart`.
+bool isTolerable(const MotionScene& scene, const Eigen::Isometry3d& motion, const Eigen::Isometry3d& apart);
+
+/// Logarithm of the Bayes factor (Kass and Raftery 1995) between a difference that has this covariance and none at all,
+/// by a measurement of it with that information.
+double logBayesFactor(const Vector6d& measured, const Matrix6d& information, const Matrix6d& covariance);
 
 /// Logarithm of the number of false alarms (a contrario, Moisan and Stival 2004): the expected number of motions with
 /// as many inliers, if each match agrees by `chance`.

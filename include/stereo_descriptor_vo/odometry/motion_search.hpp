@@ -55,8 +55,8 @@ class MotionSearch {
                             const Eigen::Isometry3d& T_current_reference) const;
   void weigh(const MotionScene& scene, MotionHypothesis& found) const;
   Alignment align(const MotionScene& scene, const MotionHypothesis& found) const;
-  std::optional<Eigen::Isometry3d> motionOfLasting(const MotionScene& scene, const MotionHypothesis& found,
-                                                   const Alignment& aligned) const;
+  std::optional<Eigen::Isometry3d> motionOfLasting(const MotionScene& scene, const Alignment& aligned,
+                                                   MotionHypothesis& found) const;
   void keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_lasting, const std::vector<Correspondence>& measured,
               MotionHypothesis& found) const;
 

@@ -17,6 +17,9 @@ constexpr int kFewestMeasured = 20;
 /// Of what is usual: ratio of the past that a pair leaves, which are some ten pairs (chosen).
 constexpr double kUsualMemory = 0.9;
 
+/// px (chosen): patches and rectification err alike within such a part of the image.
+constexpr double kPart = 24.0;
+
 /// Square, in standard deviations, that so many normally distributed numbers exceed with that probability (chi-square).
 constexpr double noiseGate(int numbers) {
   constexpr double gates[] = {15.14, 18.42, 21.11, 23.51, 25.74, 27.86};
@@ -54,9 +57,6 @@ struct NoiseOptions {
 
   /// Of a corner whose patch is not the point's: it lies anywhere in a disc with u_left and u_right within the gate.
   double unconfirmed() const { return inlierGate() / std::sqrt(8.0); }
-
-  /// Two positions by their patches that are further apart are not of one point.
-  double elsewhere() const { return std::sqrt(2.0 * noiseGate(2)) * reference; }
 };
 
 /// The errors of measurements of a rig, and the differences of motions that follow from them.
@@ -78,19 +78,21 @@ class Noise {
   /// px: motions that are closer at most points are one.
   double sameMotion() const { return scale_ * options_.length(); }
 
-  double elsewhere() const { return options_.elsewhere(); }
+  /// px: two aligned positions that are further apart are not of one point.
+  double elsewhere() const { return std::sqrt(2.0 * noiseGate(2)) * options_.reference; }
 
-  /// Chi-square of six, by the sum over so many points, beyond which two motions are not one. Neighbours share a part
-  /// of their errors, which does not average out.
-  double otherMotion(std::size_t points) const {
-    constexpr double kOther = 250.0;     // measured: up to 205 where nothing moved
-    constexpr double kOtherOfOne = 1.5;  // the same for each point; 1.7 and more with faults
-    return std::max(kOther, kOtherOfOne * static_cast<double>(points));
-  }
+  /// Takes in the square, in standard deviations (chi-square of six), by which the motions of two parts of a confirmed
+  /// motion's inliers differ.
+  void learnShared(double square) { shared_ += (1.0 - kUsualMemory) * (square / 6.0 - shared_); }
+
+  /// How many times larger than by points that err independently the variance of a motion by many of them is:
+  /// neighbours share a part of their errors, which does not average out.
+  double shared() const { return std::max(shared_, 1.0); }
 
  private:
   NoiseOptions options_;
   double scale_ = 1.0;
+  double shared_ = 4.0;  // measured on a dozen rigs: 1 to 19
 };
 
 }  // namespace sdvo

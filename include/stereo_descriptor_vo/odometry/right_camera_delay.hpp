@@ -8,6 +8,7 @@
 
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/odometry/motion_doubt.hpp"
 #include "stereo_descriptor_vo/odometry/row_delay.hpp"
 
 namespace sdvo {
@@ -35,10 +36,14 @@ class RightCameraDelay {
   /// s: the prior, and as much of the estimate's distance from it as chance does not explain.
   double compensated() const;
 
-  /// The delay of the last pair, s, if its right image is that of a neighbouring pair; else zero.
-  double partner() const { return partner_; }
-  /// In words, if the right image is nearer to another pair of a stream with one every `dt` s.
-  std::string partnerWords(double dt) const;
+  /// Right images that are those of other pairs.
+  struct Partner {
+    double delay;     ///< s
+    double log_odds;  ///< that it is so
+    std::string words() const;
+  };
+  /// The likeliest one of a stream with a pair every `dt` s.
+  Partner partner(double dt) const;
 
   /// Standard deviation of the position, m, from turns whose features were not compensated as they would be now, and
   /// from the error of what is known. A rig in step has none.
@@ -59,7 +64,8 @@ class RightCameraDelay {
   double prior_;
   RowDelay rows_;
   std::deque<Pair> pairs_;  ///< the last ones
-  double partner_ = 0.0;
+  /// Log-odds of a right image that is the pair's before or after.
+  double earlier_ = CarriedDoubt::kUnsuspected, later_ = CarriedDoubt::kUnsuspected;
   /// m/s: distance times relative error of the depth for each second of delay. m: the same as it was compensated.
   double exposed_ = 0.0, compensated_ = 0.0;
 };

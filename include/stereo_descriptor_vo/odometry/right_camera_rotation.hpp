@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 
@@ -18,19 +19,25 @@ class RightCameraRotation {
   /// before it: usual on rigs, and on this one.
   double add(const StereoFeatures& features);
 
+  /// The last pair's motion is confirmed, so that its change is this rig's way.
+  void learn();
+
   /// rad; NaN before the first pair with features.
   Eigen::Vector3d rotation() const;
-  /// Standard deviation, rad; NaN as above.
+  /// Standard deviation, rad; NaN as above. Errors within a part of the image are alike, in all pairs.
   Eigen::Vector3d sigma() const;
 
  private:
+  /// In units of the residuals, 1/px^2.
   struct Sums {
-    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();  ///< in units of the residuals, 1/px^2
+    Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
     Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-    double square = 0.0;  ///< weighted sum of squared residuals, px^2
-    double weight = 0.0;
+    double weight = 0.0, curvature = 0.0;  ///< derivatives of the residuals' costs: first by residual, second
 
-    Eigen::Vector3d rotation() const;
+    void add(const Eigen::RowVector3d& row, double dv, const Eigen::Vector3d& estimate);
+    void forget();
+    Eigen::Matrix3d covariance() const;  ///< if the errors were independent, of 1 px
+    Eigen::Vector3d rotation() const { return covariance() * gradient; }
   };
   /// Those of the past and of one pair, whose wrong matches have no weight.
   Sums sumUp(const StereoFeatures& features, const Sums& past) const;
@@ -38,17 +45,20 @@ class RightCameraRotation {
   /// Difference of two rotations as a shift of the rows of `now`, px, root mean square.
   static double distance(const Sums& now, const Sums& before);
 
-  /// Learns how large a rig's changes are as a rule.
-  struct UsualChange {
-    double square = 0.0;  ///< of the changes of the last pairs, px^2
+  /// How large a rig's changes are as a rule.
+  struct Change {
+    double last = 0.0;    ///< px
+    double square = 0.0;  ///< of those of confirmed pairs, px^2
 
-    /// Takes in a change (px) and returns how many times the usual one it is. `memory_of_large`: ratio of the square
-    /// that a large change leaves.
-    double exceededBy(double change, double memory_of_large);
+    double timesUsual() const;
+    void learn();
   };
 
-  Sums sums_, last_;  ///< of all pairs, and of the last one alone
-  UsualChange against_memory_, against_last_;
+  void addToParts(const StereoFeatures& features);
+
+  Sums sums_, last_;         ///< of all pairs, and of the last one alone
+  std::vector<Sums> parts_;  ///< of the image, of all pairs
+  Change against_memory_, against_last_;
 };
 
 }  // namespace sdvo

@@ -15,11 +15,11 @@ namespace sdvo {
 /// right camera that sits lower shifts rows by a ratio of the disparity. Neither counts as a delay.
 class RowDelay {
  public:
-  static constexpr int kColumns = 6, kRows = 4;  ///< parts of the image
-  static constexpr double kSignificant = 4.0;    ///< standard deviations beyond which a delay is proved (chosen)
-  static constexpr double kMemory = 0.995;       ///< ratio of the past that a pair leaves: some 200 pairs (chosen)
-  static constexpr double kKernel = 0.5;         ///< px (chosen): errors of healthy rows are smaller
-  static constexpr double kUseful = 0.005;       ///< s (chosen); an estimate with a larger sigma is not used
+  static constexpr int kColumns = 6, kRows = 4, kParts = kColumns * kRows;  ///< of the image
+  static constexpr double kSignificant = 4.0;  ///< standard deviations beyond which a delay is proved (chosen)
+  static constexpr double kMemory = 0.995;     ///< ratio of the past that a pair leaves: some 200 pairs (chosen)
+  static constexpr double kKernel = 0.5;       ///< px (chosen): errors of healthy rows are smaller
+  static constexpr double kUseful = 0.005;     ///< s (chosen); an estimate with a larger sigma is not used
   /// s. 2 ms is 2 cm at 10 m/s, and 0.4 px at 100 deg/s and f = 120 px. Of rigs in step (twelve drives) at most 0.2 ms
   /// are proved. 10 ms is 3.7 px at 100 deg/s and f = 212 px: beyond 3 m a rig of 5 cm then has negative disparities.
   static constexpr double kWarn = 0.002, kFail = 0.01;
@@ -64,7 +64,7 @@ class RowDelay {
     Eigen::Vector3d meanMotion() const { return motion / weight; }
     double meanDv() const { return dv / weight; }
   };
-  using Cells = std::array<Sums, static_cast<std::size_t>(kColumns) * kRows>;
+  using Cells = std::array<Sums, kParts>;
 
   /// The normal equations of what differs from each part's mean: velocity's factor is the delay. Its instrument is the
   /// part that rotations give: of a translation, rows move as the depth has it, and so do errors of the rectification.
