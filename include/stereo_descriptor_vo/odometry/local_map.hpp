@@ -34,7 +34,8 @@ struct LocalMapOptions {
     list.add("keyframes", keyframes, {2, 50}, "",
              "newest key frames, which the map holds whatever they see; as many older ones at most, because they share "
              "points with the newest pair");
-    list.add("lasting_points", lasting_points, {1, 10000}, "", "points that such an older key frame must share at least");
+    list.add("lasting_points", lasting_points, {1, 10000}, "",
+             "points that such an older key frame must share at least");
     list.add("remembered_keyframes", remembered_keyframes, {0, 1000}, "",
              "key frames that are remembered beyond that, by where they were taken, for a camera that comes back");
     list.add("remembered", remembered, {1, 100}, "",

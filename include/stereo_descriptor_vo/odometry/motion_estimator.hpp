@@ -21,9 +21,7 @@ struct MotionEstimatorOptions : SampleConsensusOptions, MotionRefinementOptions 
   }
 
   /// For measurements with this noise.
-  void assume(const NoiseOptions& noise) {
-    inlier_threshold = noise.inlierGate(), kernel_scale = noise.length();
-  }
+  void assume(const NoiseOptions& noise) { inlier_threshold = noise.inlierGate(), kernel_scale = noise.length(); }
 
   /// For measurements that err by so many times more.
   MotionEstimatorOptions scaled(double noise) const {

@@ -17,9 +17,9 @@ Matrix6d positivePart(const Matrix6d& matrix);
 /// Covariance of a pose that is reported pair by pair while the map behind it improves. All covariances are of right
 /// perturbations, T * exp(xi), translation before rotation, in m and rad.
 ///
-/// The pose's covariance is that of the last key frame plus what it errs by more in the map. So it grows from key frame to
-/// key frame, but not while the map stays the same. The traces of its translation and its rotation shrink only when a
-/// pose is measured after a predicted one.
+/// The pose's covariance is that of the last key frame plus what it errs by more in the map. So it grows from key frame
+/// to key frame, but not while the map stays the same. The traces of its translation and its rotation shrink only when
+/// a pose is measured after a predicted one.
 class PoseCovariance {
  public:
   /// Of the last pose; zero in the beginning.
