@@ -143,12 +143,15 @@ VisualOdometry::Pair VisualOdometry::usable(const StereoFeatures& given,
 /// A camera that repeats its images seems to stand. The guess, or the motion before, shows whether it does.
 bool VisualOdometry::isFrozen(const StereoFeatures& features, double dt,
                               const std::optional<MotionGuess>& guess) const {
-  if (guess && !guess->rotation_only) return state_.images.areFrozen(features, guess->T_previous_current, true);
+  const auto areFrozen = [&](const std::optional<Eigen::Isometry3d>& T_previous_current, bool is_measured) {
+    return state_.images.areFrozen(features, state_.rig.noise.sameMotion(), T_previous_current, is_measured);
+  };
+  if (guess && !guess->rotation_only) return areFrozen(guess->T_previous_current, true);
   Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
   if (guess) turn.linear() = guess->T_previous_current.linear();
   std::optional<Eigen::Isometry3d> predicted;
   if (state_.prior.velocity()) predicted = state_.prior.predicted(dt).motion;
-  return state_.images.areFrozen(features, turn, true) || state_.images.areFrozen(features, predicted, false);
+  return areFrozen(turn, true) || areFrozen(predicted, false);
 }
 
 /// The map, the pair, and the motion between them as it is expected: what was already covered by predicted pairs, and
