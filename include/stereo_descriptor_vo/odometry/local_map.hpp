@@ -131,7 +131,7 @@ class LocalMap {
   /// Bundle adjustment over all frames; sightings that do not agree with it are cut off from their points.
   struct Adjustment {
     bool success = false;
-    Matrix6d since_keyframe = Matrix6d::Zero();  ///< covariance of the newest pose since the key frame before it
+    Matrix6d since_keyframe = Matrix6d::Zero();  ///< covariance of the newest pose since the key frame before it.
     /// What the newest pose in the map errs by more than that key frame: errors of the map are in both.
     Matrix6d growth = Matrix6d::Zero();
     RigCalibration::Matrix calibration_information = RigCalibration::Matrix::Zero();
