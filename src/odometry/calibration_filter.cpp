@@ -8,6 +8,11 @@
 #include "stereo_descriptor_vo/odometry/noise.hpp"
 
 namespace sdvo {
+namespace {
+
+constexpr int kRememberedCommons = 200;  // windows (chosen) over which the mean of what is left at a point is taken
+
+}  // namespace
 
 CalibrationFilter::CalibrationFilter(const CalibrationOptions& options) : options_(checked(options)) {
   calibration_.value << options_.prior_offset, options_.prior_bend;
@@ -59,7 +64,7 @@ RigCalibration::Vector CalibrationFilter::significantSpread() const {
 }
 
 void CalibrationFilter::noteCommon(double square) {
-  commons_ = std::min(commons_ + 1, kFewestMeasured);
+  commons_ = std::min(commons_ + 1, kRememberedCommons);
   common_square_ += (square - common_square_) / commons_;
 }
 
