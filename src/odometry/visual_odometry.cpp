@@ -36,20 +36,20 @@ std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHy
 }  // namespace
 
 VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
-    : options_(checked(options)),
+    : options_(checked(options).withOneNoise()),
       T_base_camera_(lookingAhead()),
-      search_(options.matcher, options.motion, options.alignment),
-      reacquisition_(options.matcher, options.motion),
-      revisit_(options.matcher, options.motion, options.alignment),
-      optimizer_(options.window),
-      state_(options, 0) {}
+      search_(options_.matcher, options_.motion, options_.alignment),
+      reacquisition_(options_.matcher, options_.motion),
+      revisit_(options_.matcher, options_.motion, options_.alignment),
+      optimizer_(options_.window),
+      state_(options_, 0) {}
 
 void VisualOdometry::configure(const VisualOdometryOptions& options) {
-  options_ = checked(options);
-  search_ = MotionSearch(options.matcher, options.motion, options.alignment);
-  reacquisition_ = Reacquisition(options.matcher, options.motion);
-  revisit_ = Revisit(options.matcher, options.motion, options.alignment);
-  optimizer_ = WindowOptimizer(options.window);
+  options_ = checked(options).withOneNoise();
+  search_ = MotionSearch(options_.matcher, options_.motion, options_.alignment);
+  reacquisition_ = Reacquisition(options_.matcher, options_.motion);
+  revisit_ = Revisit(options_.matcher, options_.motion, options_.alignment);
+  optimizer_ = WindowOptimizer(options_.window);
   state_.prior.configure(options.tracking);
 }
 
@@ -390,7 +390,8 @@ VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, cons
     state_.covariance.advance(*step.T_previous_current, step.covariance);
     return step;
   }
-  step.covariance = state_.covariance.measure(*step.T_previous_current, candidate.adjustment.since_keyframe);
+  step.covariance = state_.covariance.measure(*step.T_previous_current, candidate.adjustment.since_keyframe,
+                                              candidate.adjustment.growth);
   // The motion between two reported poses contains what the map has learnt of the first one meanwhile: a perturbation
   // of the key frame before, then of the newest pair.
   step.correction = adjoint(map.newestPose() * map.poseBeforeNewest().inverse()) *
