@@ -99,7 +99,6 @@ void runConsensus(const ConsensusExperiment& experiment, const std::string& outp
           options.consensus = method.consensus;
           options.genetic.learning = method.learning;
           options.max_iterations = budget;
-          options.min_iterations = std::min(options.min_iterations, budget);
           options.seed = seed;
           const PoseProblem pose_problem(camera, problem.correspondences, options.inlier_threshold);
           if (seed == 1) findConsensus(pose_problem, options, options);  // warms the caches up

@@ -328,11 +328,15 @@ STANDING_FAULTS = {
 
 # These make a drive longer, so they come once.
 LENGTHENING_FAULTS = ("black_100", "standing_black_100")
+# These have no end.
+LASTING_FAULTS = ("right_one_pair_late",)
 
 
 def faulty_pairs(name, seed, drive):
     fault = STANDING_FAULTS.get(name) or FAULTS[name]
     random = numpy.random.default_rng(seed)
+    if name in LASTING_FAULTS:
+        return fault(pairs_of(drive), drive, random)
     return [pair for part in parts(pairs_of(drive)) for pair in (fault(part, drive, random) if is_hit(part) else part)]
 
 

@@ -13,7 +13,7 @@ import tempfile
 import numpy
 
 from . import drives, marks, odometry, poses, programs
-from .fault_list import (AFTER, EVERY, FAULTS, FIRST, LAST, LENGTHENING_FAULTS, PERIOD, RENDERED, STANDING_FAULTS,
+from .fault_list import (AFTER, EVERY, FAULTS, FIRST, LAST, LASTING_FAULTS, LENGTHENING_FAULTS, PERIOD, RENDERED, STANDING_FAULTS,
                          faulty_pairs, is_hit, parts, write_sequence)
 
 SIGMAS = 5.0  # standard deviations that no error may exceed
@@ -81,7 +81,7 @@ def steps_of(states, estimate, pairs, drive):
 class Verdict:
     counts: dict           # pairs of each state, by its first letter
     lost_after: float      # longest of all times that the fault came, s since it began; NaN: never lost
-    back_after: float      # the same, s since it ended; infinite: not before it came again
+    back_after: float      # the same, s since it ended; infinite: not before it came again; NaN: it does not end
     error: float           # largest of a pair's motion while TRACKING, m
     angle: float           # the same, deg
     sigmas: float          # the same in standard deviations
@@ -95,7 +95,7 @@ class Verdict:
 
     def words(self):
         said = [word for word, is_so in (("LIES", self.lies or self.drift > 0.1), ("LIES WHILE DEGRADED", self.degraded_lies),
-                                         ("NEVER BACK", not numpy.isfinite(self.back_after))) if is_so]
+                                         ("NEVER BACK", numpy.isinf(self.back_after))) if is_so]
         return ", ".join(said) or "ok"
 
 
@@ -152,7 +152,8 @@ def try_fault(name, seed, drive, work, extra):
     with tempfile.TemporaryDirectory(dir=work) as directory:
         pairs = faulty_pairs(name, seed, drive)
         write_sequence(pairs, drive, pathlib.Path(directory))
-        return verdict_of(pairs, drive, directory, extra)
+        verdict = verdict_of(pairs, drive, directory, extra)
+    return dataclasses.replace(verdict, back_after=numpy.nan) if name in LASTING_FAULTS else verdict
 
 
 HEAD = ["fault", "TRACKING/DEGRADED/LOST", "lost after [s]", "back after [s]", "error [sigma]", "[mm]",
@@ -166,10 +167,10 @@ def row_of(name, verdicts):
         return numpy.nanmax([getattr(verdict, field) for verdict in verdicts] + [-numpy.inf])
 
     lost, back = largest("lost_after"), largest("back_after")
+    lost, back = ("–" if time < 0 else "never" if numpy.isinf(time) else f"{time:.1f}" for time in (lost, back))
     words = sorted({verdict.words() for verdict in verdicts} - {"ok"})
     return [name, "/".join(str(sum(verdict.counts[letter] for verdict in verdicts)) for letter in verdicts[0].counts),
-            "–" if numpy.isinf(lost) else f"{lost:.1f}", "never" if numpy.isinf(back) else f"{back:.1f}",
-            f"{largest('sigmas'):.1f}", f"{1e3 * largest('error'):.0f}", f"{largest('angle'):.2f}",
+            lost, back, f"{largest('sigmas'):.1f}", f"{1e3 * largest('error'):.0f}", f"{largest('angle'):.2f}",
             f"{sum(v.beyond for v in verdicts)}", f"{largest('degraded_sigmas'):.1f}", f"{1e3 * largest('drift'):.0f}",
             f"{numpy.nanmean([v.nees for v in verdicts]):.1f}", ", ".join(words) or "ok"]
 

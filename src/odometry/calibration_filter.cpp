@@ -20,8 +20,7 @@ CalibrationFilter::CalibrationFilter(const CalibrationOptions& options) : option
 
 CalibrationFilter::Evidence CalibrationFilter::pastBefore(int oldest_id) const {
   if (!pending_ || pending_->newest_id >= oldest_id) return past_;
-  return {options_.memory * past_.information + pending_->evidence.information,
-          options_.memory * past_.information_mean + pending_->evidence.information_mean};
+  return pending_->evidence;
 }
 
 /// What the options say beforehand, as far as the evidence leaves it its weight.
@@ -55,7 +54,7 @@ RigCalibration::Vector CalibrationFilter::significantSpread() const {
   const RigCalibration::Matrix covariance = present_->information.inverse();
   const RigCalibration::Vector estimate = covariance * present_->information_mean;
   const RigCalibration::Vector prior(options_.prior_offset, options_.prior_bend);
-  const RigCalibration::Vector chance = options_.significance * options_.significance * covariance.diagonal();
+  const RigCalibration::Vector chance = noiseGate(1) * covariance.diagonal();
   for (int i = 0; i < RigCalibration::kParameters; ++i) {
     const double distance = estimate[i] - prior[i];
     const double significant = std::sqrt(std::max(distance * distance - chance[i], 0.0));

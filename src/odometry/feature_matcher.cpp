@@ -8,6 +8,7 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "stereo_descriptor_vo/odometry/correspondence_arrays.hpp"
 #include "stereo_descriptor_vo/odometry/hamming_distances.hpp"
 
 namespace sdvo {
@@ -190,7 +191,6 @@ std::vector<FeatureMatch> FeatureMatcher::match(const DescribedPoints& reference
   for (int i = 0; i < reference.count(); ++i) {
     if (grid) {
       const Eigen::Vector3d point = *T_current_reference * reference.positions[i];
-      constexpr double kNearestDepth = 0.1;  // m: what passes closer than this cannot be seen again
       if (point.z() < kNearestDepth) continue;
       const Eigen::Vector3d predicted = current.camera.project(point);
       count = grid->findAround(static_cast<float>(predicted.x()), static_cast<float>(predicted.y()), candidates);

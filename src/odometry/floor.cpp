@@ -8,7 +8,7 @@
 namespace sdvo {
 namespace {
 
-constexpr double kBend = 9.0;  // square of the residual, in standard deviations, at which the kernel bends
+constexpr double kBend = noiseGate(1);  // square of the residual, in standard deviations, at which the kernel bends
 
 }  // namespace
 

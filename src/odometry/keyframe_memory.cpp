@@ -3,6 +3,11 @@
 #include <algorithm>
 
 namespace sdvo {
+namespace {
+
+constexpr double kMost = 0.6;  // of a key frame's points (chosen): who sees them sees its place
+
+}  // namespace
 
 ReferencePatch OldKeyframe::reference(int point) const {
   const std::size_t p = static_cast<std::size_t>(point);
@@ -25,9 +30,8 @@ int OldKeyframe::sharedWith(const StereoCamera& camera, const Eigen::Isometry3d&
 }
 
 bool KeyframeMemory::covers(const StereoCamera& camera, const OldKeyframe& keyframe) const {
-  constexpr double kSame = 0.8;  // of the points
   const auto sees_the_same = [&](const std::shared_ptr<const OldKeyframe>& old) {
-    return keyframe.sharedWith(camera, old->T_camera_origin) > kSame * static_cast<double>(keyframe.rows.count());
+    return keyframe.sharedWith(camera, old->T_camera_origin) > kMost * static_cast<double>(keyframe.rows.count());
   };
   return std::any_of(keyframes_.rbegin(), keyframes_.rend(), sees_the_same);  // the newest are the nearest
 }
@@ -46,14 +50,13 @@ void KeyframeMemory::remember(const StereoCamera& camera, OldKeyframe keyframe) 
 
 const OldKeyframe* KeyframeMemory::nearest(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
                                            int least) const {
-  constexpr double kEnough = 0.6;    // of its points
   constexpr double kFarthest = 3.0;  // baselines: an error of a disparity is seen so many times as large from there
   const Eigen::Vector3d here = T_camera_origin.inverse().translation();
   const OldKeyframe* nearest = nullptr;
   double way = kFarthest * camera.baseline;
   for (const auto& keyframe : keyframes_) {
     const double distance = (keyframe->T_camera_origin.inverse().translation() - here).norm();
-    const double enough = std::max<double>(least, kEnough * static_cast<double>(keyframe->points.size()));
+    const double enough = std::max<double>(least, kMost * static_cast<double>(keyframe->points.size()));
     if (distance < way && keyframe->sharedWith(camera, T_camera_origin) >= enough)
       nearest = keyframe.get(), way = distance;
   }

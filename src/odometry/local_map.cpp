@@ -7,15 +7,13 @@
 #include <utility>
 
 #include "../common/median.hpp"
+#include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
 
 namespace sdvo {
 namespace {
 
 /// Disparity below which a point's distance is beyond measuring; it serves as a direction, far away.
 constexpr double kFarthestDisparity = 0.05;  // px
-
-/// Of many points a fixed number is shared for so long that the window would grow faster than they do.
-constexpr double kLastingShare = 0.125;
 
 /// Most points need no more memory than for these until it goes to another one.
 constexpr std::size_t kUsualSightings = 8;
@@ -130,7 +128,7 @@ void LocalMap::insert(const PatchAlignmentOptions& alignment, const StereoFeatur
   frames_.back().is_keyframe = needsKeyframe();
   // A corner that nothing is ever aligned with is no better than those seen later.
   const double sigma =
-      alignment.canAlign(features.patch_layout.side) ? options_.reference_sigma : options_.corner_sigma;
+      alignment.canAlign(features.patch_layout.side) ? options_.noise.reference : options_.noise.corner;
   for (int row = 0; row < features.count(); ++row)
     if (!recognised[row]) startPoint(features, row, id, T_camera_origin, calibration, sigma);
   if (static_cast<int>(frames_.size()) > options_.keyframes + 1) forgetKeyframe();
@@ -138,7 +136,9 @@ void LocalMap::insert(const PatchAlignmentOptions& alignment, const StereoFeatur
 
 LocalMap::Sighting LocalMap::sight(const PatchAlignmentOptions& options, const StereoFeatures& features,
                                    const Eigen::Isometry3d& T_camera_origin, int point, int row) const {
-  Sighting sighting{point, row, {features.u[row], features.v[row], features.disparity[row]}, options_.corner_sigma};
+  const NoiseOptions& noise = options_.noise;
+  const double sigma = options.canAlign(features.patch_layout.side) ? noise.unconfirmed() : noise.corner;
+  Sighting sighting{point, row, {features.u[row], features.v[row], features.disparity[row]}, sigma};
   const Point& seen = points_[point];
   const auto found = seen.reference.findIn(options, features, row, T_camera_origin, seen.position);
   if (!found) return sighting;
@@ -220,12 +220,11 @@ void LocalMap::forgetKeyframe() {
     if (options_.remembered_keyframes > 0 && !frames_[leaving].is_recalled) rememberKeyframe(leaving);
   }
   const std::vector<int> shared = sharedPoints();
-  const int least = std::max(options_.lasting_points, static_cast<int>(kLastingShare * shared.back()));
   const auto too_few = std::find_if(shared.begin(), shared.begin() + static_cast<std::ptrdiff_t>(lasting()),
-                                    [&](int points) { return points < least; });
+                                    [&](int points) { return points < options_.lasting_points; });
   const std::size_t unshared = static_cast<std::size_t>(too_few - shared.begin());
   if (unshared < lasting()) removeFrame(unshared);
-  while (static_cast<int>(lasting()) > options_.lasting_keyframes) {
+  while (static_cast<int>(lasting()) > options_.keyframes) {
     const std::vector<double> parallax = parallaxToPredecessors(lasting());
     removeFrame(static_cast<std::size_t>(std::min_element(parallax.begin(), parallax.end()) - parallax.begin()));
   }
@@ -399,11 +398,11 @@ void LocalMap::pose(Problem& problem) const {
 }
 
 std::vector<Eigen::Vector3d> LocalMap::positions() const {
-  constexpr double kFarthest = 1e-3;  // 1/m, of a point's depth where it was seen first
+  const double farthest = kFarthestDisparity / (camera_.fx * camera_.baseline);  // 1/m, where it was seen first
   std::vector<Eigen::Vector3d> positions;
   for (const Point& point : points_) {
     const double inverse_depth = point.position.ray_and_inverse_depth.z();
-    if (inverse_depth > kFarthest)
+    if (inverse_depth > farthest)
       positions.push_back(point.position.scaledPointIn(Eigen::Isometry3d::Identity()) / inverse_depth);
   }
   return positions;
@@ -432,7 +431,12 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   adjustment.success = true;
   adjustment.calibration_information = solution.calibration_information;
   adjustment.common_disparity_square = solution.common_disparity_square;
-  adjustment.since_keyframe = motionCovariance(window, poses, solution.pose_covariance, newest - 1, newest);
+  const auto motion = [&](int from, int to) {
+    return motionCovariance(window, poses, solution.pose_covariance, from, to);
+  };
+  adjustment.since_keyframe = motion(newest - 1, newest);
+  const Matrix6d carried = adjoint(window.T_camera_origin[newest] * window.T_camera_origin[newest - 1].inverse());
+  adjustment.growth = positivePart(motion(0, newest) - carried * motion(0, newest - 1) * carried.transpose());
   calibration = window.calibration;
   for (std::size_t f = 0; f < frames_.size(); ++f)
     frames_[f].T_camera_origin = orthonormalised(window.T_camera_origin[f]);
@@ -444,9 +448,11 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
 }
 
 void LocalMap::cutOff(const std::vector<double>& squares, Adjustment& adjustment) {
-  constexpr double kRejected = 6.0;  // sigma
+  const double gate = 2.0 * noiseGate(2);  // the point's position errs as much as the sighting's
   for (const int i : problem_.newest) {
-    if (squares[i] <= kRejected * kRejected) continue;
+    // What no patch confirms may be another thing: if it is the point's corner, it is within a corner's noise.
+    const double wider = std::max(problem_.window.observations[i].sigma / options_.noise.corner, 1.0);
+    if (wider * wider * squares[i] <= gate) continue;
     Point& point = points_[problem_.points[problem_.window.observations[i].point]];
     adjustment.rejected_rows.push_back(point.observations.back().row);
     --point.seen;

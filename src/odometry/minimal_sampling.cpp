@@ -14,8 +14,8 @@ MinimalSample drawSample(std::mt19937& random, int count) {
   return sample;
 }
 
-SampleBudget::SampleBudget(int at_least, int at_most, double confidence)
-    : at_least_(at_least), at_most_(at_most), confidence_(confidence), needed_(at_most) {}
+SampleBudget::SampleBudget(int at_most, double confidence)
+    : at_most_(at_most), confidence_(confidence), needed_(at_most) {}
 
 void SampleBudget::noteInliers(double share) {
   // Fischler and Bolles 1981.
@@ -29,7 +29,7 @@ void SampleBudget::noteInliers(double share) {
 }
 
 bool SampleBudget::spent(int samples) const {
-  return samples >= at_most_ || samples >= std::max(needed_, at_least_);
+  return samples >= std::min(needed_, at_most_);
 }
 
 double SampleBudget::progress(int samples) const {

@@ -7,8 +7,7 @@ namespace sdvo {
 namespace {
 
 LearntRig unknownRig(const VisualOdometryOptions& options) {
-  return {options.calibration,
-          {options.map.corner_sigma, options.map.reference_sigma, options.window.common_disparity_sigma}};
+  return {options.calibration, Noise(options.noise)};
 }
 
 /// The matches, which of them are inliers, and what follows from these.

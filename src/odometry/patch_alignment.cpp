@@ -97,7 +97,7 @@ std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const
   if (!makeTemplate(near_reference, centre, square, pattern)) return std::nullopt;
   const Eigen::Matrix2f inverse = pattern.hessian.inverse();
   const Eigen::Matrix2f grid = warp * (reference.spacing / current.spacing);
-  const float largest = static_cast<float>(options.max_shift) / current.spacing;
+  const float largest = static_cast<float>(options.noise.cornerGate()) / current.spacing;
 
   Eigen::Vector2f position = Eigen::Vector2f::Zero();
   Samples grey;
@@ -130,8 +130,7 @@ std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const
   const float left = sumOfSquaredDifferences(square.count(), contrast, grey.data(), pattern.grey.data());
   const float noise = left / static_cast<float>(square.pixels() - 4);
   const float warped = (grid * inverse * grid.transpose()).trace(), own = std::max(warped, inverse.trace());
-  found.sigma =
-      std::hypot(current.spacing * std::sqrt(0.5f * noise * (warped + own)), static_cast<float>(options.min_sigma));
+  found.sigma = current.spacing * std::hypot(std::sqrt(0.5f * noise * (warped + own)), kConverged);
   return found;
 }
 

@@ -39,12 +39,16 @@ Matrix6d noLessThan(const Matrix6d& before, Matrix6d covariance) {
 
 /// No less than either in any direction.
 Matrix6d covering(const Matrix6d& a, const Matrix6d& b) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> more(a - b);
-  const Matrix6d roots = more.eigenvectors() * more.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
-  return b + Matrix6d((roots * roots.transpose()).selfadjointView<Eigen::Lower>());
+  return b + positivePart(a - b);
 }
 
 }  // namespace
+
+Matrix6d positivePart(const Matrix6d& matrix) {
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(matrix);
+  const Matrix6d roots = solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  return Matrix6d((roots * roots.transpose()).selfadjointView<Eigen::Lower>());
+}
 
 bool widen(Matrix6d& covariance, const Vector6d& deviation) {
   constexpr double kExpected = 3.0;  // chi-square of six: half its mean, for a deviation is a part of the error only
@@ -85,12 +89,13 @@ void PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, const 
   unmeasured_ += covariance;
 }
 
-Matrix6d PoseCovariance::measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe) {
+Matrix6d PoseCovariance::measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe,
+                                 const Matrix6d& growth) {
   const Matrix6d before = value_ - predicted_;
   carry(T_previous_current);
   const Matrix6d motion = unmeasured_ + (since_keyframe_ ? covering(*since_keyframe_, since_keyframe) : since_keyframe);
   since_keyframe_ = since_keyframe;
-  value_ = noLessThan(before, keyframe_ + since_keyframe);
+  value_ = noLessThan(before, keyframe_ + growth);
   predicted_.setZero();
   unmeasured_.setZero();
   return motion;

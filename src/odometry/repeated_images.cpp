@@ -8,10 +8,18 @@
 #include "stereo_descriptor_vo/odometry/noise.hpp"
 
 namespace sdvo {
+namespace {
 
-bool RepeatedImages::areFrozen(const StereoFeatures& features,
+/// Of so many things of which some are of one kind, nats.
+double entropyOf(int some, int all) {
+  const auto nats = [all](int n) { return n > 0 ? n * std::log(static_cast<double>(all) / n) : 0.0; };
+  return nats(some) + nats(all - some);
+}
+
+}  // namespace
+
+bool RepeatedImages::areFrozen(const StereoFeatures& features, double noise,
                                const std::optional<Eigen::Isometry3d>& T_previous_current, bool is_measured) const {
-  constexpr double kSeen = 1.0;  // px (chosen: beyond the noise of corners) by which most points should have moved
   if (features.count() == 0 || features_[0] != features.u || features_[1] != features.v ||
       features_[2] != features.disparity)
     return false;
@@ -22,13 +30,12 @@ bool RepeatedImages::areFrozen(const StereoFeatures& features,
   for (int i = 0; i < features.count(); ++i) {
     const Eigen::Vector3d point = features.camera.backProject(features.u[i], features.v[i], features.disparity[i]);
     const Eigen::Vector3d now = features.camera.project(T_current_previous * point);
-    moved += std::hypot(now.x() - features.u[i], now.y() - features.v[i]) > kSeen;
+    moved += std::hypot(now.x() - features.u[i], now.y() - features.v[i]) > noise;
   }
   return 2 * moved > features.count();
 }
 
 std::vector<int> RepeatedImages::newRows(const StereoFeatures& features) const {
-  constexpr double kExplains = 0.9;  // ratio of the features that lie in their part (chosen); matches err at the tear
   std::vector<int> rows(features.u.size());
   std::iota(rows.begin(), rows.end(), 0);
   std::vector<std::pair<float, float>> before(features_[0].size());
@@ -50,7 +57,9 @@ std::vector<int> RepeatedImages::newRows(const StereoFeatures& features) const {
     if (std::max(below, above) <= best) continue;
     best = std::max(below, above), border = k, is_above = above > below;
   }
-  if (best < kExplains * count) return rows;
+  // Matches err at the tear. How much fewer nats tell old from new, against what some border of chance saves.
+  const double saved = entropyOf(all_old, count) - entropyOf(count - best, count);
+  if (saved < std::log((count + 1) / kTailProbability)) return rows;
   const float tear =
       features.v[order[static_cast<std::size_t>(std::clamp(is_above ? border : border - 1, 0, count - 1))]];
   rows.assign(is_above ? order.begin() + border : order.begin(), is_above ? order.end() : order.begin() + border);

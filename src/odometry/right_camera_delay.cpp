@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <sstream>
 #include <utility>
 #include <vector>
@@ -58,7 +59,6 @@ Vector6d velocityDuring(double delay, double dt, const Vector6d& before, const V
 /// by a constant.
 double misfit(const std::vector<RowMotion>& rows, double delay) {
   constexpr double kCut = 2.0 * RowDelay::kKernel;  // rows further off are matched wrongly
-  constexpr double kSmallest = 1e-6;                // px^2: simulated rows have no noise
   std::vector<double> rest;
   rest.reserve(rows.size());
   for (const RowMotion& row : rows) rest.push_back(row.dv - delay * row.velocity);
@@ -66,14 +66,15 @@ double misfit(const std::vector<RowMotion>& rows, double delay) {
   const double middle = median(sorted);
   double sum = 0.0;
   for (const double each : rest) sum += std::min((each - middle) * (each - middle), kCut * kCut);
-  return sum / static_cast<double>(rest.size()) + kSmallest;
+  return sum / static_cast<double>(rest.size());
 }
 
 /// By how much (logarithm of the ratio) the rows are likelier if the right image is late by `delay` than in step. Their
 /// variance is unknown, and errors within a part of the image are alike.
 double logRatioOfPartner(const std::vector<RowMotion>& rows, double delay) {
   const double parts = std::min<double>(static_cast<double>(rows.size()), RowDelay::kParts);
-  return 0.5 * parts * std::log(misfit(rows, 0.0) / misfit(rows, delay));
+  const double in_step = misfit(rows, 0.0), late = misfit(rows, delay);
+  return in_step == late ? 0.0 : 0.5 * parts * std::log(in_step / late);
 }
 
 constexpr int kSamePoints = 2;         // pairs in a row whose errors are alike (chosen)
@@ -163,7 +164,7 @@ StereoFeatures RightCameraDelay::inStep(const StereoFeatures& features, double d
   // The velocity goes on as it changed.
   const Vector6d change = pairs_.empty() ? Vector6d::Zero() : Vector6d(velocity - pairs_.back().velocity);
   const Vector6d during = velocityDuring(delay, dt, velocity, velocity + 0.5 * change, velocity + change);
-  constexpr float kFar = 0.1f;  // px: of points that noise puts beyond infinity
+  constexpr float kFar = std::numeric_limits<float>::epsilon();  // px: of points that noise puts beyond infinity
   StereoFeatures result = features;
   for (int i = 0; i < features.count(); ++i) {
     const InStep step = sdvo::inStep(features, i, delay, during);

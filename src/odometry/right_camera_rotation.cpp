@@ -25,30 +25,31 @@ Eigen::Vector3d unknown() {
 
 }  // namespace
 
-RightCameraRotation::Sums RightCameraRotation::sumUp(const StereoFeatures& features, const Sums& past) const {
+RightCameraRotation::Sums RightCameraRotation::sumUp(const StereoFeatures& features) const {
   constexpr int kReweightings = 3;
-  Eigen::Vector3d estimate = sums_.weight > 0.0 ? rotation() : Eigen::Vector3d::Zero();
+  Eigen::Vector3d estimate = sums_.rotation();
   Sums sums;
   for (int pass = 0; pass < kReweightings; ++pass) {
-    sums = past;
+    sums = Sums();
     for (int i = 0; i < features.count(); ++i) sums.add(effect(features, i), features.dv[i], estimate);
     estimate = sums.rotation();
   }
   return sums;
 }
 
-void RightCameraRotation::addToParts(const StereoFeatures& features) {
+/// `estimate`: of what is known, for the weights.
+void RightCameraRotation::remember(const StereoFeatures& features, const Eigen::Vector3d& estimate) {
   const auto last = [](int size) { return std::floor(size / kPart); };
   const double columns = last(features.camera.width), rows = last(features.camera.height);
   parts_.resize(static_cast<std::size_t>((columns + 1.0) * (rows + 1.0)));
+  sums_.forget();
   for (Sums& part : parts_) part.forget();
-  const Eigen::Vector3d estimate = rotation();
   for (int i = 0; i < features.count(); ++i) {
     // Clamped before it becomes an integer, which a position far outside of the image overflows.
     const double column = std::clamp(std::floor(features.u[i] / kPart), 0.0, columns);
     const double row = std::clamp(std::floor(features.v[i] / kPart), 0.0, rows);
-    Sums& part = parts_[static_cast<std::size_t>(row * (columns + 1.0) + column)];
-    part.add(effect(features, i), features.dv[i], estimate);
+    for (Sums* sums : {&sums_, &parts_[static_cast<std::size_t>(row * (columns + 1.0) + column)]})
+      sums->add(effect(features, i), features.dv[i], estimate);
   }
 }
 
@@ -57,15 +58,12 @@ double RightCameraRotation::add(const StereoFeatures& features) {
   // A camera that turned disagrees with the memory. Back in its place it agrees again, but not with the pair before.
   against_memory_.last = against_last_.last = 0.0;
   if (features.count() >= kFewestMeasured) {
-    const Sums now = sumUp(features, {});
+    const Sums now = sumUp(features);
     against_memory_.last = distance(now, sums_);
     against_last_.last = distance(now, last_);
     last_ = now;
   }
-  Sums past = sums_;
-  past.forget();
-  sums_ = sumUp(features, past);
-  addToParts(features);
+  remember(features, (sums_.weight > 0.0 ? sums_ : last_).rotation());
   return std::max(against_memory_.timesUsual(), against_last_.timesUsual());
 }
 

@@ -31,8 +31,8 @@ int RowDelay::cellOf(double u, double v, int width, int height) {
 }
 
 double RowDelay::Estimate::proved(double expected) const {
-  const double distance = value - expected, chance = kSignificant * sigma;
-  return std::copysign(std::sqrt(std::max(distance * distance - chance * chance, 0.0)), distance);
+  const double distance = value - expected, chance = kSquare * sigma * sigma;
+  return std::copysign(std::sqrt(std::max(distance * distance - chance, 0.0)), distance);
 }
 
 RowDelay::Fit RowDelay::fit(const Cells& cells) {
@@ -104,15 +104,14 @@ void RowDelay::add(const std::vector<Row>& pair) {
 }
 
 std::optional<RowDelay::Estimate> RowDelay::estimate() const {
-  constexpr double kEnough = 4.5;  // blocks (chosen), whose spread tells the standard deviation
-  if (blocks_ < kEnough) return std::nullopt;
+  const double freedom = blocks_ - 2.0;
+  if (!(freedom > 0.0)) return std::nullopt;
   const Fit fit = this->fit(cells_);
   const Eigen::Matrix2d inverse = fit.information.inverse();
   // Student's distribution: few blocks tell their own spread badly (Wallace's bound of its quantiles).
-  constexpr double kSquare = kSignificant * kSignificant;
-  const double freedom = blocks_ - 2.0, few = freedom / kSquare * std::expm1(kSquare / freedom);
+  const double few = freedom / kSquare * std::expm1(kSquare / freedom);
   const Estimate estimate{fit.value[0], std::sqrt(few * (inverse * spread_ * inverse.transpose())(0, 0))};
-  if (!(estimate.sigma < kUseful)) return std::nullopt;
+  if (!(estimate.sigma < kFail)) return std::nullopt;
   return estimate;
 }
 

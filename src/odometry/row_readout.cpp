@@ -11,9 +11,9 @@ void RowReadout::add(const StereoCamera& camera, const Eigen::Isometry3d& T_curr
                      const std::vector<Correspondence>& correspondences, const std::vector<int>& inliers,
                      const Vector6d& velocity) {
   if (static_cast<int>(inliers.size()) < kFewestMeasured) return;
-  constexpr double kUsual = 0.8;  // ratio of the past that a pair leaves of the velocity that the points were seen at
+  // The points were seen at the velocity of the last pairs.
   const Vector6d change = velocity - usual_velocity_;
-  usual_velocity_ += (1.0 - kUsual) * change;
+  usual_velocity_ += (1.0 - kUsualMemory) * change;
   // The pose is a part of each pair's fit, so that only what no motion explains counts.
   using Row = Eigen::Matrix<double, 6, 1>;
   Matrix6d square = Matrix6d::Zero();
@@ -47,12 +47,11 @@ void RowReadout::add(const StereoCamera& camera, const Eigen::Isometry3d& T_curr
 }
 
 std::optional<RowReadout::Estimate> RowReadout::estimate() const {
-  constexpr double kEnough = 25.0;  // pairs (chosen), whose spread tells the standard deviation
-  if (pairs_ < kEnough || !(information_ > 0.0)) return std::nullopt;
+  if (pairs_ < kFewestMeasured || !(information_ > 0.0)) return std::nullopt;
   const double value = product_ / information_;
   const double spread = product_square_ - 2.0 * value * mixed_ + value * value * information_square_;
   const Estimate estimate{value, std::sqrt(std::max(spread, 0.0)) / information_};
-  if (!(estimate.sigma < RowDelay::kUseful)) return std::nullopt;
+  if (!(estimate.sigma < RowDelay::kFail)) return std::nullopt;
   return estimate;
 }
 

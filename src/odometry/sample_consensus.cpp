@@ -61,7 +61,7 @@ Consensus findConsensus(const PoseProblem& problem, const SampleConsensusOptions
   std::mt19937 random(static_cast<std::uint32_t>(options.seed));
   const bool genetic =
       options.consensus == ConsensusMethod::kGasac || options.consensus == ConsensusMethod::kAdaptiveGasac;
-  const SampleBudget budget(options.min_iterations, options.max_iterations, options.confidence);
+  const SampleBudget budget(options.max_iterations, 1.0 - kTailProbability);
   return genetic ? searchByGenes(problem, options, budget, random)
                  : searchAtRandom(problem, options, refinement, budget, random);
 }

@@ -36,20 +36,20 @@ std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHy
 }  // namespace
 
 VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
-    : options_(checked(options)),
+    : options_(checked(options).withOneNoise()),
       T_base_camera_(lookingAhead()),
-      search_(options.matcher, options.motion, options.alignment),
-      reacquisition_(options.matcher, options.motion),
-      revisit_(options.matcher, options.motion, options.alignment),
-      optimizer_(options.window),
-      state_(options, 0) {}
+      search_(options_.matcher, options_.motion, options_.alignment),
+      reacquisition_(options_.matcher, options_.motion),
+      revisit_(options_.matcher, options_.motion, options_.alignment),
+      optimizer_(options_.window),
+      state_(options_, 0) {}
 
 void VisualOdometry::configure(const VisualOdometryOptions& options) {
-  options_ = checked(options);
-  search_ = MotionSearch(options.matcher, options.motion, options.alignment);
-  reacquisition_ = Reacquisition(options.matcher, options.motion);
-  revisit_ = Revisit(options.matcher, options.motion, options.alignment);
-  optimizer_ = WindowOptimizer(options.window);
+  options_ = checked(options).withOneNoise();
+  search_ = MotionSearch(options_.matcher, options_.motion, options_.alignment);
+  reacquisition_ = Reacquisition(options_.matcher, options_.motion);
+  revisit_ = Revisit(options_.matcher, options_.motion, options_.alignment);
+  optimizer_ = WindowOptimizer(options_.window);
   state_.prior.configure(options.tracking);
 }
 
@@ -143,12 +143,15 @@ VisualOdometry::Pair VisualOdometry::usable(const StereoFeatures& given,
 /// A camera that repeats its images seems to stand. The guess, or the motion before, shows whether it does.
 bool VisualOdometry::isFrozen(const StereoFeatures& features, double dt,
                               const std::optional<MotionGuess>& guess) const {
-  if (guess && !guess->rotation_only) return state_.images.areFrozen(features, guess->T_previous_current, true);
+  const auto areFrozen = [&](const std::optional<Eigen::Isometry3d>& T_previous_current, bool is_measured) {
+    return state_.images.areFrozen(features, state_.rig.noise.sameMotion(), T_previous_current, is_measured);
+  };
+  if (guess && !guess->rotation_only) return areFrozen(guess->T_previous_current, true);
   Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
   if (guess) turn.linear() = guess->T_previous_current.linear();
   std::optional<Eigen::Isometry3d> predicted;
   if (state_.prior.velocity()) predicted = state_.prior.predicted(dt).motion;
-  return state_.images.areFrozen(features, turn, true) || state_.images.areFrozen(features, predicted, false);
+  return areFrozen(turn, true) || areFrozen(predicted, false);
 }
 
 /// The map, the pair, and the motion between them as it is expected: what was already covered by predicted pairs, and
@@ -405,7 +408,8 @@ VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, cons
     state_.covariance.advance(*step.T_previous_current, step.covariance);
     return step;
   }
-  step.covariance = state_.covariance.measure(*step.T_previous_current, candidate.adjustment.since_keyframe);
+  step.covariance = state_.covariance.measure(*step.T_previous_current, candidate.adjustment.since_keyframe,
+                                              candidate.adjustment.growth);
   // The motion between two reported poses contains what the map has learnt of the first one meanwhile: a perturbation
   // of the key frame before, then of the newest pair.
   step.correction = adjoint(map.newestPose() * map.poseBeforeNewest().inverse()) *

@@ -59,7 +59,7 @@ class Solver {
   /// Refers to the window from now on, whose values are the first estimate.
   void take(const Window& window, Estimate& estimate) {
     window_ = &window;
-    common_sigma_ = window.calibration_prior.common_sigma.value_or(options_.common_disparity_sigma);
+    common_sigma_ = window.calibration_prior.common_sigma.value_or(options_.noise.common_disparity);
     const auto& observations = window.observations;
     first_of_point_.clear();
     anchors_.clear(), anchor_of_point_.clear(), estimate.points.clear();
@@ -127,7 +127,7 @@ class Solver {
       const auto square = commonSquare(points[p]);
       if (!square) continue;
       squares.push_back(disparityVariance(sightings) * *square);
-      of_means += options_.disparity_sigma * options_.disparity_sigma / sightings;
+      of_means += options_.noise.disparity * options_.noise.disparity / sightings;
     }
     const auto variance = varianceOf(squares);
     if (!variance) return std::nullopt;
@@ -299,7 +299,7 @@ class Solver {
   /// Of n disparities of one point the mean has the variance sigma^2 / n + common^2, as if each by itself had n times
   /// that: more sightings do not average away what they share.
   double disparityVariance(int sightings) const {
-    return options_.disparity_sigma * options_.disparity_sigma + sightings * common_sigma_ * common_sigma_;
+    return options_.noise.disparity * options_.noise.disparity + sightings * common_sigma_ * common_sigma_;
   }
 
   WindowOptimizerOptions options_;
@@ -360,7 +360,7 @@ struct WindowOptimizer::Memory {
 };
 
 WindowOptimizer::WindowOptimizer(const WindowOptimizerOptions& options)
-    : options_(checked(options)), memory_(std::make_unique<Memory>(options_)) {}
+    : options_(options), memory_(std::make_unique<Memory>(options_)) {}
 
 WindowOptimizer::WindowOptimizer(WindowOptimizer&&) noexcept = default;
 WindowOptimizer& WindowOptimizer::operator=(WindowOptimizer&&) noexcept = default;

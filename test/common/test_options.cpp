@@ -115,9 +115,9 @@ TEST(Options, CompositionsNameTheFullPath) {
   EXPECT_TRUE(contains(detector_error, "detector/max_features")) << detector_error;
 
   VisualOdometryOptions odometry;
-  odometry.motion.confidence = 1.0;
+  odometry.motion.min_inliers = 0;
   const std::string motion_error = errorOf([&] { VisualOdometry{odometry}; });
-  EXPECT_TRUE(contains(motion_error, "motion/confidence")) << motion_error;
+  EXPECT_TRUE(contains(motion_error, "motion/min_inliers")) << motion_error;
 }
 
 /// What fields demand of each other is checked with the whole set, wherever the component stands in it.

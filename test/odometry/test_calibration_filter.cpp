@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "stereo_descriptor_vo/odometry/calibration_filter.hpp"
+#include "stereo_descriptor_vo/odometry/noise.hpp"
 
 namespace sdvo {
 namespace test_calibration_filter {
@@ -18,15 +19,13 @@ CalibrationOptions someOptions() {
   options.prior_bend = -1.0;
   options.prior_sigma = 2.0;
   options.trust = 0.25;
-  options.significance = 3.0;
-  options.memory = 0.5;
   return options;
 }
 
 const Vector kPrior(0.5, -1.0);
 const Matrix kInformation = Vector(12.0, 5.0).asDiagonal();  // of a window
-// Distances that are significant of a window of that information, three of its standard deviations.
-const double kOffset = 3.0 / std::sqrt(12.0), kBend = 3.0 / std::sqrt(5.0);
+// Distances that are significant of a window of that information.
+const double kOffset = std::sqrt(noiseGate(1) / 12.0), kBend = std::sqrt(noiseGate(1) / 5.0);
 
 /// Adds the window of these pairs that would find `own` without a prior.
 void addWindow(CalibrationFilter& filter, int oldest, int newest, const Vector& own,
@@ -109,23 +108,23 @@ TEST(CalibrationFilter, OfWindowsThatOverlapOneCounts) {
   EXPECT_NEAR(filter.prior(6).mean[0], belief.mean[0], 1e-12) << "counted once";
 }
 
-TEST(CalibrationFilter, EarlierWindowsFadeAndTheOptionsStay) {
+TEST(CalibrationFilter, OneEarlierWindowCountsAndTheOptionsStay) {
   CalibrationFilter filter(someOptions());
   addWindow(filter, 1, 5, {100.0, -100.0});
   addWindow(filter, 6, 10, {60.0, -60.0});
   const CalibrationBelief belief = filter.prior(11);
-  EXPECT_LT((belief.information - (informationOf(2.0) * Matrix::Identity() + 1.5 * kInformation)).norm(), 1e-6);
-  EXPECT_NEAR(belief.mean[0], (4.0 * 0.5 + 6.0 * 100.0 + 12.0 * 60.0) / 22.0, 1e-3);
-  EXPECT_NEAR(belief.mean[1], (4.0 * -1.0 - 2.5 * 100.0 - 5.0 * 60.0) / 11.5, 1e-3);
+  EXPECT_LT((belief.information - (informationOf(2.0) * Matrix::Identity() + kInformation)).norm(), 1e-6);
+  EXPECT_NEAR(belief.mean[0], (4.0 * 0.5 + 12.0 * 60.0) / 16.0, 1e-3);
+  EXPECT_NEAR(belief.mean[1], (4.0 * -1.0 - 5.0 * 60.0) / 9.0, 1e-3);
 }
 
 TEST(CalibrationFilter, AgreementOfManyWindowsWearsThePriorDown) {
   CalibrationFilter filter(someOptions());
   const Matrix own = 40.0 * Matrix::Identity();
   for (int k = 0; k < 50; ++k) addWindow(filter, 10 * k + 1, 10 * k + 9, {10.0, -10.0}, own);
-  // In the end 40 of the window and 2 * 40 of the fading past stand against 4 of the options.
-  EXPECT_NEAR(filter.calibration().value[0], (4.0 * 0.5 + 120.0 * 10.0) / 124.0, 1e-3);
-  EXPECT_NEAR(filter.calibration().value[1], (4.0 * -1.0 - 120.0 * 10.0) / 124.0, 1e-3);
+  // In the end 40 of the window and 40 of the one before stand against 4 of the options.
+  EXPECT_NEAR(filter.calibration().value[0], (4.0 * 0.5 + 80.0 * 10.0) / 84.0, 1e-3);
+  EXPECT_NEAR(filter.calibration().value[1], (4.0 * -1.0 - 80.0 * 10.0) / 84.0, 1e-3);
 }
 
 TEST(CalibrationFilter, HoldsThePriorWhenNotEnabled) {

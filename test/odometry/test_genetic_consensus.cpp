@@ -41,7 +41,7 @@ GeneticResult search(const Scene& scene, const GeneticConsensusOptions& options,
                      unsigned seed, double confidence = kCertainty) {
   const PoseProblem problem(scene.camera, scene.correspondences, 2.0);
   std::mt19937 random(seed);
-  return searchGenetically(problem, options, adaptive, {1, iterations, confidence}, random);
+  return searchGenetically(problem, options, adaptive, {iterations, confidence}, random);
 }
 
 bool equal(const GeneticResult& a, const GeneticResult& b) {

@@ -11,6 +11,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/odometry/calibration_filter.hpp"
 #include "stereo_descriptor_vo/odometry/local_map.hpp"
+#include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
 
 namespace sdvo {
 namespace test_local_map {
@@ -76,7 +77,7 @@ TEST(LocalMap, APairThatSharesHardlyAnythingWithTheOthersIsNotAdjusted) {
 
 TEST(LocalMapKeyframes, GoByAgeWhenNoneLasts) {
   LocalMapOptions options;
-  options.lasting_keyframes = 0;
+  options.lasting_points = 10000;
   EXPECT_GT(oldestAfter(options, 40, hovering), 20);
 }
 
@@ -193,23 +194,23 @@ TEST(LocalMapSight, IsTheCornerWithoutAnAlignment) {
   const Wall wall;
   LocalMap map{LocalMapOptions()};
   map.insert({}, wall.view(10.0), 1, Wall::poseAt(10.0), {}, RigCalibration());
-  const auto expectCorner = [&](const PatchAlignmentOptions& options, const StereoFeatures& features) {
+  const auto expectCorner = [&](const PatchAlignmentOptions& options, const StereoFeatures& features, double sigma) {
     const LocalMap::Sighting sighting = map.sight(options, features, Wall::poseAt(10.0), 0, 0);
     EXPECT_FALSE(sighting.aligned);
     EXPECT_EQ(sighting.measurement.x(), features.u[0]);
     EXPECT_EQ(sighting.measurement.y(), features.v[0]);
-    EXPECT_EQ(sighting.sigma, LocalMapOptions().corner_sigma);
+    EXPECT_EQ(sighting.sigma, sigma);
   };
   StereoFeatures features = wall.view(10.0, {0.6, -0.5});
   PatchAlignmentOptions off;
   off.enabled = false;
-  expectCorner(off, features);
+  expectCorner(off, features, NoiseOptions().corner);
   StereoFeatures unlike = features;
   cv::RNG(1).fill(unlike.patches, cv::RNG::UNIFORM, 0, 256);
-  expectCorner(PatchAlignmentOptions(), unlike);
+  expectCorner(PatchAlignmentOptions(), unlike, NoiseOptions().unconfirmed());
   features.patch_layout.side = 0;
   features.patches.release();
-  expectCorner(PatchAlignmentOptions(), features);
+  expectCorner(PatchAlignmentOptions(), features, NoiseOptions().corner);
 }
 
 TEST(LocalMapSight, RenewsTheReferenceWhenTheScaleHasChangedAndKeepsThePoint) {
@@ -265,15 +266,16 @@ StereoFeatures see(const synthetic::World& world, int from, int to, const Eigen:
 
 /// Row `row` of the view's map point as a sighting by row `row_of_pair` of a pair, corners as they are.
 LocalMap::Sighting sighting(const LocalMap& map, const LocalMap::View& view, int row, const StereoFeatures& features,
-                            int row_of_pair) {
-  return map.sight({}, features, map.newestPose(), view.point[static_cast<std::size_t>(row)], row_of_pair);
+                            int row_of_pair, const PatchAlignmentOptions& alignment = {}) {
+  return map.sight(alignment, features, map.newestPose(), view.point[static_cast<std::size_t>(row)], row_of_pair);
 }
 
 /// The pair's rows `from` … recognise the view's rows from 0 on, `count` of them.
-Sightings recognised(const LocalMap& map, const StereoFeatures& features, int count, int from = 0) {
+Sightings recognised(const LocalMap& map, const StereoFeatures& features, int count, int from = 0,
+                     const PatchAlignmentOptions& alignment = {}) {
   const LocalMap::View view = map.view();
   Sightings sightings;
-  for (int k = 0; k < count; ++k) sightings.push_back(sighting(map, view, k, features, from + k));
+  for (int k = 0; k < count; ++k) sightings.push_back(sighting(map, view, k, features, from + k, alignment));
   return sightings;
 }
 
@@ -489,7 +491,7 @@ TEST(LocalMap, HoldsAsManyKeyframesAsItIsTold) {
   const synthetic::World world = someWorld(20);
   LocalMapOptions options = everyPairAKeyframe();
   options.keyframes = 3;
-  options.lasting_keyframes = 0;
+  options.lasting_points = 21;  // more than there are
   LocalMap map(options);
   for (int id = 1; id <= 6; ++id) {
     const Eigen::Isometry3d pose = translated(0.1 * id, 0.0, 0.0);
@@ -507,7 +509,7 @@ TEST(LocalMap, HoldsAnOldKeyframeWhileItSharesEnough) {
     bool stays;
   };
   for (const auto& [lasting_points, shared, stays] :
-       {Case{20, 20, true}, Case{20, 19, false}, Case{5, 10, true}, Case{5, 9, false}}) {
+       {Case{20, 20, true}, Case{20, 19, false}, Case{5, 5, true}, Case{5, 4, false}}) {
     const synthetic::World world = someWorld(2 * kPoints);
     LocalMapOptions options = everyPairAKeyframe();
     options.keyframes = 2;
@@ -567,7 +569,7 @@ TEST(LocalMap, TakesTheLooksOfTheLastSighting) {
 TEST(LocalMap, WithoutPatchesASightingIsTheCorner) {
   const synthetic::World world = someWorld(3);
   LocalMapOptions options;
-  options.corner_sigma = 0.7;
+  options.noise.corner = 0.7;
   LocalMap map(options);
   const StereoFeatures features = see(world, 0, 3, Eigen::Isometry3d::Identity());
   add(map, features, 1, Eigen::Isometry3d::Identity(), {});
@@ -627,7 +629,7 @@ TEST(LocalMap, PatchesThatAreNotAlignedChangeNothing) {
     };
     map.insert(options, seeNoisily(first), 1, first, {}, RigCalibration());
     const StereoFeatures features = seeNoisily(second);
-    map.insert(options, features, 2, second, recognised(map, features, 60), {});
+    map.insert(options, features, 2, second, recognised(map, features, 60, 0, options), {});
     RigCalibration calibration;
     WindowOptimizer optimizer = thorough();
     EXPECT_TRUE(map.adjust(optimizer, noRigError(), calibration).success);
@@ -670,9 +672,9 @@ TEST(LocalMap, CovarianceBetweenTwoFramesDoesNotDependOnWhereTheFirstOneIs) {
   step << 0.4, -0.2, -0.6, 0.03, 0.12, -0.05;
   const Eigen::Isometry3d second = translated(0.2, 0.0, -0.5), third = expSE3(step) * second;
   LocalMapOptions options = everyPairAKeyframe();
-  options.corner_sigma = 0.05;
+  options.noise.corner = 0.05;
   WindowOptimizerOptions window;
-  window.common_disparity_sigma = 0.0;
+  window.noise.common_disparity = 0.0;
   WindowOptimizer optimizer(window);
   RigCalibration calibration;
   constexpr double kNoise = 0.05;  // px
@@ -710,6 +712,43 @@ TEST(LocalMap, CovarianceBetweenTwoFramesDoesNotDependOnWhereTheFirstOneIs) {
   EXPECT_GT(factor, 0.1);
   EXPECT_LT(factor, 1.1);
   EXPECT_LT((ratio / factor - Matrix6d::Identity()).norm(), 0.05) << ratio;
+}
+
+/// A camera hovers in front of the same points, which every key frame sees: its pose errs by what the map errs, however
+/// many key frames there were.
+TEST(LocalMap, APoseErrsByWhatItsCovarianceSaysAfterManyKeyframesOfTheSamePoints) {
+  constexpr double kNoise = 0.3;  // px
+  constexpr int kTrials = 12, kPairs = 24;
+  LocalMapOptions options = everyPairAKeyframe();
+  WindowOptimizerOptions window;
+  options.noise.corner = window.noise.corner = kNoise;
+  window.noise.disparity = std::sqrt(2.0) * kNoise;
+  window.noise.common_disparity = 0.0;
+  window.iterations = 20;
+  WindowOptimizer optimizer(window);
+  double nees = 0.0;
+  for (unsigned trial = 0; trial < kTrials; ++trial) {
+    const synthetic::World world = someWorld(80, trial);
+    LocalMap map(options);
+    PoseCovariance covariance;
+    RigCalibration calibration;
+    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+    for (int pair = 0; pair < kPairs; ++pair) {
+      const Eigen::Isometry3d before = pair == 0 ? pose : map.newestPose();
+      pose = translated(0.3 * std::sin(0.5 * pair), 0.0, 0.2 * std::cos(0.5 * pair) - 0.2);
+      const StereoFeatures features = see(world, 0, 80, pose, kNoise, 100 * trial + static_cast<unsigned>(pair));
+      add(map, features, pair, pose, pair == 0 ? Sightings{} : recognised(map, features, 80));
+      if (pair == 0) continue;
+      const LocalMap::Adjustment adjustment = map.adjust(optimizer, noRigError(), calibration);
+      ASSERT_TRUE(adjustment.success);
+      covariance.measure(before * map.newestPose().inverse(), adjustment.since_keyframe, adjustment.growth);
+      covariance.markKeyframe();
+    }
+    const Vector6d error = logSE3(pose * map.newestPose().inverse());
+    nees += error.dot(covariance.value().ldlt().solve(error)) / kTrials;
+  }
+  EXPECT_GT(nees, 3.0);  // chi-square of six
+  EXPECT_LT(nees, 12.0);
 }
 
 }  // namespace test_local_map

@@ -21,7 +21,7 @@ TEST(DrawSample, GivesDifferentIndicesAndLeavesNoneOut) {
 TEST(SampleBudget, IsWhatTheConfidenceNeeds) {
   // Half of all samples of three inliers in a hundred are drawn without an outlier with a chance of 1/8 each:
   // log(0.01) / log(7/8) = 34.5.
-  SampleBudget budget(1, 1000, 0.99);
+  SampleBudget budget(1000, 0.99);
   EXPECT_FALSE(budget.spent(999)) << "nothing is known of the inliers yet";
   EXPECT_TRUE(budget.spent(1000));
   budget.noteInliers(0.5);
@@ -34,10 +34,10 @@ TEST(SampleBudget, IsWhatTheConfidenceNeeds) {
 }
 
 TEST(SampleBudget, KeepsItsLimits) {
-  SampleBudget budget(30, 100, 0.99);
+  SampleBudget budget(100, 0.99);
   budget.noteInliers(1.0);
-  EXPECT_FALSE(budget.spent(29));
-  EXPECT_TRUE(budget.spent(30));
+  EXPECT_FALSE(budget.spent(0));
+  EXPECT_TRUE(budget.spent(1));
   for (const double few : {0.0, 1e-5, 0.05}) {
     budget.noteInliers(few);
     EXPECT_FALSE(budget.spent(99)) << few;

@@ -234,7 +234,7 @@ TEST(MotionEstimator, FarPointsDoNotHideTheNearOnes) {
   StereoCamera camera = synthetic::camera();
   camera.fx = camera.fy = 700.0;
   MotionEstimatorOptions options;
-  options.min_iterations = options.max_iterations = 1;  // a sample that mostly has far points alone
+  options.max_iterations = 1;  // a sample that mostly has far points alone
   constexpr int kProblems = 100;
   int right = 0;
   for (options.seed = 1; options.seed <= kProblems; ++options.seed) {
@@ -247,7 +247,7 @@ TEST(MotionEstimator, FarPointsDoNotHideTheNearOnes) {
 
 TEST(MotionEstimator, TriesTheExpectedMotionToo) {
   MotionEstimatorOptions options;
-  options.min_iterations = options.max_iterations = 1;
+  options.max_iterations = 1;
   const MotionEstimator estimator(options);
   const StereoCamera camera = synthetic::camera();
   const Problem problem = randomProblem(8, 240, 0.3, 0.7);

@@ -92,7 +92,7 @@ class MotionSearchTest : public ::testing::Test {
   Street street_;
   LocalMap map_{LocalMapOptions()};
   RigCalibration calibration_;
-  Noise noise_of_rig_{0.4, 0.1, 0.3};
+  Noise noise_of_rig_{NoiseOptions()};
   MotionSearch search_{{}, {}, {}};
   const double kLargestDoubt = logOdds(0.05);
   int pairs_ = 0;

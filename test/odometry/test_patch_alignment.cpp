@@ -257,9 +257,9 @@ TEST(PatchAlignment, RefusesAFartherShiftThanAskedFor) {
     return alignPatch(options, patchOf(reference), Eigen::Vector2f::Zero(), patchOf(current),
                       Eigen::Matrix2f::Identity());
   };
-  options.max_shift = 1.0;
+  options.noise.corner = 0.3;  // 3.9 of which bound the shift
   EXPECT_TRUE(align());
-  options.max_shift = 0.6;
+  options.noise.corner = 0.15;
   EXPECT_FALSE(align());
 }
 
@@ -295,7 +295,7 @@ TEST(PatchAlignment, RefusesWhatLiesOutside) {
     return alignPatch(PatchAlignmentOptions(), patchOf(reference), centre, patchOf(current),
                       ratio * Eigen::Matrix2f::Identity());
   };
-  EXPECT_FALSE(align(far, Eigen::Vector2f::Zero(), 1.f)) << "beyond max_shift";
+  EXPECT_FALSE(align(far, Eigen::Vector2f::Zero(), 1.f)) << "farther than a corner is off";
   const auto beside = cut(scene, {1.5, 0.0}, 1.0, random, 0.0);
   EXPECT_TRUE(align(cut(scene, {1.0, 0.0}, 1.0, random, 0.0), {1.f, 0.f}, 1.f));
   EXPECT_FALSE(align(beside, {1.5f, 0.f}, 1.f)) << "the reference's square and its neighbours leave its patch";

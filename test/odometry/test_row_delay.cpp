@@ -70,8 +70,9 @@ TEST(RowDelay, IsUnknownWhereTheViewHardlyTurns) {
 
 TEST(RowDelay, ProvedIsWhatChanceDoesNotExplain) {
   const RowDelay::Estimate estimate{5.0, 1.0};
-  EXPECT_DOUBLE_EQ(estimate.proved(), 3.0) << "five less four standard deviations, squared";
-  EXPECT_DOUBLE_EQ(estimate.proved(10.0), -3.0);
+  // A normal distribution exceeds 3.89 standard deviations once in 10,000 times.
+  EXPECT_NEAR(estimate.proved(), std::sqrt(5.0 * 5.0 - 3.89 * 3.89), 0.01);
+  EXPECT_NEAR(estimate.proved(10.0), -estimate.proved(), 1e-12);
   EXPECT_DOUBLE_EQ(estimate.proved(2.0), 0.0);
 }
 

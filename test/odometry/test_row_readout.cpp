@@ -47,7 +47,7 @@ TEST(RowReadout, FindsARollingShutter) {
 TEST(RowReadout, AGlobalShutterIsNone) {
   const auto found = watched(0.0).estimate();
   ASSERT_TRUE(found);
-  EXPECT_LT(std::abs(found->value), RowReadout::kSignificant * found->sigma);
+  EXPECT_LT(std::abs(found->value), 4.0 * found->sigma);
   EXPECT_FALSE(found->isRolling());
   EXPECT_FALSE(RowReadout().estimate());
 }

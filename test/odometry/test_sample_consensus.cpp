@@ -103,9 +103,7 @@ TEST_P(EveryMethod, KeepsToTheBoundsOnSamples) {
   const Scene hopeless = makeScene(200, 1.0, 0.0, 3);
   EXPECT_EQ(search(hopeless, GetParam(), 1, 120).iterations, 120);
   const Scene clean = makeScene(200, 0.0, 0.05, 3);
-  const int iterations = search(clean, GetParam()).iterations;
-  EXPECT_GE(iterations, SampleConsensusOptions{}.min_iterations);
-  EXPECT_LE(iterations, SampleConsensusOptions{}.min_iterations + GeneticConsensusOptions{}.population);
+  EXPECT_LE(search(clean, GetParam()).iterations, GeneticConsensusOptions{}.population) << "the first generation";
 }
 
 TEST_P(EveryMethod, FindsNothingInTooFewCorrespondences) {
@@ -148,7 +146,7 @@ TEST(SampleConsensus, MoreSamplesNeverGiveAWorsePose) {
       const PoseProblem problem(scene.camera, scene.correspondences, options.inlier_threshold);
       double best = std::numeric_limits<double>::max();
       for (int samples = 1; samples <= 40; ++samples) {
-        options.min_iterations = options.max_iterations = samples;
+        options.max_iterations = samples;
         const Consensus consensus = findConsensus(problem, options, {});
         if (!consensus.found) continue;
         const double cost = problem.truncatedCost(consensus.T_current_reference);

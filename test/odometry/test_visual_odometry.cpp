@@ -1073,10 +1073,11 @@ StereoFeatures loosePair(int i) {
 TEST(VisualOdometry, WhatTheAdjustmentRefutesLeavesTheMapAsItWas) {
   {
     VisualOdometryOptions options;
-    options.motion.inlier_threshold = 15.0;  // of which exact pairs leave a half
     options.motion.min_inliers = 18;
     VisualOdometry odometry(options), blind(options);
     follow(odometry, 8), follow(blind, 8);
+    options.noise.corner = 2.0;  // of which exact pairs leave a half; the map keeps its own
+    odometry.configure(options), blind.configure(options);
     for (int i = 9; i <= 13; i += 2) {
       const OdometryResult refuted = odometry.update(loosePair(i));
       ASSERT_EQ(refuted.state, TrackingState::kDegraded) << refuted.reason;

@@ -207,7 +207,7 @@ WindowOptimizerOptions leastSquares() {
   WindowOptimizerOptions options;
   options.iterations = 10;
   options.kernel_scale = 20.0;
-  options.common_disparity_sigma = 0.0;
+  options.noise.common_disparity = 0.0;
   return options;
 }
 
@@ -219,7 +219,7 @@ TEST(WindowOptimizer, CovariancesAreThoseOfTheErrors) {
   double pose_nees = 0.0, calibration_nees = 0.0;
   for (int trial = 0; trial < kTrials; ++trial) {
     Window window = disturbedWindow(truth);
-    addNoise(window, kPositionSigma, options.disparity_sigma, 100 + static_cast<std::uint32_t>(trial));
+    addNoise(window, kPositionSigma, options.noise.disparity, 100 + static_cast<std::uint32_t>(trial));
     const WindowSolution solution = WindowOptimizer(options).optimize(window);
     ASSERT_TRUE(solution.success);
     ASSERT_EQ(solution.pose_covariance.rows(), 24);
@@ -242,7 +242,7 @@ TEST(WindowOptimizer, CovariancesAreThoseOfTheErrorsWhereTheKernelBendsAtTheNois
   double nees = 0.0;
   for (int trial = 0; trial < kTrials; ++trial) {
     Window window = disturbedWindow({});
-    addNoise(window, kPositionSigma, options.disparity_sigma, 900 + static_cast<std::uint32_t>(trial));
+    addNoise(window, kPositionSigma, options.noise.disparity, 900 + static_cast<std::uint32_t>(trial));
     const WindowSolution solution = WindowOptimizer(options).optimize(window);
     ASSERT_TRUE(solution.success);
     const Vector6d error = logSE3(syntheticPose(4).inverse() * window.T_camera_origin[4].inverse());
@@ -277,7 +277,7 @@ Window windowOfTheModel(int frames, double factor, double outliers, double share
       point.T_origin_anchor = window.T_camera_origin[static_cast<std::size_t>(first)].inverse();
       point.ray_and_inverse_depth << 1.6 * uniform(random) - 0.8, uniform(random) - 0.5,
           1.0 / (1.0 + 7.0 * uniform(random));
-      const double common = shipped.common_disparity_sigma * normal(random);
+      const double common = shipped.noise.common_disparity * normal(random);
       std::vector<WindowObservation> seen;
       for (int f = first; f <= std::min(last, frames - 1); ++f) {
         Eigen::Vector3d pixel;
@@ -287,7 +287,7 @@ Window windowOfTheModel(int frames, double factor, double outliers, double share
           continue;
         const double sigma = factor * kPositionSigma * (uniform(random) < outliers ? 20.0 : 1.0);
         pixel += Eigen::Vector3d(sigma * normal(random), sigma * normal(random),
-                                 common + shipped.disparity_sigma * normal(random));
+                                 common + shipped.noise.disparity * normal(random));
         if (shared > 0.0) {
           const auto part = [](double ray) { return static_cast<int>(std::floor(350.0 * ray / 24.0)); };
           const auto& ray = point.ray_and_inverse_depth;
@@ -365,7 +365,7 @@ TEST(WindowOptimizer, AFloorAddsItsInformationToThatOfEachPose) {
   options.planar_height_sigma = 1e-3;
   options.planar_tilt_sigma = 0.05;
   WindowOptimizerOptions least_squares = leastSquares();
-  least_squares.disparity_sigma = 1.0;  // so coarse that the floor tells as much as the measurements
+  least_squares.noise.disparity = 1.0;  // so coarse that the floor tells as much as the measurements
   WindowOptimizer optimizer(least_squares);
   Window window = disturbedWindow({}, driven);
   for (WindowObservation& observation : window.observations) observation.sigma = 2.0;
@@ -416,7 +416,7 @@ Window windowWithCommonErrors(double common, double position, std::uint32_t seed
     observation.measurement.z() += errors[static_cast<std::size_t>(observation.point)];
     observation.sigma = position;
   }
-  addNoise(window, position, WindowOptimizerOptions().disparity_sigma, seed + 1);
+  addNoise(window, position, NoiseOptions().disparity, seed + 1);
   return window;
 }
 
@@ -505,7 +505,7 @@ void expectSquaresOf(const Window& window, const WindowOptimizerOptions& options
     Eigen::Vector3d error = observation.measurement - predicted;
     error.head<2>() /= observation.sigma;
     // What the sightings share does not average away.
-    error.z() /= std::sqrt(std::pow(options.disparity_sigma, 2) + 5.0 * std::pow(options.common_disparity_sigma, 2));
+    error.z() /= std::sqrt(std::pow(options.noise.disparity, 2) + 5.0 * std::pow(options.noise.common_disparity, 2));
     EXPECT_NEAR(std::sqrt(solution.squares[i]), error.norm(), 1e-9 * (1.0 + error.norm()));
   }
 }

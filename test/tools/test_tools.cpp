@@ -225,10 +225,10 @@ TEST_F(Tools, OutputIsNeverADeviceOrAPipe) {
 
 TEST_F(Tools, OptionsThatDoNotExistOrAreOutOfRange) {
   expectError(runSequence("--param detector/no_such_option=1"), "detector/no_such_option");
-  expectError(runSequence("--param motion/confidence=1.5"), "motion/confidence");
+  expectError(runSequence("--param motion/min_inliers=1"), "motion/min_inliers");
   expectError(runSequence("--param motion/max_iterations=many"), "motion/max_iterations");
   expectError(runSequence("--param motion/consensus=square"), "motion/consensus");
-  expectError(runSequence("--param motion/confidence"), "name=value");
+  expectError(runSequence("--param motion/min_inliers"), "name=value");
   // Each in its range, but nothing would be aligned.
   for (const char* option : {"alignment/radius=6", "descriptor/patch_side=9"})
     expectError(runSequence("--param " + std::string(option)), "descriptor/patch_side");
@@ -239,8 +239,8 @@ TEST_F(Tools, OptionsThatDoNotExistOrAreOutOfRange) {
   expectError(runSequence(option), config.string());
   std::ofstream(config) << "visual_odometry: {motion: {no_such_option: 1}}\n";
   expectError(runSequence(option), "no_such_option");
-  std::ofstream(config) << "visual_odometry: {motion: {confidence: 2}}\n";
-  expectError(runSequence(option), "motion/confidence");
+  std::ofstream(config) << "visual_odometry: {motion: {min_inliers: 2}}\n";
+  expectError(runSequence(option), "motion/min_inliers");
   std::ofstream(config) << "visual_odometry: [unfinished\n";
   expectError(runSequence(option), config.string());
 }

@@ -14,8 +14,6 @@ struct CalibrationOptions {
   double prior_sigma = 1.0;
   double right_delay = 0.0;
   double trust = 0.1;
-  double significance = 4.0;
-  double memory = 0.5;
 
   void describe(OptionList& list) {
     list.add("enabled", enabled, "estimate the rig's residual disparity error while driving and compensate it");
@@ -28,12 +26,6 @@ struct CalibrationOptions {
              "time by which right images are known to be later than left ones; a significant difference is found");
     list.add("trust", trust, {0.01, 1.0}, "",
              "how far the window's own figure for its precision is believed: 1 / the factor on its standard deviation");
-    list.add(
-        "significance", significance, {0.0, 100.0}, "sigma",
-        "how many of the window's own standard deviations an estimate must differ from what is known beforehand to "
-        "move it");
-    list.add("memory", memory, {0.0, 1.0}, "",
-             "share of the earlier windows' information that one more window leaves; 1: forever");
   }
 };
 
@@ -79,8 +71,8 @@ class CalibrationFilter {
 
   CalibrationOptions options_;
   RigCalibration calibration_;
-  Evidence past_;                        ///< of windows before the present one
-  std::optional<Contribution> pending_;  ///< the last window that shared no pair with those already counted
+  Evidence past_;                        ///< of the last window that shares no pair with the present one
+  std::optional<Contribution> pending_;  ///< the window that is the next one's past
   std::optional<Evidence> present_;      ///< of the past and the last window
   int commons_ = 0;                      ///< how many squares were noted
   double common_square_ = 0.0;

@@ -6,6 +6,7 @@
 
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
+#include "stereo_descriptor_vo/odometry/noise.hpp"
 
 namespace sdvo {
 
@@ -45,9 +46,11 @@ struct Floor {
   static double cost(double square);
   static double weight(double square);
 
-  /// Whether a base with this residual drives on the floor: it is level, and at most four standard deviations over it.
-  static bool isLevel(const Eigen::Vector3d& residual) { return residual.tail<2>().norm() <= kOff; }
-  static bool isOn(const Eigen::Vector3d& residual) { return isLevel(residual) && std::abs(residual[0]) <= kOff; }
+  /// Whether a base with this residual drives on the floor: it is level, and not over it.
+  static bool isLevel(const Eigen::Vector3d& residual) { return residual.tail<2>().squaredNorm() <= noiseGate(2); }
+  static bool isOn(const Eigen::Vector3d& residual) {
+    return isLevel(residual) && residual[0] * residual[0] <= noiseGate(1);
+  }
 
   /// T_camera_origin nearer to the floor, by as much as the pose's covariance (of a right perturbation of
   /// T_origin_camera) leaves room for; unchanged where the base is off the floor.
@@ -57,8 +60,6 @@ struct Floor {
   Matrix6d constrained(const Eigen::Isometry3d& T_origin_camera, const Matrix6d& covariance) const;
 
  private:
-  static constexpr double kOff = 4.0;  // standard deviations, which a base on its floor exceeds in 1 of 2,500 pairs
-
   /// Of the residual's three numbers on a right perturbation of T_origin_camera.
   Eigen::Matrix<double, 6, 3> gain(const Jacobian& jacobian, const Matrix6d& covariance) const;
 };

@@ -13,6 +13,7 @@
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/odometry/described_points.hpp"
 #include "stereo_descriptor_vo/odometry/keyframe_memory.hpp"
+#include "stereo_descriptor_vo/odometry/noise.hpp"
 #include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
 #include "stereo_descriptor_vo/odometry/reference_patch.hpp"
 #include "stereo_descriptor_vo/odometry/window_optimizer.hpp"
@@ -22,21 +23,19 @@ namespace sdvo {
 struct LocalMapOptions {
   int keyframes = 8;
   int remembered = 4;
-  int lasting_keyframes = 8;
   int lasting_points = 150;
   int remembered_keyframes = 40;
   double keyframe_parallax = 4.0;
   double keyframe_overlap = 0.6;
-  double corner_sigma = 0.4;
-  double reference_sigma = 0.1;
   double renewal_scale = 1.2;
+  NoiseOptions noise;
 
   void describe(OptionList& list) {
-    list.add("keyframes", keyframes, {2, 50}, "", "newest key frames, which the map holds whatever they see");
-    list.add("lasting_keyframes", lasting_keyframes, {0, 100}, "",
-             "older key frames that it holds at most, because they share points with the newest pair");
+    list.add("keyframes", keyframes, {2, 50}, "",
+             "newest key frames, which the map holds whatever they see; as many older ones at most, because they share "
+             "points with the newest pair");
     list.add("lasting_points", lasting_points, {1, 10000}, "",
-             "points that such a key frame must share at least, and an eighth of the newest pair's");
+             "points that such an older key frame must share at least");
     list.add("remembered_keyframes", remembered_keyframes, {0, 1000}, "",
              "key frames that are remembered beyond that, by where they were taken, for a camera that comes back");
     list.add("remembered", remembered, {1, 100}, "",
@@ -45,10 +44,6 @@ struct LocalMapOptions {
              "a pair is kept as a key frame once its points moved by this median since the last one");
     list.add("keyframe_overlap", keyframe_overlap, {0.0, 1.0}, "",
              "… or once a smaller share of its points was seen in the last key frame");
-    list.add("corner_sigma", corner_sigma, {0.01, 10.0}, "px",
-             "standard deviation of a corner's position, where no patch was aligned");
-    list.add("reference_sigma", reference_sigma, {0.01, 10.0}, "px",
-             "the same of the position that a point's reference patch defines");
     list.add(
         "renewal_scale", renewal_scale, {1.0, 100.0}, "",
         "a point takes a new reference patch once it appears larger or smaller than in the old one by this factor");
@@ -136,7 +131,9 @@ class LocalMap {
   /// Bundle adjustment over all frames; sightings that do not agree with it are cut off from their points.
   struct Adjustment {
     bool success = false;
-    Matrix6d since_keyframe = Matrix6d::Zero();  ///< covariance of the newest pose since the key frame before it
+    Matrix6d since_keyframe = Matrix6d::Zero();  ///< covariance of the newest pose since the key frame before it.
+    /// What the newest pose in the map errs by more than that key frame: errors of the map are in both.
+    Matrix6d growth = Matrix6d::Zero();
     RigCalibration::Matrix calibration_information = RigCalibration::Matrix::Zero();
     std::optional<double> common_disparity_square;  ///< px^2, see WindowSolution
     std::vector<int> rejected_rows;                 ///< of the newest pair

@@ -17,7 +17,7 @@ MinimalSample drawSample(std::mt19937& random, int count);
 class SampleBudget {
  public:
   /// `confidence`: probability that a sample without outliers is among those drawn.
-  SampleBudget(int at_least, int at_most, double confidence);
+  SampleBudget(int at_most, double confidence);
 
   /// Takes note of the share of inliers of the best pose so far.
   void noteInliers(double share);
@@ -27,8 +27,7 @@ class SampleBudget {
   double progress(int samples) const;
 
  private:
-  double at_least_, at_most_;
-  double confidence_;
+  double at_most_, confidence_;
   double needed_;
 };
 

@@ -17,9 +17,11 @@ struct MotionEstimatorOptions : SampleConsensusOptions, MotionRefinementOptions 
 
   void describe(OptionList& list) {
     SampleConsensusOptions::describe(list);
-    MotionRefinementOptions::describe(list);
     list.add("min_inliers", min_inliers, {4, 10000}, "", "fewer are no motion");
   }
+
+  /// For measurements with this noise.
+  void assume(const NoiseOptions& noise) { inlier_threshold = noise.inlierGate(), kernel_scale = noise.length(); }
 
   /// For measurements that err by so many times more.
   MotionEstimatorOptions scaled(double noise) const {

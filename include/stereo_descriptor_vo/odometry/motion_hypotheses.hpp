@@ -39,8 +39,7 @@ struct MotionScene {
   bool is_suspected = false;          ///< what is followed may not be the camera's motion by the pairs before
   bool is_doubted = false;            ///< … and likely is not
   double tolerance = 0.05;            ///< m: motions that differ by less than this and 3 % are equally good
-  Noise noise = {LocalMapOptions().corner_sigma, LocalMapOptions().reference_sigma,
-                 WindowOptimizerOptions().common_disparity_sigma};
+  Noise noise{NoiseOptions()};
 };
 
 /// A motion that competes for being the camera's, and what speaks for it.

@@ -5,20 +5,14 @@
 #include <string>
 #include <vector>
 
-#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/odometry/noise.hpp"
 #include "stereo_descriptor_vo/odometry/pose_problem.hpp"
 
 namespace sdvo {
 
 struct MotionRefinementOptions {
-  double kernel_scale = 1.0;
-  int refinement_iterations = 20;  ///< Levenberg-Marquardt steps at most
-
-  void describe(OptionList& list) {
-    list.add("kernel_scale", kernel_scale, {0.05, 20.0}, "px",
-             "residual at which the Cauchy kernel of the refinement starts to bend; times the scale of the noise that "
-             "is learnt");
-  }
+  double kernel_scale = NoiseOptions().length();  ///< px: residual at which the Cauchy kernel starts to bend
+  int refinement_iterations = 20;                 ///< Levenberg-Marquardt steps at most
 };
 
 /// The weighted least squares problem around a pose, for the left perturbation xi = (translation, rotation) of it.

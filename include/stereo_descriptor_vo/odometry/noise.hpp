@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "stereo_descriptor_vo/common/cpp17.hpp"
+#include "stereo_descriptor_vo/common/options.hpp"
 
 namespace sdvo {
 
@@ -26,29 +26,60 @@ constexpr double noiseGate(int numbers) {
   return gates[numbers - 1];
 }
 
-/// The errors of measurements, and the differences of motions that follow from them. Standard deviations in px.
+/// Standard deviations of measurements, px, and the limits that follow from them.
+struct NoiseOptions {
+  double corner = 0.4;
+  double reference = 0.1;
+  double disparity = 0.1;
+  double common_disparity = 0.3;
+
+  void describe(OptionList& list) {
+    list.add("corner", corner, {0.01, 10.0}, "px",
+             "standard deviation of a detected corner's position, in each direction; times the scale that is learnt");
+    list.add("reference", reference, {0.01, 10.0}, "px",
+             "the same of the position that a point's reference patch defines");
+    list.add("disparity", disparity, {0.01, 10.0}, "px",
+             "standard deviation of a disparity's noise, which is new in every sighting");
+    list.add(
+        "common_disparity", common_disparity, {0.0, 10.0}, "px",
+        "standard deviation of the error that all disparities of one point share: what the calibration's two terms "
+        "leave of the rig's, and what its texture does to the matching; until 20 windows told more of it");
+  }
+
+  /// Root mean square length of (u_left, v_left, u_right) between a corner and the map's point: both err.
+  double length() const { return std::sqrt(6.0 * corner * corner + common_disparity * common_disparity); }
+
+  /// The largest such length. u_left and u_right share the corners' errors.
+  double inlierGate() const { return 2.0 * corner * std::sqrt(noiseGate(1)); }
+
+  /// The largest distance of a corner from its point, in each direction.
+  double cornerGate() const { return corner * std::sqrt(noiseGate(1)); }
+
+  /// Of a corner whose patch is not the point's: it lies anywhere in a disc with u_left and u_right within the gate.
+  double unconfirmed() const { return inlierGate() / std::sqrt(8.0); }
+};
+
+/// The errors of measurements of a rig, and the differences of motions that follow from them.
 class Noise {
  public:
-  /// Of a detected corner and of a position by its patch, in each direction, and of a disparity.
-  Noise(double corner, double aligned, double disparity) : corner_(corner), aligned_(aligned), disparity_(disparity) {}
+  explicit Noise(const NoiseOptions& options) : options_(options) {}
 
   /// Takes in what the inliers of a confirmed motion were off by (rms of u_left, v_left and u_right, px). Slow and
   /// bounded: one pair may be blurred, and what the inliers are depends on the scale itself.
   void learn(double rms) {
-    constexpr double kMost = 2.0;  // (chosen)
-    const double expected = std::sqrt(2.0 * corner_ * corner_ + disparity_ * disparity_ / 3.0);
+    constexpr double kMost = 2.0;  // and its inverse the least (chosen)
+    const double expected = options_.length() / std::sqrt(3.0);
     scale_ = std::clamp(kUsualMemory * scale_ + (1.0 - kUsualMemory) * rms / expected, 1.0 / kMost, kMost);
   }
 
   /// By how much this rig's corners err more than expected.
   double scale() const { return scale_; }
 
-  /// px: root mean square length (u_left, v_left, u_right) between a corner and the map's point. Motions that are
-  /// closer at most points are one.
-  double sameMotion() const { return scale_ * std::sqrt(6.0) * corner_; }
+  /// px: motions that are closer at most points are one.
+  double sameMotion() const { return scale_ * options_.length(); }
 
   /// px: two aligned positions that are further apart are not of one point.
-  double elsewhere() const { return std::sqrt(2.0 * noiseGate(2)) * aligned_; }
+  double elsewhere() const { return std::sqrt(2.0 * noiseGate(2)) * options_.reference; }
 
   /// Takes in the square, in standard deviations (chi-square of six), by which the motions of two parts of a confirmed
   /// motion's inliers differ.
@@ -60,7 +91,8 @@ class Noise {
 
  private:
   static constexpr double kUnknownRig = 4.0;  // measured on a dozen rigs: 1 to 19
-  double corner_, aligned_, disparity_, scale_ = 1.0;
+  NoiseOptions options_;
+  double scale_ = 1.0;
   double shared_ = kUnknownRig;
 };
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/odometry/noise.hpp"
 
 namespace sdvo {
 
@@ -13,17 +14,13 @@ struct PatchAlignmentOptions {
   bool enabled = true;
   int radius = 4;
   double min_correlation = 0.7;
-  double max_shift = 1.5;
-  double min_sigma = 0.02;
+  NoiseOptions noise;  ///< of corners, which bounds their corrections, and of what alignment leaves
 
   void describe(OptionList& list) {
     list.add("enabled", enabled, "align the patches of matched features, where the image side sends them");
     list.add("radius", radius, {2, kLargestRadius}, "samples",
              "half side of the part of the reference that is aligned");
     list.add("min_correlation", min_correlation, {0.0, 1.0}, "", "least correlation of the aligned patches");
-    list.add("max_shift", max_shift, {0.1, 10.0}, "px", "largest correction of a corner's position");
-    list.add("min_sigma", min_sigma, {0.001, 10.0}, "px",
-             "standard deviation of an aligned position that no clarity of its patch takes away");
   }
 
   /// Whether patches of so many samples a side can be aligned: the derivatives ask for one more all around.

@@ -11,12 +11,15 @@ namespace sdvo {
 /// six), and the ratio by which that may be off in every direction. Returns whether chance does not explain it.
 bool widen(Matrix6d& covariance, const Vector6d& deviation);
 
+/// A symmetric matrix without its directions of negative variance.
+Matrix6d positivePart(const Matrix6d& matrix);
+
 /// Covariance of a pose that is reported pair by pair while the map behind it improves. All covariances are of right
 /// perturbations, T * exp(xi), translation before rotation, in m and rad.
 ///
-/// Each pair is measured against the last key frame, so the pose's covariance is that of the key frame plus that of the
-/// pair. It grows from key frame to key frame. The traces of its translation and its rotation shrink only when a
-/// pose is measured after a predicted one.
+/// The pose's covariance is that of the last key frame plus what it errs by more in the map. So it grows from key frame
+/// to key frame, but not while the map stays the same. The traces of its translation and its rotation shrink only when
+/// a pose is measured after a predicted one.
 class PoseCovariance {
  public:
   /// Of the last pose; zero in the beginning.
@@ -38,12 +41,17 @@ class PoseCovariance {
   /// The pose moved on by a motion with a covariance of its own, as a predicted one.
   void advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance);
 
-  /// The pose moved on and was measured against the key frame with this covariance. Returns the covariance of the
+  /// The pose moved on and was measured against the key frame with this covariance; in the map it errs by `growth` more
+  /// than that. Returns the covariance of the
   /// motion between the two reported poses. If the pose before is that of the key frame, it is `since_keyframe`. Else
   /// the key frame's own noise is in both poses and cancels. It is as large as that of the better pose, because its
   /// points have been seen as often. So the sum less twice this is the larger one of the two covariances. What the
   /// pose before was predicted or doubted by comes on top.
-  Matrix6d measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe);
+  Matrix6d measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe, const Matrix6d& growth);
+  /// The key frame is all of the map.
+  Matrix6d measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe) {
+    return measure(T_previous_current, since_keyframe, since_keyframe);
+  }
 
   /// The last pose may be off by more than its measurement says.
   void doubt(const Matrix6d& covariance);

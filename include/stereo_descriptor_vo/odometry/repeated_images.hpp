@@ -13,10 +13,10 @@ namespace sdvo {
 class RepeatedImages {
  public:
   /// Whether the pair shows what the one before did although the camera moved between them. `T_previous_current` is how
-  /// it should have moved, if that is known. `is_measured`: by something else than the images; a prediction is believed
-  /// less, so that images which were frozen remain so until they change.
-  bool areFrozen(const StereoFeatures& features, const std::optional<Eigen::Isometry3d>& T_previous_current,
-                 bool is_measured) const;
+  /// it should have moved, if that is known: most points by more than `noise`, px. `is_measured`: by something else
+  /// than the images; a prediction is believed less, so that images which were frozen remain so until they change.
+  bool areFrozen(const StereoFeatures& features, double noise,
+                 const std::optional<Eigen::Isometry3d>& T_previous_current, bool is_measured) const;
 
   /// Rows of the features whose part of the image is new. From some row of a torn image on, or up to it, the left image
   /// is still that of the pair before: features stand where they stood, to the digit.

@@ -39,8 +39,9 @@ class RightCameraRotation {
     Eigen::Matrix3d covariance() const;  ///< if the errors were independent, of 1 px
     Eigen::Vector3d rotation() const { return covariance() * gradient; }
   };
-  /// Those of the past and of one pair, whose wrong matches have no weight.
-  Sums sumUp(const StereoFeatures& features, const Sums& past) const;
+  /// Of one pair, whose wrong matches have no weight.
+  Sums sumUp(const StereoFeatures& features) const;
+  void remember(const StereoFeatures& features, const Eigen::Vector3d& estimate);
 
   /// Difference of two rotations as a shift of the rows of `now`, px, root mean square.
   static double distance(const Sums& now, const Sums& before);
@@ -53,8 +54,6 @@ class RightCameraRotation {
     double timesUsual() const;
     void learn();
   };
-
-  void addToParts(const StereoFeatures& features);
 
   Sums sums_, last_;         ///< of all pairs, and of the last one alone
   std::vector<Sums> parts_;  ///< of the image, of all pairs

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "stereo_descriptor_vo/common/cpp17.hpp"
+#include "stereo_descriptor_vo/odometry/noise.hpp"
 
 namespace sdvo {
 
@@ -16,10 +17,9 @@ namespace sdvo {
 class RowDelay {
  public:
   static constexpr int kColumns = 6, kRows = 4, kParts = kColumns * kRows;  ///< of the image
-  static constexpr double kSignificant = 4.0;  ///< standard deviations beyond which a delay is proved (chosen)
-  static constexpr double kMemory = 0.995;     ///< ratio of the past that a pair leaves: some 200 pairs (chosen)
-  static constexpr double kKernel = 0.5;       ///< px (chosen): errors of healthy rows are smaller
-  static constexpr double kUseful = 0.005;     ///< s (chosen); an estimate with a larger sigma is not used
+  static constexpr double kMemory = 0.995;         ///< ratio of the past that a pair leaves: some 200 pairs (chosen)
+  static constexpr double kKernel = 0.5;           ///< px (chosen): errors of healthy rows are smaller
+  static constexpr double kSquare = noiseGate(1);  ///< of the standard deviations beyond which a delay is proved
   /// s. 2 ms is 2 cm at 10 m/s, and 0.4 px at 100 deg/s and f = 120 px. Of rigs in step (twelve drives) at most 0.2 ms
   /// are proved. 10 ms is 3.7 px at 100 deg/s and f = 212 px: beyond 3 m a rig of 5 cm then has negative disparities.
   static constexpr double kWarn = 0.002, kFail = 0.01;
@@ -49,7 +49,7 @@ class RowDelay {
 
   void add(const std::vector<Row>& pair);
 
-  /// None while it is not known to kUseful.
+  /// None while its standard deviation is larger than a delay may be, kFail.
   std::optional<Estimate> estimate() const;
 
  private:

@@ -17,14 +17,13 @@ namespace sdvo {
 /// bound.
 class RowReadout {
  public:
-  static constexpr double kSignificant = RowDelay::kSignificant;  ///< standard deviations that prove a rolling shutter
-  /// s. Global shutters give up to 2.8 ms (MH_01, proved by its deviation), and one of 3 ms makes 5 sigma of position.
+  /// s. Global shutters give up to 2 ms (MH_01, proved by its deviation), and one of 3 ms makes 5 sigma of position.
   static constexpr double kWarn = 0.003;
 
   struct Estimate {
     double value, sigma;  ///< s
 
-    bool isRolling() const { return value > kWarn && value > kSignificant * sigma; }
+    bool isRolling() const { return value > kWarn && value * value > RowDelay::kSquare * sigma * sigma; }
   };
 
   /// A pair's motion since the reference, with the correspondences that agree with it, and the mean velocity (m/s and

@@ -7,6 +7,7 @@
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/odometry/genetic_consensus.hpp"
 #include "stereo_descriptor_vo/odometry/motion_refinement.hpp"
+#include "stereo_descriptor_vo/odometry/noise.hpp"
 #include "stereo_descriptor_vo/odometry/pose_problem.hpp"
 
 namespace sdvo {
@@ -20,21 +21,15 @@ inline const std::vector<std::string>& namesOf(ConsensusMethod) {
 
 struct SampleConsensusOptions {
   ConsensusMethod consensus = ConsensusMethod::kMsac;
-  double inlier_threshold = 3.0;
-  double confidence = 0.999;
-  int min_iterations = 30;
+  double inlier_threshold = NoiseOptions().inlierGate();  ///< px, of (u_left, v_left, u_right)
   int max_iterations = 500;
   int seed = 1;
   GeneticConsensusOptions genetic;
 
   void describe(OptionList& list) {
     list.add("consensus", consensus, "outlier rejection; adaptive_gasac is the paper's");
-    list.add("inlier_threshold", inlier_threshold, {0.1, 20.0}, "px",
-             "largest length of the stereo reprojection error (u_left, v_left, u_right) of an inlier; times the scale "
-             "of the noise that is learnt");
-    list.add("confidence", confidence, {0.5, 0.999999}, "", "probability that one sample without outliers is drawn");
-    list.add("min_iterations", min_iterations, {1, 100000}, "", "samples drawn at least");
-    list.add("max_iterations", max_iterations, {1, 100000}, "", "samples drawn at most");
+    list.add("max_iterations", max_iterations, {1, 100000}, "",
+             "samples drawn at most; fewer once one without outliers was drawn with a probability of 0.9999");
     list.add("seed", seed, {0, 1000000000}, "", "of the random samples; equal seeds give equal results");
     list.group("genetic", genetic);
   }

@@ -37,6 +37,7 @@ struct TrackingOptions : MotionPriorOptions {
 };
 
 struct VisualOdometryOptions {
+  NoiseOptions noise;
   FeatureMatcherOptions matcher;
   MotionEstimatorOptions motion;
   PatchAlignmentOptions alignment;
@@ -48,13 +49,21 @@ struct VisualOdometryOptions {
 
   void describe(OptionList& list) {
     list.collect(planar);
+    list.group("noise", noise);
     list.group("matcher", matcher);
     list.group("motion", motion);
     list.group("alignment", alignment);
     list.group("map", map);
-    list.group("window", window);
     list.group("calibration", calibration);
     list.group("tracking", tracking);
+  }
+
+  /// All steps assume the same noise.
+  VisualOdometryOptions withOneNoise() const {
+    VisualOdometryOptions options = *this;
+    options.motion.assume(noise);
+    options.alignment.noise = options.map.noise = options.window.noise = noise;
+    return options;
   }
 };
 

@@ -5,9 +5,9 @@
 #include <optional>
 #include <vector>
 
-#include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
+#include "stereo_descriptor_vo/odometry/noise.hpp"
 #include "stereo_descriptor_vo/odometry/rig_calibration.hpp"
 #include "stereo_descriptor_vo/odometry/window.hpp"
 
@@ -16,17 +16,7 @@ namespace sdvo {
 struct WindowOptimizerOptions {
   int iterations = 1;         ///< Levenberg-Marquardt steps at most, for each pair; refused ones do not count
   double kernel_scale = 1.0;  ///< sigma: normalised residual at which the Cauchy kernel bends
-  double disparity_sigma = 0.1;
-  double common_disparity_sigma = 0.3;
-
-  void describe(OptionList& list) {
-    list.add("disparity_sigma", disparity_sigma, {0.01, 10.0}, "px",
-             "standard deviation of a disparity's noise, which is new in every sighting");
-    list.add(
-        "common_disparity_sigma", common_disparity_sigma, {0.0, 10.0}, "px",
-        "standard deviation of the error that all disparities of one point share: what the calibration's two terms "
-        "leave of the rig's, and what its texture does to the matching; until 20 windows told more of it");
-  }
+  NoiseOptions noise;
 };
 
 /// What is known after the optimisation, besides the window's new values.
@@ -47,7 +37,6 @@ struct WindowSolution {
 /// next.
 class WindowOptimizer {
  public:
-  /// Throws std::invalid_argument when an option is out of its range.
   explicit WindowOptimizer(const WindowOptimizerOptions& options);
   WindowOptimizer(WindowOptimizer&&) noexcept;
   WindowOptimizer& operator=(WindowOptimizer&&) noexcept;
