@@ -116,7 +116,6 @@ std::vector<Competitor> rivalsOf(const MotionScene& scene, double threshold, con
     if (areOne(scene, chosen, other)) continue;
     Competitor rival{&other, explanations.logRatio(k, likeliest), without(sorted(other.inlierRows()), own)};
     const int rows = static_cast<int>(rival.rows.size());
-    if (rows < kFewestMeasured) continue;
     const double chance = chanceOfAgreement(threshold, other.gate);
     if (logFalseAlarms(std::max(left, rows), rows, chance) > std::log(kTailProbability)) continue;
     const auto same = std::find_if(rivals.begin(), rivals.end(),

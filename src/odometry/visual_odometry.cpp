@@ -166,7 +166,7 @@ MotionScene VisualOdometry::sceneOf(const StereoFeatures& features, double dt,
                     {},
                     {},
                     state_.rig.usual_agreement,
-                    state_.doubt.lasts(),
+                    state_.motion_doubt.lasts(),
                     state_.doubt.logOdds() > largestDoubt(),
                     options_.tracking.doubtful_deviation,
                     state_.rig.noise};
@@ -256,7 +256,7 @@ void VisualOdometry::finish(const Pair& pair, const MotionHypothesis* found, Ste
     state_.doubt.raise(CarriedDoubt::kCertain, "many matches agreed on no motion");
   // The depths of its points may be those of a wrong rig.
   if (features.report.refused && step.state == TrackingState::kLost) state_.map.reset();
-  state_.doubt.pass();
+  state_.doubt.pass(), state_.motion_doubt.pass();
   state_.images.remember(pair.whole(), pair.frozen);
   if (pair.new_part && step.reason.empty()) step.reason = "a part of the left image repeats that of the previous pair";
   step.dt = step.T_previous_current ? static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9 : pair.dt;
@@ -286,7 +286,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   if (!refutation.empty()) return refute(refutation + " after the adjustment");
 
   const MotionDoubt doubt(scene, found, state_.doubt);
-  state_.doubt.raise(doubt.log_odds, doubt.cause);
+  for (CarriedDoubt* carried : {&state_.doubt, &state_.motion_doubt}) carried->raise(doubt.log_odds, doubt.cause);
   commit(candidate, doubt.probability);
   Step step = measure(found, candidate);
   const Matrix6d measured = step.covariance;
@@ -387,7 +387,7 @@ void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& fou
 void VisualOdometry::commit(const Candidate& candidate, double probability) {
   std::swap(state_.map, state_.candidate);
   // In doubt, what is followed agrees with itself whatever it is.
-  if (probability < options_.tracking.probability) state_.map->discountNewest();
+  if (probability < options_.tracking.probability || state_.motion_doubt.lasts()) state_.map->discountNewest();
   const LocalMap::Adjustment& adjustment = candidate.adjustment;
   if (!adjustment.success) return;
   state_.rig.calibration.note(state_.map->oldestId(), state_.map->newestId(), candidate.calibration,

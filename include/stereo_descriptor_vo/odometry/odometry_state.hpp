@@ -41,7 +41,8 @@ struct OdometryState {
   std::optional<LocalMap> candidate;  ///< the map with the pair; between pairs only its memory matters
   LearntRig rig;
   MotionPrior prior;
-  CarriedDoubt doubt;
+  CarriedDoubt doubt;         ///< of all causes
+  CarriedDoubt motion_doubt;  ///< of what the motions themselves gave cause for
   Outage outage;
   RepeatedImages images;
   FloorBelief floor;
