@@ -62,9 +62,9 @@ struct MotionHypothesis {
     int matches;  ///< that it alone explains
   };
   std::optional<Rival> rival;
-  Matrix6d rivals_moment = Matrix6d::Zero();  ///< second moment of the rivals around the motion, m and rad
-  /// Square, in standard deviations of points that err independently, between the motion of the lasting inliers and
-  /// that of all, if it is taken for noise.
+  Matrix6d rivals_moment = Matrix6d::Zero();  ///< second moment of the rivals around the motion, m and rad.
+  /// Between the motion of the lasting inliers and that of all, if it is taken for noise: the square in standard
+  /// deviations of points that err independently.
   std::optional<double> lasting_square;
 
   /// Of a match: confirmed sightings of its point, four at most.

@@ -85,8 +85,8 @@ class Noise {
   /// motion's inliers differ.
   void learnShared(double square) { shared_ += (1.0 - kUsualMemory) * (square / 6.0 - shared_); }
 
-  /// How many times larger than by points that err independently the variance of a motion by many of them is:
-  /// neighbours share a part of their errors, which does not average out.
+  /// The variance of a motion by that of one whose points err independently: neighbours share a part of their errors,
+  /// which does not average out.
   double shared() const { return std::max(shared_, 1.0); }
 
  private:
