@@ -8,7 +8,8 @@
 namespace sdvo {
 
 /// Adds the outer product of a deviation to a covariance if its square exceeds half of the expected one (chi-square of
-/// six). The ratio by which a motion may be off is added in every direction. Returns whether chance does not explain it.
+/// six). The ratio by which a motion may be off is added in every direction. Returns whether chance does not explain
+/// it.
 bool widen(Matrix6d& covariance, const Vector6d& deviation);
 
 /// A symmetric matrix without its directions of negative variance.
