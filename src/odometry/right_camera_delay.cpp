@@ -88,9 +88,12 @@ RightCameraDelay::RightCameraDelay(double prior)
 void RightCameraDelay::measure(const StereoFeatures& features, const std::vector<RowMotion>& rows, double dt,
                                const Vector6d& velocity) {
   if (rows.size() >= kFewestMeasured && dt > 0.0)
-    for (auto* partner : {&earlier_, &later_})
-      *partner = std::clamp(*partner + logRatioOfPartner(rows, partner == &earlier_ ? -dt : dt),
+    for (auto* partner : {&earlier_, &later_}) {
+      // What no further pair confirms fades: a camera that stands shows nothing of it.
+      const double carried = CarriedDoubt::kUnsuspected + kUsualMemory * (*partner - CarriedDoubt::kUnsuspected);
+      *partner = std::clamp(carried + logRatioOfPartner(rows, partner == &earlier_ ? -dt : dt),
                             CarriedDoubt::kUnsuspected, CarriedDoubt::kCertain);
+    }
   expose(features, dt * velocity.head<3>().norm(), velocity.tail<3>().norm());
   StereoFeatures positions;
   positions.camera = features.camera;

@@ -133,6 +133,10 @@ TEST(RightCameraDelay, KnowsThePartnerUntilRowsInStepSayOtherwise) {
   EXPECT_GT(measure(seen(Vector6d::Zero(), kPeriod, 0.15), Vector6d::Zero()), 0.0) << "a camera that stands";
   EXPECT_GT(measure(seen(velocity, 0.0, 0.5), 0.1 * velocityAt(2.0)), -2.9) << "rows that neither explains";
   EXPECT_LT(measure(seen(velocity, 0.0, 0.15), velocity), 0.0);
+  EXPECT_GT(measure(late, velocity), 0.0);
+  double log_odds = 0.0;
+  for (int pair = 0; pair < 20; ++pair) log_odds = measure(seen(Vector6d::Zero(), kPeriod, 0.15), Vector6d::Zero());
+  EXPECT_LT(log_odds, logOdds(0.05)) << "a camera that stands for long";
 }
 
 }  // namespace test_right_camera_delay
