@@ -18,11 +18,11 @@ Eigen::Isometry3d moved(double x) {
 /// A pair that matches some points of the world and some of a thing that moved by `thing_x`, m.
 class Competition : public ::testing::Test {
  protected:
-  void add(int count, double x, int sightings) {
+  void add(int count, double x, int sightings, double depth = 6.0) {
     std::mt19937 random(static_cast<unsigned>(view_->seen.size()));
     std::uniform_real_distribution<double> uniform(-1.0, 1.0);
     for (int i = 0; i < count; ++i) {
-      const Eigen::Vector3d point(4.0 * uniform(random), 2.0 * uniform(random), 6.0 + 2.0 * uniform(random));
+      const Eigen::Vector3d point(4.0 * uniform(random), 2.0 * uniform(random), depth + 2.0 * uniform(random));
       const int row = static_cast<int>(view_->seen.size());
       all_.matches.push_back({row, row, 0.f});
       all_.correspondences.push_back({point, synthetic::camera().project(moved(x) * point)});
@@ -104,6 +104,14 @@ TEST_F(Competition, ProbabilitiesFollowTheShareAndNotTheNumber) {
   EXPECT_GT(few, 0.6);
   add(540, 0.0, 4), add(360, 0.5, 4);
   EXPECT_NEAR(choose({0.0, 0.5}).probability, few, 0.01);
+}
+
+TEST_F(Competition, WhatBothExplainIsNoEvidence) {
+  add(100, 0.0, 4), add(20, 0.5, 4);
+  const double near_alone = choose({0.0, 0.5}).probability;
+  // Half a metre moves points 1000 m away by less than an inlier may be off.
+  add(1000, 0.0, 1, 1000.0);
+  EXPECT_NEAR(choose({0.0, 0.5}).probability, near_alone, 0.01);
 }
 
 TEST_F(Competition, EqualHypothesesAreDecidedByThePrior) {
