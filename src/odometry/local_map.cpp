@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "../common/median.hpp"
+#include "stereo_descriptor_vo/odometry/correspondence_arrays.hpp"
 #include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
 
 namespace sdvo {
@@ -64,7 +65,7 @@ LocalMap::View LocalMap::view(const std::optional<Eigen::Isometry3d>& T_next_new
   const auto isSeenNext = [&](const Eigen::Vector3d& pixel) {
     if (!T_next_newest) return false;
     const Eigen::Vector3d next = *T_next_newest * camera_.backProject(pixel.x(), pixel.y(), pixel.z());
-    return next.z() > 0.0 && camera_.sees(camera_.project(next));
+    return next.z() >= kNearestDepth && camera_.sees(camera_.project(next));
   };
   View view;
   view.rows.kind = kind_;
