@@ -41,7 +41,9 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene, double max_doubt) 
     Alignment aligned = align(scene, found);
     const std::optional<Eigen::Isometry3d> T_lasting = motionOfLasting(scene, aligned, found);
     found.motion_time += stopwatch.lap();
-    if (T_lasting && !is_chosen) continue;
+    const bool is_another =
+        T_lasting && !isTolerable(scene, *T_lasting, *T_lasting * aligned.T_current_reference.inverse());
+    if (is_another && !is_chosen) continue;
     found.motion.T_current_reference = aligned.T_current_reference;
     found.sightings = std::move(aligned.sightings);
     if (T_lasting) keepTo(scene, *T_lasting, aligned.measured, found);
