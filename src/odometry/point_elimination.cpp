@@ -221,7 +221,6 @@ struct AddPoint {
     const Three by_offset = disparity * R.times(sums.by0[2], sums.by1[2], sums.by2[2]);
     const Three by_bend = disparity * R.times(sums.shaped0[2], sums.shaped1[2], sums.shaped2[2]);
     for (int k = 0; k < moving; ++k) multiply(R, factors[k]);
-
     for (int k = 0; k < moving; ++k) {
       const FactorColumns own(factors[k]);
       PoseVector* border = borders[factors[k].pose].columns;
@@ -234,27 +233,38 @@ struct AddPoint {
         subtractProduct(own, factors[other].Y, blocks[indexOf(factors[k].pose, factors[other].pose)].columns);
     }
 
-    const double square = disparity * disparity;
-    calibration_hessian->coeffRef(0, 0) += square * sums.weight - sumOf(by_offset * by_offset);
-    calibration_hessian->coeffRef(1, 0) += square * sums.shape - sumOf(by_bend * by_offset);
-    calibration_hessian->coeffRef(1, 1) += square * sums.shape_square - sumOf(by_bend * by_bend);
+    addCalibration(sums, disparity * disparity, by_offset, by_bend, *calibration_hessian);
     eliminated->calibration_gradient << disparity * sums.residual - sumOf(by_offset * gradient),
         disparity * sums.shape_residual - sumOf(by_bend * gradient);
     *calibration_gradient += eliminated->calibration_gradient;
 
-    for (int k = 0; k < 3; ++k) {
-      eliminated->R.row(k) << R.column0[k], R.column1[k], R.column2[k];
-      eliminated->gradient[k] = gradient[k];
-      eliminated->by_calibration.col(k) << by_offset[k], by_bend[k];
-    }
     eliminated->factors = moving;
-    eliminated->sightings = sums.sightings;
-    eliminated->weight = sums.weight;
-    eliminated->disparity_residual = sums.residual;
-    eliminated->disparity_by_point << sums.by0[2], sums.by1[2], sums.by2[2];
+    keep(sums, R, gradient, by_offset, by_bend, *eliminated);
   }
 
  private:
+  /// What a point says of the calibration, less what it is in itself.
+  static SDVO_IN_KERNEL void addCalibration(const PointSums& sums, double square, const Three& by_offset,
+                                            const Three& by_bend, RigCalibration::Matrix& hessian) {
+    hessian(0, 0) += square * sums.weight - sumOf(by_offset * by_offset);
+    hessian(1, 0) += square * sums.shape - sumOf(by_bend * by_offset);
+    hessian(1, 1) += square * sums.shape_square - sumOf(by_bend * by_bend);
+  }
+
+  /// What moves the point later, and what its disparities tell.
+  static SDVO_IN_KERNEL void keep(const PointSums& sums, const InverseRoot& R, const Three& gradient,
+                                  const Three& by_offset, const Three& by_bend, EliminatedPoint& eliminated) {
+    for (int k = 0; k < 3; ++k) {
+      eliminated.R.row(k) << R.column0[k], R.column1[k], R.column2[k];
+      eliminated.gradient[k] = gradient[k];
+      eliminated.by_calibration.col(k) << by_offset[k], by_bend[k];
+    }
+    eliminated.sightings = sums.sightings;
+    eliminated.weight = sums.weight;
+    eliminated.disparity_residual = sums.residual;
+    eliminated.disparity_by_point << sums.by0[2], sums.by1[2], sums.by2[2];
+  }
+
   /// What a sighting says of its pose, of that and the calibration, and of that and the point.
   static SDVO_IN_KERNEL void addPose(const Lever& lever, const Derivatives& A, const Sight& at, double w,
                                      const double* T, PoseFactor& factor, PoseEquations::Block& block,
