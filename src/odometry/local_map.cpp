@@ -451,7 +451,7 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
 void LocalMap::cutOff(const std::vector<double>& squares, Adjustment& adjustment) {
   const double gate = 2.0 * noiseGate(2);  // the point's position errs as much as the sighting's
   for (const int i : problem_.newest) {
-    // What no patch confirms may be another thing: if it is the point's corner, it is within a corner's noise.
+    // A corner that no patch confirms may be of another point. The point's own corner is within a corner's noise.
     const double wider = std::max(problem_.window.observations[i].sigma / options_.noise.corner, 1.0);
     if (wider * wider * squares[i] <= gate) continue;
     Point& point = points_[problem_.points[problem_.window.observations[i].point]];

@@ -12,7 +12,7 @@ void CarriedDoubt::raise(double log_odds, const std::string& cause) {
 }
 
 void CarriedDoubt::pass() {
-  // Pairs: once that many have made points lasting ones, they can speak for themselves.
+  // Pairs: half of those that make a point a lasting one, whose agreement is new evidence.
   constexpr double kHalfLife = 0.5 * MotionHypothesis::kLastingSightings;
   log_odds_ = kUnsuspected + (log_odds_ - kUnsuspected) * std::exp2(-1.0 / kHalfLife);
 }

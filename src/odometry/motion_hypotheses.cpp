@@ -48,7 +48,7 @@ std::vector<int> sorted(std::vector<int> values) {
   return values;
 }
 
-/// What the hypotheses of a pair explain. Whatever hypothesis matched a point counts for all of them.
+/// The matches that each hypothesis of a pair explains. A match of one hypothesis counts for all of them.
 class Explanations {
  public:
   Explanations(const MotionScene& scene, double threshold, const std::vector<MotionHypothesis>& hypotheses)

@@ -113,7 +113,7 @@ MotionHypothesis MotionSearch::searchNear(const MotionScene& scene, const ViewPt
 /// Whether the motion found has a good part of the points where the search did not look for them.
 bool MotionSearch::leavesGate(const MotionScene& scene, const Eigen::Isometry3d& predicted,
                               const MotionHypothesis& found) const {
-  constexpr double kGoodPart = 0.1;  // fewer do not pay for a second search (measured: 15 % of a pair)
+  constexpr double kGoodPart = 0.1;  // of the points (chosen)
   const StereoCamera& camera = scene.features.camera;
   const Eigen::Isometry3d& T_current_reference = found.motion.T_current_reference;
   std::size_t seen = 0, outside = 0;
@@ -219,8 +219,8 @@ MotionSearch::Alignment MotionSearch::align(const MotionScene& scene, const Moti
   return alignment;
 }
 
-/// The motion that the points which stood still so far tell when left alone, if it is likelier another than that of all
-/// together: what moves by itself differs from it as a prediction does, the world by what the points of this rig err.
+/// The lasting points' own motion, if it is likelier another one than the motion of all inliers. The difference of a
+/// mover has the prior's covariance; that of a rigid world has this rig's noise alone.
 std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene& scene, const Alignment& aligned,
                                                                MotionHypothesis& found) const {
   const StereoCamera& camera = scene.features.camera;

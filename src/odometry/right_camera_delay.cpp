@@ -89,7 +89,7 @@ void RightCameraDelay::measure(const StereoFeatures& features, const std::vector
                                const Vector6d& velocity) {
   if (rows.size() >= kFewestMeasured && dt > 0.0)
     for (auto* partner : {&earlier_, &later_}) {
-      // What no further pair confirms fades: a camera that stands shows nothing of it.
+      // Evidence fades without renewal, because a standing camera shows none.
       const double carried = CarriedDoubt::kUnsuspected + kUsualMemory * (*partner - CarriedDoubt::kUnsuspected);
       *partner = std::clamp(carried + logRatioOfPartner(rows, partner == &earlier_ ? -dt : dt),
                             CarriedDoubt::kUnsuspected, CarriedDoubt::kCertain);

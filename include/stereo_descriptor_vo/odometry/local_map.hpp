@@ -132,7 +132,7 @@ class LocalMap {
   struct Adjustment {
     bool success = false;
     Matrix6d since_keyframe = Matrix6d::Zero();  ///< covariance of the newest pose since the key frame before it.
-    /// What the newest pose in the map errs by more than that key frame: errors of the map are in both.
+    /// Covariance of the newest pose's error in the map beyond that key frame's; errors of the map cancel.
     Matrix6d growth = Matrix6d::Zero();
     RigCalibration::Matrix calibration_information = RigCalibration::Matrix::Zero();
     std::optional<double> common_disparity_square;  ///< px^2, see WindowSolution

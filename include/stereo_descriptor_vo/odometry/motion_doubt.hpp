@@ -36,8 +36,8 @@ class CarriedDoubt {
 struct MotionDoubt {
   double probability = 1.0;  ///< that it is
   double log_odds = 0.0;     ///< that it is not, by the pair alone
-  Matrix6d moment =
-      Matrix6d::Zero();       ///< of what is expected around the motion, by the probability that it misleads, m and rad
+  /// Second moment of the prior around the motion, m and rad, times the probability that the motion is misled.
+  Matrix6d moment = Matrix6d::Zero();
   std::string reason, cause;  ///< in words, of the likeliest alternative, for this pair and for the next
 
   MotionDoubt(const MotionScene& scene, const MotionHypothesis& found, const CarriedDoubt& before);

@@ -85,12 +85,12 @@ class Noise {
   /// motion's inliers differ.
   void learnShared(double square) { shared_ += (1.0 - kUsualMemory) * (square / 6.0 - shared_); }
 
-  /// The variance of a motion by that of one whose points err independently: neighbours share a part of their errors,
-  /// which does not average out.
+  /// Ratio between a motion's variance and that by independent errors of its points. Neighbours share a part of their
+  /// errors, which does not average out.
   double shared() const { return std::max(shared_, 1.0); }
 
  private:
-  static constexpr double kUnknownRig = 4.0;  // measured on a dozen rigs: 1 to 19
+  static constexpr double kUnknownRig = 4.0;  // ratio; the learnt one of real and rendered drives is 1 to 19 (KITTI 01)
   NoiseOptions options_;
   double scale_ = 1.0;
   double shared_ = kUnknownRig;

@@ -42,12 +42,12 @@ class PoseCovariance {
   /// The pose moved on by a motion with a covariance of its own, as a predicted one.
   void advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance);
 
-  /// The pose moved on and was measured against the key frame with this covariance; in the map it errs by `growth` more
-  /// than that. Returns the covariance of the
-  /// motion between the two reported poses. If the pose before is that of the key frame, it is `since_keyframe`. Else
-  /// the key frame's own noise is in both poses and cancels. It is as large as that of the better pose, because its
-  /// points have been seen as often. So the sum less twice this is the larger one of the two covariances. What the
-  /// pose before was predicted or doubted by comes on top.
+  /// The pose moved on and was measured against the key frame with the covariance `since_keyframe`. `growth`:
+  /// covariance of its error in the map beyond the key frame's. Returns the covariance of the motion between the two
+  /// reported poses. If the pose before is that of the key frame, it is `since_keyframe`. Else the key frame's own
+  /// noise is in both poses and cancels. It is as large as that of the better pose, because its points have been seen
+  /// as often. So the sum less twice this is the larger one of the two covariances. What the pose before was predicted
+  /// or doubted by comes on top.
   Matrix6d measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe, const Matrix6d& growth);
   /// The key frame is all of the map.
   Matrix6d measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe) {
