@@ -20,17 +20,26 @@ const fs::path kSource = SDVO_SOURCE_DIR;
 const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"common", {}},
     {"front_end", {"common"}},
-    {"odometry", {"common"}},
-    {"places", {"common", "odometry"}},
+    {"motion", {"common"}},
+    {"matching", {"common", "motion"}},
+    {"map", {"common", "motion", "matching"}},
+    {"belief", {"common", "motion", "matching", "map"}},
+    {"rig", {"common", "motion", "matching", "map", "belief"}},
+    {"odometry", {"common", "motion", "matching", "map", "belief", "rig"}},
+    {"places", {"common", "motion", "matching", "map", "belief", "rig", "odometry"}},
     {"data", {"common"}},
-    {"config", {"common", "front_end", "odometry", "places"}},
-    {"check", {"common", "front_end", "odometry"}},
-    {"ros", {"common", "front_end", "odometry", "places", "config", "check"}},
-    {"tools", {"common", "front_end", "odometry", "places", "data", "config", "check", "ros"}},
+    {"config", {"common", "front_end", "motion", "matching", "map", "belief", "rig", "odometry", "places"}},
+    {"check", {"common", "front_end", "motion", "matching", "map", "belief", "rig", "odometry"}},
+    {"ros",
+     {"common", "front_end", "motion", "matching", "map", "belief", "rig", "odometry", "places", "config", "check"}},
+    {"tools",
+     {"common", "front_end", "motion", "matching", "map", "belief", "rig", "odometry", "places", "data", "config",
+      "check", "ros"}},
 };
 
 /// Rooms that a program without ROS can use.
-const std::set<std::string> kWithoutRos = {"common", "front_end", "odometry", "places", "data", "config", "check"};
+const std::set<std::string> kWithoutRos = {"common", "front_end", "motion", "matching", "map",    "belief",
+                                           "rig",    "odometry",  "places", "data",     "config", "check"};
 
 struct Include {
   fs::path file;
@@ -122,7 +131,8 @@ TEST(Rooms, TheCoreAndItsToolboxKnowNoRos) {
 
 /// OpenCV's readers of image files, which cv_bridge brings as well, bring a hundred libraries into a robot's processes.
 TEST(Rooms, WhatRunsOnARobotReadsNoImageFilesWithOpenCv) {
-  for (const std::string room : {"common", "front_end", "odometry", "places", "config", "ros"})
+  for (const std::string room :
+       {"common", "front_end", "motion", "matching", "map", "belief", "rig", "odometry", "places", "config", "ros"})
     for (const Include& include : includesOf(room))
       EXPECT_TRUE(include.header != "opencv2/imgcodecs.hpp" && include.header != "opencv2/highgui.hpp" &&
                   include.header != "opencv2/opencv.hpp" && include.header.rfind("cv_bridge/", 0) != 0)
@@ -173,9 +183,9 @@ TEST(Rooms, TheSearchKnowsRosHeaders) {
 }
 
 TEST(Rooms, TheSearchKnowsTheRoomOfAHeader) {
-  EXPECT_EQ(roomOf("stereo_descriptor_vo/odometry/local_map.hpp", "front_end"), "odometry");
+  EXPECT_EQ(roomOf("stereo_descriptor_vo/map/local_map.hpp", "front_end"), "map");
   EXPECT_EQ(roomOf("../data/text_file.hpp", "tools"), "data");
-  EXPECT_EQ(roomOf("log_sum.hpp", "odometry"), "odometry");
+  EXPECT_EQ(roomOf("log_sum.hpp", "motion"), "motion");
   EXPECT_EQ(roomOf("opencv2/core.hpp", "odometry"), "");
   EXPECT_EQ(roomOf("vector", "odometry"), "");
 }

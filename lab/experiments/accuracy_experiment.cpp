@@ -16,7 +16,7 @@
 #include "csv_table.hpp"
 #include "odometry_systems.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
-#include "stereo_descriptor_vo/odometry/sample_consensus.hpp"
+#include "stereo_descriptor_vo/motion/sample_consensus.hpp"
 
 namespace sdvo {
 namespace {

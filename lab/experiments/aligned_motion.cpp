@@ -3,7 +3,7 @@
 #include <numeric>
 #include <optional>
 
-#include "stereo_descriptor_vo/odometry/reference_patch.hpp"
+#include "stereo_descriptor_vo/map/reference_patch.hpp"
 
 namespace sdvo {
 namespace {

@@ -9,7 +9,7 @@
 #include "../../src/common/progress.hpp"
 #include "csv_table.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
-#include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
+#include "stereo_descriptor_vo/motion/motion_estimator.hpp"
 
 namespace sdvo {
 namespace {

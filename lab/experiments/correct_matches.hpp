@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/odometry/feature_matcher.hpp"
+#include "stereo_descriptor_vo/matching/feature_matcher.hpp"
 
 namespace sdvo {
 

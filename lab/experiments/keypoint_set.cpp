@@ -52,8 +52,8 @@ std::vector<StereoFeatures> describeKeypoints(const KeypointSet& set, const std:
     for (const int i : chosen) {
       const auto& [corner, match] = set.corners[static_cast<std::size_t>(i)];
       const cv::Point2f& p = corner.position;
-      keypoints.push_back({p.x, p.y, p.x - match.disparity, p.y + match.dv,
-                           static_cast<float>(curve.size(match.disparity))});
+      keypoints.push_back(
+          {p.x, p.y, p.x - match.disparity, p.y + match.dv, static_cast<float>(curve.size(match.disparity))});
     }
   const DescribedKeypoints described = descriptor.describe(set.images.left, set.images.right, keypoints);
   if (described.index.size() != keypoints.size())
@@ -69,7 +69,8 @@ std::vector<StereoFeatures> describeKeypoints(const KeypointSet& set, const std:
     features.descriptor = nameOf(descriptor.options().type);
     features.layout = descriptor.options().layout;
     features.element_type = descriptor.elementType();
-    features.descriptors = described.rows.rowRange(static_cast<int>(row), static_cast<int>(row + chosen.size())).clone();
+    features.descriptors =
+        described.rows.rowRange(static_cast<int>(row), static_cast<int>(row + chosen.size())).clone();
     for (const int i : chosen) {
       const auto& [corner, match] = set.corners[static_cast<std::size_t>(i)];
       features.append({corner.position.x, corner.position.y, match.disparity, match.dv, keypoints[row].size,

@@ -5,8 +5,8 @@
 
 #include "reference_sequence.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/odometry/feature_matcher.hpp"
-#include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
+#include "stereo_descriptor_vo/matching/feature_matcher.hpp"
+#include "stereo_descriptor_vo/motion/motion_estimator.hpp"
 
 namespace sdvo {
 

@@ -7,7 +7,7 @@
 #include "experiment_setup.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
-#include "stereo_descriptor_vo/odometry/rig_calibration.hpp"
+#include "stereo_descriptor_vo/motion/rig_calibration.hpp"
 
 namespace sdvo {
 

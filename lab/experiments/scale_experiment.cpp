@@ -11,7 +11,7 @@
 #include "csv_table.hpp"
 #include "keypoint_set.hpp"
 #include "reference_sequence.hpp"
-#include "stereo_descriptor_vo/odometry/correspondence_arrays.hpp"
+#include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
 
 namespace sdvo {
 namespace {

@@ -63,10 +63,15 @@ FIXED = set("""
     kMedianOfChiSquare kSmallestProblem kX kY kZ
     kBehindSquare kFarFromOverflow kHeld kNearestScaled kPrior kSmallestGain kSmallestStep kSteps""".split())
 
+# Of the motion side, from the ground.
+ROOMS = ("motion", "matching", "map", "belief", "rig", "odometry")
+
 
 def count():
     """Numbers that change results, options by their list.add and constants by their names; bare literals are not counted."""
-    sources = [*programs.ROOT.glob("src/odometry/*.[ch]pp"), *programs.ROOT.glob("include/stereo_descriptor_vo/odometry/*.hpp")]
+    sources = [path for room in ROOMS
+               for path in (*programs.ROOT.glob(f"src/{room}/*.[ch]pp"),
+                            *programs.ROOT.glob(f"include/stereo_descriptor_vo/{room}/*.hpp"))]
     texts = [path.read_text() for path in sources]
     settings = sum(len(re.findall(r"list\.add\(", text)) for text in texts)
     names = [name for text in texts for name in re.findall(r"\b(k[A-Z]\w*) = ", text)]

@@ -19,7 +19,7 @@ from sdvo_lab import marks, programs  # noqa: E402
 from sdvo_lab.build_copy import BuildCopy, replaced  # noqa: E402
 
 LIST, ABLATIONS = LAB / "test/mistakes.yaml", LAB / "ablations.yaml"
-ROOMS = ("odometry", "front_end", "common", "places", "data", "check", "ros")
+ROOMS = ("odometry", "rig", "belief", "map", "matching", "motion", "front_end", "common", "places", "data", "check", "ros")
 HANGS = 10  # times as long as without a mistake, and a test counts as failed
 
 

@@ -7,7 +7,7 @@
 
 #include "finding.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
-#include "stereo_descriptor_vo/odometry/row_readout.hpp"
+#include "stereo_descriptor_vo/rig/row_readout.hpp"
 
 namespace sdvo {
 

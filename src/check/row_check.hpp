@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "finding.hpp"
-#include "stereo_descriptor_vo/odometry/row_delay.hpp"
+#include "stereo_descriptor_vo/rig/row_delay.hpp"
 
 namespace sdvo {
 

@@ -2,8 +2,8 @@
 
 #include <string>
 
-#include "stereo_descriptor_vo/odometry/row_delay.hpp"
-#include "stereo_descriptor_vo/odometry/row_readout.hpp"
+#include "stereo_descriptor_vo/rig/row_delay.hpp"
+#include "stereo_descriptor_vo/rig/row_readout.hpp"
 
 namespace sdvo {
 

@@ -12,7 +12,8 @@ struct OwnCurve {
   double slope, min_size, max_size;  ///< px
 };
 
-/// Chosen by `learn size-curve` on drives that are not reported: lab/docs/experiments.md, "The size curve of each descriptor".
+/// Chosen by `learn size-curve` on drives that are not reported: lab/docs/experiments.md, "The size curve of each
+/// descriptor".
 OwnCurve ownCurve(DescriptorType type) {
   constexpr double kLargest = 32.0;                            // px, of all: three octaves above FREAK's smallest
   constexpr double kStandard = BaseDescriptor::kStandardSize;  // the smallest that ORB and BRISK tell apart

@@ -52,7 +52,8 @@ Eigen::Matrix3f inverseOfSymmetric(const Eigen::Matrix3f& m) {
                               m(0, 1) * m(1, 2) - m(0, 2) * m(1, 1));
   const float factor = 1.f / sumOfProducts(first, m.col(0));
   const float a = first[0] * factor, b = first[1] * factor, c = first[2] * factor;
-  const float d = (m(2, 2) * m(0, 0) - m(0, 2) * m(0, 2)) * factor, e = (m(0, 2) * m(0, 1) - m(0, 0) * m(1, 2)) * factor;
+  const float d = (m(2, 2) * m(0, 0) - m(0, 2) * m(0, 2)) * factor,
+              e = (m(0, 2) * m(0, 1) - m(0, 0) * m(1, 2)) * factor;
   const float f = (m(0, 0) * m(1, 1) - m(0, 1) * m(0, 1)) * factor;
   return (Eigen::Matrix3f() << a, b, c, b, d, e, c, e, f).finished();
 }

@@ -28,6 +28,22 @@ void reportMatches(const StereoFeatures& features, const std::vector<int>& all_r
   result.rms = found.motion.rms;
 }
 
+void reportRig(const LearntRig& rig, OdometryResult& result) {
+  const RigCalibration::Vector sigma = rig.calibration.sigma();
+  if (sigma.allFinite()) {
+    result.disparity_offset = rig.calibration.calibration().value[0];
+    result.disparity_bend = rig.calibration.calibration().value[1];
+    result.disparity_offset_sigma = sigma[0];
+    result.disparity_bend_sigma = sigma[1];
+  }
+  if (const auto delay = rig.right_delay.estimate())
+    result.right_delay = delay->value, result.right_delay_sigma = delay->sigma;
+  if (const auto rolling = rig.readout.estimate())
+    result.readout = rolling->value, result.readout_sigma = rolling->sigma;
+  result.right_rotation = rig.right_rotation.rotation();
+  result.right_rotation_sigma = rig.right_rotation.sigma();
+}
+
 }  // namespace
 
 OdometryState::OdometryState(const VisualOdometryOptions& options, int first_epoch)
@@ -80,7 +96,7 @@ OdometryResult OdometryState::report(const StereoFeatures& features, const std::
   reportMatches(features, all_rows, found, step.rejected_rows, result);
   result.match_time = found.match_time;
   result.motion_time = found.motion_time + step.time;
-  rig.report(result);
+  reportRig(rig, result);
   return result;
 }
 

@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "stereo_descriptor_vo/odometry/described_points.hpp"
-#include "stereo_descriptor_vo/odometry/motion_hypotheses.hpp"
+#include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
+#include "stereo_descriptor_vo/matching/described_points.hpp"
 
 namespace sdvo {
 namespace {

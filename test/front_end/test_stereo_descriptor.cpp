@@ -76,7 +76,8 @@ TEST(StereoDescriptor, ExtendsTheBorder) {
   cv::Mat large_left, large_right;
   cv::copyMakeBorder(left, large_left, kMargin, kMargin, kMargin, kMargin, cv::BORDER_REPLICATE);
   cv::copyMakeBorder(right, large_right, kMargin, kMargin, kMargin, kMargin, cv::BORDER_REPLICATE);
-  // Inside, beyond the left view's top, beyond the right view's left, and two that not even a size of 5 px, a reach of 15.7 px, fits.
+  // Inside, beyond the left view's top, beyond the right view's left, and two that not even a size of 5 px, a reach
+  // of 15.7 px, fits.
   const std::vector<StereoKeypoint> keypoints = {{160.25f, 95.f, 150.f, 95.4f, 20.f},
                                                  {200.f, 16.f, 180.f, 16.f, 20.f},
                                                  {50.5f, 90.f, 16.f, 90.5f, 30.f},

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <cmath>
 
@@ -58,6 +59,13 @@ inline Matrix6d adjoint(const Eigen::Isometry3d& T) {
   ad.bottomRightCorner<3, 3>() = T.linear();
   ad.topRightCorner<3, 3>() = skew(T.translation()) * T.linear();
   return ad;
+}
+
+/// A symmetric matrix without its directions of negative variance.
+inline Matrix6d positivePart(const Matrix6d& matrix) {
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(matrix);
+  const Matrix6d roots = solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
+  return Matrix6d((roots * roots.transpose()).selfadjointView<Eigen::Lower>());
 }
 
 /// The same pose with its rotation made orthonormal again; products of many rotations drift away from that.

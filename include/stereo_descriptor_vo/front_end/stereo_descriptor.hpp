@@ -17,8 +17,8 @@ struct DescriptorOptions {
   bool oriented = false;
   bool extend_border = true;
 
-  /// Size in px that must fit into the image where larger ones go on beyond it. Chosen: 7 px leaves 17 % of a near view's
-  /// corners undescribed at 424x240, 5 px 6 %.
+  /// Size in px that must fit into the image where larger ones go on beyond it. Chosen: 7 px leaves 17 % of a near
+  /// view's corners undescribed at 424x240, 5 px 6 %.
   static constexpr double kInsideSize = 5.0;
 
   void describe(OptionList& list);

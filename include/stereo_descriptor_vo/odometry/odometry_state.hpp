@@ -6,18 +6,18 @@
 #include <string>
 #include <vector>
 
+#include "stereo_descriptor_vo/belief/motion_doubt.hpp"
+#include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
+#include "stereo_descriptor_vo/belief/motion_prior.hpp"
+#include "stereo_descriptor_vo/belief/pose_covariance.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/odometry/floor.hpp"
-#include "stereo_descriptor_vo/odometry/learnt_rig.hpp"
-#include "stereo_descriptor_vo/odometry/local_map.hpp"
-#include "stereo_descriptor_vo/odometry/motion_doubt.hpp"
-#include "stereo_descriptor_vo/odometry/motion_hypotheses.hpp"
-#include "stereo_descriptor_vo/odometry/motion_prior.hpp"
+#include "stereo_descriptor_vo/map/floor.hpp"
+#include "stereo_descriptor_vo/map/local_map.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
 #include "stereo_descriptor_vo/odometry/outage.hpp"
-#include "stereo_descriptor_vo/odometry/pose_covariance.hpp"
-#include "stereo_descriptor_vo/odometry/repeated_images.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry_options.hpp"
+#include "stereo_descriptor_vo/rig/learnt_rig.hpp"
+#include "stereo_descriptor_vo/rig/repeated_images.hpp"
 
 namespace sdvo {
 

@@ -3,8 +3,8 @@
 #include <Eigen/Geometry>
 #include <optional>
 
+#include "stereo_descriptor_vo/belief/motion_prior.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
-#include "stereo_descriptor_vo/odometry/motion_prior.hpp"
 
 namespace sdvo {
 

@@ -4,16 +4,16 @@
 #include <optional>
 #include <vector>
 
+#include "stereo_descriptor_vo/belief/motion_doubt.hpp"
+#include "stereo_descriptor_vo/belief/motion_search.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/odometry/floor.hpp"
-#include "stereo_descriptor_vo/odometry/local_map.hpp"
-#include "stereo_descriptor_vo/odometry/motion_doubt.hpp"
-#include "stereo_descriptor_vo/odometry/motion_search.hpp"
+#include "stereo_descriptor_vo/map/floor.hpp"
+#include "stereo_descriptor_vo/map/local_map.hpp"
+#include "stereo_descriptor_vo/map/reacquisition.hpp"
+#include "stereo_descriptor_vo/map/revisit.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_state.hpp"
 #include "stereo_descriptor_vo/odometry/outage.hpp"
-#include "stereo_descriptor_vo/odometry/reacquisition.hpp"
-#include "stereo_descriptor_vo/odometry/revisit.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry_options.hpp"
 
 namespace sdvo {

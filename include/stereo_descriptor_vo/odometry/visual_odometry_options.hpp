@@ -1,14 +1,14 @@
 #pragma once
 
+#include "stereo_descriptor_vo/belief/motion_prior.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
-#include "stereo_descriptor_vo/odometry/calibration_filter.hpp"
-#include "stereo_descriptor_vo/odometry/feature_matcher.hpp"
-#include "stereo_descriptor_vo/odometry/floor.hpp"
-#include "stereo_descriptor_vo/odometry/local_map.hpp"
-#include "stereo_descriptor_vo/odometry/motion_estimator.hpp"
-#include "stereo_descriptor_vo/odometry/motion_prior.hpp"
-#include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
-#include "stereo_descriptor_vo/odometry/window_optimizer.hpp"
+#include "stereo_descriptor_vo/map/floor.hpp"
+#include "stereo_descriptor_vo/map/local_map.hpp"
+#include "stereo_descriptor_vo/map/window_optimizer.hpp"
+#include "stereo_descriptor_vo/matching/feature_matcher.hpp"
+#include "stereo_descriptor_vo/matching/patch_alignment.hpp"
+#include "stereo_descriptor_vo/motion/motion_estimator.hpp"
+#include "stereo_descriptor_vo/rig/calibration_filter.hpp"
 
 namespace sdvo {
 

@@ -90,8 +90,8 @@ class PlaceRecognition {
   /// What the map says of the odometry's origin, by the last key frame.
   Eigen::Isometry3d T_map_odom() const;
 
-  /// Covariance of T_map_odom(): of a right perturbation of the last key frame's camera in the map, since the place that
-  /// was recognised last. None where no way without a break leads there.
+  /// Covariance of T_map_odom(): of a right perturbation of the last key frame's camera in the map, since the place
+  /// that was recognised last. None where no way without a break leads there.
   std::optional<Matrix6d> covariance() const;
 
   /// A hint of the odometry's pose in the map. The next key frame is put there, after a break. Until a place

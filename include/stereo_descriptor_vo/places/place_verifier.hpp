@@ -6,7 +6,7 @@
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/odometry/view_matcher.hpp"
+#include "stereo_descriptor_vo/matching/view_matcher.hpp"
 
 namespace sdvo {
 

@@ -1,4 +1,5 @@
-// The first pairs of a folder in KITTI layout in one thread, with vectors or in plain C++: lab/test/arm64/run counts what it executes.
+// The first pairs of a folder in KITTI layout in one thread, with vectors or in plain C++: lab/test/arm64/run counts
+// what it executes.
 #include <cstdlib>
 #include <iostream>
 #include <opencv2/core/utility.hpp>
@@ -9,7 +10,8 @@
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
-/// Arguments: the folder, the number of pairs, `plain` or `vectors`, `decode` (images are read and nothing else) or `run`.
+/// Arguments: the folder, the number of pairs, `plain` or `vectors`, `decode` (images are read and nothing else) or
+/// `run`.
 int main(int argc, char** argv) {
   if (argc != 5) return 1;
   cv::setNumThreads(1);

@@ -12,7 +12,7 @@
 #include "stereo_descriptor_vo/front_end/epipolar_matcher.hpp"
 #include "stereo_descriptor_vo/front_end/fast_corners.hpp"
 #include "stereo_descriptor_vo/front_end/freak.hpp"
-#include "stereo_descriptor_vo/odometry/patch_alignment.hpp"
+#include "stereo_descriptor_vo/matching/patch_alignment.hpp"
 
 namespace {
 

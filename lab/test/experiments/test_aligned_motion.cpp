@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
+#include "../../../test/synthetic_scene.hpp"
 #include "../../experiments/aligned_motion.hpp"
 #include "../../experiments/keypoint_set.hpp"
-#include "../../../test/synthetic_scene.hpp"
 
 namespace sdvo {
 namespace test_aligned_motion {

@@ -5,9 +5,9 @@
 #include <functional>
 #include <random>
 
-#include "../../experiments/depth_scale_fit.hpp"
 #include "../../../test/synthetic_scene.hpp"
 #include "../../../test/temporary_folder.hpp"
+#include "../../experiments/depth_scale_fit.hpp"
 #include "wall_drive.hpp"
 
 namespace sdvo {

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstdlib>
 
-#include "../../experiments/keypoint_set.hpp"
 #include "../../../test/synthetic_scene.hpp"
+#include "../../experiments/keypoint_set.hpp"
 #include "stereo_descriptor_vo/front_end/freak.hpp"
 
 namespace sdvo {

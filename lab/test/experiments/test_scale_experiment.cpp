@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "../../experiments/scale_experiment.hpp"
 #include "../../../test/temporary_folder.hpp"
+#include "../../experiments/scale_experiment.hpp"
 #include "wall_drive.hpp"
 
 namespace sdvo {

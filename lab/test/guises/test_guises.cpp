@@ -166,12 +166,12 @@ TEST_P(Guises, LoseNothingAndMoveAlike) {
   EXPECT_LT(bound, 0.2 * way) << "m, after " << way << " m";
 }
 
-INSTANTIATE_TEST_SUITE_P(RealDrives, Guises,
-                         testing::Combine(testing::Values("MH_01_half", "KITTI_06"),
-                                          testing::Values("as_recorded", "every_2nd", "every_3rd", "backwards",
-                                                          "mirrored", "upside_down", "half", "middle_70", "dark_noise",
-                                                          "saturated")),
-                         [](const auto& tested) { return std::get<0>(tested.param) + "_" + std::get<1>(tested.param); });
+INSTANTIATE_TEST_SUITE_P(
+    RealDrives, Guises,
+    testing::Combine(testing::Values("MH_01_half", "KITTI_06"),
+                     testing::Values("as_recorded", "every_2nd", "every_3rd", "backwards", "mirrored", "upside_down",
+                                     "half", "middle_70", "dark_noise", "saturated")),
+    [](const auto& tested) { return std::get<0>(tested.param) + "_" + std::get<1>(tested.param); });
 
 }  // namespace test_guises
 }  // namespace sdvo

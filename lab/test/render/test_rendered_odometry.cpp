@@ -49,7 +49,8 @@ std::vector<StereoFeatures> extractAll(const Drive& drive) {
 
 TEST(RenderedOdometry, MotionsAndPosesLieInTheirCovariancesAndTheRigIsCalibrated) {
   constexpr int kFrames = 40, kSettled = 20;
-  std::vector<double> motions, poses, motions_of_off;  // squares in standard deviations: of aligned rigs, of one that is off
+  std::vector<double> motions, poses,
+      motions_of_off;  // squares in standard deviations: of aligned rigs, of one that is off
   for (const auto& [seed, disparity_offset] : {std::pair(1, 0.0), std::pair(2, 0.3), std::pair(3, 0.3)}) {
     render::RenderOptions options;
     options.seed = seed;

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <optional>
+
+#include "stereo_descriptor_vo/common/se3.hpp"
+
+namespace sdvo {
+
+/// Adds the outer product of a deviation to a covariance if its square exceeds half of the expected one (chi-square of
+/// six). The ratio by which a motion may be off is added in every direction. Returns whether chance does not explain
+/// it.
+bool widen(Matrix6d& covariance, const Vector6d& deviation);
+
+/// Covariance of a pose that is reported pair by pair while the map behind it improves. All covariances are of right
+/// perturbations, T * exp(xi), translation before rotation, in m and rad.
+///
+/// The pose's covariance is that of the last key frame plus what it errs by more in the map. So it grows from key frame
+/// to key frame, but not while the map stays the same. The traces of its translation and its rotation shrink only when
+/// a pose is measured after a predicted one.
+class PoseCovariance {
+ public:
+  /// Of the last pose; zero in the beginning.
+  const Matrix6d& value() const { return value_; }
+
+  /// The map moved the last pose by this right perturbation: its covariance then contains that.
+  void cover(const Vector6d& correction);
+
+  /// The last pose becomes the key frame of a new drive, after a motion of unknown size. `travelled` is the covariance
+  /// of what may have been travelled unseen.
+  void restart(const Matrix6d& travelled = Matrix6d::Zero());
+
+  /// The last pose is another one now, with this covariance: the key frame of a new drive.
+  void assume(const Matrix6d& covariance) {
+    *this = PoseCovariance();
+    value_ = keyframe_ = covariance;
+  }
+
+  /// The pose moved on by a motion with a covariance of its own, as a predicted one.
+  void advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance);
+
+  /// The pose moved on and was measured against the key frame with the covariance `since_keyframe`. `growth`:
+  /// covariance of its error in the map beyond the key frame's. Returns the covariance of the motion between the two
+  /// reported poses. If the pose before is that of the key frame, it is `since_keyframe`. Else the key frame's own
+  /// noise is in both poses and cancels. It is as large as that of the better pose, because its points have been seen
+  /// as often. So the sum less twice this is the larger one of the two covariances. What the pose before was predicted
+  /// or doubted by comes on top.
+  Matrix6d measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe, const Matrix6d& growth);
+  /// The key frame is all of the map.
+  Matrix6d measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe) {
+    return measure(T_previous_current, since_keyframe, since_keyframe);
+  }
+
+  /// The last pose may be off by more than its measurement says.
+  void doubt(const Matrix6d& covariance);
+
+  /// The last pose is a key frame of the map: the next ones are measured against it.
+  void markKeyframe();
+
+ private:
+  void carry(const Eigen::Isometry3d& T_previous_current);
+
+  Matrix6d value_ = Matrix6d::Zero();
+  Matrix6d keyframe_ = Matrix6d::Zero();    ///< of the key frame, as a perturbation of the last pose
+  std::optional<Matrix6d> since_keyframe_;  ///< of the last pose, as it was measured; none where it is the key frame
+  Matrix6d predicted_ = Matrix6d::Zero();   ///< of motions since the last measured pose
+  Matrix6d unmeasured_ = Matrix6d::Zero();  ///< of these, and of what the last pose was doubted by
+};
+
+}  // namespace sdvo

@@ -1,0 +1,82 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <string>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/common/se3.hpp"
+#include "stereo_descriptor_vo/motion/noise.hpp"
+
+namespace sdvo {
+
+struct PlanarOptions {
+  bool planar = false;
+  double planar_height_sigma = 0.01;
+  double planar_tilt_sigma = 0.3;
+
+  void describe(OptionList& list) {
+    list.add("planar", planar,
+             "the base drives on a flat floor: its height, roll and pitch are constrained in the adjustment");
+    list.add("planar_height_sigma", planar_height_sigma, {1e-4, 10.0}, "m",
+             "planar: standard deviation of the base's height over the floor");
+    list.add("planar_tilt_sigma", planar_tilt_sigma, {1e-3, 90.0}, "deg",
+             "planar: standard deviation of the base's roll and pitch");
+  }
+};
+
+/// The floor that a base drives on, in the axes of the base's first pose: at z = height, level.
+struct Floor {
+  using Jacobian = Eigen::Matrix<double, 3, 6>;
+
+  Eigen::Isometry3d T_base_camera;
+  double height = 0.0;                              ///< m
+  Eigen::Vector3d sigma = Eigen::Vector3d::Ones();  ///< of height (m) and of the two tilts (rad)
+
+  Floor(const PlanarOptions& options, const Eigen::Isometry3d& T_base_camera, double height);
+
+  /// T_floor_base of a camera's pose in the odometry's origin, which is the first left camera.
+  Eigen::Isometry3d base(const Eigen::Isometry3d& T_camera_origin) const;
+
+  /// Height over the floor and two tilts of the base, in standard deviations, and their derivatives by the left
+  /// perturbation of T_camera_origin.
+  Eigen::Vector3d residual(const Eigen::Isometry3d& T_camera_origin, Jacobian* jacobian = nullptr) const;
+
+  /// Of a squared residual of one of the three: it bends as Cauchy's kernel does, because a ramp is no floor.
+  static double cost(double square);
+  static double weight(double square);
+
+  /// Whether a base with this residual drives on the floor: it is level, and not over it.
+  static bool isLevel(const Eigen::Vector3d& residual) { return residual.tail<2>().squaredNorm() <= noiseGate(2); }
+  static bool isOn(const Eigen::Vector3d& residual) {
+    return isLevel(residual) && residual[0] * residual[0] <= noiseGate(1);
+  }
+
+  /// T_camera_origin nearer to the floor, by as much as the pose's covariance (of a right perturbation of
+  /// T_origin_camera) leaves room for; unchanged where the base is off the floor.
+  Eigen::Isometry3d settled(const Eigen::Isometry3d& T_camera_origin, const Matrix6d& covariance) const;
+
+  /// Covariance of a pose (of a right perturbation of T_origin_camera) after the constraint to this floor.
+  Matrix6d constrained(const Eigen::Isometry3d& T_origin_camera, const Matrix6d& covariance) const;
+
+ private:
+  /// Of the residual's three numbers on a right perturbation of T_origin_camera.
+  Eigen::Matrix<double, 6, 3> gain(const Jacobian& jacobian, const Matrix6d& covariance) const;
+};
+
+/// Which floor a planar base is on: a ramp leads to another one.
+class FloorBelief {
+ public:
+  double height() const { return height_; }  ///< m, in the axes of the base's first pose
+  bool isOnFloor() const { return on_floor_; }
+
+  /// Takes note of a pose. `known` is the floor at height(). Returns in words where the base is if it is off the floor.
+  std::string note(const Floor& known, const Eigen::Isometry3d& T_camera_origin);
+
+ private:
+  double height_ = 0.0;
+  bool on_floor_ = true;  ///< at the last pose
+  int level_pairs_ = 0;   ///< in a row, level and at another height
+};
+
+}  // namespace sdvo

@@ -1,0 +1,109 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/stereo_camera.hpp"
+#include "stereo_descriptor_vo/map/window.hpp"
+#include "stereo_descriptor_vo/motion/rig_calibration.hpp"
+
+namespace sdvo {
+
+/// How all points of a window are seen; the fourth numbers are zero.
+struct alignas(32) WindowProjection {
+  double focal[4];   ///< (fx, fy, fx * baseline), px, px, px m
+  double centre[4];  ///< (cx, cy, the disparity's error in the centre), px
+  double bend;       ///< of that error, px
+
+  WindowProjection(const StereoCamera& camera, const RigCalibration& calibration);
+};
+
+/// A point of a window with all its sightings, one at least.
+struct SightedPoint {
+  Eigen::Vector3d ray_and_inverse_depth;  ///< in its anchor
+  const WindowObservation* sightings;     ///< in the order of their frames
+  int count;
+  double inverse_disparity_sigma;            ///< of each sighting, 1/px
+  const Eigen::Isometry3d* T_camera_anchor;  ///< of each frame; the first one, 0, is held fixed
+};
+
+/// A scaled point whose z is smaller is not in front of the camera: a share of its depth in the anchor.
+constexpr double kNearestScaled = 1e-3;
+
+/// A sighting of a point that is not in front of the camera costs as much as a very wrong one.
+constexpr double kBehindSquare = 1e4;
+
+/// Squares of the sightings' normalised residuals; kBehindSquare where the point is not in front of the camera.
+void squareResiduals(const WindowProjection& projection, const SightedPoint& point, double* squares);
+
+/// Two halves of something that a pose's perturbation has six of, each in a register's room; the fourth numbers mean
+/// nothing.
+struct alignas(32) PoseVector {
+  double translation[4], rotation[4];
+};
+
+/// What a sighting says of its pose and its point, in three columns: products of these are what the elimination of the
+/// point takes away.
+struct PoseFactor {
+  PoseVector Y[3];
+  PoseVector gradient;  ///< the sighting's part of the pose's, less what the point explains
+  int pose;             ///< which of the poses that may move, from zero on
+};
+
+/// A point's own normal equations H x = g, as R = L^-1 of H = L L^T, and what else it is in, times R^T.
+struct EliminatedPoint {
+  Eigen::Matrix3d R;
+  Eigen::Vector3d gradient;
+  Eigen::Matrix<double, RigCalibration::kParameters, 3> by_calibration;
+  RigCalibration::Vector calibration_gradient;  ///< the point's part of it
+  int factors;                                  ///< sightings in front of a camera that may move
+  int sightings;                                ///< in front of any camera
+
+  // Weighted sums over these.
+  double weight;
+  double disparity_residual;           ///< normalised
+  Eigen::Vector3d disparity_by_point;  ///< its derivatives
+};
+
+/// A residual's square s costs bend * log(1 + s / bend) and weighs 1 / (1 + s / bend) in the normal equations.
+struct Linearisation {
+  double bend;
+  double damping = 0.0;  ///< share of its diagonal that is added to a point's H
+};
+
+/// Moves points (ray and inverse depth) to where they fit best after a step of poses and calibration. The step has six
+/// numbers (m, rad) for each pose that may move; the calibration's is in px. `factors`: one point's after the other's.
+void movePoints(const std::vector<EliminatedPoint>& points, const std::vector<PoseFactor>& factors,
+                const Eigen::VectorXd& pose_steps, const RigCalibration::Vector& calibration_step,
+                std::vector<Eigen::Vector3d>& ray_and_inverse_depth);
+
+/// Normal equations of a window's poses but the first, and of the rig's calibration.
+class PoseEquations {
+ public:
+  void setZero(int poses);
+
+  /// Adds what a point's sightings say, and takes away what the point itself can explain of it (Schur complement). Also
+  /// gives a factor for each sighting from a pose that may move, and the squares that squareResiduals() gives.
+  EliminatedPoint add(const WindowProjection& projection, const SightedPoint& point, const Linearisation& linearisation,
+                      PoseFactor* factors, double* squares);
+
+  /// `hessian`: its lower triangle. The poses by their left perturbations (m, rad), then the calibration.
+  void copyTo(Eigen::MatrixXd& hessian, Eigen::VectorXd& gradient) const;
+
+  /// Of two poses. Only that which is not above the diagonal of all is filled.
+  struct Block {
+    PoseVector columns[6];
+  };
+  /// A pose with the calibration's two numbers, and its gradient.
+  struct Border {
+    PoseVector columns[3];
+  };
+
+ private:
+  std::vector<Block> blocks_;    ///< row by row
+  std::vector<Border> borders_;  ///< for each pose
+  RigCalibration::Matrix calibration_hessian_;
+  RigCalibration::Vector calibration_gradient_;
+};
+
+}  // namespace sdvo

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <optional>
+#include <vector>
+
+#include "stereo_descriptor_vo/map/local_map.hpp"
+#include "stereo_descriptor_vo/matching/view_matcher.hpp"
+
+namespace sdvo {
+
+/// A point of a map in the image of a pair that may see it.
+struct ExpectedPoint {
+  Eigen::Vector2d pixel;  ///< in the left image, px
+  bool found;             ///< in the pair, at that place
+};
+
+/// Whether a pair shows the place of a map. Matches of another place agree on no motion, so chance is no danger. A
+/// thing that stands in both places is one (a poster, a chair, a part of the robot), but it fills a part of the view
+/// only. Hence the view is divided into parts with equally many expected points each. There are so many parts that
+/// three of the points found fall into each if they are spread evenly. In another place a part holds any with a
+/// probability of one half at most.
+bool showsSamePlace(std::vector<ExpectedPoint> points);
+
+/// Finds a pair in the map from before an outage, wherever the camera went meanwhile.
+class Reacquisition {
+ public:
+  Reacquisition(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion);
+
+  /// T_current_newest, the motion since the map's newest pair; nothing where the pair does not show the map's place.
+  std::optional<Eigen::Isometry3d> find(const LocalMap& map, const StereoFeatures& features,
+                                        const RigCalibration& calibration) const;
+
+ private:
+  ViewMatcher anywhere_, near_;
+};
+
+}  // namespace sdvo

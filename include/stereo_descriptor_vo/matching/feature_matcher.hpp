@@ -1,0 +1,59 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <optional>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/matching/described_points.hpp"
+
+namespace sdvo {
+
+struct FeatureMatcherOptions {
+  bool gating = true;  ///< compare only near the position that the predicted motion gives
+  double gate_radius = 20.0;
+  double max_distance = 0.3;
+
+  static constexpr double kWidestGate = 2000.0;  ///< px
+  /// For a prediction that may be wrong.
+  FeatureMatcherOptions widened() const {
+    FeatureMatcherOptions wide = *this;
+    wide.gate_radius = std::min(3.0 * gate_radius, kWidestGate);
+    return wide;
+  }
+
+  void describe(OptionList& list) {
+    list.add("gate_radius", gate_radius, {1.0, kWidestGate}, "px",
+             "radius of that search around the predicted left position; three times as far where that finds no certain "
+             "motion, or one that leads out of it");
+    list.add("max_distance", max_distance, {0.01, 1.0}, "",
+             "largest distance of matched descriptors: share of differing bits, or |a - b|^2 / (|a|^2 + |b|^2)");
+  }
+};
+
+/// A correspondence between described points, of another pair or of a map, and the features of a pair.
+struct FeatureMatch {
+  int reference;   ///< row of the reference
+  int current;     ///< row of the current features
+  float distance;  ///< in [0, 1]: share of differing bits, or |a - b|^2 / (|a|^2 + |b|^2)
+};
+
+/// Mutual nearest neighbours between the descriptors of two camera positions.
+class FeatureMatcher {
+ public:
+  explicit FeatureMatcher(const FeatureMatcherOptions& options);
+
+  const FeatureMatcherOptions& options() const { return options_; }
+
+  /// Matches in the order of the reference rows. With a prediction of the motion and gating on, only features near
+  /// their predicted position are compared. Throws std::invalid_argument when the descriptors are of different kinds.
+  std::vector<FeatureMatch> match(const DescribedPoints& reference, const StereoFeatures& current,
+                                  const std::optional<Eigen::Isometry3d>& T_current_reference) const;
+
+ private:
+  FeatureMatcherOptions options_;
+};
+
+}  // namespace sdvo

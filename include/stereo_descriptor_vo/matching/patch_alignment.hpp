@@ -1,0 +1,59 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/motion/noise.hpp"
+
+namespace sdvo {
+
+struct PatchAlignmentOptions {
+  bool enabled = true;
+  int radius = 4;
+  double min_correlation = 0.7;
+  NoiseOptions noise;  ///< of corners, which bounds their corrections, and of what alignment leaves
+
+  void describe(OptionList& list) {
+    list.add("enabled", enabled, "align the patches of matched features, where the image side sends them");
+    list.add("radius", radius, {2, kLargestRadius}, "samples",
+             "half side of the part of the reference that is aligned");
+    list.add("min_correlation", min_correlation, {0.0, 1.0}, "", "least correlation of the aligned patches");
+  }
+
+  /// Whether patches of so many samples a side can be aligned: the derivatives ask for one more all around.
+  bool canAlign(int patch_side) const { return enabled && patch_side >= leastSide(); }
+  /// In words, if patches that are meant to be aligned cannot be; without patches there is nothing to align.
+  std::string complaint(int patch_side) const;
+
+  static constexpr int kLargestRadius = 6;
+
+ private:
+  int leastSide() const { return 2 * (radius + 1) + 1; }
+};
+
+/// A grey patch as it travels with a feature: side x side samples, row by row.
+struct Patch {
+  const std::uint8_t* samples = nullptr;
+  int side = 0;
+  float spacing = 1.f;  ///< px
+};
+
+/// Where a point of one patch lies in another.
+struct PatchShift {
+  Eigen::Vector2f shift;  ///< from the middle of the current patch, px
+  float sigma;            ///< standard deviation of each coordinate, px
+  float correlation;      ///< of the two patches there
+};
+
+/// Finds a point of the reference patch in the current one. The point lies at `centre` (samples from the middle of the
+/// reference). The search begins in the current patch's middle. It is an inverse compositional alignment (Baker and
+/// Matthews 2004), blind to brightness and contrast. `warp` takes offsets in the reference image to offsets in the
+/// current one, px: the ratio of the depths above all. Nothing where the patches differ (an occluding edge, another
+/// point), show too little, or where the answer lies outside.
+std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const Patch& reference,
+                                     const Eigen::Vector2f& centre, const Patch& current, const Eigen::Matrix2f& warp);
+
+}  // namespace sdvo

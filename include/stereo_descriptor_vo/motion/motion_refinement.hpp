@@ -1,0 +1,43 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/motion/noise.hpp"
+#include "stereo_descriptor_vo/motion/pose_problem.hpp"
+
+namespace sdvo {
+
+struct MotionRefinementOptions {
+  double kernel_scale = NoiseOptions().length();  ///< px: residual at which the Cauchy kernel starts to bend
+  int refinement_iterations = 20;                 ///< Levenberg-Marquardt steps at most
+};
+
+/// The weighted least squares problem around a pose, for the left perturbation xi = (translation, rotation) of it.
+struct NormalEquations {
+  Matrix6d hessian = Matrix6d::Zero();
+  Vector6d gradient = Vector6d::Zero();
+  double cost = 0.0;             ///< sum of kernel costs, px^2
+  double weighted_square = 0.0;  ///< sum of weight * |residual|^2, px^2
+  double weight = 0.0;           ///< sum of weights
+
+  /// Of a residual's coordinate, px^2: three for each point and six parameters, and weights below one take their share
+  /// of the degrees of freedom.
+  double variance() const { return weighted_square / std::max(3.0 * weight - 6.0, 1.0); }
+};
+
+/// Minimises the robust stereo reprojection error over (u_left, v_left, u_right) of a subset of the correspondences,
+/// starting at T_current_reference and leaving the result there. Returns the normal equations at the result. Left and
+/// right rows are not mixed: the right view's may be off by more than the noise.
+NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementOptions& options,
+                             const std::vector<Correspondence>& correspondences, const std::vector<int>& subset,
+                             Eigen::Isometry3d& T_current_reference);
+
+/// The same on all of the correspondences.
+NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementOptions& options,
+                             const std::vector<Correspondence>& correspondences,
+                             Eigen::Isometry3d& T_current_reference);
+
+}  // namespace sdvo

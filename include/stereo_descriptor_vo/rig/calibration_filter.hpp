@@ -1,0 +1,81 @@
+#pragma once
+
+#include <optional>
+
+#include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/motion/rig_calibration.hpp"
+
+namespace sdvo {
+
+struct CalibrationOptions {
+  bool enabled = true;
+  double prior_offset = 0.0;
+  double prior_bend = 0.0;
+  double prior_sigma = 1.0;
+  double right_delay = 0.0;
+  double trust = 0.1;
+
+  void describe(OptionList& list) {
+    list.add("enabled", enabled, "estimate the rig's residual disparity error while driving and compensate it");
+    list.add("prior_offset", prior_offset, {-20.0, 20.0}, "px",
+             "that error in the image centre as far as it is known beforehand; held fixed when not enabled");
+    list.add("prior_bend", prior_bend, {-20.0, 20.0}, "px", "the same for its change at 45 degrees from the centre");
+    list.add("prior_sigma", prior_sigma, {1e-4, 10.0}, "px",
+             "standard deviation of what is known beforehand, in the centre and at 45 degrees from it");
+    list.add("right_delay", right_delay, {-0.1, 0.1}, "s",
+             "time by which right images are known to be later than left ones; a significant difference is found");
+    list.add("trust", trust, {0.01, 1.0}, "",
+             "how far the window's own figure for its precision is believed: 1 / the factor on its standard deviation");
+  }
+};
+
+/// Gathers the estimates of successive windows. Windows overlap: a window's information counts as prior only for
+/// windows that share no pair with it, so that nothing is counted twice.
+///
+/// A window moves the calibration away from the options' prior only as far as the evidence is significant (empirical
+/// Bayes, Efron and Morris 1973). The prior's variance is the square of the estimate less what chance explains. A
+/// simulated or well calibrated rig keeps the prior to the digit.
+class CalibrationFilter {
+ public:
+  explicit CalibrationFilter(const CalibrationOptions& options);
+
+  /// What is known from pairs before the window that begins with pair `oldest_id`.
+  CalibrationBelief prior(int oldest_id) const;
+
+  /// Notes the result of the window from pair `oldest_id` to `newest_id`, which had its prior(); `information` excludes
+  /// that.
+  void note(int oldest_id, int newest_id, const RigCalibration& calibration, const RigCalibration::Matrix& information);
+
+  /// Notes the square (px^2) of what a window found the calibration to leave at a point.
+  void noteCommon(double square);
+
+  const RigCalibration& calibration() const { return calibration_; }
+  /// Standard deviations of (offset, bend) in px as the windows measure them, NaN before the first window.
+  RigCalibration::Vector sigma() const;
+
+ private:
+  /// Estimates of windows, the options' prior excluded, with the precision that the windows state.
+  struct Evidence {
+    RigCalibration::Matrix information = RigCalibration::Matrix::Zero();       ///< 1/px^2
+    RigCalibration::Vector information_mean = RigCalibration::Vector::Zero();  ///< information * mean
+  };
+  struct Contribution {
+    int newest_id;
+    Evidence evidence;
+  };
+
+  Evidence pastBefore(int oldest_id) const;
+  Evidence beforehand() const;
+  RigCalibration::Matrix informationOf(const RigCalibration::Vector& spread) const;
+  RigCalibration::Vector significantSpread() const;
+
+  CalibrationOptions options_;
+  RigCalibration calibration_;
+  Evidence past_;                        ///< of the last window that shares no pair with the present one
+  std::optional<Contribution> pending_;  ///< the window that is the next one's past
+  std::optional<Evidence> present_;      ///< of the past and the last window
+  int commons_ = 0;                      ///< how many squares were noted
+  double common_square_ = 0.0;
+};
+
+}  // namespace sdvo

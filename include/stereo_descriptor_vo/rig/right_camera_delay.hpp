@@ -1,0 +1,73 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <deque>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/belief/motion_doubt.hpp"
+#include "stereo_descriptor_vo/common/se3.hpp"
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/rig/row_delay.hpp"
+
+namespace sdvo {
+
+/// A point that agrees with the motion.
+struct RowMotion {
+  double velocity;  ///< down in the left image, px/s
+  double dv;        ///< v_right - v_left, px
+};
+
+/// The time by which the right image is taken later than the left one, and what it does to the features. A turn
+/// shifts all disparities of such a rig by f * rate * delay: 1 px for 3 ms at 100 deg/s and f = 212 px.
+class RightCameraDelay {
+ public:
+  /// `prior`, s: what is known beforehand.
+  explicit RightCameraDelay(double prior = 0.0);
+
+  /// Takes note of a pair, as taken, with the camera's mean velocity (its own frame, m/s and rad/s) over the `dt` s
+  /// before it. `rows` are of its points.
+  void measure(const StereoFeatures& features, const std::vector<RowMotion>& rows, double dt, const Vector6d& velocity);
+  /// The next pair does not continue the last one.
+  void interrupt() { pairs_.clear(); }
+
+  std::optional<RowDelay::Estimate> estimate() const { return rows_.estimate(); }
+  /// s: the prior, and as much of the estimate's distance from it as chance does not explain.
+  double compensated() const;
+
+  /// Right images that are those of other pairs.
+  struct Partner {
+    double delay;     ///< s
+    double log_odds;  ///< that it is so
+    std::string words() const;
+  };
+  /// The likeliest one of a stream with a pair every `dt` s.
+  Partner partner(double dt) const;
+
+  /// Standard deviation of the position, m, from turns whose features were not compensated as they would be now, and
+  /// from the error of what is known. A rig in step has none.
+  double drift() const;
+
+  /// The features as the right camera would have seen them at the left one's moment. `velocity`: the mean over the
+  /// `dt` s before the pair.
+  StereoFeatures inStep(const StereoFeatures& features, double dt, const Vector6d& velocity) const;
+
+ private:
+  struct Pair {
+    StereoFeatures features;  ///< their positions alone
+    Vector6d velocity;        ///< over the time before it
+  };
+  void addRows(double dt);
+  void expose(const StereoFeatures& features, double distance, double rate);
+
+  double prior_;
+  RowDelay rows_;
+  std::deque<Pair> pairs_;  ///< the last ones
+  /// Log-odds of a right image that is the pair's before or after.
+  double earlier_ = CarriedDoubt::kUnsuspected, later_ = CarriedDoubt::kUnsuspected;
+  /// m/s: distance times relative error of the depth for each second of delay. m: the same as it was compensated.
+  double exposed_ = 0.0, compensated_ = 0.0;
+};
+
+}  // namespace sdvo

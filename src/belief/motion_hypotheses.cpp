@@ -1,0 +1,312 @@
+#include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <bitset>
+#include <cmath>
+#include <cstddef>
+#include <set>
+#include <utility>
+
+#include "../matching/ascending_rows.hpp"
+#include "stereo_descriptor_vo/belief/motion_doubt.hpp"
+#include "stereo_descriptor_vo/motion/pose_problem.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr double kLogOddsOfSighting = 0.75;  // that a point stands still, by each confirmed sighting (chosen)
+
+/// Of n observations that are correlated by this coefficient (Kish 1965, the design effect): 2.5 at most. Points of one
+/// object move together, and a view has few objects.
+double effectiveNumber(double n) {
+  constexpr double kCorrelation = 0.4;
+  return n > 0.0 ? n / (1.0 + (n - 1.0) * kCorrelation) : 0.0;
+}
+
+bool contains(const std::vector<int>& values, int value) {
+  return std::find(values.begin(), values.end(), value) != values.end();
+}
+
+/// Whether two hypotheses mean one motion, for what the one explains and for what the other does: far points alone do
+/// not tell a turn from a step.
+bool areOne(const MotionScene& scene, const MotionHypothesis& a, const MotionHypothesis& b) {
+  const StereoCamera& camera = scene.features.camera;
+  const double within = scene.noise.sameMotion();
+  const Eigen::Isometry3d &T_a = a.motion.T_current_reference, &T_b = b.motion.T_current_reference;
+  return agree(camera, a.correspondences, a.motion.inliers, T_a, T_b, within) &&
+         agree(camera, b.correspondences, b.motion.inliers, T_a, T_b, within);
+}
+
+/// The prior's logarithm, relative to its best motion, is bounded by the probability that it is wrong.
+double logPrior(const MotionHypothesis& hypothesis) {
+  return std::max(-0.5 * hypothesis.innovation, std::log(kTailProbability));
+}
+
+std::vector<int> sorted(std::vector<int> values) {
+  std::sort(values.begin(), values.end());
+  return values;
+}
+
+/// The matches that each hypothesis of a pair explains. A match of one hypothesis counts for all of them.
+class Explanations {
+ public:
+  Explanations(const MotionScene& scene, double threshold, const std::vector<MotionHypothesis>& hypotheses)
+      : hypotheses_(hypotheses) {
+    std::set<std::pair<int, int>> pairs;
+    std::vector<Correspondence> matches;
+    for (const MotionHypothesis& hypothesis : hypotheses)
+      for (std::size_t i = 0; i < hypothesis.matches.size(); ++i) {
+        const FeatureMatch& match = hypothesis.matches[i];
+        if (!pairs.emplace(match.reference, match.current).second) continue;
+        matches.push_back(hypothesis.correspondences[i]);
+        sightings_.push_back(hypothesis.sightingsOf(static_cast<int>(i)));
+      }
+    const PoseProblem problem(scene.features.camera, matches, threshold);
+    for (const MotionHypothesis& hypothesis : hypotheses) {
+      explained_.emplace_back(matches.size(), false);
+      for (const int i : problem.inliers(hypothesis.motion.T_current_reference))
+        explained_.back()[static_cast<std::size_t>(i)] = true;
+    }
+  }
+
+  /// Logarithm of how many times likelier one hypothesis is than another one, by prior and by the points that they do
+  /// not agree on.
+  double logRatio(std::size_t a, std::size_t b) const {
+    double of_a = 0.0, of_b = 0.0;
+    int points = 0;
+    for (std::size_t i = 0; i < sightings_.size(); ++i) {
+      if (explained_[a][i] == explained_[b][i]) continue;
+      (explained_[a][i] ? of_a : of_b) += sightings_[i];
+      ++points;
+    }
+    return logPrior(hypotheses_[a]) - logPrior(hypotheses_[b]) + logLikelihood(of_b, points) -
+           logLikelihood(of_a, points);
+  }
+
+  std::size_t likeliest() const {
+    std::size_t best = 0;
+    for (std::size_t k = 1; k < hypotheses_.size(); ++k)
+      if (logRatio(k, best) > 0.0) best = k;
+    return best;
+  }
+
+ private:
+  const std::vector<MotionHypothesis>& hypotheses_;
+  std::vector<double> sightings_;             ///< of each match
+  std::vector<std::vector<bool>> explained_;  ///< by each hypothesis
+};
+
+/// A motion that explains a part of the pair that the chosen one does not, and that chance does not either.
+struct Competitor {
+  const MotionHypothesis* hypothesis;
+  double log_ratio;       ///< by how much it is likelier than the chosen one
+  std::vector<int> rows;  ///< of the pair, that it explains alone
+};
+
+/// Each motion once.
+std::vector<Competitor> rivalsOf(const MotionScene& scene, double threshold, const MotionHypothesis& chosen,
+                                 const std::vector<MotionHypothesis>& hypotheses, const Explanations& explanations,
+                                 std::size_t likeliest) {
+  const std::vector<int> own = sorted(chosen.inlierRows());
+  const int left = chosen.agreement.matches - chosen.agreement.inliers;
+  std::vector<Competitor> rivals;
+  for (std::size_t k = 0; k < hypotheses.size(); ++k) {
+    const MotionHypothesis& other = hypotheses[k];
+    if (areOne(scene, chosen, other)) continue;
+    Competitor rival{&other, explanations.logRatio(k, likeliest), without(sorted(other.inlierRows()), own)};
+    const int rows = static_cast<int>(rival.rows.size());
+    const double chance = chanceOfAgreement(threshold, other.gate);
+    if (logFalseAlarms(std::max(left, rows), rows, chance) > std::log(kTailProbability)) continue;
+    const auto same = std::find_if(rivals.begin(), rivals.end(),
+                                   [&](const Competitor& before) { return areOne(scene, *before.hypothesis, other); });
+    if (same == rivals.end())
+      rivals.push_back(std::move(rival));
+    else if (same->log_ratio < rival.log_ratio)
+      *same = std::move(rival);
+  }
+  return rivals;
+}
+
+/// The chosen motion's probability, and the moment of the rivals around it.
+void compare(const MotionScene& scene, const std::vector<Competitor>& rivals, MotionHypothesis& chosen) {
+  double total = 1.0;
+  for (const Competitor& rival : rivals) total += std::exp(rival.log_ratio);
+  std::vector<int> explained;
+  for (const Competitor& rival : rivals) {
+    explained.insert(explained.end(), rival.rows.begin(), rival.rows.end());
+    const Eigen::Isometry3d& T = rival.hypothesis->motion.T_current_reference;
+    const double probability = std::exp(rival.log_ratio) / total;
+    // Both start from the same pair of the map.
+    const Eigen::Isometry3d apart = chosen.motion.T_current_reference * T.inverse();
+    chosen.rivals_moment += probability * momentOf(logSE3(apart));
+    if (isTolerable(scene, chosen.motion.T_current_reference, apart)) continue;
+    chosen.probability -= probability;
+    if (!chosen.rival || chosen.rival->probability < probability)
+      chosen.rival = {T, probability, static_cast<int>(rival.rows.size())};
+  }
+  // What rivals explain does not speak against the chosen one.
+  explained = sorted(std::move(explained));
+  for (int i = 0; i < static_cast<int>(chosen.matches.size()); ++i) {
+    const int row = chosen.matches[static_cast<std::size_t>(i)].current;
+    if (!std::binary_search(explained.begin(), explained.end(), row)) continue;
+    --chosen.agreement.matches;
+    chosen.agreement.lasting_matches -= chosen.isLasting(i);
+    chosen.agreement.sightings -= chosen.sightingsOf(i);
+  }
+}
+
+}  // namespace
+
+double logOdds(double probability) {
+  return std::log(probability / (1.0 - probability));
+}
+
+double probabilityOf(double log_odds) {
+  return 1.0 / (1.0 + std::exp(-log_odds));
+}
+
+int MotionHypothesis::sightingsOf(int match) const {
+  return std::min(view->seen[static_cast<std::size_t>(matches[static_cast<std::size_t>(match)].reference)],
+                  kLastingSightings);
+}
+
+void MotionHypothesis::follow(const MotionScene& scene, const Eigen::Isometry3d& T_current_reference,
+                              const std::vector<int>& left) {
+  const Eigen::Isometry3d T_found = std::exchange(motion.T_current_reference, T_current_reference);
+  const Eigen::Isometry3d apart = T_current_reference * T_found.inverse();
+  const int points = static_cast<int>(motion.inliers.size()), of_other = static_cast<int>(left.size());
+  double own = 0.0, others = 0.0;
+  for (const int i : motion.inliers) (contains(left, matches[i].current) ? others : own) += sightingsOf(i);
+  const double misled = probabilityOf(logLikelihood(own, points) - logLikelihood(others, points));
+  rivals_moment += misled * momentOf(logSE3(apart));
+  if (isTolerable(scene, T_current_reference, apart)) return;
+  probability *= 1.0 - misled;
+  rival = {T_found, misled, of_other};
+}
+
+std::vector<int> MotionHypothesis::inlierRows(const std::vector<int>& rejected) const {
+  std::vector<int> rows;
+  rows.reserve(motion.inliers.size());
+  for (const int i : motion.inliers)
+    if (!contains(rejected, matches[i].current)) rows.push_back(matches[i].current);
+  return rows;
+}
+
+void MotionHypothesis::countAgreement() {
+  agreement.matches = static_cast<int>(matches.size());
+  agreement.lasting_matches = agreement.sightings = 0;
+  for (int i = 0; i < agreement.matches; ++i)
+    agreement.lasting_matches += isLasting(i), agreement.sightings += sightingsOf(i);
+  reject({});
+}
+
+void MotionHypothesis::reject(const std::vector<int>& rows) {
+  agreement.inliers = agreement.lasting_inliers = agreement.inlier_sightings = 0;
+  for (const int i : motion.inliers) {
+    if (contains(rows, matches[i].current)) continue;
+    ++agreement.inliers;
+    agreement.lasting_inliers += isLasting(i);
+    agreement.inlier_sightings += sightingsOf(i);
+  }
+}
+
+bool isTolerable(const MotionScene& scene, const Eigen::Isometry3d& motion, const Eigen::Isometry3d& apart) {
+  constexpr double kAngle = 0.02;  // rad (chosen: about a degree)
+  return apart.translation().norm() <= scene.tolerance + kTolerableRatio * motion.translation().norm() &&
+         logSO3(apart.linear()).norm() <= kAngle + kTolerableRatio * logSO3(motion.linear()).norm();
+}
+
+double logBayesFactor(const Vector6d& measured, const Matrix6d& information, const Matrix6d& covariance) {
+  // With A = I + H P the measurement's variance is H^-1 + P = A^T H^-1, so its inverse is H A^-T = A^-1 H.
+  const Eigen::PartialPivLU<Matrix6d> factor(Matrix6d::Identity() + information * covariance);
+  const Vector6d weighted = information * measured;
+  return 0.5 * (measured.dot(weighted) - measured.dot(factor.solve(weighted)) - std::log(factor.determinant()));
+}
+
+double logFalseAlarms(int matches, int inliers, double chance) {
+  constexpr int kSample = 3;
+  if (inliers <= kSample) return 0.0;
+  const auto logChoose = [](int n, int k) {
+    return std::lgamma(n + 1.0) - std::lgamma(k + 1.0) - std::lgamma(n - k + 1.0);
+  };
+  return std::log(matches - kSample) + logChoose(matches, inliers) + logChoose(inliers, kSample) +
+         (inliers - kSample) * std::log(chance);
+}
+
+double chanceOfAgreement(double threshold, double gate) {
+  // A ball of (u_left, v_left, u_right) in a cylinder as deep as it is wide.
+  return std::min(2.0 / 3.0 * std::pow(threshold / gate, 3), 0.5);
+}
+
+bool agree(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
+           const std::vector<int>& points, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double within) {
+  const auto same = std::count_if(points.begin(), points.end(), [&](int i) {
+    const Eigen::Vector3d in_a = a * correspondences[i].point, in_b = b * correspondences[i].point;
+    if (std::min(in_a.z(), in_b.z()) < kNearestDepth) return false;
+    return (camera.project(in_a) - camera.project(in_b)).norm() < within;
+  });
+  return 2 * static_cast<std::size_t>(same) > points.size();
+}
+
+double logLikelihood(double of_others, int points) {
+  if (points == 0) return 0.0;
+  return -effectiveNumber(points) * kLogOddsOfSighting * of_others / points;
+}
+
+double logOddsMisled(const MotionScene& scene, const MotionHypothesis& hypothesis) {
+  const Agreement& agreement = hypothesis.agreement;
+  double confirmed = 0.0;
+  if (agreement.lasting_matches > 0) {
+    // Agreement with the camera's motion against agreement with one of something that moves.
+    const double by_chance = probabilityOf(-kLogOddsOfSighting * MotionHypothesis::kLastingSightings);
+    const double usual = std::max(scene.usual_agreement, 0.5);
+    const double ratio = static_cast<double>(agreement.lasting_inliers) / agreement.lasting_matches;
+    confirmed = effectiveNumber(agreement.lasting_matches) *
+                (ratio * std::log(usual / by_chance) + (1.0 - ratio) * std::log((1.0 - usual) / (1.0 - by_chance)));
+  }
+  return CarriedDoubt::kUnsuspected - logPrior(hypothesis) - confirmed;
+}
+
+MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::vector<MotionHypothesis> hypotheses) {
+  double match_time = 0.0, motion_time = 0.0;
+  for (const MotionHypothesis& hypothesis : hypotheses)
+    match_time += hypothesis.match_time, motion_time += hypothesis.motion_time;
+  const auto by_inliers = [](const MotionHypothesis& a, const MotionHypothesis& b) {
+    return a.motion.inliers.size() < b.motion.inliers.size();
+  };
+  const auto failures = std::stable_partition(hypotheses.begin(), hypotheses.end(),
+                                              [](const MotionHypothesis& h) { return h.motion.success; });
+  MotionHypothesis chosen;
+  if (failures == hypotheses.begin()) {
+    // The largest failure has the best reason.
+    chosen = *std::max_element(hypotheses.begin(), hypotheses.end(), by_inliers);
+  } else {
+    hypotheses.erase(failures, hypotheses.end());
+    const Explanations explanations(scene, threshold, hypotheses);
+    const std::size_t likeliest = explanations.likeliest();
+    const MotionHypothesis& first = hypotheses[likeliest];
+    // Of one motion the estimate with the most inliers.
+    chosen = first;
+    for (const MotionHypothesis& other : hypotheses)
+      if (by_inliers(chosen, other) && areOne(scene, first, other)) chosen = other;
+    compare(scene, rivalsOf(scene, threshold, chosen, hypotheses, explanations, likeliest), chosen);
+  }
+  chosen.match_time = match_time, chosen.motion_time = motion_time;
+  return chosen;
+}
+
+double coverage(const StereoFeatures& features, const std::vector<int>& rows) {
+  constexpr int kColumns = 8, kRows = 4;
+  std::bitset<kColumns * kRows> cells;
+  // Clamped before it becomes an integer, which a position far outside of the image overflows.
+  const auto cell = [](double position, int size, int count) {
+    return static_cast<std::size_t>(std::clamp(position * count / size, 0.0, count - 1.0));
+  };
+  for (const int i : rows)
+    cells.set(cell(features.v[i], features.camera.height, kRows) * kColumns +
+              cell(features.u[i], features.camera.width, kColumns));
+  return static_cast<double>(cells.count()) / (kColumns * kRows);
+}
+
+}  // namespace sdvo

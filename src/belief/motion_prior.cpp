@@ -1,0 +1,123 @@
+#include "stereo_descriptor_vo/belief/motion_prior.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <sstream>
+#include <utility>
+
+namespace sdvo {
+namespace {
+
+Matrix6d isotropic(double translation_variance, double rotation_variance) {
+  Vector6d variance;
+  variance << Eigen::Vector3d::Constant(translation_variance), Eigen::Vector3d::Constant(rotation_variance);
+  return variance.asDiagonal();
+}
+
+}  // namespace
+
+Matrix6d momentOf(const Vector6d& difference) {
+  return isotropic(difference.head<3>().squaredNorm(), difference.tail<3>().squaredNorm());
+}
+
+double ExpectedMotion::normalisedSquare(const Eigen::Isometry3d& measured, const Matrix6d& measured_covariance) const {
+  const Vector6d difference = innovation(measured);
+  return difference.dot((covariance + measured_covariance).ldlt().solve(difference));
+}
+
+/// The mean velocities of two neighbouring intervals of `dt` differ by two thirds of the velocity's variance over one.
+Matrix6d MotionPrior::processNoise(double dt, double age) const {
+  const double seconds_cubed = (2.0 / 3.0 * dt + age) * dt * dt;
+  return isotropic(options_.acceleration * options_.acceleration * seconds_cubed,
+                   options_.rotation_acceleration * options_.rotation_acceleration * seconds_cubed);
+}
+
+/// Both the velocity and the interval rest on two stamps each.
+Matrix6d MotionPrior::stampNoise(const Vector6d& velocity) const {
+  const Vector6d shift = 2.0 * options_.stamp_sigma * velocity;
+  return shift * shift.transpose();
+}
+
+void MotionPrior::pass(double dt) {
+  interval_ = std::max(dt, kUsualMemory * interval_);
+}
+
+ExpectedMotion MotionPrior::predicted(double dt) const {
+  // Stamps of a burst are closer together than the moments at which its pairs were taken.
+  const double time = std::max(dt, interval_);
+  const Vector6d missed = *velocity_ * (time - dt);
+  return {expSE3(*velocity_ * dt),
+          processNoise(time, 0.0) + missed * missed.transpose() + time * time * velocity_covariance_ + doubt_};
+}
+
+std::optional<ExpectedMotion> MotionPrior::confirmed(std::int64_t stamp, double dt) const {
+  if (!confirmed_) return std::nullopt;
+  ExpectedMotion expected = around(expSE3(*confirmed_ * dt), dt);
+  const double age = static_cast<double>(stamp - confirmed_stamp_) * 1e-9;
+  const double time = dt + 2.0 * options_.stamp_sigma;
+  expected.covariance +=
+      processNoise(time, age) - processNoise(time, 0.0) + stampNoise(*confirmed_) + dt * dt * confirmed_covariance_;
+  return expected;
+}
+
+ExpectedMotion MotionPrior::around(const Eigen::Isometry3d& motion, double dt) const {
+  return {motion, processNoise(dt + 2.0 * options_.stamp_sigma, 0.0)};
+}
+
+double MotionPrior::logRatioOfSwap(const Eigen::Isometry3d& motion, double dt) const {
+  if (!velocity_ || !before_) return 0.0;
+  const Vector6d now = logSE3(motion) / dt, first = *velocity_ + now;
+  // Bounded by the probability that the prior is wrong.
+  const auto cost = [&](const Vector6d& from, const Vector6d& to) {
+    const double square = around(expSE3(from * dt), dt).normalisedSquare(expSE3(to * dt), Matrix6d::Zero());
+    return std::min(0.5 * square, -std::log(kTailProbability));
+  };
+  return cost(*before_, *velocity_) + cost(*velocity_, now) - cost(*before_, first) - cost(first, -now);
+}
+
+Matrix6d MotionPrior::unseen(double seconds) const {
+  const Vector6d velocity = confirmed_.value_or(Vector6d::Zero());
+  const auto spread = [&](double speed, double acceleration, double most) {
+    const double t = seconds;
+    return std::min(speed * speed * t * t + acceleration * acceleration * t * t * t / 3.0, most * most);
+  };
+  return isotropic(spread(velocity.head<3>().norm(), options_.acceleration, options_.max_speed * seconds),
+                   spread(velocity.tail<3>().norm(), options_.rotation_acceleration, CV_PI));
+}
+
+std::string MotionPrior::tooFast(const Eigen::Isometry3d& motion, const Matrix6d& covariance, double dt) const {
+  const double sigmas = std::sqrt(noiseGate(1));
+  const double time = dt + sigmas * options_.stamp_sigma;
+  const auto noise = [&](int first) { return sigmas * std::sqrt(covariance.block<3, 3>(first, first).trace()); };
+  const double distance = motion.translation().norm(), angle = logSO3(motion.linear()).norm();
+  std::ostringstream words;
+  if (!(distance <= options_.max_speed * time + noise(0)))
+    words << "a speed of " << distance / dt << " m/s exceeds tracking/max_speed";
+  else if (!(angle <= options_.max_rotation_rate * time + noise(3)))
+    words << "a rotation of " << angle / dt << " rad/s exceeds tracking/max_rotation_rate";
+  return words.str();
+}
+
+void MotionPrior::measure(std::int64_t stamp, const Eigen::Isometry3d& motion, double dt, const Matrix6d& covariance,
+                          bool is_confirmed, const Matrix6d& doubt) {
+  doubt_ = doubt;
+  const Vector6d velocity = logSE3(motion) / dt;
+  // A motion may be that fast within the error of its stamps, but no other one after it.
+  if (!(velocity.head<3>().norm() <= options_.max_speed) || !(velocity.tail<3>().norm() <= options_.max_rotation_rate))
+    return;
+  before_ = std::exchange(velocity_, velocity);
+  velocity_covariance_ = covariance / (dt * dt);
+  if (!is_confirmed && confirmed_) return;
+  confirmed_ = velocity;
+  confirmed_covariance_ = velocity_covariance_;
+  confirmed_stamp_ = stamp;
+}
+
+void MotionPrior::forget() {
+  interrupt();
+  confirmed_.reset();
+}
+
+}  // namespace sdvo

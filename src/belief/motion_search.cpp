@@ -1,0 +1,272 @@
+#include "stereo_descriptor_vo/belief/motion_search.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <opencv2/core.hpp>
+#include <string>
+#include <utility>
+
+#include "../matching/ascending_rows.hpp"
+#include "stereo_descriptor_vo/belief/motion_doubt.hpp"
+#include "stereo_descriptor_vo/common/stopwatch.hpp"
+#include "stereo_descriptor_vo/matching/correspondences.hpp"
+#include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
+
+namespace sdvo {
+
+MotionSearch::MotionSearch(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion,
+                           const PatchAlignmentOptions& alignment)
+    : motion_options_(motion),
+      alignment_options_(alignment),
+      matcher_(matcher),
+      wide_matcher_(matcher.widened()),
+      estimator_(motion) {}
+
+MotionHypothesis MotionSearch::find(const MotionScene& scene, double max_doubt) const {
+  Stopwatch stopwatch;
+  const std::optional<Eigen::Isometry3d>& expected = scene.guess ? scene.guess : scene.T_current_reference;
+  const ViewPtr view = std::make_shared<const LocalMap::View>(scene.map.view(expected));
+  const double view_time = stopwatch.lap();
+  MotionHypothesis found = searchNear(scene, view, expected, max_doubt);
+  found.match_time += view_time;
+  for (bool is_chosen = false;; is_chosen = true) {
+    if (is_chosen)
+      found = chooseMotion(scene, options(scene).inlier_threshold, compete(scene, view, std::move(found)));
+    else if (scene.is_suspected || !isBeyondDoubt(scene, found, max_doubt))
+      continue;
+    if (!found.motion.success) return found;
+    stopwatch.lap();
+    Alignment aligned = align(scene, found);
+    const std::optional<Eigen::Isometry3d> T_lasting = motionOfLasting(scene, aligned, found);
+    found.motion_time += stopwatch.lap();
+    const bool is_another =
+        T_lasting && !isTolerable(scene, *T_lasting, *T_lasting * aligned.T_current_reference.inverse());
+    if (is_another && !is_chosen) continue;
+    found.motion.T_current_reference = aligned.T_current_reference;
+    found.sightings = std::move(aligned.sightings);
+    if (T_lasting) keepTo(scene, *T_lasting, aligned.measured, found);
+    return found;
+  }
+}
+
+/// The expectation itself may be what misled the search, and what moves by itself may outnumber the world.
+std::vector<MotionHypothesis> MotionSearch::compete(const MotionScene& scene, const ViewPtr& view,
+                                                    MotionHypothesis first) const {
+  const std::optional<Eigen::Isometry3d>& expected = scene.guess ? scene.guess : scene.T_current_reference;
+  std::vector<MotionHypothesis> hypotheses;
+  hypotheses.push_back(std::move(first));
+  if (scene.guess && scene.T_current_reference)
+    hypotheses.push_back(search(wide_matcher_, scene, view, scene.T_current_reference));
+  if (expected) hypotheses.push_back(search(matcher_, scene, view, std::nullopt));
+  const MotionHypothesis all = hypotheses.back();
+  std::vector<int> lasting, rest;
+  for (int i = 0; i < static_cast<int>(all.matches.size()); ++i) {
+    if (all.isLasting(i)) lasting.push_back(i);
+    rest.push_back(i);
+  }
+  hypotheses.push_back(searchAmong(scene, all, lasting));
+  // A compromise between two motions may have more inliers than the one that goes on as before.
+  if (expected) hypotheses.push_back(searchAmong(scene, all, agreeing(scene, all, *expected)));
+  // What moves by itself may have left copies of itself in the map, each with a motion of its own.
+  MotionEstimate peeled = all.motion;
+  do {
+    rest = without(rest, peeled.inliers);
+    hypotheses.push_back(searchAmong(scene, all, rest));
+    peeled = hypotheses.back().motion;
+  } while (peeled.success);
+  return hypotheses;
+}
+
+/// Neither prior nor lasting points contradict, the majority agrees with the motion, and lasting points that lack more
+/// than usual would be no serious rival even if they moved together.
+bool MotionSearch::isBeyondDoubt(const MotionScene& scene, const MotionHypothesis& found, double max_doubt) const {
+  if (!found.motion.success || found.innovation > noiseGate(6) || logOddsMisled(scene, found) > max_doubt) return false;
+  const double agree = found.agreement.lasting_inliers;
+  const double lacking = scene.usual_agreement * found.agreement.lasting_matches - agree;
+  if (lacking >= motion_options_.min_inliers) {
+    constexpr int kSightings = MotionHypothesis::kLastingSightings;
+    const int points = static_cast<int>(agree + lacking);
+    if (logLikelihood(kSightings * agree, points) - logLikelihood(kSightings * lacking, points) > max_doubt)
+      return false;
+  }
+  return 2 * found.agreement.inlier_sightings >= found.agreement.sightings;
+}
+
+/// First where a good prediction has the points, then three times as far.
+MotionHypothesis MotionSearch::searchNear(const MotionScene& scene, const ViewPtr& view,
+                                          const std::optional<Eigen::Isometry3d>& T_current_reference,
+                                          double max_doubt) const {
+  if (!T_current_reference || !matcher_.options().gating) return search(matcher_, scene, view, T_current_reference);
+  double match_time = 0.0, motion_time = 0.0;
+  if (!scene.is_doubted) {
+    MotionHypothesis found = search(matcher_, scene, view, T_current_reference);
+    if (isBeyondDoubt(scene, found, max_doubt) && !leavesGate(scene, *T_current_reference, found)) return found;
+    match_time = found.match_time, motion_time = found.motion_time;
+  }
+  MotionHypothesis found = search(wide_matcher_, scene, view, T_current_reference);
+  found.match_time += match_time, found.motion_time += motion_time;
+  return found;
+}
+
+/// Whether the motion found has a good part of the points where the search did not look for them.
+bool MotionSearch::leavesGate(const MotionScene& scene, const Eigen::Isometry3d& predicted,
+                              const MotionHypothesis& found) const {
+  constexpr double kGoodPart = 0.1;  // of the points (chosen)
+  const StereoCamera& camera = scene.features.camera;
+  const Eigen::Isometry3d& T_current_reference = found.motion.T_current_reference;
+  std::size_t seen = 0, outside = 0;
+  for (const Eigen::Vector3d& point : found.view->rows.positions) {
+    const Eigen::Vector3d here = T_current_reference * point, expected = predicted * point;
+    if (std::min(here.z(), expected.z()) < kNearestDepth) continue;
+    const Eigen::Vector3d pixel = camera.project(here);
+    if (!camera.sees(pixel)) continue;
+    ++seen;
+    outside += (pixel - camera.project(expected)).head<2>().norm() > matcher_.options().gate_radius;
+  }
+  return static_cast<double>(outside) > kGoodPart * static_cast<double>(seen);
+}
+
+MotionHypothesis MotionSearch::search(const FeatureMatcher& matcher, const MotionScene& scene, const ViewPtr& view,
+                                      const std::optional<Eigen::Isometry3d>& T_current_reference) const {
+  MotionHypothesis found;
+  found.view = view;
+  const StereoCamera& camera = scene.features.camera;
+  found.gate = T_current_reference && matcher.options().gating ? matcher.options().gate_radius
+                                                               : std::sqrt(camera.width * camera.height / CV_PI);
+  Stopwatch stopwatch;
+  found.matches = matcher.match(view->rows, scene.features, T_current_reference);
+  found.match_time = stopwatch.lap();
+  found.correspondences = correspond(view->rows, scene.features, found.matches, scene.calibration);
+  found.motion = estimator_.estimate(camera, found.correspondences, T_current_reference, scene.noise.scale());
+  weigh(scene, found);
+  found.motion_time = stopwatch.lap();
+  return found;
+}
+
+/// A motion that some of another hypothesis' matches agree on, and whatever else does.
+MotionHypothesis MotionSearch::searchAmong(const MotionScene& scene, const MotionHypothesis& all,
+                                           const std::vector<int>& subset) const {
+  Stopwatch stopwatch;
+  MotionHypothesis found = all;
+  found.match_time = 0.0;
+  std::vector<Correspondence> some;
+  some.reserve(subset.size());
+  for (const int i : subset) some.push_back(all.correspondences[static_cast<std::size_t>(i)]);
+  found.motion = estimator_.estimate(scene.features.camera, some, std::nullopt, scene.noise.scale());
+  if (found.motion.success) found.motion.inliers = agreeing(scene, all, found.motion.T_current_reference);
+  weigh(scene, found);
+  found.motion_time = stopwatch.lap();
+  return found;
+}
+
+/// Matches of a hypothesis that agree with a motion.
+std::vector<int> MotionSearch::agreeing(const MotionScene& scene, const MotionHypothesis& all,
+                                        const Eigen::Isometry3d& T_current_reference) const {
+  return PoseProblem(scene.features.camera, all.correspondences, options(scene).inlier_threshold)
+      .inliers(T_current_reference);
+}
+
+/// Gathers what speaks for the motion found.
+void MotionSearch::weigh(const MotionScene& scene, MotionHypothesis& found) const {
+  found.countAgreement();
+  if (!found.motion.success) return;
+  found.motion.reason = chanceWords(scene, found);
+  found.motion.success = found.motion.reason.empty();
+  const Eigen::Isometry3d T_reference_current = found.motion.T_current_reference.inverse();
+  double least = std::numeric_limits<double>::infinity();
+  for (const ExpectedMotion& expected : scene.prior)
+    least = std::min(least, expected.normalisedSquare(T_reference_current, found.motion.covariance));
+  found.innovation = scene.prior.empty() ? 0.0 : least;
+}
+
+MotionEstimatorOptions MotionSearch::options(const MotionScene& scene) const {
+  return motion_options_.scaled(scene.noise.scale());
+}
+
+std::string MotionSearch::chanceWords(const MotionScene& scene, const MotionHypothesis& found) const {
+  const int matches = found.agreement.matches, inliers = found.agreement.inliers;
+  const double chance = chanceOfAgreement(options(scene).inlier_threshold, found.gate);
+  if (inliers >= motion_options_.min_inliers && logFalseAlarms(matches, inliers, chance) <= std::log(kTailProbability))
+    return "";
+  return "only " + std::to_string(inliers) + " of " + std::to_string(matches) +
+         " matches agree on one motion: too few, or as many as chance gives";
+}
+
+/// Aligns the inliers' patches and refines the motion on them.
+MotionSearch::Alignment MotionSearch::align(const MotionScene& scene, const MotionHypothesis& found) const {
+  const StereoFeatures& features = scene.features;
+  const Eigen::Isometry3d T_camera_origin = found.motion.T_current_reference * scene.map.newestPose();
+  Alignment alignment{found.motion.T_current_reference, {}, {}};
+  std::vector<Correspondence> aligned;
+  for (auto* correspondences : {&alignment.measured, &aligned}) correspondences->reserve(found.motion.inliers.size());
+  alignment.sightings.reserve(found.motion.inliers.size());
+  for (const int i : found.motion.inliers) {
+    const FeatureMatch& match = found.matches[i];
+    const LocalMap::Sighting sighting = scene.map.sight(alignment_options_, features, T_camera_origin,
+                                                        found.view->point[match.reference], match.current);
+    alignment.sightings.push_back(sighting);
+    alignment.measured.push_back(found.correspondences[i]);
+    if (!sighting.aligned) continue;
+    const Eigen::Vector2d corner(features.u[match.current], features.v[match.current]);
+    alignment.measured.back().measurement =
+        measurementOf(features, match.current, scene.calibration, sighting.measurement.head<2>() - corner);
+    aligned.push_back(alignment.measured.back());
+  }
+  refineMotion(features.camera, options(scene), aligned.size() >= kFewestMeasured ? aligned : alignment.measured,
+               alignment.T_current_reference);
+  return alignment;
+}
+
+/// The lasting points' own motion, if it is likelier another one than the motion of all inliers. The difference of a
+/// mover has the prior's covariance; that of a rigid world has this rig's noise alone.
+std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene& scene, const Alignment& aligned,
+                                                               MotionHypothesis& found) const {
+  const StereoCamera& camera = scene.features.camera;
+  std::vector<Correspondence> lasting, others;
+  lasting.reserve(aligned.measured.size()), others.reserve(aligned.measured.size());
+  for (std::size_t k = 0; k < aligned.measured.size(); ++k)
+    (found.isLasting(found.motion.inliers[k]) ? lasting : others).push_back(aligned.measured[k]);
+  if (std::min(lasting.size(), others.size()) < kFewestMeasured || scene.prior.empty()) return std::nullopt;
+
+  const Eigen::Isometry3d& T = aligned.T_current_reference;
+  Eigen::Isometry3d T_lasting = T;
+  const NormalEquations equations = refineMotion(camera, options(scene), lasting, T_lasting);
+  const Vector6d difference = logSE3(T_lasting * T.inverse());
+  const Matrix6d information = equations.hessian / equations.variance();
+  const double log_factor =
+      logBayesFactor(difference, information / scene.noise.shared(), scene.prior.front().covariance);
+  if (CarriedDoubt::kUnsuspected + log_factor > 0.0) return T_lasting;
+  found.lasting_square = difference.dot(information * difference);
+  return std::nullopt;
+}
+
+/// Something that moves by less than what corners may err by is among the inliers of every hypothesis and draws them
+/// all away. Aligned positions tell it from the points that stood still so far.
+void MotionSearch::keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_lasting,
+                          const std::vector<Correspondence>& measured, MotionHypothesis& found) const {
+  const std::vector<int> kept =
+      PoseProblem(scene.features.camera, measured, scene.noise.elsewhere()).inliers(T_lasting);
+  std::vector<int> inliers, left;
+  int left_sightings = 0;
+  std::vector<LocalMap::Sighting> sightings;
+  for (int k = 0; k < static_cast<int>(measured.size()); ++k) {
+    const int i = found.motion.inliers[static_cast<std::size_t>(k)];
+    if (!std::binary_search(kept.begin(), kept.end(), k)) {
+      left.push_back(found.matches[static_cast<std::size_t>(i)].current);
+      left_sightings += found.sightingsOf(i);
+      continue;
+    }
+    inliers.push_back(i);
+    sightings.push_back(found.sightings[static_cast<std::size_t>(k)]);
+  }
+  found.follow(scene, T_lasting, left);
+  found.motion.inliers = std::move(inliers);
+  found.sightings = std::move(sightings);
+  found.countAgreement();
+  found.agreement.matches -= static_cast<int>(left.size());
+  found.agreement.sightings -= left_sightings;
+}
+
+}  // namespace sdvo

@@ -1,0 +1,102 @@
+#include "stereo_descriptor_vo/belief/pose_covariance.hpp"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
+#include "stereo_descriptor_vo/motion/noise.hpp"
+
+namespace sdvo {
+namespace {
+
+/// What a discontinuity of unknown size adds: metres and a good part of a right angle.
+Matrix6d discontinuity() {
+  Vector6d variance;
+  variance << Eigen::Vector3d::Constant(100.0), Eigen::Vector3d::Constant(0.25);
+  return variance.asDiagonal();
+}
+
+/// The covariance of a pose T as that of T * M: T exp(xi) M = T M exp(Ad(M^-1) xi).
+Matrix6d carriedBy(const Eigen::Isometry3d& motion, const Matrix6d& covariance) {
+  const Matrix6d ad = adjoint(motion.inverse());
+  const Matrix6d carried = ad * covariance * ad.transpose();
+  return 0.5 * (carried + carried.transpose());
+}
+
+/// A covariance, its translation and its rotation each scaled up to the trace that they had before.
+Matrix6d noLessThan(const Matrix6d& before, Matrix6d covariance) {
+  for (const int first : {0, 3}) {
+    const double had = before.block<3, 3>(first, first).trace(), has = covariance.block<3, 3>(first, first).trace();
+    if (!(has < had)) continue;
+    if (!(has > 0.0)) return before;
+    const double factor = std::sqrt(had / has);
+    covariance.middleRows<3>(first) *= factor;
+    covariance.middleCols<3>(first) *= factor;
+  }
+  return covariance;
+}
+
+/// No less than either in any direction.
+Matrix6d covering(const Matrix6d& a, const Matrix6d& b) {
+  return b + positivePart(a - b);
+}
+
+}  // namespace
+
+bool widen(Matrix6d& covariance, const Vector6d& deviation) {
+  constexpr double kExpected = 3.0;  // chi-square of six: half its mean, for a deviation is a part of the error only
+  const double square = deviation.dot(covariance.ldlt().solve(deviation));
+  if (square > kExpected)
+    covariance += deviation * deviation.transpose() + kTolerableRatio * kTolerableRatio * momentOf(deviation);
+  return square > noiseGate(6);
+}
+
+void PoseCovariance::cover(const Vector6d& correction) {
+  const Matrix6d before = value_;
+  widen(value_, correction);
+  keyframe_ += value_ - before;  // the next poses are measured from the same key frame
+}
+
+void PoseCovariance::restart(const Matrix6d& travelled) {
+  value_ += discontinuity() + travelled;
+  unmeasured_.setZero();
+  markKeyframe();
+}
+
+void PoseCovariance::markKeyframe() {
+  keyframe_ = value_;
+  predicted_.setZero();
+  since_keyframe_.reset();
+}
+
+void PoseCovariance::carry(const Eigen::Isometry3d& T_previous_current) {
+  for (Matrix6d* covariance : {&value_, &keyframe_, &predicted_, &unmeasured_})
+    *covariance = carriedBy(T_previous_current, *covariance);
+  if (since_keyframe_) since_keyframe_ = carriedBy(T_previous_current, *since_keyframe_);
+}
+
+void PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance) {
+  carry(T_previous_current);
+  value_ += covariance;
+  predicted_ += covariance;
+  unmeasured_ += covariance;
+}
+
+Matrix6d PoseCovariance::measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe,
+                                 const Matrix6d& growth) {
+  const Matrix6d before = value_ - predicted_;
+  carry(T_previous_current);
+  const Matrix6d motion = unmeasured_ + (since_keyframe_ ? covering(*since_keyframe_, since_keyframe) : since_keyframe);
+  since_keyframe_ = since_keyframe;
+  value_ = noLessThan(before, keyframe_ + growth);
+  predicted_.setZero();
+  unmeasured_.setZero();
+  return motion;
+}
+
+void PoseCovariance::doubt(const Matrix6d& covariance) {
+  value_ += covariance;
+  unmeasured_ += covariance;
+}
+
+}  // namespace sdvo

@@ -1,0 +1,66 @@
+#include "stereo_descriptor_vo/map/keyframe_memory.hpp"
+
+#include <algorithm>
+
+namespace sdvo {
+namespace {
+
+constexpr double kMost = 0.6;  // of a key frame's points (chosen): who sees them sees its place
+
+}  // namespace
+
+ReferencePatch OldKeyframe::reference(int point) const {
+  const std::size_t p = static_cast<std::size_t>(point);
+  const auto at = [&](std::size_t byte) { return samples.begin() + static_cast<std::ptrdiff_t>(byte); };
+  ReferencePatch reference = points[p].reference;
+  reference.samples.assign(at(p == 0 ? 0 : points[p - 1].samples_end), at(points[p].samples_end));
+  return reference;
+}
+
+int OldKeyframe::sharedWith(const StereoCamera& camera, const Eigen::Isometry3d& T_other_origin) const {
+  constexpr double kLargestRatio = 1.1;  // of depths
+  const Eigen::Isometry3d T_other_this = T_other_origin * T_camera_origin.inverse();
+  int shared = 0;
+  for (const Eigen::Vector3d& here : rows.positions) {
+    const Eigen::Vector3d there = T_other_this * here;
+    if (there.z() * kLargestRatio < here.z() || there.z() > kLargestRatio * here.z()) continue;
+    if (camera.sees(camera.project(there))) ++shared;
+  }
+  return shared;
+}
+
+bool KeyframeMemory::covers(const StereoCamera& camera, const OldKeyframe& keyframe) const {
+  const auto sees_the_same = [&](const std::shared_ptr<const OldKeyframe>& old) {
+    return keyframe.sharedWith(camera, old->T_camera_origin) > kMost * static_cast<double>(keyframe.rows.count());
+  };
+  return std::any_of(keyframes_.rbegin(), keyframes_.rend(), sees_the_same);  // the newest are the nearest
+}
+
+void KeyframeMemory::remember(const StereoCamera& camera, OldKeyframe keyframe) {
+  if (capacity_ == 0 || covers(camera, keyframe)) return;
+  const Eigen::Vector3d here = keyframe.T_camera_origin.inverse().translation();
+  keyframes_.push_back(std::make_shared<OldKeyframe>(std::move(keyframe)));
+  if (count() <= capacity_) return;
+  const auto distance = [&](const std::shared_ptr<const OldKeyframe>& old) {
+    return (old->T_camera_origin.inverse().translation() - here).norm();
+  };
+  keyframes_.erase(std::max_element(keyframes_.begin(), keyframes_.end(),
+                                    [&](const auto& a, const auto& b) { return distance(a) < distance(b); }));
+}
+
+const OldKeyframe* KeyframeMemory::nearest(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
+                                           int least) const {
+  constexpr double kFarthest = 3.0;  // baselines: an error of a disparity is seen so many times as large from there
+  const Eigen::Vector3d here = T_camera_origin.inverse().translation();
+  const OldKeyframe* nearest = nullptr;
+  double way = kFarthest * camera.baseline;
+  for (const auto& keyframe : keyframes_) {
+    const double distance = (keyframe->T_camera_origin.inverse().translation() - here).norm();
+    const double enough = std::max<double>(least, kMost * static_cast<double>(keyframe->points.size()));
+    if (distance < way && keyframe->sharedWith(camera, T_camera_origin) >= enough)
+      nearest = keyframe.get(), way = distance;
+  }
+  return nearest;
+}
+
+}  // namespace sdvo

@@ -1,0 +1,463 @@
+#include "stereo_descriptor_vo/map/local_map.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <unordered_map>
+#include <utility>
+
+#include "../common/median.hpp"
+#include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
+
+namespace sdvo {
+namespace {
+
+/// Disparity below which a point's distance is beyond measuring; it serves as a direction, far away.
+constexpr double kFarthestDisparity = 0.05;  // px
+
+/// Most points need no more memory than for these until it goes to another one.
+constexpr std::size_t kUsualSightings = 8;
+
+/// Covariance of the motion M = T_from_to between two frames, perturbed as M * exp(xi), from that of the left
+/// perturbations of `poses`, without the first: exp(f) M exp(-t) = M exp(Ad(M^-1) f - t) to first order.
+Matrix6d motionCovariance(const Window& window, const std::vector<int>& poses, const Eigen::MatrixXd& pose_covariance,
+                          int from, int to) {
+  if (from == to) return Matrix6d::Zero();
+  const auto row_of = [&](int pose) { return 6 * (std::find(poses.begin(), poses.end(), pose) - poses.begin()); };
+  const auto t = row_of(to), f = row_of(from);
+  Matrix6d covariance = pose_covariance.block<6, 6>(t, t);
+  if (from == 0) return covariance;  // held fixed
+  const Matrix6d carried = adjoint(window.T_camera_origin[to] * window.T_camera_origin[from].inverse());
+  const Matrix6d cross = carried * pose_covariance.block<6, 6>(f, t);
+  covariance += carried * pose_covariance.block<6, 6>(f, f) * carried.transpose() - cross - cross.transpose();
+  return 0.5 * (covariance + covariance.transpose());
+}
+
+/// Of observations in the order of their frames the one in this frame, or their end.
+template <class Observations>
+auto sightingIn(Observations& observations, int frame_id) {
+  const auto here = std::lower_bound(observations.begin(), observations.end(), frame_id,
+                                     [](const auto& observation, int id) { return observation.frame_id < id; });
+  return here != observations.end() && here->frame_id == frame_id ? here : observations.end();
+}
+
+}  // namespace
+
+LocalMap::LocalMap(const LocalMapOptions& options)
+    : options_(checked(options)), memory_(options.remembered_keyframes) {}
+
+int LocalMap::oldestId() const {
+  return std::find_if(frames_.begin(), frames_.end(), [](const Frame& frame) { return !frame.is_recalled; })->id;
+}
+
+int LocalMap::lastKeyframeId() const {
+  for (auto frame = frames_.rbegin(); frame != frames_.rend(); ++frame)
+    if (frame->is_keyframe) return frame->id;
+  return frames_.front().id;
+}
+
+bool LocalMap::continuedBy(const StereoFeatures& features) const {
+  return features.camera == camera_ && (features.count() == 0 || features.kind() == kind_);
+}
+
+LocalMap::View LocalMap::view(const std::optional<Eigen::Isometry3d>& T_next_newest) const {
+  const auto isSeenNext = [&](const Eigen::Vector3d& pixel) {
+    if (!T_next_newest) return false;
+    const Eigen::Vector3d next = *T_next_newest * camera_.backProject(pixel.x(), pixel.y(), pixel.z());
+    return next.z() >= kNearestDepth && camera_.sees(camera_.project(next));
+  };
+  View view;
+  view.rows.kind = kind_;
+  view.point.reserve(points_.size()), view.seen.reserve(points_.size()), view.pixels.reserve(points_.size());
+  const int since = lookedForSince();
+  for (std::size_t p = 0; p < points_.size(); ++p) {
+    if (!isLookedFor(points_[p], since)) continue;
+    Eigen::Vector3d predicted;
+    if (!predictObservation(camera_, newestPose(), points_[p].position, predicted, nullptr)) continue;
+    predicted.z() = std::max(predicted.z(), kFarthestDisparity);
+    if (!camera_.sees(predicted) && !isSeenNext(predicted)) continue;
+    view.point.push_back(static_cast<int>(p));
+    view.seen.push_back(points_[p].seen);
+    view.pixels.emplace_back(static_cast<float>(predicted.x()), static_cast<float>(predicted.y()),
+                             static_cast<float>(predicted.z()));
+  }
+  view.rows.positions.reserve(view.point.size());
+  view.rows.descriptors.create(static_cast<int>(view.point.size()), kind_.bytes, CV_8U);
+  for (std::size_t row = 0; row < view.point.size(); ++row) {
+    const cv::Point3f& pixel = view.pixels[row];
+    view.rows.positions.push_back(camera_.backProject(pixel.x, pixel.y, pixel.z));
+    const std::vector<std::uint8_t>& descriptor = points_[view.point[row]].descriptor;
+    std::copy(descriptor.begin(), descriptor.end(), view.rows.descriptors.ptr(static_cast<int>(row)));
+  }
+  return view;
+}
+
+DescribedPoints LocalMap::points(int sightings) const {
+  const double farthest = kFarthestDisparity / (camera_.fx * camera_.baseline);  // 1/m
+  const int since = lookedForSince();
+  DescribedPoints rows;
+  rows.kind = kind_;
+  rows.positions.reserve(points_.size());
+  rows.descriptors.create(static_cast<int>(points_.size()), kind_.bytes, CV_8U);
+  for (const Point& point : points_) {
+    if (point.seen < sightings || !isLookedFor(point, since)) continue;
+    std::copy(point.descriptor.begin(), point.descriptor.end(), rows.descriptors.ptr(rows.count()));
+    const double inverse_depth = std::max(point.position.ray_and_inverse_depth.z(), farthest);
+    rows.positions.push_back(point.position.scaledPointIn(newestPose()) / inverse_depth);
+  }
+  rows.descriptors = rows.descriptors.rowRange(0, rows.count());
+  return rows;
+}
+
+void LocalMap::insert(const PatchAlignmentOptions& alignment, const StereoFeatures& features, int id,
+                      const Eigen::Isometry3d& T_camera_origin, const std::vector<Sighting>& sightings,
+                      const RigCalibration& calibration) {
+  newest_stamp_ = features.stamp;
+  camera_ = features.camera;
+  kind_ = features.kind();
+
+  std::vector<bool> recognised(features.u.size(), false);
+  for (const Sighting& sighting : sightings) {
+    recognised[sighting.row] = true;
+    ++points_[sighting.point].seen;
+    points_[sighting.point].observations.push_back({id, sighting.row, sighting.measurement, sighting.sigma});
+  }
+  // Only now that the new sightings are noted: points that they carry on must outlive the forgotten pair.
+  if (!frames_.empty() && !frames_.back().is_keyframe) removeFrame(frames_.size() - 1);
+  frames_.push_back({id, T_camera_origin, false, false});
+  frames_.back().is_keyframe = needsKeyframe();
+  // A corner that nothing is ever aligned with is no better than those seen later.
+  const double sigma =
+      alignment.canAlign(features.patch_layout.side) ? options_.noise.reference : options_.noise.corner;
+  for (int row = 0; row < features.count(); ++row)
+    if (!recognised[row]) startPoint(features, row, id, T_camera_origin, calibration, sigma);
+  if (static_cast<int>(frames_.size()) > options_.keyframes + 1) forgetKeyframe();
+}
+
+LocalMap::Sighting LocalMap::sight(const PatchAlignmentOptions& options, const StereoFeatures& features,
+                                   const Eigen::Isometry3d& T_camera_origin, int point, int row) const {
+  const NoiseOptions& noise = options_.noise;
+  const double sigma = options.canAlign(features.patch_layout.side) ? noise.unconfirmed() : noise.corner;
+  Sighting sighting{point, row, {features.u[row], features.v[row], features.disparity[row]}, sigma};
+  const Point& seen = points_[point];
+  const auto found = seen.reference.findIn(options, features, row, T_camera_origin, seen.position);
+  if (!found) return sighting;
+  sighting.measurement.head<2>() += found->shift;
+  sighting.sigma = found->sigma;
+  sighting.aligned = true;
+  sighting.scale = found->scale;
+  return sighting;
+}
+
+void LocalMap::renewLooks(const StereoFeatures& features, const std::vector<Sighting>& sightings) {
+  std::vector<const Sighting*> of_row(features.u.size(), nullptr);
+  for (const Sighting& sighting : sightings) of_row[sighting.row] = &sighting;
+  for (Point& point : points_) {
+    const Observation& last = point.observations.back();
+    const Sighting* sighting = last.frame_id == newestId() ? of_row[last.row] : nullptr;
+    if (!sighting) continue;  // not seen, cut off or just started
+    takeDescriptor(point, features, last.row);
+    const double change = std::max(sighting->scale, 1.0 / sighting->scale);
+    if (sighting->aligned && change > options_.renewal_scale)
+      point.reference.take(features, last.row, sighting->measurement.head<2>(), newestPose());
+  }
+}
+
+void LocalMap::discountNewest() {
+  for (Point& point : points_)
+    if (point.observations.size() > 1 && point.observations.back().frame_id == newestId()) --point.seen;
+}
+
+void LocalMap::takeDescriptor(Point& point, const StereoFeatures& features, int row) {
+  const std::uint8_t* bytes = features.descriptors.ptr(row);
+  point.descriptor.assign(bytes, bytes + features.descriptors.cols);
+}
+
+void LocalMap::startPoint(const StereoFeatures& features, int row, int id, const Eigen::Isometry3d& T_camera_origin,
+                          const RigCalibration& calibration, double sigma) {
+  const StereoCamera& camera = features.camera;
+  const double u = features.u[row], v = features.v[row];
+  const double disparity =
+      std::max(features.disparity[row] - calibration.disparityError(camera, u), kFarthestDisparity);
+  Point& point = points_.add();
+  point.seen = 1;
+  point.position.T_origin_anchor = T_camera_origin.inverse();
+  point.position.ray_and_inverse_depth = {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy,
+                                          1.0 / camera.depth(disparity)};
+  point.reference.take(features, row, {u, v}, T_camera_origin);
+  point.observations.clear();
+  // Room for many sightings would stay with a point that will have few.
+  if (point.observations.capacity() > kUsualSightings) point.observations.shrink_to_fit();
+  point.observations.reserve(kUsualSightings);
+  point.observations.push_back({id, row, {u, v, features.disparity[row]}, sigma});
+  takeDescriptor(point, features, row);
+}
+
+bool LocalMap::needsKeyframe() const {
+  const int id = newestId(), keyframe = lastKeyframeId();
+  if (id == keyframe) return true;  // the first one
+  std::vector<double> parallax;
+  parallax.reserve(points_.size());
+  int seen = 0;
+  for (const Point& point : points_) {
+    if (point.observations.back().frame_id != id) continue;
+    ++seen;
+    for (const Observation& observation : point.observations)
+      if (observation.frame_id == keyframe)
+        parallax.push_back((observation.measurement - point.observations.back().measurement).head<2>().norm());
+  }
+  if (static_cast<double>(parallax.size()) < options_.keyframe_overlap * seen || parallax.empty()) return true;
+  return median(parallax) > options_.keyframe_parallax;
+}
+
+/// Key frames beyond the newest ones stay for what they see: the first that shares too few points with the newest pair
+/// goes, and of too many the one that adds the least to the one before it.
+void LocalMap::forgetKeyframe() {
+  const auto lasting = [&] { return frames_.size() - 1 - static_cast<std::size_t>(options_.keyframes); };
+  const std::size_t leaving = lasting() - 1;
+  if (frames_[leaving].id > last_left_) {
+    last_left_ = frames_[leaving].id;
+    if (options_.remembered_keyframes > 0 && !frames_[leaving].is_recalled) rememberKeyframe(leaving);
+  }
+  const std::vector<int> shared = sharedPoints();
+  const auto too_few = std::find_if(shared.begin(), shared.begin() + static_cast<std::ptrdiff_t>(lasting()),
+                                    [&](int points) { return points < options_.lasting_points; });
+  const std::size_t unshared = static_cast<std::size_t>(too_few - shared.begin());
+  if (unshared < lasting()) removeFrame(unshared);
+  while (static_cast<int>(lasting()) > options_.keyframes) {
+    const std::vector<double> parallax = parallaxToPredecessors(lasting());
+    removeFrame(static_cast<std::size_t>(std::min_element(parallax.begin(), parallax.end()) - parallax.begin()));
+  }
+}
+
+/// Unless it sees too little to be recalled, or nothing new.
+void LocalMap::rememberKeyframe(std::size_t frame) {
+  const OldKeyframe without_looks = keyframe(frame, false);
+  if (without_looks.rows.count() < options_.lasting_points || memory_.covers(camera_, without_looks)) return;
+  memory_.remember(camera_, keyframe(frame, true));
+}
+
+/// With the points that another frame has seen as well: where they are, and what they look like if that is asked for.
+OldKeyframe LocalMap::keyframe(std::size_t frame, bool with_looks) const {
+  OldKeyframe old{frames_[frame].id, frames_[frame].T_camera_origin, {}, {}, {}};
+  old.rows.kind = kind_;
+  const auto isShared = [&](const Point& point) {
+    return point.observations.size() >= 2 && sightingIn(point.observations, old.id) != point.observations.end();
+  };
+  if (with_looks) {  // to be kept, so in no more memory than it needs
+    std::size_t most = 0, samples = 0;
+    for (const Point& point : points_)
+      if (isShared(point)) ++most, samples += point.reference.samples.size();
+    old.points.reserve(most), old.samples.reserve(samples), old.rows.positions.reserve(most);
+    old.rows.descriptors.create(static_cast<int>(most), kind_.bytes, CV_8U);
+  } else {
+    old.rows.positions.reserve(points_.size());
+  }
+  for (const Point& point : points_) {
+    Eigen::Vector3d predicted;
+    if (!isShared(point) || !predictObservation(camera_, old.T_camera_origin, point.position, predicted, nullptr))
+      continue;
+    old.rows.positions.push_back(
+        camera_.backProject(predicted.x(), predicted.y(), std::max(predicted.z(), kFarthestDisparity)));
+    if (!with_looks) continue;
+    const auto& [samples, spacing, centre, T_camera_origin] = point.reference;
+    old.samples.insert(old.samples.end(), samples.begin(), samples.end());
+    std::copy(point.descriptor.begin(), point.descriptor.end(),
+              old.rows.descriptors.ptr(static_cast<int>(old.points.size())));
+    const auto here = sightingIn(point.observations, old.id);
+    old.points.push_back({point.position, here->measurement, here->sigma, {}, old.samples.size()});
+    ReferencePatch& reference = old.points.back().reference;
+    reference.spacing = spacing, reference.centre = centre, reference.T_camera_origin = T_camera_origin;
+  }
+  if (with_looks) old.rows.descriptors = old.rows.descriptors.rowRange(0, static_cast<int>(old.points.size()));
+  return old;
+}
+
+const OldKeyframe* LocalMap::revisited() const {
+  const auto is_recalled = [](const Frame& frame) { return frame.is_recalled; };
+  if (std::any_of(frames_.begin(), frames_.end(), is_recalled)) return nullptr;
+  const OldKeyframe* nearest = memory_.nearest(camera_, newestPose(), options_.lasting_points);
+  const auto is_here = [&](const Frame& frame) { return frame.id == nearest->id; };
+  return nearest && std::none_of(frames_.begin(), frames_.end(), is_here) ? nearest : nullptr;
+}
+
+void LocalMap::recall(const OldKeyframe& old, const std::vector<Tie>& ties) {
+  const auto later =
+      std::find_if(frames_.begin(), frames_.end(), [&](const Frame& frame) { return frame.id > old.id; });
+  frames_.insert(later, {old.id, old.T_camera_origin, true, true});
+  std::unordered_map<int, Point*> of_row;
+  for (Point& point : points_)
+    if (point.observations.back().frame_id == newestId()) of_row[point.observations.back().row] = &point;
+  for (const Tie& tie : ties) {
+    auto& observations = of_row.at(tie.row)->observations;
+    const OldKeyframe::Point& point = old.points[static_cast<std::size_t>(tie.point)];
+    // The two reference patches may show points a little apart.
+    const Eigen::Vector2d apart = tie.position - observations.back().measurement.head<2>();
+    Eigen::Vector3d measurement = point.measurement;
+    measurement.head<2>() -= apart / tie.scale;
+    const auto place = std::find_if(observations.begin(), observations.end(),
+                                    [&](const Observation& observation) { return observation.frame_id > old.id; });
+    observations.insert(place, {old.id, -1, measurement, std::hypot(point.sigma, tie.sigma)});
+  }
+}
+
+void LocalMap::moveTo(const Eigen::Isometry3d& T_newest_origin) {
+  const Eigen::Isometry3d T_old_new = newestPose().inverse() * T_newest_origin;
+  for (Frame& frame : frames_) frame.T_camera_origin = frame.T_camera_origin * T_old_new;
+  for (Point& point : points_) {
+    point.position.T_origin_anchor = T_old_new.inverse() * point.position.T_origin_anchor;
+    point.reference.T_camera_origin = point.reference.T_camera_origin * T_old_new;
+  }
+}
+
+/// For each frame the points that it shares with the newest pair.
+std::vector<int> LocalMap::sharedPoints() const {
+  std::vector<int> shared(frames_.size(), 0);
+  for (const Point& point : points_) {
+    if (point.observations.back().frame_id != newestId()) continue;
+    std::size_t f = 0;
+    for (const Observation& observation : point.observations) {
+      while (frames_[f].id < observation.frame_id) ++f;
+      ++shared[f];
+    }
+  }
+  return shared;
+}
+
+/// For each of the first frames the median distance in px by which points moved since the frame before; infinite for
+/// the very first, and where none are shared.
+std::vector<double> LocalMap::parallaxToPredecessors(std::size_t frames) const {
+  std::vector<std::vector<double>> distances(frames);
+  for (const Point& point : points_) {
+    std::size_t f = 0;
+    for (std::size_t k = 1; k < point.observations.size(); ++k) {
+      const Observation &before = point.observations[k - 1], &here = point.observations[k];
+      while (f < frames && frames_[f].id < here.frame_id) ++f;
+      if (f == frames) break;
+      if (frames_[f - 1].id == before.frame_id)
+        distances[f].push_back((here.measurement - before.measurement).head<2>().norm());
+    }
+  }
+  std::vector<double> parallax(frames, std::numeric_limits<double>::infinity());
+  for (std::size_t f = 0; f < frames; ++f)
+    if (!distances[f].empty()) parallax[f] = median(distances[f]);
+  return parallax;
+}
+
+/// The frame since which a point must have been seen if it was seen only once.
+int LocalMap::lookedForSince() const {
+  return frames_[frames_.size() - std::min(frames_.size(), std::size_t(options_.remembered))].id;
+}
+
+/// A place that was seen once and then missed is most often no place at all.
+bool LocalMap::isLookedFor(const Point& point, int since) {
+  const std::size_t sightings = point.observations.size();
+  return sightings >= 2 || (sightings == 1 && point.observations.back().frame_id >= since);
+}
+
+void LocalMap::removeFrame(std::size_t index) {
+  const int id = frames_[index].id;
+  frames_.erase(frames_.begin() + static_cast<std::ptrdiff_t>(index));
+  points_.removeIf([&, since = lookedForSince()](Point& point) {
+    const auto here = sightingIn(point.observations, id);
+    if (here != point.observations.end()) point.observations.erase(here);
+    return !isLookedFor(point, since);
+  });
+}
+
+void LocalMap::Problem::clear() {
+  window.T_camera_origin.clear(), window.points.clear(), window.observations.clear();
+  frame_ids.clear(), points.clear(), newest.clear();
+}
+
+void LocalMap::pose(Problem& problem) const {
+  Window& window = problem.window;
+  window.camera = camera_;
+  for (const Frame& frame : frames_) {
+    window.T_camera_origin.push_back(frame.T_camera_origin);
+    problem.frame_ids.push_back(frame.id);
+  }
+  for (std::size_t p = 0; p < points_.size(); ++p) {
+    const Point& point = points_[p];
+    if (point.observations.size() < 2) continue;
+    int frame = 0;
+    for (const Observation& observation : point.observations) {
+      while (problem.frame_ids[static_cast<std::size_t>(frame)] < observation.frame_id) ++frame;
+      window.observations.emplace_back();
+      WindowObservation& posed = window.observations.back();
+      posed.point = static_cast<int>(problem.points.size());
+      posed.frame = frame;
+      posed.measurement = observation.measurement;
+      posed.sigma = observation.sigma;
+    }
+    if (point.observations.back().frame_id == newestId())
+      problem.newest.push_back(static_cast<int>(window.observations.size()) - 1);
+    window.points.push_back(point.position);
+    problem.points.push_back(static_cast<int>(p));
+  }
+}
+
+std::vector<Eigen::Vector3d> LocalMap::positions() const {
+  const double farthest = kFarthestDisparity / (camera_.fx * camera_.baseline);  // 1/m, where it was seen first
+  std::vector<Eigen::Vector3d> positions;
+  for (const Point& point : points_) {
+    const double inverse_depth = point.position.ray_and_inverse_depth.z();
+    if (inverse_depth > farthest)
+      positions.push_back(point.position.scaledPointIn(Eigen::Isometry3d::Identity()) / inverse_depth);
+  }
+  return positions;
+}
+
+LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const CalibrationBelief& prior,
+                                      RigCalibration& calibration, const std::optional<Floor>& floor) {
+  Adjustment adjustment;
+  const int newest = static_cast<int>(frames_.size()) - 1;
+  if (newest == 0) return adjustment;
+  problem_.clear();
+  pose(problem_);
+  Window& window = problem_.window;
+  window.calibration = calibration;
+  window.calibration_prior = prior;
+  window.floor = floor;
+
+  std::vector<int> poses;  // whose covariances are made use of below
+  for (const int pose : {newest, newest - 1})
+    if (pose > 0) poses.push_back(pose);
+  const WindowSolution& solution = optimizer.optimize(window, poses);
+  if (!solution.success) {
+    problem_.clear();
+    return adjustment;
+  }
+  adjustment.success = true;
+  adjustment.calibration_information = solution.calibration_information;
+  adjustment.common_disparity_square = solution.common_disparity_square;
+  const auto motion = [&](int from, int to) {
+    return motionCovariance(window, poses, solution.pose_covariance, from, to);
+  };
+  adjustment.since_keyframe = motion(newest - 1, newest);
+  const Matrix6d carried = adjoint(window.T_camera_origin[newest] * window.T_camera_origin[newest - 1].inverse());
+  adjustment.growth = positivePart(motion(0, newest) - carried * motion(0, newest - 1) * carried.transpose());
+  calibration = window.calibration;
+  for (std::size_t f = 0; f < frames_.size(); ++f)
+    frames_[f].T_camera_origin = orthonormalised(window.T_camera_origin[f]);
+  for (std::size_t i = 0; i < problem_.points.size(); ++i)
+    points_[problem_.points[i]].position.ray_and_inverse_depth = window.points[i].ray_and_inverse_depth;
+  cutOff(solution.squares, adjustment);
+  problem_.clear();
+  return adjustment;
+}
+
+void LocalMap::cutOff(const std::vector<double>& squares, Adjustment& adjustment) {
+  const double gate = 2.0 * noiseGate(2);  // the point's position errs as much as the sighting's
+  for (const int i : problem_.newest) {
+    // A corner that no patch confirms may be of another point. The point's own corner is within a corner's noise.
+    const double wider = std::max(problem_.window.observations[i].sigma / options_.noise.corner, 1.0);
+    if (wider * wider * squares[i] <= gate) continue;
+    Point& point = points_[problem_.points[problem_.window.observations[i].point]];
+    adjustment.rejected_rows.push_back(point.observations.back().row);
+    --point.seen;
+    point.observations.pop_back();
+  }
+}
+
+}  // namespace sdvo

@@ -1,0 +1,49 @@
+#include "stereo_descriptor_vo/map/reference_patch.hpp"
+
+#include "stereo_descriptor_vo/map/point_elimination.hpp"
+
+namespace sdvo {
+
+ReferencePatch::ReferencePatch(const StereoFeatures& features, int row, const Eigen::Vector2d& position,
+                               const Eigen::Isometry3d& T_then_origin) {
+  take(features, row, position, T_then_origin);
+}
+
+void ReferencePatch::take(const StereoFeatures& features, int row, const Eigen::Vector2d& position,
+                          const Eigen::Isometry3d& T_then_origin) {
+  T_camera_origin = T_then_origin;
+  samples.clear(), spacing = 1.f, centre.setZero();
+  if (!features.hasPatches()) return;
+  const std::uint8_t* first = features.patches.ptr(row);
+  samples.assign(first, first + features.patches.cols);
+  spacing = features.patch_layout.spacing(features.size[row]);
+  centre = (position - Eigen::Vector2d(features.u[row], features.v[row])).cast<float>() / spacing;
+}
+
+std::optional<ReferencePatch::Found> ReferencePatch::findIn(const PatchAlignmentOptions& options,
+                                                            const StereoFeatures& features, int row,
+                                                            const Eigen::Isometry3d& T_now_origin,
+                                                            const AnchoredPoint& point) const {
+  if (!options.canAlign(features.patch_layout.side) ||
+      samples.size() != static_cast<std::size_t>(features.patch_layout.bytes()))
+    return std::nullopt;
+
+  // The patch is small and taken as facing the camera that it was taken from: to first order the two views then differ
+  // by an affine map, the ratio of the depths above all.
+  const Eigen::Vector3d then = point.scaledPointIn(T_camera_origin);
+  const Eigen::Vector3d now = point.scaledPointIn(T_now_origin);
+  if (then.z() < kNearestScaled || now.z() < kNearestScaled) return std::nullopt;
+  const Eigen::Matrix3d R = T_now_origin.linear() * T_camera_origin.linear().transpose();
+  const Eigen::Vector2d ray = now.head<2>() / now.z();
+  const double scale = then.z() / now.z();
+  const Eigen::Matrix2d warp = scale * (R.topLeftCorner<2, 2>() - ray * R.bottomLeftCorner<1, 2>());
+
+  const int side = features.patch_layout.side;
+  const Patch old_patch{samples.data(), side, spacing};
+  const Patch new_patch{features.patches.ptr(row), side, features.patch_layout.spacing(features.size[row])};
+  const auto found = alignPatch(options, old_patch, centre, new_patch, warp.cast<float>());
+  if (!found) return std::nullopt;
+  return Found{found->shift.cast<double>(), found->sigma, scale};
+}
+
+}  // namespace sdvo

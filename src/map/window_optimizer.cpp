@@ -1,0 +1,423 @@
+#include "stereo_descriptor_vo/map/window_optimizer.hpp"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "../common/median.hpp"
+#include "../motion/log_sum.hpp"
+#include "stereo_descriptor_vo/map/point_elimination.hpp"
+#include "stereo_descriptor_vo/motion/noise.hpp"
+
+namespace sdvo {
+namespace {
+
+constexpr int kCalibration = RigCalibration::kParameters;
+using CalibrationVector = RigCalibration::Vector;
+
+/// Normal equations of poses and calibration after the elimination of the points, and what is needed to get these back.
+struct ReducedSystem {
+  Eigen::MatrixXd hessian;  ///< poses but the first, then the calibration; its lower triangle
+  Eigen::VectorXd gradient;
+  std::vector<EliminatedPoint> points;
+  std::vector<PoseFactor> factors;  ///< one point's after the other's
+  double cost = 0.0;
+};
+
+/// What is looked for: poses, points (ray and inverse depth of each that is seen, in the order of the observations) and
+/// calibration.
+struct Estimate {
+  std::vector<Eigen::Isometry3d> T_camera_origin;
+  std::vector<Eigen::Vector3d> points;
+  RigCalibration calibration;
+};
+
+/// What all disparities of one point say beyond what its positions do: the square of their mean residual as a variance.
+/// What the point itself followed of it is made up for; none where that is more than half.
+std::optional<double> commonSquare(const EliminatedPoint& point) {
+  constexpr int kFewest = 4;
+  if (point.sightings < kFewest) return std::nullopt;
+  const double followed = (point.R * point.disparity_by_point).squaredNorm() / point.weight;
+  if (followed > 0.5) return std::nullopt;
+  const double mean = point.disparity_residual / point.weight;
+  return mean * mean / (1.0 - followed);
+}
+
+/// Median of squares as the variance of a normal distribution; none of too few. Reorders them.
+std::optional<double> varianceOf(std::vector<double>& squares) {
+  constexpr double kMedianOfChiSquare = 0.4549;  // of one degree of freedom
+  if (squares.size() < kFewestMeasured) return std::nullopt;
+  return median(squares) / kMedianOfChiSquare;
+}
+
+/// Linear algebra of one window after the other, in the same memory.
+class Solver {
+ public:
+  explicit Solver(const WindowOptimizerOptions& options) : options_(options) {}
+
+  /// Refers to the window from now on, whose values are the first estimate.
+  void take(const Window& window, Estimate& estimate) {
+    window_ = &window;
+    common_sigma_ = window.calibration_prior.common_sigma.value_or(options_.noise.common_disparity);
+    const auto& observations = window.observations;
+    first_of_point_.clear();
+    anchors_.clear(), anchor_of_point_.clear(), estimate.points.clear();
+    for (std::size_t i = 0; i < observations.size(); ++i) {
+      if (i > 0 && observations[i].point == observations[i - 1].point) continue;
+      first_of_point_.push_back(static_cast<int>(i));
+      const AnchoredPoint& point = window.points[static_cast<std::size_t>(observations[i].point)];
+      // Points that one pair saw first lie next to each other.
+      if (anchors_.empty() || point.T_origin_anchor.matrix() != anchors_.back().matrix())
+        anchors_.push_back(point.T_origin_anchor);
+      anchor_of_point_.push_back(anchors_.size() - 1);
+      estimate.points.push_back(point.ray_and_inverse_depth);
+    }
+    first_of_point_.push_back(static_cast<int>(observations.size()));
+    estimate.T_camera_origin = window.T_camera_origin;
+    estimate.calibration = window.calibration;
+    poses_ = static_cast<int>(window.T_camera_origin.size()) - 1;
+    size_ = 6 * poses_ + kCalibration;
+  }
+
+  /// Moves the window, the one that was taken, to the estimate.
+  void give(const Estimate& estimate, Window& window) const {
+    window.T_camera_origin = estimate.T_camera_origin;
+    window.calibration = estimate.calibration;
+    for (std::size_t p = 0; p < estimate.points.size(); ++p) {
+      const WindowObservation& first = window.observations[static_cast<std::size_t>(first_of_point_[p])];
+      window.points[static_cast<std::size_t>(first.point)].ray_and_inverse_depth = estimate.points[p];
+    }
+  }
+
+  int poses() const { return poses_; }
+  int size() const { return size_; }
+
+  /// Square of the residual at which the Cauchy kernel bends: a square s costs bend * log(1 + s / bend).
+  double bend() const { return options_.kernel_scale * options_.kernel_scale; }
+  double weight(double square) const { return bend() / (bend() + square); }
+
+  /// Also gives the square of each observation's residual.
+  double cost(const Estimate& estimate, std::vector<double>& squares) {
+    squares.resize(window_->observations.size());
+    const WindowProjection projection(window_->camera, estimate.calibration);
+    placeAnchors(estimate);
+    for (std::size_t p = 0; p < estimate.points.size(); ++p)
+      squareResiduals(projection, sightedPoint(estimate, p), squares.data() + first_of_point_[p]);
+    return costOf(estimate, squares);
+  }
+
+  /// In the memory that the system has of an earlier linearisation.
+  void linearise(const Estimate& estimate, double damping, ReducedSystem& system) {
+    eliminatePoints(estimate, {bend(), damping}, system);
+    equations_.copyTo(system.hessian, system.gradient);
+    const CalibrationBelief& prior = window_->calibration_prior;
+    system.hessian.bottomRightCorner<kCalibration, kCalibration>() += prior.information;
+    system.gradient.tail<kCalibration>() += prior.information * (prior.mean - estimate.calibration.value);
+    if (window_->floor) holdToFloor(estimate, system.hessian, system.gradient);
+    system.cost = costOf(estimate, squares_);
+  }
+
+  /// Variance, px^2, of the error that all disparities of one point share. `squares`: memory.
+  std::optional<double> commonVariance(const std::vector<EliminatedPoint>& points, std::vector<double>& squares) const {
+    double of_means = 0.0;  // what the mean of a point's disparities has of the noise that is new in each of them
+    squares.clear();
+    for (std::size_t p = 0; p < points.size(); ++p) {
+      const int sightings = first_of_point_[p + 1] - first_of_point_[p];
+      const auto square = commonSquare(points[p]);
+      if (!square) continue;
+      squares.push_back(disparityVariance(sightings) * *square);
+      of_means += options_.noise.disparity * options_.noise.disparity / sightings;
+    }
+    const auto variance = varianceOf(squares);
+    if (!variance) return std::nullopt;
+    return *variance - of_means / static_cast<double>(squares.size());
+  }
+
+  /// Covariances at a minimum of robust costs (Huber, Robust Statistics, section 7.6): A^-1 B A^-1, A the cost's second
+  /// derivatives, B the sum of the gradients' products over what errs independently. Parts of the image do (Liang and
+  /// Zeger 1986): sightings of a point share errors of its disparity, neighbours those of patches and rectification. Of
+  /// B only its size beside A is taken from the gradients, since few points leave the rest to chance. All of it is of
+  /// the last linearisation, but for `squares`: the residuals' now. `poses`: those that are asked for.
+  bool covariances(const Estimate& estimate, const std::vector<double>& squares, const std::vector<int>& poses,
+                   ReducedSystem& system, WindowSolution& solution) {
+    const RigCalibration::Matrix certain = certainInformation();
+    equations_.copyTo(system.hessian, system.gradient);
+    known_.setZero(size_, size_);  // without the points
+    known_.bottomRightCorner<kCalibration, kCalibration>() = certain;
+    if (window_->floor) holdToFloor(estimate, known_, system.gradient);
+    const auto [derivatives, gradient_products] = sinceLinearised(squares);
+    system.hessian = derivatives * system.hessian + known_;
+    factor_.compute(system.hessian);
+    if (factor_.info() != Eigen::Success) return false;  // as when nothing holds one of the poses
+
+    const int asked = 6 * static_cast<int>(poses.size());
+    units_.setZero(size_, asked + kCalibration);
+    for (int k = 0; k < asked; ++k) units_(6 * (poses[static_cast<std::size_t>(k / 6)] - 1) + k % 6, k) = 1.0;
+    units_.bottomRightCorner<kCalibration, kCalibration>().setIdentity();
+    solved_ = factor_.solve(units_);
+    const RigCalibration::Matrix of_calibration = solved_.bottomRightCorner<kCalibration, kCalibration>();
+    solution.calibration_information = (of_calibration.inverse() - certain) / derivatives;
+
+    const auto of_poses = solved_.leftCols(asked);
+    const Eigen::MatrixXd of_known = of_poses.transpose() * known_.selfadjointView<Eigen::Lower>() * of_poses;
+    const Eigen::MatrixXd of_points = units_.leftCols(asked).transpose() * of_poses - of_known;
+    solution.pose_covariance =
+        gradient_products * errorsOverInformation(system, estimate, of_poses, of_points) * of_points + of_known;
+    return solution.pose_covariance.allFinite();
+  }
+
+  /// Of the calibration before the window, where it is held for want of evidence, too.
+  RigCalibration::Matrix certainInformation() const {
+    const CalibrationBelief& prior = window_->calibration_prior;
+    return prior.certain_information.value_or(prior.information);
+  }
+
+  /// The estimate that is a step of poses and calibration away, and what the points make of it.
+  void makeStep(const Estimate& estimate, const ReducedSystem& system, const Eigen::VectorXd& step,
+                Estimate& next) const {
+    const CalibrationVector calibration = step.tail<kCalibration>();
+    next.calibration.value = estimate.calibration.value + calibration;
+    next.T_camera_origin = estimate.T_camera_origin;
+    for (int f = 0; f < poses_; ++f)
+      next.T_camera_origin[f + 1] = expSE3(step.segment<6>(6 * f)) * estimate.T_camera_origin[f + 1];
+    next.points = estimate.points;
+    movePoints(system.points, system.factors, step.head(6 * poses_), calibration, next.points);
+  }
+
+ private:
+  /// The last linearisation in units of how things are now.
+  struct SinceLinearised {
+    double derivatives;        ///< the cost's second derivatives now by the normal equations
+    double gradient_products;  ///< now by then
+  };
+  /// Of a residual the cost's second derivatives are w - w^2 s / bend = w^2 on average over two directions, where the
+  /// normal equations have its weight w, which leads to the minimum from farther away. Products of gradients have w^2,
+  /// too. Of a point's sightings i its elimination leaves w_i - w_i^2 / sum(w). Compared are the sums of that.
+  SinceLinearised sinceLinearised(const std::vector<double>& squares) const {
+    double weights = 0.0, before = 0.0, now = 0.0;
+    for (std::size_t p = 0; p + 1 < first_of_point_.size(); ++p) {
+      double w1 = 0.0, w2 = 0.0, w4 = 0.0, now2 = 0.0, now4 = 0.0;  // powers
+      for (int i = first_of_point_[p]; i < first_of_point_[p + 1]; ++i) {
+        const double w = weight(squares_[i]), square = w * w, w_now = weight(squares[i]), now_square = w_now * w_now;
+        w1 += w, w2 += square, w4 += square * square, now2 += now_square, now4 += now_square * now_square;
+      }
+      weights += w1 - w2 / w1, before += w2 - w4 / w2, now += now2 - now4 / now2;
+    }
+    return {now / std::max(weights, 1e-12), now / std::max(before, 1e-12)};
+  }
+
+  /// Mean ratio of two covariances: by the gradients of single points, and as the second derivatives have it. What the
+  /// poses took of the gradients is made up for by the degrees of freedom.
+  double errorsOverInformation(const ReducedSystem& system, const Estimate& estimate,
+                               const Eigen::Ref<const Eigen::MatrixXd>& solved, const Eigen::MatrixXd& covariance) {
+    double freedom = 0.0, trace = 0.0;  // of covariance^-1 times the sum of outer products
+    for (const EliminatedPoint& point : system.points)
+      freedom += 2.0 * point.sightings - 2.0;  // u, v and one disparity against a position
+    const Eigen::MatrixXd whitened = covariance.llt().matrixL().solve(solved.transpose());
+    for (Eigen::Index row = 0; row < whitened.rows(); row += 6)
+      trace += squareOfGradients(system, estimate, whitened.middleRows<6>(row));
+    return trace / static_cast<double>(solved.cols()) * freedom / std::max(freedom - 6.0 * poses_, 1.0);
+  }
+
+  /// Sum over parts of the image in which the points were seen first.
+  double squareOfGradients(const ReducedSystem& system, const Estimate& estimate,
+                           const Eigen::Matrix<double, 6, Eigen::Dynamic>& by) {
+    constexpr int kParts = 64;  // in a row at most
+    parts_.assign(kParts * kParts, Vector6d::Zero());
+    const double scale = window_->camera.fx / kPart;
+    const auto part = [&](double ray) { return std::clamp(static_cast<int>(ray * scale + kParts / 2), 0, kParts - 1); };
+    const PoseFactor* sighting = system.factors.data();
+    for (std::size_t p = 0; p < system.points.size(); ++p) {
+      const EliminatedPoint& point = system.points[p];
+      Vector6d& moved = parts_[part(estimate.points[p].y()) * kParts + part(estimate.points[p].x())];
+      moved += by.rightCols<kCalibration>().lazyProduct(point.calibration_gradient);
+      for (const PoseFactor* end = sighting + point.factors; sighting != end; ++sighting) {
+        const double *t = sighting->gradient.translation, *r = sighting->gradient.rotation;
+        const auto pose = by.middleCols<6>(6 * sighting->pose);
+        moved += pose.col(0) * t[0] + pose.col(1) * t[1] + pose.col(2) * t[2] +  //
+                 pose.col(3) * r[0] + pose.col(4) * r[1] + pose.col(5) * r[2];
+      }
+    }
+    double sum = 0.0;
+    for (const Vector6d& moved : parts_) sum += moved.squaredNorm();
+    return sum;
+  }
+
+  void eliminatePoints(const Estimate& estimate, const Linearisation& linearisation, ReducedSystem& system) {
+    system.points.resize(estimate.points.size());
+    system.factors.resize(window_->observations.size());
+    squares_.resize(window_->observations.size());
+    equations_.setZero(poses_);
+    const WindowProjection projection(window_->camera, estimate.calibration);
+    placeAnchors(estimate);
+    PoseFactor* factors = system.factors.data();
+    for (std::size_t p = 0; p < estimate.points.size(); ++p) {
+      system.points[p] = equations_.add(projection, sightedPoint(estimate, p), linearisation, factors,
+                                        squares_.data() + first_of_point_[p]);
+      factors += system.points[p].factors;
+    }
+  }
+
+  /// T_camera_anchor_, anchor by anchor those of all poses.
+  void placeAnchors(const Estimate& estimate) {
+    T_camera_anchor_.clear();
+    for (const Eigen::Isometry3d& T_origin_anchor : anchors_)
+      for (const Eigen::Isometry3d& T : estimate.T_camera_origin) T_camera_anchor_.push_back(T * T_origin_anchor);
+  }
+
+  SightedPoint sightedPoint(const Estimate& estimate, std::size_t p) const {
+    const int first = first_of_point_[p], count = first_of_point_[p + 1] - first;
+    return {estimate.points[p], window_->observations.data() + first, count, 1.0 / std::sqrt(disparityVariance(count)),
+            T_camera_anchor_.data() + anchor_of_point_[p] * estimate.T_camera_origin.size()};
+  }
+
+  double costOf(const Estimate& estimate, const std::vector<double>& squares) const {
+    LogSum costs;
+    for (const double square : squares) costs.add(square / bend());
+    const CalibrationVector error = estimate.calibration.value - window_->calibration_prior.mean;
+    return error.dot(window_->calibration_prior.information * error) + bend() * costs.value() + floorCost(estimate);
+  }
+
+  void holdToFloor(const Estimate& estimate, Eigen::MatrixXd& hessian, Eigen::VectorXd& gradient) const {
+    Floor::Jacobian jacobian;
+    for (int f = 0; f < poses_; ++f) {
+      const Eigen::Vector3d residual = window_->floor->residual(estimate.T_camera_origin[f + 1], &jacobian);
+      const Eigen::Vector3d weights = residual.cwiseAbs2().unaryExpr(&Floor::weight);
+      hessian.block<6, 6>(6 * f, 6 * f) += jacobian.transpose() * weights.asDiagonal() * jacobian;
+      gradient.segment<6>(6 * f) -= jacobian.transpose() * weights.cwiseProduct(residual);
+    }
+  }
+
+  double floorCost(const Estimate& estimate) const {
+    double cost = 0.0;
+    for (int f = 0; window_->floor && f < poses_; ++f)
+      cost += window_->floor->residual(estimate.T_camera_origin[f + 1]).cwiseAbs2().unaryExpr(&Floor::cost).sum();
+    return cost;
+  }
+
+  /// Of n disparities of one point the mean has the variance sigma^2 / n + common^2, as if each by itself had n times
+  /// that: more sightings do not average away what they share.
+  double disparityVariance(int sightings) const {
+    return options_.noise.disparity * options_.noise.disparity + sightings * common_sigma_ * common_sigma_;
+  }
+
+  WindowOptimizerOptions options_;
+  const Window* window_ = nullptr;
+  double common_sigma_ = 0.0;
+  std::vector<int> first_of_point_;
+  std::vector<Eigen::Isometry3d> anchors_, T_camera_anchor_;
+  std::vector<std::size_t> anchor_of_point_;
+  PoseEquations equations_;
+  std::vector<double> squares_;
+  std::vector<Vector6d> parts_;
+  Eigen::MatrixXd known_, units_, solved_;
+  Eigen::LLT<Eigen::MatrixXd> factor_;
+  int poses_ = 0, size_ = 0;
+};
+
+}  // namespace
+
+bool predictObservation(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
+                        const AnchoredPoint& point, Eigen::Vector3d& prediction, ObservationJacobians* jacobians) {
+  const double rho = point.ray_and_inverse_depth.z();
+  const Eigen::Vector3d P = point.scaledPointIn(T_camera_origin);
+  if (P.z() < kNearestScaled) return false;
+  const double iz = 1.0 / P.z();
+  const double x = P.x() * iz, y = P.y() * iz, fb = camera.fx * camera.baseline;
+  prediction = {camera.fx * x + camera.cx, camera.fy * y + camera.cy, fb * rho * iz};
+  if (!jacobians) return true;
+
+  const Eigen::Isometry3d T_camera_anchor = T_camera_origin * point.T_origin_anchor;
+  const auto R = T_camera_anchor.linear();
+  const auto t = T_camera_anchor.translation();
+  // By the scaled point, rho held: (a, 0, -a x), (0, b, -b y), (0, 0, -d). A turn moves the point by -skew(P).
+  const double a = camera.fx * iz, b = camera.fy * iz, d = fb * rho * iz * iz;
+  jacobians->pose << rho * a, 0.0, -rho * a * x, -a * x * P.y(), a * (P.z() + x * P.x()), -a * P.y(),  //
+      0.0, rho * b, -rho * b * y, -b * (P.z() + y * P.y()), b * y * P.x(), b * P.x(),                  //
+      0.0, 0.0, -rho * d, -d * P.y(), d * P.x(), 0.0;
+  const auto byDirection = [&](const auto& w) -> Eigen::Vector3d {
+    return {a * (w.x() - x * w.z()), b * (w.y() - y * w.z()), -d * w.z()};
+  };
+  jacobians->point.col(0) = byDirection(R.col(0));
+  jacobians->point.col(1) = byDirection(R.col(1));
+  jacobians->point.col(2) = byDirection(t);
+  jacobians->point(2, 2) += fb * iz;
+  return true;
+}
+
+struct WindowOptimizer::Memory {
+  explicit Memory(const WindowOptimizerOptions& options) : solver(options) {}
+
+  Solver solver;
+  ReducedSystem system;
+  Estimate estimate, next;
+  Eigen::MatrixXd hessian;
+  Eigen::LLT<Eigen::MatrixXd> factor;
+  Eigen::VectorXd step;
+  std::vector<double> squares, common_squares;
+  WindowSolution solution;
+};
+
+WindowOptimizer::WindowOptimizer(const WindowOptimizerOptions& options)
+    : options_(options), memory_(std::make_unique<Memory>(options_)) {}
+
+WindowOptimizer::WindowOptimizer(WindowOptimizer&&) noexcept = default;
+WindowOptimizer& WindowOptimizer::operator=(WindowOptimizer&&) noexcept = default;
+WindowOptimizer::~WindowOptimizer() = default;
+
+const WindowSolution& WindowOptimizer::optimize(Window& window) {
+  std::vector<int> all(window.T_camera_origin.size() - 1);
+  std::iota(all.begin(), all.end(), 1);
+  return optimize(window, all);
+}
+
+const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vector<int>& covariance_of) {
+  constexpr double kUndamped = 1e-5, kLargestDamping = 1e4;
+  auto& [solver, system, estimate, next, hessian, factor, step, squares, common_squares, solution] = *memory_;
+  solver.take(window, estimate);
+  solution.success = false;
+  solution.iterations = 0;
+  double damping = kUndamped, damping_of_system = kUndamped;
+  bool accepted = false;
+  const int c = 6 * solver.poses();
+  // A refused step is tried again with more damping.
+  while (solution.iterations < options_.iterations && damping < kLargestDamping) {
+    solver.linearise(estimate, damping, system);
+    damping_of_system = damping;
+    hessian = system.hessian;  // its lower triangle
+    hessian.diagonal().head(c) *= 1.0 + damping;
+    factor.compute(hessian);
+    if (factor.info() != Eigen::Success) {
+      accepted = false, damping *= 100.0;
+      continue;
+    }
+    step = factor.solve(system.gradient);
+    solver.makeStep(estimate, system, step, next);
+    const double next_cost = solver.cost(next, squares);
+    accepted = next_cost <= system.cost;
+    if (accepted) {
+      ++solution.iterations;
+      const bool converged = system.cost - next_cost < 1e-4 * (system.cost + 1.0);
+      std::swap(estimate, next);
+      damping = std::max(0.1 * damping, 1e-8);
+      if (converged) break;
+    } else {
+      damping *= 100.0;
+    }
+  }
+
+  solver.give(estimate, window);
+
+  // Of the last linearisation, one step before the result: half of the work saved. But points held by damping would
+  // say too much.
+  if (damping_of_system > kUndamped) solver.linearise(estimate, kUndamped, system);
+  solution.common_disparity_square = solver.commonVariance(system.points, common_squares);
+  if (!accepted) solver.cost(estimate, squares);  // those at hand belong to a refused step
+  if (!solver.covariances(estimate, squares, covariance_of, system, solution)) return solution;
+  std::swap(solution.squares, squares);
+  solution.success = true;
+  return solution;
+}
+
+}  // namespace sdvo

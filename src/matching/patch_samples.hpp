@@ -1,0 +1,57 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "stereo_descriptor_vo/matching/patch_alignment.hpp"
+
+namespace sdvo {
+
+/// Values on a square of samples, row by row; those that fill the last register are zero.
+constexpr int kLargestSampledSide = 2 * (PatchAlignmentOptions::kLargestRadius + 1) + 1;
+constexpr int kMostSampled = (kLargestSampledSide * kLargestSampledSide + 7) / 8 * 8;
+using Samples = std::array<float, kMostSampled>;
+
+/// A patch where it can be read quickly, and beyond its end.
+class NearPatch {
+ public:
+  void take(const Patch& patch);
+
+  const std::uint8_t* samples() const { return samples_.data(); }
+  int side() const { return side_; }
+
+ private:
+  std::vector<std::uint8_t> samples_;
+  int side_ = 0;
+};
+
+/// The square of side 2 radius + 1.
+class SampleSquare {
+ public:
+  SampleSquare() : SampleSquare(0) {}
+  explicit SampleSquare(int radius);
+
+  int side() const { return 2 * radius_ + 1; }
+  int pixels() const { return side() * side(); }
+  /// Pixels and what fills the last register.
+  int count() const { return (pixels() + 7) / 8 * 8; }
+  const float* mask() const { return mask_.data(); }
+
+  /// Samples a patch on this square around `centre`, its grid taken there by `grid` (all in samples of the patch, from
+  /// its middle), bilinearly. False when a corner of the square lies outside.
+  bool sample(const NearPatch& patch, const Eigen::Vector2f& centre, const Eigen::Matrix2f& grid,
+              Samples& values) const;
+
+  /// The same with the patch's own grid, and the derivatives by x and y: half of what the neighbours differ by, which
+  /// may not lie outside either.
+  bool sampleUpright(const NearPatch& patch, const Eigen::Vector2f& centre, Samples& values, Samples& by_x,
+                     Samples& by_y) const;
+
+ private:
+  int radius_;
+  Samples x_{}, y_{}, mask_{};  ///< offset of each pixel from the square's middle; one for each pixel
+};
+
+}  // namespace sdvo

@@ -1,0 +1,163 @@
+#include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
+
+#include <array>
+#include <cstddef>
+#include <limits>
+
+#include "../common/lanes.hpp"
+
+namespace sdvo {
+namespace {
+
+/// What the kernels need of a pose and a camera.
+struct Projection {
+  double rotation[3][3], translation[3];
+  double fx, fy, cx, cy, fx_baseline;
+
+  Projection(const StereoCamera& camera, const Eigen::Isometry3d& T)
+      : fx(camera.fx), fy(camera.fy), cx(camera.cx), cy(camera.cy), fx_baseline(camera.fx * camera.baseline) {
+    for (int i = 0; i < 3; ++i) {
+      translation[i] = T.translation()[i];
+      for (int j = 0; j < 3; ++j) rotation[i][j] = T.linear()(i, j);
+    }
+  }
+};
+
+/// Four correspondences under a pose, as reprojectionResidual() has them one by one.
+struct Projected {
+  DoubleLanes x, y, z;                   ///< in the camera's frame, m
+  DoubleLanes inverse_depth;             ///< 1/m
+  DoubleLanes u_left, v, u_right;        ///< residuals, px
+  decltype(DoubleLanes{} < 0.0) behind;  ///< not in front of the camera: then z is 1 m
+
+  SDVO_IN_KERNEL Projected(const Projection& p, const double* values, std::ptrdiff_t stride) {
+    DoubleLanes px, py, pz, measured;
+    load(values, px), load(values + stride, py), load(values + 2 * stride, pz);
+    x = p.rotation[0][0] * px + p.rotation[0][1] * py + p.rotation[0][2] * pz + p.translation[0];
+    y = p.rotation[1][0] * px + p.rotation[1][1] * py + p.rotation[1][2] * pz + p.translation[1];
+    z = p.rotation[2][0] * px + p.rotation[2][1] * py + p.rotation[2][2] * pz + p.translation[2];
+    behind = z < kNearestDepth;
+    z = behind ? DoubleLanes{1.0, 1.0, 1.0, 1.0} : z;
+    inverse_depth = 1.0 / z;
+    const DoubleLanes u = p.fx * x * inverse_depth + p.cx;
+    load(values + 3 * stride, measured);
+    u_left = measured - u;
+    load(values + 4 * stride, measured);
+    v = measured - (p.fy * y * inverse_depth + p.cy);
+    load(values + 5 * stride, measured);
+    u_right = measured - (u - p.fx_baseline * inverse_depth);
+  }
+};
+
+struct SquareResiduals {
+  static SDVO_IN_KERNEL void run(const Projection* projection, const double* values, std::ptrdiff_t stride, int count,
+                                 double* squares) {
+    constexpr double kInfinity = std::numeric_limits<double>::infinity();
+    const DoubleLanes infinite = {kInfinity, kInfinity, kInfinity, kInfinity};
+    for (int k = 0; k < count; k += CorrespondenceArrays::kLanes) {
+      const Projected at(*projection, values + k, stride);
+      const DoubleLanes square = at.u_left * at.u_left + (at.v * at.v + at.u_right * at.u_right);
+      store(DoubleLanes(at.behind ? infinite : square), squares + k);
+    }
+  }
+};
+
+/// Sums of the upper triangle of the Hessian, its zero left out, and of the gradient.
+struct Sums {
+  DoubleLanes hessian[6][6]{}, gradient[6]{};
+};
+
+struct SumEquations {
+  static SDVO_IN_KERNEL void run(const Projection* projection, const double* values, std::ptrdiff_t stride, int count,
+                                 const double* weights, Sums* result) {
+    const Projection& p = *projection;
+    Sums sums;
+    for (int k = 0; k < count; k += CorrespondenceArrays::kLanes) {
+      const Projected at(p, values + k, stride);
+      DoubleLanes weight;
+      load(weights + k, weight);
+      // The rows of the Jacobian are (a, 0, c, c y, a z - c x, -a y) for both u, which differ in c, and
+      // (0, b, c, c y - b z, -c x, b x) for v.
+      const DoubleLanes a = p.fx * at.inverse_depth, b = p.fy * at.inverse_depth;
+      const DoubleLanes left = -a * at.x * at.inverse_depth;
+      const DoubleLanes right = left + p.fx_baseline * at.inverse_depth * at.inverse_depth;
+      const DoubleLanes down = -b * at.y * at.inverse_depth;
+      addHorizontal(at, a, left, weight, at.u_left, sums);
+      addHorizontal(at, a, right, weight, at.u_right, sums);
+      const DoubleLanes row[5] = {b, down, down * at.y - b * at.z, -down * at.x, b * at.x};
+      const int columns[5] = {1, 2, 3, 4, 5};
+      addRow(row, columns, weight, at.v, sums);
+    }
+    *result = sums;
+  }
+
+  static SDVO_IN_KERNEL void addHorizontal(const Projected& at, const DoubleLanes& a, const DoubleLanes& c,
+                                           const DoubleLanes& weight, const DoubleLanes& residual, Sums& sums) {
+    const DoubleLanes row[5] = {a, c, c * at.y, a * at.z - c * at.x, -a * at.y};
+    const int columns[5] = {0, 2, 3, 4, 5};
+    addRow(row, columns, weight, residual, sums);
+  }
+
+  static SDVO_IN_KERNEL void addRow(const DoubleLanes (&row)[5], const int (&columns)[5], const DoubleLanes& weight,
+                                    const DoubleLanes& residual, Sums& sums) {
+#pragma GCC unroll 5
+    for (int i = 0; i < 5; ++i) {
+      const DoubleLanes weighted = weight * row[i];
+      sums.gradient[columns[i]] += weighted * residual;
+#pragma GCC unroll 5
+      for (int j = i; j < 5; ++j) sums.hessian[columns[i]][columns[j]] += weighted * row[j];
+    }
+  }
+};
+
+double total(const DoubleLanes& lanes) {
+  return (lanes[0] + lanes[2]) + (lanes[1] + lanes[3]);
+}
+
+}  // namespace
+
+CorrespondenceArrays::CorrespondenceArrays(const std::vector<Correspondence>& correspondences) {
+  resize(static_cast<int>(correspondences.size()));
+  for (int i = 0; i < count_; ++i) set(i, correspondences[static_cast<std::size_t>(i)]);
+}
+
+CorrespondenceArrays::CorrespondenceArrays(const std::vector<Correspondence>& correspondences,
+                                           const std::vector<int>& subset) {
+  resize(static_cast<int>(subset.size()));
+  for (int i = 0; i < count_; ++i)
+    set(i, correspondences[static_cast<std::size_t>(subset[static_cast<std::size_t>(i)])]);
+}
+
+void CorrespondenceArrays::resize(int count) {
+  count_ = count;
+  values_.assign(static_cast<std::size_t>(6 * roundedUp(count)), 0.0);
+}
+
+void CorrespondenceArrays::set(int i, const Correspondence& correspondence) {
+  double* values = values_.data() + i;
+  const std::ptrdiff_t stride = roundedUp(count_);
+  for (int k = 0; k < 3; ++k) {
+    values[k * stride] = correspondence.point[k];
+    values[(3 + k) * stride] = correspondence.measurement[k];
+  }
+}
+
+void CorrespondenceArrays::squareResiduals(const StereoCamera& camera, const Eigen::Isometry3d& T_current_reference,
+                                           int first, int count, double* squares) const {
+  const Projection projection(camera, T_current_reference);
+  runKernel<SquareResiduals>(&projection, values_.data() + first, std::ptrdiff_t{roundedUp(count_)}, count, squares);
+}
+
+void CorrespondenceArrays::sumEquations(const StereoCamera& camera, const Eigen::Isometry3d& T_current_reference,
+                                        const double* weights, Matrix6d& hessian, Vector6d& gradient) const {
+  const Projection projection(camera, T_current_reference);
+  Sums sums;
+  const int count = roundedUp(count_);
+  runKernel<SumEquations>(&projection, values_.data(), std::ptrdiff_t{count}, count, weights, &sums);
+  for (int i = 0; i < 6; ++i) {
+    gradient[i] = total(sums.gradient[i]);
+    for (int j = i; j < 6; ++j) hessian(i, j) = hessian(j, i) = total(sums.hessian[i][j]);
+  }
+}
+
+}  // namespace sdvo

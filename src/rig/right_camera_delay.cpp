@@ -1,0 +1,180 @@
+#include "stereo_descriptor_vo/rig/right_camera_delay.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+#include "../common/median.hpp"
+#include "stereo_descriptor_vo/motion/noise.hpp"
+
+namespace sdvo {
+namespace {
+
+/// Velocity (px/s) of a point in the right image: at infinity, and for each px of disparity.
+struct RightFlow {
+  Eigen::Vector2d far, near;
+};
+
+/// `u`, `v`: position in the right image, px.
+RightFlow rightFlow(const StereoCamera& camera, const Vector6d& velocity, double u, double v) {
+  const double x = (u - camera.cx) / camera.fx, y = (v - camera.cy) / camera.fy;
+  const Eigen::Vector3d turn = velocity.tail<3>();
+  const Eigen::Vector3d way = velocity.head<3>() + turn.cross(camera.baseline * Eigen::Vector3d::UnitX());
+  const double disparity = camera.fx * camera.baseline;  // at 1 m
+  return {{camera.fx * (turn.x() * x * y - turn.y() * (1.0 + x * x) + turn.z() * y),
+           camera.fy * (turn.x() * (1.0 + y * y) - turn.y() * x * y - turn.z() * x)},
+          Eigen::Vector2d(camera.fx * (x * way.z() - way.x()), camera.fy * (y * way.z() - way.y())) / disparity};
+}
+
+/// Disparity (px) of a feature without the delay, and its velocity in the right image (px/s) during the delay.
+struct InStep {
+  double disparity;
+  Eigen::Vector2d flow;
+};
+
+InStep inStep(const StereoFeatures& features, int i, double delay, const Vector6d& velocity) {
+  const double u = features.u[i] - features.disparity[i], v = features.v[i] + features.dv[i];
+  InStep result{features.disparity[i], Eigen::Vector2d::Zero()};
+  const int iterations = delay == 0.0 ? 1 : 2;
+  for (int iteration = 0; iteration < iterations; ++iteration) {
+    // In the middle of the delay.
+    const RightFlow flow =
+        rightFlow(features.camera, velocity, u - 0.5 * delay * result.flow.x(), v - 0.5 * delay * result.flow.y());
+    result.disparity = (features.disparity[i] + delay * flow.far.x()) / (1.0 - delay * flow.near.x());
+    result.flow = flow.far + result.disparity * flow.near;
+  }
+  return result;
+}
+
+/// The mean velocity during the delay, from that at the pair and the means over the intervals before and after it.
+Vector6d velocityDuring(double delay, double dt, const Vector6d& before, const Vector6d& at, const Vector6d& after) {
+  const double share = std::min(std::abs(delay) / dt, 1.0);
+  return at + share * ((delay < 0.0 ? before : after) - at);
+}
+
+/// Mean square (px^2, cut off) of what the rows differ from those of a right image that is late by `delay`, and lower
+/// by a constant.
+double misfit(const std::vector<RowMotion>& rows, double delay) {
+  constexpr double kCut = 2.0 * RowDelay::kKernel;  // rows further off are matched wrongly
+  std::vector<double> rest;
+  rest.reserve(rows.size());
+  for (const RowMotion& row : rows) rest.push_back(row.dv - delay * row.velocity);
+  std::vector<double> sorted = rest;
+  const double middle = median(sorted);
+  double sum = 0.0;
+  for (const double each : rest) sum += std::min((each - middle) * (each - middle), kCut * kCut);
+  return sum / static_cast<double>(rest.size());
+}
+
+/// By how much (logarithm of the ratio) the rows are likelier if the right image is late by `delay` than in step. Their
+/// variance is unknown, and errors within a part of the image are alike.
+double logRatioOfPartner(const std::vector<RowMotion>& rows, double delay) {
+  const double parts = std::min<double>(static_cast<double>(rows.size()), RowDelay::kParts);
+  const double in_step = misfit(rows, 0.0), late = misfit(rows, delay);
+  return in_step == late ? 0.0 : 0.5 * parts * std::log(in_step / late);
+}
+
+constexpr int kSamePoints = 2;         // pairs in a row whose errors are alike (chosen)
+constexpr double kLeastTurning = 2.0;  // px/s: rotations from images err by less
+
+}  // namespace
+
+RightCameraDelay::RightCameraDelay(double prior)
+    : prior_(prior), rows_(RowDelay::kMemory, kLeastTurning, kSamePoints) {}
+
+void RightCameraDelay::measure(const StereoFeatures& features, const std::vector<RowMotion>& rows, double dt,
+                               const Vector6d& velocity) {
+  if (rows.size() >= kFewestMeasured && dt > 0.0)
+    for (auto* partner : {&earlier_, &later_}) {
+      // Evidence fades without renewal, because a standing camera shows none.
+      const double carried = CarriedDoubt::kUnsuspected + kUsualMemory * (*partner - CarriedDoubt::kUnsuspected);
+      *partner = std::clamp(carried + logRatioOfPartner(rows, partner == &earlier_ ? -dt : dt),
+                            CarriedDoubt::kUnsuspected, CarriedDoubt::kCertain);
+    }
+  expose(features, dt * velocity.head<3>().norm(), velocity.tail<3>().norm());
+  StereoFeatures positions;
+  positions.camera = features.camera;
+  positions.u = features.u, positions.v = features.v;
+  positions.disparity = features.disparity, positions.dv = features.dv;
+  pairs_.push_back({std::move(positions), velocity});
+  if (pairs_.size() < 4) return;
+  addRows(dt);
+  pairs_.pop_front();
+}
+
+RightCameraDelay::Partner RightCameraDelay::partner(double dt) const {
+  const double known = compensated();
+  if (2.0 * std::abs(known) > dt) return {known, CarriedDoubt::kCertain};
+  return earlier_ > later_ ? Partner{-dt, earlier_} : Partner{dt, later_};
+}
+
+std::string RightCameraDelay::Partner::words() const {
+  std::ostringstream words;
+  words << "the right image seemed to be that of another pair, taken " << std::round(1e3 * std::abs(delay)) << " ms "
+        << (delay < 0.0 ? "earlier" : "later");
+  return words.str();
+}
+
+void RightCameraDelay::expose(const StereoFeatures& features, double distance, double rate) {
+  std::vector<float> disparities = features.disparity;
+  if (disparities.empty()) return;
+  const auto middle = disparities.begin() + static_cast<std::ptrdiff_t>(disparities.size() / 2);
+  std::nth_element(disparities.begin(), middle, disparities.end());
+  const double exposed = distance * features.camera.fx * rate / static_cast<double>(*middle);
+  exposed_ += exposed;
+  compensated_ += exposed * compensated();
+}
+
+double RightCameraDelay::drift() const {
+  const double known = compensated();
+  const auto found = estimate();
+  if (known == 0.0 || !found) return 0.0;
+  return std::hypot(known * exposed_ - compensated_, found->sigma * exposed_);
+}
+
+/// The rows of the third last pair, whose neighbours are known.
+void RightCameraDelay::addRows(double dt) {
+  const StereoFeatures& features = pairs_[1].features;
+  const double delay = compensated();
+  // The value at the border of two intervals by the means of four, to the fourth order. Motions too fast for
+  // the rate of the pairs are not in it, so the instrument has none of them.
+  const Vector6d near = pairs_[1].velocity + pairs_[2].velocity, far = pairs_[0].velocity + pairs_[3].velocity;
+  const Vector6d at = (7.0 * near - far) / 12.0;
+  const Vector6d during = velocityDuring(delay, dt, pairs_[1].velocity, at, pairs_[2].velocity);
+  const Vector6d slow = 0.25 * (near + far);
+  std::vector<RowDelay::Row> rows;
+  rows.reserve(features.u.size());
+  for (int i = 0; i < features.count(); ++i) {
+    const InStep step = sdvo::inStep(features, i, delay, during);
+    const RightFlow turning = rightFlow(features.camera, slow, features.u[i] - features.disparity[i], features.v[i]);
+    rows.push_back({RowDelay::cellOf(features.u[i], features.v[i], features.camera.width, features.camera.height),
+                    features.dv[i], step.flow.y(), turning.far.y(), step.disparity});
+  }
+  rows_.add(rows);
+}
+
+double RightCameraDelay::compensated() const {
+  const auto found = estimate();
+  if (!found) return prior_;
+  return prior_ + found->proved(prior_);
+}
+
+StereoFeatures RightCameraDelay::inStep(const StereoFeatures& features, double dt, const Vector6d& velocity) const {
+  const double delay = compensated();
+  // The velocity goes on as it changed.
+  const Vector6d change = pairs_.empty() ? Vector6d::Zero() : Vector6d(velocity - pairs_.back().velocity);
+  const Vector6d during = velocityDuring(delay, dt, velocity, velocity + 0.5 * change, velocity + change);
+  constexpr float kFar = std::numeric_limits<float>::epsilon();  // px: of points that noise puts beyond infinity
+  StereoFeatures result = features;
+  for (int i = 0; i < features.count(); ++i) {
+    const InStep step = sdvo::inStep(features, i, delay, during);
+    result.disparity[i] = std::max(kFar, static_cast<float>(step.disparity));
+    result.dv[i] -= static_cast<float>(delay * step.flow.y());
+  }
+  return result;
+}
+
+}  // namespace sdvo

@@ -1,0 +1,58 @@
+#include "stereo_descriptor_vo/rig/row_readout.hpp"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+
+#include "stereo_descriptor_vo/motion/noise.hpp"
+
+namespace sdvo {
+
+void RowReadout::add(const StereoCamera& camera, const Eigen::Isometry3d& T_current_reference,
+                     const std::vector<Correspondence>& correspondences, const std::vector<int>& inliers,
+                     const Vector6d& velocity) {
+  if (static_cast<int>(inliers.size()) < kFewestMeasured) return;
+  // The points were seen at the velocity of the last pairs.
+  const Vector6d change = velocity - usual_velocity_;
+  usual_velocity_ += (1.0 - kUsualMemory) * change;
+  // The pose is a part of each pair's fit, so that only what no motion explains counts.
+  using Row = Eigen::Matrix<double, 6, 1>;
+  Matrix6d square = Matrix6d::Zero();
+  Row by_shift = Row::Zero(), by_rest = Row::Zero();
+  double shift_square = 0.0, product = 0.0;
+  for (const int i : inliers) {
+    const Correspondence& point = correspondences[i];
+    const auto residual = reprojectionResidual(camera, T_current_reference, point);
+    if (!residual) continue;
+    const Eigen::Matrix<double, 2, 6> jacobian = motionJacobian(camera, T_current_reference, point.point).topRows<2>();
+    // A static point moves in the camera's frame by the inverse of the camera's motion.
+    const Eigen::Vector2d shift = (point.measurement.y() - camera.cy) / camera.height * (jacobian * -change);
+    const Eigen::Vector2d rest = residual->head<2>();
+    square += jacobian.transpose() * jacobian;
+    by_shift += jacobian.transpose() * shift;
+    by_rest += jacobian.transpose() * rest;
+    shift_square += shift.squaredNorm();
+    product += shift.dot(rest);
+  }
+  const Eigen::LDLT<Matrix6d> solver(square);
+  const double information = shift_square - by_shift.dot(solver.solve(by_shift));
+  product -= by_shift.dot(solver.solve(by_rest));
+  if (!std::isfinite(information) || !std::isfinite(product)) return;
+  constexpr double kMemory = RowDelay::kMemory, kForget = kMemory * kMemory;
+  information_ = kMemory * information_ + information;
+  product_ = kMemory * product_ + product;
+  information_square_ = kForget * information_square_ + information * information;
+  mixed_ = kForget * mixed_ + information * product;
+  product_square_ = kForget * product_square_ + product * product;
+  pairs_ = kMemory * pairs_ + 1.0;
+}
+
+std::optional<RowReadout::Estimate> RowReadout::estimate() const {
+  if (pairs_ < kFewestMeasured || !(information_ > 0.0)) return std::nullopt;
+  const double value = product_ / information_;
+  const double spread = product_square_ - 2.0 * value * mixed_ + value * value * information_square_;
+  const Estimate estimate{value, std::sqrt(std::max(spread, 0.0)) / information_};
+  if (!(estimate.sigma < RowDelay::kFail)) return std::nullopt;
+  return estimate;
+}
+
+}  // namespace sdvo

@@ -1,0 +1,352 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/belief/motion_search.hpp"
+
+namespace sdvo {
+namespace test_motion_search {
+
+/// What a camera sees that stands still or moves along x, of a world that stands and of a swarm that moves along x,
+/// too.
+class Street {
+ public:
+  StereoFeatures see(double camera_x, double swarm_x, std::int64_t stamp, bool world_visible = true,
+                     bool swarm_visible = true) const {
+    StereoFeatures features = synthetic::noFeatures(synthetic::camera(), stamp);
+    if (world_visible) add(features, world_, camera_x);
+    if (swarm_visible) add(features, swarm_, camera_x - swarm_x);
+    return features;
+  }
+
+  static void add(StereoFeatures& features, const synthetic::World& world, double x, double max_depth = 40.0) {
+    synthetic::Sighting sighting;
+    sighting.max_depth = max_depth;
+    const Eigen::Isometry3d T_camera_world(Eigen::Translation3d(-x, 0.0, 0.0));
+    const StereoFeatures seen =
+        synthetic::observe(world, synthetic::camera(), T_camera_world, features.stamp, sighting);
+    for (int row = 0; row < seen.count(); ++row)
+      synthetic::addFeature(features, seen.u[row], seen.v[row], seen.disparity[row],
+                            {seen.descriptors.ptr(row), seen.descriptors.ptr(row) + seen.descriptors.cols});
+  }
+
+ private:
+  synthetic::World world_ = synthetic::randomWorld(21, 250, {-10.0, -4.0, 6.0}, {10.0, 3.0, 12.0});
+  synthetic::World swarm_ = synthetic::randomWorld(22, 300, {-2.0, -1.5, 3.0}, {2.0, 1.5, 5.0});
+};
+
+constexpr std::int64_t kPeriod = 100000000;  // ns
+
+/// A map that is extended with the motions that the search finds.
+class MotionSearchTest : public ::testing::Test {
+ protected:
+  /// The pair's motion since the map's newest pair; `expected` is how far along x the camera is expected to go.
+  MotionHypothesis find(const StereoFeatures& features, std::optional<double> expected, bool is_doubted = false) const {
+    return search_.find(sceneOf(features, expected, expected, is_doubted), kLargestDoubt);
+  }
+
+  /// Where no prior tells that the camera cannot have been that fast.
+  MotionHypothesis findAround(const StereoFeatures& features, double expected) const {
+    return search_.find(sceneOf(features, expected, std::nullopt, false), kLargestDoubt);
+  }
+
+  MotionScene sceneOf(const StereoFeatures& features, std::optional<double> expected, std::optional<double> prior,
+                      bool is_doubted) const {
+    MotionScene scene{map_, calibration_, features, {}, {}, {}};
+    scene.is_suspected = scene.is_doubted = is_doubted;
+    scene.noise = noise_of_rig_;
+    if (expected) scene.T_current_reference = Eigen::Isometry3d(Eigen::Translation3d(-*expected, 0.0, 0.0));
+    if (prior)
+      scene.prior.push_back(MotionPrior({}).around(Eigen::Isometry3d(Eigen::Translation3d(*prior, 0.0, 0.0)), 0.1));
+    return scene;
+  }
+
+  /// Log-odds of being misled by a pair that was found so.
+  double doubtOf(const StereoFeatures& features, const MotionHypothesis& found, double prior) const {
+    return logOddsMisled(sceneOf(features, {}, prior, false), found);
+  }
+
+  void begin(const StereoFeatures& features) {
+    map_.insert({}, features, ++pairs_, Eigen::Isometry3d::Identity(), {}, calibration_);
+  }
+
+  void extend(const StereoFeatures& features, const MotionHypothesis& found) {
+    map_.insert({}, features, ++pairs_, found.motion.T_current_reference * map_.newestPose(), found.sightings,
+                calibration_);
+  }
+
+  /// The first `count` pairs, of the standing world.
+  void start(int count) {
+    begin(street_.see(0.0, 0.0, stamp(), true, false));
+    while (pairs_ < count) {
+      const StereoFeatures features = street_.see(0.0, 0.0, stamp(), true, false);
+      extend(features, find(features, 0.0));
+    }
+  }
+
+  std::int64_t stamp() const { return (pairs_ + 1) * kPeriod; }
+  static double moved(const MotionHypothesis& found) { return -found.motion.T_current_reference.translation().x(); }
+
+  Street street_;
+  LocalMap map_{LocalMapOptions()};
+  RigCalibration calibration_;
+  Noise noise_of_rig_{NoiseOptions()};
+  MotionSearch search_{{}, {}, {}};
+  const double kLargestDoubt = logOdds(0.05);
+  int pairs_ = 0;
+};
+
+TEST_F(MotionSearchTest, TakesASoundMotionThatWasExpected) {
+  start(2);
+  const MotionHypothesis found = find(street_.see(0.1, 0.0, stamp(), true, false), 0.1);
+  ASSERT_TRUE(found.motion.success) << found.motion.reason;
+  EXPECT_EQ(found.probability, 1.0);
+  EXPECT_NEAR(moved(found), 0.1, 1e-3);
+  EXPECT_LT(found.innovation, 1.0);
+  EXPECT_EQ(found.agreement.inliers, static_cast<int>(found.motion.inliers.size()));
+  EXPECT_EQ(found.sightings.size(), found.motion.inliers.size());
+}
+
+TEST_F(MotionSearchTest, AWrongExpectationIsOneHypothesisAmongOthers) {
+  start(2);
+  // Points 5 m away were expected 120 px beside where they are, beyond the gate.
+  const MotionHypothesis found = find(street_.see(0.1, 0.0, stamp(), true, false), 1.6);
+  EXPECT_NEAR(moved(found), 0.1, 1e-3);
+  EXPECT_GT(found.agreement.inliers, 100);
+  EXPECT_EQ(found.sightings.size(), found.motion.inliers.size());
+}
+
+TEST_F(MotionSearchTest, AnExpectationThatIsALittleWrongIsLookedAroundFurther) {
+  start(2);
+  // Points 6 to 12 m away were expected 27 to 53 px beside where they are: beyond the gate, not three times as far.
+  const MotionHypothesis found = findAround(street_.see(0.1, 0.0, stamp(), true, false), 0.9);
+  ASSERT_TRUE(found.motion.success) << found.motion.reason;
+  EXPECT_EQ(found.probability, 1.0);
+  EXPECT_NEAR(moved(found), 0.1, 1e-3);
+  EXPECT_GT(found.agreement.inliers, 100);
+}
+
+TEST_F(MotionSearchTest, WhatWasFoundNearTheExpectationMustNotLeaveThatOut) {
+  // Points far away are where they were expected, those nearby are not, and tell the step.
+  const synthetic::World far = synthetic::randomWorld(25, 300, {-25.0, -8.0, 35.0}, {25.0, 6.0, 50.0});
+  const synthetic::World near = synthetic::randomWorld(26, 120, {-4.0, -2.0, 5.0}, {4.0, 2.0, 6.0});
+  const auto see = [&](double x) {
+    StereoFeatures features = synthetic::noFeatures(synthetic::camera(), stamp());
+    for (const synthetic::World* world : {&far, &near}) Street::add(features, *world, x, 60.0);
+    return features;
+  };
+  begin(see(0.0));
+  extend(see(0.0), find(see(0.0), 0.0));
+  const MotionHypothesis found = findAround(see(0.1), 0.6);
+  EXPECT_NEAR(moved(found), 0.1, 1e-3);
+  const auto isNear = [&](int i) { return found.correspondences[static_cast<std::size_t>(i)].point.z() < 10.0; };
+  const std::vector<int>& inliers = found.motion.inliers;
+  EXPECT_GT(std::count_if(inliers.begin(), inliers.end(), isNear), 50);
+}
+
+TEST_F(MotionSearchTest, WhatStoodStillSoFarOutvotesAMajority) {
+  start(5);
+  const StereoFeatures arrived = street_.see(0.0, 0.0, stamp());
+  extend(arrived, find(arrived, 0.0));
+  const MotionHypothesis found = find(street_.see(0.0, 0.4, stamp()), 0.0, true);
+  ASSERT_TRUE(found.motion.success) << found.motion.reason;
+  EXPECT_NEAR(moved(found), 0.0, 1e-3);
+  ASSERT_TRUE(found.rival);
+  EXPECT_NEAR(found.rival->T_current_reference.translation().x(), 0.4, 1e-3) << "as if the swarm stood";
+  EXPECT_LT(found.rival->probability, 0.05) << "what goes on as before is confirmed by lasting points";
+  EXPECT_GT(found.rivals_moment(0, 0), 0.9 * found.rival->probability * 0.16);
+}
+
+/// A board arrives before what stood still so far, and moves by less than corners may err.
+class SlowBoard : public MotionSearchTest {
+ protected:
+  StereoFeatures see(std::optional<double> board_x) {
+    StereoFeatures features = synthetic::noFeatures(synthetic::camera(), stamp());
+    Street::add(features, still_, 0.0);
+    if (board_x) Street::add(features, board_, -*board_x);
+    for (auto* numbers : {&features.u, &features.v, &features.disparity})
+      for (float& number : *numbers) number += noise_(random_);
+    return features;
+  }
+
+  void arrive() {
+    begin(see({}));
+    while (pairs_ < 5) extend(see({}), find(see({}), 0.0));
+    extend(see(0.0), find(see(0.0), 0.0));
+  }
+
+  std::normal_distribution<float> noise_{0.f, 1e-3f};
+
+ private:
+  std::mt19937 random_{30};
+  synthetic::World still_ = synthetic::randomWorld(27, 200, {-10.0, -4.0, 6.0}, {10.0, 3.0, 12.0});
+  synthetic::World board_ = synthetic::randomWorld(28, 500, {-2.0, -1.5, 3.9}, {2.0, 1.5, 4.1});
+};
+
+TEST_F(SlowBoard, IsLeftAside) {
+  arrive();
+  // The board moves by 0.7 px: inliers of any motion are all there is.
+  const MotionHypothesis found = find(see(0.007), 0.0);
+  EXPECT_NEAR(moved(found), 0.0, 1e-4);
+  EXPECT_EQ(found.agreement.inliers, static_cast<int>(found.motion.inliers.size()));
+  EXPECT_EQ(found.agreement.inliers, found.agreement.lasting_inliers) << "the board is no longer among them";
+  EXPECT_LT(found.agreement.matches, 1.1 * found.agreement.inliers) << "nor does it count against them";
+  EXPECT_EQ(found.sightings.size(), found.motion.inliers.size());
+  EXPECT_FALSE(found.rival) << "millimetres are within tolerance";
+  EXPECT_GT(std::sqrt(found.rivals_moment(0, 0)), 0.001) << "the covariance has to hold what all inliers together say";
+}
+
+TEST_F(SlowBoard, IsToldByWhatTheRigIsKnownToErr) {
+  noise_ = std::normal_distribution<float>(0.f, 0.1f);
+  arrive();
+  const StereoFeatures features = see(0.008);
+  for (int pair = 0; pair < 100; ++pair) noise_of_rig_.learnShared(250.0);
+  const MotionHypothesis alike = find(features, 0.0);
+  EXPECT_GT(std::abs(moved(alike)), 4e-3) << "a rig whose neighbours err alike";
+  EXPECT_GT(alike.lasting_square.value_or(0.0), noiseGate(6));
+  for (int pair = 0; pair < 100; ++pair) noise_of_rig_.learnShared(6.0);
+  EXPECT_NEAR(moved(find(features, 0.0)), 0.0, 2e-3) << "a rig whose points err by themselves";
+}
+
+TEST_F(MotionSearchTest, AnErrorThatLastingPointsShareIsNoMover) {
+  // Nothing moves. All lasting points are off by as much as the camera would be 7 mm further, half a pixel at most; new
+  // ones are not.
+  const synthetic::World still = synthetic::randomWorld(27, 700, {-10.0, -4.0, 6.0}, {10.0, 3.0, 12.0});
+  const synthetic::World arrived = synthetic::randomWorld(28, 300, {-2.0, -1.5, 3.9}, {2.0, 1.5, 4.1});
+  std::mt19937 random(29);
+  std::normal_distribution<float> noise(0.f, 0.1f);
+  const auto see = [&](double error, bool all) {
+    StereoFeatures features = synthetic::noFeatures(synthetic::camera(), stamp());
+    Street::add(features, still, error);
+    if (all) Street::add(features, arrived, 0.0);
+    for (auto* numbers : {&features.u, &features.v, &features.disparity})
+      for (float& number : *numbers) number += noise(random);
+    return features;
+  };
+  begin(see(0.0, false));
+  while (pairs_ < 5) extend(see(0.0, false), find(see(0.0, false), 0.0));
+  extend(see(0.0, true), find(see(0.0, true), 0.0));
+  const MotionHypothesis found = find(see(0.007, true), 0.0);
+  ASSERT_TRUE(found.motion.success) << found.motion.reason;
+  EXPECT_FALSE(found.rival);
+}
+
+TEST_F(MotionSearchTest, FarPointsThatAgreeWithAnyStepAreNoMajority) {
+  // A board 4 m ahead steps aside. A step and a little turn of the camera explain that and nearly what is far away.
+  const synthetic::World far = synthetic::randomWorld(23, 150, {-25.0, -8.0, 35.0}, {25.0, 6.0, 50.0});
+  const synthetic::World board = synthetic::randomWorld(24, 300, {-2.0, -1.5, 3.9}, {2.0, 1.5, 4.1});
+  const auto see = [&](double board_x, bool board_visible) {
+    StereoFeatures features = synthetic::noFeatures(synthetic::camera(), stamp());
+    Street::add(features, far, 0.0, 60.0);
+    if (board_visible) Street::add(features, board, -board_x, 60.0);
+    return features;
+  };
+  begin(see(0.0, false));
+  while (pairs_ < 5) {
+    const StereoFeatures features = see(0.0, false);
+    extend(features, find(features, 0.0));
+  }
+  const StereoFeatures arrived = see(0.0, true);
+  extend(arrived, find(arrived, 0.0));
+  const MotionHypothesis found = find(see(0.1, true), 0.0);
+  EXPECT_NEAR(moved(found), 0.0, 0.01);
+  EXPECT_TRUE(found.rival);
+}
+
+TEST_F(MotionSearchTest, MotionsThatOnlyFarPointsConfuseAreTwo) {
+  // As above, but the board has been there as long as the rest and what goes on as before decides.
+  const synthetic::World far = synthetic::randomWorld(23, 100, {-25.0, -8.0, 35.0}, {25.0, 6.0, 50.0});
+  const synthetic::World near = synthetic::randomWorld(25, 60, {-2.0, -1.5, 4.0}, {0.0, 1.5, 6.0});
+  const synthetic::World board = synthetic::randomWorld(24, 300, {0.0, -1.5, 3.9}, {2.0, 1.5, 4.1});
+  const auto see = [&](double board_x) {
+    StereoFeatures features = synthetic::noFeatures(synthetic::camera(), stamp());
+    Street::add(features, far, 0.0, 60.0);
+    Street::add(features, near, 0.0);
+    Street::add(features, board, -board_x);
+    return features;
+  };
+  begin(see(0.0));
+  const MotionHypothesis found = find(see(0.15), 0.0, true);
+  EXPECT_NEAR(moved(found), 0.0, 0.01);
+  EXPECT_LT(found.probability, 0.95) << "it may be the board that stands";
+}
+
+TEST_F(MotionSearchTest, WhatGoesOnAsBeforeIsAHypothesisAlsoWhereACompromiseExplainsMore) {
+  // As above without anything near that stands: a step and a turn explain both the board and what is far away.
+  const synthetic::World far = synthetic::randomWorld(23, 100, {-25.0, -8.0, 35.0}, {25.0, 6.0, 50.0});
+  const synthetic::World board = synthetic::randomWorld(24, 300, {0.0, -1.5, 3.9}, {2.0, 1.5, 4.1});
+  const auto see = [&](double board_x) {
+    StereoFeatures features = synthetic::noFeatures(synthetic::camera(), stamp());
+    Street::add(features, far, 0.0, 60.0);
+    Street::add(features, board, -board_x);
+    return features;
+  };
+  begin(see(0.0));
+  EXPECT_LT(moved(findAround(see(0.15), 0.0)), -0.1) << "most agree with the compromise";
+  const MotionHypothesis found = find(see(0.15), 0.0, true);
+  EXPECT_NEAR(moved(found), 0.0, 0.02);
+  EXPECT_LT(found.probability, 0.95);
+}
+
+TEST_F(MotionSearchTest, WithoutLastingPointsTheOneThatGoesOnAsBeforeWins) {
+  begin(street_.see(0.0, 0.0, stamp()));
+  const StereoFeatures features = street_.see(0.0, 0.4, stamp());
+  EXPECT_NEAR(moved(find(features, 0.0, true)), 0.0, 1e-3) << "of the world";
+  EXPECT_NEAR(moved(find(features, -0.4, true)), -0.4, 1e-3) << "of the swarm";
+}
+
+/// What is left of the world beside a board that is fixed to the camera and covers most of the view.
+class CoveredView : public MotionSearchTest {
+ protected:
+  StereoFeatures see(double camera_x, bool world_visible = true) const {
+    StereoFeatures features = synthetic::noFeatures(synthetic::camera(), stamp());
+    if (world_visible) Street::add(features, world_, camera_x);
+    Street::add(features, board_, 0.0);
+    return features;
+  }
+
+  /// Where no prediction tells the copies of the board in the map from the board.
+  MotionHypothesis findUnguided(const StereoFeatures& features) const {
+    return search_.find(sceneOf(features, std::nullopt, kStep, true), kLargestDoubt);
+  }
+
+  static constexpr double kStep = 1.2;  // m between pairs: no camera stops from there
+
+ private:
+  synthetic::World world_ = synthetic::randomWorld(26, 30, {-2.0, -2.0, 8.0}, {6.0, 2.0, 12.0});
+  synthetic::World board_ = synthetic::randomWorld(27, 400, {-2.0, -1.5, 3.9}, {1.0, 1.5, 4.1});
+};
+
+TEST_F(CoveredView, WhatNoCameraDoesIsNotTheCamerasHoweverManyAgree) {
+  begin(see(0.0));
+  for (const double x : {kStep, 2.0 * kStep, 3.0 * kStep}) {
+    // With each pair the board has left one more copy of itself in the map.
+    const StereoFeatures features = see(x);
+    const MotionHypothesis found = find(features, kStep, x > kStep);
+    ASSERT_TRUE(found.motion.success) << found.motion.reason;
+    EXPECT_NEAR(moved(found), kStep, 0.02) << x;
+    EXPECT_LT(found.agreement.inliers, 40);
+    EXPECT_EQ(found.rival.has_value(), x > kStep) << "the board is not looked for until something is in doubt";
+    EXPECT_NEAR(moved(findUnguided(features)), kStep, 0.02) << x;
+    extend(features, found);
+  }
+}
+
+TEST_F(CoveredView, WhereNothingElseIsSeenTheMotionIsLikelyNotTheCameras) {
+  begin(see(0.0, false));
+  const StereoFeatures features = see(0.0, false);
+  EXPECT_GT(doubtOf(features, find(features, kStep, true), kStep), 0.0);
+  EXPECT_LT(doubtOf(features, find(features, 0.0, true), 0.0), kLargestDoubt);
+}
+
+TEST_F(MotionSearchTest, FailsWithAReason) {
+  start(2);
+  const MotionHypothesis found = find(synthetic::noFeatures(synthetic::camera(), stamp()), 0.0);
+  EXPECT_FALSE(found.motion.success);
+  EXPECT_NE(found.motion.reason.find("only 0 matches"), std::string::npos) << found.motion.reason;
+}
+
+}  // namespace test_motion_search
+}  // namespace sdvo

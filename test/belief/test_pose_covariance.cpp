@@ -1,0 +1,256 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <random>
+
+#include "stereo_descriptor_vo/belief/pose_covariance.hpp"
+
+namespace sdvo {
+namespace test_pose_covariance {
+
+constexpr double kForward = 2.0;  // m
+
+Eigen::Isometry3d forward() {
+  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
+  T.translation().z() = kForward;
+  return T;
+}
+
+Matrix6d diagonal(double translation, double rotation) {
+  Vector6d variance;
+  variance << Eigen::Vector3d::Constant(translation), Eigen::Vector3d::Constant(rotation);
+  return variance.asDiagonal();
+}
+
+/// Such a covariance after driving forward: a turn about y, before the drive, moves its end by +L along x; one about x
+/// by -L along y.
+Matrix6d afterForward(double translation, double rotation, double way = kForward) {
+  Matrix6d covariance = diagonal(translation, rotation);
+  covariance(0, 0) += way * way * rotation;
+  covariance(1, 1) += way * way * rotation;
+  covariance(0, 4) = covariance(4, 0) = way * rotation;
+  covariance(1, 3) = covariance(3, 1) = -way * rotation;
+  return covariance;
+}
+
+void expectEqual(const Matrix6d& actual, const Matrix6d& expected) {
+  EXPECT_LT((actual - expected).cwiseAbs().maxCoeff(), 1e-12) << actual << "\n\nexpected\n" << expected;
+}
+
+/// No less in any direction.
+void expectCovers(const Matrix6d& actual, const Matrix6d& least) {
+  EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(actual - least).eigenvalues().minCoeff(), -1e-12) << actual;
+}
+
+TEST(PoseCovariance, BeginsAtZero) {
+  expectEqual(PoseCovariance().value(), Matrix6d::Zero());
+}
+
+TEST(PoseCovariance, AddsMotionsThatAreKnownByThemselves) {
+  PoseCovariance covariance;
+  covariance.advance(forward(), diagonal(0.5, 0.25));
+  expectEqual(covariance.value(), diagonal(0.5, 0.25));
+  covariance.advance(forward(), diagonal(0.125, 0.0));
+  expectEqual(covariance.value(), afterForward(0.5, 0.25) + diagonal(0.125, 0.0));
+}
+
+TEST(PoseCovariance, DoesNotGrowBetweenPairsMeasuredFromOneKeyframe) {
+  PoseCovariance covariance;
+  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
+  expectEqual(covariance.measure(still, diagonal(0.5, 0.25)), diagonal(0.5, 0.25));
+  expectEqual(covariance.value(), diagonal(0.5, 0.25));
+  expectEqual(covariance.measure(still, diagonal(0.75, 0.25)), diagonal(0.75, 0.25));
+  expectEqual(covariance.value(), diagonal(0.75, 0.25));
+  // A better pose does not take back what was reported.
+  covariance.measure(still, diagonal(0.125, 0.125));
+  expectEqual(covariance.value(), diagonal(0.75, 0.25));
+}
+
+TEST(PoseCovariance, TheErrorOfTheKeyframeCancelsInTheMotion) {
+  // Poses along a line, each the key frame's sightings (their error `common`) against its own (error `own`).
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  double motion_square = 0.0, pose_square = 0.0;
+  constexpr int kTrials = 20000;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const double common = normal(random), before = common + normal(random), now = common + normal(random);
+    motion_square += (now - before) * (now - before) / kTrials, pose_square += now * now / kTrials;
+  }
+  PoseCovariance covariance;
+  covariance.measure(Eigen::Isometry3d::Identity(), diagonal(pose_square, 0.0));
+  const Matrix6d motion = covariance.measure(Eigen::Isometry3d::Identity(), diagonal(pose_square, 0.0));
+  EXPECT_NEAR(motion(0, 0), motion_square, 0.05 * motion_square);
+}
+
+TEST(PoseCovariance, AMotionIsThatOfTheLastTwoPosesToEachOther) {
+  // Along a line: the key frame errs by `common`, a pair by its own error against it. A weak pair, then a good one.
+  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
+  constexpr double kCommon = 1.0, kWeak = 9.0, kGood = 1.0;
+  PoseCovariance covariance;
+  covariance.measure(still, diagonal(kCommon + kWeak, 0.25));
+  Matrix6d motion = covariance.measure(still, diagonal(kCommon + kGood, 0.25));
+  EXPECT_NEAR(motion(0, 0), kWeak + kGood, 1e-9) << "both pairs' own errors, not the key frame's";
+  motion = covariance.measure(still, diagonal(kCommon + kGood, 0.25));
+  EXPECT_NEAR(motion(0, 0), kGood + kGood, 1e-9) << "the weak pair has no part in it";
+  // Where the pair before is the key frame, its error is what the new one is measured against.
+  covariance.measure(still, diagonal(kCommon + kWeak, 0.25));
+  covariance.markKeyframe();
+  motion = covariance.measure(still, diagonal(kCommon + kGood, 0.25));
+  EXPECT_NEAR(motion(0, 0), kCommon + kGood, 1e-9);
+}
+
+TEST(PoseCovariance, AMotionIsAsUncertainInEachDirectionAsTheWorseOfTheTwoPoses) {
+  PoseCovariance covariance;
+  Matrix6d sideways = diagonal(0.1, 0.01), ahead = sideways;
+  sideways(0, 0) = 0.9, ahead(2, 2) = 0.9;
+  covariance.measure(Eigen::Isometry3d::Identity(), sideways);
+  Matrix6d both = sideways;
+  both(2, 2) = 0.9;
+  expectEqual(covariance.measure(Eigen::Isometry3d::Identity(), ahead), both);
+}
+
+TEST(PoseCovariance, ContainsWhatASecondThoughtMoved) {
+  PoseCovariance covariance;
+  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
+  covariance.measure(still, diagonal(0.0001, 0.0001));
+  Vector6d correction = Vector6d::Zero();
+  correction[0] = 0.015;
+  covariance.cover(correction);
+  expectEqual(covariance.value(), diagonal(0.0001, 0.0001));  // one and a half standard deviations are expected
+  correction[0] = 0.02;
+  covariance.cover(correction);
+  // All of the correction along itself, and 3 % of it in each direction.
+  Matrix6d added = Matrix6d::Zero();
+  const auto add = [&](double square) {
+    added(0, 0) += square;
+    added.topLeftCorner<3, 3>().diagonal().array() += 9e-4 * square;
+  };
+  add(0.0004);
+  expectEqual(covariance.value(), diagonal(0.0001, 0.0001) + added);
+  correction[0] = 0.5;
+  covariance.cover(correction);
+  add(0.25);
+  expectEqual(covariance.value(), diagonal(0.0001, 0.0001) + added);
+  covariance.cover(correction);
+  expectEqual(covariance.value(), diagonal(0.0001, 0.0001) + added);
+  // What is measured from the same key frame later has that error, too.
+  covariance.measure(still, diagonal(1.0, 1.0));
+  expectEqual(covariance.value(), diagonal(1.0, 1.0) + added);
+}
+
+TEST(PoseCovariance, GrowsFromKeyframeToKeyframe) {
+  PoseCovariance covariance;
+  covariance.measure(forward(), diagonal(0.5, 0.25));
+  covariance.markKeyframe();
+  const double translation = 0.5, rotation = 0.25;
+  expectEqual(covariance.value(), diagonal(translation, rotation));
+  covariance.measure(forward(), diagonal(0.125, 0.0));
+  expectEqual(covariance.value(), afterForward(translation, rotation) + diagonal(0.125, 0.0));
+  // Still from that key frame, which is now two steps behind.
+  covariance.measure(forward(), diagonal(0.25, 0.0));
+  Matrix6d expected = diagonal(translation + 0.25, rotation);
+  for (const int axis : {0, 1}) expected(axis, axis) += 4.0 * kForward * kForward * rotation;
+  expected(0, 4) = expected(4, 0) = 2.0 * kForward * rotation;
+  expected(1, 3) = expected(3, 1) = -2.0 * kForward * rotation;
+  expectEqual(covariance.value(), expected);
+}
+
+TEST(PoseCovariance, APredictedPairAddsToTheNextOnesMotion) {
+  for (const bool from_keyframe : {false, true}) {
+    PoseCovariance covariance;
+    covariance.measure(forward(), diagonal(0.5, 0.25));
+    if (from_keyframe) covariance.markKeyframe();
+    covariance.advance(forward(), diagonal(8.0, 2.0));
+    const Matrix6d predicted = afterForward(0.5, 0.25) + diagonal(8.0, 2.0);
+    expectEqual(covariance.value(), predicted);
+    const Matrix6d motion = covariance.measure(forward(), diagonal(0.75, 0.25)) - afterForward(8.0, 2.0);
+    if (from_keyframe) {
+      expectEqual(motion, diagonal(0.75, 0.25));
+    } else {
+      // The last measured pose's own, two motions ago: its turn has moved the camera by twice as much.
+      expectCovers(motion, diagonal(0.75, 0.25));
+      expectCovers(motion, afterForward(0.5, 0.25, 2.0 * kForward));
+    }
+    // Only once.
+    const Matrix6d next = covariance.measure(forward(), diagonal(0.75, 0.25));
+    expectCovers(next, afterForward(0.75, 0.25));
+    EXPECT_LT(next.trace(), 2.0 * afterForward(0.75, 0.25).trace());
+  }
+}
+
+TEST(PoseCovariance, APredictionEndsWithTheNextMeasuredPose) {
+  PoseCovariance covariance;
+  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
+  covariance.measure(still, diagonal(0.5, 0.25));
+  for (int i = 0; i < 1000; ++i) covariance.advance(still, diagonal(8.0, 2.0));
+  covariance.measure(still, diagonal(0.5, 0.25));
+  expectEqual(covariance.value(), diagonal(0.5, 0.25));
+}
+
+TEST(PoseCovariance, AKeyframeThatWasPredictedOrDoubtedCarriesThat) {
+  PoseCovariance covariance;
+  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
+  covariance.measure(still, diagonal(0.5, 0.25));
+  covariance.advance(still, diagonal(8.0, 2.0));
+  covariance.markKeyframe();
+  expectEqual(covariance.value(), diagonal(8.5, 2.25));
+  expectEqual(covariance.measure(still, diagonal(0.125, 0.125)), diagonal(8.125, 2.125));
+}
+
+TEST(PoseCovariance, RestartsFromTheLastPoseWithMetresAndAGoodPartOfARightAngle) {
+  PoseCovariance covariance;
+  covariance.measure(forward(), diagonal(0.5, 0.25));
+  covariance.doubt(diagonal(1.0, 1.0));
+  covariance.restart();
+  expectEqual(covariance.value(), diagonal(101.5, 1.5));
+  // Neither the measurement nor the doubt before the gap has a part in the first motion after it.
+  expectEqual(covariance.measure(forward(), diagonal(0.125, 0.0)), diagonal(0.125, 0.0));
+  expectEqual(covariance.value(), afterForward(101.5, 1.5) + diagonal(0.125, 0.0));
+}
+
+TEST(PoseCovariance, WhatMayHaveBeenTravelledUnseenIsAddedAtARestart) {
+  PoseCovariance covariance;
+  covariance.restart(diagonal(4.0, 1.0));
+  expectEqual(covariance.value(), diagonal(104.0, 1.25));
+}
+
+TEST(PoseCovariance, ADoubtedPoseIsReportedSoAndTheNextMotionContainsTheDoubt) {
+  PoseCovariance covariance;
+  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
+  covariance.measure(still, diagonal(0.5, 0.25));
+  covariance.doubt(diagonal(8.0, 2.0));
+  expectEqual(covariance.value(), diagonal(8.5, 2.25));
+  expectEqual(covariance.measure(still, diagonal(0.5, 0.25)), diagonal(8.5, 2.25));
+  // What was reported stays true.
+  expectEqual(covariance.value(), diagonal(8.5, 2.25));
+}
+
+TEST(PoseCovariance, RotationDoesNotFallWhereTranslationGrows) {
+  PoseCovariance covariance;
+  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
+  covariance.measure(still, diagonal(0.5, 0.25));
+  covariance.doubt(diagonal(0.0, 2.0));
+  covariance.measure(still, diagonal(9.0, 0.5));
+  expectEqual(covariance.value(), diagonal(9.0, 2.25));
+  covariance.measure(still, diagonal(4.0, 3.0));
+  expectEqual(covariance.value(), diagonal(9.0, 3.0));
+}
+
+TEST(PoseCovariance, StaysSymmetricAndPositive) {
+  PoseCovariance covariance;
+  Vector6d step;
+  step << 0.1, -0.05, 1.0, 0.02, -0.3, 0.1;
+  for (int i = 0; i < 1000; ++i) {
+    const Matrix6d motion = covariance.measure(expSE3(step), diagonal(1e-4, 1e-6) * (1 + i % 7));
+    if (i % 3 == 0) covariance.markKeyframe();
+    if (i % 11 == 0) covariance.doubt(diagonal(1e-2, 1e-4));
+    for (const Matrix6d& matrix : {motion, covariance.value()}) {
+      EXPECT_EQ(matrix, matrix.transpose());
+      EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(matrix).eigenvalues().minCoeff(), 0.0) << i;
+    }
+  }
+}
+
+}  // namespace test_pose_covariance
+}  // namespace sdvo

@@ -1,0 +1,266 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <cmath>
+#include <cstring>
+
+#include "../synthetic_features.hpp"
+#include "stereo_descriptor_vo/common/processor.hpp"
+#include "stereo_descriptor_vo/map/point_elimination.hpp"
+#include "stereo_descriptor_vo/map/window_optimizer.hpp"
+
+namespace sdvo {
+namespace test_point_elimination {
+
+constexpr double kDamping = 1e-3;
+constexpr Linearisation kLinearisation = {2.0, kDamping};
+constexpr double kLeastInformation = 1e-9;  // that a point is given of itself
+constexpr double kDisparitySigma = 0.25;    // px
+constexpr int kPoses = 4;                   // that may move
+
+/// A point seen by the cameras of a short drive, somewhere else than it is thought to be.
+struct Scene {
+  StereoCamera camera = SyntheticScene(1, 0, 10.0).camera;
+  RigCalibration calibration;
+  AnchoredPoint point;
+  std::vector<Eigen::Isometry3d> T_camera_origin, T_camera_anchor;
+  std::vector<WindowObservation> sightings;
+
+  explicit Scene(const std::vector<int>& frames, const Eigen::Vector3d& where = {0.4, -0.2, 1.0 / 9.0}) {
+    calibration.value << 0.2, -0.7;
+    point.T_origin_anchor = syntheticPose(-2);
+    point.ray_and_inverse_depth = where;
+    for (int f = 0; f <= kPoses; ++f) T_camera_origin.push_back(syntheticPose(f).inverse());
+    for (const auto& T : T_camera_origin) T_camera_anchor.push_back(T * point.T_origin_anchor);
+    for (const int frame : frames) {
+      Eigen::Vector3d seen;
+      if (!predictObservation(camera, T_camera_origin[frame], point, seen, nullptr)) seen << 600.0, 180.0, 20.0;
+      seen += Eigen::Vector3d(0.3 * std::sin(3.0 * frame), 0.4 * std::cos(5.0 * frame), 0.2 + 0.1 * frame);
+      sightings.push_back({0, frame, seen, 0.1 + 0.05 * frame});
+    }
+  }
+
+  SightedPoint sighted() const {
+    return {point.ray_and_inverse_depth, sightings.data(), static_cast<int>(sightings.size()), 1.0 / kDisparitySigma,
+            T_camera_anchor.data()};
+  }
+};
+
+/// Residuals and Jacobians of one sighting by all that may move: poses, calibration, point.
+struct Row {
+  Eigen::Vector3d residual;
+  Eigen::MatrixXd jacobian;
+  double weight, square;
+};
+
+std::vector<Row> rowsOf(const Scene& scene, double bend = kLinearisation.bend) {
+  std::vector<Row> rows;
+  for (const WindowObservation& seen : scene.sightings) {
+    Eigen::Vector3d prediction;
+    ObservationJacobians jacobians;
+    if (!predictObservation(scene.camera, scene.T_camera_origin[seen.frame], scene.point, prediction, &jacobians))
+      continue;
+    const Eigen::Vector3d& measured = seen.measurement;
+    const Eigen::Vector3d noise(1.0 / seen.sigma, 1.0 / seen.sigma, 1.0 / kDisparitySigma);
+    prediction.z() += scene.calibration.disparityError(scene.camera, measured.x());
+    Row row;
+    row.residual = noise.cwiseProduct(measured - prediction);
+    row.square = row.residual.squaredNorm();
+    row.weight = 1.0 / (1.0 + row.square / bend);
+    row.jacobian.setZero(3, 6 * kPoses + 5);
+    if (seen.frame > 0) row.jacobian.middleCols<6>(6 * (seen.frame - 1)) = jacobians.pose;
+    row.jacobian.row(2).segment<2>(6 * kPoses) = RigCalibration::shape(scene.camera, measured.x());
+    row.jacobian.rightCols<3>() = jacobians.point;
+    row.jacobian = noise.asDiagonal() * row.jacobian;
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+/// Weighted normal equations of everything.
+struct Whole {
+  Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(6 * kPoses + 5, 6 * kPoses + 5);
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(6 * kPoses + 5);
+
+  explicit Whole(const Scene& scene) {
+    for (const Row& row : rowsOf(scene)) {
+      hessian += row.weight * row.jacobian.transpose() * row.jacobian;
+      gradient += row.weight * row.jacobian.transpose() * row.residual;
+    }
+    hessian.bottomRightCorner<3, 3>().diagonal() *= 1.0 + kDamping;
+    hessian.bottomRightCorner<3, 3>().diagonal().array() += kLeastInformation;
+  }
+};
+
+/// Of what add() makes of a scene.
+struct Reduced {
+  PoseEquations equations;
+  std::vector<PoseFactor> factors;
+  std::vector<double> squares;
+  EliminatedPoint point;
+  Eigen::MatrixXd hessian;
+  Eigen::VectorXd gradient;
+
+  explicit Reduced(const Scene& scene) : factors(scene.sightings.size()), squares(scene.sightings.size()) {
+    equations.setZero(kPoses);
+    point = equations.add({scene.camera, scene.calibration}, scene.sighted(), kLinearisation, factors.data(),
+                          squares.data());
+    equations.copyTo(hessian, gradient);
+  }
+};
+
+void expectNear(const Eigen::MatrixXd& value, const Eigen::MatrixXd& expected, const char* what) {
+  ASSERT_EQ(value.rows(), expected.rows()) << what;
+  EXPECT_LT((value - expected).cwiseAbs().maxCoeff(), 1e-9 * (1.0 + expected.cwiseAbs().maxCoeff())) << what;
+}
+
+void expectSchurComplement(const Scene& scene) {
+  const Whole whole(scene);
+  const Reduced reduced(scene);
+  const int n = 6 * kPoses + 2;
+  const Eigen::Matrix3d inverse = whole.hessian.bottomRightCorner<3, 3>().inverse();
+  const Eigen::MatrixXd with_point = whole.hessian.topRightCorner(n, 3);
+  const Eigen::MatrixXd expected = whole.hessian.topLeftCorner(n, n) - with_point * inverse * with_point.transpose();
+  expectNear(Eigen::MatrixXd(reduced.hessian.triangularView<Eigen::Lower>()),
+             Eigen::MatrixXd(expected.triangularView<Eigen::Lower>()), "hessian");
+  expectNear(reduced.gradient, whole.gradient.head(n) - with_point * inverse * whole.gradient.tail<3>(), "gradient");
+}
+
+TEST(PointElimination, IsTheSchurComplementOfTheNormalEquations) {
+  expectSchurComplement(Scene({0, 1, 2, 3, 4}));
+  expectSchurComplement(Scene({1, 3, 4}));
+  expectSchurComplement(Scene({0, 2}));
+  expectSchurComplement(Scene({4}));
+}
+
+TEST(PointElimination, GradientsOfSightingsAndPointsAddUp) {
+  const Reduced reduced(Scene({0, 1, 2, 4}));
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(reduced.gradient.size());
+  for (int k = 0; k < reduced.point.factors; ++k) {
+    const PoseFactor& factor = reduced.factors[static_cast<std::size_t>(k)];
+    for (int i = 0; i < 3; ++i) {
+      sum[6 * factor.pose + i] += factor.gradient.translation[i];
+      sum[6 * factor.pose + 3 + i] += factor.gradient.rotation[i];
+    }
+  }
+  sum.tail<2>() = reduced.point.calibration_gradient;
+  expectNear(sum, reduced.gradient, "gradient");
+}
+
+TEST(PointElimination, AFarPointIsADirection) {
+  expectSchurComplement(Scene({0, 1, 2, 3, 4}, {0.1, 0.05, 0.0}));
+}
+
+TEST(PointElimination, SightingsFromBehindCostButDoNotPull) {
+  // 3.5 m ahead of the anchor, which lies 2 m before the first camera: the last three have passed it.
+  const Scene scene({0, 1, 2, 3, 4}, {0.1, 0.05, 1.0 / 3.5});
+  ASSERT_EQ(rowsOf(scene).size(), 2u);
+  expectSchurComplement(scene);
+  const Reduced reduced(scene);
+  EXPECT_EQ(reduced.point.sightings, 2);
+  EXPECT_EQ(reduced.point.factors, 1);
+  EXPECT_LT(reduced.squares[1], kBehindSquare);
+  for (int i = 2; i < 5; ++i) EXPECT_EQ(reduced.squares[i], kBehindSquare) << i;
+}
+
+/// Some step of the poses, then of the calibration.
+Eigen::VectorXd someStep() {
+  Eigen::VectorXd step(6 * kPoses + 2);
+  for (int i = 0; i < step.size(); ++i) step[i] = 0.01 * std::sin(1.0 + i);
+  return step;
+}
+
+/// The points of several scenes after that step.
+std::vector<Eigen::Vector3d> movedPoints(const std::vector<Scene>& scenes) {
+  std::vector<EliminatedPoint> points;
+  std::vector<PoseFactor> factors;
+  std::vector<Eigen::Vector3d> moved;
+  for (const Scene& scene : scenes) {
+    const Reduced reduced(scene);
+    points.push_back(reduced.point);
+    factors.insert(factors.end(), reduced.factors.begin(), reduced.factors.begin() + reduced.point.factors);
+    moved.push_back(scene.point.ray_and_inverse_depth);
+  }
+  const Eigen::VectorXd step = someStep();
+  movePoints(points, factors, step.head(6 * kPoses), step.tail<2>(), moved);
+  return moved;
+}
+
+TEST(PointElimination, PointsFollowAsTheWholeEquationsSay) {
+  const std::vector<Scene> scenes = {Scene({0, 1, 2, 4}), Scene({0}), Scene({3, 4}, {-0.3, 0.1, 1.0 / 20.0})};
+  const std::vector<Eigen::Vector3d> moved = movedPoints(scenes);
+  const Eigen::VectorXd step = someStep();
+  for (std::size_t p = 0; p < scenes.size(); ++p) {
+    const Whole whole(scenes[p]);
+    const Eigen::Vector3d expected = whole.hessian.bottomRightCorner<3, 3>().llt().solve(
+        Eigen::Vector3d(whole.gradient.tail<3>() - whole.hessian.bottomLeftCorner(3, step.size()) * step));
+    expectNear(moved[p] - scenes[p].point.ray_and_inverse_depth, expected, "point");
+  }
+}
+
+TEST(PointElimination, SumsUpWhatItsSightingsSay) {
+  const Scene scene({0, 1, 3});
+  const Reduced reduced(scene);
+  double weight = 0.0, residual = 0.0;
+  Eigen::Vector3d by_point = Eigen::Vector3d::Zero();
+  const std::vector<Row> rows = rowsOf(scene);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    weight += rows[i].weight;
+    residual += rows[i].weight * rows[i].residual.z();
+    by_point += rows[i].weight * rows[i].jacobian.row(2).tail<3>().transpose();
+    EXPECT_NEAR(reduced.squares[i], rows[i].square, 1e-9 * rows[i].square) << i;
+  }
+  EXPECT_NEAR(reduced.point.weight, weight, 1e-9);
+  EXPECT_NEAR(reduced.point.disparity_residual, residual, 1e-9);
+  expectNear(reduced.point.disparity_by_point, by_point, "derivatives of the disparities");
+}
+
+TEST(PointElimination, SquaresAreThoseOfTheEquations) {
+  const Scene scene({0, 1, 2, 3, 4}, {0.1, 0.05, 1.0 / 3.5});
+  std::vector<double> squares(5);
+  squareResiduals({scene.camera, scene.calibration}, scene.sighted(), squares.data());
+  EXPECT_EQ(squares, Reduced(scene).squares);
+}
+
+TEST(PointElimination, PointsAddUp) {
+  const Scene one({0, 1, 2, 3}), other({1, 2, 4}, {-0.3, 0.1, 1.0 / 20.0});
+  PoseEquations equations;
+  equations.setZero(kPoses);
+  std::vector<PoseFactor> factors(4);
+  std::vector<double> squares(4);
+  for (const Scene* scene : {&one, &other})
+    equations.add({scene->camera, scene->calibration}, scene->sighted(), kLinearisation, factors.data(),
+                  squares.data());
+  Eigen::MatrixXd hessian;
+  Eigen::VectorXd gradient;
+  equations.copyTo(hessian, gradient);
+  const Reduced alone(one), other_alone(other);
+  expectNear(Eigen::MatrixXd(hessian.triangularView<Eigen::Lower>()),
+             Eigen::MatrixXd((alone.hessian + other_alone.hessian).triangularView<Eigen::Lower>()), "hessian");
+  expectNear(gradient, alone.gradient + other_alone.gradient, "gradient");
+}
+
+TEST(PointElimination, IsTheSameToTheBitWithAndWithoutVectors) {
+  const Scene scene({0, 1, 2, 3, 4});
+  const Reduced fast(scene);
+  allowVectorKernels(false);
+  const Reduced plain(scene);
+  allowVectorKernels(true);
+  EXPECT_EQ(fast.squares, plain.squares);
+  EXPECT_TRUE(fast.hessian.triangularView<Eigen::Lower>().toDenseMatrix() ==
+              plain.hessian.triangularView<Eigen::Lower>().toDenseMatrix());
+  EXPECT_TRUE(fast.gradient == plain.gradient);
+  EXPECT_TRUE(fast.point.R == plain.point.R);
+  EXPECT_TRUE(fast.point.gradient == plain.point.gradient);
+  EXPECT_TRUE(fast.point.by_calibration == plain.point.by_calibration);
+
+  const std::vector<Scene> scenes = {scene, Scene({1, 3})};
+  const std::vector<Eigen::Vector3d> moved = movedPoints(scenes);
+  allowVectorKernels(false);
+  EXPECT_EQ(moved, movedPoints(scenes));
+  allowVectorKernels(true);
+}
+
+}  // namespace test_point_elimination
+}  // namespace sdvo

@@ -1,0 +1,366 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <functional>
+#include <random>
+
+#include "../../src/common/binomial_tail.hpp"
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/map/reacquisition.hpp"
+#include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
+
+namespace sdvo {
+namespace test_reacquisition {
+
+constexpr std::int64_t kPeriod = 50'000'000;  // ns between pairs
+constexpr int kSeen = 10;                     // pairs before an outage
+
+TEST(BinomialTail, AddsUpTheProbabilities) {
+  EXPECT_NEAR(binomialTail(3, 0, 0.3), 1.0, 1e-12);
+  EXPECT_NEAR(binomialTail(3, 2, 0.5), 0.5, 1e-12);  // 3 and 1 of 8
+  EXPECT_NEAR(binomialTail(4, 4, 0.25), 1.0 / 256.0, 1e-12);
+  EXPECT_EQ(binomialTail(4, 5, 0.25), 0.0);
+}
+
+/// Points evenly over an image, of which those in its left `share` are found with a probability.
+std::vector<ExpectedPoint> spread(double share, double probability) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  std::vector<ExpectedPoint> points;
+  for (int i = 0; i < 800; ++i) {
+    const Eigen::Vector2d pixel(640.0 * uniform(random), 480.0 * uniform(random));
+    points.push_back({pixel, pixel.x() < share * 640.0 && uniform(random) < probability});
+  }
+  return points;
+}
+
+TEST(SamePlace, FewPointsWillDoThatAreSpread) {
+  EXPECT_TRUE(showsSamePlace(spread(1.0, 0.1)));
+  EXPECT_TRUE(showsSamePlace(spread(1.0, 0.8)));
+}
+
+TEST(SamePlace, ManyPointsWillNotInAPartOfTheView) {
+  for (const double share : {0.1, 0.2, 0.33}) EXPECT_FALSE(showsSamePlace(spread(share, 0.9))) << share;
+}
+
+TEST(SamePlace, NothingIsNoPlace) {
+  EXPECT_FALSE(showsSamePlace({}));
+  EXPECT_FALSE(showsSamePlace(spread(0.0, 1.0)));
+}
+
+/// A drive to and fro in a room; it is blind for a while, and then it sees another world, or this one.
+class Outage : public ::testing::Test {
+ protected:
+  static synthetic::World room(unsigned seed) {
+    return synthetic::randomWorld(seed, 1500, {-6.0, -2.0, 3.0}, {6.0, 2.0, 9.0});
+  }
+
+  static Eigen::Isometry3d poseAt(int i) {
+    return expSE3((Vector6d() << 0.03 * i, 0.01 * i, 0.02 * i, 0.0, 0.005 * i, 0.0).finished());
+  }
+
+  StereoFeatures pairOf(const synthetic::World& world, int i, const Eigen::Isometry3d& T_origin_camera) const {
+    synthetic::Sighting sighting;
+    sighting.noise = 0.2;
+    sighting.flipped = 0.03;
+    sighting.strangers = 40;
+    sighting.seed = 300 + static_cast<unsigned>(i);
+    return synthetic::observe(world, synthetic::camera(), T_origin_camera.inverse(), i * kPeriod, sighting);
+  }
+
+  void drive() {
+    for (int i = 0; i < kSeen; ++i) result_ = odometry_.update(pairOf(room_, i, poseAt(i)));
+    ASSERT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
+  }
+
+  /// Blind pairs; the number of the next one.
+  int blind(int pairs) {
+    for (int i = kSeen; i < kSeen + pairs; ++i)
+      result_ = odometry_.update(synthetic::noFeatures(synthetic::camera(), i * kPeriod));
+    EXPECT_EQ(result_.state, TrackingState::kLost);
+    EXPECT_FALSE(result_.has_pose);
+    return kSeen + pairs;
+  }
+
+  void expectFoundAt(const Eigen::Isometry3d& T_origin_camera) const {
+    EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
+    EXPECT_EQ(result_.epoch, 0);
+    EXPECT_NE(result_.reason.find("re-acquired by " + std::to_string(result_.inliers) + " points"), std::string::npos)
+        << result_.reason;
+    const Vector6d error = logSE3(T_origin_camera.inverse() * result_.T_origin_camera);
+    EXPECT_LT(error.head<3>().norm(), 0.01);
+    EXPECT_LT(error.dot(result_.pose_covariance.ldlt().solve(error)), 25.0);
+    EXPECT_LT((result_.pose_covariance.topLeftCorner<3, 3>().trace()), 0.1) << "that of a restart is larger by far";
+  }
+
+  void expectStartedAgain() const {
+    EXPECT_TRUE(result_.has_pose) << result_.reason;
+    EXPECT_EQ(result_.epoch, 1) << result_.reason;
+    EXPECT_EQ(result_.state, TrackingState::kDegraded);
+    EXPECT_NE(result_.reason.find("started again"), std::string::npos) << result_.reason;
+  }
+
+  synthetic::World room_ = room(1);
+  VisualOdometry odometry_{{}};
+  OdometryResult result_;
+};
+
+TEST_F(Outage, TheSameEpochGoesOnWhereTheCameraHasMovedTo) {
+  for (const int pairs : {3, 5, 20}) {
+    odometry_ = VisualOdometry({});
+    drive();
+    const OdometryResult before = result_;
+    const int i = blind(pairs);
+    result_ = odometry_.update(pairOf(room_, i, poseAt(i)));
+    expectFoundAt(poseAt(i));
+    EXPECT_TRUE(result_.has_motion);
+    // It begins at the last pose, which was predicted for the first blind pair.
+    EXPECT_NEAR(result_.dt, 0.05 * pairs, 1e-9);
+    EXPECT_GT(result_.distance, before.distance);
+    for (int k = 1; k < 5; ++k) {
+      result_ = odometry_.update(pairOf(room_, i + k, poseAt(i + k)));
+      EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
+      EXPECT_EQ(result_.reason.find("re-acquired"), std::string::npos);
+      EXPECT_NEAR(result_.dt, 0.05, 1e-9);
+      EXPECT_LT((result_.T_origin_camera.translation() - poseAt(i + k).translation()).norm(), 0.01);
+    }
+  }
+}
+
+TEST_F(Outage, ACameraThatStoodLosesNothing) {
+  drive();
+  const int i = blind(30);
+  result_ = odometry_.update(pairOf(room_, i, poseAt(kSeen - 1)));
+  expectFoundAt(poseAt(kSeen - 1));
+}
+
+TEST_F(Outage, ATurnThatLeavesAThirdOfTheViewIsNone) {
+  drive();
+  const int i = blind(10);
+  const Eigen::Isometry3d turned = poseAt(i) * expSE3((Vector6d() << 0.0, 0.0, 0.0, 0.0, 0.75, 0.0).finished());
+  result_ = odometry_.update(pairOf(room_, i, turned));
+  expectFoundAt(turned);
+}
+
+TEST_F(Outage, ADimPairIsWaitedOut) {
+  drive();
+  int i = blind(3);
+  StereoFeatures dim = synthetic::noFeatures(synthetic::camera(), i * kPeriod);
+  const StereoFeatures lit = pairOf(room_, i, poseAt(i));
+  for (int row = 0; row < 8; ++row) {
+    dim.append({lit.u[row], lit.v[row], lit.disparity[row], 0.f, 10.f, -1.f, 1.f});
+    dim.descriptors.push_back(lit.descriptors.row(row));
+  }
+  EXPECT_EQ(odometry_.update(dim).state, TrackingState::kLost);
+  ++i;
+  result_ = odometry_.update(pairOf(room_, i, poseAt(i)));
+  expectFoundAt(poseAt(i));
+}
+
+TEST_F(Outage, AStreamThatWasBrokenGoesOnToo) {
+  drive();
+  odometry_.breakStream();
+  result_ = odometry_.update(pairOf(room_, kSeen + 3, poseAt(kSeen + 3)));
+  expectFoundAt(poseAt(kSeen + 3));
+}
+
+TEST_F(Outage, AnotherPlaceIsANewStart) {
+  for (unsigned seed = 2; seed < 12; ++seed) {
+    odometry_ = VisualOdometry({});
+    drive();
+    const int i = blind(5);
+    result_ = odometry_.update(pairOf(room(seed), i, poseAt(i)));
+    expectStartedAgain();
+  }
+}
+
+TEST_F(Outage, WhatStandsInBothPlacesIsNoPlace) {
+  // The left third of the view, wherever the camera goes, and all else is new.
+  drive();
+  const int i = blind(5);
+  synthetic::World other = room(2);
+  for (std::size_t p = 0; p < room_.points.size(); ++p) {
+    const Eigen::Vector3d pixel = synthetic::camera().project(poseAt(i).inverse() * room_.points[p]);
+    const Eigen::Vector3d elsewhere = synthetic::camera().project(poseAt(i).inverse() * other.points[p]);
+    const double third = synthetic::camera().width / 3.0;
+    if (elsewhere.x() < third) other.points[p].y() = 100.0;  // out of view
+    if (pixel.x() >= third) continue;
+    other.points.push_back(room_.points[p]);
+    other.rows.push_back(room_.rows[p]);
+  }
+  result_ = odometry_.update(pairOf(other, i, poseAt(i)));
+  expectStartedAgain();
+}
+
+TEST_F(Outage, AMirroredPlaceIsANewStart) {
+  // With the descriptors of the original, which a real one does not have.
+  drive();
+  const int i = blind(5);
+  synthetic::World mirrored = room_;
+  for (Eigen::Vector3d& point : mirrored.points) point.x() = -point.x();
+  result_ = odometry_.update(pairOf(mirrored, i, poseAt(i)));
+  expectStartedAgain();
+}
+
+TEST_F(Outage, ARigThatWasRefusedIsANewStart) {
+  // Its map may have wrong depths, however well it is recognised.
+  for (const int refused : {2, 5}) {
+    odometry_ = VisualOdometry({});
+    drive();
+    for (int i = kSeen; i < kSeen + refused; ++i) {
+      StereoFeatures swapped = synthetic::noFeatures(synthetic::camera(), i * kPeriod);
+      swapped.report.refused = true;
+      result_ = odometry_.update(swapped);
+    }
+    EXPECT_EQ(result_.state, TrackingState::kLost);
+    const int i = kSeen + refused;
+    result_ = odometry_.update(pairOf(room_, i, poseAt(i)));
+    expectStartedAgain();
+  }
+}
+
+TEST_F(Outage, APlaceTooFarForTheTimeIsANewStart) {
+  VisualOdometryOptions options;
+  options.tracking.max_speed = 2.0;  // 0.9 m in 6 pairs
+  odometry_.configure(options);
+  drive();
+  const int i = blind(5);
+  Eigen::Isometry3d far = poseAt(kSeen);
+  far.translation().x() += 2.0;
+  result_ = odometry_.update(pairOf(room_, i, far));
+  expectStartedAgain();
+}
+
+TEST_F(Outage, ANewClockIsANewStart) {
+  drive();
+  odometry_.forgetTime();
+  StereoFeatures features = pairOf(room_, kSeen, poseAt(kSeen));
+  features.stamp -= 3'600'000'000'000;
+  result_ = odometry_.update(features);
+  expectStartedAgain();
+}
+
+/// What wheels tell: the true motion since the pair before, too long by a twentieth.
+MotionGuess wheels(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to) {
+  return {expSE3(1.05 * logSE3(from.inverse() * to)), false, 0.1};
+}
+
+TEST_F(Outage, ThePoseGoesOnByTheGuessWhileItIsDark) {
+  drive();
+  for (int i = kSeen; i < kSeen + 20; ++i) {
+    result_ =
+        odometry_.update(synthetic::noFeatures(synthetic::camera(), i * kPeriod), wheels(poseAt(i - 1), poseAt(i)));
+    EXPECT_EQ(result_.state, TrackingState::kDegraded) << i;
+    EXPECT_EQ(result_.epoch, 0);
+    const Vector6d error = logSE3(poseAt(i).inverse() * result_.T_origin_camera);
+    EXPECT_LT(error.dot(result_.pose_covariance.ldlt().solve(error)), 12.6) << i;
+  }
+  EXPECT_GT((result_.pose_covariance.topLeftCorner<3, 3>().trace()), 0.001) << "5 % of 0.75 m";
+  // The map corrects it.
+  result_ =
+      odometry_.update(pairOf(room_, kSeen + 20, poseAt(kSeen + 20)), wheels(poseAt(kSeen + 19), poseAt(kSeen + 20)));
+  EXPECT_EQ(result_.epoch, 0);
+  EXPECT_LT((result_.T_origin_camera.translation() - poseAt(kSeen + 20).translation()).norm(), 0.01);
+  EXPECT_LT((result_.pose_covariance.topLeftCorner<3, 3>().trace()), 0.001);
+}
+
+/// What a gyro tells: the rotation, too large by a twentieth.
+MotionGuess gyro(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to) {
+  Vector6d motion = 1.05 * logSE3(from.inverse() * to);
+  motion.head<3>().setConstant(100.0);  // nothing is to look at it
+  return {expSE3(motion), true, 0.1};
+}
+
+/// The drive, turning much faster from the outage on.
+Eigen::Isometry3d turningAt(int i) {
+  return expSE3(
+      (Vector6d() << 0.03 * i, 0.01 * i, 0.02 * i, 0.0, 0.005 * i + 0.05 * std::max(i - kSeen, 0), 0.0).finished());
+}
+
+TEST_F(Outage, AGyroCarriesThePoseForAsLongAsTheTranslationIsPredicted) {
+  drive();
+  for (int i = kSeen; i < kSeen + 40; ++i) {
+    result_ =
+        odometry_.update(synthetic::noFeatures(synthetic::camera(), i * kPeriod), gyro(turningAt(i - 1), turningAt(i)));
+    const bool is_short = (i - (kSeen - 1)) * kPeriod <= 1'000'000'000;  // tracking/max_gap
+    EXPECT_EQ(result_.state, is_short ? TrackingState::kDegraded : TrackingState::kLost) << i << ": " << result_.reason;
+    EXPECT_EQ(result_.epoch, 0);
+    if (!is_short) continue;
+    const Vector6d error = logSE3(turningAt(i).inverse() * result_.T_origin_camera);
+    EXPECT_LT(error.dot(result_.pose_covariance.ldlt().solve(error)), 12.6) << i;
+  }
+  // The room is another one; the turn is known.
+  const int next = kSeen + 40;
+  result_ = odometry_.update(pairOf(room(2), next, turningAt(next)), gyro(turningAt(next - 1), turningAt(next)));
+  expectStartedAgain();
+  const Vector6d error = logSE3(turningAt(next).inverse() * result_.T_origin_camera);
+  EXPECT_LT(error.tail<3>().norm(), 0.2) << "of a turn by 2 rad";
+  EXPECT_LT((result_.pose_covariance.bottomRightCorner<3, 3>().trace()), 0.2);
+  EXPECT_LT(error.dot(result_.pose_covariance.ldlt().solve(error)), 12.6);
+}
+
+TEST_F(Outage, AfterTheLongestTimeTheGuessCarriesThePoseToTheNextStart) {
+  VisualOdometryOptions options;
+  options.tracking.max_guessed = 0.5;
+  odometry_.configure(options);
+  drive();
+  constexpr int kPairs = 20;
+  for (int i = kSeen; i < kSeen + kPairs; ++i)
+    result_ =
+        odometry_.update(synthetic::noFeatures(synthetic::camera(), i * kPeriod), wheels(poseAt(i - 1), poseAt(i)));
+  EXPECT_EQ(result_.state, TrackingState::kLost);
+  const int next = kSeen + kPairs;
+  result_ = odometry_.update(pairOf(room(2), next, poseAt(next)), wheels(poseAt(next - 1), poseAt(next)));
+  EXPECT_EQ(result_.state, TrackingState::kDegraded) << result_.reason;
+  EXPECT_EQ(result_.epoch, 0);
+  const Vector6d error = logSE3(poseAt(next).inverse() * result_.T_origin_camera);
+  EXPECT_LT(error.head<3>().norm(), 0.1);
+  EXPECT_LT(error.dot(result_.pose_covariance.ldlt().solve(error)), 12.6);
+  for (int i = next + 1; i < next + 4; ++i) {
+    result_ = odometry_.update(pairOf(room(2), i, poseAt(i)), wheels(poseAt(i - 1), poseAt(i)));
+    EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
+    EXPECT_LT((result_.T_origin_camera.translation() - poseAt(i).translation()).norm(), 0.1);
+  }
+}
+
+TEST_F(Outage, AGuessThatEndsCarriesNoPose) {
+  drive();
+  for (int i = kSeen; i < kSeen + 5; ++i) {
+    std::optional<MotionGuess> guess;
+    if (i == kSeen) guess = wheels(poseAt(i - 1), poseAt(i));
+    result_ = odometry_.update(synthetic::noFeatures(synthetic::camera(), i * kPeriod), guess);
+  }
+  EXPECT_EQ(result_.state, TrackingState::kLost);
+  const int next = kSeen + 5;
+  result_ = odometry_.update(pairOf(room(2), next, poseAt(next)), wheels(poseAt(next - 1), poseAt(next)));
+  expectStartedAgain();
+}
+
+TEST_F(Outage, APoseFromElsewhereIsANewEpochOfTheSameMap) {
+  drive();
+  const Matrix6d covariance = 0.01 * Matrix6d::Identity();
+  odometry_.takePose(covariance);
+  EXPECT_TRUE(odometry_.lastPose().isApprox(result_.T_origin_camera));
+  result_ = odometry_.update(pairOf(room_, kSeen, poseAt(kSeen)));
+  EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
+  EXPECT_EQ(result_.epoch, 1);
+  EXPECT_TRUE(result_.has_motion);
+  EXPECT_LT((result_.T_origin_camera.translation() - poseAt(kSeen).translation()).norm(), 0.01);
+  EXPECT_NEAR(result_.pose_covariance.trace(), covariance.trace(), 0.01 * covariance.trace());
+}
+
+TEST_F(Outage, APoseFromElsewhereEndsTheSearchOfALostCamera) {
+  drive();
+  const int i = blind(5);
+  const Eigen::Isometry3d last = odometry_.lastPose();
+  odometry_.takePose(0.01 * Matrix6d::Identity());
+  result_ = odometry_.update(pairOf(room_, i, poseAt(i)));
+  EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
+  EXPECT_EQ(result_.epoch, 1);
+  EXPECT_TRUE(result_.T_origin_camera.isApprox(last));
+  EXPECT_NEAR(result_.pose_covariance.trace(), 0.06, 1e-9);
+}
+
+}  // namespace test_reacquisition
+}  // namespace sdvo

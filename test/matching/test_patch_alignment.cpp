@@ -1,0 +1,338 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <random>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/processor.hpp"
+#include "stereo_descriptor_vo/matching/patch_alignment.hpp"
+
+namespace sdvo {
+namespace test_patch_alignment {
+
+constexpr int kSide = 13;
+constexpr double kNoise = 2.0;  // grey levels
+
+/// What a camera sees: a grey level for each position in px.
+using Scene = std::function<double(double, double)>;
+
+/// A patch cut around `centre`, with noise and rounded to grey levels.
+std::vector<std::uint8_t> cut(const Scene& scene, const Eigen::Vector2d& centre, double spacing, std::mt19937& random,
+                              double noise = kNoise) {
+  std::normal_distribution<double> normal(0.0, 1.0);
+  std::vector<std::uint8_t> samples;
+  for (int j = 0; j < kSide; ++j)
+    for (int i = 0; i < kSide; ++i) {
+      const double x = centre.x() + spacing * (i - kSide / 2), y = centre.y() + spacing * (j - kSide / 2);
+      const double grey = scene(x, y) + noise * normal(random);
+      samples.push_back(static_cast<std::uint8_t>(std::clamp(grey + 0.5, 0.0, 255.0)));
+    }
+  return samples;
+}
+
+Patch patchOf(const std::vector<std::uint8_t>& samples, double spacing = 1.0) {
+  return {samples.data(), kSide, static_cast<float>(spacing)};
+}
+
+/// Texture with structure of 5 px and more.
+Scene texture(unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> phase(0.0, 2.0 * M_PI), wave(5.0, 25.0);
+  struct Sine {
+    double x, y, phase;
+  };
+  std::vector<Sine> sines;
+  for (int k = 0; k < 12; ++k) {
+    const double direction = phase(random), frequency = 2.0 * M_PI / wave(random);
+    sines.push_back({frequency * std::cos(direction), frequency * std::sin(direction), phase(random)});
+  }
+  return [sines](double x, double y) {
+    double sum = 0.0;
+    for (const Sine& s : sines) sum += std::sin(s.x * x + s.y * y + s.phase);
+    return 120.0 + 20.0 * sum;
+  };
+}
+
+/// The reference scene as a camera sees it for which p in it lies at warp * p + shift.
+Scene moved(const Scene& scene, const Eigen::Matrix2d& warp, const Eigen::Vector2d& shift) {
+  const Eigen::Matrix2d back = warp.inverse();
+  return [=](double x, double y) {
+    const Eigen::Vector2d p = back * (Eigen::Vector2d(x, y) - shift);
+    return scene(p.x(), p.y());
+  };
+}
+
+Eigen::Matrix2d scaled(double ratio) {
+  return ratio * Eigen::Matrix2d::Identity();
+}
+
+struct Trial {
+  int found = 0, tried = 0;
+  std::vector<double> errors;      ///< px, per coordinate
+  std::vector<double> normalised;  ///< the same by the sigma that was told
+
+  double median() {
+    std::vector<double> sizes;
+    for (const double e : errors) sizes.push_back(std::abs(e));
+    std::nth_element(sizes.begin(), sizes.begin() + sizes.size() / 2, sizes.end());
+    return sizes[sizes.size() / 2];
+  }
+  double normalisedRms() const {
+    double sum = 0.0;
+    for (const double e : normalised) sum += e * e;
+    return std::sqrt(sum / static_cast<double>(normalised.size()));
+  }
+};
+
+/// Shifts of up to a pixel under a true warp and the one that the alignment is told.
+Trial tryShifts(const Eigen::Matrix2d& truth, const Eigen::Matrix2d& told, double spacing = 1.0,
+                const PatchAlignmentOptions& options = {}) {
+  Trial trial;
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> uniform(-0.8, 0.8);
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    const Scene scene = texture(seed);
+    const Eigen::Vector2d shift(uniform(random), uniform(random));
+    const auto reference = cut(scene, Eigen::Vector2d::Zero(), spacing, random);
+    const auto current = cut(moved(scene, truth, shift), Eigen::Vector2d::Zero(), spacing, random);
+    const auto found = alignPatch(options, patchOf(reference, spacing), Eigen::Vector2f::Zero(),
+                                  patchOf(current, spacing), told.cast<float>());
+    ++trial.tried;
+    if (!found) continue;
+    ++trial.found;
+    for (int axis = 0; axis < 2; ++axis) {
+      trial.errors.push_back(found->shift[axis] - shift[axis]);
+      trial.normalised.push_back(trial.errors.back() / found->sigma);
+    }
+  }
+  return trial;
+}
+
+TEST(PatchAlignment, APatchMustHoldTheSquareAndItsDerivatives) {
+  PatchAlignmentOptions options;
+  options.radius = 5;
+  EXPECT_TRUE(options.canAlign(13));
+  EXPECT_FALSE(options.canAlign(11));
+  options.enabled = false;
+  EXPECT_FALSE(options.canAlign(13));
+}
+
+TEST(PatchAlignment, FindsTheShiftAtEveryScaleRatioThatItIsTold) {
+  for (const double ratio : {0.7, 0.85, 1.0, 1.15}) {
+    Trial trial = tryShifts(scaled(ratio), scaled(ratio));
+    EXPECT_GT(trial.found, 190) << ratio;
+    EXPECT_LT(trial.median(), 0.05) << ratio;
+  }
+  // At 1.4 the warped square fills the patch: what is shifted by more than 0.4 px leaves it.
+  Trial largest = tryShifts(scaled(1.4), scaled(1.4));
+  EXPECT_GT(largest.found, 30);
+  EXPECT_LT(largest.median(), 0.05);
+}
+
+TEST(PatchAlignment, TheScaleRatioIsWhatDoesIt) {
+  Trial told = tryShifts(scaled(0.7), scaled(0.7)), ignored = tryShifts(scaled(0.7), scaled(1.0));
+  EXPECT_GT(ignored.median(), 2.0 * told.median());
+}
+
+TEST(PatchAlignment, GroundAtASlantIsFoundToAFractionOfAPixel) {
+  // A vehicle's step: the ground's rows spread by 1.25, its columns by 1.15, and rows shear; the warp told knows only
+  // the ratio of the depths.
+  Eigen::Matrix2d ground;
+  ground << 1.15, 0.05, 0.0, 1.25;
+  Trial trial = tryShifts(ground, scaled(1.15));
+  EXPECT_GT(trial.found, 150);
+  EXPECT_LT(trial.median(), 0.15);
+}
+
+TEST(PatchAlignment, RolledViewsAreFoundByTheWarp) {
+  const double roll = 0.3;
+  Eigen::Matrix2d turn;
+  turn << std::cos(roll), -std::sin(roll), std::sin(roll), std::cos(roll);
+  Trial trial = tryShifts(turn, turn);
+  EXPECT_GT(trial.found, 150);
+  EXPECT_LT(trial.median(), 0.05);
+}
+
+TEST(PatchAlignment, ShiftsAreInPixelsWhateverTheSpacing) {
+  Trial trial = tryShifts(scaled(1.0), scaled(1.0), 2.0);
+  EXPECT_GT(trial.found, 190);
+  EXPECT_LT(trial.median(), 0.06);
+}
+
+TEST(PatchAlignment, ErrorsAreAsLargeAsToldBySigmaAtEachScale) {
+  PatchAlignmentOptions options;
+  options.radius = 3;  // so that the square stays within the patch
+  for (const double ratio : {0.67, 0.85, 1.0, 1.2, 1.5}) {
+    const Trial trial = tryShifts(scaled(ratio), scaled(ratio), 1.0, options);
+    EXPECT_GT(trial.found, 100) << ratio;
+    EXPECT_NEAR(trial.normalisedRms(), 0.95, 0.15) << ratio;
+  }
+}
+
+TEST(PatchAlignment, ThePointMayLieBesideTheReferencesMiddle) {
+  std::mt19937 random(5);
+  const Scene scene = texture(4);
+  const Eigen::Vector2d centre(1.0, -0.75), shift(0.3, 0.2);
+  const auto reference = cut(scene, Eigen::Vector2d::Zero(), 1.0, random, 0.0);
+  const auto current = cut(moved(scene, scaled(1.0), shift - centre), Eigen::Vector2d::Zero(), 1.0, random, 0.0);
+  const auto found = alignPatch(PatchAlignmentOptions(), patchOf(reference), centre.cast<float>(), patchOf(current),
+                                Eigen::Matrix2f::Identity());
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->shift.x(), 0.3, 0.03);
+  EXPECT_NEAR(found->shift.y(), 0.2, 0.03);
+}
+
+TEST(PatchAlignment, BlindToBrightnessAndContrast) {
+  std::mt19937 random(5);
+  const Scene scene = texture(9);
+  const Scene darker = [&](double x, double y) { return 0.6 * scene(x - 0.5, y + 0.25) - 20.0; };
+  const auto reference = cut(scene, Eigen::Vector2d::Zero(), 1.0, random, 0.0);
+  const auto current = cut(darker, Eigen::Vector2d::Zero(), 1.0, random, 0.0);
+  const auto found = alignPatch(PatchAlignmentOptions(), patchOf(reference), Eigen::Vector2f::Zero(), patchOf(current),
+                                Eigen::Matrix2f::Identity());
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->shift.x(), 0.5, 0.08);
+  EXPECT_NEAR(found->shift.y(), -0.25, 0.08);
+  EXPECT_GT(found->correlation, 0.99f);
+}
+
+TEST(PatchAlignment, RefusesWhatIsNotTheSame) {
+  std::mt19937 random(5);
+  const auto align = [&](const Scene& a, const Scene& b) {
+    const auto reference = cut(a, Eigen::Vector2d::Zero(), 1.0, random);
+    const auto current = cut(b, Eigen::Vector2d::Zero(), 1.0, random);
+    return alignPatch(PatchAlignmentOptions(), patchOf(reference), Eigen::Vector2f::Zero(), patchOf(current),
+                      Eigen::Matrix2f::Identity());
+  };
+  int unrelated = 0, occluded = 0;
+  for (unsigned seed = 0; seed < 100; ++seed) {
+    if (align(texture(seed), texture(seed + 1000))) ++unrelated;
+    // The left half is something near that moved on by 5 px over the background.
+    const Scene background = texture(seed), near = texture(seed + 1000);
+    const Scene before = [&](double x, double y) { return x < 0.0 ? near(x, y) : background(x, y); };
+    const Scene after = [&](double x, double y) { return x < 5.0 ? near(x - 5.0, y) : background(x, y); };
+    if (align(before, after)) ++occluded;
+  }
+  EXPECT_LE(unrelated, 5);
+  EXPECT_LE(occluded, 10);
+  const Scene flat = [](double, double) { return 100.0; };
+  const Scene edge = [](double x, double) { return x < 0.2 ? 50.0 : 200.0; };
+  std::mt19937 quiet(1);
+  for (const Scene& scene : {flat, edge}) {
+    const auto patch = cut(scene, Eigen::Vector2d::Zero(), 1.0, quiet, 0.0);
+    EXPECT_FALSE(alignPatch(PatchAlignmentOptions(), patchOf(patch), Eigen::Vector2f::Zero(), patchOf(patch),
+                            Eigen::Matrix2f::Identity()));
+  }
+}
+
+TEST(PatchAlignment, RefusesALowerCorrelationThanAskedFor) {
+  std::mt19937 random(7);
+  const auto reference = cut(texture(3), Eigen::Vector2d::Zero(), 1.0, random);
+  const auto current = cut(texture(3), Eigen::Vector2d::Zero(), 1.0, random, 20.0);
+  PatchAlignmentOptions options;
+  const auto align = [&] {
+    return alignPatch(options, patchOf(reference), Eigen::Vector2f::Zero(), patchOf(current),
+                      Eigen::Matrix2f::Identity());
+  };
+  options.min_correlation = 0.1;
+  const auto found = align();
+  ASSERT_TRUE(found);
+  ASSERT_LT(found->correlation, 0.98f);
+  options.min_correlation = found->correlation - 0.01;
+  EXPECT_TRUE(align());
+  options.min_correlation = found->correlation + 0.01;
+  EXPECT_FALSE(align());
+}
+
+TEST(PatchAlignment, RefusesAFartherShiftThanAskedFor) {
+  std::mt19937 random(7);
+  const auto reference = cut(texture(3), Eigen::Vector2d::Zero(), 1.0, random);
+  const auto current = cut(moved(texture(3), scaled(1.0), {0.0, -0.8}), Eigen::Vector2d::Zero(), 1.0, random);
+  PatchAlignmentOptions options;
+  const auto align = [&] {
+    return alignPatch(options, patchOf(reference), Eigen::Vector2f::Zero(), patchOf(current),
+                      Eigen::Matrix2f::Identity());
+  };
+  options.noise.corner = 0.3;  // 3.9 of which bound the shift
+  EXPECT_TRUE(align());
+  options.noise.corner = 0.15;
+  EXPECT_FALSE(align());
+}
+
+// Along an edge nothing but rounding tells the position.
+TEST(PatchAlignment, RefusesSlantedEdges) {
+  std::mt19937 random(7);
+  for (const double slant : {-1.03, 1.03}) {
+    const Scene edge = [slant](double x, double y) { return 125.0 + 75.0 * std::tanh(0.7 * (x + slant * y)); };
+    const auto patch = cut(edge, Eigen::Vector2d::Zero(), 1.0, random, 0.0);
+    EXPECT_FALSE(alignPatch(PatchAlignmentOptions(), patchOf(patch), Eigen::Vector2f::Zero(), patchOf(patch),
+                            Eigen::Matrix2f::Identity()));
+  }
+}
+
+TEST(PatchAlignment, PatchesMayBeSpacedDifferently) {
+  std::mt19937 random(7);
+  const Eigen::Vector2d shift(0.6, -0.4);
+  const auto reference = cut(texture(3), Eigen::Vector2d::Zero(), 1.0, random);
+  const auto current = cut(moved(texture(3), scaled(1.0), shift), Eigen::Vector2d::Zero(), 1.6, random);
+  const auto found = alignPatch(PatchAlignmentOptions(), patchOf(reference, 1.0), Eigen::Vector2f::Zero(),
+                                patchOf(current, 1.6), Eigen::Matrix2f::Identity());
+  ASSERT_TRUE(found);
+  EXPECT_LT((found->shift.cast<double>() - shift).norm(), 0.15);
+  EXPECT_GT(found->correlation, 0.95f);
+}
+
+TEST(PatchAlignment, RefusesWhatLiesOutside) {
+  std::mt19937 random(5);
+  const Scene scene = texture(2);
+  const auto reference = cut(scene, Eigen::Vector2d::Zero(), 1.0, random, 0.0);
+  const auto far = cut(moved(scene, scaled(1.0), {2.5, 0.0}), Eigen::Vector2d::Zero(), 1.0, random, 0.0);
+  const auto align = [&](const std::vector<std::uint8_t>& current, const Eigen::Vector2f& centre, float ratio) {
+    return alignPatch(PatchAlignmentOptions(), patchOf(reference), centre, patchOf(current),
+                      ratio * Eigen::Matrix2f::Identity());
+  };
+  EXPECT_FALSE(align(far, Eigen::Vector2f::Zero(), 1.f)) << "farther than a corner is off";
+  const auto beside = cut(scene, {1.5, 0.0}, 1.0, random, 0.0);
+  EXPECT_TRUE(align(cut(scene, {1.0, 0.0}, 1.0, random, 0.0), {1.f, 0.f}, 1.f));
+  EXPECT_FALSE(align(beside, {1.5f, 0.f}, 1.f)) << "the reference's square and its neighbours leave its patch";
+  EXPECT_FALSE(align(reference, Eigen::Vector2f::Zero(), 1.6f)) << "the warped square leaves the current patch";
+  EXPECT_FALSE(align(reference, Eigen::Vector2f::Zero(), std::numeric_limits<float>::quiet_NaN()));
+}
+
+TEST(PatchAlignment, IsTheSameToTheBitWithAndWithoutVectors) {
+  if (!usesVectorKernels()) GTEST_SKIP() << "this processor has neither AVX2 nor NEON";
+  std::mt19937 random(23);
+  std::uniform_real_distribution<double> part(-1.0, 1.0);
+  int compared = 0;
+  for (unsigned trial = 0; trial < 200; ++trial) {
+    const Scene scene = texture(trial);
+    const Eigen::Vector2d shift(part(random), part(random));
+    const Eigen::Matrix2d warp = scaled(1.0 + 0.2 * part(random));
+    const auto reference = cut(scene, {0.0, 0.0}, 1.0, random);
+    const auto current = cut(moved(scene, warp, shift), {0.0, 0.0}, 1.0, random);
+    PatchAlignmentOptions options;
+    options.radius = 2 + static_cast<int>(trial % 4);
+    const Eigen::Vector2f centre(0.4f * static_cast<float>(part(random)), 0.4f * static_cast<float>(part(random)));
+    const auto align = [&] {
+      return alignPatch(options, patchOf(reference), centre, patchOf(current), warp.cast<float>());
+    };
+    const auto fast = align();
+    allowVectorKernels(false);
+    const auto plain = align();
+    allowVectorKernels(true);
+    ASSERT_EQ(fast.has_value(), plain.has_value()) << trial;
+    if (!fast) continue;
+    ++compared;
+    ASSERT_EQ(fast->shift, plain->shift) << trial;
+    ASSERT_EQ(fast->sigma, plain->sigma) << trial;
+    ASSERT_EQ(fast->correlation, plain->correlation) << trial;
+  }
+  EXPECT_GT(compared, 100);
+}
+
+}  // namespace test_patch_alignment
+}  // namespace sdvo

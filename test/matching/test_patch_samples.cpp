@@ -1,0 +1,112 @@
+#include <gtest/gtest.h>
+
+#include <random>
+#include <vector>
+
+#include "../../src/matching/patch_samples.hpp"
+#include "stereo_descriptor_vo/common/processor.hpp"
+
+namespace sdvo {
+namespace test_patch_samples {
+
+/// A patch of noise.
+struct Noise {
+  std::vector<std::uint8_t> samples;
+  NearPatch patch;
+
+  Noise(int side, std::mt19937& random) : samples(static_cast<std::size_t>(side * side)) {
+    for (std::uint8_t& sample : samples) sample = static_cast<std::uint8_t>(random());
+    patch.take({samples.data(), side, 1.f});
+  }
+};
+
+/// The value at one place.
+float valueAt(const NearPatch& patch, const Eigen::Vector2f& place) {
+  Samples values;
+  EXPECT_TRUE(SampleSquare(0).sample(patch, place, Eigen::Matrix2f::Identity(), values));
+  return values[0];
+}
+
+TEST(PatchSamples, UprightOnesAreThoseOfAnyGrid) {
+  std::mt19937 random(3);
+  std::uniform_real_distribution<float> uniform(-1.f, 1.f);
+  for (const int side : {9, 13, 16})
+    for (int radius = 1; 2 * (radius + 1) < side && radius <= PatchAlignmentOptions::kLargestRadius; ++radius) {
+      const Noise noise(side, random);
+      const float free = 0.5f * static_cast<float>(side - 1) - static_cast<float>(radius + 1);
+      const SampleSquare square(radius);
+      std::vector<Eigen::Vector2f> centres = {{0.f, 0.f}, {free, free}, {-free, -free}};
+      for (int k = 0; k < 20; ++k) centres.emplace_back(free * uniform(random), free * uniform(random));
+      for (const Eigen::Vector2f& centre : centres) {
+        Samples expected, values, by_x, by_y;
+        for (Samples* of : {&expected, &values, &by_x, &by_y}) of->fill(77.f);
+        ASSERT_TRUE(square.sample(noise.patch, centre, Eigen::Matrix2f::Identity(), expected));
+        ASSERT_TRUE(square.sampleUpright(noise.patch, centre, values, by_x, by_y));
+        for (int k = 0; k < square.count(); ++k) ASSERT_EQ(values[k], expected[k]) << side << " " << radius;
+        for (int k = square.pixels(); k < square.count(); ++k) ASSERT_TRUE(by_x[k] == 0.f && by_y[k] == 0.f);
+        for (int j = 0; j < square.side(); ++j)
+          for (int i = 0; i < square.side(); ++i) {
+            const Eigen::Vector2f here = centre + Eigen::Vector2f(i - radius, j - radius);
+            const auto around = [&](float x, float y) { return valueAt(noise.patch, here + Eigen::Vector2f(x, y)); };
+            const std::size_t k = static_cast<std::size_t>(j * square.side() + i);
+            // Coordinates that are added up in another order: 255 times a few 1e-6.
+            ASSERT_NEAR(by_x[k], 0.5f * (around(1.f, 0.f) - around(-1.f, 0.f)), 1e-3f) << side << " " << radius;
+            ASSERT_NEAR(by_y[k], 0.5f * (around(0.f, 1.f) - around(0.f, -1.f)), 1e-3f) << side << " " << radius;
+          }
+      }
+    }
+}
+
+TEST(PatchSamples, NeighboursMayNotLieOutside) {
+  std::mt19937 random(4);
+  const Noise noise(13, random);
+  Samples values, by_x, by_y;
+  const SampleSquare square(4);
+  EXPECT_TRUE(square.sampleUpright(noise.patch, {1.f, -1.f}, values, by_x, by_y));
+  for (const Eigen::Vector2f& centre : {Eigen::Vector2f(1.01f, 0.f), Eigen::Vector2f(0.f, -1.01f)})
+    EXPECT_FALSE(square.sampleUpright(noise.patch, centre, values, by_x, by_y));
+}
+
+TEST(PatchSamples, NoCornerOfTheSquareMayLieOutside) {
+  std::mt19937 random(4);
+  const Noise noise(13, random);
+  Samples values;
+  const SampleSquare square(4);
+  const Eigen::Matrix2f identity = Eigen::Matrix2f::Identity();
+  Eigen::Matrix2f turned;
+  turned << 0.8f, -0.6f, 0.6f, 0.8f;
+  EXPECT_TRUE(square.sample(noise.patch, {2.f, -2.f}, identity, values));
+  EXPECT_FALSE(square.sample(noise.patch, {2.01f, 0.f}, identity, values));
+  EXPECT_FALSE(square.sample(noise.patch, {0.f, -2.01f}, identity, values));
+  EXPECT_TRUE(square.sample(noise.patch, {0.f, 0.f}, 1.5f * identity, values));
+  EXPECT_FALSE(square.sample(noise.patch, {0.f, 0.f}, 1.51f * identity, values));
+  EXPECT_TRUE(square.sample(noise.patch, {0.3f, 0.3f}, turned, values));
+  EXPECT_FALSE(square.sample(noise.patch, {0.5f, 0.f}, turned, values));
+}
+
+TEST(PatchSamples, AreTheSameToTheBitWithAndWithoutVectors) {
+  if (!usesVectorKernels()) GTEST_SKIP() << "this processor has neither AVX2 nor NEON";
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> uniform(-1.f, 1.f);
+  const Noise noise(13, random);
+  const SampleSquare square(4);
+  for (int trial = 0; trial < 100; ++trial) {
+    const Eigen::Vector2f centre(uniform(random), uniform(random));
+    Eigen::Matrix2f grid = Eigen::Matrix2f::Identity();
+    for (int k = 0; k < 4; ++k) grid(k) += 0.1f * uniform(random);
+    Samples fast[4], plain[4];
+    const auto sampleAll = [&](Samples* of) {
+      EXPECT_TRUE(square.sampleUpright(noise.patch, centre, of[0], of[1], of[2]));
+      return square.sample(noise.patch, centre, grid, of[3]);
+    };
+    const bool inside = sampleAll(fast);
+    allowVectorKernels(false);
+    ASSERT_EQ(sampleAll(plain), inside);
+    allowVectorKernels(true);
+    for (int s = 0; s < (inside ? 4 : 3); ++s)
+      for (int k = 0; k < square.count(); ++k) ASSERT_EQ(fast[s][k], plain[s][k]) << s << " " << k;
+  }
+}
+
+}  // namespace test_patch_samples
+}  // namespace sdvo

@@ -1,0 +1,100 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/common/processor.hpp"
+#include "stereo_descriptor_vo/common/se3.hpp"
+#include "stereo_descriptor_vo/motion/pose_problem.hpp"
+
+namespace sdvo {
+namespace test_correspondence_arrays {
+
+Eigen::Isometry3d someMotion() {
+  Vector6d xi;
+  xi << 0.1, -0.05, -1.2, 0.02, 0.03, -0.01;
+  return expSE3(xi);
+}
+
+/// Some behind the camera, not a multiple of the lanes.
+std::vector<Correspondence> someCorrespondences() {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> side(-8.0, 8.0), depth(-5.0, 40.0), noise(-2.0, 2.0);
+  std::vector<Correspondence> all;
+  for (int i = 0; i < 101; ++i) {
+    const Eigen::Vector3d point(side(random), 0.3 * side(random), depth(random));
+    Eigen::Vector3d measurement(300.0, 100.0, 290.0);
+    const Eigen::Vector3d now = someMotion() * point;
+    if (now.z() > 0.5)
+      measurement = synthetic::camera().project(now) + Eigen::Vector3d(noise(random), noise(random), noise(random));
+    all.push_back({point, measurement});
+  }
+  return all;
+}
+
+struct Result {
+  std::vector<double> squares, weights;
+  Matrix6d hessian;
+  Vector6d gradient;
+};
+
+Result evaluate(const CorrespondenceArrays& arrays) {
+  Result result;
+  const int count = CorrespondenceArrays::roundedUp(arrays.count());
+  result.squares.resize(static_cast<std::size_t>(count));
+  arrays.squareResiduals(synthetic::camera(), someMotion(), 0, count, result.squares.data());
+  for (int i = 0; i < count; ++i) {
+    const double square = result.squares[static_cast<std::size_t>(i)];
+    result.weights.push_back(i < arrays.count() && std::isfinite(square) ? 1.0 / (1.0 + square) : 0.0);
+  }
+  arrays.sumEquations(synthetic::camera(), someMotion(), result.weights.data(), result.hessian, result.gradient);
+  return result;
+}
+
+TEST(CorrespondenceArrays, AgreeWithTheCorrespondencesOneByOne) {
+  const auto correspondences = someCorrespondences();
+  const Result result = evaluate(CorrespondenceArrays(correspondences));
+  Matrix6d hessian = Matrix6d::Zero();
+  Vector6d gradient = Vector6d::Zero();
+  int behind = 0;
+  for (std::size_t i = 0; i < correspondences.size(); ++i) {
+    const auto residual = reprojectionResidual(synthetic::camera(), someMotion(), correspondences[i]);
+    ASSERT_EQ(residual.has_value(), std::isfinite(result.squares[i])) << i;
+    if (!residual) {
+      ++behind;
+      continue;
+    }
+    EXPECT_DOUBLE_EQ(result.squares[i], residual->squaredNorm()) << i;
+    const auto jacobian = motionJacobian(synthetic::camera(), someMotion(), correspondences[i].point);
+    hessian += result.weights[i] * jacobian.transpose() * jacobian;
+    gradient += result.weights[i] * jacobian.transpose() * *residual;
+  }
+  EXPECT_GT(behind, 5);
+  EXPECT_LT((result.hessian - hessian).norm(), 1e-12 * hessian.norm());
+  EXPECT_LT((result.gradient - gradient).norm(), 1e-12 * gradient.norm());
+}
+
+TEST(CorrespondenceArrays, TakeASubset) {
+  const auto correspondences = someCorrespondences();
+  const CorrespondenceArrays arrays(correspondences, {70, 3, 12});
+  ASSERT_EQ(arrays.count(), 3);
+  const Result all = evaluate(CorrespondenceArrays(correspondences)), some = evaluate(arrays);
+  EXPECT_EQ(some.squares[0], all.squares[70]);
+  EXPECT_EQ(some.squares[1], all.squares[3]);
+  EXPECT_EQ(some.squares[2], all.squares[12]);
+}
+
+TEST(CorrespondenceArrays, GiveTheSameToTheBitWithAndWithoutVectors) {
+  const CorrespondenceArrays arrays(someCorrespondences());
+  const Result fast = evaluate(arrays);
+  allowVectorKernels(false);
+  const Result plain = evaluate(arrays);
+  allowVectorKernels(true);
+  EXPECT_EQ(fast.squares, plain.squares);
+  EXPECT_EQ(fast.hessian, plain.hessian);
+  EXPECT_EQ(fast.gradient, plain.gradient);
+}
+
+}  // namespace test_correspondence_arrays
+}  // namespace sdvo

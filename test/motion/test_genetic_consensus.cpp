@@ -1,0 +1,123 @@
+#include <gtest/gtest.h>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/motion/genetic_consensus.hpp"
+
+namespace sdvo {
+namespace test_genetic_consensus {
+
+/// Correspondences of which a share is measured at random places.
+struct Scene {
+  StereoCamera camera = synthetic::camera();
+  Eigen::Isometry3d T_current_reference = Eigen::Isometry3d::Identity();
+  std::vector<Correspondence> correspondences;
+
+  Scene(double outlier_share, double noise, unsigned seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> uniform(0.0, 1.0);
+    std::normal_distribution<double> normal(0.0, 1.0);
+    Vector6d motion;
+    motion << -0.03, 0.01, -1.1, -0.003, 0.02, 0.004;
+    T_current_reference = expSE3(motion);
+    constexpr int kCount = 150;
+    for (int i = 0; i < kCount; ++i) {
+      const auto somewhere = [&] {
+        return camera.backProject(30.0 + 580.0 * uniform(random), 30.0 + 420.0 * uniform(random),
+                                  5.0 + 30.0 * uniform(random));
+      };
+      const Eigen::Vector3d point = somewhere();
+      const bool outlier = i < outlier_share * kCount;
+      Eigen::Vector3d measurement = camera.project(outlier ? somewhere() : T_current_reference * point);
+      for (int k = 0; k < 3; ++k) measurement[k] += noise * normal(random);
+      correspondences.push_back({point, measurement});
+    }
+  }
+};
+
+constexpr double kCertainty = 1.0;  // never reached: the whole budget is used
+constexpr double kNone = 0.0;       // reached with the first pose
+
+GeneticResult search(const Scene& scene, const GeneticConsensusOptions& options, bool adaptive, int iterations,
+                     unsigned seed, double confidence = kCertainty) {
+  const PoseProblem problem(scene.camera, scene.correspondences, 2.0);
+  std::mt19937 random(seed);
+  return searchGenetically(problem, options, adaptive, {iterations, confidence}, random);
+}
+
+bool equal(const GeneticResult& a, const GeneticResult& b) {
+  return a.cost == b.cost && a.iterations == b.iterations &&
+         a.T_current_reference.matrix() == b.T_current_reference.matrix();
+}
+
+TEST(GeneticSearch, UsesItsBudgetExactlyAndStopsWhenConfident) {
+  const Scene scene(0.5, 0.3, 1);
+  for (const bool adaptive : {false, true}) {
+    for (const int iterations : {1, 10, 24, 25, 137})
+      EXPECT_EQ(search(scene, {}, adaptive, iterations, 1).iterations, iterations) << adaptive;
+    const GeneticResult confident = search(scene, {}, adaptive, 1000, 1, kNone);
+    EXPECT_TRUE(confident.found);
+    EXPECT_LE(confident.iterations, 3);
+  }
+}
+
+TEST(GeneticSearch, TheCostIsThatOfThePose) {
+  const Scene scene(0.6, 0.3, 2);
+  const PoseProblem problem(scene.camera, scene.correspondences, 2.0);
+  for (const bool adaptive : {false, true}) {
+    const GeneticResult result = search(scene, {}, adaptive, 300, 3);
+    ASSERT_TRUE(result.found);
+    EXPECT_EQ(result.cost, problem.truncatedCost(result.T_current_reference));
+    EXPECT_LT(result.cost, problem.worstCost());
+  }
+}
+
+TEST(GeneticSearch, AnswersTheSameToTheSameSeed) {
+  const Scene scene(0.6, 0.3, 3);
+  for (const bool adaptive : {false, true}) {
+    EXPECT_TRUE(equal(search(scene, {}, adaptive, 200, 5), search(scene, {}, adaptive, 200, 5)));
+    int different = 0;
+    for (unsigned seed = 6; seed < 10; ++seed)
+      different += !equal(search(scene, {}, adaptive, 200, 5), search(scene, {}, adaptive, 200, seed));
+    EXPECT_GT(different, 0);
+  }
+}
+
+/// The ablation: learning steers the adaptive search, and only that one.
+TEST(GeneticSearch, LearningSteersTheAdaptiveSearchAlone) {
+  const Scene scene(0.7, 0.3, 4);
+  GeneticConsensusOptions without;
+  without.learning = false;
+  int different = 0;
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    different += !equal(search(scene, {}, true, 300, seed), search(scene, without, true, 300, seed));
+    EXPECT_TRUE(equal(search(scene, {}, false, 300, seed), search(scene, without, false, 300, seed)));
+  }
+  EXPECT_GT(different, 0);
+}
+
+/// What was learnt is worth something: with many outliers and few samples, the motion is found more often.
+TEST(GeneticSearch, LearningFindsTheMotionMoreOften) {
+  GeneticConsensusOptions without;
+  without.learning = false;
+  int found_with = 0, found_without = 0;
+  for (unsigned seed = 1; seed <= 150; ++seed) {
+    const Scene scene(0.8, 0.3, 100 + seed);
+    const PoseProblem problem(scene.camera, scene.correspondences, 2.0);
+    const double right = 1.05 * problem.truncatedCost(scene.T_current_reference);
+    found_with += search(scene, {}, true, 150, seed).cost < right;
+    found_without += search(scene, without, true, 150, seed).cost < right;
+  }
+  // Each is a number of successes with a standard deviation of at most 6.
+  EXPECT_GT(found_with, found_without + 6);
+}
+
+TEST(GeneticSearch, RatesAreFixedInGasacAlone) {
+  const Scene scene(0.6, 0.3, 5);
+  GeneticConsensusOptions restless;
+  restless.mutation_rate = 0.9;
+  EXPECT_FALSE(equal(search(scene, {}, false, 300, 1), search(scene, restless, false, 300, 1)));
+  EXPECT_TRUE(equal(search(scene, {}, true, 300, 1), search(scene, restless, true, 300, 1)));
+}
+
+}  // namespace test_genetic_consensus
+}  // namespace sdvo

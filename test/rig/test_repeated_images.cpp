@@ -1,0 +1,80 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <vector>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/rig/repeated_images.hpp"
+
+namespace sdvo {
+namespace test_repeated_images {
+
+StereoFeatures seen(unsigned seed) {
+  StereoFeatures features = synthetic::noFeatures(synthetic::camera());
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> uniform;
+  for (int i = 0; i < 200; ++i)
+    features.append(
+        {640.f * uniform(random), 480.f * uniform(random), 5.f + 20.f * uniform(random), 0.f, 0.f, -1.f, 1.f});
+  return features;
+}
+
+/// The new pair, with those features of the old one that `is_old` has instead.
+template <class IsOld>
+StereoFeatures mixed(const StereoFeatures& before, const StereoFeatures& now, const IsOld& is_old) {
+  StereoFeatures features = synthetic::noFeatures(now.camera);
+  for (const StereoFeatures* from : {&now, &before})
+    for (int i = 0; i < from->count(); ++i)
+      if (is_old(from->u[i], from->v[i]) == (from == &before))
+        features.append({from->u[i], from->v[i], from->disparity[i], 0.f, 0.f, -1.f, 1.f});
+  return features;
+}
+
+template <class IsOld>
+void expectNewRows(const IsOld& is_old) {
+  const StereoFeatures before = seen(1), torn = mixed(before, seen(2), is_old);
+  RepeatedImages images;
+  images.remember(before, false);
+  std::vector<int> expected;
+  for (int i = 0; i < torn.count(); ++i)
+    if (!is_old(torn.u[i], torn.v[i])) expected.push_back(i);
+  EXPECT_EQ(images.newRows(torn), expected);
+}
+
+TEST(RepeatedImages, LeavesOutWhatIsDescribedAcrossTheTear) {
+  const StereoFeatures before = seen(1);
+  StereoFeatures torn = mixed(before, seen(2), [](float, float v) { return v > 240.f; });
+  for (const float v : {200.f, 225.f, 239.f, 240.f}) torn.append({320.f, v, 10.f, 0.f, 40.f, -1.f, 1.f});
+  RepeatedImages images;
+  images.remember(before, false);
+  const std::vector<int> rows = images.newRows(torn);
+  const auto has = [&](int from_last) {
+    return std::find(rows.begin(), rows.end(), torn.count() - from_last) != rows.end();
+  };
+  EXPECT_TRUE(has(4)) << "40 px above, and described within 20 px";
+  for (const int from_last : {3, 2, 1}) EXPECT_FALSE(has(from_last));
+}
+
+TEST(RepeatedImages, LeavesOutTheOldPartOfATornImage) {
+  for (const float border : {100.f, 240.f, 380.f}) {
+    expectNewRows([&](float, float v) { return v > border; });
+    expectNewRows([&](float, float v) { return v < border; });
+  }
+}
+
+TEST(RepeatedImages, KeepsAllRowsOfOtherPairs) {
+  const StereoFeatures before = seen(1), now = seen(2);
+  RepeatedImages images;
+  EXPECT_EQ(static_cast<int>(images.newRows(now).size()), now.count()) << "the first pair";
+  images.remember(before, false);
+  EXPECT_EQ(static_cast<int>(images.newRows(now).size()), now.count());
+  EXPECT_EQ(static_cast<int>(images.newRows(before).size()), before.count()) << "repeated as a whole";
+  // A camera without noise stands, and something moves in the middle of its view.
+  const StereoFeatures mover =
+      mixed(before, now, [](float u, float v) { return u < 200.f || u > 440.f || v < 150.f || v > 330.f; });
+  EXPECT_EQ(static_cast<int>(images.newRows(mover).size()), mover.count());
+}
+
+}  // namespace test_repeated_images
+}  // namespace sdvo

@@ -1,0 +1,143 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/common/se3.hpp"
+#include "stereo_descriptor_vo/rig/right_camera_delay.hpp"
+
+namespace sdvo {
+namespace test_right_camera_delay {
+
+constexpr double kPeriod = 0.05;  // s
+
+/// Points around the camera, as a rig sees them that moves at `velocity` and whose right image is `delay` late.
+StereoFeatures seen(const Vector6d& velocity, double delay, double noise = 0.0, unsigned seed = 1) {
+  StereoFeatures features = synthetic::noFeatures(synthetic::camera());
+  const StereoCamera& camera = features.camera;
+  std::mt19937 random(seed);
+  std::normal_distribution<double> normal;
+  const Eigen::Isometry3d T_later_now = expSE3(delay * velocity).inverse();
+  for (int row = 0; row < 12; ++row)
+    for (int column = 0; column < 16; ++column) {
+      const double u = camera.width * (column + 0.5) / 16.0, v = camera.height * (row + 0.5) / 12.0;
+      const double disparity = 20.0 + 3.0 * ((5 * row + 3 * column) % 9);
+      const Eigen::Vector3d right = camera.project(T_later_now * camera.backProject(u, v, disparity));
+      features.append({static_cast<float>(u), static_cast<float>(v), static_cast<float>(u - right.z()),
+                       static_cast<float>(right.y() - v + noise * normal(random)), 10.f, -1.f, 1.f});
+    }
+  return features;
+}
+
+/// As the points move in the left image, in step.
+std::vector<RowMotion> rowsOf(const StereoFeatures& features, const Vector6d& velocity) {
+  std::vector<RowMotion> rows;
+  constexpr double kStep = 1e-3;  // s
+  const StereoFeatures later = seen(velocity, kStep), now = seen(velocity, 0.0);
+  for (int i = 0; i < features.count(); ++i) rows.push_back({(later.dv[i] - now.dv[i]) / kStep, features.dv[i]});
+  return rows;
+}
+
+Vector6d velocityAt(double time) {
+  Vector6d velocity;
+  velocity << 0.3, 0.1, 0.8, 0.5 * std::sin(5.0 * time), 1.0 + 0.3 * std::cos(3.0 * time), 0.2 * std::sin(4.0 * time);
+  return velocity;
+}
+
+/// Mean velocity over the interval before the pair.
+Vector6d before(int pair) {
+  return velocityAt(kPeriod * (pair - 0.5));
+}
+
+RightCameraDelay watched(double delay, int pairs) {
+  RightCameraDelay right_delay;
+  for (int k = 0; k < pairs; ++k) {
+    const double noise = 0.1;  // px
+    right_delay.measure(seen(velocityAt(kPeriod * k + 0.5 * delay), delay, noise, 10u + static_cast<unsigned>(k)), {},
+                        kPeriod, before(k));
+  }
+  return right_delay;
+}
+
+TEST(RightCameraDelay, PutsFeaturesInStep) {
+  for (const double delay : {-0.006, 0.006}) {
+    const Vector6d velocity = velocityAt(1.0);
+    const StereoFeatures late = seen(velocity, delay), in_step = seen(velocity, 0.0);
+    const StereoFeatures corrected = RightCameraDelay(delay).inStep(late, kPeriod, velocity);
+    for (int i = 0; i < late.count(); ++i) {
+      EXPECT_NEAR(corrected.disparity[i], in_step.disparity[i], 0.02) << late.disparity[i];
+      EXPECT_NEAR(corrected.dv[i], 0.0, 0.02) << late.dv[i];
+    }
+  }
+}
+
+TEST(RightCameraDelay, KeepsPointsThatNoiseWouldPutBeyondInfinity) {
+  Vector6d turn = Vector6d::Zero();
+  turn[4] = -2.0;
+  StereoFeatures far = seen(Vector6d::Zero(), 0.0);
+  for (float& disparity : far.disparity) disparity = 0.5f;
+  const StereoFeatures corrected = RightCameraDelay(-0.01).inStep(far, kPeriod, turn);
+  ASSERT_EQ(corrected.count(), far.count());
+  for (const float disparity : corrected.disparity) EXPECT_GT(disparity, 0.f);
+}
+
+TEST(RightCameraDelay, FindsADelayAndCompensatesIt) {
+  for (const double delay : {-0.0031, 0.0062}) {
+    const RightCameraDelay found = watched(delay, 60);
+    ASSERT_TRUE(found.estimate());
+    EXPECT_NEAR(found.estimate()->value, delay, 3e-4);
+    EXPECT_NEAR(found.compensated(), delay, 5e-4);
+  }
+  EXPECT_EQ(watched(0.0, 60).compensated(), 0.0);
+}
+
+TEST(RightCameraDelay, WhatIsKnownBeforehandHoldsUntilItIsContradicted) {
+  RightCameraDelay known(-0.003);
+  EXPECT_EQ(known.compensated(), -0.003);
+  for (int k = 0; k < 60; ++k)
+    known.measure(seen(velocityAt(kPeriod * k), 0.0, 0.1, 10u + static_cast<unsigned>(k)), {}, kPeriod, before(k));
+  EXPECT_NEAR(known.compensated(), 0.0, 5e-4);
+}
+
+TEST(RightCameraDelay, WhatWasNotCompensatedMakesThePositionUncertain) {
+  EXPECT_EQ(watched(0.0, 60).drift(), 0.0);
+  const double late = watched(0.0062, 60).drift(), later = watched(0.0124, 60).drift();
+  EXPECT_GT(late, 0.0);
+  EXPECT_NEAR(later / late, 2.0, 0.5) << "until the delay is known, it shifts points in proportion";
+}
+
+TEST(RightCameraDelay, KnowsThePartnerOfAnotherPair) {
+  for (const double delay : {-kPeriod, 0.0, kPeriod, -0.003}) {
+    RightCameraDelay right_delay;
+    const Vector6d velocity = velocityAt(1.0);
+    const StereoFeatures features = seen(velocity, delay, 0.15);
+    right_delay.measure(features, rowsOf(features, velocity), kPeriod, velocity);
+    const bool is_another = std::abs(delay) == kPeriod;
+    EXPECT_EQ(right_delay.partner(kPeriod).log_odds > 0.0, is_another) << delay;
+    if (is_another) {
+      EXPECT_EQ(right_delay.partner(kPeriod).delay, delay);
+    }
+  }
+}
+
+TEST(RightCameraDelay, KnowsThePartnerUntilRowsInStepSayOtherwise) {
+  RightCameraDelay right_delay;
+  const Vector6d velocity = velocityAt(1.0);
+  const auto measure = [&](const StereoFeatures& features, const Vector6d& moved) {
+    right_delay.measure(features, rowsOf(features, moved), kPeriod, moved);
+    return right_delay.partner(kPeriod).log_odds;
+  };
+  const StereoFeatures late = seen(velocity, kPeriod, 0.15);
+  EXPECT_GT(measure(late, velocity), 0.0);
+  EXPECT_GT(measure(seen(Vector6d::Zero(), kPeriod, 0.15), Vector6d::Zero()), 0.0) << "a camera that stands";
+  EXPECT_GT(measure(seen(velocity, 0.0, 0.5), 0.1 * velocityAt(2.0)), -2.9) << "rows that neither explains";
+  EXPECT_LT(measure(seen(velocity, 0.0, 0.15), velocity), 0.0);
+  EXPECT_GT(measure(late, velocity), 0.0);
+  double log_odds = 0.0;
+  for (int pair = 0; pair < 20; ++pair) log_odds = measure(seen(Vector6d::Zero(), kPeriod, 0.15), Vector6d::Zero());
+  EXPECT_LT(log_odds, logOdds(0.05)) << "a camera that stands for long";
+}
+
+}  // namespace test_right_camera_delay
+}  // namespace sdvo
