@@ -444,6 +444,7 @@ VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, cons
   }
   step.covariance = state_.covariance.measure(*step.T_previous_current, candidate.adjustment.since_keyframe,
                                               candidate.adjustment.growth);
+  state_.covariance.expose(candidate.adjustment.by_calibration, candidate.calibration);
   // The motion between two reported poses contains what the map has learnt of the first one meanwhile: a perturbation
   // of the key frame before, then of the newest pair.
   step.correction = adjoint(map.newestPose() * map.poseBeforeNewest().inverse()) *
