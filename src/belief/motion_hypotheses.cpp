@@ -8,8 +8,8 @@
 #include <set>
 #include <utility>
 
-#include "../matching/ascending_rows.hpp"
 #include "stereo_descriptor_vo/belief/motion_doubt.hpp"
+#include "stereo_descriptor_vo/motion/motion_estimator.hpp"
 #include "stereo_descriptor_vo/motion/pose_problem.hpp"
 
 namespace sdvo {
