@@ -1,24 +1,39 @@
 #include "stereo_descriptor_vo/front_end/feature_detector.hpp"
 
+#include <png.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
 #include <numeric>
+#include <opencv2/core.hpp>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
+#include <string>
 #include <tuple>
 #include <utility>
 
-#include "mask_file.hpp"
 #include "opencv_features.hpp"
-#include "stereo_descriptor_vo/front_end/corner_peak.hpp"
 #include "stereo_descriptor_vo/front_end/fast_corners.hpp"
 
 namespace sdvo {
 namespace {
+
+/// A PNG as CV_8U; empty if it cannot be read. What is transparent is black. By libpng: OpenCV's readers bring a
+/// hundred libraries, 40 MB, into every process.
+cv::Mat readMask(const std::string& file) {
+  png_image header{};
+  header.version = PNG_IMAGE_VERSION;
+  if (png_image_begin_read_from_file(&header, file.c_str()) == 0) return {};
+  header.format = PNG_FORMAT_GRAY;
+  // Black, which whatever is transparent lets through.
+  cv::Mat mask = cv::Mat::zeros(static_cast<int>(header.height), static_cast<int>(header.width), CV_8U);
+  const int read = png_image_finish_read(&header, nullptr, mask.data, static_cast<png_int_32>(mask.step), nullptr);
+  return read == 0 ? cv::Mat() : mask;
+}
 
 std::vector<Corner> toCorners(const std::vector<cv::KeyPoint>& keypoints) {
   std::vector<Corner> corners;
