@@ -4,6 +4,8 @@
 #include <filesystem>
 #include <stdexcept>
 
+#include "../check/stamp_check.hpp"
+#include "../config/interface_options.hpp"
 #include "bag_recording.hpp"
 #include "stereo_descriptor_vo/data/euroc_dataset.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
@@ -47,10 +49,22 @@ class FolderRecording : public Recording {
     for (int i = used_ - 1; i >= 0; --i) give(i, ends - sequence_.stamp(i), use);
   }
 
+  ArrivalFindings arrivals(const std::string&) const override {
+    StampCheck check({});
+    for (int i = 0; i < used_; ++i) {
+      const double seconds = 1e-9 * static_cast<double>(sequence_.stamp(i));
+      for (std::size_t input = 0; input < StampCheck::kInputs; ++input) check.note(input, sequence_.stamp(i), seconds);
+      check.notePair(sequence_.stamp(i));
+    }
+    const RateOptions rates;
+    const Finding transform{"TF", Verdict::kOpen, "a folder has none", ""};
+    return {check.topics(rates.min_rate, rates.max_rate, ""), check.stamps(), transform, check.rate(), std::nullopt};
+  }
+
  private:
   void give(int i, std::int64_t stamp, const Use& use) const {
     const ImagePair pair = sequence_.load(i);
-    use({sequence_.camera(), pair.left, pair.right, stamp});
+    use({sequence_.camera(), pair.left, pair.right, stamp, "", ""});
   }
 
   const Sequence sequence_;
@@ -65,6 +79,7 @@ bool isRecording(const std::string& folder) {
 }
 
 std::unique_ptr<Recording> openRecording(const std::string& path, const StereoNames& names) {
+  if (!fs::exists(path)) throw std::runtime_error("there is no '" + path + "'");
   if (fs::is_regular_file(path)) return std::make_unique<BagRecording>(path, names);
   if (const auto mav0 = findMav0(path)) return std::make_unique<FolderRecording<RectifiedEuroc>>(*mav0);
   return std::make_unique<FolderRecording<KittiSequence>>(path);

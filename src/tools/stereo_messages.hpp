@@ -20,7 +20,8 @@ using StereoTopics = std::array<std::string, 4>;
 struct StereoNames {
   std::string camera = "/stereo", left = "left", right = "right", image = "image_rect";
 
-  void addTo(CLI::App& app);
+  /// `scope` begins what --help has of them.
+  void addTo(CLI::App& app, const std::string& scope = "bags: ");
   StereoTopics topics() const;
 };
 
