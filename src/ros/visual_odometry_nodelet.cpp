@@ -8,11 +8,13 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <mutex>
 #include <opencv2/core/utility.hpp>
 #include <optional>
 #include <pluginlib/class_list_macros.hpp>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -435,7 +437,11 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
                         stereo_descriptor_vo::SaveTrajectory::Response& response) try {
     const nav_msgs::Path path = publisher_->path();
     if (path.poses.empty()) throw std::runtime_error("there is no pose to save yet: reason of vo_info says why");
-    saveTrajectory(path, *mount_->last(), request.format, request.path);
+    const std::string file = inRosHome(request.path);
+    if (!options_.output.overwrite && saved_.count(file) == 0 && std::filesystem::exists(file))
+      throw std::runtime_error("'" + file + "' was there before: give another path, or set visual_odometry/overwrite at the start");
+    saveTrajectory(path, *mount_->last(), request.format, file);
+    saved_.insert(file);
     response.success = true;
     response.message = std::to_string(path.poses.size()) + " poses";
     return true;
@@ -461,6 +467,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   std::unique_ptr<OdometryDiagnostics> diagnostics_;
   std::vector<ros::ServiceServer> services_;
   ros::Subscriber pose_subscriber_;
+  std::set<std::string> saved_;  // trajectories' files
   struct Resume {};
   std::atomic<int> starts_{0};  // by services
   Requests<Resume> resumes_;

@@ -446,6 +446,13 @@ class Live(PipelineCase):
         np.testing.assert_allclose(rows[0].reshape(3, 4), np.eye(4)[:3], atol=1e-9)
         self.assertAlmostEqual(rows[3][11], self.odometry[3].pose.pose.position.x)  # the camera looks ahead
         self.assertFalse(self.service('save_trajectory', SaveTrajectory, '/dev/null', 'tum').success)
+        others = os.path.join(directory, 'others.txt')
+        with open(others, 'w') as file:
+            file.write('precious')
+        answer = self.service('save_trajectory', SaveTrajectory, others, 'tum')
+        self.assertFalse(answer.success)
+        self.assertIn(others + "' was there before", answer.message)
+        self.assertEqual(os.path.getsize(others), 8)
         self.assert_alive()
 
     def test_reconfiguring_takes_effect_and_is_clamped(self):
