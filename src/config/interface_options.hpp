@@ -12,8 +12,10 @@ struct RateOptions {
   double max_rate = 66.0;
 
   void describe(OptionList& list) {
-    list.add("min_rate", min_rate, {0.0, 1000.0}, "Hz", "/diagnostics warn when pairs come less often (wall time)");
-    list.add("max_rate", max_rate, {0.0, 10000.0}, "Hz", "/diagnostics warn when pairs come more often (wall time)");
+    list.add("min_rate", min_rate, {0.0, 1000.0}, "Hz",
+             "/diagnostics warn when pairs come less often, by their stamps");
+    list.add("max_rate", max_rate, {0.0, 10000.0}, "Hz",
+             "/diagnostics warn when pairs come more often, by their stamps");
   }
 };
 
@@ -165,7 +167,8 @@ struct PlaceOutputOptions {
              "/diagnostics warn when no pair with odometry has come for longer (wall time)");
     list.add("opencv_threads", opencv_threads, {-1, 256}, "",
              "OpenCV's threads, of the whole process; 0: none beside the caller's, -1: left as they are");
-    list.add("places_file", places_file, "file of save_places to begin with, relative ones below ROS_HOME; empty: with no places");
+    list.add("places_file", places_file,
+             "file of save_places to begin with, relative ones below ROS_HOME; empty: with no places");
     list.add("save_at_shutdown", save_at_shutdown, "write the places to places_file at the end");
     list.add("overwrite", overwrite, "save_places may replace files that are none of its own");
     list.add("robot_name", robot_name, "what other robots know this one by; empty: the namespace");

@@ -29,6 +29,7 @@
 #include "place_publisher.hpp"
 #include "place_session.hpp"
 #include "places_file.hpp"
+#include "stamps.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
 #include "threads.hpp"
 #include "throttles.hpp"
@@ -149,7 +150,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   }
 
   void onPair(const OdometryPair& pair) {
-    diagnostics_->input().note();
+    diagnostics_->input().note(nanoseconds(pair.features->header.stamp));
     if (options_.output.publish_tf)
       transforms_->claim({ros_conversions::cleanFrameId(options_.output.map_frame_id),
                           ros_conversions::cleanFrameId(pair.odometry->header.frame_id)});

@@ -30,10 +30,10 @@ Part makePart(const std::string& name, const std::string& type, std::vector<std:
 }
 
 std::vector<Part> makeParts() {
-  return {makePart("stereo_features", "StereoFeatures", {"image_transport"}, sdvo::StereoInputOptions(),
-                   sdvo::FeatureExtractorOptions()),
-          makePart("visual_odometry", "VisualOdometry", {}, sdvo::OdometryOutputOptions(),
-                   sdvo::VisualOdometryOptions())};
+  return {
+      makePart("stereo_features", "StereoFeatures", {"image_transport"}, sdvo::StereoInputOptions(),
+               sdvo::FeatureExtractorOptions()),
+      makePart("visual_odometry", "VisualOdometry", {}, sdvo::OdometryOutputOptions(), sdvo::VisualOdometryOptions())};
 }
 
 /// `name`: relative to the process's private namespace. False where no nodelet has such a parameter.
