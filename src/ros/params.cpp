@@ -13,22 +13,29 @@
 namespace sdvo {
 namespace {
 
+/// As precise as it is.
+std::string textOf(double number) {
+  std::ostringstream text;
+  text.precision(17);
+  text << number;
+  return text.str();
+}
+
+/// YAML reads `5e0` as text and `2.0` as no integer: what has the same text is the same value.
 void assign(const XmlRpc::XmlRpcValue& parameter, Option& option) {
   using Value = XmlRpc::XmlRpcValue;
   Value value = parameter;  // its conversions are not const
-  const auto wrongType = [&](const char* wanted) { return std::invalid_argument(option.name + " is not " + wanted); };
-  if (auto* b = std::get_if<bool*>(&option.value)) {
-    if (value.getType() != Value::TypeBoolean) throw wrongType("a boolean");
-    **b = static_cast<bool&>(value);
-  } else if (auto* i = std::get_if<int*>(&option.value)) {
-    if (value.getType() != Value::TypeInt) throw wrongType("an integer");
-    **i = static_cast<int&>(value);
-  } else if (auto* d = std::get_if<double*>(&option.value)) {
-    if (value.getType() != Value::TypeDouble && value.getType() != Value::TypeInt) throw wrongType("a number");
-    **d = value.getType() == Value::TypeInt ? static_cast<int&>(value) : static_cast<double&>(value);
-  } else {
-    if (value.getType() != Value::TypeString) throw wrongType("a string");
-    option.set(static_cast<std::string&>(value));
+  switch (value.getType()) {
+    case Value::TypeBoolean:
+      return option.set(static_cast<bool&>(value) ? "true" : "false");
+    case Value::TypeInt:
+      return option.set(std::to_string(static_cast<int&>(value)));
+    case Value::TypeDouble:
+      return option.set(textOf(static_cast<double&>(value)));
+    case Value::TypeString:
+      return option.set(static_cast<std::string&>(value));
+    default:
+      throw std::invalid_argument(option.name + " is a list or a block: one value is expected");
   }
 }
 
@@ -143,14 +150,6 @@ void add(Config& config, const Option& option, const std::string& text) {
     config.doubles.push_back(makeParameter<dynamic_reconfigure::DoubleParameter>(option.name, std::stod(text)));
   else
     config.strs.push_back(makeParameter<dynamic_reconfigure::StrParameter>(option.name, text));
-}
-
-/// As precise as it is.
-std::string textOf(double number) {
-  std::ostringstream text;
-  text.precision(17);
-  text << number;
-  return text.str();
 }
 
 /// The limits that dynamic_reconfigure states for every parameter, also where there are none.

@@ -8,18 +8,22 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <filesystem>
 #include <memory>
 #include <mutex>
 #include <opencv2/core/utility.hpp>
 #include <optional>
 #include <pluginlib/class_list_macros.hpp>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "../check/axes_check.hpp"
 #include "../common/imu_tracks.hpp"
 #include "../common/stamp_filter.hpp"
+#include "../common/text.hpp"
 #include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
 #include "diagnostics.hpp"
@@ -225,7 +229,9 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     const std::string complaint = odometry_->options().alignment.complaint(features.patch_layout.side);
     if (!complaint.empty() && throttle_.allows("patches")) NODELET_WARN_STREAM(complaint);
     odometry_->mountAt(*mount_->last());
-    const OdometryResult result = odometry_->update(features, findGuess(message.header));
+    const std::optional<MotionGuess> guess = findGuess(message.header);
+    const OdometryResult result = odometry_->update(features, guess);
+    if (result.state == TrackingState::kTracking && result.has_motion) compareAxes(result, guess, message.header.stamp);
     processed_stamp_ = message.header.stamp;
     epoch_ = result.epoch;
     report(result, message.header.stamp);
@@ -233,6 +239,21 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     if (publisher_->wantsMap() && result.has_pose)
       publisher_->publishMap(odometry_->mapPoints(), result.T_origin_camera, message.header);
     return result;
+  }
+
+  /// With what the images show.
+  void compareAxes(const OdometryResult& result, const std::optional<MotionGuess>& guess, const ros::Time& stamp) {
+    const auto warnOnce = [this](Finding& told, const Finding& found, const char* consequence) {
+      if (std::exchange(told, found).verdict != Verdict::kWarn && found.verdict == Verdict::kWarn)
+        NODELET_WARN_STREAM(found.step << ": " << found.what << ": " << found.remedy << consequence);
+    };
+    optical_axis_.add(*mount_->last(), result.T_previous_current.translation());
+    warnOnce(optical_found_, optical_axis_.judge(), "");
+    constexpr double kSame = 1e-3;  // s: after an outage the motion is of another time than the guess
+    if (!guess || !guess->rotation_only || std::abs(secondsBetween(*processed_stamp_, stamp) - result.dt) > kSame)
+      return;
+    gyro_axes_.add(guess->T_previous_current.linear(), result.T_previous_current.linear());
+    warnOnce(gyro_found_, gyro_axes_.judge(), " No guess is taken from it until a reset");
   }
 
   OdometryResult waitFor(const std::string& what) const {
@@ -247,7 +268,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     info.dropped_features = worker_->dropped();
     info.out_of_order = out_of_order_;
     info.malformed = malformed_;
-    diagnostics_->note(publisher_->publishInfo(std::move(info), message.header.stamp));
+    info = publisher_->publishInfo(std::move(info), message.header.stamp);
+    diagnostics_->note(info);
+    if (std::abs(info.latency) > kOtherClock && !std::exchange(clock_is_told_, true))
+      NODELET_WARN_STREAM(info.latency << " s from image to pose" << doubtOfLatency(info.latency, kOtherClock));
   }
 
   void report(const OdometryResult& result, const ros::Time& stamp) {
@@ -267,6 +291,9 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
             << (T_odom_start.isApprox(Eigen::Isometry3d::Identity()) ? "the origin" : "the given pose"));
     odometry_->reset();
     mount_->forget();
+    optical_axis_ = {};
+    gyro_axes_ = {};
+    optical_found_ = gyro_found_ = {};
     publisher_->restart(T_odom_start);
     given_start_ = given.has_value();
     levels_until_.reset();
@@ -278,7 +305,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   /// for or knows it.
   std::optional<MotionGuess> findGuess(const std_msgs::Header& header) {
     const bool of_frame = !options_.output.guess_frame_id.empty();
-    if (!processed_stamp_ || (!of_frame && !(imu_ && imu_->hasRates()))) return std::nullopt;
+    if (!processed_stamp_ || (!of_frame && !(imu_ && imu_->hasRates() && gyro_found_.verdict != Verdict::kWarn)))
+      return std::nullopt;
     std::string problem;
     std::optional<MotionGuess> guess;
     const double now = steadyTime(), give_up = now + patience_.timeout(now);
@@ -322,7 +350,14 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     const double now = steadyTime();
     if (!levels_until_) levels_until_ = now + kPatience;
     std::string problem;
-    const auto up = imu_->up(ros_conversions::cleanFrameId(options_.output.base_frame_id), problem);
+    auto up = imu_->up(ros_conversions::cleanFrameId(options_.output.base_frame_id), problem);
+    constexpr double kSteep = 0.7;  // cosine of 45 degrees, between robots on slopes and another mounting (chosen)
+    if (up && up->dot(T_odom_start_.linear().transpose() * Eigen::Vector3d::UnitZ()) < kSteep) {
+      problem = text(2, "by its accelerometer the base is tilted from there, its up is ", up->x(), " ", up->y(), " ",
+                     up->z(), ": is the IMU mounted as TF has its frame? Else give this tilt in initial_pose");
+      up.reset();
+      levels_until_ = now;
+    }
     if (!up && now < *levels_until_) return "roll and pitch of the first pose: " + problem;
     to_be_levelled_ = false;
     if (up) {
@@ -435,7 +470,12 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
                         stereo_descriptor_vo::SaveTrajectory::Response& response) try {
     const nav_msgs::Path path = publisher_->path();
     if (path.poses.empty()) throw std::runtime_error("there is no pose to save yet: reason of vo_info says why");
-    saveTrajectory(path, *mount_->last(), request.format, request.path);
+    const std::string file = inRosHome(request.path);
+    if (!options_.output.overwrite && saved_.count(file) == 0 && std::filesystem::exists(file))
+      throw std::runtime_error("'" + file +
+                               "' was there before: give another path, or set visual_odometry/overwrite at the start");
+    saveTrajectory(path, *mount_->last(), request.format, file);
+    saved_.insert(file);
     response.success = true;
     response.message = std::to_string(path.poses.size()) + " poses";
     return true;
@@ -444,6 +484,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     return true;
   }
 
+  static constexpr double kOtherClock = 3600.0;  // s of latency that no slow machine makes
   /// Messages that wait for this node's own thread, which handles each in no time.
   static constexpr int kArrivalQueue = 20;
 
@@ -461,6 +502,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   std::unique_ptr<OdometryDiagnostics> diagnostics_;
   std::vector<ros::ServiceServer> services_;
   ros::Subscriber pose_subscriber_;
+  std::set<std::string> saved_;  // trajectories' files
   struct Resume {};
   std::atomic<int> starts_{0};  // by services
   Requests<Resume> resumes_;
@@ -481,10 +523,14 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   std::string camera_frame_;
   std::optional<std::uint32_t> processed_epoch_;
   std::optional<ros::Time> processed_stamp_;
-  bool to_be_levelled_ = false;         // T_odom_start_, by the accelerometer
+  bool to_be_levelled_ = false;  // T_odom_start_, by the accelerometer
+  bool clock_is_told_ = false;
   bool given_start_ = false;            // a service gave this run's first pose, which stays as it is
   std::optional<double> levels_until_;  // s, steady time
   Patience patience_{0.0};              // with guesses
+  OpticalAxisCheck optical_axis_;
+  GyroAxesCheck gyro_axes_;
+  Finding optical_found_{}, gyro_found_{};  // as told last
 
   std::unique_ptr<Worker<FeaturesFilter::Passed>> worker_;
   ros::Subscriber subscriber_;

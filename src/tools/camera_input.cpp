@@ -67,8 +67,8 @@ ArrivalFindings CameraInput::findings(const std::string& base_frame) {
   std::optional<Eigen::Isometry3d> T_base_camera;
   std::string problem;
   try {
-    T_base_camera = tf2::transformToEigen(
-        transforms_.lookupTransform(base_frame, ros_conversions::cleanFrameId(frame_), ros::Time(0)));
+    const std::string camera = ros_conversions::cleanFrameId(frame_.value_or(""));
+    T_base_camera = tf2::transformToEigen(transforms_.lookupTransform(base_frame, camera, ros::Time(0)));
   } catch (const tf2::TransformException& e) {
     problem = e.what();
   }
@@ -78,11 +78,13 @@ ArrivalFindings CameraInput::findings(const std::string& base_frame) {
 
 Finding CameraInput::judge(const std::optional<Eigen::Isometry3d>& T_base_camera, const std::string& base_frame,
                            const std::string& problem) const {
-  const std::string step = "TF", camera = ros_conversions::cleanFrameId(frame_);
-  if (frame_.empty()) return {step, Verdict::kOpen, "the images name no frame", "set frame_id in the driver"};
+  const std::string step = "TF";
+  if (!frame_) return {step, Verdict::kOpen, "no image came", "see topics"};
+  const std::string camera = ros_conversions::cleanFrameId(*frame_);
+  if (camera.empty()) return {step, Verdict::kOpen, "the images name no frame", "set frame_id in the driver"};
   if (!T_base_camera)
     return {step, Verdict::kFail, "no transform from " + camera + " to " + base_frame + ": " + problem,
-            "publish it: URDF, or static_transform_publisher; launch/cameras has an argument mount"};
+            "publish it: URDF, or static_transform_publisher; launch/cameras has an argument mount_rpy"};
   const Eigen::Vector3d at = T_base_camera->translation(), ahead = T_base_camera->rotation().col(2);
   const std::string what = text(2, camera, " is at ", at.x(), " ", at.y(), " ", at.z(), " m of ", base_frame,
                                 " and looks along ", ahead.x(), " ", ahead.y(), " ", ahead.z());

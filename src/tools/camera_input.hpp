@@ -7,6 +7,7 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "../check/stamp_check.hpp"
@@ -46,7 +47,7 @@ class CameraInput {
   ArrivalLog arrivals_;
   TriggerSynchroniser<sensor_msgs::Image, sensor_msgs::Image, sensor_msgs::CameraInfo, sensor_msgs::CameraInfo> pairs_;
   tf2::BufferCore transforms_;
-  std::string frame_;  ///< of the left images
+  std::optional<std::string> frame_;  ///< of the left images
 };
 
 template <ArrivalLog::Input input, class Message>

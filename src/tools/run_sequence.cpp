@@ -40,7 +40,7 @@ struct Arguments {
   std::string base_frame = "base_link";
   sdvo::StereoNames names;
   int frames = kAll, threads = 1;
-  bool places = false, shuttle = false, halves = false;
+  bool join = false, places = false, shuttle = false, halves = false;
 };
 
 /// The odometry on a recording, and on two halves of its features.
@@ -150,14 +150,19 @@ sdvo::Finding makePage(const sdvo::Recording& recording, const Drive& drive, con
   std::vector<std::int64_t> stamps;
   for (const auto& frame : drive.whole.frames()) stamps.push_back(frame.odometry.stamp);
   if (!arguments.truth.empty()) report.truth = sdvo::readGroundTruth(arguments.truth, stamps);
-  if (const std::string live = arguments.live.empty() ? input : arguments.live; fs::is_regular_file(live))
-    report.live = sdvo::readLiveRecord(rosbag::Bag(live, rosbag::bagmode::Read));
+  if (const std::string live = arguments.live.empty() ? input : arguments.live; fs::is_regular_file(live)) {
+    rosbag::Bag bag;
+    sdvo::openBag(live, bag);
+    report.live = sdvo::ofBag(live, [&] { return sdvo::readLiveRecord(bag); });
+  }
   sdvo::writeDrivePage(arguments.page, report, drive.whole);
   return judge(report, drive.whole);
 }
 
 int runOne(const Arguments& arguments) {
-  if (arguments.inputs.size() > 1) throw std::runtime_error("several recordings need --output (see --help)");
+  if (arguments.inputs.size() > 1 && !arguments.join)
+    throw std::runtime_error(
+        "several recordings need --output, or --join where they are parts of one drive (see --help)");
   const sdvo::PipelineOptions options = sdvo::readPipelineOptions(arguments.config, arguments.settings);
   std::optional<sdvo::PlaceRun> places;
   if (arguments.places) places.emplace(options.place_recognition);
@@ -170,7 +175,7 @@ int runOne(const Arguments& arguments) {
     way += drive.whole.distance();
     places->startSequence();
   }
-  const auto recording = sdvo::openRecording(arguments.inputs.front(), arguments.names);
+  const auto recording = sdvo::openParts(arguments.inputs, arguments.names);
   Drive drive(options);
   std::optional<Seen> seen;
   if (!arguments.page.empty())
@@ -320,6 +325,7 @@ int main(int argc, char** argv) {
       ->capture_default_str()
       ->check(CLI::Range(1, 256));
   arguments.names.addTo(app);
+  app.add_flag("--join", arguments.join, "the recordings are parts of one drive, as of rosbag record --split");
 
   app.add_option("--page", arguments.page,
                  "HTML page to write: verdict, camera's check, path, states, deviations, times, what the recording "
@@ -338,6 +344,7 @@ int main(int argc, char** argv) {
   app.add_option("--states", arguments.states,
                  "CSV to write, a line for each pair: state, covariances of motion and pose, reason");
   app.add_option("--output", arguments.output, "folder of the results, made where it is missing")
+      ->excludes(app.get_option("--join"))
       ->excludes(app.get_option("--page"))
       ->excludes(app.get_option("--timing"))
       ->excludes(app.get_option("--states"));
