@@ -7,6 +7,12 @@
 
 namespace sdvo {
 
+cv::Mat drawLeft(const RecordedPair& pair, const StereoFeatures& features, const OdometryResult& result) {
+  const cv::Mat both = drawFeatures(pair.left, pair.right, ros_conversions::toMessage(features, DepthScaleOptions()),
+                                    ros_conversions::toFlow(result, features));
+  return both.rowRange(0, pair.left.rows);
+}
+
 void DrivePictures::add(const RecordedPair& pair, const StereoFeatures& features, const OdometryResult& result) {
   if (seen_ == 0) first_stamp_ = pair.stamp;
   const bool is_tracking = result.state == TrackingState::kTracking;
@@ -14,10 +20,8 @@ void DrivePictures::add(const RecordedPair& pair, const StereoFeatures& features
   // The first pair has no flow yet.
   const bool is_due = spread_ < kSpread && seen_ >= (2 * spread_ + 1) * pairs_ / (2 * kSpread);
   if (is_end || is_due) {
-    const cv::Mat both = drawFeatures(pair.left, pair.right, ros_conversions::toMessage(features, DepthScaleOptions()),
-                                      ros_conversions::toFlow(result, features));
     const double seconds = 1e-9 * static_cast<double>(pair.stamp - first_stamp_);
-    pictures_.push_back({both.rowRange(0, pair.left.rows).clone(),
+    pictures_.push_back({drawLeft(pair, features, result).clone(),
                          text(1, seconds, " s, ", toString(result.state), is_tracking ? "" : ": ", result.reason)});
   }
   if (is_end) ++ends_;

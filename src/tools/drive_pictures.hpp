@@ -10,6 +10,9 @@
 
 namespace sdvo {
 
+/// The left image of a pair with its features, CV_8UC3.
+cv::Mat drawLeft(const RecordedPair& pair, const StereoFeatures& features, const OdometryResult& result);
+
 /// A dozen left images of a drive with their features: some spread over all pairs, the others where tracking ends for
 /// the first times.
 class DrivePictures {

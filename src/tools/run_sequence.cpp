@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <opencv2/core/utility.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
@@ -16,6 +17,7 @@
 
 #include "../common/progress.hpp"
 #include "../config/pipeline_options.hpp"
+#include "../data/kitti_layout.hpp"
 #include "../data/text_file.hpp"
 #include "camera_check.hpp"
 #include "drive_page.hpp"
@@ -36,7 +38,7 @@ constexpr int kAll = std::numeric_limits<int>::max();
 
 struct Arguments {
   std::vector<std::string> inputs, before, settings;
-  std::string config, format, poses, timing, states, output, odometry, keyframes, truth, page, live;
+  std::string config, format, poses, timing, states, output, odometry, keyframes, truth, page, live, pictures;
   std::string base_frame = "base_link";
   sdvo::StereoNames names;
   int frames = kAll, threads = 1;
@@ -64,11 +66,15 @@ void follow(sdvo::Recording& recording, const Arguments& arguments, Drive& drive
   const int count = std::min(arguments.frames, recording.size());
   if (arguments.output.empty()) progress.emplace(places ? "places" : "odometry", count);
   drive.left_out = recording.forEach(arguments.frames, [&](const sdvo::RecordedPair& pair) {
-    if (arguments.threads > 1 && !places && !arguments.halves && !seen) {
+    if (arguments.threads > 1 && !places && !arguments.halves && !seen && arguments.pictures.empty()) {
       drive.whole.processBeside(pair.camera, pair.left, pair.right, pair.stamp);
     } else {
       const sdvo::StereoFeatures features = drive.whole.process(pair.camera, pair.left, pair.right, pair.stamp);
       if (places) places->process(features, drive.whole.last());
+      if (!arguments.pictures.empty()) {
+        const std::string name = sdvo::kittiFrameName(drive.whole.pairs() - 1) + ".jpg";
+        cv::imwrite((fs::path(arguments.pictures) / name).string(), drawLeft(pair, features, drive.whole.last()));
+      }
       if (seen) seen->check.add(pair, features), seen->pictures.add(pair, features, drive.whole.last());
       if (arguments.halves) {
         const auto rows = halves.split(features, drive.whole.last().flow);
@@ -177,6 +183,7 @@ int runOne(const Arguments& arguments) {
   }
   const auto recording = sdvo::openParts(arguments.inputs, arguments.names);
   Drive drive(options);
+  if (!arguments.pictures.empty()) fs::create_directories(arguments.pictures);
   std::optional<Seen> seen;
   if (!arguments.page.empty())
     seen.emplace(Seen{sdvo::CameraCheck(options, drive.whole),
@@ -333,6 +340,7 @@ int main(int argc, char** argv) {
   app.add_option("--base-frame", arguments.base_frame, "page: the robot's frame on TF of a bag")->capture_default_str();
   app.add_option("--live", arguments.live, "page: bag with vo_info of the drive as it ran; default: the recording")
       ->check(CLI::ExistingFile);
+  app.add_option("--pictures", arguments.pictures, "folder of pictures to write: each left image with its features");
   app.add_option("--poses", arguments.poses, "poses to write, 12 numbers a line");
   app.add_option(
          "--format", arguments.format,
@@ -346,6 +354,7 @@ int main(int argc, char** argv) {
   app.add_option("--output", arguments.output, "folder of the results, made where it is missing")
       ->excludes(app.get_option("--join"))
       ->excludes(app.get_option("--page"))
+      ->excludes(app.get_option("--pictures"))
       ->excludes(app.get_option("--timing"))
       ->excludes(app.get_option("--states"));
   app.add_flag("--shuttle", arguments.shuttle,
