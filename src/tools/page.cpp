@@ -40,7 +40,7 @@ constexpr char kStyle[] =
     ".verdict{color:#fff;padding:.6em .8em;font-size:1.15em;font-weight:bold}.n{color:#666}"
     "table{border-collapse:collapse}td,th{padding:.3em .7em;text-align:left;border-bottom:1px solid #ddd;"
     "vertical-align:top;overflow-wrap:anywhere}.v{color:#fff;font-weight:bold}"
-    ".wide{overflow-x:auto}.wide td{padding:.3em .4em;font-size:.85em}"
+    "td:first-child{overflow-wrap:normal}.wide{overflow-x:auto}.wide td{padding:.3em .4em;font-size:.85em}"
     ".grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,330px),1fr));gap:1em}"
     "figure{margin:0;min-width:0}figcaption{font-size:.85em;margin-bottom:.2em}svg,img{width:100%;display:block}"
     "svg text{font:11px sans-serif;fill:#444}.g{stroke:#e4e4e4;fill:none}.c{fill:none;stroke-width:1.5}"

@@ -731,7 +731,7 @@ TEST_F(Tools, AnyRecordingBecomesAPage) {
   const fs::path page = root_ / "page.html";
   const std::string to_page = " --page " + page.string();
   const std::vector<std::string> all = {"Followed: 4 of 4 pairs have a pose",
-                                        "by itself",
+                                        "implied error",
                                         "shuttle: ",
                                         "halves: ",
                                         "Path from above",
@@ -757,7 +757,7 @@ TEST_F(Tools, AnyRecordingBecomesAPage) {
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   html = readPage(page);
   expectWords(html, all);
-  expectWords(html, {"by the ground truth", "visual_odometry/motion/seed", "default 1"});
+  expectWords(html, {"true error", "visual_odometry/motion/seed", "default 1"});
   EXPECT_EQ(linesOf(readText(poses())).size(), static_cast<std::size_t>(kPairs));
 
   expectError(runSequence(truth), "--page");
@@ -777,7 +777,7 @@ TEST_F(Tools, AGroundTruthWithStampsIsInterpolated) {
                        << " 0 0 0 1\n";
   const std::string arguments = bag("a").string() + " --page " + page.string() + " --ground-truth " + truth.string();
   ASSERT_EQ(run("run_sequence", arguments).exit_code, 0);
-  expectWords(readPage(page), {"by the ground truth", "at the end off by 0.0"});
+  expectWords(readPage(page), {"true error", "at the end off by 0.0"});
   std::ofstream(truth) << "10.0 0 0 0 0 0 0 1\n11.0 0 0 0 0 0 0 1\n";
   expectError(run("run_sequence", arguments), "no poses at the stamps");
 }
