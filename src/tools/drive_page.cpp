@@ -265,7 +265,7 @@ Finding judge(const DriveReport& report, const OfflineRun& run) {
   if (run.pairsWithoutPose() > 0 || run.discontinuities() > 0) {
     if (verdict.verdict != Verdict::kFail) verdict.verdict = Verdict::kWarn;
     verdict.what = text(0, "Interrupted: ", run.pairsWithoutPose(), " of ", run.pairs(), " pairs have no pose, ",
-                        run.discontinuities(), " motions are unknown");
+                        run.discontinuities(), " discontinuities");
   } else {
     verdict.what =
         text(0, "Followed: ", run.pairs(), " of ", run.pairs(), " pairs have a pose, ", tracking, " are TRACKING");

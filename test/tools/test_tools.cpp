@@ -427,7 +427,7 @@ TEST_F(Tools, PartsOfADriveAreJoined) {
     rosbag::Bag whole(bag("whole").string(), rosbag::bagmode::Read);
     rosbag::Bag out[2];
     for (const int part : {0, 1}) out[part].open(parts[part], rosbag::bagmode::Write);
-    const rosbag::View view(whole);
+    rosbag::View view(whole);
     const ros::Time begin = view.getBeginTime();
     for (const rosbag::MessageInstance& message : view)
       out[message.getTime() > begin + ros::Duration(0.25)].write(message.getTopic(), message.getTime(), message);
@@ -584,7 +584,9 @@ TEST_F(Tools, RecordingsCheckThemselves) {
   // The images of a folder are those of its bag.
   const std::string said = runSequence("--shuttle --halves").out;
   for (const std::string& line : linesOf(outcome.out))
-    if (line.rfind("a: ", 0) == 0) EXPECT_NE(said.find("\n" + line.substr(3) + "\n"), std::string::npos) << said;
+    if (line.rfind("a: ", 0) == 0) {
+      EXPECT_NE(said.find("\n" + line.substr(3) + "\n"), std::string::npos) << said;
+    }
 
   ASSERT_EQ(runBags(a.string()).exit_code, 0);
   EXPECT_FALSE(fs::exists(checks)) << "of another run than the poses beside it";
