@@ -32,8 +32,16 @@ Number parseNumber(const std::string& name, const std::string& text) {
   stream.imbue(std::locale::classic());
   Number number{};
   if (!(stream >> number) || !(stream >> std::ws).eof())
-    throw std::invalid_argument(name + " = '" + text + "' is not a number of its type");
+    throw std::invalid_argument(name + " = '" + text + "' is not a number");
   return number;
+}
+
+/// Also where it is written as `1000.0` or `1e3`.
+int parseInteger(const std::string& name, const std::string& text) {
+  const auto number = parseNumber<double>(name, text);
+  if (number != std::trunc(number) || std::abs(number) > std::numeric_limits<int>::max())
+    throw std::invalid_argument(name + " = '" + text + "' is no integer");
+  return static_cast<int>(number);
 }
 
 bool parseBool(const std::string& name, const std::string& text) {
@@ -57,7 +65,7 @@ void Option::set(const std::string& text) {
   if (auto* b = std::get_if<bool*>(&value))
     **b = parseBool(name, text);
   else if (auto* i = std::get_if<int*>(&value))
-    **i = parseNumber<int>(name, text);
+    **i = parseInteger(name, text);
   else if (auto* d = std::get_if<double*>(&value))
     **d = parseNumber<double>(name, text);
   else if (auto* s = std::get_if<std::string*>(&value))

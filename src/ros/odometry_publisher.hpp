@@ -20,7 +20,8 @@ namespace sdvo {
 /// once in a second.
 class OdometryPublisher {
  public:
-  OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOptions& options);
+  /// `tag`: of TransformPublisher.
+  OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOptions& options, std::uint32_t tag);
 
   /// Publishes what the result's state allows: without a pose neither odom (but for zeros, where these are asked for)
   /// nor TF.

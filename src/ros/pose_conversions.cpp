@@ -2,7 +2,8 @@
 
 #include <tf2_eigen/tf2_eigen.h>
 
-#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <locale>
@@ -17,6 +18,44 @@ Matrix6d rotation(const Eigen::Isometry3d& T) {
   Matrix6d both = Matrix6d::Zero();
   both.topLeftCorner<3, 3>() = both.bottomRightCorner<3, 3>() = T.linear();
   return both;
+}
+
+constexpr const char* kAxes[] = {"x", "y", "z", "roll", "pitch", "yaw"};
+
+/// The covariance that a sender meant. Throws std::invalid_argument where there is none.
+Matrix6d meantCovariance(const Matrix6d& sent) {
+  constexpr double kNone = 1e-6;      // m^2, rad^2, for a variance of zero
+  constexpr double kRounding = 1e-3;  // of a correlation, between floats
+  const auto between = [](int i, int j) { return std::string("covariance of ") + kAxes[i] + " and " + kAxes[j]; };
+  Matrix6d meant;
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j <= i; ++j) {
+      const double lower = sent(i, j), upper = sent(j, i);
+      if (!std::isfinite(lower) || !std::isfinite(upper))
+        throw std::invalid_argument("the " + between(i, j) + " is not finite: send a number, 0 if it is not known");
+      if (i == j && lower < 0.0)
+        throw std::invalid_argument(std::string("the covariance's variance of ") + kAxes[i] +
+                                    " is negative: send it in m^2 or rad^2, 0 for 1 mm or 1 mrad");
+      meant(i, j) = meant(j, i) = lower == 0.0 ? upper : upper == 0.0 ? lower : 0.5 * (lower + upper);
+    }
+  meant.diagonal() = (meant.diagonal().array() == 0.0).select(kNone, meant.diagonal());
+  for (int i = 0; i < 6; ++i)
+    for (int j = 0; j < i; ++j) {
+      const double limit = std::sqrt(meant(i, i) * meant(j, j));
+      if (std::abs(meant(i, j)) > (1.0 + kRounding) * limit)
+        throw std::invalid_argument("the " + between(i, j) +
+                                    " exceeds what their variances allow: send |c| <= sigma * sigma");
+      if (std::abs(sent(i, j) - sent(j, i)) > kRounding * limit && sent(i, j) != 0.0 && sent(j, i) != 0.0)
+        throw std::invalid_argument("the " + between(i, j) + " has two values: send the same in both triangles");
+    }
+  // Fully correlated axes, or rounding, leave an eigenvalue near zero.
+  const double least = Eigen::SelfAdjointEigenSolver<Matrix6d>(meant, Eigen::EigenvaluesOnly).eigenvalues()[0];
+  const double largest = meant.diagonal().maxCoeff();
+  if (least < -kRounding * largest)
+    throw std::invalid_argument(
+        "the covariance is not positive: its correlations contradict each other, send 0 for them");
+  if (least <= 1e-12 * largest) meant.diagonal().array() += 1e-12 * largest - std::min(least, 0.0);
+  return meant;
 }
 
 }  // namespace
@@ -39,7 +78,7 @@ Eigen::Isometry3d toPose(const geometry_msgs::Pose& message) {
   if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
     throw std::invalid_argument("the position is not finite");
   if (!(std::abs(rotation.norm() - 1.0) <= kUnitLength))
-    throw std::invalid_argument("the quaternion has not unit length");
+    throw std::invalid_argument("the quaternion has not unit length: normalise it (w = 1 and the rest 0: no rotation)");
   return Eigen::Translation3d(p.x, p.y, p.z) * rotation.normalized();
 }
 
@@ -53,9 +92,7 @@ geometry_msgs::PoseWithCovariance toMessage(const Eigen::Isometry3d& pose, const
 
 void fromMessage(const geometry_msgs::PoseWithCovariance& message, Eigen::Isometry3d& pose, Matrix6d& covariance) {
   pose = toPose(message.pose);
-  const Matrix6d in_parent = Eigen::Map<const Matrix6d>(message.covariance.data()).transpose();  // it has rows
-  if (!in_parent.allFinite() || in_parent.llt().info() != Eigen::Success)
-    throw std::invalid_argument("a covariance is not finite or not positive");
+  const Matrix6d in_parent = meantCovariance(Eigen::Map<const Matrix6d>(message.covariance.data()));
   covariance = rotation(pose).transpose() * in_parent * rotation(pose);
 }
 

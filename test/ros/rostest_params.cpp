@@ -75,11 +75,18 @@ TEST_F(LoadParams, ReadsEachTypeFromItsPath) {
   EXPECT_EQ(sample.inner.ratio, 0.25);
 }
 
-TEST_F(LoadParams, AWholeNumberIsANumber) {
+TEST_F(LoadParams, NumbersOfTheOtherTypeAreTakenWhereNothingIsLost) {
   nh_.setParam("inner/ratio", 1);
+  nh_.setParam("count", 7.0);
   Sample sample;
   loadParams(nh_, sample);
   EXPECT_EQ(sample.inner.ratio, 1.0);
+  EXPECT_EQ(sample.count, 7);
+  nh_.setParam("inner/ratio", "1e-1");  // a text to YAML
+  nh_.setParam("count", "8");
+  loadParams(nh_, sample);
+  EXPECT_EQ(sample.inner.ratio, 0.1);
+  EXPECT_EQ(sample.count, 8);
 }
 
 TEST_F(LoadParams, RefusesWhatIsOutsideOfItsRange) {
@@ -100,13 +107,13 @@ TEST_F(LoadParams, RefusesOtherTypesByName) {
   EXPECT_EQ(refusal(), "parameter /load_params/flag is not a boolean");
   nh_.setParam("flag", true);
   nh_.setParam("count", 2.5);
-  EXPECT_EQ(refusal(), "parameter /load_params/count is not an integer");
+  EXPECT_EQ(refusal(), "parameter /load_params/count = '2.5' is no integer");
   nh_.setParam("count", 2);
   nh_.setParam("kind", 5);
   EXPECT_EQ(refusal(), "parameter /load_params/kind is not a string");
   nh_.setParam("kind", "a");
   nh_.setParam("inner/ratio", "half");
-  EXPECT_EQ(refusal(), "parameter /load_params/inner/ratio is not a number");
+  EXPECT_EQ(refusal(), "parameter /load_params/inner/ratio = 'half' is not a number");
 }
 
 TEST_F(LoadParams, TheServerShowsWhatIsInUse) {
