@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <filesystem>
 #include <numeric>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/features2d.hpp>
@@ -237,10 +236,11 @@ void FeatureDetectorOptions::check() const {
 
 FeatureDetector::FeatureDetector(const FeatureDetectorOptions& options) : options_(checked(options)) {
   if (options_.mask.empty()) return;
-  mask_ = readMask(options_.mask);
-  if (mask_.empty())
-    throw std::invalid_argument("mask: cannot read a PNG from '" + std::filesystem::absolute(options_.mask).string() +
-                                "'");
+  try {
+    mask_ = readMask(options_.mask);
+  } catch (const std::invalid_argument& e) {
+    throw std::invalid_argument(std::string("mask: ") + e.what());
+  }
 }
 
 std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border, const cv::Mat& mask) const {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "../check/shutter_check.hpp"
+#include "stamps.hpp"
 
 namespace sdvo {
 
@@ -26,14 +27,15 @@ ImageDiagnostics::ImageDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& private
   updater_.add("load", &load_, &WorkLoad::diagnose);
 }
 
-void ImageDiagnostics::notePair(double gap) {
-  input_.note();
+void ImageDiagnostics::notePair(std::int64_t stamp, double gap) {
+  input_.note(stamp);
   const std::lock_guard<std::mutex> lock(mutex_);
   largest_gap_ = std::max(largest_gap_, gap);
 }
 
 void ImageDiagnostics::note(const StereoFeatures& features) {
   const std::lock_guard<std::mutex> lock(mutex_);
+  exposures_.add(features.report.mean_intensity[0]);
   last_ = features.report;
   last_count_ = features.count();
   ++pairs_;
@@ -79,7 +81,9 @@ void ImageDiagnostics::diagnoseExposure(Status& status) {
   const double left = last_->mean_intensity[0], right = last_->mean_intensity[1];
   status.addf("mean grey level", "%.1f left, %.1f right", left, right);
   status.addf("sharpness [grey levels a px]", "%.2f left, %.2f right", last_->sharpness[0], last_->sharpness[1]);
-  if (std::min(left, right) < thresholds_.min_intensity)
+  if (exposures_.takeTurns())
+    status.summary(Level::WARN, "exposures take turns from pair to pair, as in HDR: use one exposure");
+  else if (std::min(left, right) < thresholds_.min_intensity)
     status.summaryf(Level::WARN, "too dark, expose longer or add light: mean grey levels of %.0f and %.0f", left,
                     right);
   else if (std::max(left, right) > thresholds_.max_intensity)
@@ -129,7 +133,7 @@ OdometryDiagnostics::OdometryDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& p
 }
 
 void OdometryDiagnostics::note(const stereo_descriptor_vo::VoInfo& info) {
-  input_.note();
+  input_.note(nanoseconds(info.header.stamp));
   load_.noteDropped(info.dropped_features);
   const std::lock_guard<std::mutex> lock(mutex_);
   last_ = info;
@@ -158,6 +162,11 @@ void OdometryDiagnostics::diagnoseInput(Status& status) {
 std::string doubtOfLatency(double latency, double max_latency) {
   constexpr double kAhead = 0.1;  // s, a step of the slowest simulated clocks (chosen)
   if (std::isnan(latency)) return ": use_sim_time is true, and nobody publishes /clock: rosbag play needs --clock";
+  constexpr double kEpoch = 1e7;  // s, a third of a year
+  if (latency > kEpoch)
+    return ": the images have another clock than this machine: since its boot, or of a recording that is played "
+           "without "
+           "use_sim_time and --clock?";
   if (latency > max_latency) return ": is the machine too slow, or are the clocks of two machines different?";
   if (latency < -kAhead)
     return ": the images are stamped in the future, where TF knows nothing yet: is the camera's clock that of this "

@@ -25,8 +25,8 @@ class ImageDiagnostics {
 
   InputMonitor& input() { return input_; }
   WorkLoad& load() { return load_; }
-  /// Of each pair that came together: how far its stamps are apart, s.
-  void notePair(double gap);
+  /// Of each pair that came together: the left stamp, ns, and how far it is from the right one, s.
+  void notePair(std::int64_t stamp, double gap);
   /// Of each pair that was processed, and of each that could not be, why.
   void note(const StereoFeatures& features);
   void noteFailure(const std::string& why);
@@ -49,6 +49,7 @@ class ImageDiagnostics {
   double largest_gap_ = 0.0;  ///< s, since the task was asked last
   std::optional<ExtractionReport> last_;
   int last_count_ = 0;  ///< of features
+  ExposureTurns exposures_;
   std::string failure_, refused_status_;
   int pairs_ = 0, refused_pairs_ = 0;  ///< since the task was asked last
 

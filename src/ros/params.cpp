@@ -21,25 +21,21 @@ std::string textOf(double number) {
   return text.str();
 }
 
-using Value = XmlRpc::XmlRpcValue;
-
-/// Numbers of the other type, and in quotes, are taken where nothing is lost: YAML reads 1e3 as a text.
-void assign(Value value, Option& option) {
-  const auto wrongType = [&](const char* wanted) { return std::invalid_argument(option.name + " is not " + wanted); };
-  const Value::Type type = value.getType();
-  if (auto* b = std::get_if<bool*>(&option.value)) {
-    if (type != Value::TypeBoolean) throw wrongType("a boolean");
-    **b = static_cast<bool&>(value);
-  } else if (type == Value::TypeString) {
-    option.set(static_cast<std::string&>(value));
-  } else if (option.isText()) {
-    throw wrongType("a string");
-  } else if (type == Value::TypeInt) {
-    option.set(std::to_string(static_cast<int&>(value)));
-  } else if (type == Value::TypeDouble) {
-    option.set(textOf(static_cast<double&>(value)));
-  } else {
-    throw wrongType("a number");
+/// YAML reads `5e0` as text and `2.0` as no integer: what has the same text is the same value.
+void assign(const XmlRpc::XmlRpcValue& parameter, Option& option) {
+  using Value = XmlRpc::XmlRpcValue;
+  Value value = parameter;  // its conversions are not const
+  switch (value.getType()) {
+    case Value::TypeBoolean:
+      return option.set(static_cast<bool&>(value) ? "true" : "false");
+    case Value::TypeInt:
+      return option.set(std::to_string(static_cast<int&>(value)));
+    case Value::TypeDouble:
+      return option.set(textOf(static_cast<double&>(value)));
+    case Value::TypeString:
+      return option.set(static_cast<std::string&>(value));
+    default:
+      throw std::invalid_argument(option.name + " is a list or a block: one value is expected");
   }
 }
 

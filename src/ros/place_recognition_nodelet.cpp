@@ -24,10 +24,12 @@
 #include "frames.hpp"
 #include "odometry_pair_input.hpp"
 #include "other_robot.hpp"
+#include "output_files.hpp"
 #include "params.hpp"
 #include "place_publisher.hpp"
 #include "place_session.hpp"
 #include "places_file.hpp"
+#include "stamps.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
 #include "threads.hpp"
 #include "throttles.hpp"
@@ -48,6 +50,12 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     disk_callbacks_.stop();
     if (observer_) observer_->stop();
     if (optimiser_) optimiser_->stop();
+    if (options_.output.save_at_shutdown && input_) try {
+        const std::string path = map_file_.empty() ? inRosHome(options_.output.places_file) : map_file_;
+        NODELET_INFO_STREAM(save(path) << " in '" << path << "'");
+      } catch (const std::exception& e) {
+        NODELET_ERROR_STREAM("the map is not saved at the end: " << e.what());
+      }
   }
 
  private:
@@ -85,7 +93,9 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     if (output.opencv_threads >= 0) cv::setNumThreads(output.opencv_threads);
     robot_ = output.robot_name.empty() ? nh_.getNamespace() : output.robot_name;
     session_ = std::make_shared<PlaceSession>(options_.recognition);
-    if (!output.places_file.empty()) begin(output.places_file);
+    if (output.save_at_shutdown && (output.places_file.empty() || options_.recognition.localisation_only))
+      throw std::invalid_argument("save_at_shutdown needs a places_file, and a map that is not localisation_only");
+    if (!output.places_file.empty()) begin(inRosHome(output.places_file));
 
     const std::uint32_t tag = TransformPublisher::tagOf(getName());
     transforms_ = std::make_unique<RobotTransforms>(nh_, std::nullopt, tag, [this](const std::string& what) {
@@ -129,7 +139,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   /// With the places of the parameter's file. On a robot's first day there is none.
   void begin(const std::string& path) {
     map_file_ = path;
-    if (std::filesystem::path(path).is_absolute() && !std::filesystem::exists(path)) {
+    if (!std::filesystem::exists(path)) {
       NODELET_WARN_STREAM("places_file '" << path
                                           << "' does not exist: begins without places, save_places writes such a file");
       return;
@@ -153,7 +163,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   /// Throws std::invalid_argument where the odometry's frame is the map's.
   void onPair(const OdometryPair& pair) {
-    diagnostics_->input().note();
+    diagnostics_->input().note(nanoseconds(pair.features->header.stamp));
     const std::string &map_frame = options_.output.map_frame_id, &odom_frame = pair.odometry->header.frame_id;
     ros_conversions::requireTwoFrames({"map_frame_id", map_frame}, {"the odometry's odom_frame_id", odom_frame});
     if (options_.output.publish_tf)
@@ -326,6 +336,16 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   bool onSavePlaces(stereo_descriptor_vo::SavePlaces::Request& request,
                     stereo_descriptor_vo::SavePlaces::Response& response) try {
+    response.message = save(inRosHome(request.path));
+    response.success = true;
+    return true;
+  } catch (const std::exception& e) {
+    response.message = e.what();
+    return true;
+  }
+
+  /// Says how many.
+  std::string save(const std::string& path) {
     std::unique_lock<std::mutex> lock(mutex_);
     const std::vector<Place> places = session_->places();
     const ros_conversions::MapState state = session_->map();
@@ -336,26 +356,22 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     if (options_.recognition.localisation_only)
       throw std::runtime_error(
           "not saved: localisation_only keeps the map as it is in the file that it was loaded from");
-    savePlaces(places, state, stream, robot_, ros_conversions::cleanFrameId(options_.output.map_frame_id),
-               request.path);
-    response.success = true;
-    response.message = std::to_string(places.size()) + " places";
-    return true;
-  } catch (const std::exception& e) {
-    response.message = e.what();
-    return true;
+    savePlaces(places, state, stream, robot_, ros_conversions::cleanFrameId(options_.output.map_frame_id), path,
+               options_.output.overwrite);
+    return std::to_string(places.size()) + " places";
   }
 
   bool onLoadPlaces(stereo_descriptor_vo::LoadPlaces::Request& request,
                     stereo_descriptor_vo::LoadPlaces::Response& response) try {
-    std::shared_ptr<PlaceSession> loaded = load(request.path);
+    const std::string file = inRosHome(request.path);
+    std::shared_ptr<PlaceSession> loaded = load(file);
     const std::lock_guard<std::mutex> lock(mutex_);
     loaded->refuseOtherCameraThan(*session_);
     response.message = std::to_string(loaded->recognition().places().size()) + " places; " +
                        std::to_string(session_->recognition().places().size()) + " of before are forgotten";
     ++generation_;
     replace(std::move(loaded));
-    map_file_ = request.path;
+    map_file_ = file;
     response.success = true;
     return true;
   } catch (const std::exception& e) {

@@ -178,7 +178,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   void onPair(const StereoPairMessages& pair) {
     const ros::Time stamp = pair.left_image->header.stamp;
     has_pairs_ = true;
-    diagnostics_->notePair(std::abs(secondsBetween(stamp, pair.right_image->header.stamp)));
+    diagnostics_->notePair(nanoseconds(stamp), std::abs(secondsBetween(stamp, pair.right_image->header.stamp)));
     const std::uint64_t late = filter_.dropped();
     for (PairFilter::Passed& passed : filter_.add(pair, nanoseconds(stamp), nanoseconds(ros::Time::now())))
       if (pace_.isDue(nanoseconds(passed.item.left_image->header.stamp)) && !worker_->push(std::move(passed)))

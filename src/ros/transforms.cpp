@@ -109,7 +109,7 @@ std::string RobotTransforms::explainMissing(const std::string& base_frame, const
   const std::vector<std::string> above = ancestors(camera_frame);
   const std::string root = above.empty() ? camera_frame : cleanFrameId(above.back());
   return "no transform from camera frame '" + camera_frame + "' to base frame '" + base_frame + "' on TF: publish " +
-         base_frame + " -> " + root + " (static; `mount` of the camera's launch file), or set base_frame_id" +
+         base_frame + " -> " + root + " (static; `mount_rpy` of the camera's launch file), or set base_frame_id" +
          (above.empty() ? "" : " to '" + root + "', where TF has the camera");
 }
 

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <filesystem>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -20,8 +21,10 @@
 #include <utility>
 #include <vector>
 
+#include "../check/axes_check.hpp"
 #include "../common/imu_tracks.hpp"
 #include "../common/stamp_filter.hpp"
+#include "../common/text.hpp"
 #include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
 #include "diagnostics.hpp"
@@ -228,7 +231,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     Guess guess;
     {
       const std::lock_guard<std::mutex> lock(work_mutex_);
-      guess.since = processed_stamp_;
+      const bool is_trusted = !options_.output.guess_frame_id.empty() || gyro_found_.verdict != Verdict::kWarn;
+      if (is_trusted) guess.since = processed_stamp_;
     }
     if (guess.since && mount_->last()) guess.motion = findGuess(*guess.since, header, isVoid);
     return guess;
@@ -272,8 +276,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     const std::string complaint = odometry_->options().alignment.complaint(features.patch_layout.side);
     if (!complaint.empty() && throttle_.allows("patches")) NODELET_WARN_STREAM(complaint);
     odometry_->mountAt(*mount_->last());
-    const bool holds = guess.since == processed_stamp_;  // no jump since
-    const OdometryResult result = odometry_->update(features, holds ? guess.motion : std::nullopt);
+    const std::optional<MotionGuess> motion = guess.since == processed_stamp_ ? guess.motion : std::nullopt;  // no jump
+    const OdometryResult result = odometry_->update(features, motion);
+    if (result.state == TrackingState::kTracking && result.has_motion)
+      compareAxes(result, motion, message.header.stamp);
     processed_stamp_ = message.header.stamp;
     epoch_ = result.epoch;
     report(result, message.header.stamp);
@@ -281,6 +287,21 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     if (publisher_->wantsMap() && result.has_pose)
       publisher_->publishMap(odometry_->mapPoints(), result.T_origin_camera, message.header);
     return result;
+  }
+
+  /// With what the images show.
+  void compareAxes(const OdometryResult& result, const std::optional<MotionGuess>& guess, const ros::Time& stamp) {
+    const auto warnOnce = [this](Finding& told, const Finding& found, const char* consequence) {
+      if (std::exchange(told, found).verdict != Verdict::kWarn && found.verdict == Verdict::kWarn)
+        NODELET_WARN_STREAM(found.step << ": " << found.what << ": " << found.remedy << consequence);
+    };
+    optical_axis_.add(*mount_->last(), result.T_previous_current.translation());
+    warnOnce(optical_found_, optical_axis_.judge(), "");
+    constexpr double kSame = 1e-3;  // s: after an outage the motion is of another time than the guess
+    if (!guess || !guess->rotation_only || std::abs(secondsBetween(*processed_stamp_, stamp) - result.dt) > kSame)
+      return;
+    gyro_axes_.add(guess->T_previous_current.linear(), result.T_previous_current.linear());
+    warnOnce(gyro_found_, gyro_axes_.judge(), " No guess is taken from it until a reset");
   }
 
   OdometryResult waitFor(const std::string& what) const {
@@ -295,7 +316,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     info.dropped_features = unused_->count(UnusedInput::kPushedOut);
     info.out_of_order = unused_->count(UnusedInput::kLate);
     info.malformed = unused_->count(UnusedInput::kRefused);
-    diagnostics_->note(publisher_->publishInfo(std::move(info), message.header.stamp));
+    info = publisher_->publishInfo(std::move(info), message.header.stamp);
+    diagnostics_->note(info);
+    if (std::abs(info.latency) > kOtherClock && !std::exchange(clock_is_told_, true))
+      NODELET_WARN_STREAM(info.latency << " s from image to pose" << doubtOfLatency(info.latency, kOtherClock));
   }
 
   void report(const OdometryResult& result, const ros::Time& stamp) {
@@ -315,6 +339,9 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
             << (T_odom_start.isApprox(Eigen::Isometry3d::Identity()) ? "the origin" : "the given pose"));
     odometry_->reset();
     mount_->forget();
+    optical_axis_ = {};
+    gyro_axes_ = {};
+    optical_found_ = gyro_found_ = {};
     publisher_->restart(T_odom_start);
     given_start_ = given.has_value();
     levels_until_.reset();
@@ -374,7 +401,14 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     const double now = steadyTime();
     if (!levels_until_) levels_until_ = now + kPatience;
     std::string problem;
-    const auto up = imu_->up(ros_conversions::cleanFrameId(options_.output.base_frame_id), problem);
+    auto up = imu_->up(ros_conversions::cleanFrameId(options_.output.base_frame_id), problem);
+    constexpr double kSteep = 0.7;  // cosine of 45 degrees, between robots on slopes and another mounting (chosen)
+    if (up && up->dot(T_odom_start_.linear().transpose() * Eigen::Vector3d::UnitZ()) < kSteep) {
+      problem = text(2, "by its accelerometer the base is tilted from there, its up is ", up->x(), " ", up->y(), " ",
+                     up->z(), ": is the IMU mounted as TF has its frame? Else give this tilt in initial_pose");
+      up.reset();
+      levels_until_ = now;
+    }
     if (!up && now < *levels_until_) return "roll and pitch of the first pose: " + problem;
     to_be_levelled_ = false;
     if (up) {
@@ -486,7 +520,12 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
                         stereo_descriptor_vo::SaveTrajectory::Response& response) try {
     const nav_msgs::Path path = publisher_->path();
     if (path.poses.empty()) throw std::runtime_error("there is no pose to save yet: reason of vo_info says why");
-    saveTrajectory(path, *mount_->last(), request.format, request.path);
+    const std::string file = inRosHome(request.path);
+    if (!options_.output.overwrite && saved_.count(file) == 0 && std::filesystem::exists(file))
+      throw std::runtime_error("'" + file +
+                               "' was there before: give another path, or set visual_odometry/overwrite at the start");
+    saveTrajectory(path, *mount_->last(), request.format, file);
+    saved_.insert(file);
     response.success = true;
     response.message = std::to_string(path.poses.size()) + " poses";
     return true;
@@ -495,6 +534,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     return true;
   }
 
+  static constexpr double kOtherClock = 3600.0;  // s of latency that no slow machine makes
   /// Messages that wait for this node's own thread, which handles each in no time.
   static constexpr int kArrivalQueue = 20;
 
@@ -514,6 +554,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   std::unique_ptr<OdometryDiagnostics> diagnostics_;
   std::vector<ros::ServiceServer> services_;
   ros::Subscriber pose_subscriber_;
+  std::set<std::string> saved_;  // trajectories' files
   struct Resume {};
   std::atomic<int> starts_{0};  // by services
   Requests<Resume> resumes_;
@@ -532,10 +573,14 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   std::string camera_frame_;
   std::optional<std::uint32_t> processed_epoch_;
   std::optional<ros::Time> processed_stamp_;
-  bool to_be_levelled_ = false;         // T_odom_start_, by the accelerometer
+  bool to_be_levelled_ = false;  // T_odom_start_, by the accelerometer
+  bool clock_is_told_ = false;
   bool given_start_ = false;            // a service gave this run's first pose, which stays as it is
   std::optional<double> levels_until_;  // s, steady time
   Patience patience_{0.0};              // with guesses
+  OpticalAxisCheck optical_axis_;
+  GyroAxesCheck gyro_axes_;
+  Finding optical_found_{}, gyro_found_{};  // as told last
 
   std::unique_ptr<Worker<FeaturesFilter::Passed>> worker_;
   std::unique_ptr<PausableInput> input_;

@@ -37,15 +37,22 @@ bool isComplete(const StereoPairMessages& pair) {
 
 }  // namespace
 
-BagRecording::BagRecording(const std::string& path, const StereoNames& names)
-    : bag_(path, rosbag::bagmode::Read), topics_(topicsIn(bag_, names)) {
+BagRecording::BagRecording(const std::string& path, const StereoNames& names) : path_(path) {
+  openBag(path, bag_);
+  topics_ = ofBag(path, [&] { return topicsIn(bag_, names); });
   rosbag::View view(bag_);
-  std::set<std::string> recorded;
-  for (const rosbag::ConnectionInfo* connection : view.getConnections()) recorded.insert(connection->topic);
-  for (const std::string& topic : topics_)
-    if (recorded.count(topic) == 0)
-      throw std::runtime_error("there is no " + topic +
-                               " in it: name the topics by --camera, --left, --right, --image");
+  std::set<std::string> recorded, cameras;
+  for (const rosbag::ConnectionInfo* connection : view.getConnections()) {
+    recorded.insert(connection->topic);
+    if (connection->datatype == "sensor_msgs/Image" || connection->datatype == "sensor_msgs/CompressedImage")
+      cameras.insert(connection->topic);
+  }
+  const auto missing = std::find_if(topics_.begin(), topics_.end(), [&](const auto& t) { return !recorded.count(t); });
+  if (missing == topics_.end()) return;
+  std::string images;
+  for (const std::string& topic : cameras) images += (images.empty() ? "" : ", ") + topic;
+  throw std::runtime_error("'" + path + "' has no " + *missing + "; its images: " + (images.empty() ? "none" : images) +
+                           ": name the topics by --camera, --left, --right, --image");
 }
 
 int BagRecording::size() const {
@@ -53,6 +60,10 @@ int BagRecording::size() const {
 }
 
 int BagRecording::forEach(int limit, const Use& use) {
+  return ofBag(path_, [&] { return useAll(limit, use); });
+}
+
+int BagRecording::useAll(int limit, const Use& use) {
   std::map<ros::Time, Part> waiting;
   StampFilter<Part> filter;
   PairDecoder decoder;
@@ -107,7 +118,7 @@ int BagRecording::forEach(int limit, const Use& use) {
       waiting.erase(waiting.begin());
     }
   }
-  if (used_.empty()) throw std::runtime_error("no pair can be used: " + problem);
+  if (used_.empty()) throw std::runtime_error("'" + path_ + "': no pair can be used: " + problem);
   return unpaired + static_cast<int>(waiting.size() + filter.dropped()) + refused;
 }
 

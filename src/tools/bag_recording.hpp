@@ -35,6 +35,9 @@ class BagRecording : public Recording {
   };
   StereoPairMessages read(const Used& pair) const;
 
+  int useAll(int limit, const Use& use);
+
+  const std::string path_;
   rosbag::Bag bag_;
   StereoTopics topics_;
   std::vector<Used> used_;

@@ -46,8 +46,10 @@ Finding CameraInput::topics() {
 }
 
 Finding CameraInput::transform(const std::string& base_frame) const {
-  const std::string step = "TF", camera = ros_conversions::cleanFrameId(frame_);
-  if (frame_.empty()) return {step, Verdict::kOpen, "the images name no frame", "set frame_id in the driver"};
+  const std::string step = "TF";
+  if (!frame_) return {step, Verdict::kOpen, "no image came", "see topics"};
+  const std::string camera = ros_conversions::cleanFrameId(*frame_);
+  if (camera.empty()) return {step, Verdict::kOpen, "the images name no frame", "set frame_id in the driver"};
   try {
     const Eigen::Isometry3d T_base_camera =
         tf2::transformToEigen(transforms_.lookupTransform(base_frame, camera, ros::Time(0)));
@@ -60,7 +62,7 @@ Finding CameraInput::transform(const std::string& base_frame) const {
     return {step, Verdict::kOk, what, ""};
   } catch (const tf2::TransformException& e) {
     return {step, Verdict::kFail, "no transform from " + camera + " to " + base_frame + ": " + e.what(),
-            "publish it: URDF, or static_transform_publisher; launch/cameras has an argument mount"};
+            "publish it: URDF, or static_transform_publisher; launch/cameras has an argument mount_rpy"};
   }
 }
 

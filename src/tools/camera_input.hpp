@@ -6,6 +6,7 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "../check/stamp_check.hpp"
@@ -38,7 +39,7 @@ class CameraInput {
   ArrivalLog arrivals_;
   TriggerSynchroniser<sensor_msgs::Image, sensor_msgs::Image, sensor_msgs::CameraInfo, sensor_msgs::CameraInfo> pairs_;
   tf2::BufferCore transforms_;
-  std::string frame_;  ///< of the left images
+  std::optional<std::string> frame_;  ///< of the left images
 };
 
 template <ArrivalLog::Input input, class Message>

@@ -89,11 +89,14 @@ int check(const Arguments& arguments) {
     return failed ? 2 : 0;
   };
   if (!arguments.bag.empty()) {
-    const rosbag::Bag bag(arguments.bag, rosbag::bagmode::Read);
-    const sdvo::StereoTopics topics = sdvo::topicsIn(bag, arguments.names);
-    sdvo::CameraInput input(topics, [&](const sdvo::StereoPairMessages& pair) { check.add(pair); });
-    readBag(bag, topics, input);
-    return report(input);
+    rosbag::Bag bag;
+    sdvo::openBag(arguments.bag, bag);
+    return sdvo::ofBag(arguments.bag, [&] {
+      const sdvo::StereoTopics topics = sdvo::topicsIn(bag, arguments.names);
+      sdvo::CameraInput input(topics, [&](const sdvo::StereoPairMessages& pair) { check.add(pair); });
+      readBag(bag, topics, input);
+      return report(input);
+    });
   }
   constexpr std::size_t kWaiting = 100;  // pairs
   sdvo::Worker<sdvo::StereoPairMessages> worker(kWaiting,

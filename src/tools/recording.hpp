@@ -5,6 +5,7 @@
 #include <memory>
 #include <opencv2/core.hpp>
 #include <string>
+#include <vector>
 
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 #include "stereo_messages.hpp"
@@ -40,6 +41,9 @@ class Recording {
 /// A bag, a folder in KITTI's layout, or a raw folder of EuRoC's (ASL), whose images are rectified. Throws
 /// std::runtime_error that names what is wrong.
 std::unique_ptr<Recording> openRecording(const std::string& path, const StereoNames& names);
+
+/// The parts of one drive, as of `rosbag record --split`, in the order of time.
+std::unique_ptr<Recording> openParts(const std::vector<std::string>& paths, const StereoNames& names);
 
 /// Whether a folder is itself a recording, not one of bags.
 bool isRecording(const std::string& folder);

@@ -36,7 +36,7 @@ struct Arguments {
   std::string config, format, poses, timing, states, output, odometry, keyframes, truth;
   sdvo::StereoNames names;
   int frames = kAll, threads = 1;
-  bool places = false, shuttle = false, halves = false;
+  bool join = false, places = false, shuttle = false, halves = false;
 };
 
 /// The odometry on a recording, and on two halves of its features.
@@ -116,7 +116,8 @@ void printErrors(const sdvo::PlaceErrors& errors) {
 }
 
 int runOne(const Arguments& arguments) {
-  if (arguments.inputs.size() > 1) throw std::runtime_error("several recordings need --output (see --help)");
+  if (arguments.inputs.size() > 1 && !arguments.join)
+    throw std::runtime_error("several recordings need --output, or --join where they are parts of one drive (see --help)");
   const sdvo::PipelineOptions options = sdvo::readPipelineOptions(arguments.config, arguments.settings);
   std::optional<sdvo::PlaceRun> places;
   if (arguments.places) places.emplace(options.place_recognition);
@@ -129,7 +130,7 @@ int runOne(const Arguments& arguments) {
     way += drive.whole.distance();
     places->startSequence();
   }
-  const auto recording = sdvo::openRecording(arguments.inputs.front(), arguments.names);
+  const auto recording = sdvo::openParts(arguments.inputs, arguments.names);
   Drive drive(options);
   follow(*recording, arguments, drive, places ? &*places : nullptr);
   const sdvo::OfflineRun& run = drive.whole;
@@ -270,6 +271,7 @@ int main(int argc, char** argv) {
       ->capture_default_str()
       ->check(CLI::Range(1, 256));
   arguments.names.addTo(app);
+  app.add_flag("--join", arguments.join, "the recordings are parts of one drive, as of rosbag record --split");
 
   app.add_option("--poses", arguments.poses, "poses to write, 12 numbers a line");
   app.add_option(
@@ -282,6 +284,7 @@ int main(int argc, char** argv) {
   app.add_option("--states", arguments.states,
                  "CSV to write, a line for each pair: state, covariances of motion and pose, reason");
   app.add_option("--output", arguments.output, "folder of the results, made where it is missing")
+      ->excludes(app.get_option("--join"))
       ->excludes(app.get_option("--timing"))
       ->excludes(app.get_option("--states"));
   app.add_flag("--shuttle", arguments.shuttle,

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <boost/make_shared.hpp>
 #include <cstdint>
+#include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
 #include <vector>
@@ -82,6 +83,11 @@ StereoTopics topicsIn(const rosbag::Bag& bag, const StereoNames& names) {
   for (const std::size_t image : {0u, 1u})
     if (!has(topics[image]) && has(topics[image] + "/compressed")) topics[image] += "/compressed";
   return topics;
+}
+
+void openBag(const std::string& path, rosbag::Bag& bag) {
+  if (!std::filesystem::is_regular_file(path)) throw std::runtime_error("'" + path + "' is no file");
+  ofBag(path, [&] { bag.open(path, rosbag::bagmode::Read); });
 }
 
 StereoMessage readStereoMessage(const rosbag::MessageInstance& instance, const StereoTopics& topics) {

@@ -409,11 +409,59 @@ TEST_F(Tools, BagsOfOtherNamesAndCompressedImages) {
   EXPECT_EQ(runBags(renamed.string(), "--format kitti --camera /camera").exit_code, 0) << "the only one in a namespace";
   EXPECT_EQ(readText(results_ / "renamed.txt"), readText(poses()));
   expectError(runBags(renamed.string(), "--camera /other"), "1 of 1");
-  EXPECT_NE(readText(results_ / "report.csv").find("there is no /other/left/image_rect in it"), std::string::npos);
+  EXPECT_NE(
+      readText(results_ / "report.csv").find("has no /other/left/image_rect; its images: /stereo/left/image_rect, "),
+      std::string::npos);
 
   const std::string checked = run("check_camera", "--bag " + renamed.string() + names).out;
   EXPECT_EQ(checked.rfind("OK   topics", 0), 0u) << checked;
   EXPECT_NE(checked.find("malformed image: 0 bytes"), std::string::npos) << checked;
+}
+
+/// As `rosbag record --split` leaves a drive.
+TEST_F(Tools, PartsOfADriveAreJoined) {
+  ASSERT_EQ(runSequence().exit_code, 0);
+  const std::string parts[] = {(root_ / "drive_0.bag").string(), (root_ / "drive_1.bag").string()};
+  {
+    rosbag::Bag whole(bag("whole").string(), rosbag::bagmode::Read);
+    rosbag::Bag out[2];
+    for (const int part : {0, 1}) out[part].open(parts[part], rosbag::bagmode::Write);
+    const rosbag::View view(whole);
+    const ros::Time begin = view.getBeginTime();
+    for (const rosbag::MessageInstance& message : view)
+      out[message.getTime() > begin + ros::Duration(0.25)].write(message.getTopic(), message.getTime(), message);
+  }
+  const auto joined = [&](const std::string& a, const std::string& b, const std::string& more) {
+    return run("run_sequence", a + " " + b + " --poses " + (root_ / "joined.txt").string() + more);
+  };
+  const Outcome outcome = joined(parts[0], parts[1], " --join --shuttle");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(readText(root_ / "joined.txt"), readText(poses()));
+  expectError(joined(parts[0], parts[1], ""), "--join");
+  expectError(joined(parts[1], parts[0], " --join"), "drive_0.bag' is not later than");
+}
+
+TEST_F(Tools, RecordingsThatCannotBeReadAreNamedWithTheRemedy) {
+  const std::string killed = bag("killed").string(), torn = bag("torn").string(), pipe = (root_ / "pipe.bag").string();
+  {
+    std::fstream file(killed, std::ios::in | std::ios::out | std::ios::binary);
+    std::string head(4096, '\0');
+    file.read(head.data(), 4096);
+    file.seekp(static_cast<std::streamoff>(head.find("index_pos=") + 10));
+    file.write("\0\0\0\0\0\0\0\0", 8);
+  }
+  fs::resize_file(torn, fs::file_size(torn) / 2);
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const std::string poses = " --poses " + (root_ / "none.txt").string();
+  for (const std::string& tool : {"run_sequence " + poses + " ", std::string("check_camera --bag ")}) {
+    const std::string name = tool.substr(0, tool.find(' ')), arguments = tool.substr(tool.find(' '));
+    expectError(run(name, arguments + killed),
+                "killed.bag' has no index, as of a recorder that was killed: rosbag reindex");
+    expectError(run(name, arguments + torn), "torn.bag'");
+    expectError(run(name, arguments + pipe), "pipe.bag' is no file");
+  }
+  expectError(run("run_sequence", "nosuch.bag" + poses), "there is no 'nosuch.bag'");
+  expectError(run("run_sequence", sequence_.string() + poses + " --config " + pipe), "pipe.bag: it is no file");
 }
 
 /// The drive as a raw folder of EuRoC's is rectified on the fly, or by convert.
