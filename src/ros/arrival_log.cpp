@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "../common/text.hpp"
-#include "stamps.hpp"
+#include "../messages/stamps.hpp"
 
 namespace sdvo {
 namespace {

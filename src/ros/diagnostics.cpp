@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "../check/shutter_check.hpp"
-#include "stamps.hpp"
+#include "../messages/stamps.hpp"
 
 namespace sdvo {
 

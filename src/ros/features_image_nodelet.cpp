@@ -8,9 +8,9 @@
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "../messages/image_conversions.hpp"
 #include "camera_finder.hpp"
 #include "features_image.hpp"
-#include "image_conversions.hpp"
 #include "image_subscriber.hpp"
 #include "synchronisers.hpp"
 #include "threads.hpp"

@@ -2,8 +2,8 @@
 
 #include <utility>
 
-#include "frames.hpp"
-#include "stamps.hpp"
+#include "../messages/frames.hpp"
+#include "../messages/stamps.hpp"
 
 namespace sdvo {
 namespace {

@@ -3,9 +3,9 @@
 #include <boost/make_shared.hpp>
 #include <limits>
 
-#include "feature_conversions.hpp"
-#include "frames.hpp"
-#include "stamps.hpp"
+#include "../messages/feature_conversions.hpp"
+#include "../messages/frames.hpp"
+#include "../messages/stamps.hpp"
 
 namespace sdvo {
 

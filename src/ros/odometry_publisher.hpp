@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "../config/interface_options.hpp"
-#include "odometry_conversions.hpp"
+#include "../messages/odometry_conversions.hpp"
 #include "stereo_descriptor_vo/ros/stereo_features_view.hpp"
 #include "transforms.hpp"
 

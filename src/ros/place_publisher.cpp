@@ -5,7 +5,7 @@
 #include <boost/make_shared.hpp>
 #include <utility>
 
-#include "frames.hpp"
+#include "../messages/frames.hpp"
 
 namespace sdvo {
 

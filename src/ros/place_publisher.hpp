@@ -10,7 +10,7 @@
 #include <string>
 
 #include "../config/interface_options.hpp"
-#include "place_conversions.hpp"
+#include "../messages/place_conversions.hpp"
 #include "stereo_descriptor_vo/places/eased_transform.hpp"
 #include "transforms.hpp"
 

@@ -20,8 +20,9 @@
 
 #include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
+#include "../messages/frames.hpp"
+#include "../messages/stamps.hpp"
 #include "diagnostics.hpp"
-#include "frames.hpp"
 #include "odometry_pair_input.hpp"
 #include "other_robot.hpp"
 #include "output_files.hpp"
@@ -29,7 +30,6 @@
 #include "place_publisher.hpp"
 #include "place_session.hpp"
 #include "places_file.hpp"
-#include "stamps.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
 #include "threads.hpp"
 #include "throttles.hpp"

@@ -9,11 +9,11 @@
 #include <utility>
 
 #include "../common/text.hpp"
-#include "feature_conversions.hpp"
-#include "frames.hpp"
-#include "odometry_conversions.hpp"
-#include "pose_conversions.hpp"
-#include "stamps.hpp"
+#include "../messages/feature_conversions.hpp"
+#include "../messages/frames.hpp"
+#include "../messages/odometry_conversions.hpp"
+#include "../messages/pose_conversions.hpp"
+#include "../messages/stamps.hpp"
 
 namespace sdvo {
 

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "../messages/place_conversions.hpp"
 #include "odometry_pair_input.hpp"
-#include "place_conversions.hpp"
 #include "places_file.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
 

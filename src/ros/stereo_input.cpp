@@ -4,7 +4,7 @@
 #include <exception>
 #include <utility>
 
-#include "stamps.hpp"
+#include "../messages/stamps.hpp"
 
 namespace sdvo {
 namespace {

@@ -11,8 +11,8 @@
 #include <utility>
 
 #include "../common/text.hpp"
-#include "frames.hpp"
-#include "stamps.hpp"
+#include "../messages/frames.hpp"
+#include "../messages/stamps.hpp"
 
 namespace sdvo {
 

@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "frames.hpp"
+#include "../messages/frames.hpp"
 
 namespace sdvo {
 

@@ -5,7 +5,7 @@
 #include <limits>
 #include <string>
 
-#include "../../src/ros/pose_conversions.hpp"
+#include "../../src/messages/pose_conversions.hpp"
 
 namespace sdvo::ros_conversions {
 namespace test_pose_conversions {
