@@ -10,9 +10,8 @@
 #include <stdexcept>
 
 #include "../common/stamp_filter.hpp"
-#include "../ros/camera_conversions.hpp"
+#include "../messages/stamps.hpp"
 #include "../ros/pair_decoder.hpp"
-#include "../ros/stamps.hpp"
 #include "camera_input.hpp"
 
 namespace sdvo {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "../common/text.hpp"
-#include "../ros/camera_conversions.hpp"
-#include "../ros/frames.hpp"
+#include "../messages/camera_conversions.hpp"
+#include "../messages/frames.hpp"
 
 namespace sdvo {
 

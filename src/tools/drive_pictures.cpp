@@ -1,9 +1,9 @@
 #include "drive_pictures.hpp"
 
 #include "../common/text.hpp"
-#include "../ros/feature_conversions.hpp"
+#include "../messages/feature_conversions.hpp"
+#include "../messages/odometry_conversions.hpp"
 #include "../ros/features_image.hpp"
-#include "../ros/odometry_conversions.hpp"
 
 namespace sdvo {
 
