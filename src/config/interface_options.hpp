@@ -6,16 +6,19 @@
 
 namespace sdvo {
 
-/// Rates of input that diagnostics take for healthy: 5 to 60 Hz, with a tenth to either side.
+/// Input that diagnostics take for healthy: 5 to 60 Hz, with a tenth to either side, nearly all of it used.
 struct RateOptions {
   double min_rate = 4.5;
   double max_rate = 66.0;
+  double max_unused = 0.05;
 
   void describe(OptionList& list) {
     list.add("min_rate", min_rate, {0.0, 1000.0}, "Hz",
              "/diagnostics warn when pairs come less often, by their stamps");
     list.add("max_rate", max_rate, {0.0, 10000.0}, "Hz",
              "/diagnostics warn when pairs come more often, by their stamps");
+    list.add("max_unused", max_unused, {0.0, 1.0}, "ratio",
+             "/diagnostics and the log warn when more of the last seconds' input is not used");
   }
 };
 
@@ -46,6 +49,7 @@ struct StereoInputOptions {
   int sync_queue_size = 20;
   int queue_size = 1;
   double max_rate = 0.0;
+  bool find_camera = true;
   int opencv_threads = -1;
   double max_silence = 2.0;
   RateOptions rates;
@@ -62,6 +66,9 @@ struct StereoInputOptions {
              "messages kept per input until those that belong to them have come");
     list.add("queue_size", queue_size, {1, 1000}, "", "pairs that wait while one is processed; the newest win");
     list.add("max_rate", max_rate, {0.0, 1000.0}, "Hz", "pairs processed at most, by their stamps; 0: all");
+    list.add("find_camera", find_camera,
+             "while nobody publishes left|right/image_rect, take the only stereo camera in the namespace; in the "
+             "namespace / only where it is set");
     list.add("opencv_threads", opencv_threads, {-1, 256}, "",
              "OpenCV's threads, of the whole process; 0: none beside the caller's, -1: left as they are");
     list.add("max_silence", max_silence, {0.1, 3600.0}, "s",
@@ -150,6 +157,7 @@ struct PlaceOutputOptions {
   std::string robot_name;
   double other_min_score = 0.05;
   double other_timeout = 2.0;
+  bool initialpose_while_mapping = false;
 
   void describe(OptionList& list) {
     list.add("map_frame_id", map_frame_id, "frame of the corrected poses, parent of the odometry's frame");
@@ -175,6 +183,8 @@ struct PlaceOutputOptions {
     list.add("other_min_score", other_min_score, {0.0, 1.0}, "",
              "least likeness of a place of mine for which another robot is asked for its rows");
     list.add("other_timeout", other_timeout, {0.01, 60.0}, "s", "wall time in which another robot must answer");
+    list.add("initialpose_while_mapping", initialpose_while_mapping,
+             "take poses on initialpose also where no map was loaded, or when the robot is found in it already");
   }
 };
 

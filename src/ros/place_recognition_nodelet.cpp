@@ -20,8 +20,9 @@
 
 #include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
+#include "../messages/frames.hpp"
+#include "../messages/stamps.hpp"
 #include "diagnostics.hpp"
-#include "frames.hpp"
 #include "odometry_pair_input.hpp"
 #include "other_robot.hpp"
 #include "output_files.hpp"
@@ -29,11 +30,11 @@
 #include "place_publisher.hpp"
 #include "place_session.hpp"
 #include "places_file.hpp"
-#include "stamps.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
 #include "threads.hpp"
 #include "throttles.hpp"
 #include "transforms.hpp"
+#include "unused_input.hpp"
 
 namespace sdvo {
 
@@ -42,10 +43,11 @@ namespace sdvo {
 class PlaceRecognitionNodelet : public nodelet::Nodelet {
  public:
   ~PlaceRecognitionNodelet() override {
-    if (mount_) mount_->stop();
+    stopping_ = true;
     // Nothing may arrive any more, and nothing be in work, when members go.
     callbacks_.stop();
     slow_callbacks_.stop();
+    disk_callbacks_.stop();
     if (observer_) observer_->stop();
     if (optimiser_) optimiser_->stop();
     if (options_.output.save_at_shutdown && input_) try {
@@ -82,10 +84,12 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     nh_ = callbacks_.serve(getNodeHandle());
     ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
     ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
+    ros::NodeHandle disk_nh = disk_callbacks_.serve(getPrivateNodeHandle());
     ros::NodeHandle other_nh = slow_callbacks_.serve(getNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
       NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect: misspelt? See docs/parameters.md");
     const PlaceOutputOptions& output = options_.output;
+    ros_conversions::requireName({"map_frame_id", output.map_frame_id});
     if (output.opencv_threads >= 0) cv::setNumThreads(output.opencv_threads);
     robot_ = output.robot_name.empty() ? nh_.getNamespace() : output.robot_name;
     session_ = std::make_shared<PlaceSession>(options_.recognition);
@@ -93,29 +97,32 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
       throw std::invalid_argument("save_at_shutdown needs a places_file, and a map that is not localisation_only");
     if (!output.places_file.empty()) begin(inRosHome(output.places_file));
 
-    transforms_ = std::make_unique<RobotTransforms>(nh_, std::nullopt, [this](const std::string& what) {
+    const std::uint32_t tag = TransformPublisher::tagOf(getName());
+    transforms_ = std::make_unique<RobotTransforms>(nh_, std::nullopt, tag, [this](const std::string& what) {
       if (throttle_.allows(what)) NODELET_WARN_STREAM(what);
     });
     mount_ = std::make_unique<CameraMount>(*transforms_, output.tf_timeout);
-    publisher_ = std::make_unique<PlacePublisher>(nh_, output, robot_, [this] { return map(); });
+    publisher_ = std::make_unique<PlacePublisher>(nh_, output, robot_, tag, [this] { return map(); });
     services_ = {private_nh.advertiseService("reset", &PlaceRecognitionNodelet::onReset, this),
                  private_nh.advertiseService("pause", &PlaceRecognitionNodelet::onPause, this),
                  private_nh.advertiseService("resume", &PlaceRecognitionNodelet::onResume, this),
-                 slow_nh.advertiseService("save_places", &PlaceRecognitionNodelet::onSavePlaces, this),
-                 slow_nh.advertiseService("load_places", &PlaceRecognitionNodelet::onLoadPlaces, this),
+                 disk_nh.advertiseService("save_places", &PlaceRecognitionNodelet::onSavePlaces, this),
+                 disk_nh.advertiseService("load_places", &PlaceRecognitionNodelet::onLoadPlaces, this),
                  slow_nh.advertiseService("get_place", &PlaceRecognitionNodelet::onGetPlace, this)};
     observer_ = std::make_unique<Worker<Arrived>>(static_cast<std::size_t>(output.queue_size),
                                                   [this](const Arrived& arrived) { observe(arrived); });
     optimiser_ = std::make_unique<Worker<Job>>(1, [this](const Job& job) { optimise(job); });
     other_ =
         std::make_unique<OtherRobot>(other_nh, robot_, output.other_min_score, output.other_timeout, placesForOthers());
+    unused_ = std::make_unique<UnusedInput>("pairs", RateOptions().max_unused);
     input_ = std::make_unique<OdometryPairInput>(
-        nh_, output.sync_queue_size, [this](const OdometryPair& pair) { onPair(pair); },
+        nh_, output.sync_queue_size, *unused_, [this](const OdometryPair& pair) { onPair(pair); },
         [this](const std::string& topic, const ros::Time& stamp, const std::string& why) {
           if (throttle_.allows(topic + why))
             NODELET_ERROR_STREAM(topic << ": message at " << stamp << " skipped: " << why);
         });
-    diagnostics_ = std::make_unique<PlaceDiagnostics>(nh_, private_nh, getName(), input_->topics(), output.max_silence);
+    diagnostics_ =
+        std::make_unique<PlaceDiagnostics>(nh_, private_nh, getName(), input_->topics(), output.max_silence, *unused_);
     // Ours, and the robot's: that of an rviz beside the camera's namespace.
     for (const std::string& topic :
          {std::string("initialpose"), ros::names::parentNamespace(nh_.getNamespace()) + "/initialpose"})
@@ -123,6 +130,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
           topic, 1, [this](const geometry_msgs::PoseWithCovarianceStamped::ConstPtr& m) { onInitialPose(*m); }));
     callbacks_.start();
     slow_callbacks_.start();
+    disk_callbacks_.start();
   } catch (const std::exception& e) {
     NODELET_FATAL_STREAM("not started: " << e.what());
     throw;  // the manager forgets the nodelet, and its loader ends with an error
@@ -144,17 +152,23 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   void onInitialPose(const geometry_msgs::PoseWithCovarianceStamped& message) try {
     const std::lock_guard<std::mutex> lock(mutex_);
-    session_->expect(message, ros_conversions::cleanFrameId(options_.output.map_frame_id));
+    if (session_->isMapping() && !options_.output.initialpose_while_mapping)
+      throw std::invalid_argument(
+          "it would move the robot while its map grows; set initialpose_while_mapping for that");
+    const std::string map_frame = ros_conversions::cleanFrameId(options_.output.map_frame_id);
+    NODELET_WARN_STREAM("initialpose: " << session_->expect(message, map_frame));
   } catch (const std::exception& e) {
     NODELET_WARN_STREAM("the pose on initialpose is not used: " << e.what());
   }
 
+  /// Throws std::invalid_argument where the odometry's frame is the map's.
   void onPair(const OdometryPair& pair) {
     diagnostics_->input().note(nanoseconds(pair.features->header.stamp));
+    const std::string &map_frame = options_.output.map_frame_id, &odom_frame = pair.odometry->header.frame_id;
+    ros_conversions::requireTwoFrames({"map_frame_id", map_frame}, {"the odometry's odom_frame_id", odom_frame});
     if (options_.output.publish_tf)
-      transforms_->claim({ros_conversions::cleanFrameId(options_.output.map_frame_id),
-                          ros_conversions::cleanFrameId(pair.odometry->header.frame_id)});
-    observer_->push({pair, generation_});
+      transforms_->claim({ros_conversions::cleanFrameId(map_frame), ros_conversions::cleanFrameId(odom_frame)});
+    if (!observer_->push({pair, generation_})) unused_->add(UnusedInput::kPushedOut);
   }
 
   // Recognition, in the observer's thread.
@@ -164,17 +178,24 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     const ros::Time stamp = pair.features->header.stamp;
     const std::optional<Eigen::Isometry3d> T_base_camera = findExtrinsic(pair);
     if (!T_base_camera) return;
-    const std::lock_guard<std::mutex> lock(mutex_);
+    std::unique_lock<std::mutex> lock(mutex_);
     if (arrived.generation != generation_) return;
     const PlaceSession::Time time = session_->noteTime(stamp, ros::Time::now(), ros::Time::isSimTime());
     if (time == PlaceSession::Time::kStands) return;
-    if (time == PlaceSession::Time::kBeganAnew) restart("the clock jumped back", map_file_);
+    if (time == PlaceSession::Time::kBeganAnew) {
+      const std::string file = map_file_;
+      lock.unlock();  // the disk is slow
+      std::shared_ptr<PlaceSession> anew = sessionOf(file);
+      lock.lock();
+      if (arrived.generation != generation_) return;
+      restart("the clock jumped back", std::move(anew));
+    }
     if (time == PlaceSession::Time::kFell)
       NODELET_WARN_STREAM("the stamps of the features jumped back to "
                           << stamp << " (camera driver restarted?): the places stay, the motion in between is unknown");
     if (const std::optional<PlaceReport> report = session_->observe(pair, *T_base_camera)) publish(*report, stamp);
   } catch (const std::exception& e) {
-    ++refused_;
+    unused_->add(UnusedInput::kRefused);
     if (throttle_.allows(e.what()))
       NODELET_ERROR_STREAM("pair at " << arrived.pair.features->header.stamp << " skipped: " << e.what());
   }
@@ -188,6 +209,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     if (before && (before->session != pair.info->session ||
                    (before->epoch != pair.info->epoch && (since_reset <= 0.0 || since_reset < before->distance))))
       mount_->forget();
+    mount_->await(base_frame, camera_frame, [this] { return stopping_ || observer_->isFull(); });
     std::string problem;
     const std::optional<Eigen::Isometry3d> found = mount_->find(base_frame, camera_frame, problem);
     if (!found && throttle_.allows("extrinsic"))
@@ -217,19 +239,22 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     stereo_descriptor_vo::PlaceInfo info = session.info(report);
     info.header.stamp = stamp;
     info.header.frame_id = map_frame;
-    info.dropped_pairs = observer_->dropped();
-    info.unpaired = input_->unpaired();
-    info.malformed = input_->refused() + refused_;
+    info.dropped_pairs = unused_->count(UnusedInput::kPushedOut);
+    info.unpaired = unused_->count(UnusedInput::kUnpaired);
+    info.malformed = unused_->count(UnusedInput::kRefused);
     publisher_->publish(info);
     diagnostics_->note(info);
   }
 
-  /// With the places of `file` alone; empty: with none.
-  void restart(const char* why, const std::string& file) {
+  void restart(const char* why, std::shared_ptr<PlaceSession> anew) {
     NODELET_WARN_STREAM(why << ": " << session_->recognition().places().size() << " places are forgotten"
-                            << (file.empty() ? "" : ", but for those of '" + file + "'"));
-    map_file_ = file;
-    replace(std::filesystem::exists(file) ? load(file) : std::make_shared<PlaceSession>(options_.recognition));
+                            << (map_file_.empty() ? "" : ", but for those of '" + map_file_ + "'"));
+    replace(std::move(anew));
+  }
+
+  /// With the places of a file, where it is there.
+  std::shared_ptr<PlaceSession> sessionOf(const std::string& file) const {
+    return std::filesystem::exists(file) ? load(file) : std::make_shared<PlaceSession>(options_.recognition);
   }
 
   void replace(std::shared_ptr<PlaceSession> session) {
@@ -289,7 +314,8 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   bool onReset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++generation_;
-    restart("reset was called", "");
+    map_file_.clear();
+    restart("reset was called", std::make_shared<PlaceSession>(options_.recognition));
     return true;
   }
 
@@ -373,11 +399,13 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     return true;
   }
 
-  CallbackThread callbacks_, slow_callbacks_;  // the second one of services that take their time
+  CallbackThread callbacks_, slow_callbacks_,
+      disk_callbacks_;  // of services: those that take their time, those of files
   ros::NodeHandle nh_;
   Options options_;
   std::string robot_;
   ReportThrottle throttle_;
+  std::unique_ptr<UnusedInput> unused_;
   std::unique_ptr<RobotTransforms> transforms_;
   std::unique_ptr<CameraMount> mount_;
   std::unique_ptr<PlacePublisher> publisher_;
@@ -389,8 +417,8 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   std::string map_file_;                   // that its first places are from; empty: none
   bool was_located_ = false;               // … and map -> odom is published since then
   std::atomic<int> generation_{0};         // sessions that a service began
-  // Only the observer's thread touches these.
-  std::uint64_t refused_ = 0;  // pairs
+  std::atomic<bool> stopping_{false};
+  // Only the observer's thread touches this.
   stereo_descriptor_vo::VoInfo::ConstPtr mount_of_;
 
   std::unique_ptr<Worker<Arrived>> observer_;

@@ -109,7 +109,8 @@ void savePlaces(const std::vector<Place>& places, const ros_conversions::MapStat
                 const ros_conversions::FeatureStream& stream, const std::string& robot, const std::string& map_frame,
                 const std::string& path, bool overwrite) {
   if (!overwrite && std::filesystem::is_regular_file(path) && !isOfPlaces(path))
-    throw std::runtime_error("'" + path + "' is no file of save_places: give another path, or set place_recognition/overwrite at the start");
+    throw std::runtime_error(
+        "'" + path + "' is no file of save_places: give another path, or set place_recognition/overwrite at the start");
   writeWhole(path, [&](const std::string& partial) {
     OutputBag bag(partial);
     ros::Time newest = ros::TIME_MIN;

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "place_conversions.hpp"
+#include "../messages/place_conversions.hpp"
 
 namespace sdvo {
 

@@ -10,8 +10,8 @@
 #include <stdexcept>
 
 #include "../common/stamp_filter.hpp"
+#include "../messages/stamps.hpp"
 #include "../ros/pair_decoder.hpp"
-#include "../ros/stamps.hpp"
 
 namespace sdvo {
 namespace {

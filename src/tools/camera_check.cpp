@@ -5,8 +5,8 @@
 
 #include "../check/calibration_check.hpp"
 #include "../common/text.hpp"
-#include "../ros/camera_conversions.hpp"
-#include "../ros/stamps.hpp"
+#include "../messages/camera_conversions.hpp"
+#include "../messages/stamps.hpp"
 
 namespace sdvo {
 

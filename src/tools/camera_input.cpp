@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "../common/text.hpp"
-#include "../ros/frames.hpp"
+#include "../messages/frames.hpp"
 
 namespace sdvo {
 

@@ -22,6 +22,7 @@ import rospy
 import rosservice
 import rostest
 import yaml
+from nodelet.srv import NodeletList
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import CameraInfo, Image
 
@@ -318,6 +319,48 @@ class Launch(unittest.TestCase):
             process.terminate()
             process.wait()
             listener.unregister()
+
+    def test_nodelets_in_a_manager_of_others_end_with_their_loaders_or_are_replaced(self):
+        executable = roslib.packages.find_node('nodelet', 'nodelet')[0]
+        manager = subprocess.Popen([executable, 'manager', '__name:=driver', '__ns:=/stereo'])
+        self.addCleanup(manager.kill)
+        names = rospy.ServiceProxy('/stereo/driver/list', NodeletList)
+        names.wait_for_service(60)
+
+        def wait_until(condition):
+            end = time.time() + 60
+            while not condition() and time.time() < end:
+                time.sleep(0.1)
+            return condition()
+
+        def launch(**arguments):
+            return subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch', 'manager:=driver', 'start_manager:=false'] +
+                                    ['%s:=%s' % item for item in arguments.items()], stderr=subprocess.PIPE,
+                                    universal_newlines=True, start_new_session=True)
+
+        def kill(process):
+            """With all its loaders, which say nothing any more."""
+            loaders = subprocess.run(['pgrep', '-P', str(process.pid)], stdout=subprocess.PIPE, universal_newlines=True)
+            for pid in [process.pid] + [int(pid) for pid in loaders.stdout.split()]:
+                os.kill(pid, signal.SIGKILL)
+            process.wait()
+        mine = ['/stereo/features_image', '/stereo/stereo_features', '/stereo/visual_odometry']
+        first = launch()
+        self.assertTrue(wait_until(lambda: sorted(names().nodelets) == mine), names().nodelets)
+        kill(first)
+        self.assertTrue(wait_until(lambda: names().nodelets == []), names().nodelets)
+        second = launch(bond='false')
+        self.assertTrue(wait_until(lambda: sorted(names().nodelets) == mine), names().nodelets)
+        session = self.session()
+        kill(second)
+        third = launch(bond='false')
+        try:
+            self.assertTrue(wait_until(lambda: self.session() not in (None, session)))
+            self.assertEqual(sorted(names().nodelets), mine)
+        finally:
+            third.terminate()
+        self.assertIn('/stereo/visual_odometry of an earlier launch is still in /stereo/driver: it is replaced',
+                      third.communicate()[1])
 
     def test_a_recording_takes_over_from_a_pipeline_of_the_same_namespace(self):
         self.addCleanup(rospy.delete_param, '/use_sim_time')

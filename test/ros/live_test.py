@@ -803,8 +803,10 @@ class Live(PipelineCase):
         load = rospy.ServiceProxy(self.pipeline.manager + '/load_nodelet', NodeletLoad)
         for type_name, name, value in (('StereoFeatures', 'detector/max_features', -1),
                                        ('VisualOdometry', 'initial_pose', 'here'),
+                                       ('VisualOdometry', 'odom_frame_id', '/base_link'), ('VisualOdometry', 'base_frame_id', ''),
+                                       ('VisualOdometry', 'guess_frame_id', 'odom'), ('PlaceRecognition', 'map_frame_id', '/'),
                                        ('PlaceRecognition', 'sync_queue_size', 'many')):
-            nodelet = self.namespace + '/wrong_' + type_name
+            nodelet = '%s/wrong_%s_%s' % (self.namespace, type_name, name.replace('/', '_'))
             rospy.set_param(nodelet + '/' + name, value)
             with self.assertRaises(rospy.ServiceException):  # so nodelet says that it did not load
                 load(nodelet, PACKAGE + '/' + type_name, [], [], [], '')
@@ -953,6 +955,9 @@ class Live(PipelineCase):
             self.assertEqual(a.pose, b.pose)
         self.assertEqual(other_info[-1].epoch, first[-1].epoch)
         self.assertEqual(other_info[-1].distance, first[-1].distance)
+        # But for one transform.
+        self.assertTrue(wait_until(lambda: self.rosout.warned('another nodelet of', 'publishes odom -> base_link')),
+                        self.rosout.warnings)
 
     def test_two_cameras_in_one_manager(self):
         self.start()
