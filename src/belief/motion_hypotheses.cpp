@@ -1,15 +1,17 @@
 #include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <bitset>
 #include <cmath>
 #include <cstddef>
+#include <limits>
+#include <map>
 #include <set>
+#include <tuple>
 #include <utility>
 
+#include "../common/binomial_tail.hpp"
 #include "../matching/ascending_rows.hpp"
-#include "stereo_descriptor_vo/belief/motion_doubt.hpp"
 #include "stereo_descriptor_vo/motion/pose_problem.hpp"
 
 namespace sdvo {
@@ -104,6 +106,55 @@ struct Competitor {
   std::vector<int> rows;  ///< of the pair, that it explains alone
 };
 
+/// A position in the left image, px, and whether a rival alone explains it.
+struct Labelled {
+  Eigen::Vector2d pixel;
+  bool is_rivals;
+};
+
+/// One position for each part of the image and label: neighbours are no independent witnesses.
+std::vector<Labelled> byParts(const StereoFeatures& features, const std::vector<int>& own,
+                              const std::vector<int>& rivals) {
+  std::map<std::tuple<int, int, bool>, std::pair<Eigen::Vector2d, int>> parts;
+  const auto add = [&](const std::vector<int>& rows, bool is_rivals) {
+    for (const int row : rows) {
+      const Eigen::Vector2d pixel(features.u[row], features.v[row]);
+      const Eigen::Array2d part = (pixel / kPart).array().floor();
+      auto& [sum, count] = parts
+                               .try_emplace({static_cast<int>(part.x()), static_cast<int>(part.y()), is_rivals},
+                                            Eigen::Vector2d(0.0, 0.0), 0)
+                               .first->second;
+      sum += pixel, ++count;
+    }
+  };
+  add(own, false);
+  add(rivals, true);
+  std::vector<Labelled> points;
+  for (const auto& [key, mean] : parts) points.push_back({mean.first / mean.second, std::get<2>(key)});
+  return points;
+}
+
+/// Whether a rival's rows are those of an object. An object fills a part of the view: its points have each other for
+/// neighbours. Points that fit another motion because rectification or matching errs lie among those of the chosen
+/// motion. Join counts (Cliff and Ord 1973) against labels at random.
+bool isObject(const StereoFeatures& features, const std::vector<int>& own, const std::vector<int>& rivals) {
+  const std::vector<Labelled> points = byParts(features, own, rivals);
+  int of_rival = 0, joined = 0;
+  for (const Labelled& point : points) {
+    if (!point.is_rivals) continue;
+    ++of_rival;
+    const auto nearest = std::min_element(points.begin(), points.end(), [&](const Labelled& a, const Labelled& b) {
+      const auto distance = [&](const Labelled& other) {
+        return &other == &point ? std::numeric_limits<double>::infinity() : (other.pixel - point.pixel).squaredNorm();
+      };
+      return distance(a) < distance(b);
+    });
+    joined += nearest->is_rivals;
+  }
+  const double chance = static_cast<double>(of_rival) / static_cast<double>(points.size());
+  return of_rival > 1 && binomialTail(of_rival, joined, chance) < kTailProbability;
+}
+
 /// Each motion once.
 std::vector<Competitor> rivalsOf(const MotionScene& scene, double threshold, const MotionHypothesis& chosen,
                                  const std::vector<MotionHypothesis>& hypotheses, const Explanations& explanations,
@@ -118,6 +169,7 @@ std::vector<Competitor> rivalsOf(const MotionScene& scene, double threshold, con
     const int rows = static_cast<int>(rival.rows.size());
     const double chance = chanceOfAgreement(threshold, other.gate);
     if (logFalseAlarms(std::max(left, rows), rows, chance) > std::log(kTailProbability)) continue;
+    if (!isObject(scene.features, own, rival.rows)) continue;
     const auto same = std::find_if(rivals.begin(), rivals.end(),
                                    [&](const Competitor& before) { return areOne(scene, *before.hypothesis, other); });
     if (same == rivals.end())
@@ -217,13 +269,6 @@ bool isTolerable(const MotionScene& scene, const Eigen::Isometry3d& motion, cons
          logSO3(apart.linear()).norm() <= kAngle + kTolerableRatio * logSO3(motion.linear()).norm();
 }
 
-double logBayesFactor(const Vector6d& measured, const Matrix6d& information, const Matrix6d& covariance) {
-  // With A = I + H P the measurement's variance is H^-1 + P = A^T H^-1, so its inverse is H A^-T = A^-1 H.
-  const Eigen::PartialPivLU<Matrix6d> factor(Matrix6d::Identity() + information * covariance);
-  const Vector6d weighted = information * measured;
-  return 0.5 * (measured.dot(weighted) - measured.dot(factor.solve(weighted)) - std::log(factor.determinant()));
-}
-
 double logFalseAlarms(int matches, int inliers, double chance) {
   constexpr int kSample = 3;
   if (inliers <= kSample) return 0.0;
@@ -254,18 +299,19 @@ double logLikelihood(double of_others, int points) {
   return -effectiveNumber(points) * kLogOddsOfSighting * of_others / points;
 }
 
-double logOddsMisled(const MotionScene& scene, const MotionHypothesis& hypothesis) {
+double logAgreement(const MotionScene& scene, const MotionHypothesis& hypothesis) {
   const Agreement& agreement = hypothesis.agreement;
-  double confirmed = 0.0;
-  if (agreement.lasting_matches > 0) {
-    // Agreement with the camera's motion against agreement with one of something that moves.
-    const double by_chance = probabilityOf(-kLogOddsOfSighting * MotionHypothesis::kLastingSightings);
-    const double usual = std::max(scene.usual_agreement, 0.5);
-    const double ratio = static_cast<double>(agreement.lasting_inliers) / agreement.lasting_matches;
-    confirmed = effectiveNumber(agreement.lasting_matches) *
-                (ratio * std::log(usual / by_chance) + (1.0 - ratio) * std::log((1.0 - usual) / (1.0 - by_chance)));
-  }
-  return CarriedDoubt::kUnsuspected - logPrior(hypothesis) - confirmed;
+  if (agreement.lasting_matches == 0) return 0.0;
+  // Agreement with the camera's motion against agreement with one of something that moves.
+  const double by_chance = probabilityOf(-kLogOddsOfSighting * MotionHypothesis::kLastingSightings);
+  const double usual = std::max(scene.usual_agreement, 0.5);
+  const double ratio = static_cast<double>(agreement.lasting_inliers) / agreement.lasting_matches;
+  return effectiveNumber(agreement.lasting_matches) *
+         (ratio * std::log(usual / by_chance) + (1.0 - ratio) * std::log((1.0 - usual) / (1.0 - by_chance)));
+}
+
+double logOddsMisled(const MotionScene& scene, const MotionHypothesis& hypothesis) {
+  return kUnsuspected - logPrior(hypothesis) - logAgreement(scene, hypothesis);
 }
 
 MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::vector<MotionHypothesis> hypotheses) {

@@ -58,14 +58,11 @@ void PoseCovariance::cover(const Vector6d& correction) {
 }
 
 void PoseCovariance::restart(const Matrix6d& travelled) {
-  value_ += discontinuity() + travelled;
-  unmeasured_.setZero();
-  markKeyframe();
+  assume(value_ + discontinuity() + travelled);
 }
 
 void PoseCovariance::markKeyframe() {
-  keyframe_ = value_;
-  predicted_.setZero();
+  keyframe_ = value_ - predicted_;
   since_keyframe_.reset();
 }
 
@@ -94,9 +91,10 @@ Matrix6d PoseCovariance::measure(const Eigen::Isometry3d& T_previous_current, co
   return motion;
 }
 
-void PoseCovariance::doubt(const Matrix6d& covariance) {
-  value_ += covariance;
-  unmeasured_ += covariance;
+void PoseCovariance::doubt(const Matrix6d& motion, const Matrix6d& pose) {
+  value_ += pose;
+  predicted_ += pose;
+  unmeasured_ += motion;
 }
 
 }  // namespace sdvo

@@ -40,8 +40,10 @@ void reportRig(const LearntRig& rig, OdometryResult& result) {
     result.right_delay = delay->value, result.right_delay_sigma = delay->sigma;
   if (const auto rolling = rig.readout.estimate())
     result.readout = rolling->value, result.readout_sigma = rolling->sigma;
-  result.right_rotation = rig.right_rotation.rotation();
-  result.right_rotation_sigma = rig.right_rotation.sigma();
+  if (const auto rotation = rig.usual_rows.rotation()) {
+    result.right_rotation = rotation->value;
+    result.right_rotation_sigma = rotation->covariance.diagonal().cwiseSqrt();
+  }
 }
 
 }  // namespace

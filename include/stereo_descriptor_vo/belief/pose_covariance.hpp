@@ -31,7 +31,7 @@ class PoseCovariance {
   void restart(const Matrix6d& travelled = Matrix6d::Zero());
 
   /// The last pose is another one now, with this covariance: the key frame of a new drive.
-  void assume(const Matrix6d& covariance) {
+  void assume(Matrix6d covariance) {
     *this = PoseCovariance();
     value_ = keyframe_ = covariance;
   }
@@ -51,10 +51,11 @@ class PoseCovariance {
     return measure(T_previous_current, since_keyframe, since_keyframe);
   }
 
-  /// The last pose may be off by more than its measurement says.
-  void doubt(const Matrix6d& covariance);
+  /// The last motion, and the last pose, may be off by more than their measurement says. The next pose that is measured
+  /// in the map takes that back.
+  void doubt(const Matrix6d& motion, const Matrix6d& pose);
 
-  /// The last pose is a key frame of the map: the next ones are measured against it.
+  /// The last pose is a key frame of the map: the next ones are measured against it, whatever it was doubted by.
   void markKeyframe();
 
  private:
@@ -63,8 +64,8 @@ class PoseCovariance {
   Matrix6d value_ = Matrix6d::Zero();
   Matrix6d keyframe_ = Matrix6d::Zero();    ///< of the key frame, as a perturbation of the last pose
   std::optional<Matrix6d> since_keyframe_;  ///< of the last pose, as it was measured; none where it is the key frame
-  Matrix6d predicted_ = Matrix6d::Zero();   ///< of motions since the last measured pose
-  Matrix6d unmeasured_ = Matrix6d::Zero();  ///< of these, and of what the last pose was doubted by
+  Matrix6d predicted_ = Matrix6d::Zero();   ///< of motions since the last measured pose, and of its doubt
+  Matrix6d unmeasured_ = Matrix6d::Zero();  ///< of these motions, and of what the last one was doubted by
 };
 
 }  // namespace sdvo
