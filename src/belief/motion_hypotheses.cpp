@@ -7,7 +7,6 @@
 #include <limits>
 #include <map>
 #include <set>
-#include <tuple>
 #include <utility>
 
 #include "../common/binomial_tail.hpp"
@@ -50,6 +49,40 @@ std::vector<int> sorted(std::vector<int> values) {
   return values;
 }
 
+/// Positions in the left image, px, one for each part of it that has any: neighbours are no independent witnesses.
+std::vector<Eigen::Vector2d> byParts(const std::vector<Eigen::Vector2d>& pixels) {
+  std::map<std::pair<int, int>, std::pair<Eigen::Vector2d, int>> parts;
+  for (const Eigen::Vector2d& pixel : pixels) {
+    const Eigen::Array2i part = (pixel / kPart).array().floor().cast<int>();
+    auto& [sum, count] = parts.try_emplace({part.x(), part.y()}, Eigen::Vector2d(0.0, 0.0), 0).first->second;
+    sum += pixel, ++count;
+  }
+  std::vector<Eigen::Vector2d> means;
+  for (const auto& [part, sum] : parts) means.push_back(sum.first / sum.second);
+  return means;
+}
+
+double nearest(const Eigen::Vector2d& pixel, const std::vector<Eigen::Vector2d>& others) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector2d& other : others)
+    if (&other != &pixel) least = std::min(least, (other - pixel).squaredNorm());
+  return least;
+}
+
+/// Whether some points are those of an object among the others. An object fills a part of the view, so its points have
+/// each other for neighbours. Points that fit another motion because rectification or matching errs lie among the
+/// others. Join counts (Cliff and Ord 1973) against places at random.
+bool isObject(const std::vector<Eigen::Vector2d>& points, const std::vector<Eigen::Vector2d>& others) {
+  const std::vector<Eigen::Vector2d> inside = byParts(points), outside = byParts(others);
+  if (inside.size() < 2) return false;
+  if (outside.empty()) return true;
+  const auto joined = std::count_if(inside.begin(), inside.end(), [&](const Eigen::Vector2d& pixel) {
+    return nearest(pixel, inside) < nearest(pixel, outside);
+  });
+  const double chance = static_cast<double>(inside.size()) / static_cast<double>(inside.size() + outside.size());
+  return binomialTail(static_cast<int>(inside.size()), static_cast<int>(joined), chance) < kTailProbability;
+}
+
 /// The matches that each hypothesis of a pair explains. A match of one hypothesis counts for all of them.
 class Explanations {
  public:
@@ -63,6 +96,7 @@ class Explanations {
         if (!pairs.emplace(match.reference, match.current).second) continue;
         matches.push_back(hypothesis.correspondences[i]);
         sightings_.push_back(hypothesis.sightingsOf(static_cast<int>(i)));
+        pixels_.push_back(hypothesis.correspondences[i].measurement.head<2>());
       }
     const PoseProblem problem(scene.features.camera, matches, threshold);
     for (const MotionHypothesis& hypothesis : hypotheses) {
@@ -73,17 +107,20 @@ class Explanations {
   }
 
   /// Logarithm of how many times likelier one hypothesis is than another one, by prior and by the points that they do
-  /// not agree on.
+  /// not agree on. Those of an object move together; those that lie among each other err one by one.
   double logRatio(std::size_t a, std::size_t b) const {
     double of_a = 0.0, of_b = 0.0;
-    int points = 0;
+    std::vector<Eigen::Vector2d> only_a, only_b;
     for (std::size_t i = 0; i < sightings_.size(); ++i) {
       if (explained_[a][i] == explained_[b][i]) continue;
       (explained_[a][i] ? of_a : of_b) += sightings_[i];
-      ++points;
+      (explained_[a][i] ? only_a : only_b).push_back(pixels_[i]);
     }
-    return logPrior(hypotheses_[a]) - logPrior(hypotheses_[b]) + logLikelihood(of_b, points) -
-           logLikelihood(of_a, points);
+    const int points = static_cast<int>(only_a.size() + only_b.size());
+    const bool is_object = only_a.size() < only_b.size() ? isObject(only_a, only_b) : isObject(only_b, only_a);
+    const double images = is_object ? logLikelihood(of_b, points) - logLikelihood(of_a, points)
+                                    : kLogOddsOfSighting * (of_a - of_b);
+    return logPrior(hypotheses_[a]) - logPrior(hypotheses_[b]) + images;
   }
 
   std::size_t likeliest() const {
@@ -96,6 +133,7 @@ class Explanations {
  private:
   const std::vector<MotionHypothesis>& hypotheses_;
   std::vector<double> sightings_;             ///< of each match
+  std::vector<Eigen::Vector2d> pixels_;       ///< of each match
   std::vector<std::vector<bool>> explained_;  ///< by each hypothesis
 };
 
@@ -105,55 +143,6 @@ struct Competitor {
   double log_ratio;       ///< by how much it is likelier than the chosen one
   std::vector<int> rows;  ///< of the pair, that it explains alone
 };
-
-/// A position in the left image, px, and whether a rival alone explains it.
-struct Labelled {
-  Eigen::Vector2d pixel;
-  bool is_rivals;
-};
-
-/// One position for each part of the image and label: neighbours are no independent witnesses.
-std::vector<Labelled> byParts(const StereoFeatures& features, const std::vector<int>& own,
-                              const std::vector<int>& rivals) {
-  std::map<std::tuple<int, int, bool>, std::pair<Eigen::Vector2d, int>> parts;
-  const auto add = [&](const std::vector<int>& rows, bool is_rivals) {
-    for (const int row : rows) {
-      const Eigen::Vector2d pixel(features.u[row], features.v[row]);
-      const Eigen::Array2d part = (pixel / kPart).array().floor();
-      auto& [sum, count] = parts
-                               .try_emplace({static_cast<int>(part.x()), static_cast<int>(part.y()), is_rivals},
-                                            Eigen::Vector2d(0.0, 0.0), 0)
-                               .first->second;
-      sum += pixel, ++count;
-    }
-  };
-  add(own, false);
-  add(rivals, true);
-  std::vector<Labelled> points;
-  for (const auto& [key, mean] : parts) points.push_back({mean.first / mean.second, std::get<2>(key)});
-  return points;
-}
-
-/// Whether a rival's rows are those of an object. An object fills a part of the view: its points have each other for
-/// neighbours. Points that fit another motion because rectification or matching errs lie among those of the chosen
-/// motion. Join counts (Cliff and Ord 1973) against labels at random.
-bool isObject(const StereoFeatures& features, const std::vector<int>& own, const std::vector<int>& rivals) {
-  const std::vector<Labelled> points = byParts(features, own, rivals);
-  int of_rival = 0, joined = 0;
-  for (const Labelled& point : points) {
-    if (!point.is_rivals) continue;
-    ++of_rival;
-    const auto nearest = std::min_element(points.begin(), points.end(), [&](const Labelled& a, const Labelled& b) {
-      const auto distance = [&](const Labelled& other) {
-        return &other == &point ? std::numeric_limits<double>::infinity() : (other.pixel - point.pixel).squaredNorm();
-      };
-      return distance(a) < distance(b);
-    });
-    joined += nearest->is_rivals;
-  }
-  const double chance = static_cast<double>(of_rival) / static_cast<double>(points.size());
-  return of_rival > 1 && binomialTail(of_rival, joined, chance) < kTailProbability;
-}
 
 /// Each motion once.
 std::vector<Competitor> rivalsOf(const MotionScene& scene, double threshold, const MotionHypothesis& chosen,
@@ -169,7 +158,6 @@ std::vector<Competitor> rivalsOf(const MotionScene& scene, double threshold, con
     const int rows = static_cast<int>(rival.rows.size());
     const double chance = chanceOfAgreement(threshold, other.gate);
     if (logFalseAlarms(std::max(left, rows), rows, chance) > std::log(kTailProbability)) continue;
-    if (!isObject(scene.features, own, rival.rows)) continue;
     const auto same = std::find_if(rivals.begin(), rivals.end(),
                                    [&](const Competitor& before) { return areOne(scene, *before.hypothesis, other); });
     if (same == rivals.end())
