@@ -117,9 +117,9 @@ class Explanations {
       (explained_[a][i] ? only_a : only_b).push_back(pixels_[i]);
     }
     const int points = static_cast<int>(only_a.size() + only_b.size());
-    const bool is_object = only_a.size() < only_b.size() ? isObject(only_a, only_b) : isObject(only_b, only_a);
-    const double images = is_object ? logLikelihood(of_b, points) - logLikelihood(of_a, points)
-                                    : kLogOddsOfSighting * (of_a - of_b);
+    const bool is_object = isObject(only_a, only_b) || isObject(only_b, only_a);
+    const double images =
+        is_object ? logLikelihood(of_b, points) - logLikelihood(of_a, points) : kLogOddsOfSighting * (of_a - of_b);
     return logPrior(hypotheses_[a]) - logPrior(hypotheses_[b]) + images;
   }
 

@@ -51,6 +51,18 @@ bool widen(Matrix6d& covariance, const Vector6d& deviation) {
   return square > noiseGate(6);
 }
 
+Matrix6d PoseCovariance::byCalibration(const CalibrationEstimate& known) const {
+  const RigCalibration::MotionJacobian derivative = exposure_.leftCols<RigCalibration::kParameters>();
+  const Vector6d deviation = derivative * known.mean + exposure_.rightCols<1>();
+  return derivative * known.covariance * derivative.transpose() + deviation * deviation.transpose();
+}
+
+void PoseCovariance::expose(const RigCalibration::MotionJacobian& since_keyframe, const RigCalibration& compensated) {
+  exposure_ = keyframe_exposure_;
+  exposure_.leftCols<RigCalibration::kParameters>() += since_keyframe;
+  exposure_.rightCols<1>() -= since_keyframe * compensated.value;
+}
+
 void PoseCovariance::cover(const Vector6d& correction) {
   const Matrix6d before = value_;
   widen(value_, correction);
@@ -63,6 +75,7 @@ void PoseCovariance::restart(const Matrix6d& travelled) {
 
 void PoseCovariance::markKeyframe() {
   keyframe_ = value_ - predicted_;
+  keyframe_exposure_ = exposure_;
   since_keyframe_.reset();
 }
 
@@ -70,6 +83,8 @@ void PoseCovariance::carry(const Eigen::Isometry3d& T_previous_current) {
   for (Matrix6d* covariance : {&value_, &keyframe_, &predicted_, &unmeasured_})
     *covariance = carriedBy(T_previous_current, *covariance);
   if (since_keyframe_) since_keyframe_ = carriedBy(T_previous_current, *since_keyframe_);
+  for (Exposure* exposure : {&exposure_, &keyframe_exposure_})
+    *exposure = adjoint(T_previous_current.inverse()) * *exposure;
 }
 
 void PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance) {

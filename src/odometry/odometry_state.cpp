@@ -83,7 +83,7 @@ OdometryResult OdometryState::report(const StereoFeatures& features, const std::
   if (step.hasPose()) {
     result.has_pose = true;
     result.T_origin_camera = T_origin_camera;
-    result.pose_covariance = covariance.value();
+    result.pose_covariance = covariance.value() + covariance.byCalibration(rig.calibration.estimate());
     const double drift = rig.right_delay.drift();
     result.pose_covariance.topLeftCorner<3, 3>() += drift * drift * Eigen::Matrix3d::Identity();
     if (known_floor && floor.isOnFloor())

@@ -324,7 +324,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   commit(candidate, belief.probability);
   Step step = measure(found, candidate);
   const Matrix6d measured = step.covariance;
-  judge(found, candidate, belief, step);
+  judge(scene, found, candidate, belief, step);
   const bool is_confirmed = step.state == TrackingState::kTracking;
   // A motion that is likely something else's predicts nothing.
   if (belief.probability >= 0.5)
@@ -387,24 +387,32 @@ VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features,
 }
 
 /// Doubtful is a motion that is the camera's with too small a probability, or that has too large a covariance.
-void VisualOdometry::judge(const MotionHypothesis& found, const Candidate& candidate, const Belief& belief,
-                           Step& step) {
+void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& found, const Candidate& candidate,
+                           const Belief& belief, Step& step) {
   const auto add = [&](const Matrix6d& motion, const Matrix6d& pose) {
     step.covariance += motion;
     state_.covariance.doubt(motion, pose);
   };
   add(found.rivals_moment, found.rivals_moment);
+  Matrix6d covariance = candidate.adjustment.since_keyframe;
   std::string reason;
+  if (found.innovation > noiseGate(6)) {
+    // The stamps may be wrong, or the camera did what none does. The pose does not rest on stamps, but the velocity does.
+    const Vector6d innovation = scene.prior.front().innovation(found.motion.T_current_reference.inverse());
+    covariance += innovation * innovation.transpose();
+    add(innovation * innovation.transpose(), Matrix6d::Zero());
+    reason = innovationWords(found);
+  }
   if (belief.probability < options_.tracking.probability) {
     add(belief.moment, belief.pose_moment);
     reason = belief.reason;
   } else {
-    const double deviation = std::sqrt(candidate.adjustment.since_keyframe.topLeftCorner<3, 3>().trace());
+    const double deviation = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
     if (deviation <= options_.tracking.doubtful_deviation + kTolerableRatio * candidate.distance) return;
     std::ostringstream words;
     words << "a distance of " << candidate.distance << " m with a standard deviation of " << deviation
           << " m exceeds tracking/doubtful_deviation";
-    reason = words.str();
+    if (reason.empty()) reason = words.str();
   }
   step.state = TrackingState::kDegraded;
   step.reason = "doubtful: " + reason;
@@ -413,7 +421,7 @@ void VisualOdometry::judge(const MotionHypothesis& found, const Candidate& candi
 void VisualOdometry::commit(const Candidate& candidate, double probability) {
   std::swap(state_.map, state_.candidate);
   // In doubt, what is followed agrees with itself whatever it is.
-  if (probability < options_.tracking.probability || state_.doubt.lasts()) state_.map->discountNewest();
+  if (probability < options_.tracking.probability) state_.map->discountNewest();
   const LocalMap::Adjustment& adjustment = candidate.adjustment;
   if (!adjustment.success) return;
   state_.rig.calibration.note(state_.map->oldestId(), state_.map->newestId(), candidate.calibration,
@@ -436,6 +444,7 @@ VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, cons
   }
   step.covariance = state_.covariance.measure(*step.T_previous_current, candidate.adjustment.since_keyframe,
                                               candidate.adjustment.growth);
+  state_.covariance.expose(candidate.adjustment.by_calibration, candidate.calibration);
   // The motion between two reported poses contains what the map has learnt of the first one meanwhile: a perturbation
   // of the key frame before, then of the newest pair.
   step.correction = adjoint(map.newestPose() * map.poseBeforeNewest().inverse()) *

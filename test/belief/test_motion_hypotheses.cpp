@@ -14,14 +14,15 @@ Eigen::Isometry3d moved(double x) {
   return Eigen::Isometry3d(Eigen::Translation3d(x, 0.0, 0.0));
 }
 
-/// A pair that matches some points of the world and some of a thing that moved by `thing_x`, m.
+/// A pair that matches some points of the world, on the left, and some of a thing that moved by x on the right.
 class Competition : public ::testing::Test {
  protected:
   void add(int count, double x, int sightings, double depth = 6.0) {
     std::mt19937 random(static_cast<unsigned>(view_->seen.size()));
     std::uniform_real_distribution<double> uniform(-1.0, 1.0);
     for (int i = 0; i < count; ++i) {
-      const Eigen::Vector3d point(4.0 * uniform(random), 2.0 * uniform(random), depth + 2.0 * uniform(random));
+      const double z = depth + 2.0 * uniform(random), side = (x == 0.0 ? -0.5 : 0.5) + 0.45 * uniform(random);
+      const Eigen::Vector3d point(0.5 * side * z, 2.0 * uniform(random), z);
       const int row = static_cast<int>(view_->seen.size());
       all_.matches.push_back({row, row, 0.f});
       all_.correspondences.push_back({point, synthetic::camera().project(moved(x) * point)});

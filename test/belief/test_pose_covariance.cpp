@@ -253,5 +253,52 @@ TEST(PoseCovariance, StaysSymmetricAndPositive) {
   }
 }
 
+/// Ten steps of 2 m, each of them longer by a part of the calibration's error.
+PoseCovariance tenSteps(const RigCalibration& compensated) {
+  PoseCovariance covariance;
+  RigCalibration::MotionJacobian by_calibration = RigCalibration::MotionJacobian::Zero();
+  by_calibration.row(2) << 0.02, 0.005;  // m/px
+  for (int step = 0; step < 10; ++step) {
+    for (const int pair : {0, 1}) {  // of which the second is the key frame
+      covariance.measure(pair == 0 ? forward() : Eigen::Isometry3d::Identity(), diagonal(1e-4, 0.0));
+      covariance.expose(by_calibration, compensated);
+    }
+    covariance.markKeyframe();
+  }
+  return covariance;
+}
+
+TEST(PoseCovariance, TheCalibrationsErrorAddsUpWithTheDistance) {
+  CalibrationEstimate known;
+  known.covariance.diagonal() << 0.09, 0.25;
+  const Matrix6d moment = tenSteps(RigCalibration{}).byCalibration(known);
+  EXPECT_NEAR(std::sqrt(moment(2, 2)), 10.0 * std::hypot(0.02 * 0.3, 0.005 * 0.5), 1e-12);
+  EXPECT_NEAR(moment.trace(), moment(2, 2), 1e-12);
+}
+
+TEST(PoseCovariance, TheCalibrationsErrorIsFromTheOneThatWasCompensated) {
+  RigCalibration compensated;
+  compensated.value << 0.1, -0.2;
+  CalibrationEstimate known;
+  known.mean = compensated.value;
+  EXPECT_LT(tenSteps(compensated).byCalibration(known).norm(), 1e-20);
+  known.mean << 0.3, -0.2;
+  EXPECT_NEAR(std::sqrt(tenSteps(compensated).byCalibration(known)(2, 2)), 10.0 * 0.02 * 0.2, 1e-12);
+}
+
+TEST(PoseCovariance, TheWayBackUndoesTheCalibrationsError) {
+  PoseCovariance covariance = tenSteps(RigCalibration{});
+  CalibrationEstimate known;
+  known.covariance.setIdentity();
+  RigCalibration::MotionJacobian by_calibration = RigCalibration::MotionJacobian::Zero();
+  by_calibration.row(2) << -0.02, -0.005;
+  for (int step = 0; step < 10; ++step) {
+    covariance.measure(forward().inverse(), diagonal(1e-4, 0.0));
+    covariance.expose(by_calibration, RigCalibration{});
+    covariance.markKeyframe();
+  }
+  EXPECT_LT(covariance.byCalibration(known).norm(), 1e-20);
+}
+
 }  // namespace test_pose_covariance
 }  // namespace sdvo

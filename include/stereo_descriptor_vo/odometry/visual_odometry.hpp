@@ -109,7 +109,8 @@ class VisualOdometry {
   Candidate adjust(const StereoFeatures& features, const MotionHypothesis& found, bool may_recall);
   void commit(const Candidate& candidate, double probability);
   Step measure(const MotionHypothesis& found, const Candidate& candidate);
-  void judge(const MotionHypothesis& found, const Candidate& candidate, const Belief& belief, Step& step);
+  void judge(const MotionScene& scene, const MotionHypothesis& found, const Candidate& candidate, const Belief& belief,
+             Step& step);
   void finish(const Pair& pair, Step& step);
 
   VisualOdometryOptions options_;
