@@ -23,15 +23,17 @@ RecordedPair recordedPair(const DecodedPair& decoded, const StereoPairMessages& 
 
 CameraInput::CameraInput(const StereoTopics& topics, std::function<void(const StereoPairMessages&)> use)
     : stamps_(topics),
-      arrivals_(topics, StereoInputOptions()),
+      arrivals_(StereoInputOptions(), unused_),
       pairs_(StereoInputOptions().sync_queue_size, StereoInputOptions().sync_tolerance,
              [this, use = std::move(use)](
                  const sensor_msgs::ImageConstPtr& left, const sensor_msgs::ImageConstPtr& right,
                  const sensor_msgs::CameraInfoConstPtr& left_info, const sensor_msgs::CameraInfoConstPtr& right_info) {
                stamps_.notePair(nanoseconds(left->header.stamp));
-               arrivals_.notePair();
+               arrivals_.notePair(left->header.stamp, right->header.stamp, newest_);
                use({left, right, left_info, right_info});
-             }) {}
+             }) {
+  arrivals_.begin(topics, 0.0);  // long ago: a short recording is judged, too
+}
 
 void CameraInput::add(const StereoMessage& message, const ros::Time& arrival) {
   switch (message.input) {
@@ -72,7 +74,7 @@ ArrivalFindings CameraInput::findings(const std::string& base_frame) {
   } catch (const tf2::TransformException& e) {
     problem = e.what();
   }
-  return {stamps_.topics(rates.min_rate, rates.max_rate, arrivals_.explainSilence()), stamps_.stamps(),
+  return {stamps_.topics(rates.min_rate, rates.max_rate, arrivals_.explainSilence(newest_)), stamps_.stamps(),
           judge(T_base_camera, base_frame, problem), stamps_.rate(), T_base_camera};
 }
 

@@ -44,7 +44,9 @@ class CameraInput {
                 const std::string& problem) const;
 
   StampCheck stamps_;
+  UnusedInput unused_{"messages", 1.0};
   ArrivalLog arrivals_;
+  double newest_ = 0.0;  ///< arrival, s
   TriggerSynchroniser<sensor_msgs::Image, sensor_msgs::Image, sensor_msgs::CameraInfo, sensor_msgs::CameraInfo> pairs_;
   tf2::BufferCore transforms_;
   std::optional<std::string> frame_;  ///< of the left images
@@ -54,7 +56,8 @@ template <ArrivalLog::Input input, class Message>
 void CameraInput::add(const boost::shared_ptr<const Message>& message, const ros::Time& arrival) {
   const ros::Time& stamp = message->header.stamp;
   stamps_.note(input, nanoseconds(stamp), arrival.toSec());
-  arrivals_.note(input, stamp, arrival.toSec());
+  newest_ = arrival.toSec();
+  arrivals_.note(input, stamp, newest_);
   if (input == ArrivalLog::kLeftImage) frame_ = message->header.frame_id;
   if (whyUnusable(stamp).empty()) pairs_.template add<input>(message);
 }
