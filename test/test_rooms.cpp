@@ -32,11 +32,13 @@ const std::map<std::string, std::set<std::string>> kMayInclude = {
     {"data", {"common"}},
     {"config", {"common", "front_end", "motion", "matching", "map", "belief", "rig", "odometry", "places"}},
     {"check", {"common", "front_end", "motion", "matching", "map", "belief", "rig", "odometry"}},
+    {"messages", {"common", "front_end", "motion", "matching", "map", "belief", "rig", "odometry", "places"}},
     {"ros",
-     {"common", "front_end", "motion", "matching", "map", "belief", "rig", "odometry", "places", "config", "check"}},
+     {"common", "front_end", "motion", "matching", "map", "belief", "rig", "odometry", "places", "config", "check",
+      "messages"}},
     {"tools",
      {"common", "front_end", "motion", "matching", "map", "belief", "rig", "odometry", "places", "data", "config",
-      "check", "ros"}},
+      "check", "messages", "ros"}},
 };
 
 /// Rooms that a program without ROS can use.
@@ -288,7 +290,7 @@ TEST(Rooms, EveryPublicHeaderRefusesOlderStandards) {
 
 TEST(Rooms, TheSearchKnowsRosHeaders) {
   for (const char* line :
-       {"#include <ros/ros.h>", "#include \"../ros/pose_conversions.hpp\"", "  #  include <ros/time.h>",
+       {"#include <ros/ros.h>", "#include \"../messages/pose_conversions.hpp\"", "  #  include <ros/time.h>",
         "#include <sensor_msgs/Image.h>", "#include <nav_msgs/Odometry.h>", "#include <tf2/utils.h>",
         "#include <tf2_ros/buffer.h>", "#include <nodelet/nodelet.h>", "#include <cv_bridge/cv_bridge.h>",
         "#include <message_filters/subscriber.h>", "#include <image_transport/image_transport.h>",

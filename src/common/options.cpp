@@ -26,14 +26,21 @@ std::string toText(double value) {
   }
 }
 
-template <class Number>
-Number parseNumber(const std::string& name, const std::string& text) {
+double parseNumber(const std::string& name, const std::string& text) {
   std::istringstream stream(text);
   stream.imbue(std::locale::classic());
-  Number number{};
+  double number{};
   if (!(stream >> number) || !(stream >> std::ws).eof())
-    throw std::invalid_argument(name + " = '" + text + "' is not a number of its type");
+    throw std::invalid_argument(name + " = '" + text + "' is not a number");
   return number;
+}
+
+/// `1000.0` and `1e3` are whole numbers, too.
+int parseInteger(const std::string& name, const std::string& text) {
+  const double number = parseNumber(name, text);
+  if (number != std::trunc(number) || std::abs(number) > std::numeric_limits<int>::max())
+    throw std::invalid_argument(name + " = '" + text + "' is not a whole number");
+  return static_cast<int>(number);
 }
 
 bool parseBool(const std::string& name, const std::string& text) {
@@ -57,9 +64,9 @@ void Option::set(const std::string& text) {
   if (auto* b = std::get_if<bool*>(&value))
     **b = parseBool(name, text);
   else if (auto* i = std::get_if<int*>(&value))
-    **i = parseNumber<int>(name, text);
+    **i = parseInteger(name, text);
   else if (auto* d = std::get_if<double*>(&value))
-    **d = parseNumber<double>(name, text);
+    **d = parseNumber(name, text);
   else if (auto* s = std::get_if<std::string*>(&value))
     **s = text;
   else {

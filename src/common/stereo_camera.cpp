@@ -5,6 +5,8 @@
 #include <string>
 #include <tuple>
 
+#include "text.hpp"
+
 namespace sdvo {
 
 void StereoCamera::check() const {
@@ -12,11 +14,11 @@ void StereoCamera::check() const {
   const auto isPositive = [](double value) { return std::isfinite(value) && value > 0.0; };
   if (width <= 0 || height <= 0)
     refuse("image size " + std::to_string(width) + "x" + std::to_string(height) + " is empty");
-  if (!isPositive(fx)) refuse("fx = " + std::to_string(fx) + " px must be positive (uncalibrated?)");
-  if (!isPositive(fy)) refuse("fy = " + std::to_string(fy) + " px must be positive (uncalibrated?)");
+  if (!isPositive(fx)) refuse(text(6, "fx = ", fx, " px must be positive (uncalibrated?)"));
+  if (!isPositive(fy)) refuse(text(6, "fy = ", fy, " px must be positive (uncalibrated?)"));
   if (!std::isfinite(cx) || !std::isfinite(cy)) refuse("the principal point is not finite");
   if (!isPositive(baseline))
-    refuse("baseline = " + std::to_string(baseline) + " m must be positive (are left and right swapped?)");
+    refuse(text(6, "baseline = ", baseline, " m must be positive (are left and right swapped?)"));
 }
 
 Eigen::Matrix3d StereoCamera::projectionJacobian(const Eigen::Vector3d& point) const {

@@ -2,21 +2,29 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cmath>
 #include <iomanip>
 #include <numeric>
 #include <sstream>
 #include <string>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
 namespace sdvo {
 
-/// Numbers with `digits` after the point, and words between them.
+/// Numbers with `digits` after the point, and words between them. A wild number has an exponent, not hundreds of digits.
 template <class... Parts>
 std::string text(int digits, const Parts&... parts) {
+  constexpr double kWild = 1e12;
   std::ostringstream stream;
-  stream << std::fixed << std::setprecision(digits);
-  (stream << ... << parts);
+  const auto put = [&](const auto& part) {
+    if constexpr (std::is_floating_point_v<std::decay_t<decltype(part)>>)
+      stream << (std::abs(part) < kWild ? std::fixed : std::scientific) << std::setprecision(digits) << part;
+    else
+      stream << part;
+  };
+  (put(parts), ...);
   return stream.str();
 }
 

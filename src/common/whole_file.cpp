@@ -6,7 +6,9 @@
 
 #include <cerrno>
 #include <filesystem>
+#include <random>
 #include <stdexcept>
+#include <string>
 #include <system_error>
 
 namespace fs = std::filesystem;
@@ -44,23 +46,25 @@ fs::path followLinks(fs::path path) {
   return path;
 }
 
-/// Of the file that is replaced, else as any program's new file.
-mode_t modeOf(const fs::path& path) {
-  static const mode_t mask = [] {
-    const mode_t found = ::umask(077);  // it can only be read by setting it
-    ::umask(found);
-    return found;
-  }();
-  struct stat status {};
-  return ::stat(path.c_str(), &status) == 0 ? status.st_mode & 07777 : 0666 & ~mask;
+/// A new file beside `path`, whose name it appends to. Its mode is that of any program's new file: mkstemp's is not, and
+/// the process's umask can only be read by changing it.
+int create(std::string& path) {
+  std::random_device random;
+  const std::string beside = path + ".partial-";
+  for (;;) {
+    path = beside + std::to_string(random());
+    const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (file >= 0 || errno != EEXIST) return file;
+  }
 }
 
 void replace(const fs::path& path, const std::function<void(const std::string& partial)>& write) {
-  std::string partial = path.string() + ".partial-XXXXXX";
-  const Descriptor file(::mkstemp(partial.data()));
+  std::string partial = path.string();
+  const Descriptor file(create(partial));
   try {
     write(partial);
-    file.allow(modeOf(path));
+    struct stat before {};
+    if (::stat(path.c_str(), &before) == 0) file.allow(before.st_mode & 07777);
     file.synchronise();
     fs::rename(partial, path);
   } catch (...) {

@@ -2,7 +2,6 @@
 
 #include <condition_variable>
 #include <cstddef>
-#include <cstdint>
 #include <deque>
 #include <functional>
 #include <limits>
@@ -14,7 +13,7 @@
 namespace sdvo {
 
 /// One thread that handles items in order, behind a queue of bounded length: when it is full the oldest item is dropped
-/// and counted, so that latency cannot grow and callbacks never wait. The handler must not throw.
+/// so that latency cannot grow and callbacks never wait. The handler must not throw.
 template <class Item>
 class Worker {
  public:
@@ -26,16 +25,17 @@ class Worker {
   Worker(const Worker&) = delete;
   Worker& operator=(const Worker&) = delete;
 
-  void push(Item item) {
+  /// False where the oldest item had to make room.
+  bool push(Item item) {
+    bool has_room = true;
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      if (queue_.size() == capacity_) {
-        queue_.pop_front();
-        ++dropped_;
-      }
+      has_room = queue_.size() < capacity_;
+      if (!has_room) queue_.pop_front();
       queue_.push_back(std::move(item));
     }
     wake_.notify_one();
+    return has_room;
   }
 
   /// Waits for the item in work; those that wait are left. For an owner whose handler refers to this worker: the
@@ -49,10 +49,10 @@ class Worker {
     if (thread_.joinable()) thread_.join();
   }
 
-  /// Items dropped since the start.
-  std::uint64_t dropped() const {
+  /// The next item pushes the oldest one out.
+  bool isFull() const {
     const std::lock_guard<std::mutex> lock(mutex_);
-    return dropped_;
+    return queue_.size() == capacity_;
   }
 
  private:
@@ -73,7 +73,6 @@ class Worker {
   mutable std::mutex mutex_;
   std::condition_variable wake_;
   std::deque<Item> queue_;
-  std::uint64_t dropped_ = 0;
   bool stopping_ = false;
   std::thread thread_;  // last: it starts when everything else is there
 };

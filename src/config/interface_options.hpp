@@ -6,14 +6,19 @@
 
 namespace sdvo {
 
-/// Rates of input that diagnostics take for healthy: 5 to 60 Hz, with a tenth to either side.
+/// Input that diagnostics take for healthy: 5 to 60 Hz, with a tenth to either side, nearly all of it used.
 struct RateOptions {
   double min_rate = 4.5;
   double max_rate = 66.0;
+  double max_unused = 0.05;
 
   void describe(OptionList& list) {
-    list.add("min_rate", min_rate, {0.0, 1000.0}, "Hz", "/diagnostics warn when pairs come less often (wall time)");
-    list.add("max_rate", max_rate, {0.0, 10000.0}, "Hz", "/diagnostics warn when pairs come more often (wall time)");
+    list.add("min_rate", min_rate, {0.0, 1000.0}, "Hz",
+             "/diagnostics warn when pairs come less often, by their stamps");
+    list.add("max_rate", max_rate, {0.0, 10000.0}, "Hz",
+             "/diagnostics warn when pairs come more often, by their stamps");
+    list.add("max_unused", max_unused, {0.0, 1.0}, "ratio",
+             "/diagnostics and the log warn when more of the last seconds' input is not used");
   }
 };
 
@@ -44,6 +49,7 @@ struct StereoInputOptions {
   int sync_queue_size = 20;
   int queue_size = 1;
   double max_rate = 0.0;
+  bool find_camera = true;
   int opencv_threads = -1;
   double max_silence = 2.0;
   RateOptions rates;
@@ -60,6 +66,9 @@ struct StereoInputOptions {
              "messages kept per input until those that belong to them have come");
     list.add("queue_size", queue_size, {1, 1000}, "", "pairs that wait while one is processed; the newest win");
     list.add("max_rate", max_rate, {0.0, 1000.0}, "Hz", "pairs processed at most, by their stamps; 0: all");
+    list.add("find_camera", find_camera,
+             "while nobody publishes the images, take the only stereo camera in the namespace; in the "
+             "namespace / only where it is set");
     list.add("opencv_threads", opencv_threads, {-1, 256}, "",
              "OpenCV's threads, of the whole process; 0: none beside the caller's, -1: left as they are");
     list.add("max_silence", max_silence, {0.1, 3600.0}, "s",
@@ -84,6 +93,7 @@ struct OdometryOutputOptions {
   double guess_error = 0.1;
   int queue_size = 1;
   int max_path_length = 20000;
+  bool overwrite = false;
   int opencv_threads = -1;
   double max_silence = 2.0;
   RateOptions rates;
@@ -94,7 +104,7 @@ struct OdometryOutputOptions {
     list.add("odom_frame_id", odom_frame_id, "world-fixed frame of the odometry");
     list.add("base_frame_id", base_frame_id, "the robot's frame, whose pose is published");
     list.add("initial_pose", initial_pose,
-             "pose of the base in odom at the start and after a reset: 'x y z roll pitch yaw' (m, rad)");
+             "pose of the base in odom at the start and after a reset: 'x y z roll pitch yaw' (m, rad), as in URDF");
     list.add("publish_tf", publish_tf, "publish odom -> base on /tf");
     list.add("invert_tf", invert_tf, "publish base -> odom instead, where base already has a parent");
     list.add("publish_null_when_lost", publish_null_when_lost,
@@ -116,6 +126,7 @@ struct OdometryOutputOptions {
     list.add("queue_size", queue_size, {1, 1000}, "",
              "feature messages that wait while one is processed; the newest win");
     list.add("max_path_length", max_path_length, {1, 10000000}, "", "poses kept in the path; the newest win");
+    list.add("overwrite", overwrite, "save_trajectory may replace files that were there before");
     list.add("opencv_threads", opencv_threads, {-1, 256}, "",
              "OpenCV's threads, of the whole process; 0: none beside the caller's, -1: left as they are");
     list.add("max_silence", max_silence, {0.1, 3600.0}, "s",
@@ -141,9 +152,12 @@ struct PlaceOutputOptions {
   double max_silence = 10.0;
   int opencv_threads = -1;
   std::string places_file;
+  bool save_at_shutdown = false;
+  bool overwrite = false;
   std::string robot_name;
   double other_min_score = 0.05;
   double other_timeout = 2.0;
+  bool initialpose_while_mapping = false;
 
   void describe(OptionList& list) {
     list.add("map_frame_id", map_frame_id, "frame of the corrected poses, parent of the odometry's frame");
@@ -161,11 +175,16 @@ struct PlaceOutputOptions {
              "/diagnostics warn when no pair with odometry has come for longer (wall time)");
     list.add("opencv_threads", opencv_threads, {-1, 256}, "",
              "OpenCV's threads, of the whole process; 0: none beside the caller's, -1: left as they are");
-    list.add("places_file", places_file, "file of save_places to begin with (absolute path); empty: with no places");
+    list.add("places_file", places_file,
+             "file of save_places to begin with, relative ones below ROS_HOME; empty: with no places");
+    list.add("save_at_shutdown", save_at_shutdown, "write the places to places_file at the end");
+    list.add("overwrite", overwrite, "save_places may replace files that are none of its own");
     list.add("robot_name", robot_name, "what other robots know this one by; empty: the namespace");
     list.add("other_min_score", other_min_score, {0.0, 1.0}, "",
              "least likeness of a place of mine for which another robot is asked for its rows");
     list.add("other_timeout", other_timeout, {0.01, 60.0}, "s", "wall time in which another robot must answer");
+    list.add("initialpose_while_mapping", initialpose_while_mapping,
+             "take poses on initialpose also where no map was loaded, or when the robot is found in it already");
   }
 };
 

@@ -3,6 +3,8 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
+#include <cstdint>
+#include <filesystem>
 #include <stdexcept>
 #include <string_view>
 
@@ -43,7 +45,10 @@ void apply(const YAML::Node& node, const std::string& path, std::vector<Option>&
 PipelineOptions readPipelineOptions(const std::string& yaml_file, const std::vector<std::string>& settings) {
   PipelineOptions options;
   std::vector<Option> list = listOptions(options);
+  constexpr std::uintmax_t kLargest = 1'000'000;  // bytes, as of launch/copy_config.py
   if (!yaml_file.empty()) try {
+      if (!std::filesystem::is_regular_file(yaml_file)) throw std::invalid_argument("it is no file");
+      if (std::filesystem::file_size(yaml_file) > kLargest) throw std::invalid_argument("it is too large for options");
       apply(YAML::LoadFile(yaml_file), "", list);
     } catch (const std::exception& e) {
       throw std::runtime_error(yaml_file + ": " + e.what());

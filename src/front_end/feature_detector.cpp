@@ -16,23 +16,36 @@
 #include <tuple>
 #include <utility>
 
+#include "../common/text.hpp"
 #include "opencv_features.hpp"
 #include "stereo_descriptor_vo/front_end/fast_corners.hpp"
 
 namespace sdvo {
 namespace {
 
-/// A PNG as CV_8U; empty if it cannot be read. What is transparent is black. By libpng: OpenCV's readers bring a
-/// hundred libraries, 40 MB, into every process.
+/// A PNG as CV_8U. What is transparent is black. Throws std::invalid_argument that names the file when it cannot be
+/// read or is larger than any camera's image. By libpng: OpenCV's readers bring a hundred libraries, 40 MB, into every
+/// process.
 cv::Mat readMask(const std::string& file) {
+  constexpr std::uint64_t kMostPixels =
+      50'000'000;  // of stereo cameras at most 12 million; a wrong file takes no memory
+  const std::string name = "'" + std::filesystem::absolute(file).string() + "'";
   png_image header{};
   header.version = PNG_IMAGE_VERSION;
-  if (png_image_begin_read_from_file(&header, file.c_str()) == 0) return {};
+  // A pipe would be waited for.
+  if (!std::filesystem::is_regular_file(file) || png_image_begin_read_from_file(&header, file.c_str()) == 0)
+    throw std::invalid_argument("cannot read a PNG from " + name);
+  if (std::uint64_t{header.width} * header.height > kMostPixels) {
+    png_image_free(&header);
+    throw std::invalid_argument(text(0, name, " has ", header.width, "x", header.height,
+                                     " px: a mask has the size of the rectified left image"));
+  }
   header.format = PNG_FORMAT_GRAY;
   // Black, which whatever is transparent lets through.
   cv::Mat mask = cv::Mat::zeros(static_cast<int>(header.height), static_cast<int>(header.width), CV_8U);
-  const int read = png_image_finish_read(&header, nullptr, mask.data, static_cast<png_int_32>(mask.step), nullptr);
-  return read == 0 ? cv::Mat() : mask;
+  if (png_image_finish_read(&header, nullptr, mask.data, static_cast<png_int_32>(mask.step), nullptr) == 0)
+    throw std::invalid_argument("cannot read all of the PNG " + name + ": is it truncated?");
+  return mask;
 }
 
 std::vector<Corner> toCorners(const std::vector<cv::KeyPoint>& keypoints) {
@@ -252,10 +265,11 @@ void FeatureDetectorOptions::check() const {
 
 FeatureDetector::FeatureDetector(const FeatureDetectorOptions& options) : options_(checked(options)) {
   if (options_.mask.empty()) return;
-  mask_ = readMask(options_.mask);
-  if (mask_.empty())
-    throw std::invalid_argument("mask: cannot read a PNG from '" + std::filesystem::absolute(options_.mask).string() +
-                                "'");
+  try {
+    mask_ = readMask(options_.mask);
+  } catch (const std::invalid_argument& e) {
+    throw std::invalid_argument(std::string("mask: ") + e.what());
+  }
 }
 
 std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border, const cv::Mat& mask) const {

@@ -11,7 +11,7 @@
 #include "stereo_descriptor_vo/motion/noise.hpp"
 
 namespace sdvo {
-namespace {
+inline namespace window_optimizing {  // with a name: WindowOptimizer::Memory has fields of these types
 
 using CalibrationVector = RigCalibration::Vector;
 
@@ -317,7 +317,7 @@ class Solver {
   int poses_ = 0, size_ = 0;
 };
 
-}  // namespace
+}  // namespace window_optimizing
 
 struct WindowOptimizer::Memory {
   explicit Memory(const WindowOptimizerOptions& options) : solver(options) {}

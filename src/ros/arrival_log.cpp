@@ -3,104 +3,224 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <sstream>
+#include <vector>
 
-#include "stamps.hpp"
+#include "../common/text.hpp"
+#include "../messages/stamps.hpp"
 
 namespace sdvo {
 namespace {
 
-constexpr std::size_t kRemembered = 300;  // arrivals on each topic
+constexpr double kMemory = 10.0;     // s
+constexpr std::size_t kMost = 2000;  // arrivals on each topic
+constexpr double kLately = 5.0;      // s, of losses and rates
+constexpr double kPatience = 1.0;    // s longer than for any pair so far
+constexpr double kLate = 0.1;        // s between messages of one stamp (chosen): a queue is too short, perhaps
+constexpr double kHalf = 0.45;       // of a period: less, for rounding
+
+double secondsBetween(std::int64_t a, std::int64_t b) {
+  return 1e-9 * static_cast<double>(b - a);
+}
 
 }  // namespace
 
-ArrivalLog::ArrivalLog(std::array<std::string, kInputs> topics, const StereoInputOptions& options) : options_(options) {
-  for (int input = 0; input < kInputs; ++input) topics_[input].name = topics[input];
+void ArrivalLog::begin(const Topics& topics, double now) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (int input = 0; input < kInputs; ++input) topics_[input] = {topics[input], {}};
+  begin_ = now;
+  first_stamp_ = 0;
+  longest_wait_ = 0.0;
 }
 
 void ArrivalLog::note(Input input, const ros::Time& stamp, double now) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  Topic& topic = topics_[input];
-  ++topic.count;
-  if (stamp.isZero()) {
-    ++topic.zero_stamps;
-    return;
-  }
-  topic.arrivals.push_back({nanoseconds(stamp), now});
-  if (topic.arrivals.size() > kRemembered) topic.arrivals.pop_front();
-}
-
-void ArrivalLog::notePair() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  ++pairs_;
-}
-
-std::string ArrivalLog::explainSilence() {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  std::ostringstream text;
-  if (pairs_ == 0) {
-    text << "no synchronised stereo pair; received:";
+  std::deque<Arrival>& arrivals = topics_[input].arrivals;
+  arrivals.push_back({nanoseconds(stamp), now});
+  if (stamp.isZero()) arrivals.back().fate = Fate::kLost;
+  complete_ = first_stamp_ == 0 ? now : complete_;
+  if (first_stamp_ == 0)
     for (const Topic& topic : topics_) {
-      text << " " << topic.name << " " << topic.count;
-      if (topic.zero_stamps > 0) text << " (" << topic.zero_stamps << " with zero stamps)";
+      if (topic.arrivals.empty()) {
+        first_stamp_ = 0;
+        break;
+      }
+      first_stamp_ = std::max(first_stamp_, topic.arrivals.front().stamp);
     }
-    text << advise();
+  const auto waits = [](const Arrival& arrival) { return arrival.fate == Fate::kWaits; };
+  if (std::count_if(arrivals.begin(), arrivals.end(), waits) > options_.sync_queue_size)
+    giveUp(input, *std::find_if(arrivals.begin(), arrivals.end(), waits));
+  while (arrivals.size() > kMost || arrivals.front().now < now - kMemory) {
+    if (waits(arrivals.front())) giveUp(input, arrivals.front());
+    arrivals.pop_front();
   }
-  for (Topic& topic : topics_) {
-    topic.arrivals.clear();
-    topic.count = topic.zero_stamps = 0;
-  }
-  pairs_ = 0;
-  return text.str();
 }
 
-ArrivalLog::Comparison ArrivalLog::compareWithLeftImage(const Topic& topic) const {
-  Comparison comparison{std::numeric_limits<double>::infinity(), 0.0};
-  for (const Arrival& left : topics_[kLeftImage].arrivals)
-    for (const Arrival& other : topic.arrivals) {
-      const double gap = 1e-9 * std::abs(static_cast<double>(left.stamp - other.stamp));
-      comparison.smallest_gap = std::min(comparison.smallest_gap, gap);
-      if (gap <= largestGap())
-        comparison.largest_delay = std::max(comparison.largest_delay, std::abs(left.now - other.now));
-    }
-  return comparison;
+void ArrivalLog::notePair(const ros::Time& left, const ros::Time& right, double now) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  for (const auto& [input, stamp] : {std::pair(kLeftImage, left), std::pair(kRightImage, right)}) {
+    std::deque<Arrival>& arrivals = topics_[input].arrivals;
+    const auto used =
+        std::find_if(arrivals.rbegin(), arrivals.rend(), [ns = nanoseconds(stamp)](const Arrival& arrival) {
+          return arrival.stamp == ns && arrival.fate != Fate::kPaired;
+        });
+    if (used == arrivals.rend()) continue;
+    if (std::exchange(used->is_counted, false)) unused_.takeBack(UnusedInput::kUnpaired);
+    used->fate = Fate::kPaired;
+    longest_wait_ = std::max(longest_wait_, now - used->now);
+    // Each input keeps its order, so the partners of all before were lost.
+    for (auto before = used; before != arrivals.rend(); ++before)
+      if (before->fate == Fate::kWaits) giveUp(input, *before);
+  }
 }
 
-std::string ArrivalLog::advise() const {
-  const std::deque<Arrival>& left = topics_[kLeftImage].arrivals;
-  std::ostringstream text;
-  const Topic* latest = nullptr;
-  double delay = 0.0;
+/// Of the left images, s.
+double ArrivalLog::period() const {
+  constexpr double kUsual = 0.1;
+  constexpr std::size_t kEnough = 20;
+  const std::deque<Arrival>& arrivals = topics_[kLeftImage].arrivals;
+  std::vector<double> steps;
+  for (std::size_t k = arrivals.size(); k > 1 && steps.size() < kEnough; --k)
+    steps.push_back(std::abs(secondsBetween(arrivals[k - 2].stamp, arrivals[k - 1].stamp)));
+  if (steps.empty()) return kUsual;
+  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
+  return steps[steps.size() / 2];
+}
+
+/// While not all topics are connected some images have no partners.
+bool ArrivalLog::isEarly(const Arrival& arrival) const {
+  constexpr double kConnecting = 2.0;  // s (chosen)
+  return first_stamp_ == 0 || (arrival.stamp < first_stamp_ && arrival.now < complete_ + kConnecting);
+}
+
+/// Whether a right image that is not used is of another moment than the left ones that are not.
+bool ArrivalLog::isAPairOfItsOwn(Input input, const Arrival& arrival) const {
+  if (input == kLeftImage) return true;
+  const double half = kHalf * period();
+  const std::deque<Arrival>& lefts = topics_[kLeftImage].arrivals;
+  return std::none_of(lefts.begin(), lefts.end(), [&](const Arrival& left) {
+    return left.fate != Fate::kPaired && !isEarly(left) && std::abs(secondsBetween(left.stamp, arrival.stamp)) < half;
+  });
+}
+
+void ArrivalLog::giveUp(Input input, Arrival& arrival) {
+  arrival.fate = Fate::kLost;
+  arrival.is_counted =
+      (input == kLeftImage || input == kRightImage) && !isEarly(arrival) && isAPairOfItsOwn(input, arrival);
+  if (arrival.is_counted) unused_.add(UnusedInput::kUnpaired);
+}
+
+void ArrivalLog::giveUpWhatIsOld(double now) {
+  for (const Input input : {kLeftImage, kRightImage})
+    for (Arrival& arrival : topics_[input].arrivals)
+      if (arrival.fate == Fate::kWaits && arrival.now < now - kPatience - longest_wait_) giveUp(input, arrival);
+}
+
+ArrivalLog::Use ArrivalLog::usedSince(double begin) const {
+  Use use;
+  for (const Input input : {kLeftImage, kRightImage})
+    for (const Arrival& arrival : topics_[input].arrivals) {
+      if (arrival.now < begin) continue;
+      use.used += input == kLeftImage && arrival.fate == Fate::kPaired;
+      use.lost += arrival.is_counted;
+      (input == kLeftImage ? use.lefts : use.rights) += arrival.fate == Fate::kLost && !isEarly(arrival);
+    }
+  return use;
+}
+
+std::string ArrivalLog::explainLoss(double now) {
+  constexpr int kFewest = 3;  // pairs (chosen): fewer are an accident
+  const std::lock_guard<std::mutex> lock(mutex_);
+  giveUpWhatIsOld(now);
+  const double begin = now - kLately;
+  const Use use = usedSince(begin);
+  if (use.lost < kFewest || use.lost <= options_.rates.max_unused * (use.used + use.lost)) return "";
+  return text(0, use.lost, " of ", use.used + use.lost, " stereo pairs in ", kLately, " s are not used: ", use.lefts,
+              " left and ", use.rights, " right images without partners; received:", received(begin), advise(begin));
+}
+
+std::string ArrivalLog::explainSilence(double now) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (now < begin_ + kMemory || usedSince(now - kMemory).used > 0) return "";
+  return "no synchronised stereo pair; received:" + received(now - kMemory) + advise(now - kMemory);
+}
+
+std::string ArrivalLog::received(double begin) const {
+  std::string all;
   for (const Topic& topic : topics_) {
-    if (&topic == &topics_[kLeftImage]) continue;
-    if (!left.empty() && topic.count == 0 && &topic != &topics_[kRightImage])
-      text << "; " << topic.name << " must have a message for each image, with the image's stamp";
-    const Comparison comparison = compareWithLeftImage(topic);
-    if (!std::isfinite(comparison.smallest_gap)) return text.str();  // the counts say it
-    if (comparison.smallest_gap > largestGap()) {
-      if (&topic == &topics_[kRightImage])
-        text << "; smallest gap between a left and a right image stamp " << comparison.smallest_gap
-             << " s, larger than " << (options_.approximate_sync ? "max_interval (" : "sync_tolerance (")
-             << largestGap() << " s)"
-             << (options_.approximate_sync ? "" : ": set approximate_sync if the cameras are not triggered together");
-      else
-        text << "; the stamps of " << topic.name << " are not those of the left images, at best "
-             << comparison.smallest_gap << " s off";
-      return text.str();
+    int count = 0, zero = 0;
+    for (const Arrival& arrival : topic.arrivals) {
+      count += arrival.now >= begin;
+      zero += arrival.now >= begin && arrival.stamp == 0;
     }
-    if (comparison.largest_delay > delay) {
-      delay = comparison.largest_delay;
-      latest = &topic;
+    all += " " + topic.name + " " + std::to_string(count);
+    if (zero > 0) all += " (" + std::to_string(zero) + " with zero stamps)";
+  }
+  return all;
+}
+
+std::array<std::pair<std::string, double>, ArrivalLog::kInputs> ArrivalLog::rates(double now) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::array<std::pair<std::string, double>, kInputs> rates;
+  for (int input = 0; input < kInputs; ++input) {
+    const std::deque<Arrival>& arrivals = topics_[input].arrivals;
+    const auto lately = std::count_if(arrivals.begin(), arrivals.end(),
+                                      [&](const Arrival& arrival) { return arrival.now >= now - kLately; });
+    rates[input] = {topics_[input].name, static_cast<double>(lately) / std::clamp(now - begin_, 1.0, kLately)};
+  }
+  return rates;
+}
+
+ArrivalLog::Gaps ArrivalLog::gapsBetween(Input from, Input to, double begin) const {
+  const double half = kHalf * period();
+  Gaps gaps;
+  for (const Arrival& here : topics_[from].arrivals) {
+    if (here.now < begin || here.fate == Fate::kPaired || here.stamp == 0) continue;
+    double gap = std::numeric_limits<double>::infinity();
+    for (const Arrival& there : topics_[to].arrivals) {
+      if (there.stamp == 0) continue;
+      const double here_to_there = std::abs(secondsBetween(here.stamp, there.stamp));
+      gap = std::min(gap, here_to_there);
+      if (here_to_there <= largestGap()) gaps.delay = std::max(gaps.delay, std::abs(there.now - here.now));
     }
+    ++gaps.all;
+    gaps.missing += gap >= half;
+    if (gap <= largestGap() || gap >= half) continue;
+    ++gaps.apart;
+    gaps.least = std::min(gaps.least, gap);
+    gaps.most = std::max(gaps.most, gap);
+  }
+  return gaps;
+}
+
+/// What the stamps of images without a pair show.
+std::string ArrivalLog::advise(double begin) const {
+  const Gaps right = gapsBetween(kLeftImage, kRightImage, begin), left = gapsBetween(kRightImage, kLeftImage, begin);
+  if (topics_[kLeftImage].arrivals.empty() || topics_[kRightImage].arrivals.empty()) return "";  // the counts say it
+  if (2 * right.apart > right.all)
+    return text(1, "; the nearest stamps of left and right are ", 1e3 * right.least, " to ", 1e3 * right.most,
+                " ms apart, more than ", options_.approximate_sync ? "max_interval (" : "sync_tolerance (",
+                1e3 * largestGap(), " ms)",
+                options_.approximate_sync
+                    ? ""
+                    : ": set a larger sync_tolerance if one trigger takes both, else approximate_sync");
+  for (const auto& [gaps, sides] :
+       {std::pair(right, " left images have no right one"), std::pair(left, " right images have no left one")})
+    if (2 * gaps.missing > gaps.all)
+      return "; " + std::to_string(gaps.missing) + sides +
+             " within half a period: does the driver or the network lose images, or stamp them wrong?";
+  const Gaps* latest = &right;
+  std::array<Gaps, 2> infos;
+  for (const Input input : {kLeftInfo, kRightInfo}) {
+    Gaps& info = infos[input - kLeftInfo] = gapsBetween(kLeftImage, input, begin);
+    if (2 * (info.apart + info.missing) > info.all)
+      return "; " + topics_[input].name + " must have a message for each image, with the image's stamp";
+    if (info.delay > latest->delay) latest = &info;
   }
   // Equal stamps on all topics, and yet no pair: one side waits in its queue for longer than that holds.
-  if (latest && left.size() > 1 && left.back().now > left.front().now) {
-    const double rate = static_cast<double>(left.size() - 1) / (left.back().now - left.front().now);
-    text << "; stamps agree, but messages of " << latest->name << " and of the left images arrive " << delay
-         << " s apart: set sync_queue_size, now " << options_.sync_queue_size << ", to at least "
-         << static_cast<int>(std::ceil(delay * rate)) + 2;
-  }
-  return text.str();
+  if (latest->delay <= kLate) return "";
+  return text(2, "; stamps agree, but messages arrive ", latest->delay, " s apart: set sync_queue_size, now ",
+              options_.sync_queue_size, ", to at least ",
+              static_cast<int>(std::ceil(latest->delay / period() - 0.01)) + 2);
 }
 
 }  // namespace sdvo

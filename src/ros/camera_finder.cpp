@@ -60,24 +60,36 @@ std::vector<ros::M_string> findStereoCameras(const std::string& ns, const ros::m
   return found;
 }
 
-std::optional<ros::NodeHandle> findOnlyStereoCamera(const ros::NodeHandle& nh, std::string& problem) {
-  const std::string ns = nh.getNamespace() == "/" ? "/" : nh.getNamespace() + "/";
-  ros::master::V_TopicInfo topics;
-  if (!ros::master::getTopics(topics)) return std::nullopt;
-  for (const char* name : {"left/image_rect", "right/image_rect"}) {
-    const bool is_ours = std::any_of(topics.begin(), topics.end(),
-                                     [&](const auto& t) { return (t.name + "/").find(ns + name + "/") == 0; });
-    if (is_ours || nh.resolveName(name) != ns + name) return std::nullopt;
+CameraFinder::CameraFinder(const std::string& ns, std::string left, std::string right)
+    : ns_(ns == "/" ? "/" : ns + "/"), left_(std::move(left)), right_(std::move(right)) {}
+
+bool CameraFinder::update(const ros::master::V_TopicInfo& topics, std::string& report) {
+  if (left_ != ns_ + "left/image_rect" || right_ != ns_ + "right/image_rect") return false;
+  const auto own = std::find_if(topics.begin(), topics.end(), [this](const auto& topic) {
+    const std::string name = topic.name + "/";  // of any transport
+    return name.find(left_ + "/") == 0 || name.find(right_ + "/") == 0;
+  });
+  if (own != topics.end()) {
+    if (names_.empty()) return false;
+    report = "somebody publishes " + own->name + ": images are taken from " + left_ + " and " + right_ +
+             " again, no more from " + names_.at("left/image_rect");
+    names_.clear();
+    return true;
   }
-  const std::vector<ros::M_string> cameras = findStereoCameras(ns, topics);
-  if (cameras.size() == 1) {
-    ros::NodeHandle found(nh.getNamespace(), cameras.front());  // not of `nh`, whose remappings would win
-    found.setCallbackQueue(nh.getCallbackQueue());
-    return found;
+  if (!names_.empty()) return false;
+  const std::vector<ros::M_string> cameras = findStereoCameras(ns_, topics);
+  if (cameras.empty()) return false;
+  report = "nobody publishes " + left_ + " and " + right_;
+  if (cameras.size() > 1) {
+    report +=
+        ", and there are several stereo cameras in " + ns_ + ": set left_image_topic and the like to those of one:";
+    for (const ros::M_string& camera : cameras) report += " " + camera.at("left/image_rect");
+    return false;
   }
-  for (const ros::M_string& camera : cameras)
-    problem += (problem.empty() ? "several stereo cameras: " : ", ") + camera.at("left/image_rect");
-  return std::nullopt;
+  names_ = cameras.front();
+  report += ": the only stereo camera in " + ns_ + " is taken, with " + names_.at("left/image_rect") + " and " +
+            names_.at("right/image_rect") + "; find_camera:=false for none";
+  return true;
 }
 
 }  // namespace sdvo

@@ -1,9 +1,8 @@
 #pragma once
 
+#include <ros/datatypes.h>
 #include <ros/master.h>
-#include <ros/node_handle.h>
 
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,8 +15,23 @@ std::vector<ros::M_string> findStereoCameras(const std::string& ns, const ros::m
 /// Which of these topics nobody publishes, each with a leading "; ", and what to do where it comes compressed.
 std::string explainUnpublished(const std::vector<std::string>& names, const ros::master::V_TopicInfo& topics);
 
-/// A handle with the names of the only one under the node's namespace, where its images have no other names and nobody
-/// publishes them; says in `problem` where there are several. Callbacks run where those of `nh` do.
-std::optional<ros::NodeHandle> findOnlyStereoCamera(const ros::NodeHandle& nh, std::string& problem);
+/// Takes the only stereo camera under a node's namespace while nobody publishes images under the node's own names, and
+/// gives it back once somebody does. Names that the user chose stay.
+class CameraFinder {
+ public:
+  /// `ns` of the node; `left` and `right`: its names of the images.
+  CameraFinder(const std::string& ns, std::string left, std::string right);
+
+  /// Looks at what is published. True where other images are to be used from now on; `report` says why, or what keeps
+  /// from it.
+  bool update(const ros::master::V_TopicInfo& topics, std::string& report);
+
+  /// Remappings of the camera in use; empty: it is the node's own.
+  const ros::M_string& names() const { return names_; }
+
+ private:
+  const std::string ns_, left_, right_;
+  ros::M_string names_;
+};
 
 }  // namespace sdvo

@@ -7,7 +7,8 @@
 namespace sdvo {
 namespace {
 
-constexpr double kWindow = 5.0;  // s, of the rate
+constexpr double kWindow = 5.0;     // s, of the rate
+constexpr std::size_t kFewest = 3;  // arrivals that make one
 
 }  // namespace
 
@@ -18,10 +19,10 @@ double InputMonitor::secondsSince(Clock::time_point time) {
   return std::chrono::duration<double>(Clock::now() - time).count();
 }
 
-void InputMonitor::note() {
+void InputMonitor::note(std::int64_t stamp) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  arrivals_.push_back(Clock::now());
-  while (secondsSince(arrivals_.front()) > kWindow) arrivals_.pop_front();
+  arrivals_.push_back({Clock::now(), stamp});
+  while (arrivals_.size() > kFewest && secondsSince(arrivals_.front().time) > kWindow) arrivals_.pop_front();
 }
 
 void InputMonitor::noteTopics(const std::string& topics) {
@@ -39,7 +40,7 @@ void InputMonitor::noteIdle(const std::string& why) {
 std::optional<InputMonitor::Silence> InputMonitor::silence() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!idle_.empty()) return Silence{WallUpdater::Level::OK, idle_};
-  const double silence = secondsSince(arrivals_.empty() ? begin_ : arrivals_.back());
+  const double silence = secondsSince(arrivals_.empty() ? begin_ : arrivals_.back().time);
   const std::string age = text(0, silence, " s");
   if (arrivals_.empty() && silence <= max_silence_)
     return Silence{WallUpdater::Level::WARN, "no " + what_ + " yet on " + topics_};
@@ -52,11 +53,11 @@ std::optional<InputMonitor::Silence> InputMonitor::silence() const {
 
 /// Hz; none of too few.
 std::optional<double> InputMonitor::rate() const {
-  constexpr std::size_t kFewest = 3;
   const std::lock_guard<std::mutex> lock(mutex_);
   if (arrivals_.size() < kFewest) return std::nullopt;
-  const double time = std::chrono::duration<double>(arrivals_.back() - arrivals_.front()).count();
-  return static_cast<double>(arrivals_.size() - 1) / std::max(time, 1e-9);
+  const double time = 1e-9 * static_cast<double>(arrivals_.back().stamp - arrivals_.front().stamp);
+  if (time <= 0.0) return std::nullopt;  // they jumped
+  return static_cast<double>(arrivals_.size() - 1) / time;
 }
 
 void InputMonitor::diagnose(WallUpdater::Status& status) {

@@ -41,13 +41,15 @@ class WallUpdater {
   ros::WallTimer timer_;
 };
 
-/// Whether input comes, and how often, for /diagnostics. By wall time; for any thread.
+/// Whether input comes, by wall time, and how often, by its stamps: simulated time and a network have other paces. For
+/// any thread.
 class InputMonitor {
  public:
   /// `what`: of the input, in the plural. `topics`: where it comes from. `max_silence`: s.
   InputMonitor(std::string what, std::string topics, double max_silence, const RateOptions& rates);
 
-  void note();
+  /// `stamp`: ns.
+  void note(std::int64_t stamp);
   /// Input comes from elsewhere now.
   void noteTopics(const std::string& topics);
   /// While nobody wants input, silence is no fault; `why`, such as "paused", is empty otherwise. Begins anew.
@@ -75,7 +77,31 @@ class InputMonitor {
   mutable std::mutex mutex_;
   std::string topics_, idle_;
   Clock::time_point begin_ = Clock::now();
-  std::deque<Clock::time_point> arrivals_;  ///< of the last seconds, and the newest one
+  struct Arrival {
+    Clock::time_point time;
+    std::int64_t stamp;
+  };
+  std::deque<Arrival> arrivals_;  ///< of the last seconds, and the newest ones
+};
+
+/// Whether a camera's exposures take turns from pair to pair.
+class ExposureTurns {
+ public:
+  /// Mean grey level of the next pair.
+  void add(double mean) {
+    const bool is_brighter = mean > kMuch * last_, is_darker = last_ > kMuch * mean;
+    turns_ = (turns_ % 2 == 0 ? is_brighter : is_darker) ? turns_ + 1 : is_brighter;
+    last_ = mean;
+  }
+
+  bool takeTurns() const { return turns_ >= kTurns; }
+
+ private:
+  static constexpr double kMuch = 8.0;  // ratio; up to 1 : 7 descriptors and patches bridge it
+  static constexpr int kTurns = 6;      // in a row: more than a lamp that flickers
+
+  double last_ = 0.0;
+  int turns_ = 0;  ///< brighter and darker ones alternately, in a row
 };
 
 /// How much of a processor one worker's thread takes, and what it had to leave out, for /diagnostics. What OpenCV does
@@ -88,14 +114,18 @@ class WorkLoad {
   /// CPU time of this thread from construction to destruction counts as that of one item.
   class Item {
    public:
-    explicit Item(WorkLoad& load) : load_(load), begin_(threadTime()) {}
+    explicit Item(WorkLoad& load) : load_(load), begin_(threadTime()), wall_begin_(std::chrono::steady_clock::now()) {}
     Item(const Item&) = delete;
     Item& operator=(const Item&) = delete;
-    ~Item() { load_.note(threadTime() - begin_); }
+    ~Item() {
+      const std::chrono::duration<double> busy = std::chrono::steady_clock::now() - wall_begin_;
+      load_.note(threadTime() - begin_, busy.count());
+    }
 
    private:
     WorkLoad& load_;
     const double begin_;
+    const std::chrono::steady_clock::time_point wall_begin_;
   };
 
   /// Time that an item took while the thread had nothing to do but wait for `what`, s.
@@ -125,6 +155,11 @@ class WorkLoad {
     if (dropped > 0 && wait_ > time_)
       status.summaryf(WallUpdater::Level::WARN, "%d pairs dropped in %.0f s, while it waited for %s",
                       static_cast<int>(dropped), period, awaited_.c_str());
+    else if (dropped > 0 && busy_ < kOften * period)
+      status.summaryf(WallUpdater::Level::WARN,
+                      "%d pairs dropped in %.0f s though it worked for %.0f %% of the time: they come in bursts, set "
+                      "queue_size to a burst's pairs",
+                      static_cast<int>(dropped), period, 100.0 * busy_ / period);
     else if (dropped > 0)
       status.summaryf(WallUpdater::Level::WARN,
                       "too slow: %d pairs dropped in %.0f s; set fewer detector/max_features or a max_rate",
@@ -135,7 +170,7 @@ class WorkLoad {
       status.summaryf(WallUpdater::Level::OK, "%.0f %% of one processor's time", 100.0 * load);
     last_ = now;
     reported_ = dropped_;
-    time_ = wait_ = longest_wait_ = 0.0;
+    time_ = busy_ = wait_ = longest_wait_ = 0.0;
     items_ = 0;
   }
 
@@ -147,9 +182,10 @@ class WorkLoad {
     return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
   }
 
-  void note(double time) {
+  void note(double time, double busy) {
     const std::lock_guard<std::mutex> lock(mutex_);
     time_ += time;
+    busy_ += busy;
     ++items_;
   }
 
@@ -157,8 +193,9 @@ class WorkLoad {
   std::mutex mutex_;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
   std::uint64_t dropped_ = 0, reported_ = 0;
-  double time_ = 0.0, wait_ = 0.0, longest_wait_ = 0.0;  ///< s
-  std::string awaited_;                                  ///< the longest
+  static constexpr double kOften = 0.5;  ///< of wall time, below it the worker mostly rests
+  double time_ = 0.0, busy_ = 0.0, wait_ = 0.0, longest_wait_ = 0.0;  ///< s: CPU, wall
+  std::string awaited_;                                               ///< the longest
   int items_ = 0;
 };
 

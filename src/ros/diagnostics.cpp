@@ -5,14 +5,17 @@
 #include <utility>
 
 #include "../check/shutter_check.hpp"
+#include "../messages/stamps.hpp"
 
 namespace sdvo {
 
 using Level = WallUpdater::Level;
 
 ImageDiagnostics::ImageDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const std::string& name,
-                                   const StereoInputOptions& options)
+                                   const StereoInputOptions& options, ArrivalLog& arrivals, UnusedInput& unused)
     : thresholds_(options.thresholds),
+      arrivals_(arrivals),
+      unused_(unused),
       input_("pairs", nh.resolveName("left/image_rect") + " and " + nh.resolveName("right/image_rect"),
              options.max_silence, options.rates),
       load_(options.thresholds.max_load),
@@ -24,14 +27,15 @@ ImageDiagnostics::ImageDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& private
   updater_.add("load", &load_, &WorkLoad::diagnose);
 }
 
-void ImageDiagnostics::notePair(double gap) {
-  input_.note();
+void ImageDiagnostics::notePair(std::int64_t stamp, double gap) {
+  input_.note(stamp);
   const std::lock_guard<std::mutex> lock(mutex_);
   largest_gap_ = std::max(largest_gap_, gap);
 }
 
 void ImageDiagnostics::note(const StereoFeatures& features) {
   const std::lock_guard<std::mutex> lock(mutex_);
+  exposures_.add(features.report.mean_intensity[0]);
   last_ = features.report;
   last_count_ = features.count();
   ++pairs_;
@@ -44,12 +48,6 @@ void ImageDiagnostics::noteFailure(const std::string& why) {
   failure_ = why;
 }
 
-void ImageDiagnostics::noteUnused(std::uint64_t refused, std::uint64_t out_of_order) {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  refused_ = refused;
-  out_of_order_ = out_of_order;
-}
-
 /// Without input there is nothing to say; "input rate" tells why.
 bool ImageDiagnostics::isIdle(Status& status) const {
   const auto silence = input_.silence();
@@ -58,21 +56,22 @@ bool ImageDiagnostics::isIdle(Status& status) const {
 }
 
 void ImageDiagnostics::diagnoseSynchronisation(Status& status) {
+  const double now = ros::SteadyTime::now().toSec();
+  const std::string loss = arrivals_.explainLoss(now);
+  const auto silence = input_.silence();
   const std::lock_guard<std::mutex> lock(mutex_);
   const double gap = std::exchange(largest_gap_, 0.0);
-  const std::uint64_t unused = refused_ + out_of_order_;
   status.addf("largest gap [ms]", "%.2f", 1e3 * gap);
-  status.add("refused messages", refused_);
-  status.add("late or with wrong stamps", out_of_order_);
-  const std::uint64_t lately = unused - std::exchange(reported_, unused);
-  if (isIdle(status)) return;
-  if (gap > thresholds_.max_gap)
+  for (const auto& [topic, rate] : arrivals_.rates(now)) status.addf("rate of " + topic + " [Hz]", "%.2f", rate);
+  if (!loss.empty() && (!silence || silence->level != Level::OK))
+    status.summary(Level::WARN, loss);
+  else if (silence)
+    status.summary(Level::OK, "no pairs");
+  else if (gap > thresholds_.max_gap)
     status.summaryf(Level::WARN, "left and right are %.1f ms apart: are the cameras triggered together?", 1e3 * gap);
-  else if (lately > 0)
-    status.summaryf(Level::WARN, "%d messages were late or had wrong stamps: check the driver's stamps",
-                    static_cast<int>(lately));
   else
     status.summary(Level::OK, "left and right belong together");
+  unused_.diagnose(status);
 }
 
 void ImageDiagnostics::diagnoseExposure(Status& status) {
@@ -82,7 +81,9 @@ void ImageDiagnostics::diagnoseExposure(Status& status) {
   const double left = last_->mean_intensity[0], right = last_->mean_intensity[1];
   status.addf("mean grey level", "%.1f left, %.1f right", left, right);
   status.addf("sharpness [grey levels a px]", "%.2f left, %.2f right", last_->sharpness[0], last_->sharpness[1]);
-  if (std::min(left, right) < thresholds_.min_intensity)
+  if (exposures_.takeTurns())
+    status.summary(Level::WARN, "exposures take turns from pair to pair, as in HDR: use one exposure");
+  else if (std::min(left, right) < thresholds_.min_intensity)
     status.summaryf(Level::WARN, "too dark, expose longer or add light: mean grey levels of %.0f and %.0f", left,
                     right);
   else if (std::max(left, right) > thresholds_.max_intensity)
@@ -119,19 +120,20 @@ static RateOptions expectedRates(const ros::NodeHandle& nh, RateOptions rates) {
 }
 
 OdometryDiagnostics::OdometryDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const std::string& name,
-                                         const OdometryOutputOptions& options)
+                                         const OdometryOutputOptions& options, UnusedInput& unused)
     : max_latency_(options.max_latency),
+      unused_(unused),
       input_("features", nh.resolveName("stereo_features"), options.max_silence, expectedRates(nh, options.rates)),
       load_(options.max_load),
       updater_(nh, private_nh, name) {
   updater_.add("odometry", this, &OdometryDiagnostics::diagnose);
-  updater_.add("input rate", &input_, &InputMonitor::diagnose);
+  updater_.add("input rate", this, &OdometryDiagnostics::diagnoseInput);
   updater_.add("load", &load_, &WorkLoad::diagnose);
   updater_.add("latency", this, &OdometryDiagnostics::diagnoseLatency);
 }
 
 void OdometryDiagnostics::note(const stereo_descriptor_vo::VoInfo& info) {
-  input_.note();
+  input_.note(nanoseconds(info.header.stamp));
   load_.noteDropped(info.dropped_features);
   const std::lock_guard<std::mutex> lock(mutex_);
   last_ = info;
@@ -150,14 +152,21 @@ void OdometryDiagnostics::diagnose(Status& status) {
   addCalibration(status);
   status.add("latency [s]", last_->latency);
   status.add("dropped pairs", last_->dropped_pairs);
-  status.add("dropped feature messages", last_->dropped_features);
-  status.add("out of order", last_->out_of_order);
-  status.add("malformed", last_->malformed);
+}
+
+void OdometryDiagnostics::diagnoseInput(Status& status) {
+  input_.diagnose(status);
+  unused_.diagnose(status);
 }
 
 std::string doubtOfLatency(double latency, double max_latency) {
   constexpr double kAhead = 0.1;  // s, a step of the slowest simulated clocks (chosen)
   if (std::isnan(latency)) return ": use_sim_time is true, and nobody publishes /clock: rosbag play needs --clock";
+  constexpr double kEpoch = 1e7;  // s, a third of a year
+  if (latency > kEpoch)
+    return ": the images have another clock than this machine: since its boot, or of a recording that is played "
+           "without "
+           "use_sim_time and --clock?";
   if (latency > max_latency) return ": is the machine too slow, or are the clocks of two machines different?";
   if (latency < -kAhead)
     return ": the images are stamped in the future, where TF knows nothing yet: is the camera's clock that of this "
@@ -202,8 +211,8 @@ void OdometryDiagnostics::addCalibration(Status& status) const {
 }
 
 PlaceDiagnostics::PlaceDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const std::string& name,
-                                   const std::string& input, double max_silence)
-    : input_("pairs with odometry", input, max_silence, {}), updater_(nh, private_nh, name) {
+                                   const std::string& input, double max_silence, UnusedInput& unused)
+    : unused_(unused), input_("pairs with odometry", input, max_silence, {}), updater_(nh, private_nh, name) {
   updater_.add("places", this, &PlaceDiagnostics::diagnose);
 }
 
@@ -220,6 +229,7 @@ void PlaceDiagnostics::restart() {
 void PlaceDiagnostics::diagnose(Status& status) {
   const std::lock_guard<std::mutex> lock(mutex_);
   summarise(status);
+  unused_.diagnose(status);
   if (!last_) return;
   status.add("places", last_->places);
   status.add("loops", last_->loops);
@@ -229,9 +239,6 @@ void PlaceDiagnostics::diagnose(Status& status) {
   status.add("find time [s]", last_->find_time);
   status.add("verify time [s]", last_->verify_time);
   status.add("optimise time [s]", last_->optimise_time);
-  status.add("dropped pairs", last_->dropped_pairs);
-  status.add("unpaired", last_->unpaired);
-  status.add("malformed", last_->malformed);
 }
 
 /// Under the lock. Without odometry places can do nothing, but it is no fault of theirs.

@@ -4,14 +4,15 @@
 #include <stereo_descriptor_vo/PlaceInfo.h>
 #include <stereo_descriptor_vo/VoInfo.h>
 
-#include <cstdint>
 #include <mutex>
 #include <optional>
 #include <string>
 
 #include "../config/interface_options.hpp"
+#include "arrival_log.hpp"
 #include "diagnostic_tasks.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "unused_input.hpp"
 
 namespace sdvo {
 
@@ -20,17 +21,15 @@ namespace sdvo {
 class ImageDiagnostics {
  public:
   ImageDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const std::string& name,
-                   const StereoInputOptions& options);
+                   const StereoInputOptions& options, ArrivalLog& arrivals, UnusedInput& unused);
 
   InputMonitor& input() { return input_; }
   WorkLoad& load() { return load_; }
-  /// Of each pair that came together: how far its stamps are apart, s.
-  void notePair(double gap);
+  /// Of each pair that came together: the left stamp, ns, and how far it is from the right one, s.
+  void notePair(std::int64_t stamp, double gap);
   /// Of each pair that was processed, and of each that could not be, why.
   void note(const StereoFeatures& features);
   void noteFailure(const std::string& why);
-  /// Messages that were refused or came late, since the start.
-  void noteUnused(std::uint64_t refused, std::uint64_t out_of_order);
 
  private:
   using Status = WallUpdater::Status;
@@ -41,14 +40,16 @@ class ImageDiagnostics {
   bool isIdle(Status& status) const;
 
   const ImageThresholds thresholds_;
+  ArrivalLog& arrivals_;
+  UnusedInput& unused_;
   InputMonitor input_;
   WorkLoad load_;
 
   std::mutex mutex_;
   double largest_gap_ = 0.0;  ///< s, since the task was asked last
-  std::uint64_t refused_ = 0, out_of_order_ = 0, reported_ = 0;
   std::optional<ExtractionReport> last_;
   int last_count_ = 0;  ///< of features
+  ExposureTurns exposures_;
   std::string failure_, refused_status_;
   int pairs_ = 0, refused_pairs_ = 0;  ///< since the task was asked last
 
@@ -63,7 +64,7 @@ std::string doubtOfLatency(double latency, double max_latency);
 class OdometryDiagnostics {
  public:
   OdometryDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const std::string& name,
-                      const OdometryOutputOptions& options);
+                      const OdometryOutputOptions& options, UnusedInput& unused);
 
   InputMonitor& input() { return input_; }
   WorkLoad& load() { return load_; }
@@ -74,11 +75,13 @@ class OdometryDiagnostics {
   using Status = WallUpdater::Status;
 
   void diagnose(Status& status);
+  void diagnoseInput(Status& status);
   void diagnoseLatency(Status& status);
   void summarise(Status& status) const;
   void addCalibration(Status& status) const;
 
   const double max_latency_;
+  UnusedInput& unused_;
   InputMonitor input_;
   WorkLoad load_;
   std::mutex mutex_;
@@ -92,7 +95,7 @@ class PlaceDiagnostics {
  public:
   /// `max_silence`: s, wall time. `input`: names of the topics that pairs come from.
   PlaceDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const std::string& name, const std::string& input,
-                   double max_silence);
+                   double max_silence, UnusedInput& unused);
 
   /// Of pairs with odometry.
   InputMonitor& input() { return input_; }
@@ -107,6 +110,7 @@ class PlaceDiagnostics {
   void diagnose(Status& status);
   void summarise(Status& status) const;
 
+  UnusedInput& unused_;
   InputMonitor input_;
   std::mutex mutex_;
   std::optional<stereo_descriptor_vo::PlaceInfo> last_;

@@ -8,9 +8,9 @@
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "../messages/image_conversions.hpp"
 #include "camera_finder.hpp"
 #include "features_image.hpp"
-#include "image_conversions.hpp"
 #include "image_subscriber.hpp"
 #include "synchronisers.hpp"
 #include "threads.hpp"
@@ -21,49 +21,66 @@ namespace sdvo {
 /// Draws the features and their flow over the images, for people. Everything is subscribed only while somebody looks.
 class FeaturesImageNodelet : public nodelet::Nodelet {
  public:
-  ~FeaturesImageNodelet() override { callbacks_.stop(); }
+  ~FeaturesImageNodelet() override {
+    master_callbacks_.stop();
+    callbacks_.stop();
+  }
 
  private:
   using Image = sensor_msgs::Image;
   using Features = stereo_descriptor_vo::StereoFeatures;
   using Flow = stereo_descriptor_vo::FeatureFlow;
+  using Synchroniser = TriggerSynchroniser<Image, Image, Features, Flow>;
 
   struct Inputs {
     explicit Inputs(FeaturesImageNodelet& nodelet)
         : synchroniser(kQueue, kTolerance, [&nodelet](const auto&... messages) { nodelet.draw(messages...); }) {
-      std::string ignored;
-      ros::NodeHandle& nh = nodelet.nh_;
-      ros::NodeHandle image_nh = findOnlyStereoCamera(nh, ignored).value_or(nh);
+      ros::NodeHandle &nh = nodelet.nh_, image_nh = nodelet.imageHandle();
       StereoImageTransport& transport = *nodelet.transport_;
       // Resolved, for a transport appends its own name to that of the topic.
       left.subscribe(image_nh, image_nh.resolveName("left/image_rect"), kQueue, transport.left,
-                     [&nodelet](const Image::ConstPtr& m) { nodelet.take<0>(m); });
+                     [this, &nodelet](const Image::ConstPtr& m) { nodelet.take<0>(synchroniser, m); });
       right.subscribe(image_nh, image_nh.resolveName("right/image_rect"), kQueue, transport.right,
-                      [&nodelet](const Image::ConstPtr& m) { nodelet.take<1>(m); });
-      features = nh.subscribe<Features>("stereo_features", kQueue,
-                                        [&nodelet](const Features::ConstPtr& m) { nodelet.take<2>(m); });
-      flow = nh.subscribe<Flow>("feature_flow", kQueue, [&nodelet](const Flow::ConstPtr& m) { nodelet.take<3>(m); });
+                      [this, &nodelet](const Image::ConstPtr& m) { nodelet.take<1>(synchroniser, m); });
+      features = nh.subscribe<Features>("stereo_features", kQueue, [this, &nodelet](const Features::ConstPtr& m) {
+        nodelet.take<2>(synchroniser, m);
+      });
+      flow = nh.subscribe<Flow>("feature_flow", kQueue,
+                                [this, &nodelet](const Flow::ConstPtr& m) { nodelet.take<3>(synchroniser, m); });
     }
 
     static constexpr int kQueue = 10;
     static constexpr double kTolerance = 0.01;  // s, of the right images: as much as two cameras may be apart
-    TriggerSynchroniser<Image, Image, Features, Flow> synchroniser;
+    Synchroniser synchroniser;
     ImageSubscriber left, right;
     ros::Subscriber features, flow;
   };
 
   void onInit() override try {
     nh_ = callbacks_.serve(getNodeHandle());
+    finds_camera_ = getPrivateNodeHandle().param("find_camera", nh_.getNamespace() != "/");
     transport_ = std::make_unique<StereoImageTransport>(getPrivateNodeHandle());
     const image_transport::SubscriberStatusCallback on_connect =
         [this](const image_transport::SingleSubscriberPublisher&) { updateInputs(); };
-    publisher_ = image_transport::ImageTransport(nh_).advertise("features_image", 1, on_connect, on_connect);
+    publisher_ = image_transport::ImageTransport(master_callbacks_.serve(getNodeHandle()))
+                     .advertise("features_image", 1, on_connect, on_connect);
     callbacks_.start();
+    master_callbacks_.start();
   } catch (const std::exception& e) {
     NODELET_FATAL_STREAM("not started: " << e.what());
     throw;  // the manager forgets the nodelet, and its loader ends with an error
   }
 
+  /// With the names of the camera that the image side takes, too.
+  ros::NodeHandle imageHandle() {
+    CameraFinder finder(nh_.getNamespace(), nh_.resolveName("left/image_rect"), nh_.resolveName("right/image_rect"));
+    ros::master::V_TopicInfo topics;
+    std::string ignored;
+    if (!finds_camera_ || !ros::master::getTopics(topics) || !finder.update(topics, ignored)) return nh_;
+    return callbacks_.serve(ros::NodeHandle(nh_.getNamespace(), finder.names()));
+  }
+
+  /// Where waiting for the master holds no image up.
   void updateInputs() try {
     if (publisher_.getNumSubscribers() == 0) {
       inputs_.reset();
@@ -75,8 +92,8 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
   }
 
   template <int input, class Message>
-  void take(const boost::shared_ptr<const Message>& message) try {
-    if (inputs_) inputs_->synchroniser.add<input>(message);
+  void take(Synchroniser& synchroniser, const boost::shared_ptr<const Message>& message) try {
+    synchroniser.add<input>(message);
   } catch (const std::exception& e) {
     if (throttle_.allows(e.what()))
       NODELET_WARN_STREAM("features_image: a message of type " << ros::message_traits::datatype<Message>()
@@ -98,8 +115,9 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
       NODELET_ERROR_STREAM("features_image at " << left->header.stamp << " skipped: " << e.what());
   }
 
-  CallbackThread callbacks_;
+  CallbackThread callbacks_, master_callbacks_;
   ros::NodeHandle nh_;
+  bool finds_camera_ = true;
   ReportThrottle throttle_;
   std::unique_ptr<StereoImageTransport> transport_;
   image_transport::Publisher publisher_;

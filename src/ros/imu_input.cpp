@@ -2,8 +2,8 @@
 
 #include <utility>
 
-#include "frames.hpp"
-#include "stamps.hpp"
+#include "../messages/frames.hpp"
+#include "../messages/stamps.hpp"
 
 namespace sdvo {
 namespace {
@@ -13,8 +13,8 @@ const std::string kNoAccelerations = " measures no accelerations (linear_acceler
 
 }  // namespace
 
-ImuInput::ImuInput(ros::NodeHandle& nh, const RobotTransforms& transforms, Report warn)
-    : transforms_(transforms), warn_(std::move(warn)) {
+ImuInput::ImuInput(ros::NodeHandle& nh, const RobotTransforms& transforms, UnusedInput& unused, Report warn)
+    : transforms_(transforms), unused_(unused), warn_(std::move(warn)) {
   constexpr int kQueue = 1000;  // messages, a second of the fastest IMUs
   subscriber_ = nh.subscribe<sensor_msgs::Imu>(
       "imu", kQueue, [this](const sensor_msgs::ImuConstPtr& message) { take(*message); }, ros::VoidConstPtr(),
@@ -23,7 +23,10 @@ ImuInput::ImuInput(ros::NodeHandle& nh, const RobotTransforms& transforms, Repor
 
 void ImuInput::take(const sensor_msgs::Imu& message) {
   const std::string problem = whyUnusable(message.header.stamp);
-  if (!problem.empty()) return warn_(topic() + ": a message of the IMU is not used: " + problem);
+  if (!problem.empty()) {
+    unused_.add(UnusedInput::kImu);
+    return warn_(topic() + ": a message of the IMU is not used: " + problem);
+  }
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     frame_ = ros_conversions::cleanFrameId(message.header.frame_id);

@@ -12,6 +12,7 @@
 
 #include "../common/imu_tracks.hpp"
 #include "transforms.hpp"
+#include "unused_input.hpp"
 
 namespace sdvo {
 
@@ -20,8 +21,8 @@ class ImuInput {
  public:
   using Report = std::function<void(const std::string&)>;
 
-  /// `transforms` must outlive the input.
-  ImuInput(ros::NodeHandle& nh, const RobotTransforms& transforms, Report warn);
+  /// `transforms` and `unused` must outlive the input.
+  ImuInput(ros::NodeHandle& nh, const RobotTransforms& transforms, UnusedInput& unused, Report warn);
 
   std::string topic() const { return subscriber_.getTopic(); }
 
@@ -41,6 +42,7 @@ class ImuInput {
   std::optional<Eigen::Matrix3d> axesIn(const std::string& frame, std::string& problem) const;
 
   const RobotTransforms& transforms_;
+  UnusedInput& unused_;
   const Report warn_;
   std::atomic<bool> has_rates_{true}, has_accelerations_{true};  ///< by the newest message
   GyroTrack gyro_;

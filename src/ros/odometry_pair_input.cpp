@@ -3,45 +3,51 @@
 #include <memory>
 #include <stdexcept>
 #include <utility>
+#include <vector>
 
 namespace sdvo {
 
-OdometryPairInput::OdometryPairInput(const ros::NodeHandle& nh, int queue_size, Callback callback, Refusal refuse)
-    : nh_(nh), queue_size_(queue_size), callback_(std::move(callback)), refuse_(std::move(refuse)) {
-  subscribe();
-}
+OdometryPairInput::OdometryPairInput(const ros::NodeHandle& nh, int queue_size, UnusedInput& unused, Callback callback,
+                                     Refusal refuse)
+    : nh_(nh),
+      queue_size_(queue_size),
+      callback_(std::move(callback)),
+      refuse_(std::move(refuse)),
+      unused_(unused),
+      subscriptions_([this] {
+        if (!synchroniser_) beginAnew();
+        return std::vector<ros::Subscriber>{subscribe<0, Features>("stereo_features"), subscribe<1, Odometry>("odom"),
+                                            subscribe<2, Info>("vo_info")};
+      }) {}
 
 std::string OdometryPairInput::topics() const {
   return nh_.resolveName("stereo_features") + ", " + nh_.resolveName("odom") + " and " + nh_.resolveName("vo_info");
 }
 
 bool OdometryPairInput::pause() {
-  const bool was_subscribed = !subscribers_.empty();
-  subscribers_.clear();
-  return was_subscribed;
+  return subscriptions_.pause();
 }
 
 bool OdometryPairInput::resume() {
-  if (!subscribers_.empty()) return false;
+  if (!subscriptions_.isPaused()) return false;
   ++resumes_;
-  subscribe();
-  return true;
+  beginAnew();
+  return subscriptions_.resume();
 }
 
-void OdometryPairInput::subscribe() {
+void OdometryPairInput::beginAnew() {
   const auto onPair = [this](const Features::ConstPtr& features, const Odometry::ConstPtr& odometry,
                              const Info::ConstPtr& info) {
     callback_({features, odometry, info, resumes_});
+    unused_.noteUsed();
   };
   const auto onUnpaired = [this](const Features::ConstPtr&, const Odometry::ConstPtr& odometry,
                                  const Info::ConstPtr& info) {
     const bool has_odometry = !info || (info->state != "LOST" && info->state != "WAITING");
-    if (odometry || has_odometry) ++unpaired_;
+    if (odometry || has_odometry) unused_.add(UnusedInput::kUnpaired);
   };
   constexpr double kEqual = 0.0;  // s: all three have the stamp of the left image
   synchroniser_ = std::make_unique<Synchroniser>(queue_size_, kEqual, onPair, onUnpaired);
-  subscribers_ = {subscribe<0, Features>("stereo_features"), subscribe<1, Odometry>("odom"),
-                  subscribe<2, Info>("vo_info")};
 }
 
 template <int input, class Message>
@@ -54,9 +60,9 @@ ros::Subscriber OdometryPairInput::subscribe(const std::string& topic) {
 
 template <int input, class Message>
 void OdometryPairInput::take(const std::string& topic, const boost::shared_ptr<const Message>& message) try {
-  synchroniser_->add<input>(message);
+  if (!subscriptions_.isPaused()) synchroniser_->add<input>(message);
 } catch (const std::exception& e) {
-  ++refused_;
+  unused_.add(UnusedInput::kRefused);
   refuse_(nh_.resolveName(topic), message->header.stamp, e.what());
 }
 

@@ -5,14 +5,13 @@
 #include <stereo_descriptor_vo/StereoFeatures.h>
 #include <stereo_descriptor_vo/VoInfo.h>
 
-#include <atomic>
-#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
-#include <vector>
 
 #include "synchronisers.hpp"
+#include "threads.hpp"
+#include "unused_input.hpp"
 
 namespace sdvo {
 
@@ -25,15 +24,16 @@ struct OdometryPair {
 };
 
 /// The features of a pair and what the odometry said of it: topics `stereo_features`, `odom` and `vo_info`. Its
-/// functions are called where callbacks run; counts may be read anywhere.
+/// functions are called where callbacks run.
 class OdometryPairInput {
  public:
   using Callback = std::function<void(const OdometryPair&)>;
   /// Of a message that is not used, and why.
   using Refusal = std::function<void(const std::string& topic, const ros::Time& stamp, const std::string& why)>;
 
-  /// `queue_size`: pairs that wait for their other messages.
-  OdometryPairInput(const ros::NodeHandle& nh, int queue_size, Callback callback, Refusal refuse);
+  /// `queue_size`: pairs that wait for their other messages. Pairs with odometry whose other messages do not come, and
+  /// refused messages, count as `unused`.
+  OdometryPairInput(const ros::NodeHandle& nh, int queue_size, UnusedInput& unused, Callback callback, Refusal refuse);
 
   /// Without subscriptions the image side has one listener less. False where that was so already.
   bool pause();
@@ -42,9 +42,6 @@ class OdometryPairInput {
 
   /// Names of the topics, for people.
   std::string topics() const;
-  /// Pairs with odometry whose other messages did not come.
-  std::uint64_t unpaired() const { return unpaired_; }
-  std::uint64_t refused() const { return refused_; }
 
  private:
   using Features = stereo_descriptor_vo::StereoFeatures;
@@ -52,7 +49,7 @@ class OdometryPairInput {
   using Info = stereo_descriptor_vo::VoInfo;
   using Synchroniser = TriggerSynchroniser<Features, Odometry, Info>;
 
-  void subscribe();
+  void beginAnew();
   template <int input, class Message>
   ros::Subscriber subscribe(const std::string& topic);
   template <int input, class Message>
@@ -62,10 +59,10 @@ class OdometryPairInput {
   const int queue_size_;
   const Callback callback_;
   const Refusal refuse_;
+  UnusedInput& unused_;
   int resumes_ = 0;
-  std::atomic<std::uint64_t> unpaired_{0}, refused_{0};
   std::unique_ptr<Synchroniser> synchroniser_;
-  std::vector<ros::Subscriber> subscribers_;
+  PausableInput subscriptions_;
 };
 
 }  // namespace sdvo

@@ -3,18 +3,18 @@
 #include <boost/make_shared.hpp>
 #include <limits>
 
-#include "feature_conversions.hpp"
-#include "frames.hpp"
-#include "stamps.hpp"
+#include "../messages/feature_conversions.hpp"
+#include "../messages/frames.hpp"
+#include "../messages/stamps.hpp"
 
 namespace sdvo {
 
-OdometryPublisher::OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOptions& options)
+OdometryPublisher::OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOptions& options, std::uint32_t tag)
     : options_(options),
       frames_{ros_conversions::cleanFrameId(options.odom_frame_id),
               ros_conversions::cleanFrameId(options.base_frame_id)},
       session_(ros::Time().fromNSec(ros::WallTime::now().toNSec())),
-      transform_publisher_(nh),
+      transform_publisher_(nh, tag),
       path_(static_cast<std::size_t>(options.max_path_length)) {
   constexpr int kQueue = 10;
   odom_publisher_ = nh.advertise<nav_msgs::Odometry>("odom", kQueue);

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "../config/interface_options.hpp"
-#include "odometry_conversions.hpp"
+#include "../messages/odometry_conversions.hpp"
 #include "stereo_descriptor_vo/ros/stereo_features_view.hpp"
 #include "transforms.hpp"
 
@@ -20,7 +20,8 @@ namespace sdvo {
 /// once in a second.
 class OdometryPublisher {
  public:
-  OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOptions& options);
+  /// `tag`: of TransformPublisher.
+  OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOptions& options, std::uint32_t tag);
 
   /// Publishes what the result's state allows: without a pose neither odom (but for zeros, where these are asked for)
   /// nor TF.

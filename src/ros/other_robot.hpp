@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "place_conversions.hpp"
+#include "../messages/place_conversions.hpp"
 #include "throttles.hpp"
 
 namespace sdvo {

@@ -3,6 +3,7 @@
 #include <tf2_eigen/tf2_eigen.h>
 
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <fstream>
 #include <iomanip>
@@ -34,6 +35,12 @@ void writeKitti(const nav_msgs::Path& poses, const Eigen::Isometry3d& T_base_cam
 }
 
 }  // namespace
+
+std::string inRosHome(const std::string& path) {
+  const char *ros_home = std::getenv("ROS_HOME"), *home = std::getenv("HOME");
+  if (path.empty() || (!ros_home && !home)) return path;
+  return ((ros_home ? std::filesystem::path(ros_home) : std::filesystem::path(home) / ".ros") / path).string();
+}
 
 void saveTrajectory(const nav_msgs::Path& poses, const Eigen::Isometry3d& T_base_camera, const std::string& format,
                     const std::string& path) {

@@ -51,6 +51,9 @@ class OutputBag {
   bool closed_ = false;
 };
 
+/// Relative paths lead from ROS_HOME (~/.ros) on, where roslaunch starts nodes.
+std::string inRosHome(const std::string& path);
+
 /// Writes the poses of the base as SaveTrajectory.srv describes it. A file appears whole or not at all. Throws
 /// std::runtime_error that names the file, and leaves it as it was, when the format is unknown, the path is not
 /// absolute, leads to something else than a file, or may not be written.

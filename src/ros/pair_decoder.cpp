@@ -3,7 +3,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "camera_conversions.hpp"
+#include "../messages/camera_conversions.hpp"
 
 namespace sdvo {
 namespace {

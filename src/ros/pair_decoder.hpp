@@ -4,7 +4,7 @@
 #include <optional>
 #include <string>
 
-#include "image_conversions.hpp"
+#include "../messages/image_conversions.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 #include "stereo_input.hpp"
 

@@ -13,22 +13,29 @@
 namespace sdvo {
 namespace {
 
+/// As precise as it is.
+std::string textOf(double number) {
+  std::ostringstream text;
+  text.precision(17);
+  text << number;
+  return text.str();
+}
+
+/// YAML reads `5e0` as text and `2.0` as no integer: what has the same text is the same value.
 void assign(const XmlRpc::XmlRpcValue& parameter, Option& option) {
   using Value = XmlRpc::XmlRpcValue;
   Value value = parameter;  // its conversions are not const
-  const auto wrongType = [&](const char* wanted) { return std::invalid_argument(option.name + " is not " + wanted); };
-  if (auto* b = std::get_if<bool*>(&option.value)) {
-    if (value.getType() != Value::TypeBoolean) throw wrongType("a boolean");
-    **b = static_cast<bool&>(value);
-  } else if (auto* i = std::get_if<int*>(&option.value)) {
-    if (value.getType() != Value::TypeInt) throw wrongType("an integer");
-    **i = static_cast<int&>(value);
-  } else if (auto* d = std::get_if<double*>(&option.value)) {
-    if (value.getType() != Value::TypeDouble && value.getType() != Value::TypeInt) throw wrongType("a number");
-    **d = value.getType() == Value::TypeInt ? static_cast<int&>(value) : static_cast<double&>(value);
-  } else {
-    if (value.getType() != Value::TypeString) throw wrongType("a string");
-    option.set(static_cast<std::string&>(value));
+  switch (value.getType()) {
+    case Value::TypeBoolean:
+      return option.set(static_cast<bool&>(value) ? "true" : "false");
+    case Value::TypeInt:
+      return option.set(std::to_string(static_cast<int&>(value)));
+    case Value::TypeDouble:
+      return option.set(textOf(static_cast<double&>(value)));
+    case Value::TypeString:
+      return option.set(static_cast<std::string&>(value));
+    default:
+      throw std::invalid_argument(option.name + " is a list or a block: one value is expected");
   }
 }
 
@@ -38,15 +45,15 @@ bool isOfImageTransport(const std::string& name) {
   return name == "image_transport" || beginsWith("left_image/") || beginsWith("right_image/");
 }
 
-void setParam(const ros::NodeHandle& nh, const Option& option) {
-  if (const auto* b = std::get_if<bool*>(&option.value))
-    nh.setParam(option.name, **b);
-  else if (const auto* number = std::get_if<int*>(&option.value))
-    nh.setParam(option.name, **number);
-  else if (const auto* d = std::get_if<double*>(&option.value))
-    nh.setParam(option.name, **d);
+void setParam(const ros::NodeHandle& nh, const Option& option, const std::string& text) {
+  if (std::holds_alternative<bool*>(option.value))
+    nh.setParam(option.name, text == "true");
+  else if (std::holds_alternative<int*>(option.value))
+    nh.setParam(option.name, std::stoi(text));
+  else if (std::holds_alternative<double*>(option.value))
+    nh.setParam(option.name, std::stod(text));
   else
-    nh.setParam(option.name, option.text());
+    nh.setParam(option.name, text);
 }
 
 /// Whether a parameter beside our namespace was most likely meant for it: its block is called alike, or it ends as an
@@ -75,7 +82,7 @@ std::vector<std::string> loadParams(const ros::NodeHandle& nh, std::vector<Optio
   for (Option& option : options) {
     XmlRpc::XmlRpcValue value;
     if (!nh.getParam(option.name, value)) {
-      setParam(nh, option);
+      setParam(nh, option, option.text());
       continue;
     }
     try {
@@ -145,14 +152,6 @@ void add(Config& config, const Option& option, const std::string& text) {
     config.strs.push_back(makeParameter<dynamic_reconfigure::StrParameter>(option.name, text));
 }
 
-/// As precise as it is.
-std::string textOf(double number) {
-  std::ostringstream text;
-  text.precision(17);
-  text << number;
-  return text.str();
-}
-
 /// The limits that dynamic_reconfigure states for every parameter, also where there are none.
 void addLimits(Config& min, Config& max, const Option& option) {
   const bool is_bool = std::holds_alternative<bool*>(option.value);
@@ -182,7 +181,7 @@ std::string editMethod(const Option& option) {
 
 ReconfigureServer::ReconfigureServer(ros::NodeHandle private_nh, std::vector<Option> options,
                                      std::function<void()> apply, const std::vector<Option>& defaults)
-    : nh_(std::move(private_nh)), options_(std::move(options)), apply_(std::move(apply)) {
+    : nh_(std::move(private_nh)), options_(std::move(options)), apply_(std::move(apply)), kept_(texts()) {
   dynamic_reconfigure::ConfigDescription description;
   for (const dynamic_reconfigure::GroupState& state : groupsOf(options_)) {
     description.groups.emplace_back();
@@ -207,6 +206,8 @@ ReconfigureServer::ReconfigureServer(ros::NodeHandle private_nh, std::vector<Opt
   updates_ = nh_.advertise<Config>("parameter_updates", 1, true);
   descriptions_.publish(description);
   updates_.publish(currentConfig());
+  keeper_ = std::make_unique<Worker<std::vector<std::string>>>(
+      1, [this](const std::vector<std::string>& texts) { keep(texts); });
   service_ = nh_.advertiseService("set_parameters", &ReconfigureServer::onRequest, this);
 }
 
@@ -217,7 +218,7 @@ bool ReconfigureServer::onRequest(dynamic_reconfigure::Reconfigure::Request& req
   try {
     assign(request.config);
     if (texts() != before) apply_();
-    keepChanges(before);
+    keeper_->push(texts());
   } catch (const std::exception& e) {
     for (std::size_t i = 0; i < options_.size(); ++i) options_[i].set(before[i]);
     ROS_WARN_STREAM(nh_.getNamespace() << ": nothing reconfigured, all values stay: " << e.what());
@@ -227,10 +228,11 @@ bool ReconfigureServer::onRequest(dynamic_reconfigure::Reconfigure::Request& req
   return true;
 }
 
-/// On the parameter server, where a nodelet that is loaded again, and rosparam, find what is in use.
-void ReconfigureServer::keepChanges(const std::vector<std::string>& before) {
+/// On the parameter server, where a nodelet that is loaded again, and rosparam, find what is in use. In a thread of its
+/// own: a master that is out of reach lets it wait.
+void ReconfigureServer::keep(const std::vector<std::string>& texts) {
   for (std::size_t i = 0; i < options_.size(); ++i)
-    if (options_[i].text() != before[i]) setParam(nh_, options_[i]);
+    if (std::exchange(kept_[i], texts[i]) != texts[i]) setParam(nh_, options_[i], texts[i]);
 }
 
 void ReconfigureServer::assign(const Config& request) {

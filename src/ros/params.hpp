@@ -5,10 +5,12 @@
 #include <ros/node_handle.h>
 
 #include <functional>
+#include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
 
+#include "../common/worker.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
 
 namespace sdvo {
@@ -31,14 +33,15 @@ class ReconfigureServer {
   /// `options` refer to values that must outlive the server and that only the server writes. `apply` runs in a ROS
   /// callback, never twice at a time, after values have changed. A request is taken over as a whole or not at all: when
   /// a name or a value is wrong, or `apply` throws, all values are as before and the response shows these.
-  /// What has changed is set on the parameter server, too. `defaults`: the same options of a struct left as it is.
+  /// What has changed is set on the parameter server soon after. `defaults`: the same options of a struct left as it
+  /// is.
   ReconfigureServer(ros::NodeHandle private_nh, std::vector<Option> options, std::function<void()> apply,
                     const std::vector<Option>& defaults);
 
  private:
   bool onRequest(dynamic_reconfigure::Reconfigure::Request& request,
                  dynamic_reconfigure::Reconfigure::Response& response);
-  void keepChanges(const std::vector<std::string>& before);
+  void keep(const std::vector<std::string>& texts);
   void assign(const dynamic_reconfigure::Config& request);
   void set(const std::string& name, const std::string& text);
   std::vector<std::string> texts() const;
@@ -48,7 +51,9 @@ class ReconfigureServer {
   std::vector<Option> options_;
   std::function<void()> apply_;
   std::mutex mutex_;
+  std::vector<std::string> kept_;  ///< on the parameter server; the keeper's
   ros::Publisher descriptions_, updates_;
+  std::unique_ptr<Worker<std::vector<std::string>>> keeper_;
   ros::ServiceServer service_;
 };
 

@@ -5,19 +5,19 @@
 #include <boost/make_shared.hpp>
 #include <utility>
 
-#include "frames.hpp"
+#include "../messages/frames.hpp"
 
 namespace sdvo {
 
 namespace msgs = stereo_descriptor_vo;
 
 PlacePublisher::PlacePublisher(ros::NodeHandle& nh, const PlaceOutputOptions& options, const std::string& robot,
-                               std::function<Map()> map)
+                               std::uint32_t tag, std::function<Map()> map)
     : options_(options),
       robot_(robot),
       map_frame_(ros_conversions::cleanFrameId(options.map_frame_id)),
       map_(std::move(map)),
-      transform_publisher_(nh) {
+      transform_publisher_(nh, tag) {
   constexpr int kQueue = 10;
   info_publisher_ = nh.advertise<msgs::PlaceInfo>("place_info", kQueue);
   signature_publisher_ = nh.advertise<msgs::PlaceSignature>("place_signature", kQueue);

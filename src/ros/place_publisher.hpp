@@ -10,7 +10,7 @@
 #include <string>
 
 #include "../config/interface_options.hpp"
-#include "place_conversions.hpp"
+#include "../messages/place_conversions.hpp"
 #include "stereo_descriptor_vo/places/eased_transform.hpp"
 #include "transforms.hpp"
 
@@ -23,8 +23,8 @@ class PlacePublisher {
     ros_conversions::MapState state;
     std::optional<Eigen::Isometry3d> T_base_camera;  ///< none before the first pair
   };
-  /// `map`: the map as it is; called from a timer.
-  PlacePublisher(ros::NodeHandle& nh, const PlaceOutputOptions& options, const std::string& robot,
+  /// `tag`: of TransformPublisher. `map`: the map as it is; called from a timer.
+  PlacePublisher(ros::NodeHandle& nh, const PlaceOutputOptions& options, const std::string& robot, std::uint32_t tag,
                  std::function<Map()> map);
 
   void publish(const stereo_descriptor_vo::PlaceInfo& info) { info_publisher_.publish(info); }

@@ -20,10 +20,12 @@
 
 #include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
+#include "../messages/frames.hpp"
+#include "../messages/stamps.hpp"
 #include "diagnostics.hpp"
-#include "frames.hpp"
 #include "odometry_pair_input.hpp"
 #include "other_robot.hpp"
+#include "output_files.hpp"
 #include "params.hpp"
 #include "place_publisher.hpp"
 #include "place_session.hpp"
@@ -32,6 +34,7 @@
 #include "threads.hpp"
 #include "throttles.hpp"
 #include "transforms.hpp"
+#include "unused_input.hpp"
 
 namespace sdvo {
 
@@ -40,12 +43,19 @@ namespace sdvo {
 class PlaceRecognitionNodelet : public nodelet::Nodelet {
  public:
   ~PlaceRecognitionNodelet() override {
-    if (mount_) mount_->stop();
+    stopping_ = true;
     // Nothing may arrive any more, and nothing be in work, when members go.
     callbacks_.stop();
     slow_callbacks_.stop();
+    disk_callbacks_.stop();
     if (observer_) observer_->stop();
     if (optimiser_) optimiser_->stop();
+    if (options_.output.save_at_shutdown && input_) try {
+        const std::string path = map_file_.empty() ? inRosHome(options_.output.places_file) : map_file_;
+        NODELET_INFO_STREAM(save(path) << " in '" << path << "'");
+      } catch (const std::exception& e) {
+        NODELET_ERROR_STREAM("the map is not saved at the end: " << e.what());
+      }
   }
 
  private:
@@ -74,38 +84,45 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     nh_ = callbacks_.serve(getNodeHandle());
     ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
     ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
+    ros::NodeHandle disk_nh = disk_callbacks_.serve(getPrivateNodeHandle());
     ros::NodeHandle other_nh = slow_callbacks_.serve(getNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
       NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect: misspelt? See docs/parameters.md");
     const PlaceOutputOptions& output = options_.output;
+    ros_conversions::requireName({"map_frame_id", output.map_frame_id});
     if (output.opencv_threads >= 0) cv::setNumThreads(output.opencv_threads);
     robot_ = output.robot_name.empty() ? nh_.getNamespace() : output.robot_name;
     session_ = std::make_shared<PlaceSession>(options_.recognition);
-    if (!output.places_file.empty()) begin(output.places_file);
+    if (output.save_at_shutdown && (output.places_file.empty() || options_.recognition.localisation_only))
+      throw std::invalid_argument("save_at_shutdown needs a places_file, and a map that is not localisation_only");
+    if (!output.places_file.empty()) begin(inRosHome(output.places_file));
 
-    transforms_ = std::make_unique<RobotTransforms>(nh_, std::nullopt, [this](const std::string& what) {
+    const std::uint32_t tag = TransformPublisher::tagOf(getName());
+    transforms_ = std::make_unique<RobotTransforms>(nh_, std::nullopt, tag, [this](const std::string& what) {
       if (throttle_.allows(what)) NODELET_WARN_STREAM(what);
     });
     mount_ = std::make_unique<CameraMount>(*transforms_, output.tf_timeout);
-    publisher_ = std::make_unique<PlacePublisher>(nh_, output, robot_, [this] { return map(); });
+    publisher_ = std::make_unique<PlacePublisher>(nh_, output, robot_, tag, [this] { return map(); });
     services_ = {private_nh.advertiseService("reset", &PlaceRecognitionNodelet::onReset, this),
                  private_nh.advertiseService("pause", &PlaceRecognitionNodelet::onPause, this),
                  private_nh.advertiseService("resume", &PlaceRecognitionNodelet::onResume, this),
-                 slow_nh.advertiseService("save_places", &PlaceRecognitionNodelet::onSavePlaces, this),
-                 slow_nh.advertiseService("load_places", &PlaceRecognitionNodelet::onLoadPlaces, this),
+                 disk_nh.advertiseService("save_places", &PlaceRecognitionNodelet::onSavePlaces, this),
+                 disk_nh.advertiseService("load_places", &PlaceRecognitionNodelet::onLoadPlaces, this),
                  slow_nh.advertiseService("get_place", &PlaceRecognitionNodelet::onGetPlace, this)};
     observer_ = std::make_unique<Worker<Arrived>>(static_cast<std::size_t>(output.queue_size),
                                                   [this](const Arrived& arrived) { observe(arrived); });
     optimiser_ = std::make_unique<Worker<Job>>(1, [this](const Job& job) { optimise(job); });
     other_ =
         std::make_unique<OtherRobot>(other_nh, robot_, output.other_min_score, output.other_timeout, placesForOthers());
+    unused_ = std::make_unique<UnusedInput>("pairs", RateOptions().max_unused);
     input_ = std::make_unique<OdometryPairInput>(
-        nh_, output.sync_queue_size, [this](const OdometryPair& pair) { onPair(pair); },
+        nh_, output.sync_queue_size, *unused_, [this](const OdometryPair& pair) { onPair(pair); },
         [this](const std::string& topic, const ros::Time& stamp, const std::string& why) {
           if (throttle_.allows(topic + why))
             NODELET_ERROR_STREAM(topic << ": message at " << stamp << " skipped: " << why);
         });
-    diagnostics_ = std::make_unique<PlaceDiagnostics>(nh_, private_nh, getName(), input_->topics(), output.max_silence);
+    diagnostics_ =
+        std::make_unique<PlaceDiagnostics>(nh_, private_nh, getName(), input_->topics(), output.max_silence, *unused_);
     // Ours, and the robot's: that of an rviz beside the camera's namespace.
     for (const std::string& topic :
          {std::string("initialpose"), ros::names::parentNamespace(nh_.getNamespace()) + "/initialpose"})
@@ -113,6 +130,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
           topic, 1, [this](const geometry_msgs::PoseWithCovarianceStamped::ConstPtr& m) { onInitialPose(*m); }));
     callbacks_.start();
     slow_callbacks_.start();
+    disk_callbacks_.start();
   } catch (const std::exception& e) {
     NODELET_FATAL_STREAM("not started: " << e.what());
     throw;  // the manager forgets the nodelet, and its loader ends with an error
@@ -121,7 +139,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   /// With the places of the parameter's file. On a robot's first day there is none.
   void begin(const std::string& path) {
     map_file_ = path;
-    if (std::filesystem::path(path).is_absolute() && !std::filesystem::exists(path)) {
+    if (!std::filesystem::exists(path)) {
       NODELET_WARN_STREAM("places_file '" << path
                                           << "' does not exist: begins without places, save_places writes such a file");
       return;
@@ -134,17 +152,23 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   void onInitialPose(const geometry_msgs::PoseWithCovarianceStamped& message) try {
     const std::lock_guard<std::mutex> lock(mutex_);
-    session_->expect(message, ros_conversions::cleanFrameId(options_.output.map_frame_id));
+    if (session_->isMapping() && !options_.output.initialpose_while_mapping)
+      throw std::invalid_argument(
+          "it would move the robot while its map grows; set initialpose_while_mapping for that");
+    const std::string map_frame = ros_conversions::cleanFrameId(options_.output.map_frame_id);
+    NODELET_WARN_STREAM("initialpose: " << session_->expect(message, map_frame));
   } catch (const std::exception& e) {
     NODELET_WARN_STREAM("the pose on initialpose is not used: " << e.what());
   }
 
+  /// Throws std::invalid_argument where the odometry's frame is the map's.
   void onPair(const OdometryPair& pair) {
-    diagnostics_->input().note();
+    diagnostics_->input().note(nanoseconds(pair.features->header.stamp));
+    const std::string &map_frame = options_.output.map_frame_id, &odom_frame = pair.odometry->header.frame_id;
+    ros_conversions::requireTwoFrames({"map_frame_id", map_frame}, {"the odometry's odom_frame_id", odom_frame});
     if (options_.output.publish_tf)
-      transforms_->claim({ros_conversions::cleanFrameId(options_.output.map_frame_id),
-                          ros_conversions::cleanFrameId(pair.odometry->header.frame_id)});
-    observer_->push({pair, generation_});
+      transforms_->claim({ros_conversions::cleanFrameId(map_frame), ros_conversions::cleanFrameId(odom_frame)});
+    if (!observer_->push({pair, generation_})) unused_->add(UnusedInput::kPushedOut);
   }
 
   // Recognition, in the observer's thread.
@@ -154,17 +178,24 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     const ros::Time stamp = pair.features->header.stamp;
     const std::optional<Eigen::Isometry3d> T_base_camera = findExtrinsic(pair);
     if (!T_base_camera) return;
-    const std::lock_guard<std::mutex> lock(mutex_);
+    std::unique_lock<std::mutex> lock(mutex_);
     if (arrived.generation != generation_) return;
     const PlaceSession::Time time = session_->noteTime(stamp, ros::Time::now(), ros::Time::isSimTime());
     if (time == PlaceSession::Time::kStands) return;
-    if (time == PlaceSession::Time::kBeganAnew) restart("the clock jumped back", map_file_);
+    if (time == PlaceSession::Time::kBeganAnew) {
+      const std::string file = map_file_;
+      lock.unlock();  // the disk is slow
+      std::shared_ptr<PlaceSession> anew = sessionOf(file);
+      lock.lock();
+      if (arrived.generation != generation_) return;
+      restart("the clock jumped back", std::move(anew));
+    }
     if (time == PlaceSession::Time::kFell)
       NODELET_WARN_STREAM("the stamps of the features jumped back to "
                           << stamp << " (camera driver restarted?): the places stay, the motion in between is unknown");
     if (const std::optional<PlaceReport> report = session_->observe(pair, *T_base_camera)) publish(*report, stamp);
   } catch (const std::exception& e) {
-    ++refused_;
+    unused_->add(UnusedInput::kRefused);
     if (throttle_.allows(e.what()))
       NODELET_ERROR_STREAM("pair at " << arrived.pair.features->header.stamp << " skipped: " << e.what());
   }
@@ -178,6 +209,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     if (before && (before->session != pair.info->session ||
                    (before->epoch != pair.info->epoch && (since_reset <= 0.0 || since_reset < before->distance))))
       mount_->forget();
+    mount_->await(base_frame, camera_frame, [this] { return stopping_ || observer_->isFull(); });
     std::string problem;
     const std::optional<Eigen::Isometry3d> found = mount_->find(base_frame, camera_frame, problem);
     if (!found && throttle_.allows("extrinsic"))
@@ -207,19 +239,22 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     stereo_descriptor_vo::PlaceInfo info = session.info(report);
     info.header.stamp = stamp;
     info.header.frame_id = map_frame;
-    info.dropped_pairs = observer_->dropped();
-    info.unpaired = input_->unpaired();
-    info.malformed = input_->refused() + refused_;
+    info.dropped_pairs = unused_->count(UnusedInput::kPushedOut);
+    info.unpaired = unused_->count(UnusedInput::kUnpaired);
+    info.malformed = unused_->count(UnusedInput::kRefused);
     publisher_->publish(info);
     diagnostics_->note(info);
   }
 
-  /// With the places of `file` alone; empty: with none.
-  void restart(const char* why, const std::string& file) {
+  void restart(const char* why, std::shared_ptr<PlaceSession> anew) {
     NODELET_WARN_STREAM(why << ": " << session_->recognition().places().size() << " places are forgotten"
-                            << (file.empty() ? "" : ", but for those of '" + file + "'"));
-    map_file_ = file;
-    replace(std::filesystem::exists(file) ? load(file) : std::make_shared<PlaceSession>(options_.recognition));
+                            << (map_file_.empty() ? "" : ", but for those of '" + map_file_ + "'"));
+    replace(std::move(anew));
+  }
+
+  /// With the places of a file, where it is there.
+  std::shared_ptr<PlaceSession> sessionOf(const std::string& file) const {
+    return std::filesystem::exists(file) ? load(file) : std::make_shared<PlaceSession>(options_.recognition);
   }
 
   void replace(std::shared_ptr<PlaceSession> session) {
@@ -279,7 +314,8 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   bool onReset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++generation_;
-    restart("reset was called", "");
+    map_file_.clear();
+    restart("reset was called", std::make_shared<PlaceSession>(options_.recognition));
     return true;
   }
 
@@ -300,6 +336,16 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   bool onSavePlaces(stereo_descriptor_vo::SavePlaces::Request& request,
                     stereo_descriptor_vo::SavePlaces::Response& response) try {
+    response.message = save(inRosHome(request.path));
+    response.success = true;
+    return true;
+  } catch (const std::exception& e) {
+    response.message = e.what();
+    return true;
+  }
+
+  /// Says how many.
+  std::string save(const std::string& path) {
     std::unique_lock<std::mutex> lock(mutex_);
     const std::vector<Place> places = session_->places();
     const ros_conversions::MapState state = session_->map();
@@ -310,26 +356,22 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     if (options_.recognition.localisation_only)
       throw std::runtime_error(
           "not saved: localisation_only keeps the map as it is in the file that it was loaded from");
-    savePlaces(places, state, stream, robot_, ros_conversions::cleanFrameId(options_.output.map_frame_id),
-               request.path);
-    response.success = true;
-    response.message = std::to_string(places.size()) + " places";
-    return true;
-  } catch (const std::exception& e) {
-    response.message = e.what();
-    return true;
+    savePlaces(places, state, stream, robot_, ros_conversions::cleanFrameId(options_.output.map_frame_id), path,
+               options_.output.overwrite);
+    return std::to_string(places.size()) + " places";
   }
 
   bool onLoadPlaces(stereo_descriptor_vo::LoadPlaces::Request& request,
                     stereo_descriptor_vo::LoadPlaces::Response& response) try {
-    std::shared_ptr<PlaceSession> loaded = load(request.path);
+    const std::string file = inRosHome(request.path);
+    std::shared_ptr<PlaceSession> loaded = load(file);
     const std::lock_guard<std::mutex> lock(mutex_);
     loaded->refuseOtherCameraThan(*session_);
     response.message = std::to_string(loaded->recognition().places().size()) + " places; " +
                        std::to_string(session_->recognition().places().size()) + " of before are forgotten";
     ++generation_;
     replace(std::move(loaded));
-    map_file_ = request.path;
+    map_file_ = file;
     response.success = true;
     return true;
   } catch (const std::exception& e) {
@@ -357,11 +399,13 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     return true;
   }
 
-  CallbackThread callbacks_, slow_callbacks_;  // the second one of services that take their time
+  CallbackThread callbacks_, slow_callbacks_,
+      disk_callbacks_;  // of services: those that take their time, those of files
   ros::NodeHandle nh_;
   Options options_;
   std::string robot_;
   ReportThrottle throttle_;
+  std::unique_ptr<UnusedInput> unused_;
   std::unique_ptr<RobotTransforms> transforms_;
   std::unique_ptr<CameraMount> mount_;
   std::unique_ptr<PlacePublisher> publisher_;
@@ -373,8 +417,8 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   std::string map_file_;                   // that its first places are from; empty: none
   bool was_located_ = false;               // … and map -> odom is published since then
   std::atomic<int> generation_{0};         // sessions that a service began
-  // Only the observer's thread touches these.
-  std::uint64_t refused_ = 0;  // pairs
+  std::atomic<bool> stopping_{false};
+  // Only the observer's thread touches this.
   stereo_descriptor_vo::VoInfo::ConstPtr mount_of_;
 
   std::unique_ptr<Worker<Arrived>> observer_;

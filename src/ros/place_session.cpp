@@ -8,16 +8,21 @@
 #include <stdexcept>
 #include <utility>
 
-#include "feature_conversions.hpp"
-#include "frames.hpp"
-#include "odometry_conversions.hpp"
-#include "pose_conversions.hpp"
-#include "stamps.hpp"
+#include "../common/text.hpp"
+#include "../messages/feature_conversions.hpp"
+#include "../messages/frames.hpp"
+#include "../messages/odometry_conversions.hpp"
+#include "../messages/pose_conversions.hpp"
+#include "../messages/stamps.hpp"
 
 namespace sdvo {
 
 PlaceSession::PlaceSession(const PlaceRecognitionOptions& options, SavedPlaces saved)
-    : index_(options.index), recognition_(options), stream_(saved.stream), located_(false) {
+    : index_(options.index),
+      localises_only_(options.localisation_only),
+      recognition_(options),
+      stream_(saved.stream),
+      located_(false) {
   recognition_.restore(std::move(saved.places), saved.graph);
   loaded_ = recognition_.places().rbegin()->first + 1;
 }
@@ -36,7 +41,9 @@ PlaceSession::Time PlaceSession::noteTime(const ros::Time& stamp, const ros::Tim
 
 std::optional<PlaceReport> PlaceSession::observe(const OdometryPair& pair, const Eigen::Isometry3d& T_base_camera) {
   const StereoFeatures features = ros_conversions::fromMessage(*pair.features);
-  refuse(features.camera, features.kind());
+  const auto kind = features.count() > 0 ? std::optional(features.kind()) : kind_;
+  refuse(features.camera, kind);
+  kind_ = kind;
   const ros::Time stamp = pair.features->header.stamp;
   const Eigen::Isometry3d T_odom_base = ros_conversions::toPose(pair.odometry->pose.pose);
   if (const auto expected = std::exchange(expected_, std::nullopt); expected && !recognition_.places().empty()) {
@@ -52,7 +59,7 @@ std::optional<PlaceReport> PlaceSession::observe(const OdometryPair& pair, const
     motion.covariance =
         ros_conversions::toMotionCovariance(*pair.odometry, secondsBetween(last_->stamp, stamp), T_base_camera);
   std::optional<PlaceReport> report = recognition_.observe(features, motion);
-  last_ = {stamp, pair.info->session, pair.info->epoch, pair.resumes, features.camera, features.kind()};
+  last_ = {stamp, pair.info->session, pair.info->epoch, pair.resumes, features.camera, T_odom_base};
   continues_ = true;
   odom_frame_ = ros_conversions::cleanFrameId(pair.odometry->header.frame_id);
   stream_ = ros_conversions::streamOf(*pair.features);
@@ -60,7 +67,7 @@ std::optional<PlaceReport> PlaceSession::observe(const OdometryPair& pair, const
   return report;
 }
 
-void PlaceSession::expect(const geometry_msgs::PoseWithCovarianceStamped& pose, const std::string& map_frame) {
+std::string PlaceSession::expect(const geometry_msgs::PoseWithCovarianceStamped& pose, const std::string& map_frame) {
   constexpr double kLeast = 5.0;   // m: a click in rviz is no better (chosen)
   constexpr double kSigmas = 3.0;  // standard deviations
   const std::string frame = ros_conversions::cleanFrameId(pose.header.frame_id);
@@ -69,21 +76,26 @@ void PlaceSession::expect(const geometry_msgs::PoseWithCovarianceStamped& pose, 
                                 "' (rviz: Fixed Frame)");
   const double variance = std::max(pose.pose.covariance[0], pose.pose.covariance[7]);
   if (!std::isfinite(variance)) throw std::invalid_argument("its covariance is not finite");
-  expected_ = {ros_conversions::toPose(pose.pose.pose), kLeast + kSigmas * std::sqrt(std::max(0.0, variance))};
+  const Eigen::Isometry3d T_map_base = ros_conversions::toPose(pose.pose.pose);
+  expected_ = {T_map_base, kLeast + kSigmas * std::sqrt(std::max(0.0, variance))};
+  if (!last_ || !isPlaced()) return "the robot is placed in the map";
+  const Eigen::Isometry3d moved = (recognition_.T_map_odom() * last_->T_odom_base).inverse() * T_map_base;
+  return text(2, "the robot is moved in the map, by ", moved.translation().norm(), " m and ",
+              180.0 / M_PI * Eigen::AngleAxisd(moved.linear()).angle(), " deg");
 }
 
 void PlaceSession::refuseOtherCameraThan(const PlaceSession& session) const {
-  if (session.last_) refuse(session.last_->camera, session.last_->kind);
+  if (session.last_) refuse(session.last_->camera, session.kind_);
 }
 
-void PlaceSession::refuse(const StereoCamera& camera, const DescriptorKind& kind) const {
+void PlaceSession::refuse(const StereoCamera& camera, const std::optional<DescriptorKind>& kind) const {
   if (recognition_.places().empty()) return;
   const StereoFeatures& known = recognition_.places().begin()->second.features;
   if (!known.camera.isLike(camera))
-    throw std::invalid_argument("the places are of another camera: call reset, or load_places of this one");
-  if (kind != known.kind())
-    throw std::invalid_argument("the places are described by " + toString(known.kind()) + ", not by " + toString(kind) +
-                                ": call reset, or load_places of these");
+    throw std::invalid_argument("the places are of another camera: load_places of this one, or reset without any");
+  if (kind && *kind != known.kind())
+    throw std::invalid_argument("the places are described by " + toString(known.kind()) + ", not by " +
+                                toString(*kind) + ": load_places of these, or reset without any");
 }
 
 ros_conversions::MapState PlaceSession::map() const {

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "../messages/place_conversions.hpp"
 #include "odometry_pair_input.hpp"
-#include "place_conversions.hpp"
 #include "places_file.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
 
@@ -18,7 +18,8 @@ namespace sdvo {
 /// The places and all that begins anew with them. Not for several threads at once.
 class PlaceSession {
  public:
-  explicit PlaceSession(const PlaceRecognitionOptions& options) : index_(options.index), recognition_(options) {}
+  explicit PlaceSession(const PlaceRecognitionOptions& options)
+      : index_(options.index), localises_only_(options.localisation_only), recognition_(options) {}
 
   /// Begins with the places of an earlier session. Throws std::invalid_argument when they do not belong together.
   PlaceSession(const PlaceRecognitionOptions& options, SavedPlaces saved);
@@ -33,9 +34,9 @@ class PlaceSession {
   std::optional<PlaceReport> observe(const OdometryPair& pair, const Eigen::Isometry3d& T_base_camera);
 
   /// Takes a pose of the base in the map, as from rviz' "2D Pose Estimate". From the next pair on the odometry is
-  /// there, and until a place is recognised only those nearby are looked at. Throws std::invalid_argument for a pose
-  /// that is not of `map_frame`, and for numbers that are not finite.
-  void expect(const geometry_msgs::PoseWithCovarianceStamped& pose, const std::string& map_frame);
+  /// there, and until a place is recognised only those nearby are looked at. Returns what this does, in words. Throws
+  /// std::invalid_argument for a pose that is not of `map_frame`, and for numbers that are not finite.
+  std::string expect(const geometry_msgs::PoseWithCovarianceStamped& pose, const std::string& map_frame);
 
   /// Throws std::invalid_argument where the places are not of the camera and the descriptors that `session` saw last.
   void refuseOtherCameraThan(const PlaceSession& session) const;
@@ -63,6 +64,8 @@ class PlaceSession {
   bool isLocated() const { return located_; }
   /// … or somebody said where.
   bool isPlaced() const { return located_ || told_; }
+  /// Whether the map grows around an odometry that has its place in it.
+  bool isMapping() const { return located_ && !localises_only_; }
   /// Of the last optimisation, s.
   double optimise_time = 0.0;
 
@@ -73,16 +76,18 @@ class PlaceSession {
     std::uint32_t epoch;
     int resumes;
     StereoCamera camera;
-    DescriptorKind kind;
+    Eigen::Isometry3d T_odom_base;
   };
 
-  void refuse(const StereoCamera& camera, const DescriptorKind& kind) const;
+  void refuse(const StereoCamera& camera, const std::optional<DescriptorKind>& kind) const;
 
   const PlaceIndexOptions index_;
+  const bool localises_only_;
   PlaceRecognition recognition_;
   std::string odom_frame_;
   ros_conversions::FeatureStream stream_;
   std::optional<Last> last_;
+  std::optional<DescriptorKind> kind_;  ///< none before the first features: a dark pair has none
   std::optional<ros::Time> last_now_;
   bool clock_fell_ = false;  ///< since the stamps did
   bool continues_ = false;   ///< the next pair's motion since the last one is known

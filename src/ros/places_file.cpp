@@ -6,6 +6,7 @@
 #include <boost/interprocess/file_mapping.hpp>
 #include <boost/interprocess/mapped_region.hpp>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <stdexcept>
 #include <string_view>
@@ -59,14 +60,31 @@ Message parse(BagMessage in_bag) {
   return message;
 }
 
-SavedPlaces read(const std::string& path, const PoseGraphOptions& options) {
+void readFile(const std::string& path, const std::function<void(const BagMessage&)>& use) {
   namespace ipc = boost::interprocess;
+  if (!std::filesystem::is_regular_file(path)) throw std::invalid_argument("there is no such file");
   if (std::filesystem::is_empty(path)) throw std::invalid_argument("it is empty");
   const ipc::mapped_region region(ipc::file_mapping(path.c_str(), ipc::read_only), ipc::read_only);
+  readBag({static_cast<const char*>(region.get_address()), region.get_size()}, use);
+}
+
+/// Also one that a version with other messages wrote. Nothing is lost with a file that is empty.
+bool isOfPlaces(const std::string& path) try {
+  if (std::filesystem::is_regular_file(path) && std::filesystem::is_empty(path)) return true;
+  bool found = false;
+  readFile(path, [&](BagMessage message) {
+    found |= message.connection["type"] == ros::message_traits::datatype<msgs::MapGraph>();
+  });
+  return found;
+} catch (const std::exception&) {
+  return false;
+}
+
+SavedPlaces read(const std::string& path, const PoseGraphOptions& options) {
   std::vector<Place> places;
   std::optional<PoseGraph> graph;
   std::optional<ros_conversions::FeatureStream> stream;
-  readBag({static_cast<const char*>(region.get_address()), region.get_size()}, [&](BagMessage message) {
+  readFile(path, [&](BagMessage message) {
     const std::string_view topic = message.connection["topic"];
     if (topic == kPlaceTopic) {
       const auto place = parse<msgs::Place>(message);
@@ -89,7 +107,10 @@ SavedPlaces read(const std::string& path, const PoseGraphOptions& options) {
 
 void savePlaces(const std::vector<Place>& places, const ros_conversions::MapState& map,
                 const ros_conversions::FeatureStream& stream, const std::string& robot, const std::string& map_frame,
-                const std::string& path) {
+                const std::string& path, bool overwrite) {
+  if (!overwrite && std::filesystem::is_regular_file(path) && !isOfPlaces(path))
+    throw std::runtime_error(
+        "'" + path + "' is no file of save_places: give another path, or set place_recognition/overwrite at the start");
   writeWhole(path, [&](const std::string& partial) {
     OutputBag bag(partial);
     ros::Time newest = ros::TIME_MIN;
@@ -105,7 +126,6 @@ void savePlaces(const std::vector<Place>& places, const ros_conversions::MapStat
 
 SavedPlaces loadPlaces(const std::string& path, const PoseGraphOptions& options) try {
   if (!std::filesystem::path(path).is_absolute()) throw std::invalid_argument("the path must be absolute");
-  if (!std::filesystem::is_regular_file(path)) throw std::invalid_argument("there is no such file");
   return read(path, options);
 } catch (const std::exception& e) {
   throw std::runtime_error("'" + path + "': " + e.what());

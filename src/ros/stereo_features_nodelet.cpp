@@ -7,6 +7,7 @@
 #include <opencv2/core/utility.hpp>
 #include <optional>
 #include <pluginlib/class_list_macros.hpp>
+#include <set>
 #include <stdexcept>
 #include <utility>
 
@@ -15,15 +16,15 @@
 #include "../common/stamp_filter.hpp"
 #include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
-#include "camera_conversions.hpp"
+#include "../messages/camera_conversions.hpp"
+#include "../messages/feature_conversions.hpp"
+#include "../messages/frames.hpp"
+#include "../messages/image_conversions.hpp"
+#include "../messages/stamps.hpp"
 #include "camera_finder.hpp"
 #include "diagnostics.hpp"
-#include "feature_conversions.hpp"
-#include "frames.hpp"
-#include "image_conversions.hpp"
 #include "pair_decoder.hpp"
 #include "params.hpp"
-#include "stamps.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 #include "stereo_input.hpp"
 #include "threads.hpp"
@@ -53,6 +54,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
  public:
   ~StereoFeaturesNodelet() override {
     // Nothing may arrive any more, and nothing be in work, when members go.
+    master_callbacks_.stop();
     callbacks_.stop();
     slow_callbacks_.stop();
     if (worker_) worker_->stop();
@@ -72,28 +74,32 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   using PairFilter = StampFilter<StereoPairMessages>;
 
   void onInit() override try {
-    nh_ = image_nh_ = callbacks_.serve(getNodeHandle());
+    nh_ = callbacks_.serve(getNodeHandle());
     ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
     ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
+    ros::NodeHandle master_nh = master_callbacks_.serve(getNodeHandle());
+    options_.input.find_camera = nh_.getNamespace() != "/";  // there it would be any camera of the robot
     for (const std::string& name : loadParams(private_nh, options_))
       NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect: misspelt? See docs/parameters.md");
     transport_ = std::make_unique<StereoImageTransport>(private_nh);
     extractor_ = std::make_unique<FeatureExtractor>(options_.extractor);
     pace_ = Pace(options_.input.max_rate);
+    unused_ = std::make_unique<UnusedInput>(
+        "pairs", options_.input.rates.max_unused,
+        std::set<int>{UnusedInput::kUnpaired, UnusedInput::kPushedOut, UnusedInput::kRefused});
+    arrivals_ = std::make_unique<ArrivalLog>(options_.input, *unused_);
+    finder_ = std::make_unique<CameraFinder>(nh_.getNamespace(), nh_.resolveName("left/image_rect"),
+                                             nh_.resolveName("right/image_rect"));
     worker_ =
         std::make_unique<Worker<PairFilter::Passed>>(static_cast<std::size_t>(options_.input.queue_size),
                                                      [this](const PairFilter::Passed& passed) { process(passed); });
     if (options_.input.opencv_threads >= 0) cv::setNumThreads(options_.input.opencv_threads);
-    diagnostics_ = std::make_unique<ImageDiagnostics>(nh_, private_nh, getName(), options_.input);
+    diagnostics_ = std::make_unique<ImageDiagnostics>(nh_, private_nh, getName(), options_.input, *arrivals_, *unused_);
     diagnostics_->input().noteIdle(kNobodyListens);
-    silence_timer_ = nh_.createWallTimer(ros::WallDuration(kSilencePeriod), [this](const ros::WallTimerEvent&) {
-      const std::string silence = input_ ? input_->explainSilence() : std::string();
-      if (!silence.empty()) NODELET_WARN_STREAM(silence);
-    });
+    input_timer_ =
+        master_nh.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { watchInput(); });
 
     FeatureExtractorOptions defaults;
-    camera_timer_ = nh_.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { findCamera(); });
-
     reconfigured_ = options_.extractor;
     reconfigure_server_ = std::make_unique<ReconfigureServer>(
         slow_nh, listOptions(reconfigured_),
@@ -101,33 +107,36 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
 
     // Called once the callbacks' thread has started, when publisher_ is there.
     const ros::SubscriberStatusCallback on_connect = [this](const ros::SingleSubscriberPublisher&) { updateInput(); };
-    publisher_ =
-        nh_.advertise<stereo_descriptor_vo::StereoFeatures>("stereo_features", kPublishQueue, on_connect, on_connect);
+    publisher_ = master_nh.advertise<stereo_descriptor_vo::StereoFeatures>("stereo_features", kPublishQueue, on_connect,
+                                                                           on_connect);
     callbacks_.start();
     slow_callbacks_.start();
+    master_callbacks_.start();
   } catch (const std::exception& e) {
     NODELET_FATAL_STREAM("not started: " << e.what());
     throw;  // the manager forgets the nodelet, and its loader ends with an error
   }
 
-  /// Takes the names of the only stereo camera in the namespace while nobody publishes images under ours.
-  void findCamera() {
-    if (!input_ || has_pairs_) return;
-    std::string problem;
-    const std::optional<ros::NodeHandle> camera = findOnlyStereoCamera(image_nh_, problem);
-    if (!problem.empty() && throttle_.allows("cameras"))
-      NODELET_WARN_STREAM("nobody publishes " << nh_.resolveName("left/image_rect") << ", and there are " << problem
-                                              << ": set the topics of one of them, see stereo_vo.launch");
-    if (!camera) return;
-    image_nh_ = *camera;
-    NODELET_WARN_STREAM("nobody publishes " << nh_.resolveName("left/image_rect") << ": the only stereo camera in "
-                                            << nh_.getNamespace() << " is taken, with " << imageTopics());
-    input_.reset();
-    updateInput();
-  }
+  // In the thread that may wait for the master.
 
-  std::string imageTopics() const {
-    return image_nh_.resolveName("left/image_rect") + " and " + image_nh_.resolveName("right/image_rect");
+  void watchInput() {
+    if (!input_) return;
+    ros::master::V_TopicInfo topics;
+    std::string report;
+    const bool searches = options_.input.find_camera && (!has_pairs_ || !finder_->names().empty());
+    if (searches && ros::master::getTopics(topics) && finder_->update(topics, report)) {
+      NODELET_WARN_STREAM(report);
+      input_.reset();
+      return updateInput();
+    }
+    if (!report.empty() && throttle_.allows("cameras")) NODELET_WARN_STREAM(report);
+    const double now = ros::SteadyTime::now().toSec();
+    std::string problem = arrivals_->explainLoss(now);
+    if (problem.empty() && !(problem = arrivals_->explainSilence(now)).empty() && ros::master::getTopics(topics)) {
+      const ArrivalLog::Topics names = input_->subscribedTopics();
+      problem += explainUnpublished({names.begin(), names.end()}, topics);
+    }
+    if (!problem.empty() && throttle_.allows("synchronisation")) NODELET_WARN_STREAM(problem);
   }
 
   void updateInput() try {
@@ -136,20 +145,28 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
       mask_subscriber_.shutdown();
       diagnostics_->input().noteIdle(kNobodyListens);
     } else if (!input_) {
+      ros::NodeHandle image_nh = nh_;
+      if (!finder_->names().empty())  // not of `nh_`, whose remappings would win
+        image_nh = callbacks_.serve(ros::NodeHandle(nh_.getNamespace(), finder_->names()));
+      diagnostics_->input().noteTopics(image_nh.resolveName("left/image_rect") + " and " +
+                                       image_nh.resolveName("right/image_rect"));
+      diagnostics_->input().noteIdle("");
       input_ = std::make_unique<StereoInput>(
-          image_nh_, *transport_, options_.input, [this](const StereoPairMessages& pair) { onPair(pair); },
-          [this](const std::string& topic, const std::string& why) { onRefusal(topic, why); });
-      diagnostics_->input().noteTopics(imageTopics());
+          image_nh, *transport_, options_.input, *arrivals_, [this](const StereoPairMessages& pair) { onPair(pair); },
+          [this](ArrivalLog::Input input, const std::string& topic, const std::string& why) {
+            if (input == ArrivalLog::kLeftImage) unused_->add(UnusedInput::kLate);
+            onRefusal(topic, why);
+          });
       mask_subscriber_ =
           nh_.subscribe<sensor_msgs::Image>("left/mask", 1, [this](const sensor_msgs::ImageConstPtr& m) { onMask(m); });
-      diagnostics_->input().noteIdle("");
     }
   } catch (const std::exception& e) {
     NODELET_ERROR_STREAM("cannot subscribe to the images: " << e.what());
   }
 
+  // In the threads of the images.
+
   void onRefusal(const std::string& topic, const std::string& why) {
-    if (topic == image_nh_.resolveName("left/image_rect")) ++refused_;
     if (throttle_.allows(topic)) NODELET_ERROR_STREAM(topic << ": a message is not used: " << why);
   }
 
@@ -163,13 +180,13 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   void onPair(const StereoPairMessages& pair) {
     const ros::Time stamp = pair.left_image->header.stamp;
     has_pairs_ = true;
-    diagnostics_->notePair(std::abs(secondsBetween(stamp, pair.right_image->header.stamp)));
-    const std::uint64_t dropped = filter_.dropped();
+    diagnostics_->notePair(nanoseconds(stamp), std::abs(secondsBetween(stamp, pair.right_image->header.stamp)));
+    const std::uint64_t late = filter_.dropped();
     for (PairFilter::Passed& passed : filter_.add(pair, nanoseconds(stamp), nanoseconds(ros::Time::now())))
-      if (pace_.isDue(nanoseconds(passed.item.left_image->header.stamp))) worker_->push(std::move(passed));
-    out_of_order_ = filter_.dropped();
-    diagnostics_->noteUnused(refused_, out_of_order_);
-    if (filter_.dropped() > dropped && throttle_.allows("late"))
+      if (pace_.isDue(nanoseconds(passed.item.left_image->header.stamp)) && !worker_->push(std::move(passed)))
+        unused_->add(UnusedInput::kPushedOut);
+    for (std::uint64_t k = late; k < filter_.dropped(); ++k) unused_->add(UnusedInput::kLate);
+    if (filter_.dropped() > late && throttle_.allows("late"))
       NODELET_WARN_STREAM("a pair near " << stamp << " is late or has a wrong stamp: dropped (" << filter_.dropped()
                                          << " so far); if this goes on, check the driver's stamps");
   }
@@ -188,7 +205,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   void process(const PairFilter::Passed& passed) try {
     const StereoPairMessages& pair = passed.item;
     const WorkLoad::Item work(diagnostics_->load());
-    diagnostics_->load().noteDropped(worker_->dropped());
+    diagnostics_->load().noteDropped(unused_->count(UnusedInput::kPushedOut));
     takeOverOptions();
     const ros::Time stamp = pair.left_image->header.stamp;
     if (std::exchange(jumps_, passed.source_restarts + passed.clock_steps) !=
@@ -222,9 +239,11 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     message->header.stamp = stamp;
     message->header.frame_id = ros_conversions::cleanFrameId(pair.left_image->header.frame_id);
     message->stream_epoch = stream_epoch_;
-    message->dropped_pairs = worker_->dropped() + out_of_order_ + refused_;
+    message->dropped_pairs = unused_->sum();
     publisher_.publish(message);
+    unused_->noteUsed();
   } catch (const std::exception& e) {
+    unused_->add(UnusedInput::kRefused);
     diagnostics_->noteFailure(e.what());
     if (throttle_.allows(e.what()))
       NODELET_ERROR_STREAM("pair at " << passed.item.left_image->header.stamp << " of "
@@ -257,19 +276,20 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
       NODELET_WARN_STREAM("rows of left and right agree again: pairs from " << stamp << " on are used");
   }
 
-  static constexpr double kRepeats = 1.0;         // s (chosen): no real camera's images are equal for so long
-  static constexpr double kSilencePeriod = 10.0;  // s between explanations why nothing comes
+  static constexpr double kRepeats = 1.0;  // s (chosen): no real camera's images are equal for so long
   static constexpr int kPublishQueue = 10;
   static constexpr const char* kNobodyListens = "nobody listens to stereo_features";
 
-  CallbackThread callbacks_, slow_callbacks_;  // the second one of what takes its time
-  ros::NodeHandle nh_, image_nh_;              // the second one with the camera's names
+  CallbackThread callbacks_, slow_callbacks_, master_callbacks_;  // of images; of services; of what asks the master
+  ros::NodeHandle nh_;
   Options options_;
   FeatureExtractorOptions reconfigured_;  // the server's
   ReportThrottle throttle_;
   ros::Publisher publisher_;
-  ros::WallTimer silence_timer_, camera_timer_;
+  ros::WallTimer input_timer_;
   std::atomic<bool> has_pairs_{false};
+  std::unique_ptr<UnusedInput> unused_;
+  std::unique_ptr<ArrivalLog> arrivals_;
   std::unique_ptr<ImageDiagnostics> diagnostics_;
 
   Requests<std::unique_ptr<FeatureExtractor>> extractors_;
@@ -278,7 +298,6 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
 
   PairFilter filter_;  // only the input's callback touches it, and the next
   Pace pace_{0.0};
-  std::atomic<std::uint64_t> out_of_order_{0}, refused_{0};
 
   // Only the worker's thread touches these.
   std::unique_ptr<FeatureExtractor> extractor_;
@@ -292,6 +311,9 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
 
   std::unique_ptr<Worker<PairFilter::Passed>> worker_;
   std::unique_ptr<StereoImageTransport> transport_;
+
+  // Only the thread that asks the master touches these.
+  std::unique_ptr<CameraFinder> finder_;
   std::unique_ptr<StereoInput> input_;
   ros::Subscriber mask_subscriber_;
 };

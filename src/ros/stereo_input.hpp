@@ -4,11 +4,11 @@
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
 
-#include <array>
 #include <functional>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "../config/interface_options.hpp"
 #include "arrival_log.hpp"
@@ -31,14 +31,14 @@ class StereoInput {
  public:
   using Callback = std::function<void(const StereoPairMessages&)>;
   /// Of a message that is not used, and why.
-  using Refusal = std::function<void(const std::string& topic, const std::string& why)>;
+  using Refusal = std::function<void(ArrivalLog::Input input, const std::string& topic, const std::string& why)>;
 
-  /// `transport` must outlive the input.
-  StereoInput(ros::NodeHandle& nh, StereoImageTransport& transport, const StereoInputOptions& options,
-              Callback callback, Refusal refuse);
+  /// Names as the node handle has them. `transport` and `arrivals` must outlive the input.
+  StereoInput(ros::NodeHandle nh, StereoImageTransport& transport, const StereoInputOptions& options,
+              ArrivalLog& arrivals, Callback callback, Refusal refuse);
 
-  /// See ArrivalLog, and which topics have no publisher.
-  std::string explainSilence();
+  /// As subscribed: images with their transport's ending.
+  std::vector<std::string> subscribedTopics() const;
 
  private:
   using Image = sensor_msgs::Image;
@@ -51,8 +51,8 @@ class StereoInput {
 
   Callback callback_;
   Refusal refuse_;
-  const std::array<std::string, ArrivalLog::kInputs> topics_;
-  ArrivalLog arrivals_;
+  const ArrivalLog::Topics topics_;
+  ArrivalLog& arrivals_;
   std::mutex mutex_;  // of what follows
   TriggerSynchroniser<Image, Image, Info, Info> exact_;
   std::unique_ptr<ApproximateSynchroniser<Image, Image, Info, Info>> approximate_;  // null unless asked for

@@ -16,7 +16,7 @@
 #include <tuple>
 #include <utility>
 
-#include "stamps.hpp"
+#include "../messages/stamps.hpp"
 
 namespace sdvo {
 

@@ -5,12 +5,45 @@
 #include <ros/node_handle.h>
 #include <ros/spinner.h>
 
+#include <atomic>
 #include <boost/make_shared.hpp>
 #include <cstdint>
 #include <exception>
+#include <functional>
 #include <utility>
+#include <vector>
+
+#include "../common/worker.hpp"
 
 namespace sdvo {
+
+/// Subscriptions that can be paused. Both ways ask the master, which may be out of reach: in a thread of their own.
+class PausableInput {
+ public:
+  using Subscribe = std::function<std::vector<ros::Subscriber>()>;
+
+  explicit PausableInput(Subscribe subscribe)
+      : subscribe_(std::move(subscribe)), subscribers_(subscribe_()), worker_(1, [this](const bool& wanted) {
+          subscribers_ = wanted ? subscribe_() : std::vector<ros::Subscriber>();
+        }) {}
+
+  /// Each false where it is so already. Messages may still come for a moment.
+  bool pause() { return change(true); }
+  bool resume() { return change(false); }
+  bool isPaused() const { return is_paused_; }
+
+ private:
+  bool change(bool paused) {
+    if (is_paused_.exchange(paused) == paused) return false;
+    worker_.push(!paused);
+    return true;
+  }
+
+  const Subscribe subscribe_;
+  std::vector<ros::Subscriber> subscribers_;  // after the constructor the worker's
+  std::atomic<bool> is_paused_{false};
+  Worker<bool> worker_;
+};
 
 /// A callback queue with a thread of its own. Nodelets of one manager share its threads: those of others that are slow
 /// would let ours wait. An exception that a callback does not catch is reported and ends that call alone, not the

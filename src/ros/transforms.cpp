@@ -11,15 +11,16 @@
 #include <utility>
 
 #include "../common/text.hpp"
-#include "frames.hpp"
-#include "stamps.hpp"
+#include "../messages/frames.hpp"
+#include "../messages/stamps.hpp"
 
 namespace sdvo {
 
 using ros_conversions::cleanFrameId;
 
-RobotTransforms::RobotTransforms(ros::NodeHandle& nh, std::optional<ros_conversions::OdometryFrames> ours, Report warn)
-    : ours_(std::move(ours)), warn_(std::move(warn)) {
+RobotTransforms::RobotTransforms(ros::NodeHandle& nh, std::optional<ros_conversions::OdometryFrames> ours,
+                                 std::uint32_t tag, Report warn)
+    : ours_(std::move(ours)), tag_(tag), warn_(std::move(warn)) {
   constexpr int kQueue = 100;  // as tf2_ros' listener
   const auto subscribe = [&](const std::string& topic, bool is_static) {
     const boost::function<void(const Event&)> receiver = [this, is_static](const Event& event) {
@@ -69,10 +70,11 @@ void RobotTransforms::watch(const geometry_msgs::TransformStamped& transform, co
   const std::string parent = cleanFrameId(transform.header.frame_id);
   const std::string child = cleanFrameId(transform.child_frame_id);
   const std::string& us = ros::this_node::getName();
-  if (publisher == us && parent == ours_->odom && child == ours_->base) return;
+  if (publisher == us && parent == ours_->odom && child == ours_->base && transform.header.seq == tag_) return;
   if (!watched_.insert(publisher + " " + parent + " " + child).second) return;
-  const std::string contention = "TF: " + publisher + " publishes " + parent + " -> " + child + ", " + us +
-                                 " publishes " + ours_->odom + " -> " + ours_->base;
+  const std::string who = publisher == us ? "another nodelet of " + us : publisher;
+  const std::string contention = "TF: " + who + " publishes " + parent + " -> " + child + ", " + us + " publishes " +
+                                 ours_->odom + " -> " + ours_->base;
   if (child == ours_->base && parent == ours_->odom)
     warn_(contention + ": frame '" + child + "' jumps between the two; set publish_tf to false in one of them");
   else if (child == ours_->base)
@@ -101,39 +103,49 @@ bool RobotTransforms::hasAncestor(const std::string& frame, const std::string& a
 
 std::string RobotTransforms::explainMissing(const std::string& base_frame, const std::string& camera_frame) const {
   if (camera_frame.empty()) return "the left images have no frame_id: set the camera's optical frame in its driver";
+  if (ours_ && camera_frame == ours_->odom)
+    return "the left images' frame_id is '" + camera_frame +
+           "', as odom_frame_id: set the camera's optical frame in its driver";
   const std::vector<std::string> above = ancestors(camera_frame);
   const std::string root = above.empty() ? camera_frame : cleanFrameId(above.back());
   return "no transform from camera frame '" + camera_frame + "' to base frame '" + base_frame + "' on TF: publish " +
-         base_frame + " -> " + root + " (static; `mount` of the camera's launch file), or set base_frame_id" +
+         base_frame + " -> " + root + " (static; `mount_rpy` of the camera's launch file), or set base_frame_id" +
          (above.empty() ? "" : " to '" + root + "', where TF has the camera");
+}
+
+void CameraMount::await(const std::string& base_frame, const std::string& camera_frame,
+                        const std::function<bool()>& is_urgent) {
+  const ros::SteadyTime now = ros::SteadyTime::now();
+  std::unique_lock<std::mutex> lock(mutex_);
+  if (!deadline_) deadline_ = now + ros::WallDuration(timeout_);
+  const ros::SteadyTime deadline = *deadline_;
+  lock.unlock();
+  std::string ignored;
+  while (!knows(base_frame, camera_frame) && !transforms_.find(base_frame, camera_frame, ignored) &&
+         ros::SteadyTime::now() < deadline && !is_urgent() && ros::ok())
+    ros::WallDuration(0.01).sleep();
 }
 
 std::optional<Eigen::Isometry3d> CameraMount::find(const std::string& base_frame, const std::string& camera_frame,
                                                    std::string& problem) {
   if (knows(base_frame, camera_frame)) return last();
-  const auto give_up = ros::SteadyTime::now() + ros::WallDuration(has_waited_ ? 0.0 : timeout_);
-  has_waited_ = true;
-  for (;;) {
-    const std::optional<Eigen::Isometry3d> found = transforms_.find(base_frame, camera_frame, problem);
-    if (found) {
-      base_frame_ = base_frame;
-      camera_frame_ = camera_frame;
-      change_is_told_ = false;
-      const std::lock_guard<std::mutex> lock(mutex_);
-      return T_base_camera_ = found;
-    }
-    if (ros::SteadyTime::now() >= give_up || stopping_ || !ros::ok()) return std::nullopt;
-    ros::WallDuration(0.01).sleep();
-  }
+  const std::optional<Eigen::Isometry3d> found = transforms_.find(base_frame, camera_frame, problem);
+  if (!found) return std::nullopt;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  base_frame_ = base_frame;
+  camera_frame_ = camera_frame;
+  change_is_told_ = false;
+  return T_base_camera_ = found;
 }
 
 std::string CameraMount::change() {
   constexpr double kNear = 0.005, kAlike = 0.5 * M_PI / 180.0;  // m, rad: more than joints and masts give way (chosen)
   std::string ignored;
+  const std::lock_guard<std::mutex> lock(mutex_);
   if (change_is_told_ || camera_frame_.empty()) return "";
   const std::optional<Eigen::Isometry3d> now = transforms_.find(base_frame_, camera_frame_, ignored);
   if (!now) return "";
-  const Eigen::Isometry3d moved = last()->inverse() * *now;
+  const Eigen::Isometry3d moved = T_base_camera_->inverse() * *now;
   const double way = moved.translation().norm(), angle = Eigen::AngleAxisd(moved.linear()).angle();
   if (way <= kNear && angle <= kAlike) return "";
   change_is_told_ = true;
@@ -141,7 +153,13 @@ std::string CameraMount::change() {
 }
 
 bool CameraMount::knows(const std::string& base_frame, const std::string& camera_frame) const {
-  return last() && base_frame == base_frame_ && camera_frame == camera_frame_;
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return T_base_camera_ && base_frame == base_frame_ && camera_frame == camera_frame_;
+}
+
+void CameraMount::forget() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  camera_frame_.clear();
 }
 
 std::optional<Eigen::Isometry3d> CameraMount::last() const {

@@ -6,7 +6,7 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include <Eigen/Geometry>
-#include <atomic>
+#include <cstdint>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "frames.hpp"
+#include "../messages/frames.hpp"
 
 namespace sdvo {
 
@@ -26,8 +26,10 @@ class RobotTransforms {
  public:
   using Report = std::function<void(const std::string&)>;
 
-  /// `ours`: the transform that this node publishes (odom: parent, base: child); none when it publishes none.
-  RobotTransforms(ros::NodeHandle& nh, std::optional<ros_conversions::OdometryFrames> ours, Report warn);
+  /// `ours`: the transform that this node publishes (odom: parent, base: child); none when it publishes none. `tag`: of
+  /// its TransformPublisher.
+  RobotTransforms(ros::NodeHandle& nh, std::optional<ros_conversions::OdometryFrames> ours, std::uint32_t tag,
+                  Report warn);
 
   /// The transform that this node publishes from now on, for a node that learns it late. Only where callbacks run.
   void claim(ros_conversions::OdometryFrames ours) { ours_ = std::move(ours); }
@@ -52,6 +54,7 @@ class RobotTransforms {
   bool hasAncestor(const std::string& frame, const std::string& ancestor) const;
 
   std::optional<ros_conversions::OdometryFrames> ours_;
+  const std::uint32_t tag_;
   Report warn_;
   tf2::BufferCore buffer_;
   ros::Time last_update_;
@@ -60,12 +63,15 @@ class RobotTransforms {
 };
 
 /// Where the camera sits on the robot, as TF tells; read once for a camera, until that is forgotten, for the pose goes
-/// through it to the odometry's origin. One thread asks, others may read.
+/// through it to the odometry's origin. For any thread.
 class CameraMount {
  public:
-  /// `timeout`, s of wall time: how long the first question waits, because static transforms and the first features
-  /// arrive together; later ones do not wait.
+  /// `timeout`, s of wall time: how long await() waits in all.
   CameraMount(const RobotTransforms& transforms, double timeout) : transforms_(transforms), timeout_(timeout) {}
+
+  /// Returns once TF has the transform, after the timeout or when it `is_urgent`: static transforms and the first
+  /// features arrive together. Hold no lock meanwhile that others need.
+  void await(const std::string& base_frame, const std::string& camera_frame, const std::function<bool()>& is_urgent);
 
   /// T_base_camera; none, and why, while TF has no such transform. Frame ids without a leading slash.
   std::optional<Eigen::Isometry3d> find(const std::string& base_frame, const std::string& camera_frame,
@@ -78,40 +84,44 @@ class CameraMount {
   std::string change();
 
   /// find() asks TF again.
-  void forget() { camera_frame_.clear(); }
+  void forget();
 
-  /// What was found last. From any thread.
+  /// What was found last.
   std::optional<Eigen::Isometry3d> last() const;
-
-  /// Nobody waits any more. From any thread.
-  void stop() { stopping_ = true; }
 
  private:
   const RobotTransforms& transforms_;
   const double timeout_;
-  bool has_waited_ = false;
-  std::atomic<bool> stopping_{false};
+  mutable std::mutex mutex_;  // of what follows
+  std::optional<ros::SteadyTime> deadline_;
   std::string base_frame_, camera_frame_;
   bool change_is_told_ = false;
-  mutable std::mutex mutex_;
   std::optional<Eigen::Isometry3d> T_base_camera_;
 };
 
 /// Publishes on /tf as the node handle has that remapped; tf2_ros' broadcaster has the remappings of the process, which
-/// in a manager are those of no nodelet.
+/// in a manager are those of no nodelet. On TF the nodelets of a process have one name: transforms carry a tag as their
+/// `seq`, which nobody else reads.
 class TransformPublisher {
  public:
-  explicit TransformPublisher(ros::NodeHandle& nh) : publisher_(nh.advertise<tf2_msgs::TFMessage>("/tf", kQueue)) {}
+  TransformPublisher(ros::NodeHandle& nh, std::uint32_t tag)
+      : tag_(tag), publisher_(nh.advertise<tf2_msgs::TFMessage>("/tf", kQueue)) {}
+
+  static std::uint32_t tagOf(const std::string& nodelet) {
+    return static_cast<std::uint32_t>(std::hash<std::string>()(nodelet));
+  }
 
   void send(const geometry_msgs::TransformStamped& transform) {
     tf2_msgs::TFMessage message;
     message.transforms.push_back(transform);
+    message.transforms.back().header.seq = tag_;
     publisher_.publish(message);
   }
 
  private:
   static constexpr int kQueue = 100;  // as tf2_ros' broadcaster
 
+  const std::uint32_t tag_;
   ros::Publisher publisher_;
 };
 

@@ -8,34 +8,40 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <filesystem>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <opencv2/core/utility.hpp>
 #include <optional>
 #include <pluginlib/class_list_macros.hpp>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "../check/axes_check.hpp"
 #include "../common/imu_tracks.hpp"
 #include "../common/stamp_filter.hpp"
+#include "../common/text.hpp"
 #include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
+#include "../messages/feature_conversions.hpp"
+#include "../messages/frames.hpp"
+#include "../messages/pose_conversions.hpp"
+#include "../messages/stamps.hpp"
 #include "diagnostics.hpp"
-#include "feature_conversions.hpp"
-#include "frames.hpp"
 #include "imu_input.hpp"
 #include "odometry_publisher.hpp"
 #include "output_files.hpp"
 #include "params.hpp"
-#include "pose_conversions.hpp"
-#include "stamps.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 #include "stereo_descriptor_vo/ros/stereo_features_view.hpp"
 #include "threads.hpp"
 #include "throttles.hpp"
 #include "transforms.hpp"
+#include "unused_input.hpp"
 
 namespace sdvo {
 
@@ -44,10 +50,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
  public:
   ~VisualOdometryNodelet() override {
     stopping_ = true;
-    if (mount_) mount_->stop();
     // Nothing may arrive any more, and nothing be in work, when members go.
     callbacks_.stop();
     slow_callbacks_.stop();
+    disk_callbacks_.stop();
     if (worker_) worker_->stop();
   }
 
@@ -77,27 +83,32 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     nh_ = callbacks_.serve(getNodeHandle());
     ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
     ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
+    ros::NodeHandle disk_nh = disk_callbacks_.serve(getPrivateNodeHandle());
     for (const std::string& name : loadParams(private_nh, options_))
       NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect: misspelt? See docs/parameters.md");
     if (options_.output.use_imu && !options_.output.guess_frame_id.empty())
       throw std::invalid_argument("use_imu and guess_frame_id exclude each other: set one of them");
+    checkFrames();
     T_odom_start_ = ros_conversions::toPose(options_.output.initial_pose);
     odometry_ = std::make_unique<VisualOdometry>(options_.odometry);
-    publisher_ = std::make_unique<OdometryPublisher>(nh_, options_.output);
+    const std::uint32_t tag = TransformPublisher::tagOf(getName());
+    publisher_ = std::make_unique<OdometryPublisher>(nh_, options_.output, tag);
     publisher_->restart(T_odom_start_);
     to_be_levelled_ = options_.output.use_imu;
     transforms_ =
-        std::make_unique<RobotTransforms>(nh_, publishedFrames(), [this](const std::string& what) { warn(what); });
+        std::make_unique<RobotTransforms>(nh_, publishedFrames(), tag, [this](const std::string& what) { warn(what); });
     mount_ = std::make_unique<CameraMount>(*transforms_, options_.output.tf_timeout);
     patience_ = Patience(options_.output.guess_timeout);
     if (options_.output.opencv_threads >= 0) cv::setNumThreads(options_.output.opencv_threads);
-    diagnostics_ = std::make_unique<OdometryDiagnostics>(nh_, private_nh, getName(), options_.output);
+    unused_ = std::make_unique<UnusedInput>("feature messages", options_.output.rates.max_unused,
+                                            std::set<int>{UnusedInput::kPushedOut});
+    diagnostics_ = std::make_unique<OdometryDiagnostics>(nh_, private_nh, getName(), options_.output, *unused_);
     services_ = {slow_nh.advertiseService("reset", &VisualOdometryNodelet::onReset, this),
                  slow_nh.advertiseService("reset_to_pose", &VisualOdometryNodelet::onResetToPose, this),
                  slow_nh.advertiseService("set_pose", &VisualOdometryNodelet::onSetPose, this),
                  private_nh.advertiseService("pause", &VisualOdometryNodelet::onPause, this),
                  private_nh.advertiseService("resume", &VisualOdometryNodelet::onResume, this),
-                 slow_nh.advertiseService("save_trajectory", &VisualOdometryNodelet::onSaveTrajectory, this)};
+                 disk_nh.advertiseService("save_trajectory", &VisualOdometryNodelet::onSaveTrajectory, this)};
     pose_subscriber_ = slow_nh.subscribe<geometry_msgs::PoseWithCovarianceStamped>(
         "set_pose", 1, [this](const geometry_msgs::PoseWithCovarianceStampedConstPtr& pose) {
           const std::string problem = setPose(*pose);
@@ -115,13 +126,14 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
         listOptions(defaults));
 
     if (options_.output.use_imu)
-      imu_ = std::make_unique<ImuInput>(nh_, *transforms_, [this](const std::string& what) { warn(what); });
+      imu_ = std::make_unique<ImuInput>(nh_, *transforms_, *unused_, [this](const std::string& what) { warn(what); });
     worker_ = std::make_unique<Worker<FeaturesFilter::Passed>>(
         static_cast<std::size_t>(options_.output.queue_size),
         [this](const FeaturesFilter::Passed& passed) { process(passed); });
-    subscribe();
+    input_ = std::make_unique<PausableInput>([this] { return subscribe(); });
     callbacks_.start();
     slow_callbacks_.start();
+    disk_callbacks_.start();
   } catch (const std::exception& e) {
     NODELET_FATAL_STREAM("not started: " << e.what());
     throw;  // the manager forgets the nodelet, and its loader ends with an error
@@ -131,11 +143,22 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     if (throttle_.allows(what)) NODELET_WARN_STREAM(what);
   }
 
-  void subscribe() {
+  std::vector<ros::Subscriber> subscribe() {
     const auto queue = static_cast<std::uint32_t>(std::max(kArrivalQueue, options_.output.queue_size));
-    subscriber_ = nh_.subscribe<FeaturesMessage>(
+    return {nh_.subscribe<FeaturesMessage>(
         "stereo_features", queue, [this](const FeaturesMessagePtr& m) { onFeatures(m); }, ros::VoidConstPtr(),
-        ros::TransportHints().tcpNoDelay());
+        ros::TransportHints().tcpNoDelay())};
+  }
+
+  void checkFrames() const {
+    const OdometryOutputOptions& output = options_.output;
+    ros_conversions::requireTwoFrames({"odom_frame_id", output.odom_frame_id}, {"base_frame_id", output.base_frame_id});
+    if (output.guess_frame_id.empty()) return;
+    ros_conversions::requireTwoFrames({"guess_frame_id", output.guess_frame_id},
+                                      {"base_frame_id", output.base_frame_id});
+    if (output.publish_tf)  // its own pose
+      ros_conversions::requireTwoFrames({"guess_frame_id", output.guess_frame_id},
+                                        {"odom_frame_id", output.odom_frame_id});
   }
 
   /// Parent and child of the transform that goes out on TF.
@@ -148,15 +171,16 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   }
 
   void onFeatures(const FeaturesMessagePtr& message) try {
+    if (input_->isPaused()) return;
     Arrived arrived{message, check(*message), starts_, resumes_.posted()};
-    const std::uint64_t dropped = filter_.dropped();
+    const std::uint64_t late = filter_.dropped();
     const bool new_stream = stream_epoch_ && *stream_epoch_ != message->stream_epoch;
     for (FeaturesFilter::Passed& passed :
          filter_.add(std::move(arrived), nanoseconds(message->header.stamp), nanoseconds(ros::Time::now()), new_stream))
-      worker_->push(std::move(passed));
+      if (!worker_->push(std::move(passed))) unused_->add(UnusedInput::kPushedOut);
     stream_epoch_ = message->stream_epoch;
-    out_of_order_ = filter_.dropped();
-    if (filter_.dropped() > dropped && throttle_.allows("late"))
+    for (std::uint64_t k = late; k < filter_.dropped(); ++k) unused_->add(UnusedInput::kLate);
+    if (filter_.dropped() > late && throttle_.allows("late"))
       NODELET_WARN_STREAM("features near " << message->header.stamp << " are late or have a wrong stamp: dropped ("
                                            << filter_.dropped()
                                            << " so far); if this goes on, check the driver's stamps");
@@ -171,32 +195,59 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     if (!problem.empty()) throw std::invalid_argument(problem);
     return StereoFeaturesView(message);
   } catch (const std::invalid_argument&) {
-    ++malformed_;
+    unused_->add(UnusedInput::kRefused);
     throw;
   }
 
   /// In the worker's thread.
   void process(const FeaturesFilter::Passed& passed) try {
+    const Guess guess = waitForOthers(passed);
     const std::lock_guard<std::mutex> lock(work_mutex_);
     if (passed.item.starts != starts_) return;
     const WorkLoad::Item work(diagnostics_->load());
-    publishInfo(estimate(passed), *passed.item.message);
+    publishInfo(estimate(passed, guess), *passed.item.message);
+    unused_->noteUsed();
   } catch (const std::exception& e) {
     NODELET_ERROR_STREAM("features at " << passed.item.message->header.stamp << ": no vo_info: " << e.what());
   }
 
+  /// A motion since the pair of this time, if any.
+  struct Guess {
+    std::optional<ros::Time> since;
+    std::optional<MotionGuess> motion;
+  };
+
+  /// Gives TF, another odometry and the gyro time to tell what they have of a pair. Outside of the lock: services do
+  /// not wait with it.
+  Guess waitForOthers(const FeaturesFilter::Passed& passed) {
+    const std_msgs::Header& header = passed.item.message->header;
+    const auto isVoid = [&] { return stopping_ || passed.item.starts != starts_; };
+    const std::string base_frame = ros_conversions::cleanFrameId(options_.output.base_frame_id);
+    const std::string camera_frame = ros_conversions::cleanFrameId(header.frame_id);
+    const double begin = steadyTime();
+    // A pair that another one would push out is answered instead.
+    mount_->await(base_frame, camera_frame, [&] { return isVoid() || worker_->isFull(); });
+    diagnostics_->load().noteWait("the transform base <- camera", steadyTime() - begin);
+    Guess guess;
+    {
+      const std::lock_guard<std::mutex> lock(work_mutex_);
+      const bool is_trusted = !options_.output.guess_frame_id.empty() || gyro_found_.verdict != Verdict::kWarn;
+      if (is_trusted) guess.since = processed_stamp_;
+    }
+    if (guess.since && mount_->last()) guess.motion = findGuess(*guess.since, header, isVoid);
+    return guess;
+  }
+
   /// What there is to publish, but for vo_info, is.
-  OdometryResult estimate(const FeaturesFilter::Passed& passed) try {
+  OdometryResult estimate(const FeaturesFilter::Passed& passed, const Guess& guess) try {
     const FeaturesMessage& message = *passed.item.message;
     if (const auto options = reconfigurations_.take()) odometry_->configure(*options);
     noteJumps(passed);
     if (resumes_.take(passed.item.resumes)) odometry_->breakStream();
     const StereoFeatures features = ros_conversions::fromMessage(passed.item.view);
-    const double begin = steadyTime();
     std::string problem = findExtrinsic(ros_conversions::cleanFrameId(message.header.frame_id));
-    diagnostics_->load().noteWait("the transform base <- camera", steadyTime() - begin);
     if (problem.empty() && to_be_levelled_ && !given_start_) problem = level();
-    const OdometryResult result = problem.empty() ? track(features, message) : waitFor(problem);
+    const OdometryResult result = problem.empty() ? track(features, message, guess) : waitFor(problem);
     publisher_->publishPoints(passed.item.view);
     publisher_->publishFlow(result, features, message.header);
     return result;
@@ -219,13 +270,16 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     processed_stamp_.reset();
   }
 
-  OdometryResult track(const StereoFeatures& features, const FeaturesMessage& message) {
+  OdometryResult track(const StereoFeatures& features, const FeaturesMessage& message, const Guess& guess) {
     if (processed_epoch_ && *processed_epoch_ != message.stream_epoch) odometry_->breakStream();
     processed_epoch_ = message.stream_epoch;
     const std::string complaint = odometry_->options().alignment.complaint(features.patch_layout.side);
     if (!complaint.empty() && throttle_.allows("patches")) NODELET_WARN_STREAM(complaint);
     odometry_->mountAt(*mount_->last());
-    const OdometryResult result = odometry_->update(features, findGuess(message.header));
+    const std::optional<MotionGuess> motion = guess.since == processed_stamp_ ? guess.motion : std::nullopt;  // no jump
+    const OdometryResult result = odometry_->update(features, motion);
+    if (result.state == TrackingState::kTracking && result.has_motion)
+      compareAxes(result, motion, message.header.stamp);
     processed_stamp_ = message.header.stamp;
     epoch_ = result.epoch;
     report(result, message.header.stamp);
@@ -233,6 +287,21 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     if (publisher_->wantsMap() && result.has_pose)
       publisher_->publishMap(odometry_->mapPoints(), result.T_origin_camera, message.header);
     return result;
+  }
+
+  /// With what the images show.
+  void compareAxes(const OdometryResult& result, const std::optional<MotionGuess>& guess, const ros::Time& stamp) {
+    const auto warnOnce = [this](Finding& told, const Finding& found, const char* consequence) {
+      if (std::exchange(told, found).verdict != Verdict::kWarn && found.verdict == Verdict::kWarn)
+        NODELET_WARN_STREAM(found.step << ": " << found.what << ": " << found.remedy << consequence);
+    };
+    optical_axis_.add(*mount_->last(), result.T_previous_current.translation());
+    warnOnce(optical_found_, optical_axis_.judge(), "");
+    constexpr double kSame = 1e-3;  // s: after an outage the motion is of another time than the guess
+    if (!guess || !guess->rotation_only || std::abs(secondsBetween(*processed_stamp_, stamp) - result.dt) > kSame)
+      return;
+    gyro_axes_.add(guess->T_previous_current.linear(), result.T_previous_current.linear());
+    warnOnce(gyro_found_, gyro_axes_.judge(), " No guess is taken from it until a reset");
   }
 
   OdometryResult waitFor(const std::string& what) const {
@@ -244,19 +313,32 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
 
   void publishInfo(const OdometryResult& result, const FeaturesMessage& message) {
     stereo_descriptor_vo::VoInfo info = ros_conversions::toInfo(result, message);
-    info.dropped_features = worker_->dropped();
-    info.out_of_order = out_of_order_;
-    info.malformed = malformed_;
-    diagnostics_->note(publisher_->publishInfo(std::move(info), message.header.stamp));
+    info.dropped_features = unused_->count(UnusedInput::kPushedOut);
+    info.out_of_order = unused_->count(UnusedInput::kLate);
+    info.malformed = unused_->count(UnusedInput::kRefused);
+    info = publisher_->publishInfo(std::move(info), message.header.stamp);
+    diagnostics_->note(info);
+    if (std::abs(info.latency) > kOtherClock && !std::exchange(clock_is_told_, true))
+      NODELET_WARN_STREAM(info.latency << " s from image to pose" << doubtOfLatency(info.latency, kOtherClock));
   }
 
   void report(const OdometryResult& result, const ros::Time& stamp) {
-    if (result.state == TrackingState::kTracking) return;
+    const bool is_lost = result.state == TrackingState::kWaiting || result.state == TrackingState::kLost;
+    if (result.state == TrackingState::kTracking) {
+      if (is_tracking_ || !throttle_.allows("begins")) return;
+      is_tracking_ = true;
+      // The first pair has features and no matches yet.
+      NODELET_INFO_STREAM("TRACKING at " << stamp << ", epoch " << result.epoch << ": "
+                                         << (result.has_motion ? result.inliers : result.features) << " points");
+      return;
+    }
+    if (is_lost) is_tracking_ = false;
     // Each start is told apart from the predictions that go before it.
     const bool started_again = result.has_pose && !result.has_motion;
     if (throttle_.allows(started_again ? "started again" : toString(result.state)))
       NODELET_WARN_STREAM(toString(result.state)
-                          << " at " << stamp << ", epoch " << result.epoch << ": " << result.reason);
+                          << " at " << stamp << ", epoch " << result.epoch << ", " << result.inliers << " of "
+                          << result.matches << " points: " << result.reason);
   }
 
   /// At a given pose, or where it began.
@@ -267,6 +349,9 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
             << (T_odom_start.isApprox(Eigen::Isometry3d::Identity()) ? "the origin" : "the given pose"));
     odometry_->reset();
     mount_->forget();
+    optical_axis_ = {};
+    gyro_axes_ = {};
+    optical_found_ = gyro_found_ = {};
     publisher_->restart(T_odom_start);
     given_start_ = given.has_value();
     levels_until_.reset();
@@ -276,38 +361,42 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
 
   /// How another odometry, or the gyro, has the camera's motion since the pair before; nothing where neither is asked
   /// for or knows it.
-  std::optional<MotionGuess> findGuess(const std_msgs::Header& header) {
+  std::optional<MotionGuess> findGuess(const ros::Time& since, const std_msgs::Header& header,
+                                       const std::function<bool()>& is_void) {
     const bool of_frame = !options_.output.guess_frame_id.empty();
-    if (!processed_stamp_ || (!of_frame && !(imu_ && imu_->hasRates()))) return std::nullopt;
+    if (!of_frame && !(imu_ && imu_->hasRates())) return std::nullopt;
     std::string problem;
     std::optional<MotionGuess> guess;
     const double now = steadyTime(), give_up = now + patience_.timeout(now);
     for (;;) {
-      guess = of_frame ? guessOfFrame(header.stamp, problem) : guessOfGyro(header, problem);
-      if (guess || steadyTime() >= give_up || stopping_ || !ros::ok()) break;
+      guess = of_frame ? guessOfFrame(since, header.stamp, problem) : guessOfGyro(since, header, problem);
+      if (guess || steadyTime() >= give_up || is_void() || !ros::ok()) break;
       ros::WallDuration(0.002).sleep();
     }
     patience_.note(guess.has_value(), now);
     diagnostics_->load().noteWait("the guess of the motion", steadyTime() - now);
-    if (!guess && throttle_.allows("guess"))
+    if (guess) return guess;
+    unused_->add(UnusedInput::kNoGuess);
+    if (throttle_.allows("guess"))
       NODELET_WARN_STREAM("no guess of the motion until " << header.stamp << ", going on without: " << problem);
-    return guess;
+    return std::nullopt;
   }
 
   static double steadyTime() { return ros::SteadyTime::now().toSec(); }
 
-  std::optional<MotionGuess> guessOfFrame(const ros::Time& stamp, std::string& problem) const {
-    const std::optional<Eigen::Isometry3d> T_before_now = transforms_->findMotion(
-        ros_conversions::cleanFrameId(options_.output.guess_frame_id),
-        ros_conversions::cleanFrameId(options_.output.base_frame_id), *processed_stamp_, stamp, problem);
+  std::optional<MotionGuess> guessOfFrame(const ros::Time& since, const ros::Time& stamp, std::string& problem) const {
+    const std::optional<Eigen::Isometry3d> T_before_now =
+        transforms_->findMotion(ros_conversions::cleanFrameId(options_.output.guess_frame_id),
+                                ros_conversions::cleanFrameId(options_.output.base_frame_id), since, stamp, problem);
     if (!T_before_now) return std::nullopt;
     const Eigen::Isometry3d T_base_camera = *mount_->last();
     return MotionGuess{T_base_camera.inverse() * *T_before_now * T_base_camera, false, options_.output.guess_error};
   }
 
-  std::optional<MotionGuess> guessOfGyro(const std_msgs::Header& header, std::string& problem) const {
+  std::optional<MotionGuess> guessOfGyro(const ros::Time& since, const std_msgs::Header& header,
+                                         std::string& problem) const {
     const std::optional<Eigen::Matrix3d> R_before_now =
-        imu_->rotation(ros_conversions::cleanFrameId(header.frame_id), *processed_stamp_, header.stamp, problem);
+        imu_->rotation(ros_conversions::cleanFrameId(header.frame_id), since, header.stamp, problem);
     if (!R_before_now) return std::nullopt;
     MotionGuess guess;
     guess.T_previous_current.linear() = *R_before_now;
@@ -322,7 +411,14 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     const double now = steadyTime();
     if (!levels_until_) levels_until_ = now + kPatience;
     std::string problem;
-    const auto up = imu_->up(ros_conversions::cleanFrameId(options_.output.base_frame_id), problem);
+    auto up = imu_->up(ros_conversions::cleanFrameId(options_.output.base_frame_id), problem);
+    constexpr double kSteep = 0.7;  // cosine of 45 degrees, between robots on slopes and another mounting (chosen)
+    if (up && up->dot(T_odom_start_.linear().transpose() * Eigen::Vector3d::UnitZ()) < kSteep) {
+      problem = text(2, "by its accelerometer the base is tilted from there, its up is ", up->x(), " ", up->y(), " ",
+                     up->z(), ": is the IMU mounted as TF has its frame? Else give this tilt in initial_pose");
+      up.reset();
+      levels_until_ = now;
+    }
     if (!up && now < *levels_until_) return "roll and pitch of the first pose: " + problem;
     to_be_levelled_ = false;
     if (up) {
@@ -415,19 +511,18 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   /// Without a subscriber the image side rests too.
   bool onPause(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
     response.success = true;
-    response.message = subscriber_ ? "paused" : "was paused already";
-    subscriber_.shutdown();
+    response.message = input_->pause() ? "paused" : "was paused already";
     diagnostics_->input().noteIdle("paused");
     return true;
   }
 
   bool onResume(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
     response.success = true;
-    response.message = subscriber_ ? "was not paused" : "resumed; the motion in between is unknown";
-    if (subscriber_) return true;
+    response.message = input_->isPaused() ? "resumed; the motion in between is unknown" : "was not paused";
+    if (!input_->isPaused()) return true;
     resumes_.post({});
     diagnostics_->input().noteIdle("");
-    subscribe();
+    input_->resume();
     return true;
   }
 
@@ -435,7 +530,12 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
                         stereo_descriptor_vo::SaveTrajectory::Response& response) try {
     const nav_msgs::Path path = publisher_->path();
     if (path.poses.empty()) throw std::runtime_error("there is no pose to save yet: reason of vo_info says why");
-    saveTrajectory(path, *mount_->last(), request.format, request.path);
+    const std::string file = inRosHome(request.path);
+    if (!options_.output.overwrite && saved_.count(file) == 0 && std::filesystem::exists(file))
+      throw std::runtime_error("'" + file +
+                               "' was there before: give another path, or set visual_odometry/overwrite at the start");
+    saveTrajectory(path, *mount_->last(), request.format, file);
+    saved_.insert(file);
     response.success = true;
     response.message = std::to_string(path.poses.size()) + " poses";
     return true;
@@ -444,10 +544,12 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     return true;
   }
 
+  static constexpr double kOtherClock = 3600.0;  // s of latency that no slow machine makes
   /// Messages that wait for this node's own thread, which handles each in no time.
   static constexpr int kArrivalQueue = 20;
 
-  CallbackThread callbacks_, slow_callbacks_;  // the second one of services that take their time
+  CallbackThread callbacks_, slow_callbacks_,
+      disk_callbacks_;  // of services: those that take their time, those of files
   ros::NodeHandle nh_;
   Options options_;
   VisualOdometryOptions reconfigured_;  // the server's
@@ -456,11 +558,13 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   ReportThrottle throttle_;
   std::unique_ptr<RobotTransforms> transforms_;
   std::unique_ptr<CameraMount> mount_;
+  std::unique_ptr<UnusedInput> unused_;
   std::unique_ptr<ImuInput> imu_;  // none without use_imu
   std::unique_ptr<OdometryPublisher> publisher_;
   std::unique_ptr<OdometryDiagnostics> diagnostics_;
   std::vector<ros::ServiceServer> services_;
   ros::Subscriber pose_subscriber_;
+  std::set<std::string> saved_;  // trajectories' files
   struct Resume {};
   std::atomic<int> starts_{0};  // by services
   Requests<Resume> resumes_;
@@ -470,24 +574,27 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   FeaturesFilter filter_;
   std::optional<std::uint32_t> stream_epoch_;
 
-  std::atomic<std::uint64_t> out_of_order_{0}, malformed_{0};
-
   // The worker's thread touches these, and services do.
   std::mutex work_mutex_;
   std::unique_ptr<VisualOdometry> odometry_;
   Eigen::Isometry3d T_odom_start_;  // of a run
   int source_restarts_ = 0, clock_steps_ = 0;
   int epoch_ = 0;
+  bool is_tracking_ = false;  // reported, and not lost since
   std::string camera_frame_;
   std::optional<std::uint32_t> processed_epoch_;
   std::optional<ros::Time> processed_stamp_;
-  bool to_be_levelled_ = false;         // T_odom_start_, by the accelerometer
+  bool to_be_levelled_ = false;  // T_odom_start_, by the accelerometer
+  bool clock_is_told_ = false;
   bool given_start_ = false;            // a service gave this run's first pose, which stays as it is
   std::optional<double> levels_until_;  // s, steady time
   Patience patience_{0.0};              // with guesses
+  OpticalAxisCheck optical_axis_;
+  GyroAxesCheck gyro_axes_;
+  Finding optical_found_{}, gyro_found_{};  // as told last
 
   std::unique_ptr<Worker<FeaturesFilter::Passed>> worker_;
-  ros::Subscriber subscriber_;
+  std::unique_ptr<PausableInput> input_;
 };
 
 }  // namespace sdvo

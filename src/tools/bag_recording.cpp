@@ -10,8 +10,9 @@
 #include <stdexcept>
 
 #include "../common/stamp_filter.hpp"
+#include "../messages/stamps.hpp"
 #include "../ros/pair_decoder.hpp"
-#include "../ros/stamps.hpp"
+#include "camera_input.hpp"
 
 namespace sdvo {
 namespace {
@@ -37,15 +38,22 @@ bool isComplete(const StereoPairMessages& pair) {
 
 }  // namespace
 
-BagRecording::BagRecording(const std::string& path, const StereoNames& names)
-    : bag_(path, rosbag::bagmode::Read), topics_(topicsIn(bag_, names)) {
+BagRecording::BagRecording(const std::string& path, const StereoNames& names) : path_(path) {
+  openBag(path, bag_);
+  topics_ = ofBag(path, [&] { return topicsIn(bag_, names); });
   rosbag::View view(bag_);
-  std::set<std::string> recorded;
-  for (const rosbag::ConnectionInfo* connection : view.getConnections()) recorded.insert(connection->topic);
-  for (const std::string& topic : topics_)
-    if (recorded.count(topic) == 0)
-      throw std::runtime_error("there is no " + topic +
-                               " in it: name the topics by --camera, --left, --right, --image");
+  std::set<std::string> recorded, cameras;
+  for (const rosbag::ConnectionInfo* connection : view.getConnections()) {
+    recorded.insert(connection->topic);
+    if (connection->datatype == "sensor_msgs/Image" || connection->datatype == "sensor_msgs/CompressedImage")
+      cameras.insert(connection->topic);
+  }
+  const auto missing = std::find_if(topics_.begin(), topics_.end(), [&](const auto& t) { return !recorded.count(t); });
+  if (missing == topics_.end()) return;
+  std::string images;
+  for (const std::string& topic : cameras) images += (images.empty() ? "" : ", ") + topic;
+  throw std::runtime_error("'" + path + "' has no " + *missing + "; its images: " + (images.empty() ? "none" : images) +
+                           ": name the topics by --camera, --left, --right, --image");
 }
 
 int BagRecording::size() const {
@@ -53,6 +61,10 @@ int BagRecording::size() const {
 }
 
 int BagRecording::forEach(int limit, const Use& use) {
+  return ofBag(path_, [&] { return useAll(limit, use); });
+}
+
+int BagRecording::useAll(int limit, const Use& use) {
   std::map<ros::Time, Part> waiting;
   StampFilter<Part> filter;
   PairDecoder decoder;
@@ -65,7 +77,7 @@ int BagRecording::forEach(int limit, const Use& use) {
     const ros::Time stamp = pair.messages.left_image->header.stamp;
     try {
       const DecodedPair decoded = decoder.decode(pair.messages);  // whose images are the messages'
-      use({decoded.camera, decoded.left, decoded.right, nanoseconds(stamp)});
+      use(recordedPair(decoded, pair.messages, nanoseconds(stamp)));
       decoder.accept(decoded.camera);
       used_.push_back({stamp, pair.recorded});
     } catch (const std::invalid_argument& e) {
@@ -107,7 +119,7 @@ int BagRecording::forEach(int limit, const Use& use) {
       waiting.erase(waiting.begin());
     }
   }
-  if (used_.empty()) throw std::runtime_error("no pair can be used: " + problem);
+  if (used_.empty()) throw std::runtime_error("'" + path_ + "': no pair can be used: " + problem);
   return unpaired + static_cast<int>(waiting.size() + filter.dropped()) + refused;
 }
 
@@ -117,9 +129,15 @@ void BagRecording::forEachBackwards(const Use& use) const {
   for (auto pair = used_.rbegin(); pair != used_.rend(); ++pair) {
     const StereoPairMessages messages = read(*pair);
     const DecodedPair decoded = decoder.decode(messages);
-    use({decoded.camera, decoded.left, decoded.right, ends - nanoseconds(pair->stamp)});
+    use(recordedPair(decoded, messages, ends - nanoseconds(pair->stamp)));
     decoder.accept(decoded.camera);
   }
+}
+
+ArrivalFindings BagRecording::arrivals(const std::string& base_frame) const {
+  CameraInput input(topics_, [](const StereoPairMessages&) {});
+  input.addAll(bag_, topics_);
+  return input.findings(base_frame);
 }
 
 /// By the bag's index.

@@ -21,6 +21,7 @@ class BagRecording : public Recording {
   int size() const override;
   int forEach(int limit, const Use& use) override;
   void forEachBackwards(const Use& use) const override;
+  ArrivalFindings arrivals(const std::string& base_frame) const override;
 
  private:
   /// Times at which the four messages of a pair were recorded.
@@ -35,6 +36,9 @@ class BagRecording : public Recording {
   };
   StereoPairMessages read(const Used& pair) const;
 
+  int useAll(int limit, const Use& use);
+
+  const std::string path_;
   rosbag::Bag bag_;
   StereoTopics topics_;
   std::vector<Used> used_;

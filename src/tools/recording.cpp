@@ -2,8 +2,12 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <stdexcept>
+#include <utility>
 
+#include "../check/stamp_check.hpp"
+#include "../config/interface_options.hpp"
 #include "bag_recording.hpp"
 #include "stereo_descriptor_vo/data/euroc_dataset.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
@@ -47,14 +51,77 @@ class FolderRecording : public Recording {
     for (int i = used_ - 1; i >= 0; --i) give(i, ends - sequence_.stamp(i), use);
   }
 
+  ArrivalFindings arrivals(const std::string&) const override {
+    StampCheck check({});
+    for (int i = 0; i < used_; ++i) {
+      const double seconds = 1e-9 * static_cast<double>(sequence_.stamp(i));
+      for (std::size_t input = 0; input < StampCheck::kInputs; ++input) check.note(input, sequence_.stamp(i), seconds);
+      check.notePair(sequence_.stamp(i));
+    }
+    const RateOptions rates;
+    const Finding transform{"TF", Verdict::kOpen, "a folder has none", ""};
+    return {check.topics(rates.min_rate, rates.max_rate, ""), check.stamps(), transform, check.rate(), std::nullopt};
+  }
+
  private:
   void give(int i, std::int64_t stamp, const Use& use) const {
     const ImagePair pair = sequence_.load(i);
-    use({sequence_.camera(), pair.left, pair.right, stamp});
+    use({sequence_.camera(), pair.left, pair.right, stamp, "", ""});
   }
 
   const Sequence sequence_;
   int used_ = 0;
+};
+
+class JoinedRecording : public Recording {
+ public:
+  JoinedRecording(const std::vector<std::string>& paths, const StereoNames& names) : paths_(paths) {
+    for (const std::string& path : paths) parts_.push_back(openRecording(path, names));
+  }
+
+  int size() const override {
+    int size = 0;
+    for (const auto& part : parts_) size += part->size();
+    return size;
+  }
+
+  int forEach(int limit, const Use& use) override {
+    int left_out = 0;
+    ends_.clear();
+    for (std::size_t i = 0; i < parts_.size() && limit > 0; ++i) {
+      ends_.emplace_back();
+      left_out += parts_[i]->forEach(limit, [&](const RecordedPair& pair) {
+        if (!ends_.back()) {
+          if (i > 0 && pair.stamp <= ends_[i - 1]->second)
+            throw std::runtime_error("'" + paths_[i] + "' is not later than '" + paths_[i - 1] +
+                                     "': name the parts in the order of time (ls -v)");
+          ends_.back() = {pair.stamp, pair.stamp};
+        }
+        ends_.back()->second = pair.stamp;
+        --limit;
+        use(pair);
+      });
+    }
+    return left_out;
+  }
+
+  void forEachBackwards(const Use& use) const override {
+    const std::int64_t all = ends_.front()->first + ends_.back()->second;
+    for (std::size_t i = ends_.size(); i-- > 0;)
+      parts_[i]->forEachBackwards([&](RecordedPair pair) {
+        pair.stamp += all - ends_[i]->first - ends_[i]->second;
+        use(pair);
+      });
+  }
+
+  ArrivalFindings arrivals(const std::string& base_frame) const override {
+    return parts_.front()->arrivals(base_frame);  // parts are of one driver
+  }
+
+ private:
+  const std::vector<std::string> paths_;
+  std::vector<std::unique_ptr<Recording>> parts_;
+  std::vector<std::optional<std::pair<std::int64_t, std::int64_t>>> ends_;  ///< stamps, ns, of the parts that were used
 };
 
 }  // namespace
@@ -65,9 +132,15 @@ bool isRecording(const std::string& folder) {
 }
 
 std::unique_ptr<Recording> openRecording(const std::string& path, const StereoNames& names) {
-  if (fs::is_regular_file(path)) return std::make_unique<BagRecording>(path, names);
+  if (!fs::exists(path)) throw std::runtime_error("there is no '" + path + "'");
+  if (!fs::is_directory(path)) return std::make_unique<BagRecording>(path, names);
   if (const auto mav0 = findMav0(path)) return std::make_unique<FolderRecording<RectifiedEuroc>>(*mav0);
   return std::make_unique<FolderRecording<KittiSequence>>(path);
+}
+
+std::unique_ptr<Recording> openParts(const std::vector<std::string>& paths, const StereoNames& names) {
+  if (paths.size() == 1) return openRecording(paths.front(), names);
+  return std::make_unique<JoinedRecording>(paths, names);
 }
 
 }  // namespace sdvo

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <rosbag/bag.h>
+#include <rosbag/exceptions.h>
 #include <rosbag/message_instance.h>
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/Image.h>
@@ -8,6 +9,7 @@
 #include <CLI/CLI.hpp>
 #include <array>
 #include <cstddef>
+#include <stdexcept>
 #include <string>
 
 namespace sdvo {
@@ -20,13 +22,29 @@ using StereoTopics = std::array<std::string, 4>;
 struct StereoNames {
   std::string camera = "/stereo", left = "left", right = "right", image = "image_rect";
 
-  void addTo(CLI::App& app);
+  /// `scope` begins what --help has of them.
+  void addTo(CLI::App& app, const std::string& scope = "bags: ");
   StereoTopics topics() const;
 };
 
 /// The topics as a bag has them: …/compressed where an image is recorded in that form alone. Where it has none of the
 /// usual names, those of its only stereo camera, or of the only one in the namespace that is given.
 StereoTopics topicsIn(const rosbag::Bag& bag, const StereoNames& names);
+
+/// What `work` returns. Throws std::runtime_error that names the bag, and the remedy where there is one, when the bag
+/// cannot be read.
+template <class Work>
+auto ofBag(const std::string& path, const Work& work) try {
+  return work();
+} catch (const rosbag::BagUnindexedException&) {
+  throw std::runtime_error("'" + path + "' has no index, as of a recorder that was killed: rosbag reindex '" + path +
+                           "'");
+} catch (const rosbag::BagException& e) {
+  throw std::runtime_error("'" + path + "' cannot be read: " + e.what() + ". Is it whole? rosbag check '" + path + "'");
+}
+
+/// For reading. Throws as ofBag() does; a pipe, which would be waited for, is none.
+void openBag(const std::string& path, rosbag::Bag& bag);
 
 /// A message of one of the topics: an image or a calibration.
 struct StereoMessage {

@@ -45,5 +45,25 @@ TEST(EmitterCheck, ACameraThatStandsProvesNothing) {
   EXPECT_EQ(judged(0.0, 6000).verdict, Verdict::kOpen);
 }
 
+/// Bright spots of the scene behind them stay, of a camera that stands.
+TEST(EmitterCheck, PeopleWhoPassProveNothing) {
+  const synthetic::Texture scene(3, 8.0, 160.0), person(4, 8.0, 160.0);
+  std::mt19937 random(9);
+  std::vector<cv::Point> spots;
+  for (int i = 0; i < 3000; ++i)
+    spots.emplace_back(std::uniform_int_distribution<int>(1, kSize.width - 2)(random),
+                       std::uniform_int_distribution<int>(1, kSize.height - 2)(random));
+  const auto isOfPerson = [](double u) { return u > 20.0 && u < 120.0; };
+  EmitterCheck check;
+  for (int i = 0; i < 30; ++i) {
+    cv::Mat image = synthetic::render(
+        kSize, [&](double u, double v) { return 0.5 * (isOfPerson(u) ? person.at(u + 8.0 * i, v) : scene.at(u, v)); });
+    for (const cv::Point& spot : spots)
+      if (!isOfPerson(spot.x)) image.at<std::uint8_t>(spot) = 200;
+    check.add(image);
+  }
+  EXPECT_EQ(check.judge().verdict, Verdict::kOpen);
+}
+
 }  // namespace test_emitter_check
 }  // namespace sdvo

@@ -1,8 +1,10 @@
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <fstream>
 #include <numeric>
 #include <opencv2/imgcodecs.hpp>
 #include <set>
@@ -110,6 +112,24 @@ TEST(FeatureDetector, AMaskThatDoesNotFitIsNamed) {
             "the mask must have one channel of eight bits");
   options.mask = "/nowhere/mask.png";
   EXPECT_EQ(errorOf([&] { FeatureDetector{options}; }), "mask: cannot read a PNG from '/nowhere/mask.png'");
+  const TemporaryFolder folder;
+  options.mask = (folder.path() / "pipe").string();
+  ASSERT_EQ(::mkfifo(options.mask.c_str(), 0600), 0);
+  EXPECT_EQ(errorOf([&] { FeatureDetector{options}; }), "mask: cannot read a PNG from '" + options.mask + "'");
+  // The header alone, of a huge one and of one that ends early.
+  options.mask = (folder.path() / "mask.png").string();
+  cv::imwrite(options.mask, maskUpTo(10));
+  std::fstream png(options.mask, std::ios::in | std::ios::out | std::ios::binary);
+  png.seekp(16);
+  const char huge[] = {0, 0, 0x75, 0x30, 0, 0, 0x75, 0x30, 8, 0, 0, 0, 0, 0x43, 0x4c, static_cast<char>(0xa7), 0x66};
+  png.write(huge, sizeof huge);
+  png.close();
+  EXPECT_EQ(errorOf([&] { FeatureDetector{options}; }),
+            "mask: '" + options.mask + "' has 30000x30000 px: a mask has the size of the rectified left image");
+  cv::imwrite(options.mask, maskUpTo(10));
+  std::filesystem::resize_file(options.mask, std::filesystem::file_size(options.mask) / 2);
+  EXPECT_EQ(errorOf([&] { FeatureDetector{options}; }),
+            "mask: cannot read all of the PNG '" + options.mask + "': is it truncated?");
   // Where a nodelet's folder is not the user's.
   options.mask = "~/mask.png";
   EXPECT_EQ(errorOf([&] { FeatureDetector{options}; }),

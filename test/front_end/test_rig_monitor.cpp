@@ -94,8 +94,8 @@ TEST(RigMonitor, NamesARotation) {
   expectSaid(diagnosis(leftImage(), rightImage(0.0, -3.0 * CV_PI / 180.0)), "turned by 3.0 degrees counterclockwise");
 }
 
-TEST(RigMonitor, NamesSwappedImages) {
-  expectSaid(diagnosis(rightImage(0.0), leftImage()), "swapped");
+TEST(RigMonitor, NamesSwappedAndMirroredImages) {
+  expectSaid(diagnosis(rightImage(0.0), leftImage()), "swapped, mirrored, or");
 }
 
 TEST(RigMonitor, NamesRowsThatDiffer) {

@@ -3,7 +3,7 @@
 
 #include <stdexcept>
 
-#include "../../src/ros/camera_conversions.hpp"
+#include "../../src/messages/camera_conversions.hpp"
 
 namespace {
 

@@ -2,8 +2,8 @@
 // std::invalid_argument, or it can be compared with the places known here, and what comes out is finite.
 #include <stdexcept>
 
-#include "../../src/ros/place_conversions.hpp"
-#include "../../src/ros/pose_conversions.hpp"
+#include "../../src/messages/place_conversions.hpp"
+#include "../../src/messages/pose_conversions.hpp"
 #include "fuzz_message.hpp"
 #include "fuzz_places.hpp"
 

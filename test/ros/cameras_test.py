@@ -47,7 +47,7 @@ class Cameras(unittest.TestCase):
         self.rosout = Rosout('/' + namespace)
         arguments = {'publish_tf': 'false'}  # the next test's robot has the same base
         if 'zed' not in habits.launch:  # its driver publishes the mount
-            arguments['mount'] = '0 0 0 0 0 0'
+            arguments['mount_rpy'] = '0 0 0 0 0 0'
         if habits.raw:
             arguments['left_frame_id'] = frames[0]
         if habits.emitter == 'on_off':

@@ -159,6 +159,44 @@ class Examples(unittest.TestCase):
                     self.assertEqual((header.stamp, header.frame_id), (message.header.stamp, 'left_optical'))
         self.assertEqual((infos[0][0].width, infos[0][0].D[0], infos[1][0].P[3]), (4, 0.1, -50.0))
 
+    def test_camera_info_that_would_end_image_proc_is_kept_from_it(self):
+        loaders = [subprocess.Popen(['rosrun', 'nodelet', 'nodelet', 'load', name, '/split/manager', '--no-bond', '__ns:=/guarded',
+                                     '__name:=' + name.split('/')[1]] + remappings) for name, remappings in
+                   ((PACKAGE + '/RectifiableInfo', []),
+                    ('image_proc/rectify', ['camera_info:=rectifiable/camera_info', 'image_mono:=image_mono']))]
+        for loader in loaders:
+            self.addCleanup(loader.wait)
+            self.addCleanup(loader.terminate)
+        images = Collector('/guarded/image_rect', Image)
+        self.addCleanup(images.close)
+        rosout = Rosout('/split')
+        self.addCleanup(rosout.close)
+        image_publisher = rospy.Publisher('/guarded/image_mono', Image, queue_size=10)
+        info_publisher = rospy.Publisher('/guarded/camera_info', CameraInfo, queue_size=10)
+        self.assertTrue(wait_until(lambda: is_connected('/split/manager', images) and links('/split/manager') >= {
+            ('in', '/guarded/' + topic) for topic in ('image_mono', 'camera_info', 'rectifiable/camera_info')} and
+            links(rospy.get_name()) >= {('out', '/guarded/' + topic, '/split/manager') for topic in ('image_mono', 'camera_info')}))
+        info = CameraInfo(width=64, height=48, K=[50, 0, 32, 0, 50, 24, 0, 0, 1], R=[1, 0, 0, 0, 1, 0, 0, 0, 1],
+                          P=[50, 0, 32, 0, 0, 50, 24, 0, 0, 0, 1, 0])
+        image = Image(width=64, height=48, step=64, encoding='mono8', data=bytes(64 * 48))
+        seconds = 0
+        for model, numbers, words in (('fisheye', [0.01, 0, 0, 0], None), ('omnidirectional', [0.01, 0, 0, 0], 'equidistant'),
+                                      ('kannala_brandt4', [0.01, 0, 0, 0], None), ('', [], None),
+                                      ('plumb_bob', [0.01, 0, 0], '3 numbers'), ('plumb_bob', [0.01, 0, 0, 0, 0], None),
+                                      ('equidistant', [0.01, 0, 0, 0, 0], "4 are expected"), ('', [0.01], "''")):
+            seconds += 10
+            info.distortion_model, info.D = model, numbers
+            info.header.stamp = image.header.stamp = rospy.Time(seconds)
+            before = len(images)
+            info_publisher.publish(info)
+            image_publisher.publish(image)
+            if words is None:
+                self.assertTrue(wait_until(lambda: len(images) > before), model)
+            else:
+                # Said once in five seconds.
+                self.assertTrue(wait_until(lambda: rosout.said('no image is rectified', words) or
+                                           info_publisher.publish(info) or rospy.sleep(0.5)), (words, rosout.errors))
+
     def test_answers_on_a_drive(self):
         pairs = 10
         sequence = street_dir()

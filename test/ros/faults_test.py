@@ -24,9 +24,9 @@ from sensor_msgs.msg import Imu, PointCloud2
 from std_srvs.srv import Empty, Trigger
 from tf2_msgs.msg import TFMessage
 
-from kitti_replay import EPOCH, FRAME, PACKAGE, Collector, matrix_of, wait_until
+from kitti_replay import EPOCH, FRAME, PACKAGE, Camera, Collector, Pipeline, Rosout, links, matrix_of, wait_until
 from made_up_sequence import STEP, MadeUpSequence
-from pipeline_case import PipelineCase
+from pipeline_case import PipelineCase, camera_transform
 from stereo_descriptor_vo.msg import MapGraph, PlaceInfo, StereoFeatures, VoInfo
 from stereo_descriptor_vo.srv import SavePlaces, SaveTrajectory
 
@@ -233,7 +233,7 @@ class Faults(PipelineCase):
         self.expect('visual_odometry', 'odometry', ok, 'TRACKING')
         self.expect('visual_odometry', 'latency', warn, 'are the clocks of two machines different?')
         self.camera.publish(*self.camera.messages(0, time_of=self.shown - 2))
-        self.expect('stereo_features', 'synchronisation', warn, '1 messages were late')
+        self.expect('stereo_features', 'synchronisation', warn, '1 pairs late or with wrong stamps')
 
         def darken(images):
             for image in images:
@@ -264,13 +264,96 @@ class Faults(PipelineCase):
         self.features.close()
         self.expect('stereo_features', 'input rate', ok, 'nobody listens')
 
+    def test_pairs_whose_stamps_do_not_go_together_are_said_and_none_is_lost_uncounted(self):
+        self.start(queue_size=200)
+        pairs, random = 100, np.random.RandomState(1)
+        for k in range(pairs):
+            images, infos = self.camera.messages(k % PAIRS, time_of=0.5 * k)
+            for message in (images[1], infos[1]):
+                message.header.stamp += rospy.Duration.from_sec(random.uniform(-0.004, 0.004))
+            self.camera.publish(images, infos)
+            time.sleep(0.05)
+        words = 'the nearest stamps of left and right are 1.', 'more than sync_tolerance'
+        self.assertTrue(wait_until(lambda: self.rosout.warned('stereo pairs', 'are not used', *words)), self.rosout.warnings)
+        self.expect('stereo_features', 'synchronisation', DiagnosticStatus.WARN, 'are not used', *words)
+
+        def counts():
+            values = {value.key: value.value for value in self.diagnosis('synchronisation', 'stereo_features').values}
+            return [int(values.get(name, 0)) for name in ('unpaired', 'pushed out by newer ones', 'late or with wrong stamps', 'refused')]
+        self.assertTrue(wait_until(lambda: len(self.features) + sum(counts()) == pairs), (len(self.features), counts()))
+        self.assertTrue(0 < len(self.features) < 60, len(self.features))
+        self.assertGreater(self.features[-1].dropped_pairs, 10)
+
+    def test_a_long_wait_for_tf_blocks_nothing(self):
+        self.start(config=self.config('visual_odometry: {tf_timeout: 60.0}\n'))
+        begin = time.time()
+        for i in range(5):
+            self.camera.publish(*self.camera.messages(i, frame='mast'))
+            self.assertTrue(wait_until(lambda: len(self.features) == i + 1))
+        # Each pair waits until the next one but one would push another out.
+        self.assertTrue(wait_until(lambda: len(self.info) >= 2), len(self.info))
+        self.assertIn("'mast'", self.info[0].reason)
+        self.call('visual_odometry/reset', Empty)
+        self.assertLess(time.time() - begin, 50.0, 'it waited for TF')
+        self.broadcaster.sendTransform([camera_transform(FRAME), camera_transform('mast')])
+        times = itertools.count(5)
+        self.assertTrue(wait_until(lambda: self.is_answered(5, time_of=next(times), frame='mast') and
+                                   self.info[-1].state == 'TRACKING'))
+
+    def test_a_dark_pair_and_a_careless_click_leave_the_map_alone(self):
+        self.start(config=self.config('place_recognition: {keyframe_distance: 0.1, keyframe_angle: 5.0}\n'), loop_closing='true')
+        places = self.keep(Collector(self.namespace + '/place_info', PlaceInfo))
+        self.assertTrue(wait_until(lambda: self.pipeline.is_connected((places, ))))
+        for i in range(10):
+            self.feed(i)
+        self.assertTrue(wait_until(lambda: len(places) > 0))
+        images, infos = self.camera.messages(10)
+        for image in images:
+            image.data = bytes(len(image.data))
+        self.feed_messages(images, infos)
+        publisher = rospy.Publisher('/initialpose', PoseWithCovarianceStamped, queue_size=1)
+        self.addCleanup(publisher.unregister)
+        self.assertTrue(wait_until(lambda: self.is_sent_to_pipeline(publisher)))
+        click = PoseWithCovarianceStamped()
+        click.header.frame_id = 'map'
+        click.pose.pose.orientation.w = 1.0
+        publisher.publish(click)
+        self.assertTrue(wait_until(lambda: self.rosout.warned('initialpose is not used', 'initialpose_while_mapping')))
+        known = len(places)
+        for i in range(11, 30):
+            self.feed(i)
+        self.assertTrue(wait_until(lambda: len(places) > known))
+        self.assertEqual(self.rosout.errors, [])
+
+    def test_a_camera_that_was_found_is_given_back(self):
+        def pipeline(camera, **arguments):
+            self.rosout = self.keep(Rosout(self.namespace))
+            self.features = self.keep(Collector(self.namespace + '/stereo_features', StereoFeatures))
+            found = self.keep(Pipeline(self.namespace, **arguments))
+            self.assertTrue(wait_until(lambda: found.has_loaded('stereo_features', 'visual_odometry'), 60))
+            return self.keep(camera)
+        front = pipeline(Camera(self.namespace + '/front', self.sequence, self.clock))
+        self.assertTrue(wait_until(front.is_subscribed, 60))
+        self.assertTrue(wait_until(lambda: self.rosout.warned('nobody publishes', '/front/left/image_rect', 'find_camera')))
+        own = self.keep(Camera(self.namespace, self.sequence, self.clock))
+        self.assertTrue(wait_until(lambda: own.is_subscribed() and not front.has_subscribers(), 60))
+        self.assertTrue(wait_until(lambda: self.rosout.warned('somebody publishes')))
+        self.tearDown()
+        self.setUp()
+
+        front = pipeline(Camera(self.namespace + '/front', self.sequence, self.clock), find_camera='false')
+        self.assertTrue(wait_until(lambda: ('out', self.namespace + '/stereo_features', rospy.get_name()) in links(
+            self.namespace + '/stereo_vo_manager')))
+        time.sleep(3.0)
+        self.assertFalse(front.has_subscribers())
+
     def test_what_was_reconfigured_holds_after_a_respawn(self):
         self.start()
         before = self.feed(0)
         client = dynamic_reconfigure.client.Client(self.namespace + '/stereo_features', timeout=60)
         client.update_configuration({'detector/max_features': 200})
         client.close()
-        self.assertEqual(rospy.get_param(self.namespace + '/stereo_features/detector/max_features'), 200)
+        self.assertTrue(wait_until(lambda: rospy.get_param(self.namespace + '/stereo_features/detector/max_features') == 200))
         name = self.namespace + '/stereo_features'
         self.assertTrue(rospy.ServiceProxy(self.pipeline.manager + '/unload_nodelet', NodeletUnload)(name).success)
         self.assertTrue(wait_until(lambda: not self.camera.has_subscribers()))
@@ -371,6 +454,7 @@ class Faults(PipelineCase):
         self.feed(first)
         self.assertTrue(wait_until(lambda: map_to_odom() is not None))
         self.assertFalse(places[0].located)
+        self.assertTrue(self.rosout.warned('initialpose: the robot is placed in the map'), self.rosout.warnings)
         np.testing.assert_allclose(map_to_odom()[:3, 3], [0, -0.15, 0], atol=1e-6)
         for i in range(first + 1, 40):
             self.feed(i)

@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """What the launch files set on the parameter server, what they refuse, and what they start again."""
 
+import glob
 import os
 import shlex
 import signal
@@ -21,6 +22,7 @@ import rospy
 import rosservice
 import rostest
 import yaml
+from nodelet.srv import NodeletList
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import CameraInfo, Image
 
@@ -31,10 +33,13 @@ PACKAGE = 'stereo_descriptor_vo'
 ARGUMENTS = {'odom_frame_id': 'visual_odometry/odom_frame_id', 'base_frame_id': 'visual_odometry/base_frame_id',
              'initial_pose': 'visual_odometry/initial_pose', 'mask': 'stereo_features/detector/mask',
              'publish_tf': 'visual_odometry/publish_tf', 'approximate_sync': 'stereo_features/approximate_sync',
-             'queue_size': 'stereo_features/queue_size', 'odometry_queue_size': 'visual_odometry/queue_size'}
+             'sync_tolerance': 'stereo_features/sync_tolerance', 'sync_queue_size': 'stereo_features/sync_queue_size',
+             'image_transport': 'stereo_features/image_transport', 'guess_frame_id': 'visual_odometry/guess_frame_id',
+             'publish_null_when_lost': 'visual_odometry/publish_null_when_lost', 'queue_size': 'stereo_features/queue_size', 'odometry_queue_size': 'visual_odometry/queue_size'}
 IN_YAML = {'odom_frame_id': 'world', 'base_frame_id': 'robot', 'initial_pose': '1 2 3 0 0 0', 'mask': '/in/yaml.png',
            'publish_tf': False, 'approximate_sync': True,
-           'queue_size': 7, 'odometry_queue_size': 8}
+           'sync_tolerance': 0.002, 'sync_queue_size': 30, 'image_transport': 'compressed', 'guess_frame_id': 'wheel_odom',
+           'publish_null_when_lost': True, 'queue_size': 7, 'odometry_queue_size': 8}
 
 
 FOLDER = os.path.join(roslib.packages.get_pkg_dir(PACKAGE), 'launch')
@@ -100,6 +105,31 @@ class Launch(unittest.TestCase):
                          {'stereo_features/detector/max_features': 700, 'stereo_features/max_rate': 15,
                           'visual_odometry/planar': True, 'visual_odometry/use_imu': True})
 
+    def test_a_drive_is_recorded_on_request_alone(self):
+        self.assertNotIn('/stereo/recorder', nodes(load('stereo_vo.launch')))
+        for file in ('stereo_vo.launch', 'stereo_raw.launch', 'cameras/oak_d.launch', 'mavros.launch'):
+            recorders = [node for node in load(file, record='/tmp/drive.bag').nodes if node.type == 'record']
+            self.assertEqual(len(recorders), 1, file)
+            self.assertIn('"/tmp/drive.bag" /tf /tf_static ', recorders[0].args)
+        recorder = nodes(load('stereo_vo.launch', record='/tmp/drive.bag', right_image_topic='/cam/right'))['/stereo/recorder']
+        self.assertTrue(recorder.args.endswith(' /stereo/odom /stereo/vo_info /stereo/left/image_rect /cam/right '
+                                               '/stereo/left/camera_info /stereo/right/camera_info'), recorder.args)
+
+    def test_a_python_without_ros_modules_may_come_first_on_path(self):
+        with tempfile.TemporaryDirectory() as folder:
+            python, config = os.path.join(folder, 'python3'), os.path.join(folder, 'config.yaml')
+            with open(python, 'w') as file:
+                file.write('#!/bin/sh\nexec /usr/bin/python3 -I -S "$@"\n')
+            os.chmod(python, 0o755)
+            with open(config, 'w') as file:
+                file.write('visual_odometry: {motion: {seed: 7}}')
+            path = os.environ['PATH']
+            os.environ['PATH'] = folder + ':' + path
+            try:
+                self.assertEqual(parameters(config=config), {'visual_odometry/motion/seed': 7})
+            finally:
+                os.environ['PATH'] = path
+
     def test_a_filter_that_publishes_tf_gets_all_of_it(self):
         for file in ('stereo_vo.launch', 'stereo_raw.launch', 'mavros.launch', 'cameras/oak_d.launch'):
             for both, map_alone, expected in (('false', '', False), ('false', 'true', True), ('true', '', True)):
@@ -114,6 +144,19 @@ class Launch(unittest.TestCase):
             found = load(file, rviz='true', namespace='front', loop_closing='true', map_frame_id='site')
             rviz = nodes(found)['/front/rviz']
             self.assertTrue(rviz.args.endswith('/places.rviz" -f site'), rviz.args)
+
+    def test_required_nodes_and_where_their_messages_go(self):
+        for file, needed in (('stereo_vo.launch', {}), ('cameras/zed.launch', {}), ('stereo_raw.launch', {})):
+            for given, required, output in (({}, False, 'screen'), ({'required': 'true', 'output': 'log'}, True, 'log')):
+                found = {node.name: node for node in load(file, loop_closing='true', **needed, **given).nodes}
+                for name in ('stereo_vo_manager', 'stereo_features', 'visual_odometry', 'place_recognition'):
+                    self.assertEqual((found[name].required, found[name].output), (required, output), (file, name))
+                self.assertFalse(found['features_image'].required, 'only shown')
+
+    def test_the_transport_of_raw_images_is_not_that_of_rectified_ones(self):
+        found = load('stereo_raw.launch', image_transport='compressed').params
+        self.assertEqual(sorted(name for name in found if name.endswith('image_transport')),
+                         ['/stereo/left_debayer/image_transport', '/stereo/right_debayer/image_transport'])
 
     def test_a_group_keeps_all_its_names_to_itself(self):
         found = nodes(load('<launch><group ns="uav1"><include file="$(find %s)/launch/mavros.launch">'
@@ -130,9 +173,11 @@ class Launch(unittest.TestCase):
                 return sorted(node.args for node in config.nodes if node.type == 'static_transform_publisher')
             self.assertEqual(publishers(), [])
             self.assertEqual(publishers(base_frame_id='camera_link', namespace='camera'), [])
-            given = publishers(mount='1 2 3 0 0 0')
-            self.assertTrue(given and given[-1].startswith('1 2 3 0 0 0 base_link '), given)
-        same = load('cameras/realsense_d400.launch', mount='0 0 0 0 0 0', base_frame_id='camera_link')
+            # In URDF's order, as initial_pose has it; the publisher's is the other one.
+            given = publishers(mount_rpy='1 2 3 0.1 0.2 0.3')
+            self.assertTrue(given and given[-1].startswith('1 2 3 0.3 0.2 0.1 base_link '), given)
+            self.assertTrue(publishers(mount_rpy='0 0 0 0 0 0 1')[-1].startswith('mount_rpy_needs_six_numbers '))
+        same = load('cameras/realsense_d400.launch', mount_rpy='0 0 0 0 0 0', base_frame_id='camera_link')
         self.assertEqual([node for node in same.nodes if node.name == 'camera_mount'], [])
 
     def test_blocks_and_values_that_are_left_empty_are_none(self):
@@ -149,6 +194,41 @@ class Launch(unittest.TestCase):
                 config.write('- no blocks')
             with self.assertRaisesRegex(roslaunch.core.RLException, 'my config.yaml'):
                 load('stereo_vo.launch', config=path)
+
+    def test_a_configuration_that_cannot_be_read_is_named_and_leaves_no_copy(self):
+        def copies():
+            return set(glob.glob('/tmp/stereo_vo_config_*.yaml'))
+        before = copies()
+        with tempfile.TemporaryDirectory() as folder:
+            pipe, large, torn = (os.path.join(folder, name) for name in ('pipe.yaml', 'large.yaml', 'torn.yaml'))
+            os.mkfifo(pipe)
+            with open(large, 'w') as config:
+                config.truncate(2000000)
+            with open(torn, 'w') as config:
+                config.write('stereo_features: {detector: {max_feat')
+            for path in (pipe, large, torn):
+                with self.assertRaisesRegex(roslaunch.core.RLException, os.path.basename(path)):
+                    load('odometry.launch', config=path)
+            # A launch that fails between the copy and its removal.
+            failing = os.path.join(folder, 'failing.launch')
+            with open(failing, 'w') as launch:
+                launch.write('<launch><param name="copied" command="python3 %s %s %s"/><param name="x" command="false"/></launch>' % (
+                    os.path.join(FOLDER, 'copy_config.py'), os.path.join(FOLDER, '..', 'config', 'stereo_vo.yaml'),
+                    '/tmp/stereo_vo_config_test_%d.yaml' % os.getpid()))
+            subprocess.run(['roslaunch', '--dump-params', failing], stderr=subprocess.DEVNULL)
+        end = time.time() + 30
+        while copies() - before and time.time() < end:
+            time.sleep(0.1)
+        self.assertEqual(copies() - before, set())
+
+    def test_rviz_shows_what_is_in_its_namespace(self):
+        folder = os.path.join(FOLDER, '..', 'rviz')
+        for file in os.listdir(folder):
+            with open(os.path.join(folder, file)) as config:
+                displays = yaml.safe_load(config)['Visualization Manager']['Displays']
+            topics = [display[key] for display in displays for key in ('Topic', 'Image Topic', 'Marker Topic') if key in display]
+            self.assertTrue({'path', 'odom', 'features_image'} <= set(topics), (file, topics))
+            self.assertEqual([topic for topic in topics if topic.startswith('/') and not topic.startswith('/ground_truth/')], [], file)
 
     def test_nothing_is_set_that_nobody_reads(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -186,10 +266,12 @@ class Launch(unittest.TestCase):
 
     def test_loop_closing_passes_its_arguments_on(self):
         found = parameters(loop_closing='true', map_frame_id='site', publish_map_tf='false', places_file='/site.bag',
+                           save_at_shutdown='true',
                            robot_name='one', places_queue_size='40')
         self.assertEqual({name: value for name, value in found.items() if value != {}},
                          {'place_recognition/' + name: value for name, value in
-                          (('map_frame_id', 'site'), ('publish_tf', False), ('places_file', '/site.bag'), ('robot_name', 'one'),
+                          (('map_frame_id', 'site'), ('publish_tf', False), ('places_file', '/site.bag'),
+                           ('save_at_shutdown', True), ('robot_name', 'one'),
                            ('sync_queue_size', 40), ('queue_size', 40))})
 
     def test_parameters_of_an_earlier_run_are_forgotten_unless_they_are_wanted(self):
@@ -262,6 +344,48 @@ class Launch(unittest.TestCase):
             process.terminate()
             process.wait()
             listener.unregister()
+
+    def test_nodelets_in_a_manager_of_others_end_with_their_loaders_or_are_replaced(self):
+        executable = roslib.packages.find_node('nodelet', 'nodelet')[0]
+        manager = subprocess.Popen([executable, 'manager', '__name:=driver', '__ns:=/stereo'])
+        self.addCleanup(manager.kill)
+        names = rospy.ServiceProxy('/stereo/driver/list', NodeletList)
+        names.wait_for_service(60)
+
+        def wait_until(condition):
+            end = time.time() + 60
+            while not condition() and time.time() < end:
+                time.sleep(0.1)
+            return condition()
+
+        def launch(**arguments):
+            return subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch', 'manager:=driver', 'start_manager:=false'] +
+                                    ['%s:=%s' % item for item in arguments.items()], stderr=subprocess.PIPE,
+                                    universal_newlines=True, start_new_session=True)
+
+        def kill(process):
+            """With all its loaders, which say nothing any more."""
+            loaders = subprocess.run(['pgrep', '-P', str(process.pid)], stdout=subprocess.PIPE, universal_newlines=True)
+            for pid in [process.pid] + [int(pid) for pid in loaders.stdout.split()]:
+                os.kill(pid, signal.SIGKILL)
+            process.wait()
+        mine = ['/stereo/features_image', '/stereo/stereo_features', '/stereo/visual_odometry']
+        first = launch()
+        self.assertTrue(wait_until(lambda: sorted(names().nodelets) == mine), names().nodelets)
+        kill(first)
+        self.assertTrue(wait_until(lambda: names().nodelets == []), names().nodelets)
+        second = launch(bond='false')
+        self.assertTrue(wait_until(lambda: sorted(names().nodelets) == mine), names().nodelets)
+        session = self.session()
+        kill(second)
+        third = launch(bond='false')
+        try:
+            self.assertTrue(wait_until(lambda: self.session() not in (None, session)))
+            self.assertEqual(sorted(names().nodelets), mine)
+        finally:
+            third.terminate()
+        self.assertIn('/stereo/visual_odometry of an earlier launch is still in /stereo/driver: it is replaced',
+                      third.communicate()[1])
 
     def test_a_recording_takes_over_from_a_pipeline_of_the_same_namespace(self):
         self.addCleanup(rospy.delete_param, '/use_sim_time')

@@ -28,8 +28,8 @@ from sensor_msgs.msg import Image, Imu, PointCloud2
 from std_srvs.srv import Empty, Trigger
 from tf2_msgs.msg import TFMessage
 
-from kitti_replay import (EPOCH, FRAME, PACKAGE, Camera, Collector, Pipeline, StereoSequence, links, matrix_of,
-                          wait_until)
+from kitti_replay import (EPOCH, FRAME, PACKAGE, Camera, Collector, Pipeline, StereoSequence, Rosout, links,
+                          matrix_of, wait_until)
 from pipeline_case import PipelineCase, camera_transform
 from stereo_descriptor_vo.msg import FeatureFlow, PlaceInfo, StereoFeatures, VoInfo
 from stereo_descriptor_vo.srv import ResetToPose, SaveTrajectory, SetPose
@@ -64,6 +64,35 @@ class Live(PipelineCase):
         finally:
             process.terminate()
             process.wait()
+
+    def test_both_nodelets_in_one_process(self):
+        """As rosrun starts it: remapped, with private parameters of either nodelet, flat or in blocks."""
+        camera = self.keep(Camera(self.namespace + '/front', self.sequence, self.clock))
+        odometry = self.keep(Collector(self.namespace + '/odom', Odometry))
+        rosout = self.keep(Rosout(self.namespace))
+        node = self.namespace + '/stereo_odometry'
+        command = [roslib.packages.find_node(PACKAGE, 'stereo_odometry')[0], '__ns:=' + self.namespace]
+        command += ['%s:=front/%s' % (topic, topic) for topic in
+                    ('left/image_rect', 'right/image_rect', 'left/camera_info', 'right/camera_info')]
+        process = subprocess.Popen(command + ['_odom_frame_id:=world', '_detector/max_features:=600', '_queue_size:=100',
+                                              '_visual_odometry/planar:=true', '_cuont:=5'])
+        try:
+            self.assertTrue(wait_until(lambda: camera.is_subscribed() and links(node) >= {
+                ('out', odometry.subscriber.resolved_name, rospy.get_name()), ('in', '/tf_static'),
+                ('in', self.namespace + '/stereo_features')}, 60))
+            for i in range(3):
+                camera.publish(*camera.messages(i))
+            self.assertTrue(wait_until(lambda: len(odometry) == 3))
+            self.assertEqual((odometry[2].header.frame_id, odometry[2].child_frame_id), ('world', 'base_link'))
+            used = rospy.get_param(self.namespace)
+            self.assertEqual((used['stereo_features']['detector']['max_features'], used['stereo_features']['queue_size'],
+                              used['visual_odometry']['queue_size'], used['visual_odometry']['planar']), (600, 100, 100, True))
+            self.assertTrue(wait_until(lambda: rosout.warned('stereo_odometry/cuont is unknown')), rosout.warnings)
+            process.terminate()
+            self.assertEqual(process.wait(30), 0)
+        finally:
+            process.kill()
+        self.assertNotEqual(subprocess.run(command + ['_queue_size:=many']).returncode, 0)
 
     def test_malformed_features(self):
         self.start(odometry_queue_size=100)
@@ -446,6 +475,13 @@ class Live(PipelineCase):
         np.testing.assert_allclose(rows[0].reshape(3, 4), np.eye(4)[:3], atol=1e-9)
         self.assertAlmostEqual(rows[3][11], self.odometry[3].pose.pose.position.x)  # the camera looks ahead
         self.assertFalse(self.service('save_trajectory', SaveTrajectory, '/dev/null', 'tum').success)
+        others = os.path.join(directory, 'others.txt')
+        with open(others, 'w') as file:
+            file.write('precious')
+        answer = self.service('save_trajectory', SaveTrajectory, others, 'tum')
+        self.assertFalse(answer.success)
+        self.assertIn(others + "' was there before", answer.message)
+        self.assertEqual(os.path.getsize(others), 8)
         self.assert_alive()
 
     def test_reconfiguring_takes_effect_and_is_clamped(self):
@@ -767,8 +803,10 @@ class Live(PipelineCase):
         load = rospy.ServiceProxy(self.pipeline.manager + '/load_nodelet', NodeletLoad)
         for type_name, name, value in (('StereoFeatures', 'detector/max_features', -1),
                                        ('VisualOdometry', 'initial_pose', 'here'),
+                                       ('VisualOdometry', 'odom_frame_id', '/base_link'), ('VisualOdometry', 'base_frame_id', ''),
+                                       ('VisualOdometry', 'guess_frame_id', 'odom'), ('PlaceRecognition', 'map_frame_id', '/'),
                                        ('PlaceRecognition', 'sync_queue_size', 'many')):
-            nodelet = self.namespace + '/wrong_' + type_name
+            nodelet = '%s/wrong_%s_%s' % (self.namespace, type_name, name.replace('/', '_'))
             rospy.set_param(nodelet + '/' + name, value)
             with self.assertRaises(rospy.ServiceException):  # so nodelet says that it did not load
                 load(nodelet, PACKAGE + '/' + type_name, [], [], [], '')
@@ -917,6 +955,9 @@ class Live(PipelineCase):
             self.assertEqual(a.pose, b.pose)
         self.assertEqual(other_info[-1].epoch, first[-1].epoch)
         self.assertEqual(other_info[-1].distance, first[-1].distance)
+        # But for one transform.
+        self.assertTrue(wait_until(lambda: self.rosout.warned('another nodelet of', 'publishes odom -> base_link')),
+                        self.rosout.warnings)
 
     def test_two_cameras_in_one_manager(self):
         self.start()

@@ -5,12 +5,12 @@
 #include <opencv2/core.hpp>
 #include <string>
 
-#include "../../src/ros/camera_conversions.hpp"
-#include "../../src/ros/feature_conversions.hpp"
-#include "../../src/ros/frames.hpp"
-#include "../../src/ros/image_conversions.hpp"
-#include "../../src/ros/odometry_conversions.hpp"
-#include "../../src/ros/pose_conversions.hpp"
+#include "../../src/messages/camera_conversions.hpp"
+#include "../../src/messages/feature_conversions.hpp"
+#include "../../src/messages/frames.hpp"
+#include "../../src/messages/image_conversions.hpp"
+#include "../../src/messages/odometry_conversions.hpp"
+#include "../../src/messages/pose_conversions.hpp"
 
 /// Messages and results to try the conversions on.
 namespace sdvo::ros_conversions {

@@ -15,6 +15,7 @@ import numpy as np
 import rosbag
 import rosgraph
 import rospy
+import rospkg
 import rostest
 import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray
@@ -250,7 +251,9 @@ class Places(unittest.TestCase):
         with rosbag.Bag(file) as bag:
             self.assertEqual(bag.get_message_count(['place']), info.places)
             self.assertEqual(bag.get_message_count(['map_graph']), 1)
-        self.assertFalse(recognition.call('save_places', SavePlaces, 'ring.bag').success)
+        relative = 'sdvo_places_test_%d.bag' % os.getpid()
+        self.assertTrue(recognition.call('save_places', SavePlaces, relative).success)
+        os.remove(os.path.join(rospkg.get_ros_home(), relative))
         self.assertFalse(recognition.call('load_places', LoadPlaces, os.path.join(self.directory, 'none.bag')).success)
         place = recognition.call('get_place', GetPlace, 3)
         self.assertTrue(place.success)

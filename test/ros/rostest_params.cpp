@@ -95,18 +95,38 @@ TEST_F(LoadParams, RefusesWhatIsOutsideOfItsRange) {
   EXPECT_EQ(refusal(), "parameter /load_params/kind = 'c' is none of: a, b");
 }
 
-TEST_F(LoadParams, RefusesOtherTypesByName) {
+TEST_F(LoadParams, TakesTheSameValueOfAnotherType) {
   nh_.setParam("flag", 1);
-  EXPECT_EQ(refusal(), "parameter /load_params/flag is not a boolean");
+  nh_.setParam("count", 5.0);
+  nh_.setParam("inner/ratio", "5e-1");  // text, by YAML 1.1
+  Sample sample;
+  EXPECT_EQ(loadParams(nh_, sample), std::vector<std::string>{});
+  EXPECT_TRUE(sample.flag);
+  EXPECT_EQ(sample.count, 5);
+  EXPECT_EQ(sample.inner.ratio, 0.5);
+  nh_.setParam("flag", "false");
+  nh_.setParam("count", "1e1");
+  loadParams(nh_, sample);
+  EXPECT_FALSE(sample.flag);
+  EXPECT_EQ(sample.count, 10);
+}
+
+TEST_F(LoadParams, RefusesOtherValuesByNameAndValue) {
+  nh_.setParam("flag", "perhaps");
+  EXPECT_EQ(refusal(), "parameter /load_params/flag = 'perhaps' is neither true nor false");
   nh_.setParam("flag", true);
   nh_.setParam("count", 2.5);
-  EXPECT_EQ(refusal(), "parameter /load_params/count is not an integer");
+  EXPECT_EQ(refusal(), "parameter /load_params/count = '2.5' is not a whole number");
+  nh_.setParam("count", 1e300);
+  EXPECT_EQ(refusal(), "parameter /load_params/count = '1.0000000000000001e+300' is not a whole number");
   nh_.setParam("count", 2);
   nh_.setParam("kind", 5);
-  EXPECT_EQ(refusal(), "parameter /load_params/kind is not a string");
+  EXPECT_EQ(refusal(), "parameter /load_params/kind = '5' is none of: a, b");
   nh_.setParam("kind", "a");
   nh_.setParam("inner/ratio", "half");
-  EXPECT_EQ(refusal(), "parameter /load_params/inner/ratio is not a number");
+  EXPECT_EQ(refusal(), "parameter /load_params/inner/ratio = 'half' is not a number");
+  nh_.setParam("inner/ratio", std::vector<double>{0.5});
+  EXPECT_EQ(refusal(), "parameter /load_params/inner/ratio is a list or a block: one value is expected");
 }
 
 TEST_F(LoadParams, TheServerShowsWhatIsInUse) {

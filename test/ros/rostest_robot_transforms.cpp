@@ -4,6 +4,7 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -42,7 +43,7 @@ class RobotTransformsTest : public ::testing::Test {
         tf_static_(nh_.advertise<tf2_msgs::TFMessage>("/tf_static", 100)) {}
 
   void start(std::optional<ros_conversions::OdometryFrames> ours = std::nullopt) {
-    transforms_.emplace(nh_, std::move(ours), [this](const std::string& what) { warnings_.push_back(what); });
+    transforms_.emplace(nh_, std::move(ours), kTag, [this](const std::string& what) { warnings_.push_back(what); });
     ASSERT_TRUE(spinUntil([&] { return tf_.getNumSubscribers() > 0 && tf_static_.getNumSubscribers() > 0; }));
   }
 
@@ -67,6 +68,14 @@ class RobotTransformsTest : public ::testing::Test {
     send(publisher, {transform("markers", child, ros::Time::now())});
     std::string problem;
     ASSERT_TRUE(spinUntil([&] { return transforms_->find("markers", child, problem).has_value(); })) << problem;
+  }
+
+  static constexpr std::uint32_t kTag = 7;
+
+  /// As TransformPublisher sends it.
+  static geometry_msgs::TransformStamped tagged(geometry_msgs::TransformStamped message, std::uint32_t tag) {
+    message.header.seq = tag;
+    return message;
   }
 
   ros::NodeHandle nh_;
@@ -156,7 +165,7 @@ TEST_F(RobotTransformsTest, WildStampsAndFramesAreLeftOutAndNothingElse) {
 
 TEST_F(RobotTransformsTest, AnotherPublisherOfOurChildIsNamed) {
   start(ros_conversions::OdometryFrames{"odom", "base_link"});
-  send(tf_, {transform("odom", "base_link", ros::Time::now())});  // our own
+  send(tf_, {tagged(transform("odom", "base_link", ros::Time::now()), kTag)});  // our own
   waitForMarker(tf_);
   EXPECT_TRUE(warnings_.empty());
   for (int i = 0; i < 3; ++i) send(tf_, {transform("world", "base_link", ros::Time::now())});
@@ -164,6 +173,34 @@ TEST_F(RobotTransformsTest, AnotherPublisherOfOurChildIsNamed) {
   ASSERT_EQ(warnings_.size(), 1u);
   EXPECT_TRUE(contains(warnings_[0], ros::this_node::getName() + " publishes world -> base_link")) << warnings_[0];
   EXPECT_TRUE(contains(warnings_[0], ros::this_node::getName() + " publishes odom -> base_link")) << warnings_[0];
+}
+
+/// On TF the nodelets of one process have one name.
+TEST_F(RobotTransformsTest, AnotherNodeletOfTheProcessThatPublishesTheSameIsNamed) {
+  start(ros_conversions::OdometryFrames{"odom", "base_link"});
+  for (int i = 0; i < 3; ++i) {
+    const auto same = transform("odom", "base_link", ros::Time::now() + ros::Duration(0.1 * i));
+    send(tf_, {tagged(same, kTag), tagged(same, kTag + 1)});
+  }
+  waitForMarker(tf_);
+  ASSERT_EQ(warnings_.size(), 1u);
+  EXPECT_TRUE(contains(warnings_[0], "another nodelet of " + ros::this_node::getName())) << warnings_[0];
+  EXPECT_TRUE(contains(warnings_[0], "set publish_tf to false in one of them")) << warnings_[0];
+}
+
+TEST_F(RobotTransformsTest, TheCamerasPlaceIsAwaitedOnceAndNotWhenItIsUrgent) {
+  start();
+  CameraMount mount(*transforms_, 60.0);
+  const ros::WallTime begin = ros::WallTime::now();
+  int asked = 0;
+  mount.await("base_link", "camera", [&] { return ++asked == 3; });
+  EXPECT_EQ(asked, 3);
+  send(tf_static_, {transform("base_link", "camera", ros::Time::now())});
+  std::string problem;
+  ASSERT_TRUE(spinUntil([&] { return transforms_->find("base_link", "camera", problem).has_value(); }));
+  mount.await("base_link", "camera", [] { return false; });
+  EXPECT_TRUE(mount.find("base_link", "camera", problem));
+  EXPECT_LT((ros::WallTime::now() - begin).toSec(), 30.0);
 }
 
 /// As on a TurtleBot.

@@ -1,8 +1,12 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <functional>
+#include <random>
 #include <string>
 
 #include "../../src/ros/arrival_log.hpp"
+#include "../../src/ros/synchronisers.hpp"
 #include "message_samples.hpp"
 
 namespace sdvo {
@@ -12,11 +16,10 @@ using ros_conversions::contains;
 
 class ArrivalLogTest : public ::testing::Test {
  protected:
-  explicit ArrivalLogTest(bool approximate = false) : log_(topics(), options(approximate)) {}
-
-  static std::array<std::string, ArrivalLog::kInputs> topics() {
-    return {"/l/image", "/r/image", "/l/info", "/r/info"};
+  explicit ArrivalLogTest(bool approximate = false) : log_(options(approximate), unused_) {
+    log_.begin({"/l/image", "/r/image", "/l/info", "/r/info"}, 0.0);
   }
+
   static StereoInputOptions options(bool approximate) {
     StereoInputOptions options;
     options.approximate_sync = approximate;
@@ -25,84 +28,175 @@ class ArrivalLogTest : public ::testing::Test {
 
   void note(ArrivalLog::Input input, double stamp, double now) { log_.note(input, ros::Time(stamp), now); }
 
+  void noteAll(double stamp, double now) {
+    for (const auto input :
+         {ArrivalLog::kLeftImage, ArrivalLog::kRightImage, ArrivalLog::kLeftInfo, ArrivalLog::kRightInfo})
+      note(input, stamp, now);
+  }
+
+  void noteUsed(double stamp, double now) {
+    noteAll(stamp, now);
+    log_.notePair(ros::Time(stamp), ros::Time(stamp), now);
+  }
+
+  std::uint64_t unpaired() const { return unused_.count(UnusedInput::kUnpaired); }
+
+  UnusedInput unused_{"pairs", 0.05};
   ArrivalLog log_;
 };
 
-TEST_F(ArrivalLogTest, SaysNothingWhilePairsCome) {
-  note(ArrivalLog::kLeftImage, 1.0, 0.0);
-  log_.notePair();
-  EXPECT_EQ(log_.explainSilence(), "");
-  EXPECT_NE(log_.explainSilence(), "");  // none since
+TEST_F(ArrivalLogTest, SaysNothingOfAHealthyStream) {
+  for (int i = 0; i < 300; ++i) {
+    noteUsed(100.0 + 0.05 * i, 0.05 * i);
+    EXPECT_EQ(log_.explainLoss(0.05 * i), "");
+    EXPECT_EQ(log_.explainSilence(0.05 * i), "");
+  }
+  EXPECT_EQ(unpaired(), 0u);
+  for (const auto& [topic, rate] : log_.rates(15.0)) EXPECT_NEAR(rate, 20.0, 0.5) << topic;
 }
 
-TEST_F(ArrivalLogTest, CountsWhatArrivedSinceTheLastTime) {
-  note(ArrivalLog::kLeftImage, 1.0, 0.0);
-  note(ArrivalLog::kLeftImage, 2.0, 0.0);
-  note(ArrivalLog::kRightInfo, 3.0, 0.0);
-  EXPECT_EQ(log_.explainSilence(), "no synchronised stereo pair; received: /l/image 2 /r/image 0 /l/info 0 /r/info 1");
-  EXPECT_EQ(log_.explainSilence(), "no synchronised stereo pair; received: /l/image 0 /r/image 0 /l/info 0 /r/info 0");
+TEST_F(ArrivalLogTest, AnAccidentIsCountedAndNotSaid) {
+  for (int i = 0; i < 100; ++i) {
+    if (i == 50)
+      note(ArrivalLog::kLeftImage, 100.0 + 0.05 * i, 0.05 * i);
+    else
+      noteUsed(100.0 + 0.05 * i, 0.05 * i);
+    EXPECT_EQ(log_.explainLoss(0.05 * i), "");
+  }
+  EXPECT_EQ(unpaired(), 1u);
 }
 
-TEST_F(ArrivalLogTest, TheGapIsThatBetweenLeftAndRightNotWithinOneSide) {
-  // One side alone runs at 1 ms; the other is 0.25 s off at best.
-  for (int i = 0; i < 10; ++i) note(ArrivalLog::kLeftImage, 10.0 + 0.001 * i, 0.0);
-  note(ArrivalLog::kRightImage, 10.259, 0.0);
-  EXPECT_TRUE(contains(log_.explainSilence(),
-                       "smallest gap between a left and a right image stamp 0.25 s, larger than sync_tolerance "
-                       "(0.001 s): set approximate_sync"));
+/// Through the synchroniser as in the nodelet: every pair is used, or counted once.
+struct JitterTest : ArrivalLogTest {
+  int used = 0;
+  TriggerSynchroniser<sensor_msgs::Image, sensor_msgs::Image, sensor_msgs::CameraInfo, sensor_msgs::CameraInfo>
+      synchroniser{options(false).sync_queue_size, options(false).sync_tolerance,
+                   [this](const auto& left, const auto& right, const auto&, const auto&) {
+                     ++used;
+                     log_.notePair(left->header.stamp, right->header.stamp, now);
+                   }};
+  double now = 0.0;
+
+  template <ArrivalLog::Input input, class Message>
+  void send(double stamp) {
+    const auto message = boost::make_shared<Message>();
+    message->header.stamp = ros::Time(stamp);
+    log_.note(input, message->header.stamp, now);
+    synchroniser.add<input>(boost::shared_ptr<const Message>(message));
+  }
+
+  void send(int pair, double apart, bool has_left = true, bool has_right = true) {
+    now = 0.05 * pair;
+    const double left = 100.0 + 0.05 * pair, right = left + apart;
+    if (has_left) send<ArrivalLog::kLeftImage, sensor_msgs::Image>(left);
+    send<ArrivalLog::kLeftInfo, sensor_msgs::CameraInfo>(left);
+    if (has_right) send<ArrivalLog::kRightImage, sensor_msgs::Image>(right);
+    send<ArrivalLog::kRightInfo, sensor_msgs::CameraInfo>(right);
+  }
+};
+
+TEST_F(JitterTest, OfFiveHundredPairsWhoseStampsDifferEachIsUsedOrCountedAndTheSpreadIsSaid) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<double> apart(-0.004, 0.004);
+  std::string said;
+  for (int pair = 0; pair < 500; ++pair) {
+    send(pair, apart(random));
+    const std::string loss = log_.explainLoss(now);
+    if (said.empty() && !loss.empty()) {
+      said = loss;
+      EXPECT_LT(now, 3.0);
+    }
+  }
+  const std::string loss = log_.explainLoss(now);
+  EXPECT_TRUE(contains(loss, "stereo pairs in 5 s are not used")) << loss;
+  EXPECT_TRUE(contains(loss, "left and")) << loss;
+  EXPECT_TRUE(contains(loss, "the nearest stamps of left and right are 1.")) << loss;
+  EXPECT_TRUE(contains(loss, "ms apart, more than sync_tolerance (1.0 ms): set a larger sync_tolerance")) << loss;
+  log_.explainLoss(now + 10.0);  // what waits for partners is given up
+  EXPECT_GT(used, 80);
+  EXPECT_LT(used, 200);
+  EXPECT_EQ(used + unpaired(), 500u);
+}
+
+TEST_F(JitterTest, LostImagesOfEitherSideAreNamed) {
+  for (int pair = 0; pair < 120; ++pair) send(pair, 0.0, true, pair % 3 != 1);
+  EXPECT_TRUE(contains(log_.explainLoss(now), "left images have no right one within half a period"))
+      << log_.explainLoss(now);
+  for (int pair = 120; pair < 240; ++pair) send(pair, 0.0, pair % 2 == 0, true);
+  EXPECT_TRUE(contains(log_.explainLoss(now), "right images have no left one within half a period"))
+      << log_.explainLoss(now);
+  log_.explainLoss(now + 10.0);
+  EXPECT_EQ(used + unpaired(), 240u);
+}
+
+TEST_F(ArrivalLogTest, CameraInfoThatIsSlowerThanTheImagesIsNamedWithItsRate) {
+  for (int i = 0; i < 200; ++i) {
+    const double stamp = 100.0 + 0.05 * i, now = 0.05 * i;
+    if (i % 20 == 0) {
+      noteUsed(stamp, now);
+      continue;
+    }
+    for (const auto input : {ArrivalLog::kLeftImage, ArrivalLog::kRightImage, ArrivalLog::kRightInfo})
+      note(input, stamp, now);
+  }
+  const std::string loss = log_.explainLoss(10.0);
+  EXPECT_TRUE(contains(loss, "; /l/info must have a message for each image")) << loss;
+  EXPECT_TRUE(contains(loss, "/l/image 100 /r/image 100 /l/info 5 /r/info 100")) << loss;
+  log_.explainLoss(20.0);  // what waits for partners is given up
+  EXPECT_EQ(unpaired(), 190u);
+}
+
+/// The subscribers do not connect at once.
+TEST_F(ArrivalLogTest, ImagesFromBeforeAllTopicsWereThereAreNotCounted) {
+  for (int i = 0; i < 10; ++i) note(ArrivalLog::kLeftImage, 100.0 + 0.05 * i, 0.05 * i);
+  for (int i = 5; i < 12; ++i) note(ArrivalLog::kRightImage, 100.0 + 0.05 * i, 0.05 * i);
+  for (int i = 12; i < 60; ++i) noteUsed(100.0 + 0.05 * i, 0.05 * i);
+  EXPECT_EQ(log_.explainLoss(3.0), "");
+  EXPECT_EQ(unpaired(), 0u);
+}
+
+TEST_F(ArrivalLogTest, SilenceIsExplainedByWhatArrived) {
+  EXPECT_EQ(log_.explainSilence(9.0), "") << "it has just begun";
+  note(ArrivalLog::kLeftImage, 1.0, 10.0);
+  note(ArrivalLog::kLeftImage, 2.0, 10.5);
+  note(ArrivalLog::kRightInfo, 3.0, 11.0);
+  note(ArrivalLog::kRightInfo, 0.0, 11.0);
+  EXPECT_EQ(log_.explainSilence(11.0),
+            "no synchronised stereo pair; received: /l/image 2 /r/image 0 /l/info 0 /r/info 2 (1 with zero stamps)");
+  EXPECT_EQ(log_.explainLoss(11.0), "");
 }
 
 TEST_F(ArrivalLogTest, ExtremeStampsAreCompared) {
-  log_.note(ArrivalLog::kLeftImage, ros::Time(0xffffffffu, 999999999u), 0.0);
-  log_.note(ArrivalLog::kRightImage, ros::Time(0, 1), 0.0);
-  EXPECT_TRUE(contains(log_.explainSilence(), "smallest gap"));
-}
-
-TEST_F(ArrivalLogTest, ZeroStampsAreSaid) {
-  for (int i = 0; i < 3; ++i) note(ArrivalLog::kLeftImage, 0.0, 0.1 * i);
-  EXPECT_TRUE(contains(log_.explainSilence(), "/l/image 3 (3 with zero stamps)"));
+  noteAll(1.0, 10.0);
+  log_.note(ArrivalLog::kLeftImage, ros::Time(0xffffffffu, 999999999u), 10.0);
+  log_.note(ArrivalLog::kRightImage, ros::Time(0, 1), 10.0);
+  EXPECT_TRUE(contains(log_.explainSilence(11.0), "no synchronised stereo pair"));
 }
 
 TEST_F(ArrivalLogTest, OneSideThatIsLateAsksForALongerQueue) {
   // 32 Hz, equal stamps; the right camera's messages come 0.75 s later: 24 periods.
-  for (int i = 0; i < 60; ++i) {
-    const double stamp = 10.0 + i / 32.0;
+  for (int i = 0; i < 400; ++i) {
+    const double stamp = 10.0 + i / 32.0, late = stamp - 0.75;
     for (const auto input : {ArrivalLog::kLeftImage, ArrivalLog::kLeftInfo}) note(input, stamp, i / 32.0);
-    for (const auto input : {ArrivalLog::kRightImage, ArrivalLog::kRightInfo}) note(input, stamp, i / 32.0 + 0.75);
+    for (const auto input : {ArrivalLog::kRightImage, ArrivalLog::kRightInfo}) note(input, late, i / 32.0);
   }
-  const std::string text = log_.explainSilence();
+  const std::string text = log_.explainLoss(400 / 32.0);
   EXPECT_TRUE(contains(text, "0.75 s apart: set sync_queue_size, now 20, to at least 26")) << text;
   EXPECT_FALSE(contains(text, "approximate_sync")) << text;
-}
-
-TEST_F(ArrivalLogTest, CameraInfoWithOtherStampsIsNamed) {
-  for (int i = 0; i < 5; ++i) {
-    for (const auto input : {ArrivalLog::kLeftImage, ArrivalLog::kRightImage, ArrivalLog::kLeftInfo})
-      note(input, 10.0 + i, i);
-    note(ArrivalLog::kRightInfo, 10.25 + i, i);
-  }
-  EXPECT_TRUE(
-      contains(log_.explainSilence(), "the stamps of /r/info are not those of the left images, at best 0.25 s"));
 }
 
 struct ApproximateArrivalLogTest : ArrivalLogTest {
   ApproximateArrivalLogTest() : ArrivalLogTest(true) {}
 };
 
-/// A driver that publishes it once, latched.
-TEST_F(ArrivalLogTest, CameraInfoThatComesOnceIsNamed) {
-  for (int i = 0; i < 3; ++i)
-    for (const auto input : {ArrivalLog::kLeftImage, ArrivalLog::kRightImage, ArrivalLog::kRightInfo})
-      log_.note(input, ros::Time(10.0 + i), 0.0);
-  const std::string text = log_.explainSilence();
-  EXPECT_TRUE(contains(text, "; /l/info must have a message for each image")) << text;
-  EXPECT_FALSE(contains(text, "; /r/info must")) << text;
-}
-
 TEST_F(ApproximateArrivalLogTest, DoesNotAdviseWhatIsSetAlready) {
-  note(ArrivalLog::kLeftImage, 10.0, 0.0);
-  note(ArrivalLog::kRightImage, 10.02, 0.0);
-  EXPECT_TRUE(contains(log_.explainSilence(), "0.02 s, larger than max_interval (0.01 s)"));
+  for (int i = 0; i < 100; ++i) {
+    note(ArrivalLog::kLeftImage, 10.0 + 0.1 * i, 0.1 * i);
+    note(ArrivalLog::kRightImage, 10.02 + 0.1 * i, 0.1 * i);
+  }
+  const std::string text = log_.explainSilence(10.0);
+  EXPECT_TRUE(contains(text, "20.0 to 20.0 ms apart, more than max_interval (10.0 ms)")) << text;
+  EXPECT_FALSE(contains(text, "approximate_sync")) << text;
 }
 
 }  // namespace test_arrival_log

@@ -73,5 +73,41 @@ TEST(CameraFinder, EachOfSeveralIsFound) {
   EXPECT_EQ(found[1].at("left/image_rect"), "/robot/front/left/image_rect");
 }
 
+class CameraFinderTest : public ::testing::Test {
+ protected:
+  ros::master::V_TopicInfo with(std::vector<std::string> folders) { return topics(folders, {"image_rect"}); }
+
+  CameraFinder finder_{"/stereo", "/stereo/left/image_rect", "/stereo/right/image_rect"};
+  std::string report_;
+};
+
+TEST_F(CameraFinderTest, TheOnlyCameraIsTakenWithAReasonAndGivenBackOnceTheNodesOwnImagesAppear) {
+  const auto other = with({"/stereo/front/left/", "/stereo/front/right/"});
+  ASSERT_TRUE(finder_.update(other, report_));
+  EXPECT_EQ(finder_.names().at("left/image_rect"), "/stereo/front/left/image_rect");
+  for (const char* word : {"nobody publishes /stereo/left/image_rect", "/stereo/front/right/image_rect", "find_camera"})
+    EXPECT_NE(report_.find(word), std::string::npos) << report_;
+  EXPECT_FALSE(finder_.update(other, report_)) << "it is in use";
+  const auto two = with({"/stereo/front/left/", "/stereo/front/right/", "/stereo/back/left/", "/stereo/back/right/"});
+  EXPECT_FALSE(finder_.update(two, report_)) << "a camera in use stays";
+  EXPECT_FALSE(finder_.update({}, report_)) << "a driver that restarts";
+  ASSERT_TRUE(finder_.update(with({"/stereo/left/", "/stereo/front/left/", "/stereo/front/right/"}), report_));
+  EXPECT_TRUE(finder_.names().empty());
+  EXPECT_EQ(report_.find("somebody publishes /stereo/left/image_rect"), 0u) << report_;
+}
+
+TEST_F(CameraFinderTest, OfSeveralNoneIsTaken) {
+  EXPECT_FALSE(finder_.update(
+      with({"/stereo/front/left/", "/stereo/front/right/", "/stereo/back/left/", "/stereo/back/right/"}), report_));
+  EXPECT_TRUE(finder_.names().empty());
+  EXPECT_NE(report_.find("several stereo cameras in /stereo/: "), std::string::npos) << report_;
+}
+
+TEST_F(CameraFinderTest, NamesThatTheUserChoseStay) {
+  CameraFinder finder("/stereo", "/stereo/cam/left", "/stereo/right/image_rect");
+  EXPECT_FALSE(finder.update(with({"/stereo/front/left/", "/stereo/front/right/"}), report_));
+  EXPECT_EQ(report_, "");
+}
+
 }  // namespace test_camera_finder
 }  // namespace sdvo

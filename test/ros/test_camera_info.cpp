@@ -153,6 +153,22 @@ TEST(ToStereoCamera, ARegionWithoutASizeIsWhatIsLeft) {
   EXPECT_EQ(camera.cx, 400.0);
 }
 
+TEST(ToStereoCamera, PMayBeRounded) {
+  for (const std::size_t number : {0u, 2u, 5u, 6u}) {
+    sensor_msgs::CameraInfo right = cameraInfo(-350.0);
+    right.P[number] += 0.02;  // px
+    EXPECT_NO_THROW(toStereoCamera(cameraInfo(0.0), right)) << number;
+    right.P[number] += 0.1;
+    EXPECT_THROW(toStereoCamera(cameraInfo(0.0), right), std::invalid_argument) << number;
+  }
+}
+
+TEST(ToStereoCamera, WildNumbersHaveFewDigits) {
+  const std::string error = errorOf([] { toStereoCamera(cameraInfo(0.0), cameraInfo(1e300)); });
+  EXPECT_NE(error.find("baseline = -1.4"), std::string::npos) << error;
+  EXPECT_LT(error.size(), 500u) << error;
+}
+
 TEST(ToStereoCamera, AVerticalPairIsToldHowToTurn) {
   const sensor_msgs::CameraInfo first = cameraInfo(0.0);
   sensor_msgs::CameraInfo second = first;

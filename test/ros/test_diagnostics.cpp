@@ -16,5 +16,22 @@ TEST(DoubtOfLatency, StampsOfTheFutureAndThePast) {
   EXPECT_NE(doubtOfLatency(std::nan(""), 0.5).find("--clock"), std::string::npos);
 }
 
+TEST(DoubtOfLatency, AClockSinceBoot) {
+  EXPECT_NE(doubtOfLatency(1795739520.0, 0.5).find("another clock than this machine"), std::string::npos);
+  EXPECT_EQ(doubtOfLatency(1795739520.0, 0.5).find("too slow"), std::string::npos);
+}
+
+TEST(ExposureTurns, AreNamedAndNoLampIs) {
+  ExposureTurns turns, mild, lamp;
+  for (int i = 0; i < 20; ++i) {
+    turns.add(i % 2 ? 6.0 : 150.0);
+    mild.add(i % 2 ? 20.0 : 140.0);
+    lamp.add(i % 6 < 3 ? 6.0 : 150.0);
+    EXPECT_FALSE(lamp.takeTurns());
+  }
+  EXPECT_TRUE(turns.takeTurns());
+  EXPECT_FALSE(mild.takeTurns());
+}
+
 }  // namespace test_diagnostics
 }  // namespace sdvo

@@ -158,6 +158,16 @@ TEST(GreyRangeTracker, NotesNothingOfOtherEncodings) {
   EXPECT_THROW(tracker.add(*image("mono16", 2, 2, {0, 0, 0, 0}), *ramp(0, 9)), std::invalid_argument);
 }
 
+TEST(GreyRangeTracker, TheOtherSideMayHaveEightBits) {
+  const auto grey = image("mono8", 2, 1, {255, 255});
+  for (const bool is_left : {true, false}) {
+    GreyRangeTracker tracker;
+    const auto deep = ramp(0, 4095);
+    EXPECT_TRUE(tracker.add(is_left ? *deep : *grey, is_left ? *grey : *deep));
+    expectFits(tracker.range(), 0, 4095);
+  }
+}
+
 TEST(ToGrey, ColoursByLuminance) {
   // Rec. 601: 0.299 red + 0.587 green + 0.114 blue.
   constexpr int kRed = 76, kGreen = 150, kBlue = 29;

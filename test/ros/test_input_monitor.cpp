@@ -34,7 +34,7 @@ TEST(InputMonitor, WarnsAtTheStartUntilItShouldHaveCome) {
   EXPECT_TRUE(contains(diagnose(monitor).text, "no pairs yet on /left"));
   sleep(0.25);
   EXPECT_EQ(diagnose(monitor).level, Level::ERROR);
-  monitor.note();
+  monitor.note(1);
   EXPECT_EQ(diagnose(monitor).level, Level::OK);
   sleep(0.25);
   EXPECT_EQ(diagnose(monitor).level, Level::ERROR);
@@ -52,7 +52,7 @@ TEST(InputMonitor, NamesTheTopicsThatInputComesFromNow) {
 
 TEST(InputMonitor, SilenceIsNoFaultWhileNobodyWantsInput) {
   InputMonitor monitor("pairs", "/left", 0.05, {});
-  monitor.note();
+  monitor.note(1);
   monitor.noteIdle("paused");
   sleep(0.1);
   EXPECT_EQ(diagnose(monitor).level, Level::OK);
@@ -69,15 +69,22 @@ TEST(InputMonitor, RatesOutOfTheRangeAreWarnedOf) {
   InputMonitor is_slow("pairs", "/left", 5.0, slow), is_fast("pairs", "/left", 5.0, fast),
       is_fine("pairs", "/left", 5.0, fits);
   for (InputMonitor* monitor : {&is_slow, &is_fast, &is_fine})
-    for (int i = 0; i < 3; ++i) {
-      monitor->note();
-      sleep(0.01);
-    }
+    for (int i = 0; i < 3; ++i) monitor->note(i * 50'000'000);
   EXPECT_EQ(diagnose(is_slow).level, Level::WARN);
   EXPECT_TRUE(contains(diagnose(is_slow).text, "only"));
   EXPECT_EQ(diagnose(is_fast).level, Level::WARN);
   EXPECT_TRUE(contains(diagnose(is_fast).text, "at most"));
   EXPECT_EQ(diagnose(is_fine).level, Level::OK);
+}
+
+TEST(InputMonitor, TheRateIsThatOfTheStamps) {
+  InputMonitor slowed("pairs", "/left", 5.0, {}), burst("pairs", "/left", 5.0, {});
+  for (int i = 0; i < 4; ++i) {  // 20 Hz, of a simulation at a third of that, and all at once
+    slowed.note(i * 50'000'000);
+    sleep(0.15);
+  }
+  for (int i = 0; i < 10; ++i) burst.note(i * 50'000'000);
+  for (InputMonitor* monitor : {&slowed, &burst}) EXPECT_EQ(diagnose(*monitor).text, "20.00 pairs a second");
 }
 
 }  // namespace test_input_monitor

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "../../src/ros/place_conversions.hpp"
-#include "../../src/ros/pose_conversions.hpp"
+#include "../../src/messages/place_conversions.hpp"
+#include "../../src/messages/pose_conversions.hpp"
 #include "../synthetic_scene.hpp"
 #include "message_samples.hpp"
 

@@ -1,3 +1,4 @@
+#include <geometry_msgs/Pose.h>
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
 #include <std_msgs/Header.h>
@@ -50,7 +51,9 @@ class PlacesFile : public ::testing::Test {
     EXPECT_EQ(std::distance(fs::directory_iterator(folder_.path()), fs::directory_iterator()), 1);
   }
 
-  void save(const std::string& path) { savePlaces(places_, map_, stream_, "/robot", "map", path); }
+  void save(const std::string& path, bool overwrite = false) {
+    savePlaces(places_, map_, stream_, "/robot", "map", path, overwrite);
+  }
 
   static std::string refusal(const std::string& path) {
     EXPECT_THROW(loadPlaces(path, {}), std::runtime_error) << path;
@@ -80,6 +83,21 @@ TEST_F(PlacesFile, PathsThatCannotBeWrittenAreRefused) {
   EXPECT_TRUE(contains(errorOf([&] { save("places.bag"); }), "'places.bag': the path must be absolute"));
   EXPECT_TRUE(contains(errorOf([&] { save(folder_.path()); }), "it is no regular file"));
   EXPECT_TRUE(contains(errorOf([&] { save(path_ + "/places.bag"); }), "cannot be written"));
+}
+
+TEST_F(PlacesFile, ReplacesItsOwnFilesAlone) {
+  std::ofstream(path_).flush();
+  EXPECT_NO_THROW(save(path_)) << "nothing is lost";
+  EXPECT_NO_THROW(save(path_));
+  std::ofstream(path_) << "precious";
+  EXPECT_TRUE(contains(errorOf([&] { save(path_); }), "'" + path_ + "' is no file of save_places"));
+  EXPECT_EQ(fs::file_size(path_), 8u);
+  rosbag::Bag bag(path_, rosbag::bagmode::Write);  // of another recorder
+  bag.write("odom", ros::Time(1), geometry_msgs::Pose());
+  bag.close();
+  EXPECT_TRUE(contains(errorOf([&] { save(path_); }), "is no file of save_places"));
+  EXPECT_NO_THROW(save(path_, true));
+  EXPECT_EQ(loadPlaces(path_, {}).places.size(), 3u);
 }
 
 /// As on a full disk. rosbag tries to write the end of a bag once more when it is destroyed.

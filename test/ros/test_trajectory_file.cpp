@@ -2,6 +2,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -73,6 +74,18 @@ TEST_F(TrajectoryFile, KittiIsTheCamerasMotionFromItsFirstPose) {
 TEST_F(TrajectoryFile, ReplacesAFile) {
   std::ofstream(directory_ / "file.txt") << "much longer than what will be written into it, by far, and then some more";
   EXPECT_EQ(save("tum").substr(0, 12), "1.000000005 ");
+}
+
+TEST(InRosHome, RelativePathsLeadFromThereOn) {
+  const char* before = std::getenv("ROS_HOME");
+  const std::string kept = before ? before : "";
+  ::setenv("ROS_HOME", "/ros_home", 1);
+  EXPECT_EQ(inRosHome("maps/site.bag"), "/ros_home/maps/site.bag");
+  EXPECT_EQ(inRosHome("/site.bag"), "/site.bag");
+  EXPECT_EQ(inRosHome(""), "");
+  ::unsetenv("ROS_HOME");
+  EXPECT_EQ(inRosHome("site.bag"), std::string(std::getenv("HOME")) + "/.ros/site.bag");
+  if (before) ::setenv("ROS_HOME", kept.c_str(), 1);
 }
 
 TEST_F(TrajectoryFile, RefusesWhatIsNoFileOfTheUsers) {

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <string>
+#include <thread>
 
 #include "../../src/ros/diagnostic_tasks.hpp"
 #include "message_samples.hpp"
@@ -53,6 +55,17 @@ TEST(WorkLoad, PairsDroppedWhileItWaitedAreNot) {
   EXPECT_TRUE(contains(status.message, "40 pairs dropped")) << status.message;
   EXPECT_TRUE(contains(status.message, "waited for the transform base <- camera")) << status.message;
   EXPECT_FALSE(contains(status.message, "too slow")) << status.message;
+}
+
+TEST(WorkLoad, PairsDroppedWhileItMostlyRestedCameInBursts) {
+  WorkLoad load(1.0);
+  { const WorkLoad::Item item(load); }
+  std::this_thread::sleep_for(std::chrono::milliseconds(50));
+  load.noteDropped(9);
+  const WallUpdater::Status status = diagnose(load);
+  EXPECT_EQ(status.level, Level::WARN);
+  EXPECT_TRUE(contains(status.message, "9 pairs dropped")) << status.message;
+  EXPECT_TRUE(contains(status.message, "come in bursts, set queue_size")) << status.message;
 }
 
 }  // namespace test_work_load

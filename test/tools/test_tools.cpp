@@ -5,6 +5,7 @@
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
+#include <stereo_descriptor_vo/VoInfo.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -409,11 +410,59 @@ TEST_F(Tools, BagsOfOtherNamesAndCompressedImages) {
   EXPECT_EQ(runBags(renamed.string(), "--format kitti --camera /camera").exit_code, 0) << "the only one in a namespace";
   EXPECT_EQ(readText(results_ / "renamed.txt"), readText(poses()));
   expectError(runBags(renamed.string(), "--camera /other"), "1 of 1");
-  EXPECT_NE(readText(results_ / "report.csv").find("there is no /other/left/image_rect in it"), std::string::npos);
+  EXPECT_NE(
+      readText(results_ / "report.csv").find("has no /other/left/image_rect; its images: /stereo/left/image_rect, "),
+      std::string::npos);
 
   const std::string checked = run("check_camera", "--bag " + renamed.string() + names).out;
   EXPECT_EQ(checked.rfind("OK   topics", 0), 0u) << checked;
   EXPECT_NE(checked.find("malformed image: 0 bytes"), std::string::npos) << checked;
+}
+
+/// As `rosbag record --split` leaves a drive.
+TEST_F(Tools, PartsOfADriveAreJoined) {
+  ASSERT_EQ(runSequence().exit_code, 0);
+  const std::string parts[] = {(root_ / "drive_0.bag").string(), (root_ / "drive_1.bag").string()};
+  {
+    rosbag::Bag whole(bag("whole").string(), rosbag::bagmode::Read);
+    rosbag::Bag out[2];
+    for (const int part : {0, 1}) out[part].open(parts[part], rosbag::bagmode::Write);
+    rosbag::View view(whole);
+    const ros::Time begin = view.getBeginTime();
+    for (const rosbag::MessageInstance& message : view)
+      out[message.getTime() > begin + ros::Duration(0.25)].write(message.getTopic(), message.getTime(), message);
+  }
+  const auto joined = [&](const std::string& a, const std::string& b, const std::string& more) {
+    return run("run_sequence", a + " " + b + " --poses " + (root_ / "joined.txt").string() + more);
+  };
+  const Outcome outcome = joined(parts[0], parts[1], " --join --shuttle");
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(readText(root_ / "joined.txt"), readText(poses()));
+  expectError(joined(parts[0], parts[1], ""), "--join");
+  expectError(joined(parts[1], parts[0], " --join"), "drive_0.bag' is not later than");
+}
+
+TEST_F(Tools, RecordingsThatCannotBeReadAreNamedWithTheRemedy) {
+  const std::string killed = bag("killed").string(), torn = bag("torn").string(), pipe = (root_ / "pipe.bag").string();
+  {
+    std::fstream file(killed, std::ios::in | std::ios::out | std::ios::binary);
+    std::string head(4096, '\0');
+    file.read(head.data(), 4096);
+    file.seekp(static_cast<std::streamoff>(head.find("index_pos=") + 10));
+    file.write("\0\0\0\0\0\0\0\0", 8);
+  }
+  fs::resize_file(torn, fs::file_size(torn) / 2);
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const std::string poses = " --poses " + (root_ / "none.txt").string();
+  for (const std::string& tool : {"run_sequence " + poses + " ", std::string("check_camera --bag ")}) {
+    const std::string name = tool.substr(0, tool.find(' ')), arguments = tool.substr(tool.find(' '));
+    expectError(run(name, arguments + killed),
+                "killed.bag' has no index, as of a recorder that was killed: rosbag reindex");
+    expectError(run(name, arguments + torn), "torn.bag'");
+    expectError(run(name, arguments + pipe), "pipe.bag' is no file");
+  }
+  expectError(run("run_sequence", "nosuch.bag" + poses), "there is no 'nosuch.bag'");
+  expectError(run("run_sequence", sequence_.string() + poses + " --config " + pipe), "pipe.bag: it is no file");
 }
 
 /// The drive as a raw folder of EuRoC's is rectified on the fly, or by convert.
@@ -535,7 +584,9 @@ TEST_F(Tools, RecordingsCheckThemselves) {
   // The images of a folder are those of its bag.
   const std::string said = runSequence("--shuttle --halves").out;
   for (const std::string& line : linesOf(outcome.out))
-    if (line.rfind("a: ", 0) == 0) EXPECT_NE(said.find("\n" + line.substr(3) + "\n"), std::string::npos) << said;
+    if (line.rfind("a: ", 0) == 0) {
+      EXPECT_NE(said.find("\n" + line.substr(3) + "\n"), std::string::npos) << said;
+    }
 
   ASSERT_EQ(runBags(a.string()).exit_code, 0);
   EXPECT_FALSE(fs::exists(checks)) << "of another run than the poses beside it";
@@ -660,6 +711,111 @@ TEST_F(Tools, TheTwistOfTheGroundTruthIsThatOfTheBase) {
     EXPECT_NEAR(twist.angular.y, 0.0, 1e-6);
     EXPECT_NEAR(twist.angular.z, kTurn, 1e-6);
   }
+}
+
+/// What a browser shows of a page; nothing of it may come from elsewhere.
+std::string readPage(const fs::path& page) {
+  const std::string html = readText(page);
+  EXPECT_EQ(html.rfind("<!doctype html>", 0), 0u);
+  EXPECT_LT(html.size(), 2000000u);
+  for (const char* elsewhere : {"http", "src='/", "url(", "@import", "<script"})
+    EXPECT_EQ(html.find(elsewhere), std::string::npos) << elsewhere;
+  // Numbers that are none are gaps of a curve, or a dash.
+  EXPECT_EQ(html.substr(0, html.find("base64,")).find("nan"), std::string::npos);
+  return html;
+}
+
+void expectWords(const std::string& html, const std::vector<std::string>& words) {
+  for (const std::string& word : words) EXPECT_NE(html.find(word), std::string::npos) << word;
+}
+
+TEST_F(Tools, AnyRecordingBecomesAPage) {
+  const fs::path page = root_ / "page.html";
+  const std::string to_page = " --page " + page.string();
+  const std::vector<std::string> all = {"Followed: 4 of 4 pairs have a pose",
+                                        "implied error",
+                                        "shuttle: ",
+                                        "halves: ",
+                                        "Path from above",
+                                        "Height",
+                                        "Deviation of the position",
+                                        "States over time",
+                                        "What survives each stage",
+                                        "Time of each stage",
+                                        ">calibration<",
+                                        "data:image/jpeg;base64,",
+                                        "stereo_descriptor_vo "};
+  Outcome outcome = run("run_sequence", bag("a").string() + to_page);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find(": Followed: 4 of 4 pairs"), std::string::npos) << outcome.out;
+  std::string html = readPage(page);
+  expectWords(html, all);
+  expectWords(html, {"a.bag", "looks along 1.00", "<p>none</p>"});
+  EXPECT_EQ(html.find("ground truth"), std::string::npos);
+
+  const std::string truth = " --ground-truth " + (root_ / "truth.txt").string();
+  outcome =
+      run("run_sequence", sequence_.string() + to_page + truth + " --param motion/seed=2 --poses " + poses().string());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  html = readPage(page);
+  expectWords(html, all);
+  expectWords(html, {"true error", "visual_odometry/motion/seed", "default 1"});
+  EXPECT_EQ(linesOf(readText(poses())).size(), static_cast<std::size_t>(kPairs));
+
+  expectError(runSequence(truth), "--page");
+  expectError(run("run_sequence", sequence_.string()), "--page");
+  std::ofstream(root_ / "short.txt") << "1 0 0 0 0 1 0 0 0 0 1 0\n";
+  expectError(run("run_sequence", sequence_.string() + to_page + " --ground-truth " + (root_ / "short.txt").string()),
+              "short.txt");
+  expectError(run("run_sequence", sequence_.string() + " --page " + (root_ / "missing" / "page.html").string()),
+              "page.html");
+}
+
+/// Stamps of the truth are its own, and it may know only a part of the drive.
+TEST_F(Tools, AGroundTruthWithStampsIsInterpolated) {
+  const fs::path page = root_ / "page.html", truth = root_ / "truth.tum";
+  std::ofstream(truth) << "# stamp x y z qx qy qz qw\n"
+                       << "1000000000.05 0 0 " << 0.5 * kStep << " 0 0 0 1\n1000000000.25 0 0 " << 2.5 * kStep
+                       << " 0 0 0 1\n";
+  const std::string arguments = bag("a").string() + " --page " + page.string() + " --ground-truth " + truth.string();
+  ASSERT_EQ(run("run_sequence", arguments).exit_code, 0);
+  expectWords(readPage(page), {"true error", "at the end off by 0.0"});
+  std::ofstream(truth) << "10.0 0 0 0 0 0 0 1\n11.0 0 0 0 0 0 0 1\n";
+  expectError(run("run_sequence", arguments), "no poses at the stamps");
+}
+
+TEST_F(Tools, ThePageOfALostDriveSaysWhere) {
+  for (int side = 0; side < 2; ++side)
+    cv::imwrite(image(side, kPairs - 1).string(), cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
+  cv::imwrite(image(1, kPairs - 2).string(), cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
+  const fs::path page = root_ / "page.html";
+  ASSERT_EQ(run("run_sequence", sequence_.string() + " --page " + page.string()).exit_code, 0);
+  expectWords(readPage(page), {"Interrupted: ", " of 4 pairs have no pose", "LOST", "no figure"});
+}
+
+/// vo_info that was recorded while the odometry ran, in the same bag or in one of its own.
+TEST_F(Tools, ThePageShowsWhatWasReportedLive) {
+  const fs::path live = root_ / "live.bag", page = root_ / "page.html";
+  {
+    rosbag::Bag out(live.string(), rosbag::bagmode::Write);
+    for (int i = 0; i < 3; ++i) {
+      stereo_descriptor_vo::VoInfo info;
+      info.state_id = i == 2 ? stereo_descriptor_vo::VoInfo::LOST : stereo_descriptor_vo::VoInfo::TRACKING;
+      info.latency = 0.02f;
+      info.dropped_pairs = 7;
+      out.write("/stereo/vo_info", ros::Time(1000000000 + i, 0), info);
+    }
+  }
+  ASSERT_EQ(run("run_sequence", bag("a").string() + " --page " + page.string() + " --live " + live.string()).exit_code,
+            0);
+  expectWords(readPage(page), {"while it ran", "2 TRACKING, 1 LOST; 7 pairs dropped"});
+}
+
+TEST_F(Tools, PicturesOfEachPair) {
+  const fs::path pictures = root_ / "pictures";
+  ASSERT_EQ(runSequence("--pictures " + pictures.string()).exit_code, 0);
+  for (int i = 0; i < kPairs; ++i)
+    EXPECT_EQ(cv::imread((pictures / ("00000" + std::to_string(i) + ".jpg")).string()).size(), cv::Size(320, 240));
 }
 
 TEST_F(Tools, PerfectTrajectoryHasNoError) {

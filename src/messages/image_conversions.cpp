@@ -68,9 +68,10 @@ bool GreyRangeTracker::add(const sensor_msgs::Image& left, const sensor_msgs::Im
   constexpr double kMargin = 0.25;     // of the spread, on either side of it (chosen)
   constexpr double kLeastSpread = 64;  // counts: less is noise more than a scene (chosen)
   constexpr double kMostUnused = 3.0;  // times the spread, before a range is too wide; it begins at 1.5
-  if (left.encoding != encodings::MONO16 || right.encoding != encodings::MONO16) return false;
   std::vector<double> counts;
-  for (const sensor_msgs::Image* image : {&left, &right}) sample(pixelsOf16Bits(*image), counts);
+  for (const sensor_msgs::Image* image : {&left, &right})  // the other one may be of 8 bits
+    if (image->encoding == encodings::MONO16) sample(pixelsOf16Bits(*image), counts);
+  if (counts.empty()) return false;
   last_.push_back({quantile(counts, kShare), quantile(counts, 1.0 - kShare), quantile(counts, 1.0)});
   if (last_.size() > kPairs) last_.pop_front();
   const auto median = [this](std::size_t end) {

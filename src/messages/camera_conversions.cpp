@@ -7,6 +7,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "../common/text.hpp"
+
 namespace sdvo::ros_conversions {
 namespace {
 
@@ -80,7 +82,7 @@ StereoCamera toStereoCamera(const CameraInfo& left_info, const CameraInfo& right
   if (left.width != right.width || left.height != right.height)
     throw std::invalid_argument("left and right camera_info have different image sizes (left " + size(left) +
                                 ", right " + size(right) + ")");
-  constexpr double kSame = 1e-3;  // px
+  constexpr double kSame = 0.05;  // px: P typed by hand, or in single precision, is rounded
   const auto differ = [](double a, double b) { return !(std::abs(a - b) <= kSame); };
   if (differ(left.fx, right.fx) || differ(left.fy, right.fy))
     throw std::invalid_argument("left and right camera_info have different focal lengths" + both() +
@@ -93,12 +95,12 @@ StereoCamera toStereoCamera(const CameraInfo& left_info, const CameraInfo& right
   const double baseline = left.tx - right.tx, vertical = left.ty - right.ty;
   if (std::abs(vertical) > std::abs(baseline))
     throw std::invalid_argument(
-        "the baseline of " + std::to_string(std::abs(vertical)) + " m is vertical (P[7])" + both() +
+        text(6, "the baseline of ", std::abs(vertical), " m is vertical (P[7])") + both() +
         ": only a horizontal pair can be used. Turn images and camera_info of both cameras counter-clockwise by 90 "
         "degrees, the upper camera, now the " +
         (vertical > 0.0 ? "left" : "right") + " one, is the left one then: docs/cameras.md, 'A vertical pair'");
   if (!(baseline > 0.0))
-    throw std::invalid_argument("baseline = " + std::to_string(baseline) + " m is not positive" + both() + ": " +
+    throw std::invalid_argument(text(6, "baseline = ", baseline, " m is not positive") + both() + ": " +
                                 remedy(left, right));
   const StereoCamera camera{left.fx, left.fy, left.cx, left.cy, baseline, left.width, left.height};
   camera.check();

@@ -1,0 +1,90 @@
+#include <gtest/gtest.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "../../src/messages/pose_conversions.hpp"
+
+namespace sdvo::ros_conversions {
+namespace test_pose_conversions {
+
+geometry_msgs::PoseWithCovariance poseWith(const Matrix6d& covariance) {
+  geometry_msgs::PoseWithCovariance message;
+  message.pose.orientation.w = 1.0;
+  for (int i = 0; i < 36; ++i) message.covariance[i] = covariance(i / 6, i % 6);
+  return message;
+}
+
+Matrix6d taken(const Matrix6d& sent) {
+  Eigen::Isometry3d pose;
+  Matrix6d covariance;
+  fromMessage(poseWith(sent), pose, covariance);
+  EXPECT_EQ(covariance, covariance.transpose());
+  EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(covariance).eigenvalues()[0], 0.0);
+  return covariance;
+}
+
+std::string refusal(const Matrix6d& sent) {
+  try {
+    taken(sent);
+  } catch (const std::invalid_argument& e) {
+    return e.what();
+  }
+  return "";
+}
+
+/// x, y and yaw as rviz' "2D Pose Estimate" and AMCL have them.
+Matrix6d planar() {
+  Matrix6d covariance = Matrix6d::Zero();
+  covariance.diagonal() << 0.25, 0.25, 0.0, 0.0, 0.0, 0.0685;
+  return covariance;
+}
+
+TEST(PoseConversions, VariancesOfZeroAreAMillimetreAndAMilliradian) {
+  const Matrix6d covariance = taken(planar());
+  EXPECT_EQ(covariance(0, 0), 0.25);
+  for (int axis : {2, 3, 4}) EXPECT_EQ(covariance(axis, axis), 1e-6);
+  EXPECT_EQ(covariance(5, 5), 0.0685);
+  EXPECT_TRUE(taken(Matrix6d::Zero()).isApprox(1e-6 * Matrix6d::Identity()));
+}
+
+TEST(PoseConversions, EitherTriangleIsEnough) {
+  Matrix6d both = planar();
+  both(0, 1) = both(1, 0) = 0.1;
+  both(1, 5) = both(5, 1) = -0.05;
+  const Matrix6d upper = both.triangularView<Eigen::Upper>(), lower = both.triangularView<Eigen::Lower>();
+  EXPECT_EQ(taken(upper), taken(both));
+  EXPECT_EQ(taken(lower), taken(both));
+}
+
+TEST(PoseConversions, FullyCorrelatedAxesAreTaken) {
+  Matrix6d covariance = planar();
+  covariance(0, 1) = covariance(1, 0) = 0.25;
+  EXPECT_NEAR(taken(covariance)(0, 1), 0.25, 1e-9);
+}
+
+TEST(PoseConversions, RefusalsSayWhichElementToChange) {
+  Matrix6d wrong = planar();
+  wrong(5, 5) = -1.0;
+  EXPECT_EQ(refusal(wrong),
+            "the covariance's variance of yaw is negative: send it in m^2 or rad^2, 0 for 1 mm or 1 mrad");
+  wrong = planar();
+  wrong(0, 1) = std::nan("");
+  EXPECT_EQ(refusal(wrong), "the covariance of y and x is not finite: send a number, 0 if it is not known");
+  wrong = planar();
+  wrong(0, 1) = wrong(1, 0) = 0.3;
+  EXPECT_NE(refusal(wrong).find("covariance of y and x exceeds what their variances allow"), std::string::npos);
+  wrong = planar();
+  wrong(0, 1) = 0.1;
+  wrong(1, 0) = -0.1;
+  EXPECT_NE(refusal(wrong).find("covariance of y and x has two values"), std::string::npos);
+  geometry_msgs::PoseWithCovariance unset;
+  Eigen::Isometry3d pose;
+  Matrix6d covariance;
+  EXPECT_THROW(fromMessage(unset, pose, covariance), std::invalid_argument);
+}
+
+}  // namespace test_pose_conversions
+}  // namespace sdvo::ros_conversions
