@@ -10,8 +10,9 @@ import rosgraph.names
 
 
 def unload_old(command):
-    name = rosgraph.names.resolve_name(rosgraph.names.load_mappings(command)['__name'], rosgraph.names.get_ros_namespace())
-    manager = rosgraph.names.resolve_name(command[3], rosgraph.names.get_ros_namespace())
+    namespace = rosgraph.names.get_ros_namespace()
+    name = rosgraph.names.ns_join(namespace, rosgraph.names.load_mappings(command)['__name'])
+    manager = rosgraph.names.ns_join(namespace, command[3])
     master = rosgraph.Master(name)
     try:
         master.lookupService(manager + '/list')

@@ -67,7 +67,7 @@ struct StereoInputOptions {
     list.add("queue_size", queue_size, {1, 1000}, "", "pairs that wait while one is processed; the newest win");
     list.add("max_rate", max_rate, {0.0, 1000.0}, "Hz", "pairs processed at most, by their stamps; 0: all");
     list.add("find_camera", find_camera,
-             "while nobody publishes left|right/image_rect, take the only stereo camera in the namespace; in the "
+             "while nobody publishes the images, take the only stereo camera in the namespace; in the "
              "namespace / only where it is set");
     list.add("opencv_threads", opencv_threads, {-1, 256}, "",
              "OpenCV's threads, of the whole process; 0: none beside the caller's, -1: left as they are");

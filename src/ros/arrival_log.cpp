@@ -16,6 +16,7 @@ constexpr std::size_t kMost = 2000;  // arrivals on each topic
 constexpr double kLately = 5.0;      // s, of losses and rates
 constexpr double kPatience = 1.0;    // s longer than for any pair so far
 constexpr double kLate = 0.1;        // s between messages of one stamp (chosen): a queue is too short, perhaps
+constexpr double kHalf = 0.45;       // of a period: less, for rounding
 
 double secondsBetween(std::int64_t a, std::int64_t b) {
   return 1e-9 * static_cast<double>(b - a);
@@ -36,6 +37,7 @@ void ArrivalLog::note(Input input, const ros::Time& stamp, double now) {
   std::deque<Arrival>& arrivals = topics_[input].arrivals;
   arrivals.push_back({nanoseconds(stamp), now});
   if (stamp.isZero()) arrivals.back().fate = Fate::kLost;
+  complete_ = first_stamp_ == 0 ? now : complete_;
   if (first_stamp_ == 0)
     for (const Topic& topic : topics_) {
       if (topic.arrivals.empty()) {
@@ -87,13 +89,13 @@ double ArrivalLog::period() const {
 /// While not all topics are connected some images have no partners.
 bool ArrivalLog::isEarly(const Arrival& arrival) const {
   constexpr double kConnecting = 2.0;  // s (chosen)
-  return first_stamp_ == 0 || (arrival.stamp < first_stamp_ && arrival.now < begin_ + kConnecting);
+  return first_stamp_ == 0 || (arrival.stamp < first_stamp_ && arrival.now < complete_ + kConnecting);
 }
 
 /// Whether a right image that is not used is of another moment than the left ones that are not.
 bool ArrivalLog::isAPairOfItsOwn(Input input, const Arrival& arrival) const {
   if (input == kLeftImage) return true;
-  const double half = 0.5 * period();
+  const double half = kHalf * period();
   const std::deque<Arrival>& lefts = topics_[kLeftImage].arrivals;
   return std::none_of(lefts.begin(), lefts.end(), [&](const Arrival& left) {
     return left.fate != Fate::kPaired && !isEarly(left) && std::abs(secondsBetween(left.stamp, arrival.stamp)) < half;
@@ -132,7 +134,7 @@ std::string ArrivalLog::explainLoss(double now) {
   const double begin = now - kLately;
   const Use use = usedSince(begin);
   if (use.lost < kFewest || use.lost <= options_.rates.max_unused * (use.used + use.lost)) return "";
-  return text(3, use.lost, " of ", use.used + use.lost, " stereo pairs in ", kLately, " s are not used: ", use.lefts,
+  return text(0, use.lost, " of ", use.used + use.lost, " stereo pairs in ", kLately, " s are not used: ", use.lefts,
               " left and ", use.rights, " right images without partners; received:", received(begin), advise(begin));
 }
 
@@ -169,7 +171,7 @@ std::array<std::pair<std::string, double>, ArrivalLog::kInputs> ArrivalLog::rate
 }
 
 ArrivalLog::Gaps ArrivalLog::gapsBetween(Input from, Input to, double begin) const {
-  const double half = 0.5 * period();
+  const double half = kHalf * period();
   Gaps gaps;
   for (const Arrival& here : topics_[from].arrivals) {
     if (here.now < begin || here.fate == Fate::kPaired || here.stamp == 0) continue;
@@ -217,7 +219,8 @@ std::string ArrivalLog::advise(double begin) const {
   // Equal stamps on all topics, and yet no pair: one side waits in its queue for longer than that holds.
   if (latest->delay <= kLate) return "";
   return text(2, "; stamps agree, but messages arrive ", latest->delay, " s apart: set sync_queue_size, now ",
-              options_.sync_queue_size, ", to at least ", static_cast<int>(std::ceil(latest->delay / period())) + 2);
+              options_.sync_queue_size, ", to at least ",
+              static_cast<int>(std::ceil(latest->delay / period() - 0.01)) + 2);
 }
 
 }  // namespace sdvo

@@ -81,6 +81,7 @@ class ArrivalLog {
   std::array<Topic, kInputs> topics_;
   double begin_ = 0.0;            ///< of the subscription
   std::int64_t first_stamp_ = 0;  ///< from which on all topics are there, ns; 0: they are not
+  double complete_ = 0.0;         ///< when they were
   double longest_wait_ = 0.0;     ///< of a message that was used after all
 };
 

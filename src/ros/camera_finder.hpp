@@ -1,7 +1,7 @@
 #pragma once
 
+#include <ros/datatypes.h>
 #include <ros/master.h>
-#include <ros/types.h>
 
 #include <string>
 #include <vector>

@@ -48,7 +48,7 @@ StereoInput::StereoInput(ros::NodeHandle nh, StereoImageTransport& transport, co
   right_callbacks_.start();
 }
 
-ArrivalLog::Topics StereoInput::subscribedTopics() const {
+std::vector<std::string> StereoInput::subscribedTopics() const {
   return {left_image_.topic(), right_image_.topic(), left_info_.getTopic(), right_info_.getTopic()};
 }
 

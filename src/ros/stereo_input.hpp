@@ -8,6 +8,7 @@
 #include <memory>
 #include <mutex>
 #include <string>
+#include <vector>
 
 #include "../config/interface_options.hpp"
 #include "arrival_log.hpp"
@@ -37,7 +38,7 @@ class StereoInput {
               ArrivalLog& arrivals, Callback callback, Refusal refuse);
 
   /// As subscribed: images with their transport's ending.
-  ArrivalLog::Topics subscribedTopics() const;
+  std::vector<std::string> subscribedTopics() const;
 
  private:
   using Image = sensor_msgs::Image;

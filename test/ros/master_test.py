@@ -70,7 +70,7 @@ class DeadMaster(unittest.TestCase):
 
         master.kill()
         master.wait()
-        request.config.ints = [IntParameter('map/max_keyframes', 7)]
+        request.config.ints = [IntParameter('map/keyframes', 7)]
         answered = []
 
         def call():

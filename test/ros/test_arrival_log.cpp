@@ -108,7 +108,7 @@ TEST_F(JitterTest, OfFiveHundredPairsWhoseStampsDifferEachIsUsedOrCountedAndTheS
     }
   }
   const std::string loss = log_.explainLoss(now);
-  EXPECT_TRUE(contains(loss, "stereo pairs in 5.000 s are not used")) << loss;
+  EXPECT_TRUE(contains(loss, "stereo pairs in 5 s are not used")) << loss;
   EXPECT_TRUE(contains(loss, "left and")) << loss;
   EXPECT_TRUE(contains(loss, "the nearest stamps of left and right are 1.")) << loss;
   EXPECT_TRUE(contains(loss, "ms apart, more than sync_tolerance (1.0 ms): set a larger sync_tolerance")) << loss;
@@ -142,6 +142,7 @@ TEST_F(ArrivalLogTest, CameraInfoThatIsSlowerThanTheImagesIsNamedWithItsRate) {
   const std::string loss = log_.explainLoss(10.0);
   EXPECT_TRUE(contains(loss, "; /l/info must have a message for each image")) << loss;
   EXPECT_TRUE(contains(loss, "/l/image 100 /r/image 100 /l/info 5 /r/info 100")) << loss;
+  log_.explainLoss(20.0);  // what waits for partners is given up
   EXPECT_EQ(unpaired(), 190u);
 }
 
