@@ -17,7 +17,7 @@ COMMANDS = {
     "tables": ("tables", "tables of the paper's experiments from their CSV files"),
     "golden": ("golden", "poses, states and covariances of two builds"),
     "guises": ("guises", "a drive turned, cut, spoilt or in another order"),
-    "report": ("report", "picture of one drive: trajectory, errors, features, times"),
+    "film": ("film", "moving picture of a drive: features and path"),
     "layout": ("layout", "picture of the rooms of the sources"),
 }
 

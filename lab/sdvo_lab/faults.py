@@ -5,7 +5,7 @@ said: its states, when it was lost and back, and whether its covariance held the
     lab/run faults                                    # all faults, three drives
     lab/run faults --faults frozen,gap_1.5_s          # some of them
     lab/run faults --drives city_loop:kitti:4,hover:euroc:5 --pairs 1200  # other drives, two minutes each
-    lab/run faults --write                            # puts the table between the marks of docs/troubleshooting.md"""
+    lab/run faults --write                            # puts the table between the marks of lab/docs/faults.md"""
 import dataclasses
 import pathlib
 import tempfile

@@ -93,16 +93,20 @@ def draw_consensus(folder, rows):
 
 
 def draw_scale_change(folder, rows):
-    """Correct matches against the change of scale, of each method; and its time."""
-    figure, ((axis,),) = grid(1, 1, 7.0, 4.6)
-    for method, chosen in rows.groupby("method", sort=False):
-        sums = chosen.groupby("scale", sort=False)[["correct", "visible"]].sum()
-        style = {"freak": "C0", "sift": "C1", "orb": "C2"}[method.split()[0]]
-        style += "o-" if "depth" in method else "s:" if "constant" in method else "^--"
-        axis.plot(sums.index, 100.0 * sums.correct / numpy.maximum(1.0, sums.visible), style,
-                  label=f"{method} ({chosen.ms_per_pair.mean():.0f} ms)")
+    """Correct matches against the change of scale, of each method; and its time. Real and rendered drives apart."""
+    real = rows.sequence.isin(results.KITTI)
+    kinds = [(f"KITTI {', '.join(rows.sequence[real].unique())}", rows[real]), ("rendered drives", rows[~real])]
+    figure, (axes,) = grid(1, 2, 5.2, 4.2)
+    for axis, (title, of_kind) in zip(axes, kinds):
+        axis.set_title(title)
+        for method, chosen in of_kind.groupby("method", sort=False):
+            sums = chosen.groupby("scale", sort=False)[["correct", "visible"]].sum()
+            style = {"freak": "C0", "sift": "C1", "orb": "C2"}[method.split()[0]]
+            style += "o-" if "depth" in method else "s:" if "constant" in method else "^--"
+            axis.plot(sums.index, 100.0 * sums.correct / numpy.maximum(1.0, sums.visible), style,
+                      label=f"{method} ({chosen.ms_per_pair.mean():.0f} ms)")
     finish(figure, folder / "scale_change.png", xlabel="change of scale between the views",
-           ylabel="correct matches, % of the features in view", xticks=[1.0, 1.5, 2.0, 3.0, 4.0])
+           ylabel="correct matches, % of the features in view", ylim=(0.0, 42.0), xticks=[1.0, 1.5, 2.0, 3.0, 4.0])
 
 
 FIGURES = {"matching": draw_matching, "robustness": draw_robustness, "consensus": draw_consensus, "scale_change": draw_scale_change}

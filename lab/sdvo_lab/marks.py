@@ -5,7 +5,7 @@ import sys
 from .programs import ROOT
 
 ACCURACY = PERFORMANCE = SELF_CHECK = ROOT / "docs/precision.md"
-FAULTS = ROOT / "docs/troubleshooting.md"
+FAULTS = ROOT / "lab/docs/faults.md"
 EXPERIMENTS = ROOT / "lab/docs/experiments.md"
 
 

@@ -3,6 +3,8 @@ import pathlib
 
 import pandas
 
+KITTI = ("01", "04", "06")  # recorded drives of the experiments; the others are rendered
+
 # Figure 7 of the paper, improvement of SN-FREAK by the size of the feature set, %; its figure 5, inliers by step.
 PUBLISHED_BY_COUNT = {310: 11.58, 1350: 15.37, 2320: 26.41}
 PUBLISHED_INLIERS = {"stereo": (133.0, 103.0, 62.0, 40.0, 27.0), "standard": (126.0, 91.5, 51.0, 33.0, 22.0)}

@@ -13,12 +13,11 @@ import sys
 from . import bootstrap, marks, programs, results
 from .results import select
 
-KITTI = ("01", "04", "06")
 OTHER_REAL = ("19", "MH_01_half", "MH_01_moving")
 STREETS = ("d00", "d01", "d02", "d03", "d05", "d08", "d09", "d10")
 SMALL = ("s1", "s2", "s3", "s4")
-ALL = KITTI + OTHER_REAL + STREETS + SMALL
-GROUPS = {"KITTI 01, 04, 06": KITTI, "Karlsruhe 19, MH_01 (2)": OTHER_REAL, "rendered streets (8)": STREETS,
+ALL = results.KITTI + OTHER_REAL + STREETS + SMALL
+GROUPS = {"KITTI 01, 04, 06": results.KITTI, "Karlsruhe 19, MH_01 (2)": OTHER_REAL, "rendered streets (8)": STREETS,
           "rendered small rigs (4)": SMALL, "all drives": ALL}
 SETUPS = ("paper", "product")
 STEPS = ("1", "2", "3", "4", "5")
@@ -37,7 +36,7 @@ def of_drives(rows, drives, column):
     return [value for value in rows[rows.sequence.isin(drives)][column] if math.isfinite(value)]
 
 
-def cells(rows_by_setup, columns, groups=(KITTI, ALL)):
+def cells(rows_by_setup, columns, groups=(results.KITTI, ALL)):
     """Of the set-ups, groups of drives and columns, in this order."""
     return [percent(of_drives(rows, drives, column)) for rows in rows_by_setup for drives in groups for column in columns]
 
@@ -90,9 +89,9 @@ def ablation_table(folder):
     for setup in ("product", "paper"):
         for name in sorted((n for n in names if n.startswith(setup)), key=lambda n: (n != setup + " as it is", n)):
             rows = results.read(folder / "ablation" / name / "matching.csv")
-            means = (bootstrap.mean(of_drives(rows, KITTI, column)) for column in ("scale_normalised", "standard"))
+            means = (bootstrap.mean(of_drives(rows, results.KITTI, column)) for column in ("scale_normalised", "standard"))
             yield [setup, name[len(setup) + 1:], *(f"{mean:.1f}" for mean in means),
-                   *cells([rows], ("improvement_percent", "improvement_on_best_percent"), [KITTI])]
+                   *cells([rows], ("improvement_percent", "improvement_on_best_percent"), [results.KITTI])]
 
 
 def robustness_table(folder):
@@ -117,7 +116,7 @@ def accuracy_table(folder):
 def scale_table(folder):
     yield ["drives", "method", "scale 1", "1.5", "2", "3", "4", "features a view", "CPU time a view"]
     found = results.read(folder / "scale_change/scale_change.csv")
-    for kind, rows in (("real: KITTI 04, 06", found[found.sequence.isin(KITTI)]), ("rendered", found[~found.sequence.isin(KITTI)])):
+    for kind, rows in (("real: KITTI 04, 06", found[found.sequence.isin(results.KITTI)]), ("rendered", found[~found.sequence.isin(results.KITTI)])):
         for method, of_method in rows.groupby("method", sort=False):
             sums = of_method.groupby("scale", sort=False)[["correct", "visible"]].sum()
             yield [kind, method, *(f"{100.0 * correct / visible:.1f} % ({correct:.0f})" if visible else "–"

@@ -11,7 +11,7 @@
 #include "stereo_descriptor_vo/motion/noise.hpp"
 
 namespace sdvo {
-namespace {
+inline namespace window_optimizing {  // with a name: WindowOptimizer::Memory has fields of these types
 
 constexpr int kCalibration = RigCalibration::kParameters;
 using CalibrationVector = RigCalibration::Vector;
@@ -318,7 +318,7 @@ class Solver {
   int poses_ = 0, size_ = 0;
 };
 
-}  // namespace
+}  // namespace window_optimizing
 
 bool predictObservation(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
                         const AnchoredPoint& point, Eigen::Vector3d& prediction, ObservationJacobians* jacobians) {

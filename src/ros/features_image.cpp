@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 #include <string>
+#include <vector>
 
 #include "stereo_descriptor_vo/ros/stereo_features_view.hpp"
 
@@ -35,10 +36,24 @@ void drawCircle(cv::Mat& image, double u, double v, double diameter, const cv::S
   cv::circle(image, fixedPoint(u, v), radius, colour, 1, cv::LINE_AA, kShift);
 }
 
-void drawCaption(cv::Mat& image, const std::string& text) {
-  const cv::Point origin(6, 18);
-  cv::putText(image, text, origin, cv::FONT_HERSHEY_SIMPLEX, 0.5, cv::Scalar::all(0), 3, cv::LINE_AA);
-  cv::putText(image, text, origin, cv::FONT_HERSHEY_SIMPLEX, 0.5, cv::Scalar::all(255), 1, cv::LINE_AA);
+/// Words in the upper left corner. As many phrases share a line as the image has room for.
+void drawCaption(cv::Mat& image, const std::vector<std::string>& phrases) {
+  constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX, kMargin = 6, kLine = 18;  // px
+  constexpr double kScale = 0.5;
+  std::vector<std::string> lines;
+  for (const std::string& phrase : phrases) {
+    const std::string longer = lines.empty() ? phrase : lines.back() + ", " + phrase;
+    int baseline = 0;
+    if (lines.empty() || cv::getTextSize(longer, kFont, kScale, 1, &baseline).width > image.cols - 2 * kMargin)
+      lines.push_back(phrase);
+    else
+      lines.back() = longer;
+  }
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const cv::Point origin(kMargin, kLine * static_cast<int>(i + 1));
+    cv::putText(image, lines[i], origin, kFont, kScale, cv::Scalar::all(0), 3, cv::LINE_AA);
+    cv::putText(image, lines[i], origin, kFont, kScale, cv::Scalar::all(255), 1, cv::LINE_AA);
+  }
 }
 
 }  // namespace
@@ -58,19 +73,21 @@ cv::Mat drawFeatures(const cv::Mat& left, const cv::Mat& right, const stereo_des
   }
   const std::size_t matches =
       std::min({flow.u.size(), flow.v.size(), flow.u_reference.size(), flow.v_reference.size(), flow.inlier.size()});
-  std::size_t inliers = 0;
+  std::size_t drawn = 0, inliers = 0;
   const auto drawable = [&](double u, double v) {
     return u >= -left.cols && u <= 2 * left.cols && v >= -left.rows && v <= 2 * left.rows;
   };
   for (std::size_t i = 0; i < matches; ++i) {
     if (!drawable(flow.u_reference[i], flow.v_reference[i]) || !drawable(flow.u[i], flow.v[i])) continue;
+    ++drawn;
     inliers += flow.inlier[i] ? 1 : 0;
     cv::line(left_colour, fixedPoint(flow.u_reference[i], flow.v_reference[i]), fixedPoint(flow.u[i], flow.v[i]),
              flow.inlier[i] ? kInlier : kOutlier, 1, cv::LINE_AA, kShift);
   }
-  drawCaption(left_colour, "left: " + std::to_string(view.count()) + " features, " + std::to_string(matches) +
-                               " matches (green: " + std::to_string(inliers) + " inliers, magenta: outliers)");
-  drawCaption(right_colour, "right: circles have the size that the depth gives, near red to far blue");
+  drawCaption(left_colour,
+              {"left: " + std::to_string(view.count()) + " features", std::to_string(matches) + " matches",
+               std::to_string(inliers) + " inliers (green)", std::to_string(drawn - inliers) + " outliers (magenta)"});
+  drawCaption(right_colour, {"right: circles sized by depth", "near red to far blue"});
   cv::Mat both;
   cv::vconcat(left_colour, right_colour, both);
   return both;

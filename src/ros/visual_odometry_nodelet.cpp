@@ -323,12 +323,22 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   }
 
   void report(const OdometryResult& result, const ros::Time& stamp) {
-    if (result.state == TrackingState::kTracking) return;
+    const bool is_lost = result.state == TrackingState::kWaiting || result.state == TrackingState::kLost;
+    if (result.state == TrackingState::kTracking) {
+      if (std::exchange(is_tracking_, true)) return;
+      // The first pair has features and no matches yet.
+      if (throttle_.allows("begins"))
+        NODELET_INFO_STREAM("TRACKING at " << stamp << ", epoch " << result.epoch << ": "
+                                           << (result.has_motion ? result.inliers : result.features) << " points");
+      return;
+    }
+    if (is_lost) is_tracking_ = false;
     // Each start is told apart from the predictions that go before it.
     const bool started_again = result.has_pose && !result.has_motion;
     if (throttle_.allows(started_again ? "started again" : toString(result.state)))
       NODELET_WARN_STREAM(toString(result.state)
-                          << " at " << stamp << ", epoch " << result.epoch << ": " << result.reason);
+                          << " at " << stamp << ", epoch " << result.epoch << ", " << result.inliers << " of "
+                          << result.matches << " points: " << result.reason);
   }
 
   /// At a given pose, or where it began.
@@ -570,6 +580,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   Eigen::Isometry3d T_odom_start_;  // of a run
   int source_restarts_ = 0, clock_steps_ = 0;
   int epoch_ = 0;
+  bool is_tracking_ = false;  // reported, and not lost since
   std::string camera_frame_;
   std::optional<std::uint32_t> processed_epoch_;
   std::optional<ros::Time> processed_stamp_;

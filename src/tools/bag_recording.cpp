@@ -10,8 +10,10 @@
 #include <stdexcept>
 
 #include "../common/stamp_filter.hpp"
+#include "../messages/camera_conversions.hpp"
 #include "../messages/stamps.hpp"
 #include "../ros/pair_decoder.hpp"
+#include "camera_input.hpp"
 
 namespace sdvo {
 namespace {
@@ -76,7 +78,7 @@ int BagRecording::useAll(int limit, const Use& use) {
     const ros::Time stamp = pair.messages.left_image->header.stamp;
     try {
       const DecodedPair decoded = decoder.decode(pair.messages);  // whose images are the messages'
-      use({decoded.camera, decoded.left, decoded.right, nanoseconds(stamp)});
+      use(recordedPair(decoded, pair.messages, nanoseconds(stamp)));
       decoder.accept(decoded.camera);
       used_.push_back({stamp, pair.recorded});
     } catch (const std::invalid_argument& e) {
@@ -128,9 +130,15 @@ void BagRecording::forEachBackwards(const Use& use) const {
   for (auto pair = used_.rbegin(); pair != used_.rend(); ++pair) {
     const StereoPairMessages messages = read(*pair);
     const DecodedPair decoded = decoder.decode(messages);
-    use({decoded.camera, decoded.left, decoded.right, ends - nanoseconds(pair->stamp)});
+    use(recordedPair(decoded, messages, ends - nanoseconds(pair->stamp)));
     decoder.accept(decoded.camera);
   }
+}
+
+ArrivalFindings BagRecording::arrivals(const std::string& base_frame) const {
+  CameraInput input(topics_, [](const StereoPairMessages&) {});
+  input.addAll(bag_, topics_);
+  return input.findings(base_frame);
 }
 
 /// By the bag's index.

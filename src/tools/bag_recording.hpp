@@ -21,6 +21,7 @@ class BagRecording : public Recording {
   int size() const override;
   int forEach(int limit, const Use& use) override;
   void forEachBackwards(const Use& use) const override;
+  ArrivalFindings arrivals(const std::string& base_frame) const override;
 
  private:
   /// Times at which the four messages of a pair were recorded.

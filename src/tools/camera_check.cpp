@@ -1,6 +1,5 @@
 #include "camera_check.hpp"
 
-#include <exception>
 #include <opencv2/core.hpp>
 
 #include "../check/calibration_check.hpp"
@@ -10,39 +9,34 @@
 
 namespace sdvo {
 
-CameraCheck::CameraCheck(const PipelineOptions& options)
+CameraCheck::CameraCheck(const PipelineOptions& options, const OfflineRun& run)
     : options_(options),
-      run_(options),
+      run_(run),
       rows_(options.stereo_features.stereo.max_epipolar_residual, options.stereo_features.stereo.epipolar.max_disparity,
             options.stereo_features.rig_monitor.reach) {}
 
-void CameraCheck::add(const StereoPairMessages& pair) try {
-  const std::int64_t stamp = nanoseconds(pair.left_image->header.stamp);
-  if (stamp <= last_stamp_) return;  // the stamps' own step says it
-  const DecodedPair decoded = decoder_.decode(pair);
-  const StereoFeatures features = run_.process(decoded.camera, decoded.left, decoded.right, stamp);
-  decoder_.accept(decoded.camera);
-  last_stamp_ = stamp;
-  camera_ = decoded.camera;
-  lens_ = pair.left_info->distortion_model;
-  unrectified_ = ros_conversions::whyUnrectified(*pair.left_info, *pair.right_info);
+void CameraCheck::add(const RecordedPair& pair, const StereoFeatures& features) {
+  camera_ = pair.camera;
+  lens_ = pair.lens;
+  unrectified_ = pair.unrectified;
   ++used_;
   if (features.report.refused) {
     ++refused_;
     refusal_ = features.report.status;
   }
-  rows_.add(decoded.left, decoded.right, stamp);
-  images_.add(decoded.left, decoded.right, features.report);
-  emitter_.add(decoded.left);
+  rows_.add(pair.left, pair.right, pair.stamp);
+  images_.add(pair.left, pair.right, features.report);
+  emitter_.add(pair.left);
   odometry_.add(run_.last());
-  cv::vconcat(decoded.left, decoded.right, picture_);
-} catch (const std::exception& e) {
-  ++unusable_;
-  problem_ = e.what();
+  cv::vconcat(pair.left, pair.right, picture_);
 }
 
-std::vector<Finding> CameraCheck::findings(const Finding& topics, const Finding& stamps, const Finding& transform,
-                                           double rate) const {
+void CameraCheck::addUnusable(const std::string& problem) {
+  ++unusable_;
+  problem_ = problem;
+}
+
+std::vector<Finding> CameraCheck::findings(const ArrivalFindings& arrivals) const {
   std::vector<Finding> findings;
   std::string fault;
   const auto append = [&](Finding finding) {
@@ -52,8 +46,8 @@ std::vector<Finding> CameraCheck::findings(const Finding& topics, const Finding&
       fault = finding.step;
     findings.push_back(finding);
   };
-  append(topics);
-  append(stamps);
+  append(arrivals.topics);
+  append(arrivals.stamps);
   append(calibration());
   append(images_.exposure(thresholds_.min_intensity, thresholds_.max_intensity));
   append(rows_.sameMoment());
@@ -65,8 +59,8 @@ std::vector<Finding> CameraCheck::findings(const Finding& topics, const Finding&
   append(emitter_.judge());
   append(images_.frameRate(odometry_.rotations()));
   append(odometry_.judge());
-  append(load(rate));
-  findings.push_back(transform);  // which no other step needs
+  append(load(arrivals.rate));
+  findings.push_back(arrivals.transform);  // which no other step needs
   return findings;
 }
 

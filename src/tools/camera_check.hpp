@@ -11,23 +11,24 @@
 #include "../check/row_check.hpp"
 #include "../check/stamp_check.hpp"
 #include "../config/pipeline_options.hpp"
-#include "../ros/pair_decoder.hpp"
 #include "offline_run.hpp"
+#include "recording.hpp"
 
 namespace sdvo {
 
 /// All steps of the check of a stereo camera, in the order in which one proves what the next one needs.
 class CameraCheck {
  public:
-  explicit CameraCheck(const PipelineOptions& options);
+  /// `run`, which must outlive it, has the odometry of these pairs.
+  CameraCheck(const PipelineOptions& options, const OfflineRun& run);
 
-  /// Pairs in the order of their stamps.
-  void add(const StereoPairMessages& pair);
+  /// The pair that `run` has just processed, with its features.
+  void add(const RecordedPair& pair, const StereoFeatures& features);
+  /// A pair that could not be used, and why.
+  void addUnusable(const std::string& problem);
 
-  /// `topics`, `stamps` and `transform` are judged where messages arrive. A step after a FAIL is open: its findings
-  /// would be that fault's.
-  std::vector<Finding> findings(const Finding& topics, const Finding& stamps, const Finding& transform,
-                                double rate) const;
+  /// A step after a FAIL is open: its findings would be that fault's.
+  std::vector<Finding> findings(const ArrivalFindings& arrivals) const;
 
   cv::Mat rows() const { return rows_.map(); }
   /// The last pair that was used, left above right; empty: none.
@@ -40,13 +41,11 @@ class CameraCheck {
 
   const PipelineOptions options_;
   const ImageThresholds thresholds_;
-  OfflineRun run_;
-  PairDecoder decoder_;
+  const OfflineRun& run_;
   RowCheck rows_;
   ImageCheck images_;
   EmitterCheck emitter_;
   OdometryCheck odometry_;
-  std::int64_t last_stamp_ = 0;  ///< ns
   int used_ = 0, unusable_ = 0, refused_ = 0;
   std::string problem_, refusal_, lens_, unrectified_;
   StereoCamera camera_;

@@ -3,7 +3,6 @@
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
 #include <rosbag/bag.h>
-#include <rosbag/view.h>
 
 #include <CLI/CLI.hpp>
 #include <iomanip>
@@ -14,6 +13,8 @@
 #include <vector>
 
 #include "../common/worker.hpp"
+#include "../ros/pair_decoder.hpp"
+#include "../messages/stamps.hpp"
 #include "camera_check.hpp"
 #include "camera_input.hpp"
 #include "check_page.hpp"
@@ -30,16 +31,6 @@ struct Arguments {
   std::vector<std::string> settings;
   double seconds = 30.0;
 };
-
-void readBag(const rosbag::Bag& bag, const sdvo::StereoTopics& topics, sdvo::CameraInput& input) {
-  std::vector<std::string> wanted(topics.begin(), topics.end());
-  wanted.insert(wanted.end(), {"/tf", "/tf_static"});
-  for (const rosbag::MessageInstance& instance : rosbag::View(bag, rosbag::TopicQuery(wanted)))
-    if (const auto transforms = instance.instantiate<tf2_msgs::TFMessage>())
-      input.add(*transforms, instance.getTopic() == "/tf_static");
-    else
-      input.add(sdvo::readStereoMessage(instance, topics), instance.getTime());
-}
 
 void listen(const Arguments& arguments, sdvo::CameraInput& input) {
   if (!ros::master::check())
@@ -73,10 +64,26 @@ void listen(const Arguments& arguments, sdvo::CameraInput& input) {
 
 int check(const Arguments& arguments) {
   cv::setNumThreads(1);
-  sdvo::CameraCheck check(sdvo::readPipelineOptions(arguments.config, arguments.settings));
-  const auto report = [&](sdvo::CameraInput& input) {
-    const std::vector<sdvo::Finding> findings =
-        check.findings(input.topics(), input.stamps(), input.transform(arguments.base_frame), input.rate());
+  const sdvo::PipelineOptions options = sdvo::readPipelineOptions(arguments.config, arguments.settings);
+  sdvo::OfflineRun run(options);
+  sdvo::CameraCheck check(options, run);
+  sdvo::PairDecoder decoder;
+  std::int64_t last_stamp = 0;  // ns
+  const auto use = [&](const sdvo::StereoPairMessages& pair) {
+    const std::int64_t stamp = sdvo::nanoseconds(pair.left_image->header.stamp);
+    if (stamp <= last_stamp) return;  // which the step of the stamps reports
+    try {
+      const sdvo::RecordedPair decoded = recordedPair(decoder.decode(pair), pair, stamp);
+      const sdvo::StereoFeatures features = run.process(decoded.camera, decoded.left, decoded.right, stamp);
+      decoder.accept(decoded.camera);
+      last_stamp = stamp;
+      check.add(decoded, features);
+    } catch (const std::exception& e) {
+      check.addUnusable(e.what());
+    }
+  };
+  const auto report = [&](sdvo::CameraInput& input, const sdvo::StereoTopics& topics) {
+    const std::vector<sdvo::Finding> findings = check.findings(input.findings(arguments.base_frame));
     bool failed = false;
     for (const sdvo::Finding& finding : findings) {
       failed |= finding.verdict == sdvo::Verdict::kFail;
@@ -85,7 +92,7 @@ int check(const Arguments& arguments) {
                 << "\n";
     }
     if (!arguments.page.empty())
-      sdvo::writeCheckPage(arguments.page, arguments.names.topics()[0], findings, check.rows(), check.picture());
+      sdvo::writeCheckPage(arguments.page, topics[0], findings, check.rows(), check.picture());
     return failed ? 2 : 0;
   };
   if (!arguments.bag.empty()) {
@@ -93,18 +100,17 @@ int check(const Arguments& arguments) {
     sdvo::openBag(arguments.bag, bag);
     return sdvo::ofBag(arguments.bag, [&] {
       const sdvo::StereoTopics topics = sdvo::topicsIn(bag, arguments.names);
-      sdvo::CameraInput input(topics, [&](const sdvo::StereoPairMessages& pair) { check.add(pair); });
-      readBag(bag, topics, input);
-      return report(input);
+      sdvo::CameraInput input(topics, use);
+      input.addAll(bag, topics);
+      return report(input, topics);
     });
   }
   constexpr std::size_t kWaiting = 100;  // pairs
-  sdvo::Worker<sdvo::StereoPairMessages> worker(kWaiting,
-                                                [&](const sdvo::StereoPairMessages& pair) { check.add(pair); });
+  sdvo::Worker<sdvo::StereoPairMessages> worker(kWaiting, use);
   sdvo::CameraInput input(arguments.names.topics(), [&](const sdvo::StereoPairMessages& pair) { worker.push(pair); });
   listen(arguments, input);
   worker.stop();
-  return report(input);
+  return report(input, arguments.names.topics());
 }
 
 }  // namespace
@@ -117,13 +123,13 @@ int main(int argc, char** argv) {
       "Exit code 2: a step FAILs. For 30 s of a camera that is held still, walked, turned and tilted");
   Arguments arguments;
   app.add_option("--bag", arguments.bag, "recorded bag; empty: listen to the topics")->check(CLI::ExistingFile);
-  arguments.names.addTo(app);
+  arguments.names.addTo(app, "");
   app.add_option("--base-frame", arguments.base_frame, "the robot's frame on TF")->capture_default_str();
   app.add_option("--seconds", arguments.seconds, "how long to listen, s")
       ->capture_default_str()
       ->check(CLI::Range(1.0, 3600.0));
   app.add_option("--transport", arguments.transport, "image transport to listen by")->capture_default_str();
-  app.add_option("--page", arguments.page, "HTML page with the table, the map of the rows and a pair");
+  app.add_option("--page", arguments.page, "HTML page to write: verdict, table, map of the rows, a pair");
   app.add_option("--config", arguments.config, "YAML file as the nodelets load it");
   app.add_option("--param", arguments.settings, "option as name=value; repeatable")->allow_extra_args(false);
   return sdvo::runTool(app, argc, argv, [&] { return check(arguments); });

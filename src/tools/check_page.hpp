@@ -8,10 +8,10 @@
 
 namespace sdvo {
 
-/// All findings of a camera's check as one page that needs no other file: table, map of the rows, a pair of images.
-/// `rows`: RowCheck::map(), empty: none; `picture`: CV_8U, empty: none. Throws std::runtime_error when it cannot be
-/// written.
+/// All findings of a camera's check as one page that needs no other file: verdict, table, map of the rows, a pair of
+/// images. `rows`: RowCheck::map(), empty: none; `pair`: CV_8U, empty: none. Throws std::runtime_error when it cannot
+/// be written.
 void writeCheckPage(const std::string& path, const std::string& camera, const std::vector<Finding>& findings,
-                    const cv::Mat& rows, const cv::Mat& picture);
+                    const cv::Mat& rows, const cv::Mat& pair);
 
 }  // namespace sdvo

@@ -31,7 +31,12 @@ class OfflineRun {
   /// The next pair from its features alone, which were extracted elsewhere.
   void processFeatures(const StereoFeatures& features);
 
-  /// Of the last pair; only there the flow is kept.
+  struct Frame {
+    OdometryResult odometry;  ///< without the flow, but for the last pair's
+    ExtractionReport extraction;
+    double total_time = 0.0;  ///< s
+  };
+  const std::vector<Frame>& frames() const { return frames_; }
   const OdometryResult& last() const { return frames_.back().odometry; }
 
   int pairs() const { return static_cast<int>(frames_.size()); }
@@ -56,12 +61,6 @@ class OfflineRun {
   void writeStates(const std::string& path) const;
 
  private:
-  struct Frame {
-    OdometryResult odometry;
-    ExtractionReport extraction;
-    double total_time = 0.0;  ///< s
-  };
-
   /// A pair between extractor and odometry.
   struct Extracted {
     StereoFeatures features;

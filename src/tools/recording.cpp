@@ -6,6 +6,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "../check/stamp_check.hpp"
+#include "../config/interface_options.hpp"
 #include "bag_recording.hpp"
 #include "stereo_descriptor_vo/data/euroc_dataset.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
@@ -49,10 +51,22 @@ class FolderRecording : public Recording {
     for (int i = used_ - 1; i >= 0; --i) give(i, ends - sequence_.stamp(i), use);
   }
 
+  ArrivalFindings arrivals(const std::string&) const override {
+    StampCheck check({});
+    for (int i = 0; i < used_; ++i) {
+      const double seconds = 1e-9 * static_cast<double>(sequence_.stamp(i));
+      for (std::size_t input = 0; input < StampCheck::kInputs; ++input) check.note(input, sequence_.stamp(i), seconds);
+      check.notePair(sequence_.stamp(i));
+    }
+    const RateOptions rates;
+    const Finding transform{"TF", Verdict::kOpen, "a folder has none", ""};
+    return {check.topics(rates.min_rate, rates.max_rate, ""), check.stamps(), transform, check.rate(), std::nullopt};
+  }
+
  private:
   void give(int i, std::int64_t stamp, const Use& use) const {
     const ImagePair pair = sequence_.load(i);
-    use({sequence_.camera(), pair.left, pair.right, stamp});
+    use({sequence_.camera(), pair.left, pair.right, stamp, "", ""});
   }
 
   const Sequence sequence_;
@@ -98,6 +112,10 @@ class JoinedRecording : public Recording {
         pair.stamp += all - ends_[i]->first - ends_[i]->second;
         use(pair);
       });
+  }
+
+  ArrivalFindings arrivals(const std::string& base_frame) const override {
+    return parts_.front()->arrivals(base_frame);  // parts are of one driver
   }
 
  private:

@@ -1,12 +1,15 @@
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <functional>
 #include <memory>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "../check/finding.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 #include "stereo_messages.hpp"
 
@@ -15,8 +18,17 @@ namespace sdvo {
 /// A rectified pair of a recording.
 struct RecordedPair {
   StereoCamera camera;
-  cv::Mat left, right;  ///< CV_8U grey; valid as long as the call that it is given to
-  std::int64_t stamp;   ///< ns
+  cv::Mat left, right;      ///< CV_8U grey; valid as long as the call that it is given to
+  std::int64_t stamp;       ///< ns
+  std::string lens;         ///< name of the calibration's model; empty: unknown
+  std::string unrectified;  ///< why the images are most likely not rectified; empty: nothing indicates that
+};
+
+/// Steps of a camera's check that concern how the messages of pairs arrive.
+struct ArrivalFindings {
+  Finding topics, stamps, transform;
+  double rate;                                     ///< of the pairs, Hz
+  std::optional<Eigen::Isometry3d> T_base_camera;  ///< as TF has it
 };
 
 /// A recorded drive. Its images stay on disk.
@@ -36,6 +48,9 @@ class Recording {
   /// Calls `use` for the pairs of forEach() backwards. Mirrored stamps increase, and the time between pairs is the
   /// same.
   virtual void forEachBackwards(const Use& use) const = 0;
+
+  /// How its messages arrived, and where TF has the camera. Reads the whole recording where it is a bag.
+  virtual ArrivalFindings arrivals(const std::string& base_frame) const = 0;
 };
 
 /// A bag, a folder in KITTI's layout, or a raw folder of EuRoC's (ASL), whose images are rectified. Throws

@@ -8,6 +8,7 @@
 #include <limits>
 #include <map>
 #include <opencv2/core/utility.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
@@ -16,8 +17,12 @@
 
 #include "../common/progress.hpp"
 #include "../config/pipeline_options.hpp"
+#include "../data/kitti_layout.hpp"
 #include "../data/text_file.hpp"
+#include "camera_check.hpp"
+#include "drive_page.hpp"
 #include "feature_halves.hpp"
+#include "ground_truth.hpp"
 #include "offline_run.hpp"
 #include "place_run.hpp"
 #include "recording.hpp"
@@ -33,7 +38,8 @@ constexpr int kAll = std::numeric_limits<int>::max();
 
 struct Arguments {
   std::vector<std::string> inputs, before, settings;
-  std::string config, format, poses, timing, states, output, odometry, keyframes, truth;
+  std::string config, format, poses, timing, states, output, odometry, keyframes, truth, page, live, pictures;
+  std::string base_frame = "base_link";
   sdvo::StereoNames names;
   int frames = kAll, threads = 1;
   bool join = false, places = false, shuttle = false, halves = false;
@@ -47,17 +53,29 @@ struct Drive {
   explicit Drive(const sdvo::PipelineOptions& options) : whole(options), first(options), second(options) {}
 };
 
-void follow(sdvo::Recording& recording, const Arguments& arguments, Drive& drive, sdvo::PlaceRun* places) {
+/// What the page of a drive needs of each pair while its images are there.
+struct Seen {
+  sdvo::CameraCheck check;
+  sdvo::DrivePictures pictures;
+};
+
+void follow(sdvo::Recording& recording, const Arguments& arguments, Drive& drive, sdvo::PlaceRun* places,
+            Seen* seen = nullptr) {
   sdvo::FeatureHalves halves;
   std::optional<sdvo::Progress> progress;
   const int count = std::min(arguments.frames, recording.size());
   if (arguments.output.empty()) progress.emplace(places ? "places" : "odometry", count);
   drive.left_out = recording.forEach(arguments.frames, [&](const sdvo::RecordedPair& pair) {
-    if (arguments.threads > 1 && !places && !arguments.halves) {
+    if (arguments.threads > 1 && !places && !arguments.halves && !seen && arguments.pictures.empty()) {
       drive.whole.processBeside(pair.camera, pair.left, pair.right, pair.stamp);
     } else {
       const sdvo::StereoFeatures features = drive.whole.process(pair.camera, pair.left, pair.right, pair.stamp);
       if (places) places->process(features, drive.whole.last());
+      if (!arguments.pictures.empty()) {
+        const std::string name = sdvo::kittiFrameName(drive.whole.pairs() - 1) + ".jpg";
+        cv::imwrite((fs::path(arguments.pictures) / name).string(), drawLeft(pair, features, drive.whole.last()));
+      }
+      if (seen) seen->check.add(pair, features), seen->pictures.add(pair, features, drive.whole.last());
       if (arguments.halves) {
         const auto rows = halves.split(features, drive.whole.last().flow);
         drive.first.processFeatures(features.select(rows[0]));
@@ -74,8 +92,12 @@ std::vector<sdvo::SelfCheck> checkItself(const sdvo::Recording& recording, const
   std::vector<sdvo::SelfCheck> checks;
   if (arguments.shuttle) {
     sdvo::OfflineRun back(options);
-    recording.forEachBackwards(
-        [&](const sdvo::RecordedPair& pair) { back.process(pair.camera, pair.left, pair.right, pair.stamp); });
+    std::optional<sdvo::Progress> progress;
+    if (arguments.output.empty()) progress.emplace("backwards", drive.whole.pairs());
+    recording.forEachBackwards([&](const sdvo::RecordedPair& pair) {
+      back.process(pair.camera, pair.left, pair.right, pair.stamp);
+      if (progress) progress->step();
+    });
     checks.push_back(checkShuttle(drive.whole, back));
   }
   if (arguments.halves) checks.push_back(checkHalves(drive.whole, drive.first, drive.second));
@@ -115,9 +137,38 @@ void printErrors(const sdvo::PlaceErrors& errors) {
             << "ATE before " << errors.ate_before << " m, after " << errors.ate_after << " m\n";
 }
 
+sdvo::Finding makePage(const sdvo::Recording& recording, const Drive& drive, const Seen& seen,
+                       const std::vector<sdvo::SelfCheck>& checks, const sdvo::PipelineOptions& options,
+                       const Arguments& arguments) {
+  const std::string& input = arguments.inputs.front();
+  const sdvo::ArrivalFindings arrivals = recording.arrivals(arguments.base_frame);
+  sdvo::DriveReport report;
+  report.name = fs::absolute(input).lexically_normal().string();
+  report.left_out = drive.left_out;
+  report.options = options;
+  report.findings = seen.check.findings(arrivals);
+  report.rows = seen.check.rows();
+  // An optical frame looks along z, with x to the right.
+  report.R_base_camera << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;
+  if (arrivals.T_base_camera) report.R_base_camera = arrivals.T_base_camera->linear();
+  report.self_checks = checks;
+  report.pictures = seen.pictures.pictures();
+  std::vector<std::int64_t> stamps;
+  for (const auto& frame : drive.whole.frames()) stamps.push_back(frame.odometry.stamp);
+  if (!arguments.truth.empty()) report.truth = sdvo::readGroundTruth(arguments.truth, stamps);
+  if (const std::string live = arguments.live.empty() ? input : arguments.live; fs::is_regular_file(live)) {
+    rosbag::Bag bag;
+    sdvo::openBag(live, bag);
+    report.live = sdvo::ofBag(live, [&] { return sdvo::readLiveRecord(bag); });
+  }
+  sdvo::writeDrivePage(arguments.page, report, drive.whole);
+  return judge(report, drive.whole);
+}
+
 int runOne(const Arguments& arguments) {
   if (arguments.inputs.size() > 1 && !arguments.join)
-    throw std::runtime_error("several recordings need --output, or --join where they are parts of one drive (see --help)");
+    throw std::runtime_error(
+        "several recordings need --output, or --join where they are parts of one drive (see --help)");
   const sdvo::PipelineOptions options = sdvo::readPipelineOptions(arguments.config, arguments.settings);
   std::optional<sdvo::PlaceRun> places;
   if (arguments.places) places.emplace(options.place_recognition);
@@ -132,11 +183,16 @@ int runOne(const Arguments& arguments) {
   }
   const auto recording = sdvo::openParts(arguments.inputs, arguments.names);
   Drive drive(options);
-  follow(*recording, arguments, drive, places ? &*places : nullptr);
+  if (!arguments.pictures.empty()) fs::create_directories(arguments.pictures);
+  std::optional<Seen> seen;
+  if (!arguments.page.empty())
+    seen.emplace(Seen{sdvo::CameraCheck(options, drive.whole),
+                      sdvo::DrivePictures(std::min(arguments.frames, recording->size()))});
+  follow(*recording, arguments, drive, places ? &*places : nullptr, seen ? &*seen : nullptr);
   const sdvo::OfflineRun& run = drive.whole;
   if (places)
     sdvo::writeKittiPoses(arguments.poses, places->poses());
-  else
+  else if (!arguments.poses.empty())
     writePoses(arguments.poses, arguments.format, run);
   if (!arguments.odometry.empty()) writePoses(arguments.odometry, arguments.format, run);
   if (!arguments.timing.empty()) run.writeTiming(arguments.timing);
@@ -145,10 +201,14 @@ int runOne(const Arguments& arguments) {
 
   std::cout << std::fixed << std::setprecision(1);
   places ? printSummary(run, *places, way + run.distance()) : printSummary(run, options);
-  if (!arguments.truth.empty()) printErrors(places->errors(sdvo::readKittiPoses(arguments.truth)));
+  if (places && !arguments.truth.empty()) printErrors(places->errors(sdvo::readKittiPoses(arguments.truth)));
   if (drive.left_out > 0) std::cout << drive.left_out << " stamps without a usable pair\n";
-  for (const sdvo::SelfCheck& check : checkItself(*recording, drive, options, arguments))
-    std::cout << check.text() << "\n";
+  const std::vector<sdvo::SelfCheck> checks = checkItself(*recording, drive, options, arguments);
+  for (const sdvo::SelfCheck& check : checks) std::cout << check.text() << "\n";
+  if (seen) {
+    const sdvo::Finding verdict = makePage(*recording, drive, *seen, checks, options, arguments);
+    std::cout << toString(verdict.verdict) << ": " << verdict.what << "\npage: " << arguments.page << "\n";
+  }
   return 0;
 }
 
@@ -236,14 +296,15 @@ int runMany(const Arguments& arguments) {
 }
 
 int run(const Arguments& arguments) {
-  const bool is_of_places = !(arguments.before.empty() && arguments.odometry.empty() && arguments.keyframes.empty() &&
-                              arguments.truth.empty());
-  if (is_of_places && !arguments.places)
-    throw std::runtime_error("--before, --odometry, --keyframes and --ground-truth need --places");
+  const bool has_page = !arguments.page.empty();
+  const bool is_of_places = !(arguments.before.empty() && arguments.odometry.empty() && arguments.keyframes.empty());
+  if (is_of_places && !arguments.places) throw std::runtime_error("--before, --odometry and --keyframes need --places");
+  if (!arguments.truth.empty() && !arguments.places && !has_page)
+    throw std::runtime_error("--ground-truth needs --page or --places");
   cv::setNumThreads(arguments.threads);
-  if (arguments.poses.empty() == arguments.output.empty() || (arguments.places && arguments.poses.empty()))
-    throw std::runtime_error(arguments.places ? "--places needs --poses, not --output"
-                                              : "either --poses or --output is needed (see --help)");
+  if (arguments.places && arguments.poses.empty()) throw std::runtime_error("--places needs --poses, not --output");
+  if ((arguments.poses.empty() && !has_page) == arguments.output.empty())
+    throw std::runtime_error("--page, --poses or --output is needed (see --help)");
   return arguments.output.empty() ? runOne(arguments) : runMany(arguments);
 }
 
@@ -252,9 +313,9 @@ int run(const Arguments& arguments) {
 int main(int argc, char** argv) {
   CLI::App app(
       "Stereo odometry of recorded drives, every pair: bags of rectified images, folders in KITTI's layout, EuRoC "
-      "folders (rectified here). Of one drive it writes the files that are asked for; with --output, of each drive "
-      "NAME: "
-      "NAME.txt (poses of the left camera), NAME.csv (a line for each pair), and report.csv with a line for each "
+      "folders (rectified here). Of one drive it writes the files that are asked for, such as a --page to look at; "
+      "with --output, of each drive NAME: NAME.txt (poses of the left camera), NAME.csv (a line for each pair), and "
+      "report.csv with a line for each "
       "drive");
   Arguments arguments;
   arguments.places = fs::path(argv[0]).filename() == "run_places";
@@ -273,6 +334,13 @@ int main(int argc, char** argv) {
   arguments.names.addTo(app);
   app.add_flag("--join", arguments.join, "the recordings are parts of one drive, as of rosbag record --split");
 
+  app.add_option("--page", arguments.page,
+                 "HTML page to write: verdict, camera's check, path, states, deviations, times, what the recording "
+                 "implies of its error (--shuttle and --halves), images");
+  app.add_option("--base-frame", arguments.base_frame, "page: the robot's frame on TF of a bag")->capture_default_str();
+  app.add_option("--live", arguments.live, "page: bag with vo_info of the drive as it ran; default: the recording")
+      ->check(CLI::ExistingFile);
+  app.add_option("--pictures", arguments.pictures, "folder of pictures to write: each left image with its features");
   app.add_option("--poses", arguments.poses, "poses to write, 12 numbers a line");
   app.add_option(
          "--format", arguments.format,
@@ -285,6 +353,8 @@ int main(int argc, char** argv) {
                  "CSV to write, a line for each pair: state, covariances of motion and pose, reason");
   app.add_option("--output", arguments.output, "folder of the results, made where it is missing")
       ->excludes(app.get_option("--join"))
+      ->excludes(app.get_option("--page"))
+      ->excludes(app.get_option("--pictures"))
       ->excludes(app.get_option("--timing"))
       ->excludes(app.get_option("--states"));
   app.add_flag("--shuttle", arguments.shuttle,
@@ -299,6 +369,10 @@ int main(int argc, char** argv) {
   app.add_option("--odometry", arguments.odometry, "places: poses of the odometry to write, 12 numbers a line");
   app.add_option("--keyframes", arguments.keyframes, "places: CSV to write, a line for each key frame");
   app.add_option("--ground-truth", arguments.truth,
-                 "places: true poses; prints how many revisits were found and what is false");
-  return sdvo::runTool(app, argc, argv, [&] { return run(arguments); });
+                 "true poses of the left camera. Page: errors over time; KITTI's format (a line for each pair) or "
+                 "TUM's. Places: prints how many revisits were found and what is false");
+  return sdvo::runTool(app, argc, argv, [&] {
+    if (!arguments.page.empty()) arguments.shuttle = arguments.halves = true;
+    return run(arguments);
+  });
 }

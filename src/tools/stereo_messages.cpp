@@ -48,11 +48,11 @@ sensor_msgs::ImageConstPtr decode(const sensor_msgs::CompressedImage& compressed
 
 }  // namespace
 
-void StereoNames::addTo(CLI::App& app) {
-  app.add_option("--camera", camera, "bags: namespace of both sides")->capture_default_str();
-  app.add_option("--left", left, "bags: name of the left side, such as infra1")->capture_default_str();
-  app.add_option("--right", right, "bags: name of the right side")->capture_default_str();
-  app.add_option("--image", image, "bags: name of the rectified images, such as image_rect_raw; raw or …/compressed")
+void StereoNames::addTo(CLI::App& app, const std::string& scope) {
+  app.add_option("--camera", camera, scope + "namespace of both sides")->capture_default_str();
+  app.add_option("--left", left, scope + "name of the left side, such as infra1")->capture_default_str();
+  app.add_option("--right", right, scope + "name of the right side")->capture_default_str();
+  app.add_option("--image", image, scope + "name of the rectified images, such as image_rect_raw")
       ->capture_default_str();
 }
 

@@ -22,7 +22,8 @@ using StereoTopics = std::array<std::string, 4>;
 struct StereoNames {
   std::string camera = "/stereo", left = "left", right = "right", image = "image_rect";
 
-  void addTo(CLI::App& app);
+  /// `scope` begins what --help has of them.
+  void addTo(CLI::App& app, const std::string& scope = "bags: ");
   StereoTopics topics() const;
 };
 
@@ -36,7 +37,8 @@ template <class Work>
 auto ofBag(const std::string& path, const Work& work) try {
   return work();
 } catch (const rosbag::BagUnindexedException&) {
-  throw std::runtime_error("'" + path + "' has no index, as of a recorder that was killed: rosbag reindex '" + path + "'");
+  throw std::runtime_error("'" + path + "' has no index, as of a recorder that was killed: rosbag reindex '" + path +
+                           "'");
 } catch (const rosbag::BagException& e) {
   throw std::runtime_error("'" + path + "' cannot be read: " + e.what() + ". Is it whole? rosbag check '" + path + "'");
 }

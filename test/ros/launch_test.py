@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """What the launch files set on the parameter server, what they refuse, and what they start again."""
 
+import glob
 import os
 import shlex
 import signal
@@ -168,6 +169,41 @@ class Launch(unittest.TestCase):
                 config.write('- no blocks')
             with self.assertRaisesRegex(roslaunch.core.RLException, 'my config.yaml'):
                 load('stereo_vo.launch', config=path)
+
+    def test_a_configuration_that_cannot_be_read_is_named_and_leaves_no_copy(self):
+        def copies():
+            return set(glob.glob('/tmp/stereo_vo_config_*.yaml'))
+        before = copies()
+        with tempfile.TemporaryDirectory() as folder:
+            pipe, large, torn = (os.path.join(folder, name) for name in ('pipe.yaml', 'large.yaml', 'torn.yaml'))
+            os.mkfifo(pipe)
+            with open(large, 'w') as config:
+                config.truncate(2000000)
+            with open(torn, 'w') as config:
+                config.write('stereo_features: {detector: {max_feat')
+            for path in (pipe, large, torn):
+                with self.assertRaisesRegex(roslaunch.core.RLException, os.path.basename(path)):
+                    load('odometry.launch', config=path)
+            # A launch that fails between the copy and its removal.
+            failing = os.path.join(folder, 'failing.launch')
+            with open(failing, 'w') as launch:
+                launch.write('<launch><param name="copied" command="python3 %s %s %s"/><param name="x" command="false"/></launch>' % (
+                    os.path.join(FOLDER, 'copy_config.py'), os.path.join(FOLDER, '..', 'config', 'stereo_vo.yaml'),
+                    '/tmp/stereo_vo_config_test_%d.yaml' % os.getpid()))
+            subprocess.run(['roslaunch', '--dump-params', failing], stderr=subprocess.DEVNULL)
+        end = time.time() + 30
+        while copies() - before and time.time() < end:
+            time.sleep(0.1)
+        self.assertEqual(copies() - before, set())
+
+    def test_rviz_shows_what_is_in_its_namespace(self):
+        folder = os.path.join(FOLDER, '..', 'rviz')
+        for file in os.listdir(folder):
+            with open(os.path.join(folder, file)) as config:
+                displays = yaml.safe_load(config)['Visualization Manager']['Displays']
+            topics = [display[key] for display in displays for key in ('Topic', 'Image Topic', 'Marker Topic') if key in display]
+            self.assertTrue({'path', 'odom', 'features_image'} <= set(topics), (file, topics))
+            self.assertEqual([topic for topic in topics if topic.startswith('/') and not topic.startswith('/ground_truth/')], [], file)
 
     def test_nothing_is_set_that_nobody_reads(self):
         with tempfile.TemporaryDirectory() as folder:

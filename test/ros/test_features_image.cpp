@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <opencv2/imgproc.hpp>
 #include <string>
 
 #include "../../src/ros/features_image.hpp"
@@ -54,6 +55,23 @@ TEST(DrawFeatures, LeavesOutFlowThatNoImageHolds) {
   EXPECT_GT(colouredPixels(picture(line)), 30);
   picture(line).setTo(cv::Scalar::all(90));
   EXPECT_EQ(colouredPixels(picture), 0);
+}
+
+TEST(DrawFeatures, WordsFitIntoASmallImage) {
+  const FeaturesMessage none = toMessage(synthetic::noFeatures(someFeatures().camera), DepthScaleOptions());
+  const auto captionOf = [&](int width) {
+    const cv::Mat grey(240, width, CV_8UC1, cv::Scalar(90));
+    cv::Mat one;
+    cv::extractChannel(drawFeatures(grey, grey, none, {}), one, 0);
+    return one != 90;
+  };
+  for (const int width : {320, 376}) {
+    const cv::Mat words = captionOf(width);
+    EXPECT_EQ(cv::countNonZero(words.colRange(width - 4, width)), 0) << width << " px: cut";
+    // Nothing is lost: other breaks of the lines leave the letters as many, but for some commas.
+    const int letters = cv::countNonZero(words), wide = cv::countNonZero(captionOf(1280));
+    EXPECT_GT(letters, 0.9 * wide) << width;
+  }
 }
 
 TEST(DrawFeatures, SurvivesFlowOfUnequalLengths) {

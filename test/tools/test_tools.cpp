@@ -5,6 +5,7 @@
 #include <sensor_msgs/CameraInfo.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/Image.h>
+#include <stereo_descriptor_vo/VoInfo.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -708,6 +709,111 @@ TEST_F(Tools, TheTwistOfTheGroundTruthIsThatOfTheBase) {
     EXPECT_NEAR(twist.angular.y, 0.0, 1e-6);
     EXPECT_NEAR(twist.angular.z, kTurn, 1e-6);
   }
+}
+
+/// What a browser shows of a page; nothing of it may come from elsewhere.
+std::string readPage(const fs::path& page) {
+  const std::string html = readText(page);
+  EXPECT_EQ(html.rfind("<!doctype html>", 0), 0u);
+  EXPECT_LT(html.size(), 2000000u);
+  for (const char* elsewhere : {"http", "src='/", "url(", "@import", "<script"})
+    EXPECT_EQ(html.find(elsewhere), std::string::npos) << elsewhere;
+  // Numbers that are none are gaps of a curve, or a dash.
+  EXPECT_EQ(html.substr(0, html.find("base64,")).find("nan"), std::string::npos);
+  return html;
+}
+
+void expectWords(const std::string& html, const std::vector<std::string>& words) {
+  for (const std::string& word : words) EXPECT_NE(html.find(word), std::string::npos) << word;
+}
+
+TEST_F(Tools, AnyRecordingBecomesAPage) {
+  const fs::path page = root_ / "page.html";
+  const std::string to_page = " --page " + page.string();
+  const std::vector<std::string> all = {"Followed: 4 of 4 pairs have a pose",
+                                        "by itself",
+                                        "shuttle: ",
+                                        "halves: ",
+                                        "Path from above",
+                                        "Height",
+                                        "Deviation of the position",
+                                        "States over time",
+                                        "What survives each stage",
+                                        "Time of each stage",
+                                        ">calibration<",
+                                        "data:image/jpeg;base64,",
+                                        "stereo_descriptor_vo "};
+  Outcome outcome = run("run_sequence", bag("a").string() + to_page);
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_NE(outcome.out.find(": Followed: 4 of 4 pairs"), std::string::npos) << outcome.out;
+  std::string html = readPage(page);
+  expectWords(html, all);
+  expectWords(html, {"a.bag", "looks along 1.00", "<p>none</p>"});
+  EXPECT_EQ(html.find("ground truth"), std::string::npos);
+
+  const std::string truth = " --ground-truth " + (root_ / "truth.txt").string();
+  outcome =
+      run("run_sequence", sequence_.string() + to_page + truth + " --param motion/seed=2 --poses " + poses().string());
+  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  html = readPage(page);
+  expectWords(html, all);
+  expectWords(html, {"by the ground truth", "visual_odometry/motion/seed", "default 1"});
+  EXPECT_EQ(linesOf(readText(poses())).size(), static_cast<std::size_t>(kPairs));
+
+  expectError(runSequence(truth), "--page");
+  expectError(run("run_sequence", sequence_.string()), "--page");
+  std::ofstream(root_ / "short.txt") << "1 0 0 0 0 1 0 0 0 0 1 0\n";
+  expectError(run("run_sequence", sequence_.string() + to_page + " --ground-truth " + (root_ / "short.txt").string()),
+              "short.txt");
+  expectError(run("run_sequence", sequence_.string() + " --page " + (root_ / "missing" / "page.html").string()),
+              "page.html");
+}
+
+/// Stamps of the truth are its own, and it may know only a part of the drive.
+TEST_F(Tools, AGroundTruthWithStampsIsInterpolated) {
+  const fs::path page = root_ / "page.html", truth = root_ / "truth.tum";
+  std::ofstream(truth) << "# stamp x y z qx qy qz qw\n"
+                       << "1000000000.05 0 0 " << 0.5 * kStep << " 0 0 0 1\n1000000000.25 0 0 " << 2.5 * kStep
+                       << " 0 0 0 1\n";
+  const std::string arguments = bag("a").string() + " --page " + page.string() + " --ground-truth " + truth.string();
+  ASSERT_EQ(run("run_sequence", arguments).exit_code, 0);
+  expectWords(readPage(page), {"by the ground truth", "at the end off by 0.0"});
+  std::ofstream(truth) << "10.0 0 0 0 0 0 0 1\n11.0 0 0 0 0 0 0 1\n";
+  expectError(run("run_sequence", arguments), "no poses at the stamps");
+}
+
+TEST_F(Tools, ThePageOfALostDriveSaysWhere) {
+  for (int side = 0; side < 2; ++side)
+    cv::imwrite(image(side, kPairs - 1).string(), cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
+  cv::imwrite(image(1, kPairs - 2).string(), cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
+  const fs::path page = root_ / "page.html";
+  ASSERT_EQ(run("run_sequence", sequence_.string() + " --page " + page.string()).exit_code, 0);
+  expectWords(readPage(page), {"Interrupted: ", " of 4 pairs have no pose", "LOST", "no figure"});
+}
+
+/// vo_info that was recorded while the odometry ran, in the same bag or in one of its own.
+TEST_F(Tools, ThePageShowsWhatWasReportedLive) {
+  const fs::path live = root_ / "live.bag", page = root_ / "page.html";
+  {
+    rosbag::Bag out(live.string(), rosbag::bagmode::Write);
+    for (int i = 0; i < 3; ++i) {
+      stereo_descriptor_vo::VoInfo info;
+      info.state_id = i == 2 ? stereo_descriptor_vo::VoInfo::LOST : stereo_descriptor_vo::VoInfo::TRACKING;
+      info.latency = 0.02f;
+      info.dropped_pairs = 7;
+      out.write("/stereo/vo_info", ros::Time(1000000000 + i, 0), info);
+    }
+  }
+  ASSERT_EQ(run("run_sequence", bag("a").string() + " --page " + page.string() + " --live " + live.string()).exit_code,
+            0);
+  expectWords(readPage(page), {"while it ran", "2 TRACKING, 1 LOST; 7 pairs dropped"});
+}
+
+TEST_F(Tools, PicturesOfEachPair) {
+  const fs::path pictures = root_ / "pictures";
+  ASSERT_EQ(runSequence("--pictures " + pictures.string()).exit_code, 0);
+  for (int i = 0; i < kPairs; ++i)
+    EXPECT_EQ(cv::imread((pictures / ("00000" + std::to_string(i) + ".jpg")).string()).size(), cv::Size(320, 240));
 }
 
 TEST_F(Tools, PerfectTrajectoryHasNoError) {

@@ -157,7 +157,7 @@ TEST_P(Guises, LoseNothingAndMoveAlike) {
     const double turns = recorded.run.rotation[recordedAt(0)] + recorded.run.rotation[recordedAt(i)];
     const double shifts = recorded.run.translation[recordedAt(0)] + recorded.run.translation[recordedAt(i)];
     const double distance = should.translation().norm();
-    constexpr double kSigmas = 5.0;  // no error may exceed it (docs/troubleshooting.md)
+    constexpr double kSigmas = 5.0;  // no error may exceed it (lab/docs/faults.md)
     bound = kSigmas * std::sqrt(run.translation[i] + shifts + distance * distance * turns);
     EXPECT_LT(error.head<3>().norm(), bound) << "m, after " << way << " m";
     EXPECT_LT(error.tail<3>().norm(), kSigmas * std::sqrt(run.rotation[i] + turns)) << "rad";

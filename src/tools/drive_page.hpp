@@ -1,0 +1,38 @@
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "../check/finding.hpp"
+#include "../config/pipeline_options.hpp"
+#include "drive_pictures.hpp"
+#include "live_record.hpp"
+#include "offline_run.hpp"
+#include "self_check.hpp"
+
+namespace sdvo {
+
+/// All that the page of a drive shows.
+struct DriveReport {
+  std::string name;
+  int left_out = 0;  ///< stamps without a usable pair
+  PipelineOptions options;
+  std::vector<Finding> findings;  ///< of the camera's check
+  cv::Mat rows;                   ///< RowCheck::map()
+  Eigen::Matrix3d R_base_camera;  ///< x ahead, y to the left, z up
+  std::vector<SelfCheck> self_checks;
+  std::vector<DrivePictures::Picture> pictures;
+  std::vector<std::optional<Eigen::Isometry3d>> truth;  ///< of the left camera at each pair; empty: unknown
+  std::optional<LiveRecord> live;
+};
+
+/// The verdict on the drive: whether it was followed, how precisely, and the camera's worst fault.
+Finding judge(const DriveReport& report, const OfflineRun& run);
+
+/// The page of a drive, which needs no other file and has less than 2 MB. Throws std::runtime_error when it cannot be
+/// written.
+void writeDrivePage(const std::string& path, const DriveReport& report, const OfflineRun& run);
+
+}  // namespace sdvo
