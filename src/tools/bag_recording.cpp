@@ -10,7 +10,6 @@
 #include <stdexcept>
 
 #include "../common/stamp_filter.hpp"
-#include "../messages/camera_conversions.hpp"
 #include "../messages/stamps.hpp"
 #include "../ros/pair_decoder.hpp"
 #include "camera_input.hpp"

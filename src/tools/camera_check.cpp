@@ -4,8 +4,6 @@
 
 #include "../check/calibration_check.hpp"
 #include "../common/text.hpp"
-#include "../messages/camera_conversions.hpp"
-#include "../messages/stamps.hpp"
 
 namespace sdvo {
 

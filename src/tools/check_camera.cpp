@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "../common/worker.hpp"
-#include "../ros/pair_decoder.hpp"
 #include "../messages/stamps.hpp"
+#include "../ros/pair_decoder.hpp"
 #include "camera_check.hpp"
 #include "camera_input.hpp"
 #include "check_page.hpp"

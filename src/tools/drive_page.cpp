@@ -215,13 +215,13 @@ std::string figuresSection(const DriveReport& report, const OfflineRun& run) {
   if (frames.front().odometry.stamp > kThisCentury)
     rows.push_back({"first stamp", dateOf(frames.front().odometry.stamp)});
   if (report.left_out > 0) rows.push_back({"stamps without a usable pair", std::to_string(report.left_out)});
-  for (const SelfCheck& check : report.self_checks) rows.push_back({"by itself", check.text()});
+  for (const SelfCheck& check : report.self_checks) rows.push_back({"implied error", check.text()});
   if (const auto errors = errorsOf(report, frames)) {
-    rows.push_back({"by the ground truth",
-                    percent(errors->sub_paths.translation_percent) + " and " +
-                        text(4, errors->sub_paths.rotation_deg_per_m, " deg/m over sub-paths; at the end off by ") +
-                        text(3, errors->final_drift_m, " m (", errors->final_drift_percent, " %) and ",
-                             errors->final_drift_deg, " deg")});
+    rows.push_back(
+        {"true error", percent(errors->sub_paths.translation_percent) + " and " +
+                           text(4, errors->sub_paths.rotation_deg_per_m, " deg/m over sub-paths; at the end off by ") +
+                           text(3, errors->final_drift_m, " m (", errors->final_drift_percent, " %) and ",
+                                errors->final_drift_deg, " deg")});
   }
   if (report.live) {
     const LiveRecord& live = *report.live;
@@ -265,7 +265,7 @@ Finding judge(const DriveReport& report, const OfflineRun& run) {
   if (run.pairsWithoutPose() > 0 || run.discontinuities() > 0) {
     if (verdict.verdict != Verdict::kFail) verdict.verdict = Verdict::kWarn;
     verdict.what = text(0, "Interrupted: ", run.pairsWithoutPose(), " of ", run.pairs(), " pairs have no pose, ",
-                        run.discontinuities(), " motions are unknown");
+                        run.discontinuities(), " discontinuities");
   } else {
     verdict.what =
         text(0, "Followed: ", run.pairs(), " of ", run.pairs(), " pairs have a pose, ", tracking, " are TRACKING");

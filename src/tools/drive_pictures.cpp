@@ -2,8 +2,8 @@
 
 #include "../common/text.hpp"
 #include "../messages/feature_conversions.hpp"
-#include "../ros/features_image.hpp"
 #include "../messages/odometry_conversions.hpp"
+#include "../ros/features_image.hpp"
 
 namespace sdvo {
 
@@ -21,8 +21,9 @@ void DrivePictures::add(const RecordedPair& pair, const StereoFeatures& features
   const bool is_due = spread_ < kSpread && seen_ >= (2 * spread_ + 1) * pairs_ / (2 * kSpread);
   if (is_end || is_due) {
     const double seconds = 1e-9 * static_cast<double>(pair.stamp - first_stamp_);
-    pictures_.push_back({drawLeft(pair, features, result).clone(),
-                         text(1, seconds, " s, ", toString(result.state), is_tracking ? "" : ": ", result.reason)});
+    pictures_.push_back(
+        {drawLeft(pair, features, result).clone(),
+         text(1, seconds, " s, ", toString(result.state), result.reason.empty() ? "" : ": ", result.reason)});
   }
   if (is_end) ++ends_;
   if (is_due) ++spread_;

@@ -6,6 +6,7 @@
 #include <sstream>
 #include <utility>
 
+#include "../common/quantile.hpp"
 #include "../common/text.hpp"
 #include "page.hpp"
 
@@ -119,7 +120,7 @@ std::string areaOf(const Curve& curve, const Curve* below, const Scale& x, const
 std::string plot(const Axes& axes, std::vector<Curve> curves) {
   const bool are_stacked = axes.style == Axes::Style::kStacked, are_equal = axes.style == Axes::Style::kEqualScales;
   Interval x_values, y_values;
-  double least = std::numeric_limits<double>::infinity();  // that is positive
+  std::vector<double> positive;
   for (Curve& curve : curves) {
     const std::size_t count = (curve.x.size() + kMostPoints - 1) / kMostPoints;
     if (count > 1) curve.x = averaged(curve.x, count), curve.y = averaged(curve.y, count);
@@ -129,13 +130,15 @@ std::string plot(const Axes& axes, std::vector<Curve> curves) {
     for (std::size_t i = 0; i < curve.x.size(); ++i) {
       x_values.extend(curve.x[i]);
       y_values.extend(curve.y[i]);
-      if (curve.y[i] > 0.0) least = std::min(least, curve.y[i]);
+      if (curve.y[i] > 0.0) positive.push_back(curve.y[i]);
     }
-  const bool is_logarithmic = axes.style == Axes::Style::kLines && y_values.min >= 0.0 && y_values.max > 1e3 * least;
+  // Of the usual values; rounding leaves much smaller ones.
+  const double least = 0.1 * quantile(positive, 0.1);
+  const bool is_logarithmic = axes.style == Axes::Style::kLines && y_values.min >= 0.0 && y_values.max > 1e4 * least;
   if (is_logarithmic) {
     y_values = {std::floor(std::log10(least)), std::ceil(std::log10(y_values.max))};
     for (Curve& curve : curves)
-      for (double& value : curve.y) value = value > 0.0 ? std::log10(value) : kMissing;
+      for (double& value : curve.y) value = value > least ? std::log10(value) : kMissing;
   } else if (are_equal) {
     equalise(x_values, y_values, kWidth - kLeft - kRight, kHeight - kTop - kBottom);
   } else {

@@ -25,7 +25,7 @@ struct Axes {
 };
 
 /// The curves as HTML that needs no other file: title, legend, and an SVG that is legible from 320 px on. Many points
-/// are averaged. Where values span more than three decades, y is logarithmic and leaves out what is not positive.
+/// are averaged. Where the largest values are a thousand times the usual ones, y is logarithmic.
 std::string plot(const Axes& axes, std::vector<Curve> curves);
 
 /// A bar along the time: the colour of each item from left to right. Where several items share a pixel, the largest of

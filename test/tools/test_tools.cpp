@@ -427,7 +427,7 @@ TEST_F(Tools, PartsOfADriveAreJoined) {
     rosbag::Bag whole(bag("whole").string(), rosbag::bagmode::Read);
     rosbag::Bag out[2];
     for (const int part : {0, 1}) out[part].open(parts[part], rosbag::bagmode::Write);
-    const rosbag::View view(whole);
+    rosbag::View view(whole);
     const ros::Time begin = view.getBeginTime();
     for (const rosbag::MessageInstance& message : view)
       out[message.getTime() > begin + ros::Duration(0.25)].write(message.getTopic(), message.getTime(), message);
@@ -584,7 +584,9 @@ TEST_F(Tools, RecordingsCheckThemselves) {
   // The images of a folder are those of its bag.
   const std::string said = runSequence("--shuttle --halves").out;
   for (const std::string& line : linesOf(outcome.out))
-    if (line.rfind("a: ", 0) == 0) EXPECT_NE(said.find("\n" + line.substr(3) + "\n"), std::string::npos) << said;
+    if (line.rfind("a: ", 0) == 0) {
+      EXPECT_NE(said.find("\n" + line.substr(3) + "\n"), std::string::npos) << said;
+    }
 
   ASSERT_EQ(runBags(a.string()).exit_code, 0);
   EXPECT_FALSE(fs::exists(checks)) << "of another run than the poses beside it";
@@ -731,7 +733,7 @@ TEST_F(Tools, AnyRecordingBecomesAPage) {
   const fs::path page = root_ / "page.html";
   const std::string to_page = " --page " + page.string();
   const std::vector<std::string> all = {"Followed: 4 of 4 pairs have a pose",
-                                        "by itself",
+                                        "implied error",
                                         "shuttle: ",
                                         "halves: ",
                                         "Path from above",
@@ -757,7 +759,7 @@ TEST_F(Tools, AnyRecordingBecomesAPage) {
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   html = readPage(page);
   expectWords(html, all);
-  expectWords(html, {"by the ground truth", "visual_odometry/motion/seed", "default 1"});
+  expectWords(html, {"true error", "visual_odometry/motion/seed", "default 1"});
   EXPECT_EQ(linesOf(readText(poses())).size(), static_cast<std::size_t>(kPairs));
 
   expectError(runSequence(truth), "--page");
@@ -777,7 +779,7 @@ TEST_F(Tools, AGroundTruthWithStampsIsInterpolated) {
                        << " 0 0 0 1\n";
   const std::string arguments = bag("a").string() + " --page " + page.string() + " --ground-truth " + truth.string();
   ASSERT_EQ(run("run_sequence", arguments).exit_code, 0);
-  expectWords(readPage(page), {"by the ground truth", "at the end off by 0.0"});
+  expectWords(readPage(page), {"true error", "at the end off by 0.0"});
   std::ofstream(truth) << "10.0 0 0 0 0 0 0 1\n11.0 0 0 0 0 0 0 1\n";
   expectError(run("run_sequence", arguments), "no poses at the stamps");
 }
