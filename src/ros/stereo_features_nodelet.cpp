@@ -132,10 +132,8 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     if (!report.empty() && throttle_.allows("cameras")) NODELET_WARN_STREAM(report);
     const double now = ros::SteadyTime::now().toSec();
     std::string problem = arrivals_->explainLoss(now);
-    if (problem.empty() && !(problem = arrivals_->explainSilence(now)).empty() && ros::master::getTopics(topics)) {
-      const ArrivalLog::Topics names = input_->subscribedTopics();
-      problem += explainUnpublished({names.begin(), names.end()}, topics);
-    }
+    if (problem.empty() && !(problem = arrivals_->explainSilence(now)).empty() && ros::master::getTopics(topics))
+      problem += explainUnpublished(input_->subscribedTopics(), topics);
     if (!problem.empty() && throttle_.allows("synchronisation")) NODELET_WARN_STREAM(problem);
   }
 
