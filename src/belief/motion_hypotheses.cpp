@@ -1,14 +1,15 @@
 #include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <bitset>
 #include <cmath>
 #include <cstddef>
+#include <limits>
+#include <map>
 #include <set>
 #include <utility>
 
-#include "stereo_descriptor_vo/belief/motion_doubt.hpp"
+#include "../common/statistics.hpp"
 #include "stereo_descriptor_vo/motion/motion_estimator.hpp"
 #include "stereo_descriptor_vo/motion/pose_problem.hpp"
 
@@ -48,6 +49,40 @@ std::vector<int> sorted(std::vector<int> values) {
   return values;
 }
 
+/// Positions in the left image, px, one for each part of it that has any: neighbours are no independent witnesses.
+std::vector<Eigen::Vector2d> byParts(const std::vector<Eigen::Vector2d>& pixels) {
+  std::map<std::pair<int, int>, std::pair<Eigen::Vector2d, int>> parts;
+  for (const Eigen::Vector2d& pixel : pixels) {
+    const Eigen::Array2i part = (pixel / kPart).array().floor().cast<int>();
+    auto& [sum, count] = parts.try_emplace({part.x(), part.y()}, Eigen::Vector2d(0.0, 0.0), 0).first->second;
+    sum += pixel, ++count;
+  }
+  std::vector<Eigen::Vector2d> means;
+  for (const auto& [part, sum] : parts) means.push_back(sum.first / sum.second);
+  return means;
+}
+
+double nearest(const Eigen::Vector2d& pixel, const std::vector<Eigen::Vector2d>& others) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Eigen::Vector2d& other : others)
+    if (&other != &pixel) least = std::min(least, (other - pixel).squaredNorm());
+  return least;
+}
+
+/// Whether some points are those of an object among the others. An object fills a part of the view, so its points have
+/// each other for neighbours. Points that fit another motion because rectification or matching errs lie among the
+/// others. Join counts (Cliff and Ord 1973) against places at random.
+bool isObject(const std::vector<Eigen::Vector2d>& points, const std::vector<Eigen::Vector2d>& others) {
+  const std::vector<Eigen::Vector2d> inside = byParts(points), outside = byParts(others);
+  if (inside.size() < 2) return false;
+  if (outside.empty()) return true;
+  const auto joined = std::count_if(inside.begin(), inside.end(), [&](const Eigen::Vector2d& pixel) {
+    return nearest(pixel, inside) < nearest(pixel, outside);
+  });
+  const double chance = static_cast<double>(inside.size()) / static_cast<double>(inside.size() + outside.size());
+  return binomialTail(static_cast<int>(inside.size()), static_cast<int>(joined), chance) < kTailProbability;
+}
+
 /// The matches that each hypothesis of a pair explains. A match of one hypothesis counts for all of them.
 class Explanations {
  public:
@@ -61,6 +96,7 @@ class Explanations {
         if (!pairs.emplace(match.reference, match.current).second) continue;
         matches.push_back(hypothesis.correspondences[i]);
         sightings_.push_back(hypothesis.sightingsOf(static_cast<int>(i)));
+        pixels_.push_back(hypothesis.correspondences[i].measurement.head<2>());
       }
     const PoseProblem problem(scene.features.camera, matches, threshold);
     for (const MotionHypothesis& hypothesis : hypotheses) {
@@ -71,17 +107,20 @@ class Explanations {
   }
 
   /// Logarithm of how many times likelier one hypothesis is than another one, by prior and by the points that they do
-  /// not agree on.
+  /// not agree on. Those of an object move together; those that lie among each other err one by one.
   double logRatio(std::size_t a, std::size_t b) const {
     double of_a = 0.0, of_b = 0.0;
-    int points = 0;
+    std::vector<Eigen::Vector2d> only_a, only_b;
     for (std::size_t i = 0; i < sightings_.size(); ++i) {
       if (explained_[a][i] == explained_[b][i]) continue;
       (explained_[a][i] ? of_a : of_b) += sightings_[i];
-      ++points;
+      (explained_[a][i] ? only_a : only_b).push_back(pixels_[i]);
     }
-    return logPrior(hypotheses_[a]) - logPrior(hypotheses_[b]) + logLikelihood(of_b, points) -
-           logLikelihood(of_a, points);
+    const int points = static_cast<int>(only_a.size() + only_b.size());
+    const bool is_object = isObject(only_a, only_b) || isObject(only_b, only_a);
+    const double images =
+        is_object ? logLikelihood(of_b, points) - logLikelihood(of_a, points) : kLogOddsOfSighting * (of_a - of_b);
+    return logPrior(hypotheses_[a]) - logPrior(hypotheses_[b]) + images;
   }
 
   std::size_t likeliest() const {
@@ -94,6 +133,7 @@ class Explanations {
  private:
   const std::vector<MotionHypothesis>& hypotheses_;
   std::vector<double> sightings_;             ///< of each match
+  std::vector<Eigen::Vector2d> pixels_;       ///< of each match
   std::vector<std::vector<bool>> explained_;  ///< by each hypothesis
 };
 
@@ -217,13 +257,6 @@ bool isTolerable(const MotionScene& scene, const Eigen::Isometry3d& motion, cons
          logSO3(apart.linear()).norm() <= kAngle + kTolerableRatio * logSO3(motion.linear()).norm();
 }
 
-double logBayesFactor(const Vector6d& measured, const Matrix6d& information, const Matrix6d& covariance) {
-  // With A = I + H P the measurement's variance is H^-1 + P = A^T H^-1, so its inverse is H A^-T = A^-1 H.
-  const Eigen::PartialPivLU<Matrix6d> factor(Matrix6d::Identity() + information * covariance);
-  const Vector6d weighted = information * measured;
-  return 0.5 * (measured.dot(weighted) - measured.dot(factor.solve(weighted)) - std::log(factor.determinant()));
-}
-
 double logFalseAlarms(int matches, int inliers, double chance) {
   constexpr int kSample = 3;
   if (inliers <= kSample) return 0.0;
@@ -254,18 +287,19 @@ double logLikelihood(double of_others, int points) {
   return -effectiveNumber(points) * kLogOddsOfSighting * of_others / points;
 }
 
-double logOddsMisled(const MotionScene& scene, const MotionHypothesis& hypothesis) {
+double logAgreement(const MotionScene& scene, const MotionHypothesis& hypothesis) {
   const Agreement& agreement = hypothesis.agreement;
-  double confirmed = 0.0;
-  if (agreement.lasting_matches > 0) {
-    // Agreement with the camera's motion against agreement with one of something that moves.
-    const double by_chance = probabilityOf(-kLogOddsOfSighting * MotionHypothesis::kLastingSightings);
-    const double usual = std::max(scene.usual_agreement, 0.5);
-    const double ratio = static_cast<double>(agreement.lasting_inliers) / agreement.lasting_matches;
-    confirmed = effectiveNumber(agreement.lasting_matches) *
-                (ratio * std::log(usual / by_chance) + (1.0 - ratio) * std::log((1.0 - usual) / (1.0 - by_chance)));
-  }
-  return CarriedDoubt::kUnsuspected - logPrior(hypothesis) - confirmed;
+  if (agreement.lasting_matches == 0) return 0.0;
+  // Agreement with the camera's motion against agreement with one of something that moves.
+  const double by_chance = probabilityOf(-kLogOddsOfSighting * MotionHypothesis::kLastingSightings);
+  const double usual = std::max(scene.usual_agreement, 0.5);
+  const double ratio = static_cast<double>(agreement.lasting_inliers) / agreement.lasting_matches;
+  return effectiveNumber(agreement.lasting_matches) *
+         (ratio * std::log(usual / by_chance) + (1.0 - ratio) * std::log((1.0 - usual) / (1.0 - by_chance)));
+}
+
+double logOddsMisled(const MotionScene& scene, const MotionHypothesis& hypothesis) {
+  return kUnsuspected - logPrior(hypothesis) - logAgreement(scene, hypothesis);
 }
 
 MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::vector<MotionHypothesis> hypotheses) {

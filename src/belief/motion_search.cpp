@@ -8,7 +8,6 @@
 #include <string>
 #include <utility>
 
-#include "stereo_descriptor_vo/belief/motion_doubt.hpp"
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
 #include "stereo_descriptor_vo/matching/view_matcher.hpp"
 #include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
@@ -236,8 +235,8 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene
   const Vector6d difference = logSE3(T_lasting * T.inverse());
   const Matrix6d information = equations.hessian / equations.variance();
   const double log_factor =
-      logBayesFactor(difference, information / scene.noise.shared(), scene.prior.front().covariance);
-  if (CarriedDoubt::kUnsuspected + log_factor > 0.0) return T_lasting;
+      logBayesFactor<6>(difference, information / scene.noise.shared(), scene.prior.front().covariance);
+  if (kUnsuspected + log_factor > 0.0) return T_lasting;
   found.lasting_square = difference.dot(information * difference);
   return std::nullopt;
 }

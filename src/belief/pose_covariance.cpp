@@ -51,6 +51,18 @@ bool widen(Matrix6d& covariance, const Vector6d& deviation) {
   return square > noiseGate(6);
 }
 
+Matrix6d PoseCovariance::byCalibration(const CalibrationEstimate& known) const {
+  const RigCalibration::MotionJacobian derivative = exposure_.leftCols<RigCalibration::kParameters>();
+  const Vector6d deviation = derivative * known.mean + exposure_.rightCols<1>();
+  return derivative * known.covariance * derivative.transpose() + deviation * deviation.transpose();
+}
+
+void PoseCovariance::expose(const RigCalibration::MotionJacobian& since_keyframe, const RigCalibration& compensated) {
+  exposure_ = keyframe_exposure_;
+  exposure_.leftCols<RigCalibration::kParameters>() += since_keyframe;
+  exposure_.rightCols<1>() -= since_keyframe * compensated.value;
+}
+
 void PoseCovariance::cover(const Vector6d& correction) {
   const Matrix6d before = value_;
   widen(value_, correction);
@@ -58,14 +70,12 @@ void PoseCovariance::cover(const Vector6d& correction) {
 }
 
 void PoseCovariance::restart(const Matrix6d& travelled) {
-  value_ += discontinuity() + travelled;
-  unmeasured_.setZero();
-  markKeyframe();
+  assume(value_ + discontinuity() + travelled);
 }
 
 void PoseCovariance::markKeyframe() {
-  keyframe_ = value_;
-  predicted_.setZero();
+  keyframe_ = value_ - predicted_;
+  keyframe_exposure_ = exposure_;
   since_keyframe_.reset();
 }
 
@@ -73,6 +83,8 @@ void PoseCovariance::carry(const Eigen::Isometry3d& T_previous_current) {
   for (Matrix6d* covariance : {&value_, &keyframe_, &predicted_, &unmeasured_})
     *covariance = carriedBy(T_previous_current, *covariance);
   if (since_keyframe_) since_keyframe_ = carriedBy(T_previous_current, *since_keyframe_);
+  for (Exposure* exposure : {&exposure_, &keyframe_exposure_})
+    *exposure = adjoint(T_previous_current.inverse()) * *exposure;
 }
 
 void PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance) {
@@ -94,9 +106,10 @@ Matrix6d PoseCovariance::measure(const Eigen::Isometry3d& T_previous_current, co
   return motion;
 }
 
-void PoseCovariance::doubt(const Matrix6d& covariance) {
-  value_ += covariance;
-  unmeasured_ += covariance;
+void PoseCovariance::doubt(const Matrix6d& motion, const Matrix6d& pose) {
+  value_ += pose;
+  predicted_ += pose;
+  unmeasured_ += motion;
 }
 
 }  // namespace sdvo

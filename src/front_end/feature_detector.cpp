@@ -157,8 +157,8 @@ constexpr auto isStronger = [](const Corner& a, const Corner& b) {
 }  // namespace
 
 int largestCount(cv::Size size, const FeatureDetectorOptions& options) {
-  // MH_01_half at half size (188x120 px): with 133 corners nine pairs of 150 are not TRACKING, with 600 none is.
-  constexpr int kEnough = 600;  // corners
+  // MH_01_half at half size (188x120 px): with 133 corners nine pairs of 150 are not TRACKING, with 400 none is.
+  constexpr int kEnough = 400;  // corners
   if (options.area_per_feature == 0) return options.max_features;
   return std::min(options.max_features, std::max(kEnough, size.area() / options.area_per_feature));
 }

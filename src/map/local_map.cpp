@@ -433,6 +433,8 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   adjustment.since_keyframe = motion(newest - 1, newest);
   const Matrix6d carried = adjoint(window.T_camera_origin[newest] * window.T_camera_origin[newest - 1].inverse());
   adjustment.growth = positivePart(motion(0, newest) - carried * motion(0, newest - 1) * carried.transpose());
+  adjustment.by_calibration = -solution.pose_by_calibration.topRows<6>();
+  if (poses.size() > 1) adjustment.by_calibration += carried * solution.pose_by_calibration.bottomRows<6>();
   calibration = window.calibration;
   for (std::size_t f = 0; f < frames_.size(); ++f)
     frames_[f].T_camera_origin = orthonormalised(window.T_camera_origin[f]);

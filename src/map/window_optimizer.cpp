@@ -157,7 +157,9 @@ class Solver {
     units_.bottomRightCorner<kCalibration, kCalibration>().setIdentity();
     solved_ = factor_.solve(units_);
     const RigCalibration::Matrix of_calibration = solved_.bottomRightCorner<kCalibration, kCalibration>();
-    solution.calibration_information = (of_calibration.inverse() - certain) / bread;
+    const RigCalibration::Matrix certainty = of_calibration.inverse();
+    solution.calibration_information = (certainty - certain) / bread;
+    solution.pose_by_calibration = units_.leftCols(asked).transpose() * solved_.rightCols<kCalibration>() * certainty;
 
     const auto of_poses = solved_.leftCols(asked);
     const Eigen::MatrixXd of_known = of_poses.transpose() * known_.selfadjointView<Eigen::Lower>() * of_poses;

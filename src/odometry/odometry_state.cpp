@@ -40,8 +40,10 @@ void reportRig(const LearntRig& rig, OdometryResult& result) {
     result.right_delay = delay->value, result.right_delay_sigma = delay->sigma;
   if (const auto rolling = rig.readout.estimate())
     result.readout = rolling->value, result.readout_sigma = rolling->sigma;
-  result.right_rotation = rig.right_rotation.rotation();
-  result.right_rotation_sigma = rig.right_rotation.sigma();
+  if (const auto rotation = rig.usual_rows.rotation()) {
+    result.right_rotation = rotation->value;
+    result.right_rotation_sigma = rotation->covariance.diagonal().cwiseSqrt();
+  }
 }
 
 }  // namespace
@@ -81,7 +83,7 @@ OdometryResult OdometryState::report(const StereoFeatures& features, const std::
   if (step.hasPose()) {
     result.has_pose = true;
     result.T_origin_camera = T_origin_camera;
-    result.pose_covariance = covariance.value();
+    result.pose_covariance = covariance.value() + covariance.byCalibration(rig.calibration.estimate());
     const double drift = rig.right_delay.drift();
     result.pose_covariance.topLeftCorner<3, 3>() += drift * drift * Eigen::Matrix3d::Identity();
     if (known_floor && floor.isOnFloor())

@@ -35,7 +35,8 @@ OdometryStep startMap(const VisualOdometryOptions& options, const StereoFeatures
     state.covariance.assume(state.covariance.value());
   } else if (state.started) {
     ++state.epoch;
-    const double unseen = std::max(0.0, static_cast<double>(features.stamp - state.last_pose_stamp) * 1e-9);
+    const std::int64_t last = state.last_pose_stamp.value_or(features.stamp);
+    const double unseen = static_cast<double>(features.stamp - last) * 1e-9;
     state.covariance.restart(state.prior.unseen(unseen));
     step.state = TrackingState::kDegraded;
     step.reason = "started again from the last pose; the motion in between is unknown";

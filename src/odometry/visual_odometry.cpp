@@ -22,13 +22,15 @@ Eigen::Isometry3d lookingAhead() {
 }
 
 /// Of the motion's inliers over the last `dt` s, as the motion has them: corners have more noise.
-std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHypothesis& found, double dt) {
+std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHypothesis& found, double dt,
+                                  const RowPattern& usual) {
   std::vector<RowMotion> rows;
   rows.reserve(found.motion.inliers.size());
   for (const int i : found.motion.inliers) {
     const auto [reference, current, distance] = found.matches[static_cast<std::size_t>(i)];
     const Eigen::Vector3d now = found.motion.T_current_reference * found.view->points.positions[reference];
-    rows.push_back({(features.camera.project(now).y() - found.view->pixels[reference].y) / dt, features.dv[current]});
+    rows.push_back(
+        {(features.camera.project(now).y() - found.view->pixels[reference].y) / dt, usual.change(features, current)});
   }
   return rows;
 }
@@ -65,6 +67,7 @@ void VisualOdometry::forgetTime() {
   breakStream();
   state_.map.reset();  // how long ago it was seen is unknown
   state_.last_stamp.reset();
+  state_.last_pose_stamp.reset();
   state_.prior.forget();
 }
 
@@ -82,6 +85,7 @@ void VisualOdometry::mountAt(const Eigen::Isometry3d& T_base_camera) {
 
 void VisualOdometry::takePose(const Matrix6d& covariance) {
   state_.covariance.assume(covariance);
+  state_.rig.right_delay.forgetDrift();
   ++state_.epoch;
   if (!state_.interrupted) return;
   state_.map.reset();
@@ -92,26 +96,28 @@ OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::op
   refuse(given);
   const Pair pair = usable(given, guess);
   const StereoFeatures& features = pair.features();
-  const std::optional<MotionScene> scene = !pair.continued || pair.frozen ? std::nullopt
-                                           : state_.interrupted           ? reacquire(features)
-                                                                : std::optional(sceneOf(features, pair.dt, guess));
+  const std::optional<MotionScene> scene = pair.is == Pair::kFollowed ? std::optional(sceneOf(features, pair.dt, guess))
+                                           : pair.is == Pair::kSought ? reacquire(features)
+                                                                      : std::nullopt;
   MotionHypothesis found;
   if (scene) found = search_.find(*scene, largestDoubt());
 
   // Nothing has changed so far, and from here on nothing is refused.
   Stopwatch stopwatch;
   begin(pair, guess);
-  watchShutters(pair, found);
+  const std::optional<MeasuredPair> measured = measuredPair(pair, found);
+  const std::vector<Evidence> evidence = evidenceAgainst(pair, found, measured);
   Step step;
-  if (!pair.continued || (state_.interrupted && !found.motion.success))
-    step = startMap(options_, features, state_);
-  else if (pair.frozen)
-    step = holdPose(pair.dt, state_);
-  else if (!found.motion.success)
-    step = predictMotion(options_, features, pair.dt, found.motion.reason, state_);
-  else
-    step = extendMap(features, *scene, found, pair.dt);
-  finish(pair, scene ? &found : nullptr, step);
+  if (found.motion.success) {
+    step = extendMap(features, *scene, found, pair.dt, evidence);
+  } else {
+    state_.doubt.raise(evidence);
+    if (pair.is == Pair::kFrozen) step = holdPose(pair.dt, state_);
+    if (pair.is == Pair::kFollowed) step = predictMotion(options_, features, pair.dt, found.motion.reason, state_);
+    if (pair.is == Pair::kFirst || pair.is == Pair::kSought) step = startMap(options_, features, state_);
+  }
+  state_.rig.learn(features, measured ? &*measured : nullptr, found, step.state == TrackingState::kTracking && scene);
+  finish(pair, step);
   step.time = stopwatch.lap();
   return state_.report(features, pair.new_rows, found, step, floor());
 }
@@ -130,28 +136,48 @@ VisualOdometry::Pair VisualOdometry::usable(const StereoFeatures& given,
   // A lens that focuses changes the camera with every pair; the pixels of one map are those of one camera.
   if (state_.camera && *state_.camera != given.camera && state_.camera->isLike(given.camera))
     pair.refocused = given.seenBy(*state_.camera);
-  pair.new_rows = state_.images.newRows(pair.whole());
+  if (state_.last_stamp) pair.dt = static_cast<double>(given.stamp - *state_.last_stamp) * 1e-9;
+  const std::optional<Eigen::Isometry3d> expected = expectedMotion(pair.dt, guess);
+  pair.new_rows = state_.images.newRows(pair.whole(), state_.rig.noise.sameMotion(), expected);
   if (static_cast<int>(pair.new_rows.size()) < given.count()) pair.new_part = pair.whole().select(pair.new_rows);
   const StereoFeatures& taken = pair.taken();
-  if (state_.last_stamp) pair.dt = static_cast<double>(taken.stamp - *state_.last_stamp) * 1e-9;
-  pair.continued = state_.map && state_.map->continuedBy(taken);
-  pair.frozen = !state_.interrupted && isFrozen(taken, pair.dt, guess);
-  if (pair.continued && !pair.frozen) pair.in_step = inStep(taken, pair.dt, guess);
+  if (!state_.map || !state_.map->continuedBy(taken))
+    pair.is = Pair::kFirst;
+  else if (state_.interrupted)
+    pair.is = Pair::kSought;
+  else if (isFrozen(taken, pair.dt, guess))
+    pair.is = Pair::kFrozen;
+  else
+    pair.is = Pair::kFollowed;
+  if (pair.is == Pair::kFollowed || pair.is == Pair::kSought) pair.in_step = inStep(taken, pair.dt, guess);
   return pair;
 }
 
-/// A camera that repeats its images seems to stand. The guess, or the motion before, shows whether it does.
+/// Over the `dt` s since the pair before: that of another source, else that of the velocity.
+std::optional<Eigen::Isometry3d> VisualOdometry::expectedMotion(double dt,
+                                                                const std::optional<MotionGuess>& guess) const {
+  if (guess) return guess->motion(state_.prior, dt);
+  if (state_.interrupted || !state_.prior.velocity() || dt > options_.tracking.max_gap) return std::nullopt;
+  return state_.prior.predicted(dt).motion;
+}
+
+/// A camera that repeats its images seems to stand. The guess, or the motion before, shows whether it does. A robot may
+/// stop from one pair to the next if the prior allows that; the first repeated pair decides.
 bool VisualOdometry::isFrozen(const StereoFeatures& features, double dt,
                               const std::optional<MotionGuess>& guess) const {
-  const auto areFrozen = [&](const std::optional<Eigen::Isometry3d>& T_previous_current, bool is_measured) {
-    return state_.images.areFrozen(features, state_.rig.noise.sameMotion(), T_previous_current, is_measured);
+  if (!state_.images.repeat(features)) return false;
+  const auto moved = [&](const Eigen::Isometry3d& T_previous_current) {
+    return RepeatedImages::shouldHaveMoved(features, state_.rig.noise.sameMotion(), T_previous_current);
   };
-  if (guess && !guess->rotation_only) return areFrozen(guess->T_previous_current, true);
+  if (guess && !guess->rotation_only) return moved(guess->T_previous_current);
+  if (state_.frozen) return true;
   Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
   if (guess) turn.linear() = guess->T_previous_current.linear();
-  std::optional<Eigen::Isometry3d> predicted;
-  if (state_.prior.velocity()) predicted = state_.prior.predicted(dt).motion;
-  return areFrozen(turn, true) || areFrozen(predicted, false);
+  if (moved(turn)) return true;
+  const auto expected = expectedMotion(dt, std::nullopt);
+  const auto prior = state_.prior.confirmed(*state_.last_stamp, dt);
+  return expected && prior && moved(*expected) &&
+         prior->normalisedSquare(Eigen::Isometry3d::Identity(), Matrix6d::Zero()) > noiseGate(6);
 }
 
 /// The map, the pair, and the motion between them as it is expected: what was already covered by predicted pairs, and
@@ -166,7 +192,7 @@ MotionScene VisualOdometry::sceneOf(const StereoFeatures& features, double dt,
                     {},
                     {},
                     state_.rig.usual_agreement,
-                    state_.motion_doubt.lasts(),
+                    state_.doubt.lasts(),
                     state_.doubt.logOdds() > largestDoubt(),
                     options_.tracking.doubtful_deviation,
                     state_.rig.noise};
@@ -196,21 +222,36 @@ std::optional<StereoFeatures> VisualOdometry::inStep(const StereoFeatures& taken
       taken, dt, logSE3(found.motion.T_current_reference.inverse()) / state_.secondsSinceMap(taken));
 }
 
-/// Whether all rows of both images are of one moment, and the pairs in their order.
-void VisualOdometry::watchShutters(const Pair& pair, const MotionHypothesis& found) {
-  LearntRig& rig = state_.rig;
+/// The pair with the motion that the search found; nothing without one, and none that spans an outage.
+std::optional<MeasuredPair> VisualOdometry::measuredPair(const Pair& pair, const MotionHypothesis& found) const {
+  if (!found.motion.success || state_.interrupted || !(pair.dt > 0.0)) return std::nullopt;
   const StereoFeatures& taken = pair.taken();
-  if (!found.motion.success || state_.interrupted || !(pair.dt > 0.0)) return rig.right_delay.interrupt();
   const double since = state_.secondsSinceMap(taken);
-  const Eigen::Isometry3d T_reference_current = found.motion.T_current_reference.inverse();
-  const Vector6d velocity = logSE3(T_reference_current) / since;
-  rig.readout.add(taken.camera, found.motion.T_current_reference, found.correspondences, found.motion.inliers,
-                  velocity);
-  rig.right_delay.measure(taken, rowMotions(taken, found, since), pair.dt, velocity);
-  state_.doubt.raise(CarriedDoubt::kUnsuspected + state_.prior.logRatioOfSwap(T_reference_current, since),
-                     "neighbouring pairs seemed to have changed places");
+  return MeasuredPair{taken, pair.dt, found.motion.T_current_reference, since,
+                      rowMotions(taken, found, since, state_.rig.usual_rows)};
+}
+
+/// What the pair shows of causes that would mislead its motion. It decides nothing.
+std::vector<Evidence> VisualOdometry::evidenceAgainst(const Pair& pair, const MotionHypothesis& found,
+                                                      const std::optional<MeasuredPair>& measured) {
+  LearntRig& rig = state_.rig;
+  // The map is of another rig than this pair.
+  std::vector<Evidence> evidence{{rig.logOddsOfTurn(pair.features()), "the right camera seems to have turned"}};
+  if (pair.features().report.refused) evidence.push_back({kCertain, "left and right did not belong together"});
+  // Unless the camera went unseen, the views may not be of one rigid world, and the next map would be as wrong.
+  if (pair.is == Pair::kFollowed && !found.motion.success && found.agreement.matches >= kManyMatches &&
+      pair.dt <= options_.tracking.max_gap)
+    evidence.push_back({kCertain, "many matches agreed on no motion"});
+  if (!measured) return evidence;
+  rig.readout.add(measured->features.camera, measured->T_current_reference, found.correspondences, found.motion.inliers,
+                  measured->velocity());
+  rig.right_delay.watch(measured->rows, pair.dt, options_.noise.corner * rig.noise.scale());
   const RightCameraDelay::Partner partner = rig.right_delay.partner(pair.dt);
-  state_.doubt.raise(partner.log_odds, partner.words());
+  evidence.push_back({partner.log_odds, partner.words()});
+  evidence.push_back(
+      {kUnsuspected + state_.prior.logRatioOfSwap(measured->T_current_reference.inverse(), measured->since_reference),
+       "neighbouring pairs seemed to have changed places"});
+  return evidence;
 }
 
 /// Log-odds of being misled above which a motion is doubtful.
@@ -237,29 +278,21 @@ void VisualOdometry::begin(const Pair& pair, const std::optional<MotionGuess>& g
   ++state_.pairs;
   if (pair.dt <= options_.tracking.max_gap) state_.prior.pass(pair.dt);
   state_.outage.pass(pair.dt, guess, state_.prior);
-  // The map is of another rig than this pair.
-  const double turned = state_.rig.right_rotation.add(features);
-  state_.doubt.raise(CarriedDoubt::kUnsuspected + 0.5 * turned * turned, "the right camera seems to have turned");
-  if (features.report.refused) {
-    // What the pairs before told of the rig may be wrong already, and those after may be refused again.
-    state_.rig.calibration = CalibrationFilter(options_.calibration);
-    state_.doubt.raise(CarriedDoubt::kCertain, "left and right did not belong together");
-  }
+  // What the pairs before told of the rig may be wrong already, and those after may be refused again.
+  if (features.report.refused) state_.rig.calibration = CalibrationFilter(options_.calibration);
 }
 
-/// Takes note of what became of the pair. `found`: the motion that was searched.
-void VisualOdometry::finish(const Pair& pair, const MotionHypothesis* found, Step& step) {
+/// Takes note of what became of the pair.
+void VisualOdometry::finish(const Pair& pair, Step& step) {
   const StereoFeatures& features = pair.features();
-  // Unless the camera went unseen, the views may not be of one rigid world, and the next map would be as wrong.
-  if (found && !found->motion.success && found->agreement.matches >= kManyMatches &&
-      pair.dt <= options_.tracking.max_gap)
-    state_.doubt.raise(CarriedDoubt::kCertain, "many matches agreed on no motion");
   // The depths of its points may be those of a wrong rig.
   if (features.report.refused && step.state == TrackingState::kLost) state_.map.reset();
-  state_.doubt.pass(), state_.motion_doubt.pass();
-  state_.images.remember(pair.whole(), pair.frozen);
+  state_.doubt.pass();
+  state_.images.remember(pair.whole());
+  state_.frozen = pair.is == Pair::kFrozen;
   if (pair.new_part && step.reason.empty()) step.reason = "a part of the left image repeats that of the previous pair";
-  step.dt = step.T_previous_current ? static_cast<double>(features.stamp - state_.last_pose_stamp) * 1e-9 : pair.dt;
+  const bool since_pose = step.T_previous_current && state_.last_pose_stamp;
+  step.dt = since_pose ? static_cast<double>(features.stamp - *state_.last_pose_stamp) * 1e-9 : pair.dt;
   if (step.T_previous_current) state_.move(*step.T_previous_current);
   if (!step.hasPose()) return;
   state_.last_pose_stamp = features.stamp;
@@ -268,8 +301,10 @@ void VisualOdometry::finish(const Pair& pair, const MotionHypothesis* found, Ste
 
 /// The pair joins the map unless the adjustment refutes its motion.
 VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, const MotionScene& scene,
-                                               MotionHypothesis& found, double dt) {
+                                               MotionHypothesis& found, double dt,
+                                               const std::vector<Evidence>& evidence) {
   const auto refute = [&](const std::string& why) {
+    state_.doubt.raise(evidence);
     return state_.interrupted ? startMap(options_, features, state_)
                               : predictMotion(options_, features, dt, why, state_);
   };
@@ -285,16 +320,14 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   if (refutation.empty()) refutation = state_.prior.tooFast(candidate.motion, found.motion.covariance, since);
   if (!refutation.empty()) return refute(refutation + " after the adjustment");
 
-  const MotionDoubt doubt(scene, found, state_.doubt);
-  for (CarriedDoubt* carried : {&state_.doubt, &state_.motion_doubt}) carried->raise(doubt.log_odds, doubt.cause);
-  commit(candidate, doubt.probability);
+  const Belief belief = state_.doubt.weigh(scene, found, evidence);
+  commit(candidate, belief.probability);
   Step step = measure(found, candidate);
   const Matrix6d measured = step.covariance;
-  judge(scene, found, candidate, doubt, step);
+  judge(scene, found, candidate, belief, step);
   const bool is_confirmed = step.state == TrackingState::kTracking;
-  if (is_confirmed) state_.rig.learn(found);
   // A motion that is likely something else's predicts nothing.
-  if (doubt.probability >= 0.5)
+  if (belief.probability >= 0.5)
     state_.prior.measure(features.stamp, found.motion.T_current_reference.inverse(), since, measured, is_confirmed,
                          step.covariance - measured);
   if (options_.planar.planar) {
@@ -312,7 +345,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
 /// Adjusts the map with the pair, which may refute most of what was inliers by corners. Then all hypotheses compete.
 VisualOdometry::Candidate VisualOdometry::adjustBeyondDoubt(const StereoFeatures& features, const MotionScene& scene,
                                                             MotionHypothesis& found) {
-  const bool is_sound = MotionDoubt(scene, found, state_.doubt).probability >= options_.tracking.probability;
+  const bool is_sound = !state_.doubt.lasts();
   const bool was_beyond_doubt = search_.isBeyondDoubt(scene, found, largestDoubt());
   Candidate candidate = adjust(features, found, is_sound);
   found.reject(candidate.adjustment.rejected);
@@ -355,30 +388,32 @@ VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features,
 
 /// Doubtful is a motion that is the camera's with too small a probability, or that has too large a covariance.
 void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& found, const Candidate& candidate,
-                           const MotionDoubt& doubt, Step& step) {
-  std::string reason = step.reason;
-  Matrix6d covariance = candidate.adjustment.since_keyframe + step.correction * step.correction.transpose();
-  const auto add = [&](const Matrix6d& moment) { step.covariance += moment, state_.covariance.doubt(moment); };
-  add(found.rivals_moment);
+                           const Belief& belief, Step& step) {
+  const auto add = [&](const Matrix6d& motion, const Matrix6d& pose) {
+    step.covariance += motion;
+    state_.covariance.doubt(motion, pose);
+  };
+  add(found.rivals_moment, found.rivals_moment);
+  Matrix6d covariance = candidate.adjustment.since_keyframe;
+  std::string reason;
   if (found.innovation > noiseGate(6)) {
-    // The stamps may be wrong, or the camera did what none does; points cannot tell.
+    // The stamps may be wrong, or the camera did what none does. The pose does not rest on stamps, but the velocity
+    // does.
     const Vector6d innovation = scene.prior.front().innovation(found.motion.T_current_reference.inverse());
     covariance += innovation * innovation.transpose();
-    step.covariance += innovation * innovation.transpose();
+    add(innovation * innovation.transpose(), Matrix6d::Zero());
     reason = innovationWords(found);
   }
-  if (doubt.probability < options_.tracking.probability) {
-    add(doubt.moment);
-    reason = doubt.reason;
+  if (belief.probability < options_.tracking.probability) {
+    add(belief.moment, belief.pose_moment);
+    reason = belief.reason;
   } else {
     const double deviation = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
     if (deviation <= options_.tracking.doubtful_deviation + kTolerableRatio * candidate.distance) return;
-    if (reason.empty()) {
-      std::ostringstream words;
-      words << "a distance of " << candidate.distance << " m with a standard deviation of " << deviation
-            << " m exceeds tracking/doubtful_deviation";
-      reason = words.str();
-    }
+    std::ostringstream words;
+    words << "a distance of " << candidate.distance << " m with a standard deviation of " << deviation
+          << " m exceeds tracking/doubtful_deviation";
+    if (reason.empty()) reason = words.str();
   }
   step.state = TrackingState::kDegraded;
   step.reason = "doubtful: " + reason;
@@ -387,7 +422,7 @@ void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& fou
 void VisualOdometry::commit(const Candidate& candidate, double probability) {
   std::swap(state_.map, state_.candidate);
   // In doubt, what is followed agrees with itself whatever it is.
-  if (probability < options_.tracking.probability || state_.motion_doubt.lasts()) state_.map->discountNewest();
+  if (probability < options_.tracking.probability) state_.map->discountNewest();
   const LocalMap::Adjustment& adjustment = candidate.adjustment;
   if (!adjustment.success) return;
   state_.rig.calibration.note(state_.map->oldestId(), state_.map->newestId(), candidate.calibration,
@@ -410,6 +445,7 @@ VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, cons
   }
   step.covariance = state_.covariance.measure(*step.T_previous_current, candidate.adjustment.since_keyframe,
                                               candidate.adjustment.growth);
+  state_.covariance.expose(candidate.adjustment.by_calibration, candidate.calibration);
   // The motion between two reported poses contains what the map has learnt of the first one meanwhile: a perturbation
   // of the key frame before, then of the newest pair.
   step.correction = adjoint(map.newestPose() * map.poseBeforeNewest().inverse()) *

@@ -79,11 +79,18 @@ void CalibrationFilter::note(int oldest_id, int newest_id, const RigCalibration&
   if (!pending_) pending_ = {newest_id, {information, present_->information_mean - past_.information_mean}};
 }
 
+CalibrationEstimate CalibrationFilter::estimate() const {
+  const RigCalibration::Vector prior(options_.prior_offset, options_.prior_bend);
+  if (!options_.enabled) return {prior, RigCalibration::Matrix::Zero()};
+  const RigCalibration::Matrix of_prior = informationOf(RigCalibration::Vector::Constant(options_.prior_sigma));
+  const Evidence known = present_.value_or(Evidence());
+  const RigCalibration::Matrix covariance = (of_prior + known.information).inverse();
+  return {covariance * (of_prior * prior + known.information_mean), covariance / (options_.trust * options_.trust)};
+}
+
 RigCalibration::Vector CalibrationFilter::sigma() const {
   if (!present_ || !options_.enabled) return RigCalibration::Vector::Constant(std::numeric_limits<double>::quiet_NaN());
-  const RigCalibration::Vector prior_sigma = RigCalibration::Vector::Constant(options_.prior_sigma);
-  const RigCalibration::Matrix covariance = (informationOf(prior_sigma) + present_->information).inverse();
-  return covariance.diagonal().cwiseSqrt() / options_.trust;
+  return estimate().covariance.diagonal().cwiseSqrt();
 }
 
 }  // namespace sdvo

@@ -16,37 +16,50 @@ double entropyOf(int some, int all) {
   return nats(some) + nats(all - some);
 }
 
-}  // namespace
-
-bool RepeatedImages::areFrozen(const StereoFeatures& features, double noise,
-                               const std::optional<Eigen::Isometry3d>& T_previous_current, bool is_measured) const {
-  if (features.count() == 0 || features_[0] != features.u || features_[1] != features.v ||
-      features_[2] != features.disparity)
-    return false;
-  if (!is_measured && frozen_) return true;
-  if (!T_previous_current) return false;
-  const Eigen::Isometry3d T_current_previous = T_previous_current->inverse();
-  int moved = 0;
+/// Rows of the features that a motion would have moved by more than `noise`, px.
+std::vector<bool> movedBy(const Eigen::Isometry3d& T_previous_current, const StereoFeatures& features, double noise) {
+  const Eigen::Isometry3d T_current_previous = T_previous_current.inverse();
+  std::vector<bool> moved(features.u.size());
   for (int i = 0; i < features.count(); ++i) {
-    const Eigen::Vector3d point = features.camera.backProject(features.u[i], features.v[i], features.disparity[i]);
-    const Eigen::Vector3d now = features.camera.project(T_current_previous * point);
-    moved += std::hypot(now.x() - features.u[i], now.y() - features.v[i]) > noise;
+    const Eigen::Vector3d now = features.camera.project(T_current_previous * features.point(i));
+    moved[static_cast<std::size_t>(i)] = std::hypot(now.x() - features.u[i], now.y() - features.v[i]) > noise;
   }
-  return 2 * moved > features.count();
+  return moved;
 }
 
-std::vector<int> RepeatedImages::newRows(const StereoFeatures& features) const {
+}  // namespace
+
+bool RepeatedImages::repeat(const StereoFeatures& features) const {
+  return features.count() > 0 && features_[0] == features.u && features_[1] == features.v &&
+         features_[2] == features.disparity;
+}
+
+bool RepeatedImages::shouldHaveMoved(const StereoFeatures& features, double noise,
+                                     const Eigen::Isometry3d& T_previous_current) {
+  const std::vector<bool> moved = movedBy(T_previous_current, features, noise);
+  return 2 * std::count(moved.begin(), moved.end(), true) > features.count();
+}
+
+std::vector<int> RepeatedImages::newRows(const StereoFeatures& features, double noise,
+                                         const std::optional<Eigen::Isometry3d>& T_previous_current) const {
   std::vector<int> rows(features.u.size());
   std::iota(rows.begin(), rows.end(), 0);
+  if (!T_previous_current) return rows;
   std::vector<std::pair<float, float>> before(features_[0].size());
   for (std::size_t i = 0; i < before.size(); ++i) before[i] = {features_[0][i], features_[1][i]};
   std::sort(before.begin(), before.end());
+  // What stands still in the image tells nothing.
+  const std::vector<bool> moved = movedBy(*T_previous_current, features, noise);
+  std::vector<int> order;
   std::vector<bool> repeated(rows.size());
-  for (std::size_t i = 0; i < rows.size(); ++i)
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    if (!moved[i]) continue;
+    order.push_back(static_cast<int>(i));
     repeated[i] = std::binary_search(before.begin(), before.end(), std::pair(features.u[i], features.v[i]));
-  const int count = features.count(), all_old = static_cast<int>(std::count(repeated.begin(), repeated.end(), true));
+  }
+  const int count = static_cast<int>(order.size()),
+            all_old = static_cast<int>(std::count(repeated.begin(), repeated.end(), true));
   if (all_old < kFewestMeasured || count - all_old < kFewestMeasured) return rows;
-  std::vector<int> order = rows;
   std::sort(order.begin(), order.end(), [&](int a, int b) { return features.v[a] < features.v[b]; });
   std::vector<int> old{0};  // among the first so many from above
   for (const int i : order) old.push_back(old.back() + repeated[static_cast<std::size_t>(i)]);
@@ -62,17 +75,17 @@ std::vector<int> RepeatedImages::newRows(const StereoFeatures& features) const {
   if (saved < std::log((count + 1) / kTailProbability)) return rows;
   const float tear =
       features.v[order[static_cast<std::size_t>(std::clamp(is_above ? border : border - 1, 0, count - 1))]];
-  rows.assign(is_above ? order.begin() + border : order.begin(), is_above ? order.end() : order.begin() + border);
   // A descriptor across the tear shows no point of the scene.
-  const auto is_torn = [&](int i) { return std::abs(features.v[i] - tear) < 0.5f * features.size[i]; };
-  rows.erase(std::remove_if(rows.begin(), rows.end(), is_torn), rows.end());
-  std::sort(rows.begin(), rows.end());
+  const auto is_old = [&](int i) {
+    const float below = features.v[i] - tear;
+    return std::abs(below) < 0.5f * features.size[i] || (is_above ? below < 0.f : below > 0.f);
+  };
+  rows.erase(std::remove_if(rows.begin(), rows.end(), is_old), rows.end());
   return rows;
 }
 
-void RepeatedImages::remember(const StereoFeatures& features, bool frozen) {
+void RepeatedImages::remember(const StereoFeatures& features) {
   features_ = {features.u, features.v, features.disparity};
-  frozen_ = frozen;
 }
 
 }  // namespace sdvo

@@ -69,32 +69,49 @@ double misfit(const std::vector<RowMotion>& rows, double delay) {
   return sum / static_cast<double>(rest.size());
 }
 
+/// Ratio of the rows' apparent motion during `delay` that is an error of the left image: both the velocity and dv
+/// contain that error, so dv follows the velocity by this ratio even if the right image is in step (errors in
+/// variables, Fuller 1987). `row_error`: its standard deviation, px.
+double errorRatio(const std::vector<RowMotion>& rows, double delay, double row_error) {
+  double sum = 0.0, square = 0.0;
+  for (const RowMotion& row : rows) sum += row.velocity, square += row.velocity * row.velocity;
+  const double count = static_cast<double>(rows.size());
+  const double variance = delay * delay * (square / count - sum * sum / (count * count));
+  return variance > row_error * row_error ? row_error * row_error / variance : 1.0;
+}
+
 /// By how much (logarithm of the ratio) the rows are likelier if the right image is late by `delay` than in step. Their
 /// variance is unknown, and errors within a part of the image are alike.
-double logRatioOfPartner(const std::vector<RowMotion>& rows, double delay) {
+double logRatioOfPartner(const std::vector<RowMotion>& rows, double delay, double row_error) {
   const double parts = std::min<double>(static_cast<double>(rows.size()), RowDelay::kParts);
-  const double in_step = misfit(rows, 0.0), late = misfit(rows, delay);
+  const double in_step = misfit(rows, delay < 0.0 ? delay * errorRatio(rows, delay, row_error) : 0.0);
+  const double late = misfit(rows, delay);
   return in_step == late ? 0.0 : 0.5 * parts * std::log(in_step / late);
 }
 
+constexpr int kRefutable = 30;         // pairs (chosen) within which a wrong partner is known
 constexpr int kSamePoints = 2;         // pairs in a row whose errors are alike (chosen)
 constexpr double kLeastTurning = 2.0;  // px/s: rotations from images err by less
 
 }  // namespace
 
 RightCameraDelay::RightCameraDelay(double prior)
-    : prior_(prior), rows_(RowDelay::kMemory, kLeastTurning, kSamePoints) {}
+    : prior_(prior), rows_(RowDelay::kMemory, kLeastTurning, kSamePoints), newer_(rows_), older_(rows_) {}
 
-void RightCameraDelay::measure(const StereoFeatures& features, const std::vector<RowMotion>& rows, double dt,
-                               const Vector6d& velocity) {
-  if (rows.size() >= kFewestMeasured && dt > 0.0)
-    for (auto* partner : {&earlier_, &later_}) {
-      // Evidence fades without renewal, because a standing camera shows none.
-      const double carried = CarriedDoubt::kUnsuspected + kUsualMemory * (*partner - CarriedDoubt::kUnsuspected);
-      *partner = std::clamp(carried + logRatioOfPartner(rows, partner == &earlier_ ? -dt : dt),
-                            CarriedDoubt::kUnsuspected, CarriedDoubt::kCertain);
-    }
+void RightCameraDelay::watch(const std::vector<RowMotion>& rows, double dt, double row_error) {
+  if (rows.size() < kFewestMeasured || !(dt > 0.0)) return;
+  for (auto* partner : {&earlier_, &later_}) {
+    // Evidence fades without renewal, because a standing camera shows none.
+    const double carried = kUnsuspected + kUsualMemory * (*partner - kUnsuspected);
+    *partner = std::clamp(carried + logRatioOfPartner(rows, partner == &earlier_ ? -dt : dt, row_error), kUnsuspected,
+                          kCertain);
+  }
+}
+
+void RightCameraDelay::learn(const StereoFeatures& features, double dt, const Vector6d& velocity, bool is_confirmed) {
   expose(features, dt * velocity.head<3>().norm(), velocity.tail<3>().norm());
+  if (std::max(earlier_, later_) > 0.0) rows_ = newer_ = older_;
+  if (!is_confirmed) return interrupt();
   StereoFeatures positions;
   positions.camera = features.camera;
   positions.u = features.u, positions.v = features.v;
@@ -103,11 +120,12 @@ void RightCameraDelay::measure(const StereoFeatures& features, const std::vector
   if (pairs_.size() < 4) return;
   addRows(dt);
   pairs_.pop_front();
+  if (++taught_ % kRefutable == 0) older_ = std::exchange(newer_, rows_);
 }
 
 RightCameraDelay::Partner RightCameraDelay::partner(double dt) const {
   const double known = compensated();
-  if (2.0 * std::abs(known) > dt) return {known, CarriedDoubt::kCertain};
+  if (2.0 * std::abs(known) > dt) return {known, kCertain};
   return earlier_ > later_ ? Partner{-dt, earlier_} : Partner{dt, later_};
 }
 

@@ -5,7 +5,6 @@
 #include <random>
 
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/belief/motion_doubt.hpp"
 #include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
 
 namespace sdvo {
@@ -15,14 +14,15 @@ Eigen::Isometry3d moved(double x) {
   return Eigen::Isometry3d(Eigen::Translation3d(x, 0.0, 0.0));
 }
 
-/// A pair that matches some points of the world and some of a thing that moved by `thing_x`, m.
+/// A pair that matches some points of the world, on the left, and some of a thing that moved by x on the right.
 class Competition : public ::testing::Test {
  protected:
   void add(int count, double x, int sightings, double depth = 6.0) {
     std::mt19937 random(static_cast<unsigned>(view_->seen.size()));
     std::uniform_real_distribution<double> uniform(-1.0, 1.0);
     for (int i = 0; i < count; ++i) {
-      const Eigen::Vector3d point(4.0 * uniform(random), 2.0 * uniform(random), depth + 2.0 * uniform(random));
+      const double z = depth + 2.0 * uniform(random), side = (x == 0.0 ? -0.5 : 0.5) + 0.45 * uniform(random);
+      const Eigen::Vector3d point(0.5 * side * z, 2.0 * uniform(random), z);
       const int row = static_cast<int>(view_->seen.size());
       all_.matches.push_back({row, row, 0.f});
       all_.correspondences.push_back({point, synthetic::camera().project(moved(x) * point)});
@@ -70,12 +70,12 @@ TEST(BayesFactor, IsTheRatioOfTheTwoDensities) {
     const double noise = 1.0 / information[i], both = noise + covariance[i], square = measured[i] * measured[i];
     expected += 0.5 * (square / noise - square / both + std::log(noise / both));
   }
-  EXPECT_NEAR(logBayesFactor(measured, information.asDiagonal(), covariance.asDiagonal()), expected, 1e-9);
+  EXPECT_NEAR(logBayesFactor<6>(measured, information.asDiagonal(), covariance.asDiagonal()), expected, 1e-9);
   // The same in other axes.
   const Matrix6d axes = adjoint(Eigen::Isometry3d(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1.0, 2.0, 3.0).normalized())));
   const Matrix6d P = axes * covariance.asDiagonal() * axes.transpose();
   const Matrix6d H = axes * information.asDiagonal() * axes.transpose();
-  EXPECT_NEAR(logBayesFactor(axes * measured, H, P), expected, 1e-6);
+  EXPECT_NEAR(logBayesFactor<6>(axes * measured, H, P), expected, 1e-6);
 }
 
 TEST_F(Competition, WithoutARivalTheMotionIsCertain) {
@@ -158,14 +158,14 @@ TEST_F(Competition, AnImprobableMotionMisleadsUnlessLastingPointsConfirmIt) {
   view_->seen.assign(100, 4);
   EXPECT_LT(logOddsMisled(scene_, hypothesis(0.0)), logOdds(0.05));
   scene_.prior.clear();
-  EXPECT_LT(logOddsMisled(scene_, hypothesis(0.0)), CarriedDoubt::kUnsuspected);
+  EXPECT_LT(logOddsMisled(scene_, hypothesis(0.0)), kUnsuspected);
 }
 
 TEST_F(Competition, LastingPointsThatDisagreeAreMoreSuspiciousThanUsual) {
   add(25, 0.0, 4), add(75, 0.5, 4);
-  EXPECT_GT(logOddsMisled(scene_, hypothesis(0.0)), CarriedDoubt::kUnsuspected + 2.0);
+  EXPECT_GT(logOddsMisled(scene_, hypothesis(0.0)), kUnsuspected + 2.0);
   scene_.usual_agreement = 0.5;
-  EXPECT_LT(logOddsMisled(scene_, hypothesis(0.0)), CarriedDoubt::kUnsuspected + 1.0) << "a rig that always does so";
+  EXPECT_LT(logOddsMisled(scene_, hypothesis(0.0)), kUnsuspected + 1.0) << "a rig that always does so";
 }
 
 TEST_F(Competition, RejectedRowsAreNoInliers) {

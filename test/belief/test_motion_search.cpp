@@ -21,12 +21,23 @@ class Street {
     return features;
   }
 
+  /// A nearer world hides what is behind it.
   static void add(StereoFeatures& features, const synthetic::World& world, double x, double max_depth = 40.0) {
     synthetic::Sighting sighting;
     sighting.max_depth = max_depth;
     const Eigen::Isometry3d T_camera_world(Eigen::Translation3d(-x, 0.0, 0.0));
     const StereoFeatures seen =
         synthetic::observe(world, synthetic::camera(), T_camera_world, features.stamp, sighting);
+    if (seen.count() == 0) return;
+    const auto [left, right] = std::minmax_element(seen.u.begin(), seen.u.end());
+    const auto [top, bottom] = std::minmax_element(seen.v.begin(), seen.v.end());
+    const float nearest = *std::min_element(seen.disparity.begin(), seen.disparity.end());
+    std::vector<int> visible;
+    for (int i = 0; i < features.count(); ++i)
+      if (features.disparity[i] > nearest || features.u[i] < *left || features.u[i] > *right || features.v[i] < *top ||
+          features.v[i] > *bottom)
+        visible.push_back(i);
+    features = features.select(visible);
     for (int row = 0; row < seen.count(); ++row)
       synthetic::addFeature(features, seen.u[row], seen.v[row], seen.disparity[row],
                             {seen.descriptors.ptr(row), seen.descriptors.ptr(row) + seen.descriptors.cols});
@@ -181,7 +192,7 @@ class SlowBoard : public MotionSearchTest {
 
  private:
   std::mt19937 random_{30};
-  synthetic::World still_ = synthetic::randomWorld(27, 200, {-10.0, -4.0, 6.0}, {10.0, 3.0, 12.0});
+  synthetic::World still_ = synthetic::randomWorld(27, 600, {-10.0, -4.0, 6.0}, {10.0, 3.0, 12.0});
   synthetic::World board_ = synthetic::randomWorld(28, 500, {-2.0, -1.5, 3.9}, {2.0, 1.5, 4.1});
 };
 
@@ -315,7 +326,7 @@ class CoveredView : public MotionSearchTest {
   static constexpr double kStep = 1.2;  // m between pairs: no camera stops from there
 
  private:
-  synthetic::World world_ = synthetic::randomWorld(26, 30, {-2.0, -2.0, 8.0}, {6.0, 2.0, 12.0});
+  synthetic::World world_ = synthetic::randomWorld(26, 120, {-2.0, -2.0, 8.0}, {14.0, 2.0, 12.0});
   synthetic::World board_ = synthetic::randomWorld(27, 400, {-2.0, -1.5, 3.9}, {1.0, 1.5, 4.1});
 };
 

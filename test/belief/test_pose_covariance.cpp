@@ -188,20 +188,22 @@ TEST(PoseCovariance, APredictionEndsWithTheNextMeasuredPose) {
   expectEqual(covariance.value(), diagonal(0.5, 0.25));
 }
 
-TEST(PoseCovariance, AKeyframeThatWasPredictedOrDoubtedCarriesThat) {
+TEST(PoseCovariance, AKeyframeThatWasDoubtedLeavesNoDoubtToThePosesMeasuredInItsMap) {
   PoseCovariance covariance;
   const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
   covariance.measure(still, diagonal(0.5, 0.25));
-  covariance.advance(still, diagonal(8.0, 2.0));
+  covariance.doubt(diagonal(8.0, 2.0), diagonal(8.0, 2.0));
   covariance.markKeyframe();
   expectEqual(covariance.value(), diagonal(8.5, 2.25));
-  expectEqual(covariance.measure(still, diagonal(0.125, 0.125)), diagonal(8.125, 2.125));
+  const Matrix6d motion = covariance.measure(still, diagonal(0.125, 0.125));
+  expectEqual(motion, diagonal(8.125, 2.125));
+  expectEqual(covariance.value(), diagonal(0.625, 0.375));
 }
 
 TEST(PoseCovariance, RestartsFromTheLastPoseWithMetresAndAGoodPartOfARightAngle) {
   PoseCovariance covariance;
   covariance.measure(forward(), diagonal(0.5, 0.25));
-  covariance.doubt(diagonal(1.0, 1.0));
+  covariance.doubt(diagonal(1.0, 1.0), diagonal(1.0, 1.0));
   covariance.restart();
   expectEqual(covariance.value(), diagonal(101.5, 1.5));
   // Neither the measurement nor the doubt before the gap has a part in the first motion after it.
@@ -215,22 +217,21 @@ TEST(PoseCovariance, WhatMayHaveBeenTravelledUnseenIsAddedAtARestart) {
   expectEqual(covariance.value(), diagonal(104.0, 1.25));
 }
 
-TEST(PoseCovariance, ADoubtedPoseIsReportedSoAndTheNextMotionContainsTheDoubt) {
+TEST(PoseCovariance, ADoubtedPoseIsReportedSoUntilTheNextOneIsMeasured) {
   PoseCovariance covariance;
   const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
   covariance.measure(still, diagonal(0.5, 0.25));
-  covariance.doubt(diagonal(8.0, 2.0));
-  expectEqual(covariance.value(), diagonal(8.5, 2.25));
+  covariance.doubt(diagonal(8.0, 2.0), diagonal(16.0, 4.0));
+  expectEqual(covariance.value(), diagonal(16.5, 4.25));
   expectEqual(covariance.measure(still, diagonal(0.5, 0.25)), diagonal(8.5, 2.25));
-  // What was reported stays true.
-  expectEqual(covariance.value(), diagonal(8.5, 2.25));
+  expectEqual(covariance.value(), diagonal(0.5, 0.25));
 }
 
 TEST(PoseCovariance, RotationDoesNotFallWhereTranslationGrows) {
   PoseCovariance covariance;
   const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
   covariance.measure(still, diagonal(0.5, 0.25));
-  covariance.doubt(diagonal(0.0, 2.0));
+  covariance.measure(still, diagonal(0.5, 2.25));
   covariance.measure(still, diagonal(9.0, 0.5));
   expectEqual(covariance.value(), diagonal(9.0, 2.25));
   covariance.measure(still, diagonal(4.0, 3.0));
@@ -244,12 +245,59 @@ TEST(PoseCovariance, StaysSymmetricAndPositive) {
   for (int i = 0; i < 1000; ++i) {
     const Matrix6d motion = covariance.measure(expSE3(step), diagonal(1e-4, 1e-6) * (1 + i % 7));
     if (i % 3 == 0) covariance.markKeyframe();
-    if (i % 11 == 0) covariance.doubt(diagonal(1e-2, 1e-4));
+    if (i % 11 == 0) covariance.doubt(diagonal(1e-2, 1e-4), diagonal(2e-2, 1e-4));
     for (const Matrix6d& matrix : {motion, covariance.value()}) {
       EXPECT_EQ(matrix, matrix.transpose());
       EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(matrix).eigenvalues().minCoeff(), 0.0) << i;
     }
   }
+}
+
+/// Ten steps of 2 m, each of them longer by a part of the calibration's error.
+PoseCovariance tenSteps(const RigCalibration& compensated) {
+  PoseCovariance covariance;
+  RigCalibration::MotionJacobian by_calibration = RigCalibration::MotionJacobian::Zero();
+  by_calibration.row(2) << 0.02, 0.005;  // m/px
+  for (int step = 0; step < 10; ++step) {
+    for (const int pair : {0, 1}) {  // of which the second is the key frame
+      covariance.measure(pair == 0 ? forward() : Eigen::Isometry3d::Identity(), diagonal(1e-4, 0.0));
+      covariance.expose(by_calibration, compensated);
+    }
+    covariance.markKeyframe();
+  }
+  return covariance;
+}
+
+TEST(PoseCovariance, TheCalibrationsErrorAddsUpWithTheDistance) {
+  CalibrationEstimate known;
+  known.covariance.diagonal() << 0.09, 0.25;
+  const Matrix6d moment = tenSteps(RigCalibration{}).byCalibration(known);
+  EXPECT_NEAR(std::sqrt(moment(2, 2)), 10.0 * std::hypot(0.02 * 0.3, 0.005 * 0.5), 1e-12);
+  EXPECT_NEAR(moment.trace(), moment(2, 2), 1e-12);
+}
+
+TEST(PoseCovariance, TheCalibrationsErrorIsFromTheOneThatWasCompensated) {
+  RigCalibration compensated;
+  compensated.value << 0.1, -0.2;
+  CalibrationEstimate known;
+  known.mean = compensated.value;
+  EXPECT_LT(tenSteps(compensated).byCalibration(known).norm(), 1e-20);
+  known.mean << 0.3, -0.2;
+  EXPECT_NEAR(std::sqrt(tenSteps(compensated).byCalibration(known)(2, 2)), 10.0 * 0.02 * 0.2, 1e-12);
+}
+
+TEST(PoseCovariance, TheWayBackUndoesTheCalibrationsError) {
+  PoseCovariance covariance = tenSteps(RigCalibration{});
+  CalibrationEstimate known;
+  known.covariance.setIdentity();
+  RigCalibration::MotionJacobian by_calibration = RigCalibration::MotionJacobian::Zero();
+  by_calibration.row(2) << -0.02, -0.005;
+  for (int step = 0; step < 10; ++step) {
+    covariance.measure(forward().inverse(), diagonal(1e-4, 0.0));
+    covariance.expose(by_calibration, RigCalibration{});
+    covariance.markKeyframe();
+  }
+  EXPECT_LT(covariance.byCalibration(known).norm(), 1e-20);
 }
 
 }  // namespace test_pose_covariance

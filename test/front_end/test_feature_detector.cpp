@@ -240,7 +240,7 @@ TEST(FeatureDetector, KeepsFewerInASmallImage) {
   options.max_features = 20000;
   options.area_per_feature = 300;
   EXPECT_EQ(largestCount(kSize, options), 800);
-  EXPECT_EQ(largestCount(kSize / 2, options), 600);  // enough for a motion
+  EXPECT_EQ(largestCount(kSize / 2, options), 400);  // enough for a motion
   options.area_per_feature = 0;
   EXPECT_EQ(largestCount(kSize / 2, options), 20000);
   options.max_features = 100;

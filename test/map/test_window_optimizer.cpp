@@ -345,6 +345,30 @@ TEST(WindowOptimizer, ThePriorPullsTowardsItsMean) {
   EXPECT_LT((window.calibration.value - window.calibration_prior.mean).norm(), 1e-3);
 }
 
+TEST(WindowOptimizer, PosesFollowTheCalibrationByTheirDerivative) {
+  constexpr double kStep = 1e-3;  // px
+  RigCalibration truth;
+  truth.value << 0.2, -0.5;
+  for (int i = 0; i < RigCalibration::kParameters; ++i) {
+    std::vector<Eigen::Isometry3d> poses[2];
+    WindowSolution solution;
+    for (const int side : {0, 1}) {
+      Window window = disturbedWindow(truth);
+      window.calibration_prior.mean = truth.value;
+      window.calibration_prior.mean[i] += (side - 0.5) * kStep;
+      window.calibration_prior.information = 1e12 * RigCalibration::Matrix::Identity();
+      solution = WindowOptimizer(leastSquares()).optimize(window);
+      ASSERT_TRUE(solution.success);
+      poses[side] = window.T_camera_origin;
+    }
+    for (int f = 1; f < 5; ++f) {
+      const Vector6d moved = logSE3(poses[1][f] * poses[0][f].inverse()) / kStep;
+      EXPECT_LT((solution.pose_by_calibration.block<6, 1>(6 * (f - 1), i) - moved).norm(), 0.05 * moved.norm())
+          << "parameter " << i << " pose " << f;
+    }
+  }
+}
+
 /// Sixty points whose disparities are off, each by an error that all its sightings share. Positions have normal noise.
 Window windowWithCommonErrors(double common, double position, std::uint32_t seed) {
   Window window = disturbedWindow(RigCalibration{});

@@ -1054,7 +1054,6 @@ TEST(VisualOdometry, WhatIsInDoubtTellsNothingOfWhatMayBeExpected) {
   const OdometryResult doubtful = odometry.update(slowPair(12));
   ASSERT_EQ(doubtful.state, TrackingState::kDegraded) << doubtful.reason;
   EXPECT_NEAR(doubtful.T_previous_current.translation().z(), 0.4, 0.2);
-  EXPECT_GT(std::sqrt(doubtful.motion_covariance(2, 2)), 0.4 / 5.0) << "it may still go 0.8 m a pair";
 }
 
 /// Some rows of pair i, most of them too high or too low by what the search accepts and the adjustment refutes.

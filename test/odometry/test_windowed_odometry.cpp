@@ -183,6 +183,19 @@ TEST(PoseCovariance, GrowsWithTheDistance) {
   }
 }
 
+TEST(PoseCovariance, ContainsTheLengthThatAnUnknownOffsetOfTheRigCosts) {
+  for (const double offset : {-0.1, 0.1, 0.5}) {
+    SyntheticScene scene(16, 400, 100.0);
+    scene.disparity_offset = offset;
+    VisualOdometry odometry{VisualOdometryOptions{}};
+    const OdometryResult result = drive(scene, odometry, 12);
+    const double error = std::abs(result.T_origin_camera.translation().norm() - syntheticPose(11).translation().norm());
+    const double sigma = std::sqrt(result.pose_covariance.topLeftCorner<3, 3>().trace());
+    EXPECT_LT(error, 3.0 * sigma) << offset;
+    EXPECT_LT(sigma, 0.1 * syntheticPose(11).translation().norm()) << offset;
+  }
+}
+
 /// Three times 32 m ahead and back again, with disparities so noisy that the odometry drifts.
 struct ThereAndBack {
   double error = 0.0;               ///< of the last position, m

@@ -96,6 +96,20 @@ TEST(CalibrationFilter, SaysHowWellTheWindowsMeasure) {
   EXPECT_NEAR(filter.sigma()[1], 4.0 / 3.0, 1e-9);
 }
 
+TEST(CalibrationFilter, EstimatesWhatIsNotSignificant) {
+  CalibrationFilter filter(someOptions());
+  EXPECT_LT((filter.estimate().covariance - 4.0 * Matrix::Identity()).norm(), 1e-9) << "the options' alone";
+  const Vector near = kPrior + Vector(0.9 * kOffset, -0.9 * kBend);
+  addWindow(filter, 1, 9, near);
+  const CalibrationEstimate found = filter.estimate();
+  EXPECT_LT((filter.calibration().value - kPrior).norm(), 1e-5) << "held";
+  EXPECT_NEAR(found.mean[0], (4.0 * kPrior[0] + 12.0 * near[0]) / 16.0, 1e-3);
+  EXPECT_NEAR(found.covariance(0, 0), 16.0 / 16.0, 1e-9);
+  CalibrationOptions held = someOptions();
+  held.enabled = false;
+  EXPECT_EQ(CalibrationFilter(held).estimate().covariance, Matrix(Matrix::Zero()));
+}
+
 TEST(CalibrationFilter, OfWindowsThatOverlapOneCounts) {
   CalibrationFilter filter(someOptions());
   for (const int newest : {5, 6, 7, 8}) {

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -9,6 +10,13 @@
 
 namespace sdvo {
 namespace test_repeated_images {
+
+constexpr double kNoise = 1.0;  // px
+
+/// Moves all points by more than the noise.
+Eigen::Isometry3d ahead() {
+  return Eigen::Isometry3d(Eigen::Translation3d(0.5, 0.5, 0.0));
+}
 
 StereoFeatures seen(unsigned seed) {
   StereoFeatures features = synthetic::noFeatures(synthetic::camera());
@@ -35,11 +43,11 @@ template <class IsOld>
 void expectNewRows(const IsOld& is_old) {
   const StereoFeatures before = seen(1), torn = mixed(before, seen(2), is_old);
   RepeatedImages images;
-  images.remember(before, false);
+  images.remember(before);
   std::vector<int> expected;
   for (int i = 0; i < torn.count(); ++i)
     if (!is_old(torn.u[i], torn.v[i])) expected.push_back(i);
-  EXPECT_EQ(images.newRows(torn), expected);
+  EXPECT_EQ(images.newRows(torn, kNoise, ahead()), expected);
 }
 
 TEST(RepeatedImages, LeavesOutWhatIsDescribedAcrossTheTear) {
@@ -47,8 +55,8 @@ TEST(RepeatedImages, LeavesOutWhatIsDescribedAcrossTheTear) {
   StereoFeatures torn = mixed(before, seen(2), [](float, float v) { return v > 240.f; });
   for (const float v : {200.f, 225.f, 239.f, 240.f}) torn.append({320.f, v, 10.f, 0.f, 40.f, -1.f, 1.f});
   RepeatedImages images;
-  images.remember(before, false);
-  const std::vector<int> rows = images.newRows(torn);
+  images.remember(before);
+  const std::vector<int> rows = images.newRows(torn, kNoise, ahead());
   const auto has = [&](int from_last) {
     return std::find(rows.begin(), rows.end(), torn.count() - from_last) != rows.end();
   };
@@ -66,14 +74,37 @@ TEST(RepeatedImages, LeavesOutTheOldPartOfATornImage) {
 TEST(RepeatedImages, KeepsAllRowsOfOtherPairs) {
   const StereoFeatures before = seen(1), now = seen(2);
   RepeatedImages images;
-  EXPECT_EQ(static_cast<int>(images.newRows(now).size()), now.count()) << "the first pair";
-  images.remember(before, false);
-  EXPECT_EQ(static_cast<int>(images.newRows(now).size()), now.count());
-  EXPECT_EQ(static_cast<int>(images.newRows(before).size()), before.count()) << "repeated as a whole";
+  EXPECT_EQ(static_cast<int>(images.newRows(now, kNoise, ahead()).size()), now.count()) << "the first pair";
+  images.remember(before);
+  EXPECT_EQ(static_cast<int>(images.newRows(now, kNoise, ahead()).size()), now.count());
+  EXPECT_EQ(static_cast<int>(images.newRows(before, kNoise, ahead()).size()), before.count()) << "repeated as a whole";
   // A camera without noise stands, and something moves in the middle of its view.
   const StereoFeatures mover =
       mixed(before, now, [](float u, float v) { return u < 200.f || u > 440.f || v < 150.f || v > 330.f; });
-  EXPECT_EQ(static_cast<int>(images.newRows(mover).size()), mover.count());
+  EXPECT_EQ(static_cast<int>(images.newRows(mover, kNoise, ahead()).size()), mover.count());
+}
+
+TEST(RepeatedImages, KeepsTheRowsOfACameraThatStands) {
+  // Images without noise repeat; a thing that moves fills the lower part of the view.
+  const StereoFeatures before = seen(1);
+  const StereoFeatures now = mixed(before, seen(2), [](float, float v) { return v < 240.f; });
+  RepeatedImages images;
+  images.remember(before);
+  EXPECT_LT(static_cast<int>(images.newRows(now, kNoise, ahead()).size()), now.count());
+  EXPECT_EQ(static_cast<int>(images.newRows(now, kNoise, Eigen::Isometry3d::Identity()).size()), now.count());
+  EXPECT_EQ(static_cast<int>(images.newRows(now, kNoise, std::nullopt).size()), now.count()) << "nothing is expected";
+}
+
+TEST(RepeatedImages, KnowsAPairToTheDigitAndWhetherItShouldHaveMoved) {
+  RepeatedImages images;
+  StereoFeatures pair = seen(1);
+  EXPECT_FALSE(images.repeat(pair)) << "the first pair";
+  images.remember(pair);
+  EXPECT_TRUE(images.repeat(pair));
+  EXPECT_TRUE(RepeatedImages::shouldHaveMoved(pair, kNoise, ahead()));
+  EXPECT_FALSE(RepeatedImages::shouldHaveMoved(pair, kNoise, Eigen::Isometry3d::Identity()));
+  pair.disparity[7] += 1e-3f;
+  EXPECT_FALSE(images.repeat(pair));
 }
 
 }  // namespace test_repeated_images

@@ -50,12 +50,14 @@ Vector6d before(int pair) {
   return velocityAt(kPeriod * (pair - 0.5));
 }
 
+constexpr double kRowError = 0.4;  // px
+
 RightCameraDelay watched(double delay, int pairs) {
   RightCameraDelay right_delay;
   for (int k = 0; k < pairs; ++k) {
     const double noise = 0.1;  // px
-    right_delay.measure(seen(velocityAt(kPeriod * k + 0.5 * delay), delay, noise, 10u + static_cast<unsigned>(k)), {},
-                        kPeriod, before(k));
+    right_delay.learn(seen(velocityAt(kPeriod * k + 0.5 * delay), delay, noise, 10u + static_cast<unsigned>(k)),
+                      kPeriod, before(k), true);
   }
   return right_delay;
 }
@@ -96,7 +98,7 @@ TEST(RightCameraDelay, WhatIsKnownBeforehandHoldsUntilItIsContradicted) {
   RightCameraDelay known(-0.003);
   EXPECT_EQ(known.compensated(), -0.003);
   for (int k = 0; k < 60; ++k)
-    known.measure(seen(velocityAt(kPeriod * k), 0.0, 0.1, 10u + static_cast<unsigned>(k)), {}, kPeriod, before(k));
+    known.learn(seen(velocityAt(kPeriod * k), 0.0, 0.1, 10u + static_cast<unsigned>(k)), kPeriod, before(k), true);
   EXPECT_NEAR(known.compensated(), 0.0, 5e-4);
 }
 
@@ -112,7 +114,7 @@ TEST(RightCameraDelay, KnowsThePartnerOfAnotherPair) {
     RightCameraDelay right_delay;
     const Vector6d velocity = velocityAt(1.0);
     const StereoFeatures features = seen(velocity, delay, 0.15);
-    right_delay.measure(features, rowsOf(features, velocity), kPeriod, velocity);
+    right_delay.watch(rowsOf(features, velocity), kPeriod, kRowError);
     const bool is_another = std::abs(delay) == kPeriod;
     EXPECT_EQ(right_delay.partner(kPeriod).log_odds > 0.0, is_another) << delay;
     if (is_another) {
@@ -125,7 +127,7 @@ TEST(RightCameraDelay, KnowsThePartnerUntilRowsInStepSayOtherwise) {
   RightCameraDelay right_delay;
   const Vector6d velocity = velocityAt(1.0);
   const auto measure = [&](const StereoFeatures& features, const Vector6d& moved) {
-    right_delay.measure(features, rowsOf(features, moved), kPeriod, moved);
+    right_delay.watch(rowsOf(features, moved), kPeriod, kRowError);
     return right_delay.partner(kPeriod).log_odds;
   };
   const StereoFeatures late = seen(velocity, kPeriod, 0.15);
@@ -137,6 +139,56 @@ TEST(RightCameraDelay, KnowsThePartnerUntilRowsInStepSayOtherwise) {
   double log_odds = 0.0;
   for (int pair = 0; pair < 20; ++pair) log_odds = measure(seen(Vector6d::Zero(), kPeriod, 0.15), Vector6d::Zero());
   EXPECT_LT(log_odds, logOdds(0.05)) << "a camera that stands for long";
+}
+
+TEST(RightCameraDelay, LeftImagesThatShiftWhileTheCameraStandsAreNoPartnerOfAnotherPair) {
+  // The motion follows the left image, and dv contains its error with the other sign.
+  RightCameraDelay right_delay;
+  std::mt19937 random(1);
+  std::normal_distribution<double> shift(0.0, 0.2), noise(0.0, 0.05), place(0.0, 1.0);
+  for (int pair = 0; pair < 50; ++pair) {
+    const double turn = shift(random);
+    std::vector<RowMotion> rows;
+    for (int i = 0; i < 200; ++i) {
+      const double moved = turn * place(random);
+      rows.push_back({moved / kPeriod, noise(random) - moved});
+    }
+    right_delay.watch(rows, kPeriod, kRowError);
+    EXPECT_LT(right_delay.partner(kPeriod).log_odds, logOdds(0.05)) << pair;
+  }
+}
+
+TEST(RightCameraDelay, DoubtedPairsTeachNothing) {
+  RightCameraDelay right_delay = watched(0.0, 60);
+  const double known = right_delay.estimate()->value;
+  for (int k = 60; k < 120; ++k)
+    right_delay.learn(seen(velocityAt(kPeriod * k), 0.01, 0.1, 10u + static_cast<unsigned>(k)), kPeriod, before(k),
+                      false);
+  EXPECT_EQ(right_delay.estimate()->value, known);
+}
+
+TEST(RightCameraDelay, TakesBackWhatPairsWithTheWrongPartnerTaught) {
+  RightCameraDelay right_delay = watched(0.0, 90);
+  const auto learn = [&](int k, double delay) {
+    right_delay.learn(seen(velocityAt(kPeriod * k), delay, 0.1, 10u + static_cast<unsigned>(k)), kPeriod, before(k),
+                      true);
+  };
+  const double known = right_delay.estimate()->value;
+  for (int k = 90; k < 115; ++k) learn(k, 0.004);
+  const double taught = std::abs(right_delay.estimate()->value - known);
+  ASSERT_GT(taught, 3e-5);
+  const Vector6d velocity = velocityAt(1.0);
+  right_delay.watch(rowsOf(seen(velocity, -kPeriod, 0.15), velocity), kPeriod, kRowError);
+  ASSERT_GT(right_delay.partner(kPeriod).log_odds, 0.0);
+  learn(115, -kPeriod);
+  EXPECT_LT(std::abs(right_delay.estimate()->value - known), 0.5 * taught);
+}
+
+TEST(RightCameraDelay, APoseThatIsGivenHasNoDrift) {
+  RightCameraDelay right_delay = watched(0.0062, 60);
+  ASSERT_GT(right_delay.drift(), 0.0);
+  right_delay.forgetDrift();
+  EXPECT_EQ(right_delay.drift(), 0.0);
 }
 
 }  // namespace test_right_camera_delay

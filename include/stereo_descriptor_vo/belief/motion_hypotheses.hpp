@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <cmath>
 #include <memory>
 #include <optional>
 #include <string>
@@ -22,6 +24,10 @@ struct Agreement {
   int lasting_matches = 0, lasting_inliers = 0;
   int sightings = 0, inlier_sightings = 0;  ///< confirmed ones of their points, four at most for each
 };
+
+/// Log-odds of being misled, of a pair that nothing speaks against (probability of 0.001, chosen), and of an event that
+/// leaves a wrong map or a wrong rig.
+constexpr double kUnsuspected = -6.9, kCertain = -kUnsuspected;
 
 /// Probabilities as log-odds: log(p / (1 - p)).
 double logOdds(double probability);
@@ -92,7 +98,15 @@ bool isTolerable(const MotionScene& scene, const Eigen::Isometry3d& motion, cons
 
 /// Logarithm of the Bayes factor (Kass and Raftery 1995) between a difference that has this covariance and none at all,
 /// by a measurement of it with that information.
-double logBayesFactor(const Vector6d& measured, const Matrix6d& information, const Matrix6d& covariance);
+template <int N>
+double logBayesFactor(const Eigen::Matrix<double, N, 1>& measured, const Eigen::Matrix<double, N, N>& information,
+                      const Eigen::Matrix<double, N, N>& covariance) {
+  // With A = I + H P the measurement's variance is H^-1 + P = A^T H^-1, so its inverse is H A^-T = A^-1 H.
+  using Square = Eigen::Matrix<double, N, N>;
+  const Eigen::PartialPivLU<Square> factor(Square::Identity() + information * covariance);
+  const Eigen::Matrix<double, N, 1> weighted = information * measured;
+  return 0.5 * (measured.dot(weighted) - measured.dot(factor.solve(weighted)) - std::log(factor.determinant()));
+}
 
 /// Logarithm of the number of false alarms (a contrario, Moisan and Stival 2004): the expected number of motions with
 /// as many inliers, if each match agrees by `chance`.
@@ -109,6 +123,10 @@ bool agree(const StereoCamera& camera, const std::vector<Correspondence>& corres
 /// `of_others`: the sum of their confirmed sightings. Points are no independent witnesses, because what
 /// moves has many of them: the sum is tempered by their effective number.
 double logLikelihood(double of_others, int points);
+
+/// Logarithm of how many times likelier the agreement of lasting points is with the camera's motion than with that of
+/// something that moves.
+double logAgreement(const MotionScene& scene, const MotionHypothesis& hypothesis);
 
 /// Log-odds that a motion is not the camera's, by the pair itself: the prior against the agreement of lasting points.
 double logOddsMisled(const MotionScene& scene, const MotionHypothesis& hypothesis);

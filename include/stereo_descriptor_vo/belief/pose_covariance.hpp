@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "stereo_descriptor_vo/common/se3.hpp"
+#include "stereo_descriptor_vo/motion/rig_calibration.hpp"
 
 namespace sdvo {
 
@@ -18,10 +19,17 @@ bool widen(Matrix6d& covariance, const Vector6d& deviation);
 /// The pose's covariance is that of the last key frame plus what it errs by more in the map. So it grows from key frame
 /// to key frame, but not while the map stays the same. The traces of its translation and its rotation shrink only when
 /// a pose is measured after a predicted one.
+///
+/// All motions have the error of the rig's calibration in common. It adds up with the distance, unlike their noise, and
+/// is followed apart: as the pose's derivative by the calibration.
 class PoseCovariance {
  public:
-  /// Of the last pose; zero in the beginning.
+  /// Of the last pose, the calibration's error apart; zero in the beginning.
   const Matrix6d& value() const { return value_; }
+
+  /// Moment of the last pose's error by the calibration's: by how far `known` is from the one that was compensated on
+  /// the way, and by its covariance.
+  Matrix6d byCalibration(const CalibrationEstimate& known) const;
 
   /// The map moved the last pose by this right perturbation: its covariance then contains that.
   void cover(const Vector6d& correction);
@@ -31,7 +39,7 @@ class PoseCovariance {
   void restart(const Matrix6d& travelled = Matrix6d::Zero());
 
   /// The last pose is another one now, with this covariance: the key frame of a new drive.
-  void assume(const Matrix6d& covariance) {
+  void assume(Matrix6d covariance) {
     *this = PoseCovariance();
     value_ = keyframe_ = covariance;
   }
@@ -51,20 +59,29 @@ class PoseCovariance {
     return measure(T_previous_current, since_keyframe, since_keyframe);
   }
 
-  /// The last pose may be off by more than its measurement says.
-  void doubt(const Matrix6d& covariance);
+  /// The pose that was measured last depends on the calibration by this right perturbation since the key frame.
+  void expose(const RigCalibration::MotionJacobian& since_keyframe, const RigCalibration& compensated);
 
-  /// The last pose is a key frame of the map: the next ones are measured against it.
+  /// The last motion, and the last pose, may be off by more than their measurement says. The next pose that is measured
+  /// in the map takes that back.
+  void doubt(const Matrix6d& motion, const Matrix6d& pose);
+
+  /// The last pose is a key frame of the map: the next ones are measured against it, whatever it was doubted by.
   void markKeyframe();
 
  private:
+  /// Derivatives by the calibration; last column: less their sum times what was compensated.
+  using Exposure = Eigen::Matrix<double, 6, RigCalibration::kParameters + 1>;
+
   void carry(const Eigen::Isometry3d& T_previous_current);
 
   Matrix6d value_ = Matrix6d::Zero();
   Matrix6d keyframe_ = Matrix6d::Zero();    ///< of the key frame, as a perturbation of the last pose
   std::optional<Matrix6d> since_keyframe_;  ///< of the last pose, as it was measured; none where it is the key frame
-  Matrix6d predicted_ = Matrix6d::Zero();   ///< of motions since the last measured pose
-  Matrix6d unmeasured_ = Matrix6d::Zero();  ///< of these, and of what the last pose was doubted by
+  Matrix6d predicted_ = Matrix6d::Zero();   ///< of motions since the last measured pose, and of its doubt
+  Matrix6d unmeasured_ = Matrix6d::Zero();  ///< of these motions, and of what the last one was doubted by
+  Exposure exposure_ = Exposure::Zero();
+  Exposure keyframe_exposure_ = Exposure::Zero();  ///< as a perturbation of the last pose
 };
 
 }  // namespace sdvo

@@ -132,6 +132,7 @@ class LocalMap {
     Matrix6d since_keyframe = Matrix6d::Zero();  ///< covariance of the newest pose since the key frame before it.
     /// Covariance of the newest pose's error in the map beyond that key frame's; errors of the map cancel.
     Matrix6d growth = Matrix6d::Zero();
+    RigCalibration::MotionJacobian by_calibration = RigCalibration::MotionJacobian::Zero();  ///< since that key frame
     RigCalibration::Matrix calibration_information = RigCalibration::Matrix::Zero();
     std::optional<double> common_disparity_square;  ///< px^2, see WindowSolution
     std::vector<int> rejected;                      ///< features of the newest pair

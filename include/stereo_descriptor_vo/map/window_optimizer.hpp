@@ -39,8 +39,9 @@ struct WindowOptimizerOptions {
 /// What is known after the optimisation, besides the window's new values.
 struct WindowSolution {
   bool success = false;
-  int iterations = 0;               ///< accepted steps
-  Eigen::MatrixXd pose_covariance;  ///< of the left perturbations of the poses asked for, 6 rows each, m and rad
+  int iterations = 0;                   ///< accepted steps
+  Eigen::MatrixXd pose_covariance;      ///< of the left perturbations of the poses asked for, 6 rows each, m and rad
+  Eigen::MatrixXd pose_by_calibration;  ///< the same perturbations by the calibration, 1/px
   RigCalibration::Matrix calibration_information;  ///< of this window alone, the prior excluded, 1/px^2
   /// Variance, px^2, of the error that all disparities of one point share. It comes from the median of its squares over
   /// the points, and is below zero by chance. None where too few points are known better from their motion than from

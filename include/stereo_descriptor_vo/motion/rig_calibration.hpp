@@ -17,6 +17,7 @@ struct RigCalibration {
   using Vector = Eigen::Matrix<double, kParameters, 1>;  ///< (offset, bend), px
   using RowVector = Eigen::Matrix<double, 1, kParameters>;
   using Matrix = Eigen::Matrix<double, kParameters, kParameters>;
+  using MotionJacobian = Eigen::Matrix<double, 6, kParameters>;  ///< a motion's right perturbation by the parameters
 
   Vector value = Vector::Zero();
 
@@ -26,6 +27,12 @@ struct RigCalibration {
     return {1.0, x * x};
   }
   double disparityError(const StereoCamera& camera, double u) const { return shape(camera, u).dot(value); }
+};
+
+/// What is known of the calibration, whether it is compensated or not.
+struct CalibrationEstimate {
+  RigCalibration::Vector mean = RigCalibration::Vector::Zero();        ///< px
+  RigCalibration::Matrix covariance = RigCalibration::Matrix::Zero();  ///< px^2
 };
 
 /// A normal distribution over the calibration in information form.

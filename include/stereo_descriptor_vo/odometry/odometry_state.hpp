@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "stereo_descriptor_vo/belief/motion_doubt.hpp"
+#include "stereo_descriptor_vo/belief/belief.hpp"
 #include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
 #include "stereo_descriptor_vo/belief/motion_prior.hpp"
 #include "stereo_descriptor_vo/belief/pose_covariance.hpp"
@@ -41,20 +41,20 @@ struct OdometryState {
   std::optional<LocalMap> candidate;  ///< the map with the pair; between pairs only its memory matters
   LearntRig rig;
   MotionPrior prior;
-  CarriedDoubt doubt;         ///< of all causes
-  CarriedDoubt motion_doubt;  ///< of what the motions themselves gave cause for
+  Doubt doubt;
   Outage outage;
   RepeatedImages images;
   FloorBelief floor;
   std::optional<StereoCamera> camera;
   std::optional<std::int64_t> last_stamp;
   Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
-  PoseCovariance covariance;         ///< of that pose
-  std::int64_t last_pose_stamp = 0;  ///< ns
-  double distance = 0.0;             ///< m
+  PoseCovariance covariance;                    ///< of that pose
+  std::optional<std::int64_t> last_pose_stamp;  ///< ns
+  double distance = 0.0;                        ///< m
   int pairs = 0;
   int epoch = 0;
   bool started = false;
+  bool frozen = false;       ///< the last images repeated those before although the camera moved
   bool interrupted = false;  ///< where in the map the camera is is unknown
 
   OdometryState(const VisualOdometryOptions& options, int first_epoch);

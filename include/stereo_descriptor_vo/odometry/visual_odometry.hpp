@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "stereo_descriptor_vo/belief/motion_doubt.hpp"
+#include "stereo_descriptor_vo/belief/belief.hpp"
 #include "stereo_descriptor_vo/belief/motion_search.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/map/floor.hpp"
@@ -69,9 +69,9 @@ class VisualOdometry {
     const StereoFeatures& given;
     std::optional<StereoFeatures> refocused{}, new_part{}, in_step{};
     std::vector<int> new_rows{};
-    double dt = 0.0;         ///< since the previous pair, s
-    bool continued = false;  ///< the map is of this stream
-    bool frozen = false;     ///< repeats the images of the previous pair
+    double dt = 0.0;  ///< since the previous pair, s
+    /// Without a map of its stream; after an outage; with images that repeat although the camera moved; after a pose.
+    enum { kFirst, kSought, kFrozen, kFollowed } is = kFirst;
 
     const StereoFeatures& whole() const { return refocused ? *refocused : given; }
     const StereoFeatures& taken() const { return new_part ? *new_part : whole(); }
@@ -89,6 +89,7 @@ class VisualOdometry {
 
   void refuse(const StereoFeatures& features) const;
   Pair usable(const StereoFeatures& given, const std::optional<MotionGuess>& guess) const;
+  std::optional<Eigen::Isometry3d> expectedMotion(double dt, const std::optional<MotionGuess>& guess) const;
   bool isFrozen(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
   std::optional<StereoFeatures> inStep(const StereoFeatures& taken, double dt,
                                        const std::optional<MotionGuess>& guess) const;
@@ -98,15 +99,18 @@ class VisualOdometry {
   std::optional<Floor> floor() const;
 
   void begin(const Pair& pair, const std::optional<MotionGuess>& guess);
-  void watchShutters(const Pair& pair, const MotionHypothesis& found);
-  Step extendMap(const StereoFeatures& features, const MotionScene& scene, MotionHypothesis& found, double dt);
+  std::optional<MeasuredPair> measuredPair(const Pair& pair, const MotionHypothesis& found) const;
+  std::vector<Evidence> evidenceAgainst(const Pair& pair, const MotionHypothesis& found,
+                                        const std::optional<MeasuredPair>& measured);
+  Step extendMap(const StereoFeatures& features, const MotionScene& scene, MotionHypothesis& found, double dt,
+                 const std::vector<Evidence>& evidence);
   Candidate adjustBeyondDoubt(const StereoFeatures& features, const MotionScene& scene, MotionHypothesis& found);
   Candidate adjust(const StereoFeatures& features, const MotionHypothesis& found, bool may_recall);
   void commit(const Candidate& candidate, double probability);
   Step measure(const MotionHypothesis& found, const Candidate& candidate);
-  void judge(const MotionScene& scene, const MotionHypothesis& found, const Candidate& candidate,
-             const MotionDoubt& doubt, Step& step);
-  void finish(const Pair& pair, const MotionHypothesis* found, Step& step);
+  void judge(const MotionScene& scene, const MotionHypothesis& found, const Candidate& candidate, const Belief& belief,
+             Step& step);
+  void finish(const Pair& pair, Step& step);
 
   VisualOdometryOptions options_;
   Eigen::Isometry3d T_base_camera_;

@@ -13,7 +13,7 @@ struct CalibrationOptions {
   double prior_bend = 0.0;
   double prior_sigma = 1.0;
   double right_delay = 0.0;
-  double trust = 0.1;
+  double trust = 0.16;
 
   void describe(OptionList& list) {
     list.add("enabled", enabled, "estimate the rig's residual disparity error while driving and compensate it");
@@ -50,6 +50,8 @@ class CalibrationFilter {
   void noteCommon(double square);
 
   const RigCalibration& calibration() const { return calibration_; }
+  /// What options and windows tell together, whether it is significant or not.
+  CalibrationEstimate estimate() const;
   /// Standard deviations of (offset, bend) in px as the windows measure them, NaN before the first window.
   RigCalibration::Vector sigma() const;
 

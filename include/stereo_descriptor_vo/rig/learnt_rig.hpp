@@ -1,18 +1,35 @@
 #pragma once
 
+#include <vector>
+
+#include "stereo_descriptor_vo/belief/belief.hpp"
 #include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
 #include "stereo_descriptor_vo/rig/calibration_filter.hpp"
 #include "stereo_descriptor_vo/rig/right_camera_delay.hpp"
-#include "stereo_descriptor_vo/rig/right_camera_rotation.hpp"
+#include "stereo_descriptor_vo/rig/row_pattern.hpp"
 #include "stereo_descriptor_vo/rig/row_readout.hpp"
 
 namespace sdvo {
 
-/// Calibration, delay, readout and noise of the rig, estimated from its pairs.
+/// A pair whose motion was measured, as its rig learns from it.
+struct MeasuredPair {
+  const StereoFeatures& features;  ///< as taken
+  double dt;                       ///< s, since the pair before
+  Eigen::Isometry3d T_current_reference;
+  double since_reference;  ///< s
+  std::vector<RowMotion> rows;
+
+  /// Mean of the camera in its own frame since the reference, m/s and rad/s.
+  Vector6d velocity() const { return logSE3(T_current_reference.inverse()) / since_reference; }
+};
+
+/// Calibration, rows, delay, readout and noise of the rig, estimated from its pairs.
 struct LearntRig {
   CalibrationFilter calibration;
-  RightCameraRotation right_rotation;
+  RowPattern usual_rows{RowDelay::kMemory};  ///< of confirmed pairs
+  RowPattern recent_rows{kUsualMemory};      ///< of all pairs: of the rig that the map is of
+  double usual_turn = 0.0;                   ///< px^2: square of the rows' change from pair to pair
   RightCameraDelay right_delay;
   RowReadout readout;
   Noise noise;
@@ -20,8 +37,13 @@ struct LearntRig {
 
   LearntRig(const CalibrationOptions& options, const Noise& assumed);
 
-  /// Takes in what agreement and what noise a confirmed motion has, and how its rig changed.
-  void learn(const MotionHypothesis& confirmed);
+  /// Log-odds that the right camera turned since the last pairs.
+  double logOddsOfTurn(const StereoFeatures& features) const;
+
+  /// Takes in a pair whose motion is believed: confirmed ones teach all of it, doubted ones what follows the map alone.
+  /// `measured` is null where the pair has no motion.
+  void learn(const StereoFeatures& features, const MeasuredPair* measured, const MotionHypothesis& found,
+             bool is_confirmed);
 };
 
 }  // namespace sdvo

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "stereo_descriptor_vo/belief/motion_doubt.hpp"
+#include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/rig/row_delay.hpp"
@@ -16,7 +16,7 @@ namespace sdvo {
 /// A point that agrees with the motion.
 struct RowMotion {
   double velocity;  ///< down in the left image, px/s
-  double dv;        ///< v_right - v_left, px
+  double dv;        ///< v_right - v_left beyond what is usual at its place, px
 };
 
 /// The time by which the right image is taken later than the left one, and what it does to the features. A turn
@@ -26,9 +26,13 @@ class RightCameraDelay {
   /// `prior`, s: what is known beforehand.
   explicit RightCameraDelay(double prior = 0.0);
 
-  /// Takes note of a pair, as taken, with the camera's mean velocity (its own frame, m/s and rad/s) over the `dt` s
-  /// before it. `rows` are of its points.
-  void measure(const StereoFeatures& features, const std::vector<RowMotion>& rows, double dt, const Vector6d& velocity);
+  /// Evidence of a pair `dt` s after the one before for a right image that is another pair's. `row_error`, px: standard
+  /// deviation of a row in the left image.
+  void watch(const std::vector<RowMotion>& rows, double dt, double row_error);
+
+  /// Takes in a pair, as taken, with the camera's mean velocity (its own frame, m/s and rad/s) over the `dt` s before
+  /// it. What the last pairs taught is taken back once the right images are likely those of other pairs.
+  void learn(const StereoFeatures& features, double dt, const Vector6d& velocity, bool is_confirmed);
   /// The next pair does not continue the last one.
   void interrupt() { pairs_.clear(); }
 
@@ -48,6 +52,8 @@ class RightCameraDelay {
   /// Standard deviation of the position, m, from turns whose features were not compensated as they would be now, and
   /// from the error of what is known. A rig in step has none.
   double drift() const;
+  /// The position is known anew.
+  void forgetDrift() { exposed_ = compensated_ = 0.0; }
 
   /// The features as the right camera would have seen them at the left one's moment. `velocity`: the mean over the
   /// `dt` s before the pair.
@@ -63,9 +69,11 @@ class RightCameraDelay {
 
   double prior_;
   RowDelay rows_;
+  RowDelay newer_, older_;  ///< as they were some tens of pairs ago
+  int taught_ = 0;          ///< pairs
   std::deque<Pair> pairs_;  ///< the last ones
   /// Log-odds of a right image that is the pair's before or after.
-  double earlier_ = CarriedDoubt::kUnsuspected, later_ = CarriedDoubt::kUnsuspected;
+  double earlier_ = kUnsuspected, later_ = kUnsuspected;
   /// m/s: distance times relative error of the depth for each second of delay. m: the same as it was compensated.
   double exposed_ = 0.0, compensated_ = 0.0;
 };

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
+#include "stereo_descriptor_vo/common/se3.hpp"
+
+namespace sdvo {
+
+/// Something that may have misled a pair: log-odds that it did, and in words.
+struct Evidence {
+  double log_odds;
+  std::string cause;
+};
+
+/// What is believed of a pair's motion.
+struct Belief {
+  double probability = 1.0;  ///< that it is the camera's
+  /// Second moment of its error where it is not, times the probability of that, m and rad: of this motion, and of the
+  /// pose since the doubt began.
+  Matrix6d moment = Matrix6d::Zero(), pose_moment = Matrix6d::Zero();
+  std::string reason;  ///< in words, of the likeliest alternative
+};
+
+/// The doubt that pairs leave to those after them: log-odds that what is followed is not the camera's motion, or not in
+/// a sound map. It is one event, from the pair that raised it until it has faded or lasting points speak against it.
+class Doubt {
+ public:
+  double logOdds() const { return log_odds_; }
+  /// Whether it is still twice as likely as without a cause.
+  bool lasts() const;
+  /// In words, of the largest doubt that lasts.
+  const std::string& cause() const { return cause_; }
+
+  /// Posterior of a motion: its rivals, the prior, what the pair itself shows and what the pairs before left.
+  Belief weigh(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence);
+  /// A pair without a measured motion shows only this.
+  void raise(const std::vector<Evidence>& evidence);
+  /// A pair is over: doubt fades.
+  void pass();
+
+ private:
+  void raise(double log_odds, const std::string& cause);
+
+  double log_odds_ = kUnsuspected;
+  std::string cause_;
+  Matrix6d deviation_ = Matrix6d::Zero();  ///< second moment of the pose's error if the doubt is right, m and rad
+};
+
+/// The pair's own evidence against its motion.
+std::string innovationWords(const MotionHypothesis& found);
+
+}  // namespace sdvo

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <optional>
+
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/rig/row_delay.hpp"
+
+namespace sdvo {
+
+/// How much lower a rig shows points in its right image (dv, px), as a rule, in each part of the image. Rectification
+/// leaves errors that last at their place. So a pair speaks of a change only by its difference from this pattern.
+class RowPattern {
+ public:
+  /// `memory`: ratio of the past that a pair leaves.
+  explicit RowPattern(double memory) : memory_(memory) {}
+
+  void learn(const StereoFeatures& features);
+
+  /// dv of a feature beyond what is usual in its part, px; dv itself where nothing is known.
+  double change(const StereoFeatures& features, int i) const;
+
+  /// The rotation of the right camera, rad about the axes of the left optical frame, that all parts have in common.
+  /// With x and y as normalised coordinates in the right image, a small rotation w moves the right view by
+  ///   dv = f * (w_x * (1 + y^2) - w_z * x - w_y * x * y).
+  struct Rotation {
+    Eigen::Vector3d value;
+    Eigen::Matrix3d covariance;  ///< sandwich (White 1980) over parts: errors within a part are alike
+    Eigen::Matrix3d spread;      ///< covariance of a rotation that shifts the rows by 1 px (root mean square)
+  };
+  /// Of the pattern. None where too few parts are known.
+  std::optional<Rotation> rotation() const;
+  /// Of a pair against the pattern. None where too few parts of it are known.
+  std::optional<Rotation> change(const StereoFeatures& features) const;
+
+ private:
+  struct Part {
+    double weight = 0.0, dv = 0.0;                           ///< number of features; mean, px
+    Eigen::RowVector3d effect = Eigen::RowVector3d::Zero();  ///< mean derivative of dv by the rotation, px/rad
+  };
+  using Parts = std::array<Part, RowDelay::kParts>;
+  static Parts partsOf(const StereoFeatures& features);
+  static std::optional<Rotation> fit(const Parts& parts);
+
+  double memory_;
+  Parts parts_;
+};
+
+}  // namespace sdvo

@@ -1,0 +1,101 @@
+#include "stereo_descriptor_vo/rig/row_pattern.hpp"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+namespace sdvo {
+namespace {
+
+std::size_t partOf(const StereoFeatures& features, int i) {
+  const StereoCamera& camera = features.camera;
+  return static_cast<std::size_t>(RowDelay::cellOf(features.u[i], features.v[i], camera.width, camera.height));
+}
+
+Eigen::RowVector3d effectOfRotation(const StereoFeatures& features, int i) {
+  const StereoCamera& camera = features.camera;
+  const double x = (features.u[i] - features.disparity[i] - camera.cx) / camera.fx;
+  const double y = (features.v[i] - camera.cy) / camera.fy;
+  return camera.fy * Eigen::RowVector3d(1.0 + y * y, -x * y, -x);
+}
+
+}  // namespace
+
+/// Medians: a part has wrong matches.
+RowPattern::Parts RowPattern::partsOf(const StereoFeatures& features) {
+  Parts parts;
+  std::array<std::vector<double>, RowDelay::kParts> dv;
+  for (int i = 0; i < features.count(); ++i) {
+    const std::size_t p = partOf(features, i);
+    dv[p].push_back(features.dv[i]);
+    parts[p].effect += effectOfRotation(features, i);
+  }
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    if (dv[p].empty()) continue;
+    parts[p].weight = static_cast<double>(dv[p].size());
+    parts[p].effect /= parts[p].weight;
+    std::sort(dv[p].begin(), dv[p].end());
+    parts[p].dv = 0.5 * (dv[p][(dv[p].size() - 1) / 2] + dv[p][dv[p].size() / 2]);
+  }
+  return parts;
+}
+
+void RowPattern::learn(const StereoFeatures& features) {
+  const Parts now = partsOf(features);
+  for (std::size_t p = 0; p < now.size(); ++p) {
+    Part& part = parts_[p];
+    part.weight = memory_ * part.weight + now[p].weight;
+    if (!(now[p].weight > 0.0)) continue;
+    const double ratio = now[p].weight / part.weight;
+    part.dv += ratio * (now[p].dv - part.dv);
+    part.effect += ratio * (now[p].effect - part.effect);
+  }
+}
+
+double RowPattern::change(const StereoFeatures& features, int i) const {
+  return features.dv[i] - parts_[partOf(features, i)].dv;
+}
+
+std::optional<RowPattern::Rotation> RowPattern::rotation() const {
+  return fit(parts_);
+}
+
+std::optional<RowPattern::Rotation> RowPattern::change(const StereoFeatures& features) const {
+  Parts changes = partsOf(features);
+  for (std::size_t p = 0; p < changes.size(); ++p) {
+    if (!(parts_[p].weight > 0.0)) changes[p].weight = 0.0;
+    changes[p].dv -= parts_[p].dv;
+  }
+  return fit(changes);
+}
+
+/// Least squares over the parts, each with the weight of its features.
+std::optional<RowPattern::Rotation> RowPattern::fit(const Parts& parts) {
+  constexpr double kFewest = 6.0;  // parts: three rotations and as much to tell their errors from (chosen)
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d product = Eigen::Vector3d::Zero();
+  double known = 0.0, weight = 0.0;
+  for (const Part& part : parts) {
+    if (!(part.weight > 0.0)) continue;
+    ++known, weight += part.weight;
+    information += part.weight * part.effect.transpose() * part.effect;
+    product += part.weight * part.dv * part.effect.transpose();
+  }
+  if (known < kFewest) return std::nullopt;
+  constexpr double kSteady = 1e-3;  // keeps the equations solvable where all parts lie in a line, 1/rad^2
+  const Eigen::Matrix3d inverse = (information + kSteady * Eigen::Matrix3d::Identity()).inverse();
+  Rotation rotation{inverse * product, Eigen::Matrix3d::Zero(), weight / 3.0 * inverse};
+  for (const Part& part : parts) {
+    // A residual is smaller than its error by the part's leverage (MacKinnon and White 1985, HC3).
+    const double leverage = part.weight * part.effect * inverse * part.effect.transpose();
+    const double error = (part.dv - part.effect.dot(rotation.value)) / (1.0 - leverage);
+    const Eigen::Vector3d gradient = part.weight * error * part.effect.transpose();
+    rotation.covariance += gradient * gradient.transpose();
+  }
+  rotation.covariance = (inverse * rotation.covariance * inverse).eval();
+  return rotation;
+}
+
+}  // namespace sdvo

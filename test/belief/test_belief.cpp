@@ -1,0 +1,95 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "stereo_descriptor_vo/belief/belief.hpp"
+
+namespace sdvo {
+namespace test_belief {
+
+Doubt after(double log_odds, const std::string& cause) {
+  Doubt doubt;
+  doubt.raise({{log_odds, cause}});
+  return doubt;
+}
+
+TEST(Doubt, FadesByHalves) {
+  EXPECT_NEAR(probabilityOf(Doubt().logOdds()), 0.001, 1e-4);
+  Doubt doubt = after(kCertain, "a knock");
+  EXPECT_NEAR(probabilityOf(doubt.logOdds()), 0.999, 1e-4);
+  doubt.raise({{0.0, "less"}});
+  EXPECT_EQ(doubt.cause(), "a knock");
+  int doubtful = 0;
+  for (; doubt.logOdds() > logOdds(0.05); ++doubtful) doubt.pass();
+  EXPECT_EQ(doubtful, 4) << "as many pairs as make a point a lasting one";
+  doubt.raise({{50.0, "anything"}});
+  EXPECT_LE(doubt.logOdds(), kCertain);
+}
+
+TEST(Doubt, LastsUntilItSaysNothing) {
+  EXPECT_FALSE(Doubt().lasts());
+  Doubt doubt = after(logOdds(0.05), "a knock");
+  EXPECT_TRUE(doubt.lasts());
+  int pairs = 0;
+  for (; doubt.lasts(); ++pairs) doubt.pass();
+  EXPECT_NEAR(probabilityOf(doubt.logOdds()), 0.0015, 0.0005);
+  EXPECT_GT(pairs, 4) << "longer than it makes a motion doubtful";
+}
+
+/// A motion of 2 m without a prior, and a hundred lasting points, of which so many agree.
+class Weighed : public testing::Test {
+ protected:
+  Belief weigh(Doubt& doubt, int agreeing, const std::vector<Evidence>& evidence = {}) {
+    MotionHypothesis found;
+    found.motion.T_current_reference.translation().z() = -2.0;
+    found.agreement.lasting_matches = 100;
+    found.agreement.lasting_inliers = agreeing;
+    return doubt.weigh(scene_, found, evidence);
+  }
+
+  LocalMap map_{{}};
+  StereoFeatures features_;
+  MotionScene scene_{map_, {}, features_, {}, {}, {}};
+};
+
+TEST_F(Weighed, WhereNothingIsExpectedTheMotionIsAsUncertainAsItIsLong) {
+  MotionHypothesis found;
+  found.motion.T_current_reference.translation().z() = -2.0;
+  const Belief belief = after(kCertain, "a knock").weigh(scene_, found, {});
+  EXPECT_NEAR(belief.probability, 0.001, 1e-4);
+  EXPECT_NEAR(std::sqrt(belief.moment(2, 2)), 2.0, 0.1);
+}
+
+TEST_F(Weighed, AMotionThatNothingSpeaksAgainstIsBelieved) {
+  Doubt doubt;
+  EXPECT_GT(weigh(doubt, 90).probability, 0.99);
+  EXPECT_FALSE(doubt.lasts());
+}
+
+TEST_F(Weighed, EvidenceMakesThePairDoubtfulWhateverAgrees) {
+  Doubt doubt;
+  const Belief belief = weigh(doubt, 90, {{kUnsuspected, "nothing"}, {2.0, "a knock"}});
+  EXPECT_NEAR(belief.probability, probabilityOf(-2.0), 0.02);
+  EXPECT_EQ(belief.reason.rfind("a knock", 0), 0u) << belief.reason;
+}
+
+TEST_F(Weighed, LastingPointsTakeADoubtBack) {
+  Doubt agreed = after(kCertain, "a knock"), contradicted = agreed;
+  agreed.pass(), contradicted.pass();
+  EXPECT_GT(weigh(agreed, 95).probability, 0.95) << "in the next pair";
+  const Belief belief = weigh(contradicted, 10);
+  EXPECT_LT(belief.probability, 0.01);
+  EXPECT_EQ(belief.reason.rfind("a moment ago a knock", 0), 0u) << belief.reason;
+}
+
+TEST_F(Weighed, ADoubtThatLastsIsOneEventOfThePose) {
+  Doubt doubt;
+  const Belief first = weigh(doubt, 10, {{kCertain, "a knock"}});
+  doubt.pass();
+  const Belief second = weigh(doubt, 10, {{kCertain, "a knock"}});
+  EXPECT_NEAR(second.moment(2, 2), first.moment(2, 2), 0.01);
+  EXPECT_NEAR(second.pose_moment(2, 2), 2.0 * first.pose_moment(2, 2), 0.01) << "both motions may be wrong";
+}
+
+}  // namespace test_belief
+}  // namespace sdvo

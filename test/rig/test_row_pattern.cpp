@@ -1,0 +1,156 @@
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "../synthetic_scene.hpp"
+#include "stereo_descriptor_vo/common/se3.hpp"
+#include "stereo_descriptor_vo/rig/learnt_rig.hpp"
+#include "stereo_descriptor_vo/rig/row_pattern.hpp"
+
+namespace sdvo {
+namespace test_row_pattern {
+
+/// A grid of features with large disparities, whose vertical ones come from turning the right camera by `rotation`: the
+/// rays themselves are turned.
+StereoFeatures gridSeenWith(const Eigen::Vector3d& rotation) {
+  StereoFeatures features = synthetic::noFeatures(synthetic::camera());
+  const StereoCamera& camera = features.camera;
+  for (int row = 0; row < 9; ++row)
+    for (int column = 0; column < 12; ++column) {
+      const float u = 140.f + 40.f * static_cast<float>(column), v = 30.f + 50.f * static_cast<float>(row);
+      const float disparity = 60.f + 10.f * static_cast<float>((row + column) % 5);
+      const Eigen::Vector3d ray((u - disparity - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0);
+      const Eigen::Vector3d turned = expSO3(-rotation) * ray;
+      const auto dv = static_cast<float>(camera.fy * (turned.y() / turned.z() - ray.y()));
+      features.append({u, v, disparity, dv, 10.f, -1.f, 1.f});
+    }
+  return features;
+}
+
+TEST(RowPattern, IsUnknownBeforeTheFirstFeatures) {
+  RowPattern pattern(0.9);
+  EXPECT_FALSE(pattern.rotation());
+  pattern.learn(synthetic::noFeatures(synthetic::camera()));
+  EXPECT_FALSE(pattern.rotation());
+  const StereoFeatures features = gridSeenWith({1e-3, 0.0, 0.0});
+  EXPECT_FALSE(pattern.change(features));
+  EXPECT_EQ(pattern.change(features, 5), features.dv[5]);
+}
+
+TEST(RowPattern, FindsEachAxisWithItsSign) {
+  for (int axis = 0; axis < 3; ++axis)
+    for (const double angle : {-1e-3, 1e-3}) {
+      const Eigen::Vector3d truth = angle * Eigen::Vector3d::Unit(axis);
+      RowPattern pattern(0.9);
+      pattern.learn(gridSeenWith(truth));
+      EXPECT_LT((pattern.rotation()->value - truth).norm(), 0.1e-3)
+          << "axis " << axis << ": " << pattern.rotation()->value.transpose();
+    }
+}
+
+TEST(RowPattern, AWrongMatchDoesNotMatter) {
+  const Eigen::Vector3d truth(0.4e-3, -2.0e-3, 1.1e-3);
+  RowPattern right(0.9), wrong(0.9);
+  StereoFeatures features = gridSeenWith(truth);
+  right.learn(features);
+  features.dv[3] = 40.f;
+  features.dv[70] = -25.f;
+  wrong.learn(features);
+  EXPECT_LT((wrong.rotation()->value - right.rotation()->value).norm(), 0.2e-3);
+}
+
+TEST(RowPattern, FollowsARigThatChanges) {
+  const Eigen::Vector3d before(1e-3, 0.0, 0.0), after(-1e-3, 0.0, 0.0);
+  RowPattern pattern(0.9);
+  for (int k = 0; k < 50; ++k) pattern.learn(gridSeenWith(before));
+  EXPECT_LT((pattern.change(gridSeenWith(after))->value - (after - before)).norm(), 0.05e-3);
+  pattern.learn(gridSeenWith(after));
+  EXPECT_LT((pattern.rotation()->value - before).norm(), 0.25e-3) << "one pair counts as one of ten";
+  for (int k = 0; k < 50; ++k) pattern.learn(gridSeenWith(after));
+  EXPECT_LT((pattern.rotation()->value - after).norm(), 0.05e-3);
+}
+
+TEST(RowPattern, WhatLastsAtItsPlaceIsNoChange) {
+  // Rectification that errs by up to a pixel, otherwise in each part.
+  StereoFeatures features = gridSeenWith({0.5e-3, 0.0, 1e-3});
+  for (int i = 0; i < features.count(); ++i)
+    features.dv[i] += static_cast<float>(std::sin(0.02 * features.u[i]) * std::cos(0.03 * features.v[i]));
+  RowPattern pattern(0.9);
+  pattern.learn(features);
+  const auto change = pattern.change(features);
+  EXPECT_LT(change->value.norm(), 1e-6);
+}
+
+LearntRig steady(const StereoFeatures& features) {
+  LearntRig rig({}, Noise({}));
+  for (int k = 0; k < 20; ++k) rig.learn(features, nullptr, {}, true);
+  return rig;
+}
+
+TEST(LearntRig, ATurnOfTheRightCameraIsEvidenceWhileTheMapIsOfTheRigBefore) {
+  const StereoFeatures before = gridSeenWith({0.3e-3, 0.0, -0.5e-3}), turned = gridSeenWith({0.3e-3, 0.0, 6e-3});
+  LearntRig rig = steady(before);
+  EXPECT_LT(rig.logOddsOfTurn(before), logOdds(0.05));
+  EXPECT_GT(rig.logOddsOfTurn(turned), 0.0);
+  int pairs = 0;
+  for (; rig.logOddsOfTurn(turned) > logOdds(0.05); ++pairs) rig.learn(turned, nullptr, {}, false);
+  EXPECT_GT(pairs, 2);
+  EXPECT_LT(pairs, 40) << "a lasting knock is the rig's own soon";
+  for (int k = 0; k < 20; ++k) rig.learn(turned, nullptr, {}, false);
+  EXPECT_GT(rig.logOddsOfTurn(before), 0.0) << "a return is a turn";
+}
+
+TEST(LearntRig, AFewFeaturesTellOfNoTurn) {
+  const LearntRig rig = steady(gridSeenWith(Eigen::Vector3d::Zero()));
+  StereoFeatures wrong = synthetic::noFeatures(synthetic::camera());
+  EXPECT_EQ(rig.logOddsOfTurn(wrong), kUnsuspected);
+  for (int i = 0; i < 3; ++i) wrong.append({200.f + 100.f * static_cast<float>(i), 150.f, 60.f, 1.4f, 10.f, -1.f, 1.f});
+  EXPECT_EQ(rig.logOddsOfTurn(wrong), kUnsuspected);
+}
+
+TEST(LearntRig, ARigWhoseRowsAlwaysChangeIsNotSaidToTurn) {
+  LearntRig rig = steady(gridSeenWith(Eigen::Vector3d::Zero()));
+  for (int k = 0; k < 100; ++k) {
+    const StereoFeatures features = gridSeenWith(Eigen::Vector3d(0.0, 0.0, 3e-3 * std::sin(0.1 * k)));
+    EXPECT_LT(rig.logOddsOfTurn(features), logOdds(0.05)) << "pair " << k;
+    rig.learn(features, nullptr, {}, true);
+  }
+  EXPECT_GT(rig.logOddsOfTurn(gridSeenWith(Eigen::Vector3d(0.0, 0.0, 60e-3))), 0.0);
+}
+
+/// Mean square of each axis' error by the mean variance, of rigs whose rows err by 0.2 px, in each feature or in whole
+/// parts of the image.
+Eigen::Vector3d squareByVariance(bool is_alike) {
+  constexpr int kRigs = 200;
+  std::mt19937 random(1);
+  std::normal_distribution<float> normal(0.f, 0.2f);
+  const StereoFeatures exact = gridSeenWith(Eigen::Vector3d::Zero());
+  Eigen::Vector3d square = Eigen::Vector3d::Zero(), variance = square;
+  for (int rig = 0; rig < kRigs; ++rig) {
+    StereoFeatures features = exact;
+    std::array<float, RowDelay::kParts> parts;
+    for (float& part : parts) part = normal(random);
+    for (int i = 0; i < features.count(); ++i)
+      features.dv[i] =
+          is_alike
+              ? parts[RowDelay::cellOf(features.u[i], features.v[i], features.camera.width, features.camera.height)]
+              : normal(random);
+    RowPattern pattern(0.9);
+    pattern.learn(features);
+    const auto rotation = pattern.rotation();
+    square += rotation->value.cwiseAbs2();
+    variance += rotation->covariance.diagonal();
+  }
+  return square.cwiseQuotient(variance);
+}
+
+TEST(RowPattern, CovarianceIsThatOfTheErrorsHoweverAlikeTheyAreInAPart) {
+  for (const bool is_alike : {false, true})
+    for (const double ratio : squareByVariance(is_alike)) EXPECT_NEAR(ratio, 1.0, 0.35);
+}
+
+}  // namespace test_row_pattern
+}  // namespace sdvo
