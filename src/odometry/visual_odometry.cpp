@@ -397,7 +397,8 @@ void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& fou
   Matrix6d covariance = candidate.adjustment.since_keyframe;
   std::string reason;
   if (found.innovation > noiseGate(6)) {
-    // The stamps may be wrong, or the camera did what none does. The pose does not rest on stamps, but the velocity does.
+    // The stamps may be wrong, or the camera did what none does. The pose does not rest on stamps, but the velocity
+    // does.
     const Vector6d innovation = scene.prior.front().innovation(found.motion.T_current_reference.inverse());
     covariance += innovation * innovation.transpose();
     add(innovation * innovation.transpose(), Matrix6d::Zero());

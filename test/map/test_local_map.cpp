@@ -605,7 +605,7 @@ TEST(LocalMap, AdjustmentMovesTheNewestPairToWhereItsPointsSayItIs) {
   WindowOptimizer optimizer = thorough();
   const LocalMap::Adjustment adjustment = map.adjust(optimizer, noRigError(), calibration);
   ASSERT_TRUE(adjustment.success);
-  EXPECT_TRUE(adjustment.rejected_rows.empty());
+  EXPECT_TRUE(adjustment.rejected.empty());
   EXPECT_LT(logSE3(map.newestPose() * second.inverse()).norm(), 1e-4);
   EXPECT_LT(calibration.value.norm(), 1e-6);
 }
@@ -655,7 +655,7 @@ TEST(LocalMap, APointKeepsItsAppearanceWhenASightingTurnsOutWrong) {
   WindowOptimizer optimizer = thorough();
   const LocalMap::Adjustment adjustment = map.adjust(optimizer, noRigError(), calibration);
   ASSERT_TRUE(adjustment.success);
-  EXPECT_EQ(adjustment.rejected_rows, std::vector<int>{17});
+  EXPECT_EQ(adjustment.rejected, std::vector<int>{17});
   map.renewAppearance(features, sightings);
 
   const LocalMap::View view = map.view();
