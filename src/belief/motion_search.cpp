@@ -233,7 +233,14 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene
   Eigen::Isometry3d T_lasting = T;
   const NormalEquations equations = refineMotion(camera, options(scene), lasting, T_lasting);
   const Vector6d difference = logSE3(T_lasting * T.inverse());
-  const Matrix6d information = equations.hessian / equations.variance();
+  // The lasting points are a part of all, so the difference has the covariance of the part less that of all (Hausman
+  // 1978). With the others' information O its inverse is H + H O^-1 H.
+  MotionEstimatorOptions at_once = options(scene);
+  at_once.refinement_iterations = 0;
+  Eigen::Isometry3d T_all = T;
+  const Matrix6d of_others = refineMotion(camera, at_once, others, T_all).hessian;
+  const Matrix6d of_lasting = equations.hessian;
+  const Matrix6d information = (of_lasting + of_lasting * of_others.ldlt().solve(of_lasting)) / equations.variance();
   const double log_factor =
       logBayesFactor<6>(difference, information / scene.noise.shared(), scene.prior.front().covariance);
   if (kUnsuspected + log_factor > 0.0) return T_lasting;

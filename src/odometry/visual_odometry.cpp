@@ -53,6 +53,7 @@ void VisualOdometry::configure(const VisualOdometryOptions& options) {
   revisit_ = Revisit(options_.matcher, options_.motion, options_.alignment);
   optimizer_ = WindowOptimizer(options_.window);
   state_.prior.configure(options.tracking);
+  if (state_.map) state_.map->assume(options_.noise);
 }
 
 void VisualOdometry::reset() {
@@ -219,15 +220,16 @@ std::optional<StereoFeatures> VisualOdometry::inStep(const StereoFeatures& taken
   const MotionHypothesis found = search_.find(sceneOf(features, dt, guess), largestDoubt());
   if (!found.motion.success) return features;
   return state_.rig.right_delay.inStep(
-      taken, dt, logSE3(found.motion.T_current_reference.inverse()) / state_.secondsSinceMap(taken));
+      taken, dt,
+      logSE3(found.motion.T_current_reference.inverse()) / state_.prior.interval(state_.secondsSinceMap(taken)));
 }
 
 /// The pair with the motion that the search found; nothing without one, and none that spans an outage.
 std::optional<MeasuredPair> VisualOdometry::measuredPair(const Pair& pair, const MotionHypothesis& found) const {
   if (!found.motion.success || state_.interrupted || !(pair.dt > 0.0)) return std::nullopt;
   const StereoFeatures& taken = pair.taken();
-  const double since = state_.secondsSinceMap(taken);
-  return MeasuredPair{taken, pair.dt, found.motion.T_current_reference, since,
+  const double since = state_.prior.interval(state_.secondsSinceMap(taken));
+  return MeasuredPair{taken, state_.prior.interval(pair.dt), found.motion.T_current_reference, since,
                       rowMotions(taken, found, since, state_.rig.usual_rows)};
 }
 
@@ -245,8 +247,8 @@ std::vector<Evidence> VisualOdometry::evidenceAgainst(const Pair& pair, const Mo
   if (!measured) return evidence;
   rig.readout.add(measured->features.camera, measured->T_current_reference, found.correspondences, found.motion.inliers,
                   measured->velocity());
-  rig.right_delay.watch(measured->rows, pair.dt, options_.noise.corner * rig.noise.scale());
-  const RightCameraDelay::Partner partner = rig.right_delay.partner(pair.dt);
+  rig.right_delay.watch(measured->rows, measured->dt, options_.noise.corner * rig.noise.scale());
+  const RightCameraDelay::Partner partner = rig.right_delay.partner(measured->dt);
   evidence.push_back({partner.log_odds, partner.words()});
   evidence.push_back(
       {kUnsuspected + state_.prior.logRatioOfSwap(measured->T_current_reference.inverse(), measured->since_reference),
