@@ -28,7 +28,7 @@ std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHy
   rows.reserve(found.motion.inliers.size());
   for (const int i : found.motion.inliers) {
     const auto [reference, current, distance] = found.matches[static_cast<std::size_t>(i)];
-    const Eigen::Vector3d now = found.motion.T_current_reference * found.view->rows.positions[reference];
+    const Eigen::Vector3d now = found.motion.T_current_reference * found.view->points.positions[reference];
     rows.push_back(
         {(features.camera.project(now).y() - found.view->pixels[reference].y) / dt, usual.change(features, current)});
   }
@@ -348,7 +348,7 @@ VisualOdometry::Candidate VisualOdometry::adjustBeyondDoubt(const StereoFeatures
   const bool is_sound = !state_.doubt.lasts();
   const bool was_beyond_doubt = search_.isBeyondDoubt(scene, found, largestDoubt());
   Candidate candidate = adjust(features, found, is_sound);
-  found.reject(candidate.adjustment.rejected_rows);
+  found.reject(candidate.adjustment.rejected);
   if (!was_beyond_doubt || search_.isBeyondDoubt(scene, found, largestDoubt())) return candidate;
   MotionScene suspected = scene;
   suspected.is_suspected = true;
@@ -356,7 +356,7 @@ VisualOdometry::Candidate VisualOdometry::adjustBeyondDoubt(const StereoFeatures
   if (!chosen.motion.success) return candidate;
   found = std::move(chosen);
   candidate = adjust(features, found, is_sound);
-  found.reject(candidate.adjustment.rejected_rows);
+  found.reject(candidate.adjustment.rejected);
   return candidate;
 }
 
@@ -378,7 +378,7 @@ VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features,
   // The window's first pose does not move in the adjustment: what it carries in height and tilt goes with the whole
   // map.
   if (floor) map.moveTo(floor->settled(map.newestPose(), state_.covariance.value()));
-  map.renewLooks(features, found.sightings);
+  map.renewAppearance(features, found.sightings);
   // What the adjustment did to the map as a whole is no motion.
   const Eigen::Isometry3d T_before_after = candidate.T_keyframe_origin.inverse() * map.poseBeforeNewest();
   candidate.motion = T_previous_origin * T_before_after * map.newestPose().inverse();
@@ -435,7 +435,7 @@ VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, cons
   const LocalMap& map = *state_.map;
   Step step;
   step.state = TrackingState::kTracking;
-  step.rejected_rows = candidate.adjustment.rejected_rows;
+  step.rejected_rows = candidate.adjustment.rejected;
   step.T_previous_current = (map.newestPose() * state_.T_origin_camera).inverse();
   if (!candidate.adjustment.success) {
     step.covariance = found.motion.covariance;
