@@ -73,8 +73,7 @@ void follow(sdvo::Recording& recording, const Arguments& arguments, Drive& drive
       if (!arguments.pictures.empty()) {
         std::ostringstream name;
         name << std::setw(6) << std::setfill('0') << drive.whole.pairs() - 1 << ".jpg";
-        cv::imwrite((fs::path(arguments.pictures) / name.str()).string(),
-                    drawLeft(pair, features, drive.whole.last()));
+        cv::imwrite((fs::path(arguments.pictures) / name.str()).string(), drawLeft(pair, features, drive.whole.last()));
       }
       if (seen) seen->check.add(pair, features), seen->pictures.add(pair, features, drive.whole.last());
       if (arguments.halves) {
