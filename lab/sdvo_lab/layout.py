@@ -24,7 +24,8 @@ ROOMS = {
     "places": ("places recognised by features", 2.3),
     "data": ("files of data sets", 3.4),
     "config": ("all options in one place", 2.0),
-    "ros": ("nodelets; messages meet the core", 1.5),
+    "messages": ("messages meet the core", 1.5),
+    "ros": ("nodelets: parameters, topics, threads", 1.5),
     "check": ("steps of a camera's check", 1.0),
     "tools": ("command lines", 2.2),
 }
