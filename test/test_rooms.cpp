@@ -4,7 +4,9 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <map>
+#include <optional>
 #include <regex>
 #include <set>
 #include <string>
@@ -99,17 +101,135 @@ TEST(Rooms, EveryFolderOfTheSourcesIsOne) {
     }
 }
 
+/// The arrows among a room's includes that lead where it may not.
+std::vector<std::string> againstTheFlow(const std::string& room, const std::vector<Include>& includes) {
+  std::vector<std::string> wrong;
+  for (const Include& include : includes) {
+    const std::string other = roomOf(include.header, room);
+    if (other.empty() || other == room || kMayInclude.at(room).count(other) > 0) continue;
+    wrong.push_back(include.file.string() + ":" + std::to_string(include.line) + " includes " + include.header);
+  }
+  return wrong;
+}
+
 TEST(Rooms, EachIncludesOnlyWhatItMay) {
   for (const auto& [room, others] : kMayInclude) {
     const std::vector<Include> includes = includesOf(room);
     EXPECT_FALSE(includes.empty()) << room;
-    for (const Include& include : includes) {
-      const std::string other = roomOf(include.header, room);
-      if (other.empty() || other == room) continue;
-      EXPECT_EQ(others.count(other), 1u) << include.file.string() << ":" << include.line << " includes "
-                                         << include.header;
+    EXPECT_EQ(againstTheFlow(room, includes), std::vector<std::string>{}) << room;
+  }
+}
+
+TEST(Rooms, AnArrowAgainstTheFlowIsFound) {
+  const std::map<std::string, std::string> planted = {
+      {"front_end", "stereo_descriptor_vo/matching/feature_matcher.hpp"},
+      {"motion", "stereo_descriptor_vo/matching/feature_matcher.hpp"},
+      {"matching", "stereo_descriptor_vo/front_end/freak.hpp"},
+      {"map", "stereo_descriptor_vo/belief/pose_covariance.hpp"},
+      {"belief", "stereo_descriptor_vo/rig/row_delay.hpp"},
+      {"rig", "stereo_descriptor_vo/odometry/odometry_result.hpp"},
+      {"odometry", "../places/whatever.hpp"},
+      {"common", "stereo_descriptor_vo/motion/noise.hpp"},
+      {"check", "../tools/recording.hpp"}};
+  for (const auto& [room, header] : planted) {
+    std::vector<Include> includes = includesOf(room);
+    includes.push_back({"planted.cpp", 7, header});
+    EXPECT_EQ(againstTheFlow(room, includes), std::vector<std::string>{"planted.cpp:7 includes " + header}) << room;
+  }
+}
+
+/// Each file of a room and those of the room that it includes, by name.
+using Includes = std::map<std::string, std::set<std::string>>;
+
+Includes includesInside(const std::string& room) {
+  Includes inside;
+  for (const Include& include : includesOf(room))
+    if (roomOf(include.header, room) == room)
+      inside[include.file.filename().string()].insert(fs::path(include.header).filename().string());
+  return inside;
+}
+
+/// How many files the longest chain of includes from a file on has; none where it leads back to itself.
+std::optional<int> floorsOf(const std::string& file, const Includes& inside, std::set<std::string> above = {}) {
+  if (!above.insert(file).second) return std::nullopt;
+  int below = 0;
+  if (inside.count(file) > 0)
+    for (const std::string& other : inside.at(file)) {
+      const std::optional<int> floors = floorsOf(other, inside, above);
+      if (!floors) return std::nullopt;
+      below = std::max(below, *floors);
+    }
+  return 1 + below;
+}
+
+TEST(Rooms, NoneHasMoreThanSixFloors) {
+  constexpr int kMost = 6;
+  for (const auto& [room, others] : kMayInclude) {
+    const Includes inside = includesInside(room);
+    for (const auto& [file, included] : inside) {
+      const std::optional<int> floors = floorsOf(file, inside);
+      ASSERT_TRUE(floors) << room << "/" << file << " includes itself by others";
+      EXPECT_LE(*floors, kMost) << room << "/" << file;
     }
   }
+}
+
+TEST(Rooms, FloorsAreCountedAlongTheLongestChain) {
+  EXPECT_EQ(floorsOf("a.cpp", {{"a.cpp", {"a.hpp", "c.hpp"}}, {"a.hpp", {"b.hpp"}}, {"b.hpp", {"c.hpp"}}}), 4);
+  EXPECT_EQ(floorsOf("alone.cpp", {}), 1);
+  EXPECT_EQ(floorsOf("a.hpp", {{"a.hpp", {"b.hpp"}}, {"b.hpp", {"a.hpp"}}}), std::nullopt);
+}
+
+int linesOf(const fs::path& file) {
+  std::ifstream stream(file);
+  return static_cast<int>(std::count(std::istreambuf_iterator<char>(stream), {}, '\n'));
+}
+
+/// The files of a room and their lines.
+std::map<fs::path, int> filesOf(const std::string& room) {
+  std::map<fs::path, int> files;
+  for (const fs::path& directory : {kSource / "include" / "stereo_descriptor_vo" / room, kSource / "src" / room}) {
+    if (!fs::exists(directory)) continue;
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(directory))
+      files[entry.path()] = linesOf(entry.path());
+  }
+  return files;
+}
+
+/// A newcomer reads a room of the motion side in an evening.
+TEST(Rooms, NoneOfTheMotionSideIsLarge) {
+  constexpr int kMost = 2400;  // lines
+  for (const std::string room : {"motion", "matching", "map", "belief", "rig", "odometry"}) {
+    int lines = 0;
+    for (const auto& [file, of_file] : filesOf(room)) lines += of_file;
+    EXPECT_LE(lines, kMost) << room;
+    EXPECT_GT(lines, 500) << room;
+  }
+}
+
+/// One thought is one file: few are short, and a short header serves more than its own source and one other file.
+TEST(Rooms, ShortFilesAreFew) {
+  constexpr int kShort = 40, kMost = 45;               // lines; files
+  std::map<std::string, std::set<std::string>> users;  // of a header, by its name without ending
+  for (const fs::path& parent : {kSource / "include", kSource / "src", kSource / "test", kSource / "lab"})
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(parent)) {
+      if (entry.path().extension() != ".hpp" && entry.path().extension() != ".cpp") continue;
+      std::ifstream stream(entry.path());
+      for (std::string line; std::getline(stream, line);) {
+        const std::string header = fs::path(headerOf(line)).stem().string();
+        if (header != entry.path().stem()) users[header].insert(entry.path().string());
+      }
+    }
+  int files = 0;
+  for (const auto& [room, others] : kMayInclude)
+    for (const auto& [file, lines] : filesOf(room)) {
+      if (lines >= kShort) continue;
+      ++files;
+      const std::string name = file.stem().string();
+      const bool is_vector_form = name.size() > 5 && name.substr(name.size() - 5) == "_neon";
+      if (file.extension() == ".hpp" && !is_vector_form) EXPECT_GT(users[name].size(), 1u) << file << " has one user";
+    }
+  EXPECT_LE(files, kMost);
 }
 
 /// The lab measures the product; the product builds and runs without it.
@@ -187,7 +307,7 @@ TEST(Rooms, TheSearchKnowsRosHeaders) {
 TEST(Rooms, TheSearchKnowsTheRoomOfAHeader) {
   EXPECT_EQ(roomOf("stereo_descriptor_vo/map/local_map.hpp", "front_end"), "map");
   EXPECT_EQ(roomOf("../data/text_file.hpp", "tools"), "data");
-  EXPECT_EQ(roomOf("log_sum.hpp", "motion"), "motion");
+  EXPECT_EQ(roomOf("patch_samples.hpp", "matching"), "matching");
   EXPECT_EQ(roomOf("opencv2/core.hpp", "odometry"), "");
   EXPECT_EQ(roomOf("vector", "odometry"), "");
 }

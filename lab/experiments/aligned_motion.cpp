@@ -3,7 +3,7 @@
 #include <numeric>
 #include <optional>
 
-#include "stereo_descriptor_vo/map/reference_patch.hpp"
+#include "stereo_descriptor_vo/map/map_point.hpp"
 
 namespace sdvo {
 namespace {
@@ -14,9 +14,9 @@ std::optional<Eigen::Vector2d> findShift(const StereoFeatures& reference, const 
                                          const Eigen::Isometry3d& T_current_reference) {
   const PatchAlignmentOptions options;
   if (warp == PatchWarp::kNone) {
-    const auto patchOf = [](const StereoFeatures& features, int row) {
-      return Patch{features.patches.ptr(row), features.patch_layout.side,
-                   features.patch_layout.spacing(features.size[row])};
+    const auto patchOf = [](const StereoFeatures& features, int feature) {
+      return Patch{features.patches.ptr(feature), features.patch_layout.side,
+                   features.patch_layout.spacing(features.size[feature])};
     };
     const auto found = alignPatch(options, patchOf(reference, match.reference), Eigen::Vector2f::Zero(),
                                   patchOf(current, match.current), Eigen::Matrix2f::Identity());
@@ -25,8 +25,9 @@ std::optional<Eigen::Vector2d> findShift(const StereoFeatures& reference, const 
   const Eigen::Vector2d corner(reference.u[match.reference], reference.v[match.reference]);
   const Eigen::Vector3d p = reference.point(match.reference);
   const AnchoredPoint point{Eigen::Isometry3d::Identity(), {p.x() / p.z(), p.y() / p.z(), 1.0 / p.z()}};
-  const auto found = ReferencePatch(reference, match.reference, corner, Eigen::Isometry3d::Identity())
-                         .findIn(options, current, match.current, T_current_reference, point);
+  ReferencePatch patch;
+  patch.take(reference, match.reference, corner, Eigen::Isometry3d::Identity());
+  const auto found = patch.findIn(options, current, match.current, T_current_reference, point);
   return found ? std::optional<Eigen::Vector2d>(found->shift) : std::nullopt;
 }
 

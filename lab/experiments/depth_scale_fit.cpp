@@ -10,8 +10,8 @@
 #include <unsupported/Eigen/LevenbergMarquardt>
 #include <unsupported/Eigen/NumericalDiff>
 
-#include "../../src/common/median.hpp"
 #include "../../src/common/progress.hpp"
+#include "../../src/common/statistics.hpp"
 #include "correct_matches.hpp"
 #include "keypoint_set.hpp"
 

@@ -13,18 +13,25 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*[<"](?:\.\./|stereo_descriptor_vo/)([a-
 
 # What the includes do not tell: what a room is for, and its place from left (0) to right in the picture.
 ROOMS = {
-    "common": ("what all sides speak", 1.0),
-    "front_end": ("image side: pair of images to features", 0.0),
-    "odometry": ("motion side: features to poses", 1.0),
-    "places": ("places recognised by features", 1.0),
-    "data": ("files of data sets", 2.0),
-    "config": ("all options in one place", 0.5),
-    "ros": ("nodelets; messages meet the core", 0.5),
-    "check": ("steps of a camera's check", 2.6),
-    "tools": ("command lines", 1.6),
+    "common": ("what all sides speak", 0.5),
+    "front_end": ("image side: pair of images to features", 1.0),
+    "motion": ("correspondences to a pose", 0.0),
+    "matching": ("features to matches, aligned patches", 0.0),
+    "map": ("points, key frames, window", 0.0),
+    "belief": ("prior, hypotheses, doubt", 0.0),
+    "rig": ("what is learnt of this rig", 0.0),
+    "odometry": ("a pair's way through these rooms", 0.0),
+    "places": ("places recognised by features", 2.3),
+    "data": ("files of data sets", 3.4),
+    "config": ("all options in one place", 2.0),
+    "ros": ("nodelets; messages meet the core", 1.5),
+    "check": ("steps of a camera's check", 1.0),
+    "tools": ("command lines", 2.2),
 }
 WIDTH, GAP, MARGIN, LINE = 250, 30, 15, 15
-COLOURS = {"front_end": "#dcebfa", "odometry": "#dcebfa", "places": "#dcebfa", "common": "#e3e0f7", "ros": "#eef6e6"}
+MOTION_SIDE = ("motion", "matching", "map", "belief", "rig", "odometry")
+COLOURS = {"front_end": "#dcebfa", "places": "#dcebfa", "common": "#e3e0f7", "ros": "#eef6e6",
+           **{room: "#dcebfa" for room in MOTION_SIDE}}
 
 
 def files_of(room):

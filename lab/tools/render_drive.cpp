@@ -17,13 +17,11 @@
 #include <vector>
 
 #include "../../src/common/progress.hpp"
-#include "../../src/data/kitti_layout.hpp"
 #include "../../src/tools/run_tool.hpp"
 #include "../render/drive_renderer.hpp"
 #include "../render/preset_paths.hpp"
 #include "../render/rigs.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
-#include "stereo_descriptor_vo/data/kitti_writer.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
 
 namespace fs = std::filesystem;

@@ -9,8 +9,8 @@
 #include <set>
 #include <utility>
 
-#include "../common/binomial_tail.hpp"
-#include "../matching/ascending_rows.hpp"
+#include "../common/statistics.hpp"
+#include "stereo_descriptor_vo/motion/motion_estimator.hpp"
 #include "stereo_descriptor_vo/motion/pose_problem.hpp"
 
 namespace sdvo {

@@ -34,14 +34,19 @@ Matrix6d MotionPrior::processNoise(double dt, double age) const {
                    options_.rotation_acceleration * options_.rotation_acceleration * seconds_cubed);
 }
 
-/// Both the velocity and the interval rest on two stamps each.
+/// The velocity and the interval rest on two stamps each, of which they share one: it counts twice.
 Matrix6d MotionPrior::stampNoise(const Vector6d& velocity) const {
-  const Vector6d shift = 2.0 * options_.stamp_sigma * velocity;
+  const Vector6d shift = std::sqrt(6.0) * options_.stamp_sigma * velocity;
   return shift * shift.transpose();
 }
 
 void MotionPrior::pass(double dt) {
   interval_ = std::max(dt, kUsualMemory * interval_);
+}
+
+double MotionPrior::interval(double dt) const {
+  constexpr double kBurst = 0.1;  // ratio of the usual interval (chosen); a camera does not change its rate by as much
+  return dt < kBurst * interval_ ? interval_ : dt;
 }
 
 ExpectedMotion MotionPrior::predicted(double dt) const {
@@ -68,7 +73,8 @@ ExpectedMotion MotionPrior::around(const Eigen::Isometry3d& motion, double dt) c
 
 double MotionPrior::logRatioOfSwap(const Eigen::Isometry3d& motion, double dt) const {
   if (!velocity_ || !before_) return 0.0;
-  const Vector6d now = logSE3(motion) / dt, first = *velocity_ + now;
+  const Vector6d second = logSE3(motion), now = second / dt;
+  const Vector6d first = *velocity_ + second / velocity_interval_;
   // Bounded by the probability that the prior is wrong.
   const auto cost = [&](const Vector6d& from, const Vector6d& to) {
     const double square = around(expSE3(from * dt), dt).normalisedSquare(expSE3(to * dt), Matrix6d::Zero());
@@ -108,6 +114,7 @@ void MotionPrior::measure(std::int64_t stamp, const Eigen::Isometry3d& motion, d
   if (!(velocity.head<3>().norm() <= options_.max_speed) || !(velocity.tail<3>().norm() <= options_.max_rotation_rate))
     return;
   before_ = std::exchange(velocity_, velocity);
+  velocity_interval_ = dt;
   velocity_covariance_ = covariance / (dt * dt);
   if (!is_confirmed && confirmed_) return;
   confirmed_ = velocity;

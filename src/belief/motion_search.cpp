@@ -8,10 +8,10 @@
 #include <string>
 #include <utility>
 
-#include "../matching/ascending_rows.hpp"
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
-#include "stereo_descriptor_vo/matching/correspondences.hpp"
+#include "stereo_descriptor_vo/matching/view_matcher.hpp"
 #include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
+#include "stereo_descriptor_vo/motion/motion_estimator.hpp"
 
 namespace sdvo {
 
@@ -116,7 +116,7 @@ bool MotionSearch::leavesGate(const MotionScene& scene, const Eigen::Isometry3d&
   const StereoCamera& camera = scene.features.camera;
   const Eigen::Isometry3d& T_current_reference = found.motion.T_current_reference;
   std::size_t seen = 0, outside = 0;
-  for (const Eigen::Vector3d& point : found.view->rows.positions) {
+  for (const Eigen::Vector3d& point : found.view->points.positions) {
     const Eigen::Vector3d here = T_current_reference * point, expected = predicted * point;
     if (std::min(here.z(), expected.z()) < kNearestDepth) continue;
     const Eigen::Vector3d pixel = camera.project(here);
@@ -135,9 +135,9 @@ MotionHypothesis MotionSearch::search(const FeatureMatcher& matcher, const Motio
   found.gate = T_current_reference && matcher.options().gating ? matcher.options().gate_radius
                                                                : std::sqrt(camera.width * camera.height / CV_PI);
   Stopwatch stopwatch;
-  found.matches = matcher.match(view->rows, scene.features, T_current_reference);
+  found.matches = matcher.match(view->points, scene.features, T_current_reference);
   found.match_time = stopwatch.lap();
-  found.correspondences = correspond(view->rows, scene.features, found.matches, scene.calibration);
+  found.correspondences = correspond(view->points, scene.features, found.matches, scene.calibration);
   found.motion = estimator_.estimate(camera, found.correspondences, T_current_reference, scene.noise.scale());
   weigh(scene, found);
   found.motion_time = stopwatch.lap();
@@ -203,8 +203,8 @@ MotionSearch::Alignment MotionSearch::align(const MotionScene& scene, const Moti
   alignment.sightings.reserve(found.motion.inliers.size());
   for (const int i : found.motion.inliers) {
     const FeatureMatch& match = found.matches[i];
-    const LocalMap::Sighting sighting = scene.map.sight(alignment_options_, features, T_camera_origin,
-                                                        found.view->point[match.reference], match.current);
+    const LocalMap::Sighting sighting =
+        scene.map.sight(alignment_options_, features, T_camera_origin, found.view->ids[match.reference], match.current);
     alignment.sightings.push_back(sighting);
     alignment.measured.push_back(found.correspondences[i]);
     if (!sighting.aligned) continue;
@@ -233,7 +233,14 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene
   Eigen::Isometry3d T_lasting = T;
   const NormalEquations equations = refineMotion(camera, options(scene), lasting, T_lasting);
   const Vector6d difference = logSE3(T_lasting * T.inverse());
-  const Matrix6d information = equations.hessian / equations.variance();
+  // The lasting points are a part of all, so the difference has the covariance of the part less that of all (Hausman
+  // 1978). With the others' information O its inverse is H + H O^-1 H.
+  MotionEstimatorOptions at_once = options(scene);
+  at_once.refinement_iterations = 0;
+  Eigen::Isometry3d T_all = T;
+  const Matrix6d of_others = refineMotion(camera, at_once, others, T_all).hessian;
+  const Matrix6d of_lasting = equations.hessian;
+  const Matrix6d information = (of_lasting + of_lasting * of_others.ldlt().solve(of_lasting)) / equations.variance();
   const double log_factor =
       logBayesFactor<6>(difference, information / scene.noise.shared(), scene.prior.front().covariance);
   if (kUnsuspected + log_factor > 0.0) return T_lasting;

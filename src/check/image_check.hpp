@@ -1,13 +1,34 @@
 #pragma once
 
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
-#include "coarse_view.hpp"
 #include "finding.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 
 namespace sdvo {
+
+/// An image at about a hundred columns, where the motion of the view is large and small bright dots average out.
+class CoarseView {
+ public:
+  CoarseView() = default;
+  /// `image` is CV_8UC1.
+  explicit CoarseView(const cv::Mat& image);
+
+  bool empty() const { return view_.empty(); }
+  cv::Size size() const { return view_.size(); }
+
+  /// Where most of `part` (a rectangle of the coarse view) has moved since `before`, as a share of the image's width.
+  /// Nothing when the views have no common motion.
+  std::optional<cv::Point2d> motionSince(const CoarseView& before, const cv::Rect& part) const;
+  std::optional<cv::Point2d> motionSince(const CoarseView& before) const {
+    return motionSince(before, cv::Rect(cv::Point(), size()));
+  }
+
+ private:
+  cv::Mat view_;  ///< CV_64F, grey levels
+};
 
 /// Whether images are good ones to find features in: exposure, texture, motion blur, and how far the view moves from
 /// pair to pair.
@@ -30,6 +51,21 @@ class ImageCheck {
   std::vector<double> corners_, matched_;          ///< of each pair: number of corners, share found in the right image
   std::vector<double> sharpness_, moved_;  ///< of each pair after the first: grey levels a px; share of the width
   int lost_views_ = 0;                     ///< pairs without a common motion since the pair before
+};
+
+/// Finds the dots of a pattern projector: they stay where they are in the image while the scene moves.
+class EmitterCheck {
+ public:
+  /// The left image of the next pair, CV_8UC1. Cheap while nothing moves.
+  void add(const cv::Mat& image);
+
+  Finding judge() const;
+
+ private:
+  CoarseView view_;             ///< where the scene was last compared
+  cv::Mat dots_;                ///< CV_8U, 1 where a dot is
+  int age_ = 0;                 ///< pairs since then
+  std::vector<double> stayed_;  ///< of each comparison, share of the dots that stayed beyond chance
 };
 
 }  // namespace sdvo

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../common/quantile.hpp"
+#include "../common/statistics.hpp"
 #include "../common/text.hpp"
 
 namespace sdvo {

@@ -6,7 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <opencv2/video/tracking.hpp>
 
-#include "../common/median.hpp"
+#include "../common/statistics.hpp"
 #include "../common/text.hpp"
 #include "../front_end/block_search.hpp"
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "lanes.hpp"
+#include "kernel.hpp"
 
 namespace sdvo {
 

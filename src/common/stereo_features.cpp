@@ -99,6 +99,14 @@ void StereoFeatures::check() const {
     if (!std::all_of(values.begin(), values.end(), [](double x) { return std::isfinite(x); }))
       refuse("array " + std::string(name) + " holds a number that is not finite");
   });
+  // Further outside of the image no point can be seen; squares of such numbers overflow.
+  const double most = 2.0 * (camera.width + camera.height);
+  for (const auto array :
+       {&StereoFeatures::u, &StereoFeatures::v, &StereoFeatures::disparity, &StereoFeatures::dv, &StereoFeatures::size})
+    if (const auto& values = this->*array;
+        !std::all_of(values.begin(), values.end(), [most](float x) { return std::abs(x) <= most; }))
+      refuse("an array of pixels (u, v, disparity, dv or size) holds a number beyond " + std::to_string(most) +
+             " px, twice the image's width and height");
   const auto requirePositive = [](const std::vector<float>& values, const std::string& name) {
     if (!std::all_of(values.begin(), values.end(), [](float x) { return x > 0.f; }))
       refuse("array " + name + " holds a number that is not positive");

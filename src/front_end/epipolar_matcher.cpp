@@ -8,8 +8,7 @@
 
 #include "../common/kernel.hpp"
 #include "stereo_descriptor_vo/front_end/block_differences.hpp"
-#include "stereo_descriptor_vo/front_end/half_image.hpp"
-#include "stereo_descriptor_vo/front_end/image_margin.hpp"
+#include "stereo_descriptor_vo/front_end/image_copies.hpp"
 #include "stereo_descriptor_vo/front_end/slanted_patch.hpp"
 
 namespace sdvo {

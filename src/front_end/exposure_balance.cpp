@@ -2,27 +2,50 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <opencv2/imgproc.hpp>
+
+#include "../common/statistics.hpp"
 
 namespace sdvo {
 namespace {
 
 constexpr int kLevels = 256;
 
-/// How many pixels of every second row are darker than each level or just as dark.
-std::array<int, kLevels> cumulativeHistogram(const cv::Mat& image) {
+/// Parts of the images, row by row.
+constexpr int kColumns = 8, kRows = 6;
+using Parts = std::array<double, kColumns * kRows>;
+
+/// Logarithm of the right part's mean grey level by the left one's.
+Parts logRatios(const cv::Mat& left, const cv::Mat& right) {
+  cv::Mat means[2];
+  cv::resize(left, means[0], {kColumns, kRows}, 0.0, 0.0, cv::INTER_AREA);
+  cv::resize(right, means[1], {kColumns, kRows}, 0.0, 0.0, cv::INTER_AREA);
+  Parts ratios;
+  const std::uint8_t *of_left = means[0].ptr(), *of_right = means[1].ptr();
+  for (std::size_t i = 0; i < ratios.size(); ++i) ratios[i] = std::log((of_right[i] + 1.0) / (of_left[i] + 1.0));
+  return ratios;
+}
+
+/// How many pixels of every second row, in the parts that count, are darker than each level or just as dark.
+std::array<int, kLevels> cumulativeHistogram(const cv::Mat& image, const std::array<bool, kColumns * kRows>& counting) {
   std::array<int, kLevels> counts{};
   for (int y = 0; y < image.rows; y += 2) {
     const std::uint8_t* row = image.ptr(y);
-    for (int x = 0; x < image.cols; ++x) ++counts[row[x]];
+    for (int column = 0; column < kColumns; ++column) {
+      if (!counting[static_cast<std::size_t>(y * kRows / image.rows * kColumns + column)]) continue;
+      const int end = (column + 1) * image.cols / kColumns;
+      for (int x = column * image.cols / kColumns; x < end; ++x) ++counts[row[x]];
+    }
   }
   for (int level = 1; level < kLevels; ++level) counts[level] += counts[level - 1];
   return counts;
 }
 
 /// `image` with the grey levels of `model`.
-cv::Mat withLevelsOf(const cv::Mat& model, const cv::Mat& image) {
-  const auto of_image = cumulativeHistogram(image), of_model = cumulativeHistogram(model);
+cv::Mat withLevelsOf(const cv::Mat& model, const cv::Mat& image, const std::array<bool, kColumns * kRows>& counting) {
+  const auto of_image = cumulativeHistogram(image, counting), of_model = cumulativeHistogram(model, counting);
   cv::Mat table(1, kLevels, CV_8U), result;
   int found = 0;
   for (int level = 0; level < kLevels; ++level) {
@@ -42,10 +65,17 @@ void ExposureBalance::apply(double left_mean, double right_mean, cv::Mat& left, 
   constexpr double kDark = 4.0;  // grey levels
   const double darker = std::min(left_mean, right_mean), brighter = std::max(left_mean, right_mean);
   if (!options_.enabled || darker < kDark || brighter <= (1.0 + options_.tolerance) * darker) return;
-  if (left_mean < right_mean)
-    left = withLevelsOf(right, left);
+  // A part that is covered on one side tells nothing of the exposure.
+  constexpr double kCovered = 2.0;  // ratio, beyond that of most parts (chosen)
+  const Parts ratios = logRatios(left, right);
+  const double usual = quantile({ratios.begin(), ratios.end()}, 0.5);
+  if (std::abs(usual) <= std::log1p(options_.tolerance)) return;
+  std::array<bool, kColumns * kRows> counting;
+  for (std::size_t i = 0; i < ratios.size(); ++i) counting[i] = std::abs(ratios[i] - usual) < std::log(kCovered);
+  if (usual > 0.0)
+    left = withLevelsOf(right, left, counting);
   else
-    right = withLevelsOf(left, right);
+    right = withLevelsOf(left, right, counting);
 }
 
 }  // namespace sdvo

@@ -7,7 +7,6 @@
 #include <opencv2/features2d.hpp>
 
 #include "../common/kernel.hpp"
-#include "fast_circle.hpp"
 
 #ifdef SDVO_HAVE_AVX2
 #include <immintrin.h>
@@ -15,6 +14,11 @@
 
 namespace sdvo {
 namespace {
+
+// The circle of FAST (Rosten and Drummond 2006) around a pixel.
+constexpr std::size_t kCircle = 16;  // pixels on it, clockwise from above
+constexpr std::array<int, kCircle> kCircleX = {0, 1, 2, 3, 3, 3, 2, 1, 0, -1, -2, -3, -3, -3, -2, -1};
+constexpr std::array<int, kCircle> kCircleY = {-3, -3, -2, -1, 0, 1, 2, 3, 3, 3, 2, 1, 0, -1, -2, -3};
 
 constexpr int kRadius = 3;  // px, of the circle
 constexpr int kBlock = 32;  // pixels worked on at once
@@ -28,7 +32,7 @@ Offsets circleOffsets(std::ptrdiff_t step) {
   return offsets;
 }
 
-SDVO_AVX2 inline __m256i load(const std::uint8_t* pixels) {
+SDVO_AVX2 inline __m256i loadPixels(const std::uint8_t* pixels) {
   return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(pixels));
 }
 
@@ -40,10 +44,10 @@ SDVO_AVX2 inline __m256i excess(__m256i brightest, __m256i darkest, __m256i cent
 /// For 32 pixels the difference that all nine pixels of some arc exceed the centre by, upwards or downwards; zero where
 /// that is not above the threshold.
 SDVO_AVX2 inline __m256i contrast(const std::uint8_t* pixels, const Offsets& offsets, __m256i threshold) {
-  const __m256i centre = load(pixels);
+  const __m256i centre = loadPixels(pixels);
   // Every arc of nine holds two neighbours of these four.
-  const __m256i north = load(pixels + offsets[0]), east = load(pixels + offsets[4]);
-  const __m256i south = load(pixels + offsets[8]), west = load(pixels + offsets[12]);
+  const __m256i north = loadPixels(pixels + offsets[0]), east = loadPixels(pixels + offsets[4]);
+  const __m256i south = loadPixels(pixels + offsets[8]), west = loadPixels(pixels + offsets[12]);
   const __m256i bound = excess(_mm256_min_epu8(_mm256_max_epu8(north, south), _mm256_max_epu8(east, west)),
                                _mm256_max_epu8(_mm256_min_epu8(north, south), _mm256_min_epu8(east, west)), centre);
   const __m256i zero = _mm256_setzero_si256();
@@ -54,7 +58,7 @@ SDVO_AVX2 inline __m256i contrast(const std::uint8_t* pixels, const Offsets& off
   // and the largest of 2, 4 and 8 in a row are needed from each odd pixel on alone.
   __m256i circle[kCircle], least[kCircle], largest[kCircle], least_of_4[kCircle], largest_of_4[kCircle];
 #pragma GCC unroll 16
-  for (std::size_t i = 0; i < kCircle; ++i) circle[i] = load(pixels + offsets[i]);
+  for (std::size_t i = 0; i < kCircle; ++i) circle[i] = loadPixels(pixels + offsets[i]);
 #pragma GCC unroll 8
   for (std::size_t i = 1; i < kCircle; i += 2) {
     least[i] = _mm256_min_epu8(circle[i], circle[(i + 1) % kCircle]);
@@ -94,12 +98,13 @@ SDVO_AVX2 void addMaxima(const std::uint8_t* above, const std::uint8_t* here, co
                          int y, std::vector<cv::KeyPoint>& corners) {
   constexpr float kDiameter = 7.f;
   for (int x = kRadius; x < columns - kRadius; x += kBlock) {
-    const __m256i centre = load(here + x);
+    const __m256i centre = loadPixels(here + x);
     if (_mm256_testz_si256(centre, centre)) continue;
-    __m256i largest = _mm256_max_epu8(load(here + x - 1), load(here + x + 1));
+    __m256i largest = _mm256_max_epu8(loadPixels(here + x - 1), loadPixels(here + x + 1));
     for (const std::uint8_t* row : {above, below})
-      largest = _mm256_max_epu8(largest,
-                                _mm256_max_epu8(load(row + x), _mm256_max_epu8(load(row + x - 1), load(row + x + 1))));
+      largest = _mm256_max_epu8(
+          largest,
+          _mm256_max_epu8(loadPixels(row + x), _mm256_max_epu8(loadPixels(row + x - 1), loadPixels(row + x + 1))));
     const __m256i smaller = _mm256_cmpeq_epi8(_mm256_subs_epu8(centre, largest), _mm256_setzero_si256());
     unsigned maxima = ~static_cast<unsigned>(_mm256_movemask_epi8(smaller));
     for (; maxima != 0; maxima &= maxima - 1) {
@@ -132,6 +137,63 @@ std::vector<cv::KeyPoint> findWithAvx2(const cv::Mat& image, int threshold) {
 }
 #endif
 
+/// Sixteen pixels worked on at once: rows of four, of which three are of interest, and nothing.
+typedef std::uint8_t Pixels __attribute__((vector_size(16)));
+
+Pixels smaller(const Pixels& a, const Pixels& b) {
+  return a < b ? a : b;
+}
+
+Pixels larger(const Pixels& a, const Pixels& b) {
+  return a > b ? a : b;
+}
+
+/// Three rows of four pixels.
+Pixels neighbourhood(const std::uint8_t* first, std::size_t step) {
+  typedef std::uint32_t Rows __attribute__((vector_size(16)));
+  const auto row = [&](std::size_t y) {
+    std::uint32_t four;
+    std::memcpy(&four, first + y * step, sizeof four);
+    return four;
+  };
+  const Rows rows = {row(0), row(1), row(2), 0};
+  Pixels pixels;
+  std::memcpy(&pixels, &rows, sizeof pixels);
+  return pixels;
+}
+
+/// Contrasts of the three rows of four pixels that begin at `first`.
+Pixels contrasts(const std::uint8_t* first, std::size_t step) {
+  // The arc of nine that begins at an odd pixel and the one that begins right before it share eight pixels: the least
+  // and the largest of 1, 2, 4 and 8 in a row are needed from each odd pixel on alone.
+  std::array<Pixels, kCircle> circle, least, largest;
+  for (std::size_t i = 0; i < kCircle; ++i)
+    circle[i] = neighbourhood(first + kCircleY[i] * static_cast<std::ptrdiff_t>(step) + kCircleX[i], step);
+  least = largest = circle;
+  for (const std::size_t length : {1, 2, 4}) {
+    const auto least_before = least, largest_before = largest;
+    for (std::size_t i = 1; i < kCircle; i += 2) {
+      least[i] = smaller(least_before[i], least_before[(i + length) % kCircle]);
+      largest[i] = larger(largest_before[i], largest_before[(i + length) % kCircle]);
+    }
+  }
+  const Pixels centre = neighbourhood(first, step);
+  Pixels brightest = centre, darkest = centre;
+  for (std::size_t i = 1; i < kCircle; i += 2) {
+    const Pixels &before = circle[i - 1], &behind = circle[(i + 8) % kCircle];
+    brightest = larger(brightest, smaller(least[i], larger(before, behind)));
+    darkest = smaller(darkest, larger(largest[i], smaller(before, behind)));
+  }
+  return larger(brightest - centre, centre - darkest);
+}
+
+/// Of the parabola through three values one apart, from the middle one.
+float maximumOf(int before, int here, int after) {
+  const int bend = 2 * here - before - after;
+  if (bend <= 0) return 0.f;
+  return std::clamp(0.5f * static_cast<float>(after - before) / static_cast<float>(bend), -1.f, 1.f);
+}
+
 }  // namespace
 
 std::vector<cv::KeyPoint> findFastCorners(const cv::Mat& image, int threshold) {
@@ -143,6 +205,28 @@ std::vector<cv::KeyPoint> findFastCorners(const cv::Mat& image, int threshold) {
   std::vector<cv::KeyPoint> corners;
   cv::FAST(image, corners, threshold, true);
   return corners;
+}
+
+cv::Point2f cornerPeak(const cv::Mat& image, const cv::Point& pixel) {
+  CV_Assert(image.type() == CV_8UC1);
+  constexpr int kReach = 4;  // px, of the circles of its neighbours
+  const cv::Rect inside(kReach, kReach, image.cols - 2 * kReach, image.rows - 2 * kReach);
+  if (!inside.contains(pixel)) return {};
+  // The fourth pixel of a row may not lie beyond what the circles need.
+  const int left = std::min(pixel.x - 1, image.cols - kReach - 3);
+  const Pixels around = contrasts(image.ptr(pixel.y - 1, left), image.step[0]);
+  std::array<std::uint8_t, sizeof(Pixels)> values;
+  std::memcpy(values.data(), &around, sizeof around);
+  const auto at = [&](int x, int y) {
+    return static_cast<int>(values[static_cast<std::size_t>(4 * y + x + pixel.x - 1 - left)]);
+  };
+
+  std::array<int, 3> columns, rows;  // the middle counts twice
+  for (int i = 0; i < 3; ++i) {
+    columns[static_cast<std::size_t>(i)] = at(i, 0) + 2 * at(i, 1) + at(i, 2);
+    rows[static_cast<std::size_t>(i)] = at(0, i) + 2 * at(1, i) + at(2, i);
+  }
+  return {maximumOf(columns[0], columns[1], columns[2]), maximumOf(rows[0], rows[1], rows[2])};
 }
 
 }  // namespace sdvo

@@ -5,7 +5,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "freak_octet.hpp"
-#include "stereo_descriptor_vo/front_end/image_bounds.hpp"
+#include "stereo_descriptor_vo/front_end/integral_image.hpp"
 
 namespace sdvo {
 namespace {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstring>
 
-#include "../common/lanes.hpp"
+#include "../common/kernel.hpp"
 #include "freak_octet_neon.hpp"
 
 #ifdef SDVO_HAVE_AVX2

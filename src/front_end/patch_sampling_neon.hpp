@@ -1,6 +1,6 @@
 #pragma once
 
-#include "../common/lanes.hpp"
+#include "../common/kernel.hpp"
 
 #ifdef SDVO_HAVE_NEON
 #include <arm_neon.h>

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "../common/median.hpp"
+#include "../common/statistics.hpp"
 #include "../common/text.hpp"
 #include "block_search.hpp"
 

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "stereo_descriptor_vo/front_end/freak.hpp"
-#include "stereo_descriptor_vo/front_end/image_bounds.hpp"
-#include "stereo_descriptor_vo/front_end/image_margin.hpp"
+#include "stereo_descriptor_vo/front_end/image_copies.hpp"
+#include "stereo_descriptor_vo/front_end/integral_image.hpp"
 
 namespace sdvo {
 namespace {

@@ -21,7 +21,7 @@ int OldKeyframe::sharedWith(const StereoCamera& camera, const Eigen::Isometry3d&
   constexpr double kLargestRatio = 1.1;  // of depths
   const Eigen::Isometry3d T_other_this = T_other_origin * T_camera_origin.inverse();
   int shared = 0;
-  for (const Eigen::Vector3d& here : rows.positions) {
+  for (const Eigen::Vector3d& here : described.positions) {
     const Eigen::Vector3d there = T_other_this * here;
     if (there.z() * kLargestRatio < here.z() || there.z() > kLargestRatio * here.z()) continue;
     if (camera.sees(camera.project(there))) ++shared;
@@ -31,7 +31,7 @@ int OldKeyframe::sharedWith(const StereoCamera& camera, const Eigen::Isometry3d&
 
 bool KeyframeMemory::covers(const StereoCamera& camera, const OldKeyframe& keyframe) const {
   const auto sees_the_same = [&](const std::shared_ptr<const OldKeyframe>& old) {
-    return keyframe.sharedWith(camera, old->T_camera_origin) > kMost * static_cast<double>(keyframe.rows.count());
+    return keyframe.sharedWith(camera, old->T_camera_origin) > kMost * static_cast<double>(keyframe.described.count());
   };
   return std::any_of(keyframes_.rbegin(), keyframes_.rend(), sees_the_same);  // the newest are the nearest
 }

@@ -6,7 +6,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "../common/median.hpp"
+#include "../common/statistics.hpp"
 #include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
 
 namespace sdvo {
@@ -16,7 +16,7 @@ namespace {
 constexpr double kFarthestDisparity = 0.05;  // px
 
 /// Most points need no more memory than for these until it goes to another one.
-constexpr std::size_t kUsualSightings = 8;
+constexpr std::size_t kUsualObservations = 8;
 
 /// Covariance of the motion M = T_from_to between two frames, perturbed as M * exp(xi), from that of the left
 /// perturbations of `poses`, without the first: exp(f) M exp(-t) = M exp(Ad(M^-1) f - t) to first order.
@@ -35,7 +35,7 @@ Matrix6d motionCovariance(const Window& window, const std::vector<int>& poses, c
 
 /// Of observations in the order of their frames the one in this frame, or their end.
 template <class Observations>
-auto sightingIn(Observations& observations, int frame_id) {
+auto observationIn(Observations& observations, int frame_id) {
   const auto here = std::lower_bound(observations.begin(), observations.end(), frame_id,
                                      [](const auto& observation, int id) { return observation.frame_id < id; });
   return here != observations.end() && here->frame_id == frame_id ? here : observations.end();
@@ -67,27 +67,27 @@ LocalMap::View LocalMap::view(const std::optional<Eigen::Isometry3d>& T_next_new
     return next.z() >= kNearestDepth && camera_.sees(camera_.project(next));
   };
   View view;
-  view.rows.kind = kind_;
-  view.point.reserve(points_.size()), view.seen.reserve(points_.size()), view.pixels.reserve(points_.size());
+  view.points.kind = kind_;
+  view.ids.reserve(points_.size()), view.seen.reserve(points_.size()), view.pixels.reserve(points_.size());
   const int since = lookedForSince();
   for (std::size_t p = 0; p < points_.size(); ++p) {
     if (!isLookedFor(points_[p], since)) continue;
-    Eigen::Vector3d predicted;
-    if (!predictObservation(camera_, newestPose(), points_[p].position, predicted, nullptr)) continue;
-    predicted.z() = std::max(predicted.z(), kFarthestDisparity);
-    if (!camera_.sees(predicted) && !isSeenNext(predicted)) continue;
-    view.point.push_back(static_cast<int>(p));
+    auto predicted = predictObservation(camera_, newestPose(), points_[p].position);
+    if (!predicted) continue;
+    predicted->z() = std::max(predicted->z(), kFarthestDisparity);
+    if (!camera_.sees(*predicted) && !isSeenNext(*predicted)) continue;
+    view.ids.push_back(static_cast<int>(p));
     view.seen.push_back(points_[p].seen);
-    view.pixels.emplace_back(static_cast<float>(predicted.x()), static_cast<float>(predicted.y()),
-                             static_cast<float>(predicted.z()));
+    view.pixels.emplace_back(static_cast<float>(predicted->x()), static_cast<float>(predicted->y()),
+                             static_cast<float>(predicted->z()));
   }
-  view.rows.positions.reserve(view.point.size());
-  view.rows.descriptors.create(static_cast<int>(view.point.size()), kind_.bytes, CV_8U);
-  for (std::size_t row = 0; row < view.point.size(); ++row) {
-    const cv::Point3f& pixel = view.pixels[row];
-    view.rows.positions.push_back(camera_.backProject(pixel.x, pixel.y, pixel.z));
-    const std::vector<std::uint8_t>& descriptor = points_[view.point[row]].descriptor;
-    std::copy(descriptor.begin(), descriptor.end(), view.rows.descriptors.ptr(static_cast<int>(row)));
+  view.points.positions.reserve(view.ids.size());
+  view.points.descriptors.create(static_cast<int>(view.ids.size()), kind_.bytes, CV_8U);
+  for (std::size_t i = 0; i < view.ids.size(); ++i) {
+    const cv::Point3f& pixel = view.pixels[i];
+    view.points.positions.push_back(camera_.backProject(pixel.x, pixel.y, pixel.z));
+    const std::vector<std::uint8_t>& descriptor = points_[view.ids[i]].descriptor;
+    std::copy(descriptor.begin(), descriptor.end(), view.points.descriptors.ptr(static_cast<int>(i)));
   }
   return view;
 }
@@ -95,18 +95,18 @@ LocalMap::View LocalMap::view(const std::optional<Eigen::Isometry3d>& T_next_new
 DescribedPoints LocalMap::points(int sightings) const {
   const double farthest = kFarthestDisparity / (camera_.fx * camera_.baseline);  // 1/m
   const int since = lookedForSince();
-  DescribedPoints rows;
-  rows.kind = kind_;
-  rows.positions.reserve(points_.size());
-  rows.descriptors.create(static_cast<int>(points_.size()), kind_.bytes, CV_8U);
+  DescribedPoints found;
+  found.kind = kind_;
+  found.positions.reserve(points_.size());
+  found.descriptors.create(static_cast<int>(points_.size()), kind_.bytes, CV_8U);
   for (const Point& point : points_) {
     if (point.seen < sightings || !isLookedFor(point, since)) continue;
-    std::copy(point.descriptor.begin(), point.descriptor.end(), rows.descriptors.ptr(rows.count()));
+    std::copy(point.descriptor.begin(), point.descriptor.end(), found.descriptors.ptr(found.count()));
     const double inverse_depth = std::max(point.position.ray_and_inverse_depth.z(), farthest);
-    rows.positions.push_back(point.position.scaledPointIn(newestPose()) / inverse_depth);
+    found.positions.push_back(point.position.scaledPointIn(newestPose()) / inverse_depth);
   }
-  rows.descriptors = rows.descriptors.rowRange(0, rows.count());
-  return rows;
+  found.descriptors = found.descriptors.rowRange(0, found.count());
+  return found;
 }
 
 void LocalMap::insert(const PatchAlignmentOptions& alignment, const StereoFeatures& features, int id,
@@ -118,9 +118,9 @@ void LocalMap::insert(const PatchAlignmentOptions& alignment, const StereoFeatur
 
   std::vector<bool> recognised(features.u.size(), false);
   for (const Sighting& sighting : sightings) {
-    recognised[sighting.row] = true;
+    recognised[sighting.feature] = true;
     ++points_[sighting.point].seen;
-    points_[sighting.point].observations.push_back({id, sighting.row, sighting.measurement, sighting.sigma});
+    points_[sighting.point].observations.push_back({sighting, id, sighting.feature});
   }
   // Only now that the new sightings are noted: points that they carry on must outlive the forgotten pair.
   if (!frames_.empty() && !frames_.back().is_keyframe) removeFrame(frames_.size() - 1);
@@ -129,18 +129,18 @@ void LocalMap::insert(const PatchAlignmentOptions& alignment, const StereoFeatur
   // A corner that nothing is ever aligned with is no better than those seen later.
   const double sigma =
       alignment.canAlign(features.patch_layout.side) ? options_.noise.reference : options_.noise.corner;
-  for (int row = 0; row < features.count(); ++row)
-    if (!recognised[row]) startPoint(features, row, id, T_camera_origin, calibration, sigma);
+  for (int i = 0; i < features.count(); ++i)
+    if (!recognised[i]) startPoint(features, i, id, T_camera_origin, calibration, sigma);
   if (static_cast<int>(frames_.size()) > options_.keyframes + 1) forgetKeyframe();
 }
 
 LocalMap::Sighting LocalMap::sight(const PatchAlignmentOptions& options, const StereoFeatures& features,
-                                   const Eigen::Isometry3d& T_camera_origin, int point, int row) const {
+                                   const Eigen::Isometry3d& T_camera_origin, int point, int feature) const {
   const NoiseOptions& noise = options_.noise;
   const double sigma = options.canAlign(features.patch_layout.side) ? noise.unconfirmed() : noise.corner;
-  Sighting sighting{point, row, {features.u[row], features.v[row], features.disparity[row]}, sigma};
+  Sighting sighting{{{features.u[feature], features.v[feature], features.disparity[feature]}, sigma}, point, feature};
   const Point& seen = points_[point];
-  const auto found = seen.reference.findIn(options, features, row, T_camera_origin, seen.position);
+  const auto found = seen.reference.findIn(options, features, feature, T_camera_origin, seen.position);
   if (!found) return sighting;
   sighting.measurement.head<2>() += found->shift;
   sighting.sigma = found->sigma;
@@ -149,17 +149,17 @@ LocalMap::Sighting LocalMap::sight(const PatchAlignmentOptions& options, const S
   return sighting;
 }
 
-void LocalMap::renewLooks(const StereoFeatures& features, const std::vector<Sighting>& sightings) {
-  std::vector<const Sighting*> of_row(features.u.size(), nullptr);
-  for (const Sighting& sighting : sightings) of_row[sighting.row] = &sighting;
+void LocalMap::renewAppearance(const StereoFeatures& features, const std::vector<Sighting>& sightings) {
+  std::vector<const Sighting*> of_feature(features.u.size(), nullptr);
+  for (const Sighting& sighting : sightings) of_feature[sighting.feature] = &sighting;
   for (Point& point : points_) {
-    const Observation& last = point.observations.back();
-    const Sighting* sighting = last.frame_id == newestId() ? of_row[last.row] : nullptr;
+    const FrameObservation& last = point.observations.back();
+    const Sighting* sighting = last.frame_id == newestId() ? of_feature[last.feature] : nullptr;
     if (!sighting) continue;  // not seen, cut off or just started
-    takeDescriptor(point, features, last.row);
+    takeDescriptor(point, features, last.feature);
     const double change = std::max(sighting->scale, 1.0 / sighting->scale);
     if (sighting->aligned && change > options_.renewal_scale)
-      point.reference.take(features, last.row, sighting->measurement.head<2>(), newestPose());
+      point.reference.take(features, last.feature, sighting->measurement.head<2>(), newestPose());
   }
 }
 
@@ -168,29 +168,29 @@ void LocalMap::discountNewest() {
     if (point.observations.size() > 1 && point.observations.back().frame_id == newestId()) --point.seen;
 }
 
-void LocalMap::takeDescriptor(Point& point, const StereoFeatures& features, int row) {
-  const std::uint8_t* bytes = features.descriptors.ptr(row);
+void LocalMap::takeDescriptor(Point& point, const StereoFeatures& features, int feature) {
+  const std::uint8_t* bytes = features.descriptors.ptr(feature);
   point.descriptor.assign(bytes, bytes + features.descriptors.cols);
 }
 
-void LocalMap::startPoint(const StereoFeatures& features, int row, int id, const Eigen::Isometry3d& T_camera_origin,
+void LocalMap::startPoint(const StereoFeatures& features, int feature, int id, const Eigen::Isometry3d& T_camera_origin,
                           const RigCalibration& calibration, double sigma) {
   const StereoCamera& camera = features.camera;
-  const double u = features.u[row], v = features.v[row];
+  const double u = features.u[feature], v = features.v[feature];
   const double disparity =
-      std::max(features.disparity[row] - calibration.disparityError(camera, u), kFarthestDisparity);
+      std::max(features.disparity[feature] - calibration.disparityError(camera, u), kFarthestDisparity);
   Point& point = points_.add();
   point.seen = 1;
   point.position.T_origin_anchor = T_camera_origin.inverse();
   point.position.ray_and_inverse_depth = {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy,
                                           1.0 / camera.depth(disparity)};
-  point.reference.take(features, row, {u, v}, T_camera_origin);
+  point.reference.take(features, feature, {u, v}, T_camera_origin);
   point.observations.clear();
   // Room for many sightings would stay with a point that will have few.
-  if (point.observations.capacity() > kUsualSightings) point.observations.shrink_to_fit();
-  point.observations.reserve(kUsualSightings);
-  point.observations.push_back({id, row, {u, v, features.disparity[row]}, sigma});
-  takeDescriptor(point, features, row);
+  if (point.observations.capacity() > kUsualObservations) point.observations.shrink_to_fit();
+  point.observations.reserve(kUsualObservations);
+  point.observations.push_back({{{u, v, features.disparity[feature]}, sigma}, id, feature});
+  takeDescriptor(point, features, feature);
 }
 
 bool LocalMap::needsKeyframe() const {
@@ -202,7 +202,7 @@ bool LocalMap::needsKeyframe() const {
   for (const Point& point : points_) {
     if (point.observations.back().frame_id != id) continue;
     ++seen;
-    for (const Observation& observation : point.observations)
+    for (const FrameObservation& observation : point.observations)
       if (observation.frame_id == keyframe)
         parallax.push_back((observation.measurement - point.observations.back().measurement).head<2>().norm());
   }
@@ -232,44 +232,45 @@ void LocalMap::forgetKeyframe() {
 
 /// Unless it sees too little to be recalled, or nothing new.
 void LocalMap::rememberKeyframe(std::size_t frame) {
-  const OldKeyframe without_looks = keyframe(frame, false);
-  if (without_looks.rows.count() < options_.lasting_points || memory_.covers(camera_, without_looks)) return;
+  const OldKeyframe without_appearance = keyframe(frame, false);
+  if (without_appearance.described.count() < options_.lasting_points || memory_.covers(camera_, without_appearance))
+    return;
   memory_.remember(camera_, keyframe(frame, true));
 }
 
 /// With the points that another frame has seen as well: where they are, and what they look like if that is asked for.
-OldKeyframe LocalMap::keyframe(std::size_t frame, bool with_looks) const {
+OldKeyframe LocalMap::keyframe(std::size_t frame, bool with_appearance) const {
   OldKeyframe old{frames_[frame].id, frames_[frame].T_camera_origin, {}, {}, {}};
-  old.rows.kind = kind_;
+  old.described.kind = kind_;
   const auto isShared = [&](const Point& point) {
-    return point.observations.size() >= 2 && sightingIn(point.observations, old.id) != point.observations.end();
+    return point.observations.size() >= 2 && observationIn(point.observations, old.id) != point.observations.end();
   };
-  if (with_looks) {  // to be kept, so in no more memory than it needs
+  if (with_appearance) {  // to be kept, so in no more memory than it needs
     std::size_t most = 0, samples = 0;
     for (const Point& point : points_)
       if (isShared(point)) ++most, samples += point.reference.samples.size();
-    old.points.reserve(most), old.samples.reserve(samples), old.rows.positions.reserve(most);
-    old.rows.descriptors.create(static_cast<int>(most), kind_.bytes, CV_8U);
+    old.points.reserve(most), old.samples.reserve(samples), old.described.positions.reserve(most);
+    old.described.descriptors.create(static_cast<int>(most), kind_.bytes, CV_8U);
   } else {
-    old.rows.positions.reserve(points_.size());
+    old.described.positions.reserve(points_.size());
   }
   for (const Point& point : points_) {
-    Eigen::Vector3d predicted;
-    if (!isShared(point) || !predictObservation(camera_, old.T_camera_origin, point.position, predicted, nullptr))
-      continue;
-    old.rows.positions.push_back(
-        camera_.backProject(predicted.x(), predicted.y(), std::max(predicted.z(), kFarthestDisparity)));
-    if (!with_looks) continue;
+    if (!isShared(point)) continue;
+    const auto predicted = predictObservation(camera_, old.T_camera_origin, point.position);
+    if (!predicted) continue;
+    old.described.positions.push_back(
+        camera_.backProject(predicted->x(), predicted->y(), std::max(predicted->z(), kFarthestDisparity)));
+    if (!with_appearance) continue;
     const auto& [samples, spacing, centre, T_camera_origin] = point.reference;
     old.samples.insert(old.samples.end(), samples.begin(), samples.end());
     std::copy(point.descriptor.begin(), point.descriptor.end(),
-              old.rows.descriptors.ptr(static_cast<int>(old.points.size())));
-    const auto here = sightingIn(point.observations, old.id);
-    old.points.push_back({point.position, here->measurement, here->sigma, {}, old.samples.size()});
+              old.described.descriptors.ptr(static_cast<int>(old.points.size())));
+    old.points.push_back({point.position, *observationIn(point.observations, old.id), {}, old.samples.size()});
     ReferencePatch& reference = old.points.back().reference;
     reference.spacing = spacing, reference.centre = centre, reference.T_camera_origin = T_camera_origin;
   }
-  if (with_looks) old.rows.descriptors = old.rows.descriptors.rowRange(0, static_cast<int>(old.points.size()));
+  if (with_appearance)
+    old.described.descriptors = old.described.descriptors.rowRange(0, static_cast<int>(old.points.size()));
   return old;
 }
 
@@ -281,23 +282,23 @@ const OldKeyframe* LocalMap::revisited() const {
   return nearest && std::none_of(frames_.begin(), frames_.end(), is_here) ? nearest : nullptr;
 }
 
-void LocalMap::recall(const OldKeyframe& old, const std::vector<Tie>& ties) {
+void LocalMap::recall(const OldKeyframe& old, const std::vector<Link>& links) {
   const auto later =
       std::find_if(frames_.begin(), frames_.end(), [&](const Frame& frame) { return frame.id > old.id; });
   frames_.insert(later, {old.id, old.T_camera_origin, true, true});
-  std::unordered_map<int, Point*> of_row;
+  std::unordered_map<int, Point*> of_feature;
   for (Point& point : points_)
-    if (point.observations.back().frame_id == newestId()) of_row[point.observations.back().row] = &point;
-  for (const Tie& tie : ties) {
-    auto& observations = of_row.at(tie.row)->observations;
-    const OldKeyframe::Point& point = old.points[static_cast<std::size_t>(tie.point)];
+    if (point.observations.back().frame_id == newestId()) of_feature[point.observations.back().feature] = &point;
+  for (const Link& link : links) {
+    auto& observations = of_feature.at(link.feature)->observations;
+    const OldKeyframe::Point& point = old.points[static_cast<std::size_t>(link.point)];
     // The two reference patches may show points a little apart.
-    const Eigen::Vector2d apart = tie.position - observations.back().measurement.head<2>();
-    Eigen::Vector3d measurement = point.measurement;
-    measurement.head<2>() -= apart / tie.scale;
+    const Eigen::Vector2d apart = link.position - observations.back().measurement.head<2>();
+    Eigen::Vector3d measurement = point.observation.measurement;
+    measurement.head<2>() -= apart / link.scale;
     const auto place = std::find_if(observations.begin(), observations.end(),
-                                    [&](const Observation& observation) { return observation.frame_id > old.id; });
-    observations.insert(place, {old.id, -1, measurement, std::hypot(point.sigma, tie.sigma)});
+                                    [&](const FrameObservation& observation) { return observation.frame_id > old.id; });
+    observations.insert(place, {{measurement, std::hypot(point.observation.sigma, link.sigma)}, old.id, -1});
   }
 }
 
@@ -316,7 +317,7 @@ std::vector<int> LocalMap::sharedPoints() const {
   for (const Point& point : points_) {
     if (point.observations.back().frame_id != newestId()) continue;
     std::size_t f = 0;
-    for (const Observation& observation : point.observations) {
+    for (const FrameObservation& observation : point.observations) {
       while (frames_[f].id < observation.frame_id) ++f;
       ++shared[f];
     }
@@ -331,7 +332,7 @@ std::vector<double> LocalMap::parallaxToPredecessors(std::size_t frames) const {
   for (const Point& point : points_) {
     std::size_t f = 0;
     for (std::size_t k = 1; k < point.observations.size(); ++k) {
-      const Observation &before = point.observations[k - 1], &here = point.observations[k];
+      const FrameObservation &before = point.observations[k - 1], &here = point.observations[k];
       while (f < frames && frames_[f].id < here.frame_id) ++f;
       if (f == frames) break;
       if (frames_[f - 1].id == before.frame_id)
@@ -359,7 +360,7 @@ void LocalMap::removeFrame(std::size_t index) {
   const int id = frames_[index].id;
   frames_.erase(frames_.begin() + static_cast<std::ptrdiff_t>(index));
   points_.removeIf([&, since = lookedForSince()](Point& point) {
-    const auto here = sightingIn(point.observations, id);
+    const auto here = observationIn(point.observations, id);
     if (here != point.observations.end()) point.observations.erase(here);
     return !isLookedFor(point, since);
   });
@@ -381,14 +382,9 @@ void LocalMap::pose(Problem& problem) const {
     const Point& point = points_[p];
     if (point.observations.size() < 2) continue;
     int frame = 0;
-    for (const Observation& observation : point.observations) {
+    for (const FrameObservation& observation : point.observations) {
       while (problem.frame_ids[static_cast<std::size_t>(frame)] < observation.frame_id) ++frame;
-      window.observations.emplace_back();
-      WindowObservation& posed = window.observations.back();
-      posed.point = static_cast<int>(problem.points.size());
-      posed.frame = frame;
-      posed.measurement = observation.measurement;
-      posed.sigma = observation.sigma;
+      window.observations.push_back({observation, static_cast<int>(problem.points.size()), frame});
     }
     if (point.observations.back().frame_id == newestId())
       problem.newest.push_back(static_cast<int>(window.observations.size()) - 1);
@@ -450,13 +446,13 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
 }
 
 void LocalMap::cutOff(const std::vector<double>& squares, Adjustment& adjustment) {
-  const double gate = 2.0 * noiseGate(2);  // the point's position errs as much as the sighting's
+  const double gate = 2.0 * noiseGate(2);  // the point's position errs as much as its observation's
   for (const int i : problem_.newest) {
     // A corner that no patch confirms may be of another point. The point's own corner is within a corner's noise.
     const double wider = std::max(problem_.window.observations[i].sigma / options_.noise.corner, 1.0);
     if (wider * wider * squares[i] <= gate) continue;
     Point& point = points_[problem_.points[problem_.window.observations[i].point]];
-    adjustment.rejected_rows.push_back(point.observations.back().row);
+    adjustment.rejected.push_back(point.observations.back().feature);
     --point.seen;
     point.observations.pop_back();
   }

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "../common/lanes.hpp"
+#include "../common/kernel.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 
 // Vectors go from function to function only where these become part of their caller.
@@ -11,8 +11,6 @@
 
 namespace sdvo {
 namespace {
-
-constexpr int kCalibration = RigCalibration::kParameters;
 
 /// (x, y, z), and a fourth number that means nothing.
 typedef DoubleLanes Three;
@@ -42,9 +40,9 @@ SDVO_IN_KERNEL Three cross(const Three& a, const Three& b) {
   return rotated(a * rotated(b) - rotated(a) * b);
 }
 
-/// Where a sighting puts its point, as predictObservation() has it, and how far that is from the measurement. T: the
-/// columns of T_camera_anchor.
-struct Sight {
+/// Where an observation puts its point, as predictObservation() has it, and how far that is from the measurement. T:
+/// the columns of T_camera_anchor.
+struct PredictedObservation {
   Three P;           ///< scaled point in the camera's frame
   double inverse_z;  ///< 1 / P.z
   Three ray;         ///< (P.x / P.z, P.y / P.z, rho / P.z)
@@ -53,9 +51,9 @@ struct Sight {
   Three residual;  ///< normalised
   double square;
 
-  SDVO_IN_KERNEL Sight(const WindowProjection& projection, const SightedPoint& sighted, const WindowObservation& seen,
-                       const double* T) {
-    const double* point = sighted.ray_and_inverse_depth.data();
+  SDVO_IN_KERNEL PredictedObservation(const WindowProjection& projection, const ObservedPoint& observed,
+                                      const WindowObservation& seen, const double* T) {
+    const double* point = observed.ray_and_inverse_depth.data();
     P = loaded(T) * point[0] + loaded(T + 4) * point[1] + (loaded(T + 8) + loaded(T + 12) * point[2]);
     inverse_z = 1.0 / P[2];
     ray = Three{P[0], P[1], point[2], 0.0} * inverse_z;
@@ -63,7 +61,7 @@ struct Sight {
     const double x = (measured[0] - projection.centre[0]) / projection.focal[0];
     shape = x * x;
     const Three centre = loaded(projection.centre) + kZ * (projection.bend * shape);
-    inverse_noise = (kX + kY) * (1.0 / seen.sigma) + kZ * sighted.inverse_disparity_sigma;
+    inverse_noise = (kX + kY) * (1.0 / seen.sigma) + kZ * observed.inverse_disparity_sigma;
     const Three measurement = {measured[0], measured[1], measured[2], 0.0};
     residual = inverse_noise * ((measurement - centre) - loaded(projection.focal) * ray);
     square = isInFront() ? sumOf(residual * residual) : kBehindSquare;
@@ -71,23 +69,23 @@ struct Sight {
   SDVO_IN_KERNEL bool isInFront() const { return P[2] >= kNearestScaled; }
 };
 
-struct SquareResiduals {
-  static SDVO_IN_KERNEL void run(const WindowProjection* projection, const SightedPoint* point, double* squares) {
+struct SquareObservations {
+  static SDVO_IN_KERNEL void run(const WindowProjection* projection, const ObservedPoint* point, double* squares) {
     for (int i = 0; i < point->count; ++i) {
-      const WindowObservation& seen = point->sightings[i];
+      const WindowObservation& seen = point->observations[i];
       const double* T = point->T_camera_anchor[seen.frame].data();
-      squares[i] = Sight(*projection, *point, seen, T).square;
+      squares[i] = PredictedObservation(*projection, *point, seen, T).square;
     }
   }
 };
 
-/// Derivatives A of a sighting by P, divided by its noise: (a, 0, -a x), (0, b, -b y), (0, 0, -d); and of its disparity
-/// by rho, P held.
+/// Derivatives A of an observation by P, divided by its noise: (a, 0, -a x), (0, b, -b y), (0, 0, -d); and of its
+/// disparity by rho, P held.
 struct Derivatives {
   Three aside, ahead;  ///< (a, b, 0) and (a x, b y, d)
   double by_rho;
 
-  SDVO_IN_KERNEL Derivatives(const WindowProjection& projection, const Sight& at) {
+  SDVO_IN_KERNEL Derivatives(const WindowProjection& projection, const PredictedObservation& at) {
     const Three scale = at.inverse_noise * loaded(projection.focal) * at.inverse_z;
     aside = scale * (kX + kY);
     ahead = scale * at.ray;
@@ -97,7 +95,7 @@ struct Derivatives {
   SDVO_IN_KERNEL Three transposedTimes(const Three& v) const { return aside * v - kZ * sumOf(ahead * v); }
 };
 
-/// Columns of w A^T A: what a sighting says of P.
+/// Columns of w A^T A: what an observation says of P.
 struct Information {
   Three x, y, z;
 
@@ -125,17 +123,17 @@ struct Lever {
   }
 };
 
-/// A point's sums over its sightings, those of vectors part by part of the residual.
+/// A point's sums over its observations, those of vectors part by part of the residual.
 struct PointSums {
   Three H00{}, H10{}, H11{}, H20{}, H21{}, H22{}, g0{}, g1{}, g2{};
   Three by0{}, by1{}, by2{};              ///< derivatives
   Three shaped0{}, shaped1{}, shaped2{};  ///< … times the calibration's shape
   double weight = 0.0, residual = 0.0;
   double shape = 0.0, shape_square = 0.0, shape_residual = 0.0;
-  int sightings = 0;
+  int observations = 0;
 
   /// J: columns of the derivatives by the point.
-  SDVO_IN_KERNEL void add(const Sight& at, double w, const Three& J0, const Three& J1, const Three& J2) {
+  SDVO_IN_KERNEL void add(const PredictedObservation& at, double w, const Three& J0, const Three& J1, const Three& J2) {
     const Three w0 = w * J0, w1 = w * J1, w2 = w * J2, pull = w * at.residual;
     H00 += w0 * J0, H10 += w1 * J0, H11 += w1 * J1, H20 += w2 * J0, H21 += w2 * J1, H22 += w2 * J2;
     g0 += pull * J0, g1 += pull * J1, g2 += pull * J2;
@@ -144,7 +142,7 @@ struct PointSums {
     const double w_shape = w * at.shape;
     weight += w, residual += pull[2];
     shape += w_shape, shape_square += w_shape * at.shape, shape_residual += pull[2] * at.shape;
-    ++sightings;
+    ++observations;
   }
 };
 
@@ -191,7 +189,7 @@ std::size_t indexOf(int row, int column) {
 
 /// PoseEquations::add().
 struct AddPoint {
-  static SDVO_IN_KERNEL void run(const WindowProjection* projection, const SightedPoint* point,
+  static SDVO_IN_KERNEL void run(const WindowProjection* projection, const ObservedPoint* point,
                                  const Linearisation* linearisation, PoseFactor* factors, double* squares,
                                  PoseEquations::Block* blocks, PoseEquations::Border* borders,
                                  EliminatedPoint* eliminated, RigCalibration::Matrix* calibration_hessian,
@@ -199,9 +197,9 @@ struct AddPoint {
     PointSums sums;
     int moving = 0;
     for (int i = 0; i < point->count; ++i) {
-      const WindowObservation& seen = point->sightings[i];
+      const WindowObservation& seen = point->observations[i];
       const double* T = point->T_camera_anchor[seen.frame].data();
-      const Sight at(*projection, *point, seen, T);
+      const PredictedObservation at(*projection, *point, seen, T);
       squares[i] = at.square;
       if (!at.isInFront()) continue;
       const double w = linearisation->bend / (linearisation->bend + at.square);
@@ -259,14 +257,14 @@ struct AddPoint {
       eliminated.gradient[k] = gradient[k];
       eliminated.by_calibration.col(k) << by_offset[k], by_bend[k];
     }
-    eliminated.sightings = sums.sightings;
+    eliminated.observations = sums.observations;
     eliminated.weight = sums.weight;
     eliminated.disparity_residual = sums.residual;
     eliminated.disparity_by_point << sums.by0[2], sums.by1[2], sums.by2[2];
   }
 
-  /// What a sighting says of its pose, of that and the calibration, and of that and the point.
-  static SDVO_IN_KERNEL void addPose(const Lever& lever, const Derivatives& A, const Sight& at, double w,
+  /// What an observation says of its pose, of that and the calibration, and of that and the point.
+  static SDVO_IN_KERNEL void addPose(const Lever& lever, const Derivatives& A, const PredictedObservation& at, double w,
                                      const double* T, PoseFactor& factor, PoseEquations::Block& block,
                                      PoseEquations::Border& border) {
     const Information M(A, w);
@@ -346,8 +344,8 @@ WindowProjection::WindowProjection(const StereoCamera& camera, const RigCalibrat
       centre{camera.cx, camera.cy, calibration.value[0], 0.0},
       bend(calibration.value[1]) {}
 
-void squareResiduals(const WindowProjection& projection, const SightedPoint& point, double* squares) {
-  runKernel<SquareResiduals>(&projection, &point, squares);
+void squareResiduals(const WindowProjection& projection, const ObservedPoint& point, double* squares) {
+  runKernel<SquareObservations>(&projection, &point, squares);
 }
 
 void movePoints(const std::vector<EliminatedPoint>& points, const std::vector<PoseFactor>& factors,
@@ -371,7 +369,7 @@ void PoseEquations::setZero(int poses) {
   calibration_gradient_.setZero();
 }
 
-EliminatedPoint PoseEquations::add(const WindowProjection& projection, const SightedPoint& point,
+EliminatedPoint PoseEquations::add(const WindowProjection& projection, const ObservedPoint& point,
                                    const Linearisation& linearisation, PoseFactor* factors, double* squares) {
   EliminatedPoint eliminated;
   runKernel<AddPoint>(&projection, &point, &linearisation, factors, squares, blocks_.data(), borders_.data(),

@@ -5,15 +5,14 @@
 #include <cmath>
 #include <numeric>
 
-#include "../common/median.hpp"
-#include "../motion/log_sum.hpp"
+#include "../common/statistics.hpp"
 #include "stereo_descriptor_vo/map/point_elimination.hpp"
+#include "stereo_descriptor_vo/motion/motion_refinement.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
 
 namespace sdvo {
 inline namespace window_optimizing {  // with a name: WindowOptimizer::Memory has fields of these types
 
-constexpr int kCalibration = RigCalibration::kParameters;
 using CalibrationVector = RigCalibration::Vector;
 
 /// Normal equations of poses and calibration after the elimination of the points, and what is needed to get these back.
@@ -37,7 +36,7 @@ struct Estimate {
 /// What the point itself followed of it is made up for; none where that is more than half.
 std::optional<double> commonSquare(const EliminatedPoint& point) {
   constexpr int kFewest = 4;
-  if (point.sightings < kFewest) return std::nullopt;
+  if (point.observations < kFewest) return std::nullopt;
   const double followed = (point.R * point.disparity_by_point).squaredNorm() / point.weight;
   if (followed > 0.5) return std::nullopt;
   const double mean = point.disparity_residual / point.weight;
@@ -103,7 +102,7 @@ class Solver {
     const WindowProjection projection(window_->camera, estimate.calibration);
     placeAnchors(estimate);
     for (std::size_t p = 0; p < estimate.points.size(); ++p)
-      squareResiduals(projection, sightedPoint(estimate, p), squares.data() + first_of_point_[p]);
+      squareResiduals(projection, observedPoint(estimate, p), squares.data() + first_of_point_[p]);
     return costOf(estimate, squares);
   }
 
@@ -123,22 +122,23 @@ class Solver {
     double of_means = 0.0;  // what the mean of a point's disparities has of the noise that is new in each of them
     squares.clear();
     for (std::size_t p = 0; p < points.size(); ++p) {
-      const int sightings = first_of_point_[p + 1] - first_of_point_[p];
+      const int observations = first_of_point_[p + 1] - first_of_point_[p];
       const auto square = commonSquare(points[p]);
       if (!square) continue;
-      squares.push_back(disparityVariance(sightings) * *square);
-      of_means += options_.noise.disparity * options_.noise.disparity / sightings;
+      squares.push_back(disparityVariance(observations) * *square);
+      of_means += options_.noise.disparity * options_.noise.disparity / observations;
     }
     const auto variance = varianceOf(squares);
     if (!variance) return std::nullopt;
     return *variance - of_means / static_cast<double>(squares.size());
   }
 
-  /// Covariances at a minimum of robust costs (Huber, Robust Statistics, section 7.6): A^-1 B A^-1, A the cost's second
-  /// derivatives, B the sum of the gradients' products over what errs independently. Parts of the image do (Liang and
-  /// Zeger 1986): sightings of a point share errors of its disparity, neighbours those of patches and rectification. Of
-  /// B only its size beside A is taken from the gradients, since few points leave the rest to chance. All of it is of
-  /// the last linearisation, but for `squares`: the residuals' now. `poses`: those that are asked for.
+  /// Sandwich covariance of an M-estimator (Huber 1967, White 1980): A^-1 B A^-1. The bread A is the cost's second
+  /// derivatives; the meat B is the sum of the gradients' products over what errs independently. These are the parts of
+  /// the image (clusters of Liang and Zeger 1986): a point's observations share errors of its disparity, neighbours
+  /// those of patches and rectification. Of B only its size beside A is taken from the gradients, since few points
+  /// leave the rest to chance. Both are of the last linearisation and scaled to `squares`, the residuals' at the
+  /// result. `poses`: those that are asked for.
   bool covariances(const Estimate& estimate, const std::vector<double>& squares, const std::vector<int>& poses,
                    ReducedSystem& system, WindowSolution& solution) {
     const RigCalibration::Matrix certain = certainInformation();
@@ -146,8 +146,8 @@ class Solver {
     known_.setZero(size_, size_);  // without the points
     known_.bottomRightCorner<kCalibration, kCalibration>() = certain;
     if (window_->floor) holdToFloor(estimate, known_, system.gradient);
-    const auto [derivatives, gradient_products] = sinceLinearised(squares);
-    system.hessian = derivatives * system.hessian + known_;
+    const auto [bread, meat] = sandwichScale(squares);
+    system.hessian = bread * system.hessian + known_;
     factor_.compute(system.hessian);
     if (factor_.info() != Eigen::Success) return false;  // as when nothing holds one of the poses
 
@@ -158,14 +158,13 @@ class Solver {
     solved_ = factor_.solve(units_);
     const RigCalibration::Matrix of_calibration = solved_.bottomRightCorner<kCalibration, kCalibration>();
     const RigCalibration::Matrix certainty = of_calibration.inverse();
-    solution.calibration_information = (certainty - certain) / derivatives;
+    solution.calibration_information = (certainty - certain) / bread;
     solution.pose_by_calibration = units_.leftCols(asked).transpose() * solved_.rightCols<kCalibration>() * certainty;
 
     const auto of_poses = solved_.leftCols(asked);
     const Eigen::MatrixXd of_known = of_poses.transpose() * known_.selfadjointView<Eigen::Lower>() * of_poses;
     const Eigen::MatrixXd of_points = units_.leftCols(asked).transpose() * of_poses - of_known;
-    solution.pose_covariance =
-        gradient_products * errorsOverInformation(system, estimate, of_poses, of_points) * of_points + of_known;
+    solution.pose_covariance = meat * meatOverBread(system, estimate, of_poses, of_points) * of_points + of_known;
     return solution.pose_covariance.allFinite();
   }
 
@@ -188,15 +187,15 @@ class Solver {
   }
 
  private:
-  /// The last linearisation in units of how things are now.
-  struct SinceLinearised {
-    double derivatives;        ///< the cost's second derivatives now by the normal equations
-    double gradient_products;  ///< now by then
+  /// Bread and meat at the result, in units of those of the last linearisation.
+  struct SandwichScale {
+    double bread;  ///< its normal equations by their weights, times this, are the cost's second derivatives
+    double meat;
   };
-  /// Of a residual the cost's second derivatives are w - w^2 s / bend = w^2 on average over two directions, where the
-  /// normal equations have its weight w, which leads to the minimum from farther away. Products of gradients have w^2,
-  /// too. Of a point's sightings i its elimination leaves w_i - w_i^2 / sum(w). Compared are the sums of that.
-  SinceLinearised sinceLinearised(const std::vector<double>& squares) const {
+  /// The second derivatives have w - w^2 s / bend = w^2 of a residual on average over two directions, where the normal
+  /// equations have its weight w, which leads to the minimum from farther away. Products of gradients have w^2, too. Of
+  /// a point's observations i its elimination leaves w_i - w_i^2 / sum(w). Compared are the sums of that.
+  SandwichScale sandwichScale(const std::vector<double>& squares) const {
     double weights = 0.0, before = 0.0, now = 0.0;
     for (std::size_t p = 0; p + 1 < first_of_point_.size(); ++p) {
       double w1 = 0.0, w2 = 0.0, w4 = 0.0, now2 = 0.0, now4 = 0.0;  // powers
@@ -209,34 +208,34 @@ class Solver {
     return {now / std::max(weights, 1e-12), now / std::max(before, 1e-12)};
   }
 
-  /// Mean ratio of two covariances: by the gradients of single points, and as the second derivatives have it. What the
-  /// poses took of the gradients is made up for by the degrees of freedom.
-  double errorsOverInformation(const ReducedSystem& system, const Estimate& estimate,
-                               const Eigen::Ref<const Eigen::MatrixXd>& solved, const Eigen::MatrixXd& covariance) {
+  /// Mean ratio of the covariance by the gradients of single points to that by the second derivatives. What the poses
+  /// took of the gradients is made up for by the degrees of freedom.
+  double meatOverBread(const ReducedSystem& system, const Estimate& estimate,
+                       const Eigen::Ref<const Eigen::MatrixXd>& solved, const Eigen::MatrixXd& covariance) {
     double freedom = 0.0, trace = 0.0;  // of covariance^-1 times the sum of outer products
     for (const EliminatedPoint& point : system.points)
-      freedom += 2.0 * point.sightings - 2.0;  // u, v and one disparity against a position
+      freedom += 2.0 * point.observations - 2.0;  // u, v and one disparity against a position
     const Eigen::MatrixXd whitened = covariance.llt().matrixL().solve(solved.transpose());
     for (Eigen::Index row = 0; row < whitened.rows(); row += 6)
-      trace += squareOfGradients(system, estimate, whitened.middleRows<6>(row));
+      trace += meatOf(system, estimate, whitened.middleRows<6>(row));
     return trace / static_cast<double>(solved.cols()) * freedom / std::max(freedom - 6.0 * poses_, 1.0);
   }
 
-  /// Sum over parts of the image in which the points were seen first.
-  double squareOfGradients(const ReducedSystem& system, const Estimate& estimate,
-                           const Eigen::Matrix<double, 6, Eigen::Dynamic>& by) {
+  /// Squared length of the gradients' sums by cluster: the part of the image in which a point was seen first.
+  double meatOf(const ReducedSystem& system, const Estimate& estimate,
+                const Eigen::Matrix<double, 6, Eigen::Dynamic>& by) {
     constexpr int kParts = 64;  // in a row at most
     parts_.assign(kParts * kParts, Vector6d::Zero());
     const double scale = window_->camera.fx / kPart;
     const auto part = [&](double ray) { return std::clamp(static_cast<int>(ray * scale + kParts / 2), 0, kParts - 1); };
-    const PoseFactor* sighting = system.factors.data();
+    const PoseFactor* observation = system.factors.data();
     for (std::size_t p = 0; p < system.points.size(); ++p) {
       const EliminatedPoint& point = system.points[p];
       Vector6d& moved = parts_[part(estimate.points[p].y()) * kParts + part(estimate.points[p].x())];
       moved += by.rightCols<kCalibration>().lazyProduct(point.calibration_gradient);
-      for (const PoseFactor* end = sighting + point.factors; sighting != end; ++sighting) {
-        const double *t = sighting->gradient.translation, *r = sighting->gradient.rotation;
-        const auto pose = by.middleCols<6>(6 * sighting->pose);
+      for (const PoseFactor* end = observation + point.factors; observation != end; ++observation) {
+        const double *t = observation->gradient.translation, *r = observation->gradient.rotation;
+        const auto pose = by.middleCols<6>(6 * observation->pose);
         moved += pose.col(0) * t[0] + pose.col(1) * t[1] + pose.col(2) * t[2] +  //
                  pose.col(3) * r[0] + pose.col(4) * r[1] + pose.col(5) * r[2];
       }
@@ -255,7 +254,7 @@ class Solver {
     placeAnchors(estimate);
     PoseFactor* factors = system.factors.data();
     for (std::size_t p = 0; p < estimate.points.size(); ++p) {
-      system.points[p] = equations_.add(projection, sightedPoint(estimate, p), linearisation, factors,
+      system.points[p] = equations_.add(projection, observedPoint(estimate, p), linearisation, factors,
                                         squares_.data() + first_of_point_[p]);
       factors += system.points[p].factors;
     }
@@ -268,7 +267,7 @@ class Solver {
       for (const Eigen::Isometry3d& T : estimate.T_camera_origin) T_camera_anchor_.push_back(T * T_origin_anchor);
   }
 
-  SightedPoint sightedPoint(const Estimate& estimate, std::size_t p) const {
+  ObservedPoint observedPoint(const Estimate& estimate, std::size_t p) const {
     const int first = first_of_point_[p], count = first_of_point_[p + 1] - first;
     return {estimate.points[p], window_->observations.data() + first, count, 1.0 / std::sqrt(disparityVariance(count)),
             T_camera_anchor_.data() + anchor_of_point_[p] * estimate.T_camera_origin.size()};
@@ -299,9 +298,9 @@ class Solver {
   }
 
   /// Of n disparities of one point the mean has the variance sigma^2 / n + common^2, as if each by itself had n times
-  /// that: more sightings do not average away what they share.
-  double disparityVariance(int sightings) const {
-    return options_.noise.disparity * options_.noise.disparity + sightings * common_sigma_ * common_sigma_;
+  /// that: more observations do not average away what they share.
+  double disparityVariance(int observations) const {
+    return options_.noise.disparity * options_.noise.disparity + observations * common_sigma_ * common_sigma_;
   }
 
   WindowOptimizerOptions options_;
@@ -319,34 +318,6 @@ class Solver {
 };
 
 }  // namespace window_optimizing
-
-bool predictObservation(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
-                        const AnchoredPoint& point, Eigen::Vector3d& prediction, ObservationJacobians* jacobians) {
-  const double rho = point.ray_and_inverse_depth.z();
-  const Eigen::Vector3d P = point.scaledPointIn(T_camera_origin);
-  if (P.z() < kNearestScaled) return false;
-  const double iz = 1.0 / P.z();
-  const double x = P.x() * iz, y = P.y() * iz, fb = camera.fx * camera.baseline;
-  prediction = {camera.fx * x + camera.cx, camera.fy * y + camera.cy, fb * rho * iz};
-  if (!jacobians) return true;
-
-  const Eigen::Isometry3d T_camera_anchor = T_camera_origin * point.T_origin_anchor;
-  const auto R = T_camera_anchor.linear();
-  const auto t = T_camera_anchor.translation();
-  // By the scaled point, rho held: (a, 0, -a x), (0, b, -b y), (0, 0, -d). A turn moves the point by -skew(P).
-  const double a = camera.fx * iz, b = camera.fy * iz, d = fb * rho * iz * iz;
-  jacobians->pose << rho * a, 0.0, -rho * a * x, -a * x * P.y(), a * (P.z() + x * P.x()), -a * P.y(),  //
-      0.0, rho * b, -rho * b * y, -b * (P.z() + y * P.y()), b * y * P.x(), b * P.x(),                  //
-      0.0, 0.0, -rho * d, -d * P.y(), d * P.x(), 0.0;
-  const auto byDirection = [&](const auto& w) -> Eigen::Vector3d {
-    return {a * (w.x() - x * w.z()), b * (w.y() - y * w.z()), -d * w.z()};
-  };
-  jacobians->point.col(0) = byDirection(R.col(0));
-  jacobians->point.col(1) = byDirection(R.col(1));
-  jacobians->point.col(2) = byDirection(t);
-  jacobians->point(2, 2) += fb * iz;
-  return true;
-}
 
 struct WindowOptimizer::Memory {
   explicit Memory(const WindowOptimizerOptions& options) : solver(options) {}

@@ -50,7 +50,7 @@ bool hasVectorPopcount() {
   return has;
 }
 
-SDVO_VECTOR_POPCOUNT inline __m256i load(const std::uint8_t* bytes) {
+SDVO_VECTOR_POPCOUNT inline __m256i loadBytes(const std::uint8_t* bytes) {
   return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(bytes));
 }
 
@@ -65,7 +65,7 @@ SDVO_VECTOR_POPCOUNT void distancesByRegisters(const std::uint8_t* row, const cv
     const auto add = [&](__m256i a, __m256i b) SDVO_VECTOR_POPCOUNT {
       sums = _mm256_add_epi64(sums, _mm256_popcnt_epi64(_mm256_xor_si256(a, b)));
     };
-    for (int byte = 0; byte < whole; byte += kBytes) add(load(row + byte), load(other + byte));
+    for (int byte = 0; byte < whole; byte += kBytes) add(loadBytes(row + byte), loadBytes(other + byte));
     if (rest != 0) add(_mm256_maskz_loadu_epi8(rest, row + whole), _mm256_maskz_loadu_epi8(rest, other + whole));
     const __m128i halves = _mm_add_epi64(_mm256_castsi256_si128(sums), _mm256_extracti128_si256(sums, 1));
     distances[k] = static_cast<float>(_mm_extract_epi64(halves, 0) + _mm_extract_epi64(halves, 1));

@@ -4,8 +4,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "../common/lanes.hpp"
-#include "patch_placement.hpp"
+#include "../common/kernel.hpp"
 #include "patch_samples_neon.hpp"
 
 #ifdef SDVO_HAVE_AVX2

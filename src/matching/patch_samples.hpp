@@ -9,6 +9,11 @@
 
 namespace sdvo {
 
+/// Where the samples lie in a patch: the middle, and what a step along x and along y of the square changes.
+struct PatchPlacement {
+  float x, y, x_by_x, x_by_y, y_by_x, y_by_y;
+};
+
 /// Values on a square of samples, row by row; those that fill the last register are zero.
 constexpr int kLargestSampledSide = 2 * (PatchAlignmentOptions::kLargestRadius + 1) + 1;
 constexpr int kMostSampled = (kLargestSampledSide * kLargestSampledSide + 7) / 8 * 8;

@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "patch_placement.hpp"
+#include "patch_samples.hpp"
 
 namespace sdvo {
 

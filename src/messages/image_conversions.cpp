@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "../common/quantile.hpp"
+#include "../common/statistics.hpp"
 
 namespace sdvo::ros_conversions {
 namespace {

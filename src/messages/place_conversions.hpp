@@ -15,7 +15,6 @@
 #include <string>
 
 #include "stereo_descriptor_vo/front_end/depth_scale.hpp"
-#include "stereo_descriptor_vo/places/place.hpp"
 #include "stereo_descriptor_vo/places/place_index.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
 #include "stereo_descriptor_vo/places/pose_graph.hpp"

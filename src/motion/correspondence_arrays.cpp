@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <limits>
 
-#include "../common/lanes.hpp"
+#include "../common/kernel.hpp"
 
 namespace sdvo {
 namespace {

@@ -1,10 +1,10 @@
-#include "stereo_descriptor_vo/motion/genetic_consensus.hpp"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
 #include <vector>
+
+#include "stereo_descriptor_vo/motion/sample_consensus.hpp"
 
 namespace sdvo {
 namespace {
@@ -71,7 +71,7 @@ class GeneticSearch {
         random_(random),
         knowledge_(problem.count()) {}
 
-  GeneticResult run() {
+  Consensus run() {
     result_.cost = std::numeric_limits<double>::max();
     std::vector<Individual> population(static_cast<std::size_t>(options_.population));
     for (Individual& individual : population) {
@@ -159,13 +159,13 @@ class GeneticSearch {
   SampleBudget budget_;
   std::mt19937& random_;
   GeneKnowledge knowledge_;
-  GeneticResult result_;
+  Consensus result_;
 };
 
 }  // namespace
 
-GeneticResult searchGenetically(const PoseProblem& problem, const GeneticConsensusOptions& options, bool adaptive,
-                                SampleBudget budget, std::mt19937& random) {
+Consensus searchGenetically(const PoseProblem& problem, const GeneticConsensusOptions& options, bool adaptive,
+                            SampleBudget budget, std::mt19937& random) {
   return GeneticSearch(problem, options, adaptive, budget, random).run();
 }
 

@@ -5,8 +5,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "log_sum.hpp"
-
 namespace sdvo {
 namespace {
 

@@ -1,6 +1,7 @@
 #include "stereo_descriptor_vo/motion/sample_consensus.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 
@@ -25,15 +26,16 @@ Consensus searchAtRandom(const PoseProblem& problem, const SampleConsensusOption
   const bool count_only = options.consensus == ConsensusMethod::kRansac;
   const bool local = options.consensus == ConsensusMethod::kLoRansac;
   Consensus consensus;
-  double best = std::numeric_limits<double>::max();
+  consensus.cost = std::numeric_limits<double>::max();
   for (; !budget.spent(consensus.iterations); ++consensus.iterations) {
     for (const Eigen::Isometry3d& candidate : problem.solve(drawSample(random, problem.count()))) {
-      double cost = count_only ? problem.outlierCost(candidate, best) : problem.truncatedCost(candidate, best);
-      if (cost >= best) continue;
+      double cost = count_only ? problem.outlierCost(candidate, consensus.cost)
+                               : problem.truncatedCost(candidate, consensus.cost);
+      if (cost >= consensus.cost) continue;
       consensus.found = true;
       consensus.T_current_reference = candidate;
       if (local) optimiseLocally(problem, refinement, consensus.T_current_reference, cost);
-      best = cost;
+      consensus.cost = cost;
       const double inliers = static_cast<double>(problem.inliers(consensus.T_current_reference).size());
       budget.noteInliers(inliers / problem.count());
     }
@@ -41,29 +43,49 @@ Consensus searchAtRandom(const PoseProblem& problem, const SampleConsensusOption
   return consensus;
 }
 
-Consensus searchByGenes(const PoseProblem& problem, const SampleConsensusOptions& options, const SampleBudget& budget,
-                        std::mt19937& random) {
-  const GeneticResult result =
-      searchGenetically(problem, options.genetic, options.consensus == ConsensusMethod::kAdaptiveGasac, budget, random);
-  Consensus consensus;
-  consensus.found = result.found;
-  consensus.T_current_reference = result.T_current_reference;
-  consensus.iterations = result.iterations;
-  return consensus;
+}  // namespace
+
+MinimalSample drawSample(std::mt19937& random, int count) {
+  MinimalSample sample{};
+  for (std::size_t k = 0; k < sample.size();) {
+    sample[k] = static_cast<int>(random() % static_cast<unsigned>(count));
+    if (std::find(sample.begin(), sample.begin() + k, sample[k]) == sample.begin() + k) ++k;
+  }
+  return sample;
 }
 
-}  // namespace
+SampleBudget::SampleBudget(int at_most, double confidence)
+    : at_most_(at_most), confidence_(confidence), needed_(at_most) {}
+
+void SampleBudget::noteInliers(double share) {
+  // Fischler and Bolles 1981.
+  const double all_inliers = share * share * share;
+  if (all_inliers >= 1.0)
+    needed_ = 1.0;
+  else if (all_inliers <= 1e-12)
+    needed_ = at_most_;
+  else
+    needed_ = std::log(1.0 - confidence_) / std::log(1.0 - all_inliers);
+}
+
+bool SampleBudget::spent(int samples) const {
+  return samples >= std::min(needed_, at_most_);
+}
+
+double SampleBudget::progress(int samples) const {
+  return std::min(1.0, samples / std::max(1.0, std::min(needed_, at_most_)));
+}
 
 Consensus findConsensus(const PoseProblem& problem, const SampleConsensusOptions& options,
                         const MotionRefinementOptions& refinement) {
   constexpr int kSmallestProblem = 4;  // the genetic search needs a gene to exchange
   if (problem.count() < kSmallestProblem) return {};
   std::mt19937 random(static_cast<std::uint32_t>(options.seed));
-  const bool genetic =
-      options.consensus == ConsensusMethod::kGasac || options.consensus == ConsensusMethod::kAdaptiveGasac;
   const SampleBudget budget(options.max_iterations, 1.0 - kTailProbability);
-  return genetic ? searchByGenes(problem, options, budget, random)
-                 : searchAtRandom(problem, options, refinement, budget, random);
+  const bool adaptive = options.consensus == ConsensusMethod::kAdaptiveGasac;
+  if (adaptive || options.consensus == ConsensusMethod::kGasac)
+    return searchGenetically(problem, options.genetic, adaptive, budget, random);
+  return searchAtRandom(problem, options, refinement, budget, random);
 }
 
 }  // namespace sdvo

@@ -28,7 +28,7 @@ std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHy
   rows.reserve(found.motion.inliers.size());
   for (const int i : found.motion.inliers) {
     const auto [reference, current, distance] = found.matches[static_cast<std::size_t>(i)];
-    const Eigen::Vector3d now = found.motion.T_current_reference * found.view->rows.positions[reference];
+    const Eigen::Vector3d now = found.motion.T_current_reference * found.view->points.positions[reference];
     rows.push_back(
         {(features.camera.project(now).y() - found.view->pixels[reference].y) / dt, usual.change(features, current)});
   }
@@ -53,6 +53,7 @@ void VisualOdometry::configure(const VisualOdometryOptions& options) {
   revisit_ = Revisit(options_.matcher, options_.motion, options_.alignment);
   optimizer_ = WindowOptimizer(options_.window);
   state_.prior.configure(options.tracking);
+  if (state_.map) state_.map->assume(options_.noise);
 }
 
 void VisualOdometry::reset() {
@@ -219,15 +220,16 @@ std::optional<StereoFeatures> VisualOdometry::inStep(const StereoFeatures& taken
   const MotionHypothesis found = search_.find(sceneOf(features, dt, guess), largestDoubt());
   if (!found.motion.success) return features;
   return state_.rig.right_delay.inStep(
-      taken, dt, logSE3(found.motion.T_current_reference.inverse()) / state_.secondsSinceMap(taken));
+      taken, dt,
+      logSE3(found.motion.T_current_reference.inverse()) / state_.prior.interval(state_.secondsSinceMap(taken)));
 }
 
 /// The pair with the motion that the search found; nothing without one, and none that spans an outage.
 std::optional<MeasuredPair> VisualOdometry::measuredPair(const Pair& pair, const MotionHypothesis& found) const {
   if (!found.motion.success || state_.interrupted || !(pair.dt > 0.0)) return std::nullopt;
   const StereoFeatures& taken = pair.taken();
-  const double since = state_.secondsSinceMap(taken);
-  return MeasuredPair{taken, pair.dt, found.motion.T_current_reference, since,
+  const double since = state_.prior.interval(state_.secondsSinceMap(taken));
+  return MeasuredPair{taken, state_.prior.interval(pair.dt), found.motion.T_current_reference, since,
                       rowMotions(taken, found, since, state_.rig.usual_rows)};
 }
 
@@ -245,8 +247,8 @@ std::vector<Evidence> VisualOdometry::evidenceAgainst(const Pair& pair, const Mo
   if (!measured) return evidence;
   rig.readout.add(measured->features.camera, measured->T_current_reference, found.correspondences, found.motion.inliers,
                   measured->velocity());
-  rig.right_delay.watch(measured->rows, pair.dt, options_.noise.corner * rig.noise.scale());
-  const RightCameraDelay::Partner partner = rig.right_delay.partner(pair.dt);
+  rig.right_delay.watch(measured->rows, measured->dt, options_.noise.corner * rig.noise.scale());
+  const RightCameraDelay::Partner partner = rig.right_delay.partner(measured->dt);
   evidence.push_back({partner.log_odds, partner.words()});
   evidence.push_back(
       {kUnsuspected + state_.prior.logRatioOfSwap(measured->T_current_reference.inverse(), measured->since_reference),
@@ -348,7 +350,7 @@ VisualOdometry::Candidate VisualOdometry::adjustBeyondDoubt(const StereoFeatures
   const bool is_sound = !state_.doubt.lasts();
   const bool was_beyond_doubt = search_.isBeyondDoubt(scene, found, largestDoubt());
   Candidate candidate = adjust(features, found, is_sound);
-  found.reject(candidate.adjustment.rejected_rows);
+  found.reject(candidate.adjustment.rejected);
   if (!was_beyond_doubt || search_.isBeyondDoubt(scene, found, largestDoubt())) return candidate;
   MotionScene suspected = scene;
   suspected.is_suspected = true;
@@ -356,7 +358,7 @@ VisualOdometry::Candidate VisualOdometry::adjustBeyondDoubt(const StereoFeatures
   if (!chosen.motion.success) return candidate;
   found = std::move(chosen);
   candidate = adjust(features, found, is_sound);
-  found.reject(candidate.adjustment.rejected_rows);
+  found.reject(candidate.adjustment.rejected);
   return candidate;
 }
 
@@ -378,7 +380,7 @@ VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features,
   // The window's first pose does not move in the adjustment: what it carries in height and tilt goes with the whole
   // map.
   if (floor) map.moveTo(floor->settled(map.newestPose(), state_.covariance.value()));
-  map.renewLooks(features, found.sightings);
+  map.renewAppearance(features, found.sightings);
   // What the adjustment did to the map as a whole is no motion.
   const Eigen::Isometry3d T_before_after = candidate.T_keyframe_origin.inverse() * map.poseBeforeNewest();
   candidate.motion = T_previous_origin * T_before_after * map.newestPose().inverse();
@@ -397,7 +399,8 @@ void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& fou
   Matrix6d covariance = candidate.adjustment.since_keyframe;
   std::string reason;
   if (found.innovation > noiseGate(6)) {
-    // The stamps may be wrong, or the camera did what none does. The pose does not rest on stamps, but the velocity does.
+    // The stamps may be wrong, or the camera did what none does. The pose does not rest on stamps, but the velocity
+    // does.
     const Vector6d innovation = scene.prior.front().innovation(found.motion.T_current_reference.inverse());
     covariance += innovation * innovation.transpose();
     add(innovation * innovation.transpose(), Matrix6d::Zero());
@@ -435,7 +438,7 @@ VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, cons
   const LocalMap& map = *state_.map;
   Step step;
   step.state = TrackingState::kTracking;
-  step.rejected_rows = candidate.adjustment.rejected_rows;
+  step.rejected_rows = candidate.adjustment.rejected;
   step.T_previous_current = (map.newestPose() * state_.T_origin_camera).inverse();
   if (!candidate.adjustment.success) {
     step.covariance = found.motion.covariance;

@@ -1,6 +1,5 @@
 #include <stdexcept>
 
-#include "pose_graph_solver.hpp"
 #include "stereo_descriptor_vo/places/pose_graph.hpp"
 
 namespace sdvo {

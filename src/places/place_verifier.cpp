@@ -3,7 +3,7 @@
 #include <vector>
 
 #include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
-#include "stereo_descriptor_vo/matching/described_points.hpp"
+#include "stereo_descriptor_vo/matching/feature_matcher.hpp"
 
 namespace sdvo {
 namespace {

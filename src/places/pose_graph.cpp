@@ -11,8 +11,6 @@
 #include <string>
 #include <utility>
 
-#include "pose_graph_solver.hpp"
-
 namespace sdvo {
 namespace {
 

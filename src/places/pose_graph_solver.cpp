@@ -1,5 +1,3 @@
-#include "pose_graph_solver.hpp"
-
 #include <ceres/ceres.h>
 #include <ceres/rotation.h>
 

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "../common/median.hpp"
+#include "../common/statistics.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
 
 namespace sdvo {

@@ -12,7 +12,7 @@
 #include <utility>
 
 #include "../check/calibration_check.hpp"
-#include "../check/emitter_check.hpp"
+#include "../check/image_check.hpp"
 #include "../common/stamp_filter.hpp"
 #include "../common/worker.hpp"
 #include "../config/interface_options.hpp"

@@ -325,11 +325,11 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   void report(const OdometryResult& result, const ros::Time& stamp) {
     const bool is_lost = result.state == TrackingState::kWaiting || result.state == TrackingState::kLost;
     if (result.state == TrackingState::kTracking) {
-      if (std::exchange(is_tracking_, true)) return;
+      if (is_tracking_ || !throttle_.allows("begins")) return;
+      is_tracking_ = true;
       // The first pair has features and no matches yet.
-      if (throttle_.allows("begins"))
-        NODELET_INFO_STREAM("TRACKING at " << stamp << ", epoch " << result.epoch << ": "
-                                           << (result.has_motion ? result.inliers : result.features) << " points");
+      NODELET_INFO_STREAM("TRACKING at " << stamp << ", epoch " << result.epoch << ": "
+                                         << (result.has_motion ? result.inliers : result.features) << " points");
       return;
     }
     if (is_lost) is_tracking_ = false;

@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "../check/emitter_check.hpp"
 #include "../check/finding.hpp"
 #include "../check/image_check.hpp"
 #include "../check/odometry_check.hpp"

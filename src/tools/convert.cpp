@@ -19,7 +19,6 @@
 #include "stereo_bag.hpp"
 #include "stereo_descriptor_vo/data/euroc_dataset.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
-#include "stereo_descriptor_vo/data/kitti_writer.hpp"
 
 namespace {
 

@@ -6,7 +6,7 @@
 #include <limits>
 #include <utility>
 
-#include "../common/quantile.hpp"
+#include "../common/statistics.hpp"
 #include "../common/text.hpp"
 #include "page.hpp"
 #include "plot.hpp"

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "../common/quantile.hpp"
+#include "../common/statistics.hpp"
 #include "../data/text_file.hpp"
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
 

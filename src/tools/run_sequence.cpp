@@ -17,7 +17,6 @@
 
 #include "../common/progress.hpp"
 #include "../config/pipeline_options.hpp"
-#include "../data/kitti_layout.hpp"
 #include "../data/text_file.hpp"
 #include "camera_check.hpp"
 #include "drive_page.hpp"
@@ -72,8 +71,9 @@ void follow(sdvo::Recording& recording, const Arguments& arguments, Drive& drive
       const sdvo::StereoFeatures features = drive.whole.process(pair.camera, pair.left, pair.right, pair.stamp);
       if (places) places->process(features, drive.whole.last());
       if (!arguments.pictures.empty()) {
-        const std::string name = sdvo::kittiFrameName(drive.whole.pairs() - 1) + ".jpg";
-        cv::imwrite((fs::path(arguments.pictures) / name).string(), drawLeft(pair, features, drive.whole.last()));
+        std::ostringstream name;
+        name << std::setw(6) << std::setfill('0') << drive.whole.pairs() - 1 << ".jpg";
+        cv::imwrite((fs::path(arguments.pictures) / name.str()).string(), drawLeft(pair, features, drive.whole.last()));
       }
       if (seen) seen->check.add(pair, features), seen->pictures.add(pair, features, drive.whole.last());
       if (arguments.halves) {

@@ -3,7 +3,7 @@
 #include <random>
 #include <vector>
 
-#include "../../src/check/emitter_check.hpp"
+#include "../../src/check/image_check.hpp"
 #include "../synthetic_scene.hpp"
 
 namespace sdvo {

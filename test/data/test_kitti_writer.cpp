@@ -7,7 +7,6 @@
 
 #include "../temporary_folder.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
-#include "stereo_descriptor_vo/data/kitti_writer.hpp"
 
 namespace sdvo {
 namespace test_kitti_writer {

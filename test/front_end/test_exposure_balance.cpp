@@ -94,6 +94,17 @@ TEST(ExposureBalance, FeaturesAreFoundWhateverTheGainOfOneSide) {
   EXPECT_LT(features(exposed(0.4)), 0.5 * wanted);
 }
 
+TEST(ExposureBalance, APartThatIsCoveredOnOneSideSpoilsNoOtherOne) {
+  const auto features = [](Pair pair, bool is_covered) {
+    if (is_covered)
+      pair.right(cv::Rect(pair.right.cols / 2, pair.right.rows / 2, pair.right.cols / 2, pair.right.rows / 2))
+          .setTo(10);
+    return FeatureExtractor({}).extract(synthetic::camera(), pair.left, pair.right, 0).count();
+  };
+  EXPECT_GT(features(exposed(1.0), true), 0.6 * features(exposed(1.0), false));
+  EXPECT_GT(features(exposed(1.6), true), 0.6 * features(exposed(1.6), false)) << "beside another exposure";
+}
+
 TEST(ExposureBalance, RefusesOptionsOutOfRange) {
   ExposureBalanceOptions options;
   options.tolerance = -0.1;

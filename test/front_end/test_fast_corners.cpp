@@ -1,12 +1,18 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
+#include <vector>
 
+#include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/front_end/fast_corners.hpp"
 
 namespace sdvo {
+
 namespace test_fast_corners {
 
 void expectCornersOfOpenCv(const cv::Mat& image, int threshold) {
@@ -57,4 +63,125 @@ TEST(FastCorners, AreTheSameWithoutVectors) {
 }
 
 }  // namespace test_fast_corners
+
+namespace test_corner_peak {
+
+/// Blurred noise.
+cv::Mat texture(cv::Size size, int seed) {
+  cv::Mat image(size, CV_8U);
+  cv::RNG(static_cast<std::uint64_t>(seed)).fill(image, cv::RNG::UNIFORM, 0, 256);
+  cv::GaussianBlur(image, image, {}, 1.2);
+  return image;
+}
+
+/// The highest threshold that a pixel passes as a FAST corner, and one more: by asking cv::FAST at each of them.
+int contrastAt(const cv::Mat& image, const cv::Point& pixel) {
+  const cv::Mat around = image(cv::Rect(pixel - cv::Point(3, 3), cv::Size(7, 7)));
+  for (int threshold = 255; threshold > 0; --threshold) {
+    std::vector<cv::KeyPoint> corners;
+    cv::FAST(around, corners, threshold - 1, false);
+    if (!corners.empty()) return threshold;
+  }
+  return 0;
+}
+
+double peakOf(double before, double here, double after) {
+  const double bend = 2.0 * here - before - after;
+  return bend > 0.0 ? std::clamp(0.5 * (after - before) / bend, -1.0, 1.0) : 0.0;
+}
+
+TEST(CornerPeak, IsTheMaximumOfTwoParabolasThroughTheContrasts) {
+  const cv::Mat image = texture({60, 50}, 5);
+  const cv::Mat part = image(cv::Rect(3, 2, 51, 43));
+  for (int y = 4; y < part.rows - 4; y += 2)
+    for (int x = 4; x < part.cols - 4; x += 3) {
+      double columns[3] = {0, 0, 0}, rows[3] = {0, 0, 0};
+      for (int j = 0; j < 3; ++j)
+        for (int i = 0; i < 3; ++i) {
+          const int contrast = contrastAt(part, {x + i - 1, y + j - 1});
+          columns[i] += (j == 1 ? 2 : 1) * contrast;
+          rows[j] += (i == 1 ? 2 : 1) * contrast;
+        }
+      const cv::Point2f peak = cornerPeak(part, {x, y});
+      EXPECT_NEAR(peak.x, peakOf(columns[0], columns[1], columns[2]), 1e-6) << x << ", " << y;
+      EXPECT_NEAR(peak.y, peakOf(rows[0], rows[1], rows[2]), 1e-6) << x << ", " << y;
+    }
+}
+
+TEST(CornerPeak, SpotsAreBrightOrDark) {
+  const auto spot = [](double height) {
+    return synthetic::render({31, 31}, [height](double u, double v) {
+      return 128.0 + height * std::exp(-0.25 * ((u - 15.3) * (u - 15.3) + (v - 14.8) * (v - 14.8)));
+    });
+  };
+  for (const double height : {100.0, -100.0}) {
+    const cv::Point2f peak = cornerPeak(spot(height), {15, 15});
+    EXPECT_NEAR(peak.x, 0.3, 0.05) << height;
+    EXPECT_NEAR(peak.y, -0.2, 0.05) << height;
+  }
+}
+
+/// The same corners in two noisy images that are a part of a pixel apart: how far their positions are from that.
+TEST(CornerPeak, IsMoreRepeatableThanGradientLinesAre) {
+  const cv::Point2f move(0.4f, -0.3f);
+  const cv::Mat one = texture({400, 300}, 7);
+  cv::Mat other;
+  cv::warpAffine(one, other, cv::Matx23f(1.f, 0.f, move.x, 0.f, 1.f, move.y), one.size(), cv::INTER_CUBIC);
+  std::vector<cv::KeyPoint> corners[2];
+  std::vector<cv::Point2f> peaks[2], crossings[2];
+  for (const int i : {0, 1}) {
+    cv::Mat noisy, noise(one.size(), CV_16S);
+    cv::RNG(static_cast<std::uint64_t>(11 + i)).fill(noise, cv::RNG::NORMAL, 0, 2);
+    cv::add(i == 0 ? one : other, noise, noisy, cv::noArray(), CV_8U);
+    cv::FAST(noisy, corners[i], 12, true);
+    for (const cv::KeyPoint& corner : corners[i]) {
+      crossings[i].push_back(corner.pt);
+      peaks[i].push_back(corner.pt + cornerPeak(noisy, corner.pt));
+    }
+    const cv::TermCriteria until{cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 10, 0.02};
+    cv::cornerSubPix(noisy, crossings[i], {3, 3}, {-1, -1}, until);
+  }
+  double pixels = 0.0, of_peaks = 0.0, of_crossings = 0.0;
+  int pairs = 0;
+  for (std::size_t i = 0; i < corners[0].size(); ++i)
+    for (std::size_t j = 0; j < corners[1].size(); ++j) {
+      const cv::Point2f apart = corners[0][i].pt + move - corners[1][j].pt;
+      if (cv::norm(apart) > 1.2) continue;
+      ++pairs;
+      const auto square = [](const cv::Point2f& p) { return std::min(p.dot(p), 2.25f); };  // of what was lost
+      pixels += square(apart);
+      of_peaks += square(peaks[0][i] + move - peaks[1][j]);
+      of_crossings += square(crossings[0][i] + move - crossings[1][j]);
+    }
+  ASSERT_GT(pairs, 300);
+  EXPECT_LT(std::sqrt(of_peaks), 0.7 * std::sqrt(pixels));
+  EXPECT_LT(std::sqrt(of_peaks), 0.7 * std::sqrt(of_crossings));
+}
+
+TEST(CornerPeak, IsThePixelItselfWhereThereIsNoMaximum) {
+  EXPECT_EQ(cornerPeak(cv::Mat(20, 20, CV_8U, cv::Scalar(90)), {10, 10}), cv::Point2f());
+  // The contrast of a bright pixel's neighbour only grows towards it.
+  cv::Mat image(20, 20, CV_8U, cv::Scalar(90));
+  image.at<std::uint8_t>(10, 10) = 200;
+  EXPECT_EQ(cornerPeak(image, {10, 10}), cv::Point2f());
+  EXPECT_EQ(cornerPeak(image, {8, 10}).y, 0.f);
+}
+
+TEST(CornerPeak, IsThePixelItselfWhereCirclesLeaveTheImage) {
+  const cv::Mat image = texture({60, 50}, 5);
+  int moved = 0;
+  for (int y = -2; y < 53; ++y)
+    for (int x = -2; x < 63; ++x) {
+      const cv::Point2f peak = cornerPeak(image, {x, y});
+      if (x < 4 || y < 4 || x > 55 || y > 45)
+        EXPECT_EQ(peak, cv::Point2f()) << x << ", " << y;
+      else
+        moved += peak != cv::Point2f();
+      EXPECT_LE(std::max(std::abs(peak.x), std::abs(peak.y)), 1.f);
+    }
+  EXPECT_GT(moved, 1000);
+}
+
+}  // namespace test_corner_peak
+
 }  // namespace sdvo

@@ -15,7 +15,8 @@ OldKeyframe facingAWall(int id, double z, double distance) {
   keyframe.T_camera_origin.translation().z() = -z;
   keyframe.points.resize(100);
   for (int i = 0; i < 100; ++i)
-    keyframe.rows.positions.emplace_back(0.05 * distance * (i % 10 - 4.5), 0.05 * distance * (i / 10 - 4.5), distance);
+    keyframe.described.positions.emplace_back(0.05 * distance * (i % 10 - 4.5), 0.05 * distance * (i / 10 - 4.5),
+                                              distance);
   return keyframe;
 }
 
@@ -66,7 +67,7 @@ TEST(KeyframeMemory, FindsTheKeyframeOfAPlace) {
 TEST(KeyframeMemory, RatherTheNearestThanTheOneThatSharesMost) {
   KeyframeMemory memory(10);
   OldKeyframe nearer = facingAWall(2, 1.2, 10.0);
-  nearer.rows.positions.resize(80);
+  nearer.described.positions.resize(80);
   nearer.points.resize(80);
   memory.remember(rig(), facingAWall(1, 0.0, 10.0));
   memory.remember(rig(), nearer);

@@ -24,11 +24,11 @@ void see(LocalMap& map, const StereoFeatures& features, int id, const Eigen::Iso
   const Eigen::Isometry3d T_camera_origin = T_origin_camera.inverse();
   if (id > 1) {
     const LocalMap::View view = map.view();
-    for (std::size_t i = 0; i < view.point.size(); ++i)
+    for (std::size_t i = 0; i < view.ids.size(); ++i)
       for (int row = 0; row < features.count(); ++row)
-        if (std::memcmp(view.rows.descriptors.ptr(static_cast<int>(i)), features.descriptors.ptr(row),
+        if (std::memcmp(view.points.descriptors.ptr(static_cast<int>(i)), features.descriptors.ptr(row),
                         static_cast<std::size_t>(features.descriptors.cols)) == 0)
-          sightings.push_back(map.sight(PatchAlignmentOptions(), features, T_camera_origin, view.point[i], row));
+          sightings.push_back(map.sight(PatchAlignmentOptions(), features, T_camera_origin, view.ids[i], row));
   }
   sightings.resize(std::min(sightings.size(), most));
   map.insert({}, features, id, T_camera_origin, sightings, RigCalibration());
@@ -223,7 +223,7 @@ TEST(LocalMapSight, RenewsTheReferenceWhenTheScaleHasChangedAndKeepsThePoint) {
     const Eigen::Isometry3d pose = Wall::poseAt(distance);
     const LocalMap::Sighting sighting = map.sight(PatchAlignmentOptions(), features, pose, 0, 0);
     map.insert({}, features, ++id, pose, {sighting}, RigCalibration());
-    map.renewLooks(features, {sighting});
+    map.renewAppearance(features, {sighting});
     return sighting;
   };
   // A little larger: the first reference serves on. 1.25 times: from then on that view is the reference.
@@ -267,7 +267,7 @@ StereoFeatures see(const synthetic::World& world, int from, int to, const Eigen:
 /// Row `row` of the view's map point as a sighting by row `row_of_pair` of a pair, corners as they are.
 LocalMap::Sighting sighting(const LocalMap& map, const LocalMap::View& view, int row, const StereoFeatures& features,
                             int row_of_pair, const PatchAlignmentOptions& alignment = {}) {
-  return map.sight(alignment, features, map.newestPose(), view.point[static_cast<std::size_t>(row)], row_of_pair);
+  return map.sight(alignment, features, map.newestPose(), view.ids[static_cast<std::size_t>(row)], row_of_pair);
 }
 
 /// The pair's rows `from` … recognise the view's rows from 0 on, `count` of them.
@@ -283,7 +283,7 @@ Sightings recognised(const LocalMap& map, const StereoFeatures& features, int co
 void add(LocalMap& map, const StereoFeatures& features, int id, const Eigen::Isometry3d& T_camera_origin,
          const Sightings& sightings, const RigCalibration& calibration = {}) {
   map.insert({}, features, id, T_camera_origin, sightings, calibration);
-  map.renewLooks(features, sightings);
+  map.renewAppearance(features, sightings);
 }
 
 LocalMapOptions everyPairAKeyframe() {
@@ -336,17 +336,17 @@ TEST(LocalMap, ViewIsWhatTheNewestPairSees) {
     }
     const Eigen::Isometry3d newest = map.newestPose();
     const LocalMap::View view = map.view();
-    ASSERT_EQ(view.rows.count(), 20);
-    EXPECT_EQ(view.rows.kind, features.kind());
+    ASSERT_EQ(view.points.count(), 20);
+    EXPECT_EQ(view.points.kind, features.kind());
     for (int i = 0; i < 20; ++i) {
       const Eigen::Vector3d truth = newest * world.points[i];
-      EXPECT_LT((view.rows.positions[i] - truth).norm(), 1e-4);
+      EXPECT_LT((view.points.positions[i] - truth).norm(), 1e-4);
       const Eigen::Vector3d pixel = features.camera.project(truth);
       EXPECT_NEAR(view.pixels[i].x, pixel.x(), 1e-3);
       EXPECT_NEAR(view.pixels[i].y, pixel.y(), 1e-3);
       EXPECT_NEAR(view.pixels[i].z, pixel.x() - pixel.z(), 1e-3);
-      EXPECT_EQ(view.point[i], i);
-      EXPECT_EQ(0, std::memcmp(view.rows.descriptors.ptr(i), world.rows[i].data(), world.rows[i].size()));
+      EXPECT_EQ(view.ids[i], i);
+      EXPECT_EQ(0, std::memcmp(view.points.descriptors.ptr(i), world.rows[i].data(), world.rows[i].size()));
     }
   }
   EXPECT_EQ(map.newestId(), 2);
@@ -364,7 +364,7 @@ TEST(LocalMap, PointsAreWithoutTheRigsError) {
   LocalMap map({});
   add(map, features, 1, Eigen::Isometry3d::Identity(), {}, calibration);
   const LocalMap::View view = map.view();
-  for (int i = 0; i < 20; ++i) EXPECT_LT((view.rows.positions[i] - world.points[i]).norm(), 1e-4);
+  for (int i = 0; i < 20; ++i) EXPECT_LT((view.points.positions[i] - world.points[i]).norm(), 1e-4);
 }
 
 TEST(LocalMap, FarPointsAreDirections) {
@@ -373,7 +373,7 @@ TEST(LocalMap, FarPointsAreDirections) {
   synthetic::addFeature(features, 422.5, 236.25, 0.01, synthetic::randomRow(random, 128));
   LocalMap map({});
   add(map, features, 1, Eigen::Isometry3d::Identity(), {});
-  const Eigen::Vector3d position = map.view().rows.positions.at(0);
+  const Eigen::Vector3d position = map.view().points.positions.at(0);
   EXPECT_NEAR(position.z(), 400.0 * 0.5 / 0.05, 1e-2) << "farther than that cannot be told apart";
   EXPECT_NEAR(position.x() / position.z(), 0.25, 1e-9);
 }
@@ -394,7 +394,7 @@ TEST(LocalMap, DoesNotShowWhatLiesBehind) {
   ASSERT_LT(in_front, 90);
   ASSERT_LT(shown, in_front);
   ASSERT_GT(shown, 5);
-  EXPECT_EQ(map.view().rows.count(), shown) << "nor what lies beside the image";
+  EXPECT_EQ(map.view().points.count(), shown) << "nor what lies beside the image";
 }
 
 TEST(LocalMap, ShowsWhatATurnBringsIntoTheNextImage) {
@@ -415,12 +415,12 @@ TEST(LocalMap, ShowsWhatATurnBringsIntoTheNextImage) {
     now_or_next += isSeen(away) || isSeen(back * away);
   }
   ASSERT_GT(now_or_next, now + 10);
-  EXPECT_EQ(map.view().rows.count(), now);
+  EXPECT_EQ(map.view().points.count(), now);
   const LocalMap::View next = map.view(back);
-  EXPECT_EQ(next.rows.count(), now_or_next);
-  for (int row = 0; row < next.rows.count(); ++row) {
+  EXPECT_EQ(next.points.count(), now_or_next);
+  for (int row = 0; row < next.points.count(); ++row) {
     const Eigen::Vector3d& expected = world.points[static_cast<std::size_t>(next.point[row])];
-    EXPECT_LT((away.inverse() * next.rows.positions[row] - expected).norm(), 1e-3 * expected.norm());
+    EXPECT_LT((away.inverse() * next.points.positions[row] - expected).norm(), 1e-3 * expected.norm());
   }
 }
 
@@ -433,11 +433,11 @@ TEST(LocalMap, ForgetsThePairBeforeUnlessItWasAKeyframe) {
   StereoFeatures second = see(world, 0, 20, pose);
   add(map, second, 2, pose, recognised(map, second, 10));
   EXPECT_FALSE(map.newestIsKeyframe());
-  EXPECT_EQ(map.view().rows.count(), 20);
+  EXPECT_EQ(map.view().points.count(), 20);
   // The third sees five of the points that only the second had shown; the other five go with it.
   StereoFeatures third = see(world, 0, 15, pose);
   add(map, third, 3, pose, recognised(map, third, 15));
-  EXPECT_EQ(map.view().rows.count(), 15);
+  EXPECT_EQ(map.view().points.count(), 15);
   EXPECT_EQ(map.oldestId(), 1);
   EXPECT_EQ(map.newestId(), 3);
   EXPECT_EQ(map.lastKeyframeId(), 1);
@@ -542,15 +542,15 @@ TEST(LocalMap, LooksForAPointUntilEnoughFramesMissedIt) {
   LocalMap map(options);
   add(map, see(world, 0, 20, translated(0.0, 0.0, 0.0)), 1, translated(0.0, 0.0, 0.0), {});
   for (int id = 2; id <= 4; ++id) {
-    EXPECT_EQ(map.view().rows.count(), 20) << "before pair " << id;
+    EXPECT_EQ(map.view().points.count(), 20) << "before pair " << id;
     const Eigen::Isometry3d pose = translated(0.1 * id, 0.0, 0.0);
     const StereoFeatures features = see(world, 0, 10, pose);
     add(map, features, id, pose, recognised(map, features, 10));
   }
-  EXPECT_EQ(map.view().rows.count(), 10) << "pairs 2, 3 and 4 missed the others";
+  EXPECT_EQ(map.view().points.count(), 10) << "pairs 2, 3 and 4 missed the others";
 }
 
-TEST(LocalMap, TakesTheLooksOfTheLastSighting) {
+TEST(LocalMap, TakesTheAppearanceOfTheLastSighting) {
   const synthetic::World world = someWorld(20), other_looks = someWorld(20, 2);
   LocalMap map(noFurtherKeyframe());
   const Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
@@ -559,10 +559,10 @@ TEST(LocalMap, TakesTheLooksOfTheLastSighting) {
   for (int i = 0; i < 20; ++i) std::memcpy(second.descriptors.ptr(i), other_looks.rows[i].data(), 128);
   add(map, second, 2, pose, recognised(map, second, 12));
   const LocalMap::View view = map.view();
-  ASSERT_EQ(view.rows.count(), 28) << "the other eight rows are new points";
+  ASSERT_EQ(view.points.count(), 28) << "the other eight rows are new points";
   for (int i = 0; i < 28; ++i) {
     const auto& looks = i < 12 ? other_looks.rows[i] : i < 20 ? world.rows[i] : other_looks.rows[i - 8];
-    EXPECT_EQ(0, std::memcmp(view.rows.descriptors.ptr(i), looks.data(), looks.size())) << i;
+    EXPECT_EQ(0, std::memcmp(view.points.descriptors.ptr(i), looks.data(), looks.size())) << i;
   }
 }
 
@@ -575,7 +575,7 @@ TEST(LocalMap, WithoutPatchesASightingIsTheCorner) {
   add(map, features, 1, Eigen::Isometry3d::Identity(), {});
   const LocalMap::Sighting seen = map.sight({}, features, Eigen::Isometry3d::Identity(), 1, 2);
   EXPECT_EQ(seen.point, 1);
-  EXPECT_EQ(seen.row, 2);
+  EXPECT_EQ(seen.feature, 2);
   EXPECT_EQ(seen.measurement, Eigen::Vector3d(features.u[2], features.v[2], features.disparity[2]));
   EXPECT_EQ(seen.sigma, 0.7);
   EXPECT_FALSE(seen.aligned);
@@ -605,7 +605,7 @@ TEST(LocalMap, AdjustmentMovesTheNewestPairToWhereItsPointsSayItIs) {
   WindowOptimizer optimizer = thorough();
   const LocalMap::Adjustment adjustment = map.adjust(optimizer, noRigError(), calibration);
   ASSERT_TRUE(adjustment.success);
-  EXPECT_TRUE(adjustment.rejected_rows.empty());
+  EXPECT_TRUE(adjustment.rejected.empty());
   EXPECT_LT(logSE3(map.newestPose() * second.inverse()).norm(), 1e-4);
   EXPECT_LT(calibration.value.norm(), 1e-6);
 }
@@ -639,7 +639,7 @@ TEST(LocalMap, PatchesThatAreNotAlignedChangeNothing) {
   EXPECT_NE(poseAfter(true, PatchAlignmentOptions()), poseAfter(false, alignment));
 }
 
-TEST(LocalMap, APointKeepsItsLooksWhenASightingTurnsOutWrong) {
+TEST(LocalMap, APointKeepsItsAppearanceWhenASightingTurnsOutWrong) {
   const synthetic::World world = someWorld(60);
   LocalMap map(everyPairAKeyframe());
   const Eigen::Isometry3d first = Eigen::Isometry3d::Identity(), second = translated(0.1, 0.02, -0.5);
@@ -655,13 +655,13 @@ TEST(LocalMap, APointKeepsItsLooksWhenASightingTurnsOutWrong) {
   WindowOptimizer optimizer = thorough();
   const LocalMap::Adjustment adjustment = map.adjust(optimizer, noRigError(), calibration);
   ASSERT_TRUE(adjustment.success);
-  EXPECT_EQ(adjustment.rejected_rows, std::vector<int>{17});
-  map.renewLooks(features, sightings);
+  EXPECT_EQ(adjustment.rejected, std::vector<int>{17});
+  map.renewAppearance(features, sightings);
 
   const LocalMap::View view = map.view();
-  ASSERT_EQ(view.rows.count(), 60);
-  EXPECT_EQ(0, std::memcmp(view.rows.descriptors.ptr(17), world.rows[17].data(), 128));
-  EXPECT_LT((view.rows.positions[17] - second * world.points[17]).norm(), 0.02);
+  ASSERT_EQ(view.points.count(), 60);
+  EXPECT_EQ(0, std::memcmp(view.points.descriptors.ptr(17), world.rows[17].data(), 128));
+  EXPECT_LT((view.points.positions[17] - second * world.points[17]).norm(), 0.02);
 }
 
 /// Frames 2 and 3, a step and a turn apart, know each other well by forty points, and together know hardly where frame
@@ -699,7 +699,7 @@ TEST(LocalMap, CovarianceBetweenTwoFramesDoesNotDependOnWhereTheFirstOneIs) {
   add(map, twice, 2, second, loose);
   // View: 12 points of the first frame, then rows 12 … 39 and the twelve again.
   const LocalMap::View view = map.view();
-  ASSERT_EQ(view.rows.count(), 52);
+  ASSERT_EQ(view.points.count(), 52);
   Sightings sightings;
   for (int i = 0; i < 40; ++i) sightings.push_back(sighting(map, view, 12 + i, of_third, i < 28 ? 12 + i : i - 28));
   map.insert({}, of_third, 3, third, sightings, {});

@@ -25,7 +25,7 @@ struct Scene {
   RigCalibration calibration;
   AnchoredPoint point;
   std::vector<Eigen::Isometry3d> T_camera_origin, T_camera_anchor;
-  std::vector<WindowObservation> sightings;
+  std::vector<WindowObservation> observations;
 
   explicit Scene(const std::vector<int>& frames, const Eigen::Vector3d& where = {0.4, -0.2, 1.0 / 9.0}) {
     calibration.value << 0.2, -0.7;
@@ -34,20 +34,76 @@ struct Scene {
     for (int f = 0; f <= kPoses; ++f) T_camera_origin.push_back(syntheticPose(f).inverse());
     for (const auto& T : T_camera_origin) T_camera_anchor.push_back(T * point.T_origin_anchor);
     for (const int frame : frames) {
-      Eigen::Vector3d seen;
-      if (!predictObservation(camera, T_camera_origin[frame], point, seen, nullptr)) seen << 600.0, 180.0, 20.0;
+      Eigen::Vector3d seen =
+          predictObservation(camera, T_camera_origin[frame], point).value_or(Eigen::Vector3d(600.0, 180.0, 20.0));
       seen += Eigen::Vector3d(0.3 * std::sin(3.0 * frame), 0.4 * std::cos(5.0 * frame), 0.2 + 0.1 * frame);
-      sightings.push_back({0, frame, seen, 0.1 + 0.05 * frame});
+      observations.push_back({{seen, 0.1 + 0.05 * frame}, 0, frame});
     }
   }
 
-  SightedPoint sighted() const {
-    return {point.ray_and_inverse_depth, sightings.data(), static_cast<int>(sightings.size()), 1.0 / kDisparitySigma,
-            T_camera_anchor.data()};
+  ObservedPoint observed() const {
+    return {point.ray_and_inverse_depth, observations.data(), static_cast<int>(observations.size()),
+            1.0 / kDisparitySigma, T_camera_anchor.data()};
   }
 };
 
-/// Residuals and Jacobians of one sighting by all that may move: poses, calibration, point.
+/// Derivatives of predictObservation() by the left perturbation of the pose and by the point.
+struct Jacobians {
+  Eigen::Matrix<double, 3, 6> pose;
+  Eigen::Matrix3d point;
+};
+
+Jacobians jacobiansOf(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
+                      const AnchoredPoint& point) {
+  const double rho = point.ray_and_inverse_depth.z();
+  const Eigen::Vector3d P = point.scaledPointIn(T_camera_origin);
+  const double iz = 1.0 / P.z();
+  const double x = P.x() * iz, y = P.y() * iz, fb = camera.fx * camera.baseline;
+  const Eigen::Isometry3d T_camera_anchor = T_camera_origin * point.T_origin_anchor;
+  // By the scaled point, rho held: (a, 0, -a x), (0, b, -b y), (0, 0, -d). A turn moves the point by -skew(P).
+  const double a = camera.fx * iz, b = camera.fy * iz, d = fb * rho * iz * iz;
+  Jacobians jacobians;
+  jacobians.pose << rho * a, 0.0, -rho * a * x, -a * x * P.y(), a * (P.z() + x * P.x()), -a * P.y(),  //
+      0.0, rho * b, -rho * b * y, -b * (P.z() + y * P.y()), b * y * P.x(), b * P.x(),                 //
+      0.0, 0.0, -rho * d, -d * P.y(), d * P.x(), 0.0;
+  const auto byDirection = [&](const auto& w) -> Eigen::Vector3d {
+    return {a * (w.x() - x * w.z()), b * (w.y() - y * w.z()), -d * w.z()};
+  };
+  jacobians.point.col(0) = byDirection(T_camera_anchor.linear().col(0));
+  jacobians.point.col(1) = byDirection(T_camera_anchor.linear().col(1));
+  jacobians.point.col(2) = byDirection(T_camera_anchor.translation());
+  jacobians.point(2, 2) += fb * iz;
+  return jacobians;
+}
+
+TEST(PredictObservation, JacobiansAgreeWithFiniteDifferences) {
+  constexpr double kStep = 1e-6;
+  const StereoCamera camera = SyntheticScene(1, 0, 10.0).camera;
+  AnchoredPoint point;
+  point.T_origin_anchor = syntheticPose(2);
+  point.ray_and_inverse_depth = {0.3, 0.1, 0.08};
+  const Eigen::Isometry3d T = syntheticPose(6).inverse();
+  const Jacobians jacobians = jacobiansOf(camera, T, point);
+  for (int axis = 0; axis < 6; ++axis) {
+    const auto at = [&](double step) {
+      Vector6d xi = Vector6d::Zero();
+      xi[axis] = step;
+      return predictObservation(camera, expSE3(xi) * T, point).value();
+    };
+    EXPECT_LT((jacobians.pose.col(axis) - (at(kStep) - at(-kStep)) / (2 * kStep)).norm(), 1e-4) << "pose axis " << axis;
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto at = [&](double step) {
+      AnchoredPoint moved = point;
+      moved.ray_and_inverse_depth[axis] += step;
+      return predictObservation(camera, T, moved).value();
+    };
+    EXPECT_LT((jacobians.point.col(axis) - (at(kStep) - at(-kStep)) / (2 * kStep)).norm(), 1e-4)
+        << "point axis " << axis;
+  }
+}
+
+/// Residuals and Jacobians of one observation by all that may move: poses, calibration, point.
 struct Row {
   Eigen::Vector3d residual;
   Eigen::MatrixXd jacobian;
@@ -56,16 +112,16 @@ struct Row {
 
 std::vector<Row> rowsOf(const Scene& scene, double bend = kLinearisation.bend) {
   std::vector<Row> rows;
-  for (const WindowObservation& seen : scene.sightings) {
-    Eigen::Vector3d prediction;
-    ObservationJacobians jacobians;
-    if (!predictObservation(scene.camera, scene.T_camera_origin[seen.frame], scene.point, prediction, &jacobians))
-      continue;
+  for (const WindowObservation& seen : scene.observations) {
+    const Eigen::Isometry3d& T = scene.T_camera_origin[seen.frame];
+    auto prediction = predictObservation(scene.camera, T, scene.point);
+    if (!prediction) continue;
+    const Jacobians jacobians = jacobiansOf(scene.camera, T, scene.point);
     const Eigen::Vector3d& measured = seen.measurement;
     const Eigen::Vector3d noise(1.0 / seen.sigma, 1.0 / seen.sigma, 1.0 / kDisparitySigma);
-    prediction.z() += scene.calibration.disparityError(scene.camera, measured.x());
+    prediction->z() += scene.calibration.disparityError(scene.camera, measured.x());
     Row row;
-    row.residual = noise.cwiseProduct(measured - prediction);
+    row.residual = noise.cwiseProduct(measured - *prediction);
     row.square = row.residual.squaredNorm();
     row.weight = 1.0 / (1.0 + row.square / bend);
     row.jacobian.setZero(3, 6 * kPoses + 5);
@@ -102,9 +158,9 @@ struct Reduced {
   Eigen::MatrixXd hessian;
   Eigen::VectorXd gradient;
 
-  explicit Reduced(const Scene& scene) : factors(scene.sightings.size()), squares(scene.sightings.size()) {
+  explicit Reduced(const Scene& scene) : factors(scene.observations.size()), squares(scene.observations.size()) {
     equations.setZero(kPoses);
-    point = equations.add({scene.camera, scene.calibration}, scene.sighted(), kLinearisation, factors.data(),
+    point = equations.add({scene.camera, scene.calibration}, scene.observed(), kLinearisation, factors.data(),
                           squares.data());
     equations.copyTo(hessian, gradient);
   }
@@ -158,7 +214,7 @@ TEST(PointElimination, SightingsFromBehindCostButDoNotPull) {
   ASSERT_EQ(rowsOf(scene).size(), 2u);
   expectSchurComplement(scene);
   const Reduced reduced(scene);
-  EXPECT_EQ(reduced.point.sightings, 2);
+  EXPECT_EQ(reduced.point.observations, 2);
   EXPECT_EQ(reduced.point.factors, 1);
   EXPECT_LT(reduced.squares[1], kBehindSquare);
   for (int i = 2; i < 5; ++i) EXPECT_EQ(reduced.squares[i], kBehindSquare) << i;
@@ -219,7 +275,7 @@ TEST(PointElimination, SumsUpWhatItsSightingsSay) {
 TEST(PointElimination, SquaresAreThoseOfTheEquations) {
   const Scene scene({0, 1, 2, 3, 4}, {0.1, 0.05, 1.0 / 3.5});
   std::vector<double> squares(5);
-  squareResiduals({scene.camera, scene.calibration}, scene.sighted(), squares.data());
+  squareResiduals({scene.camera, scene.calibration}, scene.observed(), squares.data());
   EXPECT_EQ(squares, Reduced(scene).squares);
 }
 
@@ -230,7 +286,7 @@ TEST(PointElimination, PointsAddUp) {
   std::vector<PoseFactor> factors(4);
   std::vector<double> squares(4);
   for (const Scene* scene : {&one, &other})
-    equations.add({scene->camera, scene->calibration}, scene->sighted(), kLinearisation, factors.data(),
+    equations.add({scene->camera, scene->calibration}, scene->observed(), kLinearisation, factors.data(),
                   squares.data());
   Eigen::MatrixXd hessian;
   Eigen::VectorXd gradient;

@@ -5,7 +5,7 @@
 #include <functional>
 #include <random>
 
-#include "../../src/common/binomial_tail.hpp"
+#include "../../src/common/statistics.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/map/reacquisition.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"

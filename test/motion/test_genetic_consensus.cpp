@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/motion/genetic_consensus.hpp"
+#include "stereo_descriptor_vo/motion/sample_consensus.hpp"
 
 namespace sdvo {
 namespace test_genetic_consensus {
@@ -37,14 +37,14 @@ struct Scene {
 constexpr double kCertainty = 1.0;  // never reached: the whole budget is used
 constexpr double kNone = 0.0;       // reached with the first pose
 
-GeneticResult search(const Scene& scene, const GeneticConsensusOptions& options, bool adaptive, int iterations,
-                     unsigned seed, double confidence = kCertainty) {
+Consensus search(const Scene& scene, const GeneticConsensusOptions& options, bool adaptive, int iterations,
+                 unsigned seed, double confidence = kCertainty) {
   const PoseProblem problem(scene.camera, scene.correspondences, 2.0);
   std::mt19937 random(seed);
   return searchGenetically(problem, options, adaptive, {iterations, confidence}, random);
 }
 
-bool equal(const GeneticResult& a, const GeneticResult& b) {
+bool equal(const Consensus& a, const GeneticResult& b) {
   return a.cost == b.cost && a.iterations == b.iterations &&
          a.T_current_reference.matrix() == b.T_current_reference.matrix();
 }
@@ -54,7 +54,7 @@ TEST(GeneticSearch, UsesItsBudgetExactlyAndStopsWhenConfident) {
   for (const bool adaptive : {false, true}) {
     for (const int iterations : {1, 10, 24, 25, 137})
       EXPECT_EQ(search(scene, {}, adaptive, iterations, 1).iterations, iterations) << adaptive;
-    const GeneticResult confident = search(scene, {}, adaptive, 1000, 1, kNone);
+    const Consensus confident = search(scene, {}, adaptive, 1000, 1, kNone);
     EXPECT_TRUE(confident.found);
     EXPECT_LE(confident.iterations, 3);
   }
@@ -64,7 +64,7 @@ TEST(GeneticSearch, TheCostIsThatOfThePose) {
   const Scene scene(0.6, 0.3, 2);
   const PoseProblem problem(scene.camera, scene.correspondences, 2.0);
   for (const bool adaptive : {false, true}) {
-    const GeneticResult result = search(scene, {}, adaptive, 300, 3);
+    const Consensus result = search(scene, {}, adaptive, 300, 3);
     ASSERT_TRUE(result.found);
     EXPECT_EQ(result.cost, problem.truncatedCost(result.T_current_reference));
     EXPECT_LT(result.cost, problem.worstCost());

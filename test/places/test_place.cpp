@@ -4,7 +4,7 @@
 #include <random>
 
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/places/place.hpp"
+#include "stereo_descriptor_vo/places/place_index.hpp"
 
 namespace sdvo {
 namespace test_place {

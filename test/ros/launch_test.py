@@ -105,6 +105,31 @@ class Launch(unittest.TestCase):
                          {'stereo_features/detector/max_features': 700, 'stereo_features/max_rate': 15,
                           'visual_odometry/planar': True, 'visual_odometry/use_imu': True})
 
+    def test_a_drive_is_recorded_on_request_alone(self):
+        self.assertNotIn('/stereo/recorder', nodes(load('stereo_vo.launch')))
+        for file in ('stereo_vo.launch', 'stereo_raw.launch', 'cameras/oak_d.launch', 'mavros.launch'):
+            recorders = [node for node in load(file, record='/tmp/drive.bag').nodes if node.type == 'record']
+            self.assertEqual(len(recorders), 1, file)
+            self.assertIn('"/tmp/drive.bag" /tf /tf_static ', recorders[0].args)
+        recorder = nodes(load('stereo_vo.launch', record='/tmp/drive.bag', right_image_topic='/cam/right'))['/stereo/recorder']
+        self.assertTrue(recorder.args.endswith(' /stereo/odom /stereo/vo_info /stereo/left/image_rect /cam/right '
+                                               '/stereo/left/camera_info /stereo/right/camera_info'), recorder.args)
+
+    def test_a_python_without_ros_modules_may_come_first_on_path(self):
+        with tempfile.TemporaryDirectory() as folder:
+            python, config = os.path.join(folder, 'python3'), os.path.join(folder, 'config.yaml')
+            with open(python, 'w') as file:
+                file.write('#!/bin/sh\nexec /usr/bin/python3 -I -S "$@"\n')
+            os.chmod(python, 0o755)
+            with open(config, 'w') as file:
+                file.write('visual_odometry: {motion: {seed: 7}}')
+            path = os.environ['PATH']
+            os.environ['PATH'] = folder + ':' + path
+            try:
+                self.assertEqual(parameters(config=config), {'visual_odometry/motion/seed': 7})
+            finally:
+                os.environ['PATH'] = path
+
     def test_a_filter_that_publishes_tf_gets_all_of_it(self):
         for file in ('stereo_vo.launch', 'stereo_raw.launch', 'mavros.launch', 'cameras/oak_d.launch'):
             for both, map_alone, expected in (('false', '', False), ('false', 'true', True), ('true', '', True)):

@@ -57,6 +57,10 @@ class MotionPrior {
   /// Of the camera in its own frame, m/s and rad/s; none where no motion can be predicted.
   const std::optional<Vector6d>& velocity() const { return velocity_; }
 
+  /// The time in which a motion took place whose stamps are `dt` s apart, s. Those of a burst are closer together than
+  /// the moments at which its pairs were taken.
+  double interval(double dt) const;
+
   /// The next motion as the velocity, which must be known, predicts it.
   ExpectedMotion predicted(double dt) const;
 
@@ -95,6 +99,7 @@ class MotionPrior {
   Matrix6d velocity_covariance_ = Matrix6d::Zero(), confirmed_covariance_ = Matrix6d::Zero();
   Matrix6d doubt_ = Matrix6d::Zero();  ///< of the last measured motion, m and rad
   std::int64_t confirmed_stamp_ = 0;   ///< ns
+  double velocity_interval_ = 0.0;     ///< s, over which velocity_ was measured
   double interval_ = 0.0;              ///< s: about the longest of the last intervals
 };
 

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "stereo_descriptor_vo/common/descriptor_format.hpp"
-#include "stereo_descriptor_vo/common/patch_layout.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 
 namespace sdvo {

@@ -26,7 +26,7 @@ class ExposureBalance {
   explicit ExposureBalance(const ExposureBalanceOptions& options) : options_(checked(options)) {}
 
   /// CV_8U images of one size and their mean grey levels. An image that is changed gets memory of its own; images
-  /// that differ little, or of which one shows next to nothing (dark, covered), are left alone.
+  /// that differ little in most parts, or of which one shows next to nothing (dark, covered), are left alone.
   void apply(double left_mean, double right_mean, cv::Mat& left, cv::Mat& right) const;
 
  private:

@@ -18,7 +18,7 @@ inline const std::vector<std::string>& namesOf(DetectorType) {
 struct FeatureDetectorOptions {
   DetectorType type = DetectorType::kFast;
   int max_features = 600;
-  int area_per_feature = 225;
+  int area_per_feature = 256;
   int bucket_size = 50;
   double min_spacing = 0.0;
   int fast_min_threshold = 12;
@@ -33,7 +33,7 @@ struct FeatureDetectorOptions {
     list.add("max_features", max_features, {1, 20000}, "", "corners kept per left image");
     list.add(
         "area_per_feature", area_per_feature, {0, 10000}, "px^2",
-        "an image with less than this area for each keeps fewer corners, but at least 400; 225: the area of a 15x15 "
+        "an image with less than this area for each keeps fewer corners, but at least 400; 256: the area of a 16x16 "
         "px patch, as neighbours that share pixels share errors; 0: max_features alone");
     list.add("bucket_size", bucket_size, {8, 4096}, "px", "side of the square buckets that share the corners evenly");
     list.add("min_spacing", min_spacing, {0.0, 100.0}, "px",

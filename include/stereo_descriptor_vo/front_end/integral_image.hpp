@@ -9,6 +9,11 @@
 
 namespace sdvo {
 
+/// Whether everything within `reach` px of (u, v) lies inside an image. Pixel p covers [p - 0.5, p + 0.5].
+inline bool liesInside(double u, double v, double reach, cv::Size image) {
+  return u - reach >= -0.5 && v - reach >= -0.5 && u + reach <= image.width - 0.5 && v + reach <= image.height - 0.5;
+}
+
 /// Mean intensities of boxes with real-valued position and side. Pixel p covers [p - 0.5, p + 0.5]; interpolating the
 /// integral linearly gives the area-weighted sum.
 class IntegralImage {

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 
+#include "stereo_descriptor_vo/common/descriptor_format.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
-#include "stereo_descriptor_vo/common/patch_layout.hpp"
 
 namespace sdvo {
 

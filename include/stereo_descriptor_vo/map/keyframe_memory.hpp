@@ -7,9 +7,8 @@
 #include <memory>
 #include <vector>
 
-#include "stereo_descriptor_vo/map/reference_patch.hpp"
-#include "stereo_descriptor_vo/map/window.hpp"
-#include "stereo_descriptor_vo/matching/described_points.hpp"
+#include "stereo_descriptor_vo/map/map_point.hpp"
+#include "stereo_descriptor_vo/matching/feature_matcher.hpp"
 
 namespace sdvo {
 
@@ -17,16 +16,15 @@ namespace sdvo {
 struct OldKeyframe {
   struct Point {
     AnchoredPoint position;
-    Eigen::Vector3d measurement;  ///< (u_left, v_left, disparity) in this key frame, px
-    double sigma;                 ///< of u_left and of v_left, px
-    ReferencePatch reference;     ///< without its samples
-    std::size_t samples_end;      ///< … which end there and begin where those of the point before end
+    Observation observation;   ///< in this key frame
+    ReferencePatch reference;  ///< without its samples
+    std::size_t samples_end;   ///< … which end there and begin where those of the point before end
   };
   int id;
   Eigen::Isometry3d T_camera_origin;
   std::vector<Point> points;
   std::vector<std::uint8_t> samples;  ///< of all references: one piece of memory leaves no holes
-  DescribedPoints rows;               ///< one for each point, in this key frame's left optical frame
+  DescribedPoints described;          ///< the points in this key frame's left optical frame
 
   /// With its samples.
   ReferencePatch reference(int point) const;

@@ -12,9 +12,9 @@
 #include "stereo_descriptor_vo/common/recycled.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/map/keyframe_memory.hpp"
-#include "stereo_descriptor_vo/map/reference_patch.hpp"
+#include "stereo_descriptor_vo/map/map_point.hpp"
 #include "stereo_descriptor_vo/map/window_optimizer.hpp"
-#include "stereo_descriptor_vo/matching/described_points.hpp"
+#include "stereo_descriptor_vo/matching/feature_matcher.hpp"
 #include "stereo_descriptor_vo/matching/patch_alignment.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
 
@@ -57,6 +57,9 @@ class LocalMap {
 
   const LocalMapOptions& options() const { return options_; }
 
+  /// Takes another noise over; the other options are those of the start.
+  void assume(const NoiseOptions& noise) { options_.noise = noise; }
+
   std::int64_t newestStamp() const { return newest_stamp_; }
 
   const StereoCamera& camera() const { return camera_; }
@@ -72,15 +75,15 @@ class LocalMap {
   /// T_camera_origin of the last key frame before the newest pair. There must be one.
   const Eigen::Isometry3d& poseBeforeNewest() const { return frames_[frames_.size() - 2].T_camera_origin; }
 
-  /// The map as the newest pair would see it, one row for each point still looked for: the points as now estimated,
-  /// with the descriptors of their last sighting.
+  /// The map as the newest pair would see it: each point still looked for as now estimated, with the descriptor of its
+  /// last sighting.
   struct View {
-    DescribedPoints rows;  ///< in the newest pair's left optical frame
+    DescribedPoints points;  ///< in the newest pair's left optical frame
     /// (u_left, v_left, disparity without the rig's error) in the newest pair, px; beside its image where a point is
     /// about to enter.
     std::vector<cv::Point3f> pixels;
-    std::vector<int> point;  ///< what sightings call them
-    std::vector<int> seen;   ///< in how many confirmed pairs, the map's and forgotten ones
+    std::vector<int> ids;   ///< Sighting::point
+    std::vector<int> seen;  ///< in how many confirmed pairs, the map's and forgotten ones
   };
   /// Points in the image of the newest pair, and those that a turn of `T_next_newest` brings into the next one.
   View view(const std::optional<Eigen::Isometry3d>& T_next_newest = std::nullopt) const;
@@ -89,23 +92,21 @@ class LocalMap {
   /// frame.
   DescribedPoints points(int sightings) const;
 
-  /// A point recognised in a pair, and where that saw it.
-  struct Sighting {
-    int point, row;
-    Eigen::Vector3d measurement;  ///< (u_left, v_left, disparity), px
-    double sigma;                 ///< of u_left and of v_left, px
-    bool aligned = false;         ///< by its patch: the position is not the corner's but that of the reference's middle
-    double scale = 1.0;           ///< how much larger the point appears than in its reference patch
+  /// A map point recognised in a pair: its observation there, and by which feature.
+  struct Sighting : Observation {
+    int point, feature;
+    bool aligned = false;  ///< by its patch: the position is not the corner's but that of the reference's middle
+    double scale = 1.0;    ///< how much larger the point appears than in its reference patch
   };
 
-  /// Measurement of a point by the pair's row, seen from about `T_camera_origin`. The row's patch is aligned with the
+  /// The point by a feature of a pair seen from about `T_camera_origin`. The feature's patch is aligned with the
   /// point's reference, which is warped by the poses and the point's depth. Without patches, or where they do not
   /// agree, it is the corner as detected.
   Sighting sight(const PatchAlignmentOptions& options, const StereoFeatures& features,
-                 const Eigen::Isometry3d& T_camera_origin, int point, int row) const;
+                 const Eigen::Isometry3d& T_camera_origin, int point, int feature) const;
 
-  /// Adds a pair seen from `T_camera_origin` and what it recognised; every other row becomes a new point, whose later
-  /// sightings `alignment` is for. The previous pair is forgotten unless it was a key frame.
+  /// Adds a pair seen from `T_camera_origin` and what it recognised; every other feature becomes a new point, whose
+  /// later sightings `alignment` is for. The previous pair is forgotten unless it was a key frame.
   void insert(const PatchAlignmentOptions& alignment, const StereoFeatures& features, int id,
               const Eigen::Isometry3d& T_camera_origin, const std::vector<Sighting>& sightings,
               const RigCalibration& calibration);
@@ -115,20 +116,20 @@ class LocalMap {
   const OldKeyframe* revisited() const;
 
   /// A point of an old key frame in the newest pair.
-  struct Tie {
+  struct Link {
     int point;                 ///< of the old key frame
-    int row;                   ///< of the newest pair
+    int feature;               ///< of the newest pair
     Eigen::Vector2d position;  ///< (u_left, v_left) of the old key frame's point in the newest pair, px
     double sigma;              ///< of each of them, px
     double scale;              ///< how much larger the point appears now
   };
-  /// Takes an old key frame into the map again, tied to the newest pair by points that both saw.
-  void recall(const OldKeyframe& old, const std::vector<Tie>& ties);
+  /// Takes an old key frame into the map again, linked to the newest pair by points that both saw.
+  void recall(const OldKeyframe& old, const std::vector<Link>& links);
 
   /// Moves the map as a whole, so that its newest pair was seen from there.
   void moveTo(const Eigen::Isometry3d& T_newest_origin);
 
-  /// Bundle adjustment over all frames; sightings that do not agree with it are cut off from their points.
+  /// Bundle adjustment over all frames; observations that do not agree with it are cut off from their points.
   struct Adjustment {
     bool success = false;
     Matrix6d since_keyframe = Matrix6d::Zero();  ///< covariance of the newest pose since the key frame before it.
@@ -137,7 +138,7 @@ class LocalMap {
     RigCalibration::MotionJacobian by_calibration = RigCalibration::MotionJacobian::Zero();  ///< since that key frame
     RigCalibration::Matrix calibration_information = RigCalibration::Matrix::Zero();
     std::optional<double> common_disparity_square;  ///< px^2, see WindowSolution
-    std::vector<int> rejected_rows;                 ///< of the newest pair
+    std::vector<int> rejected;                      ///< features of the newest pair
   };
   Adjustment adjust(WindowOptimizer& optimizer, const CalibrationBelief& prior, RigCalibration& calibration,
                     const std::optional<Floor>& floor = std::nullopt);
@@ -148,9 +149,9 @@ class LocalMap {
   /// The newest pair's sightings confirm no points: its motion may be something else's.
   void discountNewest();
 
-  /// The newest pair's sightings that were not cut off renew what their points look like: the descriptors, and a
+  /// The newest pair's sightings that were not cut off renew the appearance of their points: the descriptors, and a
   /// reference patch that has become too small or too large.
-  void renewLooks(const StereoFeatures& features, const std::vector<Sighting>& sightings);
+  void renewAppearance(const StereoFeatures& features, const std::vector<Sighting>& sightings);
 
  private:
   struct Frame {
@@ -159,15 +160,12 @@ class LocalMap {
     bool is_keyframe;
     bool is_recalled;  ///< from the memory
   };
-  struct Observation {
-    int frame_id;
-    int row;
-    Eigen::Vector3d measurement;
-    double sigma;
+  struct FrameObservation : Observation {
+    int frame_id, feature;
   };
   struct Point {
     AnchoredPoint position;
-    std::vector<Observation> observations;  ///< in the order of the frames
+    std::vector<FrameObservation> observations;  ///< in the order of the frames
     std::vector<std::uint8_t> descriptor;
     ReferencePatch reference;
     int seen = 1;  ///< confirmed pairs, those included that the map has forgotten
@@ -186,7 +184,7 @@ class LocalMap {
   void pose(Problem& problem) const;
   void forgetKeyframe();
   void rememberKeyframe(std::size_t frame);
-  OldKeyframe keyframe(std::size_t frame, bool with_looks) const;
+  OldKeyframe keyframe(std::size_t frame, bool with_appearance) const;
   std::vector<int> sharedPoints() const;
   std::vector<double> parallaxToPredecessors(std::size_t frames) const;
   int lookedForSince() const;
@@ -194,8 +192,8 @@ class LocalMap {
   void removeFrame(std::size_t index);
   void cutOff(const std::vector<double>& squares, Adjustment& adjustment);
   bool needsKeyframe() const;
-  static void takeDescriptor(Point& point, const StereoFeatures& features, int row);
-  void startPoint(const StereoFeatures& features, int row, int id, const Eigen::Isometry3d& T_camera_origin,
+  static void takeDescriptor(Point& point, const StereoFeatures& features, int feature);
+  void startPoint(const StereoFeatures& features, int feature, int id, const Eigen::Isometry3d& T_camera_origin,
                   const RigCalibration& calibration, double sigma);
 
   LocalMapOptions options_;

@@ -4,10 +4,12 @@
 #include <vector>
 
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
-#include "stereo_descriptor_vo/map/window.hpp"
+#include "stereo_descriptor_vo/map/window_optimizer.hpp"
 #include "stereo_descriptor_vo/motion/rig_calibration.hpp"
 
 namespace sdvo {
+
+constexpr int kCalibration = RigCalibration::kParameters;
 
 /// How all points of a window are seen; the fourth numbers are zero.
 struct alignas(32) WindowProjection {
@@ -18,23 +20,20 @@ struct alignas(32) WindowProjection {
   WindowProjection(const StereoCamera& camera, const RigCalibration& calibration);
 };
 
-/// A point of a window with all its sightings, one at least.
-struct SightedPoint {
+/// A point of a window with all its observations, one at least.
+struct ObservedPoint {
   Eigen::Vector3d ray_and_inverse_depth;  ///< in its anchor
-  const WindowObservation* sightings;     ///< in the order of their frames
+  const WindowObservation* observations;  ///< in the order of their frames
   int count;
-  double inverse_disparity_sigma;            ///< of each sighting, 1/px
+  double inverse_disparity_sigma;            ///< of each observation, 1/px
   const Eigen::Isometry3d* T_camera_anchor;  ///< of each frame; the first one, 0, is held fixed
 };
 
-/// A scaled point whose z is smaller is not in front of the camera: a share of its depth in the anchor.
-constexpr double kNearestScaled = 1e-3;
-
-/// A sighting of a point that is not in front of the camera costs as much as a very wrong one.
+/// An observation of a point that is not in front of the camera costs as much as a very wrong one.
 constexpr double kBehindSquare = 1e4;
 
-/// Squares of the sightings' normalised residuals; kBehindSquare where the point is not in front of the camera.
-void squareResiduals(const WindowProjection& projection, const SightedPoint& point, double* squares);
+/// Squares of the observations' normalised residuals; kBehindSquare where the point is not in front of the camera.
+void squareResiduals(const WindowProjection& projection, const ObservedPoint& point, double* squares);
 
 /// Two halves of something that a pose's perturbation has six of, each in a register's room; the fourth numbers mean
 /// nothing.
@@ -42,11 +41,11 @@ struct alignas(32) PoseVector {
   double translation[4], rotation[4];
 };
 
-/// What a sighting says of its pose and its point, in three columns: products of these are what the elimination of the
-/// point takes away.
+/// What an observation says of its pose and its point, in three columns: products of these are what the elimination of
+/// the point takes away.
 struct PoseFactor {
   PoseVector Y[3];
-  PoseVector gradient;  ///< the sighting's part of the pose's, less what the point explains
+  PoseVector gradient;  ///< the observation's part of the pose's, less what the point explains
   int pose;             ///< which of the poses that may move, from zero on
 };
 
@@ -54,10 +53,10 @@ struct PoseFactor {
 struct EliminatedPoint {
   Eigen::Matrix3d R;
   Eigen::Vector3d gradient;
-  Eigen::Matrix<double, RigCalibration::kParameters, 3> by_calibration;
+  Eigen::Matrix<double, kCalibration, 3> by_calibration;
   RigCalibration::Vector calibration_gradient;  ///< the point's part of it
-  int factors;                                  ///< sightings in front of a camera that may move
-  int sightings;                                ///< in front of any camera
+  int factors;                                  ///< observations in front of a camera that may move
+  int observations;                             ///< in front of any camera
 
   // Weighted sums over these.
   double weight;
@@ -82,10 +81,10 @@ class PoseEquations {
  public:
   void setZero(int poses);
 
-  /// Adds what a point's sightings say, and takes away what the point itself can explain of it (Schur complement). Also
-  /// gives a factor for each sighting from a pose that may move, and the squares that squareResiduals() gives.
-  EliminatedPoint add(const WindowProjection& projection, const SightedPoint& point, const Linearisation& linearisation,
-                      PoseFactor* factors, double* squares);
+  /// Adds what a point's observations say, and takes away what the point itself can explain of it (Schur complement).
+  /// Also gives a factor for each observation from a pose that may move, and the squares that squareResiduals() gives.
+  EliminatedPoint add(const WindowProjection& projection, const ObservedPoint& point,
+                      const Linearisation& linearisation, PoseFactor* factors, double* squares);
 
   /// `hessian`: its lower triangle. The poses by their left perturbations (m, rad), then the calibration.
   void copyTo(Eigen::MatrixXd& hessian, Eigen::VectorXd& gradient) const;

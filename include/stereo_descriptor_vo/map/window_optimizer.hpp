@@ -7,11 +7,28 @@
 
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
-#include "stereo_descriptor_vo/map/window.hpp"
+#include "stereo_descriptor_vo/map/floor.hpp"
+#include "stereo_descriptor_vo/map/map_point.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
 #include "stereo_descriptor_vo/motion/rig_calibration.hpp"
 
 namespace sdvo {
+
+/// An observation by indices of the window's points and poses.
+struct WindowObservation : Observation {
+  int point, frame;
+};
+
+/// Several pairs and the points they share.
+struct Window {
+  StereoCamera camera;
+  std::vector<Eigen::Isometry3d> T_camera_origin;  ///< the first one is held fixed
+  std::vector<AnchoredPoint> points;
+  std::vector<WindowObservation> observations;  ///< sorted by point
+  RigCalibration calibration;
+  CalibrationBelief calibration_prior;
+  std::optional<Floor> floor;  ///< on which the base of every pose but the first is held
+};
 
 struct WindowOptimizerOptions {
   int iterations = 1;         ///< Levenberg-Marquardt steps at most, for each pair; refused ones do not count
@@ -56,16 +73,5 @@ class WindowOptimizer {
   WindowOptimizerOptions options_;
   std::unique_ptr<Memory> memory_;
 };
-
-/// Derivatives of (u_left, v_left, disparity) of a point by the left perturbation of the pose (6) and by the point (3).
-struct ObservationJacobians {
-  Eigen::Matrix<double, 3, 6> pose;
-  Eigen::Matrix3d point;
-};
-
-/// Predicted (u_left, v_left, disparity) in px without the rig's error; false when the point is not in front of the
-/// camera.
-bool predictObservation(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
-                        const AnchoredPoint& point, Eigen::Vector3d& prediction, ObservationJacobians* jacobians);
 
 }  // namespace sdvo

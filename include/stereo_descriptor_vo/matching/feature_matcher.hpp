@@ -1,15 +1,32 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/matching/described_points.hpp"
 
 namespace sdvo {
+
+/// Points with a descriptor each: what features are matched to, be it another pair's or a map's.
+struct DescribedPoints {
+  DescriptorKind kind;
+  std::vector<Eigen::Vector3d> positions;  ///< in the reference camera's left optical frame, m
+  cv::Mat descriptors;                     ///< rows x bytes, CV_8U
+
+  DescribedPoints() = default;
+  /// The points of a pair; shares its descriptors.
+  DescribedPoints(const StereoFeatures& features) : kind(features.kind()), descriptors(features.descriptors) {
+    positions.reserve(features.u.size());
+    for (int i = 0; i < features.count(); ++i) positions.push_back(features.point(i));
+  }
+
+  int count() const { return static_cast<int>(positions.size()); }
+};
 
 struct FeatureMatcherOptions {
   bool gating = true;  ///< compare only near the position that the predicted motion gives

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <algorithm>
+#include <iterator>
 #include <optional>
 #include <string>
 #include <vector>
@@ -41,6 +43,13 @@ struct MotionEstimate {
   double rms = 0.0;          ///< of the inliers' residuals, px per coordinate
   int iterations = 0;        ///< samples drawn
 };
+
+/// The indices of `first` that `second` lacks. Both ascend.
+inline std::vector<int> without(const std::vector<int>& first, const std::vector<int>& second) {
+  std::vector<int> rest;
+  std::set_difference(first.begin(), first.end(), second.begin(), second.end(), std::back_inserter(rest));
+  return rest;
+}
 
 /// Camera motion from 3-D to stereo correspondences with outliers: P3P sample consensus scored on the stereo
 /// reprojection error, then robust refinement. Stateless: the seed is part of the options.

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -9,6 +10,24 @@
 #include "stereo_descriptor_vo/motion/pose_problem.hpp"
 
 namespace sdvo {
+
+/// Sum of log(1 + x) over many x >= 0, by the logarithm of their products: a robust kernel's cost costs a
+/// multiplication then.
+class LogSum {
+ public:
+  void add(double x) {
+    constexpr double kFarFromOverflow = 1e150;
+    product_ *= 1.0 + x;
+    if (product_ > kFarFromOverflow) {
+      sum_ += std::log(product_);
+      product_ = 1.0;
+    }
+  }
+  double value() const { return sum_ + std::log(product_); }
+
+ private:
+  double product_ = 1.0, sum_ = 0.0;
+};
 
 struct MotionRefinementOptions {
   double kernel_scale = NoiseOptions().length();  ///< px: residual at which the Cauchy kernel starts to bend

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <limits>
 #include <optional>
 #include <vector>
@@ -8,7 +9,6 @@
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 #include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
-#include "stereo_descriptor_vo/motion/minimal_sampling.hpp"
 #include "stereo_descriptor_vo/motion/three_point_pose.hpp"
 
 namespace sdvo {
@@ -22,6 +22,9 @@ std::optional<Eigen::Vector3d> reprojectionResidual(const StereoCamera& camera,
 /// Derivative of the projection of exp(xi) * T_current_reference * point by xi at zero, (u_left, v_left, u_right) rows.
 Eigen::Matrix<double, 3, 6> motionJacobian(const StereoCamera& camera, const Eigen::Isometry3d& T_current_reference,
                                            const Eigen::Vector3d& point);
+
+/// Indices of the correspondences that a minimal solver takes.
+using MinimalSample = std::array<int, 3>;
 
 /// What every sample consensus works on: correspondences with outliers, the minimal solver and the consensus of a pose.
 class PoseProblem {

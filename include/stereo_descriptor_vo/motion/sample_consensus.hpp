@@ -1,16 +1,37 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <random>
 #include <string>
 #include <vector>
 
 #include "stereo_descriptor_vo/common/options.hpp"
-#include "stereo_descriptor_vo/motion/genetic_consensus.hpp"
 #include "stereo_descriptor_vo/motion/motion_refinement.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
 #include "stereo_descriptor_vo/motion/pose_problem.hpp"
 
 namespace sdvo {
+
+/// Three different indices below `count`, drawn evenly.
+MinimalSample drawSample(std::mt19937& random, int count);
+
+/// Tells when enough samples were drawn: once it is likely that one of them was without outliers, but within limits.
+class SampleBudget {
+ public:
+  /// `confidence`: probability that a sample without outliers is among those drawn.
+  SampleBudget(int at_most, double confidence);
+
+  /// Takes note of the share of inliers of the best pose so far.
+  void noteInliers(double share);
+
+  bool spent(int samples) const;
+  /// Share of the budget that is used up, 0…1.
+  double progress(int samples) const;
+
+ private:
+  double at_most_, confidence_;
+  double needed_;
+};
 
 enum class ConsensusMethod { kRansac, kMsac, kLoRansac, kGasac, kAdaptiveGasac };
 
@@ -18,6 +39,17 @@ inline const std::vector<std::string>& namesOf(ConsensusMethod) {
   static const std::vector<std::string> names = {"ransac", "msac", "lo_ransac", "gasac", "adaptive_gasac"};
   return names;
 }
+
+struct GeneticConsensusOptions {
+  int population = 24;
+  double mutation_rate = 0.1;
+  bool learning = true;  ///< adaptive: how good a replacement each gene is
+
+  void describe(OptionList& list) {
+    list.add("population", population, {4, 1000}, "", "gasac: individuals of a generation");
+    list.add("mutation_rate", mutation_rate, {0.0, 1.0}, "", "gasac: share of a child's genes replaced at random");
+  }
+};
 
 struct SampleConsensusOptions {
   ConsensusMethod consensus = ConsensusMethod::kMsac;
@@ -39,6 +71,7 @@ struct SampleConsensusOptions {
 struct Consensus {
   bool found = false;
   Eigen::Isometry3d T_current_reference = Eigen::Isometry3d::Identity();
+  double cost = 0.0;   ///< PoseProblem::truncatedCost, with kRansac outlierCost
   int iterations = 0;  ///< minimal samples solved
 };
 
@@ -47,5 +80,13 @@ struct Consensus {
 /// gives a pose.
 Consensus findConsensus(const PoseProblem& problem, const SampleConsensusOptions& options,
                         const MotionRefinementOptions& refinement);
+
+/// Genetic algorithm sample consensus. An individual is a minimal sample, its genes are the correspondences, its
+/// fitness is the consensus of its pose. With `adaptive` false the rates are fixed (GASAC, Rodehorst and Hellwich
+/// 2006). With `adaptive` true unfit individuals are mutated. The search learns for each gene how good a replacement it
+/// is: as good as the best pose it agrees with. Mutation so moves from random exploration to exploitation (Shojaedini,
+/// Majd, Safabakhsh 2017).
+Consensus searchGenetically(const PoseProblem& problem, const GeneticConsensusOptions& options, bool adaptive,
+                            SampleBudget budget, std::mt19937& random);
 
 }  // namespace sdvo

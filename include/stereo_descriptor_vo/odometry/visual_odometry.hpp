@@ -10,7 +10,6 @@
 #include "stereo_descriptor_vo/map/floor.hpp"
 #include "stereo_descriptor_vo/map/local_map.hpp"
 #include "stereo_descriptor_vo/map/reacquisition.hpp"
-#include "stereo_descriptor_vo/map/revisit.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_state.hpp"
 #include "stereo_descriptor_vo/odometry/outage.hpp"

@@ -12,7 +12,6 @@
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/places/loop_agreement.hpp"
-#include "stereo_descriptor_vo/places/place.hpp"
 #include "stereo_descriptor_vo/places/place_index.hpp"
 #include "stereo_descriptor_vo/places/place_verifier.hpp"
 #include "stereo_descriptor_vo/places/pose_graph.hpp"

@@ -52,6 +52,9 @@ struct GraphPath {
   Matrix6d covariance = Matrix6d::Zero();  ///< of a right perturbation of the relative pose, along that one
 };
 
+/// Throws std::runtime_error where the package was built without Ceres: a graph could then grow, but not be optimised.
+void requirePoseGraphSolver();
+
 /// Poses of key frames in a map, held together by odometry and by loops. A value: an optimisation may work on a copy
 /// while the original grows.
 class PoseGraph {

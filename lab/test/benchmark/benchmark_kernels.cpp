@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "stereo_descriptor_vo/common/processor.hpp"
-#include "stereo_descriptor_vo/front_end/corner_peak.hpp"
 #include "stereo_descriptor_vo/front_end/epipolar_matcher.hpp"
 #include "stereo_descriptor_vo/front_end/fast_corners.hpp"
 #include "stereo_descriptor_vo/front_end/freak.hpp"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "../../../test/synthetic_scene.hpp"
-#include "stereo_descriptor_vo/data/kitti_writer.hpp"
+#include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 
 namespace sdvo::synthetic {
 

@@ -1,27 +1,30 @@
-#include "stereo_descriptor_vo/map/reference_patch.hpp"
-
-#include "stereo_descriptor_vo/map/point_elimination.hpp"
+#include "stereo_descriptor_vo/map/map_point.hpp"
 
 namespace sdvo {
 
-ReferencePatch::ReferencePatch(const StereoFeatures& features, int row, const Eigen::Vector2d& position,
-                               const Eigen::Isometry3d& T_then_origin) {
-  take(features, row, position, T_then_origin);
+std::optional<Eigen::Vector3d> predictObservation(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
+                                                  const AnchoredPoint& point) {
+  const Eigen::Vector3d P = point.scaledPointIn(T_camera_origin);
+  if (P.z() < kNearestScaled) return std::nullopt;
+  const double iz = 1.0 / P.z();
+  const double x = P.x() * iz, y = P.y() * iz, fb = camera.fx * camera.baseline;
+  return Eigen::Vector3d{camera.fx * x + camera.cx, camera.fy * y + camera.cy,
+                         fb * point.ray_and_inverse_depth.z() * iz};
 }
 
-void ReferencePatch::take(const StereoFeatures& features, int row, const Eigen::Vector2d& position,
+void ReferencePatch::take(const StereoFeatures& features, int feature, const Eigen::Vector2d& position,
                           const Eigen::Isometry3d& T_then_origin) {
   T_camera_origin = T_then_origin;
   samples.clear(), spacing = 1.f, centre.setZero();
   if (!features.hasPatches()) return;
-  const std::uint8_t* first = features.patches.ptr(row);
+  const std::uint8_t* first = features.patches.ptr(feature);
   samples.assign(first, first + features.patches.cols);
-  spacing = features.patch_layout.spacing(features.size[row]);
-  centre = (position - Eigen::Vector2d(features.u[row], features.v[row])).cast<float>() / spacing;
+  spacing = features.patch_layout.spacing(features.size[feature]);
+  centre = (position - Eigen::Vector2d(features.u[feature], features.v[feature])).cast<float>() / spacing;
 }
 
 std::optional<ReferencePatch::Found> ReferencePatch::findIn(const PatchAlignmentOptions& options,
-                                                            const StereoFeatures& features, int row,
+                                                            const StereoFeatures& features, int feature,
                                                             const Eigen::Isometry3d& T_now_origin,
                                                             const AnchoredPoint& point) const {
   if (!options.canAlign(features.patch_layout.side) ||
@@ -40,7 +43,7 @@ std::optional<ReferencePatch::Found> ReferencePatch::findIn(const PatchAlignment
 
   const int side = features.patch_layout.side;
   const Patch old_patch{samples.data(), side, spacing};
-  const Patch new_patch{features.patches.ptr(row), side, features.patch_layout.spacing(features.size[row])};
+  const Patch new_patch{features.patches.ptr(feature), side, features.patch_layout.spacing(features.size[feature])};
   const auto found = alignPatch(options, old_patch, centre, new_patch, warp.cast<float>());
   if (!found) return std::nullopt;
   return Found{found->shift.cast<double>(), found->sigma, scale};

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/matching/correspondences.hpp"
+#include "stereo_descriptor_vo/matching/view_matcher.hpp"
 
 namespace sdvo {
 namespace test_correspondences {

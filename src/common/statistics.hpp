@@ -1,0 +1,35 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+namespace sdvo {
+
+/// Of an even number the upper one of the two in the middle; zero of none. Reorders them.
+inline double median(std::vector<double>& values) {
+  if (values.empty()) return 0.0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// The value that `share` (0 to 1) of all are not above; zero of none.
+inline double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return 0.0;
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+/// Probability of at least so many successes in independent trials that succeed with a probability in (0, 1).
+inline double binomialTail(int trials, int successes, double probability) {
+  double tail = 0.0;
+  for (int k = successes; k <= trials; ++k)
+    tail += std::exp(std::lgamma(trials + 1.0) - std::lgamma(k + 1.0) - std::lgamma(trials - k + 1.0) +
+                     k * std::log(probability) + (trials - k) * std::log1p(-probability));
+  return tail;
+}
+
+}  // namespace sdvo
