@@ -208,7 +208,7 @@ TEST_F(RobotTransformsTest, ARobotsOwnFrameAboveTheBaseIsNamedAsTheOneToMove) {
   start(ros_conversions::OdometryFrames{"odom", "base_link"});
   send(tf_static_, {transform("base_footprint", "base_link", ros::Time::now())});
   waitForMarker(tf_static_);
-  send(tf_, {transform("odom", "base_link", ros::Time::now() + ros::Duration(1.0))});
+  send(tf_, {tagged(transform("odom", "base_link", ros::Time::now() + ros::Duration(1.0)), kTag)});
   waitForMarker(tf_);
   ASSERT_EQ(warnings_.size(), 1u);
   EXPECT_TRUE(contains(warnings_[0], "set base_frame_id:=base_footprint (or invert_tf)")) << warnings_[0];
