@@ -74,6 +74,8 @@ bool isRos(const std::string& header) {
 std::string roomOf(const std::string& header, const std::string& room) {
   static const std::regex ours(R"(^(?:\.\./|stereo_descriptor_vo/)([a-z_]+)/[a-z_/]+\.(?:hpp|inc)$)");
   std::smatch match;
+  // The public view of a message belongs to the messages, whatever its path.
+  if (header.rfind("stereo_descriptor_vo/ros/", 0) == 0) return "messages";
   if (std::regex_match(header, match, ours)) return match[1];
   return header.find('/') == std::string::npos && fs::exists(kSource / "src" / room / header) ? room : "";
 }
@@ -309,6 +311,7 @@ TEST(Rooms, TheSearchKnowsTheRoomOfAHeader) {
   EXPECT_EQ(roomOf("../data/text_file.hpp", "tools"), "data");
   EXPECT_EQ(roomOf("patch_samples.hpp", "matching"), "matching");
   EXPECT_EQ(roomOf("opencv2/core.hpp", "odometry"), "");
+  EXPECT_EQ(roomOf("stereo_descriptor_vo/ros/stereo_features_view.hpp", "ros"), "messages");
   EXPECT_EQ(roomOf("vector", "odometry"), "");
 }
 

@@ -21,8 +21,8 @@ class RepeatedImages {
                               const Eigen::Isometry3d& T_previous_current);
 
   /// Rows of the features whose part of the image is new, with the motion that is expected. From some row of a torn
-  /// image on, or up to it, the left image is still that of the pair before: features stand where they stood, to the
-  /// digit, although they should have moved by more than `noise`, px.
+  /// image on, or up to it, the left image is still that of the pair before. There features stand where they stood, to
+  /// the digit, although they should have moved by more than `noise`, px.
   std::vector<int> newRows(const StereoFeatures& features, double noise,
                            const std::optional<Eigen::Isometry3d>& T_previous_current) const;
 
