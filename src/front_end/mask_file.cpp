@@ -11,7 +11,8 @@
 namespace sdvo {
 
 cv::Mat readMask(const std::string& file) {
-  constexpr std::uint64_t kMostPixels = 50'000'000;  // of stereo cameras at most 12 million; a wrong file takes no memory
+  constexpr std::uint64_t kMostPixels =
+      50'000'000;  // of stereo cameras at most 12 million; a wrong file takes no memory
   const std::string name = "'" + std::filesystem::absolute(file).string() + "'";
   png_image header{};
   header.version = PNG_IMAGE_VERSION;
