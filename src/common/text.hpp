@@ -13,7 +13,8 @@
 
 namespace sdvo {
 
-/// Numbers with `digits` after the point, and words between them. A wild number has an exponent, not hundreds of digits.
+/// Numbers with `digits` after the point, and words between them. A wild number has an exponent, not hundreds of
+/// digits.
 template <class... Parts>
 std::string text(int digits, const Parts&... parts) {
   constexpr double kWild = 1e12;

@@ -46,8 +46,8 @@ fs::path followLinks(fs::path path) {
   return path;
 }
 
-/// A new file beside `path`, whose name it appends to. Its mode is that of any program's new file: mkstemp's is not, and
-/// the process's umask can only be read by changing it.
+/// A new file beside `path`, whose name it appends to. Its mode is that of any program's new file: mkstemp's is not,
+/// and the process's umask can only be read by changing it.
 int create(std::string& path) {
   std::random_device random;
   const std::string beside = path + ".partial-";

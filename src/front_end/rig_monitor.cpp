@@ -75,7 +75,8 @@ std::string RigMonitor::diagnose(const cv::Mat& left, const cv::Mat& right,
   if (static_cast<int>(sightings.size()) < kEnough) return "";
 
   if (swappedShare(sightings) > 0.6)
-    return "left and right images are swapped, mirrored, or not rectified? Corners lie further right in the right image";
+    return "left and right images are swapped, mirrored, or not rectified? Corners lie further right in the right "
+           "image";
   const auto [slope, offset, scatter] = fitRows(sightings, left.cols);
   if (scatter > std::max(max_dv_, 0.5 * std::abs(offset)))
     return text(1, "rows of left and right differ by ", scatter,
