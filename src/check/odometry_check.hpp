@@ -7,6 +7,7 @@
 
 #include "finding.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
+#include "stereo_descriptor_vo/rig/row_delay.hpp"
 #include "stereo_descriptor_vo/rig/row_readout.hpp"
 
 namespace sdvo {
@@ -29,5 +30,8 @@ class OdometryCheck {
   std::vector<double> inliers_, rotations_;
   std::map<std::string, int> reasons_;  ///< of what is not tracked
 };
+
+/// In words, if the rows of both images are not of one moment; empty: nothing is proved.
+std::string doubtOfShutters(const RowDelay::Estimate& right, const RowReadout::Estimate& readout);
 
 }  // namespace sdvo

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "../check/shutter_check.hpp"
+#include "../check/odometry_check.hpp"
 #include "../messages/stamps.hpp"
 
 namespace sdvo {

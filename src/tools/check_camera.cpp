@@ -7,21 +7,41 @@
 #include <CLI/CLI.hpp>
 #include <iomanip>
 #include <iostream>
+#include <opencv2/core.hpp>
 #include <opencv2/core/utility.hpp>
 #include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "../check/finding.hpp"
 #include "../common/worker.hpp"
 #include "../messages/stamps.hpp"
 #include "../ros/pair_decoder.hpp"
 #include "camera_check.hpp"
 #include "camera_input.hpp"
-#include "check_page.hpp"
+#include "page.hpp"
 #include "run_tool.hpp"
 #include "stereo_messages.hpp"
 
 namespace {
+
+using namespace sdvo;
+
+/// All findings of a camera's check as one page that needs no other file: verdict, table, map of the rows, a pair of
+/// images. `rows`: RowCheck::map(), empty: none; `pair`: CV_8U, empty: none. Throws std::runtime_error when it cannot
+/// be written.
+void writeCheckPage(const std::string& path, const std::string& camera, const std::vector<Finding>& findings,
+                    const cv::Mat& rows, const cv::Mat& pair) {
+  const Finding worst = worstOf(findings);
+  const std::string sentence = worst.verdict == Verdict::kOk
+                                   ? "OK: every step that this recording shows"
+                                   : std::string(toString(worst.verdict)) + ", " + worst.step + ": " + worst.what;
+  std::string html =
+      pageHead("Stereo camera " + camera, worst.verdict, sentence) + findingsTable(findings) + rowsTable(rows);
+  constexpr std::size_t kMostBytes = 1000000;
+  if (!pair.empty()) html += "<h2>A pair</h2>\n" + picture(pair, "left above right", kMostBytes);
+  writePage(path, html);
+}
 
 using sdvo::ArrivalLog;
 
@@ -91,8 +111,7 @@ int check(const Arguments& arguments) {
                 << finding.what << (finding.remedy.empty() ? "" : "\n" + std::string(19, ' ') + "-> " + finding.remedy)
                 << "\n";
     }
-    if (!arguments.page.empty())
-      sdvo::writeCheckPage(arguments.page, topics[0], findings, check.rows(), check.picture());
+    if (!arguments.page.empty()) writeCheckPage(arguments.page, topics[0], findings, check.rows(), check.picture());
     return failed ? 2 : 0;
   };
   if (!arguments.bag.empty()) {

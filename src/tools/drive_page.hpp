@@ -1,5 +1,9 @@
 #pragma once
 
+#include <rosbag/bag.h>
+#include <stereo_descriptor_vo/VoInfo.h>
+
+#include <array>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
@@ -8,11 +12,23 @@
 #include "../check/finding.hpp"
 #include "../config/pipeline_options.hpp"
 #include "drive_pictures.hpp"
-#include "live_record.hpp"
 #include "offline_run.hpp"
 #include "self_check.hpp"
 
 namespace sdvo {
+
+/// The odometry's own account of a drive that was recorded while it ran.
+struct LiveRecord {
+  std::array<int, 4> states{};      ///< pairs of each VoInfo::state_id
+  std::vector<double> latencies;    ///< s, those known
+  std::uint64_t dropped_pairs = 0;  ///< on either side
+  int discontinuities = 0;          ///< of the pose
+
+  int pairs() const;
+};
+
+/// Of the first topic with VoInfo in a bag; nothing without one.
+std::optional<LiveRecord> readLiveRecord(const rosbag::Bag& bag);
 
 /// All that the page of a drive shows.
 struct DriveReport {

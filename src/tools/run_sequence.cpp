@@ -21,7 +21,6 @@
 #include "camera_check.hpp"
 #include "drive_page.hpp"
 #include "feature_halves.hpp"
-#include "ground_truth.hpp"
 #include "offline_run.hpp"
 #include "place_run.hpp"
 #include "recording.hpp"

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -82,5 +83,11 @@ std::vector<SubPathErrors> subPathErrors(const Trajectory& ground_truth, const T
 /// the estimate is empty or longer than the ground truth, or when a length is not positive.
 TrajectoryErrors evaluateTrajectory(const Trajectory& ground_truth, const Trajectory& estimate,
                                     const std::vector<double>& lengths = kittiLengths());
+
+/// True poses of the left camera at these stamps (ns); none where the file knows none. A file in KITTI's format has one
+/// pose for each stamp, one in TUM's format stamps of its own, between which poses are interpolated. Throws
+/// std::runtime_error that names the file where it cannot be read or fits no stamp.
+std::vector<std::optional<Eigen::Isometry3d>> readGroundTruth(const std::string& path,
+                                                              const std::vector<std::int64_t>& stamps);
 
 }  // namespace sdvo

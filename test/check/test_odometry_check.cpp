@@ -3,10 +3,10 @@
 #include <cmath>
 #include <string>
 
-#include "../../src/check/shutter_check.hpp"
+#include "../../src/check/odometry_check.hpp"
 
 namespace sdvo {
-namespace test_shutter_check {
+namespace test_odometry_check {
 
 constexpr double kUnknown = NAN;
 
@@ -25,5 +25,5 @@ TEST(ShutterCheck, NamesWhatIsProvedAndNothingElse) {
             std::string::npos);
 }
 
-}  // namespace test_shutter_check
+}  // namespace test_odometry_check
 }  // namespace sdvo
