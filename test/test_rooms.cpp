@@ -65,7 +65,7 @@ bool isRos(const std::string& header) {
       R"(^(\.\./)*(ros|tf|nodelet|nodelet_topic_tools|cv_bridge|rosbag|rosbag_storage|message_filters|image_transport|pluginlib|)"
       R"(class_loader|image_geometry|dynamic_reconfigure|diagnostic_updater|actionlib|bondcpp|xmlrpcpp|rosconsole|)"
       R"(catkin|topic_tools|angles|eigen_conversions)/.*|^tf2.*/.*|^[A-Za-z0-9_]+_msgs/.*|^std_srvs/.*|)"
-      R"(^stereo_descriptor_vo/[A-Z].*|^stereo_descriptor_vo/ros/.*)");
+      R"(^stereo_descriptor_vo/[A-Z].*|^stereo_descriptor_vo/ros/.*|^\.\./messages/.*)");
   return std::regex_match(header, ros);
 }
 
