@@ -80,12 +80,15 @@ def small_images(folder):
         yield [name, *cells((cpu, wall, p95)), f"{cpu / whole:.2f}", f"{p95 / wall:.2f}"]
 
 
-def counted(drive, side):
+SIDES = ("sdvo::FeatureExtractor::extract(*", "sdvo::VisualOdometry::update(*")
+
+
+def counted(drive, side, *arguments):
     """Instructions on one side, a function, of the pairs from the third to the thirtieth."""
     with tempfile.TemporaryDirectory() as work:
         subprocess.run(["valgrind", "--tool=callgrind", f"--callgrind-out-file={work}/part", f"--toggle-collect={side}",
                         "--dump-before=sdvo::OfflineRun::process(*", programs.program("run_sequence"), drive.directory, "--frames", "30",
-                        "--poses", f"{work}/poses.txt"],
+                        "--poses", f"{work}/poses.txt", *arguments],
                        check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         # The first part ends before the first pair, the last one has no number.
         parts = sorted(pathlib.Path(work).glob("part.*"), key=lambda part: int(part.suffix[1:]))[1:] + [pathlib.Path(work) / "part"]
@@ -104,7 +107,7 @@ def instructions(folder):
     before = stored("instructions")
     chosen = {"KITTI 06": drives.recorded("kitti", "06"), "EuRoC MH_01_half": drives.recorded("euroc", "MH_01_half", folder), **in_a_room(folder)}
     for name, drive in chosen.items():
-        counts = [counted(drive, side) for side in ("sdvo::FeatureExtractor::extract(*", "sdvo::VisualOdometry::update(*")]
+        counts = [counted(drive, side) for side in SIDES]
         sides = [statistics.mean(side) * 1e-6 for side in counts]
         whole = sorted(map(sum, zip(*counts)))
         ratio = sum(sides) / float(before[name][3]) if name in before else 1.0
@@ -119,13 +122,16 @@ def guard(rows):
         sys.exit("error: more instructions than before\n" + "\n".join(grown))
 
 
-def growth(_):
-    yield ["corners", "CPU [ms a pair]", "wall, median", "wall, p95", "t [%]", "r [deg/m]"]
-    drive = drives.recorded("kitti", "06")
-    for count in (250, 500, 1000, 1100, 2000, 4000):
-        times, run = timed(drive, "--param", f"detector/max_features={count}", "--param", "detector/area_per_feature=0", runs=1)
-        mean = odometry.errors(drive.truth, run.poses, drive.lengths)["mean"]
-        yield [count, *cells(times), f"{mean['translation_percent']:.3f}", f"{mean['rotation_deg_per_m']:.4f}"]
+def growth(folder):
+    yield ["corners", *(cell for name in ("KITTI 06", "MH_01_half") for cell in (f"{name} [millions]", "t [%]", "r [deg/m]"))]
+    chosen = [drives.recorded("kitti", "06"), drives.recorded("euroc", "MH_01_half", folder)]
+    for count in (300, 450, 600, 1100):
+        row, setting = [count], ["--param", f"detector/max_features={count}", "--param", "detector/area_per_feature=0"]
+        for drive in chosen:
+            mean = odometry.errors(drive.truth, odometry.run(drive.directory, *setting).poses, drive.lengths)["mean"]
+            millions = sum(statistics.mean(counted(drive, side, *setting)) * 1e-6 for side in SIDES)
+            row += [f"{millions:.1f}", f"{mean['translation_percent']:.3f}", f"{mean['rotation_deg_per_m']:.4f}"]
+        yield row
 
 
 def allocations(_):
