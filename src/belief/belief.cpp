@@ -32,7 +32,7 @@ Belief Doubt::weigh(const MotionScene& scene, const MotionHypothesis& found, con
   // Lasting points were confirmed before the doubt began.
   log_odds_ -= lasts() ? logAgreement(scene, found) : 0.0;
   const Evidence before{log_odds_, cause_};
-  log_odds_ = std::max(log_odds_, kUnsuspected);
+  log_odds_ = std::clamp(log_odds_, kUnsuspected, kCertain);
   raise(evidence);
   const double shown = log_odds_ > before.log_odds ? std::exp(log_odds_) : 0.0, carried = std::exp(before.log_odds);
 
