@@ -15,7 +15,6 @@ import numpy as np
 import rosbag
 import rosgraph
 import rospy
-import rospkg
 import rostest
 import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray
@@ -253,7 +252,7 @@ class Places(unittest.TestCase):
             self.assertEqual(bag.get_message_count(['map_graph']), 1)
         relative = 'sdvo_places_test_%d.bag' % os.getpid()
         self.assertTrue(recognition.call('save_places', SavePlaces, relative).success)
-        os.remove(os.path.join(rospkg.get_ros_home(), relative))
+        os.remove(os.path.join(os.environ.get('ROS_HOME', os.path.expanduser('~/.ros')), relative))
         self.assertFalse(recognition.call('load_places', LoadPlaces, os.path.join(self.directory, 'none.bag')).success)
         place = recognition.call('get_place', GetPlace, 3)
         self.assertTrue(place.success)
