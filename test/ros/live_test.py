@@ -66,7 +66,7 @@ class Live(PipelineCase):
             process.wait()
 
     def test_both_nodelets_in_one_process(self):
-        """As rosrun starts it: remapped, with private parameters of either nodelet, flat or in blocks."""
+        """Started by hand: remapped, with private parameters of either nodelet, flat or in blocks."""
         camera = self.keep(Camera(self.namespace + '/front', self.sequence, self.clock))
         odometry = self.keep(Collector(self.namespace + '/odom', Odometry))
         rosout = self.keep(Rosout(self.namespace))
