@@ -145,11 +145,11 @@ Finding ImageCheck::frameRate(const std::vector<double>& rotations) const {
 }
 
 /// Part by part, for near and far things move differently. Dots are looked for only where there is motion, and only
-/// when most parts move: people who pass move some.
+/// when more than one part moves: people who pass move one.
 void EmitterCheck::add(const cv::Mat& image) {
   constexpr int kOldest = 20;  // pairs after which the light may be another
   constexpr int kColumns = 3, kRows = 2;
-  constexpr std::size_t kMost = 4;  // parts
+  constexpr std::size_t kFewest = 2;  // parts
   constexpr double kMoved = 0.012;  // of the width; 5 px of 424, more than a dot's neighbourhood
   CoarseView view(image);
   const bool is_comparable = !view_.empty() && dots_.size() == image.size();
@@ -162,7 +162,7 @@ void EmitterCheck::add(const cv::Mat& image) {
     const auto motion = view.motionSince(view_, {cv::Point(at.x * coarse.width, at.y * coarse.height), coarse});
     if (motion && std::hypot(motion->x, motion->y) >= kMoved) moved.push_back(at);
   }
-  if (moved.size() >= kMost) {
+  if (moved.size() >= kFewest) {
     dots = findDots(image);
     cv::dilate(dots, around, cv::Mat::ones(3, 3, CV_8U));
     for (const cv::Point& at : moved)

@@ -53,7 +53,6 @@ void VisualOdometry::configure(const VisualOdometryOptions& options) {
   revisit_ = Revisit(options_.matcher, options_.motion, options_.alignment);
   optimizer_ = WindowOptimizer(options_.window);
   state_.prior.configure(options.tracking);
-  if (state_.map) state_.map->assume(options_.noise);
 }
 
 void VisualOdometry::reset() {

@@ -96,11 +96,11 @@ TEST(LocalMapView, LooksForWhatWasSeenTwiceAfterItWasOutOfSight) {
     see(map, scene.view(T, id), id, T);
   };
   look(1, 0.0), look(2, 0.0);
-  const std::size_t before = map.view().point.size();
+  const std::size_t before = map.view().ids.size();
   for (int id = 3; id <= 8; ++id) look(id, 0.6);
   EXPECT_GT(before, 100u);
   look(9, 0.0);
-  EXPECT_GT(map.view().point.size(), before) << "the points of the first two pairs and the new ones";
+  EXPECT_GT(map.view().ids.size(), before) << "the points of the first two pairs and the new ones";
 }
 
 /// One point on the optical axis in front of a textured wall, seen from a distance.
@@ -419,7 +419,7 @@ TEST(LocalMap, ShowsWhatATurnBringsIntoTheNextImage) {
   const LocalMap::View next = map.view(back);
   EXPECT_EQ(next.points.count(), now_or_next);
   for (int row = 0; row < next.points.count(); ++row) {
-    const Eigen::Vector3d& expected = world.points[static_cast<std::size_t>(next.point[row])];
+    const Eigen::Vector3d& expected = world.points[static_cast<std::size_t>(next.ids[row])];
     EXPECT_LT((away.inverse() * next.points.positions[row] - expected).norm(), 1e-3 * expected.norm());
   }
 }

@@ -44,7 +44,7 @@ Consensus search(const Scene& scene, const GeneticConsensusOptions& options, boo
   return searchGenetically(problem, options, adaptive, {iterations, confidence}, random);
 }
 
-bool equal(const Consensus& a, const GeneticResult& b) {
+bool equal(const Consensus& a, const Consensus& b) {
   return a.cost == b.cost && a.iterations == b.iterations &&
          a.T_current_reference.matrix() == b.T_current_reference.matrix();
 }

@@ -46,7 +46,7 @@ class OdometryPublisherTest : public ::testing::Test {
   }
 
   void start(const OdometryOutputOptions& options) {
-    publisher_ = std::make_unique<OdometryPublisher>(nh_, options);
+    publisher_ = std::make_unique<OdometryPublisher>(nh_, options, 1);
     odom_ = std::make_unique<Inbox<nav_msgs::Odometry>>(nh_, "odom");
     path_ = std::make_unique<Inbox<nav_msgs::Path>>(nh_, "path");
     info_ = std::make_unique<Inbox<stereo_descriptor_vo::VoInfo>>(nh_, "vo_info");
@@ -262,9 +262,9 @@ TEST_F(OdometryPublisherTest, InfoTellsLatencyAndSession) {
   EXPECT_EQ(info_->messages[0].header.stamp, stamp);
   EXPECT_NEAR(published.latency, 2.0, 0.5);
   EXPECT_EQ(info_->messages[0].latency, published.latency);
-  const OdometryPublisher other(nh_, {});
+  const OdometryPublisher other(nh_, {}, 2);
   EXPECT_FALSE(published.session.isZero());
-  EXPECT_NE(OdometryPublisher(nh_, {}).publishInfo({}, stamp).session, published.session);
+  EXPECT_NE(OdometryPublisher(nh_, {}, 3).publishInfo({}, stamp).session, published.session);
   // Stamps that are wildly wrong have a latency too.
   EXPECT_GT(publisher_->publishInfo({}, ros::Time(0, 1)).latency, 1e9f);
   EXPECT_LT(publisher_->publishInfo({}, ros::Time(0xffffffffu, 0)).latency, -1e9f);
