@@ -105,7 +105,8 @@ TEST(PlaceMessage, IsRefusedWhenItDoesNotHoldTogether) {
   EXPECT_EQ(refusal([](msgs::Place& m) { m.segment = 0x7fffffffu; }), "segment 2147483647 is too large");
   EXPECT_EQ(refusal([](msgs::Place& m) { m.travelled = kNaN; }), "travelled is not finite");
   EXPECT_EQ(refusal([](msgs::Place& m) { m.pose.position.y = kInfinity; }), "the position is not finite");
-  EXPECT_EQ(refusal([](msgs::Place& m) { m.pose.orientation.w += 0.1; }), "the quaternion has not unit length");
+  EXPECT_EQ(refusal([](msgs::Place& m) { m.pose.orientation.w += 0.1; }),
+            "the quaternion has not unit length: normalise it (w = 1 and the rest 0: no rotation)");
   EXPECT_TRUE(contains(refusal([](msgs::Place& m) { m.features.header.stamp = ros::Time(); }), "zero stamp"));
   EXPECT_TRUE(contains(refusal([](msgs::Place& m) { m.features.v.pop_back(); }), "refused: v has 4 elements"));
 }
