@@ -231,7 +231,7 @@ class Faults(PipelineCase):
             self.expect('stereo_features', task, ok)
         self.expect('visual_odometry', 'input rate', ok, 'features a second')
         self.expect('visual_odometry', 'odometry', ok, 'TRACKING')
-        self.expect('visual_odometry', 'latency', warn, 'are the clocks of two machines different?')
+        self.expect('visual_odometry', 'latency', warn, 'another clock than this machine')
         self.camera.publish(*self.camera.messages(0, time_of=self.shown - 2))
         self.expect('stereo_features', 'synchronisation', warn, '1 pairs late or with wrong stamps')
 
@@ -280,7 +280,8 @@ class Faults(PipelineCase):
         def counts():
             values = {value.key: value.value for value in self.diagnosis('synchronisation', 'stereo_features').values}
             return [int(values.get(name, 0)) for name in ('unpaired', 'pushed out by newer ones', 'late or with wrong stamps', 'refused')]
-        self.assertTrue(wait_until(lambda: len(self.features) + sum(counts()) == pairs), (len(self.features), counts()))
+        # The last one may still wait for its other side.
+        self.assertTrue(wait_until(lambda: pairs - 1 <= len(self.features) + sum(counts()) <= pairs), (len(self.features), counts()))
         self.assertTrue(0 < len(self.features) < 60, len(self.features))
         self.assertGreater(self.features[-1].dropped_pairs, 10)
 
