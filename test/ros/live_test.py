@@ -69,13 +69,12 @@ class Live(PipelineCase):
         """Started by hand: remapped, with private parameters of either nodelet, flat or in blocks."""
         camera = self.keep(Camera(self.namespace + '/front', self.sequence, self.clock))
         odometry = self.keep(Collector(self.namespace + '/odom', Odometry))
-        rosout = self.keep(Rosout(self.namespace))
         node = self.namespace + '/stereo_odometry'
         command = [roslib.packages.find_node(PACKAGE, 'stereo_odometry')[0], '__ns:=' + self.namespace]
         command += ['%s:=front/%s' % (topic, topic) for topic in
                     ('left/image_rect', 'right/image_rect', 'left/camera_info', 'right/camera_info')]
         process = subprocess.Popen(command + ['_odom_frame_id:=world', '_detector/max_features:=600', '_queue_size:=100',
-                                              '_visual_odometry/planar:=true', '_cuont:=5'])
+                                              '_visual_odometry/planar:=true'])
         try:
             self.assertTrue(wait_until(lambda: camera.is_subscribed() and links(node) >= {
                 ('out', odometry.subscriber.resolved_name, rospy.get_name()), ('in', '/tf_static'),
@@ -87,7 +86,6 @@ class Live(PipelineCase):
             used = rospy.get_param(self.namespace)
             self.assertEqual((used['stereo_features']['detector']['max_features'], used['stereo_features']['queue_size'],
                               used['visual_odometry']['queue_size'], used['visual_odometry']['planar']), (600, 100, 100, True))
-            self.assertTrue(wait_until(lambda: rosout.warned('stereo_odometry/cuont is unknown')), rosout.warnings)
             process.terminate()
             self.assertEqual(process.wait(30), 0)
         finally:

@@ -116,7 +116,7 @@ class Replay(unittest.TestCase):
             self.assertEqual(pose.pose, odometry.pose.pose)
 
     def test_covariances_are_valid_and_the_pose_gets_less_certain(self):
-        last_trace = 0.0
+        traces = []
         for odometry in self.odometry:
             for covariance in (odometry.pose.covariance, odometry.twist.covariance):
                 matrix = np.array(covariance).reshape(6, 6)
@@ -124,9 +124,9 @@ class Replay(unittest.TestCase):
                 self.assertTrue(np.all(np.diag(matrix) > 0.0))
                 eigenvalues = np.linalg.eigvalsh(matrix)
                 self.assertGreaterEqual(eigenvalues[0], -1e-12 * eigenvalues[-1])
-            trace = np.trace(np.array(odometry.pose.covariance).reshape(6, 6))
-            self.assertGreaterEqual(trace, last_trace)
-            last_trace = trace
+            traces.append(np.trace(np.array(odometry.pose.covariance).reshape(6, 6)))
+        # What one pair is doubted by ends with it; what is open of the rig adds up.
+        self.assertGreater(traces[-1], traces[len(traces) // 5])
 
     def test_twist_is_unknown_at_first_then_that_of_the_ground_truth(self):
         first = np.array(self.odometry[0].twist.covariance).reshape(6, 6)
