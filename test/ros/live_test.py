@@ -6,6 +6,7 @@ import copy
 import itertools
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -86,7 +87,7 @@ class Live(PipelineCase):
             used = rospy.get_param(self.namespace)
             self.assertEqual((used['stereo_features']['detector']['max_features'], used['stereo_features']['queue_size'],
                               used['visual_odometry']['queue_size'], used['visual_odometry']['planar']), (600, 100, 100, True))
-            process.terminate()
+            process.send_signal(signal.SIGINT)
             self.assertEqual(process.wait(30), 0)
         finally:
             process.kill()

@@ -57,9 +57,6 @@ class LocalMap {
 
   const LocalMapOptions& options() const { return options_; }
 
-  /// Takes another noise over; the other options are those of the start.
-  void assume(const NoiseOptions& noise) { options_.noise = noise; }
-
   std::int64_t newestStamp() const { return newest_stamp_; }
 
   const StereoCamera& camera() const { return camera_; }
