@@ -14,11 +14,11 @@ struct Evidence {
   std::string cause;
 };
 
-/// What is believed of a pair's motion.
+/// Posterior of a pair's motion.
 struct Belief {
-  double probability = 1.0;  ///< that it is the camera's.
-  /// Second moment (m and rad) of its error where it is not, times the probability of that. The pose's is summed since
-  /// the doubt began.
+  double probability = 1.0;  ///< that it is the camera's
+  /// Second moment (m and rad) of its error where it is not, times the probability of that.
+  /// The pose's is summed since the doubt began.
   Matrix6d moment = Matrix6d::Zero(), pose_moment = Matrix6d::Zero();
   std::string reason;  ///< in words, of the likeliest alternative
 };

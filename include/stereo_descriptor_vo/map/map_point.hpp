@@ -29,7 +29,7 @@ struct AnchoredPoint {
 /// A scaled point whose z is smaller is not in front of the camera: a ratio of its depth in the anchor.
 constexpr double kNearestScaled = 1e-3;
 
-/// What a pair measured of a point. The vertical position comes from the left view alone: the right view of real rigs
+/// Measurement of a point by a pair. The vertical position comes from the left view alone: the right view of real rigs
 /// is vertically off.
 struct Observation {
   Eigen::Vector3d measurement;  ///< (u_left, v_left, disparity), px, as measured: the rig's error is not removed

@@ -41,8 +41,8 @@ struct alignas(32) PoseVector {
   double translation[4], rotation[4];
 };
 
-/// What an observation says of its pose and its point, in three columns: products of these are what the elimination of
-/// the point takes away.
+/// Derivatives of an observation by its pose and its point, in three columns: products of these are what the
+/// elimination of the point takes away.
 struct PoseFactor {
   PoseVector Y[3];
   PoseVector gradient;  ///< the observation's part of the pose's, less what the point explains

@@ -18,7 +18,7 @@ namespace sdvo {
 Eigen::Vector3d measurementOf(const StereoFeatures& features, int row, const RigCalibration& calibration,
                               const Eigen::Vector2d& shift = Eigen::Vector2d::Zero());
 
-/// What a pair's features measure of the points that they were matched to.
+/// Measurements by a pair's features of the points that they were matched to.
 std::vector<Correspondence> correspond(const DescribedPoints& reference, const StereoFeatures& features,
                                        const std::vector<FeatureMatch>& matches, const RigCalibration& calibration);
 

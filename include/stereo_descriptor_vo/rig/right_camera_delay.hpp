@@ -31,7 +31,7 @@ class RightCameraDelay {
   void watch(const std::vector<RowMotion>& rows, double dt, double row_error);
 
   /// Takes in a pair, as taken, with the camera's mean velocity (its own frame, m/s and rad/s) over the `dt` s before
-  /// it. What the last pairs taught is taken back once the right images are likely those of other pairs.
+  /// it. The last pairs are forgotten once their right images are likely those of other pairs.
   void learn(const StereoFeatures& features, double dt, const Vector6d& velocity, bool is_confirmed);
   /// The next pair does not continue the last one.
   void interrupt() { pairs_.clear(); }
