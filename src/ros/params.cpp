@@ -45,15 +45,21 @@ bool isOfImageTransport(const std::string& name) {
   return name == "image_transport" || beginsWith("left_image/") || beginsWith("right_image/");
 }
 
-void setParam(const ros::NodeHandle& nh, const Option& option, const std::string& text) {
-  if (std::holds_alternative<bool*>(option.value))
-    nh.setParam(option.name, text == "true");
-  else if (std::holds_alternative<int*>(option.value))
-    nh.setParam(option.name, std::stoi(text));
-  else if (std::holds_alternative<double*>(option.value))
-    nh.setParam(option.name, std::stod(text));
-  else
-    nh.setParam(option.name, text);
+XmlRpc::XmlRpcValue valueOf(const Option& option, const std::string& text) {
+  if (std::holds_alternative<bool*>(option.value)) return text == "true";
+  if (std::holds_alternative<int*>(option.value)) return std::stoi(text);
+  if (std::holds_alternative<double*>(option.value)) return std::stod(text);
+  return text;
+}
+
+/// On the parameter server; false where the master does not answer. ros::param::set would wait for it with a lock that
+/// every line on the console takes, too: the whole process would stand still.
+bool setParam(const ros::NodeHandle& nh, const Option& option, const std::string& text) {
+  XmlRpc::XmlRpcValue request, response, payload;
+  request[0] = ros::this_node::getName();
+  request[1] = nh.resolveName(option.name);
+  request[2] = valueOf(option, text);
+  return ros::master::execute("setParam", request, response, payload, false);
 }
 
 /// Whether a parameter beside our namespace was most likely meant for it: its block is called alike, or it ends as an
@@ -112,6 +118,8 @@ std::vector<std::string> loadParams(const ros::NodeHandle& nh, std::vector<Optio
 namespace {
 
 using dynamic_reconfigure::Config;
+
+const ros::WallDuration kKeepPeriod(0.2);  // between attempts to set parameters
 
 std::string groupOf(const Option& option) {
   const std::size_t slash = option.name.rfind('/');
@@ -206,8 +214,9 @@ ReconfigureServer::ReconfigureServer(ros::NodeHandle private_nh, std::vector<Opt
   updates_ = nh_.advertise<Config>("parameter_updates", 1, true);
   descriptions_.publish(description);
   updates_.publish(currentConfig());
-  keeper_ = std::make_unique<Worker<std::vector<std::string>>>(
-      1, [this](const std::vector<std::string>& texts) { keep(texts); });
+  keeping_ = keeper_.serve(nh_).createWallTimer(
+      kKeepPeriod, [this](const ros::WallTimerEvent&) { keep(); }, false, false);
+  keeper_.start();
   service_ = nh_.advertiseService("set_parameters", &ReconfigureServer::onRequest, this);
 }
 
@@ -218,7 +227,7 @@ bool ReconfigureServer::onRequest(dynamic_reconfigure::Reconfigure::Request& req
   try {
     assign(request.config);
     if (texts() != before) apply_();
-    keeper_->push(texts());
+    keeping_.start();
   } catch (const std::exception& e) {
     for (std::size_t i = 0; i < options_.size(); ++i) options_[i].set(before[i]);
     ROS_WARN_STREAM(nh_.getNamespace() << ": nothing reconfigured, all values stay: " << e.what());
@@ -229,10 +238,15 @@ bool ReconfigureServer::onRequest(dynamic_reconfigure::Reconfigure::Request& req
 }
 
 /// On the parameter server, where a nodelet that is loaded again, and rosparam, find what is in use. In a thread of its
-/// own: a master that is out of reach lets it wait.
-void ReconfigureServer::keep(const std::vector<std::string>& texts) {
+/// own, until the master has taken all.
+void ReconfigureServer::keep() {
+  std::unique_lock<std::mutex> lock(mutex_);
+  const std::vector<std::string> wanted = texts();
+  lock.unlock();
   for (std::size_t i = 0; i < options_.size(); ++i)
-    if (std::exchange(kept_[i], texts[i]) != texts[i]) setParam(nh_, options_[i], texts[i]);
+    if (kept_[i] != wanted[i] && setParam(nh_, options_[i], wanted[i])) kept_[i] = wanted[i];
+  lock.lock();
+  if (kept_ == texts()) keeping_.stop();
 }
 
 void ReconfigureServer::assign(const Config& request) {

@@ -5,13 +5,12 @@
 #include <ros/node_handle.h>
 
 #include <functional>
-#include <memory>
 #include <mutex>
 #include <string>
 #include <vector>
 
-#include "../common/worker.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
+#include "threads.hpp"
 
 namespace sdvo {
 
@@ -41,7 +40,7 @@ class ReconfigureServer {
  private:
   bool onRequest(dynamic_reconfigure::Reconfigure::Request& request,
                  dynamic_reconfigure::Reconfigure::Response& response);
-  void keep(const std::vector<std::string>& texts);
+  void keep();
   void assign(const dynamic_reconfigure::Config& request);
   void set(const std::string& name, const std::string& text);
   std::vector<std::string> texts() const;
@@ -53,8 +52,9 @@ class ReconfigureServer {
   std::mutex mutex_;
   std::vector<std::string> kept_;  ///< on the parameter server; the keeper's
   ros::Publisher descriptions_, updates_;
-  std::unique_ptr<Worker<std::vector<std::string>>> keeper_;
   ros::ServiceServer service_;
+  CallbackThread keeper_;
+  ros::WallTimer keeping_;  ///< runs while the server lacks something
 };
 
 }  // namespace sdvo
