@@ -330,6 +330,7 @@ class Launch(unittest.TestCase):
             self.assertTrue(wait_until(is_offered))
             sessions = [self.session()]
             for node in ('/stereo/visual_odometry', '/stereo/stereo_vo_manager'):
+                time.sleep(3)  # nodelet's loader does not notice a manager that dies before their bond is formed
                 uri = rosnode.get_api_uri(rosgraph.Master('/test'), node)
                 errors.clear()  # that our messages have no transform
                 os.kill(xmlrpc.client.ServerProxy(uri).getPid('/test')[2], signal.SIGKILL)
