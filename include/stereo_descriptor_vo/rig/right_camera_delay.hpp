@@ -19,9 +19,9 @@ struct RowMotion {
   double dv;        ///< v_right - v_left beyond what is usual at its place, px
 };
 
-/// The time by which the right image is taken later than the left one, beyond the difference of their stamps that the
-/// features name, and what both do to the features. A turn
-/// shifts all disparities of such a rig by f * rate * delay: 1 px for 3 ms at 100 deg/s and f = 212 px.
+/// The time by which the right image is taken later than the left one, and what it does to the features. Estimated is
+/// what the difference of their stamps, which the features name, leaves. A turn shifts all disparities of such a rig by
+/// f * rate * delay: 1 px for 3 ms at 100 deg/s and f = 212 px.
 class RightCameraDelay {
  public:
   /// `prior`, s: what is known beforehand.
