@@ -39,6 +39,7 @@ struct OdometryStep {
 struct OdometryState {
   std::optional<LocalMap> map;
   std::optional<LocalMap> candidate;  ///< the map with the pair; between pairs only its memory matters
+  std::optional<LocalMap> seed;       ///< of the newest pair that an outage's map does not show, at the last pose
   LearntRig rig;
   MotionPrior prior;
   Doubt doubt;
@@ -65,7 +66,10 @@ struct OdometryState {
   /// The next pair does not continue the last one.
   void interrupt();
 
-  double secondsSinceMap(const StereoFeatures& features) const;
+  /// At the seed: how the camera moved before it is unknown.
+  void startAgain();
+  /// The seed becomes the map.
+  void takeSeed();
 
   void move(const Eigen::Isometry3d& T_previous_current);
 
