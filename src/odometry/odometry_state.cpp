@@ -100,7 +100,7 @@ OdometryResult OdometryState::report(const StereoFeatures& features, const std::
     if (known_floor && floor.isOnFloor())
       result.pose_covariance = known_floor->constrained(T_origin_camera, result.pose_covariance);
   }
-  if (step.T_previous_current) {
+  if (step.T_previous_current && !step.starts_again) {
     result.has_motion = true;
     result.T_previous_current = *step.T_previous_current;
     result.motion_covariance = step.covariance;

@@ -368,6 +368,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   }
   state_.outage.end();
   state_.seed.reset();
+  step.starts_again = starts_again;
   if (starts_again) step.state = TrackingState::kDegraded;
   if (std::exchange(state_.interrupted, false))
     step.reason = (starts_again ? kStartedAgain

@@ -31,6 +31,7 @@ struct OdometryStep {
   std::vector<int> rejected_rows;          ///< matched rows of the pair that the adjustment does not confirm
   double dt = 0.0;                         ///< over which that motion is, else since the previous pair, s
   double time = 0.0;                       ///< s
+  bool starts_again = false;               ///< that motion began at no pose that was reported
 
   bool hasPose() const { return state == TrackingState::kTracking || state == TrackingState::kDegraded; }
 };
