@@ -2,7 +2,7 @@
 
     lab/run accuracy                                 # drives, guises and robots
     lab/run accuracy drives --record                 # recorded drives, and what changed since lab/docs/accuracy.csv, which is then written
-    lab/run accuracy guises robots --write           # puts these tables between the marks of docs/precision.md
+    lab/run accuracy guises robots --write           # puts these tables between the marks of lab/docs/faults.md and docs/precision.md
 
 drives: every sequence of the data sets that has a ground truth. guises: some of them, and a rendered one, turned, cut, spoilt
 and in other orders (lab/run guises). robots: rendered drives of small rigs. long: rendered drives of 0.7 to 2.5 km along KITTI's ways,
@@ -150,5 +150,6 @@ def main(arguments):
                   "guises": lambda: guise_table(work, folder, extra), "robots": lambda: robot_table(folder, extra),
                   "long": lambda: long_table(folder, extra, arguments.frames), "still": lambda: still_table(folder, extra, arguments.frames)}
         marks.check_names(arguments.tables, tables)
+        pages = {"guises": marks.FAULTS, "robots": marks.ACCURACY}
         for name in arguments.tables or ("drives", "guises", "robots"):
-            marks.show(tables[name](), arguments.write if name in ("guises", "robots") else None, name)
+            marks.show(tables[name](), pages.get(name) if arguments.write else None, name)

@@ -45,6 +45,7 @@ StereoFeatures StereoFeatures::select(const std::vector<int>& rows) const {
   StereoFeatures selected;
   selected.stamp = stamp;
   selected.camera = camera;
+  selected.right_delay = right_delay;
   selected.descriptor = descriptor;
   selected.layout = layout;
   selected.element_type = element_type;

@@ -45,7 +45,7 @@ struct ImageThresholds {
 struct StereoInputOptions {
   double sync_tolerance = 0.001;
   bool approximate_sync = false;
-  double max_interval = 0.01;
+  double max_interval = 0.025;  // half of a period at 20 Hz
   int sync_queue_size = 20;
   int queue_size = 1;
   double max_rate = 0.0;
@@ -59,7 +59,8 @@ struct StereoInputOptions {
     list.add("sync_tolerance", sync_tolerance, {0.0, 0.1}, "s",
              "largest difference of stamps of one trigger (less than half of a period); 0: equal stamps only");
     list.add("approximate_sync", approximate_sync,
-             "pair images of cameras that are not triggered together, whose stamps differ by up to max_interval");
+             "pair images of cameras that are not triggered together, whose stamps differ by up to max_interval; the "
+             "difference is taken as the right image's delay");
     list.add("max_interval", max_interval, {1e-4, 1.0}, "s",
              "approximate_sync: largest difference of stamps in a pair");
     list.add("sync_queue_size", sync_queue_size, {1, 1000}, "",

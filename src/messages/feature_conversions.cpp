@@ -28,6 +28,7 @@ stereo_descriptor_vo::StereoFeatures toMessage(const StereoFeatures& features, c
   message.cx = features.camera.cx;
   message.cy = features.camera.cy;
   message.baseline = features.camera.baseline;
+  message.right_delay = static_cast<float>(features.right_delay);
   message.descriptor = features.descriptor;
   message.layout = nameOf(features.layout);
   message.element_type = nameOf(features.element_type);
@@ -79,6 +80,7 @@ StereoFeatures fromMessage(const StereoFeaturesView& view) {
                      message.baseline,
                      static_cast<int>(message.image_width),
                      static_cast<int>(message.image_height)};
+  features.right_delay = message.right_delay;
   features.descriptor = message.descriptor;
   features.layout = valueOf<DescriptorLayout>(message.layout);
   features.element_type = valueOf<ElementType>(message.element_type);

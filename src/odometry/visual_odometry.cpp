@@ -31,6 +31,7 @@ std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHy
     const Eigen::Vector3d now = found.motion.T_current_reference * found.view->points.positions[reference];
     rows.push_back(
         {(features.camera.project(now).y() - found.view->pixels[reference].y) / dt, usual.change(features, current)});
+    rows.back().dv -= features.right_delay * rows.back().velocity;
   }
   return rows;
 }
@@ -210,12 +211,13 @@ MotionScene VisualOdometry::sceneOf(const LocalMap& map, const StereoFeatures& f
   return scene;
 }
 
-/// The features as of one moment, if the right camera is known to be late: by the velocity that is expected, then by
+/// The features as of one moment, if the right image is known to be late: by the velocity that is expected, then by
 /// the one that these show.
 std::optional<StereoFeatures> VisualOdometry::inStep(const StereoFeatures& taken, double dt,
                                                      const std::optional<MotionGuess>& guess) const {
   const std::optional<Vector6d>& velocity = state_.prior.velocity();
-  if (state_.rig.right_delay.compensated() == 0.0 || !velocity || dt > options_.tracking.max_gap) return std::nullopt;
+  const bool is_in_step = taken.right_delay == 0.0 && state_.rig.right_delay.compensated() == 0.0;
+  if (is_in_step || !velocity || dt > options_.tracking.max_gap) return std::nullopt;
   StereoFeatures features = state_.rig.right_delay.inStep(taken, dt, *velocity);
   if (state_.interrupted) return features;
   const MotionHypothesis found = search_.find(sceneOf(*state_.map, features, dt, guess), largestDoubt());

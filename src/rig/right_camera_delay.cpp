@@ -116,6 +116,7 @@ void RightCameraDelay::learn(const StereoFeatures& features, double dt, const Ve
   positions.camera = features.camera;
   positions.u = features.u, positions.v = features.v;
   positions.disparity = features.disparity, positions.dv = features.dv;
+  positions.right_delay = features.right_delay;
   pairs_.push_back({std::move(positions), velocity});
   if (pairs_.size() < 4) return;
   addRows(dt);
@@ -156,7 +157,7 @@ double RightCameraDelay::drift() const {
 /// The rows of the third last pair, whose neighbours are known.
 void RightCameraDelay::addRows(double dt) {
   const StereoFeatures& features = pairs_[1].features;
-  const double delay = compensated();
+  const double stamped = features.right_delay, delay = stamped + compensated();
   // The value at the border of two intervals by the means of four, to the fourth order. Motions too fast for
   // the rate of the pairs are not in it, so the instrument has none of them.
   const Vector6d near = pairs_[1].velocity + pairs_[2].velocity, far = pairs_[0].velocity + pairs_[3].velocity;
@@ -169,7 +170,7 @@ void RightCameraDelay::addRows(double dt) {
     const InStep step = sdvo::inStep(features, i, delay, during);
     const RightFlow turning = rightFlow(features.camera, slow, features.u[i] - features.disparity[i], features.v[i]);
     rows.push_back({RowDelay::cellOf(features.u[i], features.v[i], features.camera.width, features.camera.height),
-                    features.dv[i], step.flow.y(), turning.far.y(), step.disparity});
+                    features.dv[i] - stamped * step.flow.y(), step.flow.y(), turning.far.y(), step.disparity});
   }
   rows_.add(rows);
 }
@@ -181,15 +182,17 @@ double RightCameraDelay::compensated() const {
 }
 
 StereoFeatures RightCameraDelay::inStep(const StereoFeatures& features, double dt, const Vector6d& velocity) const {
-  const double delay = compensated();
+  const double delay = features.right_delay + compensated();
   // The velocity goes on as it changed.
   const Vector6d change = pairs_.empty() ? Vector6d::Zero() : Vector6d(velocity - pairs_.back().velocity);
   const Vector6d during = velocityDuring(delay, dt, velocity, velocity + 0.5 * change, velocity + change);
-  constexpr float kFar = std::numeric_limits<float>::epsilon();  // px: of points that noise puts beyond infinity
+  constexpr double kFar = std::numeric_limits<float>::epsilon();  // px: of points that noise puts beyond infinity
   StereoFeatures result = features;
+  result.right_delay = 0.0;
   for (int i = 0; i < features.count(); ++i) {
     const InStep step = sdvo::inStep(features, i, delay, during);
-    result.disparity[i] = std::max(kFar, static_cast<float>(step.disparity));
+    // In sideways motion the two views may be from one place.
+    result.disparity[i] = static_cast<float>(std::clamp<double>(step.disparity, kFar, features.camera.width));
     result.dv[i] -= static_cast<float>(delay * step.flow.y());
   }
   return result;

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "../config/interface_options.hpp"
-#include "unused_input.hpp"
+#include "diagnostic_tasks.hpp"
 
 namespace sdvo {
 

@@ -92,4 +92,11 @@ bool CameraFinder::update(const ros::master::V_TopicInfo& topics, std::string& r
   return true;
 }
 
+ros::NodeHandle CameraFinder::handle(const ros::NodeHandle& nh) const {
+  if (names_.empty()) return nh;
+  ros::NodeHandle renamed(nh.getNamespace(), names_);  // not of `nh`, whose remappings would win
+  renamed.setCallbackQueue(nh.getCallbackQueue());
+  return renamed;
+}
+
 }  // namespace sdvo

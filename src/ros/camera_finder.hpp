@@ -2,6 +2,7 @@
 
 #include <ros/datatypes.h>
 #include <ros/master.h>
+#include <ros/node_handle.h>
 
 #include <string>
 #include <vector>
@@ -28,6 +29,9 @@ class CameraFinder {
 
   /// Remappings of the camera in use; empty: it is the node's own.
   const ros::M_string& names() const { return names_; }
+
+  /// The node's handle, with these names.
+  ros::NodeHandle handle(const ros::NodeHandle& nh) const;
 
  private:
   const std::string ns_, left_, right_;

@@ -12,7 +12,6 @@
 #include "arrival_log.hpp"
 #include "diagnostic_tasks.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "unused_input.hpp"
 
 namespace sdvo {
 

@@ -5,6 +5,7 @@
 #include <stereo_descriptor_vo/FeatureFlow.h>
 #include <stereo_descriptor_vo/StereoFeatures.h>
 
+#include <atomic>
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 
@@ -35,7 +36,7 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
   struct Inputs {
     explicit Inputs(FeaturesImageNodelet& nodelet)
         : synchroniser(kQueue, kTolerance, [&nodelet](const auto&... messages) { nodelet.draw(messages...); }) {
-      ros::NodeHandle &nh = nodelet.nh_, image_nh = nodelet.imageHandle();
+      ros::NodeHandle &nh = nodelet.nh_, image_nh = nodelet.finder_->handle(nh);
       StereoImageTransport& transport = *nodelet.transport_;
       // Resolved, for a transport appends its own name to that of the topic.
       left.subscribe(image_nh, image_nh.resolveName("left/image_rect"), kQueue, transport.left,
@@ -50,7 +51,7 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
     }
 
     static constexpr int kQueue = 10;
-    static constexpr double kTolerance = 0.01;  // s, of the right images: as much as two cameras may be apart
+    static constexpr double kTolerance = 0.025;  // s, of the right images: as max_interval
     Synchroniser synchroniser;
     ImageSubscriber left, right;
     ros::Subscriber features, flow;
@@ -59,11 +60,15 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
   void onInit() override try {
     nh_ = callbacks_.serve(getNodeHandle());
     finds_camera_ = getPrivateNodeHandle().param("find_camera", nh_.getNamespace() != "/");
+    finder_ = std::make_unique<CameraFinder>(nh_.getNamespace(), nh_.resolveName("left/image_rect"),
+                                             nh_.resolveName("right/image_rect"));
     transport_ = std::make_unique<StereoImageTransport>(getPrivateNodeHandle());
     const image_transport::SubscriberStatusCallback on_connect =
         [this](const image_transport::SingleSubscriberPublisher&) { updateInputs(); };
-    publisher_ = image_transport::ImageTransport(master_callbacks_.serve(getNodeHandle()))
-                     .advertise("features_image", 1, on_connect, on_connect);
+    ros::NodeHandle master_nh = master_callbacks_.serve(getNodeHandle());
+    publisher_ = image_transport::ImageTransport(master_nh).advertise("features_image", 1, on_connect, on_connect);
+    camera_timer_ =
+        master_nh.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { followCamera(); });
     callbacks_.start();
     master_callbacks_.start();
   } catch (const std::exception& e) {
@@ -71,16 +76,18 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
     throw;  // the manager forgets the nodelet, and its loader ends with an error
   }
 
-  /// With the names of the camera that the image side takes, too.
-  ros::NodeHandle imageHandle() {
-    CameraFinder finder(nh_.getNamespace(), nh_.resolveName("left/image_rect"), nh_.resolveName("right/image_rect"));
+  // In the thread that may wait for the master.
+
+  /// To the one that the image side takes, and back.
+  void followCamera() {
     ros::master::V_TopicInfo topics;
     std::string ignored;
-    if (!finds_camera_ || !ros::master::getTopics(topics) || !finder.update(topics, ignored)) return nh_;
-    return callbacks_.serve(ros::NodeHandle(nh_.getNamespace(), finder.names()));
+    const bool searches = inputs_ && finds_camera_ && (!has_pictures_ || !finder_->names().empty());
+    if (!searches || !ros::master::getTopics(topics) || !finder_->update(topics, ignored)) return;
+    inputs_.reset();
+    updateInputs();
   }
 
-  /// Where waiting for the master holds no image up.
   void updateInputs() try {
     if (publisher_.getNumSubscribers() == 0) {
       inputs_.reset();
@@ -90,6 +97,8 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
   } catch (const std::exception& e) {
     NODELET_ERROR_STREAM("features_image: cannot subscribe to images, stereo_features and feature_flow: " << e.what());
   }
+
+  // In the thread of the images.
 
   template <int input, class Message>
   void take(Synchroniser& synchroniser, const boost::shared_ptr<const Message>& message) try {
@@ -110,6 +119,7 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
     sensor_msgs::fillImage(*picture, sensor_msgs::image_encodings::BGR8, static_cast<std::uint32_t>(drawn.rows),
                            static_cast<std::uint32_t>(drawn.cols), static_cast<std::uint32_t>(drawn.step), drawn.data);
     publisher_.publish(sensor_msgs::ImageConstPtr(picture));
+    has_pictures_ = true;
   } catch (const std::exception& e) {
     if (throttle_.allows(e.what()))
       NODELET_ERROR_STREAM("features_image at " << left->header.stamp << " skipped: " << e.what());
@@ -118,10 +128,13 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
   CallbackThread callbacks_, master_callbacks_;
   ros::NodeHandle nh_;
   bool finds_camera_ = true;
+  std::atomic<bool> has_pictures_{false};
   ReportThrottle throttle_;
   std::unique_ptr<StereoImageTransport> transport_;
   image_transport::Publisher publisher_;
+  ros::WallTimer camera_timer_;
   ros_conversions::GreyRangeTracker grey_;
+  std::unique_ptr<CameraFinder> finder_;
   std::unique_ptr<Inputs> inputs_;
 };
 

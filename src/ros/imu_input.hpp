@@ -11,8 +11,8 @@
 #include <string>
 
 #include "../common/imu_tracks.hpp"
+#include "diagnostic_tasks.hpp"
 #include "transforms.hpp"
-#include "unused_input.hpp"
 
 namespace sdvo {
 

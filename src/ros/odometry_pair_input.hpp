@@ -9,9 +9,9 @@
 #include <memory>
 #include <string>
 
+#include "diagnostic_tasks.hpp"
 #include "synchronisers.hpp"
 #include "threads.hpp"
-#include "unused_input.hpp"
 
 namespace sdvo {
 

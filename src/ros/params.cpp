@@ -39,12 +39,6 @@ void assign(const XmlRpc::XmlRpcValue& parameter, Option& option) {
   }
 }
 
-/// What image_transport and its plugins keep under the same private namespace, see StereoImageTransport.
-bool isOfImageTransport(const std::string& name) {
-  const auto beginsWith = [&](const std::string& side) { return name.compare(0, side.size(), side) == 0; };
-  return name == "image_transport" || beginsWith("left_image/") || beginsWith("right_image/");
-}
-
 XmlRpc::XmlRpcValue valueOf(const Option& option, const std::string& text) {
   if (std::holds_alternative<bool*>(option.value)) return text == "true";
   if (std::holds_alternative<int*>(option.value)) return std::stoi(text);
@@ -83,6 +77,11 @@ bool isAstray(const std::string& name, const std::string& prefix, const std::vec
 }
 
 }  // namespace
+
+bool isOfImageTransport(const std::string& name) {
+  const auto beginsWith = [&](const std::string& side) { return name.compare(0, side.size(), side) == 0; };
+  return name == "image_transport" || beginsWith("left_image/") || beginsWith("right_image/");
+}
 
 std::vector<std::string> loadParams(const ros::NodeHandle& nh, std::vector<Option> options) {
   for (Option& option : options) {

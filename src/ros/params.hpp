@@ -20,6 +20,9 @@ namespace sdvo {
 /// beside it in no nodelet's namespace: most likely spelling mistakes.
 std::vector<std::string> loadParams(const ros::NodeHandle& nh, std::vector<Option> options);
 
+/// What image_transport and its plugins keep beside the options of the image side, see StereoImageTransport.
+bool isOfImageTransport(const std::string& name);
+
 template <class Options>
 std::vector<std::string> loadParams(const ros::NodeHandle& nh, Options& options) {
   return loadParams(nh, listOptions(options));

@@ -34,7 +34,6 @@
 #include "threads.hpp"
 #include "throttles.hpp"
 #include "transforms.hpp"
-#include "unused_input.hpp"
 
 namespace sdvo {
 

@@ -78,6 +78,7 @@ namespace msgs = stereo_descriptor_vo;
 
 constexpr const char* kPlaceTopic = "place";
 constexpr const char* kGraphTopic = "map_graph";
+constexpr const char* kOldPlace = "d90a2505b9172820b06c0867769c61b0";  // of 0.1.0: features end before right_delay
 
 /// Refuses an array longer than the rest of its message; ROS' own stream makes room for it before it looks.
 struct CheckedStream : ros::serialization::Stream {
@@ -143,6 +144,12 @@ SavedPlaces read(const std::string& path, const PoseGraphOptions& options) {
   readFile(path, [&](BagMessage message) {
     const std::string_view topic = message.connection["topic"];
     if (topic == kPlaceTopic) {
+      std::string completed;
+      if (message.connection["md5sum"] == kOldPlace) {
+        completed.assign(message.data).append(sizeof(float), '\0');
+        message.connection["md5sum"] = ros::message_traits::md5sum<msgs::Place>();
+        message.data = completed;
+      }
       const auto place = parse<msgs::Place>(message);
       places.push_back(ros_conversions::fromMessage(place));
       if (!stream) stream = ros_conversions::streamOf(place.features);

@@ -143,9 +143,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
       mask_subscriber_.shutdown();
       diagnostics_->input().noteIdle(kNobodyListens);
     } else if (!input_) {
-      ros::NodeHandle image_nh = nh_;
-      if (!finder_->names().empty())  // not of `nh_`, whose remappings would win
-        image_nh = callbacks_.serve(ros::NodeHandle(nh_.getNamespace(), finder_->names()));
+      const ros::NodeHandle image_nh = finder_->handle(nh_);
       diagnostics_->input().noteTopics(image_nh.resolveName("left/image_rect") + " and " +
                                        image_nh.resolveName("right/image_rect"));
       diagnostics_->input().noteIdle("");
@@ -218,6 +216,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
                                             << " are black to white");
     StereoFeatures features =
         extractor_->extract(decoded.camera, decoded.left, decoded.right, nanoseconds(stamp), mask_);
+    if (options_.input.approximate_sync) features.right_delay = secondsBetween(stamp, pair.right_image->header.stamp);
     // Only now: a calibration that does not fit the images was refused and is no new stream.
     const std::string unrectified = ros_conversions::whyUnrectified(*pair.left_info, *pair.right_info);
     noteCamera(decoded.camera, pair.left_info->distortion_model, unrectified);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "../config/interface_options.hpp"
+#include "params.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry_options.hpp"
 
@@ -20,8 +21,8 @@ struct Part {
 };
 
 template <class... Options>
-Part makePart(const std::string& name, const std::string& type, std::vector<std::string> parameters,
-              Options... options) {
+Part makePart(const std::string& name, const std::string& type, Options... options) {
+  std::vector<std::string> parameters;
   const auto add = [&](auto& component) {
     for (const sdvo::Option& option : sdvo::listOptions(component)) parameters.push_back(option.name);
   };
@@ -30,10 +31,8 @@ Part makePart(const std::string& name, const std::string& type, std::vector<std:
 }
 
 std::vector<Part> makeParts() {
-  return {
-      makePart("stereo_features", "StereoFeatures", {"image_transport"}, sdvo::StereoInputOptions(),
-               sdvo::FeatureExtractorOptions()),
-      makePart("visual_odometry", "VisualOdometry", {}, sdvo::OdometryOutputOptions(), sdvo::VisualOdometryOptions())};
+  return {makePart("stereo_features", "StereoFeatures", sdvo::StereoInputOptions(), sdvo::FeatureExtractorOptions()),
+          makePart("visual_odometry", "VisualOdometry", sdvo::OdometryOutputOptions(), sdvo::VisualOdometryOptions())};
 }
 
 /// `name`: relative to the process's private namespace. False where no nodelet has such a parameter.
@@ -43,7 +42,9 @@ bool handOver(const std::string& name, const XmlRpc::XmlRpcValue& value, const s
     const std::string block = part.name + "/";  // as YAML files have it
     const bool is_in_block = name.compare(0, block.size(), block) == 0;
     const std::string own = is_in_block ? name.substr(block.size()) : name;
-    if (!is_in_block && std::count(part.parameters.begin(), part.parameters.end(), name) == 0) continue;
+    const bool is_of_images = part.name == "stereo_features" && sdvo::isOfImageTransport(name);
+    if (!is_in_block && !is_of_images && std::count(part.parameters.begin(), part.parameters.end(), name) == 0)
+      continue;
     ros::param::set(block + own, value);  // the nodelet names one that it does not know
     is_known = true;
   }

@@ -202,7 +202,7 @@ std::string statesSection(const Frames& frames) {
   return "<h2>States over time</h2>\n" + band(ranks, colours) +
          text(1, "<p>0 to ", times.back(), " s: <b style='color:", kGreen, "'>TRACKING</b>, <b style='color:", kOrange,
               "'>DEGRADED</b>, <b style='color:", kRed, "'>LOST</b>, <b style='color:", kGrey, "'>WAITING</b></p>\n") +
-         wordsTable(rows) + more;
+         "<div class='when'>" + wordsTable(rows) + "</div>" + more;
 }
 
 std::string figuresSection(const DriveReport& report, const OfflineRun& run) {
@@ -268,7 +268,7 @@ Finding judge(const DriveReport& report, const OfflineRun& run) {
   if (run.pairsWithoutPose() > 0 || run.discontinuities() > 0) {
     if (verdict.verdict != Verdict::kFail) verdict.verdict = Verdict::kWarn;
     verdict.what = text(0, "Interrupted: ", run.pairsWithoutPose(), " of ", run.pairs(), " pairs have no pose, ",
-                        run.discontinuities(), " discontinuities");
+                        run.discontinuities(), run.discontinuities() == 1 ? " discontinuity" : " discontinuities");
   } else {
     verdict.what =
         text(0, "Followed: ", run.pairs(), " of ", run.pairs(), " pairs have a pose, ", tracking, " are TRACKING");

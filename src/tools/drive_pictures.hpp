@@ -13,8 +13,8 @@ namespace sdvo {
 /// The left image of a pair with its features, CV_8UC3.
 cv::Mat drawLeft(const RecordedPair& pair, const StereoFeatures& features, const OdometryResult& result);
 
-/// A dozen left images of a drive with their features: some spread over all pairs, the others where tracking ends for
-/// the first times.
+/// Left images of a drive with their features: a dozen spread over all pairs, and those where tracking ends for the first
+/// times.
 class DrivePictures {
  public:
   struct Picture {
@@ -30,7 +30,7 @@ class DrivePictures {
   const std::vector<Picture>& pictures() const { return pictures_; }
 
  private:
-  static constexpr int kSpread = 8, kEnds = 4;
+  static constexpr int kSpread = 12, kEnds = 4;
 
   int pairs_, seen_ = 0, spread_ = 0, ends_ = 0;
   std::int64_t first_stamp_ = 0;  ///< ns

@@ -42,6 +42,7 @@ constexpr char kStyle[] =
     "td,th{padding:.3em .7em;text-align:left;border-bottom:1px solid "
     "#ddd;vertical-align:top;overflow-wrap:break-word}.v{color:#fff;font-weight:bold}"
     ".wide td{padding:.3em .4em;font-size:.85em}"
+    ".when td{white-space:nowrap}.when td:last-child{white-space:normal}"
     ".grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,330px),1fr));gap:1em}"
     "figure{margin:0;min-width:0}figcaption{font-size:.85em;margin-bottom:.2em}svg,img{width:100%;display:block}"
     "svg text{font:11px sans-serif;fill:#444}.g{stroke:#e4e4e4;fill:none}.c{fill:none;stroke-width:1.5}"

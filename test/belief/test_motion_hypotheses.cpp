@@ -205,7 +205,7 @@ TEST(SameMotion, ProjectsToTheSamePixels) {
   std::vector<Correspondence> correspondences;
   std::vector<int> all;
   for (int i = 0; i < 100; ++i) {
-    correspondences.push_back({{0.02 * i - 1.0, 0.5, 8.0}, {}});
+    correspondences.push_back({{0.02 * i - 1.0, 0.5, 8.0}, Eigen::Vector3d::Zero()});
     all.push_back(i);
   }
   // 400 px * 0.01 m / 8 m are half a pixel in both views, 0.05 m are 2.5 px.

@@ -94,6 +94,25 @@ TEST(RightCameraDelay, FindsADelayAndCompensatesIt) {
   EXPECT_EQ(watched(0.0, 60).compensated(), 0.0);
 }
 
+TEST(RightCameraDelay, StampsOfFreeRunningCamerasAreKnownDelays) {
+  RightCameraDelay right_delay;
+  constexpr double kOffset = 0.003;  // s, of one driver's stamps
+  const auto pair = [](int k, double noise) {
+    const double stamped = 1e-3 * (k % 20 - 10), delay = stamped + kOffset;
+    StereoFeatures features = seen(velocityAt(kPeriod * k + 0.5 * delay), delay, noise, 10u + static_cast<unsigned>(k));
+    features.right_delay = stamped;
+    return features;
+  };
+  for (int k = 0; k < 100; ++k) right_delay.learn(pair(k, 0.1), kPeriod, before(k), true);
+  EXPECT_NEAR(right_delay.compensated(), kOffset, 5e-4);
+  for (int k = 100; k < 120; ++k) {
+    const StereoFeatures in_step = seen(velocityAt(kPeriod * k), 0.0);
+    const StereoFeatures corrected = right_delay.inStep(pair(k, 0.0), kPeriod, velocityAt(kPeriod * k));
+    EXPECT_EQ(corrected.right_delay, 0.0);
+    for (int i = 0; i < in_step.count(); ++i) EXPECT_NEAR(corrected.disparity[i], in_step.disparity[i], 0.25) << k;
+  }
+}
+
 TEST(RightCameraDelay, WhatIsKnownBeforehandHoldsUntilItIsContradicted) {
   RightCameraDelay known(-0.003);
   EXPECT_EQ(known.compensated(), -0.003);

@@ -20,13 +20,13 @@ import rostest
 from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from nodelet.srv import NodeletLoad, NodeletUnload
-from sensor_msgs.msg import Imu, PointCloud2
+from sensor_msgs.msg import Image, Imu, PointCloud2
 from std_srvs.srv import Empty, Trigger
 from tf2_msgs.msg import TFMessage
 
 from kitti_replay import EPOCH, FRAME, PACKAGE, Camera, Collector, Pipeline, Rosout, links, matrix_of, wait_until
 from made_up_sequence import STEP, MadeUpSequence
-from pipeline_case import PipelineCase, camera_transform
+from pipeline_case import SILENCE, PipelineCase, camera_transform
 from stereo_descriptor_vo.msg import MapGraph, PlaceInfo, StereoFeatures, VoInfo
 from stereo_descriptor_vo.srv import SavePlaces, SaveTrajectory
 
@@ -169,6 +169,7 @@ class Faults(PipelineCase):
             for message in (images[1], infos[1]):
                 message.header.stamp += rospy.Duration.from_sec(0.002)
             self.assertEqual(self.feed_messages(images, infos).state, 'TRACKING')
+        self.assertAlmostEqual(self.features[-1].right_delay, 0.002, places=5)
         self.expect('stereo_features', 'synchronisation', DiagnosticStatus.WARN, 'left and right are 2.0 ms apart')
 
     def test_nothing_waits_for_a_full_packet(self):
@@ -267,14 +268,15 @@ class Faults(PipelineCase):
     def test_pairs_whose_stamps_do_not_go_together_are_said_and_none_is_lost_uncounted(self):
         self.start(queue_size=200)
         pairs, random = 100, np.random.RandomState(1)
+        words = 'the nearest stamps of left and right are 1.', 'more than sync_tolerance'
         for k in range(pairs):
+            if k == 60:  # 3 s
+                self.assertTrue(self.rosout.warned('stereo pairs', 'are not used', 'left and', 'right images without', *words))
             images, infos = self.camera.messages(k % PAIRS, time_of=0.5 * k)
             for message in (images[1], infos[1]):
                 message.header.stamp += rospy.Duration.from_sec(random.uniform(-0.004, 0.004))
             self.camera.publish(images, infos)
             time.sleep(0.05)
-        words = 'the nearest stamps of left and right are 1.', 'more than sync_tolerance'
-        self.assertTrue(wait_until(lambda: self.rosout.warned('stereo pairs', 'are not used', *words)), self.rosout.warnings)
         self.expect('stereo_features', 'synchronisation', DiagnosticStatus.WARN, 'are not used', *words)
 
         def counts():
@@ -330,15 +332,24 @@ class Faults(PipelineCase):
         def pipeline(camera, **arguments):
             self.rosout = self.keep(Rosout(self.namespace))
             self.features = self.keep(Collector(self.namespace + '/stereo_features', StereoFeatures))
+            self.picture = self.keep(Collector(self.namespace + '/features_image', Image))
             found = self.keep(Pipeline(self.namespace, **arguments))
             self.assertTrue(wait_until(lambda: found.has_loaded('stereo_features', 'visual_odometry'), 60))
             return self.keep(camera)
+        times = itertools.count()
+
+        def is_drawn(camera):
+            drawn, k = len(self.picture), next(times)
+            camera.publish(*camera.messages(k % PAIRS, time_of=k))
+            return wait_until(lambda: len(self.picture) > drawn, SILENCE)
         front = pipeline(Camera(self.namespace + '/front', self.sequence, self.clock))
         self.assertTrue(wait_until(front.is_subscribed, 60))
         self.assertTrue(wait_until(lambda: self.rosout.warned('nobody publishes', '/front/left/image_rect', 'find_camera')))
+        self.assertTrue(wait_until(lambda: is_drawn(front)))
         own = self.keep(Camera(self.namespace, self.sequence, self.clock))
         self.assertTrue(wait_until(lambda: own.is_subscribed() and not front.has_subscribers(), 60))
         self.assertTrue(wait_until(lambda: self.rosout.warned('somebody publishes')))
+        self.assertTrue(wait_until(lambda: is_drawn(own)))
         self.tearDown()
         self.setUp()
 

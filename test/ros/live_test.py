@@ -5,6 +5,7 @@ waits for the answer to each pair, so that nothing depends on the machine's spee
 import copy
 import itertools
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -75,7 +76,8 @@ class Live(PipelineCase):
         command += ['%s:=front/%s' % (topic, topic) for topic in
                     ('left/image_rect', 'right/image_rect', 'left/camera_info', 'right/camera_info')]
         process = subprocess.Popen(command + ['_odom_frame_id:=world', '_detector/max_features:=600', '_queue_size:=100',
-                                              '_visual_odometry/planar:=true'])
+                                              '_visual_odometry/planar:=true', '_left_image/image_transport:=raw',
+                                              '_max_featurs:=600'], stderr=subprocess.PIPE, universal_newlines=True)
         try:
             self.assertTrue(wait_until(lambda: camera.is_subscribed() and links(node) >= {
                 ('out', odometry.subscriber.resolved_name, rospy.get_name()), ('in', '/tf_static'),
@@ -87,10 +89,13 @@ class Live(PipelineCase):
             used = rospy.get_param(self.namespace)
             self.assertEqual((used['stereo_features']['detector']['max_features'], used['stereo_features']['queue_size'],
                               used['visual_odometry']['queue_size'], used['visual_odometry']['planar']), (600, 100, 100, True))
+            self.assertEqual(used['stereo_features']['left_image']['image_transport'], 'raw')
             process.send_signal(signal.SIGINT)
-            self.assertEqual(process.wait(30), 0)
+            said = process.communicate(timeout=30)[1]
+            self.assertEqual(process.returncode, 0)
         finally:
             process.kill()
+        self.assertEqual(re.findall('parameter (.*) is unknown', said), [node + '/max_featurs'])
         self.assertNotEqual(subprocess.run(command + ['_queue_size:=many']).returncode, 0)
 
     def test_malformed_features(self):

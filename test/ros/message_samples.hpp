@@ -31,6 +31,7 @@ inline StereoFeatures someFeatures(ElementType type = ElementType::kBits,
   StereoFeatures features;
   features.stamp = 1403636579763555584;
   features.camera = {707.0912, 710.25, 601.8873, 183.1104, 0.5371657, 1226, 370};
+  features.right_delay = -0.015625;
   features.descriptor = "sift";
   features.layout = layout;
   features.element_type = type;

@@ -15,6 +15,7 @@ namespace test_features_message {
 void expectSame(const StereoFeatures& a, const StereoFeatures& b) {
   EXPECT_EQ(a.stamp, b.stamp);
   EXPECT_TRUE(a.camera == b.camera);
+  EXPECT_EQ(a.right_delay, b.right_delay);
   EXPECT_EQ(a.descriptor, b.descriptor);
   EXPECT_EQ(a.layout, b.layout);
   EXPECT_EQ(a.element_type, b.element_type);

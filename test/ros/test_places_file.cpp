@@ -1,8 +1,10 @@
 #include <geometry_msgs/Pose.h>
 #include <gtest/gtest.h>
 #include <rosbag/bag.h>
+#include <rosbag/view.h>
 #include <std_msgs/Header.h>
 #include <sys/resource.h>
+#include <topic_tools/shape_shifter.h>
 
 #include <csignal>
 #include <cstring>
@@ -77,6 +79,26 @@ TEST_F(PlacesFile, WhatIsSavedIsLoaded) {
   EXPECT_EQ(loaded.graph.nodes().at(2).translation().x(), 2.0);
   EXPECT_EQ(loaded.graph.edges().size(), 2u);
   EXPECT_EQ(loaded.stream.frame_id, "left_optical");
+}
+
+TEST_F(PlacesFile, PlacesOfTheFirstVersionAreLoaded) {
+  save(path_);
+  const std::string old = path_ + ".old";
+  rosbag::Bag now(path_), before(old, rosbag::bagmode::Write);
+  for (const rosbag::MessageInstance& message : rosbag::View(now)) {
+    std::vector<std::uint8_t> bytes(message.size());
+    ros::serialization::OStream out(bytes.data(), message.size());
+    message.write(out);
+    const bool is_place = message.getTopic() == "place";
+    topic_tools::ShapeShifter shifter;
+    shifter.morph(is_place ? "d90a2505b9172820b06c0867769c61b0" : message.getMD5Sum(), message.getDataType(),
+                  message.getMessageDefinition(), "");
+    ros::serialization::IStream in(bytes.data(), message.size() - (is_place ? 4 : 0));
+    shifter.read(in);
+    before.write(message.getTopic(), message.getTime(), shifter);
+  }
+  before.close();
+  EXPECT_EQ(loadPlaces(old, {}).places.size(), 3u);
 }
 
 TEST_F(PlacesFile, PathsThatCannotBeWrittenAreRefused) {

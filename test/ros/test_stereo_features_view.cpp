@@ -95,6 +95,8 @@ std::vector<Damage> allDamages() {
   damages.push_back({"v before the image", [](M& m) { m.v[2] = -20.f; }, "u or v"});
   damages.push_back({"disparity larger than the image", [](M& m) { m.disparity[2] = 1e9f; }, "disparity"});
   damages.push_back({"size larger than the image", [](M& m) { m.size[2] = 1e9f; }, "size"});
+  damages.push_back({"delay nan", [](M& m) { m.right_delay = kNaN; }, "right_delay"});
+  damages.push_back({"delay long", [](M& m) { m.right_delay = -2.f; }, "right_delay"});
   damages.push_back({"height huge", [](M& m) { m.image_height = 0xffffffffu; }, "image size"});
   return damages;
 }

@@ -2,7 +2,7 @@
 
 #include <string>
 
-#include "../../src/ros/unused_input.hpp"
+#include "../../src/ros/diagnostic_tasks.hpp"
 
 namespace sdvo {
 namespace test_unused_input {

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""scripts/run_many against a real slurmctld and slurmd of this machine, with a configuration of their own in a temporary folder. Needs
+"""run_many against a real slurmctld and slurmd of this machine, with a configuration of their own in a temporary folder. Needs
 slurm-wlm, munge, root (for slurmd), and the built tools render_drive, convert and run_sequence."""
 import os
 import pathlib
@@ -14,7 +14,7 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 TOOLS = ROOT / ".catkin_ws/devel/lib/stereo_descriptor_vo"
-RUN_MANY = ROOT / "scripts/run_many"
+RUN_MANY = TOOLS / "run_many"
 PATIENCE = 60  # s
 
 CONFIGURATION = """

@@ -47,6 +47,7 @@ struct StereoFeature {
 struct StereoFeatures {
   std::int64_t stamp = 0;  ///< of the left image, ns
   StereoCamera camera;
+  double right_delay = 0.0;  ///< s, from the left image to the right one, where their stamps are of two triggers
 
   std::string descriptor;  ///< base descriptor: "freak", …; a free name, for other extractors may send their own
   DescriptorLayout layout = DescriptorLayout::kLeft;

@@ -19,7 +19,8 @@ struct RowMotion {
   double dv;        ///< v_right - v_left beyond what is usual at its place, px
 };
 
-/// The time by which the right image is taken later than the left one, and what it does to the features. A turn
+/// The time by which the right image is taken later than the left one, beyond the difference of their stamps that the
+/// features name, and what both do to the features. A turn
 /// shifts all disparities of such a rig by f * rate * delay: 1 px for 3 ms at 100 deg/s and f = 212 px.
 class RightCameraDelay {
  public:

@@ -74,6 +74,9 @@ class StereoFeaturesView {
     if (!positive(message_.fx) || !positive(message_.fy) || !positive(message_.baseline) ||
         !std::isfinite(message_.cx) || !std::isfinite(message_.cy))
       refuse("fx, fy and baseline must be positive, cx and cy finite");
+    constexpr float kLongestDelay = 1.f;  // s, of max_interval
+    if (!(std::abs(message_.right_delay) <= kLongestDelay))
+      refuse("right_delay is not within " + std::to_string(kLongestDelay) + " s");
     // Whoever receives it makes tables of the image's size, and time grows with the number of features.
     constexpr std::uint32_t kLargestSide = 1u << 14;
     if (message_.image_width == 0 || message_.image_height == 0 || message_.image_width > kLargestSide ||
