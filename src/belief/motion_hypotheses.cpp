@@ -1,5 +1,6 @@
 #include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <bitset>
 #include <cmath>
@@ -42,6 +43,14 @@ bool areOne(const MotionScene& scene, const MotionHypothesis& a, const MotionHyp
 /// The prior's logarithm, relative to its best motion, is bounded by the probability that it is wrong.
 double logPrior(const MotionHypothesis& hypothesis) {
   return std::max(-0.5 * hypothesis.innovation, std::log(kTailProbability));
+}
+
+/// By how much the prior's density is lower for a motion that is badly determined: its innovation is smaller for that.
+double logSpread(const MotionScene& scene, const MotionHypothesis& hypothesis) {
+  if (scene.prior.empty()) return 0.0;
+  const Matrix6d& expected = scene.prior.front().covariance;
+  const Matrix6d ratio = expected.ldlt().solve(expected + hypothesis.motion.covariance);
+  return 0.5 * std::log(ratio.determinant());
 }
 
 std::vector<int> sorted(std::vector<int> values) {
@@ -87,7 +96,7 @@ bool isObject(const std::vector<Eigen::Vector2d>& points, const std::vector<Eige
 class Explanations {
  public:
   Explanations(const MotionScene& scene, double threshold, const std::vector<MotionHypothesis>& hypotheses)
-      : hypotheses_(hypotheses) {
+      : scene_(scene), hypotheses_(hypotheses) {
     std::set<std::pair<int, int>> pairs;
     std::vector<Correspondence> matches;
     for (const MotionHypothesis& hypothesis : hypotheses)
@@ -120,7 +129,8 @@ class Explanations {
     const bool is_object = isObject(only_a, only_b) || isObject(only_b, only_a);
     const double images =
         is_object ? logLikelihood(of_b, points) - logLikelihood(of_a, points) : kLogOddsOfSighting * (of_a - of_b);
-    return logPrior(hypotheses_[a]) - logPrior(hypotheses_[b]) + images;
+    const double spread = logSpread(scene_, hypotheses_[a]) - logSpread(scene_, hypotheses_[b]);
+    return logPrior(hypotheses_[a]) - logPrior(hypotheses_[b]) - spread + images;
   }
 
   std::size_t likeliest() const {
@@ -131,6 +141,7 @@ class Explanations {
   }
 
  private:
+  const MotionScene& scene_;
   const std::vector<MotionHypothesis>& hypotheses_;
   std::vector<double> sightings_;             ///< of each match
   std::vector<Eigen::Vector2d> pixels_;       ///< of each match

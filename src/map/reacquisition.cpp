@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <utility>
 
 #include "../common/statistics.hpp"
 #include "stereo_descriptor_vo/matching/view_matcher.hpp"
@@ -66,6 +67,20 @@ std::vector<ExpectedPoint> expectedPoints(const DescribedPoints& map, const Ster
   return points;
 }
 
+/// The points that a view's motion does not use.
+DescribedPoints without(const DescribedPoints& points, const ViewMatch& view) {
+  std::vector<bool> used(points.positions.size(), false);
+  for (const int i : view.motion.inliers) used[view.matches[i].reference] = true;
+  DescribedPoints others;
+  others.kind = points.kind;
+  for (std::size_t p = 0; p < used.size(); ++p) {
+    if (used[p]) continue;
+    others.positions.push_back(points.positions[p]);
+    others.descriptors.push_back(points.descriptors.row(static_cast<int>(p)));
+  }
+  return others;
+}
+
 /// Median distance in the left image, px, between where correspondences were seen and where a motion puts them.
 double medianMiss(const StereoCamera& camera, const Eigen::Isometry3d& T_current_reference,
                   const std::vector<Correspondence>& correspondences) {
@@ -80,30 +95,44 @@ double medianMiss(const StereoCamera& camera, const Eigen::Isometry3d& T_current
 
 }  // namespace
 
-bool showsSamePlace(std::vector<ExpectedPoint> points) {
-  constexpr int kInPart = 3;             // points found: if they are spread evenly, 5 % of the parts have none
-  constexpr double kRepeated = 0.5;      // probability that a part of another place shows what stands in both
-  constexpr double kFalseAlarms = 0.01;  // of such places
+double chanceOfAnotherPlace(std::vector<ExpectedPoint> points) {
+  constexpr int kInPart = 3;         // points found: if they are spread evenly, 5 % of the parts have none
+  constexpr double kRepeated = 0.5;  // probability that a part of another place shows what stands in both
   const auto found =
       std::count_if(points.begin(), points.end(), [](const ExpectedPoint& point) { return point.found; });
   const int parts = static_cast<int>(found) / kInPart;
-  if (parts == 0) return false;
-  const int agreeing = partsWithPoints(points.data(), points.data() + points.size(), parts);
-  return binomialTail(parts, agreeing, kRepeated) < kFalseAlarms;
+  if (parts == 0) return 1.0;
+  return binomialTail(parts, partsWithPoints(points.data(), points.data() + points.size(), parts), kRepeated);
 }
 
 Reacquisition::Reacquisition(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion)
     : anywhere_(ungated(matcher), motion), near_(gatedBy(matcher, motion.inlier_threshold), motion) {}
 
-std::optional<Eigen::Isometry3d> Reacquisition::find(const LocalMap& map, const StereoFeatures& features,
-                                                     const RigCalibration& calibration) const {
-  // Without a gate each point costs as much as all features; half of the points were seen once, and few of these again.
-  const MotionEstimate motion = anywhere_.match(map.points(2), features, calibration).motion;
+std::optional<Reacquisition::Match> Reacquisition::match(const DescribedPoints& seen_again,
+                                                         const DescribedPoints& points, const StereoFeatures& features,
+                                                         const RigCalibration& calibration) const {
+  constexpr double kFalseAlarms = 0.01;  // of other places that share a part of the view (chosen)
+  const MotionEstimate motion = anywhere_.match(seen_again, features, calibration).motion;
   if (!motion.success) return std::nullopt;
+  ViewMatch view = near_.match(points, features, calibration, motion.T_current_reference);
+  if (!view.motion.success) return std::nullopt;
+  const double chance = chanceOfAnotherPlace(expectedPoints(points, features, view));
+  if (!(chance < kFalseAlarms)) return std::nullopt;
+  return Match{std::move(view), chance};
+}
+
+std::optional<FoundPlace> Reacquisition::find(const LocalMap& map, const StereoFeatures& features,
+                                              const RigCalibration& calibration) const {
+  // Without a gate each point costs as much as all features; half of the points were seen once, and few of these again.
   const DescribedPoints points = map.points(1);
-  const ViewMatch view = near_.match(points, features, calibration, motion.T_current_reference);
-  if (!view.motion.success || !showsSamePlace(expectedPoints(points, features, view))) return std::nullopt;
-  return view.motion.T_current_reference;
+  const auto found = match(map.points(2), points, features, calibration);
+  if (!found) return std::nullopt;
+  FoundPlace place{found->view.motion.T_current_reference, found->chance, std::nullopt};
+  // Doors of a corridor, or shelves: the other points show whether there is one more.
+  const DescribedPoints others = without(points, found->view);
+  const auto second = match(others, others, features, calibration);
+  if (second) place.alike = second->view.motion.T_current_reference;
+  return place;
 }
 
 Revisit::Revisit(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <utility>
 
 namespace sdvo {
 namespace {
@@ -60,8 +61,18 @@ void OdometryState::interrupt() {
   prior.interrupt();
 }
 
-double OdometryState::secondsSinceMap(const StereoFeatures& features) const {
-  return static_cast<double>(features.stamp - map->newestStamp()) * 1e-9;
+void OdometryState::startAgain() {
+  ++epoch;
+  const std::int64_t last = last_pose_stamp.value_or(seed->newestStamp());
+  covariance.restart(prior.unseen(static_cast<double>(seed->newestStamp() - last) * 1e-9));
+  last_pose_stamp = seed->newestStamp();
+}
+
+void OdometryState::takeSeed() {
+  map = std::exchange(seed, std::nullopt);
+  started = true;
+  interrupted = false;
+  outage.end();
 }
 
 void OdometryState::move(const Eigen::Isometry3d& T_previous_current) {
@@ -89,7 +100,7 @@ OdometryResult OdometryState::report(const StereoFeatures& features, const std::
     if (known_floor && floor.isOnFloor())
       result.pose_covariance = known_floor->constrained(T_origin_camera, result.pose_covariance);
   }
-  if (step.T_previous_current) {
+  if (step.T_previous_current && !step.starts_again) {
     result.has_motion = true;
     result.T_previous_current = *step.T_previous_current;
     result.motion_covariance = step.covariance;

@@ -10,7 +10,7 @@ bool canFollow(const VisualOdometryOptions& options, const StereoFeatures& featu
   const auto& followed = state.outage.followed();
   if (!state.map || !followed || features.count() >= options.motion.min_inliers) return false;
   const TrackingOptions& tracking = options.tracking;
-  return state.secondsSinceMap(features) <= (followed->rotation_only ? tracking.max_gap : tracking.max_guessed);
+  return state.map->secondsUntil(features) <= (followed->rotation_only ? tracking.max_gap : tracking.max_guessed);
 }
 
 }  // namespace
@@ -24,40 +24,42 @@ OdometryStep startMap(const VisualOdometryOptions& options, const StereoFeatures
                   (features.report.status.empty() ? "" : ": " + features.report.status);
     return step;
   }
-  if (const auto& followed = state.outage.followed(); state.started && followed) {
-    step.state = TrackingState::kDegraded;
+  const auto& followed = state.outage.followed();
+  if (state.started && followed) {
+    step.T_previous_current = followed->motion;
+    step.covariance = followed->covariance;
+  }
+  state.seed.emplace(options.map);
+  const Eigen::Isometry3d T_previous_current = step.T_previous_current.value_or(Eigen::Isometry3d::Identity());
+  state.seed->insert(options.alignment, features, state.pairs, (state.T_origin_camera * T_previous_current).inverse(),
+                     {}, state.rig.calibration.calibration());
+  step.state = state.started ? TrackingState::kDegraded : TrackingState::kTracking;
+  if (!state.started) {
+    step.reason = "first pair";
+  } else if (followed) {
     step.reason = followed->rotation_only ? "started again as the gyro turned; the translation is predicted"
                                           : "started again where the guess has the camera";
     if (followed->rotation_only) ++state.epoch;
-    step.T_previous_current = followed->motion;
-    step.covariance = followed->covariance;
     state.covariance.advance(*step.T_previous_current, step.covariance);
     state.covariance.assume(state.covariance.value());
-  } else if (state.started) {
-    ++state.epoch;
-    const std::int64_t last = state.last_pose_stamp.value_or(features.stamp);
-    const double unseen = static_cast<double>(features.stamp - last) * 1e-9;
-    state.covariance.restart(state.prior.unseen(unseen));
-    step.state = TrackingState::kDegraded;
-    step.reason = "started again from the last pose; the motion in between is unknown";
+  } else if (state.map && state.map->continuedBy(features)) {
+    step.state = TrackingState::kLost;
+    step.reason = "not found in the map: the next pair may be, or goes on from here";
+    return step;
   } else {
-    step.state = TrackingState::kTracking;
-    step.reason = "first pair";
+    step.reason = kStartedAgain;
+    state.startAgain();
   }
-  state.started = true;
-  state.interrupted = false;
-  state.outage.end();
-  state.map.emplace(options.map);
-  const Eigen::Isometry3d T_previous_current = step.T_previous_current.value_or(Eigen::Isometry3d::Identity());
-  state.map->insert(options.alignment, features, state.pairs, (state.T_origin_camera * T_previous_current).inverse(),
-                    {}, state.rig.calibration.calibration());
+  state.takeSeed();
   return step;
 }
 
 OdometryStep holdPose(double dt, OdometryState& state) {
   OdometryStep step;
   step.state = TrackingState::kDegraded;
-  step.reason = "the images repeat those of the previous pair although the camera moved: is the driver frozen?";
+  step.reason = state.images.comeTwice()
+                    ? "each pair comes twice: is the driver's rate above the sensor's?"
+                    : "the images repeat those of the previous pair although the camera moved: is the driver frozen?";
   step.T_previous_current = Eigen::Isometry3d::Identity();
   step.covariance = state.outage.growth(state.prior, dt);
   state.covariance.advance(*step.T_previous_current, step.covariance);

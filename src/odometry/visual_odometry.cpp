@@ -97,7 +97,8 @@ OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::op
   refuse(given);
   const Pair pair = usable(given, guess);
   const StereoFeatures& features = pair.features();
-  const std::optional<MotionScene> scene = pair.is == Pair::kFollowed ? std::optional(sceneOf(features, pair.dt, guess))
+  const std::optional<MotionScene> scene = pair.is == Pair::kFollowed
+                                               ? std::optional(sceneOf(*state_.map, features, pair.dt, guess))
                                            : pair.is == Pair::kSought ? reacquire(features)
                                                                       : std::nullopt;
   MotionHypothesis found;
@@ -176,17 +177,18 @@ bool VisualOdometry::isFrozen(const StereoFeatures& features, double dt,
   if (guess) turn.linear() = guess->T_previous_current.linear();
   if (moved(turn)) return true;
   const auto expected = expectedMotion(dt, std::nullopt);
+  if (!expected || !moved(*expected)) return false;
   const auto prior = state_.prior.confirmed(*state_.last_stamp, dt);
-  return expected && prior && moved(*expected) &&
-         prior->normalisedSquare(Eigen::Isometry3d::Identity(), Matrix6d::Zero()) > noiseGate(6);
+  return state_.images.comeTwice() ||
+         (prior && prior->normalisedSquare(Eigen::Isometry3d::Identity(), Matrix6d::Zero()) > noiseGate(6));
 }
 
 /// The map, the pair, and the motion between them as it is expected: what was already covered by predicted pairs, and
 /// from there on the velocity or the guess.
-MotionScene VisualOdometry::sceneOf(const StereoFeatures& features, double dt,
+MotionScene VisualOdometry::sceneOf(const LocalMap& map, const StereoFeatures& features, double dt,
                                     const std::optional<MotionGuess>& guess) const {
   const MotionPrior& prior = state_.prior;
-  MotionScene scene{*state_.map,
+  MotionScene scene{map,
                     state_.rig.calibration.calibration(),
                     features,
                     {},
@@ -197,9 +199,9 @@ MotionScene VisualOdometry::sceneOf(const StereoFeatures& features, double dt,
                     state_.doubt.logOdds() > largestDoubt(),
                     options_.tracking.doubtful_deviation,
                     state_.rig.noise};
-  const Eigen::Isometry3d T_reference_previous = state_.map->newestPose() * state_.T_origin_camera;
-  const double since = state_.secondsSinceMap(features);
-  if (const auto confirmed = prior.confirmed(state_.map->newestStamp(), since)) scene.prior.push_back(*confirmed);
+  const Eigen::Isometry3d T_reference_previous = map.newestPose() * state_.T_origin_camera;
+  const double since = map.secondsUntil(features);
+  if (const auto confirmed = prior.confirmed(map.newestStamp(), since)) scene.prior.push_back(*confirmed);
   if (prior.velocity() && dt <= options_.tracking.max_gap)
     scene.T_current_reference = (T_reference_previous * prior.predicted(dt).motion).inverse();
   if (guess) {
@@ -218,18 +220,18 @@ std::optional<StereoFeatures> VisualOdometry::inStep(const StereoFeatures& taken
   if (is_in_step || !velocity || dt > options_.tracking.max_gap) return std::nullopt;
   StereoFeatures features = state_.rig.right_delay.inStep(taken, dt, *velocity);
   if (state_.interrupted) return features;
-  const MotionHypothesis found = search_.find(sceneOf(features, dt, guess), largestDoubt());
+  const MotionHypothesis found = search_.find(sceneOf(*state_.map, features, dt, guess), largestDoubt());
   if (!found.motion.success) return features;
   return state_.rig.right_delay.inStep(
       taken, dt,
-      logSE3(found.motion.T_current_reference.inverse()) / state_.prior.interval(state_.secondsSinceMap(taken)));
+      logSE3(found.motion.T_current_reference.inverse()) / state_.prior.interval(state_.map->secondsUntil(taken)));
 }
 
 /// The pair with the motion that the search found; nothing without one, and none that spans an outage.
 std::optional<MeasuredPair> VisualOdometry::measuredPair(const Pair& pair, const MotionHypothesis& found) const {
   if (!found.motion.success || state_.interrupted || !(pair.dt > 0.0)) return std::nullopt;
   const StereoFeatures& taken = pair.taken();
-  const double since = state_.prior.interval(state_.secondsSinceMap(taken));
+  const double since = state_.prior.interval(state_.map->secondsUntil(taken));
   return MeasuredPair{taken, state_.prior.interval(pair.dt), found.motion.T_current_reference, since,
                       rowMotions(taken, found, since, state_.rig.usual_rows)};
 }
@@ -262,14 +264,41 @@ double VisualOdometry::largestDoubt() const {
   return logOdds(1.0 - options_.tracking.probability);
 }
 
-/// Looks for the pair in the map from before an outage. How the camera moved meanwhile is unknown.
+/// Looks for the pair in the map from before an outage, then in that which the last pair would begin. How the camera
+/// moved meanwhile is unknown.
 std::optional<MotionScene> VisualOdometry::reacquire(const StereoFeatures& features) const {
-  const auto T_current_newest = reacquisition_.find(*state_.map, features, state_.rig.calibration.calibration());
-  if (!T_current_newest) return std::nullopt;
-  MotionScene scene = sceneOf(features, 0.0, std::nullopt);
-  scene.prior.clear();
-  scene.T_current_reference = T_current_newest;
+  std::optional<MotionScene> scene;
+  const LocalMap& map = *state_.map;
+  const auto place = reacquisition_.find(map, features, state_.rig.calibration.calibration());
+  const double since = map.secondsUntil(features);
+  if (place && state_.prior.tooFast(place->T_current_newest.inverse(), Matrix6d::Zero(), since).empty()) {
+    settle(*place, scene.emplace(sceneOf(map, features, 0.0, std::nullopt)));
+    scene->prior.clear();
+  } else if (state_.seed) {
+    scene.emplace(sceneOf(*state_.seed, features, 0.0, std::nullopt));
+  }
   return scene;
+}
+
+/// Where in the map a pair is: places that look alike are a mixture, and so is where the camera would be if it had gone
+/// on as before, in proportion to the chance that the place is another one.
+void VisualOdometry::settle(const FoundPlace& place, MotionScene& scene) const {
+  const ExpectedMotion* const prior = scene.prior.empty() ? nullptr : &scene.prior.front();
+  const auto weight = [&](const Eigen::Isometry3d& T_current_newest) {
+    const double square = prior ? prior->normalisedSquare(T_current_newest.inverse(), Matrix6d::Zero()) : 0.0;
+    return std::max(std::exp(-0.5 * square), kTailProbability);  // the prior may be wrong
+  };
+  Eigen::Isometry3d chosen = place.T_current_newest, other = place.alike.value_or(chosen);
+  if (weight(other) > weight(chosen)) std::swap(chosen, other);
+  scene.T_current_reference = chosen;
+  double total = weight(chosen);
+  const auto add = [&](const Matrix6d& moment, double with) {
+    scene.place_moment += with * moment;
+    total += with;
+  };
+  if (place.alike) add(momentOf(logSE3(chosen * other.inverse())), weight(other));
+  if (prior) add(momentOf(prior->innovation(chosen.inverse())) + prior->covariance, place.chance);
+  scene.place_moment /= total;
 }
 
 /// Takes note of the pair, whatever becomes of its motion.
@@ -311,7 +340,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
     return state_.interrupted ? startMap(options_, features, state_)
                               : predictMotion(options_, features, dt, why, state_);
   };
-  const double since = state_.secondsSinceMap(features);
+  const double since = scene.map.secondsUntil(features);
   std::string refutation =
       state_.prior.tooFast(found.motion.T_current_reference.inverse(), found.motion.covariance, since);
   // What is followed was likely something else already, and this is no motion of the camera: the prior's is likelier.
@@ -323,6 +352,8 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   if (refutation.empty()) refutation = state_.prior.tooFast(candidate.motion, found.motion.covariance, since);
   if (!refutation.empty()) return refute(refutation + " after the adjustment");
 
+  const bool starts_again = state_.seed && &scene.map == &*state_.seed;
+  if (starts_again) state_.startAgain();
   const Belief belief = state_.doubt.weigh(scene, found, evidence);
   commit(candidate, belief.probability);
   Step step = measure(found, candidate);
@@ -338,8 +369,12 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
     if (step.reason.empty()) step.reason = off;
   }
   state_.outage.end();
+  state_.seed.reset();
+  step.starts_again = starts_again;
+  if (starts_again) step.state = TrackingState::kDegraded;
   if (std::exchange(state_.interrupted, false))
-    step.reason = "re-acquired by " + std::to_string(found.agreement.inliers) + " points of the map" +
+    step.reason = (starts_again ? kStartedAgain
+                                : "re-acquired by " + std::to_string(found.agreement.inliers) + " points of the map") +
                   (step.reason.empty() ? "" : "; " + step.reason);
   if (state_.map->newestIsKeyframe()) state_.covariance.markKeyframe();
   return step;
@@ -350,7 +385,7 @@ VisualOdometry::Candidate VisualOdometry::adjustBeyondDoubt(const StereoFeatures
                                                             MotionHypothesis& found) {
   const bool is_sound = !state_.doubt.lasts();
   const bool was_beyond_doubt = search_.isBeyondDoubt(scene, found, largestDoubt());
-  Candidate candidate = adjust(features, found, is_sound);
+  Candidate candidate = adjust(features, scene.map, found, is_sound);
   found.reject(candidate.adjustment.rejected);
   if (!was_beyond_doubt || search_.isBeyondDoubt(scene, found, largestDoubt())) return candidate;
   MotionScene suspected = scene;
@@ -358,16 +393,16 @@ VisualOdometry::Candidate VisualOdometry::adjustBeyondDoubt(const StereoFeatures
   MotionHypothesis chosen = search_.find(suspected, largestDoubt());
   if (!chosen.motion.success) return candidate;
   found = std::move(chosen);
-  candidate = adjust(features, found, is_sound);
+  candidate = adjust(features, scene.map, found, is_sound);
   found.reject(candidate.adjustment.rejected);
   return candidate;
 }
 
 /// Adjusts a copy of the map with the pair in it.
-VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features, const MotionHypothesis& found,
-                                                 bool may_recall) {
-  const Eigen::Isometry3d T_previous_origin = state_.map->newestPose();
-  state_.candidate = state_.map;
+VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features, const LocalMap& before,
+                                                 const MotionHypothesis& found, bool may_recall) {
+  const Eigen::Isometry3d T_previous_origin = before.newestPose();
+  state_.candidate = before;
   LocalMap& map = *state_.candidate;
   Candidate candidate;
   candidate.calibration = state_.rig.calibration.calibration();
@@ -397,7 +432,9 @@ void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& fou
     state_.covariance.doubt(motion, pose);
   };
   add(found.rivals_moment, found.rivals_moment);
-  Matrix6d covariance = candidate.adjustment.since_keyframe;
+  step.covariance += scene.place_moment;
+  state_.covariance.spread(scene.place_moment);
+  Matrix6d covariance = candidate.adjustment.since_keyframe + scene.place_moment;
   std::string reason;
   if (found.innovation > noiseGate(6)) {
     // The stamps may be wrong, or the camera did what none does. The pose does not rest on stamps, but the velocity
@@ -417,6 +454,7 @@ void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& fou
     words << "a distance of " << candidate.distance << " m with a standard deviation of " << deviation
           << " m exceeds tracking/doubtful_deviation";
     if (reason.empty()) reason = words.str();
+    if (!scene.place_moment.isZero()) reason += ": other places of the map look alike";
   }
   step.state = TrackingState::kDegraded;
   step.reason = "doubtful: " + reason;

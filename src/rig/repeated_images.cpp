@@ -85,6 +85,12 @@ std::vector<int> RepeatedImages::newRows(const StereoFeatures& features, double 
 }
 
 void RepeatedImages::remember(const StereoFeatures& features) {
+  if (repeat(features)) {
+    ++in_a_row_;
+  } else {
+    single_ = in_a_row_ == 1 ? single_ + 1 : 0;
+    in_a_row_ = 0;
+  }
   features_ = {features.u, features.v, features.disparity};
 }
 

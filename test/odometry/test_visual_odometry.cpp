@@ -284,21 +284,25 @@ TEST(VisualOdometry, IsLostAfterTheSecondFailureAndStartsAgainFromTheLastPose) {
     EXPECT_FALSE(lost.reason.empty()) << i;
     expectHealthy(lost);
   }
-  const OdometryResult again = odometry.update(pairElsewhere(10));
+  // The map is kept until another one has a measured pair.
+  EXPECT_EQ(odometry.update(pairElsewhere(10)).state, TrackingState::kLost);
+  const OdometryResult again = odometry.update(pairElsewhere(11));
   EXPECT_TRUE(again.has_pose);
-  EXPECT_FALSE(again.has_motion);
-  EXPECT_FALSE(again.reason.empty());
+  EXPECT_EQ(again.state, TrackingState::kDegraded);
+  EXPECT_NE(again.reason.find("started again from the last pose"), std::string::npos) << again.reason;
   EXPECT_EQ(again.epoch, before.epoch + 1);
-  EXPECT_TRUE(again.T_origin_camera.isApprox(predicted.T_origin_camera, 1e-9)) << "not the last published pose";
+  EXPECT_FALSE(again.has_motion) << "it would begin at a pose that was not published";
+  const Eigen::Isometry3d begun = again.T_origin_camera * trueSinceStart(11, 10).inverse();
+  EXPECT_LT(distanceBetween(begun, predicted.T_origin_camera), 1e-3) << "not the last published pose";
   EXPECT_GT(again.pose_covariance.trace(), predicted.pose_covariance.trace());
   EXPECT_GE(again.distance, predicted.distance);
   expectHealthy(again);
 
-  for (int i = 11; i <= 14; ++i) {
+  for (int i = 12; i <= 15; ++i) {
     const OdometryResult result = odometry.update(pairElsewhere(i));
     EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
     EXPECT_EQ(result.epoch, before.epoch + 1);
-    EXPECT_LT(distanceBetween(result.T_origin_camera, again.T_origin_camera * trueSinceStart(i, 10)), 1e-3);
+    EXPECT_LT(distanceBetween(result.T_origin_camera, begun * trueSinceStart(i, 10)), 1e-3);
     EXPECT_GE(result.pose_covariance.trace(), again.pose_covariance.trace());
   }
 }
@@ -413,8 +417,8 @@ TEST(VisualOdometry, DoubtsTheNextMapWhereManyMatchesAgreedOnNoMotion) {
     const OdometryResult result = odometry.update(late);
     EXPECT_NE(result.state, TrackingState::kTracking) << i;
     lost += result.state == TrackingState::kLost;
+    degraded += result.state == TrackingState::kDegraded;
     if (!result.has_motion) continue;
-    ++degraded;
     const Vector6d error = logSE3(result.T_previous_current.inverse() * drivePose(i - 1).inverse() * drivePose(i));
     EXPECT_LT(error.dot(result.motion_covariance.ldlt().solve(error)), 20.0) << i;
   }
@@ -619,15 +623,32 @@ TEST(VisualOdometry, StartsAgainFromTheLastPoseWithOtherElements) {
   EXPECT_EQ(odometry.update(pairOfNumbers(7)).state, TrackingState::kTracking);
 }
 
+TEST(VisualOdometry, APairThatComesTwiceIsMeasuredOnce) {
+  VisualOdometry odometry({});
+  follow(odometry, 5);
+  for (int i = 6; i <= 20; ++i) {
+    const OdometryResult result = odometry.update(pairOf(i));
+    StereoFeatures copy = pairOf(i);
+    copy.stamp += kPeriod / 2;
+    const OdometryResult again = odometry.update(copy);
+    if (i < 12) continue;
+    EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
+    EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(i)), 0.05);
+    EXPECT_NE(again.reason.find("each pair comes twice"), std::string::npos) << again.reason;
+    EXPECT_TRUE(again.T_origin_camera.isApprox(result.T_origin_camera, 1e-9));
+  }
+}
+
 TEST(VisualOdometry, BrokenStreamStartsAgainFromTheLastPose) {
   VisualOdometry odometry({});
   const OdometryResult before = follow(odometry, 5);
   odometry.breakStream();
-  const OdometryResult again = odometry.update(pairElsewhere(9));
+  EXPECT_EQ(odometry.update(pairElsewhere(9)).state, TrackingState::kLost);
+  const OdometryResult again = odometry.update(pairElsewhere(10));
   EXPECT_EQ(again.epoch, before.epoch + 1);
   EXPECT_FALSE(again.has_motion);
-  EXPECT_TRUE(again.T_origin_camera.isApprox(before.T_origin_camera, 1e-9));
-  EXPECT_EQ(odometry.update(pairElsewhere(10)).state, TrackingState::kTracking);
+  EXPECT_LT(distanceBetween(again.T_origin_camera, before.T_origin_camera * trueSinceStart(10, 9)), 1e-3);
+  EXPECT_EQ(odometry.update(pairElsewhere(11)).state, TrackingState::kTracking);
 }
 
 TEST(VisualOdometry, GoesOnFromTheLastPoseWhenTheClockIsSetBack) {

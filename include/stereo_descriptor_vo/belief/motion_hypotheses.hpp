@@ -46,6 +46,8 @@ struct MotionScene {
   bool is_doubted = false;            ///< … and likely is not
   double tolerance = 0.05;            ///< m: motions that differ by less than this and 3 % are equally good
   Noise noise{NoiseOptions()};
+  /// Second moment of the motion's error where the map has other places that look alike, m and rad.
+  Matrix6d place_moment = Matrix6d::Zero();
 };
 
 /// A motion that competes for being the camera's, and what speaks for it.

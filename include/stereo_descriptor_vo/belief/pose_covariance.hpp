@@ -34,6 +34,12 @@ class PoseCovariance {
   /// The map moved the last pose by this right perturbation: its covariance then contains that.
   void cover(const Vector6d& correction);
 
+  /// The last pose, and all that are measured in the same map, may be off by more.
+  void spread(const Matrix6d& moment) {
+    value_ += moment;
+    keyframe_ += moment;
+  }
+
   /// The last pose becomes the key frame of a new drive, after a motion of unknown size. `travelled` is the covariance
   /// of what may have been travelled unseen.
   void restart(const Matrix6d& travelled = Matrix6d::Zero());

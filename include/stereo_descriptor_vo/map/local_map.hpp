@@ -58,6 +58,10 @@ class LocalMap {
   const LocalMapOptions& options() const { return options_; }
 
   std::int64_t newestStamp() const { return newest_stamp_; }
+  /// From its newest pair to this one, s.
+  double secondsUntil(const StereoFeatures& features) const {
+    return static_cast<double>(features.stamp - newest_stamp_) * 1e-9;
+  }
 
   const StereoCamera& camera() const { return camera_; }
 

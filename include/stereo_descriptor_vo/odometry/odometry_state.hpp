@@ -31,6 +31,7 @@ struct OdometryStep {
   std::vector<int> rejected_rows;          ///< matched rows of the pair that the adjustment does not confirm
   double dt = 0.0;                         ///< over which that motion is, else since the previous pair, s
   double time = 0.0;                       ///< s
+  bool starts_again = false;               ///< that motion began at no pose that was reported
 
   bool hasPose() const { return state == TrackingState::kTracking || state == TrackingState::kDegraded; }
 };
@@ -39,6 +40,7 @@ struct OdometryStep {
 struct OdometryState {
   std::optional<LocalMap> map;
   std::optional<LocalMap> candidate;  ///< the map with the pair; between pairs only its memory matters
+  std::optional<LocalMap> seed;       ///< of the newest pair that an outage's map does not show, at the last pose
   LearntRig rig;
   MotionPrior prior;
   Doubt doubt;
@@ -65,7 +67,10 @@ struct OdometryState {
   /// The next pair does not continue the last one.
   void interrupt();
 
-  double secondsSinceMap(const StereoFeatures& features) const;
+  /// At the seed: how the camera moved before it is unknown.
+  void startAgain();
+  /// The seed becomes the map.
+  void takeSeed();
 
   void move(const Eigen::Isometry3d& T_previous_current);
 

@@ -8,7 +8,10 @@
 
 namespace sdvo {
 
-/// The pair begins a map: the first one, or where the guesses have the camera, or at the last pose.
+constexpr const char* kStartedAgain = "started again from the last pose; the motion in between is unknown";
+
+/// The pair begins a map: the first one, or where the guesses have the camera, or at the last pose. While there is a
+/// map from before, the odometry is lost until the next pair is found in either.
 OdometryStep startMap(const VisualOdometryOptions& options, const StereoFeatures& features, OdometryState& state);
 
 /// Images that repeat themselves show no motion: the pose stays, as uncertain as the prior makes it meanwhile.

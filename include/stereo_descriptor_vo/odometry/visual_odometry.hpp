@@ -93,8 +93,10 @@ class VisualOdometry {
   bool isFrozen(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
   std::optional<StereoFeatures> inStep(const StereoFeatures& taken, double dt,
                                        const std::optional<MotionGuess>& guess) const;
-  MotionScene sceneOf(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
+  MotionScene sceneOf(const LocalMap& map, const StereoFeatures& features, double dt,
+                      const std::optional<MotionGuess>& guess) const;
   std::optional<MotionScene> reacquire(const StereoFeatures& features) const;
+  void settle(const FoundPlace& place, MotionScene& scene) const;
   double largestDoubt() const;
   std::optional<Floor> floor() const;
 
@@ -105,7 +107,8 @@ class VisualOdometry {
   Step extendMap(const StereoFeatures& features, const MotionScene& scene, MotionHypothesis& found, double dt,
                  const std::vector<Evidence>& evidence);
   Candidate adjustBeyondDoubt(const StereoFeatures& features, const MotionScene& scene, MotionHypothesis& found);
-  Candidate adjust(const StereoFeatures& features, const MotionHypothesis& found, bool may_recall);
+  Candidate adjust(const StereoFeatures& features, const LocalMap& before, const MotionHypothesis& found,
+                   bool may_recall);
   void commit(const Candidate& candidate, double probability);
   Step measure(const MotionHypothesis& found, const Candidate& candidate);
   void judge(const MotionScene& scene, const MotionHypothesis& found, const Candidate& candidate, const Belief& belief,

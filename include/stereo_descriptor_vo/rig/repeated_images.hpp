@@ -26,10 +26,15 @@ class RepeatedImages {
   std::vector<int> newRows(const StereoFeatures& features, double noise,
                            const std::optional<Eigen::Isometry3d>& T_previous_current) const;
 
+  /// Whether the last two pairs that repeated the one before did so once each: the driver sends each pair twice.
+  bool comeTwice() const { return in_a_row_ == 0 && single_ >= 2; }
+
   void remember(const StereoFeatures& features);
 
  private:
   std::array<std::vector<float>, 3> features_;  ///< u, v and disparity of the last pair's features, px
+  int in_a_row_ = 0;                            ///< repetitions up to the last pair
+  int single_ = 0;                              ///< repetitions that came alone, every second pair
 };
 
 }  // namespace sdvo
