@@ -89,7 +89,8 @@ double ArrivalLog::period() const {
 /// While not all topics are connected some images have no partners.
 bool ArrivalLog::isEarly(const Arrival& arrival) const {
   constexpr double kConnecting = 2.0;  // s (chosen)
-  return first_stamp_ == 0 || (arrival.stamp < first_stamp_ && arrival.now < complete_ + kConnecting);
+  return first_stamp_ == 0 || (arrival.stamp < first_stamp_ && arrival.now < complete_ + kConnecting &&
+                               secondsBetween(arrival.stamp, first_stamp_) > kHalf * period());
 }
 
 /// Whether a right image that is not used is of another moment than the left ones that are not.
