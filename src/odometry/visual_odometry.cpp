@@ -1,5 +1,6 @@
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <sstream>
@@ -179,8 +180,9 @@ bool VisualOdometry::isFrozen(const StereoFeatures& features, double dt,
   const auto expected = expectedMotion(dt, std::nullopt);
   if (!expected || !moved(*expected)) return false;
   const auto prior = state_.prior.confirmed(*state_.last_stamp, dt);
-  return state_.images.comeTwice() ||
-         (prior && prior->normalisedSquare(Eigen::Isometry3d::Identity(), Matrix6d::Zero()) > noiseGate(6));
+  // As likely as a repetition is without a cause, against a stop by the prior.
+  return state_.images.comeTwice() || state_.images.haveNoise() ||
+         (prior && 0.5 * prior->normalisedSquare(Eigen::Isometry3d::Identity(), Matrix6d::Zero()) > -kUnsuspected);
 }
 
 /// The map, the pair, and the motion between them as it is expected: what was already covered by predicted pairs, and
@@ -281,7 +283,7 @@ std::optional<MotionScene> VisualOdometry::reacquire(const StereoFeatures& featu
 }
 
 /// Where in the map a pair is: places that look alike are a mixture, and so is where the camera would be if it had gone
-/// on as before, in proportion to the chance that the place is another one.
+/// on as before, if there is such a place and it looks alike by chance.
 void VisualOdometry::settle(const FoundPlace& place, MotionScene& scene) const {
   const ExpectedMotion* const prior = scene.prior.empty() ? nullptr : &scene.prior.front();
   const auto weight = [&](const Eigen::Isometry3d& T_current_newest) {
@@ -297,7 +299,7 @@ void VisualOdometry::settle(const FoundPlace& place, MotionScene& scene) const {
     total += with;
   };
   if (place.alike) add(momentOf(logSE3(chosen * other.inverse())), weight(other));
-  if (prior) add(momentOf(prior->innovation(chosen.inverse())) + prior->covariance, place.chance);
+  if (prior) add(momentOf(prior->innovation(chosen.inverse())) + prior->covariance, kTailProbability * place.chance);
   scene.place_moment /= total;
 }
 
@@ -320,7 +322,11 @@ void VisualOdometry::finish(const Pair& pair, Step& step) {
   // The depths of its points may be those of a wrong rig.
   if (features.report.refused && step.state == TrackingState::kLost) state_.map.reset();
   state_.doubt.pass();
-  state_.images.remember(pair.whole());
+  const auto stood = [&step] {
+    const Vector6d motion = logSE3(*step.T_previous_current);
+    return motion.dot(step.covariance.ldlt().solve(motion)) < noiseGate(6);
+  };
+  state_.images.remember(pair.whole(), step.state == TrackingState::kTracking && step.T_previous_current && stood());
   state_.frozen = pair.is == Pair::kFrozen;
   if (pair.new_part && step.reason.empty()) step.reason = "a part of the left image repeats that of the previous pair";
   const bool since_pose = step.T_previous_current && state_.last_pose_stamp;

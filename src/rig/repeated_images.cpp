@@ -84,13 +84,13 @@ std::vector<int> RepeatedImages::newRows(const StereoFeatures& features, double 
   return rows;
 }
 
-void RepeatedImages::remember(const StereoFeatures& features) {
-  if (repeat(features)) {
-    ++in_a_row_;
-  } else {
-    single_ = in_a_row_ == 1 ? single_ + 1 : 0;
-    in_a_row_ = 0;
-  }
+void RepeatedImages::remember(const StereoFeatures& features, bool stood) {
+  constexpr int kStill = 4;  // pairs (chosen): one that starts from rest may seem to stand for two
+  const bool repeats = repeat(features);
+  if (!repeats) single_ = in_a_row_ == 1 ? single_ + 1 : 0;
+  in_a_row_ = repeats ? in_a_row_ + 1 : 0;
+  still_ = stood && !repeats ? still_ + 1 : 0;
+  have_noise_ |= still_ >= kStill;
   features_ = {features.u, features.v, features.disparity};
 }
 

@@ -623,6 +623,27 @@ TEST(VisualOdometry, StartsAgainFromTheLastPoseWithOtherElements) {
   EXPECT_EQ(odometry.update(pairOfNumbers(7)).state, TrackingState::kTracking);
 }
 
+TEST(VisualOdometry, ImagesWithNoiseThatRepeatAreFrozenHoweverSlowTheCameraIs) {
+  for (const double noise : {0.1, 0.0}) {
+    VisualOdometry odometry({});
+    const auto slowAt = [&](int i) {  // stands for six pairs, then goes at 0.4 m/s, which it could stop at once
+      synthetic::Sighting sighting;
+      sighting.noise = noise;
+      sighting.max_depth = 25.0;
+      sighting.seed = noise > 0.0 ? 50 + static_cast<unsigned>(i) : 50;
+      const Eigen::Isometry3d pose = expSE3((Vector6d() << 0.04 * std::max(i - 6, 0), 0, 0, 0, 0, 0).finished());
+      return synthetic::observe(street(), synthetic::camera(), pose.inverse(), stampOf(i), sighting);
+    };
+    OdometryResult result;
+    for (int i = 0; i <= 12; ++i) result = odometry.update(slowAt(i));
+    ASSERT_EQ(result.state, TrackingState::kTracking) << result.reason;
+    StereoFeatures repeated = slowAt(12);
+    repeated.stamp = stampOf(13);
+    result = odometry.update(repeated);
+    EXPECT_EQ(result.reason.find("frozen") != std::string::npos, noise > 0.0) << result.reason;
+  }
+}
+
 TEST(VisualOdometry, APairThatComesTwiceIsMeasuredOnce) {
   VisualOdometry odometry({});
   follow(odometry, 5);

@@ -43,7 +43,7 @@ template <class IsOld>
 void expectNewRows(const IsOld& is_old) {
   const StereoFeatures before = seen(1), torn = mixed(before, seen(2), is_old);
   RepeatedImages images;
-  images.remember(before);
+  images.remember(before, false);
   std::vector<int> expected;
   for (int i = 0; i < torn.count(); ++i)
     if (!is_old(torn.u[i], torn.v[i])) expected.push_back(i);
@@ -55,7 +55,7 @@ TEST(RepeatedImages, LeavesOutWhatIsDescribedAcrossTheTear) {
   StereoFeatures torn = mixed(before, seen(2), [](float, float v) { return v > 240.f; });
   for (const float v : {200.f, 225.f, 239.f, 240.f}) torn.append({320.f, v, 10.f, 0.f, 40.f, -1.f, 1.f});
   RepeatedImages images;
-  images.remember(before);
+  images.remember(before, false);
   const std::vector<int> rows = images.newRows(torn, kNoise, ahead());
   const auto has = [&](int from_last) {
     return std::find(rows.begin(), rows.end(), torn.count() - from_last) != rows.end();
@@ -75,7 +75,7 @@ TEST(RepeatedImages, KeepsAllRowsOfOtherPairs) {
   const StereoFeatures before = seen(1), now = seen(2);
   RepeatedImages images;
   EXPECT_EQ(static_cast<int>(images.newRows(now, kNoise, ahead()).size()), now.count()) << "the first pair";
-  images.remember(before);
+  images.remember(before, false);
   EXPECT_EQ(static_cast<int>(images.newRows(now, kNoise, ahead()).size()), now.count());
   EXPECT_EQ(static_cast<int>(images.newRows(before, kNoise, ahead()).size()), before.count()) << "repeated as a whole";
   // A camera without noise stands, and something moves in the middle of its view.
@@ -89,7 +89,7 @@ TEST(RepeatedImages, KeepsTheRowsOfACameraThatStands) {
   const StereoFeatures before = seen(1);
   const StereoFeatures now = mixed(before, seen(2), [](float, float v) { return v < 240.f; });
   RepeatedImages images;
-  images.remember(before);
+  images.remember(before, false);
   EXPECT_LT(static_cast<int>(images.newRows(now, kNoise, ahead()).size()), now.count());
   EXPECT_EQ(static_cast<int>(images.newRows(now, kNoise, Eigen::Isometry3d::Identity()).size()), now.count());
   EXPECT_EQ(static_cast<int>(images.newRows(now, kNoise, std::nullopt).size()), now.count()) << "nothing is expected";
@@ -99,7 +99,7 @@ TEST(RepeatedImages, KnowsAPairToTheDigitAndWhetherItShouldHaveMoved) {
   RepeatedImages images;
   StereoFeatures pair = seen(1);
   EXPECT_FALSE(images.repeat(pair)) << "the first pair";
-  images.remember(pair);
+  images.remember(pair, false);
   EXPECT_TRUE(images.repeat(pair));
   EXPECT_TRUE(RepeatedImages::shouldHaveMoved(pair, kNoise, ahead()));
   EXPECT_FALSE(RepeatedImages::shouldHaveMoved(pair, kNoise, Eigen::Isometry3d::Identity()));

@@ -29,12 +29,19 @@ class RepeatedImages {
   /// Whether the last two pairs that repeated the one before did so once each: the driver sends each pair twice.
   bool comeTwice() const { return in_a_row_ == 0 && single_ >= 2; }
 
-  void remember(const StereoFeatures& features);
+  /// Whether the camera stood for some pairs, and none repeated the one before: its images have noise, so that those
+  /// which repeat are no new ones.
+  bool haveNoise() const { return have_noise_; }
+
+  /// `stood`: no significant motion was measured since the pair before.
+  void remember(const StereoFeatures& features, bool stood);
 
  private:
   std::array<std::vector<float>, 3> features_;  ///< u, v and disparity of the last pair's features, px
   int in_a_row_ = 0;                            ///< repetitions up to the last pair
   int single_ = 0;                              ///< repetitions that came alone, every second pair
+  int still_ = 0;                               ///< pairs in a row that stood and did not repeat
+  bool have_noise_ = false;
 };
 
 }  // namespace sdvo
