@@ -68,7 +68,7 @@ std::vector<ExpectedPoint> expectedPoints(const DescribedPoints& map, const Ster
 }
 
 /// The points that a view's motion does not use.
-DescribedPoints without(const DescribedPoints& points, const ViewMatch& view) {
+DescribedPoints withoutMatches(const DescribedPoints& points, const ViewMatch& view) {
   std::vector<bool> used(points.positions.size(), false);
   for (const int i : view.motion.inliers) used[view.matches[i].reference] = true;
   DescribedPoints others;
@@ -129,7 +129,7 @@ std::optional<FoundPlace> Reacquisition::find(const LocalMap& map, const StereoF
   if (!found) return std::nullopt;
   FoundPlace place{found->view.motion.T_current_reference, found->chance, std::nullopt};
   // Doors of a corridor, or shelves: the other points show whether there is one more.
-  const DescribedPoints others = without(points, found->view);
+  const DescribedPoints others = withoutMatches(points, found->view);
   const auto second = match(others, others, features, calibration);
   if (second) place.alike = second->view.motion.T_current_reference;
   return place;
