@@ -96,8 +96,8 @@ double medianMiss(const StereoCamera& camera, const Eigen::Isometry3d& T_current
 }  // namespace
 
 double chanceOfAnotherPlace(std::vector<ExpectedPoint> points) {
-  constexpr int kInPart = 3;         // points found: if they are spread evenly, 5 % of the parts have none
-  constexpr double kRepeated = 0.5;  // probability that a part of another place shows what stands in both
+  constexpr int kInPart = 3;         // points found: spread evenly, exp(-3), 5 % of the parts have none
+  constexpr double kRepeated = 0.5;  // probability (chosen) that a part of another place shows a thing of both
   const auto found =
       std::count_if(points.begin(), points.end(), [](const ExpectedPoint& point) { return point.found; });
   const int parts = static_cast<int>(found) / kInPart;

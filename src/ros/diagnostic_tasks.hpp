@@ -101,7 +101,7 @@ class UnusedInput {
 
   void noteUsed() { ++used_; }
   void add(Cause cause) { ++counts_[cause]; }
-  /// What was given up is used after all.
+  /// Input that was counted as unused is used after all.
   void takeBack(Cause cause) { --counts_[cause]; }
 
   std::uint64_t count(Cause cause) const { return counts_[cause]; }

@@ -118,7 +118,7 @@ namespace {
 
 using dynamic_reconfigure::Config;
 
-const ros::WallDuration kKeepPeriod(0.2);  // between attempts to set parameters
+const ros::WallDuration kKeepPeriod(0.2);  // s (chosen), between attempts to set parameters
 
 std::string groupOf(const Option& option) {
   const std::size_t slash = option.name.rfind('/');

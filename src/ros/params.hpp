@@ -20,7 +20,8 @@ namespace sdvo {
 /// beside it in no nodelet's namespace: most likely spelling mistakes.
 std::vector<std::string> loadParams(const ros::NodeHandle& nh, std::vector<Option> options);
 
-/// What image_transport and its plugins keep beside the options of the image side, see StereoImageTransport.
+/// Whether image_transport or one of its plugins keeps this parameter beside the image side's, see
+/// StereoImageTransport.
 bool isOfImageTransport(const std::string& name);
 
 template <class Options>

@@ -196,7 +196,7 @@ class Corridor : public Outage {
 
   static synthetic::World corridor() {
     const synthetic::World segment = synthetic::randomWorld(3, 150, {-2.0, -1.5, 0.0}, {2.0, 1.5, kSegment});
-    // What stands at its beginning is behind the camera after the outage.
+    // The points at its beginning are behind the camera after the outage.
     synthetic::World world = synthetic::randomWorld(4, 400, {-2.0, -1.5, 3.0}, {2.0, 1.5, 4.5});
     for (int k = 0; k < 12; ++k)
       for (std::size_t p = 0; p < segment.points.size(); ++p) {

@@ -67,7 +67,7 @@ struct OdometryState {
   /// The next pair does not continue the last one.
   void interrupt();
 
-  /// At the seed: how the camera moved before it is unknown.
+  /// A new epoch begins at the seed: the camera's motion before it is unknown.
   void startAgain();
   /// The seed becomes the map.
   void takeSeed();

@@ -74,7 +74,7 @@ class StereoFeaturesView {
     if (!positive(message_.fx) || !positive(message_.fy) || !positive(message_.baseline) ||
         !std::isfinite(message_.cx) || !std::isfinite(message_.cy))
       refuse("fx, fy and baseline must be positive, cx and cy finite");
-    constexpr float kLongestDelay = 1.f;  // s, of max_interval
+    constexpr float kLongestDelay = 1.f;  // s, the largest that max_interval may be
     if (!(std::abs(message_.right_delay) <= kLongestDelay))
       refuse("right_delay is not within " + std::to_string(kLongestDelay) + " s");
     // Whoever receives it makes tables of the image's size, and time grows with the number of features.
