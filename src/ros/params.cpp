@@ -2,6 +2,7 @@
 
 #include <dynamic_reconfigure/ConfigDescription.h>
 #include <ros/master.h>
+#include <ros/this_node.h>
 
 #include <algorithm>
 #include <sstream>
