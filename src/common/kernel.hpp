@@ -1,7 +1,5 @@
 #pragma once
 
-#include <cstring>
-
 #include "stereo_descriptor_vo/common/processor.hpp"
 
 #if defined(__x86_64__) && defined(__GNUC__)
@@ -50,14 +48,20 @@ typedef float HalfLanes __attribute__((vector_size(16)));
 /// Four doubles, in the same registers.
 typedef double DoubleLanes __attribute__((vector_size(32)));
 
+/// Lanes anywhere in memory. Compilers read them at once; gcc 9 copies bytes by way of the stack.
+template <class Vector>
+struct __attribute__((packed, may_alias)) Unaligned {
+  Vector lanes;
+};
+
 template <class Number, class Vector>
 SDVO_IN_KERNEL void load(const Number* values, Vector& lanes) {
-  std::memcpy(&lanes, values, sizeof(Vector));
+  lanes = reinterpret_cast<const Unaligned<Vector>*>(values)->lanes;
 }
 
 template <class Number, class Vector>
 SDVO_IN_KERNEL void store(const Vector& lanes, Number* values) {
-  std::memcpy(values, &lanes, sizeof(Vector));
+  reinterpret_cast<Unaligned<Vector>*>(values)->lanes = lanes;
 }
 
 /// The sum of all lanes, those of the rest added after the halves.

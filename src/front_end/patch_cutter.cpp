@@ -4,16 +4,21 @@
 #include <array>
 #include <opencv2/imgproc.hpp>
 
-#include "../common/kernel.hpp"
-#include "patch_cutter_neon.hpp"
-#include "patch_edges.hpp"
-
-#ifdef SDVO_HAVE_AVX2
-#include <immintrin.h>
-#endif
+#include "../common/registers.hpp"
 
 namespace sdvo {
 namespace {
+
+/// The squares tile, so each edge serves two of them. Arrays go on to whole registers.
+constexpr int kMostEdges = (PatchOptions::kMostSamples + 1 + 7) / 8 * 8;
+using PerEdge = std::array<float, kMostEdges>;
+
+/// Positions between two columns or two rows of the integral.
+struct PatchEdges {
+  std::array<int, kMostEdges> index;
+  PerEdge share;  ///< of the second one
+  PerEdge width;  ///< from here to the next edge; none behind the last one
+};
 
 /// `size`: columns or rows of the integral. Pixel p covers [p - 0.5, p + 0.5], and column p of the integral is its left
 /// edge.
@@ -81,97 +86,91 @@ void cutPlain(const cv::Mat& integral, const PatchEdges& columns, const PatchEdg
     }
 }
 
-#ifdef SDVO_HAVE_AVX2
-/// Sums in a row at the edges, eight of them at once, with the operations of the plain form.
-class EightSums {
- public:
-  /// `registers`: how many hold the edges.
-  SDVO_AVX2 EightSums(const PatchEdges& columns, int registers, int origin)
-      : columns_(columns),
-        neighbours_(areNeighbours(columns.index.data(), 8 * registers)),
-        origin_(_mm256_set1_epi32(origin)) {}
+/// Whether the edges in so many registers are a pixel apart, as most are.
+SDVO_VECTORS bool areNeighbours(const PatchEdges& edges, int registers) {
+  bool all = true;
+  for (int k = 1; k < kRegister * registers; ++k) all &= edges.index[k] == edges.index[0] + k;
+  return all;
+}
 
-  SDVO_AVX2 __m256 inRow(const int* row, int r) const {
-    if (neighbours_) {  // as most are: edges a pixel apart
-      const int* begin = row + columns_.index[8 * r];
-      return between(load(begin), load(begin + 1), r);
+/// Sums in a row at the edges, a register of them at once, with the operations of the plain form.
+template <bool kNeighbours>
+class RowSums {
+ public:
+  SDVO_VECTORS RowSums(const PatchEdges& columns, int origin)
+      : columns_(columns), origin_(UnsignedRegister{} + static_cast<unsigned>(origin)) {}
+
+  SDVO_VECTORS Register at(const int* row, int r) const {
+    const int* index = &columns_.index[kRegister * r];
+    if constexpr (kNeighbours) {
+      UnsignedRegister sums, next_sums;
+      load(row + index[0], sums), load(row + index[0] + 1, next_sums);
+      return between(sums, next_sums, r);
+    } else {
+      const auto* places = reinterpret_cast<const unsigned*>(index);
+      const Pairs pairs(readPairs(row, places), readPairs(row, places + 2));
+      return between(pairs.first(), pairs.second(), r);
     }
-    // As 0, 1, 4, 5, 2, 3, 6, 7, so that the shuffles leave them in order. Two neighbours come with one read.
-    const __m256i turned = _mm256_permute4x64_epi64(load(&columns_.index[8 * r]), 0xd8);
-    const auto* pairs = reinterpret_cast<const long long*>(row);
-    const __m256i low = _mm256_i32gather_epi64(pairs, _mm256_castsi256_si128(turned), sizeof(int));
-    const __m256i high = _mm256_i32gather_epi64(pairs, _mm256_extracti128_si256(turned, 1), sizeof(int));
-    return between(shuffled<0x88>(low, high), shuffled<0xdd>(low, high), r);
   }
 
  private:
-  template <int kChoice>
-  SDVO_AVX2 static __m256i shuffled(__m256i a, __m256i b) {
-    return _mm256_castps_si256(_mm256_shuffle_ps(_mm256_castsi256_ps(a), _mm256_castsi256_ps(b), kChoice));
-  }
-  SDVO_AVX2 static bool areNeighbours(const int* index, int count) {
-    bool all = true;
-    for (int k = 1; k < count; ++k) all &= index[k] == index[0] + k;
-    return all;
-  }
-  SDVO_AVX2 static __m256i load(const int* values) {
-    return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(values));
-  }
-  SDVO_AVX2 __m256 sinceOrigin(__m256i sums) const { return _mm256_cvtepi32_ps(_mm256_sub_epi32(sums, origin_)); }
-  SDVO_AVX2 __m256 between(__m256i sums, __m256i next_sums, int r) const {
-    const __m256 first = sinceOrigin(sums), second = sinceOrigin(next_sums);
-    const __m256 share = _mm256_loadu_ps(&columns_.share[8 * r]);
-    return _mm256_add_ps(first, _mm256_mul_ps(share, _mm256_sub_ps(second, first)));
+  SDVO_VECTORS Register between(UnsignedRegister sums, UnsignedRegister next_sums, int r) const {
+    const Register first = toFloats(sums - origin_), second = toFloats(next_sums - origin_);
+    Register share;
+    load(&columns_.share[kRegister * r], share);
+    return first + share * (second - first);
   }
 
   const PatchEdges& columns_;
-  bool neighbours_;
-  __m256i origin_;
+  UnsignedRegister origin_;
 };
 
-/// Eight means as bytes, rounded to the nearest whole number, the even one of two.
-SDVO_AVX2 inline void storeRounded(__m256 means, std::uint8_t* bytes) {
-  const __m256i whole = _mm256_cvtps_epi32(means);
-  const __m128i words = _mm_packus_epi32(_mm256_castsi256_si128(whole), _mm256_extracti128_si256(whole, 1));
-  _mm_storel_epi64(reinterpret_cast<__m128i*>(bytes), _mm_packus_epi16(words, words));
+/// The nearest whole numbers from 0 to 255, the even one of two.
+SDVO_VECTORS inline IntRegister nearestByte(Register values) {
+  constexpr float kWhole = 1.5f * (1 << 23);  // around it a float's last bit is one
+  const IntRegister zero = reinterpret_cast<IntRegister>(kWhole - Register{}), most = zero + 255;
+  const IntRegister nearest = reinterpret_cast<IntRegister>(values + kWhole);
+  const IntRegister not_below = nearest > zero ? nearest : zero;
+  return (not_below < most ? not_below : most) - zero;
 }
 
-/// What is at the next edge, where `here` holds eight edges and `behind` the eight after them.
-SDVO_AVX2 inline __m256 nextOf(__m256 here, __m256 behind) {
-  return _mm256_permutevar8x32_ps(_mm256_blend_ps(here, behind, 1), _mm256_setr_epi32(1, 2, 3, 4, 5, 6, 7, 0));
-}
-
-/// The same row by row, eight columns at once. `kRegisters` hold the edges.
-template <int kRegisters>
-SDVO_AVX2 void cutWithAvx2(const cv::Mat& integral, const PatchEdges& columns, const PatchEdges& rows, int side,
-                           std::uint8_t* samples) {
-  const EightSums sums(columns, kRegisters, integral.ptr<int>(rows.index[0])[columns.index[0]]);
-  const __m256 zero = _mm256_setzero_ps();
-  __m256 upper[kRegisters] = {}, lower[kRegisters] = {}, above[kRegisters] = {}, across[kRegisters];
-  std::array<std::uint8_t, PatchOptions::kMostSamples * PatchOptions::kMostSamples + 8 * kRegisters> patch;
+/// The same row by row, a register of columns at once. `kCount` of them hold the edges.
+template <int kCount, bool kNeighbours>
+SDVO_VECTORS void cutRows(const cv::Mat& integral, const PatchEdges& columns, const PatchEdges& rows, int side,
+                          std::uint8_t* samples) {
+  const RowSums<kNeighbours> sums(columns, integral.ptr<int>(rows.index[0])[columns.index[0]]);
+  Register upper[kCount] = {}, lower[kCount] = {}, above[kCount] = {}, across[kCount + 1] = {};
+  std::array<std::uint32_t, PatchOptions::kMostSamples * PatchOptions::kMostSamples + kRegister * kCount> patch;
   for (int j = 0; j <= side; ++j) {
     const int row = rows.index[j];
     // Where edges are a pixel apart, each row of the integral serves two of them.
     const bool known = j > 0 && row == rows.index[j - 1] + 1;
-    const __m256 share = _mm256_set1_ps(rows.share[j]), height = _mm256_set1_ps(j > 0 ? rows.width[j - 1] : 0.f);
-    for (int r = 0; r < kRegisters; ++r) {
-      upper[r] = known ? lower[r] : sums.inRow(integral.ptr<int>(row), r);
-      lower[r] = sums.inRow(integral.ptr<int>(row + 1), r);
-      across[r] = _mm256_add_ps(upper[r], _mm256_mul_ps(share, _mm256_sub_ps(lower[r], upper[r])));
+    const float height = j > 0 ? rows.width[j - 1] : 0.f;
+    for (int r = 0; r < kCount; ++r) {
+      upper[r] = known ? lower[r] : sums.at(integral.ptr<int>(row), r);
+      lower[r] = sums.at(integral.ptr<int>(row + 1), r);
+      across[r] = upper[r] + rows.share[j] * (lower[r] - upper[r]);
     }
-    for (int r = 0; r < kRegisters; ++r) {
-      const __m256 upto = _mm256_sub_ps(nextOf(across[r], across[std::min(r + 1, kRegisters - 1)]), across[r]);
-      const __m256 inside = _mm256_sub_ps(upto, above[r]);
+    for (int r = 0; r < kCount; ++r) {
+      const Register upto = nextOf(across[r], across[r + 1]) - across[r], inside = upto - above[r];
       above[r] = upto;
       if (j == 0) continue;
-      const __m256 area = _mm256_mul_ps(_mm256_loadu_ps(&columns.width[8 * r]), height);
-      const __m256 mean = _mm256_and_ps(_mm256_div_ps(inside, area), _mm256_cmp_ps(area, zero, _CMP_GT_OQ));
-      storeRounded(mean, &patch[(j - 1) * side + 8 * r]);
+      Register width;
+      load(&columns.width[kRegister * r], width);
+      const Register area = width * height;
+      const IntRegister grey = nearestByte(inside / area) & (area > 0.f);
+      store(grey, &patch[(j - 1) * side + kRegister * r]);
     }
   }
   std::copy_n(patch.begin(), side * side, samples);
 }
-#endif
+
+template <int kCount>
+SDVO_VECTORS void cutWithVectors(const cv::Mat& integral, const PatchEdges& columns, const PatchEdges& rows, int side,
+                                 std::uint8_t* samples) {
+  const auto cut = areNeighbours(columns, kCount) ? cutRows<kCount, true> : cutRows<kCount, false>;
+  cut(integral, columns, rows, side, samples);
+}
 
 }  // namespace
 
@@ -184,14 +183,12 @@ void PatchCutter::cut(float u, float v, float size, std::uint8_t* samples) const
   const float spacing = layout_.spacing(size);
   const PatchEdges columns = edgesAround(u, layout_.side, spacing, integral_.cols);
   const PatchEdges rows = edgesAround(v, layout_.side, spacing, integral_.rows);
-#ifdef SDVO_HAVE_AVX2
   if (usesVectorKernels()) {
-    const auto cut = layout_.side < 8 ? cutWithAvx2<1> : layout_.side < 16 ? cutWithAvx2<2> : cutWithAvx2<3>;
+    const auto cut = layout_.side < 8    ? cutWithVectors<8 / kRegister>
+                     : layout_.side < 16 ? cutWithVectors<16 / kRegister>
+                                         : cutWithVectors<kMostEdges / kRegister>;
     return cut(integral_, columns, rows, layout_.side, samples);
   }
-#elif defined(SDVO_HAVE_NEON)
-  if (usesVectorKernels()) return cutWithNeon(integral_, columns, rows, layout_.side, samples);
-#endif
   cutPlain(integral_, columns, rows, layout_.side, samples);
 }
 

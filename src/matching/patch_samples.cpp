@@ -4,12 +4,7 @@
 #include <cstdint>
 #include <cstring>
 
-#include "../common/kernel.hpp"
-#include "patch_samples_neon.hpp"
-
-#ifdef SDVO_HAVE_AVX2
-#include <immintrin.h>
-#endif
+#include "../common/registers.hpp"
 
 namespace sdvo {
 namespace {
@@ -73,45 +68,29 @@ void samplePlain(const std::uint8_t* patch, int side, const PatchPlacement& at, 
   }
 }
 
-#ifdef SDVO_HAVE_AVX2
-/// Two bytes next to each other, interpolated.
-SDVO_AVX2 inline __m256 between(__m256i first, __m256i second, __m256 share) {
-  return _mm256_add_ps(_mm256_cvtepi32_ps(first),
-                       _mm256_mul_ps(share, _mm256_cvtepi32_ps(_mm256_sub_epi32(second, first))));
+/// The byte at each place and the one behind it, interpolated.
+SDVO_VECTORS inline Register between(const std::uint8_t* bytes, const std::uint32_t* places, Register share) {
+  const UnsignedRegister bits = readFours(bytes, places);
+  const UnsignedRegister first = bits & 255, second = bits >> 8 & 255;
+  return toFloats(first) + share * toFloats(second - first);
 }
 
-SDVO_AVX2 inline __m256i fourBytes(const std::uint8_t* samples, __m256i index) {
-  return _mm256_i32gather_epi32(reinterpret_cast<const int*>(samples), index, 1);
-}
-
-SDVO_AVX2 inline __m256 position(float middle, float by_x, float by_y, __m256 x, __m256 y) {
-  return _mm256_add_ps(_mm256_add_ps(_mm256_set1_ps(middle), _mm256_mul_ps(_mm256_set1_ps(by_x), x)),
-                       _mm256_mul_ps(_mm256_set1_ps(by_y), y));
-}
-
-/// The same operations in the same order, eight samples at once.
-SDVO_AVX2 void sampleAvx2(const std::uint8_t* patch, int side, const PatchPlacement& at, const float* dx,
-                          const float* dy, const float* mask, int count, float* values) {
-  const __m256i zero = _mm256_setzero_si256(), last = _mm256_set1_epi32(side - 2), width = _mm256_set1_epi32(side);
-  const __m256i byte = _mm256_set1_epi32(255);
-  for (int k = 0; k < count; k += 8) {
-    const __m256 over = _mm256_loadu_ps(dx + k), down = _mm256_loadu_ps(dy + k);
-    const __m256 x = position(at.x, at.x_by_x, at.x_by_y, over, down);
-    const __m256 y = position(at.y, at.y_by_x, at.y_by_y, over, down);
-    const __m256i column = _mm256_max_epi32(_mm256_min_epi32(_mm256_cvttps_epi32(x), last), zero);
-    const __m256i row = _mm256_max_epi32(_mm256_min_epi32(_mm256_cvttps_epi32(y), last), zero);
-    const __m256 a = _mm256_sub_ps(x, _mm256_cvtepi32_ps(column)), b = _mm256_sub_ps(y, _mm256_cvtepi32_ps(row));
-    const __m256i index = _mm256_add_epi32(_mm256_mullo_epi32(row, width), column);
-    // Of the four bytes at each place the upper row takes the first two and the lower one the last two, so that nothing
-    // beyond the patch is read.
-    const __m256i above = fourBytes(patch, index), below = fourBytes(patch + side - 2, index);
-    const __m256 upper = between(_mm256_and_si256(above, byte), _mm256_and_si256(_mm256_srli_epi32(above, 8), byte), a);
-    const __m256 lower = between(_mm256_and_si256(_mm256_srli_epi32(below, 16), byte), _mm256_srli_epi32(below, 24), a);
-    const __m256 value = _mm256_add_ps(upper, _mm256_mul_ps(b, _mm256_sub_ps(lower, upper)));
-    _mm256_storeu_ps(values + k, _mm256_mul_ps(value, _mm256_loadu_ps(mask + k)));
+/// The same operations in the same order, a register of samples at once.
+SDVO_VECTORS void sampleWithVectors(const std::uint8_t* patch, int side, const PatchPlacement& at, const float* dx,
+                                    const float* dy, const float* mask, int count, float* values) {
+  const IntRegister last = IntRegister{} + (side - 2);
+  for (int k = 0; k < count; k += kRegister) {
+    Register over, down, counts;
+    load(dx + k, over), load(dy + k, down), load(mask + k, counts);
+    const Register x = at.x + at.x_by_x * over + at.x_by_y * down, y = at.y + at.y_by_x * over + at.y_by_y * down;
+    const IntRegister column = truncated(x, last), row = truncated(y, last);
+    const Register a = x - __builtin_convertvector(column, Register), b = y - __builtin_convertvector(row, Register);
+    std::uint32_t places[kRegister];
+    store(row * side + column, places);
+    const Register upper = between(patch, places, a), lower = between(patch + side, places, a);
+    store((upper + b * (lower - upper)) * counts, values + k);
   }
 }
-#endif
 
 }  // namespace
 
@@ -138,11 +117,7 @@ bool SampleSquare::sample(const NearPatch& patch, const Eigen::Vector2f& centre,
   if (!((centre.cwiseAbs() + reach).maxCoeff() <= half)) return false;
   const PatchPlacement at{half + centre.x(), half + centre.y(), grid(0, 0), grid(0, 1), grid(1, 0), grid(1, 1)};
   auto sample = samplePlain;
-#ifdef SDVO_HAVE_AVX2
-  if (usesVectorKernels()) sample = sampleAvx2;
-#elif defined(SDVO_HAVE_NEON)
-  if (usesVectorKernels()) sample = sampleWithNeon;
-#endif
+  if (usesVectorKernels()) sample = sampleWithVectors;
   sample(patch.samples(), patch.side(), at, x_.data(), y_.data(), mask_.data(), count(), values.data());
   return true;
 }

@@ -1,0 +1,102 @@
+#pragma once
+
+#include <cstdint>
+#include <cstring>
+
+#include "kernel.hpp"
+
+namespace sdvo {
+
+/// Numbers in a register, for kernels that work on each by itself.
+#ifdef SDVO_HAVE_AVX2
+constexpr int kRegister = 8;
+#else
+constexpr int kRegister = 4;
+#endif
+typedef float Register __attribute__((vector_size(4 * kRegister)));
+typedef std::int32_t IntRegister __attribute__((vector_size(4 * kRegister)));
+/// Sums in these wrap around.
+typedef std::uint32_t UnsignedRegister __attribute__((vector_size(4 * kRegister)));
+
+// Lanes of two registers, counted through both. Of registers of eight, AVX2 takes the evens and the odds of each half
+// with one instruction.
+#ifdef __clang__
+#define SDVO_SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
+#else
+#define SDVO_SHUFFLE(a, b, ...) __builtin_shuffle(a, b, IntRegister{__VA_ARGS__})
+#endif
+#ifdef SDVO_HAVE_AVX2
+#define SDVO_EVENS 0, 2, 8, 10, 4, 6, 12, 14
+#define SDVO_ODDS 1, 3, 9, 11, 5, 7, 13, 15
+#define SDVO_NEXT 1, 2, 3, 4, 5, 6, 7, 8
+#else
+#define SDVO_EVENS 0, 2, 4, 6
+#define SDVO_ODDS 1, 3, 5, 7
+#define SDVO_NEXT 1, 2, 3, 4
+#endif
+
+/// The lane right behind each one of `here`, which `behind` continues.
+SDVO_VECTORS inline Register nextOf(Register here, Register behind) {
+  return SDVO_SHUFFLE(here, behind, SDVO_NEXT);
+}
+
+SDVO_VECTORS inline Register toFloats(UnsignedRegister numbers) {
+  return __builtin_convertvector(reinterpret_cast<IntRegister>(numbers), Register);
+}
+
+/// Whole parts, clamped to [0, last].
+SDVO_VECTORS inline IntRegister truncated(Register values, IntRegister last) {
+  const IntRegister zero{}, whole = __builtin_convertvector(values, IntRegister);
+  const IntRegister not_above = whole < last ? whole : last;
+  return not_above > zero ? not_above : zero;
+}
+
+template <class Bits, class Number>
+SDVO_IN_KERNEL Bits bitsAt(const Number* place) {
+  Bits bits;
+  std::memcpy(&bits, place, sizeof bits);
+  return bits;
+}
+
+// Single reads are faster than gathering. Places are unsigned: as addresses they need no extension of their sign.
+
+/// Two neighbours from each of places 0 and 1 on; the other half of a register of eight has those from 4 and 5 on.
+SDVO_VECTORS inline UnsignedRegister readPairs(const std::int32_t* numbers, const std::uint32_t* places) {
+  typedef std::int64_t PairRegister __attribute__((vector_size(4 * kRegister)));
+  const auto at = [&](int k) { return bitsAt<std::int64_t>(numbers + places[k]); };
+#ifdef SDVO_HAVE_AVX2
+  return reinterpret_cast<UnsignedRegister>(PairRegister{at(0), at(1), at(4), at(5)});
+#else
+  return reinterpret_cast<UnsignedRegister>(PairRegister{at(0), at(1)});
+#endif
+}
+
+/// Four bytes from each place on.
+SDVO_VECTORS inline UnsignedRegister readFours(const std::uint8_t* bytes, const std::uint32_t* places) {
+  const auto at = [&](int k) { return bitsAt<std::uint32_t>(bytes + places[k]); };
+#ifdef SDVO_HAVE_AVX2
+  return UnsignedRegister{at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)};
+#else
+  return UnsignedRegister{at(0), at(1), at(2), at(3)};
+#endif
+}
+
+/// A number for each lane, and its right neighbour.
+class Pairs {
+ public:
+  /// As read for places 0 and 1, and for places 2 and 3.
+  SDVO_VECTORS Pairs(UnsignedRegister low, UnsignedRegister high)
+      : low_(reinterpret_cast<Register>(low)), high_(reinterpret_cast<Register>(high)) {}
+
+  SDVO_VECTORS UnsignedRegister first() const {
+    return reinterpret_cast<UnsignedRegister>(SDVO_SHUFFLE(low_, high_, SDVO_EVENS));
+  }
+  SDVO_VECTORS UnsignedRegister second() const {
+    return reinterpret_cast<UnsignedRegister>(SDVO_SHUFFLE(low_, high_, SDVO_ODDS));
+  }
+
+ private:
+  Register low_, high_;  ///< whole numbers, called floats: only these are shuffled from two registers at once
+};
+
+}  // namespace sdvo
