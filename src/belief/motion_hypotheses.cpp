@@ -151,24 +151,24 @@ class Explanations {
 /// A motion that explains a part of the pair that the chosen one does not, and that chance does not either.
 struct Competitor {
   const MotionHypothesis* hypothesis;
-  double log_ratio;       ///< by how much it is likelier than the chosen one
-  std::vector<int> rows;  ///< of the pair, that it explains alone
+  double log_ratio;           ///< by how much it is likelier than the chosen one
+  std::vector<int> features;  ///< of the pair, that it explains alone
 };
 
 /// Each motion once.
 std::vector<Competitor> rivalsOf(const MotionScene& scene, double threshold, const MotionHypothesis& chosen,
                                  const std::vector<MotionHypothesis>& hypotheses, const Explanations& explanations,
                                  std::size_t likeliest) {
-  const std::vector<int> own = sorted(chosen.inlierRows());
+  const std::vector<int> own = sorted(chosen.inlierFeatures());
   const int left = chosen.agreement.matches - chosen.agreement.inliers;
   std::vector<Competitor> rivals;
   for (std::size_t k = 0; k < hypotheses.size(); ++k) {
     const MotionHypothesis& other = hypotheses[k];
     if (areOne(scene, chosen, other)) continue;
-    Competitor rival{&other, explanations.logRatio(k, likeliest), without(sorted(other.inlierRows()), own)};
-    const int rows = static_cast<int>(rival.rows.size());
+    Competitor rival{&other, explanations.logRatio(k, likeliest), without(sorted(other.inlierFeatures()), own)};
+    const int features = static_cast<int>(rival.features.size());
     const double chance = chanceOfAgreement(threshold, other.gate);
-    if (logFalseAlarms(std::max(left, rows), rows, chance) > std::log(kTailProbability)) continue;
+    if (logFalseAlarms(std::max(left, features), features, chance) > std::log(kTailProbability)) continue;
     const auto same = std::find_if(rivals.begin(), rivals.end(),
                                    [&](const Competitor& before) { return areOne(scene, *before.hypothesis, other); });
     if (same == rivals.end())
@@ -185,7 +185,7 @@ void compare(const MotionScene& scene, const std::vector<Competitor>& rivals, Mo
   for (const Competitor& rival : rivals) total += std::exp(rival.log_ratio);
   std::vector<int> explained;
   for (const Competitor& rival : rivals) {
-    explained.insert(explained.end(), rival.rows.begin(), rival.rows.end());
+    explained.insert(explained.end(), rival.features.begin(), rival.features.end());
     const Eigen::Isometry3d& T = rival.hypothesis->motion.T_current_reference;
     const double probability = std::exp(rival.log_ratio) / total;
     // Both start from the same pair of the map.
@@ -194,13 +194,13 @@ void compare(const MotionScene& scene, const std::vector<Competitor>& rivals, Mo
     if (isTolerable(scene, chosen.motion.T_current_reference, apart)) continue;
     chosen.probability -= probability;
     if (!chosen.rival || chosen.rival->probability < probability)
-      chosen.rival = {T, probability, static_cast<int>(rival.rows.size())};
+      chosen.rival = {T, probability, static_cast<int>(rival.features.size())};
   }
   // What rivals explain does not speak against the chosen one.
   explained = sorted(std::move(explained));
   for (int i = 0; i < static_cast<int>(chosen.matches.size()); ++i) {
-    const int row = chosen.matches[static_cast<std::size_t>(i)].current;
-    if (!std::binary_search(explained.begin(), explained.end(), row)) continue;
+    const int feature = chosen.matches[static_cast<std::size_t>(i)].current;
+    if (!std::binary_search(explained.begin(), explained.end(), feature)) continue;
     --chosen.agreement.matches;
     chosen.agreement.lasting_matches -= chosen.isLasting(i);
     chosen.agreement.sightings -= chosen.sightingsOf(i);
@@ -236,12 +236,12 @@ void MotionHypothesis::follow(const MotionScene& scene, const Eigen::Isometry3d&
   rival = {T_found, misled, of_other};
 }
 
-std::vector<int> MotionHypothesis::inlierRows(const std::vector<int>& rejected) const {
-  std::vector<int> rows;
-  rows.reserve(motion.inliers.size());
+std::vector<int> MotionHypothesis::inlierFeatures(const std::vector<int>& rejected) const {
+  std::vector<int> features;
+  features.reserve(motion.inliers.size());
   for (const int i : motion.inliers)
-    if (!contains(rejected, matches[i].current)) rows.push_back(matches[i].current);
-  return rows;
+    if (!contains(rejected, matches[i].current)) features.push_back(matches[i].current);
+  return features;
 }
 
 void MotionHypothesis::countAgreement() {
@@ -252,10 +252,10 @@ void MotionHypothesis::countAgreement() {
   reject({});
 }
 
-void MotionHypothesis::reject(const std::vector<int>& rows) {
+void MotionHypothesis::reject(const std::vector<int>& features) {
   agreement.inliers = agreement.lasting_inliers = agreement.inlier_sightings = 0;
   for (const int i : motion.inliers) {
-    if (contains(rows, matches[i].current)) continue;
+    if (contains(features, matches[i].current)) continue;
     ++agreement.inliers;
     agreement.lasting_inliers += isLasting(i);
     agreement.inlier_sightings += sightingsOf(i);
@@ -341,14 +341,14 @@ MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::v
   return chosen;
 }
 
-double coverage(const StereoFeatures& features, const std::vector<int>& rows) {
+double coverage(const StereoFeatures& features, const std::vector<int>& indices) {
   constexpr int kColumns = 8, kRows = 4;
   std::bitset<kColumns * kRows> cells;
   // Clamped before it becomes an integer, which a position far outside of the image overflows.
   const auto cell = [](double position, int size, int count) {
     return static_cast<std::size_t>(std::clamp(position * count / size, 0.0, count - 1.0));
   };
-  for (const int i : rows)
+  for (const int i : indices)
     cells.set(cell(features.v[i], features.camera.height, kRows) * kColumns +
               cell(features.u[i], features.camera.width, kColumns));
   return static_cast<double>(cells.count()) / (kColumns * kRows);

@@ -41,7 +41,7 @@ void StereoFeatures::append(const StereoFeature& feature) {
   forEachArray([&](const char*, auto array, auto number) { (this->*array).push_back(feature.*number); });
 }
 
-StereoFeatures StereoFeatures::select(const std::vector<int>& rows) const {
+StereoFeatures StereoFeatures::select(const std::vector<int>& indices) const {
   StereoFeatures selected;
   selected.stamp = stamp;
   selected.camera = camera;
@@ -51,11 +51,11 @@ StereoFeatures StereoFeatures::select(const std::vector<int>& rows) const {
   selected.element_type = element_type;
   selected.report = report;
   forEachArray([&](const char*, auto array, auto) {
-    for (const int row : rows) (selected.*array).push_back((this->*array)[static_cast<std::size_t>(row)]);
+    for (const int i : indices) (selected.*array).push_back((this->*array)[static_cast<std::size_t>(i)]);
   });
-  selected.descriptors = selectRows(descriptors, rows);
+  selected.descriptors = selectRows(descriptors, indices);
   selected.patch_layout = patch_layout;
-  if (hasPatches()) selected.patches = selectRows(patches, rows);
+  if (hasPatches()) selected.patches = selectRows(patches, indices);
   return selected;
 }
 

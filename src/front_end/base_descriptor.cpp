@@ -68,7 +68,7 @@ class BriefDescriptor : public BaseDescriptor {
 };
 
 /// A descriptor of OpenCV's. They differ in what they take the neighbourhood's size from, and some drop and reorder
-/// rows; `impose` sets the fields that one reads so that `size` has its effect, and class_id carries the row.
+/// key points; `impose` sets the fields that one reads so that `size` has its effect, and class_id carries the index.
 class OpenCvDescriptor : public BaseDescriptor {
  public:
   using Impose = std::function<void(float size, cv::KeyPoint&)>;
@@ -81,15 +81,15 @@ class OpenCvDescriptor : public BaseDescriptor {
   ViewDescriptors describe(const cv::Mat& image, const std::vector<ViewKeypoint>& keypoints) const override {
     ViewDescriptors described = emptyRows(keypoints.size(), bytes());
     std::vector<cv::KeyPoint> cv_keypoints;
-    std::vector<std::size_t> row_of;
+    std::vector<std::size_t> index_of;
     for (std::size_t i = 0; i < keypoints.size(); ++i) {
       const ViewKeypoint& k = keypoints[i];
       if (!liesInside(k.u, k.v, reach(k.size), image.size())) continue;
       const float degrees = k.angle < 0.f ? 0.f : k.angle * static_cast<float>(180.0 / CV_PI);
-      cv::KeyPoint keypoint(k.u, k.v, k.size, degrees, 0.f, 0, static_cast<int>(row_of.size()));
+      cv::KeyPoint keypoint(k.u, k.v, k.size, degrees, 0.f, 0, static_cast<int>(index_of.size()));
       impose_(k.size, keypoint);
       cv_keypoints.push_back(keypoint);
-      row_of.push_back(i);
+      index_of.push_back(i);
     }
     if (cv_keypoints.empty()) return described;
 
@@ -98,7 +98,7 @@ class OpenCvDescriptor : public BaseDescriptor {
     if (rows.type() == CV_32F && elementType() == ElementType::kUint8) rows.convertTo(rows, CV_8U);
     const cv::Mat row_bytes(rows.rows, static_cast<int>(rows.cols * rows.elemSize()), CV_8U, rows.data, rows.step);
     for (std::size_t k = 0; k < cv_keypoints.size(); ++k) {
-      const std::size_t i = row_of[static_cast<std::size_t>(cv_keypoints[k].class_id)];
+      const std::size_t i = index_of[static_cast<std::size_t>(cv_keypoints[k].class_id)];
       row_bytes.row(static_cast<int>(k)).copyTo(described.rows.row(static_cast<int>(i)));
       described.valid[i] = 1;
     }

@@ -114,7 +114,7 @@ BlockSearch::BlockSearch(const cv::Mat& left, const cv::Mat& right, double max_d
       small_right_(quarter(right)),
       reach_(static_cast<int>(std::ceil(0.25 * max_disparity)), static_cast<int>(std::ceil(0.25 * reach))) {}
 
-std::optional<Sighting> BlockSearch::find(const cv::Point2f& corner) const {
+std::optional<FoundCorner> BlockSearch::find(const cv::Point2f& corner) const {
   // Coarsely in all directions, swapped sides included, then around that to a pixel.
   const cv::Point small(cvRound(0.25f * corner.x - 0.375f), cvRound(0.25f * corner.y - 0.375f));
   const auto coarse = findMutually(small_left_, small_right_, small, {5, 4}, reach_);
@@ -124,7 +124,7 @@ std::optional<Sighting> BlockSearch::find(const cv::Point2f& corner) const {
   const auto fine = findBlock(left_, right_, centre, {7, 7}, {guess.x - 4, guess.y - 4, 9, 9}, 1.0);
   if (!fine) return std::nullopt;
   const auto at = [](int pixel) { return static_cast<double>(pixel); };
-  return Sighting{at(centre.x), at(centre.y), at(centre.x - fine->x), at(fine->y - centre.y)};
+  return FoundCorner{at(centre.x), at(centre.y), at(centre.x - fine->x), at(fine->y - centre.y)};
 }
 
 }  // namespace sdvo

@@ -6,7 +6,7 @@
 namespace sdvo {
 
 /// A corner of the left image and where it is in the right one.
-struct Sighting {
+struct FoundCorner {
   double u, v;       ///< px, in the left image
   double disparity;  ///< u_left - u_right, px; negative where the sides are swapped
   double dv;         ///< v_right - v_left, px
@@ -20,7 +20,7 @@ class BlockSearch {
   BlockSearch(const cv::Mat& left, const cv::Mat& right, double max_disparity, double reach);
 
   /// Nothing where texture is flat or repeats itself, or where the way back leads elsewhere.
-  std::optional<Sighting> find(const cv::Point2f& corner) const;
+  std::optional<FoundCorner> find(const cv::Point2f& corner) const;
 
  private:
   const cv::Mat left_, right_;

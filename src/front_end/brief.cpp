@@ -32,18 +32,18 @@ std::array<Test, Brief::kBits> drawTests(double half_patch) {
 
 }  // namespace
 
-void Brief::describe(double u, double v, double size, std::uint8_t* row) const {
+void Brief::describe(double u, double v, double size, std::uint8_t* descriptor) const {
   static const std::array<Test, kBits> tests = drawTests(kHalfPatch);
   const double scale = size / kStandardSize;
   const auto half = static_cast<float>(std::max(kHalfBox * scale, 0.5));
   const auto mean = [&](double x, double y) {
     return image_.boxMean(static_cast<float>(u + scale * x), static_cast<float>(v + scale * y), half);
   };
-  std::memset(row, 0, kBytes);
+  std::memset(descriptor, 0, kBytes);
   for (int bit = 0; bit < kBits; ++bit) {
     const Test& test = tests[bit];
     const bool brighter = mean(test.ax, test.ay) > mean(test.bx, test.by);
-    row[bit / 8] = static_cast<std::uint8_t>(row[bit / 8] | brighter << (bit % 8));
+    descriptor[bit / 8] = static_cast<std::uint8_t>(descriptor[bit / 8] | brighter << (bit % 8));
   }
 }
 

@@ -20,15 +20,15 @@ struct Rows {
 };
 
 /// Each corner is compared with some of those before it.
-Rows fitRows(const std::vector<Sighting>& sightings, int columns) {
-  constexpr std::size_t kPartners = 100;  // with all, time would grow with the square of rig_monitor/corners
+Rows fitRows(const std::vector<FoundCorner>& found, int columns) {
+  constexpr std::size_t kCompared = 100;  // with all, time would grow with the square of rig_monitor/corners
   std::vector<double> slopes, rest;
-  for (std::size_t i = 0; i < sightings.size(); ++i)
-    for (std::size_t k = 0; k < i; k += 1 + i / kPartners)
-      if (std::abs(sightings[i].u - sightings[k].u) > 0.1 * columns)
-        slopes.push_back((sightings[i].dv - sightings[k].dv) / (sightings[i].u - sightings[k].u));
+  for (std::size_t i = 0; i < found.size(); ++i)
+    for (std::size_t k = 0; k < i; k += 1 + i / kCompared)
+      if (std::abs(found[i].u - found[k].u) > 0.1 * columns)
+        slopes.push_back((found[i].dv - found[k].dv) / (found[i].u - found[k].u));
   Rows rows{median(slopes), 0.0, 0.0};
-  for (const Sighting& sighting : sightings) rest.push_back(sighting.dv - rows.slope * (sighting.u - 0.5 * columns));
+  for (const FoundCorner& corner : found) rest.push_back(corner.dv - rows.slope * (corner.u - 0.5 * columns));
   rows.offset = median(rest);
   for (double& value : rest) value = std::abs(value - rows.offset);
   rows.scatter = median(rest);
@@ -36,17 +36,17 @@ Rows fitRows(const std::vector<Sighting>& sightings, int columns) {
 }
 
 /// Share of the corners that lie further right in the right image.
-double swappedShare(const std::vector<Sighting>& sightings) {
+double swappedShare(const std::vector<FoundCorner>& found) {
   const auto swapped =
-      std::count_if(sightings.begin(), sightings.end(), [](const Sighting& s) { return s.disparity < -1.0; });
-  return static_cast<double>(swapped) / static_cast<double>(sightings.size());
+      std::count_if(found.begin(), found.end(), [](const FoundCorner& s) { return s.disparity < -1.0; });
+  return static_cast<double>(swapped) / static_cast<double>(found.size());
 }
 
 /// Everything that would be said against the rig is far from being true, of so many corners that it is not by chance.
-bool isClearlyInOrder(const std::vector<Sighting>& sightings, int columns, double max_dv) {
+bool isClearlyInOrder(const std::vector<FoundCorner>& found, int columns, double max_dv) {
   constexpr std::size_t kEnoughToClear = 12;
-  if (sightings.size() < kEnoughToClear || swappedShare(sightings) > 0.2) return false;
-  const auto [slope, offset, scatter] = fitRows(sightings, columns);
+  if (found.size() < kEnoughToClear || swappedShare(found) > 0.2) return false;
+  const auto [slope, offset, scatter] = fitRows(found, columns);
   return std::max({scatter, std::abs(offset), 0.5 * columns * std::abs(slope)}) <= 0.5 * max_dv;
 }
 
@@ -62,22 +62,22 @@ bool RigMonitor::isSuspicious(int corners, int found) const {
 std::string RigMonitor::diagnose(const cv::Mat& left, const cv::Mat& right,
                                  const std::vector<cv::Point2f>& corners) const {
   const BlockSearch search(left, right, max_disparity_, options_.reach);
-  std::vector<Sighting> sightings;
+  std::vector<FoundCorner> found;
   const std::size_t most = static_cast<std::size_t>(options_.corners), step = (corners.size() + most - 1) / most;
   for (std::size_t i = 0; i < corners.size(); i += step) {
-    const auto sighting = search.find(corners[i]);
-    if (!sighting) continue;
-    sightings.push_back(*sighting);
+    const auto corner = search.find(corners[i]);
+    if (!corner) continue;
+    found.push_back(*corner);
     // A view with little to match is suspicious, too, pair after pair: a few corners clear its rig.
     constexpr std::size_t kAtOnce = 4;
-    if (sightings.size() % kAtOnce == 0 && isClearlyInOrder(sightings, left.cols, max_dv_)) return "";
+    if (found.size() % kAtOnce == 0 && isClearlyInOrder(found, left.cols, max_dv_)) return "";
   }
-  if (static_cast<int>(sightings.size()) < kEnough) return "";
+  if (static_cast<int>(found.size()) < kEnough) return "";
 
-  if (swappedShare(sightings) > 0.6)
+  if (swappedShare(found) > 0.6)
     return "left and right images are swapped, mirrored, or not rectified? Corners lie further right in the right "
            "image";
-  const auto [slope, offset, scatter] = fitRows(sightings, left.cols);
+  const auto [slope, offset, scatter] = fitRows(found, left.cols);
   if (scatter > std::max(max_dv_, 0.5 * std::abs(offset)))
     return text(1, "rows of left and right differ by ", scatter,
                 " px here and there: not rectified, or not taken at the same moment?");

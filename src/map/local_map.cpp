@@ -213,19 +213,19 @@ bool LocalMap::needsKeyframe() const {
 /// Key frames beyond the newest ones stay for what they see: the first that shares too few points with the newest pair
 /// goes, and of too many the one that adds the least to the one before it.
 void LocalMap::forgetKeyframe() {
-  const auto lasting = [&] { return frames_.size() - 1 - static_cast<std::size_t>(options_.keyframes); };
-  const std::size_t leaving = lasting() - 1;
+  const auto older = [&] { return frames_.size() - 1 - static_cast<std::size_t>(options_.keyframes); };
+  const std::size_t leaving = older() - 1;
   if (frames_[leaving].id > last_left_) {
     last_left_ = frames_[leaving].id;
     if (options_.remembered_keyframes > 0 && !frames_[leaving].is_recalled) rememberKeyframe(leaving);
   }
   const std::vector<int> shared = sharedPoints();
-  const auto too_few = std::find_if(shared.begin(), shared.begin() + static_cast<std::ptrdiff_t>(lasting()),
+  const auto too_few = std::find_if(shared.begin(), shared.begin() + static_cast<std::ptrdiff_t>(older()),
                                     [&](int points) { return points < options_.lasting_points; });
   const std::size_t unshared = static_cast<std::size_t>(too_few - shared.begin());
-  if (unshared < lasting()) removeFrame(unshared);
-  while (static_cast<int>(lasting()) > options_.keyframes) {
-    const std::vector<double> parallax = parallaxToPredecessors(lasting());
+  if (unshared < older()) removeFrame(unshared);
+  while (static_cast<int>(older()) > options_.keyframes) {
+    const std::vector<double> parallax = parallaxToPredecessors(older());
     removeFrame(static_cast<std::size_t>(std::min_element(parallax.begin(), parallax.end()) - parallax.begin()));
   }
 }

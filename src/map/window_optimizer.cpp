@@ -224,14 +224,14 @@ class Solver {
   /// Squared length of the gradients' sums by cluster: the part of the image in which a point was seen first.
   double meatOf(const ReducedSystem& system, const Estimate& estimate,
                 const Eigen::Matrix<double, 6, Eigen::Dynamic>& by) {
-    constexpr int kParts = 64;  // in a row at most
-    parts_.assign(kParts * kParts, Vector6d::Zero());
+    constexpr int kSide = 64;  // clusters along each axis at most
+    clusters_.assign(kSide * kSide, Vector6d::Zero());
     const double scale = window_->camera.fx / kPart;
-    const auto part = [&](double ray) { return std::clamp(static_cast<int>(ray * scale + kParts / 2), 0, kParts - 1); };
+    const auto index = [&](double ray) { return std::clamp(static_cast<int>(ray * scale + kSide / 2), 0, kSide - 1); };
     const PoseFactor* observation = system.factors.data();
     for (std::size_t p = 0; p < system.points.size(); ++p) {
       const EliminatedPoint& point = system.points[p];
-      Vector6d& moved = parts_[part(estimate.points[p].y()) * kParts + part(estimate.points[p].x())];
+      Vector6d& moved = clusters_[index(estimate.points[p].y()) * kSide + index(estimate.points[p].x())];
       moved += by.rightCols<kCalibration>().lazyProduct(point.calibration_gradient);
       for (const PoseFactor* end = observation + point.factors; observation != end; ++observation) {
         const double *t = observation->gradient.translation, *r = observation->gradient.rotation;
@@ -241,7 +241,7 @@ class Solver {
       }
     }
     double sum = 0.0;
-    for (const Vector6d& moved : parts_) sum += moved.squaredNorm();
+    for (const Vector6d& moved : clusters_) sum += moved.squaredNorm();
     return sum;
   }
 
@@ -311,7 +311,7 @@ class Solver {
   std::vector<std::size_t> anchor_of_point_;
   PoseEquations equations_;
   std::vector<double> squares_;
-  std::vector<Vector6d> parts_;
+  std::vector<Vector6d> clusters_;
   Eigen::MatrixXd known_, units_, solved_;
   Eigen::LLT<Eigen::MatrixXd> factor_;
   int poses_ = 0, size_ = 0;

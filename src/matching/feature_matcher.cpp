@@ -14,12 +14,12 @@
 namespace sdvo {
 namespace {
 
-/// Squared L2 distances of rows of whole numbers 0…255 or of floats.
+/// Squared L2 distances of descriptors of whole numbers 0…255 or of floats.
 template <class Element>
-void squaredDistances(const std::uint8_t* row, const cv::Mat& others, const int* candidates, std::size_t count,
+void squaredDistances(const std::uint8_t* descriptor, const cv::Mat& others, const int* candidates, std::size_t count,
                       float* distances) {
   const int elements = others.cols / static_cast<int>(sizeof(Element));
-  const auto* a = reinterpret_cast<const Element*>(row);
+  const auto* a = reinterpret_cast<const Element*>(descriptor);
   for (std::size_t k = 0; k < count; ++k) {
     const auto* b = reinterpret_cast<const Element*>(others.ptr(candidates[k]));
     using Sum = std::conditional_t<std::is_integral_v<Element>, int, float>;
@@ -32,28 +32,28 @@ void squaredDistances(const std::uint8_t* row, const cv::Mat& others, const int*
   }
 }
 
-void computeDistances(ElementType type, const std::uint8_t* row, const cv::Mat& others, const int* candidates,
+void computeDistances(ElementType type, const std::uint8_t* descriptor, const cv::Mat& others, const int* candidates,
                       std::size_t count, float* distances) {
   switch (type) {
     case ElementType::kBits:
-      return hammingDistances(row, others, candidates, count, distances);
+      return hammingDistances(descriptor, others, candidates, count, distances);
     case ElementType::kUint8:
-      return squaredDistances<std::uint8_t>(row, others, candidates, count, distances);
+      return squaredDistances<std::uint8_t>(descriptor, others, candidates, count, distances);
     case ElementType::kFloat32:
-      return squaredDistances<float>(row, others, candidates, count, distances);
+      return squaredDistances<float>(descriptor, others, candidates, count, distances);
   }
 }
 
-/// Rows of `others` that a binary descriptor may match, judged by its first quarter. Without a gate nearly all are
-/// others at half of the bits. Returns their number.
-std::size_t findAlike(const std::uint8_t* row, const cv::Mat& others, double max_distance, const std::vector<int>& all,
-                      std::vector<float>& distances, std::vector<int>& found) {
+/// Indices of those that a binary descriptor may match, judged by its first quarter. Without a gate nearly all others
+/// differ in half of the bits. Returns their number.
+std::size_t findAlike(const std::uint8_t* descriptor, const cv::Mat& others, double max_distance,
+                      const std::vector<int>& all, std::vector<float>& distances, std::vector<int>& found) {
   constexpr double kSigmas = 1.0;  // of a quarter's distance around the largest: loses 1 % of the nearest (KITTI 06)
   const cv::Mat quarter = others.colRange(0, (others.cols + 3) / 4);
   const double bits = 8.0 * quarter.cols;
   const auto most =
       static_cast<float>(bits * max_distance + kSigmas * std::sqrt(bits * max_distance * (1.0 - max_distance)));
-  hammingDistances(row, quarter, all.data(), all.size(), distances.data());
+  hammingDistances(descriptor, quarter, all.data(), all.size(), distances.data());
   std::size_t count = 0;
   for (std::size_t k = 0; k < all.size(); ++k) {
     found[count] = all[k];
@@ -62,15 +62,15 @@ std::size_t findAlike(const std::uint8_t* row, const cv::Mat& others, double max
   return count;
 }
 
-/// What turns a distance into a share in [0, 1]: the number of bits, or the sum of both rows' squared lengths
-/// (orthogonal rows of whatever length are at 1 then).
-float distanceUnit(ElementType type, const cv::Mat& a, int row_a, const cv::Mat& b, int row_b) {
+/// Divisor that makes a distance a ratio in [0, 1]: the number of bits, or the sum of both squared lengths (orthogonal
+/// descriptors of whatever length are at 1 then).
+float distanceUnit(ElementType type, const cv::Mat& a, int i, const cv::Mat& b, int j) {
   if (type == ElementType::kBits) return 8.f * static_cast<float>(a.cols);
   const cv::Mat zeros = cv::Mat::zeros(1, a.cols, CV_8U);
   const int first = 0;
   float length_a, length_b;
-  computeDistances(type, a.ptr(row_a), zeros, &first, 1, &length_a);
-  computeDistances(type, b.ptr(row_b), zeros, &first, 1, &length_b);
+  computeDistances(type, a.ptr(i), zeros, &first, 1, &length_a);
+  computeDistances(type, b.ptr(j), zeros, &first, 1, &length_b);
   return std::max(length_a + length_b, 1e-12f);
 }
 
@@ -100,7 +100,7 @@ class Nearest {
   std::uint64_t least_ = kNone;
 };
 
-/// Rows of a feature set (not an empty one), found by position. Its extent is the features' own: the image size is a
+/// Indices of a pair's features (not none), found by position. Its extent is the features' own: the image size is a
 /// claim of whoever sent them.
 class PositionGrid {
  public:
@@ -115,7 +115,7 @@ class PositionGrid {
     for (int i = 0; i < features.count(); ++i) entries_[next[cellOf(i)]++] = {features.u[i], features.v[i], i};
   }
 
-  /// Writes the rows to the front of `found`, which holds at least as many as there are features; returns their number.
+  /// Writes the indices to the front of `found`, which has room for those of all features; returns their number.
   std::size_t findAround(float u, float v, std::vector<int>& found) const {
     std::size_t count = 0;
     const int first = columns_.at(u - radius_), last = columns_.at(u + radius_), last_row = rows_.at(v + radius_);
@@ -125,7 +125,7 @@ class PositionGrid {
       for (const Entry* entry = entries_.data() + begin_[cell(first, row)]; entry < end; ++entry) {
         const float du = entry->u - u, dv = entry->v - v;
         // Written in any case and counted if near: no branch, as none could be foreseen.
-        found[count] = entry->row;
+        found[count] = entry->feature;
         count += du * du + dv * dv <= square ? 1 : 0;
       }
     }
@@ -135,7 +135,7 @@ class PositionGrid {
  private:
   struct Entry {
     float u, v;
-    int row;
+    int feature;
   };
 
   /// The cells along one axis; what lies beside them belongs to the nearest one.

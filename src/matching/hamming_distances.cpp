@@ -21,7 +21,7 @@
 namespace sdvo {
 namespace {
 
-SDVO_POPCOUNT void distancesByWords(const std::uint8_t* row, const cv::Mat& others, const int* candidates,
+SDVO_POPCOUNT void distancesByWords(const std::uint8_t* descriptor, const cv::Mat& others, const int* candidates,
                                     std::size_t count, float* distances) {
   constexpr int kBytes = 32;  // of these every base descriptor has a multiple
   for (std::size_t k = 0; k < count; ++k) {
@@ -31,11 +31,12 @@ SDVO_POPCOUNT void distancesByWords(const std::uint8_t* row, const cv::Mat& othe
 #pragma GCC unroll 4
       for (int word = byte; word < byte + kBytes; word += 8) {
         std::uint64_t a, b;
-        std::memcpy(&a, row + word, 8);
+        std::memcpy(&a, descriptor + word, 8);
         std::memcpy(&b, other + word, 8);
         distance += __builtin_popcountll(a ^ b);
       }
-    for (; byte < others.cols; ++byte) distance += __builtin_popcount(static_cast<unsigned>(row[byte] ^ other[byte]));
+    for (; byte < others.cols; ++byte)
+      distance += __builtin_popcount(static_cast<unsigned>(descriptor[byte] ^ other[byte]));
     distances[k] = static_cast<float>(distance);
   }
 }
@@ -54,8 +55,8 @@ SDVO_VECTOR_POPCOUNT inline __m256i loadBytes(const std::uint8_t* bytes) {
   return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(bytes));
 }
 
-SDVO_VECTOR_POPCOUNT void distancesByRegisters(const std::uint8_t* row, const cv::Mat& others, const int* candidates,
-                                               std::size_t count, float* distances) {
+SDVO_VECTOR_POPCOUNT void distancesByRegisters(const std::uint8_t* descriptor, const cv::Mat& others,
+                                               const int* candidates, std::size_t count, float* distances) {
   constexpr int kBytes = 32;
   const int whole = others.cols / kBytes * kBytes;
   const __mmask32 rest = (1u << (others.cols - whole)) - 1;
@@ -65,8 +66,8 @@ SDVO_VECTOR_POPCOUNT void distancesByRegisters(const std::uint8_t* row, const cv
     const auto add = [&](__m256i a, __m256i b) SDVO_VECTOR_POPCOUNT {
       sums = _mm256_add_epi64(sums, _mm256_popcnt_epi64(_mm256_xor_si256(a, b)));
     };
-    for (int byte = 0; byte < whole; byte += kBytes) add(loadBytes(row + byte), loadBytes(other + byte));
-    if (rest != 0) add(_mm256_maskz_loadu_epi8(rest, row + whole), _mm256_maskz_loadu_epi8(rest, other + whole));
+    for (int byte = 0; byte < whole; byte += kBytes) add(loadBytes(descriptor + byte), loadBytes(other + byte));
+    if (rest != 0) add(_mm256_maskz_loadu_epi8(rest, descriptor + whole), _mm256_maskz_loadu_epi8(rest, other + whole));
     const __m128i halves = _mm_add_epi64(_mm256_castsi256_si128(sums), _mm256_extracti128_si256(sums, 1));
     distances[k] = static_cast<float>(_mm_extract_epi64(halves, 0) + _mm_extract_epi64(halves, 1));
   }
@@ -75,15 +76,15 @@ SDVO_VECTOR_POPCOUNT void distancesByRegisters(const std::uint8_t* row, const cv
 
 }  // namespace
 
-void hammingDistances(const std::uint8_t* row, const cv::Mat& others, const int* candidates, std::size_t count,
+void hammingDistances(const std::uint8_t* descriptor, const cv::Mat& others, const int* candidates, std::size_t count,
                       float* distances) {
 #ifdef SDVO_HAVE_AVX2
   if (usesVectorKernels() && hasVectorPopcount())
-    return distancesByRegisters(row, others, candidates, count, distances);
+    return distancesByRegisters(descriptor, others, candidates, count, distances);
 #elif defined(SDVO_HAVE_NEON)
-  if (usesVectorKernels()) return distancesWithNeon(row, others, candidates, count, distances);
+  if (usesVectorKernels()) return distancesWithNeon(descriptor, others, candidates, count, distances);
 #endif
-  distancesByWords(row, others, candidates, count, distances);
+  distancesByWords(descriptor, others, candidates, count, distances);
 }
 
 }  // namespace sdvo

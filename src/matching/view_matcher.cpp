@@ -2,10 +2,10 @@
 
 namespace sdvo {
 
-Eigen::Vector3d measurementOf(const StereoFeatures& features, int row, const RigCalibration& calibration,
+Eigen::Vector3d measurementOf(const StereoFeatures& features, int feature, const RigCalibration& calibration,
                               const Eigen::Vector2d& shift) {
-  const double u = features.u[row] + shift.x(), v = features.v[row] + shift.y();
-  return {u, v, u - (features.disparity[row] - calibration.disparityError(features.camera, u))};
+  const double u = features.u[feature] + shift.x(), v = features.v[feature] + shift.y();
+  return {u, v, u - (features.disparity[feature] - calibration.disparityError(features.camera, u))};
 }
 
 std::vector<Correspondence> correspond(const DescribedPoints& reference, const StereoFeatures& features,

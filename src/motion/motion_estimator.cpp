@@ -8,8 +8,8 @@ namespace sdvo {
 namespace {
 
 /// The better of a pose and the one that all correspondences within several thresholds of `start` lead to. Where most
-/// points are far, a pose can suit all of them while the near ones, which alone tell the translation, lie beyond the
-/// threshold; the inliers by themselves never draw them in (Lebeda, Matas and Chum 2012).
+/// points are far, a pose can suit all of them while the near ones, which alone constrain the translation, lie beyond
+/// the threshold; the inliers by themselves never draw them in (Lebeda, Matas and Chum 2012).
 void refineWidely(const PoseProblem& problem, const MotionRefinementOptions& options, Eigen::Isometry3d start,
                   Eigen::Isometry3d& T) {
   constexpr double kWide = 5.0;  // thresholds

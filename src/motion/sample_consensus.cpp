@@ -57,9 +57,9 @@ MinimalSample drawSample(std::mt19937& random, int count) {
 SampleBudget::SampleBudget(int at_most, double confidence)
     : at_most_(at_most), confidence_(confidence), needed_(at_most) {}
 
-void SampleBudget::noteInliers(double share) {
+void SampleBudget::noteInliers(double ratio) {
   // Fischler and Bolles 1981.
-  const double all_inliers = share * share * share;
+  const double all_inliers = ratio * ratio * ratio;
   if (all_inliers >= 1.0)
     needed_ = 1.0;
   else if (all_inliers <= 1e-12)

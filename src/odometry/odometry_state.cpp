@@ -12,16 +12,16 @@ LearntRig unknownRig(const VisualOdometryOptions& options) {
 }
 
 /// The matches, which of them are inliers, and what follows from these.
-void reportMatches(const StereoFeatures& features, const std::vector<int>& all_rows, const MotionHypothesis& found,
+void reportMatches(const StereoFeatures& features, const std::vector<int>& given_indices, const MotionHypothesis& found,
                    const std::vector<int>& rejected, OdometryResult& result) {
   result.flow.reserve(found.matches.size());
   for (const FeatureMatch& match : found.matches) {
     const cv::Point3f& previous = found.view->pixels[match.reference];
-    result.flow.push_back({previous.x, previous.y, all_rows[static_cast<std::size_t>(match.current)], false});
+    result.flow.push_back({previous.x, previous.y, given_indices[static_cast<std::size_t>(match.current)], false});
   }
   for (const int i : found.motion.inliers)
     result.flow[i].inlier = std::find(rejected.begin(), rejected.end(), found.matches[i].current) == rejected.end();
-  const std::vector<int> inliers = found.inlierRows(rejected);
+  const std::vector<int> inliers = found.inlierFeatures(rejected);
   result.features = features.count();
   result.matches = static_cast<int>(found.matches.size());
   result.inliers = static_cast<int>(inliers.size());
@@ -80,7 +80,7 @@ void OdometryState::move(const Eigen::Isometry3d& T_previous_current) {
   distance += T_previous_current.translation().norm();
 }
 
-OdometryResult OdometryState::report(const StereoFeatures& features, const std::vector<int>& all_rows,
+OdometryResult OdometryState::report(const StereoFeatures& features, const std::vector<int>& given_indices,
                                      const MotionHypothesis& found, const OdometryStep& step,
                                      const std::optional<Floor>& known_floor) const {
   OdometryResult result;
@@ -106,7 +106,7 @@ OdometryResult OdometryState::report(const StereoFeatures& features, const std::
     result.motion_covariance = step.covariance;
     result.correction = step.correction;
   }
-  reportMatches(features, all_rows, found, step.rejected_rows, result);
+  reportMatches(features, given_indices, found, step.rejected_features, result);
   result.match_time = found.match_time;
   result.motion_time = found.motion_time + step.time;
   reportRig(rig, result);

@@ -122,7 +122,7 @@ OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::op
   state_.rig.learn(features, measured ? &*measured : nullptr, found, step.state == TrackingState::kTracking && scene);
   finish(pair, step);
   step.time = stopwatch.lap();
-  return state_.report(features, pair.new_rows, found, step, floor());
+  return state_.report(features, pair.new_features, found, step, floor());
 }
 
 void VisualOdometry::refuse(const StereoFeatures& features) const {
@@ -141,8 +141,9 @@ VisualOdometry::Pair VisualOdometry::usable(const StereoFeatures& given,
     pair.refocused = given.seenBy(*state_.camera);
   if (state_.last_stamp) pair.dt = static_cast<double>(given.stamp - *state_.last_stamp) * 1e-9;
   const std::optional<Eigen::Isometry3d> expected = expectedMotion(pair.dt, guess);
-  pair.new_rows = state_.images.newRows(pair.whole(), state_.rig.noise.sameMotion(), expected);
-  if (static_cast<int>(pair.new_rows.size()) < given.count()) pair.new_part = pair.whole().select(pair.new_rows);
+  pair.new_features = state_.images.newFeatures(pair.whole(), state_.rig.noise.sameMotion(), expected);
+  if (static_cast<int>(pair.new_features.size()) < given.count())
+    pair.new_part = pair.whole().select(pair.new_features);
   const StereoFeatures& taken = pair.taken();
   if (!state_.map || !state_.map->continuedBy(taken))
     pair.is = Pair::kFirst;
@@ -483,7 +484,7 @@ VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, cons
   const LocalMap& map = *state_.map;
   Step step;
   step.state = TrackingState::kTracking;
-  step.rejected_rows = candidate.adjustment.rejected;
+  step.rejected_features = candidate.adjustment.rejected;
   step.T_previous_current = (map.newestPose() * state_.T_origin_camera).inverse();
   if (!candidate.adjustment.success) {
     step.covariance = found.motion.covariance;

@@ -43,12 +43,12 @@ StereoFeatures thinOut(const StereoFeatures& features, int most) {
     std::stable_sort(cell.begin(), cell.end(),
                      [&](int a, int b) { return features.response[a] > features.response[b]; });
 
-  std::vector<int> rows;
+  std::vector<int> indices;
   const auto wanted = static_cast<std::size_t>(std::min(most, features.count()));
-  for (std::size_t turn = 0; rows.size() < wanted; ++turn)
+  for (std::size_t turn = 0; indices.size() < wanted; ++turn)
     for (const std::vector<int>& cell : cells)
-      if (turn < cell.size() && rows.size() < wanted) rows.push_back(cell[turn]);
-  StereoFeatures thinned = features.select(rows);
+      if (turn < cell.size() && indices.size() < wanted) indices.push_back(cell[turn]);
+  StereoFeatures thinned = features.select(indices);
   thinned.patches = cv::Mat();
   thinned.patch_layout = {};
   return thinned;

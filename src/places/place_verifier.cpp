@@ -40,10 +40,10 @@ PlaceMatch PlaceVerifier::verify(const StereoFeatures& place, const StereoFeatur
     match.reason = motion.reason;
     return match;
   }
-  std::vector<int> rows;
-  for (const int i : motion.inliers) rows.push_back(matches[i].current);
-  match.inliers = static_cast<int>(rows.size());
-  match.coverage = coverage(current, rows);
+  std::vector<int> indices;
+  for (const int i : motion.inliers) indices.push_back(matches[i].current);
+  match.inliers = static_cast<int>(indices.size());
+  match.coverage = coverage(current, indices);
   match.rms = motion.rms;
   // exp(xi) T_camera_place inverted is T_place_camera exp(-xi): the covariance is the same, but for the noise of the
   // place's own view, which the motion's does not count.

@@ -16,7 +16,7 @@ double entropyOf(int some, int all) {
   return nats(some) + nats(all - some);
 }
 
-/// Rows of the features that a motion would have moved by more than `noise`, px.
+/// The features that a motion would have moved by more than `noise`, px.
 std::vector<bool> movedBy(const Eigen::Isometry3d& T_previous_current, const StereoFeatures& features, double noise) {
   const Eigen::Isometry3d T_current_previous = T_previous_current.inverse();
   std::vector<bool> moved(features.u.size());
@@ -40,26 +40,26 @@ bool RepeatedImages::shouldHaveMoved(const StereoFeatures& features, double nois
   return 2 * std::count(moved.begin(), moved.end(), true) > features.count();
 }
 
-std::vector<int> RepeatedImages::newRows(const StereoFeatures& features, double noise,
-                                         const std::optional<Eigen::Isometry3d>& T_previous_current) const {
-  std::vector<int> rows(features.u.size());
-  std::iota(rows.begin(), rows.end(), 0);
-  if (!T_previous_current) return rows;
+std::vector<int> RepeatedImages::newFeatures(const StereoFeatures& features, double noise,
+                                             const std::optional<Eigen::Isometry3d>& T_previous_current) const {
+  std::vector<int> indices(features.u.size());
+  std::iota(indices.begin(), indices.end(), 0);
+  if (!T_previous_current) return indices;
   std::vector<std::pair<float, float>> before(features_[0].size());
   for (std::size_t i = 0; i < before.size(); ++i) before[i] = {features_[0][i], features_[1][i]};
   std::sort(before.begin(), before.end());
   // What stands still in the image tells nothing.
   const std::vector<bool> moved = movedBy(*T_previous_current, features, noise);
   std::vector<int> order;
-  std::vector<bool> repeated(rows.size());
-  for (std::size_t i = 0; i < rows.size(); ++i) {
+  std::vector<bool> repeated(indices.size());
+  for (std::size_t i = 0; i < indices.size(); ++i) {
     if (!moved[i]) continue;
     order.push_back(static_cast<int>(i));
     repeated[i] = std::binary_search(before.begin(), before.end(), std::pair(features.u[i], features.v[i]));
   }
   const int count = static_cast<int>(order.size()),
             all_old = static_cast<int>(std::count(repeated.begin(), repeated.end(), true));
-  if (all_old < kFewestMeasured || count - all_old < kFewestMeasured) return rows;
+  if (all_old < kFewestMeasured || count - all_old < kFewestMeasured) return indices;
   std::sort(order.begin(), order.end(), [&](int a, int b) { return features.v[a] < features.v[b]; });
   std::vector<int> old{0};  // among the first so many from above
   for (const int i : order) old.push_back(old.back() + repeated[static_cast<std::size_t>(i)]);
@@ -72,7 +72,7 @@ std::vector<int> RepeatedImages::newRows(const StereoFeatures& features, double 
   }
   // Matches err at the tear. How much fewer nats tell old from new, against what some border of chance saves.
   const double saved = entropyOf(all_old, count) - entropyOf(count - best, count);
-  if (saved < std::log((count + 1) / kTailProbability)) return rows;
+  if (saved < std::log((count + 1) / kTailProbability)) return indices;
   const float tear =
       features.v[order[static_cast<std::size_t>(std::clamp(is_above ? border : border - 1, 0, count - 1))]];
   // A descriptor across the tear shows no point of the scene.
@@ -80,8 +80,8 @@ std::vector<int> RepeatedImages::newRows(const StereoFeatures& features, double 
     const float below = features.v[i] - tear;
     return std::abs(below) < 0.5f * features.size[i] || (is_above ? below < 0.f : below > 0.f);
   };
-  rows.erase(std::remove_if(rows.begin(), rows.end(), is_old), rows.end());
-  return rows;
+  indices.erase(std::remove_if(indices.begin(), indices.end(), is_old), indices.end());
+  return indices;
 }
 
 void RepeatedImages::remember(const StereoFeatures& features, bool stood) {

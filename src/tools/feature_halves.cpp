@@ -30,10 +30,10 @@ std::array<std::vector<int>, 2> FeatureHalves::split(const StereoFeatures& featu
     if (const int before = halfOfPrevious(match.u_previous, match.v_previous); before >= 0)
       half[static_cast<std::size_t>(match.current)] = before;
 
-  std::array<std::vector<int>, 2> rows;
-  for (std::size_t i = 0; i < count; ++i) rows[static_cast<std::size_t>(half[i])].push_back(static_cast<int>(i));
+  std::array<std::vector<int>, 2> indices;
+  for (std::size_t i = 0; i < count; ++i) indices[static_cast<std::size_t>(half[i])].push_back(static_cast<int>(i));
   u_ = features.u, v_ = features.v, half_ = std::move(half);
-  return rows;
+  return indices;
 }
 
 /// -1 where the previous pair had no feature.

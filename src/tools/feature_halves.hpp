@@ -13,7 +13,7 @@ namespace sdvo {
 /// a chequered pattern over the image, so neighbours, whose errors are alike, are together.
 class FeatureHalves {
  public:
-  /// Rows of both halves of the next pair. `flow`: its matches by an odometry on all features.
+  /// Indices of both halves' features of the next pair. `flow`: its matches by an odometry on all features.
   std::array<std::vector<int>, 2> split(const StereoFeatures& features, const std::vector<FeatureFlow>& flow);
 
  private:

@@ -76,9 +76,9 @@ void follow(sdvo::Recording& recording, const Arguments& arguments, Drive& drive
       }
       if (seen) seen->check.add(pair, features), seen->pictures.add(pair, features, drive.whole.last());
       if (arguments.halves) {
-        const auto rows = halves.split(features, drive.whole.last().flow);
-        drive.first.processFeatures(features.select(rows[0]));
-        drive.second.processFeatures(features.select(rows[1]));
+        const auto halved = halves.split(features, drive.whole.last().flow);
+        drive.first.processFeatures(features.select(halved[0]));
+        drive.second.processFeatures(features.select(halved[1]));
       }
     }
     if (progress) progress->step();

@@ -189,7 +189,7 @@ TEST_F(Competition, RejectedRowsAreNoInliers) {
   found.reject({3, 12});
   EXPECT_EQ(found.agreement.inliers, 18);
   EXPECT_EQ(found.agreement.lasting_inliers, 9);
-  EXPECT_EQ(found.inlierRows({3, 12}).size(), 18u);
+  EXPECT_EQ(found.inlierFeatures({3, 12}).size(), 18u);
 }
 
 TEST(FalseAlarms, AreThoseOfRandomMatches) {

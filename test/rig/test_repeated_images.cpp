@@ -47,7 +47,7 @@ void expectNewRows(const IsOld& is_old) {
   std::vector<int> expected;
   for (int i = 0; i < torn.count(); ++i)
     if (!is_old(torn.u[i], torn.v[i])) expected.push_back(i);
-  EXPECT_EQ(images.newRows(torn, kNoise, ahead()), expected);
+  EXPECT_EQ(images.newFeatures(torn, kNoise, ahead()), expected);
 }
 
 TEST(RepeatedImages, LeavesOutWhatIsDescribedAcrossTheTear) {
@@ -56,7 +56,7 @@ TEST(RepeatedImages, LeavesOutWhatIsDescribedAcrossTheTear) {
   for (const float v : {200.f, 225.f, 239.f, 240.f}) torn.append({320.f, v, 10.f, 0.f, 40.f, -1.f, 1.f});
   RepeatedImages images;
   images.remember(before, false);
-  const std::vector<int> rows = images.newRows(torn, kNoise, ahead());
+  const std::vector<int> rows = images.newFeatures(torn, kNoise, ahead());
   const auto has = [&](int from_last) {
     return std::find(rows.begin(), rows.end(), torn.count() - from_last) != rows.end();
   };
@@ -74,14 +74,15 @@ TEST(RepeatedImages, LeavesOutTheOldPartOfATornImage) {
 TEST(RepeatedImages, KeepsAllRowsOfOtherPairs) {
   const StereoFeatures before = seen(1), now = seen(2);
   RepeatedImages images;
-  EXPECT_EQ(static_cast<int>(images.newRows(now, kNoise, ahead()).size()), now.count()) << "the first pair";
+  EXPECT_EQ(static_cast<int>(images.newFeatures(now, kNoise, ahead()).size()), now.count()) << "the first pair";
   images.remember(before, false);
-  EXPECT_EQ(static_cast<int>(images.newRows(now, kNoise, ahead()).size()), now.count());
-  EXPECT_EQ(static_cast<int>(images.newRows(before, kNoise, ahead()).size()), before.count()) << "repeated as a whole";
+  EXPECT_EQ(static_cast<int>(images.newFeatures(now, kNoise, ahead()).size()), now.count());
+  EXPECT_EQ(static_cast<int>(images.newFeatures(before, kNoise, ahead()).size()), before.count())
+      << "repeated as a whole";
   // A camera without noise stands, and something moves in the middle of its view.
   const StereoFeatures mover =
       mixed(before, now, [](float u, float v) { return u < 200.f || u > 440.f || v < 150.f || v > 330.f; });
-  EXPECT_EQ(static_cast<int>(images.newRows(mover, kNoise, ahead()).size()), mover.count());
+  EXPECT_EQ(static_cast<int>(images.newFeatures(mover, kNoise, ahead()).size()), mover.count());
 }
 
 TEST(RepeatedImages, KeepsTheRowsOfACameraThatStands) {
@@ -90,9 +91,10 @@ TEST(RepeatedImages, KeepsTheRowsOfACameraThatStands) {
   const StereoFeatures now = mixed(before, seen(2), [](float, float v) { return v < 240.f; });
   RepeatedImages images;
   images.remember(before, false);
-  EXPECT_LT(static_cast<int>(images.newRows(now, kNoise, ahead()).size()), now.count());
-  EXPECT_EQ(static_cast<int>(images.newRows(now, kNoise, Eigen::Isometry3d::Identity()).size()), now.count());
-  EXPECT_EQ(static_cast<int>(images.newRows(now, kNoise, std::nullopt).size()), now.count()) << "nothing is expected";
+  EXPECT_LT(static_cast<int>(images.newFeatures(now, kNoise, ahead()).size()), now.count());
+  EXPECT_EQ(static_cast<int>(images.newFeatures(now, kNoise, Eigen::Isometry3d::Identity()).size()), now.count());
+  EXPECT_EQ(static_cast<int>(images.newFeatures(now, kNoise, std::nullopt).size()), now.count())
+      << "nothing is expected";
 }
 
 TEST(RepeatedImages, KnowsAPairToTheDigitAndWhetherItShouldHaveMoved) {

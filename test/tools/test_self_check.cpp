@@ -37,9 +37,9 @@ struct Drive {
       if (believed_baseline > 0.0) pair.camera.baseline = believed_baseline;
       if (k >= blind) pair = pair.select({});
       whole.processFeatures(pair);
-      const auto rows = halves.split(pair, whole.last().flow);
-      first.processFeatures(pair.select(rows[0]));
-      second.processFeatures(pair.select(rows[1]));
+      const auto halved = halves.split(pair, whole.last().flow);
+      first.processFeatures(pair.select(halved[0]));
+      second.processFeatures(pair.select(halved[1]));
       pairs.push_back(pair);
     }
     for (int k = kPairs - 1; k >= 0; --k) {

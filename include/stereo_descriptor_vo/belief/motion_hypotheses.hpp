@@ -54,7 +54,7 @@ struct MotionScene {
 struct MotionHypothesis {
   MotionEstimate motion;                       ///< since the map's newest pair
   std::shared_ptr<const LocalMap::View> view;  ///< of the map; one for all hypotheses of a pair
-  std::vector<FeatureMatch> matches;           ///< rows of the view to rows of the pair
+  std::vector<FeatureMatch> matches;           ///< indices of the view to those of the pair's features
   std::vector<Correspondence> correspondences;
   std::vector<LocalMap::Sighting> sightings;   ///< of the motion's inliers
   double gate = 0.0;                           ///< px: how far from their prediction matches may be
@@ -79,15 +79,15 @@ struct MotionHypothesis {
   int sightingsOf(int match) const;
   bool isLasting(int match) const { return sightingsOf(match) >= kLastingSightings; }
 
-  /// Rows of the pair that the inliers matched, but for the rejected ones.
-  std::vector<int> inlierRows(const std::vector<int>& rejected = {}) const;
+  /// Features of the pair that the inliers matched, but for the rejected ones.
+  std::vector<int> inlierFeatures(const std::vector<int>& rejected = {}) const;
 
   /// Of all matches and of the motion's inliers.
   void countAgreement();
-  /// The motion is this one, which leaves some of the inliers, by their rows of the pair, to the one that was found.
+  /// The motion is this one, which leaves some of the inliers, by their features, to the one that was found.
   void follow(const MotionScene& scene, const Eigen::Isometry3d& T_current_reference, const std::vector<int>& left);
-  /// Counts the inliers without these rows of the pair.
-  void reject(const std::vector<int>& rows);
+  /// Counts the inliers without these features of the pair.
+  void reject(const std::vector<int>& features);
 
   static constexpr int kLastingSightings = 4;
 };
@@ -137,7 +137,7 @@ double logOddsMisled(const MotionScene& scene, const MotionHypothesis& hypothesi
 /// returned has the rivals and the times of all. `threshold`, px, of an inlier.
 MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::vector<MotionHypothesis> hypotheses);
 
-/// Ratio of an 8x4 grid's cells over the image that hold one of the pair's rows.
-double coverage(const StereoFeatures& features, const std::vector<int>& rows);
+/// Ratio of an 8x4 grid's cells over the image that hold one of these features.
+double coverage(const StereoFeatures& features, const std::vector<int>& indices);
 
 }  // namespace sdvo

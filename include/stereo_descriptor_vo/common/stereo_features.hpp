@@ -77,8 +77,8 @@ struct StereoFeatures {
   /// Memory for so many of them.
   void reserve(int count);
 
-  /// The same pair with some of its rows, in the order given.
-  StereoFeatures select(const std::vector<int>& rows) const;
+  /// The same pair with some of its features, in the order given.
+  StereoFeatures select(const std::vector<int>& indices) const;
 
   /// The same points in pixels of another camera: their rays and depths stay.
   StereoFeatures seenBy(const StereoCamera& other) const;

@@ -10,7 +10,7 @@
 
 namespace sdvo {
 
-/// A key point in one view.
+/// A key point in one view: the left or the right image of a pair.
 struct ViewKeypoint {
   float u, v;   ///< px, sub-pixel
   float size;   ///< diameter, px

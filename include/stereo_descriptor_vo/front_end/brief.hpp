@@ -22,8 +22,8 @@ class Brief {
 
   explicit Brief(const cv::Mat& image) : image_(image) {}
 
-  /// Writes the kBytes of one row for a key point of diameter `size`, all px; its reach must lie inside the image.
-  void describe(double u, double v, double size, std::uint8_t* row) const;
+  /// Writes the kBytes of a key point of diameter `size`, all px; its reach must lie inside the image.
+  void describe(double u, double v, double size, std::uint8_t* descriptor) const;
 
  private:
   static constexpr double kHalfPatch = 24.0, kHalfBox = 4.5, kStandardSize = 7.0;

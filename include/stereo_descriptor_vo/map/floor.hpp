@@ -76,7 +76,7 @@ class FloorBelief {
  private:
   double height_ = 0.0;
   bool on_floor_ = true;  ///< at the last pose
-  int level_pairs_ = 0;   ///< in a row, level and at another height
+  int level_pairs_ = 0;   ///< consecutive ones, level and at another height
 };
 
 }  // namespace sdvo

@@ -189,6 +189,7 @@ class LocalMap {
   std::vector<int> sharedPoints() const;
   std::vector<double> parallaxToPredecessors(std::size_t frames) const;
   int lookedForSince() const;
+  /// Whether matches with a point are sought: from its second observation on, or while the only one is recent.
   static bool isLookedFor(const Point& point, int since);
   void removeFrame(std::size_t index);
   void cutOff(const std::vector<double>& squares, Adjustment& adjustment);

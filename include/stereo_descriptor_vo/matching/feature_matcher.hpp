@@ -12,11 +12,11 @@
 
 namespace sdvo {
 
-/// Points with a descriptor each: what features are matched to, be it another pair's or a map's.
+/// The reference of a match: points with a descriptor each, of another pair or of a map.
 struct DescribedPoints {
   DescriptorKind kind;
   std::vector<Eigen::Vector3d> positions;  ///< in the reference camera's left optical frame, m
-  cv::Mat descriptors;                     ///< rows x bytes, CV_8U
+  cv::Mat descriptors;                     ///< one in each row, CV_8U
 
   DescribedPoints() = default;
   /// The points of a pair; shares its descriptors.
@@ -52,8 +52,8 @@ struct FeatureMatcherOptions {
 
 /// A correspondence between described points, of another pair or of a map, and the features of a pair.
 struct FeatureMatch {
-  int reference;   ///< row of the reference
-  int current;     ///< row of the current features
+  int reference;   ///< index of the described point
+  int current;     ///< index of the pair's feature
   float distance;  ///< in [0, 1]: share of differing bits, or |a - b|^2 / (|a|^2 + |b|^2)
 };
 
@@ -64,7 +64,7 @@ class FeatureMatcher {
 
   const FeatureMatcherOptions& options() const { return options_; }
 
-  /// Matches in the order of the reference rows. With a prediction of the motion and gating on, only features near
+  /// Matches in the order of the reference's points. With a prediction of the motion and gating on, only features near
   /// their predicted position are compared. Throws std::invalid_argument when the descriptors are of different kinds.
   std::vector<FeatureMatch> match(const DescribedPoints& reference, const StereoFeatures& current,
                                   const std::optional<Eigen::Isometry3d>& T_current_reference) const;

@@ -15,14 +15,14 @@ namespace sdvo {
 
 /// (u_left, v_left, u_right) of a pair's feature, px, without the rig's error; its position in the left image is known
 /// better by `shift`, px.
-Eigen::Vector3d measurementOf(const StereoFeatures& features, int row, const RigCalibration& calibration,
+Eigen::Vector3d measurementOf(const StereoFeatures& features, int feature, const RigCalibration& calibration,
                               const Eigen::Vector2d& shift = Eigen::Vector2d::Zero());
 
 /// Measurements by a pair's features of the points that they were matched to.
 std::vector<Correspondence> correspond(const DescribedPoints& reference, const StereoFeatures& features,
                                        const std::vector<FeatureMatch>& matches, const RigCalibration& calibration);
 
-/// Described points in a pair, and from where it sees them.
+/// The view that a pair has of described points: its matches, and the pose that it sees them from.
 struct ViewMatch {
   std::vector<FeatureMatch> matches;
   std::vector<Correspondence> correspondences;  ///< one for each match

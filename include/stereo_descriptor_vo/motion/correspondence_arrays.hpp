@@ -8,7 +8,7 @@
 
 namespace sdvo {
 
-/// One point seen from two camera positions.
+/// One point seen from two camera positions: the reference, where the motion begins, and the current one.
 struct Correspondence {
   Eigen::Vector3d point;        ///< in the reference camera's left optical frame, m
   Eigen::Vector3d measurement;  ///< (u_left, v_left, u_right) in the current pair, px

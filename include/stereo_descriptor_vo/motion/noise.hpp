@@ -17,7 +17,7 @@ constexpr int kFewestMeasured = 20;
 /// Of what is usual: ratio of the past that a pair leaves, which are some ten pairs (chosen).
 constexpr double kUsualMemory = 0.9;
 
-/// px (chosen): patches and rectification err alike within such a part of the image.
+/// Side, px (chosen), of a part of the image within which the errors of patches and rectification are correlated.
 constexpr double kPart = 24.0;
 
 /// Square, in standard deviations, that so many normally distributed numbers exceed with that probability (chi-square).

@@ -15,17 +15,17 @@ namespace sdvo {
 /// Three different indices below `count`, drawn evenly.
 MinimalSample drawSample(std::mt19937& random, int count);
 
-/// Tells when enough samples were drawn: once it is likely that one of them was without outliers, but within limits.
+/// Bounds the number of samples: enough are drawn once it is likely that one of them was without outliers.
 class SampleBudget {
  public:
   /// `confidence`: probability that a sample without outliers is among those drawn.
   SampleBudget(int at_most, double confidence);
 
-  /// Takes note of the share of inliers of the best pose so far.
-  void noteInliers(double share);
+  /// Takes note of the inlier ratio of the best pose so far.
+  void noteInliers(double ratio);
 
   bool spent(int samples) const;
-  /// Share of the budget that is used up, 0…1.
+  /// Ratio of the budget that is used up, 0…1.
   double progress(int samples) const;
 
  private:

@@ -20,7 +20,7 @@ inline const char* toString(TrackingState state) {
 /// Where a matched feature was in the last measured pair, as predicted by the local map, and where it is now.
 struct FeatureFlow {
   float u_previous, v_previous;  ///< px, left image
-  int current;                   ///< row of the pair's features
+  int current;                   ///< index of the pair's feature
   bool inlier;                   ///< agrees with the motion that was found, used or not, and with the map
 };
 

@@ -28,7 +28,7 @@ struct OdometryStep {
   std::optional<Eigen::Isometry3d> T_previous_current;
   Matrix6d covariance = Matrix6d::Zero();  ///< of that motion
   Vector6d correction = Vector6d::Zero();  ///< the part of it that the map corrects
-  std::vector<int> rejected_rows;          ///< matched rows of the pair that the adjustment does not confirm
+  std::vector<int> rejected_features;      ///< matched features of the pair that the adjustment does not confirm
   double dt = 0.0;                         ///< over which that motion is, else since the previous pair, s
   double time = 0.0;                       ///< s
   bool starts_again = false;               ///< that motion began at no pose that was reported
@@ -74,9 +74,10 @@ struct OdometryState {
 
   void move(const Eigen::Isometry3d& T_previous_current);
 
-  /// Of a pair's rows; `all_rows` are those in the pair as it was given.
-  OdometryResult report(const StereoFeatures& features, const std::vector<int>& all_rows, const MotionHypothesis& found,
-                        const OdometryStep& step, const std::optional<Floor>& known_floor) const;
+  /// `given_indices`: of each feature in the pair as it was given.
+  OdometryResult report(const StereoFeatures& features, const std::vector<int>& given_indices,
+                        const MotionHypothesis& found, const OdometryStep& step,
+                        const std::optional<Floor>& known_floor) const;
 };
 
 }  // namespace sdvo

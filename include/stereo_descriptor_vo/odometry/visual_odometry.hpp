@@ -64,11 +64,11 @@ class VisualOdometry {
  private:
   using Step = OdometryStep;
 
-  /// A pair as it is searched: of the map's camera, without rows of the pair before, both images of one moment.
+  /// A pair as it is searched: of the map's camera, without features of the pair before, both images of one moment.
   struct Pair {
     const StereoFeatures& given;
     std::optional<StereoFeatures> refocused{}, new_part{}, in_step{};
-    std::vector<int> new_rows{};
+    std::vector<int> new_features{};
     double dt = 0.0;  ///< since the previous pair, s
     /// Without a map of its stream; after an outage; with images that repeat although the camera moved; after a pose.
     enum { kFirst, kSought, kFrozen, kFollowed } is = kFirst;

@@ -20,11 +20,11 @@ class RepeatedImages {
   static bool shouldHaveMoved(const StereoFeatures& features, double noise,
                               const Eigen::Isometry3d& T_previous_current);
 
-  /// Rows of the features whose part of the image is new, with the motion that is expected. From some row of a torn
+  /// Indices of the features whose part of the image is new, with the motion that is expected. From some row of a torn
   /// image on, or up to it, the left image is still that of the pair before. There features stand where they stood, to
   /// the digit, although they should have moved by more than `noise`, px.
-  std::vector<int> newRows(const StereoFeatures& features, double noise,
-                           const std::optional<Eigen::Isometry3d>& T_previous_current) const;
+  std::vector<int> newFeatures(const StereoFeatures& features, double noise,
+                               const std::optional<Eigen::Isometry3d>& T_previous_current) const;
 
   /// Whether the last two pairs that repeated the one before did so once each: the driver sends each pair twice.
   bool comeTwice() const { return in_a_row_ == 0 && single_ >= 2; }
