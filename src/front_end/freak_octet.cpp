@@ -110,12 +110,12 @@ struct CompareMeans {
     for (int first = 0; first < kOctet; first += kRegister)
       for (int byte = 0; byte < Freak::kBytes; byte += 4) {
         const Freak::FieldPair* pairs = &Freak::pairs()[static_cast<std::size_t>(8 * byte)];
-        IntRegister bits{}, bit = bits + 1;
+        UnsignedRegister bits{}, bit = bits + 1;
 #pragma GCC unroll 8
         for (int k = 0; k < 32; ++k, bit += bit) {
           Register a, b;
           load((*means)[pairs[k].first].data() + first, a), load((*means)[pairs[k].second].data() + first, b);
-          bits |= (a > b) & bit;
+          bits |= reinterpret_cast<UnsignedRegister>(a > b) & bit;
         }
         for (int k = 0; k < kRegister; ++k) {
           std::uint8_t* row = rows[first + k] + byte;
