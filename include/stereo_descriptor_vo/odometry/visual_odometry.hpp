@@ -46,9 +46,9 @@ class VisualOdometry {
   /// Tells that the clock was set: as breakStream(), and the next stamp may be any.
   void forgetTime();
 
-  /// Takes other options over while running. Those of `map`, with its `noise`, take effect at the next start, and
-  /// those of `calibration` when the estimate begins anew (a reset, another camera, a pair that the rig monitor
-  /// refused). If an option is out of its range, throws std::invalid_argument and keeps the old ones.
+  /// Takes other options over while running. Those of `map`, with its `noise`, take effect at the next start. Those of
+  /// `calibration` do when the estimate begins anew (a reset, another camera, a pair that the rig monitor refused).
+  /// Throws std::invalid_argument, and keeps the old ones, when an option is out of its range.
   void configure(const VisualOdometryOptions& options);
 
   const VisualOdometryOptions& options() const { return options_; }
