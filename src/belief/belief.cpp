@@ -20,7 +20,7 @@ void Doubt::raise(const std::vector<Evidence>& evidence) {
   for (const Evidence& each : evidence) raise(each.log_odds, each.cause);
 }
 
-void Doubt::pass() {
+void Doubt::fade() {
   // Pairs: half of those that make a point a lasting one, whose agreement is new evidence.
   constexpr double kHalfLife = 0.5 * MotionHypothesis::kLastingSightings;
   log_odds_ = kUnsuspected + (log_odds_ - kUnsuspected) * std::exp2(-1.0 / kHalfLife);

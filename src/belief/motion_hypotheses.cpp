@@ -149,28 +149,28 @@ class Explanations {
 };
 
 /// A motion that explains a part of the pair that the chosen one does not, and that chance does not either.
-struct Competitor {
+struct RivalMotion {
   const MotionHypothesis* hypothesis;
   double log_ratio;           ///< by how much it is likelier than the chosen one
   std::vector<int> features;  ///< of the pair, that it explains alone
 };
 
 /// Each motion once.
-std::vector<Competitor> rivalsOf(const MotionScene& scene, double threshold, const MotionHypothesis& chosen,
-                                 const std::vector<MotionHypothesis>& hypotheses, const Explanations& explanations,
-                                 std::size_t likeliest) {
+std::vector<RivalMotion> rivalsOf(const MotionScene& scene, double threshold, const MotionHypothesis& chosen,
+                                  const std::vector<MotionHypothesis>& hypotheses, const Explanations& explanations,
+                                  std::size_t likeliest) {
   const std::vector<int> own = sorted(chosen.inlierFeatures());
   const int left = chosen.agreement.matches - chosen.agreement.inliers;
-  std::vector<Competitor> rivals;
+  std::vector<RivalMotion> rivals;
   for (std::size_t k = 0; k < hypotheses.size(); ++k) {
     const MotionHypothesis& other = hypotheses[k];
     if (areOne(scene, chosen, other)) continue;
-    Competitor rival{&other, explanations.logRatio(k, likeliest), without(sorted(other.inlierFeatures()), own)};
+    RivalMotion rival{&other, explanations.logRatio(k, likeliest), without(sorted(other.inlierFeatures()), own)};
     const int features = static_cast<int>(rival.features.size());
     const double chance = chanceOfAgreement(threshold, other.gate);
     if (logFalseAlarms(std::max(left, features), features, chance) > std::log(kTailProbability)) continue;
     const auto same = std::find_if(rivals.begin(), rivals.end(),
-                                   [&](const Competitor& before) { return areOne(scene, *before.hypothesis, other); });
+                                   [&](const RivalMotion& before) { return areOne(scene, *before.hypothesis, other); });
     if (same == rivals.end())
       rivals.push_back(std::move(rival));
     else if (same->log_ratio < rival.log_ratio)
@@ -180,11 +180,11 @@ std::vector<Competitor> rivalsOf(const MotionScene& scene, double threshold, con
 }
 
 /// The chosen motion's probability, and the moment of the rivals around it.
-void compare(const MotionScene& scene, const std::vector<Competitor>& rivals, MotionHypothesis& chosen) {
+void compare(const MotionScene& scene, const std::vector<RivalMotion>& rivals, MotionHypothesis& chosen) {
   double total = 1.0;
-  for (const Competitor& rival : rivals) total += std::exp(rival.log_ratio);
+  for (const RivalMotion& rival : rivals) total += std::exp(rival.log_ratio);
   std::vector<int> explained;
-  for (const Competitor& rival : rivals) {
+  for (const RivalMotion& rival : rivals) {
     explained.insert(explained.end(), rival.features.begin(), rival.features.end());
     const Eigen::Isometry3d& T = rival.hypothesis->motion.T_current_reference;
     const double probability = std::exp(rival.log_ratio) / total;
@@ -217,13 +217,38 @@ double probabilityOf(double log_odds) {
   return 1.0 / (1.0 + std::exp(-log_odds));
 }
 
+PlaceBelief weigh(const FoundPlace& place, const std::vector<ExpectedMotion>& prior) {
+  const auto weight = [&](const Eigen::Isometry3d& T_current_newest) {
+    double log_weight = std::log(kTailProbability);  // the prior may be wrong
+    for (const ExpectedMotion& expected : prior)
+      log_weight = std::max(log_weight, -0.5 * expected.normalisedSquare(T_current_newest.inverse(), Matrix6d::Zero()));
+    return prior.empty() ? 1.0 : std::exp(log_weight);
+  };
+  Eigen::Isometry3d chosen = place.T_current_newest, other = place.alike.value_or(chosen);
+  if (weight(other) > weight(chosen)) std::swap(chosen, other);
+  PlaceBelief belief{chosen, Matrix6d::Zero(), ": the place may be another one"};
+  double total = weight(chosen);
+  if (place.alike) {
+    belief.moment += weight(other) * momentOf(logSE3(chosen * other.inverse()));
+    belief.reason = ": other places of the map look alike";
+    total += weight(other);
+  }
+  for (const ExpectedMotion& expected : prior) {
+    const double by_chance = kTailProbability * place.chance;
+    belief.moment += by_chance * (momentOf(expected.innovation(chosen.inverse())) + expected.covariance);
+    total += by_chance;
+  }
+  belief.moment /= total;
+  return belief;
+}
+
 int MotionHypothesis::sightingsOf(int match) const {
   return std::min(view->seen[static_cast<std::size_t>(matches[static_cast<std::size_t>(match)].reference)],
                   kLastingSightings);
 }
 
-void MotionHypothesis::follow(const MotionScene& scene, const Eigen::Isometry3d& T_current_reference,
-                              const std::vector<int>& left) {
+void MotionHypothesis::replaceMotion(const MotionScene& scene, const Eigen::Isometry3d& T_current_reference,
+                                     const std::vector<int>& left) {
   const Eigen::Isometry3d T_found = std::exchange(motion.T_current_reference, T_current_reference);
   const Eigen::Isometry3d apart = T_current_reference * T_found.inverse();
   const int points = static_cast<int>(motion.inliers.size()), of_other = static_cast<int>(left.size());

@@ -40,7 +40,7 @@ Matrix6d MotionPrior::stampNoise(const Vector6d& velocity) const {
   return shift * shift.transpose();
 }
 
-void MotionPrior::pass(double dt) {
+void MotionPrior::noteInterval(double dt) {
   interval_ = std::max(dt, kUsualMemory * interval_);
 }
 
@@ -106,8 +106,8 @@ std::string MotionPrior::tooFast(const Eigen::Isometry3d& motion, const Matrix6d
   return words.str();
 }
 
-void MotionPrior::measure(std::int64_t stamp, const Eigen::Isometry3d& motion, double dt, const Matrix6d& covariance,
-                          bool is_confirmed, const Matrix6d& doubt) {
+void MotionPrior::takeVelocity(std::int64_t stamp, const Eigen::Isometry3d& motion, double dt,
+                               const Matrix6d& covariance, bool is_confirmed, const Matrix6d& doubt) {
   doubt_ = doubt;
   const Vector6d velocity = logSE3(motion) / dt;
   // A motion may be that fast within the error of its stamps, but no other one after it.

@@ -267,7 +267,7 @@ void MotionSearch::keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_l
     inliers.push_back(i);
     sightings.push_back(found.sightings[static_cast<std::size_t>(k)]);
   }
-  found.follow(scene, T_lasting, left);
+  found.replaceMotion(scene, T_lasting, left);
   found.motion.inliers = std::move(inliers);
   found.sightings = std::move(sightings);
   found.countAgreement();

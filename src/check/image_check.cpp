@@ -150,7 +150,7 @@ void EmitterCheck::add(const cv::Mat& image) {
   constexpr int kOldest = 20;  // pairs after which the light may be another
   constexpr int kColumns = 3, kRows = 2;
   constexpr std::size_t kFewest = 2;  // parts
-  constexpr double kMoved = 0.012;  // of the width; 5 px of 424, more than a dot's neighbourhood
+  constexpr double kMoved = 0.012;    // of the width; 5 px of 424, more than a dot's neighbourhood
   CoarseView view(image);
   const bool is_comparable = !view_.empty() && dots_.size() == image.size();
   const cv::Size coarse(view.size().width / kColumns, view.size().height / kRows);

@@ -8,12 +8,12 @@
 
 namespace sdvo {
 
-void OdometryCheck::add(const OdometryResult& result) {
+void OdometryCheck::add(const StereoFeatures& features, const OdometryResult& result) {
   if (result.state == TrackingState::kWaiting) return;
   (result.state == TrackingState::kTracking ? tracking_ : result.state == TrackingState::kLost ? lost_ : degraded_)++;
   if (result.state != TrackingState::kTracking) ++reasons_[result.reason];
   distance_ = result.distance;
-  if (std::isfinite(result.readout)) readout_ = {result.readout, result.readout_sigma};
+  readout_.add(features, result);
   if (!result.has_motion) return;
   inliers_.push_back(result.inliers);
   rotations_.push_back(Eigen::AngleAxisd(result.T_previous_current.rotation()).angle() * 180.0 / EIGEN_PI);
@@ -37,17 +37,15 @@ Finding OdometryCheck::judge() const {
 
 Finding OdometryCheck::shutter() const {
   const std::string step = "shutter";
-  if (!std::isfinite(readout_.sigma)) return {step, Verdict::kOpen, "too few pairs with a motion that changes", "turn"};
+  const auto readout = readout_.estimate();
+  if (!readout) return {step, Verdict::kOpen, "too few pairs with a motion that changes", "turn"};
   const std::string what =
-      text(1, "last row ", 1e3 * readout_.value, " ms later than the first, +- ", 1e3 * readout_.sigma);
-  if (readout_.isRolling()) return {step, Verdict::kWarn, what, "a rolling shutter: take cameras with a global one"};
+      text(1, "last row ", 1e3 * readout->value, " ms later than the first, +- ", 1e3 * readout->sigma);
+  if (readout->isRolling()) return {step, Verdict::kWarn, what, "a rolling shutter: take cameras with a global one"};
   return {step, Verdict::kOk, what, ""};
 }
 
-std::string doubtOfShutters(const RowDelay::Estimate& right, const RowReadout::Estimate& readout) {
-  if (readout.isRolling())
-    return text(0, "rows are taken one after the other, in ", 1e3 * readout.value,
-                " ms at least: the cameras need a global shutter");
+std::string doubtOfShutters(const RowDelay::Estimate& right) {
   if (!(std::abs(right.proved()) > RowDelay::kWarn)) return "";
   return text(1, "right images are taken ", 1e3 * std::abs(right.value), " +- ", 1e3 * right.sigma, " ms ",
               right.value > 0.0 ? "after" : "before",

@@ -1,21 +1,20 @@
 #pragma once
 
-#include <limits>
 #include <map>
 #include <string>
 #include <vector>
 
 #include "finding.hpp"
+#include "row_readout.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
 #include "stereo_descriptor_vo/rig/row_delay.hpp"
-#include "stereo_descriptor_vo/rig/row_readout.hpp"
 
 namespace sdvo {
 
 /// How the odometry fared: states, inliers, rotation from pair to pair.
 class OdometryCheck {
  public:
-  void add(const OdometryResult& result);
+  void add(const StereoFeatures& features, const OdometryResult& result);
 
   Finding judge() const;
   /// Whether all rows of an image are taken at one moment.
@@ -26,12 +25,12 @@ class OdometryCheck {
  private:
   int lost_ = 0, degraded_ = 0, tracking_ = 0;
   double distance_ = 0.0;  ///< m
-  RowReadout::Estimate readout_{0.0, std::numeric_limits<double>::infinity()};
+  RowReadout readout_;
   std::vector<double> inliers_, rotations_;
   std::map<std::string, int> reasons_;  ///< of what is not tracked
 };
 
-/// In words, if the rows of both images are not of one moment; empty: nothing is proved.
-std::string doubtOfShutters(const RowDelay::Estimate& right, const RowReadout::Estimate& readout);
+/// In words, if both images are not of one moment; empty: nothing is proved.
+std::string doubtOfShutters(const RowDelay::Estimate& right);
 
 }  // namespace sdvo

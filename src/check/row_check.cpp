@@ -60,7 +60,7 @@ void RowCheck::add(const cv::Mat& left, const cv::Mat& right, std::int64_t stamp
   const auto refined = track(left, right, points, in_right, 0), followed = track(left, before, points, in_before, 4);
   back = in_before;
   const auto returned = track(before, left, in_before, back, 0);
-  std::vector<RowDelay::Row> rows;
+  std::vector<RowDelay::Sample> rows;
   for (std::size_t i = 0; i < points.size(); ++i) {
     constexpr double kBlock = 1.5, kReturn = 0.5;  // px: a block is found to a pixel, a track returns (chosen)
     if (!refined[i] || distance(in_right[i], blocks[i]) > kBlock) continue;

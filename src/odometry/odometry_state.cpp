@@ -17,7 +17,8 @@ void reportMatches(const StereoFeatures& features, const std::vector<int>& given
   result.flow.reserve(found.matches.size());
   for (const FeatureMatch& match : found.matches) {
     const cv::Point3f& previous = found.view->pixels[match.reference];
-    result.flow.push_back({previous.x, previous.y, given_indices[static_cast<std::size_t>(match.current)], false});
+    result.flow.push_back(
+        {previous.x, previous.y, previous.z, given_indices[static_cast<std::size_t>(match.current)], false});
   }
   for (const int i : found.motion.inliers)
     result.flow[i].inlier = std::find(rejected.begin(), rejected.end(), found.matches[i].current) == rejected.end();
@@ -39,8 +40,6 @@ void reportRig(const LearntRig& rig, OdometryResult& result) {
   }
   if (const auto delay = rig.right_delay.estimate())
     result.right_delay = delay->value, result.right_delay_sigma = delay->sigma;
-  if (const auto rolling = rig.readout.estimate())
-    result.readout = rolling->value, result.readout_sigma = rolling->sigma;
   if (const auto rotation = rig.usual_rows.rotation()) {
     result.right_rotation = rotation->value;
     result.right_rotation_sigma = rotation->covariance.diagonal().cwiseSqrt();

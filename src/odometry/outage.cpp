@@ -10,7 +10,7 @@ Eigen::Isometry3d MotionGuess::motion(const MotionPrior& prior, double dt) const
   return motion;
 }
 
-void Outage::pass(double dt, const std::optional<MotionGuess>& guess, const MotionPrior& prior) {
+void Outage::extend(double dt, const std::optional<MotionGuess>& guess, const MotionPrior& prior) {
   seconds_ += dt;
   if (!guess) followed_.reset();
   if (!followed_) return;

@@ -145,15 +145,16 @@ VisualOdometry::Pair VisualOdometry::usable(const StereoFeatures& given,
   if (static_cast<int>(pair.new_features.size()) < given.count())
     pair.new_part = pair.whole().select(pair.new_features);
   const StereoFeatures& taken = pair.taken();
+  pair.frozen = logOddsOfFrozen(taken, pair.dt, guess);
   if (!state_.map || !state_.map->continuedBy(taken))
     pair.is = Pair::kFirst;
   else if (state_.interrupted)
     pair.is = Pair::kSought;
-  else if (isFrozen(taken, pair.dt, guess))
+  else if (pair.frozen >= kCertain)
     pair.is = Pair::kFrozen;
   else
     pair.is = Pair::kFollowed;
-  if (pair.is == Pair::kFollowed || pair.is == Pair::kSought) pair.in_step = inStep(taken, pair.dt, guess);
+  if (pair.is == Pair::kFollowed || pair.is == Pair::kSought) pair.synchronised = synchronised(taken, pair.dt, guess);
   return pair;
 }
 
@@ -166,24 +167,26 @@ std::optional<Eigen::Isometry3d> VisualOdometry::expectedMotion(double dt,
 }
 
 /// A camera that repeats its images seems to stand. The guess, or the motion before, shows whether it does. A robot may
-/// stop from one pair to the next if the prior allows that; the first repeated pair decides.
-bool VisualOdometry::isFrozen(const StereoFeatures& features, double dt,
-                              const std::optional<MotionGuess>& guess) const {
-  if (!state_.images.repeat(features)) return false;
+/// stop from one pair to the next as far as the prior allows that; the first repeated pair decides.
+double VisualOdometry::logOddsOfFrozen(const StereoFeatures& features, double dt,
+                                       const std::optional<MotionGuess>& guess) const {
+  const RepeatedImages& images = state_.images;
+  if (!images.repeat(features)) return kUnsuspected;
   const auto moved = [&](const Eigen::Isometry3d& T_previous_current) {
     return RepeatedImages::shouldHaveMoved(features, state_.rig.noise.sameMotion(), T_previous_current);
   };
-  if (guess && !guess->rotation_only) return moved(guess->T_previous_current);
-  if (state_.frozen) return true;
+  if (guess && !guess->rotation_only) return moved(guess->T_previous_current) ? kCertain : kUnsuspected;
+  if (state_.frozen) return kCertain;
   Eigen::Isometry3d turn = Eigen::Isometry3d::Identity();
   if (guess) turn.linear() = guess->T_previous_current.linear();
-  if (moved(turn)) return true;
-  const auto expected = expectedMotion(dt, std::nullopt);
-  if (!expected || !moved(*expected)) return false;
+  if (moved(turn)) return kCertain;
   const auto prior = state_.prior.confirmed(*state_.last_stamp, dt);
-  // As likely as a repetition is without a cause, against a stop by the prior.
-  return state_.images.comeTwice() || state_.images.haveNoise() ||
-         (prior && 0.5 * prior->normalisedSquare(Eigen::Isometry3d::Identity(), Matrix6d::Zero()) > -kUnsuspected);
+  const auto expected = expectedMotion(dt, std::nullopt);
+  if (!prior || !moved(expected.value_or(prior->motion))) return kUnsuspected;
+  if (images.comeTwice() || images.haveNoise()) return kCertain;
+  if (images.inARow() > 0) return kUnsuspected;
+  // A stop and a driver at fault are equally likely beforehand.
+  return std::min(0.5 * prior->normalisedSquare(Eigen::Isometry3d::Identity(), Matrix6d::Zero()), kCertain);
 }
 
 /// The map, the pair, and the motion between them as it is expected: what was already covered by predicted pairs, and
@@ -216,16 +219,16 @@ MotionScene VisualOdometry::sceneOf(const LocalMap& map, const StereoFeatures& f
 
 /// The features as of one moment, if the right image is known to be late: by the velocity that is expected, then by
 /// the one that these show.
-std::optional<StereoFeatures> VisualOdometry::inStep(const StereoFeatures& taken, double dt,
-                                                     const std::optional<MotionGuess>& guess) const {
+std::optional<StereoFeatures> VisualOdometry::synchronised(const StereoFeatures& taken, double dt,
+                                                           const std::optional<MotionGuess>& guess) const {
   const std::optional<Vector6d>& velocity = state_.prior.velocity();
   const bool is_in_step = taken.right_delay == 0.0 && state_.rig.right_delay.compensated() == 0.0;
   if (is_in_step || !velocity || dt > options_.tracking.max_gap) return std::nullopt;
-  StereoFeatures features = state_.rig.right_delay.inStep(taken, dt, *velocity);
+  StereoFeatures features = state_.rig.right_delay.synchronised(taken, dt, *velocity);
   if (state_.interrupted) return features;
   const MotionHypothesis found = search_.find(sceneOf(*state_.map, features, dt, guess), largestDoubt());
   if (!found.motion.success) return features;
-  return state_.rig.right_delay.inStep(
+  return state_.rig.right_delay.synchronised(
       taken, dt,
       logSE3(found.motion.T_current_reference.inverse()) / state_.prior.interval(state_.map->secondsUntil(taken)));
 }
@@ -246,15 +249,14 @@ std::vector<Evidence> VisualOdometry::evidenceAgainst(const Pair& pair, const Mo
   // The map is of another rig than this pair.
   std::vector<Evidence> evidence{{rig.logOddsOfTurn(pair.features()), "the right camera seems to have turned"}};
   if (pair.features().report.refused) evidence.push_back({kCertain, "left and right did not belong together"});
+  evidence.push_back({pair.frozen, "images as of the previous pair, by a stop or a frozen driver"});
   // Unless the camera went unseen, the views may not be of one rigid world, and the next map would be as wrong.
   if (pair.is == Pair::kFollowed && !found.motion.success && found.agreement.matches >= kManyMatches &&
       pair.dt <= options_.tracking.max_gap)
     evidence.push_back({kCertain, "many matches agreed on no motion"});
   if (!measured) return evidence;
-  rig.readout.add(measured->features.camera, measured->T_current_reference, found.correspondences, found.motion.inliers,
-                  measured->velocity());
   rig.right_delay.watch(measured->rows, measured->dt, options_.noise.corner * rig.noise.scale());
-  const RightCameraDelay::Partner partner = rig.right_delay.partner(measured->dt);
+  const RightCameraDelay::OtherPair partner = rig.right_delay.otherPair(measured->dt);
   evidence.push_back({partner.log_odds, partner.words()});
   evidence.push_back(
       {kUnsuspected + state_.prior.logRatioOfSwap(measured->T_current_reference.inverse(), measured->since_reference),
@@ -275,33 +277,14 @@ std::optional<MotionScene> VisualOdometry::reacquire(const StereoFeatures& featu
   const auto place = reacquisition_.find(map, features, state_.rig.calibration.calibration());
   const double since = map.secondsUntil(features);
   if (place && state_.prior.tooFast(place->T_current_newest.inverse(), Matrix6d::Zero(), since).empty()) {
-    settle(*place, scene.emplace(sceneOf(map, features, 0.0, std::nullopt)));
+    scene.emplace(sceneOf(map, features, 0.0, std::nullopt));
+    scene->place = weigh(*place, scene->prior);
+    scene->T_current_reference = scene->place->T_current_newest;
     scene->prior.clear();
   } else if (state_.seed) {
     scene.emplace(sceneOf(*state_.seed, features, 0.0, std::nullopt));
   }
   return scene;
-}
-
-/// Where in the map a pair is: places that look alike are a mixture, and so is where the camera would be if it had gone
-/// on as before, if there is such a place and it looks alike by chance.
-void VisualOdometry::settle(const FoundPlace& place, MotionScene& scene) const {
-  const ExpectedMotion* const prior = scene.prior.empty() ? nullptr : &scene.prior.front();
-  const auto weight = [&](const Eigen::Isometry3d& T_current_newest) {
-    const double square = prior ? prior->normalisedSquare(T_current_newest.inverse(), Matrix6d::Zero()) : 0.0;
-    return std::max(std::exp(-0.5 * square), kTailProbability);  // the prior may be wrong
-  };
-  Eigen::Isometry3d chosen = place.T_current_newest, other = place.alike.value_or(chosen);
-  if (weight(other) > weight(chosen)) std::swap(chosen, other);
-  scene.T_current_reference = chosen;
-  double total = weight(chosen);
-  const auto add = [&](const Matrix6d& moment, double with) {
-    scene.place_moment += with * moment;
-    total += with;
-  };
-  if (place.alike) add(momentOf(logSE3(chosen * other.inverse())), weight(other));
-  if (prior) add(momentOf(prior->innovation(chosen.inverse())) + prior->covariance, kTailProbability * place.chance);
-  scene.place_moment /= total;
 }
 
 /// Takes note of the pair, whatever becomes of its motion.
@@ -311,8 +294,8 @@ void VisualOdometry::begin(const Pair& pair, const std::optional<MotionGuess>& g
   state_.camera = features.camera;
   state_.last_stamp = features.stamp;
   ++state_.pairs;
-  if (pair.dt <= options_.tracking.max_gap) state_.prior.pass(pair.dt);
-  state_.outage.pass(pair.dt, guess, state_.prior);
+  if (pair.dt <= options_.tracking.max_gap) state_.prior.noteInterval(pair.dt);
+  state_.outage.extend(pair.dt, guess, state_.prior);
   // What the pairs before told of the rig may be wrong already, and those after may be refused again.
   if (features.report.refused) state_.rig.calibration = CalibrationFilter(options_.calibration);
 }
@@ -322,7 +305,7 @@ void VisualOdometry::finish(const Pair& pair, Step& step) {
   const StereoFeatures& features = pair.features();
   // The depths of its points may be those of a wrong rig.
   if (features.report.refused && step.state == TrackingState::kLost) state_.map.reset();
-  state_.doubt.pass();
+  state_.doubt.fade();
   const auto stood = [&step] {
     const Vector6d motion = logSE3(*step.T_previous_current);
     return motion.dot(step.covariance.ldlt().solve(motion)) < noiseGate(6);
@@ -369,8 +352,8 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   const bool is_confirmed = step.state == TrackingState::kTracking;
   // A motion that is likely something else's predicts nothing.
   if (belief.probability >= 0.5)
-    state_.prior.measure(features.stamp, found.motion.T_current_reference.inverse(), since, measured, is_confirmed,
-                         step.covariance - measured);
+    state_.prior.takeVelocity(features.stamp, found.motion.T_current_reference.inverse(), since, measured, is_confirmed,
+                              step.covariance - measured);
   if (options_.planar.planar) {
     const std::string off = state_.floor.note(*floor(), state_.map->newestPose());
     if (step.reason.empty()) step.reason = off;
@@ -439,9 +422,12 @@ void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& fou
     state_.covariance.doubt(motion, pose);
   };
   add(found.rivals_moment, found.rivals_moment);
-  step.covariance += scene.place_moment;
-  state_.covariance.spread(scene.place_moment);
-  Matrix6d covariance = candidate.adjustment.since_keyframe + scene.place_moment;
+  Matrix6d covariance = candidate.adjustment.since_keyframe;
+  if (scene.place) {
+    step.covariance += scene.place->moment;
+    covariance += scene.place->moment;
+    state_.covariance.spread(scene.place->moment);
+  }
   std::string reason;
   if (found.innovation > noiseGate(6)) {
     // The stamps may be wrong, or the camera did what none does. The pose does not rest on stamps, but the velocity
@@ -461,7 +447,7 @@ void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& fou
     words << "a distance of " << candidate.distance << " m with a standard deviation of " << deviation
           << " m exceeds tracking/doubtful_deviation";
     if (reason.empty()) reason = words.str();
-    if (!scene.place_moment.isZero()) reason += ": other places of the map look alike";
+    if (scene.place) reason += scene.place->reason;
   }
   step.state = TrackingState::kDegraded;
   step.reason = "doubtful: " + reason;

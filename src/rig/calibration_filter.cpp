@@ -18,19 +18,19 @@ CalibrationFilter::CalibrationFilter(const CalibrationOptions& options) : option
   calibration_.value << options_.prior_offset, options_.prior_bend;
 }
 
-CalibrationFilter::Evidence CalibrationFilter::pastBefore(int oldest_id) const {
+CalibrationFilter::Information CalibrationFilter::pastBefore(int oldest_id) const {
   if (!pending_ || pending_->newest_id >= oldest_id) return past_;
   return pending_->evidence;
 }
 
 /// What the options say beforehand, as far as the evidence leaves it its weight.
-CalibrationFilter::Evidence CalibrationFilter::beforehand() const {
+CalibrationFilter::Information CalibrationFilter::beforehand() const {
   const RigCalibration::Matrix information = informationOf(significantSpread());
   return {information, information * RigCalibration::Vector(options_.prior_offset, options_.prior_bend)};
 }
 
 CalibrationBelief CalibrationFilter::prior(int oldest_id) const {
-  const Evidence past = pastBefore(oldest_id), held = beforehand();
+  const Information past = pastBefore(oldest_id), held = beforehand();
   const RigCalibration::Matrix information = held.information + past.information;
   CalibrationBelief belief{information.inverse() * (held.information_mean + past.information_mean), information};
   if (options_.enabled)
@@ -70,12 +70,12 @@ void CalibrationFilter::noteCommon(double square) {
 
 void CalibrationFilter::note(int oldest_id, int newest_id, const RigCalibration& calibration,
                              const RigCalibration::Matrix& information) {
-  const Evidence held = beforehand();
+  const Information held = beforehand();
   past_ = pastBefore(oldest_id);
   if (pending_ && pending_->newest_id < oldest_id) pending_.reset();
   calibration_ = calibration;
   const RigCalibration::Matrix known = past_.information + information;
-  present_ = Evidence{known, (held.information + known) * calibration.value - held.information_mean};
+  present_ = Information{known, (held.information + known) * calibration.value - held.information_mean};
   if (!pending_) pending_ = {newest_id, {information, present_->information_mean - past_.information_mean}};
 }
 
@@ -83,7 +83,7 @@ CalibrationEstimate CalibrationFilter::estimate() const {
   const RigCalibration::Vector prior(options_.prior_offset, options_.prior_bend);
   if (!options_.enabled) return {prior, RigCalibration::Matrix::Zero()};
   const RigCalibration::Matrix of_prior = informationOf(RigCalibration::Vector::Constant(options_.prior_sigma));
-  const Evidence known = present_.value_or(Evidence());
+  const Information known = present_.value_or(Information());
   const RigCalibration::Matrix covariance = (of_prior + known.information).inverse();
   return {covariance * (of_prior * prior + known.information_mean), covariance / (options_.trust * options_.trust)};
 }

@@ -30,14 +30,14 @@ RightFlow rightFlow(const StereoCamera& camera, const Vector6d& velocity, double
 }
 
 /// Disparity (px) of a feature without the delay, and its velocity in the right image (px/s) during the delay.
-struct InStep {
+struct Synchronised {
   double disparity;
   Eigen::Vector2d flow;
 };
 
-InStep inStep(const StereoFeatures& features, int i, double delay, const Vector6d& velocity) {
+Synchronised synchronised(const StereoFeatures& features, int i, double delay, const Vector6d& velocity) {
   const double u = features.u[i] - features.disparity[i], v = features.v[i] + features.dv[i];
-  InStep result{features.disparity[i], Eigen::Vector2d::Zero()};
+  Synchronised result{features.disparity[i], Eigen::Vector2d::Zero()};
   const int iterations = delay == 0.0 ? 1 : 2;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     // In the middle of the delay.
@@ -82,11 +82,11 @@ double errorRatio(const std::vector<RowMotion>& rows, double delay, double row_e
 
 /// By how much (logarithm of the ratio) the rows are likelier if the right image is late by `delay` than in step. Their
 /// variance is unknown, and errors within a part of the image are alike.
-double logRatioOfPartner(const std::vector<RowMotion>& rows, double delay, double row_error) {
+double logRatioOfOtherPair(const std::vector<RowMotion>& rows, double delay, double row_error) {
   const double parts = std::min<double>(static_cast<double>(rows.size()), RowDelay::kParts);
-  const double in_step = misfit(rows, delay < 0.0 ? delay * errorRatio(rows, delay, row_error) : 0.0);
+  const double synchronised = misfit(rows, delay < 0.0 ? delay * errorRatio(rows, delay, row_error) : 0.0);
   const double late = misfit(rows, delay);
-  return in_step == late ? 0.0 : 0.5 * parts * std::log(in_step / late);
+  return synchronised == late ? 0.0 : 0.5 * parts * std::log(synchronised / late);
 }
 
 constexpr int kRefutable = 30;         // pairs (chosen) within which a wrong partner is known
@@ -103,7 +103,7 @@ void RightCameraDelay::watch(const std::vector<RowMotion>& rows, double dt, doub
   for (auto* partner : {&earlier_, &later_}) {
     // Evidence fades without renewal, because a standing camera shows none.
     const double carried = kUnsuspected + kUsualMemory * (*partner - kUnsuspected);
-    *partner = std::clamp(carried + logRatioOfPartner(rows, partner == &earlier_ ? -dt : dt, row_error), kUnsuspected,
+    *partner = std::clamp(carried + logRatioOfOtherPair(rows, partner == &earlier_ ? -dt : dt, row_error), kUnsuspected,
                           kCertain);
   }
 }
@@ -124,13 +124,13 @@ void RightCameraDelay::learn(const StereoFeatures& features, double dt, const Ve
   if (++taught_ % kRefutable == 0) older_ = std::exchange(newer_, rows_);
 }
 
-RightCameraDelay::Partner RightCameraDelay::partner(double dt) const {
+RightCameraDelay::OtherPair RightCameraDelay::otherPair(double dt) const {
   const double known = compensated();
   if (2.0 * std::abs(known) > dt) return {known, kCertain};
-  return earlier_ > later_ ? Partner{-dt, earlier_} : Partner{dt, later_};
+  return earlier_ > later_ ? OtherPair{-dt, earlier_} : OtherPair{dt, later_};
 }
 
-std::string RightCameraDelay::Partner::words() const {
+std::string RightCameraDelay::OtherPair::words() const {
   std::ostringstream words;
   words << "the right image seemed to be that of another pair, taken " << std::round(1e3 * std::abs(delay)) << " ms "
         << (delay < 0.0 ? "earlier" : "later");
@@ -164,10 +164,10 @@ void RightCameraDelay::addRows(double dt) {
   const Vector6d at = (7.0 * near - far) / 12.0;
   const Vector6d during = velocityDuring(delay, dt, pairs_[1].velocity, at, pairs_[2].velocity);
   const Vector6d slow = 0.25 * (near + far);
-  std::vector<RowDelay::Row> rows;
+  std::vector<RowDelay::Sample> rows;
   rows.reserve(features.u.size());
   for (int i = 0; i < features.count(); ++i) {
-    const InStep step = sdvo::inStep(features, i, delay, during);
+    const Synchronised step = sdvo::synchronised(features, i, delay, during);
     const RightFlow turning = rightFlow(features.camera, slow, features.u[i] - features.disparity[i], features.v[i]);
     rows.push_back({RowDelay::cellOf(features.u[i], features.v[i], features.camera.width, features.camera.height),
                     features.dv[i] - stamped * step.flow.y(), step.flow.y(), turning.far.y(), step.disparity});
@@ -181,7 +181,8 @@ double RightCameraDelay::compensated() const {
   return prior_ + found->proved(prior_);
 }
 
-StereoFeatures RightCameraDelay::inStep(const StereoFeatures& features, double dt, const Vector6d& velocity) const {
+StereoFeatures RightCameraDelay::synchronised(const StereoFeatures& features, double dt,
+                                              const Vector6d& velocity) const {
   const double delay = features.right_delay + compensated();
   // The velocity goes on as it changed.
   const Vector6d change = pairs_.empty() ? Vector6d::Zero() : Vector6d(velocity - pairs_.back().velocity);
@@ -190,7 +191,7 @@ StereoFeatures RightCameraDelay::inStep(const StereoFeatures& features, double d
   StereoFeatures result = features;
   result.right_delay = 0.0;
   for (int i = 0; i < features.count(); ++i) {
-    const InStep step = sdvo::inStep(features, i, delay, during);
+    const Synchronised step = sdvo::synchronised(features, i, delay, during);
     // In sideways motion the two views may be from one place.
     result.disparity[i] = static_cast<float>(std::clamp<double>(step.disparity, kFar, features.camera.width));
     result.dv[i] -= static_cast<float>(delay * step.flow.y());

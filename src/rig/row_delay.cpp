@@ -8,7 +8,7 @@ namespace sdvo {
 
 namespace {
 
-Eigen::Vector3d motionOf(const RowDelay::Row& row) {
+Eigen::Vector3d motionOf(const RowDelay::Sample& row) {
   return {row.turning, row.velocity, row.disparity};
 }
 
@@ -61,10 +61,10 @@ void RowDelay::Sums::add(double w, const Eigen::Vector3d& moved, double lower) {
 
 /// Least squares on the means of each part, with the weights of a Huber kernel. Differences within a part are left out:
 /// on a road they have the same pattern in all pairs, as has the rectification's error.
-void RowDelay::add(const std::vector<Row>& pair) {
+void RowDelay::add(const std::vector<Sample>& pair) {
   constexpr int kReweightings = 3;
   double square = 0.0;
-  for (const Row& row : pair) square += row.turning * row.turning;
+  for (const Sample& row : pair) square += row.turning * row.turning;
   if (!(square > least_turning_ * least_turning_ * static_cast<double>(pair.size()))) return;
 
   Cells past = cells_;

@@ -191,8 +191,7 @@ void OdometryDiagnostics::summarise(Status& status) const {
   }
   const auto level = last_->state == "TRACKING" ? Level::OK : last_->state == "LOST" ? Level::ERROR : Level::WARN;
   status.summary(level, last_->state + (last_->reason.empty() ? "" : ": " + last_->reason));
-  const std::string doubt =
-      doubtOfShutters({last_->right_delay, last_->right_delay_sigma}, {last_->readout, last_->readout_sigma});
+  const std::string doubt = doubtOfShutters({last_->right_delay, last_->right_delay_sigma});
   if (!doubt.empty()) status.mergeSummary(Level::WARN, doubt);
 }
 
@@ -203,8 +202,6 @@ void OdometryDiagnostics::addCalibration(Status& status) const {
         last_->disparity_offset, last_->disparity_offset_sigma, last_->disparity_bend, last_->disparity_bend_sigma);
   if (std::isfinite(last_->right_delay))
     status.addf("right camera delay [ms]", "%.2f +- %.2f", 1e3 * last_->right_delay, 1e3 * last_->right_delay_sigma);
-  if (std::isfinite(last_->readout))
-    status.addf("readout [ms]", "%.1f +- %.1f", 1e3 * last_->readout, 1e3 * last_->readout_sigma);
   if (std::isfinite(last_->right_rotation[0]))
     status.addf("right camera rotation [mrad]", "%.2f %.2f %.2f", 1e3 * last_->right_rotation[0],
                 1e3 * last_->right_rotation[1], 1e3 * last_->right_rotation[2]);

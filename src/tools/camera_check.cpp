@@ -25,7 +25,7 @@ void CameraCheck::add(const RecordedPair& pair, const StereoFeatures& features) 
   rows_.add(pair.left, pair.right, pair.stamp);
   images_.add(pair.left, pair.right, features.report);
   emitter_.add(pair.left);
-  odometry_.add(run_.last());
+  odometry_.add(features, run_.last());
   cv::vconcat(pair.left, pair.right, picture_);
 }
 

@@ -20,7 +20,7 @@ TEST(Doubt, FadesByHalves) {
   doubt.raise({{0.0, "less"}});
   EXPECT_EQ(doubt.cause(), "a knock");
   int doubtful = 0;
-  for (; doubt.logOdds() > logOdds(0.05); ++doubtful) doubt.pass();
+  for (; doubt.logOdds() > logOdds(0.05); ++doubtful) doubt.fade();
   EXPECT_EQ(doubtful, 4) << "as many pairs as make a point a lasting one";
   doubt.raise({{50.0, "anything"}});
   EXPECT_LE(doubt.logOdds(), kCertain);
@@ -31,7 +31,7 @@ TEST(Doubt, LastsUntilItSaysNothing) {
   Doubt doubt = after(logOdds(0.05), "a knock");
   EXPECT_TRUE(doubt.lasts());
   int pairs = 0;
-  for (; doubt.lasts(); ++pairs) doubt.pass();
+  for (; doubt.lasts(); ++pairs) doubt.fade();
   EXPECT_NEAR(probabilityOf(doubt.logOdds()), 0.0015, 0.0005);
   EXPECT_GT(pairs, 4) << "longer than it makes a motion doubtful";
 }
@@ -75,7 +75,7 @@ TEST_F(Weighed, EvidenceMakesThePairDoubtfulWhateverAgrees) {
 
 TEST_F(Weighed, LastingPointsTakeADoubtBack) {
   Doubt agreed = after(kCertain, "a knock"), contradicted = agreed;
-  agreed.pass(), contradicted.pass();
+  agreed.fade(), contradicted.fade();
   EXPECT_GT(weigh(agreed, 95).probability, 0.95) << "in the next pair";
   const Belief belief = weigh(contradicted, 10);
   EXPECT_LT(belief.probability, 0.01);
@@ -85,7 +85,7 @@ TEST_F(Weighed, LastingPointsTakeADoubtBack) {
 TEST_F(Weighed, ADoubtThatLastsIsOneEventOfThePose) {
   Doubt doubt;
   const Belief first = weigh(doubt, 10, {{kCertain, "a knock"}});
-  doubt.pass();
+  doubt.fade();
   const Belief second = weigh(doubt, 10, {{kCertain, "a knock"}});
   EXPECT_NEAR(second.moment(2, 2), first.moment(2, 2), 0.01);
   EXPECT_NEAR(second.pose_moment(2, 2), 2.0 * first.pose_moment(2, 2), 0.01) << "both motions may be wrong";

@@ -26,7 +26,7 @@ MotionPriorOptions withoutStampErrors() {
 /// After 0.1 s at 3 m/s, up to the second second.
 MotionPrior moving(const MotionPriorOptions& options, const Matrix6d& covariance = Matrix6d::Zero()) {
   MotionPrior prior(options);
-  prior.measure(kSecond, ahead(0.3), 0.1, covariance, true, Matrix6d::Zero());
+  prior.takeVelocity(kSecond, ahead(0.3), 0.1, covariance, true, Matrix6d::Zero());
   return prior;
 }
 
@@ -72,16 +72,16 @@ TEST(MotionPrior, StampsMakeTheWayUncertainNotTheSides) {
 
 TEST(MotionPrior, APredictionWithinABurstIsAsUncertainAsTheIntervalBefore) {
   MotionPrior prior = moving({});
-  prior.pass(0.1);
-  prior.pass(0.001);
+  prior.noteInterval(0.1);
+  prior.noteInterval(0.001);
   EXPECT_GT(std::sqrt(prior.predicted(0.001).covariance(2, 2)), 3.0 * 0.079);
-  for (int i = 0; i < 100; ++i) prior.pass(0.001);
+  for (int i = 0; i < 100; ++i) prior.noteInterval(0.001);
   EXPECT_LT(std::sqrt(prior.predicted(0.001).covariance(2, 2)), 1e-3);
 }
 
 TEST(MotionPrior, ADoubtfulMotionPredictsAndConfirmsNothing) {
   MotionPrior prior = moving({});
-  prior.measure(2 * kSecond, ahead(0.9), 0.1, Matrix6d::Zero(), false, Matrix6d::Identity());
+  prior.takeVelocity(2 * kSecond, ahead(0.9), 0.1, Matrix6d::Zero(), false, Matrix6d::Identity());
   EXPECT_NEAR((*prior.velocity())[2], 9.0, 1e-12);
   EXPECT_GT(prior.predicted(0.1).covariance(2, 2), 1.0);
   EXPECT_NEAR(prior.confirmed(2 * kSecond, 0.1)->motion.translation().z(), 0.3, 1e-12);
@@ -96,8 +96,8 @@ TEST(MotionPrior, APairThatGoesBackAfterOneThatWentTwiceAsFarChangedPlacesWithIt
   constexpr double kStep = 0.1, kBack = -0.09;  // s; m, what a walker goes meanwhile
   MotionPrior prior({});
   EXPECT_EQ(prior.logRatioOfSwap(ahead(kBack), kStep), 0.0);
-  prior.measure(kSecond, ahead(0.09), kStep, Matrix6d::Zero(), true, Matrix6d::Zero());
-  prior.measure(kSecond + kSecond / 10, ahead(0.18), kStep, Matrix6d::Zero(), true, Matrix6d::Zero());
+  prior.takeVelocity(kSecond, ahead(0.09), kStep, Matrix6d::Zero(), true, Matrix6d::Zero());
+  prior.takeVelocity(kSecond + kSecond / 10, ahead(0.18), kStep, Matrix6d::Zero(), true, Matrix6d::Zero());
   EXPECT_GT(prior.logRatioOfSwap(ahead(kBack), kStep), 6.9) << "a thousand times as likely";
   EXPECT_LT(prior.logRatioOfSwap(ahead(0.18), kStep), 0.0) << "it became faster";
   EXPECT_LT(prior.logRatioOfSwap(ahead(0.09), kStep), 0.0);
@@ -106,7 +106,7 @@ TEST(MotionPrior, APairThatGoesBackAfterOneThatWentTwiceAsFarChangedPlacesWithIt
 TEST(MotionPrior, ATurnThatIsReversedIsNoSwap) {
   MotionPrior prior({});
   for (int i = 0; i < 2; ++i)
-    prior.measure((1 + i) * kSecond, ahead(0.0, 0.2), 0.1, Matrix6d::Zero(), true, Matrix6d::Zero());
+    prior.takeVelocity((1 + i) * kSecond, ahead(0.0, 0.2), 0.1, Matrix6d::Zero(), true, Matrix6d::Zero());
   EXPECT_LT(prior.logRatioOfSwap(ahead(0.0, -0.2), 0.1), 0.0) << "both would be beyond what a camera does";
 }
 

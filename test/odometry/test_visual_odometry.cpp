@@ -640,8 +640,36 @@ TEST(VisualOdometry, ImagesWithNoiseThatRepeatAreFrozenHoweverSlowTheCameraIs) {
     StereoFeatures repeated = slowAt(12);
     repeated.stamp = stampOf(13);
     result = odometry.update(repeated);
-    EXPECT_EQ(result.reason.find("frozen") != std::string::npos, noise > 0.0) << result.reason;
+    EXPECT_EQ(result.reason.find("is the driver frozen?") != std::string::npos, noise > 0.0) << result.reason;
   }
+}
+
+TEST(VisualOdometry, AStopAtOnceIsDoubtfulForAPairAndBelievedAfterIt) {
+  // At 0.4 m/s, which the prior lets it stop within a pair: the images may as well be those of a frozen driver.
+  const auto slowAt = [](int i, int at) {
+    synthetic::Sighting sighting;
+    sighting.noise = 0.0;
+    sighting.max_depth = 25.0;
+    const Eigen::Isometry3d pose = expSE3((Vector6d() << 0.04 * i, 0, 0, 0, 0, 0).finished());
+    return synthetic::observe(street(), synthetic::camera(), pose.inverse(), stampOf(at), sighting);
+  };
+  VisualOdometry odometry({});
+  OdometryResult moving;
+  for (int i = 0; i <= 8; ++i) moving = odometry.update(slowAt(i, i));
+  ASSERT_EQ(moving.state, TrackingState::kTracking) << moving.reason;
+  const OdometryResult first = odometry.update(slowAt(8, 9));
+  EXPECT_EQ(first.state, TrackingState::kDegraded);
+  EXPECT_NE(first.reason.find("images as of the previous pair"), std::string::npos) << first.reason;
+  const Vector6d gone_on = logSE3(moving.T_previous_current);
+  EXPECT_LT(gone_on.dot(first.motion_covariance.ldlt().solve(gone_on)), 20.0) << "it may have gone on";
+  OdometryResult standing;
+  for (int i = 10; i <= 14; ++i) standing = odometry.update(slowAt(8, i));
+  EXPECT_EQ(standing.state, TrackingState::kTracking) << standing.reason;
+  // The map shows that it has not gone on.
+  OdometryResult again;
+  for (int i = 9; i <= 12; ++i) again = odometry.update(slowAt(i, i + 6));
+  EXPECT_EQ(again.epoch, moving.epoch);
+  EXPECT_LT(std::sqrt(again.pose_covariance.topLeftCorner<3, 3>().trace()), 0.02);
 }
 
 TEST(VisualOdometry, APairThatComesTwiceIsMeasuredOnce) {

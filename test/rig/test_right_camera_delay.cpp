@@ -65,10 +65,10 @@ RightCameraDelay watched(double delay, int pairs) {
 TEST(RightCameraDelay, PutsFeaturesInStep) {
   for (const double delay : {-0.006, 0.006}) {
     const Vector6d velocity = velocityAt(1.0);
-    const StereoFeatures late = seen(velocity, delay), in_step = seen(velocity, 0.0);
-    const StereoFeatures corrected = RightCameraDelay(delay).inStep(late, kPeriod, velocity);
+    const StereoFeatures late = seen(velocity, delay), synchronised = seen(velocity, 0.0);
+    const StereoFeatures corrected = RightCameraDelay(delay).synchronised(late, kPeriod, velocity);
     for (int i = 0; i < late.count(); ++i) {
-      EXPECT_NEAR(corrected.disparity[i], in_step.disparity[i], 0.02) << late.disparity[i];
+      EXPECT_NEAR(corrected.disparity[i], synchronised.disparity[i], 0.02) << late.disparity[i];
       EXPECT_NEAR(corrected.dv[i], 0.0, 0.02) << late.dv[i];
     }
   }
@@ -79,7 +79,7 @@ TEST(RightCameraDelay, KeepsPointsThatNoiseWouldPutBeyondInfinity) {
   turn[4] = -2.0;
   StereoFeatures far = seen(Vector6d::Zero(), 0.0);
   for (float& disparity : far.disparity) disparity = 0.5f;
-  const StereoFeatures corrected = RightCameraDelay(-0.01).inStep(far, kPeriod, turn);
+  const StereoFeatures corrected = RightCameraDelay(-0.01).synchronised(far, kPeriod, turn);
   ASSERT_EQ(corrected.count(), far.count());
   for (const float disparity : corrected.disparity) EXPECT_GT(disparity, 0.f);
 }
@@ -104,12 +104,12 @@ TEST(RightCameraDelay, StampsOfFreeRunningCamerasAreKnownDelays) {
     return features;
   };
   for (int k = 0; k < 120; ++k) {
-    const StereoFeatures in_step = seen(velocityAt(kPeriod * k), 0.0);
-    const StereoFeatures corrected = right_delay.inStep(pair(k, 0.0), kPeriod, before(k));
+    const StereoFeatures synchronised = seen(velocityAt(kPeriod * k), 0.0);
+    const StereoFeatures corrected = right_delay.synchronised(pair(k, 0.0), kPeriod, before(k));
     EXPECT_EQ(corrected.right_delay, 0.0);
     constexpr double kHalfAMillisecond = 0.5;  // px, at 1 px/ms
-    for (int i = 0; i < in_step.count() && k >= 100; ++i)
-      EXPECT_NEAR(corrected.disparity[i], in_step.disparity[i], kHalfAMillisecond) << k;
+    for (int i = 0; i < synchronised.count() && k >= 100; ++i)
+      EXPECT_NEAR(corrected.disparity[i], synchronised.disparity[i], kHalfAMillisecond) << k;
     right_delay.learn(pair(k, 0.1), kPeriod, before(k), true);
   }
   EXPECT_NEAR(right_delay.compensated(), kOffset, 5e-4);
@@ -137,9 +137,9 @@ TEST(RightCameraDelay, KnowsThePartnerOfAnotherPair) {
     const StereoFeatures features = seen(velocity, delay, 0.15);
     right_delay.watch(rowsOf(features, velocity), kPeriod, kRowError);
     const bool is_another = std::abs(delay) == kPeriod;
-    EXPECT_EQ(right_delay.partner(kPeriod).log_odds > 0.0, is_another) << delay;
+    EXPECT_EQ(right_delay.otherPair(kPeriod).log_odds > 0.0, is_another) << delay;
     if (is_another) {
-      EXPECT_EQ(right_delay.partner(kPeriod).delay, delay);
+      EXPECT_EQ(right_delay.otherPair(kPeriod).delay, delay);
     }
   }
 }
@@ -149,7 +149,7 @@ TEST(RightCameraDelay, KnowsThePartnerUntilRowsInStepSayOtherwise) {
   const Vector6d velocity = velocityAt(1.0);
   const auto measure = [&](const StereoFeatures& features, const Vector6d& moved) {
     right_delay.watch(rowsOf(features, moved), kPeriod, kRowError);
-    return right_delay.partner(kPeriod).log_odds;
+    return right_delay.otherPair(kPeriod).log_odds;
   };
   const StereoFeatures late = seen(velocity, kPeriod, 0.15);
   EXPECT_GT(measure(late, velocity), 0.0);
@@ -175,7 +175,7 @@ TEST(RightCameraDelay, LeftImagesThatShiftWhileTheCameraStandsAreNoPartnerOfAnot
       rows.push_back({moved / kPeriod, noise(random) - moved});
     }
     right_delay.watch(rows, kPeriod, kRowError);
-    EXPECT_LT(right_delay.partner(kPeriod).log_odds, logOdds(0.05)) << pair;
+    EXPECT_LT(right_delay.otherPair(kPeriod).log_odds, logOdds(0.05)) << pair;
   }
 }
 
@@ -200,7 +200,7 @@ TEST(RightCameraDelay, TakesBackWhatPairsWithTheWrongPartnerTaught) {
   ASSERT_GT(taught, 3e-5);
   const Vector6d velocity = velocityAt(1.0);
   right_delay.watch(rowsOf(seen(velocity, -kPeriod, 0.15), velocity), kPeriod, kRowError);
-  ASSERT_GT(right_delay.partner(kPeriod).log_odds, 0.0);
+  ASSERT_GT(right_delay.otherPair(kPeriod).log_odds, 0.0);
   learn(115, -kPeriod);
   EXPECT_LT(std::abs(right_delay.estimate()->value - known), 0.5 * taught);
 }

@@ -17,8 +17,8 @@ class Rig {
   Rig(double delay, unsigned seed) : delay_(delay), random_(seed) {}
 
   /// 200 points of a view that goes down by `turning` px/s, and by `along` px/s for each px of disparity.
-  std::vector<RowDelay::Row> pair(double turning, double along) {
-    std::vector<RowDelay::Row> rows;
+  std::vector<RowDelay::Sample> pair(double turning, double along) {
+    std::vector<RowDelay::Sample> rows;
     for (int i = 0; i < 200; ++i) {
       const double u = 640.0 * uniform(), v = 480.0 * uniform(), disparity = 5.0 + 20.0 * uniform() * v / 480.0;
       const double velocity = turning + along * disparity * (v - 240.0) / 240.0;

@@ -38,7 +38,7 @@ class Doubt {
   /// A pair without a measured motion shows only this.
   void raise(const std::vector<Evidence>& evidence);
   /// A pair is over: doubt fades.
-  void pass();
+  void fade();
 
  private:
   void raise(double log_odds, const std::string& cause);

@@ -12,6 +12,7 @@
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/map/local_map.hpp"
+#include "stereo_descriptor_vo/map/reacquisition.hpp"
 #include "stereo_descriptor_vo/matching/feature_matcher.hpp"
 #include "stereo_descriptor_vo/motion/motion_estimator.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
@@ -33,6 +34,17 @@ constexpr double kUnsuspected = -6.9, kCertain = -kUnsuspected;
 double logOdds(double probability);
 double probabilityOf(double log_odds);
 
+/// Posterior of where in the map a pair is, after an outage.
+struct PlaceBelief {
+  Eigen::Isometry3d T_current_newest;  ///< of the likeliest place
+  Matrix6d moment;                     ///< second moment of its error, m and rad
+  std::string reason;                  ///< in words, what else it may be
+};
+
+/// Places that look alike are a mixture. So is the motion of a camera that went on as before (`prior`), if this place
+/// looks alike by chance.
+PlaceBelief weigh(const FoundPlace& place, const std::vector<ExpectedMotion>& prior);
+
 /// The input of a search for a pair's motion. The references must outlive it.
 struct MotionScene {
   const LocalMap& map;
@@ -46,8 +58,7 @@ struct MotionScene {
   bool is_doubted = false;            ///< … and likely is not
   double tolerance = 0.05;            ///< m: motions that differ by less than this and 3 % are equally good
   Noise noise{NoiseOptions()};
-  /// Second moment of the motion's error where the map has other places that look alike, m and rad.
-  Matrix6d place_moment = Matrix6d::Zero();
+  std::optional<PlaceBelief> place;  ///< of a pair that an outage's map shows
 };
 
 /// A motion that competes for being the camera's, and what speaks for it.
@@ -85,7 +96,8 @@ struct MotionHypothesis {
   /// Of all matches and of the motion's inliers.
   void countAgreement();
   /// The motion is this one, which leaves some of the inliers, by their features, to the one that was found.
-  void follow(const MotionScene& scene, const Eigen::Isometry3d& T_current_reference, const std::vector<int>& left);
+  void replaceMotion(const MotionScene& scene, const Eigen::Isometry3d& T_current_reference,
+                     const std::vector<int>& left);
   /// Counts the inliers without these features of the pair.
   void reject(const std::vector<int>& features);
 

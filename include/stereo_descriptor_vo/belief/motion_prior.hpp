@@ -52,7 +52,7 @@ class MotionPrior {
   void configure(const MotionPriorOptions& options) { options_ = options; }
 
   /// Takes note of the time since the pair before, s. Gaps longer than that over which motions are predicted are none.
-  void pass(double dt);
+  void noteInterval(double dt);
 
   /// Of the camera in its own frame, m/s and rad/s; none where no motion can be predicted.
   const std::optional<Vector6d>& velocity() const { return velocity_; }
@@ -82,8 +82,8 @@ class MotionPrior {
 
   /// Takes over the velocity of a measured motion. One in doubt predicts the next pair, but confirms nothing; what it
   /// is doubted by makes the prediction as uncertain.
-  void measure(std::int64_t stamp, const Eigen::Isometry3d& motion, double dt, const Matrix6d& covariance,
-               bool is_confirmed, const Matrix6d& doubt);
+  void takeVelocity(std::int64_t stamp, const Eigen::Isometry3d& motion, double dt, const Matrix6d& covariance,
+                    bool is_confirmed, const Matrix6d& doubt);
 
   /// The next pair does not continue the last one: no motion is predicted. The confirmed velocity stays.
   void interrupt() { velocity_.reset(), before_.reset(), doubt_.setZero(); }

@@ -19,9 +19,9 @@ inline const char* toString(TrackingState state) {
 
 /// Where a matched feature was in the last measured pair, as predicted by the local map, and where it is now.
 struct FeatureFlow {
-  float u_previous, v_previous;  ///< px, left image
-  int current;                   ///< index of the pair's feature
-  bool inlier;                   ///< agrees with the motion that was found, used or not, and with the map
+  float u_previous, v_previous, disparity_previous;  ///< px, left image
+  int current;                                       ///< index of the pair's feature
+  bool inlier;  ///< agrees with the motion that was found, used or not, and with the map
 };
 
 /// State, pose and motion after one pair. Everything published is derived from this one object.
@@ -57,8 +57,6 @@ struct OdometryResult {
   double disparity_bend_sigma = std::numeric_limits<double>::quiet_NaN();  ///< px
   double right_delay = std::numeric_limits<double>::quiet_NaN();           ///< of its images, s; compensated
   double right_delay_sigma = std::numeric_limits<double>::quiet_NaN();     ///< s
-  double readout = std::numeric_limits<double>::quiet_NaN();               ///< of a rolling shutter, s; a lower bound
-  double readout_sigma = std::numeric_limits<double>::quiet_NaN();         ///< s
   Eigen::Vector3d right_rotation = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());        ///< rad
   Eigen::Vector3d right_rotation_sigma = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());  ///< rad
 };

@@ -28,7 +28,7 @@ class Outage {
   };
 
   /// A pair comes `dt` s after the one before, with a guess of the motion between them, or with none.
-  void pass(double dt, const std::optional<MotionGuess>& guess, const MotionPrior& prior);
+  void extend(double dt, const std::optional<MotionGuess>& guess, const MotionPrior& prior);
 
   /// As guesses have it; nothing while one is missing since the last pose.
   const std::optional<Followed>& followed() const { return followed_; }

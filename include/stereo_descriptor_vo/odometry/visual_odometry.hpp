@@ -46,8 +46,8 @@ class VisualOdometry {
   /// Tells that the clock was set: as breakStream(), and the next stamp may be any.
   void forgetTime();
 
-  /// Takes other options over while running. Those of `map` take effect at the next start, those of
-  /// `calibration` when the estimate begins anew (a reset, another camera, a pair that the rig monitor refused).
+  /// Takes other options over while running. Those of `map`, with its `noise`, take effect at the next start. Those of
+  /// `calibration` do when the estimate begins anew (a reset, another camera, a pair that the rig monitor refused).
   /// Throws std::invalid_argument, and keeps the old ones, when an option is out of its range.
   void configure(const VisualOdometryOptions& options);
 
@@ -67,15 +67,16 @@ class VisualOdometry {
   /// A pair as it is searched: of the map's camera, without features of the pair before, both images of one moment.
   struct Pair {
     const StereoFeatures& given;
-    std::optional<StereoFeatures> refocused{}, new_part{}, in_step{};
+    std::optional<StereoFeatures> refocused{}, new_part{}, synchronised{};
     std::vector<int> new_features{};
-    double dt = 0.0;  ///< since the previous pair, s
-    /// Without a map of its stream; after an outage; with images that repeat although the camera moved; after a pose.
+    double dt = 0.0;               ///< since the previous pair, s
+    double frozen = kUnsuspected;  ///< log-odds that its images are old although the camera moved
+    /// Without a map of its stream; after an outage; with old images; after a pose.
     enum { kFirst, kSought, kFrozen, kFollowed } is = kFirst;
 
     const StereoFeatures& whole() const { return refocused ? *refocused : given; }
     const StereoFeatures& taken() const { return new_part ? *new_part : whole(); }
-    const StereoFeatures& features() const { return in_step ? *in_step : taken(); }
+    const StereoFeatures& features() const { return synchronised ? *synchronised : taken(); }
   };
 
   /// The map as it would be with the pair, adjusted. Nothing has changed until it is committed.
@@ -90,13 +91,12 @@ class VisualOdometry {
   void refuse(const StereoFeatures& features) const;
   Pair usable(const StereoFeatures& given, const std::optional<MotionGuess>& guess) const;
   std::optional<Eigen::Isometry3d> expectedMotion(double dt, const std::optional<MotionGuess>& guess) const;
-  bool isFrozen(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
-  std::optional<StereoFeatures> inStep(const StereoFeatures& taken, double dt,
-                                       const std::optional<MotionGuess>& guess) const;
+  double logOddsOfFrozen(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
+  std::optional<StereoFeatures> synchronised(const StereoFeatures& taken, double dt,
+                                             const std::optional<MotionGuess>& guess) const;
   MotionScene sceneOf(const LocalMap& map, const StereoFeatures& features, double dt,
                       const std::optional<MotionGuess>& guess) const;
   std::optional<MotionScene> reacquire(const StereoFeatures& features) const;
-  void settle(const FoundPlace& place, MotionScene& scene) const;
   double largestDoubt() const;
   std::optional<Floor> floor() const;
 

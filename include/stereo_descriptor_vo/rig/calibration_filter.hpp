@@ -57,25 +57,25 @@ class CalibrationFilter {
 
  private:
   /// Estimates of windows, the options' prior excluded, with the precision that the windows state.
-  struct Evidence {
+  struct Information {
     RigCalibration::Matrix information = RigCalibration::Matrix::Zero();       ///< 1/px^2
     RigCalibration::Vector information_mean = RigCalibration::Vector::Zero();  ///< information * mean
   };
   struct Contribution {
     int newest_id;
-    Evidence evidence;
+    Information evidence;
   };
 
-  Evidence pastBefore(int oldest_id) const;
-  Evidence beforehand() const;
+  Information pastBefore(int oldest_id) const;
+  Information beforehand() const;
   RigCalibration::Matrix informationOf(const RigCalibration::Vector& spread) const;
   RigCalibration::Vector significantSpread() const;
 
   CalibrationOptions options_;
   RigCalibration calibration_;
-  Evidence past_;                        ///< of the last window that shares no pair with the present one
+  Information past_;                     ///< of the last window that shares no pair with the present one
   std::optional<Contribution> pending_;  ///< the window that is the next one's past
-  std::optional<Evidence> present_;      ///< of the past and the last window
+  std::optional<Information> present_;   ///< of the past and the last window
   int commons_ = 0;                      ///< how many squares were noted
   double common_square_ = 0.0;
 };

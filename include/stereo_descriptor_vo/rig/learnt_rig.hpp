@@ -8,7 +8,6 @@
 #include "stereo_descriptor_vo/rig/calibration_filter.hpp"
 #include "stereo_descriptor_vo/rig/right_camera_delay.hpp"
 #include "stereo_descriptor_vo/rig/row_pattern.hpp"
-#include "stereo_descriptor_vo/rig/row_readout.hpp"
 
 namespace sdvo {
 
@@ -24,14 +23,13 @@ struct MeasuredPair {
   Vector6d velocity() const { return logSE3(T_current_reference.inverse()) / since_reference; }
 };
 
-/// Calibration, rows, delay, readout and noise of the rig, estimated from its pairs.
+/// Calibration, rows, delay and noise of the rig, estimated from its pairs.
 struct LearntRig {
   CalibrationFilter calibration;
   RowPattern usual_rows{RowDelay::kMemory};  ///< of confirmed pairs
   RowPattern recent_rows{kUsualMemory};      ///< of all pairs: of the rig that the map is of
   double usual_turn = 0.0;                   ///< px^2: square of the rows' change from pair to pair
   RightCameraDelay right_delay;
-  RowReadout readout;
   Noise noise;
   double usual_agreement = 0.9;  ///< ratio of lasting matches that agree with confirmed motions
 

@@ -26,6 +26,9 @@ class RepeatedImages {
   std::vector<int> newFeatures(const StereoFeatures& features, double noise,
                                const std::optional<Eigen::Isometry3d>& T_previous_current) const;
 
+  /// Repetitions up to the last pair.
+  int inARow() const { return in_a_row_; }
+
   /// Whether the last two pairs that repeated the one before did so once each: the driver sends each pair twice.
   bool comeTwice() const { return in_a_row_ == 0 && single_ >= 2; }
 

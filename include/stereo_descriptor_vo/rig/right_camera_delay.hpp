@@ -42,13 +42,13 @@ class RightCameraDelay {
   double compensated() const;
 
   /// Right images that are those of other pairs.
-  struct Partner {
+  struct OtherPair {
     double delay;     ///< s
     double log_odds;  ///< that it is so
     std::string words() const;
   };
   /// The likeliest one of a stream with a pair every `dt` s.
-  Partner partner(double dt) const;
+  OtherPair otherPair(double dt) const;
 
   /// Standard deviation of the position, m, from turns whose features were not compensated as they would be now, and
   /// from the error of what is known. A rig in step has none.
@@ -58,7 +58,7 @@ class RightCameraDelay {
 
   /// The features as the right camera would have seen them at the left one's moment. `velocity`: the mean over the
   /// `dt` s before the pair.
-  StereoFeatures inStep(const StereoFeatures& features, double dt, const Vector6d& velocity) const;
+  StereoFeatures synchronised(const StereoFeatures& features, double dt, const Vector6d& velocity) const;
 
  private:
   struct Pair {

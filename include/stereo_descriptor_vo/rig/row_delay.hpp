@@ -25,7 +25,7 @@ class RowDelay {
   static constexpr double kWarn = 0.002, kFail = 0.01;
 
   /// A point that both views show.
-  struct Row {
+  struct Sample {
     int cell;          ///< part of the image, row by row
     double dv;         ///< v_right - v_left, px
     double velocity;   ///< of its row in the right image, px/s
@@ -47,7 +47,7 @@ class RowDelay {
   RowDelay(double memory, double least_turning, int block = 1)
       : memory_(memory), least_turning_(least_turning), pairs_of_block_(block) {}
 
-  void add(const std::vector<Row>& pair);
+  void add(const std::vector<Sample>& pair);
 
   /// None while its standard deviation is larger than a delay may be, kFail.
   std::optional<Estimate> estimate() const;

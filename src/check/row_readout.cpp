@@ -1,29 +1,33 @@
-#include "stereo_descriptor_vo/rig/row_readout.hpp"
+#include "row_readout.hpp"
 
 #include <Eigen/Cholesky>
 #include <cmath>
 
 #include "stereo_descriptor_vo/motion/noise.hpp"
+#include "stereo_descriptor_vo/motion/pose_problem.hpp"
 
 namespace sdvo {
 
-void RowReadout::add(const StereoCamera& camera, const Eigen::Isometry3d& T_current_reference,
-                     const std::vector<Correspondence>& correspondences, const std::vector<int>& inliers,
-                     const Vector6d& velocity) {
-  if (static_cast<int>(inliers.size()) < kFewestMeasured) return;
+void RowReadout::add(const StereoFeatures& features, const OdometryResult& result) {
+  if (!result.has_motion || result.inliers < kFewestMeasured || !(result.dt > 0.0)) return;
+  const StereoCamera& camera = features.camera;
+  const Eigen::Isometry3d T_current_previous = result.T_previous_current.inverse();
   // The points were seen at the velocity of the last pairs.
-  const Vector6d change = velocity - usual_velocity_;
+  const Vector6d change = logSE3(result.T_previous_current) / result.dt - usual_velocity_;
   usual_velocity_ += (1.0 - kUsualMemory) * change;
   // The pose is a part of each pair's fit, so that only what no motion explains counts.
   using Row = Eigen::Matrix<double, 6, 1>;
   Matrix6d square = Matrix6d::Zero();
   Row by_shift = Row::Zero(), by_rest = Row::Zero();
   double shift_square = 0.0, product = 0.0;
-  for (const int i : inliers) {
-    const Correspondence& point = correspondences[i];
-    const auto residual = reprojectionResidual(camera, T_current_reference, point);
+  for (const FeatureFlow& flow : result.flow) {
+    if (!flow.inlier) continue;
+    const int i = flow.current;
+    const Correspondence point{camera.backProject(flow.u_previous, flow.v_previous, flow.disparity_previous),
+                               {features.u[i], features.v[i], features.u[i] - features.disparity[i]}};
+    const auto residual = reprojectionResidual(camera, T_current_previous, point);
     if (!residual) continue;
-    const Eigen::Matrix<double, 2, 6> jacobian = motionJacobian(camera, T_current_reference, point.point).topRows<2>();
+    const Eigen::Matrix<double, 2, 6> jacobian = motionJacobian(camera, T_current_previous, point.point).topRows<2>();
     // A static point moves in the camera's frame by the inverse of the camera's motion.
     const Eigen::Vector2d shift = (point.measurement.y() - camera.cy) / camera.height * (jacobian * -change);
     const Eigen::Vector2d rest = residual->head<2>();

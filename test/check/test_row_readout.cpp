@@ -1,12 +1,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numeric>
 #include <random>
 #include <vector>
 
+#include "../../src/check/row_readout.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/rig/row_readout.hpp"
 
 namespace sdvo {
 namespace test_row_readout {
@@ -21,18 +20,27 @@ RowReadout watched(double readout) {
   for (int pair = 0; pair < 60; ++pair) {
     Vector6d velocity;
     velocity << 0.2, 0.0, 0.5, 0.6 * std::sin(0.9 * pair), std::cos(0.7 * pair), 0.3 * std::sin(1.1 * pair);
-    std::vector<Correspondence> points;
+    StereoFeatures features;
+    features.camera = camera;
+    OdometryResult moved;
+    moved.has_motion = true;
+    moved.dt = 0.1;
+    moved.T_previous_current = expSE3(moved.dt * velocity);
+    moved.inliers = 200;
     for (int i = 0; i < 200; ++i) {
       const double u = camera.width * uniform(random), v = camera.height * uniform(random);
-      const Eigen::Vector3d point = camera.backProject(u, v, 10.0 + 30.0 * uniform(random));
+      const double disparity = 10.0 + 30.0 * uniform(random);
+      const Eigen::Vector3d point = camera.backProject(u, v, disparity);
       const double late = readout * (v - camera.cy) / camera.height;
-      Eigen::Vector3d pixel = camera.project(expSE3(late * velocity).inverse() * point);
-      for (int axis = 0; axis < 2; ++axis) pixel[axis] += 0.3 * normal(random);
-      points.push_back({point, pixel});
+      const Eigen::Vector3d pixel = camera.project(expSE3(late * velocity).inverse() * point);
+      const Eigen::Vector3d before = camera.project(moved.T_previous_current * point);
+      features.u.push_back(static_cast<float>(pixel.x() + 0.3 * normal(random)));
+      features.v.push_back(static_cast<float>(pixel.y() + 0.3 * normal(random)));
+      features.disparity.push_back(static_cast<float>(disparity));
+      moved.flow.push_back({static_cast<float>(before.x()), static_cast<float>(before.y()),
+                            static_cast<float>(before.x() - before.z()), i, true});
     }
-    std::vector<int> all(points.size());
-    std::iota(all.begin(), all.end(), 0);
-    result.add(camera, Eigen::Isometry3d::Identity(), points, all, velocity);
+    result.add(features, moved);
   }
   return result;
 }

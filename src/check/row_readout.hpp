@@ -1,12 +1,10 @@
 #pragma once
 
-#include <Eigen/Geometry>
 #include <optional>
-#include <vector>
 
 #include "stereo_descriptor_vo/common/se3.hpp"
-#include "stereo_descriptor_vo/common/stereo_camera.hpp"
-#include "stereo_descriptor_vo/motion/pose_problem.hpp"
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/odometry/odometry_result.hpp"
 #include "stereo_descriptor_vo/rig/row_delay.hpp"
 
 namespace sdvo {
@@ -26,11 +24,9 @@ class RowReadout {
     bool isRolling() const { return value > kWarn && value * value > RowDelay::kSquare * sigma * sigma; }
   };
 
-  /// A pair's motion since the reference, with the correspondences that agree with it, and the mean velocity (m/s and
-  /// rad/s, camera's frame).
-  void add(const StereoCamera& camera, const Eigen::Isometry3d& T_current_reference,
-           const std::vector<Correspondence>& correspondences, const std::vector<int>& inliers,
-           const Vector6d& velocity);
+  /// Takes in a pair with its motion, if that was measured. Its rows are compared with where the motion has the
+  /// inliers.
+  void add(const StereoFeatures& features, const OdometryResult& result);
 
   std::optional<Estimate> estimate() const;
 
