@@ -21,12 +21,12 @@ void RowReadout::add(const StereoFeatures& features, const OdometryResult& resul
   Row by_shift = Row::Zero(), by_rest = Row::Zero();
   double shift_square = 0.0, product = 0.0;
   for (const FeatureFlow& flow : result.flow) {
-    if (!flow.inlier) continue;
     const int i = flow.current;
     const Correspondence point{camera.backProject(flow.u_previous, flow.v_previous, flow.disparity_previous),
                                {features.u[i], features.v[i], features.u[i] - features.disparity[i]}};
     const auto residual = reprojectionResidual(camera, T_current_previous, point);
-    if (!residual) continue;
+    // Also what the adjustment rejects: it rejects rows that are late.
+    if (!residual || residual->norm() > NoiseOptions().inlierGate()) continue;
     const Eigen::Matrix<double, 2, 6> jacobian = motionJacobian(camera, T_current_previous, point.point).topRows<2>();
     // A static point moves in the camera's frame by the inverse of the camera's motion.
     const Eigen::Vector2d shift = (point.measurement.y() - camera.cy) / camera.height * (jacobian * -change);
