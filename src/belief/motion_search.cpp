@@ -87,7 +87,7 @@ bool MotionSearch::isBeyondDoubt(const MotionScene& scene, const MotionHypothesi
   if (lacking >= motion_options_.min_inliers) {
     constexpr int kSightings = MotionHypothesis::kLastingSightings;
     const int points = static_cast<int>(agree + lacking);
-    if (logLikelihood(kSightings * agree, points) - logLikelihood(kSightings * lacking, points) > max_doubt)
+    if (logLikelihood(kSightings * agree, points) - logLikelihood(kSightings * lacking, points) > kUnsuspected)
       return false;
   }
   return 2 * found.agreement.inlier_sightings >= found.agreement.sightings;

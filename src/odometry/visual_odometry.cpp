@@ -249,7 +249,8 @@ std::vector<Evidence> VisualOdometry::evidenceAgainst(const Pair& pair, const Mo
   // The map is of another rig than this pair.
   std::vector<Evidence> evidence{{rig.logOddsOfTurn(pair.features()), "the right camera seems to have turned"}};
   if (pair.features().report.refused) evidence.push_back({kCertain, "left and right did not belong together"});
-  evidence.push_back({pair.frozen, "images as of the previous pair, by a stop or a frozen driver"});
+  if (pair.is == Pair::kFollowed)
+    evidence.push_back({pair.frozen, "images as of the previous pair, by a stop or a frozen driver"});
   // Unless the camera went unseen, the views may not be of one rigid world, and the next map would be as wrong.
   if (pair.is == Pair::kFollowed && !found.motion.success && found.agreement.matches >= kManyMatches &&
       pair.dt <= options_.tracking.max_gap)
