@@ -76,7 +76,7 @@ TEST(ToInfo, IsUnderAKilobyteWithTheLongestReasons) {
 TEST(ToFlow, LeadsFromThePreviousPositionToThePresentOne) {
   OdometryResult result = trackedResult();
   const StereoFeatures features = someFeatures();
-  result.flow = {{10.f, 20.f, 3, true}, {30.f, 40.f, 0, false}};
+  result.flow = {{10.f, 20.f, 5.f, 3, true}, {30.f, 40.f, 5.f, 0, false}};
   const stereo_descriptor_vo::FeatureFlow flow = toFlow(result, features);
   EXPECT_EQ(flow.u_reference, (std::vector<float>{10.f, 30.f}));
   EXPECT_EQ(flow.v_reference, (std::vector<float>{20.f, 40.f}));
