@@ -257,8 +257,8 @@ std::vector<Evidence> VisualOdometry::evidenceAgainst(const Pair& pair, const Mo
     evidence.push_back({kCertain, "many matches agreed on no motion"});
   if (!measured) return evidence;
   rig.right_delay.watch(measured->rows, measured->dt, options_.noise.corner * rig.noise.scale());
-  const RightCameraDelay::OtherPair partner = rig.right_delay.otherPair(measured->dt);
-  evidence.push_back({partner.log_odds, partner.words()});
+  const RightCameraDelay::OtherPair other = rig.right_delay.otherPair(measured->dt);
+  evidence.push_back({other.log_odds, other.words()});
   evidence.push_back(
       {kUnsuspected + state_.prior.logRatioOfSwap(measured->T_current_reference.inverse(), measured->since_reference),
        "neighbouring pairs seemed to have changed places"});

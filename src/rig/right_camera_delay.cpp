@@ -89,7 +89,7 @@ double logRatioOfOtherPair(const std::vector<RowMotion>& rows, double delay, dou
   return synchronised == late ? 0.0 : 0.5 * parts * std::log(synchronised / late);
 }
 
-constexpr int kRefutable = 30;         // pairs (chosen) within which a wrong partner is known
+constexpr int kRefutable = 30;         // pairs (chosen) within which a wrong pair is known
 constexpr int kSamePoints = 2;         // pairs in a row whose errors are alike (chosen)
 constexpr double kLeastTurning = 2.0;  // px/s: rotations from images err by less
 
@@ -100,11 +100,11 @@ RightCameraDelay::RightCameraDelay(double prior)
 
 void RightCameraDelay::watch(const std::vector<RowMotion>& rows, double dt, double row_error) {
   if (rows.size() < kFewestMeasured || !(dt > 0.0)) return;
-  for (auto* partner : {&earlier_, &later_}) {
+  for (auto* other : {&earlier_, &later_}) {
     // Evidence fades without renewal, because a standing camera shows none.
-    const double carried = kUnsuspected + kUsualMemory * (*partner - kUnsuspected);
-    *partner = std::clamp(carried + logRatioOfOtherPair(rows, partner == &earlier_ ? -dt : dt, row_error), kUnsuspected,
-                          kCertain);
+    const double carried = kUnsuspected + kUsualMemory * (*other - kUnsuspected);
+    *other = std::clamp(carried + logRatioOfOtherPair(rows, other == &earlier_ ? -dt : dt, row_error), kUnsuspected,
+                        kCertain);
   }
 }
 

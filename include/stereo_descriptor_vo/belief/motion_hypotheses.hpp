@@ -26,8 +26,8 @@ struct Agreement {
   int sightings = 0, inlier_sightings = 0;  ///< confirmed ones of their points, four at most for each
 };
 
-/// Log-odds of being misled, of a pair that nothing speaks against (probability of 0.001, chosen), and of an event that
-/// leaves a wrong map or a wrong rig.
+/// Log-odds of being misled, that is of following another motion than the camera's. Of a pair that nothing contradicts
+/// (probability of 0.001, chosen), and of an event that leaves a wrong map or a wrong rig.
 constexpr double kUnsuspected = -6.9, kCertain = -kUnsuspected;
 
 /// Probabilities as log-odds: log(p / (1 - p)).

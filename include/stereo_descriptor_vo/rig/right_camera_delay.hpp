@@ -41,7 +41,7 @@ class RightCameraDelay {
   /// s: the prior, and as much of the estimate's distance from it as chance does not explain.
   double compensated() const;
 
-  /// Right images that are those of other pairs.
+  /// The pair that the right images seem to belong to.
   struct OtherPair {
     double delay;     ///< s
     double log_odds;  ///< that it is so

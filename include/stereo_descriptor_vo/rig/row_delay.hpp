@@ -13,7 +13,8 @@ namespace sdvo {
 
 /// How much later the right image of a rig is taken, from rows. A point that moves down in the right image at v' px/s
 /// is seen v' * delay px lower by a camera that is late. Errors of the rectification stay in their part of the image. A
-/// right camera that sits lower shifts rows by a ratio of the disparity. Neither counts as a delay.
+/// right camera that sits lower shifts rows by a ratio of the disparity. Neither counts as a delay. The estimator is
+/// that of instrumental variables (Wright 1928) with a fixed effect for each part of the image.
 class RowDelay {
  public:
   static constexpr int kColumns = 6, kRows = 4, kParts = kColumns * kRows;  ///< of the image
