@@ -58,7 +58,7 @@ struct MotionScene {
   bool is_doubted = false;            ///< … and likely is not
   double tolerance = 0.05;            ///< m: motions that differ by less than this and 3 % are equally good
   Noise noise{NoiseOptions()};
-  std::optional<PlaceBelief> place;  ///< of a pair that an outage's map shows
+  std::optional<PlaceBelief> place{};  ///< of a pair that an outage's map shows
 };
 
 /// A motion that competes for being the camera's, and what speaks for it.
