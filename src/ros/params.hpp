@@ -40,6 +40,8 @@ class ReconfigureServer {
   /// is.
   ReconfigureServer(ros::NodeHandle private_nh, std::vector<Option> options, std::function<void()> apply,
                     const std::vector<Option>& defaults);
+  /// The keeper's callback may be about to stop its timer, which is destroyed first.
+  ~ReconfigureServer() { keeper_.stop(); }
 
  private:
   bool onRequest(dynamic_reconfigure::Reconfigure::Request& request,

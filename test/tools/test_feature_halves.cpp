@@ -58,11 +58,11 @@ TEST(FeatureHalves, APointStaysInItsHalfWhereverItMoves) {
   const std::vector<int> before = halves(features.split(featuresAt({{30, 45}, {90, 45}}), {}));
   // Each moves on by a field. The second one is not matched, the third one is said to come from where nothing was.
   const StereoFeatures next = featuresAt({{90, 45}, {150, 45}, {210, 45}});
-  const std::vector<int> after = halves(features.split(next, {{30.5f, 44.5f, 0, true}, {210.f, 60.f, 2, true}}));
+  const std::vector<int> after = halves(features.split(next, {{30.5f, 44.5f, 5.f, 0, true}, {210.f, 60.f, 5.f, 2, true}}));
   EXPECT_EQ(after[0], before[0]);
   EXPECT_NE(after[1], before[1]);
   EXPECT_NE(after[2], after[1]) << "the fields of a row alternate";
-  const std::vector<int> last = halves(features.split(featuresAt({{210, 45}}), {{90.f, 45.f, 0, true}}));
+  const std::vector<int> last = halves(features.split(featuresAt({{210, 45}}), {{90.f, 45.f, 5.f, 0, true}}));
   EXPECT_EQ(last[0], before[0]);
 }
 
