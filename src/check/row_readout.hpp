@@ -25,7 +25,7 @@ class RowReadout {
   };
 
   /// Takes in a pair with its motion, if that was measured. Its rows are compared with where the motion has the
-  /// inliers.
+  /// matches.
   void add(const StereoFeatures& features, const OdometryResult& result);
 
   std::optional<Estimate> estimate() const;

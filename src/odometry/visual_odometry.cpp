@@ -145,12 +145,11 @@ VisualOdometry::Pair VisualOdometry::usable(const StereoFeatures& given,
   if (static_cast<int>(pair.new_features.size()) < given.count())
     pair.new_part = pair.whole().select(pair.new_features);
   const StereoFeatures& taken = pair.taken();
-  pair.frozen = logOddsOfFrozen(taken, pair.dt, guess);
   if (!state_.map || !state_.map->continuedBy(taken))
     pair.is = Pair::kFirst;
   else if (state_.interrupted)
     pair.is = Pair::kSought;
-  else if (pair.frozen >= kCertain)
+  else if ((pair.frozen = logOddsOfFrozen(taken, pair.dt, guess)) >= kCertain)
     pair.is = Pair::kFrozen;
   else
     pair.is = Pair::kFollowed;
