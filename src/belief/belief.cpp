@@ -50,7 +50,8 @@ Belief Doubt::weigh(const MotionScene& scene, const MotionHypothesis& found, con
   if (found.rival && rivals >= std::max({misled, shown, carried})) {
     words << "two motions in view, of " << found.agreement.inliers << " and " << found.rival->matches
           << " matches, the second with a probability of " << found.rival->probability
-          << ": does something move in front of the camera?";
+          << (found.rival->is_torn ? ", above and below a row: are the images torn or damaged?"
+                                   : ": does something move in front of the camera?");
   } else if (misled >= std::max(shown, carried)) {
     words << innovationWords(found) << ": followed with a probability of " << 1.0 - belief.probability
           << " is something else";
@@ -59,8 +60,9 @@ Belief Doubt::weigh(const MotionScene& scene, const MotionHypothesis& found, con
           << ": the motion is wrong with a probability of " << 1.0 - belief.probability;
   }
   belief.reason = words.str();
-  raise(std::log(rivals + misled), found.rival && rivals >= misled ? "something else moved in view"
-                                                                   : "the motion changed faster than a vehicle's can");
+  raise(std::log(rivals + misled), !found.rival || rivals < misled ? "the motion changed faster than a vehicle's can"
+                                   : found.rival->is_torn          ? "the images seemed to be torn or damaged"
+                                                                   : "something else moved in view");
   if (lasts()) deviation_ += deviation;
   return belief;
 }

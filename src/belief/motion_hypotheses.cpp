@@ -30,16 +30,6 @@ bool contains(const std::vector<int>& values, int value) {
   return std::find(values.begin(), values.end(), value) != values.end();
 }
 
-/// Whether two hypotheses mean one motion, for what the one explains and for what the other does: far points alone do
-/// not tell a turn from a step.
-bool areOne(const MotionScene& scene, const MotionHypothesis& a, const MotionHypothesis& b) {
-  const StereoCamera& camera = scene.features.camera;
-  const double within = scene.noise.sameMotion();
-  const Eigen::Isometry3d &T_a = a.motion.T_current_reference, &T_b = b.motion.T_current_reference;
-  return agree(camera, a.correspondences, a.motion.inliers, T_a, T_b, within) &&
-         agree(camera, b.correspondences, b.motion.inliers, T_a, T_b, within);
-}
-
 /// The prior's logarithm, relative to its best motion, is bounded by the probability that it is wrong.
 double logPrior(const MotionHypothesis& hypothesis) {
   return std::max(-0.5 * hypothesis.innovation, std::log(kTailProbability));
@@ -58,20 +48,22 @@ std::vector<int> sorted(std::vector<int> values) {
   return values;
 }
 
-/// Positions in the left image, px, one for each part of it that has any: neighbours are no independent witnesses.
-std::vector<Eigen::Vector2d> byParts(const std::vector<Eigen::Vector2d>& pixels) {
+using Points = std::vector<Eigen::Vector2d>;  // px, in the left image
+
+/// One for each part of it that has any: neighbours are no independent witnesses.
+Points byParts(const Points& pixels) {
   std::map<std::pair<int, int>, std::pair<Eigen::Vector2d, int>> parts;
   for (const Eigen::Vector2d& pixel : pixels) {
     const Eigen::Array2i part = (pixel / kPart).array().floor().cast<int>();
     auto& [sum, count] = parts.try_emplace({part.x(), part.y()}, Eigen::Vector2d(0.0, 0.0), 0).first->second;
     sum += pixel, ++count;
   }
-  std::vector<Eigen::Vector2d> means;
+  Points means;
   for (const auto& [part, sum] : parts) means.push_back(sum.first / sum.second);
   return means;
 }
 
-double nearest(const Eigen::Vector2d& pixel, const std::vector<Eigen::Vector2d>& others) {
+double nearest(const Eigen::Vector2d& pixel, const Points& others) {
   double least = std::numeric_limits<double>::infinity();
   for (const Eigen::Vector2d& other : others)
     if (&other != &pixel) least = std::min(least, (other - pixel).squaredNorm());
@@ -81,8 +73,8 @@ double nearest(const Eigen::Vector2d& pixel, const std::vector<Eigen::Vector2d>&
 /// Whether some points are those of an object among the others. An object fills a part of the view, so its points have
 /// each other for neighbours. Points that fit another motion because rectification or matching errs lie among the
 /// others. Join counts (Cliff and Ord 1973) against places at random.
-bool isObject(const std::vector<Eigen::Vector2d>& points, const std::vector<Eigen::Vector2d>& others) {
-  const std::vector<Eigen::Vector2d> inside = byParts(points), outside = byParts(others);
+bool isObject(const Points& points, const Points& others) {
+  const Points inside = byParts(points), outside = byParts(others);
   if (inside.size() < 2) return false;
   if (outside.empty()) return true;
   const auto joined = std::count_if(inside.begin(), inside.end(), [&](const Eigen::Vector2d& pixel) {
@@ -90,6 +82,23 @@ bool isObject(const std::vector<Eigen::Vector2d>& points, const std::vector<Eige
   });
   const double chance = static_cast<double>(inside.size()) / static_cast<double>(inside.size() + outside.size());
   return binomialTail(static_cast<int>(inside.size()), static_cast<int>(joined), chance) < kTailProbability;
+}
+
+/// Whether a row of the image divides points from others. What a torn or damaged image lacks reaches from one row to
+/// the end, so its share of the view says nothing of which part is the camera's.
+bool areDivided(const Points& points, const Points& others) {
+  constexpr double kAstray = 0.1;  // of either side (chosen): some wrong matches agree by chance
+  const auto rowsOf = [](const Points& pixels) {
+    std::vector<double> rows;
+    for (const Eigen::Vector2d& part : byParts(pixels)) rows.push_back(part.y());
+    return rows;
+  };
+  const std::vector<double> rows = rowsOf(points), other_rows = rowsOf(others);
+  const double all = static_cast<double>(rows.size() + other_rows.size());
+  const double larger = static_cast<double>(std::max(rows.size(), other_rows.size()));
+  if (std::pow(larger / all, all) >= kTailProbability) return false;
+  return quantile(rows, 1.0 - kAstray) <= quantile(other_rows, kAstray) ||
+         quantile(other_rows, 1.0 - kAstray) <= quantile(rows, kAstray);
 }
 
 /// The matches that each hypothesis of a pair explains. A match of one hypothesis counts for all of them.
@@ -119,58 +128,89 @@ class Explanations {
   /// not agree on. Those of an object move together; those that lie among each other err one by one.
   double logRatio(std::size_t a, std::size_t b) const {
     double of_a = 0.0, of_b = 0.0;
-    std::vector<Eigen::Vector2d> only_a, only_b;
-    for (std::size_t i = 0; i < sightings_.size(); ++i) {
-      if (explained_[a][i] == explained_[b][i]) continue;
-      (explained_[a][i] ? of_a : of_b) += sightings_[i];
-      (explained_[a][i] ? only_a : only_b).push_back(pixels_[i]);
-    }
+    for (std::size_t i = 0; i < sightings_.size(); ++i)
+      if (explained_[a][i] != explained_[b][i]) (explained_[a][i] ? of_a : of_b) += sightings_[i];
+    const Points only_a = explainedBy(a, b), only_b = explainedBy(b, a);
     const int points = static_cast<int>(only_a.size() + only_b.size());
-    const bool is_object = isObject(only_a, only_b) || isObject(only_b, only_a);
-    const double images =
-        is_object ? logLikelihood(of_b, points) - logLikelihood(of_a, points) : kLogOddsOfSighting * (of_a - of_b);
+    double images = kLogOddsOfSighting * (of_a - of_b);
+    if (areTorn(a, b))
+      images = 0.0;
+    else if (isObject(only_a, only_b) || isObject(only_b, only_a))
+      images = logLikelihood(of_b, points) - logLikelihood(of_a, points);
     const double spread = logSpread(scene_, hypotheses_[a]) - logSpread(scene_, hypotheses_[b]);
     return logPrior(hypotheses_[a]) - logPrior(hypotheses_[b]) - spread + images;
   }
 
+  /// Whether two hypotheses mean one motion, for what the one explains and for what the other does: far points alone do
+  /// not tell a turn from a step.
+  bool areOne(std::size_t a, std::size_t b) const {
+    const Eigen::Isometry3d& T_a = hypotheses_[a].motion.T_current_reference;
+    const Eigen::Isometry3d& T_b = hypotheses_[b].motion.T_current_reference;
+    const auto explains_both = [&](const MotionHypothesis& h) {
+      return agree(scene_.features.camera, h.correspondences, h.motion.inliers, T_a, T_b, scene_.noise.sameMotion());
+    };
+    return explains_both(hypotheses_[a]) && explains_both(hypotheses_[b]) && !areTorn(a, b);
+  }
+
+  /// Whether a row divides what one hypothesis explains from what the other one does alone.
+  bool areTorn(std::size_t a, std::size_t b) const {
+    return areDivided(explainedBy(a), explainedBy(b, a)) || areDivided(explainedBy(b), explainedBy(a, b));
+  }
+
+  /// The one whose strongest rival is the weakest: what two of them do not agree on may be weighed otherwise than what
+  /// one of these and a third do not.
   std::size_t likeliest() const {
-    std::size_t best = 0;
-    for (std::size_t k = 1; k < hypotheses_.size(); ++k)
-      if (logRatio(k, best) > 0.0) best = k;
-    return best;
+    const std::size_t count = hypotheses_.size();
+    std::vector<double> strongest(count, -std::numeric_limits<double>::infinity());
+    for (std::size_t a = 0; a < count; ++a)
+      for (std::size_t b = 0; b < a; ++b) {
+        const double ratio = logRatio(a, b);
+        strongest[a] = std::max(strongest[a], -ratio);
+        strongest[b] = std::max(strongest[b], ratio);
+      }
+    return static_cast<std::size_t>(std::min_element(strongest.begin(), strongest.end()) - strongest.begin());
   }
 
  private:
+  /// Positions in the left image, px, of what a hypothesis explains, and `but` does not.
+  Points explainedBy(std::size_t hypothesis, std::optional<std::size_t> but = {}) const {
+    Points points;
+    for (std::size_t i = 0; i < pixels_.size(); ++i)
+      if (explained_[hypothesis][i] && !(but && explained_[*but][i])) points.push_back(pixels_[i]);
+    return points;
+  }
+
   const MotionScene& scene_;
   const std::vector<MotionHypothesis>& hypotheses_;
   std::vector<double> sightings_;             ///< of each match
-  std::vector<Eigen::Vector2d> pixels_;       ///< of each match
+  Points pixels_;                             ///< of each match
   std::vector<std::vector<bool>> explained_;  ///< by each hypothesis
 };
 
 /// A motion that explains a part of the pair that the chosen one does not, and that chance does not either.
 struct RivalMotion {
-  const MotionHypothesis* hypothesis;
+  std::size_t hypothesis;
   double log_ratio;           ///< by how much it is likelier than the chosen one
   std::vector<int> features;  ///< of the pair, that it explains alone
+  bool is_torn;               ///< a row of the image divides it from the chosen one
 };
 
-/// Each motion once.
-std::vector<RivalMotion> rivalsOf(const MotionScene& scene, double threshold, const MotionHypothesis& chosen,
-                                  const std::vector<MotionHypothesis>& hypotheses, const Explanations& explanations,
-                                  std::size_t likeliest) {
-  const std::vector<int> own = sorted(chosen.inlierFeatures());
-  const int left = chosen.agreement.matches - chosen.agreement.inliers;
+/// Each motion once. Of the hypotheses, `likeliest` and `chosen` mean one motion.
+std::vector<RivalMotion> rivalsOf(double threshold, const std::vector<MotionHypothesis>& hypotheses,
+                                  const Explanations& explanations, std::size_t likeliest, std::size_t chosen) {
+  const std::vector<int> own = sorted(hypotheses[chosen].inlierFeatures());
+  const int left = hypotheses[chosen].agreement.matches - hypotheses[chosen].agreement.inliers;
   std::vector<RivalMotion> rivals;
   for (std::size_t k = 0; k < hypotheses.size(); ++k) {
-    const MotionHypothesis& other = hypotheses[k];
-    if (areOne(scene, chosen, other)) continue;
-    RivalMotion rival{&other, explanations.logRatio(k, likeliest), without(sorted(other.inlierFeatures()), own)};
+    if (explanations.areOne(chosen, k)) continue;
+    RivalMotion rival{k, explanations.logRatio(k, likeliest), without(sorted(hypotheses[k].inlierFeatures()), own),
+                      explanations.areTorn(chosen, k)};
     const int features = static_cast<int>(rival.features.size());
-    const double chance = chanceOfAgreement(threshold, other.gate);
+    const double chance = chanceOfAgreement(threshold, hypotheses[k].gate);
     if (logFalseAlarms(std::max(left, features), features, chance) > std::log(kTailProbability)) continue;
-    const auto same = std::find_if(rivals.begin(), rivals.end(),
-                                   [&](const RivalMotion& before) { return areOne(scene, *before.hypothesis, other); });
+    const auto same = std::find_if(rivals.begin(), rivals.end(), [&](const RivalMotion& before) {
+      return explanations.areOne(before.hypothesis, k);
+    });
     if (same == rivals.end())
       rivals.push_back(std::move(rival));
     else if (same->log_ratio < rival.log_ratio)
@@ -180,13 +220,14 @@ std::vector<RivalMotion> rivalsOf(const MotionScene& scene, double threshold, co
 }
 
 /// The chosen motion's probability, and the moment of the rivals around it.
-void compare(const MotionScene& scene, const std::vector<RivalMotion>& rivals, MotionHypothesis& chosen) {
+void compare(const MotionScene& scene, const std::vector<MotionHypothesis>& hypotheses,
+             const std::vector<RivalMotion>& rivals, MotionHypothesis& chosen) {
   double total = 1.0;
   for (const RivalMotion& rival : rivals) total += std::exp(rival.log_ratio);
   std::vector<int> explained;
   for (const RivalMotion& rival : rivals) {
     explained.insert(explained.end(), rival.features.begin(), rival.features.end());
-    const Eigen::Isometry3d& T = rival.hypothesis->motion.T_current_reference;
+    const Eigen::Isometry3d& T = hypotheses[rival.hypothesis].motion.T_current_reference;
     const double probability = std::exp(rival.log_ratio) / total;
     // Both start from the same pair of the map.
     const Eigen::Isometry3d apart = chosen.motion.T_current_reference * T.inverse();
@@ -194,7 +235,7 @@ void compare(const MotionScene& scene, const std::vector<RivalMotion>& rivals, M
     if (isTolerable(scene, chosen.motion.T_current_reference, apart)) continue;
     chosen.probability -= probability;
     if (!chosen.rival || chosen.rival->probability < probability)
-      chosen.rival = {T, probability, static_cast<int>(rival.features.size())};
+      chosen.rival = {T, probability, static_cast<int>(rival.features.size()), rival.is_torn};
   }
   // What rivals explain does not speak against the chosen one.
   explained = sorted(std::move(explained));
@@ -258,7 +299,7 @@ void MotionHypothesis::replaceMotion(const MotionScene& scene, const Eigen::Isom
   rivals_moment += misled * momentOf(logSE3(apart));
   if (isTolerable(scene, T_current_reference, apart)) return;
   probability *= 1.0 - misled;
-  rival = {T_found, misled, of_other};
+  rival = {T_found, misled, of_other, false};
 }
 
 std::vector<int> MotionHypothesis::inlierFeatures(const std::vector<int>& rejected) const {
@@ -355,12 +396,12 @@ MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::v
     hypotheses.erase(failures, hypotheses.end());
     const Explanations explanations(scene, threshold, hypotheses);
     const std::size_t likeliest = explanations.likeliest();
-    const MotionHypothesis& first = hypotheses[likeliest];
     // Of one motion the estimate with the most inliers.
-    chosen = first;
-    for (const MotionHypothesis& other : hypotheses)
-      if (by_inliers(chosen, other) && areOne(scene, first, other)) chosen = other;
-    compare(scene, rivalsOf(scene, threshold, chosen, hypotheses, explanations, likeliest), chosen);
+    std::size_t largest = likeliest;
+    for (std::size_t k = 0; k < hypotheses.size(); ++k)
+      if (by_inliers(hypotheses[largest], hypotheses[k]) && explanations.areOne(likeliest, k)) largest = k;
+    chosen = hypotheses[largest];
+    compare(scene, hypotheses, rivalsOf(threshold, hypotheses, explanations, likeliest, largest), chosen);
   }
   chosen.match_time = match_time, chosen.motion_time = motion_time;
   return chosen;

@@ -24,7 +24,7 @@ Matrix6d momentOf(const Vector6d& difference) {
 
 double ExpectedMotion::normalisedSquare(const Eigen::Isometry3d& measured, const Matrix6d& measured_covariance) const {
   const Vector6d difference = innovation(measured);
-  return difference.dot((covariance + measured_covariance).ldlt().solve(difference));
+  return mahalanobisSquare(difference, covariance + measured_covariance);
 }
 
 /// The mean velocities of two neighbouring intervals of `dt` differ by two thirds of the velocity's variance over one.

@@ -8,12 +8,39 @@
 #include <string>
 #include <utility>
 
+#include "../common/statistics.hpp"
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
 #include "stereo_descriptor_vo/matching/view_matcher.hpp"
 #include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
 #include "stereo_descriptor_vo/motion/motion_estimator.hpp"
 
 namespace sdvo {
+namespace {
+
+constexpr double kGoodPart = 0.1;  // of the points (chosen)
+
+/// Whether the motion's inliers end at a row of the image and a good part of the matches beyond it are outliers: the
+/// image may be torn there.
+bool endsAtRow(const MotionHypothesis& found) {
+  constexpr double kAstray = 0.05;  // of the inliers (chosen): some wrong matches agree by chance
+  const auto row = [&](int i) { return found.correspondences[static_cast<std::size_t>(i)].measurement.y(); };
+  std::vector<double> rows;
+  for (const int i : found.motion.inliers) rows.push_back(row(i));
+  const double first = quantile(rows, kAstray), last = quantile(rows, 1.0 - kAstray);
+  std::vector<int> above, below;
+  for (int i = 0; i < static_cast<int>(found.correspondences.size()); ++i) {
+    if (row(i) < first) above.push_back(i);
+    if (row(i) > last) below.push_back(i);
+  }
+  const std::vector<int>& beyond = above.size() > below.size() ? above : below;
+  const auto outliers = static_cast<int>(without(beyond, found.motion.inliers).size());
+  const double matches = static_cast<double>(found.correspondences.size());
+  const double share = 1.0 - static_cast<double>(rows.size()) / matches;
+  return outliers > kGoodPart * matches &&
+         binomialTail(static_cast<int>(beyond.size()), outliers, share) < kTailProbability;
+}
+
+}  // namespace
 
 MotionSearch::MotionSearch(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion,
                            const PatchAlignmentOptions& alignment)
@@ -78,8 +105,8 @@ std::vector<MotionHypothesis> MotionSearch::compete(const MotionScene& scene, co
   return hypotheses;
 }
 
-/// Neither prior nor lasting points contradict, the majority agrees with the motion, and lasting points that lack more
-/// than usual would be no serious rival even if they moved together.
+/// Neither prior nor lasting points contradict, the majority agrees with the motion, all over the image, and lasting
+/// points that lack more than usual would be no serious rival even if they moved together.
 bool MotionSearch::isBeyondDoubt(const MotionScene& scene, const MotionHypothesis& found, double max_doubt) const {
   if (!found.motion.success || found.innovation > noiseGate(6) || logOddsMisled(scene, found) > max_doubt) return false;
   const double agree = found.agreement.lasting_inliers;
@@ -90,7 +117,7 @@ bool MotionSearch::isBeyondDoubt(const MotionScene& scene, const MotionHypothesi
     if (logLikelihood(kSightings * agree, points) - logLikelihood(kSightings * lacking, points) > kUnsuspected)
       return false;
   }
-  return 2 * found.agreement.inlier_sightings >= found.agreement.sightings;
+  return 2 * found.agreement.inlier_sightings >= found.agreement.sightings && !endsAtRow(found);
 }
 
 /// First where a good prediction has the points, then three times as far.
@@ -112,7 +139,6 @@ MotionHypothesis MotionSearch::searchNear(const MotionScene& scene, const ViewPt
 /// Whether the motion found has a good part of the points where the search did not look for them.
 bool MotionSearch::leavesGate(const MotionScene& scene, const Eigen::Isometry3d& predicted,
                               const MotionHypothesis& found) const {
-  constexpr double kGoodPart = 0.1;  // of the points (chosen)
   const StereoCamera& camera = scene.features.camera;
   const Eigen::Isometry3d& T_current_reference = found.motion.T_current_reference;
   std::size_t seen = 0, outside = 0;

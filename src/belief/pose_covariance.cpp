@@ -45,7 +45,7 @@ Matrix6d covering(const Matrix6d& a, const Matrix6d& b) {
 
 bool widen(Matrix6d& covariance, const Vector6d& deviation) {
   constexpr double kExpected = 3.0;  // chi-square of six: half its mean, for a deviation is a part of the error only
-  const double square = deviation.dot(covariance.ldlt().solve(deviation));
+  const double square = mahalanobisSquare(deviation, covariance);
   if (square > kExpected)
     covariance += deviation * deviation.transpose() + kTolerableRatio * kTolerableRatio * momentOf(deviation);
   return square > noiseGate(6);

@@ -172,7 +172,7 @@ bool Revisit::recall(const StereoFeatures& features, const RigCalibration& calib
   // on a desk (0.019 to 0.041 %).
   const Eigen::Isometry3d T_camera_origin = motion.T_current_reference * old->T_camera_origin;
   const Vector6d offset = logSE3(T_camera_origin * map.newestPose().inverse());
-  if (offset.dot(motion.covariance.ldlt().solve(offset)) > noiseGate(6)) map.moveTo(T_camera_origin);
+  if (mahalanobisSquare(offset, motion.covariance) > noiseGate(6)) map.moveTo(T_camera_origin);
   map.recall(*old, links);
   return true;
 }

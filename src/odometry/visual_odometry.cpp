@@ -308,7 +308,7 @@ void VisualOdometry::finish(const Pair& pair, Step& step) {
   state_.doubt.fade();
   const auto stood = [&step] {
     const Vector6d motion = logSE3(*step.T_previous_current);
-    return motion.dot(step.covariance.ldlt().solve(motion)) < noiseGate(6);
+    return mahalanobisSquare(motion, step.covariance) < noiseGate(6);
   };
   state_.images.remember(pair.whole(), step.state == TrackingState::kTracking && step.T_previous_current && stood());
   state_.frozen = pair.is == Pair::kFrozen;

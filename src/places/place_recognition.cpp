@@ -192,7 +192,7 @@ bool PlaceRecognition::isPossible(const GraphEdge& loop) const {
   const Matrix6d covariance = path.covariance + loop.covariance + graph_.drift(path.length, path.turn) + inexact;
   const Eigen::Isometry3d T_from_to = graph_.nodes().at(loop.from).inverse() * graph_.nodes().at(loop.to);
   const Vector6d correction = logSE3(T_from_to.inverse() * loop.T_from_to);
-  return correction.dot(covariance.ldlt().solve(correction)) <= kImpossible;
+  return mahalanobisSquare(correction, covariance) <= kImpossible;
 }
 
 void PlaceRecognition::expect(const Eigen::Isometry3d& T_map_odom, double radius) {

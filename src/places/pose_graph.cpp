@@ -217,7 +217,7 @@ GraphPath PoseGraph::path(int from, int to) const {
 
 double PoseGraph::residual(const GraphEdge& edge) const {
   const Vector6d error = logSE3(edge.T_from_to.inverse() * nodes_.at(edge.from).inverse() * nodes_.at(edge.to));
-  return std::sqrt(error.dot(covariance(edge).ldlt().solve(error)));
+  return std::sqrt(mahalanobisSquare(error, covariance(edge)));
 }
 
 int PoseGraph::loops() const {

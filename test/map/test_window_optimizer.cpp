@@ -168,7 +168,7 @@ TEST(WindowOptimizer, CovariancesAreThoseOfTheErrors) {
     ASSERT_EQ(solution.pose_covariance.rows(), 24);
     const Vector6d error = logSE3(syntheticPose(4).inverse() * window.T_camera_origin[4].inverse());
     // The covariance is that of the left perturbation of T_camera_origin: exp(xi) T, so T^-1 exp(-xi).
-    pose_nees += error.dot(solution.pose_covariance.bottomRightCorner<6, 6>().ldlt().solve(error)) / kTrials;
+    pose_nees += mahalanobisSquare(error, solution.pose_covariance.bottomRightCorner<6, 6>()) / kTrials;
     const RigCalibration::Vector off = window.calibration.value - truth.value;
     calibration_nees += off.dot(solution.calibration_information * off) / kTrials;
   }
@@ -189,7 +189,7 @@ TEST(WindowOptimizer, CovariancesAreThoseOfTheErrorsWhereTheKernelBendsAtTheNois
     const WindowSolution solution = WindowOptimizer(options).optimize(window);
     ASSERT_TRUE(solution.success);
     const Vector6d error = logSE3(syntheticPose(4).inverse() * window.T_camera_origin[4].inverse());
-    nees += error.dot(solution.pose_covariance.bottomRightCorner<6, 6>().ldlt().solve(error)) / kTrials;
+    nees += mahalanobisSquare(error, solution.pose_covariance.bottomRightCorner<6, 6>()) / kTrials;
   }
   // The weights depend on the residuals, so the inverse of the normal equations alone would be too large.
   EXPECT_NEAR(nees, 6.0, 1.5);
@@ -264,7 +264,7 @@ double neesOfTheNewestMotion(int frames, double factor, double outliers, double 
     by_poses.rightCols<6>().setIdentity();
     if (frames > 2) by_poses.middleCols<6>(size - 12) = -adjoint(found);
     const Vector6d error = logSE3(found * truth.inverse());
-    nees += error.dot((by_poses * solution.pose_covariance * by_poses.transpose()).ldlt().solve(error)) / kTrials;
+    nees += mahalanobisSquare(error, by_poses * solution.pose_covariance * by_poses.transpose()) / kTrials;
   }
   return nees;
 }

@@ -153,7 +153,7 @@ TEST(MotionEstimator, CovarianceIsCalibrated) {
     ASSERT_EQ(estimate.inliers.size(), static_cast<std::size_t>(kPoints));
     ASSERT_LT((estimate.covariance - estimate.covariance.transpose()).norm(), 1e-15);
     const Vector6d error = motionError(estimate);
-    mean += error.dot(estimate.covariance.llt().solve(error)) / kTrials;
+    mean += mahalanobisSquare(error, estimate.covariance) / kTrials;
     const Eigen::Vector3d t = error.head<3>(), r = error.tail<3>();
     translation += t.dot(estimate.covariance.topLeftCorner<3, 3>().llt().solve(t)) / kTrials;
     rotation += r.dot(estimate.covariance.bottomRightCorner<3, 3>().llt().solve(r)) / kTrials;
@@ -175,7 +175,7 @@ TEST(MotionEstimator, CovarianceIsCalibratedWhereTheKernelBends) {
       const MotionEstimate estimate = MotionEstimator(options).estimate(synthetic::camera(), problem.correspondences);
       ASSERT_TRUE(estimate.success) << estimate.reason;
       const Vector6d error = motionError(estimate);
-      mean += error.dot(estimate.covariance.llt().solve(error)) / kTrials;
+      mean += mahalanobisSquare(error, estimate.covariance) / kTrials;
     }
     // Where the kernel bends within the noise it says too little rather than too much.
     EXPECT_GT(mean, 4.0) << noise << " px";

@@ -160,7 +160,7 @@ TEST(VisualOdometry, FollowsANoisyDriveAndKnowsHowWell) {
     }
     if (i == 0) continue;
     const Vector6d error = logSE3(trueSinceStart(i, i - 1).inverse() * result.T_previous_current);
-    mean_step += error.dot(result.motion_covariance.llt().solve(error)) / kPairs;
+    mean_step += mahalanobisSquare(error, result.motion_covariance) / kPairs;
   }
   EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(kPairs)), 0.01 * kPairs * kStep);
   EXPECT_LT(angleBetween(result.T_origin_camera, trueSinceStart(kPairs)), 0.01);
@@ -169,7 +169,7 @@ TEST(VisualOdometry, FollowsANoisyDriveAndKnowsHowWell) {
   EXPECT_GT(mean_step, 1.5);
   EXPECT_LT(mean_step, 24.0);
   const Vector6d final_error = logSE3(trueSinceStart(kPairs).inverse() * result.T_origin_camera);
-  EXPECT_LT(final_error.dot(result.pose_covariance.llt().solve(final_error)), 4.0 * 38.0);
+  EXPECT_LT(mahalanobisSquare(final_error, result.pose_covariance), 4.0 * 38.0);
 }
 
 TEST(VisualOdometry, WaitsForTheFirstFeatures) {
@@ -233,7 +233,7 @@ TEST(VisualOdometry, APredictionContainsTheMotionOfAPairWhoseStampIsThatOfABurst
   const Eigen::Isometry3d moved = trueSinceStart(5).inverse() * trueSinceStart(6);
   const Vector6d error = logSE3(predicted.T_previous_current.inverse() * moved);
   EXPECT_GT(error.norm(), 0.5 * kStep) << "a millisecond's way is predicted";
-  EXPECT_LT(error.dot(predicted.motion_covariance.ldlt().solve(error)), 25.0);
+  EXPECT_LT(mahalanobisSquare(error, predicted.motion_covariance), 25.0);
 }
 
 TEST(VisualOdometry, OneBadStampCostsOnePair) {
@@ -375,7 +375,7 @@ TEST(VisualOdometry, DoubtsAfterALossWhatNoCameraWithTheVelocityBeforeDoes) {
     ASSERT_NE(result.state, TrackingState::kTracking) << i;
     if (!result.has_motion) continue;
     const Vector6d error = logSE3(result.T_previous_current.inverse() * drivePose(i - 1).inverse() * drivePose(i));
-    EXPECT_LT(error.dot(result.motion_covariance.ldlt().solve(error)), 20.0) << i;
+    EXPECT_LT(mahalanobisSquare(error, result.motion_covariance), 20.0) << i;
   }
   EXPECT_TRUE(result.has_motion);
   EXPECT_NE(result.reason.find("the prior"), std::string::npos) << result.reason;
@@ -393,7 +393,7 @@ TEST(VisualOdometry, DoesNotTrustAStandstillRightAfterALossOnTheWay) {
     EXPECT_NE(result.state, TrackingState::kTracking) << i;
     if (!result.has_motion) continue;
     const Vector6d error = logSE3(result.T_previous_current.inverse() * drivePose(i - 1).inverse() * drivePose(i));
-    EXPECT_LT(error.dot(result.motion_covariance.ldlt().solve(error)), 20.0) << i;
+    EXPECT_LT(mahalanobisSquare(error, result.motion_covariance), 20.0) << i;
   }
   // It does not last for ever: it may have stopped after all.
   OdometryResult result;
@@ -420,7 +420,7 @@ TEST(VisualOdometry, DoubtsTheNextMapWhereManyMatchesAgreedOnNoMotion) {
     degraded += result.state == TrackingState::kDegraded;
     if (!result.has_motion) continue;
     const Vector6d error = logSE3(result.T_previous_current.inverse() * drivePose(i - 1).inverse() * drivePose(i));
-    EXPECT_LT(error.dot(result.motion_covariance.ldlt().solve(error)), 20.0) << i;
+    EXPECT_LT(mahalanobisSquare(error, result.motion_covariance), 20.0) << i;
   }
   EXPECT_GE(lost, 1);
   EXPECT_GE(degraded, 3) << "a map of the wrong depths explains one another's pairs";
@@ -661,7 +661,7 @@ TEST(VisualOdometry, AStopAtOnceIsDoubtfulForAPairAndBelievedAfterIt) {
   EXPECT_EQ(first.state, TrackingState::kDegraded);
   EXPECT_NE(first.reason.find("images as of the previous pair"), std::string::npos) << first.reason;
   const Vector6d gone_on = logSE3(moving.T_previous_current);
-  EXPECT_LT(gone_on.dot(first.motion_covariance.ldlt().solve(gone_on)), 20.0) << "it may have gone on";
+  EXPECT_LT(mahalanobisSquare(gone_on, first.motion_covariance), 20.0) << "it may have gone on";
   OdometryResult standing;
   for (int i = 10; i <= 14; ++i) standing = odometry.update(slowAt(8, i));
   EXPECT_EQ(standing.state, TrackingState::kTracking) << standing.reason;
@@ -934,13 +934,13 @@ TEST(VisualOdometry, ImagesThatRepeatThemselvesWhileItMovesAreNoStandstill) {
     EXPECT_EQ(result.state, TrackingState::kDegraded) << i;
     EXPECT_NE(result.reason.find("frozen"), std::string::npos) << result.reason;
     const Vector6d error = logSE3(result.T_origin_camera.inverse() * trueSinceStart(i));
-    EXPECT_LT(error.dot(result.pose_covariance.ldlt().solve(error)), 20.0) << i << ": it may have gone on";
+    EXPECT_LT(mahalanobisSquare(error, result.pose_covariance), 20.0) << i << ": it may have gone on";
   }
   // The map still shows where it went meanwhile.
   const OdometryResult again = odometry.update(pairOf(15));
   EXPECT_EQ(again.epoch, before.epoch);
   const Vector6d error = logSE3(again.T_origin_camera.inverse() * trueSinceStart(15));
-  EXPECT_LT(error.dot(again.pose_covariance.ldlt().solve(error)), 20.0);
+  EXPECT_LT(mahalanobisSquare(error, again.pose_covariance), 20.0);
   for (int i = 16; i <= 18; ++i) odometry.update(pairOf(i));
   EXPECT_EQ(odometry.update(pairOf(19)).state, TrackingState::kTracking);
 }
@@ -1091,7 +1091,7 @@ TEST(VisualOdometry, EitherHalfOfTheViewMayStandStill) {
   for (const double x : {0.0, -0.15}) {
     Vector6d error = logSE3(result.T_previous_current);
     error[0] -= x;
-    EXPECT_LT(error.dot(result.motion_covariance.ldlt().solve(error)), 25.0) << "either motion is within covariance";
+    EXPECT_LT(mahalanobisSquare(error, result.motion_covariance), 25.0) << "either motion is within covariance";
   }
 }
 

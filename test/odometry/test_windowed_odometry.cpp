@@ -159,7 +159,7 @@ TEST(MotionCovariance, ContainsTheErrorWithoutExaggeration) {
       if (!result.has_motion) continue;
       const Eigen::Isometry3d truth = syntheticPose(k - 1).inverse() * syntheticPose(k);
       const Vector6d error = logSE3(result.T_previous_current.inverse() * truth);
-      const double normalised = error.dot(result.motion_covariance.ldlt().solve(error));
+      const double normalised = mahalanobisSquare(error, result.motion_covariance);
       inside += normalised < kChiSquare95;
       sum += normalised;
       ++total;
@@ -225,10 +225,10 @@ ThereAndBack driveThereAndBack(int remembered_keyframes) {
     drive.error = (result.T_origin_camera.translation() - T_origin_camera.translation()).norm();
     drive.largest_correction = std::max(drive.largest_correction, result.correction.head<3>().norm());
     drive.worst_cover =
-        std::max(drive.worst_cover, result.correction.dot(result.pose_covariance.ldlt().solve(result.correction)));
+        std::max(drive.worst_cover, mahalanobisSquare(result.correction, result.pose_covariance));
     if (i > 0) {
       const Vector6d error = logSE3((last.inverse() * T_origin_camera).inverse() * result.T_previous_current);
-      drive.normalised_square += error.dot(result.motion_covariance.llt().solve(error)) / kPairs;
+      drive.normalised_square += mahalanobisSquare(error, result.motion_covariance) / kPairs;
     }
     last = T_origin_camera;
     drive.corrections += result.reason.rfind("the map corrected", 0) == 0;

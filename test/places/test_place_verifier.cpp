@@ -43,7 +43,7 @@ TEST(PlaceVerifier, TellsFromWhereThePlaceIsSeenNowAndHowWellItKnows) {
     const Vector6d error = logSE3(match.T_place_camera.inverse() * T_true);
     EXPECT_LT(error.head<3>().norm(), 0.1);
     EXPECT_LT(error.tail<3>().norm(), 0.01);
-    sum += error.dot(match.covariance.ldlt().solve(error));
+    sum += mahalanobisSquare(error, match.covariance);
   }
   EXPECT_GT(sum / kTrials, 3.0);
   EXPECT_LT(sum / kTrials, 18.0);

@@ -78,7 +78,8 @@ struct MotionHypothesis {
   struct Rival {
     Eigen::Isometry3d T_current_reference;
     double probability;
-    int matches;  ///< that it alone explains
+    int matches;   ///< that it alone explains
+    bool is_torn;  ///< a row of the image divides them from the motion's own
   };
   std::optional<Rival> rival;
   Matrix6d rivals_moment = Matrix6d::Zero();  ///< second moment of the rivals around the motion, m and rad.

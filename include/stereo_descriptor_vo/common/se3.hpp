@@ -1,8 +1,6 @@
 #pragma once
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
-#include <cmath>
 
 #include "stereo_descriptor_vo/common/cpp17.hpp"
 
@@ -11,68 +9,28 @@ namespace sdvo {
 using Vector6d = Eigen::Matrix<double, 6, 1>;  ///< (translation, rotation), the order of ROS' 6x6 covariances
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
-inline Eigen::Matrix3d skew(const Eigen::Vector3d& w) {
-  Eigen::Matrix3d m;
-  m << 0.0, -w.z(), w.y(), w.z(), 0.0, -w.x(), -w.y(), w.x(), 0.0;
-  return m;
-}
-
-inline Eigen::Matrix3d expSO3(const Eigen::Vector3d& w) {
-  const double angle = w.norm();
-  if (angle < 1e-12) return Eigen::Matrix3d::Identity() + skew(w);
-  return Eigen::AngleAxisd(angle, w / angle).toRotationMatrix();
-}
-
-inline Eigen::Vector3d logSO3(const Eigen::Matrix3d& rotation) {
-  const Eigen::AngleAxisd angle_axis(rotation);
-  return angle_axis.angle() * angle_axis.axis();
-}
+Eigen::Matrix3d skew(const Eigen::Vector3d& w);
+Eigen::Matrix3d expSO3(const Eigen::Vector3d& w);
+Eigen::Vector3d logSO3(const Eigen::Matrix3d& rotation);
 
 /// The left Jacobian V of SO(3): exp((rho, phi)) has the translation V(phi) * rho (Barfoot, State Estimation,
 /// eq. 7.86).
-inline Eigen::Matrix3d leftJacobianSO3(const Eigen::Vector3d& phi) {
-  const double angle = phi.norm();
-  const Eigen::Matrix3d w = skew(phi);
-  if (angle < 1e-6) return Eigen::Matrix3d::Identity() + 0.5 * w;
-  return Eigen::Matrix3d::Identity() + (1.0 - std::cos(angle)) / (angle * angle) * w +
-         (angle - std::sin(angle)) / (angle * angle * angle) * w * w;
-}
+Eigen::Matrix3d leftJacobianSO3(const Eigen::Vector3d& phi);
 
-inline Eigen::Isometry3d expSE3(const Vector6d& xi) {
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.linear() = expSO3(xi.tail<3>());
-  T.translation() = leftJacobianSO3(xi.tail<3>()) * xi.head<3>();
-  return T;
-}
-
-inline Vector6d logSE3(const Eigen::Isometry3d& T) {
-  Vector6d xi;
-  xi.tail<3>() = logSO3(T.linear());
-  xi.head<3>() = leftJacobianSO3(xi.tail<3>()).inverse() * T.translation();
-  return xi;
-}
+Eigen::Isometry3d expSE3(const Vector6d& xi);
+Vector6d logSE3(const Eigen::Isometry3d& T);
 
 /// Ad(T): T exp(xi) = exp(Ad(T) xi) T.
-inline Matrix6d adjoint(const Eigen::Isometry3d& T) {
-  Matrix6d ad = Matrix6d::Zero();
-  ad.topLeftCorner<3, 3>() = T.linear();
-  ad.bottomRightCorner<3, 3>() = T.linear();
-  ad.topRightCorner<3, 3>() = skew(T.translation()) * T.linear();
-  return ad;
-}
+Matrix6d adjoint(const Eigen::Isometry3d& T);
+
+/// The square of a difference in standard deviations (Mahalanobis 1936): chi-square of six where it has this
+/// covariance.
+double mahalanobisSquare(const Vector6d& difference, const Matrix6d& covariance);
 
 /// A symmetric matrix without its directions of negative variance.
-inline Matrix6d positivePart(const Matrix6d& matrix) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(matrix);
-  const Matrix6d roots = solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
-  return Matrix6d((roots * roots.transpose()).selfadjointView<Eigen::Lower>());
-}
+Matrix6d positivePart(const Matrix6d& matrix);
 
 /// The same pose with its rotation made orthonormal again; products of many rotations drift away from that.
-inline Eigen::Isometry3d orthonormalised(const Eigen::Isometry3d& T) {
-  Eigen::Isometry3d clean = T;
-  clean.linear() = Eigen::Quaterniond(T.linear()).normalized().toRotationMatrix();
-  return clean;
-}
+Eigen::Isometry3d orthonormalised(const Eigen::Isometry3d& T);
 
 }  // namespace sdvo

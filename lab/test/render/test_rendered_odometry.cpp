@@ -66,11 +66,11 @@ TEST(RenderedOdometry, MotionsAndPosesLieInTheirCovariancesAndTheRigIsCalibrated
       if (result.has_motion) {
         const Eigen::Isometry3d truth = drive.path.pose(frame - 1).inverse() * drive.path.pose(frame);
         const Vector6d error = logSE3(result.T_previous_current.inverse() * truth);
-        const double normalised = error.dot(result.motion_covariance.ldlt().solve(error));
+        const double normalised = mahalanobisSquare(error, result.motion_covariance);
         (disparity_offset == 0.0 ? motions : motions_of_off).push_back(normalised);
         const Eigen::Isometry3d true_pose = drive.path.pose(0).inverse() * drive.path.pose(frame);
         const Vector6d pose_error = logSE3(result.T_origin_camera.inverse() * true_pose);
-        if (disparity_offset == 0.0) poses.push_back(pose_error.dot(result.pose_covariance.ldlt().solve(pose_error)));
+        if (disparity_offset == 0.0) poses.push_back(mahalanobisSquare(pose_error, result.pose_covariance));
       }
       if (frame >= kSettled) offsets += result.disparity_offset, sigmas += result.disparity_offset_sigma;
       ++frame;
