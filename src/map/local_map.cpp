@@ -440,6 +440,10 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
     frames_[f].T_camera_origin = orthonormalised(window.T_camera_origin[f]);
   for (std::size_t i = 0; i < problem_.points.size(); ++i)
     points_[problem_.points[i]].position.ray_and_inverse_depth = window.points[i].ray_and_inverse_depth;
+  std::vector<double> newest_squares;
+  for (const int i : problem_.newest) newest_squares.push_back(solution.squares[i]);
+  adjustment.newest_measured = static_cast<int>(newest_squares.size());
+  adjustment.newest_square = median(newest_squares);
   cutOff(solution.squares, adjustment);
   problem_.clear();
   return adjustment;

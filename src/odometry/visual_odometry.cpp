@@ -403,6 +403,10 @@ VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features,
   const std::optional<Floor> floor = this->floor();
   candidate.adjustment =
       map.adjust(optimizer_, state_.rig.calibration.prior(map.oldestId()), candidate.calibration, floor);
+  const double noisier =
+      state_.rig.noise.ofPair(candidate.adjustment.newest_square, candidate.adjustment.newest_measured);
+  candidate.adjustment.since_keyframe *= noisier;
+  candidate.adjustment.growth *= noisier;
   // The window's first pose does not move in the adjustment: what it carries in height and tilt goes with the whole
   // map.
   if (floor) map.moveTo(floor->settled(map.newestPose(), state_.covariance.value()));
@@ -461,8 +465,9 @@ void VisualOdometry::commit(const Candidate& candidate, double probability) {
   if (!adjustment.success) return;
   state_.rig.calibration.note(state_.map->oldestId(), state_.map->newestId(), candidate.calibration,
                               adjustment.calibration_information);
-  if (probability >= options_.tracking.probability && adjustment.common_disparity_square)
-    state_.rig.calibration.noteCommon(*adjustment.common_disparity_square);
+  if (probability < options_.tracking.probability) return;
+  state_.rig.noise.learnPair(adjustment.newest_square);
+  if (adjustment.common_disparity_square) state_.rig.calibration.noteCommon(*adjustment.common_disparity_square);
 }
 
 /// The motion between the two poses, and its covariance.

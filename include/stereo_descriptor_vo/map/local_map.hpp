@@ -140,6 +140,8 @@ class LocalMap {
     RigCalibration::Matrix calibration_information = RigCalibration::Matrix::Zero();
     std::optional<double> common_disparity_square;  ///< px^2, see WindowSolution
     std::vector<int> rejected;                      ///< features of the newest pair
+    double newest_square = 0.0;  ///< median of the newest pair's residuals, squared in standard deviations
+    int newest_measured = 0;     ///< number of these
   };
   Adjustment adjust(WindowOptimizer& optimizer, const CalibrationBelief& prior, RigCalibration& calibration,
                     const std::optional<Floor>& floor = std::nullopt);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 
 #include "stereo_descriptor_vo/common/options.hpp"
 
@@ -85,6 +86,18 @@ class Noise {
   /// motion's inliers differ.
   void learnShared(double square) { shared_ += (1.0 - kUsualMemory) * (square / 6.0 - shared_); }
 
+  /// Takes in the median square of a confirmed pair's residuals in the map.
+  void learnPair(double square) {
+    usual_square_ = usual_square_ ? kUsualMemory * *usual_square_ + (1.0 - kUsualMemory) * square : square;
+  }
+
+  /// Ratio between the variance of a pair's measurements and the usual one: images may be noisier, blurred or damaged.
+  /// As many measurements as tell a spread at all stand for the usual one (shrinkage).
+  double ofPair(double square, int measurements) const {
+    if (!usual_square_) return 1.0;
+    return (kFewestMeasured + measurements * square / *usual_square_) / (kFewestMeasured + measurements);
+  }
+
   /// Ratio between a motion's variance and that by independent errors of its points. Neighbours share a part of their
   /// errors, which does not average out.
   double shared() const { return std::max(shared_, 1.0); }
@@ -94,6 +107,7 @@ class Noise {
   NoiseOptions options_;
   double scale_ = 1.0;
   double shared_ = kUnknownRig;
+  std::optional<double> usual_square_;
 };
 
 }  // namespace sdvo
