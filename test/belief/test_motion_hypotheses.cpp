@@ -22,11 +22,24 @@ class Competition : public ::testing::Test {
     std::uniform_real_distribution<double> uniform(-1.0, 1.0);
     for (int i = 0; i < count; ++i) {
       const double z = depth + 2.0 * uniform(random), side = (x == 0.0 ? -0.5 : 0.5) + 0.45 * uniform(random);
-      const Eigen::Vector3d point(0.5 * side * z, 2.0 * uniform(random), z);
-      const int row = static_cast<int>(view_->seen.size());
-      all_.matches.push_back({row, row, 0.f});
-      all_.correspondences.push_back({point, synthetic::camera().project(moved(x) * point)});
-      view_->seen.push_back(sightings);
+      insert({0.5 * side * z, 2.0 * uniform(random), z}, x, sightings);
+    }
+  }
+
+  void insert(const Eigen::Vector3d& point, double x, int sightings) {
+    const int index = static_cast<int>(view_->seen.size());
+    all_.matches.push_back({index, index, 0.f});
+    all_.correspondences.push_back({point, synthetic::camera().project(moved(x) * point)});
+    view_->seen.push_back(sightings);
+  }
+
+  /// Of the whole width, above or below the image's middle row.
+  void addRows(int count, double x, int sightings, bool above) {
+    std::mt19937 random(static_cast<unsigned>(view_->seen.size()));
+    std::uniform_real_distribution<double> uniform(0.0, 1.0);
+    for (int i = 0; i < count; ++i) {
+      const double z = 4.0 + 4.0 * uniform(random), y = 0.2 * (0.1 + uniform(random));
+      insert({(uniform(random) - 0.5) * z, (above ? -y : y) * z, z}, x, sightings);
     }
   }
 
@@ -104,6 +117,33 @@ TEST_F(Competition, ProbabilitiesFollowTheShareAndNotTheNumber) {
   EXPECT_GT(few, 0.6);
   add(540, 0.0, 4), add(360, 0.5, 4);
   EXPECT_NEAR(choose({0.0, 0.5}).probability, few, 0.01);
+}
+
+TEST_F(Competition, WhereARowDividesTwoMotionsTheShareIsNoEvidence) {
+  addRows(40, 0.0, 4, true), addRows(80, 0.5, 4, false);
+  const MotionHypothesis found = choose({0.0, 0.5});
+  ASSERT_TRUE(found.rival);
+  EXPECT_TRUE(found.rival->is_torn);
+  EXPECT_NEAR(found.probability, 0.5, 1e-9);
+  // The prior tells which part is the camera's.
+  scene_.prior = {{moved(0.0), 0.01 * Matrix6d::Identity()}};
+  const MotionHypothesis expected = choose({0.0, 0.5});
+  EXPECT_NEAR(expected.motion.T_current_reference.translation().x(), 0.0, 1e-12);
+  EXPECT_GT(expected.probability, 0.99);
+}
+
+TEST_F(Competition, AColumnBetweenTwoMotionsIsNoTornImage) {
+  add(40, 0.0, 4), add(80, 0.5, 4);
+  const MotionHypothesis found = choose({0.0, 0.5});
+  ASSERT_TRUE(found.rival);
+  EXPECT_FALSE(found.rival->is_torn);
+  EXPECT_GT(found.probability, 0.8);
+}
+
+TEST_F(Competition, WhatIsFewMayLieAboveARowByChance) {
+  addRows(5, 0.0, 4, true), addRows(80, 0.5, 4, false);
+  const MotionHypothesis found = choose({0.0, 0.5});
+  EXPECT_GT(found.probability, 0.95);
 }
 
 TEST_F(Competition, WhatBothExplainIsNoEvidence) {

@@ -129,6 +129,31 @@ TEST_F(MotionSearchTest, AWrongExpectationIsOneHypothesisAmongOthers) {
   EXPECT_EQ(found.sightings.size(), found.motion.inliers.size());
 }
 
+TEST_F(MotionSearchTest, WhatIsTornFromARowOnIsDoubtfulHoweverMuchOfTheViewItIs) {
+  start(2);
+  // The lower two thirds are where the camera would see them 0.1 m further on, which the prior allows.
+  const StereoFeatures sound = street_.see(0.1, 0.0, stamp(), true, false);
+  std::vector<float> rows = sound.v;
+  std::nth_element(rows.begin(), rows.begin() + rows.size() / 3, rows.end());
+  const float row = rows[rows.size() / 3];
+  const auto part = [&](const StereoFeatures& features, bool above) {
+    std::vector<int> indices;
+    for (int i = 0; i < features.count(); ++i)
+      if ((features.v[i] < row) == above) indices.push_back(i);
+    return features.select(indices);
+  };
+  StereoFeatures torn = part(sound, true);
+  const StereoFeatures shifted = part(street_.see(0.2, 0.0, stamp(), true, false), false);
+  for (int i = 0; i < shifted.count(); ++i)
+    synthetic::addFeature(torn, shifted.u[i], shifted.v[i], shifted.disparity[i],
+                          {shifted.descriptors.ptr(i), shifted.descriptors.ptr(i) + shifted.descriptors.cols});
+  const MotionHypothesis found = find(torn, 0.15);
+  ASSERT_TRUE(found.rival);
+  EXPECT_TRUE(found.rival->is_torn);
+  EXPECT_LT(found.probability, 0.7);
+  EXPECT_EQ(find(sound, 0.15).probability, 1.0);
+}
+
 TEST_F(MotionSearchTest, AnExpectationThatIsALittleWrongIsLookedAroundFurther) {
   start(2);
   // Points 6 to 12 m away were expected 27 to 53 px beside where they are: beyond the gate, not three times as far.

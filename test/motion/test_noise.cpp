@@ -74,6 +74,22 @@ TEST(Noise, WhatPointsErrAlikeIsLearntAndAtLeastWhatTheyErrByThemselves) {
   EXPECT_EQ(noise.shared(), 1.0);
 }
 
+TEST(Noise, APairIsAsNoisyAsItsResidualsBesideTheUsualOnes) {
+  Noise noise{NoiseOptions()};
+  EXPECT_EQ(noise.ofPair(5.0, 100), 1.0) << "of a rig that nothing is known of";
+  for (int pair = 0; pair < 100; ++pair) noise.learnPair(1.0);
+  EXPECT_NEAR(noise.ofPair(1.0, 100), 1.0, 1e-9);
+  EXPECT_NEAR(noise.ofPair(4.0, 100000), 4.0, 1e-2);
+  EXPECT_NEAR(noise.ofPair(4.0, kFewestMeasured), 2.5, 1e-9) << "few measurements are half of what is usual";
+  EXPECT_EQ(noise.ofPair(4.0, 0), 1.0);
+}
+
+TEST(Noise, ImagesThatDoNotDifferMakeNoLaterPairNoisy) {
+  Noise noise{NoiseOptions()};
+  for (int pair = 0; pair < 100; ++pair) noise.learnPair(0.0);
+  EXPECT_NEAR(noise.ofPair(0.1, 1000), 1.0, 1e-9);
+}
+
 TEST(Noise, MotionsAreOneWithinTheNoiseOfACorner) {
   std::mt19937 random(1);
   std::normal_distribution<double> normal;

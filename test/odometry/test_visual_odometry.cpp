@@ -172,6 +172,21 @@ TEST(VisualOdometry, FollowsANoisyDriveAndKnowsHowWell) {
   EXPECT_LT(mahalanobisSquare(final_error, result.pose_covariance), 4.0 * 38.0);
 }
 
+TEST(VisualOdometry, APairWithNoisierImagesHasALargerCovarianceAndTheNextOnesHaveNot) {
+  constexpr double kNoise = 0.15;  // px
+  constexpr int kNoisy = 30;
+  VisualOdometry odometry({});
+  double usual = 0.0;
+  for (int i = 0; i <= kNoisy + 2; ++i) {
+    const OdometryResult result = odometry.update(pairOf(i, i == kNoisy ? 3.0 * kNoise : kNoise));
+    ASSERT_EQ(result.state, TrackingState::kTracking) << i << ": " << result.reason;
+    const double variance = result.motion_covariance.trace();
+    if (i >= kNoisy - 10 && i < kNoisy) usual = std::max(usual, variance);
+    if (i == kNoisy) EXPECT_GT(variance, 4.0 * usual);
+    if (i == kNoisy + 2) EXPECT_LT(variance, 2.0 * usual);
+  }
+}
+
 TEST(VisualOdometry, WaitsForTheFirstFeatures) {
   VisualOdometry odometry({});
   for (int i = 0; i < 3; ++i) {

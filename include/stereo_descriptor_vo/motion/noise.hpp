@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <optional>
 
 #include "stereo_descriptor_vo/common/options.hpp"
 
@@ -68,7 +67,6 @@ class Noise {
   /// Takes in what the inliers of a confirmed motion were off by (rms of u_left, v_left and u_right, px). Slow and
   /// bounded: one pair may be blurred, and what the inliers are depends on the scale itself.
   void learn(double rms) {
-    constexpr double kMost = 2.0;  // and its inverse the least (chosen)
     const double expected = options_.length() / std::sqrt(3.0);
     scale_ = std::clamp(kUsualMemory * scale_ + (1.0 - kUsualMemory) * rms / expected, 1.0 / kMost, kMost);
   }
@@ -86,16 +84,17 @@ class Noise {
   /// motion's inliers differ.
   void learnShared(double square) { shared_ += (1.0 - kUsualMemory) * (square / 6.0 - shared_); }
 
-  /// Takes in the median square of a confirmed pair's residuals in the map.
+  /// Takes in the median square, in standard deviations (chi-square of two), of a confirmed pair's residuals in the
+  /// map.
   void learnPair(double square) {
-    usual_square_ = usual_square_ ? kUsualMemory * *usual_square_ + (1.0 - kUsualMemory) * square : square;
+    usual_square_ += (usual_square_ > 0.0 ? 1.0 - kUsualMemory : 1.0) * (told(square) - usual_square_);
   }
 
   /// Ratio between the variance of a pair's measurements and the usual one: images may be noisier, blurred or damaged.
-  /// As many measurements as tell a spread at all stand for the usual one (shrinkage).
+  /// The usual one counts as much as so few measurements as tell no spread (shrinkage).
   double ofPair(double square, int measurements) const {
-    if (!usual_square_) return 1.0;
-    return (kFewestMeasured + measurements * square / *usual_square_) / (kFewestMeasured + measurements);
+    if (usual_square_ == 0.0) return 1.0;
+    return (kFewestMeasured + measurements * told(square) / usual_square_) / (kFewestMeasured + measurements);
   }
 
   /// Ratio between a motion's variance and that by independent errors of its points. Neighbours share a part of their
@@ -103,11 +102,18 @@ class Noise {
   double shared() const { return std::max(shared_, 1.0); }
 
  private:
+  /// Images that do not differ leave less than any rig's noise, which tells nothing of it.
+  static double told(double square) {
+    constexpr double kMedian = 1.386;  // of chi-square of two
+    return std::max(square, kMedian / (kMost * kMost));
+  }
+
+  static constexpr double kMost = 2.0;        // of the scale, and its inverse the least (chosen)
   static constexpr double kUnknownRig = 4.0;  // ratio; the learnt one of real and rendered drives is 1 to 19 (KITTI 01)
   NoiseOptions options_;
   double scale_ = 1.0;
   double shared_ = kUnknownRig;
-  std::optional<double> usual_square_;
+  double usual_square_ = 0.0;
 };
 
 }  // namespace sdvo
