@@ -152,9 +152,13 @@ class Explanations {
     return explains_both(hypotheses_[a]) && explains_both(hypotheses_[b]) && !areTorn(a, b);
   }
 
-  /// Whether a row divides what one hypothesis explains from what the other one does alone.
+  /// Whether a row divides what one hypothesis explains from what the other one does alone, which is a good part of
+  /// both.
   bool areTorn(std::size_t a, std::size_t b) const {
-    return areDivided(explainedBy(a), explainedBy(b, a)) || areDivided(explainedBy(b), explainedBy(a, b));
+    const Points of_a = explainedBy(a), of_b = explainedBy(b), only_a = explainedBy(a, b), only_b = explainedBy(b, a);
+    const double all = static_cast<double>(of_a.size() + only_b.size());
+    if (static_cast<double>(std::min(only_a.size(), only_b.size())) < kGoodPart * all) return false;
+    return areDivided(of_a, only_b) || areDivided(of_b, only_a);
   }
 
   /// The one whose strongest rival is the weakest: what two of them do not agree on may be weighed otherwise than what

@@ -17,8 +17,6 @@
 namespace sdvo {
 namespace {
 
-constexpr double kGoodPart = 0.1;  // of the points (chosen)
-
 /// Whether the motion's inliers end at a row of the image and a good part of the matches beyond it are outliers: the
 /// image may be torn there.
 bool endsAtRow(const MotionHypothesis& found) {

@@ -140,7 +140,7 @@ TEST_F(Competition, AColumnBetweenTwoMotionsIsNoTornImage) {
   EXPECT_GT(found.probability, 0.8);
 }
 
-TEST_F(Competition, WhatIsFewMayLieAboveARowByChance) {
+TEST_F(Competition, WhatIsNoGoodPartOfTheViewMayLieAboveARowByChance) {
   addRows(5, 0.0, 4, true), addRows(80, 0.5, 4, false);
   const MotionHypothesis found = choose({0.0, 0.5});
   EXPECT_GT(found.probability, 0.95);

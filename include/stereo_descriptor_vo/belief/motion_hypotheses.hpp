@@ -105,6 +105,9 @@ struct MotionHypothesis {
   static constexpr int kLastingSightings = 4;
 };
 
+/// Ratio of all points (chosen) that is more than chance makes of them.
+constexpr double kGoodPart = 0.1;
+
 /// Ratio of a motion by which it may be off.
 constexpr double kTolerableRatio = 0.03;
 
