@@ -1,6 +1,5 @@
 #include "stereo_descriptor_vo/belief/motion_prior.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core.hpp>

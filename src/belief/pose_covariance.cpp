@@ -1,6 +1,5 @@
 #include "stereo_descriptor_vo/belief/pose_covariance.hpp"
 
-#include <Eigen/Cholesky>
 #include <cmath>
 
 #include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"

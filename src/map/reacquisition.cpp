@@ -1,6 +1,5 @@
 #include "stereo_descriptor_vo/map/reacquisition.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>

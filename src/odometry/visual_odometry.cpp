@@ -1,6 +1,5 @@
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <sstream>

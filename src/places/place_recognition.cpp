@@ -1,6 +1,5 @@
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <iterator>

@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <Eigen/Cholesky>
 
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/places/place_verifier.hpp"
