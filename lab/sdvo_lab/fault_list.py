@@ -103,6 +103,15 @@ def noisy(sigma):
     return lambda image, drive, random: numpy.uint8(numpy.clip(image + random.normal(0, sigma, image.shape), 0, 255))
 
 
+def hidden(share):
+    """Something dark on the lens, at the left."""
+    def change(image, drive, random):
+        image = image.copy()
+        image[:, :round(share * image.shape[1])] = 8
+        return image
+    return change
+
+
 def salted(image, drive, random):
     image, chance = image.copy(), random.random(image.shape)
     image[chance < 0.025], image[chance > 0.975] = 0, 255
@@ -170,6 +179,17 @@ def torn(share, sides=(0, 1)):
                 setattr(new, name, image)
         return pairs
     return fault
+
+
+def rows_aside(pairs, drive, random):
+    """From some row on, every third pair lies 8 or 16 px aside, in both images alike, as a damaged stream leaves it."""
+    for pair in touched(pairs)[::3]:
+        rows = len(pixels(pair.left))
+        row, shift = random.integers(rows // 5, 4 * rows // 5), random.choice((-16, -8, 8, 16))
+        pair.left, pair.right = pixels(pair.left).copy(), pixels(pair.right).copy()
+        for image in (pair.left, pair.right):
+            image[row:] = numpy.roll(image[row:], shift, axis=1)
+    return pairs
 
 
 def swapped(pairs, drive, random):
@@ -301,7 +321,8 @@ FAULTS = {
     "right_gain_1.6": images(gained(1.6), (1,)), "right_gain_3": images(gained(3.0), (1,)),
     "right_gain_0.4": images(gained(0.4), (1,)), "gain_3": images(gained(3.0)),
     "darkness": images(grey(2)), "white": images(grey(255)), "left_black": images(grey(0), (0,)),
-    "right_black": images(grey(0), (1,)),
+    "right_black": images(grey(0), (1,)), "right_covered_30": images(hidden(0.3), (1,)),
+    "right_covered_70": images(hidden(0.7), (1,)), "rows_aside": rows_aside,
     "black_1": black(1), "black_5": black(5), "black_20": black(20), "black_100": paused_in_the_dark(100),
     "every_100th_black": every_100th_black, "carried_in_the_dark": carried_in_the_dark,
     "noise_10": images(noisy(10)), "noise_30": images(noisy(30)), "salt_and_pepper": images(salted), "rain": images(rained),

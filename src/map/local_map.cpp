@@ -449,6 +449,11 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   return adjustment;
 }
 
+double LocalMap::varianceOfMotion() const {
+  const double newest = frames_.back().variance;
+  return frames_.size() < 2 ? newest : 0.5 * (newest + frames_[frames_.size() - 2].variance);
+}
+
 void LocalMap::cutOff(const std::vector<double>& squares, Adjustment& adjustment) {
   const double gate = 2.0 * noiseGate(2);  // the point's position errs as much as its observation's
   for (const int i : problem_.newest) {

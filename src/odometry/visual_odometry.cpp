@@ -402,10 +402,9 @@ VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features,
   const std::optional<Floor> floor = this->floor();
   candidate.adjustment =
       map.adjust(optimizer_, state_.rig.calibration.prior(map.oldestId()), candidate.calibration, floor);
-  const double noisier =
-      state_.rig.noise.ofPair(candidate.adjustment.newest_square, candidate.adjustment.newest_measured);
-  candidate.adjustment.since_keyframe *= noisier;
-  candidate.adjustment.growth *= noisier;
+  map.noteVariance(state_.rig.noise.ofPair(candidate.adjustment.newest_square, candidate.adjustment.newest_measured));
+  candidate.adjustment.since_keyframe *= map.varianceOfMotion();
+  candidate.adjustment.growth *= map.varianceOfMotion();
   // The window's first pose does not move in the adjustment: what it carries in height and tilt goes with the whole
   // map.
   if (floor) map.moveTo(floor->settled(map.newestPose(), state_.covariance.value()));

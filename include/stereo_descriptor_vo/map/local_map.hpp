@@ -149,6 +149,11 @@ class LocalMap {
   /// The points at a finite distance, in the map's origin, m.
   std::vector<Eigen::Vector3d> positions() const;
 
+  /// Takes note of the variance of the newest pair's measurements, by the usual one.
+  void noteVariance(double variance) { frames_.back().variance = variance; }
+  /// The same of the motion since the key frame before, which rests on the measurements of both.
+  double varianceOfMotion() const;
+
   /// The newest pair's sightings confirm no points: its motion may be something else's.
   void discountNewest();
 
@@ -161,7 +166,8 @@ class LocalMap {
     int id;
     Eigen::Isometry3d T_camera_origin;
     bool is_keyframe;
-    bool is_recalled;  ///< from the memory
+    bool is_recalled;       ///< from the memory
+    double variance = 1.0;  ///< of its measurements, by the usual one
   };
   struct FrameObservation : Observation {
     int frame_id, feature;
