@@ -84,8 +84,8 @@ bool isObject(const Points& points, const Points& others) {
   return binomialTail(static_cast<int>(inside.size()), static_cast<int>(joined), chance) < kTailProbability;
 }
 
-/// Whether a row of the image divides points from others. What a torn or damaged image lacks reaches from one row to
-/// the end, so its share of the view says nothing of which part is the camera's.
+/// Whether a row of the image divides points from others. A torn or damaged image lacks all rows from one to its end.
+/// How many these are does not tell which part shows the camera's motion.
 bool areDivided(const Points& points, const Points& others) {
   constexpr double kAstray = 0.1;  // of either side (chosen): some wrong matches agree by chance
   const auto rowsOf = [](const Points& pixels) {
@@ -125,7 +125,8 @@ class Explanations {
   }
 
   /// Logarithm of how many times likelier one hypothesis is than another one, by prior and by the points that they do
-  /// not agree on. Those of an object move together; those that lie among each other err one by one.
+  /// not agree on. Those of an object move together; those that lie among each other err one by one; those of a torn
+  /// image are no evidence.
   double logRatio(std::size_t a, std::size_t b) const {
     double of_a = 0.0, of_b = 0.0;
     for (std::size_t i = 0; i < sightings_.size(); ++i)

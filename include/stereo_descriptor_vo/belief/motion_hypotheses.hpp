@@ -105,7 +105,7 @@ struct MotionHypothesis {
   static constexpr int kLastingSightings = 4;
 };
 
-/// Ratio of all points (chosen) that is more than chance makes of them.
+/// Ratio of all points (chosen) above which a part of them is no matter of chance.
 constexpr double kGoodPart = 0.1;
 
 /// Ratio of a motion by which it may be off.

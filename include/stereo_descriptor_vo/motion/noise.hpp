@@ -104,11 +104,11 @@ class Noise {
  private:
   /// Images that do not differ leave less than any rig's noise, which tells nothing of it.
   static double told(double square) {
-    constexpr double kMedian = 1.386;  // of chi-square of two
+    constexpr double kMedian = 1.386;  // of chi-square of two: 2 log 2
     return std::max(square, kMedian / (kMost * kMost));
   }
 
-  static constexpr double kMost = 2.0;        // of the scale, and its inverse the least (chosen)
+  static constexpr double kMost = 2.0;        // ratio of standard deviations, and its inverse the least (chosen)
   static constexpr double kUnknownRig = 4.0;  // ratio; the learnt one of real and rendered drives is 1 to 19 (KITTI 01)
   NoiseOptions options_;
   double scale_ = 1.0;
