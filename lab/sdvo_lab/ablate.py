@@ -20,7 +20,7 @@ LIST = programs.ROOT / "lab/ablations.yaml"
 FAULTS = ("none,frozen,right_100_ms_late,duplicated,out_of_order,gap_1.5_s,gap_3_s,stamps_10_190_ms,bursts_1_ms,right_down_1_px,"
           "right_rotated_0.5_deg,gain_3,noise_30,rain,right_blur_4_px,motion_blur_31_px,jpeg_10,occluder_40,occluder_70,mover_40,"
           "mover_55,mover_70,standing,standing_frozen,standing_bursts_1_ms,standing_mover_40,standing_mover_55,standing_mover_70,"
-          "standing_approached_40,standing_approached_70")
+          "standing_slow_mover_40,standing_slow_mover_55,standing_approached_40,standing_approached_70")
 
 
 class Case:

@@ -342,7 +342,8 @@ FAULTS.update({name: FAULTS["none"] for name in RENDERED})
 STANDING_FAULTS = {
     "standing": FAULTS["none"], "standing_frozen": frozen, "standing_bursts_1_ms": bursts, "standing_noise_10": FAULTS["noise_10"],
     "standing_mover_40": covered(0.4, (1.0, 0.0)), "standing_mover_55": covered(0.55, (1.0, 0.0)),
-    "standing_mover_70": covered(0.7, (1.0, 0.0)), "standing_approached_40": covered(0.4, (0.0, 1.0)),
+    "standing_mover_70": covered(0.7, (1.0, 0.0)), "standing_slow_mover_40": covered(0.4, (0.1, 0.0)),
+    "standing_slow_mover_55": covered(0.55, (0.1, 0.0)), "standing_approached_40": covered(0.4, (0.0, 1.0)),
     "standing_approached_70": covered(0.7, (0.0, 1.0)), "standing_dark": FAULTS["darkness"],
     **{f"standing_{name}": FAULTS[name] for name in ("black_1", "black_5", "black_20", "black_100", "every_100th_black", "gap_3_s")},
 }

@@ -1,6 +1,5 @@
 #include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <bitset>
 #include <cmath>
@@ -33,14 +32,6 @@ bool contains(const std::vector<int>& values, int value) {
 /// The prior's logarithm, relative to its best motion, is bounded by the probability that it is wrong.
 double logPrior(const MotionHypothesis& hypothesis) {
   return std::max(-0.5 * hypothesis.innovation, std::log(kTailProbability));
-}
-
-/// By how much the prior's density is lower for a motion that is badly determined: its innovation is smaller for that.
-double logSpread(const MotionScene& scene, const MotionHypothesis& hypothesis) {
-  if (scene.prior.empty()) return 0.0;
-  const Matrix6d& expected = scene.prior.front().covariance;
-  const Matrix6d ratio = expected.ldlt().solve(expected + hypothesis.motion.covariance);
-  return 0.5 * std::log(ratio.determinant());
 }
 
 std::vector<int> sorted(std::vector<int> values) {
@@ -138,8 +129,7 @@ class Explanations {
       images = 0.0;
     else if (isObject(only_a, only_b) || isObject(only_b, only_a))
       images = logLikelihood(of_b, points) - logLikelihood(of_a, points);
-    const double spread = logSpread(scene_, hypotheses_[a]) - logSpread(scene_, hypotheses_[b]);
-    return logPrior(hypotheses_[a]) - logPrior(hypotheses_[b]) - spread + images;
+    return logPrior(hypotheses_[a]) - logPrior(hypotheses_[b]) + images;
   }
 
   /// Whether two hypotheses mean one motion, for what the one explains and for what the other does: far points alone do

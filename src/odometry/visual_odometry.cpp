@@ -332,9 +332,6 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   const double since = scene.map.secondsUntil(features);
   std::string refutation =
       state_.prior.tooFast(found.motion.T_current_reference.inverse(), found.motion.covariance, since);
-  // What is followed was likely something else already, and this is no motion of the camera: the prior's is likelier.
-  if (refutation.empty() && scene.is_doubted && scene.T_current_reference && logOddsMisled(scene, found) > 0.0)
-    refutation = innovationWords(found) + ", right after " + state_.doubt.cause();
   if (!refutation.empty()) return refute(refutation);
   const Candidate candidate = adjustBeyondDoubt(features, scene, found);
   refutation = search_.chanceWords(scene, found);
@@ -345,7 +342,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   if (starts_again) state_.startAgain();
   const Belief belief = state_.doubt.weigh(scene, found, evidence);
   commit(candidate, belief.probability);
-  Step step = measure(found, candidate);
+  Step step = measure(features, found, candidate, since);
   const Matrix6d measured = step.covariance;
   judge(scene, found, candidate, belief, step);
   const bool is_confirmed = step.state == TrackingState::kTracking;
@@ -468,8 +465,9 @@ void VisualOdometry::commit(const Candidate& candidate, double probability) {
   if (adjustment.common_disparity_square) state_.rig.calibration.noteCommon(*adjustment.common_disparity_square);
 }
 
-/// The motion between the two poses, and its covariance.
-VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, const Candidate& candidate) {
+/// The motion between the two poses, and its covariance. `since`: s since the map's newest pair before it.
+VisualOdometry::Step VisualOdometry::measure(const StereoFeatures& features, const MotionHypothesis& found,
+                                             const Candidate& candidate, double since) {
   const LocalMap& map = *state_.map;
   Step step;
   step.state = TrackingState::kTracking;
@@ -482,6 +480,10 @@ VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, cons
   }
   step.covariance = state_.covariance.measure(*step.T_previous_current, candidate.adjustment.since_keyframe,
                                               candidate.adjustment.growth);
+  const double rate = logSE3(found.motion.T_current_reference.inverse()).tail<3>().norm() / state_.prior.interval(since);
+  const double by_delay =
+      state_.rig.right_delay.deviation(features, step.T_previous_current->translation().norm(), rate);
+  step.covariance.topLeftCorner<3, 3>() += by_delay * by_delay * Eigen::Matrix3d::Identity();
   state_.covariance.expose(candidate.adjustment.by_calibration, candidate.calibration);
   // The motion between two reported poses contains what the map has learnt of the first one meanwhile: a perturbation
   // of the key frame before, then of the newest pair.

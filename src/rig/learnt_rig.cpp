@@ -6,7 +6,7 @@
 namespace sdvo {
 
 LearntRig::LearntRig(const CalibrationOptions& options, const Noise& assumed)
-    : calibration(options), right_delay(options.right_delay), noise(assumed) {}
+    : calibration(options), right_delay(options), noise(assumed) {}
 
 /// A turn against what changes on rigs, and on this one, as a rule.
 double LearntRig::logOddsOfTurn(const StereoFeatures& features) const {

@@ -55,6 +55,15 @@ Vector6d velocityDuring(double delay, double dt, const Vector6d& before, const V
   return at + share * ((delay < 0.0 ? before : after) - at);
 }
 
+/// Error, m, of a motion over `distance` m at `rate` rad/s for each second of delay: as the median disparity has it.
+double exposed(const StereoFeatures& features, double distance, double rate) {
+  std::vector<float> disparities = features.disparity;
+  if (disparities.empty()) return 0.0;
+  const auto middle = disparities.begin() + static_cast<std::ptrdiff_t>(disparities.size() / 2);
+  std::nth_element(disparities.begin(), middle, disparities.end());
+  return distance * features.camera.fx * rate / static_cast<double>(*middle);
+}
+
 /// Mean square (px^2, cut off) of what the rows differ from those of a right image that is late by `delay`, and lower
 /// by a constant.
 double misfit(const std::vector<RowMotion>& rows, double delay) {
@@ -95,8 +104,12 @@ constexpr double kLeastTurning = 2.0;  // px/s: rotations from images err by les
 
 }  // namespace
 
-RightCameraDelay::RightCameraDelay(double prior)
-    : prior_(prior), rows_(RowDelay::kMemory, kLeastTurning, kSamePoints), newer_(rows_), older_(rows_) {}
+RightCameraDelay::RightCameraDelay(const CalibrationOptions& options)
+    : prior_(options.right_delay),
+      prior_sigma_(options.right_delay_sigma),
+      rows_(RowDelay::kMemory, kLeastTurning, kSamePoints),
+      newer_(rows_),
+      older_(rows_) {}
 
 void RightCameraDelay::watch(const std::vector<RowMotion>& rows, double dt, double row_error) {
   if (rows.size() < kFewestMeasured || !(dt > 0.0)) return;
@@ -109,7 +122,9 @@ void RightCameraDelay::watch(const std::vector<RowMotion>& rows, double dt, doub
 }
 
 void RightCameraDelay::learn(const StereoFeatures& features, double dt, const Vector6d& velocity, bool is_confirmed) {
-  expose(features, dt * velocity.head<3>().norm(), velocity.tail<3>().norm());
+  const double exposed_here = exposed(features, dt * velocity.head<3>().norm(), velocity.tail<3>().norm());
+  exposed_ += exposed_here;
+  compensated_ += exposed_here * compensated();
   if (std::max(earlier_, later_) > 0.0) rows_ = newer_ = older_;
   if (!is_confirmed) return interrupt();
   StereoFeatures positions;
@@ -137,14 +152,10 @@ std::string RightCameraDelay::OtherPair::words() const {
   return words.str();
 }
 
-void RightCameraDelay::expose(const StereoFeatures& features, double distance, double rate) {
-  std::vector<float> disparities = features.disparity;
-  if (disparities.empty()) return;
-  const auto middle = disparities.begin() + static_cast<std::ptrdiff_t>(disparities.size() / 2);
-  std::nth_element(disparities.begin(), middle, disparities.end());
-  const double exposed = distance * features.camera.fx * rate / static_cast<double>(*middle);
-  exposed_ += exposed;
-  compensated_ += exposed * compensated();
+double RightCameraDelay::deviation(const StereoFeatures& features, double distance, double rate) const {
+  const auto found = estimate();
+  const double sigma = found ? prior_sigma_ * found->sigma / std::hypot(prior_sigma_, found->sigma) : prior_sigma_;
+  return sigma * exposed(features, distance, rate);
 }
 
 double RightCameraDelay::drift() const {

@@ -191,20 +191,6 @@ TEST_F(Competition, OfFailuresTheLargestIsReturned) {
   EXPECT_EQ(chooseMotion(scene_, kThreshold, {small, large}).motion.reason, "the largest");
 }
 
-TEST_F(Competition, OfTwoMotionsThatFitTheBetterDeterminedOneIsLikelier) {
-  add(60, 0.0, 1), add(60, 0.5, 1);
-  scene_.prior = {{moved(0.25), 0.01 * Matrix6d::Identity()}};
-  for (const bool first : {true, false}) {
-    MotionHypothesis vague = hypothesis(first ? 0.0 : 0.5), exact = hypothesis(first ? 0.5 : 0.0);
-    vague.motion.covariance = Matrix6d::Identity();
-    vague.innovation =
-        scene_.prior.front().normalisedSquare(vague.motion.T_current_reference.inverse(), vague.motion.covariance);
-    EXPECT_LT(vague.innovation, exact.innovation);
-    const MotionHypothesis chosen = chooseMotion(scene_, kThreshold, {vague, exact});
-    EXPECT_TRUE(chosen.motion.T_current_reference.isApprox(exact.motion.T_current_reference));
-  }
-}
-
 TEST_F(Competition, AnImprobableMotionMisleadsUnlessLastingPointsConfirmIt) {
   scene_.prior = {{moved(2.0), 0.01 * Matrix6d::Identity()}};
   add(100, 0.0, 1);

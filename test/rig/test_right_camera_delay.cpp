@@ -52,6 +52,12 @@ Vector6d before(int pair) {
 
 constexpr double kRowError = 0.4;  // px
 
+RightCameraDelay knownBeforehand(double delay) {
+  CalibrationOptions options;
+  options.right_delay = delay;
+  return RightCameraDelay(options);
+}
+
 RightCameraDelay watched(double delay, int pairs) {
   RightCameraDelay right_delay;
   for (int k = 0; k < pairs; ++k) {
@@ -66,7 +72,7 @@ TEST(RightCameraDelay, PutsFeaturesInStep) {
   for (const double delay : {-0.006, 0.006}) {
     const Vector6d velocity = velocityAt(1.0);
     const StereoFeatures late = seen(velocity, delay), synchronised = seen(velocity, 0.0);
-    const StereoFeatures corrected = RightCameraDelay(delay).synchronised(late, kPeriod, velocity);
+    const StereoFeatures corrected = knownBeforehand(delay).synchronised(late, kPeriod, velocity);
     for (int i = 0; i < late.count(); ++i) {
       EXPECT_NEAR(corrected.disparity[i], synchronised.disparity[i], 0.02) << late.disparity[i];
       EXPECT_NEAR(corrected.dv[i], 0.0, 0.02) << late.dv[i];
@@ -79,7 +85,7 @@ TEST(RightCameraDelay, KeepsPointsThatNoiseWouldPutBeyondInfinity) {
   turn[4] = -2.0;
   StereoFeatures far = seen(Vector6d::Zero(), 0.0);
   for (float& disparity : far.disparity) disparity = 0.5f;
-  const StereoFeatures corrected = RightCameraDelay(-0.01).synchronised(far, kPeriod, turn);
+  const StereoFeatures corrected = knownBeforehand(-0.01).synchronised(far, kPeriod, turn);
   ASSERT_EQ(corrected.count(), far.count());
   for (const float disparity : corrected.disparity) EXPECT_GT(disparity, 0.f);
 }
@@ -116,7 +122,7 @@ TEST(RightCameraDelay, StampsOfFreeRunningCamerasAreKnownDelays) {
 }
 
 TEST(RightCameraDelay, WhatIsKnownBeforehandHoldsUntilItIsContradicted) {
-  RightCameraDelay known(-0.003);
+  RightCameraDelay known = knownBeforehand(-0.003);
   EXPECT_EQ(known.compensated(), -0.003);
   for (int k = 0; k < 60; ++k)
     known.learn(seen(velocityAt(kPeriod * k), 0.0, 0.1, 10u + static_cast<unsigned>(k)), kPeriod, before(k), true);
@@ -128,6 +134,22 @@ TEST(RightCameraDelay, WhatWasNotCompensatedMakesThePositionUncertain) {
   const double late = watched(0.0062, 60).drift(), later = watched(0.0124, 60).drift();
   EXPECT_GT(late, 0.0);
   EXPECT_NEAR(later / late, 2.0, 0.5) << "until the delay is known, it shifts points in proportion";
+}
+
+TEST(RightCameraDelay, AMotionInATurnIsAsUncertainAsPriorAndPairsLeaveTheDelay) {
+  CalibrationOptions options;
+  options.right_delay_sigma = 0.004;
+  const StereoFeatures features = seen(Vector6d::Zero(), 0.0);  // 20 to 44 px, the median 32
+  const double each_second = 0.5 * features.camera.fx * 1.5 / 32.0;
+  const RightCameraDelay unknown(options);
+  EXPECT_NEAR(unknown.deviation(features, 0.5, 1.5), 0.004 * each_second, 1e-6);
+  EXPECT_EQ(unknown.deviation(features, 0.5, 0.0), 0.0);
+  EXPECT_EQ(unknown.deviation(features, 0.0, 1.5), 0.0);
+  EXPECT_EQ(unknown.deviation(synthetic::noFeatures(features.camera), 0.5, 1.5), 0.0);
+  const RightCameraDelay measured = watched(0.0062, 60);
+  const double of_pairs = measured.estimate()->sigma * each_second;
+  EXPECT_LT(measured.deviation(features, 0.5, 1.5), of_pairs) << "the prior tells something";
+  EXPECT_GT(measured.deviation(features, 0.5, 1.5), 0.9 * of_pairs) << "the pairs tell more";
 }
 
 TEST(RightCameraDelay, KnowsThePartnerOfAnotherPair) {

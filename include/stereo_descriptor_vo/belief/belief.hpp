@@ -30,8 +30,6 @@ class Doubt {
   double logOdds() const { return log_odds_; }
   /// Whether it is still twice as likely as without a cause.
   bool lasts() const;
-  /// In words, of the largest doubt that lasts.
-  const std::string& cause() const { return cause_; }
 
   /// Posterior of a motion: its rivals, the prior, what the pair itself shows and what the pairs before left.
   Belief weigh(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence);
@@ -44,7 +42,7 @@ class Doubt {
   void raise(double log_odds, const std::string& cause);
 
   double log_odds_ = kUnsuspected;
-  std::string cause_;
+  std::string cause_;  ///< in words, of the largest doubt that lasts
   Matrix6d deviation_ = Matrix6d::Zero();  ///< second moment of the pose's error if the doubt is right, m and rad
 };
 

@@ -13,6 +13,7 @@ struct CalibrationOptions {
   double prior_bend = 0.0;
   double prior_sigma = 1.0;
   double right_delay = 0.0;
+  double right_delay_sigma = 0.003;  // chosen: one trigger leaves 0.2 ms (twelve drives), none half a frame
   double trust = 0.16;
 
   void describe(OptionList& list) {
@@ -24,6 +25,8 @@ struct CalibrationOptions {
              "standard deviation of what is known beforehand, in the centre and at 45 degrees from it");
     list.add("right_delay", right_delay, {-0.1, 0.1}, "s",
              "time by which right images are known to be later than left ones; a significant difference is found");
+    list.add("right_delay_sigma", right_delay_sigma, {1e-6, 0.1}, "s",
+             "standard deviation of what is known of that time beforehand");
     list.add("trust", trust, {0.01, 1.0}, "",
              "how far the window's own figure for its precision is believed: 1 / the factor on its standard deviation");
   }

@@ -9,6 +9,7 @@
 #include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/rig/calibration_filter.hpp"
 #include "stereo_descriptor_vo/rig/row_delay.hpp"
 
 namespace sdvo {
@@ -24,8 +25,7 @@ struct RowMotion {
 /// f * rate * delay: 1 px for 3 ms at 100 deg/s and f = 212 px.
 class RightCameraDelay {
  public:
-  /// `prior`, s: what is known beforehand.
-  explicit RightCameraDelay(double prior = 0.0);
+  explicit RightCameraDelay(const CalibrationOptions& options = {});
 
   /// Evidence of a pair `dt` s after the one before for a right image that is another pair's. `row_error`, px: standard
   /// deviation of a row in the left image.
@@ -50,6 +50,10 @@ class RightCameraDelay {
   /// The likeliest one of a stream with a pair every `dt` s.
   OtherPair otherPair(double dt) const;
 
+  /// Standard deviation, m, of a motion over `distance` m at `rate` rad/s, by what prior and pairs leave unknown of the
+  /// delay. `features`: the pair's.
+  double deviation(const StereoFeatures& features, double distance, double rate) const;
+
   /// Standard deviation of the position, m, from turns whose features were not compensated as they would be now, and
   /// from the error of what is known. A rig in step has none.
   double drift() const;
@@ -66,9 +70,8 @@ class RightCameraDelay {
     Vector6d velocity;        ///< over the time before it
   };
   void addRows(double dt);
-  void expose(const StereoFeatures& features, double distance, double rate);
 
-  double prior_;
+  double prior_, prior_sigma_;  ///< s
   RowDelay rows_;
   RowDelay newer_, older_;  ///< as they were some tens of pairs ago
   int taught_ = 0;          ///< pairs
