@@ -126,12 +126,29 @@ MotionHypothesis MotionSearch::searchNear(const MotionScene& scene, const ViewPt
   double match_time = 0.0, motion_time = 0.0;
   if (!scene.is_doubted) {
     MotionHypothesis found = search(matcher_, scene, view, T_current_reference);
-    if (isBeyondDoubt(scene, found, max_doubt)) return found;
+    if (isBeyondDoubt(scene, found, max_doubt) && !leavesGate(scene, *T_current_reference, found)) return found;
     match_time = found.match_time, motion_time = found.motion_time;
   }
   MotionHypothesis found = search(wide_matcher_, scene, view, T_current_reference);
   found.match_time += match_time, found.motion_time += motion_time;
   return found;
+}
+
+/// Whether the motion found has a good part of the points where the search did not look for them.
+bool MotionSearch::leavesGate(const MotionScene& scene, const Eigen::Isometry3d& predicted,
+                              const MotionHypothesis& found) const {
+  const StereoCamera& camera = scene.features.camera;
+  const Eigen::Isometry3d& T_current_reference = found.motion.T_current_reference;
+  std::size_t seen = 0, outside = 0;
+  for (const Eigen::Vector3d& point : found.view->points.positions) {
+    const Eigen::Vector3d here = T_current_reference * point, expected = predicted * point;
+    if (std::min(here.z(), expected.z()) < kNearestDepth) continue;
+    const Eigen::Vector3d pixel = camera.project(here);
+    if (!camera.sees(pixel)) continue;
+    ++seen;
+    outside += (pixel - camera.project(expected)).head<2>().norm() > matcher_.options().gate_radius;
+  }
+  return static_cast<double>(outside) > kGoodPart * static_cast<double>(seen);
 }
 
 MotionHypothesis MotionSearch::search(const FeatureMatcher& matcher, const MotionScene& scene, const ViewPtr& view,

@@ -50,6 +50,7 @@ class MotionSearch {
                               const std::optional<Eigen::Isometry3d>& T_current_reference, double max_doubt) const;
   MotionHypothesis search(const FeatureMatcher& matcher, const MotionScene& scene, const ViewPtr& view,
                           const std::optional<Eigen::Isometry3d>& T_current_reference) const;
+  bool leavesGate(const MotionScene& scene, const Eigen::Isometry3d& predicted, const MotionHypothesis& found) const;
   MotionHypothesis searchAmong(const MotionScene& scene, const MotionHypothesis& all,
                                const std::vector<int>& subset) const;
   std::vector<int> agreeing(const MotionScene& scene, const MotionHypothesis& all,
