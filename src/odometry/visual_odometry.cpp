@@ -480,7 +480,8 @@ VisualOdometry::Step VisualOdometry::measure(const StereoFeatures& features, con
   }
   step.covariance = state_.covariance.measure(*step.T_previous_current, candidate.adjustment.since_keyframe,
                                               candidate.adjustment.growth);
-  const double rate = logSE3(found.motion.T_current_reference.inverse()).tail<3>().norm() / state_.prior.interval(since);
+  const double rate =
+      logSE3(found.motion.T_current_reference.inverse()).tail<3>().norm() / state_.prior.interval(since);
   const double by_delay =
       state_.rig.right_delay.deviation(features, step.T_previous_current->translation().norm(), rate);
   step.covariance.topLeftCorner<3, 3>() += by_delay * by_delay * Eigen::Matrix3d::Identity();

@@ -42,7 +42,7 @@ class Doubt {
   void raise(double log_odds, const std::string& cause);
 
   double log_odds_ = kUnsuspected;
-  std::string cause_;  ///< in words, of the largest doubt that lasts
+  std::string cause_;                      ///< in words, of the largest doubt that lasts
   Matrix6d deviation_ = Matrix6d::Zero();  ///< second moment of the pose's error if the doubt is right, m and rad
 };
 
