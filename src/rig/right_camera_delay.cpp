@@ -153,9 +153,14 @@ std::string RightCameraDelay::OtherPair::words() const {
 }
 
 double RightCameraDelay::deviation(const StereoFeatures& features, double distance, double rate) const {
-  const auto found = estimate();
-  const double sigma = found ? prior_sigma_ * found->sigma / std::hypot(prior_sigma_, found->sigma) : prior_sigma_;
-  return sigma * exposed(features, distance, rate);
+  double sigma = prior_sigma_, log_odds = 0.0;  // out of step or not is as likely beforehand
+  if (const auto found = estimate()) {
+    using Scalar = Eigen::Matrix<double, 1, 1>;
+    log_odds = logBayesFactor<1>(Scalar(found->value - prior_), Scalar(1.0 / (found->sigma * found->sigma)),
+                                 Scalar(prior_sigma_ * prior_sigma_));
+    sigma *= found->sigma / std::hypot(prior_sigma_, found->sigma);
+  }
+  return std::sqrt(probabilityOf(log_odds)) * sigma * exposed(features, distance, rate);
 }
 
 double RightCameraDelay::drift() const {

@@ -142,14 +142,15 @@ TEST(RightCameraDelay, AMotionInATurnIsAsUncertainAsPriorAndPairsLeaveTheDelay) 
   const StereoFeatures features = seen(Vector6d::Zero(), 0.0);  // 20 to 44 px, the median 32
   const double each_second = 0.5 * features.camera.fx * 1.5 / 32.0;
   const RightCameraDelay unknown(options);
-  EXPECT_NEAR(unknown.deviation(features, 0.5, 1.5), 0.004 * each_second, 1e-6);
+  EXPECT_NEAR(unknown.deviation(features, 0.5, 1.5), std::sqrt(0.5) * 0.004 * each_second, 1e-6);
   EXPECT_EQ(unknown.deviation(features, 0.5, 0.0), 0.0);
   EXPECT_EQ(unknown.deviation(features, 0.0, 1.5), 0.0);
   EXPECT_EQ(unknown.deviation(synthetic::noFeatures(features.camera), 0.5, 1.5), 0.0);
-  const RightCameraDelay measured = watched(0.0062, 60);
-  const double of_pairs = measured.estimate()->sigma * each_second;
-  EXPECT_LT(measured.deviation(features, 0.5, 1.5), of_pairs) << "the prior tells something";
-  EXPECT_GT(measured.deviation(features, 0.5, 1.5), 0.9 * of_pairs) << "the pairs tell more";
+  const RightCameraDelay late = watched(0.0062, 60), in_step = watched(0.0, 60);
+  const double of_pairs = late.estimate()->sigma * each_second;
+  EXPECT_LT(late.deviation(features, 0.5, 1.5), of_pairs) << "the prior tells something";
+  EXPECT_GT(late.deviation(features, 0.5, 1.5), 0.9 * of_pairs) << "the pairs tell more";
+  EXPECT_LT(in_step.deviation(features, 0.5, 1.5), 0.5 * in_step.estimate()->sigma * each_second);
 }
 
 TEST(RightCameraDelay, KnowsThePartnerOfAnotherPair) {

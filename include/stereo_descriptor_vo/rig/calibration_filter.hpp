@@ -26,7 +26,7 @@ struct CalibrationOptions {
     list.add("right_delay", right_delay, {-0.1, 0.1}, "s",
              "time by which right images are known to be later than left ones; a significant difference is found");
     list.add("right_delay_sigma", right_delay_sigma, {1e-6, 0.1}, "s",
-             "standard deviation of what is known of that time beforehand");
+             "standard deviation of an error of that time, which is beforehand as likely as none");
     list.add("trust", trust, {0.01, 1.0}, "",
              "how far the window's own figure for its precision is believed: 1 / the factor on its standard deviation");
   }

@@ -51,7 +51,7 @@ class RightCameraDelay {
   OtherPair otherPair(double dt) const;
 
   /// Standard deviation, m, of a motion over `distance` m at `rate` rad/s, by what prior and pairs leave unknown of the
-  /// delay. `features`: the pair's.
+  /// delay. Rigs that have the prior's delay and those that are out of step are a mixture. `features`: the pair's.
   double deviation(const StereoFeatures& features, double distance, double rate) const;
 
   /// Standard deviation of the position, m, from turns whose features were not compensated as they would be now, and
