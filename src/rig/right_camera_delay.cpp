@@ -153,12 +153,14 @@ std::string RightCameraDelay::OtherPair::words() const {
 }
 
 double RightCameraDelay::deviation(const StereoFeatures& features, double distance, double rate) const {
+  constexpr double kExact = 1e-6;               // s: rows without any noise, as a simulator may give them
   double sigma = prior_sigma_, log_odds = 0.0;  // out of step or not is as likely beforehand
   if (const auto found = estimate()) {
     using Scalar = Eigen::Matrix<double, 1, 1>;
-    log_odds = logBayesFactor<1>(Scalar(found->value - prior_), Scalar(1.0 / (found->sigma * found->sigma)),
+    const double of_pairs = std::max(found->sigma, kExact);
+    log_odds = logBayesFactor<1>(Scalar(found->value - prior_), Scalar(1.0 / (of_pairs * of_pairs)),
                                  Scalar(prior_sigma_ * prior_sigma_));
-    sigma *= found->sigma / std::hypot(prior_sigma_, found->sigma);
+    sigma *= of_pairs / std::hypot(prior_sigma_, of_pairs);
   }
   return std::sqrt(probabilityOf(log_odds)) * sigma * exposed(features, distance, rate);
 }

@@ -153,6 +153,15 @@ TEST(RightCameraDelay, AMotionInATurnIsAsUncertainAsPriorAndPairsLeaveTheDelay) 
   EXPECT_LT(in_step.deviation(features, 0.5, 1.5), 0.5 * in_step.estimate()->sigma * each_second);
 }
 
+TEST(RightCameraDelay, RowsWithoutNoiseLeaveHardlyAnyOfIt) {
+  RightCameraDelay exact;
+  StereoFeatures features = seen(Vector6d::Zero(), 0.0);
+  features.dv.assign(features.dv.size(), 0.f);
+  for (int k = 0; k < 60; ++k) exact.learn(features, kPeriod, before(k), true);
+  ASSERT_EQ(exact.estimate()->sigma, 0.0);
+  EXPECT_LT(exact.deviation(features, 0.5, 1.5), 1e-4);
+}
+
 TEST(RightCameraDelay, KnowsThePartnerOfAnotherPair) {
   for (const double delay : {-kPeriod, 0.0, kPeriod, -0.003}) {
     RightCameraDelay right_delay;
