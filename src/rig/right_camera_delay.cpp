@@ -57,11 +57,8 @@ Vector6d velocityDuring(double delay, double dt, const Vector6d& before, const V
 
 /// Error, m, of a motion over `distance` m at `rate` rad/s for each second of delay: as the median disparity has it.
 double exposed(const StereoFeatures& features, double distance, double rate) {
-  std::vector<float> disparities = features.disparity;
-  if (disparities.empty()) return 0.0;
-  const auto middle = disparities.begin() + static_cast<std::ptrdiff_t>(disparities.size() / 2);
-  std::nth_element(disparities.begin(), middle, disparities.end());
-  return distance * features.camera.fx * rate / static_cast<double>(*middle);
+  std::vector<double> disparities(features.disparity.begin(), features.disparity.end());
+  return disparities.empty() ? 0.0 : distance * features.camera.fx * rate / median(disparities);
 }
 
 /// Mean square (px^2, cut off) of what the rows differ from those of a right image that is late by `delay`, and lower
@@ -153,7 +150,7 @@ std::string RightCameraDelay::OtherPair::words() const {
 }
 
 double RightCameraDelay::deviation(const StereoFeatures& features, double distance, double rate) const {
-  constexpr double kExact = 1e-6;               // s: rows without any noise, as a simulator may give them
+  constexpr double kExact = 1e-6;               // s, as the least prior: rows without noise, as of a simulator
   double sigma = prior_sigma_, log_odds = 0.0;  // out of step or not is as likely beforehand
   if (const auto found = estimate()) {
     using Scalar = Eigen::Matrix<double, 1, 1>;
