@@ -1,6 +1,5 @@
 #pragma once
 
-#include <fstream>
 #include <iomanip>
 #include <sstream>
 #include <stdexcept>
@@ -26,10 +25,10 @@ class CsvTable {
 
   /// Throws std::runtime_error when the file cannot be written.
   void write(const std::string& path) const {
-    std::ofstream file(path);
+    std::ostringstream file;
     for (const auto& row : rows_)
       for (std::size_t c = 0; c < row.size(); ++c) file << row[c] << (c + 1 < row.size() ? "," : "\n");
-    finishTextFile(file, path);
+    writeTextFile(path, file.str());
   }
 
   std::string aligned() const {

@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <numeric>
 #include <opencv2/imgcodecs.hpp>
 #include <random>
+#include <sstream>
 #include <stdexcept>
 
 #include "../../src/data/text_file.hpp"
@@ -109,14 +109,14 @@ int run(Arguments arguments) {
   const std::vector<Column> chosen =
       choose(makeColumns(samples), static_cast<double>(samples.size()), arguments.max_correlation);
 
-  std::ofstream file(arguments.output);
+  std::ostringstream file;
   file << "// Learnt by learn freak-pairs from " << samples.size() << " key points in " << arguments.images.size()
        << " images; largest correlation " << arguments.max_correlation << ".\n";
   for (std::size_t i = 0; i < chosen.size(); ++i)
     file << "{" << int{chosen[i].pair.first} << ", " << int{chosen[i].pair.second} << "},"
          << (i % 12 == 11 ? "\n" : " ");
   file << "\n";
-  sdvo::finishTextFile(file, arguments.output);
+  sdvo::writeTextFile(arguments.output, file.str());
   std::cout << samples.size() << " key points, largest correlation " << arguments.max_correlation
             << ", mean of the last pair " << chosen.back().mean << ", written to " << arguments.output << "\n";
   return 0;

@@ -1,10 +1,10 @@
 // Finds the size-from-depth curve of the paper's section 4.1 by sampling: features are followed over pairs, the size at
 // which each is most similar to its first view is searched, and curves in disparity are fitted to these samples.
 #include <filesystem>
-#include <fstream>
 #include <iostream>
 #include <memory>
 #include <opencv2/core/utility.hpp>
+#include <sstream>
 #include <stdexcept>
 
 #include "../../src/data/text_file.hpp"
@@ -75,7 +75,7 @@ std::vector<sdvo::DepthScaleOptions> constantCurves(const Arguments& arguments) 
 
 void writeYaml(const std::string& path, const sdvo::ShapeFit& shape, const sdvo::DepthScaleOptions& curve,
                const Arguments& arguments, std::size_t samples) {
-  std::ofstream file(path);
+  std::ostringstream file;
   file << "# Written by learn size-curve: " << shape.model << " on " << samples << " samples of "
        << arguments.setup.sequences.size() << " sequence(s), median residual " << shape.median_residual << " octaves.\n"
        << "stereo_features:\n"
@@ -85,7 +85,7 @@ void writeYaml(const std::string& path, const sdvo::ShapeFit& shape, const sdvo:
        << "    offset: " << curve.offset << "\n"
        << "    min_size: " << curve.min_size << "\n"
        << "    max_size: " << curve.max_size << "\n";
-  sdvo::finishTextFile(file, path);
+  sdvo::writeTextFile(path, file.str());
 }
 
 int run(const Arguments& arguments) {

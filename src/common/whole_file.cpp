@@ -1,11 +1,13 @@
 #include "whole_file.hpp"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <filesystem>
+#include <fstream>
 #include <random>
 #include <stdexcept>
 #include <string>
@@ -21,20 +23,6 @@ void check(bool succeeded) {
   if (!succeeded) throw std::system_error(errno, std::generic_category());
 }
 
-/// Closed with its owner; synchronise() returns once the disk has what was written.
-class Descriptor {
- public:
-  explicit Descriptor(int file) : file_(file) { check(file >= 0); }
-  Descriptor(const Descriptor&) = delete;
-  Descriptor& operator=(const Descriptor&) = delete;
-  ~Descriptor() { ::close(file_); }
-  void synchronise() const { check(::fsync(file_) == 0 || errno == EINVAL); }  // EINVAL: a file system without it
-  void allow(mode_t mode) const { check(::fchmod(file_, mode) == 0); }
-
- private:
-  const int file_;
-};
-
 /// The file that `path` leads to, over links that may lead to nothing yet.
 fs::path followLinks(fs::path path) {
   constexpr int kMostLinks = 40;  // the kernel's own limit
@@ -46,49 +34,96 @@ fs::path followLinks(fs::path path) {
   return path;
 }
 
-/// A new file beside `path`, whose name it appends to. Its mode is that of any program's new file: mkstemp's is not,
-/// and the process's umask can only be read by changing it.
-int create(std::string& path) {
-  std::random_device random;
-  const std::string beside = path + ".partial-";
-  for (;;) {
-    path = beside + std::to_string(random());
-    const int file = ::open(path.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
-    if (file >= 0 || errno != EEXIST) return file;
-  }
-}
-
-void replace(const fs::path& path, const std::function<void(const std::string& partial)>& write) {
-  std::string partial = path.string();
-  const Descriptor file(create(partial));
-  try {
-    write(partial);
-    struct stat before {};
-    if (::stat(path.c_str(), &before) == 0) file.allow(before.st_mode & 07777);
-    file.synchronise();
-    fs::rename(partial, path);
-  } catch (...) {
-    std::error_code ignored;
-    fs::remove(partial, ignored);
-    throw;
-  }
-  Descriptor(::open(path.parent_path().c_str(), O_RDONLY | O_DIRECTORY)).synchronise();
+template <class Action>
+void ofFile(const std::string& path, const Action& action) try {
+  action();
+} catch (const std::system_error& e) {
+  throw std::runtime_error("'" + path + "': cannot be written: " + e.code().message());
+} catch (const std::exception& e) {
+  throw std::runtime_error("'" + path + "': cannot be written: " + e.what());
 }
 
 }  // namespace
 
-void writeWhole(const std::string& path, const std::function<void(const std::string& partial)>& write) {
-  const auto fail = [&](const std::string& why) { throw std::runtime_error("'" + path + "': " + why); };
+/// Closed with its owner.
+class WholeFile::Descriptor {
+ public:
+  explicit Descriptor(int file) : file_(file) { check(file >= 0); }
+  Descriptor(const Descriptor&) = delete;
+  Descriptor& operator=(const Descriptor&) = delete;
+  ~Descriptor() { ::close(file_); }
+  /// Returns once the disk has what was written.
+  void synchronise() const { check(::fsync(file_) == 0 || errno == EINVAL); }  // EINVAL: a file system without it
+  void allow(mode_t mode) const { check(::fchmod(file_, mode) == 0); }
+  /// Until it is closed, which the end of a process does. False where another one holds it.
+  bool lock() const { return ::flock(file_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK; }
+  bool hasName() const {
+    struct stat status {};
+    return ::fstat(file_, &status) == 0 && status.st_nlink > 0;
+  }
+
+ private:
+  const int file_;
+};
+
+WholeFile::WholeFile(const std::string& path) : path_(path) {
+  const auto fail = [&](const char* why) { throw std::runtime_error("'" + path + "': " + why); };
   if (!fs::path(path).is_absolute()) fail("the path must be absolute");
   std::error_code ignored;
   if (fs::exists(path, ignored) && !fs::is_regular_file(path, ignored)) fail("it is no regular file");
-  try {
-    replace(followLinks(path), write);
-  } catch (const std::system_error& e) {
-    fail("cannot be written: " + e.code().message());
-  } catch (const std::exception& e) {
-    fail(std::string("cannot be written: ") + e.what());
-  }
+  ofFile(path, [&] {
+    final_ = followLinks(path);
+    const std::string beside = final_ + ".partial-";
+    for (const fs::directory_entry& entry : fs::directory_iterator(fs::path(final_).parent_path(), ignored)) {
+      const std::string name = entry.path().string();
+      if (name.compare(0, beside.size(), beside) != 0 || !entry.is_regular_file(ignored)) continue;
+      const int left = ::open(name.c_str(), O_RDWR | O_CLOEXEC | O_NOFOLLOW);
+      if (left < 0) continue;
+      const Descriptor held(left);
+      if (held.lock()) fs::remove(name, ignored);
+    }
+    // The mode is that of any program's new file: mkstemp's is not, and the process's umask can only be read by
+    // changing it.
+    std::random_device random;
+    do {
+      partial_ = beside + std::to_string(random());
+      const int file = ::open(partial_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+      if (file < 0 && errno == EEXIST) continue;
+      file_ = std::make_unique<Descriptor>(file);
+    } while (!file_ || !file_->lock() || !file_->hasName());  // else somebody took it for one that was left
+  });
+}
+
+WholeFile::~WholeFile() {
+  std::error_code ignored;
+  if (file_) fs::remove(partial_, ignored);
+}
+
+void WholeFile::commit() {
+  ofFile(path_, [this] {
+    struct stat before {};
+    if (::stat(final_.c_str(), &before) == 0) file_->allow(before.st_mode & 07777);
+    file_->synchronise();
+    fs::rename(partial_, final_);
+    file_.reset();
+    Descriptor(::open(fs::path(final_).parent_path().c_str(), O_RDONLY | O_DIRECTORY)).synchronise();
+  });
+}
+
+void writeWhole(const std::string& path, const std::function<void(const std::string& partial)>& write) {
+  WholeFile file(path);
+  ofFile(path, [&] { write(file.partial()); });
+  file.commit();
+}
+
+void writeWhole(const std::string& path, const std::string& content) {
+  writeWhole(path, [&](const std::string& partial) {
+    errno = 0;
+    std::ofstream file(partial, std::ios::binary);
+    file << content;
+    file.close();
+    if (!file) throw std::system_error(errno, std::generic_category());
+  });
 }
 
 }  // namespace sdvo

@@ -132,13 +132,6 @@ std::vector<std::int64_t> readStamps(const std::string& path, int count) {
   return stamps;
 }
 
-void writeText(const fs::path& path, const std::string& text) {
-  std::ofstream file(path, std::ios::binary);
-  file << text;
-  file.close();
-  if (!file) throw std::runtime_error("cannot write file '" + path.string() + "': is the disk full?");
-}
-
 /// P0 and P1: equal pinhole cameras, the right one's offset is -fx * baseline.
 std::string calibrationText(const StereoCamera& camera) {
   std::string text;
@@ -270,6 +263,17 @@ std::string KittiSequence::imagePath(int side, int i) const {
   return (fs::path(image_directories_[side]) / frameName(i)).string();
 }
 
+void writeImage(const std::string& path, const cv::Mat& image) {
+  std::vector<std::uint8_t> bytes;
+  // OpenCV's own settings are its fastest, one filter and run lengths; naming a level makes it try all filters. Its
+  // imwrite() does not notice a full disk.
+  const bool is_encoded = cv::imencode(fs::path(path).extension().string(), image, bytes);
+  std::ofstream file(path, std::ios::binary);
+  file.write(reinterpret_cast<const char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+  file.close();
+  if (!is_encoded || !file) throw std::runtime_error("cannot write image '" + path + "': is the disk full?");
+}
+
 std::optional<std::string> findKittiPoses(const std::string& directory) {
   // The absolute path resolves "." and a trailing slash, either of which would hide the sequence's name.
   fs::path sequence = fs::absolute(directory).lexically_normal();
@@ -304,9 +308,7 @@ KittiWriter::~KittiWriter() {
 
 void KittiWriter::writeImage(int side, int i, const cv::Mat& image) const {
   const fs::path path = fs::path(partial_) / ("image_" + std::to_string(side)) / (kittiFrameName(i) + ".png");
-  // OpenCV's own settings are its fastest, one filter and run lengths; naming a level makes it try all filters.
-  if (!cv::imwrite(path.string(), image))
-    throw std::runtime_error("cannot write image '" + path.string() + "': is the disk full?");
+  sdvo::writeImage(path.string(), image);
 }
 
 void KittiWriter::finish(const StereoCamera& camera, const std::vector<std::int64_t>& stamps, const Trajectory& poses) {
@@ -314,10 +316,10 @@ void KittiWriter::finish(const StereoCamera& camera, const std::vector<std::int6
     throw std::invalid_argument("a sequence of " + std::to_string(stamps.size()) + " pairs has " +
                                 std::to_string(poses.size()) + " poses");
   const fs::path partial = partial_;
-  writeText(partial / "calib.txt", calibrationText(camera));
+  writeTextFile(partial / "calib.txt", calibrationText(camera));
   std::string times;
   for (const std::int64_t stamp : stamps) times += formatSeconds(stamp) + "\n";
-  writeText(partial / "times.txt", times);
+  writeTextFile(partial / "times.txt", times);
   if (!poses.empty()) writeKittiPoses((partial / "poses.txt").string(), poses);
   std::error_code error;
   fs::rename(partial, final_, error);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -10,6 +11,8 @@
 #include <stdexcept>
 #include <string>
 #include <vector>
+
+#include "../common/whole_file.hpp"
 
 namespace sdvo {
 
@@ -29,18 +32,37 @@ inline std::ifstream openTextFile(const std::string& path) {
   return file;
 }
 
-/// Closes a file written to; throws std::runtime_error that names it when it was not opened or not written to its end.
-inline void finishTextFile(std::ofstream& file, const std::string& path) {
-  file.close();
-  if (!file) throw std::runtime_error("cannot write file '" + path + "': does its directory exist, is the disk full?");
-}
-
 /// Words of a line separated by white space; a carriage return at its end counts as such.
 inline std::vector<std::string> splitWords(const std::string& line) {
   std::istringstream stream(line);
   std::vector<std::string> words;
   for (std::string word; stream >> word;) words.push_back(word);
   return words;
+}
+
+/// What begins files of one kind: the first line up to its first number, or, where that comes first, how many words it
+/// has.
+inline std::string kindOfText(const std::string& text) {
+  const std::string line = text.substr(0, text.find('\n'));
+  const std::string kind = line.substr(0, line.find_first_of("+-.0123456789"));
+  return kind.empty() ? std::to_string(splitWords(line).size()) : kind;
+}
+
+/// Writes a text file whole or not at all, in the place of none or of one of its kind; to a device as it comes. Throws
+/// std::runtime_error that names the file.
+inline void writeTextFile(const std::string& path, const std::string& text) {
+  namespace fs = std::filesystem;
+  if (fs::exists(path) && !fs::is_regular_file(path) && !fs::is_directory(path)) {
+    std::ofstream(path) << text;
+    return;
+  }
+  if (fs::is_regular_file(path) && !fs::is_empty(path)) {
+    std::string before(std::min<std::uintmax_t>(fs::file_size(path), 65536), '\0');  // B; no first line is longer
+    openTextFile(path).read(before.data(), static_cast<std::streamsize>(before.size()));
+    if (kindOfText(before) != kindOfText(text))
+      throw std::runtime_error("file '" + path + "' is of another kind and stays: give another name, or remove it");
+  }
+  writeWhole(fs::absolute(path).string(), text);
 }
 
 /// The finite number that a word holds, whatever the process' locale says of decimal points; throws

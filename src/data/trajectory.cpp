@@ -9,6 +9,7 @@
 #include <limits>
 #include <locale>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 
 #include "text_file.hpp"
@@ -84,17 +85,12 @@ double scaleOfSteps(const Trajectory& ground_truth, const Trajectory& estimate) 
   return median(ratios);
 }
 
-std::ofstream openForWriting(const std::string& path) {
-  std::ofstream file(path);
-  if (!file)
-    throw std::runtime_error("cannot write file '" + path + "': does its directory exist and may I write there?");
-  file.imbue(std::locale::classic());
-  return file;
-}
-
-void finishWriting(std::ofstream& file, const std::string& path) {
-  file.close();
-  if (!file) throw std::runtime_error("cannot write file '" + path + "' to its end: is the disk full?");
+/// Numbers as they are read anywhere, whatever the process' locale.
+std::ostringstream poseText() {
+  std::ostringstream text;
+  text.imbue(std::locale::classic());
+  text << std::scientific << std::setprecision(12);
+  return text;
 }
 
 std::vector<double> parseNumbers(const std::vector<std::string>& words, std::size_t first = 0) {
@@ -192,12 +188,11 @@ Trajectory readKittiPoses(const std::string& path) {
 }
 
 void writeKittiPoses(const std::string& path, const Trajectory& poses) {
-  std::ofstream file = openForWriting(path);
-  file << std::scientific << std::setprecision(12);
+  std::ostringstream file = poseText();
   for (const Eigen::Isometry3d& pose : poses) {
     for (int i = 0; i < 12; ++i) file << pose.matrix()(i / 4, i % 4) << (i == 11 ? '\n' : ' ');
   }
-  finishWriting(file, path);
+  writeTextFile(path, file.str());
 }
 
 StampedTrajectory readTumPoses(const std::string& path) {
@@ -223,15 +218,15 @@ void writeTumPoses(const std::string& path, const StampedTrajectory& trajectory)
     throw std::invalid_argument("a trajectory with " + std::to_string(trajectory.poses.size()) + " poses has " +
                                 std::to_string(trajectory.stamps.size()) + " stamps");
   }
-  std::ofstream file = openForWriting(path);
-  file << "# stamp[s] tx ty tz qx qy qz qw\n" << std::scientific << std::setprecision(12);
+  std::ostringstream file = poseText();
+  file << "# stamp[s] tx ty tz qx qy qz qw\n";
   for (std::size_t i = 0; i < trajectory.poses.size(); ++i) {
     const Eigen::Vector3d t = trajectory.poses[i].translation();
     const Eigen::Quaterniond q = Eigen::Quaterniond(trajectory.poses[i].linear()).normalized();
     file << formatSeconds(trajectory.stamps[i]) << ' ' << t.x() << ' ' << t.y() << ' ' << t.z() << ' ' << q.x() << ' '
          << q.y() << ' ' << q.z() << ' ' << q.w() << '\n';
   }
-  finishWriting(file, path);
+  writeTextFile(path, file.str());
 }
 
 std::vector<double> kittiLengths() {

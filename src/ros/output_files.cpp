@@ -2,11 +2,9 @@
 
 #include <tf2_eigen/tf2_eigen.h>
 
-#include <cerrno>
 #include <cstdlib>
-#include <cstring>
-#include <fstream>
 #include <iomanip>
+#include <sstream>
 #include <stdexcept>
 
 namespace sdvo {
@@ -39,6 +37,7 @@ void writeKitti(const nav_msgs::Path& poses, const Eigen::Isometry3d& T_base_cam
 std::string inRosHome(const std::string& path) {
   const char *ros_home = std::getenv("ROS_HOME"), *home = std::getenv("HOME");
   if (path.empty() || (!ros_home && !home)) return path;
+  if (home && path.compare(0, 2, "~/") == 0) return home + path.substr(1);  // which a shell had not to do with
   return ((ros_home ? std::filesystem::path(ros_home) : std::filesystem::path(home) / ".ros") / path).string();
 }
 
@@ -46,17 +45,10 @@ void saveTrajectory(const nav_msgs::Path& poses, const Eigen::Isometry3d& T_base
                     const std::string& path) {
   if (format != "tum" && format != "kitti")
     throw std::runtime_error("'" + path + "': format '" + format + "' is neither tum nor kitti");
-  writeWhole(path, [&](const std::string& partial) {
-    errno = 0;
-    std::ofstream out(partial);
-    out.precision(12);
-    if (format == "tum")
-      writeTum(poses, out);
-    else
-      writeKitti(poses, T_base_camera, out);
-    out.close();
-    if (!out) throw std::runtime_error(std::strerror(errno));
-  });
+  std::ostringstream text;
+  text.precision(12);
+  format == "tum" ? writeTum(poses, text) : writeKitti(poses, T_base_camera, text);
+  writeWhole(path, text.str());
 }
 
 }  // namespace sdvo

@@ -4,11 +4,10 @@
 #include <ros/serialization.h>
 
 #include <algorithm>
-#include <boost/interprocess/file_mapping.hpp>
-#include <boost/interprocess/mapped_region.hpp>
 #include <cstdint>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <map>
 #include <optional>
@@ -21,23 +20,58 @@
 namespace sdvo {
 namespace {
 
-/// A message of a bag, which refers to its bytes.
-struct BagMessage {
-  std::map<std::string_view, std::string_view> connection;  ///< topic, type, md5sum
-  std::string_view data;
-};
-
 using Bytes = std::string_view;
 using Fields = std::map<Bytes, Bytes>;
 
-/// The next bytes, as many as the length before them (little endian) says.
-Bytes take(Bytes& from) {
-  std::uint32_t length = 0;
-  if (from.size() >= sizeof length) std::memcpy(&length, from.data(), sizeof length);
-  if (from.size() < sizeof length + length) throw std::invalid_argument("it ends early, or a length in it is wrong");
-  const Bytes taken = from.substr(sizeof length, length);
-  from.remove_prefix(sizeof length + length);
+struct Connection {
+  std::string topic, type, md5sum;
+};
+
+/// A message of a bag, which refers to its bytes.
+struct BagMessage {
+  Connection connection;
+  Bytes data;
+};
+
+/// Returns whether it wants more.
+using UseMessage = std::function<bool(const BagMessage&)>;
+
+/// A file that may change while it is read: no more of it than there was at first, and what is missing is an error.
+struct FileBytes {
+  explicit FileBytes(const std::string& path)
+      : file(path, std::ios::binary), left(static_cast<std::size_t>(std::filesystem::file_size(path))) {}
+  bool empty() const { return left == 0; }
+
+  std::ifstream file;
+  std::size_t left;  ///< B
+};
+
+void require(bool holds) {
+  if (!holds) throw std::invalid_argument("it ends early, or a length in it is wrong");
+}
+
+Bytes takeBytes(Bytes& from, std::size_t count) {
+  require(count <= from.size());
+  const Bytes taken = from.substr(0, count);
+  from.remove_prefix(count);
   return taken;
+}
+
+std::string takeBytes(FileBytes& from, std::size_t count) {
+  require(count <= from.left);
+  from.left -= count;
+  std::string taken(count, '\0');
+  require(static_cast<bool>(from.file.read(taken.data(), static_cast<std::streamsize>(count))));
+  return taken;
+}
+
+/// The next bytes, as many as the length before them (little endian) says.
+template <class Source>
+auto take(Source& from) {
+  std::uint32_t length = 0;
+  const auto number = takeBytes(from, sizeof length);
+  std::memcpy(&length, number.data(), sizeof length);
+  return takeBytes(from, length);
 }
 
 Fields takeFields(Bytes header) {
@@ -50,28 +84,24 @@ Fields takeFields(Bytes header) {
   return fields;
 }
 
-void readRecords(Bytes records, bool in_chunk, std::map<Bytes, Fields>& connections,
-                 const std::function<void(const BagMessage&)>& use) {
+/// False once `use` wants no more.
+template <class Source>
+bool readRecords(Source records, bool in_chunk, std::map<std::string, Connection>& connections, const UseMessage& use) {
   constexpr Bytes kMessage = "\x02", kChunk = "\x05", kConnection = "\x07";
   while (!records.empty()) {
-    Fields header = takeFields(take(records));
-    const Bytes data = take(records), kind = header["op"];
+    const auto head = take(records), data = take(records);
+    Fields header = takeFields(head);
+    const Bytes kind = header["op"];
+    const std::string number(header["conn"]);
     if (kind == kChunk && (in_chunk || header["compression"] != "none"))
       throw std::invalid_argument("its chunks are compressed: `rosbag decompress` makes a file that can be read");
-    if (kind == kChunk) readRecords(data, true, connections, use);
-    if (kind == kConnection) (connections[header["conn"]] = takeFields(data))["topic"] = header["topic"];
-    if (kind == kMessage) use({connections[header["conn"]], data});
+    if (kind == kChunk && !readRecords(Bytes(data), true, connections, use)) return false;
+    if (kind == kMessage && !use({connections[number], data})) return false;
+    if (kind != kConnection) continue;
+    Fields fields = takeFields(data);
+    connections[number] = {std::string(header["topic"]), std::string(fields["type"]), std::string(fields["md5sum"])};
   }
-}
-
-/// Hands over the messages of a bag (version 2.0, without compression) in the order of its bytes. rosbag's own reader
-/// trusts every length, count and offset that a file announces: it allocates as much, or reads beyond what it holds.
-/// Throws std::invalid_argument where they do not fit into each other.
-void readBag(Bytes bytes, const std::function<void(const BagMessage&)>& use) {
-  constexpr Bytes kMagic = "#ROSBAG V2.0\n";
-  if (bytes.substr(0, kMagic.size()) != kMagic) throw std::invalid_argument("it is no bag of version 2.0");
-  std::map<Bytes, Fields> connections;
-  readRecords(bytes.substr(kMagic.size()), false, connections, use);
+  return true;
 }
 
 namespace msgs = stereo_descriptor_vo;
@@ -84,7 +114,7 @@ constexpr const char* kOldPlace = "d90a2505b9172820b06c0867769c61b0";  // of 0.1
 struct CheckedStream : ros::serialization::Stream {
   static const ros::serialization::StreamType stream_type = ros::serialization::stream_types::Input;
 
-  explicit CheckedStream(std::string_view bytes)
+  explicit CheckedStream(Bytes bytes)
       : Stream(reinterpret_cast<std::uint8_t*>(const_cast<char*>(bytes.data())),
                static_cast<std::uint32_t>(bytes.size())) {}
 
@@ -106,33 +136,41 @@ struct CheckedStream : ros::serialization::Stream {
 
 /// Throws std::invalid_argument for a message of another definition.
 template <class Message>
-Message parse(BagMessage in_bag) {
-  auto& connection = in_bag.connection;
-  if (connection["md5sum"] != ros::message_traits::md5sum<Message>())
-    throw std::invalid_argument("its messages on " + std::string(connection["topic"]) +
-                                " are of another type or version of this package (" + std::string(connection["type"]) +
-                                ", " + std::string(connection["md5sum"]) + ")");
+Message parse(const BagMessage& in_bag) {
+  const Connection& connection = in_bag.connection;
+  if (connection.md5sum != ros::message_traits::md5sum<Message>())
+    throw std::invalid_argument("its messages on " + connection.topic +
+                                " are of another type or version of this package (" + connection.type + ", " +
+                                connection.md5sum + ")");
   Message message;
   CheckedStream(in_bag.data).next(message);
   return message;
 }
 
-void readFile(const std::string& path, const std::function<void(const BagMessage&)>& use) {
-  namespace ipc = boost::interprocess;
+/// Hands over the messages of a bag (version 2.0, without compression) in the order of its bytes. rosbag's own reader
+/// trusts every length, count and offset that a file announces: it allocates as much, or reads beyond what it holds.
+/// Throws std::invalid_argument where they do not fit into each other.
+void readFile(const std::string& path, const UseMessage& use) {
+  constexpr Bytes kMagic = "#ROSBAG V2.0\n";
   if (!std::filesystem::is_regular_file(path)) throw std::invalid_argument("there is no such file");
-  if (std::filesystem::is_empty(path)) throw std::invalid_argument("it is empty");
-  const ipc::mapped_region region(ipc::file_mapping(path.c_str(), ipc::read_only), ipc::read_only);
-  readBag({static_cast<const char*>(region.get_address()), region.get_size()}, use);
+  FileBytes bytes(path);
+  if (bytes.empty()) throw std::invalid_argument("it is empty");
+  if (takeBytes(bytes, std::min(kMagic.size(), bytes.left)) != kMagic)
+    throw std::invalid_argument("it is no bag of version 2.0");
+  std::map<std::string, Connection> connections;
+  readRecords(std::move(bytes), false, connections, use);
 }
 
-/// Also one that a version with other messages wrote. Nothing is lost with a file that is empty.
+/// By its first message; also one that a version with other messages wrote. Nothing is lost with a file that is empty.
 bool isOfPlaces(const std::string& path) try {
   if (std::filesystem::is_regular_file(path) && std::filesystem::is_empty(path)) return true;
-  bool found = false;
-  readFile(path, [&](BagMessage message) {
-    found |= message.connection["type"] == ros::message_traits::datatype<msgs::MapGraph>();
+  bool is_place = false;
+  readFile(path, [&](const BagMessage& message) {
+    is_place = message.connection.topic == kPlaceTopic &&
+               message.connection.type == ros::message_traits::datatype<msgs::Place>();
+    return false;
   });
-  return found;
+  return is_place;
 } catch (const std::exception&) {
   return false;
 }
@@ -142,12 +180,12 @@ SavedPlaces read(const std::string& path, const PoseGraphOptions& options) {
   std::optional<PoseGraph> graph;
   std::optional<ros_conversions::FeatureStream> stream;
   readFile(path, [&](BagMessage message) {
-    const std::string_view topic = message.connection["topic"];
+    const std::string& topic = message.connection.topic;
     if (topic == kPlaceTopic) {
       std::string completed;
-      if (message.connection["md5sum"] == kOldPlace) {
+      if (message.connection.md5sum == kOldPlace) {
         completed.assign(message.data).append(sizeof(float), '\0');
-        message.connection["md5sum"] = ros::message_traits::md5sum<msgs::Place>();
+        message.connection.md5sum = ros::message_traits::md5sum<msgs::Place>();
         message.data = completed;
       }
       const auto place = parse<msgs::Place>(message);
@@ -160,6 +198,7 @@ SavedPlaces read(const std::string& path, const PoseGraphOptions& options) {
     } else if (topic == kGraphTopic) {
       graph = ros_conversions::fromMessage(parse<msgs::MapGraph>(message), options);
     }
+    return true;
   });
   if (places.empty() || !graph)
     throw std::invalid_argument("it holds no places, or no graph of them: a file of save_places is expected");

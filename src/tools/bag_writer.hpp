@@ -4,39 +4,31 @@
 
 #include <boost/make_shared.hpp>
 #include <filesystem>
-#include <optional>
 #include <stdexcept>
 #include <string>
-#include <system_error>
 
 #include "../ros/output_files.hpp"
 
 namespace sdvo {
 
-/// A bag that appears under its name only once it is complete; removed when something failed before.
+/// A bag that appears under its name only once it is complete. Never in the place of a file that holds something.
 class BagWriter {
+  template <class Action>
+  auto guard(const std::string& what, const Action& action) const {
+    try {
+      return action();
+    } catch (const std::exception& e) {
+      throw std::runtime_error(name_ + ": cannot " + what + ": " + e.what());
+    }
+  }
+
  public:
   BagWriter(const std::string& path, const std::string& tool)
-      : final_(path), partial_(path + ".active"), caller_("/" + tool) {
-    if (std::filesystem::is_directory(final_))
-      throw std::runtime_error("--output '" + path + "' is a directory, not a file name");
-    // A device or a pipe would be replaced by the bag.
-    if (std::filesystem::exists(final_) && !std::filesystem::is_regular_file(final_))
-      throw std::runtime_error("--output '" + path + "' is no regular file: choose another name");
-    guard("create (does its directory exist, may I write there?)", [&] { bag_.emplace(partial_); });
-  }
-  ~BagWriter() {
-    if (committed_) return;
-    bag_.reset();
-    std::error_code ignored;
-    std::filesystem::remove(partial_, ignored);
-  }
-  BagWriter(const BagWriter&) = delete;
-  BagWriter& operator=(const BagWriter&) = delete;
+      : name_("--output '" + path + "'"), caller_("/" + tool), file_(newFile(path)), bag_(begin()) {}
 
   template <class Message>
   void write(const std::string& topic, const ros::Time& time, const Message& message) {
-    guard("write", [&] { (*bag_)->write(topic, time, message); });
+    guard("write", [&] { bag_->write(topic, time, message); });
   }
 
   /// As write(), but `rosbag play` will latch the topic.
@@ -48,30 +40,31 @@ class BagWriter {
     (*header)["type"] = ros::message_traits::datatype<Message>();
     (*header)["md5sum"] = ros::message_traits::md5sum<Message>();
     (*header)["message_definition"] = ros::message_traits::definition<Message>();
-    guard("write", [&] { (*bag_)->write(topic, time, message, header); });
+    guard("write", [&] { bag_->write(topic, time, message, header); });
   }
 
   void commit() {
     guard("write", [&] {
-      bag_->close();
-      std::filesystem::rename(partial_, final_);
+      bag_.close();
+      file_.commit();
     });
-    committed_ = true;
   }
 
  private:
-  template <class Action>
-  void guard(const std::string& what, const Action& action) const {
-    try {
-      action();
-    } catch (const std::exception& e) {
-      throw std::runtime_error("--output '" + final_ + "': cannot " + what + ": " + e.what());
-    }
+  static std::string newFile(const std::string& path) {
+    const bool is_file = std::filesystem::is_regular_file(path);
+    if (is_file && !std::filesystem::is_empty(path))
+      throw std::runtime_error("--output '" + path + "' exists and stays: give another name, or remove it");
+    return std::filesystem::absolute(path).string();
   }
 
-  std::string final_, partial_, caller_;
-  std::optional<OutputBag> bag_;
-  bool committed_ = false;
+  OutputBag begin() const {
+    return guard("create", [&] { return OutputBag(file_.partial()); });
+  }
+
+  const std::string name_, caller_;
+  WholeFile file_;
+  OutputBag bag_;
 };
 
 }  // namespace sdvo

@@ -1,7 +1,7 @@
 #include <cmath>
 #include <cstdio>
-#include <fstream>
 #include <iostream>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -71,8 +71,8 @@ std::string jsonSubPaths(const SubPathErrors& errors) {
 }
 
 void writeJson(const std::string& path, const TrajectoryErrors& errors) {
-  std::ofstream file(path);
-  file << "{\n  \"frames\": " << errors.frames << ",\n  \"path_length_m\": " << jsonNumber(errors.path_length)
+  std::ostringstream file;
+  file << "{ \"frames\": " << errors.frames << ",\n  \"path_length_m\": " << jsonNumber(errors.path_length)
        << ",\n  \"mean\": {" << jsonSubPaths(errors.sub_paths) << "},\n  \"per_length\": [";
   const char* separator = "\n";
   for (const SubPathErrors& row : errors.per_length) {
@@ -92,7 +92,7 @@ void writeJson(const std::string& path, const TrajectoryErrors& errors) {
   field("largest_drift_deg", errors.largest_drift_deg);
   field("scale", errors.scale);
   file << "\n}\n";
-  sdvo::finishTextFile(file, path);
+  sdvo::writeTextFile(path, file.str());
 }
 
 }  // namespace

@@ -2,9 +2,9 @@
 
 #include <algorithm>
 #include <ctime>
-#include <fstream>
 #include <future>
 #include <iomanip>
+#include <sstream>
 #include <stdexcept>
 #include <utility>
 
@@ -130,7 +130,7 @@ StampedTrajectory OfflineRun::stampedPoses() const {
 }
 
 void OfflineRun::writeTiming(const std::string& path) const {
-  std::ofstream file(path);
+  std::ostringstream file;
   file << "frame,total_ms,detect_ms,stereo_ms,describe_ms,match_ms,motion_ms,detected,features,matches,inliers,rms_px,"
           "coverage,right_delay_ms,right_delay_sigma_ms,state,reason\n";
   for (std::size_t i = 0; i < frames_.size(); ++i) {
@@ -142,11 +142,11 @@ void OfflineRun::writeTiming(const std::string& path) const {
          << 1e3 * odometry.right_delay << "," << 1e3 * odometry.right_delay_sigma << "," << toString(odometry.state)
          << "," << withoutCommas(odometry.reason) << "\n";
   }
-  finishTextFile(file, path);
+  writeTextFile(path, file.str());
 }
 
 void OfflineRun::writeStates(const std::string& path) const {
-  std::ofstream file(path);
+  std::ostringstream file;
   file << "frame,stamp_ns,state,epoch,has_pose,has_motion";
   for (const char* name : {"motion", "pose"})
     for (int i = 0; i < 36; ++i) file << "," << name << "_" << i / 6 << i % 6;
@@ -160,7 +160,7 @@ void OfflineRun::writeStates(const std::string& path) const {
     writeCovariance(file, odometry.pose_covariance);
     file << "," << odometry.reason << "\n";
   }
-  finishTextFile(file, path);
+  writeTextFile(path, file.str());
 }
 
 }  // namespace sdvo

@@ -7,7 +7,6 @@
 #include <cmath>
 #include <cstdint>
 #include <ctime>
-#include <fstream>
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
@@ -165,9 +164,7 @@ std::string picture(const cv::Mat& image, const std::string& words, std::size_t 
 }
 
 void writePage(const std::string& path, const std::string& html) {
-  std::ofstream file(path);
-  file << html;
-  finishTextFile(file, path);
+  writeTextFile(path, html);
 }
 
 }  // namespace sdvo

@@ -3,9 +3,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <ctime>
-#include <fstream>
 #include <map>
 #include <set>
+#include <sstream>
 #include <stdexcept>
 
 #include "../data/text_file.hpp"
@@ -127,7 +127,7 @@ double PlaceRun::cpuTime() const {
 }
 
 void PlaceRun::writeKeyframes(const std::string& path) const {
-  std::ofstream file(path);
+  std::ostringstream file;
   file << "id,pair,stamp_ns,features,best,score,same,matches,inliers,coverage,rms_px,loop,find_ms,verify_ms,reason\n";
   for (const auto& [pair, report] : keyframes_) {
     const bool any = !report.candidates.empty();
@@ -138,7 +138,7 @@ void PlaceRun::writeKeyframes(const std::string& path) const {
          << report.match.rms << "," << report.loop << "," << 1e3 * report.find_time << "," << 1e3 * report.verify_time
          << "," << report.reason << "\n";
   }
-  finishTextFile(file, path);
+  writeTextFile(path, file.str());
 }
 
 }  // namespace sdvo

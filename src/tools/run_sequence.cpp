@@ -2,14 +2,13 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
-#include <fstream>
 #include <iomanip>
 #include <iostream>
 #include <limits>
 #include <map>
 #include <opencv2/core/utility.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <optional>
+#include <set>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -26,6 +25,7 @@
 #include "recording.hpp"
 #include "run_tool.hpp"
 #include "self_check.hpp"
+#include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
 
 namespace fs = std::filesystem;
@@ -72,7 +72,7 @@ void follow(sdvo::Recording& recording, const Arguments& arguments, Drive& drive
       if (!arguments.pictures.empty()) {
         std::ostringstream name;
         name << std::setw(6) << std::setfill('0') << drive.whole.pairs() - 1 << ".jpg";
-        cv::imwrite((fs::path(arguments.pictures) / name.str()).string(), drawLeft(pair, features, drive.whole.last()));
+        sdvo::writeImage(fs::path(arguments.pictures) / name.str(), drawLeft(pair, features, drive.whole.last()));
       }
       if (seen) seen->check.add(pair, features), seen->pictures.add(pair, features, drive.whole.last());
       if (arguments.halves) {
@@ -182,7 +182,11 @@ int runOne(const Arguments& arguments) {
   }
   const auto recording = sdvo::openParts(arguments.inputs, arguments.names);
   Drive drive(options);
-  if (!arguments.pictures.empty()) fs::create_directories(arguments.pictures);
+  if (!arguments.pictures.empty()) {
+    fs::create_directories(arguments.pictures);
+    if (!fs::is_empty(arguments.pictures))
+      throw std::runtime_error("--pictures '" + arguments.pictures + "' is not empty: choose another folder");
+  }
   std::optional<Seen> seen;
   if (!arguments.page.empty())
     seen.emplace(Seen{sdvo::CameraCheck(options, drive.whole),
@@ -227,13 +231,13 @@ std::string runOneOfMany(const fs::path& input, const std::string& output, sdvo:
   writePoses(output + ".txt", arguments.format.empty() ? "tum" : arguments.format, run);
   run.writeTiming(output + ".csv");
   if (const auto checks = checkItself(*recording, drive, options, arguments); !checks.empty()) {
-    std::ofstream file(self_check);
+    std::ostringstream file;
     file << sdvo::SelfCheck::columns() << "\n";
     for (const sdvo::SelfCheck& check : checks) {
       file << check.row() << "\n";
       std::cout << fs::path(output).filename().string() << ": " << check.text() << std::endl;
     }
-    sdvo::finishTextFile(file, self_check);
+    sdvo::writeTextFile(self_check, file.str());
   }
   std::ostringstream figures;
   figures << std::fixed << std::setprecision(1) << run.pairs() << "," << run.pairsWithoutPose() << ","
@@ -284,9 +288,7 @@ int runMany(const Arguments& arguments) {
     report += name + "," + figures + problem + "\n";  // which stands last, for it may hold commas
     std::cerr << name << ": " << (problem.empty() ? "done" : "failed") << std::endl;
   }
-  std::ofstream file(fs::path(arguments.output) / "report.csv");
-  file << report;
-  sdvo::finishTextFile(file, arguments.output + "/report.csv");
+  sdvo::writeTextFile(fs::path(arguments.output) / "report.csv", report);
   std::cout << report;
   if (failed > 0)
     throw std::runtime_error(std::to_string(failed) + " of " + std::to_string(recordings.size()) +
@@ -294,7 +296,22 @@ int runMany(const Arguments& arguments) {
   return 0;
 }
 
+/// True poses are of the kind of ours, and of two outputs of one name one would be left.
+void refuseOutputsThatReplace(const Arguments& arguments) {
+  std::set<fs::path> taken;
+  const auto take = [&](const fs::path& path) { return taken.insert(fs::weakly_canonical(path)).second; };
+  take(arguments.truth);
+  for (const auto& recordings : {arguments.inputs, arguments.before})
+    for (const std::string& recording : recordings)
+      if (const auto poses = sdvo::findKittiPoses(recording)) take(*poses);
+  for (const std::string& output :
+       {arguments.poses, arguments.odometry, arguments.timing, arguments.states, arguments.keyframes, arguments.page})
+    if (!output.empty() && !take(output) && fs::is_regular_file(output))
+      throw std::runtime_error("'" + output + "' has true poses, or is another output: give another name");
+}
+
 int run(const Arguments& arguments) {
+  refuseOutputsThatReplace(arguments);
   const bool has_page = !arguments.page.empty();
   const bool is_of_places = !(arguments.before.empty() && arguments.odometry.empty() && arguments.keyframes.empty());
   if (is_of_places && !arguments.places) throw std::runtime_error("--before, --odometry and --keyframes need --places");

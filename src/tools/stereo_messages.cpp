@@ -1,11 +1,14 @@
 #include "stereo_messages.hpp"
 
+#include <fcntl.h>
 #include <rosbag/view.h>
 #include <sensor_msgs/CompressedImage.h>
 #include <sensor_msgs/image_encodings.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <boost/make_shared.hpp>
+#include <cerrno>
 #include <cstdint>
 #include <filesystem>
 #include <opencv2/imgcodecs.hpp>
@@ -83,6 +86,15 @@ StereoTopics topicsIn(const rosbag::Bag& bag, const StereoNames& names) {
   for (const std::size_t image : {0u, 1u})
     if (!has(topics[image]) && has(topics[image] + "/compressed")) topics[image] += "/compressed";
   return topics;
+}
+
+void refuseWhatIsWritten(const std::string& path) {
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  // Linux grants this lease only where nobody has the file open to write; asking for it is all. EAGAIN: somebody has.
+  const bool is_written = file >= 0 && ::fcntl(file, F_SETLEASE, F_RDLCK) != 0 && errno == EAGAIN;
+  if (file >= 0) ::close(file);
+  if (is_written)
+    throw std::runtime_error("'" + path + "' is being written: end its recorder (Ctrl-C), which completes it");
 }
 
 void openBag(const std::string& path, rosbag::Bag& bag) {

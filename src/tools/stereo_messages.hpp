@@ -31,15 +31,21 @@ struct StereoNames {
 /// usual names, those of its only stereo camera, or of the only one in the namespace that is given.
 StereoTopics topicsIn(const rosbag::Bag& bag, const StereoNames& names);
 
+/// Throws std::runtime_error where a process of this machine has the file open to write it, as a recorder has: what
+/// repairs a bag would ruin it.
+void refuseWhatIsWritten(const std::string& path);
+
 /// What `work` returns. Throws std::runtime_error that names the bag, and the remedy where there is one, when the bag
 /// cannot be read.
 template <class Work>
 auto ofBag(const std::string& path, const Work& work) try {
   return work();
 } catch (const rosbag::BagUnindexedException&) {
-  throw std::runtime_error("'" + path + "' has no index, as of a recorder that was killed: rosbag reindex '" + path +
-                           "'");
+  refuseWhatIsWritten(path);
+  throw std::runtime_error("'" + path + "' has no index, as of a recorder that was killed: where none runs any more, " +
+                           "rosbag reindex '" + path + "'");
 } catch (const rosbag::BagException& e) {
+  refuseWhatIsWritten(path);
   throw std::runtime_error("'" + path + "' cannot be read: " + e.what() + ". Is it whole? rosbag check '" + path + "'");
 }
 

@@ -108,6 +108,13 @@ TEST_F(WholeFile, TwoSaversDoNotMixTheirText) {
   EXPECT_EQ(names(), std::set<std::string>{"map.bag"});
 }
 
+TEST_F(WholeFile, WhatAKilledProcessLeftGoesWithTheNext) {
+  std::ofstream(path_.string() + ".partial-17") << "half";
+  std::ofstream(path_.string() + ".part") << "precious";
+  save(path_, "new");
+  EXPECT_EQ(names(), (std::set<std::string>{"map.bag", "map.bag.part"}));
+}
+
 TEST_F(WholeFile, HasThePermissionsOfTheFileBeforeOrOfAnyNewFile) {
   save(path_, "new");
   std::ofstream(folder_.path() / "any") << "new";

@@ -98,10 +98,10 @@ class Tools : public testing::Test {
   }
 
   /// Runs a tool; `arguments` must hold no character that is special to a shell.
-  Outcome run(const std::string& tool, const std::string& arguments) const {
+  Outcome run(const std::string& tool, const std::string& arguments, const std::string& before = "") const {
     const fs::path out = root_ / "stdout", err = root_ / "stderr";
-    const std::string command = std::string(SDVO_TOOL_DIR) + "/" + tool + " " + arguments + " > " + out.string() +
-                                " 2> " + err.string() + " < /dev/null";
+    const std::string command = before + SDVO_TOOL_DIR + "/" + tool + " " + arguments + " > " + out.string() + " 2> " +
+                                err.string() + " < /dev/null";
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, readText(out), readText(err)};
   }
@@ -222,6 +222,52 @@ TEST_F(Tools, OutputIsNeverADeviceOrAPipe) {
   EXPECT_TRUE(fs::is_fifo(pipe));
   EXPECT_FALSE(fs::exists(pipe.string() + ".active"));
   expectError(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output /dev/null"), "no regular file");
+}
+
+/// Neither a file of another kind, nor its own on a full disk; a bag not at all.
+TEST_F(Tools, NoOutputDestroysAFile) {
+  const std::string drive = sequence_.string(), truth = (root_ / "truth.txt").string();
+  const fs::path output = root_ / "output";
+  for (const auto& [tool, arguments] : std::vector<std::pair<std::string, std::string>>{
+           {"run_sequence", drive + " --poses"},
+           {"run_sequence", drive + " --format tum --poses"},
+           {"run_sequence", drive + " --poses /dev/null --timing"},
+           {"run_sequence", drive + " --poses /dev/null --states"},
+           {"run_sequence", drive + " --page"},
+           {"evaluate_trajectory", "--ground-truth " + truth + " --estimate " + truth + " --lengths 0.2 --json"},
+           {"convert --sequence", drive + " --output"},
+           {"kitti_to_bag --sequence", drive + " --output"}}) {
+    SCOPED_TRACE(tool + " " + arguments);
+    const std::string command = arguments + " " + output.string();
+    std::ofstream(output) << "precious, 7 days of work";
+    expectError(run(tool, command), output.string());
+    EXPECT_EQ(readText(output), "precious, 7 days of work");
+    fs::remove(output);
+    if (tool[0] == 'c') continue;  // makes a folder
+    ASSERT_EQ(run(tool, command).exit_code, 0);
+    const bool is_bag = tool[0] == 'k';
+    EXPECT_EQ(run(tool, command).exit_code, is_bag ? 1 : 0);
+    const std::string before = readText(output);
+    if (is_bag) fs::remove(output);
+    // The table of evaluate_trajectory would not fit either.
+    if (tool[0] != 'e') expectError(run(tool, command, "trap '' XFSZ; ulimit -f 1; "), output.string());
+    if (!is_bag) EXPECT_TRUE(readText(output) == before);
+    for (const auto& entry : fs::directory_iterator(root_))
+      EXPECT_EQ(entry.path().string().find("partial"), std::string::npos) << entry.path();
+    fs::remove(output);
+  }
+}
+
+/// They would be taken for its own poses.
+TEST_F(Tools, TruePosesAreNoOutput) {
+  const fs::path beside = sequence_ / "poses.txt", truth = root_ / "truth.txt";
+  fs::copy_file(truth, beside);
+  const std::string words = "has true poses, or is another output";
+  expectError(run("run_sequence", sequence_.string() + " --poses " + beside.string()), words);
+  expectError(run("run_sequence", sequence_.string() + " --page " + (root_ / "page.html").string() +
+                                      " --ground-truth " + truth.string() + " --poses " + truth.string()),
+              words);
+  EXPECT_EQ(readText(beside), readText(truth));
 }
 
 TEST_F(Tools, OptionsThatDoNotExistOrAreOutOfRange) {
@@ -362,6 +408,7 @@ TEST_F(Tools, BagsGiveWhatTheirSequencesGive) {
   EXPECT_EQ(readText(poses()), expected);
 
   // TUM's format has the stamps: times.txt plus 1e9 s.
+  fs::remove(results_ / "a.txt");
   ASSERT_EQ(runBags((root_ / "a.bag").string()).exit_code, 0);
   const std::vector<std::string> lines = linesOf(readText(results_ / "a.txt"));
   ASSERT_EQ(lines.size(), static_cast<std::size_t>(kPairs) + 1);  // and a comment
@@ -457,9 +504,11 @@ TEST_F(Tools, RecordingsThatCannotBeReadAreNamedWithTheRemedy) {
   for (const std::string& tool : {"run_sequence " + poses + " ", std::string("check_camera --bag ")}) {
     const std::string name = tool.substr(0, tool.find(' ')), arguments = tool.substr(tool.find(' '));
     expectError(run(name, arguments + killed),
-                "killed.bag' has no index, as of a recorder that was killed: rosbag reindex");
+                "killed.bag' has no index, as of a recorder that was killed: where none runs any more, rosbag reindex");
     expectError(run(name, arguments + torn), "torn.bag'");
     expectError(run(name, arguments + pipe), "pipe.bag' is no file");
+    const std::ofstream recorder(killed, std::ios::app);
+    expectError(run(name, arguments + killed), "killed.bag' is being written: end its recorder");
   }
   expectError(run("run_sequence", "nosuch.bag" + poses), "there is no 'nosuch.bag'");
   expectError(run("run_sequence", sequence_.string() + poses + " --config " + pipe), "pipe.bag: it is no file");
@@ -816,6 +865,7 @@ TEST_F(Tools, PicturesOfEachPair) {
   ASSERT_EQ(runSequence("--pictures " + pictures.string()).exit_code, 0);
   for (int i = 0; i < kPairs; ++i)
     EXPECT_EQ(cv::imread((pictures / ("00000" + std::to_string(i) + ".jpg")).string()).size(), cv::Size(320, 240));
+  expectError(runSequence("--pictures " + pictures.string()), "is not empty: choose another folder");
 }
 
 TEST_F(Tools, PerfectTrajectoryHasNoError) {

@@ -28,6 +28,9 @@ struct ImagePair {
 /// damaged; cv::imread would return whatever could be decoded of it.
 cv::Mat readGreyPng(const std::string& path);
 
+/// In the format of the name's ending. Throws std::runtime_error that names the file when it cannot be written.
+void writeImage(const std::string& path, const cv::Mat& image);
+
 /// Which cameras of a KITTI car to use.
 enum class KittiCameras {
   kAny,     ///< grey, or colour where the directory has neither image_0 nor image_1
