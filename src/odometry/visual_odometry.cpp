@@ -295,15 +295,11 @@ void VisualOdometry::begin(const Pair& pair, const std::optional<MotionGuess>& g
   ++state_.pairs;
   if (pair.dt <= options_.tracking.max_gap) state_.prior.noteInterval(pair.dt);
   state_.outage.extend(pair.dt, guess, state_.prior);
-  // What the pairs before told of the rig may be wrong already, and those after may be refused again.
-  if (features.report.refused) state_.rig.calibration = CalibrationFilter(options_.calibration);
 }
 
 /// Takes note of what became of the pair.
 void VisualOdometry::finish(const Pair& pair, Step& step) {
   const StereoFeatures& features = pair.features();
-  // The depths of its points may be those of a wrong rig.
-  if (features.report.refused && step.state == TrackingState::kLost) state_.map.reset();
   state_.doubt.fade();
   const auto stood = [&step] {
     const Vector6d motion = logSE3(*step.T_previous_current);
