@@ -181,10 +181,10 @@ double VisualOdometry::logOddsOfFrozen(const StereoFeatures& features, double dt
   const auto prior = state_.prior.confirmed(*state_.last_stamp, dt);
   const auto expected = expectedMotion(dt, std::nullopt);
   if (!prior || !moved(expected.value_or(prior->motion))) return kUnsuspected;
-  if (images.comeTwice() || images.haveNoise()) return kCertain;
-  if (images.inARow() > 0) return kUnsuspected;
-  // A stop and a driver at fault are equally likely beforehand.
-  return std::min(0.5 * prior->normalisedSquare(Eigen::Isometry3d::Identity(), Matrix6d::Zero()), kCertain);
+  if (images.comeTwice()) return kCertain;
+  if (images.inARow() > 0 && images.logOddsOfOld() < kCertain) return kUnsuspected;
+  const double stop = 0.5 * prior->normalisedSquare(Eigen::Isometry3d::Identity(), Matrix6d::Zero());
+  return std::min(images.logOddsOfOld() + std::min(stop, -std::log(kTailProbability)), kCertain);
 }
 
 /// The map, the pair, and the motion between them as it is expected: what was already covered by predicted pairs, and

@@ -5,6 +5,7 @@
 #include <numeric>
 #include <utility>
 
+#include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
 
 namespace sdvo {
@@ -40,25 +41,38 @@ bool RepeatedImages::shouldHaveMoved(const StereoFeatures& features, double nois
   return 2 * std::count(moved.begin(), moved.end(), true) > features.count();
 }
 
+double RepeatedImages::logOddsOfOld() const {
+  if (!have_noise_) return 0.0;
+  return *have_noise_ ? kCertain : kUnsuspected;
+}
+
+/// Which features stand where one of the pair before stood, to the digit.
+std::vector<bool> RepeatedImages::repeated(const StereoFeatures& features) const {
+  std::vector<std::pair<float, float>> before(features_[0].size());
+  for (std::size_t i = 0; i < before.size(); ++i) before[i] = {features_[0][i], features_[1][i]};
+  std::sort(before.begin(), before.end());
+  std::vector<bool> repeated(features.u.size());
+  for (std::size_t i = 0; i < repeated.size(); ++i)
+    repeated[i] = std::binary_search(before.begin(), before.end(), std::pair(features.u[i], features.v[i]));
+  return repeated;
+}
+
 std::vector<int> RepeatedImages::newFeatures(const StereoFeatures& features, double noise,
                                              const std::optional<Eigen::Isometry3d>& T_previous_current) const {
   std::vector<int> indices(features.u.size());
   std::iota(indices.begin(), indices.end(), 0);
   if (!T_previous_current) return indices;
-  std::vector<std::pair<float, float>> before(features_[0].size());
-  for (std::size_t i = 0; i < before.size(); ++i) before[i] = {features_[0][i], features_[1][i]};
-  std::sort(before.begin(), before.end());
   // What stands still in the image tells nothing.
   const std::vector<bool> moved = movedBy(*T_previous_current, features, noise);
+  const std::vector<bool> repeated = this->repeated(features);
   std::vector<int> order;
-  std::vector<bool> repeated(indices.size());
+  int all_old = 0;
   for (std::size_t i = 0; i < indices.size(); ++i) {
     if (!moved[i]) continue;
     order.push_back(static_cast<int>(i));
-    repeated[i] = std::binary_search(before.begin(), before.end(), std::pair(features.u[i], features.v[i]));
+    all_old += repeated[i];
   }
-  const int count = static_cast<int>(order.size()),
-            all_old = static_cast<int>(std::count(repeated.begin(), repeated.end(), true));
+  const int count = static_cast<int>(order.size());
   if (all_old < kFewestMeasured || count - all_old < kFewestMeasured) return indices;
   std::sort(order.begin(), order.end(), [&](int a, int b) { return features.v[a] < features.v[b]; });
   std::vector<int> old{0};  // among the first so many from above
@@ -90,7 +104,11 @@ void RepeatedImages::remember(const StereoFeatures& features, bool stood) {
   if (!repeats) single_ = in_a_row_ == 1 ? single_ + 1 : 0;
   in_a_row_ = repeats ? in_a_row_ + 1 : 0;
   still_ = stood && !repeats ? still_ + 1 : 0;
-  have_noise_ |= still_ >= kStill;
+  if (still_ >= kStill) {
+    // Something that moves in view changes the pair, but leaves the rest of a simulator's images as they were.
+    const std::vector<bool> repeated = this->repeated(features);
+    have_noise_ = 2 * std::count(repeated.begin(), repeated.end(), true) < features.count();
+  }
   features_ = {features.u, features.v, features.disparity};
 }
 

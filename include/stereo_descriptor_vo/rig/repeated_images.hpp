@@ -26,25 +26,28 @@ class RepeatedImages {
   std::vector<int> newFeatures(const StereoFeatures& features, double noise,
                                const std::optional<Eigen::Isometry3d>& T_previous_current) const;
 
-  /// Repetitions up to the last pair.
+  /// Repetitions in a row up to the last pair.
   int inARow() const { return in_a_row_; }
 
   /// Whether the last two pairs that repeated the one before did so once each: the driver sends each pair twice.
   bool comeTwice() const { return in_a_row_ == 0 && single_ >= 2; }
 
-  /// Whether the camera stood for some pairs, and none repeated the one before: its images have noise, so that those
-  /// which repeat are no new ones.
-  bool haveNoise() const { return have_noise_; }
+  /// Log-odds that images which repeat are old ones, before anything is known of the motion. Images with noise never
+  /// repeat by themselves; those of a simulator without noise do whenever it stands. Until the camera stood for some
+  /// pairs, a stop and a driver at fault are equally likely.
+  double logOddsOfOld() const;
 
   /// `stood`: no significant motion was measured since the pair before.
   void remember(const StereoFeatures& features, bool stood);
 
  private:
+  std::vector<bool> repeated(const StereoFeatures& features) const;
+
   std::array<std::vector<float>, 3> features_;  ///< u, v and disparity of the last pair's features, px
   int in_a_row_ = 0;                            ///< repetitions up to the last pair
   int single_ = 0;                              ///< repetitions that came alone, every second pair
-  int still_ = 0;                               ///< pairs in a row that stood and did not repeat
-  bool have_noise_ = false;
+  int still_ = 0;                               ///< pairs in a row that stood and did not repeat as a whole
+  std::optional<bool> have_noise_;              ///< known once the camera stood
 };
 
 }  // namespace sdvo
