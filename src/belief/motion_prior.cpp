@@ -63,7 +63,8 @@ std::optional<ExpectedMotion> MotionPrior::confirmed(std::int64_t stamp, double 
   const double time = dt + 2.0 * options_.stamp_sigma;
   expected.covariance +=
       processNoise(time, age) - processNoise(time, 0.0) + stampNoise(*confirmed_) + dt * dt * confirmed_covariance_;
-  return expected;
+  const double error = std::sqrt(expected.covariance.topLeftCorner<3, 3>().trace());
+  return error < options_.max_speed * options_.max_gap ? std::optional(expected) : std::nullopt;
 }
 
 ExpectedMotion MotionPrior::around(const Eigen::Isometry3d& motion, double dt) const {

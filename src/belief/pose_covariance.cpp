@@ -42,12 +42,10 @@ Matrix6d covering(const Matrix6d& a, const Matrix6d& b) {
 
 }  // namespace
 
-bool widen(Matrix6d& covariance, const Vector6d& deviation) {
+Matrix6d lacking(const Matrix6d& covariance, const Vector6d& deviation) {
   constexpr double kExpected = 3.0;  // chi-square of six: half its mean, for a deviation is a part of the error only
-  const double square = mahalanobisSquare(deviation, covariance);
-  if (square > kExpected)
-    covariance += deviation * deviation.transpose() + kTolerableRatio * kTolerableRatio * momentOf(deviation);
-  return square > noiseGate(6);
+  if (!(mahalanobisSquare(deviation, covariance) > kExpected)) return Matrix6d::Zero();
+  return deviation * deviation.transpose() + kTolerableRatio * kTolerableRatio * momentOf(deviation);
 }
 
 Matrix6d PoseCovariance::byCalibration(const CalibrationEstimate& known) const {
@@ -63,23 +61,21 @@ void PoseCovariance::expose(const RigCalibration::MotionJacobian& since_keyframe
 }
 
 void PoseCovariance::cover(const Vector6d& correction) {
-  const Matrix6d before = value_;
-  widen(value_, correction);
-  keyframe_ += value_ - before;  // the next poses are measured from the same key frame
+  spread(lacking(value(), correction));  // the next poses are measured from the same key frame
 }
 
 void PoseCovariance::restart(const Matrix6d& travelled) {
-  assume(value_ + discontinuity() + travelled);
+  assume(value() + discontinuity() + travelled);
 }
 
 void PoseCovariance::markKeyframe() {
-  keyframe_ = value_ - predicted_;
+  keyframe_ = measured_;
   keyframe_exposure_ = exposure_;
   since_keyframe_.reset();
 }
 
 void PoseCovariance::carry(const Eigen::Isometry3d& T_previous_current) {
-  for (Matrix6d* covariance : {&value_, &keyframe_, &predicted_, &unmeasured_})
+  for (Matrix6d* covariance : {&measured_, &keyframe_, &doubted_, &unmeasured_})
     *covariance = carriedBy(T_previous_current, *covariance);
   if (since_keyframe_) since_keyframe_ = carriedBy(T_previous_current, *since_keyframe_);
   for (Exposure* exposure : {&exposure_, &keyframe_exposure_})
@@ -88,26 +84,23 @@ void PoseCovariance::carry(const Eigen::Isometry3d& T_previous_current) {
 
 void PoseCovariance::advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance) {
   carry(T_previous_current);
-  value_ += covariance;
-  predicted_ += covariance;
-  unmeasured_ += covariance;
+  doubt(covariance, covariance);
 }
 
 Matrix6d PoseCovariance::measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe,
                                  const Matrix6d& growth) {
-  const Matrix6d before = value_ - predicted_;
+  const Matrix6d before = measured_;
   carry(T_previous_current);
   const Matrix6d motion = unmeasured_ + (since_keyframe_ ? covering(*since_keyframe_, since_keyframe) : since_keyframe);
   since_keyframe_ = since_keyframe;
-  value_ = noLessThan(before, keyframe_ + growth);
-  predicted_.setZero();
+  measured_ = noLessThan(before, keyframe_ + growth);
+  doubted_.setZero();
   unmeasured_.setZero();
   return motion;
 }
 
 void PoseCovariance::doubt(const Matrix6d& motion, const Matrix6d& pose) {
-  value_ += pose;
-  predicted_ += pose;
+  doubted_ += pose;
   unmeasured_ += motion;
 }
 

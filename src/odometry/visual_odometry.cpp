@@ -487,7 +487,9 @@ VisualOdometry::Step VisualOdometry::measure(const StereoFeatures& features, con
   step.correction = adjoint(map.newestPose() * map.poseBeforeNewest().inverse()) *
                     logSE3(candidate.T_keyframe_origin * map.poseBeforeNewest().inverse());
   state_.covariance.cover(step.correction);
-  if (!widen(step.covariance, step.correction)) return step;
+  const bool by_chance = mahalanobisSquare(step.correction, step.covariance) <= noiseGate(6);
+  step.covariance += lacking(step.covariance, step.correction);
+  if (by_chance) return step;
   std::ostringstream reason;
   reason << "the map corrected the pose by " << step.correction.head<3>().norm() << " m and "
          << step.correction.tail<3>().norm() << " rad";

@@ -18,6 +18,7 @@ struct MotionPriorOptions {
   double acceleration = 2.2;
   double rotation_acceleration = 1.4;
   double stamp_sigma = 0.005;
+  double max_gap = 1.0;
 
   void describe(OptionList& list) {
     list.add("max_speed", max_speed, {0.1, 1000.0}, "m/s", "a faster motion is a wrong one");
@@ -28,6 +29,7 @@ struct MotionPriorOptions {
     list.add("rotation_acceleration", rotation_acceleration, {0.01, 1000.0}, "rad/s",
              "the same for the rate of rotation");
     list.add("stamp_sigma", stamp_sigma, {0.0, 1.0}, "s", "standard deviation of a stamp's error");
+    list.add("max_gap", max_gap, {0.01, 60.0}, "s", "longest time between pairs over which the motion is predicted");
   }
 };
 
@@ -64,7 +66,8 @@ class MotionPrior {
   /// The next motion as the velocity, which must be known, predicts it.
   ExpectedMotion predicted(double dt) const;
 
-  /// Of the motion over `dt` s from the moment `stamp` on, ns, by the confirmed velocity; none where there was none.
+  /// Of the motion over `dt` s from the moment `stamp` on, ns, by the confirmed velocity. None where there was none, and
+  /// where it is so long ago that its error exceeds any distance between two pairs (max_speed times max_gap).
   std::optional<ExpectedMotion> confirmed(std::int64_t stamp, double dt) const;
 
   /// The same around a motion that another source measured, whose error is as a prediction's within one pair.

@@ -8,24 +8,24 @@
 
 namespace sdvo {
 
-/// Adds the outer product of a deviation to a covariance if its square exceeds half of the expected one (chi-square of
-/// six). The ratio by which a motion may be off is added in every direction. Returns whether chance does not explain
-/// it.
-bool widen(Matrix6d& covariance, const Vector6d& deviation);
+/// What a covariance lacks to explain a deviation: its outer product, and the ratio by which a motion may be off in
+/// every direction. Zero where the deviation's square is at most half of the expected one (chi-square of six).
+Matrix6d lacking(const Matrix6d& covariance, const Vector6d& deviation);
 
 /// Covariance of a pose that is reported pair by pair while the map behind it improves. All covariances are of right
 /// perturbations, T * exp(xi), translation before rotation, in m and rad.
 ///
-/// The pose's covariance is that of the last key frame plus what it errs by more in the map. So it grows from key frame
-/// to key frame, but not while the map stays the same. The traces of its translation and its rotation shrink only when
-/// a pose is measured after a predicted one.
+/// The pose's covariance is the sum of two parts: of the pose as it was measured last (the key frame's and what the pose
+/// errs by more in the map), and of motions that were predicted or doubted since. The measured part grows from key frame
+/// to key frame, but not while the map stays the same: its traces of translation and rotation never shrink. A new
+/// measurement replaces the doubted part. Parts are only added, so the sum is positive whatever its size.
 ///
 /// All motions have the error of the rig's calibration in common. It adds up with the distance, unlike their noise, and
 /// is followed apart: as the pose's derivative by the calibration.
 class PoseCovariance {
  public:
   /// Of the last pose, the calibration's error apart; zero in the beginning.
-  const Matrix6d& value() const { return value_; }
+  Matrix6d value() const { return measured_ + doubted_; }
 
   /// Moment of the last pose's error by the calibration's: by how far `known` is from the one that was compensated on
   /// the way, and by its covariance.
@@ -36,7 +36,7 @@ class PoseCovariance {
 
   /// The last pose, and all that are measured in the same map, may be off by more.
   void spread(const Matrix6d& moment) {
-    value_ += moment;
+    measured_ += moment;
     keyframe_ += moment;
   }
 
@@ -45,9 +45,9 @@ class PoseCovariance {
   void restart(const Matrix6d& travelled = Matrix6d::Zero());
 
   /// The last pose is another one now, with this covariance: the key frame of a new drive.
-  void assume(Matrix6d covariance) {
+  void assume(const Matrix6d& covariance) {
     *this = PoseCovariance();
-    value_ = keyframe_ = covariance;
+    measured_ = keyframe_ = covariance;
   }
 
   /// The pose moved on by a motion with a covariance of its own, as a predicted one.
@@ -81,11 +81,11 @@ class PoseCovariance {
 
   void carry(const Eigen::Isometry3d& T_previous_current);
 
-  Matrix6d value_ = Matrix6d::Zero();
+  Matrix6d measured_ = Matrix6d::Zero();    ///< of the last measured pose, as a perturbation of the last pose
+  Matrix6d doubted_ = Matrix6d::Zero();     ///< of motions since then, and of its doubt
   Matrix6d keyframe_ = Matrix6d::Zero();    ///< of the key frame, as a perturbation of the last pose
   std::optional<Matrix6d> since_keyframe_;  ///< of the last pose, as it was measured; none where it is the key frame
-  Matrix6d predicted_ = Matrix6d::Zero();   ///< of motions since the last measured pose, and of its doubt
-  Matrix6d unmeasured_ = Matrix6d::Zero();  ///< of these motions, and of what the last one was doubted by
+  Matrix6d unmeasured_ = Matrix6d::Zero();  ///< of these motions alone, and of what the last one was doubted by
   Exposure exposure_ = Exposure::Zero();
   Exposure keyframe_exposure_ = Exposure::Zero();  ///< as a perturbation of the last pose
 };

@@ -14,7 +14,6 @@ namespace sdvo {
 
 struct TrackingOptions : MotionPriorOptions {
   int max_predicted_pairs = 1;
-  double max_gap = 1.0;
   double max_guessed = 10.0;
   double probability = 0.95;
   double doubtful_deviation = 0.05;
@@ -22,7 +21,6 @@ struct TrackingOptions : MotionPriorOptions {
   void describe(OptionList& list) {
     list.add("max_predicted_pairs", max_predicted_pairs, {0, 100}, "",
              "pairs in a row whose motion may be predicted before the odometry is lost");
-    list.add("max_gap", max_gap, {0.01, 60.0}, "s", "longest time between pairs over which the motion is predicted");
     list.add(
         "max_guessed", max_guessed, {0.0, 1000.0}, "s",
         "longest time without usable images over which the pose goes on by the guess of another odometry; by a gyro "
