@@ -8,7 +8,7 @@ namespace sdvo {
 namespace {
 
 LearntRig unknownRig(const VisualOdometryOptions& options) {
-  return {options.calibration, Noise(options.noise)};
+  return {options.calibration, options.noise};
 }
 
 /// The matches, which of them are inliers, and what follows from these.
@@ -41,8 +41,8 @@ void reportRig(const LearntRig& rig, OdometryResult& result) {
   if (const auto delay = rig.right_delay.estimate())
     result.right_delay = delay->value, result.right_delay_sigma = delay->sigma;
   if (const auto rotation = rig.usual_rows.rotation()) {
-    result.right_rotation = rotation->value;
-    result.right_rotation_sigma = rotation->covariance.diagonal().cwiseSqrt();
+    result.right_rotation = rig.rotation + rotation->value;
+    result.right_rotation_sigma = (rig.rotation_covariance + rotation->covariance).diagonal().cwiseSqrt();
   }
 }
 

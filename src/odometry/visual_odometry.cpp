@@ -95,14 +95,11 @@ void VisualOdometry::takePose(const Matrix6d& covariance) {
 
 OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::optional<MotionGuess>& guess) {
   refuse(given);
-  const Pair pair = usable(given, guess);
-  const StereoFeatures& features = pair.features();
-  const std::optional<MotionScene> scene = pair.is == Pair::kFollowed
-                                               ? std::optional(sceneOf(*state_.map, features, pair.dt, guess))
-                                           : pair.is == Pair::kSought ? reacquire(features)
-                                                                      : std::nullopt;
+  Pair pair = usable(given, guess);
+  std::optional<MotionScene> scene;
   MotionHypothesis found;
-  if (scene) found = search_.find(*scene, largestDoubt());
+  search(pair, guess, scene, found);
+  const StereoFeatures& features = pair.features();
 
   // Nothing has changed so far, and from here on nothing is refused.
   Stopwatch stopwatch;
@@ -118,7 +115,8 @@ OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::op
     if (pair.is == Pair::kFollowed) step = predictMotion(options_, features, pair.dt, found.motion.reason, state_);
     if (pair.is == Pair::kFirst || pair.is == Pair::kSought) step = startMap(options_, features, state_);
   }
-  state_.rig.learn(features, measured ? &*measured : nullptr, found, step.state == TrackingState::kTracking && scene);
+  state_.rig.learn(features, measured ? &*measured : nullptr, found, pair.rotation,
+                   step.state == TrackingState::kTracking && scene);
   finish(pair, step);
   step.time = stopwatch.lap();
   return state_.report(features, pair.new_features, found, step, floor());
@@ -152,8 +150,40 @@ VisualOdometry::Pair VisualOdometry::usable(const StereoFeatures& given,
     pair.is = Pair::kFrozen;
   else
     pair.is = Pair::kFollowed;
-  if (pair.is == Pair::kFollowed || pair.is == Pair::kSought) pair.synchronised = synchronised(taken, pair.dt, guess);
+  straighten(pair, guess);
   return pair;
+}
+
+/// The pair as a rig would have seen it whose right camera did not rotate and was in step.
+void VisualOdometry::straighten(Pair& pair, const std::optional<MotionGuess>& guess) const {
+  const LearntRig& rig = state_.rig;
+  const bool is_new = pair.rotation.log_odds > 0.0;
+  const Eigen::Vector3d rotation = is_new ? Eigen::Vector3d(rig.rotation + pair.rotation.value) : rig.rotation;
+  if (!rotation.isZero()) pair.rotated_back = rotatedBack(pair.part(), rotation);
+  if (pair.is == Pair::kFollowed || pair.is == Pair::kSought)
+    pair.synchronised = synchronised(pair.taken(), pair.dt, guess);
+}
+
+/// The motion of the pair: in the map, or in that which the last pair of an outage would begin. Where the right camera
+/// seems to have rotated, the pair is straightened and searched again.
+void VisualOdometry::search(Pair& pair, const std::optional<MotionGuess>& guess, std::optional<MotionScene>& scene,
+                            MotionHypothesis& found) const {
+  const auto find = [&] {
+    scene.reset();
+    if (pair.is == Pair::kFollowed) scene.emplace(sceneOf(*state_.map, pair.features(), pair.dt, guess));
+    if (pair.is == Pair::kSought)
+      if (auto place = reacquire(pair.features())) scene.emplace(std::move(*place));
+    found = scene ? search_.find(*scene, largestDoubt()) : MotionHypothesis();
+  };
+  find();
+  Eigen::Vector3d rate = Eigen::Vector3d::Zero();
+  if (found.motion.success)
+    rate = logSO3(found.motion.T_current_reference.linear().transpose()) /
+           state_.prior.interval(scene->map.secondsUntil(pair.features()));
+  pair.rotation = state_.rig.shownRotation(pair.features(), found, rate);
+  if (!(pair.rotation.log_odds > 0.0)) return;
+  straighten(pair, guess);
+  find();
 }
 
 /// Over the `dt` s since the pair before: that of another source, else that of the velocity.
@@ -245,7 +275,7 @@ std::vector<Evidence> VisualOdometry::evidenceAgainst(const Pair& pair, const Mo
                                                       const std::optional<MeasuredPair>& measured) {
   LearntRig& rig = state_.rig;
   // The map is of another rig than this pair.
-  std::vector<Evidence> evidence{{rig.logOddsOfTurn(pair.features()), "the right camera seems to have turned"}};
+  std::vector<Evidence> evidence{{pair.rotation.log_odds, pair.rotation.words()}};
   if (pair.features().report.refused) evidence.push_back({kCertain, "left and right did not belong together"});
   if (pair.is == Pair::kFollowed)
     evidence.push_back({pair.frozen, "images as of the previous pair, by a stop or a frozen driver"});
@@ -295,6 +325,7 @@ void VisualOdometry::begin(const Pair& pair, const std::optional<MotionGuess>& g
   ++state_.pairs;
   if (pair.dt <= options_.tracking.max_gap) state_.prior.noteInterval(pair.dt);
   state_.outage.extend(pair.dt, guess, state_.prior);
+  if (pair.rotation.log_odds > 0.0) state_.rig.rotate(pair.rotation, features.camera);
 }
 
 /// Takes note of what became of the pair.

@@ -1,5 +1,6 @@
 #include "stereo_descriptor_vo/rig/calibration_filter.hpp"
 
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -77,6 +78,18 @@ void CalibrationFilter::note(int oldest_id, int newest_id, const RigCalibration&
   const RigCalibration::Matrix known = past_.information + information;
   present_ = Information{known, (held.information + known) * calibration.value - held.information_mean};
   if (!pending_) pending_ = {newest_id, {information, present_->information_mean - past_.information_mean}};
+}
+
+void CalibrationFilter::widen(double variance) {
+  const auto widened = [&](Information& known) {
+    const RigCalibration::Vector mean = known.information.ldlt().solve(known.information_mean);
+    const RigCalibration::Matrix added = variance / (options_.trust * options_.trust) * RigCalibration::Matrix::Ones();
+    known.information = (RigCalibration::Matrix::Identity() + known.information * added).inverse() * known.information;
+    known.information_mean = known.information * mean;
+  };
+  widened(past_);
+  if (pending_) widened(pending_->evidence);
+  if (present_) widened(*present_);
 }
 
 CalibrationEstimate CalibrationFilter::estimate() const {

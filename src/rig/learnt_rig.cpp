@@ -2,30 +2,76 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <iomanip>
+#include <opencv2/core.hpp>
+#include <sstream>
+#include <utility>
 
 namespace sdvo {
+namespace {
 
-LearntRig::LearntRig(const CalibrationOptions& options, const Noise& assumed)
-    : calibration(options), right_delay(options), noise(assumed) {}
+}  // namespace
 
-/// A turn against what changes on rigs, and on this one, as a rule.
-double LearntRig::logOddsOfTurn(const StereoFeatures& features) const {
-  constexpr double kUsualOfRigs = 0.2;  // px: undisturbed, KITTI's and EuRoC's rigs change by less
+std::string ShownRotation::words() const {
+  std::ostringstream words;
+  words << std::setprecision(2) << "the right camera seems to have turned by " << value.norm() * 180.0 / CV_PI
+        << " degrees (" << 1e3 * value.transpose() << " mrad about x, y, z): calibrate again";
+  return words.str();
+}
+
+LearntRig::LearntRig(const CalibrationOptions& options, const NoiseOptions& assumed)
+    : calibration(options), right_delay(options), noise(assumed), assumed_(assumed), delay_sigma_(options.right_delay_sigma) {}
+
+/// A rotation against what changes on rigs, and on this one, as a rule.
+ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const MotionHypothesis& found,
+                                       const Eigen::Vector3d& rate) const {
+  constexpr double kUsualOfRigs = 0.2;  // px: of rigs that nothing disturbs (KITTI, EuRoC) the most is half a pixel
   constexpr double kKnock = 0.0175;     // rad: a degree (chosen)
-  const auto change = recent_rows.change(features);
-  if (!change || features.count() < kFewestMeasured) return kUnsuspected;
-  const double usual = std::max(kUsualOfRigs * kUsualOfRigs, usual_turn);
-  const Eigen::Matrix3d information = (change->covariance + usual * change->spread).inverse();
-  return kUnsuspected + logBayesFactor<3>(change->value, information, kKnock * kKnock * Eigen::Matrix3d::Identity());
+  ShownRotation shown;
+  if (features.count() < kFewestMeasured) return shown;
+  std::optional<RightRotation> by_disparities;
+  if (found.motion.success) {
+    NoiseOptions scaled = assumed_;
+    scaled.corner *= noise.scale();
+    by_disparities = rotationByDisparities(features.camera, scaled, found.correspondences, found.motion.inliers,
+                                           found.motion.T_current_reference);
+  }
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d weighted = Eigen::Vector3d::Zero();
+  for (const auto& by : {usual_rows.change(features), by_disparities}) {
+    if (!by) continue;
+    const Eigen::Matrix3d known = (by->covariance + kUsualOfRigs * kUsualOfRigs * by->spread).inverse();
+    information += known, weighted += known * by->value;
+  }
+  if (!(information.determinant() > 0.0)) return shown;
+  const Eigen::Matrix3d covariance = information.inverse();
+  // A right image that is late by d shows a camera that turns at the rate w as if it had rotated by d * w.
+  const Eigen::Vector3d by_delay = delay_sigma_ * rate;
+  shown.value = covariance * weighted;
+  shown.covariance = covariance + by_delay * by_delay.transpose() + usual_change_;
+  shown.log_odds = kUnsuspected + logBayesFactor<3>(shown.value, shown.covariance.inverse(),
+                                                    kKnock * kKnock * Eigen::Matrix3d::Identity());
+  return shown;
+}
+
+void LearntRig::rotate(const ShownRotation& shown, const StereoCamera& camera) {
+  const Eigen::Vector3d now = rotation + shown.value, back = now - rotation_before_;
+  const Eigen::Matrix3d covariance = rotation_covariance + shown.covariance;
+  std::swap(rotation, rotation_before_), std::swap(rotation_covariance, covariance_before_);
+  if (back.dot((covariance + rotation_covariance).inverse() * back) < noiseGate(3)) {
+    // The rig is as it was before the last one: no knock, but what its images do.
+    usual_change_ += shown.value * shown.value.transpose();
+    return;
+  }
+  rotation = now, rotation_covariance = covariance;
+  calibration.widen(camera.fx * camera.fx * shown.covariance(1, 1));
 }
 
 void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measured, const MotionHypothesis& found,
-                      bool is_confirmed) {
+                      const ShownRotation& shown, bool is_confirmed) {
   constexpr double kMost = 0.95;  // even if all agree, a few need not in the next pair (chosen)
   if (is_confirmed) {
-    if (const auto change = recent_rows.change(features))
-      usual_turn +=
-          (1.0 - kUsualMemory) * (change->value.dot(change->spread.inverse() * change->value) / 3.0 - usual_turn);
+    usual_change_ += (1.0 - kUsualMemory) * (shown.value * shown.value.transpose() - usual_change_);
     usual_rows.learn(features);
     noise.learn(found.motion.rms);
     if (found.lasting_square) noise.learnShared(*found.lasting_square);
@@ -35,7 +81,6 @@ void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measur
       usual_agreement += (1.0 - kUsualMemory) * (std::min(ratio, kMost) - usual_agreement);
     }
   }
-  if (features.count() >= kFewestMeasured) recent_rows.learn(features);
   if (measured)
     right_delay.learn(measured->features, measured->dt, measured->velocity(), is_confirmed);
   else

@@ -14,13 +14,6 @@ std::size_t partOf(const StereoFeatures& features, int i) {
   return static_cast<std::size_t>(RowDelay::cellOf(features.u[i], features.v[i], camera.width, camera.height));
 }
 
-Eigen::RowVector3d effectOfRotation(const StereoFeatures& features, int i) {
-  const StereoCamera& camera = features.camera;
-  const double x = (features.u[i] - features.disparity[i] - camera.cx) / camera.fx;
-  const double y = (features.v[i] - camera.cy) / camera.fy;
-  return camera.fy * Eigen::RowVector3d(1.0 + y * y, -x * y, -x);
-}
-
 }  // namespace
 
 /// Medians: a part has wrong matches.
@@ -30,7 +23,8 @@ RowPattern::Parts RowPattern::partsOf(const StereoFeatures& features) {
   for (int i = 0; i < features.count(); ++i) {
     const std::size_t p = partOf(features, i);
     dv[p].push_back(features.dv[i]);
-    parts[p].effect += effectOfRotation(features, i);
+    parts[p].effect +=
+        rotationJacobian(features.camera, features.u[i] - features.disparity[i], features.v[i]).row(1);
   }
   for (std::size_t p = 0; p < parts.size(); ++p) {
     if (dv[p].empty()) continue;
@@ -58,11 +52,11 @@ double RowPattern::change(const StereoFeatures& features, int i) const {
   return features.dv[i] - parts_[partOf(features, i)].dv;
 }
 
-std::optional<RowPattern::Rotation> RowPattern::rotation() const {
+std::optional<RightRotation> RowPattern::rotation() const {
   return fit(parts_);
 }
 
-std::optional<RowPattern::Rotation> RowPattern::change(const StereoFeatures& features) const {
+std::optional<RightRotation> RowPattern::change(const StereoFeatures& features) const {
   Parts changes = partsOf(features);
   for (std::size_t p = 0; p < changes.size(); ++p) {
     if (!(parts_[p].weight > 0.0)) changes[p].weight = 0.0;
@@ -72,7 +66,7 @@ std::optional<RowPattern::Rotation> RowPattern::change(const StereoFeatures& fea
 }
 
 /// Least squares over the parts, each with the weight of its features.
-std::optional<RowPattern::Rotation> RowPattern::fit(const Parts& parts) {
+std::optional<RightRotation> RowPattern::fit(const Parts& parts) {
   constexpr double kFewest = 6.0;  // parts: three rotations and as much to tell their errors from (chosen)
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   Eigen::Vector3d product = Eigen::Vector3d::Zero();
@@ -86,7 +80,7 @@ std::optional<RowPattern::Rotation> RowPattern::fit(const Parts& parts) {
   if (known < kFewest) return std::nullopt;
   constexpr double kSteady = 1e-3;  // keeps the equations solvable where all parts lie in a line, 1/rad^2
   const Eigen::Matrix3d inverse = (information + kSteady * Eigen::Matrix3d::Identity()).inverse();
-  Rotation rotation{inverse * product, Eigen::Matrix3d::Zero(), weight / 3.0 * inverse};
+  RightRotation rotation{inverse * product, Eigen::Matrix3d::Zero(), weight / 3.0 * inverse};
   for (const Part& part : parts) {
     // A residual is smaller than its error by the part's leverage (MacKinnon and White 1985, HC3).
     const double leverage = part.weight * part.effect * inverse * part.effect.transpose();

@@ -67,15 +67,17 @@ class VisualOdometry {
   /// A pair as it is searched: of the map's camera, without features of the pair before, both images of one moment.
   struct Pair {
     const StereoFeatures& given;
-    std::optional<StereoFeatures> refocused{}, new_part{}, synchronised{};
+    std::optional<StereoFeatures> refocused{}, new_part{}, rotated_back{}, synchronised{};
     std::vector<int> new_features{};
     double dt = 0.0;               ///< since the previous pair, s
     double frozen = kUnsuspected;  ///< log-odds that its images are old although the camera moved
     /// Without a map of its stream; after an outage; with old images; after a pose.
     enum { kFirst, kSought, kFrozen, kFollowed } is = kFirst;
+    ShownRotation rotation{};  ///< of the right camera beyond what is known
 
     const StereoFeatures& whole() const { return refocused ? *refocused : given; }
-    const StereoFeatures& taken() const { return new_part ? *new_part : whole(); }
+    const StereoFeatures& part() const { return new_part ? *new_part : whole(); }
+    const StereoFeatures& taken() const { return rotated_back ? *rotated_back : part(); }
     const StereoFeatures& features() const { return synchronised ? *synchronised : taken(); }
   };
 
@@ -90,6 +92,9 @@ class VisualOdometry {
 
   void refuse(const StereoFeatures& features) const;
   Pair usable(const StereoFeatures& given, const std::optional<MotionGuess>& guess) const;
+  void straighten(Pair& pair, const std::optional<MotionGuess>& guess) const;
+  void search(Pair& pair, const std::optional<MotionGuess>& guess, std::optional<MotionScene>& scene,
+              MotionHypothesis& found) const;
   std::optional<Eigen::Isometry3d> expectedMotion(double dt, const std::optional<MotionGuess>& guess) const;
   double logOddsOfFrozen(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
   std::optional<StereoFeatures> synchronised(const StereoFeatures& taken, double dt,

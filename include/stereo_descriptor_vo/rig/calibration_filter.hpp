@@ -52,6 +52,9 @@ class CalibrationFilter {
   /// Notes the square (px^2) of what a window found the calibration to leave at a point.
   void noteCommon(double square);
 
+  /// The right camera rotated, which is compensated but for an error of this variance, px^2, of all disparities.
+  void widen(double variance);
+
   const RigCalibration& calibration() const { return calibration_; }
   /// What options and windows tell together, whether it is significant or not.
   CalibrationEstimate estimate() const;

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/rig/right_rotation.hpp"
 #include "stereo_descriptor_vo/rig/row_delay.hpp"
 
 namespace sdvo {
@@ -21,18 +22,10 @@ class RowPattern {
   /// dv of a feature beyond what is usual in its part, px; dv itself where nothing is known.
   double change(const StereoFeatures& features, int i) const;
 
-  /// The rotation of the right camera, rad about the axes of the left optical frame, that all parts have in common.
-  /// With x and y as normalised coordinates in the right image, a small rotation w moves the right view by
-  ///   dv = f * (w_x * (1 + y^2) - w_z * x - w_y * x * y).
-  struct Rotation {
-    Eigen::Vector3d value;
-    Eigen::Matrix3d covariance;  ///< sandwich (White 1980) over parts: errors within a part are alike
-    Eigen::Matrix3d spread;      ///< covariance of a rotation that shifts the rows by 1 px (root mean square)
-  };
-  /// Of the pattern. None where too few parts are known.
-  std::optional<Rotation> rotation() const;
+  /// The rotation of the right camera that all parts of the pattern have in common; none where too few are known.
+  std::optional<RightRotation> rotation() const;
   /// Of a pair against the pattern. None where too few parts of it are known.
-  std::optional<Rotation> change(const StereoFeatures& features) const;
+  std::optional<RightRotation> change(const StereoFeatures& features) const;
 
  private:
   struct Part {
@@ -41,7 +34,7 @@ class RowPattern {
   };
   using Parts = std::array<Part, RowDelay::kParts>;
   static Parts partsOf(const StereoFeatures& features);
-  static std::optional<Rotation> fit(const Parts& parts);
+  static std::optional<RightRotation> fit(const Parts& parts);
 
   double memory_;
   Parts parts_;
