@@ -5,6 +5,11 @@
 namespace sdvo {
 namespace {
 
+std::string missing(const StereoFeatures& features) {
+  return "only " + std::to_string(features.count()) + " features" +
+         (features.report.status.empty() ? "" : ": " + features.report.status);
+}
+
 /// Whether a guess has the motion of a pair that shows nothing, not too long after the last one that did.
 bool canFollow(const VisualOdometryOptions& options, const StereoFeatures& features, const OdometryState& state) {
   const auto& followed = state.outage.followed();
@@ -13,42 +18,56 @@ bool canFollow(const VisualOdometryOptions& options, const StereoFeatures& featu
   return state.map->secondsUntil(features) <= (followed->rotation_only ? tracking.max_gap : tracking.max_guessed);
 }
 
+/// The pose moves on by a motion that is not measured.
+OdometryStep follow(const ExpectedMotion& expected, const std::string& reason, OdometryState& state) {
+  OdometryStep step;
+  step.state = TrackingState::kDegraded;
+  step.reason = reason;
+  step.T_previous_current = expected.motion;
+  step.covariance = expected.covariance;
+  state.covariance.advance(expected.motion, expected.covariance);
+  return step;
+}
+
 }  // namespace
 
 OdometryStep startMap(const VisualOdometryOptions& options, const StereoFeatures& features, OdometryState& state) {
   OdometryStep step;
   state.interrupt();
+  const auto followed = state.outage.followed();
+  if (canFollow(options, features, state)) return follow(*followed, "motion by the guess: " + missing(features), state);
   if (features.count() < options.motion.min_inliers) {
     step.state = state.started ? TrackingState::kLost : TrackingState::kWaiting;
-    step.reason = "only " + std::to_string(features.count()) + " features" +
-                  (features.report.status.empty() ? "" : ": " + features.report.status);
+    step.reason = missing(features);
     return step;
   }
-  const auto& followed = state.outage.followed();
-  if (state.started && followed) {
-    step.T_previous_current = followed->motion;
-    step.covariance = followed->covariance;
-  }
+  const bool is_guessed = state.started && followed;
+  const Eigen::Isometry3d T_previous_current = is_guessed ? followed->motion : Eigen::Isometry3d::Identity();
   state.seed.emplace(options.map);
-  const Eigen::Isometry3d T_previous_current = step.T_previous_current.value_or(Eigen::Isometry3d::Identity());
   state.seed->insert(options.alignment, features, state.pairs, (state.T_origin_camera * T_previous_current).inverse(),
                      {}, state.rig.calibration.calibration());
-  step.state = state.started ? TrackingState::kDegraded : TrackingState::kTracking;
-  if (!state.started) {
-    step.reason = "first pair";
-  } else if (followed) {
-    step.reason = followed->rotation_only ? "started again as the gyro turned; the translation is predicted"
-                                          : "started again where the guess has the camera";
+  state.seed_has_pose = is_guessed && !followed->rotation_only;
+  // Only a pair that is measured against the seed replaces the map from before.
+  const bool has_map = state.started && state.map && state.map->continuedBy(features);
+  if (is_guessed) {
+    step = follow(*followed,
+                  std::string(has_map ? "not found in the map: goes on" : "started again") +
+                      (followed->rotation_only ? " as the gyro turned; the translation is predicted"
+                                               : " where the guess has the camera"),
+                  state);
+    if (has_map) return step;
     if (followed->rotation_only) ++state.epoch;
-    state.covariance.advance(*step.T_previous_current, step.covariance);
-    state.covariance.assume(state.covariance.value());
-  } else if (state.map && state.map->continuedBy(features)) {
+  } else if (has_map) {
     step.state = TrackingState::kLost;
     step.reason = "not found in the map: the next pair may be, or goes on from here";
     return step;
-  } else {
+  } else if (state.started) {
+    step.state = TrackingState::kDegraded;
     step.reason = kStartedAgain;
     state.startAgain();
+  } else {
+    step.state = TrackingState::kTracking;
+    step.reason = "first pair";
   }
   state.takeSeed();
   return step;
@@ -69,28 +88,18 @@ OdometryStep holdPose(double dt, OdometryState& state) {
 
 OdometryStep predictMotion(const VisualOdometryOptions& options, const StereoFeatures& features, double dt,
                            const std::string& failure, OdometryState& state) {
-  OdometryStep step;
-  step.reason = failure + (features.report.status.empty() ? "" : "; " + features.report.status);
+  const std::string reason = failure + (features.report.status.empty() ? "" : "; " + features.report.status);
   const bool can_predict = state.prior.velocity() && dt <= options.tracking.max_gap &&
                            state.outage.predictedPairs() < options.tracking.max_predicted_pairs;
-  ExpectedMotion expected;
   // The prior's translation over one pair is better than that around a standstill, which a gyro needs.
-  if (canFollow(options, features, state) && !(can_predict && state.outage.followed()->rotation_only)) {
-    expected = *state.outage.followed();
-    step.reason = "motion by the guess: " + step.reason;
-  } else if (can_predict) {
+  if (canFollow(options, features, state) && !(can_predict && state.outage.followed()->rotation_only))
+    return follow(*state.outage.followed(), "motion by the guess: " + reason, state);
+  if (can_predict) {
     state.outage.countPrediction();
-    expected = state.prior.predicted(dt);
-    step.reason = "motion predicted: " + step.reason;
-  } else {
-    state.interrupt();
-    step.state = TrackingState::kLost;
-    return step;
+    return follow(state.prior.predicted(dt), "motion predicted: " + reason, state);
   }
-  step.state = TrackingState::kDegraded;
-  step.T_previous_current = expected.motion;
-  step.covariance = expected.covariance;
-  state.covariance.advance(*step.T_previous_current, step.covariance);
+  OdometryStep step = startMap(options, features, state);
+  if (step.state == TrackingState::kLost) step.reason = reason;
   return step;
 }
 

@@ -365,8 +365,9 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   if (refutation.empty()) refutation = state_.prior.tooFast(candidate.motion, found.motion.covariance, since);
   if (!refutation.empty()) return refute(refutation + " after the adjustment");
 
-  const bool starts_again = state_.seed && &scene.map == &*state_.seed;
+  const bool is_seed = state_.seed && &scene.map == &*state_.seed, starts_again = is_seed && !state_.seed_has_pose;
   if (starts_again) state_.startAgain();
+  if (is_seed) state_.covariance.assume(state_.covariance.value());
   const Belief belief = state_.doubt.weigh(scene, found, evidence);
   commit(candidate, belief.probability);
   Step step = measure(features, found, candidate, since);
@@ -387,6 +388,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   if (starts_again) step.state = TrackingState::kDegraded;
   if (std::exchange(state_.interrupted, false))
     step.reason = (starts_again ? kStartedAgain
+                   : is_seed    ? "goes on where the guess had the camera"
                                 : "re-acquired by " + std::to_string(found.agreement.inliers) + " points of the map") +
                   (step.reason.empty() ? "" : "; " + step.reason);
   if (state_.map->newestIsKeyframe()) state_.covariance.markKeyframe();

@@ -8,9 +8,7 @@
 #include <utility>
 
 namespace sdvo {
-namespace {
-
-}  // namespace
+namespace {}  // namespace
 
 std::string ShownRotation::words() const {
   std::ostringstream words;
@@ -20,7 +18,11 @@ std::string ShownRotation::words() const {
 }
 
 LearntRig::LearntRig(const CalibrationOptions& options, const NoiseOptions& assumed)
-    : calibration(options), right_delay(options), noise(assumed), assumed_(assumed), delay_sigma_(options.right_delay_sigma) {}
+    : calibration(options),
+      right_delay(options),
+      noise(assumed),
+      assumed_(assumed),
+      delay_sigma_(options.right_delay_sigma) {}
 
 /// A rotation against what changes on rigs, and on this one, as a rule.
 ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const MotionHypothesis& found,

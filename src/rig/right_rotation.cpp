@@ -83,8 +83,8 @@ std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, c
   for (const Vector& of_part : gradients) meat += of_part * of_part.transpose();
   const Matrix inverse = hessian.inverse();
   found.covariance = (inverse * meat * inverse).bottomRightCorner<3, 3>();
-  found.spread = static_cast<double>(inliers.size()) / (3.0 * of_disparity * of_disparity) *
-                 inverse.bottomRightCorner<3, 3>();
+  found.spread =
+      static_cast<double>(inliers.size()) / (3.0 * of_disparity * of_disparity) * inverse.bottomRightCorner<3, 3>();
   return found;
 }
 

@@ -23,8 +23,7 @@ RowPattern::Parts RowPattern::partsOf(const StereoFeatures& features) {
   for (int i = 0; i < features.count(); ++i) {
     const std::size_t p = partOf(features, i);
     dv[p].push_back(features.dv[i]);
-    parts[p].effect +=
-        rotationJacobian(features.camera, features.u[i] - features.disparity[i], features.v[i]).row(1);
+    parts[p].effect += rotationJacobian(features.camera, features.u[i] - features.disparity[i], features.v[i]).row(1);
   }
   for (std::size_t p = 0; p < parts.size(); ++p) {
     if (dv[p].empty()) continue;

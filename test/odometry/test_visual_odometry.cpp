@@ -326,6 +326,40 @@ TEST(VisualOdometry, IsLostAfterTheSecondFailureAndStartsAgainFromTheLastPose) {
   }
 }
 
+/// The pairs 6 to 8 are of another street; a guess is too long by 5 %.
+TEST(VisualOdometry, AfterAnOutageTheMapIsFoundAgainWithAndWithoutAGuess) {
+  for (const bool is_guessed : {false, true}) {
+    VisualOdometry odometry({});
+    const int epoch = follow(odometry, 5).epoch;
+    OdometryResult result;
+    for (int i = 6; i <= 10; ++i) {
+      Vector6d motion = logSE3(trueSinceStart(i, i - 1));
+      motion.head<3>() *= 1.05;
+      const auto guess = is_guessed ? std::optional(MotionGuess{expSE3(motion)}) : std::nullopt;
+      result = odometry.update(i <= 8 ? strangePair(i) : pairOf(i), guess);
+      expectCovariance(result.pose_covariance);
+      EXPECT_EQ(result.has_pose, is_guessed || i == 6 || i > 8) << i << ": " << result.reason;
+    }
+    EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
+    EXPECT_EQ(result.epoch, epoch);
+    EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(10)), 0.02);
+  }
+}
+
+/// Of the street where the guess led no map was made: it begins there, and no pose is missing on the way.
+TEST(VisualOdometry, GoesOnInAnotherMapWhereTheGuessHasTheCamera) {
+  VisualOdometry odometry({});
+  const int epoch = follow(odometry, 5).epoch;
+  OdometryResult result;
+  for (int i = 6; i <= 12; ++i) {
+    result = odometry.update(pairElsewhere(i), MotionGuess{trueSinceStart(i, i - 1)});
+    EXPECT_TRUE(result.has_pose) << i << ": " << result.reason;
+  }
+  EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
+  EXPECT_EQ(result.epoch, epoch);
+  EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(12)), 0.02);
+}
+
 /// A camera that stood for some pairs, and knows it, then turns by 25 degrees at once; a texture that repeats itself
 /// leaves nothing to be found but near where it is expected.
 class GuessedTurn : public ::testing::Test {

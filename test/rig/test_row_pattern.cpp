@@ -5,30 +5,11 @@
 #include <random>
 #include <vector>
 
-#include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/common/se3.hpp"
-#include "stereo_descriptor_vo/rig/learnt_rig.hpp"
 #include "stereo_descriptor_vo/rig/row_pattern.hpp"
+#include "turned_grid.hpp"
 
 namespace sdvo {
 namespace test_row_pattern {
-
-/// A grid of features with large disparities, whose vertical ones come from turning the right camera by `rotation`: the
-/// rays themselves are turned.
-StereoFeatures gridSeenWith(const Eigen::Vector3d& rotation) {
-  StereoFeatures features = synthetic::noFeatures(synthetic::camera());
-  const StereoCamera& camera = features.camera;
-  for (int row = 0; row < 9; ++row)
-    for (int column = 0; column < 12; ++column) {
-      const float u = 140.f + 40.f * static_cast<float>(column), v = 30.f + 50.f * static_cast<float>(row);
-      const float disparity = 60.f + 10.f * static_cast<float>((row + column) % 5);
-      const Eigen::Vector3d ray((u - disparity - camera.cx) / camera.fx, (v - camera.cy) / camera.fy, 1.0);
-      const Eigen::Vector3d turned = expSO3(-rotation) * ray;
-      const auto dv = static_cast<float>(camera.fy * (turned.y() / turned.z() - ray.y()));
-      features.append({u, v, disparity, dv, 10.f, -1.f, 1.f});
-    }
-  return features;
-}
 
 TEST(RowPattern, IsUnknownBeforeTheFirstFeatures) {
   RowPattern pattern(0.9);
@@ -82,43 +63,6 @@ TEST(RowPattern, WhatLastsAtItsPlaceIsNoChange) {
   pattern.learn(features);
   const auto change = pattern.change(features);
   EXPECT_LT(change->value.norm(), 1e-6);
-}
-
-LearntRig steady(const StereoFeatures& features) {
-  LearntRig rig({}, Noise({}));
-  for (int k = 0; k < 20; ++k) rig.learn(features, nullptr, {}, true);
-  return rig;
-}
-
-TEST(LearntRig, ATurnOfTheRightCameraIsEvidenceWhileTheMapIsOfTheRigBefore) {
-  const StereoFeatures before = gridSeenWith({0.3e-3, 0.0, -0.5e-3}), turned = gridSeenWith({0.3e-3, 0.0, 6e-3});
-  LearntRig rig = steady(before);
-  EXPECT_LT(rig.logOddsOfTurn(before), logOdds(0.05));
-  EXPECT_GT(rig.logOddsOfTurn(turned), 0.0);
-  int pairs = 0;
-  for (; rig.logOddsOfTurn(turned) > logOdds(0.05); ++pairs) rig.learn(turned, nullptr, {}, false);
-  EXPECT_GT(pairs, 2);
-  EXPECT_LT(pairs, 40) << "a lasting knock is the rig's own soon";
-  for (int k = 0; k < 20; ++k) rig.learn(turned, nullptr, {}, false);
-  EXPECT_GT(rig.logOddsOfTurn(before), 0.0) << "a return is a turn";
-}
-
-TEST(LearntRig, AFewFeaturesTellOfNoTurn) {
-  const LearntRig rig = steady(gridSeenWith(Eigen::Vector3d::Zero()));
-  StereoFeatures wrong = synthetic::noFeatures(synthetic::camera());
-  EXPECT_EQ(rig.logOddsOfTurn(wrong), kUnsuspected);
-  for (int i = 0; i < 3; ++i) wrong.append({200.f + 100.f * static_cast<float>(i), 150.f, 60.f, 1.4f, 10.f, -1.f, 1.f});
-  EXPECT_EQ(rig.logOddsOfTurn(wrong), kUnsuspected);
-}
-
-TEST(LearntRig, ARigWhoseRowsAlwaysChangeIsNotSaidToTurn) {
-  LearntRig rig = steady(gridSeenWith(Eigen::Vector3d::Zero()));
-  for (int k = 0; k < 100; ++k) {
-    const StereoFeatures features = gridSeenWith(Eigen::Vector3d(0.0, 0.0, 3e-3 * std::sin(0.1 * k)));
-    EXPECT_LT(rig.logOddsOfTurn(features), logOdds(0.05)) << "pair " << k;
-    rig.learn(features, nullptr, {}, true);
-  }
-  EXPECT_GT(rig.logOddsOfTurn(gridSeenWith(Eigen::Vector3d(0.0, 0.0, 60e-3))), 0.0);
 }
 
 /// Mean square of each axis' error by the mean variance, of rigs whose rows err by 0.2 px, in each feature or in whole

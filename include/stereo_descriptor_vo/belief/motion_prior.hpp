@@ -66,8 +66,8 @@ class MotionPrior {
   /// The next motion as the velocity, which must be known, predicts it.
   ExpectedMotion predicted(double dt) const;
 
-  /// Of the motion over `dt` s from the moment `stamp` on, ns, by the confirmed velocity. None where there was none, and
-  /// where it is so long ago that its error exceeds any distance between two pairs (max_speed times max_gap).
+  /// Of the motion over `dt` s from the moment `stamp` on, ns, by the confirmed velocity. None where there was none,
+  /// and where it is so long ago that its error exceeds any distance between two pairs (max_speed times max_gap).
   std::optional<ExpectedMotion> confirmed(std::int64_t stamp, double dt) const;
 
   /// The same around a motion that another source measured, whose error is as a prediction's within one pair.

@@ -40,7 +40,10 @@ struct OdometryStep {
 struct OdometryState {
   std::optional<LocalMap> map;
   std::optional<LocalMap> candidate;  ///< the map with the pair; between pairs only its memory matters
-  std::optional<LocalMap> seed;       ///< of the newest pair that an outage's map does not show, at the last pose
+  /// The map that the newest pair which an outage's map does not show would begin, where the guesses have the camera,
+  /// else at the last pose. It becomes the map once the next pair is measured against it.
+  std::optional<LocalMap> seed;
+  bool seed_has_pose = false;  ///< guesses have the motion from the map to the seed
   LearntRig rig;
   MotionPrior prior;
   Doubt doubt;

@@ -63,7 +63,7 @@ struct LearntRig {
  private:
   NoiseOptions assumed_;
   double delay_sigma_;  ///< s: of the moments at which single right images are taken
-  Eigen::Matrix3d usual_change_ = Eigen::Matrix3d::Zero();  ///< rad^2: moment of what confirmed pairs show of one
+  Eigen::Matrix3d usual_change_ = Eigen::Matrix3d::Zero();     ///< rad^2: moment of what confirmed pairs show of one
   Eigen::Vector3d rotation_before_ = Eigen::Vector3d::Zero();  ///< until the last one
   Eigen::Matrix3d covariance_before_ = Eigen::Matrix3d::Zero();
 };

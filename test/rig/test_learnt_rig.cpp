@@ -1,0 +1,77 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "stereo_descriptor_vo/rig/learnt_rig.hpp"
+#include "turned_grid.hpp"
+
+namespace sdvo {
+namespace test_learnt_rig {
+
+ShownRotation shown(const LearntRig& rig, const StereoFeatures& features,
+                    const Eigen::Vector3d& rate = Eigen::Vector3d::Zero()) {
+  return rig.shownRotation(features, MotionHypothesis(), rate);
+}
+
+void learn(LearntRig& rig, const StereoFeatures& features, int pairs = 1) {
+  for (int k = 0; k < pairs; ++k) rig.learn(features, nullptr, {}, shown(rig, features), true);
+}
+
+LearntRig steady(const StereoFeatures& features) {
+  LearntRig rig({}, {});
+  learn(rig, features, 20);
+  return rig;
+}
+
+TEST(LearntRig, AKnockOfTheRightCameraIsOneRotation) {
+  const Eigen::Vector3d knock(0.0, 0.0, 6e-3);
+  const StereoFeatures before = gridSeenWith({0.3e-3, 0.0, -0.5e-3}), turned = gridSeenWith({0.3e-3, 0.0, 5.5e-3});
+  LearntRig rig = steady(before);
+  EXPECT_LT(shown(rig, before).log_odds, logOdds(0.05));
+  const ShownRotation rotation = shown(rig, turned);
+  EXPECT_GT(rotation.log_odds, 0.0);
+  EXPECT_LT((rotation.value - knock).norm(), 0.2e-3);
+  EXPECT_NE(rotation.words().find("0.34 degrees"), std::string::npos) << rotation.words();
+  rig.rotate(rotation, turned.camera);
+  EXPECT_LT(shown(rig, rotatedBack(turned, rig.rotation)).log_odds, logOdds(0.05)) << "it is compensated";
+}
+
+TEST(LearntRig, ARotationOfOnePairIsTakenBack) {
+  const StereoFeatures before = gridSeenWith(Eigen::Vector3d::Zero()), turned = gridSeenWith({0.0, 0.0, 6e-3});
+  LearntRig rig = steady(before);
+  rig.rotate(shown(rig, turned), before.camera);
+  const ShownRotation back = shown(rig, rotatedBack(before, rig.rotation));
+  ASSERT_GT(back.log_odds, 0.0) << "a return is a rotation";
+  rig.rotate(back, before.camera);
+  EXPECT_TRUE(rig.rotation.isZero() && rig.rotation_covariance.isZero());
+  EXPECT_LT(shown(rig, turned).log_odds, 0.0) << "what came back is what this rig does";
+}
+
+TEST(LearntRig, AFewFeaturesShowNoRotation) {
+  const LearntRig rig = steady(gridSeenWith(Eigen::Vector3d::Zero()));
+  StereoFeatures wrong = synthetic::noFeatures(synthetic::camera());
+  EXPECT_EQ(shown(rig, wrong).log_odds, kUnsuspected);
+  for (int i = 0; i < 3; ++i) wrong.append({200.f + 100.f * static_cast<float>(i), 150.f, 60.f, 1.4f, 10.f, -1.f, 1.f});
+  EXPECT_EQ(shown(rig, wrong).log_odds, kUnsuspected);
+}
+
+TEST(LearntRig, ARigWhoseRowsAlwaysChangeIsNotSaidToTurn) {
+  LearntRig rig = steady(gridSeenWith(Eigen::Vector3d::Zero()));
+  for (int k = 0; k < 100; ++k) {
+    const StereoFeatures features = gridSeenWith(Eigen::Vector3d(0.0, 0.0, 3e-3 * std::sin(0.1 * k)));
+    EXPECT_LT(shown(rig, features).log_odds, logOdds(0.05)) << "pair " << k;
+    learn(rig, features);
+  }
+  EXPECT_GT(shown(rig, gridSeenWith(Eigen::Vector3d(0.0, 0.0, 60e-3))).log_odds, 0.0);
+}
+
+TEST(LearntRig, WhatALateRightImageShowsInATurnIsNoRotation) {
+  const LearntRig rig = steady(gridSeenWith(Eigen::Vector3d::Zero()));
+  const Eigen::Vector3d rate(0.0, 0.0, 2.0);  // rad/s: 3 ms late (calibration/right_delay_sigma) are 6 mrad
+  const StereoFeatures turned = gridSeenWith({0.0, 0.0, 6e-3});
+  EXPECT_GT(shown(rig, turned).log_odds, 0.0);
+  EXPECT_LT(shown(rig, turned, rate).log_odds, logOdds(0.05));
+}
+
+}  // namespace test_learnt_rig
+}  // namespace sdvo
