@@ -17,6 +17,7 @@ int runTool(CLI::App& app, int argc, char** argv, const Work& work) {
     std::cerr << "error: " << what << std::endl;
     return 1;
   };
+  app.set_version_flag("--version", SDVO_VERSION);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
