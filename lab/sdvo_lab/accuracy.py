@@ -101,7 +101,7 @@ def guise_table(work, folder, extra):
 
 
 def robot_table(folder, extra):
-    yield ["drive", "pairs", "t [%]", "r [deg/m]", "not TRACKING", "LOST", "refused"]
+    yield ["drive", "pairs", "t [%]", "r [deg/m]", "not TRACKING", "LOST", "rejected by the rig monitor"]
     for fields in ROBOTS:
         drive = robot(folder, *fields)
         e = measure(drive, extra)
