@@ -49,11 +49,16 @@ def transform_of(vector):
     return T
 
 
+def noise_of_twists():
+    with open(os.path.join(roslib.packages.get_pkg_dir(PACKAGE), 'config', 'robot_localization.yaml')) as noise:
+        return np.reshape(yaml.safe_load(noise)['process_noise_covariance'], (15, 15)).diagonal()[:12]
+
+
 class Filter:
     """x y z, roll pitch yaw in the world; their rates in the base. No accelerations."""
 
-    def __init__(self, recipe):
-        self.recipe = recipe
+    def __init__(self, recipe, noise=NOISE):
+        self.recipe, self.noise = recipe, noise
         self.state, self.covariance, self.stamp = np.zeros(12), np.eye(12) * LEAST, None
         self.first, self.last, self.has_begun = {}, {}, False
         self.accepted, self.rejected = {}, {}
@@ -69,7 +74,7 @@ class Filter:
         if dt > 0.0:
             F = np.array([(self.step(self.state + e, dt) - self.step(self.state - e, dt)) / 2e-6 for e in np.eye(12) * 1e-6]).T
             self.state = self.step(self.state, dt)
-            self.covariance = F @ self.covariance @ F.T + np.diag(NOISE) * dt
+            self.covariance = F @ self.covariance @ F.T + np.diag(self.noise) * dt
         self.stamp = stamp if self.stamp is None or dt > 0.0 else self.stamp
 
     def correct(self, name, kind, first, values, covariance):
@@ -231,7 +236,7 @@ class FilterTest(PipelineCase):
     def test_with_an_imu(self):
         """Of rates alone, with twists, which know nothing of where they begin; as poses relative to their beginning."""
         self.begin(initial_pose='3 -2 0 0 0 0')
-        ekf = Filter(self.recipes[1])
+        ekf, with_default_noise = Filter(self.recipes[1], noise_of_twists()), Filter(self.recipes[1])
         relative = Filter(dict(self.recipes[1], odom0_config=self.recipes[0]['odom0_config'], odom0_relative=True))
         odometry, _ = self.drive(0, 14)
         random = np.random.RandomState(3)
@@ -239,18 +244,21 @@ class FilterTest(PipelineCase):
             imu = Imu(header=message.header)
             imu.angular_velocity.x, imu.angular_velocity.y, imu.angular_velocity.z = random.normal(0.0, 0.002, 3)
             imu.angular_velocity_covariance = np.diag([0.002 ** 2] * 3).ravel().tolist()
-            for each in (ekf, relative):
+            for each in (ekf, relative, with_default_noise):
                 each.take('odom0', message)
                 each.take('imu0', imu)
         self.assertEqual((ekf.rejected, relative.rejected), ({}, {}))
         for each in (ekf, relative):
             self.assert_near(each, self.true_way(ekf.stamp), limit=0.05)
+        sigma, by_default = (np.sqrt(each.covariance[0, 0]) for each in (ekf, with_default_noise))
+        self.assertLess(sigma, 0.03)
+        self.assertGreater(by_default, 5 * sigma, 'what config/robot_localization.yaml is for')
 
     def test_with_wheels_and_gnss(self):
         """The wheels slip; the odometry is lost and begins anew, which a differential pose bridges."""
         recipe = self.recipes[2]
         self.begin()
-        ekf, without = Filter(recipe), Filter(recipe)
+        ekf, without = Filter(recipe, noise_of_twists()), Filter(recipe, noise_of_twists())
         self.drive(0, 8)
         self.drive(self.lose(8), PAIRS)
         random = np.random.RandomState(4)
