@@ -10,31 +10,47 @@ bool Doubt::lasts() const {
   return log_odds_ > kUnsuspected + std::log(2.0);
 }
 
-void Doubt::raise(double log_odds, const std::string& cause) {
-  if (log_odds <= log_odds_) return;
-  log_odds_ = std::min(log_odds, kCertain);
-  cause_ = cause;
+/// Causes exclude each other, so their odds add up.
+void Doubt::raise(double odds, const std::string& cause) {
+  const double unsuspected = std::exp(kUnsuspected);
+  if (!(odds > unsuspected)) return;
+  const auto add = [&](double& log_odds) {
+    log_odds = std::clamp(std::log(std::exp(log_odds) + odds - unsuspected), kUnsuspected, kCertain);
+  };
+  add(log_odds_), add(unrefuted_);
+  if (odds > largest_) largest_ = odds, cause_ = cause;
 }
 
 void Doubt::raise(const std::vector<Evidence>& evidence) {
-  for (const Evidence& each : evidence) raise(each.log_odds, each.cause);
+  for (const Evidence& each : evidence)
+    if (each.lasts) raise(std::exp(each.log_odds), each.cause);
 }
 
-void Doubt::fade() {
+Matrix6d Doubt::fade() {
   // Pairs: half of those that make a point a lasting one, whose agreement is new evidence.
   constexpr double kHalfLife = 0.5 * MotionHypothesis::kLastingSightings;
   log_odds_ = kUnsuspected + (log_odds_ - kUnsuspected) * std::exp2(-1.0 / kHalfLife);
-  if (!lasts()) deviation_.setZero();
+  if (lasts()) return Matrix6d::Zero();
+  const Matrix6d left = probabilityOf(unrefuted_) * isotropic(distance_ * distance_, angle_ * angle_);
+  unrefuted_ = kUnsuspected;
+  distance_ = angle_ = largest_ = 0.0;
+  return left;
 }
 
 Belief Doubt::weigh(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence) {
   const double rivals = 1.0 / found.probability - 1.0, misled = std::exp(logOddsMisled(scene, found));
-  // Lasting points were confirmed before the doubt began.
-  log_odds_ -= lasts() ? logAgreement(scene, found) : 0.0;
-  const Evidence before{log_odds_, cause_};
-  log_odds_ = std::clamp(log_odds_, kUnsuspected, kCertain);
+  if (lasts()) {
+    const double agreement = logAgreement(scene, found);
+    for (double* log_odds : {&log_odds_, &unrefuted_})
+      *log_odds = std::clamp(*log_odds - agreement, kUnsuspected, kCertain);
+  }
+  const double carried = std::exp(log_odds_);
+  const std::string carried_cause = cause_;
+  const auto largest = std::max_element(evidence.begin(), evidence.end(),
+                                        [](const Evidence& a, const Evidence& b) { return a.log_odds < b.log_odds; });
+  double shown = 0.0;
+  for (const Evidence& each : evidence) shown += std::exp(each.log_odds) - std::exp(kUnsuspected);
   raise(evidence);
-  const double shown = log_odds_ > before.log_odds ? std::exp(log_odds_) : 0.0, carried = std::exp(before.log_odds);
 
   Belief belief;
   belief.probability = 1.0 / (1.0 + rivals + misled + shown + carried);
@@ -44,7 +60,6 @@ Belief Doubt::weigh(const MotionScene& scene, const MotionHypothesis& found, con
   const Matrix6d deviation = momentOf(innovation) + expected.covariance;
   const double another = (misled + shown + carried) * belief.probability;
   belief.moment = another * deviation;
-  belief.pose_moment = another * (deviation_ + deviation);
 
   std::ostringstream words;
   if (found.rival && rivals >= std::max({misled, shown, carried})) {
@@ -56,14 +71,18 @@ Belief Doubt::weigh(const MotionScene& scene, const MotionHypothesis& found, con
     words << innovationWords(found) << ": followed with a probability of " << 1.0 - belief.probability
           << " is something else";
   } else {
-    words << (shown >= carried ? cause_ : "a moment ago " + before.cause)
+    words << (shown >= carried ? largest->cause : "a moment ago " + carried_cause)
           << ": the motion is wrong with a probability of " << 1.0 - belief.probability;
   }
   belief.reason = words.str();
-  raise(std::log(rivals + misled), !found.rival || rivals < misled ? "the motion changed faster than a vehicle's can"
-                                   : found.rival->is_torn          ? "the images seemed to be torn or damaged"
-                                                                   : "something else moved in view");
-  if (lasts()) deviation_ += deviation;
+  raise(rivals + misled, !found.rival || rivals < misled ? "the motion changed faster than a vehicle's can"
+                         : found.rival->is_torn          ? "the images seemed to be torn or damaged"
+                                                         : "something else moved in view");
+  // The errors of motions that follow one thing add up.
+  double distance = distance_ + std::sqrt(deviation.topLeftCorner<3, 3>().trace() / 3.0);
+  double angle = angle_ + std::sqrt(deviation.bottomRightCorner<3, 3>().trace() / 3.0);
+  belief.pose_moment = another * isotropic(distance * distance, angle * angle);
+  if (lasts()) distance_ = distance, angle_ = angle;
   return belief;
 }
 

@@ -278,11 +278,11 @@ std::vector<Evidence> VisualOdometry::evidenceAgainst(const Pair& pair, const Mo
   std::vector<Evidence> evidence{{pair.rotation.log_odds, pair.rotation.words()}};
   if (pair.features().report.refused) evidence.push_back({kCertain, "left and right did not belong together"});
   if (pair.is == Pair::kFollowed)
-    evidence.push_back({pair.frozen, "images as of the previous pair, by a stop or a frozen driver"});
+    evidence.push_back({pair.frozen, "images as of the previous pair, by a stop or a frozen driver", true});
   // Unless the camera went unseen, the views may not be of one rigid world, and the next map would be as wrong.
   if (pair.is == Pair::kFollowed && !found.motion.success && found.agreement.matches >= kManyMatches &&
       pair.dt <= options_.tracking.max_gap)
-    evidence.push_back({kCertain, "many matches agreed on no motion"});
+    evidence.push_back({kCertain, "many matches agreed on no motion", true});
   if (!measured) return evidence;
   rig.right_delay.watch(measured->rows, measured->dt, options_.noise.corner * rig.noise.scale());
   const RightCameraDelay::OtherPair other = rig.right_delay.otherPair(measured->dt);
@@ -331,7 +331,7 @@ void VisualOdometry::begin(const Pair& pair, const std::optional<MotionGuess>& g
 /// Takes note of what became of the pair.
 void VisualOdometry::finish(const Pair& pair, Step& step) {
   const StereoFeatures& features = pair.features();
-  state_.doubt.fade();
+  state_.covariance.spread(state_.doubt.fade());
   const auto stood = [&step] {
     const Vector6d motion = logSE3(*step.T_previous_current);
     return mahalanobisSquare(motion, step.covariance) < noiseGate(6);

@@ -9,7 +9,7 @@ namespace test_belief {
 
 Doubt after(double log_odds, const std::string& cause) {
   Doubt doubt;
-  doubt.raise({{log_odds, cause}});
+  doubt.raise({{log_odds, cause, true}});
   return doubt;
 }
 
@@ -20,7 +20,7 @@ TEST(Doubt, FadesByHalves) {
   int doubtful = 0;
   for (; doubt.logOdds() > logOdds(0.05); ++doubtful) doubt.fade();
   EXPECT_EQ(doubtful, 4) << "as many pairs as make a point a lasting one";
-  doubt.raise({{50.0, "anything"}});
+  doubt.raise({{50.0, "anything", true}});
   EXPECT_LE(doubt.logOdds(), kCertain);
 }
 
@@ -54,7 +54,7 @@ TEST_F(Weighed, WhereNothingIsExpectedTheMotionIsAsUncertainAsItIsLong) {
   MotionHypothesis found;
   found.motion.T_current_reference.translation().z() = -2.0;
   Doubt doubt = after(kCertain, "a knock");
-  doubt.raise({{0.0, "less"}});
+  doubt.raise({{0.0, "less", true}});
   const Belief belief = doubt.weigh(scene_, found, {});
   EXPECT_EQ(belief.reason.rfind("a moment ago a knock", 0), 0u) << belief.reason;
   EXPECT_NEAR(belief.probability, 0.001, 1e-4);
@@ -83,13 +83,38 @@ TEST_F(Weighed, LastingPointsTakeADoubtBack) {
   EXPECT_EQ(belief.reason.rfind("a moment ago a knock", 0), 0u) << belief.reason;
 }
 
-TEST_F(Weighed, ADoubtThatLastsIsOneEventOfThePose) {
+TEST_F(Weighed, CausesExcludeEachOtherAndTheirOddsAddUp) {
+  Doubt one, two;
+  const double single = weigh(one, 90, {{1.0, "a knock"}}).probability;
+  EXPECT_NEAR(weigh(two, 90, {{1.0, "a knock"}, {1.0, "a frozen driver"}}).probability, single / (2.0 - single), 0.01);
+}
+
+TEST_F(Weighed, WhatEndsWithThePairLeavesNoDoubt) {
   Doubt doubt;
-  const Belief first = weigh(doubt, 10, {{kCertain, "a knock"}});
-  doubt.fade();
-  const Belief second = weigh(doubt, 10, {{kCertain, "a knock"}});
+  weigh(doubt, 90, {{kCertain, "a right image of another pair"}});
+  EXPECT_FALSE(doubt.lasts());
+}
+
+TEST_F(Weighed, TheErrorsOfADoubtThatLastsAddUp) {
+  Doubt doubt;
+  const Belief first = weigh(doubt, 10, {{kCertain, "a knock", true}});
+  EXPECT_TRUE(doubt.fade().isZero());
+  const Belief second = weigh(doubt, 10, {{kCertain, "a knock", true}});
   EXPECT_NEAR(second.moment(2, 2), first.moment(2, 2), 0.01);
-  EXPECT_NEAR(second.pose_moment(2, 2), 2.0 * first.pose_moment(2, 2), 0.01) << "both motions may be wrong";
+  EXPECT_NEAR(second.pose_moment(2, 2), 4.0 * first.pose_moment(2, 2), 0.1) << "both motions may be wrong alike";
+}
+
+TEST_F(Weighed, ADoubtThatNothingRefutedIsLeftToThePose) {
+  Doubt refuted, faded;
+  Matrix6d of_refuted = Matrix6d::Zero(), of_faded = Matrix6d::Zero();
+  for (Doubt* doubt : {&refuted, &faded}) weigh(*doubt, 10, {{kCertain, "a knock", true}});
+  for (int pair = 0; pair < 20; ++pair) {
+    weigh(refuted, 95);
+    of_refuted += refuted.fade(), of_faded += faded.fade();
+  }
+  EXPECT_NEAR(std::sqrt(of_faded(2, 2)), 2.0, 0.1) << "the length of the doubted motion";
+  EXPECT_LT(of_refuted(2, 2), 0.1);
+  EXPECT_FALSE(refuted.lasts() || faded.lasts());
 }
 
 }  // namespace test_belief

@@ -12,6 +12,7 @@ namespace sdvo {
 struct Evidence {
   double log_odds;
   std::string cause;
+  bool lasts = false;  ///< the next pairs may follow it, too; else it ends with the pair
 };
 
 /// Posterior of a pair's motion.
@@ -24,7 +25,9 @@ struct Belief {
 };
 
 /// The doubt that pairs leave to those after them: log-odds that what is followed is not the camera's motion, or not in
-/// a sound map. It is one event, from the pair that raised it until it has faded or lasting points speak against it.
+/// a sound map. It is one event, from the pair that raised it on. Lasting points, which were confirmed before it, may
+/// refute it. What is followed may also end to be so, after some pairs; then the pose is still off by what was
+/// followed.
 class Doubt {
  public:
   double logOdds() const { return log_odds_; }
@@ -35,15 +38,17 @@ class Doubt {
   Belief weigh(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence);
   /// A pair without a measured motion shows only this.
   void raise(const std::vector<Evidence>& evidence);
-  /// A pair is over: doubt fades.
-  void fade();
+  /// A pair is over. Returns the moment (m and rad) that a doubt leaves to the pose as it ends, zero else.
+  Matrix6d fade();
 
  private:
-  void raise(double log_odds, const std::string& cause);
+  void raise(double odds, const std::string& cause);
 
   double log_odds_ = kUnsuspected;
-  std::string cause_;                      ///< in words, of the largest doubt that lasts
-  Matrix6d deviation_ = Matrix6d::Zero();  ///< second moment of the pose's error if the doubt is right, m and rad
+  double unrefuted_ = kUnsuspected;      ///< the same without the fading
+  std::string cause_;                    ///< in words, of the largest odds since it began
+  double largest_ = 0.0;                 ///< these odds
+  double distance_ = 0.0, angle_ = 0.0;  ///< by which the pose is off if the doubt is right, m and rad
 };
 
 /// The pair's own evidence against its motion.
