@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 #include <sstream>
 #include <stdexcept>
 #include <string>
@@ -50,9 +51,9 @@ void measureImage(const cv::Mat& image, double& mean_intensity, double& sharpnes
   sharpness = static_cast<double>(gradient) / static_cast<double>(std::max<std::int64_t>(pixels, 1));
 }
 
-/// Why there are no features, if there are none.
-std::string wordsOn(const StereoFeatures& features, const std::string& refusal, bool is_too_small) {
-  if (features.report.refused) return refusal;
+/// Why there are no features, or what is wrong with the rig.
+std::string wordsOn(const StereoFeatures& features, const std::string& diagnosis, bool is_too_small) {
+  if (!diagnosis.empty()) return diagnosis;
   if (is_too_small)
     return "every feature is too close to an image border for its descriptor: the image is too small for its size";
   if (features.report.detected == 0)
@@ -117,6 +118,17 @@ void FeatureExtractor::describe(const cv::Mat& left, const cv::Mat& right, const
   features.descriptors = described.rows;
 }
 
+std::vector<StereoMatch> FeatureExtractor::matchAlong(const RowLine& rows, const cv::Mat& left, const cv::Mat& right,
+                                                      const std::vector<cv::Point2f>& positions) const {
+  cv::Mat sheared;
+  const cv::Matx23d there(1.0, 0.0, 0.0, rows.slope, 1.0, rows.at(0.0));
+  cv::warpAffine(right, sheared, there, right.size(), cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
+  std::vector<StereoMatch> matches = stereo_matcher_.match(left, sheared, positions);
+  for (StereoMatch& match : matches)
+    match.dv += static_cast<float>(rows.at(positions[static_cast<std::size_t>(match.left_index)].x - match.disparity));
+  return matches;
+}
+
 StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
                                          std::int64_t stamp, const cv::Mat& mask) const {
   camera.check();
@@ -148,10 +160,17 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
   for (const Corner& corner : corners) positions.push_back(corner.position);
   std::vector<StereoMatch> matches = stereo_matcher_.match(searched_left, searched_right, positions);
   report.stereo_matched = static_cast<int>(matches.size());
-  std::string refusal;  // matches of a rig that is not what it should be are wrong ones
+  RigDiagnosis diagnosis;
   if (rig_monitor_.isSuspicious(report.detected, report.stereo_matched))
-    refusal = rig_monitor_.diagnose(left, right, positions);
-  report.refused = !refusal.empty();
+    diagnosis = rig_monitor_.diagnose(left, right, positions);
+  constexpr double kKnock = 0.0175;  // rad: a degree; images that differ by more are not those of a rectified rig
+  report.refused = !diagnosis.words.empty();
+  if (diagnosis.rows && diagnosis.rows->most() < kKnock * camera.fy) {
+    matches = matchAlong(*diagnosis.rows, searched_left, searched_right, positions);
+    report.stereo_matched = static_cast<int>(matches.size());
+    report.refused = rig_monitor_.isSuspicious(report.detected, report.stereo_matched);
+  }
+  // Those of a rig that is not what it should be are wrong ones.
   if (report.refused) matches.clear();
   report.stereo_time = stopwatch.lap();
 
@@ -163,7 +182,7 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
   report.describe_time = stopwatch.lap();
 
   const bool is_too_small = 2 * border + FeatureDetector::kSmallestSide > std::min(left.rows, left.cols);
-  report.status = wordsOn(features, refusal, is_too_small);
+  report.status = wordsOn(features, diagnosis.words, is_too_small);
   return features;
 }
 

@@ -59,8 +59,8 @@ bool RigMonitor::isSuspicious(int corners, int found) const {
   return options_.enabled && corners >= kEnough && found < options_.suspicious_share * corners;
 }
 
-std::string RigMonitor::diagnose(const cv::Mat& left, const cv::Mat& right,
-                                 const std::vector<cv::Point2f>& corners) const {
+RigDiagnosis RigMonitor::diagnose(const cv::Mat& left, const cv::Mat& right,
+                                  const std::vector<cv::Point2f>& corners) const {
   const BlockSearch search(left, right, max_disparity_, options_.reach);
   std::vector<FoundCorner> found;
   const std::size_t most = static_cast<std::size_t>(options_.corners), step = (corners.size() + most - 1) / most;
@@ -70,23 +70,29 @@ std::string RigMonitor::diagnose(const cv::Mat& left, const cv::Mat& right,
     found.push_back(*corner);
     // A view with little to match is suspicious, too, pair after pair: a few corners clear its rig.
     constexpr std::size_t kAtOnce = 4;
-    if (found.size() % kAtOnce == 0 && isClearlyInOrder(found, left.cols, max_dv_)) return "";
+    if (found.size() % kAtOnce == 0 && isClearlyInOrder(found, left.cols, max_dv_)) return {};
   }
-  if (static_cast<int>(found.size()) < kEnough) return "";
+  if (static_cast<int>(found.size()) < kEnough) return {};
 
   if (swappedShare(found) > 0.6)
-    return "left and right images are swapped, mirrored, or not rectified? Corners lie further right in the right "
-           "image";
+    return {
+        "left and right images are swapped, mirrored, or not rectified? Corners lie further right in the right "
+        "image",
+        {}};
   const auto [slope, offset, scatter] = fitRows(found, left.cols);
   if (scatter > std::max(max_dv_, 0.5 * std::abs(offset)))
-    return text(1, "rows of left and right differ by ", scatter,
-                " px here and there: not rectified, or not taken at the same moment?");
+    return {text(1, "rows of left and right differ by ", scatter,
+                 " px here and there: not rectified, or not taken at the same moment?"),
+            {}};
+  const RowLine rows{offset, slope, left.cols};
   if (std::abs(offset) > max_dv_)
-    return text(1, "right image ", std::abs(offset), " px too ", offset > 0.0 ? "low" : "high", ": not rectified?");
+    return {text(1, "right image ", std::abs(offset), " px too ", offset > 0.0 ? "low" : "high", ": not rectified?"),
+            rows};
   if (0.5 * left.cols * std::abs(slope) > 2.0 * max_dv_)
-    return text(1, "right image turned by ", std::abs(std::atan(slope)) * 180.0 / CV_PI, " degrees ",
-                slope > 0.0 ? "clockwise" : "counterclockwise", ": not rectified?");
-  return "";
+    return {text(1, "right image turned by ", std::abs(std::atan(slope)) * 180.0 / CV_PI, " degrees ",
+                 slope > 0.0 ? "clockwise" : "counterclockwise", ": not rectified?"),
+            rows};
+  return {};
 }
 
 }  // namespace sdvo

@@ -135,6 +135,7 @@ stereo_descriptor_vo::VoInfo toInfo(const OdometryResult& result,
   info.correction_translation = static_cast<float>(result.correction.head<3>().norm());
   info.correction_rotation = static_cast<float>(result.correction.tail<3>().norm());
   info.distance = result.distance;
+  info.probability = static_cast<float>(result.probability);
   info.keyframe_id = static_cast<std::uint32_t>(result.keyframe_id);
   info.disparity_offset = static_cast<float>(result.disparity_offset);
   info.disparity_offset_sigma = static_cast<float>(result.disparity_offset_sigma);

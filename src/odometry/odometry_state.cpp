@@ -88,6 +88,7 @@ OdometryResult OdometryState::report(const StereoFeatures& features, const std::
   result.state = step.state;
   result.reason = step.reason;
   result.stamp = features.stamp;
+  result.probability = step.probability;
   result.epoch = epoch;
   result.dt = step.dt;
   result.distance = distance;

@@ -371,6 +371,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   Step step = measure(features, found, candidate, since);
   const Matrix6d measured = step.covariance;
   judge(scene, found, candidate, belief, step);
+  step.probability = belief.probability;
   const bool is_confirmed = step.state == TrackingState::kTracking;
   // A motion that is likely something else's predicts nothing.
   if (belief.probability >= 0.5)

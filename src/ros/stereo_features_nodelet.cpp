@@ -265,10 +265,14 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   /// What the rig monitor says, when it says something else than before. A pair without features (dark) says nothing.
   void reportRig(const StereoFeatures& features, const ros::Time& stamp) {
     const bool refused = features.report.refused;
-    if (refused == rig_refused_ || (!refused && features.count() == 0) || !throttle_.allows("rig")) return;
-    rig_refused_ = refused;
+    const bool is_wrong = refused || (features.count() > 0 && !features.report.status.empty());
+    if (is_wrong == rig_is_wrong_ || (!is_wrong && features.count() == 0) || !throttle_.allows("rig")) return;
+    rig_is_wrong_ = is_wrong;
     if (refused)
       NODELET_WARN_STREAM("pairs from " << stamp << " on are refused: " << features.report.status);
+    else if (is_wrong)
+      NODELET_WARN_STREAM("pairs from " << stamp << " on are matched along their rows: " << features.report.status
+                                        << " Calibrate the cameras again");
     else
       NODELET_WARN_STREAM("rows of left and right agree again: pairs from " << stamp << " on are used");
   }
@@ -304,7 +308,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   EmitterCheck emitter_;
   int jumps_ = 0;  // back, of the stamps
   std::uint32_t stream_epoch_ = 0;
-  bool rig_refused_ = false;  // as reported last
+  bool rig_is_wrong_ = false;  // as reported last
 
   std::unique_ptr<Worker<PairFilter::Passed>> worker_;
   std::unique_ptr<StereoImageTransport> transport_;

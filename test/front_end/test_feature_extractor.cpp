@@ -106,6 +106,35 @@ TEST(FeatureExtractor, DescribesTheRightViewWhereTheFeatureIs) {
   }
 }
 
+/// A right camera that is pitched or rolled by more than the search takes: rows lie along a line, which leads it.
+TEST(FeatureExtractor, FollowsTheRowsOfARightCameraThatTurned) {
+  const StereoCamera camera = synthetic::camera();
+  const synthetic::Texture texture(33, 6.0, 96.0);
+  const cv::Size size(camera.width, camera.height);
+  const cv::Mat left = synthetic::render(size, [&](double u, double v) { return texture.at(u, v); });
+  struct Rows {
+    double offset, slope;  // px, px for each column
+    bool is_refused;
+    std::string words;
+  };
+  for (const Rows& rows : {Rows{4.0, 0.0, false, "4.0 px too low"}, Rows{0.0, 0.012, false, "0.7 degrees clockwise"},
+                           Rows{9.0, 0.0, true, "9.0 px too low"}}) {
+    const auto line = [&](double u) { return rows.offset + rows.slope * (u - 0.5 * size.width); };
+    const cv::Mat right =
+        synthetic::render(size, [&](double u, double v) { return texture.at(u + 14.0, v - line(u)); });
+    const StereoFeatures features = FeatureExtractor(fewFeatures()).extract(camera, left, right, 0);
+    EXPECT_NE(features.report.status.find(rows.words), std::string::npos) << features.report.status;
+    EXPECT_EQ(features.report.refused, rows.is_refused) << "beyond a degree";
+    EXPECT_EQ(features.count() >= 100, !rows.is_refused);
+    double square = 0.0;
+    for (int i = 0; i < features.count(); ++i) {
+      const double error = features.dv[i] - line(features.u[i] - features.disparity[i]);
+      square += error * error / features.count();
+    }
+    EXPECT_LT(square, 0.1 * 0.1);
+  }
+}
+
 TEST(FeatureExtractor, DetectsWhereTheSmallestDescriptorFits) {
   // A near feature would be larger; what is far away is found as near to the border as its own size allows.
   FeatureExtractorOptions options = fewFeatures();

@@ -38,7 +38,7 @@ std::vector<cv::Point2f> corners() {
 }
 
 std::string diagnosis(const cv::Mat& left, const cv::Mat& right) {
-  return RigMonitor({}, 1.5, 192.0).diagnose(left, right, corners());
+  return RigMonitor({}, 1.5, 192.0).diagnose(left, right, corners()).words;
 }
 
 void expectSaid(const std::string& diagnosis, const std::string& words) {
@@ -76,7 +76,7 @@ TEST(RigMonitor, LooksNoFurtherOnceAFewCornersClearIt) {
       const auto& half = is_left(i) ? left_half : right_half;
       mixed.push_back(half[i % half.size()]);
     }
-    return monitor.diagnose(leftImage(), right, mixed);
+    return monitor.diagnose(leftImage(), right, mixed).words;
   };
   EXPECT_EQ(diagnose([](std::size_t i) { return i < 20; }), "");
   EXPECT_NE(diagnose([](std::size_t i) { return i < 4; }), "") << "four are too few";
@@ -111,7 +111,7 @@ TEST(RigMonitor, SaysNothingWhereNothingIsFound) {
   EXPECT_EQ(diagnosis(dark, dark), "");
   const synthetic::Texture other(99, 5.0, 160.0);
   EXPECT_EQ(diagnosis(leftImage(), synthetic::render(kSize, [&](double u, double v) { return other.at(u, v); })), "");
-  EXPECT_EQ(RigMonitor({}, 1.5, 192.0).diagnose(leftImage(), rightImage(4.0), {}), "");
+  EXPECT_EQ(RigMonitor({}, 1.5, 192.0).diagnose(leftImage(), rightImage(4.0), {}).words, "");
 }
 
 }  // namespace test_rig_monitor

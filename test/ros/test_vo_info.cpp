@@ -24,6 +24,7 @@ TEST(ToInfo, TellsResultAndImageSide) {
   result.correction << 0.03, 0.0, -0.04, 0.0, 0.002, 0.0;
   result.distance = 42.5;
   result.keyframe_id = 17;
+  result.probability = 0.75;
   result.disparity_offset = -0.25;
   result.disparity_offset_sigma = 0.05;
   result.disparity_bend = 1.5;
@@ -54,6 +55,7 @@ TEST(ToInfo, TellsResultAndImageSide) {
   EXPECT_FLOAT_EQ(info.correction_rotation, 0.002f);
   EXPECT_EQ(info.distance, 42.5);
   EXPECT_EQ(info.keyframe_id, 17u);
+  EXPECT_FLOAT_EQ(info.probability, 0.75f);
   EXPECT_FLOAT_EQ(info.disparity_offset, -0.25f);
   EXPECT_FLOAT_EQ(info.disparity_offset_sigma, 0.05f);
   EXPECT_FLOAT_EQ(info.disparity_bend, 1.5f);

@@ -47,7 +47,8 @@ class FeatureExtractor {
 
   /// Images are CV_8U of the camera's size, else std::invalid_argument; so is `mask`, which hides where it is zero what
   /// moves with the robot (empty: the detector's own). A pair in which nothing is found gives an empty
-  /// set whose report says why; so does one that the rig monitor refuses.
+  /// set whose report says why; so does one that the rig monitor refuses. A pair whose rows differ as by a small
+  /// rotation of the right camera has its features, and a report that says so.
   StereoFeatures extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp,
                          const cv::Mat& mask = cv::Mat()) const;
 
@@ -57,6 +58,9 @@ class FeatureExtractor {
   const FeatureExtractorOptions& options() const { return options_; }
 
  private:
+  /// Stereo matches of a rig whose rows differ by a line.
+  std::vector<StereoMatch> matchAlong(const RowLine& rows, const cv::Mat& left, const cv::Mat& right,
+                                      const std::vector<cv::Point2f>& positions) const;
   /// Appends what both views describe of the matched corners.
   void describe(const cv::Mat& left, const cv::Mat& right, const std::vector<Corner>& corners,
                 const std::vector<StereoMatch>& matches, StereoFeatures& features) const;

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <cmath>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +25,24 @@ struct RigMonitorOptions {
   }
 };
 
+/// How much lower the right image shows what the left one does: a straight line over its columns, px. A right camera
+/// that is pitched or rolled by a small angle shows that.
+struct RowLine {
+  double offset = 0.0;  ///< in the middle column
+  double slope = 0.0;   ///< px for each column
+  int columns = 0;      ///< of the image
+
+  double at(double u) const { return offset + slope * (u - 0.5 * columns); }
+  /// Its largest amount in the image.
+  double most() const { return std::abs(offset) + 0.5 * columns * std::abs(slope); }
+};
+
+/// What the monitor found out about a pair.
+struct RigDiagnosis {
+  std::string words;            ///< the likely cause; empty when the rig is in order, or when too little is found to say
+  std::optional<RowLine> rows;  ///< by which they differ, where that is all that is wrong
+};
+
 /// Finds out what is wrong with a rig when few corners are found on their own row at positive disparity. It searches
 /// for them in all directions of the right image, blind to gain and brightness, and takes some milliseconds. Stateless.
 class RigMonitor {
@@ -33,9 +53,9 @@ class RigMonitor {
   /// Whether so few of the corners were found that the rig is worth a look.
   bool isSuspicious(int corners, int found) const;
 
-  /// The likely cause in words; empty when the rig is in order, or when too little is found to say (dark, covered or
-  /// out of focus). Images are CV_8U of one size. Corners that come first are looked at first.
-  std::string diagnose(const cv::Mat& left, const cv::Mat& right, const std::vector<cv::Point2f>& corners) const;
+  /// Too little to say is found where the view is dark, covered or out of focus. Images are CV_8U of one size. Corners
+  /// that come first are looked at first.
+  RigDiagnosis diagnose(const cv::Mat& left, const cv::Mat& right, const std::vector<cv::Point2f>& corners) const;
 
  private:
   RigMonitorOptions options_;

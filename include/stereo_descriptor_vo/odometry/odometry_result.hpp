@@ -29,7 +29,9 @@ struct OdometryResult {
   TrackingState state = TrackingState::kWaiting;
   std::string reason;      ///< in words, for every state but plain tracking
   std::int64_t stamp = 0;  ///< of the left image, ns
-  int epoch = 0;           ///< one more after every discontinuity of the pose
+  /// That the measured motion is the camera's; NaN where none was measured.
+  double probability = std::numeric_limits<double>::quiet_NaN();
+  int epoch = 0;  ///< one more after every discontinuity of the pose
 
   bool has_pose = false;  ///< false while waiting or lost: nothing may be published then
   Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();  ///< origin: the first left camera

@@ -2,6 +2,7 @@
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -25,6 +26,7 @@ namespace sdvo {
 struct OdometryStep {
   TrackingState state = TrackingState::kWaiting;
   std::string reason;
+  double probability = std::numeric_limits<double>::quiet_NaN();  ///< that a measured motion is the camera's
   std::optional<Eigen::Isometry3d> T_previous_current;
   Matrix6d covariance = Matrix6d::Zero();  ///< of that motion
   Vector6d correction = Vector6d::Zero();  ///< the part of it that the map corrects
