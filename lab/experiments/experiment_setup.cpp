@@ -20,7 +20,7 @@ const std::vector<SetupDifference>& otherDifferences() {
   static const std::vector<SetupDifference> differences = {
       {"spacing 4 px", {"detector/min_spacing=4"}, {}},
       {"inside the image", {"descriptor/extend_border=false"}, {}},
-      {"strong corners", {"detector/fast_min_threshold=12"}, {}},
+      {"strong corners", {"detector/min_contrast=28"}, {}},
   };
   return differences;
 }
@@ -42,7 +42,7 @@ PipelineOptions ExperimentSetup::options() const {
   const auto read = [this](bool freak) {
     // A loose threshold, as in the paper: weak corners belong to the large feature sets.
     std::vector<std::string> all = {"stereo_features/detector/max_features=5000", "detector/area_per_feature=0",
-                                    "detector/fast_min_threshold=3", "detector/corner_quality=0.0002"};
+                                    "detector/min_contrast=6", "detector/corner_quality=0.0002"};
     if (setup == Setup::kPaper)
       for (const SetupDifference& difference : paperDifferences())
         if (freak || !difference.of_freak) all.insert(all.end(), difference.with.begin(), difference.with.end());

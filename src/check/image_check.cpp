@@ -103,7 +103,7 @@ Finding ImageCheck::texture(int min_corners, double min_share) const {
   const std::string what = text(0, quantile(corners_, 0.5), " corners, 90 % of the pairs have more than ", few, "; ",
                                 100.0 * share, " % are found in the right image");
   if (quantile(corners_, 0.5) < min_corners)
-    return {step, Verdict::kFail, what, "focus, light, or a scene with texture; a lower detector/fast_min_threshold"};
+    return {step, Verdict::kFail, what, "focus, light, or a scene with texture; a lower detector/min_contrast"};
   if (few < min_corners) return {step, Verdict::kWarn, what, "some views have hardly any texture"};
   if (share < min_share)
     return {step, Verdict::kWarn, what,

@@ -17,6 +17,7 @@
 #include <utility>
 
 #include "../common/text.hpp"
+#include "image_noise.hpp"
 #include "opencv_features.hpp"
 #include "stereo_descriptor_vo/front_end/fast_corners.hpp"
 
@@ -57,18 +58,17 @@ std::vector<Corner> toCorners(const std::vector<cv::KeyPoint>& keypoints) {
 
 /// The score of a FAST corner is the highest threshold at which it still is one. One pass at the lowest threshold,
 /// ranked by score inside each bucket, therefore equals running every bucket at its own adaptive threshold.
-std::vector<Corner> detectFast(const cv::Mat& image, const FeatureDetectorOptions& options) {
-  return toCorners(findFastCorners(image, options.fast_min_threshold));
+std::vector<Corner> detectFast(const cv::Mat& image, int threshold) {
+  return toCorners(findFastCorners(image, threshold));
 }
 
 /// Detectors of OpenCV's with a scale space of their own: positions and scores are taken, the sizes come from the
 /// depth. More are asked for than wanted, so that the buckets have a choice.
 constexpr int kChoice = 4;
 
-std::vector<Corner> detectOrb(const cv::Mat& image, const FeatureDetectorOptions& options) {
+std::vector<Corner> detectOrb(const cv::Mat& image, const FeatureDetectorOptions& options, int threshold) {
   std::vector<cv::KeyPoint> keypoints;
-  cv::ORB::create(kChoice * options.max_features, 1.2f, 8, 31, 0, 2, cv::ORB::HARRIS_SCORE, 31,
-                  options.fast_min_threshold)
+  cv::ORB::create(kChoice * options.max_features, 1.2f, 8, 31, 0, 2, cv::ORB::HARRIS_SCORE, 31, threshold)
       ->detect(image, keypoints);
   return toCorners(keypoints);
 }
@@ -104,14 +104,15 @@ std::vector<Corner> detectGradientCorners(const cv::Mat& image, const FeatureDet
   return corners;
 }
 
-std::vector<Corner> detectAll(const cv::Mat& image, const FeatureDetectorOptions& options) {
+/// `threshold`: least contrast, grey levels, of detectors that have such a limit.
+std::vector<Corner> detectAll(const cv::Mat& image, const FeatureDetectorOptions& options, int threshold) {
   switch (options.type) {
     case DetectorType::kFast:
-      return detectFast(image, options);
+      return detectFast(image, threshold);
     case DetectorType::kGftt:
       return detectGradientCorners(image, options);
     case DetectorType::kOrb:
-      return detectOrb(image, options);
+      return detectOrb(image, options, threshold);
     case DetectorType::kSift:
       return detectSift(image, options);
   }
@@ -276,10 +277,20 @@ std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border, co
   CV_Assert(image.type() == CV_8UC1);
   const cv::Rect inner(border, border, image.cols - 2 * border, image.rows - 2 * border);
   if (inner.width < kSmallestSide || inner.height < kSmallestSide) return {};
-  std::vector<Corner> corners = detectAll(image(inner), options_);
-  for (Corner& corner : corners) corner.position += cv::Point2f(inner.tl());
+  const std::size_t wanted = static_cast<std::size_t>(largestCount(image.size(), options_));
   const cv::Mat& valid = mask.empty() ? mask_ : mask;
-  if (!valid.empty()) removeMasked(valid, image.size(), corners);
+  const auto find = [&](double contrast) {
+    std::vector<Corner> corners = detectAll(image(inner), options_, std::max(cvRound(contrast), 1));
+    for (Corner& corner : corners) corner.position += cv::Point2f(inner.tl());
+    if (!valid.empty()) removeMasked(valid, image.size(), corners);
+    return corners;
+  };
+  // Weaker ones where there are too few. At 2.5 sigma noise alone has a corner in 700 px, at twice that next to none.
+  constexpr int kHalvings = 2;
+  const bool has_limit = options_.type == DetectorType::kFast || options_.type == DetectorType::kOrb;
+  double contrast = has_limit ? options_.min_contrast * noiseOf(image(inner)) : 0.0;
+  std::vector<Corner> corners = find(contrast);
+  for (int i = 0; i < kHalvings && has_limit && corners.size() < wanted; ++i) corners = find(contrast *= 0.5);
   corners = keepApart(std::move(corners), options_.min_spacing);
   corners = spreadOverBuckets(corners, image.size(), options_.bucket_size, largestCount(image.size(), options_));
   if (options_.subpixel) refine(image, options_, corners);

@@ -99,6 +99,31 @@ TEST(EpipolarMatcher, BrightnessAndContrastOfTheViewsMayDiffer) {
   EXPECT_NEAR(found->x, 10.0, 0.1);
 }
 
+/// A twentieth of the light leaves a dozen grey levels. Noise that is as large as they are leaves nothing to align.
+TEST(EpipolarMatcher, WhatIsFlatFollowsTheNoiseAndNotTheLight) {
+  const synthetic::Texture texture(3, 20.0, 90.0);
+  const auto pair = [&](double light, double sigma) {
+    cv::RNG random(8);
+    const auto view = [&](double d) {
+      return synthetic::render(
+          kSize, [&](double u, double v) { return light * texture.at(u + d, v) + random.gaussian(sigma); });
+    };
+    return Pair{view(0.0), view(10.0)};
+  };
+  const auto found = [&](const Pair& images) {
+    int right = 0;
+    for (float u = 60.f; u < 280.f; u += 10.f) {
+      const auto corner = find(images, {u, 80.f});
+      right += corner && std::abs(corner->x - 10.f) < 0.5f;
+    }
+    return right;
+  };
+  EXPECT_EQ(found(pair(1.0, 0.3)), 22);
+  EXPECT_GE(found(pair(0.05, 0.0)), 20);
+  EXPECT_GE(found(pair(0.15, 0.3)), 20);
+  EXPECT_LE(found(pair(0.05, 8.0)), 2);
+}
+
 /// A strip that repeats itself.
 TEST(EpipolarMatcher, RefusesWhatLooksTheSameElsewhereOnTheRow) {
   constexpr int kPeriod = 40;

@@ -269,7 +269,6 @@ TEST(FeatureDetector, KeepsFewerInASmallImage) {
 
   options.max_features = 5000;
   options.subpixel = false;
-  options.fast_min_threshold = 1;
   const cv::Mat image = unevenTexture();
   EXPECT_EQ(FeatureDetector(options).detect(image).size(), 800u);
   options.area_per_feature = 0;
@@ -362,13 +361,39 @@ TEST(FeatureDetector, RefusesOptionsOutOfRange) {
   EXPECT_THROW(FeatureDetector{options}, std::invalid_argument);
 }
 
+/// The scene at a share of its contrast, with noise of `sigma` grey levels.
+cv::Mat inLight(double light, double sigma) {
+  const synthetic::Texture texture(3, 6.0, 24.0);
+  cv::RNG random(5);
+  return synthetic::render(
+      kSize, [&](double u, double v) { return 128.0 + light * (texture.at(u, v) - 128.0) + random.gaussian(sigma); });
+}
+
+TEST(FeatureDetector, WeakestCornerFollowsTheNoiseAndNotTheLight) {
+  FeatureDetectorOptions options;
+  options.max_features = 300;
+  for (const auto& [light, sigma] : std::vector<std::pair<double, double>>{{1.0, 0.3}, {0.15, 0.3}, {1.0, 2.0}}) {
+    const std::vector<Corner> corners = FeatureDetector(options).detect(inLight(light, sigma));
+    EXPECT_EQ(corners.size(), 300u) << light << " " << sigma;
+    for (const Corner& corner : corners) EXPECT_GE(corner.response, 4.9 * sigma) << light << " " << sigma;
+  }
+}
+
+/// However strong it is: at most a corner in 500 px.
+TEST(FeatureDetector, NoiseAloneHasFewCorners) {
+  FeatureDetectorOptions options;
+  options.max_features = 3000;
+  for (const double sigma : {2.0, 4.0, 16.0})
+    EXPECT_LT(FeatureDetector(options).detect(inLight(0.0, sigma)).size(), 480u) << sigma;
+}
+
 class EveryDetector : public testing::TestWithParam<const char*> {
  protected:
   static FeatureDetectorOptions options() {
     FeatureDetectorOptions options;
     options.type = valueOf<DetectorType>(GetParam());
     options.bucket_size = kBucket;
-    options.fast_min_threshold = 5;
+    options.min_contrast = 5.0;
     options.corner_quality = 1e-6;
     return options;
   }

@@ -51,6 +51,7 @@ class EpipolarMatcher {
 
   EpipolarMatcherOptions options_;
   double max_dv_;
+  double noise_;  ///< of the left image, grey levels
   const Images& images_;
 };
 

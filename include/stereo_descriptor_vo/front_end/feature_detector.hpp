@@ -21,7 +21,7 @@ struct FeatureDetectorOptions {
   int area_per_feature = 256;
   int bucket_size = 50;
   double min_spacing = 0.0;
-  int fast_min_threshold = 12;
+  double min_contrast = 10.0;
   double corner_quality = 0.002;
   int corner_block_size = 5;
   bool subpixel = true;
@@ -38,8 +38,8 @@ struct FeatureDetectorOptions {
     list.add("bucket_size", bucket_size, {8, 4096}, "px", "side of the square buckets that share the corners evenly");
     list.add("min_spacing", min_spacing, {0.0, 100.0}, "px",
              "corners nearer than this to a stronger one are left out; 0: none is");
-    list.add("fast_min_threshold", fast_min_threshold, {1, 100}, "grey levels",
-             "fast, orb: weakest corner considered; each bucket's own threshold adapts upwards from here");
+    list.add("min_contrast", min_contrast, {1.0, 100.0}, "sigma of the image's noise",
+             "fast, orb: weakest corner considered; down to a quarter of it where there are too few");
     list.add("corner_quality", corner_quality, {1e-6, 1.0}, "", "gftt: weakest response relative to the best");
     list.add("corner_block_size", corner_block_size, {3, 31}, "px", "gftt: window of the gradient matrix");
     list.add("subpixel", subpixel, "fast, gftt: refine corners to sub-pixel positions");

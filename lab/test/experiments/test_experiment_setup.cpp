@@ -16,7 +16,7 @@ TEST(ExperimentSetup, ProductHasTheNodeletsDefaultsAndMoreCorners) {
   EXPECT_GT(detector.max_features, 2 * 2320);
   detector.max_features = defaults.stereo_features.detector.max_features;
   detector.area_per_feature = defaults.stereo_features.detector.area_per_feature;
-  detector.fast_min_threshold = defaults.stereo_features.detector.fast_min_threshold;
+  detector.min_contrast = defaults.stereo_features.detector.min_contrast;
   detector.corner_quality = defaults.stereo_features.detector.corner_quality;
   EXPECT_EQ(hashOf(product), hashOf(defaults));
 }

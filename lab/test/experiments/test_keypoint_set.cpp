@@ -105,7 +105,7 @@ TEST_P(FeatureSetSize, IsTheWantedOneWithinFivePercent) {
   detector.type = valueOf<DetectorType>(GetParam());
   detector.max_features = 12000;
   detector.area_per_feature = 0;
-  detector.fast_min_threshold = 3;
+  detector.min_contrast = 6.0;
   detector.corner_quality = 0.0002;
   const KeypointSet set = findKeypoints(sequence, 10, detector, {});
   for (const int wanted : {310, 1350, 2320}) {
