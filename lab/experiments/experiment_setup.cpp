@@ -41,8 +41,8 @@ std::vector<Ablation> ablations() {
 PipelineOptions ExperimentSetup::options() const {
   const auto read = [this](bool freak) {
     // A loose threshold, as in the paper: weak corners belong to the large feature sets.
-    std::vector<std::string> all = {"stereo_features/detector/max_features=5000", "detector/area_per_feature=0",
-                                    "detector/min_contrast=6", "detector/corner_quality=0.0002"};
+    std::vector<std::string> all = {"stereo_features/detector/max_features=5000", "detector/min_contrast=6",
+                                    "detector/corner_quality=0.0002"};
     if (setup == Setup::kPaper)
       for (const SetupDifference& difference : paperDifferences())
         if (freak || !difference.of_freak) all.insert(all.end(), difference.with.begin(), difference.with.end());

@@ -126,7 +126,7 @@ def growth(folder):
     yield ["corners", *(cell for name in ("KITTI 06", "MH_01_half") for cell in (f"{name} [millions]", "t [%]", "r [deg/m]"))]
     chosen = [drives.recorded("kitti", "06"), drives.recorded("euroc", "MH_01_half", folder)]
     for count in (300, 450, 600, 1100):
-        row, setting = [count], ["--param", f"detector/max_features={count}", "--param", "detector/area_per_feature=0"]
+        row, setting = [count], ["--param", f"detector/max_features={count}"]
         for drive in chosen:
             mean = odometry.errors(drive.truth, odometry.run(drive.directory, *setting).poses, drive.lengths)["mean"]
             millions = sum(statistics.mean(counted(drive, side, *setting)) * 1e-6 for side in SIDES)

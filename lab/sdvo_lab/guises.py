@@ -161,6 +161,8 @@ GUISES = {
     "mirrored": flipped("x"), "upside_down": flipped("xy"),
     "half": half, "middle_70": middle_70,
     "dark_noise": grey_levels(0.4, 0, 3), "saturated": grey_levels(1.8, 20, 0),
+    "light_15": grey_levels(0.15, 0, 0), "light_5": grey_levels(0.05, 0, 0),
+    "noise": grey_levels(1, 0, 2), "light_15_noise": grey_levels(0.15, 0, 2), "light_5_noise": grey_levels(0.05, 0, 2),
 }
 
 

@@ -40,7 +40,6 @@ std::vector<std::array<float, Freak::kFields>> sampleKeypoints(const std::vector
                                                                std::uint32_t seed) {
   sdvo::FeatureDetectorOptions options;
   options.max_features = per_image;
-  options.area_per_feature = 0;
   const sdvo::FeatureDetector detector(options);
   std::mt19937 random(seed);
   std::vector<std::array<float, Freak::kFields>> samples;

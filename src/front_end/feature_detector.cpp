@@ -170,13 +170,6 @@ constexpr auto isStronger = [](const Corner& a, const Corner& b) {
 
 }  // namespace
 
-int largestCount(cv::Size size, const FeatureDetectorOptions& options) {
-  // MH_01_half at half size (188x120 px): with 133 corners nine pairs of 150 are not TRACKING, with 400 none is.
-  constexpr int kEnough = 400;  // corners
-  if (options.area_per_feature == 0) return options.max_features;
-  return std::min(options.max_features, std::max(kEnough, size.area() / options.area_per_feature));
-}
-
 std::vector<Corner> keepApart(std::vector<Corner> corners, double min_spacing) {
   if (min_spacing <= 0.0 || corners.empty()) return corners;
   std::sort(corners.begin(), corners.end(), isStronger);
@@ -277,7 +270,7 @@ std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border, co
   CV_Assert(image.type() == CV_8UC1);
   const cv::Rect inner(border, border, image.cols - 2 * border, image.rows - 2 * border);
   if (inner.width < kSmallestSide || inner.height < kSmallestSide) return {};
-  const std::size_t wanted = static_cast<std::size_t>(largestCount(image.size(), options_));
+  const std::size_t wanted = static_cast<std::size_t>(options_.max_features);
   const cv::Mat& valid = mask.empty() ? mask_ : mask;
   const auto find = [&](double contrast) {
     std::vector<Corner> corners = detectAll(image(inner), options_, std::max(cvRound(contrast), 1));
@@ -285,14 +278,14 @@ std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border, co
     if (!valid.empty()) removeMasked(valid, image.size(), corners);
     return corners;
   };
-  // Weaker ones where there are too few. At 2.5 sigma noise alone has a corner in 700 px, at twice that next to none.
-  constexpr int kHalvings = 2;
+  // Weaker ones where there are too few. At 2.25 sigma noise alone has a corner in 300 px, at 1 sigma in 20.
   const bool has_limit = options_.type == DetectorType::kFast || options_.type == DetectorType::kOrb;
-  double contrast = has_limit ? options_.min_contrast * noiseOf(image(inner)) : 0.0;
+  const int halvings = has_limit ? 2 : 0;
+  double contrast = options_.min_contrast * noiseOf(image(inner));
   std::vector<Corner> corners = find(contrast);
-  for (int i = 0; i < kHalvings && has_limit && corners.size() < wanted; ++i) corners = find(contrast *= 0.5);
+  for (int i = 0; i < halvings && corners.size() < wanted; ++i) corners = find(contrast *= 0.5);
   corners = keepApart(std::move(corners), options_.min_spacing);
-  corners = spreadOverBuckets(corners, image.size(), options_.bucket_size, largestCount(image.size(), options_));
+  corners = spreadOverBuckets(corners, image.size(), options_.bucket_size, options_.max_features);
   if (options_.subpixel) refine(image, options_, corners);
   return corners;
 }

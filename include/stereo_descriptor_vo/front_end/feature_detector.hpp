@@ -18,10 +18,9 @@ inline const std::vector<std::string>& namesOf(DetectorType) {
 struct FeatureDetectorOptions {
   DetectorType type = DetectorType::kFast;
   int max_features = 600;
-  int area_per_feature = 256;
   int bucket_size = 50;
   double min_spacing = 0.0;
-  double min_contrast = 10.0;
+  double min_contrast = 9.0;
   double corner_quality = 0.002;
   int corner_block_size = 5;
   bool subpixel = true;
@@ -31,10 +30,6 @@ struct FeatureDetectorOptions {
   void describe(OptionList& list) {
     list.add("type", type, "corner detector");
     list.add("max_features", max_features, {1, 20000}, "", "corners kept per left image");
-    list.add(
-        "area_per_feature", area_per_feature, {0, 10000}, "px^2",
-        "an image with less than this area for each keeps fewer corners, but at least 400; 256: the area of a 16x16 "
-        "px patch, as neighbours that share pixels share errors; 0: max_features alone");
     list.add("bucket_size", bucket_size, {8, 4096}, "px", "side of the square buckets that share the corners evenly");
     list.add("min_spacing", min_spacing, {0.0, 100.0}, "px",
              "corners nearer than this to a stronger one are left out; 0: none is");
@@ -56,9 +51,6 @@ struct Corner {
   float response;        ///< detector's own score, comparable within one image only
 };
 
-/// Corners to keep of a whole image of `size`: `max_features`, or fewer by `area_per_feature`.
-int largestCount(cv::Size size, const FeatureDetectorOptions& options);
-
 /// Finds corners and spreads them evenly over the image. Stateless: the same image gives the same corners.
 class FeatureDetector {
  public:
@@ -67,7 +59,7 @@ class FeatureDetector {
 
   static constexpr int kSmallestSide = 16;  ///< px within the border: less is no image for the detectors
 
-  /// Corners of a CV_8U image, at most `largestCount`. They lie at least `border` px away from the image's borders and
+  /// Corners of a CV_8U image, at most `max_features`. They lie at least `border` px away from the image's borders and
   /// outside of the mask's zeros, but for what the refinement moves them by. `mask` is CV_8U, or empty for the one of
   /// the options. Throws std::invalid_argument when the mask has another type, or another size than the image.
   std::vector<Corner> detect(const cv::Mat& image, int border = 0, const cv::Mat& mask = cv::Mat()) const;

@@ -15,7 +15,6 @@ TEST(ExperimentSetup, ProductHasTheNodeletsDefaultsAndMoreCorners) {
   FeatureDetectorOptions& detector = product.stereo_features.detector;
   EXPECT_GT(detector.max_features, 2 * 2320);
   detector.max_features = defaults.stereo_features.detector.max_features;
-  detector.area_per_feature = defaults.stereo_features.detector.area_per_feature;
   detector.min_contrast = defaults.stereo_features.detector.min_contrast;
   detector.corner_quality = defaults.stereo_features.detector.corner_quality;
   EXPECT_EQ(hashOf(product), hashOf(defaults));

@@ -104,7 +104,6 @@ TEST_P(FeatureSetSize, IsTheWantedOneWithinFivePercent) {
   FeatureDetectorOptions detector;
   detector.type = valueOf<DetectorType>(GetParam());
   detector.max_features = 12000;
-  detector.area_per_feature = 0;
   detector.min_contrast = 6.0;
   detector.corner_quality = 0.0002;
   const KeypointSet set = findKeypoints(sequence, 10, detector, {});
