@@ -7,5 +7,5 @@ COPY --chown=user . /home/user/stereo_descriptor_vo
 USER user
 WORKDIR /home/user/stereo_descriptor_vo
 # All that takes long once, while the image is made: the demo itself finds it done.
-RUN scripts/install_dependencies && scripts/build
+RUN scripts/install_dependencies && scripts/build stereo_descriptor_vo_demo
 CMD ["scripts/demo"]
