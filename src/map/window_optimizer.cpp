@@ -99,7 +99,7 @@ class Solver {
   /// Also gives the square of each observation's residual.
   double cost(const Estimate& estimate, std::vector<double>& squares) {
     squares.resize(window_->observations.size());
-    const WindowProjection projection(window_->camera, estimate.calibration);
+    const WindowProjection projection = {window_->camera, estimate.calibration};
     placeAnchors(estimate);
     for (std::size_t p = 0; p < estimate.points.size(); ++p)
       squareResiduals(projection, observedPoint(estimate, p), squares.data() + first_of_point_[p]);
@@ -109,7 +109,8 @@ class Solver {
   /// In the memory that the system has of an earlier linearisation.
   void linearise(const Estimate& estimate, double damping, ReducedSystem& system) {
     eliminatePoints(estimate, {bend(), damping}, system);
-    equations_.copyTo(system.hessian, system.gradient);
+    system.hessian = equations_.hessian();
+    system.gradient = equations_.gradient();
     const CalibrationBelief& prior = window_->calibration_prior;
     system.hessian.bottomRightCorner<kCalibration, kCalibration>() += prior.information;
     system.gradient.tail<kCalibration>() += prior.information * (prior.mean - estimate.calibration.value);
@@ -142,7 +143,8 @@ class Solver {
   bool covariances(const Estimate& estimate, const std::vector<double>& squares, const std::vector<int>& poses,
                    ReducedSystem& system, WindowSolution& solution) {
     const RigCalibration::Matrix certain = certainInformation();
-    equations_.copyTo(system.hessian, system.gradient);
+    system.hessian = equations_.hessian();
+    system.gradient = equations_.gradient();
     known_.setZero(size_, size_);  // without the points
     known_.bottomRightCorner<kCalibration, kCalibration>() = certain;
     if (window_->floor) holdToFloor(estimate, known_, system.gradient);
@@ -233,12 +235,8 @@ class Solver {
       const EliminatedPoint& point = system.points[p];
       Vector6d& moved = clusters_[index(estimate.points[p].y()) * kSide + index(estimate.points[p].x())];
       moved += by.rightCols<kCalibration>().lazyProduct(point.calibration_gradient);
-      for (const PoseFactor* end = observation + point.factors; observation != end; ++observation) {
-        const double *t = observation->gradient.translation, *r = observation->gradient.rotation;
-        const auto pose = by.middleCols<6>(6 * observation->pose);
-        moved += pose.col(0) * t[0] + pose.col(1) * t[1] + pose.col(2) * t[2] +  //
-                 pose.col(3) * r[0] + pose.col(4) * r[1] + pose.col(5) * r[2];
-      }
+      for (const PoseFactor* end = observation + point.factors; observation != end; ++observation)
+        moved += by.middleCols<6>(6 * observation->pose).lazyProduct(observation->gradient);
     }
     double sum = 0.0;
     for (const Vector6d& moved : clusters_) sum += moved.squaredNorm();
@@ -250,7 +248,7 @@ class Solver {
     system.factors.resize(window_->observations.size());
     squares_.resize(window_->observations.size());
     equations_.setZero(poses_);
-    const WindowProjection projection(window_->camera, estimate.calibration);
+    const WindowProjection projection = {window_->camera, estimate.calibration};
     placeAnchors(estimate);
     PoseFactor* factors = system.factors.data();
     for (std::size_t p = 0; p < estimate.points.size(); ++p) {

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <vector>
 
+#include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 #include "stereo_descriptor_vo/map/window_optimizer.hpp"
 #include "stereo_descriptor_vo/motion/rig_calibration.hpp"
@@ -11,13 +12,10 @@ namespace sdvo {
 
 constexpr int kCalibration = RigCalibration::kParameters;
 
-/// How all points of a window are seen; the fourth numbers are zero.
-struct alignas(32) WindowProjection {
-  double focal[4];   ///< (fx, fy, fx * baseline), px, px, px m
-  double centre[4];  ///< (cx, cy, the disparity's error in the centre), px
-  double bend;       ///< of that error, px
-
-  WindowProjection(const StereoCamera& camera, const RigCalibration& calibration);
+/// How all points of a window are seen.
+struct WindowProjection {
+  StereoCamera camera;
+  RigCalibration calibration;
 };
 
 /// A point of a window with all its observations, one at least.
@@ -35,26 +33,19 @@ constexpr double kBehindSquare = 1e4;
 /// Squares of the observations' normalised residuals; kBehindSquare where the point is not in front of the camera.
 void squareResiduals(const WindowProjection& projection, const ObservedPoint& point, double* squares);
 
-/// Two halves of something that a pose's perturbation has six of, each in a register's room; the fourth numbers mean
-/// nothing.
-struct alignas(32) PoseVector {
-  double translation[4], rotation[4];
-};
-
-/// Derivatives of an observation by its pose and its point, in three columns: products of these are what the
-/// elimination of the point takes away.
+/// An observation's entries in the normal equations, by its pose (left perturbation: m, rad).
 struct PoseFactor {
-  PoseVector Y[3];
-  PoseVector gradient;  ///< the observation's part of the pose's, less what the point explains
-  int pose;             ///< which of the poses that may move, from zero on
+  Eigen::Matrix<double, 6, 3> Y;  ///< J_pose^T W J_point R^T: products of these are the Schur complement
+  Vector6d gradient;              ///< its share of the reduced gradient
+  int pose;                       ///< among the poses that may move, from zero on
 };
 
-/// A point's own normal equations H x = g, as R = L^-1 of H = L L^T, and what else it is in, times R^T.
+/// A point's own normal equations H x = g, as R = L^-1 of H = L L^T, and the calibration's entries, times R^T.
 struct EliminatedPoint {
   Eigen::Matrix3d R;
   Eigen::Vector3d gradient;
   Eigen::Matrix<double, kCalibration, 3> by_calibration;
-  RigCalibration::Vector calibration_gradient;  ///< the point's part of it
+  RigCalibration::Vector calibration_gradient;  ///< the point's share of the reduced gradient
   int factors;                                  ///< observations in front of a camera that may move
   int observations;                             ///< in front of any camera
 
@@ -67,7 +58,7 @@ struct EliminatedPoint {
 /// A residual's square s costs bend * log(1 + s / bend) and weighs 1 / (1 + s / bend) in the normal equations.
 struct Linearisation {
   double bend;
-  double damping = 0.0;  ///< share of its diagonal that is added to a point's H
+  double damping = 0.0;  ///< fraction of its diagonal that is added to a point's H
 };
 
 /// Moves points (ray and inverse depth) to where they fit best after a step of poses and calibration. The step has six
@@ -81,28 +72,18 @@ class PoseEquations {
  public:
   void setZero(int poses);
 
-  /// Adds what a point's observations say, and takes away what the point itself can explain of it (Schur complement).
-  /// Also gives a factor for each observation from a pose that may move, and the squares that squareResiduals() gives.
+  /// Adds a point's observations with the point eliminated (Schur complement). Also gives a factor for each observation
+  /// from a pose that may move, and the squares that squareResiduals() gives.
   EliminatedPoint add(const WindowProjection& projection, const ObservedPoint& point,
                       const Linearisation& linearisation, PoseFactor* factors, double* squares);
 
-  /// `hessian`: its lower triangle. The poses by their left perturbations (m, rad), then the calibration.
-  void copyTo(Eigen::MatrixXd& hessian, Eigen::VectorXd& gradient) const;
-
-  /// Of two poses. Only that which is not above the diagonal of all is filled.
-  struct Block {
-    PoseVector columns[6];
-  };
-  /// A pose with the calibration's two numbers, and its gradient.
-  struct Border {
-    PoseVector columns[3];
-  };
+  /// The lower triangle, of the poses by their left perturbations (m, rad), then the calibration.
+  const Eigen::MatrixXd& hessian() const { return hessian_; }
+  const Eigen::VectorXd& gradient() const { return gradient_; }
 
  private:
-  std::vector<Block> blocks_;    ///< row by row
-  std::vector<Border> borders_;  ///< for each pose
-  RigCalibration::Matrix calibration_hessian_;
-  RigCalibration::Vector calibration_gradient_;
+  Eigen::MatrixXd hessian_;
+  Eigen::VectorXd gradient_;
 };
 
 }  // namespace sdvo
