@@ -6,7 +6,6 @@ const std::vector<SetupDifference>& paperDifferences() {
   // The paper fits its sizes to matching alone; these find most matches of FREAK on drives that are not reported.
   static const std::vector<SetupDifference> differences = {
       {"whole pixels", {"detector/subpixel=false"}, {"detector/subpixel=true"}},
-      {"tracking", {"stereo/method=lk"}, {"stereo/method=epipolar"}},
       {"orientation", {"descriptor/oriented=true"}, {"descriptor/oriented=false"}},
       {"sizes for matching",
        {"size_curve/slope=0.7", "size_curve/min_size=14", "size_curve/max_size=60"},

@@ -170,6 +170,10 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
     report.stereo_matched = static_cast<int>(matches.size());
     report.refused = rig_monitor_.isSuspicious(report.detected, report.stereo_matched);
   }
+  if (diagnosis.too_near) {
+    matches = stereo_matcher_.match(searched_left, searched_right, positions, 0.5 * left.cols);
+    report.stereo_matched = static_cast<int>(matches.size());
+  }
   // Those of a rig that is not what it should be are wrong ones.
   if (report.refused) matches.clear();
   report.stereo_time = stopwatch.lap();

@@ -50,6 +50,13 @@ bool isClearlyInOrder(const std::vector<FoundCorner>& found, int columns, double
   return std::max({scatter, std::abs(offset), 0.5 * columns * std::abs(slope)}) <= 0.5 * max_dv;
 }
 
+/// A tenth of the corners lie beyond the usual search: fewer may be wrong ones.
+bool isTooNear(const std::vector<FoundCorner>& found, double max_disparity) {
+  const auto near = std::count_if(found.begin(), found.end(),
+                                  [&](const FoundCorner& corner) { return corner.disparity > max_disparity; });
+  return 10 * near > static_cast<std::ptrdiff_t>(found.size());
+}
+
 }  // namespace
 
 RigMonitor::RigMonitor(const RigMonitorOptions& options, double max_dv, double max_disparity)
@@ -61,7 +68,7 @@ bool RigMonitor::isSuspicious(int corners, int found) const {
 
 RigDiagnosis RigMonitor::diagnose(const cv::Mat& left, const cv::Mat& right,
                                   const std::vector<cv::Point2f>& corners) const {
-  const BlockSearch search(left, right, max_disparity_, options_.reach);
+  const BlockSearch search(left, right, std::max(max_disparity_, 0.5 * left.cols), options_.reach);
   std::vector<FoundCorner> found;
   const std::size_t most = static_cast<std::size_t>(options_.corners), step = (corners.size() + most - 1) / most;
   for (std::size_t i = 0; i < corners.size(); i += step) {
@@ -70,7 +77,8 @@ RigDiagnosis RigMonitor::diagnose(const cv::Mat& left, const cv::Mat& right,
     found.push_back(*corner);
     // A view with little to match is suspicious, too, pair after pair: a few corners clear its rig.
     constexpr std::size_t kAtOnce = 4;
-    if (found.size() % kAtOnce == 0 && isClearlyInOrder(found, left.cols, max_dv_)) return {};
+    if (found.size() % kAtOnce == 0 && isClearlyInOrder(found, left.cols, max_dv_))
+      return {{}, {}, isTooNear(found, max_disparity_)};
   }
   if (static_cast<int>(found.size()) < kEnough) return {};
 
@@ -78,21 +86,25 @@ RigDiagnosis RigMonitor::diagnose(const cv::Mat& left, const cv::Mat& right,
     return {
         "left and right images are swapped, mirrored, or not rectified? Corners lie further right in the right "
         "image",
+        {},
         {}};
   const auto [slope, offset, scatter] = fitRows(found, left.cols);
   if (scatter > std::max(max_dv_, 0.5 * std::abs(offset)))
     return {text(1, "rows of left and right differ by ", scatter,
                  " px here and there: not rectified, or not taken at the same moment?"),
+            {},
             {}};
   const RowLine rows{offset, slope, left.cols};
   if (std::abs(offset) > max_dv_)
     return {text(1, "right image ", std::abs(offset), " px too ", offset > 0.0 ? "low" : "high", ": not rectified?"),
-            rows};
+            rows,
+            {}};
   if (0.5 * left.cols * std::abs(slope) > 2.0 * max_dv_)
     return {text(1, "right image turned by ", std::abs(std::atan(slope)) * 180.0 / CV_PI, " degrees ",
                  slope > 0.0 ? "clockwise" : "counterclockwise", ": not rectified?"),
-            rows};
-  return {};
+            rows,
+            {}};
+  return {{}, {}, isTooNear(found, max_disparity_)};
 }
 
 }  // namespace sdvo

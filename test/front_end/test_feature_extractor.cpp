@@ -41,6 +41,18 @@ void expectEqual(const StereoFeatures& a, const StereoFeatures& b) {
   EXPECT_TRUE(synthetic::equalMats(a.descriptors, b.descriptors));
 }
 
+/// A disparity of 267 px in an image of 640.
+TEST(FeatureExtractor, FollowsAPlaneThatIsNearerThanTheSearchReaches) {
+  const StereoCamera camera = synthetic::camera();
+  const Pair pair = planeAt(0.75);
+  const StereoFeatures features = FeatureExtractor(fewFeatures()).extract(camera, pair.left, pair.right, 0);
+  EXPECT_FALSE(features.report.refused) << features.report.status;
+  const auto right = std::count_if(features.disparity.begin(), features.disparity.end(),
+                                   [](float disparity) { return std::abs(disparity - 266.7f) < 1.f; });
+  EXPECT_GT(right, 50);
+  EXPECT_GE(right, features.count() * 9 / 10);
+}
+
 TEST(FeatureExtractor, MeasuresAPlaneAtKnownDepth) {
   const StereoCamera camera = synthetic::camera();
   FeatureExtractorOptions options = fewFeatures();

@@ -39,8 +39,9 @@ struct RowLine {
 
 /// What the monitor found out about a pair.
 struct RigDiagnosis {
-  std::string words;            ///< the likely cause; empty when the rig is in order, or when too little is found to say
+  std::string words;  ///< the likely cause; empty when the rig is in order, or when too little is found to say
   std::optional<RowLine> rows;  ///< by which they differ, where that is all that is wrong
+  bool too_near = false;        ///< nothing is wrong, but a part of the scene is nearer than `max_disparity` reaches
 };
 
 /// Finds out what is wrong with a rig when few corners are found on their own row at positive disparity. It searches
@@ -53,8 +54,8 @@ class RigMonitor {
   /// Whether so few of the corners were found that the rig is worth a look.
   bool isSuspicious(int corners, int found) const;
 
-  /// Too little to say is found where the view is dark, covered or out of focus. Images are CV_8U of one size. Corners
-  /// that come first are looked at first.
+  /// Looks for disparities up to half of the width. Too little to say is found where the view is dark, covered or out
+  /// of focus. Images are CV_8U of one size. Corners that come first are looked at first.
   RigDiagnosis diagnose(const cv::Mat& left, const cv::Mat& right, const std::vector<cv::Point2f>& corners) const;
 
  private:
