@@ -8,9 +8,12 @@
 #include <vector>
 
 #include "../common/kernel.hpp"
+#include "image_noise.hpp"
 
 namespace sdvo {
 namespace {
+
+constexpr double kFlat = 2.0;  // sigma of the image's noise; the correlation of flat blocks means nothing
 
 /// Sums over `count` blocks, one from each pixel of a row on: of their products with another block, and over their
 /// columns of grey levels and of their squares.
@@ -58,11 +61,10 @@ cv::Mat correlationOf(const cv::Mat& block, const cv::Mat& image) {
 
 /// Where the block around `centre` looks most alike within `area`, a rectangle of block centres. Nothing where the best
 /// correlation lacks more of 1 than `uniqueness` times what the best one elsewhere lacks: texture that repeats itself,
-/// or a point whose true match lies outside of the area.
+/// or a point whose true match lies outside of the area. Nothing either of a block that deviates by less than `flat`.
 std::optional<cv::Point> findBlock(const cv::Mat& from, const cv::Mat& in, cv::Point centre, cv::Size half,
-                                   cv::Rect area, double uniqueness) {
+                                   cv::Rect area, double uniqueness, double flat) {
   constexpr double kAlike = 0.85;  // least correlation
-  constexpr double kFlat = 3.0;    // grey levels; the correlation of flat blocks means nothing
   constexpr int kSame = 2;         // px around the best that count as the same place
   const cv::Rect block(centre.x - half.width, centre.y - half.height, 2 * half.width + 1, 2 * half.height + 1);
   const cv::Rect whole(0, 0, from.cols, from.rows);
@@ -72,7 +74,7 @@ std::optional<cv::Point> findBlock(const cv::Mat& from, const cv::Mat& in, cv::P
   if ((block & whole) != block || reach.width < block.width || reach.height < block.height) return std::nullopt;
   cv::Scalar mean, deviation;
   cv::meanStdDev(from(block), mean, deviation);
-  if (deviation[0] < kFlat) return std::nullopt;
+  if (deviation[0] < flat) return std::nullopt;
   cv::Mat correlation = correlationOf(from(block), in(reach));
   double best = 0.0, elsewhere = 0.0;
   cv::Point at;
@@ -87,14 +89,14 @@ std::optional<cv::Point> findBlock(const cv::Mat& from, const cv::Mat& in, cv::P
 
 /// The same where the way back leads to where it began.
 std::optional<cv::Point> findMutually(const cv::Mat& left, const cv::Mat& right, cv::Point centre, cv::Size half,
-                                      cv::Size reach) {
+                                      cv::Size reach, double flat) {
   constexpr double kUnique = 0.7;
   const auto around = [&](cv::Point middle) {
     return cv::Rect(middle.x - reach.width, middle.y - reach.height, 2 * reach.width + 1, 2 * reach.height + 1);
   };
-  const auto there = findBlock(left, right, centre, half, around(centre), kUnique);
+  const auto there = findBlock(left, right, centre, half, around(centre), kUnique, flat);
   if (!there) return std::nullopt;
-  const auto back = findBlock(right, left, *there, half, around(*there), kUnique);
+  const auto back = findBlock(right, left, *there, half, around(*there), kUnique, flat);
   if (!back || std::max(std::abs(back->x - centre.x), std::abs(back->y - centre.y)) > 1) return std::nullopt;
   return there;
 }
@@ -112,16 +114,17 @@ BlockSearch::BlockSearch(const cv::Mat& left, const cv::Mat& right, double max_d
       right_(right),
       small_left_(quarter(left)),
       small_right_(quarter(right)),
+      flat_(kFlat * noiseOf(left)),
       reach_(static_cast<int>(std::ceil(0.25 * max_disparity)), static_cast<int>(std::ceil(0.25 * reach))) {}
 
 std::optional<FoundCorner> BlockSearch::find(const cv::Point2f& corner) const {
   // Coarsely in all directions, swapped sides included, then around that to a pixel.
   const cv::Point small(cvRound(0.25f * corner.x - 0.375f), cvRound(0.25f * corner.y - 0.375f));
-  const auto coarse = findMutually(small_left_, small_right_, small, {5, 4}, reach_);
+  const auto coarse = findMutually(small_left_, small_right_, small, {5, 4}, reach_, flat_);
   if (!coarse) return std::nullopt;
   const cv::Point centre(cvRound(corner.x), cvRound(corner.y));
   const cv::Point guess = centre + 4 * (*coarse - small);
-  const auto fine = findBlock(left_, right_, centre, {7, 7}, {guess.x - 4, guess.y - 4, 9, 9}, 1.0);
+  const auto fine = findBlock(left_, right_, centre, {7, 7}, {guess.x - 4, guess.y - 4, 9, 9}, 1.0, flat_);
   if (!fine) return std::nullopt;
   const auto at = [](int pixel) { return static_cast<double>(pixel); };
   return FoundCorner{at(centre.x), at(centre.y), at(centre.x - fine->x), at(fine->y - centre.y)};

@@ -25,7 +25,8 @@ class BlockSearch {
  private:
   const cv::Mat left_, right_;
   cv::Mat small_left_, small_right_;  ///< a quarter of the size
-  cv::Size reach_;                    ///< px of these
+  double flat_;                       ///< grey levels
+  cv::Size reach_;                    ///< px of a quarter of the size
 };
 
 }  // namespace sdvo

@@ -98,6 +98,12 @@ TEST(RigMonitor, NamesSwappedAndMirroredImages) {
   expectSaid(diagnosis(rightImage(0.0), leftImage()), "swapped, mirrored, or");
 }
 
+/// A twentieth of the light, rounded to whole levels.
+TEST(RigMonitor, NamesThemInTheDark) {
+  expectSaid(diagnosis(0.05 * rightImage(0.0), 0.05 * leftImage()), "swapped, mirrored, or");
+  expectSaid(diagnosis(0.05 * leftImage(), 0.05 * rightImage(4.0)), "px too low");
+}
+
 TEST(RigMonitor, NamesRowsThatDiffer) {
   // Waves of 6 px, as no offset and no rotation makes them.
   const cv::Mat wavy = synthetic::render(
