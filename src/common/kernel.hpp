@@ -19,7 +19,7 @@
 #else
 #define SDVO_VECTORS
 #endif
-/// For kernels and their parts: they are compiled anew for the processor of each function that they become a part of.
+/// For kernels and their parts: always inlined, so each is compiled for the target of its caller.
 #define SDVO_IN_KERNEL inline __attribute__((always_inline))
 
 namespace sdvo {

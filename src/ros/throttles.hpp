@@ -12,14 +12,14 @@
 
 namespace sdvo {
 
-/// Lets items through at a limited rate, by their stamps. Twice as many as allowed leave every second one: a twentieth
-/// of the period is granted to stamps that jitter.
+/// Limits a rate by stamps. An item passes from 95 % of a period after the last one that passed: otherwise jitter at
+/// exactly twice the rate would let every third item pass instead of every second one.
 class Pace {
  public:
   /// `max_rate`: Hz; 0: no limit.
   explicit Pace(double max_rate) : period_(max_rate > 0.0 ? static_cast<std::int64_t>(1e9 / max_rate) : 0) {}
 
-  /// Whether the item of this stamp (ns) goes through. Stamps that fall begin anew.
+  /// Whether the item of this stamp (ns) passes. One that is earlier than the last always does.
   bool isDue(std::int64_t stamp) {
     if (has_begun_ && stamp > last_ && stamp - last_ < period_ - period_ / 20) return false;
     has_begun_ = true;
@@ -33,8 +33,8 @@ class Pace {
   bool has_begun_ = false;
 };
 
-/// How long to wait for what usually comes in a moment: once it did not come in time, not at all for a second, then for
-/// two, four and so on up to half a minute, until it is there again. Times in s of a clock that only goes on.
+/// How long to wait for an input, s. Each time that it does not come within its timeout, nothing waits for it for 1, 2,
+/// 4 … 30 s; when it comes, the pauses begin at 1 s again. `now`: s of a monotonic clock.
 class Patience {
  public:
   explicit Patience(double timeout) : timeout_(timeout) {}

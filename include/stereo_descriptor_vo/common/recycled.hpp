@@ -9,8 +9,8 @@
 
 namespace sdvo {
 
-/// Elements in a row, and the memory of those that went, which the next ones take: they begin as such a one was left. A
-/// copy has the elements alone, in memory of its own that it has already.
+/// A vector with a free list: add() returns a removed element with its old contents, if there is one, so that its memory
+/// is used again. An assignment copies the elements, not the free list, and keeps the memory of its target.
 template <class Element>
 class Recycled {
  public:

@@ -102,7 +102,7 @@ class Noise {
   double shared() const { return std::max(shared_, 1.0); }
 
  private:
-  /// Images that do not differ leave less than any rig's noise, which tells nothing of it.
+  /// Identical images give residuals near 0: the square is clamped, so that they teach no noise of 0.
   static double told(double square) {
     constexpr double kMedian = 1.386;  // of chi-square of two: 2 log 2
     return std::max(square, kMedian / (kMost * kMost));
