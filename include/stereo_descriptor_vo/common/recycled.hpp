@@ -9,8 +9,8 @@
 
 namespace sdvo {
 
-/// A vector with a free list: add() returns a removed element with its old contents, if there is one, so that its memory
-/// is used again. An assignment copies the elements, not the free list, and keeps the memory of its target.
+/// A vector with a free list: add() returns a removed element with its old contents, if there is one, so that its
+/// memory is used again. An assignment copies the elements, not the free list, and keeps the memory of its target.
 template <class Element>
 class Recycled {
  public:
