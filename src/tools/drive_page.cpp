@@ -182,9 +182,17 @@ std::string stateCounts(const std::array<int, 4>& counts) {
 std::string statesSection(const Frames& frames) {
   constexpr std::size_t kMostRows = 15;
   const std::vector<const char*> colours = {kGreen, kGrey, kOrange, kRed};
+  const auto rankOf = [](TrackingState state) {
+    return std::array<int, 4>{1, 0, 2, 3}[static_cast<std::size_t>(state)];
+  };
+  std::string legend;
   std::vector<int> ranks;
-  for (const OfflineRun::Frame& frame : frames)
-    ranks.push_back(std::array<int, 4>{1, 0, 2, 3}[static_cast<std::size_t>(frame.odometry.state)]);
+  for (const OfflineRun::Frame& frame : frames) ranks.push_back(rankOf(frame.odometry.state));
+  for (const TrackingState state :
+       {TrackingState::kTracking, TrackingState::kWaiting, TrackingState::kDegraded, TrackingState::kLost})
+    if (std::count(ranks.begin(), ranks.end(), rankOf(state)) > 0)
+      legend +=
+          text(0, " <b style='color:", colours[static_cast<std::size_t>(rankOf(state))], "'>", toString(state), "</b>");
   const std::vector<double> times = timesOf(frames);
   std::vector<std::vector<std::string>> rows;
   for (std::size_t begin = 0, end = 0; begin < frames.size(); begin = end) {
@@ -200,9 +208,8 @@ std::string statesSection(const Frames& frames) {
     rows.resize(kMostRows);
   }
   return "<h2>States over time</h2>\n" + band(ranks, colours) +
-         text(1, "<p>0 to ", times.back(), " s: <b style='color:", kGreen, "'>TRACKING</b>, <b style='color:", kOrange,
-              "'>DEGRADED</b>, <b style='color:", kRed, "'>LOST</b>, <b style='color:", kGrey, "'>WAITING</b></p>\n") +
-         "<div class='when'>" + wordsTable(rows) + "</div>" + more;
+         text(1, "<p>0 to ", times.back(), " s:", legend, "</p>\n") + "<div class='when'>" + wordsTable(rows) +
+         "</div>" + more;
 }
 
 std::string figuresSection(const DriveReport& report, const OfflineRun& run) {
@@ -267,8 +274,11 @@ Finding judge(const DriveReport& report, const OfflineRun& run) {
   Finding verdict{"drive", worst.verdict, "", ""};
   if (run.pairsWithoutPose() > 0 || run.discontinuities() > 0) {
     if (verdict.verdict != Verdict::kFail) verdict.verdict = Verdict::kWarn;
-    verdict.what = text(0, "Interrupted: ", run.pairsWithoutPose(), " of ", run.pairs(), " pairs have no pose, ",
-                        run.discontinuities(), run.discontinuities() == 1 ? " discontinuity" : " discontinuities");
+    verdict.what =
+        run.pairsWithoutPose() == run.pairs()
+            ? text(0, "Never started: none of ", run.pairs(), " pairs has a pose")
+            : text(0, "Interrupted: ", run.pairsWithoutPose(), " of ", run.pairs(), " pairs have no pose, ",
+                   run.discontinuities(), run.discontinuities() == 1 ? " discontinuity" : " discontinuities");
   } else {
     verdict.what =
         text(0, "Followed: ", run.pairs(), " of ", run.pairs(), " pairs have a pose, ", tracking, " are TRACKING");
@@ -289,8 +299,9 @@ void writeDrivePage(const std::string& path, const DriveReport& report, const Of
   const Finding verdict = judge(report, run);
   const Frames& frames = run.frames();
   writePage(path, pageHead(report.name, verdict.verdict, verdict.what) + figuresSection(report, run) +
-                      "<h2>Path and what it is built on</h2>\n<div class='grid'>" + pathPlots(report, frames) +
-                      deviationPlots(report, frames) +
+                      "<h2>Path and what it is built on</h2>\n<div class='grid'>" +
+                      (run.pairsWithoutPose() < run.pairs() ? pathPlots(report, frames) + deviationPlots(report, frames)
+                                                            : std::string()) +
                       stagesPlot({"What survives each stage", "time [s]", "count"}, kFunnel, frames) +
                       stagesPlot({"Time of each stage", "time [s]", "ms", Axes::Style::kStacked}, kTimes, frames) +
                       "</div>\n" + statesSection(frames) + "<h2>The camera</h2>\n" + findingsTable(report.findings) +

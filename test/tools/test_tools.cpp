@@ -842,6 +842,18 @@ TEST_F(Tools, ThePageOfALostDriveSaysWhere) {
   expectWords(readPage(page), {"Interrupted: ", " of 4 pairs have no pose", "LOST", "no figure"});
 }
 
+TEST_F(Tools, ThePageOfADriveWithoutAPoseShowsNoEmptyPlot) {
+  for (int side = 0; side < 2; ++side)
+    for (int pair = 0; pair < kPairs; ++pair)
+      cv::imwrite(image(side, pair).string(), cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
+  const fs::path page = root_ / "page.html";
+  run("run_sequence", sequence_.string() + " --page " + page.string());
+  const std::string html = readPage(page);
+  expectWords(html, {"Never started: none of 4 pairs has a pose", "States over time"});
+  for (const char* absent : {"Interrupted", "Path from above", "Deviation of", "TRACKING</b>"})
+    EXPECT_EQ(html.find(absent), std::string::npos) << absent;
+}
+
 /// vo_info that was recorded while the odometry ran, in the same bag or in one of its own.
 TEST_F(Tools, ThePageShowsWhatWasReportedLive) {
   const fs::path live = root_ / "live.bag", page = root_ / "page.html";
