@@ -8,11 +8,15 @@
 
 namespace sdvo {
 
-void OpticalAxisCheck::add(const Eigen::Isometry3d& T_base_camera, const Eigen::Vector3d& translation) {
+void OpticalAxisCheck::add(const Eigen::Isometry3d& T_base_camera, const Eigen::Isometry3d& T_before_now) {
   constexpr double kUp = 0.7;  // cosine of 45 degrees
   if (T_base_camera.linear()(2, 2) < kUp) return;
-  along_axis_ += translation.z();
-  distance_ += translation.norm();
+  const Eigen::Vector3d turn = logSO3(T_before_now.linear());
+  along_axis_ += T_before_now.translation().z();
+  distance_ += T_before_now.translation().norm();
+  about_axis_ += std::abs(turn.z());
+  about_others_ += turn.head<2>().norm();
+  is_sideways_ = std::abs(T_base_camera.linear()(0, 0)) < kUp;
 }
 
 Finding OpticalAxisCheck::judge() const {
@@ -22,37 +26,66 @@ Finding OpticalAxisCheck::judge() const {
   if (distance_ < kEnough) return {step, Verdict::kOpen, "no motion of a camera that looks up", ""};
   const std::string what = text(1, "TF has the camera look up, and it moves along its axis by ", along_axis_, " of ",
                                 distance_, " m: the robot rises");
-  if (std::abs(along_axis_) < kAlong * distance_) return {step, Verdict::kOk, what, ""};
+  constexpr double kTurned = 15.0 * M_PI / 180.0;  // rad (chosen): more than a hand or a rotor shakes a straight way
+  const bool may_rise = is_sideways_ && (about_others_ < kTurned || about_others_ < about_axis_);
+  if (may_rise || std::abs(along_axis_) < kAlong * distance_) return {step, Verdict::kOk, what, ""};
   return {
       step, Verdict::kWarn, what,
       "the images' frame_id names a body's frame (x ahead) instead of an optical one (z ahead), or lacks its rotation"};
 }
 
-void GyroAxesCheck::add(const Eigen::Matrix3d& by_gyro, const Eigen::Matrix3d& by_images) {
+void GyroAxesCheck::Turns::add(const Eigen::Matrix3d& by_gyro, const Eigen::Matrix3d& by_images) {
   constexpr double kLeast = 0.2 * M_PI / 180.0;  // rad: below it bias and noise turn as much
   const Eigen::Vector3d gyro = logSO3(by_gyro), images = logSO3(by_images);
   if (std::max(gyro.norm(), images.norm()) < kLeast) return;
-  product_ += gyro.dot(images);
-  of_gyro_ += gyro.squaredNorm();
-  of_images_ += images.squaredNorm();
-  turned_ += images.norm();
+  product += gyro.dot(images);
+  of_gyro += gyro.squaredNorm();
+  of_images += images.squaredNorm();
 }
 
-Finding GyroAxesCheck::judge() const {
+double GyroAxesCheck::Turns::cosine() const {
+  return std::clamp(product / std::sqrt(std::max(of_gyro * of_images, 1e-300)), -1.0, 1.0);
+}
+
+void GyroAxesCheck::add(std::int64_t from, std::int64_t to, const Eigen::Matrix3d& by_gyro,
+                        const Eigen::Matrix3d& by_images) {
+  constexpr std::int64_t kKept = 8'000'000'000;  // ns, less than a gyro's measurements are kept
+  turns_.add(by_gyro, by_images);
+  turned_ += logSO3(by_images).norm();
+  pairs_.push_back({from, to, by_images});
+  while (pairs_.back().to - pairs_.front().from > kKept) pairs_.pop_front();
+}
+
+Finding GyroAxesCheck::judge(const Gyro& gyro) const {
   constexpr double kEnough = 20.0 * M_PI / 180.0;  // rad
   constexpr double kAgree = 0.7, kMost = 2.0;      // cosine; ratio of the rates
   const std::string step = "IMU";
   if (turned_ < kEnough) return {step, Verdict::kOpen, "the camera did not turn enough", "turn it"};
-  const double cosine = product_ / std::sqrt(std::max(of_gyro_ * of_images_, 1e-300));
-  const double ratio = std::sqrt(of_gyro_ / of_images_);
-  const std::string what =
-      text(1, "gyro and images turn about axes ", 180.0 / M_PI * std::acos(std::clamp(cosine, -1.0, 1.0)),
-           " degrees apart, by angles of ratio ", ratio);
+  const auto degrees = [](double cosine) { return 180.0 / M_PI * std::acos(cosine); };
+  const double ratio = std::sqrt(turns_.of_gyro / turns_.of_images);
+  const std::string what = text(1, "gyro and images turn about axes ", degrees(turns_.cosine()),
+                                " degrees apart, by angles of ratio ", ratio);
   if (ratio > kMost) return {step, Verdict::kWarn, what, "is angular_velocity in rad/s, and of this camera's IMU?"};
   // A gyro that turns less than the images is no proof: a mover may fill the view.
-  if (cosine < kAgree && ratio * kMost > 1.0)
-    return {step, Verdict::kWarn, what, "is the IMU mounted as TF has its frame?"};
-  return {step, Verdict::kOk, what, ""};
+  if (turns_.cosine() >= kAgree || ratio * kMost <= 1.0) return {step, Verdict::kOk, what, ""};
+  constexpr int kSteps = 15;                    // to either side
+  constexpr std::int64_t kStep = 10'000'000;    // ns
+  constexpr double kFound = 0.9, kKnown = 0.5;  // cosine; ratio of the pairs' turns that must be there
+  double best = kFound;
+  std::int64_t shift = 0;
+  for (std::int64_t k = -kSteps; k <= kSteps; ++k) {
+    Turns shifted;
+    for (const Pair& pair : pairs_)
+      if (const auto turn = gyro(pair.from + k * kStep, pair.to + k * kStep)) shifted.add(*turn, pair.by_images);
+    if (shifted.of_images < kKnown * turns_.of_images || shifted.cosine() <= best) continue;
+    best = shifted.cosine();
+    shift = k * kStep;
+  }
+  if (shift == 0) return {step, Verdict::kWarn, what, "is the IMU mounted as TF has its frame?"};
+  return {step, Verdict::kWarn, what,
+          text(0, "its stamps are ", std::abs(1e-6 * static_cast<double>(shift)), " ms too ",
+               shift > 0 ? "late" : "early", ", with which axes agree to ", degrees(best),
+               " degrees: let the driver correct them (Kalibr's timeshift_cam_imu)")};
 }
 
 }  // namespace sdvo

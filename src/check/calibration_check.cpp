@@ -1,5 +1,6 @@
 #include "calibration_check.hpp"
 
+#include <cmath>
 #include <sstream>
 
 #include "../common/text.hpp"
@@ -9,13 +10,19 @@ namespace {
 
 /// An implausible value of the camera, in words; empty: there is none.
 std::string doubtOf(const StereoCamera& camera) {
-  // Of stereo cameras that robots carry: a lens of 20 to 150 deg, a baseline of 1 cm to 2 m.
-  constexpr double kNarrowest = 0.35, kWidest = 7.5, kShortest = 0.01, kLongest = 2.0;
+  // Of stereo cameras that robots carry: a lens of 6 to 170 deg, a baseline of 1 cm to 2 m. A ratio of the size: half
+  // of a right cx or cy is off by 0.25. Rows are cut away for the sky, columns are not.
+  constexpr double kNarrowest = 0.1, kWidest = 22.9, kShortest = 0.01, kLongest = 2.0, kAside = 0.2, kAbove = 0.4;
   const double width = camera.width / camera.fx;
+  const double aside = std::abs(camera.cx / camera.width - 0.5), above = std::abs(camera.cy / camera.height - 0.5);
   std::ostringstream doubt;
   if (width < kNarrowest || width > kWidest)
     doubt << "fx = " << camera.fx << " px at a width of " << camera.width
           << " px: is the focal length that of these images' size?";
+  else if (aside > kAside || above > kAbove)
+    doubt << "the principal point (" << camera.cx << ", " << camera.cy
+          << ") is far from the centre: is camera_info that "
+          << "of another size? With binning_x K and P are those of the whole sensor";
   else if (camera.baseline > kLongest)
     doubt << "baseline = " << camera.baseline << " m: is P[3] of the right camera_info in pixels times mm or cm? It "
           << "must be -fx * baseline with the baseline in metres";

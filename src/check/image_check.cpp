@@ -63,6 +63,44 @@ std::optional<cv::Point2d> CoarseView::motionSince(const CoarseView& before, con
   return motion * (1.0 / view_.cols);
 }
 
+void RepeatCheck::add(const cv::Mat& left, const cv::Mat& right, std::int64_t stamp) {
+  constexpr int kFew = 3;                        // in a row (chosen): a driver may hand out an image twice
+  constexpr std::int64_t kLong = 1'000'000'000;  // ns (chosen): no real camera's images are equal for so long
+  for (std::size_t side = 0; side < 2; ++side) {
+    const cv::Mat& image = side == 0 ? left : right;
+    const bool repeats =
+        image.size() == sides_[side].image.size() &&
+        std::equal(image.begin<std::uint8_t>(), image.end<std::uint8_t>(), sides_[side].image.begin<std::uint8_t>());
+    sides_[side].repeats = repeats ? sides_[side].repeats + 1 : 0;
+    if (repeats) continue;
+    sides_[side].image = image.clone();
+    sides_[side].since = stamp;
+  }
+  ++pairs_;
+  problem_.clear();
+  for (std::size_t side = 0; side < 2; ++side) {
+    const bool is_alone = sides_[side].repeats > 0 && sides_[1 - side].repeats == 0;
+    sides_[side].alone += is_alone;
+    if (is_alone && sides_[side].repeats >= kFew)
+      problem_ = std::string("the ") + (side == 0 ? "left" : "right") +
+                 " images repeat bit by bit while the other side changes: is that camera or its driver frozen?";
+  }
+  if (stamp - std::max(sides_[0].since, sides_[1].since) > kLong)
+    problem_ = "the images repeat bit by bit: is the driver frozen? A simulated one needs noise";
+}
+
+Finding RepeatCheck::judge() const {
+  constexpr double kFew = 0.05;  // ratio of the pairs (chosen)
+  const std::string step = "repeats";
+  const bool is_right = sides_[1].alone > sides_[0].alone;
+  const int alone = sides_[is_right ? 1 : 0].alone;
+  if (alone <= kFew * pairs_) return {step, Verdict::kOk, "each side has new images", ""};
+  return {step, Verdict::kFail,
+          text(0, "in ", alone, " of ", pairs_, " pairs the ", is_right ? "right" : "left",
+               " image repeats bit by bit, the other one changes"),
+          "that camera or its driver is frozen, or runs at a lower rate"};
+}
+
 void ImageCheck::add(const cv::Mat& left, const cv::Mat& right, const ExtractionReport& report) {
   constexpr double kWhite = 250.0;  // grey levels
   dark_.push_back(std::min(report.mean_intensity[0], report.mean_intensity[1]));

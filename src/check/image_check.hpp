@@ -1,7 +1,10 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "finding.hpp"
@@ -28,6 +31,30 @@ class CoarseView {
 
  private:
   cv::Mat view_;  ///< CV_64F, grey levels
+};
+
+/// Whether images repeat bit by bit, which no camera's noise does: both sides, or one alone while the other one
+/// changes.
+class RepeatCheck {
+ public:
+  /// The next pair, CV_8UC1; `stamp` in ns.
+  void add(const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
+
+  /// Of the last pairs, in words; empty: they do not repeat.
+  const std::string& problem() const { return problem_; }
+  /// Of all pairs.
+  Finding judge() const;
+
+ private:
+  struct Side {
+    cv::Mat image;
+    std::int64_t since = 0;  ///< ns
+    int repeats = 0;         ///< in a row
+    int alone = 0;           ///< pairs in which it repeated and the other one did not
+  };
+  std::array<Side, 2> sides_;
+  int pairs_ = 0;
+  std::string problem_;
 };
 
 /// Whether images are good ones to find features in: exposure, texture, motion blur, and how far the view moves from

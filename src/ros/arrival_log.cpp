@@ -30,12 +30,14 @@ void ArrivalLog::begin(const Topics& topics, double now) {
   begin_ = now;
   first_stamp_ = 0;
   longest_wait_ = 0.0;
+  has_pairs_ = has_ended_ = false;
 }
 
 void ArrivalLog::note(Input input, const ros::Time& stamp, double now) {
   const std::lock_guard<std::mutex> lock(mutex_);
   std::deque<Arrival>& arrivals = topics_[input].arrivals;
   arrivals.push_back({nanoseconds(stamp), now});
+  has_ended_ = false;
   if (stamp.isZero()) arrivals.back().fate = Fate::kLost;
   complete_ = first_stamp_ == 0 ? now : complete_;
   if (first_stamp_ == 0)
@@ -57,6 +59,7 @@ void ArrivalLog::note(Input input, const ros::Time& stamp, double now) {
 
 void ArrivalLog::notePair(const ros::Time& left, const ros::Time& right, double now) {
   const std::lock_guard<std::mutex> lock(mutex_);
+  has_pairs_ = true;
   for (const auto& [input, stamp] : {std::pair(kLeftImage, left), std::pair(kRightImage, right)}) {
     std::deque<Arrival>& arrivals = topics_[input].arrivals;
     const auto used =
@@ -142,6 +145,11 @@ std::string ArrivalLog::explainLoss(double now) {
 std::string ArrivalLog::explainSilence(double now) {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (now < begin_ + kMemory || usedSince(now - kMemory).used > 0) return "";
+  const auto is_silent = [&](const Topic& topic) {
+    return topic.arrivals.empty() || topic.arrivals.back().now < now - kMemory;
+  };
+  if (has_pairs_ && std::all_of(topics_.begin(), topics_.end(), is_silent))
+    return std::exchange(has_ended_, true) ? "" : text(0, "no message of the camera for ", kMemory, " s: it has ended");
   return "no synchronised stereo pair; received:" + received(now - kMemory) + advise(now - kMemory);
 }
 

@@ -33,7 +33,8 @@ class ArrivalLog {
   /// When more than `max_unused` of the last pairs did not come together: how many, which messages lack their partners,
   /// how far stamps are apart, and what to do. Empty otherwise.
   std::string explainLoss(double now);
-  /// When no pair came together for ten seconds: what arrived on each topic and what to do. Empty otherwise.
+  /// When no pair came together for ten seconds: what arrived on each topic and what to do. Input that ended after
+  /// pairs is said once. Empty otherwise.
   std::string explainSilence(double now);
 
   /// Hz, of each topic in the last seconds, with its name.
@@ -83,6 +84,7 @@ class ArrivalLog {
   std::int64_t first_stamp_ = 0;  ///< from which on all topics are there, ns; 0: they are not
   double complete_ = 0.0;         ///< when they were
   double longest_wait_ = 0.0;     ///< of a message that was used after all
+  bool has_pairs_ = false, has_ended_ = false;
 };
 
 }  // namespace sdvo

@@ -225,9 +225,9 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
       warnOf(emitter_.judge());
     }
     if (features.report.refused && !unrectified.empty()) features.report.status = unrectified;
-    if (!first_ || first_->data != pair.left_image->data) first_ = pair.left_image;
-    if (features.report.status.empty() && secondsBetween(first_->header.stamp, stamp) > kRepeats)
-      features.report.status = "the left images repeat bit by bit: is the driver frozen? A simulated one needs noise";
+    repeats_.add(decoded.left, decoded.right, nanoseconds(stamp));
+    if (!repeats_.problem().empty() && (features.report.refused || features.report.status.empty()))
+      features.report.status = repeats_.problem();
 
     diagnostics_->note(features);
     reportRig(features, stamp);
@@ -277,7 +277,6 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
       NODELET_WARN_STREAM("rows of left and right agree again: pairs from " << stamp << " on are used");
   }
 
-  static constexpr double kRepeats = 1.0;  // s (chosen): no real camera's images are equal for so long
   static constexpr int kPublishQueue = 10;
   static constexpr const char* kNobodyListens = "nobody listens to stereo_features";
 
@@ -303,8 +302,8 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   // Only the worker's thread touches these.
   std::unique_ptr<FeatureExtractor> extractor_;
   PairDecoder decoder_;
-  sensor_msgs::ImageConstPtr first_;  // of the newest left images that are equal
-  cv::Mat mask_;                      // of the topic; empty: none has come
+  RepeatCheck repeats_;
+  cv::Mat mask_;  // of the topic; empty: none has come
   EmitterCheck emitter_;
   int jumps_ = 0;  // back, of the stamps
   std::uint32_t stream_epoch_ = 0;

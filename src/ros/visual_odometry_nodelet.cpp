@@ -277,8 +277,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     odometry_->mountAt(*mount_->last());
     const std::optional<MotionGuess> motion = guess.since == processed_stamp_ ? guess.motion : std::nullopt;  // no jump
     const OdometryResult result = odometry_->update(features, motion);
-    if (result.state == TrackingState::kTracking && result.has_motion)
-      compareAxes(result, motion, message.header.stamp);
+    if (result.state == TrackingState::kTracking && result.has_motion) compareAxes(result, motion, message.header);
     processed_stamp_ = message.header.stamp;
     epoch_ = result.epoch;
     report(result, message.header.stamp);
@@ -289,18 +288,27 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   }
 
   /// With what the images show.
-  void compareAxes(const OdometryResult& result, const std::optional<MotionGuess>& guess, const ros::Time& stamp) {
+  void compareAxes(const OdometryResult& result, const std::optional<MotionGuess>& guess,
+                   const std_msgs::Header& header) {
     const auto warnOnce = [this](Finding& told, const Finding& found, const char* consequence) {
       if (std::exchange(told, found).verdict != Verdict::kWarn && found.verdict == Verdict::kWarn)
         NODELET_WARN_STREAM(found.step << ": " << found.what << ": " << found.remedy << consequence);
     };
-    optical_axis_.add(*mount_->last(), result.T_previous_current.translation());
+    optical_axis_.add(*mount_->last(), result.T_previous_current);
     warnOnce(optical_found_, optical_axis_.judge(), "");
     constexpr double kSame = 1e-3;  // s: after an outage the motion is of another time than the guess
-    if (!guess || !guess->rotation_only || std::abs(secondsBetween(*processed_stamp_, stamp) - result.dt) > kSame)
+    if (!guess || !guess->rotation_only ||
+        std::abs(secondsBetween(*processed_stamp_, header.stamp) - result.dt) > kSame)
       return;
-    gyro_axes_.add(guess->T_previous_current.linear(), result.T_previous_current.linear());
-    warnOnce(gyro_found_, gyro_axes_.judge(), " No guess is taken from it until a reset");
+    gyro_axes_.add(nanoseconds(*processed_stamp_), nanoseconds(header.stamp), guess->T_previous_current.linear(),
+                   result.T_previous_current.linear());
+    const auto gyro = [&](std::int64_t from, std::int64_t to) {
+      std::string ignored;
+      return imu_->rotation(ros_conversions::cleanFrameId(header.frame_id),
+                            ros::Time().fromNSec(static_cast<std::uint64_t>(from)),
+                            ros::Time().fromNSec(static_cast<std::uint64_t>(to)), ignored);
+    };
+    warnOnce(gyro_found_, gyro_axes_.judge(gyro), " No guess is taken from it until a reset");
   }
 
   OdometryResult waitFor(const std::string& what) const {

@@ -22,7 +22,8 @@ void CameraCheck::add(const RecordedPair& pair, const StereoFeatures& features) 
     ++refused_;
     refusal_ = features.report.status;
   }
-  rows_.add(pair.left, pair.right, pair.stamp);
+  lens_check_.add(pair.camera, rows_.add(pair.left, pair.right, pair.stamp));
+  repeats_.add(pair.left, pair.right, pair.stamp);
   images_.add(pair.left, pair.right, features.report);
   emitter_.add(pair.left);
   odometry_.add(features, run_.last());
@@ -48,10 +49,12 @@ std::vector<Finding> CameraCheck::findings(const ArrivalFindings& arrivals) cons
   append(arrivals.stamps);
   append(calibration());
   append(images_.exposure(thresholds_.min_intensity, thresholds_.max_intensity));
+  append(repeats_.judge());
   append(rows_.sameMoment());
   append(odometry_.shutter());
   append(rows_.rectification());
   append(rig());
+  append(lens_check_.judge());
   append(images_.texture(thresholds_.min_corners, options_.stereo_features.rig_monitor.suspicious_share));
   append(images_.blur());
   append(emitter_.judge());

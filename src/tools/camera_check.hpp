@@ -6,6 +6,7 @@
 
 #include "../check/finding.hpp"
 #include "../check/image_check.hpp"
+#include "../check/lens_check.hpp"
 #include "../check/odometry_check.hpp"
 #include "../check/row_check.hpp"
 #include "../check/stamp_check.hpp"
@@ -42,6 +43,8 @@ class CameraCheck {
   const ImageThresholds thresholds_;
   const OfflineRun& run_;
   RowCheck rows_;
+  LensCheck lens_check_;
+  RepeatCheck repeats_;
   ImageCheck images_;
   EmitterCheck emitter_;
   OdometryCheck odometry_;

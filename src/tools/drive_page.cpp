@@ -288,7 +288,7 @@ Finding judge(const DriveReport& report, const OfflineRun& run) {
     if (const auto errors = errorsOf(report, run.frames()); errors && errors->sub_paths.count > 0)
       verdict.what += "; error " + percent(errors->sub_paths.translation_percent) + " of the distance";
     else if (implied > 0.0)
-      verdict.what += "; the recording implies an error of about " + percent(implied) + " of the distance";
+      verdict.what += "; random errors of about " + percent(implied) + " of the distance, beside those of the calibration";
   }
   if (worst.verdict == Verdict::kWarn || worst.verdict == Verdict::kFail)
     verdict.what += ". Camera: " + std::string(toString(worst.verdict)) + ", " + worst.step + ": " + worst.what;

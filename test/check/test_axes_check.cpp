@@ -14,11 +14,14 @@ using Eigen::Vector3d;
 
 constexpr double kDegree = M_PI / 180.0;
 
-Verdict verdictOf(const Matrix3d& R_base_camera, const Vector3d& step) {
+/// Of 60 steps that each turn by `turn`, rad.
+Verdict verdictOf(const Matrix3d& R_base_camera, const Vector3d& step, const Vector3d& turn = Vector3d::Zero()) {
   OpticalAxisCheck check;
-  Eigen::Isometry3d T_base_camera = Eigen::Isometry3d::Identity();
+  Eigen::Isometry3d T_base_camera = Eigen::Isometry3d::Identity(), T_before_now = Eigen::Isometry3d::Identity();
   T_base_camera.linear() = R_base_camera;
-  for (int i = 0; i < 60; ++i) check.add(T_base_camera, step);
+  T_before_now.translation() = step;
+  if (turn.norm() > 0.0) T_before_now.linear() = AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+  for (int i = 0; i < 60; ++i) check.add(T_base_camera, T_before_now);
   return check.judge().verdict;
 }
 
@@ -30,9 +33,16 @@ TEST(OpticalAxisCheck, ABodysFrameIsNoOpticalOne) {
       EXPECT_EQ(
           verdictOf((AngleAxisd(yaw * kDegree, Vector3d::UnitZ()) * AngleAxisd(pitch * kDegree, Vector3d::UnitY()))
                         .toRotationMatrix(),
-                    ahead),
+                    ahead, {0.0, 0.01, 0.0}),
           Verdict::kWarn)
           << yaw << " " << pitch;
+}
+
+TEST(OpticalAxisCheck, ACameraThatLooksUpAndClimbsIsFine) {
+  const Vector3d up(0.0, 0.001, 0.02);
+  for (const double yaw : {-90.0, 90.0})  // the image's bottom is ahead, or its top
+    for (const Vector3d& turn : {Vector3d(0.0, 0.0, 0.0), Vector3d(0.001, 0.0, 0.02)})
+      EXPECT_EQ(verdictOf(AngleAxisd(yaw * kDegree, Vector3d::UnitZ()).toRotationMatrix(), up, turn), Verdict::kOk);
 }
 
 TEST(OpticalAxisCheck, ACameraThatLooksAheadOrToTheCeilingIsFine) {
@@ -47,10 +57,10 @@ Verdict verdictOf(const Matrix3d& R_camera_imu, double scale, const Vector3d& st
   GyroAxesCheck check;
   for (int i = 0; i < 60; ++i) {
     const Vector3d turn = step + 0.1 * step.norm() * Vector3d(std::sin(i), std::cos(i), 0.0);
-    check.add(AngleAxisd(scale * turn.norm(), R_camera_imu * turn.normalized()).toRotationMatrix(),
+    check.add(i, i + 1, AngleAxisd(scale * turn.norm(), R_camera_imu * turn.normalized()).toRotationMatrix(),
               AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix());
   }
-  return check.judge().verdict;
+  return check.judge([](std::int64_t, std::int64_t) { return std::nullopt; }).verdict;
 }
 
 TEST(GyroAxesCheck, AMountingThatTfDoesNotHaveIsNamed) {
@@ -61,6 +71,27 @@ TEST(GyroAxesCheck, AMountingThatTfDoesNotHaveIsNamed) {
     EXPECT_EQ(verdictOf(AngleAxisd(angle * kDegree, Vector3d::UnitX()).toRotationMatrix(), 1.0, yaw), Verdict::kWarn)
         << angle;
   EXPECT_EQ(verdictOf(Matrix3d::Identity(), 180.0 / M_PI, 0.02 * yaw / kDegree), Verdict::kWarn) << "degrees";
+}
+
+TEST(GyroAxesCheck, StampsOfAnotherTimeAreNoFaultOfTheMount) {
+  const auto shaken = [&](const Matrix3d& mount, double late) {
+    GyroAxesCheck check;
+    const auto turned = [](double t) {
+      const Vector3d turn = 3.0 * kDegree * Vector3d(std::sin(12.0 * t), 0.3 * std::sin(9.0 * t), std::cos(12.0 * t));
+      return AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+    };
+    const auto gyro = [&](std::int64_t from, std::int64_t) -> std::optional<Matrix3d> {
+      return mount * turned(1e-9 * static_cast<double>(from) - late) * mount.transpose();
+    };
+    for (std::int64_t from = 0; from < 8'000'000'000; from += 50'000'000)
+      check.add(from, from + 50'000'000, *gyro(from, 0), turned(1e-9 * static_cast<double>(from)));
+    return check.judge(gyro);
+  };
+  const Matrix3d other = AngleAxisd(M_PI, Vector3d::UnitX()).toRotationMatrix();
+  EXPECT_EQ(shaken(Matrix3d::Identity(), 0.02).verdict, Verdict::kOk);
+  EXPECT_NE(shaken(Matrix3d::Identity(), 0.1).remedy.find("100 ms too late"), std::string::npos);
+  EXPECT_NE(shaken(Matrix3d::Identity(), -0.08).remedy.find("80 ms too early"), std::string::npos);
+  EXPECT_NE(shaken(other, 0.0).remedy.find("mounted"), std::string::npos);
 }
 
 TEST(GyroAxesCheck, NothingIsSaidWithoutATurn) {

@@ -8,7 +8,7 @@ namespace sdvo {
 namespace test_calibration_check {
 
 Finding judged(double baseline, int width = 1200, const std::string& unrectified = "") {
-  return checkCalibration({700.0, 700.0, 600.0, 180.0, baseline, width, 360}, "plumb_bob", unrectified);
+  return checkCalibration({700.0, 700.0, 0.5 * width, 180.0, baseline, width, 360}, "plumb_bob", unrectified);
 }
 
 bool contains(const Finding& finding, const std::string& words) {
@@ -27,8 +27,19 @@ TEST(CalibrationCheck, ABaselineInOtherUnitsIsNamed) {
 }
 
 TEST(CalibrationCheck, AFocalLengthOfAnotherImageSizeIsNamed) {
-  EXPECT_TRUE(contains(judged(0.05, 200), "focal length"));
-  EXPECT_TRUE(contains(judged(0.05, 6000), "focal length"));
+  EXPECT_TRUE(contains(judged(0.05, 60), "focal length"));
+  EXPECT_TRUE(contains(judged(0.05, 18000), "focal length"));
+  for (const int width : {200, 6000}) EXPECT_EQ(judged(0.05, width).verdict, Verdict::kOk) << "tele and wide lenses";
+}
+
+TEST(CalibrationCheck, APrincipalPointOfAnotherImageSizeIsNamed) {
+  const auto at = [](double cx, double cy) {
+    return checkCalibration({700.0, 700.0, cx, cy, 0.05, 1200, 360}, "plumb_bob", "");
+  };
+  EXPECT_TRUE(contains(at(300.0, 90.0), "binning_x")) << "divided by the binning once too often";
+  EXPECT_TRUE(contains(at(1200.0, 360.0), "another size"));
+  EXPECT_TRUE(contains(at(600.0, 340.0), "far from the centre"));
+  EXPECT_EQ(at(520.0, 300.0).verdict, Verdict::kOk) << "without its sky";
 }
 
 TEST(CalibrationCheck, ImagesThatAreNotRectifiedAreNamedBesideADoubt) {

@@ -123,5 +123,26 @@ TEST(ImageCheck, TheFrameRateIsTooLowWhereThePairsHaveTooLittleInCommon) {
   expectSaid(unrelated.frameRate({4.0}), Verdict::kFail, "a higher frame rate");
 }
 
+TEST(RepeatCheck, ASideThatRepeatsIsNamedAndBothOnesAfterASecond) {
+  struct Case {
+    bool left, right;  ///< changes
+    const char* words;
+    Verdict verdict;
+  };
+  for (const Case& c :
+       {Case{true, true, "", Verdict::kOk}, Case{true, false, "the right images repeat", Verdict::kFail},
+        Case{false, true, "the left images repeat", Verdict::kFail},
+        Case{false, false, "the images repeat bit by bit: is the driver", Verdict::kOk}}) {
+    RepeatCheck check;
+    for (int i = 0; i < 25; ++i) {
+      check.add(grey(c.left ? i : 0), grey(c.right ? 50 + i : 50), i * 50'000'000LL);
+      if (i == 2) EXPECT_EQ(check.problem(), "") << "a driver may hand out an image twice";
+    }
+    EXPECT_EQ(check.problem().substr(0, std::string(c.words).size()), c.words);
+    EXPECT_EQ(check.problem().empty(), c.left && c.right);
+    EXPECT_EQ(check.judge().verdict, c.verdict) << c.words;
+  }
+}
+
 }  // namespace test_image_check
 }  // namespace sdvo

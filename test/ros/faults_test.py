@@ -249,7 +249,7 @@ class Faults(PipelineCase):
             for image, data in zip(images, frozen):
                 image.data = data
         self.run_for(3.0, freeze)
-        self.expect('stereo_features', 'features', warn, 'the left images repeat bit by bit')
+        self.expect('stereo_features', 'features', warn, 'the images repeat bit by bit')
 
         def swap(images):
             images[0].data, images[1].data = images[1].data, images[0].data

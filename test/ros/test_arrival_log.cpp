@@ -166,6 +166,17 @@ TEST_F(ArrivalLogTest, SilenceIsExplainedByWhatArrived) {
   EXPECT_EQ(log_.explainLoss(11.0), "");
 }
 
+TEST_F(ArrivalLogTest, TheEndOfARecordingIsSaidOnceAndItsNextStartAnew) {
+  for (const double begin : {20.0, 60.0}) {
+    noteUsed(begin, begin);
+    EXPECT_EQ(log_.explainSilence(begin + 9.0), "");
+    EXPECT_EQ(log_.explainSilence(begin + 11.0), "no message of the camera for 10 s: it has ended");
+    EXPECT_EQ(log_.explainSilence(begin + 16.0), "");
+  }
+  note(ArrivalLog::kLeftImage, 80.0, 80.0);
+  EXPECT_TRUE(contains(log_.explainSilence(81.0), "no synchronised stereo pair")) << "one side alone has not ended";
+}
+
 TEST_F(ArrivalLogTest, ExtremeStampsAreCompared) {
   noteAll(1.0, 10.0);
   log_.note(ArrivalLog::kLeftImage, ros::Time(0xffffffffu, 999999999u), 10.0);

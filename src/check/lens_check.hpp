@@ -1,0 +1,43 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "finding.hpp"
+#include "stereo_descriptor_vo/common/stereo_camera.hpp"
+
+namespace sdvo {
+
+/// Focal length and principal point from the images alone. A camera that turns by a known angle moves its middle and
+/// its edges by different amounts, whose ratio depends on f and c. All motions, f, c and an offset of the disparities
+/// are estimated together.
+class LensCheck {
+ public:
+  /// A point of the left image, with where it was in the left image before (all px).
+  struct Track {
+    double u, v, disparity, u_before, v_before;
+  };
+  /// Of the next pair.
+  void add(const StereoCamera& camera, const std::vector<Track>& tracks);
+
+  /// Focal length as a ratio of camera_info's, less one; principal point less camera_info's, in focal lengths.
+  struct Estimate {
+    Eigen::Vector3d value, sigma;
+    Eigen::Vector3d resolution;  ///< standard deviation at an error of 1 mrad in each point
+  };
+  std::optional<Estimate> estimate() const;
+
+  Finding judge() const;
+
+ private:
+  /// In units of the focal length, from the principal point.
+  struct Ray {
+    Eigen::Vector2d now, before;
+    double disparity;
+  };
+  StereoCamera camera_;
+  std::vector<std::vector<Ray>> pairs_;
+};
+
+}  // namespace sdvo
