@@ -3,10 +3,12 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <opencv2/imgproc.hpp>
 
 #include "../common/statistics.hpp"
 #include "../common/text.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
+#include "tracks.hpp"
 
 namespace sdvo {
 namespace {
@@ -68,6 +70,39 @@ PairEquations linearise(const Rays& rays, const Lens& lens, const Eigen::Isometr
 }
 
 }  // namespace
+
+/// Far corners, too, of which a block search is not sure: they show the turns.
+void LensCheck::add(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp) {
+  constexpr std::int64_t kPeriod = 190'000'000;               // ns; five pairs a second show enough
+  constexpr float kReturn = 0.5F, kRow = 1.5F, kFar = -1.0F;  // px (chosen)
+  constexpr int kLevels = 4;
+  const cv::Mat before = before_;
+  before_ = left.clone();
+  if (before.size() != left.size() || stamp - last_ < kPeriod) return;
+  last_ = stamp;
+  std::vector<cv::Point2f> corners;
+  cv::goodFeaturesToTrack(left, corners, 200, 0.01, 8.0);
+  if (corners.empty()) return;
+  /// Of each corner, where it is in `image`, and whether it returns from there.
+  const auto follow = [&](const cv::Mat& image, std::vector<cv::Point2f>& there) {
+    there = corners;
+    std::vector<std::uint8_t> found = track(left, image, corners, there, kLevels);
+    std::vector<cv::Point2f> back = there;
+    const std::vector<std::uint8_t> returned = track(image, left, there, back, kLevels);
+    for (std::size_t i = 0; i < found.size(); ++i)
+      found[i] = found[i] && returned[i] && distance(back[i], corners[i]) < kReturn;
+    return found;
+  };
+  std::vector<cv::Point2f> beside, earlier;
+  const std::vector<std::uint8_t> is_beside = follow(right, beside), is_earlier = follow(before, earlier);
+  std::vector<Track> tracks;
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const cv::Point2f apart = corners[i] - beside[i];
+    if (!is_beside[i] || !is_earlier[i] || std::abs(apart.y) > kRow || apart.x < kFar) continue;
+    tracks.push_back({corners[i].x, corners[i].y, apart.x, earlier[i].x, earlier[i].y});
+  }
+  add(camera, tracks);
+}
 
 void LensCheck::add(const StereoCamera& camera, const std::vector<Track>& tracks) {
   constexpr std::size_t kFewest = 20, kMost = 300;  // tracks of a pair; pairs, a minute of them
@@ -142,7 +177,8 @@ Finding LensCheck::judge() const {
   for (const int axis : {1, 2}) {
     if (estimate->resolution[axis] > kResolvedCentre) continue;
     const double f = axis == 1 ? camera_.fx : camera_.fy;
-    what += text(0, axis == 1 ? ", cx " : ", cy ", f * estimate->value[axis], " +- ", f * sigma[axis], " px from its");
+    what +=
+        text(0, axis == 1 ? ", cx off by " : ", cy off by ", f * estimate->value[axis], " +- ", f * sigma[axis], " px");
     is_wrong |= std::abs(estimate->value[axis]) > kProved * sigma[axis];
   }
   if (is_wrong)

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
@@ -18,7 +20,9 @@ class LensCheck {
   struct Track {
     double u, v, disparity, u_before, v_before;
   };
-  /// Of the next pair.
+  /// The next pair, CV_8UC1 of one size; `stamp` in ns.
+  void add(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
+  /// Its tracks, found elsewhere.
   void add(const StereoCamera& camera, const std::vector<Track>& tracks);
 
   /// Focal length as a ratio of camera_info's, less one; principal point less camera_info's, in focal lengths.
@@ -37,6 +41,8 @@ class LensCheck {
     double disparity;
   };
   StereoCamera camera_;
+  cv::Mat before_;  ///< the left image of the pair before
+  std::int64_t last_ = 0;
   std::vector<std::vector<Ray>> pairs_;
 };
 

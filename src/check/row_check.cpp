@@ -4,41 +4,26 @@
 #include <cmath>
 #include <limits>
 #include <opencv2/imgproc.hpp>
-#include <opencv2/video/tracking.hpp>
 
 #include "../common/statistics.hpp"
 #include "../common/text.hpp"
 #include "../front_end/block_search.hpp"
+#include "tracks.hpp"
 
 namespace sdvo {
 namespace {
 
 constexpr std::size_t kCells = RowDelay::kParts;
 
-/// Where points went, to a fraction of a pixel; `guess` in, result out. Whether each was found.
-std::vector<std::uint8_t> track(const cv::Mat& from, const cv::Mat& to, const std::vector<cv::Point2f>& points,
-                                std::vector<cv::Point2f>& guess, int levels) {
-  std::vector<std::uint8_t> found;
-  std::vector<float> error;
-  cv::calcOpticalFlowPyrLK(from, to, points, guess, found, error, cv::Size(13, 13), levels,
-                           cv::TermCriteria(cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 30, 0.01),
-                           cv::OPTFLOW_USE_INITIAL_FLOW);
-  return found;
-}
-
-double distance(const cv::Point2f& a, const cv::Point2f& b) {
-  return std::hypot(a.x - b.x, a.y - b.y);
-}
-
 }  // namespace
 
-std::vector<LensCheck::Track> RowCheck::add(const cv::Mat& left, const cv::Mat& right, std::int64_t stamp) {
+void RowCheck::add(const cv::Mat& left, const cv::Mat& right, std::int64_t stamp) {
   constexpr std::int64_t kPeriod = 190000000;  // ns; five pairs a second tell enough
   const cv::Mat before = before_;
   const double dt = 1e-9 * static_cast<double>(stamp - stamp_before_);
   before_ = left.clone();
   stamp_before_ = stamp;
-  if (before.size() != left.size() || !(dt > 0.0) || stamp - last_ < kPeriod) return {};
+  if (before.size() != left.size() || !(dt > 0.0) || stamp - last_ < kPeriod) return;
   last_ = stamp;
   size_ = left.size();
 
@@ -53,7 +38,7 @@ std::vector<LensCheck::Track> RowCheck::add(const cv::Mat& left, const cv::Mat& 
       in_right.emplace_back(corner.x - static_cast<float>(sighting->disparity),
                             corner.y + static_cast<float>(sighting->dv));
     }
-  if (points.empty()) return {};
+  if (points.empty()) return;
 
   const std::vector<cv::Point2f> blocks = in_right;
   std::vector<cv::Point2f> in_before = points, back;
@@ -61,7 +46,6 @@ std::vector<LensCheck::Track> RowCheck::add(const cv::Mat& left, const cv::Mat& 
   back = in_before;
   const auto returned = track(before, left, in_before, back, 0);
   std::vector<RowDelay::Sample> rows;
-  std::vector<LensCheck::Track> tracks;
   for (std::size_t i = 0; i < points.size(); ++i) {
     constexpr double kBlock = 1.5, kReturn = 0.5;  // px: a block is found to a pixel, a track returns (chosen)
     if (!refined[i] || distance(in_right[i], blocks[i]) > kBlock) continue;
@@ -71,10 +55,8 @@ std::vector<LensCheck::Track> RowCheck::add(const cv::Mat& left, const cv::Mat& 
     rows.push_back({cell, static_cast<double>(in_right[i].y - points[i].y), velocity, velocity,
                     static_cast<double>(points[i].x - in_right[i].x)});
     samples_.push_back({cell, rows.back().dv, velocity});
-    tracks.push_back({points[i].x, points[i].y, rows.back().disparity, in_before[i].x, in_before[i].y});
   }
   delay_.add(rows);
-  return tracks;
 }
 
 cv::Mat RowCheck::map() const {

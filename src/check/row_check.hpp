@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "finding.hpp"
-#include "lens_check.hpp"
 #include "stereo_descriptor_vo/rig/row_delay.hpp"
 
 namespace sdvo {
@@ -19,8 +18,8 @@ class RowCheck {
   RowCheck(double max_dv, double max_disparity, double reach)
       : max_dv_(max_dv), max_disparity_(max_disparity), reach_(reach) {}
 
-  /// The next pair, CV_8UC1 of one size; `stamp` in ns. Returns what was followed from the pair before.
-  std::vector<LensCheck::Track> add(const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
+  /// The next pair, CV_8UC1 of one size; `stamp` in ns.
+  void add(const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
 
   Finding rectification() const;
   Finding sameMoment() const;

@@ -22,7 +22,8 @@ void CameraCheck::add(const RecordedPair& pair, const StereoFeatures& features) 
     ++refused_;
     refusal_ = features.report.status;
   }
-  lens_check_.add(pair.camera, rows_.add(pair.left, pair.right, pair.stamp));
+  rows_.add(pair.left, pair.right, pair.stamp);
+  lens_check_.add(pair.camera, pair.left, pair.right, pair.stamp);
   repeats_.add(pair.left, pair.right, pair.stamp);
   images_.add(pair.left, pair.right, features.report);
   emitter_.add(pair.left);

@@ -136,7 +136,9 @@ TEST(RepeatCheck, ASideThatRepeatsIsNamedAndBothOnesAfterASecond) {
     RepeatCheck check;
     for (int i = 0; i < 25; ++i) {
       check.add(grey(c.left ? i : 0), grey(c.right ? 50 + i : 50), i * 50'000'000LL);
-      if (i == 2) EXPECT_EQ(check.problem(), "") << "a driver may hand out an image twice";
+      if (i == 2) {
+        EXPECT_EQ(check.problem(), "") << "a driver may hand out an image twice";
+      }
     }
     EXPECT_EQ(check.problem().substr(0, std::string(c.words).size()), c.words);
     EXPECT_EQ(check.problem().empty(), c.left && c.right);

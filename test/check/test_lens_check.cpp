@@ -56,8 +56,8 @@ TEST(LensCheck, WhatCameraInfoDoesNotHaveOfTheImagesIsNamed) {
        {Case{1.0, 0.0, 0.0, Verdict::kOk, "focal length 1.0"}, Case{1.02, 5.0, -5.0, Verdict::kOk, ""},
         Case{1.0 / 1.1, 0.0, 0.0, Verdict::kWarn, "focal length 1.10"},
         Case{0.75, 0.0, 0.0, Verdict::kWarn, "focal length 1.3"},
-        Case{1.5, 0.0, 0.0, Verdict::kWarn, "focal length 0.6"}, Case{1.0, 0.0, 80.0, Verdict::kWarn, "cy -8"},
-        Case{1.0, -160.0, -100.0, Verdict::kWarn, "cx 1"}}) {
+        Case{1.5, 0.0, 0.0, Verdict::kWarn, "focal length 0.6"}, Case{1.0, 0.0, 80.0, Verdict::kWarn, "cy off by -8"},
+        Case{1.0, -160.0, -100.0, Verdict::kWarn, "cx off by 1"}}) {
     const Finding finding = judged(scaled(c.f, c.dx, c.dy));
     EXPECT_EQ(finding.verdict, c.verdict) << finding.what;
     EXPECT_NE(finding.what.find(c.words), std::string::npos) << finding.what;
