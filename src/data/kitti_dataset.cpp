@@ -7,6 +7,7 @@
 #include <fstream>
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
+#include <optional>
 #include <stdexcept>
 #include <system_error>
 
@@ -74,23 +75,18 @@ int countFrames(const std::string& left_directory, const std::string& right_dire
 using Projection = std::vector<double>;
 
 Projection readProjection(const std::string& path, const std::string& name) {
-  std::ifstream file = openTextFile(path);
-  int number = 0;
-  for (std::string line; std::getline(file, line);) {
-    ++number;
+  std::optional<Projection> projection;
+  readLines(path, false, [&](const std::string& line) {
     const std::vector<std::string> words = splitWords(line);
-    if (words.empty() || words.front() != name + ":") continue;
-    try {
-      Projection projection;
-      for (std::size_t i = 1; i < words.size(); ++i) projection.push_back(parseNumber(words[i]));
-      if (projection.size() == 12) return projection;
+    if (projection || words.front() != name + ":") return;
+    projection.emplace();
+    for (std::size_t i = 1; i < words.size(); ++i) projection->push_back(parseNumber(words[i]));
+    if (projection->size() != 12)
       throw std::invalid_argument("expected 12 numbers after '" + name + ":', found " +
-                                  std::to_string(projection.size()));
-    } catch (const std::invalid_argument& e) {
-      throw std::runtime_error(placeInFile(path, number) + ": " + e.what());
-    }
-  }
-  throw std::runtime_error("file '" + path + "' has no line '" + name + ":'");
+                                  std::to_string(projection->size()));
+  });
+  if (!projection) throw std::runtime_error("file '" + path + "' has no line '" + name + ":'");
+  return *projection;
 }
 
 /// Number of the left camera.
@@ -103,32 +99,21 @@ std::string projectionText(const std::string& name, const Projection& p) {
 }
 
 std::vector<std::int64_t> readStamps(const std::string& path, int count) {
-  std::ifstream file = openTextFile(path);
   std::vector<std::int64_t> stamps;
-  int number = 0;
-  for (std::string line; std::getline(file, line);) {
-    ++number;
-    const std::vector<std::string> words = splitWords(line);
-    const bool complete = static_cast<int>(stamps.size()) == count;
-    if (complete && words.empty()) continue;  // blank lines at the end
-    if (complete)
+  readLines(path, true, [&](const std::string& line) {
+    if (static_cast<int>(stamps.size()) == count)
       throw std::runtime_error("file '" + path + "' has more times than the " + std::to_string(count) +
                                " images: are images missing? An extract needs the times of its own images alone");
-    try {
-      if (words.size() != 1) throw std::invalid_argument("expected one time in seconds");
-      const std::int64_t stamp = parseSeconds(words.front());
-      if (!stamps.empty() && stamp <= stamps.back()) {
-        throw std::invalid_argument("time " + words.front() + " s is not later than the one before");
-      }
-      stamps.push_back(stamp);
-    } catch (const std::invalid_argument& e) {
-      throw std::runtime_error(placeInFile(path, number) + ": " + e.what());
-    }
-  }
-  if (static_cast<int>(stamps.size()) < count) {
+    const std::vector<std::string> words = splitWords(line);
+    if (words.size() != 1) throw std::invalid_argument("expected one time in seconds");
+    const std::int64_t stamp = parseSeconds(words.front());
+    if (!stamps.empty() && stamp <= stamps.back())
+      throw std::invalid_argument("time " + words.front() + " s is not later than the one before");
+    stamps.push_back(stamp);
+  });
+  if (static_cast<int>(stamps.size()) < count)
     throw std::runtime_error("file '" + path + "' has " + std::to_string(stamps.size()) + " times for " +
                              std::to_string(count) + " images");
-  }
   return stamps;
 }
 

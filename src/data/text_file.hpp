@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -76,6 +77,37 @@ Number parseNumber(const std::string& word) {
     throw std::invalid_argument("'" + word + "' is not a finite number");
   }
   return value;
+}
+
+/// Calls `read(line)` for each line that is neither blank nor a comment (#), without its end. A std::invalid_argument
+/// of `read` becomes a std::runtime_error that names file and line, as does a blank line between others where lines
+/// count.
+template <class Read>
+void readLines(const std::string& path, bool lines_count, const Read& read) {
+  std::ifstream file = openTextFile(path);
+  int number = 0, blank = 0;
+  for (std::string line; std::getline(file, line);) {
+    ++number;
+    while (!line.empty() && std::isspace(static_cast<unsigned char>(line.back()))) line.pop_back();
+    if (line.empty()) blank = blank == 0 ? number : blank;
+    const std::size_t first = line.find_first_not_of(" \t");
+    if (first == std::string::npos || line[first] == '#') continue;
+    if (lines_count && blank > 0)
+      throw std::runtime_error(placeInFile(path, blank) + ": a blank line among the others");
+    try {
+      read(line);
+    } catch (const std::invalid_argument& e) {
+      throw std::runtime_error(placeInFile(path, number) + ": " + e.what());
+    }
+  }
+  if (file.bad()) throw std::runtime_error("cannot read file '" + path + "' to its end");
+}
+
+/// Digits alone; throws std::invalid_argument.
+inline std::int64_t parseNanoseconds(const std::string& word) {
+  if (word.empty() || word.size() > 18 + 1 || word.find_first_not_of("0123456789") != std::string::npos)
+    throw std::invalid_argument("'" + word + "' is not a stamp in nanoseconds");
+  return std::stoll(word);
 }
 
 /// Seconds as a decimal number to nanoseconds. Goes through long double: a double near today's Unix time resolves 200

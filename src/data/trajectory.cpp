@@ -93,51 +93,73 @@ std::ostringstream poseText() {
   return text;
 }
 
-std::vector<double> parseNumbers(const std::vector<std::string>& words, std::size_t first = 0) {
-  std::vector<double> numbers;
-  for (std::size_t i = first; i < words.size(); ++i) numbers.push_back(parseNumber(words[i]));
-  return numbers;
+/// Unit quaternion and place.
+Eigen::Isometry3d poseFromNumbers(const Eigen::Vector3d& place, const Eigen::Quaterniond& rotation) {
+  if (std::abs(rotation.norm() - 1.0) > kRotationTolerance)
+    throw std::invalid_argument("the quaternion is not of unit length");
+  return Eigen::Translation3d(place) * rotation.normalized();
 }
 
-/// Calls `read_line(words)` for every line that is not a comment; its std::invalid_argument gets file and line.
-template <class ReadLine>
-void readPoseLines(const std::string& path, std::size_t words_per_line, const ReadLine& read_line) {
-  std::ifstream file = openTextFile(path);
-  int number = 0;
-  int blank_line = 0;
-  int poses = 0;
-  for (std::string line; std::getline(file, line);) {
-    ++number;
+/// A format of poses in lines of numbers. `read`: numbers behind the stamp, where there is one.
+struct PoseFormat {
+  const char* name;
+  std::size_t numbers;  ///< of a line, at least
+  std::int64_t (*stamp)(const std::string& word);
+  Eigen::Isometry3d (*read)(const std::vector<double>& numbers);
+};
+
+const PoseFormat kKitti = {"KITTI's (12 numbers a line)", 12, nullptr, [](const std::vector<double>& n) {
+                             std::array<double, 12> rows;
+                             std::copy(n.begin(), n.end(), rows.begin());
+                             return poseFromRows(rows);
+                           }};
+const PoseFormat kTum = {"TUM's (stamp in s, x y z, qx qy qz qw)", 8, parseSeconds, [](const std::vector<double>& n) {
+                           return poseFromNumbers({n[0], n[1], n[2]}, {n[6], n[3], n[4], n[5]});
+                         }};
+const PoseFormat kEuroc = {"EuRoC's (stamp in ns, x, y, z, qw, qx, qy, qz, …)", 8, parseNanoseconds,
+                           [](const std::vector<double>& n) {
+                             return poseFromNumbers({n[0], n[1], n[2]}, {n[3], n[4], n[5], n[6]});
+                           }};
+
+/// By the first line of poses.
+const PoseFormat& formatOf(const std::string& line) {
+  const std::size_t numbers = splitWords(line).size();
+  if (line.find(',') < line.find_first_of(" \t") && std::count(line.begin(), line.end(), ',') >= 7) return kEuroc;
+  for (const PoseFormat* format : {&kKitti, &kTum})
+    if (numbers == format->numbers) return *format;
+  throw std::invalid_argument(std::to_string(numbers) + " numbers: poses are " + kKitti.name + ", " + kTum.name +
+                              " or " + kEuroc.name);
+}
+
+/// `wanted`: null for any that readPoses() takes.
+StampedTrajectory readPosesAs(const std::string& path, const PoseFormat* wanted) {
+  StampedTrajectory trajectory;
+  const PoseFormat* format = nullptr;
+  readLines(path, true, [&](std::string line) {
+    if (!format) {
+      format = &formatOf(line);
+      if (wanted && format != wanted)
+        throw std::invalid_argument("poses in " + std::string(format->name) + " format, expected " + wanted->name);
+    }
+    if (format == &kEuroc) std::replace(line.begin(), line.end(), ',', ' ');
     const std::vector<std::string> words = splitWords(line);
-    if (!words.empty() && words.front().front() == '#') continue;
-    if (words.empty()) {
-      if (blank_line == 0) blank_line = number;
-      continue;
+    if (words.size() < format->numbers || (words.size() > format->numbers && format != &kEuroc))
+      throw std::invalid_argument("expected " + std::to_string(format->numbers) + " numbers, found " +
+                                  std::to_string(words.size()));
+    if (format->stamp) {
+      const std::int64_t stamp = format->stamp(words.front());
+      if (!trajectory.stamps.empty() && stamp <= trajectory.stamps.back())
+        throw std::invalid_argument("stamp " + words.front() + " is not later than the one before");
+      trajectory.stamps.push_back(stamp);
     }
-    if (blank_line > 0) throw std::runtime_error(placeInFile(path, blank_line) + ": a blank line among the poses");
-    try {
-      if (words.size() != words_per_line) {
-        throw std::invalid_argument("expected " + std::to_string(words_per_line) + " numbers, found " +
-                                    std::to_string(words.size()));
-      }
-      read_line(words);
-    } catch (const std::invalid_argument& e) {
-      throw std::runtime_error(placeInFile(path, number) + ": " + e.what());
-    }
-    ++poses;
-  }
-  if (file.bad()) throw std::runtime_error("cannot read file '" + path + "' to its end");
-  if (poses == 0) throw std::runtime_error("file '" + path + "' contains no poses");
-}
-
-/// TUM's lines have eight words, or begin with a comment; KITTI's have twelve.
-bool hasStamps(const std::string& path) {
-  std::ifstream file = openTextFile(path);
-  std::string line;
-  while (std::getline(file, line))
-    if (const std::vector<std::string> words = splitWords(line); !words.empty())
-      return words.front().front() == '#' || words.size() == 8;
-  return false;
+    std::vector<double> numbers;
+    std::transform(words.begin() + (format->stamp ? 1 : 0),
+                   words.begin() + static_cast<std::ptrdiff_t>(format->numbers), std::back_inserter(numbers),
+                   parseNumber<double>);
+    trajectory.poses.push_back(format->read(numbers));
+  });
+  if (!format) throw std::runtime_error("file '" + path + "' contains no poses");
+  return trajectory;
 }
 
 /// Poses further apart than this (ns) are not interpolated: the motion between them may be anything.
@@ -176,15 +198,16 @@ Eigen::Isometry3d poseFromRows(const std::array<double, 12>& rows) {
   return pose;
 }
 
+StampedTrajectory readPoses(const std::string& path) {
+  return readPosesAs(path, nullptr);
+}
+
 Trajectory readKittiPoses(const std::string& path) {
-  Trajectory poses;
-  readPoseLines(path, 12, [&](const std::vector<std::string>& words) {
-    const std::vector<double> numbers = parseNumbers(words);
-    std::array<double, 12> rows;
-    std::copy(numbers.begin(), numbers.end(), rows.begin());
-    poses.push_back(poseFromRows(rows));
-  });
-  return poses;
+  return readPosesAs(path, &kKitti).poses;
+}
+
+StampedTrajectory readTumPoses(const std::string& path) {
+  return readPosesAs(path, &kTum);
 }
 
 void writeKittiPoses(const std::string& path, const Trajectory& poses) {
@@ -193,24 +216,6 @@ void writeKittiPoses(const std::string& path, const Trajectory& poses) {
     for (int i = 0; i < 12; ++i) file << pose.matrix()(i / 4, i % 4) << (i == 11 ? '\n' : ' ');
   }
   writeTextFile(path, file.str());
-}
-
-StampedTrajectory readTumPoses(const std::string& path) {
-  StampedTrajectory trajectory;
-  readPoseLines(path, 8, [&](const std::vector<std::string>& words) {
-    const std::int64_t stamp = parseSeconds(words.front());
-    if (!trajectory.stamps.empty() && stamp <= trajectory.stamps.back()) {
-      throw std::invalid_argument("stamp " + words.front() + " s is not later than the one before");
-    }
-    const std::vector<double> n = parseNumbers(words, 1);
-    const Eigen::Quaterniond rotation(n[6], n[3], n[4], n[5]);
-    if (std::abs(rotation.norm() - 1.0) > kRotationTolerance) {
-      throw std::invalid_argument("the quaternion is not of unit length");
-    }
-    trajectory.stamps.push_back(stamp);
-    trajectory.poses.push_back(Eigen::Translation3d(n[0], n[1], n[2]) * rotation.normalized());
-  });
-  return trajectory;
 }
 
 void writeTumPoses(const std::string& path, const StampedTrajectory& trajectory) {
@@ -323,19 +328,39 @@ TrajectoryErrors evaluateTrajectory(const Trajectory& ground_truth, const Trajec
 
 std::vector<std::optional<Eigen::Isometry3d>> readGroundTruth(const std::string& path,
                                                               const std::vector<std::int64_t>& stamps) {
-  if (!hasStamps(path)) {
-    const Trajectory poses = readKittiPoses(path);
-    if (poses.size() < stamps.size())
-      throw std::runtime_error("file '" + path + "' has " + std::to_string(poses.size()) + " poses for " +
-                               std::to_string(stamps.size()) + " pairs: one line for each is needed, or TUM's format");
-    return {poses.begin(), poses.begin() + static_cast<std::ptrdiff_t>(stamps.size())};
+  const StampedTrajectory truth = readPoses(path);
+  if (truth.stamps.empty()) {
+    if (truth.poses.size() < stamps.size())
+      throw std::runtime_error("file '" + path + "' has " + std::to_string(truth.poses.size()) + " poses for " +
+                               std::to_string(stamps.size()) + " pairs: one line for each is needed, or stamps as in " +
+                               kTum.name + " format");
+    return {truth.poses.begin(), truth.poses.begin() + static_cast<std::ptrdiff_t>(stamps.size())};
   }
-  const StampedTrajectory truth = readTumPoses(path);
   std::vector<std::optional<Eigen::Isometry3d>> poses;
   for (const std::int64_t stamp : stamps) poses.push_back(interpolated(truth, stamp));
   if (std::count_if(poses.begin(), poses.end(), [](const auto& pose) { return pose.has_value(); }) < 2)
     throw std::runtime_error("file '" + path + "' has no poses at the stamps of the recording");
   return poses;
+}
+
+std::pair<Trajectory, Trajectory> readComparable(const std::string& ground_truth, const std::string& estimate) {
+  const StampedTrajectory truth = readPoses(ground_truth), estimated = readPoses(estimate);
+  if (truth.stamps.empty() || estimated.stamps.empty()) {
+    // Without stamps on both sides only lines tell which poses belong together.
+    if (truth.stamps.empty() != estimated.stamps.empty() && truth.poses.size() != estimated.poses.size())
+      throw std::runtime_error("'" + ground_truth + "' has " + std::to_string(truth.poses.size()) + " poses, '" +
+                               estimate + "' " + std::to_string(estimated.poses.size()) +
+                               ", and one of both has no stamps: run_sequence writes either by --format kitti or tum");
+    return {truth.poses, estimated.poses};
+  }
+  std::pair<Trajectory, Trajectory> both;
+  const auto truths = readGroundTruth(ground_truth, estimated.stamps);
+  for (std::size_t i = 0; i < truths.size(); ++i) {
+    if (!truths[i]) continue;
+    both.first.push_back(*truths[i]);
+    both.second.push_back(estimated.poses[i]);
+  }
+  return both;
 }
 
 }  // namespace sdvo

@@ -35,8 +35,9 @@ View viewOf(const CameraInfo& info, const std::string& side) {
   const std::string name = side + " camera_info";
   for (std::size_t i = 0; i < info.P.size(); ++i)
     if (!std::isfinite(info.P[i])) throw std::invalid_argument(name + ": P[" + std::to_string(i) + "] is not a number");
-  if (info.K[0] == 0.0 || info.P[0] == 0.0 || info.P[5] == 0.0)
-    throw std::invalid_argument(name + ": K or P is zero, the camera is not calibrated (REP-104)");
+  // K is of the raw image, which drivers that rectify need not have.
+  if (info.P[0] == 0.0 || info.P[5] == 0.0)
+    throw std::invalid_argument(name + ": P is zero, the camera is not calibrated (REP-104)");
   if (info.P[0] < 0.0 || info.P[5] < 0.0) throw std::invalid_argument(name + ": a focal length in P is negative");
   const double x = std::max(1u, info.binning_x), y = std::max(1u, info.binning_y);
   return {info.P[0] / x,

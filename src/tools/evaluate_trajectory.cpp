@@ -100,18 +100,21 @@ void writeJson(const std::string& path, const TrajectoryErrors& errors) {
 int main(int argc, char** argv) {
   CLI::App app(
       "Errors of an estimated trajectory: KITTI translation and rotation errors over sub-paths, RPE, ATE, final drift "
-      "and scale. A shorter estimate is compared with the first poses of the ground truth.");
+      "and scale. Poses of both files belong together by their stamps; without stamps by their lines, and a shorter "
+      "estimate is compared with the first poses of the ground truth.");
   std::string ground_truth, estimate, json;
   std::vector<double> lengths = sdvo::kittiLengths();
-  app.add_option("--ground-truth", ground_truth, "True poses, KITTI format (12 numbers per line)")->required();
-  app.add_option("--estimate", estimate, "Estimated poses, KITTI format")->required();
+  app.add_option("--ground-truth", ground_truth,
+                 "True poses: KITTI's format (12 numbers a line), TUM's, or EuRoC's CSV")
+      ->required();
+  app.add_option("--estimate", estimate, "Estimated poses in one of these formats")->required();
   app.add_option("--lengths", lengths, "Lengths of the sub-paths in m, e.g. 5,10,20 (default 100,200,...,800)")
       ->delimiter(',');
   app.add_option("--json", json, "Also write the errors to this file");
 
   return sdvo::runTool(app, argc, argv, [&] {
-    const TrajectoryErrors errors =
-        sdvo::evaluateTrajectory(sdvo::readKittiPoses(ground_truth), sdvo::readKittiPoses(estimate), lengths);
+    const auto [truth, estimated] = sdvo::readComparable(ground_truth, estimate);
+    const TrajectoryErrors errors = sdvo::evaluateTrajectory(truth, estimated, lengths);
     printTable(errors);
     std::fflush(stdout);
     if (!json.empty()) writeJson(json, errors);

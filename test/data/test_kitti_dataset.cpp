@@ -151,7 +151,7 @@ TEST_F(KittiDataset, BadTimesAreNamed) {
   writeText("times.txt", "0.0\nabc\n0.1\n");
   EXPECT_TRUE(contains(openError(), "line 2: 'abc' is not a finite number")) << openError();
   writeText("times.txt", "0.0\n\n0.1\n");
-  EXPECT_TRUE(contains(openError(), "line 2: expected one time")) << openError();
+  EXPECT_TRUE(contains(openError(), "line 2: a blank line")) << openError();
   fs::remove(directory_ / "times.txt");
   EXPECT_TRUE(contains(openError(), path("times.txt") + "': it does not exist"));
 }

@@ -148,6 +148,33 @@ TEST(TumPoses, ErrorsNameFileAndLine) {
   EXPECT_THROW(writeTumPoses("/dev/null", {{0}, {}}), std::invalid_argument);
 }
 
+TEST(Poses, AFormatIsKnownByItsFirstLine) {
+  const TemporaryFile kitti(kIdentityLine), tum("1.5 1 2 3 0 0 0 1\n"),
+      euroc("#timestamp [ns], p_RS_R_x [m], …\n1500000000,1,2,3,1,0,0,0,0.1,0.1\n"), other("1 2 3\n");
+  EXPECT_TRUE(readPoses(kitti.path()).stamps.empty());
+  for (const TemporaryFile* file : {&tum, &euroc}) {
+    const StampedTrajectory read = readPoses(file->path());
+    EXPECT_EQ(read.stamps, std::vector<std::int64_t>{1500000000});
+    EXPECT_TRUE(read.poses.at(0).isApprox(pose(1.0, 2.0, 3.0)));
+  }
+  const std::string error = errorOf([&] { readPoses(other.path()); });
+  for (const char* word : {"line 1: 3 numbers", "KITTI", "TUM", "EuRoC"})
+    EXPECT_NE(error.find(word), std::string::npos) << error;
+  EXPECT_NE(errorOf([&] { readKittiPoses(tum.path()); }).find("poses in TUM's"), std::string::npos);
+}
+
+TEST(Poses, BelongTogetherByStampsOrElseByLines) {
+  const TemporaryFile truth("1 0 0 0 0 0 0 1\n1.2 0 0 2 0 0 0 1\n1.4 0 0 4 0 0 0 1\n"),
+      estimate("0.5 0 0 9 0 0 0 1\n1.1 0 0 1 0 0 0 1\n1.4 0 0 4 0 0 0 1\n"), kitti, fewer(kIdentityLine);
+  const auto [at_stamps, estimated] = readComparable(truth.path(), estimate.path());
+  ASSERT_EQ(estimated.size(), 2u);  // the truth begins later
+  for (const std::size_t i : {0u, 1u}) EXPECT_TRUE(at_stamps[i].isApprox(estimated[i], 1e-12)) << i;
+  writeKittiPoses(kitti.path(), curve(3));
+  EXPECT_EQ(readComparable(truth.path(), kitti.path()).second.size(), 3u);
+  EXPECT_EQ(readComparable(kitti.path(), fewer.path()).second.size(), 1u);
+  EXPECT_NE(errorOf([&] { readComparable(truth.path(), fewer.path()); }).find("--format"), std::string::npos);
+}
+
 TEST(Errors, AreZeroForTheTrajectoryItselfAnywhereInTheWorld) {
   const Trajectory truth = curve(100);
   Trajectory moved;

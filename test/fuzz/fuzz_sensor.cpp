@@ -18,7 +18,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::filesystem::path mav0 = std::filesystem::path(sensor).parent_path().parent_path();
   std::filesystem::copy_file(list, mav0 / "cam1/data.csv", std::filesystem::copy_options::overwrite_existing);
   try {
-    if (sdvo::EurocSequence(mav0.string()).camera(0).size.width <= 0) __builtin_trap();
+    if (sdvo::EurocSequence(mav0.string()).rectification().raw(0).size.width <= 0) __builtin_trap();
   } catch (const std::runtime_error&) {
   }
   return 0;

@@ -43,6 +43,19 @@ TEST(ToStereoCamera, GeometryComesFromPNotFromK) {
   EXPECT_DOUBLE_EQ(camera.cx, 600.0);
 }
 
+/// As of a driver that rectifies itself.
+TEST(ToStereoCamera, PAloneIsEnough) {
+  sensor_msgs::CameraInfo left = cameraInfo(0.0), right = cameraInfo(-350.0);
+  for (sensor_msgs::CameraInfo* info : {&left, &right}) {
+    info->K.assign(0.0);
+    info->R.assign(0.0);
+    info->D.clear();
+    info->distortion_model.clear();
+  }
+  EXPECT_EQ(toStereoCamera(left, right), toStereoCamera(cameraInfo(0.0), cameraInfo(-350.0)));
+  EXPECT_EQ(whyUnrectified(left, right), "");
+}
+
 TEST(ToStereoCamera, BinningAndRegionOfInterest) {
   sensor_msgs::CameraInfo left = cameraInfo(0.0), right = cameraInfo(-350.0);
   for (sensor_msgs::CameraInfo* info : {&left, &right}) {
@@ -71,12 +84,9 @@ TEST(ToStereoCamera, RefusesWhatIsNoRectifiedPair) {
   };
 
   sensor_msgs::CameraInfo uncalibrated = right;
-  uncalibrated.K.assign(0.0);
-  EXPECT_TRUE(contains(refusal(left, uncalibrated), "right camera_info"));
-  EXPECT_TRUE(contains(refusal(uncalibrated, right), "left camera_info"));
-  sensor_msgs::CameraInfo zero_p = right;
-  zero_p.P.assign(0.0);
-  EXPECT_TRUE(contains(refusal(left, zero_p), "calibrated"));
+  uncalibrated.P.assign(0.0);
+  EXPECT_TRUE(contains(refusal(left, uncalibrated), "right camera_info: P is zero"));
+  EXPECT_TRUE(contains(refusal(uncalibrated, right), "left camera_info: P is zero"));
   sensor_msgs::CameraInfo no_size = left;
   no_size.width = 0;
   EXPECT_TRUE(contains(refusal(no_size, right), "size"));

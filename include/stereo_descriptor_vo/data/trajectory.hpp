@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "stereo_descriptor_vo/common/cpp17.hpp"
@@ -16,13 +17,17 @@ using Trajectory = std::vector<Eigen::Isometry3d>;
 
 /// Poses with their stamps, in the order of time; both lists have the same length.
 struct StampedTrajectory {
-  std::vector<std::int64_t> stamps;  ///< ns
+  std::vector<std::int64_t> stamps;  ///< ns; none where a file has none
   Trajectory poses;
 };
 
 /// Pose from the rows of its 3x4 matrix. A rotation written with few digits is replaced by the nearest exact one;
 /// throws std::invalid_argument when the matrix is none (rows not orthonormal to 1e-3, a reflection, or not finite).
 Eigen::Isometry3d poseFromRows(const std::array<double, 12>& rows);
+
+/// Reads poses in KITTI's format (no stamps), TUM's or EuRoC's (CSV: stamp in ns, x, y, z, qw, qx, qy, qz, …, of the
+/// body), which the first line shows. Throws std::runtime_error that names file, line and these formats.
+StampedTrajectory readPoses(const std::string& path);
 
 /// Reads KITTI poses (one line of 12 numbers per frame: 3x4, row-major). Throws std::runtime_error that names file and
 /// line when a line is malformed; blank lines are only allowed at the end, since they would shift the frames after
@@ -84,10 +89,14 @@ std::vector<SubPathErrors> subPathErrors(const Trajectory& ground_truth, const T
 TrajectoryErrors evaluateTrajectory(const Trajectory& ground_truth, const Trajectory& estimate,
                                     const std::vector<double>& lengths = kittiLengths());
 
-/// True poses of the left camera at these stamps (ns); none where the file knows none. A file in KITTI's format has one
-/// pose for each stamp, one in TUM's format stamps of its own, between which poses are interpolated. Throws
-/// std::runtime_error that names the file where it cannot be read or fits no stamp.
+/// True poses at these stamps (ns) from a file as readPoses() takes it; none where the file knows none. Without stamps
+/// it has one pose for each, with stamps they are interpolated. Throws std::runtime_error that names the file where it
+/// cannot be read or fits no stamp.
 std::vector<std::optional<Eigen::Isometry3d>> readGroundTruth(const std::string& path,
                                                               const std::vector<std::int64_t>& stamps);
+
+/// True and estimated poses that belong together: by their stamps where both files have some, else by their lines.
+/// Throws std::runtime_error that names the files where neither tells.
+std::pair<Trajectory, Trajectory> readComparable(const std::string& ground_truth, const std::string& estimate);
 
 }  // namespace sdvo

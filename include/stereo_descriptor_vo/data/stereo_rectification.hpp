@@ -1,0 +1,61 @@
+#pragma once
+
+#include <Eigen/Geometry>
+#include <array>
+#include <opencv2/core.hpp>
+#include <string>
+#include <vector>
+
+#include "stereo_descriptor_vo/common/stereo_camera.hpp"
+#include "stereo_descriptor_vo/data/kitti_dataset.hpp"
+
+namespace sdvo {
+
+/// A raw camera in OpenCV's models.
+struct RawCamera {
+  cv::Size size;
+  cv::Matx33d K;
+  std::vector<double> D;        ///< pinhole: k1 k2 p1 p2 [k3 [k4 k5 k6 …]]; equidistant: k1 k2 k3 k4
+  bool is_equidistant = false;  ///< cv::fisheye
+
+  /// `model` by a name that ROS, Kalibr or EuRoC give it. Throws std::invalid_argument that names those there are.
+  void setLens(const std::string& model, std::vector<double> coefficients);
+};
+
+using RawCameras = std::array<RawCamera, 2>;  ///< left, right
+
+/// How the raw views of two cameras become rectified ones, by OpenCV.
+class StereoRectification {
+ public:
+  /// From a calibration: `rotations` from each raw camera's axes to the rectified ones, and the rectified camera.
+  StereoRectification(const RawCameras& raw, const std::array<cv::Matx33d, 2>& rotations, const StereoCamera& camera);
+
+  /// From the pose of both. `fov`: from the left edge of the rectified images to the right one, deg; 0: without black
+  /// borders, at most 110. Throws std::invalid_argument when the two are no pair from left to right.
+  StereoRectification(const RawCameras& raw, const Eigen::Isometry3d& T_right_left, double fov = 0.0);
+
+  const RawCamera& raw(int side) const { return raw_[static_cast<std::size_t>(side)]; }
+  const cv::Matx33d& rotation(int side) const { return rotations_[static_cast<std::size_t>(side)]; }
+  /// Of the rectified views.
+  const StereoCamera& camera() const { return camera_; }
+
+  ImagePair rectify(const ImagePair& raw) const;
+
+ private:
+  void makeMaps();
+
+  RawCameras raw_;
+  std::array<cv::Matx33d, 2> rotations_;
+  StereoCamera camera_;
+  cv::Mat map_x_[2], map_y_[2];  ///< raw pixel of each rectified one
+};
+
+/// The same camera with equal focal lengths that see so many degrees from side to side, around the middle of the image.
+StereoCamera withFieldOfView(StereoCamera camera, double fov);
+
+/// A calibration of two cameras: a camera chain of Kalibr's (cam0, cam1), or of the left and the right camera one
+/// camera_info YAML file each, or one sensor.yaml each (EuRoC). `fov` as above; 0 leaves camera_info's projection.
+/// Throws std::runtime_error that names the file and these formats.
+StereoRectification readCalibration(const std::vector<std::string>& files, double fov = 0.0);
+
+}  // namespace sdvo
