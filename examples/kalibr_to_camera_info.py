@@ -3,15 +3,19 @@
 
     rosrun stereo_descriptor_vo kalibr_to_camera_info.py camchain.yaml --output FOLDER [--left cam0 --right cam1]
 
-writes FOLDER/left.yaml and FOLDER/right.yaml: D and K are Kalibr's; R and P rectify the pair (OpenCV, equal rows, no black borders)."""
+writes FOLDER/left.yaml and FOLDER/right.yaml: D and K are Kalibr's; R and P rectify the pair (OpenCV, equal rows, no black borders). A wide
+lens is rectified to 110 degrees from side to side, which keeps the resolution of its middle, or to those of --fov."""
 
 import argparse
+import math
 import os
 import sys
 
 import cv2
 import numpy as np
 import yaml
+
+WIDEST = 110.0  # deg; at the edge a pixel sees a third (cos^2) of the angle that one in the middle sees
 
 
 class Camera:
@@ -53,8 +57,12 @@ def transform(chain, left, right):
     return from_first[right] @ np.linalg.inv(from_first[left])
 
 
-def rectify(left, right, T):
-    """R and P of both."""
+def focal_length(width, fov):
+    return width / 2 / math.tan(math.radians(fov) / 2)
+
+
+def rectify(left, right, T, fov):
+    """R and P of both. fov in deg; 0: what has no black borders, at most WIDEST."""
     if left.size != right.size or left.lens != right.lens:
         raise ValueError('both cameras need the same resolution and the same distortion_model')
     R, t = T[:3, :3], T[:3, 3]
@@ -70,6 +78,14 @@ def rectify(left, right, T):
         found = cv2.stereoRectify(left.k, np.array(left.d), right.k, np.array(right.d), left.size, R, t,
                                   flags=cv2.CALIB_ZERO_DISPARITY, alpha=0)
     R1, R2, P1, P2 = found[:4]
+    width, height = left.size
+    if fov == 0 and not P1[0, 0] >= focal_length(width, WIDEST):
+        fov = WIDEST
+    if fov > 0:
+        f, baseline = focal_length(width, fov), -P2[0, 3] / P2[0, 0]
+        for P in P1, P2:
+            P[:, :3] = [[f, 0, (width - 1) / 2], [0, f, (height - 1) / 2], [0, 0, 1]]
+        P2[0, 3] = -f * baseline
     return (R1, P1), (R2, P2)
 
 
@@ -84,14 +100,17 @@ def main():
     parser.add_argument('--output', required=True, metavar='FOLDER', help='made if it is not there')
     parser.add_argument('--left', default='cam0', help='name in the chain (%(default)s)')
     parser.add_argument('--right', default='cam1', help='name in the chain (%(default)s)')
+    parser.add_argument('--fov', type=float, default=0, help='field of view of the rectified images, from side to side, deg')
     arguments = parser.parse_args()
+    if not 0 <= arguments.fov <= 170:
+        parser.error('--fov is between 0 and 170 deg')
     try:
         with open(arguments.camchain) as file:
             chain = yaml.safe_load(file)
         if not isinstance(chain, dict):
             raise ValueError('it is no camera chain')
         left, right = Camera(chain, arguments.left), Camera(chain, arguments.right)
-        sides = rectify(left, right, transform(chain, arguments.left, arguments.right))
+        sides = rectify(left, right, transform(chain, arguments.left, arguments.right), arguments.fov)
         os.makedirs(arguments.output, exist_ok=True)
         for name, camera, (R, P) in zip(('left', 'right'), (left, right), sides):
             with open(os.path.join(arguments.output, name + '.yaml'), 'w') as file:

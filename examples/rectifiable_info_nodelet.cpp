@@ -8,32 +8,55 @@
 #include <cmath>
 #include <pluginlib/class_list_macros.hpp>
 #include <set>
+#include <stdexcept>
 #include <string>
 
 namespace examples {
 
 /// Hands on the camera_info that image_proc can rectify by, to rectifiable/camera_info. At any other one image_proc's
-/// exception would end the whole manager. Further names of a lens model become image_proc's.
+/// exception would end the whole manager. Further names of a lens model become image_proc's, and P that of ~fov (deg
+/// from side to side; 0: as calibrated).
 class RectifiableInfoNodelet : public nodelet::Nodelet {
  private:
   using Info = sensor_msgs::CameraInfo;
 
   void onInit() override {
     ros::NodeHandle nh = getNodeHandle();
+    fov_ = getPrivateNodeHandle().param("fov", 0.0);
+    if (!(fov_ >= 0.0 && fov_ <= kWidest)) throw std::invalid_argument("~fov is between 0 and 170 deg");
     publisher_ = nh.advertise<Info>("rectifiable/camera_info", kQueue);
     subscriber_ = nh.subscribe<Info>("camera_info", kQueue, [this](const Info::ConstPtr& info) { take(info); });
   }
 
-  void take(const Info::ConstPtr& info) {
+  void take(const Info::ConstPtr& given) {
     static const std::set<std::string> fisheyes = {"fisheye", "kannala_brandt", "kannala_brandt4"};
-    if (fisheyes.count(info->distortion_model) > 0) {
-      const auto renamed = boost::make_shared<Info>(*info);
-      renamed->distortion_model = sensor_msgs::distortion_models::EQUIDISTANT;
-      return take(renamed);
-    }
+    const auto info = boost::make_shared<Info>(*given);
+    if (fisheyes.count(info->distortion_model) > 0)
+      info->distortion_model = sensor_msgs::distortion_models::EQUIDISTANT;
+    if (info->distortion_model == sensor_msgs::distortion_models::EQUIDISTANT && info->D.size() == 5 &&
+        info->D[4] == 0.0)
+      info->D.pop_back();  // a T265's driver fills up with a zero
     const std::string problem = whyUnrectifiable(*info);
-    if (problem.empty()) return publisher_.publish(info);
-    NODELET_ERROR_STREAM_THROTTLE(kPeriod, subscriber_.getTopic() << ": no image is rectified: " << problem);
+    if (!problem.empty()) {
+      NODELET_ERROR_STREAM_THROTTLE(kPeriod, subscriber_.getTopic() << ": no image is rectified: " << problem);
+      return;
+    }
+    if (fov_ > 0.0 && info->P[0] > 0.0) {
+      const double f = 0.5 * info->width / std::tan(0.5 * fov_ * M_PI / 180.0);
+      info->P = {f,
+                 0.0,
+                 0.5 * (info->width - 1.0),
+                 info->P[3] * f / info->P[0],
+                 0.0,
+                 f,
+                 0.5 * (info->height - 1.0),
+                 0.0,
+                 0.0,
+                 0.0,
+                 1.0,
+                 0.0};
+    }
+    publisher_.publish(info);
   }
 
   static std::string whyUnrectifiable(const Info& info) {
@@ -59,7 +82,10 @@ class RectifiableInfoNodelet : public nodelet::Nodelet {
   }
 
   static constexpr int kQueue = 10;
-  static constexpr double kPeriod = 5.0;  // s between errors
+  static constexpr double kPeriod = 5.0;    // s between errors
+  static constexpr double kWidest = 170.0;  // deg
+
+  double fov_ = 0.0;  ///< deg
 
   ros::Publisher publisher_;
   ros::Subscriber subscriber_;

@@ -5,12 +5,14 @@
 #include <utility>
 
 namespace sdvo {
+
+const std::vector<std::string> kRectifiedImages = {"image_rect", "image_rect_raw", "image_rect_gray",
+                                                   "image_rect_color"};
+
 namespace {
 
-/// As drivers and image_proc call rectified images, what is best for features first.
-const std::vector<std::string> kImages = {"image_rect", "image_rect_raw", "image_rect_gray", "image_rect_color"};
 const std::vector<std::pair<std::string, std::string>> kSides = {
-    {"left", "right"}, {"infra1", "infra2"}, {"cam0", "cam1"}};
+    {"left", "right"}, {"infra1", "infra2"}, {"cam0", "cam1"}, {"fisheye1", "fisheye2"}};
 
 std::string replaced(std::string text, const std::string& from, const std::string& to) {
   for (std::size_t at = text.find(from); at != text.npos; at = text.find(from, at + to.size()))
@@ -37,9 +39,10 @@ std::string explainUnpublished(const std::vector<std::string>& names, const ros:
   return text;
 }
 
-std::vector<ros::M_string> findStereoCameras(const std::string& ns, const ros::master::V_TopicInfo& topics) {
+std::vector<ros::M_string> findStereoCameras(const std::string& ns, const ros::master::V_TopicInfo& topics,
+                                             const std::vector<std::string>& images) {
   std::map<std::string, ros::M_string> cameras;  // by the folder of the left one
-  for (const std::string& image : kImages)
+  for (const std::string& image : images)
     for (const ros::master::TopicInfo& topic : topics)
       for (const auto& [left, right] : kSides) {
         const std::size_t folder = topic.name.rfind('/') + 1;

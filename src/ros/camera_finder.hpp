@@ -9,9 +9,13 @@
 
 namespace sdvo {
 
-/// The stereo cameras under a namespace (with its last `/`): rectified images and a camera_info beside each, left and
-/// right named alike. Each as remappings of left|right/image_rect and left|right/camera_info.
-std::vector<ros::M_string> findStereoCameras(const std::string& ns, const ros::master::V_TopicInfo& topics);
+/// As drivers and image_proc call rectified images, what is best for features first.
+extern const std::vector<std::string> kRectifiedImages;
+
+/// The stereo cameras under a namespace (with its last `/`): images of one of these names and a camera_info beside
+/// each, left and right named alike. Each as remappings of left|right/image_rect and left|right/camera_info.
+std::vector<ros::M_string> findStereoCameras(const std::string& ns, const ros::master::V_TopicInfo& topics,
+                                             const std::vector<std::string>& images = kRectifiedImages);
 
 /// Which of these topics nobody publishes, each with a leading "; ", and what to do where it comes compressed.
 std::string explainUnpublished(const std::vector<std::string>& names, const ros::master::V_TopicInfo& topics);

@@ -58,6 +58,9 @@ class TriggerSynchroniser {
     }
   }
 
+  /// Incomplete sets.
+  std::size_t waiting() const { return waiting_.size(); }
+
  private:
   using MessageSet = std::tuple<boost::shared_ptr<const Messages>...>;
 

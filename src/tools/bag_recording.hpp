@@ -4,10 +4,11 @@
 #include <rosbag/bag.h>
 
 #include <array>
+#include <optional>
 #include <string>
 #include <vector>
 
-#include "../ros/stereo_input.hpp"
+#include "camera_input.hpp"
 #include "recording.hpp"
 
 namespace sdvo {
@@ -16,32 +17,29 @@ namespace sdvo {
 class BagRecording : public Recording {
  public:
   /// Throws std::runtime_error where a topic is missing.
-  BagRecording(const std::string& path, const StereoNames& names);
+  BagRecording(const std::string& path, const StereoSource& source);
 
   int size() const override;
-  int forEach(int limit, const Use& use) override;
+  int forEach(int limit, const Use& use, const Refuse& refuse) override;
   void forEachBackwards(const Use& use) const override;
-  ArrivalFindings arrivals(const std::string& base_frame) const override;
+  ArrivalFindings arrivals(const std::string& base_frame) const override { return input_->findings(base_frame, true); }
 
  private:
-  /// Times at which the four messages of a pair were recorded.
-  using Times = std::array<ros::Time, 4>;
-  struct Part {
-    StereoPairMessages messages;
-    Times recorded;
-  };
+  /// Of the four messages of a pair.
   struct Used {
-    ros::Time stamp;
-    Times recorded;
+    std::array<ros::Time, 4> stamps, recorded;
   };
+
+  int useAll(int limit, const Use& use, const Refuse& refuse);
   StereoPairMessages read(const Used& pair) const;
 
-  int useAll(int limit, const Use& use);
-
   const std::string path_;
+  const double fov_;
+  const std::optional<StereoInfos> infos_;  ///< in place of those of the bag
   rosbag::Bag bag_;
   StereoTopics topics_;
   std::vector<Used> used_;
+  std::unique_ptr<CameraInput> input_;  ///< of the last forEach()
 };
 
 }  // namespace sdvo

@@ -1,70 +1,92 @@
 #include "camera_input.hpp"
 
-#include <rosbag/view.h>
 #include <tf2_eigen/tf2_eigen.h>
 
+#include <algorithm>
+#include <boost/make_shared.hpp>
+#include <stdexcept>
 #include <utility>
-#include <vector>
 
 #include "../common/text.hpp"
-#include "../messages/camera_conversions.hpp"
 #include "../messages/frames.hpp"
+#include "../messages/stamps.hpp"
 
 namespace sdvo {
 
-RecordedPair recordedPair(const DecodedPair& decoded, const StereoPairMessages& messages, std::int64_t stamp) {
-  return {decoded.camera,
-          decoded.left,
-          decoded.right,
-          stamp,
-          messages.left_info->distortion_model,
-          ros_conversions::whyUnrectified(*messages.left_info, *messages.right_info)};
-}
+namespace {
 
-CameraInput::CameraInput(const StereoTopics& topics, std::function<void(const StereoPairMessages&)> use)
-    : stamps_(topics),
+/// Messages of each topic that wait for partners, of which none may ever come: images take memory.
+constexpr int kWaiting = 100;
+
+}  // namespace
+
+CameraInput::CameraInput(const StereoTopics& topics, std::optional<StereoInfos> infos, Use use)
+    : topics_(topics),
+      infos_(std::move(infos)),
+      stamps_(topics),
       arrivals_(StereoInputOptions(), unused_),
-      pairs_(StereoInputOptions().sync_queue_size, StereoInputOptions().sync_tolerance,
-             [this, use = std::move(use)](
-                 const sensor_msgs::ImageConstPtr& left, const sensor_msgs::ImageConstPtr& right,
-                 const sensor_msgs::CameraInfoConstPtr& left_info, const sensor_msgs::CameraInfoConstPtr& right_info) {
-               stamps_.notePair(nanoseconds(left->header.stamp));
-               arrivals_.notePair(left->header.stamp, right->header.stamp, newest_);
-               use({left, right, left_info, right_info});
-             }) {
+      pairs_(
+          kWaiting, StereoInputOptions().sync_tolerance,
+          [this, use = std::move(use)](const auto& left, const auto& right, const auto& left_info,
+                                       const auto& right_info) {
+            stamps_.notePair(nanoseconds(left->header.stamp));
+            arrivals_.notePair(left->header.stamp, right->header.stamp, newest_);
+            ArrivedPair pair{{left->image, right->image, left_info->info, right_info->info}, {}, {}, {}};
+            for (const auto& message : {left, right, left_info, right_info}) {
+              pair.stamps[message->input] = message->header.stamp;
+              pair.arrivals[message->input] = message->arrival;
+              pair.complete = std::max(pair.complete, message->arrival);
+            }
+            use(pair);
+          },
+          [this](const auto&...) { ++given_up_; }) {
   arrivals_.begin(topics, 0.0);  // long ago: a short recording is judged, too
 }
 
-void CameraInput::add(const StereoMessage& message, const ros::Time& arrival) {
-  switch (message.input) {
-    case ArrivalLog::kLeftImage:
-      return add<ArrivalLog::kLeftImage>(message.image, arrival);
-    case ArrivalLog::kRightImage:
-      return add<ArrivalLog::kRightImage>(message.image, arrival);
-    case ArrivalLog::kLeftInfo:
-      return add<ArrivalLog::kLeftInfo>(message.info, arrival);
-    default:
-      return add<ArrivalLog::kRightInfo>(message.info, arrival);
+void CameraInput::add(const StereoMessage& message) {
+  const ros::Time& stamp = message.header.stamp;
+  const auto input = static_cast<ArrivalLog::Input>(message.input);
+  newest_ = message.arrival.toSec();
+  stamps_.note(input, nanoseconds(stamp), newest_);
+  arrivals_.note(input, stamp, newest_);
+  if (input == ArrivalLog::kLeftImage) frame_ = message.header.frame_id;
+  if (const std::string why = whyUnusable(stamp); !why.empty()) {
+    ++unusable_;
+    problem_ = topics_[input] + ": " + why;
+  } else {
+    const auto shared = boost::make_shared<const StereoMessage>(message);
+    if (input == ArrivalLog::kLeftImage) pairs_.add<ArrivalLog::kLeftImage>(shared);
+    if (input == ArrivalLog::kRightImage) pairs_.add<ArrivalLog::kRightImage>(shared);
+    if (input == ArrivalLog::kLeftInfo) pairs_.add<ArrivalLog::kLeftInfo>(shared);
+    if (input == ArrivalLog::kRightInfo) pairs_.add<ArrivalLog::kRightInfo>(shared);
   }
+  if (!infos_ || !message.image) return;
+  const auto info = boost::make_shared<sensor_msgs::CameraInfo>((*infos_)[message.input]);
+  info->header = message.header;
+  add(toStereoMessage(message.input + 2, message.arrival, sensor_msgs::CameraInfoConstPtr(info)));
 }
 
 void CameraInput::add(const tf2_msgs::TFMessage& message, bool is_static) {
+  has_transforms_ = true;
   for (const geometry_msgs::TransformStamped& transform : message.transforms)
     if (transform.header.stamp.isZero() || whyUnusable(transform.header.stamp).empty())
       transforms_.setTransform(transform, "check_camera", is_static);
 }
 
-void CameraInput::addAll(const rosbag::Bag& bag, const StereoTopics& topics) {
-  std::vector<std::string> wanted(topics.begin(), topics.end());
-  wanted.insert(wanted.end(), {"/tf", "/tf_static"});
-  for (const rosbag::MessageInstance& instance : rosbag::View(bag, rosbag::TopicQuery(wanted)))
-    if (const auto transforms = instance.instantiate<tf2_msgs::TFMessage>())
+void CameraInput::add(const rosbag::MessageInstance& instance) {
+  if (instance.getTopic() != "/tf" && instance.getTopic() != "/tf_static")
+    return add(readStereoMessage(instance, topics_));
+  try {
+    if (const auto transforms = readAs<tf2_msgs::TFMessage>(instance))
       add(*transforms, instance.getTopic() == "/tf_static");
     else
-      add(readStereoMessage(instance, topics), instance.getTime());
+      tf_problem_ = instance.getTopic() + " holds " + instance.getDataType();
+  } catch (const std::runtime_error& e) {
+    tf_problem_ = e.what();
+  }
 }
 
-ArrivalFindings CameraInput::findings(const std::string& base_frame) {
+ArrivalFindings CameraInput::findings(const std::string& base_frame, bool is_recorded) {
   const RateOptions rates;
   std::optional<Eigen::Isometry3d> T_base_camera;
   std::string problem;
@@ -72,10 +94,12 @@ ArrivalFindings CameraInput::findings(const std::string& base_frame) {
     const std::string camera = ros_conversions::cleanFrameId(frame_.value_or(""));
     T_base_camera = tf2::transformToEigen(transforms_.lookupTransform(base_frame, camera, ros::Time(0)));
   } catch (const tf2::TransformException& e) {
-    problem = e.what();
+    problem = tf_problem_.empty() ? e.what() : tf_problem_;
   }
+  const Finding none{"TF", Verdict::kOpen, "this recording has none", "the odometry needs it while it runs"};
+  const bool is_open = is_recorded && !has_transforms_ && tf_problem_.empty();
   return {stamps_.topics(rates.min_rate, rates.max_rate, arrivals_.explainSilence(newest_)), stamps_.stamps(),
-          judge(T_base_camera, base_frame, problem), stamps_.rate(), T_base_camera};
+          is_open ? none : judge(T_base_camera, base_frame, problem), stamps_.rate(), T_base_camera};
 }
 
 Finding CameraInput::judge(const std::optional<Eigen::Isometry3d>& T_base_camera, const std::string& base_frame,

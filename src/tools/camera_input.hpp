@@ -1,65 +1,72 @@
 #pragma once
 
-#include <rosbag/bag.h>
-#include <sensor_msgs/CameraInfo.h>
-#include <sensor_msgs/Image.h>
+#include <ros/time.h>
+#include <rosbag/message_instance.h>
 #include <tf2/buffer_core.h>
 #include <tf2_msgs/TFMessage.h>
 
+#include <array>
 #include <functional>
 #include <optional>
 #include <string>
 
 #include "../check/stamp_check.hpp"
 #include "../ros/arrival_log.hpp"
-#include "../ros/pair_decoder.hpp"
 #include "../ros/stereo_input.hpp"
 #include "../ros/synchronisers.hpp"
+#include "pair_reader.hpp"
 #include "recording.hpp"
 #include "stereo_messages.hpp"
 
 namespace sdvo {
 
-/// What the messages of a pair hold, decoded.
-RecordedPair recordedPair(const DecodedPair& decoded, const StereoPairMessages& messages, std::int64_t stamp);
+/// Four messages of one trigger.
+struct ArrivedPair {
+  StereoPairMessages messages;
+  std::array<ros::Time, 4> stamps, arrivals;  ///< in the order of the topics
+  ros::Time complete;                         ///< when the last one came
+};
 
 /// Messages of a stereo camera as they arrive, from a bag or from topics: what their stamps look like, which make a
 /// pair, and where TF has the camera. One thread calls it.
 class CameraInput {
  public:
-  CameraInput(const StereoTopics& topics, std::function<void(const StereoPairMessages&)> use);
+  using Use = std::function<void(const ArrivedPair&)>;
 
-  template <ArrivalLog::Input input, class Message>
-  void add(const boost::shared_ptr<const Message>& message, const ros::Time& arrival);
-  void add(const StereoMessage& message, const ros::Time& arrival);
+  /// With `infos` each image brings its calibration.
+  CameraInput(const StereoTopics& topics, std::optional<StereoInfos> infos, Use use);
+
+  void add(const StereoMessage& message);
   void add(const tf2_msgs::TFMessage& message, bool is_static);
-  /// All messages of a bag.
-  void addAll(const rosbag::Bag& bag, const StereoTopics& topics);
+  /// Of one of the topics, or of TF.
+  void add(const rosbag::MessageInstance& instance);
 
-  ArrivalFindings findings(const std::string& base_frame);
+  /// Without any transform TF is open where they may not have been recorded, else a fault.
+  ArrivalFindings findings(const std::string& base_frame, bool is_recorded);
+
+  /// Stamps that made no pair, with those that still wait, and why the last unusable one is none.
+  int unused() const { return unusable_ + given_up_ + static_cast<int>(pairs_.waiting()); }
+  const std::string& problem() const { return problem_; }
 
  private:
+  using Message = StereoMessage;
+
   /// Whether TF has `base_frame` <- the images' frame.
   Finding judge(const std::optional<Eigen::Isometry3d>& T_base_camera, const std::string& base_frame,
                 const std::string& problem) const;
 
+  const StereoTopics topics_;
+  const std::optional<StereoInfos> infos_;
   StampCheck stamps_;
   UnusedInput unused_{"messages", 1.0};
   ArrivalLog arrivals_;
   double newest_ = 0.0;  ///< arrival, s
-  TriggerSynchroniser<sensor_msgs::Image, sensor_msgs::Image, sensor_msgs::CameraInfo, sensor_msgs::CameraInfo> pairs_;
+  int unusable_ = 0, given_up_ = 0;
+  std::string problem_ = "no four stamps agree", tf_problem_;
+  TriggerSynchroniser<Message, Message, Message, Message> pairs_;
   tf2::BufferCore transforms_;
+  bool has_transforms_ = false;
   std::optional<std::string> frame_;  ///< of the left images
 };
-
-template <ArrivalLog::Input input, class Message>
-void CameraInput::add(const boost::shared_ptr<const Message>& message, const ros::Time& arrival) {
-  const ros::Time& stamp = message->header.stamp;
-  stamps_.note(input, nanoseconds(stamp), arrival.toSec());
-  newest_ = arrival.toSec();
-  arrivals_.note(input, stamp, newest_);
-  if (input == ArrivalLog::kLeftImage) frame_ = message->header.frame_id;
-  if (whyUnusable(stamp).empty()) pairs_.template add<input>(message);
-}
 
 }  // namespace sdvo

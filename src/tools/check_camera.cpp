@@ -2,11 +2,11 @@
 #include <image_transport/image_transport.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>
-#include <rosbag/bag.h>
 
 #include <CLI/CLI.hpp>
 #include <iomanip>
 #include <iostream>
+#include <limits>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utility.hpp>
 #include <stdexcept>
@@ -16,10 +16,11 @@
 #include "../check/finding.hpp"
 #include "../common/worker.hpp"
 #include "../messages/stamps.hpp"
-#include "../ros/pair_decoder.hpp"
 #include "camera_check.hpp"
 #include "camera_input.hpp"
 #include "page.hpp"
+#include "pair_reader.hpp"
+#include "recording.hpp"
 #include "run_tool.hpp"
 #include "stereo_messages.hpp"
 
@@ -43,39 +44,36 @@ void writeCheckPage(const std::string& path, const std::string& camera, const st
   writePage(path, html);
 }
 
-using sdvo::ArrivalLog;
-
 struct Arguments {
   std::string bag, base_frame = "base_link", transport = "raw", page, config;
-  sdvo::StereoNames names;
+  sdvo::StereoSource source;
   std::vector<std::string> settings;
   double seconds = 30.0;
 };
 
-void listen(const Arguments& arguments, sdvo::CameraInput& input) {
+void listen(const Arguments& arguments, const sdvo::StereoTopics& topics, sdvo::CameraInput& input) {
   if (!ros::master::check())
     throw std::runtime_error("no ROS master at " + ros::master::getURI() + ": start the camera, or give a --bag");
   ros::NodeHandle nh;
   const image_transport::TransportHints hints(arguments.transport);
   constexpr std::uint32_t kQueue = 50;  // messages: a second of a fast camera
-  const sdvo::StereoTopics topics = arguments.names.topics();
-  image_transport::ImageTransport images(nh);
-  const auto left = images.subscribe(
-      topics[0], kQueue,
-      [&](const sensor_msgs::ImageConstPtr& m) { input.add<ArrivalLog::kLeftImage>(m, ros::Time::now()); }, {}, hints);
-  const auto right = images.subscribe(
-      topics[1], kQueue,
-      [&](const sensor_msgs::ImageConstPtr& m) { input.add<ArrivalLog::kRightImage>(m, ros::Time::now()); }, {}, hints);
-  const auto left_info = nh.subscribe<sensor_msgs::CameraInfo>(
-      topics[2], kQueue,
-      [&](const sensor_msgs::CameraInfoConstPtr& m) { input.add<ArrivalLog::kLeftInfo>(m, ros::Time::now()); });
-  const auto right_info = nh.subscribe<sensor_msgs::CameraInfo>(
-      topics[3], kQueue,
-      [&](const sensor_msgs::CameraInfoConstPtr& m) { input.add<ArrivalLog::kRightInfo>(m, ros::Time::now()); });
-  const auto transforms = nh.subscribe<tf2_msgs::TFMessage>(
-      "/tf", kQueue, [&](const tf2_msgs::TFMessageConstPtr& m) { input.add(*m, false); });
-  const auto static_transforms = nh.subscribe<tf2_msgs::TFMessage>(
-      "/tf_static", kQueue, [&](const tf2_msgs::TFMessageConstPtr& m) { input.add(*m, true); });
+  image_transport::ImageTransport transport(nh);
+  std::vector<image_transport::Subscriber> images;
+  std::vector<ros::Subscriber> others;
+  for (const std::size_t side : {0u, 1u}) {
+    const auto add = [&, side](const sensor_msgs::ImageConstPtr& m) {
+      input.add(toStereoMessage(side, ros::Time::now(), m));
+    };
+    images.push_back(transport.subscribe(topics[side], kQueue, add, {}, hints));
+    if (arguments.source.calibration.empty())
+      others.push_back(nh.subscribe<sensor_msgs::CameraInfo>(
+          topics[side + 2], kQueue, [&, side](const sensor_msgs::CameraInfoConstPtr& m) {
+            input.add(toStereoMessage(side + 2, ros::Time::now(), m));
+          }));
+  }
+  for (const std::string topic : {"/tf", "/tf_static"})
+    others.push_back(nh.subscribe<tf2_msgs::TFMessage>(
+        topic, kQueue, [&, topic](const tf2_msgs::TFMessageConstPtr& m) { input.add(*m, topic == "/tf_static"); }));
   std::cerr << "Listening to " << topics[0] << " and " << topics[1] << " for " << arguments.seconds
             << " s: hold the camera still, then walk, turn and tilt it." << std::endl;
   const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(arguments.seconds);
@@ -87,49 +85,42 @@ int check(const Arguments& arguments) {
   const sdvo::PipelineOptions options = sdvo::readPipelineOptions(arguments.config, arguments.settings);
   sdvo::OfflineRun run(options);
   sdvo::CameraCheck check(options, run);
-  sdvo::PairDecoder decoder;
-  std::int64_t last_stamp = 0;  // ns
-  const auto use = [&](const sdvo::StereoPairMessages& pair) {
-    const std::int64_t stamp = sdvo::nanoseconds(pair.left_image->header.stamp);
-    if (stamp <= last_stamp) return;  // which the step of the stamps reports
-    try {
-      const sdvo::RecordedPair decoded = recordedPair(decoder.decode(pair), pair, stamp);
-      const sdvo::StereoFeatures features = run.process(decoded.camera, decoded.left, decoded.right, stamp);
-      decoder.accept(decoded.camera);
-      last_stamp = stamp;
-      check.add(decoded, features);
-    } catch (const std::exception& e) {
-      check.addUnusable(e.what());
-    }
+  const auto use = [&](const sdvo::RecordedPair& pair) {
+    check.add(pair, run.process(pair.camera, pair.left, pair.right, pair.stamp));
   };
-  const auto report = [&](sdvo::CameraInput& input, const sdvo::StereoTopics& topics) {
-    const std::vector<sdvo::Finding> findings = check.findings(input.findings(arguments.base_frame));
-    bool failed = false;
-    for (const sdvo::Finding& finding : findings) {
-      failed |= finding.verdict == sdvo::Verdict::kFail;
+  const auto report = [&](const std::string& camera, const sdvo::ArrivalFindings& arrivals) {
+    const std::vector<sdvo::Finding> findings = check.findings(arrivals);
+    for (const sdvo::Finding& finding : findings)
       std::cout << std::left << std::setw(5) << toString(finding.verdict) << std::setw(14) << finding.step
                 << finding.what << (finding.remedy.empty() ? "" : "\n" + std::string(19, ' ') + "-> " + finding.remedy)
                 << "\n";
-    }
-    if (!arguments.page.empty()) writeCheckPage(arguments.page, topics[0], findings, check.rows(), check.picture());
-    return failed ? 2 : 0;
+    if (!arguments.page.empty()) writeCheckPage(arguments.page, camera, findings, check.rows(), check.picture());
+    return exitCodeOf(worstOf(findings).verdict);
   };
   if (!arguments.bag.empty()) {
-    rosbag::Bag bag;
-    sdvo::openBag(arguments.bag, bag);
-    return sdvo::ofBag(arguments.bag, [&] {
-      const sdvo::StereoTopics topics = sdvo::topicsIn(bag, arguments.names);
-      sdvo::CameraInput input(topics, use);
-      input.addAll(bag, topics);
-      return report(input, topics);
-    });
+    const auto recording = sdvo::openRecording(arguments.bag, arguments.source);
+    recording->forEach(std::numeric_limits<int>::max(), use, [&](const std::string& why) { check.addUnusable(why); });
+    return report(arguments.bag, recording->arrivals(arguments.base_frame));
   }
-  constexpr std::size_t kWaiting = 100;  // pairs
-  sdvo::Worker<sdvo::StereoPairMessages> worker(kWaiting, use);
-  sdvo::CameraInput input(arguments.names.topics(), [&](const sdvo::StereoPairMessages& pair) { worker.push(pair); });
-  listen(arguments, input);
+  const sdvo::StereoTopics topics = arguments.source.topics();
+  sdvo::PairReader reader(topics, arguments.source.fov);
+  std::int64_t last_stamp = 0;  // ns
+  constexpr std::size_t kWaitingPairs = 100;
+  sdvo::Worker<sdvo::StereoPairMessages> worker(kWaitingPairs, [&](const sdvo::StereoPairMessages& pair) {
+    const std::int64_t stamp = sdvo::nanoseconds(pair.left_image->header.stamp);
+    if (stamp <= last_stamp) return;  // which the step of the stamps reports
+    try {
+      use(reader.read(pair, stamp));
+      last_stamp = stamp;
+    } catch (const std::exception& e) {
+      check.addUnusable(e.what());
+    }
+  });
+  sdvo::CameraInput input(topics, infosOf(arguments.source),
+                          [&](const sdvo::ArrivedPair& pair) { worker.push(pair.messages); });
+  listen(arguments, topics, input);
   worker.stop();
-  return report(input, arguments.names.topics());
+  return report(topics[0], input.findings(arguments.base_frame, false));
 }
 
 }  // namespace
@@ -138,11 +129,12 @@ int main(int argc, char** argv) {
   ros::init(argc, argv, "check_camera", ros::init_options::AnonymousName);  // takes ROS's arguments away
   ros::Time::init();                                                        // for bags, which need no master
   CLI::App app(
-      "Checks a rectified stereo camera step by step, live or in a bag: topics, stamps, calibration, images, motion. "
+      "Checks a stereo camera step by step, live or in a bag: topics, stamps, calibration, images, motion. "
       "Exit code 2: a step FAILs. For 30 s of a camera that is held still, walked, turned and tilted");
   Arguments arguments;
-  app.add_option("--bag", arguments.bag, "recorded bag; empty: listen to the topics")->check(CLI::ExistingFile);
-  arguments.names.addTo(app, "");
+  app.add_option("--bag", arguments.bag, "recorded bag or folder; empty: listen to the topics")
+      ->check(CLI::ExistingPath);
+  arguments.source.addTo(app);
   app.add_option("--base-frame", arguments.base_frame, "the robot's frame on TF")->capture_default_str();
   app.add_option("--seconds", arguments.seconds, "how long to listen, s")
       ->capture_default_str()

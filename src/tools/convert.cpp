@@ -1,6 +1,5 @@
 // Converts recorded drives: a folder (KITTI, EuRoC) to a bag, or any recording to a folder in KITTI's layout.
 #include <ros/time.h>
-#include <sensor_msgs/CameraInfo.h>
 
 #include <algorithm>
 #include <cstdint>
@@ -14,6 +13,7 @@
 #include <vector>
 
 #include "../common/progress.hpp"
+#include "pair_reader.hpp"
 #include "recording.hpp"
 #include "run_tool.hpp"
 #include "stereo_bag.hpp"
@@ -28,40 +28,9 @@ constexpr std::int64_t kEpoch = 1000000000LL * 1000000000LL;  // ns
 struct Arguments {
   std::string tool, input, output;
   std::string poses;  ///< empty: look beside the input
-  sdvo::StereoNames names;
+  sdvo::StereoSource source;
   int frames = std::numeric_limits<int>::max();
 };
-
-/// Of images that are rectified already: no distortion, no rotation, K the left part of P. As in image_pipeline both
-/// views are expressed in the left optical frame; the right one's place is in P's Tx = -fx*baseline.
-sensor_msgs::CameraInfo makeCameraInfo(const sdvo::StereoCamera& camera, double tx) {
-  sensor_msgs::CameraInfo message;
-  message.width = static_cast<std::uint32_t>(camera.width);
-  message.height = static_cast<std::uint32_t>(camera.height);
-  message.distortion_model = "plumb_bob";
-  message.D.assign(5, 0.0);
-  message.K = {camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0};
-  message.R = {1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0};
-  message.P = {camera.fx, 0.0, camera.cx, tx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 0.0, 1.0, 0.0};
-  return message;
-}
-
-/// Of raw images: what rectifies them, and what the rectified ones are.
-sensor_msgs::CameraInfo makeCameraInfo(const sdvo::EurocSequence& sequence, int side) {
-  const sdvo::EurocCamera& camera = sequence.camera(side);
-  const cv::Matx33d& R = sequence.rectification().rotations[side];
-  const cv::Matx34d& P = sequence.rectification().projections[side];
-  sensor_msgs::CameraInfo message;
-  message.width = static_cast<std::uint32_t>(camera.size.width);
-  message.height = static_cast<std::uint32_t>(camera.size.height);
-  message.distortion_model = "plumb_bob";  // k1 k2 p1 p2 k3
-  message.D = camera.distortion;
-  message.D.push_back(0.0);
-  std::copy(camera.intrinsics.val, camera.intrinsics.val + 9, message.K.begin());
-  std::copy(R.val, R.val + 9, message.R.begin());
-  std::copy(P.val, P.val + 12, message.P.begin());
-  return message;
-}
 
 /// True poses of the rectified left camera in each frame; empty, with a note, where they are not known.
 sdvo::Trajectory groundTruth(const Arguments& arguments, std::size_t frames) {
@@ -71,7 +40,7 @@ sdvo::Trajectory groundTruth(const Arguments& arguments, std::size_t frames) {
   sdvo::Trajectory poses;
   std::string problem;
   if (mav0 && arguments.poses.empty())
-    poses = sdvo::EurocSequence(*mav0).rectifiedPoses(problem);
+    poses = sdvo::EurocSequence(*mav0, arguments.source.calibration, arguments.source.fov).rectifiedPoses(problem);
   else if (path)
     poses = sdvo::readKittiPoses(*path);
   else
@@ -87,11 +56,11 @@ sdvo::Trajectory groundTruth(const Arguments& arguments, std::size_t frames) {
   return poses;
 }
 
-/// A bag of the images as a folder has them.
-template <class Sequence>
-void writeBag(const Arguments& arguments, const Sequence& sequence, const sdvo::StereoCamera& rectified,
-              std::int64_t epoch, const std::string& topic, const sensor_msgs::CameraInfo& left,
-              const sensor_msgs::CameraInfo& right) {
+/// A bag of the images as a folder has them. `geometry`: of the rectified images or what rectifies raw ones.
+template <class Sequence, class Geometry>
+void writeBag(const Arguments& arguments, const Sequence& sequence, const Geometry& geometry,
+              const sdvo::StereoCamera& rectified, std::int64_t epoch, const std::string& topic) {
+  const auto left = sdvo::toCameraInfo(geometry, 0), right = sdvo::toCameraInfo(geometry, 1);
   const int frames = std::min(arguments.frames, sequence.size());
   std::vector<ros::Time> stamps;
   for (int i = 0; i < frames; ++i)
@@ -105,21 +74,18 @@ void writeBag(const Arguments& arguments, const Sequence& sequence, const sdvo::
 
 void writeBag(const Arguments& arguments) {
   if (const auto mav0 = sdvo::findMav0(arguments.input)) {
-    const sdvo::EurocSequence sequence(*mav0);
+    const sdvo::EurocSequence sequence(*mav0, arguments.source.calibration, arguments.source.fov);
     if (sequence.unpaired() > 0)
       std::cerr << "note: " << sequence.unpaired() << " image(s) without a partner are left out" << std::endl;
-    return writeBag(arguments, sequence, sequence.rectification().camera, 0, "image_raw", makeCameraInfo(sequence, 0),
-                    makeCameraInfo(sequence, 1));
+    return writeBag(arguments, sequence, sequence.rectification(), sequence.rectification().camera(), 0, "image_raw");
   }
   const sdvo::KittiSequence sequence(arguments.input);
-  const sdvo::StereoCamera& camera = sequence.camera();
-  writeBag(arguments, sequence, camera, kEpoch, "image_rect", makeCameraInfo(camera, 0.0),
-           makeCameraInfo(camera, -camera.fx * camera.baseline));
+  writeBag(arguments, sequence, sequence.camera(), sequence.camera(), kEpoch, "image_rect");
 }
 
 /// A folder in KITTI's layout, of rectified images.
 void writeFolder(const Arguments& arguments) {
-  const auto recording = sdvo::openRecording(arguments.input, arguments.names);
+  const auto recording = sdvo::openRecording(arguments.input, arguments.source);
   sdvo::KittiWriter output(arguments.output);
   std::vector<std::int64_t> stamps;
   sdvo::StereoCamera camera;
@@ -157,23 +123,22 @@ int convert(const Arguments& arguments) {
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Converts a recorded drive. To NAME.bag from a KITTI or EuRoC folder: images (EuRoC's stay raw) and CameraInfo "
-      "on "
-      "/stereo/left|right/..., /tf_static and, where poses are known, /ground_truth/path and /ground_truth/odom; "
-      "stamps "
-      "of KITTI are times.txt plus 1e9 s. To a folder in KITTI's layout from a EuRoC folder or a bag: rectified "
-      "images, "
-      "calib.txt, times.txt (seconds since the first stamp) and, where they are known, poses.txt of the left camera");
+      "Converts a recorded drive. To NAME.bag from a folder of KITTI, EuRoC or TUM-VI: images (raw ones stay raw) and "
+      "CameraInfo on /stereo/left|right/..., /tf_static and, where poses are known, /ground_truth/path and "
+      "/ground_truth/odom; stamps of KITTI are times.txt plus 1e9 s. To a folder in KITTI's layout from an EuRoC or "
+      "TUM-VI folder or a bag: rectified images, calib.txt, times.txt (seconds since the first stamp) and, where they "
+      "are known, poses.txt of the left camera");
   Arguments arguments;
   arguments.tool = std::filesystem::path(argv[0]).filename().string();
-  app.add_option("input,--input,--sequence", arguments.input,
-                 "KITTI folder (image_0, image_1, calib.txt, times.txt), EuRoC folder (mav0, or cam0 and cam1), or bag")
+  app.add_option(
+         "input,--input,--sequence", arguments.input,
+         "folder of KITTI (image_0, image_1, calib.txt, times.txt), EuRoC or TUM-VI (mav0, or cam0 and cam1), or bag")
       ->required();
   app.add_option("--output", arguments.output, "NAME.bag, or folder to create")->required();
   app.add_option("--poses", arguments.poses,
                  "ground truth in KITTI format (default: poses.txt in a KITTI folder or ../../poses/NN.txt, "
                  "cam0_ground_truth.txt of EuRoC)");
   app.add_option("--frames", arguments.frames, "only the first N pairs")->check(CLI::Range(1, 1000000));
-  arguments.names.addTo(app);
+  arguments.source.addTo(app);
   return sdvo::runTool(app, argc, argv, [&] { return convert(arguments); });
 }

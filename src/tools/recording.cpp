@@ -21,7 +21,7 @@ namespace {
 class RectifiedEuroc : public EurocSequence {
  public:
   using EurocSequence::EurocSequence;
-  const StereoCamera& camera() const { return rectification().camera; }
+  const StereoCamera& camera() const { return rectification().camera(); }
   ImagePair load(int i) const { return loadRectified(i); }
 };
 
@@ -36,11 +36,12 @@ int unpaired(const RectifiedEuroc& sequence) {
 template <class Sequence>
 class FolderRecording : public Recording {
  public:
-  explicit FolderRecording(const std::string& folder) : sequence_(folder) {}
+  template <class... Arguments>
+  explicit FolderRecording(const Arguments&... arguments) : sequence_(arguments...) {}
 
   int size() const override { return sequence_.size(); }
 
-  int forEach(int limit, const Use& use) override {
+  int forEach(int limit, const Use& use, const Refuse&) override {
     used_ = std::min(limit, size());
     for (int i = 0; i < used_; ++i) give(i, sequence_.stamp(i), use);
     return unpaired(sequence_);
@@ -75,8 +76,8 @@ class FolderRecording : public Recording {
 
 class JoinedRecording : public Recording {
  public:
-  JoinedRecording(const std::vector<std::string>& paths, const StereoNames& names) : paths_(paths) {
-    for (const std::string& path : paths) parts_.push_back(openRecording(path, names));
+  JoinedRecording(const std::vector<std::string>& paths, const StereoSource& source) : paths_(paths) {
+    for (const std::string& path : paths) parts_.push_back(openRecording(path, source));
   }
 
   int size() const override {
@@ -85,12 +86,12 @@ class JoinedRecording : public Recording {
     return size;
   }
 
-  int forEach(int limit, const Use& use) override {
+  int forEach(int limit, const Use& use, const Refuse& refuse) override {
     int left_out = 0;
     ends_.clear();
     for (std::size_t i = 0; i < parts_.size() && limit > 0; ++i) {
       ends_.emplace_back();
-      left_out += parts_[i]->forEach(limit, [&](const RecordedPair& pair) {
+      const auto use_part = [&](const RecordedPair& pair) {
         if (!ends_.back()) {
           if (i > 0 && pair.stamp <= ends_[i - 1]->second)
             throw std::runtime_error("'" + paths_[i] + "' is not later than '" + paths_[i - 1] +
@@ -100,7 +101,8 @@ class JoinedRecording : public Recording {
         ends_.back()->second = pair.stamp;
         --limit;
         use(pair);
-      });
+      };
+      left_out += parts_[i]->forEach(limit, use_part, refuse);
     }
     return left_out;
   }
@@ -126,21 +128,23 @@ class JoinedRecording : public Recording {
 
 }  // namespace
 
-bool isRecording(const std::string& folder) {
-  const auto has = [&](const char* name) { return fs::is_directory(fs::path(folder) / name); };
-  return has("cam0") || has("mav0") || has("image_0") || has("image_2");
-}
-
-std::unique_ptr<Recording> openRecording(const std::string& path, const StereoNames& names) {
+std::unique_ptr<Recording> openRecording(const std::string& path, const StereoSource& source) {
   if (!fs::exists(path)) throw std::runtime_error("there is no '" + path + "'");
-  if (!fs::is_directory(path)) return std::make_unique<BagRecording>(path, names);
-  if (const auto mav0 = findMav0(path)) return std::make_unique<FolderRecording<RectifiedEuroc>>(*mav0);
-  return std::make_unique<FolderRecording<KittiSequence>>(path);
+  if (!fs::is_directory(path)) return std::make_unique<BagRecording>(path, source);
+  if (const auto mav0 = findMav0(path))
+    return std::make_unique<FolderRecording<RectifiedEuroc>>(*mav0, source.calibration, source.fov);
+  for (const char* images : {"image_0", "image_1", "image_2", "image_3"})
+    if (fs::is_directory(fs::path(path) / images)) return std::make_unique<FolderRecording<KittiSequence>>(path);
+  throw std::runtime_error(
+      "'" + path + "' is " +
+      (fs::exists(fs::path(path) / "metadata.yaml") ? "a bag of ROS 2 or another" : "no recording:") +
+      " folder; KITTI's (image_0, image_1, calib.txt, times.txt), EuRoC's and TUM-VI's (mav0, or cam0 "
+      "and cam1) are read, and bags of ROS 1 (of a folder of bags each one: run_many)");
 }
 
-std::unique_ptr<Recording> openParts(const std::vector<std::string>& paths, const StereoNames& names) {
-  if (paths.size() == 1) return openRecording(paths.front(), names);
-  return std::make_unique<JoinedRecording>(paths, names);
+std::unique_ptr<Recording> openParts(const std::vector<std::string>& paths, const StereoSource& source) {
+  if (paths.size() == 1) return openRecording(paths.front(), source);
+  return std::make_unique<JoinedRecording>(paths, source);
 }
 
 }  // namespace sdvo

@@ -20,7 +20,7 @@ struct RecordedPair {
   StereoCamera camera;
   cv::Mat left, right;      ///< CV_8U grey; valid as long as the call that it is given to
   std::int64_t stamp;       ///< ns
-  std::string lens;         ///< name of the calibration's model; empty: unknown
+  std::string lens;         ///< the calibration's model in words; empty: unknown
   std::string unrectified;  ///< why the images are most likely not rectified; empty: nothing indicates that
 };
 
@@ -35,6 +35,7 @@ struct ArrivalFindings {
 class Recording {
  public:
   using Use = std::function<void(const RecordedPair&)>;
+  using Refuse = std::function<void(const std::string& why)>;
 
   virtual ~Recording() = default;
 
@@ -42,25 +43,23 @@ class Recording {
   virtual int size() const = 0;
 
   /// Calls `use` for the first `limit` pairs in the order of their stamps. Returns how many stamps gave no usable pair.
-  /// Throws std::runtime_error where the recording cannot be read or no pair is usable.
-  virtual int forEach(int limit, const Use& use) = 0;
+  /// Throws std::runtime_error where the recording cannot be read or, unless `refuse` is told of each that is none, no
+  /// pair is usable.
+  virtual int forEach(int limit, const Use& use, const Refuse& refuse = {}) = 0;
 
   /// Calls `use` for the pairs of forEach() backwards. Mirrored stamps increase, and the time between pairs is the
   /// same.
   virtual void forEachBackwards(const Use& use) const = 0;
 
-  /// How its messages arrived, and where TF has the camera. Reads the whole recording where it is a bag.
+  /// How the messages of forEach() arrived, and where TF has the camera.
   virtual ArrivalFindings arrivals(const std::string& base_frame) const = 0;
 };
 
-/// A bag, a folder in KITTI's layout, or a raw folder of EuRoC's (ASL), whose images are rectified. Throws
-/// std::runtime_error that names what is wrong.
-std::unique_ptr<Recording> openRecording(const std::string& path, const StereoNames& names);
+/// A bag, a folder in KITTI's layout, or a raw folder in that of EuRoC and TUM-VI (ASL). Raw images are rectified.
+/// Throws std::runtime_error that names what is wrong.
+std::unique_ptr<Recording> openRecording(const std::string& path, const StereoSource& source);
 
 /// The parts of one drive, as of `rosbag record --split`, in the order of time.
-std::unique_ptr<Recording> openParts(const std::vector<std::string>& paths, const StereoNames& names);
-
-/// Whether a folder is itself a recording, not one of bags.
-bool isRecording(const std::string& folder);
+std::unique_ptr<Recording> openParts(const std::vector<std::string>& paths, const StereoSource& source);
 
 }  // namespace sdvo

@@ -5,7 +5,6 @@
 #include <iomanip>
 #include <iostream>
 #include <limits>
-#include <map>
 #include <opencv2/core/utility.hpp>
 #include <optional>
 #include <set>
@@ -38,7 +37,7 @@ struct Arguments {
   std::vector<std::string> inputs, before, settings;
   std::string config, format, poses, timing, states, output, odometry, keyframes, truth, page, live, pictures;
   std::string base_frame = "base_link";
-  sdvo::StereoNames names;
+  sdvo::StereoSource source;
   int frames = kAll, threads = 1;
   bool join = false, places = false, shuttle = false, halves = false;
 };
@@ -60,9 +59,7 @@ struct Seen {
 void follow(sdvo::Recording& recording, const Arguments& arguments, Drive& drive, sdvo::PlaceRun* places,
             Seen* seen = nullptr) {
   sdvo::FeatureHalves halves;
-  std::optional<sdvo::Progress> progress;
-  const int count = std::min(arguments.frames, recording.size());
-  if (arguments.output.empty()) progress.emplace(places ? "places" : "odometry", count);
+  sdvo::Progress progress(places ? "places" : "odometry", std::min(arguments.frames, recording.size()));
   drive.left_out = recording.forEach(arguments.frames, [&](const sdvo::RecordedPair& pair) {
     if (arguments.threads > 1 && !places && !arguments.halves && !seen && arguments.pictures.empty()) {
       drive.whole.processBeside(pair.camera, pair.left, pair.right, pair.stamp);
@@ -81,7 +78,7 @@ void follow(sdvo::Recording& recording, const Arguments& arguments, Drive& drive
         drive.second.processFeatures(features.select(halved[1]));
       }
     }
-    if (progress) progress->step();
+    progress.step();
   });
   drive.whole.finish();
 }
@@ -91,11 +88,10 @@ std::vector<sdvo::SelfCheck> checkItself(const sdvo::Recording& recording, const
   std::vector<sdvo::SelfCheck> checks;
   if (arguments.shuttle) {
     sdvo::OfflineRun back(options);
-    std::optional<sdvo::Progress> progress;
-    if (arguments.output.empty()) progress.emplace("backwards", drive.whole.pairs());
+    sdvo::Progress progress("backwards", drive.whole.pairs());
     recording.forEachBackwards([&](const sdvo::RecordedPair& pair) {
       back.process(pair.camera, pair.left, pair.right, pair.stamp);
-      if (progress) progress->step();
+      progress.step();
     });
     checks.push_back(checkShuttle(drive.whole, back));
   }
@@ -164,136 +160,34 @@ sdvo::Finding makePage(const sdvo::Recording& recording, const Drive& drive, con
   return judge(report, drive.whole);
 }
 
-int runOne(const Arguments& arguments) {
-  if (arguments.inputs.size() > 1 && !arguments.join)
-    throw std::runtime_error(
-        "several recordings need --output, or --join where they are parts of one drive (see --help)");
-  const sdvo::PipelineOptions options = sdvo::readPipelineOptions(arguments.config, arguments.settings);
-  std::optional<sdvo::PlaceRun> places;
-  if (arguments.places) places.emplace(options.place_recognition);
-  double way = 0.0;  // m, of all recordings
-  for (const std::string& before : arguments.before) {
-    Arguments whole = arguments;
-    whole.frames = kAll;
-    Drive drive(options);
-    follow(*sdvo::openRecording(before, arguments.names), whole, drive, &*places);
-    way += drive.whole.distance();
-    places->startSequence();
-  }
-  const auto recording = sdvo::openParts(arguments.inputs, arguments.names);
-  Drive drive(options);
-  if (!arguments.pictures.empty()) {
-    fs::create_directories(arguments.pictures);
-    if (!fs::is_empty(arguments.pictures))
-      throw std::runtime_error("--pictures '" + arguments.pictures + "' is not empty: choose another folder");
-  }
-  std::optional<Seen> seen;
-  if (!arguments.page.empty())
-    seen.emplace(Seen{sdvo::CameraCheck(options, drive.whole),
-                      sdvo::DrivePictures(std::min(arguments.frames, recording->size()))});
-  follow(*recording, arguments, drive, places ? &*places : nullptr, seen ? &*seen : nullptr);
+std::string reportOf(const Arguments& arguments) {
+  return (fs::path(arguments.output) / "report.csv").string();
+}
+
+/// The name of a recording: that of a bag without ".bag", that of a folder.
+std::string nameOf(const std::string& input) {
+  fs::path path = fs::absolute(input).lexically_normal();
+  while (path.filename().empty() || path.filename() == "mav0") path = path.parent_path();
+  return path.extension() == ".bag" ? path.stem().string() : path.filename().string();
+}
+
+/// NAME.txt, NAME.csv and report.csv, for people and for run_many, which joins these reports.
+void writeResults(const Drive& drive, const std::vector<sdvo::SelfCheck>& checks, sdvo::PipelineOptions options,
+                  const Arguments& arguments) {
   const sdvo::OfflineRun& run = drive.whole;
-  if (places)
-    sdvo::writeKittiPoses(arguments.poses, places->poses());
-  else if (!arguments.poses.empty())
-    writePoses(arguments.poses, arguments.format, run);
-  if (!arguments.odometry.empty()) writePoses(arguments.odometry, arguments.format, run);
-  if (!arguments.timing.empty()) run.writeTiming(arguments.timing);
-  if (!arguments.states.empty()) run.writeStates(arguments.states);
-  if (!arguments.keyframes.empty()) places->writeKeyframes(arguments.keyframes);
-
-  std::cout << std::fixed << std::setprecision(1);
-  places ? printSummary(run, *places, way + run.distance()) : printSummary(run, options);
-  if (places && !arguments.truth.empty()) printErrors(places->errors(sdvo::readKittiPoses(arguments.truth)));
-  if (drive.left_out > 0) std::cout << drive.left_out << " stamps without a usable pair\n";
-  const std::vector<sdvo::SelfCheck> checks = checkItself(*recording, drive, options, arguments);
-  for (const sdvo::SelfCheck& check : checks) std::cout << check.text() << "\n";
-  if (seen) {
-    const sdvo::Finding verdict = makePage(*recording, drive, *seen, checks, options, arguments);
-    std::cout << toString(verdict.verdict) << ": " << verdict.what << "\npage: " << arguments.page << "\n";
-  }
-  return 0;
-}
-
-/// What --output has a line of for each recording.
-const char kColumns[] =
-    "bag,pairs,without_pose,discontinuities,left_out,distance_m,median_ms,p95_ms,cpu_ms,options,problem\n";
-
-/// Writes the results of a recording to files that begin with `output`. Returns the figures of its line.
-std::string runOneOfMany(const fs::path& input, const std::string& output, sdvo::PipelineOptions options,
-                         const Arguments& arguments) {
-  const std::string self_check = output + ".self_check.csv";
-  fs::remove(self_check);
-  const auto recording = sdvo::openRecording(input.string(), arguments.names);
-  Drive drive(options);
-  follow(*recording, arguments, drive, nullptr);
-  const sdvo::OfflineRun& run = drive.whole;
-  writePoses(output + ".txt", arguments.format.empty() ? "tum" : arguments.format, run);
-  run.writeTiming(output + ".csv");
-  if (const auto checks = checkItself(*recording, drive, options, arguments); !checks.empty()) {
-    std::ostringstream file;
-    file << sdvo::SelfCheck::columns() << "\n";
-    for (const sdvo::SelfCheck& check : checks) {
-      file << check.row() << "\n";
-      std::cout << fs::path(output).filename().string() << ": " << check.text() << std::endl;
-    }
-    sdvo::writeTextFile(self_check, file.str());
-  }
-  std::ostringstream figures;
-  figures << std::fixed << std::setprecision(1) << run.pairs() << "," << run.pairsWithoutPose() << ","
-          << run.discontinuities() << "," << drive.left_out << "," << run.distance() << "," << run.time(0.5) << ","
-          << run.time(0.95) << "," << run.cpuTime() << "," << sdvo::hashOptions(sdvo::listOptions(options)) << ",";
-  return figures.str();
-}
-
-/// The recordings by name: that of a bag without ".bag", that of a folder.
-std::map<std::string, fs::path> findRecordings(const std::vector<std::string>& inputs) {
-  std::map<std::string, fs::path> recordings;
-  const auto add = [&](const std::string& name, const fs::path& path) {
-    if (!recordings.emplace(name, path).second)
-      throw std::runtime_error("two recordings are called " + name + ", and so would be their results");
-  };
-  for (const std::string& input : inputs) {
-    if (!fs::exists(input)) throw std::runtime_error("there is no '" + input + "'");
-    if (!fs::is_directory(input)) {
-      add(fs::path(input).stem().string(), input);
-    } else if (sdvo::isRecording(input)) {
-      fs::path folder = fs::absolute(input).lexically_normal();
-      while (folder.filename().empty() || folder.filename() == "mav0") folder = folder.parent_path();
-      add(folder.filename().string(), input);
-    } else {
-      for (const fs::directory_entry& entry : fs::directory_iterator(input))
-        if (entry.path().extension() == ".bag") add(entry.path().stem().string(), entry.path());
-    }
-  }
-  if (recordings.empty()) throw std::runtime_error("there is no bag in '" + inputs.front() + "'");
-  return recordings;
-}
-
-int runMany(const Arguments& arguments) {
-  const sdvo::PipelineOptions options = sdvo::readPipelineOptions(arguments.config, arguments.settings);
-  const auto recordings = findRecordings(arguments.inputs);
-  fs::create_directories(arguments.output);
-  std::string report = kColumns;
-  int failed = 0;
-  for (const auto& [name, input] : recordings) {
-    std::string figures = ",,,,,,,,,", problem;
-    try {
-      figures = runOneOfMany(input, (fs::path(arguments.output) / name).string(), options, arguments);
-    } catch (const std::exception& e) {
-      ++failed;
-      problem = e.what();
-      std::replace(problem.begin(), problem.end(), '\n', ' ');
-    }
-    report += name + "," + figures + problem + "\n";  // which stands last, for it may hold commas
-    std::cerr << name << ": " << (problem.empty() ? "done" : "failed") << std::endl;
-  }
-  sdvo::writeTextFile(fs::path(arguments.output) / "report.csv", report);
-  std::cout << report;
-  if (failed > 0)
-    throw std::runtime_error(std::to_string(failed) + " of " + std::to_string(recordings.size()) +
-                             " recordings failed, see the report");
-  return 0;
+  const std::string name = nameOf(arguments.inputs.front()), base = (fs::path(arguments.output) / name).string();
+  writePoses(base + ".txt", arguments.format.empty() ? "tum" : arguments.format, run);
+  run.writeTiming(base + ".csv");
+  fs::remove(base + ".self_check.csv");  // of an earlier run
+  std::string rows = std::string(sdvo::SelfCheck::columns()) + "\n";
+  for (const sdvo::SelfCheck& check : checks) rows += check.row() + "\n";
+  if (!checks.empty()) sdvo::writeTextFile(base + ".self_check.csv", rows);
+  std::ostringstream report;
+  report << "bag,pairs,without_pose,discontinuities,left_out,distance_m,median_ms,p95_ms,cpu_ms,options,problem\n"
+         << std::fixed << std::setprecision(1) << name << "," << run.pairs() << "," << run.pairsWithoutPose() << ","
+         << run.discontinuities() << "," << drive.left_out << "," << run.distance() << "," << run.time(0.5) << ","
+         << run.time(0.95) << "," << run.cpuTime() << "," << sdvo::hashOptions(sdvo::listOptions(options)) << ",\n";
+  sdvo::writeTextFile(reportOf(arguments), report.str());
 }
 
 /// True poses are of the kind of ours, and of two outputs of one name one would be left.
@@ -317,26 +211,72 @@ int run(const Arguments& arguments) {
   if (is_of_places && !arguments.places) throw std::runtime_error("--before, --odometry and --keyframes need --places");
   if (!arguments.truth.empty() && !arguments.places && !has_page)
     throw std::runtime_error("--ground-truth needs --page or --places");
-  cv::setNumThreads(arguments.threads);
-  if (arguments.places && arguments.poses.empty()) throw std::runtime_error("--places needs --poses, not --output");
-  if ((arguments.poses.empty() && !has_page) == arguments.output.empty())
+  if (arguments.places && arguments.poses.empty()) throw std::runtime_error("--places needs --poses");
+  if (arguments.poses.empty() && !has_page && arguments.output.empty())
     throw std::runtime_error("--page, --poses or --output is needed (see --help)");
-  return arguments.output.empty() ? runOne(arguments) : runMany(arguments);
+  if (arguments.inputs.size() > 1 && !arguments.join)
+    throw std::runtime_error(
+        "several recordings are run_many's; --join where they are parts of one drive (see --help)");
+  cv::setNumThreads(arguments.threads);
+  const sdvo::PipelineOptions options = sdvo::readPipelineOptions(arguments.config, arguments.settings);
+  std::optional<sdvo::PlaceRun> places;
+  if (arguments.places) places.emplace(options.place_recognition);
+  double way = 0.0;  // m, of all recordings
+  for (const std::string& before : arguments.before) {
+    Arguments whole = arguments;
+    whole.frames = kAll;
+    Drive drive(options);
+    follow(*sdvo::openRecording(before, arguments.source), whole, drive, &*places);
+    way += drive.whole.distance();
+    places->startSequence();
+  }
+  for (const std::string& folder : {arguments.pictures, arguments.output})
+    if (!folder.empty()) fs::create_directories(folder);
+  if (!arguments.pictures.empty() && !fs::is_empty(arguments.pictures))
+    throw std::runtime_error("--pictures '" + arguments.pictures + "' is not empty: choose another folder");
+  if (!arguments.output.empty()) fs::remove(reportOf(arguments));  // of an earlier run
+  const auto recording = sdvo::openParts(arguments.inputs, arguments.source);
+  Drive drive(options);
+  std::optional<Seen> seen;
+  if (!arguments.page.empty())
+    seen.emplace(Seen{sdvo::CameraCheck(options, drive.whole),
+                      sdvo::DrivePictures(std::min(arguments.frames, recording->size()))});
+  follow(*recording, arguments, drive, places ? &*places : nullptr, seen ? &*seen : nullptr);
+  const sdvo::OfflineRun& run = drive.whole;
+  if (places)
+    sdvo::writeKittiPoses(arguments.poses, places->poses());
+  else if (!arguments.poses.empty())
+    writePoses(arguments.poses, arguments.format, run);
+  if (!arguments.odometry.empty()) writePoses(arguments.odometry, arguments.format, run);
+  if (!arguments.timing.empty()) run.writeTiming(arguments.timing);
+  if (!arguments.states.empty()) run.writeStates(arguments.states);
+  if (!arguments.keyframes.empty()) places->writeKeyframes(arguments.keyframes);
+
+  std::cout << std::fixed << std::setprecision(1);
+  places ? printSummary(run, *places, way + run.distance()) : printSummary(run, options);
+  if (places && !arguments.truth.empty()) printErrors(places->errors(sdvo::readKittiPoses(arguments.truth)));
+  if (drive.left_out > 0) std::cout << drive.left_out << " stamps without a usable pair\n";
+  const std::vector<sdvo::SelfCheck> checks = checkItself(*recording, drive, options, arguments);
+  for (const sdvo::SelfCheck& check : checks) std::cout << check.text() << "\n";
+  if (!arguments.output.empty()) writeResults(drive, checks, options, arguments);
+  if (!seen) return 0;
+  const sdvo::Finding verdict = makePage(*recording, drive, *seen, checks, options, arguments);
+  std::cout << toString(verdict.verdict) << ": " << verdict.what << "\npage: " << arguments.page << "\n";
+  return sdvo::exitCodeOf(verdict.verdict);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   CLI::App app(
-      "Stereo odometry of recorded drives, every pair: bags of rectified images, folders in KITTI's layout, EuRoC "
-      "folders (rectified here). Of one drive it writes the files that are asked for, such as a --page to look at; "
-      "with --output, of each drive NAME: NAME.txt (poses of the left camera), NAME.csv (a line for each pair), and "
-      "report.csv with a line for each "
-      "drive");
+      "Stereo odometry of a recorded drive, every pair: a bag, a folder in the layout of KITTI, EuRoC or TUM-VI. Raw "
+      "images are rectified. Writes the files that are asked for, such as a --page to look at. Exit code 2: its "
+      "verdict "
+      "is FAIL. Many drives: run_many");
   Arguments arguments;
   arguments.places = fs::path(argv[0]).filename() == "run_places";
   app.add_option("recordings", arguments.inputs,
-                 "bag, folder with image_0, image_1, calib.txt, times.txt, folder with mav0; or folders of bags")
+                 "bag, folder with image_0, image_1, calib.txt, times.txt, or folder with mav0")
       ->required();
   app.add_option("--config", arguments.config, "YAML file as the nodelets load it");
   app.add_option("--param", arguments.settings,
@@ -347,7 +287,7 @@ int main(int argc, char** argv) {
                  "threads of OpenCV; more than one: odometry of a pair beside the features of the next")
       ->capture_default_str()
       ->check(CLI::Range(1, 256));
-  arguments.names.addTo(app);
+  arguments.source.addTo(app);
   app.add_flag("--join", arguments.join, "the recordings are parts of one drive, as of rosbag record --split");
 
   app.add_option("--page", arguments.page,
@@ -367,12 +307,9 @@ int main(int argc, char** argv) {
                  "CSV to write, a line for each pair: times, counts, state and its reason");
   app.add_option("--states", arguments.states,
                  "CSV to write, a line for each pair: state, covariances of motion and pose, reason");
-  app.add_option("--output", arguments.output, "folder of the results, made where it is missing")
-      ->excludes(app.get_option("--join"))
-      ->excludes(app.get_option("--page"))
-      ->excludes(app.get_option("--pictures"))
-      ->excludes(app.get_option("--timing"))
-      ->excludes(app.get_option("--states"));
+  app.add_option(
+      "--output", arguments.output,
+      "folder of results, made where it is missing: NAME.txt (poses), NAME.csv (as --timing) and report.csv");
   app.add_flag("--shuttle", arguments.shuttle,
                "runs each drive backwards, too: says how far from its start it ends (NAME.self_check.csv)");
   app.add_flag("--halves", arguments.halves,

@@ -6,7 +6,14 @@
 #include <iostream>
 #include <string>
 
+#include "../check/finding.hpp"
+
 namespace sdvo {
+
+/// Of a tool that judges; 1 is that of an error.
+inline int exitCodeOf(Verdict verdict) {
+  return verdict == Verdict::kFail ? 2 : 0;
+}
 
 /// What every tool's main() does: parse the command line, run `work` (returns the exit code), and report any failure as
 /// one line "error: …" on stderr with exit code 1.

@@ -11,8 +11,12 @@
 #include <cerrno>
 #include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <opencv2/imgcodecs.hpp>
+#include <set>
+#include <sstream>
 #include <stdexcept>
+#include <utility>
 #include <vector>
 
 #include "../ros/camera_finder.hpp"
@@ -49,42 +53,125 @@ sensor_msgs::ImageConstPtr decode(const sensor_msgs::CompressedImage& compressed
   return image;
 }
 
+/// Types of a definition's fields one after the other, those of nested messages in their place, without names.
+std::string layoutOf(const std::string& definition, const std::string& type = "", int depth = 0) {
+  constexpr int kDeepest = 10;
+  std::istringstream lines(definition);
+  std::string layout;
+  bool is_here = type.empty();
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream words(line.substr(0, line.find('#')));
+    std::string field, name;
+    if (!(words >> field >> name)) continue;
+    if (field == "MSG:") {
+      if (is_here) break;
+      if (const std::size_t ros2 = name.find("/msg/"); ros2 != std::string::npos) name.erase(ros2, 4);
+      is_here = name == type || (type.find('/') == std::string::npos && name.substr(name.rfind('/') + 1) == type);
+      continue;
+    }
+    if (!is_here || line.find('=') != std::string::npos) continue;  // a constant, or the line above the next message
+    const std::size_t array = std::min(field.find('['), field.size());
+    std::string base = field.substr(0, array);
+    if (const std::size_t ros2 = base.find("/msg/"); ros2 != std::string::npos) base.erase(ros2, 4);
+    const std::string nested = depth < kDeepest ? layoutOf(definition, base, depth + 1) : "";
+    layout += (nested.empty() ? base : "(" + nested + ")") + field.substr(array) + " ";
+  }
+  return layout;
+}
+
+/// What begins a file.
+const std::pair<const char*, const char*> kOtherFiles[] = {
+    {"SQLite format 3", "a bag of ROS 2 (SQLite)"}, {"\x89MCAP", "an MCAP file"}, {"PK", "a ZIP archive"}};
+
+/// As drivers call images that are not rectified.
+const std::vector<std::string> kRawImages = {"image_raw", "image_mono", "image", "image_color"};
+
 }  // namespace
 
-void StereoNames::addTo(CLI::App& app, const std::string& scope) {
-  app.add_option("--camera", camera, scope + "namespace of both sides")->capture_default_str();
-  app.add_option("--left", left, scope + "name of the left side, such as infra1")->capture_default_str();
-  app.add_option("--right", right, scope + "name of the right side")->capture_default_str();
-  app.add_option("--image", image, scope + "name of the rectified images, such as image_rect_raw")
+void StereoSource::addTo(CLI::App& app) {
+  app.add_option("--camera", camera, "topics: namespace of both sides")->capture_default_str();
+  app.add_option("--left", left, "topics: name of the left side, such as infra1")->capture_default_str();
+  app.add_option("--right", right, "topics: name of the right side")->capture_default_str();
+  app.add_option("--image", image,
+                 "topics: name of the images, such as image_rect_raw; without 'rect' in it they are raw, and rectified")
       ->capture_default_str();
+  app.add_option("--calibration", calibration,
+                 "in place of camera_info or sensor.yaml: Kalibr's camera chain, or the files of left and right: "
+                 "camera_info (YAML) or sensor.yaml of EuRoC")
+      ->expected(1, 2)
+      ->check(CLI::ExistingFile);
+  app.add_option("--fov", fov, "raw images: field of view once rectified, from side to side, deg; 0: as calibrated")
+      ->capture_default_str()
+      ->check(CLI::Range(0.0, 170.0));
 }
 
-StereoTopics StereoNames::topics() const {
-  const std::string of_left = camera + "/" + left + "/", of_right = camera + "/" + right + "/";
-  return {of_left + image, of_right + image, of_left + "camera_info", of_right + "camera_info"};
+std::string StereoSource::folder() const {
+  return camera.substr(0, camera.find_last_not_of('/') + 1) + "/";
 }
 
-StereoTopics topicsIn(const rosbag::Bag& bag, const StereoNames& names) {
-  StereoTopics topics = names.topics();
-  ros::master::V_TopicInfo recorded;
+StereoTopics StereoSource::topics() const {
+  const std::string of_left = folder() + left + "/", of_right = folder() + right + "/";
+  if (calibration.empty())
+    return {of_left + image, of_right + image, of_left + "camera_info", of_right + "camera_info"};
+  return {of_left + image, of_right + image, calibration.front(), calibration.back()};
+}
+
+StereoTopics topicsIn(const rosbag::Bag& bag, const StereoSource& source) {
+  StereoTopics topics = source.topics();
+  ros::master::V_TopicInfo recorded, imagined;  // without the forms of images; with a camera_info beside each
   rosbag::View all(bag);
   for (const rosbag::ConnectionInfo* connection : all.getConnections()) {
-    const bool is_compressed = connection->datatype == "sensor_msgs/CompressedImage";
-    recorded.emplace_back(connection->topic.substr(0, is_compressed ? connection->topic.rfind('/') : std::string::npos),
-                          is_compressed ? "sensor_msgs/Image" : connection->datatype);
+    const std::string& type = connection->datatype;
+    const bool is_compressed = type.find("/CompressedImage") != std::string::npos;
+    const std::string name =
+        connection->topic.substr(0, is_compressed ? connection->topic.rfind('/') : std::string::npos);
+    recorded.emplace_back(name, type);
+    if (!is_compressed && type.find("/Image") == std::string::npos) continue;
+    imagined.emplace_back(name, type);
+    imagined.emplace_back(name.substr(0, name.rfind('/') + 1) + "camera_info", "");
   }
-  const bool is_there =
-      std::any_of(recorded.begin(), recorded.end(), [&](const auto& t) { return t.name == topics[0]; });
-  StereoNames usual;
-  const std::string folder = names.camera == usual.camera ? "/" : names.camera + "/";
-  usual.camera = names.camera;
-  const std::vector<ros::M_string> cameras = findStereoCameras(folder, recorded);
-  if (!is_there && topics == usual.topics() && cameras.size() == 1)
-    topics = {cameras[0].at("left/image_rect"), cameras[0].at("right/image_rect"), cameras[0].at("left/camera_info"),
-              cameras[0].at("right/camera_info")};
-  const auto has = [&bag](const std::string& topic) { return rosbag::View(bag, rosbag::TopicQuery(topic)).size() > 0; };
-  for (const std::size_t image : {0u, 1u})
-    if (!has(topics[image]) && has(topics[image] + "/compressed")) topics[image] += "/compressed";
+  const auto has = [](const ros::master::V_TopicInfo& among, const std::string& name) {
+    return std::any_of(among.begin(), among.end(), [&](const auto& topic) { return topic.name == name; });
+  };
+  StereoSource usual;
+  usual.camera = source.camera;
+  usual.calibration = source.calibration;
+  if (topics == usual.topics() && !has(recorded, topics[0])) {
+    const std::string folder = source.camera == StereoSource().camera ? "/" : source.folder();
+    for (const ros::master::V_TopicInfo* among : {&recorded, &imagined})
+      for (const auto& images : {kRectifiedImages, kRawImages}) {
+        const std::vector<ros::M_string> cameras = findStereoCameras(folder, *among, images);
+        if (has(recorded, topics[0]) || cameras.size() != 1) continue;
+        topics[0] = cameras[0].at("left/image_rect");
+        topics[1] = cameras[0].at("right/image_rect");
+        if (!source.calibration.empty()) continue;
+        topics[2] = cameras[0].at("left/camera_info");
+        topics[3] = cameras[0].at("right/camera_info");
+      }
+  }
+  const std::string path = bag.getFileName();
+  for (const std::size_t input : {0u, 1u}) {
+    if (has(imagined, topics[input])) continue;
+    std::set<std::string> names;
+    for (std::size_t i = 0; i < imagined.size(); i += 2) names.insert(imagined[i].name);
+    std::string images;
+    for (const std::string& name : names) images += (images.empty() ? "" : ", ") + name;
+    throw std::runtime_error("'" + path + "' has no " + topics[input] +
+                             "; its images: " + (images.empty() ? "none" : images) +
+                             ": name the topics by --camera, --left, --right, --image");
+  }
+  for (const std::size_t input : {2u, 3u})  // stereo_raw.launch with a field of view of its own
+    if (const std::string of_fov = topics[input].substr(0, topics[input].rfind('/') + 1) + "rectifiable/camera_info";
+        !has(recorded, topics[input]) && has(recorded, of_fov))
+      topics[input] = of_fov;
+  for (const std::size_t input : {2u, 3u})
+    if (source.calibration.empty() && !has(recorded, topics[input]))
+      throw std::runtime_error("'" + path + "' has images on " + topics[0] + " and " + topics[1] + ", but no " +
+                               topics[input] +
+                               ": the calibration is missing. Give it: --calibration camchain.yaml (Kalibr's), or "
+                               "--calibration left.yaml right.yaml (camera_info or EuRoC's sensor.yaml)");
+  for (const std::size_t input : {0u, 1u})
+    if (rosbag::View(bag, rosbag::TopicQuery(topics[input])).size() == 0) topics[input] += "/compressed";
   return topics;
 }
 
@@ -99,23 +186,37 @@ void refuseWhatIsWritten(const std::string& path) {
 
 void openBag(const std::string& path, rosbag::Bag& bag) {
   if (!std::filesystem::is_regular_file(path)) throw std::runtime_error("'" + path + "' is no file");
+  std::string begin(16, '\0');
+  std::ifstream(path, std::ios::binary).read(begin.data(), static_cast<std::streamsize>(begin.size()));
+  for (const auto& [magic, what] : kOtherFiles)
+    if (begin.rfind(magic, 0) == 0)
+      throw std::runtime_error(
+          "'" + path + "' is " + what +
+          ", no bag of ROS 1: convert it, for example by rosbags-convert of the Python package rosbags");
   ofBag(path, [&] { bag.open(path, rosbag::bagmode::Read); });
+}
+
+void requireLayout(const rosbag::MessageInstance& instance, const std::string& type, const std::string& definition,
+                   const std::string& md5) {
+  const std::string here = layoutOf(definition), there = layoutOf(instance.getMessageDefinition());
+  if (here != there)
+    throw std::runtime_error(instance.getTopic() + " holds " + type + " of another definition: " + there + "(MD5 " +
+                             instance.getMD5Sum() + "), expected " + here + "(MD5 " + md5 + ")");
 }
 
 StereoMessage readStereoMessage(const rosbag::MessageInstance& instance, const StereoTopics& topics) {
   const auto input =
       static_cast<std::size_t>(std::find(topics.begin(), topics.end(), instance.getTopic()) - topics.begin());
-  StereoMessage message{input, nullptr, nullptr};
-  if (input >= 2)
-    message.info = instance.instantiate<sensor_msgs::CameraInfo>();
-  else if (const auto compressed = instance.instantiate<sensor_msgs::CompressedImage>())
-    message.image = decode(*compressed);
-  else
-    message.image = instance.instantiate<sensor_msgs::Image>();
-  if (!message.image && !message.info)
-    throw std::runtime_error(instance.getTopic() + " holds " + instance.getDataType() + ", expected " +
-                             (input < 2 ? "sensor_msgs/Image or CompressedImage" : "sensor_msgs/CameraInfo"));
-  return message;
+  const ros::Time& recorded = instance.getTime();
+  if (input >= 2) {
+    if (const auto info = readAs<sensor_msgs::CameraInfo>(instance)) return toStereoMessage(input, recorded, info);
+  } else if (const auto image = readAs<sensor_msgs::Image>(instance)) {
+    return toStereoMessage(input, recorded, image);
+  } else if (const auto compressed = readAs<sensor_msgs::CompressedImage>(instance)) {
+    return toStereoMessage(input, recorded, decode(*compressed));
+  }
+  throw std::runtime_error(instance.getTopic() + " holds " + instance.getDataType() + ", expected " +
+                           (input < 2 ? "sensor_msgs/Image or CompressedImage" : "sensor_msgs/CameraInfo"));
 }
 
 }  // namespace sdvo

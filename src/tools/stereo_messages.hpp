@@ -1,5 +1,7 @@
 #pragma once
 
+#include <ros/message_traits.h>
+#include <ros/serialization.h>
 #include <rosbag/bag.h>
 #include <rosbag/exceptions.h>
 #include <rosbag/message_instance.h>
@@ -8,28 +10,32 @@
 
 #include <CLI/CLI.hpp>
 #include <array>
+#include <boost/make_shared.hpp>
 #include <cstddef>
 #include <stdexcept>
 #include <string>
+#include <vector>
 
 namespace sdvo {
 
-/// Topics of a rectified stereo camera: left and right image, left and right calibration (the order of
-/// ArrivalLog::Input).
+/// Topics of a stereo camera: left and right image, left and right calibration (the order of ArrivalLog::Input).
 using StereoTopics = std::array<std::string, 4>;
 
-/// The names that the topics are made of, as options of a command line.
-struct StereoNames {
+/// Where the images and the calibration of a recorded or live stereo camera are, as options of a command line.
+struct StereoSource {
   std::string camera = "/stereo", left = "left", right = "right", image = "image_rect";
+  std::vector<std::string> calibration;  ///< files of readCalibration() in place of camera_info; none: camera_info
+  double fov = 0.0;                      ///< of raw images once they are rectified, deg; 0: as calibrated
 
-  /// `scope` begins what --help has of them.
-  void addTo(CLI::App& app, const std::string& scope = "bags: ");
+  void addTo(CLI::App& app);
+  std::string folder() const;  ///< the namespace with its last `/`
   StereoTopics topics() const;
 };
 
 /// The topics as a bag has them: …/compressed where an image is recorded in that form alone. Where it has none of the
-/// usual names, those of its only stereo camera, or of the only one in the namespace that is given.
-StereoTopics topicsIn(const rosbag::Bag& bag, const StereoNames& names);
+/// usual names, those of its only stereo camera, rectified or else raw, or of the only one in the namespace that is
+/// given. Files of a calibration stand for its topics. Throws std::runtime_error where the bag lacks a topic.
+StereoTopics topicsIn(const rosbag::Bag& bag, const StereoSource& source);
 
 /// Throws std::runtime_error where a process of this machine has the file open to write it, as a recorder has: what
 /// repairs a bag would ruin it.
@@ -49,17 +55,51 @@ auto ofBag(const std::string& path, const Work& work) try {
   throw std::runtime_error("'" + path + "' cannot be read: " + e.what() + ". Is it whole? rosbag check '" + path + "'");
 }
 
-/// For reading. Throws as ofBag() does; a pipe, which would be waited for, is none.
+/// For reading. Throws as ofBag() does, and for what is no bag of ROS 1; a pipe, which would be waited for, is none.
 void openBag(const std::string& path, rosbag::Bag& bag);
+
+/// Throws std::runtime_error that has both definitions unless their bytes are alike, whatever the names of fields.
+void requireLayout(const rosbag::MessageInstance& instance, const std::string& type, const std::string& definition,
+                   const std::string& md5);
+
+/// A message by what it holds: converters from ROS 2 keep other names of fields, and so another MD5. Null for another
+/// type; throws std::runtime_error for another version of this one.
+template <class Message>
+boost::shared_ptr<Message> readAs(const rosbag::MessageInstance& instance) {
+  if (auto message = instance.instantiate<Message>()) return message;
+  namespace traits = ros::message_traits;
+  const std::string type = traits::datatype<Message>();
+  std::string recorded = instance.getDataType();
+  if (const std::size_t ros2 = recorded.find("/msg/"); ros2 != std::string::npos) recorded.erase(ros2, 4);
+  if (recorded != type) return nullptr;
+  requireLayout(instance, type, traits::definition<Message>(), traits::md5sum<Message>());
+  std::vector<std::uint8_t> bytes(instance.size());
+  ros::serialization::OStream out(bytes.data(), instance.size());
+  instance.write(out);
+  ros::serialization::IStream in(bytes.data(), instance.size());
+  const auto message = boost::make_shared<Message>();
+  ros::serialization::deserialize(in, *message);
+  return message;
+}
 
 /// A message of one of the topics: an image or a calibration.
 struct StereoMessage {
+  std_msgs::Header header;
   std::size_t input;  ///< which of the topics
+  ros::Time arrival;  ///< or when it was recorded
   sensor_msgs::ImageConstPtr image;
   sensor_msgs::CameraInfoConstPtr info;
-
-  const std_msgs::Header& header() const { return image ? image->header : info->header; }
 };
+
+/// Of either kind.
+inline StereoMessage toStereoMessage(std::size_t input, const ros::Time& arrival,
+                                     const sensor_msgs::ImageConstPtr& image) {
+  return {image->header, input, arrival, image, nullptr};
+}
+inline StereoMessage toStereoMessage(std::size_t input, const ros::Time& arrival,
+                                     const sensor_msgs::CameraInfoConstPtr& info) {
+  return {info->header, input, arrival, nullptr, info};
+}
 
 /// A compressed image becomes a raw one; without pixels where it cannot be decoded. Throws std::runtime_error for
 /// another type of message.
