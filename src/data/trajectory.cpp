@@ -12,6 +12,7 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "../common/statistics.hpp"
 #include "text_file.hpp"
 
 namespace sdvo {
@@ -68,13 +69,6 @@ double rootMeanSquareDistance(const Eigen::Matrix3Xd& a, const Eigen::Matrix3Xd&
   return std::sqrt((a - b).squaredNorm() / static_cast<double>(a.cols()));
 }
 
-double median(std::vector<double> values) {
-  if (values.empty()) return kNaN;
-  std::sort(values.begin(), values.end());
-  const std::size_t middle = values.size() / 2;
-  return values.size() % 2 == 1 ? values[middle] : 0.5 * (values[middle - 1] + values[middle]);
-}
-
 double scaleOfSteps(const Trajectory& ground_truth, const Trajectory& estimate) {
   std::vector<double> ratios;
   for (std::size_t i = 1; i < estimate.size(); ++i) {
@@ -82,7 +76,7 @@ double scaleOfSteps(const Trajectory& ground_truth, const Trajectory& estimate) 
     if (true_step < kSmallestStep) continue;
     ratios.push_back((estimate[i].translation() - estimate[i - 1].translation()).norm() / true_step);
   }
-  return median(ratios);
+  return ratios.empty() ? kNaN : median(ratios);
 }
 
 /// Numbers as they are read anywhere, whatever the process' locale.

@@ -26,6 +26,25 @@ std::string cell(const char* pattern, double value) {
   return std::isnan(value) ? "-" : format(pattern, value);
 }
 
+/// Of the whole trajectory.
+struct Figure {
+  const char *name, *words, *pattern;
+  double TrajectoryErrors::*value;
+};
+
+const Figure kFigures[] = {
+    {"rpe_translation_m", "RPE translation, rmse per frame [m]", "%.5f", &TrajectoryErrors::rpe_translation_m},
+    {"rpe_rotation_deg", "RPE rotation, rmse per frame [deg]", "%.5f", &TrajectoryErrors::rpe_rotation_deg},
+    {"ate_aligned_m", "ATE, rmse after rigid alignment [m]", "%.4f", &TrajectoryErrors::ate_aligned_m},
+    {"ate_first_pose_m", "ATE, rmse with equal first poses [m]", "%.4f", &TrajectoryErrors::ate_first_pose_m},
+    {"final_drift_m", "final drift [m]", "%.4f", &TrajectoryErrors::final_drift_m},
+    {"final_drift_percent", "final drift [% of length]", "%.4f", &TrajectoryErrors::final_drift_percent},
+    {"final_drift_deg", "final drift [deg]", "%.4f", &TrajectoryErrors::final_drift_deg},
+    {"largest_drift_m", "largest drift [m]", "%.4f", &TrajectoryErrors::largest_drift_m},
+    {"largest_drift_deg", "largest drift [deg]", "%.4f", &TrajectoryErrors::largest_drift_deg},
+    {"scale", "scale, median of estimated / true step", "%.5f", &TrajectoryErrors::scale},
+};
+
 void printRow(const std::string& name, const SubPathErrors& errors) {
   std::printf("%10s %10d %15s %18s\n", name.c_str(), errors.count, cell("%.4f", errors.translation_percent).c_str(),
               cell("%.5f", errors.rotation_deg_per_m).c_str());
@@ -38,17 +57,8 @@ void printTable(const TrajectoryErrors& errors) {
   printRow("mean", errors.sub_paths);
   std::printf("\n");
 
-  const auto line = [](const char* name, const std::string& value) { std::printf("%-44s %s\n", name, value.c_str()); };
-  line("RPE translation, rmse per frame [m]", cell("%.5f", errors.rpe_translation_m));
-  line("RPE rotation, rmse per frame [deg]", cell("%.5f", errors.rpe_rotation_deg));
-  line("ATE, rmse after rigid alignment [m]", cell("%.4f", errors.ate_aligned_m));
-  line("ATE, rmse with equal first poses [m]", cell("%.4f", errors.ate_first_pose_m));
-  line("final drift [m]", cell("%.4f", errors.final_drift_m));
-  line("final drift [% of length]", cell("%.4f", errors.final_drift_percent));
-  line("final drift [deg]", cell("%.4f", errors.final_drift_deg));
-  line("largest drift [m]", cell("%.4f", errors.largest_drift_m));
-  line("largest drift [deg]", cell("%.4f", errors.largest_drift_deg));
-  line("scale, median of estimated / true step", cell("%.5f", errors.scale));
+  for (const Figure& figure : kFigures)
+    std::printf("%-44s %s\n", figure.words, cell(figure.pattern, errors.*figure.value).c_str());
 }
 
 /// The requested lengths that no sub-path reaches, as "100, 200"; empty when there is none.
@@ -80,17 +90,7 @@ void writeJson(const std::string& path, const TrajectoryErrors& errors) {
     separator = ",\n";
   }
   file << "\n  ]";
-  const auto field = [&](const char* name, double value) { file << ",\n  \"" << name << "\": " << jsonNumber(value); };
-  field("rpe_translation_m", errors.rpe_translation_m);
-  field("rpe_rotation_deg", errors.rpe_rotation_deg);
-  field("ate_aligned_m", errors.ate_aligned_m);
-  field("ate_first_pose_m", errors.ate_first_pose_m);
-  field("final_drift_m", errors.final_drift_m);
-  field("final_drift_percent", errors.final_drift_percent);
-  field("final_drift_deg", errors.final_drift_deg);
-  field("largest_drift_m", errors.largest_drift_m);
-  field("largest_drift_deg", errors.largest_drift_deg);
-  field("scale", errors.scale);
+  for (const Figure& figure : kFigures) file << ",\n  \"" << figure.name << "\": " << jsonNumber(errors.*figure.value);
   file << "\n}\n";
   sdvo::writeTextFile(path, file.str());
 }

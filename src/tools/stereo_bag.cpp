@@ -5,13 +5,15 @@
 #include <nav_msgs/Odometry.h>
 #include <nav_msgs/Path.h>
 #include <sensor_msgs/Image.h>
+#include <tf2_eigen/tf2_eigen.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstdint>
-#include <unsupported/Eigen/MatrixFunctions>
 #include <utility>
+
+#include "stereo_descriptor_vo/common/se3.hpp"
 
 namespace sdvo {
 namespace {
@@ -36,37 +38,12 @@ Eigen::Isometry3d baseFromOptical() {
   return T_base_optical;
 }
 
-geometry_msgs::Quaternion toMessage(const Eigen::Quaterniond& q) {
-  geometry_msgs::Quaternion message;
-  message.x = q.x();
-  message.y = q.y();
-  message.z = q.z();
-  message.w = q.w();
-  return message;
-}
-
-geometry_msgs::Pose toMessage(const Eigen::Isometry3d& pose) {
-  geometry_msgs::Pose message;
-  message.position.x = pose.translation().x();
-  message.position.y = pose.translation().y();
-  message.position.z = pose.translation().z();
-  Eigen::Quaterniond rotation = Eigen::Quaterniond(pose.linear()).normalized();
-  if (rotation.w() < 0.0) rotation.coeffs() = -rotation.coeffs();  // both signs are the same rotation: keep to one
-  message.orientation = toMessage(rotation);
-  return message;
-}
-
 geometry_msgs::TransformStamped makeTransform(const ros::Time& stamp, const char* parent, const char* child,
                                               const Eigen::Isometry3d& T_parent_child) {
-  const geometry_msgs::Pose pose = toMessage(T_parent_child);
-  geometry_msgs::TransformStamped message;
+  geometry_msgs::TransformStamped message = tf2::eigenToTransform(T_parent_child);
   message.header.stamp = stamp;
   message.header.frame_id = parent;
   message.child_frame_id = child;
-  message.transform.translation.x = pose.position.x;
-  message.transform.translation.y = pose.position.y;
-  message.transform.translation.z = pose.position.z;
-  message.transform.rotation = pose.orientation;
   return message;
 }
 
@@ -84,10 +61,7 @@ sensor_msgs::Image makeImage(const std_msgs::Header& header, const cv::Mat& imag
   message.height = static_cast<std::uint32_t>(image.rows);
   message.encoding = "mono8";
   message.step = message.width;
-  message.data.reserve(image.total());
-  for (int row = 0; row < image.rows; ++row) {
-    message.data.insert(message.data.end(), image.ptr<std::uint8_t>(row), image.ptr<std::uint8_t>(row) + image.cols);
-  }
+  message.data.assign(image.datastart, image.dataend);  // read or rectified, so continuous
   return message;
 }
 
@@ -110,41 +84,29 @@ Trajectory basePoses(const Trajectory& camera_poses) {
   return poses;
 }
 
-/// Constant body twist (m/s, rad/s) that leads from one pose to the other: log(inv(from) * to) / dt, linear part first.
-Eigen::Matrix<double, 6, 1> bodyTwist(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to, double dt) {
-  const Eigen::Matrix4d log = Eigen::Matrix4d((from.inverse() * to).matrix()).log();
-  Eigen::Matrix<double, 6, 1> twist;
-  twist << log(0, 3), log(1, 3), log(2, 3), log(2, 1), log(0, 2), log(1, 0);
-  return twist / dt;
-}
-
 void writePath(BagWriter& bag, const std::vector<ros::Time>& stamps, const Trajectory& poses) {
   nav_msgs::Path path;
   path.header = makeHeader(stamps.front(), kOdomFrame);
   for (std::size_t i = 0; i < poses.size(); ++i) {
     geometry_msgs::PoseStamped pose;
     pose.header = makeHeader(stamps[i], kOdomFrame);
-    pose.pose = toMessage(poses[i]);
+    pose.pose = tf2::toMsg(poses[i]);
     path.poses.push_back(pose);
   }
   bag.writeLatched("/ground_truth/path", stamps.front(), path);
 }
 
-/// Odometry of frame i. The twist is that of the step that led here; at the first frame that of the step to come.
+/// Odometry of frame i. The twist, constant in the body's axes, is that of the step that led here; at the first frame
+/// that of the step to come.
 nav_msgs::Odometry makeOdometry(const std::vector<ros::Time>& stamps, const Trajectory& poses, std::size_t i) {
   nav_msgs::Odometry message;
   message.header = makeHeader(stamps[i], kOdomFrame);
   message.child_frame_id = kTrueBaseFrame;
-  message.pose.pose = toMessage(poses[i]);
+  message.pose.pose = tf2::toMsg(poses[i]);
   if (poses.size() < 2) return message;
   const std::size_t to = std::max<std::size_t>(i, 1);
-  const Eigen::Matrix<double, 6, 1> twist = bodyTwist(poses[to - 1], poses[to], (stamps[to] - stamps[to - 1]).toSec());
-  message.twist.twist.linear.x = twist[0];
-  message.twist.twist.linear.y = twist[1];
-  message.twist.twist.linear.z = twist[2];
-  message.twist.twist.angular.x = twist[3];
-  message.twist.twist.angular.y = twist[4];
-  message.twist.twist.angular.z = twist[5];
+  const Vector6d twist = logSE3(poses[to - 1].inverse() * poses[to]) / (stamps[to] - stamps[to - 1]).toSec();
+  message.twist.twist = tf2::toMsg(twist);
   return message;
 }
 

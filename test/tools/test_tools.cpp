@@ -282,7 +282,7 @@ TEST_F(Tools, NoOutputDestroysAFile) {
     if (is_bag) fs::remove(output);
     // The table of evaluate_trajectory would not fit either.
     if (tool[0] != 'e') expectError(run(tool, command, "trap '' XFSZ; ulimit -f 1; "), output.string());
-    if (!is_bag) EXPECT_TRUE(readText(output) == before);
+    EXPECT_TRUE(is_bag || readText(output) == before);
     for (const auto& entry : fs::directory_iterator(root_))
       EXPECT_EQ(entry.path().string().find("partial"), std::string::npos) << entry.path();
     fs::remove(output);
@@ -610,10 +610,11 @@ TEST_F(Tools, RawBagsAreRectified) {
 
 /// As converters from ROS 2 leave it: fields with other names, so another MD5.
 TEST_F(Tools, MessagesAreKnownByWhatTheyHold) {
-  const auto changed = [this](const std::string& name, const std::string& definition) {
+  const fs::path plain = bag("plain");
+  const auto changed = [&](const std::string& name, const std::string& definition) {
     const fs::path path = root_ / (name + ".bag");
     rosbag::Bag out(path.string(), rosbag::bagmode::Write);
-    const rosbag::Bag in(bag("plain").string());
+    const rosbag::Bag in(plain.string());
     for (const rosbag::MessageInstance& message : rosbag::View(in)) {
       const auto header = boost::make_shared<ros::M_string>(*message.getConnectionHeader());
       if (message.getDataType() == "sensor_msgs/CameraInfo") {
