@@ -18,7 +18,7 @@ import rosgraph
 import rospy
 import rostest
 from nav_msgs.msg import Odometry
-from sensor_msgs.msg import Image
+from sensor_msgs.msg import CameraInfo
 
 from kitti_replay import PACKAGE, Collector, data_dir, links, matrix_of, run_tool, wait_until
 from stereo_descriptor_vo.msg import VoInfo
@@ -49,6 +49,7 @@ class Raw(unittest.TestCase):
 
         cls.odometry = Collector('/stereo/odom', Odometry)
         cls.info = Collector('/stereo/vo_info', VoInfo)
+        cls.cameras = [Collector('/stereo/%s/rectifiable/camera_info' % side, CameraInfo) for side in ('left', 'right')]
         needed = {('out', c.subscriber.resolved_name, rospy.get_name()) for c in (cls.odometry, cls.info)}
         needed |= {('in', '/stereo/%s/%s' % (side, what)) for side in ('left', 'right') for what in ('image_mono', 'image_rect')}
         needed |= {('in', name) for name in NAMES.values()}
@@ -71,6 +72,13 @@ class Raw(unittest.TestCase):
     def test_every_pair_is_tracked(self):
         self.assertEqual([message.header.stamp for message in self.odometry], self.stamps)
         self.assertEqual({message.state for message in self.info}, {'TRACKING'})
+
+    def test_images_have_the_field_of_view_that_was_asked_for(self):
+        f = 752 / 2 / np.tan(np.radians(80 / 2))
+        for camera, baseline in zip(self.cameras, (0.0, 0.11)):
+            P = np.reshape(camera[0].P, (3, 4))
+            np.testing.assert_allclose(P[:, :3], [[f, 0, 375.5], [0, f, 239.5], [0, 0, 1]])
+            self.assertAlmostEqual(-P[0, 3] / f, baseline, places=3)
 
     def test_images_stay_in_the_manager(self):
         self.assertTrue(self.connected)
