@@ -13,6 +13,7 @@
 #include "../common/text.hpp"
 #include "page.hpp"
 #include "plot.hpp"
+#include "stereo_messages.hpp"
 
 namespace sdvo {
 namespace {
@@ -321,7 +322,7 @@ std::optional<LiveRecord> readLiveRecord(const rosbag::Bag& bag) {
   for (const rosbag::MessageInstance& instance :
        rosbag::View(bag, rosbag::TypeQuery(ros::message_traits::datatype<VoInfo>()))) {
     if (topic.empty()) topic = instance.getTopic();
-    const VoInfo::ConstPtr info = instance.getTopic() == topic ? instance.instantiate<VoInfo>() : nullptr;
+    const VoInfo::ConstPtr info = instance.getTopic() == topic ? readAs<VoInfo>(instance) : nullptr;
     if (!info || info->state_id >= record.states.size()) continue;
     ++record.states[info->state_id];
     if (std::isfinite(info->latency)) record.latencies.push_back(info->latency);

@@ -154,7 +154,11 @@ sdvo::Finding makePage(const sdvo::Recording& recording, const Drive& drive, con
   if (const std::string live = arguments.live.empty() ? input : arguments.live; fs::is_regular_file(live)) {
     rosbag::Bag bag;
     sdvo::openBag(live, bag);
-    report.live = sdvo::ofBag(live, [&] { return sdvo::readLiveRecord(bag); });
+    try {
+      report.live = sdvo::ofBag(live, [&] { return sdvo::readLiveRecord(bag); });
+    } catch (const std::runtime_error& e) {
+      std::cerr << "note: " << e.what() << "; the page lacks what the odometry reported while it ran" << std::endl;
+    }
   }
   sdvo::writeDrivePage(arguments.page, report, drive.whole);
   return judge(report, drive.whole);

@@ -932,6 +932,22 @@ TEST_F(Tools, ThePageShowsWhatWasReportedLive) {
   ASSERT_EQ(run("run_sequence", bag("a").string() + " --page " + page.string() + " --live " + live.string()).exit_code,
             0);
   expectWords(readPage(page), {"while it ran", "2 TRACKING, 1 LOST; 7 pairs dropped"});
+
+  // Of another version.
+  fs::remove(live);
+  {
+    rosbag::Bag out(live.string(), rosbag::bagmode::Write);
+    const auto header = boost::make_shared<ros::M_string>();
+    (*header)["type"] = "stereo_descriptor_vo/VoInfo";
+    (*header)["md5sum"] = "0123456789abcdef0123456789abcdef";
+    (*header)["message_definition"] = "std_msgs/Header header\nstring state\n";
+    out.write("/stereo/vo_info", ros::Time(1000000000, 0), stereo_descriptor_vo::VoInfo(), header);
+  }
+  const Outcome other =
+      run("run_sequence", (root_ / "a.bag").string() + " --page " + page.string() + " --live " + live.string());
+  EXPECT_EQ(other.exit_code, 0) << other.err;
+  EXPECT_NE(other.err.find("/stereo/vo_info holds stereo_descriptor_vo/VoInfo of another definition"),
+            std::string::npos);
 }
 
 TEST_F(Tools, PicturesOfEachPair) {
