@@ -149,24 +149,31 @@ std::string RightCameraDelay::OtherPair::words() const {
   return words.str();
 }
 
+/// By prior and pairs. Out of step or not is as likely beforehand.
+RightCameraDelay::Posterior RightCameraDelay::posterior() const {
+  constexpr double kExact = 1e-6;  // s, as the least prior: rows without noise, as of a simulator
+  const auto found = estimate();
+  if (!found) return {0.5, prior_, prior_sigma_};
+  using Scalar = Eigen::Matrix<double, 1, 1>;
+  const double of_pairs = std::max(found->sigma, kExact), ratio = of_pairs / std::hypot(prior_sigma_, of_pairs);
+  const double log_odds = logBayesFactor<1>(Scalar(found->value - prior_), Scalar(1.0 / (of_pairs * of_pairs)),
+                                            Scalar(prior_sigma_ * prior_sigma_));
+  return {probabilityOf(log_odds), found->value + ratio * ratio * (prior_ - found->value), ratio * prior_sigma_};
+}
+
+/// Root mean square error of `compensated`, m, where each second of delay is `exposed` m.
+double RightCameraDelay::Posterior::error(double exposed, double prior, double compensated) const {
+  const double out = mean * exposed - compensated, in = prior * exposed - compensated;
+  return std::sqrt(out_of_step * (out * out + sigma * sigma * exposed * exposed) + (1.0 - out_of_step) * in * in);
+}
+
 double RightCameraDelay::deviation(const StereoFeatures& features, double distance, double rate) const {
-  constexpr double kExact = 1e-6;               // s, as the least prior: rows without noise, as of a simulator
-  double sigma = prior_sigma_, log_odds = 0.0;  // out of step or not is as likely beforehand
-  if (const auto found = estimate()) {
-    using Scalar = Eigen::Matrix<double, 1, 1>;
-    const double of_pairs = std::max(found->sigma, kExact);
-    log_odds = logBayesFactor<1>(Scalar(found->value - prior_), Scalar(1.0 / (of_pairs * of_pairs)),
-                                 Scalar(prior_sigma_ * prior_sigma_));
-    sigma *= of_pairs / std::hypot(prior_sigma_, of_pairs);
-  }
-  return std::sqrt(probabilityOf(log_odds)) * sigma * exposed(features, distance, rate);
+  const double here = exposed(features, distance, rate);
+  return posterior().error(here, prior_, here * compensated());
 }
 
 double RightCameraDelay::drift() const {
-  const double known = compensated();
-  const auto found = estimate();
-  if (known == 0.0 || !found) return 0.0;
-  return std::hypot(known * exposed_ - compensated_, found->sigma * exposed_);
+  return estimate() ? posterior().error(exposed_, prior_, compensated_) : 0.0;
 }
 
 /// The rows of the third last pair, whose neighbours are known.

@@ -130,9 +130,10 @@ TEST(RightCameraDelay, WhatIsKnownBeforehandHoldsUntilItIsContradicted) {
 }
 
 TEST(RightCameraDelay, WhatWasNotCompensatedMakesThePositionUncertain) {
-  EXPECT_EQ(watched(0.0, 60).drift(), 0.0);
-  const double late = watched(0.0062, 60).drift(), later = watched(0.0124, 60).drift();
-  EXPECT_GT(late, 0.0);
+  EXPECT_EQ(RightCameraDelay().drift(), 0.0);
+  const double late = watched(0.0062, 60).drift();
+  EXPECT_LT(watched(0.0, 60).drift(), 0.02 * late);
+  const double later = watched(0.0124, 60).drift();
   EXPECT_NEAR(later / late, 2.0, 0.5) << "until the delay is known, it shifts points in proportion";
 }
 
@@ -148,9 +149,21 @@ TEST(RightCameraDelay, AMotionInATurnIsAsUncertainAsPriorAndPairsLeaveTheDelay) 
   EXPECT_EQ(unknown.deviation(synthetic::noFeatures(features.camera), 0.5, 1.5), 0.0);
   const RightCameraDelay late = watched(0.0062, 60), in_step = watched(0.0, 60);
   const double of_pairs = late.estimate()->sigma * each_second;
-  EXPECT_LT(late.deviation(features, 0.5, 1.5), of_pairs) << "the prior tells something";
-  EXPECT_GT(late.deviation(features, 0.5, 1.5), 0.9 * of_pairs) << "the pairs tell more";
+  EXPECT_GT(late.deviation(features, 0.5, 1.5), 0.9 * of_pairs);
+  const double uncompensated = (late.estimate()->value - late.compensated()) * each_second;
+  EXPECT_LT(late.deviation(features, 0.5, 1.5), std::hypot(of_pairs, 1.1 * uncompensated));
   EXPECT_LT(in_step.deviation(features, 0.5, 1.5), 0.5 * in_step.estimate()->sigma * each_second);
+}
+
+/// Two seconds to ten of rigs out of step by a little: what is left after the compensation, in standard deviations.
+TEST(RightCameraDelay, WhatIsLeftIsWithinItsDeviation) {
+  const StereoFeatures features = seen(Vector6d::Zero(), 0.0);
+  const double each_second = 0.5 * features.camera.fx * 1.5 / 32.0;
+  for (const double delay : {0.001, 0.002, 0.003}) {
+    const RightCameraDelay rig = watched(delay, 60);
+    const double left = (delay - rig.compensated()) * each_second;
+    EXPECT_LT(std::abs(left), 3.0 * rig.deviation(features, 0.5, 1.5)) << delay;
+  }
 }
 
 TEST(RightCameraDelay, RowsWithoutNoiseLeaveHardlyAnyOfIt) {

@@ -54,8 +54,8 @@ class RightCameraDelay {
   /// delay. Rigs that have the prior's delay and those that are out of step are a mixture. `features`: the pair's.
   double deviation(const StereoFeatures& features, double distance, double rate) const;
 
-  /// Standard deviation of the position, m, from turns whose features were not compensated as they would be now, and
-  /// from the error of what is known. A rig in step has none.
+  /// The same of the position, m, from all turns: what was compensated in each against what is known now. Zero until
+  /// pairs show anything of the delay.
   double drift() const;
   /// The position is known anew.
   void forgetDrift() { exposed_ = compensated_ = 0.0; }
@@ -69,6 +69,13 @@ class RightCameraDelay {
     StereoFeatures features;  ///< their positions alone
     Vector6d velocity;        ///< over the time before it
   };
+  /// The delay as a mixture: of rigs that have the prior's, and of those that are out of step.
+  struct Posterior {
+    double out_of_step;  ///< probability
+    double mean, sigma;  ///< s, if it is
+    double error(double exposed, double prior, double compensated) const;
+  };
+  Posterior posterior() const;
   void addRows(double dt);
 
   double prior_, prior_sigma_;  ///< s
