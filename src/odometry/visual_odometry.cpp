@@ -22,13 +22,15 @@ Eigen::Isometry3d lookingAhead() {
 }
 
 /// Of the motion's inliers over the last `dt` s, as the motion has them: corners have more noise.
-std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHypothesis& found, double dt) {
+std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHypothesis& found, double dt,
+                                  const RowPattern& usual) {
   std::vector<RowMotion> rows;
   rows.reserve(found.motion.inliers.size());
   for (const int i : found.motion.inliers) {
     const auto [reference, current, distance] = found.matches[static_cast<std::size_t>(i)];
     const Eigen::Vector3d now = found.motion.T_current_reference * found.view->points.positions[reference];
-    rows.push_back({(features.camera.project(now).y() - found.view->pixels[reference].y) / dt, features.dv[current]});
+    rows.push_back(
+        {(features.camera.project(now).y() - found.view->pixels[reference].y) / dt, usual.change(features, current)});
     rows.back().dv -= features.right_delay * rows.back().velocity;
   }
   return rows;
@@ -265,7 +267,7 @@ std::optional<MeasuredPair> VisualOdometry::measuredPair(const Pair& pair, const
   const StereoFeatures& taken = pair.taken();
   const double since = state_.prior.interval(state_.map->secondsUntil(taken));
   return MeasuredPair{taken, state_.prior.interval(pair.dt), found.motion.T_current_reference, since,
-                      rowMotions(taken, found, since)};
+                      rowMotions(taken, found, since, state_.rig.usual_rows)};
 }
 
 /// What the pair shows of causes that would mislead its motion. It decides nothing.

@@ -17,7 +17,7 @@ namespace sdvo {
 /// A point that agrees with the motion.
 struct RowMotion {
   double velocity;  ///< down in the left image, px/s
-  double dv;        ///< v_right - v_left, px
+  double dv;        ///< v_right - v_left beyond what is usual at its place, px
 };
 
 /// The time by which the right image is taken later than the left one, and what it does to the features. Estimated is
