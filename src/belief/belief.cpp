@@ -14,10 +14,7 @@ bool Doubt::lasts() const {
 void Doubt::raise(double odds, const std::string& cause) {
   const double unsuspected = std::exp(kUnsuspected);
   if (!(odds > unsuspected)) return;
-  const auto add = [&](double& log_odds) {
-    log_odds = std::clamp(std::log(std::exp(log_odds) + odds - unsuspected), kUnsuspected, kCertain);
-  };
-  add(log_odds_), add(unrefuted_);
+  log_odds_ = std::clamp(std::log(std::exp(log_odds_) + odds - unsuspected), kUnsuspected, kCertain);
   if (odds > largest_) largest_ = odds, cause_ = cause;
 }
 
@@ -26,24 +23,16 @@ void Doubt::raise(const std::vector<Evidence>& evidence) {
     if (each.lasts) raise(std::exp(each.log_odds), each.cause);
 }
 
-Matrix6d Doubt::fade() {
+void Doubt::fade() {
   // Pairs: half of those that make a point a lasting one, whose agreement is new evidence.
   constexpr double kHalfLife = 0.5 * MotionHypothesis::kLastingSightings;
   log_odds_ = kUnsuspected + (log_odds_ - kUnsuspected) * std::exp2(-1.0 / kHalfLife);
-  if (lasts()) return Matrix6d::Zero();
-  const Matrix6d left = probabilityOf(unrefuted_) * isotropic(distance_ * distance_, angle_ * angle_);
-  unrefuted_ = kUnsuspected;
-  distance_ = angle_ = largest_ = 0.0;
-  return left;
+  if (!lasts()) distance_ = angle_ = largest_ = 0.0;
 }
 
 Belief Doubt::weigh(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence) {
   const double rivals = 1.0 / found.probability - 1.0, misled = std::exp(logOddsMisled(scene, found));
-  if (lasts()) {
-    const double agreement = logAgreement(scene, found);
-    for (double* log_odds : {&log_odds_, &unrefuted_})
-      *log_odds = std::clamp(*log_odds - agreement, kUnsuspected, kCertain);
-  }
+  if (lasts()) log_odds_ = std::clamp(log_odds_ - logAgreement(scene, found), kUnsuspected, kCertain);
   const double carried = std::exp(log_odds_);
   const std::string carried_cause = cause_;
   const auto largest = std::max_element(evidence.begin(), evidence.end(),

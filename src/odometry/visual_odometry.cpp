@@ -331,7 +331,7 @@ void VisualOdometry::begin(const Pair& pair, const std::optional<MotionGuess>& g
 /// Takes note of what became of the pair.
 void VisualOdometry::finish(const Pair& pair, Step& step) {
   const StereoFeatures& features = pair.features();
-  state_.covariance.spread(state_.doubt.fade());
+  state_.doubt.fade();
   const auto stood = [&step] {
     const Vector6d motion = logSE3(*step.T_previous_current);
     return mahalanobisSquare(motion, step.covariance) < noiseGate(6);

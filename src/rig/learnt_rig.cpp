@@ -32,7 +32,8 @@ ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const Mot
   ShownRotation shown;
   if (features.count() < kFewestMeasured) return shown;
   std::optional<RightRotation> by_disparities;
-  if (found.motion.success) {
+  // A motion of the minority may be something else's.
+  if (found.motion.success && 2 * found.agreement.inliers > found.agreement.matches) {
     NoiseOptions scaled = assumed_;
     scaled.corner *= noise.scale();
     by_disparities = rotationByDisparities(features.camera, scaled, found.correspondences, found.motion.inliers,

@@ -173,7 +173,7 @@ double RightCameraDelay::deviation(const StereoFeatures& features, double distan
 }
 
 double RightCameraDelay::drift() const {
-  return estimate() ? posterior().error(exposed_, prior_, compensated_) : 0.0;
+  return compensated() != 0.0 && estimate() ? posterior().error(exposed_, prior_, compensated_) : 0.0;
 }
 
 /// The rows of the third last pair, whose neighbours are known.

@@ -25,9 +25,8 @@ struct Belief {
 };
 
 /// The doubt that pairs leave to those after them: log-odds that what is followed is not the camera's motion, or not in
-/// a sound map. It is one event, from the pair that raised it on. Lasting points, which were confirmed before it, may
-/// refute it. What is followed may also end to be so, after some pairs; then the pose is still off by what was
-/// followed.
+/// a sound map. It is one event, from the pair that raised it until it has faded or lasting points refute it: these
+/// were confirmed before.
 class Doubt {
  public:
   double logOdds() const { return log_odds_; }
@@ -38,14 +37,13 @@ class Doubt {
   Belief weigh(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence);
   /// A pair without a measured motion shows only this.
   void raise(const std::vector<Evidence>& evidence);
-  /// A pair is over. Returns the moment (m and rad) that a doubt leaves to the pose as it ends, zero else.
-  Matrix6d fade();
+  /// A pair is over: what is followed may end to be so.
+  void fade();
 
  private:
   void raise(double odds, const std::string& cause);
 
   double log_odds_ = kUnsuspected;
-  double unrefuted_ = kUnsuspected;      ///< the same without the fading
   std::string cause_;                    ///< in words, of the largest odds since it began
   double largest_ = 0.0;                 ///< these odds
   double distance_ = 0.0, angle_ = 0.0;  ///< by which the pose is off if the doubt is right, m and rad

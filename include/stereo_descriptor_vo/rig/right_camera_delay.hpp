@@ -54,8 +54,8 @@ class RightCameraDelay {
   /// delay. Rigs that have the prior's delay and those that are out of step are a mixture. `features`: the pair's.
   double deviation(const StereoFeatures& features, double distance, double rate) const;
 
-  /// The same of the position, m, from all turns: what was compensated in each against what is known now. Zero until
-  /// pairs show anything of the delay.
+  /// The same of the position, m, from all turns: what was compensated in each against what is known now. Zero while
+  /// nothing is compensated.
   double drift() const;
   /// The position is known anew.
   void forgetDrift() { exposed_ = compensated_ = 0.0; }
