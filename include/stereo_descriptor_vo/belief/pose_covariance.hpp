@@ -15,10 +15,11 @@ Matrix6d lacking(const Matrix6d& covariance, const Vector6d& deviation);
 /// Covariance of a pose that is reported pair by pair while the map behind it improves. All covariances are of right
 /// perturbations, T * exp(xi), translation before rotation, in m and rad.
 ///
-/// The pose's covariance is the sum of two parts: of the pose as it was measured last (the key frame's and what the
-/// pose errs by more in the map), and of motions that were predicted or doubted since. The measured part grows from key
-/// frame to key frame, but not while the map stays the same: its traces of translation and rotation never shrink. A new
-/// measurement replaces the doubted part. Parts are only added, so the sum is positive whatever its size.
+/// The pose's covariance is the sum of two parts. One is of the pose as it was measured last: the key frame's, and what
+/// the pose errs by more in the map. The other is of motions that were predicted or doubted since. The measured part
+/// grows from key frame to key frame, but not while the map stays the same: its traces of translation and rotation
+/// never shrink. A new measurement replaces the doubted part. Parts are only added, so the sum is positive whatever its
+/// size.
 ///
 /// All motions have the error of the rig's calibration in common. It adds up with the distance, unlike their noise, and
 /// is followed apart: as the pose's derivative by the calibration.

@@ -41,9 +41,9 @@ struct OdometryStep {
 /// The memory of the odometry from pair to pair.
 struct OdometryState {
   std::optional<LocalMap> map;
-  std::optional<LocalMap> candidate;  ///< the map with the pair; between pairs only its memory matters
-  /// The map that the newest pair which an outage's map does not show would begin, where the guesses have the camera,
-  /// else at the last pose. It becomes the map once the next pair is measured against it.
+  std::optional<LocalMap> candidate;  ///< the map with the pair; between pairs only its memory matters.
+  /// The map that the newest pair of an outage would begin. It is placed where the guesses have the camera, else at the
+  /// last pose. It becomes the map once the next pair is measured against it.
   std::optional<LocalMap> seed;
   bool seed_has_pose = false;  ///< guesses have the motion from the map to the seed
   LearntRig rig;

@@ -11,8 +11,8 @@
 
 namespace sdvo {
 
-/// A rotation w of the right camera, rad about the axes of the left optical frame, as a measurement has it. With x and
-/// y as normalised coordinates in the right image, a small one moves the right view by
+/// A rotation w of the right camera, rad about the axes of the left optical frame, as a measurement has it. The
+/// right view moves by (du, dv), where (x, y) are normalised coordinates in the right image.
 ///   du = f * (w_x * x * y - w_y * (1 + x^2) + w_z * y),  dv = f * (w_x * (1 + y^2) - w_y * x * y - w_z * x).
 struct RightRotation {
   Eigen::Vector3d value = Eigen::Vector3d::Zero();
