@@ -1,19 +1,15 @@
 #!/usr/bin/env python3
-"""Before `nodelet load TYPE MANAGER …`: a nodelet of that name that an earlier launch has left in the manager is unloaded. The
-manager would refuse the new one, and the old one would go on with its old parameters."""
+"""Launch prefix of `nodelet load TYPE MANAGER …`: a nodelet of that name that an earlier launch has left in the manager is unloaded
+first. The manager would refuse the new one, and the old one would go on with its old parameters."""
 
-import signal
+import os
 import sys
 
-ANSWER = 5  # s that a manager may take
-
-
-def hangs(*_):
-    raise TimeoutError('the nodelet manager does not answer: does it hang, or is it stopped? Its loader waits for it')
+import rosgraph
+import rosgraph.names
 
 
 def unload_old(command):
-    import rosgraph.names
     namespace = rosgraph.names.get_ros_namespace()
     name = rosgraph.names.ns_join(namespace, rosgraph.names.load_mappings(command)['__name'])
     manager = rosgraph.names.ns_join(namespace, command[3])
@@ -22,8 +18,6 @@ def unload_old(command):
         master.lookupService(manager + '/list')
     except rosgraph.MasterError:
         return  # it begins with this launch
-    signal.signal(signal.SIGALRM, hangs)
-    signal.alarm(ANSWER)
     import rospy
     from nodelet.srv import NodeletList, NodeletUnload
     if name in rospy.ServiceProxy(manager + '/list', NodeletList)().nodelets:
@@ -36,3 +30,4 @@ if __name__ == '__main__':
         unload_old(sys.argv[1:])
     except Exception as problem:  # the loader names what is wrong with its arguments or the manager
         print('[ WARN] %s' % problem, file=sys.stderr, flush=True)
+    os.execvp(sys.argv[1], sys.argv[1:])
