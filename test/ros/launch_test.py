@@ -389,7 +389,7 @@ class Launch(unittest.TestCase):
                       third.communicate()[1])
 
     def test_a_recording_takes_over_from_a_pipeline_of_the_same_namespace(self):
-        self.addCleanup(rospy.delete_param, '/use_sim_time')
+        self.addCleanup(lambda: rospy.has_param('/use_sim_time') and rospy.delete_param('/use_sim_time'))
         with tempfile.TemporaryDirectory() as directory:
             path = os.path.join(directory, 'a recording.bag')
             with rosbag.Bag(path, 'w') as bag:

@@ -111,7 +111,8 @@ class RenderedDrive(unittest.TestCase):
 
         def largest_error(poses):
             return max(np.linalg.norm(pose[:2, 3] - true[:2, 3]) for pose, true in zip(poses, self.true))
-        self.assertLess(largest_error(planar), largest_error(self.estimated) + 0.05)
+        # The floor costs no more than a permille of the way.
+        self.assertLess(largest_error(planar), largest_error(self.estimated) + 0.05 + 0.001 * self.info[-1].distance)
 
     def test_standing_still_is_standing_still(self):
         # The first pairs of the stop still refine what was measured while driving.
