@@ -68,7 +68,7 @@ void OdometryState::startAgain() {
 }
 
 void OdometryState::takeSeed() {
-  // What was guessed until the seed's pair is in all poses that are measured against it.
+  // The guesses' error up to the seed's pair is in all poses that are measured against it.
   covariance.assume(covariance.value());
   map = std::exchange(seed, std::nullopt);
   started = true;

@@ -8,7 +8,6 @@
 #include <utility>
 
 namespace sdvo {
-namespace {}  // namespace
 
 std::string ShownRotation::words() const {
   std::ostringstream words;

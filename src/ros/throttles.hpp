@@ -19,7 +19,7 @@ class Pace {
   /// `max_rate`: Hz; 0: no limit.
   explicit Pace(double max_rate) : period_(max_rate > 0.0 ? static_cast<std::int64_t>(1e9 / max_rate) : 0) {}
 
-  /// Whether the item of this stamp (ns) passes. One that is not later than the last always does.
+  /// Whether the item of this stamp (ns) passes. Where the stamp is not later than the last one, it passes.
   bool isDue(std::int64_t stamp) {
     if (has_begun_ && stamp > last_ && stamp - last_ < period_ - period_ / 20) return false;
     has_begun_ = true;

@@ -8,8 +8,8 @@
 
 namespace sdvo {
 
-/// What a covariance lacks to explain a deviation: its outer product, and the ratio by which a motion may be off in
-/// every direction. Zero where the deviation's square is at most half of the expected one (chi-square of six).
+/// The addition that lets a covariance explain a deviation: its outer product, and the ratio by which a motion may err
+/// in every direction. Zero where the deviation's square is at most half of the expected one (chi-square of six).
 Matrix6d lacking(const Matrix6d& covariance, const Vector6d& deviation);
 
 /// Covariance of a pose that is reported pair by pair while the map behind it improves. All covariances are of right

@@ -37,7 +37,7 @@ struct RowLine {
   double most() const { return std::abs(offset) + 0.5 * columns * std::abs(slope); }
 };
 
-/// What the monitor found out about a pair.
+/// The monitor's diagnosis of a pair.
 struct RigDiagnosis {
   std::string words;  ///< the likely cause; empty when the rig is in order, or when too little is found to say
   std::optional<RowLine> rows;  ///< by which they differ, where that is all that is wrong

@@ -26,7 +26,7 @@ struct MeasuredPair {
   Vector6d velocity() const { return logSE3(T_current_reference.inverse()) / since_reference; }
 };
 
-/// What a pair shows of the right camera: a rotation since the pairs before, by its rows and by its disparities.
+/// A rotation of the right camera since the pairs before, as the rows and disparities of one pair show it.
 struct ShownRotation {
   Eigen::Vector3d value = Eigen::Vector3d::Zero();       ///< rad
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< rad^2
@@ -63,7 +63,7 @@ struct LearntRig {
  private:
   NoiseOptions assumed_;
   double delay_sigma_;  ///< s: of the moments at which single right images are taken
-  Eigen::Matrix3d usual_change_ = Eigen::Matrix3d::Zero();     ///< rad^2: moment of what confirmed pairs show of one
+  Eigen::Matrix3d usual_change_ = Eigen::Matrix3d::Zero();     ///< rad^2: second moment of confirmed pairs' rotations
   Eigen::Vector3d rotation_before_ = Eigen::Vector3d::Zero();  ///< until the last one
   Eigen::Matrix3d covariance_before_ = Eigen::Matrix3d::Zero();
 };
