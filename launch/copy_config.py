@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Copies a YAML file for config.launch: blocks and values that are left empty are left out."""
+"""Copies a YAML file for config.launch: blocks and values that are left empty are left out, and what has no effect is named."""
 
 import os
 import sys
@@ -8,12 +8,46 @@ import time
 import rosparam  # noqa: F401 reads !degrees and !radians for yaml
 import yaml
 
+BLOCKS = ('stereo_features', 'visual_odometry', 'place_recognition', 'features_image')
 LARGEST = 1000000  # bytes, of options
 LONGEST = 60  # s that a launch takes to read the copy
 
 
 def without_empty(value):
     return {k: without_empty(v) for k, v in value.items() if v is not None} if isinstance(value, dict) else value
+
+
+def warn(path, problem):
+    print('[ WARN] config %s: %s' % (path, problem), file=sys.stderr, flush=True)
+
+
+def name_duplicates(path, node):
+    """yaml takes the last one."""
+    if not isinstance(node, yaml.CollectionNode):
+        return
+    keys = set()
+    for child in node.value:
+        if isinstance(child, tuple):
+            if child[0].value in keys:
+                warn(path, 'line %d: %s is there twice, the last one holds' % (child[0].start_mark.line + 1, child[0].value))
+            keys.add(str(child[0].value))
+        name_duplicates(path, child[1] if isinstance(child, tuple) else child)
+
+
+def check(value, name):
+    """That the parameter server has room for it."""
+    if isinstance(value, dict):
+        for key, inner in value.items():
+            if not isinstance(key, str):
+                raise ValueError('%s%s is no name: quote it' % (name, key))
+            check(inner, name + key + '/')
+    elif isinstance(value, list):
+        for inner in value:
+            check(inner, name)
+    elif not isinstance(value, (str, int, float)):
+        raise ValueError('%s = %s is a %s: quote it' % (name[:-1], value, type(value).__name__))
+    elif isinstance(value, int) and abs(value) >= 2**31:
+        raise ValueError('%s = %s does not fit into 32 bits' % (name[:-1], value))
 
 
 def remove_with_the_launch(copy):
@@ -39,11 +73,17 @@ def main(path, copy):
         if os.path.getsize(path) > LARGEST:
             raise ValueError('it is too large for options')
         with open(path) as file:
-            config = yaml.safe_load(file) or {}
+            text = file.read()
+        config = without_empty(yaml.safe_load(text) or {})
         if not isinstance(config, dict):
             raise ValueError('it has no blocks such as "stereo_features:"')
+        check(config, '')
+        name_duplicates(path, yaml.compose(text, yaml.SafeLoader))
+        for block in config:
+            if block not in BLOCKS:
+                warn(path, '%s is of no nodelet here and has no effect on them: their blocks are %s' % (block, ', '.join(BLOCKS)))
         with open(copy, 'x') as file:
-            yaml.safe_dump(without_empty(config), file)
+            yaml.safe_dump(config, file)
     except (OSError, ValueError, yaml.YAMLError) as error:
         sys.exit('ERROR: config %s: %s' % (path, error))
     remove_with_the_launch(copy)

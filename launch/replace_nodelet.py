@@ -1,15 +1,19 @@
 #!/usr/bin/env python3
-"""Launch prefix of `nodelet load TYPE MANAGER …`: a nodelet of that name that an earlier launch has left in the manager is unloaded
-first. The manager would refuse the new one, and the old one would go on with its old parameters."""
+"""Before `nodelet load TYPE MANAGER …`: a nodelet of that name that an earlier launch has left in the manager is unloaded. The
+manager would refuse the new one, and the old one would go on with its old parameters."""
 
-import os
+import signal
 import sys
 
-import rosgraph
-import rosgraph.names
+ANSWER = 5  # s that a manager may take
+
+
+def hangs(*_):
+    raise TimeoutError('the nodelet manager does not answer: does it hang, or is it stopped? Its loader waits for it')
 
 
 def unload_old(command):
+    import rosgraph.names
     namespace = rosgraph.names.get_ros_namespace()
     name = rosgraph.names.ns_join(namespace, rosgraph.names.load_mappings(command)['__name'])
     manager = rosgraph.names.ns_join(namespace, command[3])
@@ -18,6 +22,8 @@ def unload_old(command):
         master.lookupService(manager + '/list')
     except rosgraph.MasterError:
         return  # it begins with this launch
+    signal.signal(signal.SIGALRM, hangs)
+    signal.alarm(ANSWER)
     import rospy
     from nodelet.srv import NodeletList, NodeletUnload
     if name in rospy.ServiceProxy(manager + '/list', NodeletList)().nodelets:
@@ -30,4 +36,3 @@ if __name__ == '__main__':
         unload_old(sys.argv[1:])
     except Exception as problem:  # the loader names what is wrong with its arguments or the manager
         print('[ WARN] %s' % problem, file=sys.stderr, flush=True)
-    os.execvp(sys.argv[1], sys.argv[1:])

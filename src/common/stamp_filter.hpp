@@ -25,11 +25,12 @@ class StampFilter {
   std::vector<Passed> add(Item item, std::int64_t stamp, std::int64_t now, bool announced = false) {
     const Arrival arrival{stamp, now};
     // Nothing orders the clock and the items: either may jump first.
-    clock_fell_ |= last_now_ && now < *last_now_;
+    if (last_now_ && now < *last_now_) fell_to_ = now;
     last_now_ = now;
     if (!last_) return {pass(std::move(item), arrival)};
     const std::int64_t step = stamp - last_->stamp;
     if (step > 0 && step <= kJump) {
+      if (fell_to_ && now - *fell_to_ > kJump) fell_to_.reset();  // too little for the stamps to fall, too
       dropHeld();
       return {pass(std::move(item), arrival)};
     }
@@ -73,7 +74,8 @@ class StampFilter {
   }
 
   Passed pass(Item item, const Arrival& arrival) {
-    if (last_ && arrival.stamp <= last_->stamp) ++(std::exchange(clock_fell_, false) ? clock_steps_ : source_restarts_);
+    if (last_ && arrival.stamp <= last_->stamp)
+      ++(std::exchange(fell_to_, std::nullopt) ? clock_steps_ : source_restarts_);
     last_ = arrival;
     return {std::move(item), source_restarts_, clock_steps_};
   }
@@ -86,7 +88,7 @@ class StampFilter {
   std::optional<Arrival> last_;
   std::optional<std::pair<Item, Arrival>> held_;
   std::optional<std::int64_t> last_now_;
-  bool clock_fell_ = false;  ///< since the stamps did
+  std::optional<std::int64_t> fell_to_;  ///< the clock, since the stamps did
   int source_restarts_ = 0, clock_steps_ = 0;
   std::uint64_t dropped_ = 0;
 };

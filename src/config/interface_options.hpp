@@ -178,8 +178,8 @@ struct PlaceOutputOptions {
              "OpenCV's threads, of the whole process; 0: none beside the caller's, -1: left as they are");
     list.add("places_file", places_file,
              "file of save_places to begin with, relative ones below ROS_HOME; empty: with no places");
-    list.add("save_at_shutdown", save_at_shutdown, "write the places to places_file at the end");
-    list.add("overwrite", overwrite, "save_places may replace files that are none of its own");
+    list.add("save_at_shutdown", save_at_shutdown, "write the places to places_file each minute and at the end");
+    list.add("overwrite", overwrite, "files that are none of save_places, and maps with other or more places, may be replaced");
     list.add("robot_name", robot_name, "what other robots know this one by; empty: the namespace");
     list.add("other_min_score", other_min_score, {0.0, 1.0}, "",
              "least likeness of a place of mine for which another robot is asked for its rows");

@@ -130,12 +130,12 @@ PlaceSignature fromMessage(const msgs::PlaceSignature& message, const PlaceIndex
       message.bits_per_word != static_cast<std::uint32_t>(index.bits_per_word))
     refuse(std::to_string(message.words_per_row) + " words of " + std::to_string(message.bits_per_word) +
            " bits for a row, here " + std::to_string(index.words_per_row) + " of " +
-           std::to_string(index.bits_per_word) + ": set index/… alike in both robots");
+           std::to_string(index.bits_per_word) + ": set index/... alike in both robots");
   if (message.descriptor != kind.descriptor || message.layout != nameOf(kind.layout) ||
       message.element_type != nameOf(kind.element_type) ||
       message.bytes_per_row != static_cast<std::uint32_t>(kind.bytes))
     refuse("descriptors " + message.descriptor + ", " + message.layout + ", " + std::to_string(message.bytes_per_row) +
-           " bytes, here " + toString(kind) + ": set descriptor/… alike in both robots");
+           " bytes, here " + toString(kind) + ": set descriptor/... alike in both robots");
   constexpr std::size_t kMostWords = 1u << 18;
   if (message.words.size() > kMostWords) refuse(std::to_string(message.words.size()) + " words");
   if (std::adjacent_find(message.words.begin(), message.words.end(), std::greater_equal<>()) != message.words.end())

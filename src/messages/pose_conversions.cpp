@@ -58,6 +58,16 @@ Matrix6d meantCovariance(const Matrix6d& sent) {
   return meant;
 }
 
+/// Throws std::invalid_argument for what is nowhere.
+Eigen::Translation3d checked(double x, double y, double z) {
+  constexpr double kFarthest = 1e8;  // m; grids of the earth, 4e7 m around it, have no larger coordinates
+  for (const double coordinate : {x, y, z}) {
+    if (!std::isfinite(coordinate)) throw std::invalid_argument("the position is not finite");
+    if (std::abs(coordinate) > kFarthest) throw std::invalid_argument("the position is beyond 1e8 m");
+  }
+  return {x, y, z};
+}
+
 }  // namespace
 
 Eigen::Isometry3d toPose(const std::string& text) {
@@ -66,7 +76,10 @@ Eigen::Isometry3d toPose(const std::string& text) {
   double x, y, z, roll, pitch, yaw;
   if (!(stream >> x >> y >> z >> roll >> pitch >> yaw) || !(stream >> std::ws).eof())
     throw std::invalid_argument("'" + text + "' is no pose: six numbers 'x y z roll pitch yaw' (m, rad) are expected");
-  return Eigen::Translation3d(x, y, z) * Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
+  for (const double angle : {roll, pitch, yaw})
+    if (!(std::abs(angle) <= 2.0 * M_PI))
+      throw std::invalid_argument("'" + text + "' has an angle beyond 2 pi: give radians, not degrees");
+  return checked(x, y, z) * Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitZ()) *
          Eigen::AngleAxisd(pitch, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(roll, Eigen::Vector3d::UnitX());
 }
 
@@ -75,11 +88,9 @@ Eigen::Isometry3d toPose(const geometry_msgs::Pose& message) {
   const auto& p = message.position;
   const auto& q = message.orientation;
   const Eigen::Quaterniond rotation(q.w, q.x, q.y, q.z);
-  if (!std::isfinite(p.x) || !std::isfinite(p.y) || !std::isfinite(p.z))
-    throw std::invalid_argument("the position is not finite");
   if (!(std::abs(rotation.norm() - 1.0) <= kUnitLength))
     throw std::invalid_argument("the quaternion has not unit length: normalise it (w = 1 and the rest 0: no rotation)");
-  return Eigen::Translation3d(p.x, p.y, p.z) * rotation.normalized();
+  return checked(p.x, p.y, p.z) * rotation.normalized();
 }
 
 geometry_msgs::PoseWithCovariance toMessage(const Eigen::Isometry3d& pose, const Matrix6d& covariance) {

@@ -87,7 +87,7 @@ void OdometryPublisher::publishPoints(const StereoFeaturesView& features) {
 }
 
 void OdometryPublisher::restart(const Eigen::Isometry3d& T_odom_start) {
-  T_odom_start_ = T_odom_start;
+  moveTo(T_odom_start);
   const std::lock_guard<std::mutex> lock(path_mutex_);
   if (!path_.empty()) path_changed_ = true;
   path_.clear();

@@ -36,7 +36,9 @@ class OdometryPublisher {
   /// from the origin of odom, as in UTM coordinates, their floats would have steps of half a metre.
   void publishMap(const std::vector<Eigen::Vector3d>& points, const Eigen::Isometry3d& T_origin_camera,
                   const std_msgs::Header& header);
-  /// The odometry has been reset: the path begins anew, and the base is here in odom.
+  /// From now on the odometry's origin is here in odom. The path stays as it was published.
+  void moveTo(const Eigen::Isometry3d& T_odom_start) { T_odom_start_ = T_odom_start; }
+  /// The odometry has been reset: the path begins anew, too.
   void restart(const Eigen::Isometry3d& T_odom_start);
 
   /// The poses since the last reset, the newest `max_path_length` of them. From any thread.

@@ -23,7 +23,8 @@ OtherRobot::OtherRobot(ros::NodeHandle& nh, const std::string& robot, double min
 }
 
 void OtherRobot::onSignature(const SignatureMessage& signature) try {
-  if (signature.robot == robot_) return;
+  if (signature.robot == robot_)
+    throw std::invalid_argument("it has this robot's name: `other` is this robot's namespace, or set robot_name");
   giveUpWhatIsLate();
   std::vector<PlaceCandidate> candidates = places_.find(signature);
   candidates.erase(std::remove_if(candidates.begin(), candidates.end(),

@@ -47,37 +47,15 @@ XmlRpc::XmlRpcValue valueOf(const Option& option, const std::string& text) {
   return text;
 }
 
-/// On the parameter server; false where the master does not answer. ros::param::set would wait for it with a lock that
-/// every line on the console takes, too: the whole process would stand still.
-bool setParam(const ros::NodeHandle& nh, const Option& option, const std::string& text) {
+}  // namespace
+
+bool setParam(const ros::NodeHandle& nh, const std::string& name, const XmlRpc::XmlRpcValue& value) {
   XmlRpc::XmlRpcValue request, response, payload;
   request[0] = ros::this_node::getName();
-  request[1] = nh.resolveName(option.name);
-  request[2] = valueOf(option, text);
+  request[1] = nh.resolveName(name);
+  request[2] = value;
   return ros::master::execute("setParam", request, response, payload, false);
 }
-
-/// Whether a parameter beside our namespace was most likely meant for it: its block is called alike, or it ends as an
-/// option of a group does; and it is in no block of this package's nodelets and of no node that runs.
-bool isAstray(const std::string& name, const std::string& prefix, const std::vector<Option>& options) {
-  const std::size_t parent = prefix.rfind('/', prefix.size() - 2) + 1,
-                    end = std::min(name.find('/', parent), name.size());
-  if (name.compare(0, parent, prefix, 0, parent) != 0) return false;
-  for (const char* nodelet : {"/stereo_features/", "/visual_odometry/", "/place_recognition/"})
-    if (name.find(nodelet) != std::string::npos) return false;
-  const auto isMeant = [&](const Option& option) {
-    const std::string path = "/" + option.name;
-    return option.name.find('/') != std::string::npos && name.size() > path.size() &&
-           name.compare(name.size() - path.size(), path.size(), path) == 0;
-  };
-  if (!isAlike(name.substr(parent, end - parent), prefix.substr(parent)) &&
-      std::none_of(options.begin(), options.end(), isMeant))
-    return false;
-  ros::V_string nodes;
-  return !ros::master::getNodes(nodes) || std::count(nodes.begin(), nodes.end(), name.substr(0, end)) == 0;
-}
-
-}  // namespace
 
 bool isOfImageTransport(const std::string& name) {
   const auto beginsWith = [&](const std::string& side) { return name.compare(0, side.size(), side) == 0; };
@@ -88,7 +66,7 @@ std::vector<std::string> loadParams(const ros::NodeHandle& nh, std::vector<Optio
   for (Option& option : options) {
     XmlRpc::XmlRpcValue value;
     if (!nh.getParam(option.name, value)) {
-      setParam(nh, option, option.text());
+      setParam(nh, option.name, valueOf(option, option.text()));
       continue;
     }
     try {
@@ -103,12 +81,9 @@ std::vector<std::string> loadParams(const ros::NodeHandle& nh, std::vector<Optio
   nh.getParamNames(names);
   const std::string prefix = nh.getNamespace() + "/";
   for (const std::string& name : names) {
-    if (name.compare(0, prefix.size(), prefix) != 0) {
-      if (isAstray(name, prefix, options)) unknown.push_back(name);
-      continue;
-    }
+    if (name.compare(0, prefix.size(), prefix) != 0) continue;
     const std::string relative = name.substr(prefix.size());
-    if (isOfImageTransport(relative)) continue;
+    if (isOfImageTransport(relative) || relative == kInputTopics) continue;
     const bool known = std::any_of(options.begin(), options.end(), [&](const Option& o) { return o.name == relative; });
     if (!known) unknown.push_back(name);
   }
@@ -244,7 +219,7 @@ void ReconfigureServer::keep() {
   const std::vector<std::string> wanted = texts();
   lock.unlock();
   for (std::size_t i = 0; i < options_.size(); ++i)
-    if (kept_[i] != wanted[i] && setParam(nh_, options_[i], wanted[i])) kept_[i] = wanted[i];
+    if (kept_[i] != wanted[i] && setParam(nh_, options_[i].name, valueOf(options_[i], wanted[i]))) kept_[i] = wanted[i];
   lock.lock();
   if (kept_ == texts()) keeping_.stop();
 }

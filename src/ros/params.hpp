@@ -16,9 +16,16 @@ namespace sdvo {
 
 /// Reads each option from the parameter of the same name in `nh`'s namespace; absent ones keep their value and are set,
 /// so that the server shows what is in use. Throws std::invalid_argument naming the parameter when one has the wrong
-/// type or is outside its range. Returns the parameters in that namespace that are no option, and options that stand
-/// beside it in no nodelet's namespace: most likely spelling mistakes.
+/// type or is outside its range. Returns the parameters in that namespace that are no option: most likely spelling
+/// mistakes.
 std::vector<std::string> loadParams(const ros::NodeHandle& nh, std::vector<Option> options);
+
+/// On the parameter server; false where the master does not answer. ros::param::set would wait for it with a lock that
+/// every line on the console takes, too: the whole process would stand still.
+bool setParam(const ros::NodeHandle& nh, const std::string& name, const XmlRpc::XmlRpcValue& value);
+
+/// What the image side reads, for a recorder: no option.
+constexpr const char* kInputTopics = "input_topics";
 
 /// Whether image_transport or one of its plugins keeps this parameter beside the image side's, see
 /// StereoImageTransport.

@@ -8,11 +8,14 @@
 
 #include <atomic>
 #include <filesystem>
+#include <iostream>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <opencv2/core/utility.hpp>
 #include <optional>
 #include <pluginlib/class_list_macros.hpp>
+#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -49,12 +52,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     disk_callbacks_.stop();
     if (observer_) observer_->stop();
     if (optimiser_) optimiser_->stop();
-    if (options_.output.save_at_shutdown && input_) try {
-        const std::string path = map_file_.empty() ? inRosHome(options_.output.places_file) : map_file_;
-        NODELET_INFO_STREAM(save(path) << " in '" << path << "'");
-      } catch (const std::exception& e) {
-        NODELET_ERROR_STREAM("the map is not saved at the end: " << e.what());
-      }
+    if (options_.output.save_at_shutdown && input_) saveByItself(true);
   }
 
  private:
@@ -102,12 +100,26 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     });
     mount_ = std::make_unique<CameraMount>(*transforms_, output.tf_timeout);
     publisher_ = std::make_unique<PlacePublisher>(nh_, output, robot_, tag, [this] { return map(); });
-    services_ = {private_nh.advertiseService("reset", &PlaceRecognitionNodelet::onReset, this),
-                 private_nh.advertiseService("pause", &PlaceRecognitionNodelet::onPause, this),
-                 private_nh.advertiseService("resume", &PlaceRecognitionNodelet::onResume, this),
-                 disk_nh.advertiseService("save_places", &PlaceRecognitionNodelet::onSavePlaces, this),
-                 disk_nh.advertiseService("load_places", &PlaceRecognitionNodelet::onLoadPlaces, this),
-                 slow_nh.advertiseService("get_place", &PlaceRecognitionNodelet::onGetPlace, this)};
+    using namespace stereo_descriptor_vo;
+    using std_srvs::Trigger;
+    services_ = {
+        private_nh.advertiseService("reset", &PlaceRecognitionNodelet::onReset, this),
+        serve<Trigger>(private_nh, "pause", [this](const auto&, auto& response) { pause(response.message); }),
+        serve<Trigger>(private_nh, "resume", [this](const auto&, auto& response) { resume(response.message); }),
+        serve<SavePlaces>(
+            disk_nh, "save_places",
+            [this](const auto& request, auto& response) { response.message = save(inRosHome(request.path)); }),
+        serve<LoadPlaces>(
+            disk_nh, "load_places",
+            [this](const auto& request, auto& response) { response.message = replaceBy(inRosHome(request.path)); }),
+        serve<GetPlace>(slow_nh, "get_place", [this](const auto& request, auto& response) {
+          const std::lock_guard<std::mutex> lock(mutex_);
+          const auto place = session_->message(static_cast<int>(request.id), robot_);
+          if (!place) throw std::invalid_argument("there is no place " + std::to_string(request.id));
+          response.place = *place;
+        })};
+    if (output.save_at_shutdown)
+      saving_ = disk_nh.createWallTimer(kSavePeriod, [this](const ros::WallTimerEvent&) { saveByItself(false); });
     observer_ = std::make_unique<Worker<Arrived>>(static_cast<std::size_t>(output.queue_size),
                                                   [this](const Arrived& arrived) { observe(arrived); });
     optimiser_ = std::make_unique<Worker<Job>>(1, [this](const Job& job) { optimise(job); });
@@ -122,9 +134,10 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
         });
     diagnostics_ =
         std::make_unique<PlaceDiagnostics>(nh_, private_nh, getName(), input_->topics(), output.max_silence, *unused_);
-    // Ours, and the robot's: that of an rviz beside the camera's namespace.
+    // Ours, and the robot's: that of an rviz beside the camera's namespace, in "/" the same.
     for (const std::string& topic :
-         {std::string("initialpose"), ros::names::parentNamespace(nh_.getNamespace()) + "/initialpose"})
+         std::set<std::string>{nh_.resolveName("initialpose"),
+                               ros::names::append(ros::names::parentNamespace(nh_.getNamespace()), "initialpose")})
       initial_pose_subscribers_.push_back(nh_.subscribe<geometry_msgs::PoseWithCovarianceStamped>(
           topic, 1, [this](const geometry_msgs::PoseWithCovarianceStamped::ConstPtr& m) { onInitialPose(*m); }));
     callbacks_.start();
@@ -138,12 +151,15 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   /// With the places of the parameter's file. On a robot's first day there is none.
   void begin(const std::string& path) {
     map_file_ = path;
+    if (options_.output.save_at_shutdown) WholeFile{path};  // throws where the end could not write it
+    kept_ = {{path, 0}};
     if (!std::filesystem::exists(path)) {
       NODELET_WARN_STREAM("places_file '" << path
                                           << "' does not exist: begins without places, save_places writes such a file");
       return;
     }
     session_ = load(path);
+    kept_[path] = session_->recognition().places().size();
     NODELET_INFO_STREAM(session_->recognition().places().size() << " places of '" << path << "'");
   }
 
@@ -233,7 +249,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
       pose->header.frame_id = map_frame;
       publisher_->publish(*pose);
     }
-    publisher_->noteChange();
+    noteChange();
     if (const auto signature = session.signature(report.id, robot_)) publisher_->publish(*signature);
     stereo_descriptor_vo::PlaceInfo info = session.info(report);
     info.header.stamp = stamp;
@@ -276,9 +292,14 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
       return;
     }
     if (session.isPlaced()) publisher_->correct(session.recognition().T_map_odom(), session.odomFrame(), false);
-    publisher_->noteChange();
+    noteChange();
   } catch (const std::exception& e) {
     NODELET_ERROR_STREAM("the map was not optimised, its poses stay as they are: " << e.what());
+  }
+
+  void noteChange() {
+    ++changes_;
+    publisher_->noteChange();
   }
 
   /// For the publisher.
@@ -314,33 +335,20 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++generation_;
     map_file_.clear();
+    kept_.clear();
     restart("reset was called", std::make_shared<PlaceSession>(options_.recognition));
     return true;
   }
 
-  bool onPause(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
-    response.success = true;
-    response.message = input_->pause() ? "paused" : "was paused already";
+  void pause(std::string& outcome) {
+    outcome = input_->pause() ? "paused" : "was paused already";
     diagnostics_->input().noteIdle("paused");
-    return true;
   }
 
-  bool onResume(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
-    response.success = true;
+  void resume(std::string& outcome) {
     const bool resumed = input_->resume();
-    response.message = resumed ? "resumed; the way in between is unknown" : "was not paused";
+    outcome = resumed ? "resumed; the way in between is unknown" : "was not paused";
     if (resumed) diagnostics_->input().noteIdle("");
-    return true;
-  }
-
-  bool onSavePlaces(stereo_descriptor_vo::SavePlaces::Request& request,
-                    stereo_descriptor_vo::SavePlaces::Response& response) try {
-    response.message = save(inRosHome(request.path));
-    response.success = true;
-    return true;
-  } catch (const std::exception& e) {
-    response.message = e.what();
-    return true;
   }
 
   /// Says how many.
@@ -349,6 +357,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     const std::vector<Place> places = session_->places();
     const ros_conversions::MapState state = session_->map();
     const ros_conversions::FeatureStream stream = session_->stream();
+    const int changes = changes_, generation = generation_;
     lock.unlock();
     if (places.empty())
       throw std::runtime_error("there is no place to save yet: a key frame needs a pair with odometry");
@@ -357,25 +366,63 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
           "not saved: localisation_only keeps the map as it is in the file that it was loaded from");
     savePlaces(places, state, stream, robot_, ros_conversions::cleanFrameId(options_.output.map_frame_id), path,
                options_.output.overwrite);
+    lock.lock();
+    if (generation == generation_) {
+      kept_[path] = places.size();
+      if (path == inRosHome(options_.output.places_file)) saved_changes_ = changes;
+    }
     return std::to_string(places.size()) + " places";
   }
 
-  bool onLoadPlaces(stereo_descriptor_vo::LoadPlaces::Request& request,
-                    stereo_descriptor_vo::LoadPlaces::Response& response) try {
-    const std::string file = inRosHome(request.path);
+  /// To places_file, while the session goes on or at its end: roslaunch gives that 15 s, and the console is gone.
+  void saveByItself(bool at_end) {
+    const std::string path = inRosHome(options_.output.places_file);
+    const auto say = [&](const std::string& what) {
+      if (ros::ok())
+        NODELET_WARN_STREAM(what);
+      else
+        std::cerr << "[ WARN] " << getName() << ": " << what << std::endl;
+    };
+    std::unique_lock<std::mutex> lock(mutex_);
+    const std::size_t places = session_->recognition().places().size();
+    const auto kept = kept_.find(path);
+    const bool is_refused =
+        (kept == kept_.end() || places < kept->second) && std::filesystem::exists(path) && !options_.output.overwrite;
+    const bool is_due = changes_ != saved_changes_ && places > 0 && (at_end || ros::SteadyTime::now() >= next_save_);
+    const std::size_t before = kept == kept_.end() ? 0 : kept->second;
+    lock.unlock();
+    if (!is_due) return;
+    if (is_refused) {
+      if (at_end)
+        say("the map's " + std::to_string(places) + " places are not saved: '" + path +
+            "' has others, or more; call save_places before the end, or set place_recognition/overwrite");
+      return;
+    }
+    if (at_end)
+      say("saving " + std::to_string(places) + " places in '" + path + "', which has " + std::to_string(before));
+    const ros::SteadyTime begin = ros::SteadyTime::now();
+    try {
+      const std::string saved = save(path);
+      if (at_end) say(saved + " are saved");
+    } catch (const std::exception& e) {
+      say(std::string("the map is not saved: ") + e.what());
+    }
+    next_save_ = ros::SteadyTime::now() + (ros::SteadyTime::now() - begin) * kRests;
+  }
+
+  /// Begins anew with the places of a file. Says how many.
+  std::string replaceBy(const std::string& file) {
     std::shared_ptr<PlaceSession> loaded = load(file);
     const std::lock_guard<std::mutex> lock(mutex_);
     loaded->refuseOtherCameraThan(*session_);
-    response.message = std::to_string(loaded->recognition().places().size()) + " places; " +
-                       std::to_string(session_->recognition().places().size()) + " of before are forgotten";
+    const std::size_t places = loaded->recognition().places().size();
+    const std::string outcome = std::to_string(places) + " places; " +
+                                std::to_string(session_->recognition().places().size()) + " of before are forgotten";
     ++generation_;
     replace(std::move(loaded));
     map_file_ = file;
-    response.success = true;
-    return true;
-  } catch (const std::exception& e) {
-    response.message = e.what();
-    return true;
+    kept_ = {{file, places}};
+    return outcome;
   }
 
   /// A session that begins with the places of a file. Throws std::runtime_error or std::invalid_argument.
@@ -383,20 +430,8 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     return std::make_shared<PlaceSession>(options_.recognition, loadPlaces(path, options_.recognition.graph));
   }
 
-  bool onGetPlace(stereo_descriptor_vo::GetPlace::Request& request,
-                  stereo_descriptor_vo::GetPlace::Response& response) try {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (const auto place = session_->message(static_cast<int>(request.id), robot_)) {
-      response.place = *place;
-      response.success = true;
-    } else {
-      response.message = "there is no place " + std::to_string(request.id);
-    }
-    return true;
-  } catch (const std::exception& e) {
-    response.message = e.what();
-    return true;
-  }
+  static constexpr double kRests = 20.0;      // times as long as saving took: at most a twentieth of the disk's time
+  const ros::WallDuration kSavePeriod{60.0};  // s: what a killed process loses (chosen)
 
   CallbackThread callbacks_, slow_callbacks_,
       disk_callbacks_;  // of services: those that take their time, those of files
@@ -410,12 +445,16 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   std::unique_ptr<PlacePublisher> publisher_;
   std::unique_ptr<PlaceDiagnostics> diagnostics_;
   std::vector<ros::ServiceServer> services_;
+  ros::WallTimer saving_;
+  ros::SteadyTime next_save_;  // the disk's thread
 
   std::mutex mutex_;
-  std::shared_ptr<PlaceSession> session_;  // and all in it: under mutex_
-  std::string map_file_;                   // that its first places are from; empty: none
-  bool was_located_ = false;               // … and map -> odom is published since then
-  std::atomic<int> generation_{0};         // sessions that a service began
+  std::shared_ptr<PlaceSession> session_;    // and all in it: under mutex_
+  std::string map_file_;                     // that its first places are from; empty: none
+  std::map<std::string, std::size_t> kept_;  // files that hold this session's first places, and how many it held then
+  int changes_ = 0, saved_changes_ = 0;      // of the session; those in places_file
+  bool was_located_ = false;                 // … and map -> odom is published since then
+  std::atomic<int> generation_{0};           // sessions that a service began
   std::atomic<bool> stopping_{false};
   // Only the observer's thread touches this.
   stereo_descriptor_vo::VoInfo::ConstPtr mount_of_;

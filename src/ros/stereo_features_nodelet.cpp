@@ -153,6 +153,9 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
             if (input == ArrivalLog::kLeftImage) unused_->add(UnusedInput::kLate);
             onRefusal(topic, why);
           });
+      XmlRpc::XmlRpcValue topics;
+      for (const std::string& topic : input_->subscribedTopics()) topics[topics.valid() ? topics.size() : 0] = topic;
+      setParam(getPrivateNodeHandle(), kInputTopics, topics);
       mask_subscriber_ =
           nh_.subscribe<sensor_msgs::Image>("left/mask", 1, [this](const sensor_msgs::ImageConstPtr& m) { onMask(m); });
     }
@@ -204,9 +207,8 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     diagnostics_->load().noteDropped(unused_->count(UnusedInput::kPushedOut));
     takeOverOptions();
     const ros::Time stamp = pair.left_image->header.stamp;
-    if (std::exchange(jumps_, passed.source_restarts + passed.clock_steps) !=
-        passed.source_restarts + passed.clock_steps) {
-      NODELET_WARN_STREAM("the stamps of the images jumped back to " << stamp << ": a new stream begins (epoch + 1)");
+    if (std::exchange(clock_steps_, passed.clock_steps) != passed.clock_steps && ros::Time::isSimTime()) {
+      NODELET_WARN_STREAM("the clock jumped back to " << stamp << ": a new stream begins (epoch + 1)");
       ++stream_epoch_;
     }
     if (const auto mask = masks_.take()) mask_ = *mask;
@@ -305,7 +307,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   RepeatCheck repeats_;
   cv::Mat mask_;  // of the topic; empty: none has come
   EmitterCheck emitter_;
-  int jumps_ = 0;  // back, of the stamps
+  int clock_steps_ = 0;
   std::uint32_t stream_epoch_ = 0;
   bool rig_is_wrong_ = false;  // as reported last
 

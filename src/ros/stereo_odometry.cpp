@@ -35,9 +35,10 @@ std::vector<Part> makeParts() {
           makePart("visual_odometry", "VisualOdometry", sdvo::OdometryOutputOptions(), sdvo::VisualOdometryOptions())};
 }
 
-/// `name`: relative to the process's private namespace. False where no nodelet has such a parameter.
-bool handOver(const std::string& name, const XmlRpc::XmlRpcValue& value, const std::vector<Part>& parts) {
-  bool is_known = false;
+/// `name`: relative to the process's private namespace. Returns the parameters of nodelets that have it now.
+std::vector<std::string> handOver(const std::string& name, const XmlRpc::XmlRpcValue& value,
+                                  const std::vector<Part>& parts) {
+  std::vector<std::string> given;
   for (const Part& part : parts) {
     const std::string block = part.name + "/";  // as YAML files have it
     const bool is_in_block = name.compare(0, block.size(), block) == 0;
@@ -46,16 +47,29 @@ bool handOver(const std::string& name, const XmlRpc::XmlRpcValue& value, const s
     if (!is_in_block && !is_of_images && std::count(part.parameters.begin(), part.parameters.end(), name) == 0)
       continue;
     ros::param::set(block + own, value);  // the nodelet names one that it does not know
-    is_known = true;
+    given.push_back(ros::names::resolve(block + own));
   }
-  return is_known;
+  return given;
+}
+
+/// Once ROS has shut down here, too: options end with the process that they were given to.
+void forget(const std::string& parameter) {
+  XmlRpc::XmlRpcValue request, response, payload;
+  request[0] = ros::this_node::getName();
+  request[1] = parameter;
+  ros::master::execute("deleteParam", request, response, payload, false);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
+  const std::vector<std::string> arguments(argv + 1, argv + argc);
   ros::init(argc, argv, "stereo_odometry");
   const ros::NodeHandle private_nh("~");
+  std::vector<std::string> mine;  // parameters that nobody else gave
+  for (const std::string& argument : arguments)
+    if (argument.find(":=") != std::string::npos && argument[0] == '_' && argument[1] != '_')
+      mine.push_back(private_nh.resolveName(argument.substr(1, argument.find(":=") - 1)));
   const std::vector<Part> parts = makeParts();
   std::vector<std::string> names;
   private_nh.getParamNames(names);
@@ -63,12 +77,15 @@ int main(int argc, char** argv) {
   for (const std::string& name : names) {
     XmlRpc::XmlRpcValue value;
     if (name.compare(0, prefix.size(), prefix) != 0 || !ros::param::get(name, value)) continue;
-    if (!handOver(name.substr(prefix.size()), value, parts))
+    const std::vector<std::string> given = handOver(name.substr(prefix.size()), value, parts);
+    mine.insert(mine.end(), given.begin(), given.end());
+    if (given.empty())
       ROS_WARN_STREAM("parameter " << name << " is unknown and has no effect: misspelt? See docs/parameters.md");
   }
   nodelet::Loader loader(false);
   for (const Part& part : parts)
     if (!loader.load(ros::names::resolve(part.name), part.type, ros::names::getRemappings(), {})) return EXIT_FAILURE;
   ros::spin();
+  for (const std::string& parameter : mine) forget(parameter);
   return EXIT_SUCCESS;
 }

@@ -10,12 +10,30 @@
 #include <cstdint>
 #include <exception>
 #include <functional>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "../common/worker.hpp"
 
 namespace sdvo {
+
+/// A service that succeeds unless `work` throws; the response has what it says.
+template <class Service, class Work>
+ros::ServiceServer serve(ros::NodeHandle& nh, const std::string& name, Work work) {
+  using Request = typename Service::Request;
+  using Response = typename Service::Response;
+  const boost::function<bool(Request&, Response&)> callback = [work](Request& request, Response& response) {
+    try {
+      work(request, response);
+      response.success = true;
+    } catch (const std::exception& e) {
+      response.message = e.what();
+    }
+    return true;
+  };
+  return nh.advertiseService(name, callback);
+}
 
 /// Subscriptions that can be paused. Both ways ask the master, which may be out of reach: in a thread of their own.
 class PausableInput {

@@ -103,9 +103,10 @@ bool RobotTransforms::hasAncestor(const std::string& frame, const std::string& a
 
 std::string RobotTransforms::explainMissing(const std::string& base_frame, const std::string& camera_frame) const {
   if (camera_frame.empty()) return "the left images have no frame_id: set the camera's optical frame in its driver";
-  if (ours_ && camera_frame == ours_->odom)
-    return "the left images' frame_id is '" + camera_frame +
-           "', as odom_frame_id: set the camera's optical frame in its driver";
+  const bool is_base = camera_frame == base_frame;  // tf2 refuses a transform from a frame to itself
+  if (is_base || (ours_ && camera_frame == ours_->odom))
+    return "the left images' frame_id is '" + camera_frame + "', as " + (is_base ? "base" : "odom") +
+           "_frame_id: set the camera's optical frame in its driver";
   const std::vector<std::string> above = ancestors(camera_frame);
   const std::string root = above.empty() ? camera_frame : cleanFrameId(above.back());
   return "no transform from camera frame '" + camera_frame + "' to base frame '" + base_frame + "' on TF: publish " +

@@ -70,10 +70,11 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     }
   };
 
-  /// Features as they arrived, and how often services had started the odometry again or resumed by then.
+  /// Features as they arrived, when, and how often services had started the odometry again or resumed by then.
   struct Arrived {
     FeaturesMessagePtr message;
     StereoFeaturesView view;
+    std::int64_t now;  ///< ns, simulated or of a clock that nobody sets
     int starts, resumes;
   };
   using FeaturesFilter = StampFilter<Arrived>;
@@ -102,16 +103,25 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     unused_ = std::make_unique<UnusedInput>("feature messages", options_.output.rates.max_unused,
                                             std::set<int>{UnusedInput::kPushedOut});
     diagnostics_ = std::make_unique<OdometryDiagnostics>(nh_, private_nh, getName(), options_.output, *unused_);
-    services_ = {slow_nh.advertiseService("reset", &VisualOdometryNodelet::onReset, this),
-                 slow_nh.advertiseService("reset_to_pose", &VisualOdometryNodelet::onResetToPose, this),
-                 slow_nh.advertiseService("set_pose", &VisualOdometryNodelet::onSetPose, this),
-                 private_nh.advertiseService("pause", &VisualOdometryNodelet::onPause, this),
-                 private_nh.advertiseService("resume", &VisualOdometryNodelet::onResume, this),
-                 disk_nh.advertiseService("save_trajectory", &VisualOdometryNodelet::onSaveTrajectory, this)};
+    using namespace stereo_descriptor_vo;
+    using std_srvs::Trigger;
+    services_ = {
+        slow_nh.advertiseService("reset", &VisualOdometryNodelet::onReset, this),
+        serve<ResetToPose>(slow_nh, "reset_to_pose",
+                           [this](const auto& request, auto&) { startAgain(ros_conversions::toPose(request.pose)); }),
+        serve<SetPose>(slow_nh, "set_pose", [this](const auto& request, auto&) { setPose(request.pose); }),
+        serve<Trigger>(private_nh, "pause", [this](const auto&, auto& response) { pause(response.message); }),
+        serve<Trigger>(private_nh, "resume", [this](const auto&, auto& response) { resume(response.message); }),
+        serve<SaveTrajectory>(disk_nh, "save_trajectory", [this](const auto& request, auto& response) {
+          response.message = save(request.format, inRosHome(request.path));
+        })};
     pose_subscriber_ = slow_nh.subscribe<geometry_msgs::PoseWithCovarianceStamped>(
         "set_pose", 1, [this](const geometry_msgs::PoseWithCovarianceStampedConstPtr& pose) {
-          const std::string problem = setPose(*pose);
-          if (!problem.empty()) NODELET_ERROR_STREAM("set_pose: " << problem);
+          try {
+            setPose(*pose);
+          } catch (const std::invalid_argument& e) {
+            NODELET_ERROR_STREAM("set_pose: " << e.what());
+          }
         });
 
     VisualOdometryOptions defaults;
@@ -171,7 +181,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
 
   void onFeatures(const FeaturesMessagePtr& message) try {
     if (input_->isPaused()) return;
-    Arrived arrived{message, check(*message), starts_, resumes_.posted()};
+    const std::uint64_t now = ros::Time::isSimTime() ? ros::Time::now().toNSec() : ros::SteadyTime::now().toNSec();
+    Arrived arrived{message, check(*message), static_cast<std::int64_t>(now), starts_, resumes_.posted()};
     const std::uint64_t late = filter_.dropped();
     const bool new_stream = stream_epoch_ && *stream_epoch_ != message->stream_epoch;
     for (FeaturesFilter::Passed& passed :
@@ -243,7 +254,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     if (const auto options = reconfigurations_.take()) odometry_->configure(*options);
     noteJumps(passed);
     if (resumes_.take(passed.item.resumes)) odometry_->breakStream();
-    const StereoFeatures features = ros_conversions::fromMessage(passed.item.view);
+    StereoFeatures features = ros_conversions::fromMessage(passed.item.view);
+    features.stamp += time_shift_;
     std::string problem = findExtrinsic(ros_conversions::cleanFrameId(message.header.frame_id));
     if (problem.empty() && to_be_levelled_ && !given_start_) problem = level();
     const OdometryResult result = problem.empty() ? track(features, message, guess) : waitFor(problem);
@@ -256,16 +268,24 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     return waitFor(std::string("features skipped: ") + e.what());
   }
 
-  /// Only simulated time that jumps back, as when a bag is played again, begins anew. A driver that restarts and a
-  /// system's clock that is set back leave the robot where it is.
+  /// Only simulated time that jumps back, as when a bag is played again, begins anew. Where stamps jump, to either
+  /// side, the camera's or the system's clock was set: pairs are as far apart as they arrive.
   void noteJumps(const FeaturesFilter::Passed& passed) {
+    constexpr std::int64_t kJump = 1000000000, kLeast = 1000000;  // ns: as the filter's; between two pairs
+    const std::int64_t stamp = nanoseconds(passed.item.message->header.stamp), now = passed.item.now;
+    const auto before = std::exchange(last_arrival_, std::pair(stamp, now));
     const bool source_restarted = std::exchange(source_restarts_, passed.source_restarts) != passed.source_restarts;
     const bool clock_set = std::exchange(clock_steps_, passed.clock_steps) != passed.clock_steps;
     if (clock_set && ros::Time::isSimTime()) return restart("the clock jumped back");
-    if (!clock_set && !source_restarted) return;
-    NODELET_WARN_STREAM((clock_set ? "the system's clock was set back" : "the stamps of the features jumped back")
-                        << " to " << passed.item.message->header.stamp << ": the odometry goes on from the last pose");
-    odometry_->forgetTime();
+    if (!before) return;
+    const std::int64_t step = stamp - before->first, passed_time = std::max(now - before->second, kLeast);
+    if (step > 0 && (step <= kJump || std::abs(step - passed_time) <= kJump)) return;
+    NODELET_WARN_STREAM((clock_set          ? "the system's clock was set back"
+                         : source_restarted ? "the stamps of the features jumped back"
+                                            : "the stamps of the features jumped ahead")
+                        << " to " << passed.item.message->header.stamp << ": the odometry goes on, "
+                        << 1e-9 * static_cast<double>(passed_time) << " s after the pair before");
+    time_shift_ += passed_time - step;
     processed_stamp_.reset();
   }
 
@@ -276,7 +296,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     if (!complaint.empty() && throttle_.allows("patches")) NODELET_WARN_STREAM(complaint);
     odometry_->mountAt(*mount_->last());
     const std::optional<MotionGuess> motion = guess.since == processed_stamp_ ? guess.motion : std::nullopt;  // no jump
-    const OdometryResult result = odometry_->update(features, motion);
+    OdometryResult result = odometry_->update(features, motion);
+    result.stamp = nanoseconds(message.header.stamp);
     if (result.state == TrackingState::kTracking && result.has_motion) compareAxes(result, motion, message.header);
     processed_stamp_ = message.header.stamp;
     epoch_ = result.epoch;
@@ -355,6 +376,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
         why << ": the odometry starts again from "
             << (T_odom_start.isApprox(Eigen::Isometry3d::Identity()) ? "the origin" : "the given pose"));
     odometry_->reset();
+    time_shift_ = 0;
     mount_->forget();
     optical_axis_ = {};
     gyro_axes_ = {};
@@ -478,77 +500,49 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     return true;
   }
 
-  bool onResetToPose(stereo_descriptor_vo::ResetToPose::Request& request,
-                     stereo_descriptor_vo::ResetToPose::Response& response) try {
-    startAgain(ros_conversions::toPose(request.pose));
-    response.success = true;
-    return true;
-  } catch (const std::invalid_argument& e) {
-    response.message = e.what();
-    return true;
-  }
-
-  bool onSetPose(stereo_descriptor_vo::SetPose::Request& request, stereo_descriptor_vo::SetPose::Response& response) {
-    response.message = setPose(request.pose);
-    response.success = response.message.empty();
-    return true;
-  }
-
-  /// The base is there in odom, with this covariance, at the newest pair. Returns why not.
-  std::string setPose(const geometry_msgs::PoseWithCovarianceStamped& message) try {
+  /// The base is there in odom, with this covariance, at the newest pair. Throws std::invalid_argument.
+  void setPose(const geometry_msgs::PoseWithCovarianceStamped& message) {
     const std::string frame = ros_conversions::cleanFrameId(message.header.frame_id);
     if (frame != ros_conversions::cleanFrameId(options_.output.odom_frame_id))
-      return "the pose is in frame '" + frame + "', not in odom_frame_id";
+      throw std::invalid_argument("the pose is in frame '" + frame + "', not in odom_frame_id");
     Eigen::Isometry3d T_odom_base;
     Matrix6d covariance;
     ros_conversions::fromMessage(message.pose, T_odom_base, covariance);
     const std::lock_guard<std::mutex> lock(work_mutex_);
     const std::optional<Eigen::Isometry3d> T_base_camera = mount_->last();
-    if (!T_base_camera) return "there is no pose yet: set initial_pose, or wait for the first pair";
+    if (!T_base_camera)
+      throw std::invalid_argument("there is no pose yet: set initial_pose, or wait for the first pair");
     const Matrix6d to_camera = adjoint(T_base_camera->inverse());
     odometry_->takePose(to_camera * covariance * to_camera.transpose());
     const Eigen::Isometry3d T_start_base = *T_base_camera * odometry_->lastPose() * T_base_camera->inverse();
-    publisher_->restart(T_odom_base * T_start_base.inverse());
+    publisher_->moveTo(T_odom_base * T_start_base.inverse());
     given_start_ = true;
-    return "";
-  } catch (const std::invalid_argument& e) {
-    return e.what();
   }
 
   /// Without a subscriber the image side rests too.
-  bool onPause(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
-    response.success = true;
-    response.message = input_->pause() ? "paused" : "was paused already";
+  void pause(std::string& outcome) {
+    outcome = input_->pause() ? "paused" : "was paused already";
     diagnostics_->input().noteIdle("paused");
-    return true;
   }
 
-  bool onResume(std_srvs::Trigger::Request&, std_srvs::Trigger::Response& response) {
-    response.success = true;
-    response.message = input_->isPaused() ? "resumed; the motion in between is unknown" : "was not paused";
-    if (!input_->isPaused()) return true;
+  void resume(std::string& outcome) {
+    outcome = input_->isPaused() ? "resumed; the motion in between is unknown" : "was not paused";
+    if (!input_->isPaused()) return;
     resumes_.post({});
     diagnostics_->input().noteIdle("");
     input_->resume();
-    return true;
   }
 
-  bool onSaveTrajectory(stereo_descriptor_vo::SaveTrajectory::Request& request,
-                        stereo_descriptor_vo::SaveTrajectory::Response& response) try {
+  /// Says how many poses.
+  std::string save(const std::string& format, const std::string& file) {
     const nav_msgs::Path path = publisher_->path();
     if (path.poses.empty()) throw std::runtime_error("there is no pose to save yet: reason of vo_info says why");
-    const std::string file = inRosHome(request.path);
     if (!options_.output.overwrite && saved_.count(file) == 0 && std::filesystem::exists(file))
       throw std::runtime_error("'" + file +
                                "' was there before: give another path, or set visual_odometry/overwrite at the start");
-    saveTrajectory(path, *mount_->last(), request.format, file);
+    saveTrajectory(path, *mount_->last(), format, file);
     saved_.insert(file);
-    response.success = true;
-    response.message = std::to_string(path.poses.size()) + " poses";
-    return true;
-  } catch (const std::exception& e) {
-    response.message = e.what();
-    return true;
+    return std::to_string(path.poses.size()) + " poses";
   }
 
   static constexpr double kOtherClock = 3600.0;  // s of latency that no slow machine makes
@@ -586,6 +580,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   std::unique_ptr<VisualOdometry> odometry_;
   Eigen::Isometry3d T_odom_start_;  // of a run
   int source_restarts_ = 0, clock_steps_ = 0;
+  std::optional<std::pair<std::int64_t, std::int64_t>> last_arrival_;  // stamp of the last pair, and when it came
+  std::int64_t time_shift_ = 0;  // ns, from stamps to times of the odometry, which only go on
   int epoch_ = 0;
   bool is_tracking_ = false;  // reported, and not lost since
   std::string camera_frame_;

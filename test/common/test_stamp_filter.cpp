@@ -97,6 +97,15 @@ TEST_F(StampFilterTest, AJumpThatTheClockMadeIsBelievedAtOnceAndCountedByItself)
   EXPECT_EQ(filter_.dropped(), 0u);
 }
 
+TEST_F(StampFilterTest, ASmallStepOfTheClockHasNoPartInAJumpMuchLater) {
+  add(100.0, 100.0);
+  add(100.1, 99.9);
+  add(100.2, 100.0), add(100.9, 100.7), add(101.8, 101.6);
+  EXPECT_EQ(add(50.0, 101.7), Passed{});
+  EXPECT_EQ(add(50.1, 101.8), (Passed{{5, 1}, {6, 1}})) << "the source alone";
+  EXPECT_EQ(clock_steps_, 0);
+}
+
 TEST_F(StampFilterTest, AJumpOfTheClockIsKnownWhetherItOrTheItemComesFirst) {
   add(160.0, 160.0);
   EXPECT_EQ(add(100.0, 160.0), Passed{});  // before the clock

@@ -90,10 +90,10 @@ class Faults(PipelineCase):
         self.assertTrue(wait_until(lambda: len(self.info) == answered + 2), self.rosout.warnings)
         for i in range(22, 30):
             self.feed(i, time_of=boot + i - 20)
-        self.assertEqual({info.epoch for info in self.info[answered:]}, {epoch + 1})
+        self.assertEqual({info.epoch for info in self.info[answered:]}, {epoch})
         self.assertLess(self.info[-1].header.stamp, rospy.Time(10))
         self.assertTrue(wait_until(lambda: len(self.odometry) == answered + 10))
-        np.testing.assert_allclose(self.position(answered), last, atol=1e-9)
+        self.assertAlmostEqual(np.linalg.norm(self.position(answered) - last), STEP, delta=0.2 * STEP)
         self.assertAlmostEqual(np.linalg.norm(self.position() - self.position(answered)), 9 * STEP, delta=STEP)
         self.assertTrue(wait_until(lambda: len(places) > 0 and places[-1].header.stamp < rospy.Time(10)))
         self.assertGreater(places[-1].places, known)

@@ -24,7 +24,7 @@ import rostest
 import yaml
 from nodelet.srv import NodeletList
 from rosgraph_msgs.msg import Log
-from sensor_msgs.msg import CameraInfo, Image
+from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
 from stereo_descriptor_vo.msg import StereoFeatures, VoInfo
 
@@ -109,11 +109,62 @@ class Launch(unittest.TestCase):
         self.assertNotIn('/stereo/recorder', nodes(load('stereo_vo.launch')))
         for file in ('stereo_vo.launch', 'stereo_raw.launch', 'cameras/oak_d.launch', 'mavros.launch'):
             recorders = [node for node in load(file, record='/tmp/drive.bag').nodes if node.type == 'record']
-            self.assertEqual(len(recorders), 1, file)
-            self.assertIn('"/tmp/drive.bag" /tf /tf_static ', recorders[0].args)
-        recorder = nodes(load('stereo_vo.launch', record='/tmp/drive.bag', right_image_topic='/cam/right'))['/stereo/recorder']
-        self.assertTrue(recorder.args.endswith(' /stereo/odom /stereo/vo_info /stereo/left/image_rect /cam/right '
-                                               '/stereo/left/camera_info /stereo/right/camera_info'), recorder.args)
+            self.assertEqual([recorder.args for recorder in recorders], ['-O "/tmp/drive.bag" /tf /tf_static odom vo_info'], file)
+
+    def test_what_is_recorded_is_what_is_used_under_a_name_of_its_own(self):
+        """With a stand-in for rosbag's recorder."""
+        topics = ['/cam/left/image_rect_raw/compressed', '/cam/right/image_rect_raw/compressed', '/cam/left/camera_info',
+                  '/cam/right/camera_info']
+        with tempfile.TemporaryDirectory() as home:
+            environment = dict(os.environ, HOME=home, ROS_NAMESPACE='/recorded')
+
+            def record(path, **options):
+                return subprocess.Popen(['sh', os.path.join(FOLDER, 'ros_python'), os.path.join(FOLDER, 'record_drive.py'), 'stereo_features',
+                                         '/bin/echo', '-O', path, '/tf', 'odom'], env=environment, stdout=subprocess.PIPE,
+                                        stderr=subprocess.PIPE, universal_newlines=True, **options)
+            waiting = record('~/drive.bag')
+            self.addCleanup(rospy.delete_param, '/recorded')
+            rospy.set_param('/recorded/stereo_features/input_topics', topics)
+            time.sleep(2)
+            self.assertIsNone(waiting.poll(), 'there are no images')
+            publishers = [rospy.Publisher(topic, CompressedImage, queue_size=1) for topic in topics[:2]]
+            self.assertEqual(waiting.communicate(timeout=20)[0].split(), ['-O', home + '/drive.bag', '/tf', 'odom'] + topics)
+            for there, expected in (('drive.bag', 'drive_2.bag'), ('drive_2.bag.active', 'drive_3.bag')):  # a killed recorder's
+                open(os.path.join(home, there), 'w').close()
+                self.assertIn(' %s/%s ' % (home, expected), record('~/drive').communicate(timeout=20)[0])
+            refused = record(home + '/missing/drive.bag')
+            self.assertIn('[ERROR] nothing is recorded: there is no folder %s/missing' % home, refused.communicate(timeout=20)[1])
+            self.assertEqual(refused.returncode, 1)
+            for publisher in publishers:
+                publisher.unregister()
+
+    def test_what_has_no_effect_in_a_yaml_file_is_named(self):
+        def copy(text):
+            with tempfile.TemporaryDirectory() as folder:
+                path = os.path.join(folder, 'mine.yaml')
+                with open(path, 'w') as file:
+                    file.write(text)
+                return subprocess.run([sys.executable, os.path.join(FOLDER, 'copy_config.py'), path, path + '.copy'], stderr=subprocess.PIPE,
+                                      universal_newlines=True)
+        for text, said in (('max_features: 5', 'max_features is of no nodelet here'), ('stereo: {stereo_features: {}}', 'stereo is of no nodelet here'),
+                           ('stereo_feature: {}', 'stereo_feature is of no nodelet here'),
+                           ('visual_odometry: {planar: true,\n  planar: false}', 'line 2: planar is there twice, the last one holds')):
+            outcome = copy(text)
+            self.assertIn('mine.yaml: ' + said, outcome.stderr)
+            self.assertEqual(outcome.returncode, 0, outcome.stderr)
+        self.assertEqual(copy('stereo_features: {detector: {max_features: 5}}\nplace_recognition:\n').stderr, '')
+        for text, said in (('stereo_features: {max_rate: 99999999999}', 'stereo_features/max_rate = 99999999999 does not fit into 32 bits'),
+                           ('visual_odometry: {a: 2026-01-01}', 'visual_odometry/a = 2026-01-01 is a date: quote it'),
+                           ('visual_odometry: {1: 2}', 'visual_odometry/1 is no name: quote it')):
+            outcome = copy(text)
+            self.assertEqual((outcome.returncode, outcome.stderr.count('\n')), (1, 1), outcome.stderr)
+            self.assertIn('mine.yaml: ' + said, outcome.stderr)
+
+    def test_options_end_with_their_launch(self):
+        for file in launch_files():
+            for node in xml.etree.ElementTree.parse(os.path.join(FOLDER, file)).getroot().iter('node'):
+                if 'load stereo_descriptor_vo' in node.get('args', '') and node.get('launch-prefix'):
+                    self.assertEqual(node.get('clear_params'), '$(arg clear_params)', '%s: %s' % (file, node.get('name')))
 
     def test_a_python_without_ros_modules_may_come_first_on_path(self):
         with tempfile.TemporaryDirectory() as folder:
@@ -127,8 +178,17 @@ class Launch(unittest.TestCase):
             os.environ['PATH'] = folder + ':' + path
             try:
                 self.assertEqual(parameters(config=config), {'visual_odometry/motion/seed': 7})
+                process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch', 'record:=/missing/drive.bag'],
+                                           stderr=subprocess.PIPE, universal_newlines=True)
             finally:
                 os.environ['PATH'] = path
+            try:
+                self.assertIsNotNone(self.session())
+            finally:
+                process.terminate()
+            said = process.communicate()[1]
+            self.assertIn('nothing is recorded: there is no folder /missing', said)
+            self.assertNotIn('Traceback', said)
 
     def test_a_filter_that_publishes_tf_gets_all_of_it(self):
         for file in ('stereo_vo.launch', 'stereo_raw.launch', 'mavros.launch', 'cameras/oak_d.launch'):
@@ -264,6 +324,11 @@ class Launch(unittest.TestCase):
                              [True, 30, 'odom_2'])
             self.assertEqual(found[ARGUMENTS['base_frame_id']], 'robot')
 
+    def test_another_robot_is_named_from_the_root_on(self):
+        for other in ('r2', '/r2', '/r2/'):
+            node = nodes(load('stereo_vo.launch', loop_closing='true', other=other))['/stereo/place_recognition']
+            self.assertIn('/r2/place_signature', [to for _, to in node.remap_args])
+
     def test_loop_closing_passes_its_arguments_on(self):
         found = parameters(loop_closing='true', map_frame_id='site', publish_map_tf='false', places_file='/site.bag',
                            save_at_shutdown='true',
@@ -367,8 +432,9 @@ class Launch(unittest.TestCase):
         def kill(process):
             """With all its loaders, which say nothing any more."""
             loaders = subprocess.run(['pgrep', '-P', str(process.pid)], stdout=subprocess.PIPE, universal_newlines=True)
-            for pid in [process.pid] + [int(pid) for pid in loaders.stdout.split()]:
-                os.kill(pid, signal.SIGKILL)
+            os.kill(process.pid, signal.SIGKILL)
+            for pid in loaders.stdout.split():  # which lead a group of processes
+                os.killpg(int(pid), signal.SIGKILL)
             process.wait()
         mine = ['/stereo/features_image', '/stereo/stereo_features', '/stereo/visual_odometry']
         first = launch()
@@ -387,6 +453,30 @@ class Launch(unittest.TestCase):
             third.terminate()
         self.assertIn('/stereo/visual_odometry of an earlier launch is still in /stereo/driver: it is replaced',
                       third.communicate()[1])
+
+    def test_the_end_and_the_halt_of_anothers_manager_are_explained(self):
+        executable = roslib.packages.find_node('nodelet', 'nodelet')[0]
+
+        def run(disturb):
+            manager = subprocess.Popen([executable, 'manager', '__name:=driver', '__ns:=/stereo'])
+            self.addCleanup(manager.kill)
+            rospy.wait_for_service('/stereo/driver/list', 60)
+            process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'odometry.launch', 'manager:=driver', 'start_manager:=false'],
+                                       stderr=subprocess.PIPE, universal_newlines=True, start_new_session=True)
+            disturb(manager)
+            time.sleep(20)  # a bond takes 10 s to break
+            process.terminate()
+            manager.send_signal(signal.SIGCONT)
+            manager.terminate()
+            manager.wait()
+            return process.communicate()[1]
+
+        def kill(manager):
+            self.assertIsNotNone(self.session())
+            time.sleep(3)  # until the bond is formed
+            manager.kill()
+        self.assertIn('has ended with its manager driver, or its loader was killed: respawn:=true loads it again', run(kill))
+        self.assertIn('the nodelet manager does not answer', run(lambda manager: manager.send_signal(signal.SIGSTOP)))
 
     def test_a_recording_takes_over_from_a_pipeline_of_the_same_namespace(self):
         self.addCleanup(lambda: rospy.has_param('/use_sim_time') and rospy.delete_param('/use_sim_time'))

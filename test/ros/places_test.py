@@ -5,6 +5,7 @@ image side and the odometry, and waits for the answer to each pair; every pair i
 import io
 import os
 import shutil
+import signal
 import subprocess
 import sys
 import tempfile
@@ -19,7 +20,7 @@ import rostest
 import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry, Path
-from std_srvs.srv import Trigger
+from std_srvs.srv import Empty, Trigger
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
@@ -138,7 +139,8 @@ class Recognition:
         self.loops, self.matches = Collector(namespace + '/loops', MarkerArray), Collector(namespace + '/other_matches', PlaceMatch)
         self.rosout = Rosout(namespace)
         arguments = ['%s:=%s' % item for item in arguments.items()] + ['namespace:=' + namespace.strip('/')]
-        self.process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'place_recognition.launch'] + arguments)
+        self.console = tempfile.TemporaryFile('w+')
+        self.process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'place_recognition.launch'] + arguments, stderr=self.console)
 
     def inputs(self):
         """Its subscriptions as our end has them."""
@@ -157,8 +159,11 @@ class Recognition:
         return rospy.ServiceProxy(name, service)(*arguments)
 
     def close(self):
-        self.process.terminate()
+        """Returns what the console has."""
+        self.process.send_signal(signal.SIGINT)
         self.process.wait()
+        self.console.seek(0)
+        return self.console.read()
 
 
 class Places(unittest.TestCase):
@@ -397,6 +402,41 @@ class Places(unittest.TestCase):
         info = self.drive(robot, recognition, 1)
         self.assertEqual(info.places, int(answer.message.split()[0]) + 1)
         self.assertEqual(recognition.rosout.errors, [])
+
+    def test_the_end_loses_no_place(self):
+        file, other = (os.path.join(self.directory, name) for name in ('site.bag', 'other.bag'))
+        namespace, starts = '/places_e', iter(range(1, 99))
+
+        def count(path):
+            with rosbag.Bag(path) as bag:
+                return bag.get_message_count(['place'])
+
+        def run(pairs, act=lambda recognition: None):
+            robot = Robot(namespace, self.ring, self.clock)
+            robot.session = rospy.Time(100 + next(starts))
+            recognition = self.start(namespace, places_file=file, save_at_shutdown='true')
+            self.assertTrue(wait_until(recognition.is_connected, 60), 'it did not start')
+            self.drive(robot, recognition, 2)
+            act(recognition)
+            self.drive(robot, recognition, pairs)
+            return recognition.close()
+
+        def save_by_itself(_):
+            self.assertTrue(wait_until(lambda: os.path.exists(file), 75), 'nothing was saved while it ran')
+            self.assertEqual(count(file), 2)
+        # Places left beside, as by a process that was killed while it saved.
+        open(file + '.partial-1', 'w').close()
+        self.assertIn("6 places are saved", run(4, save_by_itself))
+        self.assertEqual((count(file), os.listdir(self.directory)), (6, ['site.bag']))
+        shutil.copy(file, other)
+        for service, arguments in (('reset', (Empty,)), ('load_places', (LoadPlaces, other))):
+            self.assertIn("are not saved: '%s' has others, or more" % file,
+                          run(2, lambda recognition: recognition.call(service, *arguments)), service)
+            self.assertEqual((count(file), count(other)), (6, 6))
+        os.remove(file)
+        os.mkdir(file)
+        refused = self.start(namespace, places_file=file, save_at_shutdown='true')
+        self.assertTrue(wait_until(lambda: refused.rosout.said('it is no regular file'), 60))
 
     def test_a_reset_takes_the_mount_anew(self):
         self.addCleanup(self.broadcaster.sendTransform, camera_transform(FRAME))

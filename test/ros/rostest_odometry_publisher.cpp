@@ -229,6 +229,17 @@ TEST_F(OdometryPublisherTest, AfterAResetThePathBeginsAnew) {
   EXPECT_EQ(path_->messages.back().poses[0].pose.position.z, 0.0);
 }
 
+TEST_F(OdometryPublisherTest, APoseThatIsSetLeavesThePathOfBefore) {
+  start({});
+  publish(resultAt(7));
+  publisher_->moveTo(Eigen::Isometry3d(Eigen::Translation3d(100.0, 0.0, 0.0)));
+  publish(resultAt(8));
+  const auto poses = publisher_->path().poses;
+  ASSERT_EQ(poses.size(), 2u);
+  EXPECT_EQ(poses[0].pose.position.z, 7.0);
+  EXPECT_EQ(poses[1].pose.position.x, 100.0);
+}
+
 TEST_F(OdometryPublisherTest, WhoeverSubscribesLateGetsThePath) {
   start({});
   publish(resultAt(1));

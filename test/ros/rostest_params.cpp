@@ -144,28 +144,11 @@ TEST_F(LoadParams, TheServerShowsWhatIsInUse) {
   EXPECT_TRUE(nh_.getParam("kind", kind) && kind == "a");
 }
 
-/// Beside its own block, and whatever the block's name.
-TEST_F(LoadParams, NamesOptionsThatStandInNoNodeletsBlock) {
-  const ros::NodeHandle robot("/robot"), nh(robot, "stereo_features");
-  robot.setParam("stereo_feature/count", 5);        // too short
-  robot.setParam("StereoFeatures/inner/ratio", 1);  // spelt otherwise
-  robot.setParam("features/inner/ratio", 1);        // another word
-  robot.setParam("inner/ratio", 1);                 // no block at all
-  robot.setParam("left_rectify/count", 5);          // another node's, by chance of an option's name
-  robot.setParam("visual_odometry/inner/ratio", 1);
-  robot.setParam("front/stereo_features/inner/ratio", 1);  // another rig's
-  Sample sample;
-  std::vector<std::string> unknown = loadParams(nh, sample);
-  std::sort(unknown.begin(), unknown.end());
-  robot.deleteParam("/robot");
-  EXPECT_EQ(unknown, (std::vector<std::string>{"/robot/StereoFeatures/inner/ratio", "/robot/features/inner/ratio",
-                                               "/robot/inner/ratio", "/robot/stereo_feature/count"}));
-}
-
 TEST_F(LoadParams, NamesWhatIsNoOption) {
   nh_.setParam("cuont", 5);
   nh_.setParam("inner/rate", 5);
   nh_.setParam("image_transport", "raw");
+  nh_.setParam("input_topics", "/left/image_rect");
   nh_.setParam("left_image/compressed/mode", "color");
   nh_.setParam("right_image/compressed/mode", "color");
   ros::NodeHandle("/load_params_of_another").setParam("other", 1);

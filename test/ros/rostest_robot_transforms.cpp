@@ -97,6 +97,7 @@ TEST_F(RobotTransformsTest, AMissingTransformIsNamedFromWhereTfHasTheCamera) {
   EXPECT_TRUE(contains(alone, "publish base_link -> nowhere (static")) << alone;
   EXPECT_FALSE(contains(alone, "where TF has")) << alone;
   EXPECT_TRUE(contains(transforms_->explainMissing("base_link", ""), "no frame_id"));
+  EXPECT_TRUE(contains(transforms_->explainMissing("base_link", "base_link"), "as base_frame_id: set the camera's"));
 }
 
 TEST_F(RobotTransformsTest, TheCamerasPlaceIsReadOnceAndAgainWhenItIsForgotten) {

@@ -35,6 +35,16 @@ std::string refusal(const Matrix6d& sent) {
   return "";
 }
 
+TEST(Poses, WhatIsNowhereIsRefused) {
+  EXPECT_THROW(toPose("1e300 0 0 0 0 0"), std::invalid_argument);
+  EXPECT_THROW(toPose("0 0 0 0 0 90"), std::invalid_argument);
+  EXPECT_NO_THROW(toPose("500000 9000000 100 0 0 -6.28"));  // UTM
+  geometry_msgs::Pose pose;
+  pose.orientation.w = 1.0;
+  pose.position.y = 1e300;
+  EXPECT_THROW(toPose(pose), std::invalid_argument);
+}
+
 /// x, y and yaw as rviz' "2D Pose Estimate" and AMCL have them.
 Matrix6d planar() {
   Matrix6d covariance = Matrix6d::Zero();
