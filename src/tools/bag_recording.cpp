@@ -1,5 +1,6 @@
 #include "bag_recording.hpp"
 
+#include <nav_msgs/Odometry.h>
 #include <rosbag/view.h>
 
 #include <boost/make_shared.hpp>
@@ -53,6 +54,7 @@ int BagRecording::useAll(int limit, const Use& use, const Refuse& refuse) {
   std::vector<std::string> wanted(topics_.begin(), topics_.end());
   wanted.insert(wanted.end(), {"/tf", "/tf_static"});
   rosbag::View view(bag_, rosbag::TopicQuery(wanted));
+  view.addQuery(bag_, rosbag::TypeQuery(ros::message_traits::datatype<nav_msgs::Odometry>()));  // name the base
   for (auto instance = view.begin(); instance != view.end() && !isEnough(); ++instance) input_->add(*instance);
   if (used_.empty() && !refuse)
     throw std::runtime_error("'" + path_ +

@@ -1,5 +1,6 @@
 #include "camera_input.hpp"
 
+#include <nav_msgs/Odometry.h>
 #include <tf2_eigen/tf2_eigen.h>
 
 #include <algorithm>
@@ -74,6 +75,10 @@ void CameraInput::add(const tf2_msgs::TFMessage& message, bool is_static) {
 }
 
 void CameraInput::add(const rosbag::MessageInstance& instance) {
+  if (const auto odometry = instance.instantiate<nav_msgs::Odometry>()) {
+    bases_.insert(ros_conversions::cleanFrameId(odometry->child_frame_id));
+    return;
+  }
   if (instance.getTopic() != "/tf" && instance.getTopic() != "/tf_static")
     return add(readStereoMessage(instance, topics_));
   try {
@@ -86,12 +91,20 @@ void CameraInput::add(const rosbag::MessageInstance& instance) {
   }
 }
 
-ArrivalFindings CameraInput::findings(const std::string& base_frame, bool is_recorded) {
+std::string CameraInput::baseAbove(std::string frame) const {
+  std::set<std::string> passed;  // frames may stand in a circle
+  while (passed.insert(frame).second && transforms_._getParent(frame, ros::Time(0), frame))
+    if (bases_.count(frame) > 0) return frame;
+  return "base_link";
+}
+
+ArrivalFindings CameraInput::findings(const std::string& base_frame_given, bool is_recorded) {
   const RateOptions rates;
+  const std::string camera = ros_conversions::cleanFrameId(frame_.value_or(""));
+  const std::string base_frame = base_frame_given.empty() ? baseAbove(camera) : base_frame_given;
   std::optional<Eigen::Isometry3d> T_base_camera;
   std::string problem;
   try {
-    const std::string camera = ros_conversions::cleanFrameId(frame_.value_or(""));
     T_base_camera = tf2::transformToEigen(transforms_.lookupTransform(base_frame, camera, ros::Time(0)));
   } catch (const tf2::TransformException& e) {
     problem = tf_problem_.empty() ? e.what() : tf_problem_;

@@ -8,6 +8,7 @@
 #include <array>
 #include <functional>
 #include <optional>
+#include <set>
 #include <string>
 
 #include "../check/stamp_check.hpp"
@@ -41,7 +42,8 @@ class CameraInput {
   /// Of one of the topics, or of TF.
   void add(const rosbag::MessageInstance& instance);
 
-  /// Without any transform TF is open where they may not have been recorded, else a fault.
+  /// Without any transform TF is open where they may not have been recorded, else a fault. Without a `base_frame` it is
+  /// the one above the camera whose pose an odometry in the bag publishes, else base_link.
   ArrivalFindings findings(const std::string& base_frame, bool is_recorded);
 
   /// Stamps that made no pair, with those that still wait, and why the last unusable one is none.
@@ -51,6 +53,7 @@ class CameraInput {
  private:
   using Message = StereoMessage;
 
+  std::string baseAbove(std::string frame) const;
   /// Whether TF has `base_frame` <- the images' frame.
   Finding judge(const std::optional<Eigen::Isometry3d>& T_base_camera, const std::string& base_frame,
                 const std::string& problem) const;
@@ -67,6 +70,7 @@ class CameraInput {
   tf2::BufferCore transforms_;
   bool has_transforms_ = false;
   std::optional<std::string> frame_;  ///< of the left images
+  std::set<std::string> bases_;       ///< child frames of odometries
 };
 
 }  // namespace sdvo

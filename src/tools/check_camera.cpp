@@ -45,7 +45,7 @@ void writeCheckPage(const std::string& path, const std::string& camera, const st
 }
 
 struct Arguments {
-  std::string bag, base_frame = "base_link", transport = "raw", page, config;
+  std::string bag, base_frame, transport = "raw", page, config;
   sdvo::StereoSource source;
   std::vector<std::string> settings;
   double seconds = 30.0;
@@ -135,7 +135,8 @@ int main(int argc, char** argv) {
   app.add_option("--bag", arguments.bag, "recorded bag or folder; empty: listen to the topics")
       ->check(CLI::ExistingPath);
   arguments.source.addTo(app);
-  app.add_option("--base-frame", arguments.base_frame, "the robot's frame on TF")->capture_default_str();
+  app.add_option("--base-frame", arguments.base_frame,
+                 "the robot's frame on TF; empty: that of the bag's odometry, else base_link");
   app.add_option("--seconds", arguments.seconds, "how long to listen, s")
       ->capture_default_str()
       ->check(CLI::Range(1.0, 3600.0));

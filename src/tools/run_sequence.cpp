@@ -35,8 +35,8 @@ constexpr int kAll = std::numeric_limits<int>::max();
 
 struct Arguments {
   std::vector<std::string> inputs, before, settings;
-  std::string config, format, poses, timing, states, output, odometry, keyframes, truth, page, live, pictures;
-  std::string base_frame = "base_link";
+  std::string config, format, poses, timing, states, output, odometry, keyframes, truth, page, live, pictures,
+      base_frame;
   sdvo::StereoSource source;
   int frames = kAll, threads = 1;
   bool join = false, places = false, shuttle = false, halves = false;
@@ -297,7 +297,8 @@ int main(int argc, char** argv) {
   app.add_option("--page", arguments.page,
                  "HTML page to write: verdict, camera's check, path, states, deviations, times, what the recording "
                  "implies of its error (--shuttle and --halves), images");
-  app.add_option("--base-frame", arguments.base_frame, "page: the robot's frame on TF of a bag")->capture_default_str();
+  app.add_option("--base-frame", arguments.base_frame,
+                 "page: the robot's frame on TF; empty: that of the bag's odometry, else base_link");
   app.add_option("--live", arguments.live, "page: bag with vo_info of the drive as it ran; default: the recording")
       ->check(CLI::ExistingFile);
   app.add_option("--pictures", arguments.pictures, "folder of pictures to write: each left image with its features");

@@ -8,6 +8,7 @@
 #include <stereo_descriptor_vo/VoInfo.h>
 #include <sys/stat.h>
 #include <sys/wait.h>
+#include <tf2_msgs/TFMessage.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -948,6 +949,34 @@ TEST_F(Tools, ThePageShowsWhatWasReportedLive) {
   EXPECT_EQ(other.exit_code, 0) << other.err;
   EXPECT_NE(other.err.find("/stereo/vo_info holds stereo_descriptor_vo/VoInfo of another definition"),
             std::string::npos);
+}
+
+/// Of two robots in a bag the camera is on one.
+TEST_F(Tools, TheBaseIsThatOfTheOdometryAboveTheCamera) {
+  const fs::path drive = bag("a"), named = root_ / "named.bag";
+  const auto check = [&](const std::vector<std::string>& bases, const std::string& arguments, const std::string& said) {
+    {
+      const rosbag::Bag in(drive.string());
+      rosbag::Bag out(named.string(), rosbag::bagmode::Write);
+      for (const rosbag::MessageInstance& message : rosbag::View(in)) {
+        const auto transforms = message.instantiate<tf2_msgs::TFMessage>();
+        if (message.getTopic() == "/tf_static") transforms->transforms.front().header.frame_id = "/r2/base";
+        transforms ? out.write(message.getTopic(), message.getTime(), *transforms)
+                   : out.write(message.getTopic(), message.getTime(), message);
+      }
+      for (const std::string& base : bases) {
+        nav_msgs::Odometry odometry;
+        odometry.child_frame_id = base;
+        out.write("/" + base + "/odom", rosbag::View(in).getBeginTime(), odometry);
+      }
+    }
+    const Outcome outcome = run("check_camera", "--bag " + named.string() + arguments);
+    EXPECT_NE(outcome.out.find(said), std::string::npos) << outcome.out;
+  };
+  check({"r1/base", "r2/base"}, "", "m of r2/base and looks along 1.00");
+  check({}, " --base-frame r2/base", "m of r2/base and looks along 1.00");
+  check({"r1/base", "r2/base"}, " --base-frame r1/base", "to r1/base: ");
+  check({"r1/base"}, "", "to base_link: ");
 }
 
 TEST_F(Tools, PicturesOfEachPair) {
