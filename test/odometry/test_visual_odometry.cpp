@@ -2,9 +2,11 @@
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <set>
 
+#include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
@@ -34,7 +36,17 @@ std::int64_t stampOf(int i) {
   return 1000000000 + i * kPeriod;
 }
 
-/// Pair i of the drive; pixels are off by `noise` px each.
+/// Pair i as a camera at a pose in a world sees it to a depth of `reach` m; pixels are off by `noise` px each.
+StereoFeatures pairAt(const Eigen::Isometry3d& T_world_camera, int i, const synthetic::World& world, double noise = 0.0,
+                      unsigned seed = 1, double reach = 25.0) {
+  synthetic::Sighting sighting;
+  sighting.noise = noise;
+  sighting.max_depth = reach;
+  sighting.seed = seed;
+  return synthetic::observe(world, synthetic::camera(), T_world_camera.inverse(), stampOf(i), sighting);
+}
+
+/// Pair i of the drive.
 StereoFeatures pairOf(int i, double noise = 0.0) {
   synthetic::Sighting sighting;
   sighting.noise = noise;
@@ -48,7 +60,7 @@ StereoFeatures pairOf(int i, double noise = 0.0) {
 /// Pair i of the same drive in another street, of which no map was made.
 StereoFeatures pairElsewhere(int i) {
   static const synthetic::World other = synthetic::randomWorld(2, 5000, {-40.0, -4.0, -5.0}, {30.0, 3.0, 70.0});
-  return synthetic::observe(other, synthetic::camera(), drivePose(i).inverse(), stampOf(i));
+  return pairAt(drivePose(i), i, other, 0.0, 1, 40.0);
 }
 
 /// Pair i in which nothing is seen.
@@ -58,11 +70,28 @@ StereoFeatures blindPair(int i) {
 
 /// Pair i in which everything is new, as after a jump to another place.
 StereoFeatures strangePair(int i) {
-  synthetic::Sighting sighting;
-  sighting.seed = 900 + static_cast<unsigned>(i);
-  const synthetic::World elsewhere =
-      synthetic::randomWorld(500 + static_cast<unsigned>(i), 600, {-10.0, -4.0, 3.0}, {10.0, 3.0, 25.0});
-  return synthetic::observe(elsewhere, synthetic::camera(), Eigen::Isometry3d::Identity(), stampOf(i), sighting);
+  const auto seed = static_cast<unsigned>(i);
+  const synthetic::World elsewhere = synthetic::randomWorld(500 + seed, 600, {-10.0, -4.0, 3.0}, {10.0, 3.0, 25.0});
+  return pairAt(Eigen::Isometry3d::Identity(), i, elsewhere, 0.0, 900 + seed, 40.0);
+}
+
+/// What was seen before, with the stamp of pair i.
+StereoFeatures stampedAs(int i, StereoFeatures features) {
+  features.stamp = stampOf(i);
+  return features;
+}
+
+/// Pair i of something that is fixed to the camera and covers the whole view.
+StereoFeatures coveredPair(int i) {
+  StereoFeatures covered = stampedAs(i, strangePair(0));
+  for (float& u : covered.u) u += 0.01f * static_cast<float>(i);  // noise: no image is that of the pair before
+  return covered;
+}
+
+void addAll(StereoFeatures& features, const StereoFeatures& others) {
+  for (int row = 0; row < others.count(); ++row)
+    synthetic::addFeature(features, others.u[row], others.v[row], others.disparity[row],
+                          {others.descriptors.ptr(row), others.descriptors.ptr(row) + others.descriptors.cols});
 }
 
 double distanceBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
@@ -75,6 +104,18 @@ double angleBetween(const Eigen::Isometry3d& a, const Eigen::Isometry3d& b) {
 
 Eigen::Isometry3d trueSinceStart(int i, int start = 0) {
   return drivePose(start).inverse() * drivePose(i);
+}
+
+/// Squares of errors in units of their covariance.
+double motionError(const OdometryResult& result, const Eigen::Isometry3d& truth) {
+  return mahalanobisSquare(logSE3(result.T_previous_current.inverse() * truth), result.motion_covariance);
+}
+double poseError(const OdometryResult& result, const Eigen::Isometry3d& truth) {
+  return mahalanobisSquare(logSE3(result.T_origin_camera.inverse() * truth), result.pose_covariance);
+}
+
+double positionSigma(const OdometryResult& result) {
+  return std::sqrt(result.pose_covariance.topLeftCorner<3, 3>().trace());
 }
 
 void expectCovariance(const Matrix6d& covariance) {
@@ -91,7 +132,8 @@ void expectHealthy(const OdometryResult& result) {
   EXPECT_LT((rotation * rotation.transpose() - Eigen::Matrix3d::Identity()).norm(), 1e-9);
   expectCovariance(result.pose_covariance);
   expectCovariance(result.motion_covariance);
-  EXPECT_EQ(result.reason.empty(), result.state == TrackingState::kTracking && result.has_motion);
+  const bool is_plain = result.state == TrackingState::kTracking && result.has_motion;
+  EXPECT_TRUE(is_plain || !result.reason.empty());
 }
 
 /// Follows the pairs 0 … last of the drive; the last result.
@@ -99,6 +141,95 @@ OdometryResult follow(VisualOdometry& odometry, int last, int first = 0) {
   OdometryResult result;
   for (int i = first; i <= last; ++i) result = odometry.update(pairOf(i));
   return result;
+}
+
+/// The odometry on pairs that are letters: (g)ood, (b)lind, (s)trange, (e)lsewhere or (c)overed. A point is a pair
+/// that does not come, a bar breaks the stream, a space only divides.
+struct Drive {
+  explicit Drive(const VisualOdometryOptions& options = {}) : odometry(options) {}
+
+  /// The pairs' states by their first letters, with what divides them.
+  std::string operator()(const std::string& pairs) {
+    std::string states;
+    for (const char kind : pairs) {
+      if (kind == ' ' || kind == '.' || kind == '|') {
+        states += kind;
+        next += kind == '.';
+        if (kind == '|') odometry.breakStream();
+        continue;
+      }
+      const auto pair = kind == 'g'   ? pairOf(next)
+                        : kind == 'b' ? blindPair(next)
+                        : kind == 's' ? strangePair(next)
+                        : kind == 'e' ? pairElsewhere(next)
+                                      : coveredPair(next);
+      last = odometry.update(pair, guess ? std::optional(guess(next)) : std::nullopt);
+      SCOPED_TRACE("pair " + std::to_string(next) + " of " + pairs + ": " + last.reason);
+      expectConsistency();
+      ++next;
+      states += toString(last.state)[0];
+    }
+    return states;
+  }
+
+  /// Whatever the pairs show.
+  void expectConsistency() {
+    const bool has_pose = last.state == TrackingState::kTracking || last.state == TrackingState::kDegraded;
+    expectHealthy(last);
+    EXPECT_EQ(last.has_pose, has_pose);
+    EXPECT_TRUE(has_pose || !last.has_motion);
+    if (!has_pose) return;
+    if (!before) {
+      start = next;
+      EXPECT_TRUE(last.T_origin_camera.isApprox(Eigen::Isometry3d::Identity()));
+    } else {
+      EXPECT_EQ(last.has_motion, last.epoch == before->epoch) << "it would begin at a pose that was not published";
+      if (last.has_motion) {
+        EXPECT_TRUE((before->T_origin_camera * last.T_previous_current).isApprox(last.T_origin_camera, 1e-9));
+        EXPECT_NEAR(last.dt, 1e-9 * static_cast<double>(last.stamp - before->stamp), 1e-12);
+      }
+      EXPECT_GE(last.pose_covariance.trace(), (1.0 - 1e-9) * measured) << "but for rounding";
+      EXPECT_GE(last.distance, before->distance);
+    }
+    before = last;
+    if (last.state == TrackingState::kTracking) measured = last.pose_covariance.trace();
+  }
+
+  /// So far no epoch ended, and the last pose is true to so many m.
+  void expectTruth(double tolerance) const {
+    EXPECT_EQ(last.epoch, 0);
+    EXPECT_LT(distanceBetween(last.T_origin_camera, trueSinceStart(next - 1, start)), tolerance) << next - 1;
+  }
+
+  VisualOdometry odometry;
+  std::function<MotionGuess(int)> guess;
+  int start = 0, next = 0;  ///< pairs
+  OdometryResult last;
+
+ private:
+  std::optional<OdometryResult> before;  ///< with a pose
+  double measured = 0.0;                 ///< trace of the last measured pose's covariance
+};
+
+TEST(VisualOdometry, StatesFollowFromWhatThePairsShow) {
+  struct Scenario {
+    std::string pairs, states, why;
+  };
+  for (const Scenario& s : std::vector<Scenario>{
+           {"bbb gg", "WWW TT", "waits for the first features"},
+           {"g b", "T L", "there is no motion to predict"},
+           {"gggggg bgbgbgbg", "TTTTTT DTDTDTDT", "it may predict again once it has measured"},
+           {"gggg.g.g b", "TTTT.T.T D", "speed is by the clock"},
+           {"gggggggg b gggggg bbb ggggggg", "TTTTTTTT D TTTTTT DLL TTTTTTT", "found again in the map"},
+           {"gggggg sss gg", "TTTTTT DLL TT", "pairs of another street leave the map"},
+           {"gggggg|e b", "TTTTTT|L L", "a velocity is of no use after a break"},
+       }) {
+    SCOPED_TRACE(s.why);
+    Drive drive;
+    EXPECT_EQ(drive(s.pairs), s.states);
+    if (s.states.back() == 'T') drive.expectTruth(0.02);
+    if (s.states.back() == 'D') drive.expectTruth(0.1);
+  }
 }
 
 TEST(VisualOdometry, FirstPairIsTheOrigin) {
@@ -127,6 +258,7 @@ TEST(VisualOdometry, FollowsAnExactDrive) {
     EXPECT_LT(angleBetween(result.T_origin_camera, trueSinceStart(i)), 1e-4) << i;
     if (i == 0) continue;
     EXPECT_TRUE(result.has_motion);
+    EXPECT_EQ(result.reason, "");
     EXPECT_NEAR(result.dt, 0.1, 1e-12);
     EXPECT_LT(distanceBetween(result.T_previous_current, trueSinceStart(i, i - 1)), 1e-3);
     travelled += trueSinceStart(i, i - 1).translation().norm();
@@ -157,9 +289,7 @@ TEST(VisualOdometry, FollowsANoisyDriveAndKnowsHowWell) {
       EXPECT_GE(result.pose_covariance.trace(), previous_trace) << i;
       previous_trace = result.pose_covariance.trace();
     }
-    if (i == 0) continue;
-    const Vector6d error = logSE3(trueSinceStart(i, i - 1).inverse() * result.T_previous_current);
-    mean_step += mahalanobisSquare(error, result.motion_covariance) / kPairs;
+    if (i > 0) mean_step += motionError(result, trueSinceStart(i, i - 1)) / kPairs;
   }
   EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(kPairs)), 0.01 * kPairs * kStep);
   EXPECT_LT(angleBetween(result.T_origin_camera, trueSinceStart(kPairs)), 0.01);
@@ -167,8 +297,7 @@ TEST(VisualOdometry, FollowsANoisyDriveAndKnowsHowWell) {
   // frame's noise leaves to the next shift that; a factor of four either way is dishonest.
   EXPECT_GT(mean_step, 1.5);
   EXPECT_LT(mean_step, 24.0);
-  const Vector6d final_error = logSE3(trueSinceStart(kPairs).inverse() * result.T_origin_camera);
-  EXPECT_LT(mahalanobisSquare(final_error, result.pose_covariance), 4.0 * 38.0);
+  EXPECT_LT(poseError(result, trueSinceStart(kPairs)), 4.0 * 38.0);
 }
 
 TEST(VisualOdometry, APairWithNoisierImagesHasALargerCovarianceAndTheNextOnesHaveNot) {
@@ -191,80 +320,54 @@ TEST(VisualOdometry, APairWithNoisierImagesHasALargerCovarianceAndTheNextOnesHav
   }
 }
 
-TEST(VisualOdometry, WaitsForTheFirstFeatures) {
-  VisualOdometry odometry({});
-  for (int i = 0; i < 3; ++i) {
-    const OdometryResult result = odometry.update(blindPair(i));
-    EXPECT_EQ(result.state, TrackingState::kWaiting);
-    EXPECT_FALSE(result.has_pose);
-    EXPECT_FALSE(result.has_motion);
-    EXPECT_FALSE(result.reason.empty());
-    expectHealthy(result);
-  }
-  const OdometryResult first = odometry.update(pairOf(3));
-  EXPECT_TRUE(first.has_pose);
-  EXPECT_TRUE(first.T_origin_camera.isApprox(Eigen::Isometry3d::Identity()));
-  EXPECT_EQ(odometry.update(pairOf(4)).state, TrackingState::kTracking);
-}
-
 TEST(VisualOdometry, PassesOnWhyThereAreNoFeatures) {
   VisualOdometry odometry({});
   StereoFeatures dark = blindPair(0);
   dark.report.status = "the lens is covered";
-  EXPECT_NE(odometry.update(dark).reason.find("the lens is covered"), std::string::npos);
+  EXPECT_TRUE(contains(odometry.update(dark).reason, "the lens is covered"));
   follow(odometry, 2, 1);
   dark.stamp = stampOf(3);
-  EXPECT_NE(odometry.update(dark).reason.find("the lens is covered"), std::string::npos);
+  EXPECT_TRUE(contains(odometry.update(dark).reason, "the lens is covered"));
 }
 
 TEST(VisualOdometry, BridgesOneFailedPairByPrediction) {
-  for (const bool strange : {false, true}) {
-    VisualOdometry odometry({});
-    const OdometryResult before = follow(odometry, 5);
-    const OdometryResult predicted = odometry.update(strange ? strangePair(6) : blindPair(6));
-    EXPECT_EQ(predicted.state, TrackingState::kDegraded);
-    EXPECT_FALSE(predicted.reason.empty());
-    EXPECT_TRUE(predicted.has_pose);
-    EXPECT_TRUE(predicted.has_motion);
-    EXPECT_EQ(predicted.epoch, before.epoch);
-    expectHealthy(predicted);
-    // Constant velocity: the sway of the drive is a few centimetres.
-    EXPECT_LT(distanceBetween(predicted.T_origin_camera, trueSinceStart(6)), 0.1);
-    EXPECT_GT(predicted.pose_covariance.trace(), 2.0 * before.pose_covariance.trace());
-    EXPECT_GT(predicted.motion_covariance.trace(), 2.0 * before.motion_covariance.trace());
-
-    const OdometryResult after = odometry.update(pairOf(7));
-    EXPECT_EQ(after.state, TrackingState::kTracking) << after.reason;
-    EXPECT_EQ(after.epoch, before.epoch);
-    EXPECT_LT(distanceBetween(after.T_origin_camera, trueSinceStart(7)), 0.01) << "the prediction's error stayed";
-    EXPECT_GE(after.pose_covariance.trace(), before.pose_covariance.trace());
-    EXPECT_EQ(odometry.update(pairOf(8)).state, TrackingState::kTracking);
+  for (const std::string failed : {"b", "s"}) {
+    Drive drive;
+    ASSERT_EQ(drive("gggggg"), "TTTTTT");
+    const OdometryResult before = drive.last;
+    ASSERT_EQ(drive(failed), "D");
+    drive.expectTruth(0.1);  // at constant velocity: the sway of the drive is a few centimetres
+    EXPECT_GT(drive.last.pose_covariance.trace(), 2.0 * before.pose_covariance.trace());
+    EXPECT_GT(drive.last.motion_covariance.trace(), 2.0 * before.motion_covariance.trace());
+    ASSERT_EQ(drive("g"), "T") << drive.last.reason;
+    drive.expectTruth(0.01);  // the prediction's error does not stay
+    EXPECT_EQ(drive("g"), "T");
   }
 }
 
 TEST(VisualOdometry, APredictionContainsTheMotionOfAPairWhoseStampIsThatOfABurst) {
   VisualOdometry odometry({});
-  const OdometryResult before = follow(odometry, 5);
+  follow(odometry, 5);
   StereoFeatures burst = blindPair(6);
-  burst.stamp = pairOf(5).stamp + 1000000;  // ns
+  burst.stamp = stampOf(5) + 1000000;  // ns
   const OdometryResult predicted = odometry.update(burst);
   ASSERT_TRUE(predicted.has_motion) << predicted.reason;
-  const Eigen::Isometry3d moved = trueSinceStart(5).inverse() * trueSinceStart(6);
-  const Vector6d error = logSE3(predicted.T_previous_current.inverse() * moved);
-  EXPECT_GT(error.norm(), 0.5 * kStep) << "a millisecond's way is predicted";
-  EXPECT_LT(mahalanobisSquare(error, predicted.motion_covariance), 25.0);
+  const Eigen::Isometry3d moved = trueSinceStart(6, 5);
+  EXPECT_GT(logSE3(predicted.T_previous_current.inverse() * moved).norm(), 0.5 * kStep)
+      << "a millisecond's way is predicted";
+  EXPECT_LT(motionError(predicted, moved), 25.0);
 }
 
 TEST(VisualOdometry, OneBadStampCostsOnePair) {
   VisualOdometryOptions options;
   options.tracking.max_speed = 10.0;
   VisualOdometry odometry(options);
-  for (int i = 0; i < 6; ++i) ASSERT_EQ(odometry.update(pairOf(i)).state, TrackingState::kTracking);
+  ASSERT_EQ(follow(odometry, 5).state, TrackingState::kTracking);
   StereoFeatures too_fast = pairOf(7);
   too_fast.stamp = stampOf(5) + kPeriod / 10;
   const OdometryResult refuted = odometry.update(too_fast);
   EXPECT_EQ(refuted.state, TrackingState::kDegraded);
-  EXPECT_NE(refuted.reason.find("max_speed"), std::string::npos) << refuted.reason;
+  EXPECT_TRUE(contains(refuted.reason, "max_speed")) << refuted.reason;
   const OdometryResult next = odometry.update(pairOf(8));
   EXPECT_EQ(next.state, TrackingState::kTracking) << next.reason;
   EXPECT_EQ(next.epoch, 0);
@@ -285,79 +388,51 @@ TEST(VisualOdometry, ARightCameraThatTurnsUnderWayIsWatched) {
     for (int i = 0; i < 6; ++i) ASSERT_EQ(odometry.update(pairOf(i)).state, TrackingState::kTracking);
     const OdometryResult result = odometry.update(pairWithRightTurnedBy(much ? 8e-3 : 0.5e-3, 6));
     EXPECT_EQ(result.state, much ? TrackingState::kDegraded : TrackingState::kTracking) << result.reason;
-    EXPECT_EQ(result.reason.find("the right camera") != std::string::npos, much) << result.reason;
+    EXPECT_EQ(contains(result.reason, "the right camera"), much) << result.reason;
     for (int i = 7; i < 15; ++i) odometry.update(pairOf(i));
     EXPECT_EQ(odometry.update(pairOf(15)).state, TrackingState::kTracking);
   }
 }
 
 TEST(VisualOdometry, IsLostAfterTheSecondFailureAndStartsAgainFromTheLastPose) {
-  VisualOdometry odometry({});
-  const OdometryResult before = follow(odometry, 5);
-  const OdometryResult predicted = odometry.update(blindPair(6));
-  for (int i = 7; i <= 9; ++i) {
-    const OdometryResult lost = odometry.update(blindPair(i));
-    EXPECT_EQ(lost.state, TrackingState::kLost) << i;
-    EXPECT_FALSE(lost.has_pose) << i;
-    EXPECT_FALSE(lost.has_motion) << i;
-    EXPECT_FALSE(lost.reason.empty()) << i;
-    expectHealthy(lost);
-  }
-  // The map is kept until another one has a measured pair.
-  EXPECT_EQ(odometry.update(pairElsewhere(10)).state, TrackingState::kLost);
-  const OdometryResult again = odometry.update(pairElsewhere(11));
-  EXPECT_TRUE(again.has_pose);
-  EXPECT_EQ(again.state, TrackingState::kDegraded);
-  EXPECT_NE(again.reason.find("started again from the last pose"), std::string::npos) << again.reason;
-  EXPECT_EQ(again.epoch, before.epoch + 1);
-  EXPECT_FALSE(again.has_motion) << "it would begin at a pose that was not published";
+  Drive drive;
+  ASSERT_EQ(drive("gggggg b"), "TTTTTT D");
+  const OdometryResult predicted = drive.last;
+  ASSERT_EQ(drive("bbb ee"), "LLL LD") << "the map is kept until another one has a measured pair";
+  const OdometryResult again = drive.last;
+  EXPECT_TRUE(contains(again.reason, "started again from the last pose")) << again.reason;
+  EXPECT_EQ(again.epoch, 1);
   const Eigen::Isometry3d begun = again.T_origin_camera * trueSinceStart(11, 10).inverse();
   EXPECT_LT(distanceBetween(begun, predicted.T_origin_camera), 1e-3) << "not the last published pose";
   EXPECT_GT(again.pose_covariance.trace(), predicted.pose_covariance.trace());
-  EXPECT_GE(again.distance, predicted.distance);
-  expectHealthy(again);
-
   for (int i = 12; i <= 15; ++i) {
-    const OdometryResult result = odometry.update(pairElsewhere(i));
-    EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
-    EXPECT_EQ(result.epoch, before.epoch + 1);
-    EXPECT_LT(distanceBetween(result.T_origin_camera, begun * trueSinceStart(i, 10)), 1e-3);
-    EXPECT_GE(result.pose_covariance.trace(), again.pose_covariance.trace());
+    EXPECT_EQ(drive("e"), "T") << drive.last.reason;
+    EXPECT_EQ(drive.last.epoch, 1);
+    EXPECT_LT(distanceBetween(drive.last.T_origin_camera, begun * trueSinceStart(i, 10)), 1e-3);
+    EXPECT_GE(drive.last.pose_covariance.trace(), again.pose_covariance.trace());
   }
 }
 
-/// The pairs 6 to 8 are of another street; a guess is too long by 5 %.
-TEST(VisualOdometry, AfterAnOutageTheMapIsFoundAgainWithAndWithoutAGuess) {
-  for (const bool is_guessed : {false, true}) {
-    VisualOdometry odometry({});
-    const int epoch = follow(odometry, 5).epoch;
-    OdometryResult result;
-    for (int i = 6; i <= 10; ++i) {
-      Vector6d motion = logSE3(trueSinceStart(i, i - 1));
-      motion.head<3>() *= 1.05;
-      const auto guess = is_guessed ? std::optional(MotionGuess{expSE3(motion)}) : std::nullopt;
-      result = odometry.update(i <= 8 ? strangePair(i) : pairOf(i), guess);
-      expectCovariance(result.pose_covariance);
-      EXPECT_EQ(result.has_pose, is_guessed || i == 6 || i > 8) << i << ": " << result.reason;
-    }
-    EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
-    EXPECT_EQ(result.epoch, epoch);
-    EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(10)), 0.02);
-  }
+/// A guess that is too long by 5 % bridges them.
+TEST(VisualOdometry, AGuessHasAPoseForEachPairOfAnOutage) {
+  Drive drive;
+  drive("gggggg");
+  drive.guess = [](int i) {
+    Vector6d motion = logSE3(trueSinceStart(i, i - 1));
+    motion.head<3>() *= 1.05;
+    return MotionGuess{expSE3(motion)};
+  };
+  EXPECT_EQ(drive("sss gg"), "DDD TT");
+  drive.expectTruth(0.02);
 }
 
 /// Of the street where the guess led no map was made: it begins there, and no pose is missing on the way.
 TEST(VisualOdometry, GoesOnInAnotherMapWhereTheGuessHasTheCamera) {
-  VisualOdometry odometry({});
-  const int epoch = follow(odometry, 5).epoch;
-  OdometryResult result;
-  for (int i = 6; i <= 12; ++i) {
-    result = odometry.update(pairElsewhere(i), MotionGuess{trueSinceStart(i, i - 1)});
-    EXPECT_TRUE(result.has_pose) << i << ": " << result.reason;
-  }
-  EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
-  EXPECT_EQ(result.epoch, epoch);
-  EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(12)), 0.02);
+  Drive drive;
+  drive("gggggg");
+  drive.guess = [](int i) { return MotionGuess{trueSinceStart(i, i - 1)}; };
+  EXPECT_EQ(drive("eeeeeee"), "DDTTTTT");
+  drive.expectTruth(0.02);
 }
 
 /// A camera that stood for some pairs, and knows it, then turns by 25 degrees at once; a texture that repeats itself
@@ -415,48 +490,21 @@ TEST_F(GuessedTurn, AWrongGuessDoesNoHarm) {
   }
 }
 
-TEST(VisualOdometry, DoubtsAfterALossWhatNoCameraWithTheVelocityBeforeDoes) {
-  // Something that is fixed to the camera comes to cover the whole view.
-  VisualOdometry odometry({});
-  follow(odometry, 5);
-  OdometryResult result;
-  for (int i = 6; i <= 10; ++i) {
-    StereoFeatures covered = strangePair(0);
-    covered.stamp = stampOf(i);
-    for (float& u : covered.u) u += 0.01f * static_cast<float>(i);  // noise: no image is that of the pair before
-    result = odometry.update(covered);
-    ASSERT_NE(result.state, TrackingState::kTracking) << i;
-    if (!result.has_motion) continue;
-    const Vector6d error = logSE3(result.T_previous_current.inverse() * drivePose(i - 1).inverse() * drivePose(i));
-    EXPECT_LT(mahalanobisSquare(error, result.motion_covariance), 20.0) << i;
-  }
-  EXPECT_TRUE(result.has_motion);
-  EXPECT_NE(result.reason.find("the prior"), std::string::npos) << result.reason;
-}
-
+/// What comes to cover the view seems to stand. No camera with the velocity before does: 8 m/s could be gone in a
+/// pair or two, but hardly ever are.
 TEST(VisualOdometry, DoesNotTrustAStandstillRightAfterALossOnTheWay) {
-  // The same, and 8 m/s could be gone in a pair or two, but hardly ever are.
-  VisualOdometry odometry({});
-  follow(odometry, 5);
+  Drive drive;
+  drive("gggggg");
   for (int i = 6; i <= 15; ++i) {
-    StereoFeatures covered = strangePair(0);
-    covered.stamp = stampOf(i);
-    for (float& u : covered.u) u += 0.01f * static_cast<float>(i);
-    const OdometryResult result = odometry.update(covered);
-    EXPECT_NE(result.state, TrackingState::kTracking) << i;
-    if (!result.has_motion) continue;
-    const Vector6d error = logSE3(result.T_previous_current.inverse() * drivePose(i - 1).inverse() * drivePose(i));
-    EXPECT_LT(mahalanobisSquare(error, result.motion_covariance), 20.0) << i;
+    EXPECT_NE(drive("c"), "T") << i;
+    if (drive.last.has_motion) {
+      EXPECT_LT(motionError(drive.last, trueSinceStart(i, i - 1)), 20.0) << i;
+    }
+    if (i == 10) {
+      EXPECT_TRUE(drive.last.has_motion && contains(drive.last.reason, "the prior")) << drive.last.reason;
+    }
   }
-  // It does not last for ever: it may have stopped after all.
-  OdometryResult result;
-  for (int i = 16; i <= 40; ++i) {
-    StereoFeatures still = strangePair(0);
-    still.stamp = stampOf(i);
-    for (float& u : still.u) u += 0.01f * static_cast<float>(i);
-    result = odometry.update(still);
-  }
-  EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
+  EXPECT_EQ(drive(std::string(25, 'c')).back(), 'T') << "it may have stopped after all: " << drive.last.reason;
 }
 
 TEST(VisualOdometry, DoubtsTheNextMapWhereManyMatchesAgreedOnNoMotion) {
@@ -472,8 +520,7 @@ TEST(VisualOdometry, DoubtsTheNextMapWhereManyMatchesAgreedOnNoMotion) {
     lost += result.state == TrackingState::kLost;
     degraded += result.state == TrackingState::kDegraded;
     if (!result.has_motion) continue;
-    const Vector6d error = logSE3(result.T_previous_current.inverse() * drivePose(i - 1).inverse() * drivePose(i));
-    EXPECT_LT(mahalanobisSquare(error, result.motion_covariance), 20.0) << i;
+    EXPECT_LT(motionError(result, trueSinceStart(i, i - 1)), 20.0) << i;
   }
   EXPECT_GE(lost, 1);
   EXPECT_GE(degraded, 3) << "a map of the wrong depths explains one another's pairs";
@@ -495,63 +542,33 @@ TEST(VisualOdometry, DoesNotDoubtForLongWhatComesAfterAGap) {
   EXPECT_EQ(odometry.update(afterGap(11)).state, TrackingState::kTracking);
 }
 
-TEST(VisualOdometry, IsLostAtOnceWhenThereIsNoMotionToPredict) {
-  VisualOdometry odometry({});
-  odometry.update(pairOf(0));
-  const OdometryResult second = odometry.update(blindPair(1));
-  EXPECT_EQ(second.state, TrackingState::kLost);
-  EXPECT_FALSE(second.has_pose);
-}
-
 TEST(VisualOdometry, DoesNotPredictOverALongGap) {
   VisualOdometryOptions options;
   options.tracking.max_gap = 0.5;
-  VisualOdometry odometry(options);
-  follow(odometry, 5);
-  EXPECT_EQ(odometry.update(blindPair(20)).state, TrackingState::kLost);
+  EXPECT_EQ(Drive(options)("gggggg .... b"), "TTTTTT .... D");
+  EXPECT_EQ(Drive(options)("gggggg ..... b"), "TTTTTT ..... L");
 }
 
-TEST(VisualOdometry, PoseIsContinuousWithinAnEpoch) {
-  VisualOdometry odometry({});
-  std::optional<OdometryResult> previous;
-  double measured = 0.0;  // trace of the last measured pose's covariance
-  for (int i = 0, before = 0; i <= 24; ++i) {
-    const bool blind = i == 8 || i == 15 || i == 16 || i == 17;
-    const OdometryResult result = odometry.update(blind ? blindPair(i) : pairOf(i));
-    if (!result.has_pose) continue;
-    if (previous && result.has_motion) {
-      EXPECT_TRUE((previous->T_origin_camera * result.T_previous_current).isApprox(result.T_origin_camera, 1e-9)) << i;
-    }
-    if (previous) {
-      EXPECT_LT(distanceBetween(previous->T_origin_camera, result.T_origin_camera), 2.0 * kStep * (i - before)) << i;
-      EXPECT_GE(result.pose_covariance.trace(), (1.0 - 1e-9) * measured) << i << ", but for rounding";
-      EXPECT_GE(result.distance, previous->distance);
-    }
-    previous = result, before = i;
-    if (!blind) measured = result.pose_covariance.trace();
-  }
-}
-
-TEST(VisualOdometry, RefusesStampsThatDoNotIncreaseAndGoesOn) {
+TEST(VisualOdometry, RefusesBrokenPairsAndGoesOn) {
   VisualOdometry disturbed({}), undisturbed({});
   follow(disturbed, 5);
   follow(undisturbed, 5);
-  EXPECT_THROW(disturbed.update(pairOf(5)), std::invalid_argument);
-  EXPECT_THROW(disturbed.update(pairOf(2)), std::invalid_argument);
-  StereoFeatures broken = pairOf(6);
-  broken.disparity[0] = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_THROW(disturbed.update(broken), std::invalid_argument);
-  broken = pairOf(6);
-  broken.v.pop_back();
-  EXPECT_THROW(disturbed.update(broken), std::invalid_argument);
-  broken = pairOf(8);
-  broken.descriptors.convertTo(broken.descriptors, CV_32F);
-  EXPECT_THROW(disturbed.update(broken), std::invalid_argument);
-  broken = pairOf(8);
-  broken.element_type = ElementType::kFloat32;
-  broken.descriptors = broken.descriptors.colRange(0, 126).clone();
-  EXPECT_THROW(disturbed.update(broken), std::invalid_argument);
-
+  const Refusals<StereoFeatures> refusals = {
+      {[](StereoFeatures& f) { f.stamp = stampOf(5); }, "stamp"},
+      {[](StereoFeatures& f) { f.stamp = stampOf(2); }, "stamp"},
+      {[](StereoFeatures& f) { f.disparity[0] = std::numeric_limits<float>::quiet_NaN(); }, "disparity"},
+      {[](StereoFeatures& f) { f.v.pop_back(); }, "array v"},
+      {[](StereoFeatures& f) { f.descriptors.convertTo(f.descriptors, CV_32F); }, "descriptors"},
+      {[](StereoFeatures& f) {
+         f.element_type = ElementType::kFloat32;
+         f.descriptors = f.descriptors.colRange(0, 126).clone();
+       },
+       "126 bytes"}};
+  for (const auto& [damage, words] : refusals) {
+    StereoFeatures broken = pairOf(6);
+    damage(broken);
+    expectError([&, pair = broken] { disturbed.update(pair); }, {words});
+  }
   const OdometryResult a = disturbed.update(pairOf(6)), b = undisturbed.update(pairOf(6));
   EXPECT_EQ(a.state, b.state);
   EXPECT_EQ(a.epoch, b.epoch);
@@ -601,24 +618,39 @@ TEST(VisualOdometry, GoesOnWithALensThatFocuses) {
   }
 }
 
-TEST(VisualOdometry, StartsAgainFromTheLastPoseWithAnotherCamera) {
-  VisualOdometry odometry({});
-  const OdometryResult before = follow(odometry, 5);
+/// Of another camera, descriptor, or the same bytes to be read as numbers, which neither name nor width tells.
+TEST(VisualOdometry, StartsAgainFromTheLastPoseWithOtherFeatures) {
   StereoCamera other = synthetic::camera();
   other.baseline = 0.3;
   other.fx = 380.0;
-  const auto otherPair = [&](int i) { return synthetic::observe(street(), other, drivePose(i).inverse(), stampOf(i)); };
-  const OdometryResult again = odometry.update(otherPair(6));
-  EXPECT_TRUE(again.has_pose);
-  EXPECT_FALSE(again.has_motion);
-  EXPECT_EQ(again.epoch, before.epoch + 1);
-  EXPECT_TRUE(again.T_origin_camera.isApprox(before.T_origin_camera, 1e-9));
-  EXPECT_GT(again.pose_covariance.trace(), before.pose_covariance.trace());
-  EXPECT_TRUE(std::isfinite(before.disparity_offset) && std::isfinite(before.right_rotation.norm()));
-  EXPECT_TRUE(std::isnan(again.disparity_offset_sigma)) << "what was learnt was of the other rig";
-  const OdometryResult next = odometry.update(otherPair(7));
-  EXPECT_EQ(next.state, TrackingState::kTracking) << next.reason;
-  EXPECT_LT(distanceBetween(next.T_origin_camera, again.T_origin_camera * trueSinceStart(7, 6)), 1e-3);
+  const std::vector<std::function<StereoFeatures(int)>> others = {
+      [&](int i) { return synthetic::observe(street(), other, drivePose(i).inverse(), stampOf(i)); },
+      [](int i) {
+        StereoFeatures features = pairOf(i);
+        features.layout = DescriptorLayout::kLeft;
+        features.descriptors = features.descriptors.colRange(0, 64).clone();
+        return features;
+      },
+      [](int i) {
+        StereoFeatures features = pairOf(i);
+        features.element_type = ElementType::kUint8;
+        return features;
+      }};
+  for (const auto& otherPair : others) {
+    VisualOdometry odometry({});
+    const OdometryResult before = follow(odometry, 5), again = odometry.update(otherPair(6));
+    EXPECT_TRUE(again.has_pose);
+    EXPECT_FALSE(again.has_motion);
+    EXPECT_EQ(again.epoch, before.epoch + 1);
+    EXPECT_TRUE(again.T_origin_camera.isApprox(before.T_origin_camera, 1e-9));
+    EXPECT_GT(again.pose_covariance.trace(), before.pose_covariance.trace());
+    EXPECT_TRUE(std::isfinite(before.disparity_offset) && std::isfinite(before.right_rotation.norm()));
+    EXPECT_EQ(std::isnan(again.disparity_offset_sigma), otherPair(6).camera == other)
+        << "what was learnt was of another rig";
+    const OdometryResult next = odometry.update(otherPair(7));
+    EXPECT_EQ(next.state, TrackingState::kTracking) << next.reason;
+    EXPECT_LT(distanceBetween(next.T_origin_camera, again.T_origin_camera * trueSinceStart(7, 6)), 1e-3);
+  }
 }
 
 TEST(VisualOdometry, AnotherCameraOfTheRobotGoesOnFromTheBasesPose) {
@@ -644,85 +676,41 @@ TEST(VisualOdometry, AnotherCameraOfTheRobotGoesOnFromTheBasesPose) {
   }
 }
 
-TEST(VisualOdometry, StartsAgainFromTheLastPoseWithAnotherDescriptor) {
-  VisualOdometry odometry({});
-  const OdometryResult before = follow(odometry, 5);
-  const auto leftPair = [&](int i) {
-    StereoFeatures features = pairOf(i);
-    features.layout = DescriptorLayout::kLeft;
-    features.descriptors = features.descriptors.colRange(0, 64).clone();
-    return features;
-  };
-  OdometryResult again;
-  ASSERT_NO_THROW(again = odometry.update(leftPair(6)));
-  EXPECT_EQ(again.epoch, before.epoch + 1);
-  EXPECT_TRUE(again.T_origin_camera.isApprox(before.T_origin_camera, 1e-9));
-  EXPECT_EQ(odometry.update(leftPair(7)).state, TrackingState::kTracking);
-}
-
-TEST(VisualOdometry, StartsAgainFromTheLastPoseWithOtherElements) {
-  // The same bytes to be read as numbers: neither the name nor the width of the rows tells the difference.
-  VisualOdometry odometry({});
-  const OdometryResult before = follow(odometry, 5);
-  const auto pairOfNumbers = [&](int i) {
-    StereoFeatures features = pairOf(i);
-    features.element_type = ElementType::kUint8;
-    return features;
-  };
-  OdometryResult again;
-  ASSERT_NO_THROW(again = odometry.update(pairOfNumbers(6)));
-  EXPECT_EQ(again.epoch, before.epoch + 1);
-  EXPECT_TRUE(again.T_origin_camera.isApprox(before.T_origin_camera, 1e-9));
-  EXPECT_EQ(odometry.update(pairOfNumbers(7)).state, TrackingState::kTracking);
+/// Along the street at 0.4 m/s, which the prior lets it stop within a pair, after `standing` pairs.
+Eigen::Isometry3d slowPose(int i, int standing = 0) {
+  return Eigen::Isometry3d(Eigen::Translation3d(0.04 * std::max(i - standing, 0), 0.0, 0.0));
 }
 
 TEST(VisualOdometry, ImagesWithNoiseThatRepeatAreFrozenHoweverSlowTheCameraIs) {
   for (const double noise : {0.1, 0.0}) {
     VisualOdometry odometry({});
-    const auto slowAt = [&](int i) {  // stands for six pairs, then goes at 0.4 m/s, which it could stop at once
-      synthetic::Sighting sighting;
-      sighting.noise = noise;
-      sighting.max_depth = 25.0;
-      sighting.seed = noise > 0.0 ? 50 + static_cast<unsigned>(i) : 50;
-      const Eigen::Isometry3d pose = expSE3((Vector6d() << 0.04 * std::max(i - 6, 0), 0, 0, 0, 0, 0).finished());
-      return synthetic::observe(street(), synthetic::camera(), pose.inverse(), stampOf(i), sighting);
+    const auto slowPair = [&](int i) {
+      return pairAt(slowPose(i, 6), i, street(), noise, noise > 0.0 ? 50 + static_cast<unsigned>(i) : 50);
     };
     OdometryResult result;
-    for (int i = 0; i <= 12; ++i) result = odometry.update(slowAt(i));
+    for (int i = 0; i <= 12; ++i) result = odometry.update(slowPair(i));
     ASSERT_EQ(result.state, TrackingState::kTracking) << result.reason;
-    StereoFeatures repeated = slowAt(12);
-    repeated.stamp = stampOf(13);
-    result = odometry.update(repeated);
-    EXPECT_EQ(result.reason.find("is the driver frozen?") != std::string::npos, noise > 0.0) << result.reason;
+    result = odometry.update(stampedAs(13, slowPair(12)));
+    EXPECT_EQ(contains(result.reason, "is the driver frozen?"), noise > 0.0) << result.reason;
   }
 }
 
 TEST(VisualOdometry, AStopAtOnceIsDoubtfulForAPairAndBelievedAfterIt) {
-  // At 0.4 m/s, which the prior lets it stop within a pair: the images may as well be those of a frozen driver.
-  const auto slowAt = [](int i, int at) {
-    synthetic::Sighting sighting;
-    sighting.noise = 0.0;
-    sighting.max_depth = 25.0;
-    const Eigen::Isometry3d pose = expSE3((Vector6d() << 0.04 * i, 0, 0, 0, 0, 0).finished());
-    return synthetic::observe(street(), synthetic::camera(), pose.inverse(), stampOf(at), sighting);
-  };
   VisualOdometry odometry({});
-  OdometryResult moving;
-  for (int i = 0; i <= 8; ++i) moving = odometry.update(slowAt(i, i));
+  OdometryResult moving, standing, again;
+  for (int i = 0; i <= 8; ++i) moving = odometry.update(pairAt(slowPose(i), i, street()));
   ASSERT_EQ(moving.state, TrackingState::kTracking) << moving.reason;
-  const OdometryResult first = odometry.update(slowAt(8, 9));
+  const OdometryResult first = odometry.update(pairAt(slowPose(8), 9, street()));
   EXPECT_EQ(first.state, TrackingState::kDegraded);
-  EXPECT_NE(first.reason.find("images as of the previous pair"), std::string::npos) << first.reason;
+  EXPECT_TRUE(contains(first.reason, "images as of the previous pair")) << "of a frozen driver: " << first.reason;
   const Vector6d gone_on = logSE3(moving.T_previous_current);
   EXPECT_LT(mahalanobisSquare(gone_on, first.motion_covariance), 20.0) << "it may have gone on";
-  OdometryResult standing;
-  for (int i = 10; i <= 14; ++i) standing = odometry.update(slowAt(8, i));
+  for (int i = 10; i <= 14; ++i) standing = odometry.update(pairAt(slowPose(8), i, street()));
   EXPECT_EQ(standing.state, TrackingState::kTracking) << standing.reason;
   // The map shows that it has not gone on.
-  OdometryResult again;
-  for (int i = 9; i <= 12; ++i) again = odometry.update(slowAt(i, i + 6));
+  for (int i = 9; i <= 12; ++i) again = odometry.update(pairAt(slowPose(i), i + 6, street()));
   EXPECT_EQ(again.epoch, moving.epoch);
-  EXPECT_LT(std::sqrt(again.pose_covariance.topLeftCorner<3, 3>().trace()), 0.02);
+  EXPECT_LT(positionSigma(again), 0.02);
 }
 
 TEST(VisualOdometry, APairThatComesTwiceIsMeasuredOnce) {
@@ -736,21 +724,19 @@ TEST(VisualOdometry, APairThatComesTwiceIsMeasuredOnce) {
     if (i < 12) continue;
     EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
     EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(i)), 0.05);
-    EXPECT_NE(again.reason.find("each pair comes twice"), std::string::npos) << again.reason;
+    EXPECT_TRUE(contains(again.reason, "each pair comes twice")) << again.reason;
     EXPECT_TRUE(again.T_origin_camera.isApprox(result.T_origin_camera, 1e-9));
   }
 }
 
 TEST(VisualOdometry, BrokenStreamStartsAgainFromTheLastPose) {
-  VisualOdometry odometry({});
-  const OdometryResult before = follow(odometry, 5);
-  odometry.breakStream();
-  EXPECT_EQ(odometry.update(pairElsewhere(9)).state, TrackingState::kLost);
-  const OdometryResult again = odometry.update(pairElsewhere(10));
-  EXPECT_EQ(again.epoch, before.epoch + 1);
-  EXPECT_FALSE(again.has_motion);
-  EXPECT_LT(distanceBetween(again.T_origin_camera, before.T_origin_camera * trueSinceStart(10, 9)), 1e-3);
-  EXPECT_EQ(odometry.update(pairElsewhere(11)).state, TrackingState::kTracking);
+  Drive drive;
+  ASSERT_EQ(drive("gggggg"), "TTTTTT");
+  const OdometryResult before = drive.last;
+  EXPECT_EQ(drive("...|ee"), "...|LD");
+  EXPECT_EQ(drive.last.epoch, 1);
+  EXPECT_LT(distanceBetween(drive.last.T_origin_camera, before.T_origin_camera * trueSinceStart(10, 9)), 1e-3);
+  EXPECT_EQ(drive("e"), "T");
 }
 
 TEST(VisualOdometry, GoesOnFromTheLastPoseWhenTheClockIsSetBack) {
@@ -776,11 +762,9 @@ TEST(VisualOdometry, RefusesMotionsThatNoRobotMakes) {
   options.tracking.max_speed = 12.0;  // the drive goes at 8 m/s
   VisualOdometry odometry(options);
   follow(odometry, 4);
-  StereoFeatures leap = pairOf(7);  // three steps in one period: 24 m/s
-  leap.stamp = stampOf(5);
-  const OdometryResult result = odometry.update(leap);
+  const OdometryResult result = odometry.update(stampedAs(5, pairOf(7)));  // three steps in one period: 24 m/s
   EXPECT_NE(result.state, TrackingState::kTracking);
-  EXPECT_NE(result.reason.find("max_speed"), std::string::npos) << result.reason;
+  EXPECT_TRUE(contains(result.reason, "max_speed")) << result.reason;
 }
 
 TEST(VisualOdometry, IsDeterministic) {
@@ -798,16 +782,11 @@ TEST(VisualOdometry, VelocityAfterAPredictedPairIsTheTrueOne) {
   // motion, so a pair predicted right after it must stand still too.
   VisualOdometry odometry({});
   follow(odometry, 5);
-  const auto standing = [](int stamp_index) {
-    StereoFeatures features = pairOf(5);
-    features.stamp = stampOf(stamp_index);
-    return features;
-  };
   odometry.update(blindPair(6));
-  const OdometryResult seen = odometry.update(standing(7));
+  const OdometryResult seen = odometry.update(stampedAs(7, pairOf(5)));
   // From 8 m/s: more than a robot's brakes can do.
   EXPECT_EQ(seen.state, TrackingState::kDegraded);
-  EXPECT_NE(seen.reason.find("the prior"), std::string::npos) << seen.reason;
+  EXPECT_TRUE(contains(seen.reason, "the prior")) << seen.reason;
   ASSERT_LT(distanceBetween(seen.T_origin_camera, trueSinceStart(5)), 0.01);
   const OdometryResult predicted = odometry.update(blindPair(8));
   ASSERT_EQ(predicted.state, TrackingState::kDegraded);
@@ -817,19 +796,11 @@ TEST(VisualOdometry, VelocityAfterAPredictedPairIsTheTrueOne) {
 TEST(VisualOdometry, MeasuresASuddenTurnAgainstThePredictedOne) {
   // A robot turns on the spot and all at once turns back: everything is 160 px away from where it was expected.
   const synthetic::World around = synthetic::randomWorld(3, 5000, {-25.0, -4.0, -25.0}, {25.0, 4.0, 25.0});
-  const auto turnedPair = [&](int i) {
-    const double yaw = 0.2 * (i <= 5 ? i : 10 - i);
-    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    pose.linear() = expSO3({0.0, yaw, 0.0});
-    synthetic::Sighting sighting;
-    sighting.max_depth = 25.0;
-    sighting.seed = 50 + static_cast<unsigned>(i);
-    return std::make_pair(pose, synthetic::observe(around, synthetic::camera(), pose.inverse(), stampOf(i), sighting));
-  };
   VisualOdometry odometry({});
   for (int i = 0; i <= 8; ++i) {
-    const auto [truth, features] = turnedPair(i);
-    const OdometryResult result = odometry.update(features);
+    const double yaw = 0.2 * (i <= 5 ? i : 10 - i);
+    const Eigen::Isometry3d truth(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()));
+    const OdometryResult result = odometry.update(pairAt(truth, i, around, 0.0, 50 + static_cast<unsigned>(i)));
     ASSERT_EQ(result.state, TrackingState::kTracking) << i << ": " << result.reason;
     EXPECT_LT(angleBetween(result.T_origin_camera, truth), 1e-3) << i;
   }
@@ -840,37 +811,14 @@ TEST(VisualOdometry, RefusesRotationsThatNoRobotMakes) {
   options.tracking.max_rotation_rate = 1.0;
   options.tracking.acceleration = 1000.0;  // it stops at once
   VisualOdometry odometry(options);
-  const auto pairTurnedBy = [&](double yaw, int i) {
-    Eigen::Isometry3d pose = drivePose(4);
-    pose.linear() = pose.linear() * expSO3({0.0, yaw, 0.0});
-    synthetic::Sighting sighting;
-    sighting.max_depth = 25.0;
-    return synthetic::observe(street(), synthetic::camera(), pose.inverse(), stampOf(i), sighting);
+  const auto pairTurnedBy = [](double yaw, int i) {
+    return pairAt(drivePose(4) * Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()), i, street());
   };
   follow(odometry, 4);
   EXPECT_EQ(odometry.update(pairTurnedBy(0.08, 5)).state, TrackingState::kTracking);
   const OdometryResult result = odometry.update(pairTurnedBy(0.28, 6));
   EXPECT_NE(result.state, TrackingState::kTracking);
-  EXPECT_NE(result.reason.find("max_rotation_rate"), std::string::npos) << result.reason;
-}
-
-TEST(VisualOdometry, AVelocityIsOfNoUseAfterABreak) {
-  VisualOdometry odometry({});
-  follow(odometry, 5);
-  odometry.breakStream();
-  odometry.update(pairElsewhere(6));
-  // Nothing was measured since, so there is nothing to predict from.
-  EXPECT_EQ(odometry.update(blindPair(7)).state, TrackingState::kLost);
-}
-
-TEST(VisualOdometry, MayPredictAgainOnceItHasMeasured) {
-  VisualOdometry odometry({});
-  follow(odometry, 5);
-  for (int i = 6; i <= 13; ++i) {
-    const OdometryResult result = odometry.update(i % 2 == 0 ? blindPair(i) : pairOf(i));
-    EXPECT_EQ(result.state, i % 2 == 0 ? TrackingState::kDegraded : TrackingState::kTracking) << i;
-    EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(i)), 0.1) << i;
-  }
+  EXPECT_TRUE(contains(result.reason, "max_rotation_rate")) << result.reason;
 }
 
 TEST(VisualOdometry, APredictedPairIsAsUncertainAsAVehicleMayAccelerate) {
@@ -916,7 +864,7 @@ TEST(VisualOdometry, StampsThatMisleadThePriorDoNotMisleadThePose) {
     ASSERT_TRUE(result.has_pose) << i << ": " << result.reason;
     EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(i)), 0.05) << i;
     // A speed of 0.8 m in 10 ms is not believed, the way itself is.
-    EXPECT_LT(std::sqrt(result.pose_covariance.topLeftCorner<3, 3>().trace()), 0.2) << i;
+    EXPECT_LT(positionSigma(result), 0.2) << i;
     if (result.state != TrackingState::kDegraded) continue;
     ++degraded;
     EXPECT_GT(std::sqrt(result.motion_covariance(2, 2)), 0.3) << i << ": " << result.reason;
@@ -925,18 +873,14 @@ TEST(VisualOdometry, StampsThatMisleadThePriorDoNotMisleadThePose) {
 }
 
 TEST(VisualOdometry, WhatIsPredictedFromADoubtfulMotionIsDoubtful) {
-  VisualOdometry odometry({});
+  VisualOdometry odometry({}), sound({});
   follow(odometry, 5);
+  follow(sound, 5);
   const OdometryResult doubtful = odometry.update(pairStamped(6, -90000000));
   ASSERT_EQ(doubtful.state, TrackingState::kDegraded) << doubtful.reason;
-  StereoFeatures blind = blindPair(7);
-  blind.stamp = stampOf(6);
-  const OdometryResult predicted = odometry.update(blind);
+  const OdometryResult predicted = odometry.update(blindPair(6));
   ASSERT_EQ(predicted.state, TrackingState::kDegraded) << predicted.reason;
   EXPECT_GT(std::sqrt(predicted.motion_covariance(2, 2)), 0.3);
-
-  VisualOdometry sound({});
-  follow(sound, 5);
   EXPECT_LT(std::sqrt(sound.update(blindPair(6)).motion_covariance(2, 2)), 0.06)
       << "white acceleration, and the velocity's own";
 }
@@ -947,7 +891,7 @@ TEST(VisualOdometry, RotationsOfABurstAreMeasured) {
   for (int i = 0; i <= 20; ++i) {
     const OdometryResult result = odometry.update(pairStamped(i, i < 6 ? 0 : -(i % 3) * (kPeriod - 1000000)));
     ASSERT_TRUE(result.has_pose) << i << ": " << result.reason;
-    EXPECT_EQ(result.reason.find("max_rotation_rate"), std::string::npos) << result.reason;
+    EXPECT_FALSE(contains(result.reason, "max_rotation_rate")) << result.reason;
     EXPECT_LT(distanceBetween(result.T_origin_camera, trueSinceStart(i)), 0.05) << i;
   }
 }
@@ -958,22 +902,16 @@ TEST(VisualOdometry, AWayThatTheMapKnowsBadlyIsDoubted) {
   VisualOdometryOptions options;
   options.tracking.doubtful_deviation = 0.005;
   VisualOdometry odometry(options);
-  synthetic::Sighting sighting;
-  sighting.noise = 0.5;
-  sighting.max_depth = 150.0;
   OdometryResult result;
-  for (int i = 0; i <= 3; ++i) {
-    sighting.seed = 400 + static_cast<unsigned>(i);
-    result = odometry.update(
-        synthetic::observe(far, synthetic::camera(), Eigen::Isometry3d::Identity(), stampOf(i), sighting));
+  for (unsigned i = 0; i <= 4; ++i) {
+    if (i == 4) {
+      EXPECT_EQ(result.state, TrackingState::kDegraded);
+      EXPECT_TRUE(contains(result.reason, "doubtful_deviation")) << result.reason;
+      options.tracking.doubtful_deviation = 10.0;
+      odometry.configure(options);
+    }
+    result = odometry.update(pairAt(Eigen::Isometry3d::Identity(), static_cast<int>(i), far, 0.5, 400 + i, 150.0));
   }
-  EXPECT_EQ(result.state, TrackingState::kDegraded);
-  EXPECT_NE(result.reason.find("doubtful_deviation"), std::string::npos) << result.reason;
-  options.tracking.doubtful_deviation = 10.0;
-  odometry.configure(options);
-  sighting.seed = 404;
-  result = odometry.update(
-      synthetic::observe(far, synthetic::camera(), Eigen::Isometry3d::Identity(), stampOf(4), sighting));
   EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
 }
 
@@ -981,21 +919,16 @@ TEST(VisualOdometry, ImagesThatRepeatThemselvesWhileItMovesAreNoStandstill) {
   VisualOdometry odometry({});
   const OdometryResult before = follow(odometry, 8);
   for (int i = 9; i <= 14; ++i) {
-    StereoFeatures frozen = pairOf(8);
-    frozen.stamp = stampOf(i);
-    const OdometryResult result = odometry.update(frozen);
+    const OdometryResult result = odometry.update(stampedAs(i, pairOf(8)));
     EXPECT_EQ(result.state, TrackingState::kDegraded) << i;
-    EXPECT_NE(result.reason.find("frozen"), std::string::npos) << result.reason;
-    const Vector6d error = logSE3(result.T_origin_camera.inverse() * trueSinceStart(i));
-    EXPECT_LT(mahalanobisSquare(error, result.pose_covariance), 20.0) << i << ": it may have gone on";
+    EXPECT_TRUE(contains(result.reason, "frozen")) << result.reason;
+    EXPECT_LT(poseError(result, trueSinceStart(i)), 20.0) << i << ": it may have gone on";
   }
   // The map still shows where it went meanwhile.
   const OdometryResult again = odometry.update(pairOf(15));
   EXPECT_EQ(again.epoch, before.epoch);
-  const Vector6d error = logSE3(again.T_origin_camera.inverse() * trueSinceStart(15));
-  EXPECT_LT(mahalanobisSquare(error, again.pose_covariance), 20.0);
-  for (int i = 16; i <= 18; ++i) odometry.update(pairOf(i));
-  EXPECT_EQ(odometry.update(pairOf(19)).state, TrackingState::kTracking);
+  EXPECT_LT(poseError(again, trueSinceStart(15)), 20.0);
+  EXPECT_EQ(follow(odometry, 19, 16).state, TrackingState::kTracking);
 }
 
 TEST(VisualOdometry, ASimulatedCameraThatStopsDeadIsNotLost) {
@@ -1003,10 +936,9 @@ TEST(VisualOdometry, ASimulatedCameraThatStopsDeadIsNotLost) {
   const OdometryResult before = follow(odometry, 8);
   constexpr int kStops = 9, kMoves = kStops + 1000;
   double trace = before.pose_covariance.trace();
+  OdometryResult result;
   for (int i = kStops; i < kMoves; ++i) {
-    StereoFeatures still = pairOf(8);
-    still.stamp = stampOf(i);
-    const OdometryResult result = odometry.update(still);
+    result = odometry.update(stampedAs(i, pairOf(8)));
     ASSERT_EQ(result.state, TrackingState::kDegraded) << i;
     ASSERT_TRUE(result.T_origin_camera.isApprox(before.T_origin_camera, 1e-9)) << i;
     ASSERT_GT(result.pose_covariance.trace(), trace) << i;
@@ -1015,13 +947,10 @@ TEST(VisualOdometry, ASimulatedCameraThatStopsDeadIsNotLost) {
     trace = result.pose_covariance.trace();
   }
   // It moves on slowly.
-  OdometryResult result;
   for (int i = kMoves; i < kMoves + 6; ++i) {
-    synthetic::Sighting sighting;
-    sighting.max_depth = 25.0;
     Eigen::Isometry3d pose = drivePose(8);
     pose.translation() += 0.05 * (i - kMoves + 1) * pose.linear().col(2);
-    result = odometry.update(synthetic::observe(street(), synthetic::camera(), pose.inverse(), stampOf(i), sighting));
+    result = odometry.update(pairAt(pose, i, street()));
     EXPECT_EQ(result.epoch, before.epoch);
     EXPECT_LT(result.pose_covariance.trace(), 10.0 * before.pose_covariance.trace()) << "the map tells where it is";
     EXPECT_LT(distanceBetween(result.T_origin_camera, drivePose(0).inverse() * pose), 0.01) << i;
@@ -1029,72 +958,49 @@ TEST(VisualOdometry, ASimulatedCameraThatStopsDeadIsNotLost) {
   EXPECT_EQ(result.state, TrackingState::kTracking) << result.reason;
 }
 
-TEST(VisualOdometry, ImagesThatRepeatThemselvesWhileAGyroTurnsAreNoStandstill) {
-  // It stood when the driver froze; only the gyro says that it turns.
-  VisualOdometry odometry({});
+/// As a simulated camera without noise gives them while it stands. A gyro alone may say that the driver is frozen.
+TEST(VisualOdometry, ImagesThatRepeatThemselvesWhileItStandsAreAStandstillUnlessAGyroTurns) {
+  VisualOdometry standing({}), turning({});
   MotionGuess guess;
   guess.rotation_only = true;
   for (int i = 0; i <= 12; ++i) {
-    StereoFeatures features = pairOf(0);
-    features.stamp = stampOf(i);
+    const StereoFeatures features = stampedAs(i, pairOf(0));
+    EXPECT_EQ(standing.update(features).state, TrackingState::kTracking) << i;
     if (i > 4) guess.T_previous_current.linear() = expSO3({0.0, 0.1, 0.0});  // 57 deg/s
-    const OdometryResult result = odometry.update(features, guess);
-    EXPECT_EQ(result.state, i <= 4 ? TrackingState::kTracking : TrackingState::kDegraded) << i;
+    EXPECT_EQ(turning.update(features, guess).state, i <= 4 ? TrackingState::kTracking : TrackingState::kDegraded) << i;
   }
 }
 
-TEST(VisualOdometry, ImagesThatRepeatThemselvesWhileItStandsAreAStandstill) {
-  // As a simulated camera without noise gives them.
-  VisualOdometry odometry({});
-  for (int i = 0; i <= 6; ++i) {
-    StereoFeatures features = pairOf(0);
-    features.stamp = stampOf(i);
-    EXPECT_EQ(odometry.update(features).state, TrackingState::kTracking) << i;
-  }
-}
-
+/// A simulated robot that stops within a pair.
 TEST(VisualOdometry, ImagesThatRepeatThemselvesAreAStandstillWhereAGuessSaysSo) {
-  // A simulated robot that stops within a pair.
-  VisualOdometry odometry({});
-  const OdometryResult before = follow(odometry, 8);
-  StereoFeatures still = pairOf(8);
-  still.stamp = stampOf(9);
-  MotionGuess guess;
-  guess.rotation_only = true;
-  VisualOdometry told_of_the_turn_only({});
-  follow(told_of_the_turn_only, 8);
-  EXPECT_NE(told_of_the_turn_only.update(still, guess).reason.find("frozen"), std::string::npos);
-  guess.rotation_only = false;
-  const OdometryResult result = odometry.update(still, guess);
-  EXPECT_EQ(result.reason.find("frozen"), std::string::npos) << result.reason;
-  EXPECT_LT(distanceBetween(result.T_origin_camera, before.T_origin_camera), 1e-3);
-
-  // Also when the guess missed the first of these pairs.
-  VisualOdometry told_late({});
-  follow(told_late, 8);
-  EXPECT_NE(told_late.update(still).reason.find("frozen"), std::string::npos);
-  still.stamp = stampOf(10);
-  const OdometryResult late = told_late.update(still, guess);
-  EXPECT_EQ(late.reason.find("frozen"), std::string::npos) << late.reason;
+  struct {
+    std::optional<MotionGuess> first, second;
+    bool frozen_first, frozen_second;
+  } const cases[] = {{MotionGuess{}, MotionGuess{}, false, false},
+                     {MotionGuess{Eigen::Isometry3d::Identity(), true}, {}, true, true},  // of the turn alone
+                     {{}, MotionGuess{}, true, false}};                                   // missed the first of them
+  for (const auto& c : cases) {
+    VisualOdometry odometry({});
+    const OdometryResult before = follow(odometry, 8), first = odometry.update(stampedAs(9, pairOf(8)), c.first);
+    EXPECT_EQ(contains(first.reason, "frozen"), c.frozen_first) << first.reason;
+    if (!c.frozen_first) {
+      EXPECT_LT(distanceBetween(first.T_origin_camera, before.T_origin_camera), 1e-3);
+    }
+    const OdometryResult second = odometry.update(stampedAs(10, pairOf(8)), c.second);
+    EXPECT_EQ(contains(second.reason, "frozen"), c.frozen_second) << second.reason;
+  }
 }
 
-/// What stands still around a camera at `x`, and a swarm of points that moves past it by 0.12 m a pair and is the
-/// larger part of the view from pair 6 on.
-StereoFeatures crowdedPair(int i, double x = 0.0) {
-  const Eigen::Isometry3d T_camera_world(Eigen::Translation3d(-x, 0.0, 0.0));
-  synthetic::Sighting sighting;
-  sighting.noise = 0.1;
-  sighting.max_depth = 25.0;
-  sighting.seed = 300 + static_cast<unsigned>(i);
+/// What stands still around a camera, and a swarm of points that moves past it by 0.12 m a pair and is the larger part
+/// of the view from pair 6 on.
+StereoFeatures crowdedPair(int i) {
+  const auto seed = 300 + static_cast<unsigned>(i);
   const synthetic::World still = synthetic::randomWorld(21, 250, {-10.0, -4.0, 5.0}, {10.0, 3.0, 20.0});
-  StereoFeatures features = synthetic::observe(still, synthetic::camera(), T_camera_world, stampOf(i), sighting);
+  StereoFeatures features = pairAt(Eigen::Isometry3d::Identity(), i, still, 0.1, seed);
   if (i < 6) return features;
   synthetic::World swarm = synthetic::randomWorld(22, 400, {-3.0, -1.5, 3.0}, {3.0, 1.5, 6.0});
   for (Eigen::Vector3d& point : swarm.points) point.x() += 0.12 * (i - 6);
-  const StereoFeatures moving = synthetic::observe(swarm, synthetic::camera(), T_camera_world, stampOf(i), sighting);
-  for (int row = 0; row < moving.count(); ++row)
-    synthetic::addFeature(features, moving.u[row], moving.v[row], moving.disparity[row],
-                          {moving.descriptors.ptr(row), moving.descriptors.ptr(row) + moving.descriptors.cols});
+  addAll(features, pairAt(Eigen::Isometry3d::Identity(), i, swarm, 0.1, seed));
   return features;
 }
 
@@ -1107,7 +1013,7 @@ TEST(VisualOdometry, DoesNotFollowWhatMovesBeforeAStandingCamera) {
     EXPECT_LT(result.T_origin_camera.translation().norm(), 0.02) << i << ": " << result.reason;
     if (result.state != TrackingState::kDegraded) continue;
     ++degraded;
-    EXPECT_NE(result.reason.find("two motions"), std::string::npos) << result.reason;
+    EXPECT_TRUE(contains(result.reason, "two motions")) << result.reason;
     // It may be the others that stand: the difference of 0.12 m is within five standard deviations.
     EXPECT_GT(std::sqrt(result.motion_covariance(0, 0)), 0.12 / 5.0) << i;
   }
@@ -1116,21 +1022,13 @@ TEST(VisualOdometry, DoesNotFollowWhatMovesBeforeAStandingCamera) {
 
 /// Half of what stood still so far begins to move, as a train beside the one in which the camera is.
 StereoFeatures partingPair(int i) {
-  synthetic::Sighting sighting;
-  sighting.noise = 0.1;
-  sighting.max_depth = 25.0;
-  sighting.seed = 300 + static_cast<unsigned>(i);
-  StereoFeatures features = synthetic::noFeatures(synthetic::camera(), stampOf(i));
+  StereoFeatures features = blindPair(i);
   for (const bool moves : {false, true}) {
     synthetic::World world =
         synthetic::randomWorld(moves ? 22 : 21, 200, {moves ? 0.5 : -6.0, -2.0, 5.0}, {moves ? 6.0 : -0.5, 2.0, 9.0});
     if (moves)
       for (Eigen::Vector3d& point : world.points) point.x() += 0.15 * std::max(i - 8, 0);
-    const StereoFeatures seen =
-        synthetic::observe(world, synthetic::camera(), Eigen::Isometry3d::Identity(), stampOf(i), sighting);
-    for (int row = 0; row < seen.count(); ++row)
-      synthetic::addFeature(features, seen.u[row], seen.v[row], seen.disparity[row],
-                            {seen.descriptors.ptr(row), seen.descriptors.ptr(row) + seen.descriptors.cols});
+    addAll(features, pairAt(Eigen::Isometry3d::Identity(), i, world, 0.1, 300 + static_cast<unsigned>(i)));
   }
   return features;
 }
@@ -1140,7 +1038,7 @@ TEST(VisualOdometry, EitherHalfOfTheViewMayStandStill) {
   for (int i = 0; i <= 8; ++i) ASSERT_EQ(odometry.update(partingPair(i)).state, TrackingState::kTracking);
   const OdometryResult result = odometry.update(partingPair(9));
   ASSERT_EQ(result.state, TrackingState::kDegraded);
-  EXPECT_NE(result.reason.find("two motions"), std::string::npos) << result.reason;
+  EXPECT_TRUE(contains(result.reason, "two motions")) << result.reason;
   for (const double x : {0.0, -0.15}) {
     Vector6d error = logSE3(result.T_previous_current);
     error[0] -= x;
@@ -1151,27 +1049,16 @@ TEST(VisualOdometry, EitherHalfOfTheViewMayStandStill) {
 TEST(VisualOdometry, WhatIsInDoubtTellsNothingOfWhatMayBeExpected) {
   // From pair 6 on only what is far away is to be seen, as if by a camera that goes 0.4 m a pair and not 0.8 m.
   const synthetic::World far = synthetic::randomWorld(31, 2000, {-80.0, -40.0, 60.0}, {80.0, 40.0, 120.0});
-  const auto farPair = [&](int i, const Eigen::Isometry3d& T_origin_camera) {
-    synthetic::Sighting sighting;
-    sighting.noise = i > 5 ? 2.0 : 0.5;
-    sighting.max_depth = 150.0;
-    sighting.seed = 700 + static_cast<unsigned>(i);
-    return synthetic::observe(far, synthetic::camera(), T_origin_camera.inverse(), stampOf(i), sighting);
+  const auto farPair = [&](int i, const Eigen::Isometry3d& pose) {
+    return pairAt(pose, i, far, i > 5 ? 2.0 : 0.5, 700 + static_cast<unsigned>(i), 150.0);
   };
-  const auto slowPair = [&](int i) {
-    Eigen::Isometry3d T_origin_camera = drivePose(5);
-    T_origin_camera.translation() += 0.4 * (i - 5) * T_origin_camera.linear().col(2);
-    return farPair(i, T_origin_camera);
-  };
+  const auto slowPair = [&](int i) { return farPair(i, drivePose(5) * Eigen::Translation3d(0.0, 0.0, 0.4 * (i - 5))); };
   VisualOdometryOptions options;
   options.tracking.doubtful_deviation = 0.001;
   VisualOdometry odometry(options);
   for (int i = 0; i <= 5; ++i) {
     StereoFeatures features = pairOf(i);
-    const StereoFeatures behind = farPair(i, drivePose(i));
-    for (int row = 0; row < behind.count(); ++row)
-      synthetic::addFeature(features, behind.u[row], behind.v[row], behind.disparity[row],
-                            {behind.descriptors.ptr(row), behind.descriptors.ptr(row) + behind.descriptors.cols});
+    addAll(features, farPair(i, drivePose(i)));
     ASSERT_EQ(odometry.update(features).state, TrackingState::kTracking) << i;
   }
   for (int i = 6; i <= 8; ++i) ASSERT_EQ(odometry.update(slowPair(i)).state, TrackingState::kDegraded) << i;
@@ -1196,33 +1083,26 @@ StereoFeatures loosePair(int i) {
 }
 
 TEST(VisualOdometry, WhatTheAdjustmentRefutesLeavesTheMapAsItWas) {
-  {
-    VisualOdometryOptions options;
-    options.motion.min_inliers = 18;
-    VisualOdometry odometry(options), blind(options);
-    follow(odometry, 8), follow(blind, 8);
-    options.noise.corner = 2.0;  // of which exact pairs leave a half; the map keeps its own
-    odometry.configure(options), blind.configure(options);
-    for (int i = 9; i <= 13; i += 2) {
-      const OdometryResult refuted = odometry.update(loosePair(i));
-      ASSERT_EQ(refuted.state, TrackingState::kDegraded) << refuted.reason;
-      ASSERT_NE(refuted.reason.find("after the adjustment"), std::string::npos) << refuted.reason;
-      EXPECT_EQ(blind.update(blindPair(i)).state, TrackingState::kDegraded);
-      const OdometryResult next = odometry.update(pairOf(i + 1)), expected = blind.update(pairOf(i + 1));
-      EXPECT_EQ(next.epoch, 0);
-      EXPECT_TRUE(next.T_origin_camera.isApprox(expected.T_origin_camera, 1e-12));
-      EXPECT_EQ(next.inliers, expected.inliers);
-    }
+  VisualOdometryOptions options;
+  options.motion.min_inliers = 18;
+  VisualOdometry odometry(options), blind(options);
+  follow(odometry, 8), follow(blind, 8);
+  options.noise.corner = 2.0;  // of which exact pairs leave a half; the map keeps its own
+  odometry.configure(options), blind.configure(options);
+  for (int i = 9; i <= 13; i += 2) {
+    const OdometryResult refuted = odometry.update(loosePair(i));
+    ASSERT_EQ(refuted.state, TrackingState::kDegraded) << refuted.reason;
+    ASSERT_TRUE(contains(refuted.reason, "after the adjustment")) << refuted.reason;
+    EXPECT_EQ(blind.update(blindPair(i)).state, TrackingState::kDegraded);
+    const OdometryResult next = odometry.update(pairOf(i + 1)), expected = blind.update(pairOf(i + 1));
+    EXPECT_EQ(next.epoch, 0);
+    EXPECT_TRUE(next.T_origin_camera.isApprox(expected.T_origin_camera, 1e-12));
+    EXPECT_EQ(next.inliers, expected.inliers);
   }
 }
 
 TEST(VisualOdometry, FlowLeadsFromWhereAFeatureWasToWhereItIs) {
-  synthetic::Sighting clear;
-  clear.max_depth = 25.0;
-  const auto clearPair = [&](int i) {
-    clear.seed = 70 + static_cast<unsigned>(i);
-    return synthetic::observe(street(), synthetic::camera(), drivePose(i).inverse(), stampOf(i), clear);
-  };
+  const auto clearPair = [](int i) { return pairAt(drivePose(i), i, street(), 0.0, 70 + static_cast<unsigned>(i)); };
   VisualOdometry odometry({});
   for (int i = 0; i < 3; ++i) odometry.update(clearPair(i));
   const StereoFeatures before = clearPair(2), now = clearPair(3);
@@ -1261,17 +1141,6 @@ TEST(VisualOdometry, CoverageIsTheShareOfCellsWithAnInlier) {
   }
 }
 
-TEST(VisualOdometry, SpeedIsByTheClock) {
-  // Every second pair is missing, then one is blind: its motion is one period's.
-  VisualOdometry odometry({});
-  follow(odometry, 3);
-  for (const int i : {5, 7}) ASSERT_EQ(odometry.update(pairOf(i)).state, TrackingState::kTracking);
-  const OdometryResult predicted = odometry.update(blindPair(8));
-  ASSERT_EQ(predicted.state, TrackingState::kDegraded);
-  EXPECT_NEAR(predicted.dt, 0.1, 1e-12);
-  EXPECT_LT(distanceBetween(predicted.T_origin_camera, trueSinceStart(8)), 0.1);
-}
-
 TEST(VisualOdometry, TakesOtherOptionsOverWhileRunning) {
   VisualOdometry odometry({});
   follow(odometry, 5);
@@ -1289,12 +1158,13 @@ TEST(VisualOdometry, TakesOtherOptionsOverWhileRunning) {
 }
 
 TEST(VisualOdometry, NamesTheMapsLastKeyframe) {
-  VisualOdometry odometry({});
-  EXPECT_EQ(odometry.update(pairOf(0)).keyframe_id, 1);
-  EXPECT_EQ(odometry.update(pairOf(1)).keyframe_id, 2) << "at this speed every pair is one";
-  EXPECT_EQ(odometry.update(blindPair(2)).keyframe_id, 2);
-  EXPECT_EQ(odometry.update(blindPair(3)).keyframe_id, 0) << "lost";
-  EXPECT_EQ(odometry.update(pairOf(4)).keyframe_id, 5);
+  Drive drive;
+  // At this speed every pair is one; a lost odometry has none.
+  for (const auto& [pair, id] :
+       std::vector<std::pair<const char*, int>>{{"g", 1}, {"g", 2}, {"b", 2}, {"b", 0}, {"g", 5}}) {
+    drive(pair);
+    EXPECT_EQ(drive.last.keyframe_id, id);
+  }
 }
 
 TEST(VisualOdometry, NamesItsStates) {
