@@ -169,6 +169,7 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
     matches = matchAlong(*diagnosis.rows, searched_left, searched_right, positions);
     report.stereo_matched = static_cast<int>(matches.size());
     report.refused = rig_monitor_.isSuspicious(report.detected, report.stereo_matched);
+    report.along_rows = !report.refused;
   }
   if (diagnosis.too_near) {
     matches = stereo_matcher_.match(searched_left, searched_right, positions, 0.5 * left.cols);

@@ -267,7 +267,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   /// What the rig monitor says, when it says something else than before. A pair without features (dark) says nothing.
   void reportRig(const StereoFeatures& features, const ros::Time& stamp) {
     const bool refused = features.report.refused;
-    const bool is_wrong = refused || (features.count() > 0 && !features.report.status.empty());
+    const bool is_wrong = refused || features.report.along_rows;
     if (is_wrong == rig_is_wrong_ || (!is_wrong && features.count() == 0) || !throttle_.allows("rig")) return;
     rig_is_wrong_ = is_wrong;
     if (refused)

@@ -185,9 +185,16 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     Arrived arrived{message, check(*message), static_cast<std::int64_t>(now), starts_, resumes_.posted()};
     const std::uint64_t late = filter_.dropped();
     const bool new_stream = stream_epoch_ && *stream_epoch_ != message->stream_epoch;
-    for (FeaturesFilter::Passed& passed :
-         filter_.add(std::move(arrived), nanoseconds(message->header.stamp), nanoseconds(ros::Time::now()), new_stream))
-      if (!worker_->push(std::move(passed))) unused_->add(UnusedInput::kPushedOut);
+    std::vector<FeaturesFilter::Passed> passed =
+        filter_.add(std::move(arrived), nanoseconds(message->header.stamp), nanoseconds(ros::Time::now()), new_stream);
+    // The first one may have waited for the second where the features are made, too: it came before, by their stamps.
+    if (passed.size() == 2) {
+      Arrived &held = passed[0].item, &next = passed[1].item;
+      const auto stamp = [](const Arrived& item) { return nanoseconds(item.message->header.stamp); };
+      held.now = std::min(held.now, next.now - (stamp(next) - stamp(held)));
+    }
+    for (FeaturesFilter::Passed& item : passed)
+      if (!worker_->push(std::move(item))) unused_->add(UnusedInput::kPushedOut);
     stream_epoch_ = message->stream_epoch;
     for (std::uint64_t k = late; k < filter_.dropped(); ++k) unused_->add(UnusedInput::kLate);
     if (filter_.dropped() > late && throttle_.allows("late"))

@@ -427,7 +427,8 @@ class Places(unittest.TestCase):
         # Places left beside, as by a process that was killed while it saved.
         open(file + '.partial-1', 'w').close()
         self.assertIn("6 places are saved", run(4, save_by_itself))
-        self.assertEqual((count(file), os.listdir(self.directory)), (6, ['site.bag']))
+        self.assertEqual(count(file), 6)
+        self.assertEqual([name for name in os.listdir(self.directory) if 'site' in name], ['site.bag'])
         shutil.copy(file, other)
         for service, arguments in (('reset', (Empty,)), ('load_places', (LoadPlaces, other))):
             self.assertIn("are not saved: '%s' has others, or more" % file,

@@ -34,6 +34,7 @@ struct ExtractionReport {
   double stereo_time = 0.0;               ///< s
   double describe_time = 0.0;             ///< s
   bool refused = false;                   ///< by the rig monitor: rows do not agree, `status` names the cause
+  bool along_rows = false;                ///< rows differ as of a right camera that turned, and were matched so
   std::string status;                     ///< empty, or why the pair gave few or no features
 };
 
