@@ -138,7 +138,7 @@ Finding ImageCheck::exposure(double min_intensity, double max_intensity) const {
 Finding ImageCheck::texture(int min_corners, double min_share) const {
   const std::string step = "texture";
   const double few = quantile(corners_, 0.1), share = quantile(matched_, 0.5);
-  const std::string what = text(0, quantile(corners_, 0.5), " corners, 90 % of the pairs have more than ", few, "; ",
+  const std::string what = text(0, quantile(corners_, 0.5), " corners (median), 90 % of the pairs have ", few, " or more; ",
                                 100.0 * share, " % are found in the right image");
   if (quantile(corners_, 0.5) < min_corners)
     return {step, Verdict::kFail, what, "focus, light, or a scene with texture; a lower detector/min_contrast"};

@@ -12,7 +12,6 @@
 #include "../common/statistics.hpp"
 #include "../common/text.hpp"
 #include "page.hpp"
-#include "plot.hpp"
 #include "stereo_messages.hpp"
 
 namespace sdvo {
@@ -22,42 +21,77 @@ using Frames = std::vector<OfflineRun::Frame>;
 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr double kDegrees = 180.0 / M_PI;
-const char* const kBlue = "#1f6fb4";
-const char* const kGreen = "#2e8b3d";
-const char* const kOrange = "#d9730d";
-const char* const kRed = "#c62828";
-const char* const kGrey = "#7a7a7a";
 
-/// A value of each pair.
-template <class Value>
-std::vector<double> ofEach(const Frames& frames, const Value& value) {
-  std::vector<double> values;
-  for (const OfflineRun::Frame& frame : frames) values.push_back(value(frame));
-  return values;
+/// Numbers of each pair under the names that page.html has for them.
+struct Column {
+  const char* name;
+  int digits;  ///< after the point
+  double (*of)(const OfflineRun::Frame&);
+};
+
+/// Of a block of the pose's covariance: 0 position (m), 1 rotation (rad).
+double sigmaOf(const OfflineRun::Frame& frame, int block) {
+  const OdometryResult& odometry = frame.odometry;
+  return odometry.has_pose ? std::sqrt(odometry.pose_covariance.diagonal().segment<3>(3 * block).sum()) : kUnknown;
 }
 
-/// Since the first pair, s.
-std::vector<double> timesOf(const Frames& frames) {
-  return ofEach(frames, [&](const OfflineRun::Frame& frame) {
-    return 1e-9 * static_cast<double>(frame.odometry.stamp - frames.front().odometry.stamp);
-  });
+const Column kColumns[] = {
+    {"sigma_m", 5, [](const OfflineRun::Frame& f) { return sigmaOf(f, 0); }},
+    {"sigma_deg", 4, [](const OfflineRun::Frame& f) { return kDegrees * sigmaOf(f, 1); }},
+    {"corners", 0, [](const OfflineRun::Frame& f) { return 1.0 * f.extraction.detected; }},
+    {"features", 0, [](const OfflineRun::Frame& f) { return 1.0 * f.odometry.features; }},
+    {"matches", 0, [](const OfflineRun::Frame& f) { return 1.0 * f.odometry.matches; }},
+    {"inliers", 0, [](const OfflineRun::Frame& f) { return 1.0 * f.odometry.inliers; }},
+    {"detect", 2, [](const OfflineRun::Frame& f) { return 1e3 * f.extraction.detect_time; }},
+    {"stereo", 2, [](const OfflineRun::Frame& f) { return 1e3 * f.extraction.stereo_time; }},
+    {"describe", 2, [](const OfflineRun::Frame& f) { return 1e3 * f.extraction.describe_time; }},
+    {"match", 2, [](const OfflineRun::Frame& f) { return 1e3 * f.odometry.match_time; }},
+    {"motion", 2, [](const OfflineRun::Frame& f) { return 1e3 * f.odometry.motion_time; }},
+};
+
+/// x y z (m) and the quaternion x y z w.
+std::string listOfPose(const std::optional<Eigen::Isometry3d>& pose) {
+  if (!pose) return "null";
+  const Eigen::Vector3d t = pose->translation();
+  const Eigen::Quaterniond q(pose->linear());
+  return listOf(std::array{t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()}, [](double v) { return number(v, 6); });
 }
 
-double angleOf(const Eigen::Isometry3d& transform) {
-  return kDegrees * Eigen::AngleAxisd(transform.linear()).angle();
+/// Of each `step` pairs that follow each other the worst one, so that none without a pose is missing.
+std::vector<std::size_t> worstOfEach(const Frames& frames, std::size_t step) {
+  const auto rankOf = [&](std::size_t i) {
+    const TrackingState state = frames[i].odometry.state;
+    return state == TrackingState::kTracking ? 0 : 1 + static_cast<int>(state);
+  };
+  std::vector<std::size_t> worst;
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    if (i % step == 0)
+      worst.push_back(i);
+    else if (rankOf(i) > rankOf(worst.back()))
+      worst.back() = i;
+  return worst;
 }
 
-/// The true poses in the frame of the estimated ones: laid upon the first one of which both are known.
-std::vector<std::optional<Eigen::Isometry3d>> alignedTruth(const DriveReport& report, const Frames& frames) {
-  std::optional<Eigen::Isometry3d> T_origin_world;
-  std::vector<std::optional<Eigen::Isometry3d>> aligned(report.truth.size());
-  for (std::size_t i = 0; i < aligned.size(); ++i) {
-    if (!report.truth[i]) continue;
-    if (!T_origin_world && frames[i].odometry.has_pose)
-      T_origin_world = frames[i].odometry.T_origin_camera * report.truth[i]->inverse();
-    if (T_origin_world) aligned[i] = *T_origin_world * *report.truth[i];
-  }
-  return aligned;
+/// A list for each column.
+std::string columnsOf(const DriveReport& report, const Frames& frames, std::size_t step) {
+  const std::vector<std::size_t> shown = worstOfEach(frames, step);
+  const auto list = [&](const auto& of) { return listOf(shown, [&](std::size_t i) { return of(frames[i]); }); };
+  const auto poseOf = [](const OfflineRun::Frame& frame) {
+    return listOfPose(frame.odometry.has_pose ? std::optional(frame.odometry.T_origin_camera) : std::nullopt);
+  };
+  const auto timeOf = [&](const OfflineRun::Frame& frame) {
+    return std::to_string(frame.odometry.stamp - frames.front().odometry.stamp);
+  };
+  JsonMembers members = {{"ns", list(timeOf)},
+                         {"state", list([](const OfflineRun::Frame& f) { return quoted(toString(f.odometry.state)); })},
+                         {"reason", list([](const OfflineRun::Frame& f) { return quoted(f.odometry.reason); })},
+                         {"pose", list(poseOf)}};
+  if (!report.truth.empty())
+    members.emplace_back("truth", listOf(shown, [&](std::size_t i) { return listOfPose(report.truth[i]); }));
+  for (const Column& column : kColumns)
+    members.emplace_back(column.name,
+                         list([&](const OfflineRun::Frame& f) { return number(column.of(f), column.digits); }));
+  return objectOf(members);
 }
 
 /// Errors of the pairs of which both poses are known; none where there are fewer than two.
@@ -80,90 +114,6 @@ std::string percent(double value) {
   return std::isfinite(value) ? text(value < 0.1 ? 3 : 2, value, " %") : "-";
 }
 
-/// Steps of a pair, each with its colour.
-struct Stage {
-  const char* name;
-  const char* colour;
-  double (*value)(const OfflineRun::Frame&);
-};
-
-const std::array<Stage, 5> kTimes = {{
-    {"detect", kBlue, [](const OfflineRun::Frame& f) { return 1e3 * f.extraction.detect_time; }},
-    {"stereo", kGreen, [](const OfflineRun::Frame& f) { return 1e3 * f.extraction.stereo_time; }},
-    {"describe", kOrange, [](const OfflineRun::Frame& f) { return 1e3 * f.extraction.describe_time; }},
-    {"match", kGrey, [](const OfflineRun::Frame& f) { return 1e3 * f.odometry.match_time; }},
-    {"motion", kRed, [](const OfflineRun::Frame& f) { return 1e3 * f.odometry.motion_time; }},
-}};
-
-const std::array<Stage, 4> kFunnel = {{
-    {"corners", kGrey, [](const OfflineRun::Frame& f) { return 1.0 * f.extraction.detected; }},
-    {"features", kBlue, [](const OfflineRun::Frame& f) { return 1.0 * f.odometry.features; }},
-    {"matches", kOrange, [](const OfflineRun::Frame& f) { return 1.0 * f.odometry.matches; }},
-    {"inliers", kGreen, [](const OfflineRun::Frame& f) { return 1.0 * f.odometry.inliers; }},
-}};
-
-template <std::size_t count>
-std::string stagesPlot(const Axes& axes, const std::array<Stage, count>& stages, const Frames& frames) {
-  std::vector<Curve> curves;
-  for (const Stage& stage : stages)
-    curves.push_back({stage.name, stage.colour, timesOf(frames), ofEach(frames, stage.value)});
-  return plot(axes, std::move(curves));
-}
-
-/// From above and its height, in the axes of the base at the first pair.
-std::string pathPlots(const DriveReport& report, const Frames& frames) {
-  Curve above{"odometry", kBlue, {}, {}}, height{"odometry", kBlue, timesOf(frames), {}};
-  Curve true_above{"ground truth", kGreen, {}, {}}, true_height{"ground truth", kGreen, timesOf(frames), {}};
-  const auto add = [&](Curve& path, Curve& up, const std::optional<Eigen::Isometry3d>& pose) {
-    const Eigen::Vector3d at =
-        pose ? Eigen::Vector3d(report.R_base_camera * pose->translation()) : Eigen::Vector3d::Constant(kUnknown);
-    path.x.push_back(-at.y());
-    path.y.push_back(at.x());
-    up.y.push_back(at.z());
-  };
-  for (const OfflineRun::Frame& frame : frames)
-    add(above, height, frame.odometry.has_pose ? std::optional(frame.odometry.T_origin_camera) : std::nullopt);
-  std::vector<Curve> paths, heights;
-  if (!report.truth.empty()) {
-    for (const auto& pose : alignedTruth(report, frames)) add(true_above, true_height, pose);
-    paths = {true_above};
-    heights = {true_height};
-  }
-  paths.push_back(above);
-  heights.push_back(height);
-  return plot({"Path from above", "to the right [m]", "ahead [m]", Axes::Style::kEqualScales}, paths) +
-         plot({"Height", "time [s]", "m"}, heights);
-}
-
-/// Standard deviations of the pose, and its errors where the truth is known.
-std::string deviationPlots(const DriveReport& report, const Frames& frames) {
-  const auto sigma = [&](int block) {
-    return ofEach(frames, [block](const OfflineRun::Frame& frame) {
-      const OdometryResult& odometry = frame.odometry;
-      return odometry.has_pose ? std::sqrt(odometry.pose_covariance.diagonal().segment<3>(3 * block).sum()) : kUnknown;
-    });
-  };
-  std::vector<double> metres = sigma(0), degrees = sigma(1);
-  for (double& value : degrees) value *= kDegrees;
-  std::vector<Curve> position = {{"sigma", kBlue, timesOf(frames), metres}};
-  std::vector<Curve> rotation = {{"sigma", kBlue, timesOf(frames), degrees}};
-  if (!report.truth.empty()) {
-    Curve off{"error", kRed, timesOf(frames), {}}, turned = off;
-    const auto truth = alignedTruth(report, frames);
-    for (std::size_t i = 0; i < frames.size(); ++i) {
-      const bool is_known = truth[i] && frames[i].odometry.has_pose;
-      const Eigen::Isometry3d error =
-          is_known ? truth[i]->inverse() * frames[i].odometry.T_origin_camera : Eigen::Isometry3d::Identity();
-      off.y.push_back(is_known ? error.translation().norm() : kUnknown);
-      turned.y.push_back(is_known ? angleOf(error) : kUnknown);
-    }
-    position.push_back(off);
-    rotation.push_back(turned);
-  }
-  return plot({"Deviation of the position", "time [s]", "m"}, position) +
-         plot({"Deviation of the rotation", "time [s]", "deg"}, rotation);
-}
-
 std::array<int, 4> countStates(const Frames& frames) {
   std::array<int, 4> counts{};
   for (const OfflineRun::Frame& frame : frames) ++counts[static_cast<std::size_t>(frame.odometry.state)];
@@ -179,45 +129,13 @@ std::string stateCounts(const std::array<int, 4>& counts) {
   return words;
 }
 
-/// A bar of all pairs, and the reasons of those that are not TRACKING.
-std::string statesSection(const Frames& frames) {
-  constexpr std::size_t kMostRows = 15;
-  const std::vector<const char*> colours = {kGreen, kGrey, kOrange, kRed};
-  const auto rankOf = [](TrackingState state) {
-    return std::array<int, 4>{1, 0, 2, 3}[static_cast<std::size_t>(state)];
-  };
-  std::string legend;
-  std::vector<int> ranks;
-  for (const OfflineRun::Frame& frame : frames) ranks.push_back(rankOf(frame.odometry.state));
-  for (const TrackingState state :
-       {TrackingState::kTracking, TrackingState::kWaiting, TrackingState::kDegraded, TrackingState::kLost})
-    if (std::count(ranks.begin(), ranks.end(), rankOf(state)) > 0)
-      legend +=
-          text(0, " <b style='color:", colours[static_cast<std::size_t>(rankOf(state))], "'>", toString(state), "</b>");
-  const std::vector<double> times = timesOf(frames);
-  std::vector<std::vector<std::string>> rows;
-  for (std::size_t begin = 0, end = 0; begin < frames.size(); begin = end) {
-    while (end < frames.size() && ranks[end] == ranks[begin]) ++end;
-    if (ranks[begin] > 0)
-      rows.push_back({text(1, times[begin], " s"), toString(frames[begin].odometry.state),
-                      std::to_string(end - begin) + (end - begin == 1 ? " pair" : " pairs"),
-                      frames[begin].odometry.reason});
-  }
-  std::string more;
-  if (rows.size() > kMostRows) {
-    more = "<p>and " + std::to_string(rows.size() - kMostRows) + " more stretches</p>\n";
-    rows.resize(kMostRows);
-  }
-  return "<h2>States over time</h2>\n" + band(ranks, colours) +
-         text(1, "<p>0 to ", times.back(), " s:", legend, "</p>\n") + "<div class='when'>" + wordsTable(rows) +
-         "</div>" + more;
-}
-
-std::string figuresSection(const DriveReport& report, const OfflineRun& run) {
+std::vector<Words> figuresOf(const DriveReport& report, const OfflineRun& run) {
   const Frames& frames = run.frames();
-  std::vector<std::vector<std::string>> rows = {
+  std::vector<Words> rows = {
       {"pairs", std::to_string(run.pairs()) + ": " + stateCounts(countStates(frames))},
-      {"distance", text(2, run.distance(), " m in ", timesOf(frames).back(), " s")},
+      {"distance",
+       text(2, run.distance(), " m in ",
+            1e-9 * static_cast<double>(frames.back().odometry.stamp - frames.front().odometry.stamp), " s")},
       {"discontinuities of the pose", std::to_string(run.discontinuities())},
       {"time of a pair", text(1, run.time(0.5), " ms (median), ", run.time(0.95), " ms (95 %), ", run.cpuTime(),
                               " ms of CPU; without reading and decoding")}};
@@ -242,28 +160,18 @@ std::string figuresSection(const DriveReport& report, const OfflineRun& run) {
                                         text(0, "published ", 1e3 * quantile(live.latencies, 0.5), " ms (median), ",
                                              1e3 * quantile(live.latencies, 0.95), " ms (95 %) after the image")});
   }
-  return wordsTable(rows);
+  return rows;
 }
 
-std::string optionsSection(PipelineOptions options) {
+/// Those that are not the default.
+std::vector<Words> optionsOf(PipelineOptions options) {
   PipelineOptions defaults;
   const std::vector<Option> set = listOptions(options), usual = listOptions(defaults);
-  std::vector<std::vector<std::string>> rows;
+  std::vector<Words> rows;
   for (std::size_t i = 0; i < set.size(); ++i)
     if (set[i].text() != usual[i].text())
       rows.push_back({set[i].name, set[i].text() + " " + set[i].unit, "default " + usual[i].text()});
-  return "<h2>Options that differ from the defaults</h2>\n" +
-         (rows.empty() ? "<p>none</p>\n" : "<div class='wide'>" + wordsTable(rows) + "</div>\n");
-}
-
-std::string picturesSection(const std::vector<DrivePictures::Picture>& pictures) {
-  constexpr std::size_t kMostBytes = 1500000;  // all of them: the page has less than 2 MB
-  std::string html =
-      "<h2>Features</h2>\n<p>Circles have the size that the depth gives, near ones red and far ones blue. Lines lead "
-      "from where a feature was before: green ones agree with the motion, magenta ones do not.</p>\n<div class='grid'>";
-  for (const DrivePictures::Picture& one : pictures)
-    html += picture(one.image, one.words, kMostBytes / pictures.size());
-  return html + "</div>\n";
+  return rows;
 }
 
 }  // namespace
@@ -275,11 +183,11 @@ Finding judge(const DriveReport& report, const OfflineRun& run) {
   Finding verdict{"drive", worst.verdict, "", ""};
   if (run.pairsWithoutPose() > 0 || run.discontinuities() > 0) {
     if (verdict.verdict != Verdict::kFail) verdict.verdict = Verdict::kWarn;
+    const int poses = run.pairs() - run.pairsWithoutPose();
     verdict.what =
-        run.pairsWithoutPose() == run.pairs()
-            ? text(0, "Never started: none of ", run.pairs(), " pairs has a pose")
-            : text(0, "Interrupted: ", run.pairsWithoutPose(), " of ", run.pairs(), " pairs have no pose, ",
-                   run.discontinuities(), run.discontinuities() == 1 ? " discontinuity" : " discontinuities");
+        poses < 2 ? text(0, "Never started: ", poses == 0 ? "none" : "one", " of ", run.pairs(), " pairs has a pose")
+                  : text(0, "Interrupted: ", run.pairsWithoutPose(), " of ", run.pairs(), " pairs have no pose, ",
+                         run.discontinuities(), run.discontinuities() == 1 ? " discontinuity" : " discontinuities");
   } else {
     verdict.what =
         text(0, "Followed: ", run.pairs(), " of ", run.pairs(), " pairs have a pose, ", tracking, " are TRACKING");
@@ -289,7 +197,8 @@ Finding judge(const DriveReport& report, const OfflineRun& run) {
     if (const auto errors = errorsOf(report, run.frames()); errors && errors->sub_paths.count > 0)
       verdict.what += "; error " + percent(errors->sub_paths.translation_percent) + " of the distance";
     else if (implied > 0.0)
-      verdict.what += "; random errors of about " + percent(implied) + " of the distance, beside those of the calibration";
+      verdict.what +=
+          "; random errors of about " + percent(implied) + " of the distance, beside those of the calibration";
   }
   if (worst.verdict == Verdict::kWarn || worst.verdict == Verdict::kFail)
     verdict.what += ". Camera: " + std::string(toString(worst.verdict)) + ", " + worst.step + ": " + worst.what;
@@ -297,16 +206,23 @@ Finding judge(const DriveReport& report, const OfflineRun& run) {
 }
 
 void writeDrivePage(const std::string& path, const DriveReport& report, const OfflineRun& run) {
-  const Finding verdict = judge(report, run);
+  // The page has less than 2 MB; 3000 pairs have 0.8 MB.
+  constexpr std::size_t kMostPairs = 3000, kMostBytes = 1100000;
   const Frames& frames = run.frames();
-  writePage(path, pageHead(report.name, verdict.verdict, verdict.what) + figuresSection(report, run) +
-                      "<h2>Path and what it is built on</h2>\n<div class='grid'>" +
-                      (run.pairsWithoutPose() < run.pairs() ? pathPlots(report, frames) + deviationPlots(report, frames)
-                                                            : std::string()) +
-                      stagesPlot({"What survives each stage", "time [s]", "count"}, kFunnel, frames) +
-                      stagesPlot({"Time of each stage", "time [s]", "ms", Axes::Style::kStacked}, kTimes, frames) +
-                      "</div>\n" + statesSection(frames) + "<h2>The camera</h2>\n" + findingsTable(report.findings) +
-                      rowsTable(report.rows) + picturesSection(report.pictures) + optionsSection(report.options));
+  const std::size_t step = (frames.size() + kMostPairs - 1) / kMostPairs;
+  Eigen::Isometry3d T_base_camera = Eigen::Isometry3d::Identity();
+  T_base_camera.linear() = report.R_base_camera;
+  const auto pictureOfDrive = [&](const DrivePictures::Picture& picture) {
+    return pictureOf(picture.image, picture.words, kMostBytes / report.pictures.size());
+  };
+  writePage(path, report.name, judge(report, run), report.findings, report.rows,
+            {{"figures", tableOf(figuresOf(report, run))},
+             {"options", tableOf(optionsOf(report.options))},
+             {"first_stamp", quoted(std::to_string(frames.front().odometry.stamp))},
+             {"step", std::to_string(step)},
+             {"T_base_camera", listOfPose(T_base_camera)},
+             {"pairs", columnsOf(report, frames, step)},
+             {"pictures", listOf(report.pictures, pictureOfDrive)}});
 }
 
 using stereo_descriptor_vo::VoInfo;

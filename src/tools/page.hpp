@@ -3,42 +3,48 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "../check/finding.hpp"
 
 namespace sdvo {
 
-/// Parts of an HTML page that needs no other file and reads on a narrow screen, too.
+/// What page.html draws is one JSON object. Here are its parts, and how it becomes a file.
 
-/// A word or sentence that holds no tag.
-std::string escaped(const std::string& words);
+/// Words as a JSON string, which may stand in a script of HTML.
+std::string quoted(const std::string& words);
 
-/// The page up to its heading: the name of what was looked at, and the verdict on it in its colour. Below stand the
-/// moment of writing and the version of this package.
-std::string pageHead(const std::string& title, Verdict verdict, const std::string& sentence);
+/// With `digits` after the point; null for what is no number.
+std::string number(double value, int digits);
 
-/// The steps of a camera's check.
-std::string findingsTable(const std::vector<Finding>& findings);
+/// A JSON list of what `toJson` makes of each item.
+template <class Items, class ToJson>
+std::string listOf(const Items& items, const ToJson& toJson) {
+  std::string list = "[";
+  for (const auto& item : items) list += (list.size() > 1 ? "," : "") + toJson(item);
+  return list + "]";
+}
 
-/// RowCheck::map() as a table; empty without a map.
-std::string rowsTable(const cv::Mat& rows);
+/// Members of a JSON object by their names.
+using JsonMembers = std::vector<std::pair<std::string, std::string>>;
+std::string objectOf(const JsonMembers& members);
 
-/// Words in rows, the first of which are names.
-std::string wordsTable(const std::vector<std::vector<std::string>>& rows);
+using Words = std::vector<std::string>;
+std::string tableOf(const std::vector<Words>& rows);
 
-/// CV_8UC1 or CV_8UC3 as a picture with words below. It takes at most `most_bytes` of the page.
-std::string picture(const cv::Mat& image, const std::string& words, std::size_t most_bytes);
+/// CV_8UC1 or CV_8UC3 as a JPEG with words. It takes at most `most_bytes` of the page.
+std::string pictureOf(const cv::Mat& image, const std::string& words, std::size_t most_bytes);
 
 /// A moment (ns since 1970) as date and time in UTC.
 std::string dateOf(std::int64_t stamp);
 
-const char* colourOf(Verdict verdict);
-
 /// The worst verdict, and what its first finding says.
 Finding worstOf(const std::vector<Finding>& findings);
 
-/// Throws std::runtime_error that names the file when it cannot be written.
-void writePage(const std::string& path, const std::string& html);
+/// A page that needs no other file: what was looked at, the verdict on it, the steps of the camera's check,
+/// RowCheck::map(), and what else there is. Throws std::runtime_error that names the file when it cannot be written.
+void writePage(const std::string& path, const std::string& title, const Finding& verdict,
+               const std::vector<Finding>& findings, const cv::Mat& rows, JsonMembers more);
 
 }  // namespace sdvo

@@ -87,7 +87,7 @@ std::string SelfCheck::text() const {
   const double driven = returns ? 2.0 * distance : distance;
   sentence << (returns ? "back at the start it is off by " : "the two ends are apart by ") << end_m << " m and "
            << end_deg << " deg after " << driven << " m";
-  if (difference.count > 0)
+  if (difference.count > 0 && driven >= 100.0)
     sentence << " (" << 100.0 * end_m / driven << " m and " << 100.0 * end_deg / driven << " deg per 100 m)";
   return sentence.str();
 }
