@@ -378,10 +378,10 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   void saveByItself(bool at_end) {
     const std::string path = inRosHome(options_.output.places_file);
     const auto say = [&](const std::string& what) {
-      if (ros::ok())
-        NODELET_WARN_STREAM(what);
-      else
+      if (at_end)  // rosconsole ends while this runs
         std::cerr << "[ WARN] " << getName() << ": " << what << std::endl;
+      else
+        NODELET_WARN_STREAM(what);
     };
     std::unique_lock<std::mutex> lock(mutex_);
     const std::size_t places = session_->recognition().places().size();

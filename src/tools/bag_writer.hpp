@@ -18,7 +18,7 @@ class BagWriter {
     try {
       return action();
     } catch (const std::exception& e) {
-      throw std::runtime_error(name_ + ": cannot " + what + ": " + e.what());
+      throw std::runtime_error(name_ + ": cannot " + what + " (is the disk full?): " + e.what());
     }
   }
 

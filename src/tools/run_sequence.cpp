@@ -234,8 +234,11 @@ int run(const Arguments& arguments) {
     way += drive.whole.distance();
     places->startSequence();
   }
-  for (const std::string& folder : {arguments.pictures, arguments.output})
-    if (!folder.empty()) fs::create_directories(folder);
+  for (const std::string& folder : {arguments.pictures, arguments.output}) {
+    std::error_code error;
+    if (!folder.empty()) fs::create_directories(folder, error);
+    if (error) throw std::runtime_error("cannot create folder '" + folder + "': " + error.message());
+  }
   if (!arguments.pictures.empty() && !fs::is_empty(arguments.pictures))
     throw std::runtime_error("--pictures '" + arguments.pictures + "' is not empty: choose another folder");
   if (!arguments.output.empty()) fs::remove(reportOf(arguments));  // of an earlier run

@@ -293,6 +293,9 @@ class Places(unittest.TestCase):
         signature.bits_per_word += 1
         publisher.publish(signature)
         self.assertTrue(wait_until(lambda: recognition.rosout.warned('PlaceSignature message refused')))
+        signature.robot = recognition.namespace
+        publisher.publish(signature)
+        self.assertTrue(wait_until(lambda: recognition.rosout.warned("it has this robot's name")), recognition.rosout.warnings)
         publisher.unregister()
         requests.close()
 
@@ -432,7 +435,7 @@ class Places(unittest.TestCase):
         shutil.copy(file, other)
         for service, arguments in (('reset', (Empty,)), ('load_places', (LoadPlaces, other))):
             self.assertIn("are not saved: '%s' has others, or more" % file,
-                          run(2, lambda recognition: recognition.call(service, *arguments)), service)
+                          run(8, lambda recognition: recognition.call(service, *arguments)), service)
             self.assertEqual((count(file), count(other)), (6, 6))
         os.remove(file)
         os.mkdir(file)
