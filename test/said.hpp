@@ -30,7 +30,9 @@ inline std::string errorOf(const std::function<void()>& action) {
 }
 
 inline void expectError(const std::function<void()>& action, const std::vector<std::string>& all) {
-  expectWords(errorOf(action), all);
+  const std::string error = errorOf(action);
+  EXPECT_NE(error, "no error");
+  expectWords(error, all);
 }
 
 /// Damages to a T of which `check` refuses each one, in these words. Each begins with a sound T.

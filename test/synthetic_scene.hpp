@@ -7,24 +7,16 @@
 #include <functional>
 #include <opencv2/core.hpp>
 #include <random>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "said.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 
 /// Synthetic images and features whose truth is known analytically; for the tests of the core.
 namespace sdvo::synthetic {
 
-/// The message of the exception that `action` throws, or "no error".
-inline std::string errorOf(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const std::exception& e) {
-    return e.what();
-  }
-  return "no error";
-}
+using sdvo::errorOf;
 
 /// A rig like KITTI's at a size that renders quickly.
 inline StereoCamera camera() {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <random>
 
+#include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/belief/motion_search.hpp"
 
@@ -381,7 +382,7 @@ TEST_F(MotionSearchTest, FailsWithAReason) {
   start(2);
   const MotionHypothesis found = find(synthetic::noFeatures(synthetic::camera(), stamp()), 0.0);
   EXPECT_FALSE(found.motion.success);
-  EXPECT_NE(found.motion.reason.find("only 0 matches"), std::string::npos) << found.motion.reason;
+  EXPECT_TRUE(contains(found.motion.reason, "only 0 matches")) << found.motion.reason;
 }
 
 }  // namespace test_motion_search

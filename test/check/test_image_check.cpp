@@ -5,6 +5,7 @@
 #include <string>
 
 #include "../../src/check/image_check.hpp"
+#include "../said.hpp"
 
 namespace sdvo {
 namespace test_image_check {
@@ -33,7 +34,7 @@ ImageCheck checked(const ExtractionReport& report, const cv::Mat& left = grey(10
 
 void expectSaid(const Finding& finding, Verdict verdict, const std::string& words) {
   EXPECT_EQ(finding.verdict, verdict) << finding.what;
-  EXPECT_NE((finding.what + finding.remedy).find(words), std::string::npos) << finding.what << "; " << finding.remedy;
+  EXPECT_TRUE(contains((finding.what + finding.remedy), words)) << finding.what << "; " << finding.remedy;
 }
 
 TEST(ImageCheck, ExposureIsThatOfTheDarkerAndOfTheBrighterSide) {

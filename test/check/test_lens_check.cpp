@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "../../src/check/lens_check.hpp"
+#include "../said.hpp"
 
 namespace sdvo {
 namespace test_lens_check {
@@ -60,7 +61,7 @@ TEST(LensCheck, WhatCameraInfoDoesNotHaveOfTheImagesIsNamed) {
         Case{1.0, -160.0, -100.0, Verdict::kWarn, "cx off by 1"}}) {
     const Finding finding = judged(scaled(c.f, c.dx, c.dy));
     EXPECT_EQ(finding.verdict, c.verdict) << finding.what;
-    EXPECT_NE(finding.what.find(c.words), std::string::npos) << finding.what;
+    EXPECT_TRUE(contains(finding.what, c.words)) << finding.what;
   }
 }
 

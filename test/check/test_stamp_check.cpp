@@ -3,6 +3,7 @@
 #include <string>
 
 #include "../../src/check/stamp_check.hpp"
+#include "../said.hpp"
 
 namespace sdvo {
 namespace test_stamp_check {
@@ -25,7 +26,7 @@ StampCheck recording(int pairs, std::int64_t clock = 0, int every = 1) {
 
 void expectSaid(const Finding& finding, Verdict verdict, const std::string& words) {
   EXPECT_EQ(finding.verdict, verdict) << finding.what;
-  EXPECT_NE((finding.what + finding.remedy).find(words), std::string::npos) << finding.what << "; " << finding.remedy;
+  EXPECT_TRUE(contains((finding.what + finding.remedy), words)) << finding.what << "; " << finding.remedy;
 }
 
 TEST(StampCheck, SteadyPairsAreInOrder) {

@@ -1,14 +1,14 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 
+#include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 
 namespace sdvo {
 namespace test_stereo_camera {
-
-using synthetic::errorOf;
 
 TEST(StereoCamera, ProjectsByHand) {
   const StereoCamera camera{100.0, 200.0, 50.0, 60.0, 0.5, 100, 120};
@@ -45,29 +45,20 @@ TEST(StereoCamera, JacobianIsTheDerivative) {
 }
 
 TEST(StereoCamera, CheckRefusesWhatNoCameraHas) {
-  EXPECT_NO_THROW(synthetic::camera().check());
   constexpr double kNaN = std::numeric_limits<double>::quiet_NaN(), kInf = std::numeric_limits<double>::infinity();
-  const auto expectRefused = [](double StereoCamera::*field, double value, const std::string& name) {
-    StereoCamera camera = synthetic::camera();
-    camera.*field = value;
-    EXPECT_THROW(camera.check(), std::invalid_argument) << name << " = " << value;
-    EXPECT_NE(errorOf([&] { camera.check(); }).find(name), std::string::npos) << name << " = " << value;
-  };
-  for (const double bad : {0.0, -400.0, kNaN, kInf}) {
-    expectRefused(&StereoCamera::fx, bad, "fx");
-    expectRefused(&StereoCamera::fy, bad, "fy");
-    expectRefused(&StereoCamera::baseline, bad, "baseline");
+  Refusals<StereoCamera> refusals = {{[](StereoCamera& c) { c.width = 0; }, "size"},
+                                     {[](StereoCamera& c) { c.height = 0; }, "size"},
+                                     {[](StereoCamera& c) { c = {}; }, ""}};
+  for (const double bad : {kNaN, kInf, 0.0, -400.0}) {
+    refusals.emplace_back([bad](StereoCamera& c) { c.fx = bad; }, "fx");
+    refusals.emplace_back([bad](StereoCamera& c) { c.fy = bad; }, "fy");
+    refusals.emplace_back([bad](StereoCamera& c) { c.baseline = bad; }, "baseline");
+    if (std::isfinite(bad)) continue;
+    refusals.emplace_back([bad](StereoCamera& c) { c.cx = bad; }, "principal point");
+    refusals.emplace_back([bad](StereoCamera& c) { c.cy = bad; }, "principal point");
   }
-  for (const double bad : {kNaN, kInf}) {
-    expectRefused(&StereoCamera::cx, bad, "principal point");
-    expectRefused(&StereoCamera::cy, bad, "principal point");
-  }
-  for (int StereoCamera::*field : {&StereoCamera::width, &StereoCamera::height}) {
-    StereoCamera camera = synthetic::camera();
-    camera.*field = 0;
-    EXPECT_NE(errorOf([&] { camera.check(); }).find("size"), std::string::npos);
-  }
-  EXPECT_THROW(StereoCamera().check(), std::invalid_argument);
+  expectRefusals(
+      synthetic::camera(), [](const StereoCamera& camera) { camera.check(); }, refusals);
 }
 
 TEST(StereoCamera, EqualityLooksAtEveryField) {

@@ -2,12 +2,13 @@
 
 #include <filesystem>
 #include <fstream>
-#include <functional>
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
-#include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "../said.hpp"
 #include "../temporary_folder.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 
@@ -25,19 +26,6 @@ cv::Mat noise(int width, int height, int type, int seed) {
   cv::RNG rng(static_cast<std::uint64_t>(seed) + 1);
   rng.fill(image, cv::RNG::UNIFORM, 0, 256);
   return image;
-}
-
-std::string errorOf(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const std::runtime_error& e) {
-    return e.what();
-  }
-  return "no error";
-}
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
 }
 
 /// sequences/07 with three grey pairs of 120x80 px; each test damages it.
@@ -117,43 +105,42 @@ TEST_F(KittiDataset, CamerasMayBeChosen) {
   EXPECT_TRUE(contains(openError(KittiCameras::kColour), "no image_2"));
 }
 
-TEST_F(KittiDataset, NegativeOrZeroBaselineQuotesBothMatrices) {
-  writeText("calib.txt", "P0: 700 0 60 0 0 710 40 0 0 0 1 0\nP1: 700 0 60 350 0 710 40 0 0 0 1 0\n");
-  const std::string error = openError();
-  EXPECT_TRUE(contains(error, path("calib.txt"))) << error;
-  EXPECT_TRUE(contains(error, "-0.5")) << error;
-  EXPECT_TRUE(contains(error, "P0 has fx = 700.000000, Tx = 0.000000")) << error;
-  EXPECT_TRUE(contains(error, "P1 has fx = 700.000000, Tx = 350.000000")) << error;
-  writeText("calib.txt", "P0: 700 0 60 5 0 710 40 0 0 0 1 0\nP1: 700 0 60 5 0 710 40 0 0 0 1 0\n");
-  EXPECT_TRUE(contains(openError(), "must be positive"));
-}
-
 TEST_F(KittiDataset, BadCalibrationsAreNamed) {
-  writeText("calib.txt", "P0: 700 0 60 0 0 710 40 0 0 0 1 0\n");
-  EXPECT_EQ(openError(), "file '" + path("calib.txt") + "' has no line 'P1:'");
-  writeText("calib.txt", "P0: 700 0 60 0 0 710 40 0 0 0 1 0\nP1: 700 0 60\n");
-  EXPECT_TRUE(contains(openError(), "line 2: expected 12 numbers after 'P1:', found 3")) << openError();
-  writeText("calib.txt", "P0: 700 0 60 0 0 nan 40 0 0 0 1 0\n");
-  EXPECT_TRUE(contains(openError(), "line 1: 'nan' is not a finite number")) << openError();
-  writeText("calib.txt", "P0: 0 0 60 0 0 710 40 0 0 0 1 0\nP1: 0 0 60 -350 0 710 40 0 0 0 1 0\n");
-  EXPECT_TRUE(contains(openError(), "focal lengths of P0 must be positive")) << openError();
-  writeText("calib.txt", "P0: 700 0 60 0 0 710 40 0 0 0 1 0\nP1: 700 0 65 -350 0 710 40 0 0 0 1 0\n");
-  EXPECT_TRUE(contains(openError(), "do not belong to a rectified pair")) << openError();
-  fs::remove(directory_ / "calib.txt");
-  EXPECT_EQ(openError(), "cannot read file '" + path("calib.txt") + "': it does not exist");
+  const std::string p0 = "P0: 700 0 60 0 0 710 40 0 0 0 1 0\n", name = path("calib.txt");
+  const std::vector<std::pair<std::string, std::vector<std::string>>> cases = {
+      {p0, {"file '" + name + "' has no line 'P1:'"}},
+      {p0 + "P1: 700 0 60\n", {"line 2: expected 12 numbers after 'P1:', found 3"}},
+      {"P0: 700 0 60 0 0 nan 40 0 0 0 1 0\n", {"line 1: 'nan' is not a finite number"}},
+      {"P0: 0 0 60 0 0 710 40 0 0 0 1 0\nP1: 0 0 60 -350 0 710 40 0 0 0 1 0\n",
+       {"focal lengths of P0 must be positive"}},
+      {p0 + "P1: 700 0 65 -350 0 710 40 0 0 0 1 0\n", {"do not belong to a rectified pair"}},
+      {p0 + "P1: 700 0 60 0 0 710 40 0 0 0 1 0\n", {"must be positive"}},
+      {p0 + "P1: 700 0 60 350 0 710 40 0 0 0 1 0\n",
+       {name, "-0.5", "P0 has fx = 700.000000, Tx = 0.000000", "P1 has fx = 700.000000, Tx = 350.000000"}}};
+  for (const auto& [text, words] : cases) {
+    writeText("calib.txt", text);
+    expectWords(openError(), words);
+  }
+  fs::remove(name);
+  EXPECT_EQ(openError(), "cannot read file '" + name + "': it does not exist");
 }
 
 TEST_F(KittiDataset, BadTimesAreNamed) {
-  writeText("times.txt", "0.0\n0.1\n");
-  EXPECT_EQ(openError(), "file '" + path("times.txt") + "' has 2 times for 3 images");
-  writeText("times.txt", "0.0\n0.1\n0.1\n");
-  EXPECT_TRUE(contains(openError(), "line 3: time 0.1 s is not later")) << openError();
-  writeText("times.txt", "0.0\nabc\n0.1\n");
-  EXPECT_TRUE(contains(openError(), "line 2: 'abc' is not a finite number")) << openError();
-  writeText("times.txt", "0.0\n\n0.1\n");
-  EXPECT_TRUE(contains(openError(), "line 2: a blank line")) << openError();
-  fs::remove(directory_ / "times.txt");
-  EXPECT_TRUE(contains(openError(), path("times.txt") + "': it does not exist"));
+  const std::string name = path("times.txt");
+  const std::vector<std::pair<std::string, std::string>> cases = {
+      {"0.0\n0.1\n", "file '" + name + "' has 2 times for 3 images"},
+      {"0.0\n0.1\n0.2\n0.3\n", "'" + name + "' has more times than the 3 images"},
+      {"0.0\n0.1\n0.1\n", "line 3: time 0.1 s is not later"},
+      {"0.0\nabc\n0.1\n", "line 2: 'abc' is not a finite number"},
+      {"0.0\n\n0.1\n", "line 2: a blank line"}};
+  for (const auto& [text, words] : cases) {
+    writeText("times.txt", text);
+    expectWords(openError(), {words});
+  }
+  writeText("times.txt", "0.0\n0.1\n0.2\n\n  \n");
+  EXPECT_EQ(open().size(), 3);
+  fs::remove(name);
+  expectWords(openError(), {name + "': it does not exist"});
 }
 
 TEST_F(KittiDataset, StampsAreExactToTheNanosecond) {
@@ -163,82 +150,60 @@ TEST_F(KittiDataset, StampsAreExactToTheNanosecond) {
   EXPECT_EQ(sequence.stamp(1), 1403636584763555585);
 }
 
-TEST_F(KittiDataset, MoreTimesThanImagesAreRefused) {
-  writeText("times.txt", "0.0\n0.1\n0.2\n0.3\n");
-  const std::string error = openError();
-  EXPECT_TRUE(contains(error, "'" + path("times.txt") + "' has more times than the 3 images")) << error;
-  writeText("times.txt", "0.0\n0.1\n0.2\n\n  \n");
-  EXPECT_EQ(open().size(), 3);
-}
-
 TEST_F(KittiDataset, MissingDirectoriesAndImagesAreNamed) {
-  EXPECT_TRUE(contains(errorOf([] { KittiSequence("/nowhere/06"); }), "'/nowhere/06' does not exist"));
-  fs::remove(directory_ / "image_1" / "000001.png");
-  const std::string error = openError();
-  EXPECT_TRUE(contains(error, "'" + path("image_1/000001.png") + "' is missing")) << error;
-  EXPECT_TRUE(contains(error, "has 3 images")) << error;
-  EXPECT_TRUE(contains(error, "has 2;")) << error;
-  fs::remove_all(directory_ / "image_1");
-  EXPECT_TRUE(contains(openError(), "has no image_1")) << openError();
-  fs::remove_all(directory_ / "image_0");
-  EXPECT_TRUE(contains(openError(), "neither image_0 and image_1 nor image_2 and image_3")) << openError();
-}
-
-TEST_F(KittiDataset, MissingLeftImageAndGapsAreNamed) {
-  fs::remove(directory_ / "image_0" / "000002.png");
-  EXPECT_TRUE(contains(openError(), path("image_0/000002.png") + "' is missing")) << openError();
+  expectError([] { KittiSequence("/nowhere/06"); }, {"'/nowhere/06' does not exist"});
+  const auto expectMissing = [this](const std::string& removed, const std::vector<std::string>& words) {
+    fs::remove_all(directory_ / removed);
+    expectWords(openError(), words);
+  };
+  expectMissing("image_1/000001.png", {"'" + path("image_1/000001.png") + "' is missing", "has 3 images", "has 2;"});
+  expectMissing("image_1", {"has no image_1"});
+  expectMissing("image_0", {"neither image_0 and image_1 nor image_2 and image_3"});
+  SetUp();
+  expectMissing("image_0/000002.png", {path("image_0/000002.png") + "' is missing"});
   fs::remove(directory_ / "image_1" / "000002.png");
   writeText("times.txt", "0.0\n0.1\n");
   EXPECT_EQ(open().size(), 2);
-  fs::remove(directory_ / "image_0" / "000000.png");
   fs::remove(directory_ / "image_1" / "000000.png");
-  EXPECT_TRUE(contains(openError(), path("image_0/000000.png") + "' is missing")) << openError();
-  fs::remove(directory_ / "image_0" / "000001.png");
-  EXPECT_TRUE(contains(openError(), "has no PNG images")) << openError();
+  expectMissing("image_0/000000.png", {path("image_0/000000.png") + "' is missing"});
+  expectMissing("image_0/000001.png", {"has no PNG images"});
 }
 
-TEST_F(KittiDataset, TruncatedImagesAreRefusedWhereverTheyEnd) {
+TEST_F(KittiDataset, TruncatedAndDamagedImagesAreRefused) {
   const std::string file = path("image_1/000001.png");
   std::ifstream stream(file, std::ios::binary);
   const std::string bytes((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
   const KittiSequence sequence = open();
   ASSERT_NO_THROW(sequence.load(1));
+  const auto errorWith = [&](const std::string& damaged) {
+    std::ofstream(file, std::ios::binary) << damaged;
+    return errorOf([&] { sequence.load(1); });
+  };
+  const std::string truncated = "image '" + file + "' is truncated: copy it again";
   for (const std::size_t size :
-       {bytes.size() - 1, bytes.size() - 12, bytes.size() / 2, std::size_t{40}, std::size_t{8}}) {
-    std::ofstream(file, std::ios::binary) << bytes.substr(0, size);
-    EXPECT_EQ(errorOf([&] { sequence.load(1); }), "image '" + file + "' is truncated: copy it again") << size;
-  }
-  std::string longer_end = bytes;
+       {bytes.size() - 1, bytes.size() - 12, bytes.size() / 2, std::size_t{40}, std::size_t{8}})
+    EXPECT_EQ(errorWith(bytes.substr(0, size)), truncated) << size;
+  std::string longer_end = bytes, flipped = bytes;
   longer_end[bytes.size() - 12 + 3] = 1;  // the length of the last chunk, which is empty
-  std::ofstream(file, std::ios::binary) << longer_end;
-  EXPECT_EQ(errorOf([&] { sequence.load(1); }), "image '" + file + "' is truncated: copy it again");
-  std::ofstream(file, std::ios::binary) << "";
-  EXPECT_EQ(errorOf([&] { sequence.load(1); }), "image '" + file + "' is not a PNG file");
-}
-
-TEST_F(KittiDataset, DamagedImagesAreRefused) {
-  const std::string file = path("image_0/000001.png");
-  std::ifstream stream(file, std::ios::binary);
-  std::string bytes((std::istreambuf_iterator<char>(stream)), std::istreambuf_iterator<char>());
-  bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 0x55);
-  std::ofstream(file, std::ios::binary) << bytes;
-  EXPECT_TRUE(contains(errorOf([&] { open().load(1); }), "'" + file + "' is damaged"));
+  EXPECT_EQ(errorWith(longer_end), truncated);
+  EXPECT_EQ(errorWith(""), "image '" + file + "' is not a PNG file");
+  flipped[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 0x55);
+  expectWords(errorWith(flipped), {"'" + file + "' is damaged"});
 }
 
 TEST_F(KittiDataset, SizesMustAgree) {
-  cv::imwrite(path("image_1/000001.png"), noise(119, 80, CV_8UC1, 5));
-  const std::string error = errorOf([&] { open().load(1); });
-  EXPECT_TRUE(contains(error, path("image_0/000001.png") + "' (120x80)")) << error;
-  EXPECT_TRUE(contains(error, path("image_1/000001.png") + "' (119x80) differ in size")) << error;
-  cv::imwrite(path("image_0/000001.png"), noise(119, 80, CV_8UC1, 5));
-  EXPECT_TRUE(contains(errorOf([&] { open().load(1); }), "is 119x80 but the first one"));
+  const std::string left = path("image_0/000001.png"), right = path("image_1/000001.png");
+  cv::imwrite(right, noise(119, 80, CV_8UC1, 5));
+  expectError([&] { open().load(1); }, {left + "' (120x80)", right + "' (119x80) differ in size"});
+  cv::imwrite(left, noise(119, 80, CV_8UC1, 5));
+  expectError([&] { open().load(1); }, {"is 119x80 but the first one"});
 }
 
 TEST_F(KittiDataset, FramesOutsideAreRefused) {
   const KittiSequence sequence = open();
   for (const int i : {-1, 3}) {
-    EXPECT_TRUE(contains(errorOf([&] { sequence.load(i); }), "frame " + std::to_string(i) + " is outside"));
-    EXPECT_TRUE(contains(errorOf([&] { sequence.stamp(i); }), "which has 3 frames"));
+    expectError([&] { sequence.load(i); }, {"frame " + std::to_string(i) + " is outside"});
+    expectError([&] { sequence.stamp(i); }, {"which has 3 frames"});
   }
 }
 

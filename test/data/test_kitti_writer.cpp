@@ -5,6 +5,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "../said.hpp"
 #include "../temporary_folder.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 
@@ -70,7 +71,7 @@ TEST_F(KittiWriterTest, TheNameAppearsWithTheWholeSequence) {
     writer.writeImage(0, 0, image(0, 0));
     EXPECT_FALSE(fs::exists(directory_));
     EXPECT_TRUE(fs::exists(directory_ + ".part"));
-    EXPECT_NE(errorOfWriter().find("left from an interrupted run"), std::string::npos);
+    EXPECT_TRUE(contains(errorOfWriter(), "left from an interrupted run"));
   }  // something failed
   EXPECT_TRUE(fs::is_empty(root_));
   KittiWriter writer(directory_);
@@ -84,7 +85,7 @@ TEST_F(KittiWriterTest, NothingIsOverwritten) {
   fs::create_directory(directory_);
   EXPECT_EQ(errorOfWriter(), "no error");  // it is empty
   std::ofstream(directory_ + "/notes.txt") << "mine";
-  EXPECT_NE(errorOfWriter().find("not empty"), std::string::npos);
+  EXPECT_TRUE(contains(errorOfWriter(), "not empty"));
   EXPECT_FALSE(fs::exists(directory_ + ".part"));
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "../said.hpp"
 #include "../temporary_folder.hpp"
 #include "stereo_descriptor_vo/data/stereo_rectification.hpp"
 
@@ -92,11 +93,11 @@ TEST(StereoRectification, CamerasThatAreNoPairAreNamed) {
     }
     return "no error";
   };
-  EXPECT_NE(errorOf(kRadtan, 0.1).find("swapped"), std::string::npos);
-  EXPECT_NE(errorOf(kWide, -0.1).find("resolution"), std::string::npos);
+  EXPECT_TRUE(contains(errorOf(kRadtan, 0.1), "swapped"));
+  EXPECT_TRUE(contains(errorOf(kWide, -0.1), "resolution"));
   RawCamera other = kRadtan;
   other.setLens("fisheye", {0.0, 0.0, 0.0, 0.0});
-  EXPECT_NE(errorOf(other, -0.1).find("lens model"), std::string::npos);
+  EXPECT_TRUE(contains(errorOf(other, -0.1), "lens model"));
 }
 
 /// One rig in the three formats, with lenses of no distortion and axes that agree.
@@ -180,7 +181,7 @@ TEST_F(CalibrationFile, WhatIsWrongIsNamed) {
       {{infos({})[0], chain({})[0]}, formats},
       {{"nowhere.yaml"}, "nowhere.yaml': it does not exist"},
       {{write("[1, 2]")}, formats}};
-  for (const auto& [files, words] : cases) EXPECT_NE(errorOf(files).find(words), std::string::npos) << errorOf(files);
+  for (const auto& [files, words] : cases) EXPECT_TRUE(contains(errorOf(files), words)) << errorOf(files);
 }
 
 }  // namespace test_stereo_rectification

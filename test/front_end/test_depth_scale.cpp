@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 #include "stereo_descriptor_vo/front_end/depth_scale.hpp"
@@ -55,8 +56,8 @@ TEST(DepthScale, RefusesBoundsThatLeaveNoSize) {
   DepthScaleOptions options = plainCurve();
   options.min_size = 30.5;
   EXPECT_THROW(DepthScale{options}, std::invalid_argument);
-  const std::string error = synthetic::errorOf([&] { DepthScale{options}; });
-  EXPECT_NE(error.find("min_size"), std::string::npos) << error;
+  const std::string error = errorOf([&] { DepthScale{options}; });
+  EXPECT_TRUE(contains(error, "min_size")) << error;
   options.min_size = options.max_size;
   EXPECT_EQ(DepthScale(options).size(1.0), 30.0);
   options.exponent = 0.0;

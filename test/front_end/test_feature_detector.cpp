@@ -10,14 +10,13 @@
 #include <set>
 #include <utility>
 
+#include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "../temporary_folder.hpp"
 #include "stereo_descriptor_vo/front_end/feature_detector.hpp"
 
 namespace sdvo {
 namespace test_feature_detector {
-
-using synthetic::errorOf;
 
 constexpr int kBucket = 50;  // px
 const cv::Size kSize(600, 400);
@@ -104,35 +103,38 @@ TEST(FeatureDetector, TheMaskOfAFileHoldsUntilAnotherIsGiven) {
 }
 
 TEST(FeatureDetector, AMaskThatDoesNotFitIsNamed) {
-  FeatureDetectorOptions options;
   const cv::Mat image = unevenTexture();
-  EXPECT_EQ(errorOf([&] { FeatureDetector(options).detect(image, 0, cv::Mat::zeros(100, 200, CV_8U)); }),
+  const auto errorWith = [&](const cv::Mat& mask) {
+    return errorOf([&] { FeatureDetector({}).detect(image, 0, mask); });
+  };
+  EXPECT_EQ(errorWith(cv::Mat::zeros(100, 200, CV_8U)),
             "the mask is 200x100, the left image is 600x400: make it of the rectified left image");
-  EXPECT_EQ(errorOf([&] { FeatureDetector(options).detect(image, 0, cv::Mat::zeros(image.size(), CV_8UC3)); }),
-            "the mask must have one channel of eight bits");
-  options.mask = "/nowhere/mask.png";
-  EXPECT_EQ(errorOf([&] { FeatureDetector{options}; }), "mask: cannot read a PNG from '/nowhere/mask.png'");
+  EXPECT_EQ(errorWith(cv::Mat::zeros(image.size(), CV_8UC3)), "the mask must have one channel of eight bits");
+
   const TemporaryFolder folder;
-  options.mask = (folder.path() / "pipe").string();
-  ASSERT_EQ(::mkfifo(options.mask.c_str(), 0600), 0);
-  EXPECT_EQ(errorOf([&] { FeatureDetector{options}; }), "mask: cannot read a PNG from '" + options.mask + "'");
+  const std::string pipe = (folder.path() / "pipe").string(), png = (folder.path() / "mask.png").string();
+  const auto errorOfFile = [](const std::string& file) {
+    FeatureDetectorOptions options;
+    options.mask = file;
+    return errorOf([&] { FeatureDetector{options}; });
+  };
+  EXPECT_EQ(errorOfFile("/nowhere/mask.png"), "mask: cannot read a PNG from '/nowhere/mask.png'");
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  EXPECT_EQ(errorOfFile(pipe), "mask: cannot read a PNG from '" + pipe + "'");
   // The header alone, of a huge one and of one that ends early.
-  options.mask = (folder.path() / "mask.png").string();
-  cv::imwrite(options.mask, maskUpTo(10));
-  std::fstream png(options.mask, std::ios::in | std::ios::out | std::ios::binary);
-  png.seekp(16);
+  cv::imwrite(png, maskUpTo(10));
+  std::fstream stream(png, std::ios::in | std::ios::out | std::ios::binary);
+  stream.seekp(16);
   const char huge[] = {0, 0, 0x75, 0x30, 0, 0, 0x75, 0x30, 8, 0, 0, 0, 0, 0x43, 0x4c, static_cast<char>(0xa7), 0x66};
-  png.write(huge, sizeof huge);
-  png.close();
-  EXPECT_EQ(errorOf([&] { FeatureDetector{options}; }),
-            "mask: '" + options.mask + "' has 30000x30000 px: a mask has the size of the rectified left image");
-  cv::imwrite(options.mask, maskUpTo(10));
-  std::filesystem::resize_file(options.mask, std::filesystem::file_size(options.mask) / 2);
-  EXPECT_EQ(errorOf([&] { FeatureDetector{options}; }),
-            "mask: cannot read all of the PNG '" + options.mask + "': is it truncated?");
+  stream.write(huge, sizeof huge);
+  stream.close();
+  EXPECT_EQ(errorOfFile(png),
+            "mask: '" + png + "' has 30000x30000 px: a mask has the size of the rectified left image");
+  cv::imwrite(png, maskUpTo(10));
+  std::filesystem::resize_file(png, std::filesystem::file_size(png) / 2);
+  EXPECT_EQ(errorOfFile(png), "mask: cannot read all of the PNG '" + png + "': is it truncated?");
   // Where a nodelet's folder is not the user's.
-  options.mask = "~/mask.png";
-  EXPECT_EQ(errorOf([&] { FeatureDetector{options}; }),
+  EXPECT_EQ(errorOfFile("~/mask.png"),
             "mask: cannot read a PNG from '" + std::filesystem::current_path().string() + "/~/mask.png'");
 }
 

@@ -2,14 +2,13 @@
 
 #include <algorithm>
 
+#include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 #include "stereo_descriptor_vo/front_end/freak.hpp"
 
 namespace sdvo {
 namespace test_feature_extractor {
-
-using synthetic::errorOf;
 
 struct Pair {
   cv::Mat left, right;
@@ -135,7 +134,7 @@ TEST(FeatureExtractor, FollowsTheRowsOfARightCameraThatTurned) {
     const cv::Mat right =
         synthetic::render(size, [&](double u, double v) { return texture.at(u + 14.0, v - line(u)); });
     const StereoFeatures features = FeatureExtractor(fewFeatures()).extract(camera, left, right, 0);
-    EXPECT_NE(features.report.status.find(rows.words), std::string::npos) << features.report.status;
+    EXPECT_TRUE(contains(features.report.status, rows.words)) << features.report.status;
     EXPECT_EQ(features.report.refused, rows.is_refused) << "beyond a degree";
     EXPECT_EQ(features.count() >= 100, !rows.is_refused);
     double square = 0.0;
@@ -194,14 +193,10 @@ TEST(FeatureExtractor, RefusesWrongImagesNamingTheSide) {
   const cv::Mat colour(camera.height, camera.width, CV_8UC3, cv::Scalar(100));
   const cv::Mat deep(camera.height, camera.width, CV_16U, cv::Scalar(100));
   for (const cv::Mat& bad : {narrow, low, colour, deep, cv::Mat()}) {
-    EXPECT_THROW(extractor.extract(camera, bad, good, 0), std::invalid_argument);
     EXPECT_EQ(errorOf([&] { extractor.extract(camera, bad, good, 0); }).rfind("left image", 0), 0u);
-    EXPECT_THROW(extractor.extract(camera, good, bad, 0), std::invalid_argument);
     EXPECT_EQ(errorOf([&] { extractor.extract(camera, good, bad, 0); }).rfind("right image", 0), 0u);
   }
-  const std::string error = errorOf([&] { extractor.extract(camera, narrow, good, 0); });
-  EXPECT_NE(error.find("639x480"), std::string::npos) << error;
-  EXPECT_NE(error.find("640x480"), std::string::npos) << error;
+  expectError([&] { extractor.extract(camera, narrow, good, 0); }, {"639x480", "640x480"});
   StereoCamera uncalibrated = camera;
   uncalibrated.fx = 0.0;
   EXPECT_THROW(extractor.extract(uncalibrated, good, good, 0), std::invalid_argument);
@@ -209,34 +204,28 @@ TEST(FeatureExtractor, RefusesWrongImagesNamingTheSide) {
 
 TEST(FeatureExtractor, SaysWhyAPairGivesNothing) {
   const StereoCamera camera = synthetic::camera();
-  const FeatureExtractor extractor(fewFeatures());
   const cv::Mat black(camera.height, camera.width, CV_8U, cv::Scalar(0));
   const Pair pair = planeAt(10.0);
-  const auto expectEmpty = [&](const cv::Mat& left, const cv::Mat& right, const std::string& word) {
-    const StereoFeatures features = extractor.extract(camera, left, right, 5);
-    EXPECT_EQ(features.count(), 0);
-    EXPECT_NO_THROW(features.check());
-    EXPECT_NE(features.report.status.find(word), std::string::npos) << features.report.status;
-  };
-  expectEmpty(black, black, "corners");
-  expectEmpty(black, pair.right, "corners");
-  expectEmpty(pair.left, black, "stereo");
-  expectEmpty(pair.right, pair.left, "swapped");
-
   FeatureExtractorOptions huge = fewFeatures();
-  huge.size_curve.min_size = 150.0;  // reaches 471 px
-  huge.size_curve.max_size = 150.0;
+  huge.size_curve.min_size = huge.size_curve.max_size = 150.0;  // reaches 471 px
   huge.descriptor.extend_border = false;
-  const StereoFeatures outside = FeatureExtractor(huge).extract(camera, pair.left, pair.right, 5);
-  EXPECT_EQ(outside.count(), 0);
-  EXPECT_NE(outside.report.status.find("border"), std::string::npos) << outside.report.status;
-
   // Of so few rows none is as far from both borders as a descriptor reaches.
   StereoCamera flat = camera;
   flat.height = 36;
   const cv::Range rows(100, 100 + flat.height);
-  const StereoFeatures none = extractor.extract(flat, pair.left.rowRange(rows), pair.right.rowRange(rows), 5);
-  EXPECT_NE(none.report.status.find("the image is too small"), std::string::npos) << none.report.status;
+  const auto expectEmpty = [&](const cv::Mat& left, const cv::Mat& right, const std::string& words,
+                               const StereoCamera& camera, const FeatureExtractorOptions& options) {
+    const StereoFeatures features = FeatureExtractor(options).extract(camera, left, right, 5);
+    EXPECT_EQ(features.count(), 0);
+    EXPECT_NO_THROW(features.check());
+    expectWords(features.report.status, {words});
+  };
+  expectEmpty(black, black, "corners", camera, fewFeatures());
+  expectEmpty(black, pair.right, "corners", camera, fewFeatures());
+  expectEmpty(pair.left, black, "stereo", camera, fewFeatures());
+  expectEmpty(pair.right, pair.left, "swapped", camera, fewFeatures());
+  expectEmpty(pair.left, pair.right, "border", camera, huge);
+  expectEmpty(pair.left.rowRange(rows), pair.right.rowRange(rows), "the image is too small", flat, fewFeatures());
 }
 
 TEST(FeatureExtractor, SizesFollowTheDescriptorUnlessSet) {
@@ -262,9 +251,7 @@ TEST(FeatureExtractor, SizesFollowTheDescriptorUnlessSet) {
 TEST(FeatureExtractor, RefusesALimitThatTheDescriptorsOwnContradicts) {
   FeatureExtractorOptions options;
   options.size_curve.max_size = 3.0;
-  const std::string error = synthetic::errorOf([&] { FeatureExtractor{options}; });
-  for (const char* part : {"size_curve/min_size", "4 px", "3 px"})
-    EXPECT_NE(error.find(part), std::string::npos) << error;
+  expectError([&] { FeatureExtractor{options}; }, {"size_curve/min_size", "4 px", "3 px"});
 }
 
 TEST(FeatureExtractor, DescribesMostOfASmallImage) {

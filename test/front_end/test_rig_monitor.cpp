@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/front_end/rig_monitor.hpp"
 
@@ -42,7 +43,7 @@ std::string diagnosis(const cv::Mat& left, const cv::Mat& right) {
 }
 
 void expectSaid(const std::string& diagnosis, const std::string& words) {
-  EXPECT_NE(diagnosis.find(words), std::string::npos) << "'" << diagnosis << "' does not say '" << words << "'";
+  EXPECT_TRUE(contains(diagnosis, words)) << "'" << diagnosis << "' does not say '" << words << "'";
 }
 
 TEST(RigMonitor, LooksOnlyWhenFewCornersAreFound) {

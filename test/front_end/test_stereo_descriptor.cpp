@@ -2,6 +2,7 @@
 
 #include <opencv2/imgproc.hpp>
 
+#include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/front_end/freak.hpp"
 #include "stereo_descriptor_vo/front_end/stereo_descriptor.hpp"
@@ -151,15 +152,15 @@ TEST(StereoDescriptor, RefusesUnknownNames) {
   DescriptorOptions options;
   std::vector<Option> list = listOptions(options);
   EXPECT_THROW(setOption(list, "layout", "right"), std::invalid_argument);
-  EXPECT_NE(synthetic::errorOf([&] { setOption(list, "type", "unheard_of"); }).find("unheard_of"), std::string::npos);
+  EXPECT_TRUE(contains(errorOf([&] { setOption(list, "type", "unheard_of"); }), "unheard_of"));
 }
 
 TEST(StereoDescriptor, OptionsKnowWhatTheOpenCvAtHandLacks) {
   for (const std::string& name : namesOf(DescriptorType{})) {
     DescriptorOptions options;
     options.type = valueOf<DescriptorType>(name);
-    const std::string lacks = synthetic::errorOf([&] { makeBaseDescriptor(options.type); });
-    EXPECT_EQ(synthetic::errorOf([&] { checked(options); }), lacks);
+    const std::string lacks = errorOf([&] { makeBaseDescriptor(options.type); });
+    EXPECT_EQ(errorOf([&] { checked(options); }), lacks);
   }
 }
 

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "../../src/common/statistics.hpp"
+#include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/map/reacquisition.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
@@ -85,7 +86,7 @@ class Outage : public ::testing::Test {
   void expectFoundAt(const Eigen::Isometry3d& T_origin_camera) const {
     EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
     EXPECT_EQ(result_.epoch, 0);
-    EXPECT_NE(result_.reason.find("re-acquired by " + std::to_string(result_.inliers) + " points"), std::string::npos)
+    EXPECT_TRUE(contains(result_.reason, "re-acquired by " + std::to_string(result_.inliers) + " points"))
         << result_.reason;
     const Vector6d error = logSE3(T_origin_camera.inverse() * result_.T_origin_camera);
     EXPECT_LT(error.head<3>().norm(), 0.01);
@@ -97,7 +98,7 @@ class Outage : public ::testing::Test {
     EXPECT_TRUE(result_.has_pose) << result_.reason;
     EXPECT_EQ(result_.epoch, 1) << result_.reason;
     EXPECT_EQ(result_.state, TrackingState::kDegraded);
-    EXPECT_NE(result_.reason.find("started again"), std::string::npos) << result_.reason;
+    EXPECT_TRUE(contains(result_.reason, "started again")) << result_.reason;
   }
 
   /// The old map is kept until the next pair is measured against this one.
@@ -129,7 +130,7 @@ TEST_F(Outage, TheSameEpochGoesOnWhereTheCameraHasMovedTo) {
     for (int k = 1; k < 5; ++k) {
       result_ = odometry_.update(pairOf(room_, i + k, poseAt(i + k)));
       EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
-      EXPECT_EQ(result_.reason.find("re-acquired"), std::string::npos);
+      EXPECT_FALSE(contains(result_.reason, "re-acquired"));
       EXPECT_NEAR(result_.dt, 0.05, 1e-9);
       EXPECT_LT((result_.T_origin_camera.translation() - poseAt(i + k).translation()).norm(), 0.01);
     }

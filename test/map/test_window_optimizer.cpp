@@ -27,6 +27,30 @@ Eigen::Isometry3d perturbed(const Eigen::Isometry3d& T, int axis, double step) {
 
 constexpr double kPositionSigma = 0.2;  // px
 
+RigCalibration calibrationOf(double offset, double bend) {
+  RigCalibration calibration;
+  calibration.value << offset, bend;
+  return calibration;
+}
+
+WindowOptimizerOptions iterated(int iterations) {
+  WindowOptimizerOptions options;
+  options.iterations = iterations;
+  return options;
+}
+
+/// The points before `points` in the frames before `frames` alone.
+Window partOf(Window window, std::size_t frames, std::size_t points) {
+  window.T_camera_origin.resize(frames);
+  window.points.resize(points);
+  const auto is_left_out = [&](const WindowObservation& o) {
+    return o.frame >= static_cast<int>(frames) || o.point >= static_cast<int>(points);
+  };
+  window.observations.erase(std::remove_if(window.observations.begin(), window.observations.end(), is_left_out),
+                            window.observations.end());
+  return window;
+}
+
 /// Five poses, sixty points, measurements without noise but with the rig's error; poses and points start off the truth.
 Window disturbedWindow(const RigCalibration& truth, const std::function<Eigen::Isometry3d(int)>& pose = syntheticPose) {
   std::mt19937 random(7);
@@ -57,12 +81,9 @@ Window disturbedWindow(const RigCalibration& truth, const std::function<Eigen::I
 }
 
 TEST(WindowOptimizer, FindsPosesAndCalibrationOfExactMeasurements) {
-  RigCalibration truth;
-  truth.value << 0.3, -1.0;
+  const RigCalibration truth = calibrationOf(0.3, -1.0);
   Window window = disturbedWindow(truth);
-  WindowOptimizerOptions options;
-  options.iterations = 50;
-  const WindowSolution solution = WindowOptimizer(options).optimize(window);
+  const WindowSolution solution = WindowOptimizer(iterated(50)).optimize(window);
   ASSERT_TRUE(solution.success);
   for (int f = 0; f < 5; ++f) {
     const Vector6d error = logSE3(window.T_camera_origin[f] * syntheticPose(f));
@@ -74,8 +95,7 @@ TEST(WindowOptimizer, FindsPosesAndCalibrationOfExactMeasurements) {
 }
 
 TEST(WindowOptimizer, IsTheSameToTheBitWithAndWithoutVectors) {
-  RigCalibration truth;
-  truth.value << 0.3, -1.0;
+  const RigCalibration truth = calibrationOf(0.3, -1.0);
   const Window disturbed = disturbedWindow(truth);
   Window fast = disturbed, plain = disturbed;
   const WindowSolution with_vectors = WindowOptimizer(WindowOptimizerOptions{}).optimize(fast);
@@ -90,8 +110,7 @@ TEST(WindowOptimizer, IsTheSameToTheBitWithAndWithoutVectors) {
 }
 
 TEST(WindowOptimizer, TheCovarianceOfSomePosesIsPartOfThatOfAll) {
-  RigCalibration truth;
-  truth.value << 0.3, -1.0;
+  const RigCalibration truth = calibrationOf(0.3, -1.0);
   const Window disturbed = disturbedWindow(truth);
   const std::vector<int> asked = {4, 2};
   Window one = disturbed, another = disturbed;
@@ -111,16 +130,8 @@ TEST(WindowOptimizer, TheCovarianceOfSomePosesIsPartOfThatOfAll) {
 }
 
 TEST(WindowOptimizer, AWindowSaysTheSameWhateverWasOptimisedBefore) {
-  RigCalibration truth;
-  truth.value << 0.3, -1.0;
-  const Window large = disturbedWindow(truth);
-  Window small = large;
-  small.T_camera_origin.resize(4);
-  small.points.resize(40);
-  const auto is_left_out = [](const WindowObservation& o) { return o.frame >= 4 || o.point >= 40; };
-  small.observations.erase(std::remove_if(small.observations.begin(), small.observations.end(), is_left_out),
-                           small.observations.end());
-
+  const RigCalibration truth = calibrationOf(0.3, -1.0);
+  const Window large = disturbedWindow(truth), small = partOf(large, 4, 40);
   WindowOptimizer optimizer(WindowOptimizerOptions{});
   for (const Window& window : {large, small, large}) {
     Window alone = window, after_others = window;
@@ -146,8 +157,7 @@ void addNoise(Window& window, double position, double disparity, std::uint32_t s
 
 /// A kernel that bends far out: plain least squares.
 WindowOptimizerOptions leastSquares() {
-  WindowOptimizerOptions options;
-  options.iterations = 10;
+  WindowOptimizerOptions options = iterated(10);
   options.kernel_scale = 20.0;
   options.noise.common_disparity = 0.0;
   return options;
@@ -156,8 +166,7 @@ WindowOptimizerOptions leastSquares() {
 TEST(WindowOptimizer, CovariancesAreThoseOfTheErrors) {
   constexpr int kTrials = 200;
   const WindowOptimizerOptions options = leastSquares();
-  RigCalibration truth;
-  truth.value << 0.2, -0.5;
+  const RigCalibration truth = calibrationOf(0.2, -0.5);
   double pose_nees = 0.0, calibration_nees = 0.0;
   for (int trial = 0; trial < kTrials; ++trial) {
     Window window = disturbedWindow(truth);
@@ -246,8 +255,7 @@ Window windowOfTheModel(int frames, double factor, double outliers, double share
 /// Mean NEES of the newest pose relative to the one before, over a hundred windows.
 double neesOfTheNewestMotion(int frames, double factor, double outliers, double shared = 0.0) {
   constexpr int kTrials = 100;
-  WindowOptimizerOptions options;
-  options.iterations = 20;
+  WindowOptimizerOptions options = iterated(20);
   double nees = 0.0;
   for (int trial = 0; trial < kTrials; ++trial) {
     Window window =
@@ -323,8 +331,7 @@ TEST(WindowOptimizer, AFloorAddsItsInformationToThatOfEachPose) {
 }
 
 TEST(WindowOptimizer, InformationOfTheCalibrationIsWithoutThePrior) {
-  RigCalibration truth;
-  truth.value << 0.2, -0.5;
+  const RigCalibration truth = calibrationOf(0.2, -0.5);
   Window weak = disturbedWindow(truth), strong = disturbedWindow(truth);
   addNoise(weak, kPositionSigma, 0.2, 1);
   addNoise(strong, kPositionSigma, 0.2, 1);
@@ -346,8 +353,7 @@ TEST(WindowOptimizer, ThePriorPullsTowardsItsMean) {
 
 TEST(WindowOptimizer, PosesFollowTheCalibrationByTheirDerivative) {
   constexpr double kStep = 1e-3;  // px
-  RigCalibration truth;
-  truth.value << 0.2, -0.5;
+  const RigCalibration truth = calibrationOf(0.2, -0.5);
   for (int i = 0; i < RigCalibration::kParameters; ++i) {
     std::vector<Eigen::Isometry3d> poses[2];
     WindowSolution solution;
@@ -386,8 +392,7 @@ Window windowWithCommonErrors(double common, double position, std::uint32_t seed
 /// Mean of what forty such windows tell, px^2.
 double commonVarianceFound(double common, double believed, double position = 0.02, double kernel_scale = 20.0) {
   constexpr int kTrials = 40;
-  WindowOptimizerOptions options;
-  options.iterations = 10;
+  WindowOptimizerOptions options = iterated(10);
   options.kernel_scale = kernel_scale;
   double sum = 0.0;
   for (int trial = 0; trial < kTrials; ++trial) {
@@ -432,11 +437,7 @@ TEST(WindowOptimizer, WhatIsBelievedOfTheCommonErrorsDoesNotMakeThem) {
 }
 
 TEST(WindowOptimizer, FewPointsTellNothingOfCommonErrors) {
-  Window window = windowWithCommonErrors(0.2, 0.02, 1);
-  window.points.resize(19);
-  const auto is_left_out = [](const WindowObservation& o) { return o.point >= 19; };
-  window.observations.erase(std::remove_if(window.observations.begin(), window.observations.end(), is_left_out),
-                            window.observations.end());
+  Window window = partOf(windowWithCommonErrors(0.2, 0.02, 1), 5, 19);
   const WindowSolution solution = WindowOptimizer(WindowOptimizerOptions{}).optimize(window);
   EXPECT_TRUE(solution.success);
   EXPECT_FALSE(solution.common_disparity_square);
@@ -474,16 +475,13 @@ void expectSquaresOf(const Window& window, const WindowOptimizerOptions& options
 }
 
 TEST(WindowOptimizer, ResidualsAreInUnitsOfWhatIsExpected) {
-  RigCalibration truth;
-  truth.value << 0.2, -0.5;
+  const RigCalibration truth = calibrationOf(0.2, -0.5);
   Window window = disturbedWindow(truth);
   addNoise(window, 0.5, 0.5, 2);
   for (std::size_t i = 0; i < window.observations.size(); i += 3) window.observations[i].sigma = 0.7;
-  WindowOptimizerOptions options;
-  options.iterations = 10;
-  const WindowSolution solution = WindowOptimizer(options).optimize(window);
+  const WindowSolution solution = WindowOptimizer(iterated(10)).optimize(window);
   ASSERT_TRUE(solution.success);
-  expectSquaresOf(window, options, solution);
+  expectSquaresOf(window, iterated(10), solution);
 }
 
 TEST(WindowOptimizer, ARefusedStepIsTriedAgainWithMoreDamping) {
@@ -506,9 +504,7 @@ TEST(WindowOptimizer, ASightingThatCannotBeIsNotUsed) {
   Eigen::Isometry3d turned = Eigen::Isometry3d::Identity();
   turned.linear() = Eigen::AngleAxisd(3.0, Eigen::Vector3d::UnitY()).toRotationMatrix();
   window.points[0].T_origin_anchor = turned;  // behind all cameras
-  WindowOptimizerOptions options;
-  options.iterations = 20;
-  const WindowSolution solution = WindowOptimizer(options).optimize(window);
+  const WindowSolution solution = WindowOptimizer(iterated(20)).optimize(window);
   ASSERT_TRUE(solution.success);
   for (int i = 0; i < 5; ++i) EXPECT_GT(solution.squares[i], 2500.0);
   EXPECT_LT(logSE3(window.T_camera_origin[4] * syntheticPose(4)).norm(), 0.01);
@@ -524,9 +520,7 @@ TEST(WindowOptimizer, HoldsTheFirstPose) {
 TEST(WindowOptimizer, OneWrongSightingDoesNotMoveTheRest) {
   Window window = disturbedWindow(RigCalibration{});
   window.observations[42].measurement += Eigen::Vector3d(40.0, -25.0, 5.0);
-  WindowOptimizerOptions options;
-  options.iterations = 50;
-  const WindowSolution solution = WindowOptimizer(options).optimize(window);
+  const WindowSolution solution = WindowOptimizer(iterated(50)).optimize(window);
   ASSERT_TRUE(solution.success);
   EXPECT_GT(solution.squares[42], 400.0);
   EXPECT_LT(logSE3(window.T_camera_origin[4] * syntheticPose(4)).norm(), 0.01);

@@ -2,6 +2,7 @@
 
 #include <set>
 
+#include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/matching/feature_matcher.hpp"
@@ -235,8 +236,8 @@ TEST(FeatureMatcher, RefusesSetsThatCannotBeCompared) {
   addFeature(left, 100, 100, 10, randomRow(random, 64));
   left.layout = DescriptorLayout::kLeft;
   EXPECT_THROW(FeatureMatcher({}).match(both, left, std::nullopt), std::invalid_argument);
-  const std::string error = synthetic::errorOf([&] { FeatureMatcher({}).match(both, left, std::nullopt); });
-  EXPECT_NE(error.find("left+right"), std::string::npos) << error;
+  const std::string error = errorOf([&] { FeatureMatcher({}).match(both, left, std::nullopt); });
+  EXPECT_TRUE(contains(error, "left+right")) << error;
   StereoFeatures other = both;
   other.descriptor = "orb";
   EXPECT_THROW(FeatureMatcher({}).match(both, other, std::nullopt), std::invalid_argument);

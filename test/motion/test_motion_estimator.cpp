@@ -4,6 +4,7 @@
 #include <iterator>
 #include <limits>
 
+#include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/motion/motion_estimator.hpp"
 
@@ -278,7 +279,7 @@ TEST(MotionEstimator, FailsOnTooFewMatches) {
     const MotionEstimate estimate =
         estimator.estimate(synthetic::camera(), randomProblem(6, count, 0.1, 0.0).correspondences);
     expectFailure(estimate);
-    EXPECT_NE(estimate.reason.find(std::to_string(count)), std::string::npos) << estimate.reason;
+    EXPECT_TRUE(contains(estimate.reason, std::to_string(count))) << estimate.reason;
   }
   EXPECT_TRUE(estimator.estimate(synthetic::camera(), randomProblem(6, 12, 0.1, 0.0).correspondences).success);
 }

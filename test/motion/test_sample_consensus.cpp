@@ -4,6 +4,7 @@
 #include <limits>
 #include <set>
 
+#include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/motion/sample_consensus.hpp"
 
@@ -165,8 +166,8 @@ INSTANTIATE_TEST_SUITE_P(ByName, EveryMethod, testing::Values("ransac", "msac", 
 TEST(SampleConsensus, RefusesUnknownNames) {
   SampleConsensusOptions options;
   std::vector<Option> list = listOptions(options);
-  const std::string error = synthetic::errorOf([&] { setOption(list, "consensus", "prosac"); });
-  EXPECT_NE(error.find("adaptive_gasac"), std::string::npos) << error;
+  const std::string error = errorOf([&] { setOption(list, "consensus", "prosac"); });
+  EXPECT_TRUE(contains(error, "adaptive_gasac")) << error;
 }
 
 /// A minimal sample carries the noise of its three points; optimised over all of its inliers a pose gathers more of

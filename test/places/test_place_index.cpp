@@ -4,13 +4,12 @@
 #include <random>
 #include <vector>
 
+#include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/places/place_index.hpp"
 
 namespace sdvo {
 namespace test_place_index {
-
-using synthetic::errorOf;
 
 using Rows = std::vector<std::vector<std::uint8_t>>;
 
@@ -127,14 +126,14 @@ TEST(PlaceIndex, RefusesWhatItCannotMakeWordsOf) {
   const PlaceIndex index{PlaceIndexOptions()};
   StereoFeatures floats = show(randomRows(1, 5));
   floats.element_type = ElementType::kFloat32;
-  EXPECT_NE(errorOf([&] { index.signature(floats); }).find("float32"), std::string::npos);
+  EXPECT_TRUE(contains(errorOf([&] { index.signature(floats); }), "float32"));
   StereoFeatures narrow = synthetic::noFeatures(synthetic::camera(), 0, 8);
   std::mt19937 random(1);
   synthetic::addFeature(narrow, 1.0, 1.0, 1.0, synthetic::randomRow(random, 8));
-  EXPECT_NE(errorOf([&] { index.signature(narrow); }).find("at least 72 bits"), std::string::npos);
+  EXPECT_TRUE(contains(errorOf([&] { index.signature(narrow); }), "at least 72 bits"));
   PlaceIndex twice{PlaceIndexOptions()};
   twice.add(1, {});
-  EXPECT_NE(errorOf([&] { twice.add(1, {}); }).find("place 1"), std::string::npos);
+  EXPECT_TRUE(contains(errorOf([&] { twice.add(1, {}); }), "place 1"));
 }
 
 }  // namespace test_place_index

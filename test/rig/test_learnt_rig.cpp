@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "../said.hpp"
 #include "stereo_descriptor_vo/rig/learnt_rig.hpp"
 #include "turned_grid.hpp"
 
@@ -31,7 +32,7 @@ TEST(LearntRig, AKnockOfTheRightCameraIsOneRotation) {
   const ShownRotation rotation = shown(rig, turned);
   EXPECT_GT(rotation.log_odds, 0.0);
   EXPECT_LT((rotation.value - knock).norm(), 0.2e-3);
-  EXPECT_NE(rotation.words().find("0.34 degrees"), std::string::npos) << rotation.words();
+  EXPECT_TRUE(contains(rotation.words(), "0.34 degrees")) << rotation.words();
   rig.rotate(rotation, turned.camera);
   EXPECT_LT(shown(rig, rotatedBack(turned, rig.rotation)).log_odds, logOdds(0.05)) << "it is compensated";
 }

@@ -11,6 +11,7 @@
 #include "../../src/messages/image_conversions.hpp"
 #include "../../src/messages/odometry_conversions.hpp"
 #include "../../src/messages/pose_conversions.hpp"
+#include "../said.hpp"
 
 /// Messages and results to try the conversions on.
 namespace sdvo::ros_conversions {
@@ -19,10 +20,6 @@ using FeaturesMessage = stereo_descriptor_vo::StereoFeatures;
 
 constexpr float kNaN = std::numeric_limits<float>::quiet_NaN();
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
-
-inline bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
 
 /// Every field has a value of its own, so that a mix-up of two fields shows.
 inline StereoFeatures someFeatures(ElementType type = ElementType::kBits,

@@ -5,12 +5,11 @@
 #include <vector>
 
 #include "../../src/ros/params.hpp"
+#include "../said.hpp"
 #include "../synthetic_scene.hpp"
 
 namespace sdvo {
 namespace rostest_params {
-
-using synthetic::errorOf;
 
 enum class Kind { kA, kB };
 

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "../../src/ros/params.hpp"
+#include "../said.hpp"
 
 namespace sdvo {
 namespace rostest_reconfigure_server {
@@ -215,7 +216,7 @@ TEST_F(ReconfigureServerTest, DescribesRangesAndDefaults) {
   EXPECT_EQ(description->groups[0].parameters[1].description, "smaller than high [px]");
   EXPECT_EQ(description->max.ints.at(0).value, 10);
   EXPECT_EQ(description->dflt.ints.at(1).value, 8);
-  EXPECT_NE(description->groups[0].parameters[4].edit_method.find("'value': 'b'"), std::string::npos);
+  EXPECT_TRUE(contains(description->groups[0].parameters[4].edit_method, "'value': 'b'"));
 }
 
 /// As rqt_reconfigure shows them: a tab for each component, and beside a value the one to go back to.

@@ -11,13 +11,10 @@
 #include <vector>
 
 #include "../../src/ros/transforms.hpp"
+#include "../said.hpp"
 
 namespace sdvo {
 namespace rostest_robot_transforms {
-
-bool contains(const std::string& text, const std::string& part) {
-  return text.find(part) != std::string::npos;
-}
 
 geometry_msgs::TransformStamped transform(const std::string& parent, const std::string& child, const ros::Time& stamp,
                                           double x = 0.0) {

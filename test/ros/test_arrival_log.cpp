@@ -7,12 +7,11 @@
 
 #include "../../src/ros/arrival_log.hpp"
 #include "../../src/ros/synchronisers.hpp"
+#include "../said.hpp"
 #include "message_samples.hpp"
 
 namespace sdvo {
 namespace test_arrival_log {
-
-using ros_conversions::contains;
 
 class ArrivalLogTest : public ::testing::Test {
  protected:

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "../../src/ros/camera_finder.hpp"
+#include "../said.hpp"
 
 namespace sdvo {
 namespace test_camera_finder {
@@ -60,8 +61,8 @@ TEST(CameraFinder, TopicsWithoutAPublisherAreNamed) {
   published.erase(published.begin() + 1);
   const std::string only_compressed = explainUnpublished(names, published);
   EXPECT_EQ(only_compressed.find("; nobody publishes /stereo/left/image_rect, but its /compressed: set "), 0u);
-  EXPECT_NE(only_compressed.find("left_image/image_transport"), std::string::npos) << only_compressed;
-  EXPECT_EQ(only_compressed.find("/stereo/right"), std::string::npos) << only_compressed;
+  EXPECT_TRUE(contains(only_compressed, "left_image/image_transport")) << only_compressed;
+  EXPECT_FALSE(contains(only_compressed, "/stereo/right")) << only_compressed;
 }
 
 TEST(CameraFinder, EachOfSeveralIsFound) {
@@ -86,7 +87,7 @@ TEST_F(CameraFinderTest, TheOnlyCameraIsTakenWithAReasonAndGivenBackOnceTheNodes
   ASSERT_TRUE(finder_.update(other, report_));
   EXPECT_EQ(finder_.names().at("left/image_rect"), "/stereo/front/left/image_rect");
   for (const char* word : {"nobody publishes /stereo/left/image_rect", "/stereo/front/right/image_rect", "find_camera"})
-    EXPECT_NE(report_.find(word), std::string::npos) << report_;
+    EXPECT_TRUE(contains(report_, word)) << report_;
   EXPECT_FALSE(finder_.update(other, report_)) << "it is in use";
   const auto two = with({"/stereo/front/left/", "/stereo/front/right/", "/stereo/back/left/", "/stereo/back/right/"});
   EXPECT_FALSE(finder_.update(two, report_)) << "a camera in use stays";
@@ -100,7 +101,7 @@ TEST_F(CameraFinderTest, OfSeveralNoneIsTaken) {
   EXPECT_FALSE(finder_.update(
       with({"/stereo/front/left/", "/stereo/front/right/", "/stereo/back/left/", "/stereo/back/right/"}), report_));
   EXPECT_TRUE(finder_.names().empty());
-  EXPECT_NE(report_.find("several stereo cameras in /stereo/: "), std::string::npos) << report_;
+  EXPECT_TRUE(contains(report_, "several stereo cameras in /stereo/: ")) << report_;
 }
 
 TEST_F(CameraFinderTest, NamesThatTheUserChoseStay) {

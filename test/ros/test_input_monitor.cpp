@@ -5,13 +5,13 @@
 #include <thread>
 
 #include "../../src/ros/diagnostic_tasks.hpp"
+#include "../said.hpp"
 #include "message_samples.hpp"
 
 namespace sdvo {
 namespace test_input_monitor {
 
 using Level = WallUpdater::Level;
-using ros_conversions::contains;
 
 struct Diagnosis {
   int level;

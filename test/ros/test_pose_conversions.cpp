@@ -6,6 +6,7 @@
 #include <string>
 
 #include "../../src/messages/pose_conversions.hpp"
+#include "../said.hpp"
 
 namespace sdvo::ros_conversions {
 namespace test_pose_conversions {
@@ -85,11 +86,11 @@ TEST(PoseConversions, RefusalsSayWhichElementToChange) {
   EXPECT_EQ(refusal(wrong), "the covariance of y and x is not finite: send a number, 0 if it is not known");
   wrong = planar();
   wrong(0, 1) = wrong(1, 0) = 0.3;
-  EXPECT_NE(refusal(wrong).find("covariance of y and x exceeds what their variances allow"), std::string::npos);
+  EXPECT_TRUE(contains(refusal(wrong), "covariance of y and x exceeds what their variances allow"));
   wrong = planar();
   wrong(0, 1) = 0.1;
   wrong(1, 0) = -0.1;
-  EXPECT_NE(refusal(wrong).find("covariance of y and x has two values"), std::string::npos);
+  EXPECT_TRUE(contains(refusal(wrong), "covariance of y and x has two values"));
   geometry_msgs::PoseWithCovariance unset;
   Eigen::Isometry3d pose;
   Matrix6d covariance;

@@ -9,6 +9,7 @@
 #include <string>
 
 #include "../../src/ros/output_files.hpp"
+#include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "../temporary_folder.hpp"
 #include "message_samples.hpp"
@@ -17,8 +18,6 @@ namespace sdvo {
 namespace test_trajectory_file {
 
 namespace fs = std::filesystem;
-using ros_conversions::contains;
-using synthetic::errorOf;
 
 class TrajectoryFile : public ::testing::Test {
  protected:

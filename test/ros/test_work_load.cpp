@@ -5,13 +5,13 @@
 #include <thread>
 
 #include "../../src/ros/diagnostic_tasks.hpp"
+#include "../said.hpp"
 #include "message_samples.hpp"
 
 namespace sdvo {
 namespace test_work_load {
 
 using Level = WallUpdater::Level;
-using ros_conversions::contains;
 
 WallUpdater::Status diagnose(WorkLoad& load) {
   WallUpdater::Status status;

@@ -5,6 +5,7 @@
 
 #include "../../src/tools/feature_halves.hpp"
 #include "../../src/tools/self_check.hpp"
+#include "../said.hpp"
 #include "../synthetic_features.hpp"
 
 namespace sdvo {
@@ -109,15 +110,15 @@ TEST(SelfCheck, ALostDriveHasNoFigures) {
   ASSERT_GT(drive.whole.pairsWithoutPose(), 0) << "else this tests nothing";
   for (const SelfCheck& check :
        {checkHalves(drive.whole, drive.first, drive.second), checkShuttle(drive.whole, drive.back)}) {
-    EXPECT_NE(check.problem.find("no pose"), std::string::npos) << check.problem;
+    EXPECT_TRUE(contains(check.problem, "no pose")) << check.problem;
     EXPECT_EQ(check.row().rfind(check.name + ",40,", 0), 0u);
-    EXPECT_NE(check.row().find(",,,,,,,,"), std::string::npos) << check.row();
-    EXPECT_NE(check.text().find("no figure"), std::string::npos) << check.text();
+    EXPECT_TRUE(contains(check.row(), ",,,,,,,,")) << check.row();
+    EXPECT_TRUE(contains(check.text(), "no figure")) << check.text();
   }
   // A half alone that is lost is no better.
   const Drive good(37);
   const SelfCheck check = checkHalves(good.whole, drive.first, good.second);
-  EXPECT_NE(check.problem.find("the first half"), std::string::npos) << check.problem;
+  EXPECT_TRUE(contains(check.problem, "the first half")) << check.problem;
 }
 
 TEST(SelfCheck, ACameraThatStandsHasNoErrorForEachMetre) {
@@ -131,7 +132,7 @@ TEST(SelfCheck, ACameraThatStandsHasNoErrorForEachMetre) {
   ASSERT_EQ(check.problem, "");
   EXPECT_EQ(check.difference.count, 0);
   EXPECT_GT(check.end_m, 0.0);
-  EXPECT_NE(check.text().find("stands"), std::string::npos) << check.text();
+  EXPECT_TRUE(contains(check.text(), "stands")) << check.text();
   const std::string columns = SelfCheck::columns(), row = check.row();
   EXPECT_EQ(std::count(row.begin(), row.end(), ','), std::count(columns.begin(), columns.end(), ','));
 }
@@ -153,7 +154,7 @@ TEST(SelfCheck, APairAloneHasNoMotion) {
   SyntheticScene scene(39, 2500, 120.0);
   OfflineRun run{PipelineOptions{}};
   run.processFeatures(scene.view(syntheticPose(0), kPeriod));
-  EXPECT_NE(checkShuttle(run, run).problem.find("one pair"), std::string::npos);
+  EXPECT_TRUE(contains(checkShuttle(run, run).problem, "one pair"));
 }
 
 }  // namespace test_self_check

@@ -26,6 +26,7 @@
 #include <string>
 #include <vector>
 
+#include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "../temporary_folder.hpp"
 
@@ -72,11 +73,11 @@ std::string readPage(const fs::path& page) {
   EXPECT_EQ(html.rfind("<!doctype html>", 0), 0u);
   EXPECT_LT(html.size(), 2000000u);
   for (const char* elsewhere : {"http", "src='/", "url(", "@import", "<script src", "import(", "fetch("})
-    EXPECT_EQ(html.find(elsewhere), std::string::npos) << elsewhere;
+    EXPECT_FALSE(contains(html, elsewhere)) << elsewhere;
   const std::size_t data = html.find(begin) + begin.size();
   const std::string json = html.substr(data, html.find("</script>") - data);
   // Numbers that are none are null.
-  EXPECT_EQ(json.substr(0, json.find("\"pictures\"")).find("nan"), std::string::npos);
+  EXPECT_FALSE(contains(json.substr(0, json.find("\"pictures\"")), "nan"));
   EXPECT_TRUE(YAML::Load(json).IsMap());
   return json;
 }
@@ -164,7 +165,7 @@ class Tools : public testing::Test {
     EXPECT_GT(outcome.exit_code, 0);
     const std::vector<std::string> errors = errorLines(outcome);
     ASSERT_EQ(errors.size(), 1u);
-    EXPECT_NE(errors.front().find(said), std::string::npos) << "expected it to say: " << said;
+    EXPECT_TRUE(contains(errors.front(), said)) << "expected it to say: " << said;
     EXPECT_EQ(linesOf(outcome.err).back(), errors.front()) << "the error is not the last thing said";
   }
 
@@ -196,7 +197,7 @@ TEST_F(Tools, AllExplainThemselves) {
   for (const char* tool : {SDVO_TOOLS}) {
     const Outcome outcome = run(tool, "--help");
     EXPECT_EQ(outcome.exit_code, 0) << tool << ": " << outcome.err;
-    EXPECT_NE(outcome.out.find("--help"), std::string::npos) << tool;
+    EXPECT_TRUE(contains(outcome.out, "--help")) << tool;
     EXPECT_EQ(outcome.err, "") << tool;
     expectError(run(tool, "--no-such-option"), "--help");
   }
@@ -289,7 +290,7 @@ TEST_F(Tools, NoOutputDestroysAFile) {
     if (tool[0] != 'e') expectError(run(tool, command, "trap '' XFSZ; ulimit -f 1; "), output.string());
     EXPECT_TRUE(is_bag || readText(output) == before);
     for (const auto& entry : fs::directory_iterator(root_))
-      EXPECT_EQ(entry.path().string().find("partial"), std::string::npos) << entry.path();
+      EXPECT_FALSE(contains(entry.path().string(), "partial")) << entry.path();
     fs::remove(output);
   }
 }
@@ -331,7 +332,7 @@ TEST_F(Tools, OptionsThatDoNotExistOrAreOutOfRange) {
 TEST_F(Tools, OnePoseForEachPairAndTheDriveIsFollowed) {
   const Outcome outcome = runSequence("--timing " + (root_ / "timing.csv").string());
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_NE(outcome.out.find("options "), std::string::npos) << "no hash of the options: " << outcome.out;
+  EXPECT_TRUE(contains(outcome.out, "options ")) << "no hash of the options: " << outcome.out;
 
   const std::vector<std::string> lines = linesOf(readText(poses()));
   ASSERT_EQ(lines.size(), static_cast<std::size_t>(kPairs));
@@ -364,7 +365,7 @@ TEST_F(Tools, PlacesByASwitchOrByTheName) {
   const Outcome named = run("run_places", arguments("named"));
   if (named.err.find("without Ceres") != std::string::npos) GTEST_SKIP() << named.err;
   ASSERT_EQ(named.exit_code, 0) << named.err;
-  EXPECT_NE(named.out.find("\nrevisits "), std::string::npos) << named.out;
+  EXPECT_TRUE(contains(named.out, "\nrevisits ")) << named.out;
   EXPECT_EQ(linesOf(readText(root_ / "named.txt")).size(), static_cast<std::size_t>(kPairs));
   EXPECT_EQ(linesOf(readText(root_ / "named.csv")).size(), 2u * kPairs + 1u);
   const std::string odometry = readText(poses());
@@ -488,7 +489,7 @@ TEST_F(Tools, BagsOfOtherNamesAndCompressedImages) {
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(readText(results_ / "renamed.txt"), readText(poses()));
   EXPECT_EQ(linesOf(readText(results_ / "report.csv")).at(1).rfind("renamed,4,0,0,1,", 0), 0u);
-  EXPECT_NE(outcome.out.find("shuttle: error about "), std::string::npos) << outcome.out;
+  EXPECT_TRUE(contains(outcome.out, "shuttle: error about ")) << outcome.out;
   fs::remove(results_ / "renamed.txt");
   ASSERT_EQ(runBags(renamed.string(), "--format kitti").exit_code, 0) << "the bag's only stereo camera";
   EXPECT_EQ(runBags(renamed.string(), "--format kitti --camera /camera").exit_code, 0) << "the only one in a namespace";
@@ -498,7 +499,7 @@ TEST_F(Tools, BagsOfOtherNamesAndCompressedImages) {
 
   const std::string checked = run("check_camera", "--bag " + renamed.string() + names).out;
   EXPECT_EQ(checked.rfind("OK   topics", 0), 0u) << checked;
-  EXPECT_NE(checked.find("malformed image: 0 bytes"), std::string::npos) << checked;
+  EXPECT_TRUE(contains(checked, "malformed image: 0 bytes")) << checked;
 }
 
 /// As `rosbag record --split` leaves a drive.
@@ -588,7 +589,7 @@ TEST_F(Tools, RawBagsAreRectified) {
           run("run_sequence", raw.string() + fov + " --page " + page.string() + " --poses " + poses().string());
       EXPECT_EQ(outcome.exit_code, 0) << outcome.out << outcome.err;
       EXPECT_EQ(readText(poses()), expected) << lens << fov;
-      EXPECT_NE(readPage(page).find("raw images rectified here"), std::string::npos);
+      EXPECT_TRUE(contains(readPage(page), "raw images rectified here"));
       {
         rosbag::Bag out(bare.string(), rosbag::bagmode::Write);
         const rosbag::Bag in(raw.string());
@@ -667,7 +668,7 @@ TEST_F(Tools, ManyRecordings) {
   Outcome outcome = runMany(" -- --format kitti");
   EXPECT_EQ(outcome.exit_code, 1) << outcome.err;
   EXPECT_EQ(outcome.out.rfind("bad,,,,,,,,,,", 0), 0u) << outcome.out;
-  EXPECT_NE(outcome.out.find("1 of 2 recordings are finished"), std::string::npos) << outcome.out;
+  EXPECT_TRUE(contains(outcome.out, "1 of 2 recordings are finished")) << outcome.out;
   const fs::path result = results_ / "good" / "good.txt";
   EXPECT_EQ(linesOf(readText(result)).size(), static_cast<std::size_t>(kPairs));
   const fs::file_time_type finished = fs::last_write_time(result);
@@ -705,13 +706,13 @@ TEST_F(Tools, RecordingsCheckThemselves) {
     EXPECT_NEAR(std::stod(fields[2]), (kPairs - 1) * kStep, 0.02);
     EXPECT_GT(std::stod(fields[3]), 0.0);
     EXPECT_LT(std::stod(fields[3]), 0.03);
-    EXPECT_NE(outcome.out.find("\n" + fields[0] + ": error about "), std::string::npos) << outcome.out;
+    EXPECT_TRUE(contains(outcome.out, "\n" + fields[0] + ": error about ")) << outcome.out;
   }
   // The images of a folder are those of its bag.
   const std::string said = runSequence("--shuttle --halves").out;
   for (const std::string& line : linesOf(outcome.out))
     if (line.find(": error about ") != std::string::npos) {
-      EXPECT_NE(said.find("\n" + line + "\n"), std::string::npos) << said;
+      EXPECT_TRUE(contains(said, "\n" + line + "\n")) << said;
     }
 
   ASSERT_EQ(runBags(a.string()).exit_code, 0);
@@ -737,7 +738,7 @@ TEST_F(Tools, AShuttleFindsPairsHoweverTheyWereRecorded) {
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   }
   const std::string expected = readText(results_ / "plain.self_check.csv");
-  EXPECT_NE(expected.find("shuttle,4,"), std::string::npos);
+  EXPECT_TRUE(contains(expected, "shuttle,4,"));
   EXPECT_EQ(readText(results_ / "at_once.self_check.csv"), expected);
   EXPECT_EQ(readText(results_ / "late.self_check.csv"), expected);
 }
@@ -749,10 +750,10 @@ TEST_F(Tools, ALostDriveDoesNotPassItsSelfChecks) {
   const Outcome outcome = runBags(sequence_.string(), "--shuttle --halves");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   for (const char* check : {"shuttle", "halves"}) {
-    EXPECT_NE(outcome.out.find(std::string(check) + ": no figure"), std::string::npos) << outcome.out;
-    EXPECT_NE(readText(results_ / "09.self_check.csv").find(std::string("\n") + check + ",4,"), std::string::npos);
+    EXPECT_TRUE(contains(outcome.out, std::string(check) + ": no figure")) << outcome.out;
+    EXPECT_TRUE(contains(readText(results_ / "09.self_check.csv"), std::string("\n") + check + ",4,"));
   }
-  EXPECT_NE(outcome.out.find("pairs have no pose"), std::string::npos) << outcome.out;
+  EXPECT_TRUE(contains(outcome.out, "pairs have no pose")) << outcome.out;
 }
 
 /// Of all stamps that wait, images are held in memory, so only so many may.
@@ -842,7 +843,7 @@ TEST_F(Tools, TheTwistOfTheGroundTruthIsThatOfTheBase) {
 }
 
 void expectWords(const std::string& page, const std::vector<std::string>& words) {
-  for (const std::string& word : words) EXPECT_NE(page.find(word), std::string::npos) << word;
+  for (const std::string& word : words) EXPECT_TRUE(contains(page, word)) << word;
 }
 
 TEST_F(Tools, AnyRecordingBecomesAPage) {
@@ -856,7 +857,7 @@ TEST_F(Tools, AnyRecordingBecomesAPage) {
                                         "stereo_descriptor_vo "};
   Outcome outcome = run("run_sequence", bag("a").string() + to_page);
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_NE(outcome.out.find(": Followed: 4 of 4 pairs"), std::string::npos) << outcome.out;
+  EXPECT_TRUE(contains(outcome.out, ": Followed: 4 of 4 pairs")) << outcome.out;
   std::string json = readPage(page);
   expectWords(json, all);
   expectWords(json, {"a.bag", "looks along 1.00", "\"options\":[]"});
@@ -917,7 +918,7 @@ TEST_F(Tools, ThePageOfADriveWithoutAPose) {
   run("run_sequence", sequence_.string() + " --page " + page.string());
   const std::string json = readPage(page);
   expectWords(json, {"Never started: none of 4 pairs has a pose"});
-  EXPECT_EQ(json.find("Interrupted"), std::string::npos);
+  EXPECT_FALSE(contains(json, "Interrupted"));
   for (const YAML::Node& pose : YAML::Load(json)["pairs"]["pose"]) EXPECT_TRUE(pose.IsNull());
 }
 
@@ -951,8 +952,7 @@ TEST_F(Tools, ThePageShowsWhatWasReportedLive) {
   const Outcome other =
       run("run_sequence", (root_ / "a.bag").string() + " --page " + page.string() + " --live " + live.string());
   EXPECT_EQ(other.exit_code, 0) << other.err;
-  EXPECT_NE(other.err.find("/stereo/vo_info holds stereo_descriptor_vo/VoInfo of another definition"),
-            std::string::npos);
+  EXPECT_TRUE(contains(other.err, "/stereo/vo_info holds stereo_descriptor_vo/VoInfo of another definition"));
 }
 
 /// Of two robots in a bag the camera is on one.
@@ -975,7 +975,7 @@ TEST_F(Tools, TheBaseIsThatOfTheOdometryAboveTheCamera) {
       }
     }
     const Outcome outcome = run("check_camera", "--bag " + named.string() + arguments);
-    EXPECT_NE(outcome.out.find(said), std::string::npos) << outcome.out;
+    EXPECT_TRUE(contains(outcome.out, said)) << outcome.out;
   };
   check({"r1/base", "r2/base"}, "", "m of r2/base and looks along 1.00");
   check({}, " --base-frame r2/base", "m of r2/base and looks along 1.00");

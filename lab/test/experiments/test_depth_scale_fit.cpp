@@ -58,7 +58,7 @@ TEST(DepthScaleFit, ACircleOfFixedSizeInTheWorldNeedsNeither) {
 }
 
 TEST(DepthScaleFit, RefusesAHandfulOfSamples) {
-  const std::string error = synthetic::errorOf([] { fitShapes({{5.0, 10.0, 2.0}}); });
+  const std::string error = errorOf([] { fitShapes({{5.0, 10.0, 2.0}}); });
   EXPECT_NE(error.find("only 1 features"), std::string::npos) << error;
 }
 
