@@ -20,7 +20,7 @@ int countCorrect(const StereoFeatures& reference, const StereoFeatures& current,
   int correct = 0;
   for (const FeatureMatch& match : matches) {
     const Eigen::Vector3d point = T_current_reference * reference.point(match.reference);
-    if (point.z() < kNearestDepth) continue;
+    if (point.z() < current.camera.nearestDepth()) continue;
     const Eigen::Vector3d predicted = current.camera.project(point);
     const Eigen::Vector3d measured = current.measurement(match.current);
     if (std::hypot(predicted.x() - measured.x(), predicted.y() - measured.y()) <= tolerance) ++correct;

@@ -111,7 +111,7 @@ void compare(const StereoFeatures& first, const StereoFeatures& later, const Eig
     match_of[static_cast<std::size_t>(match.reference)] = match.current;
   for (int i = 0; i < first.count(); ++i) {
     const Eigen::Vector3d before = first.point(i), point = T_later_first * before;
-    if (point.z() < kNearestDepth) continue;
+    if (point.z() < later.camera.nearestDepth()) continue;
     const Eigen::Vector3d seen = later.camera.project(point);
     if (seen.x() < 0.0 || seen.y() < 0.0 || seen.x() > later.camera.width - 1 || seen.y() > later.camera.height - 1)
       continue;

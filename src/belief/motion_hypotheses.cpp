@@ -348,7 +348,7 @@ bool agree(const StereoCamera& camera, const std::vector<Correspondence>& corres
            const std::vector<int>& points, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double within) {
   const auto same = std::count_if(points.begin(), points.end(), [&](int i) {
     const Eigen::Vector3d in_a = a * correspondences[i].point, in_b = b * correspondences[i].point;
-    if (std::min(in_a.z(), in_b.z()) < kNearestDepth) return false;
+    if (std::min(in_a.z(), in_b.z()) < camera.nearestDepth()) return false;
     return (camera.project(in_a) - camera.project(in_b)).norm() < within;
   });
   return 2 * static_cast<std::size_t>(same) > points.size();

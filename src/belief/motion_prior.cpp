@@ -90,6 +90,12 @@ Matrix6d MotionPrior::unseen(double seconds) const {
                    spread(velocity.tail<3>().norm(), options_.rotation_acceleration, CV_PI));
 }
 
+Matrix6d MotionPrior::unknown() const {
+  constexpr double kTurn = 0.5;  // rad (chosen)
+  const double longest = options_.max_speed * options_.max_gap;
+  return isotropic(longest * longest, kTurn * kTurn);
+}
+
 std::string MotionPrior::tooFast(const Eigen::Isometry3d& motion, const Matrix6d& covariance, double dt) const {
   const double sigmas = std::sqrt(noiseGate(1));
   const double time = dt + sigmas * options_.stamp_sigma;

@@ -142,7 +142,7 @@ bool MotionSearch::leavesGate(const MotionScene& scene, const Eigen::Isometry3d&
   std::size_t seen = 0, outside = 0;
   for (const Eigen::Vector3d& point : found.view->points.positions) {
     const Eigen::Vector3d here = T_current_reference * point, expected = predicted * point;
-    if (std::min(here.z(), expected.z()) < kNearestDepth) continue;
+    if (std::min(here.z(), expected.z()) < camera.nearestDepth()) continue;
     const Eigen::Vector3d pixel = camera.project(here);
     if (!camera.sees(pixel)) continue;
     ++seen;

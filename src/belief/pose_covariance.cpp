@@ -8,13 +8,6 @@
 namespace sdvo {
 namespace {
 
-/// What a discontinuity of unknown size adds: metres and a good part of a right angle.
-Matrix6d discontinuity() {
-  Vector6d variance;
-  variance << Eigen::Vector3d::Constant(100.0), Eigen::Vector3d::Constant(0.25);
-  return variance.asDiagonal();
-}
-
 /// The covariance of a pose T as that of T * M: T exp(xi) M = T M exp(Ad(M^-1) xi).
 Matrix6d carriedBy(const Eigen::Isometry3d& motion, const Matrix6d& covariance) {
   const Matrix6d ad = adjoint(motion.inverse());
@@ -62,10 +55,6 @@ void PoseCovariance::expose(const RigCalibration::MotionJacobian& since_keyframe
 
 void PoseCovariance::cover(const Vector6d& correction) {
   spread(lacking(value(), correction));  // the next poses are measured from the same key frame
-}
-
-void PoseCovariance::restart(const Matrix6d& travelled) {
-  assume(value() + discontinuity() + travelled);
 }
 
 void PoseCovariance::markKeyframe() {

@@ -64,7 +64,7 @@ LocalMap::View LocalMap::view(const std::optional<Eigen::Isometry3d>& T_next_new
   const auto isSeenNext = [&](const Eigen::Vector3d& pixel) {
     if (!T_next_newest) return false;
     const Eigen::Vector3d next = *T_next_newest * camera_.backProject(pixel.x(), pixel.y(), pixel.z());
-    return next.z() >= kNearestDepth && camera_.sees(camera_.project(next));
+    return next.z() >= camera_.nearestDepth() && camera_.sees(camera_.project(next));
   };
   View view;
   view.points.kind = kind_;

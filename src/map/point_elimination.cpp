@@ -85,7 +85,7 @@ void PoseEquations::setZero(int poses) {
 
 EliminatedPoint PoseEquations::add(const WindowProjection& projection, const ObservedPoint& point,
                                    const Linearisation& linearisation, PoseFactor* factors, double* squares) {
-  constexpr double kLeastInformation = 1e-9;  // of a direction without any observation
+  constexpr double kLeastInformation = 1e-9;  // of a direction without any observation; of depths in baselines
   const Eigen::Index calibration = hessian_.rows() - kCalibration;
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
   Eigen::Vector3d g = Eigen::Vector3d::Zero();
@@ -125,7 +125,8 @@ EliminatedPoint PoseEquations::add(const WindowProjection& projection, const Obs
         weighted_shape.transpose() * J.by_pose.row(2);
   }
 
-  H.diagonal() = H.diagonal() * (1.0 + linearisation.damping) + Eigen::Vector3d::Constant(kLeastInformation);
+  const Eigen::Vector3d unit(1.0, 1.0, projection.camera.baseline * projection.camera.baseline);
+  H.diagonal() = H.diagonal() * (1.0 + linearisation.damping) + kLeastInformation * unit;
   const Eigen::LLT<Eigen::Matrix3d> root(H);
   result.R = root.matrixL().solve(Eigen::Matrix3d::Identity());
   result.gradient = result.R * g;

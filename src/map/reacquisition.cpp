@@ -59,7 +59,7 @@ std::vector<ExpectedPoint> expectedPoints(const DescribedPoints& map, const Ster
   std::vector<ExpectedPoint> points;
   for (std::size_t p = 0; p < map.positions.size(); ++p) {
     const Eigen::Vector3d point = view.motion.T_current_reference * map.positions[p];
-    if (point.z() < kNearestDepth) continue;
+    if (point.z() < features.camera.nearestDepth()) continue;
     const Eigen::Vector3d pixel = features.camera.project(point);
     if (features.camera.sees(pixel) && isLit(features, pixel)) points.push_back({pixel.head<2>(), found[p]});
   }

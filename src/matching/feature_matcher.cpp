@@ -191,7 +191,7 @@ std::vector<FeatureMatch> FeatureMatcher::match(const DescribedPoints& reference
   for (int i = 0; i < reference.count(); ++i) {
     if (grid) {
       const Eigen::Vector3d point = *T_current_reference * reference.positions[i];
-      if (point.z() < kNearestDepth) continue;
+      if (point.z() < current.camera.nearestDepth()) continue;
       const Eigen::Vector3d predicted = current.camera.project(point);
       count = grid->findAround(static_cast<float>(predicted.x()), static_cast<float>(predicted.y()), candidates);
     } else if (kind.element_type == ElementType::kBits) {

@@ -12,10 +12,15 @@ namespace {
 /// What the kernels need of a pose and a camera.
 struct Projection {
   double rotation[3][3], translation[3];
-  double fx, fy, cx, cy, fx_baseline;
+  double fx, fy, cx, cy, fx_baseline, nearest;
 
   Projection(const StereoCamera& camera, const Eigen::Isometry3d& T)
-      : fx(camera.fx), fy(camera.fy), cx(camera.cx), cy(camera.cy), fx_baseline(camera.fx * camera.baseline) {
+      : fx(camera.fx),
+        fy(camera.fy),
+        cx(camera.cx),
+        cy(camera.cy),
+        fx_baseline(camera.fx * camera.baseline),
+        nearest(camera.nearestDepth()) {
     for (int i = 0; i < 3; ++i) {
       translation[i] = T.translation()[i];
       for (int j = 0; j < 3; ++j) rotation[i][j] = T.linear()(i, j);
@@ -36,7 +41,7 @@ struct Projected {
     x = p.rotation[0][0] * px + p.rotation[0][1] * py + p.rotation[0][2] * pz + p.translation[0];
     y = p.rotation[1][0] * px + p.rotation[1][1] * py + p.rotation[1][2] * pz + p.translation[1];
     z = p.rotation[2][0] * px + p.rotation[2][1] * py + p.rotation[2][2] * pz + p.translation[2];
-    behind = z < kNearestDepth;
+    behind = z < p.nearest;
     z = behind ? DoubleLanes{1.0, 1.0, 1.0, 1.0} : z;
     inverse_depth = 1.0 / z;
     const DoubleLanes u = p.fx * x * inverse_depth + p.cx;

@@ -64,7 +64,6 @@ class Lineariser {
 NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementOptions& options,
                              const std::vector<Correspondence>& correspondences, const std::vector<int>& subset,
                              Eigen::Isometry3d& T) {
-  constexpr double kSmallestStep = 1e-6;  // m and rad
   constexpr double kSmallestGain = 1e-5;  // of the cost: a tenth of the result's standard deviation
   double damping = 1e-6;
   Lineariser problem(camera, options, correspondences, subset);
@@ -77,7 +76,7 @@ NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementO
     const Eigen::Isometry3d candidate = expSE3(step) * T;
     const NormalEquations next = problem.at(candidate);
     if (next.cost <= equations.cost) {
-      const bool converged = step.norm() < kSmallestStep || equations.cost - next.cost < kSmallestGain * equations.cost;
+      const bool converged = equations.cost - next.cost <= kSmallestGain * equations.cost;
       T = candidate;
       equations = next;
       damping = std::max(damping * 0.1, 1e-9);

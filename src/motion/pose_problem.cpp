@@ -9,7 +9,7 @@ namespace sdvo {
 std::optional<Eigen::Vector3d> reprojectionResidual(const StereoCamera& camera, const Eigen::Isometry3d& T,
                                                     const Correspondence& correspondence) {
   const Eigen::Vector3d point = T * correspondence.point;
-  if (point.z() < kNearestDepth) return std::nullopt;
+  if (point.z() < camera.nearestDepth()) return std::nullopt;
   return correspondence.measurement - camera.project(point);
 }
 

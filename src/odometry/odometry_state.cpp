@@ -63,7 +63,8 @@ void OdometryState::interrupt() {
 void OdometryState::startAgain() {
   ++epoch;
   const std::int64_t last = last_pose_stamp.value_or(seed->newestStamp());
-  covariance.restart(prior.unseen(static_cast<double>(seed->newestStamp() - last) * 1e-9));
+  const Matrix6d unseen = prior.unseen(static_cast<double>(seed->newestStamp() - last) * 1e-9);
+  covariance.assume(covariance.value() + prior.unknown() + unseen);
   last_pose_stamp = seed->newestStamp();
 }
 

@@ -1,6 +1,7 @@
 #include "stereo_descriptor_vo/odometry/outage.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace sdvo {
 
@@ -16,25 +17,26 @@ void Outage::extend(double dt, const std::optional<MotionGuess>& guess, const Mo
   if (!followed_) return;
   const Eigen::Isometry3d motion = guess->motion(prior, dt);
   const Matrix6d carried = adjoint(motion.inverse());
-  Matrix6d covariance = covarianceOf(*guess);
+  Matrix6d covariance = covarianceOf(*guess, prior.around(motion, dt).covariance);
   if (guess->rotation_only) covariance.topLeftCorner<3, 3>() = growth(prior, dt).topLeftCorner<3, 3>();
   followed_->motion = followed_->motion * motion;
   followed_->covariance = carried * followed_->covariance * carried.transpose() + covariance;
   followed_->rotation_only |= guess->rotation_only;
 }
 
-/// Of the guess, on top of those before it: the part of a scale error that a longer way adds.
-Matrix6d Outage::covarianceOf(const MotionGuess& guess) {
-  constexpr double kLeast = 1e-3;  // m and rad (chosen): no odometry stands still to less
+/// Of the guess, on top of those before it: the part of a scale error that a longer way adds. No odometry stands still
+/// better than to a small part of what the camera may have done.
+Matrix6d Outage::covarianceOf(const MotionGuess& guess, const Matrix6d& process_noise) {
+  constexpr double kLeast = 0.02;  // standard deviations (chosen): at 10 Hz a millimetre
   const Vector6d motion = logSE3(guess.T_previous_current);
-  const auto grow = [&](double& way, double by) {
+  const auto grow = [&](double& way, double by, double variance) {
     const double before = way;
-    way += std::max(by, kLeast);
+    way += std::max(by, kLeast * std::sqrt(variance));
     return guess.error * guess.error * (way * way - before * before);
   };
   Vector6d variance;
-  variance.head<3>().setConstant(grow(distance_, motion.head<3>().norm()));
-  variance.tail<3>().setConstant(grow(angle_, motion.tail<3>().norm()));
+  variance.head<3>().setConstant(grow(distance_, motion.head<3>().norm(), process_noise(0, 0)));
+  variance.tail<3>().setConstant(grow(angle_, motion.tail<3>().norm(), process_noise(3, 3)));
   return variance.asDiagonal();
 }
 

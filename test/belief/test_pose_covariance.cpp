@@ -200,21 +200,15 @@ TEST(PoseCovariance, AKeyframeThatWasDoubtedLeavesNoDoubtToThePosesMeasuredInIts
   expectEqual(covariance.value(), diagonal(0.625, 0.375));
 }
 
-TEST(PoseCovariance, RestartsFromTheLastPoseWithMetresAndAGoodPartOfARightAngle) {
+TEST(PoseCovariance, AnAssumedPoseIsTheKeyFrameOfANewDrive) {
   PoseCovariance covariance;
   covariance.measure(forward(), diagonal(0.5, 0.25));
   covariance.doubt(diagonal(1.0, 1.0), diagonal(1.0, 1.0));
-  covariance.restart();
+  covariance.assume(covariance.value() + diagonal(100.0, 0.25));
   expectEqual(covariance.value(), diagonal(101.5, 1.5));
   // Neither the measurement nor the doubt before the gap has a part in the first motion after it.
   expectEqual(covariance.measure(forward(), diagonal(0.125, 0.0)), diagonal(0.125, 0.0));
   expectEqual(covariance.value(), afterForward(101.5, 1.5) + diagonal(0.125, 0.0));
-}
-
-TEST(PoseCovariance, WhatMayHaveBeenTravelledUnseenIsAddedAtARestart) {
-  PoseCovariance covariance;
-  covariance.restart(diagonal(4.0, 1.0));
-  expectEqual(covariance.value(), diagonal(104.0, 1.25));
 }
 
 TEST(PoseCovariance, ADoubtedPoseIsReportedSoUntilTheNextOneIsMeasured) {

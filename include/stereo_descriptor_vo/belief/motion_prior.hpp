@@ -80,6 +80,10 @@ class MotionPrior {
   /// Of an unseen motion around a standstill, m and rad: its speed was that of the confirmed velocity, and is bounded.
   Matrix6d unseen(double seconds) const;
 
+  /// Of a motion of unknown size, m and rad: the longest one over which motions are predicted, and a good part of a
+  /// right angle.
+  Matrix6d unknown() const;
+
   /// In words, if no motion may be as fast, noise and stamps considered.
   std::string tooFast(const Eigen::Isometry3d& motion, const Matrix6d& covariance, double dt) const;
 

@@ -41,10 +41,6 @@ class PoseCovariance {
     keyframe_ += moment;
   }
 
-  /// The last pose becomes the key frame of a new drive, after a motion of unknown size. `travelled` is the covariance
-  /// of what may have been travelled unseen.
-  void restart(const Matrix6d& travelled = Matrix6d::Zero());
-
   /// The last pose is another one now, with this covariance: the key frame of a new drive.
   void assume(const Matrix6d& covariance) {
     *this = PoseCovariance();

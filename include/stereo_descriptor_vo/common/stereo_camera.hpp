@@ -41,6 +41,9 @@ struct StereoCamera {
   double depth(double disparity) const { return fx * baseline / disparity; }
   double disparity(double depth) const { return fx * baseline / depth; }
 
+  /// Of what both views can show: its disparity is their width, m. Nearer points are not in front of the camera.
+  double nearestDepth() const { return depth(width); }
+
   /// Whether `other` can be this rig with another focus, or calibrated anew while it runs. Images have one size, and
   /// numbers differ by at most 5 % (autofocus changes a focal length by 1 to 4 %).
   bool isLike(const StereoCamera& other) const;

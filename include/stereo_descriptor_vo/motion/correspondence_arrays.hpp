@@ -14,9 +14,6 @@ struct Correspondence {
   Eigen::Vector3d measurement;  ///< (u_left, v_left, u_right) in the current pair, px
 };
 
-/// A point nearer than this to the camera's plane is not in front of it, m.
-constexpr double kNearestDepth = 0.05;
-
 /// Correspondences number by number, so that several are worked on at once.
 class CorrespondenceArrays {
  public:

@@ -45,7 +45,7 @@ class Outage {
   void end();
 
  private:
-  Matrix6d covarianceOf(const MotionGuess& guess);
+  Matrix6d covarianceOf(const MotionGuess& guess, const Matrix6d& process_noise);
 
   std::optional<Followed> followed_ = Followed();
   double distance_ = 0.0, angle_ = 0.0;  ///< of the guesses, m and rad
