@@ -1,6 +1,7 @@
-"""Moving picture of a drive: what the pipeline sees beside the path from above, as a GIF of at most 3 MB for the README.
+"""Moving picture of a drive: what the pipeline sees beside the path from above and the truth, as a GIF of at most 3 MB for the README.
 
-    lab/run film --sequence .catkin_ws/demo/drive --output docs/images/drive.gif
+    rosrun stereo_descriptor_vo render_drive --trajectory hand_held --rig d435_small --frames 340 --output room
+    lab/run film --sequence room --output docs/images/drive.gif
 """
 import io
 import pathlib
@@ -17,14 +18,19 @@ LARGEST = 3000000  # bytes
 WIDTH = 480  # px of the images
 
 
-def draw_path(positions, now, lowest, highest):
-    """The path so far and the camera, as a square picture."""
-    figure, axis = plt.subplots(figsize=(1.8, 1.8), dpi=100)
-    axis.plot(*positions[:now + 1].T, color="tab:blue", linewidth=1.5)
-    axis.plot(*positions[now], "o", color="tab:red", markersize=4)
-    axis.set(xlim=(lowest[0], highest[0]), ylim=(lowest[1], highest[1]), aspect="equal")
-    axis.tick_params(labelsize=6)
-    axis.set_title("path from above [m]", fontsize=7)
+def draw_path(path, truth, now, side):
+    """The path so far and the camera over the whole true path, as a square picture of `side` px."""
+    dots = 100
+    figure, axis = plt.subplots(figsize=(side / dots, side / dots), dpi=dots)
+    axis.plot(*truth[:, [0, 2], 3].T, color="tab:green", alpha=0.35, linewidth=5, label="truth")
+    axis.plot(*path[:now + 1, [0, 2], 3].T, color="tab:blue", linewidth=1.5, label="odometry")
+    axis.plot(*path[now, [0, 2], 3], "o", color="tab:red", markersize=5)
+    axis.set_aspect("equal", "datalim")
+    axis.tick_params(labelsize=7)
+    axis.legend(fontsize=7, loc="upper right")
+    travelled = np.linalg.norm(np.diff(truth[:now + 1, :3, 3], axis=0), axis=1).sum()
+    error = np.linalg.norm(path[now, :3, 3] - truth[now, :3, 3])
+    axis.set_title(f"path from above [m]\n{100 * error:.1f} cm off after {travelled:.1f} m", fontsize=8)
     figure.tight_layout(pad=0.4)
     with io.BytesIO() as png:
         figure.savefig(png, format="png")
@@ -32,12 +38,19 @@ def draw_path(positions, now, lowest, highest):
         return Image.open(png).convert("RGB")
 
 
+def palette_of(*parts):
+    """The colours of (picture, how many): grey images leave none for a few lines."""
+    palette = Image.new("P", (1, 1))
+    palette.putpalette([value for picture, count in parts for value in picture.quantize(count).getpalette()[:3 * count]])
+    return palette
+
+
 def options(parser):
-    parser.add_argument("--sequence", required=True, help="recording that run_sequence reads")
+    parser.add_argument("--sequence", required=True, help="rendered drive: a folder with its poses.txt")
     parser.add_argument("--output", required=True, help="GIF to write")
-    parser.add_argument("--frames", type=int, default=250, help="pairs")
-    parser.add_argument("--every", type=int, default=5, help="one picture of so many pairs")
-    parser.add_argument("--colours", type=int, default=64)
+    parser.add_argument("--frames", type=int, default=340, help="pairs")
+    parser.add_argument("--every", type=int, default=8, help="one picture of so many pairs")
+    parser.add_argument("--colours", type=int, default=32, help="of the images")
     programs.add_params(parser)
 
 
@@ -46,18 +59,18 @@ def main(arguments):
         folder = pathlib.Path(folder)
         programs.run("run_sequence", arguments.sequence, "--frames", arguments.frames, "--pictures", folder / "pictures",
                      "--poses", folder / "poses.txt", *programs.params(arguments))
-        positions = poses.read(folder / "poses.txt")[:, [0, 2], 3]
-        middle = (positions.min(0) + positions.max(0)) / 2
-        reach = np.full(2, 0.55 * (positions.max(0) - positions.min(0)).max() + 0.1)
+        path = poses.read(folder / "poses.txt")
+        truth = poses.read(pathlib.Path(arguments.sequence) / "poses.txt", len(path))
+        truth = np.linalg.inv(truth[0]) @ truth
         frames = []
-        for now in range(arguments.every, len(positions), arguments.every):
+        for now in range(arguments.every, len(path), arguments.every):
             seen = Image.open(folder / "pictures" / f"{now:06d}.jpg")
             seen = seen.resize((WIDTH, seen.height * WIDTH // seen.width), Image.LANCZOS)
-            path = draw_path(positions, now, middle - reach, middle + reach)
-            both = Image.new("RGB", (WIDTH + path.width, max(seen.height, path.height)), "white")
-            both.paste(seen, (0, (both.height - seen.height) // 2))
-            both.paste(path, (WIDTH, (both.height - path.height) // 2))
-            frames.append(both.quantize(arguments.colours, dither=Image.NONE))
+            both = Image.new("RGB", (WIDTH + seen.height, seen.height), "white")
+            both.paste(seen, (0, 0))
+            drawn = draw_path(path, truth, now, seen.height)
+            both.paste(drawn, (WIDTH, 0))
+            frames.append(both.quantize(palette=palette_of((seen, arguments.colours), (drawn, 16)), dither=Image.NONE))
     output = pathlib.Path(arguments.output)
     frames[0].save(output, save_all=True, append_images=frames[1:], duration=120, loop=0, optimize=True)
     size = output.stat().st_size

@@ -36,30 +36,32 @@ void drawCircle(cv::Mat& image, double u, double v, double diameter, const cv::S
   cv::circle(image, fixedPoint(u, v), radius, colour, 1, cv::LINE_AA, kShift);
 }
 
-/// Words in the upper left corner. As many phrases share a line as the image has room for.
+/// Words in the upper left corner, of a size that is legible when a large image is shown 500 px wide. As many phrases
+/// share a line as the image has room for.
 void drawCaption(cv::Mat& image, const std::vector<std::string>& phrases) {
-  constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX, kMargin = 6, kLine = 18;  // px
-  constexpr double kScale = 0.5;
+  constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX, kMargin = 6;  // px
+  const double scale = std::max(0.5, 0.001 * image.cols);
+  const int line = static_cast<int>(36 * scale), stroke = static_cast<int>(2 * scale);
   std::vector<std::string> lines;
   for (const std::string& phrase : phrases) {
     const std::string longer = lines.empty() ? phrase : lines.back() + ", " + phrase;
     int baseline = 0;
-    if (lines.empty() || cv::getTextSize(longer, kFont, kScale, 1, &baseline).width > image.cols - 2 * kMargin)
+    if (lines.empty() || cv::getTextSize(longer, kFont, scale, stroke, &baseline).width > image.cols - 2 * kMargin)
       lines.push_back(phrase);
     else
       lines.back() = longer;
   }
   for (std::size_t i = 0; i < lines.size(); ++i) {
-    const cv::Point origin(kMargin, kLine * static_cast<int>(i + 1));
-    cv::putText(image, lines[i], origin, kFont, kScale, cv::Scalar::all(0), 3, cv::LINE_AA);
-    cv::putText(image, lines[i], origin, kFont, kScale, cv::Scalar::all(255), 1, cv::LINE_AA);
+    const cv::Point origin(kMargin, line * static_cast<int>(i + 1));
+    cv::putText(image, lines[i], origin, kFont, scale, cv::Scalar::all(0), stroke + 2, cv::LINE_AA);
+    cv::putText(image, lines[i], origin, kFont, scale, cv::Scalar::all(255), stroke, cv::LINE_AA);
   }
 }
 
 }  // namespace
 
 cv::Mat drawFeatures(const cv::Mat& left, const cv::Mat& right, const stereo_descriptor_vo::StereoFeatures& features,
-                     const stereo_descriptor_vo::FeatureFlow& flow) {
+                     const stereo_descriptor_vo::FeatureFlow& flow, const std::string& state) {
   const StereoFeaturesView view(features);
   cv::Mat left_colour, right_colour;
   cv::cvtColor(left, left_colour, cv::COLOR_GRAY2BGR);
@@ -85,7 +87,7 @@ cv::Mat drawFeatures(const cv::Mat& left, const cv::Mat& right, const stereo_des
              flow.inlier[i] ? kInlier : kOutlier, 1, cv::LINE_AA, kShift);
   }
   drawCaption(left_colour,
-              {"left: " + std::to_string(view.count()) + " features", std::to_string(matches) + " matches",
+              {state, std::to_string(view.count()) + " features", std::to_string(matches) + " matches",
                std::to_string(inliers) + " inliers (green)", std::to_string(drawn - inliers) + " outliers (magenta)"});
   drawCaption(right_colour, {"right: circles sized by depth", "near red to far blue"});
   cv::Mat both;

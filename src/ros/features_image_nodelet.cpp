@@ -4,6 +4,7 @@
 #include <sensor_msgs/image_encodings.h>
 #include <stereo_descriptor_vo/FeatureFlow.h>
 #include <stereo_descriptor_vo/StereoFeatures.h>
+#include <stereo_descriptor_vo/VoInfo.h>
 
 #include <atomic>
 #include <memory>
@@ -31,7 +32,8 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
   using Image = sensor_msgs::Image;
   using Features = stereo_descriptor_vo::StereoFeatures;
   using Flow = stereo_descriptor_vo::FeatureFlow;
-  using Synchroniser = TriggerSynchroniser<Image, Image, Features, Flow>;
+  using Info = stereo_descriptor_vo::VoInfo;
+  using Synchroniser = TriggerSynchroniser<Image, Image, Features, Flow, Info>;
 
   struct Inputs {
     explicit Inputs(FeaturesImageNodelet& nodelet)
@@ -46,6 +48,8 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
       features = nh.subscribe<Features>("stereo_features", kQueue, [this, &nodelet](const Features::ConstPtr& m) {
         nodelet.take<2>(synchroniser, m);
       });
+      info = nh.subscribe<Info>("vo_info", kQueue,
+                                [this, &nodelet](const Info::ConstPtr& m) { nodelet.take<4>(synchroniser, m); });
       flow = nh.subscribe<Flow>("feature_flow", kQueue,
                                 [this, &nodelet](const Flow::ConstPtr& m) { nodelet.take<3>(synchroniser, m); });
     }
@@ -54,7 +58,7 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
     static constexpr double kTolerance = 0.025;  // s, of the right images: as max_interval
     Synchroniser synchroniser;
     ImageSubscriber left, right;
-    ros::Subscriber features, flow;
+    ros::Subscriber features, flow, info;
   };
 
   void onInit() override try {
@@ -95,7 +99,8 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
       inputs_ = std::make_unique<Inputs>(*this);
     }
   } catch (const std::exception& e) {
-    NODELET_ERROR_STREAM("features_image: cannot subscribe to images, stereo_features and feature_flow: " << e.what());
+    NODELET_ERROR_STREAM(
+        "features_image: cannot subscribe to images, stereo_features, feature_flow and vo_info: " << e.what());
   }
 
   // In the thread of the images.
@@ -110,10 +115,10 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
   }
 
   void draw(const sensor_msgs::ImageConstPtr& left, const sensor_msgs::ImageConstPtr& right,
-            const Features::ConstPtr& features, const Flow::ConstPtr& flow) try {
+            const Features::ConstPtr& features, const Flow::ConstPtr& flow, const Info::ConstPtr& info) try {
     grey_.add(*left, *right);
     const cv::Mat drawn = drawFeatures(ros_conversions::toGrey(left, grey_.range()),
-                                       ros_conversions::toGrey(right, grey_.range()), *features, *flow);
+                                       ros_conversions::toGrey(right, grey_.range()), *features, *flow, info->state);
     const auto picture = boost::make_shared<sensor_msgs::Image>();
     picture->header = left->header;
     sensor_msgs::fillImage(*picture, sensor_msgs::image_encodings::BGR8, static_cast<std::uint32_t>(drawn.rows),

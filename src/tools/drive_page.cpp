@@ -146,11 +146,14 @@ std::vector<Words> figuresOf(const DriveReport& report, const OfflineRun& run) {
   if (report.left_out > 0) rows.push_back({"stamps without a usable pair", std::to_string(report.left_out)});
   for (const SelfCheck& check : report.self_checks) rows.push_back({"implied error", check.text()});
   if (const auto errors = errorsOf(report, frames)) {
-    rows.push_back(
-        {"true error", percent(errors->sub_paths.translation_percent) + " and " +
-                           text(4, errors->sub_paths.rotation_deg_per_m, " deg/m over sub-paths; at the end off by ") +
-                           text(3, errors->final_drift_m, " m (", errors->final_drift_percent, " %) and ",
-                                errors->final_drift_deg, " deg")});
+    const auto& lengths = errors->per_length;
+    rows.push_back({"true error",
+                    percent(errors->sub_paths.translation_percent) +
+                        text(4, " and ", errors->sub_paths.rotation_deg_per_m, " deg/m over sub-paths") +
+                        (lengths.empty() ? std::string()
+                                         : text(1, " of ", lengths.front().length, " to ", lengths.back().length, " m")) +
+                        text(3, "; at the end off by ", errors->final_drift_m, " m (", errors->final_drift_percent,
+                             " %) and ", errors->final_drift_deg, " deg")});
   }
   if (report.live) {
     const LiveRecord& live = *report.live;

@@ -9,7 +9,7 @@ namespace sdvo {
 
 cv::Mat drawLeft(const RecordedPair& pair, const StereoFeatures& features, const OdometryResult& result) {
   const cv::Mat both = drawFeatures(pair.left, pair.right, ros_conversions::toMessage(features, DepthScaleOptions()),
-                                    ros_conversions::toFlow(result, features));
+                                    ros_conversions::toFlow(result, features), toString(result.state));
   return both.rowRange(0, pair.left.rows);
 }
 

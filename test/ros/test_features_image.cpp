@@ -31,7 +31,7 @@ TEST(DrawFeatures, DrawsCirclesOfTheDepthDerivedSizeInBothViews) {
   message.dv[0] = 0.f;
   message.size[0] = kSize;
   const cv::Mat grey(370, 1226, CV_8UC1, cv::Scalar(90));
-  const cv::Mat picture = drawFeatures(grey, grey, message, {});
+  const cv::Mat picture = drawFeatures(grey, grey, message, {}, "");
   ASSERT_EQ(picture.size(), cv::Size(1226, 740));
   const auto isColoured = [&](int x, int y) { return colouredPixels(picture(cv::Rect(x, y, 1, 1))) == 1; };
   EXPECT_TRUE(isColoured(200 + 20, 200));
@@ -50,7 +50,7 @@ TEST(DrawFeatures, LeavesOutFlowThatNoImageHolds) {
   flow.inlier = {true, true, true};
   const cv::Mat grey(370, 1226, CV_8UC1, cv::Scalar(90));
   const FeaturesMessage none = toMessage(synthetic::noFeatures(someFeatures().camera), DepthScaleOptions());
-  const cv::Mat picture = drawFeatures(grey, grey, none, flow);
+  const cv::Mat picture = drawFeatures(grey, grey, none, flow, "");
   const cv::Rect line(98, 296, 46, 8);
   EXPECT_GT(colouredPixels(picture(line)), 30);
   picture(line).setTo(cv::Scalar::all(90));
@@ -62,14 +62,14 @@ TEST(DrawFeatures, WordsFitIntoASmallImage) {
   const auto captionOf = [&](int width) {
     const cv::Mat grey(240, width, CV_8UC1, cv::Scalar(90));
     cv::Mat one;
-    cv::extractChannel(drawFeatures(grey, grey, none, {}), one, 0);
+    cv::extractChannel(drawFeatures(grey, grey, none, {}, "TRACKING"), one, 0);
     return one != 90;
   };
   for (const int width : {320, 376}) {
     const cv::Mat words = captionOf(width);
     EXPECT_EQ(cv::countNonZero(words.colRange(width - 4, width)), 0) << width << " px: cut";
     // Nothing is lost: other breaks of the lines leave the letters as many, but for some commas.
-    const int letters = cv::countNonZero(words), wide = cv::countNonZero(captionOf(1280));
+    const int letters = cv::countNonZero(words), wide = cv::countNonZero(captionOf(500));
     EXPECT_GT(letters, 0.9 * wide) << width;
   }
 }
@@ -79,7 +79,7 @@ TEST(DrawFeatures, SurvivesFlowOfUnequalLengths) {
   flow.u = {1.f, 2.f};
   flow.v = {1.f};
   const cv::Mat grey(370, 1226, CV_8UC1, cv::Scalar(90));
-  EXPECT_NO_THROW(drawFeatures(grey, grey, someMessage(), flow));
+  EXPECT_NO_THROW(drawFeatures(grey, grey, someMessage(), flow, "LOST"));
 }
 
 }  // namespace test_features_image
