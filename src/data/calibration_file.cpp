@@ -64,7 +64,9 @@ StereoRectification readSensors(const YAML::Node (&sensors)[2], double fov) {
     cameras[side] = readCamera(sensors[side], "distortion_coefficients");
     T_body_camera[side] = poseOf(readList<std::array<double, 16>>(sensors[side]["T_BS"], "data"));
   }
-  return {cameras, T_body_camera[1].inverse() * T_body_camera[0], fov};
+  StereoRectification rectification(cameras, T_body_camera[1].inverse() * T_body_camera[0], fov);
+  rectification.mount(T_body_camera[0]);
+  return rectification;
 }
 
 StereoRectification readInfos(const YAML::Node (&infos)[2], double fov) {

@@ -97,6 +97,12 @@ void StereoRectification::makeMaps() {
   }
 }
 
+void StereoRectification::mount(const Eigen::Isometry3d& T_body_raw_left) {
+  Eigen::Matrix3d R_rectified_raw;
+  cv::cv2eigen(rotations_[0], R_rectified_raw);
+  T_body_left_ = T_body_raw_left * Eigen::Isometry3d(R_rectified_raw.transpose());
+}
+
 ImagePair StereoRectification::rectify(const ImagePair& raw) const {
   ImagePair pair;
   cv::remap(raw.left, pair.left, map_x_[0], map_y_[0], cv::INTER_LINEAR);

@@ -11,6 +11,7 @@
 #include "bag_recording.hpp"
 #include "stereo_descriptor_vo/data/euroc_dataset.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
+#include "stereo_descriptor_vo/data/trajectory.hpp"
 
 namespace fs = std::filesystem;
 
@@ -32,6 +33,13 @@ int unpaired(const RectifiedEuroc& sequence) {
   return sequence.unpaired();
 }
 
+Eigen::Isometry3d mountOf(const KittiSequence&) {
+  return Eigen::Isometry3d::Identity();
+}
+Eigen::Isometry3d mountOf(const RectifiedEuroc& sequence) {
+  return sequence.rectification().T_body_left();
+}
+
 /// A folder, of which every pair is usable.
 template <class Sequence>
 class FolderRecording : public Recording {
@@ -50,6 +58,15 @@ class FolderRecording : public Recording {
   void forEachBackwards(const Use& use) const override {
     const std::int64_t ends = sequence_.stamp(0) + sequence_.stamp(used_ - 1);
     for (int i = used_ - 1; i >= 0; --i) give(i, ends - sequence_.stamp(i), use);
+  }
+
+  std::vector<std::optional<Eigen::Isometry3d>> truth(const std::string& path,
+                                                      const std::vector<std::int64_t>& stamps) const override {
+    auto poses = readGroundTruth(path, stamps);
+    if (fs::path(path).extension() == ".csv")
+      for (auto& pose : poses)
+        if (pose) *pose = *pose * mountOf(sequence_);
+    return poses;
   }
 
   ArrivalFindings arrivals(const std::string&) const override {
@@ -127,6 +144,11 @@ class JoinedRecording : public Recording {
 };
 
 }  // namespace
+
+std::vector<std::optional<Eigen::Isometry3d>> Recording::truth(const std::string& path,
+                                                               const std::vector<std::int64_t>& stamps) const {
+  return readGroundTruth(path, stamps);
+}
 
 std::unique_ptr<Recording> openRecording(const std::string& path, const StereoSource& source) {
   if (!fs::exists(path)) throw std::runtime_error("there is no '" + path + "'");

@@ -51,6 +51,10 @@ class Recording {
   /// same.
   virtual void forEachBackwards(const Use& use) const = 0;
 
+  /// True poses of the rectified left camera, as readGroundTruth() reads them. Those of EuRoC's CSV are its IMU's.
+  virtual std::vector<std::optional<Eigen::Isometry3d>> truth(const std::string& path,
+                                                              const std::vector<std::int64_t>& stamps) const;
+
   /// How the messages of forEach() arrived, and where TF has the camera.
   virtual ArrivalFindings arrivals(const std::string& base_frame) const = 0;
 };

@@ -150,7 +150,7 @@ sdvo::Finding makePage(const sdvo::Recording& recording, const Drive& drive, con
   report.pictures = seen.pictures.pictures();
   std::vector<std::int64_t> stamps;
   for (const auto& frame : drive.whole.frames()) stamps.push_back(frame.odometry.stamp);
-  if (!arguments.truth.empty()) report.truth = sdvo::readGroundTruth(arguments.truth, stamps);
+  if (!arguments.truth.empty()) report.truth = recording.truth(arguments.truth, stamps);
   if (const std::string live = arguments.live.empty() ? input : arguments.live; fs::is_regular_file(live)) {
     rosbag::Bag bag;
     sdvo::openBag(live, bag);
@@ -329,9 +329,10 @@ int main(int argc, char** argv) {
       ->allow_extra_args(false);
   app.add_option("--odometry", arguments.odometry, "places: poses of the odometry to write, 12 numbers a line");
   app.add_option("--keyframes", arguments.keyframes, "places: CSV to write, a line for each key frame");
-  app.add_option("--ground-truth", arguments.truth,
-                 "true poses of the left camera. Page: errors over time; KITTI's format (a line for each pair) or "
-                 "TUM's. Places: prints how many revisits were found and what is false");
+  app.add_option(
+      "--ground-truth", arguments.truth,
+      "true poses of the left camera, KITTI's format (a line for each pair) or TUM's, or of EuRoC's IMU (CSV). "
+      "Page: errors over time. Places: prints how many revisits were found and what is false");
   return sdvo::runTool(app, argc, argv, [&] {
     if (!arguments.page.empty()) arguments.shuttle = arguments.halves = true;
     return run(arguments);

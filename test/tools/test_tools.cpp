@@ -901,6 +901,27 @@ TEST_F(Tools, AGroundTruthWithStampsIsInterpolated) {
   expectError(run("run_sequence", arguments), "no poses at the stamps");
 }
 
+/// Of a body that looks along x, on which the cameras are mounted as on a drone.
+TEST_F(Tools, TheTruthOfEurocIsThatOfItsBody) {
+  const fs::path asl = rawFolder("radial-tangential"), page = root_ / "page.html", truth = root_ / "data.csv";
+  for (int side = 0; side < 2; ++side) {
+    const fs::path sensor = asl / "mav0" / ("cam" + std::to_string(side)) / "sensor.yaml";
+    const std::string text = readText(sensor);
+    std::ofstream(sensor) << text.substr(0, text.find("T_BS")) << "T_BS: {data: [0, 0, 1, 0.1, -1, 0, 0, "
+                          << -side * kBaseline << ", 0, -1, 0, 0.2, 0, 0, 0, 1]}\n";
+  }
+  std::ofstream poses(truth);
+  for (int i = 1; i < kPairs; ++i)  // unknown at first
+    poses << 1400000000000000000 + i * 100000000 << "," << kStep * i << ",0,0,1,0,0,0,0,0,0\n";
+  poses.close();
+  ASSERT_EQ(
+      run("run_sequence", asl.string() + " --page " + page.string() + " --ground-truth " + truth.string()).exit_code,
+      0);
+  const YAML::Node true_poses = YAML::Load(readPage(page))["pairs"]["truth"];
+  EXPECT_TRUE(true_poses[0].IsNull());
+  expectWords(readPage(page), {"at the end off by 0.0"});
+}
+
 TEST_F(Tools, ThePageOfALostDriveSaysWhere) {
   for (int side = 0; side < 2; ++side)
     cv::imwrite(image(side, kPairs - 1).string(), cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));

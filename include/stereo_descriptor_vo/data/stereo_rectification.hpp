@@ -39,6 +39,10 @@ class StereoRectification {
   /// Of the rectified views.
   const StereoCamera& camera() const { return camera_; }
 
+  /// Pose of the rectified left camera on the body that the calibration names (EuRoC's T_BS); identity without one.
+  const Eigen::Isometry3d& T_body_left() const { return T_body_left_; }
+  void mount(const Eigen::Isometry3d& T_body_raw_left);
+
   ImagePair rectify(const ImagePair& raw) const;
 
  private:
@@ -47,6 +51,7 @@ class StereoRectification {
   RawCameras raw_;
   std::array<cv::Matx33d, 2> rotations_;
   StereoCamera camera_;
+  Eigen::Isometry3d T_body_left_ = Eigen::Isometry3d::Identity();
   cv::Mat map_x_[2], map_y_[2];  ///< raw pixel of each rectified one
 };
 
