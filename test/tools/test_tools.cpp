@@ -53,6 +53,11 @@ std::vector<std::string> linesOf(const std::string& text) {
   return lines;
 }
 
+std::vector<double> numbersOf(const std::string& line) {
+  std::istringstream stream(line);
+  return {std::istream_iterator<double>(stream), std::istream_iterator<double>()};
+}
+
 std::vector<std::string> cellsOf(const std::string& row) {
   std::istringstream stream(row);
   std::vector<std::string> cells;
@@ -123,17 +128,32 @@ class Tools : public testing::Test {
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, readText(out), readText(err)};
   }
 
-  Outcome runSequence(const std::string& extra = "") const {
-    return run("run_sequence", sequence_.string() + " --poses " + poses().string() + " " + extra);
+  /// A file of this test.
+  std::string in(const std::string& name) const { return (root_ / name).string(); }
+  std::string poses() const { return readText(root_ / "poses.txt"); }
+
+  Outcome runOn(const std::string& recording, const std::string& extra = "") const {
+    return run("run_sequence", recording + " --poses " + in("poses.txt") + " " + extra);
   }
-  fs::path poses() const { return root_ / "poses.txt"; }
+  Outcome runSequence(const std::string& extra = "") const { return runOn(sequence_.string(), extra); }
+
+  void darken(int side, int pair) const {
+    cv::imwrite(image(side, pair).string(), cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
+  }
 
   /// The drive as a bag.
-  fs::path bag(const std::string& name) const {
-    const fs::path bag = root_ / (name + ".bag");
-    const Outcome outcome = run("convert", sequence_.string() + " --output " + bag.string());
+  std::string bag(const std::string& name) const {
+    const Outcome outcome = run("convert", sequence_.string() + " --output " + in(name + ".bag"));
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-    return bag;
+    return in(name + ".bag");
+  }
+  /// A bag of what `write` makes of each message of another one.
+  template <class Write>
+  std::string rewritten(const std::string& bag, const std::string& name, const Write& write) const {
+    const rosbag::Bag from(bag);
+    rosbag::Bag out(in(name + ".bag"), rosbag::bagmode::Write);
+    for (const rosbag::MessageInstance& message : rosbag::View(from)) write(out, message);
+    return in(name + ".bag");
   }
   /// The drive as a raw folder of EuRoC's or TUM-VI's.
   fs::path rawFolder(const std::string& lens) const {
@@ -173,26 +193,6 @@ class Tools : public testing::Test {
   const fs::path root_ = folder_.path(), sequence_ = root_ / "sequences" / "09", results_ = root_ / "results";
 };
 
-/// The tools that read a sequence, with arguments for a sound run.
-struct Reader {
-  const char* tool;
-  std::function<std::string(const fs::path& sequence, const fs::path& root)> arguments;
-};
-
-const std::vector<Reader>& readers() {
-  static const std::vector<Reader> all = {
-      {"run_sequence",
-       [](const fs::path& sequence, const fs::path& root) {
-         return sequence.string() + " --poses " + (root / "reader.txt").string();
-       }},
-      {"kitti_to_bag",
-       [](const fs::path& sequence, const fs::path& root) {
-         return "--sequence " + sequence.string() + " --output " + (root / "reader.bag").string();
-       }},
-  };
-  return all;
-}
-
 TEST_F(Tools, AllExplainThemselves) {
   for (const char* tool : {SDVO_TOOLS}) {
     const Outcome outcome = run(tool, "--help");
@@ -203,49 +203,43 @@ TEST_F(Tools, AllExplainThemselves) {
   }
 }
 
-TEST_F(Tools, SoundSequenceIsRead) {
-  for (const Reader& reader : readers()) {
-    const Outcome outcome = run(reader.tool, reader.arguments(sequence_, root_));
-    EXPECT_EQ(outcome.exit_code, 0) << reader.tool << ": " << outcome.err;
-    EXPECT_TRUE(errorLines(outcome).empty()) << reader.tool << ": " << outcome.err;
+/// By each tool that reads one.
+TEST_F(Tools, ASoundSequenceIsReadAndADamagedOneIsNamed) {
+  const fs::path sound = root_ / "sound";
+  fs::copy(sequence_, sound, fs::copy_options::recursive);
+  const auto readBy = [this](bool converter) {
+    return converter ? run("kitti_to_bag", "--sequence " + sequence_.string() + " --output " + in("reader.bag"))
+                     : run("run_sequence", sequence_.string() + " --poses " + in("reader.txt"));
+  };
+  const std::vector<std::pair<std::function<void()>, std::string>> damages = {
+      {[] {}, ""},
+      {[this] { fs::remove(sequence_ / "calib.txt"); }, (sequence_ / "calib.txt").string()},
+      {[this] { fs::remove_all(sequence_); }, sequence_.string()},
+      {[this] { fs::resize_file(image(1, 2), fs::file_size(image(1, 2)) / 2); }, image(1, 2).string()},
+      {[this] { cv::imwrite(image(1, 1).string(), cv::Mat(200, 320, CV_8U, cv::Scalar(90))); }, image(1, 1).string()},
+      {[this] { writeCalibration(0.0); }, "baseline"}};
+  for (const auto& [damage, words] : damages) {
+    fs::remove_all(sequence_);
+    fs::copy(sound, sequence_, fs::copy_options::recursive);
+    damage();
+    for (const bool converter : {false, true}) {
+      const Outcome outcome = readBy(converter);
+      if (!words.empty()) {
+        expectError(outcome, words);
+        continue;
+      }
+      EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+      EXPECT_TRUE(errorLines(outcome).empty()) << outcome.err;
+    }
   }
 }
 
-TEST_F(Tools, NoCalibration) {
-  fs::remove(sequence_ / "calib.txt");
-  for (const Reader& reader : readers())
-    expectError(run(reader.tool, reader.arguments(sequence_, root_)), (sequence_ / "calib.txt").string());
-}
-
-TEST_F(Tools, NoSequence) {
-  for (const Reader& reader : readers())
-    expectError(run(reader.tool, reader.arguments(root_ / "missing", root_)), (root_ / "missing").string());
-}
-
-TEST_F(Tools, TruncatedImage) {
-  fs::resize_file(image(1, 2), fs::file_size(image(1, 2)) / 2);
-  for (const Reader& reader : readers())
-    expectError(run(reader.tool, reader.arguments(sequence_, root_)), image(1, 2).string());
-}
-
-TEST_F(Tools, LeftAndRightOfDifferentSize) {
-  cv::imwrite(image(1, 1).string(), cv::Mat(200, 320, CV_8U, cv::Scalar(90)));
-  for (const Reader& reader : readers())
-    expectError(run(reader.tool, reader.arguments(sequence_, root_)), image(1, 1).string());
-}
-
-TEST_F(Tools, BaselineOfZero) {
-  writeCalibration(0.0);
-  for (const Reader& reader : readers()) expectError(run(reader.tool, reader.arguments(sequence_, root_)), "baseline");
-}
-
 TEST_F(Tools, OutputThatCannotBeWritten) {
-  const std::string missing = (root_ / "missing" / "out").string();
+  const std::string missing = in("missing/out"), truth = in("truth.txt");
   expectError(run("run_sequence", sequence_.string() + " --poses " + missing), missing);
   expectError(runSequence("--timing " + missing), missing);
   expectError(runSequence("--states " + missing), missing);
   expectError(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output " + missing), missing);
-  const std::string truth = (root_ / "truth.txt").string();
   expectError(run("evaluate_trajectory",
                   "--ground-truth " + truth + " --estimate " + truth + " --lengths 0.2 --json " + missing),
               missing);
@@ -263,7 +257,7 @@ TEST_F(Tools, OutputIsNeverADeviceOrAPipe) {
 
 /// Neither a file of another kind, nor its own on a full disk; a bag not at all.
 TEST_F(Tools, NoOutputDestroysAFile) {
-  const std::string drive = sequence_.string(), truth = (root_ / "truth.txt").string();
+  const std::string drive = sequence_.string(), truth = in("truth.txt");
   const fs::path output = root_ / "output";
   for (const auto& [tool, arguments] : std::vector<std::pair<std::string, std::string>>{
            {"run_sequence", drive + " --poses"},
@@ -301,40 +295,41 @@ TEST_F(Tools, TruePosesAreNoOutput) {
   fs::copy_file(truth, beside);
   const std::string words = "has true poses, or is another output";
   expectError(run("run_sequence", sequence_.string() + " --poses " + beside.string()), words);
-  expectError(run("run_sequence", sequence_.string() + " --page " + (root_ / "page.html").string() +
-                                      " --ground-truth " + truth.string() + " --poses " + truth.string()),
+  expectError(run("run_sequence", sequence_.string() + " --page " + in("page.html") + " --ground-truth " +
+                                      truth.string() + " --poses " + truth.string()),
               words);
   EXPECT_EQ(readText(beside), readText(truth));
 }
 
 TEST_F(Tools, OptionsThatDoNotExistOrAreOutOfRange) {
-  expectError(runSequence("--param detector/no_such_option=1"), "detector/no_such_option");
-  expectError(runSequence("--param motion/min_inliers=1"), "motion/min_inliers");
-  expectError(runSequence("--param motion/max_iterations=many"), "motion/max_iterations");
-  expectError(runSequence("--param motion/consensus=square"), "motion/consensus");
-  expectError(runSequence("--param motion/min_inliers"), "name=value");
-  // Each in its range, but nothing would be aligned.
-  for (const char* option : {"alignment/radius=6", "descriptor/patch_side=9"})
-    expectError(runSequence("--param " + std::string(option)), "descriptor/patch_side");
-  expectError(runSequence("--frames 0"), "--frames");
-
-  const fs::path config = root_ / "config.yaml";
-  const std::string option = "--config " + config.string();
-  expectError(runSequence(option), config.string());
-  std::ofstream(config) << "visual_odometry: {motion: {no_such_option: 1}}\n";
-  expectError(runSequence(option), "no_such_option");
-  std::ofstream(config) << "visual_odometry: {motion: {min_inliers: 2}}\n";
-  expectError(runSequence(option), "motion/min_inliers");
-  std::ofstream(config) << "visual_odometry: [unfinished\n";
-  expectError(runSequence(option), config.string());
+  const std::vector<std::pair<std::string, std::string>> options = {
+      {"--param detector/no_such_option=1", "detector/no_such_option"},
+      {"--param motion/min_inliers=1", "motion/min_inliers"},
+      {"--param motion/max_iterations=many", "motion/max_iterations"},
+      {"--param motion/consensus=square", "motion/consensus"},
+      {"--param motion/min_inliers", "name=value"},
+      // Each in its range, but nothing would be aligned.
+      {"--param alignment/radius=6", "descriptor/patch_side"},
+      {"--param descriptor/patch_side=9", "descriptor/patch_side"},
+      {"--frames 0", "--frames"},
+      {"--config " + in("none.yaml"), in("none.yaml")}};
+  for (const auto& [option, words] : options) expectError(runSequence(option), words);
+  const std::vector<std::pair<std::string, std::string>> configs = {
+      {"visual_odometry: {motion: {no_such_option: 1}}\n", "no_such_option"},
+      {"visual_odometry: {motion: {min_inliers: 2}}\n", "motion/min_inliers"},
+      {"visual_odometry: [unfinished\n", in("config.yaml")}};
+  for (const auto& [text, words] : configs) {
+    std::ofstream(in("config.yaml")) << text;
+    expectError(runSequence("--config " + in("config.yaml")), words);
+  }
 }
 
 TEST_F(Tools, OnePoseForEachPairAndTheDriveIsFollowed) {
-  const Outcome outcome = runSequence("--timing " + (root_ / "timing.csv").string());
+  const Outcome outcome = runSequence("--timing " + in("timing.csv"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_TRUE(contains(outcome.out, "options ")) << "no hash of the options: " << outcome.out;
 
-  const std::vector<std::string> lines = linesOf(readText(poses()));
+  const std::vector<std::string> lines = linesOf(poses());
   ASSERT_EQ(lines.size(), static_cast<std::size_t>(kPairs));
   for (int i = 0; i < kPairs; ++i) {
     std::istringstream stream(lines[static_cast<std::size_t>(i)]);
@@ -358,9 +353,9 @@ TEST_F(Tools, OnePoseForEachPairAndTheDriveIsFollowed) {
 
 TEST_F(Tools, PlacesByASwitchOrByTheName) {
   const auto arguments = [this](const std::string& name) {
-    return sequence_.string() + " --poses " + (root_ / (name + ".txt")).string() + " --odometry " + poses().string() +
-           " --keyframes " + (root_ / (name + ".csv")).string() + " --ground-truth " + (root_ / "truth.txt").string() +
-           " --before " + sequence_.string() + " --param place_recognition/keyframe_distance=0.15";  // m, below a step
+    return sequence_.string() + " --poses " + in(name + ".txt") + " --odometry " + in("poses.txt") + " --keyframes " +
+           in(name + ".csv") + " --ground-truth " + in("truth.txt") + " --before " + sequence_.string() +
+           " --param place_recognition/keyframe_distance=0.15";  // m, below a step
   };
   const Outcome named = run("run_places", arguments("named"));
   if (named.err.find("without Ceres") != std::string::npos) GTEST_SKIP() << named.err;
@@ -368,18 +363,18 @@ TEST_F(Tools, PlacesByASwitchOrByTheName) {
   EXPECT_TRUE(contains(named.out, "\nrevisits ")) << named.out;
   EXPECT_EQ(linesOf(readText(root_ / "named.txt")).size(), static_cast<std::size_t>(kPairs));
   EXPECT_EQ(linesOf(readText(root_ / "named.csv")).size(), 2u * kPairs + 1u);
-  const std::string odometry = readText(poses());
+  const std::string odometry = poses();
   ASSERT_EQ(run("run_sequence", "--places " + arguments("switched")).exit_code, 0);
   EXPECT_EQ(readText(root_ / "switched.txt"), readText(root_ / "named.txt"));
   ASSERT_EQ(runSequence().exit_code, 0);
-  EXPECT_EQ(readText(poses()), odometry);
+  EXPECT_EQ(poses(), odometry);
   expectError(run("run_sequence", arguments("neither")), "need --places");
 }
 
 TEST_F(Tools, TimingEndsWithTheReasonWithoutCommas) {
   // A grey right image refuses the pair, and the odometry says why.
   cv::imwrite(image(1, 2).string(), cv::Mat1b(240, 320, std::uint8_t{90}));
-  const std::string timing = (root_ / "timing.csv").string(), states = (root_ / "states.csv").string();
+  const std::string timing = in("timing.csv"), states = in("states.csv");
   ASSERT_EQ(runSequence("--timing " + timing + " --states " + states).exit_code, 0);
   const std::vector<std::string> rows = linesOf(readText(timing)), stated = linesOf(readText(states));
   const auto last = [](const std::string& row) { return row.substr(row.rfind(',') + 1); };
@@ -393,7 +388,7 @@ TEST_F(Tools, TimingEndsWithTheReasonWithoutCommas) {
 }
 
 TEST_F(Tools, StatesHaveTheCovariancesOfEachPair) {
-  ASSERT_EQ(runSequence("--states " + (root_ / "states.csv").string()).exit_code, 0);
+  ASSERT_EQ(runSequence("--states " + in("states.csv")).exit_code, 0);
   const std::vector<std::string> rows = linesOf(readText(root_ / "states.csv"));
   ASSERT_EQ(rows.size(), static_cast<std::size_t>(kPairs) + 1);
   EXPECT_EQ(rows.front().rfind("frame,stamp_ns,state,epoch,has_pose,has_motion,motion_00,", 0), 0u);
@@ -414,24 +409,23 @@ TEST_F(Tools, StatesHaveTheCovariancesOfEachPair) {
 
 TEST_F(Tools, FramesLimitsThePairs) {
   ASSERT_EQ(runSequence("--frames 2").exit_code, 0);
-  EXPECT_EQ(linesOf(readText(poses())).size(), 2u);
+  EXPECT_EQ(linesOf(poses()).size(), 2u);
 }
 
 TEST_F(Tools, ResultsAreBitIdenticalInEveryRunAndWithAnyThreads) {
   ASSERT_EQ(runSequence("--threads 1").exit_code, 0);
-  const std::string first = readText(poses());
+  const std::string first = poses();
   for (const char* threads : {"--threads 1", "--threads 2", "--threads 3"}) {
-    fs::remove(poses());
+    fs::remove(in("poses.txt"));
     ASSERT_EQ(runSequence(threads).exit_code, 0);
-    EXPECT_EQ(readText(poses()), first) << threads;
+    EXPECT_EQ(poses(), first) << threads;
   }
 }
 
 TEST_F(Tools, BagsGiveWhatTheirSequencesGive) {
   ASSERT_EQ(runSequence().exit_code, 0);
-  const std::string expected = readText(poses());
-  bag("a");
-  for (const fs::path& recording : {sequence_, root_ / "a.bag"}) {
+  const std::string expected = poses(), a = bag("a");
+  for (const fs::path& recording : {sequence_, fs::path(a)}) {
     const std::string name = recording.stem().string();
     const Outcome outcome = runBags(recording.string(), "--format kitti");
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
@@ -441,13 +435,12 @@ TEST_F(Tools, BagsGiveWhatTheirSequencesGive) {
     EXPECT_EQ(readText(results_ / (name + ".txt")), expected);
     EXPECT_EQ(linesOf(readText(results_ / (name + ".csv"))).size(), static_cast<std::size_t>(kPairs) + 1);
   }
-  ASSERT_EQ(run("run_sequence", (root_ / "a.bag").string() + " --poses " + poses().string() + " --threads 2").exit_code,
-            0);
-  EXPECT_EQ(readText(poses()), expected);
+  ASSERT_EQ(runOn(a, "--threads 2").exit_code, 0);
+  EXPECT_EQ(poses(), expected);
 
   // TUM's format has the stamps: times.txt plus 1e9 s.
   fs::remove(results_ / "a.txt");
-  ASSERT_EQ(runBags((root_ / "a.bag").string()).exit_code, 0);
+  ASSERT_EQ(runBags(a).exit_code, 0);
   const std::vector<std::string> lines = linesOf(readText(results_ / "a.txt"));
   ASSERT_EQ(lines.size(), static_cast<std::size_t>(kPairs) + 1);  // and a comment
   EXPECT_EQ(lines[1].rfind("1000000000.000000000 ", 0), 0u) << lines[1];
@@ -456,48 +449,51 @@ TEST_F(Tools, BagsGiveWhatTheirSequencesGive) {
 
 /// As a RealSense D400 names its topics, with images as image_transport compresses them.
 TEST_F(Tools, BagsOfOtherNamesAndCompressedImages) {
-  const fs::path renamed = root_ / "renamed.bag";
+  sensor_msgs::CameraInfo infos[2];
+  const auto topicOf = [](int side) { return "/camera/infra" + std::to_string(1 + side); };
+  const auto writeInfo = [&](rosbag::Bag& out, int side, ros::Time time) {
+    out.write(topicOf(side) + "/camera_info", time, infos[side]);
+  };
+  const std::string renamed =
+      rewritten(bag("plain"), "renamed", [&](rosbag::Bag& out, const rosbag::MessageInstance& message) {
+        const int side = contains(message.getTopic(), "/left/") ? 0 : 1;
+        if (const auto info = message.instantiate<sensor_msgs::CameraInfo>()) {
+          infos[side] = *info;
+          writeInfo(out, side, message.getTime());
+        }
+        const auto image = message.instantiate<sensor_msgs::Image>();
+        if (!image) return;
+        sensor_msgs::CompressedImage compressed;
+        compressed.header = image->header;
+        compressed.format = "mono8; png compressed mono8";
+        cv::imencode(".png", cv::Mat(240, 320, CV_8U, const_cast<std::uint8_t*>(image->data.data())), compressed.data);
+        out.write(topicOf(side) + "/image_rect_raw/compressed", message.getTime(), compressed);
+      });
   {
-    sensor_msgs::CameraInfo infos[2];
-    const rosbag::Bag in(bag("plain").string());
-    rosbag::Bag out(renamed.string(), rosbag::bagmode::Write);
-    for (const rosbag::MessageInstance& message : rosbag::View(in)) {
-      const int side = message.getTopic().find("/left/") == std::string::npos ? 1 : 0;
-      const std::string topic = "/camera/infra" + std::to_string(1 + side);
-      if (const auto info = message.instantiate<sensor_msgs::CameraInfo>())
-        out.write(topic + "/camera_info", message.getTime(), infos[side] = *info);
-      const auto image = message.instantiate<sensor_msgs::Image>();
-      if (!image) continue;
-      sensor_msgs::CompressedImage compressed;
-      compressed.header = image->header;
-      compressed.format = "mono8; png compressed mono8";
-      cv::imencode(".png", cv::Mat(240, 320, CV_8U, const_cast<std::uint8_t*>(image->data.data())), compressed.data);
-      out.write(topic + "/image_rect_raw/compressed", message.getTime(), compressed);
-    }
+    rosbag::Bag out(renamed, rosbag::bagmode::Append);
     sensor_msgs::CompressedImage torn;  // whose pair is left out
     torn.header.stamp = ros::Time(1000000001.0);
     for (const int side : {0, 1}) {
-      const std::string topic = "/camera/infra" + std::to_string(1 + side);
-      out.write(topic + "/image_rect_raw/compressed", torn.header.stamp, torn);
+      out.write(topicOf(side) + "/image_rect_raw/compressed", torn.header.stamp, torn);
       infos[side].header.stamp = torn.header.stamp;
-      out.write(topic + "/camera_info", torn.header.stamp, infos[side]);
+      writeInfo(out, side, torn.header.stamp);
     }
   }
   const std::string names = " --camera /camera --left infra1 --right infra2 --image image_rect_raw";
   ASSERT_EQ(runSequence().exit_code, 0);
-  const Outcome outcome = runBags(renamed.string(), "--format kitti --shuttle" + names);
+  const Outcome outcome = runBags(renamed, "--format kitti --shuttle" + names);
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_EQ(readText(results_ / "renamed.txt"), readText(poses()));
+  EXPECT_EQ(readText(results_ / "renamed.txt"), poses());
   EXPECT_EQ(linesOf(readText(results_ / "report.csv")).at(1).rfind("renamed,4,0,0,1,", 0), 0u);
   EXPECT_TRUE(contains(outcome.out, "shuttle: error about ")) << outcome.out;
   fs::remove(results_ / "renamed.txt");
-  ASSERT_EQ(runBags(renamed.string(), "--format kitti").exit_code, 0) << "the bag's only stereo camera";
-  EXPECT_EQ(runBags(renamed.string(), "--format kitti --camera /camera").exit_code, 0) << "the only one in a namespace";
-  EXPECT_EQ(readText(results_ / "renamed.txt"), readText(poses()));
-  expectError(runBags(renamed.string(), "--camera /other"),
+  ASSERT_EQ(runBags(renamed, "--format kitti").exit_code, 0) << "the bag's only stereo camera";
+  EXPECT_EQ(runBags(renamed, "--format kitti --camera /camera").exit_code, 0) << "the only one in a namespace";
+  EXPECT_EQ(readText(results_ / "renamed.txt"), poses());
+  expectError(runBags(renamed, "--camera /other"),
               "has no /other/left/image_rect; its images: /camera/infra1/image_rect_raw");
 
-  const std::string checked = run("check_camera", "--bag " + renamed.string() + names).out;
+  const std::string checked = run("check_camera", "--bag " + renamed + names).out;
   EXPECT_EQ(checked.rfind("OK   topics", 0), 0u) << checked;
   EXPECT_TRUE(contains(checked, "malformed image: 0 bytes")) << checked;
 }
@@ -505,28 +501,22 @@ TEST_F(Tools, BagsOfOtherNamesAndCompressedImages) {
 /// As `rosbag record --split` leaves a drive.
 TEST_F(Tools, PartsOfADriveAreJoined) {
   ASSERT_EQ(runSequence().exit_code, 0);
-  const std::string parts[] = {(root_ / "drive_0.bag").string(), (root_ / "drive_1.bag").string()};
-  {
-    rosbag::Bag whole(bag("whole").string(), rosbag::bagmode::Read);
-    rosbag::Bag out[2];
-    for (const int part : {0, 1}) out[part].open(parts[part], rosbag::bagmode::Write);
-    rosbag::View view(whole);
-    const ros::Time begin = view.getBeginTime();
-    for (const rosbag::MessageInstance& message : view)
-      out[message.getTime() > begin + ros::Duration(0.25)].write(message.getTopic(), message.getTime(), message);
-  }
-  const auto joined = [&](const std::string& a, const std::string& b, const std::string& more) {
-    return run("run_sequence", a + " " + b + " --poses " + (root_ / "joined.txt").string() + more);
-  };
-  const Outcome outcome = joined(parts[0], parts[1], " --join --shuttle");
+  const std::string expected = poses(), whole = bag("whole");
+  std::string parts[2];
+  for (const bool is_second : {false, true})
+    parts[is_second] = rewritten(whole, is_second ? "drive_1" : "drive_0", [&](rosbag::Bag& out, const auto& message) {
+      if ((message.getTime() > ros::Time(1000000000.25)) == is_second)
+        out.write(message.getTopic(), message.getTime(), message);
+    });
+  const Outcome outcome = runOn(parts[0] + " " + parts[1], "--join --shuttle");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_EQ(readText(root_ / "joined.txt"), readText(poses()));
-  expectError(joined(parts[0], parts[1], ""), "--join");
-  expectError(joined(parts[1], parts[0], " --join"), "drive_0.bag' is not later than");
+  EXPECT_EQ(poses(), expected);
+  expectError(runOn(parts[0] + " " + parts[1]), "--join");
+  expectError(runOn(parts[1] + " " + parts[0], "--join"), "drive_0.bag' is not later than");
 }
 
 TEST_F(Tools, RecordingsThatCannotBeReadAreNamedWithTheRemedy) {
-  const std::string killed = bag("killed").string(), torn = bag("torn").string(), pipe = (root_ / "pipe.bag").string();
+  const std::string killed = bag("killed"), torn = bag("torn"), pipe = in("pipe.bag");
   {
     std::fstream file(killed, std::ios::in | std::ios::out | std::ios::binary);
     std::string head(4096, '\0');
@@ -536,125 +526,108 @@ TEST_F(Tools, RecordingsThatCannotBeReadAreNamedWithTheRemedy) {
   }
   fs::resize_file(torn, fs::file_size(torn) / 2);
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  const std::string poses = " --poses " + (root_ / "none.txt").string();
-  for (const std::string& tool : {"run_sequence " + poses + " ", std::string("check_camera --bag ")}) {
-    const std::string name = tool.substr(0, tool.find(' ')), arguments = tool.substr(tool.find(' '));
-    expectError(run(name, arguments + killed),
+  for (const bool checker : {false, true}) {
+    const auto read = [&](const std::string& bag) {
+      return checker ? run("check_camera", "--bag " + bag) : runOn(bag);
+    };
+    expectError(read(killed),
                 "killed.bag' has no index, as of a recorder that was killed: where none runs any more, rosbag reindex");
-    expectError(run(name, arguments + torn), "torn.bag'");
-    expectError(run(name, arguments + pipe), "pipe.bag' is no file");
+    expectError(read(torn), "torn.bag'");
+    expectError(read(pipe), "pipe.bag' is no file");
     const std::ofstream recorder(killed, std::ios::app);
-    expectError(run(name, arguments + killed), "killed.bag' is being written: end its recorder");
+    expectError(read(killed), "killed.bag' is being written: end its recorder");
   }
-  expectError(run("run_sequence", "nosuch.bag" + poses), "there is no 'nosuch.bag'");
-  expectError(run("run_sequence", sequence_.string() + poses + " --config " + pipe), "pipe.bag: it is no file");
+  expectError(runOn("nosuch.bag"), "there is no 'nosuch.bag'");
+  expectError(runSequence("--config " + pipe), "pipe.bag: it is no file");
 }
 
 /// The drive as a raw folder of EuRoC's is rectified on the fly, or by convert.
 TEST_F(Tools, RawFoldersOfEuroc) {
-  const fs::path asl = rawFolder("radial-tangential");
-  const fs::path raw = root_ / "raw.txt", rectified = root_ / "rectified";
-  const Outcome outcome = run("run_sequence", asl.string() + " --format tum --poses " + raw.string());
+  const std::string asl = rawFolder("radial-tangential").string(), rectified = in("rectified");
+  const Outcome outcome = runOn(asl, "--format tum");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  ASSERT_EQ(run("euroc_to_kitti", "--input " + (asl / "mav0").string() + " --output " + rectified.string()).exit_code,
-            0);
-  ASSERT_EQ(run("run_sequence", rectified.string() + " --poses " + poses().string()).exit_code, 0);
-  const std::vector<std::string> lines = linesOf(readText(raw)), expected = linesOf(readText(poses()));
+  const std::vector<std::string> lines = linesOf(poses());
+  ASSERT_EQ(run("euroc_to_kitti", "--input " + asl + "/mav0 --output " + rectified).exit_code, 0);
+  ASSERT_EQ(runOn(rectified).exit_code, 0);
+  const std::vector<std::string> expected = linesOf(poses());
   ASSERT_EQ(lines.size(), static_cast<std::size_t>(kPairs) + 1);  // and a comment
   for (std::size_t i = 0; i < kPairs; ++i) {
-    std::istringstream line(lines[i + 1]), other(expected[i]);
-    const std::vector<double> pose((std::istream_iterator<double>(line)), std::istream_iterator<double>());
-    const std::vector<double> same((std::istream_iterator<double>(other)), std::istream_iterator<double>());
+    const std::vector<double> pose = numbersOf(lines[i + 1]), same = numbersOf(expected[i]);
     for (const std::size_t axis : {0u, 1u, 2u}) EXPECT_NEAR(pose.at(1 + axis), same.at(3 + 4 * axis), 1e-6);
     EXPECT_NEAR(pose[0], 1.4e9 + 0.1 * static_cast<double>(i), 1e-6);
     EXPECT_NEAR(pose[3], kStep * static_cast<double>(i), 0.05);
   }
 
-  const fs::path bag = root_ / "raw.bag";
-  ASSERT_EQ(run("convert", asl.string() + " --frames 3 --output " + bag.string()).exit_code, 0);
-  rosbag::Bag in(bag.string());
-  EXPECT_EQ(rosbag::View(in, rosbag::TopicQuery("/stereo/right/image_raw")).size(), 3u);
+  ASSERT_EQ(run("convert", asl + " --frames 3 --output " + in("raw.bag")).exit_code, 0);
+  rosbag::Bag raw(in("raw.bag"));
+  EXPECT_EQ(rosbag::View(raw, rosbag::TopicQuery("/stereo/right/image_raw")).size(), 3u);
 }
 
 /// With its camera_info a raw bag gives what its folder gives; without it a calibration is asked for.
 TEST_F(Tools, RawBagsAreRectified) {
   for (const std::string lens : {"radial-tangential", "equidistant"})
     for (const std::string fov : {"", " --fov 70"}) {
-      const fs::path asl = rawFolder(lens), raw = root_ / "raw.bag", bare = root_ / "bare.bag",
-                     page = root_ / "page.html";
-      ASSERT_EQ(run("run_sequence", asl.string() + fov + " --poses " + poses().string()).exit_code, 0);
-      const std::string expected = readText(poses());
-      ASSERT_EQ(run("convert", asl.string() + " --output " + raw.string()).exit_code, 0);
-      const Outcome outcome =
-          run("run_sequence", raw.string() + fov + " --page " + page.string() + " --poses " + poses().string());
+      const fs::path asl = rawFolder(lens);
+      const std::string raw = in("raw.bag"), folder = in(lens + std::to_string(fov.size()));
+      ASSERT_EQ(runOn(asl.string(), fov).exit_code, 0);
+      const std::string expected = poses();
+      ASSERT_EQ(run("convert", asl.string() + " --output " + raw).exit_code, 0);
+      const Outcome outcome = runOn(raw, fov + " --page " + in("page.html"));
       EXPECT_EQ(outcome.exit_code, 0) << outcome.out << outcome.err;
-      EXPECT_EQ(readText(poses()), expected) << lens << fov;
-      EXPECT_TRUE(contains(readPage(page), "raw images rectified here"));
-      {
-        rosbag::Bag out(bare.string(), rosbag::bagmode::Write);
-        const rosbag::Bag in(raw.string());
-        for (const rosbag::MessageInstance& message : rosbag::View(in))
-          if (message.getTopic().find("image_raw") != std::string::npos)
-            out.write(message.getTopic().find("left") != std::string::npos ? "/cam0/image_raw" : "/cam1/image_raw",
-                      message.getTime(), message);
-      }
+      EXPECT_EQ(poses(), expected) << lens << fov;
+      EXPECT_TRUE(contains(readPage(in("page.html")), "raw images rectified here"));
+      const std::string bare = rewritten(raw, "bare", [](rosbag::Bag& out, const rosbag::MessageInstance& message) {
+        if (contains(message.getTopic(), "image_raw"))
+          out.write(contains(message.getTopic(), "left") ? "/cam0/image_raw" : "/cam1/image_raw", message.getTime(),
+                    message);
+      });
       const std::string sensors = " --calibration " + (asl / "mav0" / "cam0" / "sensor.yaml").string() + " " +
                                   (asl / "mav0" / "cam1" / "sensor.yaml").string();
-      const std::string ways[] = {
-          "run_sequence " + bare.string() + " --poses " + poses().string(), "check_camera --bag " + bare.string(),
-          "convert " + bare.string() + " --output " + (root_ / (lens + std::to_string(fov.size()))).string()};
-      for (const std::string& way : ways) {
-        const std::size_t space = way.find(' ');
-        expectError(run(way.substr(0, space), way.substr(space)), "no /cam0/camera_info: the calibration is missing");
-        const Outcome given = run(way.substr(0, space), way.substr(space) + sensors + fov);
+      for (const auto& [tool, arguments] :
+           std::vector<std::pair<std::string, std::string>>{{"run_sequence", bare + " --poses " + in("poses.txt")},
+                                                            {"check_camera", "--bag " + bare},
+                                                            {"convert", bare + " --output " + folder}}) {
+        expectError(run(tool, arguments), "no /cam0/camera_info: the calibration is missing");
+        const Outcome given = run(tool, arguments + sensors + fov);
         EXPECT_NE(given.exit_code, 1) << given.err;
       }
-      EXPECT_EQ(readText(poses()), expected) << lens << fov;
-      for (const fs::path& made : {asl, raw, bare}) fs::remove_all(made);
+      EXPECT_EQ(poses(), expected) << lens << fov;
+      for (const fs::path& made : {asl, fs::path(raw), fs::path(bare)}) fs::remove_all(made);
     }
 }
 
 /// As converters from ROS 2 leave it: fields with other names, so another MD5.
 TEST_F(Tools, MessagesAreKnownByWhatTheyHold) {
-  const fs::path plain = bag("plain");
+  const std::string plain = bag("plain");
   const auto changed = [&](const std::string& name, const std::string& definition) {
-    const fs::path path = root_ / (name + ".bag");
-    rosbag::Bag out(path.string(), rosbag::bagmode::Write);
-    const rosbag::Bag in(plain.string());
-    for (const rosbag::MessageInstance& message : rosbag::View(in)) {
+    return rewritten(plain, name, [&](rosbag::Bag& out, const rosbag::MessageInstance& message) {
       const auto header = boost::make_shared<ros::M_string>(*message.getConnectionHeader());
       if (message.getDataType() == "sensor_msgs/CameraInfo") {
         (*header)["md5sum"] = "b5aff04250fbf270b71bef9d82c2132e";
         (*header)["message_definition"] = definition;
       }
       out.write(message.getTopic(), message.getTime(), message, header);
-    }
-    return path.string();
+    });
   };
   std::string ros2 = ros::message_traits::definition<sensor_msgs::CameraInfo>();
   for (const auto& [from, to] : {std::pair("float64[] D", "float64[] d"), std::pair("float64[9]  K", "float64[9] k")})
     ros2.replace(ros2.find(from), std::string(from).size(), to);
   ASSERT_EQ(runSequence().exit_code, 0);
-  const std::string expected = readText(poses());
-  ASSERT_EQ(run("run_sequence", changed("ros2", ros2) + " --poses " + poses().string()).exit_code, 0);
-  EXPECT_EQ(readText(poses()), expected);
-  const std::string other = changed("other", "uint32 height\n" + ros2);
-  expectError(run("run_sequence", other + " --poses " + poses().string()),
-              "of another definition: uint32 (uint32 time");
-  std::ofstream(root_ / "drive.db3") << "SQLite format 3";
-  expectError(run("run_sequence", (root_ / "drive.db3").string() + " --poses " + poses().string()), "a bag of ROS 2");
+  const std::string expected = poses();
+  ASSERT_EQ(runOn(changed("ros2", ros2)).exit_code, 0);
+  EXPECT_EQ(poses(), expected);
+  expectError(runOn(changed("other", "uint32 height\n" + ros2)), "of another definition: uint32 (uint32 time");
+  std::ofstream(in("drive.db3")) << "SQLite format 3";
+  expectError(runOn(in("drive.db3")), "a bag of ROS 2");
 }
 
 TEST_F(Tools, ABagBecomesAFolder) {
   const fs::path folder = root_ / "folder";
-  ASSERT_EQ(
-      run("convert", bag("a").string() + " --poses " + (root_ / "truth.txt").string() + " --output " + folder.string())
-          .exit_code,
-      0);
+  ASSERT_EQ(run("convert", bag("a") + " --poses " + in("truth.txt") + " --output " + folder.string()).exit_code, 0);
   ASSERT_EQ(runSequence().exit_code, 0);
-  const std::string expected = readText(poses());
-  ASSERT_EQ(run("run_sequence", folder.string() + " --poses " + poses().string()).exit_code, 0);
-  EXPECT_EQ(readText(poses()), expected);
+  const std::string expected = poses();
+  ASSERT_EQ(runOn(folder.string()).exit_code, 0);
+  EXPECT_EQ(poses(), expected);
   EXPECT_EQ(linesOf(readText(folder / "poses.txt")).size(), static_cast<std::size_t>(kPairs));
 }
 
@@ -721,94 +694,87 @@ TEST_F(Tools, RecordingsCheckThemselves) {
 
 /// The way back finds the messages of a pair by when they were recorded, which need not be one after the other.
 TEST_F(Tools, AShuttleFindsPairsHoweverTheyWereRecorded) {
-  const fs::path plain = bag("plain"), at_once = root_ / "at_once.bag", late = root_ / "late.bag";
-  {
-    const rosbag::Bag in(plain.string());
-    rosbag::Bag out_at_once(at_once.string(), rosbag::bagmode::Write), out_late(late.string(), rosbag::bagmode::Write);
-    for (const rosbag::MessageInstance& message : rosbag::View(in)) {
-      if (message.getTopic().rfind("/stereo/", 0) != 0) continue;
-      out_at_once.write(message.getTopic(), ros::Time(1000000009.0), message, message.getConnectionHeader());
-      const bool is_late = message.getTopic() == "/stereo/right/image_rect";
-      out_late.write(message.getTopic(), message.getTime() + ros::Duration(is_late ? 0.25 : 0.0), message,
-                     message.getConnectionHeader());
-    }
-  }
-  for (const fs::path& recording : {plain, at_once, late}) {
-    const Outcome outcome = runBags(recording.string(), "--shuttle");
+  const std::string plain = bag("plain");
+  for (const bool is_at_once : {true, false})
+    rewritten(plain, is_at_once ? "at_once" : "late", [&](rosbag::Bag& out, const rosbag::MessageInstance& message) {
+      if (message.getTopic().rfind("/stereo/", 0) != 0) return;
+      const bool is_late = !is_at_once && message.getTopic() == "/stereo/right/image_rect";
+      const ros::Time time = message.getTime() + ros::Duration(is_late ? 0.25 : 0.0);
+      out.write(message.getTopic(), is_at_once ? ros::Time(1000000009.0) : time, message,
+                message.getConnectionHeader());
+    });
+  std::string expected;
+  for (const std::string name : {"plain", "at_once", "late"}) {
+    const Outcome outcome = runBags(in(name + ".bag"), "--shuttle");
     EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    const std::string checks = readText(results_ / (name + ".self_check.csv"));
+    EXPECT_TRUE(contains(checks, "shuttle,4,"));
+    if (name == "plain") expected = checks;
+    EXPECT_EQ(checks, expected);
   }
-  const std::string expected = readText(results_ / "plain.self_check.csv");
-  EXPECT_TRUE(contains(expected, "shuttle,4,"));
-  EXPECT_EQ(readText(results_ / "at_once.self_check.csv"), expected);
-  EXPECT_EQ(readText(results_ / "late.self_check.csv"), expected);
 }
 
 TEST_F(Tools, ALostDriveDoesNotPassItsSelfChecks) {
   for (int i = 1; i < kPairs; ++i)
-    for (int side = 0; side < 2; ++side)
-      cv::imwrite(image(side, i).string(), cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
+    for (const int side : {0, 1}) darken(side, i);
   const Outcome outcome = runBags(sequence_.string(), "--shuttle --halves");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-  for (const char* check : {"shuttle", "halves"}) {
-    EXPECT_TRUE(contains(outcome.out, std::string(check) + ": no figure")) << outcome.out;
-    EXPECT_TRUE(contains(readText(results_ / "09.self_check.csv"), std::string("\n") + check + ",4,"));
+  for (const std::string check : {"shuttle", "halves"}) {
+    EXPECT_TRUE(contains(outcome.out, check + ": no figure")) << outcome.out;
+    EXPECT_TRUE(contains(readText(results_ / "09.self_check.csv"), "\n" + check + ",4,"));
   }
   EXPECT_TRUE(contains(outcome.out, "pairs have no pose")) << outcome.out;
 }
 
 /// Of all stamps that wait, images are held in memory, so only so many may.
 TEST_F(Tools, MessagesThatMakeNoPairDoNotKeepOthersFromIt) {
-  const fs::path mixed = root_ / "mixed.bag";
   constexpr int kAlone = 250;
-  {
-    rosbag::Bag out(mixed.string(), rosbag::bagmode::Write);
-    sensor_msgs::CameraInfo info;
-    for (int i = 0; i < kAlone; ++i) {
-      info.header.stamp = ros::Time(999999000 + i, 0);
-      out.write("/stereo/left/camera_info", ros::Time(999999000 + i, 0), info);
-    }
-    const rosbag::Bag in(bag("good").string());
-    for (const rosbag::MessageInstance& message : rosbag::View(in))
-      out.write(message.getTopic(), message.getTime(), message, message.getConnectionHeader());
-  }
-  ASSERT_EQ(runBags(mixed.string()).exit_code, 0);
+  int alone = 0;
+  const std::string mixed =
+      rewritten(bag("good"), "mixed", [&](rosbag::Bag& out, const rosbag::MessageInstance& message) {
+        for (sensor_msgs::CameraInfo info; alone < kAlone; ++alone) {
+          info.header.stamp = ros::Time(999999000 + alone, 0);
+          out.write("/stereo/left/camera_info", info.header.stamp, info);
+        }
+        out.write(message.getTopic(), message.getTime(), message, message.getConnectionHeader());
+      });
+  ASSERT_EQ(runBags(mixed).exit_code, 0);
   const std::string row = linesOf(readText(results_ / "report.csv")).at(1);
   EXPECT_EQ(row.rfind("mixed,4,0,0," + std::to_string(kAlone) + ",", 0), 0u) << row;
 }
 
 TEST_F(Tools, ABagWithoutTimesSaysSo) {
-  const fs::path bag = root_ / "zero.bag";
   {
-    rosbag::Bag out(bag.string(), rosbag::bagmode::Write);
+    rosbag::Bag out(in("zero.bag"), rosbag::bagmode::Write);
     for (const std::string side : {"left", "right"}) {
       out.write("/stereo/" + side + "/image_rect", ros::Time(1.0), sensor_msgs::Image());
       out.write("/stereo/" + side + "/camera_info", ros::Time(1.0), sensor_msgs::CameraInfo());
     }
   }
-  expectError(run("run_sequence", bag.string() + " --poses " + poses().string()), "no pair can be used: /stereo/");
-  expectError(runBags(bag.string()), "zero stamp");
+  expectError(runOn(in("zero.bag")), "no pair can be used: /stereo/");
+  expectError(runBags(in("zero.bag")), "zero stamp");
   EXPECT_FALSE(fs::exists(results_ / "report.csv"));
 }
 
 TEST_F(Tools, HashTellsOptionsApart) {
   const auto hash = [this](const std::string& extra) { return linesOf(runSequence("--frames 1 " + extra).out).at(0); };
+  const auto hashOf = [&](const std::string& config) {
+    std::ofstream(in("config.yaml")) << config;
+    return hash("--config " + in("config.yaml"));
+  };
   const std::string defaults = hash("");
   EXPECT_EQ(hash(""), defaults);
   EXPECT_NE(hash("--param motion/seed=2"), defaults);
   // What is the nodelets' alone has no effect on the tools.
-  std::ofstream(root_ / "same.yaml") << "stereo_features: {image_transport: compressed}\n"
-                                        "features_image: {image_transport: compressed}\n"
-                                        "visual_odometry: {motion: {seed: 2}}\n";
-  EXPECT_EQ(hash("--param motion/seed=2"), hash("--config " + (root_ / "same.yaml").string()));
+  EXPECT_EQ(hash("--param motion/seed=2"), hashOf("stereo_features: {image_transport: compressed}\n"
+                                                  "features_image: {image_transport: compressed}\n"
+                                                  "visual_odometry: {motion: {seed: 2}}\n"));
   // A block or a value that is left empty, as where all its lines are comments, is none.
-  std::ofstream(root_ / "empty.yaml") << "stereo_features:\n  # image_transport: compressed\n"
-                                         "visual_odometry:\n  motion:\n    seed:\n";
-  EXPECT_EQ(hash("--config " + (root_ / "empty.yaml").string()), defaults);
+  EXPECT_EQ(hashOf("stereo_features:\n  # image_transport: compressed\nvisual_odometry:\n  motion:\n    seed:\n"),
+            defaults);
   // Booleans as the launch files' rosparam reads them.
-  std::ofstream(root_ / "upright.yaml") << "stereo_features: {descriptor: {oriented: False}}\n";
-  std::ofstream(root_ / "turned.yaml") << "stereo_features: {descriptor: {oriented: Yes}}\n";
-  EXPECT_EQ(hash("--config " + (root_ / "upright.yaml").string()), hash("--param descriptor/oriented=false"));
-  EXPECT_EQ(hash("--config " + (root_ / "turned.yaml").string()), hash("--param descriptor/oriented=true"));
+  EXPECT_EQ(hashOf("stereo_features: {descriptor: {oriented: False}}\n"), hash("--param descriptor/oriented=false"));
+  EXPECT_EQ(hashOf("stereo_features: {descriptor: {oriented: Yes}}\n"), hash("--param descriptor/oriented=true"));
 }
 
 /// A circle to the left: the camera's z points ahead and its x to the right, the base's x ahead and its z upwards.
@@ -824,8 +790,8 @@ TEST_F(Tools, TheTwistOfTheGroundTruthIsThatOfTheBase) {
     }
   }
   const fs::path file = root_ / "circle.bag";
-  ASSERT_EQ(run("kitti_to_bag", "--sequence " + sequence_.string() + " --poses " + (root_ / "circle.txt").string() +
-                                    " --output " + file.string())
+  ASSERT_EQ(run("kitti_to_bag",
+                "--sequence " + sequence_.string() + " --poses " + in("circle.txt") + " --output " + file.string())
                 .exit_code,
             0);
   const rosbag::Bag bag(file.string());
@@ -842,10 +808,6 @@ TEST_F(Tools, TheTwistOfTheGroundTruthIsThatOfTheBase) {
   }
 }
 
-void expectWords(const std::string& page, const std::vector<std::string>& words) {
-  for (const std::string& word : words) EXPECT_TRUE(contains(page, word)) << word;
-}
-
 TEST_F(Tools, AnyRecordingBecomesAPage) {
   const fs::path page = root_ / "page.html";
   const std::string to_page = " --page " + page.string();
@@ -855,7 +817,7 @@ TEST_F(Tools, AnyRecordingBecomesAPage) {
                                         "halves: ",
                                         "calibration",
                                         "stereo_descriptor_vo "};
-  Outcome outcome = run("run_sequence", bag("a").string() + to_page);
+  Outcome outcome = run("run_sequence", bag("a") + to_page);
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_TRUE(contains(outcome.out, ": Followed: 4 of 4 pairs")) << outcome.out;
   std::string json = readPage(page);
@@ -869,35 +831,33 @@ TEST_F(Tools, AnyRecordingBecomesAPage) {
   EXPECT_NEAR(pairs["pose"][kPairs - 1][2].as<double>(), (kPairs - 1) * kStep, 0.1 * kStep);
   EXPECT_FALSE(pairs["truth"]);
 
-  const std::string truth = " --ground-truth " + (root_ / "truth.txt").string();
+  const std::string truth = " --ground-truth " + in("truth.txt");
   outcome =
-      run("run_sequence", sequence_.string() + to_page + truth + " --param motion/seed=2 --poses " + poses().string());
+      run("run_sequence", sequence_.string() + to_page + truth + " --param motion/seed=2 --poses " + in("poses.txt"));
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   json = readPage(page);
   expectWords(json, all);
   expectWords(json, {"true error", "visual_odometry/motion/seed", "default 1"});
   EXPECT_EQ(YAML::Load(json)["pairs"]["truth"].size(), static_cast<std::size_t>(kPairs));
-  EXPECT_EQ(linesOf(readText(poses())).size(), static_cast<std::size_t>(kPairs));
+  EXPECT_EQ(linesOf(poses()).size(), static_cast<std::size_t>(kPairs));
 
   expectError(runSequence(truth), "--page");
   expectError(run("run_sequence", sequence_.string()), "--page");
   std::ofstream(root_ / "short.txt") << "1 0 0 0 0 1 0 0 0 0 1 0\n";
-  expectError(run("run_sequence", sequence_.string() + to_page + " --ground-truth " + (root_ / "short.txt").string()),
-              "short.txt");
+  expectError(run("run_sequence", sequence_.string() + to_page + " --ground-truth " + in("short.txt")), "short.txt");
   expectError(run("run_sequence", sequence_.string() + " --page " + (root_ / "missing" / "page.html").string()),
               "page.html");
 }
 
 /// Stamps of the truth are its own, and it may know only a part of the drive.
 TEST_F(Tools, AGroundTruthWithStampsIsInterpolated) {
-  const fs::path page = root_ / "page.html", truth = root_ / "truth.tum";
-  std::ofstream(truth) << "# stamp x y z qx qy qz qw\n"
-                       << "1000000000.05 0 0 " << 0.5 * kStep << " 0 0 0 1\n1000000000.25 0 0 " << 2.5 * kStep
-                       << " 0 0 0 1\n";
-  const std::string arguments = bag("a").string() + " --page " + page.string() + " --ground-truth " + truth.string();
+  std::ofstream(in("truth.tum")) << "# stamp x y z qx qy qz qw\n"
+                                 << "1000000000.05 0 0 " << 0.5 * kStep << " 0 0 0 1\n1000000000.25 0 0 " << 2.5 * kStep
+                                 << " 0 0 0 1\n";
+  const std::string arguments = bag("a") + " --page " + in("page.html") + " --ground-truth " + in("truth.tum");
   ASSERT_EQ(run("run_sequence", arguments).exit_code, 0);
-  expectWords(readPage(page), {"true error", "at the end off by 0.0"});
-  std::ofstream(truth) << "10.0 0 0 0 0 0 0 1\n11.0 0 0 0 0 0 0 1\n";
+  expectWords(readPage(in("page.html")), {"true error", "at the end off by 0.0"});
+  std::ofstream(in("truth.tum")) << "10.0 0 0 0 0 0 0 1\n11.0 0 0 0 0 0 0 1\n";
   expectError(run("run_sequence", arguments), "no poses at the stamps");
 }
 
@@ -923,21 +883,17 @@ TEST_F(Tools, TheTruthOfEurocIsThatOfItsBody) {
 }
 
 TEST_F(Tools, ThePageOfALostDriveSaysWhere) {
-  for (int side = 0; side < 2; ++side)
-    cv::imwrite(image(side, kPairs - 1).string(), cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
-  cv::imwrite(image(1, kPairs - 2).string(), cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
-  const fs::path page = root_ / "page.html";
-  EXPECT_EQ(run("run_sequence", sequence_.string() + " --page " + page.string()).exit_code, 2);
-  expectWords(readPage(page), {"Interrupted: ", " of 4 pairs have no pose", "LOST", "no figure"});
+  for (const int side : {0, 1}) darken(side, kPairs - 1);
+  darken(1, kPairs - 2);
+  EXPECT_EQ(run("run_sequence", sequence_.string() + " --page " + in("page.html")).exit_code, 2);
+  expectWords(readPage(in("page.html")), {"Interrupted: ", " of 4 pairs have no pose", "LOST", "no figure"});
 }
 
 TEST_F(Tools, ThePageOfADriveWithoutAPose) {
-  for (int side = 0; side < 2; ++side)
-    for (int pair = 0; pair < kPairs; ++pair)
-      cv::imwrite(image(side, pair).string(), cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
-  const fs::path page = root_ / "page.html";
-  run("run_sequence", sequence_.string() + " --page " + page.string());
-  const std::string json = readPage(page);
+  for (int pair = 0; pair < kPairs; ++pair)
+    for (const int side : {0, 1}) darken(side, pair);
+  run("run_sequence", sequence_.string() + " --page " + in("page.html"));
+  const std::string json = readPage(in("page.html"));
   expectWords(json, {"Never started: none of 4 pairs has a pose"});
   EXPECT_FALSE(contains(json, "Interrupted"));
   for (const YAML::Node& pose : YAML::Load(json)["pairs"]["pose"]) EXPECT_TRUE(pose.IsNull());
@@ -956,8 +912,7 @@ TEST_F(Tools, ThePageShowsWhatWasReportedLive) {
       out.write("/stereo/vo_info", ros::Time(1000000000 + i, 0), info);
     }
   }
-  ASSERT_EQ(run("run_sequence", bag("a").string() + " --page " + page.string() + " --live " + live.string()).exit_code,
-            0);
+  ASSERT_EQ(run("run_sequence", bag("a") + " --page " + page.string() + " --live " + live.string()).exit_code, 0);
   expectWords(readPage(page), {"while it ran", "2 TRACKING, 1 LOST; 7 pairs dropped"});
 
   // Of another version.
@@ -970,8 +925,7 @@ TEST_F(Tools, ThePageShowsWhatWasReportedLive) {
     (*header)["message_definition"] = "std_msgs/Header header\nstring state\n";
     out.write("/stereo/vo_info", ros::Time(1000000000, 0), stereo_descriptor_vo::VoInfo(), header);
   }
-  const Outcome other =
-      run("run_sequence", (root_ / "a.bag").string() + " --page " + page.string() + " --live " + live.string());
+  const Outcome other = run("run_sequence", in("a.bag") + " --page " + page.string() + " --live " + live.string());
   EXPECT_EQ(other.exit_code, 0) << other.err;
   EXPECT_TRUE(contains(other.err, "/stereo/vo_info holds stereo_descriptor_vo/VoInfo of another definition"));
 }
@@ -1005,15 +959,14 @@ TEST_F(Tools, TheBaseIsThatOfTheOdometryAboveTheCamera) {
 }
 
 TEST_F(Tools, PicturesOfEachPair) {
-  const fs::path pictures = root_ / "pictures";
-  ASSERT_EQ(runSequence("--pictures " + pictures.string()).exit_code, 0);
+  ASSERT_EQ(runSequence("--pictures " + in("pictures")).exit_code, 0);
   for (int i = 0; i < kPairs; ++i)
-    EXPECT_EQ(cv::imread((pictures / ("00000" + std::to_string(i) + ".jpg")).string()).size(), cv::Size(320, 240));
-  expectError(runSequence("--pictures " + pictures.string()), "is not empty: choose another folder");
+    EXPECT_EQ(cv::imread(in("pictures/00000" + std::to_string(i) + ".jpg")).size(), cv::Size(320, 240));
+  expectError(runSequence("--pictures " + in("pictures")), "is not empty: choose another folder");
 }
 
 TEST_F(Tools, PerfectTrajectoryHasNoError) {
-  const std::string truth = (root_ / "truth.txt").string();
+  const std::string truth = in("truth.txt");
   const fs::path json = root_ / "errors.json";
   const Outcome outcome = run("evaluate_trajectory", "--ground-truth " + truth + " --estimate " + truth +
                                                          " --lengths 0.2,0.4 --json " + json.string());
@@ -1023,8 +976,7 @@ TEST_F(Tools, PerfectTrajectoryHasNoError) {
   ASSERT_EQ(per_length.size(), 2u);
   EXPECT_DOUBLE_EQ(static_cast<double>(per_length[1]["length_m"]), 0.4);
   EXPECT_NEAR(static_cast<double>(per_length[1]["translation_percent"]), 0.0, 1e-9);
-  expectError(run("evaluate_trajectory", "--ground-truth " + truth + " --estimate " + (root_ / "none").string()),
-              (root_ / "none").string());
+  expectError(run("evaluate_trajectory", "--ground-truth " + truth + " --estimate " + in("none")), in("none"));
 }
 
 }  // namespace test_tools
