@@ -4,8 +4,7 @@
 
 #include "stereo_descriptor_vo/belief/belief.hpp"
 
-namespace sdvo {
-namespace test_belief {
+namespace sdvo::test_belief {
 
 Doubt after(double log_odds, const std::string& cause) {
   Doubt doubt;
@@ -104,5 +103,4 @@ TEST_F(Weighed, TheErrorsOfADoubtThatLastsAddUp) {
   EXPECT_NEAR(second.pose_moment(2, 2), 4.0 * first.pose_moment(2, 2), 0.1) << "both motions may be wrong alike";
 }
 
-}  // namespace test_belief
-}  // namespace sdvo
+}  // namespace sdvo::test_belief

@@ -7,8 +7,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
 
-namespace sdvo {
-namespace test_motion_hypotheses {
+namespace sdvo::test_motion_hypotheses {
 
 Eigen::Isometry3d moved(double x) {
   return Eigen::Isometry3d(Eigen::Translation3d(x, 0.0, 0.0));
@@ -251,5 +250,4 @@ TEST(Coverage, CountsCellsOfEightColumnsAndFourRows) {
   EXPECT_EQ(coverage(features, {0, 1}), 1.0 / 32.0) << "far outside on the right";
 }
 
-}  // namespace test_motion_hypotheses
-}  // namespace sdvo
+}  // namespace sdvo::test_motion_hypotheses

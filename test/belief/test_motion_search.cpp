@@ -7,8 +7,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/belief/motion_search.hpp"
 
-namespace sdvo {
-namespace test_motion_search {
+namespace sdvo::test_motion_search {
 
 /// What a camera sees that stands still or moves along x, of a world that stands and of a swarm that moves along x,
 /// too.
@@ -385,5 +384,4 @@ TEST_F(MotionSearchTest, FailsWithAReason) {
   EXPECT_TRUE(contains(found.motion.reason, "only 0 matches")) << found.motion.reason;
 }
 
-}  // namespace test_motion_search
-}  // namespace sdvo
+}  // namespace sdvo::test_motion_search

@@ -6,8 +6,7 @@
 
 #include "stereo_descriptor_vo/belief/pose_covariance.hpp"
 
-namespace sdvo {
-namespace test_pose_covariance {
+namespace sdvo::test_pose_covariance {
 
 constexpr double kForward = 2.0;  // m
 
@@ -294,5 +293,4 @@ TEST(PoseCovariance, TheWayBackUndoesTheCalibrationsError) {
   EXPECT_LT(covariance.byCalibration(known).norm(), 1e-20);
 }
 
-}  // namespace test_pose_covariance
-}  // namespace sdvo
+}  // namespace sdvo::test_pose_covariance

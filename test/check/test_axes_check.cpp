@@ -6,8 +6,7 @@
 #include "../../src/check/axes_check.hpp"
 #include "../said.hpp"
 
-namespace sdvo {
-namespace test_axes_check {
+namespace sdvo::test_axes_check {
 
 using Eigen::AngleAxisd;
 using Eigen::Matrix3d;
@@ -104,5 +103,4 @@ TEST(GyroAxesCheck, AMoverInTheViewIsNoFaultOfTheGyro) {
             Verdict::kOk);
 }
 
-}  // namespace test_axes_check
-}  // namespace sdvo
+}  // namespace sdvo::test_axes_check

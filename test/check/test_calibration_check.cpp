@@ -4,8 +4,7 @@
 
 #include "../../src/check/calibration_check.hpp"
 
-namespace sdvo {
-namespace test_calibration_check {
+namespace sdvo::test_calibration_check {
 
 Finding judged(double baseline, int width = 1200, const std::string& unrectified = "") {
   return checkCalibration({700.0, 700.0, 0.5 * width, 180.0, baseline, width, 360}, "plumb_bob", unrectified);
@@ -48,5 +47,4 @@ TEST(CalibrationCheck, ImagesThatAreNotRectifiedAreNamedBesideADoubt) {
   EXPECT_TRUE(contains(judged(50.0, 1200, "R is not the identity"), "baseline = 50 m"));
 }
 
-}  // namespace test_calibration_check
-}  // namespace sdvo
+}  // namespace sdvo::test_calibration_check

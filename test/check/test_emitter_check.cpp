@@ -6,8 +6,7 @@
 #include "../../src/check/image_check.hpp"
 #include "../synthetic_scene.hpp"
 
-namespace sdvo {
-namespace test_emitter_check {
+namespace sdvo::test_emitter_check {
 
 const cv::Size kSize(424, 240);
 
@@ -65,5 +64,4 @@ TEST(EmitterCheck, PeopleWhoPassProveNothing) {
   EXPECT_EQ(check.judge().verdict, Verdict::kOpen);
 }
 
-}  // namespace test_emitter_check
-}  // namespace sdvo
+}  // namespace sdvo::test_emitter_check

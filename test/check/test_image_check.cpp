@@ -7,8 +7,7 @@
 #include "../../src/check/image_check.hpp"
 #include "../said.hpp"
 
-namespace sdvo {
-namespace test_image_check {
+namespace sdvo::test_image_check {
 
 const cv::Size kSize(212, 120);
 
@@ -63,7 +62,8 @@ TEST(ImageCheck, TextureIsCornersThatAreFoundInBothImages) {
     report.detected = corners, report.stereo_matched = matched;
     return checked(report).texture(100, 0.5);
   };
-  expectSaid(texture(100, 50), Verdict::kOk, "100 corners (median), 90 % of the pairs have 100 or more; 50 % are found");
+  expectSaid(texture(100, 50), Verdict::kOk,
+             "100 corners (median), 90 % of the pairs have 100 or more; 50 % are found");
   expectSaid(texture(99, 90), Verdict::kFail, "scene with texture");
   expectSaid(texture(100, 49), Verdict::kWarn, "max_disparity");
   expectSaid(texture(0, 0), Verdict::kFail, "0 % are found");
@@ -147,5 +147,4 @@ TEST(RepeatCheck, ASideThatRepeatsIsNamedAndBothOnesAfterASecond) {
   }
 }
 
-}  // namespace test_image_check
-}  // namespace sdvo
+}  // namespace sdvo::test_image_check

@@ -9,8 +9,7 @@
 #include "../../src/check/lens_check.hpp"
 #include "../said.hpp"
 
-namespace sdvo {
-namespace test_lens_check {
+namespace sdvo::test_lens_check {
 
 const StereoCamera kTrue{400.0, 400.0, 320.0, 200.0, 0.1, 640, 400};
 
@@ -70,5 +69,4 @@ TEST(LensCheck, AWayStraightAheadShowsNothing) {
   EXPECT_EQ(LensCheck().judge().verdict, Verdict::kOpen);
 }
 
-}  // namespace test_lens_check
-}  // namespace sdvo
+}  // namespace sdvo::test_lens_check

@@ -6,8 +6,7 @@
 #include "../../src/check/odometry_check.hpp"
 #include "../said.hpp"
 
-namespace sdvo {
-namespace test_odometry_check {
+namespace sdvo::test_odometry_check {
 
 constexpr double kUnknown = NAN;
 
@@ -19,5 +18,4 @@ TEST(ShutterCheck, NamesWhatIsProvedAndNothingElse) {
   EXPECT_TRUE(contains(doubtOfShutters({0.0062, 0.0001}), "6.2 +- 0.1 ms after left ones"));
 }
 
-}  // namespace test_odometry_check
-}  // namespace sdvo
+}  // namespace sdvo::test_odometry_check

@@ -5,8 +5,7 @@
 #include "../../src/check/row_check.hpp"
 #include "../synthetic_scene.hpp"
 
-namespace sdvo {
-namespace test_row_check {
+namespace sdvo::test_row_check {
 
 const cv::Size kSize(320, 240);
 constexpr double kDisparity = 12.0, kPeriod = 0.1;  // px, s
@@ -98,5 +97,4 @@ TEST(RowCheck, JudgesNothingWithoutTexture) {
   EXPECT_TRUE(std::isnan(check.map().at<double>(0)));
 }
 
-}  // namespace test_row_check
-}  // namespace sdvo
+}  // namespace sdvo::test_row_check

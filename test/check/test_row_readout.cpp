@@ -7,8 +7,7 @@
 #include "../../src/check/row_readout.hpp"
 #include "../synthetic_scene.hpp"
 
-namespace sdvo {
-namespace test_row_readout {
+namespace sdvo::test_row_readout {
 
 /// 60 pairs of a camera that shakes, seen with a readout, s, and 0.3 px of noise.
 RowReadout watched(double readout) {
@@ -60,5 +59,4 @@ TEST(RowReadout, AGlobalShutterIsNone) {
   EXPECT_FALSE(RowReadout().estimate());
 }
 
-}  // namespace test_row_readout
-}  // namespace sdvo
+}  // namespace sdvo::test_row_readout

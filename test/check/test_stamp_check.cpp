@@ -5,8 +5,7 @@
 #include "../../src/check/stamp_check.hpp"
 #include "../said.hpp"
 
-namespace sdvo {
-namespace test_stamp_check {
+namespace sdvo::test_stamp_check {
 
 constexpr std::int64_t kPeriod = 50000000;  // ns, 20 Hz
 constexpr std::int64_t kBegin = 1700000000000000000;
@@ -76,5 +75,4 @@ TEST(StampCheck, JudgesNoStampsWithoutPairs) {
   EXPECT_EQ(recording(1).stamps().verdict, Verdict::kOpen);
 }
 
-}  // namespace test_stamp_check
-}  // namespace sdvo
+}  // namespace sdvo::test_stamp_check

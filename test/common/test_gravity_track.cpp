@@ -5,8 +5,7 @@
 
 #include "../../src/common/imu_tracks.hpp"
 
-namespace sdvo {
-namespace test_gravity_track {
+namespace sdvo::test_gravity_track {
 
 constexpr std::int64_t kMillisecond = 1000000;
 const Eigen::Vector3d kStill = Eigen::Vector3d::Zero();
@@ -84,5 +83,4 @@ TEST(Levelled, KeepsPositionAndYawAndTurnsUpToTheParentsZ) {
   EXPECT_NEAR(std::atan2(level.linear()(1, 0), level.linear()(0, 0)), 2.5, 1e-12);
 }
 
-}  // namespace test_gravity_track
-}  // namespace sdvo
+}  // namespace sdvo::test_gravity_track

@@ -6,8 +6,7 @@
 #include "../../src/common/imu_tracks.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 
-namespace sdvo {
-namespace test_gyro_track {
+namespace sdvo::test_gyro_track {
 
 constexpr std::int64_t kMillisecond = 1000000;
 
@@ -113,5 +112,4 @@ TEST(GyroTrack, ForgetsWhatIsLongAgo) {
   EXPECT_TRUE(track.rotation(500 * kMillisecond, 600 * kMillisecond));
 }
 
-}  // namespace test_gyro_track
-}  // namespace sdvo
+}  // namespace sdvo::test_gyro_track

@@ -10,8 +10,7 @@
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
-namespace sdvo {
-namespace test_options {
+namespace sdvo::test_options {
 
 /// One option of every type, two of them with the same last name.
 struct Inner {
@@ -233,5 +232,4 @@ TEST(Options, HashTellsOptionsApart) {
   expectNew([](Outer& o) { o.height = std::nextafter(3.0, 4.0); });
 }
 
-}  // namespace test_options
-}  // namespace sdvo
+}  // namespace sdvo::test_options

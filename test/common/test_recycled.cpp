@@ -5,8 +5,7 @@
 
 #include "stereo_descriptor_vo/common/recycled.hpp"
 
-namespace sdvo {
-namespace test_recycled {
+namespace sdvo::test_recycled {
 
 using Lists = Recycled<std::vector<int>>;
 
@@ -55,5 +54,4 @@ TEST(Recycled, ACopyLeavesTheMemoryOfThoseThatWent) {
   EXPECT_EQ(copy.add().capacity(), 0u);
 }
 
-}  // namespace test_recycled
-}  // namespace sdvo
+}  // namespace sdvo::test_recycled

@@ -2,8 +2,7 @@
 
 #include "../../src/common/worker.hpp"
 
-namespace sdvo {
-namespace test_requests {
+namespace sdvo::test_requests {
 
 TEST(Requests, HoldForWhatArrivesLaterAndOnce) {
   Requests<char> requests;
@@ -24,5 +23,4 @@ TEST(Requests, TheNewestWins) {
   EXPECT_EQ(requests.take(requests.posted()), 'b');
 }
 
-}  // namespace test_requests
-}  // namespace sdvo
+}  // namespace sdvo::test_requests

@@ -4,8 +4,7 @@
 
 #include "stereo_descriptor_vo/common/se3.hpp"
 
-namespace sdvo {
-namespace test_se3 {
+namespace sdvo::test_se3 {
 
 Vector6d vector6(double x, double y, double z, double rx, double ry, double rz) {
   Vector6d xi;
@@ -85,5 +84,4 @@ TEST(Se3, OrthonormalisedRestoresARotation) {
   EXPECT_EQ(repaired.translation(), clean.translation());
 }
 
-}  // namespace test_se3
-}  // namespace sdvo
+}  // namespace sdvo::test_se3

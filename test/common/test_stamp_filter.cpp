@@ -7,8 +7,7 @@
 
 #include "../../src/common/stamp_filter.hpp"
 
-namespace sdvo {
-namespace test_stamp_filter {
+namespace sdvo::test_stamp_filter {
 
 constexpr std::int64_t kSecond = 1000000000;
 
@@ -140,5 +139,4 @@ TEST_F(StampFilterTest, SurvivesEveryStamp) {
   EXPECT_EQ(next.back().first, next_ - 1);
 }
 
-}  // namespace test_stamp_filter
-}  // namespace sdvo
+}  // namespace sdvo::test_stamp_filter

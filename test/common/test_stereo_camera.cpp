@@ -7,8 +7,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 
-namespace sdvo {
-namespace test_stereo_camera {
+namespace sdvo::test_stereo_camera {
 
 TEST(StereoCamera, ProjectsByHand) {
   const StereoCamera camera{100.0, 200.0, 50.0, 60.0, 0.5, 100, 120};
@@ -76,5 +75,4 @@ TEST(StereoCamera, EqualityLooksAtEveryField) {
   }
 }
 
-}  // namespace test_stereo_camera
-}  // namespace sdvo
+}  // namespace sdvo::test_stereo_camera

@@ -2,8 +2,7 @@
 
 #include "../../src/common/text.hpp"
 
-namespace sdvo {
-namespace test_text {
+namespace sdvo::test_text {
 
 TEST(Text, AWildNumberHasFewDigits) {
   EXPECT_EQ(text(1, 640, "x", 480, ", f ", 400.0, " px"), "640x480, f 400.0 px");
@@ -11,5 +10,4 @@ TEST(Text, AWildNumberHasFewDigits) {
   EXPECT_EQ(text(3, 1795739520.5), "1795739520.500") << "a stamp is not wild";
 }
 
-}  // namespace test_text
-}  // namespace sdvo
+}  // namespace sdvo::test_text

@@ -10,8 +10,7 @@
 
 #include "../../src/common/worker.hpp"
 
-namespace sdvo {
-namespace test_worker {
+namespace sdvo::test_worker {
 
 using namespace std::chrono_literals;
 
@@ -111,5 +110,4 @@ TEST(Worker, EndsWithoutEverHavingHadAnItem) {
   for (int i = 0; i < 50; ++i) Worker<int>(1, [](const int&) {});
 }
 
-}  // namespace test_worker
-}  // namespace sdvo
+}  // namespace sdvo::test_worker

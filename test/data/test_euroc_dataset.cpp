@@ -13,8 +13,7 @@
 #include "../temporary_folder.hpp"
 #include "stereo_descriptor_vo/data/euroc_dataset.hpp"
 
-namespace sdvo {
-namespace test_euroc_dataset {
+namespace sdvo::test_euroc_dataset {
 
 namespace fs = std::filesystem;
 
@@ -131,5 +130,4 @@ TEST_F(EurocDataset, WhatDoesNotHoldTogetherIsNamed) {
   }
 }
 
-}  // namespace test_euroc_dataset
-}  // namespace sdvo
+}  // namespace sdvo::test_euroc_dataset

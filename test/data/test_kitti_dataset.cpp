@@ -12,8 +12,7 @@
 #include "../temporary_folder.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 
-namespace sdvo {
-namespace test_kitti_dataset {
+namespace sdvo::test_kitti_dataset {
 
 namespace fs = std::filesystem;
 
@@ -231,5 +230,4 @@ TEST(KittiRealData, Sequence04) {
   EXPECT_TRUE(findKittiPoses(directory));
 }
 
-}  // namespace test_kitti_dataset
-}  // namespace sdvo
+}  // namespace sdvo::test_kitti_dataset

@@ -9,8 +9,7 @@
 #include "../temporary_folder.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 
-namespace sdvo {
-namespace test_kitti_writer {
+namespace sdvo::test_kitti_writer {
 
 namespace fs = std::filesystem;
 
@@ -95,5 +94,4 @@ TEST_F(KittiWriterTest, RefusesPosesOfAnotherNumberAndImagesThatCannotBeWritten)
   EXPECT_THROW(writer.writeImage(2, 0, image(0, 0)), std::runtime_error);  // there is no image_2
 }
 
-}  // namespace test_kitti_writer
-}  // namespace sdvo
+}  // namespace sdvo::test_kitti_writer

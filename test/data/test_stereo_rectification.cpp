@@ -12,8 +12,7 @@
 #include "../temporary_folder.hpp"
 #include "stereo_descriptor_vo/data/stereo_rectification.hpp"
 
-namespace sdvo {
-namespace test_stereo_rectification {
+namespace sdvo::test_stereo_rectification {
 
 RawCamera rawCamera(const cv::Size& size, double f, const std::string& lens, const std::vector<double>& D) {
   RawCamera camera;
@@ -184,5 +183,4 @@ TEST_F(CalibrationFile, WhatIsWrongIsNamed) {
   for (const auto& [files, words] : cases) EXPECT_TRUE(contains(errorOf(files), words)) << errorOf(files);
 }
 
-}  // namespace test_stereo_rectification
-}  // namespace sdvo
+}  // namespace sdvo::test_stereo_rectification

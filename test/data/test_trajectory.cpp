@@ -12,8 +12,7 @@
 #include "../temporary_folder.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
 
-namespace sdvo {
-namespace test_trajectory {
+namespace sdvo::test_trajectory {
 
 namespace fs = std::filesystem;
 
@@ -315,5 +314,4 @@ TEST(KittiGroundTruth, HasTheKnownLength) {
   EXPECT_NEAR(errors.sub_paths.rotation_deg_per_m, 0.0, 1e-9);
 }
 
-}  // namespace test_trajectory
-}  // namespace sdvo
+}  // namespace sdvo::test_trajectory

@@ -8,8 +8,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/front_end/base_descriptor.hpp"
 
-namespace sdvo {
-namespace test_base_descriptor {
+namespace sdvo::test_base_descriptor {
 
 /// The descriptors that the OpenCV at hand has.
 std::vector<std::string> availableDescriptors() {
@@ -196,5 +195,4 @@ TEST(SiftDescriptor, IsMostAlikeAtTheSizeOfTheDistance) {
 }
 #endif
 
-}  // namespace test_base_descriptor
-}  // namespace sdvo
+}  // namespace sdvo::test_base_descriptor

@@ -7,8 +7,7 @@
 #include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/front_end/block_differences.hpp"
 
-namespace sdvo {
-namespace test_block_differences {
+namespace sdvo::test_block_differences {
 
 cv::Mat noise(unsigned seed, bool extreme) {
   cv::Mat image(40, 131, CV_8U);
@@ -44,5 +43,4 @@ TEST(BlockDifferences, AreSumsOverWholeBlocks) {
   allowVectorKernels(true);
 }
 
-}  // namespace test_block_differences
-}  // namespace sdvo
+}  // namespace sdvo::test_block_differences

@@ -7,8 +7,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/front_end/brief.hpp"
 
-namespace sdvo {
-namespace test_brief {
+namespace sdvo::test_brief {
 
 using Row = std::array<std::uint8_t, Brief::kBytes>;
 
@@ -117,5 +116,4 @@ TEST(Brief, SeesItsReachAndNothingBeyond) {
   EXPECT_NE(describe(image, 150.0, 150.0, size), describe(centre, 150.0, 150.0, size));
 }
 
-}  // namespace test_brief
-}  // namespace sdvo
+}  // namespace sdvo::test_brief

@@ -5,8 +5,7 @@
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 #include "stereo_descriptor_vo/front_end/depth_scale.hpp"
 
-namespace sdvo {
-namespace test_depth_scale {
+namespace sdvo::test_depth_scale {
 
 DepthScaleOptions plainCurve() {
   DepthScaleOptions options;
@@ -96,5 +95,4 @@ TEST(DepthScale, FreakFollowsDisparitiesOfThreeOctaves) {
   EXPECT_EQ(freak.size(50.0), 32.0);
 }
 
-}  // namespace test_depth_scale
-}  // namespace sdvo
+}  // namespace sdvo::test_depth_scale

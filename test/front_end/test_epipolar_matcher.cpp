@@ -7,8 +7,7 @@
 #include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/front_end/epipolar_matcher.hpp"
 
-namespace sdvo {
-namespace test_epipolar_matcher {
+namespace sdvo::test_epipolar_matcher {
 
 const cv::Size kSize(320, 160);
 constexpr double kMaxDv = 2.5;  // px
@@ -308,5 +307,4 @@ TEST(EpipolarMatcher, FindsTheSameToTheBitWithAndWithoutVectors) {
   EXPECT_GT(compared, 500);
 }
 
-}  // namespace test_epipolar_matcher
-}  // namespace sdvo
+}  // namespace sdvo::test_epipolar_matcher

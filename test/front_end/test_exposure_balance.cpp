@@ -4,8 +4,7 @@
 #include "stereo_descriptor_vo/front_end/exposure_balance.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 
-namespace sdvo {
-namespace test_exposure_balance {
+namespace sdvo::test_exposure_balance {
 
 struct Pair {
   cv::Mat left, right;
@@ -111,5 +110,4 @@ TEST(ExposureBalance, RefusesOptionsOutOfRange) {
   EXPECT_THROW(ExposureBalance{options}, std::invalid_argument);
 }
 
-}  // namespace test_exposure_balance
-}  // namespace sdvo
+}  // namespace sdvo::test_exposure_balance

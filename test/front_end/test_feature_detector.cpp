@@ -15,8 +15,7 @@
 #include "../temporary_folder.hpp"
 #include "stereo_descriptor_vo/front_end/feature_detector.hpp"
 
-namespace sdvo {
-namespace test_feature_detector {
+namespace sdvo::test_feature_detector {
 
 constexpr int kBucket = 50;  // px
 const cv::Size kSize(600, 400);
@@ -526,5 +525,4 @@ INSTANTIATE_TEST_SUITE_P(Types, EveryDetector, testing::Values("fast", "gftt", "
 #endif
 INSTANTIATE_TEST_SUITE_P(Types, CornerDetector, testing::Values("fast", "gftt"));
 
-}  // namespace test_feature_detector
-}  // namespace sdvo
+}  // namespace sdvo::test_feature_detector

@@ -7,8 +7,7 @@
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 #include "stereo_descriptor_vo/front_end/freak.hpp"
 
-namespace sdvo {
-namespace test_feature_extractor {
+namespace sdvo::test_feature_extractor {
 
 struct Pair {
   cv::Mat left, right;
@@ -307,5 +306,4 @@ TEST(FeatureExtractor, LeavesItsImagesAlone) {
   EXPECT_TRUE(synthetic::equalMats(pair.right, right));
 }
 
-}  // namespace test_feature_extractor
-}  // namespace sdvo
+}  // namespace sdvo::test_feature_extractor

@@ -7,8 +7,7 @@
 #include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/front_end/freak.hpp"
 
-namespace sdvo {
-namespace test_freak {
+namespace sdvo::test_freak {
 
 cv::Mat row(const Freak& freak, const FreakKeypoint& keypoint) {
   cv::Mat bits(1, Freak::kBytes, CV_8U);
@@ -339,5 +338,4 @@ TEST(Freak, RowsOfManyKeypointsAreThoseOfEach) {
   allowVectorKernels(true);
 }
 
-}  // namespace test_freak
-}  // namespace sdvo
+}  // namespace sdvo::test_freak

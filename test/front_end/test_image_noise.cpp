@@ -6,8 +6,7 @@
 #include "../../src/front_end/image_noise.hpp"
 #include "../synthetic_scene.hpp"
 
-namespace sdvo {
-namespace test_image_noise {
+namespace sdvo::test_image_noise {
 
 const cv::Size kSize(400, 300);
 
@@ -48,5 +47,4 @@ TEST(ImageNoise, IgnoresWhatIsBlackOrWhite) {
   EXPECT_NEAR(noiseOf(image), 3.0, 0.4);
 }
 
-}  // namespace test_image_noise
-}  // namespace sdvo
+}  // namespace sdvo::test_image_noise

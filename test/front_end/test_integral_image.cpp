@@ -2,8 +2,7 @@
 
 #include "stereo_descriptor_vo/front_end/integral_image.hpp"
 
-namespace sdvo {
-namespace test_integral_image {
+namespace sdvo::test_integral_image {
 
 /// Three columns, two rows; pixel (u, v) covers [u - 0.5, u + 0.5] x [v - 0.5, v + 0.5].
 const cv::Mat kSmall = (cv::Mat_<std::uint8_t>(2, 3) << 10, 20, 40, 80, 160, 240);
@@ -65,5 +64,4 @@ TEST(IntegralImage, AWideImageIsAsExact) {
   for (float u = 15000.f; u < 15040.f; u += 1.25f) EXPECT_EQ(image.boxMean(u, 20.5f, 5.f), 255.f) << u;
 }
 
-}  // namespace test_integral_image
-}  // namespace sdvo
+}  // namespace sdvo::test_integral_image

@@ -6,8 +6,7 @@
 #include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/front_end/patch_cutter.hpp"
 
-namespace sdvo {
-namespace test_patch_cutter {
+namespace sdvo::test_patch_cutter {
 
 constexpr PatchLayout kLayout{5, 1.f, 0.1f};
 
@@ -93,5 +92,4 @@ TEST(PatchCutter, AcrossTheBorderSquaresInsideAreWhole) {
   }
 }
 
-}  // namespace test_patch_cutter
-}  // namespace sdvo
+}  // namespace sdvo::test_patch_cutter

@@ -6,8 +6,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/front_end/rig_monitor.hpp"
 
-namespace sdvo {
-namespace test_rig_monitor {
+namespace sdvo::test_rig_monitor {
 
 const cv::Size kSize(640, 400);
 constexpr double kDisparity = 17.0;  // px
@@ -121,5 +120,4 @@ TEST(RigMonitor, SaysNothingWhereNothingIsFound) {
   EXPECT_EQ(RigMonitor({}, 1.5, 192.0).diagnose(leftImage(), rightImage(4.0), {}).words, "");
 }
 
-}  // namespace test_rig_monitor
-}  // namespace sdvo
+}  // namespace sdvo::test_rig_monitor

@@ -7,8 +7,7 @@
 #include "stereo_descriptor_vo/front_end/freak.hpp"
 #include "stereo_descriptor_vo/front_end/stereo_descriptor.hpp"
 
-namespace sdvo {
-namespace test_stereo_descriptor {
+namespace sdvo::test_stereo_descriptor {
 
 const cv::Size kSize(320, 200);
 
@@ -164,5 +163,4 @@ TEST(StereoDescriptor, OptionsKnowWhatTheOpenCvAtHandLacks) {
   }
 }
 
-}  // namespace test_stereo_descriptor
-}  // namespace sdvo
+}  // namespace sdvo::test_stereo_descriptor

@@ -3,8 +3,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
 
-namespace sdvo {
-namespace test_stereo_matcher {
+namespace sdvo::test_stereo_matcher {
 
 const cv::Size kSize(640, 400);  // four pyramid levels still hold a window
 
@@ -136,5 +135,4 @@ TEST(StereoMatcher, RefusesOptionsOutOfRange) {
   EXPECT_THROW(StereoMatcher{options}, std::invalid_argument);
 }
 
-}  // namespace test_stereo_matcher
-}  // namespace sdvo
+}  // namespace sdvo::test_stereo_matcher

@@ -5,8 +5,7 @@
 
 #include "stereo_descriptor_vo/map/floor.hpp"
 
-namespace sdvo {
-namespace test_floor {
+namespace sdvo::test_floor {
 
 /// Looks ahead and down a little, from half a metre above the base.
 Eigen::Isometry3d mount() {
@@ -92,5 +91,4 @@ TEST(Floor, TheCovarianceIsNoLargerThanTheFloorAllows) {
   EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix6d>(of_camera).eigenvalues().minCoeff(), 0.0);
 }
 
-}  // namespace test_floor
-}  // namespace sdvo
+}  // namespace sdvo::test_floor

@@ -2,8 +2,7 @@
 
 #include "stereo_descriptor_vo/map/keyframe_memory.hpp"
 
-namespace sdvo {
-namespace test_keyframe_memory {
+namespace sdvo::test_keyframe_memory {
 
 StereoCamera rig() {
   return {400.0, 400.0, 320.0, 240.0, 0.5, 640, 480};
@@ -115,5 +114,4 @@ TEST(KeyframeMemory, OfNoCapacityRemembersNothing) {
   EXPECT_EQ(memory.count(), 0);
 }
 
-}  // namespace test_keyframe_memory
-}  // namespace sdvo
+}  // namespace sdvo::test_keyframe_memory

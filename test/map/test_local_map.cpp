@@ -13,8 +13,7 @@
 #include "stereo_descriptor_vo/map/local_map.hpp"
 #include "stereo_descriptor_vo/rig/calibration_filter.hpp"
 
-namespace sdvo {
-namespace test_local_map {
+namespace sdvo::test_local_map {
 
 /// Adds a pair seen from a known pose; points, `most` of them, are recognised by their descriptors, which are all
 /// different.
@@ -751,5 +750,4 @@ TEST(LocalMap, APoseErrsByWhatItsCovarianceSaysAfterManyKeyframesOfTheSamePoints
   EXPECT_LT(nees, 12.0);
 }
 
-}  // namespace test_local_map
-}  // namespace sdvo
+}  // namespace sdvo::test_local_map

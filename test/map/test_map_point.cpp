@@ -3,8 +3,7 @@
 #include "../synthetic_features.hpp"
 #include "stereo_descriptor_vo/map/map_point.hpp"
 
-namespace sdvo {
-namespace test_map_point {
+namespace sdvo::test_map_point {
 
 StereoCamera someCamera() {
   return SyntheticScene(1, 0, 10.0).camera;
@@ -42,5 +41,4 @@ TEST(PredictObservation, RefusesPointsBehindTheCamera) {
   EXPECT_FALSE(predictObservation(someCamera(), T, point));
 }
 
-}  // namespace test_map_point
-}  // namespace sdvo
+}  // namespace sdvo::test_map_point

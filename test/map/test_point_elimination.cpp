@@ -8,8 +8,7 @@
 #include "stereo_descriptor_vo/map/point_elimination.hpp"
 #include "stereo_descriptor_vo/map/window_optimizer.hpp"
 
-namespace sdvo {
-namespace test_point_elimination {
+namespace sdvo::test_point_elimination {
 
 constexpr double kDamping = 1e-3;
 constexpr Linearisation kLinearisation = {2.0, kDamping};
@@ -290,5 +289,4 @@ TEST(PointElimination, PointsAddUp) {
   expectNear(equations.gradient(), alone.gradient + other_alone.gradient, "gradient");
 }
 
-}  // namespace test_point_elimination
-}  // namespace sdvo
+}  // namespace sdvo::test_point_elimination

@@ -10,8 +10,7 @@
 #include "stereo_descriptor_vo/map/reacquisition.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
-namespace sdvo {
-namespace test_reacquisition {
+namespace sdvo::test_reacquisition {
 
 constexpr std::int64_t kPeriod = 50'000'000;  // ns between pairs
 constexpr int kSeen = 10;                     // pairs before an outage
@@ -424,5 +423,4 @@ TEST_F(Outage, APoseFromElsewhereEndsTheSearchOfALostCamera) {
   EXPECT_NEAR(result_.pose_covariance.trace(), 0.06, 1e-9);
 }
 
-}  // namespace test_reacquisition
-}  // namespace sdvo
+}  // namespace sdvo::test_reacquisition

@@ -12,8 +12,7 @@
 #include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/map/window_optimizer.hpp"
 
-namespace sdvo {
-namespace test_window_optimizer {
+namespace sdvo::test_window_optimizer {
 
 StereoCamera someCamera() {
   return SyntheticScene(1, 0, 10.0).camera;
@@ -526,5 +525,4 @@ TEST(WindowOptimizer, OneWrongSightingDoesNotMoveTheRest) {
   EXPECT_LT(logSE3(window.T_camera_origin[4] * syntheticPose(4)).norm(), 0.01);
 }
 
-}  // namespace test_window_optimizer
-}  // namespace sdvo
+}  // namespace sdvo::test_window_optimizer

@@ -7,8 +7,7 @@
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/matching/feature_matcher.hpp"
 
-namespace sdvo {
-namespace test_feature_matcher {
+namespace sdvo::test_feature_matcher {
 
 using synthetic::addFeature;
 using synthetic::noFeatures;
@@ -271,5 +270,4 @@ TEST(FeatureMatcher, TakesEmptySets) {
   EXPECT_TRUE(matcher.match(none, none, Eigen::Isometry3d::Identity()).empty());
 }
 
-}  // namespace test_feature_matcher
-}  // namespace sdvo
+}  // namespace sdvo::test_feature_matcher

@@ -7,8 +7,7 @@
 #include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/matching/hamming_distances.hpp"
 
-namespace sdvo {
-namespace test_hamming_distances {
+namespace sdvo::test_hamming_distances {
 
 TEST(HammingDistances, CountTheBitsThatDiffer) {
   const std::vector<int> candidates = {7, 0, 3, 3};
@@ -31,5 +30,4 @@ TEST(HammingDistances, CountTheBitsThatDiffer) {
   allowVectorKernels(true);
 }
 
-}  // namespace test_hamming_distances
-}  // namespace sdvo
+}  // namespace sdvo::test_hamming_distances

@@ -11,8 +11,7 @@
 #include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/matching/patch_alignment.hpp"
 
-namespace sdvo {
-namespace test_patch_alignment {
+namespace sdvo::test_patch_alignment {
 
 constexpr int kSide = 13;
 constexpr double kNoise = 2.0;  // grey levels
@@ -334,5 +333,4 @@ TEST(PatchAlignment, IsTheSameToTheBitWithAndWithoutVectors) {
   EXPECT_GT(compared, 100);
 }
 
-}  // namespace test_patch_alignment
-}  // namespace sdvo
+}  // namespace sdvo::test_patch_alignment

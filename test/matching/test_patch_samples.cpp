@@ -6,8 +6,7 @@
 #include "../../src/matching/patch_samples.hpp"
 #include "stereo_descriptor_vo/common/processor.hpp"
 
-namespace sdvo {
-namespace test_patch_samples {
+namespace sdvo::test_patch_samples {
 
 /// A patch of noise.
 struct Noise {
@@ -108,5 +107,4 @@ TEST(PatchSamples, AreTheSameToTheBitWithAndWithoutVectors) {
   }
 }
 
-}  // namespace test_patch_samples
-}  // namespace sdvo
+}  // namespace sdvo::test_patch_samples

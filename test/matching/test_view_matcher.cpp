@@ -3,8 +3,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/matching/view_matcher.hpp"
 
-namespace sdvo {
-namespace test_correspondences {
+namespace sdvo::test_correspondences {
 
 StereoFeatures twoFeatures() {
   StereoFeatures features = synthetic::noFeatures(synthetic::camera(), 0);
@@ -35,5 +34,4 @@ TEST(Correspondences, AreInTheOrderOfTheMatches) {
   EXPECT_EQ(correspondences[1].measurement, measurementOf(features, 1, {}));
 }
 
-}  // namespace test_correspondences
-}  // namespace sdvo
+}  // namespace sdvo::test_correspondences

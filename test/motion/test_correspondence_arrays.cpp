@@ -8,8 +8,7 @@
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/motion/pose_problem.hpp"
 
-namespace sdvo {
-namespace test_correspondence_arrays {
+namespace sdvo::test_correspondence_arrays {
 
 Eigen::Isometry3d someMotion() {
   Vector6d xi;
@@ -96,5 +95,4 @@ TEST(CorrespondenceArrays, GiveTheSameToTheBitWithAndWithoutVectors) {
   EXPECT_EQ(fast.gradient, plain.gradient);
 }
 
-}  // namespace test_correspondence_arrays
-}  // namespace sdvo
+}  // namespace sdvo::test_correspondence_arrays

@@ -3,8 +3,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/motion/sample_consensus.hpp"
 
-namespace sdvo {
-namespace test_genetic_consensus {
+namespace sdvo::test_genetic_consensus {
 
 /// Correspondences of which a share is measured at random places.
 struct Scene {
@@ -119,5 +118,4 @@ TEST(GeneticSearch, RatesAreFixedInGasacAlone) {
   EXPECT_TRUE(equal(search(scene, {}, true, 300, 1), search(scene, restless, true, 300, 1)));
 }
 
-}  // namespace test_genetic_consensus
-}  // namespace sdvo
+}  // namespace sdvo::test_genetic_consensus

@@ -8,8 +8,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/motion/motion_estimator.hpp"
 
-namespace sdvo {
-namespace test_motion_estimator {
+namespace sdvo::test_motion_estimator {
 
 using Correspondences = std::vector<Correspondence>;
 
@@ -346,5 +345,4 @@ TEST(MotionEstimator, RefusesOptionsOutOfRange) {
   EXPECT_THROW(MotionEstimator{options}, std::invalid_argument);
 }
 
-}  // namespace test_motion_estimator
-}  // namespace sdvo
+}  // namespace sdvo::test_motion_estimator

@@ -6,8 +6,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/motion/motion_refinement.hpp"
 
-namespace sdvo {
-namespace test_motion_refinement {
+namespace sdvo::test_motion_refinement {
 
 Eigen::Isometry3d trueMotion() {
   Vector6d xi;
@@ -165,5 +164,4 @@ TEST(RefineMotion, ReturnsToALargeMotionInAFewSteps) {
   }
 }
 
-}  // namespace test_motion_refinement
-}  // namespace sdvo
+}  // namespace sdvo::test_motion_refinement

@@ -5,8 +5,7 @@
 
 #include "stereo_descriptor_vo/motion/noise.hpp"
 
-namespace sdvo {
-namespace test_noise {
+namespace sdvo::test_noise {
 
 TEST(Noise, GatesAreExceededByChanceAsOftenAsStated) {
   // Tails of chi-square in closed form: of one number, of two, of four and of six.
@@ -102,5 +101,4 @@ TEST(Noise, MotionsAreOneWithinTheNoiseOfACorner) {
   EXPECT_NEAR(noise.sameMotion(), std::sqrt(square), 0.01);
 }
 
-}  // namespace test_noise
-}  // namespace sdvo
+}  // namespace sdvo::test_noise

@@ -4,8 +4,7 @@
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/motion/pose_problem.hpp"
 
-namespace sdvo {
-namespace test_pose_problem {
+namespace sdvo::test_pose_problem {
 
 constexpr double kThreshold = 2.0;  // px
 
@@ -75,5 +74,4 @@ TEST(PoseProblem, OneOfTheSolutionsOfAnExactSampleIsTheTruth) {
   }
 }
 
-}  // namespace test_pose_problem
-}  // namespace sdvo
+}  // namespace sdvo::test_pose_problem

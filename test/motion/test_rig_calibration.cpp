@@ -2,8 +2,7 @@
 
 #include "stereo_descriptor_vo/motion/rig_calibration.hpp"
 
-namespace sdvo {
-namespace test_rig_calibration {
+namespace sdvo::test_rig_calibration {
 
 TEST(RigCalibration, IsAnOffsetAndABendThatGrowsToBothSides) {
   const StereoCamera camera{400.0, 410.0, 320.0, 240.0, 0.5, 1120, 480};
@@ -27,5 +26,4 @@ TEST(RigCalibration, ShapeIsTheDerivative) {
   }
 }
 
-}  // namespace test_rig_calibration
-}  // namespace sdvo
+}  // namespace sdvo::test_rig_calibration

@@ -11,8 +11,7 @@
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/motion/three_point_pose.hpp"
 
-namespace sdvo {
-namespace test_three_point_pose {
+namespace sdvo::test_three_point_pose {
 
 /// Three points some metres in front of a camera that has moved a little, as between two pairs.
 struct Sample {
@@ -131,5 +130,4 @@ TEST(ThreePointPose, PointsOnALineGiveNone) {
   EXPECT_EQ(solveThreePointPose({points[0], points[0], points[1]}, {rays[0], rays[0], rays[1]}).size(), 0u);
 }
 
-}  // namespace test_three_point_pose
-}  // namespace sdvo
+}  // namespace sdvo::test_three_point_pose

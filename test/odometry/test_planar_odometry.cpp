@@ -8,8 +8,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
-namespace sdvo {
-namespace test_planar_odometry {
+namespace sdvo::test_planar_odometry {
 
 constexpr double kStep = 0.8;  // m between pairs
 constexpr double kDegree = M_PI / 180.0;
@@ -102,5 +101,4 @@ TEST(PlanarOdometry, ARampIsToldOfAndALevelStretchBehindItIsAnotherFloor) {
   EXPECT_EQ(results.back().reason, "");
 }
 
-}  // namespace test_planar_odometry
-}  // namespace sdvo
+}  // namespace sdvo::test_planar_odometry

@@ -5,8 +5,7 @@
 #include "../synthetic_features.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
-namespace sdvo {
-namespace test_windowed_odometry {
+namespace sdvo::test_windowed_odometry {
 
 constexpr std::int64_t kPeriod = 100000000;  // ns
 
@@ -284,5 +283,4 @@ TEST(WindowedOdometry, TakesNoMoreMemoryTheLongerItRuns) {
   EXPECT_LT(late, 1.03 * early);
 }
 
-}  // namespace test_windowed_odometry
-}  // namespace sdvo
+}  // namespace sdvo::test_windowed_odometry

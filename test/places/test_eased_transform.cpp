@@ -2,8 +2,7 @@
 
 #include "stereo_descriptor_vo/places/eased_transform.hpp"
 
-namespace sdvo {
-namespace test_eased_transform {
+namespace sdvo::test_eased_transform {
 
 Eigen::Isometry3d target(double x, double turn) {
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
@@ -48,5 +47,4 @@ TEST(EasedTransform, ADurationOfZeroIsAtOnce) {
   EXPECT_TRUE(eased.at(1.0).isApprox(target(4.0, 0.5)));
 }
 
-}  // namespace test_eased_transform
-}  // namespace sdvo
+}  // namespace sdvo::test_eased_transform

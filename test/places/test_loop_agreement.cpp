@@ -2,8 +2,7 @@
 
 #include "stereo_descriptor_vo/places/loop_agreement.hpp"
 
-namespace sdvo {
-namespace test_loop_agreement {
+namespace sdvo::test_loop_agreement {
 
 Eigen::Isometry3d ahead(double z, double x = 0.0) {
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
@@ -73,5 +72,4 @@ TEST(LoopAgreement, OutlivesTheNodesOfItsProposals) {
   EXPECT_TRUE(agreement.confirm(graph, proposal(1, 51, ahead(0.0))).empty());
 }
 
-}  // namespace test_loop_agreement
-}  // namespace sdvo
+}  // namespace sdvo::test_loop_agreement

@@ -6,8 +6,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/places/place_index.hpp"
 
-namespace sdvo {
-namespace test_place {
+namespace sdvo::test_place {
 
 /// Features of rising response, nine tenths of them in the top left corner of the image.
 StereoFeatures crowded() {
@@ -65,5 +64,4 @@ TEST(Place, TellsItsMemory) {
   EXPECT_EQ(place.bytes(), sizeof(Place) + rows);
 }
 
-}  // namespace test_place
-}  // namespace sdvo
+}  // namespace sdvo::test_place

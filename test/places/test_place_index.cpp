@@ -8,8 +8,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/places/place_index.hpp"
 
-namespace sdvo {
-namespace test_place_index {
+namespace sdvo::test_place_index {
 
 using Rows = std::vector<std::vector<std::uint8_t>>;
 
@@ -136,5 +135,4 @@ TEST(PlaceIndex, RefusesWhatItCannotMakeWordsOf) {
   EXPECT_TRUE(contains(errorOf([&] { twice.add(1, {}); }), "place 1"));
 }
 
-}  // namespace test_place_index
-}  // namespace sdvo
+}  // namespace sdvo::test_place_index

@@ -11,8 +11,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
 
-namespace sdvo {
-namespace test_place_recognition {
+namespace sdvo::test_place_recognition {
 
 constexpr double kPi = 3.14159265358979323846;
 
@@ -320,5 +319,4 @@ TEST(PlaceRecognition, RefusesOtherDescriptorsAndKeepsItsState) {
   EXPECT_EQ(drive.recognition.places().size(), known);
 }
 
-}  // namespace test_place_recognition
-}  // namespace sdvo
+}  // namespace sdvo::test_place_recognition

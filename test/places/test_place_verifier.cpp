@@ -4,8 +4,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/places/place_verifier.hpp"
 
-namespace sdvo {
-namespace test_place_verifier {
+namespace sdvo::test_place_verifier {
 
 using synthetic::camera;
 
@@ -78,5 +77,4 @@ TEST(PlaceVerifier, NothingToSeeIsNoError) {
   EXPECT_FALSE(verifier.verify(some, nothing).same);
 }
 
-}  // namespace test_place_verifier
-}  // namespace sdvo
+}  // namespace sdvo::test_place_verifier

@@ -8,8 +8,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/places/pose_graph.hpp"
 
-namespace sdvo {
-namespace test_pose_graph {
+namespace sdvo::test_pose_graph {
 
 constexpr double kPi = 3.14159265358979323846;
 
@@ -254,5 +253,4 @@ TEST(PoseGraph, IsMadeOfItsPartsAgainAndRefusesPartsThatDoNotFit) {
   EXPECT_TRUE(contains(errorOf([&] { PoseGraph(PoseGraphOptions(), ring.graph.nodes(), edges); }), "covariance"));
 }
 
-}  // namespace test_pose_graph
-}  // namespace sdvo
+}  // namespace sdvo::test_pose_graph

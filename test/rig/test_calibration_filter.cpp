@@ -7,8 +7,7 @@
 #include "stereo_descriptor_vo/motion/noise.hpp"
 #include "stereo_descriptor_vo/rig/calibration_filter.hpp"
 
-namespace sdvo {
-namespace test_calibration_filter {
+namespace sdvo::test_calibration_filter {
 
 using Matrix = RigCalibration::Matrix;
 using Vector = RigCalibration::Vector;
@@ -182,5 +181,4 @@ TEST(CalibrationFilter, AskingForAPriorChangesNothing) {
   EXPECT_EQ(asked.prior(6).mean, other.prior(6).mean);
 }
 
-}  // namespace test_calibration_filter
-}  // namespace sdvo
+}  // namespace sdvo::test_calibration_filter

@@ -6,8 +6,7 @@
 #include "stereo_descriptor_vo/rig/learnt_rig.hpp"
 #include "turned_grid.hpp"
 
-namespace sdvo {
-namespace test_learnt_rig {
+namespace sdvo::test_learnt_rig {
 
 ShownRotation shown(const LearntRig& rig, const StereoFeatures& features,
                     const Eigen::Vector3d& rate = Eigen::Vector3d::Zero()) {
@@ -74,5 +73,4 @@ TEST(LearntRig, WhatALateRightImageShowsInATurnIsNoRotation) {
   EXPECT_LT(shown(rig, turned, rate).log_odds, logOdds(0.05));
 }
 
-}  // namespace test_learnt_rig
-}  // namespace sdvo
+}  // namespace sdvo::test_learnt_rig

@@ -8,8 +8,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/rig/repeated_images.hpp"
 
-namespace sdvo {
-namespace test_repeated_images {
+namespace sdvo::test_repeated_images {
 
 constexpr double kNoise = 1.0;  // px
 
@@ -109,5 +108,4 @@ TEST(RepeatedImages, KnowsAPairToTheDigitAndWhetherItShouldHaveMoved) {
   EXPECT_FALSE(images.repeat(pair));
 }
 
-}  // namespace test_repeated_images
-}  // namespace sdvo
+}  // namespace sdvo::test_repeated_images

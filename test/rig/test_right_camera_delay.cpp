@@ -7,8 +7,7 @@
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/rig/right_camera_delay.hpp"
 
-namespace sdvo {
-namespace test_right_camera_delay {
+namespace sdvo::test_right_camera_delay {
 
 constexpr double kPeriod = 0.05;  // s
 
@@ -257,5 +256,4 @@ TEST(RightCameraDelay, APoseThatIsGivenHasNoDrift) {
   EXPECT_EQ(right_delay.drift(), 0.0);
 }
 
-}  // namespace test_right_camera_delay
-}  // namespace sdvo
+}  // namespace sdvo::test_right_camera_delay

@@ -7,8 +7,7 @@
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/rig/right_rotation.hpp"
 
-namespace sdvo {
-namespace test_right_rotation {
+namespace sdvo::test_right_rotation {
 
 /// Where a right camera that turned by `rotation` sees what it saw at (u, v) before.
 Eigen::Vector2d seenTurned(const StereoCamera& camera, double u, double v, const Eigen::Vector3d& rotation) {
@@ -82,5 +81,4 @@ TEST(RightRotation, IsFoundByDisparitiesTogetherWithTheMotion) {
   EXPECT_FALSE(rotationByDisparities(camera, noise, {}, {}, T_current_reference));
 }
 
-}  // namespace test_right_rotation
-}  // namespace sdvo
+}  // namespace sdvo::test_right_rotation

@@ -6,8 +6,7 @@
 
 #include "stereo_descriptor_vo/rig/row_delay.hpp"
 
-namespace sdvo {
-namespace test_row_delay {
+namespace sdvo::test_row_delay {
 
 constexpr double kDelay = 0.003;  // s
 
@@ -82,5 +81,4 @@ TEST(RowDelay, PartsOfTheImageAreRowByRow) {
   EXPECT_EQ(RowDelay::cellOf(700.0, 500.0, 600, 400), RowDelay::kColumns * RowDelay::kRows - 1);
 }
 
-}  // namespace test_row_delay
-}  // namespace sdvo
+}  // namespace sdvo::test_row_delay

@@ -8,8 +8,7 @@
 #include "stereo_descriptor_vo/rig/row_pattern.hpp"
 #include "turned_grid.hpp"
 
-namespace sdvo {
-namespace test_row_pattern {
+namespace sdvo::test_row_pattern {
 
 TEST(RowPattern, IsUnknownBeforeTheFirstFeatures) {
   RowPattern pattern(0.9);
@@ -96,5 +95,4 @@ TEST(RowPattern, CovarianceIsThatOfTheErrorsHoweverAlikeTheyAreInAPart) {
     for (const double ratio : squareByVariance(is_alike)) EXPECT_NEAR(ratio, 1.0, 0.35);
 }
 
-}  // namespace test_row_pattern
-}  // namespace sdvo
+}  // namespace sdvo::test_row_pattern

@@ -10,8 +10,7 @@
 
 #include "../../src/ros/threads.hpp"
 
-namespace sdvo {
-namespace rostest_callback_thread {
+namespace sdvo::rostest_callback_thread {
 
 bool waitUntil(const std::function<bool()>& condition) {
   const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(10.0);
@@ -116,5 +115,4 @@ TEST(CallbackThread, WhatACallbackThrowsEndsThatCallAlone) {
   EXPECT_TRUE(waitUntil([&] { return last == 5; }));
 }
 
-}  // namespace rostest_callback_thread
-}  // namespace sdvo
+}  // namespace sdvo::rostest_callback_thread

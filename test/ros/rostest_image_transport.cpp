@@ -3,8 +3,7 @@
 
 #include "../../src/ros/image_subscriber.hpp"
 
-namespace sdvo {
-namespace rostest_image_transport {
+namespace sdvo::rostest_image_transport {
 
 TEST(StereoImageTransport, EachSideKeepsItsOptionsInANamespaceOfItsOwn) {
   ros::NodeHandle nh("/image_transport_test");
@@ -23,5 +22,4 @@ TEST(StereoImageTransport, AnUnknownOneIsRefused) {
   EXPECT_THROW(StereoImageTransport{nh}, pluginlib::PluginlibException);
 }
 
-}  // namespace rostest_image_transport
-}  // namespace sdvo
+}  // namespace sdvo::rostest_image_transport

@@ -12,8 +12,7 @@
 #include "../../src/ros/odometry_publisher.hpp"
 #include "message_samples.hpp"
 
-namespace sdvo {
-namespace rostest_odometry_publisher {
+namespace sdvo::rostest_odometry_publisher {
 
 using ros_conversions::trackedResult;
 
@@ -281,5 +280,4 @@ TEST_F(OdometryPublisherTest, InfoTellsLatencyAndSession) {
   EXPECT_LT(publisher_->publishInfo({}, ros::Time(0xffffffffu, 0)).latency, -1e9f);
 }
 
-}  // namespace rostest_odometry_publisher
-}  // namespace sdvo
+}  // namespace sdvo::rostest_odometry_publisher

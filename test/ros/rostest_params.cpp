@@ -8,8 +8,7 @@
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
 
-namespace sdvo {
-namespace rostest_params {
+namespace sdvo::rostest_params {
 
 enum class Kind { kA, kB };
 
@@ -157,5 +156,4 @@ TEST_F(LoadParams, NamesWhatIsNoOption) {
   EXPECT_EQ(unknown, (std::vector<std::string>{"/load_params/cuont", "/load_params/inner/rate"}));
 }
 
-}  // namespace rostest_params
-}  // namespace sdvo
+}  // namespace sdvo::rostest_params

@@ -13,8 +13,7 @@
 #include "../../src/ros/params.hpp"
 #include "../said.hpp"
 
-namespace sdvo {
-namespace rostest_reconfigure_server {
+namespace sdvo::rostest_reconfigure_server {
 
 enum class Kind { kA, kB };
 
@@ -245,5 +244,4 @@ TEST_F(ReconfigureServerTest, ComponentsAreGroupsAndDefaultsStayWhatTheyAre) {
   EXPECT_EQ(ros::topic::waitForMessage<Config>("/loaded/parameter_updates")->ints.at(1).value, 6);
 }
 
-}  // namespace rostest_reconfigure_server
-}  // namespace sdvo
+}  // namespace sdvo::rostest_reconfigure_server

@@ -13,8 +13,7 @@
 #include "../../src/ros/transforms.hpp"
 #include "../said.hpp"
 
-namespace sdvo {
-namespace rostest_robot_transforms {
+namespace sdvo::rostest_robot_transforms {
 
 geometry_msgs::TransformStamped transform(const std::string& parent, const std::string& child, const ros::Time& stamp,
                                           double x = 0.0) {
@@ -240,5 +239,4 @@ TEST_F(RobotTransformsTest, WithoutATransformOfOursThereIsNoContention) {
   EXPECT_TRUE(warnings_.empty());
 }
 
-}  // namespace rostest_robot_transforms
-}  // namespace sdvo
+}  // namespace sdvo::rostest_robot_transforms

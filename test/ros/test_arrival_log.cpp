@@ -10,8 +10,7 @@
 #include "../said.hpp"
 #include "message_samples.hpp"
 
-namespace sdvo {
-namespace test_arrival_log {
+namespace sdvo::test_arrival_log {
 
 class ArrivalLogTest : public ::testing::Test {
  protected:
@@ -209,5 +208,4 @@ TEST_F(ApproximateArrivalLogTest, DoesNotAdviseWhatIsSetAlready) {
   EXPECT_FALSE(contains(text, "approximate_sync")) << text;
 }
 
-}  // namespace test_arrival_log
-}  // namespace sdvo
+}  // namespace sdvo::test_arrival_log

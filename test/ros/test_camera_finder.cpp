@@ -6,8 +6,7 @@
 #include "../../src/ros/camera_finder.hpp"
 #include "../said.hpp"
 
-namespace sdvo {
-namespace test_camera_finder {
+namespace sdvo::test_camera_finder {
 
 ros::master::V_TopicInfo topics(const std::vector<std::string>& folders, const std::vector<std::string>& images) {
   ros::master::V_TopicInfo topics;
@@ -110,5 +109,4 @@ TEST_F(CameraFinderTest, NamesThatTheUserChoseStay) {
   EXPECT_EQ(report_, "");
 }
 
-}  // namespace test_camera_finder
-}  // namespace sdvo
+}  // namespace sdvo::test_camera_finder

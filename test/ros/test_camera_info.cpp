@@ -8,8 +8,7 @@
 #include "../synthetic_scene.hpp"
 #include "message_samples.hpp"
 
-namespace sdvo::ros_conversions {
-namespace test_camera_info {
+namespace sdvo::ros_conversions::test_camera_info {
 
 sensor_msgs::CameraInfo cameraInfo(double tx, double f = 700.0) {
   sensor_msgs::CameraInfo info;
@@ -178,5 +177,4 @@ TEST(WhyUnrectified, ARotationWithoutDistortionIsNotTakenOutByImageProc) {
   EXPECT_EQ(whyUnrectified(left, right), "") << "R was left out";
 }
 
-}  // namespace test_camera_info
-}  // namespace sdvo::ros_conversions
+}  // namespace sdvo::ros_conversions::test_camera_info

@@ -6,8 +6,7 @@
 #include "../../src/ros/diagnostics.hpp"
 #include "../said.hpp"
 
-namespace sdvo {
-namespace test_diagnostics {
+namespace sdvo::test_diagnostics {
 
 TEST(DoubtOfLatency, StampsOfTheFutureAndThePast) {
   for (const double latency : {-0.05, 0.0, 0.3}) EXPECT_EQ(doubtOfLatency(latency, 0.5), "") << latency;
@@ -34,5 +33,4 @@ TEST(ExposureTurns, AreNamedAndNoLampIs) {
   EXPECT_FALSE(mild.takeTurns());
 }
 
-}  // namespace test_diagnostics
-}  // namespace sdvo
+}  // namespace sdvo::test_diagnostics

@@ -7,8 +7,7 @@
 #include "../synthetic_scene.hpp"
 #include "message_samples.hpp"
 
-namespace sdvo::ros_conversions {
-namespace test_features_image {
+namespace sdvo::ros_conversions::test_features_image {
 
 /// Pixels that are not grey any more.
 int colouredPixels(const cv::Mat& picture) {
@@ -82,5 +81,4 @@ TEST(DrawFeatures, SurvivesFlowOfUnequalLengths) {
   EXPECT_NO_THROW(drawFeatures(grey, grey, someMessage(), flow, "LOST"));
 }
 
-}  // namespace test_features_image
-}  // namespace sdvo::ros_conversions
+}  // namespace sdvo::ros_conversions::test_features_image

@@ -9,8 +9,7 @@
 #include "../synthetic_scene.hpp"
 #include "message_samples.hpp"
 
-namespace sdvo::ros_conversions {
-namespace test_features_message {
+namespace sdvo::ros_conversions::test_features_message {
 
 void expectSame(const StereoFeatures& a, const StereoFeatures& b) {
   EXPECT_EQ(a.stamp, b.stamp);
@@ -131,5 +130,4 @@ TEST(FeaturesMessageTest, APairThatTheRigMonitorRefusedIsKnownAsOne) {
   EXPECT_EQ(received.report.status, refused.report.status);
 }
 
-}  // namespace test_features_message
-}  // namespace sdvo::ros_conversions
+}  // namespace sdvo::ros_conversions::test_features_message

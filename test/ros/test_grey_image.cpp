@@ -9,8 +9,7 @@
 #include "../synthetic_scene.hpp"
 #include "message_samples.hpp"
 
-namespace sdvo::ros_conversions {
-namespace test_grey_image {
+namespace sdvo::ros_conversions::test_grey_image {
 
 sensor_msgs::ImagePtr image(const std::string& encoding, int width, int height, const std::vector<std::uint8_t>& data,
                             std::uint32_t step = 0) {
@@ -199,5 +198,4 @@ TEST(ToGrey, RefusesOtherEncodingsAndMalformedImages) {
           << encoding << " of " << bytes;
 }
 
-}  // namespace test_grey_image
-}  // namespace sdvo::ros_conversions
+}  // namespace sdvo::ros_conversions::test_grey_image

@@ -8,8 +8,7 @@
 #include "../said.hpp"
 #include "message_samples.hpp"
 
-namespace sdvo {
-namespace test_input_monitor {
+namespace sdvo::test_input_monitor {
 
 using Level = WallUpdater::Level;
 
@@ -87,5 +86,4 @@ TEST(InputMonitor, TheRateIsThatOfTheStamps) {
   for (InputMonitor* monitor : {&slowed, &burst}) EXPECT_EQ(diagnose(*monitor).text, "20.00 pairs a second");
 }
 
-}  // namespace test_input_monitor
-}  // namespace sdvo
+}  // namespace sdvo::test_input_monitor

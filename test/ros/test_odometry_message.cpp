@@ -9,8 +9,7 @@
 
 #include "message_samples.hpp"
 
-namespace sdvo::ros_conversions {
-namespace test_odometry_message {
+namespace sdvo::ros_conversions::test_odometry_message {
 
 /// A camera that looks ahead, mounted 1.2 m ahead, 0.3 m left of and 1.6 m above the base.
 Eigen::Isometry3d mountedCamera() {
@@ -286,5 +285,4 @@ TEST(ToTransform, EqualsTheOdometryOrItsInverse) {
   EXPECT_TRUE((poseOf(direct) * poseOf(inverse)).isApprox(Eigen::Isometry3d::Identity(), 1e-12));
 }
 
-}  // namespace test_odometry_message
-}  // namespace sdvo::ros_conversions
+}  // namespace sdvo::ros_conversions::test_odometry_message

@@ -2,8 +2,7 @@
 
 #include "../../src/ros/throttles.hpp"
 
-namespace sdvo {
-namespace test_pace {
+namespace sdvo::test_pace {
 
 constexpr std::int64_t kMillisecond = 1000000;
 
@@ -35,5 +34,4 @@ TEST(Pace, StampsThatFallBeginAnew) {
   EXPECT_FALSE(pace.isDue(1010 * kMillisecond));
 }
 
-}  // namespace test_pace
-}  // namespace sdvo
+}  // namespace sdvo::test_pace

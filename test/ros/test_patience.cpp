@@ -2,8 +2,7 @@
 
 #include "../../src/ros/throttles.hpp"
 
-namespace sdvo {
-namespace test_patience {
+namespace sdvo::test_patience {
 
 TEST(Patience, WaitsAsLongAsItIsThere) {
   Patience patience(0.1);
@@ -38,5 +37,4 @@ TEST(Patience, IsBackWhenItComesAgain) {
   EXPECT_EQ(patience.timeout(101.7), 0.1) << "rests for a second again";
 }
 
-}  // namespace test_patience
-}  // namespace sdvo
+}  // namespace sdvo::test_patience

@@ -10,8 +10,7 @@
 #include "../synthetic_scene.hpp"
 #include "message_samples.hpp"
 
-namespace sdvo::ros_conversions {
-namespace test_place_messages {
+namespace sdvo::ros_conversions::test_place_messages {
 
 using synthetic::equalMats;
 namespace msgs = stereo_descriptor_vo;
@@ -249,5 +248,4 @@ TEST(MotionCovariance, IsThatOfTheCamera) {
   }
 }
 
-}  // namespace test_place_messages
-}  // namespace sdvo::ros_conversions
+}  // namespace sdvo::ros_conversions::test_place_messages

@@ -23,8 +23,7 @@
 #include "../temporary_folder.hpp"
 #include "message_samples.hpp"
 
-namespace sdvo {
-namespace test_places_file {
+namespace sdvo::test_places_file {
 
 namespace fs = std::filesystem;
 
@@ -228,5 +227,4 @@ TEST_F(PlacesFile, AFileThatAnnouncesMuchTakesLittle) {
   }
 }
 
-}  // namespace test_places_file
-}  // namespace sdvo
+}  // namespace sdvo::test_places_file

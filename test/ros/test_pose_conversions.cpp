@@ -8,8 +8,7 @@
 #include "../../src/messages/pose_conversions.hpp"
 #include "../said.hpp"
 
-namespace sdvo::ros_conversions {
-namespace test_pose_conversions {
+namespace sdvo::ros_conversions::test_pose_conversions {
 
 geometry_msgs::PoseWithCovariance poseWith(const Matrix6d& covariance) {
   geometry_msgs::PoseWithCovariance message;
@@ -97,5 +96,4 @@ TEST(PoseConversions, RefusalsSayWhichElementToChange) {
   EXPECT_THROW(fromMessage(unset, pose, covariance), std::invalid_argument);
 }
 
-}  // namespace test_pose_conversions
-}  // namespace sdvo::ros_conversions
+}  // namespace sdvo::ros_conversions::test_pose_conversions

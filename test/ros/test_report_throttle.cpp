@@ -2,8 +2,7 @@
 
 #include "../../src/ros/throttles.hpp"
 
-namespace sdvo {
-namespace test_report_throttle {
+namespace sdvo::test_report_throttle {
 
 TEST(ReportThrottle, LetsAKindThroughOnce) {
   ReportThrottle throttle;
@@ -23,5 +22,4 @@ TEST(ReportThrottle, NumbersMakeNoOtherKind) {
   EXPECT_FALSE(throttle.allows("left image is 752x480"));
 }
 
-}  // namespace test_report_throttle
-}  // namespace sdvo
+}  // namespace sdvo::test_report_throttle

@@ -13,8 +13,7 @@
 #include "stereo_descriptor_vo/front_end/feature_detector.hpp"
 #include "stereo_descriptor_vo/ros/stereo_features_view.hpp"
 
-namespace sdvo::ros_conversions {
-namespace test_stereo_features_view {
+namespace sdvo::ros_conversions::test_stereo_features_view {
 
 using M = FeaturesMessage;
 
@@ -184,5 +183,4 @@ TEST(StereoFeaturesViewTest, NoFeaturesMakeAnEmptyCloud) {
   EXPECT_EQ(cloud.fields.size(), 4u);
 }
 
-}  // namespace test_stereo_features_view
-}  // namespace sdvo::ros_conversions
+}  // namespace sdvo::ros_conversions::test_stereo_features_view

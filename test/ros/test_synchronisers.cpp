@@ -7,8 +7,7 @@
 
 #include "../../src/ros/synchronisers.hpp"
 
-namespace sdvo {
-namespace test_synchronisers {
+namespace sdvo::test_synchronisers {
 
 using sensor_msgs::CameraInfo;
 using sensor_msgs::Image;
@@ -148,5 +147,4 @@ TEST(ApproximateSynchroniser, BeginsAnewWhenStampsFall) {
   EXPECT_EQ(play(5000.0), first);
 }
 
-}  // namespace test_synchronisers
-}  // namespace sdvo
+}  // namespace sdvo::test_synchronisers

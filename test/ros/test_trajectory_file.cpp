@@ -14,8 +14,7 @@
 #include "../temporary_folder.hpp"
 #include "message_samples.hpp"
 
-namespace sdvo {
-namespace test_trajectory_file {
+namespace sdvo::test_trajectory_file {
 
 namespace fs = std::filesystem;
 
@@ -98,5 +97,4 @@ TEST_F(TrajectoryFile, RefusesWhatIsNoFileOfTheUsers) {
   EXPECT_FALSE(fs::exists(directory_ / "file.txt"));
 }
 
-}  // namespace test_trajectory_file
-}  // namespace sdvo
+}  // namespace sdvo::test_trajectory_file

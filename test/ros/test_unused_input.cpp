@@ -4,8 +4,7 @@
 
 #include "../../src/ros/diagnostic_tasks.hpp"
 
-namespace sdvo {
-namespace test_unused_input {
+namespace sdvo::test_unused_input {
 
 using Status = WallUpdater::Status;
 using Level = WallUpdater::Level;
@@ -56,5 +55,4 @@ TEST(UnusedInput, CausesThatOtherTasksExplainAreOnlyCounted) {
   EXPECT_EQ(unused.count(UnusedInput::kPushedOut), 20u);
 }
 
-}  // namespace test_unused_input
-}  // namespace sdvo
+}  // namespace sdvo::test_unused_input

@@ -6,8 +6,7 @@
 
 #include "message_samples.hpp"
 
-namespace sdvo::ros_conversions {
-namespace test_vo_info {
+namespace sdvo::ros_conversions::test_vo_info {
 
 TEST(ToInfo, TellsResultAndImageSide) {
   OdometryResult result = trackedResult();
@@ -89,5 +88,4 @@ TEST(ToFlow, LeadsFromThePreviousPositionToThePresentOne) {
   EXPECT_FALSE(flow.inlier[1]);
 }
 
-}  // namespace test_vo_info
-}  // namespace sdvo::ros_conversions
+}  // namespace sdvo::ros_conversions::test_vo_info

@@ -8,8 +8,7 @@
 #include "../said.hpp"
 #include "message_samples.hpp"
 
-namespace sdvo {
-namespace test_work_load {
+namespace sdvo::test_work_load {
 
 using Level = WallUpdater::Level;
 
@@ -68,5 +67,4 @@ TEST(WorkLoad, PairsDroppedWhileItMostlyRestedCameInBursts) {
   EXPECT_TRUE(contains(status.message, "come in bursts, set queue_size")) << status.message;
 }
 
-}  // namespace test_work_load
-}  // namespace sdvo
+}  // namespace sdvo::test_work_load

@@ -9,8 +9,7 @@
 #include "../synthetic_features.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
-namespace sdvo {
-namespace test_feature_halves {
+namespace sdvo::test_feature_halves {
 
 StereoFeatures featuresAt(const std::vector<cv::Point2f>& positions) {
   StereoFeatures features;
@@ -58,7 +57,8 @@ TEST(FeatureHalves, APointStaysInItsHalfWhereverItMoves) {
   const std::vector<int> before = halves(features.split(featuresAt({{30, 45}, {90, 45}}), {}));
   // Each moves on by a field. The second one is not matched, the third one is said to come from where nothing was.
   const StereoFeatures next = featuresAt({{90, 45}, {150, 45}, {210, 45}});
-  const std::vector<int> after = halves(features.split(next, {{30.5f, 44.5f, 5.f, 0, true}, {210.f, 60.f, 5.f, 2, true}}));
+  const std::vector<int> after =
+      halves(features.split(next, {{30.5f, 44.5f, 5.f, 0, true}, {210.f, 60.f, 5.f, 2, true}}));
   EXPECT_EQ(after[0], before[0]);
   EXPECT_NE(after[1], before[1]);
   EXPECT_NE(after[2], after[1]) << "the fields of a row alternate";
@@ -92,5 +92,4 @@ TEST(FeatureHalves, FollowTheMatchesOfAnOdometry) {
   EXPECT_GT(kept, 9 * all / 10);
 }
 
-}  // namespace test_feature_halves
-}  // namespace sdvo
+}  // namespace sdvo::test_feature_halves

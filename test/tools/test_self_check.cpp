@@ -8,8 +8,7 @@
 #include "../said.hpp"
 #include "../synthetic_features.hpp"
 
-namespace sdvo {
-namespace test_self_check {
+namespace sdvo::test_self_check {
 
 constexpr std::int64_t kPeriod = 100000000;  // ns
 constexpr int kPairs = 40;
@@ -157,5 +156,4 @@ TEST(SelfCheck, APairAloneHasNoMotion) {
   EXPECT_TRUE(contains(checkShuttle(run, run).problem, "one pair"));
 }
 
-}  // namespace test_self_check
-}  // namespace sdvo
+}  // namespace sdvo::test_self_check

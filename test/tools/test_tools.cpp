@@ -30,8 +30,7 @@
 #include "../synthetic_scene.hpp"
 #include "../temporary_folder.hpp"
 
-namespace sdvo {
-namespace test_tools {
+namespace sdvo::test_tools {
 
 namespace fs = std::filesystem;
 
@@ -979,5 +978,4 @@ TEST_F(Tools, PerfectTrajectoryHasNoError) {
   expectError(run("evaluate_trajectory", "--ground-truth " + truth + " --estimate " + in("none")), in("none"));
 }
 
-}  // namespace test_tools
-}  // namespace sdvo
+}  // namespace sdvo::test_tools

@@ -4,8 +4,7 @@
 #include "../../experiments/aligned_motion.hpp"
 #include "../../experiments/keypoint_set.hpp"
 
-namespace sdvo {
-namespace test_aligned_motion {
+namespace sdvo::test_aligned_motion {
 
 constexpr double kDepth = 8.0;  // m
 
@@ -80,5 +79,4 @@ TEST_F(AlignedMotion, TooFewPatchesLeaveTheMotionAsItWas) {
   EXPECT_EQ(T.translation(), start_);
 }
 
-}  // namespace test_aligned_motion
-}  // namespace sdvo
+}  // namespace sdvo::test_aligned_motion

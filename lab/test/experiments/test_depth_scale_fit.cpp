@@ -10,8 +10,7 @@
 #include "../../experiments/depth_scale_fit.hpp"
 #include "wall_drive.hpp"
 
-namespace sdvo {
-namespace test_depth_scale_fit {
+namespace sdvo::test_depth_scale_fit {
 
 namespace fs = std::filesystem;
 
@@ -88,5 +87,4 @@ TEST(TryCurves, CountsCorrectMatchesOfAPairAndComparesThemWithTheStandardSize) {
   EXPECT_GT(of_far[2].gain, 0.0) << "sizes that follow the depth are for views that differ in scale";
 }
 
-}  // namespace test_depth_scale_fit
-}  // namespace sdvo
+}  // namespace sdvo::test_depth_scale_fit

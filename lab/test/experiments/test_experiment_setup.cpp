@@ -2,8 +2,7 @@
 
 #include "../../experiments/experiment_setup.hpp"
 
-namespace sdvo {
-namespace test_experiment_setup {
+namespace sdvo::test_experiment_setup {
 
 std::string hashOf(PipelineOptions options) {
   return hashOptions(listOptions(options));
@@ -65,5 +64,4 @@ TEST(ExperimentSetup, SettingsWinOverTheSetup) {
   EXPECT_FALSE(setup.options().stereo_features.detector.subpixel);
 }
 
-}  // namespace test_experiment_setup
-}  // namespace sdvo
+}  // namespace sdvo::test_experiment_setup

@@ -7,8 +7,7 @@
 #include "../../experiments/keypoint_set.hpp"
 #include "stereo_descriptor_vo/front_end/freak.hpp"
 
-namespace sdvo {
-namespace test_keypoint_set {
+namespace sdvo::test_keypoint_set {
 
 DepthScale constantSize(double size) {
   DepthScaleOptions options;
@@ -116,5 +115,4 @@ TEST_P(FeatureSetSize, IsTheWantedOneWithinFivePercent) {
 INSTANTIATE_TEST_SUITE_P(ByName, FeatureSetSize, testing::Values("fast", "gftt", "orb", "sift"),
                          [](const auto& parameter) { return std::string(parameter.param); });
 
-}  // namespace test_keypoint_set
-}  // namespace sdvo
+}  // namespace sdvo::test_keypoint_set

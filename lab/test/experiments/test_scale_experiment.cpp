@@ -10,8 +10,7 @@
 #include "../../experiments/scale_experiment.hpp"
 #include "wall_drive.hpp"
 
-namespace sdvo {
-namespace test_scale_experiment {
+namespace sdvo::test_scale_experiment {
 
 /// Geometric means of neighbours part the scale changes 1, 1.5, 2, 3, 4.
 TEST(ScaleExperiment, AFeatureCountsForTheNearestScaleChange) {
@@ -78,5 +77,4 @@ TEST(ScaleExperiment, SizesByDepthFindMoreOfAWallAtHalfTheDistanceThanConstantOn
   EXPECT_LT(percent["freak constant"], 10.0) << "a pattern of 7 px covers another part of the wall";
 }
 
-}  // namespace test_scale_experiment
-}  // namespace sdvo
+}  // namespace sdvo::test_scale_experiment

@@ -16,8 +16,7 @@
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
 
-namespace sdvo {
-namespace test_guises {
+namespace sdvo::test_guises {
 
 namespace fs = std::filesystem;
 
@@ -173,5 +172,4 @@ INSTANTIATE_TEST_SUITE_P(
                                      "half", "middle_70", "dark_noise", "saturated")),
     [](const auto& tested) { return std::get<0>(tested.param) + "_" + std::get<1>(tested.param); });
 
-}  // namespace test_guises
-}  // namespace sdvo
+}  // namespace sdvo::test_guises

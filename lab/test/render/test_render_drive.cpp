@@ -11,8 +11,7 @@
 #include "../../render/preset_paths.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
 
-namespace sdvo::render {
-namespace test_render_drive {
+namespace sdvo::render::test_render_drive {
 
 StereoCamera smallCamera() {
   return {176.77, 176.77, 150.0, 45.0, 0.5371, 310, 94};
@@ -340,5 +339,4 @@ TEST(RenderDrive, PresetsHaveTheirShape) {
   EXPECT_THROW(makePresetPath("nowhere", 10, 10.0, 1), std::invalid_argument);
 }
 
-}  // namespace test_render_drive
-}  // namespace sdvo::render
+}  // namespace sdvo::render::test_render_drive

@@ -7,8 +7,7 @@
 #include "../../render/drive_renderer.hpp"
 #include "../../render/rigs.hpp"
 
-namespace sdvo::render {
-namespace test_render_geometry {
+namespace sdvo::render::test_render_geometry {
 
 /// A world of its own with flat light: what is seen depends on reflectance alone.
 World plainWorld(Mesh mesh, const Texture& texture) {
@@ -255,5 +254,4 @@ TEST(RenderGeometry, AnEdgeCoversPixelsByTheirShare) {
   EXPECT_FLOAT_EQ(image(100, 603), 0.0f);
 }
 
-}  // namespace test_render_geometry
-}  // namespace sdvo::render
+}  // namespace sdvo::render::test_render_geometry

@@ -11,8 +11,7 @@
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
-namespace sdvo {
-namespace test_rendered_odometry {
+namespace sdvo::test_rendered_odometry {
 
 constexpr double kRate = 10.0;  // Hz
 constexpr int kThreads = 2;
@@ -103,5 +102,4 @@ TEST(RenderedOdometry, TheNumberOfThreadsChangesNoBit) {
   for (std::size_t k = 0; k < poses[0].size(); ++k) EXPECT_EQ(poses[0][k], poses[1][k]) << "pair " << k;
 }
 
-}  // namespace test_rendered_odometry
-}  // namespace sdvo
+}  // namespace sdvo::test_rendered_odometry

@@ -12,8 +12,7 @@
 #include "../../render/preset_paths.hpp"
 #include "../../render/rigs.hpp"
 
-namespace sdvo::render {
-namespace test_robot_drives {
+namespace sdvo::render::test_robot_drives {
 
 constexpr double kDegree = M_PI / 180.0;
 const std::vector<std::string> kMotions = {"hand_held", "turn_in_place", "corridor", "desk"};
@@ -274,5 +273,4 @@ TEST(RobotWorlds, AFastTurnSmearsEdgesInsteadOfRepeatingThem) {
   EXPECT_LT(difference(cv::Mat1f(blurred)), 0.3 * difference(cv::Mat1f(sharp)));
 }
 
-}  // namespace test_robot_drives
-}  // namespace sdvo::render
+}  // namespace sdvo::render::test_robot_drives
