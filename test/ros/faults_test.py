@@ -40,22 +40,6 @@ class Faults(PipelineCase):
     def setUpClass(cls):
         super().setUpClass(MadeUpSequence(PAIRS))
 
-    def config(self, text):
-        """A file of parameters."""
-        file = tempfile.NamedTemporaryFile('w', suffix='.yaml')
-        self.addCleanup(file.close)
-        file.write(text)
-        file.flush()
-        return file.name
-
-    def folder(self):
-        directory = tempfile.mkdtemp(prefix='sdvo_faults_')
-        self.addCleanup(shutil.rmtree, directory, ignore_errors=True)
-        return directory
-
-    def call(self, name, service_type, *arguments):
-        return rospy.ServiceProxy('%s/%s' % (self.namespace, name), service_type)(*arguments)
-
     def position(self, k=-1):
         return matrix_of(self.odometry[k].pose.pose)[:3, 3]
 
@@ -64,21 +48,19 @@ class Faults(PipelineCase):
         file = os.path.join(self.folder(), 'map.bag')
         config = self.config('place_recognition: {keyframe_distance: 0.1, keyframe_angle: 5.0}\n')
         self.start(config=config, loop_closing='true', queue_size=5, odometry_queue_size=5)
-        places = self.keep(Collector(self.namespace + '/place_info', PlaceInfo))
-        self.assertTrue(wait_until(lambda: self.pipeline.is_connected((places, ))))
+        places = self.listen('place_info', PlaceInfo)
         for i in range(30):
             self.feed(i)
-        self.assertTrue(wait_until(lambda: len(places) >= 5), len(places))
+        self.until(lambda: len(places) >= 5)
         self.assertTrue(self.call('place_recognition/save_places', SavePlaces, file).success)
         self.tearDown()
         self.setUp()
 
         self.start(config=config, loop_closing='true', places_file=file, queue_size=5, odometry_queue_size=5)
-        places = self.keep(Collector(self.namespace + '/place_info', PlaceInfo))
-        self.assertTrue(wait_until(lambda: self.pipeline.is_connected((places, ))))
+        places = self.listen('place_info', PlaceInfo)
         for i in range(20):
             self.assertEqual(self.feed(i).state, 'TRACKING')
-        self.assertTrue(wait_until(lambda: len(places) >= 3), len(places))
+        self.until(lambda: len(places) >= 3)
         known, epoch, answered, last = places[-1].places, self.info[-1].epoch, len(self.info), self.position()
         self.assertGreater(known, 5)
         self.assertGreater(np.linalg.norm(last), 15 * STEP)
@@ -87,15 +69,15 @@ class Faults(PipelineCase):
         boot = -10 * EPOCH + 2.0  # in tenths of a second
         self.camera.publish(*self.camera.messages(20, time_of=boot))
         self.camera.publish(*self.camera.messages(21, time_of=boot + 1))
-        self.assertTrue(wait_until(lambda: len(self.info) == answered + 2), self.rosout.warnings)
+        self.until(lambda: len(self.info) == answered + 2)
         for i in range(22, 30):
             self.feed(i, time_of=boot + i - 20)
         self.assertEqual({info.epoch for info in self.info[answered:]}, {epoch})
         self.assertLess(self.info[-1].header.stamp, rospy.Time(10))
-        self.assertTrue(wait_until(lambda: len(self.odometry) == answered + 10))
+        self.until(lambda: len(self.odometry) == answered + 10)
         self.assertAlmostEqual(np.linalg.norm(self.position(answered) - last), STEP, delta=0.2 * STEP)
         self.assertAlmostEqual(np.linalg.norm(self.position() - self.position(answered)), 9 * STEP, delta=STEP)
-        self.assertTrue(wait_until(lambda: len(places) > 0 and places[-1].header.stamp < rospy.Time(10)))
+        self.until(lambda: len(places) > 0 and places[-1].header.stamp < rospy.Time(10))
         self.assertGreater(places[-1].places, known)
         self.assertEqual([w for w in self.rosout.warnings if 'forgotten' in w or 'starts again' in w], [])
         self.assertEqual(self.rosout.errors, [])
@@ -143,9 +125,7 @@ class Faults(PipelineCase):
             self.start()
         for i in range(3):
             self.assertEqual(self.feed(i).state, 'TRACKING')
-        publisher = rospy.Publisher(self.namespace + '/stereo_features', StereoFeatures, queue_size=1)
-        self.addCleanup(publisher.unregister)
-        self.assertTrue(wait_until(lambda: self.is_sent_to_pipeline(publisher)))
+        publisher = self.publisher('stereo_features', StereoFeatures)
         message = copy.deepcopy(self.features[2])
         message.header.stamp += rospy.Duration.from_sec(0.05)
         for name in ('u', 'v', 'disparity', 'dv', 'size', 'angle', 'response'):
@@ -153,11 +133,11 @@ class Faults(PipelineCase):
         message.descriptors, message.patches = message.descriptors[:rows * row], message.patches[:rows * message.patch_side**2]
         self.assertEqual(len(message.descriptors), rows * row)
         publisher.publish(message)
-        self.assertTrue(wait_until(lambda: self.info.has(message.header.stamp)), self.rosout.errors)
+        self.until(lambda: self.info.has(message.header.stamp))
         answer = self.info[-1]
         self.assertEqual((answer.state, answer.epoch), ('WAITING', self.info[0].epoch))
         self.assertIn('features skipped', answer.reason)
-        self.assertTrue(wait_until(lambda: self.rosout.said('skipped', 'Failed to allocate')), self.rosout.errors)
+        self.until(lambda: self.rosout.said('skipped', 'Failed to allocate'))
         after = self.feed(3)
         self.assertEqual((after.state, after.epoch), ('TRACKING', answer.epoch))
         self.assert_alive()
@@ -181,7 +161,7 @@ class Faults(PipelineCase):
         def delays():
             return [not connection.socket.getsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY)
                     for connection in publisher.impl.connections if connection.endpoint_id == self.pipeline.manager]
-        self.assertTrue(wait_until(lambda: len(delays()) == 1 and self.is_sent_to_pipeline(publisher)))
+        self.until(lambda: len(delays()) == 1 and self.is_sent_to_pipeline(publisher))
         self.assertEqual(delays(), [False])
 
     def test_a_map_that_was_loaded_is_shown_before_the_first_pair(self):
@@ -190,12 +170,12 @@ class Faults(PipelineCase):
         self.start(config=config, loop_closing='true')
         for i in range(12):
             self.feed(i)
-        self.assertTrue(wait_until(lambda: self.call('place_recognition/save_places', SavePlaces, file).success))
+        self.until(lambda: self.call('place_recognition/save_places', SavePlaces, file).success)
         self.tearDown()
         self.setUp()
-        graph = self.keep(Collector(self.namespace + '/map_graph', MapGraph))
+        graph = self.collect('map_graph', MapGraph)
         self.start(config=config, loop_closing='true', places_file=file)
-        self.assertTrue(wait_until(lambda: len(graph) > 0))
+        self.until(lambda: len(graph) > 0)
         self.assertGreater(len(graph[0].nodes), 1)
 
     def statuses(self, node, task):
@@ -205,8 +185,8 @@ class Faults(PipelineCase):
                 if status.name.endswith(name)]
 
     def expect(self, node, task, level, *words):
-        self.assertTrue(wait_until(lambda: any(found == level and all(word in message for word in words)
-                                               for found, message in self.statuses(node, task))), self.statuses(node, task))
+        self.until(lambda: any(found == level and all(word in message for word in words)
+                               for found, message in self.statuses(node, task)))
 
     def run_for(self, seconds, damage=lambda images: None):
         """Pairs at 10 Hz of wall time, there and back, until the time is over."""
@@ -281,7 +261,7 @@ class Faults(PipelineCase):
         def counts():
             values = {value.key: value.value for value in self.diagnosis('synchronisation', 'stereo_features').values}
             return [int(values.get(name, 0)) for name in ('unpaired', 'pushed out by newer ones', 'late or with wrong stamps', 'refused')]
-        self.assertTrue(wait_until(lambda: len(self.features) + sum(counts()) == pairs), (len(self.features), counts()))
+        self.until(lambda: len(self.features) + sum(counts()) == pairs)
         self.assertTrue(0 < len(self.features) < 60, len(self.features))
         self.assertGreater(self.features[-1].dropped_pairs, 10)
 
@@ -290,49 +270,43 @@ class Faults(PipelineCase):
         begin = time.time()
         for i in range(5):
             self.camera.publish(*self.camera.messages(i, frame='mast'))
-            self.assertTrue(wait_until(lambda: len(self.features) == i + 1))
+            self.until(lambda: len(self.features) == i + 1)
         # Each pair waits until the next one but one would push another out.
-        self.assertTrue(wait_until(lambda: len(self.info) >= 2), len(self.info))
+        self.until(lambda: len(self.info) >= 2)
         self.assertIn("'mast'", self.info[0].reason)
         self.call('visual_odometry/reset', Empty)
         self.assertLess(time.time() - begin, 50.0, 'it waited for TF')
         self.broadcaster.sendTransform([camera_transform(FRAME), camera_transform('mast')])
         times = itertools.count(5)
-        self.assertTrue(wait_until(lambda: self.is_answered(5, time_of=next(times), frame='mast') and
-                                   self.info[-1].state == 'TRACKING'))
+        self.until(lambda: self.is_answered(5, time_of=next(times), frame='mast') and self.info[-1].state == 'TRACKING')
 
     def test_a_dark_pair_and_a_careless_click_leave_the_map_alone(self):
         self.start(config=self.config('place_recognition: {keyframe_distance: 0.1, keyframe_angle: 5.0}\n'), loop_closing='true')
-        places = self.keep(Collector(self.namespace + '/place_info', PlaceInfo))
-        self.assertTrue(wait_until(lambda: self.pipeline.is_connected((places, ))))
+        places = self.listen('place_info', PlaceInfo)
         for i in range(10):
             self.feed(i)
-        self.assertTrue(wait_until(lambda: len(places) > 0))
-        images, infos = self.camera.messages(10)
-        for image in images:
-            image.data = bytes(len(image.data))
+        self.until(lambda: len(places) > 0)
+        images, infos = self.camera.dark(10)
         self.feed_messages(images, infos)
-        publisher = rospy.Publisher('/initialpose', PoseWithCovarianceStamped, queue_size=1)
-        self.addCleanup(publisher.unregister)
-        self.assertTrue(wait_until(lambda: self.is_sent_to_pipeline(publisher)))
+        publisher = self.publisher('/initialpose', PoseWithCovarianceStamped)
         click = PoseWithCovarianceStamped()
         click.header.frame_id = 'map'
         click.pose.pose.orientation.w = 1.0
         publisher.publish(click)
-        self.assertTrue(wait_until(lambda: self.rosout.warned('initialpose is not used', 'initialpose_while_mapping')))
+        self.until(lambda: self.rosout.warned('initialpose is not used', 'initialpose_while_mapping'))
         known = len(places)
         for i in range(11, 30):
             self.feed(i)
-        self.assertTrue(wait_until(lambda: len(places) > known))
+        self.until(lambda: len(places) > known)
         self.assertEqual(self.rosout.errors, [])
 
     def test_a_camera_that_was_found_is_given_back(self):
         def pipeline(camera, **arguments):
             self.rosout = self.keep(Rosout(self.namespace))
-            self.features = self.keep(Collector(self.namespace + '/stereo_features', StereoFeatures))
-            self.picture = self.keep(Collector(self.namespace + '/features_image', Image))
+            self.features = self.collect('stereo_features', StereoFeatures)
+            self.picture = self.collect('features_image', Image)
             found = self.keep(Pipeline(self.namespace, **arguments))
-            self.assertTrue(wait_until(lambda: found.has_loaded('stereo_features', 'visual_odometry'), 60))
+            self.until(lambda: found.has_loaded('stereo_features', 'visual_odometry'), 60)
             return self.keep(camera)
         times = itertools.count()
 
@@ -341,19 +315,19 @@ class Faults(PipelineCase):
             camera.publish(*camera.messages(k % PAIRS, time_of=k))
             return wait_until(lambda: len(self.picture) > drawn, SILENCE)
         front = pipeline(Camera(self.namespace + '/front', self.sequence, self.clock))
-        self.assertTrue(wait_until(front.is_subscribed, 60))
-        self.assertTrue(wait_until(lambda: self.rosout.warned('nobody publishes', '/front/left/image_rect', 'find_camera')))
-        self.assertTrue(wait_until(lambda: is_drawn(front)))
+        self.until(front.is_subscribed, 60)
+        self.until(lambda: self.rosout.warned('nobody publishes', '/front/left/image_rect', 'find_camera'))
+        self.until(lambda: is_drawn(front))
         own = self.keep(Camera(self.namespace, self.sequence, self.clock))
-        self.assertTrue(wait_until(lambda: own.is_subscribed() and not front.has_subscribers(), 60))
-        self.assertTrue(wait_until(lambda: self.rosout.warned('somebody publishes')))
-        self.assertTrue(wait_until(lambda: is_drawn(own)))
+        self.until(lambda: own.is_subscribed() and not front.has_subscribers(), 60)
+        self.until(lambda: self.rosout.warned('somebody publishes'))
+        self.until(lambda: is_drawn(own))
         self.tearDown()
         self.setUp()
 
         front = pipeline(Camera(self.namespace + '/front', self.sequence, self.clock), find_camera='false')
-        self.assertTrue(wait_until(lambda: ('out', self.namespace + '/stereo_features', rospy.get_name()) in links(
-            self.namespace + '/stereo_vo_manager')))
+        self.until(lambda: ('out', self.namespace + '/stereo_features', rospy.get_name()) in links(
+            self.namespace + '/stereo_vo_manager'))
         time.sleep(3.0)
         self.assertFalse(front.has_subscribers())
 
@@ -363,15 +337,15 @@ class Faults(PipelineCase):
         client = dynamic_reconfigure.client.Client(self.namespace + '/stereo_features', timeout=60)
         client.update_configuration({'detector/max_features': 200})
         client.close()
-        self.assertTrue(wait_until(lambda: rospy.get_param(self.namespace + '/stereo_features/detector/max_features') == 200))
+        self.until(lambda: rospy.get_param(self.namespace + '/stereo_features/detector/max_features') == 200)
         name = self.namespace + '/stereo_features'
         self.assertTrue(rospy.ServiceProxy(self.pipeline.manager + '/unload_nodelet', NodeletUnload)(name).success)
-        self.assertTrue(wait_until(lambda: not self.camera.has_subscribers()))
+        self.until(lambda: not self.camera.has_subscribers())
         load = rospy.ServiceProxy(self.pipeline.manager + '/load_nodelet', NodeletLoad)
         self.assertTrue(load(name, PACKAGE + '/StereoFeatures', [], [], [], '').success)
-        self.assertTrue(wait_until(lambda: self.camera.is_subscribed() and self.pipeline.is_connected((self.features, ))))
+        self.until(lambda: self.camera.is_subscribed() and self.pipeline.is_connected((self.features, )))
         times = itertools.count(1)
-        self.assertTrue(wait_until(lambda: self.is_answered(1, time_of=next(times))))
+        self.until(lambda: self.is_answered(1, time_of=next(times)))
         self.assertGreater(before.detected, 250)
         self.assertEqual(self.info[-1].detected, 200)
 
@@ -387,12 +361,12 @@ class Faults(PipelineCase):
 
     def test_states_and_the_map_are_there_for_others(self):
         self.start(config=self.config('visual_odometry: {publish_null_when_lost: true}\n'))
-        pose = self.keep(Collector(self.namespace + '/pose', PoseWithCovarianceStamped))
-        cloud = self.keep(Collector(self.namespace + '/map_points', PointCloud2))
-        self.assertTrue(wait_until(lambda: self.pipeline.is_connected((pose, cloud))))
+        pose = self.collect('pose', PoseWithCovarianceStamped)
+        cloud = self.collect('map_points', PointCloud2)
+        self.until(lambda: self.pipeline.is_connected((pose, cloud)))
         for i in range(5):
             self.assertEqual(self.feed(i).state_id, VoInfo.TRACKING)
-        self.assertTrue(wait_until(lambda: len(pose) == 5 and len(cloud) > 0 and cloud[-1].header.stamp == pose[-1].header.stamp))
+        self.until(lambda: len(pose) == 5 and len(cloud) > 0 and cloud[-1].header.stamp == pose[-1].header.stamp)
         self.assertEqual(pose[-1].pose.covariance, self.odometry[-1].pose.covariance)
         self.assertEqual(cloud[-1].header.frame_id, FRAME)
         # Two walls across the way ahead, 2 and 4 m away; the camera's z is ahead.
@@ -401,21 +375,17 @@ class Faults(PipelineCase):
         self.assertGreater(np.mean((abs(ahead - 2) < 0.1) | (abs(ahead - 4) < 0.2)), 0.9)
 
         for k in range(5, 9):
-            images, infos = self.camera.messages(5, time_of=k)
-            for image in images:
-                image.data = bytes(len(image.data))
+            images, infos = self.camera.dark(5, time_of=k)
             self.camera.publish(images, infos)
-            self.assertTrue(wait_until(lambda: self.info.has(images[0].header.stamp)))
+            self.until(lambda: self.info.has(images[0].header.stamp))
         self.assertEqual(self.info[-1].state_id, VoInfo.LOST)
-        self.assertTrue(wait_until(lambda: self.odometry.has(self.info[-1].header.stamp)))
+        self.until(lambda: self.odometry.has(self.info[-1].header.stamp))
         null = self.odometry[-1]
         self.assertEqual((null.pose.pose.orientation.w, null.pose.covariance[0]), (0.0, 9999.0))
 
     def test_the_first_pose_has_roll_and_pitch_of_gravity(self):
         self.start(config=self.config('visual_odometry: {use_imu: true}\n'))
-        imu = rospy.Publisher(self.namespace + '/imu', Imu, queue_size=500)
-        self.addCleanup(imu.unregister)
-        self.assertTrue(wait_until(lambda: self.is_sent_to_pipeline(imu)))
+        imu = self.publisher('imu', Imu)
         roll = 0.1
         for k in range(111):
             message = Imu()
@@ -424,7 +394,7 @@ class Faults(PipelineCase):
             message.linear_acceleration.y, message.linear_acceleration.z = 9.81 * np.sin(roll), 9.81 * np.cos(roll)
             imu.publish(message)
         times = itertools.count(0)
-        self.assertTrue(wait_until(lambda: self.is_answered(0, time_of=next(times)) and len(self.odometry) > 0))
+        self.until(lambda: self.is_answered(0, time_of=next(times)) and len(self.odometry) > 0)
         up = matrix_of(self.odometry[0].pose.pose)[:3, :3].T @ [0, 0, 1]
         np.testing.assert_allclose(up, [0, np.sin(roll), np.cos(roll)], atol=1e-3)
         self.assertNotIn('those of initial_pose', ' '.join(self.rosout.warnings))
@@ -435,16 +405,16 @@ class Faults(PipelineCase):
         self.start(config=self.config('place_recognition: ' + small % ''), loop_closing='true')
         for i in range(40):
             self.feed(i)
-        self.assertTrue(wait_until(lambda: self.call('place_recognition/save_places', SavePlaces, file).success))
+        self.until(lambda: self.call('place_recognition/save_places', SavePlaces, file).success)
         self.tearDown()
         self.setUp()
-        places = self.keep(Collector(self.namespace + '/place_info', PlaceInfo))
-        pose = self.keep(Collector(self.namespace + '/map_pose', PoseWithCovarianceStamped))
-        graph = self.keep(Collector(self.namespace + '/map_graph', MapGraph))
+        places = self.collect('place_info', PlaceInfo)
+        pose = self.collect('map_pose', PoseWithCovarianceStamped)
+        graph = self.collect('map_graph', MapGraph)
         tf = self.keep(Collector('/tf', TFMessage))
         self.start(config=self.config('place_recognition: ' + small % ', localisation_only: true'), loop_closing='true',
                    places_file=file, odom_frame_id='odom_2')
-        self.assertTrue(wait_until(lambda: self.pipeline.is_connected((places, pose, graph)) and len(graph) > 0))
+        self.until(lambda: self.pipeline.is_connected((places, pose, graph)) and len(graph) > 0)
         nodes = {node.id: node.pose for node in graph[0].nodes}
 
         def map_to_odom():
@@ -456,26 +426,24 @@ class Faults(PipelineCase):
         hint.header.frame_id = 'map'
         hint.pose.pose.position.y = -0.2 + 0.05
         hint.pose.pose.orientation.w = 1.0
-        publisher = rospy.Publisher('/initialpose', PoseWithCovarianceStamped, queue_size=1)
-        self.addCleanup(publisher.unregister)
-        self.assertTrue(wait_until(lambda: self.is_sent_to_pipeline(publisher)))
+        publisher = self.publisher('/initialpose', PoseWithCovarianceStamped)
         publisher.publish(hint)
         time.sleep(0.5)
         self.feed(first)
-        self.assertTrue(wait_until(lambda: map_to_odom() is not None))
+        self.until(lambda: map_to_odom() is not None)
         self.assertFalse(places[0].located)
         self.assertTrue(self.rosout.warned('initialpose: the robot is placed in the map'), self.rosout.warnings)
         np.testing.assert_allclose(map_to_odom()[:3, 3], [0, -0.15, 0], atol=1e-6)
         for i in range(first + 1, 40):
             self.feed(i)
-        self.assertTrue(wait_until(lambda: places[-1].located), [(p.same, p.reason) for p in places])
-        self.assertTrue(wait_until(lambda: len(pose) > 0 and pose[-1].header.stamp == places[-1].header.stamp))
+        self.until(lambda: places[-1].located)
+        self.until(lambda: len(pose) > 0 and pose[-1].header.stamp == places[-1].header.stamp)
         true = -STEP * round((pose[-1].header.stamp.to_sec() - EPOCH) * 10)
         self.assertAlmostEqual(pose[-1].pose.pose.position.y, true, delta=0.02)
         covariance = np.array(pose[-1].pose.covariance).reshape(6, 6)
         self.assertTrue(0 < covariance[1, 1] < 0.1**2, covariance[1, 1])
         # What was loaded has not moved, and cannot be saved anew.
-        self.assertTrue(wait_until(lambda: len(graph[-1].nodes) > len(nodes)))
+        self.until(lambda: len(graph[-1].nodes) > len(nodes))
         for node in graph[-1].nodes:
             if node.id in nodes:
                 self.assertEqual(node.pose, nodes[node.id])

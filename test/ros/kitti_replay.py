@@ -166,6 +166,13 @@ class Camera:
             message.header.frame_id = frame
         return images, infos
 
+    def dark(self, i, **options):
+        """As messages(), of a lens that is covered."""
+        images, infos = self.messages(i, **options)
+        for image in images:
+            image.data = bytes(len(image.data))
+        return images, infos
+
     def publish(self, images, infos):
         self.clock.advance_to(images[0].header.stamp)
         for publisher, message in zip(self.infos + self.images, infos + images):

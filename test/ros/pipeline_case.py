@@ -1,7 +1,11 @@
 """The launched pipeline with a camera that is the test itself: what the tests of its faults share."""
 
+import os
+import shutil
+import tempfile
 import unittest
 
+import dynamic_reconfigure.client
 import rospy
 import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
@@ -49,11 +53,53 @@ class PipelineCase(unittest.TestCase):
         self.closeables.append(closeable)
         return closeable
 
+    def until(self, condition, timeout=30.0):
+        """What must happen; else the test fails with all that was said and answered."""
+        if not wait_until(condition, timeout):
+            kept = {c.subscriber.resolved_name: len(c) for c in self.closeables if isinstance(c, Collector)}
+            said = [(c.errors, c.warnings) for c in self.closeables if isinstance(c, Rosout)]
+            answers = [(info.state, info.epoch, info.reason) for info in list(getattr(self, 'info', ()))[-5:]]
+            self.fail('waited in vain; messages: %s; errors, warnings: %s; last answers: %s' % (kept, said, answers))
+
+    def config(self, text):
+        """A file of parameters."""
+        path = os.path.join(self.folder(), 'config.yaml')
+        with open(path, 'w') as file:
+            file.write(text)
+        return path
+
+    def folder(self):
+        directory = tempfile.mkdtemp(prefix='sdvo_case_')
+        self.addCleanup(shutil.rmtree, directory, ignore_errors=True)
+        return directory
+
+    def call(self, name, service_type, *arguments):
+        return rospy.ServiceProxy('%s/%s' % (self.namespace, name), service_type)(*arguments)
+
+    def collect(self, topic, message_type):
+        return self.keep(Collector('%s/%s' % (self.namespace, topic), message_type))
+
+    def listen(self, topic, message_type):
+        """collect(); returns once the pipeline sends to it."""
+        collector = self.collect(topic, message_type)
+        self.until(lambda: self.pipeline.is_connected((collector, )))
+        return collector
+
+    def publisher(self, topic, message_type):
+        """Of what the pipeline takes in; returns once it does. With a slash: of a topic outside of the namespace."""
+        publisher = rospy.Publisher(topic if topic.startswith('/') else '%s/%s' % (self.namespace, topic), message_type, queue_size=500)
+        self.addCleanup(publisher.unregister)
+        self.until(lambda: self.is_sent_to_pipeline(publisher))
+        return publisher
+
+    def reconfigure(self, node):
+        return self.keep(dynamic_reconfigure.client.Client('%s/%s' % (self.namespace, node), timeout=60))
+
     def start(self, odom=None, **arguments):
         """Launches the pipeline and returns when everything is connected to it. `odom`: the topic's name, where it is another."""
         self.odometry = self.keep(Collector(odom or self.namespace + '/odom', Odometry))
-        self.info = self.keep(Collector(self.namespace + '/vo_info', VoInfo))
-        self.features = self.keep(Collector(self.namespace + '/stereo_features', StereoFeatures))
+        self.info = self.collect('vo_info', VoInfo)
+        self.features = self.collect('stereo_features', StereoFeatures)
         self.diagnostics = self.keep(Collector('/diagnostics', DiagnosticArray))
         self.rosout = self.keep(Rosout(self.namespace))
         self.camera = self.keep(Camera(self.namespace, self.sequence, self.clock))
