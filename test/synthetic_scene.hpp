@@ -7,7 +7,6 @@
 #include <functional>
 #include <opencv2/core.hpp>
 #include <random>
-#include <string>
 #include <vector>
 
 #include "said.hpp"
@@ -79,6 +78,11 @@ inline cv::Mat render(cv::Size size, const std::function<double(double u, double
   for (int v = 0; v < size.height; ++v)
     for (int u = 0; u < size.width; ++u) image.at<std::uint8_t>(v, u) = cv::saturate_cast<std::uint8_t>(grey(u, v));
   return image;
+}
+
+/// Image of a texture in pixels, moved by so many to the left and down.
+inline cv::Mat render(cv::Size size, const Texture& texture, double left = 0.0, double down = 0.0) {
+  return render(size, [&](double u, double v) { return texture.at(u + left, v - down); });
 }
 
 /// View of the fronto-parallel plane at `depth` m that carries `texture` (in m) from a camera whose centre is `x` m to

@@ -9,6 +9,7 @@
 namespace sdvo::test_pose_covariance {
 
 constexpr double kForward = 2.0;  // m
+const Eigen::Isometry3d kStill = Eigen::Isometry3d::Identity();
 
 Eigen::Isometry3d forward() {
   Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
@@ -56,13 +57,12 @@ TEST(PoseCovariance, AddsMotionsThatAreKnownByThemselves) {
 
 TEST(PoseCovariance, DoesNotGrowBetweenPairsMeasuredFromOneKeyframe) {
   PoseCovariance covariance;
-  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
-  expectEqual(covariance.measure(still, diagonal(0.5, 0.25)), diagonal(0.5, 0.25));
+  expectEqual(covariance.measure(kStill, diagonal(0.5, 0.25)), diagonal(0.5, 0.25));
   expectEqual(covariance.value(), diagonal(0.5, 0.25));
-  expectEqual(covariance.measure(still, diagonal(0.75, 0.25)), diagonal(0.75, 0.25));
+  expectEqual(covariance.measure(kStill, diagonal(0.75, 0.25)), diagonal(0.75, 0.25));
   expectEqual(covariance.value(), diagonal(0.75, 0.25));
   // A better pose does not take back what was reported.
-  covariance.measure(still, diagonal(0.125, 0.125));
+  covariance.measure(kStill, diagonal(0.125, 0.125));
   expectEqual(covariance.value(), diagonal(0.75, 0.25));
 }
 
@@ -77,25 +77,24 @@ TEST(PoseCovariance, TheErrorOfTheKeyframeCancelsInTheMotion) {
     motion_square += (now - before) * (now - before) / kTrials, pose_square += now * now / kTrials;
   }
   PoseCovariance covariance;
-  covariance.measure(Eigen::Isometry3d::Identity(), diagonal(pose_square, 0.0));
-  const Matrix6d motion = covariance.measure(Eigen::Isometry3d::Identity(), diagonal(pose_square, 0.0));
+  covariance.measure(kStill, diagonal(pose_square, 0.0));
+  const Matrix6d motion = covariance.measure(kStill, diagonal(pose_square, 0.0));
   EXPECT_NEAR(motion(0, 0), motion_square, 0.05 * motion_square);
 }
 
 TEST(PoseCovariance, AMotionIsThatOfTheLastTwoPosesToEachOther) {
   // Along a line: the key frame errs by `common`, a pair by its own error against it. A weak pair, then a good one.
-  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
   constexpr double kCommon = 1.0, kWeak = 9.0, kGood = 1.0;
   PoseCovariance covariance;
-  covariance.measure(still, diagonal(kCommon + kWeak, 0.25));
-  Matrix6d motion = covariance.measure(still, diagonal(kCommon + kGood, 0.25));
+  covariance.measure(kStill, diagonal(kCommon + kWeak, 0.25));
+  Matrix6d motion = covariance.measure(kStill, diagonal(kCommon + kGood, 0.25));
   EXPECT_NEAR(motion(0, 0), kWeak + kGood, 1e-9) << "both pairs' own errors, not the key frame's";
-  motion = covariance.measure(still, diagonal(kCommon + kGood, 0.25));
+  motion = covariance.measure(kStill, diagonal(kCommon + kGood, 0.25));
   EXPECT_NEAR(motion(0, 0), kGood + kGood, 1e-9) << "the weak pair has no part in it";
   // Where the pair before is the key frame, its error is what the new one is measured against.
-  covariance.measure(still, diagonal(kCommon + kWeak, 0.25));
+  covariance.measure(kStill, diagonal(kCommon + kWeak, 0.25));
   covariance.markKeyframe();
-  motion = covariance.measure(still, diagonal(kCommon + kGood, 0.25));
+  motion = covariance.measure(kStill, diagonal(kCommon + kGood, 0.25));
   EXPECT_NEAR(motion(0, 0), kCommon + kGood, 1e-9);
 }
 
@@ -103,16 +102,15 @@ TEST(PoseCovariance, AMotionIsAsUncertainInEachDirectionAsTheWorseOfTheTwoPoses)
   PoseCovariance covariance;
   Matrix6d sideways = diagonal(0.1, 0.01), ahead = sideways;
   sideways(0, 0) = 0.9, ahead(2, 2) = 0.9;
-  covariance.measure(Eigen::Isometry3d::Identity(), sideways);
+  covariance.measure(kStill, sideways);
   Matrix6d both = sideways;
   both(2, 2) = 0.9;
-  expectEqual(covariance.measure(Eigen::Isometry3d::Identity(), ahead), both);
+  expectEqual(covariance.measure(kStill, ahead), both);
 }
 
 TEST(PoseCovariance, ContainsWhatASecondThoughtMoved) {
   PoseCovariance covariance;
-  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
-  covariance.measure(still, diagonal(0.0001, 0.0001));
+  covariance.measure(kStill, diagonal(0.0001, 0.0001));
   Vector6d correction = Vector6d::Zero();
   correction[0] = 0.015;
   covariance.cover(correction);
@@ -134,7 +132,7 @@ TEST(PoseCovariance, ContainsWhatASecondThoughtMoved) {
   covariance.cover(correction);
   expectEqual(covariance.value(), diagonal(0.0001, 0.0001) + added);
   // What is measured from the same key frame later has that error, too.
-  covariance.measure(still, diagonal(1.0, 1.0));
+  covariance.measure(kStill, diagonal(1.0, 1.0));
   expectEqual(covariance.value(), diagonal(1.0, 1.0) + added);
 }
 
@@ -180,21 +178,19 @@ TEST(PoseCovariance, APredictedPairAddsToTheNextOnesMotion) {
 
 TEST(PoseCovariance, APredictionEndsWithTheNextMeasuredPose) {
   PoseCovariance covariance;
-  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
-  covariance.measure(still, diagonal(0.5, 0.25));
-  for (int i = 0; i < 1000; ++i) covariance.advance(still, diagonal(8.0, 2.0));
-  covariance.measure(still, diagonal(0.5, 0.25));
+  covariance.measure(kStill, diagonal(0.5, 0.25));
+  for (int i = 0; i < 1000; ++i) covariance.advance(kStill, diagonal(8.0, 2.0));
+  covariance.measure(kStill, diagonal(0.5, 0.25));
   expectEqual(covariance.value(), diagonal(0.5, 0.25));
 }
 
 TEST(PoseCovariance, AKeyframeThatWasDoubtedLeavesNoDoubtToThePosesMeasuredInItsMap) {
   PoseCovariance covariance;
-  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
-  covariance.measure(still, diagonal(0.5, 0.25));
+  covariance.measure(kStill, diagonal(0.5, 0.25));
   covariance.doubt(diagonal(8.0, 2.0), diagonal(8.0, 2.0));
   covariance.markKeyframe();
   expectEqual(covariance.value(), diagonal(8.5, 2.25));
-  const Matrix6d motion = covariance.measure(still, diagonal(0.125, 0.125));
+  const Matrix6d motion = covariance.measure(kStill, diagonal(0.125, 0.125));
   expectEqual(motion, diagonal(8.125, 2.125));
   expectEqual(covariance.value(), diagonal(0.625, 0.375));
 }
@@ -212,22 +208,20 @@ TEST(PoseCovariance, AnAssumedPoseIsTheKeyFrameOfANewDrive) {
 
 TEST(PoseCovariance, ADoubtedPoseIsReportedSoUntilTheNextOneIsMeasured) {
   PoseCovariance covariance;
-  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
-  covariance.measure(still, diagonal(0.5, 0.25));
+  covariance.measure(kStill, diagonal(0.5, 0.25));
   covariance.doubt(diagonal(8.0, 2.0), diagonal(16.0, 4.0));
   expectEqual(covariance.value(), diagonal(16.5, 4.25));
-  expectEqual(covariance.measure(still, diagonal(0.5, 0.25)), diagonal(8.5, 2.25));
+  expectEqual(covariance.measure(kStill, diagonal(0.5, 0.25)), diagonal(8.5, 2.25));
   expectEqual(covariance.value(), diagonal(0.5, 0.25));
 }
 
 TEST(PoseCovariance, RotationDoesNotFallWhereTranslationGrows) {
   PoseCovariance covariance;
-  const Eigen::Isometry3d still = Eigen::Isometry3d::Identity();
-  covariance.measure(still, diagonal(0.5, 0.25));
-  covariance.measure(still, diagonal(0.5, 2.25));
-  covariance.measure(still, diagonal(9.0, 0.5));
+  covariance.measure(kStill, diagonal(0.5, 0.25));
+  covariance.measure(kStill, diagonal(0.5, 2.25));
+  covariance.measure(kStill, diagonal(9.0, 0.5));
   expectEqual(covariance.value(), diagonal(9.0, 2.25));
-  covariance.measure(still, diagonal(4.0, 3.0));
+  covariance.measure(kStill, diagonal(4.0, 3.0));
   expectEqual(covariance.value(), diagonal(9.0, 3.0));
 }
 

@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cstdio>
 #include <opencv2/imgproc.hpp>
 #include <string>
 

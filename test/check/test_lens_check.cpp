@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <random>
-#include <string>
 #include <vector>
 
 #include "../../src/check/lens_check.hpp"

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <random>
-#include <vector>
 
 #include "../../src/check/row_readout.hpp"
 #include "../synthetic_scene.hpp"

@@ -7,7 +7,10 @@
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/front_end/exposure_balance.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
+#include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
+#include "stereo_descriptor_vo/motion/motion_estimator.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
 namespace sdvo::test_options {
@@ -96,13 +99,27 @@ TEST(Options, EndsOfTheRangeAreInsideAndNeighboursAreNot) {
   }
 }
 
-TEST(Options, CompositionsNameTheFullPath) {
+/// Whoever is made of options checks them; a composition names the full path.
+template <class Component, class Options>
+void expectChecked(Options options, const std::string& words) {
+  expectError([&] { Component{options}; }, {words});
+}
+
+TEST(Options, ComponentsRefuseWhatIsOutOfRange) {
   FeatureExtractorOptions extractor;
   extractor.detector.max_features = 0;
-  expectError([&] { FeatureExtractor{extractor}; }, {"detector/max_features"});
+  expectChecked<FeatureExtractor>(extractor, "detector/max_features");
+  expectChecked<FeatureDetector>(extractor.detector, "max_features");
+  StereoMatcherOptions stereo;
+  stereo.min_disparity = 0.0;
+  expectChecked<StereoMatcher>(stereo, "min_disparity");
+  ExposureBalanceOptions exposure;
+  exposure.tolerance = -0.1;
+  expectChecked<ExposureBalance>(exposure, "tolerance");
   VisualOdometryOptions odometry;
   odometry.motion.min_inliers = 0;
-  expectError([&] { VisualOdometry{odometry}; }, {"motion/min_inliers"});
+  expectChecked<VisualOdometry>(odometry, "motion/min_inliers");
+  expectChecked<MotionEstimator>(odometry.motion, "min_inliers");
 }
 
 /// What fields demand of each other is checked with the whole set, wherever the component stands in it.

@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 #include <opencv2/features2d.hpp>
 
 #include "../said.hpp"
@@ -84,7 +83,7 @@ TEST_P(EveryDescriptor, SeesTheSameWhenTheSizeFollowsTheDistance) {
 
 TEST_P(EveryDescriptor, KeepsRowsAlignedWhereOthersLeaveTheImage) {
   const synthetic::Texture texture(7, 6.0, 60.0);
-  const cv::Mat image = synthetic::render({420, 300}, [&](double u, double v) { return texture.at(u, v); });
+  const cv::Mat image = synthetic::render({420, 300}, texture);
   const auto descriptor = makeBaseDescriptor(valueOf<DescriptorType>(GetParam()));
   // Large and small, in and out of the image, in an order that sorting by octave or by validity would disturb.
   std::vector<ViewKeypoint> keypoints;
@@ -152,7 +151,7 @@ TEST(BaseDescriptor, WhatOpenCvLacksIsOneClearError) {
 /// diameter has to be turned back into.
 TEST(SiftDescriptor, SamplesTheOctaveAndLayerOfTheSizeAndItsRowsAreWholeNumbers) {
   const synthetic::Texture texture(11, 6.0, 120.0);
-  const cv::Mat image = synthetic::render({640, 480}, [&](double u, double v) { return texture.at(u, v); });
+  const cv::Mat image = synthetic::render({640, 480}, texture);
   const cv::Ptr<cv::SIFT> sift = cv::SIFT::create();
   std::vector<cv::KeyPoint> detected, kept;
   sift->detect(image, detected);

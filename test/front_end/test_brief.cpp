@@ -42,7 +42,7 @@ TEST(Brief, TestsAreSpreadEvenlyAroundTheCentre) {
 
 TEST(Brief, InvertsWithTheImage) {
   const synthetic::Texture texture(4, 8.0, 60.0);
-  const cv::Mat image = synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); });
+  const cv::Mat image = synthetic::render(kSize, texture);
   cv::Mat inverse;
   cv::subtract(cv::Scalar(255), image, inverse);
   // Only exact ties keep their bit.
@@ -51,7 +51,7 @@ TEST(Brief, InvertsWithTheImage) {
 
 TEST(Brief, IgnoresBrightnessAndContrast) {
   const synthetic::Texture texture(4, 8.0, 60.0);
-  const cv::Mat image = synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); });
+  const cv::Mat image = synthetic::render(kSize, texture);
   const cv::Mat darker = synthetic::render(kSize, [&](double u, double v) { return 0.5 * texture.at(u, v) + 20.0; });
   EXPECT_LE(differing(describe(image, 150.0, 150.0, 7.0), describe(darker, 150.0, 150.0, 7.0)), 8);
 }
@@ -78,7 +78,7 @@ TEST(Brief, FollowsTheSize) {
 
 TEST(Brief, WritesEveryBitOfTheRow) {
   const synthetic::Texture texture(4, 8.0, 60.0);
-  const cv::Mat image = synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); });
+  const cv::Mat image = synthetic::render(kSize, texture);
   Row used;
   used.fill(0xff);
   Brief(image).describe(150.0, 150.0, 7.0, used.data());
@@ -91,7 +91,7 @@ TEST(Brief, PointsScatterAsPublished) {
   const synthetic::Texture texture(4, 8.0, 60.0), other(5, 8.0, 60.0);
   const int inside = 14;  // 9.6 px and half a box
   const auto within = [&](double x) { return std::abs(x - 150.0) <= inside; };
-  const cv::Mat image = synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); });
+  const cv::Mat image = synthetic::render(kSize, texture);
   const cv::Mat changed = synthetic::render(
       kSize, [&](double u, double v) { return within(u) && within(v) ? texture.at(u, v) : other.at(u, v); });
   const int bits = differing(describe(image, 150.0, 150.0, 7.0), describe(changed, 150.0, 150.0, 7.0));
@@ -101,7 +101,7 @@ TEST(Brief, PointsScatterAsPublished) {
 
 TEST(Brief, SeesItsReachAndNothingBeyond) {
   const synthetic::Texture texture(9, 8.0, 60.0);
-  const cv::Mat image = synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); });
+  const cv::Mat image = synthetic::render(kSize, texture);
   const double size = 14.0;
   // As published: a patch of 48 px and a smoothing box of 9 px belong to a size of 7 px.
   EXPECT_NEAR(Brief::reach(size), (24.0 + 4.5) * 2.0, 1e-12);

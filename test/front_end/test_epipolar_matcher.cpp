@@ -1,8 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <functional>
-#include <random>
-
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/front_end/epipolar_matcher.hpp"
@@ -25,8 +22,7 @@ std::optional<cv::Point2f> find(const Pair& pair, const cv::Point2f& position,
 /// A smooth surface of disparity `d` everywhere, the right view `dv` lower.
 Pair smoothPair(double d, double dv) {
   const synthetic::Texture texture(3, 6.0, 90.0);
-  return {synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); }),
-          synthetic::render(kSize, [&](double u, double v) { return texture.at(u + d, v - dv); })};
+  return {synthetic::render(kSize, texture), synthetic::render(kSize, texture, d, dv)};
 }
 
 cv::Mat noise(unsigned seed) {
@@ -62,9 +58,9 @@ TEST(EpipolarMatcher, MeasuresDisparityAndRowToAFewHundredths) {
 /// Waves so short that an alignment from the wrong row ends at another one.
 TEST(EpipolarMatcher, LooksAtTheRowsAboveAndBelow) {
   const synthetic::Texture texture(4, 6.0, 24.0);
-  const cv::Mat left = synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); });
+  const cv::Mat left = synthetic::render(kSize, texture);
   for (const double dv : {-2.0, -1.0, 1.0, 2.0}) {
-    const Pair pair{left, synthetic::render(kSize, [&](double u, double v) { return texture.at(u + 14.0, v - dv); })};
+    const Pair pair{left, synthetic::render(kSize, texture, 14.0, dv)};
     int right = 0, tried = 0;
     for (float u = 60.f; u < 280.f; u += 20.f, ++tried) {
       const auto found = find(pair, {u, 80.f});
@@ -80,9 +76,9 @@ TEST(EpipolarMatcher, FollowsASlantedSurface) {
   for (const double slant : {0.3, -0.3}) {
     const auto disparity = [=](double v) { return 30.0 + slant * (v - 80.0); };
     constexpr double kDv = 1.3;
-    const Pair pair{
-        synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); }),
-        synthetic::render(kSize, [&](double u, double v) { return texture.at(u + disparity(v - kDv), v - kDv); })};
+    const Pair pair{synthetic::render(kSize, texture), synthetic::render(kSize, [&](double u, double v) {
+                      return texture.at(u + disparity(v - kDv), v - kDv);
+                    })};
     const auto found = find(pair, {160.f, 82.4f});
     ASSERT_TRUE(found) << slant;
     EXPECT_NEAR(found->x, disparity(82.4), 0.1) << slant;
@@ -234,7 +230,7 @@ TEST(EpipolarMatcher, ASlantIsToldFromADisparity) {
 TEST(EpipolarMatcher, PatchesAreHeldAgainstEachOtherAtTheirSlant) {
   const synthetic::Texture texture(8, 6.0, 12.0);
   const auto disparity = [](double v) { return 30.0 + 0.3 * (v - 80.0); };
-  const Pair pair{synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); }),
+  const Pair pair{synthetic::render(kSize, texture),
                   synthetic::render(kSize, [&](double u, double v) { return texture.at(u + disparity(v), v); })};
   EpipolarMatcherOptions options;
   options.min_correlation = 0.95;
@@ -246,12 +242,12 @@ TEST(EpipolarMatcher, PatchesAreHeldAgainstEachOtherAtTheirSlant) {
 TEST(EpipolarMatcher, NeverLeavesTheRightImage) {
   // The true place of some is up to 2 px outside; whatever correlates is taken.
   const synthetic::Texture texture(6, 24.0, 90.0);
-  const cv::Mat left = synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); });
+  const cv::Mat left = synthetic::render(kSize, texture);
   EpipolarMatcherOptions options;
   options.min_correlation = 0.0;
   options.uniqueness = 1.0;
   for (const double disparity : {20.0, 21.0, 30.5}) {
-    const Pair pair{left, synthetic::render(kSize, [&](double u, double v) { return texture.at(u + disparity, v); })};
+    const Pair pair{left, synthetic::render(kSize, texture, disparity)};
     for (double outside = -2.0; outside < 2.0; outside += 0.25)
       for (float v = 20.f; v < 140.f; v += 8.f) {
         const float u = static_cast<float>(disparity - outside);

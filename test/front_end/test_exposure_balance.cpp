@@ -104,10 +104,4 @@ TEST(ExposureBalance, APartThatIsCoveredOnOneSideSpoilsNoOtherOne) {
   EXPECT_GT(features(exposed(1.6), true), 0.6 * features(exposed(1.6), false)) << "beside another exposure";
 }
 
-TEST(ExposureBalance, RefusesOptionsOutOfRange) {
-  ExposureBalanceOptions options;
-  options.tolerance = -0.1;
-  EXPECT_THROW(ExposureBalance{options}, std::invalid_argument);
-}
-
 }  // namespace sdvo::test_exposure_balance

@@ -334,12 +334,6 @@ TEST(FeatureDetector, RefinedPositionsStayNear) {
   }
 }
 
-TEST(FeatureDetector, RefusesOptionsOutOfRange) {
-  FeatureDetectorOptions options;
-  options.max_features = 0;
-  EXPECT_THROW(FeatureDetector{options}, std::invalid_argument);
-}
-
 /// The scene at a share of its contrast, with noise of `sigma` grey levels.
 cv::Mat inLight(double light, double sigma) {
   const synthetic::Texture texture(3, 6.0, 24.0);

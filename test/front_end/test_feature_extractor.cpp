@@ -91,9 +91,9 @@ TEST(FeatureExtractor, DescribesTheRightViewWhereTheFeatureIs) {
   constexpr double kDisparity = 14.0;
   const synthetic::Texture texture(33, 6.0, 96.0);
   const cv::Size size(camera.width, camera.height);
-  const cv::Mat left = synthetic::render(size, [&](double u, double v) { return texture.at(u, v); });
+  const cv::Mat left = synthetic::render(size, texture);
   for (const double dv : {-1.2, 1.2}) {
-    cv::Mat right = synthetic::render(size, [&](double u, double v) { return texture.at(u + kDisparity, v - dv); });
+    cv::Mat right = synthetic::render(size, texture, kDisparity, dv);
     right.rowRange(0, 160).setTo(90);  // the first corners have no match
     const StereoFeatures features = FeatureExtractor(fewFeatures()).extract(camera, left, right, 0);
     ASSERT_GE(features.count(), 100);
@@ -121,7 +121,7 @@ TEST(FeatureExtractor, FollowsTheRowsOfARightCameraThatTurned) {
   const StereoCamera camera = synthetic::camera();
   const synthetic::Texture texture(33, 6.0, 96.0);
   const cv::Size size(camera.width, camera.height);
-  const cv::Mat left = synthetic::render(size, [&](double u, double v) { return texture.at(u, v); });
+  const cv::Mat left = synthetic::render(size, texture);
   struct Rows {
     double offset, slope;  // px, px for each column
     bool is_refused;

@@ -131,7 +131,7 @@ TEST(Freak, SetsNoBitOnAnEvenImage) {
 
 TEST(Freak, ChangesContinuouslyWithTheSize) {
   const synthetic::Texture texture(5, 5.0, 80.0);
-  const Freak freak(synthetic::render({300, 300}, [&](double u, double v) { return texture.at(u, v); }));
+  const Freak freak(synthetic::render({300, 300}, texture));
   double tiny = 0.0, large = 0.0;
   int steps = 0;
   for (float u = 90.f; u < 210.f; u += 12.3f)
@@ -186,7 +186,7 @@ TEST(Freak, DescribesASurfaceAlikeAtTwiceTheDistanceOnlyWhenTheSizeFollows) {
 
 TEST(Freak, TellsDifferentPlacesApart) {
   const synthetic::Texture texture(22, 5.0, 80.0);
-  const Freak freak(synthetic::render({400, 300}, [&](double u, double v) { return texture.at(u, v); }));
+  const Freak freak(synthetic::render({400, 300}, texture));
   double sum = 0.0;
   int count = 0;
   for (float v = 60.f; v < 240.f; v += 40.f, ++count)

@@ -13,7 +13,7 @@ const cv::Size kSize(320, 200);
 
 cv::Mat view(unsigned seed) {
   const synthetic::Texture texture(seed, 5.0, 80.0);
-  return synthetic::render(kSize, [&](double u, double v) { return texture.at(u, v); });
+  return synthetic::render(kSize, texture);
 }
 
 DescriptorOptions withLayout(DescriptorLayout layout, bool oriented = false) {

@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <functional>
 #include <random>
 
 #include "../../src/common/statistics.hpp"
@@ -82,15 +80,21 @@ class Outage : public ::testing::Test {
     return kSeen + pairs;
   }
 
+  /// The pose's error, and its square in units of its covariance.
+  Vector6d error(const Eigen::Isometry3d& truth) const { return logSE3(truth.inverse() * result_.T_origin_camera); }
+  double normalisedError(const Eigen::Isometry3d& truth) const {
+    return mahalanobisSquare(error(truth), result_.pose_covariance);
+  }
+  double positionVariance() const { return result_.pose_covariance.topLeftCorner<3, 3>().trace(); }
+
   void expectFoundAt(const Eigen::Isometry3d& T_origin_camera) const {
     EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
     EXPECT_EQ(result_.epoch, 0);
     EXPECT_TRUE(contains(result_.reason, "re-acquired by " + std::to_string(result_.inliers) + " points"))
         << result_.reason;
-    const Vector6d error = logSE3(T_origin_camera.inverse() * result_.T_origin_camera);
-    EXPECT_LT(error.head<3>().norm(), 0.01);
-    EXPECT_LT(mahalanobisSquare(error, result_.pose_covariance), 25.0);
-    EXPECT_LT((result_.pose_covariance.topLeftCorner<3, 3>().trace()), 0.1) << "that of a restart is larger by far";
+    EXPECT_LT(error(T_origin_camera).head<3>().norm(), 0.01);
+    EXPECT_LT(normalisedError(T_origin_camera), 25.0);
+    EXPECT_LT(positionVariance(), 0.1) << "that of a restart is larger by far";
   }
 
   void expectStartedAgain() const {
@@ -218,8 +222,7 @@ TEST_F(Corridor, EqualSegmentsAreAMixture) {
   for (int k = 0; k < 5; ++k) {
     result_ = odometry_.update(pairOf(world, i + k, alongAt(i + k)));
     if (!result_.has_pose) continue;
-    const Vector6d error = logSE3(alongAt(i + k).inverse() * result_.T_origin_camera);
-    EXPECT_LT(mahalanobisSquare(error, result_.pose_covariance), 25.0) << k << ": " << result_.reason;
+    EXPECT_LT(normalisedError(alongAt(i + k)), 25.0) << k << ": " << result_.reason;
     EXPECT_TRUE(k > 0 || result_.reason.find("other places of the map look alike") != std::string::npos)
         << result_.reason;
   }
@@ -313,16 +316,15 @@ TEST_F(Outage, ThePoseGoesOnByTheGuessWhileItIsDark) {
         odometry_.update(synthetic::noFeatures(synthetic::camera(), i * kPeriod), wheels(poseAt(i - 1), poseAt(i)));
     EXPECT_EQ(result_.state, TrackingState::kDegraded) << i;
     EXPECT_EQ(result_.epoch, 0);
-    const Vector6d error = logSE3(poseAt(i).inverse() * result_.T_origin_camera);
-    EXPECT_LT(mahalanobisSquare(error, result_.pose_covariance), 12.6) << i;
+    EXPECT_LT(normalisedError(poseAt(i)), 12.6) << i;
   }
-  EXPECT_GT((result_.pose_covariance.topLeftCorner<3, 3>().trace()), 0.001) << "5 % of 0.75 m";
+  EXPECT_GT(positionVariance(), 0.001) << "5 % of 0.75 m";
   // The map corrects it.
   result_ =
       odometry_.update(pairOf(room_, kSeen + 20, poseAt(kSeen + 20)), wheels(poseAt(kSeen + 19), poseAt(kSeen + 20)));
   EXPECT_EQ(result_.epoch, 0);
   EXPECT_LT((result_.T_origin_camera.translation() - poseAt(kSeen + 20).translation()).norm(), 0.01);
-  EXPECT_LT((result_.pose_covariance.topLeftCorner<3, 3>().trace()), 0.001);
+  EXPECT_LT(positionVariance(), 0.001);
 }
 
 /// What a gyro tells: the rotation, too large by a twentieth.
@@ -347,8 +349,7 @@ TEST_F(Outage, AGyroCarriesThePoseForAsLongAsTheTranslationIsPredicted) {
     EXPECT_EQ(result_.state, is_short ? TrackingState::kDegraded : TrackingState::kLost) << i << ": " << result_.reason;
     EXPECT_EQ(result_.epoch, 0);
     if (!is_short) continue;
-    const Vector6d error = logSE3(turningAt(i).inverse() * result_.T_origin_camera);
-    EXPECT_LT(mahalanobisSquare(error, result_.pose_covariance), 12.6) << i;
+    EXPECT_LT(normalisedError(turningAt(i)), 12.6) << i;
   }
   // The room is another one; the turn is known.
   const int next = kSeen + 40;

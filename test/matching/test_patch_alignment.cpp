@@ -37,6 +37,12 @@ Patch patchOf(const std::vector<std::uint8_t>& samples, double spacing = 1.0) {
   return {samples.data(), kSide, static_cast<float>(spacing)};
 }
 
+std::optional<PatchShift> align(const std::vector<std::uint8_t>& reference, const std::vector<std::uint8_t>& current,
+                                const PatchAlignmentOptions& options = {}) {
+  return alignPatch(options, patchOf(reference), Eigen::Vector2f::Zero(), patchOf(current),
+                    Eigen::Matrix2f::Identity());
+}
+
 /// Texture with structure of 5 px and more.
 Scene texture(unsigned seed) {
   std::mt19937 random(seed);
@@ -191,8 +197,7 @@ TEST(PatchAlignment, BlindToBrightnessAndContrast) {
   const Scene darker = [&](double x, double y) { return 0.6 * scene(x - 0.5, y + 0.25) - 20.0; };
   const auto reference = cut(scene, Eigen::Vector2d::Zero(), 1.0, random, 0.0);
   const auto current = cut(darker, Eigen::Vector2d::Zero(), 1.0, random, 0.0);
-  const auto found = alignPatch(PatchAlignmentOptions(), patchOf(reference), Eigen::Vector2f::Zero(), patchOf(current),
-                                Eigen::Matrix2f::Identity());
+  const auto found = align(reference, current);
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->shift.x(), 0.5, 0.08);
   EXPECT_NEAR(found->shift.y(), -0.25, 0.08);
@@ -201,20 +206,18 @@ TEST(PatchAlignment, BlindToBrightnessAndContrast) {
 
 TEST(PatchAlignment, RefusesWhatIsNotTheSame) {
   std::mt19937 random(5);
-  const auto align = [&](const Scene& a, const Scene& b) {
+  const auto agree = [&](const Scene& a, const Scene& b) {
     const auto reference = cut(a, Eigen::Vector2d::Zero(), 1.0, random);
-    const auto current = cut(b, Eigen::Vector2d::Zero(), 1.0, random);
-    return alignPatch(PatchAlignmentOptions(), patchOf(reference), Eigen::Vector2f::Zero(), patchOf(current),
-                      Eigen::Matrix2f::Identity());
+    return align(reference, cut(b, Eigen::Vector2d::Zero(), 1.0, random)).has_value();
   };
   int unrelated = 0, occluded = 0;
   for (unsigned seed = 0; seed < 100; ++seed) {
-    if (align(texture(seed), texture(seed + 1000))) ++unrelated;
+    unrelated += agree(texture(seed), texture(seed + 1000));
     // The left half is something near that moved on by 5 px over the background.
     const Scene background = texture(seed), near = texture(seed + 1000);
     const Scene before = [&](double x, double y) { return x < 0.0 ? near(x, y) : background(x, y); };
     const Scene after = [&](double x, double y) { return x < 5.0 ? near(x - 5.0, y) : background(x, y); };
-    if (align(before, after)) ++occluded;
+    occluded += agree(before, after);
   }
   EXPECT_LE(unrelated, 5);
   EXPECT_LE(occluded, 10);
@@ -223,8 +226,7 @@ TEST(PatchAlignment, RefusesWhatIsNotTheSame) {
   std::mt19937 quiet(1);
   for (const Scene& scene : {flat, edge}) {
     const auto patch = cut(scene, Eigen::Vector2d::Zero(), 1.0, quiet, 0.0);
-    EXPECT_FALSE(alignPatch(PatchAlignmentOptions(), patchOf(patch), Eigen::Vector2f::Zero(), patchOf(patch),
-                            Eigen::Matrix2f::Identity()));
+    EXPECT_FALSE(align(patch, patch));
   }
 }
 
@@ -233,18 +235,14 @@ TEST(PatchAlignment, RefusesALowerCorrelationThanAskedFor) {
   const auto reference = cut(texture(3), Eigen::Vector2d::Zero(), 1.0, random);
   const auto current = cut(texture(3), Eigen::Vector2d::Zero(), 1.0, random, 20.0);
   PatchAlignmentOptions options;
-  const auto align = [&] {
-    return alignPatch(options, patchOf(reference), Eigen::Vector2f::Zero(), patchOf(current),
-                      Eigen::Matrix2f::Identity());
-  };
   options.min_correlation = 0.1;
-  const auto found = align();
+  const auto found = align(reference, current, options);
   ASSERT_TRUE(found);
   ASSERT_LT(found->correlation, 0.98f);
   options.min_correlation = found->correlation - 0.01;
-  EXPECT_TRUE(align());
+  EXPECT_TRUE(align(reference, current, options));
   options.min_correlation = found->correlation + 0.01;
-  EXPECT_FALSE(align());
+  EXPECT_FALSE(align(reference, current, options));
 }
 
 TEST(PatchAlignment, RefusesAFartherShiftThanAskedFor) {
@@ -252,14 +250,10 @@ TEST(PatchAlignment, RefusesAFartherShiftThanAskedFor) {
   const auto reference = cut(texture(3), Eigen::Vector2d::Zero(), 1.0, random);
   const auto current = cut(moved(texture(3), scaled(1.0), {0.0, -0.8}), Eigen::Vector2d::Zero(), 1.0, random);
   PatchAlignmentOptions options;
-  const auto align = [&] {
-    return alignPatch(options, patchOf(reference), Eigen::Vector2f::Zero(), patchOf(current),
-                      Eigen::Matrix2f::Identity());
-  };
   options.noise.corner = 0.3;  // 3.9 of which bound the shift
-  EXPECT_TRUE(align());
+  EXPECT_TRUE(align(reference, current, options));
   options.noise.corner = 0.15;
-  EXPECT_FALSE(align());
+  EXPECT_FALSE(align(reference, current, options));
 }
 
 // Along an edge nothing but rounding tells the position.
@@ -268,8 +262,7 @@ TEST(PatchAlignment, RefusesSlantedEdges) {
   for (const double slant : {-1.03, 1.03}) {
     const Scene edge = [slant](double x, double y) { return 125.0 + 75.0 * std::tanh(0.7 * (x + slant * y)); };
     const auto patch = cut(edge, Eigen::Vector2d::Zero(), 1.0, random, 0.0);
-    EXPECT_FALSE(alignPatch(PatchAlignmentOptions(), patchOf(patch), Eigen::Vector2f::Zero(), patchOf(patch),
-                            Eigen::Matrix2f::Identity()));
+    EXPECT_FALSE(align(patch, patch));
   }
 }
 

@@ -339,10 +339,4 @@ TEST(MotionEstimator, SurvivesMeasurementsThatAreNotFinite) {
   }
 }
 
-TEST(MotionEstimator, RefusesOptionsOutOfRange) {
-  MotionEstimatorOptions options;
-  options.min_inliers = 3;
-  EXPECT_THROW(MotionEstimator{options}, std::invalid_argument);
-}
-
 }  // namespace sdvo::test_motion_estimator

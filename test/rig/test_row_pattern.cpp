@@ -3,7 +3,6 @@
 #include <array>
 #include <cmath>
 #include <random>
-#include <vector>
 
 #include "stereo_descriptor_vo/rig/row_pattern.hpp"
 #include "turned_grid.hpp"

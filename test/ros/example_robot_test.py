@@ -72,6 +72,7 @@ class ExampleRobot(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.directory = tempfile.mkdtemp(prefix='sdvo_example_robot_')
+        cls.addClassCleanup(shutil.rmtree, cls.directory, ignore_errors=True)
         drive, bag = os.path.join(cls.directory, 'drive'), os.path.join(cls.directory, 'drive.bag')
         run_tool('render_drive', '--trajectory', 'turn_in_place', '--rig', 'd435_small', '--frames', str(PAIRS), '--output',
                  drive)
@@ -95,10 +96,6 @@ class ExampleRobot(unittest.TestCase):
             process.wait()
         listener.unregister()
         cls.stamps = [message.header.stamp for message in cls.odometry]
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.directory, ignore_errors=True)
 
     def transform(self, parent, child, stamp=rospy.Time(0)):
         return matrix_of(self.transforms.lookup_transform(parent, child, stamp).transform)

@@ -4,11 +4,9 @@
 import copy
 import itertools
 import os
-import shutil
 import socket
 import subprocess
 import sys
-import tempfile
 import threading
 import time
 from unittest import mock

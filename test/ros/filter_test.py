@@ -17,7 +17,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 
-from kitti_replay import EPOCH, PACKAGE, Collector, links, matrix_of, wait_until
+from kitti_replay import EPOCH, PACKAGE, links, matrix_of
 from made_up_sequence import STEP, MadeUpSequence
 from pipeline_case import PipelineCase, camera_transform
 from stereo_descriptor_vo.srv import SetPose
@@ -159,23 +159,19 @@ class FilterTest(PipelineCase):
 
     def begin(self, **arguments):
         self.start(publish_tf='false', odometry_queue_size=100, **arguments)
-        self.poses = self.keep(Collector(self.namespace + '/pose', PoseWithCovarianceStamped))
-        self.resets = self.keep(Collector(self.namespace + '/set_pose', PoseWithCovarianceStamped))
+        self.poses = self.collect('pose', PoseWithCovarianceStamped)
+        self.resets = self.collect('set_pose', PoseWithCovarianceStamped)
         node = subprocess.Popen(['rosrun', PACKAGE, 'filter_reset.py', '__ns:=' + self.namespace])
         self.addCleanup(node.wait)
         self.addCleanup(node.terminate)
-        self.assertTrue(wait_until(lambda: ('out', self.resets.subscriber.resolved_name, rospy.get_name()) in
-                                   links(self.namespace + '/filter_reset') and
-                                   links(self.namespace + '/filter_reset') >= {('in', self.namespace + '/pose'),
-                                                                               ('in', self.namespace + '/vo_info')}))
+        self.until(lambda: links(self.namespace + '/filter_reset') >= {
+            ('out', self.resets.subscriber.resolved_name, rospy.get_name()), ('in', self.namespace + '/pose'),
+            ('in', self.namespace + '/vo_info')})
 
     def lose(self, i):
         """A covered lens from pair i on, until the odometry is lost; the pair that comes next."""
         for k in range(i, PAIRS):
-            images, infos = self.camera.messages(k, frame=FRAME)
-            for image in images:
-                image.data = bytes(len(image.data))
-            if self.feed_messages(images, infos).state == 'LOST':
+            if self.feed_messages(*self.camera.dark(k, frame=FRAME)).state == 'LOST':
                 return k + 1
         self.fail('darkness did not lose it')
 
@@ -183,7 +179,7 @@ class FilterTest(PipelineCase):
         """Returns the odometry and the poses of the pairs that have some."""
         before = len(self.odometry)
         states = [self.feed(i, frame=FRAME).state for i in range(begin, end)]
-        self.assertTrue(wait_until(lambda: len(self.poses) == len(self.odometry)))
+        self.until(lambda: len(self.poses) == len(self.odometry))
         self.assertGreaterEqual(states.count('TRACKING'), len(states) - 2, states)
         return list(self.odometry)[before:], list(self.poses)[before:]
 
@@ -216,10 +212,10 @@ class FilterTest(PipelineCase):
         pose.pose.pose.position.x, pose.pose.pose.orientation.w = 50.0, 1.0
         pose.pose.covariance = np.diag([1e-4] * 6).ravel().tolist()
         resets = len(self.resets)
-        answer = rospy.ServiceProxy(self.namespace + '/visual_odometry/set_pose', SetPose)(pose)
+        answer = self.call('visual_odometry/set_pose', SetPose, pose)
         self.assertTrue(answer.success, answer.message)
         odometry, _ = self.drive(again, again + 8)
-        self.assertTrue(wait_until(lambda: len(self.resets) > resets), 'no reset of the filter')
+        self.until(lambda: len(self.resets) > resets)
         for message in odometry:
             left_alone.take('odom0', message)
             for reset in list(self.resets):
@@ -293,7 +289,7 @@ class FilterTest(PipelineCase):
         self.begin(publish_null_when_lost='true')
         self.drive(0, 6)
         self.lose(6)
-        self.assertTrue(wait_until(lambda: self.odometry[-1].pose.covariance[0] == 9999.0))
+        self.until(lambda: self.odometry[-1].pose.covariance[0] == 9999.0)
         ekf = Filter(self.recipes[0])
         for message in list(self.odometry):
             ekf.take('odom0', message)

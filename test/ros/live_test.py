@@ -13,10 +13,8 @@ import sys
 import tempfile
 import threading
 import time
-import unittest
 
 import cv2
-import dynamic_reconfigure.client
 import numpy as np
 import roslib.packages
 import rospy
@@ -30,7 +28,7 @@ from sensor_msgs.msg import Image, Imu, PointCloud2
 from std_srvs.srv import Empty, Trigger
 from tf2_msgs.msg import TFMessage
 
-from kitti_replay import (EPOCH, FRAME, PACKAGE, Camera, Collector, Pipeline, StereoSequence, Rosout, links,
+from kitti_replay import (EPOCH, FRAME, PACKAGE, Camera, Collector, Pipeline, StereoSequence, links,
                           matrix_of, wait_until)
 from pipeline_case import PipelineCase, camera_transform
 from stereo_descriptor_vo.msg import FeatureFlow, PlaceInfo, StereoFeatures, VoInfo
@@ -99,11 +97,11 @@ class Live(PipelineCase):
         self.assertNotEqual(subprocess.run(command + ['_queue_size:=many']).returncode, 0)
 
     def test_malformed_features(self):
+        """What is malformed is for the view's own test."""
         self.start(odometry_queue_size=100)
-        publisher = rospy.Publisher(self.namespace + '/stereo_features', StereoFeatures, queue_size=100)
+        publisher = self.publisher('stereo_features', StereoFeatures)
         for i in range(3):
             self.assertEqual(self.feed(i).state, 'TRACKING')
-        self.until(lambda: self.is_sent_to_pipeline(publisher))
         good = self.features[2]
 
         def damaged(**fields):
@@ -113,19 +111,10 @@ class Live(PipelineCase):
             for name, value in fields.items():
                 setattr(message, name, value)
             return message
-
-        def expect_refusal(message, *words):
-            answers = len(self.info)
+        for message, words in ((damaged(v=good.v[:-1]), 'v has'), (damaged(layout='sideways'), 'sideways')):
             publisher.publish(message)
-            self.until(lambda: self.rosout.said('refused', *words))
-            self.assertEqual(len(self.info), answers)
-
-        expect_refusal(damaged(v=good.v[:-1]), 'v has')
-        expect_refusal(damaged(descriptors=good.descriptors[:-1]), 'descriptors')
-        expect_refusal(damaged(bytes_per_row=0), 'bytes_per_row')
-        expect_refusal(damaged(disparity=[float('nan')] * len(good.u)), 'disparity')
-        expect_refusal(damaged(baseline=0.0), 'baseline')
-        expect_refusal(damaged(layout='sideways'), 'sideways')
+            self.until(lambda: self.rosout.said('refused', words))
+            self.assertEqual(len(self.info), 3)
 
         # A flood of the same is one error in five seconds. How many of it are seen depends on the queues.
         errors, start = len(self.rosout.errors), time.time()
@@ -134,23 +123,19 @@ class Live(PipelineCase):
         self.until(lambda: self.rosout.said('flood'))
         # Nothing orders the flood and the next pairs, of which it may push one out of the queue.
         for i in range(3, PAIRS):
-            if self.is_answered(i) and self.info[-1].malformed > 8:
+            if self.is_answered(i) and self.info[-1].malformed > 4:
                 break
         info = self.info[-1]
-        self.assertTrue(8 < info.malformed <= 26 - info.dropped_features, info.malformed)
+        self.assertTrue(4 < info.malformed <= 22 - info.dropped_features, info.malformed)
         self.assertLessEqual(len(self.rosout.errors) - errors, 1 + (time.time() - start) // 5.0)
         self.assertEqual((info.state, info.epoch), ('TRACKING', self.info[0].epoch))
-        publisher.unregister()
         self.assert_alive()
 
     def test_bad_calibration_and_images(self):
+        """Each of what the conversions' own tests refuse: one of camera_info, one of both, one of an image."""
         self.start()
         first = self.feed(0)
         self.assertEqual(first.state, 'TRACKING')
-
-        def zero_p(images, infos):
-            for info in infos:
-                info.P = [0.0] * 12
 
         def swapped(images, infos):
             infos[0].P, infos[1].P = infos[1].P, infos[0].P
@@ -159,24 +144,15 @@ class Live(PipelineCase):
             for info in infos:
                 info.width, info.height = 640, 480
 
-        def other_encoding(images, infos):
-            for image in images:
-                image.encoding = 'bayer_rggb8'
-
         def truncated(images, infos):
             images[0].data = images[0].data[:-1000]
-
-        cases = ((zero_p, ('calibrated', )), (swapped, ('baseline', 'swapped', 'Tx')),
-                 (other_size, ('640x480', )), (other_encoding, ('left image', "'bayer_rggb8'")), (truncated, ('malformed', )))
-        for time_of, (damage, words) in enumerate(cases):
+        cases = ((swapped, ('baseline', 'swapped', 'Tx')), (other_size, ('640x480', )), (truncated, ('malformed', )))
+        for k, (damage, words) in enumerate(cases):
             with self.subTest(damage.__name__):
-                def publish():
-                    images, infos = self.camera.messages(1, time_of=1 + 0.1 * time_of)
-                    damage(images, infos)
-                    self.camera.publish(images, infos)
-                self.rosout.errors.clear()
-                self.expect_error(publish, *words)
-        self.assert_alive()
+                images, infos = self.camera.messages(1, time_of=1 + 0.1 * k)
+                damage(images, infos)
+                self.camera.publish(images, infos)
+                self.until(lambda: self.rosout.said(*words))
         info = self.feed(2)
         self.assertEqual((info.state, info.epoch), ('TRACKING', first.epoch))
         self.assert_only([first, info])
@@ -482,45 +458,12 @@ class Live(PipelineCase):
         self.assertEqual(os.path.getsize(others), 8)
         self.assert_alive()
 
-    def test_reconfiguring_takes_effect_and_is_clamped(self):
+    def test_reconfiguring_takes_effect_and_is_clamped_or_refused(self):
         self.start()
         before = self.feed(0)
-        client = self.reconfigure('stereo_features')
-        answer = client.update_configuration({'detector/max_features': 200, 'stereo/min_disparity': 1000.0})
-        self.assertEqual(answer['detector/max_features'], 200)
-        self.assertEqual(answer['stereo/min_disparity'], 50.0)  # the end of its range
-        client.update_configuration({'stereo/min_disparity': 0.5})
-        after = self.feed(1)
         self.assertGreater(before.detected, 400)
-        self.assertEqual(after.detected, 200)
-        # Fewer features are described as before: nothing begins anew.
-        self.assertEqual((after.state, after.epoch), ('TRACKING', before.epoch))
-        # Nor with the same value.
-        client.update_configuration({'size_curve/max_size': 32.0})
-        after = self.feed(2)
-        self.assertEqual((after.state, after.epoch), ('TRACKING', before.epoch))
-        # Rows of another size do not continue the old ones, but the map is found again by them.
-        client.update_configuration({'size_curve/max_size': 25.0})
-        after = self.feed(3)
-        self.assertEqual((after.state, after.epoch), ('TRACKING', before.epoch))
-        self.assertIn('re-acquired', after.reason)
-        self.assertEqual(self.feed(4).state, 'TRACKING')
-        self.assert_alive()
-
-    def test_reconfiguring_the_odometry_takes_effect_with_the_next_pair(self):
-        self.start()
-        for i in range(3):
-            self.assertEqual(self.feed(i).state, 'TRACKING')
-        client = self.reconfigure('visual_odometry')
-        client.update_configuration({'tracking/max_speed': 1.0})
-        info = self.feed(3)  # 10 m/s
-        self.assertNotEqual(info.state, 'TRACKING')
-        self.assertIn('exceeds tracking/max_speed', info.reason)
-
-    def test_reconfiguring_refuses_what_does_not_go_together(self):
-        self.start()
-        self.feed(0)
         client = self.reconfigure('stereo_features')
+        # What does not go together.
         wrong = ({'size_curve/min_size': 100.0}, {'descriptor/type': 'surf'}, {'detector/type': 'no such detector'})
         for i, request in enumerate(wrong):
             answer = client.update_configuration(dict(request, **{'detector/max_features': 300}))
@@ -530,9 +473,30 @@ class Live(PipelineCase):
             self.until(lambda: sum('nothing reconfigured' in w for w in self.rosout.warnings) == i + 1)
             self.assertGreater(self.feed(i + 1).detected, 400)
         # What comes next and is right takes effect.
-        client.update_configuration({'detector/max_features': 200})
-        self.assertEqual(self.feed(4).detected, 200)
+        answer = client.update_configuration({'detector/max_features': 200, 'stereo/min_disparity': 1000.0})
+        self.assertEqual(answer['detector/max_features'], 200)
+        self.assertEqual(answer['stereo/min_disparity'], 50.0)  # the end of its range
+        client.update_configuration({'stereo/min_disparity': 0.5})
+        after = self.feed(4)
+        self.assertEqual(after.detected, 200)
+        # Fewer features are described as before: nothing begins anew. Nor with the same value.
+        self.assertEqual((after.state, after.epoch), ('TRACKING', before.epoch))
+        client.update_configuration({'size_curve/max_size': 32.0})
+        after = self.feed(5)
+        self.assertEqual((after.state, after.epoch), ('TRACKING', before.epoch))
+        # Rows of another size do not continue the old ones, but the map is found again by them.
+        client.update_configuration({'size_curve/max_size': 25.0})
+        after = self.feed(6)
+        self.assertEqual((after.state, after.epoch), ('TRACKING', before.epoch))
+        self.assertIn('re-acquired', after.reason)
+        self.assertEqual(self.feed(7).state, 'TRACKING')
         self.assertEqual(self.rosout.errors, [])
+        # The odometry's, with the next pair.
+        self.reconfigure('visual_odometry').update_configuration({'tracking/max_speed': 1.0})
+        info = self.feed(8)  # 10 m/s
+        self.assertNotEqual(info.state, 'TRACKING')
+        self.assertIn('exceeds tracking/max_speed', info.reason)
+        self.assert_alive()
 
     def test_rounding_of_the_calibration_is_no_new_one(self):
         self.start()

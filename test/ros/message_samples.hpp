@@ -3,7 +3,6 @@
 #include <cstring>
 #include <limits>
 #include <opencv2/core.hpp>
-#include <string>
 
 #include "../../src/messages/camera_conversions.hpp"
 #include "../../src/messages/feature_conversions.hpp"

@@ -105,9 +105,8 @@ class PipelineCase(unittest.TestCase):
         self.camera = self.keep(Camera(self.namespace, self.sequence, self.clock))
         self.pipeline = self.keep(Pipeline(self.namespace, **arguments))
         nodelets = ['stereo_features', 'visual_odometry'] + ['place_recognition'] * (arguments.get('loop_closing') == 'true')
-        self.assertTrue(wait_until(lambda: self.camera.is_subscribed() and self.pipeline.has_loaded(*nodelets) and
-                                   self.pipeline.is_connected((self.odometry, self.info, self.features)), 60),
-                        'the pipeline did not start')
+        self.until(lambda: self.camera.is_subscribed() and self.pipeline.has_loaded(*nodelets) and
+                   self.pipeline.is_connected((self.odometry, self.info, self.features)), 60)
         self.pid = self.pipeline.pid()
         self.assertIsNotNone(self.pid)
 
@@ -126,19 +125,13 @@ class PipelineCase(unittest.TestCase):
         stamp = images[0].header.stamp
         answers, features, poses = len(self.info), len(self.features), len(self.odometry)
         self.camera.publish(images, infos)
-        self.assertTrue(wait_until(lambda: len(self.info) > answers), 'the pair at %.1f s got no answer' % stamp.to_sec())
+        self.until(lambda: len(self.info) > answers)
         info = self.info[answers]
         self.assertEqual(info.header.stamp, stamp)
-        self.assertTrue(wait_until(lambda: any(m.header.stamp == stamp for m in self.features[features:])))
+        self.until(lambda: any(m.header.stamp == stamp for m in self.features[features:]))
         if info.state in ('TRACKING', 'DEGRADED'):
-            self.assertTrue(wait_until(lambda: len(self.odometry) > poses))
+            self.until(lambda: len(self.odometry) > poses)
         return info
-
-    def expect_error(self, publish, *words):
-        """What `publish` sends must be answered by an error that holds these words."""
-        publish()
-        self.assertTrue(wait_until(lambda: self.rosout.said(*words)), 'no error on /rosout with %s, only %s' %
-                        (words, self.rosout.errors))
 
     def assert_only(self, infos):
         """All that came were answers to these pairs, the last of which has just been fed: topics keep their order."""

@@ -14,7 +14,6 @@ import unittest
 
 import numpy as np
 import rosbag
-import rosgraph
 import rospy
 import rostest
 import tf2_ros
@@ -170,15 +169,12 @@ class Places(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.directory = tempfile.mkdtemp(prefix='sdvo_places_')
+        cls.addClassCleanup(shutil.rmtree, cls.directory, ignore_errors=True)
         cls.clock, cls.ring = SimulatedClock(), Ring()
         cls.broadcaster = tf2_ros.StaticTransformBroadcaster()
         cls.broadcaster.sendTransform(camera_transform(FRAME))
         cls.tf = Collector('/tf', TFMessage)
         cls.diagnostics = Collector('/diagnostics', DiagnosticArray)
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.directory, ignore_errors=True)
 
     def start(self, namespace, **arguments):
         recognition = Recognition(namespace, **arguments)

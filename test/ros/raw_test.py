@@ -41,6 +41,7 @@ class Raw(unittest.TestCase):
     def setUpClass(cls):
         recording = os.path.join(data_dir('EUROC_DIR', 'MH_01_moving'), 'MH_01_moving', 'mav0')
         cls.directory = tempfile.mkdtemp(prefix='sdvo_raw_')
+        cls.addClassCleanup(shutil.rmtree, cls.directory, ignore_errors=True)
         bag = os.path.join(cls.directory, 'raw.bag')
         run_tool('euroc_to_bag', '--input', recording, '--output', bag)
         with rosbag.Bag(bag) as recorded:
@@ -64,10 +65,6 @@ class Raw(unittest.TestCase):
             player.kill()
             player.wait()
         wait_until(lambda: len(cls.odometry) >= len(cls.stamps) and len(cls.info) >= len(cls.stamps))
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.directory, ignore_errors=True)
 
     def test_every_pair_is_tracked(self):
         self.assertEqual([message.header.stamp for message in self.odometry], self.stamps)

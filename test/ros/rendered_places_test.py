@@ -27,6 +27,7 @@ class RenderedPlaces(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.directory = tempfile.mkdtemp(prefix='sdvo_rendered_places_')
+        cls.addClassCleanup(shutil.rmtree, cls.directory, ignore_errors=True)
         drive = os.path.join(cls.directory, 'drive')
         run_tool('render_drive', '--trajectory', 'figure_eight', '--rate', str(RATE), '--frames', str(PAIRS), '--calib', CALIBRATION,
                  '--size', SIZE, '--output', drive)
@@ -47,10 +48,6 @@ class RenderedPlaces(unittest.TestCase):
                         '/ground_truth/odom', '/tf_static', '--bags', bag], check=True)
         wait_until(lambda: len(cls.odometry) >= PAIRS)
         cls.settled = wait_until(lambda: cls.info and (cls.odometry[-1].header.stamp - cls.info[-1].header.stamp).to_sec() < 3.0)
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.directory, ignore_errors=True)
 
     def test_where_it_comes_by_again_it_is_recognised_and_nowhere_else(self):
         self.assertTrue(self.settled)

@@ -52,6 +52,7 @@ class RenderedDrive(unittest.TestCase):
     @classmethod
     def setUpClass(cls):
         cls.directory = tempfile.mkdtemp(prefix='sdvo_rendered_')
+        cls.addClassCleanup(shutil.rmtree, cls.directory, ignore_errors=True)
         drive = os.path.join(cls.directory, 'drive')
         poses = os.path.join(cls.directory, 'plan.txt')
         np.savetxt(poses, planned_drive().reshape(-1, 12))
@@ -77,10 +78,6 @@ class RenderedDrive(unittest.TestCase):
         wait_until(lambda: min(map(len, (cls.odometry, cls.info, cls.planar))) >= len(cls.stamps))
         cls.estimated = [matrix_of(message.pose.pose) for message in cls.odometry]
         cls.true = [matrix_of(cls.truth[stamp].pose.pose) for stamp in cls.stamps]
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.directory, ignore_errors=True)
 
     def test_every_pair_is_tracked(self):
         self.assertGreaterEqual(len(self.stamps), 300)

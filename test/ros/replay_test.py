@@ -33,6 +33,7 @@ class Replay(unittest.TestCase):
         name = rospy.get_param('~sequence', '')
         sequence = os.path.join(kitti_dir(), 'sequences', name) if name else street_dir()
         cls.directory = tempfile.mkdtemp(prefix='sdvo_replay_')
+        cls.addClassCleanup(shutil.rmtree, cls.directory, ignore_errors=True)
         bag = os.path.join(cls.directory, 'sequence.bag')
         poses = os.path.join(cls.directory, 'poses.txt')
         run_tool('kitti_to_bag', '--sequence', sequence, '--output', bag)
@@ -64,10 +65,6 @@ class Replay(unittest.TestCase):
         wait_until(lambda: all(len(c) >= pairs for c in (cls.odometry, cls.features, cls.info, cls.transforms)) and
                    all(len(c) > 0 and c[-1].header.stamp == cls.stamps[-1] for c in (cls.path, cls.points)) and
                    cls.tf.can_transform('odom', 'base_link', cls.stamps[-1]))
-
-    @classmethod
-    def tearDownClass(cls):
-        shutil.rmtree(cls.directory, ignore_errors=True)
 
     def poses(self):
         return [matrix_of(odometry.pose.pose) for odometry in self.odometry]

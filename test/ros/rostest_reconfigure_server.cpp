@@ -3,7 +3,6 @@
 #include <gtest/gtest.h>
 #include <ros/ros.h>
 
-#include <algorithm>
 #include <atomic>
 #include <stdexcept>
 #include <string>

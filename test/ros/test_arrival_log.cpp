@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <functional>
 #include <random>
 #include <string>
 
@@ -106,7 +104,8 @@ TEST_F(JitterTest, OfFiveHundredPairsWhoseStampsDifferEachIsUsedOrCountedAndTheS
     }
   }
   const std::string loss = log_.explainLoss(now);
-  expectWords(loss, {"stereo pairs in 5 s are not used", "left and", "the nearest stamps of left and right are 1.", "ms apart, more than sync_tolerance (1.0 ms): set a larger sync_tolerance"});
+  expectWords(loss, {"stereo pairs in 5 s are not used", "left and", "the nearest stamps of left and right are 1.",
+                     "ms apart, more than sync_tolerance (1.0 ms): set a larger sync_tolerance"});
   log_.explainLoss(now + 10.0);  // what waits for partners is given up
   EXPECT_GT(used, 80);
   EXPECT_LT(used, 200);
@@ -135,7 +134,8 @@ TEST_F(ArrivalLogTest, CameraInfoThatIsSlowerThanTheImagesIsNamedWithItsRate) {
       note(input, stamp, now);
   }
   const std::string loss = log_.explainLoss(10.0);
-  expectWords(loss, {"; /l/info must have a message for each image", "/l/image 100 /r/image 100 /l/info 5 /r/info 100"});
+  expectWords(loss,
+              {"; /l/info must have a message for each image", "/l/image 100 /r/image 100 /l/info 5 /r/info 100"});
   log_.explainLoss(20.0);  // what waits for partners is given up
   EXPECT_EQ(unpaired(), 190u);
 }

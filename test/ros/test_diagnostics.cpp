@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <string>
 
 #include "../../src/ros/diagnostics.hpp"
 #include "../said.hpp"

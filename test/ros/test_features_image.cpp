@@ -1,8 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <opencv2/imgproc.hpp>
-#include <string>
-
 #include "../../src/ros/features_image.hpp"
 #include "../synthetic_scene.hpp"
 #include "message_samples.hpp"

@@ -60,7 +60,8 @@ TEST(FeaturesMessageTest, TheCloudHasThePointsAndTheirDisparities) {
   const StereoFeatures features = someFeatures();
   const sensor_msgs::PointCloud2 cloud = toPointCloud(StereoFeaturesView(message));
   EXPECT_EQ(cloud.header.stamp, message.header.stamp);
-  ASSERT_EQ(cloud.width, static_cast<std::uint32_t>(features.count()));
+  EXPECT_EQ(cloud.header.frame_id, "left_optical");
+  ASSERT_EQ(cloud.height * cloud.width, static_cast<std::uint32_t>(features.count()));
   sensor_msgs::PointCloud2ConstIterator<float> field(cloud, "x");
   for (int i = 0; i < features.count(); ++i, ++field) {
     EXPECT_LT((Eigen::Vector3f(field[0], field[1], field[2]) - features.point(i).cast<float>()).norm(), 1e-5f) << i;

@@ -28,6 +28,12 @@ Eigen::Isometry3d arc(double speed, double yaw_rate, double dt) {
   return T;
 }
 
+/// Of a position or a vector.
+template <class Message>
+void expectNear(const Message& message, const Eigen::Vector3d& expected, double tolerance) {
+  EXPECT_LT((Eigen::Vector3d(message.x, message.y, message.z) - expected).cwiseAbs().maxCoeff(), tolerance) << message;
+}
+
 using Covariance = Eigen::Map<const Eigen::Matrix<double, 6, 6, Eigen::RowMajor>>;
 
 Matrix6d covarianceOf(const boost::array<double, 36>& message) {
@@ -51,9 +57,7 @@ TEST(ToOdometry, ForwardOfTheCameraIsXAndALeftTurnIsPositiveYaw) {
 
   result.T_origin_camera = Eigen::Translation3d(0.0, 0.0, 2.5);  // optical z is forward
   geometry_msgs::Pose pose = toOdometry(result, optical, {}).pose.pose;
-  EXPECT_NEAR(pose.position.x, 2.5, 1e-12);
-  EXPECT_NEAR(pose.position.y, 0.0, 1e-12);
-  EXPECT_NEAR(pose.position.z, 0.0, 1e-12);
+  expectNear(pose.position, {2.5, 0.0, 0.0}, 1e-12);
   EXPECT_NEAR(yawOf(pose.orientation), 0.0, 1e-12);
 
   result.T_origin_camera = Eigen::Translation3d(-1.0, -2.0, 0.0);  // optical x is right, y is down
@@ -109,18 +113,13 @@ TEST(ToOdometry, PoseAndTwistAreThoseOfTheBaseNotOfTheCamera) {
   EXPECT_EQ(odometry.child_frame_id, "robot");
   EXPECT_EQ(odometry.header.stamp.toNSec(), 1000000000100000007u);
   // After 2 s on the circle.
-  EXPECT_NEAR(odometry.pose.pose.position.x, speed / yaw_rate * std::sin(1.4), 1e-9);
-  EXPECT_NEAR(odometry.pose.pose.position.y, speed / yaw_rate * (1.0 - std::cos(1.4)), 1e-9);
-  EXPECT_NEAR(odometry.pose.pose.position.z, 0.0, 1e-9);
+  expectNear(odometry.pose.pose.position,
+             {speed / yaw_rate * std::sin(1.4), speed / yaw_rate * (1.0 - std::cos(1.4)), 0.0}, 1e-9);
   EXPECT_NEAR(yawOf(odometry.pose.pose.orientation), 1.4, 1e-9);
   // In the base's own frame the velocity of a constant turn is constant.
   const geometry_msgs::Twist& twist = odometry.twist.twist;
-  EXPECT_NEAR(twist.linear.x, speed, 1e-9);
-  EXPECT_NEAR(twist.linear.y, 0.0, 1e-9);
-  EXPECT_NEAR(twist.linear.z, 0.0, 1e-9);
-  EXPECT_NEAR(twist.angular.x, 0.0, 1e-9);
-  EXPECT_NEAR(twist.angular.y, 0.0, 1e-9);
-  EXPECT_NEAR(twist.angular.z, yaw_rate, 1e-9);
+  expectNear(twist.linear, {speed, 0.0, 0.0}, 1e-9);
+  expectNear(twist.angular, {0.0, 0.0, yaw_rate}, 1e-9);
 }
 
 TEST(ToOdometry, QuaternionIsUnitAlsoForADriftedRotation) {

@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 #include <ros/serialization.h>
 
-#include <string>
 #include <vector>
 
 #include "../../src/messages/place_conversions.hpp"

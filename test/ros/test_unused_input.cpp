@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <string>
-
 #include "../../src/ros/diagnostic_tasks.hpp"
 
 namespace sdvo::test_unused_input {
