@@ -3,6 +3,7 @@
 
 import glob
 import os
+import pathlib
 import shlex
 import signal
 import subprocess
@@ -26,9 +27,9 @@ from nodelet.srv import NodeletList
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import CameraInfo, CompressedImage, Image
 
+from kitti_replay import PACKAGE, wait_until
 from stereo_descriptor_vo.msg import StereoFeatures, VoInfo
 
-PACKAGE = 'stereo_descriptor_vo'
 # Under the nodelets' names; what an argument of the launch file can set.
 ARGUMENTS = {'odom_frame_id': 'visual_odometry/odom_frame_id', 'base_frame_id': 'visual_odometry/base_frame_id',
              'initial_pose': 'visual_odometry/initial_pose', 'mask': 'stereo_features/detector/mask',
@@ -276,10 +277,7 @@ class Launch(unittest.TestCase):
                     os.path.join(FOLDER, 'copy_config.py'), os.path.join(FOLDER, '..', 'config', 'stereo_vo.yaml'),
                     '/tmp/stereo_vo_config_test_%d.yaml' % os.getpid()))
             subprocess.run(['roslaunch', '--dump-params', failing], stderr=subprocess.DEVNULL)
-        end = time.time() + 30
-        while copies() - before and time.time() < end:
-            time.sleep(0.1)
-        self.assertEqual(copies() - before, set())
+        self.assertTrue(wait_until(lambda: not copies() - before), copies() - before)
 
     def test_rviz_shows_what_is_in_its_namespace(self):
         folder = os.path.join(FOLDER, '..', 'rviz')
@@ -348,10 +346,7 @@ class Launch(unittest.TestCase):
             process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch', 'start_manager:=false',
                                         'base_frame_id:=robot'] + (['clear_params:=' + clear] if clear else []))
             try:
-                end = time.time() + 30
-                while rospy.get_param('/stereo/visual_odometry/base_frame_id', '') != 'robot' and time.time() < end:
-                    time.sleep(0.05)
-                self.assertEqual(rospy.get_param('/stereo/visual_odometry/base_frame_id', ''), 'robot')
+                self.assertTrue(wait_until(lambda: rospy.get_param('/stereo/visual_odometry/base_frame_id', '') == 'robot'))
                 self.assertEqual(rospy.has_param(stale), clear == 'false')
                 self.assertEqual(rospy.get_param(other), 5)
             finally:
@@ -366,11 +361,12 @@ class Launch(unittest.TestCase):
         publisher = rospy.Publisher('/stereo/stereo_features', StereoFeatures, queue_size=1)
         message = StereoFeatures(image_width=640, image_height=480, fx=400.0, fy=400.0, cx=320.0, cy=240.0, baseline=0.1,
                                  descriptor='freak', layout='left+right', element_type='bits', bytes_per_row=128)
-        end = time.time() + 30
-        while not answers and time.time() < end:
+
+        def is_answered():
             message.header.stamp = rospy.Time.now()
             publisher.publish(message)
-            time.sleep(0.3)
+            return wait_until(lambda: answers, 0.3)
+        wait_until(is_answered)
         listener.unregister()
         publisher.unregister()
         return answers[-1] if answers else None
@@ -385,22 +381,16 @@ class Launch(unittest.TestCase):
                 return rosservice.get_service_node(service) is not None
             except (rosservice.ROSServiceException, rosgraph.network.ROSHandshakeException):
                 return False  # it ends while it is asked
-
-        def wait_until(condition):
-            end = time.time() + 60
-            while not condition() and time.time() < end:
-                time.sleep(0.1)
-            return condition()
         try:
-            self.assertTrue(wait_until(is_offered))
+            self.assertTrue(wait_until(is_offered, 60))
             sessions = [self.session()]
             for node in ('/stereo/visual_odometry', '/stereo/stereo_vo_manager'):
                 time.sleep(3)  # nodelet's loader does not notice a manager that dies before their bond is formed
                 uri = rosnode.get_api_uri(rosgraph.Master('/test'), node)
                 errors.clear()  # that our messages have no transform
                 os.kill(xmlrpc.client.ServerProxy(uri).getPid('/test')[2], signal.SIGKILL)
-                self.assertTrue(wait_until(lambda: not is_offered()))
-                self.assertTrue(wait_until(is_offered))
+                self.assertTrue(wait_until(lambda: not is_offered(), 60))
+                self.assertTrue(wait_until(is_offered, 60))
                 self.assertEqual(errors, [], node)
                 sessions.append(self.session())
             # The epoch begins at zero with each, so only the session tells them apart.
@@ -418,11 +408,6 @@ class Launch(unittest.TestCase):
         names = rospy.ServiceProxy('/stereo/driver/list', NodeletList)
         names.wait_for_service(60)
 
-        def wait_until(condition):
-            end = time.time() + 60
-            while not condition() and time.time() < end:
-                time.sleep(0.1)
-            return condition()
 
         def launch(**arguments):
             return subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch', 'manager:=driver', 'start_manager:=false'] +
@@ -438,16 +423,16 @@ class Launch(unittest.TestCase):
             process.wait()
         mine = ['/stereo/features_image', '/stereo/stereo_features', '/stereo/visual_odometry']
         first = launch()
-        self.assertTrue(wait_until(lambda: sorted(names().nodelets) == mine), names().nodelets)
+        self.assertTrue(wait_until(lambda: sorted(names().nodelets) == mine, 60), names().nodelets)
         kill(first)
-        self.assertTrue(wait_until(lambda: names().nodelets == []), names().nodelets)
+        self.assertTrue(wait_until(lambda: names().nodelets == [], 60), names().nodelets)
         second = launch(bond='false')
-        self.assertTrue(wait_until(lambda: sorted(names().nodelets) == mine), names().nodelets)
+        self.assertTrue(wait_until(lambda: sorted(names().nodelets) == mine, 60), names().nodelets)
         session = self.session()
         kill(second)
         third = launch(bond='false')
         try:
-            self.assertTrue(wait_until(lambda: self.session() not in (None, session)))
+            self.assertTrue(wait_until(lambda: self.session() not in (None, session), 60))
             self.assertEqual(sorted(names().nodelets), mine)
         finally:
             third.terminate()
@@ -457,26 +442,28 @@ class Launch(unittest.TestCase):
     def test_the_end_and_the_halt_of_anothers_manager_are_explained(self):
         executable = roslib.packages.find_node('nodelet', 'nodelet')[0]
 
-        def run(disturb):
+        def expect(words, disturb):
             manager = subprocess.Popen([executable, 'manager', '__name:=driver', '__ns:=/stereo'])
             self.addCleanup(manager.kill)
             rospy.wait_for_service('/stereo/driver/list', 60)
+            said = tempfile.NamedTemporaryFile()
             process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'odometry.launch', 'manager:=driver', 'start_manager:=false'],
-                                       stderr=subprocess.PIPE, universal_newlines=True, start_new_session=True)
+                                       stderr=said, start_new_session=True)
             disturb(manager)
-            time.sleep(20)  # a bond takes 10 s to break
+            # A bond takes 10 s to break.
+            self.assertTrue(wait_until(lambda: words in pathlib.Path(said.name).read_text(), 60), words)
             process.terminate()
             manager.send_signal(signal.SIGCONT)
             manager.terminate()
             manager.wait()
-            return process.communicate()[1]
+            process.wait()
 
         def kill(manager):
             self.assertIsNotNone(self.session())
             time.sleep(3)  # until the bond is formed
             manager.kill()
-        self.assertIn('has ended with its manager driver, or its loader was killed: respawn:=true loads it again', run(kill))
-        self.assertIn('the nodelet manager does not answer', run(lambda manager: manager.send_signal(signal.SIGSTOP)))
+        expect('has ended with its manager driver, or its loader was killed: respawn:=true loads it again', kill)
+        expect('the nodelet manager does not answer', lambda manager: manager.send_signal(signal.SIGSTOP))
 
     def test_a_recording_takes_over_from_a_pipeline_of_the_same_namespace(self):
         self.addCleanup(lambda: rospy.has_param('/use_sim_time') and rospy.delete_param('/use_sim_time'))

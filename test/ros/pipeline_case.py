@@ -47,7 +47,11 @@ class PipelineCase(unittest.TestCase):
 
     def tearDown(self):
         for closeable in reversed(self.closeables):
-            closeable.close()
+            if isinstance(closeable, Pipeline):  # which has names of its own: the next test need not wait for its end
+                closeable.process.terminate()
+                self.addClassCleanup(closeable.close)
+            else:
+                closeable.close()
 
     def keep(self, closeable):
         self.closeables.append(closeable)
