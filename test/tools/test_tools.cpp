@@ -221,6 +221,7 @@ TEST_F(Tools, ASoundSequenceIsReadAndADamagedOneIsNamed) {
     fs::remove_all(sequence_);
     fs::copy(sound, sequence_, fs::copy_options::recursive);
     damage();
+    fs::remove(in("reader.bag"));
     for (const bool converter : {false, true}) {
       const Outcome outcome = readBy(converter);
       if (!words.empty()) {
@@ -546,6 +547,7 @@ TEST_F(Tools, RawFoldersOfEuroc) {
   const Outcome outcome = runOn(asl, "--format tum");
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   const std::vector<std::string> lines = linesOf(poses());
+  fs::remove(in("poses.txt"));
   ASSERT_EQ(run("euroc_to_kitti", "--input " + asl + "/mav0 --output " + rectified).exit_code, 0);
   ASSERT_EQ(runOn(rectified).exit_code, 0);
   const std::vector<std::string> expected = linesOf(poses());
