@@ -7,7 +7,8 @@
 #include "../said.hpp"
 #include "stereo_descriptor_vo/belief/motion_prior.hpp"
 
-namespace sdvo::test_motion_prior {
+namespace sdvo {
+namespace test_motion_prior {
 
 constexpr std::int64_t kSecond = 1000000000;  // ns
 
@@ -136,4 +137,5 @@ TEST(MotionPrior, NoiseAndStampsMayExceedTheLargestSpeed) {
   EXPECT_EQ(prior.tooFast(ahead(0.01, 0.01), Matrix6d::Zero(), 0.001), "") << "stamps of a burst";
 }
 
-}  // namespace sdvo::test_motion_prior
+}  // namespace test_motion_prior
+}  // namespace sdvo

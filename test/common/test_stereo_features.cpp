@@ -11,7 +11,8 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 
-namespace sdvo::test_stereo_features {
+namespace sdvo {
+namespace test_stereo_features {
 
 StereoFeatures threeFeatures() {
   std::mt19937 random(1);
@@ -152,4 +153,5 @@ TEST(StereoFeatures, RefusesACameraThatIsNone) {
   expectRefused({{[](StereoFeatures& f) { f.camera.baseline = 0.0; }, "baseline"}});
 }
 
-}  // namespace sdvo::test_stereo_features
+}  // namespace test_stereo_features
+}  // namespace sdvo
