@@ -223,7 +223,9 @@ class Solver {
     return trace / static_cast<double>(solved.cols()) * freedom / std::max(freedom - 6.0 * poses_, 1.0);
   }
 
-  /// Squared length of the gradients' sums by cluster: the part of the image in which a point was seen first.
+  /// Squared length of the gradients' sums by cluster: the part of the image in which a point was seen first. Points
+  /// that move alike over a larger area, as grass in waves, are one witness: the largest sum over areas of one, two and
+  /// four parts' width counts, each made up for by the constraint that all gradients cancel.
   double meatOf(const ReducedSystem& system, const Estimate& estimate,
                 const Eigen::Matrix<double, 6, Eigen::Dynamic>& by) {
     constexpr int kSide = 64;  // clusters along each axis at most
@@ -238,9 +240,20 @@ class Solver {
       for (const PoseFactor* end = observation + point.factors; observation != end; ++observation)
         moved += by.middleCols<6>(6 * observation->pose).lazyProduct(observation->gradient);
     }
-    double sum = 0.0;
-    for (const Vector6d& moved : clusters_) sum += moved.squaredNorm();
-    return sum;
+    double most = 0.0;
+    for (int side = kSide; side >= kSide / 4; side /= 2) {
+      double sum = 0.0, occupied = 0.0;
+      for (int k = 0; k < side * side; ++k) {
+        const double square = clusters_[k].squaredNorm();
+        sum += square, occupied += square > 0.0;
+      }
+      most = std::max(most, sum * occupied / std::max(occupied - 1.0, 1.0));
+      for (int k = 0; k < side * side / 4; ++k) {  // the four that become the next size's one are not before it
+        const Vector6d* four = &clusters_[4 * k - 2 * (k % (side / 2))];
+        clusters_[k] = four[0] + four[1] + four[side] + four[side + 1];
+      }
+    }
+    return most;
   }
 
   void eliminatePoints(const Estimate& estimate, const Linearisation& linearisation, ReducedSystem& system) {
