@@ -223,9 +223,15 @@ class Solver {
     return trace / static_cast<double>(solved.cols()) * freedom / std::max(freedom - 6.0 * poses_, 1.0);
   }
 
-  /// Squared length of the gradients' sums by cluster: the part of the image in which a point was seen first. Points
-  /// that move alike over a larger area, as grass in waves, are one witness: the largest sum over areas of one, two and
-  /// four parts' width counts, each made up for by the constraint that all gradients cancel.
+  /// What makes up for few clusters: all gradients cancel, which hides a part, and the largest of several sums is so by
+  /// chance, too: one standard deviation of their six numbers' squares is taken off.
+  static double largerArea(double clusters) {
+    return clusters / std::max(clusters - 1.0, 1.0) / (1.0 + std::sqrt(2.0 / (6.0 * std::max(clusters, 1.0))));
+  }
+
+  /// Squared length of the gradients' sums by cluster: the part of the image in which a point was seen first. Enlarged
+  /// images and grass in waves err alike over a larger area: areas two and four times as wide count where they show
+  /// more than chance does.
   double meatOf(const ReducedSystem& system, const Estimate& estimate,
                 const Eigen::Matrix<double, 6, Eigen::Dynamic>& by) {
     constexpr int kSide = 64;  // clusters along each axis at most
@@ -247,7 +253,8 @@ class Solver {
         const double square = clusters_[k].squaredNorm();
         sum += square, occupied += square > 0.0;
       }
-      most = std::max(most, sum * occupied / std::max(occupied - 1.0, 1.0));
+      if (side < kSide) sum *= largerArea(occupied);
+      most = std::max(most, sum);
       for (int k = 0; k < side * side / 4; ++k) {  // the four that become the next size's one are not before it
         const Vector6d* four = &clusters_[4 * k - 2 * (k % (side / 2))];
         clusters_[k] = four[0] + four[1] + four[side] + four[side + 1];
