@@ -57,21 +57,6 @@ std::string listOfPose(const std::optional<Eigen::Isometry3d>& pose) {
   return listOf(std::array{t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()}, [](double v) { return number(v, 6); });
 }
 
-/// Of each `step` pairs that follow each other the worst one, so that none without a pose is missing.
-std::vector<std::size_t> worstOfEach(const Frames& frames, std::size_t step) {
-  const auto rankOf = [&](std::size_t i) {
-    const TrackingState state = frames[i].odometry.state;
-    return state == TrackingState::kTracking ? 0 : 1 + static_cast<int>(state);
-  };
-  std::vector<std::size_t> worst;
-  for (std::size_t i = 0; i < frames.size(); ++i)
-    if (i % step == 0)
-      worst.push_back(i);
-    else if (rankOf(i) > rankOf(worst.back()))
-      worst.back() = i;
-  return worst;
-}
-
 /// A list for each column.
 std::string columnsOf(const DriveReport& report, const Frames& frames, std::size_t step) {
   const std::vector<std::size_t> shown = worstOfEach(frames, step);
@@ -147,13 +132,13 @@ std::vector<Words> figuresOf(const DriveReport& report, const OfflineRun& run) {
   for (const SelfCheck& check : report.self_checks) rows.push_back({"implied error", check.text()});
   if (const auto errors = errorsOf(report, frames)) {
     const auto& lengths = errors->per_length;
-    rows.push_back({"true error",
-                    percent(errors->sub_paths.translation_percent) +
-                        text(4, " and ", errors->sub_paths.rotation_deg_per_m, " deg/m over sub-paths") +
-                        (lengths.empty() ? std::string()
-                                         : text(1, " of ", lengths.front().length, " to ", lengths.back().length, " m")) +
-                        text(3, "; at the end off by ", errors->final_drift_m, " m (", errors->final_drift_percent,
-                             " %) and ", errors->final_drift_deg, " deg")});
+    rows.push_back({"true error", percent(errors->sub_paths.translation_percent) +
+                                      text(4, " and ", errors->sub_paths.rotation_deg_per_m, " deg/m over sub-paths") +
+                                      (lengths.empty() ? std::string()
+                                                       : text(1, " of ", lengths.front().length, " to ",
+                                                              lengths.back().length, " m")) +
+                                      text(3, "; at the end off by ", errors->final_drift_m, " m (",
+                                           errors->final_drift_percent, " %) and ", errors->final_drift_deg, " deg")});
   }
   if (report.live) {
     const LiveRecord& live = *report.live;
@@ -206,6 +191,20 @@ Finding judge(const DriveReport& report, const OfflineRun& run) {
   if (worst.verdict == Verdict::kWarn || worst.verdict == Verdict::kFail)
     verdict.what += ". Camera: " + std::string(toString(worst.verdict)) + ", " + worst.step + ": " + worst.what;
   return verdict;
+}
+
+std::vector<std::size_t> worstOfEach(const Frames& frames, std::size_t step) {
+  const auto rankOf = [&](std::size_t i) {
+    const TrackingState state = frames[i].odometry.state;
+    return state == TrackingState::kTracking ? 0 : 1 + static_cast<int>(state);
+  };
+  std::vector<std::size_t> worst;
+  for (std::size_t i = 0; i < frames.size(); ++i)
+    if (i % step == 0)
+      worst.push_back(i);
+    else if (rankOf(i) > rankOf(worst.back()))
+      worst.back() = i;
+  return worst;
 }
 
 void writeDrivePage(const std::string& path, const DriveReport& report, const OfflineRun& run) {

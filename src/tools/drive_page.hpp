@@ -47,6 +47,9 @@ struct DriveReport {
 /// The verdict on the drive: whether it was followed, how precisely, and the camera's worst fault.
 Finding judge(const DriveReport& report, const OfflineRun& run);
 
+/// Of each `step` pairs that follow each other the worst one, so that none without a pose is missing.
+std::vector<std::size_t> worstOfEach(const std::vector<OfflineRun::Frame>& frames, std::size_t step);
+
 /// The page of a drive, which needs no other file and has less than 2 MB. Throws std::runtime_error when it cannot be
 /// written.
 void writeDrivePage(const std::string& path, const DriveReport& report, const OfflineRun& run);
