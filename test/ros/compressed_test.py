@@ -10,7 +10,7 @@ import rospy
 import rostest
 from sensor_msgs.msg import CompressedImage
 
-from kitti_replay import (PACKAGE, Camera, Collector, Pipeline, Rosout, SimulatedClock, StereoSequence, links,
+from kitti_replay import (PACKAGE, Camera, Collector, Pipeline, Rosout, SimulatedClock, StereoSequence, is_connected,
                           wait_until)
 from stereo_descriptor_vo.msg import StereoFeatures
 
@@ -50,8 +50,7 @@ class Compressed(unittest.TestCase):
         rosout = Rosout(namespace)
         pipeline = Pipeline(namespace, publish_tf='false')
         try:
-            out = ('out', features.subscriber.resolved_name, rospy.get_name())
-            self.assertTrue(wait_until(lambda: camera.is_subscribed() and out in links(pipeline.manager), 60),
+            self.assertTrue(wait_until(lambda: camera.is_subscribed() and is_connected(pipeline.manager, [features]), 60),
                             'the pipeline did not start')
             for i in range(PAIRS):
                 images, infos = camera.messages(i)

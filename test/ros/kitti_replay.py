@@ -76,6 +76,17 @@ def links(node):
     return {('in', c[4]) if c[2] == 'i' else ('out', c[4], c[1]) for c in connections if c[5]}
 
 
+def is_connected(node, collectors, inputs=()):
+    """Whether a node sends to these collectors of ours and takes in these topics."""
+    needed = {('out', c.subscriber.resolved_name, rospy.get_name()) for c in collectors}
+    return links(node) >= needed | {('in', topic) for topic in inputs}
+
+
+def play(bag, *more):
+    """A recording that waits for its subscribers, with its clock."""
+    subprocess.run(['rosbag', 'play', '--quiet', '--clock', '--wait-for-subscribers', *more, bag], check=True)
+
+
 def node_pid(node):
     """None when the node does not answer."""
     try:
@@ -175,6 +186,10 @@ class Camera:
 
     def publish(self, images, infos):
         self.clock.advance_to(images[0].header.stamp)
+        self.send(images, infos)
+
+    def send(self, images, infos):
+        """Whatever time it is."""
         for publisher, message in zip(self.infos + self.images, infos + images):
             publisher.publish(message)
 

@@ -20,7 +20,7 @@ import rostest
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo
 
-from kitti_replay import PACKAGE, Collector, data_dir, links, matrix_of, run_tool, wait_until
+from kitti_replay import PACKAGE, Collector, data_dir, is_connected, matrix_of, run_tool, wait_until
 from stereo_descriptor_vo.msg import VoInfo
 
 MANAGER = '/stereo/stereo_vo_manager'
@@ -51,14 +51,13 @@ class Raw(unittest.TestCase):
         cls.odometry = Collector('/stereo/odom', Odometry)
         cls.info = Collector('/stereo/vo_info', VoInfo)
         cls.cameras = [Collector('/stereo/%s/rectifiable/camera_info' % side, CameraInfo) for side in ('left', 'right')]
-        needed = {('out', c.subscriber.resolved_name, rospy.get_name()) for c in (cls.odometry, cls.info)}
-        needed |= {('in', '/stereo/%s/%s' % (side, what)) for side in ('left', 'right') for what in ('image_mono', 'image_rect')}
-        needed |= {('in', name) for name in NAMES.values()}
+        inputs = ['/stereo/%s/%s' % (side, what) for side in ('left', 'right') for what in ('image_mono', 'image_rect')]
+        inputs += NAMES.values()
         player = subprocess.Popen(['rosbag', 'play', '--quiet', '--clock', '--wait-for-subscribers', '--rate',
                                    str(rospy.get_param('~rate')), bag, '--topics', *NAMES, '/tf_static'] +
                                   ['%s:=%s' % names for names in NAMES.items()])
         try:
-            cls.connected = wait_until(lambda: links(MANAGER) >= needed, 60)
+            cls.connected = wait_until(lambda: is_connected(MANAGER, (cls.odometry, cls.info), inputs), 60)
             cls.transports = transports(MANAGER)
             assert player.wait() == 0
         finally:

@@ -4,7 +4,6 @@ recognised, and nowhere else. Needs no data set."""
 
 import os
 import shutil
-import subprocess
 import sys
 import tempfile
 import unittest
@@ -16,7 +15,7 @@ import rostest
 from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
 
-from kitti_replay import PACKAGE, Collector, links, matrix_of, run_tool, wait_until
+from kitti_replay import PACKAGE, Collector, is_connected, matrix_of, play, run_tool, wait_until
 from rendered_test import CALIBRATION, SIZE
 from stereo_descriptor_vo.msg import PlaceInfo
 
@@ -39,13 +38,11 @@ class RenderedPlaces(unittest.TestCase):
         cls.odometry, cls.info = Collector('/stereo/odom', Odometry), Collector('/stereo/place_info', PlaceInfo)
         cls.tf = Collector('/tf', TFMessage)
         cls.ground_truth = Collector('/ground_truth/odom', Odometry)
-        ours = [cls.odometry, cls.info, cls.tf]
-        needed = {('out', c.subscriber.resolved_name, rospy.get_name()) for c in ours}
-        needed |= {('in', '/stereo/' + topic) for topic in ('stereo_features', 'odom', 'vo_info')}
-        assert wait_until(lambda: links('/stereo/stereo_vo_manager') >= needed, 60), 'the nodelets are not connected'
-        subprocess.run(['rosbag', 'play', '--quiet', '--clock', '--wait-for-subscribers', '--rate', '2', '--topics',
-                        '/stereo/left/image_rect', '/stereo/right/image_rect', '/stereo/left/camera_info', '/stereo/right/camera_info',
-                        '/ground_truth/odom', '/tf_static', '--bags', bag], check=True)
+        inputs = ['/stereo/' + topic for topic in ('stereo_features', 'odom', 'vo_info')]
+        connected = wait_until(lambda: is_connected('/stereo/stereo_vo_manager', (cls.odometry, cls.info, cls.tf), inputs), 60)
+        assert connected, 'the nodelets are not connected'
+        play(bag, '--rate', '2', '--topics', '/stereo/left/image_rect', '/stereo/right/image_rect', '/stereo/left/camera_info',
+             '/stereo/right/camera_info', '/ground_truth/odom', '/tf_static', '--bags')
         wait_until(lambda: len(cls.odometry) >= PAIRS)
         cls.settled = wait_until(lambda: cls.info and (cls.odometry[-1].header.stamp - cls.info[-1].header.stamp).to_sec() < 3.0)
 

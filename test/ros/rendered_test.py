@@ -6,7 +6,6 @@ Parameter: ~rate of the replay."""
 
 import os
 import shutil
-import subprocess
 import sys
 import tempfile
 import unittest
@@ -17,7 +16,7 @@ import rospy
 import rostest
 from nav_msgs.msg import Odometry, Path
 
-from kitti_replay import PACKAGE, Collector, links, matrix_of, run_tool, wait_until
+from kitti_replay import PACKAGE, Collector, is_connected, matrix_of, play, run_tool, wait_until
 from stereo_descriptor_vo.msg import VoInfo
 
 RATE = 10.0  # Hz
@@ -68,13 +67,10 @@ class RenderedDrive(unittest.TestCase):
         cls.info = Collector('/stereo/vo_info', VoInfo)
         cls.planar = Collector('/planar/odom', Odometry)
         cls.ground_truth = [Collector('/ground_truth/odom', Odometry), Collector('/ground_truth/path', Path)]
-        needed = {('out', c.subscriber.resolved_name, rospy.get_name()) for c in (cls.odometry, cls.info)}
-        needed.add(('in', '/stereo/stereo_features'))
-        assert wait_until(lambda: links('/stereo/stereo_vo_manager') >= needed, 60), 'the nodelets are not connected'
-        needed = {('out', '/planar/odom', rospy.get_name()), ('in', '/stereo/stereo_features')}
-        assert wait_until(lambda: links('/planar/odometry_manager') >= needed, 60), 'the planar nodelet is not connected'
-        subprocess.run(['rosbag', 'play', '--quiet', '--clock', '--wait-for-subscribers', '--rate',
-                        str(rospy.get_param('~rate')), bag], check=True)
+        for manager, collectors in (('/stereo/stereo_vo_manager', (cls.odometry, cls.info)),
+                                    ('/planar/odometry_manager', (cls.planar, ))):
+            assert wait_until(lambda: is_connected(manager, collectors, ['/stereo/stereo_features']), 60), manager
+        play(bag, '--rate', str(rospy.get_param('~rate')))
         wait_until(lambda: min(map(len, (cls.odometry, cls.info, cls.planar))) >= len(cls.stamps))
         cls.estimated = [matrix_of(message.pose.pose) for message in cls.odometry]
         cls.true = [matrix_of(cls.truth[stamp].pose.pose) for stamp in cls.stamps]

@@ -5,7 +5,6 @@ Parameters: ~sequence of KITTI, for example "06", without it the rendered street
 
 import os
 import shutil
-import subprocess
 import sys
 import tempfile
 import unittest
@@ -19,7 +18,7 @@ from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import PointCloud2
 from tf2_msgs.msg import TFMessage
 
-from kitti_replay import PACKAGE, Collector, kitti_dir, links, matrix_of, run_tool, street_dir, wait_until
+from kitti_replay import PACKAGE, Collector, is_connected, kitti_dir, matrix_of, play, run_tool, street_dir, wait_until
 from stereo_descriptor_vo.msg import StereoFeatures, VoInfo
 
 STATIC_FRAMES = ('base_link', 'stereo_left_optical')
@@ -53,14 +52,10 @@ class Replay(unittest.TestCase):
         cls.tf = tf2_ros.Buffer(rospy.Duration(1000))
         cls.listener = tf2_ros.TransformListener(cls.tf)
         collectors = (cls.odometry, cls.features, cls.info, cls.path, cls.points, cls.transforms)
-        needed = {('out', c.subscriber.resolved_name, rospy.get_name()) for c in collectors}
-        needed.add(('in', cls.features.subscriber.resolved_name))
-        connected = wait_until(lambda: links('/stereo/stereo_vo_manager') >= needed and
+        connected = wait_until(lambda: is_connected('/stereo/stereo_vo_manager', collectors, ['/stereo/stereo_features']) and
                                cls.listener.tf_sub.get_num_connections() > 0, 60)
         assert connected, 'the nodelets are not connected within a minute'
-
-        subprocess.run(['rosbag', 'play', '--quiet', '--clock', '--wait-for-subscribers', '--rate',
-                        str(rospy.get_param('~rate')), bag], check=True)
+        play(bag, '--rate', str(rospy.get_param('~rate')))
         pairs = len(cls.stamps)
         wait_until(lambda: all(len(c) >= pairs for c in (cls.odometry, cls.features, cls.info, cls.transforms)) and
                    all(len(c) > 0 and c[-1].header.stamp == cls.stamps[-1] for c in (cls.path, cls.points)) and
