@@ -23,9 +23,9 @@ double ExpectedMotion::normalisedSquare(const Eigen::Isometry3d& measured, const
   return mahalanobisSquare(difference, covariance + measured_covariance);
 }
 
-/// The mean velocities of two neighbouring intervals of `dt` differ by two thirds of the velocity's variance over one.
-Matrix6d MotionPrior::processNoise(double dt, double age) const {
-  const double seconds_cubed = (2.0 / 3.0 * dt + age) * dt * dt;
+/// The mean velocities of two neighbouring intervals differ by a third of the velocity's variance over both.
+Matrix6d MotionPrior::processNoise(double dt, double before, double age) const {
+  const double seconds_cubed = ((before + dt) / 3.0 + age) * dt * dt;
   return isotropic(options_.acceleration * options_.acceleration * seconds_cubed,
                    options_.rotation_acceleration * options_.rotation_acceleration * seconds_cubed);
 }
@@ -40,32 +40,33 @@ void MotionPrior::noteInterval(double dt) {
   interval_ = std::max(dt, kUsualMemory * interval_);
 }
 
-double MotionPrior::interval(double dt) const {
+double MotionPrior::interval(double dt, const Eigen::Isometry3d& motion) const {
   constexpr double kBurst = 0.1;  // ratio of the usual interval (chosen); a camera does not change its rate by as much
-  return dt < kBurst * interval_ ? interval_ : dt;
+  return std::max({dt < kBurst * interval_ ? interval_ : dt, motion.translation().norm() / options_.max_speed,
+                   logSO3(motion.linear()).norm() / options_.max_rotation_rate});
 }
 
 ExpectedMotion MotionPrior::predicted(double dt) const {
   // Stamps of a burst are closer together than the moments at which its pairs were taken.
   const double time = std::max(dt, interval_);
   const Vector6d missed = *velocity_ * (time - dt);
-  return {expSE3(*velocity_ * dt),
-          processNoise(time, 0.0) + missed * missed.transpose() + time * time * velocity_covariance_ + doubt_};
+  return {expSE3(*velocity_ * dt), processNoise(time, velocity_interval_, 0.0) + missed * missed.transpose() +
+                                       time * time * velocity_covariance_ + doubt_};
 }
 
 std::optional<ExpectedMotion> MotionPrior::confirmed(std::int64_t stamp, double dt) const {
   if (!confirmed_) return std::nullopt;
-  ExpectedMotion expected = around(expSE3(*confirmed_ * dt), dt);
-  const double age = static_cast<double>(stamp - confirmed_stamp_) * 1e-9;
-  const double time = dt + 2.0 * options_.stamp_sigma;
-  expected.covariance +=
-      processNoise(time, age) - processNoise(time, 0.0) + stampNoise(*confirmed_) + dt * dt * confirmed_covariance_;
+  const double age = static_cast<double>(stamp - confirmed_stamp_) * 1e-9, stamps = 2.0 * options_.stamp_sigma;
+  const ExpectedMotion expected{expSE3(*confirmed_ * dt), processNoise(dt + stamps, confirmed_interval_ + stamps, age) +
+                                                              stampNoise(*confirmed_) +
+                                                              dt * dt * confirmed_covariance_};
   const double error = std::sqrt(expected.covariance.topLeftCorner<3, 3>().trace());
   return error < options_.max_speed * options_.max_gap ? std::optional(expected) : std::nullopt;
 }
 
 ExpectedMotion MotionPrior::around(const Eigen::Isometry3d& motion, double dt) const {
-  return {motion, processNoise(dt + 2.0 * options_.stamp_sigma, 0.0)};
+  const double time = dt + 2.0 * options_.stamp_sigma;
+  return {motion, processNoise(time, time, 0.0)};
 }
 
 double MotionPrior::logRatioOfSwap(const Eigen::Isometry3d& motion, double dt) const {
@@ -121,6 +122,7 @@ void MotionPrior::takeVelocity(std::int64_t stamp, const Eigen::Isometry3d& moti
   velocity_covariance_ = covariance / (dt * dt);
   if (!is_confirmed && confirmed_) return;
   confirmed_ = velocity;
+  confirmed_interval_ = dt;
   confirmed_covariance_ = velocity_covariance_;
   confirmed_stamp_ = stamp;
 }

@@ -29,9 +29,10 @@ std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHy
   for (const int i : found.motion.inliers) {
     const auto [reference, current, distance] = found.matches[static_cast<std::size_t>(i)];
     const Eigen::Vector3d now = found.motion.T_current_reference * found.view->points.positions[reference];
-    rows.push_back(
-        {(features.camera.project(now).y() - found.view->pixels[reference].y) / dt, usual.change(features, current)});
-    rows.back().dv -= features.right_delay * rows.back().velocity;
+    const StereoCamera& camera = features.camera;
+    const double velocity = (camera.project(now).y() - found.view->pixels[reference].y) / dt;
+    rows.push_back({velocity, usual.change(features, current) - features.right_delay * velocity,
+                    RowDelay::cellOf(features.u[current], features.v[current], camera.width, camera.height)});
   }
   return rows;
 }
@@ -179,7 +180,7 @@ void VisualOdometry::search(Pair& pair, const std::optional<MotionGuess>& guess,
   Eigen::Vector3d rate = Eigen::Vector3d::Zero();
   if (found.motion.success)
     rate = logSO3(found.motion.T_current_reference.linear().transpose()) /
-           state_.prior.interval(scene->map.secondsUntil(pair.features()));
+           state_.prior.interval(scene->map.secondsUntil(pair.features()), found.motion.T_current_reference);
   pair.rotation = state_.rig.shownRotation(pair.features(), found, rate);
   if (!(pair.rotation.log_odds > 0.0)) return;
   straighten(pair, guess);
@@ -256,17 +257,18 @@ std::optional<StereoFeatures> VisualOdometry::synchronised(const StereoFeatures&
   if (state_.interrupted) return features;
   const MotionHypothesis found = search_.find(sceneOf(*state_.map, features, dt, guess), largestDoubt());
   if (!found.motion.success) return features;
+  const Eigen::Isometry3d motion = found.motion.T_current_reference.inverse();
   return state_.rig.right_delay.synchronised(
-      taken, dt,
-      logSE3(found.motion.T_current_reference.inverse()) / state_.prior.interval(state_.map->secondsUntil(taken)));
+      taken, dt, logSE3(motion) / state_.prior.interval(state_.map->secondsUntil(taken), motion));
 }
 
 /// The pair with the motion that the search found; nothing without one, and none that spans an outage.
 std::optional<MeasuredPair> VisualOdometry::measuredPair(const Pair& pair, const MotionHypothesis& found) const {
   if (!found.motion.success || state_.interrupted || !(pair.dt > 0.0)) return std::nullopt;
   const StereoFeatures& taken = pair.taken();
-  const double since = state_.prior.interval(state_.map->secondsUntil(taken));
-  return MeasuredPair{taken, state_.prior.interval(pair.dt), found.motion.T_current_reference, since,
+  const Eigen::Isometry3d& motion = found.motion.T_current_reference;
+  const double since = state_.prior.interval(state_.map->secondsUntil(taken), motion);
+  return MeasuredPair{taken, state_.prior.interval(pair.dt, motion), motion, since,
                       rowMotions(taken, found, since, state_.rig.usual_rows)};
 }
 
@@ -510,8 +512,8 @@ VisualOdometry::Step VisualOdometry::measure(const StereoFeatures& features, con
   }
   step.covariance = state_.covariance.measure(*step.T_previous_current, candidate.adjustment.since_keyframe,
                                               candidate.adjustment.growth);
-  const double rate =
-      logSE3(found.motion.T_current_reference.inverse()).tail<3>().norm() / state_.prior.interval(since);
+  const Eigen::Isometry3d& motion = found.motion.T_current_reference;
+  const double rate = logSO3(motion.linear()).norm() / state_.prior.interval(since, motion);
   const double by_delay =
       state_.rig.right_delay.deviation(features, step.T_previous_current->translation().norm(), rate);
   step.covariance.topLeftCorner<3, 3>() += by_delay * by_delay * Eigen::Matrix3d::Identity();

@@ -1,6 +1,7 @@
 #include "stereo_descriptor_vo/rig/right_camera_delay.hpp"
 
 #include <algorithm>
+#include <bitset>
 #include <cmath>
 #include <limits>
 #include <sstream>
@@ -89,7 +90,9 @@ double errorRatio(const std::vector<RowMotion>& rows, double delay, double row_e
 /// By how much (logarithm of the ratio) the rows are likelier if the right image is late by `delay` than in step. Their
 /// variance is unknown, and errors within a part of the image are alike.
 double logRatioOfOtherPair(const std::vector<RowMotion>& rows, double delay, double row_error) {
-  const double parts = std::min<double>(static_cast<double>(rows.size()), RowDelay::kParts);
+  std::bitset<RowDelay::kParts> seen;
+  for (const RowMotion& row : rows) seen.set(static_cast<std::size_t>(row.part));
+  const double parts = static_cast<double>(seen.count()) - 1.0;  // one tells the constant
   const double synchronised = misfit(rows, delay < 0.0 ? delay * errorRatio(rows, delay, row_error) : 0.0);
   const double late = misfit(rows, delay);
   return synchronised == late ? 0.0 : 0.5 * parts * std::log(synchronised / late);

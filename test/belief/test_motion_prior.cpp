@@ -80,6 +80,24 @@ TEST(MotionPrior, APredictionWithinABurstIsAsUncertainAsTheIntervalBefore) {
   EXPECT_LT(std::sqrt(prior.predicted(0.001).covariance(2, 2)), 1e-3);
 }
 
+TEST(MotionPrior, NothingTakesPlaceInLessTimeThanItMayTake) {
+  const MotionPriorOptions options;
+  const Eigen::Isometry3d turn(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY()));
+  EXPECT_EQ(MotionPrior(options).interval(1e-6, ahead(0.3)), 0.3 / options.max_speed);
+  EXPECT_NEAR(MotionPrior(options).interval(1e-6, turn), 0.1 / options.max_rotation_rate, 1e-12);
+  EXPECT_EQ(MotionPrior(options).interval(0.1, turn), 0.1);
+}
+
+TEST(MotionPrior, AMeanOverALongIntervalIsNoVelocityOfNow) {
+  const MotionPriorOptions options = withoutStampErrors();
+  MotionPrior prior(options);
+  prior.takeVelocity(kSecond, ahead(9.0), 3.0, Matrix6d::Zero(), true, Matrix6d::Zero());
+  // Of a random walk: its value at the end differs from the mean by a third of the variance over the 3 s.
+  const double variance = std::pow(options.acceleration, 2) * (3.0 + 0.1) / 3.0 * 0.1 * 0.1;
+  EXPECT_NEAR(prior.confirmed(kSecond, 0.1)->covariance(2, 2), variance, 1e-9);
+  EXPECT_NEAR(prior.predicted(0.1).covariance(2, 2), variance, 1e-9);
+}
+
 TEST(MotionPrior, ADoubtfulMotionPredictsAndConfirmsNothing) {
   MotionPrior prior = moving({});
   prior.takeVelocity(2 * kSecond, ahead(0.9), 0.1, Matrix6d::Zero(), false, Matrix6d::Identity());

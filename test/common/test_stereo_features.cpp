@@ -81,6 +81,8 @@ TEST(StereoFeatures, RefusesNumbersThatMeanNothing) {
         refusals.emplace_back([array = array, bad](StereoFeatures& f) { (f.*array)[1] = bad; },
                               "array " + std::string(name) + " ");
   EXPECT_EQ(refusals.size(), 7u * 3u + 2u * 2u);
+  for (const double bad : {double{kNaN}, double{kInf}, -1.1})  // s
+    refusals.emplace_back([bad](StereoFeatures& f) { f.right_delay = bad; }, "right_delay");
   expectRefused(refusals);
 }
 

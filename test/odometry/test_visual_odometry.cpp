@@ -826,11 +826,11 @@ TEST(VisualOdometry, APredictedPairIsAsUncertainAsAVehicleMayAccelerate) {
     VisualOdometry odometry({});
     const OdometryResult before = follow(odometry, 5);
     const OdometryResult predicted = odometry.update(blindPair(5 + missed));
-    const double dt = 0.1 * missed;
+    const double before_it = 0.1, dt = 0.1 * missed, seconds_cubed = (before_it + dt) / 3.0 * dt * dt;
     Vector6d variance;
     const MotionPriorOptions options;
-    variance << Eigen::Vector3d::Constant(std::pow(options.acceleration, 2) * 2.0 / 3.0 * std::pow(dt, 3)),
-        Eigen::Vector3d::Constant(std::pow(options.rotation_acceleration, 2) * 2.0 / 3.0 * std::pow(dt, 3));
+    variance << Eigen::Vector3d::Constant(std::pow(options.acceleration, 2) * seconds_cubed),
+        Eigen::Vector3d::Constant(std::pow(options.rotation_acceleration, 2) * seconds_cubed);
     // As far off as the velocity before was, and by what a vehicle may accelerate.
     const Matrix6d expected = Matrix6d(variance.asDiagonal()) + missed * missed * before.motion_covariance;
     EXPECT_LT((predicted.motion_covariance - expected).norm(), 1e-12);

@@ -35,7 +35,8 @@ std::vector<RowMotion> rowsOf(const StereoFeatures& features, const Vector6d& ve
   std::vector<RowMotion> rows;
   constexpr double kStep = 1e-3;  // s
   const StereoFeatures later = seen(velocity, kStep), now = seen(velocity, 0.0);
-  for (int i = 0; i < features.count(); ++i) rows.push_back({(later.dv[i] - now.dv[i]) / kStep, features.dv[i]});
+  for (int i = 0; i < features.count(); ++i)
+    rows.push_back({(later.dv[i] - now.dv[i]) / kStep, features.dv[i], i % RowDelay::kParts});
   return rows;
 }
 
@@ -217,11 +218,29 @@ TEST(RightCameraDelay, LeftImagesThatShiftWhileTheCameraStandsAreNoPartnerOfAnot
     std::vector<RowMotion> rows;
     for (int i = 0; i < 200; ++i) {
       const double moved = turn * place(random);
-      rows.push_back({moved / kPeriod, noise(random) - moved});
+      rows.push_back({moved / kPeriod, noise(random) - moved, i % RowDelay::kParts});
     }
     right_delay.watch(rows, kPeriod, kRowError);
     EXPECT_LT(right_delay.otherPair(kPeriod).log_odds, logOdds(0.05)) << pair;
   }
+}
+
+TEST(RightCameraDelay, PartsOfTheImageAreTheWitnessesHoweverManyCornersTheyHave) {
+  // Rows follow a right image that is the next pair's, in so many parts.
+  const auto evidence = [](int parts, int corners) {
+    RightCameraDelay right_delay;
+    std::mt19937 random(3);
+    std::normal_distribution<double> normal;
+    std::vector<RowMotion> rows;
+    for (int i = 0; i < corners; ++i) {
+      const double velocity = 3.0 * (i % parts % 2);  // px/s
+      rows.push_back({velocity, kPeriod * velocity + 0.1 * normal(random), i % parts});
+    }
+    right_delay.watch(rows, kPeriod, kRowError);
+    return right_delay.otherPair(kPeriod).log_odds - kUnsuspected;
+  };
+  EXPECT_NEAR(evidence(2, 2000) / evidence(2, 200), 1.0, 0.2);
+  EXPECT_NEAR(evidence(24, 2000) / evidence(2, 2000), 23.0, 1.0);
 }
 
 TEST(RightCameraDelay, DoubtedPairsTeachNothing) {

@@ -60,8 +60,8 @@ class MotionPrior {
   const std::optional<Vector6d>& velocity() const { return velocity_; }
 
   /// The time in which a motion took place whose stamps are `dt` s apart, s. Those of a burst are closer together than
-  /// the moments at which its pairs were taken.
-  double interval(double dt) const;
+  /// the moments at which its pairs were taken, and nothing is faster than it may be.
+  double interval(double dt, const Eigen::Isometry3d& motion) const;
 
   /// The next motion as the velocity, which must be known, predicts it.
   ExpectedMotion predicted(double dt) const;
@@ -97,17 +97,18 @@ class MotionPrior {
   void forget();
 
  private:
-  Matrix6d processNoise(double dt, double age) const;
+  /// Of a motion over `dt` s, by the velocity over `before` s that ended `age` s ago.
+  Matrix6d processNoise(double dt, double before, double age) const;
   Matrix6d stampNoise(const Vector6d& velocity) const;
 
   MotionPriorOptions options_;
   std::optional<Vector6d> velocity_, before_,
       confirmed_;  ///< m/s and rad/s; `before_` is of the motion before the last
   Matrix6d velocity_covariance_ = Matrix6d::Zero(), confirmed_covariance_ = Matrix6d::Zero();
-  Matrix6d doubt_ = Matrix6d::Zero();  ///< of the last measured motion, m and rad
-  std::int64_t confirmed_stamp_ = 0;   ///< ns
-  double velocity_interval_ = 0.0;     ///< s, over which velocity_ was measured
-  double interval_ = 0.0;              ///< s: about the longest of the last intervals
+  Matrix6d doubt_ = Matrix6d::Zero();                          ///< of the last measured motion, m and rad
+  std::int64_t confirmed_stamp_ = 0;                           ///< ns
+  double velocity_interval_ = 0.0, confirmed_interval_ = 0.0;  ///< s, over which the velocities were measured
+  double interval_ = 0.0;                                      ///< s: about the longest of the last intervals
 };
 
 /// The same in every direction, m^2 and rad^2.

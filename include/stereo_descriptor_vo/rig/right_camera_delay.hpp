@@ -18,6 +18,7 @@ namespace sdvo {
 struct RowMotion {
   double velocity;  ///< down in the left image, px/s
   double dv;        ///< v_right - v_left beyond what is usual at its place, px
+  int part;         ///< of the image (RowDelay::cellOf)
 };
 
 /// The time by which the right image is taken later than the left one, and what it does to the features. Estimated is
