@@ -93,7 +93,6 @@ struct OdometryOutputOptions {
   double guess_timeout = 0.1;
   double guess_error = 0.1;
   int queue_size = 1;
-  int max_path_length = 20000;
   bool overwrite = false;
   int opencv_threads = -1;
   double max_silence = 2.0;
@@ -126,7 +125,6 @@ struct OdometryOutputOptions {
              "wall time to wait for either at each pair; seldom once it did not come in time");
     list.add("queue_size", queue_size, {1, 1000}, "",
              "feature messages that wait while one is processed; the newest win");
-    list.add("max_path_length", max_path_length, {1, 10000000}, "", "poses kept in the path; the newest win");
     list.add("overwrite", overwrite, "save_trajectory may replace files that were there before");
     list.add("opencv_threads", opencv_threads, {-1, 256}, "",
              "OpenCV's threads, of the whole process; 0: none beside the caller's, -1: left as they are");
@@ -144,8 +142,6 @@ struct OdometryOutputOptions {
 struct PlaceOutputOptions {
   std::string map_frame_id = "map";
   bool publish_tf = true;
-  double tf_rate = 10.0;
-  double transform_tolerance = 0.2;
   double correction_time = 2.0;
   double tf_timeout = 2.0;
   int sync_queue_size = 100;
@@ -163,9 +159,6 @@ struct PlaceOutputOptions {
   void describe(OptionList& list) {
     list.add("map_frame_id", map_frame_id, "frame of the corrected poses, parent of the odometry's frame");
     list.add("publish_tf", publish_tf, "publish map -> odom on /tf");
-    list.add("tf_rate", tf_rate, {0.1, 1000.0}, "Hz", "of map -> odom on /tf");
-    list.add("transform_tolerance", transform_tolerance, {0.0, 10.0}, "s",
-             "map -> odom is stamped so far ahead: until then it is good");
     list.add("correction_time", correction_time, {0.0, 600.0}, "s", "in which a correction goes into map -> odom");
     list.add("tf_timeout", tf_timeout, {0.0, 60.0}, "s",
              "wall time to wait for the transform base <- camera at the start");
@@ -179,7 +172,8 @@ struct PlaceOutputOptions {
     list.add("places_file", places_file,
              "file of save_places to begin with, relative ones below ROS_HOME; empty: with no places");
     list.add("save_at_shutdown", save_at_shutdown, "write the places to places_file each minute and at the end");
-    list.add("overwrite", overwrite, "files that are none of save_places, and maps with other or more places, may be replaced");
+    list.add("overwrite", overwrite,
+             "files that are none of save_places, and maps with other or more places, may be replaced");
     list.add("robot_name", robot_name, "what other robots know this one by; empty: the namespace");
     list.add("other_min_score", other_min_score, {0.0, 1.0}, "",
              "least likeness of a place of mine for which another robot is asked for its rows");

@@ -135,9 +135,8 @@ std::optional<cv::Point2f> EpipolarMatcher::align(const cv::Point2f& left_positi
   // Where the patch says little about its slant, upright is the better guess.
   constexpr float kNoise = 5.f, kUsualSlant = 0.2f;  // grey levels, px per row
   constexpr float kUpright = (kNoise / kUsualSlant) * (kNoise / kUsualSlant);
-  thread_local std::optional<SlantedPatch> scratch;
-  if (!scratch || scratch->radius() != options_.patch_radius) scratch.emplace(options_.patch_radius);
-  SlantedPatch& patch = *scratch;
+  constexpr int kHalfSide = 6;  // px, of the patch
+  thread_local SlantedPatch patch(kHalfSide);
   patch.take(images_.left, kMargin, left_position.x, left_position.y);
   Eigen::Matrix3f hessian = patch.hessian();
   const float dd = hessian(0, 0), dv = hessian(0, 1), vv = hessian(1, 1);

@@ -61,15 +61,16 @@ cv::Mat withLevelsOf(const cv::Mat& model, const cv::Mat& image, const std::arra
 
 }  // namespace
 
-void ExposureBalance::apply(double left_mean, double right_mean, cv::Mat& left, cv::Mat& right) const {
-  constexpr double kDark = 4.0;  // grey levels
+void balanceExposures(double left_mean, double right_mean, cv::Mat& left, cv::Mat& right) {
+  constexpr double kDark = 4.0;        // grey levels
+  constexpr double kTolerance = 0.15;  // ratio of the mean grey levels beyond 1
   const double darker = std::min(left_mean, right_mean), brighter = std::max(left_mean, right_mean);
-  if (!options_.enabled || darker < kDark || brighter <= (1.0 + options_.tolerance) * darker) return;
+  if (darker < kDark || brighter <= (1.0 + kTolerance) * darker) return;
   // A part that is covered on one side tells nothing of the exposure.
   constexpr double kCovered = 2.0;  // ratio, beyond that of most parts (chosen)
   const Parts ratios = logRatios(left, right);
   const double usual = quantile({ratios.begin(), ratios.end()}, 0.5);
-  if (std::abs(usual) <= std::log1p(options_.tolerance)) return;
+  if (std::abs(usual) <= std::log1p(kTolerance)) return;
   std::array<bool, kColumns * kRows> counting;
   for (std::size_t i = 0; i < ratios.size(); ++i) counting[i] = std::abs(ratios[i] - usual) < std::log(kCovered);
   if (usual > 0.0)

@@ -84,11 +84,13 @@ std::vector<Corner> detectSift(const cv::Mat& image, const FeatureDetectorOption
   return toCorners(keypoints);
 }
 
+constexpr int kGradientWindow = 5;  // px, side of the window of gftt's gradient matrix
+
 /// Local maxima of the gradient matrix' smaller eigenvalue as in cv::goodFeaturesToTrack, but with the response kept
 /// for the buckets.
 std::vector<Corner> detectGradientCorners(const cv::Mat& image, const FeatureDetectorOptions& options) {
   cv::Mat response, neighbourhood_maximum;
-  cv::cornerMinEigenVal(image, response, options.corner_block_size, 3);
+  cv::cornerMinEigenVal(image, response, kGradientWindow, 3);
   cv::dilate(response, neighbourhood_maximum, cv::Mat());
   double strongest = 0.0;
   cv::minMaxLoc(response, nullptr, &strongest);
@@ -121,18 +123,18 @@ std::vector<Corner> detectAll(const cv::Mat& image, const FeatureDetectorOptions
 
 /// To the intersection of the gradient lines. A corner that wanders off is not one point; its integer position is kept.
 /// Gradient detectors answer up to half their window inside of a corner, hence the limit.
-void refineByGradients(const cv::Mat& image, const FeatureDetectorOptions& options, std::vector<Corner>& corners) {
-  const int smallest_side = 2 * options.subpixel_radius + 5;  // of cv::cornerSubPix
-  if (corners.empty() || std::min(image.cols, image.rows) < smallest_side) return;
+void refineByGradients(const cv::Mat& image, std::vector<Corner>& corners) {
+  constexpr int kHalfSide = 3;  // px, of the window: cv::cornerSubPix needs 11 px, less than the smallest image has
+  if (corners.empty()) return;
   const cv::Rect2f inside(0.f, 0.f, static_cast<float>(image.cols - 1), static_cast<float>(image.rows - 1));
-  const float largest_shift = 0.5f * static_cast<float>(options.corner_block_size);
+  constexpr float kLargestShift = 0.5f * kGradientWindow;
   std::vector<cv::Point2f> refined;
   for (const Corner& corner : corners) refined.push_back(corner.position);
-  cv::cornerSubPix(image, refined, {options.subpixel_radius, options.subpixel_radius}, {-1, -1},
+  cv::cornerSubPix(image, refined, {kHalfSide, kHalfSide}, {-1, -1},
                    {cv::TermCriteria::COUNT | cv::TermCriteria::EPS, 10, 0.02});
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const cv::Point2f shift = refined[i] - corners[i].position;
-    if (std::max(std::abs(shift.x), std::abs(shift.y)) <= largest_shift && inside.contains(refined[i]))
+    if (std::max(std::abs(shift.x), std::abs(shift.y)) <= kLargestShift && inside.contains(refined[i]))
       corners[i].position = refined[i];
   }
 }
@@ -145,7 +147,7 @@ void refine(const cv::Mat& image, const FeatureDetectorOptions& options, std::ve
       for (Corner& corner : corners) corner.position += cornerPeak(image, cv::Point(corner.position));
       break;
     case DetectorType::kGftt:
-      refineByGradients(image, options, corners);
+      refineByGradients(image, corners);
       break;
     case DetectorType::kOrb:
     case DetectorType::kSift:

@@ -9,6 +9,7 @@
 
 #include "../common/kernel.hpp"
 #include "stereo_descriptor_vo/common/stopwatch.hpp"
+#include "stereo_descriptor_vo/front_end/exposure_balance.hpp"
 
 namespace sdvo {
 namespace {
@@ -83,7 +84,6 @@ void FeatureExtractorOptions::check() const {
 FeatureExtractor::FeatureExtractor(const FeatureExtractorOptions& options)
     : options_(checked(options)),
       detector_(options.detector),
-      exposure_balance_(options.exposure_balance),
       stereo_matcher_(options.stereo),
       rig_monitor_(options.rig_monitor, options.stereo.max_epipolar_residual, options.stereo.epipolar.max_disparity),
       depth_scale_(options.sizeCurve()),
@@ -154,7 +154,7 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
 
   // Find each feature in the right image, in images that are equally exposed.
   cv::Mat searched_left = left, searched_right = right;
-  exposure_balance_.apply(report.mean_intensity[0], report.mean_intensity[1], searched_left, searched_right);
+  balanceExposures(report.mean_intensity[0], report.mean_intensity[1], searched_left, searched_right);
   std::vector<cv::Point2f> positions;
   positions.reserve(corners.size());
   for (const Corner& corner : corners) positions.push_back(corner.position);

@@ -21,7 +21,7 @@ struct Rows {
 
 /// Each corner is compared with some of those before it.
 Rows fitRows(const std::vector<FoundCorner>& found, int columns) {
-  constexpr std::size_t kCompared = 100;  // with all, time would grow with the square of rig_monitor/corners
+  constexpr std::size_t kCompared = 100;  // with all, time would grow with the square of the corners
   std::vector<double> slopes, rest;
   for (std::size_t i = 0; i < found.size(); ++i)
     for (std::size_t k = 0; k < i; k += 1 + i / kCompared)
@@ -63,14 +63,15 @@ RigMonitor::RigMonitor(const RigMonitorOptions& options, double max_dv, double m
     : options_(checked(options)), max_dv_(max_dv), max_disparity_(max_disparity) {}
 
 bool RigMonitor::isSuspicious(int corners, int found) const {
-  return options_.enabled && corners >= kEnough && found < options_.suspicious_share * corners;
+  return corners >= kEnough && found < options_.suspicious_share * corners;
 }
 
 RigDiagnosis RigMonitor::diagnose(const cv::Mat& left, const cv::Mat& right,
                                   const std::vector<cv::Point2f>& corners) const {
-  const BlockSearch search(left, right, std::max(max_disparity_, 0.5 * left.cols), options_.reach);
+  const BlockSearch search(left, right, std::max(max_disparity_, 0.5 * left.cols), kReach);
   std::vector<FoundCorner> found;
-  const std::size_t most = static_cast<std::size_t>(options_.corners), step = (corners.size() + most - 1) / most;
+  constexpr std::size_t kMost = 120;  // corners: a millisecond
+  const std::size_t step = (corners.size() + kMost - 1) / kMost;
   for (std::size_t i = 0; i < corners.size(); i += step) {
     const auto corner = search.find(corners[i]);
     if (!corner) continue;

@@ -128,7 +128,7 @@ void LocalMap::insert(const PatchAlignmentOptions& alignment, const StereoFeatur
   frames_.back().is_keyframe = needsKeyframe();
   // A corner that nothing is ever aligned with is no better than those seen later.
   const double sigma =
-      alignment.canAlign(features.patch_layout.side) ? options_.noise.reference : options_.noise.corner;
+      alignment.canAlign(features.patch_layout.side) ? NoiseOptions::kReference : options_.noise.corner;
   for (int i = 0; i < features.count(); ++i)
     if (!recognised[i]) startPoint(features, i, id, T_camera_origin, calibration, sigma);
   if (static_cast<int>(frames_.size()) > options_.keyframes + 1) forgetKeyframe();
@@ -150,6 +150,7 @@ LocalMap::Sighting LocalMap::sight(const PatchAlignmentOptions& options, const S
 }
 
 void LocalMap::renewAppearance(const StereoFeatures& features, const std::vector<Sighting>& sightings) {
+  constexpr double kRenewal = 1.2;  // factor on a point's size since its reference patch was taken
   std::vector<const Sighting*> of_feature(features.u.size(), nullptr);
   for (const Sighting& sighting : sightings) of_feature[sighting.feature] = &sighting;
   for (Point& point : points_) {
@@ -158,7 +159,7 @@ void LocalMap::renewAppearance(const StereoFeatures& features, const std::vector
     if (!sighting) continue;  // not seen, cut off or just started
     takeDescriptor(point, features, last.feature);
     const double change = std::max(sighting->scale, 1.0 / sighting->scale);
-    if (sighting->aligned && change > options_.renewal_scale)
+    if (sighting->aligned && change > kRenewal)
       point.reference.take(features, last.feature, sighting->measurement.head<2>(), newestPose());
   }
 }
@@ -347,7 +348,8 @@ std::vector<double> LocalMap::parallaxToPredecessors(std::size_t frames) const {
 
 /// The frame since which a point must have been seen if it was seen only once.
 int LocalMap::lookedForSince() const {
-  return frames_[frames_.size() - std::min(frames_.size(), std::size_t(options_.remembered))].id;
+  constexpr std::size_t kMissed = 4;  // frames of the map that may miss it
+  return frames_[frames_.size() - std::min(frames_.size(), kMissed)].id;
 }
 
 /// A place that was seen once and then missed is most often no place at all.

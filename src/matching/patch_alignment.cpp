@@ -79,7 +79,7 @@ bool makeTemplate(const NearPatch& reference, const Eigen::Vector2f& centre, con
 }  // namespace
 
 std::string PatchAlignmentOptions::complaint(int patch_side) const {
-  if (!enabled || patch_side == 0 || canAlign(patch_side)) return "";
+  if (patch_side == 0 || canAlign(patch_side)) return "";
   const std::string side = std::to_string(patch_side);
   return "patches of " + side + "x" + side + " samples are too small for alignment/radius " + std::to_string(radius) +
          ": no match is aligned; descriptor/patch_side of stereo_features must be " + std::to_string(leastSide()) +
@@ -89,7 +89,8 @@ std::string PatchAlignmentOptions::complaint(int patch_side) const {
 std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const Patch& reference,
                                      const Eigen::Vector2f& centre, const Patch& current, const Eigen::Matrix2f& warp) {
   constexpr int kIterations = 10;
-  constexpr float kConverged = 0.02f;  // samples
+  constexpr float kConverged = 0.02f;        // samples
+  constexpr float kLeastCorrelation = 0.7f;  // of the aligned patches
   const SampleSquare& square = squareOf(options.radius);
   thread_local NearPatch near_reference, near_current;
   near_reference.take(reference), near_current.take(current);
@@ -123,7 +124,7 @@ std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const
   PatchShift found;
   found.shift = current.spacing * position;
   found.correlation = p.ab / std::sqrt(pattern.square * p.aa);
-  if (!(found.correlation >= static_cast<float>(options.min_correlation))) return std::nullopt;
+  if (!(found.correlation >= kLeastCorrelation)) return std::nullopt;
   // The remaining difference is noise of the images, four parameters fitted, and so tells the position's. It is
   // about one image's, because values between samples are smooth. The reference's appears as large as this does. That
   // of a current patch in which the point appears smaller does not shrink: its samples are taken more than once.

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "../common/text.hpp"
 #include "feature_conversions.hpp"
 #include "frames.hpp"
 #include "pose_conversions.hpp"
@@ -103,8 +104,8 @@ msgs::PlaceInfo toInfo(const PlaceReport& report) {
   return info;
 }
 
-msgs::PlaceSignature toMessage(const PlaceSignature& words, const Place& place, const PlaceIndexOptions& index,
-                               const std::string& robot, const std::string& frame_id) {
+msgs::PlaceSignature toMessage(const PlaceSignature& words, const Place& place, const std::string& robot,
+                               const std::string& frame_id) {
   msgs::PlaceSignature message;
   message.header.stamp = toTime(place.features.stamp);
   message.header.frame_id = frame_id;
@@ -115,22 +116,19 @@ msgs::PlaceSignature toMessage(const PlaceSignature& words, const Place& place, 
   message.layout = nameOf(kind.layout);
   message.element_type = nameOf(kind.element_type);
   message.bytes_per_row = static_cast<std::uint32_t>(kind.bytes);
-  message.words_per_row = static_cast<std::uint32_t>(index.words_per_row);
-  message.bits_per_word = static_cast<std::uint32_t>(index.bits_per_word);
+  message.words_per_row = PlaceIndex::kWordsPerRow;
+  message.bits_per_word = PlaceIndex::kBitsPerWord;
   message.words = words;
   return message;
 }
 
-PlaceSignature fromMessage(const msgs::PlaceSignature& message, const PlaceIndexOptions& index,
-                           const DescriptorKind& kind) {
+PlaceSignature fromMessage(const msgs::PlaceSignature& message, const DescriptorKind& kind) {
   const auto refuse = [](const std::string& what) {
     throw std::invalid_argument("PlaceSignature message refused: " + what);
   };
-  if (message.words_per_row != static_cast<std::uint32_t>(index.words_per_row) ||
-      message.bits_per_word != static_cast<std::uint32_t>(index.bits_per_word))
-    refuse(std::to_string(message.words_per_row) + " words of " + std::to_string(message.bits_per_word) +
-           " bits for a row, here " + std::to_string(index.words_per_row) + " of " +
-           std::to_string(index.bits_per_word) + ": set index/... alike in both robots");
+  if (message.words_per_row != PlaceIndex::kWordsPerRow || message.bits_per_word != PlaceIndex::kBitsPerWord)
+    refuse(text(0, message.words_per_row, " words of ", message.bits_per_word, " bits for a row, here ",
+                PlaceIndex::kWordsPerRow, " of ", PlaceIndex::kBitsPerWord, ": other versions of this package?"));
   if (message.descriptor != kind.descriptor || message.layout != nameOf(kind.layout) ||
       message.element_type != nameOf(kind.element_type) ||
       message.bytes_per_row != static_cast<std::uint32_t>(kind.bytes))
@@ -140,7 +138,7 @@ PlaceSignature fromMessage(const msgs::PlaceSignature& message, const PlaceIndex
   if (message.words.size() > kMostWords) refuse(std::to_string(message.words.size()) + " words");
   if (std::adjacent_find(message.words.begin(), message.words.end(), std::greater_equal<>()) != message.words.end())
     refuse("words that do not ascend");
-  const std::uint64_t end = static_cast<std::uint64_t>(index.words_per_row) << index.bits_per_word;
+  const std::uint64_t end = std::uint64_t{PlaceIndex::kWordsPerRow} << PlaceIndex::kBitsPerWord;
   if (!message.words.empty() && message.words.back() >= end) refuse("a word beyond the largest one");
   return message.words;
 }
@@ -229,14 +227,14 @@ msgs::MapGraph toMessage(const MapState& map, const std::string& robot, const st
   return message;
 }
 
-PoseGraph fromMessage(const msgs::MapGraph& message, const PoseGraphOptions& options) {
+PoseGraph fromMessage(const msgs::MapGraph& message) {
   std::map<int, Eigen::Isometry3d> nodes;
   for (const msgs::MapNode& node : message.nodes)
     if (!nodes.emplace(toInt(node.id, "id"), toPose(node.pose)).second)
       throw std::invalid_argument("node " + std::to_string(node.id) + " is there twice");
   std::vector<GraphEdge> edges;
   for (const msgs::MapEdge& edge : message.edges) edges.push_back(edgeOf(edge));
-  return PoseGraph(options, std::move(nodes), std::move(edges));
+  return PoseGraph(std::move(nodes), std::move(edges));
 }
 
 nav_msgs::Path toPath(const MapState& map, const Eigen::Isometry3d& T_base_camera, const std::string& frame_id) {

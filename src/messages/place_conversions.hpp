@@ -37,11 +37,9 @@ Place fromMessage(const stereo_descriptor_vo::Place& message);
 stereo_descriptor_vo::PlaceInfo toInfo(const PlaceReport& report);
 
 stereo_descriptor_vo::PlaceSignature toMessage(const PlaceSignature& words, const Place& place,
-                                               const PlaceIndexOptions& index, const std::string& robot,
-                                               const std::string& frame_id);
-/// Throws std::invalid_argument when the message's words are not such as `index` makes of rows like `kind`.
-PlaceSignature fromMessage(const stereo_descriptor_vo::PlaceSignature& message, const PlaceIndexOptions& index,
-                           const DescriptorKind& kind);
+                                               const std::string& robot, const std::string& frame_id);
+/// Throws std::invalid_argument when the message's words are not such as an index makes of rows like `kind`.
+PlaceSignature fromMessage(const stereo_descriptor_vo::PlaceSignature& message, const DescriptorKind& kind);
 
 /// Names of robots are the caller's to fill.
 stereo_descriptor_vo::PlaceMatch toMessage(const PlaceMatch& match, const Place& mine, const Place& other,
@@ -58,7 +56,7 @@ struct MapState {
 
 stereo_descriptor_vo::MapGraph toMessage(const MapState& map, const std::string& robot, const std::string& frame_id);
 /// Throws std::invalid_argument when the message does not hold together.
-PoseGraph fromMessage(const stereo_descriptor_vo::MapGraph& message, const PoseGraphOptions& options);
+PoseGraph fromMessage(const stereo_descriptor_vo::MapGraph& message);
 
 /// Poses of the base at the key frames.
 nav_msgs::Path toPath(const MapState& map, const Eigen::Isometry3d& T_base_camera, const std::string& frame_id);

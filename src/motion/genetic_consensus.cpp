@@ -73,7 +73,7 @@ class GeneticSearch {
 
   Consensus run() {
     result_.cost = std::numeric_limits<double>::max();
-    std::vector<Individual> population(static_cast<std::size_t>(options_.population));
+    std::vector<Individual> population(GeneticConsensusOptions::kPopulation);
     for (Individual& individual : population) {
       individual.genes = drawSample(random_, problem_.count());
       evaluate(individual);
@@ -136,7 +136,7 @@ class GeneticSearch {
 
   void mutateAtFixedRate(MinimalSample& genes) {
     for (std::size_t g = 0; g < genes.size(); ++g)
-      if (uniform(random_) < options_.mutation_rate) replace(genes, g, false);
+      if (uniform(random_) < GeneticConsensusOptions::kMutationRate) replace(genes, g, false);
   }
 
   /// All genes of an unfit individual are replaced: at random in the beginning, by the best known ones in the end.

@@ -8,23 +8,24 @@ namespace sdvo {
 namespace {
 
 constexpr std::size_t kRemembered = 20;
+constexpr double kLongestWay = 20.0;         // m back on the way, to the second loop
+constexpr double kLargestTranslation = 0.5;  // m between the spots where two loops put the camera
+constexpr double kLargestRotation = 2.0;     // deg between their directions
 
 }  // namespace
 
-LoopAgreement::LoopAgreement(const LoopAgreementOptions& options) : options_(checked(options)) {}
-
 std::vector<GraphEdge> LoopAgreement::confirm(const PoseGraph& graph, const GraphEdge& proposal) {
   const auto& nodes = graph.nodes();
-  const std::set<int> near_from = graph.near(proposal.from, options_.max_way);
-  const std::set<int> near_to = graph.near(proposal.to, options_.max_way);
+  const std::set<int> near_from = graph.near(proposal.from, kLongestWay);
+  const std::set<int> near_to = graph.near(proposal.to, kLongestWay);
   // Nodes that were forgotten meanwhile are near to none.
   const auto agrees = [&](const GraphEdge& earlier) {
     if (near_from.count(earlier.from) == 0 || near_to.count(earlier.to) == 0 || earlier.to == proposal.to) return false;
     const Eigen::Isometry3d T_from_from = nodes.at(proposal.from).inverse() * nodes.at(earlier.from);
     const Eigen::Isometry3d T_to_to = nodes.at(earlier.to).inverse() * nodes.at(proposal.to);
     const Eigen::Isometry3d offset = proposal.T_from_to.inverse() * T_from_from * earlier.T_from_to * T_to_to;
-    return offset.translation().norm() <= options_.max_translation &&
-           Eigen::AngleAxisd(offset.linear()).angle() <= options_.max_rotation * CV_PI / 180.0;
+    return offset.translation().norm() <= kLargestTranslation &&
+           Eigen::AngleAxisd(offset.linear()).angle() <= kLargestRotation * CV_PI / 180.0;
   };
 
   std::vector<GraphEdge> trusted;

@@ -54,24 +54,22 @@ StereoFeatures thinOut(const StereoFeatures& features, int most) {
   return thinned;
 }
 
-PlaceIndex::PlaceIndex(const PlaceIndexOptions& options) : options_(checked(options)) {}
-
 PlaceSignature PlaceIndex::signature(const StereoFeatures& features) const {
   const int row_bits = 8 * features.descriptors.cols;
-  const int needed = options_.words_per_row * options_.bits_per_word;
+  constexpr int needed = kWordsPerRow * kBitsPerWord;
   if (features.count() > 0 && (features.element_type != ElementType::kBits || row_bits < needed))
     throw std::invalid_argument("places are recognised by rows of at least " + std::to_string(needed) +
                                 " bits, not by " + toString(features.kind()));
   PlaceSignature words;
   if (features.count() == 0) return words;
   const std::vector<int> bits = sampleBits(row_bits, needed);
-  words.reserve(static_cast<std::size_t>(features.count()) * options_.words_per_row);
+  words.reserve(static_cast<std::size_t>(features.count()) * kWordsPerRow);
   for (int i = 0; i < features.count(); ++i) {
     const std::uint8_t* row = features.descriptors.ptr(i);
     auto bit = bits.begin();
-    for (int w = 0; w < options_.words_per_row; ++w) {
+    for (int w = 0; w < kWordsPerRow; ++w) {
       auto word = static_cast<std::uint32_t>(w);
-      for (int b = 0; b < options_.bits_per_word; ++b, ++bit) word = word << 1 | (row[*bit / 8] >> (*bit % 8) & 1u);
+      for (int b = 0; b < kBitsPerWord; ++b, ++bit) word = word << 1 | (row[*bit / 8] >> (*bit % 8) & 1u);
       words.push_back(word);
     }
   }

@@ -30,12 +30,7 @@ Matrix6d unknown() {
 
 }  // namespace
 
-PlaceRecognition::PlaceRecognition(const PlaceRecognitionOptions& options)
-    : options_(checked(options)),
-      index_(options.index),
-      verifier_(options.verifier),
-      agreement_(options.agreement),
-      graph_(options.graph) {}
+PlaceRecognition::PlaceRecognition(const PlaceRecognitionOptions& options) : options_(checked(options)) {}
 
 std::optional<PlaceReport> PlaceRecognition::observe(const StereoFeatures& features, const CameraMotion& motion) {
   features.check();
@@ -104,7 +99,7 @@ void PlaceRecognition::forget(int id) {
 
 /// Whether the last pair is worth keeping: far enough from the last key frame, and with enough to be recognised by.
 bool PlaceRecognition::isKeyframe(const StereoFeatures& features) const {
-  if (features.count() < options_.verifier.min_inliers) return false;
+  if (features.count() < PlaceVerifier::kLeastInliers) return false;
   if (!last_ || !way_.known) return true;
   const Eigen::Isometry3d T_keyframe_camera = places_.at(*last_).T_odom_camera.inverse() * *way_.T_odom_camera;
   return T_keyframe_camera.translation().norm() >= options_.keyframe_distance ||
@@ -220,8 +215,8 @@ PlaceSignature PlaceRecognition::signature(int place) const {
 std::size_t PlaceRecognition::bytes() const {
   std::size_t bytes = 0;
   for (const auto& [id, place] : places_)
-    bytes += place.bytes() + 2 * sizeof(std::uint32_t) * static_cast<std::size_t>(options_.index.words_per_row) *
-                                 static_cast<std::size_t>(place.features.count());
+    bytes += place.bytes() +
+             2 * sizeof(std::uint32_t) * PlaceIndex::kWordsPerRow * static_cast<std::size_t>(place.features.count());
   return bytes;
 }
 
@@ -236,7 +231,7 @@ PlaceMatch PlaceRecognition::verify(int place, const StereoFeatures& features) c
 void PlaceRecognition::restore(std::vector<Place> places, const PoseGraph& graph) {
   if (!places_.empty()) throw std::invalid_argument("places can only be taken up before there are any");
   if (places.empty()) throw std::invalid_argument("there are no places to take up");
-  PlaceIndex index(options_.index);
+  PlaceIndex index;
   std::map<int, Place> restored;
   int segment = 0;
   for (Place& place : places) {

@@ -2,22 +2,28 @@
 
 #include <vector>
 
+#include "../common/text.hpp"
 #include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
 #include "stereo_descriptor_vo/matching/feature_matcher.hpp"
 
 namespace sdvo {
 namespace {
 
-FeatureMatcherOptions matcherOptions(const PlaceVerifierOptions& options) {
+// Less, or larger, is not the same place (chosen).
+constexpr double kLeastRatio = 0.3;      // inliers per match
+constexpr double kLeastCoverage = 0.25;  // by inliers, share of an 8x4 grid over the image
+constexpr double kLargestRms = 1.5;      // px per coordinate
+
+FeatureMatcherOptions matcherOptions() {
   FeatureMatcherOptions matcher;
-  matcher.gating = false;  // nothing is known of where the place would be seen from
-  matcher.max_distance = options.max_distance;
+  matcher.gating = false;      // nothing is known of where the place would be seen from
+  matcher.max_distance = 0.3;  // share of the bits
   return matcher;
 }
 
-MotionEstimatorOptions estimatorOptions(const PlaceVerifierOptions& options) {
+MotionEstimatorOptions estimatorOptions() {
   MotionEstimatorOptions estimator;
-  estimator.inlier_threshold = options.inlier_threshold;
+  estimator.inlier_threshold = 3.0;  // px
   // Enough for the smallest share of inliers that is accepted; what is another place takes all of them.
   estimator.max_iterations = 150;
   return estimator;
@@ -25,14 +31,13 @@ MotionEstimatorOptions estimatorOptions(const PlaceVerifierOptions& options) {
 
 }  // namespace
 
-PlaceVerifier::PlaceVerifier(const PlaceVerifierOptions& options)
-    : options_(checked(options)), views_(matcherOptions(options), estimatorOptions(options)) {}
+PlaceVerifier::PlaceVerifier() : views_(matcherOptions(), estimatorOptions()) {}
 
 PlaceMatch PlaceVerifier::verify(const StereoFeatures& place, const StereoFeatures& current) const {
   const auto [matches, correspondences, motion] = views_.match(place, current, RigCalibration());
   PlaceMatch match;
   match.matches = static_cast<int>(matches.size());
-  if (match.matches < options_.min_inliers) {
+  if (match.matches < kLeastInliers) {
     match.reason = "only " + std::to_string(match.matches) + " matches";
     return match;
   }
@@ -51,12 +56,12 @@ PlaceMatch PlaceVerifier::verify(const StereoFeatures& place, const StereoFeatur
   match.covariance = 2.0 * motion.covariance;
 
   const std::string inliers = std::to_string(match.inliers) + " of " + std::to_string(match.matches) + " matches";
-  if (match.inliers < options_.min_inliers || match.inliers < options_.min_inlier_ratio * match.matches)
+  if (match.inliers < kLeastInliers || match.inliers < kLeastRatio * match.matches)
     match.reason = "only " + inliers + " agree";
-  else if (match.coverage < options_.min_coverage)
+  else if (match.coverage < kLeastCoverage)
     match.reason = inliers + " agree, but only in a small part of the image";
-  else if (match.rms > options_.max_rms)
-    match.reason = inliers + " agree, but with residuals above verifier/max_rms";
+  else if (match.rms > kLargestRms)
+    match.reason = inliers + " agree, but their residuals are above " + text(kLargestRms, 1) + " px";
   match.same = match.reason.empty();
   return match;
 }

@@ -82,13 +82,12 @@ Matrix6d inverted(const Eigen::Isometry3d& T, const Matrix6d& covariance) {
 
 }  // namespace
 
-PoseGraph::PoseGraph(const PoseGraphOptions& options) : options_(checked(options)) {
+PoseGraph::PoseGraph() {
   requirePoseGraphSolver();
 }
 
-PoseGraph::PoseGraph(const PoseGraphOptions& options, std::map<int, Eigen::Isometry3d> nodes,
-                     std::vector<GraphEdge> edges)
-    : options_(checked(options)), nodes_(std::move(nodes)), edges_(std::move(edges)) {
+PoseGraph::PoseGraph(std::map<int, Eigen::Isometry3d> nodes, std::vector<GraphEdge> edges)
+    : nodes_(std::move(nodes)), edges_(std::move(edges)) {
   for (const GraphEdge& edge : edges_) {
     const std::string name = "edge " + std::to_string(edge.from) + " - " + std::to_string(edge.to);
     if (nodes_.count(edge.from) == 0 || nodes_.count(edge.to) == 0)
@@ -145,9 +144,10 @@ PoseGraph::Summary PoseGraph::optimise() {
 }
 
 Matrix6d PoseGraph::drift(double length, double turn) const {
-  constexpr double kRadians = CV_PI / 180.0;
-  const double rotation = options_.drift_rotation * kRadians * length + options_.drift_turn * turn;
-  const double translation = options_.drift_translation * length + 0.5 * rotation * length;
+  constexpr double kDriftOfRotation = 0.01 * CV_PI / 180.0;  // rad/m
+  constexpr double kDriftOfTranslation = 0.03;               // m/m
+  const double rotation = kDriftOfRotation * length + kDriftOfTurn * turn;
+  const double translation = kDriftOfTranslation * length + 0.5 * rotation * length;
   Vector6d variances;
   variances << Eigen::Vector3d::Constant(translation * translation), Eigen::Vector3d::Constant(rotation * rotation);
   return variances.asDiagonal();
@@ -166,7 +166,7 @@ bool PoseGraph::loopsHold() const {
   for (const GraphEdge& edge : edges_) {
     if (edge.kind != GraphEdge::Kind::kLoop) continue;
     ++all;
-    hold += residual(edge) <= options_.loop_threshold;
+    hold += residual(edge) <= kLoopThreshold;
   }
   return 2 * hold > all;
 }

@@ -101,14 +101,14 @@ void PoseGraph::solve(Summary& summary) {
     NodePose &from = poses.at(edge.from), &to = poses.at(edge.to);
     problem.AddResidualBlock(
         new ceres::AutoDiffCostFunction<EdgeResidual, 6, 4, 3, 4, 3, 1>(new EdgeResidual(edge, covariance(edge))),
-        edge.kind == GraphEdge::Kind::kLoop ? new ceres::CauchyLoss(options_.loop_threshold) : nullptr,
-        from.q.coeffs().data(), from.t.data(), to.q.coeffs().data(), to.t.data(), &turn_error_);
+        edge.kind == GraphEdge::Kind::kLoop ? new ceres::CauchyLoss(kLoopThreshold) : nullptr, from.q.coeffs().data(),
+        from.t.data(), to.q.coeffs().data(), to.t.data(), &turn_error_);
   }
-  const double sigma = std::max(options_.drift_turn, 1e-6);
-  problem.AddResidualBlock(new ceres::AutoDiffCostFunction<NearZero, 1, 1>(new NearZero{sigma}), nullptr, &turn_error_);
+  problem.AddResidualBlock(new ceres::AutoDiffCostFunction<NearZero, 1, 1>(new NearZero{kDriftOfTurn}), nullptr,
+                           &turn_error_);
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  options.max_num_iterations = options_.iterations;
+  options.max_num_iterations = 50;    // more would keep a key frame waiting
   options.function_tolerance = 1e-4;  // further steps move nodes by less than loops know
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary solved;

@@ -41,9 +41,9 @@ CalibrationBelief CalibrationFilter::prior(int oldest_id) const {
   return belief;
 }
 
-/// The windows keep the precision that they state; a prior weighed up by 1 / trust^2 is the same.
+/// The windows keep the precision that they state; a prior weighed up by 1 / kTrust^2 is the same.
 RigCalibration::Matrix CalibrationFilter::informationOf(const RigCalibration::Vector& spread) const {
-  return (options_.trust * spread).cwiseAbs2().cwiseInverse().asDiagonal();
+  return (kTrust * spread).cwiseAbs2().cwiseInverse().asDiagonal();
 }
 
 /// Standard deviation, px, of the rig around the options' prior: as much of the evidence's distance from it as chance
@@ -83,7 +83,7 @@ void CalibrationFilter::note(int oldest_id, int newest_id, const RigCalibration&
 void CalibrationFilter::widen(double variance) {
   const auto widened = [&](Information& known) {
     const RigCalibration::Vector mean = known.information.ldlt().solve(known.information_mean);
-    const RigCalibration::Matrix added = variance / (options_.trust * options_.trust) * RigCalibration::Matrix::Ones();
+    const RigCalibration::Matrix added = variance / (kTrust * kTrust) * RigCalibration::Matrix::Ones();
     known.information = (RigCalibration::Matrix::Identity() + known.information * added).inverse() * known.information;
     known.information_mean = known.information * mean;
   };
@@ -98,7 +98,7 @@ CalibrationEstimate CalibrationFilter::estimate() const {
   const RigCalibration::Matrix of_prior = informationOf(RigCalibration::Vector::Constant(options_.prior_sigma));
   const Information known = present_.value_or(Information());
   const RigCalibration::Matrix covariance = (of_prior + known.information).inverse();
-  return {covariance * (of_prior * prior + known.information_mean), covariance / (options_.trust * options_.trust)};
+  return {covariance * (of_prior * prior + known.information_mean), covariance / (kTrust * kTrust)};
 }
 
 RigCalibration::Vector CalibrationFilter::sigma() const {

@@ -15,7 +15,7 @@ OdometryPublisher::OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOp
               ros_conversions::cleanFrameId(options.base_frame_id)},
       session_(ros::Time().fromNSec(ros::WallTime::now().toNSec())),
       transform_publisher_(nh, tag),
-      path_(static_cast<std::size_t>(options.max_path_length)) {
+      path_(kLongestPath) {
   constexpr int kQueue = 10;
   odom_publisher_ = nh.advertise<nav_msgs::Odometry>("odom", kQueue);
   pose_publisher_ = nh.advertise<geometry_msgs::PoseWithCovarianceStamped>("pose", kQueue);

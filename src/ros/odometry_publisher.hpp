@@ -41,7 +41,8 @@ class OdometryPublisher {
   /// The odometry has been reset: the path begins anew, too.
   void restart(const Eigen::Isometry3d& T_odom_start);
 
-  /// The poses since the last reset, the newest `max_path_length` of them. From any thread.
+  static constexpr std::size_t kLongestPath = 20'000;  ///< poses: at 30 Hz eleven minutes, 1.3 MB
+  /// The poses since the last reset, the newest `kLongestPath` of them. From any thread.
   nav_msgs::Path path() const;
 
  private:

@@ -11,6 +11,13 @@ namespace sdvo {
 
 namespace msgs = stereo_descriptor_vo;
 
+namespace {
+
+/// s, of map -> odom on /tf. It is stamped two of them ahead: so long a listener need not wait for the next one.
+constexpr double kTfPeriod = 0.1;
+
+}  // namespace
+
 PlacePublisher::PlacePublisher(ros::NodeHandle& nh, const PlaceOutputOptions& options, const std::string& robot,
                                std::uint32_t tag, std::function<Map()> map)
     : options_(options),
@@ -31,8 +38,7 @@ PlacePublisher::PlacePublisher(ros::NodeHandle& nh, const PlaceOutputOptions& op
   map_timer_ = nh.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { publishMap(); });
   // By the time of stamps: a transform that has the stamp of the one before is an error to TF.
   if (options_.publish_tf)
-    tf_timer_ =
-        nh.createTimer(ros::Duration(1.0 / options_.tf_rate), [this](const ros::TimerEvent&) { publishTransform(); });
+    tf_timer_ = nh.createTimer(ros::Duration(kTfPeriod), [this](const ros::TimerEvent&) { publishTransform(); });
 }
 
 void PlacePublisher::noteChange() {
@@ -64,7 +70,7 @@ void PlacePublisher::publishTransform() {
   if (!eased_ || now.isZero() || now == last_stamp_) return;
   last_stamp_ = now;
   geometry_msgs::TransformStamped transform = tf2::eigenToTransform(eased_->at(now.toSec()));
-  transform.header.stamp = now + ros::Duration(options_.transform_tolerance);
+  transform.header.stamp = now + ros::Duration(2.0 * kTfPeriod);
   transform.header.frame_id = map_frame_;
   transform.child_frame_id = odom_frame_;
   transform_publisher_.send(transform);

@@ -427,7 +427,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   /// A session that begins with the places of a file. Throws std::runtime_error or std::invalid_argument.
   std::shared_ptr<PlaceSession> load(const std::string& path) const {
-    return std::make_shared<PlaceSession>(options_.recognition, loadPlaces(path, options_.recognition.graph));
+    return std::make_shared<PlaceSession>(options_.recognition, loadPlaces(path));
   }
 
   static constexpr double kRests = 20.0;      // times as long as saving took: at most a twentieth of the disk's time

@@ -18,11 +18,7 @@
 namespace sdvo {
 
 PlaceSession::PlaceSession(const PlaceRecognitionOptions& options, SavedPlaces saved)
-    : index_(options.index),
-      localises_only_(options.localisation_only),
-      recognition_(options),
-      stream_(saved.stream),
-      located_(false) {
+    : localises_only_(options.localisation_only), recognition_(options), stream_(saved.stream), located_(false) {
   recognition_.restore(std::move(saved.places), saved.graph);
   loaded_ = recognition_.places().rbegin()->first + 1;
 }
@@ -119,7 +115,7 @@ std::optional<stereo_descriptor_vo::Place> PlaceSession::message(int id, const s
 std::optional<stereo_descriptor_vo::PlaceSignature> PlaceSession::signature(int id, const std::string& robot) const {
   const auto place = recognition_.places().find(id);
   if (place == recognition_.places().end()) return std::nullopt;
-  return ros_conversions::toMessage(recognition_.signature(id), place->second, index_, robot, stream_.frame_id);
+  return ros_conversions::toMessage(recognition_.signature(id), place->second, robot, stream_.frame_id);
 }
 
 stereo_descriptor_vo::PlaceInfo PlaceSession::info(const PlaceReport& report) const {
@@ -148,7 +144,7 @@ std::optional<geometry_msgs::PoseWithCovarianceStamped> PlaceSession::basePose(
 std::vector<PlaceCandidate> PlaceSession::find(const stereo_descriptor_vo::PlaceSignature& signature) const {
   if (recognition_.places().empty()) return {};
   const DescriptorKind kind = recognition_.places().begin()->second.features.kind();
-  return recognition_.find(ros_conversions::fromMessage(signature, index_, kind));
+  return recognition_.find(ros_conversions::fromMessage(signature, kind));
 }
 
 std::optional<stereo_descriptor_vo::PlaceMatch> PlaceSession::verify(int id, const Place& other) const {

@@ -19,7 +19,7 @@ namespace sdvo {
 class PlaceSession {
  public:
   explicit PlaceSession(const PlaceRecognitionOptions& options)
-      : index_(options.index), localises_only_(options.localisation_only), recognition_(options) {}
+      : localises_only_(options.localisation_only), recognition_(options) {}
 
   /// Begins with the places of an earlier session. Throws std::invalid_argument when they do not belong together.
   PlaceSession(const PlaceRecognitionOptions& options, SavedPlaces saved);
@@ -81,7 +81,6 @@ class PlaceSession {
 
   void refuse(const StereoCamera& camera, const std::optional<DescriptorKind>& kind) const;
 
-  const PlaceIndexOptions index_;
   const bool localises_only_;
   PlaceRecognition recognition_;
   std::string odom_frame_;

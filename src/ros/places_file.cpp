@@ -175,7 +175,7 @@ bool isOfPlaces(const std::string& path) try {
   return false;
 }
 
-SavedPlaces read(const std::string& path, const PoseGraphOptions& options) {
+SavedPlaces read(const std::string& path) {
   std::vector<Place> places;
   std::optional<PoseGraph> graph;
   std::optional<ros_conversions::FeatureStream> stream;
@@ -196,7 +196,7 @@ SavedPlaces read(const std::string& path, const PoseGraphOptions& options) {
         throw std::invalid_argument("its places " + std::to_string(places.front().id) + " and " +
                                     std::to_string(places.back().id) + " are of different cameras");
     } else if (topic == kGraphTopic) {
-      graph = ros_conversions::fromMessage(parse<msgs::MapGraph>(message), options);
+      graph = ros_conversions::fromMessage(parse<msgs::MapGraph>(message));
     }
     return true;
   });
@@ -226,9 +226,9 @@ void savePlaces(const std::vector<Place>& places, const ros_conversions::MapStat
   });
 }
 
-SavedPlaces loadPlaces(const std::string& path, const PoseGraphOptions& options) try {
+SavedPlaces loadPlaces(const std::string& path) try {
   if (!std::filesystem::path(path).is_absolute()) throw std::invalid_argument("the path must be absolute");
-  return read(path, options);
+  return read(path);
 } catch (const std::exception& e) {
   throw std::runtime_error("'" + path + "': " + e.what());
 }

@@ -21,6 +21,6 @@ void savePlaces(const std::vector<Place>& places, const ros_conversions::MapStat
                 const std::string& path, bool overwrite);
 
 /// Throws std::runtime_error that names the file when it is no such file or does not hold together.
-SavedPlaces loadPlaces(const std::string& path, const PoseGraphOptions& options);
+SavedPlaces loadPlaces(const std::string& path);
 
 }  // namespace sdvo

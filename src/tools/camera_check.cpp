@@ -11,7 +11,7 @@ CameraCheck::CameraCheck(const PipelineOptions& options, const OfflineRun& run)
     : options_(options),
       run_(run),
       rows_(options.stereo_features.stereo.max_epipolar_residual, options.stereo_features.stereo.epipolar.max_disparity,
-            options.stereo_features.rig_monitor.reach) {}
+            RigMonitor::kReach) {}
 
 void CameraCheck::add(const RecordedPair& pair, const StereoFeatures& features) {
   camera_ = pair.camera;

@@ -170,8 +170,8 @@ TEST(Options, SetBySuffixOrFullPath) {
 
   FeatureExtractorOptions extractor;
   std::vector<Option> real = listOptions(extractor);
-  setOption(real, "patch_radius", "5");
-  EXPECT_EQ(extractor.stereo.epipolar.patch_radius, 5);
+  setOption(real, "max_disparity", "50");
+  EXPECT_EQ(extractor.stereo.epipolar.max_disparity, 50.0);
 }
 
 TEST(Options, SetRefusesAmbiguousAndUnknownNames) {

@@ -137,16 +137,6 @@ TEST(FeatureDetector, AMaskThatDoesNotFitIsNamed) {
             "mask: cannot read a PNG from '" + std::filesystem::current_path().string() + "/~/mask.png'");
 }
 
-TEST(FeatureDetector, CornersOfAnImageTooSmallForTheRefinementStayWhereTheyAre) {
-  FeatureDetectorOptions options;
-  options.type = DetectorType::kGftt;
-  options.subpixel_radius = 15;
-  const cv::Mat small = unevenTexture()(cv::Rect(100, 100, 30, 30)).clone();
-  const std::vector<Corner> corners = FeatureDetector(options).detect(small);
-  ASSERT_FALSE(corners.empty());
-  for (const Corner& corner : corners) EXPECT_EQ(corner.position.x, std::round(corner.position.x));
-}
-
 TEST(FeatureDetector, TheSmallestImageIsSearchedAndASmallerOneIsNot) {
   constexpr int kSide = FeatureDetector::kSmallestSide, kMiddle = kSide / 2;
   cv::Mat image(kSide, kSide, CV_8U, cv::Scalar(50));
@@ -318,7 +308,6 @@ TEST(FeatureDetector, RefinedPositionsStayNear) {
     FeatureDetectorOptions options;
     options.type = type;
     options.corner_quality = 1e-6;
-    options.corner_block_size = 5;
     options.subpixel = false;
     const std::vector<Corner> whole = FeatureDetector(options).detect(image);
     options.subpixel = true;

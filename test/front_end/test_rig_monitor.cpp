@@ -51,7 +51,7 @@ TEST(RigMonitor, LooksOnlyWhenFewCornersAreFound) {
   EXPECT_TRUE(monitor.isSuspicious(1000, 399));
   EXPECT_FALSE(monitor.isSuspicious(24, 0)) << "too few to judge by";
   RigMonitorOptions off;
-  off.enabled = false;
+  off.suspicious_share = 0.0;
   EXPECT_FALSE(RigMonitor(off, 1.5, 192.0).isSuspicious(1000, 0));
 }
 

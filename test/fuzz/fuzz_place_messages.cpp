@@ -20,7 +20,7 @@ void damage(msgs::PlaceSignature& message, FuzzedDataProvider& bytes) {
 
 void findThat(const msgs::PlaceSignature& message, const PlaceRecognition& known) {
   const DescriptorKind kind = known.places().begin()->second.features.kind();
-  for (const PlaceCandidate& candidate : known.find(ros_conversions::fromMessage(message, PlaceIndexOptions(), kind)))
+  for (const PlaceCandidate& candidate : known.find(ros_conversions::fromMessage(message, kind)))
     if (known.places().count(candidate.place) == 0 || !(candidate.score > 0.0 && candidate.score <= 1.0))
       __builtin_trap();
 }
@@ -50,8 +50,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     return recognition;
   }();
   const Place& place = known.places().at(2);
-  msgs::PlaceSignature signature =
-      ros_conversions::toMessage(known.signature(2), place, PlaceIndexOptions(), "/other", "left_optical");
+  msgs::PlaceSignature signature = ros_conversions::toMessage(known.signature(2), place, "/other", "left_optical");
   msgs::Place answer = ros_conversions::toMessage(place, "/other", fuzz::someStream());
   damage(signature, bytes);
   fuzz::damage(answer, bytes);

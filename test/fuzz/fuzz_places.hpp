@@ -43,7 +43,7 @@ inline SavedPlaces somePlaces() {
     loop.to = 3;
     loop.kind = GraphEdge::Kind::kLoop;
     edges.push_back(loop);
-    return SavedPlaces{places, PoseGraph(PoseGraphOptions(), nodes, edges), someStream()};
+    return SavedPlaces{places, PoseGraph(nodes, edges), someStream()};
   }();
   return some;
 }

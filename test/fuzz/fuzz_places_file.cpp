@@ -72,7 +72,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   const std::string path = (std::filesystem::path(folder.path()) / "places.bag").string();
   write(path, bytes);
   try {
-    goOn(loadPlaces(path, PoseGraphOptions()));
+    goOn(loadPlaces(path));
   } catch (const std::runtime_error&) {
   } catch (const std::invalid_argument&) {
   }

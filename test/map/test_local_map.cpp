@@ -536,17 +536,15 @@ TEST(LocalMap, HoldsAnOldKeyframeWhileItSharesEnough) {
 
 TEST(LocalMap, LooksForAPointUntilEnoughFramesMissedIt) {
   const synthetic::World world = someWorld(20);
-  LocalMapOptions options = everyPairAKeyframe();
-  options.remembered = 3;
-  LocalMap map(options);
+  LocalMap map(everyPairAKeyframe());
   add(map, see(world, 0, 20, translated(0.0, 0.0, 0.0)), 1, translated(0.0, 0.0, 0.0), {});
-  for (int id = 2; id <= 4; ++id) {
+  for (int id = 2; id <= 5; ++id) {
     EXPECT_EQ(map.view().points.count(), 20) << "before pair " << id;
     const Eigen::Isometry3d pose = translated(0.1 * id, 0.0, 0.0);
     const StereoFeatures features = see(world, 0, 10, pose);
     add(map, features, id, pose, recognised(map, features, 10));
   }
-  EXPECT_EQ(map.view().points.count(), 10) << "pairs 2, 3 and 4 missed the others";
+  EXPECT_EQ(map.view().points.count(), 10) << "pairs 2 to 5 missed the others";
 }
 
 TEST(LocalMap, TakesTheAppearanceOfTheLastSighting) {
@@ -612,7 +610,7 @@ TEST(LocalMap, AdjustmentMovesTheNewestPairToWhereItsPointsSayItIs) {
 /// A corner that nothing is ever aligned with weighs as much as those seen later, whether it has a patch or not.
 TEST(LocalMap, PatchesThatAreNotAlignedChangeNothing) {
   PatchAlignmentOptions alignment;
-  alignment.enabled = false;
+  alignment.radius = 6;  // samples: too large for a patch of 13
   const auto poseAfter = [&](bool has_patches, const PatchAlignmentOptions& options) {
     const synthetic::World world = someWorld(60);
     LocalMap map(everyPairAKeyframe());

@@ -110,12 +110,4 @@ TEST(GeneticSearch, LearningFindsTheMotionMoreOften) {
   EXPECT_GT(found_with, found_without + 6);
 }
 
-TEST(GeneticSearch, RatesAreFixedInGasacAlone) {
-  const Scene scene(0.6, 0.3, 5);
-  GeneticConsensusOptions restless;
-  restless.mutation_rate = 0.9;
-  EXPECT_FALSE(equal(search(scene, {}, false, 300, 1), search(scene, restless, false, 300, 1)));
-  EXPECT_TRUE(equal(search(scene, {}, true, 300, 1), search(scene, restless, true, 300, 1)));
-}
-
 }  // namespace sdvo::test_genetic_consensus

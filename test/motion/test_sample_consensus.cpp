@@ -149,7 +149,7 @@ TEST_P(EveryMethod, KeepsToTheBoundsOnSamples) {
   const Scene hopeless = makeScene(200, 1.0, 0.0, 3);
   EXPECT_EQ(search(hopeless, GetParam(), 1, 120).iterations, 120);
   const Scene clean = makeScene(200, 0.0, 0.05, 3);
-  EXPECT_LE(search(clean, GetParam()).iterations, GeneticConsensusOptions{}.population) << "the first generation";
+  EXPECT_LE(search(clean, GetParam()).iterations, GeneticConsensusOptions::kPopulation) << "the first generation";
 }
 
 TEST_P(EveryMethod, FindsNothingInTooFewCorrespondences) {

@@ -12,7 +12,7 @@ Eigen::Isometry3d ahead(double z, double x = 0.0) {
 
 /// Nodes 0 … 60 along a way, 3 m apart.
 PoseGraph way() {
-  PoseGraph graph{PoseGraphOptions()};
+  PoseGraph graph;
   graph.start(0, Eigen::Isometry3d::Identity());
   for (int k = 1; k <= 60; ++k) {
     GraphEdge edge;
@@ -36,7 +36,7 @@ GraphEdge proposal(int from, int to, const Eigen::Isometry3d& T_from_to) {
 
 TEST(LoopAgreement, TwoNeighboursThatSayTheSameAreTrusted) {
   const PoseGraph graph = way();
-  LoopAgreement agreement{LoopAgreementOptions()};
+  LoopAgreement agreement;
   EXPECT_TRUE(agreement.confirm(graph, proposal(10, 50, ahead(0.4))).empty());
   const auto trusted = agreement.confirm(graph, proposal(11, 51, ahead(0.5)));
   ASSERT_EQ(trusted.size(), 2u);
@@ -47,7 +47,7 @@ TEST(LoopAgreement, TwoNeighboursThatSayTheSameAreTrusted) {
 
 TEST(LoopAgreement, NeighboursThatDisagreeAreNot) {
   const PoseGraph graph = way();
-  LoopAgreement agreement{LoopAgreementOptions()};
+  LoopAgreement agreement;
   agreement.confirm(graph, proposal(10, 50, ahead(0.0)));
   EXPECT_TRUE(agreement.confirm(graph, proposal(11, 51, ahead(0.7))).empty()) << "0.7 m apart";
   Eigen::Isometry3d turned = ahead(0.0);
@@ -58,7 +58,7 @@ TEST(LoopAgreement, NeighboursThatDisagreeAreNot) {
 
 TEST(LoopAgreement, AKeyFrameDoesNotConfirmItselfNorOneFarBack) {
   const PoseGraph graph = way();
-  LoopAgreement agreement{LoopAgreementOptions()};
+  LoopAgreement agreement;
   agreement.confirm(graph, proposal(10, 50, ahead(0.0)));
   EXPECT_TRUE(agreement.confirm(graph, proposal(11, 50, ahead(-3.0))).empty());
   EXPECT_TRUE(agreement.confirm(graph, proposal(18, 58, ahead(0.0))).empty()) << "24 m farther";
@@ -66,7 +66,7 @@ TEST(LoopAgreement, AKeyFrameDoesNotConfirmItselfNorOneFarBack) {
 
 TEST(LoopAgreement, OutlivesTheNodesOfItsProposals) {
   PoseGraph graph = way();
-  LoopAgreement agreement{LoopAgreementOptions()};
+  LoopAgreement agreement;
   agreement.confirm(graph, proposal(0, 50, ahead(0.0)));
   graph.remove(0);
   EXPECT_TRUE(agreement.confirm(graph, proposal(1, 51, ahead(0.0))).empty());

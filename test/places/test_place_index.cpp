@@ -38,7 +38,7 @@ bool anyPlace(int) {
 }
 
 TEST(PlaceIndex, FindsAPlaceAmongManyWhenAnEighthOfTheBitsDiffer) {
-  PlaceIndex index{PlaceIndexOptions()};
+  PlaceIndex index;
   for (int place = 0; place < 300; ++place) index.add(place, index.signature(show(randomRows(place, 200))));
   ASSERT_EQ(index.count(), 300);
   for (const int place : {0, 150, 299}) {
@@ -52,7 +52,7 @@ TEST(PlaceIndex, FindsAPlaceAmongManyWhenAnEighthOfTheBitsDiffer) {
 }
 
 TEST(PlaceIndex, ScoresTheShareOfWhatWasAskedFor) {
-  PlaceIndex index{PlaceIndexOptions()};
+  PlaceIndex index;
   const Rows all = randomRows(1, 100);
   const Rows half(all.begin(), all.begin() + 50);
   index.add(3, index.signature(show(half)));
@@ -65,7 +65,7 @@ TEST(PlaceIndex, ScoresTheShareOfWhatWasAskedFor) {
 }
 
 TEST(PlaceIndex, WordsThatEverybodyHasSayNothing) {
-  PlaceIndex index{PlaceIndexOptions()};
+  PlaceIndex index;
   const Rows common = randomRows(99, 150);
   for (int place = 0; place < 20; ++place) {
     Rows rows = randomRows(place, 20);
@@ -81,7 +81,7 @@ TEST(PlaceIndex, WordsThatEverybodyHasSayNothing) {
 }
 
 TEST(PlaceIndex, FindsOnlyWhatIsAdmittedAndNotWhatWasRemoved) {
-  PlaceIndex index{PlaceIndexOptions()};
+  PlaceIndex index;
   const PlaceSignature words = index.signature(show(randomRows(1, 100)));
   index.add(1, words);
   index.add(2, words);
@@ -98,7 +98,7 @@ TEST(PlaceIndex, FindsOnlyWhatIsAdmittedAndNotWhatWasRemoved) {
 }
 
 TEST(PlaceIndex, AnEmptyOneAndAnEmptyPlaceAreNoError) {
-  PlaceIndex index{PlaceIndexOptions()};
+  PlaceIndex index;
   const PlaceSignature nothing = index.signature(show({}));
   EXPECT_TRUE(nothing.empty());
   EXPECT_TRUE(index.find(index.signature(show(randomRows(1, 10))), 3, anyPlace).empty());
@@ -107,14 +107,14 @@ TEST(PlaceIndex, AnEmptyOneAndAnEmptyPlaceAreNoError) {
 }
 
 TEST(PlaceIndex, ASignatureOf500FeaturesFitsIntoEightKilobytes) {
-  const PlaceIndex index{PlaceIndexOptions()};
+  const PlaceIndex index;
   const PlaceSignature words = index.signature(show(randomRows(1, 500)));
   EXPECT_LE(words.size() * sizeof(words[0]), 8000u);
   EXPECT_TRUE(std::is_sorted(words.begin(), words.end()));
 }
 
 TEST(PlaceIndex, ASignatureDependsOnTheRowsAlone) {
-  const PlaceIndex one{PlaceIndexOptions()}, other{PlaceIndexOptions()};
+  const PlaceIndex one, other;
   Rows rows = randomRows(1, 50);
   const PlaceSignature words = one.signature(show(rows));
   std::reverse(rows.begin(), rows.end());
@@ -122,7 +122,7 @@ TEST(PlaceIndex, ASignatureDependsOnTheRowsAlone) {
 }
 
 TEST(PlaceIndex, RefusesWhatItCannotMakeWordsOf) {
-  const PlaceIndex index{PlaceIndexOptions()};
+  const PlaceIndex index;
   StereoFeatures floats = show(randomRows(1, 5));
   floats.element_type = ElementType::kFloat32;
   EXPECT_TRUE(contains(errorOf([&] { index.signature(floats); }), "float32"));
@@ -130,7 +130,7 @@ TEST(PlaceIndex, RefusesWhatItCannotMakeWordsOf) {
   std::mt19937 random(1);
   synthetic::addFeature(narrow, 1.0, 1.0, 1.0, synthetic::randomRow(random, 8));
   EXPECT_TRUE(contains(errorOf([&] { index.signature(narrow); }), "at least 72 bits"));
-  PlaceIndex twice{PlaceIndexOptions()};
+  PlaceIndex twice;
   twice.add(1, {});
   EXPECT_TRUE(contains(errorOf([&] { twice.add(1, {}); }), "place 1"));
 }

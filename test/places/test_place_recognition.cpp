@@ -258,7 +258,7 @@ TEST(PlaceRecognition, PlacesWithWildNumbersAreNotTakenUp) {
     places[1].segment = segment;
     std::map<int, Eigen::Isometry3d> nodes = {{0, Eigen::Isometry3d::Identity()}, {id, Eigen::Isometry3d::Identity()}};
     PlaceRecognition fresh{PlaceRecognitionOptions()};
-    return errorOf([&] { fresh.restore(places, PoseGraph(PoseGraphOptions(), nodes, {})); });
+    return errorOf([&] { fresh.restore(places, PoseGraph(nodes, {})); });
   };
   constexpr int kLargest = std::numeric_limits<int>::max();
   EXPECT_EQ(refusal(5, 0), "no error");

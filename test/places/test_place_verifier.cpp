@@ -27,7 +27,7 @@ StereoFeatures see(const synthetic::World& world, const Eigen::Isometry3d& T_wor
 }
 
 TEST(PlaceVerifier, TellsFromWhereThePlaceIsSeenNowAndHowWellItKnows) {
-  const PlaceVerifier verifier{PlaceVerifierOptions()};
+  const PlaceVerifier verifier;
   double sum = 0.0;
   constexpr int kTrials = 20;
   for (int i = 0; i < kTrials; ++i) {
@@ -49,8 +49,8 @@ TEST(PlaceVerifier, TellsFromWhereThePlaceIsSeenNowAndHowWellItKnows) {
 
 TEST(PlaceVerifier, AnotherPlaceIsNotTheSame) {
   const synthetic::World other = synthetic::randomWorld(2, 500, {-8.0, -4.0, 4.0}, {8.0, 4.0, 25.0});
-  const PlaceMatch match = PlaceVerifier{PlaceVerifierOptions()}.verify(see(kWorld, pose({0, 0, 0}, 0.0), 1),
-                                                                        see(other, pose({0, 0, 0}, 0.0), 2));
+  const PlaceMatch match =
+      PlaceVerifier().verify(see(kWorld, pose({0, 0, 0}, 0.0), 1), see(other, pose({0, 0, 0}, 0.0), 2));
   EXPECT_FALSE(match.same);
   EXPECT_FALSE(match.reason.empty());
 }
@@ -64,15 +64,15 @@ TEST(PlaceVerifier, AThingInACornerIsNoPlace) {
     world->points.insert(world->points.end(), thing.points.begin(), thing.points.end());
     world->rows.insert(world->rows.end(), thing.rows.begin(), thing.rows.end());
   }
-  const PlaceMatch match = PlaceVerifier{PlaceVerifierOptions()}.verify(see(here, pose({0, 0, 0}, 0.0), 1),
-                                                                        see(there, pose({0.5, 0, 0}, 0.0), 2));
+  const PlaceMatch match =
+      PlaceVerifier().verify(see(here, pose({0, 0, 0}, 0.0), 1), see(there, pose({0.5, 0, 0}, 0.0), 2));
   EXPECT_FALSE(match.same);
   EXPECT_TRUE(contains(match.reason, "small part of the image")) << match.reason;
 }
 
 TEST(PlaceVerifier, NothingToSeeIsNoError) {
   const StereoFeatures nothing = synthetic::noFeatures(camera()), some = see(kWorld, pose({0, 0, 0}, 0.0), 1);
-  const PlaceVerifier verifier{PlaceVerifierOptions()};
+  const PlaceVerifier verifier;
   EXPECT_EQ(verifier.verify(nothing, some).reason, "only 0 matches");
   EXPECT_FALSE(verifier.verify(some, nothing).same);
 }

@@ -41,7 +41,7 @@ GraphEdge edge(int from, int to, GraphEdge::Kind kind, const Eigen::Isometry3d& 
 /// Truth and a chain once around a circle of 100 nodes and 20 more, each step of which turns too far.
 struct Ring {
   static constexpr int kAround = 100, kNodes = 120;
-  PoseGraph graph{PoseGraphOptions()};
+  PoseGraph graph;
   std::vector<Eigen::Isometry3d> truth;
 
   explicit Ring(double turn_too_far = 0.001) {
@@ -131,7 +131,7 @@ TEST(PoseGraph, OneFalseLoopAloneDoesNotBendItEither) {
 
 TEST(PoseGraph, APartBehindABreakMovesAsAWholeOnceAPlaceIsRecognised) {
   const auto truth = [](int k) { return onCircle(k, 100, 50.0); };
-  PoseGraph graph{PoseGraphOptions()};
+  PoseGraph graph;
   graph.start(0, truth(0));
   for (int k = 1; k < 100; ++k) {
     const bool broken = k == 60;
@@ -165,7 +165,7 @@ TEST(PoseGraph, AnOptimisedCopyIsAdoptedByWhatHasGrownMeanwhile) {
 }
 
 TEST(PoseGraph, ACopyFromBeforeAPartMovedIsRefused) {
-  PoseGraph graph{PoseGraphOptions()};
+  PoseGraph graph;
   graph.start(0, Eigen::Isometry3d::Identity());
   graph.extend(edge(0, 1, GraphEdge::Kind::kBreak, Eigen::Isometry3d::Identity(), covariance(1000.0, 10.0)));
   const PoseGraph copy = graph;
@@ -185,7 +185,7 @@ TEST(PoseGraph, APathIsTheShortestAndItsCovarianceThatOfTheWholeMotion) {
   EXPECT_NEAR(ring.graph.path(0, 110).length, 10 * ring.graph.edges().front().length, 1e-6);
 
   // Against samples of the edges' errors.
-  PoseGraph chain{PoseGraphOptions()};
+  PoseGraph chain;
   chain.start(0, Eigen::Isometry3d::Identity());
   std::vector<GraphEdge> edges;
   for (int k = 0; k < 5; ++k) {
@@ -221,7 +221,7 @@ TEST(PoseGraph, NearAreTheNodesOnAShortWayOverLoopsAndNotOverBreaks) {
   ring.graph.close(ring.loop(5, 105));
   EXPECT_EQ(ring.graph.near(5, 1.5 * step), (std::set<int>{4, 5, 6, 104, 105, 106}));
 
-  PoseGraph broken{PoseGraphOptions()};
+  PoseGraph broken;
   broken.start(0, Eigen::Isometry3d::Identity());
   broken.extend(edge(0, 1, GraphEdge::Kind::kBreak, onCircle(1, 12, 10.0), covariance(0.02, 0.003)));
   EXPECT_EQ(broken.near(0, 1e6), std::set<int>{0});
@@ -242,15 +242,15 @@ TEST(PoseGraph, ForgettingTheFirstNodeLeavesTheRestWhereItIs) {
 TEST(PoseGraph, IsMadeOfItsPartsAgainAndRefusesPartsThatDoNotFit) {
   Ring ring;
   ring.graph.close(ring.loop(0, 100));
-  PoseGraph again(PoseGraphOptions(), ring.graph.nodes(), ring.graph.edges());
+  PoseGraph again(ring.graph.nodes(), ring.graph.edges());
   ring.graph.optimise();
   again.optimise();
   for (const auto& [id, T] : ring.graph.nodes()) EXPECT_TRUE(T.isApprox(again.nodes().at(id), 1e-12));
 
   std::vector<GraphEdge> edges{ring.loop(0, 100)};
-  EXPECT_TRUE(contains(errorOf([&] { PoseGraph(PoseGraphOptions(), {}, edges); }), "edge 0 - 100"));
+  EXPECT_TRUE(contains(errorOf([&] { PoseGraph({}, edges); }), "edge 0 - 100"));
   edges[0].covariance(2, 2) = -1.0;
-  EXPECT_TRUE(contains(errorOf([&] { PoseGraph(PoseGraphOptions(), ring.graph.nodes(), edges); }), "covariance"));
+  EXPECT_TRUE(contains(errorOf([&] { PoseGraph(ring.graph.nodes(), edges); }), "covariance"));
 }
 
 }  // namespace sdvo::test_pose_graph

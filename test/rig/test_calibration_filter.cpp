@@ -17,7 +17,6 @@ CalibrationOptions someOptions() {
   options.prior_offset = 0.5;
   options.prior_bend = -1.0;
   options.prior_sigma = 2.0;
-  options.trust = 0.25;
   return options;
 }
 
@@ -37,7 +36,7 @@ void addWindow(CalibrationFilter& filter, int oldest, int newest, const Vector& 
 
 /// What is left of a prior's standard deviation, as information in the windows' units.
 double informationOf(double spread) {
-  return 1.0 / std::pow(0.25 * spread, 2);
+  return 1.0 / std::pow(CalibrationFilter::kTrust * spread, 2);
 }
 
 TEST(CalibrationFilter, BeginsWithWhatTheOptionsSay) {
@@ -90,9 +89,8 @@ TEST(CalibrationFilter, TheOptionsSigmaIsTheLargestSpread) {
 TEST(CalibrationFilter, SaysHowWellTheWindowsMeasure) {
   CalibrationFilter filter(someOptions());
   addWindow(filter, 1, 9, kPrior);
-  // Four times 1 / sqrt(4 + 12) and 1 / sqrt(4 + 5), 4 = 1 / (0.25 * 2)^2 being the options'.
-  EXPECT_NEAR(filter.sigma()[0], 4.0 * 0.25, 1e-9);
-  EXPECT_NEAR(filter.sigma()[1], 4.0 / 3.0, 1e-9);
+  EXPECT_NEAR(filter.sigma()[0], 1.0 / (CalibrationFilter::kTrust * std::sqrt(informationOf(2.0) + 12.0)), 1e-9);
+  EXPECT_NEAR(filter.sigma()[1], 1.0 / (CalibrationFilter::kTrust * std::sqrt(informationOf(2.0) + 5.0)), 1e-9);
 }
 
 TEST(CalibrationFilter, EstimatesWhatIsNotSignificant) {

@@ -203,15 +203,13 @@ TEST_F(OdometryPublisherTest, NoTransformWhereAFilterPublishesIt) {
 }
 
 TEST_F(OdometryPublisherTest, ThePathKeepsItsNewestPoses) {
-  OdometryOutputOptions options;
-  options.max_path_length = 3;
-  start(options);
-  for (int i = 0; i < 5; ++i) publish(resultAt(i));
-  ASSERT_TRUE(spinUntil(
-      [&] { return !path_->messages.empty() && path_->messages.back().poses.back().pose.position.z == 4.0; }));
-  const auto& poses = path_->messages.back().poses;
-  ASSERT_EQ(poses.size(), 3u);
-  EXPECT_EQ(poses[0].pose.position.z, 2.0);
+  start({});
+  constexpr int kPoses = OdometryPublisher::kLongestPath + 2;
+  for (int i = 0; i < kPoses; ++i) publish(resultAt(i));
+  const auto poses = publisher_->path().poses;
+  ASSERT_EQ(poses.size(), OdometryPublisher::kLongestPath);
+  EXPECT_EQ(poses.front().pose.position.z, 2.0);
+  EXPECT_EQ(poses.back().pose.position.z, kPoses - 1.0);
 }
 
 TEST_F(OdometryPublisherTest, AfterAResetThePathBeginsAnew) {

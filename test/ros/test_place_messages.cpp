@@ -58,7 +58,7 @@ MapState someMap() {
     edges[i].length = 2.0 - i;
   }
   edges[2].length = 0.0;
-  return {PoseGraph(PoseGraphOptions(), nodes, edges), {{3, 1000000000}, {4, 2000000001}, {6, 3000000002}}};
+  return {PoseGraph(nodes, edges), {{3, 1000000000}, {4, 2000000001}, {6, 3000000002}}};
 }
 
 /// As it arrives.
@@ -136,7 +136,7 @@ TEST(MapGraphMessage, CovariancesAreInTheParentsAxes) {
   // The child's x axis is the parent's y axis, its y axis the parent's z axis.
   edge.T_from_to.linear() << 0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0;
   edge.covariance.diagonal() << 1.0, 2.0, 3.0, 4.0, 5.0, 6.0;
-  const PoseGraph graph(PoseGraphOptions(), {{0, Eigen::Isometry3d::Identity()}, {1, edge.T_from_to}}, {edge});
+  const PoseGraph graph({{0, Eigen::Isometry3d::Identity()}, {1, edge.T_from_to}}, {edge});
   const msgs::MapGraph message = toMessage(MapState{graph, {}}, "", "map");
   const auto& covariance = message.edges[0].motion.covariance;
   const double expected[] = {3.0, 1.0, 2.0, 6.0, 4.0, 5.0};
@@ -156,16 +156,15 @@ TEST(MapGraphMessage, IsRefusedWhenItDoesNotHoldTogether) {
 }
 
 TEST(PlaceSignatureMessage, ComesBackWhereWordsAreMadeAlike) {
-  const PlaceIndexOptions index;
   const Place place = somePlace();
   const PlaceSignature words = {5, 17, 1u << 18};
-  const msgs::PlaceSignature message = sent(toMessage(words, place, index, "/robot", "left_optical"));
+  const msgs::PlaceSignature message = sent(toMessage(words, place, "/robot", "left_optical"));
   EXPECT_EQ(message.id, 7u);
   EXPECT_EQ(message.header.stamp.toNSec(), static_cast<std::uint64_t>(place.features.stamp));
-  EXPECT_EQ(fromMessage(message, index, place.features.kind()), words);
+  EXPECT_EQ(fromMessage(message, place.features.kind()), words);
 
   using M = msgs::PlaceSignature;
-  expectRefusals(message, [&](const M& m) { fromMessage(m, index, place.features.kind()); },
+  expectRefusals(message, [&](const M& m) { fromMessage(m, place.features.kind()); },
                  {{[](M& m) { ++m.words_per_row; }, ""},
                   {[](M& m) { ++m.bits_per_word; }, ""},
                   {[](M& m) { m.descriptor = "orb"; }, ""},

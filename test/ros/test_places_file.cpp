@@ -44,7 +44,7 @@ class PlacesFile : public ::testing::Test {
       edge.to = id;
       if (id > 0) edges.push_back(edge);
     }
-    map_.graph = PoseGraph(PoseGraphOptions(), nodes, edges);
+    map_.graph = PoseGraph(nodes, edges);
     for (const Place& place : places_) map_.stamps[place.id] = place.features.stamp;
     stream_.frame_id = "left_optical";
   }
@@ -65,7 +65,7 @@ class PlacesFile : public ::testing::Test {
   const TemporaryFolder folder_;
   const std::string path_ = (fs::path(folder_.path()) / "places.bag").string();
   std::vector<Place> places_;
-  ros_conversions::MapState map_{PoseGraph(PoseGraphOptions()), {}};
+  ros_conversions::MapState map_{PoseGraph(), {}};
   ros_conversions::FeatureStream stream_;
 };
 
@@ -202,7 +202,7 @@ TEST_F(PlacesFile, AFileMayChangeWhileItIsRead) {
 /// Whatever length, count or offset in it is wrong: a record's, a chunk's, an array's within a message.
 TEST_F(PlacesFile, AFileThatAnnouncesMuchTakesLittle) {
   places_.resize(1);
-  map_ = {PoseGraph(PoseGraphOptions(), {{0, Eigen::Isometry3d::Identity()}}, {}), {{0, places_[0].features.stamp}}};
+  map_ = {PoseGraph({{0, Eigen::Isometry3d::Identity()}}, {}), {{0, places_[0].features.stamp}}};
   save(path_);
   std::stringstream text;
   text << std::ifstream(path_, std::ios::binary).rdbuf();

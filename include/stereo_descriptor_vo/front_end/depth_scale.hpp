@@ -9,17 +9,15 @@ namespace sdvo {
 /// has an image radius proportional to 1/Z, that is to the disparity; in disparity the curve is the same for every rig.
 /// Slope and limits of 0 are those of the base descriptor, see completedFor().
 struct DepthScaleOptions {
-  bool scale_normalisation = true;
+  bool scale_normalisation = true;  ///< false: every feature has constant_size, which the lab compares with
   double slope = 0.0;
   double exponent = 1.0;
   double offset = 0.0;
   double min_size = 0.0;
   double max_size = 0.0;
-  double constant_size = BaseDescriptor::kStandardSize;
+  double constant_size = BaseDescriptor::kStandardSize;  ///< px
 
   void describe(OptionList& list) {
-    list.add("scale_normalisation", scale_normalisation,
-             "size follows disparity; false: every feature has constant_size");
     list.add("slope", slope, {0.0, 100.0}, "px", "a in size = a * disparity^b + c; 0: the one of descriptor/type");
     list.add("exponent", exponent, {0.1, 3.0}, "", "b in size = a * disparity^b + c; 1: a fixed circle in the world");
     list.add("offset", offset, {-100.0, 100.0}, "px", "c in size = a * disparity^b + c");
@@ -27,7 +25,6 @@ struct DepthScaleOptions {
              "smallest key point diameter, at least 2 px; 0: the one of descriptor/type");
     list.add("max_size", max_size, {0.0, 400.0}, "px",
              "largest key point diameter, at least min_size; 0: the one of descriptor/type");
-    list.add("constant_size", constant_size, {2.0, 200.0}, "px", "diameter without scale normalisation");
   }
 
   /// The same with the base descriptor's own slope and limits in place of zeros. A descriptor that depth does not help

@@ -10,15 +10,12 @@ namespace sdvo {
 struct EpipolarMatcherOptions {
   double max_disparity = 192.0;
   double uniqueness = 0.9;
-  int patch_radius = 6;
   double min_correlation = 0.8;
 
   void describe(OptionList& list) {
     list.add("max_disparity", max_disparity, {4.0, 2000.0}, "px", "largest disparity looked for, before alignment");
     list.add("uniqueness", uniqueness, {0.1, 1.0}, "",
              "largest ratio between the difference of the best block and that of the best one elsewhere");
-    list.add("patch_radius", patch_radius, {3, 20}, "px",
-             "half side of the patch that is aligned to sub-pixel precision");
     list.add("min_correlation", min_correlation, {0.0, 1.0}, "", "least correlation of the aligned patches");
   }
 };

@@ -22,9 +22,7 @@ struct FeatureDetectorOptions {
   double min_spacing = 0.0;
   double min_contrast = 9.0;
   double corner_quality = 0.002;
-  int corner_block_size = 5;
   bool subpixel = true;
-  int subpixel_radius = 3;
   std::string mask;
 
   void describe(OptionList& list) {
@@ -36,9 +34,7 @@ struct FeatureDetectorOptions {
     list.add("min_contrast", min_contrast, {1.0, 100.0}, "sigma of the image's noise",
              "fast, orb: weakest corner considered; down to a quarter of it where there are too few");
     list.add("corner_quality", corner_quality, {1e-6, 1.0}, "", "gftt: weakest response relative to the best");
-    list.add("corner_block_size", corner_block_size, {3, 31}, "px", "gftt: window of the gradient matrix");
     list.add("subpixel", subpixel, "fast, gftt: refine corners to sub-pixel positions");
-    list.add("subpixel_radius", subpixel_radius, {1, 15}, "px", "gftt: half side of the sub-pixel window");
     list.add("mask", mask, "PNG (absolute path) of the left image's size: no corners where it is black; empty: none");
   }
   /// Throws std::invalid_argument when the OpenCV at hand lacks the detector.

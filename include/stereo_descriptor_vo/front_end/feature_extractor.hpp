@@ -5,7 +5,6 @@
 
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/front_end/depth_scale.hpp"
-#include "stereo_descriptor_vo/front_end/exposure_balance.hpp"
 #include "stereo_descriptor_vo/front_end/feature_detector.hpp"
 #include "stereo_descriptor_vo/front_end/patch_cutter.hpp"
 #include "stereo_descriptor_vo/front_end/rig_monitor.hpp"
@@ -16,7 +15,6 @@ namespace sdvo {
 
 struct FeatureExtractorOptions {
   FeatureDetectorOptions detector;
-  ExposureBalanceOptions exposure_balance;
   StereoMatcherOptions stereo;
   RigMonitorOptions rig_monitor;
   DepthScaleOptions size_curve;
@@ -25,7 +23,6 @@ struct FeatureExtractorOptions {
 
   void describe(OptionList& list) {
     list.group("detector", detector);
-    list.group("exposure_balance", exposure_balance);
     list.group("stereo", stereo);
     list.group("rig_monitor", rig_monitor);
     list.group("size_curve", size_curve);
@@ -67,7 +64,6 @@ class FeatureExtractor {
 
   FeatureExtractorOptions options_;
   FeatureDetector detector_;
-  ExposureBalance exposure_balance_;
   StereoMatcher stereo_matcher_;
   RigMonitor rig_monitor_;
   DepthScale depth_scale_;

@@ -10,19 +10,14 @@ namespace sdvo {
 
 struct PatchOptions {
   int patch_side = 13;
-  double patch_min_spacing = 1.0;
-  double patch_spacing = 0.1;
 
   void describe(OptionList& list) {
     list.add("patch_side", patch_side, {0, kMostSamples}, "samples",
              "side of the grey patch sent with each feature, for its alignment between pairs; 0: none is sent");
-    list.add("patch_min_spacing", patch_min_spacing, {0.25, 10.0}, "px", "least distance of a patch's samples");
-    list.add("patch_spacing", patch_spacing, {0.0, 1.0}, "", "their distance as a share of the feature's size");
   }
 
-  PatchLayout layout() const {
-    return {patch_side, static_cast<float>(patch_min_spacing), static_cast<float>(patch_spacing)};
-  }
+  /// Samples are a tenth of the feature's size apart, and at least 1 px.
+  PatchLayout layout() const { return {patch_side, 1.f, 0.1f}; }
 
   static constexpr int kMostSamples = 16;
 };

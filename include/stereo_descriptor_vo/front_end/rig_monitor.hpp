@@ -11,17 +11,13 @@
 namespace sdvo {
 
 struct RigMonitorOptions {
-  bool enabled = true;
   double suspicious_share = 0.4;
-  int corners = 120;
-  double reach = 24.0;
 
   void describe(OptionList& list) {
-    list.add("enabled", enabled, "refuse pairs whose rows do not agree, and say what is wrong with the rig");
-    list.add("suspicious_share", suspicious_share, {0.0, 1.0}, "",
-             "the rig is looked at when a smaller share of the corners is found in the right image");
-    list.add("corners", corners, {50, 10000}, "", "corners that are looked for then, in all directions");
-    list.add("reach", reach, {4.0, 200.0}, "px", "rows above and below its own in which each is looked for");
+    list.add(
+        "suspicious_share", suspicious_share, {0.0, 1.0}, "",
+        "the rig is looked at, and the pair refused where its rows do not agree, when a smaller share of the corners "
+        "is found in the right image; 0: never");
   }
 };
 
@@ -48,6 +44,8 @@ struct RigDiagnosis {
 /// for them in all directions of the right image, blind to gain and brightness, and takes some milliseconds. Stateless.
 class RigMonitor {
  public:
+  static constexpr double kReach = 24.0;  ///< px, rows above and below its own in which a corner is looked for
+
   /// `max_dv` in px: rows may differ by that. Throws std::invalid_argument when an option is out of its range.
   RigMonitor(const RigMonitorOptions& options, double max_dv, double max_disparity);
 

@@ -34,7 +34,6 @@ class SlantedPatch {
   /// Takes the patch around (x, y).
   void take(const cv::Mat& image, int margin, float x, float y);
 
-  int radius() const { return radius_; }
   int pixels() const { return side() * side(); }
   /// Products of the three derivatives with each other, without their means.
   const Eigen::Matrix3f& hessian() const { return hessian_; }

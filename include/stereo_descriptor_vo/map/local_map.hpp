@@ -22,12 +22,10 @@ namespace sdvo {
 
 struct LocalMapOptions {
   int keyframes = 8;
-  int remembered = 4;
   int lasting_points = 150;
   int remembered_keyframes = 40;
   double keyframe_parallax = 4.0;
   double keyframe_overlap = 0.6;
-  double renewal_scale = 1.2;
   NoiseOptions noise;
 
   void describe(OptionList& list) {
@@ -38,15 +36,10 @@ struct LocalMapOptions {
              "points that such an older key frame must share at least");
     list.add("remembered_keyframes", remembered_keyframes, {0, 1000}, "",
              "key frames that are remembered beyond that, by where they were taken, for a camera that comes back");
-    list.add("remembered", remembered, {1, 100}, "",
-             "a point seen once is looked for until this many frames of the map missed it");
     list.add("keyframe_parallax", keyframe_parallax, {0.0, 500.0}, "px",
              "a pair is kept as a key frame once its points moved by this median since the last one");
     list.add("keyframe_overlap", keyframe_overlap, {0.0, 1.0}, "",
              "… or once a smaller share of its points was seen in the last key frame");
-    list.add(
-        "renewal_scale", renewal_scale, {1.0, 100.0}, "",
-        "a point takes a new reference patch once it appears larger or smaller than in the old one by this factor");
   }
 };
 

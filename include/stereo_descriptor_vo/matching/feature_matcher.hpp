@@ -45,8 +45,6 @@ struct FeatureMatcherOptions {
     list.add("gate_radius", gate_radius, {1.0, kWidestGate}, "px",
              "radius of that search around the predicted left position; three times as far where that finds no certain "
              "motion, or one that leads out of it");
-    list.add("max_distance", max_distance, {0.01, 1.0}, "",
-             "largest distance of matched descriptors: share of differing bits, or |a - b|^2 / (|a|^2 + |b|^2)");
   }
 };
 

@@ -11,20 +11,16 @@
 namespace sdvo {
 
 struct PatchAlignmentOptions {
-  bool enabled = true;
   int radius = 4;
-  double min_correlation = 0.7;
   NoiseOptions noise;  ///< of corners, which bounds their corrections, and of what alignment leaves
 
   void describe(OptionList& list) {
-    list.add("enabled", enabled, "align the patches of matched features, where the image side sends them");
     list.add("radius", radius, {2, kLargestRadius}, "samples",
              "half side of the part of the reference that is aligned");
-    list.add("min_correlation", min_correlation, {0.0, 1.0}, "", "least correlation of the aligned patches");
   }
 
   /// Whether patches of so many samples a side can be aligned: the derivatives ask for one more all around.
-  bool canAlign(int patch_side) const { return enabled && patch_side >= leastSide(); }
+  bool canAlign(int patch_side) const { return patch_side >= leastSide(); }
   /// In words, if patches that are meant to be aligned cannot be; without patches there is nothing to align.
   std::string complaint(int patch_side) const;
 

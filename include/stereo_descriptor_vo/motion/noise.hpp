@@ -29,15 +29,14 @@ constexpr double noiseGate(int numbers) {
 /// Standard deviations of measurements, px, and the limits that follow from them.
 struct NoiseOptions {
   double corner = 0.4;
-  double reference = 0.1;
+  /// The same of the position that a point's reference patch defines.
+  static constexpr double kReference = 0.1;
   double disparity = 0.1;
   double common_disparity = 0.3;
 
   void describe(OptionList& list) {
     list.add("corner", corner, {0.01, 10.0}, "px",
              "standard deviation of a detected corner's position, in each direction; times the scale that is learnt");
-    list.add("reference", reference, {0.01, 10.0}, "px",
-             "the same of the position that a point's reference patch defines");
     list.add("disparity", disparity, {0.01, 10.0}, "px",
              "standard deviation of a disparity's noise, which is new in every sighting");
     list.add(
@@ -78,7 +77,7 @@ class Noise {
   double sameMotion() const { return scale_ * options_.length(); }
 
   /// px: two aligned positions that are further apart are not of one point.
-  double elsewhere() const { return std::sqrt(2.0 * noiseGate(2)) * options_.reference; }
+  double elsewhere() const { return std::sqrt(2.0 * noiseGate(2)) * NoiseOptions::kReference; }
 
   /// Takes in the square, in standard deviations (chi-square of six), by which the motions of two parts of a confirmed
   /// motion's inliers differ.

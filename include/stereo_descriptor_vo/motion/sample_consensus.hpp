@@ -41,14 +41,9 @@ inline const std::vector<std::string>& namesOf(ConsensusMethod) {
 }
 
 struct GeneticConsensusOptions {
-  int population = 24;
-  double mutation_rate = 0.1;
-  bool learning = true;  ///< adaptive: how good a replacement each gene is
-
-  void describe(OptionList& list) {
-    list.add("population", population, {4, 1000}, "", "gasac: individuals of a generation");
-    list.add("mutation_rate", mutation_rate, {0.0, 1.0}, "", "gasac: share of a child's genes replaced at random");
-  }
+  static constexpr int kPopulation = 24;        ///< individuals of a generation
+  static constexpr double kMutationRate = 0.1;  ///< gasac: ratio of a child's genes replaced at random
+  bool learning = true;                         ///< adaptive: how good a replacement each gene is
 };
 
 struct SampleConsensusOptions {
@@ -63,7 +58,6 @@ struct SampleConsensusOptions {
     list.add("max_iterations", max_iterations, {1, 100000}, "",
              "samples drawn at most; fewer once one without outliers was drawn with a probability of 0.9999");
     list.add("seed", seed, {0, 1000000000}, "", "of the random samples; equal seeds give equal results");
-    list.group("genetic", genetic);
   }
 };
 

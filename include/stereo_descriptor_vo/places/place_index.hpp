@@ -8,7 +8,6 @@
 #include <unordered_map>
 #include <vector>
 
-#include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 
 namespace sdvo {
@@ -30,16 +29,6 @@ struct Place {
 /// Patches are left behind.
 StereoFeatures thinOut(const StereoFeatures& features, int most);
 
-struct PlaceIndexOptions {
-  int words_per_row = 4;
-  int bits_per_word = 18;
-
-  void describe(OptionList& list) {
-    list.add("words_per_row", words_per_row, {1, 16}, "", "words that stand for a descriptor in the index");
-    list.add("bits_per_word", bits_per_word, {8, 24}, "bit", "bits of the descriptor in each of its words");
-  }
-};
-
 /// The words of a place's rows, ascending, none twice: what an index knows of it, and all that another robot needs to
 /// ask whether a place is known.
 using PlaceSignature = std::vector<std::uint32_t>;
@@ -56,7 +45,9 @@ struct PlaceCandidate {
 /// Sivic and Zisserman 2003).
 class PlaceIndex {
  public:
-  explicit PlaceIndex(const PlaceIndexOptions& options);
+  // Words of 18 bits: a hundred thousand different rows share few by chance.
+  static constexpr int kWordsPerRow = 4;
+  static constexpr int kBitsPerWord = 18;
 
   /// Throws std::invalid_argument where the rows are not made of bits or too short for the words.
   PlaceSignature signature(const StereoFeatures& features) const;
@@ -75,7 +66,6 @@ class PlaceIndex {
  private:
   double weight(std::size_t having) const;
 
-  PlaceIndexOptions options_;
   std::map<int, PlaceSignature> places_;
   std::unordered_map<std::uint32_t, std::vector<int>> postings_;  ///< for each word, the places that have it, ascending
 };

@@ -27,10 +27,6 @@ struct PlaceRecognitionOptions {
   double min_travel = 30.0;
   int candidates = 1;
   bool localisation_only = false;
-  PlaceIndexOptions index;
-  PlaceVerifierOptions verifier;
-  LoopAgreementOptions agreement;
-  PoseGraphOptions graph;
 
   void describe(OptionList& list) {
     list.add("keyframe_distance", keyframe_distance, {0.01, 100.0}, "m",
@@ -44,10 +40,6 @@ struct PlaceRecognitionOptions {
     list.add("candidates", candidates, {1, 100}, "", "places that geometry looks at for each key frame");
     list.add("localisation_only", localisation_only,
              "a map that was loaded stays as it is: no places are added, none is moved");
-    list.group("index", index);
-    list.group("verifier", verifier);
-    list.group("agreement", agreement);
-    list.group("graph", graph);
   }
 };
 

@@ -6,28 +6,9 @@
 #include <set>
 #include <vector>
 
-#include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 
 namespace sdvo {
-
-struct PoseGraphOptions {
-  double drift_translation = 0.03;
-  double drift_rotation = 0.01;
-  double drift_turn = 0.01;
-  double loop_threshold = 3.0;
-  int iterations = 50;
-
-  void describe(OptionList& list) {
-    list.add("drift_translation", drift_translation, {0.0, 1.0}, "m/m",
-             "largest error of the odometry, beyond its covariance, that a loop may have to take back");
-    list.add("drift_rotation", drift_rotation, {0.0, 10.0}, "deg/m", "the same of its rotation, for the way");
-    list.add("drift_turn", drift_turn, {0.0, 1.0}, "rad/rad", "… and for what it turned");
-    list.add("loop_threshold", loop_threshold, {0.1, 100.0}, "",
-             "residual of a loop, in standard deviations, beyond which it counts less and less");
-    list.add("iterations", iterations, {1, 1000}, "", "largest number of steps of one optimisation");
-  }
-};
 
 /// A measured relative pose between two nodes.
 struct GraphEdge {
@@ -59,10 +40,10 @@ void requirePoseGraphSolver();
 /// while the original grows.
 class PoseGraph {
  public:
-  explicit PoseGraph(const PoseGraphOptions& options);
+  PoseGraph();
 
   /// A graph as it was before. Throws std::invalid_argument where an edge names no node, or its covariance is none.
-  PoseGraph(const PoseGraphOptions& options, std::map<int, Eigen::Isometry3d> nodes, std::vector<GraphEdge> edges);
+  PoseGraph(std::map<int, Eigen::Isometry3d> nodes, std::vector<GraphEdge> edges);
 
   /// The first node, which stays where it is.
   void start(int id, const Eigen::Isometry3d& T_map_node);
@@ -121,7 +102,9 @@ class PoseGraph {
   void solve(Summary& summary);
   bool loopsHold() const;
 
-  PoseGraphOptions options_;
+  static constexpr double kDriftOfTurn = 0.01;   ///< rad/rad, largest error of turns
+  static constexpr double kLoopThreshold = 3.0;  ///< standard deviations; a loop's residual beyond counts less and less
+
   std::map<int, Eigen::Isometry3d> nodes_;  ///< T_map_node
   std::vector<GraphEdge> edges_;
   int moved_parts_ = 0;

@@ -14,7 +14,6 @@ struct CalibrationOptions {
   double prior_sigma = 1.0;
   double right_delay = 0.0;
   double right_delay_sigma = 0.003;  // chosen: one trigger leaves 0.2 ms (twelve drives), none half a frame
-  double trust = 0.16;
 
   void describe(OptionList& list) {
     list.add("enabled", enabled, "estimate the rig's residual disparity error while driving and compensate it");
@@ -27,8 +26,6 @@ struct CalibrationOptions {
              "time by which right images are known to be later than left ones; a significant difference is found");
     list.add("right_delay_sigma", right_delay_sigma, {1e-6, 0.1}, "s",
              "standard deviation of an error of that time, which is beforehand as likely as none");
-    list.add("trust", trust, {0.01, 1.0}, "",
-             "how far the window's own figure for its precision is believed: 1 / the factor on its standard deviation");
   }
 };
 
@@ -40,6 +37,9 @@ struct CalibrationOptions {
 /// simulated or well calibrated rig keeps the prior to the digit.
 class CalibrationFilter {
  public:
+  /// A window's standard deviation is too small by 1 / kTrust.
+  static constexpr double kTrust = 0.16;
+
   explicit CalibrationFilter(const CalibrationOptions& options);
 
   /// What is known from pairs before the window that begins with pair `oldest_id`.

@@ -57,7 +57,7 @@ class Signatures {
 };
 
 void findPlace(benchmark::State& state) {
-  sdvo::PlaceIndex index{sdvo::PlaceIndexOptions()};
+  sdvo::PlaceIndex index;
   Signatures signatures(index);
   for (int place = 0; place < state.range(0); ++place) index.add(place, signatures.next());
   const sdvo::PlaceSignature asked = signatures.next();
@@ -65,13 +65,13 @@ void findPlace(benchmark::State& state) {
 }
 
 void signature(benchmark::State& state) {
-  const sdvo::PlaceIndex index{sdvo::PlaceIndexOptions()};
+  const sdvo::PlaceIndex index;
   const sdvo::StereoFeatures features = unevenRows(1);
   for (auto _ : state) benchmark::DoNotOptimize(index.signature(features));
 }
 
 void verifyAnotherPlace(benchmark::State& state) {
-  const sdvo::PlaceVerifier verifier{sdvo::PlaceVerifierOptions()};
+  const sdvo::PlaceVerifier verifier;
   const sdvo::StereoFeatures here = unevenRows(1), there = unevenRows(2);
   for (auto _ : state) benchmark::DoNotOptimize(verifier.verify(there, here));
 }
@@ -100,7 +100,7 @@ sdvo::PoseGraph streets(int nodes, int loops) {
     made.covariance.bottomRightCorner<3, 3>() *= 4e-4;
     return made;
   };
-  sdvo::PoseGraph graph{sdvo::PoseGraphOptions()};
+  sdvo::PoseGraph graph;
   graph.start(0, truth(0));
   for (int k = 1; k < nodes; ++k) graph.extend(edge(k - 1, k, sdvo::GraphEdge::Kind::kOdometry, 0.05));
   for (int k = 0; k < loops; ++k) {
