@@ -94,7 +94,6 @@ struct OdometryOutputOptions {
   double guess_error = 0.1;
   int queue_size = 1;
   bool overwrite = false;
-  int opencv_threads = -1;
   double max_silence = 2.0;
   RateOptions rates;
   double max_load = 0.9;
@@ -126,8 +125,6 @@ struct OdometryOutputOptions {
     list.add("queue_size", queue_size, {1, 1000}, "",
              "feature messages that wait while one is processed; the newest win");
     list.add("overwrite", overwrite, "save_trajectory may replace files that were there before");
-    list.add("opencv_threads", opencv_threads, {-1, 256}, "",
-             "OpenCV's threads, of the whole process; 0: none beside the caller's, -1: left as they are");
     list.add("max_silence", max_silence, {0.1, 3600.0}, "s",
              "/diagnostics report an error when no pair has come for longer (wall time)");
     list.group("diagnostics", rates);
@@ -143,11 +140,9 @@ struct PlaceOutputOptions {
   std::string map_frame_id = "map";
   bool publish_tf = true;
   double correction_time = 2.0;
-  double tf_timeout = 2.0;
   int sync_queue_size = 100;
   int queue_size = 10;
   double max_silence = 10.0;
-  int opencv_threads = -1;
   std::string places_file;
   bool save_at_shutdown = false;
   bool overwrite = false;
@@ -160,15 +155,11 @@ struct PlaceOutputOptions {
     list.add("map_frame_id", map_frame_id, "frame of the corrected poses, parent of the odometry's frame");
     list.add("publish_tf", publish_tf, "publish map -> odom on /tf");
     list.add("correction_time", correction_time, {0.0, 600.0}, "s", "in which a correction goes into map -> odom");
-    list.add("tf_timeout", tf_timeout, {0.0, 60.0}, "s",
-             "wall time to wait for the transform base <- camera at the start");
     list.add("sync_queue_size", sync_queue_size, {2, 10000}, "",
              "messages kept per input until those that belong to them have come");
     list.add("queue_size", queue_size, {1, 10000}, "", "pairs that wait while one is processed; the newest win");
     list.add("max_silence", max_silence, {0.1, 3600.0}, "s",
              "/diagnostics warn when no pair with odometry has come for longer (wall time)");
-    list.add("opencv_threads", opencv_threads, {-1, 256}, "",
-             "OpenCV's threads, of the whole process; 0: none beside the caller's, -1: left as they are");
     list.add("places_file", places_file,
              "file of save_places to begin with, relative ones below ROS_HOME; empty: with no places");
     list.add("save_at_shutdown", save_at_shutdown, "write the places to places_file each minute and at the end");

@@ -87,7 +87,6 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
       NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect: misspelt? See docs/parameters.md");
     const PlaceOutputOptions& output = options_.output;
     ros_conversions::requireName({"map_frame_id", output.map_frame_id});
-    if (output.opencv_threads >= 0) cv::setNumThreads(output.opencv_threads);
     robot_ = output.robot_name.empty() ? nh_.getNamespace() : output.robot_name;
     session_ = std::make_shared<PlaceSession>(options_.recognition);
     if (output.save_at_shutdown && (output.places_file.empty() || options_.recognition.localisation_only))
@@ -98,7 +97,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     transforms_ = std::make_unique<RobotTransforms>(nh_, std::nullopt, tag, [this](const std::string& what) {
       if (throttle_.allows(what)) NODELET_WARN_STREAM(what);
     });
-    mount_ = std::make_unique<CameraMount>(*transforms_, output.tf_timeout);
+    mount_ = std::make_unique<CameraMount>(*transforms_, OdometryOutputOptions().tf_timeout);
     publisher_ = std::make_unique<PlacePublisher>(nh_, output, robot_, tag, [this] { return map(); });
     using namespace stereo_descriptor_vo;
     using std_srvs::Trigger;

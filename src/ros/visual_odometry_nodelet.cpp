@@ -99,7 +99,6 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
         std::make_unique<RobotTransforms>(nh_, publishedFrames(), tag, [this](const std::string& what) { warn(what); });
     mount_ = std::make_unique<CameraMount>(*transforms_, options_.output.tf_timeout);
     patience_ = Patience(options_.output.guess_timeout);
-    if (options_.output.opencv_threads >= 0) cv::setNumThreads(options_.output.opencv_threads);
     unused_ = std::make_unique<UnusedInput>("feature messages", options_.output.rates.max_unused,
                                             std::set<int>{UnusedInput::kPushedOut});
     diagnostics_ = std::make_unique<OdometryDiagnostics>(nh_, private_nh, getName(), options_.output, *unused_);
