@@ -7,7 +7,7 @@
 #include <memory>
 #include <opencv2/features2d.hpp>
 #include <pluginlib/class_list_macros.hpp>
-#include <stereo_descriptor_vo/ros/stereo_features_view.hpp>
+#include <stereo_descriptor_vo/messages/stereo_features_view.hpp>
 
 namespace examples {
 

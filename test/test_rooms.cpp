@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <iterator>
 #include <map>
 #include <optional>
@@ -65,7 +66,7 @@ bool isRos(const std::string& header) {
       R"(^(\.\./)*(ros|tf|nodelet|nodelet_topic_tools|cv_bridge|rosbag|rosbag_storage|message_filters|image_transport|pluginlib|)"
       R"(class_loader|image_geometry|dynamic_reconfigure|diagnostic_updater|actionlib|bondcpp|xmlrpcpp|rosconsole|)"
       R"(catkin|topic_tools|angles|eigen_conversions)/.*|^tf2.*/.*|^[A-Za-z0-9_]+_msgs/.*|^std_srvs/.*|)"
-      R"(^stereo_descriptor_vo/[A-Z].*|^stereo_descriptor_vo/ros/.*|^\.\./messages/.*)");
+      R"(^stereo_descriptor_vo/[A-Z].*|^stereo_descriptor_vo/messages/.*|^\.\./messages/.*)");
   return std::regex_match(header, ros);
 }
 
@@ -74,8 +75,6 @@ bool isRos(const std::string& header) {
 std::string roomOf(const std::string& header, const std::string& room) {
   static const std::regex ours(R"(^(?:\.\./|stereo_descriptor_vo/)([a-z_]+)/[a-z_/]+\.(?:hpp|inc)$)");
   std::smatch match;
-  // The public view of a message belongs to the messages, whatever its path.
-  if (header.rfind("stereo_descriptor_vo/ros/", 0) == 0) return "messages";
   if (std::regex_match(header, match, ours)) return match[1];
   return header.find('/') == std::string::npos && fs::exists(kSource / "src" / room / header) ? room : "";
 }
@@ -126,9 +125,9 @@ TEST(Rooms, AnArrowAgainstTheFlowIsFound) {
   const std::map<std::string, std::string> planted = {
       {"front_end", "stereo_descriptor_vo/matching/feature_matcher.hpp"},
       {"motion", "stereo_descriptor_vo/matching/feature_matcher.hpp"},
-      {"matching", "stereo_descriptor_vo/front_end/freak.hpp"},
-      {"map", "stereo_descriptor_vo/belief/pose_covariance.hpp"},
-      {"belief", "stereo_descriptor_vo/rig/row_delay.hpp"},
+      {"matching", "../src/front_end/freak.hpp"},
+      {"map", "../src/belief/pose_covariance.hpp"},
+      {"belief", "../src/rig/row_delay.hpp"},
       {"rig", "stereo_descriptor_vo/odometry/odometry_result.hpp"},
       {"odometry", "../places/whatever.hpp"},
       {"common", "stereo_descriptor_vo/motion/noise.hpp"},
@@ -267,6 +266,24 @@ TEST(Rooms, WhatRunsOnARobotReadsNoImageFilesWithOpenCv) {
           << include.file.string() << ":" << include.line << " includes " << include.header;
 }
 
+/// Public is what a program, a nodelet or an example includes, and what that includes; all else stands in src/.
+TEST(Rooms, EveryPublicHeaderIsReachedFromAnEntryPoint) {
+  const fs::path include = kSource / "include";
+  std::set<std::string> reached;
+  const std::function<void(const fs::path&)> follow = [&](const fs::path& file) {
+    std::ifstream stream(file);
+    for (std::string line; std::getline(stream, line);)
+      if (const std::string header = headerOf(line); fs::exists(include / header) && reached.insert(header).second)
+        follow(include / header);
+  };
+  for (const char* folder : {"src/tools", "src/config", "src/ros", "src/messages", "src/check", "examples"})
+    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(kSource / folder))
+      if (entry.is_regular_file()) follow(entry.path());
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(include))
+    if (entry.is_regular_file())
+      EXPECT_EQ(reached.count(entry.path().lexically_relative(include).string()), 1u) << entry.path();
+}
+
 /// With one sentence, before anything that only C++17 has. Headers that include another one of ours leave it to that
 /// one.
 TEST(Rooms, EveryPublicHeaderRefusesOlderStandards) {
@@ -302,7 +319,7 @@ TEST(Rooms, TheSearchKnowsRosHeaders) {
         "#include <message_filters/subscriber.h>", "#include <image_transport/image_transport.h>",
         "#include <rosbag/bag.h>", "#include <pluginlib/class_list_macros.hpp>",
         "#include \"stereo_descriptor_vo/StereoFeatures.h\"",
-        "#include <stereo_descriptor_vo/ros/stereo_features_view.hpp>"})
+        "#include <stereo_descriptor_vo/messages/stereo_features_view.hpp>"})
     EXPECT_TRUE(isRos(headerOf(line))) << line;
   for (const char* line : {"#include <cstdint>", "#include <opencv2/core.hpp>", "#include <Eigen/Geometry>",
                            "#include \"stereo_descriptor_vo/common/stereo_features.hpp\"",
@@ -315,7 +332,7 @@ TEST(Rooms, TheSearchKnowsTheRoomOfAHeader) {
   EXPECT_EQ(roomOf("../data/text_file.hpp", "tools"), "data");
   EXPECT_EQ(roomOf("patch_samples.hpp", "matching"), "matching");
   EXPECT_EQ(roomOf("opencv2/core.hpp", "odometry"), "");
-  EXPECT_EQ(roomOf("stereo_descriptor_vo/ros/stereo_features_view.hpp", "ros"), "messages");
+  EXPECT_EQ(roomOf("stereo_descriptor_vo/messages/stereo_features_view.hpp", "ros"), "messages");
   EXPECT_EQ(roomOf("vector", "odometry"), "");
 }
 

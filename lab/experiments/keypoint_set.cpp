@@ -5,7 +5,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "stereo_descriptor_vo/front_end/integral_image.hpp"
+#include "../../src/front_end/integral_image.hpp"
 
 namespace sdvo {
 KeypointSet findKeypoints(const KittiSequence& sequence, int i, const FeatureDetectorOptions& detector,

@@ -41,8 +41,7 @@ def files_of(room):
 
 def includes_of(room, rooms):
     lines = [line for f in files_of(room) for line in f.read_text().splitlines()]
-    # The public view of a message belongs to the messages, whatever its path.
-    found = {"messages" if "stereo_descriptor_vo/ros/" in line else m[1] for line in lines if (m := INCLUDE.match(line))}
+    found = {m[1] for line in lines if (m := INCLUDE.match(line))}
     return {other for other in found if other in rooms and other != room}
 
 

@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/belief/belief.hpp"
+#include "belief.hpp"
 
 #include <algorithm>
 #include <cmath>

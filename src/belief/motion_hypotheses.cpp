@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
+#include "motion_hypotheses.hpp"
 
 #include <algorithm>
 #include <bitset>

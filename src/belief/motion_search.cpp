@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/belief/motion_search.hpp"
+#include "motion_search.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "../common/statistics.hpp"
-#include "stereo_descriptor_vo/common/stopwatch.hpp"
+#include "../common/stopwatch.hpp"
 #include "stereo_descriptor_vo/matching/view_matcher.hpp"
 #include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
 #include "stereo_descriptor_vo/motion/motion_estimator.hpp"

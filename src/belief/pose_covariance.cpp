@@ -1,8 +1,8 @@
-#include "stereo_descriptor_vo/belief/pose_covariance.hpp"
+#include "pose_covariance.hpp"
 
 #include <cmath>
 
-#include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
+#include "motion_hypotheses.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
 
 namespace sdvo {

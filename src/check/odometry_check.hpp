@@ -4,10 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "../rig/row_delay.hpp"
 #include "finding.hpp"
 #include "row_readout.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
-#include "stereo_descriptor_vo/rig/row_delay.hpp"
 
 namespace sdvo {
 

@@ -5,8 +5,8 @@
 #include <optional>
 #include <vector>
 
+#include "../rig/row_delay.hpp"
 #include "finding.hpp"
-#include "stereo_descriptor_vo/rig/row_delay.hpp"
 
 namespace sdvo {
 

@@ -2,10 +2,10 @@
 
 #include <optional>
 
+#include "../rig/row_delay.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
-#include "stereo_descriptor_vo/rig/row_delay.hpp"
 
 namespace sdvo {
 

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "stereo_descriptor_vo/common/processor.hpp"
+#include "processor.hpp"
 
 #if defined(__x86_64__) && defined(__GNUC__)
 #define SDVO_HAVE_AVX2

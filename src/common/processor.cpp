@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/common/processor.hpp"
+#include "processor.hpp"
 
 #include <atomic>
 

@@ -7,10 +7,10 @@
 #include <stdexcept>
 #include <utility>
 
+#include "brief.hpp"
+#include "freak.hpp"
+#include "integral_image.hpp"
 #include "opencv_features.hpp"
-#include "stereo_descriptor_vo/front_end/brief.hpp"
-#include "stereo_descriptor_vo/front_end/freak.hpp"
-#include "stereo_descriptor_vo/front_end/integral_image.hpp"
 
 #ifdef SDVO_HAVE_XFEATURES2D
 #include <opencv2/xfeatures2d.hpp>

@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/front_end/block_differences.hpp"
+#include "block_differences.hpp"
 
 #include <algorithm>
 #include <cstdlib>

@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "stereo_descriptor_vo/front_end/block_differences.hpp"
+#include "block_differences.hpp"
 
 namespace sdvo {
 

@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/front_end/brief.hpp"
+#include "brief.hpp"
 
 #include <algorithm>
 #include <cmath>

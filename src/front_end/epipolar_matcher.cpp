@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "../common/kernel.hpp"
+#include "block_differences.hpp"
+#include "image_copies.hpp"
 #include "image_noise.hpp"
-#include "stereo_descriptor_vo/front_end/block_differences.hpp"
-#include "stereo_descriptor_vo/front_end/image_copies.hpp"
-#include "stereo_descriptor_vo/front_end/slanted_patch.hpp"
+#include "slanted_patch.hpp"
 
 namespace sdvo {
 namespace {

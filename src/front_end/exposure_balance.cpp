@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/front_end/exposure_balance.hpp"
+#include "exposure_balance.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/front_end/fast_corners.hpp"
+#include "fast_corners.hpp"
 
 #include <algorithm>
 #include <array>

@@ -17,9 +17,9 @@
 #include <utility>
 
 #include "../common/text.hpp"
+#include "fast_corners.hpp"
 #include "image_noise.hpp"
 #include "opencv_features.hpp"
-#include "stereo_descriptor_vo/front_end/fast_corners.hpp"
 
 namespace sdvo {
 namespace {

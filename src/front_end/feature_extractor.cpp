@@ -8,8 +8,8 @@
 #include <string>
 
 #include "../common/kernel.hpp"
-#include "stereo_descriptor_vo/common/stopwatch.hpp"
-#include "stereo_descriptor_vo/front_end/exposure_balance.hpp"
+#include "../common/stopwatch.hpp"
+#include "exposure_balance.hpp"
 
 namespace sdvo {
 namespace {

@@ -1,11 +1,11 @@
-#include "stereo_descriptor_vo/front_end/freak.hpp"
+#include "freak.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <opencv2/core/utility.hpp>
 
 #include "freak_octet.hpp"
-#include "stereo_descriptor_vo/front_end/integral_image.hpp"
+#include "integral_image.hpp"
 
 namespace sdvo {
 namespace {

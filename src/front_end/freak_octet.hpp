@@ -3,7 +3,7 @@
 #include <array>
 #include <cstdint>
 
-#include "stereo_descriptor_vo/front_end/freak.hpp"
+#include "freak.hpp"
 
 namespace sdvo {
 

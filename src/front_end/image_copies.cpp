@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/front_end/image_copies.hpp"
+#include "image_copies.hpp"
 
 #include <algorithm>
 #include <cmath>

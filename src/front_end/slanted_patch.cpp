@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/front_end/slanted_patch.hpp"
+#include "slanted_patch.hpp"
 
 #include <array>
 #include <cstddef>
@@ -79,7 +79,8 @@ SDVO_AVX2 inline HalfLanes fourPixels(const std::uint8_t* pixels) {
 #ifdef SDVO_HAVE_VECTORS
 /// The same operations in the same order, eight columns at once, and the last ones one by one.
 template <class Vector, Vector (*kPixels)(const std::uint8_t*)>
-SDVO_VECTORS inline void sampleRow(const std::uint8_t* upper, const std::uint8_t* lower, RowPlace place, float* values) {
+SDVO_VECTORS inline void sampleRow(const std::uint8_t* upper, const std::uint8_t* lower, RowPlace place,
+                                   float* values) {
   const Vector sum = place.w00 * kPixels(upper) + place.w01 * kPixels(upper + 1) + place.w10 * kPixels(lower) +
                      place.w11 * kPixels(lower + 1);
   std::memcpy(values, &sum, sizeof sum);
@@ -101,8 +102,8 @@ SDVO_VECTORS void sampleWithVectors(const std::uint8_t* image, std::size_t step,
 /// Eight or four columns of rows that lie right below each other: what is the lower row of one is the upper one of the
 /// next.
 template <class Vector, Vector (*kPixels)(const std::uint8_t*)>
-SDVO_VECTORS inline void sampleColumns(const std::uint8_t* upper, std::size_t step, RowPlace place, int count, int columns,
-                                       float* patch) {
+SDVO_VECTORS inline void sampleColumns(const std::uint8_t* upper, std::size_t step, RowPlace place, int count,
+                                       int columns, float* patch) {
   Vector a = kPixels(upper), b = kPixels(upper + 1);
   const std::uint8_t* lower = upper + step;
   for (int j = 0; j < count; ++j, lower += step, patch += columns) {

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "stereo_descriptor_vo/front_end/freak.hpp"
-#include "stereo_descriptor_vo/front_end/image_copies.hpp"
-#include "stereo_descriptor_vo/front_end/integral_image.hpp"
+#include "freak.hpp"
+#include "image_copies.hpp"
+#include "integral_image.hpp"
 
 namespace sdvo {
 namespace {

@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/map/point_elimination.hpp"
+#include "point_elimination.hpp"
 
 #include <Eigen/Cholesky>
 #include <cstddef>

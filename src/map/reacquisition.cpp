@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/map/reacquisition.hpp"
+#include "reacquisition.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -6,7 +6,7 @@
 #include <numeric>
 
 #include "../common/statistics.hpp"
-#include "stereo_descriptor_vo/map/point_elimination.hpp"
+#include "point_elimination.hpp"
 #include "stereo_descriptor_vo/motion/motion_refinement.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
 

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <type_traits>
 
-#include "stereo_descriptor_vo/matching/hamming_distances.hpp"
+#include "hamming_distances.hpp"
 #include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
 
 namespace sdvo {

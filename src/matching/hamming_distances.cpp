@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/matching/hamming_distances.hpp"
+#include "hamming_distances.hpp"
 
 #include <cstring>
 

@@ -5,7 +5,7 @@
 
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/front_end/depth_scale.hpp"
-#include "stereo_descriptor_vo/ros/stereo_features_view.hpp"
+#include "stereo_descriptor_vo/messages/stereo_features_view.hpp"
 
 namespace sdvo::ros_conversions {
 

@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/odometry/odometry_state.hpp"
+#include "odometry_state.hpp"
 
 #include <algorithm>
 #include <cstddef>

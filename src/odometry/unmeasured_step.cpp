@@ -1,6 +1,6 @@
-#include "stereo_descriptor_vo/odometry/unmeasured_step.hpp"
-
 #include <algorithm>
+
+#include "odometry_state.hpp"
 
 namespace sdvo {
 namespace {

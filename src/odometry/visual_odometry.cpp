@@ -6,8 +6,11 @@
 #include <stdexcept>
 #include <utility>
 
-#include "stereo_descriptor_vo/common/stopwatch.hpp"
-#include "stereo_descriptor_vo/odometry/unmeasured_step.hpp"
+#include "../belief/belief.hpp"
+#include "../belief/motion_search.hpp"
+#include "../common/stopwatch.hpp"
+#include "../map/reacquisition.hpp"
+#include "odometry_state.hpp"
 
 namespace sdvo {
 namespace {
@@ -39,14 +42,62 @@ std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHy
 
 }  // namespace
 
+/// A pair as it is searched: of the map's camera, without features of the pair before, both images of one moment.
+struct VisualOdometry::Pair {
+  const StereoFeatures& given;
+  std::optional<StereoFeatures> refocused{}, new_part{}, rotated_back{}, synchronised{};
+  std::vector<int> new_features{};
+  double dt = 0.0;               ///< since the previous pair, s
+  double frozen = kUnsuspected;  ///< log-odds that its images are old although the camera moved
+  /// Without a map of its stream; after an outage; with old images; after a pose.
+  enum { kFirst, kSought, kFrozen, kFollowed } is = kFirst;
+  ShownRotation rotation{};  ///< of the right camera beyond what is known
+
+  const StereoFeatures& whole() const { return refocused ? *refocused : given; }
+  const StereoFeatures& part() const { return new_part ? *new_part : whole(); }
+  const StereoFeatures& taken() const { return rotated_back ? *rotated_back : part(); }
+  const StereoFeatures& features() const { return synchronised ? *synchronised : taken(); }
+};
+
+/// The map as it would be with the pair, adjusted. Nothing has changed until it is committed.
+struct VisualOdometry::Candidate {
+  RigCalibration calibration;
+  LocalMap::Adjustment adjustment;
+  Eigen::Isometry3d motion;             ///< T_reference_current after the adjustment
+  Eigen::Isometry3d T_keyframe_origin;  ///< of the key frame before the pair, before the adjustment
+  double distance = 0.0;                ///< from that key frame, m
+};
+
+struct VisualOdometry::Parts {
+  explicit Parts(const VisualOdometryOptions& options)
+      : search(options.matcher, options.motion, options.alignment),
+        reacquisition(options.matcher, options.motion),
+        revisit(options.matcher, options.motion, options.alignment),
+        optimizer(options.window),
+        state(options, 0) {}
+
+  MotionSearch search;
+  Reacquisition reacquisition;
+  Revisit revisit;
+  WindowOptimizer optimizer;
+  OdometryState state;
+};
+
 VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
     : options_(checked(options).withOneNoise()),
       T_base_camera_(lookingAhead()),
-      search_(options_.matcher, options_.motion, options_.alignment),
-      reacquisition_(options_.matcher, options_.motion),
-      revisit_(options_.matcher, options_.motion, options_.alignment),
-      optimizer_(options_.window),
-      state_(options_, 0) {}
+      parts_(std::make_unique<Parts>(options_)),
+      search_(parts_->search),
+      reacquisition_(parts_->reacquisition),
+      revisit_(parts_->revisit),
+      optimizer_(parts_->optimizer),
+      state_(parts_->state) {}
+
+VisualOdometry::~VisualOdometry() = default;
+
+const Eigen::Isometry3d& VisualOdometry::lastPose() const {
+  return state_.T_origin_camera;
+}
 
 void VisualOdometry::configure(const VisualOdometryOptions& options) {
   options_ = checked(options).withOneNoise();

@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "stereo_descriptor_vo/common/stopwatch.hpp"
+#include "../common/stopwatch.hpp"
 
 namespace sdvo {
 namespace {

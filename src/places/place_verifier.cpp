@@ -2,8 +2,8 @@
 
 #include <vector>
 
+#include "../belief/motion_hypotheses.hpp"
 #include "../common/text.hpp"
-#include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
 #include "stereo_descriptor_vo/matching/feature_matcher.hpp"
 
 namespace sdvo {

@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/rig/learnt_rig.hpp"
+#include "learnt_rig.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>

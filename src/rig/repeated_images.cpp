@@ -1,11 +1,11 @@
-#include "stereo_descriptor_vo/rig/repeated_images.hpp"
+#include "repeated_images.hpp"
 
 #include <algorithm>
 #include <cmath>
 #include <numeric>
 #include <utility>
 
-#include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
+#include "../belief/motion_hypotheses.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
 
 namespace sdvo {

@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/rig/right_camera_delay.hpp"
+#include "right_camera_delay.hpp"
 
 #include <algorithm>
 #include <bitset>

@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/rig/right_rotation.hpp"
+#include "right_rotation.hpp"
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
@@ -7,9 +7,9 @@
 #include <cmath>
 #include <limits>
 
+#include "row_delay.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/motion/pose_problem.hpp"
-#include "stereo_descriptor_vo/rig/row_delay.hpp"
 
 namespace sdvo {
 

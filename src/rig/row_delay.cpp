@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/rig/row_delay.hpp"
+#include "row_delay.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>

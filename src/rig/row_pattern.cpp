@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/rig/row_pattern.hpp"
+#include "row_pattern.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "stereo_descriptor_vo/ros/stereo_features_view.hpp"
+#include "stereo_descriptor_vo/messages/stereo_features_view.hpp"
 
 namespace sdvo {
 namespace {

@@ -11,7 +11,7 @@
 
 #include "../config/interface_options.hpp"
 #include "../messages/odometry_conversions.hpp"
-#include "stereo_descriptor_vo/ros/stereo_features_view.hpp"
+#include "stereo_descriptor_vo/messages/stereo_features_view.hpp"
 #include "transforms.hpp"
 
 namespace sdvo {

@@ -11,7 +11,7 @@
 
 #include "../config/interface_options.hpp"
 #include "../messages/place_conversions.hpp"
-#include "stereo_descriptor_vo/places/eased_transform.hpp"
+#include "../places/eased_transform.hpp"
 #include "transforms.hpp"
 
 namespace sdvo {

@@ -12,7 +12,6 @@
 #include <map>
 #include <memory>
 #include <mutex>
-#include <opencv2/core/utility.hpp>
 #include <optional>
 #include <pluginlib/class_list_macros.hpp>
 #include <set>
@@ -97,7 +96,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     transforms_ = std::make_unique<RobotTransforms>(nh_, std::nullopt, tag, [this](const std::string& what) {
       if (throttle_.allows(what)) NODELET_WARN_STREAM(what);
     });
-    mount_ = std::make_unique<CameraMount>(*transforms_, OdometryOutputOptions().tf_timeout);
+    mount_ = std::make_unique<CameraMount>(*transforms_, kTfTimeout);
     publisher_ = std::make_unique<PlacePublisher>(nh_, output, robot_, tag, [this] { return map(); });
     using namespace stereo_descriptor_vo;
     using std_srvs::Trigger;
@@ -429,6 +428,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     return std::make_shared<PlaceSession>(options_.recognition, loadPlaces(path));
   }
 
+  static constexpr double kTfTimeout = 2.0;   // s of wall time, at the start
   static constexpr double kRests = 20.0;      // times as long as saving took: at most a twentieth of the disk's time
   const ros::WallDuration kSavePeriod{60.0};  // s: what a killed process loses (chosen)
 

@@ -12,7 +12,6 @@
 #include <functional>
 #include <memory>
 #include <mutex>
-#include <opencv2/core/utility.hpp>
 #include <optional>
 #include <pluginlib/class_list_macros.hpp>
 #include <set>
@@ -36,8 +35,8 @@
 #include "odometry_publisher.hpp"
 #include "output_files.hpp"
 #include "params.hpp"
+#include "stereo_descriptor_vo/messages/stereo_features_view.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
-#include "stereo_descriptor_vo/ros/stereo_features_view.hpp"
 #include "threads.hpp"
 #include "throttles.hpp"
 #include "transforms.hpp"

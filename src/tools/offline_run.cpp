@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "../common/statistics.hpp"
+#include "../common/stopwatch.hpp"
 #include "../data/text_file.hpp"
-#include "stereo_descriptor_vo/common/stopwatch.hpp"
 
 namespace sdvo {
 namespace {

@@ -8,8 +8,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "../common/stopwatch.hpp"
 #include "../data/text_file.hpp"
-#include "stereo_descriptor_vo/common/stopwatch.hpp"
 
 namespace sdvo {
 namespace {

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "stereo_descriptor_vo/belief/belief.hpp"
+#include "../../src/belief/belief.hpp"
 
 namespace sdvo::test_belief {
 

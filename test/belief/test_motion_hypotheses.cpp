@@ -4,8 +4,8 @@
 #include <memory>
 #include <random>
 
+#include "../../src/belief/motion_hypotheses.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
 
 namespace sdvo::test_motion_hypotheses {
 

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <random>
 
+#include "../../src/belief/motion_search.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/belief/motion_search.hpp"
 
 namespace sdvo::test_motion_search {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "stereo_descriptor_vo/belief/pose_covariance.hpp"
+#include "../../src/belief/pose_covariance.hpp"
 
 namespace sdvo::test_pose_covariance {
 

@@ -4,8 +4,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "stereo_descriptor_vo/common/processor.hpp"
-#include "stereo_descriptor_vo/front_end/block_differences.hpp"
+#include "../../src/common/processor.hpp"
+#include "../../src/front_end/block_differences.hpp"
 
 namespace sdvo::test_block_differences {
 

@@ -4,8 +4,8 @@
 #include <bitset>
 #include <cmath>
 
+#include "../../src/front_end/brief.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/front_end/brief.hpp"
 
 namespace sdvo::test_brief {
 

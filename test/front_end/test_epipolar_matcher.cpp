@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
+#include "../../src/common/processor.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/front_end/epipolar_matcher.hpp"
 
 namespace sdvo::test_epipolar_matcher {

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
+#include "../../src/front_end/exposure_balance.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/front_end/exposure_balance.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 
 namespace sdvo::test_exposure_balance {

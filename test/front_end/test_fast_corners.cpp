@@ -7,9 +7,9 @@
 #include <opencv2/imgproc.hpp>
 #include <vector>
 
+#include "../../src/common/processor.hpp"
+#include "../../src/front_end/fast_corners.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/common/processor.hpp"
-#include "stereo_descriptor_vo/front_end/fast_corners.hpp"
 
 namespace sdvo {
 

@@ -2,10 +2,10 @@
 
 #include <algorithm>
 
+#include "../../src/front_end/freak.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
-#include "stereo_descriptor_vo/front_end/freak.hpp"
 
 namespace sdvo::test_feature_extractor {
 

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <set>
 
+#include "../../src/common/processor.hpp"
+#include "../../src/front_end/freak.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/common/processor.hpp"
-#include "stereo_descriptor_vo/front_end/freak.hpp"
 
 namespace sdvo::test_freak {
 

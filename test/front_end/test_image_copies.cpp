@@ -2,7 +2,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "stereo_descriptor_vo/front_end/image_copies.hpp"
+#include "../../src/front_end/image_copies.hpp"
 
 namespace sdvo {
 

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "stereo_descriptor_vo/front_end/integral_image.hpp"
+#include "../../src/front_end/integral_image.hpp"
 
 namespace sdvo::test_integral_image {
 

@@ -3,7 +3,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "stereo_descriptor_vo/common/processor.hpp"
+#include "../../src/common/processor.hpp"
 #include "stereo_descriptor_vo/front_end/patch_cutter.hpp"
 
 namespace sdvo::test_patch_cutter {

@@ -5,8 +5,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "stereo_descriptor_vo/common/processor.hpp"
-#include "stereo_descriptor_vo/front_end/slanted_patch.hpp"
+#include "../../src/common/processor.hpp"
+#include "../../src/front_end/slanted_patch.hpp"
 
 namespace sdvo {
 

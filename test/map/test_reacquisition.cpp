@@ -3,9 +3,9 @@
 #include <random>
 
 #include "../../src/common/statistics.hpp"
+#include "../../src/map/reacquisition.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/map/reacquisition.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
 namespace sdvo::test_reacquisition {
@@ -67,14 +67,14 @@ class Outage : public ::testing::Test {
   }
 
   void drive() {
-    for (int i = 0; i < kSeen; ++i) result_ = odometry_.update(pairOf(room_, i, poseAt(i)));
+    for (int i = 0; i < kSeen; ++i) result_ = odometry_->update(pairOf(room_, i, poseAt(i)));
     ASSERT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
   }
 
   /// Blind pairs; the number of the next one.
   int blind(int pairs) {
     for (int i = kSeen; i < kSeen + pairs; ++i)
-      result_ = odometry_.update(synthetic::noFeatures(synthetic::camera(), i * kPeriod));
+      result_ = odometry_->update(synthetic::noFeatures(synthetic::camera(), i * kPeriod));
     EXPECT_EQ(result_.state, TrackingState::kLost);
     EXPECT_FALSE(result_.has_pose);
     return kSeen + pairs;
@@ -109,29 +109,29 @@ class Outage : public ::testing::Test {
     EXPECT_EQ(result_.state, TrackingState::kLost) << result_.reason;
     EXPECT_FALSE(result_.has_pose);
     EXPECT_EQ(result_.epoch, 0);
-    result_ = odometry_.update(next);
+    result_ = odometry_->update(next);
     expectStartedAgain();
   }
 
   synthetic::World room_ = room(1);
-  VisualOdometry odometry_{{}};
+  std::optional<VisualOdometry> odometry_{std::in_place, VisualOdometryOptions()};
   OdometryResult result_;
 };
 
 TEST_F(Outage, TheSameEpochGoesOnWhereTheCameraHasMovedTo) {
   for (const int pairs : {3, 5, 20}) {
-    odometry_ = VisualOdometry({});
+    odometry_.emplace(VisualOdometryOptions());
     drive();
     const OdometryResult before = result_;
     const int i = blind(pairs);
-    result_ = odometry_.update(pairOf(room_, i, poseAt(i)));
+    result_ = odometry_->update(pairOf(room_, i, poseAt(i)));
     expectFoundAt(poseAt(i));
     EXPECT_TRUE(result_.has_motion);
     // It begins at the last pose, which was predicted for the first blind pair.
     EXPECT_NEAR(result_.dt, 0.05 * pairs, 1e-9);
     EXPECT_GT(result_.distance, before.distance);
     for (int k = 1; k < 5; ++k) {
-      result_ = odometry_.update(pairOf(room_, i + k, poseAt(i + k)));
+      result_ = odometry_->update(pairOf(room_, i + k, poseAt(i + k)));
       EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
       EXPECT_FALSE(contains(result_.reason, "re-acquired"));
       EXPECT_NEAR(result_.dt, 0.05, 1e-9);
@@ -143,7 +143,7 @@ TEST_F(Outage, TheSameEpochGoesOnWhereTheCameraHasMovedTo) {
 TEST_F(Outage, ACameraThatStoodLosesNothing) {
   drive();
   const int i = blind(30);
-  result_ = odometry_.update(pairOf(room_, i, poseAt(kSeen - 1)));
+  result_ = odometry_->update(pairOf(room_, i, poseAt(kSeen - 1)));
   expectFoundAt(poseAt(kSeen - 1));
 }
 
@@ -151,7 +151,7 @@ TEST_F(Outage, ATurnThatLeavesAThirdOfTheViewIsNone) {
   drive();
   const int i = blind(10);
   const Eigen::Isometry3d turned = poseAt(i) * expSE3((Vector6d() << 0.0, 0.0, 0.0, 0.0, 0.75, 0.0).finished());
-  result_ = odometry_.update(pairOf(room_, i, turned));
+  result_ = odometry_->update(pairOf(room_, i, turned));
   expectFoundAt(turned);
 }
 
@@ -164,30 +164,30 @@ TEST_F(Outage, ADimPairIsWaitedOut) {
     dim.append({lit.u[row], lit.v[row], lit.disparity[row], 0.f, 10.f, -1.f, 1.f});
     dim.descriptors.push_back(lit.descriptors.row(row));
   }
-  EXPECT_EQ(odometry_.update(dim).state, TrackingState::kLost);
+  EXPECT_EQ(odometry_->update(dim).state, TrackingState::kLost);
   ++i;
-  result_ = odometry_.update(pairOf(room_, i, poseAt(i)));
+  result_ = odometry_->update(pairOf(room_, i, poseAt(i)));
   expectFoundAt(poseAt(i));
 }
 
 TEST_F(Outage, AStreamThatWasBrokenGoesOnToo) {
   drive();
-  odometry_.breakStream();
-  result_ = odometry_.update(pairOf(room_, kSeen + 3, poseAt(kSeen + 3)));
+  odometry_->breakStream();
+  result_ = odometry_->update(pairOf(room_, kSeen + 3, poseAt(kSeen + 3)));
   expectFoundAt(poseAt(kSeen + 3));
 }
 
 TEST_F(Outage, OddPairsBetweenItAndTheFirstGoodOneAreWaitedOut) {
   for (const int odd : {1, 4}) {
-    odometry_ = VisualOdometry({});
+    odometry_.emplace(VisualOdometryOptions());
     drive();
     int i = blind(3);
     for (const int end = i + odd; i < end; ++i) {
       StereoFeatures foreign = pairOf(room(20 + static_cast<unsigned>(i)), i, poseAt(i));
-      result_ = odometry_.update(foreign);
+      result_ = odometry_->update(foreign);
       EXPECT_EQ(result_.state, TrackingState::kLost) << result_.reason;
     }
-    result_ = odometry_.update(pairOf(room_, i, poseAt(i)));
+    result_ = odometry_->update(pairOf(room_, i, poseAt(i)));
     expectFoundAt(poseAt(i));
   }
 }
@@ -216,11 +216,11 @@ class Corridor : public Outage {
 
 TEST_F(Corridor, EqualSegmentsAreAMixture) {
   const synthetic::World world = corridor();
-  for (int i = 0; i < kSeen; ++i) result_ = odometry_.update(pairOf(world, i, alongAt(i)));
+  for (int i = 0; i < kSeen; ++i) result_ = odometry_->update(pairOf(world, i, alongAt(i)));
   ASSERT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
   const int i = blind(40);  // 2 s, two segments
   for (int k = 0; k < 5; ++k) {
-    result_ = odometry_.update(pairOf(world, i + k, alongAt(i + k)));
+    result_ = odometry_->update(pairOf(world, i + k, alongAt(i + k)));
     if (!result_.has_pose) continue;
     EXPECT_LT(normalisedError(alongAt(i + k)), 25.0) << k << ": " << result_.reason;
     EXPECT_TRUE(k > 0 || result_.reason.find("other places of the map look alike") != std::string::npos)
@@ -231,10 +231,10 @@ TEST_F(Corridor, EqualSegmentsAreAMixture) {
 
 TEST_F(Outage, AnotherPlaceIsANewStart) {
   for (unsigned seed = 2; seed < 12; ++seed) {
-    odometry_ = VisualOdometry({});
+    odometry_.emplace(VisualOdometryOptions());
     drive();
     const int i = blind(5);
-    result_ = odometry_.update(pairOf(room(seed), i, poseAt(i)));
+    result_ = odometry_->update(pairOf(room(seed), i, poseAt(i)));
     expectStartedAgainBy(pairOf(room(seed), i + 1, poseAt(i + 1)));
   }
 }
@@ -253,7 +253,7 @@ TEST_F(Outage, WhatStandsInBothPlacesIsNoPlace) {
     other.points.push_back(room_.points[p]);
     other.rows.push_back(room_.rows[p]);
   }
-  result_ = odometry_.update(pairOf(other, i, poseAt(i)));
+  result_ = odometry_->update(pairOf(other, i, poseAt(i)));
   expectStartedAgainBy(pairOf(other, i + 1, poseAt(i + 1)));
 }
 
@@ -263,22 +263,22 @@ TEST_F(Outage, AMirroredPlaceIsANewStart) {
   const int i = blind(5);
   synthetic::World mirrored = room_;
   for (Eigen::Vector3d& point : mirrored.points) point.x() = -point.x();
-  result_ = odometry_.update(pairOf(mirrored, i, poseAt(i)));
+  result_ = odometry_->update(pairOf(mirrored, i, poseAt(i)));
   expectStartedAgainBy(pairOf(mirrored, i + 1, poseAt(i + 1)));
 }
 
 TEST_F(Outage, WrongPartnersAreWaitedOutAsBlindPairsAre) {
   for (const int refused : {2, 5}) {
-    odometry_ = VisualOdometry({});
+    odometry_.emplace(VisualOdometryOptions());
     drive();
     for (int i = kSeen; i < kSeen + refused; ++i) {
       StereoFeatures swapped = synthetic::noFeatures(synthetic::camera(), i * kPeriod);
       swapped.report.refused = true;
-      result_ = odometry_.update(swapped);
+      result_ = odometry_->update(swapped);
     }
     EXPECT_EQ(result_.state, TrackingState::kLost);
     const int i = kSeen + refused;
-    result_ = odometry_.update(pairOf(room_, i, poseAt(i)));
+    result_ = odometry_->update(pairOf(room_, i, poseAt(i)));
     expectFoundAt(poseAt(i));
   }
 }
@@ -286,21 +286,21 @@ TEST_F(Outage, WrongPartnersAreWaitedOutAsBlindPairsAre) {
 TEST_F(Outage, APlaceTooFarForTheTimeIsANewStart) {
   VisualOdometryOptions options;
   options.tracking.max_speed = 2.0;  // 0.9 m in 6 pairs
-  odometry_.configure(options);
+  odometry_->configure(options);
   drive();
   const int i = blind(5);
   Eigen::Isometry3d far = poseAt(kSeen);
   far.translation().x() += 2.0;
-  result_ = odometry_.update(pairOf(room_, i, far));
+  result_ = odometry_->update(pairOf(room_, i, far));
   expectStartedAgainBy(pairOf(room_, i + 1, far));
 }
 
 TEST_F(Outage, ANewClockIsANewStart) {
   drive();
-  odometry_.forgetTime();
+  odometry_->forgetTime();
   StereoFeatures features = pairOf(room_, kSeen, poseAt(kSeen));
   features.stamp -= 3'600'000'000'000;
-  result_ = odometry_.update(features);
+  result_ = odometry_->update(features);
   expectStartedAgain();
 }
 
@@ -313,7 +313,7 @@ TEST_F(Outage, ThePoseGoesOnByTheGuessWhileItIsDark) {
   drive();
   for (int i = kSeen; i < kSeen + 20; ++i) {
     result_ =
-        odometry_.update(synthetic::noFeatures(synthetic::camera(), i * kPeriod), wheels(poseAt(i - 1), poseAt(i)));
+        odometry_->update(synthetic::noFeatures(synthetic::camera(), i * kPeriod), wheels(poseAt(i - 1), poseAt(i)));
     EXPECT_EQ(result_.state, TrackingState::kDegraded) << i;
     EXPECT_EQ(result_.epoch, 0);
     EXPECT_LT(normalisedError(poseAt(i)), 12.6) << i;
@@ -321,7 +321,7 @@ TEST_F(Outage, ThePoseGoesOnByTheGuessWhileItIsDark) {
   EXPECT_GT(positionVariance(), 0.001) << "5 % of 0.75 m";
   // The map corrects it.
   result_ =
-      odometry_.update(pairOf(room_, kSeen + 20, poseAt(kSeen + 20)), wheels(poseAt(kSeen + 19), poseAt(kSeen + 20)));
+      odometry_->update(pairOf(room_, kSeen + 20, poseAt(kSeen + 20)), wheels(poseAt(kSeen + 19), poseAt(kSeen + 20)));
   EXPECT_EQ(result_.epoch, 0);
   EXPECT_LT((result_.T_origin_camera.translation() - poseAt(kSeen + 20).translation()).norm(), 0.01);
   EXPECT_LT(positionVariance(), 0.001);
@@ -344,7 +344,7 @@ TEST_F(Outage, AGyroCarriesThePoseForAsLongAsTheTranslationIsPredicted) {
   drive();
   for (int i = kSeen; i < kSeen + 40; ++i) {
     result_ =
-        odometry_.update(synthetic::noFeatures(synthetic::camera(), i * kPeriod), gyro(turningAt(i - 1), turningAt(i)));
+        odometry_->update(synthetic::noFeatures(synthetic::camera(), i * kPeriod), gyro(turningAt(i - 1), turningAt(i)));
     const bool is_short = (i - (kSeen - 1)) * kPeriod <= 1'000'000'000;  // tracking/max_gap
     EXPECT_EQ(result_.state, is_short ? TrackingState::kDegraded : TrackingState::kLost) << i << ": " << result_.reason;
     EXPECT_EQ(result_.epoch, 0);
@@ -353,7 +353,7 @@ TEST_F(Outage, AGyroCarriesThePoseForAsLongAsTheTranslationIsPredicted) {
   }
   // The room is another one; the turn is known.
   const int next = kSeen + 40;
-  result_ = odometry_.update(pairOf(room(2), next, turningAt(next)), gyro(turningAt(next - 1), turningAt(next)));
+  result_ = odometry_->update(pairOf(room(2), next, turningAt(next)), gyro(turningAt(next - 1), turningAt(next)));
   EXPECT_EQ(result_.state, TrackingState::kDegraded) << result_.reason;
   EXPECT_EQ(result_.epoch, 0) << "until a pair is measured there";
   const Vector6d error = logSE3(turningAt(next).inverse() * result_.T_origin_camera);
@@ -365,22 +365,22 @@ TEST_F(Outage, AGyroCarriesThePoseForAsLongAsTheTranslationIsPredicted) {
 TEST_F(Outage, AfterTheLongestTimeTheGuessCarriesThePoseToTheNextStart) {
   VisualOdometryOptions options;
   options.tracking.max_guessed = 0.5;
-  odometry_.configure(options);
+  odometry_->configure(options);
   drive();
   constexpr int kPairs = 20;
   for (int i = kSeen; i < kSeen + kPairs; ++i)
     result_ =
-        odometry_.update(synthetic::noFeatures(synthetic::camera(), i * kPeriod), wheels(poseAt(i - 1), poseAt(i)));
+        odometry_->update(synthetic::noFeatures(synthetic::camera(), i * kPeriod), wheels(poseAt(i - 1), poseAt(i)));
   EXPECT_EQ(result_.state, TrackingState::kLost);
   const int next = kSeen + kPairs;
-  result_ = odometry_.update(pairOf(room(2), next, poseAt(next)), wheels(poseAt(next - 1), poseAt(next)));
+  result_ = odometry_->update(pairOf(room(2), next, poseAt(next)), wheels(poseAt(next - 1), poseAt(next)));
   EXPECT_EQ(result_.state, TrackingState::kDegraded) << result_.reason;
   EXPECT_EQ(result_.epoch, 0);
   const Vector6d error = logSE3(poseAt(next).inverse() * result_.T_origin_camera);
   EXPECT_LT(error.head<3>().norm(), 0.1);
   EXPECT_LT(mahalanobisSquare(error, result_.pose_covariance), 12.6);
   for (int i = next + 1; i < next + 4; ++i) {
-    result_ = odometry_.update(pairOf(room(2), i, poseAt(i)), wheels(poseAt(i - 1), poseAt(i)));
+    result_ = odometry_->update(pairOf(room(2), i, poseAt(i)), wheels(poseAt(i - 1), poseAt(i)));
     EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
     EXPECT_LT((result_.T_origin_camera.translation() - poseAt(i).translation()).norm(), 0.1);
   }
@@ -391,20 +391,20 @@ TEST_F(Outage, AGuessThatEndsCarriesNoPose) {
   for (int i = kSeen; i < kSeen + 5; ++i) {
     std::optional<MotionGuess> guess;
     if (i == kSeen) guess = wheels(poseAt(i - 1), poseAt(i));
-    result_ = odometry_.update(synthetic::noFeatures(synthetic::camera(), i * kPeriod), guess);
+    result_ = odometry_->update(synthetic::noFeatures(synthetic::camera(), i * kPeriod), guess);
   }
   EXPECT_EQ(result_.state, TrackingState::kLost);
   const int next = kSeen + 5;
-  result_ = odometry_.update(pairOf(room(2), next, poseAt(next)), wheels(poseAt(next - 1), poseAt(next)));
+  result_ = odometry_->update(pairOf(room(2), next, poseAt(next)), wheels(poseAt(next - 1), poseAt(next)));
   expectStartedAgainBy(pairOf(room(2), next + 1, poseAt(next + 1)));
 }
 
 TEST_F(Outage, APoseFromElsewhereIsANewEpochOfTheSameMap) {
   drive();
   const Matrix6d covariance = 0.01 * Matrix6d::Identity();
-  odometry_.takePose(covariance);
-  EXPECT_TRUE(odometry_.lastPose().isApprox(result_.T_origin_camera));
-  result_ = odometry_.update(pairOf(room_, kSeen, poseAt(kSeen)));
+  odometry_->takePose(covariance);
+  EXPECT_TRUE(odometry_->lastPose().isApprox(result_.T_origin_camera));
+  result_ = odometry_->update(pairOf(room_, kSeen, poseAt(kSeen)));
   EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
   EXPECT_EQ(result_.epoch, 1);
   EXPECT_TRUE(result_.has_motion);
@@ -415,9 +415,9 @@ TEST_F(Outage, APoseFromElsewhereIsANewEpochOfTheSameMap) {
 TEST_F(Outage, APoseFromElsewhereEndsTheSearchOfALostCamera) {
   drive();
   const int i = blind(5);
-  const Eigen::Isometry3d last = odometry_.lastPose();
-  odometry_.takePose(0.01 * Matrix6d::Identity());
-  result_ = odometry_.update(pairOf(room_, i, poseAt(i)));
+  const Eigen::Isometry3d last = odometry_->lastPose();
+  odometry_->takePose(0.01 * Matrix6d::Identity());
+  result_ = odometry_->update(pairOf(room_, i, poseAt(i)));
   EXPECT_EQ(result_.state, TrackingState::kTracking) << result_.reason;
   EXPECT_EQ(result_.epoch, 1);
   EXPECT_TRUE(result_.T_origin_camera.isApprox(last));

@@ -8,8 +8,8 @@
 #include <random>
 #include <tuple>
 
+#include "../../src/common/processor.hpp"
 #include "../synthetic_features.hpp"
-#include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/map/window_optimizer.hpp"
 
 namespace sdvo::test_window_optimizer {

@@ -4,8 +4,8 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "stereo_descriptor_vo/common/processor.hpp"
-#include "stereo_descriptor_vo/matching/hamming_distances.hpp"
+#include "../../src/common/processor.hpp"
+#include "../../src/matching/hamming_distances.hpp"
 
 namespace sdvo::test_hamming_distances {
 

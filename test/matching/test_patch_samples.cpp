@@ -3,8 +3,8 @@
 #include <random>
 #include <vector>
 
+#include "../../src/common/processor.hpp"
 #include "../../src/matching/patch_samples.hpp"
-#include "stereo_descriptor_vo/common/processor.hpp"
 
 namespace sdvo::test_patch_samples {
 

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <vector>
 
+#include "../../src/common/processor.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/common/processor.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/motion/pose_problem.hpp"
 

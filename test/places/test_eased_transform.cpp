@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "stereo_descriptor_vo/places/eased_transform.hpp"
+#include "../../src/places/eased_transform.hpp"
 
 namespace sdvo::test_eased_transform {
 

@@ -12,11 +12,13 @@ namespace sdvo::test_calibration_filter {
 using Matrix = RigCalibration::Matrix;
 using Vector = RigCalibration::Vector;
 
+const double kSigma = 0.5 / CalibrationFilter::kTrust;  // px: an information of 4 in the windows' units
+
 CalibrationOptions someOptions() {
   CalibrationOptions options;
   options.prior_offset = 0.5;
   options.prior_bend = -1.0;
-  options.prior_sigma = 2.0;
+  options.prior_sigma = kSigma;
   return options;
 }
 
@@ -77,31 +79,31 @@ TEST(CalibrationFilter, ACalibrationThatIsHeldIsNotKnownForThat) {
   EXPECT_GT(filter.prior(2).information.diagonal().minCoeff(), 1e6);
   const std::optional<Matrix> certain = filter.prior(2).certain_information;
   ASSERT_TRUE(certain);
-  EXPECT_LT((*certain - informationOf(2.0) * Matrix::Identity()).norm(), 1e-6);
+  EXPECT_LT((*certain - informationOf(kSigma) * Matrix::Identity()).norm(), 1e-6);
 }
 
 TEST(CalibrationFilter, TheOptionsSigmaIsTheLargestSpread) {
   CalibrationFilter filter(someOptions());
   addWindow(filter, 1, 9, {100.0, 100.0});
-  EXPECT_LT((filter.prior(2).information - informationOf(2.0) * Matrix::Identity()).norm(), 1e-6);
+  EXPECT_LT((filter.prior(2).information - informationOf(kSigma) * Matrix::Identity()).norm(), 1e-6);
 }
 
 TEST(CalibrationFilter, SaysHowWellTheWindowsMeasure) {
   CalibrationFilter filter(someOptions());
   addWindow(filter, 1, 9, kPrior);
-  EXPECT_NEAR(filter.sigma()[0], 1.0 / (CalibrationFilter::kTrust * std::sqrt(informationOf(2.0) + 12.0)), 1e-9);
-  EXPECT_NEAR(filter.sigma()[1], 1.0 / (CalibrationFilter::kTrust * std::sqrt(informationOf(2.0) + 5.0)), 1e-9);
+  EXPECT_NEAR(filter.sigma()[0], kSigma / 2.0, 1e-9);
+  EXPECT_NEAR(filter.sigma()[1], kSigma * 2.0 / 3.0, 1e-9);
 }
 
 TEST(CalibrationFilter, EstimatesWhatIsNotSignificant) {
   CalibrationFilter filter(someOptions());
-  EXPECT_LT((filter.estimate().covariance - 4.0 * Matrix::Identity()).norm(), 1e-9) << "the options' alone";
+  EXPECT_LT((filter.estimate().covariance - kSigma * kSigma * Matrix::Identity()).norm(), 1e-9) << "the options' alone";
   const Vector near = kPrior + Vector(0.9 * kOffset, -0.9 * kBend);
   addWindow(filter, 1, 9, near);
   const CalibrationEstimate found = filter.estimate();
   EXPECT_LT((filter.calibration().value - kPrior).norm(), 1e-5) << "held";
   EXPECT_NEAR(found.mean[0], (4.0 * kPrior[0] + 12.0 * near[0]) / 16.0, 1e-3);
-  EXPECT_NEAR(found.covariance(0, 0), 16.0 / 16.0, 1e-9);
+  EXPECT_NEAR(found.covariance(0, 0), kSigma * kSigma * 4.0 / 16.0, 1e-9);
   CalibrationOptions held = someOptions();
   held.enabled = false;
   EXPECT_EQ(CalibrationFilter(held).estimate().covariance, Matrix(Matrix::Zero()));
@@ -114,7 +116,7 @@ TEST(CalibrationFilter, OfWindowsThatOverlapOneCounts) {
     EXPECT_LT((filter.prior(newest - 4).mean - kPrior).norm(), 1e-9);
   }
   const CalibrationBelief belief = filter.prior(6);  // the first window has no pair in common with it
-  EXPECT_LT((belief.information - (informationOf(2.0) * Matrix::Identity() + kInformation)).norm(), 1e-6);
+  EXPECT_LT((belief.information - (informationOf(kSigma) * Matrix::Identity() + kInformation)).norm(), 1e-6);
   EXPECT_NEAR(belief.mean[0], (4.0 * 0.5 + 12.0 * 100.0) / 16.0, 1e-3);
   EXPECT_NEAR(filter.prior(6).mean[0], belief.mean[0], 1e-12) << "counted once";
 }
@@ -124,7 +126,7 @@ TEST(CalibrationFilter, OneEarlierWindowCountsAndTheOptionsStay) {
   addWindow(filter, 1, 5, {100.0, -100.0});
   addWindow(filter, 6, 10, {60.0, -60.0});
   const CalibrationBelief belief = filter.prior(11);
-  EXPECT_LT((belief.information - (informationOf(2.0) * Matrix::Identity() + kInformation)).norm(), 1e-6);
+  EXPECT_LT((belief.information - (informationOf(kSigma) * Matrix::Identity() + kInformation)).norm(), 1e-6);
   EXPECT_NEAR(belief.mean[0], (4.0 * 0.5 + 12.0 * 60.0) / 16.0, 1e-3);
   EXPECT_NEAR(belief.mean[1], (4.0 * -1.0 - 5.0 * 60.0) / 9.0, 1e-3);
 }

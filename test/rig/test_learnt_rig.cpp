@@ -2,8 +2,8 @@
 
 #include <cmath>
 
+#include "../../src/rig/learnt_rig.hpp"
 #include "../said.hpp"
-#include "stereo_descriptor_vo/rig/learnt_rig.hpp"
 #include "turned_grid.hpp"
 
 namespace sdvo::test_learnt_rig {

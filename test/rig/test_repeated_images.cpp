@@ -5,8 +5,8 @@
 #include <random>
 #include <vector>
 
+#include "../../src/rig/repeated_images.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/rig/repeated_images.hpp"
 
 namespace sdvo::test_repeated_images {
 

@@ -3,9 +3,9 @@
 #include <cmath>
 #include <random>
 
+#include "../../src/rig/right_camera_delay.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
-#include "stereo_descriptor_vo/rig/right_camera_delay.hpp"
 
 namespace sdvo {
 namespace test_right_camera_delay {

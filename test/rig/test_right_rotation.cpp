@@ -3,9 +3,9 @@
 #include <random>
 #include <vector>
 
+#include "../../src/rig/right_rotation.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
-#include "stereo_descriptor_vo/rig/right_rotation.hpp"
 
 namespace sdvo::test_right_rotation {
 

@@ -4,7 +4,7 @@
 #include <random>
 #include <vector>
 
-#include "stereo_descriptor_vo/rig/row_delay.hpp"
+#include "../../src/rig/row_delay.hpp"
 
 namespace sdvo::test_row_delay {
 

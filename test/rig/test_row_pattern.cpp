@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "stereo_descriptor_vo/rig/row_pattern.hpp"
+#include "../../src/rig/row_pattern.hpp"
 #include "turned_grid.hpp"
 
 namespace sdvo::test_row_pattern {

@@ -10,7 +10,7 @@
 
 #include "message_samples.hpp"
 #include "stereo_descriptor_vo/front_end/feature_detector.hpp"
-#include "stereo_descriptor_vo/ros/stereo_features_view.hpp"
+#include "stereo_descriptor_vo/messages/stereo_features_view.hpp"
 
 namespace sdvo::ros_conversions::test_stereo_features_view {
 

@@ -9,7 +9,7 @@
 #include <algorithm>
 #include <limits>
 #include <stdexcept>
-#include <stereo_descriptor_vo/ros/stereo_features_view.hpp>
+#include <stereo_descriptor_vo/messages/stereo_features_view.hpp>
 
 using Features = stereo_descriptor_vo::StereoFeatures;
 using Info = stereo_descriptor_vo::VoInfo;

@@ -1,21 +1,27 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <memory>
 #include <optional>
 #include <vector>
 
-#include "stereo_descriptor_vo/belief/belief.hpp"
-#include "stereo_descriptor_vo/belief/motion_search.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/map/floor.hpp"
-#include "stereo_descriptor_vo/map/local_map.hpp"
-#include "stereo_descriptor_vo/map/reacquisition.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
-#include "stereo_descriptor_vo/odometry/odometry_state.hpp"
 #include "stereo_descriptor_vo/odometry/outage.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry_options.hpp"
 
 namespace sdvo {
+
+struct Belief;
+struct Evidence;
+struct MeasuredPair;
+struct MotionHypothesis;
+struct MotionScene;
+struct OdometryState;
+struct OdometryStep;
+class MotionSearch;
+class Reacquisition;
+class Revisit;
 
 /// Stereo odometry on stereo features alone. Every pair is matched to a local map of the points around the camera,
 /// separated from outliers by sample consensus, and adjusted together with the last key frames.
@@ -23,6 +29,7 @@ class VisualOdometry {
  public:
   /// Throws std::invalid_argument when an option is out of its range.
   explicit VisualOdometry(const VisualOdometryOptions& options);
+  ~VisualOdometry();
 
   /// Processes the next pair. Stamps must increase and the features must pass check(), else std::invalid_argument and
   /// the state is as before. `guess` is one more place to look for the motion; it is never taken for a measurement.
@@ -41,7 +48,7 @@ class VisualOdometry {
   void takePose(const Matrix6d& covariance);
 
   /// T_origin_camera of the last pair that had a pose.
-  const Eigen::Isometry3d& lastPose() const { return state_.T_origin_camera; }
+  const Eigen::Isometry3d& lastPose() const;
 
   /// Tells that the clock was set: as breakStream(), and the next stamp may be any.
   void forgetTime();
@@ -63,32 +70,9 @@ class VisualOdometry {
 
  private:
   using Step = OdometryStep;
-
-  /// A pair as it is searched: of the map's camera, without features of the pair before, both images of one moment.
-  struct Pair {
-    const StereoFeatures& given;
-    std::optional<StereoFeatures> refocused{}, new_part{}, rotated_back{}, synchronised{};
-    std::vector<int> new_features{};
-    double dt = 0.0;               ///< since the previous pair, s
-    double frozen = kUnsuspected;  ///< log-odds that its images are old although the camera moved
-    /// Without a map of its stream; after an outage; with old images; after a pose.
-    enum { kFirst, kSought, kFrozen, kFollowed } is = kFirst;
-    ShownRotation rotation{};  ///< of the right camera beyond what is known
-
-    const StereoFeatures& whole() const { return refocused ? *refocused : given; }
-    const StereoFeatures& part() const { return new_part ? *new_part : whole(); }
-    const StereoFeatures& taken() const { return rotated_back ? *rotated_back : part(); }
-    const StereoFeatures& features() const { return synchronised ? *synchronised : taken(); }
-  };
-
-  /// The map as it would be with the pair, adjusted. Nothing has changed until it is committed.
-  struct Candidate {
-    RigCalibration calibration;
-    LocalMap::Adjustment adjustment;
-    Eigen::Isometry3d motion;             ///< T_reference_current after the adjustment
-    Eigen::Isometry3d T_keyframe_origin;  ///< of the key frame before the pair, before the adjustment
-    double distance = 0.0;                ///< from that key frame, m
-  };
+  struct Pair;
+  struct Candidate;
+  struct Parts;
 
   void refuse(const StereoFeatures& features) const;
   Pair usable(const StereoFeatures& given, const std::optional<MotionGuess>& guess) const;
@@ -122,11 +106,12 @@ class VisualOdometry {
 
   VisualOdometryOptions options_;
   Eigen::Isometry3d T_base_camera_;
-  MotionSearch search_;
-  Reacquisition reacquisition_;
-  Revisit revisit_;
-  WindowOptimizer optimizer_;
-  OdometryState state_;
+  std::unique_ptr<Parts> parts_;  ///< what the next ones refer to
+  MotionSearch& search_;
+  Reacquisition& reacquisition_;
+  Revisit& revisit_;
+  WindowOptimizer& optimizer_;
+  OdometryState& state_;
 };
 
 }  // namespace sdvo

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
+#include <deque>
 #include <map>
 #include <optional>
 #include <string>
@@ -11,7 +12,6 @@
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/places/loop_agreement.hpp"
 #include "stereo_descriptor_vo/places/place_index.hpp"
 #include "stereo_descriptor_vo/places/place_verifier.hpp"
 #include "stereo_descriptor_vo/places/pose_graph.hpp"
@@ -60,6 +60,21 @@ struct PlaceReport {
   bool loop = false;                          ///< accepted: the graph has a new loop and wants to be optimised
   std::string reason;                         ///< why there is no loop
   double find_time = 0.0, verify_time = 0.0;  ///< s
+};
+
+/// A place that was recognised once may be an accident; two neighbouring key frames that say the same are none.
+class LoopAgreement {
+ public:
+  /// The loops that can be trusted now: none, or this one and those before it that it is the first to agree with.
+  std::vector<GraphEdge> confirm(const PoseGraph& graph, const GraphEdge& proposal);
+
+ private:
+  struct Proposal {
+    GraphEdge loop;
+    bool trusted;
+  };
+
+  std::deque<Proposal> proposals_;  ///< of the last few key frames
 };
 
 /// Recognises places by the features of stereo pairs and keeps a graph of them: the drift of an odometry is taken back

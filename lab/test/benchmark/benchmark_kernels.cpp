@@ -7,10 +7,10 @@
 #include <random>
 #include <vector>
 
-#include "stereo_descriptor_vo/common/processor.hpp"
+#include "../../../src/common/processor.hpp"
+#include "../../../src/front_end/fast_corners.hpp"
+#include "../../../src/front_end/freak.hpp"
 #include "stereo_descriptor_vo/front_end/epipolar_matcher.hpp"
-#include "stereo_descriptor_vo/front_end/fast_corners.hpp"
-#include "stereo_descriptor_vo/front_end/freak.hpp"
 #include "stereo_descriptor_vo/matching/patch_alignment.hpp"
 
 namespace {

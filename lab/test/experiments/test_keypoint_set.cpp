@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cstdlib>
 
+#include "../../../src/front_end/freak.hpp"
 #include "../../../test/synthetic_scene.hpp"
 #include "../../experiments/keypoint_set.hpp"
-#include "stereo_descriptor_vo/front_end/freak.hpp"
 
 namespace sdvo::test_keypoint_set {
 

@@ -3,8 +3,6 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "stereo_descriptor_vo/common/cpp17.hpp"
-
 namespace sdvo {
 
 /// FAST corners of nine contiguous pixels (Rosten and Drummond 2006) of a CV_8U image: those of cv::FAST with

@@ -4,8 +4,6 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "stereo_descriptor_vo/common/cpp17.hpp"
-
 namespace sdvo {
 
 /// Half side of the largest patch, px.

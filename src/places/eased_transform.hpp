@@ -2,8 +2,6 @@
 
 #include <Eigen/Geometry>
 
-#include "stereo_descriptor_vo/common/cpp17.hpp"
-
 namespace sdvo {
 
 /// A transform that follows its target smoothly, so that whoever uses it sees no jump.

@@ -2,8 +2,6 @@
 
 #include <opencv2/core.hpp>
 
-#include "stereo_descriptor_vo/common/cpp17.hpp"
-
 namespace sdvo {
 
 /// A CV_8U image at half its resolution, odd sizes rounded up. The pixels are those of cv::resize with INTER_AREA,

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 
-#include "stereo_descriptor_vo/front_end/integral_image.hpp"
+#include "integral_image.hpp"
 
 namespace sdvo {
 

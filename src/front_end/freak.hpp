@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "stereo_descriptor_vo/front_end/integral_image.hpp"
+#include "integral_image.hpp"
 
 namespace sdvo {
 

@@ -4,13 +4,13 @@
 #include <string>
 #include <vector>
 
-#include "stereo_descriptor_vo/belief/belief.hpp"
-#include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
+#include "../belief/belief.hpp"
+#include "../belief/motion_hypotheses.hpp"
+#include "right_camera_delay.hpp"
+#include "right_rotation.hpp"
+#include "row_pattern.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
 #include "stereo_descriptor_vo/rig/calibration_filter.hpp"
-#include "stereo_descriptor_vo/rig/right_camera_delay.hpp"
-#include "stereo_descriptor_vo/rig/right_rotation.hpp"
-#include "stereo_descriptor_vo/rig/row_pattern.hpp"
 
 namespace sdvo {
 

@@ -7,18 +7,18 @@
 #include <string>
 #include <vector>
 
-#include "stereo_descriptor_vo/belief/belief.hpp"
-#include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
+#include "../belief/belief.hpp"
+#include "../belief/motion_hypotheses.hpp"
+#include "../belief/pose_covariance.hpp"
+#include "../rig/learnt_rig.hpp"
+#include "../rig/repeated_images.hpp"
 #include "stereo_descriptor_vo/belief/motion_prior.hpp"
-#include "stereo_descriptor_vo/belief/pose_covariance.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/map/floor.hpp"
 #include "stereo_descriptor_vo/map/local_map.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
 #include "stereo_descriptor_vo/odometry/outage.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry_options.hpp"
-#include "stereo_descriptor_vo/rig/learnt_rig.hpp"
-#include "stereo_descriptor_vo/rig/repeated_images.hpp"
 
 namespace sdvo {
 
@@ -84,5 +84,20 @@ struct OdometryState {
                         const MotionHypothesis& found, const OdometryStep& step,
                         const std::optional<Floor>& known_floor) const;
 };
+
+// Steps of pairs whose motion is not measured: unmeasured_step.cpp.
+
+constexpr const char* kStartedAgain = "started again from the last pose; the motion in between is unknown";
+
+/// The pair begins a map: the first one, or where the guesses have the camera, or at the last pose. While there is a
+/// map from before, the odometry is lost until the next pair is found in either.
+OdometryStep startMap(const VisualOdometryOptions& options, const StereoFeatures& features, OdometryState& state);
+
+/// Images that repeat themselves show no motion: the pose stays, as uncertain as the prior makes it meanwhile.
+OdometryStep holdPose(double dt, OdometryState& state);
+
+/// The motion by the guess or by the velocity; without them the odometry is lost. `failure`: why it is not measured.
+OdometryStep predictMotion(const VisualOdometryOptions& options, const StereoFeatures& features, double dt,
+                           const std::string& failure, OdometryState& state);
 
 }  // namespace sdvo

@@ -2,8 +2,6 @@
 
 #include <chrono>
 
-#include "stereo_descriptor_vo/common/cpp17.hpp"
-
 namespace sdvo {
 
 /// Wall time between two laps.

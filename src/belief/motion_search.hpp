@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
+#include "motion_hypotheses.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 #include "stereo_descriptor_vo/map/local_map.hpp"
 #include "stereo_descriptor_vo/matching/feature_matcher.hpp"

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
+#include "motion_hypotheses.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 
 namespace sdvo {

@@ -4,9 +4,9 @@
 #include <array>
 #include <optional>
 
+#include "right_rotation.hpp"
+#include "row_delay.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/rig/right_rotation.hpp"
-#include "stereo_descriptor_vo/rig/row_delay.hpp"
 
 namespace sdvo {
 

@@ -1,7 +1,5 @@
 #pragma once
 
-#include "stereo_descriptor_vo/common/cpp17.hpp"
-
 namespace sdvo {
 
 // The kernels in which most of the time goes by exist twice, in plain C++ and with vectors of AVX2 or NEON, and are

@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "stereo_descriptor_vo/belief/motion_hypotheses.hpp"
+#include "../belief/motion_hypotheses.hpp"
+#include "row_delay.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/rig/calibration_filter.hpp"
-#include "stereo_descriptor_vo/rig/row_delay.hpp"
 
 namespace sdvo {
 

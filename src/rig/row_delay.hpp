@@ -6,7 +6,6 @@
 #include <optional>
 #include <vector>
 
-#include "stereo_descriptor_vo/common/cpp17.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
 
 namespace sdvo {

@@ -4,8 +4,6 @@
 #include <cstdint>
 #include <opencv2/core.hpp>
 
-#include "stereo_descriptor_vo/common/cpp17.hpp"
-
 namespace sdvo {
 
 /// Numbers of bits in which a descriptor differs from `count` of the others (CV_8U, one in each row of the matrix),

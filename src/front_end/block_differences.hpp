@@ -3,8 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "stereo_descriptor_vo/common/cpp17.hpp"
-
 namespace sdvo {
 
 /// Columns of a block: one register. It reaches from 8 px left of its centre to 7 px right of it.

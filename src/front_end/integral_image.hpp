@@ -5,8 +5,6 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
-#include "stereo_descriptor_vo/common/cpp17.hpp"
-
 namespace sdvo {
 
 /// Whether everything within `reach` px of (u, v) lies inside an image. Pixel p covers [p - 0.5, p + 0.5].

@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "../map/reacquisition.hpp"
 #include "stereo_descriptor_vo/belief/motion_prior.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/map/local_map.hpp"
-#include "stereo_descriptor_vo/map/reacquisition.hpp"
 #include "stereo_descriptor_vo/matching/feature_matcher.hpp"
 #include "stereo_descriptor_vo/motion/motion_estimator.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
