@@ -58,8 +58,8 @@ class PlacesFile : public ::testing::Test {
   }
 
   static void expectRefused(const std::string& path, const std::string& words) {
-    EXPECT_THROW(loadPlaces(path, {}), std::runtime_error) << path;
-    expectError([&] { loadPlaces(path, {}); }, {words});
+    EXPECT_THROW(loadPlaces(path), std::runtime_error) << path;
+    expectError([&] { loadPlaces(path); }, {words});
   }
 
   const TemporaryFolder folder_;
@@ -72,7 +72,7 @@ class PlacesFile : public ::testing::Test {
 TEST_F(PlacesFile, WhatIsSavedIsLoaded) {
   save(path_);
   expectNoPartialFile();
-  const SavedPlaces loaded = loadPlaces(path_, {});
+  const SavedPlaces loaded = loadPlaces(path_);
   ASSERT_EQ(loaded.places.size(), 3u);
   EXPECT_EQ(loaded.places[2].id, 2);
   EXPECT_EQ(loaded.places[2].features.stamp, places_[2].features.stamp);
@@ -98,7 +98,7 @@ TEST_F(PlacesFile, PlacesOfTheFirstVersionAreLoaded) {
     before.write(message.getTopic(), message.getTime(), shifter);
   }
   before.close();
-  EXPECT_EQ(loadPlaces(old, {}).places.size(), 3u);
+  EXPECT_EQ(loadPlaces(old).places.size(), 3u);
 }
 
 TEST_F(PlacesFile, PathsThatCannotBeWrittenAreRefused) {
@@ -119,7 +119,7 @@ TEST_F(PlacesFile, ReplacesItsOwnFilesAlone) {
   bag.close();
   EXPECT_TRUE(contains(errorOf([&] { save(path_); }), "is no file of save_places"));
   EXPECT_NO_THROW(save(path_, true));
-  EXPECT_EQ(loadPlaces(path_, {}).places.size(), 3u);
+  EXPECT_EQ(loadPlaces(path_).places.size(), 3u);
 }
 
 /// As on a full disk. rosbag tries to write the end of a bag once more when it is destroyed.
@@ -138,7 +138,7 @@ TEST_F(PlacesFile, WhereThereIsNoRoomTheProcessGoesOn) {
   EXPECT_TRUE(contains(error, "cannot be written")) << error;
   expectNoPartialFile();
   EXPECT_EQ(fs::file_size(path_), size);
-  EXPECT_EQ(loadPlaces(path_, {}).places.size(), 3u);
+  EXPECT_EQ(loadPlaces(path_).places.size(), 3u);
 }
 
 TEST_F(PlacesFile, WhatCannotBeWrittenToItsEndLeavesTheFileOfBefore) {
@@ -146,7 +146,7 @@ TEST_F(PlacesFile, WhatCannotBeWrittenToItsEndLeavesTheFileOfBefore) {
   places_[2].features.stamp = 0;
   EXPECT_TRUE(contains(errorOf([&] { save(path_); }), "cannot be written"));
   expectNoPartialFile();
-  EXPECT_EQ(loadPlaces(path_, {}).places.size(), 3u);
+  EXPECT_EQ(loadPlaces(path_).places.size(), 3u);
 }
 
 TEST_F(PlacesFile, FilesThatAreNoneAreRefused) {
@@ -190,7 +190,7 @@ TEST_F(PlacesFile, AFileMayChangeWhileItIsRead) {
     }
   });
   for (int i = 0; i < 2000; ++i) {
-    const std::string error = errorOf([&] { loadPlaces(path_, {}); });
+    const std::string error = errorOf([&] { loadPlaces(path_); });
     EXPECT_TRUE(error == "no error" || contains(error, "it ends early") || contains(error, "it is empty") ||
                 contains(error, "no bag"))
         << error;
@@ -221,7 +221,7 @@ TEST_F(PlacesFile, AFileThatAnnouncesMuchTakesLittle) {
       std::string bad = good;
       std::memcpy(&bad[at], &announced, sizeof announced);
       std::ofstream(path_, std::ios::binary) << bad;
-      errorOf([&] { loadPlaces(path_, {}); });
+      errorOf([&] { loadPlaces(path_); });
       ASSERT_LT(peak() - before, 64 << 20) << announced << " at byte " << at;
     }
   }
