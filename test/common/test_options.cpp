@@ -7,7 +7,6 @@
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
-#include "stereo_descriptor_vo/front_end/exposure_balance.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 #include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
 #include "stereo_descriptor_vo/motion/motion_estimator.hpp"
@@ -113,9 +112,6 @@ TEST(Options, ComponentsRefuseWhatIsOutOfRange) {
   StereoMatcherOptions stereo;
   stereo.min_disparity = 0.0;
   expectChecked<StereoMatcher>(stereo, "min_disparity");
-  ExposureBalanceOptions exposure;
-  exposure.tolerance = -0.1;
-  expectChecked<ExposureBalance>(exposure, "tolerance");
   VisualOdometryOptions odometry;
   odometry.motion.min_inliers = 0;
   expectChecked<VisualOdometry>(odometry, "motion/min_inliers");

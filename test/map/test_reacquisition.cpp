@@ -344,8 +344,8 @@ Eigen::Isometry3d turningAt(int i) {
 TEST_F(Outage, AGyroCarriesThePoseForAsLongAsTheTranslationIsPredicted) {
   drive();
   for (int i = kSeen; i < kSeen + 40; ++i) {
-    result_ =
-        odometry_->update(synthetic::noFeatures(synthetic::camera(), i * kPeriod), gyro(turningAt(i - 1), turningAt(i)));
+    result_ = odometry_->update(synthetic::noFeatures(synthetic::camera(), i * kPeriod),
+                                gyro(turningAt(i - 1), turningAt(i)));
     const bool is_short = (i - (kSeen - 1)) * kPeriod <= 1'000'000'000;  // tracking/max_gap
     EXPECT_EQ(result_.state, is_short ? TrackingState::kDegraded : TrackingState::kLost) << i << ": " << result_.reason;
     EXPECT_EQ(result_.epoch, 0);
