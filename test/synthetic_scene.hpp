@@ -192,4 +192,16 @@ inline bool equalMats(const cv::Mat& a, const cv::Mat& b) {
   return a.empty() || cv::norm(a, b, cv::NORM_INF) == 0.0;
 }
 
+/// All of each feature but its patch.
+inline void expectEqual(const StereoFeatures& a, const StereoFeatures& b) {
+  EXPECT_EQ(a.u, b.u);
+  EXPECT_EQ(a.v, b.v);
+  EXPECT_EQ(a.disparity, b.disparity);
+  EXPECT_EQ(a.dv, b.dv);
+  EXPECT_EQ(a.size, b.size);
+  EXPECT_EQ(a.angle, b.angle);
+  EXPECT_EQ(a.response, b.response);
+  EXPECT_TRUE(equalMats(a.descriptors, b.descriptors));
+}
+
 }  // namespace sdvo::synthetic

@@ -28,17 +28,6 @@ FeatureExtractorOptions fewFeatures() {
   return options;
 }
 
-void expectEqual(const StereoFeatures& a, const StereoFeatures& b) {
-  EXPECT_EQ(a.u, b.u);
-  EXPECT_EQ(a.v, b.v);
-  EXPECT_EQ(a.disparity, b.disparity);
-  EXPECT_EQ(a.dv, b.dv);
-  EXPECT_EQ(a.size, b.size);
-  EXPECT_EQ(a.angle, b.angle);
-  EXPECT_EQ(a.response, b.response);
-  EXPECT_TRUE(synthetic::equalMats(a.descriptors, b.descriptors));
-}
-
 /// A disparity of 267 px in an image of 640.
 TEST(FeatureExtractor, FollowsAPlaneThatIsNearerThanTheSearchReaches) {
   const StereoCamera camera = synthetic::camera();
@@ -294,8 +283,8 @@ TEST(FeatureExtractor, IsStateless) {
   const StereoFeatures other = extractor.extract(camera, second.left, second.right, 2);
   const StereoFeatures after = extractor.extract(camera, first.left, first.right, 3);
   EXPECT_NE(before.u, other.u);
-  expectEqual(before, after);
-  expectEqual(before, FeatureExtractor(fewFeatures()).extract(camera, first.left, first.right, 4));
+  synthetic::expectEqual(before, after);
+  synthetic::expectEqual(before, FeatureExtractor(fewFeatures()).extract(camera, first.left, first.right, 4));
 }
 
 TEST(FeatureExtractor, LeavesItsImagesAlone) {

@@ -4,13 +4,13 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include <cmath>
-#include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "../../src/ros/odometry_publisher.hpp"
 #include "message_samples.hpp"
+#include "spin.hpp"
 
 namespace sdvo::rostest_odometry_publisher {
 
@@ -34,16 +34,6 @@ class Inbox {
 
 class OdometryPublisherTest : public ::testing::Test {
  protected:
-  /// All that was published before has come when this returns.
-  static bool spinUntil(const std::function<bool()>& condition) {
-    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(10.0);
-    while (!condition() && ros::WallTime::now() < end) {
-      ros::spinOnce();
-      ros::WallDuration(0.001).sleep();
-    }
-    return condition();
-  }
-
   void start(const OdometryOutputOptions& options) {
     publisher_ = std::make_unique<OdometryPublisher>(nh_, options, 1);
     odom_ = std::make_unique<Inbox<nav_msgs::Odometry>>(nh_, "odom");

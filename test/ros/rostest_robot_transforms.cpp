@@ -5,13 +5,13 @@
 
 #include <cmath>
 #include <cstdint>
-#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "../../src/ros/transforms.hpp"
 #include "../said.hpp"
+#include "spin.hpp"
 
 namespace sdvo::rostest_robot_transforms {
 
@@ -41,15 +41,6 @@ class RobotTransformsTest : public ::testing::Test {
   void start(std::optional<ros_conversions::OdometryFrames> ours = std::nullopt) {
     transforms_.emplace(nh_, std::move(ours), kTag, [this](const std::string& what) { warnings_.push_back(what); });
     ASSERT_TRUE(spinUntil([&] { return tf_.getNumSubscribers() > 0 && tf_static_.getNumSubscribers() > 0; }));
-  }
-
-  static bool spinUntil(const std::function<bool()>& condition) {
-    const ros::WallTime end = ros::WallTime::now() + ros::WallDuration(10.0);
-    while (!condition() && ros::WallTime::now() < end) {
-      ros::spinOnce();
-      ros::WallDuration(0.001).sleep();
-    }
-    return condition();
   }
 
   void send(ros::Publisher& publisher, const std::vector<geometry_msgs::TransformStamped>& transforms) {
@@ -86,7 +77,8 @@ TEST_F(RobotTransformsTest, AMissingTransformIsNamedFromWhereTfHasTheCamera) {
   send(tf_static_, {transform("oak_base", "oak_body", ros::Time()), transform("oak_body", "oak_left", ros::Time())});
   waitForMarker(tf_static_);
   const std::string within = transforms_->explainMissing("base_link", "oak_left");
-  expectWords(within, {"'oak_left' to base frame 'base_link'", "publish base_link -> oak_base (static", "set base_frame_id to 'oak_base'"});
+  expectWords(within, {"'oak_left' to base frame 'base_link'", "publish base_link -> oak_base (static",
+                       "set base_frame_id to 'oak_base'"});
   const std::string alone = transforms_->explainMissing("base_link", "nowhere");
   EXPECT_TRUE(contains(alone, "publish base_link -> nowhere (static")) << alone;
   EXPECT_FALSE(contains(alone, "where TF has")) << alone;
@@ -166,7 +158,8 @@ TEST_F(RobotTransformsTest, AnotherPublisherOfOurChildIsNamed) {
   for (int i = 0; i < 3; ++i) send(tf_, {transform("world", "base_link", ros::Time::now())});
   waitForMarker(tf_);
   ASSERT_EQ(warnings_.size(), 1u);
-  expectWords(warnings_[0], {ros::this_node::getName() + " publishes world -> base_link", ros::this_node::getName() + " publishes odom -> base_link"});
+  expectWords(warnings_[0], {ros::this_node::getName() + " publishes world -> base_link",
+                             ros::this_node::getName() + " publishes odom -> base_link"});
 }
 
 /// On TF the nodelets of one process have one name.
@@ -178,7 +171,8 @@ TEST_F(RobotTransformsTest, AnotherNodeletOfTheProcessThatPublishesTheSameIsName
   }
   waitForMarker(tf_);
   ASSERT_EQ(warnings_.size(), 1u);
-  expectWords(warnings_[0], {"another nodelet of " + ros::this_node::getName(), "set publish_tf to false in one of them"});
+  expectWords(warnings_[0],
+              {"another nodelet of " + ros::this_node::getName(), "set publish_tf to false in one of them"});
 }
 
 TEST_F(RobotTransformsTest, TheCamerasPlaceIsAwaitedOnceAndNotWhenItIsUrgent) {

@@ -18,14 +18,7 @@ void expectSame(const StereoFeatures& a, const StereoFeatures& b) {
   EXPECT_EQ(a.descriptor, b.descriptor);
   EXPECT_EQ(a.layout, b.layout);
   EXPECT_EQ(a.element_type, b.element_type);
-  EXPECT_EQ(a.u, b.u);
-  EXPECT_EQ(a.v, b.v);
-  EXPECT_EQ(a.disparity, b.disparity);
-  EXPECT_EQ(a.dv, b.dv);
-  EXPECT_EQ(a.size, b.size);
-  EXPECT_EQ(a.angle, b.angle);
-  EXPECT_EQ(a.response, b.response);
-  EXPECT_TRUE(synthetic::equalMats(a.descriptors, b.descriptors));
+  synthetic::expectEqual(a, b);
   EXPECT_TRUE(a.patch_layout == b.patch_layout);
   EXPECT_TRUE(synthetic::equalMats(a.patches, b.patches));
   EXPECT_EQ(a.report.detected, b.report.detected);

@@ -11,7 +11,6 @@
 
 namespace sdvo::ros_conversions::test_place_messages {
 
-using synthetic::equalMats;
 namespace msgs = stereo_descriptor_vo;
 
 Eigen::Isometry3d somePose(double x) {
@@ -86,9 +85,7 @@ TEST(PlaceMessage, HoldsAllOfAPlace) {
   EXPECT_EQ(again.features.stamp, place.features.stamp);
   EXPECT_EQ(again.features.camera, place.features.camera);
   EXPECT_EQ(again.features.kind(), place.features.kind());
-  EXPECT_EQ(again.features.u, place.features.u);
-  EXPECT_EQ(again.features.response, place.features.response);
-  EXPECT_TRUE(equalMats(again.features.descriptors, place.features.descriptors));
+  synthetic::expectEqual(again.features, place.features);
 }
 
 TEST(PlaceMessage, IsRefusedWhenItDoesNotHoldTogether) {
