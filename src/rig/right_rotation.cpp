@@ -52,7 +52,8 @@ std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, c
   Matrix hessian;
   std::array<Vector, RowDelay::kParts> gradients;
   for (int step = 0;; ++step) {
-    hessian = Eigen::Matrix<double, kUnknowns, 1>::Ones().asDiagonal();  // 1 m, 1 rad: where the view shows nothing
+    hessian.setIdentity();  // a baseline, 1 rad: where the view shows nothing
+    hessian.diagonal().head<3>() /= camera.baseline * camera.baseline;
     gradients.fill(Vector::Zero());
     for (const int i : inliers) {
       const Correspondence& c = correspondences[static_cast<std::size_t>(i)];
@@ -67,9 +68,10 @@ std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, c
       jacobian = scale.asDiagonal() * jacobian;
       *residual = scale.cwiseProduct(*residual);
       const double weight = kBend / (kBend + residual->squaredNorm());
-      hessian += weight * jacobian.transpose() * jacobian;
+      const Eigen::Matrix<double, kUnknowns, 3> weighted = weight * jacobian.transpose();
+      hessian += weighted.lazyProduct(jacobian);  // a general product takes six times as long
       const int part = RowDelay::cellOf(c.measurement.x(), c.measurement.y(), camera.width, camera.height);
-      gradients[static_cast<std::size_t>(part)] += weight * jacobian.transpose() * *residual;
+      gradients[static_cast<std::size_t>(part)] += weighted * *residual;
     }
     if (step == kSteps) break;
     Vector gradient = Vector::Zero();
