@@ -7,8 +7,7 @@
 #include "../said.hpp"
 #include "stereo_descriptor_vo/belief/motion_prior.hpp"
 
-namespace sdvo {
-namespace test_motion_prior {
+namespace sdvo::test_motion_prior {
 
 constexpr std::int64_t kSecond = 1000000000;  // ns
 
@@ -155,5 +154,4 @@ TEST(MotionPrior, NoiseAndStampsMayExceedTheLargestSpeed) {
   EXPECT_EQ(prior.tooFast(ahead(0.01, 0.01), Matrix6d::Zero(), 0.001), "") << "stamps of a burst";
 }
 
-}  // namespace test_motion_prior
-}  // namespace sdvo
+}  // namespace sdvo::test_motion_prior

@@ -11,8 +11,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 
-namespace sdvo {
-namespace test_stereo_features {
+namespace sdvo::test_stereo_features {
 
 StereoFeatures threeFeatures() {
   std::mt19937 random(1);
@@ -155,5 +154,4 @@ TEST(StereoFeatures, RefusesACameraThatIsNone) {
   expectRefused({{[](StereoFeatures& f) { f.camera.baseline = 0.0; }, "baseline"}});
 }
 
-}  // namespace test_stereo_features
-}  // namespace sdvo
+}  // namespace sdvo::test_stereo_features

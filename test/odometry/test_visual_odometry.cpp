@@ -10,8 +10,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
-namespace sdvo {
-namespace test_visual_odometry {
+namespace sdvo::test_visual_odometry {
 
 constexpr std::int64_t kPeriod = 100000000;  // ns between pairs
 constexpr double kStep = 0.8;                // m between pairs
@@ -1174,5 +1173,4 @@ TEST(VisualOdometry, NamesItsStates) {
   EXPECT_STREQ(toString(TrackingState::kLost), "LOST");
 }
 
-}  // namespace test_visual_odometry
-}  // namespace sdvo
+}  // namespace sdvo::test_visual_odometry

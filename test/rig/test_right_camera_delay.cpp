@@ -7,8 +7,7 @@
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 
-namespace sdvo {
-namespace test_right_camera_delay {
+namespace sdvo::test_right_camera_delay {
 
 constexpr double kPeriod = 0.05;  // s
 
@@ -59,13 +58,15 @@ RightCameraDelay knownBeforehand(double delay) {
   return RightCameraDelay(options);
 }
 
+/// Pair k, whose rows have noise of 0.1 px, by a right camera that is so late.
+void learn(RightCameraDelay& right_delay, int k, double delay, bool is_trusted = true) {
+  right_delay.learn(seen(velocityAt(kPeriod * k + 0.5 * delay), delay, 0.1, 10u + static_cast<unsigned>(k)), kPeriod,
+                    before(k), is_trusted);
+}
+
 RightCameraDelay watched(double delay, int pairs) {
   RightCameraDelay right_delay;
-  for (int k = 0; k < pairs; ++k) {
-    const double noise = 0.1;  // px
-    right_delay.learn(seen(velocityAt(kPeriod * k + 0.5 * delay), delay, noise, 10u + static_cast<unsigned>(k)),
-                      kPeriod, before(k), true);
-  }
+  for (int k = 0; k < pairs; ++k) learn(right_delay, k, delay);
   return right_delay;
 }
 
@@ -125,8 +126,7 @@ TEST(RightCameraDelay, StampsOfFreeRunningCamerasAreKnownDelays) {
 TEST(RightCameraDelay, WhatIsKnownBeforehandHoldsUntilItIsContradicted) {
   RightCameraDelay known = knownBeforehand(-0.003);
   EXPECT_EQ(known.compensated(), -0.003);
-  for (int k = 0; k < 60; ++k)
-    known.learn(seen(velocityAt(kPeriod * k), 0.0, 0.1, 10u + static_cast<unsigned>(k)), kPeriod, before(k), true);
+  for (int k = 0; k < 60; ++k) learn(known, k, 0.0);
   EXPECT_NEAR(known.compensated(), 0.0, 5e-4);
 }
 
@@ -246,26 +246,20 @@ TEST(RightCameraDelay, PartsOfTheImageAreTheWitnessesHoweverManyCornersTheyHave)
 TEST(RightCameraDelay, DoubtedPairsTeachNothing) {
   RightCameraDelay right_delay = watched(0.0, 60);
   const double known = right_delay.estimate()->value;
-  for (int k = 60; k < 120; ++k)
-    right_delay.learn(seen(velocityAt(kPeriod * k), 0.01, 0.1, 10u + static_cast<unsigned>(k)), kPeriod, before(k),
-                      false);
+  for (int k = 60; k < 120; ++k) learn(right_delay, k, 0.01, false);
   EXPECT_EQ(right_delay.estimate()->value, known);
 }
 
 TEST(RightCameraDelay, TakesBackWhatPairsWithTheWrongPartnerTaught) {
   RightCameraDelay right_delay = watched(0.0, 90);
-  const auto learn = [&](int k, double delay) {
-    right_delay.learn(seen(velocityAt(kPeriod * k), delay, 0.1, 10u + static_cast<unsigned>(k)), kPeriod, before(k),
-                      true);
-  };
   const double known = right_delay.estimate()->value;
-  for (int k = 90; k < 115; ++k) learn(k, 0.004);
+  for (int k = 90; k < 115; ++k) learn(right_delay, k, 0.004);
   const double taught = std::abs(right_delay.estimate()->value - known);
   ASSERT_GT(taught, 3e-5);
   const Vector6d velocity = velocityAt(1.0);
   right_delay.watch(rowsOf(seen(velocity, -kPeriod, 0.15), velocity), kPeriod, kRowError);
   ASSERT_GT(right_delay.otherPair(kPeriod).log_odds, 0.0);
-  learn(115, -kPeriod);
+  learn(right_delay, 115, -kPeriod);
   EXPECT_LT(std::abs(right_delay.estimate()->value - known), 0.5 * taught);
 }
 
@@ -276,5 +270,4 @@ TEST(RightCameraDelay, APoseThatIsGivenHasNoDrift) {
   EXPECT_EQ(right_delay.drift(), 0.0);
 }
 
-}  // namespace test_right_camera_delay
-}  // namespace sdvo
+}  // namespace sdvo::test_right_camera_delay
