@@ -115,8 +115,9 @@ TEST(DamagedStreams, EveryCovarianceIsPositiveDefiniteAndATrackedMotionIsKnown) 
       if (result.has_motion) {
         EXPECT_GT(leastEigenvalue(result.motion_covariance), 0.0);
         // A motion from a pose that was hardly known, as after a restart, contains what that lacked.
-        if (result.state == TrackingState::kTracking)
+        if (result.state == TrackingState::kTracking) {
           EXPECT_LT(positionSigma(result.motion_covariance), 100.0 + before);
+        }
       }
       if (!result.has_pose || result.reason == "first pair") continue;  // which is the origin
       EXPECT_TRUE(result.T_origin_camera.matrix().allFinite());
