@@ -23,9 +23,10 @@ double ExpectedMotion::normalisedSquare(const Eigen::Isometry3d& measured, const
   return mahalanobisSquare(difference, covariance + measured_covariance);
 }
 
-/// The mean velocities of two neighbouring intervals differ by a third of the velocity's variance over both.
+/// The mean velocities of two neighbouring intervals differ by a third of the velocity's variance over both: by at most
+/// two thirds of that over the longer one.
 Matrix6d MotionPrior::processNoise(double dt, double before, double age) const {
-  const double seconds_cubed = ((before + dt) / 3.0 + age) * dt * dt;
+  const double seconds_cubed = (2.0 / 3.0 * std::max(before, dt) + age) * dt * dt;
   return isotropic(options_.acceleration * options_.acceleration * seconds_cubed,
                    options_.rotation_acceleration * options_.rotation_acceleration * seconds_cubed);
 }

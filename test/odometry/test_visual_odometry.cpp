@@ -825,7 +825,7 @@ TEST(VisualOdometry, APredictedPairIsAsUncertainAsAVehicleMayAccelerate) {
     VisualOdometry odometry({});
     const OdometryResult before = follow(odometry, 5);
     const OdometryResult predicted = odometry.update(blindPair(5 + missed));
-    const double before_it = 0.1, dt = 0.1 * missed, seconds_cubed = (before_it + dt) / 3.0 * dt * dt;
+    const double dt = 0.1 * missed, seconds_cubed = 2.0 / 3.0 * std::pow(dt, 3);
     Vector6d variance;
     const MotionPriorOptions options;
     variance << Eigen::Vector3d::Constant(std::pow(options.acceleration, 2) * seconds_cubed),

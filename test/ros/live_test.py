@@ -225,7 +225,9 @@ class Live(PipelineCase):
                 self.camera.send(images, infos)
             i += count
             self.until(lambda: len(self.info) == len(self.odometry) == i)
-        self.assertEqual({(info.state, info.epoch) for info in self.info}, {('TRACKING', self.info[0].epoch)})
+        # A clock that is late shifts the moment of the jump by a pair: its motion is doubtful then, and right.
+        self.assertEqual({info.epoch for info in self.info}, {self.info[0].epoch})
+        self.assertLessEqual([info.state for info in self.info].count('DEGRADED'), len(jumps))
         self.assertEqual(self.info[-1].dropped_pairs, 0)
         self.assertAlmostEqual(self.info[-1].distance, PAIRS - 1, delta=0.1)
         for way in ('back', 'ahead'):
