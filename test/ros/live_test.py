@@ -303,10 +303,14 @@ class Live(PipelineCase):
                 message.header.stamp = rospy.Time(seconds, 999999999)
                 publisher.publish(message)
         # Topics keep their order: who answers a later pair has taken these.
-        for i in range(6, PAIRS):
-            self.camera.publish(*self.camera.messages(i))
-        later = self.camera.messages(6)[0][0].header.stamp
-        self.until(lambda: self.info[-1].header.stamp >= later)
+        later, times = self.camera.messages(6)[0][0].header.stamp, itertools.count(6)
+
+        def is_answered():
+            i = next(times)
+            self.camera.publish(*self.camera.messages(i % PAIRS, time_of=i))
+            time.sleep(0.1)
+            return self.info[-1].header.stamp >= later
+        self.until(is_answered)
         self.assert_alive()
 
     def test_reset_service_goes_back_to_the_initial_pose(self):
