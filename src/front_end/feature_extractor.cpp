@@ -59,8 +59,12 @@ std::string wordsOn(const StereoFeatures& features, const std::string& diagnosis
     return "every feature is too close to an image border for its descriptor: the image is too small for its size";
   if (features.report.detected == 0)
     return "no corners: the left image has no texture (dark, covered, masked or out of focus?)";
-  if (features.report.stereo_matched == 0)
+  if (features.report.stereo_matched == 0) {
+    constexpr double kLit = 0.25;  // ratio of gradients (chosen): focus and exposure of a rig differ by less
+    if (features.report.sharpness[1] < kLit * features.report.sharpness[0])
+      return "no stereo matches: the right image has no texture (dark, covered or out of focus?)";
     return "no stereo matches: left and right do not show the same scene, are swapped or not rectified";
+  }
   return features.count() == 0 ? "every feature is too close to an image border for its descriptor" : "";
 }
 

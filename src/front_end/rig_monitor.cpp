@@ -83,18 +83,18 @@ RigDiagnosis RigMonitor::diagnose(const cv::Mat& left, const cv::Mat& right,
   }
   if (static_cast<int>(found.size()) < kEnough) return {};
 
-  if (swappedShare(found) > 0.6)
-    return {
-        "left and right images are swapped, mirrored, or not rectified? Corners lie further right in the right "
-        "image",
-        {},
-        {}};
   const auto [slope, offset, scatter] = fitRows(found, left.cols);
   if (scatter > std::max(max_dv_, 0.5 * std::abs(offset)))
     return {text(1, "rows of left and right differ by ", scatter,
                  " px here and there: not rectified, or not taken at the same moment?"),
             {},
             {}};
+  if (swappedShare(found) > 0.6)
+    return {
+        "left and right images are swapped, or both are mirrored: corners lie further right in the right image, on "
+        "their rows",
+        {},
+        {}};
   const RowLine rows{offset, slope, left.cols};
   if (std::abs(offset) > max_dv_)
     return {text(1, "right image ", std::abs(offset), " px too ", offset > 0.0 ? "low" : "high", ": not rectified?"),

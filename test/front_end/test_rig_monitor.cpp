@@ -95,12 +95,12 @@ TEST(RigMonitor, NamesARotation) {
 }
 
 TEST(RigMonitor, NamesSwappedAndMirroredImages) {
-  expectSaid(diagnosis(rightImage(0.0), leftImage()), "swapped, mirrored, or");
+  expectSaid(diagnosis(rightImage(0.0), leftImage()), "are swapped, or both are mirrored");
 }
 
 /// A twentieth of the light, rounded to whole levels.
 TEST(RigMonitor, NamesThemInTheDark) {
-  expectSaid(diagnosis(0.05 * rightImage(0.0), 0.05 * leftImage()), "swapped, mirrored, or");
+  expectSaid(diagnosis(0.05 * rightImage(0.0), 0.05 * leftImage()), "are swapped, or both are mirrored");
   expectSaid(diagnosis(0.05 * leftImage(), 0.05 * rightImage(4.0)), "px too low");
 }
 
