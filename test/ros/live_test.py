@@ -93,6 +93,8 @@ class Live(PipelineCase):
             self.assertEqual(process.returncode, 0)
         finally:
             process.kill()
+        for name in (node + '/odom_frame_id', self.namespace + '/visual_odometry/odom_frame_id'):
+            self.assertFalse(rospy.has_param(name), name + ' is for the next process, too')
         self.assertEqual(re.findall('parameter (.*) is unknown', said), [node + '/max_featurs'])
         self.assertNotEqual(subprocess.run(command + ['_queue_size:=many']).returncode, 0)
 
