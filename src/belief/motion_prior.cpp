@@ -128,9 +128,4 @@ void MotionPrior::takeVelocity(std::int64_t stamp, const Eigen::Isometry3d& moti
   confirmed_stamp_ = stamp;
 }
 
-void MotionPrior::forget() {
-  interrupt();
-  confirmed_.reset();
-}
-
 }  // namespace sdvo

@@ -116,14 +116,6 @@ void VisualOdometry::breakStream() {
   state_.interrupt();
 }
 
-void VisualOdometry::forgetTime() {
-  breakStream();
-  state_.map.reset();  // how long ago it was seen is unknown
-  state_.last_stamp.reset();
-  state_.last_pose_stamp.reset();
-  state_.prior.forget();
-}
-
 void VisualOdometry::mountAt(const Eigen::Isometry3d& T_base_camera) {
   const Eigen::Isometry3d T_before_now = T_base_camera_.inverse() * T_base_camera;
   const bool is_same = T_base_camera.matrix() == T_base_camera_.matrix();

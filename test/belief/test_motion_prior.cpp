@@ -109,8 +109,6 @@ TEST(MotionPrior, ADoubtfulMotionPredictsAndConfirmsNothing) {
   prior.interrupt();
   EXPECT_FALSE(prior.velocity());
   EXPECT_TRUE(prior.confirmed(2 * kSecond, 0.1));
-  prior.forget();
-  EXPECT_FALSE(prior.confirmed(2 * kSecond, 0.1));
 }
 
 TEST(MotionPrior, APairThatGoesBackAfterOneThatWentTwiceAsFarChangedPlacesWithIt) {

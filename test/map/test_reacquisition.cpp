@@ -296,15 +296,6 @@ TEST_F(Outage, APlaceTooFarForTheTimeIsANewStart) {
   expectStartedAgainBy(pairOf(room_, i + 1, far));
 }
 
-TEST_F(Outage, ANewClockIsANewStart) {
-  drive();
-  odometry_->forgetTime();
-  StereoFeatures features = pairOf(room_, kSeen, poseAt(kSeen));
-  features.stamp -= 3'600'000'000'000;
-  result_ = odometry_->update(features);
-  expectStartedAgain();
-}
-
 /// What wheels tell: the true motion since the pair before, too long by a twentieth.
 MotionGuess wheels(const Eigen::Isometry3d& from, const Eigen::Isometry3d& to) {
   return {expSE3(1.05 * logSE3(from.inverse() * to)), false, 0.1};

@@ -738,24 +738,6 @@ TEST(VisualOdometry, BrokenStreamStartsAgainFromTheLastPose) {
   EXPECT_EQ(drive("e"), "T");
 }
 
-TEST(VisualOdometry, GoesOnFromTheLastPoseWhenTheClockIsSetBack) {
-  VisualOdometry odometry({});
-  const OdometryResult before = follow(odometry, 5);
-  odometry.forgetTime();
-  constexpr std::int64_t kHour = 3'600'000'000'000;  // ns
-  for (int i = 6; i <= 12; ++i) {
-    StereoFeatures features = pairOf(i);
-    features.stamp -= kHour;
-    const OdometryResult result = odometry.update(features);
-    EXPECT_EQ(result.epoch, before.epoch + 1);
-    EXPECT_EQ(result.state, i == 6 ? TrackingState::kDegraded : TrackingState::kTracking) << result.reason;
-    if (i == 6) {
-      EXPECT_TRUE(result.T_origin_camera.isApprox(before.T_origin_camera, 1e-9));
-    }
-    EXPECT_TRUE(result.pose_covariance.allFinite());
-  }
-}
-
 TEST(VisualOdometry, RefusesMotionsThatNoRobotMakes) {
   VisualOdometryOptions options;
   options.tracking.max_speed = 12.0;  // the drive goes at 8 m/s

@@ -94,7 +94,6 @@ class MotionPrior {
 
   /// The next pair does not continue the last one: no motion is predicted. The confirmed velocity stays.
   void interrupt() { velocity_.reset(), before_.reset(), doubt_.setZero(); }
-  void forget();
 
  private:
   /// Of a motion over `dt` s, by the velocity over `before` s that ended `age` s ago.

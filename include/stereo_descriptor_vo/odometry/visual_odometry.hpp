@@ -50,9 +50,6 @@ class VisualOdometry {
   /// T_origin_camera of the last pair that had a pose.
   const Eigen::Isometry3d& lastPose() const;
 
-  /// Tells that the clock was set: as breakStream(), and the next stamp may be any.
-  void forgetTime();
-
   /// Takes other options over while running. Those of `map`, with its `noise`, take effect at the next start. Those of
   /// `calibration` do when the estimate begins anew (a reset, another camera, a pair that the rig monitor refused).
   /// Throws std::invalid_argument, and keeps the old ones, when an option is out of its range.
