@@ -280,8 +280,9 @@ TEST(Rooms, EveryPublicHeaderIsReachedFromAnEntryPoint) {
     for (const fs::directory_entry& entry : fs::recursive_directory_iterator(kSource / folder))
       if (entry.is_regular_file()) follow(entry.path());
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(include))
-    if (entry.is_regular_file())
+    if (entry.is_regular_file()) {
       EXPECT_EQ(reached.count(entry.path().lexically_relative(include).string()), 1u) << entry.path();
+    }
 }
 
 /// With one sentence, before anything that only C++17 has. Headers that include another one of ours leave it to that

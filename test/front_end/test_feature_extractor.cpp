@@ -202,8 +202,8 @@ TEST(FeatureExtractor, SaysWhyAPairGivesNothing) {
   flat.height = 36;
   const cv::Range rows(100, 100 + flat.height);
   const auto expectEmpty = [&](const cv::Mat& left, const cv::Mat& right, const std::string& words,
-                               const StereoCamera& camera, const FeatureExtractorOptions& options) {
-    const StereoFeatures features = FeatureExtractor(options).extract(camera, left, right, 5);
+                               const StereoCamera& rig, const FeatureExtractorOptions& options) {
+    const StereoFeatures features = FeatureExtractor(options).extract(rig, left, right, 5);
     EXPECT_EQ(features.count(), 0);
     EXPECT_NO_THROW(features.check());
     expectWords(features.report.status, {words});
