@@ -84,7 +84,7 @@ void StereoFeatures::check() const {
   requireLength(static_cast<std::size_t>(descriptors.rows), "descriptors (rows)");
   if (n > 0 && (descriptors.type() != CV_8U || descriptors.cols % bytesOf(element_type) != 0))
     refuse("descriptors are not rows of whole elements: " + toString(kind()));
-  constexpr double kOtherPair = 1.0;  // s: as far apart as the synchroniser lets stamps be
+  constexpr double kOtherPair = 1.0;  // s (chosen): images further apart are of two pairs
   if (!(std::abs(right_delay) <= kOtherPair)) refuse("right_delay is not a time of at most 1 s");
   if (patch_layout.side < 0) refuse("the patches' side must not be negative");
   if (hasPatches()) {

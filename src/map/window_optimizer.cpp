@@ -223,8 +223,9 @@ class Solver {
     return trace / static_cast<double>(solved.cols()) * freedom / std::max(freedom - 6.0 * poses_, 1.0);
   }
 
-  /// What makes up for few clusters: all gradients cancel, which hides a part, and the largest of several sums is so by
-  /// chance, too: one standard deviation of their six numbers' squares is taken off.
+  /// Factor on the squared sum of so many clusters before areas of different size are compared. All gradients cancel,
+  /// which hides a part of few clusters. The largest of several sums is also large by chance: one standard deviation of
+  /// six squared normal numbers for each cluster is taken off.
   static double largerArea(double clusters) {
     return clusters / std::max(clusters - 1.0, 1.0) / (1.0 + std::sqrt(2.0 / (6.0 * std::max(clusters, 1.0))));
   }

@@ -24,7 +24,7 @@ std::vector<std::string> loadParams(const ros::NodeHandle& nh, std::vector<Optio
 /// every line on the console takes, too: the whole process would stand still.
 bool setParam(const ros::NodeHandle& nh, const std::string& name, const XmlRpc::XmlRpcValue& value);
 
-/// What the image side reads, for a recorder: no option.
+/// The image side writes the topics that it reads here, for a recorder. It is no option.
 constexpr const char* kInputTopics = "input_topics";
 
 /// Whether image_transport or one of its plugins keeps this parameter beside the image side's, see

@@ -151,7 +151,7 @@ std::vector<Words> figuresOf(const DriveReport& report, const OfflineRun& run) {
   return rows;
 }
 
-/// Those that are not the default.
+/// Options with a value other than the default, as rows of name, value and default.
 std::vector<Words> optionsOf(PipelineOptions options) {
   PipelineOptions defaults;
   const std::vector<Option> set = listOptions(options), usual = listOptions(defaults);

@@ -74,7 +74,7 @@ StereoFeatures strangePair(int i) {
   return pairAt(Eigen::Isometry3d::Identity(), i, elsewhere, 0.0, 900 + seed, 40.0);
 }
 
-/// What was seen before, with the stamp of pair i.
+/// An earlier pair's features with the stamp of pair i.
 StereoFeatures stampedAs(int i, StereoFeatures features) {
   features.stamp = stampOf(i);
   return features;

@@ -59,8 +59,9 @@ class MotionPrior {
   /// Of the camera in its own frame, m/s and rad/s; none where no motion can be predicted.
   const std::optional<Vector6d>& velocity() const { return velocity_; }
 
-  /// The time in which a motion took place whose stamps are `dt` s apart, s. Those of a burst are closer together than
-  /// the moments at which its pairs were taken, and nothing is faster than it may be.
+  /// The time in which a motion took place whose stamps are `dt` s apart, s. Stamps of a burst are closer together than
+  /// the moments at which its pairs were taken. The time is never so short that the motion would exceed the largest
+  /// speed or rotation rate.
   double interval(double dt, const Eigen::Isometry3d& motion) const;
 
   /// The next motion as the velocity, which must be known, predicts it.
@@ -80,8 +81,8 @@ class MotionPrior {
   /// Of an unseen motion around a standstill, m and rad: its speed was that of the confirmed velocity, and is bounded.
   Matrix6d unseen(double seconds) const;
 
-  /// Of a motion of unknown size, m and rad: the longest one over which motions are predicted, and a good part of a
-  /// right angle.
+  /// Covariance, m^2 and rad^2, of a motion of which nothing is known. Its deviations are the distance at max_speed
+  /// over max_gap, and half a radian.
   Matrix6d unknown() const;
 
   /// In words, if no motion may be as fast, noise and stamps considered.
@@ -96,7 +97,8 @@ class MotionPrior {
   void interrupt() { velocity_.reset(), before_.reset(), doubt_.setZero(); }
 
  private:
-  /// Of a motion over `dt` s, by the velocity over `before` s that ended `age` s ago.
+  /// Covariance, m^2 and rad^2, of a motion over `dt` s that the velocity predicts. The velocity is the mean over
+  /// `before` s, which ended `age` s ago.
   Matrix6d processNoise(double dt, double before, double age) const;
   Matrix6d stampNoise(const Vector6d& velocity) const;
 

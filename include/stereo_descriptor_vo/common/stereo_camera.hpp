@@ -41,7 +41,7 @@ struct StereoCamera {
   double depth(double disparity) const { return fx * baseline / disparity; }
   double disparity(double depth) const { return fx * baseline / depth; }
 
-  /// Of what both views can show: its disparity is their width, m. Nearer points are not in front of the camera.
+  /// Depth, m, at which the disparity is the image's width. Both views show no nearer point: such counts as behind.
   double nearestDepth() const { return depth(width); }
 
   /// Whether `other` can be this rig with another focus, or calibrated anew while it runs. Images have one size, and
