@@ -30,7 +30,7 @@ void GravityTrack::add(std::int64_t stamp, const Eigen::Vector3d& acceleration, 
   const std::lock_guard<std::mutex> lock(mutex_);
   if (!measurements_.empty() && stamp <= measurements_.back().stamp) measurements_.clear();
   measurements_.push_back({stamp, acceleration, rate});
-  // One that is older stays, so that a whole second is seen to be there.
+  // One measurement from before the last second stays: up() compares the first and last stamp with a second.
   while (measurements_.size() > 1 && stamp - measurements_[1].stamp >= kPeriod) measurements_.pop_front();
 }
 
@@ -100,7 +100,7 @@ std::optional<Eigen::Matrix3d> GyroTrack::rotation(std::int64_t from, std::int64
     if (begin >= end) continue;
     if (b.stamp - a.stamp >= kLongest)
       return refuse("a pause of ", seconds(b.stamp - a.stamp), " s between two of its rates");
-    // The rate in the middle, which is linear between the two.
+    // The mean rate from `begin` to `end`: that in the middle, linearly interpolated between a and b.
     const double share = 0.5 * seconds(begin - a.stamp + end - a.stamp) / seconds(b.stamp - a.stamp);
     R_from_to = R_from_to * expSO3((a.rate + share * (b.rate - a.rate)) * seconds(end - begin));
   }

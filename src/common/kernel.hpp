@@ -7,13 +7,14 @@
 /// For functions that may use AVX2's instructions; to be called only where usesVectorKernels().
 #define SDVO_AVX2 __attribute__((target("avx2")))
 #elif defined(__aarch64__) && defined(__ARM_NEON)
-/// Every such processor has it: kernels need no second compilation. To be called only where usesVectorKernels().
+/// Every 64-bit ARM processor has NEON, so kernels are compiled once. Functions that use it are called only where
+/// usesVectorKernels().
 #define SDVO_HAVE_NEON
 #endif
 #if defined(SDVO_HAVE_AVX2) || defined(SDVO_HAVE_NEON)
 #define SDVO_HAVE_VECTORS
 #endif
-/// For functions that are compiled for either.
+/// For functions that are written once for AVX2 and NEON.
 #ifdef SDVO_HAVE_AVX2
 #define SDVO_VECTORS SDVO_AVX2
 #else
@@ -40,15 +41,16 @@ void runKernel(Arguments... arguments) {
   Kernel::run(arguments...);
 }
 
-/// Eight floats worked on at once: one register with AVX, two without. A plain loop over floats may not be summed up in
-/// parallel, as that changes the order of the additions; here the order is written down.
+/// Eight floats worked on at once: one register with AVX, two without. A compiler may not vectorise a plain sum of
+/// floats, because that changes the order of the additions. Lanes fix the order, so all processors give the same sum.
 typedef float Lanes __attribute__((vector_size(32)));
 /// Half of them, for what is left at the end.
 typedef float HalfLanes __attribute__((vector_size(16)));
 /// Four doubles, in the same registers.
 typedef double DoubleLanes __attribute__((vector_size(32)));
 
-/// Lanes anywhere in memory. Compilers read them at once; gcc 9 copies bytes by way of the stack.
+/// Lanes at an address that need not be aligned. Read by one instruction; gcc 9 turns memcpy into a detour by the
+/// stack.
 template <class Vector>
 struct __attribute__((packed, may_alias)) Unaligned {
   Vector lanes;
@@ -64,7 +66,7 @@ SDVO_IN_KERNEL void store(const Vector& lanes, Number* values) {
   reinterpret_cast<Unaligned<Vector>*>(values)->lanes = lanes;
 }
 
-/// The sum of all lanes, those of the rest added after the halves.
+/// The sum of all lanes in a fixed order: the two halves of `lanes`, then `rest`, then across.
 SDVO_IN_KERNEL float sumOf(const Lanes& lanes, const HalfLanes& rest = HalfLanes{}) {
   const HalfLanes low = {lanes[0], lanes[1], lanes[2], lanes[3]}, high = {lanes[4], lanes[5], lanes[6], lanes[7]};
   const HalfLanes sums = (low + high) + rest;

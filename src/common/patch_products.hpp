@@ -6,7 +6,7 @@ namespace sdvo {
 
 // Kernels on patches: arrays of `count` floats, a multiple of four.
 
-/// Takes the mean away within the mask.
+/// Subtracts the mean where the mask is 1; where it is 0, values are 0. `pixels` is the sum of the mask.
 struct RemoveMean {
   template <class Vector>
   static SDVO_IN_KERNEL void add(const float* values, Vector& sum) {
@@ -34,7 +34,7 @@ struct RemoveMean {
   }
 };
 
-/// Of arrays a, b and c.
+/// Sums of the products of arrays a, b and c, each with each.
 template <class Vector>
 struct Products {
   Vector aa{}, ab{}, ac{}, bb{}, bc{}, cc{};

@@ -7,7 +7,7 @@
 
 namespace sdvo {
 
-/// Numbers in a register, for kernels that work on each by itself.
+/// Floats in a register, for kernels that work on each of them alone.
 #ifdef SDVO_HAVE_AVX2
 constexpr int kRegister = 8;
 #else
@@ -18,8 +18,8 @@ typedef std::int32_t IntRegister __attribute__((vector_size(4 * kRegister)));
 /// Sums in these wrap around.
 typedef std::uint32_t UnsignedRegister __attribute__((vector_size(4 * kRegister)));
 
-// Lanes of two registers, counted through both. Of registers of eight, AVX2 takes the evens and the odds of each half
-// with one instruction.
+// Indices for shuffling registers a and b: 0 to 3 (7) are a's lanes, 4 to 7 (8 to 15) b's. AVX2 shuffles within halves
+// of a register by one instruction, hence the order of its even and odd lanes.
 #ifdef __clang__
 #define SDVO_SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
 #else
@@ -35,7 +35,7 @@ typedef std::uint32_t UnsignedRegister __attribute__((vector_size(4 * kRegister)
 #define SDVO_NEXT 1, 2, 3, 4
 #endif
 
-/// The lane right behind each one of `here`, which `behind` continues.
+/// The right neighbours of the lanes of `here`; that of the last one is the first of `behind`.
 SDVO_VECTORS inline Register nextOf(Register here, Register behind) {
   return SDVO_SHUFFLE(here, behind, SDVO_NEXT);
 }
@@ -44,7 +44,7 @@ SDVO_VECTORS inline Register toFloats(UnsignedRegister numbers) {
   return __builtin_convertvector(reinterpret_cast<IntRegister>(numbers), Register);
 }
 
-/// Whole parts, clamped to [0, last].
+/// Values without their fractions, clamped to [0, last].
 SDVO_VECTORS inline IntRegister truncated(Register values, IntRegister last) {
   const IntRegister zero{}, whole = __builtin_convertvector(values, IntRegister);
   const IntRegister not_above = whole < last ? whole : last;
@@ -58,9 +58,11 @@ SDVO_IN_KERNEL Bits bitsAt(const Number* place) {
   return bits;
 }
 
-// Single reads are faster than gathering. Places are unsigned: as addresses they need no extension of their sign.
+// Reads from scattered places. Single ones are faster than AVX2's gather instruction. Places are unsigned, which spares
+// an instruction for each address.
 
-/// Two neighbours from each of places 0 and 1 on; the other half of a register of eight has those from 4 and 5 on.
+/// numbers[p] and numbers[p + 1] for p = places[0] and places[1]; a register of eight also has those for places[4]
+/// and places[5].
 SDVO_VECTORS inline UnsignedRegister readPairs(const std::int32_t* numbers, const std::uint32_t* places) {
   typedef std::int64_t PairRegister __attribute__((vector_size(4 * kRegister)));
   const auto at = [&](int k) { return bitsAt<std::int64_t>(numbers + places[k]); };
@@ -71,7 +73,7 @@ SDVO_VECTORS inline UnsignedRegister readPairs(const std::int32_t* numbers, cons
 #endif
 }
 
-/// Four bytes from each place on.
+/// For each place, the four bytes that begin there, as one number.
 SDVO_VECTORS inline UnsignedRegister readFours(const std::uint8_t* bytes, const std::uint32_t* places) {
   const auto at = [&](int k) { return bitsAt<std::uint32_t>(bytes + places[k]); };
 #ifdef SDVO_HAVE_AVX2
@@ -81,10 +83,10 @@ SDVO_VECTORS inline UnsignedRegister readFours(const std::uint8_t* bytes, const 
 #endif
 }
 
-/// A number for each lane, and its right neighbour.
+/// For each lane a number and its right neighbour in memory: first() and second().
 class Pairs {
  public:
-  /// As read for places 0 and 1, and for places 2 and 3.
+  /// Two results of readPairs(): of places from 0 on, and from 2 on.
   SDVO_VECTORS Pairs(UnsignedRegister low, UnsignedRegister high)
       : low_(reinterpret_cast<Register>(low)), high_(reinterpret_cast<Register>(high)) {}
 
@@ -96,7 +98,7 @@ class Pairs {
   }
 
  private:
-  Register low_, high_;  ///< whole numbers, called floats: only these are shuffled from two registers at once
+  Register low_, high_;  ///< bits of integers, typed as floats: AVX2's shuffle of two registers takes only floats
 };
 
 }  // namespace sdvo

@@ -60,7 +60,7 @@ double mahalanobisSquare(const Vector6d& difference, const Matrix6d& covariance)
 
 Matrix6d positivePart(const Matrix6d& matrix) {
   const double m = matrix.topLeftCorner<3, 3>().norm(), rad = matrix.bottomRightCorner<3, 3>().norm();
-  Vector6d unit = Vector6d::Ones();  // makes both parts as large, since metres compare with no radians
+  Vector6d unit = Vector6d::Ones();  // scales both blocks to one norm: eigenvectors would mix metres and radians
   if (m > 0.0 && rad > 0.0) unit.head<3>().setConstant(std::sqrt(m / rad));
   const Vector6d inverse = unit.cwiseInverse();
   const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(inverse.asDiagonal() * matrix * inverse.asDiagonal());

@@ -8,10 +8,10 @@
 
 namespace sdvo {
 
-/// Keeps a stream of stamped items in order. What is late by less than a second was overtaken and is dropped. A jump,
-/// to either side, is believed at once when the clock made it too (a bag started again, a camera paused) or the source
-/// announced it; else the item is held back until the next one tells: that one goes on from the item, or from before
-/// it, in which case the item was an outlier and is dropped. Stamps and times in ns.
+/// Keeps a stream of stamped items in order. An item that is late by less than a second is dropped. A larger jump, back
+/// or ahead, is believed at once if the clock jumped too (a bag started again, a camera paused) or the source announced
+/// it. Otherwise the item is held until the next one. If that continues from the held item, both pass; else the held
+/// one was an outlier and is dropped. Stamps and times in ns.
 template <class Item>
 class StampFilter {
  public:
@@ -24,13 +24,13 @@ class StampFilter {
   /// `now` is the clock's time at the item's arrival. Returns what may be processed, in order: usually the item itself.
   std::vector<Passed> add(Item item, std::int64_t stamp, std::int64_t now, bool announced = false) {
     const Arrival arrival{stamp, now};
-    // Nothing orders the clock and the items: either may jump first.
+    // When a bag starts again, either the clock or the first stamp may be seen to jump first.
     if (last_now_ && now < *last_now_) fell_to_ = now;
     last_now_ = now;
     if (!last_) return {pass(std::move(item), arrival)};
     const std::int64_t step = stamp - last_->stamp;
     if (step > 0 && step <= kJump) {
-      if (fell_to_ && now - *fell_to_ > kJump) fell_to_.reset();  // too little for the stamps to fall, too
+      if (fell_to_ && now - *fell_to_ > kJump) fell_to_.reset();  // the clock was set back: no stamp followed in time
       dropHeld();
       return {pass(std::move(item), arrival)};
     }
@@ -88,7 +88,7 @@ class StampFilter {
   std::optional<Arrival> last_;
   std::optional<std::pair<Item, Arrival>> held_;
   std::optional<std::int64_t> last_now_;
-  std::optional<std::int64_t> fell_to_;  ///< the clock, since the stamps did
+  std::optional<std::int64_t> fell_to_;  ///< the clock's time after it jumped back, until the stamps do so
   int source_restarts_ = 0, clock_steps_ = 0;
   std::uint64_t dropped_ = 0;
 };

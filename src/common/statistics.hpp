@@ -7,7 +7,7 @@
 
 namespace sdvo {
 
-/// Of an even number the upper one of the two in the middle; zero of none. Reorders them.
+/// The upper median: of an even number of values the larger of the middle two. Zero of none. Reorders the values.
 inline double median(std::vector<double>& values) {
   if (values.empty()) return 0.0;
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -15,7 +15,7 @@ inline double median(std::vector<double>& values) {
   return *middle;
 }
 
-/// The value that `share` (0 to 1) of all are not above; zero of none.
+/// The quantile of `share` (0 to 1), by the nearest rank; zero of none.
 inline double quantile(std::vector<double> values, double share) {
   if (values.empty()) return 0.0;
   const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1) + 0.5);
@@ -23,7 +23,7 @@ inline double quantile(std::vector<double> values, double share) {
   return *at;
 }
 
-/// Probability of at least so many successes in independent trials that succeed with a probability in (0, 1).
+/// Probability of at least `successes` in independent trials; `probability` of each in (0, 1).
 inline double binomialTail(int trials, int successes, double probability) {
   double tail = 0.0;
   for (int k = successes; k <= trials; ++k)

@@ -82,15 +82,15 @@ WholeFile::WholeFile(const std::string& path) : path_(path) {
       const Descriptor held(left);
       if (held.lock()) fs::remove(name, ignored);
     }
-    // The mode is that of any program's new file: mkstemp's is not, and the process's umask can only be read by
-    // changing it.
+    // open() gives the mode of any new file, 0666 less the umask. mkstemp() would give 0600, and the umask cannot be
+    // read without changing it.
     std::random_device random;
     do {
       partial_ = beside + std::to_string(random());
       const int file = ::open(partial_.c_str(), O_RDWR | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
       if (file < 0 && errno == EEXIST) continue;
       file_ = std::make_unique<Descriptor>(file);
-    } while (!file_ || !file_->lock() || !file_->hasName());  // else somebody took it for one that was left
+    } while (!file_ || !file_->lock() || !file_->hasName());  // another process may have removed it as a killed one's
   });
 }
 

@@ -6,9 +6,10 @@
 
 namespace sdvo {
 
-/// A file that appears whole or not at all. Until commit() the partial one beside it is there to be written, of this
-/// object alone, and goes with it. Links stay and lead to the new file. Throws std::runtime_error that names the file,
-/// and leaves it as it was, when it cannot be written, the path is not absolute or leads to something else than a file.
+/// Writes a file as a whole or not at all. The caller writes the partial file beside it, and commit() puts that in its
+/// place; without commit() the destructor removes it. Symbolic links on the path stay links. If the file cannot be
+/// written, or the path is not absolute or not of a regular file, throws std::runtime_error with the file's name and
+/// leaves the file as it was.
 class WholeFile {
  public:
   /// Removes partial files of processes that were killed.

@@ -38,8 +38,8 @@ class Worker {
     return has_room;
   }
 
-  /// Waits for the item in work; those that wait are left. For an owner whose handler refers to this worker: the
-  /// pointer to it must stay until then.
+  /// Waits until the handler is done with its item; items in the queue are not handled. An owner whose handler uses
+  /// this worker calls it before it destroys the pointer to the worker.
   void stop() {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
@@ -77,8 +77,8 @@ class Worker {
   std::thread thread_;  // last: it starts when everything else is there
 };
 
-/// What a service asks of the thread that handles a stream of items: it holds for items that arrive after the request,
-/// not for those that wait in a queue already. The newest request wins. For any thread.
+/// A request of a service to the thread that handles a stream of items. It applies to items that arrive after the
+/// request, not to those that are queued already. A newer request replaces one that was not taken. Thread-safe.
 template <class Request>
 class Requests {
  public:
@@ -94,7 +94,8 @@ class Requests {
     return posted_;
   }
 
-  /// The request that holds for an item and has not been taken; `posted` as noted when that arrived, or any request.
+  /// The request, if it has not been taken and applies to an item: `posted` is posted() when that item arrived. Without
+  /// an item, any request.
   std::optional<Request> take(int posted = std::numeric_limits<int>::max()) {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (posted < posted_) return std::nullopt;

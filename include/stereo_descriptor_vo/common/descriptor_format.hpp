@@ -26,9 +26,9 @@ inline const std::vector<std::string>& namesOf(DescriptorLayout) {
 }
 
 /// Positions of a grey patch's samples: side x side of them around the feature's position in the left image, row by
-/// row. Each is the mean of a square as wide as their spacing. The spacing follows the
-/// feature's size, and so its depth. Two patches of one point differ by a shift and by what little the sizes' limits
-/// leave of the scale.
+/// row. Each is the mean of a square as wide as their spacing. The spacing follows the feature's size, and so its
+/// depth. Hence patches of one point, from two images, differ by a shift; their scales differ only where the size or
+/// the spacing is at its limit.
 struct PatchLayout {
   int side = 0;                 ///< samples; 0: no patches
   float min_spacing = 1.f;      ///< px

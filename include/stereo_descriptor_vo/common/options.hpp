@@ -49,7 +49,7 @@ struct Option {
 
 /// Collects the options of a struct and of the structs it is composed of. Every options struct has a member
 /// `void describe(OptionList&)` that adds its fields in order; defaults stay in the struct itself. It may have a member
-/// `void check() const` for what its fields demand of each other, which throws std::invalid_argument.
+/// `void check() const` that throws std::invalid_argument if its fields contradict each other.
 class OptionList {
  public:
   void add(const std::string& name, bool& value, const std::string& meaning);
@@ -73,7 +73,7 @@ class OptionList {
     prefix_ = outer;
   }
 
-  /// A component's fields as they are.
+  /// A component's fields, without a group's name before theirs.
   template <class Options>
   void collect(Options& options) {
     options.describe(*this);
@@ -82,8 +82,8 @@ class OptionList {
 
   const std::vector<Option>& options() const { return options_; }
 
-  /// Throws std::invalid_argument at the first field outside its range and at the first component whose fields do not
-  /// go together; either is named with its path.
+  /// Throws std::invalid_argument at the first field outside its range and at the first component whose fields
+  /// contradict each other. The message has the path of either.
   void check() const;
 
  private:

@@ -23,11 +23,11 @@ Vector6d logSE3(const Eigen::Isometry3d& T);
 /// Ad(T): T exp(xi) = exp(Ad(T) xi) T.
 Matrix6d adjoint(const Eigen::Isometry3d& T);
 
-/// The square of a difference in standard deviations (Mahalanobis 1936): chi-square of six where it has this
+/// The squared Mahalanobis distance: chi-square with six degrees of freedom if the difference is Gaussian with this
 /// covariance.
 double mahalanobisSquare(const Vector6d& difference, const Matrix6d& covariance);
 
-/// A symmetric matrix without its directions of negative variance.
+/// A symmetric matrix with its negative eigenvalues set to zero. A difference of covariances may have such.
 Matrix6d positivePart(const Matrix6d& matrix);
 
 /// The same pose with its rotation made orthonormal again; products of many rotations drift away from that.

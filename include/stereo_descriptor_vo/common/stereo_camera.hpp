@@ -41,10 +41,11 @@ struct StereoCamera {
   double depth(double disparity) const { return fx * baseline / disparity; }
   double disparity(double depth) const { return fx * baseline / depth; }
 
-  /// Depth, m, at which the disparity is the image's width. Both views show no nearer point: such counts as behind.
+  /// Depth, m, at which the disparity is the image's width. No point nearer than that is in both images, so a motion
+  /// that predicts one is treated as if the point were behind the camera.
   double nearestDepth() const { return depth(width); }
 
-  /// Whether `other` can be this rig with another focus, or calibrated anew while it runs. Images have one size, and
+  /// Whether `other` can be this rig after autofocus or a new calibration: the image size is the same, and the other
   /// numbers differ by at most 5 % (autofocus changes a focal length by 1 to 4 %).
   bool isLike(const StereoCamera& other) const;
 

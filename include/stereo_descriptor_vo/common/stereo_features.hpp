@@ -24,7 +24,7 @@ struct DescriptorKind {
 /// In words, for messages.
 std::string toString(const DescriptorKind& kind);
 
-/// What the image side alone can know of a pair; travels with the features for the sake of whoever receives them.
+/// What only the image side can measure of a pair. It is sent with the features.
 struct ExtractionReport {
   int detected = 0;                       ///< corners in the left image, before stereo matching
   int stereo_matched = 0;                 ///< of these, found in the right image
@@ -34,7 +34,7 @@ struct ExtractionReport {
   double stereo_time = 0.0;               ///< s
   double describe_time = 0.0;             ///< s
   bool refused = false;                   ///< by the rig monitor: rows do not agree, `status` names the cause
-  bool along_rows = false;                ///< rows differ as of a right camera that turned, and were matched so
+  bool along_rows = false;                ///< the right camera turned: matched along the rows that the monitor found
   std::string status;                     ///< empty, or why the pair gave few or no features
 };
 
@@ -48,7 +48,7 @@ struct StereoFeature {
 struct StereoFeatures {
   std::int64_t stamp = 0;  ///< of the left image, ns
   StereoCamera camera;
-  double right_delay = 0.0;  ///< s, from the left image to the right one, where their stamps are of two triggers
+  double right_delay = 0.0;  ///< s, from the left image to the right one, where each camera has its own trigger
 
   std::string descriptor;  ///< base descriptor: "freak", …; a free name, for other extractors may send their own
   DescriptorLayout layout = DescriptorLayout::kLeft;
@@ -57,7 +57,7 @@ struct StereoFeatures {
   std::vector<float> u, v;       ///< left position, px
   std::vector<float> disparity;  ///< u_left - u_right > 0, px
   std::vector<float> dv;         ///< v_right - v_left, px: the rig's residual misalignment shows here
-  std::vector<float> size;       ///< diameter of the described neighbourhood's key point, px
+  std::vector<float> size;       ///< of the cv::KeyPoint, px: scales the described neighbourhood and the patch
   std::vector<float> angle;      ///< rad in [0, 2 pi), -1 where the descriptor is not oriented
   std::vector<float> response;   ///< detector's score
   cv::Mat descriptors;           ///< rows x bytes, CV_8U; elements wider than a byte in the machine's own order
