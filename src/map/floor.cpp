@@ -27,7 +27,8 @@ Eigen::Vector3d Floor::residual(const Eigen::Isometry3d& T_camera_origin, Jacobi
   const Eigen::Matrix3d& R = T_floor_base.linear();
   const Eigen::Vector3d weights = sigma.cwiseInverse();
   if (jacobian) {
-    // exp(xi) T_camera_origin is T_floor_base exp(-Ad(T_base_camera) xi); a turn eta moves the base's z by R (eta x z).
+    // exp(xi) T_camera_origin makes it T_floor_base exp(-Ad(T_base_camera) xi). A rotation eta of the base changes its
+    // z axis by R (eta x z).
     Jacobian by_base = Jacobian::Zero();
     by_base.block<1, 3>(0, 0) = R.row(2);
     by_base.block<2, 1>(1, 3) = -R.block<2, 1>(0, 1);
@@ -62,7 +63,7 @@ Eigen::Isometry3d Floor::settled(const Eigen::Isometry3d& T_camera_origin, const
 Matrix6d Floor::constrained(const Eigen::Isometry3d& T_origin_camera, const Matrix6d& covariance) const {
   Jacobian by_left;
   residual(T_origin_camera.inverse(), &by_left);
-  // T_origin_camera exp(xi) inverted is exp(-xi) T_camera_origin; the sign does not matter to a covariance.
+  // The inverse of T_origin_camera exp(xi) is exp(-xi) T_camera_origin. The sign cancels in a covariance.
   const Matrix6d left = covariance - gain(by_left, covariance) * by_left * covariance;
   return 0.5 * (left + left.transpose());
 }

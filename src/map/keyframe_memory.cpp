@@ -5,7 +5,7 @@
 namespace sdvo {
 namespace {
 
-constexpr double kMost = 0.6;  // of a key frame's points (chosen): who sees them sees its place
+constexpr double kMost = 0.6;  // of a key frame's points (chosen): a view of so many shows the same place
 
 }  // namespace
 
@@ -50,7 +50,7 @@ void KeyframeMemory::remember(const StereoCamera& camera, OldKeyframe keyframe) 
 
 const OldKeyframe* KeyframeMemory::nearest(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
                                            int least) const {
-  constexpr double kFarthest = 3.0;  // baselines: an error of a disparity is seen so many times as large from there
+  constexpr double kFarthest = 3.0;  // baselines: seen from there, a disparity's error shifts a point by 3 times that
   const Eigen::Vector3d here = T_camera_origin.inverse().translation();
   const OldKeyframe* nearest = nullptr;
   double way = kFarthest * camera.baseline;

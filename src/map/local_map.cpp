@@ -12,10 +12,10 @@
 namespace sdvo {
 namespace {
 
-/// Disparity below which a point's distance is beyond measuring; it serves as a direction, far away.
+/// Smallest disparity of a point: below it the distance cannot be measured, and the point is as good as at infinity.
 constexpr double kFarthestDisparity = 0.05;  // px
 
-/// Most points need no more memory than for these until it goes to another one.
+/// Room for the observations of most points. A recycled point that has more gives it back.
 constexpr std::size_t kUsualObservations = 8;
 
 /// Covariance of the motion M = T_from_to between two frames, perturbed as M * exp(xi), from that of the left
@@ -33,7 +33,7 @@ Matrix6d motionCovariance(const Window& window, const std::vector<int>& poses, c
   return 0.5 * (covariance + covariance.transpose());
 }
 
-/// Of observations in the order of their frames the one in this frame, or their end.
+/// The observation in a frame, or the end. Observations are sorted by their frames.
 template <class Observations>
 auto observationIn(Observations& observations, int frame_id) {
   const auto here = std::lower_bound(observations.begin(), observations.end(), frame_id,
@@ -122,11 +122,11 @@ void LocalMap::insert(const PatchAlignmentOptions& alignment, const StereoFeatur
     ++points_[sighting.point].seen;
     points_[sighting.point].observations.push_back({sighting, id, sighting.feature});
   }
-  // Only now that the new sightings are noted: points that they carry on must outlive the forgotten pair.
+  // After the new sightings are added: removeFrame() also removes points that no longer have enough observations.
   if (!frames_.empty() && !frames_.back().is_keyframe) removeFrame(frames_.size() - 1);
   frames_.push_back({id, T_camera_origin, false, false});
   frames_.back().is_keyframe = needsKeyframe();
-  // A corner that nothing is ever aligned with is no better than those seen later.
+  // With patches the corner defines the point's place, so its own error is small. Without, it errs as any later one.
   const double sigma =
       alignment.canAlign(features.patch_layout.side) ? NoiseOptions::kReference : options_.noise.corner;
   for (int i = 0; i < features.count(); ++i)
@@ -187,7 +187,7 @@ void LocalMap::startPoint(const StereoFeatures& features, int feature, int id, c
                                           1.0 / camera.depth(disparity)};
   point.reference.take(features, feature, {u, v}, T_camera_origin);
   point.observations.clear();
-  // Room for many sightings would stay with a point that will have few.
+  // Else the memory of a point with many sightings would stay with a new one, which will have few.
   if (point.observations.capacity() > kUsualObservations) point.observations.shrink_to_fit();
   point.observations.reserve(kUsualObservations);
   point.observations.push_back({{{u, v, features.disparity[feature]}, sigma}, id, feature});
@@ -211,8 +211,8 @@ bool LocalMap::needsKeyframe() const {
   return median(parallax) > options_.keyframe_parallax;
 }
 
-/// Key frames beyond the newest ones stay for what they see: the first that shares too few points with the newest pair
-/// goes, and of too many the one that adds the least to the one before it.
+/// Removes key frames that are older than the `keyframes` newest ones: the oldest that shares too few points with the
+/// newest pair, and while they are too many, the one with the least parallax to the frame before.
 void LocalMap::forgetKeyframe() {
   const auto older = [&] { return frames_.size() - 1 - static_cast<std::size_t>(options_.keyframes); };
   const std::size_t leaving = older() - 1;
@@ -231,7 +231,7 @@ void LocalMap::forgetKeyframe() {
   }
 }
 
-/// Unless it sees too little to be recalled, or nothing new.
+/// Not if it has too few points to be recalled, or if a remembered one sees the same.
 void LocalMap::rememberKeyframe(std::size_t frame) {
   const OldKeyframe without_appearance = keyframe(frame, false);
   if (without_appearance.described.count() < options_.lasting_points || memory_.covers(camera_, without_appearance))
@@ -239,14 +239,15 @@ void LocalMap::rememberKeyframe(std::size_t frame) {
   memory_.remember(camera_, keyframe(frame, true));
 }
 
-/// With the points that another frame has seen as well: where they are, and what they look like if that is asked for.
+/// A copy of a frame with the points that another frame has seen as well. `with_appearance`: with descriptors and
+/// patches; otherwise only with positions.
 OldKeyframe LocalMap::keyframe(std::size_t frame, bool with_appearance) const {
   OldKeyframe old{frames_[frame].id, frames_[frame].T_camera_origin, {}, {}, {}};
   old.described.kind = kind_;
   const auto isShared = [&](const Point& point) {
     return point.observations.size() >= 2 && observationIn(point.observations, old.id) != point.observations.end();
   };
-  if (with_appearance) {  // to be kept, so in no more memory than it needs
+  if (with_appearance) {  // it will be remembered, so it gets exactly the memory that it needs
     std::size_t most = 0, samples = 0;
     for (const Point& point : points_)
       if (isShared(point)) ++most, samples += point.reference.samples.size();
@@ -293,7 +294,7 @@ void LocalMap::recall(const OldKeyframe& old, const std::vector<Link>& links) {
   for (const Link& link : links) {
     auto& observations = of_feature.at(link.feature)->observations;
     const OldKeyframe::Point& point = old.points[static_cast<std::size_t>(link.point)];
-    // The two reference patches may show points a little apart.
+    // The old key frame's reference and the map point's may be of spots a little apart: the measurement is shifted.
     const Eigen::Vector2d apart = link.position - observations.back().measurement.head<2>();
     Eigen::Vector3d measurement = point.observation.measurement;
     measurement.head<2>() -= apart / link.scale;
@@ -312,7 +313,7 @@ void LocalMap::moveTo(const Eigen::Isometry3d& T_newest_origin) {
   }
 }
 
-/// For each frame the points that it shares with the newest pair.
+/// For each frame, the number of points that it shares with the newest pair.
 std::vector<int> LocalMap::sharedPoints() const {
   std::vector<int> shared(frames_.size(), 0);
   for (const Point& point : points_) {
@@ -346,13 +347,13 @@ std::vector<double> LocalMap::parallaxToPredecessors(std::size_t frames) const {
   return parallax;
 }
 
-/// The frame since which a point must have been seen if it was seen only once.
+/// Id of the oldest frame in which the only observation of a point may be.
 int LocalMap::lookedForSince() const {
   constexpr std::size_t kMissed = 4;  // frames of the map that may miss it
   return frames_[frames_.size() - std::min(frames_.size(), kMissed)].id;
 }
 
-/// A place that was seen once and then missed is most often no place at all.
+/// A point that was seen once and then missed is most often a wrong stereo match.
 bool LocalMap::isLookedFor(const Point& point, int since) {
   const std::size_t sightings = point.observations.size();
   return sightings >= 2 || (sightings == 1 && point.observations.back().frame_id >= since);
@@ -418,7 +419,7 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   window.calibration_prior = prior;
   window.floor = floor;
 
-  std::vector<int> poses;  // whose covariances are made use of below
+  std::vector<int> poses;  // whose covariances are needed below
   for (const int pose : {newest, newest - 1})
     if (pose > 0) poses.push_back(pose);
   const WindowSolution& solution = optimizer.optimize(window, poses);
@@ -459,7 +460,8 @@ double LocalMap::varianceOfMotion() const {
 void LocalMap::cutOff(const std::vector<double>& squares, Adjustment& adjustment) {
   const double gate = 2.0 * noiseGate(2);  // the point's position errs as much as its observation's
   for (const int i : problem_.newest) {
-    // A corner that no patch confirms may be of another point. The point's own corner is within a corner's noise.
+    // The sigma of a corner that no patch confirms allows for a neighbour's corner. The gate does not: the point's own
+    // corner lies within a corner's noise.
     const double wider = std::max(problem_.window.observations[i].sigma / options_.noise.corner, 1.0);
     if (wider * wider * squares[i] <= gate) continue;
     Point& point = points_[problem_.points[problem_.window.observations[i].point]];

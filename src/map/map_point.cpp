@@ -31,8 +31,8 @@ std::optional<ReferencePatch::Found> ReferencePatch::findIn(const PatchAlignment
       samples.size() != static_cast<std::size_t>(features.patch_layout.bytes()))
     return std::nullopt;
 
-  // The patch is small and taken as facing the camera that it was taken from: to first order the two views then differ
-  // by an affine map, the ratio of the depths above all.
+  // Assumes that the patch is small and parallel to the image that it was taken from. To first order an affine map then
+  // leads to the other view; its main part is the ratio of the depths.
   const Eigen::Vector3d then = point.scaledPointIn(T_camera_origin);
   const Eigen::Vector3d now = point.scaledPointIn(T_now_origin);
   if (then.z() < kNearestScaled || now.z() < kNearestScaled) return std::nullopt;

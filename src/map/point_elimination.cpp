@@ -10,7 +10,7 @@ namespace {
 
 using PoseJacobian = Eigen::Matrix<double, 3, 6>;
 
-/// A point in one camera, as predictObservation() has it, against its measurement. Everything is divided by the noise.
+/// Measurement minus prediction (as by predictObservation()) of a point in one camera, divided by the noise.
 struct WindowResidual {
   Eigen::Vector3d P;  ///< scaled point in the camera's frame
   Eigen::Vector3d inverse_noise;
@@ -48,7 +48,8 @@ struct WindowJacobians {
     const double b = projection.camera.fy * iz * at.inverse_noise.y();
     const double c = fb * iz * at.inverse_noise.z(), d = c * rho * iz;
     const double x = at.P.x() * iz, y = at.P.y() * iz;
-    // By P, rho held: (a, 0, -a x), (0, b, -b y), (0, 0, -d). A perturbation (t, w) moves P by rho t + w x P.
+    // Rows of the derivative by P at constant rho: (a, 0, -a x), (0, b, -b y), (0, 0, -d). A perturbation (t, w) of the
+    // pose moves P by rho t + w x P.
     const auto byDirection = [&](const auto& v) {
       return Eigen::Vector3d(a * (v.x() - x * v.z()), b * (v.y() - y * v.z()), -d * v.z());
     };
@@ -85,7 +86,7 @@ void PoseEquations::setZero(int poses) {
 
 EliminatedPoint PoseEquations::add(const WindowProjection& projection, const ObservedPoint& point,
                                    const Linearisation& linearisation, PoseFactor* factors, double* squares) {
-  constexpr double kLeastInformation = 1e-9;  // of a direction without any observation; of depths in baselines
+  constexpr double kLeastInformation = 1e-9;  // keeps H invertible if no observation constrains a direction
   const Eigen::Index calibration = hessian_.rows() - kCalibration;
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
   Eigen::Vector3d g = Eigen::Vector3d::Zero();
@@ -102,7 +103,7 @@ EliminatedPoint PoseEquations::add(const WindowProjection& projection, const Obs
     if (!at.isInFront()) continue;
     const double w = linearisation.bend / (linearisation.bend + at.square);
     const WindowJacobians J(projection, point, at, point.T_camera_anchor[seen.frame]);
-    const RigCalibration::RowVector weighted_shape = w * at.inverse_noise.z() * at.shape;  // disparities alone have it
+    const RigCalibration::RowVector weighted_shape = w * at.inverse_noise.z() * at.shape;  // changes disparities alone
     const Eigen::Matrix3d weighted = w * J.by_point;
     H.noalias() += weighted.transpose() * J.by_point;
     g.noalias() += weighted.transpose() * at.value;

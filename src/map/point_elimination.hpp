@@ -12,13 +12,13 @@ namespace sdvo {
 
 constexpr int kCalibration = RigCalibration::kParameters;
 
-/// How all points of a window are seen.
+/// Camera and calibration, which all observations of a window share.
 struct WindowProjection {
   StereoCamera camera;
   RigCalibration calibration;
 };
 
-/// A point of a window with all its observations, one at least.
+/// A point of a window with all its observations; it has at least one.
 struct ObservedPoint {
   Eigen::Vector3d ray_and_inverse_depth;  ///< in its anchor
   const WindowObservation* observations;  ///< in the order of their frames
@@ -27,7 +27,7 @@ struct ObservedPoint {
   const Eigen::Isometry3d* T_camera_anchor;  ///< of each frame; the first one, 0, is held fixed
 };
 
-/// An observation of a point that is not in front of the camera costs as much as a very wrong one.
+/// Squared residual of a point that is not in front of the camera: that of a gross outlier.
 constexpr double kBehindSquare = 1e4;
 
 /// Squares of the observations' normalised residuals; kBehindSquare where the point is not in front of the camera.
@@ -40,19 +40,20 @@ struct PoseFactor {
   int pose;                       ///< among the poses that may move, from zero on
 };
 
-/// A point's own normal equations H x = g, as R = L^-1 of H = L L^T, and the calibration's entries, times R^T.
+/// A point's 3x3 normal equations H x = g, factored as H = L L^T with R = L^-1. `by_calibration` is the block of the
+/// calibration and the point times R^T.
 struct EliminatedPoint {
   Eigen::Matrix3d R;
-  Eigen::Vector3d gradient;
+  Eigen::Vector3d gradient;  ///< R g
   Eigen::Matrix<double, kCalibration, 3> by_calibration;
   RigCalibration::Vector calibration_gradient;  ///< the point's share of the reduced gradient
-  int factors;                                  ///< observations in front of a camera that may move
-  int observations;                             ///< in front of any camera
+  int factors;                                  ///< observations that count, from poses that may move
+  int observations;                             ///< observations that count: the point is in front of the camera
 
-  // Weighted sums over these.
+  // Weighted sums over `observations`.
   double weight;
   double disparity_residual;           ///< normalised
-  Eigen::Vector3d disparity_by_point;  ///< its derivatives
+  Eigen::Vector3d disparity_by_point;  ///< derivatives of the predicted disparities, normalised
 };
 
 /// A residual's square s costs bend * log(1 + s / bend) and weighs 1 / (1 + s / bend) in the normal equations.
@@ -61,19 +62,19 @@ struct Linearisation {
   double damping = 0.0;  ///< fraction of its diagonal that is added to a point's H
 };
 
-/// Moves points (ray and inverse depth) to where they fit best after a step of poses and calibration. The step has six
-/// numbers (m, rad) for each pose that may move; the calibration's is in px. `factors`: one point's after the other's.
+/// Back-substitution: moves points (ray and inverse depth) to their optimum after a step of poses and calibration. The
+/// step has six numbers (m, rad) for each pose that may move, the calibration's is in px. `factors`: sorted by point.
 void movePoints(const std::vector<EliminatedPoint>& points, const std::vector<PoseFactor>& factors,
                 const Eigen::VectorXd& pose_steps, const RigCalibration::Vector& calibration_step,
                 std::vector<Eigen::Vector3d>& ray_and_inverse_depth);
 
-/// Normal equations of a window's poses but the first, and of the rig's calibration.
+/// Reduced normal equations of all poses of a window but the first, and of the rig's calibration.
 class PoseEquations {
  public:
   void setZero(int poses);
 
-  /// Adds a point's observations with the point eliminated (Schur complement). Also gives a factor for each observation
-  /// from a pose that may move, and the squares that squareResiduals() gives.
+  /// Adds a point's observations with the point eliminated (Schur complement). Writes a factor for each observation
+  /// from a pose that may move, and the same squares as squareResiduals().
   EliminatedPoint add(const WindowProjection& projection, const ObservedPoint& point,
                       const Linearisation& linearisation, PoseFactor* factors, double* squares);
 

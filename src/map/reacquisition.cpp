@@ -19,14 +19,15 @@ FeatureMatcherOptions ungated(FeatureMatcherOptions options) {
   return options;
 }
 
-/// Consensus leaves the points within the threshold; their matches lie within twice of that.
+/// After consensus, points are predicted to within the threshold, so matches are sought within twice of that.
 FeatureMatcherOptions gatedBy(FeatureMatcherOptions options, double threshold) {
   options.gating = true;
   options.gate_radius = std::max(2.0 * threshold, 1.0);
   return options;
 }
 
-/// Divides points into so many parts by medians across their longer side. The number of parts with a point found.
+/// Splits points into `parts` of equal size, at the median along the longer axis each time. Returns the number of parts
+/// with a point found.
 int partsWithPoints(ExpectedPoint* first, ExpectedPoint* last, int parts) {
   if (parts == 1) return std::any_of(first, last, [](const ExpectedPoint& point) { return point.found; });
   Eigen::Array2d low = first->pixel, high = first->pixel;
@@ -42,7 +43,8 @@ int partsWithPoints(ExpectedPoint* first, ExpectedPoint* last, int parts) {
   return partsWithPoints(first, middle, parts / 2) + partsWithPoints(middle, last, parts - parts / 2);
 }
 
-/// Whether a pair has a feature around a pixel. A part of the view without any is dark or covered: it tells nothing.
+/// Whether a pair has a feature around a pixel. A part of the view without any is dark or covered, and is no evidence
+/// against the place.
 bool isLit(const StereoFeatures& features, const Eigen::Vector3d& pixel) {
   constexpr double kAround = 0.05;  // of the image's width (chosen)
   const double radius = kAround * features.camera.width;
@@ -51,7 +53,7 @@ bool isLit(const StereoFeatures& features, const Eigen::Vector3d& pixel) {
   return false;
 }
 
-/// Points of a map that a pair may see, and which of them it shows.
+/// Points of a map that project into a pair, and whether they were matched there.
 std::vector<ExpectedPoint> expectedPoints(const DescribedPoints& map, const StereoFeatures& features,
                                           const ViewMatch& view) {
   std::vector<bool> found(map.positions.size(), false);
@@ -66,7 +68,7 @@ std::vector<ExpectedPoint> expectedPoints(const DescribedPoints& map, const Ster
   return points;
 }
 
-/// The points that a view's motion does not use.
+/// The points that are no inliers of a view's motion.
 DescribedPoints withoutMatches(const DescribedPoints& points, const ViewMatch& view) {
   std::vector<bool> used(points.positions.size(), false);
   for (const int i : view.motion.inliers) used[view.matches[i].reference] = true;
@@ -80,7 +82,7 @@ DescribedPoints withoutMatches(const DescribedPoints& points, const ViewMatch& v
   return others;
 }
 
-/// Median distance in the left image, px, between where correspondences were seen and where a motion puts them.
+/// Median reprojection error of a motion in the left image, px.
 double medianMiss(const StereoCamera& camera, const Eigen::Isometry3d& T_current_reference,
                   const std::vector<Correspondence>& correspondences) {
   std::vector<double> misses;
@@ -95,7 +97,7 @@ double medianMiss(const StereoCamera& camera, const Eigen::Isometry3d& T_current
 }  // namespace
 
 double chanceOfAnotherPlace(std::vector<ExpectedPoint> points) {
-  constexpr int kInPart = 3;         // points found: spread evenly, exp(-3), 5 % of the parts have none
+  constexpr int kInPart = 3;         // points found: scattered at random they leave exp(-3), 5 % of the parts empty
   constexpr double kRepeated = 0.5;  // probability (chosen) that a part of another place shows a thing of both
   const auto found =
       std::count_if(points.begin(), points.end(), [](const ExpectedPoint& point) { return point.found; });
@@ -122,12 +124,13 @@ std::optional<Reacquisition::Match> Reacquisition::match(const DescribedPoints& 
 
 std::optional<FoundPlace> Reacquisition::find(const LocalMap& map, const StereoFeatures& features,
                                               const RigCalibration& calibration) const {
-  // Without a gate each point costs as much as all features; half of the points were seen once, and few of these again.
+  // The search without a gate compares each point with all features. It takes only points that were seen twice: half
+  // of all points were seen once, and few of those will be seen again.
   const DescribedPoints points = map.points(1);
   const auto found = match(map.points(2), points, features, calibration);
   if (!found) return std::nullopt;
   FoundPlace place{found->view.motion.T_current_reference, found->chance, std::nullopt};
-  // Doors of a corridor, or shelves: the other points show whether there is one more.
+  // Doors of a corridor, or shelves: if the other points match as well, at another motion, the structure is repeated.
   const DescribedPoints others = withoutMatches(points, found->view);
   const auto second = match(others, others, features, calibration);
   if (second) place.alike = second->view.motion.T_current_reference;
@@ -162,13 +165,13 @@ bool Revisit::recall(const StereoFeatures& features, const RigCalibration& calib
   }
   if (static_cast<int>(links.size()) < map.options().lasting_points) return false;
   refineMotion(features.camera, motion_options_, aligned, motion.T_current_reference);
-  // If no motion fits to that, the rectification differs over the image, and a link would bend the map.
+  // If no motion fits so well, the rectification errs differently over the image, and a link would bend the map.
   constexpr double kSameWorld = 0.3;  // px, median (chosen; up to 0.25 where rectification is exact)
   if (medianMiss(features.camera, motion.T_current_reference, aligned) > kSameWorld) return false;
 
-  // Drift since that key frame is a rigid offset: shift the map first, or the robust kernel rejects the links. Small
-  // offsets, within the covariance of the corners, are left to the adjustment: to shift these, too, doubles the error
-  // on a desk (0.019 to 0.041 %).
+  // Drift since that key frame is a rigid offset: shift the map first, or the robust kernel rejects the links. Offsets
+  // within the covariance of the corners are left to the adjustment. To shift these as well doubles the error on a
+  // rendered desk (0.019 to 0.041 %).
   const Eigen::Isometry3d T_camera_origin = motion.T_current_reference * old->T_camera_origin;
   const Vector6d offset = logSE3(T_camera_origin * map.newestPose().inverse());
   if (mahalanobisSquare(offset, motion.covariance) > noiseGate(6)) map.moveTo(T_camera_origin);

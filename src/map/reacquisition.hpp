@@ -13,32 +13,32 @@
 
 namespace sdvo {
 
-/// A point of a map in the image of a pair that may see it.
+/// A point of a map, projected into a pair in which it should be seen.
 struct ExpectedPoint {
   Eigen::Vector2d pixel;  ///< in the left image, px
-  bool found;             ///< in the pair, at that place
+  bool found;             ///< a feature of the pair was matched with it there
 };
 
-/// Probability that a pair which shows another place finds as many of a map's points as this. Matches of another place
-/// agree on no motion, so chance is no danger. A thing that stands in both places is one (a poster, a chair, a part of
-/// the robot), but it fills a part of the view only. Hence the view is divided into parts with equally many expected
-/// points each. There are so many parts that three of the points found fall into each if they are spread evenly. In
-/// another place a part holds any with a probability of one half at most.
+/// Probability that a pair of another place matches the map at least as widely as this one. Chance matches agree on no
+/// motion, but an object that is in both places (a poster, a chair, a part of the robot) does. It fills only a part of
+/// the view. Hence the view is divided into parts with equally many expected points, one part for three points found.
+/// The test counts the parts with a point found. In another place each part has one with a probability of one half at
+/// most.
 double chanceOfAnotherPlace(std::vector<ExpectedPoint> points);
 
-/// Where a map shows what a pair sees.
+/// Pose of a pair relative to the map in which it was recognised.
 struct FoundPlace {
   Eigen::Isometry3d T_current_newest;      ///< the motion since the map's newest pair
-  double chance;                           ///< that the pair shows another place
-  std::optional<Eigen::Isometry3d> alike;  ///< the same by other points of the map, where these show as much
+  double chance;                           ///< probability that the pair shows another place
+  std::optional<Eigen::Isometry3d> alike;  ///< a second such motion, found with the other points: a repeated structure
 };
 
-/// Finds a pair in the map from before an outage, wherever the camera went meanwhile.
+/// Recognises the map from before an outage in a pair, without any guess of the motion meanwhile.
 class Reacquisition {
  public:
   Reacquisition(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion);
 
-  /// Nothing where the pair does not show the map's place.
+  /// Nothing if the pair does not show the map's place.
   std::optional<FoundPlace> find(const LocalMap& map, const StereoFeatures& features,
                                  const RigCalibration& calibration) const;
 
@@ -53,14 +53,14 @@ class Reacquisition {
   ViewMatcher anywhere_, near_;
 };
 
-/// Links the map's newest pair to a remembered key frame of the same place, so that drift since then is taken back.
+/// Links the map's newest pair to a remembered key frame of the same place, which removes the drift since then.
 class Revisit {
  public:
   Revisit(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion,
           const PatchAlignmentOptions& alignment);
 
-  /// Recalls the key frame whose place the newest pair has come back to. Returns whether there was one that enough
-  /// aligned points confirm. The map is as before otherwise.
+  /// Recalls the key frame to whose place the newest pair has come back, if enough aligned points confirm it. Returns
+  /// whether it did; if not, the map is unchanged.
   bool recall(const StereoFeatures& features, const RigCalibration& calibration, LocalMap& map) const;
 
  private:

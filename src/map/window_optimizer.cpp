@@ -15,25 +15,25 @@ inline namespace window_optimizing {  // with a name: WindowOptimizer::Memory ha
 
 using CalibrationVector = RigCalibration::Vector;
 
-/// Normal equations of poses and calibration after the elimination of the points, and what is needed to get these back.
+/// Normal equations of poses and calibration after the elimination of the points, and the factors for the points'
+/// steps.
 struct ReducedSystem {
-  Eigen::MatrixXd hessian;  ///< poses but the first, then the calibration; its lower triangle
+  Eigen::MatrixXd hessian;  ///< lower triangle: poses but the first, then the calibration
   Eigen::VectorXd gradient;
   std::vector<EliminatedPoint> points;
-  std::vector<PoseFactor> factors;  ///< one point's after the other's
+  std::vector<PoseFactor> factors;  ///< sorted by point
   double cost = 0.0;
 };
 
-/// What is looked for: poses, points (ray and inverse depth of each that is seen, in the order of the observations) and
-/// calibration.
+/// The unknowns: poses, points (ray and inverse depth of each point with an observation, in their order), calibration.
 struct Estimate {
   std::vector<Eigen::Isometry3d> T_camera_origin;
   std::vector<Eigen::Vector3d> points;
   RigCalibration calibration;
 };
 
-/// What all disparities of one point say beyond what its positions do: the square of their mean residual as a variance.
-/// What the point itself followed of it is made up for; none where that is more than half.
+/// Square of the mean residual of a point's disparities, in standard deviations: the error that they share. The point's
+/// estimate follows a part of that error; the result is corrected for this part. None if it is more than half.
 std::optional<double> commonSquare(const EliminatedPoint& point) {
   constexpr int kFewest = 4;
   if (point.observations < kFewest) return std::nullopt;
@@ -43,19 +43,19 @@ std::optional<double> commonSquare(const EliminatedPoint& point) {
   return mean * mean / (1.0 - followed);
 }
 
-/// Median of squares as the variance of a normal distribution; none of too few. Reorders them.
+/// Variance of a normal distribution by the median of its squares; none if they are too few. Reorders them.
 std::optional<double> varianceOf(std::vector<double>& squares) {
   constexpr double kMedianOfChiSquare = 0.4549;  // of one degree of freedom
   if (squares.size() < kFewestMeasured) return std::nullopt;
   return median(squares) / kMedianOfChiSquare;
 }
 
-/// Linear algebra of one window after the other, in the same memory.
+/// Linear algebra of a window. Reuses its memory for the next one.
 class Solver {
  public:
   explicit Solver(const WindowOptimizerOptions& options) : options_(options) {}
 
-  /// Refers to the window from now on, whose values are the first estimate.
+  /// Starts with a window, which must stay valid; its values become the first estimate.
   void take(const Window& window, Estimate& estimate) {
     window_ = &window;
     common_sigma_ = window.calibration_prior.common_sigma.value_or(options_.noise.common_disparity);
@@ -66,7 +66,7 @@ class Solver {
       if (i > 0 && observations[i].point == observations[i - 1].point) continue;
       first_of_point_.push_back(static_cast<int>(i));
       const AnchoredPoint& point = window.points[static_cast<std::size_t>(observations[i].point)];
-      // Points that one pair saw first lie next to each other.
+      // Points with the same anchor follow each other.
       if (anchors_.empty() || point.T_origin_anchor.matrix() != anchors_.back().matrix())
         anchors_.push_back(point.T_origin_anchor);
       anchor_of_point_.push_back(anchors_.size() - 1);
@@ -79,7 +79,7 @@ class Solver {
     size_ = 6 * poses_ + kCalibration;
   }
 
-  /// Moves the window, the one that was taken, to the estimate.
+  /// Writes the estimate into the window that take() was given.
   void give(const Estimate& estimate, Window& window) const {
     window.T_camera_origin = estimate.T_camera_origin;
     window.calibration = estimate.calibration;
@@ -96,7 +96,7 @@ class Solver {
   double bend() const { return options_.kernel_scale * options_.kernel_scale; }
   double weight(double square) const { return bend() / (bend() + square); }
 
-  /// Also gives the square of each observation's residual.
+  /// The cost of an estimate. Also writes the square of each observation's residual.
   double cost(const Estimate& estimate, std::vector<double>& squares) {
     squares.resize(window_->observations.size());
     const WindowProjection projection = {window_->camera, estimate.calibration};
@@ -106,7 +106,7 @@ class Solver {
     return costOf(estimate, squares);
   }
 
-  /// In the memory that the system has of an earlier linearisation.
+  /// Computes the reduced system at an estimate and reuses the system's memory.
   void linearise(const Estimate& estimate, double damping, ReducedSystem& system) {
     eliminatePoints(estimate, {bend(), damping}, system);
     system.hessian = equations_.hessian();
@@ -118,9 +118,9 @@ class Solver {
     system.cost = costOf(estimate, squares_);
   }
 
-  /// Variance, px^2, of the error that all disparities of one point share. `squares`: memory.
+  /// Variance, px^2, of the error that all disparities of one point share. `squares`: scratch memory.
   std::optional<double> commonVariance(const std::vector<EliminatedPoint>& points, std::vector<double>& squares) const {
-    double of_means = 0.0;  // what the mean of a point's disparities has of the noise that is new in each of them
+    double of_means = 0.0;  // variance of a point's mean disparity by the noise that is independent in each
     squares.clear();
     for (std::size_t p = 0; p < points.size(); ++p) {
       const int observations = first_of_point_[p + 1] - first_of_point_[p];
@@ -135,23 +135,23 @@ class Solver {
   }
 
   /// Sandwich covariance of an M-estimator (Huber 1967, White 1980): A^-1 B A^-1. The bread A is the cost's second
-  /// derivatives; the meat B is the sum of the gradients' products over what errs independently. These are the parts of
-  /// the image (clusters of Liang and Zeger 1986): a point's observations share errors of its disparity, neighbours
-  /// those of patches and rectification. Of B only its size beside A is taken from the gradients, since few points
-  /// leave the rest to chance. Both are of the last linearisation and scaled to `squares`, the residuals' at the
-  /// result. `poses`: those that are asked for.
+  /// derivatives. The meat B is the sum of outer products of gradients, one gradient for each cluster of observations
+  /// with correlated errors (Liang and Zeger 1986). A cluster is a part of the image: observations of a point share the
+  /// error of its disparity, neighbours share those of patches and rectification. Few points make B noisy, so only
+  /// the mean ratio of both covariances is taken from it, and scales A^-1. A and B are of the last linearisation and
+  /// scaled to `squares`, the squared residuals at the result. `poses`: those whose covariance is needed.
   bool covariances(const Estimate& estimate, const std::vector<double>& squares, const std::vector<int>& poses,
                    ReducedSystem& system, WindowSolution& solution) {
     const RigCalibration::Matrix certain = certainInformation();
     system.hessian = equations_.hessian();
     system.gradient = equations_.gradient();
-    known_.setZero(size_, size_);  // without the points
+    known_.setZero(size_, size_);  // information of the priors, without the points'
     known_.bottomRightCorner<kCalibration, kCalibration>() = certain;
     if (window_->floor) holdToFloor(estimate, known_, system.gradient);
     const auto [bread, meat] = sandwichScale(squares);
     system.hessian = bread * system.hessian + known_;
     factor_.compute(system.hessian);
-    if (factor_.info() != Eigen::Success) return false;  // as when nothing holds one of the poses
+    if (factor_.info() != Eigen::Success) return false;  // for example, no observation constrains one of the poses
 
     const int asked = 6 * static_cast<int>(poses.size());
     units_.setZero(size_, asked + kCalibration);
@@ -170,13 +170,14 @@ class Solver {
     return solution.pose_covariance.allFinite();
   }
 
-  /// Of the calibration before the window, where it is held for want of evidence, too.
+  /// Information of the calibration's prior. Where the prior is tighter than the evidence, only to keep the calibration
+  /// still, it is that of the evidence.
   RigCalibration::Matrix certainInformation() const {
     const CalibrationBelief& prior = window_->calibration_prior;
     return prior.certain_information.value_or(prior.information);
   }
 
-  /// The estimate that is a step of poses and calibration away, and what the points make of it.
+  /// Applies a step of poses and calibration to an estimate, and the points' steps that follow from it.
   void makeStep(const Estimate& estimate, const ReducedSystem& system, const Eigen::VectorXd& step,
                 Estimate& next) const {
     const CalibrationVector calibration = step.tail<kCalibration>();
@@ -189,14 +190,14 @@ class Solver {
   }
 
  private:
-  /// Bread and meat at the result, in units of those of the last linearisation.
+  /// Factors from matrices of the last linearisation to those at the result.
   struct SandwichScale {
-    double bread;  ///< its normal equations by their weights, times this, are the cost's second derivatives
-    double meat;
+    double bread;  ///< from the normal equations to the second derivatives
+    double meat;   ///< from the products of gradients to those at the result
   };
-  /// The second derivatives have w - w^2 s / bend = w^2 of a residual on average over two directions, where the normal
-  /// equations have its weight w, which leads to the minimum from farther away. Products of gradients have w^2, too. Of
-  /// a point's observations i its elimination leaves w_i - w_i^2 / sum(w). Compared are the sums of that.
+  /// An observation with the weight w adds w times a product of Jacobians to the normal equations. To the second
+  /// derivatives it adds w^2 times that, on average over the two directions of its residual; to the meat also w^2. The
+  /// elimination of the point leaves w_i - w_i^2 / sum(w) of each. The factors are ratios of the sums of these.
   SandwichScale sandwichScale(const std::vector<double>& squares) const {
     double weights = 0.0, before = 0.0, now = 0.0;
     for (std::size_t p = 0; p + 1 < first_of_point_.size(); ++p) {
@@ -210,11 +211,11 @@ class Solver {
     return {now / std::max(weights, 1e-12), now / std::max(before, 1e-12)};
   }
 
-  /// Mean ratio of the covariance by the gradients of single points to that by the second derivatives. What the poses
-  /// took of the gradients is made up for by the degrees of freedom.
+  /// Mean ratio, over the directions, of the covariance from gradients to that from second derivatives: their trace
+  /// ratio. The fit makes gradients smaller than the errors; the degrees of freedom correct for this.
   double meatOverBread(const ReducedSystem& system, const Estimate& estimate,
                        const Eigen::Ref<const Eigen::MatrixXd>& solved, const Eigen::MatrixXd& covariance) {
-    double freedom = 0.0, trace = 0.0;  // of covariance^-1 times the sum of outer products
+    double freedom = 0.0, trace = 0.0;  // trace of covariance^-1 times the sum of outer products
     for (const EliminatedPoint& point : system.points)
       freedom += 2.0 * point.observations - 2.0;  // u, v and one disparity against a position
     const Eigen::MatrixXd whitened = covariance.llt().matrixL().solve(solved.transpose());
@@ -223,16 +224,16 @@ class Solver {
     return trace / static_cast<double>(solved.cols()) * freedom / std::max(freedom - 6.0 * poses_, 1.0);
   }
 
-  /// Factor on the squared sum of so many clusters before areas of different size are compared. All gradients cancel,
-  /// which hides a part of few clusters. The largest of several sums is also large by chance: one standard deviation of
-  /// six squared normal numbers for each cluster is taken off.
+  /// Correction of a sum of squares over n clusters, before clusters of different size are compared. The gradients sum
+  /// up to zero, which makes the sum smaller by (n - 1) / n. The largest of several sums is too large by chance: it is
+  /// divided by the mean of 6 n squared normal numbers plus its standard deviation.
   static double largerArea(double clusters) {
     return clusters / std::max(clusters - 1.0, 1.0) / (1.0 + std::sqrt(2.0 / (6.0 * std::max(clusters, 1.0))));
   }
 
-  /// Squared length of the gradients' sums by cluster: the part of the image in which a point was seen first. Enlarged
-  /// images and grass in waves err alike over a larger area: areas two and four times as wide count where they show
-  /// more than chance does.
+  /// Sum over clusters of the squared length of the cluster's gradient. A cluster is the part of the image in which a
+  /// point was seen first. Enlarged images, or grass in the wind, have errors that correlate over a larger area. Hence
+  /// areas of two and four times the width are tried, and the largest sum counts.
   double meatOf(const ReducedSystem& system, const Estimate& estimate,
                 const Eigen::Matrix<double, 6, Eigen::Dynamic>& by) {
     constexpr int kSide = 64;  // clusters along each axis at most
@@ -256,7 +257,7 @@ class Solver {
       }
       if (side < kSide) sum *= largerArea(occupied);
       most = std::max(most, sum);
-      for (int k = 0; k < side * side / 4; ++k) {  // the four that become the next size's one are not before it
+      for (int k = 0; k < side * side / 4; ++k) {  // in place: a cluster's four parts have indices of at least its own
         const Vector6d* four = &clusters_[4 * k - 2 * (k % (side / 2))];
         clusters_[k] = four[0] + four[1] + four[side] + four[side + 1];
       }
@@ -279,7 +280,7 @@ class Solver {
     }
   }
 
-  /// T_camera_anchor_, anchor by anchor those of all poses.
+  /// Fills T_camera_anchor_: for each anchor the transforms of all poses.
   void placeAnchors(const Estimate& estimate) {
     T_camera_anchor_.clear();
     for (const Eigen::Isometry3d& T_origin_anchor : anchors_)
@@ -316,8 +317,8 @@ class Solver {
     return cost;
   }
 
-  /// Of n disparities of one point the mean has the variance sigma^2 / n + common^2, as if each by itself had n times
-  /// that: more observations do not average away what they share.
+  /// Variance of each of n disparities of a point. Their mean has the variance sigma^2 / n + common^2, because the
+  /// error that they share does not average out. With n times this for each, independent noise gives the same mean.
   double disparityVariance(int observations) const {
     return options_.noise.disparity * options_.noise.disparity + observations * common_sigma_ * common_sigma_;
   }
@@ -373,7 +374,7 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
   double damping = kUndamped, damping_of_system = kUndamped;
   bool accepted = false;
   const int c = 6 * solver.poses();
-  // A refused step is tried again with more damping.
+  // A step that increases the cost is tried again with more damping.
   while (solution.iterations < options_.iterations && damping < kLargestDamping) {
     solver.linearise(estimate, damping, system);
     damping_of_system = damping;
@@ -401,11 +402,11 @@ const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vecto
 
   solver.give(estimate, window);
 
-  // Of the last linearisation, one step before the result: half of the work saved. But points held by damping would
-  // say too much.
+  // The last linearisation, one step before the result, is used: this saves half of the work. But damping counts as
+  // information about the points, so a damped system is computed again.
   if (damping_of_system > kUndamped) solver.linearise(estimate, kUndamped, system);
   solution.common_disparity_square = solver.commonVariance(system.points, common_squares);
-  if (!accepted) solver.cost(estimate, squares);  // those at hand belong to a refused step
+  if (!accepted) solver.cost(estimate, squares);  // `squares` belongs to a refused step
   if (!solver.covariances(estimate, squares, covariance_of, system, solution)) return solution;
   std::swap(solution.squares, squares);
   solution.success = true;

@@ -45,8 +45,8 @@ struct StereoCamera {
   /// that predicts one is treated as if the point were behind the camera.
   double nearestDepth() const { return depth(width); }
 
-  /// Whether `other` can be this rig after autofocus or a new calibration: the image size is the same, and the other
-  /// numbers differ by at most 5 % (autofocus changes a focal length by 1 to 4 %).
+  /// Whether `other` can be this rig after autofocus or a new calibration. The image size must be the same, the other
+  /// numbers within 5 %: autofocus changes a focal length by 1 to 4 %.
   bool isLike(const StereoCamera& other) const;
 
   bool operator==(const StereoCamera& other) const;

@@ -25,7 +25,7 @@ struct PlanarOptions {
   }
 };
 
-/// The floor that a base drives on, in the axes of the base's first pose: at z = height, level.
+/// The floor that a base drives on: the plane z = height in the frame of the base's first pose.
 struct Floor {
   using Jacobian = Eigen::Matrix<double, 3, 6>;
 
@@ -35,32 +35,32 @@ struct Floor {
 
   Floor(const PlanarOptions& options, const Eigen::Isometry3d& T_base_camera, double height);
 
-  /// T_floor_base of a camera's pose in the odometry's origin, which is the first left camera.
+  /// T_floor_base for the pose of a camera. T_camera_origin has the first left camera as its origin.
   Eigen::Isometry3d base(const Eigen::Isometry3d& T_camera_origin) const;
 
   /// Height over the floor and two tilts of the base, in standard deviations, and their derivatives by the left
   /// perturbation of T_camera_origin.
   Eigen::Vector3d residual(const Eigen::Isometry3d& T_camera_origin, Jacobian* jacobian = nullptr) const;
 
-  /// Of a squared residual of one of the three: it bends as Cauchy's kernel does, because a ramp is no floor.
+  /// Cauchy's kernel of one squared residual, and its weight: a robust one, so that a ramp is not forced to be level.
   static double cost(double square);
   static double weight(double square);
 
-  /// Whether a base with this residual drives on the floor: it is level, and not over it.
+  /// Whether a base with this residual is level, and whether it also has the floor's height.
   static bool isLevel(const Eigen::Vector3d& residual) { return residual.tail<2>().squaredNorm() <= noiseGate(2); }
   static bool isOn(const Eigen::Vector3d& residual) {
     return isLevel(residual) && residual[0] * residual[0] <= noiseGate(1);
   }
 
-  /// T_camera_origin nearer to the floor, by as much as the pose's covariance (of a right perturbation of
-  /// T_origin_camera) leaves room for; unchanged where the base is off the floor.
+  /// T_camera_origin moved towards the floor by one Kalman step; unchanged where the base is off the floor. The
+  /// covariance is of a right perturbation of T_origin_camera.
   Eigen::Isometry3d settled(const Eigen::Isometry3d& T_camera_origin, const Matrix6d& covariance) const;
 
   /// Covariance of a pose (of a right perturbation of T_origin_camera) after the constraint to this floor.
   Matrix6d constrained(const Eigen::Isometry3d& T_origin_camera, const Matrix6d& covariance) const;
 
  private:
-  /// Of the residual's three numbers on a right perturbation of T_origin_camera.
+  /// Kalman gain: from the three residuals to the perturbation of the pose that `covariance` is of.
   Eigen::Matrix<double, 6, 3> gain(const Jacobian& jacobian, const Matrix6d& covariance) const;
 };
 
@@ -70,7 +70,8 @@ class FloorBelief {
   double height() const { return height_; }  ///< m, in the axes of the base's first pose
   bool isOnFloor() const { return on_floor_; }
 
-  /// Takes note of a pose. `known` is the floor at height(). Returns in words where the base is if it is off the floor.
+  /// Updates the belief by a pose; `known` is the floor at height(). Returns words if the base is off the floor: by how
+  /// much, and whether its height is the floor from now on. Otherwise an empty string.
   std::string note(const Floor& known, const Eigen::Isometry3d& T_camera_origin);
 
  private:

@@ -43,7 +43,7 @@ struct LocalMapOptions {
   }
 };
 
-/// The points around the camera and the last few pairs that saw them: what the next pair is measured against.
+/// The points around the camera and the key frames that saw them. The next pair's motion is measured against it.
 class LocalMap {
  public:
   explicit LocalMap(const LocalMapOptions& options);
@@ -51,7 +51,7 @@ class LocalMap {
   const LocalMapOptions& options() const { return options_; }
 
   std::int64_t newestStamp() const { return newest_stamp_; }
-  /// From its newest pair to this one, s.
+  /// Time from the map's newest pair to this one, s.
   double secondsUntil(const StereoFeatures& features) const {
     return static_cast<double>(features.stamp - newest_stamp_) * 1e-9;
   }
@@ -69,44 +69,45 @@ class LocalMap {
   /// T_camera_origin of the last key frame before the newest pair. There must be one.
   const Eigen::Isometry3d& poseBeforeNewest() const { return frames_[frames_.size() - 2].T_camera_origin; }
 
-  /// The map as the newest pair would see it: each point still looked for as now estimated, with the descriptor of its
-  /// last sighting.
+  /// The map in the newest pair's image: the points that are still looked for, at their present estimates, with the
+  /// descriptors of their last sightings.
   struct View {
     DescribedPoints points;  ///< in the newest pair's left optical frame
-    /// (u_left, v_left, disparity without the rig's error) in the newest pair, px; beside its image where a point is
-    /// about to enter.
+    /// (u_left, v_left, disparity without the rig's error) in the newest pair, px. A point that the next motion brings
+    /// into view is outside of its image.
     std::vector<cv::Point3f> pixels;
     std::vector<int> ids;   ///< Sighting::point
-    std::vector<int> seen;  ///< in how many confirmed pairs, the map's and forgotten ones
+    std::vector<int> seen;  ///< number of confirmed pairs that saw the point, also of those that left the map
   };
-  /// Points in the image of the newest pair, and those that a turn of `T_next_newest` brings into the next one.
+  /// Points in the image of the newest pair, and those that the motion `T_next_newest` brings into the next one.
   View view(const std::optional<Eigen::Isometry3d>& T_next_newest = std::nullopt) const;
 
-  /// The points still looked for that at least so many pairs saw, wherever they are, in the newest pair's left optical
-  /// frame.
+  /// Points, in view or not, that are still looked for and that at least `sightings` pairs saw. In the newest pair's
+  /// left optical frame.
   DescribedPoints points(int sightings) const;
 
   /// A map point recognised in a pair: its observation there, and by which feature.
   struct Sighting : Observation {
     int point, feature;
-    bool aligned = false;  ///< by its patch: the position is not the corner's but that of the reference's middle
+    bool aligned = false;  ///< the position was found by aligning the reference patch; it is not the corner's
     double scale = 1.0;    ///< how much larger the point appears than in its reference patch
   };
 
-  /// The point by a feature of a pair seen from about `T_camera_origin`. The feature's patch is aligned with the
-  /// point's reference, which is warped by the poses and the point's depth. Without patches, or where they do not
-  /// agree, it is the corner as detected.
+  /// The sighting of a point by the feature that was matched with it; the pair was seen from about `T_camera_origin`.
+  /// The feature's patch is aligned with the point's reference, which is warped by the poses and the point's depth.
+  /// Without patches, or where they do not agree, the position is the detected corner.
   Sighting sight(const PatchAlignmentOptions& options, const StereoFeatures& features,
                  const Eigen::Isometry3d& T_camera_origin, int point, int feature) const;
 
-  /// Adds a pair seen from `T_camera_origin` and what it recognised; every other feature becomes a new point, whose
-  /// later sightings `alignment` is for. The previous pair is forgotten unless it was a key frame.
+  /// Adds a pair seen from `T_camera_origin` and its sightings. Every other feature becomes a new point; its sigma
+  /// depends on whether `alignment` can align later sightings with it. The previous pair is forgotten unless it is a
+  /// key frame.
   void insert(const PatchAlignmentOptions& alignment, const StereoFeatures& features, int id,
               const Eigen::Isometry3d& T_camera_origin, const std::vector<Sighting>& sightings,
               const RigCalibration& calibration);
 
-  /// The remembered key frame whose place the newest pair has come back to; null where there is none, where it never
-  /// left the map, and while another one is recalled.
+  /// The remembered key frame to whose place the newest pair has come back. Null if there is none, if the map still has
+  /// it, or while another one is recalled.
   const OldKeyframe* revisited() const;
 
   /// A point of an old key frame in the newest pair.
@@ -117,41 +118,43 @@ class LocalMap {
     double sigma;              ///< of each of them, px
     double scale;              ///< how much larger the point appears now
   };
-  /// Takes an old key frame into the map again, linked to the newest pair by points that both saw.
+  /// Inserts an old key frame into the map again. The links become its observations of the newest pair's points.
   void recall(const OldKeyframe& old, const std::vector<Link>& links);
 
-  /// Moves the map as a whole, so that its newest pair was seen from there.
+  /// Moves the whole map rigidly, so that its newest pair has the pose T_newest_origin.
   void moveTo(const Eigen::Isometry3d& T_newest_origin);
 
-  /// Bundle adjustment over all frames; observations that do not agree with it are cut off from their points.
+  /// Result of adjust().
   struct Adjustment {
     bool success = false;
-    Matrix6d since_keyframe = Matrix6d::Zero();  ///< covariance of the newest pose since the key frame before it.
-    /// Covariance of the newest pose's error in the map beyond that key frame's; errors of the map cancel.
+    Matrix6d since_keyframe = Matrix6d::Zero();  ///< covariance of the motion from the last key frame.
+    /// By how much the covariance of the newest pose, in the map, exceeds that of this key frame.
     Matrix6d growth = Matrix6d::Zero();
-    RigCalibration::MotionJacobian by_calibration = RigCalibration::MotionJacobian::Zero();  ///< since that key frame
+    RigCalibration::MotionJacobian by_calibration = RigCalibration::MotionJacobian::Zero();  ///< of the same motion
     RigCalibration::Matrix calibration_information = RigCalibration::Matrix::Zero();
     std::optional<double> common_disparity_square;  ///< px^2, see WindowSolution
     std::vector<int> rejected;                      ///< features of the newest pair
-    double newest_square = 0.0;  ///< median of the newest pair's residuals, squared in standard deviations
-    int newest_measured = 0;     ///< number of these
+    double newest_square = 0.0;  ///< median of the newest pair's squared residuals, in standard deviations
+    int newest_measured = 0;     ///< number of these residuals
   };
+  /// Bundle adjustment over all frames. Outliers among the newest pair's observations are removed from their points.
   Adjustment adjust(WindowOptimizer& optimizer, const CalibrationBelief& prior, RigCalibration& calibration,
                     const std::optional<Floor>& floor = std::nullopt);
 
   /// The points at a finite distance, in the map's origin, m.
   std::vector<Eigen::Vector3d> positions() const;
 
-  /// Takes note of the variance of the newest pair's measurements, by the usual one.
+  /// Stores the variance of the newest pair's measurements, in units of this rig's usual variance.
   void noteVariance(double variance) { frames_.back().variance = variance; }
-  /// The same of the motion since the key frame before, which rests on the measurements of both.
+  /// Mean of this over the newest pair and the key frame before it, since their motion depends on both.
   double varianceOfMotion() const;
 
-  /// The newest pair's sightings confirm no points: its motion may be something else's.
+  /// Does not count the newest pair's sightings in `seen`: a doubtful motion may follow a mover, whose points would
+  /// confirm each other.
   void discountNewest();
 
-  /// The newest pair's sightings that were not cut off renew the appearance of their points: the descriptors, and a
-  /// reference patch that has become too small or too large.
+  /// Updates the appearance of the newest pair's points that adjust() left. The descriptor becomes the newest one. The
+  /// reference patch is taken anew where the point's size has changed too much.
   void renewAppearance(const StereoFeatures& features, const std::vector<Sighting>& sightings);
 
  private:
@@ -160,7 +163,7 @@ class LocalMap {
     Eigen::Isometry3d T_camera_origin;
     bool is_keyframe;
     bool is_recalled;       ///< from the memory
-    double variance = 1.0;  ///< of its measurements, by the usual one
+    double variance = 1.0;  ///< see noteVariance()
   };
   struct FrameObservation : Observation {
     int frame_id, feature;
@@ -170,15 +173,15 @@ class LocalMap {
     std::vector<FrameObservation> observations;  ///< in the order of the frames
     std::vector<std::uint8_t> descriptor;
     ReferencePatch reference;
-    int seen = 1;  ///< confirmed pairs, those included that the map has forgotten
+    int seen = 1;  ///< number of confirmed pairs that saw it, also of those that left the map
   };
 
-  /// The map as the optimizer takes it, and what of the map it is made of.
+  /// The optimizer's input, and which frames, points and observations of the map it consists of.
   struct Problem {
     Window window;
     std::vector<int> frame_ids;
-    std::vector<int> points;  ///< for each of the window's
-    std::vector<int> newest;  ///< of the window's observations those in the newest frame
+    std::vector<int> points;  ///< for each point of the window its index in the map
+    std::vector<int> newest;  ///< indices of the window's observations in the newest frame
 
     void clear();
   };
@@ -190,7 +193,7 @@ class LocalMap {
   std::vector<int> sharedPoints() const;
   std::vector<double> parallaxToPredecessors(std::size_t frames) const;
   int lookedForSince() const;
-  /// Whether matches with a point are sought: from its second observation on, or while the only one is recent.
+  /// Whether a point is matched with new pairs: if the map has two observations of it, or a recent one.
   static bool isLookedFor(const Point& point, int since);
   void removeFrame(std::size_t index);
   void cutOff(const std::vector<double>& squares, Adjustment& adjustment);
@@ -200,14 +203,14 @@ class LocalMap {
                   const RigCalibration& calibration, double sigma);
 
   LocalMapOptions options_;
-  std::int64_t newest_stamp_ = 0;  ///< of the newest pair, as are camera and kind
-  StereoCamera camera_;
-  DescriptorKind kind_;
+  std::int64_t newest_stamp_ = 0;  ///< of the newest pair
+  StereoCamera camera_;            ///< of the newest pair
+  DescriptorKind kind_;            ///< of the newest pair's descriptors
   std::deque<Frame> frames_;
   Recycled<Point> points_;
   KeyframeMemory memory_;
-  int last_left_ = -1;  ///< the last key frame that was not among the newest ones any more
-  Problem problem_;     ///< empty once it is solved, so that a copy of the map is none of it
+  int last_left_ = -1;  ///< id of the newest key frame that is older than the `keyframes` newest ones
+  Problem problem_;     ///< cleared when solved: its memory is used again, and copies of the map need not copy it
 };
 
 }  // namespace sdvo

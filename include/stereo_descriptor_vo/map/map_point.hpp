@@ -26,7 +26,7 @@ struct AnchoredPoint {
   }
 };
 
-/// A scaled point whose z is smaller is not in front of the camera: a ratio of its depth in the anchor.
+/// Smallest z of a scaled point in front of the camera: its depth divided by its depth in the anchor.
 constexpr double kNearestScaled = 1e-3;
 
 /// Measurement of a point by a pair. The vertical position comes from the left view alone: the right view of real rigs
@@ -48,12 +48,12 @@ struct ReferencePatch {
   Eigen::Vector2f centre = Eigen::Vector2f::Zero();                   ///< samples from the patch's middle
   Eigen::Isometry3d T_camera_origin = Eigen::Isometry3d::Identity();  ///< of the pair that it was taken from
 
-  /// Becomes a feature's patch, in the memory that it has; the point lies at `position` of its left image, px. Empty
-  /// where the features have no patches.
+  /// Takes over a feature's patch and reuses its own memory. The point lies at `position` in the left image, px. The
+  /// patch is empty if the features have none.
   void take(const StereoFeatures& features, int feature, const Eigen::Vector2d& position,
             const Eigen::Isometry3d& T_then_origin);
 
-  /// Where the reference's point lies in another pair.
+  /// Where the point lies in another pair.
   struct Found {
     Eigen::Vector2d shift;  ///< from the feature's own position, px
     double sigma;           ///< of each coordinate, px

@@ -27,32 +27,30 @@ struct Window {
   std::vector<WindowObservation> observations;  ///< sorted by point
   RigCalibration calibration;
   CalibrationBelief calibration_prior;
-  std::optional<Floor> floor;  ///< on which the base of every pose but the first is held
+  std::optional<Floor> floor;  ///< constrains the base of every pose but the first
 };
 
 struct WindowOptimizerOptions {
-  int iterations = 1;         ///< Levenberg-Marquardt steps at most, for each pair; refused ones do not count
+  int iterations = 1;         ///< most accepted Levenberg-Marquardt steps for each pair
   double kernel_scale = 1.0;  ///< sigma: normalised residual at which the Cauchy kernel bends
   NoiseOptions noise;
 };
 
-/// What is known after the optimisation, besides the window's new values.
+/// Results besides the window's new values.
 struct WindowSolution {
   bool success = false;
   int iterations = 0;                   ///< accepted steps
   Eigen::MatrixXd pose_covariance;      ///< of the left perturbations of the poses asked for, 6 rows each, m and rad
-  Eigen::MatrixXd pose_by_calibration;  ///< the same perturbations by the calibration, 1/px
+  Eigen::MatrixXd pose_by_calibration;  ///< derivatives of these perturbations by the calibration, m/px and rad/px
   RigCalibration::Matrix calibration_information;  ///< of this window alone, the prior excluded, 1/px^2
-  /// Variance, px^2, of the error that all disparities of one point share. It comes from the median of its squares over
-  /// the points, and is below zero by chance. None where too few points are known better from their motion than from
-  /// their disparities.
+  /// Variance, px^2, of the error that all disparities of one point share. It is a median over the points whose
+  /// position comes mostly from motion; none if these are too few. Noise can make it negative.
   std::optional<double> common_disparity_square;
   std::vector<double> squares;  ///< of each observation's normalised residual
 };
 
 /// Bundle adjustment of windows: poses, points and the rig's calibration, by Levenberg-Marquardt with the points
-/// eliminated first (Schur complement). Deterministic: only its memory, some megabytes, goes from one window to the
-/// next.
+/// eliminated first (Schur complement). Deterministic: windows share its memory, some megabytes, and nothing else.
 class WindowOptimizer {
  public:
   explicit WindowOptimizer(const WindowOptimizerOptions& options);
@@ -60,8 +58,8 @@ class WindowOptimizer {
   WindowOptimizer& operator=(WindowOptimizer&&) noexcept;
   ~WindowOptimizer();
 
-  /// The solution is there until the next one. `covariance_of`: poses whose covariance is asked for, not the first one;
-  /// six columns are solved for each.
+  /// The result is valid until the next call. `covariance_of`: poses whose covariance is needed, not the first one.
+  /// Each costs six columns to solve.
   const WindowSolution& optimize(Window& window, const std::vector<int>& covariance_of);
   /// With the covariance of all poses but the first.
   const WindowSolution& optimize(Window& window);
