@@ -8,6 +8,18 @@
 
 namespace sdvo {
 
+Finding checkMount(const std::string& base_frame, const std::string& camera_frame,
+                   const Eigen::Isometry3d& T_base_camera) {
+  const Eigen::Vector3d at = T_base_camera.translation(), ahead = T_base_camera.linear().col(2);
+  // An optical frame looks along +z, on a robot seldom up.
+  return judged(false, T_base_camera.linear().isIdentity(1e-3),
+                text(2, camera_frame, " is at ", at.x(), " ", at.y(), " ", at.z(), " m of ", base_frame,
+                     " and looks along ", ahead.x(), " ", ahead.y(), " ", ahead.z()),
+                "camera frame '" + camera_frame +
+                    "' has the axes of the base (x forward): an optical frame (x right, "
+                    "z forward) was expected; name it as the images' frame_id");
+}
+
 void OpticalAxisCheck::add(const Eigen::Isometry3d& T_base_camera, const Eigen::Isometry3d& T_before_now) {
   constexpr double kUp = 0.7;  // cosine of 45 degrees
   if (T_base_camera.linear()(2, 2) < kUp) return;
@@ -22,15 +34,14 @@ void OpticalAxisCheck::add(const Eigen::Isometry3d& T_base_camera, const Eigen::
 Finding OpticalAxisCheck::judge() const {
   constexpr double kEnough = 0.5;  // m (chosen)
   constexpr double kAlong = 0.8;   // ratio (chosen): a robot under a ceiling camera drives across its axis
-  const std::string step = "axes";
-  if (distance_ < kEnough) return {step, Verdict::kOpen, "no motion of a camera that looks up", ""};
+  if (distance_ < kEnough) return {Verdict::kOpen, "no motion of a camera that looks up"};
   const std::string what = text(1, "TF has the camera look up, and it moves along its axis by ", along_axis_, " of ",
                                 distance_, " m: the robot rises");
   constexpr double kTurned = 15.0 * M_PI / 180.0;  // rad (chosen): more than a hand or a rotor shakes a straight way
   const bool may_rise = is_sideways_ && (about_others_ < kTurned || about_others_ < about_axis_);
-  if (may_rise || std::abs(along_axis_) < kAlong * distance_) return {step, Verdict::kOk, what, ""};
+  if (may_rise || std::abs(along_axis_) < kAlong * distance_) return {Verdict::kOk, what};
   return {
-      step, Verdict::kWarn, what,
+      Verdict::kWarn, what,
       "the images' frame_id names a body's frame (x ahead) instead of an optical one (z ahead), or lacks its rotation"};
 }
 
@@ -59,15 +70,14 @@ void GyroAxesCheck::add(std::int64_t from, std::int64_t to, const Eigen::Matrix3
 Finding GyroAxesCheck::judge(const Gyro& gyro) const {
   constexpr double kEnough = 20.0 * M_PI / 180.0;  // rad
   constexpr double kAgree = 0.7, kMost = 2.0;      // cosine; ratio of the rates
-  const std::string step = "IMU";
-  if (turned_ < kEnough) return {step, Verdict::kOpen, "the camera did not turn enough", "turn it"};
+  if (turned_ < kEnough) return {Verdict::kOpen, "the camera did not turn enough", "turn it"};
   const auto degrees = [](double cosine) { return 180.0 / M_PI * std::acos(cosine); };
   const double ratio = std::sqrt(turns_.of_gyro / turns_.of_images);
   const std::string what = text(1, "gyro and images turn about axes ", degrees(turns_.cosine()),
                                 " degrees apart, by angles of ratio ", ratio);
-  if (ratio > kMost) return {step, Verdict::kWarn, what, "is angular_velocity in rad/s, and of this camera's IMU?"};
+  if (ratio > kMost) return {Verdict::kWarn, what, "is angular_velocity in rad/s, and of this camera's IMU?"};
   // A gyro that turns less than the images is no proof: a mover may fill the view.
-  if (turns_.cosine() >= kAgree || ratio * kMost <= 1.0) return {step, Verdict::kOk, what, ""};
+  if (turns_.cosine() >= kAgree || ratio * kMost <= 1.0) return {Verdict::kOk, what};
   constexpr int kSteps = 15;                    // to either side
   constexpr std::int64_t kStep = 10'000'000;    // ns
   constexpr double kFound = 0.9, kKnown = 0.5;  // cosine; ratio of the pairs' turns that must be there
@@ -81,8 +91,8 @@ Finding GyroAxesCheck::judge(const Gyro& gyro) const {
     best = shifted.cosine();
     shift = k * kStep;
   }
-  if (shift == 0) return {step, Verdict::kWarn, what, "is the IMU mounted as TF has its frame?"};
-  return {step, Verdict::kWarn, what,
+  if (shift == 0) return {Verdict::kWarn, what, "is the IMU mounted as TF has its frame?"};
+  return {Verdict::kWarn, what,
           text(0, "its stamps are ", std::abs(1e-6 * static_cast<double>(shift)), " ms too ",
                shift > 0 ? "late" : "early", ", with which axes agree to ", degrees(best),
                " degrees: let the driver correct them (Kalibr's timeshift_cam_imu)")};

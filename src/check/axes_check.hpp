@@ -5,10 +5,15 @@
 #include <deque>
 #include <functional>
 #include <optional>
+#include <string>
 
 #include "finding.hpp"
 
 namespace sdvo {
+
+/// Whether a camera frame at this place on the robot is an optical one, by its axes alone.
+Finding checkMount(const std::string& base_frame, const std::string& camera_frame,
+                   const Eigen::Isometry3d& T_base_camera);
 
 /// Whether the frame of the left images is an optical one (z ahead). A body's frame (x ahead, z up) in its place makes
 /// a robot that drives rise. A camera that really looks up may rise, too: its image's top is then rarely to a side of

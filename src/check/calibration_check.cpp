@@ -39,7 +39,7 @@ Finding checkCalibration(const StereoCamera& camera, const std::string& lens, co
                                 1e3 * camera.baseline, " mm, ", lens.empty() ? "no lens model" : lens);
   const std::string doubt = doubtOf(camera);
   const std::string remedy = doubt + (doubt.empty() || unrectified.empty() ? "" : "; ") + unrectified;
-  return {"calibration", remedy.empty() ? Verdict::kOk : Verdict::kWarn, what, remedy};
+  return {remedy.empty() ? Verdict::kOk : Verdict::kWarn, what, remedy};
 }
 
 }  // namespace sdvo

@@ -1,31 +1,52 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace sdvo {
 
+/// kOpen: the pairs do not show it.
 enum class Verdict { kOk, kWarn, kFail, kOpen };
 
 inline const char* toString(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::kOk:
-      return "OK";
-    case Verdict::kWarn:
-      return "WARN";
-    case Verdict::kFail:
-      return "FAIL";
-    case Verdict::kOpen:
-      break;
-  }
-  return "-";
+  constexpr const char* kNames[] = {"OK", "WARN", "FAIL", "-"};
+  return kNames[static_cast<int>(verdict)];
 }
 
-/// The result of one step of a camera's check. kOpen: the recording does not show it.
+/// What is found of a camera by some of its pairs. /diagnostics, check_camera, pages and warnings print it.
 struct Finding {
-  std::string step;
-  Verdict verdict;
-  std::string what;    ///< the figures
-  std::string remedy;  ///< what to do; empty when all is well
+  Verdict verdict = Verdict::kOpen;
+  std::string what = "";    ///< the figures
+  std::string remedy = "";  ///< what to do; empty when all is well
+
+  bool isFault() const { return verdict == Verdict::kWarn || verdict == Verdict::kFail; }
+
+  /// Where a FAIL is none of the reporter's.
+  Finding asWarning() const { return {isFault() ? Verdict::kWarn : verdict, what, remedy}; }
+
+  std::string text() const { return remedy.empty() ? what : what + ": " + remedy; }
 };
+
+inline Finding judged(bool fails, bool is_doubtful, const std::string& what, const std::string& remedy = "") {
+  if (!fails && !is_doubtful) return {Verdict::kOk, what};
+  return {fails ? Verdict::kFail : Verdict::kWarn, what, remedy};
+}
+
+/// A step of a camera's check.
+struct CheckStep {
+  std::string name;
+  Finding finding;
+
+  /// Without the remedy.
+  std::string text() const { return std::string(toString(finding.verdict)) + ", " + name + ": " + finding.what; }
+};
+
+/// The first one of the worst verdict.
+inline CheckStep worstOf(const std::vector<CheckStep>& steps) {
+  for (const Verdict verdict : {Verdict::kFail, Verdict::kWarn, Verdict::kOk})
+    for (const CheckStep& step : steps)
+      if (step.finding.verdict == verdict) return step;
+  return {"", {Verdict::kOpen, "nothing was judged"}};
+}
 
 }  // namespace sdvo

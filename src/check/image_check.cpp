@@ -11,6 +11,8 @@
 namespace sdvo {
 namespace {
 
+constexpr const char* kTooBright = "too bright: shorter exposure, less gain";
+
 /// Small bright spots: brighter than all around them, and by kContrast grey levels than the mean there.
 cv::Mat findDots(const cv::Mat& image) {
   constexpr double kContrast = 8.0;  // chosen: five times the noise of a camera, 1.5
@@ -91,20 +93,29 @@ void RepeatCheck::add(const cv::Mat& left, const cv::Mat& right, std::int64_t st
 
 Finding RepeatCheck::judge() const {
   constexpr double kFew = 0.05;  // ratio of the pairs (chosen)
-  const std::string step = "repeats";
   const bool is_right = sides_[1].alone > sides_[0].alone;
   const int alone = sides_[is_right ? 1 : 0].alone;
-  if (alone <= kFew * pairs_) return {step, Verdict::kOk, "each side has new images", ""};
-  return {step, Verdict::kFail,
+  if (alone <= kFew * pairs_) return {Verdict::kOk, "each side has new images"};
+  return {Verdict::kFail,
           text(0, "in ", alone, " of ", pairs_, " pairs the ", is_right ? "right" : "left",
                " image repeats bit by bit, the other one changes"),
           "that camera or its driver is frozen, or runs at a lower rate"};
+}
+
+Finding checkExposure(double dark, double bright, bool takes_turns, double min_intensity, double max_intensity) {
+  const std::string what = text(0, "mean grey level ", dark, " to ", bright);
+  if (takes_turns) return {Verdict::kWarn, what, "exposures take turns from pair to pair, as in HDR: use one exposure"};
+  if (dark < min_intensity)
+    return {bright < min_intensity ? Verdict::kFail : Verdict::kWarn, what,
+            "too dark: light, longer exposure or more gain"};
+  return judged(false, bright > max_intensity, what, kTooBright);
 }
 
 void ImageCheck::add(const cv::Mat& left, const cv::Mat& right, const ExtractionReport& report) {
   constexpr double kWhite = 250.0;  // grey levels
   dark_.push_back(std::min(report.mean_intensity[0], report.mean_intensity[1]));
   bright_.push_back(std::max(report.mean_intensity[0], report.mean_intensity[1]));
+  turns_.add(report.mean_intensity[0]);
   const double white = cv::countNonZero(left > kWhite) + cv::countNonZero(right > kWhite);
   saturated_.push_back(white / static_cast<double>(left.total() + right.total()));
   corners_.push_back(report.detected);
@@ -124,36 +135,29 @@ void ImageCheck::add(const cv::Mat& left, const cv::Mat& right, const Extraction
 
 Finding ImageCheck::exposure(double min_intensity, double max_intensity) const {
   constexpr double kMuchWhite = 0.25;  // share of the pixels; chosen: a quarter of the view is blind then
-  const std::string step = "exposure";
-  const double dark = quantile(dark_, 0.1), bright = quantile(bright_, 0.9), white = quantile(saturated_, 0.9);
-  const std::string what = text(0, "mean grey level ", dark, " to ", bright, ", ", 100.0 * white, " % white");
-  if (bright < min_intensity || dark < min_intensity)
-    return {step, bright < min_intensity ? Verdict::kFail : Verdict::kWarn, what,
-            "too dark: light, longer exposure or more gain"};
-  if (bright > max_intensity || white > kMuchWhite)
-    return {step, Verdict::kWarn, what, "too bright: shorter exposure, less gain"};
-  return {step, Verdict::kOk, what, ""};
+  const double white = quantile(saturated_, 0.9);
+  Finding finding =
+      checkExposure(quantile(dark_, 0.1), quantile(bright_, 0.9), turns_.takeTurns(), min_intensity, max_intensity);
+  if (white > kMuchWhite && !finding.isFault()) finding = {Verdict::kWarn, finding.what, kTooBright};
+  finding.what += text(0, ", ", 100.0 * white, " % white");
+  return finding;
 }
 
 Finding ImageCheck::texture(int min_corners, double min_share) const {
-  const std::string step = "texture";
   const double few = quantile(corners_, 0.1), share = quantile(matched_, 0.5);
-  const std::string what = text(0, quantile(corners_, 0.5), " corners (median), 90 % of the pairs have ", few, " or more; ",
-                                100.0 * share, " % are found in the right image");
+  const std::string what = text(0, quantile(corners_, 0.5), " corners (median), 90 % of the pairs have ", few,
+                                " or more; ", 100.0 * share, " % are found in the right image");
   if (quantile(corners_, 0.5) < min_corners)
-    return {step, Verdict::kFail, what, "focus, light, or a scene with texture; a lower detector/min_contrast"};
-  if (few < min_corners) return {step, Verdict::kWarn, what, "some views have hardly any texture"};
-  if (share < min_share)
-    return {step, Verdict::kWarn, what,
-            "the scene is nearer than stereo/epipolar/max_disparity reaches, or repeats itself"};
-  return {step, Verdict::kOk, what, ""};
+    return {Verdict::kFail, what, "focus, light, or a scene with texture; a lower detector/min_contrast"};
+  if (few < min_corners) return {Verdict::kWarn, what, "some views have hardly any texture"};
+  return judged(false, share < min_share, what,
+                "the scene is nearer than stereo/epipolar/max_disparity reaches, or repeats itself");
 }
 
 Finding ImageCheck::blur() const {
   constexpr double kMoving = 0.01;    // of the width a pair
   constexpr std::size_t kEnough = 8;  // pairs of either kind
   constexpr double kBlurred = 0.6;    // chosen: healthy rigs keep 0.74 and more
-  const std::string step = "motion blur";
   std::vector<double> still, moving;
   const double slow = quantile(moved_, 0.25), fast = std::max(quantile(moved_, 0.75), kMoving);
   for (std::size_t i = 0; i < moved_.size(); ++i) {
@@ -161,25 +165,21 @@ Finding ImageCheck::blur() const {
     if (moved_[i] >= fast) moving.push_back(sharpness_[i]);
   }
   if (still.size() < kEnough || moving.size() < kEnough)
-    return {step, Verdict::kOpen, "the camera did not move enough", "turn with it, and hold it still"};
+    return {Verdict::kOpen, "the camera did not move enough", "turn with it, and hold it still"};
   const double ratio = quantile(moving, 0.5) / std::max(quantile(still, 0.5), 1e-6);
   const std::string what = text(0, "fast views have ", 100.0 * ratio, " % of the sharpness of slow ones");
-  if (ratio < kBlurred) return {step, Verdict::kWarn, what, "shorter exposure (10 ms or less), more light or gain"};
-  return {step, Verdict::kOk, what, ""};
+  return judged(false, ratio < kBlurred, what, "shorter exposure (10 ms or less), more light or gain");
 }
 
 Finding ImageCheck::frameRate(const std::vector<double>& rotations) const {
   // docs/robot.md: less than 20 deg of turn and half a view between pairs. Half of that leaves room.
   constexpr double kTurn = 20.0, kView = 0.5;  // deg, share of the width
-  const std::string step = "frame rate";
-  if (moved_.empty() && lost_views_ == 0) return {step, Verdict::kOpen, "no two pairs", ""};
+  if (moved_.empty() && lost_views_ == 0) return {Verdict::kOpen, "no two pairs"};
   const double turn = quantile(rotations, 0.95), view = quantile(moved_, 0.95);
   const double unrelated = static_cast<double>(lost_views_) / static_cast<double>(moved_.size() + lost_views_);
   const std::string what = text(1, "up to ", turn, " deg and ", 100.0 * view, " % of the view from pair to pair");
-  const std::string remedy = "a higher frame rate, or slower turns";
-  if (turn > kTurn || view > kView || unrelated > 0.5) return {step, Verdict::kFail, what, remedy};
-  if (turn > 0.5 * kTurn || view > 0.5 * kView) return {step, Verdict::kWarn, what, remedy};
-  return {step, Verdict::kOk, what, ""};
+  return judged(turn > kTurn || view > kView || unrelated > 0.5, turn > 0.5 * kTurn || view > 0.5 * kView, what,
+                "a higher frame rate, or slower turns");
 }
 
 /// Part by part, for near and far things move differently. Dots are looked for only where there is motion, and only
@@ -215,17 +215,12 @@ void EmitterCheck::add(const cv::Mat& image) {
 Finding EmitterCheck::judge() const {
   constexpr std::size_t kEnough = 12;  // parts that moved: each of the six twice
   constexpr double kPattern = 0.3;     // ratio; lab/test/check_camera_check: 0.5 with a projector, 0.04 without
-  const std::string step = "emitter";
-  if (stayed_.size() < kEnough)
-    return {step, Verdict::kOpen, "the camera did not move enough", "turn and walk with it"};
+  if (stayed_.size() < kEnough) return {Verdict::kOpen, "the camera did not move enough", "turn and walk with it"};
   const double stayed = quantile(stayed_, 0.5);
   const std::string what = text(0, 100.0 * std::max(stayed, 0.0), " % of the bright dots move with the camera");
-  if (stayed > kPattern)
-    return {
-        step, Verdict::kFail, what,
-        "switch the pattern projector off (RealSense: emitter_enabled 0): its dots say that nothing moves. Mask text "
-        "that is printed into the images"};
-  return {step, Verdict::kOk, what, ""};
+  return judged(stayed > kPattern, false, what,
+                "switch the pattern projector off (RealSense: emitter_enabled 0): its dots say that nothing moves. "
+                "Mask text that is printed into the images");
 }
 
 }  // namespace sdvo

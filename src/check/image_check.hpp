@@ -57,6 +57,30 @@ class RepeatCheck {
   std::string problem_;
 };
 
+/// Whether a camera's exposures take turns from pair to pair.
+class ExposureTurns {
+ public:
+  /// Mean grey level of the next pair.
+  void add(double mean) {
+    const bool is_brighter = mean > kMuch * last_, is_darker = last_ > kMuch * mean;
+    turns_ = (turns_ % 2 == 0 ? is_brighter : is_darker) ? turns_ + 1 : is_brighter;
+    last_ = mean;
+  }
+
+  bool takeTurns() const { return turns_ >= kTurns; }
+
+ private:
+  static constexpr double kMuch = 8.0;  // ratio; up to 1 : 7 descriptors and patches bridge it
+  static constexpr int kTurns = 6;      // in a row: more than a lamp that flickers
+
+  double last_ = 0.0;
+  int turns_ = 0;  ///< brighter and darker ones alternately, in a row
+};
+
+/// By mean grey levels of the darker and the brighter side; outside of `min_intensity` to `max_intensity` they are too
+/// dark and too bright.
+Finding checkExposure(double dark, double bright, bool takes_turns, double min_intensity, double max_intensity);
+
 /// Whether images are good ones to find features in: exposure, texture, motion blur, and how far the view moves from
 /// pair to pair.
 class ImageCheck {
@@ -64,7 +88,7 @@ class ImageCheck {
   /// A pair (CV_8UC1) with what extraction reports of it.
   void add(const cv::Mat& left, const cv::Mat& right, const ExtractionReport& report);
 
-  /// Mean grey levels outside of `min_intensity` to `max_intensity` are too dark and too bright.
+  /// As checkExposure() has it, and by the share of white pixels.
   Finding exposure(double min_intensity, double max_intensity) const;
   /// `min_corners`: fewer are too few. `min_share`: of these, those found in the right image.
   Finding texture(int min_corners, double min_share) const;
@@ -74,6 +98,7 @@ class ImageCheck {
 
  private:
   CoarseView view_;
+  ExposureTurns turns_;
   std::vector<double> dark_, bright_, saturated_;  ///< of each pair: mean grey levels, share of white pixels
   std::vector<double> corners_, matched_;          ///< of each pair: number of corners, share found in the right image
   std::vector<double> sharpness_, moved_;  ///< of each pair after the first: grey levels a px; share of the width

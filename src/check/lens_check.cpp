@@ -166,10 +166,9 @@ Finding LensCheck::judge() const {
   // RMS over right rigs of KITTI, Karlsruhe, EuRoC and three small ones: what rectification leaves bends the images.
   const Eigen::Vector3d rigs(0.015, 0.03, 0.03);
   constexpr double kResolved = 0.06, kResolvedCentre = 0.1, kProved = 3.0;  // chosen; the last one: standard deviations
-  const std::string step = "lens";
   const auto estimate = this->estimate();
   if (!estimate || estimate->resolution[0] > kResolved)
-    return {step, Verdict::kOpen, "too few turns for a focal length from the images", "turn and tilt the camera"};
+    return {Verdict::kOpen, "too few turns for a focal length from the images", "turn and tilt the camera"};
   const Eigen::Vector3d sigma = (estimate->sigma.cwiseAbs2() + rigs.cwiseAbs2()).cwiseSqrt();
   std::string what = text(2, "calibration by the images: focal length ", 1.0 + estimate->value[0], " +- ", sigma[0],
                           " of camera_info's");
@@ -182,9 +181,9 @@ Finding LensCheck::judge() const {
     is_wrong |= std::abs(estimate->value[axis]) > kProved * sigma[axis];
   }
   if (is_wrong)
-    return {step, Verdict::kWarn, what,
+    return {Verdict::kWarn, what,
             "is camera_info of another image size, or are the images a crop or an enlargement? Calibrate as they are"};
-  return {step, Verdict::kOk, what, ""};
+  return {Verdict::kOk, what};
 }
 
 }  // namespace sdvo

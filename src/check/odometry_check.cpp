@@ -21,35 +21,25 @@ void OdometryCheck::add(const StereoFeatures& features, const OdometryResult& re
 
 Finding OdometryCheck::judge() const {
   constexpr double kFew = 0.02, kMany = 0.2;  // chosen: shares of the pairs
-  const std::string step = "odometry";
   const int pairs = lost_ + degraded_ + tracking_;
-  if (pairs < 2) return {step, Verdict::kOpen, "too few pairs", ""};
+  if (pairs < 2) return {Verdict::kOpen, "too few pairs"};
   std::string what = text(0, tracking_, " of ", pairs, " pairs TRACKING, ", degraded_, " DEGRADED, ", lost_, " LOST; ",
                           quantile(inliers_, 0.5), " inliers (median)") +
                      text(1, "; ", distance_, " m");
   const auto often = std::max_element(reasons_.begin(), reasons_.end(),
                                       [](const auto& a, const auto& b) { return a.second < b.second; });
   const double bad = static_cast<double>(lost_ + degraded_) / pairs;
-  if (bad <= kFew && lost_ == 0) return {step, Verdict::kOk, what, ""};
-  return {step, static_cast<double>(lost_) / pairs > kMany ? Verdict::kFail : Verdict::kWarn, what,
-          "most often: " + often->first + " (docs/troubleshooting.md)"};
+  if (bad <= kFew && lost_ == 0) return {Verdict::kOk, what};
+  return judged(static_cast<double>(lost_) / pairs > kMany, true, what,
+                "most often: " + often->first + " (docs/troubleshooting.md)");
 }
 
 Finding OdometryCheck::shutter() const {
-  const std::string step = "shutter";
   const auto readout = readout_.estimate();
-  if (!readout) return {step, Verdict::kOpen, "too few pairs with a motion that changes", "turn"};
-  const std::string what =
-      text(1, "last row ", 1e3 * readout->value, " ms later than the first, +- ", 1e3 * readout->sigma);
-  if (readout->isRolling()) return {step, Verdict::kWarn, what, "a rolling shutter: take cameras with a global one"};
-  return {step, Verdict::kOk, what, ""};
-}
-
-std::string doubtOfShutters(const RowDelay::Estimate& right) {
-  if (!(std::abs(right.proved()) > RowDelay::kWarn)) return "";
-  return text(1, "right images are taken ", 1e3 * std::abs(right.value), " +- ", 1e3 * right.sigma, " ms ",
-              right.value > 0.0 ? "after" : "before",
-              " left ones: trigger both cameras together; calibration/right_delay takes a known delay");
+  if (!readout) return {Verdict::kOpen, "too few pairs with a motion that changes", "turn"};
+  return judged(false, readout->isRolling(),
+                text(1, "last row ", 1e3 * readout->value, " ms later than the first, +- ", 1e3 * readout->sigma),
+                "a rolling shutter: take cameras with a global one");
 }
 
 }  // namespace sdvo

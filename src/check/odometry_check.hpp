@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "../rig/row_delay.hpp"
 #include "finding.hpp"
 #include "row_readout.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
@@ -29,8 +28,5 @@ class OdometryCheck {
   std::vector<double> inliers_, rotations_;
   std::map<std::string, int> reasons_;  ///< of what is not tracked
 };
-
-/// In words, if both images are not of one moment; empty: nothing is proved.
-std::string doubtOfShutters(const RowDelay::Estimate& right);
 
 }  // namespace sdvo

@@ -73,7 +73,6 @@ cv::Mat RowCheck::map() const {
 }
 
 Finding RowCheck::rectification() const {
-  const std::string step = "rectification";
   const cv::Mat rows = map();
   double worst = 0.0, square = 0.0;
   int known = 0, bad = 0;
@@ -86,31 +85,30 @@ Finding RowCheck::rectification() const {
   }
   if (4 * known < static_cast<int>(kCells)) {
     if (corners_ > 1000 && static_cast<int>(samples_.size()) < corners_ / 20)
-      return {step, Verdict::kFail,
-              text(0, "of ", corners_, " corners ", samples_.size(), " are found in the right image"),
+      return {Verdict::kFail, text(0, "of ", corners_, " corners ", samples_.size(), " are found in the right image"),
               "left and right do not show the same scene: look at both"};
-    return {step, Verdict::kOpen, "too few corners are found in both images", "show it a scene with texture"};
+    return {Verdict::kOpen, "too few corners are found in both images", "show it a scene with texture"};
   }
   const double rms = std::sqrt(square / known);
   const std::string what = text(2, "rows differ by ", rms, " px (RMS over the image), ", worst, " at worst, in ", known,
                                 " of ", kCells, " parts");
-  const std::string remedy = "raw images under the name of rectified ones? Else calibrate the pair again";
-  if (10 * bad > known) return {step, Verdict::kFail, what, remedy};
   constexpr double kMuch = 0.45;  // of what features may have (chosen): KITTI 01, a reference, has 0.37
-  if (rms > kMuch * max_dv_) return {step, Verdict::kWarn, what, remedy};
-  return {step, Verdict::kOk, what, ""};
+  return judged(10 * bad > known, rms > kMuch * max_dv_, what,
+                "raw images under the name of rectified ones? Else calibrate the pair again");
 }
 
 Finding RowCheck::sameMoment() const {
-  const std::string step = "same moment";
   const auto found = delay_.estimate();
-  if (!found) return {step, Verdict::kOpen, "rows hardly moved", "tilt the camera up and down"};
-  const std::string what = text(1, "right image ", 1e3 * found->value, " ms later than left, +- ", 1e3 * found->sigma);
-  const double late = std::abs(found->proved());
-  const std::string remedy = "trigger both cameras together, and stamp each image with its own time";
-  if (late > RowDelay::kFail) return {step, Verdict::kFail, what, remedy};
-  if (late > RowDelay::kWarn) return {step, Verdict::kWarn, what, remedy};
-  return {step, Verdict::kOk, what, ""};
+  return found ? checkMoment(*found) : Finding{Verdict::kOpen, "rows hardly moved", "tilt the camera up and down"};
+}
+
+Finding checkMoment(const RowDelay::Estimate& right) {
+  const double late = std::abs(right.proved());
+  return judged(late > RowDelay::kFail, late > RowDelay::kWarn,
+                text(1, "right images are taken ", 1e3 * std::abs(right.value), " +- ", 1e3 * right.sigma, " ms ",
+                     right.value > 0.0 ? "after" : "before", " left ones"),
+                "trigger both cameras together, and stamp each image with its own time; calibration/right_delay takes "
+                "a known delay");
 }
 
 }  // namespace sdvo

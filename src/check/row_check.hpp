@@ -44,4 +44,7 @@ class RowCheck {
   RowDelay delay_{1.0, 10.0};  ///< 10 ms are a tenth of a pixel then
 };
 
+/// Whether right images are of the same moment as left ones.
+Finding checkMoment(const RowDelay::Estimate& right);
+
 }  // namespace sdvo

@@ -29,14 +29,13 @@ class StampCheck {
   double rate() const;  ///< of the pairs by their stamps, Hz; zero when it is not known
 
  private:
-  struct Arrival {
-    std::int64_t stamp;
-    double arrival;
-  };
-
   std::array<std::string, kInputs> topics_;
-  std::array<std::vector<Arrival>, kInputs> arrivals_;
+  std::array<int, kInputs> counts_{};
+  std::vector<double> delays_;  ///< of left images, s
   std::vector<std::int64_t> pairs_;
 };
+
+/// Of poses that come so late, s; negative: before their time. `most`: of a machine that is fast enough.
+Finding checkLatency(double latency, double most);
 
 }  // namespace sdvo

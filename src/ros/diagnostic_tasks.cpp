@@ -22,12 +22,24 @@ struct Words {
 constexpr std::array<Words, UnusedInput::kCauses> kWords = {
     {{"unpaired", "", false},
      {"pushed out by newer ones", "", false},
-     {"late or with wrong stamps", ": check the driver's stamps", true},
-     {"refused", ": the log says why", true},
-     {"without a guess of the motion", ": guess_timeout, or the source of the guess", false},
-     {"messages of the IMU refused", ": the log says why", true}}};
+     {"late or with wrong stamps", "check the driver's stamps", true},
+     {"refused", "the log says why", true},
+     {"without a guess of the motion", "guess_timeout, or the source of the guess", false},
+     {"messages of the IMU refused", "the log says why", true}}};
 
 }  // namespace
+
+void WallUpdater::print(const Findings& findings, Status& status) {
+  for (const Finding& finding : findings) {
+    const auto level = finding.verdict == Verdict::kFail   ? Level::ERROR
+                       : finding.verdict == Verdict::kWarn ? Level::WARN
+                                                           : Level::OK;
+    if (&finding == &findings.front())
+      status.summary(level, finding.text());
+    else
+      status.mergeSummary(level, finding.text());
+  }
+}
 
 InputMonitor::InputMonitor(std::string what, std::string topics, double max_silence, const RateOptions& rates)
     : what_(std::move(what)), max_silence_(max_silence), rates_(rates), topics_(std::move(topics)) {}
@@ -54,18 +66,16 @@ void InputMonitor::noteIdle(const std::string& why) {
   arrivals_.clear();
 }
 
-std::optional<InputMonitor::Silence> InputMonitor::silence() const {
+std::optional<Finding> InputMonitor::silence() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (!idle_.empty()) return Silence{WallUpdater::Level::OK, idle_};
+  if (!idle_.empty()) return Finding{Verdict::kOk, idle_};
   const double silence = secondsSince(arrivals_.empty() ? begin_ : arrivals_.back().time);
-  const std::string age = text(0, silence, " s");
-  if (arrivals_.empty() && silence <= max_silence_)
-    return Silence{WallUpdater::Level::WARN, "no " + what_ + " yet on " + topics_};
   if (arrivals_.empty())
-    return Silence{WallUpdater::Level::ERROR, "no " + what_ + " yet on " + topics_ + ", for " + age};
-  if (silence > max_silence_)
-    return Silence{WallUpdater::Level::ERROR, "no " + what_ + " for " + age + " on " + topics_};
-  return std::nullopt;
+    return judged(
+        silence > max_silence_, true,
+        "no " + what_ + " yet on " + topics_ + (silence > max_silence_ ? text(0, ", for ", silence, " s") : ""));
+  if (silence <= max_silence_) return std::nullopt;
+  return Finding{Verdict::kFail, text(0, "no ", what_, " for ", silence, " s on ", topics_)};
 }
 
 /// Hz; none of too few.
@@ -77,52 +87,73 @@ std::optional<double> InputMonitor::rate() const {
   return static_cast<double>(arrivals_.size() - 1) / time;
 }
 
-void InputMonitor::diagnose(WallUpdater::Status& status) {
+Findings InputMonitor::judge(WallUpdater::Status& values) {
   const std::optional<double> measured = rate();
-  status.addf("rate [Hz]", "%.2f", measured.value_or(0.0));
-  status.addf("expected [Hz]", "%g to %g", rates_.min_rate, rates_.max_rate);
+  values.addf("rate [Hz]", "%.2f", measured.value_or(0.0));
+  values.addf("expected [Hz]", "%g to %g", rates_.min_rate, rates_.max_rate);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    status.add("topics", topics_);
+    values.add("topics", topics_);
   }
-  if (const auto silent = silence())
-    status.summary(silent->level, silent->text);
-  else if (!measured)
-    status.summary(WallUpdater::Level::OK, "just started, no rate is measured yet");
-  else if (*measured < rates_.min_rate)
-    status.summaryf(
-        WallUpdater::Level::WARN,
-        "only %.2f %s a second, at least %g are expected (diagnostics/min_rate): driver or network too slow?",
-        *measured, what_.c_str(), rates_.min_rate);
-  else if (*measured > rates_.max_rate)
-    status.summaryf(WallUpdater::Level::WARN, "%.2f %s a second, at most %g are expected (diagnostics/max_rate)",
-                    *measured, what_.c_str(), rates_.max_rate);
-  else
-    status.summaryf(WallUpdater::Level::OK, "%.2f %s a second", *measured, what_.c_str());
+  if (const auto silent = silence()) return {*silent};
+  if (!measured) return {{Verdict::kOk, "just started, no rate is measured yet"}};
+  const std::string what = text(2, *measured, " ", what_, " a second");
+  if (*measured < rates_.min_rate)
+    return {{Verdict::kWarn,
+             text(1, "only ", what, ", at least ", rates_.min_rate, " are expected (diagnostics/min_rate)"),
+             "driver or network too slow?"}};
+  if (*measured > rates_.max_rate)
+    return {{Verdict::kWarn, text(1, what, ", at most ", rates_.max_rate, " are expected (diagnostics/max_rate)")}};
+  return {{Verdict::kOk, what}};
 }
 
-void UnusedInput::diagnose(WallUpdater::Status& status) {
+Findings UnusedInput::judge(Finding first, WallUpdater::Status& values) {
   constexpr std::size_t kCalls = 6;  // five seconds
   constexpr std::uint64_t kFew = 3;  // unused ones (chosen): fewer are an accident
+  Findings findings = {std::move(first)};
   Counts now;
   std::copy(counts_.begin(), counts_.end(), now.begin());
   now.back() = used_;
   history_.push_back(now);
   if (history_.size() > kCalls) history_.pop_front();
-  const Counts& first = history_.front();
+  const Counts& before = history_.front();
   const Counts& last = history_[history_.size() < 2 ? 0 : history_.size() - 2];
   for (std::size_t cause = 0; cause < kCauses; ++cause) {
     const Words& words = kWords[cause];
-    if (cause <= kRefused || now[cause] > 0) status.add(words.name, now[cause]);
-    const Counts& then = words.is_rare ? last : first;
+    if (cause <= kRefused || now[cause] > 0) values.add(words.name, now[cause]);
+    const Counts& then = words.is_rare ? last : before;
     const std::uint64_t unused = now[cause] > then[cause] ? now[cause] - then[cause] : 0;
     const std::uint64_t all = now.back() - then.back() + (cause == kNoGuess ? 0 : unused);
     const bool is_much = unused >= kFew && static_cast<double>(unused) > max_share_ * static_cast<double>(all);
     if (unused == 0 || !(words.is_rare || is_much) || explained_.count(static_cast<int>(cause)) > 0) continue;
-    status.mergeSummary(WallUpdater::Level::WARN, std::to_string(unused) +
-                                                      (words.is_rare ? " " : " of " + std::to_string(all) + " ") +
-                                                      (cause == kImu ? "" : what_ + " ") + words.name + words.remedy);
+    findings.push_back(
+        {Verdict::kWarn,
+         text(0, unused, words.is_rare ? " " : text(0, " of ", all, " "), cause == kImu ? "" : what_ + " ", words.name),
+         words.remedy});
   }
+  return findings;
+}
+
+Findings WorkLoad::judge(WallUpdater::Status& values) {
+  constexpr double kOften = 0.5;  // of wall time, below it the worker mostly rests
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto now = std::chrono::steady_clock::now();
+  const double period = std::chrono::duration<double>(now - std::exchange(last_, now)).count();
+  const double time = std::exchange(time_, 0.0), busy = std::exchange(busy_, 0.0), wait = std::exchange(wait_, 0.0);
+  const double load = period > 0.0 ? time / period : 0.0;
+  const int items = std::exchange(items_, 0);
+  const std::uint64_t dropped = dropped_ - std::exchange(reported_, dropped_);
+  longest_wait_ = 0.0;
+  values.addf("CPU time [ms a pair]", "%.2f", items > 0 ? 1e3 * time / items : 0.0);
+  values.addf("CPU time [share of one processor]", "%.2f", load);
+  values.add("dropped since the start", dropped_);
+  const std::string loss = text(0, dropped, " pairs dropped in ", period, " s");
+  if (dropped > 0 && wait > time) return {{Verdict::kWarn, loss + ", while it waited for " + awaited_}};
+  if (dropped > 0 && busy < kOften * period)
+    return {{Verdict::kWarn, text(0, loss, " though it worked for ", 100.0 * busy / period,
+                                  " % of the time: they come in bursts, set queue_size to a burst's pairs")}};
+  if (dropped > 0) return {{Verdict::kWarn, "too slow: " + loss + "; set fewer detector/max_features or a max_rate"}};
+  return {judged(false, load > max_load_, text(0, 100.0 * load, " % of one processor's time"))};
 }
 
 }  // namespace sdvo

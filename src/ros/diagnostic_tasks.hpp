@@ -15,10 +15,14 @@
 #include <set>
 #include <string>
 #include <utility>
+#include <vector>
 
+#include "../check/finding.hpp"
 #include "../config/interface_options.hpp"
 
 namespace sdvo {
+
+using Findings = std::vector<Finding>;
 
 /// /diagnostics once a second of wall time: simulated time stands still when a bag has ended, which is what diagnostics
 /// are there to tell. To be declared after what its tasks refer to.
@@ -34,10 +38,14 @@ class WallUpdater {
         nh.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { updater_.force_update(); });
   }
 
+  /// `judge` adds its values to the status that it is given, and returns what it finds.
   template <class Owner>
-  void add(const std::string& task, Owner* owner, void (Owner::*diagnose)(Status&)) {
-    updater_.add(task, owner, diagnose);
+  void add(const std::string& task, Owner* owner, Findings (Owner::*judge)(Status& values)) {
+    updater_.add(task, [owner, judge](Status& status) { print((owner->*judge)(status), status); });
   }
+
+  /// The first finding, and faults that others find.
+  static void print(const Findings& findings, Status& status);
 
  private:
   diagnostic_updater::Updater updater_;
@@ -58,15 +66,11 @@ class InputMonitor {
   /// While nobody wants input, silence is no fault; `why`, such as "paused", is empty otherwise. Begins anew.
   void noteIdle(const std::string& why);
 
-  struct Silence {
-    std::uint8_t level;
-    std::string text;
-  };
   /// Nothing while input comes.
-  std::optional<Silence> silence() const;
+  std::optional<Finding> silence() const;
 
   /// The task "input rate".
-  void diagnose(WallUpdater::Status& status);
+  Findings judge(WallUpdater::Status& values);
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -108,9 +112,9 @@ class UnusedInput {
   /// Of all causes but missing guesses and the IMU's, without which the rest is used.
   std::uint64_t sum() const { return count(kUnpaired) + count(kPushedOut) + count(kLate) + count(kRefused); }
 
-  /// Adds the counts to a task of /diagnostics, and a warning of causes that took more than their share in the last
-  /// seconds. Once a second, by one thread.
-  void diagnose(WallUpdater::Status& status);
+  /// Adds the counts to the values of a task of /diagnostics. `first`, and causes that took more than their share in
+  /// the last seconds. Once a second, by one thread.
+  Findings judge(Finding first, WallUpdater::Status& values);
 
  private:
   using Counts = std::array<std::uint64_t, kCauses + 1>;  ///< the last one: used
@@ -121,26 +125,6 @@ class UnusedInput {
   std::atomic<std::uint64_t> used_{0};
   std::array<std::atomic<std::uint64_t>, kCauses> counts_{};
   std::deque<Counts> history_;  ///< of the last calls
-};
-
-/// Whether a camera's exposures take turns from pair to pair.
-class ExposureTurns {
- public:
-  /// Mean grey level of the next pair.
-  void add(double mean) {
-    const bool is_brighter = mean > kMuch * last_, is_darker = last_ > kMuch * mean;
-    turns_ = (turns_ % 2 == 0 ? is_brighter : is_darker) ? turns_ + 1 : is_brighter;
-    last_ = mean;
-  }
-
-  bool takeTurns() const { return turns_ >= kTurns; }
-
- private:
-  static constexpr double kMuch = 8.0;  // ratio; up to 1 : 7 descriptors and patches bridge it
-  static constexpr int kTurns = 6;      // in a row: more than a lamp that flickers
-
-  double last_ = 0.0;
-  int turns_ = 0;  ///< brighter and darker ones alternately, in a row
 };
 
 /// How much of a processor one worker's thread takes, and what it had to leave out, for /diagnostics. What OpenCV does
@@ -182,36 +166,7 @@ class WorkLoad {
   }
 
   /// The task "load", of the time since it was asked last.
-  void diagnose(WallUpdater::Status& status) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    const auto now = std::chrono::steady_clock::now();
-    const double period = std::chrono::duration<double>(now - last_).count();
-    const double load = period > 0.0 ? time_ / period : 0.0;
-    const std::uint64_t dropped = dropped_ - reported_;
-    status.addf("CPU time [ms a pair]", "%.2f", items_ > 0 ? 1e3 * time_ / items_ : 0.0);
-    status.addf("CPU time [share of one processor]", "%.2f", load);
-    status.add("dropped since the start", dropped_);
-    if (dropped > 0 && wait_ > time_)
-      status.summaryf(WallUpdater::Level::WARN, "%d pairs dropped in %.0f s, while it waited for %s",
-                      static_cast<int>(dropped), period, awaited_.c_str());
-    else if (dropped > 0 && busy_ < kOften * period)
-      status.summaryf(WallUpdater::Level::WARN,
-                      "%d pairs dropped in %.0f s though it worked for %.0f %% of the time: they come in bursts, set "
-                      "queue_size to a burst's pairs",
-                      static_cast<int>(dropped), period, 100.0 * busy_ / period);
-    else if (dropped > 0)
-      status.summaryf(WallUpdater::Level::WARN,
-                      "too slow: %d pairs dropped in %.0f s; set fewer detector/max_features or a max_rate",
-                      static_cast<int>(dropped), period);
-    else if (load > max_load_)
-      status.summaryf(WallUpdater::Level::WARN, "%.0f %% of one processor's time", 100.0 * load);
-    else
-      status.summaryf(WallUpdater::Level::OK, "%.0f %% of one processor's time", 100.0 * load);
-    last_ = now;
-    reported_ = dropped_;
-    time_ = busy_ = wait_ = longest_wait_ = 0.0;
-    items_ = 0;
-  }
+  Findings judge(WallUpdater::Status& values);
 
  private:
   /// CPU time of this thread, s.
@@ -232,7 +187,6 @@ class WorkLoad {
   std::mutex mutex_;
   std::chrono::steady_clock::time_point last_ = std::chrono::steady_clock::now();
   std::uint64_t dropped_ = 0, reported_ = 0;
-  static constexpr double kOften = 0.5;  ///< of wall time, below it the worker mostly rests
   double time_ = 0.0, busy_ = 0.0, wait_ = 0.0, longest_wait_ = 0.0;  ///< s: CPU, wall
   std::string awaited_;                                               ///< the longest
   int items_ = 0;

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 
+#include "../check/image_check.hpp"
 #include "../config/interface_options.hpp"
 #include "arrival_log.hpp"
 #include "diagnostic_tasks.hpp"
@@ -33,10 +34,9 @@ class ImageDiagnostics {
  private:
   using Status = WallUpdater::Status;
 
-  void diagnoseSynchronisation(Status& status);
-  void diagnoseExposure(Status& status);
-  void diagnoseFeatures(Status& status);
-  bool isIdle(Status& status) const;
+  Findings judgeSynchronisation(Status& values);
+  Findings judgeExposure(Status& values);
+  Findings judgeFeatures(Status& values);
 
   const ImageThresholds thresholds_;
   ArrivalLog& arrivals_;
@@ -55,10 +55,6 @@ class ImageDiagnostics {
   WallUpdater updater_;
 };
 
-/// What is wrong with poses that come so late (s; negative: before their time), as the end of a sentence; empty:
-/// nothing.
-std::string doubtOfLatency(double latency, double max_latency);
-
 /// /diagnostics of the odometry: its state as vo_info tells it, the rate of its input, its load and how late it is.
 class OdometryDiagnostics {
  public:
@@ -73,11 +69,10 @@ class OdometryDiagnostics {
  private:
   using Status = WallUpdater::Status;
 
-  void diagnose(Status& status);
-  void diagnoseInput(Status& status);
-  void diagnoseLatency(Status& status);
-  void summarise(Status& status) const;
-  void addCalibration(Status& status) const;
+  Findings judge(Status& values);
+  Findings judgeInput(Status& values);
+  Findings judgeLatency(Status& values);
+  void addValues(Status& values) const;
 
   const double max_latency_;
   UnusedInput& unused_;
@@ -106,8 +101,7 @@ class PlaceDiagnostics {
  private:
   using Status = WallUpdater::Status;
 
-  void diagnose(Status& status);
-  void summarise(Status& status) const;
+  Findings judge(Status& values);
 
   UnusedInput& unused_;
   InputMonitor input_;

@@ -224,7 +224,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     noteCamera(decoded.camera, pair.left_info->distortion_model, unrectified);
     if (emitter_.judge().verdict == Verdict::kOpen) {  // until the camera has moved enough
       emitter_.add(decoded.left);
-      warnOf(emitter_.judge());
+      warnOf("emitter", emitter_.judge());
     }
     if (features.report.refused && !unrectified.empty()) features.report.status = unrectified;
     repeats_.add(decoded.left, decoded.right, nanoseconds(stamp));
@@ -252,16 +252,15 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   void noteCamera(const StereoCamera& camera, const std::string& lens, const std::string& unrectified) {
     const PairDecoder::Change change = decoder_.accept(camera);
     if (change == PairDecoder::Change::kNone) return;
-    warnOf(checkCalibration(camera, lens, unrectified));
+    warnOf("calibration", checkCalibration(camera, lens, unrectified));
     if (change == PairDecoder::Change::kFirst) return;
     ++stream_epoch_;
     if (throttle_.allows("camera_info"))
       NODELET_WARN_STREAM("camera_info changed: a new stream begins (epoch + 1; " << stream_epoch_ << " so far)");
   }
 
-  void warnOf(const Finding& finding) {
-    if (finding.verdict == Verdict::kWarn || finding.verdict == Verdict::kFail)
-      NODELET_WARN_STREAM(finding.step << ": " << finding.what << ": " << finding.remedy);
+  void warnOf(const char* step, const Finding& finding) {
+    if (finding.isFault()) NODELET_WARN_STREAM(step << ": " << finding.text());
   }
 
   /// What the rig monitor says, when it says something else than before. A pair without features (dark) says nothing.

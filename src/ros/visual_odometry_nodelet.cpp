@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "../check/axes_check.hpp"
+#include "../check/stamp_check.hpp"
 #include "../common/imu_tracks.hpp"
 #include "../common/stamp_filter.hpp"
 #include "../common/text.hpp"
@@ -246,7 +247,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     Guess guess;
     {
       const std::lock_guard<std::mutex> lock(work_mutex_);
-      const bool is_trusted = !options_.output.guess_frame_id.empty() || gyro_found_.verdict != Verdict::kWarn;
+      const bool is_trusted = !options_.output.guess_frame_id.empty() || !gyro_found_.isFault();
       if (is_trusted) guess.since = processed_stamp_;
     }
     if (guess.since && mount_->last()) guess.motion = findGuess(*guess.since, header, isVoid);
@@ -316,12 +317,12 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   /// With what the images show.
   void compareAxes(const OdometryResult& result, const std::optional<MotionGuess>& guess,
                    const std_msgs::Header& header) {
-    const auto warnOnce = [this](Finding& told, const Finding& found, const char* consequence) {
-      if (std::exchange(told, found).verdict != Verdict::kWarn && found.verdict == Verdict::kWarn)
-        NODELET_WARN_STREAM(found.step << ": " << found.what << ": " << found.remedy << consequence);
+    const auto warnOnce = [this](const char* step, Finding& told, const Finding& found, const char* consequence) {
+      if (!std::exchange(told, found).isFault() && found.isFault())
+        NODELET_WARN_STREAM(step << ": " << found.text() << consequence);
     };
     optical_axis_.add(*mount_->last(), result.T_previous_current);
-    warnOnce(optical_found_, optical_axis_.judge(), "");
+    warnOnce("axes", optical_found_, optical_axis_.judge(), "");
     constexpr double kSame = 1e-3;  // s: after an outage the motion is of another time than the guess
     if (!guess || !guess->rotation_only ||
         std::abs(secondsBetween(*processed_stamp_, header.stamp) - result.dt) > kSame)
@@ -334,7 +335,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
                             ros::Time().fromNSec(static_cast<std::uint64_t>(from)),
                             ros::Time().fromNSec(static_cast<std::uint64_t>(to)), ignored);
     };
-    warnOnce(gyro_found_, gyro_axes_.judge(gyro), " No guess is taken from it until a reset");
+    warnOnce("IMU", gyro_found_, gyro_axes_.judge(gyro), " No guess is taken from it until a reset");
   }
 
   OdometryResult waitFor(const std::string& what) const {
@@ -352,7 +353,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     info = publisher_->publishInfo(std::move(info), message.header.stamp);
     diagnostics_->note(info);
     if (std::abs(info.latency) > kOtherClock && !std::exchange(clock_is_told_, true))
-      NODELET_WARN_STREAM(info.latency << " s from image to pose" << doubtOfLatency(info.latency, kOtherClock));
+      NODELET_WARN_STREAM(checkLatency(info.latency, kOtherClock).text());
   }
 
   void report(const OdometryResult& result, const ros::Time& stamp) {
@@ -476,10 +477,8 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     }
     std::string problem;
     if (const std::optional<Eigen::Isometry3d> found = mount_->find(base_frame, camera_frame, problem)) {
-      if (found->linear().isIdentity(1e-3))  // an optical frame looks along +z, on a robot seldom up
-        NODELET_WARN_STREAM("camera frame '" << camera_frame
-                                             << "' has the axes of the base (x forward): an optical frame "
-                                             << "(x right, z forward) was expected; name it as the images' frame_id");
+      if (const Finding mount = checkMount(base_frame, camera_frame, *found); mount.isFault())
+        NODELET_WARN_STREAM(mount.remedy);
       if (!camera_frame_.empty() && camera_frame_ != camera_frame)
         NODELET_WARN_STREAM("the images' frame was '" << camera_frame_ << "' and is '" << camera_frame
                                                       << "' now: another camera goes on from the base's last pose "

@@ -1,5 +1,6 @@
 #include "camera_check.hpp"
 
+#include <algorithm>
 #include <opencv2/core.hpp>
 
 #include "../check/calibration_check.hpp"
@@ -36,63 +37,52 @@ void CameraCheck::addUnusable(const std::string& problem) {
   problem_ = problem;
 }
 
-std::vector<Finding> CameraCheck::findings(const ArrivalFindings& arrivals) const {
-  std::vector<Finding> findings;
-  std::string fault;
-  const auto append = [&](Finding finding) {
-    if (!fault.empty())
-      finding = {finding.step, Verdict::kOpen, "not judged: mend '" + fault + "' first", ""};
-    else if (finding.verdict == Verdict::kFail)
-      fault = finding.step;
-    findings.push_back(finding);
-  };
-  append(arrivals.topics);
-  append(arrivals.stamps);
-  append(calibration());
-  append(images_.exposure(thresholds_.min_intensity, thresholds_.max_intensity));
-  append(repeats_.judge());
-  append(rows_.sameMoment());
-  append(odometry_.shutter());
-  append(rows_.rectification());
-  append(rig());
-  append(lens_check_.judge());
-  append(images_.texture(thresholds_.min_corners, options_.stereo_features.rig_monitor.suspicious_share));
-  append(images_.blur());
-  append(emitter_.judge());
-  append(images_.frameRate(odometry_.rotations()));
-  append(odometry_.judge());
-  append(load(arrivals.rate));
-  findings.push_back(arrivals.transform);  // which no other step needs
-  return findings;
+std::vector<CheckStep> CameraCheck::steps(const ArrivalFindings& arrivals) const {
+  std::vector<CheckStep> steps = {
+      {"topics", arrivals.topics},
+      {"stamps", arrivals.stamps},
+      {"calibration", calibration()},
+      {"exposure", images_.exposure(thresholds_.min_intensity, thresholds_.max_intensity)},
+      {"repeats", repeats_.judge()},
+      {"same moment", rows_.sameMoment()},
+      {"shutter", odometry_.shutter()},
+      {"rectification", rows_.rectification()},
+      {"rig monitor", rig()},
+      {"lens", lens_check_.judge()},
+      {"texture", images_.texture(thresholds_.min_corners, options_.stereo_features.rig_monitor.suspicious_share)},
+      {"motion blur", images_.blur()},
+      {"emitter", emitter_.judge()},
+      {"frame rate", images_.frameRate(odometry_.rotations())},
+      {"odometry", odometry_.judge()},
+      {"load", load(arrivals.rate)}};
+  const auto fault = std::find_if(steps.begin(), steps.end(),
+                                  [](const CheckStep& step) { return step.finding.verdict == Verdict::kFail; });
+  for (auto later = fault; later != steps.end(); ++later)
+    if (later != fault) later->finding = {Verdict::kOpen, "not judged: mend '" + fault->name + "' first"};
+  steps.push_back({"TF", arrivals.transform});  // which no other step needs
+  return steps;
 }
 
 Finding CameraCheck::calibration() const {
-  const std::string step = "calibration";
-  if (unusable_ > 0 || used_ == 0)
-    return {step, used_ == 0 && unusable_ == 0 ? Verdict::kOpen : Verdict::kFail,
-            problem_.empty() ? "no pairs" : problem_,
-            unusable_ > 0 ? "see docs/cameras.md, 'What a wrong camera_info looks like'" : ""};
+  if (unusable_ > 0) return {Verdict::kFail, problem_, "see docs/cameras.md, 'What a wrong camera_info looks like'"};
+  if (used_ == 0) return {Verdict::kOpen, "no pairs"};
   return checkCalibration(camera_, lens_, unrectified_);
 }
 
 Finding CameraCheck::rig() const {
   constexpr double kFew = 0.1;  // share of the pairs (chosen)
-  const std::string step = "rig monitor";
   const std::string what =
       text(0, refused_, " of ", used_, " pairs refused") + (refusal_.empty() ? "" : ": " + refusal_);
-  if (refused_ > kFew * used_) return {step, Verdict::kFail, what, "look at both images: sides, mounting, calibration"};
-  return {step, refused_ > 0 ? Verdict::kWarn : Verdict::kOk, what, ""};
+  if (refused_ > kFew * used_) return {Verdict::kFail, what, "look at both images: sides, mounting, calibration"};
+  return judged(false, refused_ > 0, what);
 }
 
 Finding CameraCheck::load(double rate) const {
-  const std::string step = "load";
   const double share = 1e-3 * run_.cpuTime() * rate;
-  const std::string what =
-      text(1, run_.cpuTime(), " ms of CPU time a pair, ", 100.0 * share, " % of one processor; done after ",
-           run_.time(0.5), " ms (median), ", run_.time(0.95), " ms (95 %)");
-  if (share > thresholds_.max_load)
-    return {step, Verdict::kWarn, what, "fewer detector/max_features, smaller images or max_rate"};
-  return {step, Verdict::kOk, what, ""};
+  return judged(false, share > thresholds_.max_load,
+                text(1, run_.cpuTime(), " ms of CPU time a pair, ", 100.0 * share, " % of one processor; done after ",
+                     run_.time(0.5), " ms (median), ", run_.time(0.95), " ms (95 %)"),
+                "fewer detector/max_features, smaller images or max_rate");
 }
 
 }  // namespace sdvo

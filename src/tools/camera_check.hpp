@@ -28,7 +28,7 @@ class CameraCheck {
   void addUnusable(const std::string& problem);
 
   /// A step after a FAIL is open: its findings would be that fault's.
-  std::vector<Finding> findings(const ArrivalFindings& arrivals) const;
+  std::vector<CheckStep> steps(const ArrivalFindings& arrivals) const;
 
   cv::Mat rows() const { return rows_.map(); }
   /// The last pair that was used, left above right; empty: none.

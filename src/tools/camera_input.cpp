@@ -8,7 +8,7 @@
 #include <stdexcept>
 #include <utility>
 
-#include "../common/text.hpp"
+#include "../check/axes_check.hpp"
 #include "../messages/frames.hpp"
 #include "../messages/stamps.hpp"
 
@@ -100,37 +100,30 @@ std::string CameraInput::baseAbove(std::string frame) const {
 
 ArrivalFindings CameraInput::findings(const std::string& base_frame_given, bool is_recorded) {
   const RateOptions rates;
+  ArrivalFindings found{stamps_.topics(rates.min_rate, rates.max_rate, arrivals_.explainSilence(newest_)),
+                        stamps_.stamps(),
+                        {},
+                        stamps_.rate(),
+                        std::nullopt};
   const std::string camera = ros_conversions::cleanFrameId(frame_.value_or(""));
   const std::string base_frame = base_frame_given.empty() ? baseAbove(camera) : base_frame_given;
-  std::optional<Eigen::Isometry3d> T_base_camera;
-  std::string problem;
   try {
-    T_base_camera = tf2::transformToEigen(transforms_.lookupTransform(base_frame, camera, ros::Time(0)));
+    found.T_base_camera = tf2::transformToEigen(transforms_.lookupTransform(base_frame, camera, ros::Time(0)));
+    found.transform = checkMount(base_frame, camera, *found.T_base_camera);
   } catch (const tf2::TransformException& e) {
-    problem = tf_problem_.empty() ? e.what() : tf_problem_;
+    if (is_recorded && !has_transforms_ && tf_problem_.empty())
+      found.transform = {Verdict::kOpen, "this recording has none", "the odometry needs it while it runs"};
+    else if (!frame_)
+      found.transform = {Verdict::kOpen, "no image came", "see topics"};
+    else if (camera.empty())
+      found.transform = {Verdict::kOpen, "the images name no frame", "set frame_id in the driver"};
+    else
+      found.transform = {
+          Verdict::kFail,
+          "no transform from " + camera + " to " + base_frame + ": " + (tf_problem_.empty() ? e.what() : tf_problem_),
+          "publish it: URDF, or static_transform_publisher; launch/cameras has an argument mount_rpy"};
   }
-  const Finding none{"TF", Verdict::kOpen, "this recording has none", "the odometry needs it while it runs"};
-  const bool is_open = is_recorded && !has_transforms_ && tf_problem_.empty();
-  return {stamps_.topics(rates.min_rate, rates.max_rate, arrivals_.explainSilence(newest_)), stamps_.stamps(),
-          is_open ? none : judge(T_base_camera, base_frame, problem), stamps_.rate(), T_base_camera};
-}
-
-Finding CameraInput::judge(const std::optional<Eigen::Isometry3d>& T_base_camera, const std::string& base_frame,
-                           const std::string& problem) const {
-  const std::string step = "TF";
-  if (!frame_) return {step, Verdict::kOpen, "no image came", "see topics"};
-  const std::string camera = ros_conversions::cleanFrameId(*frame_);
-  if (camera.empty()) return {step, Verdict::kOpen, "the images name no frame", "set frame_id in the driver"};
-  if (!T_base_camera)
-    return {step, Verdict::kFail, "no transform from " + camera + " to " + base_frame + ": " + problem,
-            "publish it: URDF, or static_transform_publisher; launch/cameras has an argument mount_rpy"};
-  const Eigen::Vector3d at = T_base_camera->translation(), ahead = T_base_camera->rotation().col(2);
-  const std::string what = text(2, camera, " is at ", at.x(), " ", at.y(), " ", at.z(), " m of ", base_frame,
-                                " and looks along ", ahead.x(), " ", ahead.y(), " ", ahead.z());
-  if (T_base_camera->rotation().isIdentity(1e-3))
-    return {step, Verdict::kWarn, what,
-            "these are the axes of a body (x ahead), not of a camera (z ahead): give the images their optical frame"};
-  return {step, Verdict::kOk, what, ""};
+  return found;
 }
 
 }  // namespace sdvo

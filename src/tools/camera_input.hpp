@@ -54,9 +54,6 @@ class CameraInput {
   using Message = StereoMessage;
 
   std::string baseAbove(std::string frame) const;
-  /// Whether TF has `base_frame` <- the images' frame.
-  Finding judge(const std::optional<Eigen::Isometry3d>& T_base_camera, const std::string& base_frame,
-                const std::string& problem) const;
 
   const StereoTopics topics_;
   const std::optional<StereoInfos> infos_;

@@ -31,26 +31,24 @@ using namespace sdvo;
 /// All findings of a camera's check as one page that needs no other file: verdict, table, map of the rows, a pair of
 /// images. `rows`: RowCheck::map(), empty: none; `pair`: CV_8U, empty: none. Throws std::runtime_error when it cannot
 /// be written.
-void writeCheckPage(const std::string& path, const std::string& camera, const std::vector<Finding>& findings,
+void writeCheckPage(const std::string& path, const std::string& camera, const std::vector<CheckStep>& steps,
                     const cv::Mat& rows, const cv::Mat& pair) {
-  const Finding worst = worstOf(findings);
-  const std::string sentence = worst.verdict == Verdict::kOk
-                                   ? "OK: every step that this recording shows"
-                                   : std::string(toString(worst.verdict)) + ", " + worst.step + ": " + worst.what;
+  const CheckStep worst = worstOf(steps);
+  const Verdict verdict = worst.finding.verdict;
+  const std::string sentence = verdict == Verdict::kOk ? "OK: every step that this recording shows" : worst.text();
   constexpr std::size_t kMostBytes = 1000000;
   const std::string pictures = pair.empty() ? "[]" : "[" + pictureOf(pair, "left above right", kMostBytes) + "]";
-  writePage(path, "Stereo camera " + camera, {"", worst.verdict, sentence, ""}, findings, rows,
-            {{"pictures", pictures}});
+  writePage(path, "Stereo camera " + camera, {verdict, sentence}, steps, rows, {{"pictures", pictures}});
 }
 
 struct Arguments {
   std::string bag, base_frame, transport = "raw", page, config;
-  sdvo::StereoSource source;
+  StereoSource source;
   std::vector<std::string> settings;
   double seconds = 30.0;
 };
 
-void listen(const Arguments& arguments, const sdvo::StereoTopics& topics, sdvo::CameraInput& input) {
+void listen(const Arguments& arguments, const StereoTopics& topics, CameraInput& input) {
   if (!ros::master::check())
     throw std::runtime_error("no ROS master at " + ros::master::getURI() + ": start the camera, or give a --bag");
   ros::NodeHandle nh;
@@ -81,32 +79,31 @@ void listen(const Arguments& arguments, const sdvo::StereoTopics& topics, sdvo::
 
 int check(const Arguments& arguments) {
   cv::setNumThreads(1);
-  const sdvo::PipelineOptions options = sdvo::readPipelineOptions(arguments.config, arguments.settings);
-  sdvo::OfflineRun run(options);
-  sdvo::CameraCheck check(options, run);
-  const auto use = [&](const sdvo::RecordedPair& pair) {
+  const PipelineOptions options = readPipelineOptions(arguments.config, arguments.settings);
+  OfflineRun run(options);
+  CameraCheck check(options, run);
+  const auto use = [&](const RecordedPair& pair) {
     check.add(pair, run.process(pair.camera, pair.left, pair.right, pair.stamp));
   };
-  const auto report = [&](const std::string& camera, const sdvo::ArrivalFindings& arrivals) {
-    const std::vector<sdvo::Finding> findings = check.findings(arrivals);
-    for (const sdvo::Finding& finding : findings)
-      std::cout << std::left << std::setw(5) << toString(finding.verdict) << std::setw(14) << finding.step
-                << finding.what << (finding.remedy.empty() ? "" : "\n" + std::string(19, ' ') + "-> " + finding.remedy)
-                << "\n";
-    if (!arguments.page.empty()) writeCheckPage(arguments.page, camera, findings, check.rows(), check.picture());
-    return exitCodeOf(worstOf(findings).verdict);
+  const auto report = [&](const std::string& camera, const ArrivalFindings& arrivals) {
+    const std::vector<CheckStep> steps = check.steps(arrivals);
+    for (const auto& [name, finding] : steps)
+      std::cout << std::left << std::setw(5) << toString(finding.verdict) << std::setw(14) << name << finding.what
+                << (finding.remedy.empty() ? "" : "\n" + std::string(19, ' ') + "-> " + finding.remedy) << "\n";
+    if (!arguments.page.empty()) writeCheckPage(arguments.page, camera, steps, check.rows(), check.picture());
+    return exitCodeOf(worstOf(steps).finding.verdict);
   };
   if (!arguments.bag.empty()) {
-    const auto recording = sdvo::openRecording(arguments.bag, arguments.source);
+    const auto recording = openRecording(arguments.bag, arguments.source);
     recording->forEach(std::numeric_limits<int>::max(), use, [&](const std::string& why) { check.addUnusable(why); });
     return report(arguments.bag, recording->arrivals(arguments.base_frame));
   }
-  const sdvo::StereoTopics topics = arguments.source.topics();
-  sdvo::PairReader reader(topics, arguments.source.fov);
+  const StereoTopics topics = arguments.source.topics();
+  PairReader reader(topics, arguments.source.fov);
   std::int64_t last_stamp = 0;  // ns
   constexpr std::size_t kWaitingPairs = 100;
-  sdvo::Worker<sdvo::StereoPairMessages> worker(kWaitingPairs, [&](const sdvo::StereoPairMessages& pair) {
-    const std::int64_t stamp = sdvo::nanoseconds(pair.left_image->header.stamp);
+  Worker<StereoPairMessages> worker(kWaitingPairs, [&](const StereoPairMessages& pair) {
+    const std::int64_t stamp = nanoseconds(pair.left_image->header.stamp);
     if (stamp <= last_stamp) return;  // which the step of the stamps reports
     try {
       use(reader.read(pair, stamp));
@@ -115,8 +112,7 @@ int check(const Arguments& arguments) {
       check.addUnusable(e.what());
     }
   });
-  sdvo::CameraInput input(topics, infosOf(arguments.source),
-                          [&](const sdvo::ArrivedPair& pair) { worker.push(pair.messages); });
+  CameraInput input(topics, infosOf(arguments.source), [&](const ArrivedPair& pair) { worker.push(pair.messages); });
   listen(arguments, topics, input);
   worker.stop();
   return report(topics[0], input.findings(arguments.base_frame, false));

@@ -167,8 +167,8 @@ std::vector<Words> optionsOf(PipelineOptions options) {
 Finding judge(const DriveReport& report, const OfflineRun& run) {
   const std::array<int, 4> states = countStates(run.frames());
   const int tracking = states[static_cast<std::size_t>(TrackingState::kTracking)];
-  const Finding worst = worstOf(report.findings);
-  Finding verdict{"drive", worst.verdict, "", ""};
+  const CheckStep worst = worstOf(report.steps);
+  Finding verdict{worst.finding.verdict};
   if (run.pairsWithoutPose() > 0 || run.discontinuities() > 0) {
     if (verdict.verdict != Verdict::kFail) verdict.verdict = Verdict::kWarn;
     const int poses = run.pairs() - run.pairsWithoutPose();
@@ -188,8 +188,7 @@ Finding judge(const DriveReport& report, const OfflineRun& run) {
       verdict.what +=
           "; random errors of about " + percent(implied) + " of the distance, beside those of the calibration";
   }
-  if (worst.verdict == Verdict::kWarn || worst.verdict == Verdict::kFail)
-    verdict.what += ". Camera: " + std::string(toString(worst.verdict)) + ", " + worst.step + ": " + worst.what;
+  if (worst.finding.isFault()) verdict.what += ". Camera: " + worst.text();
   return verdict;
 }
 
@@ -217,7 +216,7 @@ void writeDrivePage(const std::string& path, const DriveReport& report, const Of
   const auto pictureOfDrive = [&](const DrivePictures::Picture& picture) {
     return pictureOf(picture.image, picture.words, kMostBytes / report.pictures.size());
   };
-  writePage(path, report.name, judge(report, run), report.findings, report.rows,
+  writePage(path, report.name, judge(report, run), report.steps, report.rows,
             {{"figures", tableOf(figuresOf(report, run))},
              {"options", tableOf(optionsOf(report.options))},
              {"first_stamp", quoted(std::to_string(frames.front().odometry.stamp))},

@@ -35,7 +35,7 @@ struct DriveReport {
   std::string name;
   int left_out = 0;  ///< stamps without a usable pair
   PipelineOptions options;
-  std::vector<Finding> findings;  ///< of the camera's check
+  std::vector<CheckStep> steps;   ///< of the camera's check
   cv::Mat rows;                   ///< RowCheck::map()
   Eigen::Matrix3d R_base_camera;  ///< x ahead, y to the left, z up
   std::vector<SelfCheck> self_checks;

@@ -78,18 +78,11 @@ std::string dateOf(std::int64_t stamp) {
   return words;
 }
 
-Finding worstOf(const std::vector<Finding>& findings) {
-  for (const Verdict verdict : {Verdict::kFail, Verdict::kWarn, Verdict::kOk})
-    for (const Finding& finding : findings)
-      if (finding.verdict == verdict) return finding;
-  return {"", Verdict::kOpen, "nothing was judged", ""};
-}
-
 void writePage(const std::string& path, const std::string& title, const Finding& verdict,
-               const std::vector<Finding>& findings, const cv::Mat& rows, JsonMembers more) {
-  std::vector<Words> steps;
-  for (const Finding& finding : findings)
-    steps.push_back({finding.step, toString(finding.verdict), finding.what, finding.remedy});
+               const std::vector<CheckStep>& steps, const cv::Mat& rows, JsonMembers more) {
+  std::vector<Words> findings;
+  for (const auto& [name, finding] : steps)
+    findings.push_back({name, toString(finding.verdict), finding.what, finding.remedy});
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   const std::string written =
       dateOf(std::chrono::nanoseconds(now).count()) + " by stereo_descriptor_vo " + SDVO_VERSION;
@@ -98,7 +91,7 @@ void writePage(const std::string& path, const std::string& title, const Finding&
   const JsonMembers members = {{"title", quoted(title)},
                                {"verdict", listOf(Words{toString(verdict.verdict), verdict.what}, quoted)},
                                {"written", quoted(written)},
-                               {"findings", tableOf(steps)},
+                               {"findings", tableOf(findings)},
                                {"rows", listOf(map, [](const std::vector<double>& row) {
                                   return listOf(row, [](double dv) { return number(dv, 2); });
                                 })}};

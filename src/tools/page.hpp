@@ -39,12 +39,9 @@ std::string pictureOf(const cv::Mat& image, const std::string& words, std::size_
 /// A moment (ns since 1970) as date and time in UTC.
 std::string dateOf(std::int64_t stamp);
 
-/// The worst verdict, and what its first finding says.
-Finding worstOf(const std::vector<Finding>& findings);
-
 /// A page that needs no other file: what was looked at, the verdict on it, the steps of the camera's check,
 /// RowCheck::map(), and what else there is. Throws std::runtime_error that names the file when it cannot be written.
 void writePage(const std::string& path, const std::string& title, const Finding& verdict,
-               const std::vector<Finding>& findings, const cv::Mat& rows, JsonMembers more);
+               const std::vector<CheckStep>& steps, const cv::Mat& rows, JsonMembers more);
 
 }  // namespace sdvo

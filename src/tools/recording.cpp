@@ -77,7 +77,7 @@ class FolderRecording : public Recording {
       check.notePair(sequence_.stamp(i));
     }
     const RateOptions rates;
-    const Finding transform{"TF", Verdict::kOpen, "a folder has none", ""};
+    const Finding transform{Verdict::kOpen, "a folder has none"};
     return {check.topics(rates.min_rate, rates.max_rate, ""), check.stamps(), transform, check.rate(), std::nullopt};
   }
 

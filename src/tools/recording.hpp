@@ -27,7 +27,7 @@ struct RecordedPair {
 /// Steps of a camera's check that concern how the messages of pairs arrive.
 struct ArrivalFindings {
   Finding topics, stamps, transform;
-  double rate;                                     ///< of the pairs, Hz
+  double rate = 0.0;                               ///< of the pairs, Hz
   std::optional<Eigen::Isometry3d> T_base_camera;  ///< as TF has it
 };
 

@@ -141,7 +141,7 @@ sdvo::Finding makePage(const sdvo::Recording& recording, const Drive& drive, con
   report.name = fs::absolute(input).lexically_normal().string();
   report.left_out = drive.left_out;
   report.options = options;
-  report.findings = seen.check.findings(arrivals);
+  report.steps = seen.check.steps(arrivals);
   report.rows = seen.check.rows();
   // An optical frame looks along z, with x to the right.
   report.R_base_camera << 0.0, 0.0, 1.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0;

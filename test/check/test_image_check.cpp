@@ -45,6 +45,19 @@ TEST(ImageCheck, ExposureIsThatOfTheDarkerAndOfTheBrighterSide) {
   expectSaid(exposure(100.0, 221.0), Verdict::kWarn, "too bright");
 }
 
+TEST(ImageCheck, ExposuresThatTakeTurnsAreNamedAndNoLampIs) {
+  ImageCheck turns, mild, lamp;
+  const auto add = [](ImageCheck& check, double mean) { check.add(grey(100), grey(100), goodReport(mean, mean)); };
+  for (int i = 0; i < 20; ++i) {
+    add(turns, i % 2 ? 6.0 : 150.0);
+    add(mild, i % 2 ? 20.0 : 140.0);
+    add(lamp, i % 6 < 3 ? 6.0 : 150.0);
+    EXPECT_FALSE(contains(lamp.exposure(10.0, 220.0).text(), "take turns"));
+  }
+  expectSaid(turns.exposure(10.0, 220.0), Verdict::kWarn, "take turns");
+  expectSaid(mild.exposure(10.0, 220.0), Verdict::kOk, "mean grey level 20 to 140");
+}
+
 TEST(ImageCheck, WhiteInAQuarterOfBothImagesIsTooBright) {
   const auto withWhite = [](int columns) {
     cv::Mat left = grey(100);

@@ -1,20 +1,33 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
+#include <string>
 
 #include "../../src/check/odometry_check.hpp"
 #include "../said.hpp"
 
 namespace sdvo::test_odometry_check {
 
-constexpr double kUnknown = NAN;
+/// Of a hundred pairs as many are lost, or degraded.
+Finding judged(int lost, int degraded) {
+  OdometryCheck check;
+  for (int i = 0; i < 100; ++i) {
+    OdometryResult result;
+    result.state = i < lost              ? TrackingState::kLost
+                   : i < lost + degraded ? TrackingState::kDegraded
+                                         : TrackingState::kTracking;
+    result.reason = i < lost ? "too few matches" : "doubtful";
+    check.add({}, result);
+  }
+  return check.judge();
+}
 
-TEST(ShutterCheck, NamesWhatIsProvedAndNothingElse) {
-  EXPECT_EQ(doubtOfShutters({kUnknown, kUnknown}), "");
-  EXPECT_EQ(doubtOfShutters({0.0005, 0.0001}), "") << "less than matters";
-  EXPECT_EQ(doubtOfShutters({0.02, 0.02}), "") << "within chance";
-  EXPECT_TRUE(contains(doubtOfShutters({-0.0062, 0.0001}), "right images are taken 6.2 +- 0.1 ms before"));
-  EXPECT_TRUE(contains(doubtOfShutters({0.0062, 0.0001}), "6.2 +- 0.1 ms after left ones"));
+TEST(OdometryCheck, NamesTheStatesAndTheReasonThatIsMostFrequent) {
+  EXPECT_EQ(judged(0, 2).verdict, Verdict::kOk);
+  EXPECT_EQ(judged(1, 0).verdict, Verdict::kWarn);
+  EXPECT_EQ(judged(21, 0).verdict, Verdict::kFail);
+  EXPECT_TRUE(contains(judged(2, 9).text(), "89 of 100 pairs TRACKING, 9 DEGRADED, 2 LOST"));
+  EXPECT_TRUE(contains(judged(2, 9).text(), "most often: doubtful"));
+  EXPECT_EQ(OdometryCheck().judge().verdict, Verdict::kOpen);
 }
 
 }  // namespace sdvo::test_odometry_check

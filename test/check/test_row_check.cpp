@@ -49,7 +49,7 @@ TEST(RowCheck, MeasuresADelayWithoutBlamingTheRectification) {
   const Finding moment = check.sameMoment();
   EXPECT_EQ(moment.verdict, Verdict::kFail) << moment.what;
   double late = 0.0;
-  ASSERT_EQ(std::sscanf(moment.what.c_str(), "right image %lf", &late), 1);
+  ASSERT_EQ(std::sscanf(moment.what.c_str(), "right images are taken %lf", &late), 1);
   EXPECT_NEAR(late, 30.0, 2.0) << "ms; a row goes 24 px/s, so that 2 ms are 0.05 px";
   EXPECT_EQ(check.rectification().verdict, Verdict::kOk) << check.rectification().what;
 }
@@ -95,6 +95,16 @@ TEST(RowCheck, JudgesNothingWithoutTexture) {
   EXPECT_EQ(check.rectification().verdict, Verdict::kOpen);
   EXPECT_EQ(check.sameMoment().verdict, Verdict::kOpen);
   EXPECT_TRUE(std::isnan(check.map().at<double>(0)));
+}
+
+TEST(CheckMoment, NamesWhatIsProvedAndNothingElse) {
+  constexpr double kUnknown = NAN;
+  for (const RowDelay::Estimate& right : {RowDelay::Estimate{kUnknown, kUnknown}, {0.0005, 0.0001}, {0.02, 0.02}})
+    EXPECT_EQ(checkMoment(right).verdict, Verdict::kOk) << "less than matters, or within chance";
+  EXPECT_EQ(checkMoment({-0.0062, 0.0001}).verdict, Verdict::kWarn);
+  EXPECT_EQ(checkMoment({-0.0062, 0.0001}).what, "right images are taken 6.2 +- 0.1 ms before left ones");
+  EXPECT_EQ(checkMoment({0.0162, 0.0001}).what, "right images are taken 16.2 +- 0.1 ms after left ones");
+  EXPECT_EQ(checkMoment({0.0162, 0.0001}).verdict, Verdict::kFail);
 }
 
 }  // namespace sdvo::test_row_check

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <string>
 
 #include "../../src/check/stamp_check.hpp"
@@ -73,6 +74,15 @@ TEST(StampCheck, WarnsOfStampsThatFall) {
 
 TEST(StampCheck, JudgesNoStampsWithoutPairs) {
   EXPECT_EQ(recording(1).stamps().verdict, Verdict::kOpen);
+}
+
+TEST(CheckLatency, StampsOfTheFutureAndThePastAndSinceBoot) {
+  for (const double latency : {-0.05, 0.0, 0.3}) EXPECT_EQ(checkLatency(latency, 0.5).verdict, Verdict::kOk) << latency;
+  expectSaid(checkLatency(0.6, 0.5), Verdict::kWarn, "0.600 s from image to poseis the machine too slow");
+  for (const double latency : {-0.3, -5.0}) expectSaid(checkLatency(latency, 0.5), Verdict::kWarn, "in the future");
+  expectSaid(checkLatency(std::nan(""), 0.5), Verdict::kWarn, "--clock");
+  expectSaid(checkLatency(1795739520.0, 0.5), Verdict::kWarn, "another clock than this machine");
+  EXPECT_FALSE(contains(checkLatency(1795739520.0, 0.5).text(), "too slow"));
 }
 
 }  // namespace sdvo::test_stamp_check

@@ -19,7 +19,7 @@ struct Diagnosis {
 
 Diagnosis diagnose(InputMonitor& monitor) {
   WallUpdater::Status status;
-  monitor.diagnose(status);
+  WallUpdater::print(monitor.judge(status), status);
   return {status.level, status.message};
 }
 
@@ -44,8 +44,7 @@ TEST(InputMonitor, NamesTheTopicsThatInputComesFromNow) {
   InputMonitor monitor("pairs", "/left", 0.05, {});
   monitor.noteTopics("/infra1");
   WallUpdater::Status status;
-  monitor.diagnose(status);
-  EXPECT_TRUE(contains(status.message, "no pairs yet on /infra1")) << status.message;
+  EXPECT_TRUE(contains(monitor.judge(status).front().what, "no pairs yet on /infra1"));
   EXPECT_EQ(status.values.back().value, "/infra1");
 }
 

@@ -13,7 +13,7 @@ using Level = WallUpdater::Level;
 
 WallUpdater::Status diagnose(WorkLoad& load) {
   WallUpdater::Status status;
-  load.diagnose(status);
+  WallUpdater::print(load.judge(status), status);
   return status;
 }
 
