@@ -4,7 +4,7 @@
 
 namespace sdvo {
 
-/// A transform that follows its target smoothly, so that whoever uses it sees no jump.
+/// A transform that moves smoothly to its target, so that it never jumps.
 class EasedTransform {
  public:
   /// `duration` of a change, s; zero: at once.
@@ -18,7 +18,7 @@ class EasedTransform {
   }
 
   Eigen::Isometry3d at(double now) const {
-    // Before its begin: the clock was set back, and what was on its way has arrived.
+    // Before its begin the clock was set back: the change counts as complete.
     if (now < begin_ || now >= begin_ + duration_) return target_;
     const double passed = (now - begin_) / duration_;
     const double share = passed * passed * (3.0 - 2.0 * passed);

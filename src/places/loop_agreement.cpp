@@ -8,9 +8,9 @@ namespace sdvo {
 namespace {
 
 constexpr std::size_t kRemembered = 20;
-constexpr double kLongestWay = 20.0;         // m back on the way, to the second loop
-constexpr double kLargestTranslation = 0.5;  // m between the spots where two loops put the camera
-constexpr double kLargestRotation = 2.0;     // deg between their directions
+constexpr double kLongestWay = 20.0;         // m travelled between the ends of two loops
+constexpr double kLargestTranslation = 0.5;  // m between the camera's positions by two loops
+constexpr double kLargestRotation = 2.0;     // deg between its orientations by them
 
 }  // namespace
 
@@ -18,7 +18,7 @@ std::vector<GraphEdge> LoopAgreement::confirm(const PoseGraph& graph, const Grap
   const auto& nodes = graph.nodes();
   const std::set<int> near_from = graph.near(proposal.from, kLongestWay);
   const std::set<int> near_to = graph.near(proposal.to, kLongestWay);
-  // Nodes that were forgotten meanwhile are near to none.
+  // Nodes that were removed meanwhile are in neither set.
   const auto agrees = [&](const GraphEdge& earlier) {
     if (near_from.count(earlier.from) == 0 || near_to.count(earlier.to) == 0 || earlier.to == proposal.to) return false;
     const Eigen::Isometry3d T_from_from = nodes.at(proposal.from).inverse() * nodes.at(earlier.from);

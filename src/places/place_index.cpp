@@ -12,11 +12,11 @@
 namespace sdvo {
 namespace {
 
-/// The bits of a row that make its words, word after word: none twice, always the same for rows of one length.
+/// Indices of the bits of which words are made, word after word, none twice. They depend on the row's length alone.
 std::vector<int> sampleBits(int row_bits, int count) {
   std::vector<int> bits(static_cast<std::size_t>(row_bits));
   std::iota(bits.begin(), bits.end(), 0);
-  std::minstd_rand random;  // its numbers are the same everywhere; std::shuffle's use of them is not
+  std::minstd_rand random;  // the same numbers on every platform; std::shuffle would use them differently
   for (int i = 0; i < count; ++i) std::swap(bits[i], bits[i + static_cast<int>(random() % (row_bits - i))]);
   bits.resize(static_cast<std::size_t>(count));
   return bits;
@@ -98,7 +98,7 @@ void PlaceIndex::remove(int place) {
   places_.erase(entry);
 }
 
-/// Of a word that so many places have.
+/// Weight of a word that `having` places have.
 double PlaceIndex::weight(std::size_t having) const {
   return std::log1p(static_cast<double>(places_.size()) / static_cast<double>(having));
 }
@@ -107,7 +107,7 @@ std::vector<PlaceCandidate> PlaceIndex::find(const PlaceSignature& signature, in
                                              const std::function<bool(int place)>& admitted) const {
   if (places_.empty()) return {};
   const int first = places_.begin()->first, last = places_.rbegin()->first;
-  // The rarest words first, and of the others as many as the time allows: they say little.
+  // The rarest words first: common ones distinguish places little, and are left out beyond this number of look-ups.
   constexpr std::size_t kLookups = 100'000;
   std::vector<const std::vector<int>*> postings;
   for (const std::uint32_t word : signature) {

@@ -20,10 +20,10 @@ Matrix6d isotropic(double translation, double rotation) {
   return variances.asDiagonal();
 }
 
-constexpr int kMostNumber = std::numeric_limits<int>::max() / 2;  ///< of places and segments that are taken up
-constexpr int kMostApart = 1'000'000;                             ///< numbers of places; as many as can be kept
+constexpr int kMostNumber = std::numeric_limits<int>::max() / 2;  ///< of places and segments that are loaded
+constexpr int kMostApart = 1'000'000;                             ///< between ids of places: the largest max_places
 
-/// Of a motion of which nothing is known: wide enough to give way to anything.
+/// Covariance of an unknown motion: so wide that it constrains nothing.
 Matrix6d unknown() {
   return isotropic(1000.0, 10.0);
 }
@@ -37,7 +37,7 @@ std::optional<PlaceReport> PlaceRecognition::observe(const StereoFeatures& featu
   if (!places_.empty() && features.count() > 0 && features.kind() != places_.begin()->second.features.kind())
     throw std::invalid_argument("the places are described by " + toString(places_.begin()->second.features.kind()) +
                                 ", not by " + toString(features.kind()));
-  // The way since the last key frame.
+  // The path since the last key frame.
   if (way_.T_odom_camera) {
     const Eigen::Isometry3d T_previous_current = way_.T_odom_camera->inverse() * motion.T_odom_camera;
     const Matrix6d ad = adjoint(T_previous_current.inverse());
@@ -80,7 +80,8 @@ bool PlaceRecognition::isCandidate(const Place& place, const Place& here) const 
           here.travelled - place.travelled >= options_.min_travel);
 }
 
-/// Beyond what is to be kept. Where places are only to be recognised, the newest key frames are kept for their way.
+/// Removes the oldest places beyond max_places. With localisation_only, only the newest key frames of this session are
+/// kept, for the path between two loops.
 void PlaceRecognition::forgetOldest() {
   constexpr int kWay = 20;
   if (options_.localisation_only) {
@@ -97,7 +98,7 @@ void PlaceRecognition::forget(int id) {
   places_.erase(id);
 }
 
-/// Whether the last pair is worth keeping: far enough from the last key frame, and with enough to be recognised by.
+/// Whether the last pair becomes a key frame: it is far enough from the last one and has enough features.
 bool PlaceRecognition::isKeyframe(const StereoFeatures& features) const {
   if (features.count() < PlaceVerifier::kLeastInliers) return false;
   if (!last_ || !way_.known) return true;
@@ -144,8 +145,8 @@ void PlaceRecognition::addKeyframe(const StereoFeatures& features, int id) {
   way_.known = true;
 }
 
-/// Looks at the candidates one after the other until geometry says that one is the same place; a neighbour that said
-/// so, too, makes it a loop.
+/// Checks the candidates' geometry, one after the other, until one is the same place. It becomes a loop if one of a
+/// neighbouring key frame agrees.
 void PlaceRecognition::recognise(const Place& here, PlaceReport& report) {
   report.reason = "no place looks similar";
   for (const PlaceCandidate& candidate : report.candidates) {
@@ -175,13 +176,13 @@ void PlaceRecognition::recognise(const Place& here, PlaceReport& report) {
   }
 }
 
-/// Whether what a loop says of the drift is within what the odometry's errors can have made on the way between.
+/// Whether the correction by a loop is within the drift that the odometry can have on the path between its nodes.
 bool PlaceRecognition::isPossible(const GraphEdge& loop) const {
   constexpr double kImpossible = 22.5;  // chi-square of six, 99.9 %
   const GraphPath path = graph_.path(loop.from, loop.to);
   if (!path.known) return true;
-  // A loop may be less exact than it says; small corrections are never out of question, or an inexact loop would keep
-  // all better ones out.
+  // A loop may err by more than its covariance says. Small corrections are always possible; else one inexact loop would
+  // make the graph reject all later, better ones.
   const Matrix6d inexact = isotropic(0.5, 0.03);
   const Matrix6d covariance = path.covariance + loop.covariance + graph_.drift(path.length, path.turn) + inexact;
   const Eigen::Isometry3d T_from_to = graph_.nodes().at(loop.from).inverse() * graph_.nodes().at(loop.to);
@@ -196,7 +197,7 @@ void PlaceRecognition::expect(const Eigen::Isometry3d& T_map_odom, double radius
 }
 
 std::optional<Matrix6d> PlaceRecognition::covariance() const {
-  constexpr double kShare = 0.1;  // of the largest drift, that edges give way by
+  constexpr double kShare = 0.1;  // of the largest drift, as a standard deviation
   if (!last_) return std::nullopt;
   const GraphPath path = graph_.path(recognised_.value_or(places_.begin()->first), *last_);
   if (!path.known) return std::nullopt;
@@ -250,7 +251,7 @@ void PlaceRecognition::restore(std::vector<Place> places, const PoseGraph& graph
     restored.emplace(id, std::move(place));
   }
   if (restored.size() != graph.nodes().size()) throw std::invalid_argument("the graph has nodes without a place");
-  // The index looks through all numbers between the first place and the last one.
+  // The index has an array over all ids from the first place to the last one.
   const int first = restored.begin()->first, last = restored.rbegin()->first;
   if (last - first > kMostApart)
     throw std::invalid_argument("places " + std::to_string(first) + " and " + std::to_string(last) +

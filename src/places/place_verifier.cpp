@@ -9,14 +9,14 @@
 namespace sdvo {
 namespace {
 
-// Less, or larger, is not the same place (chosen).
+// Thresholds of the same place (chosen).
 constexpr double kLeastRatio = 0.3;      // inliers per match
 constexpr double kLeastCoverage = 0.25;  // by inliers, share of an 8x4 grid over the image
 constexpr double kLargestRms = 1.5;      // px per coordinate
 
 FeatureMatcherOptions matcherOptions() {
   FeatureMatcherOptions matcher;
-  matcher.gating = false;      // nothing is known of where the place would be seen from
+  matcher.gating = false;      // the relative pose is unknown
   matcher.max_distance = 0.3;  // share of the bits
   return matcher;
 }
@@ -24,7 +24,7 @@ FeatureMatcherOptions matcherOptions() {
 MotionEstimatorOptions estimatorOptions() {
   MotionEstimatorOptions estimator;
   estimator.inlier_threshold = 3.0;  // px
-  // Enough for the smallest share of inliers that is accepted; what is another place takes all of them.
+  // Enough for the smallest inlier ratio that is accepted. A candidate that shows another place takes all of them.
   estimator.max_iterations = 150;
   return estimator;
 }
@@ -50,8 +50,8 @@ PlaceMatch PlaceVerifier::verify(const StereoFeatures& place, const StereoFeatur
   match.inliers = static_cast<int>(indices.size());
   match.coverage = coverage(current, indices);
   match.rms = motion.rms;
-  // exp(xi) T_camera_place inverted is T_place_camera exp(-xi): the covariance is the same, but for the noise of the
-  // place's own view, which the motion's does not count.
+  // The inverse of exp(xi) T_camera_place is T_place_camera exp(-xi), so the covariance stays. It is doubled because
+  // the motion's takes the place's points for exact, which err as much as the current ones.
   match.T_place_camera = motion.T_current_reference.inverse();
   match.covariance = 2.0 * motion.covariance;
 

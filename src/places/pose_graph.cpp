@@ -16,7 +16,7 @@ namespace {
 
 using EdgesOf = std::map<int, std::vector<const GraphEdge*>>;
 
-/// The edges at each node, but for breaks.
+/// The edges of each node, without breaks.
 EdgesOf edgesOf(const std::vector<GraphEdge>& edges) {
   EdgesOf edges_of;
   for (const GraphEdge& edge : edges) {
@@ -31,7 +31,7 @@ int otherEnd(const GraphEdge& edge, int id) {
   return edge.from == id ? edge.to : edge.from;
 }
 
-/// The nodes that edges other than breaks tie to one.
+/// The nodes that are connected with one by paths without a break.
 std::set<int> part(const std::vector<GraphEdge>& edges, int id) {
   EdgesOf edges_of = edgesOf(edges);
   std::set<int> found{id};
@@ -50,8 +50,8 @@ struct Way {
   const GraphEdge* last = nullptr;
 };
 
-/// The ways from a node, not over breaks, until one is done (id, length); the shortest for all that are not longer
-/// (Dijkstra's algorithm).
+/// Shortest paths from a node without breaks (Dijkstra's algorithm). Ends at the first node for which done(id, length)
+/// is true: all paths that are not longer are final.
 template <class Done>
 std::map<int, Way> shortestWays(const std::vector<GraphEdge>& edges, int from, const Done& done) {
   EdgesOf edges_of = edgesOf(edges);
@@ -153,14 +153,14 @@ Matrix6d PoseGraph::drift(double length, double turn) const {
   return variances.asDiagonal();
 }
 
-/// With the drift that edges give way by, and never better than to a millimetre.
+/// Covariance of an edge in the optimisation: its own, a share of the drift, and at least 1 mm and 0.1 mrad.
 Matrix6d PoseGraph::covariance(const GraphEdge& edge) const {
   Vector6d least;
   least << Eigen::Vector3d::Constant(1e-6), Eigen::Vector3d::Constant(1e-8);
   return edge.covariance + slack_ * slack_ * drift(edge.length, edge.turn) + Matrix6d(least.asDiagonal());
 }
 
-/// Whether most loops are within the residual beyond which they count less.
+/// Whether most loops have a residual below the scale of their robust loss.
 bool PoseGraph::loopsHold() const {
   int all = 0, hold = 0;
   for (const GraphEdge& edge : edges_) {
@@ -200,7 +200,7 @@ GraphPath PoseGraph::path(int from, int to) const {
   path.known = ways.count(to) > 0;
   if (!path.known) return path;
   path.length = ways.at(to).length;
-  // Back from the end: what is known of the way from a node on to the end.
+  // From the end backwards: the covariance of the relative pose from a node to the end.
   Eigen::Isometry3d T_node_end = Eigen::Isometry3d::Identity();
   for (int id = to; id != from;) {
     const GraphEdge& edge = *ways.at(id).last;

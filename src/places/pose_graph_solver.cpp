@@ -10,8 +10,8 @@
 namespace sdvo {
 namespace {
 
-/// Where two nodes are, as their edge does not want it: residual of its right perturbation in standard deviations. What
-/// odometry measured of turns is taken for too small by a share that is common to all edges.
+/// Residual of an edge, as a right perturbation, in standard deviations. Rotations of odometry are corrected by a
+/// relative error that all edges share.
 class EdgeResidual {
  public:
   EdgeResidual(const GraphEdge& edge, const Matrix6d& covariance)
@@ -28,7 +28,7 @@ class EdgeResidual {
     using Vector3 = Eigen::Matrix<T, 3, 1>;
     const Eigen::Map<const Quaternion> q_a(q_from), q_b(q_to);
     const Eigen::Map<const Vector3> t_a(t_from), t_b(t_to);
-    // The way turns on average by half of what its end does.
+    // On average over the path, the translation is rotated by half of the error at its end.
     const Quaternion half = rotation<T>(turn_.cast<T>() * (T(0.5) * *turn_error));
     const Quaternion to_edge = (q_.cast<T>() * half * half).conjugate();
     Eigen::Matrix<T, 6, 1> error;
@@ -53,7 +53,7 @@ class EdgeResidual {
   Matrix6d whitening_;
 };
 
-/// What is known of a number beforehand: it is zero with a standard deviation.
+/// Prior of a number: zero with a standard deviation.
 struct NearZero {
   double sigma;
 
@@ -108,8 +108,8 @@ void PoseGraph::solve(Summary& summary) {
                            &turn_error_);
   ceres::Solver::Options options;
   options.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  options.max_num_iterations = 50;    // more would keep a key frame waiting
-  options.function_tolerance = 1e-4;  // further steps move nodes by less than loops know
+  options.max_num_iterations = 50;    // more would delay the next key frame
+  options.function_tolerance = 1e-4;  // further steps are smaller than the loops' standard deviations
   options.logging_type = ceres::SILENT;
   ceres::Solver::Summary solved;
   ceres::Solve(options, &problem, &solved);

@@ -43,7 +43,7 @@ struct PlaceRecognitionOptions {
   }
 };
 
-/// Where the odometry sees the camera at a pair.
+/// The odometry's output for a pair.
 struct CameraMotion {
   Eigen::Isometry3d T_odom_camera = Eigen::Isometry3d::Identity();
   Matrix6d covariance =
@@ -51,21 +51,22 @@ struct CameraMotion {
   bool continuous = true;  ///< false: the motion since the pair before is unknown (a new epoch)
 };
 
-/// What a new key frame led to.
+/// Result for a new key frame.
 struct PlaceReport {
   int id = 0;                                 ///< of the new key frame
-  std::vector<PlaceCandidate> candidates;     ///< that looked alike
+  std::vector<PlaceCandidate> candidates;     ///< places of similar appearance
   std::optional<int> same;                    ///< the place that geometry confirmed
-  PlaceMatch match;                           ///< its measurement; of the last one looked at, where none was confirmed
-  bool loop = false;                          ///< accepted: the graph has a new loop and wants to be optimised
+  PlaceMatch match;                           ///< of this place; of the last candidate, where none was confirmed
+  bool loop = false;                          ///< accepted: the graph has a new loop and is to be optimised
   std::string reason;                         ///< why there is no loop
   double find_time = 0.0, verify_time = 0.0;  ///< s
 };
 
-/// A place that was recognised once may be an accident; two neighbouring key frames that say the same are none.
+/// Accepts a loop only if another one, of neighbouring key frames, gives the same relative pose. A single one may be
+/// wrong by chance.
 class LoopAgreement {
  public:
-  /// The loops that can be trusted now: none, or this one and those before it that it is the first to agree with.
+  /// The loops that are newly trusted: none, or this one and the earlier ones that it is the first to agree with.
   std::vector<GraphEdge> confirm(const PoseGraph& graph, const GraphEdge& proposal);
 
  private:
@@ -77,45 +78,46 @@ class LoopAgreement {
   std::deque<Proposal> proposals_;  ///< of the last few key frames
 };
 
-/// Recognises places by the features of stereo pairs and keeps a graph of them: the drift of an odometry is taken back
-/// where the camera comes by again. Sees no image.
+/// Recognises places by the features of stereo pairs, without images, and keeps a graph of their poses. Where the
+/// camera comes back to a place, the drift of the odometry is corrected.
 class PlaceRecognition {
  public:
   /// Throws std::invalid_argument when an option is out of its range.
   explicit PlaceRecognition(const PlaceRecognitionOptions& options);
 
-  /// Takes the next pair of the odometry. A report where it became a key frame. The graph is not optimised here: that
-  /// takes long and may be done on a copy meanwhile (graph(), PoseGraph::optimise(), adopt()). Throws
-  /// std::invalid_argument, and adds no place, for features that are no rows of bits or of another kind than those
+  /// Takes the next pair of the odometry. Returns a report if it became a key frame. The graph is not optimised here:
+  /// that takes long and may be done on a copy meanwhile (graph(), PoseGraph::optimise(), adopt()). Throws
+  /// std::invalid_argument, and adds no place, for descriptors that are not binary or of another kind than those
   /// before. The caller ensures that the camera is the same.
   std::optional<PlaceReport> observe(const StereoFeatures& features, const CameraMotion& motion);
 
   const PoseGraph& graph() const { return graph_; }
   bool adopt(const PoseGraph& optimised) { return graph_.adopt(optimised); }
 
-  /// What the map says of the odometry's origin, by the last key frame.
+  /// Pose of the odometry's origin in the map, by the last key frame.
   Eigen::Isometry3d T_map_odom() const;
 
-  /// Covariance of T_map_odom(): of a right perturbation of the last key frame's camera in the map, since the place
-  /// that was recognised last. None where no way without a break leads there.
+  /// Covariance of T_map_odom(), as that of a right perturbation of the last key frame in the map: it grows along the
+  /// path since the place that was recognised last. None if there is a break on every path.
   std::optional<Matrix6d> covariance() const;
 
-  /// A hint of the odometry's pose in the map. The next key frame is put there, after a break. Until a place
-  /// is recognised, only those within `radius` (m) of the camera are looked at. Without places nothing happens.
+  /// A hint of the odometry's pose in the map. The next key frame is put there, after a break. Until a place is
+  /// recognised, only places within `radius` (m) of the camera are candidates. Without places nothing happens.
   void expect(const Eigen::Isometry3d& T_map_odom, double radius);
 
-  /// Places of which rows are kept, by id.
+  /// All places by id.
   const std::map<int, Place>& places() const { return places_; }
   PlaceSignature signature(int place) const;
   std::size_t bytes() const;  ///< of all places and their words
 
-  /// Places known that look like another robot's, the best first, and whether they are the same.
+  /// Places that look like another robot's, the best first.
   std::vector<PlaceCandidate> find(const PlaceSignature& signature) const;
+  /// Whether another robot's features show a place.
   PlaceMatch verify(int place, const StereoFeatures& features) const;
 
-  /// Takes up the places and the graph of an earlier session, before the first pair of this one. They stay where they
-  /// are, and where the present session is among them is unknown until a place is recognised. Throws
-  /// std::invalid_argument when there are places already, or when places and graph do not belong together.
+  /// Loads the places and the graph of an earlier session, before the first pair of this one. They stay where they are.
+  /// The pose of the present session in their map is unknown until a place is recognised. Throws std::invalid_argument
+  /// when there are places already, or when places and graph do not belong together.
   void restore(std::vector<Place> places, const PoseGraph& graph);
 
  private:
@@ -135,7 +137,7 @@ class PlaceRecognition {
   std::map<int, Place> places_;
   std::optional<int> last_;        ///< key frame of this session
   std::optional<int> recognised_;  ///< the place of the last loop
-  int restored_ = 0;               ///< places with smaller numbers were taken up
+  int restored_ = 0;               ///< places with smaller ids were loaded
   struct Expectation {
     Eigen::Isometry3d T_map_odom;
     double radius;  ///< m
@@ -144,7 +146,7 @@ class PlaceRecognition {
   int next_id_ = 0;
   int segment_ = 0;
 
-  /// The way since the last key frame.
+  /// The path since the last key frame.
   struct Way {
     std::optional<Eigen::Isometry3d> T_odom_camera;  ///< of the last pair
     Matrix6d covariance = Matrix6d::Zero();          ///< of a right perturbation of its end

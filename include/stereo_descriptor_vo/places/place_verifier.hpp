@@ -9,11 +9,11 @@
 
 namespace sdvo {
 
-/// What geometry says of two pairs that look alike.
+/// Result of the geometric check of two pairs.
 struct PlaceMatch {
   bool same = false;                                                 ///< both show the same place
   std::string reason;                                                ///< why not
-  Eigen::Isometry3d T_place_camera = Eigen::Isometry3d::Identity();  ///< where the newer pair was seen from
+  Eigen::Isometry3d T_place_camera = Eigen::Isometry3d::Identity();  ///< pose of the newer pair
   Matrix6d covariance = Matrix6d::Zero();                            ///< of its right perturbation, m and rad
   int matches = 0, inliers = 0;
   double coverage = 0.0;  ///< by the inliers, share of an 8x4 grid
