@@ -45,7 +45,7 @@ void ofFile(const std::string& path, const Action& action) try {
 
 }  // namespace
 
-/// Closed with its owner.
+/// A file descriptor, closed by the destructor.
 class WholeFile::Descriptor {
  public:
   explicit Descriptor(int file) : file_(file) { check(file >= 0); }
@@ -55,7 +55,7 @@ class WholeFile::Descriptor {
   /// Returns once the disk has what was written.
   void synchronise() const { check(::fsync(file_) == 0 || errno == EINVAL); }  // EINVAL: a file system without it
   void allow(mode_t mode) const { check(::fchmod(file_, mode) == 0); }
-  /// Until it is closed, which the end of a process does. False where another one holds it.
+  /// Locks the file until it is closed, at the latest by the end of the process. False if another process has the lock.
   bool lock() const { return ::flock(file_, LOCK_EX | LOCK_NB) == 0 || errno != EWOULDBLOCK; }
   bool hasName() const {
     struct stat status {};

@@ -11,7 +11,7 @@
 
 namespace sdvo {
 
-/// Enums are for the inside, their names for files, messages and people. Such an enum counts up from 0 and has a
+/// Name of an enum's value, by which files, messages and people refer to it. Such an enum counts up from 0 and has a
 /// function `const std::vector<std::string>& namesOf(Enum)` beside it, which lists the names in that order.
 template <class Enum>
 const std::string& nameOf(Enum value) {
