@@ -67,7 +67,7 @@ StereoRectification::StereoRectification(const RawCameras& raw, const Eigen::Iso
   cv::eigen2cv(Eigen::Vector3d(T_right_left.translation()), t);
   if (left.is_equidistant)
     cv::fisheye::stereoRectify(left.K, left.D, right.K, right.D, left.size, R, t, R_rect[0], R_rect[1], P[0], P[1], Q,
-                               cv::fisheye::CALIB_ZERO_DISPARITY);
+                               cv::CALIB_ZERO_DISPARITY);  // equal to that of fisheye, which OpenCV 4.2 lacks
   else
     cv::stereoRectify(left.K, left.D, right.K, right.D, left.size, R, t, R_rect[0], R_rect[1], P[0], P[1], Q,
                       cv::CALIB_ZERO_DISPARITY, 0.0);
