@@ -59,12 +59,8 @@ std::string wordsOn(const StereoFeatures& features, const std::string& diagnosis
     return "every feature is too close to an image border for its descriptor: the image is too small for its size";
   if (features.report.detected == 0)
     return "no corners: the left image has no texture (dark, covered, masked or out of focus?)";
-  if (features.report.stereo_matched == 0) {
-    constexpr double kLit = 0.25;  // ratio of gradients (chosen): focus and exposure of a rig differ by less
-    if (features.report.sharpness[1] < kLit * features.report.sharpness[0])
-      return "no stereo matches: the right image has no texture (dark, covered or out of focus?)";
-    return "no stereo matches: left and right do not show the same scene, are swapped or not rectified";
-  }
+  if (features.report.stereo_matched == 0)
+    return "no stereo matches: either different scenes or moments, or rows far apart, or a scene too near";
   return features.count() == 0 ? "every feature is too close to an image border for its descriptor" : "";
 }
 
@@ -134,7 +130,8 @@ std::vector<StereoMatch> FeatureExtractor::matchAlong(const RowLine& rows, const
 }
 
 StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
-                                         std::int64_t stamp, const cv::Mat& mask) const {
+                                         std::int64_t stamp, const cv::Mat& mask,
+                                         const ExtractionReport& before) const {
   camera.check();
   checkImage(left, "left", camera);
   checkImage(right, "right", camera);
@@ -166,9 +163,9 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
   report.stereo_matched = static_cast<int>(matches.size());
   RigDiagnosis diagnosis;
   if (rig_monitor_.isSuspicious(report.detected, report.stereo_matched))
-    diagnosis = rig_monitor_.diagnose(left, right, positions);
+    diagnosis = rig_monitor_.diagnose(left, right, positions, report, before);
   constexpr double kKnock = 0.0175;  // rad: a degree; images that differ by more are not those of a rectified rig
-  report.refused = !diagnosis.words.empty();
+  report.refused = diagnosis.refused;
   if (diagnosis.rows && diagnosis.rows->most() < kKnock * camera.fy) {
     matches = matchAlong(*diagnosis.rows, searched_left, searched_right, positions);
     report.stereo_matched = static_cast<int>(matches.size());
@@ -176,7 +173,7 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
     report.along_rows = !report.refused;
   }
   if (diagnosis.too_near) {
-    matches = stereo_matcher_.match(searched_left, searched_right, positions, 0.5 * left.cols);
+    matches = stereo_matcher_.match(searched_left, searched_right, positions, left.cols);
     report.stereo_matched = static_cast<int>(matches.size());
   }
   // Those of a rig that is not what it should be are wrong ones.

@@ -217,7 +217,8 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
       NODELET_INFO_STREAM("mono16 images: " << decoder_.greyRange().black << " to " << decoder_.greyRange().white
                                             << " are black to white");
     StereoFeatures features =
-        extractor_->extract(decoded.camera, decoded.left, decoded.right, nanoseconds(stamp), mask_);
+        extractor_->extract(decoded.camera, decoded.left, decoded.right, nanoseconds(stamp), mask_, last_report_);
+    last_report_ = features.report;
     if (options_.input.approximate_sync) features.right_delay = secondsBetween(stamp, pair.right_image->header.stamp);
     // Only now: a calibration that does not fit the images was refused and is no new stream.
     const std::string unrectified = ros_conversions::whyUnrectified(*pair.left_info, *pair.right_info);
@@ -303,6 +304,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   // Only the worker's thread touches these.
   std::unique_ptr<FeatureExtractor> extractor_;
   PairDecoder decoder_;
+  ExtractionReport last_report_;
   RepeatCheck repeats_;
   cv::Mat mask_;  // of the topic; empty: none has come
   EmitterCheck emitter_;

@@ -43,7 +43,8 @@ StereoFeatures OfflineRun::process(const StereoCamera& camera, const cv::Mat& le
                                    std::int64_t stamp) {
   const double cpu_before = cpuSeconds();
   Stopwatch stopwatch;
-  const Extracted pair{extractor_.extract(camera, left, right, stamp), 0.0};
+  const ExtractionReport last = frames_.empty() ? ExtractionReport() : frames_.back().extraction;
+  const Extracted pair{extractor_.extract(camera, left, right, stamp, cv::Mat(), last), 0.0};
   track(pair);
   frames_.back().total_time = stopwatch.lap();
   cpu_time_ += cpuSeconds() - cpu_before;
@@ -58,7 +59,8 @@ void OfflineRun::processBeside(const StereoCamera& camera, const cv::Mat& left, 
   const std::optional<Extracted> before = std::exchange(waiting_, std::nullopt);
   std::future<void> odometry;
   if (before) odometry = std::async(std::launch::async, [&] { track(*before); });
-  Extracted pair{extractor_.extract(camera, left, right, stamp), 0.0};
+  const ExtractionReport last = before ? before->features.report : ExtractionReport();
+  Extracted pair{extractor_.extract(camera, left, right, stamp, cv::Mat(), last), 0.0};
   if (odometry.valid()) odometry.get();
   pair.time = stopwatch.lap();
   waiting_ = std::move(pair);

@@ -216,6 +216,32 @@ TEST(FeatureExtractor, SaysWhyAPairGivesNothing) {
   expectEmpty(pair.left.rowRange(rows), pair.right.rowRange(rows), "the image is too small", flat, fewFeatures());
 }
 
+/// A thermal camera's shutter: for some frames one side shows a plate, with noise, or its last image again.
+TEST(FeatureExtractor, NamesTheSideThatShowsNothingOrRepeats) {
+  const FeatureExtractor extractor(fewFeatures());
+  const StereoCamera camera = synthetic::camera();
+  const Pair pair = planeAt(10.0), next = planeAt(10.0, 32);
+  cv::Mat plate(pair.left.size(), CV_8U), blurred;
+  cv::randn(plate, 110.0, 2.0);
+  cv::GaussianBlur(next.right, blurred, {}, 15.0);
+  const ExtractionReport before = extractor.extract(camera, pair.left, pair.right, 5).report;
+  struct Shown {
+    cv::Mat left, right;
+    std::string words;
+    bool refused;
+  };
+  for (const Shown& shown : {Shown{plate, next.right, "the left image has no texture", false},
+                             Shown{next.left, plate, "the right image has no texture", false},
+                             Shown{next.left, blurred, "the right image has no texture", false},
+                             Shown{pair.left, next.right, "the left image repeats", true},
+                             Shown{next.left, pair.right, "the right image repeats", true}}) {
+    const ExtractionReport report = extractor.extract(camera, shown.left, shown.right, 6, cv::Mat(), before).report;
+    expectWords(report.status, {shown.words});
+    EXPECT_EQ(report.refused, shown.refused) << shown.words;
+  }
+  EXPECT_EQ(extractor.extract(camera, pair.left, pair.right, 6, cv::Mat(), before).report.status, "") << "both repeat";
+}
+
 TEST(FeatureExtractor, SizesFollowTheDescriptorUnlessSet) {
   const StereoCamera camera = synthetic::camera();
   const Pair pair = planeAt(8.0);

@@ -41,6 +41,12 @@ std::string diagnosis(const cv::Mat& left, const cv::Mat& right) {
   return RigMonitor({}, 1.5, 192.0).diagnose(left, right, corners()).words;
 }
 
+cv::Mat flipped(const cv::Mat& image, int code) {
+  cv::Mat result;
+  cv::flip(image, result, code);
+  return result;
+}
+
 void expectSaid(const std::string& diagnosis, const std::string& words) {
   EXPECT_TRUE(contains(diagnosis, words)) << "'" << diagnosis << "' does not say '" << words << "'";
 }
@@ -68,7 +74,7 @@ TEST(RigMonitor, LooksNoFurtherOnceAFewCornersClearIt) {
   rightImage(6.0).colRange(kSize.width / 2, kSize.width).copyTo(right.colRange(kSize.width / 2, kSize.width));
   std::vector<cv::Point2f> left_half, right_half;
   for (const cv::Point2f& corner : corners())
-    (corner.x < 0.45f * static_cast<float>(kSize.width) ? left_half : right_half).push_back(corner);
+    (corner.x < 0.5f * static_cast<float>(kSize.width) ? left_half : right_half).push_back(corner);
   const RigMonitor monitor({}, 1.5, 192.0);
   const auto diagnose = [&](const auto& is_left) {
     std::vector<cv::Point2f> mixed;
@@ -80,7 +86,7 @@ TEST(RigMonitor, LooksNoFurtherOnceAFewCornersClearIt) {
   };
   EXPECT_EQ(diagnose([](std::size_t i) { return i < 20; }), "");
   EXPECT_NE(diagnose([](std::size_t i) { return i < 4; }), "") << "four are too few";
-  EXPECT_NE(diagnose([](std::size_t i) { return i % 3 == 0; }), "") << "there is a doubt from the beginning";
+  EXPECT_NE(diagnose([](std::size_t i) { return i % 6 == 0; }), "") << "there is a doubt from the beginning";
 }
 
 TEST(RigMonitor, NamesTheHeightOfTheRightImage) {
@@ -94,13 +100,40 @@ TEST(RigMonitor, NamesARotation) {
   expectSaid(diagnosis(leftImage(), rightImage(0.0, -3.0 * CV_PI / 180.0)), "turned by 3.0 degrees counterclockwise");
 }
 
-TEST(RigMonitor, NamesSwappedAndMirroredImages) {
-  expectSaid(diagnosis(rightImage(0.0), leftImage()), "are swapped, or both are mirrored");
+TEST(RigMonitor, NamesSidesThatAreSwappedOrFlipped) {
+  const cv::Mat left = leftImage(), right = rightImage(0.0);
+  const std::string swapped = "are swapped, both are mirrored, or";
+  expectSaid(diagnosis(right, left), swapped);
+  expectSaid(diagnosis(flipped(left, 1), flipped(right, 1)), swapped);
+  struct OneSide {
+    int code;
+    std::string of_left, of_right;
+  };
+  for (const OneSide& flip : {OneSide{1, "left image is mirrored, or the right one is and both are swapped",
+                                      "right image is mirrored, or the left one is and both are swapped"},
+                              OneSide{-1, "the left image is upside down", "the right image is upside down"}}) {
+    expectSaid(diagnosis(flipped(left, flip.code), right), flip.of_left);
+    expectSaid(diagnosis(left, flipped(right, flip.code)), flip.of_right);
+  }
+  expectSaid(diagnosis(flipped(right, 1), left), "right image is mirrored, or the left one is and both are swapped");
+}
+
+/// A robot before a wall: few corners are in both views, and a wrong one far from them shows no slope of the rows.
+TEST(RigMonitor, NamesAWallThatIsTooNear) {
+  const RigMonitor monitor({}, 1.5, 192.0);
+  for (const double share : {0.35, 0.45, 0.55, 0.65}) {
+    const cv::Mat right =
+        synthetic::render(kSize, [=](double u, double v) { return texture().at(u + share * kSize.width, v); });
+    const RigDiagnosis diagnosis = monitor.diagnose(leftImage(), right, corners());
+    EXPECT_TRUE(diagnosis.too_near) << share << diagnosis.words;
+    EXPECT_FALSE(diagnosis.refused) << share << diagnosis.words;
+    EXPECT_EQ(contains(diagnosis.words, "too near"), share > 0.5) << share << diagnosis.words;
+  }
 }
 
 /// A twentieth of the light, rounded to whole levels.
 TEST(RigMonitor, NamesThemInTheDark) {
-  expectSaid(diagnosis(0.05 * rightImage(0.0), 0.05 * leftImage()), "are swapped, or both are mirrored");
+  expectSaid(diagnosis(0.05 * rightImage(0.0), 0.05 * leftImage()), "are swapped, both are mirrored");
   expectSaid(diagnosis(0.05 * leftImage(), 0.05 * rightImage(4.0)), "px too low");
 }
 

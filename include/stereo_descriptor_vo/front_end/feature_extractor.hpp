@@ -43,11 +43,11 @@ class FeatureExtractor {
   explicit FeatureExtractor(const FeatureExtractorOptions& options);
 
   /// Images are CV_8U of the camera's size, else std::invalid_argument; so is `mask`, which hides where it is zero what
-  /// moves with the robot (empty: the detector's own). A pair in which nothing is found gives an empty
-  /// set whose report says why; so does one that the rig monitor refuses. A pair whose rows differ as by a small
-  /// rotation of the right camera has its features, and a report that says so.
+  /// moves with the robot (empty: the detector's own). A pair in which nothing is found gives an empty set whose report
+  /// says why; so does one that the rig monitor refuses. A pair whose rows differ as by a small rotation of the right
+  /// camera has its features, and a report that says so. `before`: report of the pair before, to see an image repeated.
   StereoFeatures extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp,
-                         const cv::Mat& mask = cv::Mat()) const;
+                         const cv::Mat& mask = cv::Mat(), const ExtractionReport& before = {}) const;
 
   /// The size curve of features in images of this size (px): no size exceeds what the image has room for.
   DepthScaleOptions sizeCurve(cv::Size image) const;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/common/stereo_features.hpp"
 
 namespace sdvo {
 
@@ -37,11 +38,13 @@ struct RowLine {
 struct RigDiagnosis {
   std::string words;  ///< the likely cause; empty when the rig is in order, or when too little is found to say
   std::optional<RowLine> rows;  ///< by which they differ, where that is all that is wrong
-  bool too_near = false;        ///< nothing is wrong, but a part of the scene is nearer than `max_disparity` reaches
+  bool too_near = false;        ///< a part of the scene is nearer than `max_disparity` reaches
+  bool refused = false;         ///< left and right do not belong together
 };
 
 /// Finds out what is wrong with a rig when few corners are found on their own row at positive disparity. It searches
-/// for them in all directions of the right image, blind to gain and brightness, and takes some milliseconds. Stateless.
+/// for them in all directions of the right image, blind to gain and brightness. A cause that explains twice as many of
+/// them as the next one is named. Takes some milliseconds. Stateless.
 class RigMonitor {
  public:
   static constexpr double kReach = 24.0;  ///< px, rows above and below its own in which a corner is looked for
@@ -52,9 +55,11 @@ class RigMonitor {
   /// Whether so few of the corners were found that the rig is worth a look.
   bool isSuspicious(int corners, int found) const;
 
-  /// Looks for disparities up to half of the width. Too little to say is found where the view is dark, covered or out
-  /// of focus. Images are CV_8U of one size. Corners that come first are looked at first.
-  RigDiagnosis diagnose(const cv::Mat& left, const cv::Mat& right, const std::vector<cv::Point2f>& corners) const;
+  /// Too little to say is found where both views are dark, covered or out of focus. Images are CV_8U of one size.
+  /// Corners that come first are looked at first. Brightness and sharpness in the reports of this pair and of the one
+  /// before it show a side that repeats its image.
+  RigDiagnosis diagnose(const cv::Mat& left, const cv::Mat& right, const std::vector<cv::Point2f>& corners,
+                        const ExtractionReport& report = {}, const ExtractionReport& before = {}) const;
 
  private:
   RigMonitorOptions options_;
