@@ -50,7 +50,7 @@ class StampFilter {
       ++dropped_;
       return {};
     }
-    dropHeld();
+    if (held_) ++dropped_;
     held_.emplace(std::move(item), arrival);
     return {};
   }
