@@ -8,8 +8,6 @@
 namespace sdvo {
 namespace {
 
-using PoseJacobian = Eigen::Matrix<double, 3, 6>;
-
 /// Measurement minus prediction (as by predictObservation()) of a point in one camera, divided by the noise.
 struct WindowResidual {
   Eigen::Vector3d P;  ///< scaled point in the camera's frame
@@ -37,29 +35,40 @@ struct WindowResidual {
 
 /// Derivatives of the prediction, divided by the noise.
 struct WindowJacobians {
+  Eigen::Matrix3d by_place;  ///< by P at constant rho
   Eigen::Matrix3d by_point;
-  PoseJacobian by_pose;  ///< by the left perturbation
+  Vector6d disparity_by_pose;
 
   WindowJacobians(const WindowProjection& projection, const ObservedPoint& point, const WindowResidual& at,
                   const Eigen::Isometry3d& T) {
     const double rho = point.ray_and_inverse_depth.z(), iz = 1.0 / at.P.z();
-    const double fb = projection.camera.fx * projection.camera.baseline;
     const double a = projection.camera.fx * iz * at.inverse_noise.x();
     const double b = projection.camera.fy * iz * at.inverse_noise.y();
-    const double c = fb * iz * at.inverse_noise.z(), d = c * rho * iz;
+    const double c = projection.camera.fx * projection.camera.baseline * iz * at.inverse_noise.z(), d = c * rho * iz;
     const double x = at.P.x() * iz, y = at.P.y() * iz;
-    // Rows of the derivative by P at constant rho: (a, 0, -a x), (0, b, -b y), (0, 0, -d). A perturbation (t, w) of the
-    // pose moves P by rho t + w x P.
+    by_place << a, 0.0, -a * x, 0.0, b, -b * y, 0.0, 0.0, -d;
     const auto byDirection = [&](const auto& v) {
       return Eigen::Vector3d(a * (v.x() - x * v.z()), b * (v.y() - y * v.z()), -d * v.z());
     };
     by_point << byDirection(T.linear().col(0)), byDirection(T.linear().col(1)), byDirection(T.translation());
     by_point(2, 2) += c;
-    by_pose << rho * a, 0.0, -rho * a * x, -a * x * at.P.y(), a * (at.P.z() + x * at.P.x()), -a * at.P.y(),  //
-        0.0, rho * b, -rho * b * y, -b * (at.P.z() + y * at.P.y()), b * y * at.P.x(), b * at.P.x(),          //
-        0.0, 0.0, -rho * d, -d * at.P.y(), d * at.P.x(), 0.0;
+    disparity_by_pose << 0.0, 0.0, -rho * d, -d * at.P.y(), d * at.P.x(), 0.0;
   }
 };
+
+/// From columns of derivatives by P to those by the pose: a perturbation (t, w) of it moves P by rho t + w x P.
+template <int kColumns>
+void toPose(double rho, const Eigen::Vector3d& P, const Eigen::Matrix<double, 3, kColumns>& by_place,
+            Eigen::Matrix<double, 6, kColumns>& by_pose) {
+  by_pose.template topRows<3>() = rho * by_place;
+  for (int k = 0; k < kColumns; ++k) by_pose.col(k).template tail<3>() = P.cross(by_place.col(k));
+}
+
+/// block -= a b^T. Column by column: so a compiler keeps `a` in registers.
+template <class Block>
+void subtractProduct(const Eigen::Matrix<double, 6, 3>& a, const Eigen::Matrix<double, 6, 3>& b, Block&& block) {
+  for (int k = 0; k < 6; ++k) block.col(k) -= a.col(0) * b(k, 0) + a.col(1) * b(k, 1) + a.col(2) * b(k, 2);
+}
 
 }  // namespace
 
@@ -118,12 +127,17 @@ EliminatedPoint PoseEquations::add(const WindowProjection& projection, const Obs
     if (seen.frame == 0) continue;
     PoseFactor& factor = factors[result.factors++];
     factor.pose = seen.frame - 1;
-    const PoseJacobian weighted_pose = w * J.by_pose;
-    factor.Y.noalias() = weighted_pose.transpose() * J.by_point;
-    factor.gradient.noalias() = weighted_pose.transpose() * at.value;
-    hessian_.block<6, 6>(6 * factor.pose, 6 * factor.pose).noalias() += weighted_pose.transpose() * J.by_pose;
+    const double rho = point.ray_and_inverse_depth.z();
+    const Eigen::Matrix3d weighted_place = w * J.by_place.transpose();
+    toPose<3>(rho, at.P, weighted_place.lazyProduct(J.by_point), factor.Y);
+    toPose<1>(rho, at.P, weighted_place.lazyProduct(at.value), factor.gradient);
+    Eigen::Matrix<double, 6, 3> by_both;
+    toPose<3>(rho, at.P, weighted_place.lazyProduct(J.by_place), by_both);
+    auto of_pose = hessian_.block<6, 6>(6 * factor.pose, 6 * factor.pose);
+    of_pose.leftCols<3>() += rho * by_both;
+    for (int k = 3; k < 6; ++k) of_pose.block<1, 3>(k, 3) += at.P.cross(by_both.row(k)).transpose();
     hessian_.block<kCalibration, 6>(calibration, 6 * factor.pose).noalias() +=
-        weighted_shape.transpose() * J.by_pose.row(2);
+        weighted_shape.transpose() * J.disparity_by_pose.transpose();
   }
 
   const Eigen::Vector3d unit(1.0, 1.0, projection.camera.baseline * projection.camera.baseline);
@@ -141,8 +155,7 @@ EliminatedPoint PoseEquations::add(const WindowProjection& projection, const Obs
     hessian_.block<kCalibration, 6>(calibration, 6 * factor.pose).noalias() -=
         result.by_calibration * factor.Y.transpose();
     for (int other = 0; other <= k; ++other)
-      hessian_.block<6, 6>(6 * factor.pose, 6 * factors[other].pose).noalias() -=
-          factor.Y * factors[other].Y.transpose();
+      subtractProduct(factor.Y, factors[other].Y, hessian_.block<6, 6>(6 * factor.pose, 6 * factors[other].pose));
   }
   hessian_.bottomRightCorner<kCalibration, kCalibration>() -= result.by_calibration * result.by_calibration.transpose();
   gradient_.tail<kCalibration>() += result.calibration_gradient;

@@ -237,30 +237,32 @@ class Solver {
   double meatOf(const ReducedSystem& system, const Estimate& estimate,
                 const Eigen::Matrix<double, 6, Eigen::Dynamic>& by) {
     constexpr int kSide = 64;  // clusters along each axis at most
-    clusters_.assign(kSide * kSide, Vector6d::Zero());
+    clusters_.clear();
     const double scale = window_->camera.fx / kPart;
     const auto index = [&](double ray) { return std::clamp(static_cast<int>(ray * scale + kSide / 2), 0, kSide - 1); };
     const PoseFactor* observation = system.factors.data();
     for (std::size_t p = 0; p < system.points.size(); ++p) {
       const EliminatedPoint& point = system.points[p];
-      Vector6d& moved = clusters_[index(estimate.points[p].y()) * kSide + index(estimate.points[p].x())];
-      moved += by.rightCols<kCalibration>().lazyProduct(point.calibration_gradient);
+      Vector6d moved = by.rightCols<kCalibration>().lazyProduct(point.calibration_gradient);
       for (const PoseFactor* end = observation + point.factors; observation != end; ++observation)
         moved += by.middleCols<6>(6 * observation->pose).lazyProduct(observation->gradient);
+      clusters_.push_back({index(estimate.points[p].x()), index(estimate.points[p].y()), moved});
     }
     double most = 0.0;
     for (int side = kSide; side >= kSide / 4; side /= 2) {
-      double sum = 0.0, occupied = 0.0;
-      for (int k = 0; k < side * side; ++k) {
-        const double square = clusters_[k].squaredNorm();
-        sum += square, occupied += square > 0.0;
+      cluster_at_.assign(side * side, -1);
+      int count = 0;
+      for (const Cluster& part : clusters_) {
+        int& at = cluster_at_[part.y * side + part.x];
+        if (at < 0)
+          at = count, clusters_[count++] = part;
+        else
+          clusters_[at].gradient += part.gradient;
       }
-      if (side < kSide) sum *= largerArea(occupied);
-      most = std::max(most, sum);
-      for (int k = 0; k < side * side / 4; ++k) {  // in place: a cluster's four parts have indices of at least its own
-        const Vector6d* four = &clusters_[4 * k - 2 * (k % (side / 2))];
-        clusters_[k] = four[0] + four[1] + four[side] + four[side + 1];
-      }
+      clusters_.resize(count);
+      double sum = 0.0;
+      for (Cluster& cluster : clusters_) sum += cluster.gradient.squaredNorm(), cluster.x /= 2, cluster.y /= 2;
+      most = std::max(most, side < kSide ? sum * largerArea(count) : sum);
     }
     return most;
   }
@@ -331,7 +333,12 @@ class Solver {
   std::vector<std::size_t> anchor_of_point_;
   PoseEquations equations_;
   std::vector<double> squares_;
-  std::vector<Vector6d> clusters_;
+  struct Cluster {
+    int x, y;
+    Vector6d gradient;
+  };
+  std::vector<Cluster> clusters_;
+  std::vector<int> cluster_at_;
   Eigen::MatrixXd known_, units_, solved_;
   Eigen::LLT<Eigen::MatrixXd> factor_;
   int poses_ = 0, size_ = 0;
