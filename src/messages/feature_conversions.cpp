@@ -54,13 +54,8 @@ stereo_descriptor_vo::StereoFeatures toMessage(const StereoFeatures& features, c
   message.refused = report.refused;
   message.status = report.status;
 
-  message.u = features.u;
-  message.v = features.v;
-  message.disparity = features.disparity;
-  message.dv = features.dv;
-  message.size = features.size;
-  message.angle = features.angle;
-  message.response = features.response;
+  StereoFeatures::forEachArray<stereo_descriptor_vo::StereoFeatures>(
+      [&](auto ours, auto theirs) { message.*theirs = features.*ours; });
   message.descriptors = bytesOf(features.descriptors);
   message.patch_side = static_cast<std::uint32_t>(features.patch_layout.side);
   message.patch_min_spacing = features.patch_layout.min_spacing;
@@ -84,17 +79,12 @@ StereoFeatures fromMessage(const StereoFeaturesView& view) {
   features.descriptor = message.descriptor;
   features.layout = valueOf<DescriptorLayout>(message.layout);
   features.element_type = valueOf<ElementType>(message.element_type);
-  features.u = message.u;
-  features.v = message.v;
-  features.disparity = message.disparity;
-  features.dv = message.dv;
-  features.size = message.size;
-  features.angle = message.angle;
-  features.response = message.response;
+  StereoFeatures::forEachArray<stereo_descriptor_vo::StereoFeatures>(
+      [&](auto ours, auto theirs) { features.*ours = message.*theirs; });
   features.descriptors = cv::Mat(features.count(), static_cast<int>(message.bytes_per_row), CV_8U,
                                  const_cast<std::uint8_t*>(message.descriptors.data()))
                              .clone();
-  features.patch_layout = {static_cast<int>(message.patch_side), message.patch_min_spacing, message.patch_spacing};
+  features.patch_layout = view.patchLayout();
   features.patches = view.patches().clone();
 
   ExtractionReport& report = features.report;

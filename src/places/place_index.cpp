@@ -26,8 +26,7 @@ std::vector<int> sampleBits(int row_bits, int count) {
 
 std::size_t Place::bytes() const {
   std::size_t bytes = sizeof(Place) + features.descriptors.total() * features.descriptors.elemSize();
-  StereoFeatures::forEachArray(
-      [&](const char*, auto array, auto) { bytes += (features.*array).size() * sizeof(float); });
+  StereoFeatures::forEachArray([&](auto array, auto) { bytes += (features.*array).size() * sizeof(float); });
   return bytes;
 }
 

@@ -48,11 +48,8 @@ void ArrivalLog::note(Input input, const ros::Time& stamp, double now) {
       }
       first_stamp_ = std::max(first_stamp_, topic.arrivals.front().stamp);
     }
-  const auto waits = [](const Arrival& arrival) { return arrival.fate == Fate::kWaits; };
-  if (std::count_if(arrivals.begin(), arrivals.end(), waits) > options_.sync_queue_size)
-    giveUp(input, *std::find_if(arrivals.begin(), arrivals.end(), waits));
   while (arrivals.size() > kMost || arrivals.front().now < now - kMemory) {
-    if (waits(arrivals.front())) giveUp(input, arrivals.front());
+    if (arrivals.front().fate == Fate::kWaits) giveUp(input, arrivals.front());
     arrivals.pop_front();
   }
 }
@@ -70,9 +67,6 @@ void ArrivalLog::notePair(const ros::Time& left, const ros::Time& right, double 
     if (std::exchange(used->is_counted, false)) unused_.takeBack(UnusedInput::kUnpaired);
     used->fate = Fate::kPaired;
     longest_wait_ = std::max(longest_wait_, now - used->now);
-    // Each input keeps its order, so the partners of all before were lost.
-    for (auto before = used; before != arrivals.rend(); ++before)
-      if (before->fate == Fate::kWaits) giveUp(input, *before);
   }
 }
 

@@ -22,27 +22,29 @@
 
 namespace {
 
+using namespace sdvo;
+
 // KITTI's times start at 0, which ROS reads as "no time": all stamps are times.txt plus this.
 constexpr std::int64_t kEpoch = 1000000000LL * 1000000000LL;  // ns
 
 struct Arguments {
   std::string tool, input, output;
   std::string poses;  ///< empty: look beside the input
-  sdvo::StereoSource source;
+  StereoSource source;
   int frames = std::numeric_limits<int>::max();
 };
 
 /// True poses of the rectified left camera in each frame; empty, with a note, where they are not known.
-sdvo::Trajectory groundTruth(const Arguments& arguments, std::size_t frames) {
-  const auto mav0 = sdvo::findMav0(arguments.input);
+Trajectory groundTruth(const Arguments& arguments, std::size_t frames) {
+  const auto mav0 = findMav0(arguments.input);
   const std::optional<std::string> path =
-      arguments.poses.empty() && !mav0 ? sdvo::findKittiPoses(arguments.input) : arguments.poses;
-  sdvo::Trajectory poses;
+      arguments.poses.empty() && !mav0 ? findKittiPoses(arguments.input) : arguments.poses;
+  Trajectory poses;
   std::string problem;
   if (mav0 && arguments.poses.empty())
-    poses = sdvo::EurocSequence(*mav0, arguments.source.calibration, arguments.source.fov).rectifiedPoses(problem);
+    poses = EurocSequence(*mav0, arguments.source.calibration, arguments.source.fov).rectifiedPoses(problem);
   else if (path)
-    poses = sdvo::readKittiPoses(*path);
+    poses = readKittiPoses(*path);
   else
     problem = "no poses file beside '" + arguments.input + "' and no --poses";
   if (!problem.empty()) {
@@ -59,40 +61,40 @@ sdvo::Trajectory groundTruth(const Arguments& arguments, std::size_t frames) {
 /// A bag of the images as a folder has them. `geometry`: of the rectified images or what rectifies raw ones.
 template <class Sequence, class Geometry>
 void writeBag(const Arguments& arguments, const Sequence& sequence, const Geometry& geometry,
-              const sdvo::StereoCamera& rectified, std::int64_t epoch, const std::string& topic) {
-  const auto left = sdvo::toCameraInfo(geometry, 0), right = sdvo::toCameraInfo(geometry, 1);
+              const StereoCamera& rectified, std::int64_t epoch, const std::string& topic) {
+  const auto left = toCameraInfo(geometry, 0), right = toCameraInfo(geometry, 1);
   const int frames = std::min(arguments.frames, sequence.size());
   std::vector<ros::Time> stamps;
   for (int i = 0; i < frames; ++i)
     stamps.push_back(ros::Time().fromNSec(static_cast<std::uint64_t>(epoch + sequence.stamp(i))));
-  sdvo::StereoBag bag(arguments.output, arguments.tool, stamps, rectified, groundTruth(arguments, stamps.size()));
-  sdvo::Progress progress("writing bag", frames);
+  StereoBag bag(arguments.output, arguments.tool, stamps, rectified, groundTruth(arguments, stamps.size()));
+  Progress progress("writing bag", frames);
   for (int i = 0; i < frames; ++i, progress.step())
     bag.write(static_cast<std::size_t>(i), topic, sequence.load(i), left, right);
   bag.commit();
 }
 
 void writeBag(const Arguments& arguments) {
-  if (const auto mav0 = sdvo::findMav0(arguments.input)) {
-    const sdvo::EurocSequence sequence(*mav0, arguments.source.calibration, arguments.source.fov);
+  if (const auto mav0 = findMav0(arguments.input)) {
+    const EurocSequence sequence(*mav0, arguments.source.calibration, arguments.source.fov);
     if (sequence.unpaired() > 0)
       std::cerr << "note: " << sequence.unpaired() << " image(s) without a partner are left out" << std::endl;
     return writeBag(arguments, sequence, sequence.rectification(), sequence.rectification().camera(), 0, "image_raw");
   }
-  const sdvo::KittiSequence sequence(arguments.input);
+  const KittiSequence sequence(arguments.input);
   writeBag(arguments, sequence, sequence.camera(), sequence.camera(), kEpoch, "image_rect");
 }
 
 /// A folder in KITTI's layout, of rectified images.
 void writeFolder(const Arguments& arguments) {
-  const auto recording = sdvo::openRecording(arguments.input, arguments.source);
-  sdvo::KittiWriter output(arguments.output);
+  const auto recording = openRecording(arguments.input, arguments.source);
+  KittiWriter output(arguments.output);
   std::vector<std::int64_t> stamps;
-  sdvo::StereoCamera camera;
+  StereoCamera camera;
   int left_out = 0;
   {
-    sdvo::Progress progress("writing images", std::min(arguments.frames, recording->size()));
-    left_out = recording->forEach(arguments.frames, [&](const sdvo::RecordedPair& pair) {
+    Progress progress("writing images", std::min(arguments.frames, recording->size()));
+    left_out = recording->forEach(arguments.frames, [&](const RecordedPair& pair) {
       const int i = static_cast<int>(stamps.size());
       if (i > 0 && pair.camera != camera)
         throw std::runtime_error("the calibration changes in pair " + std::to_string(i));
@@ -104,7 +106,7 @@ void writeFolder(const Arguments& arguments) {
     });
   }
   if (left_out > 0) std::cerr << "note: " << left_out << " stamp(s) without a usable pair are left out" << std::endl;
-  const sdvo::Trajectory poses = groundTruth(arguments, stamps.size());
+  const Trajectory poses = groundTruth(arguments, stamps.size());
   const std::int64_t first = stamps.front();
   for (std::int64_t& stamp : stamps) stamp -= first;
   output.finish(camera, stamps, poses);

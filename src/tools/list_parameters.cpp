@@ -10,7 +10,9 @@
 
 namespace {
 
-std::string rangeOf(const sdvo::Option& option) {
+using namespace sdvo;
+
+std::string rangeOf(const Option& option) {
   std::ostringstream text;
   if (std::holds_alternative<bool*>(option.value)) return "true, false";
   if (std::holds_alternative<std::string*>(option.value)) return "text";
@@ -46,22 +48,22 @@ const std::vector<FirstChoice>& firstChoices() {
   return choices;
 }
 
-bool isFirstChoice(const sdvo::Option& option) {
+bool isFirstChoice(const Option& option) {
   const auto& choices = firstChoices();
   return std::any_of(choices.begin(), choices.end(), [&](const FirstChoice& c) { return c.name == option.name; });
 }
 
 /// Default, unit, range and meaning as cells.
-std::string cells(const sdvo::Option& option) {
+std::string cells(const Option& option) {
   return " | " + option.text() + " | " + option.unit + " | " + rangeOf(option) + " | " + cell(option.meaning) + " |";
 }
 
-void printFirstChoices(const std::vector<sdvo::Option>& options) {
+void printFirstChoices(const std::vector<Option>& options) {
   std::cout << "| parameter | nodelet | default | unit | range | meaning | change it when |\n"
                "| --- | --- | --- | --- | --- | --- | --- |\n";
   for (const FirstChoice& choice : firstChoices()) {
     const auto option =
-        std::find_if(options.begin(), options.end(), [&](const sdvo::Option& o) { return o.name == choice.name; });
+        std::find_if(options.begin(), options.end(), [&](const Option& o) { return o.name == choice.name; });
     if (option == options.end()) throw std::logic_error("no nodelet has the parameter " + choice.name);
     const std::size_t slash = choice.name.find('/');
     std::cout << "| `" << choice.name.substr(slash + 1) << "` | " << choice.name.substr(0, slash) << cells(*option)
@@ -69,20 +71,20 @@ void printFirstChoices(const std::vector<sdvo::Option>& options) {
   }
 }
 
-void printTable(const std::string& nodelet, const std::vector<sdvo::Option>& options) {
+void printTable(const std::string& nodelet, const std::vector<Option>& options) {
   const std::string prefix = nodelet + "/";
   std::cout << "\n## " << nodelet
             << "\n| parameter | default | unit | range | meaning |\n| --- | --- | --- | --- | --- |\n";
-  for (const sdvo::Option& option : options)
+  for (const Option& option : options)
     if (option.name.compare(0, prefix.size(), prefix) == 0 && !isFirstChoice(option))
       std::cout << "| `" << option.name.substr(prefix.size()) << "`" << cells(option) << "\n";
 }
 
 int run() {
-  sdvo::PipelineOptions core;
-  sdvo::InterfaceOptions nodelets;
-  std::vector<sdvo::Option> options = sdvo::listOptions(nodelets);
-  for (const sdvo::Option& option : sdvo::listOptions(core)) options.push_back(option);
+  PipelineOptions core;
+  InterfaceOptions nodelets;
+  std::vector<Option> options = listOptions(nodelets);
+  for (const Option& option : listOptions(core)) options.push_back(option);
 
   std::cout << "# Parameters\n\n"
                "Private parameters of the nodelets: first the ten that most users change, then all others. Made by "

@@ -7,8 +7,11 @@
 #include <set>
 #include <sstream>
 #include <stdexcept>
+#include <utility>
 
+#include "../common/statistics.hpp"
 #include "../common/stopwatch.hpp"
+#include "../common/text.hpp"
 #include "../data/text_file.hpp"
 
 namespace sdvo {
@@ -80,8 +83,7 @@ PlaceErrors PlaceRun::errors(const Trajectory& truth) const {
   constexpr double kWrong = 1.0, kWrongAngle = 5.0;  // m, deg
   const std::size_t pairs = pairs_.size() - first_pair_;
   if (truth.size() < pairs)
-    throw std::invalid_argument("--poses has " + std::to_string(truth.size()) + " poses for " + std::to_string(pairs) +
-                                " pairs");
+    throw std::invalid_argument(text(0, "--poses has ", truth.size(), " poses for ", pairs, " pairs"));
   PlaceErrors errors;
   std::map<int, int> pair_of;
   for (auto keyframe = ownKeyframes(); keyframe != keyframes_.end(); ++keyframe)
@@ -114,12 +116,10 @@ PlaceErrors PlaceRun::errors(const Trajectory& truth) const {
 }
 
 double PlaceRun::keyframeTime(double quantile) const {
-  if (keyframes_.empty()) return 0.0;
   std::vector<double> times;
   for (const Keyframe& keyframe : keyframes_)
     times.push_back(1e3 * (keyframe.report.find_time + keyframe.report.verify_time));
-  std::sort(times.begin(), times.end());
-  return times[static_cast<std::size_t>(quantile * static_cast<double>(times.size() - 1) + 0.5)];
+  return sdvo::quantile(std::move(times), quantile);
 }
 
 double PlaceRun::cpuTime() const {

@@ -31,45 +31,46 @@ namespace fs = std::filesystem;
 
 namespace {
 
+using namespace sdvo;
+
 constexpr int kAll = std::numeric_limits<int>::max();
 
 struct Arguments {
   std::vector<std::string> inputs, before, settings;
   std::string config, format, poses, timing, states, output, odometry, keyframes, truth, page, live, pictures,
       base_frame;
-  sdvo::StereoSource source;
+  StereoSource source;
   int frames = kAll, threads = 1;
   bool join = false, places = false, shuttle = false, halves = false;
 };
 
 /// The odometry on a recording, and on two halves of its features.
 struct Drive {
-  sdvo::OfflineRun whole, first, second;
+  OfflineRun whole, first, second;
   int left_out = 0;  ///< stamps without a usable pair
 
-  explicit Drive(const sdvo::PipelineOptions& options) : whole(options), first(options), second(options) {}
+  explicit Drive(const PipelineOptions& options) : whole(options), first(options), second(options) {}
 };
 
 /// What the page of a drive needs of each pair while its images are there.
 struct Seen {
-  sdvo::CameraCheck check;
-  sdvo::DrivePictures pictures;
+  CameraCheck check;
+  DrivePictures pictures;
 };
 
-void follow(sdvo::Recording& recording, const Arguments& arguments, Drive& drive, sdvo::PlaceRun* places,
-            Seen* seen = nullptr) {
-  sdvo::FeatureHalves halves;
-  sdvo::Progress progress(places ? "places" : "odometry", std::min(arguments.frames, recording.size()));
-  drive.left_out = recording.forEach(arguments.frames, [&](const sdvo::RecordedPair& pair) {
+void follow(Recording& recording, const Arguments& arguments, Drive& drive, PlaceRun* places, Seen* seen = nullptr) {
+  FeatureHalves halves;
+  Progress progress(places ? "places" : "odometry", std::min(arguments.frames, recording.size()));
+  drive.left_out = recording.forEach(arguments.frames, [&](const RecordedPair& pair) {
     if (arguments.threads > 1 && !places && !arguments.halves && !seen && arguments.pictures.empty()) {
       drive.whole.processBeside(pair.camera, pair.left, pair.right, pair.stamp);
     } else {
-      const sdvo::StereoFeatures features = drive.whole.process(pair.camera, pair.left, pair.right, pair.stamp);
+      const StereoFeatures features = drive.whole.process(pair.camera, pair.left, pair.right, pair.stamp);
       if (places) places->process(features, drive.whole.last());
       if (!arguments.pictures.empty()) {
         std::ostringstream name;
         name << std::setw(6) << std::setfill('0') << drive.whole.pairs() - 1 << ".jpg";
-        sdvo::writeImage(fs::path(arguments.pictures) / name.str(), drawLeft(pair, features, drive.whole.last()));
+        writeImage(fs::path(arguments.pictures) / name.str(), drawLeft(pair, features, drive.whole.last()));
       }
       if (seen) seen->check.add(pair, features), seen->pictures.add(pair, features, drive.whole.last());
       if (arguments.halves) {
@@ -83,13 +84,13 @@ void follow(sdvo::Recording& recording, const Arguments& arguments, Drive& drive
   drive.whole.finish();
 }
 
-std::vector<sdvo::SelfCheck> checkItself(const sdvo::Recording& recording, const Drive& drive,
-                                         const sdvo::PipelineOptions& options, const Arguments& arguments) {
-  std::vector<sdvo::SelfCheck> checks;
+std::vector<SelfCheck> checkItself(const Recording& recording, const Drive& drive, const PipelineOptions& options,
+                                   const Arguments& arguments) {
+  std::vector<SelfCheck> checks;
   if (arguments.shuttle) {
-    sdvo::OfflineRun back(options);
-    sdvo::Progress progress("backwards", drive.whole.pairs());
-    recording.forEachBackwards([&](const sdvo::RecordedPair& pair) {
+    OfflineRun back(options);
+    Progress progress("backwards", drive.whole.pairs());
+    recording.forEachBackwards([&](const RecordedPair& pair) {
       back.process(pair.camera, pair.left, pair.right, pair.stamp);
       progress.step();
     });
@@ -99,12 +100,12 @@ std::vector<sdvo::SelfCheck> checkItself(const sdvo::Recording& recording, const
   return checks;
 }
 
-void writePoses(const std::string& path, const std::string& format, const sdvo::OfflineRun& run) {
-  format == "tum" ? sdvo::writeTumPoses(path, run.stampedPoses()) : sdvo::writeKittiPoses(path, run.poses());
+void writePoses(const std::string& path, const std::string& format, const OfflineRun& run) {
+  format == "tum" ? writeTumPoses(path, run.stampedPoses()) : writeKittiPoses(path, run.poses());
 }
 
-void printSummary(const sdvo::OfflineRun& run, sdvo::PipelineOptions options) {
-  std::cout << "options " << sdvo::hashOptions(sdvo::listOptions(options)) << "\n"
+void printSummary(const OfflineRun& run, PipelineOptions options) {
+  std::cout << "options " << hashOptions(listOptions(options)) << "\n"
             << run.pairs() << " pairs, " << run.pairsWithoutPose() << " without a pose, " << run.distance()
             << " m travelled\n"
             << "time per pair: median " << run.time(0.5) << " ms, p95 " << run.time(0.95) << " ms, CPU "
@@ -112,8 +113,8 @@ void printSummary(const sdvo::OfflineRun& run, sdvo::PipelineOptions options) {
 }
 
 /// `way`: m, of all recordings.
-void printSummary(const sdvo::OfflineRun& run, const sdvo::PlaceRun& places, double way) {
-  const sdvo::PlaceRecognition& recognition = places.recognition();
+void printSummary(const OfflineRun& run, const PlaceRun& places, double way) {
+  const PlaceRecognition& recognition = places.recognition();
   const auto kept = static_cast<double>(std::max<std::size_t>(recognition.places().size(), 1));
   const double bytes = static_cast<double>(recognition.bytes()) / kept;
   std::cout << run.pairs() << " pairs, " << run.distance() << " m, " << recognition.places().size() << " key frames of "
@@ -125,19 +126,18 @@ void printSummary(const sdvo::OfflineRun& run, const sdvo::PlaceRun& places, dou
             << places.cpuTime() << " ms\n";
 }
 
-void printErrors(const sdvo::PlaceErrors& errors) {
+void printErrors(const PlaceErrors& errors) {
   std::cout << std::setprecision(3) << "revisits " << errors.revisits << ", recognised " << errors.recognised
             << "; loops " << errors.loops << ", false " << errors.false_loops << ", worst " << errors.worst_translation
             << " m " << errors.worst_rotation << " deg\n"
             << "ATE before " << errors.ate_before << " m, after " << errors.ate_after << " m\n";
 }
 
-sdvo::Finding makePage(const sdvo::Recording& recording, const Drive& drive, const Seen& seen,
-                       const std::vector<sdvo::SelfCheck>& checks, const sdvo::PipelineOptions& options,
-                       const Arguments& arguments) {
+Finding makePage(const Recording& recording, const Drive& drive, const Seen& seen, const std::vector<SelfCheck>& checks,
+                 const PipelineOptions& options, const Arguments& arguments) {
   const std::string& input = arguments.inputs.front();
-  const sdvo::ArrivalFindings arrivals = recording.arrivals(arguments.base_frame);
-  sdvo::DriveReport report;
+  const ArrivalFindings arrivals = recording.arrivals(arguments.base_frame);
+  DriveReport report;
   report.name = fs::absolute(input).lexically_normal().string();
   report.left_out = drive.left_out;
   report.options = options;
@@ -153,14 +153,14 @@ sdvo::Finding makePage(const sdvo::Recording& recording, const Drive& drive, con
   if (!arguments.truth.empty()) report.truth = recording.truth(arguments.truth, stamps);
   if (const std::string live = arguments.live.empty() ? input : arguments.live; fs::is_regular_file(live)) {
     rosbag::Bag bag;
-    sdvo::openBag(live, bag);
+    openBag(live, bag);
     try {
-      report.live = sdvo::ofBag(live, [&] { return sdvo::readLiveRecord(bag); });
+      report.live = ofBag(live, [&] { return readLiveRecord(bag); });
     } catch (const std::runtime_error& e) {
       std::cerr << "note: " << e.what() << "; the page lacks what the odometry reported while it ran" << std::endl;
     }
   }
-  sdvo::writeDrivePage(arguments.page, report, drive.whole);
+  writeDrivePage(arguments.page, report, drive.whole);
   return judge(report, drive.whole);
 }
 
@@ -176,22 +176,22 @@ std::string nameOf(const std::string& input) {
 }
 
 /// NAME.txt, NAME.csv and report.csv, for people and for run_many, which joins these reports.
-void writeResults(const Drive& drive, const std::vector<sdvo::SelfCheck>& checks, sdvo::PipelineOptions options,
+void writeResults(const Drive& drive, const std::vector<SelfCheck>& checks, PipelineOptions options,
                   const Arguments& arguments) {
-  const sdvo::OfflineRun& run = drive.whole;
+  const OfflineRun& run = drive.whole;
   const std::string name = nameOf(arguments.inputs.front()), base = (fs::path(arguments.output) / name).string();
   writePoses(base + ".txt", arguments.format.empty() ? "tum" : arguments.format, run);
   run.writeTiming(base + ".csv");
   fs::remove(base + ".self_check.csv");  // of an earlier run
-  std::string rows = std::string(sdvo::SelfCheck::columns()) + "\n";
-  for (const sdvo::SelfCheck& check : checks) rows += check.row() + "\n";
-  if (!checks.empty()) sdvo::writeTextFile(base + ".self_check.csv", rows);
+  std::string rows = std::string(SelfCheck::columns()) + "\n";
+  for (const SelfCheck& check : checks) rows += check.row() + "\n";
+  if (!checks.empty()) writeTextFile(base + ".self_check.csv", rows);
   std::ostringstream report;
   report << "bag,pairs,without_pose,discontinuities,left_out,distance_m,median_ms,p95_ms,cpu_ms,options,problem\n"
          << std::fixed << std::setprecision(1) << name << "," << run.pairs() << "," << run.pairsWithoutPose() << ","
          << run.discontinuities() << "," << drive.left_out << "," << run.distance() << "," << run.time(0.5) << ","
-         << run.time(0.95) << "," << run.cpuTime() << "," << sdvo::hashOptions(sdvo::listOptions(options)) << ",\n";
-  sdvo::writeTextFile(reportOf(arguments), report.str());
+         << run.time(0.95) << "," << run.cpuTime() << "," << hashOptions(listOptions(options)) << ",\n";
+  writeTextFile(reportOf(arguments), report.str());
 }
 
 /// True poses are of the kind of ours, and of two outputs of one name one would be left.
@@ -201,7 +201,7 @@ void refuseOutputsThatReplace(const Arguments& arguments) {
   take(arguments.truth);
   for (const auto& recordings : {arguments.inputs, arguments.before})
     for (const std::string& recording : recordings)
-      if (const auto poses = sdvo::findKittiPoses(recording)) take(*poses);
+      if (const auto poses = findKittiPoses(recording)) take(*poses);
   for (const std::string& output :
        {arguments.poses, arguments.odometry, arguments.timing, arguments.states, arguments.keyframes, arguments.page})
     if (!output.empty() && !take(output) && fs::is_regular_file(output))
@@ -222,15 +222,15 @@ int run(const Arguments& arguments) {
     throw std::runtime_error(
         "several recordings are run_many's; --join where they are parts of one drive (see --help)");
   cv::setNumThreads(arguments.threads);
-  const sdvo::PipelineOptions options = sdvo::readPipelineOptions(arguments.config, arguments.settings);
-  std::optional<sdvo::PlaceRun> places;
+  const PipelineOptions options = readPipelineOptions(arguments.config, arguments.settings);
+  std::optional<PlaceRun> places;
   if (arguments.places) places.emplace(options.place_recognition);
   double way = 0.0;  // m, of all recordings
   for (const std::string& before : arguments.before) {
     Arguments whole = arguments;
     whole.frames = kAll;
     Drive drive(options);
-    follow(*sdvo::openRecording(before, arguments.source), whole, drive, &*places);
+    follow(*openRecording(before, arguments.source), whole, drive, &*places);
     way += drive.whole.distance();
     places->startSequence();
   }
@@ -242,16 +242,15 @@ int run(const Arguments& arguments) {
   if (!arguments.pictures.empty() && !fs::is_empty(arguments.pictures))
     throw std::runtime_error("--pictures '" + arguments.pictures + "' is not empty: choose another folder");
   if (!arguments.output.empty()) fs::remove(reportOf(arguments));  // of an earlier run
-  const auto recording = sdvo::openParts(arguments.inputs, arguments.source);
+  const auto recording = openParts(arguments.inputs, arguments.source);
   Drive drive(options);
   std::optional<Seen> seen;
   if (!arguments.page.empty())
-    seen.emplace(Seen{sdvo::CameraCheck(options, drive.whole),
-                      sdvo::DrivePictures(std::min(arguments.frames, recording->size()))});
+    seen.emplace(Seen{CameraCheck(options, drive.whole), DrivePictures(std::min(arguments.frames, recording->size()))});
   follow(*recording, arguments, drive, places ? &*places : nullptr, seen ? &*seen : nullptr);
-  const sdvo::OfflineRun& run = drive.whole;
+  const OfflineRun& run = drive.whole;
   if (places)
-    sdvo::writeKittiPoses(arguments.poses, places->poses());
+    writeKittiPoses(arguments.poses, places->poses());
   else if (!arguments.poses.empty())
     writePoses(arguments.poses, arguments.format, run);
   if (!arguments.odometry.empty()) writePoses(arguments.odometry, arguments.format, run);
@@ -261,15 +260,15 @@ int run(const Arguments& arguments) {
 
   std::cout << std::fixed << std::setprecision(1);
   places ? printSummary(run, *places, way + run.distance()) : printSummary(run, options);
-  if (places && !arguments.truth.empty()) printErrors(places->errors(sdvo::readKittiPoses(arguments.truth)));
+  if (places && !arguments.truth.empty()) printErrors(places->errors(readKittiPoses(arguments.truth)));
   if (drive.left_out > 0) std::cout << drive.left_out << " stamps without a usable pair\n";
-  const std::vector<sdvo::SelfCheck> checks = checkItself(*recording, drive, options, arguments);
-  for (const sdvo::SelfCheck& check : checks) std::cout << check.text() << "\n";
+  const std::vector<SelfCheck> checks = checkItself(*recording, drive, options, arguments);
+  for (const SelfCheck& check : checks) std::cout << check.text() << "\n";
   if (!arguments.output.empty()) writeResults(drive, checks, options, arguments);
   if (!seen) return 0;
-  const sdvo::Finding verdict = makePage(*recording, drive, *seen, checks, options, arguments);
+  const Finding verdict = makePage(*recording, drive, *seen, checks, options, arguments);
   std::cout << toString(verdict.verdict) << ": " << verdict.what << "\npage: " << arguments.page << "\n";
-  return sdvo::exitCodeOf(verdict.verdict);
+  return exitCodeOf(verdict.verdict);
 }
 
 }  // namespace

@@ -98,7 +98,7 @@ TEST(PlaceMessage, IsRefusedWhenItDoesNotHoldTogether) {
                   {[](M& m) { m.pose.orientation.w += 0.1; },
                    "the quaternion has not unit length: normalise it (w = 1 and the rest 0: no rotation)"},
                   {[](M& m) { m.features.header.stamp = ros::Time(); }, "zero stamp"},
-                  {[](M& m) { m.features.v.pop_back(); }, "refused: v has 4 elements"}});
+                  {[](M& m) { m.features.v.pop_back(); }, "refused: array v has 4 elements"}});
 }
 
 TEST(MapGraphMessage, HoldsAllOfAGraph) {

@@ -1,6 +1,8 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <string>
 #include <vector>
 
@@ -36,6 +38,12 @@ struct PatchLayout {
 
   int bytes() const { return side * side; }
 
+  /// Whether patches, if there are any, have samples at a distance.
+  bool isUsable() const {
+    return side == 0 || (side > 0 && std::isfinite(min_spacing) && min_spacing > 0.f &&
+                         std::isfinite(spacing_by_size) && spacing_by_size >= 0.f);
+  }
+
   /// Distance of neighbouring samples in px for a feature of `size` px.
   float spacing(float size) const { return std::max(min_spacing, spacing_by_size * size); }
 
@@ -44,5 +52,30 @@ struct PatchLayout {
   }
   bool operator!=(const PatchLayout& other) const { return !(*this == other); }
 };
+
+/// What each array of StereoFeatures, or of its message, may hold. Returns what one does not keep to, in words; empty:
+/// nothing. `width`, `height`: px, of the image.
+template <class Features>
+std::string faultOfArrays(const Features& features, double width, double height) {
+  constexpr double kAny = std::numeric_limits<float>::max();
+  std::string fault;
+  const auto check = [&](const std::string& name, const std::vector<float>& values, double above, double most) {
+    if (!fault.empty()) return;
+    if (values.size() != features.u.size())
+      fault = "array " + name + " has " + std::to_string(values.size()) + " elements, u has " +
+              std::to_string(features.u.size());
+    else if (!std::all_of(values.begin(), values.end(), [&](float x) { return x > above && x <= most; }))
+      fault = "array " + name + " holds a number that is not " +
+              (most < kAny ? "between " + std::to_string(above) + " and " + std::to_string(most) : "finite");
+  };
+  check("u", features.u, -1.0, width);  // on the border of a pixel of the border, it is still in the image
+  check("v", features.v, -1.0, height);
+  check("disparity", features.disparity, 0.0, width);
+  check("dv", features.dv, -height, height);
+  check("size", features.size, 0.0, width + height);
+  check("angle", features.angle, -kAny, kAny);
+  check("response", features.response, -kAny, kAny);
+  return fault;
+}
 
 }  // namespace sdvo

@@ -94,16 +94,17 @@ struct StereoFeatures {
   /// be, or the descriptors are not rows of whole elements.
   void check() const;
 
-  /// Calls visit(name, array, number of one row) with pointers to members, for each array of numbers.
-  template <class Visit>
+  /// Calls visit(array, other) with pointers to members of one name, for each array of numbers: of a row, or of the
+  /// message.
+  template <class Other = StereoFeature, class Visit>
   static void forEachArray(const Visit& visit) {
-    visit("u", &StereoFeatures::u, &StereoFeature::u);
-    visit("v", &StereoFeatures::v, &StereoFeature::v);
-    visit("disparity", &StereoFeatures::disparity, &StereoFeature::disparity);
-    visit("dv", &StereoFeatures::dv, &StereoFeature::dv);
-    visit("size", &StereoFeatures::size, &StereoFeature::size);
-    visit("angle", &StereoFeatures::angle, &StereoFeature::angle);
-    visit("response", &StereoFeatures::response, &StereoFeature::response);
+    visit(&StereoFeatures::u, &Other::u);
+    visit(&StereoFeatures::v, &Other::v);
+    visit(&StereoFeatures::disparity, &Other::disparity);
+    visit(&StereoFeatures::dv, &Other::dv);
+    visit(&StereoFeatures::size, &Other::size);
+    visit(&StereoFeatures::angle, &Other::angle);
+    visit(&StereoFeatures::response, &Other::response);
   }
 };
 
