@@ -142,11 +142,11 @@ class Solver {
   /// scaled to `squares`, the squared residuals at the result. `poses`: those whose covariance is needed.
   bool covariances(const Estimate& estimate, const std::vector<double>& squares, const std::vector<int>& poses,
                    ReducedSystem& system, WindowSolution& solution) {
-    const RigCalibration::Matrix certain = certainInformation();
+    const RigCalibration::Matrix& prior = window_->calibration_prior.information;
     system.hessian = equations_.hessian();
     system.gradient = equations_.gradient();
     known_.setZero(size_, size_);  // information of the priors, without the points'
-    known_.bottomRightCorner<kCalibration, kCalibration>() = certain;
+    known_.bottomRightCorner<kCalibration, kCalibration>() = prior;
     if (window_->floor) holdToFloor(estimate, known_, system.gradient);
     const auto [bread, meat] = sandwichScale(squares);
     system.hessian = bread * system.hessian + known_;
@@ -160,7 +160,7 @@ class Solver {
     solved_ = factor_.solve(units_);
     const RigCalibration::Matrix of_calibration = solved_.bottomRightCorner<kCalibration, kCalibration>();
     const RigCalibration::Matrix certainty = of_calibration.inverse();
-    solution.calibration_information = (certainty - certain) / bread;
+    solution.calibration_information = (certainty - prior) / bread;
     solution.pose_by_calibration = units_.leftCols(asked).transpose() * solved_.rightCols<kCalibration>() * certainty;
 
     const auto of_poses = solved_.leftCols(asked);
@@ -168,13 +168,6 @@ class Solver {
     const Eigen::MatrixXd of_points = units_.leftCols(asked).transpose() * of_poses - of_known;
     solution.pose_covariance = meat * meatOverBread(system, estimate, of_poses, of_points) * of_points + of_known;
     return solution.pose_covariance.allFinite();
-  }
-
-  /// Information of the calibration's prior. Where the prior is tighter than the evidence, only to keep the calibration
-  /// still, it is that of the evidence.
-  RigCalibration::Matrix certainInformation() const {
-    const CalibrationBelief& prior = window_->calibration_prior;
-    return prior.certain_information.value_or(prior.information);
   }
 
   /// Applies a step of poses and calibration to an estimate, and the points' steps that follow from it.

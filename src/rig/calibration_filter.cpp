@@ -1,67 +1,55 @@
 #include "stereo_descriptor_vo/rig/calibration_filter.hpp"
 
-#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
+#include "../belief/motion_hypotheses.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
 
 namespace sdvo {
 namespace {
 
+using Matrix = RigCalibration::Matrix;
+using Vector = RigCalibration::Vector;
+
 constexpr int kRememberedCommons = 200;  // windows (chosen) over which the mean of what is left at a point is taken
+constexpr double kWarming = 0.05;        // px/sqrt(s) (chosen): half a pixel in 100 s, by warmth or by knocks that no pair shows
+
+Vector priorOf(const CalibrationOptions& options) {
+  return {options.prior_offset, options.prior_bend};
+}
 
 }  // namespace
 
 CalibrationFilter::CalibrationFilter(const CalibrationOptions& options) : options_(checked(options)) {
-  calibration_.value << options_.prior_offset, options_.prior_bend;
+  calibration_.value = priorOf(options_);
 }
 
-CalibrationFilter::Information CalibrationFilter::pastBefore(int oldest_id) const {
-  if (!pending_ || pending_->newest_id >= oldest_id) return past_;
-  return pending_->evidence;
-}
-
-/// What the options say beforehand, as far as the evidence leaves it its weight.
-CalibrationFilter::Information CalibrationFilter::beforehand() const {
-  const RigCalibration::Matrix information = informationOf(significantSpread());
-  return {information, information * RigCalibration::Vector(options_.prior_offset, options_.prior_bend)};
+const CalibrationFilter::Evidence& CalibrationFilter::pastBefore(int oldest_id) const {
+  return pending_id_ >= 0 && pending_id_ < oldest_id ? pending_ : past_;
 }
 
 CalibrationBelief CalibrationFilter::prior(int oldest_id) const {
-  const Information past = pastBefore(oldest_id), held = beforehand();
-  const RigCalibration::Matrix information = held.information + past.information;
-  CalibrationBelief belief{information.inverse() * (held.information_mean + past.information_mean), information};
-  if (options_.enabled)
-    belief.certain_information =
-        informationOf(RigCalibration::Vector::Constant(options_.prior_sigma)) + past.information;
+  constexpr double kExact = 0.01;  // px: 0.1 % of the depth at 10 px of disparity; less makes the equations stiff
+  const CalibrationEstimate known = weigh(pastBefore(oldest_id));
+  const Matrix covariance = known.covariance + kExact * kExact * Matrix::Identity();
+  CalibrationBelief belief{known.mean, covariance.inverse() / kHonest};
   if (commons_ >= kFewestMeasured) belief.common_sigma = std::sqrt(std::max(common_square_, 0.0));
   return belief;
 }
 
-/// The windows keep the precision that they state; a prior weighed up by 1 / kTrust^2 is the same.
-RigCalibration::Matrix CalibrationFilter::informationOf(const RigCalibration::Vector& spread) const {
-  return (kTrust * spread).cwiseAbs2().cwiseInverse().asDiagonal();
-}
-
-/// Standard deviation, px, of the rig around the options' prior: as much of the evidence's distance from it as chance
-/// does not explain.
-RigCalibration::Vector CalibrationFilter::significantSpread() const {
-  constexpr double kHeld = 1e-4;  // px: holds the calibration where the options put it
-  RigCalibration::Vector spread = RigCalibration::Vector::Constant(kHeld);
-  if (!options_.enabled || !present_) return spread;
-  const RigCalibration::Matrix covariance = present_->information.inverse();
-  const RigCalibration::Vector estimate = covariance * present_->information_mean;
-  const RigCalibration::Vector prior(options_.prior_offset, options_.prior_bend);
-  const RigCalibration::Vector chance = noiseGate(1) * covariance.diagonal();
-  for (int i = 0; i < RigCalibration::kParameters; ++i) {
-    const double distance = estimate[i] - prior[i];
-    const double significant = std::sqrt(std::max(distance * distance - chance[i], 0.0));
-    spread[i] = std::clamp(significant, spread[i], options_.prior_sigma);
-  }
-  return spread;
+/// The mixture of a rig that is as the options say and one that is not, as a normal distribution of its moments.
+CalibrationEstimate CalibrationFilter::weigh(const Evidence& evidence) const {
+  const Vector prior = priorOf(options_);
+  if (!options_.enabled) return {prior, Matrix::Zero()};
+  const double variance = options_.prior_sigma * options_.prior_sigma;
+  const Matrix covariance = (evidence.information + Matrix::Identity() / variance).inverse();
+  const Vector shown = evidence.information_mean - evidence.information * prior, distance = covariance * shown;
+  const double log_factor = 0.5 * (shown.dot(distance) + std::log(covariance.determinant() / (variance * variance)));
+  const double other = probabilityOf(log_factor);
+  return {prior + other * distance, other * covariance + other * (1.0 - other) * distance * distance.transpose()};
 }
 
 void CalibrationFilter::noteCommon(double square) {
@@ -70,39 +58,43 @@ void CalibrationFilter::noteCommon(double square) {
 }
 
 void CalibrationFilter::note(int oldest_id, int newest_id, const RigCalibration& calibration,
-                             const RigCalibration::Matrix& information) {
-  const Information held = beforehand();
+                             const Matrix& information) {
+  const CalibrationBelief prior = this->prior(oldest_id);
   past_ = pastBefore(oldest_id);
-  if (pending_ && pending_->newest_id < oldest_id) pending_.reset();
   calibration_ = calibration;
-  const RigCalibration::Matrix known = past_.information + information;
-  present_ = Information{known, (held.information + known) * calibration.value - held.information_mean};
-  if (!pending_) pending_ = {newest_id, {information, present_->information_mean - past_.information_mean}};
+  // The result with its own information and the prior's is known, so the window's own follows. The optimizer fills one
+  // triangle; what the halves differ by would grow from window to window.
+  const Matrix own = 0.5 * kHonest * (information + information.transpose());
+  const Vector own_mean = own * calibration.value + kHonest * prior.information * (calibration.value - prior.mean);
+  present_ = Evidence{past_.information + own, past_.information_mean + own_mean};
+  if (pending_id_ >= oldest_id) return;
+  pending_id_ = newest_id;
+  pending_ = *present_;
+}
+
+void CalibrationFilter::predict(double dt) {
+  widen(kWarming * kWarming * dt * Matrix::Identity());
 }
 
 void CalibrationFilter::widen(double variance) {
-  const auto widened = [&](Information& known) {
-    const RigCalibration::Vector mean = known.information.ldlt().solve(known.information_mean);
-    const RigCalibration::Matrix added = variance / (kTrust * kTrust) * RigCalibration::Matrix::Ones();
-    known.information = (RigCalibration::Matrix::Identity() + known.information * added).inverse() * known.information;
-    known.information_mean = known.information * mean;
+  widen(variance * Matrix::Ones());
+}
+
+void CalibrationFilter::widen(const Matrix& covariance) {
+  const auto widened = [&](Evidence& known) {
+    const Matrix less = (Matrix::Identity() + known.information * covariance).inverse();
+    known = {less * known.information, less * known.information_mean};
   };
-  widened(past_);
-  if (pending_) widened(pending_->evidence);
+  widened(past_), widened(pending_);
   if (present_) widened(*present_);
 }
 
 CalibrationEstimate CalibrationFilter::estimate() const {
-  const RigCalibration::Vector prior(options_.prior_offset, options_.prior_bend);
-  if (!options_.enabled) return {prior, RigCalibration::Matrix::Zero()};
-  const RigCalibration::Matrix of_prior = informationOf(RigCalibration::Vector::Constant(options_.prior_sigma));
-  const Information known = present_.value_or(Information());
-  const RigCalibration::Matrix covariance = (of_prior + known.information).inverse();
-  return {covariance * (of_prior * prior + known.information_mean), covariance / (kTrust * kTrust)};
+  return weigh(present_.value_or(Evidence()));
 }
 
 RigCalibration::Vector CalibrationFilter::sigma() const {
-  if (!present_ || !options_.enabled) return RigCalibration::Vector::Constant(std::numeric_limits<double>::quiet_NaN());
+  if (!present_ || !options_.enabled) return Vector::Constant(std::numeric_limits<double>::quiet_NaN());
   return estimate().covariance.diagonal().cwiseSqrt();
 }
 

@@ -39,8 +39,6 @@ struct CalibrationEstimate {
 struct CalibrationBelief {
   RigCalibration::Vector mean = RigCalibration::Vector::Zero();                     ///< px
   RigCalibration::Matrix information = 1e-12 * RigCalibration::Matrix::Identity();  ///< 1/px^2
-  /// Information for covariances, 1/px^2, where the calibration is held for want of evidence; `information` if not set.
-  std::optional<RigCalibration::Matrix> certain_information = std::nullopt;
   /// Standard deviation in px of what it leaves at a point, the same in all sightings; unknown to begin with.
   std::optional<double> common_sigma = std::nullopt;
 };

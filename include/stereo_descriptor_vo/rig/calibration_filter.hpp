@@ -29,18 +29,21 @@ struct CalibrationOptions {
   }
 };
 
-/// Gathers the estimates of successive windows. Windows overlap: a window's information counts as prior only for
-/// windows that share no pair with it, so that nothing is counted twice.
+/// What is known of the rig's disparity error, a filter over the windows of pairs (Kalman in information form). Windows
+/// overlap: one counts as prior only for windows that share no pair with it.
 ///
-/// A window moves the calibration away from the options' prior only as far as the evidence is significant (empirical
-/// Bayes, Efron and Morris 1973). The prior's variance is the square of the estimate less what chance explains. A
-/// simulated or well calibrated rig keeps the prior to the digit.
+/// Beforehand a rig is as likely as the options say as it is somewhere around that, by their sigma. The windows decide
+/// between the two (Bayes factor). So what is compensated goes over from the options' value to the measured one.
 class CalibrationFilter {
  public:
-  /// A window's standard deviation is too small by 1 / kTrust.
-  static constexpr double kTrust = 0.16;
+  /// Ratio between the information of a window and what it states: it counts points as if they erred independently
+  /// (chosen by the errors of long drives).
+  static constexpr double kHonest = 0.16 * 0.16;
 
   explicit CalibrationFilter(const CalibrationOptions& options);
+
+  /// `dt` s pass, in which the rig warms up or cools down.
+  void predict(double dt);
 
   /// What is known from pairs before the window that begins with pair `oldest_id`.
   CalibrationBelief prior(int oldest_id) const;
@@ -56,33 +59,29 @@ class CalibrationFilter {
   void widen(double variance);
 
   const RigCalibration& calibration() const { return calibration_; }
-  /// What options and windows tell together, whether it is significant or not.
+  /// What options and windows tell together.
   CalibrationEstimate estimate() const;
-  /// Standard deviations of (offset, bend) in px as the windows measure them, NaN before the first window.
+  /// Standard deviations of (offset, bend) in px, NaN before the first window.
   RigCalibration::Vector sigma() const;
 
  private:
-  /// Estimates of windows, the options' prior excluded, with the precision that the windows state.
-  struct Information {
+  /// Of windows, the options' prior excluded.
+  struct Evidence {
     RigCalibration::Matrix information = RigCalibration::Matrix::Zero();       ///< 1/px^2
     RigCalibration::Vector information_mean = RigCalibration::Vector::Zero();  ///< information * mean
   };
-  struct Contribution {
-    int newest_id;
-    Information evidence;
-  };
 
-  Information pastBefore(int oldest_id) const;
-  Information beforehand() const;
-  RigCalibration::Matrix informationOf(const RigCalibration::Vector& spread) const;
-  RigCalibration::Vector significantSpread() const;
+  const Evidence& pastBefore(int oldest_id) const;
+  CalibrationEstimate weigh(const Evidence& evidence) const;
+  void widen(const RigCalibration::Matrix& covariance);
 
   CalibrationOptions options_;
   RigCalibration calibration_;
-  Information past_;                     ///< of the last window that shares no pair with the present one
-  std::optional<Contribution> pending_;  ///< the window that is the next one's past
-  std::optional<Information> present_;   ///< of the past and the last window
-  int commons_ = 0;                      ///< how many squares were noted
+  Evidence past_;     ///< of windows that share no pair with the present one
+  Evidence pending_;  ///< of these and of one more, which is past to windows that begin after pair `pending_id_`
+  int pending_id_ = -1;
+  std::optional<Evidence> present_;  ///< of the past and the last window
+  int commons_ = 0;                  ///< how many squares were noted
   double common_square_ = 0.0;
 };
 
