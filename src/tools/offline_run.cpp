@@ -4,6 +4,7 @@
 #include <ctime>
 #include <future>
 #include <iomanip>
+#include <limits>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
@@ -153,7 +154,7 @@ void OfflineRun::writeStates(const std::string& path) const {
   for (const char* name : {"motion", "pose"})
     for (int i = 0; i < 36; ++i) file << "," << name << "_" << i / 6 << i % 6;
   file << ",reason\n"  // which stands last, for it may hold commas
-       << std::setprecision(10);
+       << std::setprecision(std::numeric_limits<double>::max_digits10);  // a covariance stays positive definite
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     const OdometryResult& odometry = frames_[i].odometry;
     file << i << "," << odometry.stamp << "," << toString(odometry.state) << "," << odometry.epoch << ","
