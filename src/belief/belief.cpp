@@ -38,7 +38,7 @@ Belief Doubt::weigh(const MotionScene& scene, const MotionHypothesis& found, con
   const auto largest = std::max_element(evidence.begin(), evidence.end(),
                                         [](const Evidence& a, const Evidence& b) { return a.log_odds < b.log_odds; });
   double shown = 0.0;
-  for (const Evidence& each : evidence) shown += std::exp(each.log_odds) - std::exp(kUnsuspected);
+  for (const Evidence& each : evidence) shown += std::max(std::exp(each.log_odds) - std::exp(kUnsuspected), 0.0);
   raise(evidence);
 
   Belief belief;

@@ -66,6 +66,14 @@ TEST_F(Weighed, AMotionThatNothingSpeaksAgainstIsBelieved) {
   EXPECT_FALSE(doubt.lasts());
 }
 
+/// A weight below zero would make the covariance indefinite.
+TEST_F(Weighed, EvidenceForTheMotionTakesNothingFromItsCovariance) {
+  Doubt with, without;
+  const Belief belief = weigh(with, 90, {{-30.0, "exchanged pairs"}}), plain = weigh(without, 90);
+  EXPECT_EQ(belief.moment, plain.moment);
+  EXPECT_EQ(belief.probability, plain.probability);
+}
+
 TEST_F(Weighed, EvidenceMakesThePairDoubtfulWhateverAgrees) {
   Doubt doubt;
   const Belief belief = weigh(doubt, 90, {{kUnsuspected, "nothing"}, {2.0, "a knock"}});
