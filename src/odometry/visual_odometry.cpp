@@ -370,7 +370,7 @@ void VisualOdometry::begin(const Pair& pair, const std::optional<MotionGuess>& g
   ++state_.pairs;
   if (pair.dt <= options_.tracking.max_gap) state_.prior.noteInterval(pair.dt);
   state_.outage.extend(pair.dt, guess, state_.prior);
-  state_.rig.calibration.predict(pair.dt);
+  state_.rig.calibration.predict(std::min(pair.dt, options_.tracking.max_gap));  // a clock's step changes no rig
   if (pair.rotation.log_odds > 0.0) state_.rig.rotate(pair.rotation, features.camera);
 }
 

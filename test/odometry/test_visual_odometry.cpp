@@ -809,6 +809,16 @@ TEST(VisualOdometry, RefusesRotationsThatNoRobotMakes) {
   EXPECT_TRUE(contains(result.reason, "max_rotation_rate")) << result.reason;
 }
 
+TEST(VisualOdometry, AStepOfTheClockForgetsNothingOfTheRig) {
+  VisualOdometry odometry({});
+  const OdometryResult before = follow(odometry, 10);
+  StereoFeatures pair = pairOf(11);
+  pair.stamp += 86'400'000'000'000;
+  const OdometryResult after = odometry.update(pair);
+  EXPECT_LT(after.disparity_offset_sigma, 1.5 * before.disparity_offset_sigma);
+  EXPECT_LT(after.disparity_bend_sigma, 1.5 * before.disparity_bend_sigma);
+}
+
 TEST(VisualOdometry, APredictedPairIsAsUncertainAsAVehicleMayAccelerate) {
   for (const int missed : {1, 2}) {
     VisualOdometry odometry(knownRig());
