@@ -70,8 +70,8 @@ class ExposureTurns {
   bool takeTurns() const { return turns_ >= kTurns; }
 
  private:
-  static constexpr double kMuch = 8.0;  // ratio; up to 1 : 7 descriptors and patches bridge it
-  static constexpr int kTurns = 6;      // in a row: more than a lamp that flickers
+  static constexpr double kMuch = 8.0;  // ratio (chosen): up to 1 : 7 descriptors and patches bridge it
+  static constexpr int kTurns = 6;      // in a row (chosen): more than a lamp that flickers
 
   double last_ = 0.0;
   int turns_ = 0;  ///< brighter and darker ones alternately, in a row

@@ -8,9 +8,9 @@ namespace sdvo {
 namespace {
 
 constexpr std::size_t kRemembered = 20;
-constexpr double kLongestWay = 20.0;         // m travelled between the ends of two loops
-constexpr double kLargestTranslation = 0.5;  // m between the camera's positions by two loops
-constexpr double kLargestRotation = 2.0;     // deg between its orientations by them
+constexpr double kLongestWay = 20.0;         // m (chosen) travelled between the ends of two loops
+constexpr double kLargestTranslation = 0.5;  // m (chosen) between the camera's positions by two loops
+constexpr double kLargestRotation = 2.0;     // deg (chosen) between its orientations by them
 
 }  // namespace
 

@@ -197,7 +197,7 @@ void PlaceRecognition::expect(const Eigen::Isometry3d& T_map_odom, double radius
 }
 
 std::optional<Matrix6d> PlaceRecognition::covariance() const {
-  constexpr double kShare = 0.1;  // of the largest drift, as a standard deviation
+  constexpr double kShare = 0.1;  // of the largest drift (chosen), as a standard deviation
   if (!last_) return std::nullopt;
   const GraphPath path = graph_.path(recognised_.value_or(places_.begin()->first), *last_);
   if (!path.known) return std::nullopt;

@@ -15,7 +15,8 @@ using Matrix = RigCalibration::Matrix;
 using Vector = RigCalibration::Vector;
 
 constexpr int kRememberedCommons = 200;  // windows (chosen) over which the mean of what is left at a point is taken
-constexpr double kWarming = 0.05;        // px/sqrt(s) (chosen): half a pixel in 100 s, by warmth or by knocks that no pair shows
+// px/sqrt(s) (chosen): half a pixel in 100 s, by warmth or by small knocks that no detector finds.
+constexpr double kWarming = 0.05;
 
 Vector priorOf(const CalibrationOptions& options) {
   return {options.prior_offset, options.prior_bend};
@@ -40,7 +41,7 @@ CalibrationBelief CalibrationFilter::prior(int oldest_id) const {
   return belief;
 }
 
-/// The mixture of a rig that is as the options say and one that is not, as a normal distribution of its moments.
+/// Mean and covariance of the mixture, given the windows' evidence.
 CalibrationEstimate CalibrationFilter::weigh(const Evidence& evidence) const {
   const Vector prior = priorOf(options_);
   if (!options_.enabled) return {prior, Matrix::Zero()};
@@ -62,8 +63,8 @@ void CalibrationFilter::note(int oldest_id, int newest_id, const RigCalibration&
   const CalibrationBelief prior = this->prior(oldest_id);
   past_ = pastBefore(oldest_id);
   calibration_ = calibration;
-  // The result with its own information and the prior's is known, so the window's own follows. The optimizer fills one
-  // triangle; what the halves differ by would grow from window to window.
+  // The window's result combines its own evidence with the prior, so its own is the result's less the prior's. Only one
+  // triangle of `information` is accurate; a difference between both would grow from window to window.
   const Matrix own = 0.5 * kHonest * (information + information.transpose());
   const Vector own_mean = own * calibration.value + kHonest * prior.information * (calibration.value - prior.mean);
   present_ = Evidence{past_.information + own, past_.information_mean + own_mean};

@@ -153,7 +153,7 @@ void OfflineRun::writeStates(const std::string& path) const {
   file << "frame,stamp_ns,state,epoch,has_pose,has_motion";
   for (const char* name : {"motion", "pose"})
     for (int i = 0; i < 36; ++i) file << "," << name << "_" << i / 6 << i % 6;
-  file << ",reason\n"  // which stands last, for it may hold commas
+  file << ",reason\n"                                                    // which stands last, for it may hold commas
        << std::setprecision(std::numeric_limits<double>::max_digits10);  // a covariance stays positive definite
   for (std::size_t i = 0; i < frames_.size(); ++i) {
     const OdometryResult& odometry = frames_[i].odometry;

@@ -12,7 +12,8 @@ namespace sdvo::test_calibration_filter {
 using Matrix = RigCalibration::Matrix;
 using Vector = RigCalibration::Vector;
 
-const double kSigma = std::sqrt(1.0 / (4.0 * CalibrationFilter::kHonest));  // px: an information of 4 in a window's units
+const double kSigma =
+    std::sqrt(1.0 / (4.0 * CalibrationFilter::kHonest));  // px: an information of 4 in a window's units
 
 CalibrationOptions someOptions() {
   CalibrationOptions options;

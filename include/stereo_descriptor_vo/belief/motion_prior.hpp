@@ -59,9 +59,9 @@ class MotionPrior {
   /// Of the camera in its own frame, m/s and rad/s; none where no motion can be predicted.
   const std::optional<Vector6d>& velocity() const { return velocity_; }
 
-  /// The time in which a motion took place whose stamps are `dt` s apart, s. Stamps of a burst are closer together than
-  /// the moments at which its pairs were taken. The time is never so short that the motion would exceed the largest
-  /// speed or rotation rate.
+  /// Duration of a motion, s, between pairs whose stamps are `dt` s apart. It is longer than `dt` for a burst, whose
+  /// stamps lie closer together than its exposures, and where the motion would else exceed max_speed or
+  /// max_rotation_rate.
   double interval(double dt, const Eigen::Isometry3d& motion) const;
 
   /// The next motion as the velocity, which must be known, predicts it.
@@ -81,8 +81,8 @@ class MotionPrior {
   /// Of an unseen motion around a standstill, m and rad: its speed was that of the confirmed velocity, and is bounded.
   Matrix6d unseen(double seconds) const;
 
-  /// Covariance, m^2 and rad^2, of a motion of which nothing is known. Its deviations are the distance at max_speed
-  /// over max_gap, and half a radian.
+  /// Covariance, m^2 and rad^2, of a motion without any measurement. The standard deviations are the distance at
+  /// max_speed over max_gap, and half a radian.
   Matrix6d unknown() const;
 
   /// In words, if no motion may be as fast, noise and stamps considered.
@@ -97,8 +97,8 @@ class MotionPrior {
   void interrupt() { velocity_.reset(), before_.reset(), doubt_.setZero(); }
 
  private:
-  /// Covariance, m^2 and rad^2, of a motion over `dt` s that the velocity predicts. The velocity is the mean over
-  /// `before` s, which ended `age` s ago.
+  /// Covariance, m^2 and rad^2, that white acceleration gives to a motion over `dt` s. It is predicted by a mean
+  /// velocity over `before` s, an interval that ended `age` s earlier.
   Matrix6d processNoise(double dt, double before, double age) const;
   Matrix6d stampNoise(const Vector6d& velocity) const;
 

@@ -28,9 +28,9 @@ inline const std::vector<std::string>& namesOf(DescriptorLayout) {
 }
 
 /// Positions of a grey patch's samples: side x side of them around the feature's position in the left image, row by
-/// row. Each is the mean of a square as wide as their spacing. The spacing follows the feature's size, and so its
-/// depth. Hence patches of one point, from two images, differ by a shift; their scales differ only where the size or
-/// the spacing is at its limit.
+/// row. Each sample is the mean grey level of a square as wide as the distance between samples. This distance is
+/// proportional to the feature's size, so patches of one point have the same scale in all images, unless size or
+/// distance is at its limit.
 struct PatchLayout {
   int side = 0;                 ///< samples; 0: no patches
   float min_spacing = 1.f;      ///< px
@@ -53,8 +53,8 @@ struct PatchLayout {
   bool operator!=(const PatchLayout& other) const { return !(*this == other); }
 };
 
-/// What each array of StereoFeatures, or of its message, may hold. Returns what one does not keep to, in words; empty:
-/// nothing. `width`, `height`: px, of the image.
+/// Checks the arrays of StereoFeatures, or of its message: equal lengths, finite numbers, positions in the image of
+/// `width` and `height` px. Returns the first fault in words, or an empty string.
 template <class Features>
 std::string faultOfArrays(const Features& features, double width, double height) {
   constexpr double kAny = std::numeric_limits<float>::max();

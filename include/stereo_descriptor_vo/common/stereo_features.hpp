@@ -24,7 +24,7 @@ struct DescriptorKind {
 /// In words, for messages.
 std::string toString(const DescriptorKind& kind);
 
-/// What only the image side can measure of a pair. It is sent with the features.
+/// Measurements of a pair that only the image side can make. They are sent with the features.
 struct ExtractionReport {
   int detected = 0;                       ///< corners in the left image, before stereo matching
   int stereo_matched = 0;                 ///< of these, found in the right image

@@ -51,7 +51,7 @@ class VisualOdometry {
   const Eigen::Isometry3d& lastPose() const;
 
   /// Takes other options over while running. Those of `map`, with its `noise`, take effect at the next start. Those of
-  /// `calibration` do when the estimate begins anew (a reset, another camera, a pair that the rig monitor refused).
+  /// `calibration` do when the estimate begins anew (a reset, another camera).
   /// Throws std::invalid_argument, and keeps the old ones, when an option is out of its range.
   void configure(const VisualOdometryOptions& options);
 

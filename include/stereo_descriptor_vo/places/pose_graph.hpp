@@ -104,7 +104,7 @@ class PoseGraph {
   bool loopsHold() const;
 
   static constexpr double kDriftOfTurn = 0.01;   ///< rad/rad, largest error of turns
-  static constexpr double kLoopThreshold = 3.0;  ///< scale of Cauchy's loss on loops, standard deviations
+  static constexpr double kLoopThreshold = 3.0;  ///< scale of Cauchy's loss on loops, standard deviations (chosen)
 
   std::map<int, Eigen::Isometry3d> nodes_;  ///< T_map_node
   std::vector<GraphEdge> edges_;

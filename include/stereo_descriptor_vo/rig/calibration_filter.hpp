@@ -21,7 +21,8 @@ struct CalibrationOptions {
              "that error in the image centre as far as it is known beforehand; held fixed when not enabled");
     list.add("prior_bend", prior_bend, {-20.0, 20.0}, "px", "the same for its change at 45 degrees from the centre");
     list.add("prior_sigma", prior_sigma, {1e-4, 10.0}, "px",
-             "standard deviation of what is known beforehand, in the centre and at 45 degrees from it");
+             "standard deviation of an error of both, in the centre and at 45 degrees from it, which is beforehand as "
+             "likely as none");
     list.add("right_delay", right_delay, {-0.1, 0.1}, "s",
              "time by which right images are known to be later than left ones; a significant difference is found");
     list.add("right_delay_sigma", right_delay_sigma, {1e-6, 0.1}, "s",
@@ -29,11 +30,12 @@ struct CalibrationOptions {
   }
 };
 
-/// What is known of the rig's disparity error, a filter over the windows of pairs (Kalman in information form). Windows
-/// overlap: one counts as prior only for windows that share no pair with it.
+/// Estimate of the rig's disparity error: a Kalman filter, in information form, over the windows of pairs. Windows
+/// overlap: one is part of the prior only for windows that share no pair with it.
 ///
-/// Beforehand a rig is as likely as the options say as it is somewhere around that, by their sigma. The windows decide
-/// between the two (Bayes factor). So what is compensated goes over from the options' value to the measured one.
+/// The prior is a mixture with equal weights: the error is the options' value, or it is normally distributed around
+/// that with `prior_sigma`. The windows shift the weights (Bayes factor), so the compensated error moves from the
+/// options' value to the measured one without a threshold.
 class CalibrationFilter {
  public:
   /// Ratio between the information of a window and what it states: it counts points as if they erred independently
@@ -42,10 +44,10 @@ class CalibrationFilter {
 
   explicit CalibrationFilter(const CalibrationOptions& options);
 
-  /// `dt` s pass, in which the rig warms up or cools down.
+  /// Process noise of `dt` s, in which the rig warms up or cools down.
   void predict(double dt);
 
-  /// What is known from pairs before the window that begins with pair `oldest_id`.
+  /// Estimate by the pairs before the window that begins with pair `oldest_id`.
   CalibrationBelief prior(int oldest_id) const;
 
   /// Notes the result of the window from pair `oldest_id` to `newest_id`, which had its prior(); `information` excludes
@@ -59,7 +61,7 @@ class CalibrationFilter {
   void widen(double variance);
 
   const RigCalibration& calibration() const { return calibration_; }
-  /// What options and windows tell together.
+  /// Estimate by the options and all windows.
   CalibrationEstimate estimate() const;
   /// Standard deviations of (offset, bend) in px, NaN before the first window.
   RigCalibration::Vector sigma() const;
