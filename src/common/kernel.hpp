@@ -44,8 +44,6 @@ void runKernel(Arguments... arguments) {
 /// Eight floats worked on at once: one register with AVX, two without. A compiler may not vectorise a plain sum of
 /// floats, because that changes the order of the additions. Lanes fix the order, so all processors give the same sum.
 typedef float Lanes __attribute__((vector_size(32)));
-/// Half of them, for what is left at the end.
-typedef float HalfLanes __attribute__((vector_size(16)));
 /// Four doubles, in the same registers.
 typedef double DoubleLanes __attribute__((vector_size(32)));
 
@@ -66,10 +64,11 @@ SDVO_IN_KERNEL void store(const Vector& lanes, Number* values) {
   reinterpret_cast<Unaligned<Vector>*>(values)->lanes = lanes;
 }
 
-/// The sum of all lanes in a fixed order: the two halves of `lanes`, then `rest`, then across.
-SDVO_IN_KERNEL float sumOf(const Lanes& lanes, const HalfLanes& rest = HalfLanes{}) {
+/// The sum of all lanes in a fixed order: the two halves, then across.
+SDVO_IN_KERNEL float sumOf(const Lanes& lanes) {
+  typedef float HalfLanes __attribute__((vector_size(16)));
   const HalfLanes low = {lanes[0], lanes[1], lanes[2], lanes[3]}, high = {lanes[4], lanes[5], lanes[6], lanes[7]};
-  const HalfLanes sums = (low + high) + rest;
+  const HalfLanes sums = low + high;
   return (sums[0] + sums[2]) + (sums[1] + sums[3]);
 }
 

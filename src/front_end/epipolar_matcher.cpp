@@ -135,13 +135,12 @@ std::optional<cv::Point2f> EpipolarMatcher::align(const cv::Point2f& left_positi
   // Where the patch says little about its slant, upright is the better guess.
   constexpr float kNoise = 5.f, kUsualSlant = 0.2f;  // grey levels, px per row
   constexpr float kUpright = (kNoise / kUsualSlant) * (kNoise / kUsualSlant);
-  constexpr int kHalfSide = 6;  // px, of the patch
-  thread_local SlantedPatch patch(kHalfSide);
+  thread_local SlantedPatch patch;
   patch.take(images_.left, kMargin, left_position.x, left_position.y);
   Eigen::Matrix3f hessian = patch.hessian();
   const float dd = hessian(0, 0), dv = hessian(0, 1), vv = hessian(1, 1);
   // Noise alone: half a difference has half of its variance, 0.44 of which is left between pixels on average.
-  const float of_noise = 0.22f * static_cast<float>(noise_ * noise_) * static_cast<float>(patch.pixels());
+  const float of_noise = 0.22f * static_cast<float>(noise_ * noise_) * float{SlantedPatch::kPixels};
   if (dd * vv - dv * dv < 1e-3f * dd * vv || dd < of_noise) return std::nullopt;
   hessian(2, 2) += kUpright;
   const Eigen::Matrix3f inverse = inverseOfSymmetric(hessian);

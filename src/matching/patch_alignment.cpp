@@ -25,12 +25,42 @@ struct Project {
   }
 };
 
+/// Subtracts the mean where the mask is 1; where it is 0, values are 0. `pixels` is the sum of the mask.
+struct RemoveMean {
+  static SDVO_IN_KERNEL void run(int count, float pixels, const float* mask, float* values) {
+    Lanes sum{};
+    for (int k = 0; k < count; k += 8) {
+      Lanes v;
+      load(values + k, v);
+      sum += v;
+    }
+    const float mean = sumOf(sum) / pixels;
+    for (int k = 0; k < count; k += 8) {
+      Lanes v, m;
+      load(values + k, v), load(mask + k, m);
+      store(v - mean * m, values + k);
+    }
+  }
+};
+
+struct SumProducts {
+  static SDVO_IN_KERNEL void run(int count, const float* a, const float* b, const float* c, Products<float>* sums) {
+    Products<Lanes> products;
+    for (int k = 0; k < count; k += 8) {
+      Lanes u, v, w;
+      load(a + k, u), load(b + k, v), load(c + k, w);
+      products.add(u, v, w);
+    }
+    *sums = sumOf(products);
+  }
+};
+
 void removeMean(const SampleSquare& square, Samples& values) {
   runKernel<RemoveMean>(square.count(), static_cast<float>(square.pixels()), square.mask(), values.data());
 }
 
-LaneProducts multiply(int count, const float* a, const float* b, const float* c) {
-  LaneProducts products;
+Products<float> multiply(int count, const float* a, const float* b, const float* c) {
+  Products<float> products;
   runKernel<SumProducts>(count, a, b, c, &products);
   return products;
 }
@@ -68,7 +98,7 @@ bool makeTemplate(const NearPatch& reference, const Eigen::Vector2f& centre, con
   constexpr float kOneSided = 1e-3f;  // of the hessian's two directions: an edge holds no position along itself
   if (!square.sampleUpright(reference, centre, result.grey, result.by_x, result.by_y)) return false;
   for (Samples* values : {&result.grey, &result.by_x, &result.by_y}) removeMean(square, *values);
-  const LaneProducts p = multiply(square.count(), result.by_x.data(), result.by_y.data(), result.grey.data());
+  const Products<float> p = multiply(square.count(), result.by_x.data(), result.by_y.data(), result.grey.data());
   result.hessian << p.aa, p.ab, p.ab, p.bb;
   result.gradient = {p.ac, p.bc};
   result.square = p.cc;
@@ -120,7 +150,7 @@ std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const
   }
 
   removeMean(square, grey);
-  const LaneProducts p = multiply(square.count(), grey.data(), pattern.grey.data(), pattern.grey.data());
+  const Products<float> p = multiply(square.count(), grey.data(), pattern.grey.data(), pattern.grey.data());
   PatchShift found;
   found.shift = current.spacing * position;
   found.correlation = p.ab / std::sqrt(pattern.square * p.aa);
