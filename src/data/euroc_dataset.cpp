@@ -1,7 +1,6 @@
 #include "stereo_descriptor_vo/data/euroc_dataset.hpp"
 
 #include <algorithm>
-#include <array>
 #include <filesystem>
 #include <map>
 #include <opencv2/core/eigen.hpp>
@@ -37,19 +36,6 @@ std::vector<std::string> calibrationFiles(const fs::path& mav0) {
   return {left.string(), right.string()};
 }
 
-/// Poses T_world_camera by stamp, from lines "stamp[ns] r11 r12 r13 tx r21 … tz".
-std::map<std::int64_t, Eigen::Isometry3d> readGroundTruth(const std::string& path) {
-  std::map<std::int64_t, Eigen::Isometry3d> poses;
-  readLines(path, false, [&](const std::string& line) {
-    const std::vector<std::string> words = splitWords(line);
-    std::array<double, 12> rows;
-    if (words.size() != rows.size() + 1) throw std::invalid_argument("expected a stamp and 12 numbers");
-    std::transform(words.begin() + 1, words.end(), rows.begin(), parseNumber<double>);
-    poses[parseNanoseconds(words.front())] = poseFromRows(rows);
-  });
-  return poses;
-}
-
 }  // namespace
 
 EurocSequence::EurocSequence(const std::string& mav0, const std::vector<std::string>& calibration, double fov)
@@ -81,18 +67,18 @@ Trajectory EurocSequence::rectifiedPoses(std::string& problem) const {
     problem = "there is no '" + path + "'";
     return {};
   }
-  const std::map<std::int64_t, Eigen::Isometry3d> ground_truth = readGroundTruth(path);
+  const StampedTrajectory truth = readPoses(path);
   Eigen::Matrix3d R_rect_camera;
   cv::cv2eigen(rectification_.rotation(0), R_rect_camera);
   const Eigen::Isometry3d T_camera_rect(R_rect_camera.transpose());
   Trajectory poses;
   for (const Frame& frame : frames_) {
-    const auto found = ground_truth.find(frame.stamp);
-    if (found == ground_truth.end()) {
+    const auto found = std::lower_bound(truth.stamps.begin(), truth.stamps.end(), frame.stamp);
+    if (found == truth.stamps.end() || *found != frame.stamp) {
       problem = "'" + path + "' has no pose at " + std::to_string(frame.stamp);
       return {};
     }
-    poses.push_back(found->second * T_camera_rect);
+    poses.push_back(truth.poses[static_cast<std::size_t>(found - truth.stamps.begin())] * T_camera_rect);
   }
   const Eigen::Isometry3d T_first_world = poses.front().inverse();
   for (Eigen::Isometry3d& pose : poses) pose = T_first_world * pose;

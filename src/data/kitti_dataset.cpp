@@ -151,13 +151,8 @@ StereoCamera readKittiCalibration(const std::string& path, KittiCameras cameras)
                                " do not belong to a rectified pair (equal pinhole cameras side by side)");
     }
   }
-  StereoCamera camera;
-  camera.fx = left[0];
-  camera.fy = left[5];
-  camera.cx = left[2];
-  camera.cy = left[6];
-  // The difference of both offsets: a colour pair's left one is not zero.
-  camera.baseline = (left[3] - right[3]) / left[0];
+  // The baseline is a difference: the offset of a colour pair's left camera is not zero.
+  const StereoCamera camera{left[0], left[5], left[2], left[6], (left[3] - right[3]) / left[0], 0, 0};
   if (!(camera.baseline > 0.0)) {
     throw std::runtime_error("file '" + path + "': the baseline (difference of Tx / fx) is " +
                              std::to_string(camera.baseline) + " m but must be positive; " +
@@ -217,13 +212,7 @@ KittiSequence::KittiSequence(const std::string& directory, KittiCameras cameras)
   camera_.height = image.rows;
 }
 
-std::int64_t KittiSequence::stamp(int i) const {
-  checkIndex(i);
-  return stamps_[static_cast<std::size_t>(i)];
-}
-
 ImagePair KittiSequence::load(int i) const {
-  checkIndex(i);
   ImagePair pair{readGreyPng(imagePath(0, i)), readGreyPng(imagePath(1, i))};
   if (pair.left.size() != pair.right.size()) {
     throw std::runtime_error("images '" + imagePath(0, i) + "' (" + sizeText(pair.left) + ") and '" + imagePath(1, i) +
@@ -235,13 +224,6 @@ ImagePair KittiSequence::load(int i) const {
                              std::to_string(camera_.height));
   }
   return pair;
-}
-
-void KittiSequence::checkIndex(int i) const {
-  if (i < 0 || i >= size()) {
-    throw std::runtime_error("frame " + std::to_string(i) + " is outside of sequence '" + directory_ + "', which has " +
-                             std::to_string(size()) + " frames");
-  }
 }
 
 std::string KittiSequence::imagePath(int side, int i) const {

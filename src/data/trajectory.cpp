@@ -44,18 +44,14 @@ Eigen::Isometry3d motionError(const Trajectory& ground_truth, const Trajectory& 
   return true_motion.inverse() * estimated_motion;
 }
 
-void checkComparable(const Trajectory& ground_truth, const Trajectory& estimate) {
+/// The ground truth of the frames that the estimate covers.
+Trajectory covered(const Trajectory& ground_truth, const Trajectory& estimate) {
   if (estimate.empty()) throw std::invalid_argument("the estimated trajectory has no poses");
   if (estimate.size() > ground_truth.size()) {
     throw std::invalid_argument("the estimated trajectory has " + std::to_string(estimate.size()) +
                                 " poses, more than the " + std::to_string(ground_truth.size()) +
                                 " of the ground truth: do they belong to the same sequence?");
   }
-}
-
-/// The ground truth of the frames that the estimate covers.
-Trajectory covered(const Trajectory& ground_truth, const Trajectory& estimate) {
-  checkComparable(ground_truth, estimate);
   return {ground_truth.begin(), ground_truth.begin() + static_cast<std::ptrdiff_t>(estimate.size())};
 }
 
@@ -102,11 +98,14 @@ struct PoseFormat {
   Eigen::Isometry3d (*read)(const std::vector<double>& numbers);
 };
 
-const PoseFormat kKitti = {"KITTI's (12 numbers a line)", 12, nullptr, [](const std::vector<double>& n) {
-                             std::array<double, 12> rows;
-                             std::copy(n.begin(), n.end(), rows.begin());
-                             return poseFromRows(rows);
-                           }};
+Eigen::Isometry3d poseFromTwelve(const std::vector<double>& n) {
+  std::array<double, 12> rows;
+  std::copy(n.begin(), n.end(), rows.begin());
+  return poseFromRows(rows);
+}
+
+const PoseFormat kKitti = {"KITTI's (12 numbers a line)", 12, nullptr, poseFromTwelve};
+const PoseFormat kStampedKitti = {"KITTI's behind a stamp in ns", 13, parseNanoseconds, poseFromTwelve};
 const PoseFormat kTum = {"TUM's (stamp in s, x y z, qx qy qz qw)", 8, parseSeconds, [](const std::vector<double>& n) {
                            return poseFromNumbers({n[0], n[1], n[2]}, {n[6], n[3], n[4], n[5]});
                          }};
@@ -119,7 +118,7 @@ const PoseFormat kEuroc = {"EuRoC's (stamp in ns, x, y, z, qw, qx, qy, qz, …)"
 const PoseFormat& formatOf(const std::string& line) {
   const std::size_t numbers = splitWords(line).size();
   if (line.find(',') < line.find_first_of(" \t") && std::count(line.begin(), line.end(), ',') >= 7) return kEuroc;
-  for (const PoseFormat* format : {&kKitti, &kTum})
+  for (const PoseFormat* format : {&kKitti, &kStampedKitti, &kTum})
     if (numbers == format->numbers) return *format;
   throw std::invalid_argument(std::to_string(numbers) + " numbers: poses are " + kKitti.name + ", " + kTum.name +
                               " or " + kEuroc.name);
@@ -198,10 +197,6 @@ StampedTrajectory readPoses(const std::string& path) {
 
 Trajectory readKittiPoses(const std::string& path) {
   return readPosesAs(path, &kKitti).poses;
-}
-
-StampedTrajectory readTumPoses(const std::string& path) {
-  return readPosesAs(path, &kTum);
 }
 
 void writeKittiPoses(const std::string& path, const Trajectory& poses) {

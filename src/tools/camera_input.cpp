@@ -3,7 +3,6 @@
 #include <nav_msgs/Odometry.h>
 #include <tf2_eigen/tf2_eigen.h>
 
-#include <algorithm>
 #include <boost/make_shared.hpp>
 #include <stdexcept>
 #include <utility>
@@ -30,15 +29,13 @@ CameraInput::CameraInput(const StereoTopics& topics, std::optional<StereoInfos> 
           kWaiting, StereoInputOptions().sync_tolerance,
           [this, use = std::move(use)](const auto& left, const auto& right, const auto& left_info,
                                        const auto& right_info) {
-            stamps_.notePair(nanoseconds(left->header.stamp));
-            arrivals_.notePair(left->header.stamp, right->header.stamp, newest_);
-            ArrivedPair pair{{left->image, right->image, left_info->info, right_info->info}, {}, {}, {}};
-            for (const auto& message : {left, right, left_info, right_info}) {
-              pair.stamps[message->input] = message->header.stamp;
-              pair.arrivals[message->input] = message->arrival;
-              pair.complete = std::max(pair.complete, message->arrival);
-            }
-            use(pair);
+            const std::int64_t stamp = nanoseconds(left->header.stamp);
+            stamps_.notePair(stamp);
+            arrivals_.notePair(left->header.stamp, right->header.stamp, newest_.toSec());
+            use({{left->image, right->image, left_info->info, right_info->info},
+                 stamp,
+                 newest_,
+                 {left->recorded, right->recorded}});
           },
           [this](const auto&...) { ++given_up_; }) {
   arrivals_.begin(topics, 0.0);  // long ago: a short recording is judged, too
@@ -47,9 +44,9 @@ CameraInput::CameraInput(const StereoTopics& topics, std::optional<StereoInfos> 
 void CameraInput::add(const StereoMessage& message) {
   const ros::Time& stamp = message.header.stamp;
   const auto input = static_cast<ArrivalLog::Input>(message.input);
-  newest_ = message.arrival.toSec();
-  stamps_.note(input, nanoseconds(stamp), newest_);
-  arrivals_.note(input, stamp, newest_);
+  newest_ = message.arrival;
+  stamps_.note(input, nanoseconds(stamp), newest_.toSec());
+  arrivals_.note(input, stamp, newest_.toSec());
   if (input == ArrivalLog::kLeftImage) frame_ = message.header.frame_id;
   if (const std::string why = whyUnusable(stamp); !why.empty()) {
     ++unusable_;
@@ -79,8 +76,11 @@ void CameraInput::add(const rosbag::MessageInstance& instance) {
     bases_.insert(ros_conversions::cleanFrameId(odometry->child_frame_id));
     return;
   }
-  if (instance.getTopic() != "/tf" && instance.getTopic() != "/tf_static")
-    return add(readStereoMessage(instance, topics_));
+  if (instance.getTopic() != "/tf" && instance.getTopic() != "/tf_static") {
+    StereoMessage message = readStereoMessage(instance, topics_);
+    message.recorded = std::make_shared<const rosbag::MessageInstance>(instance);
+    return add(message);
+  }
   try {
     if (const auto transforms = readAs<tf2_msgs::TFMessage>(instance))
       add(*transforms, instance.getTopic() == "/tf_static");
@@ -100,7 +100,7 @@ std::string CameraInput::baseAbove(std::string frame) const {
 
 ArrivalFindings CameraInput::findings(const std::string& base_frame_given, bool is_recorded) {
   const RateOptions rates;
-  ArrivalFindings found{stamps_.topics(rates.min_rate, rates.max_rate, arrivals_.explainSilence(newest_)),
+  ArrivalFindings found{stamps_.topics(rates.min_rate, rates.max_rate, arrivals_.explainSilence(newest_.toSec())),
                         stamps_.stamps(),
                         {},
                         stamps_.rate(),

@@ -6,7 +6,9 @@
 #include <tf2_msgs/TFMessage.h>
 
 #include <array>
+#include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -24,8 +26,9 @@ namespace sdvo {
 /// Four messages of one trigger.
 struct ArrivedPair {
   StereoPairMessages messages;
-  std::array<ros::Time, 4> stamps, arrivals;  ///< in the order of the topics
-  ros::Time complete;                         ///< when the last one came
+  std::int64_t stamp;                                                    ///< of the left image, ns
+  ros::Time complete;                                                    ///< when the last one came
+  std::array<std::shared_ptr<const rosbag::MessageInstance>, 2> images;  ///< where a bag has them; null: live
 };
 
 /// Messages of a stereo camera as they arrive, from a bag or from topics: what their stamps look like, which make a
@@ -60,7 +63,7 @@ class CameraInput {
   StampCheck stamps_;
   UnusedInput unused_{"messages", 1.0};
   ArrivalLog arrivals_;
-  double newest_ = 0.0;  ///< arrival, s
+  ros::Time newest_;  ///< arrival
   int unusable_ = 0, given_up_ = 0;
   std::string problem_ = "no four stamps agree", tf_problem_;
   TriggerSynchroniser<Message, Message, Message, Message> pairs_;

@@ -5,11 +5,10 @@
 #include <rosbag/view.h>
 
 #include <algorithm>
-#include <array>
-#include <boost/make_shared.hpp>
 #include <filesystem>
 #include <optional>
 #include <stdexcept>
+#include <type_traits>
 #include <utility>
 
 #include "../check/stamp_check.hpp"
@@ -27,31 +26,11 @@ namespace fs = std::filesystem;
 namespace sdvo {
 namespace {
 
-/// The rectified views.
-class RectifiedEuroc : public EurocSequence {
- public:
-  using EurocSequence::EurocSequence;
-  const StereoCamera& camera() const { return rectification().camera(); }
-  ImagePair load(int i) const { return loadRectified(i); }
-};
-
-int unpaired(const KittiSequence&) {
-  return 0;
-}
-int unpaired(const RectifiedEuroc& sequence) {
-  return sequence.unpaired();
-}
-
-Eigen::Isometry3d mountOf(const KittiSequence&) {
-  return Eigen::Isometry3d::Identity();
-}
-Eigen::Isometry3d mountOf(const RectifiedEuroc& sequence) {
-  return sequence.rectification().T_body_left();
-}
-
-/// A folder, of which every pair is usable.
+/// A folder, of which every pair is usable. Those of EuRoC have raw images, and poses of a body.
 template <class Sequence>
 class FolderRecording : public Recording {
+  static constexpr bool kIsEuroc = std::is_same_v<Sequence, EurocSequence>;
+
  public:
   template <class... Arguments>
   explicit FolderRecording(const Arguments&... arguments) : sequence_(arguments...) {}
@@ -61,7 +40,8 @@ class FolderRecording : public Recording {
   int forEach(int limit, const Use& use, const Refuse&) override {
     used_ = std::min(limit, size());
     for (int i = 0; i < used_; ++i) give(i, sequence_.stamp(i), use);
-    return unpaired(sequence_);
+    if constexpr (kIsEuroc) return sequence_.unpaired();
+    return 0;
   }
 
   void forEachBackwards(const Use& use) const override {
@@ -72,9 +52,9 @@ class FolderRecording : public Recording {
   std::vector<std::optional<Eigen::Isometry3d>> truth(const std::string& path,
                                                       const std::vector<std::int64_t>& stamps) const override {
     auto poses = readGroundTruth(path, stamps);
-    if (fs::path(path).extension() == ".csv")
+    if constexpr (kIsEuroc)
       for (auto& pose : poses)
-        if (pose) *pose = *pose * mountOf(sequence_);
+        if (pose && fs::path(path).extension() == ".csv") *pose = *pose * sequence_.rectification().T_body_left();
     return poses;
   }
 
@@ -92,7 +72,7 @@ class FolderRecording : public Recording {
 
  private:
   void give(int i, std::int64_t stamp, const Use& use) const {
-    const ImagePair pair = sequence_.load(i);
+    const ImagePair pair = sequence_.loadRectified(i);
     use({sequence_.camera(), pair.left, pair.right, stamp, "", ""});
   }
 
@@ -118,19 +98,18 @@ class BagRecording : public Recording {
 
   void forEachBackwards(const Use& use) const override {
     PairReader reader(topics_, fov_);
-    const std::int64_t ends = nanoseconds(used_.front().stamps[0]) + nanoseconds(used_.back().stamps[0]);
-    for (auto pair = used_.rbegin(); pair != used_.rend(); ++pair)
-      use(reader.read(read(*pair), ends - nanoseconds(pair->stamps[0])));
+    const std::int64_t ends = used_.front().stamp + used_.back().stamp;
+    for (auto pair = used_.rbegin(); pair != used_.rend(); ++pair) {
+      StereoPairMessages messages = pair->messages;
+      messages.left_image = readStereoMessage(*pair->images[0], topics_).image;
+      messages.right_image = readStereoMessage(*pair->images[1], topics_).image;
+      use(reader.read(messages, ends - pair->stamp));
+    }
   }
 
   ArrivalFindings arrivals(const std::string& base_frame) const override { return input_->findings(base_frame, true); }
 
  private:
-  /// Of the four messages of a pair.
-  struct Used {
-    std::array<ros::Time, 4> stamps, recorded;
-  };
-
   int useAll(int limit, const Use& use, const Refuse& refuse) {
     StampFilter<ArrivedPair> filter;
     PairReader reader(topics_, fov_);
@@ -140,8 +119,9 @@ class BagRecording : public Recording {
     const auto isEnough = [&] { return static_cast<int>(used_.size()) == limit; };
     const auto process = [&](const ArrivedPair& pair) {
       try {
-        use(reader.read(pair.messages, nanoseconds(pair.stamps[0])));
-        used_.push_back({pair.stamps, pair.arrivals});
+        use(reader.read(pair.messages, pair.stamp));
+        used_.push_back(pair);
+        used_.back().messages.left_image = used_.back().messages.right_image = nullptr;
       } catch (const std::invalid_argument& e) {
         ++refused;
         problem = e.what();
@@ -149,7 +129,7 @@ class BagRecording : public Recording {
       }
     };
     input_ = std::make_unique<CameraInput>(topics_, infos_, [&](const ArrivedPair& pair) {
-      for (const auto& passed : filter.add(pair, nanoseconds(pair.stamps[0]), nanoseconds(pair.complete))) {
+      for (const auto& passed : filter.add(pair, pair.stamp, nanoseconds(pair.complete))) {
         if (passed.source_restarts > 0 && !refuse)
           throw std::runtime_error(
               "stamps jump back for good: these are several recordings, one bag for each is needed");
@@ -168,34 +148,12 @@ class BagRecording : public Recording {
     return input_->unused() + static_cast<int>(filter.dropped()) + refused;
   }
 
-  /// By the bag's index.
-  StereoPairMessages read(const Used& pair) const {
-    StereoPairMessages messages;
-    for (std::size_t input = 0; input < topics_.size(); ++input) {
-      if (infos_ && input >= 2) {
-        (input == 2 ? messages.left_info : messages.right_info) =
-            boost::make_shared<sensor_msgs::CameraInfo>((*infos_)[input - 2]);
-        continue;
-      }
-      rosbag::View view(bag_, rosbag::TopicQuery(topics_[input]), pair.recorded[input], pair.recorded[input]);
-      for (const rosbag::MessageInstance& instance : view) {
-        const StereoMessage message = readStereoMessage(instance, topics_);
-        if (message.header.stamp != pair.stamps[input]) continue;
-        if (message.image)
-          (input == 0 ? messages.left_image : messages.right_image) = message.image;
-        else
-          (input == 2 ? messages.left_info : messages.right_info) = message.info;
-      }
-    }
-    return messages;
-  }
-
   const std::string path_;
   const double fov_;
   const std::optional<StereoInfos> infos_;  ///< in place of those of the bag
   rosbag::Bag bag_;
   StereoTopics topics_;
-  std::vector<Used> used_;
+  std::vector<ArrivedPair> used_;       ///< by the last forEach(); their images are in the bag alone
   std::unique_ptr<CameraInput> input_;  ///< of the last forEach()
 };
 
@@ -262,7 +220,7 @@ std::unique_ptr<Recording> openRecording(const std::string& path, const StereoSo
   if (!fs::exists(path)) throw std::runtime_error("there is no '" + path + "'");
   if (!fs::is_directory(path)) return std::make_unique<BagRecording>(path, source);
   if (const auto mav0 = findMav0(path))
-    return std::make_unique<FolderRecording<RectifiedEuroc>>(*mav0, source.calibration, source.fov);
+    return std::make_unique<FolderRecording<EurocSequence>>(*mav0, source.calibration, source.fov);
   for (const char* images : {"image_0", "image_1", "image_2", "image_3"})
     if (fs::is_directory(fs::path(path) / images)) return std::make_unique<FolderRecording<KittiSequence>>(path);
   throw std::runtime_error(

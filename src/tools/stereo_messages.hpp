@@ -12,6 +12,7 @@
 #include <array>
 #include <boost/make_shared.hpp>
 #include <cstddef>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <vector>
@@ -89,6 +90,7 @@ struct StereoMessage {
   ros::Time arrival;  ///< or when it was recorded
   sensor_msgs::ImageConstPtr image;
   sensor_msgs::CameraInfoConstPtr info;
+  std::shared_ptr<const rosbag::MessageInstance> recorded = nullptr;  ///< where the bag has it; null: live
 };
 
 /// Of either kind.

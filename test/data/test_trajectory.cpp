@@ -104,7 +104,7 @@ TEST(TumPoses, SurviveWritingAndReadingToTheNanosecond) {
   const TemporaryFile file;
   const StampedTrajectory written{{-1250000000, 0, 1, 1403636584763555584}, curve(4)};
   writeTumPoses(file.path(), written);
-  const StampedTrajectory read = readTumPoses(file.path());
+  const StampedTrajectory read = readPoses(file.path());
   EXPECT_EQ(read.stamps, written.stamps);
   ASSERT_EQ(read.poses.size(), 4u);
   for (std::size_t i = 0; i < 4; ++i) EXPECT_TRUE(read.poses[i].isApprox(written.poses[i], 1e-11)) << i;
@@ -112,7 +112,7 @@ TEST(TumPoses, SurviveWritingAndReadingToTheNanosecond) {
 
 TEST(TumPoses, QuaternionIsXyzw) {
   const TemporaryFile file("# a comment\n1.5 1 2 3 0 0 0.7071067811865476 0.7071067811865476\n");
-  const StampedTrajectory read = readTumPoses(file.path());
+  const StampedTrajectory read = readPoses(file.path());
   EXPECT_EQ(read.stamps, std::vector<std::int64_t>{1500000000});
   EXPECT_TRUE((read.poses[0] * Eigen::Vector3d(1.0, 0.0, 0.0)).isApprox(Eigen::Vector3d(1.0, 3.0, 3.0), 1e-12));
 }
@@ -125,7 +125,7 @@ TEST(TumPoses, ErrorsNameFileAndLine) {
   };
   for (const auto& [line, what] : cases) {
     const TemporaryFile file("1 0 0 0 0 0 0 1\n" + line);
-    expectError([&] { readTumPoses(file.path()); }, {file.path() + "', line 2: ", what});
+    expectError([&] { readPoses(file.path()); }, {file.path() + "', line 2: ", what});
   }
   EXPECT_THROW(writeTumPoses("/dev/null", {{0}, {}}), std::invalid_argument);
 }

@@ -21,9 +21,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   } catch (const std::runtime_error&) {
   }
   try {
-    const sdvo::StampedTrajectory trajectory = sdvo::readTumPoses(path);
+    const sdvo::StampedTrajectory trajectory = sdvo::readPoses(path);
     requireRigid(trajectory.poses);
-    if (trajectory.stamps.size() != trajectory.poses.size()) __builtin_trap();
+    if (!trajectory.stamps.empty() && trajectory.stamps.size() != trajectory.poses.size()) __builtin_trap();
   } catch (const std::runtime_error&) {
   }
   return 0;

@@ -29,7 +29,8 @@ class EurocSequence {
 
   /// Decodes frame i as recorded, not rectified.
   ImagePair load(int i) const;
-  /// The views of frame i that rectification().camera has.
+  /// The rectified views, and frame i in them.
+  const StereoCamera& camera() const { return rectification_.camera(); }
   ImagePair loadRectified(int i) const { return rectification_.rectify(load(i)); }
 
   /// Poses of the rectified left camera relative to its first one, from cam0_ground_truth.txt (lines "stamp[ns] r11 r12

@@ -57,13 +57,14 @@ class KittiSequence {
   int size() const { return static_cast<int>(stamps_.size()); }
 
   /// Time of frame i since the start of the sequence's clock, ns; strictly increasing.
-  std::int64_t stamp(int i) const;
+  std::int64_t stamp(int i) const { return stamps_.at(static_cast<std::size_t>(i)); }
 
   /// Decodes frame i; both images have the size of camera(). May be called from several threads.
   ImagePair load(int i) const;
+  /// The same, for they are rectified.
+  ImagePair loadRectified(int i) const { return load(i); }
 
  private:
-  void checkIndex(int i) const;
   std::string imagePath(int side, int i) const;
 
   std::string directory_;

@@ -25,8 +25,9 @@ struct StampedTrajectory {
 /// throws std::invalid_argument when the matrix is none (rows not orthonormal to 1e-3, a reflection, or not finite).
 Eigen::Isometry3d poseFromRows(const std::array<double, 12>& rows);
 
-/// Reads poses in KITTI's format (no stamps), TUM's or EuRoC's (CSV: stamp in ns, x, y, z, qw, qx, qy, qz, …, of the
-/// body), which the first line shows. Throws std::runtime_error that names file, line and these formats.
+/// Reads poses in the format that the first line shows: KITTI's (12 numbers, also behind a stamp in ns), TUM's
+/// ("stamp[s] tx ty tz qx qy qz qw") or EuRoC's (CSV: stamp in ns, x, y, z, qw, qx, qy, qz, …, of the body). Throws
+/// std::runtime_error that names file, line and these formats.
 StampedTrajectory readPoses(const std::string& path);
 
 /// Reads KITTI poses (one line of 12 numbers per frame: 3x4, row-major). Throws std::runtime_error that names file and
@@ -37,11 +38,8 @@ Trajectory readKittiPoses(const std::string& path);
 /// Writes KITTI poses, one line per frame; throws std::runtime_error that names the file when it cannot be written.
 void writeKittiPoses(const std::string& path, const Trajectory& poses);
 
-/// Reads TUM poses ("stamp[s] tx ty tz qx qy qz qw", comments begin with #). Throws std::runtime_error that names file
-/// and line when a line is malformed, a quaternion is not of unit length or the stamps do not increase.
-StampedTrajectory readTumPoses(const std::string& path);
-
-/// Writes TUM poses; throws std::invalid_argument when the lists differ in length, std::runtime_error as above.
+/// Writes TUM poses ("stamp[s] tx ty tz qx qy qz qw"); throws std::invalid_argument when the lists differ in length,
+/// std::runtime_error as above.
 void writeTumPoses(const std::string& path, const StampedTrajectory& trajectory);
 
 /// Mean KITTI errors over the sub-paths of one length; NaN when there is none.
