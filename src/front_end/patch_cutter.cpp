@@ -86,41 +86,22 @@ void cutPlain(const cv::Mat& integral, const PatchEdges& columns, const PatchEdg
     }
 }
 
-/// Whether the edges in so many registers are a pixel apart, as most are.
-SDVO_VECTORS bool areNeighbours(const PatchEdges& edges, int registers) {
-  bool all = true;
-  for (int k = 1; k < kRegister * registers; ++k) all &= edges.index[k] == edges.index[0] + k;
-  return all;
-}
-
 /// Sums in a row at the edges, a register of them at once, with the operations of the plain form.
-template <bool kNeighbours>
 class RowSums {
  public:
   SDVO_VECTORS RowSums(const PatchEdges& columns, int origin)
       : columns_(columns), origin_(UnsignedRegister{} + static_cast<unsigned>(origin)) {}
 
   SDVO_VECTORS Register at(const int* row, int r) const {
-    const int* index = &columns_.index[kRegister * r];
-    if constexpr (kNeighbours) {
-      UnsignedRegister sums, next_sums;
-      load(row + index[0], sums), load(row + index[0] + 1, next_sums);
-      return between(sums, next_sums, r);
-    } else {
-      const auto* places = reinterpret_cast<const unsigned*>(index);
-      const Pairs pairs(readPairs(row, places), readPairs(row, places + 2));
-      return between(pairs.first(), pairs.second(), r);
-    }
-  }
-
- private:
-  SDVO_VECTORS Register between(UnsignedRegister sums, UnsignedRegister next_sums, int r) const {
-    const Register first = toFloats(sums - origin_), second = toFloats(next_sums - origin_);
+    const auto* places = reinterpret_cast<const unsigned*>(&columns_.index[kRegister * r]);
+    const Pairs pairs(readPairs(row, places), readPairs(row, places + 2));
+    const Register first = toFloats(pairs.first() - origin_), second = toFloats(pairs.second() - origin_);
     Register share;
     load(&columns_.share[kRegister * r], share);
     return first + share * (second - first);
   }
 
+ private:
   const PatchEdges& columns_;
   UnsignedRegister origin_;
 };
@@ -135,10 +116,10 @@ SDVO_VECTORS inline IntRegister nearestByte(Register values) {
 }
 
 /// The same row by row, a register of columns at once. `kCount` of them hold the edges.
-template <int kCount, bool kNeighbours>
-SDVO_VECTORS void cutRows(const cv::Mat& integral, const PatchEdges& columns, const PatchEdges& rows, int side,
-                          std::uint8_t* samples) {
-  const RowSums<kNeighbours> sums(columns, integral.ptr<int>(rows.index[0])[columns.index[0]]);
+template <int kCount>
+SDVO_VECTORS void cutWithVectors(const cv::Mat& integral, const PatchEdges& columns, const PatchEdges& rows, int side,
+                                 std::uint8_t* samples) {
+  const RowSums sums(columns, integral.ptr<int>(rows.index[0])[columns.index[0]]);
   Register upper[kCount] = {}, lower[kCount] = {}, above[kCount] = {}, across[kCount + 1] = {};
   std::array<std::uint32_t, PatchOptions::kMostSamples * PatchOptions::kMostSamples + kRegister * kCount> patch;
   for (int j = 0; j <= side; ++j) {
@@ -163,13 +144,6 @@ SDVO_VECTORS void cutRows(const cv::Mat& integral, const PatchEdges& columns, co
     }
   }
   std::copy_n(patch.begin(), side * side, samples);
-}
-
-template <int kCount>
-SDVO_VECTORS void cutWithVectors(const cv::Mat& integral, const PatchEdges& columns, const PatchEdges& rows, int side,
-                                 std::uint8_t* samples) {
-  const auto cut = areNeighbours(columns, kCount) ? cutRows<kCount, true> : cutRows<kCount, false>;
-  cut(integral, columns, rows, side, samples);
 }
 
 }  // namespace
