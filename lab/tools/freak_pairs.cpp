@@ -20,7 +20,7 @@
 namespace {
 
 using sdvo::Freak;
-using sdvo::FreakKeypoint;
+using sdvo::ViewKeypoint;
 
 /// One bit for each key point, packed; a column of the paper's matrix D.
 struct Column {
@@ -49,7 +49,7 @@ std::vector<std::array<float, Freak::kFields>> sampleKeypoints(const std::vector
     const Freak freak(image);
     for (const sdvo::Corner& corner : detector.detect(image)) {
       const double fraction = static_cast<double>(random()) / static_cast<double>(std::mt19937::max());
-      const FreakKeypoint keypoint{corner.position.x, corner.position.y,
+      const ViewKeypoint keypoint{corner.position.x, corner.position.y,
                                    static_cast<float>(7.0 * std::pow(30.0 / 7.0, fraction)), -1.f};
       if (Freak::fits(keypoint, image.size())) samples.push_back(freak.intensities(keypoint));
     }

@@ -8,12 +8,6 @@
 
 namespace sdvo {
 
-Matrix6d isotropic(double translation_variance, double rotation_variance) {
-  Vector6d variance;
-  variance << Eigen::Vector3d::Constant(translation_variance), Eigen::Vector3d::Constant(rotation_variance);
-  return variance.asDiagonal();
-}
-
 Matrix6d momentOf(const Vector6d& difference) {
   return isotropic(difference.head<3>().squaredNorm(), difference.tail<3>().squaredNorm());
 }

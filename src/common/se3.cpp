@@ -54,6 +54,17 @@ Matrix6d adjoint(const Eigen::Isometry3d& T) {
   return ad;
 }
 
+Matrix6d carried(const Eigen::Isometry3d& T, const Matrix6d& covariance) {
+  const Matrix6d ad = adjoint(T);
+  return ad * covariance * ad.transpose();
+}
+
+Matrix6d isotropic(double translation_variance, double rotation_variance) {
+  Vector6d variances;
+  variances << Eigen::Vector3d::Constant(translation_variance), Eigen::Vector3d::Constant(rotation_variance);
+  return variances.asDiagonal();
+}
+
 double mahalanobisSquare(const Vector6d& difference, const Matrix6d& covariance) {
   return difference.dot(covariance.ldlt().solve(difference));
 }

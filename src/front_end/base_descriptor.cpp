@@ -31,13 +31,12 @@ class FreakDescriptor : public BaseDescriptor {
   ViewDescriptors describe(const cv::Mat& image, const std::vector<ViewKeypoint>& keypoints) const override {
     const Freak freak(image);
     ViewDescriptors described = emptyRows(keypoints.size(), Freak::kBytes);
-    std::vector<FreakKeypoint> fitting;
+    std::vector<ViewKeypoint> fitting;
     std::vector<std::uint8_t*> rows;
     fitting.reserve(keypoints.size()), rows.reserve(keypoints.size());
     for (std::size_t i = 0; i < keypoints.size(); ++i) {
-      const FreakKeypoint keypoint{keypoints[i].u, keypoints[i].v, keypoints[i].size, keypoints[i].angle};
-      if (!Freak::fits(keypoint, image.size())) continue;
-      fitting.push_back(keypoint);
+      if (!Freak::fits(keypoints[i], image.size())) continue;
+      fitting.push_back(keypoints[i]);
       rows.push_back(described.rows.ptr(static_cast<int>(i)));
       described.valid[i] = 1;
     }

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
-#include <numeric>
+#include <map>
 #include <opencv2/core.hpp>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/features2d.hpp>
@@ -173,33 +173,23 @@ constexpr auto isStronger = [](const Corner& a, const Corner& b) {
 }  // namespace
 
 std::vector<Corner> keepApart(std::vector<Corner> corners, double min_spacing) {
-  if (min_spacing <= 0.0 || corners.empty()) return corners;
+  if (min_spacing <= 0.0) return corners;
   std::sort(corners.begin(), corners.end(), isStronger);
-  const double side = std::max(min_spacing, 1.0);
-  const auto cellOf = [side](float coordinate) { return static_cast<int>(std::max(coordinate, 0.f) / side) + 1; };
-  int columns = 0, rows = 0;
-  for (const Corner& corner : corners) {
-    columns = std::max(columns, cellOf(corner.position.x) + 2);
-    rows = std::max(rows, cellOf(corner.position.y) + 2);
-  }
-  // The corners kept of each cell are chained: the cell tells the newest of them, each of them the one before. What is
-  // too near lies in one of nine cells; a cell's width around the image is free.
-  std::vector<int> newest(static_cast<std::size_t>(columns) * rows, -1), before;
-  std::vector<Corner> kept;
-  const auto isFree = [&](const Corner& corner, std::size_t cell) {
-    for (int row = -1; row <= 1; ++row)
-      for (int column = -1; column <= 1; ++column)
-        for (int i = newest[cell + static_cast<std::size_t>(row * columns + column)]; i >= 0; i = before[i]) {
-          const cv::Point2f apart = kept[i].position - corner.position;
-          if (std::hypot(apart.x, apart.y) < min_spacing) return false;
-        }
+  // Positions that are kept, by the cell of a grid. Those too near to a corner lie in its cell or in a neighbour of it.
+  std::map<std::pair<int, int>, std::vector<cv::Point2f>> cells;
+  const auto isFree = [&](const cv::Point2f& position, int column, int row) {
+    for (int y = row - 1; y <= row + 1; ++y)
+      for (int x = column - 1; x <= column + 1; ++x)
+        if (const auto cell = cells.find({x, y}); cell != cells.end())
+          for (const cv::Point2f& kept : cell->second)
+            if (std::hypot(kept.x - position.x, kept.y - position.y) < min_spacing) return false;
     return true;
   };
+  std::vector<Corner> kept;
   for (const Corner& corner : corners) {
-    const std::size_t cell = static_cast<std::size_t>(cellOf(corner.position.y)) * columns + cellOf(corner.position.x);
-    if (!isFree(corner, cell)) continue;
-    before.push_back(newest[cell]);
-    newest[cell] = static_cast<int>(kept.size());
+    const int column = cvFloor(corner.position.x / min_spacing), row = cvFloor(corner.position.y / min_spacing);
+    if (!isFree(corner.position, column, row)) continue;
+    cells[{column, row}].push_back(corner.position);
     kept.push_back(corner);
   }
   return kept;
@@ -209,40 +199,21 @@ std::vector<Corner> spreadOverBuckets(const std::vector<Corner>& corners, cv::Si
                                       int max_count) {
   const int columns = (image_size.width + bucket_size - 1) / bucket_size;
   const int rows = (image_size.height + bucket_size - 1) / bucket_size;
-  const auto bucketOf = [&](const Corner& corner) {
+  std::vector<std::vector<Corner>> buckets(static_cast<std::size_t>(columns) * rows);
+  for (const Corner& corner : corners) {
     const int column = std::clamp(static_cast<int>(corner.position.x) / bucket_size, 0, columns - 1);
     const int row = std::clamp(static_cast<int>(corner.position.y) / bucket_size, 0, rows - 1);
-    return static_cast<std::size_t>(row) * columns + column;
-  };
-  // The corners bucket by bucket, and where each bucket ends; it begins where the one before ends.
-  const std::size_t buckets = static_cast<std::size_t>(columns) * rows;
-  std::vector<std::size_t> end(buckets + 1, 0), bucket_of(corners.size());
-  for (std::size_t i = 0; i < corners.size(); ++i) ++end[(bucket_of[i] = bucketOf(corners[i])) + 1];
-  std::partial_sum(end.begin(), end.end(), end.begin());
-  std::vector<Corner> sorted(corners.size());
-  for (std::size_t i = 0; i < corners.size(); ++i) sorted[end[bucket_of[i]]++] = corners[i];
-  const auto begin = [&](std::size_t bucket) { return bucket == 0 ? 0 : end[bucket - 1]; };
+    buckets[static_cast<std::size_t>(row) * columns + column].push_back(corner);
+  }
+  for (std::vector<Corner>& bucket : buckets) std::sort(bucket.begin(), bucket.end(), isStronger);
 
   // Serve every bucket's strongest corner, then every second strongest, …; the last round goes to the strongest of it.
-  // No more of a bucket need be in order than the rounds ask for.
   const std::size_t wanted = std::min(static_cast<std::size_t>(max_count), corners.size());
-  std::size_t rounds = 0;
-  for (std::size_t served = 0; served < wanted; ++rounds)
-    for (std::size_t bucket = 0; bucket < buckets; ++bucket) served += begin(bucket) + rounds < end[bucket] ? 1 : 0;
-  for (std::size_t bucket = 0; bucket < buckets; ++bucket) {
-    const auto first = sorted.begin() + static_cast<std::ptrdiff_t>(begin(bucket));
-    const auto last = sorted.begin() + static_cast<std::ptrdiff_t>(end[bucket]);
-    const auto asked = first + std::min(static_cast<std::ptrdiff_t>(rounds), last - first);
-    if (asked < last) std::nth_element(first, asked, last, isStronger);
-    std::sort(first, asked, isStronger);
-  }
   std::vector<Corner> kept, served;
-  kept.reserve(wanted + buckets);
-  served.reserve(buckets);
-  for (std::size_t round = 0; round < rounds; ++round) {
+  for (std::size_t round = 0; kept.size() < wanted; ++round) {
     served.clear();
-    for (std::size_t bucket = 0; bucket < buckets; ++bucket)
-      if (begin(bucket) + round < end[bucket]) served.push_back(sorted[begin(bucket) + round]);
+    for (const std::vector<Corner>& bucket : buckets)
+      if (round < bucket.size()) served.push_back(bucket[round]);
     const std::size_t room = wanted - kept.size();
     if (served.size() > room) {
       std::sort(served.begin(), served.end(), isStronger);

@@ -77,13 +77,13 @@ const std::array<Freak::FieldPair, Freak::kBits>& Freak::pairs() {
   return kLearntPairs;
 }
 
-bool Freak::fits(const FreakKeypoint& keypoint, cv::Size image_size) {
+bool Freak::fits(const ViewKeypoint& keypoint, cv::Size image_size) {
   return keypoint.size > 0.f && liesInside(keypoint.u, keypoint.v, reach(keypoint.size), image_size);
 }
 
 Freak::Freak(const cv::Mat& image) : image_(image) {}
 
-std::array<float, Freak::kFields> Freak::intensities(const FreakKeypoint& keypoint) const {
+std::array<float, Freak::kFields> Freak::intensities(const ViewKeypoint& keypoint) const {
   const auto [scale, cosine, sine] = FreakPose(keypoint);
   std::array<float, kFields> means;
   for (int i = 0; i < kFields; ++i) {
@@ -96,7 +96,7 @@ std::array<float, Freak::kFields> Freak::intensities(const FreakKeypoint& keypoi
   return means;
 }
 
-void Freak::describe(const FreakKeypoint& keypoint, std::uint8_t* row) const {
+void Freak::describe(const ViewKeypoint& keypoint, std::uint8_t* row) const {
   const std::array<float, kFields> means = intensities(keypoint);
   for (int byte = 0; byte < kBytes; ++byte) {
     unsigned bits = 0;
@@ -108,7 +108,7 @@ void Freak::describe(const FreakKeypoint& keypoint, std::uint8_t* row) const {
   }
 }
 
-void Freak::describe(const std::vector<FreakKeypoint>& keypoints, const std::vector<std::uint8_t*>& rows) const {
+void Freak::describe(const std::vector<ViewKeypoint>& keypoints, const std::vector<std::uint8_t*>& rows) const {
   const std::size_t octets = keypoints.size() / kOctet;
   cv::parallel_for_(cv::Range(0, static_cast<int>(octets)), [&](const cv::Range& range) {
     OctetMeans means;
@@ -121,7 +121,7 @@ void Freak::describe(const std::vector<FreakKeypoint>& keypoints, const std::vec
   for (std::size_t i = octets * kOctet; i < keypoints.size(); ++i) describe(keypoints[i], rows[i]);
 }
 
-float Freak::orientation(FreakKeypoint keypoint) const {
+float Freak::orientation(ViewKeypoint keypoint) const {
   static const std::vector<FieldPair> orientation_pairs = makeOrientationPairs();
   keypoint.angle = -1.f;
   const std::array<float, kFields> means = intensities(keypoint);

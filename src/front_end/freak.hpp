@@ -8,15 +8,9 @@
 #include <vector>
 
 #include "integral_image.hpp"
+#include "stereo_descriptor_vo/front_end/base_descriptor.hpp"
 
 namespace sdvo {
-
-/// A key point as a descriptor needs it.
-struct FreakKeypoint {
-  float u, v;   ///< px, sub-pixel
-  float size;   ///< diameter in px, any positive real number
-  float angle;  ///< rad, rotation of the pattern; ignored (and none) when negative
-};
 
 /// Fast Retina Keypoint (Alahi, Ortiz, Vandergheynst, CVPR 2012) at any real-valued size.
 ///
@@ -47,19 +41,19 @@ class Freak {
   /// Distance from the centre, in px, that the pattern reaches for a key point size in px.
   static double reach(double size) { return size * kReachPerSize; }
   /// Whether the whole neighbourhood of the key point lies inside the image, whatever its angle.
-  static bool fits(const FreakKeypoint& keypoint, cv::Size image_size);
+  static bool fits(const ViewKeypoint& keypoint, cv::Size image_size);
 
   /// `image` must be CV_8U; only its integral is kept.
   explicit Freak(const cv::Mat& image);
 
   /// Mean intensities of the receptive fields; the key point must fit.
-  std::array<float, kFields> intensities(const FreakKeypoint& keypoint) const;
+  std::array<float, kFields> intensities(const ViewKeypoint& keypoint) const;
   /// Writes the kBytes of one row; the key point must fit.
-  void describe(const FreakKeypoint& keypoint, std::uint8_t* row) const;
+  void describe(const ViewKeypoint& keypoint, std::uint8_t* row) const;
   /// The same rows for many key points, several at once.
-  void describe(const std::vector<FreakKeypoint>& keypoints, const std::vector<std::uint8_t*>& rows) const;
+  void describe(const std::vector<ViewKeypoint>& keypoints, const std::vector<std::uint8_t*>& rows) const;
   /// Orientation in [0, 2 pi) from the intensity gradient over symmetric field pairs (section 4.4 there).
-  float orientation(FreakKeypoint keypoint) const;
+  float orientation(ViewKeypoint keypoint) const;
 
   const IntegralImage& image() const { return image_; }
 
@@ -73,7 +67,7 @@ class Freak {
 struct FreakPose {
   static constexpr float kSmallestHalfSide = 0.5f;  ///< of a field's box: one pixel
 
-  explicit FreakPose(const FreakKeypoint& keypoint)
+  explicit FreakPose(const ViewKeypoint& keypoint)
       : scale(static_cast<float>(Freak::reach(keypoint.size))),
         cosine(keypoint.angle < 0.f ? scale : std::cos(keypoint.angle) * scale),
         sine(keypoint.angle < 0.f ? 0.f : std::sin(keypoint.angle) * scale) {}

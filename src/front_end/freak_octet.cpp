@@ -7,7 +7,7 @@
 namespace sdvo {
 namespace {
 
-void measurePlain(const Freak& freak, const FreakKeypoint* keypoints, OctetMeans& means) {
+void measurePlain(const Freak& freak, const ViewKeypoint* keypoints, OctetMeans& means) {
   for (std::size_t k = 0; k < kOctet; ++k) {
     const std::array<float, Freak::kFields> of_one = freak.intensities(keypoints[k]);
     for (std::size_t field = 0; field < Freak::kFields; ++field) means[field][k] = of_one[field];
@@ -81,7 +81,7 @@ class Boxes {
   IntRegister last_column_, last_row_;
 };
 
-SDVO_VECTORS void measureWithVectors(const cv::Mat& sums, const FreakKeypoint* keypoints, OctetMeans& means) {
+SDVO_VECTORS void measureWithVectors(const cv::Mat& sums, const ViewKeypoint* keypoints, OctetMeans& means) {
   const Boxes boxes(sums);
   float us[kOctet], vs[kOctet], scales[kOctet], cosines[kOctet], sines[kOctet];
   for (int k = 0; k < kOctet; ++k) {
@@ -127,7 +127,7 @@ struct CompareMeans {
 
 }  // namespace
 
-void measureOctet(const Freak& freak, const FreakKeypoint* keypoints, OctetMeans& means) {
+void measureOctet(const Freak& freak, const ViewKeypoint* keypoints, OctetMeans& means) {
   if (usesVectorKernels()) return measureWithVectors(freak.image().sums(), keypoints, means);
   measurePlain(freak, keypoints, means);
 }

@@ -14,7 +14,7 @@ constexpr int kOctet = 8;
 using OctetMeans = std::array<std::array<float, kOctet>, Freak::kFields>;
 
 /// The same numbers as Freak::intensities for each of the key points, which must fit.
-void measureOctet(const Freak& freak, const FreakKeypoint* keypoints, OctetMeans& means);
+void measureOctet(const Freak& freak, const ViewKeypoint* keypoints, OctetMeans& means);
 
 /// Writes the eight rows that these means give.
 void compareOctet(const OctetMeans& means, std::uint8_t* const* rows);

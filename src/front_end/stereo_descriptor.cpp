@@ -14,10 +14,8 @@ namespace {
 /// neighbourhood leaves the image.
 void orient(const cv::Mat& image, std::vector<ViewKeypoint>& keypoints) {
   const Freak freak(image);
-  for (ViewKeypoint& k : keypoints) {
-    const FreakKeypoint keypoint{k.u, k.v, k.size, -1.f};
-    if (Freak::fits(keypoint, image.size())) k.angle = freak.orientation(keypoint);
-  }
+  for (ViewKeypoint& keypoint : keypoints)
+    if (Freak::fits(keypoint, image.size())) keypoint.angle = freak.orientation(keypoint);
 }
 
 /// px by which the furthest pattern goes beyond its image; both images have the same `size`.

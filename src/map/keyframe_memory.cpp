@@ -9,14 +9,6 @@ constexpr double kMost = 0.6;  // of a key frame's points (chosen): a view of so
 
 }  // namespace
 
-ReferencePatch OldKeyframe::reference(int point) const {
-  const std::size_t p = static_cast<std::size_t>(point);
-  const auto at = [&](std::size_t byte) { return samples.begin() + static_cast<std::ptrdiff_t>(byte); };
-  ReferencePatch reference = points[p].reference;
-  reference.samples.assign(at(p == 0 ? 0 : points[p - 1].samples_end), at(points[p].samples_end));
-  return reference;
-}
-
 int OldKeyframe::sharedWith(const StereoCamera& camera, const Eigen::Isometry3d& T_other_origin) const {
   constexpr double kLargestRatio = 1.1;  // of depths
   const Eigen::Isometry3d T_other_this = T_other_origin * T_camera_origin.inverse();
@@ -29,15 +21,12 @@ int OldKeyframe::sharedWith(const StereoCamera& camera, const Eigen::Isometry3d&
   return shared;
 }
 
-bool KeyframeMemory::covers(const StereoCamera& camera, const OldKeyframe& keyframe) const {
-  const auto sees_the_same = [&](const std::shared_ptr<const OldKeyframe>& old) {
-    return keyframe.sharedWith(camera, old->T_camera_origin) > kMost * static_cast<double>(keyframe.described.count());
-  };
-  return std::any_of(keyframes_.rbegin(), keyframes_.rend(), sees_the_same);  // the newest are the nearest
-}
-
 void KeyframeMemory::remember(const StereoCamera& camera, OldKeyframe keyframe) {
-  if (capacity_ == 0 || covers(camera, keyframe)) return;
+  const auto sees_the_same = [&](const std::shared_ptr<const OldKeyframe>& old) {
+    return keyframe.sharedWith(camera, old->T_camera_origin) > kMost * keyframe.described.count();
+  };
+  // The newest are the nearest.
+  if (capacity_ == 0 || std::any_of(keyframes_.rbegin(), keyframes_.rend(), sees_the_same)) return;
   const Eigen::Vector3d here = keyframe.T_camera_origin.inverse().translation();
   keyframes_.push_back(std::make_shared<OldKeyframe>(std::move(keyframe)));
   if (count() <= capacity_) return;

@@ -27,9 +27,9 @@ Matrix6d motionCovariance(const Window& window, const std::vector<int>& poses, c
   const auto t = row_of(to), f = row_of(from);
   Matrix6d covariance = pose_covariance.block<6, 6>(t, t);
   if (from == 0) return covariance;  // held fixed
-  const Matrix6d carried = adjoint(window.T_camera_origin[to] * window.T_camera_origin[from].inverse());
-  const Matrix6d cross = carried * pose_covariance.block<6, 6>(f, t);
-  covariance += carried * pose_covariance.block<6, 6>(f, f) * carried.transpose() - cross - cross.transpose();
+  const Eigen::Isometry3d T_to_from = window.T_camera_origin[to] * window.T_camera_origin[from].inverse();
+  const Matrix6d cross = adjoint(T_to_from) * pose_covariance.block<6, 6>(f, t);
+  covariance += carried(T_to_from, pose_covariance.block<6, 6>(f, f)) - cross - cross.transpose();
   return 0.5 * (covariance + covariance.transpose());
 }
 
@@ -218,7 +218,11 @@ void LocalMap::forgetKeyframe() {
   const std::size_t leaving = older() - 1;
   if (frames_[leaving].id > last_left_) {
     last_left_ = frames_[leaving].id;
-    if (options_.remembered_keyframes > 0 && !frames_[leaving].is_recalled) rememberKeyframe(leaving);
+    if (options_.remembered_keyframes > 0 && !frames_[leaving].is_recalled) {
+      OldKeyframe old = keyframe(frames_[leaving]);
+      // With fewer points it could not be recalled.
+      if (old.described.count() >= options_.lasting_points) memory_.remember(camera_, std::move(old));
+    }
   }
   const std::vector<int> shared = sharedPoints();
   const auto too_few = std::find_if(shared.begin(), shared.begin() + static_cast<std::ptrdiff_t>(older()),
@@ -231,48 +235,20 @@ void LocalMap::forgetKeyframe() {
   }
 }
 
-/// Not if it has too few points to be recalled, or if a remembered one sees the same.
-void LocalMap::rememberKeyframe(std::size_t frame) {
-  const OldKeyframe without_appearance = keyframe(frame, false);
-  if (without_appearance.described.count() < options_.lasting_points || memory_.covers(camera_, without_appearance))
-    return;
-  memory_.remember(camera_, keyframe(frame, true));
-}
-
-/// A copy of a frame with the points that another frame has seen as well. `with_appearance`: with descriptors and
-/// patches; otherwise only with positions.
-OldKeyframe LocalMap::keyframe(std::size_t frame, bool with_appearance) const {
-  OldKeyframe old{frames_[frame].id, frames_[frame].T_camera_origin, {}, {}, {}};
+/// A copy of a frame with those of its points that other frames have seen as well.
+OldKeyframe LocalMap::keyframe(const Frame& frame) const {
+  OldKeyframe old{frame.id, frame.T_camera_origin, {}, {}};
   old.described.kind = kind_;
-  const auto isShared = [&](const Point& point) {
-    return point.observations.size() >= 2 && observationIn(point.observations, old.id) != point.observations.end();
-  };
-  if (with_appearance) {  // it will be remembered, so it gets exactly the memory that it needs
-    std::size_t most = 0, samples = 0;
-    for (const Point& point : points_)
-      if (isShared(point)) ++most, samples += point.reference.samples.size();
-    old.points.reserve(most), old.samples.reserve(samples), old.described.positions.reserve(most);
-    old.described.descriptors.create(static_cast<int>(most), kind_.bytes, CV_8U);
-  } else {
-    old.described.positions.reserve(points_.size());
-  }
   for (const Point& point : points_) {
-    if (!isShared(point)) continue;
-    const auto predicted = predictObservation(camera_, old.T_camera_origin, point.position);
+    const auto seen = observationIn(point.observations, frame.id);
+    if (point.observations.size() < 2 || seen == point.observations.end()) continue;
+    const auto predicted = predictObservation(camera_, frame.T_camera_origin, point.position);
     if (!predicted) continue;
     old.described.positions.push_back(
         camera_.backProject(predicted->x(), predicted->y(), std::max(predicted->z(), kFarthestDisparity)));
-    if (!with_appearance) continue;
-    const auto& [samples, spacing, centre, T_camera_origin] = point.reference;
-    old.samples.insert(old.samples.end(), samples.begin(), samples.end());
-    std::copy(point.descriptor.begin(), point.descriptor.end(),
-              old.described.descriptors.ptr(static_cast<int>(old.points.size())));
-    old.points.push_back({point.position, *observationIn(point.observations, old.id), {}, old.samples.size()});
-    ReferencePatch& reference = old.points.back().reference;
-    reference.spacing = spacing, reference.centre = centre, reference.T_camera_origin = T_camera_origin;
+    old.described.descriptors.push_back(cv::Mat(point.descriptor).reshape(1, 1));
+    old.points.push_back({point.position, *seen, point.reference});
   }
-  if (with_appearance)
-    old.described.descriptors = old.described.descriptors.rowRange(0, static_cast<int>(old.points.size()));
   return old;
 }
 
@@ -434,10 +410,12 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
     return motionCovariance(window, poses, solution.pose_covariance, from, to);
   };
   adjustment.since_keyframe = motion(newest - 1, newest);
-  const Matrix6d carried = adjoint(window.T_camera_origin[newest] * window.T_camera_origin[newest - 1].inverse());
-  adjustment.growth = positivePart(motion(0, newest) - carried * motion(0, newest - 1) * carried.transpose());
+  const Eigen::Isometry3d T_newest_keyframe =
+      window.T_camera_origin[newest] * window.T_camera_origin[newest - 1].inverse();
+  adjustment.growth = positivePart(motion(0, newest) - carried(T_newest_keyframe, motion(0, newest - 1)));
   adjustment.by_calibration = -solution.pose_by_calibration.topRows<6>();
-  if (poses.size() > 1) adjustment.by_calibration += carried * solution.pose_by_calibration.bottomRows<6>();
+  if (poses.size() > 1)
+    adjustment.by_calibration += adjoint(T_newest_keyframe) * solution.pose_by_calibration.bottomRows<6>();
   calibration = window.calibration;
   for (std::size_t f = 0; f < frames_.size(); ++f)
     frames_[f].T_camera_origin = orthonormalised(window.T_camera_origin[f]);

@@ -153,9 +153,8 @@ bool Revisit::recall(const StereoFeatures& features, const RigCalibration& calib
   for (const int i : motion.inliers) {
     const FeatureMatch& match = matches[i];
     const OldKeyframe::Point& point = old->points[match.reference];
-    const auto found = old->reference(match.reference)
-                           .findIn(alignment_options_, features, match.current,
-                                   motion.T_current_reference * old->T_camera_origin, point.position);
+    const auto found = point.reference.findIn(alignment_options_, features, match.current,
+                                              motion.T_current_reference * old->T_camera_origin, point.position);
     if (!found) continue;
     const Eigen::Vector3d& then = old->described.positions[match.reference];
     const Eigen::Vector3d measurement = measurementOf(features, match.current, calibration, found->shift);

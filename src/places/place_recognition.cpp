@@ -13,19 +13,12 @@
 namespace sdvo {
 namespace {
 
-/// Independent errors of translation and rotation, the same along all axes.
-Matrix6d isotropic(double translation, double rotation) {
-  Vector6d variances;
-  variances << Eigen::Vector3d::Constant(translation * translation), Eigen::Vector3d::Constant(rotation * rotation);
-  return variances.asDiagonal();
-}
-
 constexpr int kMostNumber = std::numeric_limits<int>::max() / 2;  ///< of places and segments that are loaded
 constexpr int kMostApart = 1'000'000;                             ///< between ids of places: the largest max_places
 
 /// Covariance of an unknown motion: so wide that it constrains nothing.
 Matrix6d unknown() {
-  return isotropic(1000.0, 10.0);
+  return isotropic(1000.0 * 1000.0, 10.0 * 10.0);
 }
 
 }  // namespace
@@ -40,8 +33,7 @@ std::optional<PlaceReport> PlaceRecognition::observe(const StereoFeatures& featu
   // The path since the last key frame.
   if (way_.T_odom_camera) {
     const Eigen::Isometry3d T_previous_current = way_.T_odom_camera->inverse() * motion.T_odom_camera;
-    const Matrix6d ad = adjoint(T_previous_current.inverse());
-    way_.covariance = ad * way_.covariance * ad.transpose() + motion.covariance;
+    way_.covariance = carried(T_previous_current.inverse(), way_.covariance) + motion.covariance;
     if (motion.continuous) {
       way_.length += T_previous_current.translation().norm();
       way_.turn += Eigen::AngleAxisd(T_previous_current.linear()).angle();
@@ -120,23 +112,13 @@ void PlaceRecognition::addKeyframe(const StereoFeatures& features, int id) {
   if (places_.empty()) {
     graph_.start(id, place.T_odom_camera);
   } else if (last_ && way_.known) {
-    GraphEdge edge;
-    edge.from = *last_;
-    edge.to = id;
-    edge.T_from_to = places_.at(*last_).T_odom_camera.inverse() * place.T_odom_camera;
-    edge.length = way_.length;
-    edge.turn = way_.turn;
-    edge.covariance = way_.covariance;
-    graph_.extend(edge);
+    const Eigen::Isometry3d T_last_here = places_.at(*last_).T_odom_camera.inverse() * place.T_odom_camera;
+    graph_.extend({*last_, id, GraphEdge::Kind::kOdometry, T_last_here, way_.covariance, way_.length, way_.turn});
   } else {
-    GraphEdge edge;
-    edge.from = places_.rbegin()->first;
-    edge.to = id;
-    edge.kind = GraphEdge::Kind::kBreak;
-    edge.T_from_to = graph_.nodes().at(edge.from).inverse() * (expectation_ ? expectation_->T_map_odom : T_map_odom()) *
-                     place.T_odom_camera;
-    edge.covariance = unknown();
-    graph_.extend(edge);
+    const auto& [last, T_map_last] = *graph_.nodes().rbegin();
+    const Eigen::Isometry3d T_map_odometry = expectation_ ? expectation_->T_map_odom : T_map_odom();
+    const Eigen::Isometry3d T_last_here = T_map_last.inverse() * T_map_odometry * place.T_odom_camera;
+    graph_.extend({last, id, GraphEdge::Kind::kBreak, T_last_here, unknown()});
   }
   places_.emplace(id, std::move(place));
   last_ = id;
@@ -153,12 +135,8 @@ void PlaceRecognition::recognise(const Place& here, PlaceReport& report) {
     report.match = verifier_.verify(places_.at(candidate.place).features, here.features);
     report.reason = report.match.reason;
     if (!report.match.same) continue;
-    GraphEdge loop;
-    loop.from = candidate.place;
-    loop.to = here.id;
-    loop.kind = GraphEdge::Kind::kLoop;
-    loop.T_from_to = report.match.T_place_camera;
-    loop.covariance = report.match.covariance;
+    const GraphEdge loop{candidate.place, here.id, GraphEdge::Kind::kLoop, report.match.T_place_camera,
+                         report.match.covariance};
     if (!isPossible(loop)) {
       report.reason = "the odometry cannot have drifted that far";
       continue;
@@ -183,7 +161,7 @@ bool PlaceRecognition::isPossible(const GraphEdge& loop) const {
   if (!path.known) return true;
   // A loop may err by more than its covariance says. Small corrections are always possible; else one inexact loop would
   // make the graph reject all later, better ones.
-  const Matrix6d inexact = isotropic(0.5, 0.03);
+  const Matrix6d inexact = isotropic(0.5 * 0.5, 0.03 * 0.03);
   const Matrix6d covariance = path.covariance + loop.covariance + graph_.drift(path.length, path.turn) + inexact;
   const Eigen::Isometry3d T_from_to = graph_.nodes().at(loop.from).inverse() * graph_.nodes().at(loop.to);
   const Vector6d correction = logSE3(T_from_to.inverse() * loop.T_from_to);

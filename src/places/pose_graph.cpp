@@ -31,20 +31,6 @@ int otherEnd(const GraphEdge& edge, int id) {
   return edge.from == id ? edge.to : edge.from;
 }
 
-/// The nodes that are connected with one by paths without a break.
-std::set<int> part(const std::vector<GraphEdge>& edges, int id) {
-  EdgesOf edges_of = edgesOf(edges);
-  std::set<int> found{id};
-  std::vector<int> open{id};
-  while (!open.empty()) {
-    const int next = open.back();
-    open.pop_back();
-    for (const GraphEdge* edge : edges_of[next])
-      if (found.insert(otherEnd(*edge, next)).second) open.push_back(otherEnd(*edge, next));
-  }
-  return found;
-}
-
 struct Way {
   double length = std::numeric_limits<double>::infinity();
   const GraphEdge* last = nullptr;
@@ -72,12 +58,6 @@ std::map<int, Way> shortestWays(const std::vector<GraphEdge>& edges, int from, c
     }
   }
   return ways;
-}
-
-/// Covariance of a right perturbation of T^-1 from that of T.
-Matrix6d inverted(const Eigen::Isometry3d& T, const Matrix6d& covariance) {
-  const Matrix6d ad = adjoint(T);
-  return ad * covariance * ad.transpose();
 }
 
 }  // namespace
@@ -108,11 +88,12 @@ void PoseGraph::extend(const GraphEdge& edge) {
 
 void PoseGraph::close(const GraphEdge& edge) {
   const Eigen::Isometry3d T_map_from = nodes_.at(edge.from), T_map_to = nodes_.at(edge.to);
-  std::set<int> moved = part(edges_, edge.to);
+  constexpr double kAny = std::numeric_limits<double>::infinity();
+  std::set<int> moved = near(edge.to, kAny);
   if (moved.count(edge.from) == 0) {
     Eigen::Isometry3d T_moved = T_map_from * edge.T_from_to * T_map_to.inverse();
     if (moved.count(nodes_.begin()->first) > 0) {
-      moved = part(edges_, edge.from);
+      moved = near(edge.from, kAny);
       T_moved = T_moved.inverse();
     }
     for (const int id : moved) nodes_[id] = orthonormalised(T_moved * nodes_[id]);
@@ -148,16 +129,12 @@ Matrix6d PoseGraph::drift(double length, double turn) const {
   constexpr double kDriftOfTranslation = 0.03;               // m/m
   const double rotation = kDriftOfRotation * length + kDriftOfTurn * turn;
   const double translation = kDriftOfTranslation * length + 0.5 * rotation * length;
-  Vector6d variances;
-  variances << Eigen::Vector3d::Constant(translation * translation), Eigen::Vector3d::Constant(rotation * rotation);
-  return variances.asDiagonal();
+  return isotropic(translation * translation, rotation * rotation);
 }
 
 /// Covariance of an edge in the optimisation: its own, a share of the drift, and at least 1 mm and 0.1 mrad.
 Matrix6d PoseGraph::covariance(const GraphEdge& edge) const {
-  Vector6d least;
-  least << Eigen::Vector3d::Constant(1e-6), Eigen::Vector3d::Constant(1e-8);
-  return edge.covariance + slack_ * slack_ * drift(edge.length, edge.turn) + Matrix6d(least.asDiagonal());
+  return edge.covariance + slack_ * slack_ * drift(edge.length, edge.turn) + isotropic(1e-6, 1e-8);
 }
 
 /// Whether most loops have a residual below the scale of their robust loss.
@@ -205,9 +182,8 @@ GraphPath PoseGraph::path(int from, int to) const {
   for (int id = to; id != from;) {
     const GraphEdge& edge = *ways.at(id).last;
     const bool forward = edge.to == id;
-    const Matrix6d step = forward ? edge.covariance : inverted(edge.T_from_to, edge.covariance);
-    const Matrix6d ad = adjoint(T_node_end.inverse());
-    path.covariance += ad * step * ad.transpose();
+    const Matrix6d step = forward ? edge.covariance : carried(edge.T_from_to, edge.covariance);  // of the inverse
+    path.covariance += carried(T_node_end.inverse(), step);
     path.turn += edge.turn;
     T_node_end = (forward ? edge.T_from_to : edge.T_from_to.inverse()) * T_node_end;
     id = forward ? edge.from : edge.to;

@@ -72,6 +72,17 @@ TEST(Se3, AdjointCarriesPerturbationsToTheOtherSide) {
     }
 }
 
+TEST(Se3, CovariancesAreCarriedAsTheirPerturbations) {
+  for (const Vector6d& pose : samples())
+    for (const Vector6d& xi : samples()) {
+      const Eigen::Isometry3d T = expSE3(pose);
+      const Vector6d moved = adjoint(T) * xi;
+      EXPECT_LT((carried(T, xi * xi.transpose()) - moved * moved.transpose()).norm(),
+                1e-9 * (1.0 + moved.squaredNorm()));
+    }
+  EXPECT_EQ(isotropic(4.0, 9.0).diagonal(), vector6(4, 4, 4, 9, 9, 9));
+}
+
 TEST(Se3, OrthonormalisedRestoresARotation) {
   Eigen::Isometry3d T = expSE3(vector6(1, 2, 3, 0.4, -0.8, 0.1));
   const Eigen::Isometry3d clean = T;

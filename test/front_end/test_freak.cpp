@@ -9,7 +9,7 @@
 
 namespace sdvo::test_freak {
 
-cv::Mat row(const Freak& freak, const FreakKeypoint& keypoint) {
+cv::Mat row(const Freak& freak, const ViewKeypoint& keypoint) {
   cv::Mat bits(1, Freak::kBytes, CV_8U);
   freak.describe(keypoint, bits.ptr());
   return bits;
@@ -90,10 +90,10 @@ TEST(Freak, PatternIsThePublishedRetina) {
 TEST(Freak, IntensitiesAreExactBoxMeans) {
   const cv::Mat image = randomImage({97, 91});
   const Freak freak(image);
-  for (const FreakKeypoint& keypoint :
-       {FreakKeypoint{48.f, 45.f, 7.f, -1.f}, FreakKeypoint{50.f, 44.f, 12.f, -1.f},
-        FreakKeypoint{47.3f, 45.8f, 11.37f, -1.f}, FreakKeypoint{47.25f, 44.5f, 5.f, 1.1f},
-        FreakKeypoint{48.f, 45.f, 2.f, -1.f}}) {
+  for (const ViewKeypoint& keypoint :
+       {ViewKeypoint{48.f, 45.f, 7.f, -1.f}, ViewKeypoint{50.f, 44.f, 12.f, -1.f},
+        ViewKeypoint{47.3f, 45.8f, 11.37f, -1.f}, ViewKeypoint{47.25f, 44.5f, 5.f, 1.1f},
+        ViewKeypoint{48.f, 45.f, 2.f, -1.f}}) {
     const auto means = freak.intensities(keypoint);
     const double reach = Freak::reach(keypoint.size), angle = std::max(keypoint.angle, 0.f);
     for (std::size_t i = 0; i < means.size(); ++i) {
@@ -109,7 +109,7 @@ TEST(Freak, IntensitiesAreExactBoxMeans) {
 
 TEST(Freak, BitsCompareThePairsInOrder) {
   const Freak freak(randomImage({97, 91}));
-  const FreakKeypoint keypoint{47.3f, 45.8f, 11.f, -1.f};
+  const ViewKeypoint keypoint{47.3f, 45.8f, 11.f, -1.f};
   const auto means = freak.intensities(keypoint);
   const cv::Mat bits = row(freak, keypoint);
   for (std::size_t bit = 0; bit < Freak::kBits; ++bit) {
@@ -160,8 +160,8 @@ double bitsAtTwiceTheDistance(float near_size, float far_size, bool oriented = f
     for (double y = -2.0; y < 2.0; y += 0.41) {
       const Eigen::Vector3d near_pixel = camera.project({x, y, kDepth}),
                             far_pixel = camera.project({x, y, 2.0 * kDepth});
-      FreakKeypoint a{static_cast<float>(near_pixel.x()), static_cast<float>(near_pixel.y()), near_size, -1.f};
-      FreakKeypoint b{static_cast<float>(far_pixel.x()), static_cast<float>(far_pixel.y()), far_size, -1.f};
+      ViewKeypoint a{static_cast<float>(near_pixel.x()), static_cast<float>(near_pixel.y()), near_size, -1.f};
+      ViewKeypoint b{static_cast<float>(far_pixel.x()), static_cast<float>(far_pixel.y()), far_size, -1.f};
       if (!Freak::fits(a, {camera.width, camera.height}) || !Freak::fits(b, {camera.width, camera.height})) continue;
       if (oriented) {
         a.angle = near_view.orientation(a);
@@ -212,7 +212,7 @@ Turned turnImages(double turn) {
       });
     };
     const Freak before(view(0.0)), after(view(turn));
-    FreakKeypoint a{kCentre, kCentre, kSize, -1.f}, b = a;
+    ViewKeypoint a{kCentre, kCentre, kSize, -1.f}, b = a;
     turned.upright_bits.push_back(synthetic::differingBits(row(before, a), row(after, b)));
     a.angle = before.orientation(a);
     b.angle = after.orientation(b);
@@ -247,7 +247,7 @@ TEST(Freak, OrientationFollowsTheImage) {
 TEST(Freak, OrientationIsThePublishedSum) {
   const Freak freak(randomImage({97, 91}));
   for (float u = 42.f; u < 54.f; u += 2.7f) {
-    const FreakKeypoint keypoint{u, 45.8f, 11.f, -1.f};
+    const ViewKeypoint keypoint{u, 45.8f, 11.f, -1.f};
     const auto means = freak.intensities(keypoint);
     double x = 0.0, y = 0.0;
     const auto add = [&](std::size_t a, std::size_t b) {
@@ -300,8 +300,8 @@ TEST(Freak, FieldsOfAFittingKeypointStayInsideAtAnyAngle) {
   const cv::Mat white(80, 100, CV_8U, cv::Scalar(200));
   const Freak freak(white);
   for (float angle = 0.f; angle < 6.28f; angle += 0.1f)
-    for (const FreakKeypoint& keypoint :
-         {FreakKeypoint{21.5f, 21.5f, 7.f, angle}, FreakKeypoint{77.5f, 57.5f, 7.f, angle}})
+    for (const ViewKeypoint& keypoint :
+         {ViewKeypoint{21.5f, 21.5f, 7.f, angle}, ViewKeypoint{77.5f, 57.5f, 7.f, angle}})
       for (const float mean : freak.intensities(keypoint)) EXPECT_NEAR(mean, 200.f, 1e-3f) << "angle " << angle;
 }
 
@@ -309,17 +309,17 @@ TEST(Freak, RowsOfManyKeypointsAreThoseOfEach) {
   const cv::Mat image = randomImage({231, 177});
   const Freak freak(image);
   cv::RNG random(5);
-  std::vector<FreakKeypoint> keypoints;
+  std::vector<ViewKeypoint> keypoints;
   while (keypoints.size() < 203) {  // no whole number of registers
     const float size = random.uniform(0.3f, 20.f), angle = random.uniform(-3.f, 6.28f);
-    const FreakKeypoint keypoint{random.uniform(0.f, 231.f), random.uniform(0.f, 177.f), size, angle};
+    const ViewKeypoint keypoint{random.uniform(0.f, 231.f), random.uniform(0.f, 177.f), size, angle};
     if (Freak::fits(keypoint, image.size())) keypoints.push_back(keypoint);
   }
   // As near to the image's corners as they fit.
   const float reach = static_cast<float>(Freak::reach(7.f));
   for (const float u : {reach - 0.5f, 230.5f - reach})
     for (const float v : {reach - 0.5f, 176.5f - reach}) {
-      const FreakKeypoint keypoint{u, v, 6.999f, -1.f};
+      const ViewKeypoint keypoint{u, v, 6.999f, -1.f};
       ASSERT_TRUE(Freak::fits(keypoint, image.size()));
       keypoints.push_back(keypoint);
     }

@@ -10,7 +10,7 @@ StereoCamera rig() {
 
 /// 100 points on a wall across the view, `distance` m ahead of a camera at `z` m along the optical axis.
 OldKeyframe facingAWall(int id, double z, double distance) {
-  OldKeyframe keyframe{id, Eigen::Isometry3d::Identity(), {}, {}, {}};
+  OldKeyframe keyframe{id, Eigen::Isometry3d::Identity(), {}, {}};
   keyframe.T_camera_origin.translation().z() = -z;
   keyframe.points.resize(100);
   for (int i = 0; i < 100; ++i)
@@ -23,20 +23,6 @@ Eigen::Isometry3d cameraAt(double x, double z) {
   Eigen::Isometry3d T_camera_origin = Eigen::Isometry3d::Identity();
   T_camera_origin.translation() = -Eigen::Vector3d(x, 0.0, z);
   return T_camera_origin;
-}
-
-TEST(OldKeyframe, EachReferenceHasItsOwnSamples) {
-  OldKeyframe keyframe = facingAWall(1, 0.0, 10.0);
-  keyframe.samples = {1, 2, 3, 4, 5};
-  keyframe.points.resize(3);
-  keyframe.points[0].samples_end = 2;
-  keyframe.points[1].samples_end = 2;  // it has none
-  keyframe.points[2].samples_end = 5;
-  keyframe.points[2].reference.spacing = 1.5f;
-  EXPECT_EQ(keyframe.reference(0).samples, (std::vector<std::uint8_t>{1, 2}));
-  EXPECT_TRUE(keyframe.reference(1).samples.empty());
-  EXPECT_EQ(keyframe.reference(2).samples, (std::vector<std::uint8_t>{3, 4, 5}));
-  EXPECT_EQ(keyframe.reference(2).spacing, 1.5f);
 }
 
 TEST(OldKeyframe, SharesWhatIsInViewAndAboutAsFarAway) {

@@ -112,9 +112,6 @@ class MotionPrior {
   double interval_ = 0.0;                                      ///< s: about the longest of the last intervals
 };
 
-/// The same in every direction, m^2 and rad^2.
-Matrix6d isotropic(double translation_variance, double rotation_variance);
-
 /// The second moment of a difference between motions, the same in every direction of its translation and rotation.
 Matrix6d momentOf(const Vector6d& difference);
 

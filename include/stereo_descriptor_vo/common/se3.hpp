@@ -23,6 +23,12 @@ Vector6d logSE3(const Eigen::Isometry3d& T);
 /// Ad(T): T exp(xi) = exp(Ad(T) xi) T.
 Matrix6d adjoint(const Eigen::Isometry3d& T);
 
+/// Covariance of Ad(T) xi from that of xi: of a left perturbation of a motion from that of a right one, for example.
+Matrix6d carried(const Eigen::Isometry3d& T, const Matrix6d& covariance);
+
+/// Covariance of independent errors, the same along all axes; m^2 and rad^2.
+Matrix6d isotropic(double translation_variance, double rotation_variance);
+
 /// The squared Mahalanobis distance: chi-square with six degrees of freedom if the difference is Gaussian with this
 /// covariance.
 double mahalanobisSquare(const Vector6d& difference, const Matrix6d& covariance);

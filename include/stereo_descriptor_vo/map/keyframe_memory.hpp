@@ -1,8 +1,6 @@
 #pragma once
 
 #include <Eigen/Geometry>
-#include <cstddef>
-#include <cstdint>
 #include <list>
 #include <memory>
 #include <vector>
@@ -16,18 +14,13 @@ namespace sdvo {
 struct OldKeyframe {
   struct Point {
     AnchoredPoint position;
-    Observation observation;   ///< in this key frame
-    ReferencePatch reference;  ///< its samples are in `samples` of the key frame
-    std::size_t samples_end;   ///< where they end there; they begin where those of the point before end
+    Observation observation;  ///< in this key frame
+    ReferencePatch reference;
   };
   int id;
   Eigen::Isometry3d T_camera_origin;
   std::vector<Point> points;
-  std::vector<std::uint8_t> samples;  ///< of all references: one allocation does not fragment the heap
-  DescribedPoints described;          ///< the points in this key frame's left optical frame
-
-  /// A point's reference patch together with its samples.
-  ReferencePatch reference(int point) const;
+  DescribedPoints described;  ///< the points in this key frame's left optical frame
 
   /// How many of its points another view sees at nearly the same depth, and so nearly as large.
   int sharedWith(const StereoCamera& camera, const Eigen::Isometry3d& T_other_origin) const;
@@ -39,10 +32,7 @@ class KeyframeMemory {
  public:
   explicit KeyframeMemory(int capacity) : capacity_(capacity) {}
 
-  /// Whether a remembered key frame sees most of this one's points. Only its pose and the points' positions are used.
-  bool covers(const StereoCamera& camera, const OldKeyframe& keyframe) const;
-
-  /// Keeps a key frame unless a remembered one covers it.
+  /// Keeps a key frame unless a remembered one sees most of its points.
   void remember(const StereoCamera& camera, OldKeyframe keyframe);
 
   /// The key frame nearest to a view, among those that share most of their points with it, at least `least`, and are

@@ -188,8 +188,7 @@ class LocalMap {
 
   void pose(Problem& problem) const;
   void forgetKeyframe();
-  void rememberKeyframe(std::size_t frame);
-  OldKeyframe keyframe(std::size_t frame, bool with_appearance) const;
+  OldKeyframe keyframe(const Frame& frame) const;
   std::vector<int> sharedPoints() const;
   std::vector<double> parallaxToPredecessors(std::size_t frames) const;
   int lookedForSince() const;

@@ -78,7 +78,7 @@ void stereoMatch(benchmark::State& state) {
 void freakInTwoViews(benchmark::State& state) {
   const WithOrWithoutVectors version(state);
   const cv::Mat left = view(false), right = view(true);
-  std::vector<sdvo::FreakKeypoint> keypoints;
+  std::vector<sdvo::ViewKeypoint> keypoints;
   cv::Mat rows(kFeatures, sdvo::Freak::kBytes, CV_8U);
   std::vector<std::uint8_t*> row;
   for (const cv::Point2f& p : positions()) {
