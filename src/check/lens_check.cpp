@@ -3,12 +3,10 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
 #include "../common/statistics.hpp"
 #include "../common/text.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
-#include "tracks.hpp"
 
 namespace sdvo {
 namespace {
@@ -72,29 +70,13 @@ PairEquations linearise(const Rays& rays, const Lens& lens, const Eigen::Isometr
 }  // namespace
 
 /// Far corners, too, of which a block search is not sure: they show the turns.
-void LensCheck::add(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp) {
-  constexpr std::int64_t kPeriod = 190'000'000;               // ns; five pairs a second show enough
-  constexpr float kReturn = 0.5F, kRow = 1.5F, kFar = -1.0F;  // px (chosen)
+void LensCheck::add(const StereoCamera& camera, const CornerPair& pair) {
+  constexpr float kRow = 1.5F, kFar = -1.0F;  // px (chosen)
   constexpr int kLevels = 4;
-  const cv::Mat before = before_;
-  before_ = left.clone();
-  if (before.size() != left.size() || stamp - last_ < kPeriod) return;
-  last_ = stamp;
-  std::vector<cv::Point2f> corners;
-  cv::goodFeaturesToTrack(left, corners, 200, 0.01, 8.0);
-  if (corners.empty()) return;
-  /// Of each corner, where it is in `image`, and whether it returns from there.
-  const auto follow = [&](const cv::Mat& image, std::vector<cv::Point2f>& there) {
-    there = corners;
-    std::vector<std::uint8_t> found = track(left, image, corners, there, kLevels);
-    std::vector<cv::Point2f> back = there;
-    const std::vector<std::uint8_t> returned = track(image, left, there, back, kLevels);
-    for (std::size_t i = 0; i < found.size(); ++i)
-      found[i] = found[i] && returned[i] && distance(back[i], corners[i]) < kReturn;
-    return found;
-  };
+  const std::vector<cv::Point2f>& corners = pair.corners;
   std::vector<cv::Point2f> beside, earlier;
-  const std::vector<std::uint8_t> is_beside = follow(right, beside), is_earlier = follow(before, earlier);
+  const auto is_beside = trackBothWays(pair.left, pair.right, corners, beside, kLevels);
+  const auto is_earlier = trackBothWays(pair.left, pair.before, corners, earlier, kLevels);
   std::vector<Track> tracks;
   for (std::size_t i = 0; i < corners.size(); ++i) {
     const cv::Point2f apart = corners[i] - beside[i];

@@ -1,11 +1,10 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstdint>
-#include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
+#include "corner_pairs.hpp"
 #include "finding.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 
@@ -20,8 +19,7 @@ class LensCheck {
   struct Track {
     double u, v, disparity, u_before, v_before;
   };
-  /// The next pair, CV_8UC1 of one size; `stamp` in ns.
-  void add(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
+  void add(const StereoCamera& camera, const CornerPair& pair);
   /// Its tracks, found elsewhere.
   void add(const StereoCamera& camera, const std::vector<Track>& tracks);
 
@@ -41,8 +39,6 @@ class LensCheck {
     double disparity;
   };
   StereoCamera camera_;
-  cv::Mat before_;  ///< the left image of the pair before
-  std::int64_t last_ = 0;
   std::vector<std::vector<Ray>> pairs_;
 };
 

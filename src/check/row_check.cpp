@@ -3,12 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <opencv2/imgproc.hpp>
 
 #include "../common/statistics.hpp"
 #include "../common/text.hpp"
 #include "../front_end/block_search.hpp"
-#include "tracks.hpp"
 
 namespace sdvo {
 namespace {
@@ -17,41 +15,26 @@ constexpr std::size_t kCells = RowDelay::kParts;
 
 }  // namespace
 
-void RowCheck::add(const cv::Mat& left, const cv::Mat& right, std::int64_t stamp) {
-  constexpr std::int64_t kPeriod = 190000000;  // ns; five pairs a second tell enough
-  const cv::Mat before = before_;
-  const double dt = 1e-9 * static_cast<double>(stamp - stamp_before_);
-  before_ = left.clone();
-  stamp_before_ = stamp;
-  if (before.size() != left.size() || !(dt > 0.0) || stamp - last_ < kPeriod) return;
-  last_ = stamp;
-  size_ = left.size();
-
-  std::vector<cv::Point2f> corners;
-  cv::goodFeaturesToTrack(left, corners, 200, 0.01, 8.0);
-  corners_ += static_cast<int>(corners.size());
-  const BlockSearch search(left, right, max_disparity_, reach_);
+void RowCheck::add(const CornerPair& pair) {
+  corners_ += static_cast<int>(pair.corners.size());
+  const BlockSearch search(pair.left, pair.right, max_disparity_, reach_);
   std::vector<cv::Point2f> points, in_right;
-  for (const cv::Point2f& corner : corners)
+  for (const cv::Point2f& corner : pair.corners)
     if (const auto sighting = search.find(corner)) {
       points.push_back(corner);
       in_right.emplace_back(corner.x - static_cast<float>(sighting->disparity),
                             corner.y + static_cast<float>(sighting->dv));
     }
-  if (points.empty()) return;
-
   const std::vector<cv::Point2f> blocks = in_right;
-  std::vector<cv::Point2f> in_before = points, back;
-  const auto refined = track(left, right, points, in_right, 0), followed = track(left, before, points, in_before, 4);
-  back = in_before;
-  const auto returned = track(before, left, in_before, back, 0);
+  std::vector<cv::Point2f> in_before;
+  const auto refined = track(pair.left, pair.right, points, in_right, 0);
+  const auto followed = trackBothWays(pair.left, pair.before, points, in_before, 0);
   std::vector<RowDelay::Sample> rows;
   for (std::size_t i = 0; i < points.size(); ++i) {
-    constexpr double kBlock = 1.5, kReturn = 0.5;  // px: a block is found to a pixel, a track returns (chosen)
-    if (!refined[i] || distance(in_right[i], blocks[i]) > kBlock) continue;
-    if (!followed[i] || !returned[i] || distance(back[i], points[i]) > kReturn) continue;
-    const int cell = RowDelay::cellOf(points[i].x, points[i].y, size_.width, size_.height);
-    const double velocity = static_cast<double>(points[i].y - in_before[i].y) / dt;
+    constexpr double kBlock = 1.5;  // px: a block is found to a pixel (chosen)
+    if (!refined[i] || !followed[i] || distance(in_right[i], blocks[i]) > kBlock) continue;
+    const int cell = RowDelay::cellOf(points[i].x, points[i].y, pair.left.cols, pair.left.rows);
+    const double velocity = static_cast<double>(points[i].y - in_before[i].y) / pair.dt;
     rows.push_back({cell, static_cast<double>(in_right[i].y - points[i].y), velocity, velocity,
                     static_cast<double>(points[i].x - in_right[i].x)});
     samples_.push_back({cell, rows.back().dv, velocity});

@@ -1,11 +1,11 @@
 #pragma once
 
-#include <cstdint>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
 #include "../rig/row_delay.hpp"
+#include "corner_pairs.hpp"
 #include "finding.hpp"
 
 namespace sdvo {
@@ -18,8 +18,7 @@ class RowCheck {
   RowCheck(double max_dv, double max_disparity, double reach)
       : max_dv_(max_dv), max_disparity_(max_disparity), reach_(reach) {}
 
-  /// The next pair, CV_8UC1 of one size; `stamp` in ns.
-  void add(const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
+  void add(const CornerPair& pair);
 
   Finding rectification() const;
   Finding sameMoment() const;
@@ -36,9 +35,6 @@ class RowCheck {
   };
 
   double max_dv_, max_disparity_, reach_;
-  cv::Size size_;
-  cv::Mat before_;  ///< the left image of the pair before
-  std::int64_t stamp_before_ = 0, last_ = 0;
   int corners_ = 0;
   std::vector<Sample> samples_;
   RowDelay delay_{1.0, 10.0};  ///< 10 ms are a tenth of a pixel then

@@ -10,6 +10,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "pose_conversions.hpp"
+
 namespace sdvo::ros_conversions {
 namespace {
 
@@ -27,13 +29,6 @@ Matrix6d unsteadiness(double dt) {
   return deviation.cwiseAbs2().asDiagonal();
 }
 
-template <class Covariance>
-void fillCovariance(const Matrix6d& covariance, Covariance& message) {
-  Matrix6d symmetric = 0.5 * (covariance + covariance.transpose());
-  symmetric.diagonal().array() += kVarianceFloor;
-  Eigen::Map<Matrix6d>(message.data()) = symmetric;
-}
-
 }  // namespace
 
 nav_msgs::Odometry toOdometry(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera,
@@ -46,30 +41,19 @@ nav_msgs::Odometry toOdometry(const OdometryResult& result, const Eigen::Isometr
   // The base starts where the core's origin, the camera's first pose, puts it.
   const Eigen::Isometry3d T_odom_base =
       orthonormalised(T_odom_start * T_base_camera * result.T_origin_camera * T_base_camera.inverse());
-  odometry.pose.pose = tf2::toMsg(T_odom_base);
-
-  // Perturbations of the camera, in its own axes, become those of the base; then the axes of odom.
+  // Perturbations of the camera, in its own axes, become those of the base.
   const Matrix6d to_base = adjoint(T_base_camera);
-  Matrix6d to_odom_axes = Matrix6d::Zero();
-  to_odom_axes.topLeftCorner<3, 3>() = T_odom_base.linear();
-  to_odom_axes.bottomRightCorner<3, 3>() = T_odom_base.linear();
-  const Matrix6d to_pose = to_odom_axes * to_base;
-  fillCovariance(to_pose * result.pose_covariance * to_pose.transpose(), odometry.pose.covariance);
+  const Matrix6d floor = kVarianceFloor * Matrix6d::Identity();
+  odometry.pose = toMessage(T_odom_base, to_base * result.pose_covariance * to_base.transpose() + floor);
 
-  if (!result.has_motion || !(result.dt > 0.0)) {
-    fillCovariance(kUnknownVariance * Matrix6d::Identity(), odometry.twist.covariance);
-    return odometry;
+  Matrix6d of_twist = kUnknownVariance * Matrix6d::Identity();
+  if (result.has_motion && result.dt > 0.0) {
+    const Vector6d twist = logSE3(T_base_camera * result.T_previous_current * T_base_camera.inverse()) / result.dt;
+    odometry.twist.twist = tf2::toMsg(twist);
+    of_twist =
+        to_base * result.motion_covariance * to_base.transpose() / (result.dt * result.dt) + unsteadiness(result.dt);
   }
-  const Vector6d twist = logSE3(T_base_camera * result.T_previous_current * T_base_camera.inverse()) / result.dt;
-  odometry.twist.twist.linear.x = twist[0];
-  odometry.twist.twist.linear.y = twist[1];
-  odometry.twist.twist.linear.z = twist[2];
-  odometry.twist.twist.angular.x = twist[3];
-  odometry.twist.twist.angular.y = twist[4];
-  odometry.twist.twist.angular.z = twist[5];
-  fillCovariance(
-      to_base * result.motion_covariance * to_base.transpose() / (result.dt * result.dt) + unsteadiness(result.dt),
-      odometry.twist.covariance);
+  Eigen::Map<Matrix6d>(odometry.twist.covariance.data()) = 0.5 * (of_twist + of_twist.transpose()) + floor;
   return odometry;
 }
 

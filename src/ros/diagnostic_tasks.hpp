@@ -104,7 +104,7 @@ class UnusedInput {
       : what_(std::move(what)), max_share_(max_share), explained_(std::move(explained)) {}
 
   void noteUsed() { ++used_; }
-  void add(Cause cause) { ++counts_[cause]; }
+  void add(Cause cause, std::uint64_t count = 1) { counts_[cause] += count; }
   /// Input that was counted as unused is used after all.
   void takeBack(Cause cause) { --counts_[cause]; }
 

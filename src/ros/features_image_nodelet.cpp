@@ -1,5 +1,4 @@
 #include <image_transport/image_transport.h>
-#include <nodelet/nodelet.h>
 #include <sensor_msgs/fill_image.h>
 #include <sensor_msgs/image_encodings.h>
 #include <stereo_descriptor_vo/FeatureFlow.h>
@@ -10,23 +9,20 @@
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 
+#include "../common/text.hpp"
 #include "../messages/image_conversions.hpp"
 #include "camera_finder.hpp"
 #include "features_image.hpp"
 #include "image_subscriber.hpp"
+#include "robot_nodelet.hpp"
 #include "synchronisers.hpp"
-#include "threads.hpp"
-#include "throttles.hpp"
 
 namespace sdvo {
 
 /// Draws the features and their flow over the images, for people. Everything is subscribed only while somebody looks.
-class FeaturesImageNodelet : public nodelet::Nodelet {
+class FeaturesImageNodelet : public RobotNodelet {
  public:
-  ~FeaturesImageNodelet() override {
-    master_callbacks_.stop();
-    callbacks_.stop();
-  }
+  ~FeaturesImageNodelet() override { stopThreads(); }
 
  private:
   using Image = sensor_msgs::Image;
@@ -61,23 +57,18 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
     ros::Subscriber features, flow, info;
   };
 
-  void onInit() override try {
-    nh_ = callbacks_.serve(getNodeHandle());
+  void begin() override {
+    ros::NodeHandle master_nh = addThread().serve(getNodeHandle());  // what may wait for the master
+    nh_ = addThread().serve(getNodeHandle());
     finds_camera_ = getPrivateNodeHandle().param("find_camera", nh_.getNamespace() != "/");
     finder_ = std::make_unique<CameraFinder>(nh_.getNamespace(), nh_.resolveName("left/image_rect"),
                                              nh_.resolveName("right/image_rect"));
     transport_ = std::make_unique<StereoImageTransport>(getPrivateNodeHandle());
     const image_transport::SubscriberStatusCallback on_connect =
         [this](const image_transport::SingleSubscriberPublisher&) { updateInputs(); };
-    ros::NodeHandle master_nh = master_callbacks_.serve(getNodeHandle());
     publisher_ = image_transport::ImageTransport(master_nh).advertise("features_image", 1, on_connect, on_connect);
     camera_timer_ =
         master_nh.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { followCamera(); });
-    callbacks_.start();
-    master_callbacks_.start();
-  } catch (const std::exception& e) {
-    NODELET_FATAL_STREAM("not started: " << e.what());
-    throw;  // the manager forgets the nodelet, and its loader ends with an error
   }
 
   // In the thread that may wait for the master.
@@ -109,9 +100,9 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
   void take(Synchroniser& synchroniser, const boost::shared_ptr<const Message>& message) try {
     synchroniser.add<input>(message);
   } catch (const std::exception& e) {
-    if (throttle_.allows(e.what()))
-      NODELET_WARN_STREAM("features_image: a message of type " << ros::message_traits::datatype<Message>()
-                                                               << " is not used: " << e.what());
+    warn(text(0, "features_image: a message of type ", ros::message_traits::datatype<Message>(),
+              " is not used: ", e.what()),
+         e.what());
   }
 
   void draw(const sensor_msgs::ImageConstPtr& left, const sensor_msgs::ImageConstPtr& right,
@@ -126,15 +117,12 @@ class FeaturesImageNodelet : public nodelet::Nodelet {
     publisher_.publish(sensor_msgs::ImageConstPtr(picture));
     has_pictures_ = true;
   } catch (const std::exception& e) {
-    if (throttle_.allows(e.what()))
-      NODELET_ERROR_STREAM("features_image at " << left->header.stamp << " skipped: " << e.what());
+    fail(text(0, "features_image at ", left->header.stamp, " skipped: ", e.what()), e.what());
   }
 
-  CallbackThread callbacks_, master_callbacks_;
   ros::NodeHandle nh_;
   bool finds_camera_ = true;
   std::atomic<bool> has_pictures_{false};
-  ReportThrottle throttle_;
   std::unique_ptr<StereoImageTransport> transport_;
   image_transport::Publisher publisher_;
   ros::WallTimer camera_timer_;

@@ -14,25 +14,19 @@ OdometryPairInput::OdometryPairInput(const ros::NodeHandle& nh, int queue_size, 
       callback_(std::move(callback)),
       refuse_(std::move(refuse)),
       unused_(unused),
-      subscriptions_([this] {
-        if (!synchroniser_) beginAnew();
-        return std::vector<ros::Subscriber>{subscribe<0, Features>("stereo_features"), subscribe<1, Odometry>("odom"),
-                                            subscribe<2, Info>("vo_info")};
-      }) {}
+      subscriptions_(
+          [this] {
+            if (!synchroniser_) beginAnew();
+            return std::vector<ros::Subscriber>{subscribe<0, Features>("stereo_features"),
+                                                subscribe<1, Odometry>("odom"), subscribe<2, Info>("vo_info")};
+          },
+          [this] {
+            ++resumes_;
+            beginAnew();
+          }) {}
 
 std::string OdometryPairInput::topics() const {
   return nh_.resolveName("stereo_features") + ", " + nh_.resolveName("odom") + " and " + nh_.resolveName("vo_info");
-}
-
-bool OdometryPairInput::pause() {
-  return subscriptions_.pause();
-}
-
-bool OdometryPairInput::resume() {
-  if (!subscriptions_.isPaused()) return false;
-  ++resumes_;
-  beginAnew();
-  return subscriptions_.resume();
 }
 
 void OdometryPairInput::beginAnew() {

@@ -35,10 +35,8 @@ class OdometryPairInput {
   /// refused messages, count as `unused`.
   OdometryPairInput(const ros::NodeHandle& nh, int queue_size, UnusedInput& unused, Callback callback, Refusal refuse);
 
-  /// Without subscriptions the image side has one listener less. False where that was so already.
-  bool pause();
-  /// False where it was not paused.
-  bool resume();
+  /// While they are paused the image side has one listener less.
+  PausableInput& subscriptions() { return subscriptions_; }
 
   /// Names of the topics, for people.
   std::string topics() const;

@@ -39,7 +39,7 @@ void OtherRobot::onSignature(const SignatureMessage& signature) try {
   request.requested_by = robot_;
   requests_.publish(request);
 } catch (const std::exception& e) {
-  if (throttle_.allows(e.what())) places_.warn("key frame of " + signature.robot + " skipped: " + e.what());
+  places_.warn("key frame of " + signature.robot + " skipped: " + e.what(), e.what());
 }
 
 void OtherRobot::giveUpWhatIsLate() {
@@ -48,8 +48,8 @@ void OtherRobot::giveUpWhatIsLate() {
     const auto next = std::next(question);
     if (now > question->second.deadline) {
       const std::string& robot = question->first.first;
-      if (throttle_.allows("no answer of " + robot))
-        places_.warn("key frame of " + robot + " skipped: it gives no answer on " + subscribers_[1].getTopic());
+      places_.warn("key frame of " + robot + " skipped: it gives no answer on " + subscribers_[1].getTopic(),
+                   "no answer of " + robot);
       questions_.erase(question);
     }
     question = next;
@@ -71,14 +71,14 @@ void OtherRobot::onAnswer(const PlaceMessage& answer) try {
     return;
   }
 } catch (const std::exception& e) {
-  if (throttle_.allows(e.what())) places_.warn("key frame of " + answer.robot + " skipped: " + e.what());
+  places_.warn("key frame of " + answer.robot + " skipped: " + e.what(), e.what());
 }
 
 void OtherRobot::onRequest(const msgs::PlaceRequest& request) try {
   if (request.robot != robot_) return;
   if (const std::optional<PlaceMessage> place = places_.get(static_cast<int>(request.id))) answers_.publish(*place);
 } catch (const std::exception& e) {
-  if (throttle_.allows(e.what())) places_.warn("key frame " + std::to_string(request.id) + " is not sent: " + e.what());
+  places_.warn("key frame " + std::to_string(request.id) + " is not sent: " + e.what(), e.what());
 }
 
 }  // namespace sdvo

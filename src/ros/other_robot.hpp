@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "../messages/place_conversions.hpp"
-#include "throttles.hpp"
 
 namespace sdvo {
 
@@ -32,7 +31,7 @@ class OtherRobot {
     std::function<std::optional<stereo_descriptor_vo::PlaceMatch>(int place, const Place& other)> verify;
     std::function<std::optional<PlaceMessage>(int place)> get;  ///< nothing when it is not there any more
     std::function<void(const stereo_descriptor_vo::PlaceMatch&)> publish;
-    std::function<void(const std::string&)> warn;
+    std::function<void(const std::string& what, const std::string& kind)> warn;  ///< one of a kind now and then
   };
 
   /// `robot`: our own name, whose signatures are no other's. `min_score` of a place for which rows are asked for;
@@ -54,7 +53,6 @@ class OtherRobot {
   const std::string robot_;
   const double min_score_, timeout_;
   const Places places_;
-  ReportThrottle throttle_;
   std::map<std::pair<std::string, std::uint32_t>, Question> questions_;  ///< by robot and place
   ros::Publisher requests_, answers_;
   std::vector<ros::Subscriber> subscribers_;

@@ -31,9 +31,12 @@ constexpr const char* kInputTopics = "input_topics";
 /// StereoImageTransport.
 bool isOfImageTransport(const std::string& name);
 
-template <class Options>
-std::vector<std::string> loadParams(const ros::NodeHandle& nh, Options& options) {
-  return loadParams(nh, listOptions(options));
+/// The same for the fields of options structs.
+template <class... Options>
+std::vector<std::string> loadParams(const ros::NodeHandle& nh, Options&... options) {
+  OptionList list;
+  (list.collect(options), ...);
+  return loadParams(nh, list.options());
 }
 
 /// Serves options through dynamic_reconfigure's messages, for dynparam and rqt_reconfigure. Names, ranges, defaults and

@@ -1,7 +1,4 @@
 #include <geometry_msgs/PoseWithCovarianceStamped.h>
-#include <nodelet/nodelet.h>
-#include <std_srvs/Empty.h>
-#include <std_srvs/Trigger.h>
 #include <stereo_descriptor_vo/GetPlace.h>
 #include <stereo_descriptor_vo/LoadPlaces.h>
 #include <stereo_descriptor_vo/SavePlaces.h>
@@ -20,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "../common/text.hpp"
 #include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
 #include "../messages/frames.hpp"
@@ -28,43 +26,30 @@
 #include "odometry_pair_input.hpp"
 #include "other_robot.hpp"
 #include "output_files.hpp"
-#include "params.hpp"
 #include "place_publisher.hpp"
 #include "place_session.hpp"
 #include "places_file.hpp"
+#include "robot_nodelet.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
-#include "threads.hpp"
-#include "throttles.hpp"
 #include "transforms.hpp"
 
 namespace sdvo {
 
+using ros_conversions::cleanFrameId;
+
 /// Stereo feature messages and their odometry in; a map of places, and where the odometry is in it, out. Never sees an
 /// image.
-class PlaceRecognitionNodelet : public nodelet::Nodelet {
+class PlaceRecognitionNodelet : public RobotNodelet {
  public:
   ~PlaceRecognitionNodelet() override {
     stopping_ = true;
-    // Nothing may arrive any more, and nothing be in work, when members go.
-    callbacks_.stop();
-    slow_callbacks_.stop();
-    disk_callbacks_.stop();
+    stopThreads();
     if (observer_) observer_->stop();
     if (optimiser_) optimiser_->stop();
-    if (options_.output.save_at_shutdown && input_) saveByItself(true);
+    if (options_.save_at_shutdown && input_) saveByItself(true);
   }
 
  private:
-  struct Options {
-    PlaceOutputOptions output;
-    PlaceRecognitionOptions recognition;
-
-    void describe(OptionList& list) {
-      output.describe(list);
-      recognition.describe(list);
-    }
-  };
-
   /// A pair of the session that was there when it arrived.
   struct Arrived {
     OdometryPair pair;
@@ -76,80 +61,69 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     std::shared_ptr<PlaceSession> session;
   };
 
-  void onInit() override try {
-    nh_ = callbacks_.serve(getNodeHandle());
-    ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
-    ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
-    ros::NodeHandle disk_nh = disk_callbacks_.serve(getPrivateNodeHandle());
-    ros::NodeHandle other_nh = slow_callbacks_.serve(getNodeHandle());
-    for (const std::string& name : loadParams(private_nh, options_))
-      NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect: misspelt? See docs/parameters.md");
-    const PlaceOutputOptions& output = options_.output;
-    ros_conversions::requireName({"map_frame_id", output.map_frame_id});
-    robot_ = output.robot_name.empty() ? nh_.getNamespace() : output.robot_name;
-    session_ = std::make_shared<PlaceSession>(options_.recognition);
-    if (output.save_at_shutdown && (output.places_file.empty() || options_.recognition.localisation_only))
+  void begin() override {
+    CallbackThread &callbacks = addThread(), &slow_callbacks = addThread();  // messages; what takes its time
+    nh_ = callbacks.serve(getNodeHandle());
+    ros::NodeHandle private_nh = callbacks.serve(getPrivateNodeHandle());
+    ros::NodeHandle slow_nh = slow_callbacks.serve(getPrivateNodeHandle());
+    ros::NodeHandle other_nh = slow_callbacks.serve(getNodeHandle());
+    ros::NodeHandle disk_nh = addThread().serve(getPrivateNodeHandle());  // files
+    loadOptions(private_nh, options_, recognition_options_);
+    ros_conversions::requireName({"map_frame_id", options_.map_frame_id});
+    options_.map_frame_id = cleanFrameId(options_.map_frame_id);
+    robot_ = options_.robot_name.empty() ? nh_.getNamespace() : options_.robot_name;
+    session_ = std::make_shared<PlaceSession>(recognition_options_);
+    if (options_.save_at_shutdown && (options_.places_file.empty() || recognition_options_.localisation_only))
       throw std::invalid_argument("save_at_shutdown needs a places_file, and a map that is not localisation_only");
-    if (!output.places_file.empty()) begin(inRosHome(output.places_file));
+    if (!options_.places_file.empty()) beginWith(inRosHome(options_.places_file));
 
     const std::uint32_t tag = TransformPublisher::tagOf(getName());
-    transforms_ = std::make_unique<RobotTransforms>(nh_, std::nullopt, tag, [this](const std::string& what) {
-      if (throttle_.allows(what)) NODELET_WARN_STREAM(what);
-    });
+    transforms_ =
+        std::make_unique<RobotTransforms>(nh_, std::nullopt, tag, [this](const std::string& what) { warn(what); });
     mount_ = std::make_unique<CameraMount>(*transforms_, kTfTimeout);
-    publisher_ = std::make_unique<PlacePublisher>(nh_, output, robot_, tag, [this] { return map(); });
+    publisher_ = std::make_unique<PlacePublisher>(nh_, options_, robot_, tag, [this] { return map(); });
     using namespace stereo_descriptor_vo;
-    using std_srvs::Trigger;
-    services_ = {
-        private_nh.advertiseService("reset", &PlaceRecognitionNodelet::onReset, this),
-        serve<Trigger>(private_nh, "pause", [this](const auto&, auto& response) { pause(response.message); }),
-        serve<Trigger>(private_nh, "resume", [this](const auto&, auto& response) { resume(response.message); }),
-        serve<SavePlaces>(
-            disk_nh, "save_places",
-            [this](const auto& request, auto& response) { response.message = save(inRosHome(request.path)); }),
-        serve<LoadPlaces>(
-            disk_nh, "load_places",
-            [this](const auto& request, auto& response) { response.message = replaceBy(inRosHome(request.path)); }),
-        serve<GetPlace>(slow_nh, "get_place", [this](const auto& request, auto& response) {
-          const std::lock_guard<std::mutex> lock(mutex_);
-          const auto place = session_->message(static_cast<int>(request.id), robot_);
-          if (!place) throw std::invalid_argument("there is no place " + std::to_string(request.id));
-          response.place = *place;
-        })};
-    if (output.save_at_shutdown)
+    serveReset(private_nh, [this] { reset(); });
+    serve<SavePlaces>(disk_nh, "save_places", [this](const auto& request, auto& response) {
+      response.message = save(inRosHome(request.path));
+    });
+    serve<LoadPlaces>(disk_nh, "load_places", [this](const auto& request, auto& response) {
+      response.message = replaceBy(inRosHome(request.path));
+    });
+    serve<GetPlace>(slow_nh, "get_place", [this](const auto& request, auto& response) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      const auto place = session_->message(static_cast<int>(request.id), robot_);
+      if (!place) throw std::invalid_argument("there is no place " + std::to_string(request.id));
+      response.place = *place;
+    });
+    if (options_.save_at_shutdown)
       saving_ = disk_nh.createWallTimer(kSavePeriod, [this](const ros::WallTimerEvent&) { saveByItself(false); });
-    observer_ = std::make_unique<Worker<Arrived>>(static_cast<std::size_t>(output.queue_size),
+    observer_ = std::make_unique<Worker<Arrived>>(static_cast<std::size_t>(options_.queue_size),
                                                   [this](const Arrived& arrived) { observe(arrived); });
     optimiser_ = std::make_unique<Worker<Job>>(1, [this](const Job& job) { optimise(job); });
-    other_ =
-        std::make_unique<OtherRobot>(other_nh, robot_, output.other_min_score, output.other_timeout, placesForOthers());
+    other_ = std::make_unique<OtherRobot>(other_nh, robot_, options_.other_min_score, options_.other_timeout,
+                                          placesForOthers());
     unused_ = std::make_unique<UnusedInput>("pairs", RateOptions().max_unused);
     input_ = std::make_unique<OdometryPairInput>(
-        nh_, output.sync_queue_size, *unused_, [this](const OdometryPair& pair) { onPair(pair); },
+        nh_, options_.sync_queue_size, *unused_, [this](const OdometryPair& pair) { onPair(pair); },
         [this](const std::string& topic, const ros::Time& stamp, const std::string& why) {
-          if (throttle_.allows(topic + why))
-            NODELET_ERROR_STREAM(topic << ": message at " << stamp << " skipped: " << why);
+          fail(text(0, topic, ": message at ", stamp, " skipped: ", why), topic + why);
         });
-    diagnostics_ =
-        std::make_unique<PlaceDiagnostics>(nh_, private_nh, getName(), input_->topics(), output.max_silence, *unused_);
+    diagnostics_ = std::make_unique<PlaceDiagnostics>(nh_, private_nh, getName(), input_->topics(),
+                                                      options_.max_silence, *unused_);
+    servePauses(private_nh, input_->subscriptions(), diagnostics_->input(), "the way in between is unknown");
     // Ours, and the robot's: that of an rviz beside the camera's namespace, in "/" the same.
     for (const std::string& topic :
          std::set<std::string>{nh_.resolveName("initialpose"),
                                ros::names::append(ros::names::parentNamespace(nh_.getNamespace()), "initialpose")})
       initial_pose_subscribers_.push_back(nh_.subscribe<geometry_msgs::PoseWithCovarianceStamped>(
           topic, 1, [this](const geometry_msgs::PoseWithCovarianceStamped::ConstPtr& m) { onInitialPose(*m); }));
-    callbacks_.start();
-    slow_callbacks_.start();
-    disk_callbacks_.start();
-  } catch (const std::exception& e) {
-    NODELET_FATAL_STREAM("not started: " << e.what());
-    throw;  // the manager forgets the nodelet, and its loader ends with an error
   }
 
   /// With the places of the parameter's file. On a robot's first day there is none.
-  void begin(const std::string& path) {
+  void beginWith(const std::string& path) {
     map_file_ = path;
-    if (options_.output.save_at_shutdown) WholeFile{path};  // throws where the end could not write it
+    if (options_.save_at_shutdown) WholeFile{path};  // throws where the end could not write it
     kept_ = {{path, 0}};
     if (!std::filesystem::exists(path)) {
       NODELET_WARN_STREAM("places_file '" << path
@@ -165,11 +139,10 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   void onInitialPose(const geometry_msgs::PoseWithCovarianceStamped& message) try {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (session_->isMapping() && !options_.output.initialpose_while_mapping)
+    if (session_->isMapping() && !options_.initialpose_while_mapping)
       throw std::invalid_argument(
           "it would move the robot while its map grows; set initialpose_while_mapping for that");
-    const std::string map_frame = ros_conversions::cleanFrameId(options_.output.map_frame_id);
-    NODELET_WARN_STREAM("initialpose: " << session_->expect(message, map_frame));
+    NODELET_WARN_STREAM("initialpose: " << session_->expect(message, options_.map_frame_id));
   } catch (const std::exception& e) {
     NODELET_WARN_STREAM("the pose on initialpose is not used: " << e.what());
   }
@@ -177,10 +150,9 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
   /// Throws std::invalid_argument where the odometry's frame is the map's.
   void onPair(const OdometryPair& pair) {
     diagnostics_->input().note(nanoseconds(pair.features->header.stamp));
-    const std::string &map_frame = options_.output.map_frame_id, &odom_frame = pair.odometry->header.frame_id;
+    const std::string &map_frame = options_.map_frame_id, &odom_frame = pair.odometry->header.frame_id;
     ros_conversions::requireTwoFrames({"map_frame_id", map_frame}, {"the odometry's odom_frame_id", odom_frame});
-    if (options_.output.publish_tf)
-      transforms_->claim({ros_conversions::cleanFrameId(map_frame), ros_conversions::cleanFrameId(odom_frame)});
+    if (options_.publish_tf) transforms_->claim({map_frame, cleanFrameId(odom_frame)});
     if (!observer_->push({pair, generation_})) unused_->add(UnusedInput::kPushedOut);
   }
 
@@ -209,13 +181,12 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     if (const std::optional<PlaceReport> report = session_->observe(pair, *T_base_camera)) publish(*report, stamp);
   } catch (const std::exception& e) {
     unused_->add(UnusedInput::kRefused);
-    if (throttle_.allows(e.what()))
-      NODELET_ERROR_STREAM("pair at " << arrived.pair.features->header.stamp << " skipped: " << e.what());
+    fail(text(0, "pair at ", arrived.pair.features->header.stamp, " skipped: ", e.what()), e.what());
   }
 
   std::optional<Eigen::Isometry3d> findExtrinsic(const OdometryPair& pair) {
-    const std::string base_frame = ros_conversions::cleanFrameId(pair.odometry->child_frame_id);
-    const std::string camera_frame = ros_conversions::cleanFrameId(pair.features->header.frame_id);
+    const std::string base_frame = cleanFrameId(pair.odometry->child_frame_id);
+    const std::string camera_frame = cleanFrameId(pair.features->header.frame_id);
     // As the odometry does: at a reset, where the distance travelled falls. Other epochs keep the mount.
     const stereo_descriptor_vo::VoInfo::ConstPtr before = std::exchange(mount_of_, pair.info);
     const double since_reset = pair.info->distance;
@@ -225,8 +196,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     mount_->await(base_frame, camera_frame, [this] { return stopping_ || observer_->isFull(); });
     std::string problem;
     const std::optional<Eigen::Isometry3d> found = mount_->find(base_frame, camera_frame, problem);
-    if (!found && throttle_.allows("extrinsic"))
-      NODELET_ERROR_STREAM(transforms_->explainMissing(base_frame, camera_frame) << ". " << problem);
+    if (!found) fail(transforms_->explainMissing(base_frame, camera_frame) + ". " + problem, "extrinsic");
     return found;
   }
 
@@ -241,17 +211,16 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     if (session.isPlaced())
       publisher_->correct(recognition.T_map_odom(), session.odomFrame(), !was_located_ || !session.isLocated());
     was_located_ = session.isLocated();
-    const std::string map_frame = ros_conversions::cleanFrameId(options_.output.map_frame_id);
     if (auto pose = was_located_ ? session.basePose(*mount_->last()) : std::nullopt) {
       pose->header.stamp = stamp;
-      pose->header.frame_id = map_frame;
+      pose->header.frame_id = options_.map_frame_id;
       publisher_->publish(*pose);
     }
     noteChange();
     if (const auto signature = session.signature(report.id, robot_)) publisher_->publish(*signature);
     stereo_descriptor_vo::PlaceInfo info = session.info(report);
     info.header.stamp = stamp;
-    info.header.frame_id = map_frame;
+    info.header.frame_id = options_.map_frame_id;
     info.dropped_pairs = unused_->count(UnusedInput::kPushedOut);
     info.unpaired = unused_->count(UnusedInput::kUnpaired);
     info.malformed = unused_->count(UnusedInput::kRefused);
@@ -267,7 +236,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   /// With the places of a file, where it is there.
   std::shared_ptr<PlaceSession> sessionOf(const std::string& file) const {
-    return std::filesystem::exists(file) ? load(file) : std::make_shared<PlaceSession>(options_.recognition);
+    return std::filesystem::exists(file) ? load(file) : std::make_shared<PlaceSession>(recognition_options_);
   }
 
   void replace(std::shared_ptr<PlaceSession> session) {
@@ -323,30 +292,18 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
       return session_->message(id, robot_);
     };
     places.publish = [this](const stereo_descriptor_vo::PlaceMatch& match) { publisher_->publish(match); };
-    places.warn = [this](const std::string& what) { NODELET_WARN_STREAM(what); };
+    places.warn = [this](const std::string& what, const std::string& kind) { warn(what, kind); };
     return places;
   }
 
   // The services.
 
-  bool onReset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
+  void reset() {
     const std::lock_guard<std::mutex> lock(mutex_);
     ++generation_;
     map_file_.clear();
     kept_.clear();
-    restart("reset was called", std::make_shared<PlaceSession>(options_.recognition));
-    return true;
-  }
-
-  void pause(std::string& outcome) {
-    outcome = input_->pause() ? "paused" : "was paused already";
-    diagnostics_->input().noteIdle("paused");
-  }
-
-  void resume(std::string& outcome) {
-    const bool resumed = input_->resume();
-    outcome = resumed ? "resumed; the way in between is unknown" : "was not paused";
-    if (resumed) diagnostics_->input().noteIdle("");
+    restart("reset was called", std::make_shared<PlaceSession>(recognition_options_));
   }
 
   /// Says how many.
@@ -359,22 +316,21 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     lock.unlock();
     if (places.empty())
       throw std::runtime_error("there is no place to save yet: a key frame needs a pair with odometry");
-    if (options_.recognition.localisation_only)
+    if (recognition_options_.localisation_only)
       throw std::runtime_error(
           "not saved: localisation_only keeps the map as it is in the file that it was loaded from");
-    savePlaces(places, state, stream, robot_, ros_conversions::cleanFrameId(options_.output.map_frame_id), path,
-               options_.output.overwrite);
+    savePlaces(places, state, stream, robot_, options_.map_frame_id, path, options_.overwrite);
     lock.lock();
     if (generation == generation_) {
       kept_[path] = places.size();
-      if (path == inRosHome(options_.output.places_file)) saved_changes_ = changes;
+      if (path == inRosHome(options_.places_file)) saved_changes_ = changes;
     }
     return std::to_string(places.size()) + " places";
   }
 
   /// To places_file, while the session goes on or at its end: roslaunch gives that 15 s, and the console is gone.
   void saveByItself(bool at_end) {
-    const std::string path = inRosHome(options_.output.places_file);
+    const std::string path = inRosHome(options_.places_file);
     const auto say = [&](const std::string& what) {
       if (at_end)  // rosconsole ends while this runs
         std::cerr << "[ WARN] " << getName() << ": " << what << std::endl;
@@ -385,7 +341,7 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
     const std::size_t places = session_->recognition().places().size();
     const auto kept = kept_.find(path);
     const bool is_refused =
-        (kept == kept_.end() || places < kept->second) && std::filesystem::exists(path) && !options_.output.overwrite;
+        (kept == kept_.end() || places < kept->second) && std::filesystem::exists(path) && !options_.overwrite;
     const bool is_due = changes_ != saved_changes_ && places > 0 && (at_end || ros::SteadyTime::now() >= next_save_);
     const std::size_t before = kept == kept_.end() ? 0 : kept->second;
     lock.unlock();
@@ -425,25 +381,22 @@ class PlaceRecognitionNodelet : public nodelet::Nodelet {
 
   /// A session that begins with the places of a file. Throws std::runtime_error or std::invalid_argument.
   std::shared_ptr<PlaceSession> load(const std::string& path) const {
-    return std::make_shared<PlaceSession>(options_.recognition, loadPlaces(path));
+    return std::make_shared<PlaceSession>(recognition_options_, loadPlaces(path));
   }
 
   static constexpr double kTfTimeout = 2.0;   // s of wall time, at the start
   static constexpr double kRests = 20.0;      // times as long as saving took: at most a twentieth of the disk's time
   const ros::WallDuration kSavePeriod{60.0};  // s: what a killed process loses (chosen)
 
-  CallbackThread callbacks_, slow_callbacks_,
-      disk_callbacks_;  // of services: those that take their time, those of files
   ros::NodeHandle nh_;
-  Options options_;
+  PlaceOutputOptions options_;
+  PlaceRecognitionOptions recognition_options_;
   std::string robot_;
-  ReportThrottle throttle_;
   std::unique_ptr<UnusedInput> unused_;
   std::unique_ptr<RobotTransforms> transforms_;
   std::unique_ptr<CameraMount> mount_;
   std::unique_ptr<PlacePublisher> publisher_;
   std::unique_ptr<PlaceDiagnostics> diagnostics_;
-  std::vector<ros::ServiceServer> services_;
   ros::WallTimer saving_;
   ros::SteadyTime next_save_;  // the disk's thread
 

@@ -1,5 +1,3 @@
-#include <nodelet/nodelet.h>
-
 #include <atomic>
 #include <boost/make_shared.hpp>
 #include <cmath>
@@ -14,6 +12,7 @@
 #include "../check/calibration_check.hpp"
 #include "../check/image_check.hpp"
 #include "../common/stamp_filter.hpp"
+#include "../common/text.hpp"
 #include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
 #include "../messages/camera_conversions.hpp"
@@ -24,10 +23,9 @@
 #include "camera_finder.hpp"
 #include "diagnostics.hpp"
 #include "pair_decoder.hpp"
-#include "params.hpp"
+#include "robot_nodelet.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 #include "stereo_input.hpp"
-#include "threads.hpp"
 #include "throttles.hpp"
 
 namespace sdvo {
@@ -50,57 +48,42 @@ bool describeAlike(const FeatureExtractorOptions& a, const FeatureExtractorOptio
 }  // namespace
 
 /// Rectified stereo images in, depth-scaled stereo descriptors out. Images are subscribed only while somebody listens.
-class StereoFeaturesNodelet : public nodelet::Nodelet {
+class StereoFeaturesNodelet : public RobotNodelet {
  public:
   ~StereoFeaturesNodelet() override {
-    // Nothing may arrive any more, and nothing be in work, when members go.
-    master_callbacks_.stop();
-    callbacks_.stop();
-    slow_callbacks_.stop();
+    stopThreads();
     if (worker_) worker_->stop();
   }
 
  private:
-  struct Options {
-    StereoInputOptions input;
-    FeatureExtractorOptions extractor;
-
-    void describe(OptionList& list) {
-      input.describe(list);
-      extractor.describe(list);
-    }
-  };
-
   using PairFilter = StampFilter<StereoPairMessages>;
 
-  void onInit() override try {
-    nh_ = callbacks_.serve(getNodeHandle());
-    ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
-    ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
-    ros::NodeHandle master_nh = master_callbacks_.serve(getNodeHandle());
-    options_.input.find_camera = nh_.getNamespace() != "/";  // there it would be any camera of the robot
-    for (const std::string& name : loadParams(private_nh, options_))
-      NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect: misspelt? See docs/parameters.md");
+  void begin() override {
+    ros::NodeHandle master_nh = addThread().serve(getNodeHandle());  // what may wait for the master
+    CallbackThread& callbacks = addThread();
+    nh_ = callbacks.serve(getNodeHandle());
+    ros::NodeHandle private_nh = callbacks.serve(getPrivateNodeHandle());
+    ros::NodeHandle slow_nh = addThread().serve(getPrivateNodeHandle());  // services
+    options_.find_camera = nh_.getNamespace() != "/";                     // there it would be any camera of the robot
+    loadOptions(private_nh, options_, reconfigured_);
     transport_ = std::make_unique<StereoImageTransport>(private_nh);
-    extractor_ = std::make_unique<FeatureExtractor>(options_.extractor);
-    pace_ = Pace(options_.input.max_rate);
+    extractor_ = std::make_unique<FeatureExtractor>(reconfigured_);
+    pace_ = Pace(options_.max_rate);
     unused_ = std::make_unique<UnusedInput>(
-        "pairs", options_.input.rates.max_unused,
+        "pairs", options_.rates.max_unused,
         std::set<int>{UnusedInput::kUnpaired, UnusedInput::kPushedOut, UnusedInput::kRefused});
-    arrivals_ = std::make_unique<ArrivalLog>(options_.input, *unused_);
+    arrivals_ = std::make_unique<ArrivalLog>(options_, *unused_);
     finder_ = std::make_unique<CameraFinder>(nh_.getNamespace(), nh_.resolveName("left/image_rect"),
                                              nh_.resolveName("right/image_rect"));
-    worker_ =
-        std::make_unique<Worker<PairFilter::Passed>>(static_cast<std::size_t>(options_.input.queue_size),
-                                                     [this](const PairFilter::Passed& passed) { process(passed); });
-    if (options_.input.opencv_threads >= 0) cv::setNumThreads(options_.input.opencv_threads);
-    diagnostics_ = std::make_unique<ImageDiagnostics>(nh_, private_nh, getName(), options_.input, *arrivals_, *unused_);
+    worker_ = std::make_unique<Worker<PairFilter::Passed>>(
+        static_cast<std::size_t>(options_.queue_size), [this](const PairFilter::Passed& passed) { process(passed); });
+    if (options_.opencv_threads >= 0) cv::setNumThreads(options_.opencv_threads);
+    diagnostics_ = std::make_unique<ImageDiagnostics>(nh_, private_nh, getName(), options_, *arrivals_, *unused_);
     diagnostics_->input().noteIdle(kNobodyListens);
     input_timer_ =
         master_nh.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { watchInput(); });
 
     FeatureExtractorOptions defaults;
-    reconfigured_ = options_.extractor;
     reconfigure_server_ = std::make_unique<ReconfigureServer>(
         slow_nh, listOptions(reconfigured_),
         [this] { extractors_.post(std::make_unique<FeatureExtractor>(reconfigured_)); }, listOptions(defaults));
@@ -109,12 +92,6 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     const ros::SubscriberStatusCallback on_connect = [this](const ros::SingleSubscriberPublisher&) { updateInput(); };
     publisher_ = master_nh.advertise<stereo_descriptor_vo::StereoFeatures>("stereo_features", kPublishQueue, on_connect,
                                                                            on_connect);
-    callbacks_.start();
-    slow_callbacks_.start();
-    master_callbacks_.start();
-  } catch (const std::exception& e) {
-    NODELET_FATAL_STREAM("not started: " << e.what());
-    throw;  // the manager forgets the nodelet, and its loader ends with an error
   }
 
   // In the thread that may wait for the master.
@@ -123,18 +100,18 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     if (!input_) return;
     ros::master::V_TopicInfo topics;
     std::string report;
-    const bool searches = options_.input.find_camera && (!has_pairs_ || !finder_->names().empty());
+    const bool searches = options_.find_camera && (!has_pairs_ || !finder_->names().empty());
     if (searches && ros::master::getTopics(topics) && finder_->update(topics, report)) {
       NODELET_WARN_STREAM(report);
       input_.reset();
       return updateInput();
     }
-    if (!report.empty() && throttle_.allows("cameras")) NODELET_WARN_STREAM(report);
+    if (!report.empty()) warn(report, "cameras");
     const double now = ros::SteadyTime::now().toSec();
     std::string problem = arrivals_->explainLoss(now);
     if (problem.empty() && !(problem = arrivals_->explainSilence(now)).empty() && ros::master::getTopics(topics))
       problem += explainUnpublished(input_->subscribedTopics(), topics);
-    if (!problem.empty() && throttle_.allows("synchronisation")) NODELET_WARN_STREAM(problem);
+    if (!problem.empty()) warn(problem, "synchronisation");
   }
 
   void updateInput() try {
@@ -148,7 +125,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
                                        image_nh.resolveName("right/image_rect"));
       diagnostics_->input().noteIdle("");
       input_ = std::make_unique<StereoInput>(
-          image_nh, *transport_, options_.input, *arrivals_, [this](const StereoPairMessages& pair) { onPair(pair); },
+          image_nh, *transport_, options_, *arrivals_, [this](const StereoPairMessages& pair) { onPair(pair); },
           [this](ArrivalLog::Input input, const std::string& topic, const std::string& why) {
             if (input == ArrivalLog::kLeftImage) unused_->add(UnusedInput::kLate);
             onRefusal(topic, why);
@@ -166,7 +143,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   // In the threads of the images.
 
   void onRefusal(const std::string& topic, const std::string& why) {
-    if (throttle_.allows(topic)) NODELET_ERROR_STREAM(topic << ": a message is not used: " << why);
+    fail(topic + ": a message is not used: " + why, topic);
   }
 
   /// The newest mask holds, whatever its stamp, until the next one comes.
@@ -184,10 +161,11 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     for (PairFilter::Passed& passed : filter_.add(pair, nanoseconds(stamp), nanoseconds(ros::Time::now())))
       if (pace_.isDue(nanoseconds(passed.item.left_image->header.stamp)) && !worker_->push(std::move(passed)))
         unused_->add(UnusedInput::kPushedOut);
-    for (std::uint64_t k = late; k < filter_.dropped(); ++k) unused_->add(UnusedInput::kLate);
-    if (filter_.dropped() > late && throttle_.allows("late"))
-      NODELET_WARN_STREAM("a pair near " << stamp << " is late or has a wrong stamp: dropped (" << filter_.dropped()
-                                         << " so far); if this goes on, check the driver's stamps");
+    unused_->add(UnusedInput::kLate, filter_.dropped() - late);
+    if (filter_.dropped() > late)
+      warn(text(0, "a pair near ", stamp, " is late or has a wrong stamp: dropped (", filter_.dropped(),
+                " so far); if this goes on, check the driver's stamps"),
+           "late");
   }
 
   void takeOverOptions() {
@@ -219,7 +197,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     StereoFeatures features =
         extractor_->extract(decoded.camera, decoded.left, decoded.right, nanoseconds(stamp), mask_, last_report_);
     last_report_ = features.report;
-    if (options_.input.approximate_sync) features.right_delay = secondsBetween(stamp, pair.right_image->header.stamp);
+    if (options_.approximate_sync) features.right_delay = secondsBetween(stamp, pair.right_image->header.stamp);
     // Only now: a calibration that does not fit the images was refused and is no new stream.
     const std::string unrectified = ros_conversions::whyUnrectified(*pair.left_info, *pair.right_info);
     noteCamera(decoded.camera, pair.left_info->distortion_model, unrectified);
@@ -245,9 +223,8 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   } catch (const std::exception& e) {
     unused_->add(UnusedInput::kRefused);
     diagnostics_->noteFailure(e.what());
-    if (throttle_.allows(e.what()))
-      NODELET_ERROR_STREAM("pair at " << passed.item.left_image->header.stamp << " of "
-                                      << passed.item.left_image->header.frame_id << " skipped: " << e.what());
+    const std_msgs::Header& header = passed.item.left_image->header;
+    fail(text(0, "pair at ", header.stamp, " of ", header.frame_id, " skipped: ", e.what()), e.what());
   }
 
   void noteCamera(const StereoCamera& camera, const std::string& lens, const std::string& unrectified) {
@@ -256,8 +233,7 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
     warnOf("calibration", checkCalibration(camera, lens, unrectified));
     if (change == PairDecoder::Change::kFirst) return;
     ++stream_epoch_;
-    if (throttle_.allows("camera_info"))
-      NODELET_WARN_STREAM("camera_info changed: a new stream begins (epoch + 1; " << stream_epoch_ << " so far)");
+    warn(text(0, "camera_info changed: a new stream begins (epoch + 1; ", stream_epoch_, " so far)"), "camera_info");
   }
 
   void warnOf(const char* step, const Finding& finding) {
@@ -282,11 +258,9 @@ class StereoFeaturesNodelet : public nodelet::Nodelet {
   static constexpr int kPublishQueue = 10;
   static constexpr const char* kNobodyListens = "nobody listens to stereo_features";
 
-  CallbackThread callbacks_, slow_callbacks_, master_callbacks_;  // of images; of services; of what asks the master
   ros::NodeHandle nh_;
-  Options options_;
+  StereoInputOptions options_;
   FeatureExtractorOptions reconfigured_;  // the server's
-  ReportThrottle throttle_;
   ros::Publisher publisher_;
   ros::WallTimer input_timer_;
   std::atomic<bool> has_pairs_{false};

@@ -18,36 +18,25 @@
 
 namespace sdvo {
 
-/// A service that succeeds unless `work` throws; the response has what it says.
-template <class Service, class Work>
-ros::ServiceServer serve(ros::NodeHandle& nh, const std::string& name, Work work) {
-  using Request = typename Service::Request;
-  using Response = typename Service::Response;
-  const boost::function<bool(Request&, Response&)> callback = [work](Request& request, Response& response) {
-    try {
-      work(request, response);
-      response.success = true;
-    } catch (const std::exception& e) {
-      response.message = e.what();
-    }
-    return true;
-  };
-  return nh.advertiseService(name, callback);
-}
-
 /// Subscriptions that can be paused. Both ways ask the master, which may be out of reach: in a thread of their own.
 class PausableInput {
  public:
   using Subscribe = std::function<std::vector<ros::Subscriber>()>;
 
-  explicit PausableInput(Subscribe subscribe)
-      : subscribe_(std::move(subscribe)), subscribers_(subscribe_()), worker_(1, [this](const bool& wanted) {
-          subscribers_ = wanted ? subscribe_() : std::vector<ros::Subscriber>();
-        }) {}
+  /// `before_resume` is called in resume(), before messages come again.
+  PausableInput(Subscribe subscribe, std::function<void()> before_resume)
+      : subscribe_(std::move(subscribe)),
+        before_resume_(std::move(before_resume)),
+        subscribers_(subscribe_()),
+        worker_(
+            1, [this](const bool& wanted) { subscribers_ = wanted ? subscribe_() : std::vector<ros::Subscriber>(); }) {}
 
   /// Each false where it is so already. Messages may still come for a moment.
   bool pause() { return change(true); }
-  bool resume() { return change(false); }
+  bool resume() {
+    if (is_paused_) before_resume_();
+    return change(false);
+  }
   bool isPaused() const { return is_paused_; }
 
  private:
@@ -58,6 +47,7 @@ class PausableInput {
   }
 
   const Subscribe subscribe_;
+  const std::function<void()> before_resume_;
   std::vector<ros::Subscriber> subscribers_;  // after the constructor the worker's
   std::atomic<bool> is_paused_{false};
   Worker<bool> worker_;

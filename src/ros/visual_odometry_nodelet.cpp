@@ -1,6 +1,3 @@
-#include <nodelet/nodelet.h>
-#include <std_srvs/Empty.h>
-#include <std_srvs/Trigger.h>
 #include <stereo_descriptor_vo/ResetToPose.h>
 #include <stereo_descriptor_vo/SaveTrajectory.h>
 #include <stereo_descriptor_vo/SetPose.h>
@@ -35,40 +32,28 @@
 #include "imu_input.hpp"
 #include "odometry_publisher.hpp"
 #include "output_files.hpp"
-#include "params.hpp"
+#include "robot_nodelet.hpp"
 #include "stereo_descriptor_vo/messages/stereo_features_view.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
-#include "threads.hpp"
 #include "throttles.hpp"
 #include "transforms.hpp"
 
 namespace sdvo {
 
+using ros_conversions::cleanFrameId;
+
 /// Stereo feature messages in; odometry, TF and the state of both out. Never sees an image.
-class VisualOdometryNodelet : public nodelet::Nodelet {
+class VisualOdometryNodelet : public RobotNodelet {
  public:
   ~VisualOdometryNodelet() override {
     stopping_ = true;
-    // Nothing may arrive any more, and nothing be in work, when members go.
-    callbacks_.stop();
-    slow_callbacks_.stop();
-    disk_callbacks_.stop();
+    stopThreads();
     if (worker_) worker_->stop();
   }
 
  private:
   using FeaturesMessage = stereo_descriptor_vo::StereoFeatures;
   using FeaturesMessagePtr = stereo_descriptor_vo::StereoFeaturesConstPtr;
-
-  struct Options {
-    OdometryOutputOptions output;
-    VisualOdometryOptions odometry;
-
-    void describe(OptionList& list) {
-      output.describe(list);
-      odometry.describe(list);
-    }
-  };
 
   /// Features as they arrived, when, and how often services had started the odometry again or resumed by then.
   struct Arrived {
@@ -79,41 +64,39 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   };
   using FeaturesFilter = StampFilter<Arrived>;
 
-  void onInit() override try {
-    nh_ = callbacks_.serve(getNodeHandle());
-    ros::NodeHandle private_nh = callbacks_.serve(getPrivateNodeHandle());
-    ros::NodeHandle slow_nh = slow_callbacks_.serve(getPrivateNodeHandle());
-    ros::NodeHandle disk_nh = disk_callbacks_.serve(getPrivateNodeHandle());
-    for (const std::string& name : loadParams(private_nh, options_))
-      NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect: misspelt? See docs/parameters.md");
-    if (options_.output.use_imu && !options_.output.guess_frame_id.empty())
+  void begin() override {
+    CallbackThread& callbacks = addThread();
+    nh_ = callbacks.serve(getNodeHandle());
+    ros::NodeHandle private_nh = callbacks.serve(getPrivateNodeHandle());
+    ros::NodeHandle slow_nh = addThread().serve(getPrivateNodeHandle());  // services that take their time
+    ros::NodeHandle disk_nh = addThread().serve(getPrivateNodeHandle());  // services that write files
+    loadOptions(private_nh, options_, reconfigured_);
+    if (options_.use_imu && !options_.guess_frame_id.empty())
       throw std::invalid_argument("use_imu and guess_frame_id exclude each other: set one of them");
     checkFrames();
-    T_odom_start_ = ros_conversions::toPose(options_.output.initial_pose);
-    odometry_ = std::make_unique<VisualOdometry>(options_.odometry);
+    for (std::string* frame : {&options_.odom_frame_id, &options_.base_frame_id, &options_.guess_frame_id})
+      *frame = cleanFrameId(*frame);
+    T_odom_start_ = ros_conversions::toPose(options_.initial_pose);
+    odometry_ = std::make_unique<VisualOdometry>(reconfigured_);
     const std::uint32_t tag = TransformPublisher::tagOf(getName());
-    publisher_ = std::make_unique<OdometryPublisher>(nh_, options_.output, tag);
+    publisher_ = std::make_unique<OdometryPublisher>(nh_, options_, tag);
     publisher_->restart(T_odom_start_);
-    to_be_levelled_ = options_.output.use_imu;
+    to_be_levelled_ = options_.use_imu;
     transforms_ =
         std::make_unique<RobotTransforms>(nh_, publishedFrames(), tag, [this](const std::string& what) { warn(what); });
-    mount_ = std::make_unique<CameraMount>(*transforms_, options_.output.tf_timeout);
-    patience_ = Patience(options_.output.guess_timeout);
-    unused_ = std::make_unique<UnusedInput>("feature messages", options_.output.rates.max_unused,
+    mount_ = std::make_unique<CameraMount>(*transforms_, options_.tf_timeout);
+    patience_ = Patience(options_.guess_timeout);
+    unused_ = std::make_unique<UnusedInput>("feature messages", options_.rates.max_unused,
                                             std::set<int>{UnusedInput::kPushedOut});
-    diagnostics_ = std::make_unique<OdometryDiagnostics>(nh_, private_nh, getName(), options_.output, *unused_);
+    diagnostics_ = std::make_unique<OdometryDiagnostics>(nh_, private_nh, getName(), options_, *unused_);
     using namespace stereo_descriptor_vo;
-    using std_srvs::Trigger;
-    services_ = {
-        slow_nh.advertiseService("reset", &VisualOdometryNodelet::onReset, this),
-        serve<ResetToPose>(slow_nh, "reset_to_pose",
-                           [this](const auto& request, auto&) { startAgain(ros_conversions::toPose(request.pose)); }),
-        serve<SetPose>(slow_nh, "set_pose", [this](const auto& request, auto&) { setPose(request.pose); }),
-        serve<Trigger>(private_nh, "pause", [this](const auto&, auto& response) { pause(response.message); }),
-        serve<Trigger>(private_nh, "resume", [this](const auto&, auto& response) { resume(response.message); }),
-        serve<SaveTrajectory>(disk_nh, "save_trajectory", [this](const auto& request, auto& response) {
-          response.message = save(request.format, inRosHome(request.path));
-        })};
+    serveReset(slow_nh, [this] { startAgain(); });
+    serve<ResetToPose>(slow_nh, "reset_to_pose",
+                       [this](const auto& request, auto&) { startAgain(ros_conversions::toPose(request.pose)); });
+    serve<SetPose>(slow_nh, "set_pose", [this](const auto& request, auto&) { setPose(request.pose); });
+    serve<SaveTrajectory>(disk_nh, "save_trajectory", [this](const auto& request, auto& response) {
+      response.message = save(request.format, inRosHome(request.path));
+    });
     pose_subscriber_ = slow_nh.subscribe<geometry_msgs::PoseWithCovarianceStamped>(
         "set_pose", 1, [this](const geometry_msgs::PoseWithCovarianceStampedConstPtr& pose) {
           try {
@@ -124,7 +107,6 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
         });
 
     VisualOdometryOptions defaults;
-    reconfigured_ = options_.odometry;
     reconfigure_server_ = std::make_unique<ReconfigureServer>(
         slow_nh, listOptions(reconfigured_),
         [this] {
@@ -133,48 +115,39 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
         },
         listOptions(defaults));
 
-    if (options_.output.use_imu)
+    if (options_.use_imu)
       imu_ = std::make_unique<ImuInput>(nh_, *transforms_, *unused_, [this](const std::string& what) { warn(what); });
     worker_ = std::make_unique<Worker<FeaturesFilter::Passed>>(
-        static_cast<std::size_t>(options_.output.queue_size),
+        static_cast<std::size_t>(options_.queue_size),
         [this](const FeaturesFilter::Passed& passed) { process(passed); });
-    input_ = std::make_unique<PausableInput>([this] { return subscribe(); });
-    callbacks_.start();
-    slow_callbacks_.start();
-    disk_callbacks_.start();
-  } catch (const std::exception& e) {
-    NODELET_FATAL_STREAM("not started: " << e.what());
-    throw;  // the manager forgets the nodelet, and its loader ends with an error
-  }
-
-  void warn(const std::string& what) {
-    if (throttle_.allows(what)) NODELET_WARN_STREAM(what);
+    // Without a subscriber the image side rests, too.
+    input_ = std::make_unique<PausableInput>([this] { return subscribe(); }, [this] { resumes_.post({}); });
+    servePauses(private_nh, *input_, diagnostics_->input(), "the motion in between is unknown");
   }
 
   std::vector<ros::Subscriber> subscribe() {
-    const auto queue = static_cast<std::uint32_t>(std::max(kArrivalQueue, options_.output.queue_size));
+    const auto queue = static_cast<std::uint32_t>(std::max(kArrivalQueue, options_.queue_size));
     return {nh_.subscribe<FeaturesMessage>(
         "stereo_features", queue, [this](const FeaturesMessagePtr& m) { onFeatures(m); }, ros::VoidConstPtr(),
         ros::TransportHints().tcpNoDelay())};
   }
 
   void checkFrames() const {
-    const OdometryOutputOptions& output = options_.output;
-    ros_conversions::requireTwoFrames({"odom_frame_id", output.odom_frame_id}, {"base_frame_id", output.base_frame_id});
-    if (output.guess_frame_id.empty()) return;
-    ros_conversions::requireTwoFrames({"guess_frame_id", output.guess_frame_id},
-                                      {"base_frame_id", output.base_frame_id});
-    if (output.publish_tf)  // its own pose
-      ros_conversions::requireTwoFrames({"guess_frame_id", output.guess_frame_id},
-                                        {"odom_frame_id", output.odom_frame_id});
+    ros_conversions::requireTwoFrames({"odom_frame_id", options_.odom_frame_id},
+                                      {"base_frame_id", options_.base_frame_id});
+    if (options_.guess_frame_id.empty()) return;
+    ros_conversions::requireTwoFrames({"guess_frame_id", options_.guess_frame_id},
+                                      {"base_frame_id", options_.base_frame_id});
+    if (options_.publish_tf)  // its own pose
+      ros_conversions::requireTwoFrames({"guess_frame_id", options_.guess_frame_id},
+                                        {"odom_frame_id", options_.odom_frame_id});
   }
 
   /// Parent and child of the transform that goes out on TF.
   std::optional<ros_conversions::OdometryFrames> publishedFrames() const {
-    if (!options_.output.publish_tf) return std::nullopt;
-    ros_conversions::OdometryFrames frames{ros_conversions::cleanFrameId(options_.output.odom_frame_id),
-                                           ros_conversions::cleanFrameId(options_.output.base_frame_id)};
-    if (options_.output.invert_tf) std::swap(frames.odom, frames.base);
+    if (!options_.publish_tf) return std::nullopt;
+    ros_conversions::OdometryFrames frames{options_.odom_frame_id, options_.base_frame_id};
+    if (options_.invert_tf) std::swap(frames.odom, frames.base);
     return frames;
   }
 
@@ -195,14 +168,13 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     for (FeaturesFilter::Passed& item : passed)
       if (!worker_->push(std::move(item))) unused_->add(UnusedInput::kPushedOut);
     stream_epoch_ = message->stream_epoch;
-    for (std::uint64_t k = late; k < filter_.dropped(); ++k) unused_->add(UnusedInput::kLate);
-    if (filter_.dropped() > late && throttle_.allows("late"))
-      NODELET_WARN_STREAM("features near " << message->header.stamp << " are late or have a wrong stamp: dropped ("
-                                           << filter_.dropped()
-                                           << " so far); if this goes on, check the driver's stamps");
+    unused_->add(UnusedInput::kLate, filter_.dropped() - late);
+    if (filter_.dropped() > late)
+      warn(text(0, "features near ", message->header.stamp, " are late or have a wrong stamp: dropped (",
+                filter_.dropped(), " so far); if this goes on, check the driver's stamps"),
+           "late");
   } catch (const std::exception& e) {
-    if (throttle_.allows(e.what()))
-      NODELET_ERROR_STREAM("features at " << message->header.stamp << " skipped: " << e.what());
+    fail(text(0, "features at ", message->header.stamp, " skipped: ", e.what()), e.what());
   }
 
   /// Throws for what cannot be used, before its stamp counts.
@@ -238,16 +210,15 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   Guess waitForOthers(const FeaturesFilter::Passed& passed) {
     const std_msgs::Header& header = passed.item.message->header;
     const auto isVoid = [&] { return stopping_ || passed.item.starts != starts_; };
-    const std::string base_frame = ros_conversions::cleanFrameId(options_.output.base_frame_id);
-    const std::string camera_frame = ros_conversions::cleanFrameId(header.frame_id);
+    const std::string camera_frame = cleanFrameId(header.frame_id);
     const double begin = steadyTime();
     // A pair that another one would push out is answered instead.
-    mount_->await(base_frame, camera_frame, [&] { return isVoid() || worker_->isFull(); });
+    mount_->await(options_.base_frame_id, camera_frame, [&] { return isVoid() || worker_->isFull(); });
     diagnostics_->load().noteWait("the transform base <- camera", steadyTime() - begin);
     Guess guess;
     {
       const std::lock_guard<std::mutex> lock(work_mutex_);
-      const bool is_trusted = !options_.output.guess_frame_id.empty() || !gyro_found_.isFault();
+      const bool is_trusted = !options_.guess_frame_id.empty() || !gyro_found_.isFault();
       if (is_trusted) guess.since = processed_stamp_;
     }
     if (guess.since && mount_->last()) guess.motion = findGuess(*guess.since, header, isVoid);
@@ -262,15 +233,14 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     if (resumes_.take(passed.item.resumes)) odometry_->breakStream();
     StereoFeatures features = ros_conversions::fromMessage(passed.item.view);
     features.stamp += time_shift_;
-    std::string problem = findExtrinsic(ros_conversions::cleanFrameId(message.header.frame_id));
+    std::string problem = findExtrinsic(cleanFrameId(message.header.frame_id));
     if (problem.empty() && to_be_levelled_ && !given_start_) problem = level();
     const OdometryResult result = problem.empty() ? track(features, message, guess) : waitFor(problem);
     publisher_->publishPoints(passed.item.view);
     publisher_->publishFlow(result, features, message.header);
     return result;
   } catch (const std::exception& e) {
-    if (throttle_.allows(e.what()))
-      NODELET_ERROR_STREAM("features at " << passed.item.message->header.stamp << " skipped: " << e.what());
+    fail(text(0, "features at ", passed.item.message->header.stamp, " skipped: ", e.what()), e.what());
     return waitFor(std::string("features skipped: ") + e.what());
   }
 
@@ -299,7 +269,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     if (processed_epoch_ && *processed_epoch_ != message.stream_epoch) odometry_->breakStream();
     processed_epoch_ = message.stream_epoch;
     const std::string complaint = odometry_->options().alignment.complaint(features.patch_layout.side);
-    if (!complaint.empty() && throttle_.allows("patches")) NODELET_WARN_STREAM(complaint);
+    if (!complaint.empty()) warn(complaint, "patches");
     odometry_->mountAt(*mount_->last());
     const std::optional<MotionGuess> motion = guess.since == processed_stamp_ ? guess.motion : std::nullopt;  // no jump
     OdometryResult result = odometry_->update(features, motion);
@@ -331,8 +301,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
                    result.T_previous_current.linear());
     const auto gyro = [&](std::int64_t from, std::int64_t to) {
       std::string ignored;
-      return imu_->rotation(ros_conversions::cleanFrameId(header.frame_id),
-                            ros::Time().fromNSec(static_cast<std::uint64_t>(from)),
+      return imu_->rotation(cleanFrameId(header.frame_id), ros::Time().fromNSec(static_cast<std::uint64_t>(from)),
                             ros::Time().fromNSec(static_cast<std::uint64_t>(to)), ignored);
     };
     warnOnce("IMU", gyro_found_, gyro_axes_.judge(gyro), " No guess is taken from it until a reset");
@@ -369,10 +338,9 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     if (is_lost) is_tracking_ = false;
     // Each start is told apart from the predictions that go before it.
     const bool started_again = result.has_pose && !result.has_motion;
-    if (throttle_.allows(started_again ? "started again" : toString(result.state)))
-      NODELET_WARN_STREAM(toString(result.state)
-                          << " at " << stamp << ", epoch " << result.epoch << ", " << result.inliers << " of "
-                          << result.matches << " points: " << result.reason);
+    warn(text(0, toString(result.state), " at ", stamp, ", epoch ", result.epoch, ", ", result.inliers, " of ",
+              result.matches, " points: ", result.reason),
+         started_again ? "started again" : toString(result.state));
   }
 
   /// At a given pose, or where it began.
@@ -398,7 +366,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   /// for or knows it.
   std::optional<MotionGuess> findGuess(const ros::Time& since, const std_msgs::Header& header,
                                        const std::function<bool()>& is_void) {
-    const bool of_frame = !options_.output.guess_frame_id.empty();
+    const bool of_frame = !options_.guess_frame_id.empty();
     if (!of_frame && !(imu_ && imu_->hasRates())) return std::nullopt;
     std::string problem;
     std::optional<MotionGuess> guess;
@@ -412,8 +380,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     diagnostics_->load().noteWait("the guess of the motion", steadyTime() - now);
     if (guess) return guess;
     unused_->add(UnusedInput::kNoGuess);
-    if (throttle_.allows("guess"))
-      NODELET_WARN_STREAM("no guess of the motion until " << header.stamp << ", going on without: " << problem);
+    warn(text(0, "no guess of the motion until ", header.stamp, ", going on without: ", problem), "guess");
     return std::nullopt;
   }
 
@@ -421,17 +388,16 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
 
   std::optional<MotionGuess> guessOfFrame(const ros::Time& since, const ros::Time& stamp, std::string& problem) const {
     const std::optional<Eigen::Isometry3d> T_before_now =
-        transforms_->findMotion(ros_conversions::cleanFrameId(options_.output.guess_frame_id),
-                                ros_conversions::cleanFrameId(options_.output.base_frame_id), since, stamp, problem);
+        transforms_->findMotion(options_.guess_frame_id, options_.base_frame_id, since, stamp, problem);
     if (!T_before_now) return std::nullopt;
     const Eigen::Isometry3d T_base_camera = *mount_->last();
-    return MotionGuess{T_base_camera.inverse() * *T_before_now * T_base_camera, false, options_.output.guess_error};
+    return MotionGuess{T_base_camera.inverse() * *T_before_now * T_base_camera, false, options_.guess_error};
   }
 
   std::optional<MotionGuess> guessOfGyro(const ros::Time& since, const std_msgs::Header& header,
                                          std::string& problem) const {
     const std::optional<Eigen::Matrix3d> R_before_now =
-        imu_->rotation(ros_conversions::cleanFrameId(header.frame_id), since, header.stamp, problem);
+        imu_->rotation(cleanFrameId(header.frame_id), since, header.stamp, problem);
     if (!R_before_now) return std::nullopt;
     MotionGuess guess;
     guess.T_previous_current.linear() = *R_before_now;
@@ -446,7 +412,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     const double now = steadyTime();
     if (!levels_until_) levels_until_ = now + kPatience;
     std::string problem;
-    auto up = imu_->up(ros_conversions::cleanFrameId(options_.output.base_frame_id), problem);
+    auto up = imu_->up(options_.base_frame_id, problem);
     constexpr double kSteep = 0.7;  // cosine of 45 degrees, between robots on slopes and another mounting (chosen)
     if (up && up->dot(T_odom_start_.linear().transpose() * Eigen::Vector3d::UnitZ()) < kSteep) {
       problem = text(2, "by its accelerometer the base is tilted from there, its up is ", up->x(), " ", up->y(), " ",
@@ -467,7 +433,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
 
   /// Asks for the camera's place on the robot; says what is missing, nothing when it is known.
   std::string findExtrinsic(const std::string& camera_frame) {
-    const std::string base_frame = ros_conversions::cleanFrameId(options_.output.base_frame_id);
+    const std::string& base_frame = options_.base_frame_id;
     if (mount_->knows(base_frame, camera_frame)) {
       if (const std::string change = mount_->change(); !change.empty())
         NODELET_WARN_STREAM("TF: " << change << "; the odometry holds on to the transform that it began with. A camera "
@@ -487,7 +453,7 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
       return "";
     }
     const std::string report = transforms_->explainMissing(base_frame, camera_frame);
-    if (throttle_.allows("extrinsic")) NODELET_ERROR_STREAM(report << ". " << problem);
+    fail(report + ". " + problem, "extrinsic");
     return report;
   }
 
@@ -499,15 +465,10 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     restart("reset was called", T_odom_base);
   }
 
-  bool onReset(std_srvs::Empty::Request&, std_srvs::Empty::Response&) {
-    startAgain();
-    return true;
-  }
-
   /// The base is there in odom, with this covariance, at the newest pair. Throws std::invalid_argument.
   void setPose(const geometry_msgs::PoseWithCovarianceStamped& message) {
-    const std::string frame = ros_conversions::cleanFrameId(message.header.frame_id);
-    if (frame != ros_conversions::cleanFrameId(options_.output.odom_frame_id))
+    const std::string frame = cleanFrameId(message.header.frame_id);
+    if (frame != options_.odom_frame_id)
       throw std::invalid_argument("the pose is in frame '" + frame + "', not in odom_frame_id");
     Eigen::Isometry3d T_odom_base;
     Matrix6d covariance;
@@ -523,25 +484,11 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
     given_start_ = true;
   }
 
-  /// Without a subscriber the image side rests too.
-  void pause(std::string& outcome) {
-    outcome = input_->pause() ? "paused" : "was paused already";
-    diagnostics_->input().noteIdle("paused");
-  }
-
-  void resume(std::string& outcome) {
-    outcome = input_->isPaused() ? "resumed; the motion in between is unknown" : "was not paused";
-    if (!input_->isPaused()) return;
-    resumes_.post({});
-    diagnostics_->input().noteIdle("");
-    input_->resume();
-  }
-
   /// Says how many poses.
   std::string save(const std::string& format, const std::string& file) {
     const nav_msgs::Path path = publisher_->path();
     if (path.poses.empty()) throw std::runtime_error("there is no pose to save yet: reason of vo_info says why");
-    if (!options_.output.overwrite && saved_.count(file) == 0 && std::filesystem::exists(file))
+    if (!options_.overwrite && saved_.count(file) == 0 && std::filesystem::exists(file))
       throw std::runtime_error("'" + file +
                                "' was there before: give another path, or set visual_odometry/overwrite at the start");
     saveTrajectory(path, *mount_->last(), format, file);
@@ -553,21 +500,17 @@ class VisualOdometryNodelet : public nodelet::Nodelet {
   /// Messages that wait for this node's own thread, which handles each in no time.
   static constexpr int kArrivalQueue = 20;
 
-  CallbackThread callbacks_, slow_callbacks_,
-      disk_callbacks_;  // of services: those that take their time, those of files
   ros::NodeHandle nh_;
-  Options options_;
+  OdometryOutputOptions options_;
   VisualOdometryOptions reconfigured_;  // the server's
   Requests<VisualOdometryOptions> reconfigurations_;
   std::unique_ptr<ReconfigureServer> reconfigure_server_;
-  ReportThrottle throttle_;
   std::unique_ptr<RobotTransforms> transforms_;
   std::unique_ptr<CameraMount> mount_;
   std::unique_ptr<UnusedInput> unused_;
   std::unique_ptr<ImuInput> imu_;  // none without use_imu
   std::unique_ptr<OdometryPublisher> publisher_;
   std::unique_ptr<OdometryDiagnostics> diagnostics_;
-  std::vector<ros::ServiceServer> services_;
   ros::Subscriber pose_subscriber_;
   std::set<std::string> saved_;  // trajectories' files
   struct Resume {};

@@ -23,8 +23,10 @@ void CameraCheck::add(const RecordedPair& pair, const StereoFeatures& features) 
     ++refused_;
     refusal_ = features.report.status;
   }
-  rows_.add(pair.left, pair.right, pair.stamp);
-  lens_check_.add(pair.camera, pair.left, pair.right, pair.stamp);
+  if (const auto corners = corner_pairs_.add(pair.left, pair.right, pair.stamp)) {
+    rows_.add(*corners);
+    lens_check_.add(pair.camera, *corners);
+  }
   repeats_.add(pair.left, pair.right, pair.stamp);
   images_.add(pair.left, pair.right, features.report);
   emitter_.add(pair.left);

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "../check/corner_pairs.hpp"
 #include "../check/finding.hpp"
 #include "../check/image_check.hpp"
 #include "../check/lens_check.hpp"
@@ -42,6 +43,7 @@ class CameraCheck {
   const PipelineOptions options_;
   const ImageThresholds thresholds_;
   const OfflineRun& run_;
+  CornerPairs corner_pairs_;
   RowCheck rows_;
   LensCheck lens_check_;
   RepeatCheck repeats_;

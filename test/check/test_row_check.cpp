@@ -26,10 +26,13 @@ cv::Mat view(double down, double disparity, const Rows& dv) {
 template <class Rows>
 RowCheck checked(double delay, double motion, const Rows& dv) {
   RowCheck check(1.5, 48.0, 24.0);
+  CornerPairs pairs;
   for (int i = 0; i < 60; ++i) {
     const double time = i * kPeriod;
-    check.add(view(motion * nod(time), 0.0, [](double, double) { return 0.0; }),
-              view(motion * nod(time + delay), kDisparity, dv), static_cast<std::int64_t>(1e9 * (time + 1.0)));
+    const auto pair =
+        pairs.add(view(motion * nod(time), 0.0, [](double, double) { return 0.0; }),
+                  view(motion * nod(time + delay), kDisparity, dv), static_cast<std::int64_t>(1e9 * (time + 1.0)));
+    if (pair) check.add(*pair);
   }
   return check;
 }
@@ -90,8 +93,10 @@ TEST(RowCheck, DoesNotJudgeTheMomentOfACameraThatStands) {
 
 TEST(RowCheck, JudgesNothingWithoutTexture) {
   RowCheck check(1.5, 48.0, 24.0);
+  const cv::Mat grey(kSize, CV_8U, cv::Scalar(90));
+  CornerPairs pairs;
   for (int i = 0; i < 60; ++i)
-    check.add(cv::Mat(kSize, CV_8U, cv::Scalar(90)), cv::Mat(kSize, CV_8U, cv::Scalar(90)), (i + 1) * 100000000LL);
+    if (const auto pair = pairs.add(grey, grey, (i + 1) * 100000000LL)) check.add(*pair);
   EXPECT_EQ(check.rectification().verdict, Verdict::kOpen);
   EXPECT_EQ(check.sameMoment().verdict, Verdict::kOpen);
   EXPECT_TRUE(std::isnan(check.map().at<double>(0)));

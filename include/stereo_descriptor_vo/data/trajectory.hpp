@@ -25,8 +25,8 @@ struct StampedTrajectory {
 /// throws std::invalid_argument when the matrix is none (rows not orthonormal to 1e-3, a reflection, or not finite).
 Eigen::Isometry3d poseFromRows(const std::array<double, 12>& rows);
 
-/// Reads poses in the format that the first line shows: KITTI's (12 numbers, also behind a stamp in ns), TUM's
-/// ("stamp[s] tx ty tz qx qy qz qw") or EuRoC's (CSV: stamp in ns, x, y, z, qw, qx, qy, qz, …, of the body). Throws
+/// Reads poses in the format that the first line shows. KITTI's has 12 numbers, also behind a stamp in ns. TUM's is
+/// "stamp[s] tx ty tz qx qy qz qw". EuRoC's is CSV: stamp in ns, x, y, z, qw, qx, qy, qz, …, of the body. Throws
 /// std::runtime_error that names file, line and these formats.
 StampedTrajectory readPoses(const std::string& path);
 
