@@ -14,7 +14,7 @@ namespace {
 constexpr double kMemory = 10.0;     // s
 constexpr std::size_t kMost = 2000;  // arrivals on each topic
 constexpr double kLately = 5.0;      // s, of losses and rates
-constexpr double kPatience = 1.0;    // s longer than for any pair so far
+constexpr double kPatience = 1.0;    // s beyond the longest wait of a pair so far
 constexpr double kLate = 0.1;        // s between messages of one stamp (chosen): a queue is too short, perhaps
 constexpr double kHalf = 0.45;       // of a period: less, for rounding
 
@@ -83,14 +83,14 @@ double ArrivalLog::period() const {
   return steps[steps.size() / 2];
 }
 
-/// While not all topics are connected some images have no partners.
+/// Whether the image came before all topics were connected, when partners are missing for no fault.
 bool ArrivalLog::isEarly(const Arrival& arrival) const {
   constexpr double kConnecting = 2.0;  // s (chosen)
   return first_stamp_ == 0 || (arrival.stamp < first_stamp_ && arrival.now < complete_ + kConnecting &&
                                secondsBetween(arrival.stamp, first_stamp_) > kHalf * period());
 }
 
-/// Whether a right image that is not used is of another moment than the left ones that are not.
+/// Whether the image counts as a lost pair: a left one, or a right one whose left one was not lost, too.
 bool ArrivalLog::isAPairOfItsOwn(Input input, const Arrival& arrival) const {
   if (input == kLeftImage) return true;
   const double half = kHalf * period();
@@ -195,7 +195,7 @@ ArrivalLog::Gaps ArrivalLog::gapsBetween(Input from, Input to, double begin) con
   return gaps;
 }
 
-/// What the stamps of images without a pair show.
+/// The likely cause and a remedy, by the stamps of images without a pair.
 std::string ArrivalLog::advise(double begin) const {
   const Gaps right = gapsBetween(kLeftImage, kRightImage, begin), left = gapsBetween(kRightImage, kLeftImage, begin);
   if (topics_[kLeftImage].arrivals.empty() || topics_[kRightImage].arrivals.empty()) return "";  // the counts say it
@@ -219,7 +219,7 @@ std::string ArrivalLog::advise(double begin) const {
       return "; " + topics_[input].name + " must have a message for each image, with the image's stamp";
     if (info.delay > latest->delay) latest = &info;
   }
-  // Equal stamps on all topics, and yet no pair: one side waits in its queue for longer than that holds.
+  // Equal stamps on all topics, and no pair: one side came so late that the queue had dropped the other.
   if (latest->delay <= kLate) return "";
   return text(2, "; stamps agree, but messages arrive ", latest->delay, " s apart: set sync_queue_size, now ",
               options_.sync_queue_size, ", to at least ",

@@ -15,8 +15,8 @@
 
 namespace sdvo {
 
-/// What arrives on the four inputs of stereo processing and what becomes of it: counts pairs that do not come together
-/// and tells why. Times are s of any clock that does not jump. For any thread.
+/// Arrivals on the four inputs of stereo processing: counts images that make no pair, and gives the cause. Times in s
+/// of any steady clock. For any thread.
 class ArrivalLog {
  public:
   enum Input { kLeftImage, kRightImage, kLeftInfo, kRightInfo };
@@ -25,16 +25,16 @@ class ArrivalLog {
 
   ArrivalLog(const StereoInputOptions& options, UnusedInput& unused) : options_(options), unused_(unused) {}
 
-  /// Subscribed anew, to `topics` in the order of Input.
+  /// A new subscription; `topics` in the order of Input.
   void begin(const Topics& topics, double now);
   void note(Input input, const ros::Time& stamp, double now);
   void notePair(const ros::Time& left, const ros::Time& right, double now);
 
-  /// When more than `max_unused` of the last pairs did not come together: how many, which messages lack their partners,
-  /// how far stamps are apart, and what to do. Empty otherwise.
+  /// If more than `max_unused` of the last pairs are incomplete: how many, which messages are missing, how far stamps
+  /// are apart, and a remedy. Empty otherwise.
   std::string explainLoss(double now);
-  /// When no pair came together for ten seconds: what arrived on each topic and what to do. Input that ended after
-  /// pairs is said once. Empty otherwise.
+  /// If no pair was complete for ten seconds: what arrived on each topic, and a remedy. The end of the input is
+  /// reported once. Empty otherwise.
   std::string explainSilence(double now);
 
   /// Hz, of each topic in the last seconds, with its name.
@@ -46,7 +46,7 @@ class ArrivalLog {
     std::int64_t stamp;  ///< ns; 0: none
     double now;          ///< s
     Fate fate = Fate::kWaits;
-    bool is_counted = false;  ///< as a pair that is not used
+    bool is_counted = false;  ///< as UnusedInput::kUnpaired
   };
   struct Topic {
     std::string name;
@@ -57,9 +57,9 @@ class ArrivalLog {
     int used = 0, lost = 0, lefts = 0, rights = 0;  ///< the last two: images without partners
   };
 
-  /// From images that are not used to the nearest messages of another topic, s.
+  /// Differences of stamps between unused images and the nearest messages of another topic, s.
   struct Gaps {
-    int all = 0, apart = 0, missing = 0;  ///< the nearest one is farther than allowed; than half a period
+    int all = 0, apart = 0, missing = 0;  ///< images; difference beyond what is allowed; beyond half a period
     double least = std::numeric_limits<double>::infinity(), most = 0.0;  ///< of those apart
     double delay = 0.0;                                                  ///< largest between arrivals of one stamp
   };
@@ -81,9 +81,9 @@ class ArrivalLog {
   mutable std::mutex mutex_;
   std::array<Topic, kInputs> topics_;
   double begin_ = 0.0;            ///< of the subscription
-  std::int64_t first_stamp_ = 0;  ///< from which on all topics are there, ns; 0: they are not
-  double complete_ = 0.0;         ///< when they were
-  double longest_wait_ = 0.0;     ///< of a message that was used after all
+  std::int64_t first_stamp_ = 0;  ///< from which on all topics have messages, ns; 0: some have none
+  double complete_ = 0.0;         ///< arrival of the first message of the last topic
+  double longest_wait_ = 0.0;     ///< of a message for its pair
   bool has_pairs_ = false, has_ended_ = false;
 };
 

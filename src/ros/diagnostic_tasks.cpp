@@ -15,7 +15,7 @@ constexpr std::size_t kFewest = 3;  // arrivals that make one
 struct Words {
   const char* name;
   const char* remedy;
-  bool is_rare;  ///< one is a fault already
+  bool is_rare;  ///< a single one is a fault
 };
 
 /// In the order of the causes.
@@ -83,7 +83,7 @@ std::optional<double> InputMonitor::rate() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (arrivals_.size() < kFewest) return std::nullopt;
   const double time = 1e-9 * static_cast<double>(arrivals_.back().stamp - arrivals_.front().stamp);
-  if (time <= 0.0) return std::nullopt;  // they jumped
+  if (time <= 0.0) return std::nullopt;  // stamps jumped back
   return static_cast<double>(arrivals_.size() - 1) / time;
 }
 
@@ -135,7 +135,7 @@ Findings UnusedInput::judge(Finding first, WallUpdater::Status& values) {
 }
 
 Findings WorkLoad::judge(WallUpdater::Status& values) {
-  constexpr double kOften = 0.5;  // of wall time, below it the worker mostly rests
+  constexpr double kOften = 0.5;  // ratio of wall time at work, below which drops are for bursts (chosen)
   const std::lock_guard<std::mutex> lock(mutex_);
   const auto now = std::chrono::steady_clock::now();
   const double period = std::chrono::duration<double>(now - std::exchange(last_, now)).count();

@@ -24,8 +24,8 @@ namespace sdvo {
 
 using Findings = std::vector<Finding>;
 
-/// /diagnostics once a second of wall time: simulated time stands still when a bag has ended, which is what diagnostics
-/// are there to tell. To be declared after what its tasks refer to.
+/// /diagnostics once a second of wall time: simulated time stands still at the end of a bag, which diagnostics must
+/// report. Declare it after the members that its tasks use.
 class WallUpdater {
  public:
   using Status = diagnostic_updater::DiagnosticStatusWrapper;
@@ -44,7 +44,7 @@ class WallUpdater {
     updater_.add(task, [owner, judge](Status& status) { print((owner->*judge)(status), status); });
   }
 
-  /// The first finding, and faults that others find.
+  /// The first finding, and the faults among the others.
   static void print(const Findings& findings, Status& status);
 
  private:
@@ -52,7 +52,7 @@ class WallUpdater {
   ros::WallTimer timer_;
 };
 
-/// Whether input comes, by wall time, and how often, by its stamps: simulated time and a network have other paces. For
+/// Silence of an input in wall time, and its rate by stamps, which neither simulated time nor a network changes. For
 /// any thread.
 class InputMonitor {
  public:
@@ -63,7 +63,7 @@ class InputMonitor {
   void note(std::int64_t stamp);
   /// Input comes from elsewhere now.
   void noteTopics(const std::string& topics);
-  /// While nobody wants input, silence is no fault; `why`, such as "paused", is empty otherwise. Begins anew.
+  /// `why` silence is no fault from now on, such as "paused"; empty: it is one. Earlier arrivals are forgotten.
   void noteIdle(const std::string& why);
 
   /// Nothing while input comes.
@@ -88,32 +88,32 @@ class InputMonitor {
     Clock::time_point time;
     std::int64_t stamp;
   };
-  std::deque<Arrival> arrivals_;  ///< of the last seconds, and the newest ones
+  std::deque<Arrival> arrivals_;  ///< of the last seconds, at least the newest ones
 };
 
-/// Input that a node did not use, by cause since its start: the one place that counts, for messages and /diagnostics.
+/// Counts of input that a node did not use, by cause, since its start. Messages and /diagnostics have them from here.
 /// Counting is for any thread.
 class UnusedInput {
  public:
   enum Cause { kUnpaired, kPushedOut, kLate, kRefused, kNoGuess, kImu };
   static constexpr int kCauses = 6;
 
-  /// `what`: of the input, in the plural. `max_share` of it that may be missing before the task warns, but of causes
-  /// that are `explained` elsewhere.
+  /// `what`: name of the input, in the plural. Beyond `max_share` of unused input the task warns, except of causes that
+  /// are `explained` elsewhere.
   UnusedInput(std::string what, double max_share, std::set<int> explained = {})
       : what_(std::move(what)), max_share_(max_share), explained_(std::move(explained)) {}
 
   void noteUsed() { ++used_; }
   void add(Cause cause, std::uint64_t count = 1) { counts_[cause] += count; }
-  /// Input that was counted as unused is used after all.
+  /// For input that is used after it was counted.
   void takeBack(Cause cause) { --counts_[cause]; }
 
   std::uint64_t count(Cause cause) const { return counts_[cause]; }
-  /// Of all causes but missing guesses and the IMU's, without which the rest is used.
+  /// Sum over the causes that lose a pair. Pairs without a guess or IMU are used.
   std::uint64_t sum() const { return count(kUnpaired) + count(kPushedOut) + count(kLate) + count(kRefused); }
 
-  /// Adds the counts to the values of a task of /diagnostics. `first`, and causes that took more than their share in
-  /// the last seconds. Once a second, by one thread.
+  /// Adds the counts to the values of a task of /diagnostics. Returns `first` and a warning for each cause beyond
+  /// max_share in the last seconds. Call once a second, from one thread.
   Findings judge(Finding first, WallUpdater::Status& values);
 
  private:
@@ -127,8 +127,7 @@ class UnusedInput {
   std::deque<Counts> history_;  ///< of the last calls
 };
 
-/// How much of a processor one worker's thread takes, and what it had to leave out, for /diagnostics. What OpenCV does
-/// in threads of its own is not in it.
+/// CPU load of a worker's thread and the items that it dropped, for /diagnostics. Threads of OpenCV are not counted.
 class WorkLoad {
  public:
   /// `max_load`: share of one processor's time.
@@ -151,7 +150,7 @@ class WorkLoad {
     const std::chrono::steady_clock::time_point wall_begin_;
   };
 
-  /// Time that an item took while the thread had nothing to do but wait for `what`, s.
+  /// Time (s) that the thread waited for `what` during an item.
   void noteWait(const std::string& what, double time) {
     const std::lock_guard<std::mutex> lock(mutex_);
     wait_ += time;
@@ -159,13 +158,13 @@ class WorkLoad {
     longest_wait_ = std::max(longest_wait_, time);
   }
 
-  /// Of items that were left out because the thread was busy, since the start.
+  /// Items that were dropped since the start because the thread was busy.
   void noteDropped(std::uint64_t dropped) {
     const std::lock_guard<std::mutex> lock(mutex_);
     dropped_ = dropped;
   }
 
-  /// The task "load", of the time since it was asked last.
+  /// The task "load", over the time since the last call.
   Findings judge(WallUpdater::Status& values);
 
  private:

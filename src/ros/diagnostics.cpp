@@ -12,9 +12,9 @@
 namespace sdvo {
 namespace {
 
-constexpr const char* kNoPairs = "no pairs";  // of which "input rate" tells why
+constexpr const char* kNoPairs = "no pairs";  // the task "input rate" has the reason
 
-/// The image side may be told to leave pairs out; with a tenth to either side, as RateOptions.
+/// The image side's max_rate lowers the expected rate, with a tolerance of a tenth as in RateOptions.
 RateOptions expectedRates(const ros::NodeHandle& nh, RateOptions rates) {
   const double limit = nh.param("stereo_features/max_rate", 0.0);
   if (limit > 0.0) rates.min_rate = std::min(rates.min_rate, 0.9 * limit);
@@ -190,7 +190,7 @@ Findings PlaceDiagnostics::judge(Status& values) {
   const std::lock_guard<std::mutex> lock(mutex_);
   Finding finding{Verdict::kOk, last_ ? "recognising places" : "no key frame yet"};
   if (const auto silence = input_.silence())
-    finding = silence->asWarning();  // without odometry places can do nothing, but it is no fault of theirs
+    finding = silence->asWarning();  // the fault is the odometry's
   else if (last_ && !last_->located)
     finding = {Verdict::kWarn,
                "none of the places that were loaded has been recognised yet, so there is no map -> odom",

@@ -16,8 +16,7 @@
 
 namespace sdvo {
 
-/// /diagnostics of the image side, one task for each thing that goes wrong with cameras: rate, synchronisation,
-/// exposure, corners, load.
+/// /diagnostics of the image side. Tasks: rate, synchronisation, exposure, features, load.
 class ImageDiagnostics {
  public:
   ImageDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const std::string& name,
@@ -25,9 +24,9 @@ class ImageDiagnostics {
 
   InputMonitor& input() { return input_; }
   WorkLoad& load() { return load_; }
-  /// Of each pair that came together: the left stamp, ns, and how far it is from the right one, s.
+  /// For each complete pair: the left stamp (ns) and the distance of the right one (s).
   void notePair(std::int64_t stamp, double gap);
-  /// Of each pair that was processed, and of each that could not be, why.
+  /// For each processed pair; for each that could not be processed, with the reason.
   void note(const StereoFeatures& features);
   void noteFailure(const std::string& why);
 
@@ -45,17 +44,17 @@ class ImageDiagnostics {
   WorkLoad load_;
 
   std::mutex mutex_;
-  double largest_gap_ = 0.0;  ///< s, since the task was asked last
+  double largest_gap_ = 0.0;  ///< s, since the last call of the task
   std::optional<ExtractionReport> last_;
   int last_count_ = 0;  ///< of features
   ExposureTurns exposures_;
   std::string failure_, refused_status_;
-  int pairs_ = 0, refused_pairs_ = 0;  ///< since the task was asked last
+  int pairs_ = 0, refused_pairs_ = 0;  ///< since the last call of the task
 
   WallUpdater updater_;
 };
 
-/// /diagnostics of the odometry: its state as vo_info tells it, the rate of its input, its load and how late it is.
+/// /diagnostics of the odometry. Tasks: its state in vo_info, rate of its input, load, latency.
 class OdometryDiagnostics {
  public:
   OdometryDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const std::string& name,
@@ -87,7 +86,7 @@ class OdometryDiagnostics {
 /// /diagnostics of the place recognition.
 class PlaceDiagnostics {
  public:
-  /// `max_silence`: s, wall time. `input`: names of the topics that pairs come from.
+  /// `max_silence`: s, wall time. `input`: names of the topics of its input.
   PlaceDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const std::string& name, const std::string& input,
                    double max_silence, UnusedInput& unused);
 
@@ -95,7 +94,7 @@ class PlaceDiagnostics {
   InputMonitor& input() { return input_; }
   /// Of each key frame, as published.
   void note(const stereo_descriptor_vo::PlaceInfo& info);
-  /// Nothing is known any more, or what was loaded.
+  /// The session began anew, with no places or with loaded ones.
   void restart();
 
  private:

@@ -8,10 +8,9 @@
 
 namespace sdvo {
 
-/// What the pipeline sees, as a picture: the left view above the right one, a circle of the depth-derived size around
-/// each feature in both, near ones red and far ones blue; lines in the left view lead from where a matched feature was
-/// before (green: inlier, magenta: outlier). `state`: of the odometry, written over the left view. Images are CV_8UC1
-/// of one size; the result is CV_8UC3, BGR.
+/// A picture of the features: the left view above the right one. Around each feature is a circle of its size, red for
+/// near and blue for far ones. Lines in the left view begin at a match's previous position (green: inlier, magenta:
+/// outlier). `state` of the odometry is written over the left view. Images are CV_8UC1 of one size; the result is BGR.
 cv::Mat drawFeatures(const cv::Mat& left, const cv::Mat& right, const stereo_descriptor_vo::StereoFeatures& features,
                      const stereo_descriptor_vo::FeatureFlow& flow, const std::string& state);
 

@@ -36,7 +36,7 @@ class FeaturesImageNodelet : public RobotNodelet {
         : synchroniser(kQueue, kTolerance, [&nodelet](const auto&... messages) { nodelet.draw(messages...); }) {
       ros::NodeHandle &nh = nodelet.nh_, image_nh = nodelet.finder_->handle(nh);
       StereoImageTransport& transport = *nodelet.transport_;
-      // Resolved, for a transport appends its own name to that of the topic.
+      // Topics are resolved here, because a transport appends its name to them.
       left.subscribe(image_nh, image_nh.resolveName("left/image_rect"), kQueue, transport.left,
                      [this, &nodelet](const Image::ConstPtr& m) { nodelet.take<0>(synchroniser, m); });
       right.subscribe(image_nh, image_nh.resolveName("right/image_rect"), kQueue, transport.right,
@@ -73,7 +73,7 @@ class FeaturesImageNodelet : public RobotNodelet {
 
   // In the thread that may wait for the master.
 
-  /// To the one that the image side takes, and back.
+  /// Subscribes to the camera that the image side chose, too.
   void followCamera() {
     ros::master::V_TopicInfo topics;
     std::string ignored;

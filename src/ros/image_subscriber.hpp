@@ -10,7 +10,7 @@
 
 namespace sdvo {
 
-/// One camera's image transport. Each has a parameter namespace of its own: transports keep options there.
+/// The image transport of one camera. Its hints name the parameter namespace where the transport has its options.
 struct ImageTransport {
   using Plugin = image_transport::SubscriberPlugin;
 
@@ -18,9 +18,9 @@ struct ImageTransport {
   pluginlib::UniquePtr<Plugin> plugin;
 };
 
-/// The transports of a stereo pair's images, as the private parameter `image_transport` names them. To be made in
-/// onInit(): image_transport's own subscribers load their plugin whenever they subscribe, which in a nodelet's thread
-/// races with the manager's loading of other nodelets and at times crashed it.
+/// The transports of left and right images, named by the private parameter `image_transport`. Make it while the nodelet
+/// starts: image_transport's own subscribers load their plugin whenever they subscribe. That races with the manager's
+/// loading of other nodelets and has crashed it.
 class StereoImageTransport {
  public:
   /// Throws pluginlib::PluginlibException when there is no such transport.
@@ -42,7 +42,7 @@ class StereoImageTransport {
   ImageTransport left, right;
 };
 
-/// A subscription to images over a plugin that is there already, as long as it lives.
+/// A subscription to images over a plugin that is loaded already. Ends with its destruction.
 class ImageSubscriber {
  public:
   ImageSubscriber() = default;
@@ -59,7 +59,7 @@ class ImageSubscriber {
     plugin_->subscribe(nh, topic, queue_size, callback, ros::VoidPtr(), transport.hints);
   }
 
-  /// With the transport's ending.
+  /// The name with the transport's ending, such as /compressed.
   std::string topic() const { return plugin_->getTopic(); }
 
  private:

@@ -16,7 +16,7 @@
 
 namespace sdvo {
 
-/// The topic `imu`, its measurements turned into other frames of the robot by TF. May be used by several threads.
+/// The topic `imu`, with measurements rotated into other frames of the robot by TF. For any thread.
 class ImuInput {
  public:
   using Report = std::function<void(const std::string&)>;
@@ -26,15 +26,16 @@ class ImuInput {
 
   std::string topic() const { return subscriber_.getTopic(); }
 
-  /// R_from_to of `frame` between two times; none, and why, without measurements of that time or without the IMU on TF.
+  /// R_from_to of `frame` between two times. None, with the `problem`, if measurements or the IMU's transform are
+  /// missing.
   std::optional<Eigen::Matrix3d> rotation(const std::string& frame, const ros::Time& from, const ros::Time& to,
                                           std::string& problem) const;
 
-  /// False once messages say that they hold no rates: the topic is an accelerometer's.
+  /// False if the newest message has no rates, as of a mere accelerometer.
   bool hasRates() const { return has_rates_; }
 
-  /// Unit vector away from the earth in the axes of `frame`, as the last second has it; none, and why, unless the robot
-  /// stood in that second.
+  /// Unit vector away from the earth in the axes of `frame`, from the last second. None, with the `problem`, if the
+  /// robot moved in that second.
   std::optional<Eigen::Vector3d> up(const std::string& frame, std::string& problem) const;
 
  private:

@@ -15,24 +15,23 @@
 
 namespace sdvo {
 
-/// Messages of one pair, stamps equal.
+/// The three messages of one pair, which have one stamp.
 struct OdometryPair {
   stereo_descriptor_vo::StereoFeatures::ConstPtr features;
   nav_msgs::Odometry::ConstPtr odometry;
   stereo_descriptor_vo::VoInfo::ConstPtr info;
-  int resumes = 0;  ///< of the subscription, until it arrived
+  int resumes = 0;  ///< number of resumes of the subscription before it arrived
 };
 
-/// The features of a pair and what the odometry said of it: topics `stereo_features`, `odom` and `vo_info`. Its
-/// functions are called where callbacks run.
+/// Synchronised topics `stereo_features`, `odom` and `vo_info`. For the thread of its callbacks.
 class OdometryPairInput {
  public:
   using Callback = std::function<void(const OdometryPair&)>;
-  /// Of a message that is not used, and why.
+  /// For a message that is not used, with the reason.
   using Refusal = std::function<void(const std::string& topic, const ros::Time& stamp, const std::string& why)>;
 
-  /// `queue_size`: pairs that wait for their other messages. Pairs with odometry whose other messages do not come, and
-  /// refused messages, count as `unused`.
+  /// `queue_size`: incomplete pairs that wait. Refused messages count as `unused`, and incomplete pairs unless the
+  /// odometry had no pose.
   OdometryPairInput(const ros::NodeHandle& nh, int queue_size, UnusedInput& unused, Callback callback, Refusal refuse);
 
   /// While they are paused the image side has one listener less.

@@ -16,15 +16,14 @@
 
 namespace sdvo {
 
-/// odom, pose, TF, points, map_points, feature_flow and vo_info of one processed pair, and the path, which is long,
-/// once in a second.
+/// Publishes odom, pose, TF, points, map_points, feature_flow and vo_info of each pair, and once a second the path,
+/// which is long.
 class OdometryPublisher {
  public:
   /// `tag`: of TransformPublisher.
   OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOptions& options, std::uint32_t tag);
 
-  /// Publishes what the result's state allows: without a pose neither odom (but for zeros, where these are asked for)
-  /// nor TF.
+  /// Without a pose publishes neither odom nor TF; with publish_null_when_lost an odom of zeros.
   void publish(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera);
   /// Fills in header, session and latency; returns what was published.
   stereo_descriptor_vo::VoInfo publishInfo(stereo_descriptor_vo::VoInfo info, const ros::Time& stamp);
@@ -32,13 +31,13 @@ class OdometryPublisher {
   void publishPoints(const StereoFeaturesView& features);
   /// Whether somebody listens to map_points.
   bool wantsMap() const { return map_publisher_.getNumSubscribers() > 0; }
-  /// `points` in the odometry's origin, the first left camera. They go out in the camera's frame of the header: far
-  /// from the origin of odom, as in UTM coordinates, their floats would have steps of half a metre.
+  /// `points` in the odometry's origin, the first left camera. They are published in the header's camera frame: far
+  /// from the origin of odom, such as in UTM coordinates, floats have steps of half a metre.
   void publishMap(const std::vector<Eigen::Vector3d>& points, const Eigen::Isometry3d& T_origin_camera,
                   const std_msgs::Header& header);
-  /// From now on the odometry's origin is here in odom. The path stays as it was published.
+  /// Sets the odometry's origin in odom. Earlier poses of the path stay.
   void moveTo(const Eigen::Isometry3d& T_odom_start) { T_odom_start_ = T_odom_start; }
-  /// The odometry has been reset: the path begins anew, too.
+  /// The same after a reset of the odometry, with an empty path.
   void restart(const Eigen::Isometry3d& T_odom_start);
 
   static constexpr std::size_t kLongestPath = 20'000;  ///< poses: at 30 Hz eleven minutes, 1.3 MB
@@ -46,7 +45,7 @@ class OdometryPublisher {
   nav_msgs::Path path() const;
 
  private:
-  /// A pose of the path, in no more memory than it needs: there are many, in one block.
+  /// A pose of the path without a header, which would take most of the memory.
   struct PathPose {
     ros::Time stamp;
     geometry_msgs::Pose pose;

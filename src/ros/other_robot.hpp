@@ -15,31 +15,31 @@
 
 namespace sdvo {
 
-/// Looks another robot's key frames up among ours, and lets it do the same. Its signatures come on
-/// other/place_signature; when one of our places looks alike its rows are asked for (other/place_request) and come on
-/// other/place_answer. Its own requests come on place_request, and the rows go out on place_answer. Nothing waits: one
-/// thread's callbacks do it all.
+/// Recognises another robot's key frames among our places, and answers its requests. It publishes signatures on
+/// other/place_signature. If one of our places looks similar, its features are requested (other/place_request) and come
+/// on other/place_answer. Its requests come on place_request and are answered on place_answer. All in callbacks of one
+/// thread, which never waits.
 class OtherRobot {
  public:
   using SignatureMessage = stereo_descriptor_vo::PlaceSignature;
   using PlaceMessage = stereo_descriptor_vo::Place;
 
-  /// What it must know of our places; may throw std::invalid_argument.
+  /// Access to our places. Functions may throw std::invalid_argument.
   struct Places {
     std::function<std::vector<PlaceCandidate>(const SignatureMessage&)> find;  ///< the best first
-    /// What geometry says of one of ours and the other's; nothing while it is not the same place.
+    /// Geometric match of one of our places with the other robot's; nothing if they are not the same place.
     std::function<std::optional<stereo_descriptor_vo::PlaceMatch>(int place, const Place& other)> verify;
-    std::function<std::optional<PlaceMessage>(int place)> get;  ///< nothing when it is not there any more
+    std::function<std::optional<PlaceMessage>(int place)> get;  ///< nothing if the place was forgotten
     std::function<void(const stereo_descriptor_vo::PlaceMatch&)> publish;
     std::function<void(const std::string& what, const std::string& kind)> warn;  ///< one of a kind now and then
   };
 
-  /// `robot`: our own name, whose signatures are no other's. `min_score` of a place for which rows are asked for;
-  /// `timeout`: s of wall time for the answer. Callbacks run where `nh` has them.
+  /// `robot`: our own name, whose signatures are refused. `min_score`: similarity above which features are requested.
+  /// `timeout`: s of wall time for the answer. Callbacks run in the queue of `nh`.
   OtherRobot(ros::NodeHandle& nh, const std::string& robot, double min_score, double timeout, Places places);
 
  private:
-  /// Rows that were asked for, and the places of ours that may be the same.
+  /// A request without an answer yet, and our places that look similar.
   struct Question {
     std::vector<PlaceCandidate> candidates;
     ros::SteadyTime deadline;

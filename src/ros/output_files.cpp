@@ -37,7 +37,7 @@ void writeKitti(const nav_msgs::Path& poses, const Eigen::Isometry3d& T_base_cam
 std::string inRosHome(const std::string& path) {
   const char *ros_home = std::getenv("ROS_HOME"), *home = std::getenv("HOME");
   if (path.empty() || (!ros_home && !home)) return path;
-  if (home && path.compare(0, 2, "~/") == 0) return home + path.substr(1);  // which a shell had not to do with
+  if (home && path.compare(0, 2, "~/") == 0) return home + path.substr(1);  // no shell has replaced it
   return ((ros_home ? std::filesystem::path(ros_home) : std::filesystem::path(home) / ".ros") / path).string();
 }
 

@@ -13,8 +13,8 @@
 
 namespace sdvo {
 
-/// A bag being written, which may be given up. rosbag's own destructor closes (writes an index) and ends the process
-/// when that fails, as it does on a full disk.
+/// A bag being written. rosbag's own destructor writes the index, and terminates the process if that fails on a full
+/// disk.
 class OutputBag {
  public:
   /// Throws rosbag::BagException when the file cannot be made.
@@ -25,11 +25,11 @@ class OutputBag {
   ~OutputBag() {
     if (closed_) return;
     std::error_code ignored;
-    std::filesystem::resize_file(path_, 0, ignored);  // what closing writes has room again
+    std::filesystem::resize_file(path_, 0, ignored);  // makes room for what close() writes
     try {
       bag_->close();
     } catch (const std::exception&) {
-      // Left behind, in reach: a leak would be reported.
+      // Never destroyed. The static pointer keeps leak checkers from reporting it.
       [[maybe_unused]] static rosbag::Bag* volatile left_behind;
       left_behind = bag_.release();
     }
@@ -51,7 +51,7 @@ class OutputBag {
   bool closed_ = false;
 };
 
-/// Relative paths lead from ROS_HOME (~/.ros) on, where roslaunch starts nodes.
+/// Relative paths begin in ROS_HOME (~/.ros), where roslaunch starts nodes.
 std::string inRosHome(const std::string& path);
 
 /// Writes the poses of the base as SaveTrajectory.srv describes it. A file appears whole or not at all. Throws

@@ -10,22 +10,21 @@
 
 namespace sdvo {
 
-/// What the core takes of a pair. The images share the messages' memory where they can.
+/// A pair as the core's types. Images share the messages' memory if no conversion is needed.
 struct DecodedPair {
   StereoCamera camera;
   cv::Mat left, right;     ///< CV_8U grey
-  bool new_range = false;  ///< mono16: grey levels mean something else than in the pair before
+  bool new_range = false;  ///< mono16: the mapping to grey levels has changed
 };
 
-/// Turns the messages of one stream into what the core takes: each pair with its own camera, for some drivers publish
-/// one for each focus of the lens, and grey levels that keep their meaning.
+/// Converts the messages of one stream to the core's types. Each pair has its own camera, because some drivers publish
+/// one for each focus of the lens. The mapping of mono16 to grey levels stays from pair to pair.
 class PairDecoder {
  public:
   /// Throws std::invalid_argument as toStereoCamera() and toGrey() do.
   DecodedPair decode(const StereoPairMessages& pair);
 
-  /// The pair's camera proved to fit its images: it is the stream's from now on. Whether it is another rig than before,
-  /// or the first one.
+  /// Takes a camera that fits its images as the stream's. Returns whether it is the first one or another rig.
   enum class Change { kNone, kFirst, kOther };
   Change accept(const StereoCamera& camera);
 

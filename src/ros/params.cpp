@@ -14,7 +14,7 @@
 namespace sdvo {
 namespace {
 
-/// As precise as it is.
+/// With all digits of a double.
 std::string textOf(double number) {
   std::ostringstream text;
   text.precision(17);
@@ -22,7 +22,7 @@ std::string textOf(double number) {
   return text.str();
 }
 
-/// YAML reads `5e0` as text and `2.0` as no integer: what has the same text is the same value.
+/// By the parameter's text, for YAML takes `5e0` for text and `2.0` for a double.
 void assign(const XmlRpc::XmlRpcValue& parameter, Option& option) {
   using Value = XmlRpc::XmlRpcValue;
   Value value = parameter;  // its conversions are not const
@@ -101,7 +101,7 @@ std::string groupOf(const Option& option) {
   return slash == std::string::npos ? "Default" : option.name.substr(0, slash);
 }
 
-/// One of each component's options; the first, of those that are in none, is there always.
+/// A group for each component. The first group, for options of none, always exists.
 std::vector<dynamic_reconfigure::GroupState> groupsOf(const std::vector<Option>& options) {
   std::vector<dynamic_reconfigure::GroupState> groups;
   const auto add = [&](const std::string& name) {
@@ -212,8 +212,8 @@ bool ReconfigureServer::onRequest(dynamic_reconfigure::Reconfigure::Request& req
   return true;
 }
 
-/// On the parameter server, where a nodelet that is loaded again, and rosparam, find what is in use. In a thread of its
-/// own, until the master has taken all.
+/// Sets changed values on the parameter server, for rosparam and for a nodelet that is loaded again. Runs in a thread
+/// of its own until the master has them all.
 void ReconfigureServer::keep() {
   std::unique_lock<std::mutex> lock(mutex_);
   const std::vector<std::string> wanted = texts();

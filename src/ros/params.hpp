@@ -14,21 +14,19 @@
 
 namespace sdvo {
 
-/// Reads each option from the parameter of the same name in `nh`'s namespace; absent ones keep their value and are set,
-/// so that the server shows what is in use. Throws std::invalid_argument naming the parameter when one has the wrong
-/// type or is outside its range. Returns the parameters in that namespace that are no option: most likely spelling
-/// mistakes.
+/// Reads each option from the parameter of its name in `nh`'s namespace. Missing parameters are set to the option's
+/// value, so that the server shows all that are in use. Throws std::invalid_argument that names a parameter of a wrong
+/// type or out of range. Returns the parameters that are no option: likely spelling mistakes.
 std::vector<std::string> loadParams(const ros::NodeHandle& nh, std::vector<Option> options);
 
-/// On the parameter server; false where the master does not answer. ros::param::set would wait for it with a lock that
-/// every line on the console takes, too: the whole process would stand still.
+/// Sets a parameter on the server; false if the master does not answer. ros::param::set would wait for the master while
+/// it holds a lock that every line on the console needs: the whole process would block.
 bool setParam(const ros::NodeHandle& nh, const std::string& name, const XmlRpc::XmlRpcValue& value);
 
-/// The image side writes the topics that it reads here, for a recorder. It is no option.
+/// Parameter, no option, where the image side writes its input topics for a recorder.
 constexpr const char* kInputTopics = "input_topics";
 
-/// Whether image_transport or one of its plugins keeps this parameter beside the image side's, see
-/// StereoImageTransport.
+/// Whether a private parameter of the image side belongs to image_transport or its plugins, see StereoImageTransport.
 bool isOfImageTransport(const std::string& name);
 
 /// The same for the fields of options structs.
@@ -43,14 +41,13 @@ std::vector<std::string> loadParams(const ros::NodeHandle& nh, Options&... optio
 /// meanings come from the options themselves; a .cfg file would state each of them a second time.
 class ReconfigureServer {
  public:
-  /// `options` refer to values that must outlive the server and that only the server writes. `apply` runs in a ROS
-  /// callback, never twice at a time, after values have changed. A request is taken over as a whole or not at all: when
-  /// a name or a value is wrong, or `apply` throws, all values are as before and the response shows these.
-  /// What has changed is set on the parameter server soon after. `defaults`: the same options of a struct left as it
-  /// is.
+  /// `options` refer to values that must outlive the server and that only the server writes. `apply` runs in a callback
+  /// after values have changed, never twice at a time. If a name or value is wrong, or `apply` throws, the whole
+  /// request is rejected: all values stay, and the response has them. Changes are set on the parameter server soon
+  /// after. `defaults`: the same options of a default-constructed struct.
   ReconfigureServer(ros::NodeHandle private_nh, std::vector<Option> options, std::function<void()> apply,
                     const std::vector<Option>& defaults);
-  /// The keeper's callback may be about to stop its timer, which is destroyed first.
+  /// keeping_ is destroyed before keeper_, whose callback may be using it.
   ~ReconfigureServer() { keeper_.stop(); }
 
  private:

@@ -13,7 +13,7 @@ namespace msgs = stereo_descriptor_vo;
 
 namespace {
 
-/// s, of map -> odom on /tf. It is stamped two of them ahead: so long a listener need not wait for the next one.
+/// Period (s) of map -> odom on /tf. Stamps are two periods ahead, so that listeners need not wait for the next one.
 constexpr double kTfPeriod = 0.1;
 
 }  // namespace
@@ -36,7 +36,7 @@ PlacePublisher::PlacePublisher(ros::NodeHandle& nh, const PlaceOutputOptions& op
   loops_publisher_ = nh.advertise<visualization_msgs::MarkerArray>("loops", 1, on_connect);
   graph_publisher_ = nh.advertise<msgs::MapGraph>("map_graph", 1, on_connect);
   map_timer_ = nh.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { publishMap(); });
-  // By the time of stamps: a transform that has the stamp of the one before is an error to TF.
+  // In ROS time: TF reports a second transform of one stamp as an error.
   if (options_.publish_tf)
     tf_timer_ = nh.createTimer(ros::Duration(kTfPeriod), [this](const ros::TimerEvent&) { publishTransform(); });
 }
@@ -76,7 +76,7 @@ void PlacePublisher::publishTransform() {
   transform_publisher_.send(transform);
 }
 
-/// Of a timer, which an exception would end for good.
+/// In a timer, which an exception would end.
 void PlacePublisher::publishMap() try {
   const bool path_wanted = path_publisher_.getNumSubscribers() > 0;
   const bool loops_wanted = loops_publisher_.getNumSubscribers() > 0;

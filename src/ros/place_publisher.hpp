@@ -23,7 +23,7 @@ class PlacePublisher {
     ros_conversions::MapState state;
     std::optional<Eigen::Isometry3d> T_base_camera;  ///< none before the first pair
   };
-  /// `tag`: of TransformPublisher. `map`: the map as it is; called from a timer.
+  /// `tag`: of TransformPublisher. `map` returns the current map; a timer calls it.
   PlacePublisher(ros::NodeHandle& nh, const PlaceOutputOptions& options, const std::string& robot, std::uint32_t tag,
                  std::function<Map()> map);
 
@@ -32,10 +32,10 @@ class PlacePublisher {
   void publish(const stereo_descriptor_vo::PlaceMatch& match) { match_publisher_.publish(match); }
   void publish(const geometry_msgs::PoseWithCovarianceStamped& pose) { pose_publisher_.publish(pose); }
 
-  /// The map has changed: it is published soon, if somebody listens.
+  /// Has the map published soon, if somebody listens.
   void noteChange();
 
-  /// T_map_odom from now on; TF moves there smoothly, but for the first time, or when asked to at once.
+  /// Sets T_map_odom. TF moves there smoothly, except the first time and if `at_once`.
   void correct(const Eigen::Isometry3d& T_map_odom, const std::string& odom_frame, bool at_once);
   /// T_map_odom is unknown.
   void forget();

@@ -37,8 +37,7 @@ namespace sdvo {
 
 using ros_conversions::cleanFrameId;
 
-/// Stereo feature messages and their odometry in; a map of places, and where the odometry is in it, out. Never sees an
-/// image.
+/// Stereo feature messages and their odometry in; a map of places and the odometry's pose in it out. Without images.
 class PlaceRecognitionNodelet : public RobotNodelet {
  public:
   ~PlaceRecognitionNodelet() override {
@@ -50,7 +49,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
   }
 
  private:
-  /// A pair of the session that was there when it arrived.
+  /// A pair with the generation_ of the session at its arrival.
   struct Arrived {
     OdometryPair pair;
     int generation;
@@ -112,7 +111,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     diagnostics_ = std::make_unique<PlaceDiagnostics>(nh_, private_nh, getName(), input_->topics(),
                                                       options_.max_silence, *unused_);
     servePauses(private_nh, input_->subscriptions(), diagnostics_->input(), "the way in between is unknown");
-    // Ours, and the robot's: that of an rviz beside the camera's namespace, in "/" the same.
+    // In our namespace, and in the one above, where an rviz of the robot publishes.
     for (const std::string& topic :
          std::set<std::string>{nh_.resolveName("initialpose"),
                                ros::names::append(ros::names::parentNamespace(nh_.getNamespace()), "initialpose")})
@@ -120,7 +119,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
           topic, 1, [this](const geometry_msgs::PoseWithCovarianceStamped::ConstPtr& m) { onInitialPose(*m); }));
   }
 
-  /// With the places of the parameter's file. On a robot's first day there is none.
+  /// Begins with the places of places_file. It need not exist: a robot's first map has none.
   void beginWith(const std::string& path) {
     map_file_ = path;
     if (options_.save_at_shutdown) WholeFile{path};  // throws where the end could not write it
@@ -147,7 +146,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     NODELET_WARN_STREAM("the pose on initialpose is not used: " << e.what());
   }
 
-  /// Throws std::invalid_argument where the odometry's frame is the map's.
+  /// Throws std::invalid_argument if map and odometry have the same frame.
   void onPair(const OdometryPair& pair) {
     diagnostics_->input().note(nanoseconds(pair.features->header.stamp));
     const std::string &map_frame = options_.map_frame_id, &odom_frame = pair.odometry->header.frame_id;
@@ -187,7 +186,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
   std::optional<Eigen::Isometry3d> findExtrinsic(const OdometryPair& pair) {
     const std::string base_frame = cleanFrameId(pair.odometry->child_frame_id);
     const std::string camera_frame = cleanFrameId(pair.features->header.frame_id);
-    // As the odometry does: at a reset, where the distance travelled falls. Other epochs keep the mount.
+    // The mount is read again when the odometry does: after a reset, where the distance falls. Other epochs keep it.
     const stereo_descriptor_vo::VoInfo::ConstPtr before = std::exchange(mount_of_, pair.info);
     const double since_reset = pair.info->distance;
     if (before && (before->session != pair.info->session ||
@@ -200,7 +199,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     return found;
   }
 
-  /// Under the lock, as what follows. `report`: of the session's newest key frame.
+  /// Under the lock, as are the functions below. `report`: of the session's newest key frame.
   void publish(const PlaceReport& report, const ros::Time& stamp) {
     const PlaceSession& session = *session_;
     const PlaceRecognition& recognition = session.recognition();
@@ -234,7 +233,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     replace(std::move(anew));
   }
 
-  /// With the places of a file, where it is there.
+  /// A session with the places of a file, if it exists.
   std::shared_ptr<PlaceSession> sessionOf(const std::string& file) const {
     return std::filesystem::exists(file) ? load(file) : std::make_shared<PlaceSession>(recognition_options_);
   }
@@ -246,7 +245,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     diagnostics_->restart();
   }
 
-  /// In the optimiser's thread, which works on a copy while the graph grows.
+  /// In the optimiser's thread, on a copy, because the graph grows meanwhile.
   void optimise(const Job& job) try {
     PoseGraph graph = job.graph;
     const PoseGraph::Summary summary = graph.optimise();
@@ -275,7 +274,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     return {session_->map(), mount_->last()};
   }
 
-  // The other robot, in the thread of what takes its time.
+  // For the other robot, in the thread of slow callbacks.
 
   OtherRobot::Places placesForOthers() {
     OtherRobot::Places places;
@@ -306,7 +305,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     restart("reset was called", std::make_shared<PlaceSession>(recognition_options_));
   }
 
-  /// Says how many.
+  /// Returns the number of places in words.
   std::string save(const std::string& path) {
     std::unique_lock<std::mutex> lock(mutex_);
     const std::vector<Place> places = session_->places();
@@ -328,7 +327,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     return std::to_string(places.size()) + " places";
   }
 
-  /// To places_file, while the session goes on or at its end: roslaunch gives that 15 s, and the console is gone.
+  /// Writes places_file, each minute and at the end. At the end roslaunch grants 15 s, and rosconsole is gone.
   void saveByItself(bool at_end) {
     const std::string path = inRosHome(options_.places_file);
     const auto say = [&](const std::string& what) {
@@ -364,7 +363,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     next_save_ = ros::SteadyTime::now() + (ros::SteadyTime::now() - begin) * kRests;
   }
 
-  /// Begins anew with the places of a file. Says how many.
+  /// Begins anew with the places of a file. Returns their number in words.
   std::string replaceBy(const std::string& file) {
     std::shared_ptr<PlaceSession> loaded = load(file);
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -385,8 +384,8 @@ class PlaceRecognitionNodelet : public RobotNodelet {
   }
 
   static constexpr double kTfTimeout = 2.0;   // s of wall time, at the start
-  static constexpr double kRests = 20.0;      // times as long as saving took: at most a twentieth of the disk's time
-  const ros::WallDuration kSavePeriod{60.0};  // s: what a killed process loses (chosen)
+  static constexpr double kRests = 20.0;      // ratio of the pause to the time that saving took (chosen)
+  const ros::WallDuration kSavePeriod{60.0};  // s, the most that a killed process loses (chosen)
 
   ros::NodeHandle nh_;
   PlaceOutputOptions options_;
@@ -402,10 +401,10 @@ class PlaceRecognitionNodelet : public RobotNodelet {
 
   std::mutex mutex_;
   std::shared_ptr<PlaceSession> session_;    // and all in it: under mutex_
-  std::string map_file_;                     // that its first places are from; empty: none
-  std::map<std::string, std::size_t> kept_;  // files that hold this session's first places, and how many it held then
-  int changes_ = 0, saved_changes_ = 0;      // of the session; those in places_file
-  bool was_located_ = false;                 // … and map -> odom is published since then
+  std::string map_file_;                     // file of its first places; empty: none
+  std::map<std::string, std::size_t> kept_;  // files that were loaded or saved, with their number of places
+  int changes_ = 0, saved_changes_ = 0;      // of the session; of it those in places_file
+  bool was_located_ = false;                 // at the last publish(): map -> odom is on TF
   std::atomic<int> generation_{0};           // sessions that a service began
   std::atomic<bool> stopping_{false};
   // Only the observer's thread touches this.

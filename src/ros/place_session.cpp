@@ -28,7 +28,7 @@ PlaceSession::Time PlaceSession::noteTime(const ros::Time& stamp, const ros::Tim
   last_now_ = now;
   if (last_ && stamp == last_->stamp) return Time::kStands;
   const bool falls = last_ && stamp < last_->stamp;
-  // A pair that waited while the clock jumped back is still of the time before, ahead of the new one.
+  // A pair that waited while the clock jumped back still has a stamp of the earlier time, ahead of the clock.
   const bool is_of_new_time = falls || stamp <= now + ros::Duration(1.0);
   if (!last_ || !(falls || (clock_fell_ && is_simulated && is_of_new_time))) return Time::kGoesOn;
   continues_ = false;

@@ -27,16 +27,17 @@ struct Connection {
   std::string topic, type, md5sum;
 };
 
-/// A message of a bag, which refers to its bytes.
+/// A message of a bag; `data` points into the bag's bytes.
 struct BagMessage {
   Connection connection;
   Bytes data;
 };
 
-/// Returns whether it wants more.
+/// Returns whether to go on with the next message.
 using UseMessage = std::function<bool(const BagMessage&)>;
 
-/// A file that may change while it is read: no more of it than there was at first, and what is missing is an error.
+/// Bytes of a file that may change while it is read: at most as many as it had at first, and an error if some are
+/// missing.
 struct FileBytes {
   explicit FileBytes(const std::string& path)
       : file(path, std::ios::binary), left(static_cast<std::size_t>(std::filesystem::file_size(path))) {}
@@ -65,7 +66,7 @@ std::string takeBytes(FileBytes& from, std::size_t count) {
   return taken;
 }
 
-/// The next bytes, as many as the length before them (little endian) says.
+/// The next bytes. Their number stands before them (little endian).
 template <class Source>
 auto take(Source& from) {
   std::uint32_t length = 0;
@@ -84,7 +85,7 @@ Fields takeFields(Bytes header) {
   return fields;
 }
 
-/// False once `use` wants no more.
+/// False if `use` ended the reading.
 template <class Source>
 bool readRecords(Source records, bool in_chunk, std::map<std::string, Connection>& connections, const UseMessage& use) {
   constexpr Bytes kMessage = "\x02", kChunk = "\x05", kConnection = "\x07";
@@ -108,9 +109,9 @@ namespace msgs = stereo_descriptor_vo;
 
 constexpr const char* kPlaceTopic = "place";
 constexpr const char* kGraphTopic = "map_graph";
-constexpr const char* kOldPlace = "d90a2505b9172820b06c0867769c61b0";  // of 0.1.0: features end before right_delay
+constexpr const char* kOldPlace = "d90a2505b9172820b06c0867769c61b0";  // MD5 in 0.1.0, without right_delay at the end
 
-/// Refuses an array longer than the rest of its message; ROS' own stream makes room for it before it looks.
+/// Refuses an array longer than the rest of its message. ROS' own stream allocates it before it checks.
 struct CheckedStream : ros::serialization::Stream {
   static const ros::serialization::StreamType stream_type = ros::serialization::stream_types::Input;
 
@@ -147,9 +148,9 @@ Message parse(const BagMessage& in_bag) {
   return message;
 }
 
-/// Hands over the messages of a bag (version 2.0, without compression) in the order of its bytes. rosbag's own reader
-/// trusts every length, count and offset that a file announces: it allocates as much, or reads beyond what it holds.
-/// Throws std::invalid_argument where they do not fit into each other.
+/// Reads the messages of a bag (version 2.0, not compressed) in the order of its bytes. rosbag's own reader trusts
+/// every length, count and offset in a file: a damaged one makes it allocate or read out of bounds. Throws
+/// std::invalid_argument if lengths are inconsistent.
 void readFile(const std::string& path, const UseMessage& use) {
   constexpr Bytes kMagic = "#ROSBAG V2.0\n";
   if (!std::filesystem::is_regular_file(path)) throw std::invalid_argument("there is no such file");
@@ -161,7 +162,8 @@ void readFile(const std::string& path, const UseMessage& use) {
   readRecords(std::move(bytes), false, connections, use);
 }
 
-/// By its first message; also one that a version with other messages wrote. Nothing is lost with a file that is empty.
+/// Whether a file may be replaced: by its first message it is one of places, of any version of this package, or it is
+/// empty.
 bool isOfPlaces(const std::string& path) try {
   if (std::filesystem::is_regular_file(path) && std::filesystem::is_empty(path)) return true;
   bool is_place = false;

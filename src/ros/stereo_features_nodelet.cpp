@@ -31,7 +31,7 @@
 namespace sdvo {
 namespace {
 
-/// Whether rows described with either options can be compared. What finds the features may differ.
+/// Whether descriptors of these options can be matched with each other. Detector and stereo options do not matter.
 bool describeAlike(const FeatureExtractorOptions& a, const FeatureExtractorOptions& b) {
   const auto texts = [](FeatureExtractorOptions options) {
     OptionList list;
@@ -146,7 +146,7 @@ class StereoFeaturesNodelet : public RobotNodelet {
     fail(topic + ": a message is not used: " + why, topic);
   }
 
-  /// The newest mask holds, whatever its stamp, until the next one comes.
+  /// A mask is used until the next one comes, whatever its stamp.
   void onMask(const sensor_msgs::ImageConstPtr& message) try {
     masks_.post(ros_conversions::toGrey(message).clone());
   } catch (const std::exception& e) {
@@ -174,7 +174,7 @@ class StereoFeaturesNodelet : public RobotNodelet {
     const bool same_rows = describeAlike(extractor_->options(), (*pending)->options());
     extractor_ = *std::move(pending);
     if (same_rows) return;
-    ++stream_epoch_;  // rows of another kind or size do not continue the old ones
+    ++stream_epoch_;  // descriptors of another kind or size match none of before
     NODELET_INFO("reconfigured: descriptors of another kind or size, so a new stream begins (epoch + 1)");
   }
 
@@ -198,7 +198,7 @@ class StereoFeaturesNodelet : public RobotNodelet {
         extractor_->extract(decoded.camera, decoded.left, decoded.right, nanoseconds(stamp), mask_, last_report_);
     last_report_ = features.report;
     if (options_.approximate_sync) features.right_delay = secondsBetween(stamp, pair.right_image->header.stamp);
-    // Only now: a calibration that does not fit the images was refused and is no new stream.
+    // After the extraction, which has thrown if the calibration does not fit the images: that begins no new stream.
     const std::string unrectified = ros_conversions::whyUnrectified(*pair.left_info, *pair.right_info);
     noteCamera(decoded.camera, pair.left_info->distortion_model, unrectified);
     if (emitter_.judge().verdict == Verdict::kOpen) {  // until the camera has moved enough
@@ -240,7 +240,7 @@ class StereoFeaturesNodelet : public RobotNodelet {
     if (finding.isFault()) NODELET_WARN_STREAM(step << ": " << finding.text());
   }
 
-  /// What the rig monitor says, when it says something else than before. A pair without features (dark) says nothing.
+  /// Reports changes of the rig monitor's verdict. A pair without features (dark) has none.
   void reportRig(const StereoFeatures& features, const ros::Time& stamp) {
     const bool refused = features.report.refused;
     const bool is_wrong = refused || features.report.along_rows;

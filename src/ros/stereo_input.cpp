@@ -9,7 +9,7 @@
 namespace sdvo {
 namespace {
 
-/// Messages that wait for this node's own thread, which handles each in no time: long enough that none is lost there.
+/// Queue of the subscribers (messages). Callbacks only store messages, so that none is lost in it.
 constexpr int kArrivalQueue = 20;
 
 ArrivalLog::Topics resolvedTopics(const ros::NodeHandle& nh) {

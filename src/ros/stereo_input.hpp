@@ -24,20 +24,20 @@ struct StereoPairMessages {
   sensor_msgs::CameraInfoConstPtr left_info, right_info;
 };
 
-/// The four synchronised inputs of stereo processing under their usual names: left|right/image_rect and camera_info.
-/// Subscribed from construction to destruction. The right images have a thread of their own, so that a transport
-/// decodes both sides at once; the callbacks never run at the same time.
+/// The four synchronised inputs of stereo processing: left|right/image_rect and left|right/camera_info. Subscribed from
+/// construction to destruction. The right images have a thread of their own, so that a transport decodes both sides in
+/// parallel; the callbacks never run in parallel.
 class StereoInput {
  public:
   using Callback = std::function<void(const StereoPairMessages&)>;
-  /// Of a message that is not used, and why.
+  /// For a message that is not used, with the reason.
   using Refusal = std::function<void(ArrivalLog::Input input, const std::string& topic, const std::string& why)>;
 
-  /// Names as the node handle has them. `transport` and `arrivals` must outlive the input.
+  /// Topics are resolved by `nh`. `transport` and `arrivals` must outlive the input.
   StereoInput(ros::NodeHandle nh, StereoImageTransport& transport, const StereoInputOptions& options,
               ArrivalLog& arrivals, Callback callback, Refusal refuse);
 
-  /// As subscribed: images with their transport's ending.
+  /// Names of the topics; images with their transport's ending.
   std::vector<std::string> subscribedTopics() const;
 
  private:

@@ -20,24 +20,24 @@
 
 namespace sdvo {
 
-/// Puts messages of one trigger together, one of each input: those of equal stamps, else of the nearest ones within a
-/// tolerance. Incomplete sets wait in the order of their arrival.
-/// message_filters' ExactTime orders them by stamp instead: a complete set with a future stamp discards sets that
-/// arrived after it, and a queue full of future stamps discards every new message. Not for several threads at once.
+/// Combines messages of one trigger, one of each input, by equal stamps or the nearest ones within a tolerance.
+/// Incomplete sets wait in the order of their arrival. message_filters' ExactTime orders them by stamp: a complete set
+/// with a future stamp discards sets that arrive after it, and a queue full of future stamps discards every new
+/// message. Not thread-safe.
 template <class... Messages>
 class TriggerSynchroniser {
  public:
   using Callback = std::function<void(const boost::shared_ptr<const Messages>&...)>;
 
-  /// `capacity`: messages of each input that wait; `tolerance`: s between the stamps of a set. `on_unpaired`, unless
-  /// empty, is told of sets that are given up, null for what is missing.
+  /// `capacity`: messages of each input that wait; `tolerance`: s between the stamps of a set. `on_unpaired`, if not
+  /// empty, is called with incomplete sets that are given up, null for each missing message.
   TriggerSynchroniser(int capacity, double tolerance, Callback on_set, Callback on_unpaired = {})
       : capacity_(capacity),
         tolerance_(static_cast<std::int64_t>(1e9 * tolerance)),
         on_set_(std::move(on_set)),
         on_unpaired_(std::move(on_unpaired)) {}
 
-  /// Of the input of this number. Throws std::invalid_argument for a stamp that ROS cannot compare.
+  /// Takes a message of the input of this number. Throws std::invalid_argument for a stamp that ROS cannot compare.
   template <int input, class Message>
   void add(const boost::shared_ptr<const Message>& message) {
     const std::string problem = whyUnusable(message->header.stamp);
@@ -45,7 +45,7 @@ class TriggerSynchroniser {
     const std::size_t at = setOf<input>(nanoseconds(message->header.stamp));
     std::get<input>(waiting_[at].messages) = message;
     if (std::apply([](const auto&... all) { return (... && all); }, waiting_[at].messages)) {
-      // Each input keeps its order, so a message of every earlier set was lost.
+      // Each topic is in order: every earlier set has lost a message.
       for (std::size_t k = 0; k < at; ++k) giveUp(0);
       const MessageSet complete = take(0);
       std::apply(on_set_, complete);
@@ -69,14 +69,14 @@ class TriggerSynchroniser {
     MessageSet messages;
   };
 
-  /// The place of the set that a message belongs to, which is a new one where nothing of it came before.
+  /// Index of the set that a message belongs to; a new set if it is the first one.
   template <int input>
   std::size_t setOf(std::int64_t stamp) {
     std::size_t at = waiting_.size();
     std::int64_t nearest = tolerance_ + 1;
     for (std::size_t k = 0; k < waiting_.size(); ++k) {
       const std::int64_t gap = std::abs(waiting_[k].stamp - stamp);
-      // Only a message of the very same stamp, which came twice, takes the place of another one.
+      // A set has this input's message already: only a repeated one of equal stamp replaces it.
       if (gap >= nearest || (gap > 0 && std::get<input>(waiting_[k].messages))) continue;
       nearest = gap;
       at = k;
@@ -103,7 +103,7 @@ class TriggerSynchroniser {
   std::deque<Waiting> waiting_;  ///< in the order in which the first message of each came
 };
 
-/// Puts messages together whose stamps differ by up to an interval, the nearest ones. Not for several threads at once.
+/// Combines messages of the nearest stamps, which differ by up to an interval. Not thread-safe.
 template <class... Messages>
 class ApproximateSynchroniser {
  public:
@@ -114,8 +114,7 @@ class ApproximateSynchroniser {
       : policy_(static_cast<std::uint32_t>(capacity)), on_set_(std::move(on_set)) {
     constexpr double kLeastPeriod = 0.01;  // s, of a camera
     policy_.setMaxIntervalDuration(ros::Duration(max_interval));
-    // Without a least time between messages of one input each set would wait for the next one, to see that it is no
-    // better.
+    // Without a least time between messages of one input each set would wait for the next message, which may be nearer.
     for (int input = 0; input < static_cast<int>(sizeof...(Messages)); ++input)
       policy_.setInterMessageLowerBound(input, ros::Duration(std::min(max_interval, kLeastPeriod)));
     beginAnew();
@@ -123,7 +122,7 @@ class ApproximateSynchroniser {
 
   template <int input, class Message>
   void add(const boost::shared_ptr<const Message>& message) {
-    // The policy would wait for partners of what is left of the time before a jump back.
+    // After a jump back the policy would keep waiting for partners of messages from before the jump.
     constexpr double kJump = 1.0;  // s, more than messages of one time are apart
     const ros::Time& stamp = message->header.stamp;
     if (secondsBetween(stamp, newest_) > kJump) {

@@ -18,7 +18,8 @@
 
 namespace sdvo {
 
-/// Subscriptions that can be paused. Both ways ask the master, which may be out of reach: in a thread of their own.
+/// Subscriptions that can be paused. To subscribe and to unsubscribe needs the master, which may be out of reach: both
+/// happen in a thread of their own.
 class PausableInput {
  public:
   using Subscribe = std::function<std::vector<ros::Subscriber>()>;
@@ -31,7 +32,7 @@ class PausableInput {
         worker_(
             1, [this](const bool& wanted) { subscribers_ = wanted ? subscribe_() : std::vector<ros::Subscriber>(); }) {}
 
-  /// Each false where it is so already. Messages may still come for a moment.
+  /// False if paused, or not paused, already. Messages may still come for a moment.
   bool pause() { return change(true); }
   bool resume() {
     if (is_paused_) before_resume_();
@@ -53,16 +54,16 @@ class PausableInput {
   Worker<bool> worker_;
 };
 
-/// A callback queue with a thread of its own. Nodelets of one manager share its threads: those of others that are slow
-/// would let ours wait. An exception that a callback does not catch is reported and ends that call alone, not the
-/// process. To be declared before, that is destroyed after, all that has callbacks in it.
+/// A callback queue with a thread of its own, because nodelets of one manager share its threads, and slow ones delay
+/// the others. An exception of a callback is reported and does not end the process. Declare it before (it is destroyed
+/// after) everything with callbacks in it.
 class CallbackThread {
  public:
   CallbackThread() : spinner_(1, &queue_) {}
   CallbackThread(const CallbackThread&) = delete;
   CallbackThread& operator=(const CallbackThread&) = delete;
 
-  /// The same node handle, whose callbacks run here.
+  /// The node handle with callbacks in this thread.
   ros::NodeHandle serve(ros::NodeHandle nh) {
     nh.setCallbackQueue(&queue_);
     return nh;

@@ -12,14 +12,14 @@
 
 namespace sdvo {
 
-/// Limits a rate by stamps. An item passes from 95 % of a period after the last one that passed: otherwise jitter at
-/// exactly twice the rate would let every third item pass instead of every second one.
+/// Limits a rate by stamps. An item passes if 95 % of a period has elapsed since the last one that passed. With 100 %,
+/// jitter of an input at twice the rate would let every third item pass instead of every second one.
 class Pace {
  public:
   /// `max_rate`: Hz; 0: no limit.
   explicit Pace(double max_rate) : period_(max_rate > 0.0 ? static_cast<std::int64_t>(1e9 / max_rate) : 0) {}
 
-  /// Whether the item of this stamp (ns) passes. Where the stamp is not later than the last one, it passes.
+  /// Whether the item of this stamp (ns) passes. Stamps that do not increase pass.
   bool isDue(std::int64_t stamp) {
     if (has_begun_ && stamp > last_ && stamp - last_ < period_ - period_ / 20) return false;
     has_begun_ = true;
@@ -33,8 +33,8 @@ class Pace {
   bool has_begun_ = false;
 };
 
-/// How long to wait for an input, s. Each time that it does not come within its timeout, nothing waits for it for 1, 2,
-/// 4 … 30 s; when it comes, the pauses begin at 1 s again. `now`: s of a monotonic clock.
+/// Time to wait for an input, s. After each timeout there is no waiting for 1, 2, 4 … 30 s. Once the input comes,
+/// pauses begin at 1 s again. `now`: s of a steady clock.
 class Patience {
  public:
   explicit Patience(double timeout) : timeout_(timeout) {}
@@ -58,9 +58,8 @@ class Patience {
   double rest_ = kShortest, rests_until_ = 0.0;
 };
 
-/// Lets a report of one kind through at most once in a period. ROS' own throttle shares its state between all nodelets
-/// of a manager, lets different errors hide each other and goes by simulated time, which may stand still; the system's
-/// clock may be set back.
+/// Passes one report of each kind in a period of steady time. ROS' own throttle is shared by all nodelets of a manager,
+/// lets different errors hide each other, and stops with simulated time or when the system's clock is set back.
 class ReportThrottle {
  public:
   /// Whether to report `text` now. Texts that differ in their numbers alone are of one kind.

@@ -19,29 +19,28 @@
 
 namespace sdvo {
 
-/// The robot's transforms as others publish them on TF. tf2_ros' own listener lets exceptions out of its thread, so
-/// that one wild stamp on /tf ends the process; here such a transform is left out. Warns of those that contend with
-/// ours.
+/// Listens to TF. An exception in tf2_ros' own listener ends the process, for example of one wild stamp on /tf; here
+/// such a transform is left out. Warns of publishers that contradict this node's transform.
 class RobotTransforms {
  public:
   using Report = std::function<void(const std::string&)>;
 
-  /// `ours`: the transform that this node publishes (odom: parent, base: child); none when it publishes none. `tag`: of
-  /// its TransformPublisher.
+  /// `ours`: parent (odom) and child (base) of the transform that this node publishes, if any. `tag`: of its
+  /// TransformPublisher.
   RobotTransforms(ros::NodeHandle& nh, std::optional<ros_conversions::OdometryFrames> ours, std::uint32_t tag,
                   Report warn);
 
-  /// The transform that this node publishes from now on, for a node that learns it late. Only where callbacks run.
+  /// Sets `ours` later. For the thread of its callbacks.
   void claim(ros_conversions::OdometryFrames ours) { ours_ = std::move(ours); }
 
-  /// T_parent_child at the newest time known; none, and why, while TF has no such transform.
+  /// T_parent_child at the newest time known. None, with the `problem`, while TF has no such transform.
   std::optional<Eigen::Isometry3d> find(const std::string& parent, const std::string& child,
                                         std::string& problem) const;
 
-  /// Why there is none, and what to publish.
+  /// Why find() returns none, and what to publish.
   std::string explainMissing(const std::string& base_frame, const std::string& camera_frame) const;
 
-  /// T_child(from)_child(to), as `fixed` has it: how a frame moved between two times.
+  /// T_child(from)_child(to): motion of a frame between two times, by its pose in `fixed`.
   std::optional<Eigen::Isometry3d> findMotion(const std::string& fixed, const std::string& child, const ros::Time& from,
                                               const ros::Time& to, std::string& problem) const;
 
@@ -62,31 +61,31 @@ class RobotTransforms {
   ros::Subscriber dynamic_, static_;
 };
 
-/// Where the camera sits on the robot, as TF tells; read once for a camera, until that is forgotten, for the pose goes
-/// through it to the odometry's origin. For any thread.
+/// The camera's pose on the robot, by TF. It is read once for each camera, until forget(): a change would move the
+/// odometry's origin. For any thread.
 class CameraMount {
  public:
-  /// `timeout`, s of wall time: how long await() waits in all.
+  /// `timeout`: s of wall time from the first await() on, after which none waits.
   CameraMount(const RobotTransforms& transforms, double timeout) : transforms_(transforms), timeout_(timeout) {}
 
-  /// Returns once TF has the transform, after the timeout or when it `is_urgent`: static transforms and the first
-  /// features arrive together. Hold no lock meanwhile that others need.
+  /// Waits until TF has the transform, the timeout, or `is_urgent`: static transforms may come after the first
+  /// features. Hold no lock meanwhile that others need.
   void await(const std::string& base_frame, const std::string& camera_frame, const std::function<bool()>& is_urgent);
 
-  /// T_base_camera; none, and why, while TF has no such transform. Frame ids without a leading slash.
+  /// T_base_camera. None, with the `problem`, while TF has no such transform. Frame ids without a leading slash.
   std::optional<Eigen::Isometry3d> find(const std::string& base_frame, const std::string& camera_frame,
                                         std::string& problem);
 
-  /// Whether find() has it already.
+  /// Whether find() returned this transform already.
   bool knows(const std::string& base_frame, const std::string& camera_frame) const;
 
-  /// What TF has by now instead of what find() found, in words; empty while that is the same, and when it was said.
+  /// How the transform on TF differs by now from find()'s, in words. Empty if it does not, or was reported already.
   std::string change();
 
-  /// find() asks TF again.
+  /// The next find() reads TF again.
   void forget();
 
-  /// What was found last.
+  /// Result of the last find() that succeeded.
   std::optional<Eigen::Isometry3d> last() const;
 
  private:
@@ -99,9 +98,8 @@ class CameraMount {
   std::optional<Eigen::Isometry3d> T_base_camera_;
 };
 
-/// Publishes on /tf as the node handle has that remapped; tf2_ros' broadcaster has the remappings of the process, which
-/// in a manager are those of no nodelet. On TF the nodelets of a process have one name: transforms carry a tag as their
-/// `seq`, which nobody else reads.
+/// Publishes on /tf with the nodelet's remappings; tf2_ros' broadcaster has the manager's. All nodelets of a manager
+/// have one name on TF, so that transforms carry a tag as `seq`, which nobody else reads, to tell them apart.
 class TransformPublisher {
  public:
   TransformPublisher(ros::NodeHandle& nh, std::uint32_t tag)

@@ -55,11 +55,11 @@ class VisualOdometryNodelet : public RobotNodelet {
   using FeaturesMessage = stereo_descriptor_vo::StereoFeatures;
   using FeaturesMessagePtr = stereo_descriptor_vo::StereoFeaturesConstPtr;
 
-  /// Features as they arrived, when, and how often services had started the odometry again or resumed by then.
+  /// A feature message with the time of its arrival, and the number of restarts and resumes by services before it.
   struct Arrived {
     FeaturesMessagePtr message;
     StereoFeaturesView view;
-    std::int64_t now;  ///< ns, simulated or of a clock that nobody sets
+    std::int64_t now;  ///< ns, simulated or of a steady clock
     int starts, resumes;
   };
   using FeaturesFilter = StampFilter<Arrived>;
@@ -143,7 +143,7 @@ class VisualOdometryNodelet : public RobotNodelet {
                                         {"odom_frame_id", options_.odom_frame_id});
   }
 
-  /// Parent and child of the transform that goes out on TF.
+  /// Parent and child of the transform that is published on TF.
   std::optional<ros_conversions::OdometryFrames> publishedFrames() const {
     if (!options_.publish_tf) return std::nullopt;
     ros_conversions::OdometryFrames frames{options_.odom_frame_id, options_.base_frame_id};
@@ -159,7 +159,8 @@ class VisualOdometryNodelet : public RobotNodelet {
     const bool new_stream = stream_epoch_ && *stream_epoch_ != message->stream_epoch;
     std::vector<FeaturesFilter::Passed> passed =
         filter_.add(std::move(arrived), nanoseconds(message->header.stamp), nanoseconds(ros::Time::now()), new_stream);
-    // The first one may have waited for the second where the features are made, too: it came before, by their stamps.
+    // The held pair may have been held by the image side, too. Its arrival is at most the next one's less their stamps'
+    // difference.
     if (passed.size() == 2) {
       Arrived &held = passed[0].item, &next = passed[1].item;
       const auto stamp = [](const Arrived& item) { return nanoseconds(item.message->header.stamp); };
@@ -177,7 +178,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     fail(text(0, "features at ", message->header.stamp, " skipped: ", e.what()), e.what());
   }
 
-  /// Throws for what cannot be used, before its stamp counts.
+  /// Throws for a message that cannot be used, before filter_ takes its stamp.
   StereoFeaturesView check(const FeaturesMessage& message) try {
     const std::string problem = whyUnusable(message.header.stamp);
     if (!problem.empty()) throw std::invalid_argument(problem);
@@ -205,14 +206,14 @@ class VisualOdometryNodelet : public RobotNodelet {
     std::optional<MotionGuess> motion;
   };
 
-  /// Gives TF, another odometry and the gyro time to tell what they have of a pair. Outside of the lock: services do
-  /// not wait with it.
+  /// Waits for the camera's mount on TF and for a guess by another odometry or the gyro. Without the lock, which
+  /// services need.
   Guess waitForOthers(const FeaturesFilter::Passed& passed) {
     const std_msgs::Header& header = passed.item.message->header;
     const auto isVoid = [&] { return stopping_ || passed.item.starts != starts_; };
     const std::string camera_frame = cleanFrameId(header.frame_id);
     const double begin = steadyTime();
-    // A pair that another one would push out is answered instead.
+    // With a full queue the next pair would be dropped: stop waiting.
     mount_->await(options_.base_frame_id, camera_frame, [&] { return isVoid() || worker_->isFull(); });
     diagnostics_->load().noteWait("the transform base <- camera", steadyTime() - begin);
     Guess guess;
@@ -225,7 +226,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     return guess;
   }
 
-  /// What there is to publish, but for vo_info, is.
+  /// Publishes everything of a pair but vo_info.
   OdometryResult estimate(const FeaturesFilter::Passed& passed, const Guess& guess) try {
     const FeaturesMessage& message = *passed.item.message;
     if (const auto options = reconfigurations_.take()) odometry_->configure(*options);
@@ -244,8 +245,8 @@ class VisualOdometryNodelet : public RobotNodelet {
     return waitFor(std::string("features skipped: ") + e.what());
   }
 
-  /// Only simulated time that jumps back, as when a bag is played again, begins anew. Where stamps jump, to either
-  /// side, the camera's or the system's clock was set: pairs are as far apart as they arrive.
+  /// If simulated time jumps back (a bag is played again), the odometry restarts. If stamps jump to either side, the
+  /// camera's or system's clock was set: the interval of the pairs is that of their arrivals.
   void noteJumps(const FeaturesFilter::Passed& passed) {
     constexpr std::int64_t kJump = 1000000000, kLeast = 1000000;  // ns: as the filter's; between two pairs
     const std::int64_t stamp = nanoseconds(passed.item.message->header.stamp), now = passed.item.now;
@@ -284,7 +285,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     return result;
   }
 
-  /// With what the images show.
+  /// Compares the axes of camera and IMU on TF with the motion in the images.
   void compareAxes(const OdometryResult& result, const std::optional<MotionGuess>& guess,
                    const std_msgs::Header& header) {
     const auto warnOnce = [this](const char* step, Finding& told, const Finding& found, const char* consequence) {
@@ -336,14 +337,14 @@ class VisualOdometryNodelet : public RobotNodelet {
       return;
     }
     if (is_lost) is_tracking_ = false;
-    // Each start is told apart from the predictions that go before it.
+    // A restart is of another kind than the predictions before it, which would hide it.
     const bool started_again = result.has_pose && !result.has_motion;
     warn(text(0, toString(result.state), " at ", stamp, ", epoch ", result.epoch, ", ", result.inliers, " of ",
               result.matches, " points: ", result.reason),
          started_again ? "started again" : toString(result.state));
   }
 
-  /// At a given pose, or where it began.
+  /// At a given pose of the base, or at the initial one.
   void restart(const char* why, const std::optional<Eigen::Isometry3d>& given = std::nullopt) {
     const Eigen::Isometry3d T_odom_start = given.value_or(T_odom_start_);
     NODELET_WARN_STREAM(
@@ -362,8 +363,8 @@ class VisualOdometryNodelet : public RobotNodelet {
     processed_stamp_.reset();
   }
 
-  /// How another odometry, or the gyro, has the camera's motion since the pair before; nothing where neither is asked
-  /// for or knows it.
+  /// The camera's motion since the previous pair by another odometry or the gyro; nothing if neither is enabled or has
+  /// it.
   std::optional<MotionGuess> findGuess(const ros::Time& since, const std_msgs::Header& header,
                                        const std::function<bool()>& is_void) {
     const bool of_frame = !options_.guess_frame_id.empty();
@@ -405,8 +406,8 @@ class VisualOdometryNodelet : public RobotNodelet {
     return guess;
   }
 
-  /// Takes roll and pitch of the first pose from the accelerometer, if the robot stands; waits a moment for a second of
-  /// its measurements and says so, nothing when it is done.
+  /// Takes roll and pitch of the first pose from the accelerometer, if the robot stands. Returns what it waits for: at
+  /// most 2 s for a second of measurements. Empty when done.
   std::string level() {
     constexpr double kPatience = 2.0;  // s of wall time
     const double now = steadyTime();
@@ -431,7 +432,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     return "";
   }
 
-  /// Asks for the camera's place on the robot; says what is missing, nothing when it is known.
+  /// Finds the camera's pose on the robot. Returns what is missing; empty if it is known.
   std::string findExtrinsic(const std::string& camera_frame) {
     const std::string& base_frame = options_.base_frame_id;
     if (mount_->knows(base_frame, camera_frame)) {
@@ -457,7 +458,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     return report;
   }
 
-  // The services. What they ask for has happened when they answer, and features that still wait are dropped.
+  // The services. They answer when the effect is there. Features that wait in the queue are dropped.
 
   void startAgain(const std::optional<Eigen::Isometry3d>& T_odom_base = std::nullopt) {
     const std::lock_guard<std::mutex> lock(work_mutex_);
@@ -465,7 +466,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     restart("reset was called", T_odom_base);
   }
 
-  /// The base is there in odom, with this covariance, at the newest pair. Throws std::invalid_argument.
+  /// Sets the base's pose in odom, with its covariance, at the newest pair. Throws std::invalid_argument.
   void setPose(const geometry_msgs::PoseWithCovarianceStamped& message) {
     const std::string frame = cleanFrameId(message.header.frame_id);
     if (frame != options_.odom_frame_id)
@@ -484,7 +485,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     given_start_ = true;
   }
 
-  /// Says how many poses.
+  /// Returns the number of poses in words.
   std::string save(const std::string& format, const std::string& file) {
     const nav_msgs::Path path = publisher_->path();
     if (path.poses.empty()) throw std::runtime_error("there is no pose to save yet: reason of vo_info says why");
@@ -496,8 +497,8 @@ class VisualOdometryNodelet : public RobotNodelet {
     return std::to_string(path.poses.size()) + " poses";
   }
 
-  static constexpr double kOtherClock = 3600.0;  // s of latency that no slow machine makes
-  /// Messages that wait for this node's own thread, which handles each in no time.
+  static constexpr double kOtherClock = 3600.0;  // s of latency, more than any slow machine has
+  /// Queue of the subscriber (messages). The callback only stores them.
   static constexpr int kArrivalQueue = 20;
 
   ros::NodeHandle nh_;
@@ -527,16 +528,16 @@ class VisualOdometryNodelet : public RobotNodelet {
   std::unique_ptr<VisualOdometry> odometry_;
   Eigen::Isometry3d T_odom_start_;  // of a run
   int source_restarts_ = 0, clock_steps_ = 0;
-  std::optional<std::pair<std::int64_t, std::int64_t>> last_arrival_;  // stamp of the last pair, and when it came
-  std::int64_t time_shift_ = 0;  // ns, from stamps to times of the odometry, which only go on
+  std::optional<std::pair<std::int64_t, std::int64_t>> last_arrival_;  // stamp and arrival of the last pair, ns
+  std::int64_t time_shift_ = 0;  // ns, from stamps to times of the odometry, which never jump
   int epoch_ = 0;
-  bool is_tracking_ = false;  // reported, and not lost since
+  bool is_tracking_ = false;  // TRACKING was reported, and no LOST since
   std::string camera_frame_;
   std::optional<std::uint32_t> processed_epoch_;
   std::optional<ros::Time> processed_stamp_;
-  bool to_be_levelled_ = false;  // T_odom_start_, by the accelerometer
+  bool to_be_levelled_ = false;  // T_odom_start_ still needs the accelerometer
   bool clock_is_told_ = false;
-  bool given_start_ = false;            // a service gave this run's first pose, which stays as it is
+  bool given_start_ = false;            // a service has set the pose, which is not levelled
   std::optional<double> levels_until_;  // s, steady time
   Patience patience_{0.0};              // with guesses
   OpticalAxisCheck optical_axis_;

@@ -17,7 +17,7 @@
 
 namespace sdvo {
 
-/// All steps of the check of a stereo camera, in the order in which one proves what the next one needs.
+/// All steps of the check of a stereo camera. Each step relies on those before it.
 class CameraCheck {
  public:
   /// `run`, which must outlive it, has the odometry of these pairs.
@@ -28,7 +28,7 @@ class CameraCheck {
   /// A pair that could not be used, and why.
   void addUnusable(const std::string& problem);
 
-  /// A step after a FAIL is open: its findings would be that fault's.
+  /// Steps after a FAIL are open: that fault would be the cause of what they find.
   std::vector<CheckStep> steps(const ArrivalFindings& arrivals) const;
 
   cv::Mat rows() const { return rows_.map(); }

@@ -15,7 +15,7 @@ namespace sdvo {
 
 namespace {
 
-/// Messages of each topic that wait for partners, of which none may ever come: images take memory.
+/// Messages of each topic that wait for partners. Some never come, and images take memory.
 constexpr int kWaiting = 100;
 
 }  // namespace

@@ -31,13 +31,13 @@ struct ArrivedPair {
   std::array<std::shared_ptr<const rosbag::MessageInstance>, 2> images;  ///< where a bag has them; null: live
 };
 
-/// Messages of a stereo camera as they arrive, from a bag or from topics: what their stamps look like, which make a
-/// pair, and where TF has the camera. One thread calls it.
+/// Takes the messages of a stereo camera, from a bag or from topics. Makes pairs of them, checks their stamps, and
+/// finds the camera's pose on TF. For one thread.
 class CameraInput {
  public:
   using Use = std::function<void(const ArrivedPair&)>;
 
-  /// With `infos` each image brings its calibration.
+  /// `infos`: used with each image in place of camera_info messages.
   CameraInput(const StereoTopics& topics, std::optional<StereoInfos> infos, Use use);
 
   void add(const StereoMessage& message);
@@ -45,11 +45,11 @@ class CameraInput {
   /// Of one of the topics, or of TF.
   void add(const rosbag::MessageInstance& instance);
 
-  /// Without any transform TF is open where they may not have been recorded, else a fault. Without a `base_frame` it is
-  /// the one above the camera whose pose an odometry in the bag publishes, else base_link.
+  /// Missing transforms are a fault, except in a recording without any. An empty `base_frame` stands for the frame
+  /// above the camera on TF that is the child frame of an odometry in the bag, else for base_link.
   ArrivalFindings findings(const std::string& base_frame, bool is_recorded);
 
-  /// Stamps that made no pair, with those that still wait, and why the last unusable one is none.
+  /// Number of stamps without a pair, with those that still wait; reason of the last unusable one.
   int unused() const { return unusable_ + given_up_ + static_cast<int>(pairs_.waiting()); }
   const std::string& problem() const { return problem_; }
 

@@ -22,14 +22,14 @@ using Frames = std::vector<OfflineRun::Frame>;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 constexpr double kDegrees = 180.0 / M_PI;
 
-/// Numbers of each pair under the names that page.html has for them.
+/// A number of each pair, with the name that page.html uses.
 struct Column {
   const char* name;
   int digits;  ///< after the point
   double (*of)(const OfflineRun::Frame&);
 };
 
-/// Of a block of the pose's covariance: 0 position (m), 1 rotation (rad).
+/// Standard deviation of the pose's position (block 0, m) or rotation (block 1, rad).
 double sigmaOf(const OfflineRun::Frame& frame, int block) {
   const OdometryResult& odometry = frame.odometry;
   return odometry.has_pose ? std::sqrt(odometry.pose_covariance.diagonal().segment<3>(3 * block).sum()) : kUnknown;
@@ -79,7 +79,7 @@ std::string columnsOf(const DriveReport& report, const Frames& frames, std::size
   return objectOf(members);
 }
 
-/// Errors of the pairs of which both poses are known; none where there are fewer than two.
+/// Errors over the pairs that have a true and an estimated pose; none with fewer than two.
 std::optional<TrajectoryErrors> errorsOf(const DriveReport& report, const Frames& frames) {
   Trajectory truth, estimate;
   for (std::size_t i = 0; i < report.truth.size(); ++i) {

@@ -17,7 +17,7 @@
 
 namespace sdvo {
 
-/// The odometry's own account of a drive that was recorded while it ran.
+/// What the odometry reported in vo_info while the drive was recorded.
 struct LiveRecord {
   std::array<int, 4> states{};      ///< pairs of each VoInfo::state_id
   std::vector<double> latencies;    ///< s, those known
@@ -27,7 +27,7 @@ struct LiveRecord {
   int pairs() const;
 };
 
-/// Of the first topic with VoInfo in a bag; nothing without one.
+/// From the first topic with VoInfo in a bag; nothing without one.
 std::optional<LiveRecord> readLiveRecord(const rosbag::Bag& bag);
 
 /// All that the page of a drive shows.
@@ -47,7 +47,7 @@ struct DriveReport {
 /// The verdict on the drive: whether it was followed, how precisely, and the camera's worst fault.
 Finding judge(const DriveReport& report, const OfflineRun& run);
 
-/// Of each `step` pairs that follow each other the worst one, so that none without a pose is missing.
+/// Indices of the worst one of each `step` successive pairs, so that the page shows every outage.
 std::vector<std::size_t> worstOfEach(const std::vector<OfflineRun::Frame>& frames, std::size_t step);
 
 /// The page of a drive, which needs no other file and has less than 2 MB. Throws std::runtime_error when it cannot be

@@ -13,8 +13,7 @@ namespace sdvo {
 /// The left image of a pair with its features, CV_8UC3.
 cv::Mat drawLeft(const RecordedPair& pair, const StereoFeatures& features, const OdometryResult& result);
 
-/// Left images of a drive with their features: a dozen spread over all pairs, and those where tracking ends for the first
-/// times.
+/// Left images of a drive with their features: twelve spread over all pairs, and the first four where tracking ends.
 class DrivePictures {
  public:
   struct Picture {

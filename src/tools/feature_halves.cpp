@@ -7,11 +7,11 @@
 namespace sdvo {
 namespace {
 
-/// Fields over the height of the image. Neighbours have errors alike, which cancel where they are not in the same half:
-/// with 8 fields instead of 4 the halves differ by up to a third less. With 2 of them, halves cover the image badly.
+/// Fields over the height of the image. Errors of neighbours are correlated and must stay in one half: with 8 fields
+/// the halves differ by up to a third less. With 2 fields a half covers the image badly.
 constexpr int kFields = 4;
 
-/// A feature of the previous pair is as near as this to where the map saw its point: a few corner errors, px.
+/// Largest distance (px) of a previous feature from the start of a flow that belongs to it: a few corner errors.
 constexpr float kSamePoint = 2.f;
 
 int halfOfField(float u, float v, int height) {

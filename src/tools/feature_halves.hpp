@@ -8,9 +8,9 @@
 
 namespace sdvo {
 
-/// Splits the features of each pair in two halves that share none. A point stays in its half from pair to pair, as far
-/// as the flow follows it: else either half would lose most of its matches. A new point takes the half of its field of
-/// a chequered pattern over the image, so neighbours, whose errors are alike, are together.
+/// Splits the features of each pair in two halves without a common feature. A point that the flow follows stays in its
+/// half: else both halves would lose most of their matches. New points are assigned by the fields of a chequerboard
+/// over the image, so that neighbours, whose errors are correlated, are in one half.
 class FeatureHalves {
  public:
   /// Indices of both halves' features of the next pair. `flow`: its matches by an odometry on all features.

@@ -56,7 +56,7 @@ void OfflineRun::processBeside(const StereoCamera& camera, const cv::Mat& left, 
                                std::int64_t stamp) {
   const double cpu_before = cpuSeconds();
   Stopwatch stopwatch;
-  // The extraction stays in this thread, whose buffers it knows.
+  // The extraction stays in this thread, which has its buffers.
   const std::optional<Extracted> before = std::exchange(waiting_, std::nullopt);
   std::future<void> odometry;
   if (before) odometry = std::async(std::launch::async, [&] { track(*before); });

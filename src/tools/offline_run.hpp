@@ -23,8 +23,8 @@ class OfflineRun {
   /// Stamps (ns) must increase. Returns the pair's features.
   StereoFeatures process(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
 
-  /// The same, but the odometry of the pair before runs beside the extraction of this one, as it does between the
-  /// nodelets: equal results, which are there after the next call or `finish()`.
+  /// The same with the odometry of the previous pair in a second thread during this pair's extraction, as in the
+  /// nodelets. Results are equal, and available after the next call or finish().
   void processBeside(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
   void finish();
 
@@ -32,7 +32,7 @@ class OfflineRun {
   void processFeatures(const StereoFeatures& features);
 
   struct Frame {
-    OdometryResult odometry;  ///< without the flow, but for the last pair's
+    OdometryResult odometry;  ///< only the last pair keeps its flow
     ExtractionReport extraction;
     double total_time = 0.0;  ///< s
   };
@@ -41,12 +41,12 @@ class OfflineRun {
 
   int pairs() const { return static_cast<int>(frames_.size()); }
   int pairsWithoutPose() const;
-  /// How often the pose was not continued by measurement.
+  /// Changes of the epoch: motions of the pose that were not measured.
   int discontinuities() const;
   double distance() const;  ///< m
 
-  /// Per pair, ms; decoding excluded. Zero without pairs. `quantile`: 0.5 is the median. Beside each other the time of
-  /// a pair is that from one pair to the next.
+  /// Of a pair, ms, without decoding; zero without pairs. `quantile`: 0.5 is the median. For processBeside() it is the
+  /// time between two pairs.
   double time(double quantile) const;
   double cpuTime() const;  ///< mean of all threads
 
@@ -57,7 +57,7 @@ class OfflineRun {
 
   /// A CSV with a line for each pair: times, counts, state and its reason, in which semicolons stand for commas.
   void writeTiming(const std::string& path) const;
-  /// A CSV with what a filter behind the odometry is told of each pair: state, covariances of motion and pose, reason.
+  /// A CSV with a line for each pair: state, covariances of motion and pose, reason.
   void writeStates(const std::string& path) const;
 
  private:

@@ -39,8 +39,8 @@ std::string pictureOf(const cv::Mat& image, const std::string& words, std::size_
 /// A moment (ns since 1970) as date and time in UTC.
 std::string dateOf(std::int64_t stamp);
 
-/// A page that needs no other file: what was looked at, the verdict on it, the steps of the camera's check,
-/// RowCheck::map(), and what else there is. Throws std::runtime_error that names the file when it cannot be written.
+/// Writes a page that needs no other file, with `more` members of its JSON object. `rows`: RowCheck::map(). Throws
+/// std::runtime_error that names the file if it cannot be written.
 void writePage(const std::string& path, const std::string& title, const Finding& verdict,
                const std::vector<CheckStep>& steps, const cv::Mat& rows, JsonMembers more);
 

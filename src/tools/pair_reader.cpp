@@ -14,7 +14,7 @@ using sensor_msgs::CameraInfo;
 
 using Rows = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
 
-/// As the raw image is cut and binned.
+/// The raw camera after the region of interest and binning.
 RawCamera rawCamera(const CameraInfo& info, const StereoCamera& rectified) {
   const double x = std::max(1u, info.binning_x), y = std::max(1u, info.binning_y);
   RawCamera camera;

@@ -13,15 +13,15 @@
 
 namespace sdvo {
 
-/// Of images that are rectified, side 0 (left) or 1. As in image_pipeline both views are expressed in the left optical
-/// frame; the right one's place is in P's Tx = -fx * baseline.
+/// camera_info of rectified images, side 0 (left) or 1. As in image_pipeline both are in the left optical frame, and
+/// the right camera's position is in P's Tx = -fx * baseline.
 sensor_msgs::CameraInfo toCameraInfo(const StereoCamera& camera, int side);
-/// Of raw images: what rectifies them, and what the rectified ones are.
+/// camera_info of raw images: K, D and R rectify them, P is of the rectified ones.
 sensor_msgs::CameraInfo toCameraInfo(const StereoRectification& rectification, int side);
 
 using StereoInfos = std::array<sensor_msgs::CameraInfo, 2>;
 
-/// Of the files that stand for camera_info; none: it comes as messages.
+/// From the files that stand for camera_info messages; none without such files.
 std::optional<StereoInfos> infosOf(const StereoSource& source);
 
 /// Turns the messages of one camera's pairs into rectified pairs. Images without "rect" in their topic's name are raw,
@@ -39,7 +39,7 @@ class PairReader {
   const bool may_be_raw_;
   const double fov_;
   PairDecoder decoder_;
-  StereoInfos infos_;  ///< of the rectification, which follows them
+  StereoInfos infos_;  ///< from which the rectification was made
   std::optional<StereoRectification> rectification_;
 };
 

@@ -15,25 +15,24 @@ struct PlaceErrors {
   int revisits = 0;     ///< key frames where the camera had been before: within 5 m and 30 degrees
   int recognised = 0;   ///< of these, those that a loop was accepted for
   int loops = 0;        ///< accepted
-  int false_loops = 0;  ///< of these, those wrong by more than 1 m or 5 degrees, and all to another sequence
+  int false_loops = 0;  ///< of these, those wrong by more than 1 m or 5 degrees, or to another sequence
   double worst_translation = 0.0, worst_rotation = 0.0;  ///< of any accepted loop, m and deg
   double ate_before = 0.0, ate_after = 0.0;              ///< m, rmse of all pairs after the best rigid alignment
 };
 
-/// Places along an odometry that was run off line: each loop is followed by an optimisation of the graph at once.
+/// Place recognition along the odometry of recordings. Each loop is followed by an optimisation of the graph.
 class PlaceRun {
  public:
   explicit PlaceRun(const PlaceRecognitionOptions& options) : options_(options), recognition_(options) {}
 
   void process(const StereoFeatures& features, const OdometryResult& odometry);
 
-  /// What comes now is another sequence, in a place that none of those before has seen. Poses and errors are of the
-  /// last one.
+  /// Begins another sequence, which was driven where no earlier one was. Poses and errors are of the last sequence.
   void startSequence();
 
   const PlaceRecognition& recognition() const { return recognition_; }
 
-  /// Poses of all pairs in the map as it is in the end: each follows the last key frame before it.
+  /// Poses of all pairs in the final map. Each pair keeps its pose relative to the last key frame before it.
   Trajectory poses() const;
 
   PlaceErrors errors(const Trajectory& truth) const;

@@ -80,7 +80,7 @@ class FolderRecording : public Recording {
   int used_ = 0;
 };
 
-/// The stereo pairs of a recorded bag. In memory are only those at work and those without a partner so far.
+/// The stereo pairs of a recorded bag. Only the current images and those that wait for a partner are in memory.
 class BagRecording : public Recording {
  public:
   /// Throws std::runtime_error where a topic is missing.

@@ -21,7 +21,7 @@ struct RecordedPair {
   cv::Mat left, right;      ///< CV_8U grey; valid as long as the call that it is given to
   std::int64_t stamp;       ///< ns
   std::string lens;         ///< the calibration's model in words; empty: unknown
-  std::string unrectified;  ///< why the images are most likely not rectified; empty: nothing indicates that
+  std::string unrectified;  ///< evidence that the images are not rectified; empty: none
 };
 
 /// Steps of a camera's check that concern how the messages of pairs arrive.
@@ -42,16 +42,17 @@ class Recording {
   /// Pairs at most.
   virtual int size() const = 0;
 
-  /// Calls `use` for the first `limit` pairs in the order of their stamps. Returns how many stamps gave no usable pair.
-  /// Throws std::runtime_error where the recording cannot be read or, unless `refuse` is told of each that is none, no
-  /// pair is usable.
+  /// Calls `use` for the first `limit` pairs in the order of their stamps, and `refuse` for each pair that cannot be
+  /// used. Returns the number of stamps without a usable pair. Throws std::runtime_error if the recording cannot be
+  /// read or, without `refuse`, has no usable pair.
   virtual int forEach(int limit, const Use& use, const Refuse& refuse = {}) = 0;
 
-  /// Calls `use` for the pairs of forEach() backwards. Mirrored stamps increase, and the time between pairs is the
-  /// same.
+  /// Calls `use` for the pairs of the last forEach() in reverse order. Stamps are mirrored: they increase, and the time
+  /// between pairs is the same.
   virtual void forEachBackwards(const Use& use) const = 0;
 
-  /// True poses of the rectified left camera, as readGroundTruth() reads them. Those of EuRoC's CSV are its IMU's.
+  /// True poses of the rectified left camera, as readGroundTruth() reads them. EuRoC's CSV has the IMU's poses, which
+  /// become the camera's here.
   virtual std::vector<std::optional<Eigen::Isometry3d>> truth(const std::string& path,
                                                               const std::vector<std::int64_t>& stamps) const;
 

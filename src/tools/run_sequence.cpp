@@ -52,7 +52,7 @@ struct Drive {
   explicit Drive(const PipelineOptions& options) : whole(options), first(options), second(options) {}
 };
 
-/// What the page of a drive needs of each pair while its images are there.
+/// Parts of the page that are made while the images of a pair are in memory.
 struct Seen {
   CameraCheck check;
   DrivePictures pictures;
@@ -194,7 +194,7 @@ void writeResults(const Drive& drive, const std::vector<SelfCheck>& checks, Pipe
   writeTextFile(reportOf(arguments), report.str());
 }
 
-/// True poses are of the kind of ours, and of two outputs of one name one would be left.
+/// An output must replace neither true poses, whose format is the same, nor another output.
 void refuseOutputsThatReplace(const Arguments& arguments) {
   std::set<fs::path> taken;
   const auto take = [&](const fs::path& path) { return taken.insert(fs::weakly_canonical(path)).second; };

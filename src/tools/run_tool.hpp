@@ -10,7 +10,7 @@
 
 namespace sdvo {
 
-/// Of a tool that judges; 1 is that of an error.
+/// Exit code of a verdict; 1 stands for an error.
 inline int exitCodeOf(Verdict verdict) {
   return verdict == Verdict::kFail ? 2 : 0;
 }

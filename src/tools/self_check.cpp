@@ -10,11 +10,10 @@ namespace {
 
 constexpr double kDegreesPerRadian = 180.0 / M_PI;
 
-/// Sub-paths have this part of the distance: a drive has about ten that share nothing, and its mean is no chance of
-/// one.
+/// Length of a sub-path as a ratio of the distance: the mean is over at least ten sub-paths that do not overlap.
 constexpr double kSubPath = 0.1;
 
-/// Below this distance in m the steps are mostly noise, and nothing can be said for each metre.
+/// Distance (m) below which the steps are mostly noise, so that there is no error per metre.
 constexpr double kStanding = 0.5;
 
 /// Why a run is no estimate of the whole drive; empty when it is one.
@@ -30,7 +29,7 @@ void setEnd(SelfCheck& check, const Eigen::Isometry3d& T_one_other) {
   check.end_deg = kDegreesPerRadian * Eigen::AngleAxisd(T_one_other.linear()).angle();
 }
 
-/// All but the ends.
+/// All fields but end_m and end_deg.
 SelfCheck compare(const std::string& name, const Trajectory& one, const Trajectory& other, double error_by_difference) {
   SelfCheck check;
   check.name = name;

@@ -7,8 +7,8 @@
 
 namespace sdvo {
 
-/// How precise a drive is by its own evidence: two estimates of it are compared, as an estimate is with the ground
-/// truth. Their difference implies the error of one of them, but for what both have in common.
+/// Precision of a drive without ground truth: two estimates of it are compared. Their difference implies the error of
+/// one estimate, except for errors that both share.
 struct SelfCheck {
   std::string name;                ///< "shuttle" or "halves"
   int pairs = 0;                   ///< of the drive
@@ -16,7 +16,7 @@ struct SelfCheck {
   double end_m = 0.0;              ///< distance between the two ends
   double end_deg = 0.0;            ///< angle between them
   SubPathErrors difference;        ///< mean over sub-paths of a tenth of the distance; none where the camera stands
-  double error_by_difference = 0;  ///< the error of an estimate is so much of the difference
+  double error_by_difference = 0;  ///< ratio of an estimate's error to the difference
   std::string problem;             ///< why there are no figures; empty when there are
 
   double errorPercent() const { return error_by_difference * difference.translation_percent; }
@@ -29,8 +29,8 @@ struct SelfCheck {
   static const char* columns();
 };
 
-/// Where a drive ends that goes to the end of `out` and from there back along `back`, in the frame of its start.
-/// The poses of `back` begin with the last pair of `out`.
+/// End of a drive along `out` and back along `back`, in the frame of its start. `back` begins with the last pair of
+/// `out`.
 Eigen::Isometry3d shuttleEnd(const Trajectory& out, const Trajectory& back);
 
 /// The drive forwards, and its pairs in reverse by an odometry that has seen nothing of the way out. If the errors of

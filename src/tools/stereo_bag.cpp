@@ -18,8 +18,8 @@
 namespace sdvo {
 namespace {
 
-// Messages travel over a connection per topic, so equal bag times promise no order. The static transforms are written
-// this much earlier, for a node that gets them after the first pair could not use that pair.
+// Time of the static transforms before the first pair. Each topic has its own connection, so that messages of one time
+// arrive in any order, and a node cannot use a pair that comes before the transforms.
 const ros::Duration kTransformLead(0.1);
 
 const char kOdomFrame[] = "odom";
@@ -96,8 +96,8 @@ void writePath(BagWriter& bag, const std::vector<ros::Time>& stamps, const Traje
   bag.writeLatched("/ground_truth/path", stamps.front(), path);
 }
 
-/// Odometry of frame i. The twist, constant in the body's axes, is that of the step that led here; at the first frame
-/// that of the step to come.
+/// Odometry of frame i. The twist, in the body's axes, is the mean since the previous frame; for the first frame, until
+/// the next one.
 nav_msgs::Odometry makeOdometry(const std::vector<ros::Time>& stamps, const Trajectory& poses, std::size_t i) {
   nav_msgs::Odometry message;
   message.header = makeHeader(stamps[i], kOdomFrame);

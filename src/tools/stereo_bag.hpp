@@ -17,7 +17,7 @@
 
 namespace sdvo {
 
-/// A bag that appears under its name only once it is complete. Never in the place of a file that holds something.
+/// A bag that gets its name when it is complete. It replaces no file but an empty one.
 class BagWriter {
   template <class Action>
   auto guard(const std::string& what, const Action& action) const {

@@ -24,7 +24,7 @@
 namespace sdvo {
 namespace {
 
-/// Empty for what is no camera's.
+/// Empty for a type of pixels that no camera has.
 std::string encodingOf(const cv::Mat& pixels) {
   namespace encodings = sensor_msgs::image_encodings;
   switch (pixels.type()) {
@@ -53,7 +53,7 @@ sensor_msgs::ImageConstPtr decode(const sensor_msgs::CompressedImage& compressed
   return image;
 }
 
-/// Types of a definition's fields one after the other, those of nested messages in their place, without names.
+/// Types of a definition's fields in their order, without names. Nested messages are replaced by their fields.
 std::string layoutOf(const std::string& definition, const std::string& type = "", int depth = 0) {
   constexpr int kDeepest = 10;
   std::istringstream lines(definition);
@@ -83,7 +83,7 @@ std::string layoutOf(const std::string& definition, const std::string& type = ""
 const std::pair<const char*, const char*> kOtherFiles[] = {
     {"SQLite format 3", "a bag of ROS 2 (SQLite)"}, {"\x89MCAP", "an MCAP file"}, {"PK", "a ZIP archive"}};
 
-/// As drivers call images that are not rectified.
+/// Usual names of raw images.
 const std::vector<std::string> kRawImages = {"image_raw", "image_mono", "image", "image_color"};
 
 }  // namespace
@@ -118,7 +118,7 @@ StereoTopics StereoSource::topics() const {
 
 StereoTopics topicsIn(const rosbag::Bag& bag, const StereoSource& source) {
   StereoTopics topics = source.topics();
-  ros::master::V_TopicInfo recorded, imagined;  // without the forms of images; with a camera_info beside each
+  ros::master::V_TopicInfo recorded, imagined;  // names without /compressed; images, each with a camera_info added
   rosbag::View all(bag);
   for (const rosbag::ConnectionInfo* connection : all.getConnections()) {
     const std::string& type = connection->datatype;
@@ -177,7 +177,7 @@ StereoTopics topicsIn(const rosbag::Bag& bag, const StereoSource& source) {
 
 void refuseWhatIsWritten(const std::string& path) {
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  // Linux grants this lease only where nobody has the file open to write; asking for it is all. EAGAIN: somebody has.
+  // Linux refuses this lease (EAGAIN) while somebody has the file open for writing. close() ends it.
   const bool is_written = file >= 0 && ::fcntl(file, F_SETLEASE, F_RDLCK) != 0 && errno == EAGAIN;
   if (file >= 0) ::close(file);
   if (is_written)

@@ -29,21 +29,20 @@ struct StereoSource {
   double fov = 0.0;                      ///< of raw images once they are rectified, deg; 0: as calibrated
 
   void addTo(CLI::App& app);
-  std::string folder() const;  ///< the namespace with its last `/`
+  std::string folder() const;  ///< the namespace, which ends with `/`
   StereoTopics topics() const;
 };
 
-/// The topics as a bag has them: …/compressed where an image is recorded in that form alone. Where it has none of the
-/// usual names, those of its only stereo camera, rectified or else raw, or of the only one in the namespace that is
-/// given. Files of a calibration stand for its topics. Throws std::runtime_error where the bag lacks a topic.
+/// Topics of a bag's stereo camera. Images that are recorded compressed alone have `/compressed` at the end. If a bag
+/// lacks the default names, its only stereo camera is taken, or the only one in the given namespace: a rectified one,
+/// else a raw one. Files of a calibration stand for camera_info. Throws std::runtime_error if the bag lacks a topic.
 StereoTopics topicsIn(const rosbag::Bag& bag, const StereoSource& source);
 
-/// Throws std::runtime_error where a process of this machine has the file open to write it, as a recorder has: what
-/// repairs a bag would ruin it.
+/// Throws std::runtime_error if a process of this machine has the file open for writing, such as a recorder. Repairing
+/// its bag now would destroy it.
 void refuseWhatIsWritten(const std::string& path);
 
-/// What `work` returns. Throws std::runtime_error that names the bag, and the remedy where there is one, when the bag
-/// cannot be read.
+/// Returns the result of `work`. If the bag cannot be read, throws std::runtime_error with its name and a remedy.
 template <class Work>
 auto ofBag(const std::string& path, const Work& work) try {
   return work();
@@ -56,15 +55,16 @@ auto ofBag(const std::string& path, const Work& work) try {
   throw std::runtime_error("'" + path + "' cannot be read: " + e.what() + ". Is it whole? rosbag check '" + path + "'");
 }
 
-/// For reading. Throws as ofBag() does, and for what is no bag of ROS 1; a pipe, which would be waited for, is none.
+/// Opens a bag for reading. Throws as ofBag() does, and for files that are no bags of ROS 1. A pipe is none: opening it
+/// would block.
 void openBag(const std::string& path, rosbag::Bag& bag);
 
-/// Throws std::runtime_error that has both definitions unless their bytes are alike, whatever the names of fields.
+/// Throws std::runtime_error with both definitions if their fields differ in type or order. Names do not count.
 void requireLayout(const rosbag::MessageInstance& instance, const std::string& type, const std::string& definition,
                    const std::string& md5);
 
-/// A message by what it holds: converters from ROS 2 keep other names of fields, and so another MD5. Null for another
-/// type; throws std::runtime_error for another version of this one.
+/// Reads a message by the types of its fields, not by its MD5: bags converted from ROS 2 have other field names, hence
+/// another MD5. Null for another type; throws std::runtime_error for another version of this type.
 template <class Message>
 boost::shared_ptr<Message> readAs(const rosbag::MessageInstance& instance) {
   if (auto message = instance.instantiate<Message>()) return message;
@@ -93,7 +93,7 @@ struct StereoMessage {
   std::shared_ptr<const rosbag::MessageInstance> recorded = nullptr;  ///< where the bag has it; null: live
 };
 
-/// Of either kind.
+/// From an image or a camera_info.
 inline StereoMessage toStereoMessage(std::size_t input, const ros::Time& arrival,
                                      const sensor_msgs::ImageConstPtr& image) {
   return {image->header, input, arrival, image, nullptr};
