@@ -46,7 +46,7 @@ Finding OpticalAxisCheck::judge() const {
 }
 
 void GyroAxesCheck::Turns::add(const Eigen::Matrix3d& by_gyro, const Eigen::Matrix3d& by_images) {
-  constexpr double kLeast = 0.2 * M_PI / 180.0;  // rad: below it bias and noise turn as much
+  constexpr double kLeast = 0.2 * M_PI / 180.0;  // rad, as much as bias and noise give
   const Eigen::Vector3d gyro = logSO3(by_gyro), images = logSO3(by_images);
   if (std::max(gyro.norm(), images.norm()) < kLeast) return;
   product += gyro.dot(images);
@@ -76,7 +76,7 @@ Finding GyroAxesCheck::judge(const Gyro& gyro) const {
   const std::string what = text(1, "gyro and images turn about axes ", degrees(turns_.cosine()),
                                 " degrees apart, by angles of ratio ", ratio);
   if (ratio > kMost) return {Verdict::kWarn, what, "is angular_velocity in rad/s, and of this camera's IMU?"};
-  // A gyro that turns less than the images is no proof: a mover may fill the view.
+  // If the gyro turns less than the images, a moving object may fill the view.
   if (turns_.cosine() >= kAgree || ratio * kMost <= 1.0) return {Verdict::kOk, what};
   constexpr int kSteps = 15;                    // to either side
   constexpr std::int64_t kStep = 10'000'000;    // ns

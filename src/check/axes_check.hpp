@@ -11,13 +11,13 @@
 
 namespace sdvo {
 
-/// Whether a camera frame at this place on the robot is an optical one, by its axes alone.
+/// Whether the axes of a camera frame on TF are those of an optical frame.
 Finding checkMount(const std::string& base_frame, const std::string& camera_frame,
                    const Eigen::Isometry3d& T_base_camera);
 
-/// Whether the frame of the left images is an optical one (z ahead). A body's frame (x ahead, z up) in its place makes
-/// a robot that drives rise. A camera that really looks up may rise, too: its image's top is then rarely to a side of
-/// the robot, and the robot turns about the optical axis.
+/// Whether the frame of the left images is an optical one (z ahead). With a body frame (x ahead, z up) instead, a
+/// driving robot appears to rise. A camera that really looks up may rise, too. The top of its image is then seldom to a
+/// side of the robot, and the robot turns about the optical axis.
 class OpticalAxisCheck {
  public:
   /// `T_before_now`: of the camera since the pair before.
@@ -28,17 +28,17 @@ class OpticalAxisCheck {
  private:
   double along_axis_ = 0.0, distance_ = 0.0;      ///< m, while the axis points up
   double about_axis_ = 0.0, about_others_ = 0.0;  ///< rad
-  bool is_sideways_ = false;                      ///< as a body's frame the camera looks to the left or right
+  bool is_sideways_ = false;                      ///< the x axis, ahead in a body frame, is to the robot's side
 };
 
-/// Whether a gyro turns about the axes that the images turn about, with TF's word about its mounting. If not, its
-/// stamps may be those of another time.
+/// Whether rotations by the gyro, mounted as on TF, have the same axes as those by the images. If not, the gyro's
+/// stamps may be shifted in time.
 class GyroAxesCheck {
  public:
-  /// A rotation by the gyro between two of its stamps, ns, in the camera's axes; none where it has no measurements.
+  /// Rotation by the gyro between two stamps (ns), in the camera's axes; none without measurements.
   using Gyro = std::function<std::optional<Eigen::Matrix3d>(std::int64_t from, std::int64_t to)>;
 
-  /// Of one pair, in the camera's axes; `from`, `to`: stamps, ns.
+  /// Rotations of one pair between two stamps (ns), in the camera's axes.
   void add(std::int64_t from, std::int64_t to, const Eigen::Matrix3d& by_gyro, const Eigen::Matrix3d& by_images);
 
   Finding judge(const Gyro& gyro) const;

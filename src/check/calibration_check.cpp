@@ -8,10 +8,11 @@
 namespace sdvo {
 namespace {
 
-/// An implausible value of the camera, in words; empty: there is none.
+/// An implausible value of the camera, in words; empty: all are plausible.
 std::string doubtOf(const StereoCamera& camera) {
-  // Of stereo cameras that robots carry: a lens of 6 to 170 deg, a baseline of 3 mm (endoscopes) to 4 m (ships). A
-  // ratio of the size: half of a right cx or cy is off by 0.25. Rows are cut away for the sky, columns are not.
+  // Range of robots' stereo cameras: fields of view of 6 to 170 deg, baselines of 3 mm (endoscopes) to 4 m (ships). The
+  // principal point's distance from the centre as a ratio of the size: 0.25 for half of the right cx or cy, as after
+  // binning. It is larger for cy, because rows of the sky are cut off.
   constexpr double kNarrowest = 0.1, kWidest = 22.9, kShortest = 0.003, kLongest = 4.0, kAside = 0.2, kAbove = 0.4;
   const double width = camera.width / camera.fx;
   const double aside = std::abs(camera.cx / camera.width - 0.5), above = std::abs(camera.cy / camera.height - 0.5);

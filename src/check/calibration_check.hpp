@@ -7,8 +7,8 @@
 
 namespace sdvo {
 
-/// Whether a camera that can be used is one that robots carry. `lens`: name of the lens model. `unrectified`: why its
-/// images are most likely not rectified; empty: nothing speaks for it.
+/// Whether a valid calibration is plausible for a robot's camera. `lens`: name of the lens model. `unrectified`:
+/// evidence that the images are not rectified; empty: none.
 Finding checkCalibration(const StereoCamera& camera, const std::string& lens, const std::string& unrectified);
 
 }  // namespace sdvo

@@ -5,7 +5,7 @@
 
 namespace sdvo {
 
-/// kOpen: the pairs do not show it.
+/// kOpen: the pairs do not suffice for a verdict.
 enum class Verdict { kOk, kWarn, kFail, kOpen };
 
 inline const char* toString(Verdict verdict) {
@@ -13,7 +13,7 @@ inline const char* toString(Verdict verdict) {
   return kNames[static_cast<int>(verdict)];
 }
 
-/// What is found of a camera by some of its pairs. /diagnostics, check_camera, pages and warnings print it.
+/// Result of a check of a camera. /diagnostics, check_camera, pages and warnings print it.
 struct Finding {
   Verdict verdict = Verdict::kOpen;
   std::string what = "";    ///< the figures
@@ -21,7 +21,7 @@ struct Finding {
 
   bool isFault() const { return verdict == Verdict::kWarn || verdict == Verdict::kFail; }
 
-  /// Where a FAIL is none of the reporter's.
+  /// For a reporter that works in spite of the fault.
   Finding asWarning() const { return {isFault() ? Verdict::kWarn : verdict, what, remedy}; }
 
   std::string text() const { return remedy.empty() ? what : what + ": " + remedy; }

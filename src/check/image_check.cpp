@@ -23,7 +23,7 @@ cv::Mat findDots(const cv::Mat& image) {
   return dots / 255;
 }
 
-/// Share of the dots in `part` of `before` that are seen within a pixel of where they were, moved by `offset` px.
+/// Ratio of the dots in `part` of `before` that are seen again within a pixel of their position plus `offset` px.
 double shareFound(const cv::Mat& before, const cv::Mat& around, const cv::Rect& part, cv::Point offset) {
   const cv::Rect moved = (part + offset) & cv::Rect(0, 0, before.cols, before.rows);
   const cv::Mat from = before(moved - offset);
@@ -32,7 +32,7 @@ double shareFound(const cv::Mat& before, const cv::Mat& around, const cv::Rect& 
   return cv::sum(both)[0] / std::max(cv::sum(from)[0], 1.0);
 }
 
-/// Share of the dots in `part` of `before` that stayed beyond chance.
+/// Ratio of the dots in `part` of `before` that stayed, less the ratio expected by chance.
 double shareStayed(const cv::Mat& before, const cv::Mat& around, const cv::Rect& part) {
   constexpr double kDots = 30.0;  // fewer tell nothing
   if (cv::sum(before(part))[0] < kDots) return 0.0;
@@ -67,7 +67,7 @@ std::optional<cv::Point2d> CoarseView::motionSince(const CoarseView& before, con
 
 void RepeatCheck::add(const cv::Mat& left, const cv::Mat& right, std::int64_t stamp) {
   constexpr int kFew = 3;                        // in a row (chosen): a driver may hand out an image twice
-  constexpr std::int64_t kLong = 1'000'000'000;  // ns (chosen): no real camera's images are equal for so long
+  constexpr std::int64_t kLong = 1'000'000'000;  // ns (chosen): no real camera repeats images for so long
   for (std::size_t side = 0; side < 2; ++side) {
     const cv::Mat& image = side == 0 ? left : right;
     const bool repeats =
@@ -182,8 +182,8 @@ Finding ImageCheck::frameRate(const std::vector<double>& rotations) const {
                 "a higher frame rate, or slower turns");
 }
 
-/// Part by part, for near and far things move differently. Dots are looked for only where there is motion, and only
-/// when more than one part moves: people who pass move one.
+/// In parts of the image, because near and far points move differently. Dots are searched only in parts that moved, and
+/// only if several did: people who pass move one.
 void EmitterCheck::add(const cv::Mat& image) {
   constexpr int kOldest = 20;  // pairs after which the light may be another
   constexpr int kColumns = 3, kRows = 2;

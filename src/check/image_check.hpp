@@ -12,7 +12,7 @@
 
 namespace sdvo {
 
-/// An image at about a hundred columns, where the motion of the view is large and small bright dots average out.
+/// An image reduced to about a hundred columns, in which small bright dots average out.
 class CoarseView {
  public:
   CoarseView() = default;
@@ -22,8 +22,8 @@ class CoarseView {
   bool empty() const { return view_.empty(); }
   cv::Size size() const { return view_.size(); }
 
-  /// Where most of `part` (a rectangle of the coarse view) has moved since `before`, as a share of the image's width.
-  /// Nothing when the views have no common motion.
+  /// Dominant shift of `part` (a rectangle of the coarse view) since `before`, as a ratio of the image's width. Nothing
+  /// if the views are unrelated.
   std::optional<cv::Point2d> motionSince(const CoarseView& before, const cv::Rect& part) const;
   std::optional<cv::Point2d> motionSince(const CoarseView& before) const {
     return motionSince(before, cv::Rect(cv::Point(), size()));
@@ -33,14 +33,14 @@ class CoarseView {
   cv::Mat view_;  ///< CV_64F, grey levels
 };
 
-/// Whether images repeat bit by bit, which no camera's noise does: both sides, or one alone while the other one
+/// Whether images repeat bit by bit, which noise rules out for a real camera: on both sides, or on one while the other
 /// changes.
 class RepeatCheck {
  public:
   /// The next pair, CV_8UC1; `stamp` in ns.
   void add(const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
 
-  /// Of the last pairs, in words; empty: they do not repeat.
+  /// Fault of the last pairs in words; empty: they do not repeat.
   const std::string& problem() const { return problem_; }
   /// Of all pairs.
   Finding judge() const;
@@ -77,20 +77,18 @@ class ExposureTurns {
   int turns_ = 0;  ///< brighter and darker ones alternately, in a row
 };
 
-/// By mean grey levels of the darker and the brighter side; outside of `min_intensity` to `max_intensity` they are too
-/// dark and too bright.
+/// `dark`, `bright`: mean grey levels of the darker and the brighter side.
 Finding checkExposure(double dark, double bright, bool takes_turns, double min_intensity, double max_intensity);
 
-/// Whether images are good ones to find features in: exposure, texture, motion blur, and how far the view moves from
-/// pair to pair.
+/// Quality of the images for features: exposure, texture, motion blur, and motion of the view from pair to pair.
 class ImageCheck {
  public:
   /// A pair (CV_8UC1) with what extraction reports of it.
   void add(const cv::Mat& left, const cv::Mat& right, const ExtractionReport& report);
 
-  /// As checkExposure() has it, and by the share of white pixels.
+  /// checkExposure(), and the ratio of white pixels.
   Finding exposure(double min_intensity, double max_intensity) const;
-  /// `min_corners`: fewer are too few. `min_share`: of these, those found in the right image.
+  /// `min_share`: ratio of the corners that must be found in the right image.
   Finding texture(int min_corners, double min_share) const;
   Finding blur() const;
   /// `rotations`: deg, of each pair whose motion is known.

@@ -13,13 +13,12 @@ namespace {
 
 using Lens = Eigen::Vector4d;  ///< focal length less one, principal point, offset of the disparities, in focal lengths
 
-/// One pair's normal equations of the lens, its motion eliminated, and how the motion follows from a change of the
-/// lens.
+/// Normal equations of the lens from one pair after elimination of its motion, and the back substitution of the motion.
 struct PairEquations {
   Eigen::Matrix4d information;
   Lens gradient;
   Vector6d motion;                         ///< at an unchanged lens
-  Eigen::Matrix<double, 6, 4> per_change;  ///< motion less this times the lens' change
+  Eigen::Matrix<double, 6, 4> per_change;  ///< the step is motion - per_change * (change of the lens)
 };
 
 template <class Rays>
@@ -69,7 +68,7 @@ PairEquations linearise(const Rays& rays, const Lens& lens, const Eigen::Isometr
 
 }  // namespace
 
-/// Far corners, too, of which a block search is not sure: they show the turns.
+/// Follows far corners, too, which the rows' block search leaves out: they show rotations best.
 void LensCheck::add(const StereoCamera& camera, const CornerPair& pair) {
   constexpr float kRow = 1.5F, kFar = -1.0F;  // px (chosen)
   constexpr int kLevels = 4;
@@ -145,7 +144,7 @@ std::optional<LensCheck::Estimate> LensCheck::estimate() const {
 }
 
 Finding LensCheck::judge() const {
-  // RMS over right rigs of KITTI, Karlsruhe, EuRoC and three small ones: what rectification leaves bends the images.
+  // RMS error over good calibrations of KITTI, Karlsruhe, EuRoC and three small rigs: residual distortion.
   const Eigen::Vector3d rigs(0.015, 0.03, 0.03);
   constexpr double kResolved = 0.06, kResolvedCentre = 0.1, kProved = 3.0;  // chosen; the last one: standard deviations
   const auto estimate = this->estimate();

@@ -10,9 +10,8 @@
 
 namespace sdvo {
 
-/// Focal length and principal point from the images alone. A camera that turns by a known angle moves its middle and
-/// its edges by different amounts, whose ratio depends on f and c. All motions, f, c and an offset of the disparities
-/// are estimated together.
+/// Focal length and principal point from the images. A rotation shifts the image more at its edges than in the middle,
+/// by a ratio that depends on f and c. All motions, f, c and an offset of the disparities are estimated together.
 class LensCheck {
  public:
   /// A point of the left image, with where it was in the left image before (all px).
@@ -20,7 +19,7 @@ class LensCheck {
     double u, v, disparity, u_before, v_before;
   };
   void add(const StereoCamera& camera, const CornerPair& pair);
-  /// Its tracks, found elsewhere.
+  /// With given tracks.
   void add(const StereoCamera& camera, const std::vector<Track>& tracks);
 
   /// Focal length as a ratio of camera_info's, less one; principal point less camera_info's, in focal lengths.

@@ -10,7 +10,7 @@
 
 namespace sdvo {
 
-/// How the odometry fared: states, inliers, rotation from pair to pair.
+/// Statistics of the odometry: states, inliers, rotation from pair to pair.
 class OdometryCheck {
  public:
   void add(const StereoFeatures& features, const OdometryResult& result);
@@ -26,7 +26,7 @@ class OdometryCheck {
   double distance_ = 0.0;  ///< m
   RowReadout readout_;
   std::vector<double> inliers_, rotations_;
-  std::map<std::string, int> reasons_;  ///< of what is not tracked
+  std::map<std::string, int> reasons_;  ///< of pairs that are not TRACKING
 };
 
 }  // namespace sdvo

@@ -10,11 +10,11 @@
 
 namespace sdvo {
 
-/// Rows of both images over a whole recording: how far the rectification leaves them apart, and how much later the
-/// right image was taken.
+/// Row differences between both images over a recording: errors of the rectification, and delay of the right image.
 class RowCheck {
  public:
-  /// `max_dv`, px: rows of features may differ by that. `max_disparity`, `reach`, px: how far corners are looked for.
+  /// `max_dv`: largest row difference of features, px. `max_disparity`, `reach`: search range along and across rows,
+  /// px.
   RowCheck(double max_dv, double max_disparity, double reach)
       : max_dv_(max_dv), max_disparity_(max_disparity), reach_(reach) {}
 
@@ -23,8 +23,8 @@ class RowCheck {
   Finding rectification() const;
   Finding sameMoment() const;
 
-  /// Median of v_right - v_left (px) in each cell of the image, delay removed; a cell a part of RowDelay, CV_64F, NaN
-  /// where fewer than ten corners were found.
+  /// Median of v_right - v_left (px) in each part of the image (RowDelay's), without the delay's effect. CV_64F; NaN
+  /// with fewer than ten corners.
   cv::Mat map() const;
 
  private:
@@ -40,7 +40,7 @@ class RowCheck {
   RowDelay delay_{1.0, 10.0};  ///< 10 ms are a tenth of a pixel then
 };
 
-/// Whether right images are of the same moment as left ones.
+/// Whether left and right images are taken at one moment.
 Finding checkMoment(const RowDelay::Estimate& right);
 
 }  // namespace sdvo

@@ -9,13 +9,13 @@
 
 namespace sdvo {
 
-/// The time that a rolling shutter takes from the first row to the last. While the camera turns, each row sees another
-/// pose: a point v px below the middle is off by its velocity in the image * readout * v / height. A part of that looks
-/// like a motion, and a steady one like points that lie elsewhere: what changes is left, and the estimate is a lower
-/// bound.
+/// Readout time of a rolling shutter, from the first row to the last. While the camera turns, each row has another
+/// pose: a point v px below the middle is shifted by its image velocity * readout * v / height. Part of the shift is
+/// indistinguishable from a motion, and at constant velocity from other positions of the points. Only changes of the
+/// velocity are used, and the estimate is a lower bound.
 class RowReadout {
  public:
-  /// s. Global shutters give up to 2 ms (MH_01, proved by its deviation), and one of 3 ms makes 5 sigma of position.
+  /// s. Estimates for global shutters are up to 2 ms (MH_01); a readout of 3 ms causes position errors of 5 sigma.
   static constexpr double kWarn = 0.003;
 
   struct Estimate {
@@ -24,15 +24,14 @@ class RowReadout {
     bool isRolling() const { return value > kWarn && value * value > RowDelay::kSquare * sigma * sigma; }
   };
 
-  /// Takes in a pair with its motion, if that was measured. Its rows are compared with where the motion has the
-  /// matches.
+  /// Adds a pair with a measured motion. Uses the vertical and horizontal residuals of its matches.
   void add(const StereoFeatures& features, const OdometryResult& result);
 
   std::optional<Estimate> estimate() const;
 
  private:
   double information_ = 0.0, product_ = 0.0;  ///< px^2/s^2, px^2/s
-  /// Sums over pairs, whose errors may be alike, of squares of information and product.
+  /// Sums over pairs of squares and products of information and product, for the empirical deviation.
   double information_square_ = 0.0, mixed_ = 0.0, product_square_ = 0.0;
   double pairs_ = 0.0;
   Vector6d usual_velocity_ = Vector6d::Zero();

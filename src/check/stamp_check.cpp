@@ -9,7 +9,7 @@
 namespace sdvo {
 namespace {
 
-/// Chosen: what a driver loses now and then is no fault.
+/// Ratio of pairs that may be lost (chosen): drivers lose one now and then.
 constexpr double kFew = 0.02;
 
 /// Between successive pairs, s.

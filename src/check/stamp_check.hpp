@@ -16,14 +16,14 @@ class StampCheck {
 
   explicit StampCheck(std::array<std::string, kInputs> topics) : topics_(std::move(topics)) {}
 
-  /// `stamp` in ns, zero when the message has none; `arrival` in s of the clock that stamps should be of.
+  /// `stamp` in ns, zero if the message has none; `arrival` in s of the system's clock.
   void note(std::size_t input, std::int64_t stamp, double arrival);
   /// Four messages of one stamp came together.
   void notePair(std::int64_t stamp);
 
-  /// Whether all four come, and often enough: `min_rate`, `max_rate` in Hz. `explanation` says why no pair came.
+  /// Whether all four come, at a rate in [`min_rate`, `max_rate`] (Hz). `explanation`: reason if there was no pair.
   Finding topics(double min_rate, double max_rate, const std::string& explanation) const;
-  /// Whether stamps are those of a camera: of the system's clock, rising, without gaps, each with its partner.
+  /// Whether stamps are of the system's clock, increase, have no gaps, and have partners.
   Finding stamps() const;
 
   double rate() const;  ///< of the pairs by their stamps, Hz; zero when it is not known
@@ -35,7 +35,7 @@ class StampCheck {
   std::vector<std::int64_t> pairs_;
 };
 
-/// Of poses that come so late, s; negative: before their time. `most`: of a machine that is fast enough.
+/// `latency` of poses, s; negative for stamps in the future. `most`: the largest one that is no fault.
 Finding checkLatency(double latency, double most);
 
 }  // namespace sdvo

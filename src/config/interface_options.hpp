@@ -6,7 +6,7 @@
 
 namespace sdvo {
 
-/// Input that diagnostics take for healthy: 5 to 60 Hz, with a tenth to either side, nearly all of it used.
+/// Healthy input for diagnostics: 5 to 60 Hz with a tolerance of a tenth, and nearly all of it used.
 struct RateOptions {
   double min_rate = 4.5;
   double max_rate = 66.0;
@@ -41,7 +41,7 @@ struct ImageThresholds {
   }
 };
 
-/// What the image side's nodelet needs beside the extractor's options.
+/// Options of the image side's nodelet beside those of FeatureExtractor.
 struct StereoInputOptions {
   double sync_tolerance = 0.001;
   bool approximate_sync = false;
@@ -79,7 +79,7 @@ struct StereoInputOptions {
   }
 };
 
-/// What the odometry's nodelet needs beside the odometry's options.
+/// Options of the odometry's nodelet beside those of VisualOdometry.
 struct OdometryOutputOptions {
   std::string odom_frame_id = "odom";
   std::string base_frame_id = "base_link";
@@ -135,7 +135,7 @@ struct OdometryOutputOptions {
   }
 };
 
-/// What the place recognition's nodelet needs beside the recognition's options.
+/// Options of the place recognition's nodelet beside those of PlaceRecognition.
 struct PlaceOutputOptions {
   std::string map_frame_id = "map";
   bool publish_tf = true;

@@ -11,7 +11,7 @@
 namespace sdvo {
 namespace {
 
-/// The file serves the launch files, too, and may hold what is of no concern here.
+/// Whether a name in the YAML file is an option of the nodelets alone, which the launch files use.
 bool belongsToNodelet(const std::string& path) {
   constexpr std::string_view kTransport = "/image_transport";  // of image_transport itself
   if (path.size() > kTransport.size() && path.compare(path.size() - kTransport.size(), path.npos, kTransport) == 0)

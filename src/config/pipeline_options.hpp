@@ -23,7 +23,7 @@ struct PipelineOptions {
   }
 };
 
-/// What the nodelets read beside the core's options; a YAML file that holds them is no error for the tools.
+/// Options of the nodelets beside the core's. Tools accept and ignore them in a YAML file.
 struct InterfaceOptions {
   StereoInputOptions stereo_features;
   OdometryOutputOptions visual_odometry;

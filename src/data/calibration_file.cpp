@@ -17,7 +17,7 @@ T read(const YAML::Node& node, const std::string& name) {
   return node[name].as<T>();
 }
 
-/// As many as `Values` has.
+/// A list with the length of `Values`.
 template <class Values>
 Values readList(const YAML::Node& node, const std::string& name) {
   const auto list = read<std::vector<double>>(node, name);
@@ -34,7 +34,7 @@ Eigen::Isometry3d poseOf(const std::array<double, 16>& rows) {
   return poseFromRows(upper);
 }
 
-/// As Kalibr and EuRoC have it, but for the name of the coefficients.
+/// A camera of Kalibr or EuRoC, whose formats differ in the name of the coefficients.
 RawCamera readCamera(const YAML::Node& node, const std::string& coefficients) {
   if (const auto model = read<std::string>(node, "camera_model"); model != "pinhole")
     throw std::invalid_argument("camera_model '" + model + "' is not supported, only 'pinhole' is");

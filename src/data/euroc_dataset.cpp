@@ -28,7 +28,7 @@ std::map<std::int64_t, std::string> listImages(const fs::path& directory) {
   return files;
 }
 
-/// Where the data set has its calibration: EuRoC beside the images, TUM-VI beside mav0.
+/// Calibration files of the data set: EuRoC has them beside the images, TUM-VI beside mav0.
 std::vector<std::string> calibrationFiles(const fs::path& mav0) {
   const fs::path left = mav0 / "cam0" / "sensor.yaml", right = mav0 / "cam1" / "sensor.yaml";
   const fs::path chain = fs::absolute(mav0).lexically_normal().parent_path() / "dso" / "camchain.yaml";

@@ -13,8 +13,8 @@
 namespace sdvo {
 namespace {
 
-/// Beyond this a rectified image is mostly border: at its edge (55 deg) a pixel sees a third of the angle that one in
-/// the middle sees, cos² of it.
+/// Largest default field of view. At its edge (55 deg) a pixel covers cos²(55 deg), a third, of the angle of one in the
+/// middle: a wider image would be mostly stretched border.
 constexpr double kWidest = 110.0;  // deg
 
 double focalLength(int width, double fov) {
@@ -33,7 +33,7 @@ void RawCamera::setLens(const std::string& model, std::vector<double> coefficien
     throw std::invalid_argument("lens model '" + model +
                                 "' is not supported: radial-tangential (radtan, plumb_bob), rational_polynomial and "
                                 "equidistant (fisheye, kannala_brandt4) are");
-  // Some drivers (T265) fill up with zeros.
+  // Some drivers (T265) append zeros.
   while (is_equidistant && coefficients.size() > 4 && coefficients.back() == 0.0) coefficients.pop_back();
   if (coefficients.empty()) coefficients.assign(4, 0.0);
   const std::set<std::size_t> sizes =

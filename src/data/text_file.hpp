@@ -41,15 +41,15 @@ inline std::vector<std::string> splitWords(const std::string& line) {
   return words;
 }
 
-/// What begins files of one kind: the first line up to its first number, or, where that comes first, how many words it
-/// has.
+/// Files of one kind have the same first line up to its first number. If a number comes first, they have the same count
+/// of words in that line.
 inline std::string kindOfText(const std::string& text) {
   const std::string line = text.substr(0, text.find('\n'));
   const std::string kind = line.substr(0, line.find_first_of("+-.0123456789"));
   return kind.empty() ? std::to_string(splitWords(line).size()) : kind;
 }
 
-/// Writes a text file whole or not at all, in the place of none or of one of its kind; to a device as it comes. Throws
+/// Writes a text file whole or not at all. It replaces only files of its kind. Devices are written directly. Throws
 /// std::runtime_error that names the file.
 inline void writeTextFile(const std::string& path, const std::string& text) {
   namespace fs = std::filesystem;
@@ -66,8 +66,8 @@ inline void writeTextFile(const std::string& path, const std::string& text) {
   writeWhole(fs::absolute(path).string(), text);
 }
 
-/// The finite number that a word holds, whatever the process' locale says of decimal points; throws
-/// std::invalid_argument that quotes the word otherwise. Number is double or long double.
+/// Parses a finite number with a decimal point, in any locale. Throws std::invalid_argument that quotes the word if it
+/// is none. Number is double or long double.
 template <class Number = double>
 Number parseNumber(const std::string& word) {
   std::istringstream stream(word);
@@ -79,9 +79,9 @@ Number parseNumber(const std::string& word) {
   return value;
 }
 
-/// Calls `read(line)` for each line that is neither blank nor a comment (#), without its end. A std::invalid_argument
-/// of `read` becomes a std::runtime_error that names file and line, as does a blank line between others where lines
-/// count.
+/// Calls `read(line)` for each line that is neither blank nor a comment (#). A std::invalid_argument of `read` becomes
+/// a std::runtime_error that names file and line. If `lines_count` (line i is frame i), so does a blank line between
+/// others.
 template <class Read>
 void readLines(const std::string& path, bool lines_count, const Read& read) {
   std::ifstream file = openTextFile(path);

@@ -21,10 +21,10 @@ namespace {
 constexpr double kDegreesPerRadian = 180.0 / M_PI;
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 
-/// Frames that close a sub-path to within rounding count as having reached its length.
+/// Rounding that a sub-path may lack of its length.
 constexpr double kLengthTolerance = 1e-9;  // m
 
-/// Steps shorter than this say nothing about scale: the robot stands.
+/// Shorter steps are left out of the scale: the robot stands.
 constexpr double kSmallestStep = 1e-3;  // m
 
 /// Tolerance on rows of rotations and quaternions in files, which may have been written with four decimals.
@@ -83,14 +83,14 @@ std::ostringstream poseText() {
   return text;
 }
 
-/// Unit quaternion and place.
+/// Throws std::invalid_argument if the quaternion has not unit length.
 Eigen::Isometry3d poseFromNumbers(const Eigen::Vector3d& place, const Eigen::Quaterniond& rotation) {
   if (std::abs(rotation.norm() - 1.0) > kRotationTolerance)
     throw std::invalid_argument("the quaternion is not of unit length");
   return Eigen::Translation3d(place) * rotation.normalized();
 }
 
-/// A format of poses in lines of numbers. `read`: numbers behind the stamp, where there is one.
+/// A format of poses in lines of numbers. `read` gets the numbers after the stamp, if there is one.
 struct PoseFormat {
   const char* name;
   std::size_t numbers;  ///< of a line, at least
@@ -114,7 +114,7 @@ const PoseFormat kEuroc = {"EuRoC's (stamp in ns, x, y, z, qw, qx, qy, qz, …)"
                              return poseFromNumbers({n[0], n[1], n[2]}, {n[3], n[4], n[5], n[6]});
                            }};
 
-/// By the first line of poses.
+/// The format that the first line of poses shows.
 const PoseFormat& formatOf(const std::string& line) {
   const std::size_t numbers = splitWords(line).size();
   if (line.find(',') < line.find_first_of(" \t") && std::count(line.begin(), line.end(), ',') >= 7) return kEuroc;
@@ -124,7 +124,7 @@ const PoseFormat& formatOf(const std::string& line) {
                               " or " + kEuroc.name);
 }
 
-/// `wanted`: null for any that readPoses() takes.
+/// `wanted`: the only format accepted; null: any.
 StampedTrajectory readPosesAs(const std::string& path, const PoseFormat* wanted) {
   StampedTrajectory trajectory;
   const PoseFormat* format = nullptr;

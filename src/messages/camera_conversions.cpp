@@ -22,7 +22,7 @@ struct View {
   int width, height;
 };
 
-/// Pixels of an image that was `all` wide or high and then cut (a part of 0: all that is left) and binned.
+/// Size (px) of an image of size `all` after the region of interest (`part` of 0: all from `offset` on) and binning.
 int sizeOf(const std::string& name, std::uint32_t all, std::uint32_t offset, std::uint32_t part, double binning) {
   const double pixels = part == 0 ? static_cast<double>(all) - offset : part;
   if (pixels < binning || pixels > kLargestSide)
@@ -35,7 +35,7 @@ View viewOf(const CameraInfo& info, const std::string& side) {
   const std::string name = side + " camera_info";
   for (std::size_t i = 0; i < info.P.size(); ++i)
     if (!std::isfinite(info.P[i])) throw std::invalid_argument(name + ": P[" + std::to_string(i) + "] is not a number");
-  // K is of the raw image, which drivers that rectify need not have.
+  // K is not needed: it is of the raw image, and drivers that rectify may leave it out.
   if (info.P[0] == 0.0 || info.P[5] == 0.0)
     throw std::invalid_argument(name + ": P is zero, the camera is not calibrated (REP-104)");
   if (info.P[0] < 0.0 || info.P[5] < 0.0) throw std::invalid_argument(name + ": a focal length in P is negative");
@@ -57,7 +57,7 @@ std::string describeP(const CameraInfo& info) {
   return text.str();
 }
 
-/// What to do about a baseline that is not positive.
+/// Remedy for a baseline that is not positive.
 std::string remedy(const View& left, const View& right) {
   if (left.tx == right.tx)
     return "no baseline in P: P[3] of the right camera_info must be -fx * baseline (old camera drivers leave it out)";
@@ -67,7 +67,7 @@ std::string remedy(const View& left, const View& right) {
   return "P[3] of the right camera_info has the wrong sign, it must be -fx * baseline";
 }
 
-/// Of the rectification, rad; 0 where R is left out.
+/// Angle of the rectification's rotation, rad; 0 without R.
 double rotation(const CameraInfo& info) {
   using Rows = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
   const Eigen::Map<const Rows> R(info.R.data());

@@ -21,13 +21,13 @@ struct NamedFrame {
   std::string parameter, frame;
 };
 
-/// Throws std::invalid_argument where a frame has no name: TF takes none such.
+/// Throws std::invalid_argument if a frame has no name, which TF requires.
 inline void requireName(const NamedFrame& named) {
   if (cleanFrameId(named.frame).empty())
     throw std::invalid_argument(named.parameter + " is empty: give the frame a name");
 }
 
-/// … or two have the same one.
+/// Throws std::invalid_argument if a frame has no name or both have the same one.
 inline void requireTwoFrames(const NamedFrame& parent, const NamedFrame& child) {
   requireName(parent);
   requireName(child);

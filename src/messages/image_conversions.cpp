@@ -19,8 +19,8 @@ namespace {
 
 namespace encodings = sensor_msgs::image_encodings;
 
-/// The pixels of an image, of some bytes each; refers to the message. Not by cv_bridge, which brings OpenCV's readers
-/// of image files and with them 40 MB of libraries.
+/// The pixels of an image, of `bytes` each; shares the message's memory. Without cv_bridge, which links OpenCV's
+/// readers of image files and 40 MB of libraries.
 cv::Mat pixelsOf(const sensor_msgs::Image& message, int bytes) {
   const std::size_t rows = message.height, columns = message.width, step = message.step;
   if (rows == 0 || columns == 0 || step < static_cast<std::size_t>(bytes) * columns ||
@@ -32,7 +32,7 @@ cv::Mat pixelsOf(const sensor_msgs::Image& message, int bytes) {
                  const_cast<std::uint8_t*>(message.data.data()), step);
 }
 
-/// The pixels of a mono16 image in this machine's order of bytes; refers to the message where that is its order.
+/// The pixels of a mono16 image in this machine's byte order; shares the message's memory if that is its order.
 cv::Mat pixelsOf16Bits(const sensor_msgs::Image& message) {
   const cv::Mat bytes = pixelsOf(message, 2);
   const std::uint16_t probe = 1;
@@ -54,7 +54,7 @@ void sample(const cv::Mat& pixels, std::vector<double>& counts) {
       counts.push_back(pixels.at<std::uint16_t>(row, column));
 }
 
-/// Whether a count is the largest of a sensor of 8 and more bits, whichever bits of the pixel it fills: 0x0fff, 0xfff0.
+/// Whether a count is the largest of a sensor of 8 or more bits, in low or high bits of the pixel: 0x0fff, 0xfff0.
 bool isFullScale(double count) {
   const auto bits = static_cast<std::uint32_t>(count), lowest = bits & (~bits + 1u);
   return bits > 0 && bits / lowest >= 255 && (bits & (bits + lowest)) == 0;
@@ -63,11 +63,11 @@ bool isFullScale(double count) {
 }  // namespace
 
 bool GreyRangeTracker::add(const sensor_msgs::Image& left, const sensor_msgs::Image& right) {
-  constexpr std::size_t kPairs = 5;    // whose median counts: two in a row may be damaged
+  constexpr std::size_t kPairs = 5;    // of which the median is taken: two in a row may be damaged
   constexpr double kShare = 0.02;      // of the pixels, beyond the range at either end (chosen)
   constexpr double kMargin = 0.25;     // of the spread, on either side of it (chosen)
   constexpr double kLeastSpread = 64;  // counts: less is noise more than a scene (chosen)
-  constexpr double kMostUnused = 3.0;  // times the spread, before a range is too wide; it begins at 1.5
+  constexpr double kMostUnused = 3.0;  // largest ratio of the range to the spread; a new range has 1.5
   std::vector<double> counts;
   for (const sensor_msgs::Image* image : {&left, &right})  // the other one may be of 8 bits
     if (image->encoding == encodings::MONO16) sample(pixelsOf16Bits(*image), counts);
@@ -83,7 +83,7 @@ bool GreyRangeTracker::add(const sensor_msgs::Image& left, const sensor_msgs::Im
   if (last_.size() > 1 && dark >= range_.black && bright <= range_.white &&
       range_.white - range_.black <= kMostUnused * spread)
     return false;
-  // What is saturated is white, so that over-exposure is seen as such.
+  // Saturated pixels become white, so that over-exposure is visible.
   const double white =
       bright >= median(2) && isFullScale(bright) ? bright : std::min(dark + (1.0 + kMargin) * spread, 65535.0);
   range_ = {std::max(0.0, std::min(dark - kMargin * spread, white - kLeastSpread)), white};

@@ -15,12 +15,12 @@
 namespace sdvo::ros_conversions {
 namespace {
 
-/// Variance of what is not known at all, and the floor that keeps every covariance positive.
+/// Variance of an unknown motion (m²/s², rad²/s²), and the floor that keeps covariances positive definite.
 constexpr double kUnknownVariance = 1e6;
 constexpr double kVarianceFloor = 1e-9;
 
-/// Over a gap the mean velocity, which is all that is measured, says little of that at its end: meanwhile a vehicle may
-/// accelerate by 5 m/s^2 and 2 rad/s^2.
+/// Variance of the velocity at the end of a gap about the measured mean over it, for a vehicle that accelerates by up
+/// to 5 m/s^2 and 2 rad/s^2.
 Matrix6d unsteadiness(double dt) {
   constexpr double kSteady = 0.2;  // s
   const double gap = std::max(0.0, dt - kSteady);
@@ -38,7 +38,7 @@ nav_msgs::Odometry toOdometry(const OdometryResult& result, const Eigen::Isometr
   odometry.header.frame_id = frames.odom;
   odometry.child_frame_id = frames.base;
 
-  // The base starts where the core's origin, the camera's first pose, puts it.
+  // The core's origin is the camera's first pose, T_odom_start the base's.
   const Eigen::Isometry3d T_odom_base =
       orthonormalised(T_odom_start * T_base_camera * result.T_origin_camera * T_base_camera.inverse());
   // Perturbations of the camera, in its own axes, become those of the base.
@@ -73,7 +73,7 @@ Matrix6d toMotionCovariance(const nav_msgs::Odometry& odometry, double dt, const
   Matrix6d twist = Eigen::Map<const Matrix6d>(odometry.twist.covariance.data()).transpose();  // it has rows
   if (!twist.allFinite()) throw std::invalid_argument("the twist's covariance is not finite");
   const Matrix6d steady = twist - unsteadiness(dt);
-  // Of a fused odometry it never was a part.
+  // A fused odometry's covariance may lack it: then nothing is subtracted.
   if (steady.llt().info() == Eigen::Success) twist = steady;
   const Matrix6d to_camera = adjoint(T_base_camera.inverse());
   return to_camera * twist * to_camera.transpose() * dt * dt;

@@ -24,24 +24,23 @@ nav_msgs::Odometry toOdometry(const OdometryResult& result, const Eigen::Isometr
                               const OdometryFrames& frames,
                               const Eigen::Isometry3d& T_odom_start = Eigen::Isometry3d::Identity());
 
-/// What says that there is no odometry, as rtabmap does: pose and twist all zeros, the quaternion too, and variances of
-/// 9999.
+/// Odometry of a lost robot, as rtabmap sends it: pose (with the quaternion) and twist are zeros, variances are 9999.
 nav_msgs::Odometry toNullOdometry(const ros::Time& stamp, const OdometryFrames& frames);
 
-/// What toOdometry() was given as the covariance of the camera's motion since the pair before, `dt` s ago: of its right
-/// perturbation, m and rad. Throws std::invalid_argument where a number of the twist's covariance is not finite.
+/// Inverse of toOdometry(): covariance of the camera's motion since the previous pair, `dt` s ago, as a right
+/// perturbation (m, rad). Throws std::invalid_argument if the twist's covariance is not finite.
 Matrix6d toMotionCovariance(const nav_msgs::Odometry& odometry, double dt, const Eigen::Isometry3d& T_base_camera);
 
 /// The transform of an odometry message: odom -> base, or base -> odom when inverted.
 geometry_msgs::TransformStamped toTransform(const nav_msgs::Odometry& odometry, bool inverted);
 
-/// What the result and the image side tell; header, latency and input counters are the caller's to fill.
+/// From the result and the image side's message; the caller fills in header, latency and counters of unused input.
 stereo_descriptor_vo::VoInfo toInfo(const OdometryResult& result, const stereo_descriptor_vo::StereoFeatures& features);
 
-/// Where the matched features of a pair were before; header is the caller's to fill.
+/// Current and previous positions of the matched features; the caller fills in the header.
 stereo_descriptor_vo::FeatureFlow toFlow(const OdometryResult& result, const StereoFeatures& features);
 
-/// Points given in another frame, such as the local map's; header is the caller's to fill.
+/// A cloud of points that are given in another frame, such as the local map's; the caller fills in the header.
 sensor_msgs::PointCloud2 toPointCloud(const std::vector<Eigen::Vector3d>& points,
                                       const Eigen::Isometry3d& T_cloud_points);
 

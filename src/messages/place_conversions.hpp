@@ -22,7 +22,7 @@
 /// Where messages and the types of places meet.
 namespace sdvo::ros_conversions {
 
-/// What messages tell of a stream of features that the features themselves do not hold.
+/// Fields of feature messages that StereoFeatures does not have.
 struct FeatureStream {
   std::string frame_id;  ///< of the camera
   DepthScaleOptions size_curve;
@@ -33,15 +33,15 @@ stereo_descriptor_vo::Place toMessage(const Place& place, const std::string& rob
 /// Throws std::invalid_argument when the message does not hold together; the result owns its memory.
 Place fromMessage(const stereo_descriptor_vo::Place& message);
 
-/// What the report tells; header and counts are the caller's to fill.
+/// From the report; the caller fills in header and counts.
 stereo_descriptor_vo::PlaceInfo toInfo(const PlaceReport& report);
 
 stereo_descriptor_vo::PlaceSignature toMessage(const PlaceSignature& words, const Place& place,
                                                const std::string& robot, const std::string& frame_id);
-/// Throws std::invalid_argument when the message's words are not such as an index makes of rows like `kind`.
+/// Throws std::invalid_argument if the words were not made by PlaceIndex from descriptors of this kind.
 PlaceSignature fromMessage(const stereo_descriptor_vo::PlaceSignature& message, const DescriptorKind& kind);
 
-/// Names of robots are the caller's to fill.
+/// The caller fills in the robots' names.
 stereo_descriptor_vo::PlaceMatch toMessage(const PlaceMatch& match, const Place& mine, const Place& other,
                                            const std::string& frame_id);
 

@@ -13,7 +13,7 @@
 namespace sdvo::ros_conversions {
 namespace {
 
-/// The rotation of the six axes of a perturbation.
+/// Rotates both halves of a perturbation.
 Matrix6d rotation(const Eigen::Isometry3d& T) {
   Matrix6d both = Matrix6d::Zero();
   both.topLeftCorner<3, 3>() = both.bottomRightCorner<3, 3>() = T.linear();
@@ -22,7 +22,8 @@ Matrix6d rotation(const Eigen::Isometry3d& T) {
 
 constexpr const char* kAxes[] = {"x", "y", "z", "roll", "pitch", "yaw"};
 
-/// The covariance that a sender meant. Throws std::invalid_argument where there is none.
+/// A symmetric positive covariance from a sender's, which may have one empty triangle. Throws std::invalid_argument if
+/// it is invalid.
 Matrix6d meantCovariance(const Matrix6d& sent) {
   constexpr double kNone = 1e-6;      // m^2, rad^2, for a variance of zero
   constexpr double kRounding = 1e-3;  // of a correlation, between floats
@@ -58,7 +59,7 @@ Matrix6d meantCovariance(const Matrix6d& sent) {
   return meant;
 }
 
-/// Throws std::invalid_argument for what is nowhere.
+/// Throws std::invalid_argument for a position that is not finite or too far away.
 Eigen::Translation3d checked(double x, double y, double z) {
   constexpr double kFarthest = 1e8;  // m; grids of the earth, 4e7 m around it, have no larger coordinates
   for (const double coordinate : {x, y, z}) {

@@ -17,12 +17,11 @@ Eigen::Isometry3d toPose(const std::string& text);
 /// Throws std::invalid_argument when the position is not finite or the quaternion has not unit length.
 Eigen::Isometry3d toPose(const geometry_msgs::Pose& message);
 
-/// ROS' convention: covariance of the position, and of the rotation about the fixed axes, of the parent's frame. The
-/// core's is that of a right perturbation.
+/// Converts a covariance of a right perturbation to ROS' convention: position and rotation in the fixed axes of the
+/// parent frame.
 geometry_msgs::PoseWithCovariance toMessage(const Eigen::Isometry3d& pose, const Matrix6d& covariance);
-/// Covariances as others send them: one triangle may be left empty, and a variance of zero, as rviz and AMCL have it
-/// for z, roll and pitch, is 1e-6 (1 mm, 1 mrad). Throws std::invalid_argument, which says what to change, for the
-/// rest.
+/// Accepts covariances of other senders: with one empty triangle, and with variances of zero (z, roll and pitch of rviz
+/// and AMCL), which become 1e-6 (1 mm, 1 mrad). Throws std::invalid_argument with a remedy for invalid ones.
 void fromMessage(const geometry_msgs::PoseWithCovariance& message, Eigen::Isometry3d& pose, Matrix6d& covariance);
 
 }  // namespace sdvo::ros_conversions

@@ -5,6 +5,7 @@
 #include <limits>
 #include <vector>
 
+#include "../common/statistics.hpp"
 #include "../common/text.hpp"
 #include "../messages/stamps.hpp"
 
@@ -39,15 +40,12 @@ void ArrivalLog::note(Input input, const ros::Time& stamp, double now) {
   arrivals.push_back({nanoseconds(stamp), now});
   has_ended_ = false;
   if (stamp.isZero()) arrivals.back().fate = Fate::kLost;
-  complete_ = first_stamp_ == 0 ? now : complete_;
-  if (first_stamp_ == 0)
-    for (const Topic& topic : topics_) {
-      if (topic.arrivals.empty()) {
-        first_stamp_ = 0;
-        break;
-      }
-      first_stamp_ = std::max(first_stamp_, topic.arrivals.front().stamp);
-    }
+  if (first_stamp_ == 0) {
+    complete_ = now;
+    const auto is_silent = [](const Topic& topic) { return topic.arrivals.empty(); };
+    if (std::none_of(topics_.begin(), topics_.end(), is_silent))
+      for (const Topic& topic : topics_) first_stamp_ = std::max(first_stamp_, topic.arrivals.front().stamp);
+  }
   while (arrivals.size() > kMost || arrivals.front().now < now - kMemory) {
     if (arrivals.front().fate == Fate::kWaits) giveUp(input, arrivals.front());
     arrivals.pop_front();
@@ -78,9 +76,7 @@ double ArrivalLog::period() const {
   std::vector<double> steps;
   for (std::size_t k = arrivals.size(); k > 1 && steps.size() < kEnough; --k)
     steps.push_back(std::abs(secondsBetween(arrivals[k - 2].stamp, arrivals[k - 1].stamp)));
-  if (steps.empty()) return kUsual;
-  std::nth_element(steps.begin(), steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2), steps.end());
-  return steps[steps.size() / 2];
+  return steps.empty() ? kUsual : median(steps);
 }
 
 /// Whether the image came before all topics were connected, when partners are missing for no fault.

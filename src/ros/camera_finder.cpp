@@ -20,11 +20,11 @@ std::string replaced(std::string text, const std::string& from, const std::strin
   return text;
 }
 
+}  // namespace
+
 bool isAmong(const ros::master::V_TopicInfo& topics, const std::string& name) {
   return std::any_of(topics.begin(), topics.end(), [&](const auto& topic) { return topic.name == name; });
 }
-
-}  // namespace
 
 std::string explainUnpublished(const std::vector<std::string>& names, const ros::master::V_TopicInfo& topics) {
   std::string text;

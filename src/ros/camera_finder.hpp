@@ -12,6 +12,8 @@ namespace sdvo {
 /// Usual names of rectified images, best ones for features first.
 extern const std::vector<std::string> kRectifiedImages;
 
+bool isAmong(const ros::master::V_TopicInfo& topics, const std::string& name);
+
 /// Stereo cameras under a namespace (which ends with `/`): a left and a right image of one of these names with a
 /// camera_info beside each. Each camera as remappings of left|right/image_rect and left|right/camera_info.
 std::vector<ros::M_string> findStereoCameras(const std::string& ns, const ros::master::V_TopicInfo& topics,

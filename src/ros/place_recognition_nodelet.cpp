@@ -308,23 +308,21 @@ class PlaceRecognitionNodelet : public RobotNodelet {
   /// Returns the number of places in words.
   std::string save(const std::string& path) {
     std::unique_lock<std::mutex> lock(mutex_);
-    const std::vector<Place> places = session_->places();
-    const ros_conversions::MapState state = session_->map();
-    const ros_conversions::FeatureStream stream = session_->stream();
+    const SavedPlaces saved = session_->saved();
     const int changes = changes_, generation = generation_;
     lock.unlock();
-    if (places.empty())
+    if (saved.places.empty())
       throw std::runtime_error("there is no place to save yet: a key frame needs a pair with odometry");
     if (recognition_options_.localisation_only)
       throw std::runtime_error(
           "not saved: localisation_only keeps the map as it is in the file that it was loaded from");
-    savePlaces(places, state, stream, robot_, options_.map_frame_id, path, options_.overwrite);
+    savePlaces(saved, robot_, options_.map_frame_id, path, options_.overwrite);
     lock.lock();
     if (generation == generation_) {
-      kept_[path] = places.size();
+      kept_[path] = saved.places.size();
       if (path == inRosHome(options_.places_file)) saved_changes_ = changes;
     }
-    return std::to_string(places.size()) + " places";
+    return std::to_string(saved.places.size()) + " places";
   }
 
   /// Writes places_file, each minute and at the end. At the end roslaunch grants 15 s, and rosconsole is gone.

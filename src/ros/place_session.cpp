@@ -100,10 +100,10 @@ ros_conversions::MapState PlaceSession::map() const {
   return state;
 }
 
-std::vector<Place> PlaceSession::places() const {
-  std::vector<Place> places;
-  for (const auto& [id, place] : recognition_.places()) places.push_back(place);
-  return places;
+SavedPlaces PlaceSession::saved() const {
+  SavedPlaces saved{{}, recognition_.graph(), stream_};
+  for (const auto& [id, place] : recognition_.places()) saved.places.push_back(place);
+  return saved;
 }
 
 std::optional<stereo_descriptor_vo::Place> PlaceSession::message(int id, const std::string& robot) const {

@@ -44,8 +44,7 @@ class PlaceSession {
   PlaceRecognition& recognition() { return recognition_; }
   const PlaceRecognition& recognition() const { return recognition_; }
   ros_conversions::MapState map() const;
-  std::vector<Place> places() const;
-  const ros_conversions::FeatureStream& stream() const { return stream_; }
+  SavedPlaces saved() const;
   const std::string& odomFrame() const { return odom_frame_; }
   std::optional<stereo_descriptor_vo::Place> message(int id, const std::string& robot) const;
   std::optional<stereo_descriptor_vo::PlaceSignature> signature(int id, const std::string& robot) const;

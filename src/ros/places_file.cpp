@@ -209,8 +209,7 @@ SavedPlaces read(const std::string& path) {
 
 }  // namespace
 
-void savePlaces(const std::vector<Place>& places, const ros_conversions::MapState& map,
-                const ros_conversions::FeatureStream& stream, const std::string& robot, const std::string& map_frame,
+void savePlaces(const SavedPlaces& saved, const std::string& robot, const std::string& map_frame,
                 const std::string& path, bool overwrite) {
   if (!overwrite && std::filesystem::is_regular_file(path) && !isOfPlaces(path))
     throw std::runtime_error(
@@ -218,8 +217,10 @@ void savePlaces(const std::vector<Place>& places, const ros_conversions::MapStat
   writeWhole(path, [&](const std::string& partial) {
     OutputBag bag(partial);
     ros::Time newest = ros::TIME_MIN;
-    for (const Place& place : places) {
-      const msgs::Place message = ros_conversions::toMessage(place, robot, stream);
+    ros_conversions::MapState map{saved.graph, {}};
+    for (const Place& place : saved.places) {
+      map.stamps[place.id] = place.features.stamp;
+      const msgs::Place message = ros_conversions::toMessage(place, robot, saved.stream);
       newest = std::max(newest, message.features.header.stamp);
       bag->write(kPlaceTopic, message.features.header.stamp, message);
     }

@@ -16,8 +16,7 @@ struct SavedPlaces {
 
 /// Writes a file whole or not at all. It replaces an earlier file of places; any other file only with `overwrite`.
 /// Throws std::runtime_error as writeWhole() does.
-void savePlaces(const std::vector<Place>& places, const ros_conversions::MapState& map,
-                const ros_conversions::FeatureStream& stream, const std::string& robot, const std::string& map_frame,
+void savePlaces(const SavedPlaces& saved, const std::string& robot, const std::string& map_frame,
                 const std::string& path, bool overwrite);
 
 /// Throws std::runtime_error that names the file if it has another content or is inconsistent.

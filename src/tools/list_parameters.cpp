@@ -2,6 +2,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
+#include <iterator>
 #include <sstream>
 #include <stdexcept>
 
@@ -33,24 +34,21 @@ struct FirstChoice {
   std::string when;
 };
 
-const std::vector<FirstChoice>& firstChoices() {
-  static const std::vector<FirstChoice> choices = {
-      {"visual_odometry/base_frame_id", "the robot's URDF has another name for it, such as base_footprint"},
-      {"visual_odometry/odom_frame_id", "several robots share one TF tree"},
-      {"visual_odometry/publish_tf", "a filter such as robot_localization publishes odom -> base"},
-      {"stereo_features/approximate_sync", "the cameras have no common trigger"},
-      {"stereo_features/detector/mask", "parts of the robot are in view"},
-      {"stereo_features/detector/max_features", "dropped_pairs grows: fewer need less time"},
-      {"stereo_features/max_rate", "the processor is needed for other work, or the camera is very fast"},
-      {"stereo_features/queue_size", "every pair of a recording counts: 300, for both nodelets"},
-      {"visual_odometry/planar", "the floor is flat and the camera's pitch on TF is right"},
-      {"visual_odometry/use_imu", "turns exceed 20 degrees a pair, or the robot starts on a slope"}};
-  return choices;
-}
+const FirstChoice kFirstChoices[] = {
+    {"visual_odometry/base_frame_id", "the robot's URDF has another name for it, such as base_footprint"},
+    {"visual_odometry/odom_frame_id", "several robots share one TF tree"},
+    {"visual_odometry/publish_tf", "a filter such as robot_localization publishes odom -> base"},
+    {"stereo_features/approximate_sync", "the cameras have no common trigger"},
+    {"stereo_features/detector/mask", "parts of the robot are in view"},
+    {"stereo_features/detector/max_features", "dropped_pairs grows: fewer need less time"},
+    {"stereo_features/max_rate", "the processor is needed for other work, or the camera is very fast"},
+    {"stereo_features/queue_size", "every pair of a recording counts: 300, for both nodelets"},
+    {"visual_odometry/planar", "the floor is flat and the camera's pitch on TF is right"},
+    {"visual_odometry/use_imu", "turns exceed 20 degrees a pair, or the robot starts on a slope"}};
 
 bool isFirstChoice(const Option& option) {
-  const auto& choices = firstChoices();
-  return std::any_of(choices.begin(), choices.end(), [&](const FirstChoice& c) { return c.name == option.name; });
+  return std::any_of(std::begin(kFirstChoices), std::end(kFirstChoices),
+                     [&](const FirstChoice& choice) { return choice.name == option.name; });
 }
 
 /// Default, unit, range and meaning as cells.
@@ -61,7 +59,7 @@ std::string cells(const Option& option) {
 void printFirstChoices(const std::vector<Option>& options) {
   std::cout << "| parameter | nodelet | default | unit | range | meaning | change it when |\n"
                "| --- | --- | --- | --- | --- | --- | --- |\n";
-  for (const FirstChoice& choice : firstChoices()) {
+  for (const FirstChoice& choice : kFirstChoices) {
     const auto option =
         std::find_if(options.begin(), options.end(), [&](const Option& o) { return o.name == choice.name; });
     if (option == options.end()) throw std::logic_error("no nodelet has the parameter " + choice.name);

@@ -4,13 +4,17 @@
 #include <geometry_msgs/TransformStamped.h>
 #include <nav_msgs/Odometry.h>
 #include <nav_msgs/Path.h>
+#include <ros/message_traits.h>
 #include <sensor_msgs/Image.h>
 #include <tf2_eigen/tf2_eigen.h>
 #include <tf2_msgs/TFMessage.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <boost/make_shared.hpp>
 #include <cstdint>
+#include <filesystem>
+#include <stdexcept>
 #include <utility>
 
 #include "stereo_descriptor_vo/common/se3.hpp"
@@ -65,14 +69,6 @@ sensor_msgs::Image makeImage(const std_msgs::Header& header, const cv::Mat& imag
   return message;
 }
 
-void writeTransforms(BagWriter& bag, const ros::Time& start, const StereoCamera& camera) {
-  tf2_msgs::TFMessage message;
-  message.transforms.push_back(makeTransform(start, kBaseFrame, kLeftFrame, baseFromOptical()));
-  message.transforms.push_back(makeTransform(start, kLeftFrame, kRightFrame,
-                                             Eigen::Isometry3d(Eigen::Translation3d(camera.baseline, 0.0, 0.0))));
-  bag.writeLatched("/tf_static", start - kTransformLead, message);
-}
-
 /// True poses of the base in the odom frame, which is the base's frame at the first stamp.
 Trajectory basePoses(const Trajectory& camera_poses) {
   const Eigen::Isometry3d T_base_optical = baseFromOptical();
@@ -82,18 +78,6 @@ Trajectory basePoses(const Trajectory& camera_poses) {
   for (const Eigen::Isometry3d& pose : camera_poses)
     poses.push_back(T_base_optical * T_first_world * pose * T_base_optical.inverse());
   return poses;
-}
-
-void writePath(BagWriter& bag, const std::vector<ros::Time>& stamps, const Trajectory& poses) {
-  nav_msgs::Path path;
-  path.header = makeHeader(stamps.front(), kOdomFrame);
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    geometry_msgs::PoseStamped pose;
-    pose.header = makeHeader(stamps[i], kOdomFrame);
-    pose.pose = tf2::toMsg(poses[i]);
-    path.poses.push_back(pose);
-  }
-  bag.writeLatched("/ground_truth/path", stamps.front(), path);
 }
 
 /// Odometry of frame i. The twist, in the body's axes, is the mean since the previous frame; for the first frame, until
@@ -110,13 +94,60 @@ nav_msgs::Odometry makeOdometry(const std::vector<ros::Time>& stamps, const Traj
   return message;
 }
 
+std::string newFile(const std::string& path) {
+  if (std::filesystem::is_regular_file(path) && !std::filesystem::is_empty(path))
+    throw std::runtime_error("--output '" + path + "' exists and stays: give another name, or remove it");
+  return std::filesystem::absolute(path).string();
+}
+
 }  // namespace
+
+template <class Action>
+auto StereoBag::guard(const std::string& what, const Action& action) const try {
+  return action();
+} catch (const std::exception& e) {
+  throw std::runtime_error(name_ + ": cannot " + what + " (is the disk full?): " + e.what());
+}
+
+template <class Message>
+void StereoBag::write(const std::string& topic, const ros::Time& time, const Message& message) {
+  guard("write", [&] { bag_->write(topic, time, message); });
+}
+
+template <class Message>
+void StereoBag::writeLatched(const std::string& topic, const ros::Time& time, const Message& message) {
+  const auto header = boost::make_shared<ros::M_string>();
+  (*header)["callerid"] = caller_;
+  (*header)["latching"] = "1";
+  (*header)["type"] = ros::message_traits::datatype<Message>();
+  (*header)["md5sum"] = ros::message_traits::md5sum<Message>();
+  (*header)["message_definition"] = ros::message_traits::definition<Message>();
+  guard("write", [&] { bag_->write(topic, time, message, header); });
+}
 
 StereoBag::StereoBag(const std::string& path, const std::string& tool, std::vector<ros::Time> stamps,
                      const StereoCamera& camera, const Trajectory& camera_poses)
-    : bag_(path, tool), stamps_(std::move(stamps)), base_poses_(basePoses(camera_poses)) {
-  writeTransforms(bag_, stamps_.front(), camera);
-  if (!base_poses_.empty()) writePath(bag_, stamps_, base_poses_);
+    : name_("--output '" + path + "'"),
+      caller_("/" + tool),
+      file_(newFile(path)),
+      bag_(guard("create", [&] { return OutputBag(file_.partial()); })),
+      stamps_(std::move(stamps)),
+      base_poses_(basePoses(camera_poses)) {
+  tf2_msgs::TFMessage transforms;
+  const Eigen::Isometry3d T_left_right(Eigen::Translation3d(camera.baseline, 0.0, 0.0));
+  transforms.transforms = {makeTransform(stamps_.front(), kBaseFrame, kLeftFrame, baseFromOptical()),
+                           makeTransform(stamps_.front(), kLeftFrame, kRightFrame, T_left_right)};
+  writeLatched("/tf_static", stamps_.front() - kTransformLead, transforms);
+  if (base_poses_.empty()) return;
+  nav_msgs::Path path_of_base;
+  path_of_base.header = makeHeader(stamps_.front(), kOdomFrame);
+  for (std::size_t i = 0; i < base_poses_.size(); ++i) {
+    geometry_msgs::PoseStamped pose;
+    pose.header = makeHeader(stamps_[i], kOdomFrame);
+    pose.pose = tf2::toMsg(base_poses_[i]);
+    path_of_base.poses.push_back(pose);
+  }
+  writeLatched("/ground_truth/path", stamps_.front(), path_of_base);
 }
 
 void StereoBag::write(std::size_t i, const std::string& image_topic, const ImagePair& pair,
@@ -124,11 +155,18 @@ void StereoBag::write(std::size_t i, const std::string& image_topic, const Image
   const ros::Time& stamp = stamps_[i];
   const std_msgs::Header header = makeHeader(stamp, kLeftFrame);
   left.header = right.header = header;
-  bag_.write("/stereo/left/camera_info", stamp, left);
-  bag_.write("/stereo/right/camera_info", stamp, right);
-  bag_.write("/stereo/left/" + image_topic, stamp, makeImage(header, pair.left));
-  bag_.write("/stereo/right/" + image_topic, stamp, makeImage(header, pair.right));
-  if (!base_poses_.empty()) bag_.write("/ground_truth/odom", stamp, makeOdometry(stamps_, base_poses_, i));
+  write("/stereo/left/camera_info", stamp, left);
+  write("/stereo/right/camera_info", stamp, right);
+  write("/stereo/left/" + image_topic, stamp, makeImage(header, pair.left));
+  write("/stereo/right/" + image_topic, stamp, makeImage(header, pair.right));
+  if (!base_poses_.empty()) write("/ground_truth/odom", stamp, makeOdometry(stamps_, base_poses_, i));
+}
+
+void StereoBag::commit() {
+  guard("write", [&] {
+    bag_.close();
+    file_.commit();
+  });
 }
 
 }  // namespace sdvo

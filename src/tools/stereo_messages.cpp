@@ -65,14 +65,13 @@ std::string layoutOf(const std::string& definition, const std::string& type = ""
     if (!(words >> field >> name)) continue;
     if (field == "MSG:") {
       if (is_here) break;
-      if (const std::size_t ros2 = name.find("/msg/"); ros2 != std::string::npos) name.erase(ros2, 4);
+      name = ros1Type(name);
       is_here = name == type || (type.find('/') == std::string::npos && name.substr(name.rfind('/') + 1) == type);
       continue;
     }
     if (!is_here || line.find('=') != std::string::npos) continue;  // a constant, or the line above the next message
     const std::size_t array = std::min(field.find('['), field.size());
-    std::string base = field.substr(0, array);
-    if (const std::size_t ros2 = base.find("/msg/"); ros2 != std::string::npos) base.erase(ros2, 4);
+    const std::string base = ros1Type(field.substr(0, array));
     const std::string nested = depth < kDeepest ? layoutOf(definition, base, depth + 1) : "";
     layout += (nested.empty() ? base : "(" + nested + ")") + field.substr(array) + " ";
   }
@@ -130,18 +129,15 @@ StereoTopics topicsIn(const rosbag::Bag& bag, const StereoSource& source) {
     imagined.emplace_back(name, type);
     imagined.emplace_back(name.substr(0, name.rfind('/') + 1) + "camera_info", "");
   }
-  const auto has = [](const ros::master::V_TopicInfo& among, const std::string& name) {
-    return std::any_of(among.begin(), among.end(), [&](const auto& topic) { return topic.name == name; });
-  };
   StereoSource usual;
   usual.camera = source.camera;
   usual.calibration = source.calibration;
-  if (topics == usual.topics() && !has(recorded, topics[0])) {
+  if (topics == usual.topics() && !isAmong(recorded, topics[0])) {
     const std::string folder = source.camera == StereoSource().camera ? "/" : source.folder();
     for (const ros::master::V_TopicInfo* among : {&recorded, &imagined})
       for (const auto& images : {kRectifiedImages, kRawImages}) {
         const std::vector<ros::M_string> cameras = findStereoCameras(folder, *among, images);
-        if (has(recorded, topics[0]) || cameras.size() != 1) continue;
+        if (isAmong(recorded, topics[0]) || cameras.size() != 1) continue;
         topics[0] = cameras[0].at("left/image_rect");
         topics[1] = cameras[0].at("right/image_rect");
         if (!source.calibration.empty()) continue;
@@ -151,7 +147,7 @@ StereoTopics topicsIn(const rosbag::Bag& bag, const StereoSource& source) {
   }
   const std::string path = bag.getFileName();
   for (const std::size_t input : {0u, 1u}) {
-    if (has(imagined, topics[input])) continue;
+    if (isAmong(imagined, topics[input])) continue;
     std::set<std::string> names;
     for (std::size_t i = 0; i < imagined.size(); i += 2) names.insert(imagined[i].name);
     std::string images;
@@ -162,10 +158,10 @@ StereoTopics topicsIn(const rosbag::Bag& bag, const StereoSource& source) {
   }
   for (const std::size_t input : {2u, 3u})  // stereo_raw.launch with a field of view of its own
     if (const std::string of_fov = topics[input].substr(0, topics[input].rfind('/') + 1) + "rectifiable/camera_info";
-        !has(recorded, topics[input]) && has(recorded, of_fov))
+        !isAmong(recorded, topics[input]) && isAmong(recorded, of_fov))
       topics[input] = of_fov;
   for (const std::size_t input : {2u, 3u})
-    if (source.calibration.empty() && !has(recorded, topics[input]))
+    if (source.calibration.empty() && !isAmong(recorded, topics[input]))
       throw std::runtime_error("'" + path + "' has images on " + topics[0] + " and " + topics[1] + ", but no " +
                                topics[input] +
                                ": the calibration is missing. Give it: --calibration camchain.yaml (Kalibr's), or "
@@ -194,6 +190,11 @@ void openBag(const std::string& path, rosbag::Bag& bag) {
           "'" + path + "' is " + what +
           ", no bag of ROS 1: convert it, for example by rosbags-convert of the Python package rosbags");
   ofBag(path, [&] { bag.open(path, rosbag::bagmode::Read); });
+}
+
+std::string ros1Type(std::string type) {
+  if (const std::size_t ros2 = type.find("/msg/"); ros2 != std::string::npos) type.erase(ros2, 4);
+  return type;
 }
 
 void requireLayout(const rosbag::MessageInstance& instance, const std::string& type, const std::string& definition,

@@ -63,6 +63,9 @@ void openBag(const std::string& path, rosbag::Bag& bag);
 void requireLayout(const rosbag::MessageInstance& instance, const std::string& type, const std::string& definition,
                    const std::string& md5);
 
+/// The name of a type as ROS 1 has it, without ROS 2's /msg/.
+std::string ros1Type(std::string type);
+
 /// Reads a message by the types of its fields, not by its MD5: bags converted from ROS 2 have other field names, hence
 /// another MD5. Null for another type; throws std::runtime_error for another version of this type.
 template <class Message>
@@ -70,9 +73,7 @@ boost::shared_ptr<Message> readAs(const rosbag::MessageInstance& instance) {
   if (auto message = instance.instantiate<Message>()) return message;
   namespace traits = ros::message_traits;
   const std::string type = traits::datatype<Message>();
-  std::string recorded = instance.getDataType();
-  if (const std::size_t ros2 = recorded.find("/msg/"); ros2 != std::string::npos) recorded.erase(ros2, 4);
-  if (recorded != type) return nullptr;
+  if (ros1Type(instance.getDataType()) != type) return nullptr;
   requireLayout(instance, type, traits::definition<Message>(), traits::md5sum<Message>());
   std::vector<std::uint8_t> bytes(instance.size());
   ros::serialization::OStream out(bytes.data(), instance.size());

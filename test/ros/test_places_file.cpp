@@ -44,8 +44,7 @@ class PlacesFile : public ::testing::Test {
       edge.to = id;
       if (id > 0) edges.push_back(edge);
     }
-    map_.graph = PoseGraph(nodes, edges);
-    for (const Place& place : places_) map_.stamps[place.id] = place.features.stamp;
+    graph_ = PoseGraph(nodes, edges);
     stream_.frame_id = "left_optical";
   }
 
@@ -54,7 +53,7 @@ class PlacesFile : public ::testing::Test {
   }
 
   void save(const std::string& path, bool overwrite = false) {
-    savePlaces(places_, map_, stream_, "/robot", "map", path, overwrite);
+    savePlaces({places_, graph_, stream_}, "/robot", "map", path, overwrite);
   }
 
   static void expectRefused(const std::string& path, const std::string& words) {
@@ -65,7 +64,7 @@ class PlacesFile : public ::testing::Test {
   const TemporaryFolder folder_;
   const std::string path_ = (fs::path(folder_.path()) / "places.bag").string();
   std::vector<Place> places_;
-  ros_conversions::MapState map_{PoseGraph(), {}};
+  PoseGraph graph_;
   ros_conversions::FeatureStream stream_;
 };
 
@@ -202,7 +201,7 @@ TEST_F(PlacesFile, AFileMayChangeWhileItIsRead) {
 /// Whatever length, count or offset in it is wrong: a record's, a chunk's, an array's within a message.
 TEST_F(PlacesFile, AFileThatAnnouncesMuchTakesLittle) {
   places_.resize(1);
-  map_ = {PoseGraph({{0, Eigen::Isometry3d::Identity()}}, {}), {{0, places_[0].features.stamp}}};
+  graph_ = PoseGraph({{0, Eigen::Isometry3d::Identity()}}, {});
   save(path_);
   std::stringstream text;
   text << std::ifstream(path_, std::ios::binary).rdbuf();

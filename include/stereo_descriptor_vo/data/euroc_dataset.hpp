@@ -20,7 +20,7 @@ class EurocSequence {
   explicit EurocSequence(const std::string& mav0, const std::vector<std::string>& calibration = {}, double fov = 0.0);
 
   int size() const { return static_cast<int>(frames_.size()); }
-  /// Images that the other camera has no partner for; they are no frames.
+  /// Number of images without a partner of the other camera. They are in no frame.
   int unpaired() const { return unpaired_; }
   const StereoRectification& rectification() const { return rectification_; }
 
@@ -34,7 +34,7 @@ class EurocSequence {
   ImagePair loadRectified(int i) const { return rectification_.rectify(load(i)); }
 
   /// Poses of the rectified left camera relative to its first one, from cam0_ground_truth.txt (lines "stamp[ns] r11 r12
-  /// r13 tx r21 … tz" of the raw camera). Empty when there are not some for each frame; `problem` then says why.
+  /// r13 tx r21 … tz" of the raw camera). Empty, with the `problem`, if a frame has none.
   Trajectory rectifiedPoses(std::string& problem) const;
 
  private:

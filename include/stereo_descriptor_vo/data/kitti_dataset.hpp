@@ -38,8 +38,8 @@ enum class KittiCameras {
   kColour,  ///< image_2 and image_3, P2 and P3; converted to grey
 };
 
-/// The camera of a calib.txt, without the size of its images, which that does not tell; kAny means grey. Throws
-/// std::runtime_error that names the file when the two matrices are missing or belong to no rectified pair.
+/// The camera of a calib.txt, which has no image size; kAny means grey. Throws std::runtime_error that names the file
+/// if the two matrices are missing or belong to no rectified pair.
 StereoCamera readKittiCalibration(const std::string& path, KittiCameras cameras);
 
 /// One sequence in the layout of the KITTI odometry benchmark: a directory with image_0, image_1 (or image_2, image_3),
@@ -88,7 +88,7 @@ class KittiWriter {
   KittiWriter(const KittiWriter&) = delete;
   KittiWriter& operator=(const KittiWriter&) = delete;
 
-  /// The incomplete directory, for what else belongs into it.
+  /// The incomplete directory, for further files.
   const std::string& path() const { return partial_; }
 
   /// One image of frame i, side 0 (left) or 1 (right). May be called from several threads. Throws std::runtime_error

@@ -18,20 +18,20 @@ struct RawCamera {
   std::vector<double> D;        ///< pinhole: k1 k2 p1 p2 [k3 [k4 k5 k6 …]]; equidistant: k1 k2 k3 k4
   bool is_equidistant = false;  ///< cv::fisheye
 
-  /// `model` by a name that ROS, Kalibr or EuRoC give it. Throws std::invalid_argument that names those there are.
+  /// `model`: its name in ROS, Kalibr or EuRoC. Throws std::invalid_argument that names the supported models.
   void setLens(const std::string& model, std::vector<double> coefficients);
 };
 
 using RawCameras = std::array<RawCamera, 2>;  ///< left, right
 
-/// How the raw views of two cameras become rectified ones, by OpenCV.
+/// Rectification of the raw images of two cameras, by OpenCV.
 class StereoRectification {
  public:
   /// From a calibration: `rotations` from each raw camera's axes to the rectified ones, and the rectified camera.
   StereoRectification(const RawCameras& raw, const std::array<cv::Matx33d, 2>& rotations, const StereoCamera& camera);
 
-  /// From the pose of both. `fov`: from the left edge of the rectified images to the right one, deg; 0: without black
-  /// borders, at most 110. Throws std::invalid_argument when the two are no pair from left to right.
+  /// From the relative pose. `fov`: horizontal field of view of the rectified images, deg; 0: the largest without black
+  /// borders, at most 110. Throws std::invalid_argument if the second camera is not to the right of the first one.
   StereoRectification(const RawCameras& raw, const Eigen::Isometry3d& T_right_left, double fov = 0.0);
 
   const RawCamera& raw(int side) const { return raw_[static_cast<std::size_t>(side)]; }
@@ -55,7 +55,8 @@ class StereoRectification {
   cv::Mat map_x_[2], map_y_[2];  ///< raw pixel of each rectified one
 };
 
-/// The same camera with equal focal lengths that see so many degrees from side to side, around the middle of the image.
+/// The same camera with this horizontal field of view (deg), equal focal lengths, and the principal point in the
+/// middle.
 StereoCamera withFieldOfView(StereoCamera camera, double fov);
 
 /// A calibration of two cameras: a camera chain of Kalibr's (cam0, cam1), or of the left and the right camera one

@@ -87,14 +87,14 @@ std::vector<SubPathErrors> subPathErrors(const Trajectory& ground_truth, const T
 TrajectoryErrors evaluateTrajectory(const Trajectory& ground_truth, const Trajectory& estimate,
                                     const std::vector<double>& lengths = kittiLengths());
 
-/// True poses at these stamps (ns) from a file as readPoses() takes it; none where the file knows none. Without stamps
-/// it has one pose for each, with stamps they are interpolated. Throws std::runtime_error that names the file where it
-/// cannot be read or fits no stamp.
+/// True poses at these stamps (ns) from a file that readPoses() reads. With stamps in the file they are interpolated,
+/// and none in its gaps; without, it has one pose for each stamp. Throws std::runtime_error that names the file if it
+/// cannot be read or has no pose at the stamps.
 std::vector<std::optional<Eigen::Isometry3d>> readGroundTruth(const std::string& path,
                                                               const std::vector<std::int64_t>& stamps);
 
-/// True and estimated poses that belong together: by their stamps where both files have some, else by their lines.
-/// Throws std::runtime_error that names the files where neither tells.
+/// Corresponding true and estimated poses: by stamps if both files have some, else by lines. Throws std::runtime_error
+/// that names the files if neither is possible.
 std::pair<Trajectory, Trajectory> readComparable(const std::string& ground_truth, const std::string& estimate);
 
 }  // namespace sdvo

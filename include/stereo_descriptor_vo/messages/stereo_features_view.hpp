@@ -15,7 +15,7 @@
 namespace sdvo {
 
 /// A StereoFeatures message, checked once and then read without a copy. For every node that subscribes to descriptors.
-/// The message must outlive the view and the matrices it hands out; those are read-only although cv::Mat cannot say so.
+/// The message must outlive the view and its matrices. These are read-only, which cv::Mat cannot express.
 class StereoFeaturesView {
  public:
   /// Throws std::invalid_argument that says which field does not hold together; nothing is read before it is checked.
@@ -80,7 +80,7 @@ class StereoFeaturesView {
       refuse("fx, fy and baseline must be positive, cx and cy finite");
     constexpr float kLongestDelay = 1.f;  // s, the largest that max_interval may be
     if (!(std::abs(message_.right_delay) <= kLongestDelay)) refuse("right_delay is not within ", kLongestDelay, " s");
-    // Whoever receives it makes tables of the image's size, and time grows with the number of features.
+    // Receivers allocate tables of the image's size, and their time grows with the number of features.
     constexpr std::uint32_t kLargestSide = 1u << 14;
     const std::uint32_t width = message_.image_width, height = message_.image_height;
     if (width == 0 || height == 0 || width > kLargestSide || height > kLargestSide)
