@@ -41,16 +41,16 @@ Matrix6d lacking(const Matrix6d& covariance, const Vector6d& deviation) {
   return deviation * deviation.transpose() + kTolerableRatio * kTolerableRatio * momentOf(deviation);
 }
 
-Matrix6d PoseCovariance::byCalibration(const CalibrationEstimate& known) const {
-  const RigCalibration::MotionJacobian derivative = exposure_.leftCols<RigCalibration::kParameters>();
+Matrix6d PoseCovariance::byRig(const RigEstimate& known) const {
+  const RigEstimate::MotionJacobian derivative = exposure_.leftCols<RigEstimate::kParameters>();
   const Vector6d deviation = derivative * known.mean + exposure_.rightCols<1>();
   return derivative * known.covariance * derivative.transpose() + deviation * deviation.transpose();
 }
 
-void PoseCovariance::expose(const RigCalibration::MotionJacobian& since_keyframe, const RigCalibration& compensated) {
+void PoseCovariance::expose(const RigEstimate::MotionJacobian& since_keyframe, const RigEstimate::Vector& compensated) {
   exposure_ = keyframe_exposure_;
-  exposure_.leftCols<RigCalibration::kParameters>() += since_keyframe;
-  exposure_.rightCols<1>() -= since_keyframe * compensated.value;
+  exposure_.leftCols<RigEstimate::kParameters>() += since_keyframe;
+  exposure_.rightCols<1>() -= since_keyframe * compensated;
 }
 
 void PoseCovariance::cover(const Vector6d& correction) {

@@ -21,16 +21,16 @@ Matrix6d lacking(const Matrix6d& covariance, const Vector6d& deviation);
 /// never shrink. A new measurement replaces the doubted part. Parts are only added, so the sum is positive whatever its
 /// size.
 ///
-/// All motions have the error of the rig's calibration in common. It adds up with the distance, unlike their noise, and
-/// is followed apart: as the pose's derivative by the calibration.
+/// All motions have the error of the rig in common. It adds up with the distance, unlike their noise, and is followed
+/// apart: as the pose's derivative by the rig.
 class PoseCovariance {
  public:
-  /// Of the last pose, the calibration's error apart; zero in the beginning.
+  /// Of the last pose, the rig's error apart; zero in the beginning.
   Matrix6d value() const { return measured_ + doubted_; }
 
-  /// Moment of the last pose's error by the calibration's: by how far `known` is from the one that was compensated on
-  /// the way, and by its covariance.
-  Matrix6d byCalibration(const CalibrationEstimate& known) const;
+  /// Moment of the last pose's error by the rig's: by how far `known` is from what was compensated on the way, and by
+  /// its covariance.
+  Matrix6d byRig(const RigEstimate& known) const;
 
   /// The map moved the last pose by this right perturbation: its covariance then contains that.
   void cover(const Vector6d& correction);
@@ -62,8 +62,8 @@ class PoseCovariance {
     return measure(T_previous_current, since_keyframe, since_keyframe);
   }
 
-  /// The pose that was measured last depends on the calibration by this right perturbation since the key frame.
-  void expose(const RigCalibration::MotionJacobian& since_keyframe, const RigCalibration& compensated);
+  /// The pose that was measured last depends on the rig by this right perturbation since the key frame.
+  void expose(const RigEstimate::MotionJacobian& since_keyframe, const RigEstimate::Vector& compensated);
 
   /// The last motion, and the last pose, may be off by more than their measurement says. The next pose that is measured
   /// in the map takes that back.
@@ -73,8 +73,8 @@ class PoseCovariance {
   void markKeyframe();
 
  private:
-  /// Derivatives by the calibration; last column: less their sum times what was compensated.
-  using Exposure = Eigen::Matrix<double, 6, RigCalibration::kParameters + 1>;
+  /// Derivatives by the rig; last column: less their sum times what was compensated.
+  using Exposure = Eigen::Matrix<double, 6, RigEstimate::kParameters + 1>;
 
   void carry(const Eigen::Isometry3d& T_previous_current);
 

@@ -46,8 +46,13 @@ auto observationIn(Observations& observations, int frame_id) {
 LocalMap::LocalMap(const LocalMapOptions& options)
     : options_(checked(options)), memory_(options.remembered_keyframes) {}
 
-int LocalMap::oldestId() const {
-  return std::find_if(frames_.begin(), frames_.end(), [](const Frame& frame) { return !frame.is_recalled; })->id;
+const LocalMap::Frame& LocalMap::oldest() const {
+  return *std::find_if(frames_.begin(), frames_.end(), [](const Frame& frame) { return !frame.is_recalled; });
+}
+
+std::pair<Eigen::Isometry3d, double> LocalMap::motionOfWindow() const {
+  return {oldest().T_camera_origin * newestPose().inverse(),
+          static_cast<double>(newestStamp() - oldest().stamp) * 1e-9};
 }
 
 int LocalMap::lastKeyframeId() const {
@@ -112,7 +117,6 @@ DescribedPoints LocalMap::points(int sightings) const {
 void LocalMap::insert(const PatchAlignmentOptions& alignment, const StereoFeatures& features, int id,
                       const Eigen::Isometry3d& T_camera_origin, const std::vector<Sighting>& sightings,
                       const RigCalibration& calibration) {
-  newest_stamp_ = features.stamp;
   camera_ = features.camera;
   kind_ = features.kind();
 
@@ -124,7 +128,7 @@ void LocalMap::insert(const PatchAlignmentOptions& alignment, const StereoFeatur
   }
   // After the new sightings are added: removeFrame() also removes points that no longer have enough observations.
   if (!frames_.empty() && !frames_.back().is_keyframe) removeFrame(frames_.size() - 1);
-  frames_.push_back({id, T_camera_origin, false, false});
+  frames_.push_back({id, T_camera_origin, false, false, features.stamp});
   frames_.back().is_keyframe = needsKeyframe();
   // With patches the corner defines the point's place, so its own error is small. Without, it errs as any later one.
   const double sigma =

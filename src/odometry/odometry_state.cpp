@@ -31,15 +31,13 @@ void reportMatches(const StereoFeatures& features, const std::vector<int>& given
 }
 
 void reportRig(const LearntRig& rig, OdometryResult& result) {
-  const RigCalibration::Vector sigma = rig.calibration.sigma();
-  if (sigma.allFinite()) {
-    result.disparity_offset = rig.calibration.calibration().value[0];
-    result.disparity_bend = rig.calibration.calibration().value[1];
-    result.disparity_offset_sigma = sigma[0];
-    result.disparity_bend_sigma = sigma[1];
+  if (rig.calibration.hasWindow()) {
+    const RigEstimate known = rig.calibration.estimate();
+    const RigEstimate::Vector sigma = known.covariance.diagonal().cwiseSqrt();
+    result.disparity_offset = known.mean[0], result.disparity_offset_sigma = sigma[0];
+    result.disparity_bend = known.mean[1], result.disparity_bend_sigma = sigma[1];
+    result.right_delay = known.delay(), result.right_delay_sigma = sigma[RigEstimate::kDelay];
   }
-  if (const auto delay = rig.right_delay.estimate())
-    result.right_delay = delay->value, result.right_delay_sigma = delay->sigma;
   if (const auto rotation = rig.usual_rows.rotation()) {
     result.right_rotation = rig.rotation + rotation->value;
     result.right_rotation_sigma = (rig.rotation_covariance + rotation->covariance).diagonal().cwiseSqrt();
@@ -97,9 +95,7 @@ OdometryResult OdometryState::report(const StereoFeatures& features, const std::
   if (step.hasPose()) {
     result.has_pose = true;
     result.T_origin_camera = T_origin_camera;
-    result.pose_covariance = covariance.value() + covariance.byCalibration(rig.calibration.estimate());
-    const double drift = rig.right_delay.drift();
-    result.pose_covariance.topLeftCorner<3, 3>() += drift * drift * Eigen::Matrix3d::Identity();
+    result.pose_covariance = covariance.value() + covariance.byRig(rig.calibration.estimate());
     if (known_floor && floor.isOnFloor())
       result.pose_covariance = known_floor->constrained(T_origin_camera, result.pose_covariance);
   }

@@ -62,6 +62,8 @@ struct VisualOdometry::Pair {
 /// The map as it would be with the pair, adjusted. Nothing has changed until it is committed.
 struct VisualOdometry::Candidate {
   RigCalibration calibration;
+  RigEstimate::Shape calibration_by_rig;
+  double delay = 0.0;  ///< of the right camera, as it is compensated, s
   LocalMap::Adjustment adjustment;
   Eigen::Isometry3d motion;             ///< T_reference_current after the adjustment
   Eigen::Isometry3d T_keyframe_origin;  ///< of the key frame before the pair, before the adjustment
@@ -130,7 +132,6 @@ void VisualOdometry::mountAt(const Eigen::Isometry3d& T_base_camera) {
 
 void VisualOdometry::takePose(const Matrix6d& covariance) {
   state_.covariance.assume(covariance);
-  state_.rig.right_delay.forgetDrift();
   ++state_.epoch;
   if (!state_.interrupted) return;
   state_.map.reset();
@@ -294,15 +295,18 @@ MotionScene VisualOdometry::sceneOf(const LocalMap& map, const StereoFeatures& f
 std::optional<StereoFeatures> VisualOdometry::synchronised(const StereoFeatures& taken, double dt,
                                                            const std::optional<MotionGuess>& guess) const {
   const std::optional<Vector6d>& velocity = state_.prior.velocity();
-  const bool is_in_step = taken.right_delay == 0.0 && state_.rig.right_delay.compensated() == 0.0;
-  if (is_in_step || !velocity || dt > options_.tracking.max_gap) return std::nullopt;
-  StereoFeatures features = state_.rig.right_delay.synchronised(taken, dt, *velocity);
-  if (state_.interrupted) return features;
+  const double known = state_.rig.calibration.delay(), delay = taken.right_delay + known;
+  if (delay == 0.0 || !velocity || dt > options_.tracking.max_gap) return std::nullopt;
+  StereoFeatures features = state_.rig.right_delay.synchronised(taken, dt, *velocity, known);
+  constexpr double kNegligible = 0.02;  // px: a fifth of a disparity's noise
+  const double rate_sigma = std::sqrt(state_.prior.predicted(dt).covariance(4, 4)) / dt;
+  const bool is_exact = std::abs(delay) * taken.camera.fx * rate_sigma < kNegligible;
+  if (state_.interrupted || is_exact) return features;
   const MotionHypothesis found = search_.find(sceneOf(*state_.map, features, dt, guess), largestDoubt());
   if (!found.motion.success) return features;
   const Eigen::Isometry3d motion = found.motion.T_current_reference.inverse();
   return state_.rig.right_delay.synchronised(
-      taken, dt, logSE3(motion) / state_.prior.interval(state_.map->secondsUntil(taken), motion));
+      taken, dt, logSE3(motion) / state_.prior.interval(state_.map->secondsUntil(taken), motion), known);
 }
 
 /// The pair with the motion that the search found; nothing without one, and none that spans an outage.
@@ -330,7 +334,7 @@ std::vector<Evidence> VisualOdometry::evidenceAgainst(const Pair& pair, const Mo
     evidence.push_back({kCertain, "many matches agreed on no motion", true});
   if (!measured) return evidence;
   rig.right_delay.watch(measured->rows, measured->dt, options_.noise.corner * rig.noise.scale());
-  const RightCameraDelay::OtherPair other = rig.right_delay.otherPair(measured->dt);
+  const RightCameraDelay::OtherPair other = rig.right_delay.otherPair(measured->dt, rig.calibration.delay());
   evidence.push_back({other.log_odds, other.words()});
   evidence.push_back(
       {kUnsuspected + state_.prior.logRatioOfSwap(measured->T_current_reference.inverse(), measured->since_reference),
@@ -416,7 +420,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   if (is_seed) state_.covariance.assume(state_.covariance.value());
   const Belief belief = state_.doubt.weigh(scene, found, evidence);
   commit(candidate, belief.probability);
-  Step step = measure(features, found, candidate, since);
+  Step step = measure(found, candidate);
   const Matrix6d measured = step.covariance;
   judge(scene, found, candidate, belief, step);
   step.probability = belief.probability;
@@ -468,13 +472,18 @@ VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features,
   LocalMap& map = *state_.candidate;
   Candidate candidate;
   candidate.calibration = state_.rig.calibration.calibration();
+  candidate.delay = state_.rig.calibration.delay();
   map.insert(options_.alignment, features, state_.pairs, found.motion.T_current_reference * T_previous_origin,
              found.sightings, candidate.calibration);
   candidate.T_keyframe_origin = map.poseBeforeNewest();
   if (map.newestIsKeyframe() && may_recall) revisit_.recall(features, candidate.calibration, map);
   const std::optional<Floor> floor = this->floor();
+  const auto [T_oldest_newest, seconds] = map.motionOfWindow();
+  candidate.calibration_by_rig = RigEstimate::shape(
+      features.camera, logSO3(T_oldest_newest.linear()).y() / state_.prior.interval(seconds, T_oldest_newest));
   candidate.adjustment =
-      map.adjust(optimizer_, state_.rig.calibration.prior(map.oldestId()), candidate.calibration, floor);
+      map.adjust(optimizer_, state_.rig.calibration.prior(map.oldestId(), candidate.calibration_by_rig),
+                 candidate.calibration, floor);
   map.noteVariance(state_.rig.noise.ofPair(candidate.adjustment.newest_square, candidate.adjustment.newest_measured));
   candidate.adjustment.since_keyframe *= map.varianceOfMotion();
   candidate.adjustment.growth *= map.varianceOfMotion();
@@ -534,16 +543,15 @@ void VisualOdometry::commit(const Candidate& candidate, double probability) {
   if (probability < options_.tracking.probability) state_.map->discountNewest();
   const LocalMap::Adjustment& adjustment = candidate.adjustment;
   if (!adjustment.success) return;
-  state_.rig.calibration.note(state_.map->oldestId(), state_.map->newestId(), candidate.calibration,
-                              adjustment.calibration_information);
+  state_.rig.calibration.note(state_.map->oldestId(), state_.map->newestId(), candidate.calibration_by_rig,
+                              candidate.calibration, adjustment.calibration_information);
   if (probability < options_.tracking.probability) return;
   state_.rig.noise.learnPair(adjustment.newest_square);
   if (adjustment.common_disparity_square) state_.rig.calibration.noteCommon(*adjustment.common_disparity_square);
 }
 
-/// The motion between the two poses, and its covariance. `since`: s since the map's newest pair before it.
-VisualOdometry::Step VisualOdometry::measure(const StereoFeatures& features, const MotionHypothesis& found,
-                                             const Candidate& candidate, double since) {
+/// The motion between the two poses, and its covariance.
+VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, const Candidate& candidate) {
   const LocalMap& map = *state_.map;
   Step step;
   step.state = TrackingState::kTracking;
@@ -556,12 +564,9 @@ VisualOdometry::Step VisualOdometry::measure(const StereoFeatures& features, con
   }
   step.covariance = state_.covariance.measure(*step.T_previous_current, candidate.adjustment.since_keyframe,
                                               candidate.adjustment.growth);
-  const Eigen::Isometry3d& motion = found.motion.T_current_reference;
-  const double rate = logSO3(motion.linear()).norm() / state_.prior.interval(since, motion);
-  const double by_delay =
-      state_.rig.right_delay.deviation(features, step.T_previous_current->translation().norm(), rate);
-  step.covariance.topLeftCorner<3, 3>() += by_delay * by_delay * Eigen::Matrix3d::Identity();
-  state_.covariance.expose(candidate.adjustment.by_calibration, candidate.calibration);
+  RigEstimate::Vector compensated;
+  compensated << candidate.calibration.value, candidate.delay;
+  state_.covariance.expose(candidate.adjustment.by_calibration * candidate.calibration_by_rig, compensated);
   // The motion between two reported poses contains what the map has learnt of the first one meanwhile: a perturbation
   // of the key frame before, then of the newest pair.
   step.correction = adjoint(map.newestPose() * map.poseBeforeNewest().inverse()) *

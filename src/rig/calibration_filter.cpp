@@ -3,54 +3,88 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <limits>
+#include <vector>
 
-#include "../belief/motion_hypotheses.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
 
 namespace sdvo {
 namespace {
 
-using Matrix = RigCalibration::Matrix;
-using Vector = RigCalibration::Vector;
+using Matrix = RigEstimate::Matrix;
+using Vector = RigEstimate::Vector;
 
 constexpr int kRememberedCommons = 200;  // windows (chosen) over which the mean of what is left at a point is taken
 // px/sqrt(s) (chosen): half a pixel in 100 s, by warmth or by small knocks that no detector finds.
 constexpr double kWarming = 0.05;
+constexpr double kClocks = 1e-4;  // s/sqrt(s): a millisecond in 100 s, as clocks drift whose rates differ by 1e-5
 
 Vector priorOf(const CalibrationOptions& options) {
-  return {options.prior_offset, options.prior_bend};
+  return {options.prior_offset, options.prior_bend, options.right_delay};
 }
 
 }  // namespace
 
 CalibrationFilter::CalibrationFilter(const CalibrationOptions& options) : options_(checked(options)) {
-  calibration_.value = priorOf(options_);
+  calibration_.value = priorOf(options_).head<RigCalibration::kParameters>();
 }
 
 const CalibrationFilter::Evidence& CalibrationFilter::pastBefore(int oldest_id) const {
   return pending_id_ >= 0 && pending_id_ < oldest_id ? pending_ : past_;
 }
 
-CalibrationBelief CalibrationFilter::prior(int oldest_id) const {
+CalibrationBelief CalibrationFilter::prior(int oldest_id, const RigEstimate::Shape& shape) const {
   constexpr double kExact = 0.01;  // px: 0.1 % of the depth at 10 px of disparity; less makes the equations stiff
-  const CalibrationEstimate known = weigh(pastBefore(oldest_id));
-  const Matrix covariance = known.covariance + kExact * kExact * Matrix::Identity();
-  CalibrationBelief belief{known.mean, covariance.inverse() / kHonest};
+  CalibrationBelief belief;
+  RigCalibration::Matrix covariance = kExact * kExact * RigCalibration::Matrix::Identity();
+  belief.mean = priorOf(options_).head<RigCalibration::kParameters>();
+  if (options_.enabled) {
+    const RigEstimate known = weigh(pastBefore(oldest_id));
+    belief.mean = shape * known.mean - shape.col(RigEstimate::kDelay) * delay();
+    covariance += shape * known.covariance * shape.transpose();
+  }
+  belief.information = covariance.inverse() / kHonest;
   if (commons_ >= kFewestMeasured) belief.common_sigma = std::sqrt(std::max(common_square_, 0.0));
   return belief;
 }
 
-/// Mean and covariance of the mixture, given the windows' evidence.
-CalibrationEstimate CalibrationFilter::weigh(const Evidence& evidence) const {
+/// Mean and covariance of the mixture: of rigs with and without an error of their disparities, and with and without one
+/// of their delay.
+RigEstimate CalibrationFilter::weigh(const Evidence& windows) const {
   const Vector prior = priorOf(options_);
-  if (!options_.enabled) return {prior, Matrix::Zero()};
-  const double variance = options_.prior_sigma * options_.prior_sigma;
-  const Matrix covariance = (evidence.information + Matrix::Identity() / variance).inverse();
-  const Vector shown = evidence.information_mean - evidence.information * prior, distance = covariance * shown;
-  const double log_factor = 0.5 * (shown.dot(distance) + std::log(covariance.determinant() / (variance * variance)));
-  const double other = probabilityOf(log_factor);
-  return {prior + other * distance, other * covariance + other * (1.0 - other) * distance * distance.transpose()};
+  Matrix information = windows.information;
+  Vector shown = windows.information_mean - information * prior;
+  information(RigEstimate::kDelay, RigEstimate::kDelay) += rows_information_;
+  shown[RigEstimate::kDelay] += rows_information_ * (rows_delay_ - prior[RigEstimate::kDelay]);
+  struct Component {
+    double log_weight;
+    Vector mean;
+    Matrix covariance;
+  };
+  std::vector<Component> components;
+  double largest = 0.0;
+  for (const double disparity_sigma : {0.0, options_.prior_sigma}) {
+    if (disparity_sigma > 0.0 && !options_.enabled) continue;
+    for (const double delay_sigma : {0.0, options_.right_delay_sigma}) {
+      const Matrix sigma = Vector(disparity_sigma, disparity_sigma, delay_sigma).asDiagonal();
+      const Matrix whitened = Matrix::Identity() + sigma * information * sigma;
+      const Matrix covariance = sigma * whitened.inverse() * sigma;
+      const Vector mean = covariance * shown;
+      components.push_back({0.5 * (shown.dot(mean) - std::log(whitened.determinant())), mean, covariance});
+      largest = std::max(largest, components.back().log_weight);
+    }
+  }
+  RigEstimate estimate;
+  double sum = 0.0;
+  for (const auto& [log_weight, mean, covariance] : components) {
+    const double weight = std::exp(log_weight - largest);
+    sum += weight;
+    estimate.mean += weight * mean;
+    estimate.covariance += weight * (covariance + mean * mean.transpose());
+  }
+  estimate.mean /= sum;
+  estimate.covariance = (estimate.covariance / sum - estimate.mean * estimate.mean.transpose()).eval();
+  estimate.mean += prior;
+  return estimate;
 }
 
 void CalibrationFilter::noteCommon(double square) {
@@ -58,27 +92,38 @@ void CalibrationFilter::noteCommon(double square) {
   common_square_ += (square - common_square_) / commons_;
 }
 
-void CalibrationFilter::note(int oldest_id, int newest_id, const RigCalibration& calibration,
-                             const Matrix& information) {
-  const CalibrationBelief prior = this->prior(oldest_id);
+void CalibrationFilter::note(int oldest_id, int newest_id, const RigEstimate::Shape& shape,
+                             const RigCalibration& calibration, const RigCalibration::Matrix& information) {
+  const CalibrationBelief prior = this->prior(oldest_id, shape);
+  const RigCalibration::Vector compensated = shape.col(RigEstimate::kDelay) * delay();
   past_ = pastBefore(oldest_id);
   calibration_ = calibration;
   // The window's result combines its own evidence with the prior, so its own is the result's less the prior's. Only one
   // triangle of `information` is accurate; a difference between both would grow from window to window.
-  const Matrix own = 0.5 * kHonest * (information + information.transpose());
-  const Vector own_mean = own * calibration.value + kHonest * prior.information * (calibration.value - prior.mean);
-  present_ = Evidence{past_.information + own, past_.information_mean + own_mean};
+  const RigCalibration::Matrix own = 0.5 * kHonest * (information + information.transpose());
+  const RigCalibration::Vector own_mean = own * (calibration.value + compensated) +
+                                          kHonest * prior.information * (calibration.value - prior.mean);
+  present_ = Evidence{past_.information + shape.transpose() * own * shape,
+                      past_.information_mean + shape.transpose() * own_mean};
   if (pending_id_ >= oldest_id) return;
   pending_id_ = newest_id;
   pending_ = *present_;
 }
 
+void CalibrationFilter::noteRows(double delay, double sigma) {
+  constexpr double kExact = 1e-6;  // s, as the least prior: rows without noise, as of a simulator
+  rows_information_ = 1.0 / (sigma * sigma + kExact * kExact);
+  rows_delay_ = delay;
+}
+
 void CalibrationFilter::predict(double dt) {
-  widen(kWarming * kWarming * dt * Matrix::Identity());
+  widen(Matrix(Vector(kWarming * kWarming * dt, kWarming * kWarming * dt, kClocks * kClocks * dt).asDiagonal()));
 }
 
 void CalibrationFilter::widen(double variance) {
-  widen(variance * Matrix::Ones());
+  Matrix covariance = Matrix::Zero();
+  covariance.topLeftCorner<RigCalibration::kParameters, RigCalibration::kParameters>().setConstant(variance);
+  widen(covariance);
 }
 
 void CalibrationFilter::widen(const Matrix& covariance) {
@@ -88,15 +133,6 @@ void CalibrationFilter::widen(const Matrix& covariance) {
   };
   widened(past_), widened(pending_);
   if (present_) widened(*present_);
-}
-
-CalibrationEstimate CalibrationFilter::estimate() const {
-  return weigh(present_.value_or(Evidence()));
-}
-
-RigCalibration::Vector CalibrationFilter::sigma() const {
-  if (!present_ || !options_.enabled) return Vector::Constant(std::numeric_limits<double>::quiet_NaN());
-  return estimate().covariance.diagonal().cwiseSqrt();
 }
 
 }  // namespace sdvo

@@ -18,7 +18,6 @@ std::string ShownRotation::words() const {
 
 LearntRig::LearntRig(const CalibrationOptions& options, const NoiseOptions& assumed)
     : calibration(options),
-      right_delay(options),
       noise(assumed),
       assumed_(assumed),
       delay_sigma_(options.right_delay_sigma) {}
@@ -84,9 +83,10 @@ void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measur
     }
   }
   if (measured)
-    right_delay.learn(measured->features, measured->dt, measured->velocity(), is_confirmed);
+    right_delay.learn(measured->features, measured->dt, measured->velocity(), calibration.delay(), is_confirmed);
   else
     right_delay.interrupt();
+  if (const auto delay = right_delay.estimate()) calibration.noteRows(delay->value, delay->sigma);
 }
 
 }  // namespace sdvo

@@ -56,12 +56,6 @@ Vector6d velocityDuring(double delay, double dt, const Vector6d& before, const V
   return at + share * ((delay < 0.0 ? before : after) - at);
 }
 
-/// Error, m, of a motion over `distance` m at `rate` rad/s for each second of delay: as the median disparity has it.
-double exposed(const StereoFeatures& features, double distance, double rate) {
-  std::vector<double> disparities(features.disparity.begin(), features.disparity.end());
-  return disparities.empty() ? 0.0 : distance * features.camera.fx * rate / median(disparities);
-}
-
 /// Mean square (px^2, cut off) of what the rows differ from those of a right image that is late by `delay`, and lower
 /// by a constant.
 double misfit(const std::vector<RowMotion>& rows, double delay) {
@@ -104,12 +98,8 @@ constexpr double kLeastTurning = 2.0;  // px/s: rotations from images err by les
 
 }  // namespace
 
-RightCameraDelay::RightCameraDelay(const CalibrationOptions& options)
-    : prior_(options.right_delay),
-      prior_sigma_(options.right_delay_sigma),
-      rows_(RowDelay::kMemory, kLeastTurning, kSamePoints),
-      newer_(rows_),
-      older_(rows_) {}
+RightCameraDelay::RightCameraDelay()
+    : rows_(RowDelay::kMemory, kLeastTurning, kSamePoints), newer_(rows_), older_(rows_) {}
 
 void RightCameraDelay::watch(const std::vector<RowMotion>& rows, double dt, double row_error) {
   if (rows.size() < kFewestMeasured || !(dt > 0.0)) return;
@@ -121,10 +111,8 @@ void RightCameraDelay::watch(const std::vector<RowMotion>& rows, double dt, doub
   }
 }
 
-void RightCameraDelay::learn(const StereoFeatures& features, double dt, const Vector6d& velocity, bool is_confirmed) {
-  const double exposed_here = exposed(features, dt * velocity.head<3>().norm(), velocity.tail<3>().norm());
-  exposed_ += exposed_here;
-  compensated_ += exposed_here * compensated();
+void RightCameraDelay::learn(const StereoFeatures& features, double dt, const Vector6d& velocity, double known,
+                             bool is_confirmed) {
   if (std::max(earlier_, later_) > 0.0) rows_ = newer_ = older_;
   if (!is_confirmed) return interrupt();
   StereoFeatures positions;
@@ -134,13 +122,12 @@ void RightCameraDelay::learn(const StereoFeatures& features, double dt, const Ve
   positions.right_delay = features.right_delay;
   pairs_.push_back({std::move(positions), velocity});
   if (pairs_.size() < 4) return;
-  addRows(dt);
+  addRows(dt, known);
   pairs_.pop_front();
   if (++taught_ % kRefutable == 0) older_ = std::exchange(newer_, rows_);
 }
 
-RightCameraDelay::OtherPair RightCameraDelay::otherPair(double dt) const {
-  const double known = compensated();
+RightCameraDelay::OtherPair RightCameraDelay::otherPair(double dt, double known) const {
   if (2.0 * std::abs(known) > dt) return {known, kCertain};
   return earlier_ > later_ ? OtherPair{-dt, earlier_} : OtherPair{dt, later_};
 }
@@ -152,37 +139,10 @@ std::string RightCameraDelay::OtherPair::words() const {
   return words.str();
 }
 
-/// By prior and pairs. Out of step or not is as likely beforehand.
-RightCameraDelay::Posterior RightCameraDelay::posterior() const {
-  constexpr double kExact = 1e-6;  // s, as the least prior: rows without noise, as of a simulator
-  const auto found = estimate();
-  if (!found) return {0.5, prior_, prior_sigma_};
-  using Scalar = Eigen::Matrix<double, 1, 1>;
-  const double of_pairs = std::max(found->sigma, kExact), ratio = of_pairs / std::hypot(prior_sigma_, of_pairs);
-  const double log_odds = logBayesFactor<1>(Scalar(found->value - prior_), Scalar(1.0 / (of_pairs * of_pairs)),
-                                            Scalar(prior_sigma_ * prior_sigma_));
-  return {probabilityOf(log_odds), found->value + ratio * ratio * (prior_ - found->value), ratio * prior_sigma_};
-}
-
-/// Root mean square error of `compensated`, m, where each second of delay is `exposed` m.
-double RightCameraDelay::Posterior::error(double exposed, double prior, double compensated) const {
-  const double out = mean * exposed - compensated, in = prior * exposed - compensated;
-  return std::sqrt(out_of_step * (out * out + sigma * sigma * exposed * exposed) + (1.0 - out_of_step) * in * in);
-}
-
-double RightCameraDelay::deviation(const StereoFeatures& features, double distance, double rate) const {
-  const double here = exposed(features, distance, rate);
-  return posterior().error(here, prior_, here * compensated());
-}
-
-double RightCameraDelay::drift() const {
-  return compensated() != 0.0 && estimate() ? posterior().error(exposed_, prior_, compensated_) : 0.0;
-}
-
 /// The rows of the third last pair, whose neighbours are known.
-void RightCameraDelay::addRows(double dt) {
+void RightCameraDelay::addRows(double dt, double known) {
   const StereoFeatures& features = pairs_[1].features;
-  const double stamped = features.right_delay, delay = stamped + compensated();
+  const double stamped = features.right_delay, delay = stamped + known;
   // The value at the border of two intervals by the means of four, to the fourth order. Motions too fast for
   // the rate of the pairs are not in it, so the instrument has none of them.
   const Vector6d near = pairs_[1].velocity + pairs_[2].velocity, far = pairs_[0].velocity + pairs_[3].velocity;
@@ -200,15 +160,9 @@ void RightCameraDelay::addRows(double dt) {
   rows_.add(rows);
 }
 
-double RightCameraDelay::compensated() const {
-  const auto found = estimate();
-  if (!found) return prior_;
-  return prior_ + found->proved(prior_);
-}
-
-StereoFeatures RightCameraDelay::synchronised(const StereoFeatures& features, double dt,
-                                              const Vector6d& velocity) const {
-  const double delay = features.right_delay + compensated();
+StereoFeatures RightCameraDelay::synchronised(const StereoFeatures& features, double dt, const Vector6d& velocity,
+                                              double known) const {
+  const double delay = features.right_delay + known;
   // The velocity goes on as it changed.
   const Vector6d change = pairs_.empty() ? Vector6d::Zero() : Vector6d(velocity - pairs_.back().velocity);
   const Vector6d during = velocityDuring(delay, dt, velocity, velocity + 0.5 * change, velocity + change);

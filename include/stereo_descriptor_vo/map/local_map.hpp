@@ -50,10 +50,10 @@ class LocalMap {
 
   const LocalMapOptions& options() const { return options_; }
 
-  std::int64_t newestStamp() const { return newest_stamp_; }
+  std::int64_t newestStamp() const { return frames_.back().stamp; }
   /// Time from the map's newest pair to this one, s.
   double secondsUntil(const StereoFeatures& features) const {
-    return static_cast<double>(features.stamp - newest_stamp_) * 1e-9;
+    return static_cast<double>(features.stamp - newestStamp()) * 1e-9;
   }
 
   const StereoCamera& camera() const { return camera_; }
@@ -61,13 +61,15 @@ class LocalMap {
   /// Whether features come from the same camera and, if there are any, with descriptors of the same kind.
   bool continuedBy(const StereoFeatures& features) const;
 
-  int oldestId() const;  ///< recalled key frames aside
+  int oldestId() const { return oldest().id; }  ///< recalled key frames aside
   int newestId() const { return frames_.back().id; }
   int lastKeyframeId() const;
   bool newestIsKeyframe() const { return frames_.back().is_keyframe; }
   const Eigen::Isometry3d& newestPose() const { return frames_.back().T_camera_origin; }
   /// T_camera_origin of the last key frame before the newest pair. There must be one.
   const Eigen::Isometry3d& poseBeforeNewest() const { return frames_[frames_.size() - 2].T_camera_origin; }
+  /// T_oldest_newest, recalled key frames aside, and the time between the two, s.
+  std::pair<Eigen::Isometry3d, double> motionOfWindow() const;
 
   /// The map in the newest pair's image: the points that are still looked for, at their present estimates, with the
   /// descriptors of their last sightings.
@@ -162,7 +164,8 @@ class LocalMap {
     int id;
     Eigen::Isometry3d T_camera_origin;
     bool is_keyframe;
-    bool is_recalled;       ///< from the memory
+    bool is_recalled;  ///< from the memory
+    std::int64_t stamp = 0;
     double variance = 1.0;  ///< see noteVariance()
   };
   struct FrameObservation : Observation {
@@ -186,6 +189,7 @@ class LocalMap {
     void clear();
   };
 
+  const Frame& oldest() const;
   void pose(Problem& problem) const;
   void forgetKeyframe();
   OldKeyframe keyframe(const Frame& frame) const;
@@ -202,9 +206,8 @@ class LocalMap {
                   const RigCalibration& calibration, double sigma);
 
   LocalMapOptions options_;
-  std::int64_t newest_stamp_ = 0;  ///< of the newest pair
-  StereoCamera camera_;            ///< of the newest pair
-  DescriptorKind kind_;            ///< of the newest pair's descriptors
+  StereoCamera camera_;  ///< of the newest pair
+  DescriptorKind kind_;  ///< of the newest pair's descriptors
   std::deque<Frame> frames_;
   Recycled<Point> points_;
   KeyframeMemory memory_;

@@ -29,10 +29,29 @@ struct RigCalibration {
   double disparityError(const StereoCamera& camera, double u) const { return shape(camera, u).dot(value); }
 };
 
-/// What is known of the calibration, whether it is compensated or not.
-struct CalibrationEstimate {
-  RigCalibration::Vector mean = RigCalibration::Vector::Zero();        ///< px
-  RigCalibration::Matrix covariance = RigCalibration::Matrix::Zero();  ///< px^2
+/// What is known of the rig: (offset, bend, delay) in px, px, s. The delay is the time by which right images are taken
+/// later than their stamps say.
+struct RigEstimate {
+  static constexpr int kParameters = RigCalibration::kParameters + 1, kDelay = RigCalibration::kParameters;
+  using Vector = Eigen::Matrix<double, kParameters, 1>;
+  using Matrix = Eigen::Matrix<double, kParameters, kParameters>;
+  using MotionJacobian = Eigen::Matrix<double, 6, kParameters>;
+  using Shape = Eigen::Matrix<double, RigCalibration::kParameters, kParameters>;
+
+  Vector mean = Vector::Zero();
+  Matrix covariance = Matrix::Zero();
+
+  double delay() const { return mean[kDelay]; }
+
+  /// Derivative of the calibration that disparities show, px, by the rig. While the camera turns to the right at `yaw`
+  /// rad/s, a late right image has moved by f * yaw * (1 + x^2) to the left for each second of delay.
+  static Shape shape(const StereoCamera& camera, double yaw) {
+    const double late = camera.fx * yaw;
+    Shape shape;
+    shape << 1.0, 0.0, late,  //
+        0.0, 1.0, late;
+    return shape;
+  }
 };
 
 /// A normal distribution over the calibration in information form.

@@ -30,12 +30,13 @@ struct CalibrationOptions {
   }
 };
 
-/// Estimate of the rig's disparity error: a Kalman filter, in information form, over the windows of pairs. Windows
-/// overlap: one is part of the prior only for windows that share no pair with it.
+/// Estimate of the rig: a Kalman filter, in information form, over the windows of pairs and the rows of the features.
+/// Windows overlap: one is part of the prior only for windows that share no pair with it.
 ///
-/// The prior is a mixture with equal weights: the error is the options' value, or it is normally distributed around
-/// that with `prior_sigma`. The windows shift the weights (Bayes factor), so the compensated error moves from the
-/// options' value to the measured one without a threshold.
+/// The prior is a mixture with equal weights: the disparities' error is the options' value, or it is normally
+/// distributed around that with `prior_sigma`; the same of the delay, with `right_delay_sigma`. The measurements shift
+/// the weights (Bayes factor), so what is compensated moves from the options' values to the measured ones without a
+/// threshold.
 class CalibrationFilter {
  public:
   /// Ratio between the information of a window and what it states: it counts points as if they erred independently
@@ -44,15 +45,20 @@ class CalibrationFilter {
 
   explicit CalibrationFilter(const CalibrationOptions& options);
 
-  /// Process noise of `dt` s, in which the rig warms up or cools down.
+  /// Process noise of `dt` s, in which the rig warms up or cools down, and its cameras' clocks drift.
   void predict(double dt);
 
-  /// Estimate by the pairs before the window that begins with pair `oldest_id`.
-  CalibrationBelief prior(int oldest_id) const;
+  /// Estimate by the pairs before the window that begins with pair `oldest_id`: of the calibration that its disparities
+  /// have while they are compensated for the present delay().
+  CalibrationBelief prior(int oldest_id, const RigEstimate::Shape& shape) const;
 
   /// Notes the result of the window from pair `oldest_id` to `newest_id`, which had its prior(); `information` excludes
   /// that.
-  void note(int oldest_id, int newest_id, const RigCalibration& calibration, const RigCalibration::Matrix& information);
+  void note(int oldest_id, int newest_id, const RigEstimate::Shape& shape, const RigCalibration& calibration,
+            const RigCalibration::Matrix& information);
+
+  /// Notes the delay, s, that rows have shown up to now, and its standard deviation.
+  void noteRows(double delay, double sigma);
 
   /// Notes the square (px^2) of what a window found the calibration to leave at a point.
   void noteCommon(double square);
@@ -60,22 +66,24 @@ class CalibrationFilter {
   /// The right camera rotated, which is compensated but for an error of this variance, px^2, of all disparities.
   void widen(double variance);
 
+  /// Of the last window.
   const RigCalibration& calibration() const { return calibration_; }
-  /// Estimate by the options and all windows.
-  CalibrationEstimate estimate() const;
-  /// Standard deviations of (offset, bend) in px, NaN before the first window.
-  RigCalibration::Vector sigma() const;
+  /// Estimate by the options, rows and all windows.
+  RigEstimate estimate() const { return weigh(present_.value_or(Evidence())); }
+  /// The delay that is compensated, s.
+  double delay() const { return estimate().delay(); }
+  bool hasWindow() const { return present_.has_value(); }
 
  private:
-  /// Of windows, the options' prior excluded.
+  /// Of measurements, the options' prior excluded.
   struct Evidence {
-    RigCalibration::Matrix information = RigCalibration::Matrix::Zero();       ///< 1/px^2
-    RigCalibration::Vector information_mean = RigCalibration::Vector::Zero();  ///< information * mean
+    RigEstimate::Matrix information = RigEstimate::Matrix::Zero();
+    RigEstimate::Vector information_mean = RigEstimate::Vector::Zero();  ///< information * mean
   };
 
   const Evidence& pastBefore(int oldest_id) const;
-  CalibrationEstimate weigh(const Evidence& evidence) const;
-  void widen(const RigCalibration::Matrix& covariance);
+  RigEstimate weigh(const Evidence& windows) const;
+  void widen(const RigEstimate::Matrix& covariance);
 
   CalibrationOptions options_;
   RigCalibration calibration_;
@@ -83,6 +91,7 @@ class CalibrationFilter {
   Evidence pending_;  ///< of these and of one more, which is past to windows that begin after pair `pending_id_`
   int pending_id_ = -1;
   std::optional<Evidence> present_;  ///< of the past and the last window
+  double rows_information_ = 0.0, rows_delay_ = 0.0;  ///< 1/s^2, s
   int commons_ = 0;                  ///< how many squares were noted
   double common_square_ = 0.0;
 };
