@@ -34,8 +34,10 @@ void reportRig(const LearntRig& rig, OdometryResult& result) {
   if (rig.calibration.hasWindow()) {
     const RigEstimate known = rig.calibration.estimate();
     const RigEstimate::Vector sigma = known.covariance.diagonal().cwiseSqrt();
-    result.disparity_offset = known.mean[0], result.disparity_offset_sigma = sigma[0];
-    result.disparity_bend = known.mean[1], result.disparity_bend_sigma = sigma[1];
+    if (!known.covariance.topLeftCorner<2, 2>().isZero()) {
+      result.disparity_offset = known.mean[0], result.disparity_offset_sigma = sigma[0];
+      result.disparity_bend = known.mean[1], result.disparity_bend_sigma = sigma[1];
+    }
     result.right_delay = known.delay(), result.right_delay_sigma = sigma[RigEstimate::kDelay];
   }
   if (const auto rotation = rig.usual_rows.rotation()) {

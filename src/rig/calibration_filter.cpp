@@ -101,8 +101,8 @@ void CalibrationFilter::note(int oldest_id, int newest_id, const RigEstimate::Sh
   // The window's result combines its own evidence with the prior, so its own is the result's less the prior's. Only one
   // triangle of `information` is accurate; a difference between both would grow from window to window.
   const RigCalibration::Matrix own = 0.5 * kHonest * (information + information.transpose());
-  const RigCalibration::Vector own_mean = own * (calibration.value + compensated) +
-                                          kHonest * prior.information * (calibration.value - prior.mean);
+  const RigCalibration::Vector own_mean =
+      own * (calibration.value + compensated) + kHonest * prior.information * (calibration.value - prior.mean);
   present_ = Evidence{past_.information + shape.transpose() * own * shape,
                       past_.information_mean + shape.transpose() * own_mean};
   if (pending_id_ >= oldest_id) return;

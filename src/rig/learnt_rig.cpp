@@ -17,10 +17,7 @@ std::string ShownRotation::words() const {
 }
 
 LearntRig::LearntRig(const CalibrationOptions& options, const NoiseOptions& assumed)
-    : calibration(options),
-      noise(assumed),
-      assumed_(assumed),
-      delay_sigma_(options.right_delay_sigma) {}
+    : calibration(options), noise(assumed), assumed_(assumed), delay_sigma_(options.right_delay_sigma) {}
 
 /// A rotation against what changes on rigs, and on this one, as a rule.
 ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const MotionHypothesis& found,

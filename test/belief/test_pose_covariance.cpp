@@ -240,51 +240,50 @@ TEST(PoseCovariance, StaysSymmetricAndPositive) {
   }
 }
 
-/// Ten steps of 2 m, each of them longer by a part of the calibration's error.
-PoseCovariance tenSteps(const RigCalibration& compensated) {
+/// Ten steps of 2 m, each of them longer by a part of the rig's error.
+PoseCovariance tenSteps(const RigEstimate::Vector& compensated) {
   PoseCovariance covariance;
-  RigCalibration::MotionJacobian by_calibration = RigCalibration::MotionJacobian::Zero();
-  by_calibration.row(2) << 0.02, 0.005;  // m/px
+  RigEstimate::MotionJacobian by_rig = RigEstimate::MotionJacobian::Zero();
+  by_rig.row(2) << 0.02, 0.005, 3.0;  // m/px, m/px, m/s
   for (int step = 0; step < 10; ++step) {
     for (const int pair : {0, 1}) {  // of which the second is the key frame
       covariance.measure(pair == 0 ? forward() : Eigen::Isometry3d::Identity(), diagonal(1e-4, 0.0));
-      covariance.expose(by_calibration, compensated);
+      covariance.expose(by_rig, compensated);
     }
     covariance.markKeyframe();
   }
   return covariance;
 }
 
-TEST(PoseCovariance, TheCalibrationsErrorAddsUpWithTheDistance) {
-  CalibrationEstimate known;
-  known.covariance.diagonal() << 0.09, 0.25;
-  const Matrix6d moment = tenSteps(RigCalibration{}).byCalibration(known);
-  EXPECT_NEAR(std::sqrt(moment(2, 2)), 10.0 * std::hypot(0.02 * 0.3, 0.005 * 0.5), 1e-12);
+TEST(PoseCovariance, TheRigsErrorAddsUpWithTheDistance) {
+  RigEstimate known;
+  known.covariance.diagonal() << 0.09, 0.25, 1e-6;
+  const Matrix6d moment = tenSteps(RigEstimate::Vector::Zero()).byRig(known);
+  EXPECT_NEAR(std::sqrt(moment(2, 2)), 10.0 * std::hypot(0.02 * 0.3, 0.005 * 0.5, 3.0 * 0.001), 1e-12);
   EXPECT_NEAR(moment.trace(), moment(2, 2), 1e-12);
 }
 
-TEST(PoseCovariance, TheCalibrationsErrorIsFromTheOneThatWasCompensated) {
-  RigCalibration compensated;
-  compensated.value << 0.1, -0.2;
-  CalibrationEstimate known;
-  known.mean = compensated.value;
-  EXPECT_LT(tenSteps(compensated).byCalibration(known).norm(), 1e-20);
-  known.mean << 0.3, -0.2;
-  EXPECT_NEAR(std::sqrt(tenSteps(compensated).byCalibration(known)(2, 2)), 10.0 * 0.02 * 0.2, 1e-12);
+TEST(PoseCovariance, TheRigsErrorIsFromTheOneThatWasCompensated) {
+  const RigEstimate::Vector compensated(0.1, -0.2, 0.002);
+  RigEstimate known;
+  known.mean = compensated;
+  EXPECT_LT(tenSteps(compensated).byRig(known).norm(), 1e-20);
+  known.mean << 0.3, -0.2, 0.002;
+  EXPECT_NEAR(std::sqrt(tenSteps(compensated).byRig(known)(2, 2)), 10.0 * 0.02 * 0.2, 1e-12);
 }
 
-TEST(PoseCovariance, TheWayBackUndoesTheCalibrationsError) {
-  PoseCovariance covariance = tenSteps(RigCalibration{});
-  CalibrationEstimate known;
+TEST(PoseCovariance, TheWayBackUndoesTheRigsError) {
+  PoseCovariance covariance = tenSteps(RigEstimate::Vector::Zero());
+  RigEstimate known;
   known.covariance.setIdentity();
-  RigCalibration::MotionJacobian by_calibration = RigCalibration::MotionJacobian::Zero();
-  by_calibration.row(2) << -0.02, -0.005;
+  RigEstimate::MotionJacobian by_rig = RigEstimate::MotionJacobian::Zero();
+  by_rig.row(2) << -0.02, -0.005, -3.0;
   for (int step = 0; step < 10; ++step) {
     covariance.measure(forward().inverse(), diagonal(1e-4, 0.0));
-    covariance.expose(by_calibration, RigCalibration{});
+    covariance.expose(by_rig, RigEstimate::Vector::Zero());
     covariance.markKeyframe();
   }
-  EXPECT_LT(covariance.byCalibration(known).norm(), 1e-20);
+  EXPECT_LT(covariance.byRig(known).norm(), 1e-20);
 }
 
 }  // namespace sdvo::test_pose_covariance

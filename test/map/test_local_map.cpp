@@ -61,7 +61,7 @@ TEST(LocalMap, APairThatSharesHardlyAnythingWithTheOthersIsNotAdjusted) {
   SyntheticScene scene(3, 3000, 120.0);
   LocalMap map{LocalMapOptions()};
   WindowOptimizer optimizer{WindowOptimizerOptions()};
-  const CalibrationBelief prior = CalibrationFilter(CalibrationOptions()).prior(1);
+  const CalibrationBelief prior = CalibrationFilter(CalibrationOptions()).prior(1, RigEstimate::Shape::Identity());
   RigCalibration calibration;
   see(map, scene.view(Eigen::Isometry3d::Identity(), 1), 1, Eigen::Isometry3d::Identity());
   EXPECT_FALSE(map.adjust(optimizer, prior, calibration).success) << "there are no others";

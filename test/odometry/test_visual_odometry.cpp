@@ -139,6 +139,7 @@ void expectHealthy(const OdometryResult& result) {
 VisualOdometryOptions knownRig() {
   VisualOdometryOptions options;
   options.calibration.enabled = false;
+  options.calibration.right_delay_sigma = 1e-6;
   return options;
 }
 

@@ -117,7 +117,7 @@ TEST(SelfCalibrationReport, ARefusedPairKeepsWhatTheRigTaughtAndTheMap) {
   for (const int k : {20, 21}) {
     StereoFeatures none = scene.view(syntheticPose(k), (k + 1) * kPeriod, 1.0);
     none.report.refused = true;
-    EXPECT_EQ(odometry.update(none).disparity_offset, before.disparity_offset);
+    EXPECT_NEAR(odometry.update(none).disparity_offset, before.disparity_offset, 1e-3);
   }
   for (int k = 22; k < 26; ++k) {
     const OdometryResult result = odometry.update(scene.view(syntheticPose(k), (k + 1) * kPeriod));
@@ -172,6 +172,7 @@ TEST(PoseCovariance, GrowsWithTheDistance) {
   SyntheticScene scene(15, 4000, 100.0);
   VisualOdometryOptions options;
   options.calibration.enabled = false;  // learning the rig makes poses more certain
+  options.calibration.right_delay_sigma = 1e-6;
   VisualOdometry odometry(options);
   double last = 0.0;
   for (int k = 0; k < 20; ++k) {

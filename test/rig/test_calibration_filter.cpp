@@ -4,6 +4,7 @@
 #include <Eigen/LU>
 #include <cmath>
 
+#include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
 #include "stereo_descriptor_vo/rig/calibration_filter.hpp"
 
@@ -26,13 +27,27 @@ CalibrationOptions someOptions() {
 const Vector kPrior(0.5, -1.0);
 const Matrix kInformation = Vector(12.0, 5.0).asDiagonal();  // as a window states it
 
+const RigEstimate::Shape kAhead = RigEstimate::Shape::Identity();  // of a camera that does not turn
+
+CalibrationBelief priorOf(const CalibrationFilter& filter, int oldest) {
+  return filter.prior(oldest, kAhead);
+}
+
+Vector meanOf(const CalibrationFilter& filter) {
+  return filter.estimate().mean.head<2>();
+}
+
+Vector sigmaOf(const CalibrationFilter& filter) {
+  return filter.estimate().covariance.diagonal().head<2>().cwiseSqrt();
+}
+
 /// Adds the window of these pairs that would find `own` without a prior.
 void addWindow(CalibrationFilter& filter, int oldest, int newest, const Vector& own,
-               const Matrix& information = kInformation) {
-  const CalibrationBelief prior = filter.prior(oldest);
+               const Matrix& information = kInformation, const RigEstimate::Shape& shape = kAhead) {
+  const CalibrationBelief prior = filter.prior(oldest, shape);
   RigCalibration result;
   result.value = (prior.information + information).inverse() * (prior.information * prior.mean + information * own);
-  filter.note(oldest, newest, result, information);
+  filter.note(oldest, newest, shape, result, information);
 }
 
 double normal(double distance, double variance) {
@@ -58,11 +73,11 @@ Moments mixed(const Vector& own, const Matrix& information) {
 
 TEST(CalibrationFilter, BeginsAsTheOptionsSayOrAroundThat) {
   CalibrationFilter filter(someOptions());
-  EXPECT_EQ(filter.prior(1).mean, kPrior);
+  EXPECT_EQ(priorOf(filter, 1).mean, kPrior);
   EXPECT_EQ(filter.calibration().value, kPrior);
   EXPECT_NEAR(filter.estimate().covariance(0, 0), 0.5 * kSigma * kSigma, 1e-9) << "half of the rigs are exact";
-  EXPECT_NEAR(filter.prior(1).information(0, 0), 8.0, 1e-2) << "the same in a window's units";
-  EXPECT_TRUE(filter.sigma().array().isNaN().all());
+  EXPECT_NEAR(priorOf(filter, 1).information(0, 0), 8.0, 1e-2) << "the same in a window's units";
+  EXPECT_FALSE(filter.hasWindow());
 }
 
 TEST(CalibrationFilter, GoesOverFromTheOptionsToWhatWindowsMeasure) {
@@ -72,10 +87,10 @@ TEST(CalibrationFilter, GoesOverFromTheOptionsToWhatWindowsMeasure) {
     const Vector own = kPrior + sigmas * Vector(sigma, -0.5 * sigma);
     addWindow(filter, 1, 9, own);
     const Moments expected = mixed(own, kInformation);
-    EXPECT_LT((filter.estimate().mean - expected.mean).norm(), 1e-9) << sigmas;
-    EXPECT_LT((filter.estimate().covariance.diagonal() - expected.variance).norm(), 1e-9) << sigmas;
-    EXPECT_LT((filter.prior(10).mean - expected.mean).norm(), 1e-9) << sigmas;
-    EXPECT_EQ(filter.prior(9).mean, kPrior) << "it shares a pair with this one";
+    EXPECT_LT((meanOf(filter) - expected.mean).norm(), 1e-9) << sigmas;
+    EXPECT_LT((sigmaOf(filter).cwiseAbs2() - expected.variance).norm(), 1e-9) << sigmas;
+    EXPECT_LT((priorOf(filter, 10).mean - expected.mean).norm(), 1e-9) << sigmas;
+    EXPECT_EQ(priorOf(filter, 9).mean, kPrior) << "it shares a pair with this one";
   }
 }
 
@@ -84,10 +99,10 @@ TEST(CalibrationFilter, OfWindowsThatOverlapOneCounts) {
   const Vector own(30.0, -30.0);
   for (const int newest : {5, 6, 7, 8}) {
     addWindow(filter, newest - 4, newest, own);
-    EXPECT_EQ(filter.prior(newest - 4).mean, kPrior);
+    EXPECT_EQ(priorOf(filter, newest - 4).mean, kPrior);
   }
   for (int again = 0; again < 2; ++again)  // the first window has no pair in common with it
-    EXPECT_LT((filter.prior(6).mean - mixed(own, kInformation).mean).norm(), 1e-9);
+    EXPECT_LT((priorOf(filter, 6).mean - mixed(own, kInformation).mean).norm(), 1e-9);
 }
 
 TEST(CalibrationFilter, ManyWindowsKnowMoreAndPoorOnesTakeNothingAway) {
@@ -96,10 +111,10 @@ TEST(CalibrationFilter, ManyWindowsKnowMoreAndPoorOnesTakeNothingAway) {
   double before = 2.0 * kSigma;
   for (int k = 0; k < 50; ++k) {
     addWindow(filter, 10 * k + 1, 10 * k + 9, own);
-    EXPECT_LT(filter.sigma()[0], before) << k;
-    before = filter.sigma()[0];
+    EXPECT_LT(sigmaOf(filter)[0], before) << k;
+    before = sigmaOf(filter)[0];
   }
-  EXPECT_LT((filter.estimate().mean - mixed(own, 50.0 * kInformation).mean).norm(), 1e-6);
+  EXPECT_LT((meanOf(filter) - mixed(own, 50.0 * kInformation).mean).norm(), 1e-6);
   for (int k = 50; k < 70; ++k) addWindow(filter, 10 * k + 1, 10 * k + 9, kPrior, 1e-3 * kInformation);
   EXPECT_LT((filter.calibration().value - own).norm(), 0.1);
 }
@@ -107,18 +122,18 @@ TEST(CalibrationFilter, ManyWindowsKnowMoreAndPoorOnesTakeNothingAway) {
 TEST(CalibrationFilter, WhatIsOldIsKnownLess) {
   CalibrationFilter filter(someOptions());
   addWindow(filter, 1, 9, {3.5, -2.0}, 1e6 * kInformation);
-  const double before = filter.sigma()[0];
+  const double before = sigmaOf(filter)[0];
   for (int second = 0; second < 100; ++second) filter.predict(1.0);
-  EXPECT_NEAR(filter.sigma()[0], 0.5, 0.02) << "half a pixel in 100 s";
+  EXPECT_NEAR(sigmaOf(filter)[0], 0.5, 0.02) << "half a pixel in 100 s";
   EXPECT_LT(before, 0.01);
-  EXPECT_LT((filter.estimate().mean - Vector(3.5, -2.0)).norm(), 0.1);
+  EXPECT_LT((meanOf(filter) - Vector(3.5, -2.0)).norm(), 0.1);
 }
 
 TEST(CalibrationFilter, AKnockMakesBothUnknownAlike) {
   CalibrationFilter filter(someOptions());
   addWindow(filter, 1, 9, {3.5, -2.0}, 1e6 * kInformation);
   filter.widen(0.25);
-  const Matrix covariance = filter.estimate().covariance;
+  const RigEstimate::Matrix covariance = filter.estimate().covariance;
   EXPECT_NEAR(covariance(0, 0), 0.25, 0.02);
   EXPECT_NEAR(covariance(0, 1), 0.25, 0.02) << "a turn about the vertical axis moves offset and bend alike";
 }
@@ -127,11 +142,75 @@ TEST(CalibrationFilter, HoldsThePriorWhenNotEnabled) {
   CalibrationOptions options = someOptions();
   options.enabled = false;
   CalibrationFilter filter(options);
-  EXPECT_EQ(filter.estimate().covariance, Matrix(Matrix::Zero()));
+  EXPECT_TRUE(sigmaOf(filter).isZero());
   addWindow(filter, 1, 9, {100.0, 100.0});
-  EXPECT_EQ(filter.prior(10).mean, kPrior);
+  EXPECT_EQ(priorOf(filter, 10).mean, kPrior);
   EXPECT_LT((filter.calibration().value - kPrior).norm(), 0.01) << "of 100 px";
-  EXPECT_TRUE(filter.sigma().array().isNaN().all());
+  EXPECT_EQ(meanOf(filter), kPrior);
+}
+
+constexpr double kFocal = 400.0;  // px
+
+RigEstimate::Shape turning(double yaw) {
+  StereoCamera camera;
+  camera.fx = kFocal;
+  return RigEstimate::shape(camera, yaw);
+}
+
+/// A window of a rig without misalignment whose right image is so late beyond what is compensated.
+void addTurn(CalibrationFilter& filter, int k, double yaw, double delay) {
+  const double shown = kFocal * yaw * (delay - filter.delay());
+  addWindow(filter, 10 * k + 1, 10 * k + 9, Vector(shown, shown), 1e4 * Matrix::Identity(), turning(yaw));
+}
+
+TEST(CalibrationFilter, ADelayIsWhatFollowsTheYawAndAnOffsetWhatStays) {
+  for (const double delay : {-0.003, 0.0, 0.001, 0.003}) {
+    CalibrationFilter filter{CalibrationOptions()};
+    addTurn(filter, 0, 0.5, delay);
+    const RigEstimate one = filter.estimate();
+    if (delay != 0.0) {
+      EXPECT_LT(one.covariance(0, 2), -0.5 * std::sqrt(one.covariance(0, 0) * one.covariance(2, 2)))
+          << "one turn shows their sum";
+    }
+    EXPECT_LT(one.covariance(2, 2), 0.003 * 0.003);
+    for (int k = 1; k < 20; ++k) addTurn(filter, k, k % 2 ? -0.5 : 0.5, delay);
+    EXPECT_NEAR(filter.delay(), delay, 1e-4);
+    EXPECT_LT(meanOf(filter).norm(), 0.05) << delay;
+    EXPECT_LT((filter.prior(1000, turning(1.0)).mean).norm(), 0.05) << "it is compensated";
+  }
+}
+
+TEST(CalibrationFilter, RowsShowTheDelayToo) {
+  CalibrationFilter filter{CalibrationOptions()};
+  EXPECT_NEAR(std::sqrt(filter.estimate().covariance(2, 2)), std::sqrt(0.5) * CalibrationOptions().right_delay_sigma,
+              1e-9)
+      << "half of the rigs are in step";
+  for (const double delay : {0.0002, 0.003}) {
+    filter.noteRows(delay, 0.0002);
+    EXPECT_LE(filter.delay(), delay);
+    EXPECT_NEAR(filter.delay(), delay > 0.001 ? delay : 0.0, 5e-5) << "as far as chance does not explain it";
+    const double left = delay - filter.delay();
+    EXPECT_GT(filter.estimate().covariance(2, 2) + 1e-12, left * left / 9.0);
+  }
+  for (int second = 0; second < 100; ++second) filter.predict(1.0);
+  EXPECT_NEAR(filter.delay(), 0.003, 5e-5) << "rows have a memory of their own";
+}
+
+/// As a late right image has it: a point far away, in the middle and at 45 degrees.
+TEST(RigEstimate, ShapeIsThatOfARightImageThatIsLate) {
+  StereoCamera camera;
+  camera.fx = camera.fy = kFocal, camera.cx = 500.0, camera.cy = 300.0, camera.baseline = 0.1;
+  constexpr double kYaw = 0.4, kDelay = 0.002;
+  Vector6d turn = Vector6d::Zero();
+  turn[4] = kYaw * kDelay;
+  for (const double u : {500.0, 100.0, 900.0}) {
+    const Eigen::Vector3d point = camera.backProject(u, 300.0, 1e-3);
+    const Eigen::Vector3d late = camera.project(expSE3(turn).inverse() * point);
+    RigCalibration shown;
+    shown.value = RigEstimate::shape(camera, kYaw) * Eigen::Vector3d(0.0, 0.0, kDelay);
+    const double disparity_error = u - late.x();  // the left one is at u, the right one would be, too
+    EXPECT_NEAR(shown.disparityError(camera, u), disparity_error, 0.01) << u;
+  }
 }
 
 /// The optimizer fills one triangle of its matrices.
@@ -140,7 +219,7 @@ TEST(CalibrationFilter, HalvesThatDifferDoNotGrow) {
   Matrix information = 1e4 * Matrix::Identity();
   information(0, 1) = 1e-3;
   for (int k = 0; k < 300; ++k) addWindow(filter, k, k + 8, kPrior, information);
-  const CalibrationBelief prior = filter.prior(300);
+  const CalibrationBelief prior = priorOf(filter, 300);
   EXPECT_EQ(prior.information(0, 1), prior.information(1, 0));
   EXPECT_LT((filter.calibration().value - kPrior).norm(), 1e-3);
 }
@@ -148,20 +227,20 @@ TEST(CalibrationFilter, HalvesThatDifferDoNotGrow) {
 TEST(CalibrationFilter, WhatIsLeftAtAPointIsKnownOnceTwentyWindowsToldOfIt) {
   CalibrationFilter filter(someOptions());
   for (int window = 1; window < 20; ++window) filter.noteCommon(0.02 + (window % 2) * 0.04);
-  EXPECT_FALSE(filter.prior(1).common_sigma);
+  EXPECT_FALSE(priorOf(filter, 1).common_sigma);
   filter.noteCommon(0.02);
-  ASSERT_TRUE(filter.prior(1).common_sigma);
+  ASSERT_TRUE(priorOf(filter, 1).common_sigma);
   // Their mean is 0.04 px^2.
-  EXPECT_NEAR(*filter.prior(1).common_sigma, 0.2, 1e-9);
+  EXPECT_NEAR(*priorOf(filter, 1).common_sigma, 0.2, 1e-9);
 }
 
 TEST(CalibrationFilter, WhatIsLeftAtAPointMayChange) {
   CalibrationFilter filter(someOptions());
   for (int window = 0; window < 1000; ++window) filter.noteCommon(0.01);
   for (int window = 0; window < 200; ++window) filter.noteCommon(0.09);
-  EXPECT_GT(*filter.prior(1).common_sigma, std::sqrt(0.05));
+  EXPECT_GT(*priorOf(filter, 1).common_sigma, std::sqrt(0.05));
   for (int window = 0; window < 2000; ++window) filter.noteCommon(0.09);
-  EXPECT_NEAR(*filter.prior(1).common_sigma, 0.3, 1e-3);
+  EXPECT_NEAR(*priorOf(filter, 1).common_sigma, 0.3, 1e-3);
 }
 
 /// A window that is refused after all asks for its prior as well.
@@ -169,11 +248,11 @@ TEST(CalibrationFilter, AskingForAPriorChangesNothing) {
   CalibrationFilter asked{CalibrationOptions{}}, other{CalibrationOptions{}};
   RigCalibration found;
   found.value << 0.3, -0.5;
-  for (CalibrationFilter* filter : {&asked, &other}) filter->note(0, 4, found, 1e4 * Matrix::Identity());
-  asked.prior(5);
-  for (CalibrationFilter* filter : {&asked, &other}) filter->note(4, 8, found, 1e4 * Matrix::Identity());
-  EXPECT_EQ(asked.prior(6).information, other.prior(6).information);
-  EXPECT_EQ(asked.prior(6).mean, other.prior(6).mean);
+  for (CalibrationFilter* filter : {&asked, &other}) filter->note(0, 4, kAhead, found, 1e4 * Matrix::Identity());
+  priorOf(asked, 5);
+  for (CalibrationFilter* filter : {&asked, &other}) filter->note(4, 8, kAhead, found, 1e4 * Matrix::Identity());
+  EXPECT_EQ(priorOf(asked, 6).information, priorOf(other, 6).information);
+  EXPECT_EQ(priorOf(asked, 6).mean, priorOf(other, 6).mean);
 }
 
 }  // namespace sdvo::test_calibration_filter

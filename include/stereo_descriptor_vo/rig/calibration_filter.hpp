@@ -24,7 +24,7 @@ struct CalibrationOptions {
              "standard deviation of an error of both, in the centre and at 45 degrees from it, which is beforehand as "
              "likely as none");
     list.add("right_delay", right_delay, {-0.1, 0.1}, "s",
-             "time by which right images are known to be later than left ones; a significant difference is found");
+             "time by which right images are known to be later than left ones; what it lacks is estimated");
     list.add("right_delay_sigma", right_delay_sigma, {1e-6, 0.1}, "s",
              "standard deviation of an error of that time, which is beforehand as likely as none");
   }
@@ -33,10 +33,9 @@ struct CalibrationOptions {
 /// Estimate of the rig: a Kalman filter, in information form, over the windows of pairs and the rows of the features.
 /// Windows overlap: one is part of the prior only for windows that share no pair with it.
 ///
-/// The prior is a mixture with equal weights: the disparities' error is the options' value, or it is normally
-/// distributed around that with `prior_sigma`; the same of the delay, with `right_delay_sigma`. The measurements shift
-/// the weights (Bayes factor), so what is compensated moves from the options' values to the measured ones without a
-/// threshold.
+/// The prior is a mixture with equal weights. The disparities' error is the options' value, or it is normally
+/// distributed around that with `prior_sigma`. The delay has the same prior, with `right_delay_sigma`. Measurements
+/// shift the weights (Bayes factor), so what is compensated moves to the measured values without a threshold.
 class CalibrationFilter {
  public:
   /// Ratio between the information of a window and what it states: it counts points as if they erred independently
@@ -90,9 +89,9 @@ class CalibrationFilter {
   Evidence past_;     ///< of windows that share no pair with the present one
   Evidence pending_;  ///< of these and of one more, which is past to windows that begin after pair `pending_id_`
   int pending_id_ = -1;
-  std::optional<Evidence> present_;  ///< of the past and the last window
+  std::optional<Evidence> present_;                   ///< of the past and the last window
   double rows_information_ = 0.0, rows_delay_ = 0.0;  ///< 1/s^2, s
-  int commons_ = 0;                  ///< how many squares were noted
+  int commons_ = 0;                                   ///< how many squares were noted
   double common_square_ = 0.0;
 };
 
