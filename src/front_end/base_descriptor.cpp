@@ -66,8 +66,8 @@ class BriefDescriptor : public BaseDescriptor {
   int bytes() const override { return Brief::kBytes; }
 };
 
-/// A descriptor of OpenCV's. They differ in what they take the neighbourhood's size from, and some drop and reorder
-/// key points; `impose` sets the fields that one reads so that `size` has its effect, and class_id carries the index.
+/// A descriptor of OpenCV's. Each reads the neighbourhood's size from another field of the key point (size, octave,
+/// level): `impose` sets it. Some drop and reorder key points: class_id has the index.
 class OpenCvDescriptor : public BaseDescriptor {
  public:
   using Impose = std::function<void(float size, cv::KeyPoint&)>;

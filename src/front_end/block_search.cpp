@@ -59,9 +59,9 @@ cv::Mat correlationOf(const cv::Mat& block, const cv::Mat& image) {
   return correlation;
 }
 
-/// Where the block around `centre` looks most alike within `area`, a rectangle of block centres. Nothing where the best
-/// correlation lacks more of 1 than `uniqueness` times what the best one elsewhere lacks: texture that repeats itself,
-/// or a point whose true match lies outside of the area. Nothing either of a block that deviates by less than `flat`.
+/// Position of the best correlation with the block around `centre`, within `area`, a rectangle of block centres.
+/// Nothing unless 1 - best <= uniqueness * (1 - best elsewhere): else the texture repeats, or the true match lies
+/// outside of the area. Nothing either if the block's standard deviation is below `flat`.
 std::optional<cv::Point> findBlock(const cv::Mat& from, const cv::Mat& in, cv::Point centre, cv::Size half,
                                    cv::Rect area, double uniqueness, double flat) {
   constexpr double kAlike = 0.85;  // least correlation
@@ -87,7 +87,7 @@ std::optional<cv::Point> findBlock(const cv::Mat& from, const cv::Mat& in, cv::P
   return cv::Point(reach.x + at.x + half.width, reach.y + at.y + half.height);
 }
 
-/// The same where the way back leads to where it began.
+/// The same with a check from right to left: the match of the match must be the centre, to a pixel.
 std::optional<cv::Point> findMutually(const cv::Mat& left, const cv::Mat& right, cv::Point centre, cv::Size half,
                                       cv::Size reach, double flat) {
   constexpr double kUnique = 0.7;

@@ -15,11 +15,11 @@ struct FoundCorner {
 /// Looks for corners of the left image in all directions of the right one, to a pixel, blind to gain and brightness.
 class BlockSearch {
  public:
-  /// Images are CV_8U of one size and must outlive the search. `max_disparity`, px to either side; `reach`, rows above
-  /// and below.
+  /// Images are CV_8U of one size and must outlive the search. It reaches `max_disparity` px to the left and to the
+  /// right, and `reach` rows up and down.
   BlockSearch(const cv::Mat& left, const cv::Mat& right, double max_disparity, double reach);
 
-  /// Nothing where texture is flat or repeats itself, or where the way back leads elsewhere.
+  /// Nothing where texture is flat or repeats itself, or where the search from right to left ends elsewhere.
   std::optional<FoundCorner> find(const cv::Point2f& corner) const;
 
  private:

@@ -28,7 +28,7 @@ Parts logRatios(const cv::Mat& left, const cv::Mat& right) {
   return ratios;
 }
 
-/// How many pixels of every second row, in the parts that count, are darker than each level or just as dark.
+/// For each grey level, how many pixels have at most that level. Every second row of the parts that count.
 std::array<int, kLevels> cumulativeHistogram(const cv::Mat& image, const std::array<bool, kColumns * kRows>& counting) {
   std::array<int, kLevels> counts{};
   for (int y = 0; y < image.rows; y += 2) {
@@ -49,7 +49,7 @@ cv::Mat withLevelsOf(const cv::Mat& model, const cv::Mat& image, const std::arra
   cv::Mat table(1, kLevels, CV_8U), result;
   int found = 0;
   for (int level = 0; level < kLevels; ++level) {
-    // The middle of the level's pixels: a level that holds many of them is none of its two ends.
+    // Rank of the middle one of the level's pixels: with the first or the last one, levels of many pixels are biased.
     const int darker = level > 0 ? of_image[level - 1] : 0;
     const int rank = darker + (of_image[level] - darker) / 2;
     while (found < kLevels - 1 && of_model[found] <= rank) ++found;
@@ -66,8 +66,8 @@ void balanceExposures(double left_mean, double right_mean, cv::Mat& left, cv::Ma
   constexpr double kTolerance = 0.15;  // ratio of the mean grey levels beyond 1
   const double darker = std::min(left_mean, right_mean), brighter = std::max(left_mean, right_mean);
   if (darker < kDark || brighter <= (1.0 + kTolerance) * darker) return;
-  // A part that is covered on one side tells nothing of the exposure.
-  constexpr double kCovered = 2.0;  // ratio, beyond that of most parts (chosen)
+  // A part that is covered on one side has another ratio; it is left out of the histograms.
+  constexpr double kCovered = 2.0;  // factor between its ratio and that of most parts (chosen)
   const Parts ratios = logRatios(left, right);
   const double usual = quantile({ratios.begin(), ratios.end()}, 0.5);
   if (std::abs(usual) <= std::log1p(kTolerance)) return;

@@ -36,13 +36,13 @@ SDVO_AVX2 inline __m256i loadPixels(const std::uint8_t* pixels) {
   return _mm256_loadu_si256(reinterpret_cast<const __m256i*>(pixels));
 }
 
-/// How far both differences, upwards and downwards, exceed zero: their larger one.
+/// max(brightest - centre, centre - darkest, 0).
 SDVO_AVX2 inline __m256i excess(__m256i brightest, __m256i darkest, __m256i centre) {
   return _mm256_max_epu8(_mm256_subs_epu8(brightest, centre), _mm256_subs_epu8(centre, darkest));
 }
 
-/// For 32 pixels the difference that all nine pixels of some arc exceed the centre by, upwards or downwards; zero where
-/// that is not above the threshold.
+/// Contrasts of 32 pixels: the largest difference to the centre that all nine pixels of an arc have, brighter or
+/// darker; zero if that is not above the threshold.
 SDVO_AVX2 inline __m256i contrast(const std::uint8_t* pixels, const Offsets& offsets, __m256i threshold) {
   const __m256i centre = loadPixels(pixels);
   // Every arc of nine holds two neighbours of these four.
@@ -82,7 +82,7 @@ SDVO_AVX2 inline __m256i contrast(const std::uint8_t* pixels, const Offsets& off
   return _mm256_andnot_si256(_mm256_cmpeq_epi8(_mm256_subs_epu8(found, threshold), zero), found);
 }
 
-/// Contrasts of one row's pixels but those within the radius of its ends.
+/// Contrasts of a row's pixels, without kRadius of them at both ends.
 SDVO_AVX2 void contrastsOfRow(const std::uint8_t* row, int columns, const Offsets& offsets, int threshold,
                               std::uint8_t* contrasts) {
   const __m256i lanes = _mm256_set1_epi8(static_cast<char>(threshold));
@@ -137,7 +137,7 @@ std::vector<cv::KeyPoint> findWithAvx2(const cv::Mat& image, int threshold) {
 }
 #endif
 
-/// Sixteen pixels worked on at once: rows of four, of which three are of interest, and nothing.
+/// Three rows of four pixels in a register; its last four bytes are unused.
 typedef std::uint8_t Pixels __attribute__((vector_size(16)));
 
 Pixels smaller(const Pixels& a, const Pixels& b) {
@@ -187,7 +187,7 @@ Pixels contrasts(const std::uint8_t* first, std::size_t step) {
   return larger(brightest - centre, centre - darkest);
 }
 
-/// Of the parabola through three values one apart, from the middle one.
+/// Offset of the maximum of the parabola through the values at -1, 0 and 1.
 float maximumOf(int before, int here, int after) {
   const int bend = 2 * here - before - after;
   if (bend <= 0) return 0.f;

@@ -28,12 +28,11 @@ namespace {
 /// read or is larger than any camera's image. By libpng: OpenCV's readers bring a hundred libraries, 40 MB, into every
 /// process.
 cv::Mat readMask(const std::string& file) {
-  constexpr std::uint64_t kMostPixels =
-      50'000'000;  // of stereo cameras at most 12 million; a wrong file takes no memory
+  constexpr std::uint64_t kMostPixels = 50'000'000;  // stereo cameras have at most 12 million
   const std::string name = "'" + std::filesystem::absolute(file).string() + "'";
   png_image header{};
   header.version = PNG_IMAGE_VERSION;
-  // A pipe would be waited for.
+  // Reading from a pipe would block.
   if (!std::filesystem::is_regular_file(file) || png_image_begin_read_from_file(&header, file.c_str()) == 0)
     throw std::invalid_argument("cannot read a PNG from " + name);
   if (std::uint64_t{header.width} * header.height > kMostPixels) {
@@ -42,7 +41,7 @@ cv::Mat readMask(const std::string& file) {
                                      " px: a mask has the size of the rectified left image"));
   }
   header.format = PNG_FORMAT_GRAY;
-  // Black, which whatever is transparent lets through.
+  // libpng blends transparent pixels with this black background.
   cv::Mat mask = cv::Mat::zeros(static_cast<int>(header.height), static_cast<int>(header.width), CV_8U);
   if (png_image_finish_read(&header, nullptr, mask.data, static_cast<png_int_32>(mask.step), nullptr) == 0)
     throw std::invalid_argument("cannot read all of the PNG " + name + ": is it truncated?");
@@ -62,8 +61,8 @@ std::vector<Corner> detectFast(const cv::Mat& image, int threshold) {
   return toCorners(findFastCorners(image, threshold));
 }
 
-/// Detectors of OpenCV's with a scale space of their own: positions and scores are taken, the sizes come from the
-/// depth. More are asked for than wanted, so that the buckets have a choice.
+/// Corners that OpenCV's detectors are asked for, per corner that is wanted: the buckets choose among them. Their sizes
+/// are not used; those come from the depth.
 constexpr int kChoice = 4;
 
 std::vector<Corner> detectOrb(const cv::Mat& image, const FeatureDetectorOptions& options, int threshold) {
@@ -121,8 +120,8 @@ std::vector<Corner> detectAll(const cv::Mat& image, const FeatureDetectorOptions
   throw std::invalid_argument("there is no such detector");
 }
 
-/// To the intersection of the gradient lines. A corner that wanders off is not one point; its integer position is kept.
-/// Gradient detectors answer up to half their window inside of a corner, hence the limit.
+/// Moves corners to the intersection of the gradient lines around them. Gradient detectors respond up to half of their
+/// window inside of a corner. One that moves further is no single point and keeps its integer position.
 void refineByGradients(const cv::Mat& image, std::vector<Corner>& corners) {
   constexpr int kHalfSide = 3;  // px, of the window: cv::cornerSubPix needs 11 px, less than the smallest image has
   if (corners.empty()) return;
@@ -139,8 +138,7 @@ void refineByGradients(const cv::Mat& image, std::vector<Corner>& corners) {
   }
 }
 
-/// Each detector's corners by what makes them one. Those of SIFT lie between pixels already, and those of ORB's smaller
-/// images are not corners of the image itself.
+/// Sub-pixel positions of corners. SIFT has them already. ORB's corners of smaller images are none at full resolution.
 void refine(const cv::Mat& image, const FeatureDetectorOptions& options, std::vector<Corner>& corners) {
   switch (options.type) {
     case DetectorType::kFast:
@@ -251,7 +249,8 @@ std::vector<Corner> FeatureDetector::detect(const cv::Mat& image, int border, co
     if (!valid.empty()) removeMasked(valid, image.size(), corners);
     return corners;
   };
-  // Weaker ones where there are too few. At 2.25 sigma noise alone has a corner in 300 px, at 1 sigma in 20.
+  // If they are too few, the contrast is halved, at most twice: at 2.25 sigma noise alone has a corner in 300 px, at 1
+  // sigma in 20.
   const bool has_limit = options_.type == DetectorType::kFast || options_.type == DetectorType::kOrb;
   const int halvings = has_limit ? 2 : 0;
   double contrast = options_.min_contrast * noiseOf(image(inner));

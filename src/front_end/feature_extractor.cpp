@@ -23,7 +23,7 @@ void checkImage(const cv::Mat& image, const char* side, const StereoCamera& came
   throw std::invalid_argument(message.str());
 }
 
-/// Sums of the grey levels but the first, and of the absolute horizontal gradients.
+/// Sums of the grey levels, without the first one, and of the absolute horizontal gradients.
 struct MeasureRow {
   static SDVO_IN_KERNEL void run(const std::uint8_t* row, int columns, int* sum, int* gradient) {
     int greys = 0, gradients = 0;
@@ -35,8 +35,8 @@ struct MeasureRow {
   }
 };
 
-/// Mean grey level and mean absolute horizontal gradient, on every fourth row: both are there to recognise darkness and
-/// blur, not to be precise.
+/// Mean grey level and mean absolute horizontal gradient of every fourth row: precise enough to recognise darkness and
+/// blur.
 void measureImage(const cv::Mat& image, double& mean_intensity, double& sharpness) {
   constexpr int kRowStep = 4;
   std::int64_t sum = 0, gradient = 0, pixels = 0;
@@ -176,13 +176,13 @@ StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::M
     matches = stereo_matcher_.match(searched_left, searched_right, positions, left.cols);
     report.stereo_matched = static_cast<int>(matches.size());
   }
-  // Those of a rig that is not what it should be are wrong ones.
+  // A refused rig matches wrong points.
   if (report.refused) matches.clear();
   report.stereo_time = stopwatch.lap();
 
   describe(left, right, corners, matches, features);
 
-  // A patch at that size, too, by which the feature can be aligned between pairs.
+  // A patch of the left view at that size, with which later pairs align the feature.
   features.patch_layout = options_.patch.layout();
   if (features.hasPatches()) features.patches = cutPatches(left, features);
   report.describe_time = stopwatch.lap();

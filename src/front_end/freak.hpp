@@ -63,7 +63,7 @@ class Freak {
   IntegralImage image_;
 };
 
-/// What a key point makes of the pattern: how much larger it is and how it is turned.
+/// Scale and rotation of the pattern at a key point.
 struct FreakPose {
   static constexpr float kSmallestHalfSide = 0.5f;  ///< of a field's box: one pixel
 

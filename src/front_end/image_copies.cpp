@@ -12,8 +12,8 @@
 namespace sdvo {
 namespace {
 
-/// What pixels 2 k - 1, 2 k and 2 k + 1 contribute to pixel k of the half: where there are less than two of them for
-/// each, it begins within the first.
+/// Weights of pixels 2 k - 1, 2 k and 2 k + 1 in pixel k of the half image. An odd size has slightly less than two
+/// pixels for each of the half's, so the interval of pixel k begins in the middle of a pixel.
 struct Shares {
   std::vector<float> before, here, after;
 

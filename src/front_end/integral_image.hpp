@@ -26,7 +26,7 @@ class IntegralImage {
   const cv::Mat& sums() const { return sums_; }
 
   /// Mean grey level of the square around (u, v) with the given half side (all px). The square must lie inside the
-  /// image. To the nearest 1/256: means that are equal must compare so, whatever the sums were rounded to on the way.
+  /// image. Rounded to 1/256, so that rounding errors of the sums do not make equal means different.
   float boxMean(float u, float v, float half) const {
     const Edge left = edge(u - half, sums_.cols), right = edge(u + half, sums_.cols);
     const Edge top = edge(v - half, sums_.rows), bottom = edge(v + half, sums_.rows);

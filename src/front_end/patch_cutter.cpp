@@ -17,7 +17,7 @@ using PerEdge = std::array<float, kMostEdges>;
 struct PatchEdges {
   std::array<int, kMostEdges> index;
   PerEdge share;  ///< of the second one
-  PerEdge width;  ///< from here to the next edge; none behind the last one
+  PerEdge width;  ///< px to the next edge; 0 at the last one
 };
 
 /// `size`: columns or rows of the integral. Pixel p covers [p - 0.5, p + 0.5], and column p of the integral is its left
@@ -44,8 +44,8 @@ PatchEdges edgesAround(float centre, int side, float spacing, int size) {
   return edges;
 }
 
-/// The integral at the columns' edges, between rows of it. It counts from the patch's own corner: such sums are small
-/// enough to be exact in single precision.
+/// Sums of the pixels between the patch's first corner and real-valued positions. From there they are small enough to
+/// be exact in single precision.
 class Sums {
  public:
   Sums(const cv::Mat& integral, const PatchEdges& columns, const PatchEdges& rows)
@@ -74,7 +74,7 @@ class Sums {
 void cutPlain(const cv::Mat& integral, const PatchEdges& columns, const PatchEdges& rows, int side,
               std::uint8_t* samples) {
   const Sums sums(integral, columns, rows);
-  PerEdge above{};  // all that lies above a row of squares, for each of its columns
+  PerEdge above{};  // for each column of squares, the sum of all pixels above the present row of them
   for (int j = 0; j <= side; ++j)
     for (int i = 0; i < side; ++i) {
       const float upto = sums.at(rows.index[j], rows.share[j], i + 1) - sums.at(rows.index[j], rows.share[j], i);
@@ -124,7 +124,7 @@ SDVO_VECTORS void cutWithVectors(const cv::Mat& integral, const PatchEdges& colu
   std::array<std::uint32_t, PatchOptions::kMostSamples * PatchOptions::kMostSamples + kRegister * kCount> patch;
   for (int j = 0; j <= side; ++j) {
     const int row = rows.index[j];
-    // Where edges are a pixel apart, each row of the integral serves two of them.
+    // Where edges are a pixel apart, the previous edge's lower row is this one's upper row.
     const bool known = j > 0 && row == rows.index[j - 1] + 1;
     const float height = j > 0 ? rows.width[j - 1] : 0.f;
     for (int r = 0; r < kCount; ++r) {

@@ -19,8 +19,8 @@ double distanceFrom(const RowLine& rows, const FoundCorner& corner) {
   return std::abs(corner.dv - rows.at(corner.u));
 }
 
-/// Medians of the slopes between corners far apart, and of the rest in the middle of the image. Each corner is compared
-/// with some of those before it.
+/// The slope is the median over pairs of corners that are far apart (Theil-Sen), the offset the median of the rest.
+/// Each corner is paired with some of the previous ones.
 RowLine fitRows(const std::vector<FoundCorner>& found, int columns) {
   constexpr std::size_t kCompared = 100;  // with all, time would grow with the square of the corners
   std::vector<double> slopes, rest;
@@ -29,14 +29,15 @@ RowLine fitRows(const std::vector<FoundCorner>& found, int columns) {
     for (std::size_t k = 0; k < i; k += 1 + i / kCompared, ++compared)
       if (std::abs(found[i].u - found[k].u) > 0.1 * columns)
         slopes.push_back((found[i].dv - found[k].dv) / (found[i].u - found[k].u));
-  if (4 * slopes.size() < compared) slopes.clear();  // corners side by side show none, but a wrong one far from them
+  // If nearly all corners are close together, the pairs that are far apart have an outlier: no slope is measured.
+  if (4 * slopes.size() < compared) slopes.clear();
   RowLine rows{0.0, median(slopes), columns};
   for (const FoundCorner& corner : found) rest.push_back(corner.dv - rows.at(corner.u));
   rows.offset = median(rest);
   return rows;
 }
 
-/// Corners within `max_dv` of the rows: further left in the right image, as they should be, and further right.
+/// Corners within `max_dv` of the rows, by the sign of their disparity: positive, and negative as of swapped images.
 struct Agreement {
   int in_order = 0, swapped = 0;
 };
@@ -57,8 +58,8 @@ RigDiagnosis refusal(const std::string& words, const std::optional<RowLine>& row
   return {words, rows, false, true};
 }
 
-/// Of a rig in order. The scene is too near where a tenth of the corners lie beyond the usual search: fewer may be
-/// wrong ones.
+/// Diagnosis of a rig in order. The scene is too near if a tenth of the corners have larger disparities than the search
+/// reaches; fewer may be wrong matches.
 RigDiagnosis inOrder(const std::vector<FoundCorner>& found, int columns, double max_disparity) {
   const auto shareBeyond = [&](double most) {
     const auto is = [&](const FoundCorner& corner) { return corner.disparity > most; };
@@ -69,7 +70,7 @@ RigDiagnosis inOrder(const std::vector<FoundCorner>& found, int columns, double 
       is_half ? "too near: disparities beyond half of the image's width" : "", {}, shareBeyond(max_disparity) > 0.1};
 }
 
-/// One side alone is flipped, by the code of cv::flip. Swapped sides whose other image is flipped show the same.
+/// Hypothesis: one side is flipped; `code` as of cv::flip. Swapped sides with the other image flipped look the same.
 Cause tryFlip(int code, const char* how, const cv::Mat& left, const cv::Mat& right,
               const std::vector<cv::Point2f>& corners, double max_dv) {
   cv::Mat flipped;
@@ -88,8 +89,8 @@ Cause tryFlip(int code, const char* how, const cv::Mat& left, const cv::Mat& rig
                        is_right ? "left" : "right", " one is and both are swapped"))};
 }
 
-/// What is seen of one side alone and explains all: its gradients beyond noise are much smaller than the other one's,
-/// or it is the image of the pair before. Sums over so many pixels are equal for no other reason.
+/// Faults of a single side: its gradients, less those of noise, are much smaller than the other side's, or it repeats
+/// the image of the previous pair. Sums over so many pixels are not equal by chance.
 RigDiagnosis judgeSides(const cv::Mat& left, const cv::Mat& right, const ExtractionReport& now,
                         const ExtractionReport& before) {
   constexpr double kLit = 0.25;              // ratio (chosen): focus and exposure of a rig differ by less
@@ -130,7 +131,7 @@ RigDiagnosis RigMonitor::diagnose(const cv::Mat& left, const cv::Mat& right, con
     const auto there = search.find(corner);
     if (!there) continue;
     found.push_back(*there);
-    // A view with little to match is suspicious, too, pair after pair: a few corners clear its rig.
+    // Views with little texture are suspicious in every pair. A few corners in order end the search early.
     const int in_order = agreementWith(straight, found, max_dv_).in_order;
     if (in_order >= kAgreeing && in_order > 0.8 * static_cast<double>(found.size()))
       return inOrder(found, left.cols, max_disparity_);

@@ -18,7 +18,7 @@ void orient(const cv::Mat& image, std::vector<ViewKeypoint>& keypoints) {
     if (Freak::fits(keypoint, image.size())) keypoint.angle = freak.orientation(keypoint);
 }
 
-/// px by which the furthest pattern goes beyond its image; both images have the same `size`.
+/// px by which patterns extend beyond the images at most; both images have this `size`.
 int overhang(const BaseDescriptor& base, cv::Size size, const std::vector<StereoKeypoint>& keypoints) {
   const float last_column = static_cast<float>(size.width - 1), last_row = static_cast<float>(size.height - 1);
   double furthest = 0.0;

@@ -1,9 +1,196 @@
 #include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
 
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <limits>
 #include <opencv2/core/utility.hpp>
 #include <stdexcept>
 
+#include "../common/kernel.hpp"
+#include "block_differences.hpp"
+#include "image_copies.hpp"
+#include "image_noise.hpp"
+#include "slanted_patch.hpp"
+
 namespace sdvo {
+namespace {
+
+constexpr int kHalfRows = 4;  // block rows above and below the centre at half resolution
+constexpr int kFullRows = 5;  // … and at full resolution
+constexpr int kMargin = 64;   // px added around every image, so that no read needs a check
+
+/// The least of the values from `begin` to before `end`.
+struct Least {
+  static SDVO_IN_KERNEL void run(const unsigned* values, int begin, int end, unsigned* least) {
+    unsigned smallest = std::numeric_limits<unsigned>::max();
+    for (int k = begin; k < end; ++k) smallest = std::min(smallest, values[k]);
+    *least = smallest;
+  }
+};
+
+unsigned leastOf(const unsigned* values, int begin, int end) {
+  unsigned least;
+  runKernel<Least>(values, begin, end, &least);
+  return least;
+}
+
+/// Sub-pixel offset of the minimum from the middle one of three sums of absolute differences, which is the least.
+/// Model: the sums rise to both sides at the same rate.
+float valleyBetween(const unsigned* differences) {
+  const float before = static_cast<float>(differences[0]), after = static_cast<float>(differences[2]);
+  const float rise = std::max(before, after) - static_cast<float>(differences[1]);
+  return rise > 0.f ? 0.5f * (before - after) / rise : 0.f;
+}
+
+/// Eigen sums three products in an order that depends on the processor: here it is written down.
+float sumOfProducts(const Eigen::Vector3f& a, const Eigen::Vector3f& b) {
+  return a[0] * b[0] + (a[1] * b[1] + a[2] * b[2]);
+}
+
+Eigen::Matrix3f inverseOfSymmetric(const Eigen::Matrix3f& m) {
+  const Eigen::Vector3f first(m(1, 1) * m(2, 2) - m(1, 2) * m(1, 2), m(1, 2) * m(0, 2) - m(2, 2) * m(0, 1),
+                              m(0, 1) * m(1, 2) - m(0, 2) * m(1, 1));
+  const float factor = 1.f / sumOfProducts(first, m.col(0));
+  const float a = first[0] * factor, b = first[1] * factor, c = first[2] * factor;
+  const float d = (m(2, 2) * m(0, 0) - m(0, 2) * m(0, 2)) * factor,
+              e = (m(0, 2) * m(0, 1) - m(0, 0) * m(1, 2)) * factor;
+  const float f = (m(0, 0) * m(1, 1) - m(0, 1) * m(0, 1)) * factor;
+  return (Eigen::Matrix3f() << a, b, c, b, d, e, c, e, f).finished();
+}
+
+/// A pair with a margin of kMargin px, and the same at half resolution.
+struct SearchedImages {
+  cv::Mat left, right, left_half, right_half;
+  cv::Mat half;  ///< one of them before it gets the margin
+
+  void take(const cv::Mat& new_left, const cv::Mat& new_right) {
+    addMargin(new_left, kMargin, left);
+    addMargin(new_right, kMargin, right);
+    halveImage(new_left, half);
+    addMargin(half, kMargin, left_half);
+    halveImage(new_right, half);
+    addMargin(half, kMargin, right_half);
+  }
+};
+
+class EpipolarSearch {
+ public:
+  EpipolarSearch(const StereoMatcherOptions& options, double max_disparity, double noise, const SearchedImages& images)
+      : options_(options), max_disparity_(max_disparity), noise_(noise), images_(images) {}
+
+  /// (disparity, dv) of a left position, px.
+  std::optional<cv::Point2f> find(const cv::Point2f& left_position) const {
+    const std::optional<int> disparity = searchRow(left_position);
+    if (!disparity) return std::nullopt;
+    const cv::Point2f start = searchAround(cv::Point(cvRound(left_position.x), cvRound(left_position.y)), *disparity);
+    return align(left_position, start);
+  }
+
+ private:
+  std::optional<int> searchRow(const cv::Point2f& left_position) const {
+    // The centre of half-resolution pixel h lies between full pixels 2 h and 2 h + 1.
+    const int x = cvRound(0.5f * left_position.x - 0.25f), y = cvRound(0.5f * left_position.y - 0.25f);
+    const std::uint8_t* left = images_.left_half.ptr(y + kMargin) + x + kMargin;
+    const std::uint8_t* right = images_.right_half.ptr(y + kMargin) + x + kMargin;
+    // A point that looks best at a negative disparity has no match: swapped images show themselves this way.
+    constexpr int kNegative = 16;
+    const int range = std::min(static_cast<int>(0.5 * max_disparity_), x);
+    const int count = kNegative + range + 1;
+    thread_local std::vector<unsigned> differences;
+    differences.resize(static_cast<std::size_t>(count));
+    const std::ptrdiff_t step = static_cast<std::ptrdiff_t>(images_.left_half.step[0]);
+    blockDifferences<kHalfRows>(left, right + kNegative, step, count, differences.data());
+    const unsigned least = leastOf(differences.data(), 0, count);
+    const int best = static_cast<int>(std::find(differences.begin(), differences.end(), least) - differences.begin());
+    if (best < kNegative - 1) return std::nullopt;
+    constexpr int kSame = 2;  // px around the best that count as the same place
+    const unsigned elsewhere =
+        std::min(leastOf(differences.data(), 0, best - kSame), leastOf(differences.data(), best + kSame + 1, count));
+    if (least > options_.epipolar.uniqueness * elsewhere) return std::nullopt;
+    return 2 * (best - kNegative);
+  }
+
+  cv::Point2f searchAround(const cv::Point& left, int disparity) const {
+    constexpr int kReach = 2;
+    const int rows = std::min(2, static_cast<int>(std::ceil(options_.max_epipolar_residual)));
+    const std::uint8_t* block = images_.left.ptr(left.y + kMargin) + left.x + kMargin;
+    const std::ptrdiff_t step = static_cast<std::ptrdiff_t>(images_.left.step[0]);
+    cv::Point2f best;
+    unsigned least = std::numeric_limits<unsigned>::max();
+    for (int dv = -rows; dv <= rows; ++dv) {
+      const std::uint8_t* other = images_.right.ptr(left.y + dv + kMargin) + left.x - disparity + kReach + kMargin;
+      unsigned differences[2 * kReach + 1];
+      blockDifferences<kFullRows>(block, other, step, 2 * kReach + 1, differences);
+      for (int k = 0; k <= 2 * kReach; ++k) {
+        const int d = disparity - kReach + k;
+        if (left.x - d < 0 || left.x - d > images_.right.cols - 2 * kMargin) continue;
+        if (differences[k] >= least) continue;
+        least = differences[k];
+        const float between = k > 0 && k < 2 * kReach ? valleyBetween(differences + k - 1) : 0.f;
+        best = {static_cast<float>(d) + between, static_cast<float>(dv)};
+      }
+    }
+    return best;
+  }
+
+  /// Inverse compositional alignment (Baker and Matthews 2004) of (disparity, dv, slant), blind to a difference of
+  /// brightness. On the ground in front of a vehicle, disparities grow by a third of a pixel from row to row: without
+  /// the slant, the result would be half a pixel off there.
+  std::optional<cv::Point2f> align(const cv::Point2f& left_position, const cv::Point2f& start) const {
+    constexpr int kIterations = 10;
+    constexpr float kConverged = 0.03f, kNextConverged = 0.015f;  // px, of a step and of what would be the next one
+    constexpr float kLargestCorrection = 2.0f;                    // px
+    constexpr float kSteepest = 0.8f;                             // px per row
+    // Prior of the slant, for patches that constrain it little: zero, with a standard deviation.
+    constexpr float kNoise = 5.f, kUsualSlant = 0.2f;  // grey levels, px per row
+    constexpr float kUpright = (kNoise / kUsualSlant) * (kNoise / kUsualSlant);
+    thread_local SlantedPatch patch;
+    patch.take(images_.left, kMargin, left_position.x, left_position.y);
+    Eigen::Matrix3f hessian = patch.hessian();
+    const float dd = hessian(0, 0), dv = hessian(0, 1), vv = hessian(1, 1);
+    // Sum of squared gradients of pure noise: half a difference has half of the noise's variance, and interpolation
+    // between pixels leaves 0.44 of that on average.
+    const float of_noise = 0.22f * static_cast<float>(noise_ * noise_) * float{SlantedPatch::kPixels};
+    if (dd * vv - dv * dv < 1e-3f * dd * vv || dd < of_noise) return std::nullopt;
+    hessian(2, 2) += kUpright;
+    const Eigen::Matrix3f inverse = inverseOfSymmetric(hessian);
+
+    cv::Point2f found = start;
+    float slant = 0.f, step_before = 0.f;
+    for (int iteration = 0; iteration < kIterations; ++iteration) {
+      Eigen::Vector3f gradient =
+          patch.compare(images_.right, kMargin, left_position.x - found.x, left_position.y + found.y, slant);
+      gradient[2] -= kUpright * slant;
+      Eigen::Vector3f step;
+      for (int i = 0; i < 3; ++i) step[i] = sumOfProducts(inverse.col(i), gradient);
+      slant += step[2];
+      found.x += step[0] + slant * step[1];
+      found.y += step[1];
+      const cv::Point2f correction = found - start;
+      if (!(std::max(std::abs(correction.x), std::abs(correction.y)) <= kLargestCorrection)) return std::nullopt;
+      if (!(std::abs(slant) <= kSteepest)) return std::nullopt;
+      const float u_right = left_position.x - found.x;
+      if (u_right < 0.f || u_right > static_cast<float>(images_.right.cols - 2 * kMargin - 1)) return std::nullopt;
+      // Convergence is linear: the next step has about the length square / previous.
+      const float length = std::max(std::abs(step[0]), std::abs(step[1]));
+      if (length < kConverged || length * length < kNextConverged * step_before) break;
+      step_before = length;
+    }
+
+    const auto [product, square, other_square] = patch.similarity();
+    if (!(other_square > 0.f)) return std::nullopt;  // nothing but one grey level
+    if (product < options_.epipolar.min_correlation * std::sqrt(square) * std::sqrt(other_square)) return std::nullopt;
+    return found;
+  }
+
+  const StereoMatcherOptions& options_;
+  double max_disparity_;
+  double noise_;  ///< of the left image, grey levels
+  const SearchedImages& images_;
+};
+
+}  // namespace
 
 void StereoMatcherOptions::check() const {
   if (min_disparity >= epipolar.max_disparity)
@@ -17,18 +204,18 @@ std::vector<StereoMatch> StereoMatcher::match(const cv::Mat& left, const cv::Mat
                                               const std::vector<cv::Point2f>& left_positions,
                                               std::optional<double> max_disparity) const {
   if (left_positions.empty()) return {};
-  thread_local EpipolarMatcher::Images scratch;
-  EpipolarMatcherOptions epipolar = options_.epipolar;
-  epipolar.max_disparity = max_disparity.value_or(epipolar.max_disparity);
-  const EpipolarMatcher matcher(epipolar, options_.max_epipolar_residual, left, right, scratch);
+  thread_local SearchedImages images;  // keep their memory: to get it anew from the system is slow
+  images.take(left, right);
+  const double most = max_disparity.value_or(options_.epipolar.max_disparity);
+  const EpipolarSearch search(options_, most, noiseOf(left), images);
   std::vector<std::optional<cv::Point2f>> found(left_positions.size());
   cv::parallel_for_(cv::Range(0, static_cast<int>(found.size())), [&](const cv::Range& range) {
-    for (int i = range.start; i < range.end; ++i) found[i] = matcher.find(left_positions[i]);
+    for (int i = range.start; i < range.end; ++i) found[i] = search.find(left_positions[i]);
   });
   std::vector<StereoMatch> matches;
   matches.reserve(found.size());
   for (std::size_t i = 0; i < found.size(); ++i)
-    if (found[i] && isTrusted(found[i]->x, found[i]->y))
+    if (found[i] && found[i]->x >= options_.min_disparity && std::abs(found[i]->y) <= options_.max_epipolar_residual)
       matches.push_back({static_cast<int>(i), found[i]->x, found[i]->y});
   return matches;
 }

@@ -15,9 +15,6 @@ namespace {
 /// Smallest disparity of a point: below it the distance cannot be measured, and the point is as good as at infinity.
 constexpr double kFarthestDisparity = 0.05;  // px
 
-/// Room for the observations of most points. A recycled point that has more gives it back.
-constexpr std::size_t kUsualObservations = 8;
-
 /// Covariance of the motion M = T_from_to between two frames, perturbed as M * exp(xi), from that of the left
 /// perturbations of `poses`, without the first: exp(f) M exp(-t) = M exp(Ad(M^-1) f - t) to first order.
 Matrix6d motionCovariance(const Window& window, const std::vector<int>& poses, const Eigen::MatrixXd& pose_covariance,
@@ -184,16 +181,11 @@ void LocalMap::startPoint(const StereoFeatures& features, int feature, int id, c
   const double u = features.u[feature], v = features.v[feature];
   const double disparity =
       std::max(features.disparity[feature] - calibration.disparityError(camera, u), kFarthestDisparity);
-  Point& point = points_.add();
-  point.seen = 1;
+  Point& point = points_.emplace_back();
   point.position.T_origin_anchor = T_camera_origin.inverse();
   point.position.ray_and_inverse_depth = {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy,
                                           1.0 / camera.depth(disparity)};
   point.reference.take(features, feature, {u, v}, T_camera_origin);
-  point.observations.clear();
-  // Else the memory of a point with many sightings would stay with a new one, which will have few.
-  if (point.observations.capacity() > kUsualObservations) point.observations.shrink_to_fit();
-  point.observations.reserve(kUsualObservations);
   point.observations.push_back({{{u, v, features.disparity[feature]}, sigma}, id, feature});
   takeDescriptor(point, features, feature);
 }
@@ -342,11 +334,12 @@ bool LocalMap::isLookedFor(const Point& point, int since) {
 void LocalMap::removeFrame(std::size_t index) {
   const int id = frames_[index].id;
   frames_.erase(frames_.begin() + static_cast<std::ptrdiff_t>(index));
-  points_.removeIf([&, since = lookedForSince()](Point& point) {
+  for (Point& point : points_) {
     const auto here = observationIn(point.observations, id);
     if (here != point.observations.end()) point.observations.erase(here);
-    return !isLookedFor(point, since);
-  });
+  }
+  const auto is_forgotten = [since = lookedForSince()](const Point& point) { return !isLookedFor(point, since); };
+  points_.erase(std::remove_if(points_.begin(), points_.end(), is_forgotten), points_.end());
 }
 
 void LocalMap::Problem::clear() {

@@ -44,11 +44,12 @@ void computeDistances(ElementType type, const std::uint8_t* descriptor, const cv
   }
 }
 
-/// Indices of those that a binary descriptor may match, judged by its first quarter. Without a gate nearly all others
-/// differ in half of the bits. Returns their number.
+/// Preselection without a gate, where nearly all descriptors differ in half of the bits: writes the indices of those
+/// whose first quarter is near enough to be within the largest distance. Returns their number.
 std::size_t findAlike(const std::uint8_t* descriptor, const cv::Mat& others, double max_distance,
                       const std::vector<int>& all, std::vector<float>& distances, std::vector<int>& found) {
-  constexpr double kSigmas = 1.0;  // of a quarter's distance around the largest: loses 1 % of the nearest (KITTI 06)
+  // Standard deviations by which a quarter's distance may exceed the largest one: loses 1 % of the matches (KITTI 06).
+  constexpr double kSigmas = 1.0;
   const cv::Mat quarter = others.colRange(0, (others.cols + 3) / 4);
   const double bits = 8.0 * quarter.cols;
   const auto most =
@@ -62,8 +63,8 @@ std::size_t findAlike(const std::uint8_t* descriptor, const cv::Mat& others, dou
   return count;
 }
 
-/// Divisor that makes a distance a ratio in [0, 1]: the number of bits, or the sum of both squared lengths (orthogonal
-/// descriptors of whatever length are at 1 then).
+/// Divisor that makes a distance a ratio in [0, 1]: the number of bits, or the sum of both squared lengths, with which
+/// orthogonal descriptors have the distance 1.
 float distanceUnit(ElementType type, const cv::Mat& a, int i, const cv::Mat& b, int j) {
   if (type == ElementType::kBits) return 8.f * static_cast<float>(a.cols);
   const cv::Mat zeros = cv::Mat::zeros(1, a.cols, CV_8U);
@@ -74,9 +75,8 @@ float distanceUnit(ElementType type, const cv::Mat& a, int i, const cv::Mat& b, 
   return std::max(length_a + length_b, 1e-12f);
 }
 
-/// The nearest of several, the first of equal ones if they come in the order of their indices. Distance and index are
-/// one number, whose minimum needs no branch, as none could be foreseen: the bits of floats from zero on are ordered as
-/// they are.
+/// The nearest candidate, of equal distances that with the smallest index. Distance and index form one number: its
+/// minimum needs no branch, which the processor could not predict. The bits of non-negative floats sort as the floats.
 class Nearest {
  public:
   void note(float distance, int index) { least_ = std::min(least_, numberOf(distance, index)); }
@@ -100,8 +100,8 @@ class Nearest {
   std::uint64_t least_ = kNone;
 };
 
-/// Indices of a pair's features (not none), found by position. Its extent is the features' own: the image size is a
-/// claim of whoever sent them.
+/// Indices of a pair's features (at least one), found by position. The grid covers the features, not the image: a
+/// message with a wrong image size must not make it huge.
 class PositionGrid {
  public:
   PositionGrid(const StereoFeatures& features, double radius)
@@ -124,7 +124,7 @@ class PositionGrid {
       const Entry* const end = entries_.data() + begin_[cell(last, row) + 1];
       for (const Entry* entry = entries_.data() + begin_[cell(first, row)]; entry < end; ++entry) {
         const float du = entry->u - u, dv = entry->v - v;
-        // Written in any case and counted if near: no branch, as none could be foreseen.
+        // Written in any case, and counted if near: without a branch, which the processor could not predict.
         found[count] = entry->feature;
         count += du * du + dv * dv <= square ? 1 : 0;
       }
@@ -138,7 +138,7 @@ class PositionGrid {
     int feature;
   };
 
-  /// The cells along one axis; what lies beside them belongs to the nearest one.
+  /// The cells along one axis. Positions beside them belong to the nearest cell.
   class Axis {
    public:
     Axis(const std::vector<float>& positions, double smallest_cell) {

@@ -94,8 +94,9 @@ struct Template {
 
 bool makeTemplate(const NearPatch& reference, const Eigen::Vector2f& centre, const SampleSquare& square,
                   Template& result) {
-  constexpr float kFlat = 1.f;        // grey level: less contrast than this is noise
-  constexpr float kOneSided = 1e-3f;  // of the hessian's two directions: an edge holds no position along itself
+  constexpr float kFlat = 1.f;  // grey level: less contrast than this is noise
+  // Least determinant of the hessian, per product of its diagonal: an edge does not constrain the position along it.
+  constexpr float kOneSided = 1e-3f;
   if (!square.sampleUpright(reference, centre, result.grey, result.by_x, result.by_y)) return false;
   for (Samples* values : {&result.grey, &result.by_x, &result.by_y}) removeMean(square, *values);
   const Products<float> p = multiply(square.count(), result.by_x.data(), result.by_y.data(), result.grey.data());
@@ -135,7 +136,7 @@ std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const
   float contrast = 1.f;
   for (int iteration = 0; iteration < kIterations; ++iteration) {
     if (!square.sample(near_current, position, grid, grey)) return std::nullopt;
-    // The pattern and its derivatives have no mean, so that of the current patch drops out.
+    // The pattern and its derivatives have no mean, so the current patch's mean has no effect.
     float product;
     Eigen::Vector2f products;
     runKernel<Project>(square.count(), grey.data(), pattern.grey.data(), pattern.by_x.data(), pattern.by_y.data(),
@@ -155,9 +156,10 @@ std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const
   found.shift = current.spacing * position;
   found.correlation = p.ab / std::sqrt(pattern.square * p.aa);
   if (!(found.correlation >= kLeastCorrelation)) return std::nullopt;
-  // The remaining difference is noise of the images, four parameters fitted, and so tells the position's. It is
-  // about one image's, because values between samples are smooth. The reference's appears as large as this does. That
-  // of a current patch in which the point appears smaller does not shrink: its samples are taken more than once.
+  // The position's variance follows from the remaining difference, with four parameters fitted. This is about the noise
+  // of one image, because interpolation smooths the other one. Noise of the reference moves the position by its warped
+  // amount. Noise of the current patch does so, too, but not by less than unwarped: where the point appears smaller,
+  // neighbouring values share samples.
   const float left = sumOfSquaredDifferences(square.count(), contrast, grey.data(), pattern.grey.data());
   const float noise = left / static_cast<float>(square.pixels() - 4);
   const float warped = (grid * inverse * grid.transpose()).trace(), own = std::max(warped, inverse.trace());

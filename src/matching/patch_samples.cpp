@@ -13,8 +13,7 @@ constexpr int kRow = 16;  // numbers of a row in registers: whole ones
 static_assert(kLargestSampledSide < kRow, "a pixel more than the samples is read");
 static_assert((kLargestSampledSide - 2) * (kLargestSampledSide - 2) + kRow <= kMostSampled, "a row is written at once");
 
-/// The square's values and derivatives, whose middle lies at (x, y) of the patch. All in a row lie between two pixels
-/// at the same share of the way.
+/// The square's values and derivatives; its middle lies at (x, y) of the patch.
 struct SampleUpright {
   static SDVO_IN_KERNEL void run(const std::uint8_t* patch, int side, float x, float y, int radius, float* values,
                                  float* by_x, float* by_y) {
@@ -68,7 +67,7 @@ void samplePlain(const std::uint8_t* patch, int side, const PatchPlacement& at, 
   }
 }
 
-/// The byte at each place and the one behind it, interpolated.
+/// Interpolates between the byte at each place and its right neighbour.
 SDVO_VECTORS inline Register between(const std::uint8_t* bytes, const std::uint32_t* places, Register share) {
   const UnsignedRegister bits = readFours(bytes, places);
   const UnsignedRegister first = bits & 255, second = bits >> 8 & 255;

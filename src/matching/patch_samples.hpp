@@ -9,17 +9,17 @@
 
 namespace sdvo {
 
-/// Where the samples lie in a patch: the middle, and what a step along x and along y of the square changes.
+/// Affine map from the square to positions in a patch: of its middle, and of a step along x and along y.
 struct PatchPlacement {
   float x, y, x_by_x, x_by_y, y_by_x, y_by_y;
 };
 
-/// Values on a square of samples, row by row; those that fill the last register are zero.
+/// Values on a square of samples, row by row, filled up to whole registers with zeros.
 constexpr int kLargestSampledSide = 2 * (PatchAlignmentOptions::kLargestRadius + 1) + 1;
 constexpr int kMostSampled = (kLargestSampledSide * kLargestSampledSide + 7) / 8 * 8;
 using Samples = std::array<float, kMostSampled>;
 
-/// A patch where it can be read quickly, and beyond its end.
+/// A copy of a patch with room behind it, so that kernels may read whole registers.
 class NearPatch {
  public:
   void take(const Patch& patch);
@@ -44,13 +44,13 @@ class SampleSquare {
   int count() const { return (pixels() + 7) / 8 * 8; }
   const float* mask() const { return mask_.data(); }
 
-  /// Samples a patch on this square around `centre`, its grid taken there by `grid` (all in samples of the patch, from
-  /// its middle), bilinearly. False when a corner of the square lies outside.
+  /// Samples a patch bilinearly on this square around `centre`; `grid` maps the square's offsets to the patch's. All
+  /// are in samples of the patch, from its middle. False if a corner of the square lies outside.
   bool sample(const NearPatch& patch, const Eigen::Vector2f& centre, const Eigen::Matrix2f& grid,
               Samples& values) const;
 
-  /// The same with the patch's own grid, and the derivatives by x and y: half of what the neighbours differ by, which
-  /// may not lie outside either.
+  /// The same with the patch's own grid, and the derivatives by x and y: half of the difference between both
+  /// neighbours, which must not lie outside either.
   bool sampleUpright(const NearPatch& patch, const Eigen::Vector2f& centre, Samples& values, Samples& by_x,
                      Samples& by_y) const;
 

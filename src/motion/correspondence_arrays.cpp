@@ -67,7 +67,7 @@ struct SquareResiduals {
   }
 };
 
-/// Sums of the upper triangle of the Hessian, its zero left out, and of the gradient.
+/// Sums of the Hessian's upper triangle, and of the gradient.
 struct Sums {
   DoubleLanes hessian[6][6]{}, gradient[6]{};
 };
@@ -121,29 +121,16 @@ double total(const DoubleLanes& lanes) {
 
 }  // namespace
 
-CorrespondenceArrays::CorrespondenceArrays(const std::vector<Correspondence>& correspondences) {
-  resize(static_cast<int>(correspondences.size()));
-  for (int i = 0; i < count_; ++i) set(i, correspondences[static_cast<std::size_t>(i)]);
-}
-
-CorrespondenceArrays::CorrespondenceArrays(const std::vector<Correspondence>& correspondences,
-                                           const std::vector<int>& subset) {
-  resize(static_cast<int>(subset.size()));
-  for (int i = 0; i < count_; ++i)
-    set(i, correspondences[static_cast<std::size_t>(subset[static_cast<std::size_t>(i)])]);
-}
-
-void CorrespondenceArrays::resize(int count) {
-  count_ = count;
-  values_.assign(static_cast<std::size_t>(6 * roundedUp(count)), 0.0);
-}
-
-void CorrespondenceArrays::set(int i, const Correspondence& correspondence) {
-  double* values = values_.data() + i;
+CorrespondenceArrays::CorrespondenceArrays(const std::vector<Correspondence>& correspondences)
+    : count_(static_cast<int>(correspondences.size())), values_(static_cast<std::size_t>(6 * roundedUp(count_)), 0.0) {
   const std::ptrdiff_t stride = roundedUp(count_);
-  for (int k = 0; k < 3; ++k) {
-    values[k * stride] = correspondence.point[k];
-    values[(3 + k) * stride] = correspondence.measurement[k];
+  double* values = values_.data();
+  for (const Correspondence& correspondence : correspondences) {
+    for (int k = 0; k < 3; ++k) {
+      values[k * stride] = correspondence.point[k];
+      values[(3 + k) * stride] = correspondence.measurement[k];
+    }
+    ++values;
   }
 }
 

@@ -22,10 +22,9 @@ bool contains(const MinimalSample& genes, int gene) {
   return std::find(genes.begin(), genes.end(), gene) != genes.end();
 }
 
-/// What mutation has learnt of each correspondence: the fitness of the best pose that it agrees with. The abstract of
-/// the 2017 paper leaves open what is learnt. A sample's fitness says something of its three genes alone, and most
-/// genes are never drawn; its pose says something of every correspondence. Poses below the average are chance and teach
-/// nothing.
+/// Learnt quality of each correspondence: the fitness of the best pose that it agrees with. The abstract of the 2017
+/// paper leaves open what is learnt. The fitness of a sample rates its three genes alone, and most genes are never
+/// drawn; the inliers of its pose rate all correspondences. Poses below the average agree by chance and are ignored.
 class GeneKnowledge {
  public:
   explicit GeneKnowledge(int count) : quality_(static_cast<std::size_t>(count), 0.0) {}
@@ -44,7 +43,7 @@ class GeneKnowledge {
     ++poses_;
   }
 
-  /// The best of a few genes drawn at random (tournament selection): exploitation that never repeats itself blindly.
+  /// The best of a few genes drawn at random (tournament selection): always the best one would repeat samples.
   int drawGood(std::mt19937& random) const {
     constexpr int kTournament = 8;
     std::size_t best = random() % quality_.size();
@@ -124,8 +123,7 @@ class GeneticSearch {
     }
   }
 
-  /// Each gene comes from either parent, the father's where the child has not got it; a child like its mother gets a
-  /// random one.
+  /// Each gene comes from either parent, but none twice. A child that equals its mother gets a random gene.
   MinimalSample cross(const MinimalSample& mother, const MinimalSample& father) {
     MinimalSample child = mother;
     for (std::size_t g = 0; g < child.size(); ++g)

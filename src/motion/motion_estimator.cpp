@@ -7,9 +7,9 @@
 namespace sdvo {
 namespace {
 
-/// The better of a pose and the one that all correspondences within several thresholds of `start` lead to. Where most
-/// points are far, a pose can suit all of them while the near ones, which alone constrain the translation, lie beyond
-/// the threshold; the inliers by themselves never draw them in (Lebeda, Matas and Chum 2012).
+/// Refines `start` over all correspondences within several thresholds of it, and keeps the result in T if its cost is
+/// lower. Where most points are far, a pose can fit them while the near points, which alone constrain the translation,
+/// are beyond the threshold: a refinement over inliers alone would leave them out (Lebeda, Matas and Chum 2012).
 void refineWidely(const PoseProblem& problem, const MotionRefinementOptions& options, Eigen::Isometry3d start,
                   Eigen::Isometry3d& T) {
   constexpr double kWide = 5.0;  // thresholds

@@ -3,52 +3,35 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <utility>
 
 namespace sdvo {
 namespace {
-
-/// Cauchy's kernel, its costs added up.
-class Kernel {
- public:
-  explicit Kernel(double scale) : square_(scale * scale), inverse_square_(1.0 / square_) {}
-
-  /// Adds the cost of a squared residual and returns its weight.
-  double add(double square) {
-    const double ratio_square = square * inverse_square_;
-    costs_.add(ratio_square);
-    return 1.0 / (1.0 + ratio_square);
-  }
-  double cost() const { return square_ * costs_.value(); }
-
- private:
-  double square_, inverse_square_;
-  LogSum costs_;
-};
 
 /// The problem around one pose after the other.
 class Lineariser {
  public:
   Lineariser(const StereoCamera& camera, const MotionRefinementOptions& options,
-             const std::vector<Correspondence>& correspondences, const std::vector<int>& subset)
-      : camera_(camera), kernel_scale_(options.kernel_scale), arrays_(correspondences, subset) {
+             const std::vector<Correspondence>& correspondences)
+      : camera_(camera), kernel_scale_(options.kernel_scale), arrays_(correspondences) {
     weights_.resize(static_cast<std::size_t>(CorrespondenceArrays::roundedUp(arrays_.count())));
   }
 
   NormalEquations at(const Eigen::Isometry3d& T) {
+    const double bend = kernel_scale_ * kernel_scale_, inverse_bend = 1.0 / bend;
     NormalEquations equations;
-    Kernel kernel(kernel_scale_);
+    LogSum costs;
     arrays_.squareResiduals(camera_, T, 0, static_cast<int>(weights_.size()), weights_.data());
-    const auto beyond = weights_.begin() + arrays_.count();
-    for (auto at = weights_.begin(); at != beyond; ++at) {
-      const double square = *at, weight = std::isinf(square) ? 0.0 : kernel.add(square);
-      *at = weight;
-      if (weight > 0.0) equations.weighted_square += weight * square;
-      equations.weight += weight;
+    for (std::size_t i = 0; i < weights_.size(); ++i) {
+      const double square = std::exchange(weights_[i], 0.0), bent = square * inverse_bend;
+      if (static_cast<int>(i) >= arrays_.count() || std::isinf(square)) continue;
+      costs.add(bent);
+      weights_[i] = 1.0 / (1.0 + bent);
+      equations.weighted_square += weights_[i] * square;
+      equations.weight += weights_[i];
     }
-    std::fill(beyond, weights_.end(), 0.0);
     arrays_.sumEquations(camera_, T, weights_.data(), equations.hessian, equations.gradient);
-    equations.cost = kernel.cost();
+    equations.cost = bend * costs.value();
     return equations;
   }
 
@@ -62,11 +45,10 @@ class Lineariser {
 }  // namespace
 
 NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementOptions& options,
-                             const std::vector<Correspondence>& correspondences, const std::vector<int>& subset,
-                             Eigen::Isometry3d& T) {
+                             const std::vector<Correspondence>& correspondences, Eigen::Isometry3d& T) {
   constexpr double kSmallestGain = 1e-5;  // of the cost: a tenth of the result's standard deviation
   double damping = 1e-6;
-  Lineariser problem(camera, options, correspondences, subset);
+  Lineariser problem(camera, options, correspondences);
   NormalEquations equations = problem.at(T);
   for (int iteration = 0; iteration < options.refinement_iterations; ++iteration) {
     Matrix6d damped = equations.hessian;
@@ -90,10 +72,12 @@ NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementO
 }
 
 NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementOptions& options,
-                             const std::vector<Correspondence>& correspondences, Eigen::Isometry3d& T) {
-  std::vector<int> all(correspondences.size());
-  std::iota(all.begin(), all.end(), 0);
-  return refineMotion(camera, options, correspondences, all, T);
+                             const std::vector<Correspondence>& correspondences, const std::vector<int>& subset,
+                             Eigen::Isometry3d& T) {
+  std::vector<Correspondence> some;
+  some.reserve(subset.size());
+  for (const int i : subset) some.push_back(correspondences[i]);
+  return refineMotion(camera, options, some, T);
 }
 
 }  // namespace sdvo

@@ -58,14 +58,8 @@ SampleBudget::SampleBudget(int at_most, double confidence)
     : at_most_(at_most), confidence_(confidence), needed_(at_most) {}
 
 void SampleBudget::noteInliers(double ratio) {
-  // Fischler and Bolles 1981.
-  const double all_inliers = ratio * ratio * ratio;
-  if (all_inliers >= 1.0)
-    needed_ = 1.0;
-  else if (all_inliers <= 1e-12)
-    needed_ = at_most_;
-  else
-    needed_ = std::log(1.0 - confidence_) / std::log(1.0 - all_inliers);
+  const double all_inliers = ratio * ratio * ratio;  // probability of such a sample (Fischler and Bolles 1981)
+  needed_ = std::max(1.0, std::log(1.0 - confidence_) / std::log1p(-all_inliers));
 }
 
 bool SampleBudget::spent(int samples) const {

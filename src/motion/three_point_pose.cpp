@@ -58,9 +58,9 @@ bool splitIntoPlanes(const Eigen::Matrix3d& form, Eigen::Vector3d& first, Eigen:
   return true;
 }
 
-/// The planes that hold the distances along the rays. False where there are none.
+/// The planes in which the distances along the rays lie. False if there are none.
 bool findPlanes(const Triangle& t, std::array<Eigen::Vector3d, 2>& planes) {
-  // The equations of sides 12 and 13, each without what it has in common with that of side 23.
+  // The equations of sides 12 and 13, each combined with that of side 23 so that the constants cancel.
   Eigen::Matrix3d first, second;
   first << t.a23, -t.a23 * t.b12, 0.0,               //
       -t.a23 * t.b12, t.a23 - t.a12, t.a12 * t.b23,  //
@@ -84,7 +84,7 @@ bool findPlanes(const Triangle& t, std::array<Eigen::Vector3d, 2>& planes) {
   return std::isfinite(root) && splitIntoPlanes(degenerate, planes[0], planes[1]);
 }
 
-/// Without memory of their own: thousands of triangles are solved for a pair.
+/// On the stack: thousands of triangles are solved for a pair.
 struct Distances {
   std::array<Eigen::Vector3d, 4> values;
   std::size_t count = 0;

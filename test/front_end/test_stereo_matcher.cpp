@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "../../src/common/processor.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
 
@@ -130,3 +131,300 @@ TEST(StereoMatcher, NeverLeavesTheRightImage) {
 }
 
 }  // namespace sdvo::test_stereo_matcher
+
+namespace sdvo::test_epipolar_search {
+
+const cv::Size kSize(320, 160);
+constexpr double kMaxDv = 2.5;  // px
+
+struct Pair {
+  cv::Mat left, right;
+};
+
+/// (disparity, dv)
+std::optional<cv::Point2f> find(const Pair& pair, const cv::Point2f& position, const EpipolarOptions& epipolar = {},
+                                double max_dv = kMaxDv) {
+  StereoMatcherOptions options;
+  options.epipolar = epipolar, options.max_epipolar_residual = max_dv;
+  const std::vector<StereoMatch> matches = StereoMatcher(options).match(pair.left, pair.right, {position});
+  if (matches.empty()) return std::nullopt;
+  return cv::Point2f(matches[0].disparity, matches[0].dv);
+}
+
+/// A smooth surface of disparity `d` everywhere, the right view `dv` lower.
+Pair smoothPair(double d, double dv) {
+  const synthetic::Texture texture(3, 6.0, 90.0);
+  return {synthetic::render(kSize, texture), synthetic::render(kSize, texture, d, dv)};
+}
+
+cv::Mat noise(unsigned seed) {
+  cv::Mat image(kSize, CV_8U);
+  cv::RNG(seed).fill(image, cv::RNG::UNIFORM, 0, 256);
+  return image;
+}
+
+/// The part of `image` that a shift by (-d, dv) carries into the picture; the rest comes from `elsewhere`.
+cv::Mat shifted(const cv::Mat& image, int d, int dv, const cv::Mat& elsewhere) {
+  cv::Mat result = elsewhere.clone();
+  for (int v = 0; v < kSize.height; ++v)
+    for (int u = 0; u < kSize.width; ++u)
+      if (u + d >= 0 && u + d < kSize.width && v - dv >= 0 && v - dv < kSize.height)
+        result.at<std::uint8_t>(v, u) = image.at<std::uint8_t>(v - dv, u + d);
+  return result;
+}
+
+TEST(EpipolarSearch, MeasuresDisparityAndRowToAFewHundredths) {
+  for (const auto& [d, dv] : std::vector<std::pair<double, double>>{
+           {12.0, 0.0}, {12.0, -2.0}, {12.0, 2.0}, {7.3, -0.6}, {31.75, 1.4}, {1.2, 0.3}}) {
+    const Pair pair = smoothPair(d, dv);
+    for (const cv::Point2f& position :
+         {cv::Point2f(150.f, 80.f), cv::Point2f(201.3f, 61.6f), cv::Point2f(90.f, 99.5f)}) {
+      const auto found = find(pair, position);
+      ASSERT_TRUE(found) << position << ", disparity " << d << ", dv " << dv;
+      EXPECT_NEAR(found->x, d, 0.06) << position << ", dv " << dv;
+      EXPECT_NEAR(found->y, dv, 0.06) << position << ", disparity " << d;
+    }
+  }
+}
+
+/// Waves so short that an alignment from the wrong row ends at another one.
+TEST(EpipolarSearch, LooksAtTheRowsAboveAndBelow) {
+  const synthetic::Texture texture(4, 6.0, 24.0);
+  const cv::Mat left = synthetic::render(kSize, texture);
+  for (const double dv : {-2.0, -1.0, 1.0, 2.0}) {
+    const Pair pair{left, synthetic::render(kSize, texture, 14.0, dv)};
+    int right = 0, tried = 0;
+    for (float u = 60.f; u < 280.f; u += 20.f, ++tried) {
+      const auto found = find(pair, {u, 80.f});
+      right += found && std::abs(found->x - 14.f) < 0.1f && std::abs(found->y - dv) < 0.1;
+    }
+    EXPECT_GE(right, tried * 8 / 10) << "dv " << dv;
+  }
+}
+
+TEST(EpipolarSearch, FollowsASlantedSurface) {
+  // The disparity grows from row to row as the ground's does, and the right view is lower.
+  const synthetic::Texture texture(5, 8.0, 90.0);
+  for (const double slant : {0.3, -0.3}) {
+    const auto disparity = [=](double v) { return 30.0 + slant * (v - 80.0); };
+    constexpr double kDv = 1.3;
+    const Pair pair{synthetic::render(kSize, texture), synthetic::render(kSize, [&](double u, double v) {
+                      return texture.at(u + disparity(v - kDv), v - kDv);
+                    })};
+    const auto found = find(pair, {160.f, 82.4f});
+    ASSERT_TRUE(found) << slant;
+    EXPECT_NEAR(found->x, disparity(82.4), 0.1) << slant;
+    EXPECT_NEAR(found->y, kDv, 0.1) << slant;
+  }
+}
+
+TEST(EpipolarSearch, BrightnessAndContrastOfTheViewsMayDiffer) {
+  Pair pair = smoothPair(10.0, 0.0);
+  pair.right.convertTo(pair.right, CV_8U, 0.9, 20.0);
+  const auto found = find(pair, {150.f, 80.f});
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(found->x, 10.0, 0.1);
+}
+
+/// A twentieth of the light leaves a dozen grey levels. Noise that is as large as they are leaves nothing to align.
+TEST(EpipolarSearch, WhatIsFlatFollowsTheNoiseAndNotTheLight) {
+  const synthetic::Texture texture(3, 20.0, 90.0);
+  const auto pair = [&](double light, double sigma) {
+    cv::RNG random(8);
+    const auto view = [&](double d) {
+      return synthetic::render(
+          kSize, [&](double u, double v) { return light * texture.at(u + d, v) + random.gaussian(sigma); });
+    };
+    return Pair{view(0.0), view(10.0)};
+  };
+  const auto found = [&](const Pair& images) {
+    int right = 0;
+    for (float u = 60.f; u < 280.f; u += 10.f) {
+      const auto corner = find(images, {u, 80.f});
+      right += corner && std::abs(corner->x - 10.f) < 0.5f;
+    }
+    return right;
+  };
+  EXPECT_EQ(found(pair(1.0, 0.3)), 22);
+  EXPECT_GE(found(pair(0.05, 0.0)), 20);
+  EXPECT_GE(found(pair(0.15, 0.3)), 20);
+  EXPECT_LE(found(pair(0.05, 8.0)), 2);
+}
+
+/// A strip that repeats itself.
+TEST(EpipolarSearch, RefusesWhatLooksTheSameElsewhereOnTheRow) {
+  constexpr int kPeriod = 40;
+  cv::Mat left = noise(3);
+  for (int u = kPeriod; u < kSize.width; ++u) left.col(u - kPeriod).copyTo(left.col(u));
+  cv::Mat disturbed(kSize, CV_16S), right;
+  cv::RNG(4).fill(disturbed, cv::RNG::NORMAL, 0.0, 4.0);
+  cv::add(left, disturbed, right, cv::noArray(), CV_8U);
+  const Pair pair{left, right};  // disparities 0, 40, 80 … all fit
+  EXPECT_FALSE(find(pair, {200.f, 80.f}));
+  EpipolarOptions narrow;
+  narrow.max_disparity = 30.0;  // only one of them is looked at
+  const Pair moved{left, shifted(left, 6, 0, left)};
+  EXPECT_TRUE(find(moved, {200.f, 80.f}, narrow));
+}
+
+/// The block is the one around the position: two pixels further it would see what does not match.
+TEST(EpipolarSearch, HalfResolutionBlocksAreCentredOnThePosition) {
+  constexpr int kDisparity = 20;
+  for (const cv::Point& position : {cv::Point(151, 81), cv::Point(150, 80), cv::Point(149, 79), cv::Point(152, 82)}) {
+    // Half-resolution pixel h covers 2 h and 2 h + 1; a block has 16 x 9 of them, 8 to the left of its centre.
+    const int x = 2 * (position.x / 2), y = 2 * (position.y / 2);
+    const cv::Rect block(x - 16, y - 8, 32, 18);
+    const cv::Mat left = noise(5);
+    cv::Mat right = noise(6);
+    left(block).copyTo(right(block - cv::Point(kDisparity, 0)));
+    EpipolarOptions strict;
+    strict.uniqueness = 0.1;  // a row and a column of noise in the block are 0.17 of what noise everywhere is
+    const auto found = find({left, right}, position, strict);
+    ASSERT_TRUE(found) << position;
+    EXPECT_NEAR(found->x, kDisparity, 0.05) << position;
+    EXPECT_NEAR(found->y, 0.0, 0.05) << position;
+  }
+}
+
+TEST(EpipolarSearch, UniquenessIsARatioToTheBestBlockElsewhere) {
+  // The true block, damaged a little, against noise: their ratio is known.
+  constexpr int kDisparity = 20;
+  const cv::Mat left = noise(7);
+  cv::Mat right = shifted(left, kDisparity, 0, noise(8));
+  // Half of the block's rows is replaced.
+  noise(9).rowRange(80, 100).copyTo(right.rowRange(80, 100));
+  EpipolarOptions options;
+  options.min_correlation = 0.0;
+  options.uniqueness = 0.3;
+  EXPECT_FALSE(find({left, right}, {200.f, 80.f}, options));
+  options.uniqueness = 0.9;
+  EXPECT_TRUE(find({left, right}, {200.f, 70.f}, options));
+}
+
+TEST(EpipolarSearch, RefusesDisparitiesBeyondTheLargest) {
+  const cv::Mat left = noise(11);
+  const Pair pair{left, shifted(left, 60, 0, noise(12))};
+  EpipolarOptions options;
+  options.max_disparity = 64.0;
+  EXPECT_TRUE(find(pair, {200.f, 80.f}, options));
+  options.max_disparity = 40.0;
+  EXPECT_FALSE(find(pair, {200.f, 80.f}, options));
+}
+
+TEST(EpipolarSearch, RefusesPointsThatAreFurtherRightInTheRightView) {
+  const cv::Mat left = noise(13);
+  EXPECT_FALSE(find({left, shifted(left, -12, 0, noise(14))}, {150.f, 80.f}));
+  EXPECT_TRUE(find({left, shifted(left, 12, 0, noise(14))}, {150.f, 80.f}));
+}
+
+TEST(EpipolarSearch, RefusesAnEdgeAlongTheRow) {
+  // Only the row is known there.
+  const cv::Mat edge = synthetic::render(kSize, [](double, double v) { return v < 80.0 ? 60.0 : 180.0; });
+  EXPECT_FALSE(find({edge, edge}, {150.f, 80.f}));
+}
+
+TEST(EpipolarSearch, RefusesASlopingEdge) {
+  // Moved along itself it looks the same: neither disparity nor row is known, however well the patches agree.
+  const auto edge = [](double d) {
+    return synthetic::render(
+        kSize, [=](double u, double v) { return 120.0 + 60.0 * std::tanh(((u + d - 150.0) + (v - 80.0)) / 4.0); });
+  };
+  const Pair pair{edge(0.0), edge(10.3)};
+  EpipolarOptions options;
+  options.uniqueness = 1.0;
+  options.min_correlation = 0.0;
+  for (float v = 40.f; v < 120.f; v += 5.3f)
+    EXPECT_FALSE(find(pair, {230.f - v, v}, options)) << "row " << v;  // on the edge
+}
+
+/// What is seen of a patch above its centre alone has the disparity of the rows above: the slant tells that of the
+/// centre.
+TEST(EpipolarSearch, ASlantIsToldFromADisparity) {
+  const synthetic::Texture texture(5, 6.0, 40.0);
+  for (const double slant : {0.3, -0.3}) {
+    const auto disparity = [=](double v) { return 30.0 + slant * (v - 80.0); };
+    const auto grey = [&](double u, double v) {
+      const double contrast = v < 80.0 ? 1.0 : 0.15;
+      return 128.0 + contrast * (texture.at(u, v) - 128.0);
+    };
+    const Pair pair{synthetic::render(kSize, grey),
+                    synthetic::render(kSize, [&](double u, double v) { return grey(u + disparity(v), v); })};
+    double sum = 0.0;
+    int count = 0;
+    for (float u = 100.f; u < 290.f; u += 10.f)
+      if (const auto found = find(pair, {u, 80.f})) sum += found->x - disparity(80.0), ++count;
+    ASSERT_GE(count, 12) << slant;
+    EXPECT_NEAR(sum / count, 0.0, 0.25) << slant;  // without a slant 0.3 * 3
+  }
+}
+
+/// A patch that moved as a whole would agree little with short waves on slanted ground.
+TEST(EpipolarSearch, PatchesAreHeldAgainstEachOtherAtTheirSlant) {
+  const synthetic::Texture texture(8, 6.0, 12.0);
+  const auto disparity = [](double v) { return 30.0 + 0.3 * (v - 80.0); };
+  const Pair pair{synthetic::render(kSize, texture),
+                  synthetic::render(kSize, [&](double u, double v) { return texture.at(u + disparity(v), v); })};
+  EpipolarOptions options;
+  options.min_correlation = 0.95;
+  int found = 0, tried = 0;
+  for (float u = 100.f; u < 290.f; u += 10.f, ++tried) found += find(pair, {u, 80.f}, options).has_value();
+  EXPECT_GE(found, tried / 2);
+}
+
+TEST(EpipolarSearch, NeverLeavesTheRightImage) {
+  // The true place of some is up to 2 px outside; whatever correlates is taken.
+  const synthetic::Texture texture(6, 24.0, 90.0);
+  const cv::Mat left = synthetic::render(kSize, texture);
+  EpipolarOptions options;
+  options.min_correlation = 0.0;
+  options.uniqueness = 1.0;
+  for (const double disparity : {20.0, 21.0, 30.5}) {
+    const Pair pair{left, synthetic::render(kSize, texture, disparity)};
+    for (double outside = -2.0; outside < 2.0; outside += 0.25)
+      for (float v = 20.f; v < 140.f; v += 8.f) {
+        const float u = static_cast<float>(disparity - outside);
+        const auto found = find(pair, {u, v}, options);
+        if (found) {
+          EXPECT_GE(u - found->x, 0.f) << u << ", " << v;
+        }
+      }
+  }
+}
+
+TEST(EpipolarSearch, RefusesPatchesThatCorrelateLittle) {
+  const Pair clean = smoothPair(10.0, 0.0);
+  Pair noisy{clean.left, clean.right.clone()};
+  cv::Mat disturbed(kSize, CV_16S);
+  cv::RNG(15).fill(disturbed, cv::RNG::NORMAL, 0.0, 15.0);
+  cv::add(noisy.right, disturbed, noisy.right, cv::noArray(), CV_8U);
+  const auto count = [](const Pair& pair, double min_correlation) {
+    EpipolarOptions options;
+    options.min_correlation = min_correlation;
+    int found = 0;
+    for (float u = 60.f; u < 280.f; u += 20.f) found += find(pair, {u, 80.f}, options).has_value();
+    return found;
+  };
+  EXPECT_EQ(count(clean, 0.97), 11);
+  EXPECT_LE(count(noisy, 0.97), 1);
+  EXPECT_GE(count(noisy, 0.5), 9);
+}
+
+TEST(EpipolarSearch, FindsTheSameToTheBitWithAndWithoutVectors) {
+  if (!usesVectorKernels()) GTEST_SKIP() << "this processor has neither AVX2 nor NEON";
+  const Pair pair = smoothPair(17.3, 0.6);
+  int compared = 0;
+  for (float v = 0.f; v < 160.f; v += 7.3f)
+    for (float u = 0.f; u < 320.f; u += 5.7f) {
+      const auto fast = find(pair, {u, v});
+      allowVectorKernels(false);
+      const auto plain = find(pair, {u, v});
+      allowVectorKernels(true);
+      ASSERT_EQ(fast.has_value(), plain.has_value()) << u << ", " << v;
+      if (!fast) continue;
+      ++compared;
+      ASSERT_EQ(*fast, *plain) << u << ", " << v;
+    }
+  EXPECT_GT(compared, 500);
+}
+
+}  // namespace sdvo::test_epipolar_search

@@ -74,16 +74,6 @@ TEST(CorrespondenceArrays, AgreeWithTheCorrespondencesOneByOne) {
   EXPECT_LT((result.gradient - gradient).norm(), 1e-12 * gradient.norm());
 }
 
-TEST(CorrespondenceArrays, TakeASubset) {
-  const auto correspondences = someCorrespondences();
-  const CorrespondenceArrays arrays(correspondences, {70, 3, 12});
-  ASSERT_EQ(arrays.count(), 3);
-  const Result all = evaluate(CorrespondenceArrays(correspondences)), some = evaluate(arrays);
-  EXPECT_EQ(some.squares[0], all.squares[70]);
-  EXPECT_EQ(some.squares[1], all.squares[3]);
-  EXPECT_EQ(some.squares[2], all.squares[12]);
-}
-
 TEST(CorrespondenceArrays, GiveTheSameToTheBitWithAndWithoutVectors) {
   const CorrespondenceArrays arrays(someCorrespondences());
   const Result fast = evaluate(arrays);

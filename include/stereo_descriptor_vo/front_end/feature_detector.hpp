@@ -56,8 +56,9 @@ class FeatureDetector {
   static constexpr int kSmallestSide = 16;  ///< px within the border: less is no image for the detectors
 
   /// Corners of a CV_8U image, at most `max_features`. They lie at least `border` px away from the image's borders and
-  /// outside of the mask's zeros, but for what the refinement moves them by. `mask` is CV_8U, or empty for the one of
-  /// the options. Throws std::invalid_argument when the mask has another type, or another size than the image.
+  /// outside of the mask's zeros; the sub-pixel refinement may move them a little further. `mask` is CV_8U, or empty
+  /// for the one of the options. Throws std::invalid_argument when the mask has another type, or another size than the
+  /// image.
   std::vector<Corner> detect(const cv::Mat& image, int border = 0, const cv::Mat& mask = cv::Mat()) const;
 
  private:
@@ -65,12 +66,12 @@ class FeatureDetector {
   cv::Mat mask_;  ///< of the file; empty: none
 };
 
-/// Without the corners that lie nearer than `min_spacing` px to a stronger one that is kept, strongest first. Larger
-/// neighbourhoods cannot tell neighbours of a few px apart. Does not depend on the order of the input.
+/// Without the corners that lie nearer than `min_spacing` px to a stronger one that is kept; strongest first. Corners a
+/// few px apart have nearly equal descriptors, which are matched with each other. The order of the input is irrelevant.
 std::vector<Corner> keepApart(std::vector<Corner> corners, double min_spacing);
 
-/// Keeps `max_count` corners such that buckets of a `bucket_size` px grid hold as equal numbers as they can, the
-/// strongest of each first. Ties are broken by position, so the result does not depend on the order of the input.
+/// Keeps `max_count` corners, as equally many in each bucket of a grid of `bucket_size` px as there are, the strongest
+/// of each bucket first. Ties are broken by position, so the order of the input is irrelevant.
 std::vector<Corner> spreadOverBuckets(const std::vector<Corner>& corners, cv::Size image_size, int bucket_size,
                                       int max_count);
 

@@ -42,10 +42,11 @@ class FeatureExtractor {
   /// Throws std::invalid_argument when an option is out of its range.
   explicit FeatureExtractor(const FeatureExtractorOptions& options);
 
-  /// Images are CV_8U of the camera's size, else std::invalid_argument; so is `mask`, which hides where it is zero what
-  /// moves with the robot (empty: the detector's own). A pair in which nothing is found gives an empty set whose report
-  /// says why; so does one that the rig monitor refuses. A pair whose rows differ as by a small rotation of the right
-  /// camera has its features, and a report that says so. `before`: report of the pair before, to see an image repeated.
+  /// Images and `mask` are CV_8U of the camera's size, else std::invalid_argument. The mask is zero where parts of the
+  /// robot are in view; if it is empty, the detector's own is used. A pair without features, or one that the rig
+  /// monitor refuses, gives an empty set with the reason in its report. Rows that differ as by a small rotation of the
+  /// right camera are followed; the report says so. `before`: report of the previous pair, to recognise a repeated
+  /// image.
   StereoFeatures extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp,
                          const cv::Mat& mask = cv::Mat(), const ExtractionReport& before = {}) const;
 

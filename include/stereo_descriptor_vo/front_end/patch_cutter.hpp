@@ -28,8 +28,8 @@ class PatchCutter {
   /// `image` must be CV_8UC1; only its integral is kept.
   PatchCutter(const PatchLayout& layout, const cv::Mat& image);
 
-  /// Writes layout.bytes() samples of the patch around (u, v) px for a feature of `size` px. Of squares that
-  /// cross the image's border it is the mean of the part inside; those beyond are black.
+  /// Writes layout.bytes() samples of the patch around (u, v) px for a feature of `size` px. A square that crosses the
+  /// image's border gets the mean of its part inside; one beyond it is black.
   void cut(float u, float v, float size, std::uint8_t* samples) const;
 
  private:

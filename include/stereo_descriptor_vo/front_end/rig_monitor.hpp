@@ -22,22 +22,22 @@ struct RigMonitorOptions {
   }
 };
 
-/// How much lower the right image shows what the left one does: a straight line over its columns, px. A right camera
-/// that is pitched or rolled by a small angle shows that.
+/// v_right - v_left as a straight line over the columns of the image, px: the effect of a small pitch or roll of the
+/// right camera.
 struct RowLine {
   double offset = 0.0;  ///< in the middle column
   double slope = 0.0;   ///< px for each column
   int columns = 0;      ///< of the image
 
   double at(double u) const { return offset + slope * (u - 0.5 * columns); }
-  /// Its largest amount in the image.
+  /// Largest |v_right - v_left| in the image, px.
   double most() const { return std::abs(offset) + 0.5 * columns * std::abs(slope); }
 };
 
 /// The monitor's diagnosis of a pair.
 struct RigDiagnosis {
-  std::string words;  ///< the likely cause; empty when the rig is in order, or when too little is found to say
-  std::optional<RowLine> rows;  ///< by which they differ, where that is all that is wrong
+  std::string words;            ///< the likely cause; empty if the rig is in order, or if too few corners are found
+  std::optional<RowLine> rows;  ///< of a rig whose only fault is that its rows differ
   bool too_near = false;        ///< a part of the scene is nearer than `max_disparity` reaches
   bool refused = false;         ///< left and right do not belong together
 };
@@ -49,15 +49,15 @@ class RigMonitor {
  public:
   static constexpr double kReach = 24.0;  ///< px, rows above and below its own in which a corner is looked for
 
-  /// `max_dv` in px: rows may differ by that. Throws std::invalid_argument when an option is out of its range.
+  /// `max_dv`: largest tolerated |v_right - v_left|, px. Throws std::invalid_argument when an option is out of its
+  /// range.
   RigMonitor(const RigMonitorOptions& options, double max_dv, double max_disparity);
 
-  /// Whether so few of the corners were found that the rig is worth a look.
+  /// Whether so few of the corners were found in the right image that diagnose() is worth its time.
   bool isSuspicious(int corners, int found) const;
 
-  /// Too little to say is found where both views are dark, covered or out of focus. Images are CV_8U of one size.
-  /// Corners that come first are looked at first. Brightness and sharpness in the reports of this pair and of the one
-  /// before it show a side that repeats its image.
+  /// Images are CV_8U of one size. Views that are both dark, covered or out of focus give no diagnosis. Brightness and
+  /// sharpness in the reports of this pair and of the previous one show a side that repeats its image.
   RigDiagnosis diagnose(const cv::Mat& left, const cv::Mat& right, const std::vector<cv::Point2f>& corners,
                         const ExtractionReport& report = {}, const ExtractionReport& before = {}) const;
 

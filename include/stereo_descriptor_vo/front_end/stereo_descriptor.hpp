@@ -17,8 +17,8 @@ struct DescriptorOptions {
   bool oriented = false;
   bool extend_border = true;
 
-  /// Size in px that must fit into the image where larger ones go on beyond it. Chosen: 7 px leaves 17 % of a near
-  /// view's corners undescribed at 424x240, 5 px 6 %.
+  /// px: a key point whose own size does not fit into the image is described if this size does, on an image extended
+  /// by its border pixels. Chosen: with 7 px, 17 % of a near view's corners stay undescribed at 424x240, with 5 px 6 %.
   static constexpr double kInsideSize = 5.0;
 
   void describe(OptionList& list);
@@ -49,7 +49,7 @@ class StereoDescriptor {
   DescribedKeypoints describe(const cv::Mat& left_image, const cv::Mat& right_image,
                               const std::vector<StereoKeypoint>& keypoints) const;
 
-  /// Distance in px from its centre within which a key point of `size` px must find the image.
+  /// Least distance, px, of a described key point of `size` px from the image's border.
   double reach(double size) const;
   /// Size in px whose neighbourhood is as wide as the image's shorter side; a larger one shows more border than image.
   double largestSize(cv::Size image) const;

@@ -1,17 +1,28 @@
 #pragma once
 
-#include <cmath>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <vector>
 
 #include "stereo_descriptor_vo/common/options.hpp"
-#include "stereo_descriptor_vo/front_end/epipolar_matcher.hpp"
 
 namespace sdvo {
 
+struct EpipolarOptions {
+  double max_disparity = 192.0;
+  double uniqueness = 0.9;
+  double min_correlation = 0.8;
+
+  void describe(OptionList& list) {
+    list.add("max_disparity", max_disparity, {4.0, 2000.0}, "px", "largest disparity looked for, before alignment");
+    list.add("uniqueness", uniqueness, {0.1, 1.0}, "",
+             "largest ratio between the difference of the best block and that of the best one elsewhere");
+    list.add("min_correlation", min_correlation, {0.0, 1.0}, "", "least correlation of the aligned patches");
+  }
+};
+
 struct StereoMatcherOptions {
-  EpipolarMatcherOptions epipolar;
+  EpipolarOptions epipolar;
   double max_epipolar_residual = 1.5;
   double min_disparity = 0.5;
 
@@ -32,23 +43,21 @@ struct StereoMatch {
   float dv;         ///< v_right - v_left, px
 };
 
-/// Left to right matching by a search along the row (paper, section 4: by feature tracking, which is slower and needs a
-/// pyramid to reach large disparities).
+/// Finds left positions in the right image (paper, section 4: by feature tracking, which is slower and needs a pyramid
+/// for large disparities). Blocks are compared along the row at half resolution, then around the best one at full
+/// resolution. There the patch is aligned to sub-pixel precision in both directions.
 class StereoMatcher {
  public:
   explicit StereoMatcher(const StereoMatcherOptions& options);
 
-  /// Matches in the order of `left_positions`, those without a trusted match left out. Images are CV_8U of one size.
-  /// `max_disparity`, px, in place of the options' one.
+  /// Matches in the order of `left_positions`. A position has none if no block stands out, if the alignment moves by
+  /// more than 2 px, or if the aligned patches differ. Images are CV_8U of one size. `max_disparity`, px, replaces that
+  /// of the options.
   std::vector<StereoMatch> match(const cv::Mat& left, const cv::Mat& right,
                                  const std::vector<cv::Point2f>& left_positions,
                                  std::optional<double> max_disparity = std::nullopt) const;
 
  private:
-  bool isTrusted(float disparity, float dv) const {
-    return disparity >= options_.min_disparity && std::abs(dv) <= options_.max_epipolar_residual;
-  }
-
   StereoMatcherOptions options_;
 };
 

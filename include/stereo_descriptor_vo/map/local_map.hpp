@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "stereo_descriptor_vo/common/options.hpp"
-#include "stereo_descriptor_vo/common/recycled.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/map/keyframe_memory.hpp"
 #include "stereo_descriptor_vo/map/map_point.hpp"
@@ -209,7 +208,7 @@ class LocalMap {
   StereoCamera camera_;  ///< of the newest pair
   DescriptorKind kind_;  ///< of the newest pair's descriptors
   std::deque<Frame> frames_;
-  Recycled<Point> points_;
+  std::vector<Point> points_;
   KeyframeMemory memory_;
   int last_left_ = -1;  ///< id of the newest key frame that is older than the `keyframes` newest ones
   Problem problem_;     ///< cleared when solved: its memory is used again, and copies of the map need not copy it

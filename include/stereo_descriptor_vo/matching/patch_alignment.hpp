@@ -19,9 +19,9 @@ struct PatchAlignmentOptions {
              "half side of the part of the reference that is aligned");
   }
 
-  /// Whether patches of so many samples a side can be aligned: the derivatives ask for one more all around.
+  /// Whether patches of so many samples a side can be aligned: derivatives need one sample more on each side.
   bool canAlign(int patch_side) const { return patch_side >= leastSide(); }
-  /// In words, if patches that are meant to be aligned cannot be; without patches there is nothing to align.
+  /// A warning if patches are too small to be aligned; empty if they are large enough, or if there are none.
   std::string complaint(int patch_side) const;
 
   static constexpr int kLargestRadius = 6;
@@ -47,8 +47,8 @@ struct PatchShift {
 /// Finds a point of the reference patch in the current one. The point lies at `centre` (samples from the middle of the
 /// reference). The search begins in the current patch's middle. It is an inverse compositional alignment (Baker and
 /// Matthews 2004), blind to brightness and contrast. `warp` takes offsets in the reference image to offsets in the
-/// current one, px: the ratio of the depths above all. Nothing where the patches differ (an occluding edge, another
-/// point), show too little, or where the answer lies outside.
+/// current one, px; mostly a scale by the ratio of the depths. Nothing where the patches differ (an occluding edge,
+/// another point), have too little texture, or where the result lies outside.
 std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const Patch& reference,
                                      const Eigen::Vector2f& centre, const Patch& current, const Eigen::Matrix2f& warp);
 

@@ -13,8 +13,8 @@
 
 namespace sdvo {
 
-/// (u_left, v_left, u_right) of a pair's feature, px, without the rig's error; its position in the left image is known
-/// better by `shift`, px.
+/// (u_left, v_left, u_right) of a pair's feature, px, without the rig's error. `shift`: correction of its position in
+/// both images by an alignment, px.
 Eigen::Vector3d measurementOf(const StereoFeatures& features, int feature, const RigCalibration& calibration,
                               const Eigen::Vector2d& shift = Eigen::Vector2d::Zero());
 
@@ -22,7 +22,7 @@ Eigen::Vector3d measurementOf(const StereoFeatures& features, int feature, const
 std::vector<Correspondence> correspond(const DescribedPoints& reference, const StereoFeatures& features,
                                        const std::vector<FeatureMatch>& matches, const RigCalibration& calibration);
 
-/// The view that a pair has of described points: its matches, and the pose that it sees them from.
+/// Matches of a pair with described points, and the motion from these points' frame to the pair.
 struct ViewMatch {
   std::vector<FeatureMatch> matches;
   std::vector<Correspondence> correspondences;  ///< one for each match

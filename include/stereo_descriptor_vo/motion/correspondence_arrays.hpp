@@ -14,16 +14,14 @@ struct Correspondence {
   Eigen::Vector3d measurement;  ///< (u_left, v_left, u_right) in the current pair, px
 };
 
-/// Correspondences number by number, so that several are worked on at once.
+/// Correspondences as one array for each of their six numbers, for kernels that work on several at once.
 class CorrespondenceArrays {
  public:
   explicit CorrespondenceArrays(const std::vector<Correspondence>& correspondences);
-  /// Some of them.
-  CorrespondenceArrays(const std::vector<Correspondence>& correspondences, const std::vector<int>& subset);
 
   int count() const { return count_; }
 
-  /// How many are worked on at once.
+  /// Correspondences in a register.
   static constexpr int kLanes = 4;
   static int roundedUp(int count) { return (count + kLanes - 1) / kLanes * kLanes; }
 
@@ -40,10 +38,7 @@ class CorrespondenceArrays {
                     Matrix6d& hessian, Vector6d& gradient) const;
 
  private:
-  void resize(int count);
-  void set(int i, const Correspondence& correspondence);
-
-  int count_ = 0;
+  int count_;
   std::vector<double> values_;  ///< six arrays: x, y, z of the points, u_left, v_left, u_right
 };
 

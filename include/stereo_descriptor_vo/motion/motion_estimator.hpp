@@ -25,7 +25,7 @@ struct MotionEstimatorOptions : SampleConsensusOptions, MotionRefinementOptions 
   /// For measurements with this noise.
   void assume(const NoiseOptions& noise) { inlier_threshold = noise.inlierGate(), kernel_scale = noise.length(); }
 
-  /// For measurements that err by so many times more.
+  /// With the thresholds multiplied by `noise`.
   MotionEstimatorOptions scaled(double noise) const {
     MotionEstimatorOptions options = *this;
     options.inlier_threshold *= noise, options.kernel_scale *= noise;
@@ -57,8 +57,8 @@ class MotionEstimator {
  public:
   explicit MotionEstimator(const MotionEstimatorOptions& options);
 
-  /// `expected`, T_current_reference as predicted, is one more start of the refinement: it wins where it ends at a pose
-  /// that the correspondences agree with better. `noise`: how many times more than the options say measurements err.
+  /// `expected`, the predicted T_current_reference, is a second start of the refinement; the pose with the lower cost
+  /// wins. `noise`: factor on the standard deviations that the options assume.
   MotionEstimate estimate(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
                           const std::optional<Eigen::Isometry3d>& expected = std::nullopt, double noise = 1.0) const;
 

@@ -11,8 +11,8 @@
 
 namespace sdvo {
 
-/// Sum of log(1 + x) over many x >= 0, by the logarithm of their products: a robust kernel's cost costs a
-/// multiplication then.
+/// Sum of log(1 + x) over many x >= 0, as the logarithm of a product: a multiplication for each is faster than a
+/// logarithm.
 class LogSum {
  public:
   void add(double x) {
@@ -30,7 +30,7 @@ class LogSum {
 };
 
 struct MotionRefinementOptions {
-  double kernel_scale = NoiseOptions().length();  ///< px: residual at which the Cauchy kernel starts to bend
+  double kernel_scale = NoiseOptions().length();  ///< px: residual at which the Cauchy kernel has the weight 1/2
   int refinement_iterations = 20;                 ///< Levenberg-Marquardt steps at most
 };
 
@@ -42,21 +42,21 @@ struct NormalEquations {
   double weighted_square = 0.0;  ///< sum of weight * |residual|^2, px^2
   double weight = 0.0;           ///< sum of weights
 
-  /// Of a residual's coordinate, px^2: three for each point and six parameters, and weights below one take their share
-  /// of the degrees of freedom.
+  /// Variance of one coordinate of a residual, px^2. Each point has three coordinates, which count by its weight; the
+  /// motion takes six degrees of freedom.
   double variance() const { return weighted_square / std::max(3.0 * weight - 6.0, 1.0); }
 };
 
-/// Minimises the robust stereo reprojection error over (u_left, v_left, u_right) of a subset of the correspondences,
-/// starting at T_current_reference and leaving the result there. Returns the normal equations at the result. Left and
-/// right rows are not mixed: the right view's may be off by more than the noise.
-NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementOptions& options,
-                             const std::vector<Correspondence>& correspondences, const std::vector<int>& subset,
-                             Eigen::Isometry3d& T_current_reference);
-
-/// The same on all of the correspondences.
+/// Minimises the robust stereo reprojection error over (u_left, v_left, u_right), starting at T_current_reference and
+/// leaving the result there. Returns the normal equations at the result. v_right is not used: after an imperfect
+/// rectification it is off by more than the noise.
 NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementOptions& options,
                              const std::vector<Correspondence>& correspondences,
+                             Eigen::Isometry3d& T_current_reference);
+
+/// The same on a subset, by indices of the correspondences.
+NormalEquations refineMotion(const StereoCamera& camera, const MotionRefinementOptions& options,
+                             const std::vector<Correspondence>& correspondences, const std::vector<int>& subset,
                              Eigen::Isometry3d& T_current_reference);
 
 }  // namespace sdvo

@@ -11,16 +11,16 @@ namespace sdvo {
 /// Probability that chance exceeds the limits of this package, for normal distributions as well as for agreement.
 constexpr double kTailProbability = 1e-4;
 
-/// Fewer measurements tell neither their spread nor a motion of their own from noise (chosen).
+/// Least number of measurements for a variance, or for a motion that is compared with another one (chosen).
 constexpr int kFewestMeasured = 20;
 
-/// Of what is usual: ratio of the past that a pair leaves, which are some ten pairs (chosen).
+/// Weight of the previous mean in a running mean over confirmed pairs: a memory of about ten pairs (chosen).
 constexpr double kUsualMemory = 0.9;
 
 /// Side, px (chosen), of a part of the image within which the errors of patches and rectification are correlated.
 constexpr double kPart = 24.0;
 
-/// Square, in standard deviations, that so many normally distributed numbers exceed with that probability (chi-square).
+/// Chi-square of so many degrees of freedom that is exceeded with this probability.
 constexpr double noiseGate(int numbers) {
   constexpr double gates[] = {15.14, 18.42, 21.11, 23.51, 25.74, 27.86};
   return gates[numbers - 1];
@@ -29,7 +29,7 @@ constexpr double noiseGate(int numbers) {
 /// Standard deviations of measurements, px, and the limits that follow from them.
 struct NoiseOptions {
   double corner = 0.4;
-  /// The same of the position that a point's reference patch defines.
+  /// Standard deviation of a position that is aligned with the point's reference patch, px.
   static constexpr double kReference = 0.1;
   double disparity = 0.1;
   double common_disparity = 0.3;
@@ -63,17 +63,17 @@ class Noise {
  public:
   explicit Noise(const NoiseOptions& options) : options_(options) {}
 
-  /// Takes in what the inliers of a confirmed motion were off by (rms of u_left, v_left and u_right, px). Slow and
-  /// bounded: one pair may be blurred, and what the inliers are depends on the scale itself.
+  /// Updates the scale by the residuals of a confirmed motion's inliers (rms of u_left, v_left and u_right, px). The
+  /// update is slow and bounded: one pair may be blurred, and the scale decides which points are inliers.
   void learn(double rms) {
     const double expected = options_.length() / std::sqrt(3.0);
     scale_ = std::clamp(kUsualMemory * scale_ + (1.0 - kUsualMemory) * rms / expected, 1.0 / kMost, kMost);
   }
 
-  /// By how much this rig's corners err more than expected.
+  /// Ratio between the standard deviation of this rig's corners and the expected one.
   double scale() const { return scale_; }
 
-  /// px: motions that are closer at most points are one.
+  /// px: two motions are the same if they move most points to positions no further apart.
   double sameMotion() const { return scale_ * options_.length(); }
 
   /// px: two aligned positions that are further apart are not of one point.
@@ -89,15 +89,15 @@ class Noise {
     usual_square_ += (usual_square_ > 0.0 ? 1.0 - kUsualMemory : 1.0) * (told(square) - usual_square_);
   }
 
-  /// Ratio between the variance of a pair's measurements and the usual one: images may be noisier, blurred or damaged.
-  /// The usual one counts as much as so few measurements as tell no spread (shrinkage).
+  /// Ratio between the variance of a pair's measurements and its running mean: images may be noisier, blurred or
+  /// damaged. With few measurements it is shrunk to 1, as by kFewestMeasured measurements of the mean.
   double ofPair(double square, int measurements) const {
     if (usual_square_ == 0.0) return 1.0;
     return (kFewestMeasured + measurements * told(square) / usual_square_) / (kFewestMeasured + measurements);
   }
 
-  /// Ratio between a motion's variance and that by independent errors of its points. Neighbours share a part of their
-  /// errors, which does not average out.
+  /// Ratio between a motion's variance and the variance if the errors of its points were independent. Neighbours in the
+  /// image share a part of their errors, which does not average out.
   double shared() const { return std::max(shared_, 1.0); }
 
  private:

@@ -10,8 +10,8 @@ namespace sdvo {
 /// Misalignment of a stereo rig after rectification, as an error of its disparities that varies smoothly over the
 /// image:
 ///   measured disparity = true disparity + offset + bend * x^2,  x = (u - cx) / fx.
-/// The offset is the error in the centre, of the convergence or of a principal point. Its change towards the sides has
-/// the shape that a turn about the vertical axis gives.
+/// The offset is the error in the centre, by a wrong convergence angle or principal point. The bend is how a rotation
+/// of the right camera about the vertical axis changes the error towards the sides.
 struct RigCalibration {
   static constexpr int kParameters = 2;
   using Vector = Eigen::Matrix<double, kParameters, 1>;  ///< (offset, bend), px
@@ -29,7 +29,7 @@ struct RigCalibration {
   double disparityError(const StereoCamera& camera, double u) const { return shape(camera, u).dot(value); }
 };
 
-/// What is known of the rig: (offset, bend, delay) in px, px, s. The delay is the time by which right images are taken
+/// Estimate of the rig: (offset, bend, delay) in px, px, s. The delay is the time by which right images are taken
 /// later than their stamps say.
 struct RigEstimate {
   static constexpr int kParameters = RigCalibration::kParameters + 1, kDelay = RigCalibration::kParameters;
@@ -58,7 +58,8 @@ struct RigEstimate {
 struct CalibrationBelief {
   RigCalibration::Vector mean = RigCalibration::Vector::Zero();                     ///< px
   RigCalibration::Matrix information = 1e-12 * RigCalibration::Matrix::Identity();  ///< 1/px^2
-  /// Standard deviation in px of what it leaves at a point, the same in all sightings; unknown to begin with.
+  /// Standard deviation, px, of the disparity error that it leaves at a point, equal in all of the point's sightings.
+  /// None: not measured yet.
   std::optional<double> common_sigma = std::nullopt;
 };
 

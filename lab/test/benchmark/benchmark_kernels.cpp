@@ -10,7 +10,7 @@
 #include "../../../src/common/processor.hpp"
 #include "../../../src/front_end/fast_corners.hpp"
 #include "../../../src/front_end/freak.hpp"
-#include "stereo_descriptor_vo/front_end/epipolar_matcher.hpp"
+#include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
 #include "stereo_descriptor_vo/matching/patch_alignment.hpp"
 
 namespace {
@@ -68,11 +68,8 @@ void stereoMatch(benchmark::State& state) {
   const WithOrWithoutVectors version(state);
   const cv::Mat left = view(false), right = view(true);
   const auto corners = positions();
-  sdvo::EpipolarMatcher::Images scratch;
-  for (auto _ : state) {
-    const sdvo::EpipolarMatcher matcher({}, 1.5, left, right, scratch);
-    for (const cv::Point2f& corner : corners) benchmark::DoNotOptimize(matcher.find(corner));
-  }
+  const sdvo::StereoMatcher matcher({});
+  for (auto _ : state) benchmark::DoNotOptimize(matcher.match(left, right, corners));
 }
 
 void freakInTwoViews(benchmark::State& state) {
