@@ -228,10 +228,8 @@ TEST(Rooms, ShortFilesAreFew) {
       if (lines >= kShort) continue;
       ++files;
       const std::string name = file.stem().string();
-      const bool is_vector_form = name.size() > 5 && name.substr(name.size() - 5) == "_neon";
       const fs::path source = kSource / "src" / room / (name + ".cpp");
-      if (file.extension() != ".hpp" || is_vector_form || (fs::exists(source) && linesOf(source) > 2 * kShort))
-        continue;
+      if (file.extension() != ".hpp" || (fs::exists(source) && linesOf(source) > 2 * kShort)) continue;
       EXPECT_GT(users[name].size(), 1u) << file << " has one user";
     }
   EXPECT_LE(files, kMost);

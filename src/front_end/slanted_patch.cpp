@@ -6,10 +6,13 @@
 
 #include "../common/kernel.hpp"
 #include "../common/patch_products.hpp"
-#include "patch_sampling_neon.hpp"
 
 #ifdef SDVO_HAVE_AVX2
 #include <immintrin.h>
+#elif defined(SDVO_HAVE_NEON)
+#include <arm_neon.h>
+
+#include <cstring>
 #endif
 
 namespace sdvo {
@@ -53,6 +56,15 @@ void samplePlain(const std::uint8_t* image, std::size_t step, const Places& plac
 #ifdef SDVO_HAVE_AVX2
 SDVO_AVX2 inline Lanes eightPixels(const std::uint8_t* pixels) {
   return _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(pixels))));
+}
+#elif defined(SDVO_HAVE_NEON)
+inline Lanes eightPixels(const std::uint8_t* pixels) {
+  const uint16x8_t words = vmovl_u8(vld1_u8(pixels));
+  const float32x4_t halves[] = {vcvtq_f32_u32(vmovl_u16(vget_low_u16(words))),
+                                vcvtq_f32_u32(vmovl_u16(vget_high_u16(words)))};
+  Lanes lanes;
+  std::memcpy(&lanes, halves, sizeof lanes);
+  return lanes;
 }
 #endif
 

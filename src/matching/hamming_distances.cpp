@@ -3,10 +3,11 @@
 #include <cstring>
 
 #include "../common/kernel.hpp"
-#include "hamming_distances_neon.hpp"
 
 #ifdef SDVO_HAVE_AVX2
 #include <immintrin.h>
+#elif defined(SDVO_HAVE_NEON)
+#include <arm_neon.h>
 #endif
 
 // The population count of 64 bits is one instruction on every x86 processor since 2008, but only a function compiled
@@ -70,6 +71,22 @@ SDVO_VECTOR_POPCOUNT void distancesByRegisters(const std::uint8_t* descriptor, c
     if (rest != 0) add(_mm256_maskz_loadu_epi8(rest, descriptor + whole), _mm256_maskz_loadu_epi8(rest, other + whole));
     const __m128i halves = _mm_add_epi64(_mm256_castsi256_si128(sums), _mm256_extracti128_si256(sums, 1));
     distances[k] = static_cast<float>(_mm_extract_epi64(halves, 0) + _mm_extract_epi64(halves, 1));
+  }
+}
+#elif defined(SDVO_HAVE_NEON)
+void distancesWithNeon(const std::uint8_t* descriptor, const cv::Mat& others, const int* candidates, std::size_t count,
+                       float* distances) {
+  constexpr int kBytes = 16;
+  const int whole = others.cols / kBytes * kBytes;
+  for (std::size_t k = 0; k < count; ++k) {
+    const std::uint8_t* other = others.ptr(candidates[k]);
+    uint16x8_t sums = vdupq_n_u16(0);
+    for (int byte = 0; byte < whole; byte += kBytes)
+      sums = vpadalq_u8(sums, vcntq_u8(veorq_u8(vld1q_u8(descriptor + byte), vld1q_u8(other + byte))));
+    int distance = vaddvq_u16(sums);
+    for (int byte = whole; byte < others.cols; ++byte)
+      distance += __builtin_popcount(static_cast<unsigned>(descriptor[byte] ^ other[byte]));
+    distances[k] = static_cast<float>(distance);
   }
 }
 #endif

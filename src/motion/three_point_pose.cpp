@@ -84,22 +84,14 @@ bool findPlanes(const Triangle& t, std::array<Eigen::Vector3d, 2>& planes) {
   return std::isfinite(root) && splitIntoPlanes(degenerate, planes[0], planes[1]);
 }
 
-/// On the stack: thousands of triangles are solved for a pair.
-struct Distances {
-  std::array<Eigen::Vector3d, 4> values;
-  std::size_t count = 0;
-
-  void add(double l1, double l2, double l3) { values[count++] = {l1, l2, l3}; }
-};
-
 /// Distances along the rays on one of the planes, four at most with those of the other.
-void appendDistances(const Triangle& t, const Eigen::Vector3d& plane, Distances& distances) {
+void appendDistances(const Triangle& t, const Eigen::Vector3d& plane, UpToFour<Eigen::Vector3d>& distances) {
   const auto secondDistance = [&](double ratio) { return std::sqrt(t.a23 / (1.0 + ratio * (ratio - 2.0 * t.b23))); };
   constexpr double kParallel = 1e-9;  // the plane holds the first axis: a symmetric triangle
   if (std::abs(plane[0]) < kParallel * plane.norm()) {
     const double ratio = -plane[1] / plane[2], l2 = secondDistance(ratio);
     const double half = std::sqrt(t.a12 - l2 * l2 * (1.0 - t.b12 * t.b12));
-    for (const double l1 : {t.b12 * l2 - half, t.b12 * l2 + half}) distances.add(l1, l2, ratio * l2);
+    for (const double l1 : {t.b12 * l2 - half, t.b12 * l2 + half}) distances.add({l1, l2, ratio * l2});
     return;
   }
   // lambda1 = w0 lambda2 + w1 lambda3, and the ratio lambda3 / lambda2 from sides 12 and 13.
@@ -112,7 +104,7 @@ void appendDistances(const Triangle& t, const Eigen::Vector3d& plane, Distances&
   const double q = -(b + std::copysign(std::sqrt(discriminant), b));
   for (const double ratio : {q / a, c / q}) {
     const double l2 = secondDistance(ratio);
-    distances.add((w0 + w1 * ratio) * l2, l2, ratio * l2);
+    distances.add({(w0 + w1 * ratio) * l2, l2, ratio * l2});
   }
 }
 
@@ -152,11 +144,10 @@ PoseCandidates solveThreePointPose(const std::array<Eigen::Vector3d, 3>& points,
   Eigen::Matrix3d in_reference;
   in_reference << side12, side13, normal;
   const Eigen::Matrix3d from_reference = in_reference.inverse();
-  Distances distances;
+  UpToFour<Eigen::Vector3d> distances;
   for (const Eigen::Vector3d& plane : planes) appendDistances(t, plane, distances);
   const auto isAhead = [](const Eigen::Vector3d& lambda) { return lambda.allFinite() && lambda.minCoeff() > 0.0; };
-  for (std::size_t k = 0; k < distances.count; ++k) {
-    Eigen::Vector3d& lambda = distances.values[k];
+  for (Eigen::Vector3d lambda : distances) {
     if (!isAhead(lambda)) continue;
     polish(t, lambda);
     if (!isAhead(lambda)) continue;
