@@ -42,19 +42,12 @@ void StereoFeatures::append(const StereoFeature& feature) {
 }
 
 StereoFeatures StereoFeatures::select(const std::vector<int>& indices) const {
-  StereoFeatures selected;
-  selected.stamp = stamp;
-  selected.camera = camera;
-  selected.right_delay = right_delay;
-  selected.descriptor = descriptor;
-  selected.layout = layout;
-  selected.element_type = element_type;
-  selected.report = report;
+  StereoFeatures selected = *this;
   forEachArray([&](auto array, auto) {
+    (selected.*array).clear();
     for (const int i : indices) (selected.*array).push_back((this->*array)[static_cast<std::size_t>(i)]);
   });
   selected.descriptors = selectRows(descriptors, indices);
-  selected.patch_layout = patch_layout;
   if (hasPatches()) selected.patches = selectRows(patches, indices);
   return selected;
 }

@@ -159,11 +159,6 @@ std::unique_ptr<BaseDescriptor> makeOrb() {
   return std::make_unique<OpenCvDescriptor>(orb, 19.0 / kStandardSize, impose);
 }
 
-/// BRISK reads the size itself.
-std::unique_ptr<BaseDescriptor> makeBrisk() {
-  return std::make_unique<OpenCvDescriptor>(cv::BRISK::create(), 2.0, [](float, cv::KeyPoint&) {});
-}
-
 std::unique_ptr<BaseDescriptor> makeSurf() {
 #ifdef SDVO_HAVE_XFEATURES2D
   try {
@@ -184,7 +179,8 @@ std::unique_ptr<BaseDescriptor> makeBaseDescriptor(DescriptorType type) {
     case DescriptorType::kBrief:
       return std::make_unique<BriefDescriptor>();
     case DescriptorType::kBrisk:
-      return makeBrisk();
+      // It reads the size itself.
+      return std::make_unique<OpenCvDescriptor>(cv::BRISK::create(), 2.0, [](float, cv::KeyPoint&) {});
     case DescriptorType::kFreak:
       return std::make_unique<FreakDescriptor>();
     case DescriptorType::kOrb:

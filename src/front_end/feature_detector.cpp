@@ -55,12 +55,6 @@ std::vector<Corner> toCorners(const std::vector<cv::KeyPoint>& keypoints) {
   return corners;
 }
 
-/// The score of a FAST corner is the highest threshold at which it still is one. One pass at the lowest threshold,
-/// ranked by score inside each bucket, therefore equals running every bucket at its own adaptive threshold.
-std::vector<Corner> detectFast(const cv::Mat& image, int threshold) {
-  return toCorners(findFastCorners(image, threshold));
-}
-
 /// Corners that OpenCV's detectors are asked for, per corner that is wanted: the buckets choose among them. Their sizes
 /// are not used; those come from the depth.
 constexpr int kChoice = 4;
@@ -109,7 +103,9 @@ std::vector<Corner> detectGradientCorners(const cv::Mat& image, const FeatureDet
 std::vector<Corner> detectAll(const cv::Mat& image, const FeatureDetectorOptions& options, int threshold) {
   switch (options.type) {
     case DetectorType::kFast:
-      return detectFast(image, threshold);
+      // The score is the highest threshold at which a corner is found: one pass at the lowest threshold, ranked by
+      // score inside each bucket, equals a pass for each bucket at its own threshold.
+      return toCorners(findFastCorners(image, threshold));
     case DetectorType::kGftt:
       return detectGradientCorners(image, options);
     case DetectorType::kOrb:
@@ -156,9 +152,8 @@ void refine(const cv::Mat& image, const FeatureDetectorOptions& options, std::ve
 void removeMasked(const cv::Mat& mask, cv::Size size, std::vector<Corner>& corners) {
   if (mask.type() != CV_8UC1) throw std::invalid_argument("the mask must have one channel of eight bits");
   if (mask.size() != size)
-    throw std::invalid_argument("the mask is " + std::to_string(mask.cols) + "x" + std::to_string(mask.rows) +
-                                ", the left image is " + std::to_string(size.width) + "x" +
-                                std::to_string(size.height) + ": make it of the rectified left image");
+    throw std::invalid_argument(text(0, "the mask is ", mask.cols, "x", mask.rows, ", the left image is ", size.width,
+                                     "x", size.height, ": make it of the rectified left image"));
   const auto is_masked = [&](const Corner& corner) { return mask.at<std::uint8_t>(cv::Point(corner.position)) == 0; };
   corners.erase(std::remove_if(corners.begin(), corners.end(), is_masked), corners.end());
 }

@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <opencv2/imgproc.hpp>
-#include <sstream>
 #include <stdexcept>
 #include <string>
 
 #include "../common/kernel.hpp"
 #include "../common/stopwatch.hpp"
+#include "../common/text.hpp"
 #include "exposure_balance.hpp"
 
 namespace sdvo {
@@ -16,11 +16,9 @@ namespace {
 
 void checkImage(const cv::Mat& image, const char* side, const StereoCamera& camera) {
   if (image.type() == CV_8UC1 && image.cols == camera.width && image.rows == camera.height) return;
-  std::ostringstream message;
-  message << side << " image is " << image.cols << "x" << image.rows << " with " << image.channels()
-          << " channel(s) of " << image.elemSize1() << " byte(s); the camera model needs " << camera.width << "x"
-          << camera.height << " with 1 channel of 1 byte";
-  throw std::invalid_argument(message.str());
+  throw std::invalid_argument(text(0, side, " image is ", image.cols, "x", image.rows, " with ", image.channels(),
+                                   " channel(s) of ", image.elemSize1(), " byte(s); the camera model needs ",
+                                   camera.width, "x", camera.height, " with 1 channel of 1 byte"));
 }
 
 /// Sums of the grey levels, without the first one, and of the absolute horizontal gradients.

@@ -53,11 +53,17 @@ bool isLit(const StereoFeatures& features, const Eigen::Vector3d& pixel) {
   return false;
 }
 
+/// Which of a map's points are inliers of a view's motion.
+std::vector<bool> inliersOf(const ViewMatch& view, const DescribedPoints& map) {
+  std::vector<bool> is_inlier(map.positions.size(), false);
+  for (const int i : view.motion.inliers) is_inlier[view.matches[i].reference] = true;
+  return is_inlier;
+}
+
 /// Points of a map that project into a pair, and whether they were matched there.
 std::vector<ExpectedPoint> expectedPoints(const DescribedPoints& map, const StereoFeatures& features,
                                           const ViewMatch& view) {
-  std::vector<bool> found(map.positions.size(), false);
-  for (const int i : view.motion.inliers) found[view.matches[i].reference] = true;
+  const std::vector<bool> found = inliersOf(view, map);
   std::vector<ExpectedPoint> points;
   for (std::size_t p = 0; p < map.positions.size(); ++p) {
     const Eigen::Vector3d point = view.motion.T_current_reference * map.positions[p];
@@ -70,8 +76,7 @@ std::vector<ExpectedPoint> expectedPoints(const DescribedPoints& map, const Ster
 
 /// The points that are no inliers of a view's motion.
 DescribedPoints withoutMatches(const DescribedPoints& points, const ViewMatch& view) {
-  std::vector<bool> used(points.positions.size(), false);
-  for (const int i : view.motion.inliers) used[view.matches[i].reference] = true;
+  const std::vector<bool> used = inliersOf(view, points);
   DescribedPoints others;
   others.kind = points.kind;
   for (std::size_t p = 0; p < used.size(); ++p) {

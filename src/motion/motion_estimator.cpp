@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "../common/text.hpp"
+
 namespace sdvo {
 namespace {
 
@@ -32,8 +34,7 @@ MotionEstimate MotionEstimator::estimate(const StereoCamera& camera, const std::
   };
   const std::size_t count = correspondences.size();
   if (static_cast<int>(count) < options.min_inliers)
-    return failed("only " + std::to_string(count) + " matches, at least " + std::to_string(options.min_inliers) +
-                  " are needed");
+    return failed(text(0, "only ", count, " matches, at least ", options.min_inliers, " are needed"));
 
   // Reject outliers.
   const PoseProblem problem(camera, correspondences, options.inlier_threshold);
@@ -44,8 +45,7 @@ MotionEstimate MotionEstimator::estimate(const StereoCamera& camera, const std::
   if (expected) refineWidely(problem, options, *expected, T);
   estimate.inliers = problem.inliers(T);
   if (static_cast<int>(estimate.inliers.size()) < options.min_inliers)
-    return failed("only " + std::to_string(estimate.inliers.size()) + " of " + std::to_string(count) +
-                  " matches agree on one motion");
+    return failed(text(0, "only ", estimate.inliers.size(), " of ", count, " matches agree on one motion"));
 
   const NormalEquations equations = refineMotion(camera, options, correspondences, estimate.inliers, T);
   estimate.inliers = problem.inliers(T);

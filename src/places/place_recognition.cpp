@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "../common/stopwatch.hpp"
+#include "../common/text.hpp"
 
 namespace sdvo {
 namespace {
@@ -216,8 +217,8 @@ void PlaceRecognition::restore(std::vector<Place> places, const PoseGraph& graph
   for (Place& place : places) {
     place.features.check();
     if (place.id < 0 || place.id > kMostNumber || place.segment < 0 || place.segment > kMostNumber)
-      throw std::invalid_argument("place " + std::to_string(place.id) + " of segment " + std::to_string(place.segment) +
-                                  " leaves no numbers to go on with");
+      throw std::invalid_argument(
+          text(0, "place ", place.id, " of segment ", place.segment, " leaves no numbers to go on with"));
     if (graph.nodes().count(place.id) == 0)
       throw std::invalid_argument("place " + std::to_string(place.id) + " is not in the graph");
     if (!restored.empty() && place.features.kind() != restored.begin()->second.features.kind())
@@ -232,8 +233,7 @@ void PlaceRecognition::restore(std::vector<Place> places, const PoseGraph& graph
   // The index has an array over all ids from the first place to the last one.
   const int first = restored.begin()->first, last = restored.rbegin()->first;
   if (last - first > kMostApart)
-    throw std::invalid_argument("places " + std::to_string(first) + " and " + std::to_string(last) +
-                                " cannot be of one map");
+    throw std::invalid_argument(text(0, "places ", first, " and ", last, " cannot be of one map"));
   segment_ = segment;
   places_ = std::move(restored);
   index_ = std::move(index);
