@@ -79,6 +79,7 @@ void RepeatCheck::add(const cv::Mat& left, const cv::Mat& right, std::int64_t st
     sides_[side].since = stamp;
   }
   ++pairs_;
+  together_ += sides_[0].repeats > 0 && sides_[1].repeats > 0;
   problem_.clear();
   for (std::size_t side = 0; side < 2; ++side) {
     const bool is_alone = sides_[side].repeats > 0 && sides_[1 - side].repeats == 0;
@@ -95,7 +96,10 @@ Finding RepeatCheck::judge() const {
   constexpr double kFew = 0.05;  // ratio of the pairs (chosen)
   const bool is_right = sides_[1].alone > sides_[0].alone;
   const int alone = sides_[is_right ? 1 : 0].alone;
-  if (alone <= kFew * pairs_) return {Verdict::kOk, "each side has new images"};
+  if (alone <= kFew * pairs_)
+    return judged(false, together_ > kFew * pairs_,
+                  text(0, "in ", together_, " of ", pairs_, " pairs both images repeat bit by bit"),
+                  "the driver is frozen or sends images twice; a simulated camera that stands needs noise");
   return {Verdict::kFail,
           text(0, "in ", alone, " of ", pairs_, " pairs the ", is_right ? "right" : "left",
                " image repeats bit by bit, the other one changes"),

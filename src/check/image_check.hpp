@@ -54,6 +54,7 @@ class RepeatCheck {
   };
   std::array<Side, 2> sides_;
   int pairs_ = 0;
+  int together_ = 0;  ///< pairs in which both repeated
   std::string problem_;
 };
 

@@ -28,6 +28,7 @@ void CameraCheck::add(const RecordedPair& pair, const StereoFeatures& features) 
     lens_check_.add(pair.camera, *corners);
   }
   repeats_.add(pair.left, pair.right, pair.stamp);
+  focus_.add(pair.left, pair.right);
   images_.add(pair.left, pair.right, features.report);
   emitter_.add(pair.left);
   odometry_.add(features, run_.last());
@@ -46,6 +47,7 @@ std::vector<CheckStep> CameraCheck::steps(const ArrivalFindings& arrivals) const
       {"calibration", calibration()},
       {"exposure", images_.exposure(thresholds_.min_intensity, thresholds_.max_intensity)},
       {"repeats", repeats_.judge()},
+      {"focus", focus_.judge()},
       {"same moment", rows_.sameMoment()},
       {"shutter", odometry_.shutter()},
       {"rectification", rows_.rectification()},

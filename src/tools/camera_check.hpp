@@ -6,6 +6,7 @@
 
 #include "../check/corner_pairs.hpp"
 #include "../check/finding.hpp"
+#include "../check/focus_check.hpp"
 #include "../check/image_check.hpp"
 #include "../check/lens_check.hpp"
 #include "../check/odometry_check.hpp"
@@ -47,6 +48,7 @@ class CameraCheck {
   RowCheck rows_;
   LensCheck lens_check_;
   RepeatCheck repeats_;
+  FocusCheck focus_;
   ImageCheck images_;
   EmitterCheck emitter_;
   OdometryCheck odometry_;
