@@ -34,7 +34,7 @@ double shareFound(const cv::Mat& before, const cv::Mat& around, const cv::Rect& 
 
 /// Ratio of the dots in `part` of `before` that stayed, less the ratio expected by chance.
 double shareStayed(const cv::Mat& before, const cv::Mat& around, const cv::Rect& part) {
-  constexpr double kDots = 30.0;  // fewer tell nothing
+  constexpr double kDots = 30.0;  // the least for a ratio (chosen)
   if (cv::sum(before(part))[0] < kDots) return 0.0;
   double chance = 0.0;
   for (const cv::Point& offset : {cv::Point(5, 7), cv::Point(-7, 5), cv::Point(7, -5), cv::Point(-5, -7)})

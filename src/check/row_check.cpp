@@ -37,8 +37,8 @@ void RowCheck::add(const CornerPair& pair) {
     const double velocity = static_cast<double>(points[i].y - in_before[i].y) / pair.dt;
     rows.push_back({cell, static_cast<double>(in_right[i].y - points[i].y), velocity, velocity,
                     static_cast<double>(points[i].x - in_right[i].x)});
-    samples_.push_back({cell, rows.back().dv, velocity});
   }
+  samples_.insert(samples_.end(), rows.begin(), rows.end());
   delay_.add(rows);
 }
 
@@ -47,7 +47,7 @@ cv::Mat RowCheck::map() const {
   const auto found = delay_.estimate();
   const double late = found ? found->proved() : 0.0;
   std::vector<std::vector<double>> cells(kCells);
-  for (const Sample& sample : samples_)
+  for (const RowDelay::Sample& sample : samples_)
     cells[static_cast<std::size_t>(sample.cell)].push_back(sample.dv - late * sample.velocity);
   cv::Mat map(RowDelay::kRows, RowDelay::kColumns, CV_64F, cv::Scalar(std::numeric_limits<double>::quiet_NaN()));
   for (std::size_t cell = 0; cell < kCells; ++cell)

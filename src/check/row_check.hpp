@@ -28,15 +28,9 @@ class RowCheck {
   cv::Mat map() const;
 
  private:
-  struct Sample {
-    int cell;
-    double dv;        ///< px
-    double velocity;  ///< of the point's row, px/s
-  };
-
   double max_dv_, max_disparity_, reach_;
   int corners_ = 0;
-  std::vector<Sample> samples_;
+  std::vector<RowDelay::Sample> samples_;
   RowDelay delay_{1.0, 10.0};  ///< 10 ms are a tenth of a pixel then
 };
 

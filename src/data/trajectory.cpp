@@ -335,7 +335,7 @@ std::vector<std::optional<Eigen::Isometry3d>> readGroundTruth(const std::string&
 std::pair<Trajectory, Trajectory> readComparable(const std::string& ground_truth, const std::string& estimate) {
   const StampedTrajectory truth = readPoses(ground_truth), estimated = readPoses(estimate);
   if (truth.stamps.empty() || estimated.stamps.empty()) {
-    // Without stamps on both sides only lines tell which poses belong together.
+    // Without stamps in both files poses correspond by their lines.
     if (truth.stamps.empty() != estimated.stamps.empty() && truth.poses.size() != estimated.poses.size())
       throw std::runtime_error("'" + ground_truth + "' has " + std::to_string(truth.poses.size()) + " poses, '" +
                                estimate + "' " + std::to_string(estimated.poses.size()) +

@@ -14,7 +14,7 @@ stereo_descriptor_vo::StereoFeatures toMessage(const StereoFeatures& features, c
 
 /// The result owns its memory.
 StereoFeatures fromMessage(const StereoFeaturesView& view);
-/// Throws std::invalid_argument when the message does not hold together.
+/// Throws std::invalid_argument if the message is inconsistent.
 inline StereoFeatures fromMessage(const stereo_descriptor_vo::StereoFeatures& message) {
   return fromMessage(StereoFeaturesView(message));
 }

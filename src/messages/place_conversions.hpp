@@ -30,7 +30,7 @@ struct FeatureStream {
 FeatureStream streamOf(const stereo_descriptor_vo::StereoFeatures& message);
 
 stereo_descriptor_vo::Place toMessage(const Place& place, const std::string& robot, const FeatureStream& stream);
-/// Throws std::invalid_argument when the message does not hold together; the result owns its memory.
+/// Throws std::invalid_argument if the message is inconsistent; the result owns its memory.
 Place fromMessage(const stereo_descriptor_vo::Place& message);
 
 /// From the report; the caller fills in header and counts.
@@ -55,7 +55,7 @@ struct MapState {
 };
 
 stereo_descriptor_vo::MapGraph toMessage(const MapState& map, const std::string& robot, const std::string& frame_id);
-/// Throws std::invalid_argument when the message does not hold together.
+/// Throws std::invalid_argument if the message is inconsistent.
 PoseGraph fromMessage(const stereo_descriptor_vo::MapGraph& message);
 
 /// Poses of the base at the key frames.

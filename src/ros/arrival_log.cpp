@@ -194,7 +194,7 @@ ArrivalLog::Gaps ArrivalLog::gapsBetween(Input from, Input to, double begin) con
 /// The likely cause and a remedy, by the stamps of images without a pair.
 std::string ArrivalLog::advise(double begin) const {
   const Gaps right = gapsBetween(kLeftImage, kRightImage, begin), left = gapsBetween(kRightImage, kLeftImage, begin);
-  if (topics_[kLeftImage].arrivals.empty() || topics_[kRightImage].arrivals.empty()) return "";  // the counts say it
+  if (topics_[kLeftImage].arrivals.empty() || topics_[kRightImage].arrivals.empty()) return "";  // the counts show it
   if (2 * right.apart > right.all)
     return text(1, "; the nearest stamps of left and right are ", 1e3 * right.least, " to ", 1e3 * right.most,
                 " ms apart, more than ", options_.approximate_sync ? "max_interval (" : "sync_tolerance (",

@@ -41,6 +41,7 @@ class ArrivalLog {
   std::array<std::pair<std::string, double>, kInputs> rates(double now) const;
 
  private:
+  /// A message waits for its partners until its pair is complete, or until it is too old for one.
   enum class Fate { kWaits, kPaired, kLost };
   struct Arrival {
     std::int64_t stamp;  ///< ns; 0: none

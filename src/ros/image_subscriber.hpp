@@ -23,7 +23,7 @@ struct ImageTransport {
 /// loading of other nodelets and has crashed it.
 class StereoImageTransport {
  public:
-  /// Throws pluginlib::PluginlibException when there is no such transport.
+  /// Throws pluginlib::PluginlibException if the transport is not installed.
   explicit StereoImageTransport(const ros::NodeHandle& private_nh)
       : loader_("image_transport", "image_transport::SubscriberPlugin"),
         left(make(private_nh, "left_image")),

@@ -52,9 +52,9 @@ std::optional<Eigen::Matrix3d> ImuInput::axesIn(const std::string& frame, std::s
   return T_frame_imu->linear();
 }
 
-std::optional<Eigen::Matrix3d> ImuInput::rotation(const std::string& frame, const ros::Time& from, const ros::Time& to,
+std::optional<Eigen::Matrix3d> ImuInput::rotation(const std::string& frame, std::int64_t from, std::int64_t to,
                                                   std::string& problem) const {
-  const std::optional<Eigen::Matrix3d> of_imu = gyro_.rotation(nanoseconds(from), nanoseconds(to), &problem);
+  const std::optional<Eigen::Matrix3d> of_imu = gyro_.rotation(from, to, &problem);
   if (!of_imu) {
     problem = topic() + (has_rates_ ? ": " + problem : kNoRates);
     return std::nullopt;

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <mutex>
 #include <optional>
@@ -26,9 +27,9 @@ class ImuInput {
 
   std::string topic() const { return subscriber_.getTopic(); }
 
-  /// R_from_to of `frame` between two times. None, with the `problem`, if measurements or the IMU's transform are
+  /// R_from_to of `frame` between two stamps (ns). None, with the `problem`, if measurements or the IMU's transform are
   /// missing.
-  std::optional<Eigen::Matrix3d> rotation(const std::string& frame, const ros::Time& from, const ros::Time& to,
+  std::optional<Eigen::Matrix3d> rotation(const std::string& frame, std::int64_t from, std::int64_t to,
                                           std::string& problem) const;
 
   /// False if the newest message has no rates, as of a mere accelerometer.

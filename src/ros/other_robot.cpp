@@ -58,7 +58,7 @@ void OtherRobot::giveUpWhatIsLate() {
 
 void OtherRobot::onAnswer(const PlaceMessage& answer) try {
   const auto asked = questions_.find({answer.robot, answer.id});
-  if (asked == questions_.end()) return;  // another robot asked, or it is late
+  if (asked == questions_.end()) return;  // requested by another robot, or too late
   const Question question = std::move(asked->second);
   questions_.erase(asked);
   const Place other = ros_conversions::fromMessage(answer);

@@ -276,23 +276,21 @@ class PlaceRecognitionNodelet : public RobotNodelet {
 
   // For the other robot, in the thread of slow callbacks.
 
+  /// A function of the session, called under its lock.
+  template <class Function>
+  auto locked(Function function) {
+    return [this, function](const auto&... arguments) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      return function(*session_, arguments...);
+    };
+  }
+
   OtherRobot::Places placesForOthers() {
-    OtherRobot::Places places;
-    places.find = [this](const OtherRobot::SignatureMessage& signature) {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      return session_->find(signature);
-    };
-    places.verify = [this](int id, const Place& other) {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      return session_->verify(id, other);
-    };
-    places.get = [this](int id) {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      return session_->message(id, robot_);
-    };
-    places.publish = [this](const stereo_descriptor_vo::PlaceMatch& match) { publisher_->publish(match); };
-    places.warn = [this](const std::string& what, const std::string& kind) { warn(what, kind); };
-    return places;
+    return {locked([](const PlaceSession& session, const auto& signature) { return session.find(signature); }),
+            locked([](const PlaceSession& session, int id, const Place& other) { return session.verify(id, other); }),
+            locked([this](const PlaceSession& session, int id) { return session.message(id, robot_); }),
+            [this](const auto& match) { publisher_->publish(match); },
+            [this](const auto& what, const auto& kind) { warn(what, kind); }};
   }
 
   // The services.

@@ -45,7 +45,7 @@ std::optional<PlaceReport> PlaceSession::observe(const OdometryPair& pair, const
   if (const auto expected = std::exchange(expected_, std::nullopt); expected && !recognition_.places().empty()) {
     recognition_.expect(expected->T_map_base * T_odom_base.inverse(), expected->radius);
     located_ = false;
-    told_ = true;
+    pose_given_ = true;
   }
   CameraMotion motion;
   motion.T_odom_camera = T_odom_base * T_base_camera;

@@ -62,7 +62,7 @@ class PlaceSession {
   /// Whether one of the loaded places was recognised; true if none were loaded.
   bool isLocated() const { return located_; }
   /// Whether T_map_odom is known: located, or given on initialpose.
-  bool isPlaced() const { return located_ || told_; }
+  bool isPlaced() const { return located_ || pose_given_; }
   /// Whether new places are added to a map in which the robot is located.
   bool isMapping() const { return located_ && !localises_only_; }
   /// Of the last optimisation, s.
@@ -91,7 +91,7 @@ class PlaceSession {
   bool continues_ = false;   ///< the motion from the last pair to the next one is known
   int loaded_ = 0;           ///< places with smaller ids were loaded
   bool located_ = true;
-  bool told_ = false;
+  bool pose_given_ = false;
   struct Expectation {
     Eigen::Isometry3d T_map_base;
     double radius;

@@ -17,8 +17,8 @@
 
 namespace sdvo {
 
-/// What the nodelets of this package have in common: callbacks in threads of their own, a start that fails as a whole,
-/// and reports that do not repeat within seconds.
+/// Base of this package's nodelets: callbacks in threads of their own, a start that fails as a whole, services, and
+/// reports that do not repeat within seconds.
 class RobotNodelet : public nodelet::Nodelet {
  protected:
   /// The nodelet's onInit(). Callbacks begin once it has returned. An exception is the reason of a failed start.
@@ -39,7 +39,7 @@ class RobotNodelet : public nodelet::Nodelet {
       NODELET_WARN_STREAM("parameter " << name << " is unknown and has no effect: misspelt? See docs/parameters.md");
   }
 
-  /// A service that succeeds unless `work` throws; the response has what it says.
+  /// A service that succeeds unless `work` throws. The exception's text becomes the response's message.
   template <class Service, class Work>
   void serve(ros::NodeHandle& nh, const std::string& name, Work work) {
     using Request = typename Service::Request;

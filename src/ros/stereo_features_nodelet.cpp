@@ -88,7 +88,7 @@ class StereoFeaturesNodelet : public RobotNodelet {
         slow_nh, listOptions(reconfigured_),
         [this] { extractors_.post(std::make_unique<FeatureExtractor>(reconfigured_)); }, listOptions(defaults));
 
-    // Called once the callbacks' thread has started, when publisher_ is there.
+    // Called when the threads have started, and so after publisher_ is set.
     const ros::SubscriberStatusCallback on_connect = [this](const ros::SingleSubscriberPublisher&) { updateInput(); };
     publisher_ = master_nh.advertise<stereo_descriptor_vo::StereoFeatures>("stereo_features", kPublishQueue, on_connect,
                                                                            on_connect);
@@ -289,7 +289,7 @@ class StereoFeaturesNodelet : public RobotNodelet {
   std::unique_ptr<Worker<PairFilter::Passed>> worker_;
   std::unique_ptr<StereoImageTransport> transport_;
 
-  // Only the thread that asks the master touches these.
+  // Only the thread that may wait for the master touches these.
   std::unique_ptr<CameraFinder> finder_;
   std::unique_ptr<StereoInput> input_;
   ros::Subscriber mask_subscriber_;

@@ -55,7 +55,7 @@ class StereoInput {
   ArrivalLog& arrivals_;
   std::mutex mutex_;  // of what follows
   TriggerSynchroniser<Image, Image, Info, Info> exact_;
-  std::unique_ptr<ApproximateSynchroniser<Image, Image, Info, Info>> approximate_;  // null unless asked for
+  std::unique_ptr<ApproximateSynchroniser<Image, Image, Info, Info>> approximate_;  // null without approximate_sync
 
   // Destroyed in reverse order: first the subscribers.
   CallbackThread right_callbacks_;

@@ -46,7 +46,7 @@ std::vector<std::string> handOver(const std::string& name, const XmlRpc::XmlRpcV
     const bool is_of_images = part.name == "stereo_features" && sdvo::isOfImageTransport(name);
     if (!is_in_block && !is_of_images && std::count(part.parameters.begin(), part.parameters.end(), name) == 0)
       continue;
-    ros::param::set(block + own, value);  // the nodelet names one that it does not know
+    ros::param::set(block + own, value);  // if it is unknown, the nodelet warns
     given.push_back(ros::names::resolve(block + own));
   }
   return given;

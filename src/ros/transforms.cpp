@@ -135,7 +135,7 @@ std::optional<Eigen::Isometry3d> CameraMount::find(const std::string& base_frame
   const std::lock_guard<std::mutex> lock(mutex_);
   base_frame_ = base_frame;
   camera_frame_ = camera_frame;
-  change_is_told_ = false;
+  change_reported_ = false;
   return T_base_camera_ = found;
 }
 
@@ -143,13 +143,13 @@ std::string CameraMount::change() {
   constexpr double kNear = 0.005, kAlike = 0.5 * M_PI / 180.0;  // m, rad: more than joints and masts give way (chosen)
   std::string ignored;
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (change_is_told_ || camera_frame_.empty()) return "";
+  if (change_reported_ || camera_frame_.empty()) return "";
   const std::optional<Eigen::Isometry3d> now = transforms_.find(base_frame_, camera_frame_, ignored);
   if (!now) return "";
   const Eigen::Isometry3d moved = T_base_camera_->inverse() * *now;
   const double way = moved.translation().norm(), angle = Eigen::AngleAxisd(moved.linear()).angle();
   if (way <= kNear && angle <= kAlike) return "";
-  change_is_told_ = true;
+  change_reported_ = true;
   return text(3, base_frame_, " -> ", camera_frame_, " has changed by ", way, " m and ", 180.0 / M_PI * angle, " deg");
 }
 

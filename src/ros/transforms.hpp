@@ -94,7 +94,7 @@ class CameraMount {
   mutable std::mutex mutex_;  // of what follows
   std::optional<ros::SteadyTime> deadline_;
   std::string base_frame_, camera_frame_;
-  bool change_is_told_ = false;
+  bool change_reported_ = false;
   std::optional<Eigen::Isometry3d> T_base_camera_;
 };
 

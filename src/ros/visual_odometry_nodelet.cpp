@@ -288,8 +288,8 @@ class VisualOdometryNodelet : public RobotNodelet {
   /// Compares the axes of camera and IMU on TF with the motion in the images.
   void compareAxes(const OdometryResult& result, const std::optional<MotionGuess>& guess,
                    const std_msgs::Header& header) {
-    const auto warnOnce = [this](const char* step, Finding& told, const Finding& found, const char* consequence) {
-      if (!std::exchange(told, found).isFault() && found.isFault())
+    const auto warnOnce = [this](const char* step, Finding& last, const Finding& found, const char* consequence) {
+      if (!std::exchange(last, found).isFault() && found.isFault())
         NODELET_WARN_STREAM(step << ": " << found.text() << consequence);
     };
     optical_axis_.add(*mount_->last(), result.T_previous_current);
@@ -302,8 +302,7 @@ class VisualOdometryNodelet : public RobotNodelet {
                    result.T_previous_current.linear());
     const auto gyro = [&](std::int64_t from, std::int64_t to) {
       std::string ignored;
-      return imu_->rotation(cleanFrameId(header.frame_id), ros::Time().fromNSec(static_cast<std::uint64_t>(from)),
-                            ros::Time().fromNSec(static_cast<std::uint64_t>(to)), ignored);
+      return imu_->rotation(cleanFrameId(header.frame_id), from, to, ignored);
     };
     warnOnce("IMU", gyro_found_, gyro_axes_.judge(gyro), " No guess is taken from it until a reset");
   }
@@ -322,7 +321,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     info.malformed = unused_->count(UnusedInput::kRefused);
     info = publisher_->publishInfo(std::move(info), message.header.stamp);
     diagnostics_->note(info);
-    if (std::abs(info.latency) > kOtherClock && !std::exchange(clock_is_told_, true))
+    if (std::abs(info.latency) > kOtherClock && !std::exchange(latency_reported_, true))
       NODELET_WARN_STREAM(checkLatency(info.latency, kOtherClock).text());
   }
 
@@ -398,7 +397,7 @@ class VisualOdometryNodelet : public RobotNodelet {
   std::optional<MotionGuess> guessOfGyro(const ros::Time& since, const std_msgs::Header& header,
                                          std::string& problem) const {
     const std::optional<Eigen::Matrix3d> R_before_now =
-        imu_->rotation(cleanFrameId(header.frame_id), since, header.stamp, problem);
+        imu_->rotation(cleanFrameId(header.frame_id), nanoseconds(since), nanoseconds(header.stamp), problem);
     if (!R_before_now) return std::nullopt;
     MotionGuess guess;
     guess.T_previous_current.linear() = *R_before_now;
@@ -536,13 +535,13 @@ class VisualOdometryNodelet : public RobotNodelet {
   std::optional<std::uint32_t> processed_epoch_;
   std::optional<ros::Time> processed_stamp_;
   bool to_be_levelled_ = false;  // T_odom_start_ still needs the accelerometer
-  bool clock_is_told_ = false;
+  bool latency_reported_ = false;
   bool given_start_ = false;            // a service has set the pose, which is not levelled
   std::optional<double> levels_until_;  // s, steady time
   Patience patience_{0.0};              // with guesses
   OpticalAxisCheck optical_axis_;
   GyroAxesCheck gyro_axes_;
-  Finding optical_found_{}, gyro_found_{};  // as told last
+  Finding optical_found_{}, gyro_found_{};  // as reported last
 
   std::unique_ptr<Worker<FeaturesFilter::Passed>> worker_;
   std::unique_ptr<PausableInput> input_;

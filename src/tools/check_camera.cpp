@@ -1,4 +1,4 @@
-// Goes through the inputs of a stereo camera one by one, live or in a bag, and says what to do about each.
+// Checks the inputs of a stereo camera one by one, live or in a bag, and prints a remedy for each fault.
 #include <image_transport/image_transport.h>
 #include <ros/callback_queue.h>
 #include <ros/ros.h>

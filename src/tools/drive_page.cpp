@@ -6,7 +6,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 #include "../common/statistics.hpp"
@@ -227,10 +226,6 @@ void writeDrivePage(const std::string& path, const DriveReport& report, const Of
 }
 
 using stereo_descriptor_vo::VoInfo;
-
-int LiveRecord::pairs() const {
-  return std::accumulate(states.begin(), states.end(), 0);
-}
 
 std::optional<LiveRecord> readLiveRecord(const rosbag::Bag& bag) {
   LiveRecord record;

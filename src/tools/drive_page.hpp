@@ -23,8 +23,6 @@ struct LiveRecord {
   std::vector<double> latencies;    ///< s, those known
   std::uint64_t dropped_pairs = 0;  ///< on either side
   int discontinuities = 0;          ///< of the pose
-
-  int pairs() const;
 };
 
 /// From the first topic with VoInfo in a bag; nothing without one.

@@ -61,7 +61,7 @@ void printTable(const TrajectoryErrors& errors) {
     std::printf("%-44s %s\n", figure.words, cell(figure.pattern, errors.*figure.value).c_str());
 }
 
-/// The requested lengths that no sub-path reaches, as "100, 200"; empty when there is none.
+/// Requested lengths that are longer than the path, as "100, 200"; empty without any.
 std::string missingLengths(const TrajectoryErrors& errors) {
   std::string text;
   for (const SubPathErrors& row : errors.per_length) {

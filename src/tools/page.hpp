@@ -10,7 +10,7 @@
 
 namespace sdvo {
 
-/// What page.html draws is one JSON object. Here are its parts, and how it becomes a file.
+/// The JSON object that page.html draws: its parts, and how it becomes a file.
 
 /// Words as a JSON string, which may stand in a script of HTML.
 std::string quoted(const std::string& words);

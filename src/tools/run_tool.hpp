@@ -15,7 +15,7 @@ inline int exitCodeOf(Verdict verdict) {
   return verdict == Verdict::kFail ? 2 : 0;
 }
 
-/// What every tool's main() does: parse the command line, run `work` (returns the exit code), and report any failure as
+/// The main() of every tool: parses the command line, run `work` (returns the exit code), and report any failure as
 /// one line "error: …" on stderr with exit code 1.
 template <class Work>
 int runTool(CLI::App& app, int argc, char** argv, const Work& work) {

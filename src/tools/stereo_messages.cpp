@@ -78,7 +78,7 @@ std::string layoutOf(const std::string& definition, const std::string& type = ""
   return layout;
 }
 
-/// First bytes of files that are no bags of ROS 1, and what such files are.
+/// First bytes of files that users take for bags of ROS 1, and their formats.
 const std::pair<const char*, const char*> kOtherFiles[] = {
     {"SQLite format 3", "a bag of ROS 2 (SQLite)"}, {"\x89MCAP", "an MCAP file"}, {"PK", "a ZIP archive"}};
 

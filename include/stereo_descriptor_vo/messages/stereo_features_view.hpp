@@ -18,7 +18,7 @@ namespace sdvo {
 /// The message must outlive the view and its matrices. These are read-only, which cv::Mat cannot express.
 class StereoFeaturesView {
  public:
-  /// Throws std::invalid_argument that says which field does not hold together; nothing is read before it is checked.
+  /// Checks all fields before they are read. Throws std::invalid_argument that names an inconsistent one.
   explicit StereoFeaturesView(const stereo_descriptor_vo::StereoFeatures& message) : message_(message) {
     checkGeometry();
     checkRows();
