@@ -195,22 +195,23 @@ VisualOdometry::Pair VisualOdometry::usable(const StereoFeatures& given,
     pair.is = Pair::kFrozen;
   else
     pair.is = Pair::kFollowed;
-  straighten(pair, guess);
+  straighten(pair);
   return pair;
 }
 
 /// The pair as a rig would have seen it whose right camera did not rotate and was in step.
-void VisualOdometry::straighten(Pair& pair, const std::optional<MotionGuess>& guess) const {
+void VisualOdometry::straighten(Pair& pair) const {
   const LearntRig& rig = state_.rig;
   const bool is_new = pair.rotation.log_odds > 0.0;
   const Eigen::Vector3d rotation = is_new ? Eigen::Vector3d(rig.rotation + pair.rotation.value) : rig.rotation;
   if (!rotation.isZero()) pair.rotated_back = rotatedBack(pair.part(), rotation);
-  if (pair.is == Pair::kFollowed || pair.is == Pair::kSought)
-    pair.synchronised = synchronised(pair.taken(), pair.dt, guess);
+  const bool has_map = pair.is == Pair::kFollowed || pair.is == Pair::kSought;
+  if (has_map && state_.prior.velocity() && pair.dt <= options_.tracking.max_gap)
+    pair.synchronised = synchronised(pair.taken(), pair.dt, *state_.prior.velocity());
 }
 
-/// The motion of the pair: in the map, or in that which the last pair of an outage would begin. Where the right camera
-/// seems to have rotated, the pair is straightened and searched again.
+/// The motion of the pair: in the map, or in that which the last pair of an outage would begin. Where the camera moves
+/// otherwise than expected, or the right one seems to have rotated, the pair is straightened and searched again.
 void VisualOdometry::search(Pair& pair, const std::optional<MotionGuess>& guess, std::optional<MotionScene>& scene,
                             MotionHypothesis& found) const {
   const auto find = [&] {
@@ -219,16 +220,25 @@ void VisualOdometry::search(Pair& pair, const std::optional<MotionGuess>& guess,
     if (pair.is == Pair::kSought)
       if (auto place = reacquire(pair.features())) scene.emplace(std::move(*place));
     found = scene ? search_.find(*scene, largestDoubt()) : MotionHypothesis();
+    if (!found.motion.success) return Vector6d(Vector6d::Zero());
+    const Eigen::Isometry3d motion = found.motion.T_current_reference.inverse();
+    return Vector6d(logSE3(motion) / state_.prior.interval(scene->map.secondsUntil(pair.features()), motion));
   };
-  find();
-  Eigen::Vector3d rate = Eigen::Vector3d::Zero();
-  if (found.motion.success)
-    rate = logSO3(found.motion.T_current_reference.linear().transpose()) /
-           state_.prior.interval(scene->map.secondsUntil(pair.features()), found.motion.T_current_reference);
-  pair.rotation = state_.rig.shownRotation(pair.features(), found, rate);
+  const auto findSynchronised = [&] {
+    constexpr double kNegligible = 0.02;  // px: a fifth of a disparity's noise
+    Vector6d velocity = find();
+    if (pair.is != Pair::kFollowed || !pair.synchronised || !found.motion.success) return velocity;
+    const double delay = pair.taken().right_delay + state_.rig.calibration.delay();
+    const double unexpected = (velocity - *state_.prior.velocity()).tail<3>().norm();
+    if (std::abs(delay) * pair.given.camera.fx * unexpected < kNegligible) return velocity;
+    pair.synchronised = synchronised(pair.taken(), pair.dt, velocity);
+    return find();
+  };
+  const Vector6d velocity = findSynchronised();
+  pair.rotation = state_.rig.shownRotation(pair.features(), found, velocity.tail<3>());
   if (!(pair.rotation.log_odds > 0.0)) return;
-  straighten(pair, guess);
-  find();
+  straighten(pair);
+  findSynchronised();
 }
 
 /// Over the `dt` s since the pair before: that of another source, else that of the velocity.
@@ -290,23 +300,12 @@ MotionScene VisualOdometry::sceneOf(const LocalMap& map, const StereoFeatures& f
   return scene;
 }
 
-/// The features as of one moment, if the right image is known to be late: by the velocity that is expected, then by
-/// the one that these show.
+/// The features as of one moment, if the right image is known to be late.
 std::optional<StereoFeatures> VisualOdometry::synchronised(const StereoFeatures& taken, double dt,
-                                                           const std::optional<MotionGuess>& guess) const {
-  const std::optional<Vector6d>& velocity = state_.prior.velocity();
-  const double known = state_.rig.calibration.delay(), delay = taken.right_delay + known;
-  if (delay == 0.0 || !velocity || dt > options_.tracking.max_gap) return std::nullopt;
-  StereoFeatures features = state_.rig.right_delay.synchronised(taken, dt, *velocity, known);
-  constexpr double kNegligible = 0.02;  // px: a fifth of a disparity's noise
-  const double rate_sigma = std::sqrt(state_.prior.predicted(dt).covariance(4, 4)) / dt;
-  const bool is_exact = std::abs(delay) * taken.camera.fx * rate_sigma < kNegligible;
-  if (state_.interrupted || is_exact) return features;
-  const MotionHypothesis found = search_.find(sceneOf(*state_.map, features, dt, guess), largestDoubt());
-  if (!found.motion.success) return features;
-  const Eigen::Isometry3d motion = found.motion.T_current_reference.inverse();
-  return state_.rig.right_delay.synchronised(
-      taken, dt, logSE3(motion) / state_.prior.interval(state_.map->secondsUntil(taken), motion), known);
+                                                           const Vector6d& velocity) const {
+  const double known = state_.rig.calibration.delay();
+  if (taken.right_delay + known == 0.0) return std::nullopt;
+  return state_.rig.right_delay.synchronised(taken, dt, velocity, known);
 }
 
 /// The pair with the motion that the search found; nothing without one, and none that spans an outage.

@@ -73,13 +73,12 @@ class VisualOdometry {
 
   void refuse(const StereoFeatures& features) const;
   Pair usable(const StereoFeatures& given, const std::optional<MotionGuess>& guess) const;
-  void straighten(Pair& pair, const std::optional<MotionGuess>& guess) const;
+  void straighten(Pair& pair) const;
   void search(Pair& pair, const std::optional<MotionGuess>& guess, std::optional<MotionScene>& scene,
               MotionHypothesis& found) const;
   std::optional<Eigen::Isometry3d> expectedMotion(double dt, const std::optional<MotionGuess>& guess) const;
   double logOddsOfFrozen(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
-  std::optional<StereoFeatures> synchronised(const StereoFeatures& taken, double dt,
-                                             const std::optional<MotionGuess>& guess) const;
+  std::optional<StereoFeatures> synchronised(const StereoFeatures& taken, double dt, const Vector6d& velocity) const;
   MotionScene sceneOf(const LocalMap& map, const StereoFeatures& features, double dt,
                       const std::optional<MotionGuess>& guess) const;
   std::optional<MotionScene> reacquire(const StereoFeatures& features) const;
