@@ -31,7 +31,7 @@ double growth(double at_2, double at_4, double at_8) {
 
 /// Standard deviation of the blur of such edges, px.
 double blurOf(double growth_of_edges) {
-  constexpr double kSharp = 1.0, kStep = 0.1, kMost = 20.0;  // px; sharper ones depend on the texture
+  constexpr double kSharp = 1.0, kStep = 0.1, kMost = 20.0;  // px (chosen); below, texture decides
   double sigma = kSharp;
   const auto at = [&](std::size_t i) { return differenceOfEdge(kDistances[i], sigma); };
   while (sigma < kMost && growth(at(0), at(1), at(2)) < growth_of_edges) sigma += kStep;
@@ -52,7 +52,7 @@ void FocusCheck::add(const cv::Mat& left, const cv::Mat& right) {
 Finding FocusCheck::judge() const {
   // A hand-held 424x240 camera with noise of 1.5 grey levels keeps half of its inliers at 3 px, a tenth at 7 px, and at
   // 10 px it is lost. Images of KITTI, Karlsruhe, EuRoC, Tsukuba, an OAK-D and a Bumblebee have at most 2 px.
-  constexpr double kSoft = 4.0, kBlind = 7.0;  // px
+  constexpr double kSoft = 4.0, kBlind = 7.0;  // px (chosen)
   constexpr double kEdges = 0.1;               // grey levels squared; of noise alone it is a tenth of that
   std::array<double, 2> blur{};
   for (const std::size_t side : {0u, 1u}) {

@@ -117,7 +117,7 @@ std::vector<Corner> detectAll(const cv::Mat& image, const FeatureDetectorOptions
 }
 
 /// Moves corners to the intersection of the gradient lines around them. Gradient detectors respond up to half of their
-/// window inside of a corner. One that moves further is no single point and keeps its integer position.
+/// window inside of a corner. A corner that moves further is no single point and keeps its integer position.
 void refineByGradients(const cv::Mat& image, std::vector<Corner>& corners) {
   constexpr int kHalfSide = 3;  // px, of the window: cv::cornerSubPix needs 11 px, less than the smallest image has
   if (corners.empty()) return;

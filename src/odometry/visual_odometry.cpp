@@ -225,8 +225,8 @@ void VisualOdometry::search(Pair& pair, const std::optional<MotionGuess>& guess,
     return Vector6d(logSE3(motion) / state_.prior.interval(scene->map.secondsUntil(pair.features()), motion));
   };
   const auto findSynchronised = [&] {
-    constexpr double kNegligible = 0.02;  // px: a fifth of a disparity's noise
-    Vector6d velocity = find();
+    constexpr double kNegligible = 0.02;  // px (chosen): a fifth of a disparity's noise
+    const Vector6d velocity = find();
     if (pair.is != Pair::kFollowed || !pair.synchronised || !found.motion.success) return velocity;
     const double delay = pair.taken().right_delay + state_.rig.calibration.delay();
     const double unexpected = (velocity - *state_.prior.velocity()).tail<3>().norm();

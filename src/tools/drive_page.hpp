@@ -17,7 +17,7 @@
 
 namespace sdvo {
 
-/// What the odometry reported in vo_info while the drive was recorded.
+/// States, latencies, dropped pairs and jumps in the vo_info of a recorded drive.
 struct LiveRecord {
   std::array<int, 4> states{};      ///< pairs of each VoInfo::state_id
   std::vector<double> latencies;    ///< s, those known

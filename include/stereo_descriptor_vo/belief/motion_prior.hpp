@@ -60,7 +60,7 @@ class MotionPrior {
   const std::optional<Vector6d>& velocity() const { return velocity_; }
 
   /// Duration of a motion, s, between pairs whose stamps are `dt` s apart. It is longer than `dt` for a burst, whose
-  /// stamps lie closer together than its exposures, and where the motion would else exceed max_speed or
+  /// stamps lie closer together than its exposures, and where the motion would exceed max_speed or
   /// max_rotation_rate.
   double interval(double dt, const Eigen::Isometry3d& motion) const;
 
@@ -97,8 +97,8 @@ class MotionPrior {
   void interrupt() { velocity_.reset(), before_.reset(), doubt_.setZero(); }
 
  private:
-  /// Covariance, m^2 and rad^2, that white acceleration gives to a motion over `dt` s. It is predicted by a mean
-  /// velocity over `before` s, an interval that ended `age` s earlier.
+  /// Covariance, m^2 and rad^2, of a motion over `dt` s under white acceleration. The prediction is the mean velocity
+  /// over `before` s, an interval that ended `age` s earlier.
   Matrix6d processNoise(double dt, double before, double age) const;
   Matrix6d stampNoise(const Vector6d& velocity) const;
 
