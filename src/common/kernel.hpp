@@ -11,15 +11,6 @@
 /// usesVectorKernels().
 #define SDVO_HAVE_NEON
 #endif
-#if defined(SDVO_HAVE_AVX2) || defined(SDVO_HAVE_NEON)
-#define SDVO_HAVE_VECTORS
-#endif
-/// For functions that are written once for AVX2 and NEON.
-#ifdef SDVO_HAVE_AVX2
-#define SDVO_VECTORS SDVO_AVX2
-#else
-#define SDVO_VECTORS
-#endif
 /// For kernels and their parts: always inlined, so each is compiled for the target of its caller.
 #define SDVO_IN_KERNEL inline __attribute__((always_inline))
 

@@ -2,8 +2,9 @@
 
 namespace sdvo {
 
-// The kernels that take most of the time exist twice: in plain C++ and with vectors of AVX2 or NEON. One of them is
-// chosen at run time. Both give the same bits: sums are added in a fixed order, and no product is fused with a sum.
+// The kernels that take most of the time are compiled twice: for any processor, and for AVX2. Those by intrinsics have a
+// plain form beside them. One of both is chosen at run time, and both give the same bits: sums are added in a fixed
+// order, and no product is fused with a sum.
 
 /// Whether kernels use vectors. All 64-bit ARM processors have NEON, not all of x86 have AVX2.
 bool usesVectorKernels();

@@ -36,16 +36,16 @@ typedef std::uint32_t UnsignedRegister __attribute__((vector_size(4 * kRegister)
 #endif
 
 /// The right neighbours of the lanes of `here`; that of the last one is the first of `behind`.
-SDVO_VECTORS inline Register nextOf(Register here, Register behind) {
+SDVO_IN_KERNEL Register nextOf(Register here, Register behind) {
   return SDVO_SHUFFLE(here, behind, SDVO_NEXT);
 }
 
-SDVO_VECTORS inline Register toFloats(UnsignedRegister numbers) {
+SDVO_IN_KERNEL Register toFloats(UnsignedRegister numbers) {
   return __builtin_convertvector(reinterpret_cast<IntRegister>(numbers), Register);
 }
 
 /// Values without their fractions, clamped to [0, last].
-SDVO_VECTORS inline IntRegister truncated(Register values, IntRegister last) {
+SDVO_IN_KERNEL IntRegister truncated(Register values, IntRegister last) {
   const IntRegister zero{}, whole = __builtin_convertvector(values, IntRegister);
   const IntRegister not_above = whole < last ? whole : last;
   return not_above > zero ? not_above : zero;
@@ -63,7 +63,7 @@ SDVO_IN_KERNEL Bits bitsAt(const Number* place) {
 
 /// numbers[p] and numbers[p + 1] for p = places[0] and places[1]; a register of eight also has those for places[4]
 /// and places[5].
-SDVO_VECTORS inline UnsignedRegister readPairs(const std::int32_t* numbers, const std::uint32_t* places) {
+SDVO_IN_KERNEL UnsignedRegister readPairs(const std::int32_t* numbers, const std::uint32_t* places) {
   typedef std::int64_t PairRegister __attribute__((vector_size(4 * kRegister)));
   const auto at = [&](int k) { return bitsAt<std::int64_t>(numbers + places[k]); };
 #ifdef SDVO_HAVE_AVX2
@@ -74,7 +74,7 @@ SDVO_VECTORS inline UnsignedRegister readPairs(const std::int32_t* numbers, cons
 }
 
 /// For each place, the four bytes that begin there, as one number.
-SDVO_VECTORS inline UnsignedRegister readFours(const std::uint8_t* bytes, const std::uint32_t* places) {
+SDVO_IN_KERNEL UnsignedRegister readFours(const std::uint8_t* bytes, const std::uint32_t* places) {
   const auto at = [&](int k) { return bitsAt<std::uint32_t>(bytes + places[k]); };
 #ifdef SDVO_HAVE_AVX2
   return UnsignedRegister{at(0), at(1), at(2), at(3), at(4), at(5), at(6), at(7)};
@@ -87,13 +87,13 @@ SDVO_VECTORS inline UnsignedRegister readFours(const std::uint8_t* bytes, const 
 class Pairs {
  public:
   /// Two results of readPairs(): of places from 0 on, and from 2 on.
-  SDVO_VECTORS Pairs(UnsignedRegister low, UnsignedRegister high)
+  SDVO_IN_KERNEL Pairs(UnsignedRegister low, UnsignedRegister high)
       : low_(reinterpret_cast<Register>(low)), high_(reinterpret_cast<Register>(high)) {}
 
-  SDVO_VECTORS UnsignedRegister first() const {
+  SDVO_IN_KERNEL UnsignedRegister first() const {
     return reinterpret_cast<UnsignedRegister>(SDVO_SHUFFLE(low_, high_, SDVO_EVENS));
   }
-  SDVO_VECTORS UnsignedRegister second() const {
+  SDVO_IN_KERNEL UnsignedRegister second() const {
     return reinterpret_cast<UnsignedRegister>(SDVO_SHUFFLE(low_, high_, SDVO_ODDS));
   }
 

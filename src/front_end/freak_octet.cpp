@@ -7,23 +7,16 @@
 namespace sdvo {
 namespace {
 
-void measurePlain(const Freak& freak, const ViewKeypoint* keypoints, OctetMeans& means) {
-  for (std::size_t k = 0; k < kOctet; ++k) {
-    const std::array<float, Freak::kFields> of_one = freak.intensities(keypoints[k]);
-    for (std::size_t field = 0; field < Freak::kFields; ++field) means[field][k] = of_one[field];
-  }
-}
-
 /// IntegralImage::boxMean with the same operations in the same order, a register of boxes at once.
 class Boxes {
  public:
-  SDVO_VECTORS explicit Boxes(const cv::Mat& sums)
+  SDVO_IN_KERNEL explicit Boxes(const cv::Mat& sums)
       : sums_(sums.ptr<std::int32_t>()),
         step_(static_cast<std::int32_t>(sums.step1())),
         last_column_(IntRegister{} + (sums.cols - 2)),
         last_row_(IntRegister{} + (sums.rows - 2)) {}
 
-  SDVO_VECTORS Register means(Register u, Register v, Register half) const {
+  SDVO_IN_KERNEL Register means(Register u, Register v, Register half) const {
     const Edge left = edge(u - half, last_column_), right = edge(u + half, last_column_);
     const Edge top = edge(v - half, last_row_), bottom = edge(v + half, last_row_);
     const IntRegister first_row = top.index * step_, last_row = bottom.index * step_;
@@ -40,13 +33,13 @@ class Boxes {
     Register share;
   };
 
-  SDVO_VECTORS static Edge edge(Register position, IntRegister last) {
+  SDVO_IN_KERNEL static Edge edge(Register position, IntRegister last) {
     const Register shifted = position + 0.5f;
     const IntRegister index = truncated(shifted, last);
     return {index, shifted - __builtin_convertvector(index, Register)};
   }
 
-  SDVO_VECTORS static Register width(const Edge& first, const Edge& last) {
+  SDVO_IN_KERNEL static Register width(const Edge& first, const Edge& last) {
     return __builtin_convertvector(last.index - first.index, Register) + (last.share - first.share);
   }
 
@@ -55,7 +48,7 @@ class Boxes {
     Pairs inside, at_top, at_bottom;
   };
 
-  SDVO_VECTORS Side side(const Edge& edge, IntRegister first_row, IntRegister last_row) const {
+  SDVO_IN_KERNEL Side side(const Edge& edge, IntRegister first_row, IntRegister last_row) const {
     std::uint32_t above[kRegister], below[kRegister];
     store(first_row + edge.index, above), store(last_row + edge.index, below);
     UnsignedRegister inside[2], at_top[2], at_bottom[2];
@@ -69,8 +62,8 @@ class Boxes {
   }
 
   /// IntegralImage::sumBetween of boxes.
-  SDVO_VECTORS static Register between(const Pairs& at_left, const Pairs& at_right, const Edge& left,
-                                       const Edge& right) {
+  SDVO_IN_KERNEL static Register between(const Pairs& at_left, const Pairs& at_right, const Edge& left,
+                                         const Edge& right) {
     const UnsignedRegister from = at_left.first(), to = at_right.first();
     return toFloats(to - from) + right.share * toFloats(at_right.second() - to) -
            left.share * toFloats(at_left.second() - from);
@@ -81,28 +74,30 @@ class Boxes {
   IntRegister last_column_, last_row_;
 };
 
-SDVO_VECTORS void measureWithVectors(const cv::Mat& sums, const ViewKeypoint* keypoints, OctetMeans& means) {
-  const Boxes boxes(sums);
-  float us[kOctet], vs[kOctet], scales[kOctet], cosines[kOctet], sines[kOctet];
-  for (int k = 0; k < kOctet; ++k) {
-    us[k] = keypoints[k].u, vs[k] = keypoints[k].v;
-    const FreakPose pose(keypoints[k]);
-    scales[k] = pose.scale, cosines[k] = pose.cosine, sines[k] = pose.sine;
-  }
-  const auto& pattern = Freak::pattern();
-  const Register smallest = FreakPose::kSmallestHalfSide - Register{};
-  for (int first = 0; first < kOctet; first += kRegister) {
-    Register u, v, scale, cosine, sine;
-    load(us + first, u), load(vs + first, v), load(scales + first, scale);
-    load(cosines + first, cosine), load(sines + first, sine);
-    for (std::size_t i = 0; i < Freak::kFields; ++i) {
-      const Freak::Field& field = pattern[i];
-      const Register x = u + cosine * field.x - sine * field.y, y = v + sine * field.x + cosine * field.y;
-      const Register half = field.sigma * scale;
-      store(boxes.means(x, y, half < smallest ? smallest : half), means[i].data() + first);
+struct MeasureFields {
+  static SDVO_IN_KERNEL void run(const cv::Mat* sums, const ViewKeypoint* keypoints, OctetMeans* means) {
+    const Boxes boxes(*sums);
+    float us[kOctet], vs[kOctet], scales[kOctet], cosines[kOctet], sines[kOctet];
+    for (int k = 0; k < kOctet; ++k) {
+      us[k] = keypoints[k].u, vs[k] = keypoints[k].v;
+      const FreakPose pose(keypoints[k]);
+      scales[k] = pose.scale, cosines[k] = pose.cosine, sines[k] = pose.sine;
+    }
+    const auto& pattern = Freak::pattern();
+    const Register smallest = FreakPose::kSmallestHalfSide - Register{};
+    for (int first = 0; first < kOctet; first += kRegister) {
+      Register u, v, scale, cosine, sine;
+      load(us + first, u), load(vs + first, v), load(scales + first, scale);
+      load(cosines + first, cosine), load(sines + first, sine);
+      for (std::size_t i = 0; i < Freak::kFields; ++i) {
+        const Freak::Field& field = pattern[i];
+        const Register x = u + cosine * field.x - sine * field.y, y = v + sine * field.x + cosine * field.y;
+        const Register half = field.sigma * scale;
+        store(boxes.means(x, y, half < smallest ? smallest : half), (*means)[i].data() + first);
+      }
     }
   }
-}
+};
 
 /// 32 bits of some rows at once.
 struct CompareMeans {
@@ -128,8 +123,7 @@ struct CompareMeans {
 }  // namespace
 
 void measureOctet(const Freak& freak, const ViewKeypoint* keypoints, OctetMeans& means) {
-  if (usesVectorKernels()) return measureWithVectors(freak.image().sums(), keypoints, means);
-  measurePlain(freak, keypoints, means);
+  runKernel<MeasureFields>(&freak.image().sums(), keypoints, &means);
 }
 
 void compareOctet(const OctetMeans& means, std::uint8_t* const* rows) {

@@ -51,45 +51,33 @@ struct SampleUpright {
   }
 };
 
-void samplePlain(const std::uint8_t* patch, int side, const PatchPlacement& at, const float* dx, const float* dy,
-                 const float* mask, int count, float* values) {
-  const int last = side - 2;
-  for (int k = 0; k < count; ++k) {
-    const float x = at.x + at.x_by_x * dx[k] + at.x_by_y * dy[k];
-    const float y = at.y + at.y_by_x * dx[k] + at.y_by_y * dy[k];
-    // Rounding may lead a hair outside of the square that was checked.
-    const int column = std::clamp(static_cast<int>(x), 0, last), row = std::clamp(static_cast<int>(y), 0, last);
-    const float a = x - static_cast<float>(column), b = y - static_cast<float>(row);
-    const std::uint8_t* sample = patch + row * side + column;
-    const float upper = sample[0] + a * static_cast<float>(sample[1] - sample[0]);
-    const float lower = sample[side] + a * static_cast<float>(sample[side + 1] - sample[side]);
-    values[k] = (upper + b * (lower - upper)) * mask[k];
-  }
-}
-
 /// Interpolates between the byte at each place and its right neighbour.
-SDVO_VECTORS inline Register between(const std::uint8_t* bytes, const std::uint32_t* places, Register share) {
+SDVO_IN_KERNEL Register between(const std::uint8_t* bytes, const std::uint32_t* places, Register share) {
   const UnsignedRegister bits = readFours(bytes, places);
   const UnsignedRegister first = bits & 255, second = bits >> 8 & 255;
   return toFloats(first) + share * toFloats(second - first);
 }
 
-/// The same operations in the same order, a register of samples at once.
-SDVO_VECTORS void sampleWithVectors(const std::uint8_t* patch, int side, const PatchPlacement& at, const float* dx,
-                                    const float* dy, const float* mask, int count, float* values) {
-  const IntRegister last = IntRegister{} + (side - 2);
-  for (int k = 0; k < count; k += kRegister) {
-    Register over, down, counts;
-    load(dx + k, over), load(dy + k, down), load(mask + k, counts);
-    const Register x = at.x + at.x_by_x * over + at.x_by_y * down, y = at.y + at.y_by_x * over + at.y_by_y * down;
-    const IntRegister column = truncated(x, last), row = truncated(y, last);
-    const Register a = x - __builtin_convertvector(column, Register), b = y - __builtin_convertvector(row, Register);
-    std::uint32_t places[kRegister];
-    store(row * side + column, places);
-    const Register upper = between(patch, places, a), lower = between(patch + side, places, a);
-    store((upper + b * (lower - upper)) * counts, values + k);
+/// A register of samples at once.
+struct SampleGrid {
+  static SDVO_IN_KERNEL void run(const std::uint8_t* patch, int side, const PatchPlacement* at, const float* dx,
+                                 const float* dy, const float* mask, int count, float* values) {
+    const IntRegister last = IntRegister{} + (side - 2);
+    for (int k = 0; k < count; k += kRegister) {
+      Register over, down, counts;
+      load(dx + k, over), load(dy + k, down), load(mask + k, counts);
+      const Register x = at->x + at->x_by_x * over + at->x_by_y * down;
+      const Register y = at->y + at->y_by_x * over + at->y_by_y * down;
+      // Rounding may lead a hair outside of the square that was checked: clamped.
+      const IntRegister column = truncated(x, last), row = truncated(y, last);
+      const Register a = x - __builtin_convertvector(column, Register), b = y - __builtin_convertvector(row, Register);
+      std::uint32_t places[kRegister];
+      store(row * side + column, places);
+      const Register upper = between(patch, places, a), lower = between(patch + side, places, a);
+      store((upper + b * (lower - upper)) * counts, values + k);
+    }
   }
-}
+};
 
 }  // namespace
 
@@ -115,9 +103,7 @@ bool SampleSquare::sample(const NearPatch& patch, const Eigen::Vector2f& centre,
   const Eigen::Vector2f reach = static_cast<float>(radius_) * grid.cwiseAbs().rowwise().sum();
   if (!((centre.cwiseAbs() + reach).maxCoeff() <= half)) return false;
   const PatchPlacement at{half + centre.x(), half + centre.y(), grid(0, 0), grid(0, 1), grid(1, 0), grid(1, 1)};
-  auto sample = samplePlain;
-  if (usesVectorKernels()) sample = sampleWithVectors;
-  sample(patch.samples(), patch.side(), at, x_.data(), y_.data(), mask_.data(), count(), values.data());
+  runKernel<SampleGrid>(patch.samples(), patch.side(), &at, x_.data(), y_.data(), mask_.data(), count(), values.data());
   return true;
 }
 

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -52,6 +53,33 @@ TEST(PatchCutter, ASampleIsTheMeanOfItsSquare) {
   const PatchLayout layout{3, 2.f, 0.f};
   const std::vector<std::uint8_t> samples = cut(image, layout, 10.5f, 10.5f, 7.f);
   for (int k = 0; k < 9; ++k) EXPECT_EQ(samples[static_cast<std::size_t>(k)], k == 4 ? 50 : 0) << k;
+}
+
+/// Mean grey level of the square of side `spacing` around (u, v), by the area that each pixel has in it.
+double meanByArea(const cv::Mat& image, double u, double v, double spacing) {
+  const auto overlap = [&](int pixel, double centre) {
+    return std::max(0.0, std::min(pixel + 0.5, centre + 0.5 * spacing) - std::max(pixel - 0.5, centre - 0.5 * spacing));
+  };
+  double sum = 0.0;
+  for (int y = 0; y < image.rows; ++y)
+    for (int x = 0; x < image.cols; ++x) sum += overlap(x, u) * overlap(y, v) * image.at<std::uint8_t>(y, x);
+  return sum / (spacing * spacing);
+}
+
+TEST(PatchCutter, SamplesAreMeansByArea) {
+  cv::Mat image(60, 70, CV_8U);
+  cv::RNG random(7);
+  random.fill(image, cv::RNG::UNIFORM, 0, 256);
+  for (int trial = 0; trial < 20; ++trial) {
+    const float u = random.uniform(15.f, 54.f), v = random.uniform(15.f, 44.f), size = random.uniform(5.f, 20.f);
+    const PatchLayout layout{trial % 2 ? 13 : 6, 1.f, 0.1f};
+    const std::vector<std::uint8_t> samples = cut(image, layout, u, v, size);
+    for (int k = 0; k < layout.bytes(); ++k) {
+      const double spacing = layout.spacing(size), middle = 0.5 * (layout.side - 1);
+      const double x = u + spacing * (k % layout.side - middle), y = v + spacing * (k / layout.side - middle);
+      ASSERT_NEAR(samples[static_cast<std::size_t>(k)], meanByArea(image, x, y, spacing), 0.51) << u << " " << v;
+    }
+  }
 }
 
 TEST(PatchCutter, AnyProcessorGivesTheSameBytes) {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 #include <vector>
 
@@ -24,6 +25,34 @@ float valueAt(const NearPatch& patch, const Eigen::Vector2f& place) {
   Samples values;
   EXPECT_TRUE(SampleSquare(0).sample(patch, place, Eigen::Matrix2f::Identity(), values));
   return values[0];
+}
+
+TEST(PatchSamples, AreInterpolatedOnTheGrid) {
+  constexpr int kSide = 13;
+  std::mt19937 random(6);
+  std::uniform_real_distribution<float> uniform(-1.f, 1.f);
+  const Noise noise(kSide, random);
+  const SampleSquare square(3);
+  for (int trial = 0; trial < 50; ++trial) {
+    const Eigen::Vector2f centre(uniform(random), uniform(random));
+    Eigen::Matrix2f grid = Eigen::Matrix2f::Identity();
+    for (int k = 0; k < 4; ++k) grid(k) += 0.3f * uniform(random);
+    Samples values;
+    if (!square.sample(noise.patch, centre, grid, values)) continue;
+    for (int k = 0; k < square.pixels(); ++k) {
+      const Eigen::Vector2f offset(k % square.side() - 3, k / square.side() - 3);
+      const Eigen::Vector2f at = grid * offset + centre + Eigen::Vector2f::Constant(0.5f * (kSide - 1));
+      const int x = std::min(static_cast<int>(at.x()), kSide - 2), y = std::min(static_cast<int>(at.y()), kSide - 2);
+      const auto sample = [&](int dx, int dy) {
+        return static_cast<float>(noise.samples[static_cast<std::size_t>((y + dy) * kSide + x + dx)]);
+      };
+      const float a = at.x() - static_cast<float>(x), b = at.y() - static_cast<float>(y);
+      const float expected =
+          (1.f - b) * ((1.f - a) * sample(0, 0) + a * sample(1, 0)) + b * ((1.f - a) * sample(0, 1) + a * sample(1, 1));
+      ASSERT_NEAR(values[static_cast<std::size_t>(k)], expected, 2e-3f) << k;
+    }
+    for (int k = square.pixels(); k < square.count(); ++k) ASSERT_EQ(values[static_cast<std::size_t>(k)], 0.f);
+  }
 }
 
 TEST(PatchSamples, UprightOnesAreThoseOfAnyGrid) {
