@@ -4,10 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <functional>
 #include <opencv2/core.hpp>
 #include <random>
-#include <vector>
 
 #include "said.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
@@ -117,6 +115,13 @@ inline void addFeature(StereoFeatures& features, double u, double v, double disp
   features.append({static_cast<float>(u), static_cast<float>(v), static_cast<float>(disparity), 0.f, 10.f, -1.f, 1.f});
   features.descriptors.push_back(
       cv::Mat(1, static_cast<int>(row.size()), CV_8U, const_cast<std::uint8_t*>(row.data())));
+}
+
+/// Adds the features of another set, with their positions and descriptors alone.
+inline void addAll(StereoFeatures& features, const StereoFeatures& others) {
+  for (int row = 0; row < others.count(); ++row)
+    addFeature(features, others.u[row], others.v[row], others.disparity[row],
+               {others.descriptors.ptr(row), others.descriptors.ptr(row) + others.descriptors.cols});
 }
 
 /// Points with a descriptor of their own each.

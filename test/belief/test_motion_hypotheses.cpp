@@ -1,9 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <memory>
-#include <random>
-
 #include "../../src/belief/motion_hypotheses.hpp"
 #include "../synthetic_scene.hpp"
 

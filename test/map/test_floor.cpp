@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
-#include <cmath>
 
 #include "stereo_descriptor_vo/map/floor.hpp"
 

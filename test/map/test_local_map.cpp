@@ -2,10 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <algorithm>
-#include <cmath>
 #include <cstring>
-#include <functional>
 
 #include "../../src/belief/pose_covariance.hpp"
 #include "../synthetic_features.hpp"
@@ -14,6 +11,8 @@
 #include "stereo_descriptor_vo/rig/calibration_filter.hpp"
 
 namespace sdvo::test_local_map {
+
+const Eigen::Isometry3d kOrigin = Eigen::Isometry3d::Identity();
 
 /// Adds a pair seen from a known pose; points, `most` of them, are recognised by their descriptors, which are all
 /// different.
@@ -38,8 +37,7 @@ int oldestAfter(const LocalMapOptions& options, int pairs, const std::function<E
   SyntheticScene scene(3, 3000, 120.0);
   LocalMap map(options);
   for (int id = 1; id <= pairs; ++id) {
-    Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
-    T_origin_camera.translation() = position(id - 1);
+    const Eigen::Isometry3d T_origin_camera(Eigen::Translation3d(position(id - 1)));
     see(map, scene.view(T_origin_camera, id), id, T_origin_camera);
   }
   return map.oldestId();
@@ -62,16 +60,16 @@ TEST(LocalMap, APairThatSharesHardlyAnythingWithTheOthersIsNotAdjusted) {
   LocalMap map{LocalMapOptions()};
   WindowOptimizer optimizer{WindowOptimizerOptions()};
   const CalibrationBelief prior = CalibrationFilter(CalibrationOptions()).prior(1, RigEstimate::Shape::Identity());
-  RigCalibration calibration;
-  see(map, scene.view(Eigen::Isometry3d::Identity(), 1), 1, Eigen::Isometry3d::Identity());
-  EXPECT_FALSE(map.adjust(optimizer, prior, calibration).success) << "there are no others";
-  for (int id = 2; id <= 3; ++id)
-    see(map, scene.view(Eigen::Isometry3d::Identity(), id), id, Eigen::Isometry3d::Identity());
-  EXPECT_TRUE(map.adjust(optimizer, prior, calibration).success);
-  see(map, scene.view(Eigen::Isometry3d::Identity(), 4), 4, Eigen::Isometry3d::Identity(), 0);
-  EXPECT_FALSE(map.adjust(optimizer, prior, calibration).success) << "nothing holds its pose";
-  see(map, scene.view(Eigen::Isometry3d::Identity(), 5), 5, Eigen::Isometry3d::Identity(), 2);
-  EXPECT_FALSE(map.adjust(optimizer, prior, calibration).success) << "it may turn about two points";
+  const auto isAdjusted = [&](int id, std::size_t recognised) {
+    RigCalibration calibration;
+    see(map, scene.view(kOrigin, id), id, kOrigin, recognised);
+    return map.adjust(optimizer, prior, calibration).success;
+  };
+  EXPECT_FALSE(isAdjusted(1, 10000)) << "there are no others";
+  isAdjusted(2, 10000);
+  EXPECT_TRUE(isAdjusted(3, 10000));
+  EXPECT_FALSE(isAdjusted(4, 0)) << "nothing holds its pose";
+  EXPECT_FALSE(isAdjusted(5, 2)) << "it may turn about two points";
 }
 
 TEST(LocalMapKeyframes, GoByAgeWhenNoneLasts) {
@@ -90,8 +88,7 @@ TEST(LocalMapView, LooksForWhatWasSeenTwiceAfterItWasOutOfSight) {
   SyntheticScene scene(3, 3000, 120.0);
   LocalMap map{LocalMapOptions()};
   const auto look = [&](int id, double yaw) {
-    Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-    T.linear() = Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()).toRotationMatrix();
+    const Eigen::Isometry3d T(Eigen::AngleAxisd(yaw, Eigen::Vector3d::UnitY()));
     see(map, scene.view(T, id), id, T);
   };
   look(1, 0.0), look(2, 0.0);
@@ -110,6 +107,11 @@ class Wall {
     camera_.width = 640, camera_.height = 480;
   }
 
+  /// At a place on the wall, in the pixels of a view from 10 m.
+  static std::uint8_t grey(double x, double y) {
+    return static_cast<std::uint8_t>(120.5 + 50.0 * std::sin(0.8 * x + 0.3) + 50.0 * std::cos(0.7 * y - 0.4 * x));
+  }
+
   /// The detector errs by `error` px: patch and position lie there.
   StereoFeatures view(double distance, const Eigen::Vector2d& error = {0.0, 0.0}) const {
     StereoFeatures features;
@@ -120,20 +122,22 @@ class Wall {
     features.patch_layout = {13, 1.f, 0.f};
     features.patches.create(1, 169, CV_8U);
     for (int j = 0; j < 13; ++j)
-      for (int i = 0; i < 13; ++i) {
-        // Position on the wall, in the pixels of a view from 10 m.
-        const double x = (i - 6 + error.x()) * distance / 10.0, y = (j - 6 + error.y()) * distance / 10.0;
-        const double grey = 120.0 + 50.0 * std::sin(0.8 * x + 0.3) + 50.0 * std::cos(0.7 * y - 0.4 * x);
-        features.patches.at<std::uint8_t>(0, 13 * j + i) = static_cast<std::uint8_t>(grey + 0.5);
-      }
+      for (int i = 0; i < 13; ++i)
+        features.patches.at<std::uint8_t>(0, 13 * j + i) =
+            grey((i - 6 + error.x()) * distance / 10.0, (j - 6 + error.y()) * distance / 10.0);
     return features;
   }
 
   /// Pose from which the wall, 10 m in front of the origin, is at a distance.
   static Eigen::Isometry3d poseAt(double distance) {
-    Eigen::Isometry3d T_camera_origin = Eigen::Isometry3d::Identity();
-    T_camera_origin.translation().z() = distance - 10.0;
-    return T_camera_origin;
+    return Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.0, distance - 10.0));
+  }
+
+  /// A map of the wall as seen from 10 m.
+  LocalMap mapped(const LocalMapOptions& options = {}) const {
+    LocalMap map(options);
+    map.insert({}, view(10.0), 1, poseAt(10.0), {}, RigCalibration());
+    return map;
   }
 
  private:
@@ -143,8 +147,7 @@ class Wall {
 
 TEST(LocalMapSight, TakesOutTheDetectorsErrorAtAnotherDepth) {
   const Wall wall;
-  LocalMap map{LocalMapOptions()};
-  map.insert({}, wall.view(10.0), 1, Wall::poseAt(10.0), {}, RigCalibration());
+  LocalMap map = wall.mapped();
   const StereoFeatures features = wall.view(8.0, {0.6, -0.5});
   const LocalMap::Sighting sighting = map.sight(PatchAlignmentOptions(), features, Wall::poseAt(8.0), 0, 0);
   EXPECT_TRUE(sighting.aligned);
@@ -158,18 +161,15 @@ TEST(LocalMapSight, TakesOutTheDetectorsErrorAtAnotherDepth) {
 TEST(LocalMapSight, KnowsWhatATurnedCameraMakesOfAPatch) {
   // The wall again, seen from one place: straight on, then turned away until the point is half a radian off the axis,
   // where a pixel covers less of the wall.
-  const auto texture = [](double x, double y) {
-    return 120.0 + 50.0 * std::sin(0.8 * x + 0.3) + 50.0 * std::cos(0.7 * y - 0.4 * x);
-  };
-  StereoFeatures straight = Wall().view(10.0);
-  const StereoCamera& camera = straight.camera;
+  const Wall wall;
+  StereoFeatures features = wall.view(10.0);
+  const StereoCamera& camera = features.camera;
   const Eigen::Matrix3d R = expSO3({0.0, -0.5, 0.0});  // camera from wall
   Eigen::Isometry3d turned = Eigen::Isometry3d::Identity();
   turned.linear() = R;
   const Eigen::Vector3d pixel = camera.project(R * Eigen::Vector3d(0.0, 0.0, 10.0));
   ASSERT_GT(std::abs(pixel.x() - camera.cx), 200.0);
   const Eigen::Vector2d error(0.6, -0.5);
-  StereoFeatures features = straight;
   features.u[0] = static_cast<float>(pixel.x() + error.x());
   features.v[0] = static_cast<float>(pixel.y() + error.y());
   for (int j = 0; j < 13; ++j)
@@ -177,11 +177,10 @@ TEST(LocalMapSight, KnowsWhatATurnedCameraMakesOfAPatch) {
       const Eigen::Vector3d ray((pixel.x() + i - 6 + error.x() - camera.cx) / camera.fx,
                                 (pixel.y() + j - 6 + error.y() - camera.cy) / camera.fy, 1.0);
       const Eigen::Vector3d on_wall = R.transpose() * ray;
-      const double grey = texture(camera.fx * on_wall.x() / on_wall.z(), camera.fy * on_wall.y() / on_wall.z());
-      features.patches.at<std::uint8_t>(0, 13 * j + i) = static_cast<std::uint8_t>(grey + 0.5);
+      features.patches.at<std::uint8_t>(0, 13 * j + i) =
+          Wall::grey(camera.fx * on_wall.x() / on_wall.z(), camera.fy * on_wall.y() / on_wall.z());
     }
-  LocalMap map{LocalMapOptions()};
-  map.insert({}, Wall().view(10.0), 1, Eigen::Isometry3d::Identity(), {}, RigCalibration());
+  LocalMap map = wall.mapped();
   const LocalMap::Sighting sighting = map.sight(PatchAlignmentOptions(), features, turned, 0, 0);
   ASSERT_TRUE(sighting.aligned);
   EXPECT_NEAR(sighting.measurement.x(), pixel.x(), 0.06);
@@ -191,31 +190,30 @@ TEST(LocalMapSight, KnowsWhatATurnedCameraMakesOfAPatch) {
 
 TEST(LocalMapSight, IsTheCornerWithoutAnAlignment) {
   const Wall wall;
-  LocalMap map{LocalMapOptions()};
-  map.insert({}, wall.view(10.0), 1, Wall::poseAt(10.0), {}, RigCalibration());
+  LocalMapOptions map_options;
+  map_options.noise.corner = 0.7;
+  LocalMap map = wall.mapped(map_options);
   const auto expectCorner = [&](const PatchAlignmentOptions& options, const StereoFeatures& features, double sigma) {
     const LocalMap::Sighting sighting = map.sight(options, features, Wall::poseAt(10.0), 0, 0);
     EXPECT_FALSE(sighting.aligned);
-    EXPECT_EQ(sighting.measurement.x(), features.u[0]);
-    EXPECT_EQ(sighting.measurement.y(), features.v[0]);
+    EXPECT_EQ(sighting.measurement, Eigen::Vector3d(features.u[0], features.v[0], features.disparity[0]));
     EXPECT_EQ(sighting.sigma, sigma);
   };
   StereoFeatures features = wall.view(10.0, {0.6, -0.5});
   PatchAlignmentOptions off;
   off.radius = 6;  // samples: too large for a patch of 13
-  expectCorner(off, features, NoiseOptions().corner);
+  expectCorner(off, features, 0.7);
   StereoFeatures unlike = features;
   cv::RNG(1).fill(unlike.patches, cv::RNG::UNIFORM, 0, 256);
-  expectCorner(PatchAlignmentOptions(), unlike, NoiseOptions().unconfirmed());
+  expectCorner(PatchAlignmentOptions(), unlike, map_options.noise.unconfirmed());
   features.patch_layout.side = 0;
   features.patches.release();
-  expectCorner(PatchAlignmentOptions(), features, NoiseOptions().corner);
+  expectCorner(PatchAlignmentOptions(), features, 0.7);
 }
 
 TEST(LocalMapSight, RenewsTheReferenceWhenTheScaleHasChangedAndKeepsThePoint) {
   const Wall wall;
-  LocalMap map{LocalMapOptions()};
-  map.insert({}, wall.view(10.0), 1, Wall::poseAt(10.0), {}, RigCalibration());
+  LocalMap map = wall.mapped();
   int id = 1;
   const auto approach = [&](double distance, const Eigen::Vector2d& error) {
     const StereoFeatures features = wall.view(distance, error);
@@ -243,9 +241,7 @@ synthetic::World someWorld(int count, unsigned seed = 1) {
 }
 
 Eigen::Isometry3d translated(double x, double y, double z) {
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.translation() << x, y, z;
-  return T;
+  return Eigen::Isometry3d(Eigen::Translation3d(x, y, z));
 }
 
 /// The points `from` … `to` - 1 of a world, one row each, in that order.
@@ -301,8 +297,8 @@ LocalMapOptions noFurtherKeyframe() {
 TEST(LocalMap, IsContinuedByTheSameCameraAndKindOfDescriptor) {
   const synthetic::World world = someWorld(5);
   LocalMap map({});
-  const StereoFeatures features = see(world, 0, 5, Eigen::Isometry3d::Identity());
-  add(map, features, 1, Eigen::Isometry3d::Identity(), {});
+  const StereoFeatures features = see(world, 0, 5, kOrigin);
+  add(map, features, 1, kOrigin, {});
   EXPECT_TRUE(map.continuedBy(features));
   const auto continuedWith = [&](const std::function<void(StereoFeatures&)>& change) {
     StereoFeatures other = features;
@@ -323,16 +319,12 @@ TEST(LocalMap, ViewIsWhatTheNewestPairSees) {
   Vector6d xi;
   xi << 0.3, -0.1, 0.5, 0.02, -0.05, 0.03;
   const Eigen::Isometry3d first = expSE3(xi), second = translated(0.0, 0.0, -0.4) * first;
-  StereoFeatures features = see(world, 0, 20, first);
-  features.stamp = 42;
-  add(map, features, 1, first, {});
-  EXPECT_EQ(map.newestStamp(), 42);
-  EXPECT_EQ(map.newestId(), 1);
-  for (const Eigen::Isometry3d& pose : {first, second}) {
-    if (&pose != &first && map.newestId() == 1) {
-      const StereoFeatures next = see(world, 0, 20, second);
-      add(map, next, 2, second, recognised(map, next, 20));
-    }
+  for (const int id : {1, 2}) {
+    StereoFeatures features = see(world, 0, 20, id == 1 ? first : second);
+    features.stamp = 42 + id;
+    add(map, features, id, id == 1 ? first : second, id == 1 ? Sightings{} : recognised(map, features, 20));
+    EXPECT_EQ(map.newestStamp(), 42 + id);
+    EXPECT_EQ(map.newestId(), id);
     const Eigen::Isometry3d newest = map.newestPose();
     const LocalMap::View view = map.view();
     ASSERT_EQ(view.points.count(), 20);
@@ -348,12 +340,11 @@ TEST(LocalMap, ViewIsWhatTheNewestPairSees) {
       EXPECT_EQ(0, std::memcmp(view.points.descriptors.ptr(i), world.rows[i].data(), world.rows[i].size()));
     }
   }
-  EXPECT_EQ(map.newestId(), 2);
 }
 
 TEST(LocalMap, PointsAreWithoutTheRigsError) {
   const synthetic::World world = someWorld(20);
-  StereoFeatures features = see(world, 0, 20, Eigen::Isometry3d::Identity());
+  StereoFeatures features = see(world, 0, 20, kOrigin);
   RigCalibration calibration;
   calibration.value << 0.5, -2.0;
   for (int i = 0; i < 20; ++i) {
@@ -361,7 +352,7 @@ TEST(LocalMap, PointsAreWithoutTheRigsError) {
     features.disparity[i] += static_cast<float>(0.5 - 2.0 * x * x);
   }
   LocalMap map({});
-  add(map, features, 1, Eigen::Isometry3d::Identity(), {}, calibration);
+  add(map, features, 1, kOrigin, {}, calibration);
   const LocalMap::View view = map.view();
   for (int i = 0; i < 20; ++i) EXPECT_LT((view.points.positions[i] - world.points[i]).norm(), 1e-4);
 }
@@ -371,7 +362,7 @@ TEST(LocalMap, FarPointsAreDirections) {
   std::mt19937 random(1);
   synthetic::addFeature(features, 422.5, 236.25, 0.01, synthetic::randomRow(random, 128));
   LocalMap map({});
-  add(map, features, 1, Eigen::Isometry3d::Identity(), {});
+  add(map, features, 1, kOrigin, {});
   const Eigen::Vector3d position = map.view().points.positions.at(0);
   EXPECT_NEAR(position.z(), 400.0 * 0.5 / 0.05, 1e-2) << "farther than that cannot be told apart";
   EXPECT_NEAR(position.x() / position.z(), 0.25, 1e-9);
@@ -380,7 +371,7 @@ TEST(LocalMap, FarPointsAreDirections) {
 TEST(LocalMap, DoesNotShowWhatLiesBehind) {
   const synthetic::World world = someWorld(100);
   LocalMap map(noFurtherKeyframe());
-  add(map, see(world, 0, 100, Eigen::Isometry3d::Identity()), 1, Eigen::Isometry3d::Identity(), {});
+  add(map, see(world, 0, 100, kOrigin), 1, kOrigin, {});
   const Eigen::Isometry3d ahead = translated(0.0, 0.0, -10.0);
   add(map, synthetic::noFeatures(synthetic::camera()), 2, ahead, {});
   int in_front = 0, shown = 0;
@@ -399,10 +390,9 @@ TEST(LocalMap, DoesNotShowWhatLiesBehind) {
 TEST(LocalMap, ShowsWhatATurnBringsIntoTheNextImage) {
   const synthetic::World world = someWorld(100);
   LocalMap map(noFurtherKeyframe());
-  add(map, see(world, 0, 100, Eigen::Isometry3d::Identity()), 1, Eigen::Isometry3d::Identity(), {});
-  Eigen::Isometry3d away = Eigen::Isometry3d::Identity(), back = away;
-  away.linear() = Eigen::AngleAxisd(0.8, Eigen::Vector3d::UnitY()).toRotationMatrix();
-  back.linear() = Eigen::AngleAxisd(-0.3, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  add(map, see(world, 0, 100, kOrigin), 1, kOrigin, {});
+  const Eigen::Isometry3d away(Eigen::AngleAxisd(0.8, Eigen::Vector3d::UnitY()));
+  const Eigen::Isometry3d back(Eigen::AngleAxisd(-0.3, Eigen::Vector3d::UnitY()));
   add(map, synthetic::noFeatures(synthetic::camera()), 2, away, {});
   int now = 0, now_or_next = 0;
   for (const Eigen::Vector3d& point : world.points) {
@@ -426,7 +416,7 @@ TEST(LocalMap, ShowsWhatATurnBringsIntoTheNextImage) {
 TEST(LocalMap, ForgetsThePairBeforeUnlessItWasAKeyframe) {
   const synthetic::World world = someWorld(30);
   LocalMap map(noFurtherKeyframe());
-  const Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  const Eigen::Isometry3d& pose = kOrigin;
   add(map, see(world, 0, 10, pose), 1, pose, {});
   EXPECT_TRUE(map.newestIsKeyframe()) << "the first one is";
   StereoFeatures second = see(world, 0, 20, pose);
@@ -467,7 +457,7 @@ TEST(LocalMap, KeepsAPairWhosePointsMovedFarEnough) {
 
 TEST(LocalMap, KeepsAPairOnceFewOfItsPointsWereInTheLastKeyframe) {
   const synthetic::World world = someWorld(40);
-  const Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  const Eigen::Isometry3d& pose = kOrigin;
   for (const int old : {11, 13}) {
     LocalMapOptions options = noFurtherKeyframe();
     options.keyframe_overlap = 0.6;
@@ -520,13 +510,10 @@ TEST(LocalMap, HoldsAnOldKeyframeWhileItSharesEnough) {
       const StereoFeatures features = see(world, shared, kPoints + shared, pose);
       const LocalMap::View view = map.view();
       Sightings sightings;
-      for (int row = 0; row < kPoints; ++row) {
-        // Those of the first pair are the map's first; the second pair adds all others.
+      // Those of the first pair are the map's first; the second pair adds all others.
+      for (int row = id == 2 ? kPoints - shared : 0; row < kPoints; ++row) {
         const int of_first = row - (kPoints - shared);
-        if (of_first >= 0)
-          sightings.push_back(sighting(map, view, of_first, features, row));
-        else if (id > 2)
-          sightings.push_back(sighting(map, view, kPoints + row, features, row));
+        sightings.push_back(sighting(map, view, of_first >= 0 ? of_first : kPoints + row, features, row));
       }
       add(map, features, id, pose, sightings);
     }
@@ -550,7 +537,7 @@ TEST(LocalMap, LooksForAPointUntilEnoughFramesMissedIt) {
 TEST(LocalMap, TakesTheAppearanceOfTheLastSighting) {
   const synthetic::World world = someWorld(20), other_looks = someWorld(20, 2);
   LocalMap map(noFurtherKeyframe());
-  const Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
+  const Eigen::Isometry3d& pose = kOrigin;
   add(map, see(world, 0, 20, pose), 1, pose, {});
   StereoFeatures second = see(world, 0, 20, pose);
   for (int i = 0; i < 20; ++i) std::memcpy(second.descriptors.ptr(i), other_looks.rows[i].data(), 128);
@@ -561,21 +548,6 @@ TEST(LocalMap, TakesTheAppearanceOfTheLastSighting) {
     const auto& looks = i < 12 ? other_looks.rows[i] : i < 20 ? world.rows[i] : other_looks.rows[i - 8];
     EXPECT_EQ(0, std::memcmp(view.points.descriptors.ptr(i), looks.data(), looks.size())) << i;
   }
-}
-
-TEST(LocalMap, WithoutPatchesASightingIsTheCorner) {
-  const synthetic::World world = someWorld(3);
-  LocalMapOptions options;
-  options.noise.corner = 0.7;
-  LocalMap map(options);
-  const StereoFeatures features = see(world, 0, 3, Eigen::Isometry3d::Identity());
-  add(map, features, 1, Eigen::Isometry3d::Identity(), {});
-  const LocalMap::Sighting seen = map.sight({}, features, Eigen::Isometry3d::Identity(), 1, 2);
-  EXPECT_EQ(seen.point, 1);
-  EXPECT_EQ(seen.feature, 2);
-  EXPECT_EQ(seen.measurement, Eigen::Vector3d(features.u[2], features.v[2], features.disparity[2]));
-  EXPECT_EQ(seen.sigma, 0.7);
-  EXPECT_FALSE(seen.aligned);
 }
 
 WindowOptimizer thorough() {
@@ -589,22 +561,26 @@ CalibrationBelief noRigError() {
   return {RigCalibration::Vector::Zero(), 1e12 * RigCalibration::Matrix::Identity()};
 }
 
+LocalMap::Adjustment adjusted(LocalMap& map) {
+  RigCalibration calibration;
+  WindowOptimizer optimizer = thorough();
+  const LocalMap::Adjustment adjustment = map.adjust(optimizer, noRigError(), calibration);
+  EXPECT_TRUE(adjustment.success);
+  EXPECT_LT(calibration.value.norm(), 1e-6);
+  return adjustment;
+}
+
 TEST(LocalMap, AdjustmentMovesTheNewestPairToWhereItsPointsSayItIs) {
   const synthetic::World world = someWorld(60);
   LocalMap map(everyPairAKeyframe());
-  const Eigen::Isometry3d first = Eigen::Isometry3d::Identity(), second = translated(0.1, 0.02, -0.5);
-  add(map, see(world, 0, 60, first), 1, first, {});
+  const Eigen::Isometry3d second = translated(0.1, 0.02, -0.5);
+  add(map, see(world, 0, 60, kOrigin), 1, kOrigin, {});
   const StereoFeatures features = see(world, 0, 60, second);
   Vector6d error;
   error << 0.03, -0.02, 0.04, 0.002, -0.003, 0.004;
   map.insert({}, features, 2, expSE3(error) * second, recognised(map, features, 60), {});
-  RigCalibration calibration;
-  WindowOptimizer optimizer = thorough();
-  const LocalMap::Adjustment adjustment = map.adjust(optimizer, noRigError(), calibration);
-  ASSERT_TRUE(adjustment.success);
-  EXPECT_TRUE(adjustment.rejected.empty());
+  EXPECT_TRUE(adjusted(map).rejected.empty());
   EXPECT_LT(logSE3(map.newestPose() * second.inverse()).norm(), 1e-4);
-  EXPECT_LT(calibration.value.norm(), 1e-6);
 }
 
 /// A corner that nothing is ever aligned with weighs as much as those seen later, whether it has a patch or not.
@@ -614,7 +590,7 @@ TEST(LocalMap, PatchesThatAreNotAlignedChangeNothing) {
   const auto poseAfter = [&](bool has_patches, const PatchAlignmentOptions& options) {
     const synthetic::World world = someWorld(60);
     LocalMap map(everyPairAKeyframe());
-    const Eigen::Isometry3d first = Eigen::Isometry3d::Identity(), second = translated(0.1, 0.02, -0.5);
+    const Eigen::Isometry3d second = translated(0.1, 0.02, -0.5);
     const auto seeNoisily = [&](const Eigen::Isometry3d& pose) {
       StereoFeatures features = see(world, 0, 60, pose);
       for (std::size_t i = 0; i < features.u.size(); ++i) features.u[i] += i % 3 == 0 ? 0.6f : -0.2f;
@@ -624,12 +600,10 @@ TEST(LocalMap, PatchesThatAreNotAlignedChangeNothing) {
       }
       return features;
     };
-    map.insert(options, seeNoisily(first), 1, first, {}, RigCalibration());
+    map.insert(options, seeNoisily(kOrigin), 1, kOrigin, {}, RigCalibration());
     const StereoFeatures features = seeNoisily(second);
     map.insert(options, features, 2, second, recognised(map, features, 60, 0, options), {});
-    RigCalibration calibration;
-    WindowOptimizer optimizer = thorough();
-    EXPECT_TRUE(map.adjust(optimizer, noRigError(), calibration).success);
+    adjusted(map);
     return map.newestPose().matrix();
   };
   EXPECT_EQ(poseAfter(true, alignment), poseAfter(false, alignment));
@@ -639,8 +613,8 @@ TEST(LocalMap, PatchesThatAreNotAlignedChangeNothing) {
 TEST(LocalMap, APointKeepsItsAppearanceWhenASightingTurnsOutWrong) {
   const synthetic::World world = someWorld(60);
   LocalMap map(everyPairAKeyframe());
-  const Eigen::Isometry3d first = Eigen::Isometry3d::Identity(), second = translated(0.1, 0.02, -0.5);
-  add(map, see(world, 0, 60, first), 1, first, {});
+  const Eigen::Isometry3d second = translated(0.1, 0.02, -0.5);
+  add(map, see(world, 0, 60, kOrigin), 1, kOrigin, {});
   StereoFeatures features = see(world, 0, 60, second);
   std::mt19937 random(9);
   const std::vector<std::uint8_t> strange = synthetic::randomRow(random, 128);
@@ -648,11 +622,7 @@ TEST(LocalMap, APointKeepsItsAppearanceWhenASightingTurnsOutWrong) {
   std::memcpy(features.descriptors.ptr(17), strange.data(), strange.size());
   const Sightings sightings = recognised(map, features, 60);
   map.insert({}, features, 2, second, sightings, {});
-  RigCalibration calibration;
-  WindowOptimizer optimizer = thorough();
-  const LocalMap::Adjustment adjustment = map.adjust(optimizer, noRigError(), calibration);
-  ASSERT_TRUE(adjustment.success);
-  EXPECT_EQ(adjustment.rejected, std::vector<int>{17});
+  EXPECT_EQ(adjusted(map).rejected, std::vector<int>{17});
   map.renewAppearance(features, sightings);
 
   const LocalMap::View view = map.view();
@@ -684,7 +654,7 @@ TEST(LocalMap, CovarianceBetweenTwoFramesDoesNotDependOnWhereTheFirstOneIs) {
   ASSERT_TRUE(known.success);
 
   LocalMap map(options);
-  add(map, see(world, 0, 12, Eigen::Isometry3d::Identity()), 1, Eigen::Isometry3d::Identity(), {});
+  add(map, see(world, 0, 12, kOrigin), 1, kOrigin, {});
   Sightings loose = recognised(map, of_second, 12);
   for (LocalMap::Sighting& sighting : loose) sighting.sigma = 20.0;
   // The rows come a second time as points of the second frame's own.

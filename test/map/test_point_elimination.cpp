@@ -2,7 +2,6 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <cmath>
 
 #include "../../src/map/point_elimination.hpp"
 #include "../synthetic_features.hpp"

@@ -1,10 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Eigenvalues>
-#include <cmath>
-#include <cstdint>
-#include <random>
-#include <string>
 
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"

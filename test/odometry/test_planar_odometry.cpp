@@ -1,9 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <string>
-#include <vector>
-
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"

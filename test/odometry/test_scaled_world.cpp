@@ -1,10 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
-#include <string>
-#include <vector>
-
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
