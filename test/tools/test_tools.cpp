@@ -12,19 +12,12 @@
 #include <unistd.h>
 #include <yaml-cpp/yaml.h>
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
-#include <functional>
 #include <iomanip>
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
-#include <string>
-#include <vector>
 
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
@@ -127,14 +120,29 @@ class Tools : public testing::Test {
     return {WIFEXITED(status) ? WEXITSTATUS(status) : -1, readText(out), readText(err)};
   }
 
+  /// run() of a tool that has to succeed.
+  Outcome succeed(const std::string& tool, const std::string& arguments) const {
+    const Outcome outcome = run(tool, arguments);
+    EXPECT_EQ(outcome.exit_code, 0) << tool << " " << arguments << ": " << outcome.err;
+    return outcome;
+  }
+
   /// A file of this test.
   std::string in(const std::string& name) const { return (root_ / name).string(); }
-  std::string poses() const { return readText(root_ / "poses.txt"); }
+  std::vector<std::string> linesIn(const std::string& name) const { return linesOf(readText(root_ / name)); }
 
   Outcome runOn(const std::string& recording, const std::string& extra = "") const {
     return run("run_sequence", recording + " --poses " + in("poses.txt") + " " + extra);
   }
-  Outcome runSequence(const std::string& extra = "") const { return runOn(sequence_.string(), extra); }
+  Outcome runSequence(const std::string& extra = "") const { return runOn(drive_, extra); }
+
+  /// The poses of a recording that is followed.
+  std::string posesOf(const std::string& recording, const std::string& extra = "") const {
+    fs::remove(in("poses.txt"));
+    succeed("run_sequence", recording + " --poses " + in("poses.txt") + " " + extra);
+    return poses();
+  }
+  std::string poses() const { return readText(root_ / "poses.txt"); }
 
   void darken(int side, int pair) const {
     cv::imwrite(image(side, pair).string(), cv::Mat(240, 320, CV_8UC1, cv::Scalar(0)));
@@ -142,12 +150,11 @@ class Tools : public testing::Test {
 
   /// The drive as a bag.
   std::string bag(const std::string& name) const {
-    const Outcome outcome = run("convert", sequence_.string() + " --output " + in(name + ".bag"));
-    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+    succeed("convert", drive_ + " --output " + in(name + ".bag"));
     return in(name + ".bag");
   }
   /// A bag of what `write` makes of each message of another one.
-  template <class Write>
+  using Write = std::function<void(rosbag::Bag&, const rosbag::MessageInstance&)>;
   std::string rewritten(const std::string& bag, const std::string& name, const Write& write) const {
     const rosbag::Bag from(bag);
     rosbag::Bag out(in(name + ".bag"), rosbag::bagmode::Write);
@@ -190,12 +197,12 @@ class Tools : public testing::Test {
 
   const TemporaryFolder folder_;
   const fs::path root_ = folder_.path(), sequence_ = root_ / "sequences" / "09", results_ = root_ / "results";
+  const std::string drive_ = sequence_.string();
 };
 
 TEST_F(Tools, AllExplainThemselves) {
   for (const char* tool : {SDVO_TOOLS}) {
-    const Outcome outcome = run(tool, "--help");
-    EXPECT_EQ(outcome.exit_code, 0) << tool << ": " << outcome.err;
+    const Outcome outcome = succeed(tool, "--help");
     EXPECT_TRUE(contains(outcome.out, "--help")) << tool;
     EXPECT_EQ(outcome.err, "") << tool;
     expectError(run(tool, "--no-such-option"), "--help");
@@ -207,13 +214,13 @@ TEST_F(Tools, ASoundSequenceIsReadAndADamagedOneIsNamed) {
   const fs::path sound = root_ / "sound";
   fs::copy(sequence_, sound, fs::copy_options::recursive);
   const auto readBy = [this](bool converter) {
-    return converter ? run("kitti_to_bag", "--sequence " + sequence_.string() + " --output " + in("reader.bag"))
-                     : run("run_sequence", sequence_.string() + " --poses " + in("reader.txt"));
+    return converter ? run("kitti_to_bag", "--sequence " + drive_ + " --output " + in("reader.bag"))
+                     : run("run_sequence", drive_ + " --poses " + in("reader.txt"));
   };
   const std::vector<std::pair<std::function<void()>, std::string>> damages = {
       {[] {}, ""},
       {[this] { fs::remove(sequence_ / "calib.txt"); }, (sequence_ / "calib.txt").string()},
-      {[this] { fs::remove_all(sequence_); }, sequence_.string()},
+      {[this] { fs::remove_all(sequence_); }, drive_},
       {[this] { fs::resize_file(image(1, 2), fs::file_size(image(1, 2)) / 2); }, image(1, 2).string()},
       {[this] { cv::imwrite(image(1, 1).string(), cv::Mat(200, 320, CV_8U, cv::Scalar(90))); }, image(1, 1).string()},
       {[this] { writeCalibration(0.0); }, "baseline"}};
@@ -236,38 +243,37 @@ TEST_F(Tools, ASoundSequenceIsReadAndADamagedOneIsNamed) {
 
 TEST_F(Tools, OutputThatCannotBeWritten) {
   const std::string missing = in("missing/out"), truth = in("truth.txt");
-  expectError(run("run_sequence", sequence_.string() + " --poses " + missing), missing);
-  expectError(runSequence("--timing " + missing), missing);
-  expectError(runSequence("--states " + missing), missing);
-  expectError(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output " + missing), missing);
-  expectError(run("evaluate_trajectory",
-                  "--ground-truth " + truth + " --estimate " + truth + " --lengths 0.2 --json " + missing),
-              missing);
+  for (const auto& [tool, arguments] : std::vector<std::pair<std::string, std::string>>{
+           {"run_sequence", drive_ + " --poses "},
+           {"run_sequence", drive_ + " --poses /dev/null --timing "},
+           {"run_sequence", drive_ + " --poses /dev/null --states "},
+           {"kitti_to_bag", "--sequence " + drive_ + " --output "},
+           {"evaluate_trajectory", "--ground-truth " + truth + " --estimate " + truth + " --lengths 0.2 --json "}})
+    expectError(run(tool, arguments + missing), missing);
 }
 
 TEST_F(Tools, OutputIsNeverADeviceOrAPipe) {
   const fs::path pipe = root_ / "pipe";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
-  expectError(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output " + pipe.string()),
-              "no regular file");
+  for (const std::string& output : {pipe.string(), std::string("/dev/null")})
+    expectError(run("kitti_to_bag", "--sequence " + drive_ + " --output " + output), "no regular file");
   EXPECT_TRUE(fs::is_fifo(pipe));
   EXPECT_FALSE(fs::exists(pipe.string() + ".active"));
-  expectError(run("kitti_to_bag", "--sequence " + sequence_.string() + " --output /dev/null"), "no regular file");
 }
 
 /// Neither a file of another kind, nor its own on a full disk; a bag not at all.
 TEST_F(Tools, NoOutputDestroysAFile) {
-  const std::string drive = sequence_.string(), truth = in("truth.txt");
+  const std::string truth = in("truth.txt");
   const fs::path output = root_ / "output";
   for (const auto& [tool, arguments] : std::vector<std::pair<std::string, std::string>>{
-           {"run_sequence", drive + " --poses"},
-           {"run_sequence", drive + " --format tum --poses"},
-           {"run_sequence", drive + " --poses /dev/null --timing"},
-           {"run_sequence", drive + " --poses /dev/null --states"},
-           {"run_sequence", drive + " --page"},
+           {"run_sequence", drive_ + " --poses"},
+           {"run_sequence", drive_ + " --format tum --poses"},
+           {"run_sequence", drive_ + " --poses /dev/null --timing"},
+           {"run_sequence", drive_ + " --poses /dev/null --states"},
+           {"run_sequence", drive_ + " --page"},
            {"evaluate_trajectory", "--ground-truth " + truth + " --estimate " + truth + " --lengths 0.2 --json"},
-           {"convert --sequence", drive + " --output"},
-           {"kitti_to_bag --sequence", drive + " --output"}}) {
+           {"convert --sequence", drive_ + " --output"},
+           {"kitti_to_bag --sequence", drive_ + " --output"}}) {
     SCOPED_TRACE(tool + " " + arguments);
     const std::string command = arguments + " " + output.string();
     std::ofstream(output) << "precious, 7 days of work";
@@ -294,9 +300,9 @@ TEST_F(Tools, TruePosesAreNoOutput) {
   const fs::path beside = sequence_ / "poses.txt", truth = root_ / "truth.txt";
   fs::copy_file(truth, beside);
   const std::string words = "has true poses, or is another output";
-  expectError(run("run_sequence", sequence_.string() + " --poses " + beside.string()), words);
-  expectError(run("run_sequence", sequence_.string() + " --page " + in("page.html") + " --ground-truth " +
-                                      truth.string() + " --poses " + truth.string()),
+  expectError(run("run_sequence", drive_ + " --poses " + beside.string()), words);
+  expectError(run("run_sequence", drive_ + " --page " + in("page.html") + " --ground-truth " + truth.string() +
+                                      " --poses " + truth.string()),
               words);
   EXPECT_EQ(readText(beside), readText(truth));
 }
@@ -329,54 +335,46 @@ TEST_F(Tools, OnePoseForEachPairAndTheDriveIsFollowed) {
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_TRUE(contains(outcome.out, "options ")) << "no hash of the options: " << outcome.out;
 
-  const std::vector<std::string> lines = linesOf(poses());
+  const std::vector<std::string> lines = linesIn("poses.txt"), rows = linesIn("timing.csv");
   ASSERT_EQ(lines.size(), static_cast<std::size_t>(kPairs));
-  for (int i = 0; i < kPairs; ++i) {
-    std::istringstream stream(lines[static_cast<std::size_t>(i)]);
-    std::vector<double> numbers((std::istream_iterator<double>(stream)), std::istream_iterator<double>());
-    ASSERT_EQ(numbers.size(), 12u);
-    EXPECT_NEAR(numbers[3], 0.0, 0.05) << "pair " << i;
-    EXPECT_NEAR(numbers[7], 0.0, 0.05) << "pair " << i;
-    EXPECT_NEAR(numbers[11], kStep * i, 0.05) << "pair " << i;
-  }
-
-  const std::vector<std::string> rows = linesOf(readText(root_ / "timing.csv"));
   ASSERT_EQ(rows.size(), static_cast<std::size_t>(kPairs) + 1);
   EXPECT_EQ(rows.front().rfind("frame,total_ms,detect_ms,stereo_ms,describe_ms,match_ms,motion_ms,", 0), 0u);
   const auto commas = [](const std::string& row) { return std::count(row.begin(), row.end(), ','); };
-  for (int i = 0; i < kPairs; ++i) {
-    const std::string& row = rows[static_cast<std::size_t>(i) + 1];
-    EXPECT_EQ(row.rfind(std::to_string(i) + ",", 0), 0u) << row;
-    EXPECT_EQ(commas(row), commas(rows.front())) << row;
+  for (std::size_t i = 0; i < kPairs; ++i) {
+    const std::vector<double> numbers = numbersOf(lines[i]);
+    ASSERT_EQ(numbers.size(), 12u);
+    EXPECT_NEAR(numbers[3], 0.0, 0.05) << "pair " << i;
+    EXPECT_NEAR(numbers[7], 0.0, 0.05) << "pair " << i;
+    EXPECT_NEAR(numbers[11], kStep * static_cast<double>(i), 0.05) << "pair " << i;
+    EXPECT_EQ(rows[i + 1].rfind(std::to_string(i) + ",", 0), 0u) << rows[i + 1];
+    EXPECT_EQ(commas(rows[i + 1]), commas(rows.front())) << rows[i + 1];
   }
 }
 
 TEST_F(Tools, PlacesByASwitchOrByTheName) {
   const auto arguments = [this](const std::string& name) {
-    return sequence_.string() + " --poses " + in(name + ".txt") + " --odometry " + in("poses.txt") + " --keyframes " +
-           in(name + ".csv") + " --ground-truth " + in("truth.txt") + " --before " + sequence_.string() +
+    return drive_ + " --poses " + in(name + ".txt") + " --odometry " + in("poses.txt") + " --keyframes " +
+           in(name + ".csv") + " --ground-truth " + in("truth.txt") + " --before " + drive_ +
            " --param place_recognition/keyframe_distance=0.15";  // m, below a step
   };
   const Outcome named = run("run_places", arguments("named"));
   if (named.err.find("without Ceres") != std::string::npos) GTEST_SKIP() << named.err;
   ASSERT_EQ(named.exit_code, 0) << named.err;
   EXPECT_TRUE(contains(named.out, "\nrevisits ")) << named.out;
-  EXPECT_EQ(linesOf(readText(root_ / "named.txt")).size(), static_cast<std::size_t>(kPairs));
-  EXPECT_EQ(linesOf(readText(root_ / "named.csv")).size(), 2u * kPairs + 1u);
+  EXPECT_EQ(linesIn("named.txt").size(), static_cast<std::size_t>(kPairs));
+  EXPECT_EQ(linesIn("named.csv").size(), 2u * kPairs + 1u);
   const std::string odometry = poses();
-  ASSERT_EQ(run("run_sequence", "--places " + arguments("switched")).exit_code, 0);
-  EXPECT_EQ(readText(root_ / "switched.txt"), readText(root_ / "named.txt"));
-  ASSERT_EQ(runSequence().exit_code, 0);
-  EXPECT_EQ(poses(), odometry);
+  succeed("run_sequence", "--places " + arguments("switched"));
+  EXPECT_EQ(linesIn("switched.txt"), linesIn("named.txt"));
+  EXPECT_EQ(posesOf(drive_), odometry);
   expectError(run("run_sequence", arguments("neither")), "need --places");
 }
 
 TEST_F(Tools, TimingEndsWithTheReasonWithoutCommas) {
   // A grey right image refuses the pair, and the odometry says why.
   cv::imwrite(image(1, 2).string(), cv::Mat1b(240, 320, std::uint8_t{90}));
-  const std::string timing = in("timing.csv"), states = in("states.csv");
-  ASSERT_EQ(runSequence("--timing " + timing + " --states " + states).exit_code, 0);
-  const std::vector<std::string> rows = linesOf(readText(timing)), stated = linesOf(readText(states));
+  posesOf(drive_, "--timing " + in("timing.csv") + " --states " + in("states.csv"));
+  const std::vector<std::string> rows = linesIn("timing.csv"), stated = linesIn("states.csv");
   const auto last = [](const std::string& row) { return row.substr(row.rfind(',') + 1); };
   EXPECT_EQ(last(rows.front()), "reason");
   EXPECT_EQ(last(rows[2]), "") << rows[2];
@@ -388,8 +386,8 @@ TEST_F(Tools, TimingEndsWithTheReasonWithoutCommas) {
 }
 
 TEST_F(Tools, StatesHaveTheCovariancesOfEachPair) {
-  ASSERT_EQ(runSequence("--states " + in("states.csv")).exit_code, 0);
-  const std::vector<std::string> rows = linesOf(readText(root_ / "states.csv"));
+  posesOf(drive_, "--states " + in("states.csv"));
+  const std::vector<std::string> rows = linesIn("states.csv");
   ASSERT_EQ(rows.size(), static_cast<std::size_t>(kPairs) + 1);
   EXPECT_EQ(rows.front().rfind("frame,stamp_ns,state,epoch,has_pose,has_motion,motion_00,", 0), 0u);
   for (int i = 0; i < kPairs; ++i) {
@@ -408,40 +406,32 @@ TEST_F(Tools, StatesHaveTheCovariancesOfEachPair) {
 }
 
 TEST_F(Tools, FramesLimitsThePairs) {
-  ASSERT_EQ(runSequence("--frames 2").exit_code, 0);
-  EXPECT_EQ(linesOf(poses()).size(), 2u);
+  EXPECT_EQ(linesOf(posesOf(drive_, "--frames 2")).size(), 2u);
 }
 
 TEST_F(Tools, ResultsAreBitIdenticalInEveryRunAndWithAnyThreads) {
-  ASSERT_EQ(runSequence("--threads 1").exit_code, 0);
-  const std::string first = poses();
-  for (const char* threads : {"--threads 1", "--threads 2", "--threads 3"}) {
-    fs::remove(in("poses.txt"));
-    ASSERT_EQ(runSequence(threads).exit_code, 0);
-    EXPECT_EQ(poses(), first) << threads;
-  }
+  const std::string first = posesOf(drive_, "--threads 1");
+  for (const char* threads : {"--threads 1", "--threads 2", "--threads 3"})
+    EXPECT_EQ(posesOf(drive_, threads), first) << threads;
 }
 
 TEST_F(Tools, BagsGiveWhatTheirSequencesGive) {
-  ASSERT_EQ(runSequence().exit_code, 0);
-  const std::string expected = poses(), a = bag("a");
+  const std::string expected = posesOf(drive_), a = bag("a");
   for (const fs::path& recording : {sequence_, fs::path(a)}) {
     const std::string name = recording.stem().string();
-    const Outcome outcome = runBags(recording.string(), "--format kitti");
-    EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
-    const std::vector<std::string> report = linesOf(readText(results_ / "report.csv"));
+    EXPECT_EQ(runBags(recording.string(), "--format kitti").exit_code, 0);
+    const std::vector<std::string> report = linesIn("results/report.csv");
     ASSERT_EQ(report.size(), 2u);
     EXPECT_EQ(report[1].rfind(name + ",4,0,0,0,", 0), 0u) << report[1];
     EXPECT_EQ(readText(results_ / (name + ".txt")), expected);
-    EXPECT_EQ(linesOf(readText(results_ / (name + ".csv"))).size(), static_cast<std::size_t>(kPairs) + 1);
+    EXPECT_EQ(linesIn("results/" + name + ".csv").size(), static_cast<std::size_t>(kPairs) + 1);
   }
-  ASSERT_EQ(runOn(a, "--threads 2").exit_code, 0);
-  EXPECT_EQ(poses(), expected);
+  EXPECT_EQ(posesOf(a, "--threads 2"), expected);
 
   // TUM's format has the stamps: times.txt plus 1e9 s.
   fs::remove(results_ / "a.txt");
   ASSERT_EQ(runBags(a).exit_code, 0);
-  const std::vector<std::string> lines = linesOf(readText(results_ / "a.txt"));
+  const std::vector<std::string> lines = linesIn("results/a.txt");
   ASSERT_EQ(lines.size(), static_cast<std::size_t>(kPairs) + 1);  // and a comment
   EXPECT_EQ(lines[1].rfind("1000000000.000000000 ", 0), 0u) << lines[1];
   EXPECT_EQ(lines[4].rfind("1000000000.300000000 ", 0), 0u) << lines[4];
@@ -454,21 +444,20 @@ TEST_F(Tools, BagsOfOtherNamesAndCompressedImages) {
   const auto writeInfo = [&](rosbag::Bag& out, int side, ros::Time time) {
     out.write(topicOf(side) + "/camera_info", time, infos[side]);
   };
-  const std::string renamed =
-      rewritten(bag("plain"), "renamed", [&](rosbag::Bag& out, const rosbag::MessageInstance& message) {
-        const int side = contains(message.getTopic(), "/left/") ? 0 : 1;
-        if (const auto info = message.instantiate<sensor_msgs::CameraInfo>()) {
-          infos[side] = *info;
-          writeInfo(out, side, message.getTime());
-        }
-        const auto image = message.instantiate<sensor_msgs::Image>();
-        if (!image) return;
-        sensor_msgs::CompressedImage compressed;
-        compressed.header = image->header;
-        compressed.format = "mono8; png compressed mono8";
-        cv::imencode(".png", cv::Mat(240, 320, CV_8U, const_cast<std::uint8_t*>(image->data.data())), compressed.data);
-        out.write(topicOf(side) + "/image_rect_raw/compressed", message.getTime(), compressed);
-      });
+  const std::string renamed = rewritten(bag("plain"), "renamed", [&](rosbag::Bag& out, const auto& message) {
+    const int side = contains(message.getTopic(), "/left/") ? 0 : 1;
+    if (const auto info = message.template instantiate<sensor_msgs::CameraInfo>()) {
+      infos[side] = *info;
+      writeInfo(out, side, message.getTime());
+    }
+    const auto image = message.template instantiate<sensor_msgs::Image>();
+    if (!image) return;
+    sensor_msgs::CompressedImage compressed;
+    compressed.header = image->header;
+    compressed.format = "mono8; png compressed mono8";
+    cv::imencode(".png", cv::Mat(240, 320, CV_8U, const_cast<std::uint8_t*>(image->data.data())), compressed.data);
+    out.write(topicOf(side) + "/image_rect_raw/compressed", message.getTime(), compressed);
+  });
   {
     rosbag::Bag out(renamed, rosbag::bagmode::Append);
     sensor_msgs::CompressedImage torn;  // whose pair is left out
@@ -480,16 +469,17 @@ TEST_F(Tools, BagsOfOtherNamesAndCompressedImages) {
     }
   }
   const std::string names = " --camera /camera --left infra1 --right infra2 --image image_rect_raw";
-  ASSERT_EQ(runSequence().exit_code, 0);
+  const std::string expected = posesOf(drive_);
   const Outcome outcome = runBags(renamed, "--format kitti --shuttle" + names);
   ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_EQ(readText(results_ / "renamed.txt"), poses());
-  EXPECT_EQ(linesOf(readText(results_ / "report.csv")).at(1).rfind("renamed,4,0,0,1,", 0), 0u);
+  EXPECT_EQ(linesIn("results/report.csv").at(1).rfind("renamed,4,0,0,1,", 0), 0u);
   EXPECT_TRUE(contains(outcome.out, "shuttle: error about ")) << outcome.out;
-  fs::remove(results_ / "renamed.txt");
-  ASSERT_EQ(runBags(renamed, "--format kitti").exit_code, 0) << "the bag's only stereo camera";
-  EXPECT_EQ(runBags(renamed, "--format kitti --camera /camera").exit_code, 0) << "the only one in a namespace";
-  EXPECT_EQ(readText(results_ / "renamed.txt"), poses());
+  EXPECT_EQ(readText(results_ / "renamed.txt"), expected);
+  for (const std::string only : {"", " --camera /camera"}) {  // the bag's only stereo camera, or that of a namespace
+    fs::remove(results_ / "renamed.txt");
+    EXPECT_EQ(runBags(renamed, "--format kitti" + only).exit_code, 0);
+    EXPECT_EQ(readText(results_ / "renamed.txt"), expected);
+  }
   expectError(runBags(renamed, "--camera /other"),
               "has no /other/left/image_rect; its images: /camera/infra1/image_rect_raw");
 
@@ -500,17 +490,14 @@ TEST_F(Tools, BagsOfOtherNamesAndCompressedImages) {
 
 /// As `rosbag record --split` leaves a drive.
 TEST_F(Tools, PartsOfADriveAreJoined) {
-  ASSERT_EQ(runSequence().exit_code, 0);
-  const std::string expected = poses(), whole = bag("whole");
+  const std::string expected = posesOf(drive_), whole = bag("whole");
   std::string parts[2];
   for (const bool is_second : {false, true})
     parts[is_second] = rewritten(whole, is_second ? "drive_1" : "drive_0", [&](rosbag::Bag& out, const auto& message) {
       if ((message.getTime() > ros::Time(1000000000.25)) == is_second)
         out.write(message.getTopic(), message.getTime(), message);
     });
-  const Outcome outcome = runOn(parts[0] + " " + parts[1], "--join --shuttle");
-  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  EXPECT_EQ(poses(), expected);
+  EXPECT_EQ(posesOf(parts[0] + " " + parts[1], "--join --shuttle"), expected);
   expectError(runOn(parts[0] + " " + parts[1]), "--join");
   expectError(runOn(parts[1] + " " + parts[0], "--join"), "drive_0.bag' is not later than");
 }
@@ -544,13 +531,9 @@ TEST_F(Tools, RecordingsThatCannotBeReadAreNamedWithTheRemedy) {
 /// The drive as a raw folder of EuRoC's is rectified on the fly, or by convert.
 TEST_F(Tools, RawFoldersOfEuroc) {
   const std::string asl = rawFolder("radial-tangential").string(), rectified = in("rectified");
-  const Outcome outcome = runOn(asl, "--format tum");
-  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
-  const std::vector<std::string> lines = linesOf(poses());
-  fs::remove(in("poses.txt"));
-  ASSERT_EQ(run("euroc_to_kitti", "--input " + asl + "/mav0 --output " + rectified).exit_code, 0);
-  ASSERT_EQ(runOn(rectified).exit_code, 0);
-  const std::vector<std::string> expected = linesOf(poses());
+  const std::vector<std::string> lines = linesOf(posesOf(asl, "--format tum"));
+  succeed("euroc_to_kitti", "--input " + asl + "/mav0 --output " + rectified);
+  const std::vector<std::string> expected = linesOf(posesOf(rectified));
   ASSERT_EQ(lines.size(), static_cast<std::size_t>(kPairs) + 1);  // and a comment
   for (std::size_t i = 0; i < kPairs; ++i) {
     const std::vector<double> pose = numbersOf(lines[i + 1]), same = numbersOf(expected[i]);
@@ -559,7 +542,7 @@ TEST_F(Tools, RawFoldersOfEuroc) {
     EXPECT_NEAR(pose[3], kStep * static_cast<double>(i), 0.05);
   }
 
-  ASSERT_EQ(run("convert", asl + " --frames 3 --output " + in("raw.bag")).exit_code, 0);
+  succeed("convert", asl + " --frames 3 --output " + in("raw.bag"));
   rosbag::Bag raw(in("raw.bag"));
   EXPECT_EQ(rosbag::View(raw, rosbag::TopicQuery("/stereo/right/image_raw")).size(), 3u);
 }
@@ -570,14 +553,11 @@ TEST_F(Tools, RawBagsAreRectified) {
     for (const std::string fov : {"", " --fov 70"}) {
       const fs::path asl = rawFolder(lens);
       const std::string raw = in("raw.bag"), folder = in(lens + std::to_string(fov.size()));
-      ASSERT_EQ(runOn(asl.string(), fov).exit_code, 0);
-      const std::string expected = poses();
-      ASSERT_EQ(run("convert", asl.string() + " --output " + raw).exit_code, 0);
-      const Outcome outcome = runOn(raw, fov + " --page " + in("page.html"));
-      EXPECT_EQ(outcome.exit_code, 0) << outcome.out << outcome.err;
-      EXPECT_EQ(poses(), expected) << lens << fov;
+      const std::string expected = posesOf(asl.string(), fov);
+      succeed("convert", asl.string() + " --output " + raw);
+      EXPECT_EQ(posesOf(raw, fov + " --page " + in("page.html")), expected) << lens << fov;
       EXPECT_TRUE(contains(readPage(in("page.html")), "raw images rectified here"));
-      const std::string bare = rewritten(raw, "bare", [](rosbag::Bag& out, const rosbag::MessageInstance& message) {
+      const std::string bare = rewritten(raw, "bare", [](rosbag::Bag& out, const auto& message) {
         if (contains(message.getTopic(), "image_raw"))
           out.write(contains(message.getTopic(), "left") ? "/cam0/image_raw" : "/cam1/image_raw", message.getTime(),
                     message);
@@ -601,7 +581,7 @@ TEST_F(Tools, RawBagsAreRectified) {
 TEST_F(Tools, MessagesAreKnownByWhatTheyHold) {
   const std::string plain = bag("plain");
   const auto changed = [&](const std::string& name, const std::string& definition) {
-    return rewritten(plain, name, [&](rosbag::Bag& out, const rosbag::MessageInstance& message) {
+    return rewritten(plain, name, [&](rosbag::Bag& out, const auto& message) {
       const auto header = boost::make_shared<ros::M_string>(*message.getConnectionHeader());
       if (message.getDataType() == "sensor_msgs/CameraInfo") {
         (*header)["md5sum"] = "b5aff04250fbf270b71bef9d82c2132e";
@@ -613,10 +593,7 @@ TEST_F(Tools, MessagesAreKnownByWhatTheyHold) {
   std::string ros2 = ros::message_traits::definition<sensor_msgs::CameraInfo>();
   for (const auto& [from, to] : {std::pair("float64[] D", "float64[] d"), std::pair("float64[9]  K", "float64[9] k")})
     ros2.replace(ros2.find(from), std::string(from).size(), to);
-  ASSERT_EQ(runSequence().exit_code, 0);
-  const std::string expected = poses();
-  ASSERT_EQ(runOn(changed("ros2", ros2)).exit_code, 0);
-  EXPECT_EQ(poses(), expected);
+  EXPECT_EQ(posesOf(changed("ros2", ros2)), posesOf(drive_));
   expectError(runOn(changed("other", "uint32 height\n" + ros2)), "of another definition: uint32 (uint32 time");
   std::ofstream(in("drive.db3")) << "SQLite format 3";
   expectError(runOn(in("drive.db3")), "a bag of ROS 2");
@@ -624,12 +601,9 @@ TEST_F(Tools, MessagesAreKnownByWhatTheyHold) {
 
 TEST_F(Tools, ABagBecomesAFolder) {
   const fs::path folder = root_ / "folder";
-  ASSERT_EQ(run("convert", bag("a") + " --poses " + in("truth.txt") + " --output " + folder.string()).exit_code, 0);
-  ASSERT_EQ(runSequence().exit_code, 0);
-  const std::string expected = poses();
-  ASSERT_EQ(runOn(folder.string()).exit_code, 0);
-  EXPECT_EQ(poses(), expected);
-  EXPECT_EQ(linesOf(readText(folder / "poses.txt")).size(), static_cast<std::size_t>(kPairs));
+  succeed("convert", bag("a") + " --poses " + in("truth.txt") + " --output " + folder.string());
+  EXPECT_EQ(posesOf(folder.string()), posesOf(drive_));
+  EXPECT_EQ(linesIn("folder/poses.txt").size(), static_cast<std::size_t>(kPairs));
 }
 
 /// Many recordings, a process for each: what is finished stays.
@@ -644,7 +618,7 @@ TEST_F(Tools, ManyRecordings) {
   EXPECT_EQ(outcome.out.rfind("bad,,,,,,,,,,", 0), 0u) << outcome.out;
   EXPECT_TRUE(contains(outcome.out, "1 of 2 recordings are finished")) << outcome.out;
   const fs::path result = results_ / "good" / "good.txt";
-  EXPECT_EQ(linesOf(readText(result)).size(), static_cast<std::size_t>(kPairs));
+  EXPECT_EQ(linesIn("results/good/good.txt").size(), static_cast<std::size_t>(kPairs));
   const fs::file_time_type finished = fs::last_write_time(result);
   EXPECT_EQ(runMany("").exit_code, 1);  // other arguments
   expectError(run("run_sequence", root_.string() + " --output " + results_.string()), "run_many");
@@ -657,7 +631,7 @@ TEST_F(Tools, ManyRecordings) {
   outcome = runMany(" -- --format kitti");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.out << outcome.err;
   EXPECT_EQ(fs::last_write_time(result), finished);
-  EXPECT_EQ(linesOf(readText(results_ / "report.csv")).size(), 3u);
+  EXPECT_EQ(linesIn("results/report.csv").size(), 3u);
 }
 
 TEST_F(Tools, RecordingsCheckThemselves) {
@@ -669,7 +643,7 @@ TEST_F(Tools, RecordingsCheckThemselves) {
   const Outcome outcome = runBags(a.string(), "--shuttle --halves");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   EXPECT_EQ(readText(results_ / "a.txt"), poses_alone);
-  const std::vector<std::string> lines = linesOf(readText(checks));
+  const std::vector<std::string> lines = linesIn("results/a.self_check.csv");
   ASSERT_EQ(lines.size(), 3u);
   EXPECT_EQ(lines[0].rfind("check,pairs,distance_m,end_m,", 0), 0u);
   for (const std::size_t i : {1u, 2u}) {
@@ -697,7 +671,7 @@ TEST_F(Tools, RecordingsCheckThemselves) {
 TEST_F(Tools, AShuttleFindsPairsHoweverTheyWereRecorded) {
   const std::string plain = bag("plain");
   for (const bool is_at_once : {true, false})
-    rewritten(plain, is_at_once ? "at_once" : "late", [&](rosbag::Bag& out, const rosbag::MessageInstance& message) {
+    rewritten(plain, is_at_once ? "at_once" : "late", [&](rosbag::Bag& out, const auto& message) {
       if (message.getTopic().rfind("/stereo/", 0) != 0) return;
       const bool is_late = !is_at_once && message.getTopic() == "/stereo/right/image_rect";
       const ros::Time time = message.getTime() + ros::Duration(is_late ? 0.25 : 0.0);
@@ -718,7 +692,7 @@ TEST_F(Tools, AShuttleFindsPairsHoweverTheyWereRecorded) {
 TEST_F(Tools, ALostDriveDoesNotPassItsSelfChecks) {
   for (int i = 1; i < kPairs; ++i)
     for (const int side : {0, 1}) darken(side, i);
-  const Outcome outcome = runBags(sequence_.string(), "--shuttle --halves");
+  const Outcome outcome = runBags(drive_, "--shuttle --halves");
   EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
   for (const std::string check : {"shuttle", "halves"}) {
     EXPECT_TRUE(contains(outcome.out, check + ": no figure")) << outcome.out;
@@ -731,16 +705,15 @@ TEST_F(Tools, ALostDriveDoesNotPassItsSelfChecks) {
 TEST_F(Tools, MessagesThatMakeNoPairDoNotKeepOthersFromIt) {
   constexpr int kAlone = 250;
   int alone = 0;
-  const std::string mixed =
-      rewritten(bag("good"), "mixed", [&](rosbag::Bag& out, const rosbag::MessageInstance& message) {
-        for (sensor_msgs::CameraInfo info; alone < kAlone; ++alone) {
-          info.header.stamp = ros::Time(999999000 + alone, 0);
-          out.write("/stereo/left/camera_info", info.header.stamp, info);
-        }
-        out.write(message.getTopic(), message.getTime(), message, message.getConnectionHeader());
-      });
+  const std::string mixed = rewritten(bag("good"), "mixed", [&](rosbag::Bag& out, const auto& message) {
+    for (sensor_msgs::CameraInfo info; alone < kAlone; ++alone) {
+      info.header.stamp = ros::Time(999999000 + alone, 0);
+      out.write("/stereo/left/camera_info", info.header.stamp, info);
+    }
+    out.write(message.getTopic(), message.getTime(), message, message.getConnectionHeader());
+  });
   ASSERT_EQ(runBags(mixed).exit_code, 0);
-  const std::string row = linesOf(readText(results_ / "report.csv")).at(1);
+  const std::string row = linesIn("results/report.csv").at(1);
   EXPECT_EQ(row.rfind("mixed,4,0,0," + std::to_string(kAlone) + ",", 0), 0u) << row;
 }
 
@@ -791,10 +764,7 @@ TEST_F(Tools, TheTwistOfTheGroundTruthIsThatOfTheBase) {
     }
   }
   const fs::path file = root_ / "circle.bag";
-  ASSERT_EQ(run("kitti_to_bag",
-                "--sequence " + sequence_.string() + " --poses " + in("circle.txt") + " --output " + file.string())
-                .exit_code,
-            0);
+  succeed("kitti_to_bag", "--sequence " + drive_ + " --poses " + in("circle.txt") + " --output " + file.string());
   const rosbag::Bag bag(file.string());
   rosbag::View view(bag, rosbag::TopicQuery("/ground_truth/odom"));
   EXPECT_EQ(view.size(), static_cast<std::uint32_t>(kPairs));
@@ -818,8 +788,7 @@ TEST_F(Tools, AnyRecordingBecomesAPage) {
                                         "halves: ",
                                         "calibration",
                                         "stereo_descriptor_vo "};
-  Outcome outcome = run("run_sequence", bag("a") + to_page);
-  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  const Outcome outcome = succeed("run_sequence", bag("a") + to_page);
   EXPECT_TRUE(contains(outcome.out, ": Followed: 4 of 4 pairs")) << outcome.out;
   std::string json = readPage(page);
   expectWords(json, all);
@@ -833,21 +802,18 @@ TEST_F(Tools, AnyRecordingBecomesAPage) {
   EXPECT_FALSE(pairs["truth"]);
 
   const std::string truth = " --ground-truth " + in("truth.txt");
-  outcome =
-      run("run_sequence", sequence_.string() + to_page + truth + " --param motion/seed=2 --poses " + in("poses.txt"));
-  ASSERT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(linesOf(posesOf(drive_, to_page + truth + " --param motion/seed=2")).size(),
+            static_cast<std::size_t>(kPairs));
   json = readPage(page);
   expectWords(json, all);
   expectWords(json, {"true error", "visual_odometry/motion/seed", "default 1"});
   EXPECT_EQ(YAML::Load(json)["pairs"]["truth"].size(), static_cast<std::size_t>(kPairs));
-  EXPECT_EQ(linesOf(poses()).size(), static_cast<std::size_t>(kPairs));
 
-  expectError(runSequence(truth), "--page");
-  expectError(run("run_sequence", sequence_.string()), "--page");
   std::ofstream(root_ / "short.txt") << "1 0 0 0 0 1 0 0 0 0 1 0\n";
-  expectError(run("run_sequence", sequence_.string() + to_page + " --ground-truth " + in("short.txt")), "short.txt");
-  expectError(run("run_sequence", sequence_.string() + " --page " + (root_ / "missing" / "page.html").string()),
-              "page.html");
+  expectError(runSequence(truth), "--page");
+  expectError(run("run_sequence", drive_), "--page");
+  expectError(run("run_sequence", drive_ + to_page + " --ground-truth " + in("short.txt")), "short.txt");
+  expectError(run("run_sequence", drive_ + " --page " + in("missing/page.html")), "page.html");
 }
 
 /// Stamps of the truth are its own, and it may know only a part of the drive.
@@ -856,7 +822,7 @@ TEST_F(Tools, AGroundTruthWithStampsIsInterpolated) {
                                  << "1000000000.05 0 0 " << 0.5 * kStep << " 0 0 0 1\n1000000000.25 0 0 " << 2.5 * kStep
                                  << " 0 0 0 1\n";
   const std::string arguments = bag("a") + " --page " + in("page.html") + " --ground-truth " + in("truth.tum");
-  ASSERT_EQ(run("run_sequence", arguments).exit_code, 0);
+  succeed("run_sequence", arguments);
   expectWords(readPage(in("page.html")), {"true error", "at the end off by 0.0"});
   std::ofstream(in("truth.tum")) << "10.0 0 0 0 0 0 0 1\n11.0 0 0 0 0 0 0 1\n";
   expectError(run("run_sequence", arguments), "no poses at the stamps");
@@ -875,9 +841,7 @@ TEST_F(Tools, TheTruthOfEurocIsThatOfItsBody) {
   for (int i = 1; i < kPairs; ++i)  // unknown at first
     poses << 1400000000000000000 + i * 100000000 << "," << kStep * i << ",0,0,1,0,0,0,0,0,0\n";
   poses.close();
-  ASSERT_EQ(
-      run("run_sequence", asl.string() + " --page " + page.string() + " --ground-truth " + truth.string()).exit_code,
-      0);
+  succeed("run_sequence", asl.string() + " --page " + page.string() + " --ground-truth " + truth.string());
   const YAML::Node true_poses = YAML::Load(readPage(page))["pairs"]["truth"];
   EXPECT_TRUE(true_poses[0].IsNull());
   expectWords(readPage(page), {"at the end off by 0.0"});
@@ -886,14 +850,14 @@ TEST_F(Tools, TheTruthOfEurocIsThatOfItsBody) {
 TEST_F(Tools, ThePageOfALostDriveSaysWhere) {
   for (const int side : {0, 1}) darken(side, kPairs - 1);
   darken(1, kPairs - 2);
-  EXPECT_EQ(run("run_sequence", sequence_.string() + " --page " + in("page.html")).exit_code, 2);
+  EXPECT_EQ(run("run_sequence", drive_ + " --page " + in("page.html")).exit_code, 2);
   expectWords(readPage(in("page.html")), {"Interrupted: ", " of 4 pairs have no pose", "LOST", "no figure"});
 }
 
 TEST_F(Tools, ThePageOfADriveWithoutAPose) {
   for (int pair = 0; pair < kPairs; ++pair)
     for (const int side : {0, 1}) darken(side, pair);
-  run("run_sequence", sequence_.string() + " --page " + in("page.html"));
+  run("run_sequence", drive_ + " --page " + in("page.html"));
   const std::string json = readPage(in("page.html"));
   expectWords(json, {"Never started: none of 4 pairs has a pose"});
   EXPECT_FALSE(contains(json, "Interrupted"));
@@ -913,7 +877,8 @@ TEST_F(Tools, ThePageShowsWhatWasReportedLive) {
       out.write("/stereo/vo_info", ros::Time(1000000000 + i, 0), info);
     }
   }
-  ASSERT_EQ(run("run_sequence", bag("a") + " --page " + page.string() + " --live " + live.string()).exit_code, 0);
+  const std::string arguments = bag("a") + " --page " + page.string() + " --live " + live.string();
+  succeed("run_sequence", arguments);
   expectWords(readPage(page), {"while it ran", "2 TRACKING, 1 LOST; 7 pairs dropped"});
 
   // Of another version.
@@ -926,31 +891,27 @@ TEST_F(Tools, ThePageShowsWhatWasReportedLive) {
     (*header)["message_definition"] = "std_msgs/Header header\nstring state\n";
     out.write("/stereo/vo_info", ros::Time(1000000000, 0), stereo_descriptor_vo::VoInfo(), header);
   }
-  const Outcome other = run("run_sequence", in("a.bag") + " --page " + page.string() + " --live " + live.string());
-  EXPECT_EQ(other.exit_code, 0) << other.err;
-  EXPECT_TRUE(contains(other.err, "/stereo/vo_info holds stereo_descriptor_vo/VoInfo of another definition"));
+  EXPECT_TRUE(contains(succeed("run_sequence", arguments).err,
+                       "/stereo/vo_info holds stereo_descriptor_vo/VoInfo of another definition"));
 }
 
 /// Of two robots in a bag the camera is on one.
 TEST_F(Tools, TheBaseIsThatOfTheOdometryAboveTheCamera) {
-  const fs::path drive = bag("a"), named = root_ / "named.bag";
+  const std::string drive = bag("a");
   const auto check = [&](const std::vector<std::string>& bases, const std::string& arguments, const std::string& said) {
-    {
-      const rosbag::Bag in(drive.string());
-      rosbag::Bag out(named.string(), rosbag::bagmode::Write);
-      for (const rosbag::MessageInstance& message : rosbag::View(in)) {
-        const auto transforms = message.instantiate<tf2_msgs::TFMessage>();
-        if (message.getTopic() == "/tf_static") transforms->transforms.front().header.frame_id = "/r2/base";
-        transforms ? out.write(message.getTopic(), message.getTime(), *transforms)
-                   : out.write(message.getTopic(), message.getTime(), message);
-      }
-      for (const std::string& base : bases) {
+    std::vector<std::string> unnamed = bases;
+    const std::string named = rewritten(drive, "named", [&](rosbag::Bag& out, const auto& message) {
+      for (; !unnamed.empty(); unnamed.pop_back()) {
         nav_msgs::Odometry odometry;
-        odometry.child_frame_id = base;
-        out.write("/" + base + "/odom", rosbag::View(in).getBeginTime(), odometry);
+        odometry.child_frame_id = unnamed.back();
+        out.write("/" + unnamed.back() + "/odom", message.getTime(), odometry);
       }
-    }
-    const Outcome outcome = run("check_camera", "--bag " + named.string() + arguments);
+      const auto transforms = message.template instantiate<tf2_msgs::TFMessage>();
+      if (message.getTopic() == "/tf_static") transforms->transforms.front().header.frame_id = "/r2/base";
+      transforms ? out.write(message.getTopic(), message.getTime(), *transforms)
+                 : out.write(message.getTopic(), message.getTime(), message);
+    });
+    const Outcome outcome = run("check_camera", "--bag " + named + arguments);
     EXPECT_TRUE(contains(outcome.out, said)) << outcome.out;
   };
   check({"r1/base", "r2/base"}, "", "m of r2/base and looks along 1.00");
@@ -960,7 +921,7 @@ TEST_F(Tools, TheBaseIsThatOfTheOdometryAboveTheCamera) {
 }
 
 TEST_F(Tools, PicturesOfEachPair) {
-  ASSERT_EQ(runSequence("--pictures " + in("pictures")).exit_code, 0);
+  posesOf(drive_, "--pictures " + in("pictures"));
   for (int i = 0; i < kPairs; ++i)
     EXPECT_EQ(cv::imread(in("pictures/00000" + std::to_string(i) + ".jpg")).size(), cv::Size(320, 240));
   expectError(runSequence("--pictures " + in("pictures")), "is not empty: choose another folder");
@@ -969,9 +930,8 @@ TEST_F(Tools, PicturesOfEachPair) {
 TEST_F(Tools, PerfectTrajectoryHasNoError) {
   const std::string truth = in("truth.txt");
   const fs::path json = root_ / "errors.json";
-  const Outcome outcome = run("evaluate_trajectory", "--ground-truth " + truth + " --estimate " + truth +
-                                                         " --lengths 0.2,0.4 --json " + json.string());
-  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  succeed("evaluate_trajectory",
+          "--ground-truth " + truth + " --estimate " + truth + " --lengths 0.2,0.4 --json " + json.string());
   const cv::FileStorage errors(json.string(), cv::FileStorage::READ | cv::FileStorage::FORMAT_JSON);
   const cv::FileNode per_length = errors["per_length"];
   ASSERT_EQ(per_length.size(), 2u);
