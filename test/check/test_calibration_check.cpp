@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <string>
-
 #include "../../src/check/calibration_check.hpp"
 
 namespace sdvo::test_calibration_check {

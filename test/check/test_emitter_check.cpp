@@ -1,8 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <random>
-#include <vector>
-
 #include "../../src/check/image_check.hpp"
 #include "../synthetic_scene.hpp"
 

@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <opencv2/imgproc.hpp>
-#include <string>
 
 #include "../../src/check/image_check.hpp"
 #include "../said.hpp"

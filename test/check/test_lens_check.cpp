@@ -3,7 +3,6 @@
 #include <Eigen/Geometry>
 #include <cmath>
 #include <random>
-#include <vector>
 
 #include "../../src/check/lens_check.hpp"
 #include "../said.hpp"

@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <string>
-
 #include "../../src/check/odometry_check.hpp"
 #include "../said.hpp"
 

@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "../../src/check/row_check.hpp"
 #include "../synthetic_scene.hpp"
 

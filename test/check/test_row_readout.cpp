@@ -1,8 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <random>
-
 #include "../../src/check/row_readout.hpp"
 #include "../synthetic_scene.hpp"
 

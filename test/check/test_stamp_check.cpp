@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <string>
 
 #include "../../src/check/stamp_check.hpp"
 #include "../said.hpp"

@@ -1,9 +1,6 @@
 #include <gtest/gtest.h>
 
-#include <cstdint>
 #include <limits>
-#include <utility>
-#include <vector>
 
 #include "../../src/common/stamp_filter.hpp"
 

@@ -1,8 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <limits>
-
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"

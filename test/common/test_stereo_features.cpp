@@ -1,11 +1,6 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <functional>
-#include <limits>
-#include <string>
 #include <tuple>
-#include <vector>
 
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"

@@ -2,12 +2,9 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include <filesystem>
 #include <fstream>
 #include <set>
 #include <sstream>
-#include <string>
-#include <vector>
 
 #include "../../src/common/whole_file.hpp"
 #include "../said.hpp"

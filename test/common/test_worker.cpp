@@ -4,8 +4,6 @@
 #include <chrono>
 #include <future>
 #include <memory>
-#include <mutex>
-#include <thread>
 #include <vector>
 
 #include "../../src/common/worker.hpp"

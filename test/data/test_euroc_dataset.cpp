@@ -1,13 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <cstdint>
-#include <filesystem>
 #include <fstream>
-#include <functional>
 #include <opencv2/imgcodecs.hpp>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "../said.hpp"
 #include "../temporary_folder.hpp"

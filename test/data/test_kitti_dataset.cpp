@@ -1,13 +1,9 @@
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <stdexcept>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "../said.hpp"
 #include "../temporary_folder.hpp"

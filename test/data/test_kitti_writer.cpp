@@ -1,9 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <filesystem>
 #include <fstream>
 #include <stdexcept>
-#include <string>
 
 #include "../said.hpp"
 #include "../temporary_folder.hpp"

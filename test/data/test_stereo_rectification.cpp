@@ -5,8 +5,6 @@
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core/eigen.hpp>
 #include <stdexcept>
-#include <string>
-#include <vector>
 
 #include "../said.hpp"
 #include "../temporary_folder.hpp"

@@ -1,12 +1,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <limits>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "../said.hpp"
 #include "../temporary_folder.hpp"

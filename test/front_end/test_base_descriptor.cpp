@@ -1,6 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <opencv2/features2d.hpp>
 
 #include "../said.hpp"

@@ -1,8 +1,6 @@
 #include <gtest/gtest.h>
 
-#include <array>
 #include <bitset>
-#include <cmath>
 
 #include "../../src/front_end/brief.hpp"
 #include "../synthetic_scene.hpp"

@@ -1,11 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
-#include <vector>
 
 #include "../../src/common/processor.hpp"
 #include "../../src/front_end/fast_corners.hpp"

@@ -1,14 +1,10 @@
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
 #include <fstream>
 #include <numeric>
 #include <opencv2/imgcodecs.hpp>
 #include <set>
-#include <utility>
 
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"

@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "../../src/front_end/freak.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"

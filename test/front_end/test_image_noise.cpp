@@ -1,8 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <opencv2/core.hpp>
-
 #include "../../src/front_end/image_noise.hpp"
 #include "../synthetic_scene.hpp"
 

@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <Eigen/Core>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <vector>

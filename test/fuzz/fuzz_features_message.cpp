@@ -1,5 +1,4 @@
 // A StereoFeatures message of any content: it is refused with one std::invalid_argument, or all that reads it can.
-#include <stdexcept>
 
 #include "../ros/message_samples.hpp"
 #include "fuzz_message.hpp"

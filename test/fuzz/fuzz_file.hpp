@@ -2,9 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <filesystem>
 #include <fstream>
-#include <string>
 
 #include "../temporary_folder.hpp"
 

@@ -1,6 +1,5 @@
 // What another robot sends of its places: a PlaceSignature, and a Place as GetPlace's answer. Each is refused with one
 // std::invalid_argument, or it can be compared with the places known here, and what comes out is finite.
-#include <stdexcept>
 
 #include "../../src/messages/place_conversions.hpp"
 #include "../../src/messages/pose_conversions.hpp"

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <map>
-#include <vector>
 
 #include "../../src/ros/places_file.hpp"
 #include "../synthetic_features.hpp"

@@ -3,9 +3,6 @@
 #include <rosbag/bag.h>
 #include <std_msgs/Header.h>
 
-#include <filesystem>
-#include <stdexcept>
-
 #include "../../src/ros/places_file.hpp"
 #include "../temporary_folder.hpp"
 #include "fuzz_message.hpp"

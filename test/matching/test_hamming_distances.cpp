@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <bitset>
-#include <opencv2/core.hpp>
 #include <vector>
 
 #include "../../src/common/processor.hpp"

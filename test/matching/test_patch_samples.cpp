@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <random>
-#include <vector>
 
 #include "../../src/common/processor.hpp"
 #include "../../src/matching/patch_samples.hpp"

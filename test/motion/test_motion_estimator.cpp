@@ -1,8 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
-#include <iterator>
-#include <limits>
 
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"

@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <limits>
 #include <set>
 
 #include "../said.hpp"

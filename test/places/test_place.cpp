@@ -1,8 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <random>
-
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/places/place_index.hpp"
 

@@ -1,9 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <random>
-#include <set>
-
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/places/pose_graph.hpp"

@@ -1,7 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "../../src/rig/learnt_rig.hpp"
 #include "../said.hpp"
 #include "turned_grid.hpp"

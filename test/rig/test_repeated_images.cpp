@@ -1,10 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <optional>
-#include <random>
-#include <vector>
-
 #include "../../src/rig/repeated_images.hpp"
 #include "../synthetic_scene.hpp"
 

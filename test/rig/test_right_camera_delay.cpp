@@ -1,8 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <random>
-
 #include "../../src/rig/right_camera_delay.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"

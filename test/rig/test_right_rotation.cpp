@@ -1,8 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <random>
-#include <vector>
-
 #include "../../src/rig/right_rotation.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"

@@ -1,9 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <array>
-#include <cmath>
-#include <random>
-
 #include "../../src/rig/row_pattern.hpp"
 #include "turned_grid.hpp"
 

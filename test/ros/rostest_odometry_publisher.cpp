@@ -3,11 +3,6 @@
 #include <sensor_msgs/point_cloud2_iterator.h>
 #include <tf2_msgs/TFMessage.h>
 
-#include <cmath>
-#include <memory>
-#include <string>
-#include <vector>
-
 #include "../../src/ros/odometry_publisher.hpp"
 #include "message_samples.hpp"
 #include "spin.hpp"

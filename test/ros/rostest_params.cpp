@@ -1,9 +1,7 @@
 #include <gtest/gtest.h>
 #include <ros/ros.h>
 
-#include <string>
 #include <tuple>
-#include <vector>
 
 #include "../../src/ros/params.hpp"
 #include "../said.hpp"

@@ -5,9 +5,7 @@
 
 #include <atomic>
 #include <stdexcept>
-#include <string>
 #include <thread>
-#include <vector>
 
 #include "../../src/ros/params.hpp"
 #include "../said.hpp"

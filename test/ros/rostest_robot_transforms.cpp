@@ -6,8 +6,6 @@
 #include <cmath>
 #include <cstdint>
 #include <optional>
-#include <string>
-#include <vector>
 
 #include "../../src/ros/transforms.hpp"
 #include "../said.hpp"

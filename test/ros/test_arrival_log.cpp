@@ -1,8 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <random>
-#include <string>
-
 #include "../../src/ros/arrival_log.hpp"
 #include "../../src/ros/synchronisers.hpp"
 #include "../said.hpp"

@@ -1,8 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <string>
-#include <vector>
-
 #include "../../src/ros/camera_finder.hpp"
 #include "../said.hpp"
 

@@ -1,9 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <string>
-#include <vector>
-
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "message_samples.hpp"

@@ -2,10 +2,6 @@
 #include <ros/serialization.h>
 #include <sensor_msgs/point_cloud2_iterator.h>
 
-#include <cstdint>
-#include <string>
-#include <vector>
-
 #include "../synthetic_scene.hpp"
 #include "message_samples.hpp"
 

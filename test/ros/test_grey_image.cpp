@@ -1,9 +1,6 @@
 #include <gtest/gtest.h>
 
 #include <boost/make_shared.hpp>
-#include <cstdint>
-#include <string>
-#include <vector>
 
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"

@@ -2,10 +2,6 @@
 #include <tf2/LinearMath/Quaternion.h>
 
 #include <Eigen/Eigenvalues>
-#include <Eigen/Geometry>
-#include <cmath>
-#include <functional>
-#include <random>
 
 #include "message_samples.hpp"
 

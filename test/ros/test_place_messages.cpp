@@ -1,8 +1,6 @@
 #include <gtest/gtest.h>
 #include <ros/serialization.h>
 
-#include <vector>
-
 #include "../../src/messages/place_conversions.hpp"
 #include "../../src/messages/pose_conversions.hpp"
 #include "../said.hpp"

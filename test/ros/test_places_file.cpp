@@ -8,14 +8,8 @@
 
 #include <atomic>
 #include <csignal>
-#include <cstring>
-#include <filesystem>
 #include <fstream>
-#include <iterator>
-#include <sstream>
-#include <string>
 #include <thread>
-#include <vector>
 
 #include "../../src/ros/places_file.hpp"
 #include "../said.hpp"

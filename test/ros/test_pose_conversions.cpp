@@ -2,7 +2,6 @@
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
-#include <string>
 
 #include "../../src/messages/pose_conversions.hpp"
 #include "../said.hpp"

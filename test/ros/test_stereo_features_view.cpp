@@ -1,13 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <cstring>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "message_samples.hpp"
 #include "stereo_descriptor_vo/front_end/feature_detector.hpp"
 #include "stereo_descriptor_vo/messages/stereo_features_view.hpp"

@@ -3,10 +3,7 @@
 #include <unistd.h>
 
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
-#include <sstream>
-#include <string>
 
 #include "../../src/ros/output_files.hpp"
 #include "../said.hpp"

@@ -1,9 +1,6 @@
 #include <gtest/gtest.h>
 #include <ros/serialization.h>
 
-#include <string>
-#include <vector>
-
 #include "message_samples.hpp"
 
 namespace sdvo::ros_conversions::test_vo_info {

@@ -1,9 +1,6 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cstdint>
 #include <map>
-#include <vector>
 
 #include "../../src/tools/feature_halves.hpp"
 #include "../synthetic_features.hpp"

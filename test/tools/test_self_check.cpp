@@ -1,8 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cstdint>
-
 #include "../../src/tools/feature_halves.hpp"
 #include "../../src/tools/self_check.hpp"
 #include "../said.hpp"

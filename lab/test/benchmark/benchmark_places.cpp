@@ -1,11 +1,6 @@
 // Times what the recognition of places costs as the map grows.
 #include <benchmark/benchmark.h>
 
-#include <algorithm>
-#include <cmath>
-#include <random>
-#include <vector>
-
 #include "../../../test/synthetic_scene.hpp"
 #include "stereo_descriptor_vo/places/place_index.hpp"
 #include "stereo_descriptor_vo/places/place_verifier.hpp"

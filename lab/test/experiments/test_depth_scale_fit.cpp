@@ -1,10 +1,5 @@
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <filesystem>
-#include <functional>
-#include <random>
-
 #include "../../../test/synthetic_scene.hpp"
 #include "../../../test/temporary_folder.hpp"
 #include "../../experiments/depth_scale_fit.hpp"

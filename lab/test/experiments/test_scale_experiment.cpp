@@ -3,8 +3,6 @@
 #include <fstream>
 #include <map>
 #include <sstream>
-#include <string>
-#include <vector>
 
 #include "../../../test/temporary_folder.hpp"
 #include "../../experiments/scale_experiment.hpp"

@@ -1,9 +1,5 @@
 #pragma once
 
-#include <cstdint>
-#include <string>
-#include <vector>
-
 #include "../../../test/synthetic_scene.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 

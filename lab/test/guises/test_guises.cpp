@@ -3,12 +3,10 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 #include <map>
 #include <memory>
 #include <sstream>
-#include <string>
 #include <tuple>
 #include <vector>
 
