@@ -7,17 +7,16 @@
 
 #include "../common/statistics.hpp"
 #include "../common/text.hpp"
-#include "../messages/stamps.hpp"
 
 namespace sdvo {
 namespace {
 
-constexpr double kMemory = 10.0;     // s
-constexpr std::size_t kMost = 2000;  // arrivals on each topic
-constexpr double kLately = 5.0;      // s, of losses and rates
-constexpr double kPatience = 1.0;    // s beyond the longest wait of a pair so far
-constexpr double kLate = 0.1;        // s between messages of one stamp (chosen): a queue is too short, perhaps
-constexpr double kHalf = 0.45;       // of a period: less, for rounding
+constexpr double kMost = 200.0;    // arrivals a second on each topic (chosen): more are no camera's
+constexpr double kLately = 5.0;    // s, of losses and rates
+constexpr double kPatience = 1.0;  // s beyond the longest wait of a pair so far
+constexpr double kLate = 0.1;      // s between messages of one stamp (chosen): a queue is too short, perhaps
+constexpr double kHalf = 0.45;     // of a period: less, for rounding
+constexpr double kFewLost = 0.02;  // ratio of pairs (chosen): drivers lose one now and then
 
 double secondsBetween(std::int64_t a, std::int64_t b) {
   return 1e-9 * static_cast<double>(b - a);
@@ -32,35 +31,38 @@ void ArrivalLog::begin(const Topics& topics, double now) {
   first_stamp_ = 0;
   longest_wait_ = 0.0;
   has_pairs_ = has_ended_ = false;
+  pairs_.noteTopics(topics[kLeftImage] + " and " + topics[kRightImage]);
+  pairs_.noteIdle("");
 }
 
-void ArrivalLog::note(Input input, const ros::Time& stamp, double now) {
+void ArrivalLog::note(Input input, std::int64_t stamp, double now) {
   const std::lock_guard<std::mutex> lock(mutex_);
   std::deque<Arrival>& arrivals = topics_[input].arrivals;
-  arrivals.push_back({nanoseconds(stamp), now});
+  arrivals.push_back({stamp, now});
   has_ended_ = false;
-  if (stamp.isZero()) arrivals.back().fate = Fate::kLost;
+  if (stamp == 0) arrivals.back().fate = Fate::kLost;
   if (first_stamp_ == 0) {
     complete_ = now;
     const auto is_silent = [](const Topic& topic) { return topic.arrivals.empty(); };
     if (std::none_of(topics_.begin(), topics_.end(), is_silent))
       for (const Topic& topic : topics_) first_stamp_ = std::max(first_stamp_, topic.arrivals.front().stamp);
   }
-  while (arrivals.size() > kMost || arrivals.front().now < now - kMemory) {
+  while (static_cast<double>(arrivals.size()) > kMost * memory_ || arrivals.front().now < now - memory_) {
     if (arrivals.front().fate == Fate::kWaits) giveUp(input, arrivals.front());
     arrivals.pop_front();
   }
 }
 
-void ArrivalLog::notePair(const ros::Time& left, const ros::Time& right, double now) {
+void ArrivalLog::notePair(std::int64_t left, std::int64_t right, double now) {
+  pairs_.note(left);
   const std::lock_guard<std::mutex> lock(mutex_);
   has_pairs_ = true;
+  largest_gap_ = std::max(largest_gap_, std::abs(secondsBetween(left, right)));
   for (const auto& [input, stamp] : {std::pair(kLeftImage, left), std::pair(kRightImage, right)}) {
     std::deque<Arrival>& arrivals = topics_[input].arrivals;
-    const auto used =
-        std::find_if(arrivals.rbegin(), arrivals.rend(), [ns = nanoseconds(stamp)](const Arrival& arrival) {
-          return arrival.stamp == ns && arrival.fate != Fate::kPaired;
-        });
+    const auto used = std::find_if(arrivals.rbegin(), arrivals.rend(), [stamp = stamp](const Arrival& arrival) {
+      return arrival.stamp == stamp && arrival.fate != Fate::kPaired;
+    });
     if (used == arrivals.rend()) continue;
     if (std::exchange(used->is_counted, false)) unused_.takeBack(UnusedInput::kUnpaired);
     used->fate = Fate::kPaired;
@@ -169,6 +171,79 @@ std::array<std::pair<std::string, double>, ArrivalLog::kInputs> ArrivalLog::rate
   return rates;
 }
 
+double ArrivalLog::takeLargestGap() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return std::exchange(largest_gap_, 0.0);
+}
+
+/// Between successive pairs, s.
+std::vector<double> ArrivalLog::pairPeriods() const {
+  std::vector<double> periods;
+  const Arrival* before = nullptr;
+  for (const Arrival& left : topics_[kLeftImage].arrivals) {
+    if (left.fate != Fate::kPaired) continue;
+    if (before) periods.push_back(secondsBetween(before->stamp, left.stamp));
+    before = &left;
+  }
+  return periods;
+}
+
+double ArrivalLog::pairRate() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const double period = quantile(pairPeriods(), 0.5);
+  return period > 0.0 ? 1.0 / period : 0.0;
+}
+
+Finding ArrivalLog::checkTopics() {
+  const double rate = pairRate();
+  double newest = 0.0;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    for (const Topic& topic : topics_) {
+      if (topic.arrivals.empty())
+        return {Verdict::kFail, "nothing came on " + topic.name,
+                "start the driver with both sides, or give the names that it has (--camera, --left, --right, --image)"};
+      newest = std::max(newest, topic.arrivals.back().now);
+    }
+    if (has_pairs_) {
+      const std::size_t periods = pairPeriods().size();
+      if (periods == 0) return {Verdict::kOpen, "one pair alone", "take more of them"};
+      return judged(false, rate < options_.rates.min_rate || rate > options_.rates.max_rate,
+                    text(1, periods + 1, " pairs, ", rate, " Hz"), "5 to 60 Hz suit, 15 Hz or more for fast turns");
+    }
+  }
+  return {Verdict::kFail, explainSilence(newest), "see docs/troubleshooting.md, synchronisation"};
+}
+
+Finding ArrivalLog::checkStamps() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::vector<double> periods = pairPeriods();
+  if (periods.empty()) return {Verdict::kOpen, "no pairs"};
+  const std::deque<Arrival>&lefts = topics_[kLeftImage].arrivals, &rights = topics_[kRightImage].arrivals;
+  const double all = static_cast<double>(std::max(lefts.size(), rights.size()));
+  const double alone = 1.0 - static_cast<double>(periods.size() + 1) / all;
+  const double usual = quantile(periods, 0.5), longest = *std::max_element(periods.begin(), periods.end());
+  std::vector<double> delays;
+  for (const Arrival& left : lefts) delays.push_back(left.now - 1e-9 * static_cast<double>(left.stamp));
+  const double delay = quantile(delays, 0.5);
+  const std::string what = text(1, "longest gap ", 1e3 * longest, " ms, ", 100.0 * alone, " % without partner");
+
+  if (*std::min_element(periods.begin(), periods.end()) <= 0.0)
+    return {Verdict::kWarn, "stamps fall; " + what, "one recording at a time, and a driver that does not restart"};
+  if (std::abs(delay) > 1.0)
+    return {Verdict::kWarn,
+            text(0, "stamps are ", std::abs(delay), " s ", delay > 0.0 ? "behind" : "ahead of",
+                 " the clock of arrivals: another clock"),
+            "let the driver stamp with the system's clock: TF and filters compare stamps of several sources"};
+  if (alone > kFewLost)
+    return {Verdict::kWarn, what,
+            "some images have no partner of the same stamp: trigger both cameras together, "
+            "or look for losses on the way (network, USB)"};
+  const auto gaps = std::count_if(periods.begin(), periods.end(), [&](double period) { return period > 1.5 * usual; });
+  return judged(false, static_cast<double>(gaps) > kFewLost * static_cast<double>(periods.size()), what,
+                "pairs are missing: look for losses on the way (USB, network, processor)");
+}
+
 ArrivalLog::Gaps ArrivalLog::gapsBetween(Input from, Input to, double begin) const {
   const double half = kHalf * period();
   Gaps gaps;
@@ -179,11 +254,11 @@ ArrivalLog::Gaps ArrivalLog::gapsBetween(Input from, Input to, double begin) con
       if (there.stamp == 0) continue;
       const double here_to_there = std::abs(secondsBetween(here.stamp, there.stamp));
       gap = std::min(gap, here_to_there);
-      if (here_to_there <= largestGap()) gaps.delay = std::max(gaps.delay, std::abs(there.now - here.now));
+      if (here_to_there <= allowedGap()) gaps.delay = std::max(gaps.delay, std::abs(there.now - here.now));
     }
     ++gaps.all;
     gaps.missing += gap >= half;
-    if (gap <= largestGap() || gap >= half) continue;
+    if (gap <= allowedGap() || gap >= half) continue;
     ++gaps.apart;
     gaps.least = std::min(gaps.least, gap);
     gaps.most = std::max(gaps.most, gap);
@@ -198,7 +273,7 @@ std::string ArrivalLog::advise(double begin) const {
   if (2 * right.apart > right.all)
     return text(1, "; the nearest stamps of left and right are ", 1e3 * right.least, " to ", 1e3 * right.most,
                 " ms apart, more than ", options_.approximate_sync ? "max_interval (" : "sync_tolerance (",
-                1e3 * largestGap(), " ms)",
+                1e3 * allowedGap(), " ms)",
                 options_.approximate_sync
                     ? ""
                     : ": set a larger sync_tolerance if one trigger takes both, else approximate_sync");

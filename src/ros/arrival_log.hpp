@@ -1,7 +1,5 @@
 #pragma once
 
-#include <ros/time.h>
-
 #include <array>
 #include <cstdint>
 #include <deque>
@@ -9,26 +7,35 @@
 #include <mutex>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "../config/interface_options.hpp"
 #include "diagnostic_tasks.hpp"
 
 namespace sdvo {
 
-/// Arrivals on the four inputs of stereo processing: counts images that make no pair, and gives the cause. Times in s
-/// of any steady clock. For any thread.
+/// Arrivals on the four inputs of a stereo camera, and the pairs made of them: rates, lateness, order, gaps, and images
+/// that make no pair, with the cause. /diagnostics, the log, check_camera and pages print its findings. Stamps in ns,
+/// 0: none. Times in s of any steady clock. For any thread.
 class ArrivalLog {
  public:
   enum Input { kLeftImage, kRightImage, kLeftInfo, kRightInfo };
   static constexpr int kInputs = 4;
   using Topics = std::array<std::string, kInputs>;
 
-  ArrivalLog(const StereoInputOptions& options, UnusedInput& unused) : options_(options), unused_(unused) {}
+  static constexpr double kMemory = 10.0;  // s
+
+  /// Arrivals are forgotten after `memory` (s), those of a recording that is checked as a whole never.
+  ArrivalLog(const StereoInputOptions& options, UnusedInput& unused, double memory = kMemory)
+      : options_(options), unused_(unused), memory_(memory), pairs_("pairs", "", options.max_silence, options.rates) {}
 
   /// A new subscription; `topics` in the order of Input.
   void begin(const Topics& topics, double now);
-  void note(Input input, const ros::Time& stamp, double now);
-  void notePair(const ros::Time& left, const ros::Time& right, double now);
+  void note(Input input, std::int64_t stamp, double now);
+  void notePair(std::int64_t left, std::int64_t right, double now);
+
+  /// Rate and silence of the pairs.
+  InputMonitor& pairs() { return pairs_; }
 
   /// If more than `max_unused` of the last pairs are incomplete: how many, which messages are missing, how far stamps
   /// are apart, and a remedy. Empty otherwise.
@@ -39,13 +46,23 @@ class ArrivalLog {
 
   /// Hz, of each topic in the last seconds, with its name.
   std::array<std::pair<std::string, double>, kInputs> rates(double now) const;
+  /// Largest difference between the stamps of a pair since the last call, s.
+  double takeLargestGap();
+
+  // Of all arrivals in memory.
+
+  /// Whether all topics have messages, and pairs come at the rate that is expected.
+  Finding checkTopics();
+  /// Whether stamps are of the clock of arrivals, increase, have no gaps, and have partners.
+  Finding checkStamps() const;
+  double pairRate() const;  ///< by the stamps, Hz; zero when it is not known
 
  private:
   /// A message waits for its partners until its pair is complete, or until it is too old for one.
   enum class Fate { kWaits, kPaired, kLost };
   struct Arrival {
-    std::int64_t stamp;  ///< ns; 0: none
-    double now;          ///< s
+    std::int64_t stamp;
+    double now;
     Fate fate = Fate::kWaits;
     bool is_counted = false;  ///< as UnusedInput::kUnpaired
   };
@@ -66,8 +83,9 @@ class ArrivalLog {
   };
 
   /// Of stamps in a pair, s.
-  double largestGap() const { return options_.approximate_sync ? options_.max_interval : options_.sync_tolerance; }
+  double allowedGap() const { return options_.approximate_sync ? options_.max_interval : options_.sync_tolerance; }
   double period() const;
+  std::vector<double> pairPeriods() const;
   bool isEarly(const Arrival& arrival) const;
   bool isAPairOfItsOwn(Input input, const Arrival& arrival) const;
   void giveUp(Input input, Arrival& arrival);
@@ -79,12 +97,15 @@ class ArrivalLog {
 
   const StereoInputOptions options_;
   UnusedInput& unused_;
+  const double memory_;
+  InputMonitor pairs_;
   mutable std::mutex mutex_;
   std::array<Topic, kInputs> topics_;
   double begin_ = 0.0;            ///< of the subscription
   std::int64_t first_stamp_ = 0;  ///< from which on all topics have messages, ns; 0: some have none
   double complete_ = 0.0;         ///< arrival of the first message of the last topic
   double longest_wait_ = 0.0;     ///< of a message for its pair
+  double largest_gap_ = 0.0;      ///< s, between the stamps of a pair since the last takeLargestGap()
   bool has_pairs_ = false, has_ended_ = false;
 };
 

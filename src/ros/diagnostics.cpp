@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "../check/row_check.hpp"
-#include "../check/stamp_check.hpp"
 #include "../common/text.hpp"
 #include "../messages/stamps.hpp"
 
@@ -23,26 +22,36 @@ RateOptions expectedRates(const ros::NodeHandle& nh, RateOptions rates) {
 
 }  // namespace
 
+Finding checkLatency(double latency, double most) {
+  constexpr double kEpoch = 1e7;  // s, a third of a year
+  constexpr double kAhead = 0.1;  // s, a step of the slowest simulated clocks (chosen)
+  const std::string what = text(3, latency, " s from image to pose");
+  if (std::isnan(latency))
+    return {Verdict::kWarn, what, "use_sim_time is true, and nobody publishes /clock: rosbag play needs --clock"};
+  if (latency > kEpoch)
+    return {Verdict::kWarn, what,
+            "the images have another clock than this machine: since its boot, or of a recording that is played "
+            "without use_sim_time and --clock?"};
+  if (latency > most)
+    return {Verdict::kWarn, what, "is the machine too slow, or are the clocks of two machines different?"};
+  return judged(false, latency < -kAhead, what,
+                "the images are stamped in the future, where TF knows nothing yet: is the camera's clock that of this "
+                "machine?");
+}
+
 ImageDiagnostics::ImageDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const std::string& name,
                                    const StereoInputOptions& options, ArrivalLog& arrivals, UnusedInput& unused)
     : thresholds_(options.thresholds),
       arrivals_(arrivals),
       unused_(unused),
-      input_("pairs", nh.resolveName("left/image_rect") + " and " + nh.resolveName("right/image_rect"),
-             options.max_silence, options.rates),
       load_(options.thresholds.max_load),
       updater_(nh, private_nh, name) {
-  updater_.add("input rate", &input_, &InputMonitor::judge);
+  arrivals_.pairs().noteTopics(nh.resolveName("left/image_rect") + " and " + nh.resolveName("right/image_rect"));
+  updater_.add("input rate", &arrivals_.pairs(), &InputMonitor::judge);
   updater_.add("synchronisation", this, &ImageDiagnostics::judgeSynchronisation);
   updater_.add("exposure", this, &ImageDiagnostics::judgeExposure);
   updater_.add("features", this, &ImageDiagnostics::judgeFeatures);
   updater_.add("load", &load_, &WorkLoad::judge);
-}
-
-void ImageDiagnostics::notePair(std::int64_t stamp, double gap) {
-  input_.note(stamp);
-  const std::lock_guard<std::mutex> lock(mutex_);
-  largest_gap_ = std::max(largest_gap_, gap);
 }
 
 void ImageDiagnostics::note(const StereoFeatures& features) {
@@ -63,9 +72,8 @@ void ImageDiagnostics::noteFailure(const std::string& why) {
 Findings ImageDiagnostics::judgeSynchronisation(Status& values) {
   const double now = ros::SteadyTime::now().toSec();
   const std::string loss = arrivals_.explainLoss(now);
-  const auto silence = input_.silence();
-  const std::lock_guard<std::mutex> lock(mutex_);
-  const double gap = std::exchange(largest_gap_, 0.0);
+  const auto silence = arrivals_.pairs().silence();
+  const double gap = arrivals_.takeLargestGap();
   values.addf("largest gap [ms]", "%.2f", 1e3 * gap);
   for (const auto& [topic, rate] : arrivals_.rates(now)) values.addf("rate of " + topic + " [Hz]", "%.2f", rate);
   Finding finding{Verdict::kOk, silence ? kNoPairs : "left and right belong together"};
@@ -79,7 +87,7 @@ Findings ImageDiagnostics::judgeSynchronisation(Status& values) {
 
 Findings ImageDiagnostics::judgeExposure(Status& values) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (input_.silence()) return {{Verdict::kOk, kNoPairs}};
+  if (arrivals_.pairs().silence()) return {{Verdict::kOk, kNoPairs}};
   if (!last_ || (pairs_ == 0 && !failure_.empty())) return {{Verdict::kOk, "no pair was used"}};
   const double left = last_->mean_intensity[0], right = last_->mean_intensity[1];
   values.addf("mean grey level", "%.1f left, %.1f right", left, right);
@@ -93,7 +101,7 @@ Findings ImageDiagnostics::judgeFeatures(Status& values) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const std::string failure = std::exchange(failure_, "");
   const int pairs = std::exchange(pairs_, 0), refused = std::exchange(refused_pairs_, 0);
-  if (input_.silence()) return {{Verdict::kOk, kNoPairs}};
+  if (arrivals_.pairs().silence()) return {{Verdict::kOk, kNoPairs}};
   values.add("corners", last_ ? last_->detected : 0);
   values.add("features", last_count_);
   values.add("refused pairs, of the last second", text(0, refused, " of ", pairs));

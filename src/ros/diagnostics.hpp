@@ -16,16 +16,16 @@
 
 namespace sdvo {
 
+/// `latency` of poses, s; negative for stamps in the future. `most`: the largest one that is no fault.
+Finding checkLatency(double latency, double most);
+
 /// /diagnostics of the image side. Tasks: rate, synchronisation, exposure, features, load.
 class ImageDiagnostics {
  public:
   ImageDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& private_nh, const std::string& name,
                    const StereoInputOptions& options, ArrivalLog& arrivals, UnusedInput& unused);
 
-  InputMonitor& input() { return input_; }
   WorkLoad& load() { return load_; }
-  /// For each complete pair: the left stamp (ns) and the distance of the right one (s).
-  void notePair(std::int64_t stamp, double gap);
   /// For each processed pair; for each that could not be processed, with the reason.
   void note(const StereoFeatures& features);
   void noteFailure(const std::string& why);
@@ -40,11 +40,9 @@ class ImageDiagnostics {
   const ImageThresholds thresholds_;
   ArrivalLog& arrivals_;
   UnusedInput& unused_;
-  InputMonitor input_;
   WorkLoad load_;
 
   std::mutex mutex_;
-  double largest_gap_ = 0.0;  ///< s, since the last call of the task
   std::optional<ExtractionReport> last_;
   int last_count_ = 0;  ///< of features
   ExposureTurns exposures_;

@@ -1,6 +1,5 @@
 #include <atomic>
 #include <boost/make_shared.hpp>
-#include <cmath>
 #include <memory>
 #include <opencv2/core/utility.hpp>
 #include <optional>
@@ -79,7 +78,7 @@ class StereoFeaturesNodelet : public RobotNodelet {
         static_cast<std::size_t>(options_.queue_size), [this](const PairFilter::Passed& passed) { process(passed); });
     if (options_.opencv_threads >= 0) cv::setNumThreads(options_.opencv_threads);
     diagnostics_ = std::make_unique<ImageDiagnostics>(nh_, private_nh, getName(), options_, *arrivals_, *unused_);
-    diagnostics_->input().noteIdle(kNobodyListens);
+    arrivals_->pairs().noteIdle(kNobodyListens);
     input_timer_ =
         master_nh.createWallTimer(ros::WallDuration(1.0), [this](const ros::WallTimerEvent&) { watchInput(); });
 
@@ -118,14 +117,11 @@ class StereoFeaturesNodelet : public RobotNodelet {
     if (publisher_.getNumSubscribers() == 0) {
       input_.reset();
       mask_subscriber_.shutdown();
-      diagnostics_->input().noteIdle(kNobodyListens);
+      arrivals_->pairs().noteIdle(kNobodyListens);
     } else if (!input_) {
-      const ros::NodeHandle image_nh = finder_->handle(nh_);
-      diagnostics_->input().noteTopics(image_nh.resolveName("left/image_rect") + " and " +
-                                       image_nh.resolveName("right/image_rect"));
-      diagnostics_->input().noteIdle("");
       input_ = std::make_unique<StereoInput>(
-          image_nh, *transport_, options_, *arrivals_, [this](const StereoPairMessages& pair) { onPair(pair); },
+          finder_->handle(nh_), *transport_, options_, *arrivals_,
+          [this](const StereoPairMessages& pair) { onPair(pair); },
           [this](ArrivalLog::Input input, const std::string& topic, const std::string& why) {
             if (input == ArrivalLog::kLeftImage) unused_->add(UnusedInput::kLate);
             onRefusal(topic, why);
@@ -156,7 +152,6 @@ class StereoFeaturesNodelet : public RobotNodelet {
   void onPair(const StereoPairMessages& pair) {
     const ros::Time stamp = pair.left_image->header.stamp;
     has_pairs_ = true;
-    diagnostics_->notePair(nanoseconds(stamp), std::abs(secondsBetween(stamp, pair.right_image->header.stamp)));
     const std::uint64_t late = filter_.dropped();
     for (PairFilter::Passed& passed : filter_.add(pair, nanoseconds(stamp), nanoseconds(ros::Time::now())))
       if (pace_.isDue(nanoseconds(passed.item.left_image->header.stamp)) && !worker_->push(std::move(passed)))

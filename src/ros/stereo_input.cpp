@@ -57,7 +57,7 @@ void StereoInput::take(const boost::shared_ptr<const Message>& message) {
   const std::lock_guard<std::mutex> lock(mutex_);
   try {
     const ros::Time& stamp = message->header.stamp;
-    arrivals_.note(input, stamp, steadyTime());
+    arrivals_.note(input, nanoseconds(stamp), steadyTime());
     const std::string problem = whyUnusable(stamp);
     if (!problem.empty()) return refuse_(input, topics_[input], problem);
     if (approximate_) {
@@ -73,7 +73,7 @@ void StereoInput::take(const boost::shared_ptr<const Message>& message) {
 void StereoInput::onPair(const sensor_msgs::ImageConstPtr& left_image, const sensor_msgs::ImageConstPtr& right_image,
                          const sensor_msgs::CameraInfoConstPtr& left_info,
                          const sensor_msgs::CameraInfoConstPtr& right_info) {
-  arrivals_.notePair(left_image->header.stamp, right_image->header.stamp, steadyTime());
+  arrivals_.notePair(nanoseconds(left_image->header.stamp), nanoseconds(right_image->header.stamp), steadyTime());
   callback_({left_image, right_image, left_info, right_info});
 }
 

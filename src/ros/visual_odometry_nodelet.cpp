@@ -18,7 +18,6 @@
 #include <vector>
 
 #include "../check/axes_check.hpp"
-#include "../check/stamp_check.hpp"
 #include "../common/imu_tracks.hpp"
 #include "../common/stamp_filter.hpp"
 #include "../common/text.hpp"

@@ -11,7 +11,6 @@
 #include "../check/lens_check.hpp"
 #include "../check/odometry_check.hpp"
 #include "../check/row_check.hpp"
-#include "../check/stamp_check.hpp"
 #include "../config/pipeline_options.hpp"
 #include "offline_run.hpp"
 #include "recording.hpp"

@@ -23,15 +23,12 @@ constexpr int kWaiting = 100;
 CameraInput::CameraInput(const StereoTopics& topics, std::optional<StereoInfos> infos, Use use)
     : topics_(topics),
       infos_(std::move(infos)),
-      stamps_(topics),
-      arrivals_(StereoInputOptions(), unused_),
       pairs_(
           kWaiting, StereoInputOptions().sync_tolerance,
           [this, use = std::move(use)](const auto& left, const auto& right, const auto& left_info,
                                        const auto& right_info) {
             const std::int64_t stamp = nanoseconds(left->header.stamp);
-            stamps_.notePair(stamp);
-            arrivals_.notePair(left->header.stamp, right->header.stamp, newest_.toSec());
+            arrivals_.notePair(stamp, nanoseconds(right->header.stamp), newest_.toSec());
             use({{left->image, right->image, left_info->info, right_info->info},
                  stamp,
                  newest_,
@@ -45,8 +42,7 @@ void CameraInput::add(const StereoMessage& message) {
   const ros::Time& stamp = message.header.stamp;
   const auto input = static_cast<ArrivalLog::Input>(message.input);
   newest_ = message.arrival;
-  stamps_.note(input, nanoseconds(stamp), newest_.toSec());
-  arrivals_.note(input, stamp, newest_.toSec());
+  arrivals_.note(input, nanoseconds(stamp), newest_.toSec());
   if (input == ArrivalLog::kLeftImage) frame_ = message.header.frame_id;
   if (const std::string why = whyUnusable(stamp); !why.empty()) {
     ++unusable_;
@@ -99,12 +95,7 @@ std::string CameraInput::baseAbove(std::string frame) const {
 }
 
 ArrivalFindings CameraInput::findings(const std::string& base_frame_given, bool is_recorded) {
-  const RateOptions rates;
-  ArrivalFindings found{stamps_.topics(rates.min_rate, rates.max_rate, arrivals_.explainSilence(newest_.toSec())),
-                        stamps_.stamps(),
-                        {},
-                        stamps_.rate(),
-                        std::nullopt};
+  ArrivalFindings found{arrivals_.checkTopics(), arrivals_.checkStamps(), {}, arrivals_.pairRate(), std::nullopt};
   const std::string camera = ros_conversions::cleanFrameId(frame_.value_or(""));
   const std::string base_frame = base_frame_given.empty() ? baseAbove(camera) : base_frame_given;
   try {

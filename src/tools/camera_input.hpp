@@ -8,12 +8,12 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <set>
 #include <string>
 
-#include "../check/stamp_check.hpp"
 #include "../ros/arrival_log.hpp"
 #include "../ros/stereo_input.hpp"
 #include "../ros/synchronisers.hpp"
@@ -60,9 +60,8 @@ class CameraInput {
 
   const StereoTopics topics_;
   const std::optional<StereoInfos> infos_;
-  StampCheck stamps_;
   UnusedInput unused_{"messages", 1.0};
-  ArrivalLog arrivals_;
+  ArrivalLog arrivals_{StereoInputOptions(), unused_, std::numeric_limits<double>::infinity()};
   ros::Time newest_;  ///< arrival
   int unusable_ = 0, given_up_ = 0;
   std::string problem_ = "no four stamps agree", tf_problem_;

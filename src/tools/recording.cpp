@@ -6,15 +6,16 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <limits>
 #include <optional>
 #include <stdexcept>
 #include <type_traits>
 #include <utility>
 
-#include "../check/stamp_check.hpp"
 #include "../common/stamp_filter.hpp"
 #include "../config/interface_options.hpp"
 #include "../messages/stamps.hpp"
+#include "../ros/arrival_log.hpp"
 #include "camera_input.hpp"
 #include "pair_reader.hpp"
 #include "stereo_descriptor_vo/data/euroc_dataset.hpp"
@@ -59,15 +60,17 @@ class FolderRecording : public Recording {
   }
 
   ArrivalFindings arrivals(const std::string&) const override {
-    StampCheck check({});
+    UnusedInput unused("pairs", 1.0);
+    ArrivalLog log(StereoInputOptions(), unused, std::numeric_limits<double>::infinity());
     for (int i = 0; i < used_; ++i) {
-      const double seconds = 1e-9 * static_cast<double>(sequence_.stamp(i));
-      for (std::size_t input = 0; input < StampCheck::kInputs; ++input) check.note(input, sequence_.stamp(i), seconds);
-      check.notePair(sequence_.stamp(i));
+      const std::int64_t stamp = sequence_.stamp(i);
+      const double seconds = 1e-9 * static_cast<double>(stamp);
+      for (const auto input :
+           {ArrivalLog::kLeftImage, ArrivalLog::kRightImage, ArrivalLog::kLeftInfo, ArrivalLog::kRightInfo})
+        log.note(input, stamp, seconds);
+      log.notePair(stamp, stamp, seconds);
     }
-    const RateOptions rates;
-    const Finding transform{Verdict::kOpen, "a folder has none"};
-    return {check.topics(rates.min_rate, rates.max_rate, ""), check.stamps(), transform, check.rate(), std::nullopt};
+    return {log.checkTopics(), log.checkStamps(), {Verdict::kOpen, "a folder has none"}, log.pairRate(), std::nullopt};
   }
 
  private:

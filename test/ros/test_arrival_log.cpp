@@ -19,7 +19,7 @@ class ArrivalLogTest : public ::testing::Test {
     return options;
   }
 
-  void note(ArrivalLog::Input input, double stamp, double now) { log_.note(input, ros::Time(stamp), now); }
+  void note(ArrivalLog::Input input, double stamp, double now) { log_.note(input, nanoseconds(ros::Time(stamp)), now); }
 
   void noteAll(double stamp, double now) {
     for (const auto input :
@@ -29,7 +29,8 @@ class ArrivalLogTest : public ::testing::Test {
 
   void noteUsed(double stamp, double now) {
     noteAll(stamp, now);
-    log_.notePair(ros::Time(stamp), ros::Time(stamp), now);
+    const std::int64_t ns = nanoseconds(ros::Time(stamp));
+    log_.notePair(ns, ns, now);
   }
 
   std::uint64_t unpaired() const { return unused_.count(UnusedInput::kUnpaired); }
@@ -66,7 +67,7 @@ struct JitterTest : ArrivalLogTest {
       synchroniser{options(false).sync_queue_size, options(false).sync_tolerance,
                    [this](const auto& left, const auto& right, const auto&, const auto&) {
                      ++used;
-                     log_.notePair(left->header.stamp, right->header.stamp, now);
+                     log_.notePair(nanoseconds(left->header.stamp), nanoseconds(right->header.stamp), now);
                    }};
   double now = 0.0;
 
@@ -74,7 +75,7 @@ struct JitterTest : ArrivalLogTest {
   void send(double stamp) {
     const auto message = boost::make_shared<Message>();
     message->header.stamp = ros::Time(stamp);
-    log_.note(input, message->header.stamp, now);
+    note(input, stamp, now);
     synchroniser.add<input>(boost::shared_ptr<const Message>(message));
   }
 
@@ -170,8 +171,8 @@ TEST_F(ArrivalLogTest, TheEndOfARecordingIsSaidOnceAndItsNextStartAnew) {
 
 TEST_F(ArrivalLogTest, ExtremeStampsAreCompared) {
   noteAll(1.0, 10.0);
-  log_.note(ArrivalLog::kLeftImage, ros::Time(0xffffffffu, 999999999u), 10.0);
-  log_.note(ArrivalLog::kRightImage, ros::Time(0, 1), 10.0);
+  log_.note(ArrivalLog::kLeftImage, nanoseconds(ros::Time(0xffffffffu, 999999999u)), 10.0);
+  log_.note(ArrivalLog::kRightImage, 1, 10.0);
   EXPECT_TRUE(contains(log_.explainSilence(11.0), "no synchronised stereo pair"));
 }
 
@@ -199,6 +200,88 @@ TEST_F(ApproximateArrivalLogTest, DoesNotAdviseWhatIsSetAlready) {
   const std::string text = log_.explainSilence(10.0);
   EXPECT_TRUE(contains(text, "40.0 to 40.0 ms apart, more than max_interval (25.0 ms)")) << text;
   EXPECT_FALSE(contains(text, "approximate_sync")) << text;
+}
+
+/// Of a whole recording.
+class RecordedArrivals : public ::testing::Test {
+ protected:
+  static constexpr double kBegin = 1.7e9, kPeriod = 0.05;  // s
+
+  RecordedArrivals() { log_.begin({"/left", "/right", "/left_info", "/right_info"}, 0.0); }
+
+  void note(int input, double stamp, double now) {
+    log_.note(static_cast<ArrivalLog::Input>(input), nanoseconds(ros::Time(stamp)), now);
+  }
+
+  /// `count` pairs, which arrive 20 ms after their time, with stamps of another clock.
+  void notePairs(int count, double clock = 0.0, int every = 0, double begin = kBegin) {
+    for (int i = 0; i < count; ++i) {
+      if (every > 0 && i % every == 0) continue;
+      const double time = begin + i * kPeriod, now = time + 0.02;
+      for (int input = 0; input < ArrivalLog::kInputs; ++input) note(input, time + clock, now);
+      const std::int64_t stamp = nanoseconds(ros::Time(time + clock));
+      log_.notePair(stamp, stamp, now);
+    }
+  }
+
+  static void expectFinding(const Finding& finding, Verdict verdict, const std::string& words) {
+    EXPECT_EQ(finding.verdict, verdict) << finding.text();
+    EXPECT_TRUE(contains(finding.text(), words)) << finding.text();
+  }
+
+  UnusedInput unused_{"pairs", 1.0};
+  StereoInputOptions options_;
+  ArrivalLog log_{options_, unused_, std::numeric_limits<double>::infinity()};
+};
+
+TEST_F(RecordedArrivals, SteadyPairsAreInOrderHoweverLongTheRecording) {
+  notePairs(4000);
+  EXPECT_NEAR(log_.pairRate(), 20.0, 1e-3);
+  expectFinding(log_.checkTopics(), Verdict::kOk, "4000 pairs, 20.0 Hz");
+  expectFinding(log_.checkStamps(), Verdict::kOk, "longest gap 50.0 ms, 0.0 % without partner");
+}
+
+TEST_F(RecordedArrivals, TheTopicOnWhichNothingComesIsNamed) {
+  for (const int input : {0, 1, 2}) note(input, kBegin, kBegin);
+  expectFinding(log_.checkTopics(), Verdict::kFail, "/right_info");
+}
+
+TEST_F(RecordedArrivals, TheCauseOfNoPairIsNamed) {
+  for (const int input : {0, 1, 2, 3}) note(input, kBegin + input, kBegin);
+  expectFinding(log_.checkTopics(), Verdict::kFail, "no synchronised stereo pair; received: /left 1");
+}
+
+TEST_F(RecordedArrivals, ARateBeyondWhatSuits) {
+  for (int i = 0; i < 4; ++i) notePairs(1, 0.0, 0, kBegin + i);
+  expectFinding(log_.checkTopics(), Verdict::kWarn, "4 pairs, 1.0 Hz");
+}
+
+TEST_F(RecordedArrivals, AnotherClock) {
+  notePairs(40, -1.6e9);
+  expectFinding(log_.checkStamps(), Verdict::kWarn, "another clock");
+}
+
+TEST_F(RecordedArrivals, MissingPairs) {
+  notePairs(60, 0.0, 10);
+  expectFinding(log_.checkStamps(), Verdict::kWarn, "missing");
+}
+
+TEST_F(RecordedArrivals, ImagesWithoutPartner) {
+  notePairs(40);
+  for (int i = 1; i < 5; ++i) note(0, kBegin + 0.001 * i, kBegin + 2.0);
+  expectFinding(log_.checkStamps(), Verdict::kWarn, "no partner of the same stamp");
+}
+
+TEST_F(RecordedArrivals, StampsThatFall) {
+  notePairs(40);
+  notePairs(1);
+  expectFinding(log_.checkStamps(), Verdict::kWarn, "fall");
+}
+
+TEST_F(RecordedArrivals, OnePairIsTooFew) {
+  notePairs(1);
+  expectFinding(log_.checkTopics(), Verdict::kOpen, "one pair alone");
+  expectFinding(log_.checkStamps(), Verdict::kOpen, "no pairs");
 }
 
 }  // namespace sdvo::test_arrival_log
