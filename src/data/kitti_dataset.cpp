@@ -2,15 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 #include <system_error>
+#include <utility>
 
+#include "../common/text.hpp"
 #include "text_file.hpp"
 
 namespace fs = std::filesystem;
@@ -20,10 +22,6 @@ namespace {
 
 std::string frameName(int i) {
   return kittiFrameName(i) + ".png";
-}
-
-std::string sizeText(const cv::Mat& image) {
-  return std::to_string(image.cols) + "x" + std::to_string(image.rows);
 }
 
 /// Walks the chunks of a PNG; false when the file ends before its IEND chunk does.
@@ -54,20 +52,16 @@ std::vector<std::string> listPngs(const std::string& directory) {
 
 /// Number of frames; throws when the files are not 000000.png, 000001.png … on both sides.
 int countFrames(const std::string& left_directory, const std::string& right_directory) {
-  const std::vector<std::string> left = listPngs(left_directory);
-  const std::vector<std::string> right = listPngs(right_directory);
+  const std::vector<std::string> left = listPngs(left_directory), right = listPngs(right_directory);
   if (left.empty()) throw std::runtime_error("directory '" + left_directory + "' has no PNG images");
-  const auto requireNumbered = [&](const std::vector<std::string>& names, const std::string& directory) {
+  for (const auto& [names, directory] : {std::pair(left, left_directory), std::pair(right, right_directory)})
     for (std::size_t i = 0; i < std::max(left.size(), right.size()); ++i) {
       const std::string expected = frameName(static_cast<int>(i));
-      if (i < names.size() && names[i] == expected) continue;
-      throw std::runtime_error("image '" + directory + "/" + expected + "' is missing ('" + left_directory + "' has " +
-                               std::to_string(left.size()) + " images, '" + right_directory + "' has " +
-                               std::to_string(right.size()) + "; frames are numbered from 000000.png)");
+      if (i >= names.size() || names[i] != expected)
+        throw std::runtime_error(text(0, "image '", directory, "/", expected, "' is missing ('", left_directory,
+                                      "' has ", left.size(), " images, '", right_directory, "' has ", right.size(),
+                                      "; frames are numbered from 000000.png)"));
     }
-  };
-  requireNumbered(left, left_directory);
-  requireNumbered(right, right_directory);
   return static_cast<int>(left.size());
 }
 
@@ -82,8 +76,7 @@ Projection readProjection(const std::string& path, const std::string& name) {
     projection.emplace();
     for (std::size_t i = 1; i < words.size(); ++i) projection->push_back(parseNumber(words[i]));
     if (projection->size() != 12)
-      throw std::invalid_argument("expected 12 numbers after '" + name + ":', found " +
-                                  std::to_string(projection->size()));
+      throw std::invalid_argument(text(0, "expected 12 numbers after '", name, ":', found ", projection->size()));
   });
   if (!projection) throw std::runtime_error("file '" + path + "' has no line '" + name + ":'");
   return *projection;
@@ -94,16 +87,12 @@ int firstCamera(KittiCameras cameras) {
   return cameras == KittiCameras::kColour ? 2 : 0;
 }
 
-std::string projectionText(const std::string& name, const Projection& p) {
-  return name + " has fx = " + std::to_string(p[0]) + ", Tx = " + std::to_string(p[3]);
-}
-
 std::vector<std::int64_t> readStamps(const std::string& path, int count) {
   std::vector<std::int64_t> stamps;
   readLines(path, true, [&](const std::string& line) {
     if (static_cast<int>(stamps.size()) == count)
-      throw std::runtime_error("file '" + path + "' has more times than the " + std::to_string(count) +
-                               " images: are images missing? An extract needs the times of its own images alone");
+      throw std::runtime_error(text(0, "file '", path, "' has more times than the ", count,
+                                    " images: are images missing? An extract needs the times of its own images alone"));
     const std::vector<std::string> words = splitWords(line);
     if (words.size() != 1) throw std::invalid_argument("expected one time in seconds");
     const std::int64_t stamp = parseSeconds(words.front());
@@ -112,26 +101,21 @@ std::vector<std::int64_t> readStamps(const std::string& path, int count) {
     stamps.push_back(stamp);
   });
   if (static_cast<int>(stamps.size()) < count)
-    throw std::runtime_error("file '" + path + "' has " + std::to_string(stamps.size()) + " times for " +
-                             std::to_string(count) + " images");
+    throw std::runtime_error(text(0, "file '", path, "' has ", stamps.size(), " times for ", count, " images"));
   return stamps;
 }
 
 /// P0 and P1: equal pinhole cameras, the right one's offset is -fx * baseline.
 std::string calibrationText(const StereoCamera& camera) {
-  std::string text;
+  std::ostringstream lines = numberStream();
   for (int side = 0; side < 2; ++side) {
     const double offset = side == 0 ? 0.0 : -camera.fx * camera.baseline;
-    text += "P" + std::to_string(side) + ":";
-    for (const double element :
-         {camera.fx, 0.0, camera.cx, offset, 0.0, camera.fy, camera.cy, 0.0, 0.0, 0.0, 1.0, 0.0}) {
-      char number[32];
-      std::snprintf(number, sizeof number, " %.12e", element);
-      text += number;
-    }
-    text += "\n";
+    lines << "P" << side << ":";
+    for (const double element : {camera.fx, 0.0, camera.cx, offset, 0.0, camera.fy, camera.cy, 0.0, 0.0, 0.0, 1.0, 0.0})
+      lines << " " << element;
+    lines << "\n";
   }
-  return text;
+  return lines.str();
 }
 
 }  // namespace
@@ -141,24 +125,21 @@ StereoCamera readKittiCalibration(const std::string& path, KittiCameras cameras)
   const std::string left_name = "P" + std::to_string(first), right_name = "P" + std::to_string(first + 1);
   const Projection left = readProjection(path, left_name);
   const Projection right = readProjection(path, right_name);
-  if (!(left[0] > 0.0 && left[5] > 0.0)) {
+  if (!(left[0] > 0.0 && left[5] > 0.0))
     throw std::runtime_error("file '" + path + "': the focal lengths of " + left_name + " must be positive");
-  }
   for (const int i : {0, 1, 2, 4, 5, 6, 8, 9, 10}) {
     const bool must_vanish = i == 1 || i == 4 || i == 8 || i == 9;
-    if (std::abs(left[i] - right[i]) > 1e-6 * left[0] || (must_vanish && left[i] != 0.0)) {
+    if (std::abs(left[i] - right[i]) > 1e-6 * left[0] || (must_vanish && left[i] != 0.0))
       throw std::runtime_error("file '" + path + "': " + left_name + " and " + right_name +
                                " do not belong to a rectified pair (equal pinhole cameras side by side)");
-    }
   }
   // The baseline is a difference: the offset of a colour pair's left camera is not zero.
   const StereoCamera camera{left[0], left[5], left[2], left[6], (left[3] - right[3]) / left[0], 0, 0};
-  if (!(camera.baseline > 0.0)) {
-    throw std::runtime_error("file '" + path + "': the baseline (difference of Tx / fx) is " +
-                             std::to_string(camera.baseline) + " m but must be positive; " +
-                             projectionText(left_name, left) + "; " + projectionText(right_name, right) +
-                             " (are left and right swapped?)");
-  }
+  if (!(camera.baseline > 0.0))
+    throw std::runtime_error(text(6, "file '", path, "': the baseline (difference of Tx / fx) is ", camera.baseline,
+                                  " m but must be positive; ", left_name, " has fx = ", left[0], ", Tx = ", left[3],
+                                  "; ", right_name, " has fx = ", right[0], ", Tx = ", right[3],
+                                  " (are left and right swapped?)"));
   return camera;
 }
 
@@ -214,15 +195,12 @@ KittiSequence::KittiSequence(const std::string& directory, KittiCameras cameras)
 
 ImagePair KittiSequence::load(int i) const {
   ImagePair pair{readGreyPng(imagePath(0, i)), readGreyPng(imagePath(1, i))};
-  if (pair.left.size() != pair.right.size()) {
-    throw std::runtime_error("images '" + imagePath(0, i) + "' (" + sizeText(pair.left) + ") and '" + imagePath(1, i) +
-                             "' (" + sizeText(pair.right) + ") differ in size");
-  }
-  if (pair.left.cols != camera_.width || pair.left.rows != camera_.height) {
-    throw std::runtime_error("image '" + imagePath(0, i) + "' is " + sizeText(pair.left) + " but the first one of '" +
-                             directory_ + "' is " + std::to_string(camera_.width) + "x" +
-                             std::to_string(camera_.height));
-  }
+  if (pair.left.size() != pair.right.size())
+    throw std::runtime_error(text(0, "images '", imagePath(0, i), "' (", pair.left.cols, "x", pair.left.rows, ") and '",
+                                  imagePath(1, i), "' (", pair.right.cols, "x", pair.right.rows, ") differ in size"));
+  if (pair.left.cols != camera_.width || pair.left.rows != camera_.height)
+    throw std::runtime_error(text(0, "image '", imagePath(0, i), "' is ", pair.left.cols, "x", pair.left.rows,
+                                  " but the first one of '", directory_, "' is ", camera_.width, "x", camera_.height));
   return pair;
 }
 

@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iomanip>
 #include <locale>
 #include <sstream>
 #include <stdexcept>
@@ -79,9 +80,17 @@ Number parseNumber(const std::string& word) {
   return value;
 }
 
+/// A stream of numbers with twelve decimals, which every locale reads as they were written.
+inline std::ostringstream numberStream() {
+  std::ostringstream stream;
+  stream.imbue(std::locale::classic());
+  stream << std::scientific << std::setprecision(12);
+  return stream;
+}
+
 /// Calls `read(line)` for each line that is neither blank nor a comment (#). A std::invalid_argument of `read` becomes
-/// a std::runtime_error that names file and line. If `lines_count` (line i is frame i), so does a blank line between
-/// others.
+/// a std::runtime_error that names file and line. If `lines_count`, line i belongs to frame i, and a blank line among
+/// the others is such an error.
 template <class Read>
 void readLines(const std::string& path, bool lines_count, const Read& read) {
   std::ifstream file = openTextFile(path);

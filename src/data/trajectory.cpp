@@ -3,16 +3,14 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <fstream>
-#include <iomanip>
 #include <iterator>
 #include <limits>
-#include <locale>
 #include <optional>
 #include <sstream>
 #include <stdexcept>
 
 #include "../common/statistics.hpp"
+#include "../common/text.hpp"
 #include "text_file.hpp"
 
 namespace sdvo {
@@ -47,11 +45,10 @@ Eigen::Isometry3d motionError(const Trajectory& ground_truth, const Trajectory& 
 /// The ground truth of the frames that the estimate covers.
 Trajectory covered(const Trajectory& ground_truth, const Trajectory& estimate) {
   if (estimate.empty()) throw std::invalid_argument("the estimated trajectory has no poses");
-  if (estimate.size() > ground_truth.size()) {
-    throw std::invalid_argument("the estimated trajectory has " + std::to_string(estimate.size()) +
-                                " poses, more than the " + std::to_string(ground_truth.size()) +
-                                " of the ground truth: do they belong to the same sequence?");
-  }
+  if (estimate.size() > ground_truth.size())
+    throw std::invalid_argument(text(0, "the estimated trajectory has ", estimate.size(), " poses, more than the ",
+                                     ground_truth.size(),
+                                     " of the ground truth: do they belong to the same sequence?"));
   return {ground_truth.begin(), ground_truth.begin() + static_cast<std::ptrdiff_t>(estimate.size())};
 }
 
@@ -75,19 +72,11 @@ double scaleOfSteps(const Trajectory& ground_truth, const Trajectory& estimate) 
   return ratios.empty() ? kNaN : median(ratios);
 }
 
-/// Numbers as they are read anywhere, whatever the process' locale.
-std::ostringstream poseText() {
-  std::ostringstream text;
-  text.imbue(std::locale::classic());
-  text << std::scientific << std::setprecision(12);
-  return text;
-}
-
 /// Throws std::invalid_argument if the quaternion has not unit length.
-Eigen::Isometry3d poseFromNumbers(const Eigen::Vector3d& place, const Eigen::Quaterniond& rotation) {
+Eigen::Isometry3d poseOf(const std::vector<double>& position, const Eigen::Quaterniond& rotation) {
   if (std::abs(rotation.norm() - 1.0) > kRotationTolerance)
     throw std::invalid_argument("the quaternion is not of unit length");
-  return Eigen::Translation3d(place) * rotation.normalized();
+  return Eigen::Translation3d(position[0], position[1], position[2]) * rotation.normalized();
 }
 
 /// A format of poses in lines of numbers. `read` gets the numbers after the stamp, if there is one.
@@ -107,11 +96,11 @@ Eigen::Isometry3d poseFromTwelve(const std::vector<double>& n) {
 const PoseFormat kKitti = {"KITTI's (12 numbers a line)", 12, nullptr, poseFromTwelve};
 const PoseFormat kStampedKitti = {"KITTI's behind a stamp in ns", 13, parseNanoseconds, poseFromTwelve};
 const PoseFormat kTum = {"TUM's (stamp in s, x y z, qx qy qz qw)", 8, parseSeconds, [](const std::vector<double>& n) {
-                           return poseFromNumbers({n[0], n[1], n[2]}, {n[6], n[3], n[4], n[5]});
+                           return poseOf(n, {n[6], n[3], n[4], n[5]});
                          }};
 const PoseFormat kEuroc = {"EuRoC's (stamp in ns, x, y, z, qw, qx, qy, qz, …)", 8, parseNanoseconds,
                            [](const std::vector<double>& n) {
-                             return poseFromNumbers({n[0], n[1], n[2]}, {n[3], n[4], n[5], n[6]});
+                             return poseOf(n, {n[3], n[4], n[5], n[6]});
                            }};
 
 /// The format that the first line of poses shows.
@@ -120,8 +109,8 @@ const PoseFormat& formatOf(const std::string& line) {
   if (line.find(',') < line.find_first_of(" \t") && std::count(line.begin(), line.end(), ',') >= 7) return kEuroc;
   for (const PoseFormat* format : {&kKitti, &kStampedKitti, &kTum})
     if (numbers == format->numbers) return *format;
-  throw std::invalid_argument(std::to_string(numbers) + " numbers: poses are " + kKitti.name + ", " + kTum.name +
-                              " or " + kEuroc.name);
+  throw std::invalid_argument(
+      text(0, numbers, " numbers: poses are ", kKitti.name, ", ", kTum.name, " or ", kEuroc.name));
 }
 
 /// `wanted`: the only format accepted; null: any.
@@ -137,8 +126,7 @@ StampedTrajectory readPosesAs(const std::string& path, const PoseFormat* wanted)
     if (format == &kEuroc) std::replace(line.begin(), line.end(), ',', ' ');
     const std::vector<std::string> words = splitWords(line);
     if (words.size() < format->numbers || (words.size() > format->numbers && format != &kEuroc))
-      throw std::invalid_argument("expected " + std::to_string(format->numbers) + " numbers, found " +
-                                  std::to_string(words.size()));
+      throw std::invalid_argument(text(0, "expected ", format->numbers, " numbers, found ", words.size()));
     if (format->stamp) {
       const std::int64_t stamp = format->stamp(words.front());
       if (!trajectory.stamps.empty() && stamp <= trajectory.stamps.back())
@@ -176,14 +164,12 @@ std::optional<Eigen::Isometry3d> interpolated(const StampedTrajectory& truth, st
 }  // namespace
 
 Eigen::Isometry3d poseFromRows(const std::array<double, 12>& rows) {
-  const Eigen::Matrix<double, 3, 4, Eigen::RowMajor> matrix =
-      Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>>(rows.data());
+  const Eigen::Map<const Eigen::Matrix<double, 3, 4, Eigen::RowMajor>> matrix(rows.data());
   if (!matrix.allFinite()) throw std::invalid_argument("the pose is not finite");
   const Eigen::Matrix3d written = matrix.leftCols<3>();
   const double deviation = (written * written.transpose() - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-  if (deviation > kRotationTolerance || written.determinant() < 0.0) {
+  if (deviation > kRotationTolerance || written.determinant() < 0.0)
     throw std::invalid_argument("the left 3x3 part of the pose is not a rotation");
-  }
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(written, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
   pose.linear() = svd.matrixU() * svd.matrixV().transpose();
@@ -200,7 +186,7 @@ Trajectory readKittiPoses(const std::string& path) {
 }
 
 void writeKittiPoses(const std::string& path, const Trajectory& poses) {
-  std::ostringstream file = poseText();
+  std::ostringstream file = numberStream();
   for (const Eigen::Isometry3d& pose : poses) {
     for (int i = 0; i < 12; ++i) file << pose.matrix()(i / 4, i % 4) << (i == 11 ? '\n' : ' ');
   }
@@ -208,11 +194,10 @@ void writeKittiPoses(const std::string& path, const Trajectory& poses) {
 }
 
 void writeTumPoses(const std::string& path, const StampedTrajectory& trajectory) {
-  if (trajectory.stamps.size() != trajectory.poses.size()) {
-    throw std::invalid_argument("a trajectory with " + std::to_string(trajectory.poses.size()) + " poses has " +
-                                std::to_string(trajectory.stamps.size()) + " stamps");
-  }
-  std::ostringstream file = poseText();
+  if (trajectory.stamps.size() != trajectory.poses.size())
+    throw std::invalid_argument(
+        text(0, "a trajectory with ", trajectory.poses.size(), " poses has ", trajectory.stamps.size(), " stamps"));
+  std::ostringstream file = numberStream();
   file << "# stamp[s] tx ty tz qx qy qz qw\n";
   for (std::size_t i = 0; i < trajectory.poses.size(); ++i) {
     const Eigen::Vector3d t = trajectory.poses[i].translation();
@@ -320,9 +305,8 @@ std::vector<std::optional<Eigen::Isometry3d>> readGroundTruth(const std::string&
   const StampedTrajectory truth = readPoses(path);
   if (truth.stamps.empty()) {
     if (truth.poses.size() < stamps.size())
-      throw std::runtime_error("file '" + path + "' has " + std::to_string(truth.poses.size()) + " poses for " +
-                               std::to_string(stamps.size()) + " pairs: one line for each is needed, or stamps as in " +
-                               kTum.name + " format");
+      throw std::runtime_error(text(0, "file '", path, "' has ", truth.poses.size(), " poses for ", stamps.size(),
+                                    " pairs: one line for each is needed, or stamps as in ", kTum.name, " format"));
     return {truth.poses.begin(), truth.poses.begin() + static_cast<std::ptrdiff_t>(stamps.size())};
   }
   std::vector<std::optional<Eigen::Isometry3d>> poses;
@@ -337,9 +321,9 @@ std::pair<Trajectory, Trajectory> readComparable(const std::string& ground_truth
   if (truth.stamps.empty() || estimated.stamps.empty()) {
     // Without stamps in both files poses correspond by their lines.
     if (truth.stamps.empty() != estimated.stamps.empty() && truth.poses.size() != estimated.poses.size())
-      throw std::runtime_error("'" + ground_truth + "' has " + std::to_string(truth.poses.size()) + " poses, '" +
-                               estimate + "' " + std::to_string(estimated.poses.size()) +
-                               ", and one of both has no stamps: run_sequence writes either by --format kitti or tum");
+      throw std::runtime_error(
+          text(0, "'", ground_truth, "' has ", truth.poses.size(), " poses, '", estimate, "' ", estimated.poses.size(),
+               ", and one of both has no stamps: run_sequence writes either by --format kitti or tum"));
     return {truth.poses, estimated.poses};
   }
   std::pair<Trajectory, Trajectory> both;

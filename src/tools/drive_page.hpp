@@ -11,11 +11,38 @@
 
 #include "../check/finding.hpp"
 #include "../config/pipeline_options.hpp"
-#include "drive_pictures.hpp"
 #include "offline_run.hpp"
+#include "recording.hpp"
 #include "self_check.hpp"
 
 namespace sdvo {
+
+/// The left image of a pair with its features, CV_8UC3.
+cv::Mat drawLeft(const RecordedPair& pair, const StereoFeatures& features, const OdometryResult& result);
+
+/// Left images of a drive with their features: twelve spread over all pairs, and the first four where tracking ends.
+class DrivePictures {
+ public:
+  struct Picture {
+    cv::Mat image;  ///< CV_8UC3
+    std::string words;
+  };
+
+  explicit DrivePictures(int pairs) : pairs_(pairs) {}
+
+  /// The next pair.
+  void add(const RecordedPair& pair, const StereoFeatures& features, const OdometryResult& result);
+
+  const std::vector<Picture>& pictures() const { return pictures_; }
+
+ private:
+  static constexpr int kSpread = 12, kEnds = 4;
+
+  int pairs_, seen_ = 0, spread_ = 0, ends_ = 0;
+  std::int64_t first_stamp_ = 0;  ///< ns
+  bool was_tracking_ = true;
+  std::vector<Picture> pictures_;
+};
 
 /// States, latencies, dropped pairs and jumps in the vo_info of a recorded drive.
 struct LiveRecord {

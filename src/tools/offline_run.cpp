@@ -42,14 +42,8 @@ OfflineRun::OfflineRun(const PipelineOptions& options)
 
 StereoFeatures OfflineRun::process(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
                                    std::int64_t stamp) {
-  const double cpu_before = cpuSeconds();
-  Stopwatch stopwatch;
-  const ExtractionReport last = frames_.empty() ? ExtractionReport() : frames_.back().extraction;
-  const Extracted pair{extractor_.extract(camera, left, right, stamp, cv::Mat(), last), 0.0};
-  track(pair);
-  frames_.back().total_time = stopwatch.lap();
-  cpu_time_ += cpuSeconds() - cpu_before;
-  return pair.features;
+  processBeside(camera, left, right, stamp);
+  return *finish();
 }
 
 void OfflineRun::processBeside(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
@@ -60,7 +54,9 @@ void OfflineRun::processBeside(const StereoCamera& camera, const cv::Mat& left, 
   const std::optional<Extracted> before = std::exchange(waiting_, std::nullopt);
   std::future<void> odometry;
   if (before) odometry = std::async(std::launch::async, [&] { track(*before); });
-  const ExtractionReport last = before ? before->features.report : ExtractionReport();
+  const ExtractionReport last = before            ? before->features.report
+                                : frames_.empty() ? ExtractionReport()
+                                                  : frames_.back().extraction;
   Extracted pair{extractor_.extract(camera, left, right, stamp, cv::Mat(), last), 0.0};
   if (odometry.valid()) odometry.get();
   pair.time = stopwatch.lap();
@@ -68,14 +64,15 @@ void OfflineRun::processBeside(const StereoCamera& camera, const cv::Mat& left, 
   cpu_time_ += cpuSeconds() - cpu_before;
 }
 
-void OfflineRun::finish() {
+std::optional<StereoFeatures> OfflineRun::finish() {
   const double cpu_before = cpuSeconds();
   Stopwatch stopwatch;
-  if (const std::optional<Extracted> last = std::exchange(waiting_, std::nullopt)) {
-    track(*last);
-    frames_.back().total_time += stopwatch.lap();
-  }
+  std::optional<Extracted> last = std::exchange(waiting_, std::nullopt);
+  if (!last) return std::nullopt;
+  track(*last);
+  frames_.back().total_time += stopwatch.lap();
   cpu_time_ += cpuSeconds() - cpu_before;
+  return std::move(last->features);
 }
 
 void OfflineRun::processFeatures(const StereoFeatures& features) {

@@ -26,7 +26,8 @@ class OfflineRun {
   /// The same with the odometry of the previous pair in a second thread during this pair's extraction, as in the
   /// nodelets. Results are equal, and available after the next call or finish().
   void processBeside(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
-  void finish();
+  /// Returns the features of the last pair, if its odometry was not done yet.
+  std::optional<StereoFeatures> finish();
 
   /// The next pair from its features alone, which were extracted elsewhere.
   void processFeatures(const StereoFeatures& features);
