@@ -26,8 +26,8 @@ struct View {
 int sizeOf(const std::string& name, std::uint32_t all, std::uint32_t offset, std::uint32_t part, double binning) {
   const double pixels = part == 0 ? static_cast<double>(all) - offset : part;
   if (pixels < binning || pixels > kLargestSide)
-    throw std::invalid_argument(name + " has no image size: " + std::to_string(all) + " px, region of interest of " +
-                                std::to_string(part) + " px from " + std::to_string(offset) + " on");
+    throw std::invalid_argument(
+        text(0, name, " has no image size: ", all, " px, region of interest of ", part, " px from ", offset, " on"));
   return static_cast<int>(pixels / binning);
 }
 
@@ -78,11 +78,10 @@ double rotation(const CameraInfo& info) {
 
 StereoCamera toStereoCamera(const CameraInfo& left_info, const CameraInfo& right_info) {
   const View left = viewOf(left_info, "left"), right = viewOf(right_info, "right");
-  const auto size = [](const View& view) { return std::to_string(view.width) + "x" + std::to_string(view.height); };
   const auto both = [&] { return " (left " + describeP(left_info) + "; right " + describeP(right_info) + ")"; };
   if (left.width != right.width || left.height != right.height)
-    throw std::invalid_argument("left and right camera_info have different image sizes (left " + size(left) +
-                                ", right " + size(right) + ")");
+    throw std::invalid_argument(text(0, "left and right camera_info have different image sizes (left ", left.width, "x",
+                                     left.height, ", right ", right.width, "x", right.height, ")"));
   constexpr double kSame = 0.05;  // px: P typed by hand, or in single precision, is rounded
   const auto differ = [](double a, double b) { return !(std::abs(a - b) <= kSame); };
   if (differ(left.fx, right.fx) || differ(left.fy, right.fy))

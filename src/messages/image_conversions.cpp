@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "../common/statistics.hpp"
+#include "../common/text.hpp"
 
 namespace sdvo::ros_conversions {
 namespace {
@@ -25,9 +26,8 @@ cv::Mat pixelsOf(const sensor_msgs::Image& message, int bytes) {
   const std::size_t rows = message.height, columns = message.width, step = message.step;
   if (rows == 0 || columns == 0 || step < static_cast<std::size_t>(bytes) * columns ||
       message.data.size() < step * rows)
-    throw std::invalid_argument("malformed image: " + std::to_string(message.data.size()) + " bytes in rows of " +
-                                std::to_string(step) + " for " + std::to_string(columns) + "x" + std::to_string(rows) +
-                                " pixels of " + std::to_string(bytes) + (bytes == 1 ? " byte" : " bytes"));
+    throw std::invalid_argument(text(0, "malformed image: ", message.data.size(), " bytes in rows of ", step, " for ",
+                                     columns, "x", rows, " pixels of ", bytes, bytes == 1 ? " byte" : " bytes"));
   return cv::Mat(static_cast<int>(rows), static_cast<int>(columns), CV_8UC(bytes),
                  const_cast<std::uint8_t*>(message.data.data()), step);
 }

@@ -19,8 +19,8 @@ namespace {
 constexpr double kUnknownVariance = 1e6;
 constexpr double kVarianceFloor = 1e-9;
 
-/// Variance of the velocity at the end of a gap about the measured mean over it, for a vehicle that accelerates by up
-/// to 5 m/s^2 and 2 rad/s^2.
+/// Only the mean velocity since the previous pair, `dt` s ago, is measured. Variance of the present velocity about it,
+/// for a vehicle that accelerates by up to 5 m/s^2 and 2 rad/s^2.
 Matrix6d unsteadiness(double dt) {
   constexpr double kSteady = 0.2;  // s
   const double gap = std::max(0.0, dt - kSteady);
@@ -73,7 +73,7 @@ Matrix6d toMotionCovariance(const nav_msgs::Odometry& odometry, double dt, const
   Matrix6d twist = Eigen::Map<const Matrix6d>(odometry.twist.covariance.data()).transpose();  // it has rows
   if (!twist.allFinite()) throw std::invalid_argument("the twist's covariance is not finite");
   const Matrix6d steady = twist - unsteadiness(dt);
-  // A fused odometry's covariance may lack it: then nothing is subtracted.
+  // Another program's odometry may have a covariance without this term: then nothing is subtracted.
   if (steady.llt().info() == Eigen::Success) twist = steady;
   const Matrix6d to_camera = adjoint(T_base_camera.inverse());
   return to_camera * twist * to_camera.transpose() * dt * dt;

@@ -35,10 +35,17 @@ ros::Time toTime(std::int64_t stamp) {
   return ros::Time().fromNSec(static_cast<std::uint64_t>(stamp));
 }
 
+std_msgs::Header headerOf(std::int64_t stamp, const std::string& frame_id) {
+  std_msgs::Header header;
+  header.stamp = toTime(stamp);
+  header.frame_id = frame_id;
+  return header;
+}
+
 /// Throws std::invalid_argument that gives `name` when the number is too large.
 int toInt(std::uint32_t number, const char* name) {
   if (number >= static_cast<std::uint32_t>(std::numeric_limits<int>::max()))
-    throw std::invalid_argument(std::string(name) + " " + std::to_string(number) + " is too large");
+    throw std::invalid_argument(text(0, name, " ", number, " is too large"));
   return static_cast<int>(number);
 }
 
@@ -67,8 +74,7 @@ msgs::Place toMessage(const Place& place, const std::string& robot, const Featur
   message.segment = static_cast<std::uint32_t>(place.segment);
   message.travelled = place.travelled;
   message.features = toMessage(place.features, stream.size_curve);
-  message.features.header.stamp = toTime(place.features.stamp);
-  message.features.header.frame_id = stream.frame_id;
+  message.features.header = headerOf(place.features.stamp, stream.frame_id);
   return message;
 }
 
@@ -107,8 +113,7 @@ msgs::PlaceInfo toInfo(const PlaceReport& report) {
 msgs::PlaceSignature toMessage(const PlaceSignature& words, const Place& place, const std::string& robot,
                                const std::string& frame_id) {
   msgs::PlaceSignature message;
-  message.header.stamp = toTime(place.features.stamp);
-  message.header.frame_id = frame_id;
+  message.header = headerOf(place.features.stamp, frame_id);
   message.robot = robot;
   message.id = static_cast<std::uint32_t>(place.id);
   const DescriptorKind kind = place.features.kind();
@@ -132,8 +137,8 @@ PlaceSignature fromMessage(const msgs::PlaceSignature& message, const Descriptor
   if (message.descriptor != kind.descriptor || message.layout != nameOf(kind.layout) ||
       message.element_type != nameOf(kind.element_type) ||
       message.bytes_per_row != static_cast<std::uint32_t>(kind.bytes))
-    refuse("descriptors " + message.descriptor + ", " + message.layout + ", " + std::to_string(message.bytes_per_row) +
-           " bytes, here " + toString(kind) + ": set descriptor/... alike in both robots");
+    refuse(text(0, "descriptors ", message.descriptor, ", ", message.layout, ", ", message.bytes_per_row,
+                " bytes, here ", toString(kind), ": set descriptor/... alike in both robots"));
   constexpr std::size_t kMostWords = 1u << 18;
   if (message.words.size() > kMostWords) refuse(std::to_string(message.words.size()) + " words");
   if (std::adjacent_find(message.words.begin(), message.words.end(), std::greater_equal<>()) != message.words.end())
@@ -146,8 +151,7 @@ PlaceSignature fromMessage(const msgs::PlaceSignature& message, const Descriptor
 msgs::PlaceMatch toMessage(const PlaceMatch& match, const Place& mine, const Place& other,
                            const std::string& frame_id) {
   msgs::PlaceMatch message;
-  message.header.stamp = toTime(mine.features.stamp);
-  message.header.frame_id = frame_id;
+  message.header = headerOf(mine.features.stamp, frame_id);
   message.id = static_cast<std::uint32_t>(mine.id);
   message.other_id = static_cast<std::uint32_t>(other.id);
   message.other_stamp = toTime(other.features.stamp);
@@ -199,9 +203,9 @@ visualization_msgs::Marker lines(const std::string& name, int id, float red, flo
   return marker;
 }
 
-/// Newest stamp of the map's key frames.
-ros::Time newestStamp(const MapState& map) {
-  return map.stamps.empty() ? ros::Time() : toTime(map.stamps.rbegin()->second);
+/// With the stamp of the newest key frame.
+std_msgs::Header headerOf(const MapState& map, const std::string& frame_id) {
+  return headerOf(map.stamps.empty() ? 0 : map.stamps.rbegin()->second, frame_id);
 }
 
 std::int64_t stampOf(const MapState& map, int id) {
@@ -213,8 +217,7 @@ std::int64_t stampOf(const MapState& map, int id) {
 
 msgs::MapGraph toMessage(const MapState& map, const std::string& robot, const std::string& frame_id) {
   msgs::MapGraph message;
-  message.header.stamp = newestStamp(map);
-  message.header.frame_id = frame_id;
+  message.header = headerOf(map, frame_id);
   message.robot = robot;
   for (const auto& [id, T_map_camera] : map.graph.nodes()) {
     msgs::MapNode node;
@@ -239,13 +242,11 @@ PoseGraph fromMessage(const msgs::MapGraph& message) {
 
 nav_msgs::Path toPath(const MapState& map, const Eigen::Isometry3d& T_base_camera, const std::string& frame_id) {
   nav_msgs::Path path;
-  path.header.stamp = newestStamp(map);
-  path.header.frame_id = frame_id;
+  path.header = headerOf(map, frame_id);
   const Eigen::Isometry3d T_camera_base = T_base_camera.inverse();
   for (const auto& [id, T_map_camera] : map.graph.nodes()) {
     geometry_msgs::PoseStamped pose;
-    pose.header.stamp = toTime(stampOf(map, id));
-    pose.header.frame_id = frame_id;
+    pose.header = headerOf(stampOf(map, id), frame_id);
     pose.pose = tf2::toMsg(Eigen::Isometry3d(T_map_camera * T_camera_base));
     path.poses.push_back(pose);
   }
@@ -256,10 +257,7 @@ visualization_msgs::MarkerArray toMarkers(const MapState& map, const std::string
   visualization_msgs::MarkerArray array;
   array.markers = {lines("odometry", 0, 0.16f, 0.47f, 1.f, 0.1), lines("loop", 1, 1.f, 0.4f, 0.f, 0.25),
                    lines("break", 2, 0.6f, 0.6f, 0.6f, 0.1)};
-  for (visualization_msgs::Marker& marker : array.markers) {
-    marker.header.stamp = newestStamp(map);
-    marker.header.frame_id = frame_id;
-  }
+  for (visualization_msgs::Marker& marker : array.markers) marker.header = headerOf(map, frame_id);
   const std::map<int, Eigen::Isometry3d>& nodes = map.graph.nodes();
   for (const GraphEdge& edge : map.graph.edges()) {
     std::vector<geometry_msgs::Point>& points = array.markers[static_cast<std::size_t>(edge.kind)].points;

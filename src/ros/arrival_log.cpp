@@ -15,7 +15,7 @@ constexpr double kMost = 200.0;    // arrivals a second on each topic (chosen): 
 constexpr double kLately = 5.0;    // s, of losses and rates
 constexpr double kPatience = 1.0;  // s beyond the longest wait of a pair so far
 constexpr double kLate = 0.1;      // s between messages of one stamp (chosen): a queue is too short, perhaps
-constexpr double kHalf = 0.45;     // of a period: less, for rounding
+constexpr double kHalf = 0.45;     // ratio of a period: images of one pair are nearer; below 0.5, for jitter
 constexpr double kFewLost = 0.02;  // ratio of pairs (chosen): drivers lose one now and then
 
 double secondsBetween(std::int64_t a, std::int64_t b) {
@@ -81,14 +81,14 @@ double ArrivalLog::period() const {
   return steps.empty() ? kUsual : median(steps);
 }
 
-/// Whether the image came before all topics were connected, when partners are missing for no fault.
+/// Whether the image came before all four topics were connected. Then its partner may be missing without a fault.
 bool ArrivalLog::isEarly(const Arrival& arrival) const {
   constexpr double kConnecting = 2.0;  // s (chosen)
   return first_stamp_ == 0 || (arrival.stamp < first_stamp_ && arrival.now < complete_ + kConnecting &&
                                secondsBetween(arrival.stamp, first_stamp_) > kHalf * period());
 }
 
-/// Whether the image counts as a lost pair: a left one, or a right one whose left one was not lost, too.
+/// Whether the lost image counts as a lost pair. If both images of a pair are lost, only the left one counts.
 bool ArrivalLog::isAPairOfItsOwn(Input input, const Arrival& arrival) const {
   if (input == kLeftImage) return true;
   const double half = kHalf * period();

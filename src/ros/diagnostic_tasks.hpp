@@ -61,9 +61,10 @@ class InputMonitor {
 
   /// `stamp`: ns.
   void note(std::int64_t stamp);
-  /// Input comes from elsewhere now.
+  /// From now on the input comes from other topics.
   void noteTopics(const std::string& topics);
-  /// `why` silence is no fault from now on, such as "paused"; empty: it is one. Earlier arrivals are forgotten.
+  /// From now on silence is no fault, because of `why`, such as "paused"; if that is empty, it is a fault again.
+  /// Earlier arrivals are forgotten.
   void noteIdle(const std::string& why);
 
   /// Nothing while input comes.

@@ -9,7 +9,6 @@
 #include <memory>
 #include <pluginlib/class_list_macros.hpp>
 
-#include "../common/text.hpp"
 #include "../messages/image_conversions.hpp"
 #include "camera_finder.hpp"
 #include "features_image.hpp"
@@ -100,9 +99,8 @@ class FeaturesImageNodelet : public RobotNodelet {
   void take(Synchroniser& synchroniser, const boost::shared_ptr<const Message>& message) try {
     synchroniser.add<input>(message);
   } catch (const std::exception& e) {
-    warn(text(0, "features_image: a message of type ", ros::message_traits::datatype<Message>(),
-              " is not used: ", e.what()),
-         e.what());
+    SDVO_WARN(e.what(), "features_image: a message of type " << ros::message_traits::datatype<Message>()
+                                                             << " is not used: " << e.what());
   }
 
   void draw(const sensor_msgs::ImageConstPtr& left, const sensor_msgs::ImageConstPtr& right,
@@ -117,7 +115,7 @@ class FeaturesImageNodelet : public RobotNodelet {
     publisher_.publish(sensor_msgs::ImageConstPtr(picture));
     has_pictures_ = true;
   } catch (const std::exception& e) {
-    fail(text(0, "features_image at ", left->header.stamp, " skipped: ", e.what()), e.what());
+    SDVO_ERROR(e.what(), "features_image at " << left->header.stamp << " skipped: " << e.what());
   }
 
   ros::NodeHandle nh_;

@@ -1,6 +1,7 @@
 #include "params.hpp"
 
 #include <dynamic_reconfigure/ConfigDescription.h>
+#include <dynamic_reconfigure/config_tools.h>
 #include <ros/master.h>
 #include <ros/this_node.h>
 
@@ -40,11 +41,17 @@ void assign(const XmlRpc::XmlRpcValue& parameter, Option& option) {
   }
 }
 
+/// Calls `use` with the value of this text in the option's type: bool, int, double or std::string.
+template <class Use>
+auto withValue(const Option& option, const std::string& text, const Use& use) {
+  if (std::holds_alternative<bool*>(option.value)) return use(text == "true");
+  if (std::holds_alternative<int*>(option.value)) return use(std::stoi(text));
+  if (std::holds_alternative<double*>(option.value)) return use(std::stod(text));
+  return use(text);
+}
+
 XmlRpc::XmlRpcValue valueOf(const Option& option, const std::string& text) {
-  if (std::holds_alternative<bool*>(option.value)) return text == "true";
-  if (std::holds_alternative<int*>(option.value)) return std::stoi(text);
-  if (std::holds_alternative<double*>(option.value)) return std::stod(text);
-  return text;
+  return withValue(option, text, [](const auto& value) { return XmlRpc::XmlRpcValue(value); });
 }
 
 }  // namespace
@@ -116,23 +123,9 @@ std::vector<dynamic_reconfigure::GroupState> groupsOf(const std::vector<Option>&
   return groups;
 }
 
-template <class Parameter, class Value>
-Parameter makeParameter(const std::string& name, const Value& value) {
-  Parameter parameter;
-  parameter.name = name;
-  parameter.value = value;
-  return parameter;
-}
-
 void add(Config& config, const Option& option, const std::string& text) {
-  if (std::holds_alternative<bool*>(option.value))
-    config.bools.push_back(makeParameter<dynamic_reconfigure::BoolParameter>(option.name, text == "true"));
-  else if (std::holds_alternative<int*>(option.value))
-    config.ints.push_back(makeParameter<dynamic_reconfigure::IntParameter>(option.name, std::stoi(text)));
-  else if (std::holds_alternative<double*>(option.value))
-    config.doubles.push_back(makeParameter<dynamic_reconfigure::DoubleParameter>(option.name, std::stod(text)));
-  else
-    config.strs.push_back(makeParameter<dynamic_reconfigure::StrParameter>(option.name, text));
+  withValue(option, text,
+            [&](const auto& value) { dynamic_reconfigure::ConfigTools::appendParameter(config, option.name, value); });
 }
 
 /// The limits that dynamic_reconfigure states for every parameter, also where there are none.
@@ -143,10 +136,8 @@ void addLimits(Config& min, Config& max, const Option& option) {
 }
 
 const char* typeName(const Option& option) {
-  if (std::holds_alternative<bool*>(option.value)) return "bool";
-  if (std::holds_alternative<int*>(option.value)) return "int";
-  if (std::holds_alternative<double*>(option.value)) return "double";
-  return "str";
+  constexpr const char* kNames[] = {"bool", "int", "double", "str", "str"};  // in the order of Option::value
+  return kNames[option.value.index()];
 }
 
 /// The list to choose from, in the form of a Python literal that rqt_reconfigure reads.

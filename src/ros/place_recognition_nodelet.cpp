@@ -17,7 +17,6 @@
 #include <utility>
 #include <vector>
 
-#include "../common/text.hpp"
 #include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
 #include "../messages/frames.hpp"
@@ -77,8 +76,8 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     if (!options_.places_file.empty()) beginWith(inRosHome(options_.places_file));
 
     const std::uint32_t tag = TransformPublisher::tagOf(getName());
-    transforms_ =
-        std::make_unique<RobotTransforms>(nh_, std::nullopt, tag, [this](const std::string& what) { warn(what); });
+    transforms_ = std::make_unique<RobotTransforms>(nh_, std::nullopt, tag,
+                                                    [this](const std::string& what) { SDVO_WARN(what, what); });
     mount_ = std::make_unique<CameraMount>(*transforms_, kTfTimeout);
     publisher_ = std::make_unique<PlacePublisher>(nh_, options_, robot_, tag, [this] { return map(); });
     using namespace stereo_descriptor_vo;
@@ -106,7 +105,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     input_ = std::make_unique<OdometryPairInput>(
         nh_, options_.sync_queue_size, *unused_, [this](const OdometryPair& pair) { onPair(pair); },
         [this](const std::string& topic, const ros::Time& stamp, const std::string& why) {
-          fail(text(0, topic, ": message at ", stamp, " skipped: ", why), topic + why);
+          SDVO_ERROR(topic + why, topic << ": message at " << stamp << " skipped: " << why);
         });
     diagnostics_ = std::make_unique<PlaceDiagnostics>(nh_, private_nh, getName(), input_->topics(),
                                                       options_.max_silence, *unused_);
@@ -180,13 +179,14 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     if (const std::optional<PlaceReport> report = session_->observe(pair, *T_base_camera)) publish(*report, stamp);
   } catch (const std::exception& e) {
     unused_->add(UnusedInput::kRefused);
-    fail(text(0, "pair at ", arrived.pair.features->header.stamp, " skipped: ", e.what()), e.what());
+    SDVO_ERROR(e.what(), "pair at " << arrived.pair.features->header.stamp << " skipped: " << e.what());
   }
 
   std::optional<Eigen::Isometry3d> findExtrinsic(const OdometryPair& pair) {
     const std::string base_frame = cleanFrameId(pair.odometry->child_frame_id);
     const std::string camera_frame = cleanFrameId(pair.features->header.frame_id);
-    // The mount is read again when the odometry does: after a reset, where the distance falls. Other epochs keep it.
+    // After a reset, which lets the distance fall, the odometry reads the mount again, and so does this nodelet. After
+    // other changes of the epoch it stays.
     const stereo_descriptor_vo::VoInfo::ConstPtr before = std::exchange(mount_of_, pair.info);
     const double since_reset = pair.info->distance;
     if (before && (before->session != pair.info->session ||
@@ -195,7 +195,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     mount_->await(base_frame, camera_frame, [this] { return stopping_ || observer_->isFull(); });
     std::string problem;
     const std::optional<Eigen::Isometry3d> found = mount_->find(base_frame, camera_frame, problem);
-    if (!found) fail(transforms_->explainMissing(base_frame, camera_frame) + ". " + problem, "extrinsic");
+    if (!found) SDVO_ERROR("extrinsic", transforms_->explainMissing(base_frame, camera_frame) << ". " << problem);
     return found;
   }
 
@@ -290,7 +290,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
             locked([](const PlaceSession& session, int id, const Place& other) { return session.verify(id, other); }),
             locked([this](const PlaceSession& session, int id) { return session.message(id, robot_); }),
             [this](const auto& match) { publisher_->publish(match); },
-            [this](const auto& what, const auto& kind) { warn(what, kind); }};
+            [this](const auto& what, const auto& kind) { SDVO_WARN(kind, what); }};
   }
 
   // The services.

@@ -15,6 +15,13 @@
 #include "threads.hpp"
 #include "throttles.hpp"
 
+/// Report in a RobotNodelet, at most once in 5 s for each `kind`. Macros, so that rosout has the caller's file and
+/// line.
+#define SDVO_WARN(kind, ...) \
+  if (throttle_.allows(kind)) NODELET_WARN_STREAM(__VA_ARGS__)
+#define SDVO_ERROR(kind, ...) \
+  if (throttle_.allows(kind)) NODELET_ERROR_STREAM(__VA_ARGS__)
+
 namespace sdvo {
 
 /// Base of this package's nodelets: callbacks in threads of their own, a start that fails as a whole, services, and
@@ -79,16 +86,7 @@ class RobotNodelet : public nodelet::Nodelet {
     });
   }
 
-  /// Reports of one `kind` come at most once in 5 s. Without a kind, texts that differ in their numbers alone are of
-  /// one.
-  void warn(const std::string& what, const std::string& kind = "") {
-    if (throttle_.allows(kind.empty() ? what : kind)) NODELET_WARN_STREAM(what);
-  }
-  void fail(const std::string& what, const std::string& kind = "") {
-    if (throttle_.allows(kind.empty() ? what : kind)) NODELET_ERROR_STREAM(what);
-  }
-
-  ReportThrottle throttle_;
+  ReportThrottle throttle_;  ///< for SDVO_WARN and SDVO_ERROR
 
  private:
   void onInit() final try {

@@ -11,7 +11,6 @@
 #include "../check/calibration_check.hpp"
 #include "../check/image_check.hpp"
 #include "../common/stamp_filter.hpp"
-#include "../common/text.hpp"
 #include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
 #include "../messages/camera_conversions.hpp"
@@ -105,12 +104,12 @@ class StereoFeaturesNodelet : public RobotNodelet {
       input_.reset();
       return updateInput();
     }
-    if (!report.empty()) warn(report, "cameras");
+    if (!report.empty()) SDVO_WARN("cameras", report);
     const double now = ros::SteadyTime::now().toSec();
     std::string problem = arrivals_->explainLoss(now);
     if (problem.empty() && !(problem = arrivals_->explainSilence(now)).empty() && ros::master::getTopics(topics))
       problem += explainUnpublished(input_->subscribedTopics(), topics);
-    if (!problem.empty()) warn(problem, "synchronisation");
+    if (!problem.empty()) SDVO_WARN("synchronisation", problem);
   }
 
   void updateInput() try {
@@ -139,7 +138,7 @@ class StereoFeaturesNodelet : public RobotNodelet {
   // In the threads of the images.
 
   void onRefusal(const std::string& topic, const std::string& why) {
-    fail(topic + ": a message is not used: " + why, topic);
+    SDVO_ERROR(topic, topic << ": a message is not used: " << why);
   }
 
   /// A mask is used until the next one comes, whatever its stamp.
@@ -158,9 +157,8 @@ class StereoFeaturesNodelet : public RobotNodelet {
         unused_->add(UnusedInput::kPushedOut);
     unused_->add(UnusedInput::kLate, filter_.dropped() - late);
     if (filter_.dropped() > late)
-      warn(text(0, "a pair near ", stamp, " is late or has a wrong stamp: dropped (", filter_.dropped(),
-                " so far); if this goes on, check the driver's stamps"),
-           "late");
+      SDVO_WARN("late", "a pair near " << stamp << " is late or has a wrong stamp: dropped (" << filter_.dropped()
+                                       << " so far); if this goes on, check the driver's stamps");
   }
 
   void takeOverOptions() {
@@ -193,7 +191,7 @@ class StereoFeaturesNodelet : public RobotNodelet {
         extractor_->extract(decoded.camera, decoded.left, decoded.right, nanoseconds(stamp), mask_, last_report_);
     last_report_ = features.report;
     if (options_.approximate_sync) features.right_delay = secondsBetween(stamp, pair.right_image->header.stamp);
-    // After the extraction, which has thrown if the calibration does not fit the images: that begins no new stream.
+    // After the extraction, which throws if the calibration does not fit the images: such a one begins no new stream.
     const std::string unrectified = ros_conversions::whyUnrectified(*pair.left_info, *pair.right_info);
     noteCamera(decoded.camera, pair.left_info->distortion_model, unrectified);
     if (emitter_.judge().verdict == Verdict::kOpen) {  // until the camera has moved enough
@@ -219,7 +217,7 @@ class StereoFeaturesNodelet : public RobotNodelet {
     unused_->add(UnusedInput::kRefused);
     diagnostics_->noteFailure(e.what());
     const std_msgs::Header& header = passed.item.left_image->header;
-    fail(text(0, "pair at ", header.stamp, " of ", header.frame_id, " skipped: ", e.what()), e.what());
+    SDVO_ERROR(e.what(), "pair at " << header.stamp << " of " << header.frame_id << " skipped: " << e.what());
   }
 
   void noteCamera(const StereoCamera& camera, const std::string& lens, const std::string& unrectified) {
@@ -228,7 +226,7 @@ class StereoFeaturesNodelet : public RobotNodelet {
     warnOf("calibration", checkCalibration(camera, lens, unrectified));
     if (change == PairDecoder::Change::kFirst) return;
     ++stream_epoch_;
-    warn(text(0, "camera_info changed: a new stream begins (epoch + 1; ", stream_epoch_, " so far)"), "camera_info");
+    SDVO_WARN("camera_info", "camera_info changed: a new stream begins (epoch + 1; " << stream_epoch_ << " so far)");
   }
 
   void warnOf(const char* step, const Finding& finding) {

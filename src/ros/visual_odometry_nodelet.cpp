@@ -81,8 +81,8 @@ class VisualOdometryNodelet : public RobotNodelet {
     publisher_ = std::make_unique<OdometryPublisher>(nh_, options_, tag);
     publisher_->restart(T_odom_start_);
     to_be_levelled_ = options_.use_imu;
-    transforms_ =
-        std::make_unique<RobotTransforms>(nh_, publishedFrames(), tag, [this](const std::string& what) { warn(what); });
+    transforms_ = std::make_unique<RobotTransforms>(nh_, publishedFrames(), tag,
+                                                    [this](const std::string& what) { SDVO_WARN(what, what); });
     mount_ = std::make_unique<CameraMount>(*transforms_, options_.tf_timeout);
     patience_ = Patience(options_.guess_timeout);
     unused_ = std::make_unique<UnusedInput>("feature messages", options_.rates.max_unused,
@@ -115,7 +115,8 @@ class VisualOdometryNodelet : public RobotNodelet {
         listOptions(defaults));
 
     if (options_.use_imu)
-      imu_ = std::make_unique<ImuInput>(nh_, *transforms_, *unused_, [this](const std::string& what) { warn(what); });
+      imu_ = std::make_unique<ImuInput>(nh_, *transforms_, *unused_,
+                                        [this](const std::string& what) { SDVO_WARN(what, what); });
     worker_ = std::make_unique<Worker<FeaturesFilter::Passed>>(
         static_cast<std::size_t>(options_.queue_size),
         [this](const FeaturesFilter::Passed& passed) { process(passed); });
@@ -158,8 +159,8 @@ class VisualOdometryNodelet : public RobotNodelet {
     const bool new_stream = stream_epoch_ && *stream_epoch_ != message->stream_epoch;
     std::vector<FeaturesFilter::Passed> passed =
         filter_.add(std::move(arrived), nanoseconds(message->header.stamp), nanoseconds(ros::Time::now()), new_stream);
-    // The held pair may have been held by the image side, too. Its arrival is at most the next one's less their stamps'
-    // difference.
+    // The first of two was held until the next one confirmed its stamp, perhaps by the image side, too. So it arrived
+    // late: it is dated back to the next one's arrival less the difference of their stamps.
     if (passed.size() == 2) {
       Arrived &held = passed[0].item, &next = passed[1].item;
       const auto stamp = [](const Arrived& item) { return nanoseconds(item.message->header.stamp); };
@@ -170,11 +171,11 @@ class VisualOdometryNodelet : public RobotNodelet {
     stream_epoch_ = message->stream_epoch;
     unused_->add(UnusedInput::kLate, filter_.dropped() - late);
     if (filter_.dropped() > late)
-      warn(text(0, "features near ", message->header.stamp, " are late or have a wrong stamp: dropped (",
-                filter_.dropped(), " so far); if this goes on, check the driver's stamps"),
-           "late");
+      SDVO_WARN("late", "features near " << message->header.stamp << " are late or have a wrong stamp: dropped ("
+                                         << filter_.dropped()
+                                         << " so far); if this goes on, check the driver's stamps");
   } catch (const std::exception& e) {
-    fail(text(0, "features at ", message->header.stamp, " skipped: ", e.what()), e.what());
+    SDVO_ERROR(e.what(), "features at " << message->header.stamp << " skipped: " << e.what());
   }
 
   /// Throws for a message that cannot be used, before filter_ takes its stamp.
@@ -240,7 +241,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     publisher_->publishFlow(result, features, message.header);
     return result;
   } catch (const std::exception& e) {
-    fail(text(0, "features at ", passed.item.message->header.stamp, " skipped: ", e.what()), e.what());
+    SDVO_ERROR(e.what(), "features at " << passed.item.message->header.stamp << " skipped: " << e.what());
     return waitFor(std::string("features skipped: ") + e.what());
   }
 
@@ -269,7 +270,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     if (processed_epoch_ && *processed_epoch_ != message.stream_epoch) odometry_->breakStream();
     processed_epoch_ = message.stream_epoch;
     const std::string complaint = odometry_->options().alignment.complaint(features.patch_layout.side);
-    if (!complaint.empty()) warn(complaint, "patches");
+    if (!complaint.empty()) SDVO_WARN("patches", complaint);
     odometry_->mountAt(*mount_->last());
     const std::optional<MotionGuess> motion = guess.since == processed_stamp_ ? guess.motion : std::nullopt;  // no jump
     OdometryResult result = odometry_->update(features, motion);
@@ -335,11 +336,11 @@ class VisualOdometryNodelet : public RobotNodelet {
       return;
     }
     if (is_lost) is_tracking_ = false;
-    // A restart is of another kind than the predictions before it, which would hide it.
+    // A restart is a kind of its own, or the throttle would drop it as one of the predictions before it.
     const bool started_again = result.has_pose && !result.has_motion;
-    warn(text(0, toString(result.state), " at ", stamp, ", epoch ", result.epoch, ", ", result.inliers, " of ",
-              result.matches, " points: ", result.reason),
-         started_again ? "started again" : toString(result.state));
+    SDVO_WARN(started_again ? "started again" : toString(result.state),
+              toString(result.state) << " at " << stamp << ", epoch " << result.epoch << ", " << result.inliers
+                                     << " of " << result.matches << " points: " << result.reason);
   }
 
   /// At a given pose of the base, or at the initial one.
@@ -379,7 +380,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     diagnostics_->load().noteWait("the guess of the motion", steadyTime() - now);
     if (guess) return guess;
     unused_->add(UnusedInput::kNoGuess);
-    warn(text(0, "no guess of the motion until ", header.stamp, ", going on without: ", problem), "guess");
+    SDVO_WARN("guess", "no guess of the motion until " << header.stamp << ", going on without: " << problem);
     return std::nullopt;
   }
 
@@ -404,8 +405,8 @@ class VisualOdometryNodelet : public RobotNodelet {
     return guess;
   }
 
-  /// Takes roll and pitch of the first pose from the accelerometer, if the robot stands. Returns what it waits for: at
-  /// most 2 s for a second of measurements. Empty when done.
+  /// Takes roll and pitch of the first pose from the accelerometer, if the robot stands. That needs a second of
+  /// measurements, for which it waits 2 s. Returns what is missing; empty when done.
   std::string level() {
     constexpr double kPatience = 2.0;  // s of wall time
     const double now = steadyTime();
@@ -452,7 +453,7 @@ class VisualOdometryNodelet : public RobotNodelet {
       return "";
     }
     const std::string report = transforms_->explainMissing(base_frame, camera_frame);
-    fail(report + ". " + problem, "extrinsic");
+    SDVO_ERROR("extrinsic", report << ". " << problem);
     return report;
   }
 
