@@ -136,6 +136,7 @@ class Faults(PipelineCase):
         self.assertEqual((answer.state, answer.epoch), ('WAITING', self.info[0].epoch))
         self.assertIn('features skipped', answer.reason)
         self.until(lambda: self.rosout.said('skipped', 'Failed to allocate'))
+        self.assertIn('visual_odometry_nodelet.cpp', self.rosout.files)  # of the caller
         after = self.feed(3)
         self.assertEqual((after.state, after.epoch), ('TRACKING', answer.epoch))
         self.assert_alive()

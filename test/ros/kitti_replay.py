@@ -258,12 +258,13 @@ class Rosout:
 
     def __init__(self, namespace):
         self.namespace = namespace
-        self.errors, self.warnings = [], []
+        self.errors, self.warnings, self.files = [], [], set()
         self.subscriber = rospy.Subscriber('/rosout', Log, self.receive, queue_size=1000)
 
     def receive(self, log):
         if log.name.startswith(self.namespace + '/') and log.level >= Log.WARN:
             (self.errors if log.level >= Log.ERROR else self.warnings).append(log.msg)
+            self.files.add(os.path.basename(log.file))
 
     def said(self, *words):
         return any(all(word in error for word in words) for error in self.errors)
