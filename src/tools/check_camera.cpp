@@ -94,7 +94,7 @@ int check(const Arguments& arguments) {
     return exitCodeOf(worstOf(steps).finding.verdict);
   };
   if (!arguments.bag.empty()) {
-    const auto recording = openRecording(arguments.bag, arguments.source);
+    const auto recording = openRecording({arguments.bag}, arguments.source);
     recording->forEach(std::numeric_limits<int>::max(), use, [&](const std::string& why) { check.addUnusable(why); });
     return report(arguments.bag, recording->arrivals(arguments.base_frame));
   }

@@ -259,7 +259,7 @@ void writeBag(const Arguments& arguments) {
 
 /// A folder in KITTI's layout, of rectified images.
 void writeFolder(const Arguments& arguments) {
-  const auto recording = openRecording(arguments.input, arguments.source);
+  const auto recording = openRecording({arguments.input}, arguments.source);
   KittiWriter output(arguments.output);
   std::vector<std::int64_t> stamps;
   StereoCamera camera;

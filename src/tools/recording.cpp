@@ -83,20 +83,38 @@ class FolderRecording : public Recording {
   int used_ = 0;
 };
 
-/// The stereo pairs of a recorded bag. Only the current images and those that wait for a partner are in memory.
+/// The stereo pairs of a bag, or of the parts of one. Only the current images and those that wait for a partner are in
+/// memory.
 class BagRecording : public Recording {
  public:
   /// Throws std::runtime_error where a topic is missing.
-  BagRecording(const std::string& path, const StereoSource& source)
-      : path_(path), fov_(source.fov), infos_(infosOf(source)) {
-    openBag(path, bag_);
-    topics_ = ofBag(path, [&] { return topicsIn(bag_, source); });
+  BagRecording(const std::vector<std::string>& parts, const StereoSource& source)
+      : fov_(source.fov), infos_(infosOf(source)) {
+    ros::Time begin;  // of the part before; its end may be a little later than the next one's begin
+    for (const std::string& part : parts) {
+      openBag(part, *bags_.emplace_back(std::make_unique<rosbag::Bag>()));
+      ofBag(part, [&] {
+        const ros::Time before = std::exchange(begin, rosbag::View(*bags_.back()).getBeginTime());
+        if (begin <= before)
+          throw std::runtime_error("'" + part + "' is not later than " + names_ +
+                                   ": name the parts in the order of time (ls -v)");
+      });
+      names_ += (names_.empty() ? "'" : ", '") + part + "'";
+    }
+    topics_ = ofBag(parts.front(), [&] { return topicsIn(*bags_.front(), source); });
   }
 
-  int size() const override { return static_cast<int>(rosbag::View(bag_, rosbag::TopicQuery(topics_[0])).size()); }
+  int size() const override {
+    rosbag::View view;
+    for (const auto& bag : bags_) view.addQuery(*bag, rosbag::TopicQuery(topics_[0]));
+    return static_cast<int>(view.size());
+  }
 
-  int forEach(int limit, const Use& use, const Refuse& refuse) override {
-    return ofBag(path_, [&] { return useAll(limit, use, refuse); });
+  int forEach(int limit, const Use& use, const Refuse& refuse) override try {
+    return useAll(limit, use, refuse);
+  } catch (const rosbag::BagException& e) {
+    for (const auto& bag : bags_) refuseWhatIsWritten(bag->getFileName());
+    throw std::runtime_error(names_ + " cannot be read: " + e.what() + ". Is it whole? rosbag check " + names_);
   }
 
   void forEachBackwards(const Use& use) const override {
@@ -142,74 +160,24 @@ class BagRecording : public Recording {
 
     std::vector<std::string> wanted(topics_.begin(), topics_.end());
     wanted.insert(wanted.end(), {"/tf", "/tf_static"});
-    rosbag::View view(bag_, rosbag::TopicQuery(wanted));
-    view.addQuery(bag_, rosbag::TypeQuery(ros::message_traits::datatype<nav_msgs::Odometry>()));  // name the base
+    rosbag::View view;
+    for (const auto& bag : bags_) {
+      view.addQuery(*bag, rosbag::TopicQuery(wanted));
+      view.addQuery(*bag, rosbag::TypeQuery(ros::message_traits::datatype<nav_msgs::Odometry>()));  // name the base
+    }
     for (auto instance = view.begin(); instance != view.end() && !isEnough(); ++instance) input_->add(*instance);
     if (used_.empty() && !refuse)
-      throw std::runtime_error("'" + path_ +
-                               "': no pair can be used: " + (problem.empty() ? input_->problem() : problem));
+      throw std::runtime_error(names_ + ": no pair can be used: " + (problem.empty() ? input_->problem() : problem));
     return input_->unused() + static_cast<int>(filter.dropped()) + refused;
   }
 
-  const std::string path_;
   const double fov_;
   const std::optional<StereoInfos> infos_;  ///< in place of those of the bag
-  rosbag::Bag bag_;
+  std::vector<std::unique_ptr<rosbag::Bag>> bags_;
+  std::string names_;  ///< of the bags, in quotes
   StereoTopics topics_;
   std::vector<ArrivedPair> used_;       ///< by the last forEach(); their images are in the bag alone
   std::unique_ptr<CameraInput> input_;  ///< of the last forEach()
-};
-
-class JoinedRecording : public Recording {
- public:
-  JoinedRecording(const std::vector<std::string>& paths, const StereoSource& source) : paths_(paths) {
-    for (const std::string& path : paths) parts_.push_back(openRecording(path, source));
-  }
-
-  int size() const override {
-    int size = 0;
-    for (const auto& part : parts_) size += part->size();
-    return size;
-  }
-
-  int forEach(int limit, const Use& use, const Refuse& refuse) override {
-    int left_out = 0;
-    ends_.clear();
-    for (std::size_t i = 0; i < parts_.size() && limit > 0; ++i) {
-      ends_.emplace_back();
-      const auto use_part = [&](const RecordedPair& pair) {
-        if (!ends_.back()) {
-          if (i > 0 && pair.stamp <= ends_[i - 1]->second)
-            throw std::runtime_error("'" + paths_[i] + "' is not later than '" + paths_[i - 1] +
-                                     "': name the parts in the order of time (ls -v)");
-          ends_.back() = {pair.stamp, pair.stamp};
-        }
-        ends_.back()->second = pair.stamp;
-        --limit;
-        use(pair);
-      };
-      left_out += parts_[i]->forEach(limit, use_part, refuse);
-    }
-    return left_out;
-  }
-
-  void forEachBackwards(const Use& use) const override {
-    const std::int64_t all = ends_.front()->first + ends_.back()->second;
-    for (std::size_t i = ends_.size(); i-- > 0;)
-      parts_[i]->forEachBackwards([&](RecordedPair pair) {
-        pair.stamp += all - ends_[i]->first - ends_[i]->second;
-        use(pair);
-      });
-  }
-
-  ArrivalFindings arrivals(const std::string& base_frame) const override {
-    return parts_.front()->arrivals(base_frame);  // parts are of one driver
-  }
-
- private:
-  const std::vector<std::string> paths_;
-  std::vector<std::unique_ptr<Recording>> parts_;
-  std::vector<std::optional<std::pair<std::int64_t, std::int64_t>>> ends_;  ///< stamps, ns, of the parts that were used
 };
 
 }  // namespace
@@ -219,9 +187,11 @@ std::vector<std::optional<Eigen::Isometry3d>> Recording::truth(const std::string
   return readGroundTruth(path, stamps);
 }
 
-std::unique_ptr<Recording> openRecording(const std::string& path, const StereoSource& source) {
-  if (!fs::exists(path)) throw std::runtime_error("there is no '" + path + "'");
-  if (!fs::is_directory(path)) return std::make_unique<BagRecording>(path, source);
+std::unique_ptr<Recording> openRecording(const std::vector<std::string>& parts, const StereoSource& source) {
+  for (const std::string& part : parts)
+    if (!fs::exists(part)) throw std::runtime_error("there is no '" + part + "'");
+  const std::string& path = parts.front();
+  if (parts.size() > 1 || !fs::is_directory(path)) return std::make_unique<BagRecording>(parts, source);
   if (const auto mav0 = findMav0(path))
     return std::make_unique<FolderRecording<EurocSequence>>(*mav0, source.calibration, source.fov);
   for (const char* images : {"image_0", "image_1", "image_2", "image_3"})
@@ -231,11 +201,6 @@ std::unique_ptr<Recording> openRecording(const std::string& path, const StereoSo
       (fs::exists(fs::path(path) / "metadata.yaml") ? "a bag of ROS 2 or another" : "no recording:") +
       " folder; KITTI's (image_0, image_1, calib.txt, times.txt), EuRoC's and TUM-VI's (mav0, or cam0 "
       "and cam1) are read, and bags of ROS 1 (of a folder of bags each one: run_many)");
-}
-
-std::unique_ptr<Recording> openParts(const std::vector<std::string>& paths, const StereoSource& source) {
-  if (paths.size() == 1) return openRecording(paths.front(), source);
-  return std::make_unique<JoinedRecording>(paths, source);
 }
 
 }  // namespace sdvo

@@ -61,10 +61,8 @@ class Recording {
 };
 
 /// A bag, a folder in KITTI's layout, or a raw folder in that of EuRoC and TUM-VI (ASL). Raw images are rectified.
-/// Throws std::runtime_error that names what is wrong.
-std::unique_ptr<Recording> openRecording(const std::string& path, const StereoSource& source);
-
-/// The parts of one drive, as of `rosbag record --split`, in the order of time.
-std::unique_ptr<Recording> openParts(const std::vector<std::string>& paths, const StereoSource& source);
+/// Several bags are the parts of one drive, as of `rosbag record --split`, in the order of time. Throws
+/// std::runtime_error that names what is wrong.
+std::unique_ptr<Recording> openRecording(const std::vector<std::string>& parts, const StereoSource& source);
 
 }  // namespace sdvo

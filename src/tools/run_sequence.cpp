@@ -230,7 +230,7 @@ int run(const Arguments& arguments) {
     Arguments whole = arguments;
     whole.frames = kAll;
     Drive drive(options);
-    follow(*openRecording(before, arguments.source), whole, drive, &*places);
+    follow(*openRecording({before}, arguments.source), whole, drive, &*places);
     way += drive.whole.distance();
     places->startSequence();
   }
@@ -242,7 +242,7 @@ int run(const Arguments& arguments) {
   if (!arguments.pictures.empty() && !fs::is_empty(arguments.pictures))
     throw std::runtime_error("--pictures '" + arguments.pictures + "' is not empty: choose another folder");
   if (!arguments.output.empty()) fs::remove(reportOf(arguments));  // of an earlier run
-  const auto recording = openParts(arguments.inputs, arguments.source);
+  const auto recording = openRecording(arguments.inputs, arguments.source);
   Drive drive(options);
   std::optional<Seen> seen;
   if (!arguments.page.empty())
@@ -294,7 +294,7 @@ int main(int argc, char** argv) {
       ->capture_default_str()
       ->check(CLI::Range(1, 256));
   arguments.source.addTo(app);
-  app.add_flag("--join", arguments.join, "the recordings are parts of one drive, as of rosbag record --split");
+  app.add_flag("--join", arguments.join, "the bags are parts of one drive, as of rosbag record --split");
 
   app.add_option("--page", arguments.page,
                  "HTML page to write: verdict, camera's check, path, states, deviations, times, what the recording "
