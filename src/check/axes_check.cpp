@@ -60,7 +60,7 @@ double GyroAxesCheck::Turns::cosine() const {
 
 void GyroAxesCheck::add(std::int64_t from, std::int64_t to, const Eigen::Matrix3d& by_gyro,
                         const Eigen::Matrix3d& by_images) {
-  constexpr std::int64_t kKept = 8'000'000'000;  // ns, less than a gyro's measurements are kept
+  constexpr std::int64_t kKept = 8'000'000'000;  // ns, shorter than the track of the gyro's measurements
   turns_.add(by_gyro, by_images);
   turned_ += logSO3(by_images).norm();
   pairs_.push_back({from, to, by_images});

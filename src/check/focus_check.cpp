@@ -24,7 +24,7 @@ double differenceOfEdge(double distance, double sigma) {
   return sigma * (2.0 / std::sqrt(M_PI) * std::expm1(-0.25 * a * a) + a * std::erf(0.5 * a));
 }
 
-/// From 2, for sharp edges, to 4, for a mere slope.
+/// Ratio between the growths of the difference from 4 to 8 px and from 2 to 4 px: 2 for sharp edges, 4 for a slope.
 double growth(double at_2, double at_4, double at_8) {
   return (at_8 - at_4) / (at_4 - at_2);
 }

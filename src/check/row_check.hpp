@@ -31,7 +31,7 @@ class RowCheck {
   double max_dv_, max_disparity_, reach_;
   int corners_ = 0;
   std::vector<RowDelay::Sample> samples_;
-  RowDelay delay_{1.0, 10.0};  ///< 10 ms are a tenth of a pixel then
+  RowDelay delay_{1.0, 10.0};  ///< px/s of the least turning: there a delay of 10 ms shifts rows by 0.1 px
 };
 
 /// Whether left and right images are taken at one moment.

@@ -12,7 +12,7 @@ void RowReadout::add(const StereoFeatures& features, const OdometryResult& resul
   if (!result.has_motion || result.inliers < kFewestMeasured || !(result.dt > 0.0)) return;
   const StereoCamera& camera = features.camera;
   const Eigen::Isometry3d T_current_previous = result.T_previous_current.inverse();
-  // Positions of the points have absorbed the shift at the mean velocity of the last pairs.
+  // The points' positions contain the shift that belongs to the mean velocity of the last pairs.
   const Vector6d change = logSE3(result.T_previous_current) / result.dt - usual_velocity_;
   usual_velocity_ += (1.0 - kUsualMemory) * change;
   // The pose is fitted for each pair and eliminated: only shifts that no motion explains count.
@@ -25,7 +25,7 @@ void RowReadout::add(const StereoFeatures& features, const OdometryResult& resul
     const Correspondence point{camera.backProject(flow.u_previous, flow.v_previous, flow.disparity_previous),
                                {features.u[i], features.v[i], features.u[i] - features.disparity[i]}};
     const auto residual = reprojectionResidual(camera, T_current_previous, point);
-    // Outliers of the adjustment, too: it rejects points with a large shift.
+    // The adjustment's outliers are used, too, because it rejects points with a large shift.
     if (!residual || residual->norm() > NoiseOptions().inlierGate()) continue;
     const Eigen::Matrix<double, 2, 6> jacobian = motionJacobian(camera, T_current_previous, point.point).topRows<2>();
     // A static point moves in the camera's frame by the inverse of the camera's motion.

@@ -10,8 +10,8 @@
 namespace sdvo {
 
 /// Readout time of a rolling shutter, from the first row to the last. While the camera turns, each row has another
-/// pose: a point v px below the middle is shifted by its image velocity * readout * v / height. Part of the shift is
-/// indistinguishable from a motion, and at constant velocity from other positions of the points. Only changes of the
+/// pose: a point v px below the middle is shifted by its image velocity * readout * v / height. A motion explains part
+/// of the shift, and at constant velocity other positions of the points explain all of it. So only changes of the
 /// velocity are used, and the estimate is a lower bound.
 class RowReadout {
  public:

@@ -17,19 +17,45 @@ std::vector<std::uint8_t> bytesOf(const cv::Mat& matrix) {
   return {first, first + matrix.total() * matrix.elemSize()};
 }
 
+/// Calls `assign` with each field of the message and the core's field of the same meaning, but for arrays and enums.
+template <class Message, class Features, class Assign>
+void forEachField(Message& message, Features& features, const Assign& assign) {
+  auto& camera = features.camera;
+  assign(message.image_width, camera.width);
+  assign(message.image_height, camera.height);
+  assign(message.fx, camera.fx);
+  assign(message.fy, camera.fy);
+  assign(message.cx, camera.cx);
+  assign(message.cy, camera.cy);
+  assign(message.baseline, camera.baseline);
+  assign(message.right_delay, features.right_delay);
+  assign(message.descriptor, features.descriptor);
+  assign(message.patch_side, features.patch_layout.side);
+  assign(message.patch_min_spacing, features.patch_layout.min_spacing);
+  assign(message.patch_spacing, features.patch_layout.spacing_by_size);
+  auto& report = features.report;
+  assign(message.detected, report.detected);
+  for (std::size_t side : {0u, 1u}) {
+    assign(message.mean_intensity[side], report.mean_intensity[side]);
+    assign(message.sharpness[side], report.sharpness[side]);
+  }
+  assign(message.detect_time, report.detect_time);
+  assign(message.stereo_time, report.stereo_time);
+  assign(message.describe_time, report.describe_time);
+  assign(message.refused, report.refused);
+  assign(message.status, report.status);
+}
+
+template <class To, class From>
+void convert(To& to, const From& from) {
+  to = static_cast<To>(from);
+}
+
 }  // namespace
 
 stereo_descriptor_vo::StereoFeatures toMessage(const StereoFeatures& features, const DepthScaleOptions& size_curve) {
   stereo_descriptor_vo::StereoFeatures message;
-  message.image_width = static_cast<std::uint32_t>(features.camera.width);
-  message.image_height = static_cast<std::uint32_t>(features.camera.height);
-  message.fx = features.camera.fx;
-  message.fy = features.camera.fy;
-  message.cx = features.camera.cx;
-  message.cy = features.camera.cy;
-  message.baseline = features.camera.baseline;
-  message.right_delay = static_cast<float>(features.right_delay);
-  message.descriptor = features.descriptor;
+  forEachField(message, features, [](auto& theirs, const auto& ours) { convert(theirs, ours); });
   message.layout = nameOf(features.layout);
   message.element_type = nameOf(features.element_type);
   message.bytes_per_row = static_cast<std::uint32_t>(features.descriptors.cols);
@@ -42,24 +68,9 @@ stereo_descriptor_vo::StereoFeatures toMessage(const StereoFeatures& features, c
   message.size_max =
       static_cast<float>(size_curve.scale_normalisation ? size_curve.max_size : size_curve.constant_size);
 
-  const ExtractionReport& report = features.report;
-  message.detected = static_cast<std::uint32_t>(report.detected);
-  for (int side = 0; side < 2; ++side) {
-    message.mean_intensity[side] = static_cast<float>(report.mean_intensity[side]);
-    message.sharpness[side] = static_cast<float>(report.sharpness[side]);
-  }
-  message.detect_time = static_cast<float>(report.detect_time);
-  message.stereo_time = static_cast<float>(report.stereo_time);
-  message.describe_time = static_cast<float>(report.describe_time);
-  message.refused = report.refused;
-  message.status = report.status;
-
   StereoFeatures::forEachArray<stereo_descriptor_vo::StereoFeatures>(
       [&](auto ours, auto theirs) { message.*theirs = features.*ours; });
   message.descriptors = bytesOf(features.descriptors);
-  message.patch_side = static_cast<std::uint32_t>(features.patch_layout.side);
-  message.patch_min_spacing = features.patch_layout.min_spacing;
-  message.patch_spacing = features.patch_layout.spacing_by_size;
   message.patches = bytesOf(features.patches);
   return message;
 }
@@ -68,15 +79,7 @@ StereoFeatures fromMessage(const StereoFeaturesView& view) {
   const stereo_descriptor_vo::StereoFeatures& message = view.message();
   StereoFeatures features;
   features.stamp = static_cast<std::int64_t>(message.header.stamp.toNSec());
-  features.camera = {message.fx,
-                     message.fy,
-                     message.cx,
-                     message.cy,
-                     message.baseline,
-                     static_cast<int>(message.image_width),
-                     static_cast<int>(message.image_height)};
-  features.right_delay = message.right_delay;
-  features.descriptor = message.descriptor;
+  forEachField(message, features, [](const auto& theirs, auto& ours) { convert(ours, theirs); });
   features.layout = valueOf<DescriptorLayout>(message.layout);
   features.element_type = valueOf<ElementType>(message.element_type);
   StereoFeatures::forEachArray<stereo_descriptor_vo::StereoFeatures>(
@@ -84,20 +87,7 @@ StereoFeatures fromMessage(const StereoFeaturesView& view) {
   features.descriptors = cv::Mat(features.count(), static_cast<int>(message.bytes_per_row), CV_8U,
                                  const_cast<std::uint8_t*>(message.descriptors.data()))
                              .clone();
-  features.patch_layout = view.patchLayout();
   features.patches = view.patches().clone();
-
-  ExtractionReport& report = features.report;
-  report.detected = static_cast<int>(message.detected);
-  for (int side = 0; side < 2; ++side) {
-    report.mean_intensity[side] = message.mean_intensity[side];
-    report.sharpness[side] = message.sharpness[side];
-  }
-  report.detect_time = message.detect_time;
-  report.stereo_time = message.stereo_time;
-  report.describe_time = message.describe_time;
-  report.refused = message.refused;
-  report.status = message.status;
   return features;
 }
 

@@ -64,8 +64,7 @@ void ArrivalLog::notePair(std::int64_t left, std::int64_t right, double now) {
       return arrival.stamp == stamp && arrival.fate != Fate::kPaired;
     });
     if (used == arrivals.rend()) continue;
-    if (std::exchange(used->is_counted, false)) unused_.takeBack(UnusedInput::kUnpaired);
-    used->fate = Fate::kPaired;
+    if (std::exchange(used->fate, Fate::kPaired) == Fate::kCounted) unused_.takeBack(UnusedInput::kUnpaired);
     longest_wait_ = std::max(longest_wait_, now - used->now);
   }
 }
@@ -99,10 +98,10 @@ bool ArrivalLog::isAPairOfItsOwn(Input input, const Arrival& arrival) const {
 }
 
 void ArrivalLog::giveUp(Input input, Arrival& arrival) {
-  arrival.fate = Fate::kLost;
-  arrival.is_counted =
-      (input == kLeftImage || input == kRightImage) && !isEarly(arrival) && isAPairOfItsOwn(input, arrival);
-  if (arrival.is_counted) unused_.add(UnusedInput::kUnpaired);
+  const bool is_image = input == kLeftImage || input == kRightImage;
+  const bool counts = is_image && !isEarly(arrival) && isAPairOfItsOwn(input, arrival);
+  arrival.fate = counts ? Fate::kCounted : Fate::kLost;
+  if (counts) unused_.add(UnusedInput::kUnpaired);
 }
 
 void ArrivalLog::giveUpWhatIsOld(double now) {
@@ -117,8 +116,8 @@ ArrivalLog::Use ArrivalLog::usedSince(double begin) const {
     for (const Arrival& arrival : topics_[input].arrivals) {
       if (arrival.now < begin) continue;
       use.used += input == kLeftImage && arrival.fate == Fate::kPaired;
-      use.lost += arrival.is_counted;
-      (input == kLeftImage ? use.lefts : use.rights) += arrival.fate == Fate::kLost && !isEarly(arrival);
+      use.lost += arrival.fate == Fate::kCounted;
+      (input == kLeftImage ? use.lefts : use.rights) += arrival.isLost() && !isEarly(arrival);
     }
   return use;
 }
@@ -153,8 +152,8 @@ std::string ArrivalLog::received(double begin) const {
       count += arrival.now >= begin;
       zero += arrival.now >= begin && arrival.stamp == 0;
     }
-    all += " " + topic.name + " " + std::to_string(count);
-    if (zero > 0) all += " (" + std::to_string(zero) + " with zero stamps)";
+    all += text(0, " ", topic.name, " ", count);
+    if (zero > 0) all += text(0, " (", zero, " with zero stamps)");
   }
   return all;
 }

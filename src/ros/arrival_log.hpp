@@ -58,13 +58,15 @@ class ArrivalLog {
   double pairRate() const;  ///< by the stamps, Hz; zero when it is not known
 
  private:
-  /// A message waits for its partners until its pair is complete, or until it is too old for one.
-  enum class Fate { kWaits, kPaired, kLost };
+  /// A message waits for its partners until its pair is complete, or until it is too old for one. kCounted: lost, and
+  /// counted as UnusedInput::kUnpaired.
+  enum class Fate { kWaits, kPaired, kLost, kCounted };
   struct Arrival {
     std::int64_t stamp;
     double now;
     Fate fate = Fate::kWaits;
-    bool is_counted = false;  ///< as UnusedInput::kUnpaired
+
+    bool isLost() const { return fate == Fate::kLost || fate == Fate::kCounted; }
   };
   struct Topic {
     std::string name;

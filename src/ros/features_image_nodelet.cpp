@@ -31,22 +31,22 @@ class FeaturesImageNodelet : public RobotNodelet {
   using Synchroniser = TriggerSynchroniser<Image, Image, Features, Flow, Info>;
 
   struct Inputs {
+    /// The callback of an input of the synchroniser.
+    template <int input>
+    auto take(FeaturesImageNodelet& nodelet) {
+      return [this, &nodelet](const auto& message) { nodelet.take<input>(synchroniser, message); };
+    }
+
     explicit Inputs(FeaturesImageNodelet& nodelet)
         : synchroniser(kQueue, kTolerance, [&nodelet](const auto&... messages) { nodelet.draw(messages...); }) {
       ros::NodeHandle &nh = nodelet.nh_, image_nh = nodelet.finder_->handle(nh);
       StereoImageTransport& transport = *nodelet.transport_;
       // Topics are resolved here, because a transport appends its name to them.
-      left.subscribe(image_nh, image_nh.resolveName("left/image_rect"), kQueue, transport.left,
-                     [this, &nodelet](const Image::ConstPtr& m) { nodelet.take<0>(synchroniser, m); });
-      right.subscribe(image_nh, image_nh.resolveName("right/image_rect"), kQueue, transport.right,
-                      [this, &nodelet](const Image::ConstPtr& m) { nodelet.take<1>(synchroniser, m); });
-      features = nh.subscribe<Features>("stereo_features", kQueue, [this, &nodelet](const Features::ConstPtr& m) {
-        nodelet.take<2>(synchroniser, m);
-      });
-      info = nh.subscribe<Info>("vo_info", kQueue,
-                                [this, &nodelet](const Info::ConstPtr& m) { nodelet.take<4>(synchroniser, m); });
-      flow = nh.subscribe<Flow>("feature_flow", kQueue,
-                                [this, &nodelet](const Flow::ConstPtr& m) { nodelet.take<3>(synchroniser, m); });
+      left.subscribe(image_nh, image_nh.resolveName("left/image_rect"), kQueue, transport.left, take<0>(nodelet));
+      right.subscribe(image_nh, image_nh.resolveName("right/image_rect"), kQueue, transport.right, take<1>(nodelet));
+      features = nh.subscribe<Features>("stereo_features", kQueue, take<2>(nodelet));
+      flow = nh.subscribe<Flow>("feature_flow", kQueue, take<3>(nodelet));
+      info = nh.subscribe<Info>("vo_info", kQueue, take<4>(nodelet));
     }
 
     static constexpr int kQueue = 10;

@@ -140,7 +140,7 @@ std::optional<Eigen::Isometry3d> CameraMount::find(const std::string& base_frame
 }
 
 std::string CameraMount::change() {
-  constexpr double kNear = 0.005, kAlike = 0.5 * M_PI / 180.0;  // m, rad: more than joints and masts give way (chosen)
+  constexpr double kNear = 0.005, kAlike = 0.5 * M_PI / 180.0;  // m, rad: more than a mast bends (chosen)
   std::string ignored;
   const std::lock_guard<std::mutex> lock(mutex_);
   if (change_reported_ || camera_frame_.empty()) return "";

@@ -156,7 +156,7 @@ StereoTopics topicsIn(const rosbag::Bag& bag, const StereoSource& source) {
                              "; its images: " + (images.empty() ? "none" : images) +
                              ": name the topics by --camera, --left, --right, --image");
   }
-  for (const std::size_t input : {2u, 3u})  // stereo_raw.launch with a field of view of its own
+  for (const std::size_t input : {2u, 3u})  // as stereo_raw.launch records it where it is given a field of view
     if (const std::string of_fov = topics[input].substr(0, topics[input].rfind('/') + 1) + "rectifiable/camera_info";
         !isAmong(recorded, topics[input]) && isAmong(recorded, of_fov))
       topics[input] = of_fov;
