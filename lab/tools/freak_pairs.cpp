@@ -50,7 +50,7 @@ std::vector<std::array<float, Freak::kFields>> sampleKeypoints(const std::vector
     for (const sdvo::Corner& corner : detector.detect(image)) {
       const double fraction = static_cast<double>(random()) / static_cast<double>(std::mt19937::max());
       const ViewKeypoint keypoint{corner.position.x, corner.position.y,
-                                   static_cast<float>(7.0 * std::pow(30.0 / 7.0, fraction)), -1.f};
+                                  static_cast<float>(7.0 * std::pow(30.0 / 7.0, fraction)), -1.f};
       if (Freak::fits(keypoint, image.size())) samples.push_back(freak.intensities(keypoint));
     }
   }
@@ -59,13 +59,15 @@ std::vector<std::array<float, Freak::kFields>> sampleKeypoints(const std::vector
 
 std::vector<Column> makeColumns(const std::vector<std::array<float, Freak::kFields>>& samples) {
   std::vector<Column> columns;
-  for (const Freak::FieldPair& pair : Freak::candidatePairs()) {
-    Column column{pair, std::vector<std::uint64_t>((samples.size() + 63) / 64, 0), 0.0};
-    for (std::size_t s = 0; s < samples.size(); ++s)
-      if (samples[s][pair.first] > samples[s][pair.second]) column.bits[s / 64] |= std::uint64_t{1} << (s % 64);
-    column.mean = popcount(column.bits, column.bits) / static_cast<double>(samples.size());
-    columns.push_back(std::move(column));
-  }
+  for (std::uint8_t i = 1; i < Freak::kFields; ++i)
+    for (std::uint8_t j = 0; j < i; ++j) {
+      const Freak::FieldPair pair(i, j);
+      Column column{pair, std::vector<std::uint64_t>((samples.size() + 63) / 64, 0), 0.0};
+      for (std::size_t s = 0; s < samples.size(); ++s)
+        if (samples[s][pair.first] > samples[s][pair.second]) column.bits[s / 64] |= std::uint64_t{1} << (s % 64);
+      column.mean = popcount(column.bits, column.bits) / static_cast<double>(samples.size());
+      columns.push_back(std::move(column));
+    }
   return columns;
 }
 

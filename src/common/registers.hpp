@@ -18,8 +18,9 @@ typedef std::int32_t IntRegister __attribute__((vector_size(4 * kRegister)));
 /// Sums in these wrap around.
 typedef std::uint32_t UnsignedRegister __attribute__((vector_size(4 * kRegister)));
 
-// Indices for shuffling registers a and b: 0 to 3 (7) are a's lanes, 4 to 7 (8 to 15) b's. AVX2 shuffles within halves
-// of a register by one instruction, hence the order of its even and odd lanes.
+// A shuffle makes a register of the lanes of two, a and b. Lanes are numbered through a, then b: with AVX2 0 to 7 and 8
+// to 15, else 0 to 3 and 4 to 7. AVX2 shuffles by one instruction if lanes stay in their half of a register. Hence each
+// half gets two even (or odd) lanes of a, then two of b, and readPairs() fills registers to match.
 #ifdef __clang__
 #define SDVO_SHUFFLE(a, b, ...) __builtin_shufflevector(a, b, __VA_ARGS__)
 #else
@@ -61,8 +62,8 @@ SDVO_IN_KERNEL Bits bitsAt(const Number* place) {
 // Reads from scattered places. Single ones are faster than AVX2's gather instruction. Places are unsigned, which spares
 // an instruction for each address.
 
-/// numbers[p] and numbers[p + 1] for p = places[0] and places[1]; a register of eight also has those for places[4]
-/// and places[5].
+/// Pairs numbers[p], numbers[p + 1] for the places 0 and 1; in a register of eight also for the places 4 and 5. Those
+/// for the other places are read with `places + 2`.
 SDVO_IN_KERNEL UnsignedRegister readPairs(const std::int32_t* numbers, const std::uint32_t* places) {
   typedef std::int64_t PairRegister __attribute__((vector_size(4 * kRegister)));
   const auto at = [&](int k) { return bitsAt<std::int64_t>(numbers + places[k]); };
@@ -83,7 +84,7 @@ SDVO_IN_KERNEL UnsignedRegister readFours(const std::uint8_t* bytes, const std::
 #endif
 }
 
-/// For each lane a number and its right neighbour in memory: first() and second().
+/// For each place, in order, a number and its right neighbour in memory: first() and second().
 class Pairs {
  public:
   /// Two results of readPairs(): of places from 0 on, and from 2 on.

@@ -1,6 +1,5 @@
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <stdexcept>
 

@@ -10,7 +10,6 @@
 #include <fstream>
 #include <random>
 #include <stdexcept>
-#include <string>
 #include <system_error>
 
 namespace fs = std::filesystem;

@@ -1,6 +1,7 @@
 #include "brief.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <random>

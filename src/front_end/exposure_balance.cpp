@@ -49,7 +49,8 @@ cv::Mat withLevelsOf(const cv::Mat& model, const cv::Mat& image, const std::arra
   cv::Mat table(1, kLevels, CV_8U), result;
   int found = 0;
   for (int level = 0; level < kLevels; ++level) {
-    // Rank of the middle one of the level's pixels: with the first or the last one, levels of many pixels are biased.
+    // Pixels are ranked by grey level. A level is mapped by the rank of its middle pixel: its first or last one would
+    // bias levels of many pixels.
     const int darker = level > 0 ? of_image[level - 1] : 0;
     const int rank = darker + (of_image[level] - darker) / 2;
     while (found < kLevels - 1 && of_model[found] <= rank) ++found;

@@ -7,12 +7,10 @@
 #include <cstdint>
 #include <filesystem>
 #include <map>
-#include <opencv2/core.hpp>
 #include <opencv2/core/utility.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <stdexcept>
-#include <string>
 #include <tuple>
 #include <utility>
 
@@ -55,8 +53,8 @@ std::vector<Corner> toCorners(const std::vector<cv::KeyPoint>& keypoints) {
   return corners;
 }
 
-/// Corners that OpenCV's detectors are asked for, per corner that is wanted: the buckets choose among them. Their sizes
-/// are not used; those come from the depth.
+/// Ratio of the corners requested of OpenCV's detectors to those wanted: the buckets choose among them. The detectors'
+/// sizes are not used, since the size follows from the depth.
 constexpr int kChoice = 4;
 
 std::vector<Corner> detectOrb(const cv::Mat& image, const FeatureDetectorOptions& options, int threshold) {

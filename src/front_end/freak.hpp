@@ -1,7 +1,6 @@
 #pragma once
 
 #include <array>
-#include <cmath>
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <utility>
@@ -33,8 +32,6 @@ class Freak {
 
   /// The published retina pattern, outermost ring first.
   static const std::array<Field, kFields>& pattern();
-  /// All 903 unordered pairs of fields, the candidates for bits.
-  static const std::vector<FieldPair>& candidatePairs();
   /// The 512 pairs in use, learnt by `learn freak-pairs`.
   static const std::array<FieldPair, kBits>& pairs();
 
@@ -48,32 +45,15 @@ class Freak {
 
   /// Mean intensities of the receptive fields; the key point must fit.
   std::array<float, kFields> intensities(const ViewKeypoint& keypoint) const;
-  /// Writes the kBytes of one row; the key point must fit.
-  void describe(const ViewKeypoint& keypoint, std::uint8_t* row) const;
-  /// The same rows for many key points, several at once.
+  /// Writes the kBytes of each key point's row; key points must fit.
   void describe(const std::vector<ViewKeypoint>& keypoints, const std::vector<std::uint8_t*>& rows) const;
   /// Orientation in [0, 2 pi) from the intensity gradient over symmetric field pairs (section 4.4 there).
   float orientation(ViewKeypoint keypoint) const;
-
-  const IntegralImage& image() const { return image_; }
 
  private:
   static constexpr double kReachPerSize = 22.0 / 7.0;
 
   IntegralImage image_;
-};
-
-/// Scale and rotation of the pattern at a key point.
-struct FreakPose {
-  static constexpr float kSmallestHalfSide = 0.5f;  ///< of a field's box: one pixel
-
-  explicit FreakPose(const ViewKeypoint& keypoint)
-      : scale(static_cast<float>(Freak::reach(keypoint.size))),
-        cosine(keypoint.angle < 0.f ? scale : std::cos(keypoint.angle) * scale),
-        sine(keypoint.angle < 0.f ? 0.f : std::sin(keypoint.angle) * scale) {}
-
-  float scale;         ///< px
-  float cosine, sine;  ///< of the angle, times the scale
 };
 
 }  // namespace sdvo

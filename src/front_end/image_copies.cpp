@@ -1,7 +1,6 @@
 #include "image_copies.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>

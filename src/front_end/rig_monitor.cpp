@@ -1,8 +1,6 @@
 #include "stereo_descriptor_vo/front_end/rig_monitor.hpp"
 
 #include <algorithm>
-#include <cmath>
-#include <opencv2/core.hpp>
 
 #include "../common/statistics.hpp"
 #include "../common/text.hpp"
@@ -13,7 +11,7 @@ namespace sdvo {
 namespace {
 
 constexpr int kEnough = 25;    // corners found that a judgement needs: half of those that must be looked for
-constexpr int kAgreeing = 12;  // corners on one line of rows: of wrong ones 6 % lie there by chance
+constexpr int kAgreeing = 12;  // corners on one line of rows: a wrong match lies there with a probability of 6 %
 
 double distanceFrom(const RowLine& rows, const FoundCorner& corner) {
   return std::abs(corner.dv - rows.at(corner.u));
@@ -29,7 +27,7 @@ RowLine fitRows(const std::vector<FoundCorner>& found, int columns) {
     for (std::size_t k = 0; k < i; k += 1 + i / kCompared, ++compared)
       if (std::abs(found[i].u - found[k].u) > 0.1 * columns)
         slopes.push_back((found[i].dv - found[k].dv) / (found[i].u - found[k].u));
-  // If nearly all corners are close together, the pairs that are far apart have an outlier: no slope is measured.
+  // If nearly all corners are close together, most pairs that are far apart contain an outlier: no slope is measured.
   if (4 * slopes.size() < compared) slopes.clear();
   RowLine rows{0.0, median(slopes), columns};
   for (const FoundCorner& corner : found) rest.push_back(corner.dv - rows.at(corner.u));
@@ -78,7 +76,7 @@ Cause tryFlip(int code, const char* how, const cv::Mat& left, const cv::Mat& rig
   const BlockSearch search(left, flipped, left.cols, RigMonitor::kReach);
   std::vector<FoundCorner> found;
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    // Of a flipped image a fifth of the corners are found at least, of another one a fiftieth.
+    // If the image is flipped, at least a fifth of the corners are found; otherwise a fiftieth. So 3 of 24 decide.
     if (i == 24 && found.size() < 3) break;
     if (const auto corner = search.find(corners[i])) found.push_back(*corner);
   }

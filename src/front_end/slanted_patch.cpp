@@ -5,7 +5,6 @@
 #include <cstdint>
 
 #include "../common/kernel.hpp"
-#include "../common/patch_products.hpp"
 
 namespace sdvo {
 namespace {

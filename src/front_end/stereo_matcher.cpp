@@ -93,7 +93,7 @@ class EpipolarSearch {
     const int x = cvRound(0.5f * left_position.x - 0.25f), y = cvRound(0.5f * left_position.y - 0.25f);
     const std::uint8_t* left = images_.left_half.ptr(y + kMargin) + x + kMargin;
     const std::uint8_t* right = images_.right_half.ptr(y + kMargin) + x + kMargin;
-    // A point that looks best at a negative disparity has no match: swapped images show themselves this way.
+    // A corner that matches best at a negative disparity has no match. In swapped images these are most corners.
     constexpr int kNegative = 16;
     const int range = std::min(static_cast<int>(0.5 * max_disparity_), x);
     const int count = kNegative + range + 1;

@@ -1,10 +1,8 @@
 #include "stereo_descriptor_vo/matching/feature_matcher.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <numeric>
-#include <optional>
 #include <stdexcept>
 #include <type_traits>
 

@@ -5,7 +5,7 @@
 #include <array>
 #include <cmath>
 
-#include "../common/patch_products.hpp"
+#include "../common/kernel.hpp"
 #include "patch_samples.hpp"
 
 namespace sdvo {

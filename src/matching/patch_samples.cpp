@@ -1,8 +1,6 @@
 #include "patch_samples.hpp"
 
 #include <algorithm>
-#include <cstdint>
-#include <cstring>
 
 #include "../common/registers.hpp"
 

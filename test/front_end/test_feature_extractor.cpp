@@ -89,10 +89,10 @@ TEST(FeatureExtractor, DescribesTheRightViewWhereTheFeatureIs) {
     for (int i = 0; i < features.count(); ++i) {
       const std::size_t k = static_cast<std::size_t>(i);
       cv::Mat expected(1, 2 * Freak::kBytes, CV_8U);
-      left_view.describe({features.u[k], features.v[k], features.size[k], -1.f}, expected.ptr());
+      left_view.describe({{features.u[k], features.v[k], features.size[k], -1.f}}, {expected.ptr()});
       right_view.describe(
-          {features.u[k] - features.disparity[k], features.v[k] + features.dv[k], features.size[k], -1.f},
-          expected.ptr() + Freak::kBytes);
+          {{features.u[k] - features.disparity[k], features.v[k] + features.dv[k], features.size[k], -1.f}},
+          {expected.ptr() + Freak::kBytes});
       EXPECT_TRUE(synthetic::equalMats(features.descriptors.row(i), expected)) << "feature " << i << ", dv " << dv;
       apart += synthetic::differingBits(features.descriptors.row(i).colRange(0, Freak::kBytes),
                                         features.descriptors.row(i).colRange(Freak::kBytes, 2 * Freak::kBytes));

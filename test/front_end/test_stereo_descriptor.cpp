@@ -60,8 +60,8 @@ TEST(StereoDescriptor, IsTheConcatenationOfBothViews) {
   for (int row = 0; row < both.rows.rows; ++row) {
     const StereoKeypoint& k = keypoints[static_cast<std::size_t>(both.index[static_cast<std::size_t>(row)])];
     cv::Mat expected(1, 2 * Freak::kBytes, CV_8U);
-    left_view.describe({k.u_left, k.v_left, k.size, -1.f}, expected.ptr());
-    right_view.describe({k.u_right, k.v_right, k.size, -1.f}, expected.ptr() + Freak::kBytes);
+    left_view.describe({{k.u_left, k.v_left, k.size, -1.f}}, {expected.ptr()});
+    right_view.describe({{k.u_right, k.v_right, k.size, -1.f}}, {expected.ptr() + Freak::kBytes});
     EXPECT_TRUE(synthetic::equalMats(both.rows.row(row), expected)) << "row " << row;
   }
   const DescribedKeypoints left_alone =
@@ -128,8 +128,8 @@ TEST(StereoDescriptor, OrientedHalvesTurnByTheLeftAngle) {
     EXPECT_GE(described.angle[row], 0.f);
     EXPECT_LT(described.angle[row], static_cast<float>(2.0 * CV_PI));
     cv::Mat expected(1, 2 * Freak::kBytes, CV_8U);
-    left_view.describe({k.u_left, k.v_left, k.size, angle}, expected.ptr());
-    right_view.describe({k.u_right, k.v_right, k.size, angle}, expected.ptr() + Freak::kBytes);
+    left_view.describe({{k.u_left, k.v_left, k.size, angle}}, {expected.ptr()});
+    right_view.describe({{k.u_right, k.v_right, k.size, angle}}, {expected.ptr() + Freak::kBytes});
     EXPECT_TRUE(synthetic::equalMats(described.rows.row(static_cast<int>(row)), expected)) << "row " << row;
   }
 }

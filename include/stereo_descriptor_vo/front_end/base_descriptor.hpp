@@ -19,7 +19,7 @@ struct ViewKeypoint {
 
 /// Descriptors of one view: row i belongs to key point i.
 struct ViewDescriptors {
-  cv::Mat rows;                     ///< CV_8U, one row for each key point, zeros where not described
+  cv::Mat rows;                     ///< CV_8U, one row for each key point; only valid ones are written
   std::vector<std::uint8_t> valid;  ///< 0 where the neighbourhood leaves the image
 };
 
