@@ -1,9 +1,9 @@
 #include "stereo_descriptor_vo/map/floor.hpp"
 
 #include <Eigen/Cholesky>
-#include <cmath>
 #include <opencv2/core.hpp>
-#include <sstream>
+
+#include "../common/text.hpp"
 
 namespace sdvo {
 namespace {
@@ -75,18 +75,18 @@ std::string FloorBelief::note(const Floor& known, const Eigen::Isometry3d& T_cam
   const bool is_tilted = !Floor::isLevel(residual);
   on_floor_ = Floor::isOn(residual);
   level_pairs_ = on_floor_ || is_tilted ? 0 : level_pairs_ + 1;
-  std::ostringstream reason;
+  std::string reason;
   if (is_tilted)
-    reason << "off the floor: tilted by "
-           << residual.tail<2>().cwiseProduct(known.sigma.tail<2>()).norm() * 180.0 / CV_PI << " degrees, a ramp?";
+    reason = text(1, "off the floor: tilted by ",
+                  residual.tail<2>().cwiseProduct(known.sigma.tail<2>()).norm() * 180.0 / CV_PI, " degrees, a ramp?");
   else if (!on_floor_)
-    reason << "off the floor: " << height - height_ << " m above it";
+    reason = text(2, "off the floor: ", height - height_, " m above it");
   if (level_pairs_ >= kLevel) {
-    reason << ", level: this is the floor from now on";
+    reason += ", level: this is the floor from now on";
     height_ = height;
     level_pairs_ = 0;
   }
-  return reason.str();
+  return reason;
 }
 
 }  // namespace sdvo

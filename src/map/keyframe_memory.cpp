@@ -5,7 +5,7 @@
 namespace sdvo {
 namespace {
 
-constexpr double kMost = 0.6;  // of a key frame's points (chosen): a view of so many shows the same place
+constexpr double kMost = 0.6;  // ratio of a key frame's points (chosen): a view that has more shows the same place
 
 }  // namespace
 
@@ -39,15 +39,15 @@ void KeyframeMemory::remember(const StereoCamera& camera, OldKeyframe keyframe) 
 
 const OldKeyframe* KeyframeMemory::nearest(const StereoCamera& camera, const Eigen::Isometry3d& T_camera_origin,
                                            int least) const {
-  constexpr double kFarthest = 3.0;  // baselines: seen from there, a disparity's error shifts a point by 3 times that
+  constexpr double kFarthest = 3.0;  // baselines (chosen): the error of a disparity shifts points by 3 times as much
   const Eigen::Vector3d here = T_camera_origin.inverse().translation();
   const OldKeyframe* nearest = nullptr;
-  double way = kFarthest * camera.baseline;
+  double least_distance = kFarthest * camera.baseline;
   for (const auto& keyframe : keyframes_) {
     const double distance = (keyframe->T_camera_origin.inverse().translation() - here).norm();
     const double enough = std::max<double>(least, kMost * static_cast<double>(keyframe->points.size()));
-    if (distance < way && keyframe->sharedWith(camera, T_camera_origin) >= enough)
-      nearest = keyframe.get(), way = distance;
+    if (distance < least_distance && keyframe->sharedWith(camera, T_camera_origin) >= enough)
+      nearest = keyframe.get(), least_distance = distance;
   }
   return nearest;
 }

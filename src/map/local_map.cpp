@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <unordered_map>
-#include <utility>
 
 #include "../common/statistics.hpp"
 #include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
@@ -127,7 +126,8 @@ void LocalMap::insert(const PatchAlignmentOptions& alignment, const StereoFeatur
   if (!frames_.empty() && !frames_.back().is_keyframe) removeFrame(frames_.size() - 1);
   frames_.push_back({id, T_camera_origin, false, false, features.stamp});
   frames_.back().is_keyframe = needsKeyframe();
-  // With patches the corner defines the point's place, so its own error is small. Without, it errs as any later one.
+  // With patches the point is by definition where this corner was detected, so the first sighting hardly errs. Without
+  // patches it errs as much as later ones.
   const double sigma =
       alignment.canAlign(features.patch_layout.side) ? NoiseOptions::kReference : options_.noise.corner;
   for (int i = 0; i < features.count(); ++i)
@@ -342,31 +342,25 @@ void LocalMap::removeFrame(std::size_t index) {
   points_.erase(std::remove_if(points_.begin(), points_.end(), is_forgotten), points_.end());
 }
 
-void LocalMap::Problem::clear() {
-  window.T_camera_origin.clear(), window.points.clear(), window.observations.clear();
-  frame_ids.clear(), points.clear(), newest.clear();
-}
-
-void LocalMap::pose(Problem& problem) const {
+LocalMap::Problem LocalMap::problem() const {
+  Problem problem;
   Window& window = problem.window;
   window.camera = camera_;
-  for (const Frame& frame : frames_) {
-    window.T_camera_origin.push_back(frame.T_camera_origin);
-    problem.frame_ids.push_back(frame.id);
-  }
+  for (const Frame& frame : frames_) window.T_camera_origin.push_back(frame.T_camera_origin);
   for (std::size_t p = 0; p < points_.size(); ++p) {
     const Point& point = points_[p];
     if (point.observations.size() < 2) continue;
-    int frame = 0;
+    std::size_t frame = 0;
     for (const FrameObservation& observation : point.observations) {
-      while (problem.frame_ids[static_cast<std::size_t>(frame)] < observation.frame_id) ++frame;
-      window.observations.push_back({observation, static_cast<int>(problem.points.size()), frame});
+      while (frames_[frame].id < observation.frame_id) ++frame;
+      window.observations.push_back({observation, static_cast<int>(problem.points.size()), static_cast<int>(frame)});
     }
     if (point.observations.back().frame_id == newestId())
       problem.newest.push_back(static_cast<int>(window.observations.size()) - 1);
     window.points.push_back(point.position);
     problem.points.push_back(static_cast<int>(p));
   }
+  return problem;
 }
 
 std::vector<Eigen::Vector3d> LocalMap::positions() const {
@@ -385,9 +379,8 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   Adjustment adjustment;
   const int newest = static_cast<int>(frames_.size()) - 1;
   if (newest == 0) return adjustment;
-  problem_.clear();
-  pose(problem_);
-  Window& window = problem_.window;
+  Problem problem = this->problem();
+  Window& window = problem.window;
   window.calibration = calibration;
   window.calibration_prior = prior;
   window.floor = floor;
@@ -396,10 +389,7 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   for (const int pose : {newest, newest - 1})
     if (pose > 0) poses.push_back(pose);
   const WindowSolution& solution = optimizer.optimize(window, poses);
-  if (!solution.success) {
-    problem_.clear();
-    return adjustment;
-  }
+  if (!solution.success) return adjustment;
   adjustment.success = true;
   adjustment.calibration_information = solution.calibration_information;
   adjustment.common_disparity_square = solution.common_disparity_square;
@@ -416,14 +406,13 @@ LocalMap::Adjustment LocalMap::adjust(WindowOptimizer& optimizer, const Calibrat
   calibration = window.calibration;
   for (std::size_t f = 0; f < frames_.size(); ++f)
     frames_[f].T_camera_origin = orthonormalised(window.T_camera_origin[f]);
-  for (std::size_t i = 0; i < problem_.points.size(); ++i)
-    points_[problem_.points[i]].position.ray_and_inverse_depth = window.points[i].ray_and_inverse_depth;
+  for (std::size_t i = 0; i < problem.points.size(); ++i)
+    points_[problem.points[i]].position.ray_and_inverse_depth = window.points[i].ray_and_inverse_depth;
   std::vector<double> newest_squares;
-  for (const int i : problem_.newest) newest_squares.push_back(solution.squares[i]);
+  for (const int i : problem.newest) newest_squares.push_back(solution.squares[i]);
   adjustment.newest_measured = static_cast<int>(newest_squares.size());
   adjustment.newest_square = median(newest_squares);
-  cutOff(solution.squares, adjustment);
-  problem_.clear();
+  cutOff(problem, solution.squares, adjustment);
   return adjustment;
 }
 
@@ -432,14 +421,14 @@ double LocalMap::varianceOfMotion() const {
   return frames_.size() < 2 ? newest : 0.5 * (newest + frames_[frames_.size() - 2].variance);
 }
 
-void LocalMap::cutOff(const std::vector<double>& squares, Adjustment& adjustment) {
+void LocalMap::cutOff(const Problem& problem, const std::vector<double>& squares, Adjustment& adjustment) {
   const double gate = 2.0 * noiseGate(2);  // the point's position errs as much as its observation's
-  for (const int i : problem_.newest) {
+  for (const int i : problem.newest) {
     // The sigma of a corner that no patch confirms allows for a neighbour's corner. The gate does not: the point's own
     // corner lies within a corner's noise.
-    const double wider = std::max(problem_.window.observations[i].sigma / options_.noise.corner, 1.0);
+    const double wider = std::max(problem.window.observations[i].sigma / options_.noise.corner, 1.0);
     if (wider * wider * squares[i] <= gate) continue;
-    Point& point = points_[problem_.points[problem_.window.observations[i].point]];
+    Point& point = points_[problem.points[problem.window.observations[i].point]];
     adjustment.rejected.push_back(point.observations.back().feature);
     --point.seen;
     point.observations.pop_back();

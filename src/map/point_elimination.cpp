@@ -89,14 +89,14 @@ void movePoints(const std::vector<EliminatedPoint>& points, const std::vector<Po
 }
 
 void PoseEquations::setZero(int poses) {
-  hessian_.setZero(6 * poses + kCalibration, 6 * poses + kCalibration);
-  gradient_.setZero(6 * poses + kCalibration);
+  hessian.setZero(6 * poses + kCalibration, 6 * poses + kCalibration);
+  gradient.setZero(6 * poses + kCalibration);
 }
 
 EliminatedPoint PoseEquations::add(const WindowProjection& projection, const ObservedPoint& point,
                                    const Linearisation& linearisation, PoseFactor* factors, double* squares) {
   constexpr double kLeastInformation = 1e-9;  // keeps H invertible if no observation constrains a direction
-  const Eigen::Index calibration = hessian_.rows() - kCalibration;
+  const Eigen::Index calibration = hessian.rows() - kCalibration;
   Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
   Eigen::Vector3d g = Eigen::Vector3d::Zero();
   EliminatedPoint result;
@@ -118,7 +118,7 @@ EliminatedPoint PoseEquations::add(const WindowProjection& projection, const Obs
     g.noalias() += weighted.transpose() * at.value;
     result.by_calibration.noalias() += weighted_shape.transpose() * J.by_point.row(2);
     result.calibration_gradient += weighted_shape.transpose() * at.value.z();
-    hessian_.bottomRightCorner<kCalibration, kCalibration>() +=
+    hessian.bottomRightCorner<kCalibration, kCalibration>() +=
         at.inverse_noise.z() * at.shape.transpose() * weighted_shape;
     result.weight += w;
     result.disparity_residual += w * at.value.z();
@@ -133,10 +133,10 @@ EliminatedPoint PoseEquations::add(const WindowProjection& projection, const Obs
     toPose<1>(rho, at.P, weighted_place.lazyProduct(at.value), factor.gradient);
     Eigen::Matrix<double, 6, 3> by_both;
     toPose<3>(rho, at.P, weighted_place.lazyProduct(J.by_place), by_both);
-    auto of_pose = hessian_.block<6, 6>(6 * factor.pose, 6 * factor.pose);
+    auto of_pose = hessian.block<6, 6>(6 * factor.pose, 6 * factor.pose);
     of_pose.leftCols<3>() += rho * by_both;
     for (int k = 3; k < 6; ++k) of_pose.block<1, 3>(k, 3) += at.P.cross(by_both.row(k)).transpose();
-    hessian_.block<kCalibration, 6>(calibration, 6 * factor.pose).noalias() +=
+    hessian.block<kCalibration, 6>(calibration, 6 * factor.pose).noalias() +=
         weighted_shape.transpose() * J.disparity_by_pose.transpose();
   }
 
@@ -151,14 +151,14 @@ EliminatedPoint PoseEquations::add(const WindowProjection& projection, const Obs
     PoseFactor& factor = factors[k];
     factor.Y = (factor.Y * result.R.transpose()).eval();
     factor.gradient.noalias() -= factor.Y * result.gradient;
-    gradient_.segment<6>(6 * factor.pose) += factor.gradient;
-    hessian_.block<kCalibration, 6>(calibration, 6 * factor.pose).noalias() -=
+    gradient.segment<6>(6 * factor.pose) += factor.gradient;
+    hessian.block<kCalibration, 6>(calibration, 6 * factor.pose).noalias() -=
         result.by_calibration * factor.Y.transpose();
     for (int other = 0; other <= k; ++other)
-      subtractProduct(factor.Y, factors[other].Y, hessian_.block<6, 6>(6 * factor.pose, 6 * factors[other].pose));
+      subtractProduct(factor.Y, factors[other].Y, hessian.block<6, 6>(6 * factor.pose, 6 * factors[other].pose));
   }
-  hessian_.bottomRightCorner<kCalibration, kCalibration>() -= result.by_calibration * result.by_calibration.transpose();
-  gradient_.tail<kCalibration>() += result.calibration_gradient;
+  hessian.bottomRightCorner<kCalibration, kCalibration>() -= result.by_calibration * result.by_calibration.transpose();
+  gradient.tail<kCalibration>() += result.calibration_gradient;
   return result;
 }
 

@@ -69,22 +69,16 @@ void movePoints(const std::vector<EliminatedPoint>& points, const std::vector<Po
                 std::vector<Eigen::Vector3d>& ray_and_inverse_depth);
 
 /// Reduced normal equations of all poses of a window but the first, and of the rig's calibration.
-class PoseEquations {
- public:
+struct PoseEquations {
+  Eigen::MatrixXd hessian;   ///< lower triangle: the poses by their left perturbations (m, rad), then the calibration
+  Eigen::VectorXd gradient;  ///< in the same order
+
   void setZero(int poses);
 
   /// Adds a point's observations with the point eliminated (Schur complement). Writes a factor for each observation
   /// from a pose that may move, and the same squares as squareResiduals().
   EliminatedPoint add(const WindowProjection& projection, const ObservedPoint& point,
                       const Linearisation& linearisation, PoseFactor* factors, double* squares);
-
-  /// The lower triangle, of the poses by their left perturbations (m, rad), then the calibration.
-  const Eigen::MatrixXd& hessian() const { return hessian_; }
-  const Eigen::VectorXd& gradient() const { return gradient_; }
-
- private:
-  Eigen::MatrixXd hessian_;
-  Eigen::VectorXd gradient_;
 };
 
 }  // namespace sdvo

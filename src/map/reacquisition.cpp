@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "../common/statistics.hpp"
-#include "stereo_descriptor_vo/matching/view_matcher.hpp"
 #include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
 #include "stereo_descriptor_vo/motion/motion_refinement.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
@@ -15,7 +14,7 @@ namespace sdvo {
 namespace {
 
 FeatureMatcherOptions ungated(FeatureMatcherOptions options) {
-  options.gating = false;  // nothing is known of where the camera is
+  options.gating = false;  // the camera's pose is unknown
   return options;
 }
 

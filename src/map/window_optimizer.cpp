@@ -3,27 +3,13 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "../common/statistics.hpp"
 #include "point_elimination.hpp"
 #include "stereo_descriptor_vo/motion/motion_refinement.hpp"
-#include "stereo_descriptor_vo/motion/noise.hpp"
 
 namespace sdvo {
-inline namespace window_optimizing {  // with a name: WindowOptimizer::Memory has fields of these types
-
-using CalibrationVector = RigCalibration::Vector;
-
-/// Normal equations of poses and calibration after the elimination of the points, and the factors for the points'
-/// steps.
-struct ReducedSystem {
-  Eigen::MatrixXd hessian;  ///< lower triangle: poses but the first, then the calibration
-  Eigen::VectorXd gradient;
-  std::vector<EliminatedPoint> points;
-  std::vector<PoseFactor> factors;  ///< sorted by point
-  double cost = 0.0;
-};
+namespace {
 
 /// The unknowns: poses, points (ray and inverse depth of each point with an observation, in their order), calibration.
 struct Estimate {
@@ -50,18 +36,55 @@ std::optional<double> varianceOf(std::vector<double>& squares) {
   return median(squares) / kMedianOfChiSquare;
 }
 
-/// Linear algebra of a window. Reuses its memory for the next one.
-class Solver {
+}  // namespace
+
+/// Optimises one window after the other in the same memory.
+class WindowOptimizer::Solver {
  public:
   explicit Solver(const WindowOptimizerOptions& options) : options_(options) {}
 
+  const WindowSolution& optimize(Window& window, const std::vector<int>& covariance_of) {
+    constexpr double kUndamped = 1e-5, kLargestDamping = 1e4;
+    take(window);
+    solution_.success = false;
+    solution_.iterations = 0;
+    double damping = kUndamped, damping_of_system = kUndamped;
+    bool accepted = false;
+    // A step that increases the cost is tried again with more damping.
+    while (solution_.iterations < options_.iterations && damping < kLargestDamping) {
+      linearise(damping);
+      damping_of_system = damping;
+      const std::optional<double> next_cost = tryStep(damping);
+      accepted = next_cost && *next_cost <= cost_;
+      if (!accepted) {
+        damping *= 100.0;
+        continue;
+      }
+      ++solution_.iterations;
+      std::swap(estimate_, next_);
+      damping = std::max(0.1 * damping, 1e-8);
+      if (cost_ - *next_cost < 1e-4 * (cost_ + 1.0)) break;
+    }
+    give(window);
+
+    // The last linearisation, one step before the result, is used: this saves half of the work. But damping counts as
+    // information about the points, so a damped system is computed again.
+    if (damping_of_system > kUndamped) linearise(kUndamped);
+    solution_.common_disparity_square = commonVariance();
+    if (!accepted) cost(estimate_, squares_);  // they are those of a refused step
+    solution_.success = covariances(covariance_of);
+    if (solution_.success) std::swap(solution_.squares, squares_);
+    return solution_;
+  }
+
+ private:
   /// Starts with a window, which must stay valid; its values become the first estimate.
-  void take(const Window& window, Estimate& estimate) {
+  void take(const Window& window) {
     window_ = &window;
     common_sigma_ = window.calibration_prior.common_sigma.value_or(options_.noise.common_disparity);
     const auto& observations = window.observations;
     first_of_point_.clear();
-    anchors_.clear(), anchor_of_point_.clear(), estimate.points.clear();
+    anchors_.clear(), anchor_of_point_.clear(), estimate_.points.clear();
     for (std::size_t i = 0; i < observations.size(); ++i) {
       if (i > 0 && observations[i].point == observations[i - 1].point) continue;
       first_of_point_.push_back(static_cast<int>(i));
@@ -70,27 +93,23 @@ class Solver {
       if (anchors_.empty() || point.T_origin_anchor.matrix() != anchors_.back().matrix())
         anchors_.push_back(point.T_origin_anchor);
       anchor_of_point_.push_back(anchors_.size() - 1);
-      estimate.points.push_back(point.ray_and_inverse_depth);
+      estimate_.points.push_back(point.ray_and_inverse_depth);
     }
     first_of_point_.push_back(static_cast<int>(observations.size()));
-    estimate.T_camera_origin = window.T_camera_origin;
-    estimate.calibration = window.calibration;
+    estimate_.T_camera_origin = window.T_camera_origin;
+    estimate_.calibration = window.calibration;
     poses_ = static_cast<int>(window.T_camera_origin.size()) - 1;
-    size_ = 6 * poses_ + kCalibration;
   }
 
   /// Writes the estimate into the window that take() was given.
-  void give(const Estimate& estimate, Window& window) const {
-    window.T_camera_origin = estimate.T_camera_origin;
-    window.calibration = estimate.calibration;
-    for (std::size_t p = 0; p < estimate.points.size(); ++p) {
+  void give(Window& window) const {
+    window.T_camera_origin = estimate_.T_camera_origin;
+    window.calibration = estimate_.calibration;
+    for (std::size_t p = 0; p < estimate_.points.size(); ++p) {
       const WindowObservation& first = window.observations[static_cast<std::size_t>(first_of_point_[p])];
-      window.points[static_cast<std::size_t>(first.point)].ray_and_inverse_depth = estimate.points[p];
+      window.points[static_cast<std::size_t>(first.point)].ray_and_inverse_depth = estimate_.points[p];
     }
   }
-
-  int poses() const { return poses_; }
-  int size() const { return size_; }
 
   /// Square of the residual at which the Cauchy kernel bends: a square s costs bend * log(1 + s / bend).
   double bend() const { return options_.kernel_scale * options_.kernel_scale; }
@@ -106,83 +125,106 @@ class Solver {
     return costOf(estimate, squares);
   }
 
-  /// Computes the reduced system at an estimate and reuses the system's memory.
-  void linearise(const Estimate& estimate, double damping, ReducedSystem& system) {
-    eliminatePoints(estimate, {bend(), damping}, system);
-    system.hessian = equations_.hessian();
-    system.gradient = equations_.gradient();
-    const CalibrationBelief& prior = window_->calibration_prior;
-    system.hessian.bottomRightCorner<kCalibration, kCalibration>() += prior.information;
-    system.gradient.tail<kCalibration>() += prior.information * (prior.mean - estimate.calibration.value);
-    if (window_->floor) holdToFloor(estimate, system.hessian, system.gradient);
-    system.cost = costOf(estimate, squares_);
+  /// Normal equations and cost at the estimate, and the factors for the points' steps.
+  void linearise(double damping) {
+    points_.resize(estimate_.points.size());
+    factors_.resize(window_->observations.size());
+    linearised_squares_.resize(window_->observations.size());
+    equations_.setZero(poses_);
+    const WindowProjection projection = {window_->camera, estimate_.calibration};
+    placeAnchors(estimate_);
+    PoseFactor* factors = factors_.data();
+    for (std::size_t p = 0; p < points_.size(); ++p) {
+      points_[p] = equations_.add(projection, observedPoint(estimate_, p), {bend(), damping}, factors,
+                                  linearised_squares_.data() + first_of_point_[p]);
+      factors += points_[p].factors;
+    }
+    hessian_ = equations_.hessian;
+    gradient_ = equations_.gradient;
+    addPriors(hessian_, gradient_);
+    cost_ = costOf(estimate_, linearised_squares_);
   }
 
-  /// Variance, px^2, of the error that all disparities of one point share. `squares`: scratch memory.
-  std::optional<double> commonVariance(const std::vector<EliminatedPoint>& points, std::vector<double>& squares) const {
+  /// Adds the priors of the calibration and of the floor.
+  void addPriors(Eigen::MatrixXd& hessian, Eigen::VectorXd& gradient) const {
+    const CalibrationBelief& prior = window_->calibration_prior;
+    hessian.bottomRightCorner<kCalibration, kCalibration>() += prior.information;
+    gradient.tail<kCalibration>() += prior.information * (prior.mean - estimate_.calibration.value);
+    Floor::Jacobian jacobian;
+    for (int f = 0; window_->floor && f < poses_; ++f) {
+      const Eigen::Vector3d residual = window_->floor->residual(estimate_.T_camera_origin[f + 1], &jacobian);
+      const Eigen::Vector3d weights = residual.cwiseAbs2().unaryExpr(&Floor::weight);
+      hessian.block<6, 6>(6 * f, 6 * f) += jacobian.transpose() * weights.asDiagonal() * jacobian;
+      gradient.segment<6>(6 * f) -= jacobian.transpose() * weights.cwiseProduct(residual);
+    }
+  }
+
+  /// Computes the estimate after a damped step, and its cost. None if the equations do not determine the step.
+  std::optional<double> tryStep(double damping) {
+    damped_ = hessian_;  // its lower triangle
+    damped_.diagonal().head(6 * poses_) *= 1.0 + damping;
+    factor_.compute(damped_);
+    if (factor_.info() != Eigen::Success) return std::nullopt;
+    step_ = factor_.solve(gradient_);
+    const RigCalibration::Vector of_calibration = step_.tail<kCalibration>();
+    next_.calibration.value = estimate_.calibration.value + of_calibration;
+    next_.T_camera_origin = estimate_.T_camera_origin;
+    for (int f = 0; f < poses_; ++f)
+      next_.T_camera_origin[f + 1] = expSE3(step_.segment<6>(6 * f)) * estimate_.T_camera_origin[f + 1];
+    next_.points = estimate_.points;
+    movePoints(points_, factors_, step_.head(6 * poses_), of_calibration, next_.points);
+    return cost(next_, squares_);
+  }
+
+  /// Variance, px^2, of the error that all disparities of one point share.
+  std::optional<double> commonVariance() {
     double of_means = 0.0;  // variance of a point's mean disparity by the noise that is independent in each
-    squares.clear();
-    for (std::size_t p = 0; p < points.size(); ++p) {
+    common_squares_.clear();
+    for (std::size_t p = 0; p < points_.size(); ++p) {
       const int observations = first_of_point_[p + 1] - first_of_point_[p];
-      const auto square = commonSquare(points[p]);
+      const auto square = commonSquare(points_[p]);
       if (!square) continue;
-      squares.push_back(disparityVariance(observations) * *square);
+      common_squares_.push_back(disparityVariance(observations) * *square);
       of_means += options_.noise.disparity * options_.noise.disparity / observations;
     }
-    const auto variance = varianceOf(squares);
+    const auto variance = varianceOf(common_squares_);
     if (!variance) return std::nullopt;
-    return *variance - of_means / static_cast<double>(squares.size());
+    return *variance - of_means / static_cast<double>(common_squares_.size());
   }
 
   /// Sandwich covariance of an M-estimator (Huber 1967, White 1980): A^-1 B A^-1. The bread A is the cost's second
   /// derivatives. The meat B is the sum of outer products of gradients, one gradient for each cluster of observations
   /// with correlated errors (Liang and Zeger 1986). A cluster is a part of the image: observations of a point share the
-  /// error of its disparity, neighbours share those of patches and rectification. Few points make B noisy, so only
-  /// the mean ratio of both covariances is taken from it, and scales A^-1. A and B are of the last linearisation and
-  /// scaled to `squares`, the squared residuals at the result. `poses`: those whose covariance is needed.
-  bool covariances(const Estimate& estimate, const std::vector<double>& squares, const std::vector<int>& poses,
-                   ReducedSystem& system, WindowSolution& solution) {
-    const RigCalibration::Matrix& prior = window_->calibration_prior.information;
-    system.hessian = equations_.hessian();
-    system.gradient = equations_.gradient();
-    known_.setZero(size_, size_);  // information of the priors, without the points'
-    known_.bottomRightCorner<kCalibration, kCalibration>() = prior;
-    if (window_->floor) holdToFloor(estimate, known_, system.gradient);
-    const auto [bread, meat] = sandwichScale(squares);
-    system.hessian = bread * system.hessian + known_;
-    factor_.compute(system.hessian);
-    if (factor_.info() != Eigen::Success) return false;  // for example, no observation constrains one of the poses
+  /// error of its disparity, neighbours share those of patches and rectification. Few points make B noisy. Hence only
+  /// the mean ratio of both covariances is taken from B, as a factor on A^-1. A and B are of the last linearisation,
+  /// scaled to `squares_`, the squared residuals at the result. False if an observation is missing that constrains a
+  /// pose. `poses`: those whose covariance is needed.
+  bool covariances(const std::vector<int>& poses) {
+    const int size = 6 * poses_ + kCalibration;
+    known_.setZero(size, size);  // information of the priors, without the points'
+    addPriors(known_, gradient_);
+    const auto [bread, meat] = sandwichScale();
+    hessian_ = bread * equations_.hessian + known_;
+    factor_.compute(hessian_);
+    if (factor_.info() != Eigen::Success) return false;
 
     const int asked = 6 * static_cast<int>(poses.size());
-    units_.setZero(size_, asked + kCalibration);
+    units_.setZero(size, asked + kCalibration);
     for (int k = 0; k < asked; ++k) units_(6 * (poses[static_cast<std::size_t>(k / 6)] - 1) + k % 6, k) = 1.0;
     units_.bottomRightCorner<kCalibration, kCalibration>().setIdentity();
     solved_ = factor_.solve(units_);
     const RigCalibration::Matrix of_calibration = solved_.bottomRightCorner<kCalibration, kCalibration>();
     const RigCalibration::Matrix certainty = of_calibration.inverse();
-    solution.calibration_information = (certainty - prior) / bread;
-    solution.pose_by_calibration = units_.leftCols(asked).transpose() * solved_.rightCols<kCalibration>() * certainty;
+    solution_.calibration_information = (certainty - window_->calibration_prior.information) / bread;
+    solution_.pose_by_calibration = units_.leftCols(asked).transpose() * solved_.rightCols<kCalibration>() * certainty;
 
     const auto of_poses = solved_.leftCols(asked);
     const Eigen::MatrixXd of_known = of_poses.transpose() * known_.selfadjointView<Eigen::Lower>() * of_poses;
     const Eigen::MatrixXd of_points = units_.leftCols(asked).transpose() * of_poses - of_known;
-    solution.pose_covariance = meat * meatOverBread(system, estimate, of_poses, of_points) * of_points + of_known;
-    return solution.pose_covariance.allFinite();
+    solution_.pose_covariance = meat * meatOverBread(of_poses, of_points) * of_points + of_known;
+    return solution_.pose_covariance.allFinite();
   }
 
-  /// Applies a step of poses and calibration to an estimate, and the points' steps that follow from it.
-  void makeStep(const Estimate& estimate, const ReducedSystem& system, const Eigen::VectorXd& step,
-                Estimate& next) const {
-    const CalibrationVector calibration = step.tail<kCalibration>();
-    next.calibration.value = estimate.calibration.value + calibration;
-    next.T_camera_origin = estimate.T_camera_origin;
-    for (int f = 0; f < poses_; ++f)
-      next.T_camera_origin[f + 1] = expSE3(step.segment<6>(6 * f)) * estimate.T_camera_origin[f + 1];
-    next.points = estimate.points;
-    movePoints(system.points, system.factors, step.head(6 * poses_), calibration, next.points);
-  }
-
- private:
   /// Factors from matrices of the last linearisation to those at the result.
   struct SandwichScale {
     double bread;  ///< from the normal equations to the second derivatives
@@ -191,12 +233,13 @@ class Solver {
   /// An observation with the weight w adds w times a product of Jacobians to the normal equations. To the second
   /// derivatives it adds w^2 times that, on average over the two directions of its residual; to the meat also w^2. The
   /// elimination of the point leaves w_i - w_i^2 / sum(w) of each. The factors are ratios of the sums of these.
-  SandwichScale sandwichScale(const std::vector<double>& squares) const {
+  SandwichScale sandwichScale() const {
     double weights = 0.0, before = 0.0, now = 0.0;
     for (std::size_t p = 0; p + 1 < first_of_point_.size(); ++p) {
       double w1 = 0.0, w2 = 0.0, w4 = 0.0, now2 = 0.0, now4 = 0.0;  // powers
       for (int i = first_of_point_[p]; i < first_of_point_[p + 1]; ++i) {
-        const double w = weight(squares_[i]), square = w * w, w_now = weight(squares[i]), now_square = w_now * w_now;
+        const double w = weight(linearised_squares_[i]), square = w * w, w_now = weight(squares_[i]),
+                     now_square = w_now * w_now;
         w1 += w, w2 += square, w4 += square * square, now2 += now_square, now4 += now_square * now_square;
       }
       weights += w1 - w2 / w1, before += w2 - w4 / w2, now += now2 - now4 / now2;
@@ -206,14 +249,12 @@ class Solver {
 
   /// Mean ratio, over the directions, of the covariance from gradients to that from second derivatives: their trace
   /// ratio. The fit makes gradients smaller than the errors; the degrees of freedom correct for this.
-  double meatOverBread(const ReducedSystem& system, const Estimate& estimate,
-                       const Eigen::Ref<const Eigen::MatrixXd>& solved, const Eigen::MatrixXd& covariance) {
+  double meatOverBread(const Eigen::Ref<const Eigen::MatrixXd>& solved, const Eigen::MatrixXd& covariance) {
     double freedom = 0.0, trace = 0.0;  // trace of covariance^-1 times the sum of outer products
-    for (const EliminatedPoint& point : system.points)
+    for (const EliminatedPoint& point : points_)
       freedom += 2.0 * point.observations - 2.0;  // u, v and one disparity against a position
     const Eigen::MatrixXd whitened = covariance.llt().matrixL().solve(solved.transpose());
-    for (Eigen::Index row = 0; row < whitened.rows(); row += 6)
-      trace += meatOf(system, estimate, whitened.middleRows<6>(row));
+    for (Eigen::Index row = 0; row < whitened.rows(); row += 6) trace += meatOf(whitened.middleRows<6>(row));
     return trace / static_cast<double>(solved.cols()) * freedom / std::max(freedom - 6.0 * poses_, 1.0);
   }
 
@@ -227,19 +268,18 @@ class Solver {
   /// Sum over clusters of the squared length of the cluster's gradient. A cluster is the part of the image in which a
   /// point was seen first. Enlarged images, or grass in the wind, have errors that correlate over a larger area. Hence
   /// areas of two and four times the width are tried, and the largest sum counts.
-  double meatOf(const ReducedSystem& system, const Estimate& estimate,
-                const Eigen::Matrix<double, 6, Eigen::Dynamic>& by) {
+  double meatOf(const Eigen::Matrix<double, 6, Eigen::Dynamic>& by) {
     constexpr int kSide = 64;  // clusters along each axis at most
     clusters_.clear();
     const double scale = window_->camera.fx / kPart;
     const auto index = [&](double ray) { return std::clamp(static_cast<int>(ray * scale + kSide / 2), 0, kSide - 1); };
-    const PoseFactor* observation = system.factors.data();
-    for (std::size_t p = 0; p < system.points.size(); ++p) {
-      const EliminatedPoint& point = system.points[p];
+    const PoseFactor* observation = factors_.data();
+    for (std::size_t p = 0; p < points_.size(); ++p) {
+      const EliminatedPoint& point = points_[p];
       Vector6d moved = by.rightCols<kCalibration>().lazyProduct(point.calibration_gradient);
       for (const PoseFactor* end = observation + point.factors; observation != end; ++observation)
         moved += by.middleCols<6>(6 * observation->pose).lazyProduct(observation->gradient);
-      clusters_.push_back({index(estimate.points[p].x()), index(estimate.points[p].y()), moved});
+      clusters_.push_back({index(estimate_.points[p].x()), index(estimate_.points[p].y()), moved});
     }
     double most = 0.0;
     for (int side = kSide; side >= kSide / 4; side /= 2) {
@@ -260,21 +300,6 @@ class Solver {
     return most;
   }
 
-  void eliminatePoints(const Estimate& estimate, const Linearisation& linearisation, ReducedSystem& system) {
-    system.points.resize(estimate.points.size());
-    system.factors.resize(window_->observations.size());
-    squares_.resize(window_->observations.size());
-    equations_.setZero(poses_);
-    const WindowProjection projection = {window_->camera, estimate.calibration};
-    placeAnchors(estimate);
-    PoseFactor* factors = system.factors.data();
-    for (std::size_t p = 0; p < estimate.points.size(); ++p) {
-      system.points[p] = equations_.add(projection, observedPoint(estimate, p), linearisation, factors,
-                                        squares_.data() + first_of_point_[p]);
-      factors += system.points[p].factors;
-    }
-  }
-
   /// Fills T_camera_anchor_: for each anchor the transforms of all poses.
   void placeAnchors(const Estimate& estimate) {
     T_camera_anchor_.clear();
@@ -291,18 +316,8 @@ class Solver {
   double costOf(const Estimate& estimate, const std::vector<double>& squares) const {
     LogSum costs;
     for (const double square : squares) costs.add(square / bend());
-    const CalibrationVector error = estimate.calibration.value - window_->calibration_prior.mean;
+    const RigCalibration::Vector error = estimate.calibration.value - window_->calibration_prior.mean;
     return error.dot(window_->calibration_prior.information * error) + bend() * costs.value() + floorCost(estimate);
-  }
-
-  void holdToFloor(const Estimate& estimate, Eigen::MatrixXd& hessian, Eigen::VectorXd& gradient) const {
-    Floor::Jacobian jacobian;
-    for (int f = 0; f < poses_; ++f) {
-      const Eigen::Vector3d residual = window_->floor->residual(estimate.T_camera_origin[f + 1], &jacobian);
-      const Eigen::Vector3d weights = residual.cwiseAbs2().unaryExpr(&Floor::weight);
-      hessian.block<6, 6>(6 * f, 6 * f) += jacobian.transpose() * weights.asDiagonal() * jacobian;
-      gradient.segment<6>(6 * f) -= jacobian.transpose() * weights.cwiseProduct(residual);
-    }
   }
 
   double floorCost(const Estimate& estimate) const {
@@ -319,98 +334,45 @@ class Solver {
   }
 
   WindowOptimizerOptions options_;
+
   const Window* window_ = nullptr;
   double common_sigma_ = 0.0;
+  int poses_ = 0;  ///< that may move
   std::vector<int> first_of_point_;
   std::vector<Eigen::Isometry3d> anchors_, T_camera_anchor_;
   std::vector<std::size_t> anchor_of_point_;
-  PoseEquations equations_;
-  std::vector<double> squares_;
+  Estimate estimate_, next_;
+
+  // Of the last linearisation.
+  PoseEquations equations_;  ///< without priors
+  Eigen::MatrixXd hessian_;  ///< lower triangle: poses but the first, then the calibration
+  Eigen::VectorXd gradient_;
+  std::vector<EliminatedPoint> points_;
+  std::vector<PoseFactor> factors_;  ///< sorted by point
+  std::vector<double> linearised_squares_;
+  double cost_ = 0.0;
+
   struct Cluster {
     int x, y;
     Vector6d gradient;
   };
   std::vector<Cluster> clusters_;
   std::vector<int> cluster_at_;
-  Eigen::MatrixXd known_, units_, solved_;
+  Eigen::MatrixXd damped_, known_, units_, solved_;
   Eigen::LLT<Eigen::MatrixXd> factor_;
-  int poses_ = 0, size_ = 0;
+  Eigen::VectorXd step_;
+  std::vector<double> squares_, common_squares_;
+  WindowSolution solution_;
 };
 
-}  // namespace window_optimizing
-
-struct WindowOptimizer::Memory {
-  explicit Memory(const WindowOptimizerOptions& options) : solver(options) {}
-
-  Solver solver;
-  ReducedSystem system;
-  Estimate estimate, next;
-  Eigen::MatrixXd hessian;
-  Eigen::LLT<Eigen::MatrixXd> factor;
-  Eigen::VectorXd step;
-  std::vector<double> squares, common_squares;
-  WindowSolution solution;
-};
-
-WindowOptimizer::WindowOptimizer(const WindowOptimizerOptions& options)
-    : options_(options), memory_(std::make_unique<Memory>(options_)) {}
+WindowOptimizer::WindowOptimizer(const WindowOptimizerOptions& options) : solver_(std::make_unique<Solver>(options)) {}
 
 WindowOptimizer::WindowOptimizer(WindowOptimizer&&) noexcept = default;
 WindowOptimizer& WindowOptimizer::operator=(WindowOptimizer&&) noexcept = default;
 WindowOptimizer::~WindowOptimizer() = default;
 
-const WindowSolution& WindowOptimizer::optimize(Window& window) {
-  std::vector<int> all(window.T_camera_origin.size() - 1);
-  std::iota(all.begin(), all.end(), 1);
-  return optimize(window, all);
-}
-
 const WindowSolution& WindowOptimizer::optimize(Window& window, const std::vector<int>& covariance_of) {
-  constexpr double kUndamped = 1e-5, kLargestDamping = 1e4;
-  auto& [solver, system, estimate, next, hessian, factor, step, squares, common_squares, solution] = *memory_;
-  solver.take(window, estimate);
-  solution.success = false;
-  solution.iterations = 0;
-  double damping = kUndamped, damping_of_system = kUndamped;
-  bool accepted = false;
-  const int c = 6 * solver.poses();
-  // A step that increases the cost is tried again with more damping.
-  while (solution.iterations < options_.iterations && damping < kLargestDamping) {
-    solver.linearise(estimate, damping, system);
-    damping_of_system = damping;
-    hessian = system.hessian;  // its lower triangle
-    hessian.diagonal().head(c) *= 1.0 + damping;
-    factor.compute(hessian);
-    if (factor.info() != Eigen::Success) {
-      accepted = false, damping *= 100.0;
-      continue;
-    }
-    step = factor.solve(system.gradient);
-    solver.makeStep(estimate, system, step, next);
-    const double next_cost = solver.cost(next, squares);
-    accepted = next_cost <= system.cost;
-    if (accepted) {
-      ++solution.iterations;
-      const bool converged = system.cost - next_cost < 1e-4 * (system.cost + 1.0);
-      std::swap(estimate, next);
-      damping = std::max(0.1 * damping, 1e-8);
-      if (converged) break;
-    } else {
-      damping *= 100.0;
-    }
-  }
-
-  solver.give(estimate, window);
-
-  // The last linearisation, one step before the result, is used: this saves half of the work. But damping counts as
-  // information about the points, so a damped system is computed again.
-  if (damping_of_system > kUndamped) solver.linearise(estimate, kUndamped, system);
-  solution.common_disparity_square = solver.commonVariance(system.points, common_squares);
-  if (!accepted) solver.cost(estimate, squares);  // `squares` belongs to a refused step
-  if (!solver.covariances(estimate, squares, covariance_of, system, solution)) return solution;
-  std::swap(solution.squares, squares);
-  solution.success = true;
-  return solution;
+  return solver_->optimize(window, covariance_of);
 }
 
 }  // namespace sdvo

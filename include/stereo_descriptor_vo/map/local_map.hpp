@@ -178,18 +178,15 @@ class LocalMap {
     int seen = 1;  ///< number of confirmed pairs that saw it, also of those that left the map
   };
 
-  /// The optimizer's input, and which frames, points and observations of the map it consists of.
+  /// The optimizer's input, and which points and observations of the map it consists of.
   struct Problem {
     Window window;
-    std::vector<int> frame_ids;
     std::vector<int> points;  ///< for each point of the window its index in the map
     std::vector<int> newest;  ///< indices of the window's observations in the newest frame
-
-    void clear();
   };
 
   const Frame& oldest() const;
-  void pose(Problem& problem) const;
+  Problem problem() const;
   void forgetKeyframe();
   OldKeyframe keyframe(const Frame& frame) const;
   std::vector<int> sharedPoints() const;
@@ -198,7 +195,7 @@ class LocalMap {
   /// Whether a point is matched with new pairs: if the map has two observations of it, or a recent one.
   static bool isLookedFor(const Point& point, int since);
   void removeFrame(std::size_t index);
-  void cutOff(const std::vector<double>& squares, Adjustment& adjustment);
+  void cutOff(const Problem& problem, const std::vector<double>& squares, Adjustment& adjustment);
   bool needsKeyframe() const;
   static void takeDescriptor(Point& point, const StereoFeatures& features, int feature);
   void startPoint(const StereoFeatures& features, int feature, int id, const Eigen::Isometry3d& T_camera_origin,
@@ -211,7 +208,6 @@ class LocalMap {
   std::vector<Point> points_;
   KeyframeMemory memory_;
   int last_left_ = -1;  ///< id of the newest key frame that is older than the `keyframes` newest ones
-  Problem problem_;     ///< cleared when solved: its memory is used again, and copies of the map need not copy it
 };
 
 }  // namespace sdvo

@@ -61,15 +61,10 @@ class WindowOptimizer {
   /// The result is valid until the next call. `covariance_of`: poses whose covariance is needed, not the first one.
   /// Each costs six columns to solve.
   const WindowSolution& optimize(Window& window, const std::vector<int>& covariance_of);
-  /// With the covariance of all poses but the first.
-  const WindowSolution& optimize(Window& window);
-
-  const WindowOptimizerOptions& options() const { return options_; }
 
  private:
-  struct Memory;
-  WindowOptimizerOptions options_;
-  std::unique_ptr<Memory> memory_;
+  class Solver;
+  std::unique_ptr<Solver> solver_;
 };
 
 }  // namespace sdvo
