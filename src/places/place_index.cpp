@@ -7,12 +7,11 @@
 #include <random>
 #include <stdexcept>
 #include <string>
-#include <vector>
 
 namespace sdvo {
 namespace {
 
-/// Indices of the bits of which words are made, word after word, none twice. They depend on the row's length alone.
+/// Indices of the bits of all words, one word after the other, no bit twice. They depend only on the row's length.
 std::vector<int> sampleBits(int row_bits, int count) {
   std::vector<int> bits(static_cast<std::size_t>(row_bits));
   std::iota(bits.begin(), bits.end(), 0);

@@ -1,7 +1,6 @@
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <iterator>
 #include <limits>
 #include <opencv2/core.hpp>
@@ -93,7 +92,7 @@ void PlaceRecognition::forget(int id) {
 
 /// Whether the last pair becomes a key frame: it is far enough from the last one and has enough features.
 bool PlaceRecognition::isKeyframe(const StereoFeatures& features) const {
-  if (features.count() < PlaceVerifier::kLeastInliers) return false;
+  if (features.count() < kLeastPlaceInliers) return false;
   if (!last_ || !way_.known) return true;
   const Eigen::Isometry3d T_keyframe_camera = places_.at(*last_).T_odom_camera.inverse() * *way_.T_odom_camera;
   return T_keyframe_camera.translation().norm() >= options_.keyframe_distance ||
@@ -133,7 +132,7 @@ void PlaceRecognition::addKeyframe(const StereoFeatures& features, int id) {
 void PlaceRecognition::recognise(const Place& here, PlaceReport& report) {
   report.reason = "no place looks similar";
   for (const PlaceCandidate& candidate : report.candidates) {
-    report.match = verifier_.verify(places_.at(candidate.place).features, here.features);
+    report.match = verifyPlace(places_.at(candidate.place).features, here.features);
     report.reason = report.match.reason;
     if (!report.match.same) continue;
     const GraphEdge loop{candidate.place, here.id, GraphEdge::Kind::kLoop, report.match.T_place_camera,
@@ -160,7 +159,7 @@ bool PlaceRecognition::isPossible(const GraphEdge& loop) const {
   constexpr double kImpossible = 22.5;  // chi-square of six, 99.9 %
   const GraphPath path = graph_.path(loop.from, loop.to);
   if (!path.known) return true;
-  // A loop may err by more than its covariance says. Small corrections are always possible; else one inexact loop would
+  // The error of a loop may exceed its covariance. Small corrections are always possible; else one inexact loop would
   // make the graph reject all later, better ones.
   const Matrix6d inexact = isotropic(0.5 * 0.5, 0.03 * 0.03);
   const Matrix6d covariance = path.covariance + loop.covariance + graph_.drift(path.length, path.turn) + inexact;
@@ -205,7 +204,7 @@ std::vector<PlaceCandidate> PlaceRecognition::find(const PlaceSignature& signatu
 }
 
 PlaceMatch PlaceRecognition::verify(int place, const StereoFeatures& features) const {
-  return verifier_.verify(places_.at(place).features, thinOut(features, options_.max_features));
+  return verifyPlace(places_.at(place).features, thinOut(features, options_.max_features));
 }
 
 void PlaceRecognition::restore(std::vector<Place> places, const PoseGraph& graph) {

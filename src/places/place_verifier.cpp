@@ -4,7 +4,7 @@
 
 #include "../belief/motion_hypotheses.hpp"
 #include "../common/text.hpp"
-#include "stereo_descriptor_vo/matching/feature_matcher.hpp"
+#include "stereo_descriptor_vo/matching/view_matcher.hpp"
 
 namespace sdvo {
 namespace {
@@ -12,7 +12,6 @@ namespace {
 // Thresholds of the same place (chosen).
 constexpr double kLeastRatio = 0.3;      // inliers per match
 constexpr double kLeastCoverage = 0.25;  // by inliers, share of an 8x4 grid over the image
-constexpr double kLargestRms = 1.5;      // px per coordinate
 
 FeatureMatcherOptions matcherOptions() {
   FeatureMatcherOptions matcher;
@@ -23,7 +22,7 @@ FeatureMatcherOptions matcherOptions() {
 
 MotionEstimatorOptions estimatorOptions() {
   MotionEstimatorOptions estimator;
-  estimator.inlier_threshold = 3.0;  // px
+  estimator.inlier_threshold = 3.0;  // px (chosen)
   // Enough for the smallest inlier ratio that is accepted. A candidate that shows another place takes all of them.
   estimator.max_iterations = 150;
   return estimator;
@@ -31,14 +30,13 @@ MotionEstimatorOptions estimatorOptions() {
 
 }  // namespace
 
-PlaceVerifier::PlaceVerifier() : views_(matcherOptions(), estimatorOptions()) {}
-
-PlaceMatch PlaceVerifier::verify(const StereoFeatures& place, const StereoFeatures& current) const {
-  const auto [matches, correspondences, motion] = views_.match(place, current, RigCalibration());
+PlaceMatch verifyPlace(const StereoFeatures& place, const StereoFeatures& current) {
+  static const ViewMatcher views(matcherOptions(), estimatorOptions());
+  const auto [matches, correspondences, motion] = views.match(place, current, RigCalibration());
   PlaceMatch match;
   match.matches = static_cast<int>(matches.size());
-  if (match.matches < kLeastInliers) {
-    match.reason = "only " + std::to_string(match.matches) + " matches";
+  if (match.matches < kLeastPlaceInliers) {
+    match.reason = text(0, "only ", match.matches, " matches");
     return match;
   }
   if (!motion.success) {
@@ -55,13 +53,11 @@ PlaceMatch PlaceVerifier::verify(const StereoFeatures& place, const StereoFeatur
   match.T_place_camera = motion.T_current_reference.inverse();
   match.covariance = 2.0 * motion.covariance;
 
-  const std::string inliers = std::to_string(match.inliers) + " of " + std::to_string(match.matches) + " matches";
-  if (match.inliers < kLeastInliers || match.inliers < kLeastRatio * match.matches)
+  const std::string inliers = text(0, match.inliers, " of ", match.matches, " matches");
+  if (match.inliers < kLeastPlaceInliers || match.inliers < kLeastRatio * match.matches)
     match.reason = "only " + inliers + " agree";
   else if (match.coverage < kLeastCoverage)
     match.reason = inliers + " agree, but only in a small part of the image";
-  else if (match.rms > kLargestRms)
-    match.reason = inliers + " agree, but their residuals are above " + text(kLargestRms, 1) + " px";
   match.same = match.reason.empty();
   return match;
 }

@@ -6,7 +6,6 @@
 #include <limits>
 #include <opencv2/core.hpp>
 #include <queue>
-#include <set>
 #include <stdexcept>
 #include <string>
 #include <utility>

@@ -2,7 +2,6 @@
 #include <ceres/rotation.h>
 
 #include <Eigen/Cholesky>
-#include <algorithm>
 #include <map>
 
 #include "stereo_descriptor_vo/places/pose_graph.hpp"
@@ -115,9 +114,6 @@ void PoseGraph::solve(Summary& summary) {
   ceres::Solve(options, &problem, &solved);
 
   summary.converged = solved.termination_type == ceres::CONVERGENCE;
-  summary.iterations += static_cast<int>(solved.iterations.size());
-  summary.initial_cost = solved.initial_cost;
-  summary.final_cost = solved.final_cost;
   summary.time += solved.total_time_in_seconds;
   if (!solved.IsSolutionUsable()) return;
   for (auto& [id, T] : nodes_) {

@@ -36,7 +36,6 @@ bool anyPlace(int) {
 TEST(PlaceIndex, FindsAPlaceAmongManyWhenAnEighthOfTheBitsDiffer) {
   PlaceIndex index;
   for (int place = 0; place < 300; ++place) index.add(place, index.signature(show(randomRows(place, 200))));
-  ASSERT_EQ(index.count(), 300);
   for (const int place : {0, 150, 299}) {
     const PlaceSignature asked = index.signature(show(randomRows(place, 200), 0.125, 7));
     const auto found = index.find(asked, 3, anyPlace);

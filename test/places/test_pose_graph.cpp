@@ -67,9 +67,7 @@ TEST(PoseGraph, ALoopTakesTheDriftBack) {
   const double before = ring.largestError();
   ASSERT_GT(before, 5.0);
   for (int k = 100; k < 110; ++k) ring.graph.close(ring.loop(k - 100, k));
-  const PoseGraph::Summary summary = ring.graph.optimise();
-  EXPECT_TRUE(summary.converged);
-  EXPECT_LT(summary.final_cost, summary.initial_cost);
+  EXPECT_TRUE(ring.graph.optimise().converged);
   EXPECT_LT(ring.largestError(), 0.02 * before);
   const double measured = 2.0 * kPi / Ring::kAround + 0.001, is = 2.0 * kPi / Ring::kAround;
   EXPECT_NEAR(ring.graph.turnError(), is / measured - 1.0, 0.001) << "common to all turns";

@@ -60,8 +60,6 @@ class PlaceIndex {
   std::vector<PlaceCandidate> find(const PlaceSignature& signature, int most,
                                    const std::function<bool(int place)>& admitted) const;
 
-  int count() const { return static_cast<int>(places_.size()); }
-
  private:
   double weight(std::size_t having) const;
 

@@ -131,7 +131,6 @@ class PlaceRecognition {
 
   PlaceRecognitionOptions options_;
   PlaceIndex index_;
-  PlaceVerifier verifier_;
   LoopAgreement agreement_;
   PoseGraph graph_;
   std::map<int, Place> places_;

@@ -5,7 +5,6 @@
 
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/matching/view_matcher.hpp"
 
 namespace sdvo {
 
@@ -20,17 +19,9 @@ struct PlaceMatch {
   double rms = 0.0;       ///< px per coordinate
 };
 
+constexpr int kLeastPlaceInliers = 40;  ///< fewer are not the same place
+
 /// Decides by geometry alone whether two stereo pairs show the same place: match, consensus, refinement.
-class PlaceVerifier {
- public:
-  static constexpr int kLeastInliers = 40;  ///< fewer are not the same place
-
-  PlaceVerifier();
-
-  PlaceMatch verify(const StereoFeatures& place, const StereoFeatures& current) const;
-
- private:
-  ViewMatcher views_;
-};
+PlaceMatch verifyPlace(const StereoFeatures& place, const StereoFeatures& current);
 
 }  // namespace sdvo

@@ -68,8 +68,6 @@ class PoseGraph {
   /// tenth of the largest drift. While most loops still disagree, this share grows, up to all of it.
   struct Summary {
     bool converged = false;
-    int iterations = 0;
-    double initial_cost = 0.0, final_cost = 0.0;
     double time = 0.0;  ///< s
   };
   Summary optimise();
