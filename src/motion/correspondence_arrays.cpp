@@ -1,6 +1,5 @@
 #include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
 
-#include <array>
 #include <cstddef>
 #include <limits>
 

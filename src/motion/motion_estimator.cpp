@@ -1,7 +1,6 @@
 #include "stereo_descriptor_vo/motion/motion_estimator.hpp"
 
 #include <Eigen/Cholesky>
-#include <algorithm>
 #include <cmath>
 
 #include "../common/text.hpp"

@@ -1,8 +1,6 @@
 #include "stereo_descriptor_vo/motion/motion_refinement.hpp"
 
 #include <Eigen/Cholesky>
-#include <algorithm>
-#include <cmath>
 #include <utility>
 
 namespace sdvo {

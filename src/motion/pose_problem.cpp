@@ -1,7 +1,6 @@
 #include "stereo_descriptor_vo/motion/pose_problem.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 namespace sdvo {

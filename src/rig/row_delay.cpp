@@ -30,9 +30,8 @@ int RowDelay::cellOf(double u, double v, int width, int height) {
   return part(v, height, kRows) * kColumns + part(u, width, kColumns);
 }
 
-double RowDelay::Estimate::proved(double expected) const {
-  const double distance = value - expected, chance = kSquare * sigma * sigma;
-  return std::copysign(std::sqrt(std::max(distance * distance - chance, 0.0)), distance);
+double RowDelay::Estimate::proved() const {
+  return std::copysign(std::sqrt(std::max(value * value - kSquare * sigma * sigma, 0.0)), value);
 }
 
 RowDelay::Fit RowDelay::fit(const Cells& cells) {
@@ -59,8 +58,8 @@ void RowDelay::Sums::add(double w, const Eigen::Vector3d& moved, double lower) {
   product += w * lower * moved;
 }
 
-/// Least squares on the means of each part, with the weights of a Huber kernel. Differences within a part are left out:
-/// on a road they have the same pattern in all pairs, as has the rectification's error.
+/// Each part of the pair is one observation: the mean of its samples, weighted by a Huber kernel. Differences within a
+/// part do not count. On a road they have the same pattern in all pairs, as has the error of the rectification.
 void RowDelay::add(const std::vector<Sample>& pair) {
   constexpr int kReweightings = 3;
   double square = 0.0;
@@ -108,7 +107,7 @@ std::optional<RowDelay::Estimate> RowDelay::estimate() const {
   if (!(freedom > 0.0)) return std::nullopt;
   const Fit fit = this->fit(cells_);
   const Eigen::Matrix2d inverse = fit.information.inverse();
-  // Student's distribution: few blocks tell their own spread badly (Wallace's bound of its quantiles).
+  // The spread of few blocks is uncertain: Student's distribution, by Wallace's bound of its quantiles.
   const double few = freedom / kSquare * std::expm1(kSquare / freedom);
   const Estimate estimate{fit.value[0], std::sqrt(few * (inverse * spread_ * inverse.transpose())(0, 0))};
   if (!(estimate.sigma < kFail)) return std::nullopt;

@@ -37,13 +37,13 @@ class RowDelay {
   struct Estimate {
     double value, sigma;  ///< s
 
-    /// By how much it differs from `expected`, s, as far as chance does not explain that.
-    double proved(double expected = 0.0) const;
+    /// By how much it differs from 0, s, as far as chance does not explain that.
+    double proved() const;
   };
 
   /// `memory`: ratio of the past that a pair leaves. Pairs are left out where the instrument is below `least_turning`
   /// (px/s, RMS): errors of the velocity must be smaller.
-  /// `block`: pairs in a row that may see the same points, whose errors are then alike.
+  /// `block`: number of successive pairs with correlated errors, because they may see the same points.
   RowDelay(double memory, double least_turning, int block = 1)
       : memory_(memory), least_turning_(least_turning), pairs_of_block_(block) {}
 
@@ -66,8 +66,9 @@ class RowDelay {
   };
   using Cells = std::array<Sums, kParts>;
 
-  /// The normal equations of what differs from each part's mean: velocity's factor is the delay. Its instrument is the
-  /// part that rotations give: of a translation, rows move as the depth has it, and so do errors of the rectification.
+  /// Regression of dv on velocity, whose factor is the delay, and disparity, all less the mean of their part. The
+  /// instrument of the velocity is the part of it that rotations cause. In a translation the velocity depends on depth,
+  /// as do errors of the rectification, and would be correlated with them.
   struct Fit {
     Eigen::Matrix2d information = Eigen::Matrix2d::Zero();
     Eigen::Vector2d value = Eigen::Vector2d::Zero();

@@ -2,7 +2,6 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <vector>
 
@@ -16,7 +15,7 @@ std::size_t partOf(const StereoFeatures& features, int i) {
 
 }  // namespace
 
-/// Medians: a part has wrong matches.
+/// Takes medians of dv, because a part has wrong matches.
 RowPattern::Parts RowPattern::partsOf(const StereoFeatures& features) {
   Parts parts;
   std::array<std::vector<double>, RowDelay::kParts> dv;
@@ -66,7 +65,7 @@ std::optional<RightRotation> RowPattern::change(const StereoFeatures& features) 
 
 /// Least squares over the parts, each with the weight of its features.
 std::optional<RightRotation> RowPattern::fit(const Parts& parts) {
-  constexpr double kFewest = 6.0;  // parts: three rotations and as much to tell their errors from (chosen)
+  constexpr double kFewest = 6.0;  // parts (chosen): three for the rotation, three for its errors
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   Eigen::Vector3d product = Eigen::Vector3d::Zero();
   double known = 0.0, weight = 0.0;

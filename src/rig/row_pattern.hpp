@@ -10,8 +10,8 @@
 
 namespace sdvo {
 
-/// How much lower a rig shows points in its right image (dv, px), as a rule, in each part of the image. Rectification
-/// leaves errors that last at their place. So a pair speaks of a change only by its difference from this pattern.
+/// Mean dv (v_right - v_left, px) of a rig in each part of the image. Rectification leaves errors that stay in their
+/// part. Hence the rig changed only if a pair differs from this pattern.
 class RowPattern {
  public:
   /// `memory`: ratio of the past that a pair leaves.
@@ -19,12 +19,12 @@ class RowPattern {
 
   void learn(const StereoFeatures& features);
 
-  /// dv of a feature beyond what is usual in its part, px; dv itself where nothing is known.
+  /// dv of a feature less the mean of its part, px; dv itself in a part without a mean.
   double change(const StereoFeatures& features, int i) const;
 
-  /// The rotation of the right camera that all parts of the pattern have in common; none where too few are known.
+  /// The rotation of the right camera that fits the pattern best; none if too few parts have a mean.
   std::optional<RightRotation> rotation() const;
-  /// Of a pair against the pattern. None where too few parts of it are known.
+  /// The rotation that fits the differences of a pair from the pattern best; none if too few parts have both.
   std::optional<RightRotation> change(const StereoFeatures& features) const;
 
  private:

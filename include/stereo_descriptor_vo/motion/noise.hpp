@@ -86,14 +86,14 @@ class Noise {
   /// Takes in the median square, in standard deviations (chi-square of two), of a confirmed pair's residuals in the
   /// map.
   void learnPair(double square) {
-    usual_square_ += (usual_square_ > 0.0 ? 1.0 - kUsualMemory : 1.0) * (told(square) - usual_square_);
+    usual_square_ += (usual_square_ > 0.0 ? 1.0 - kUsualMemory : 1.0) * (clamped(square) - usual_square_);
   }
 
   /// Ratio between the variance of a pair's measurements and its running mean: images may be noisier, blurred or
   /// damaged. With few measurements it is shrunk to 1, as by kFewestMeasured measurements of the mean.
   double ofPair(double square, int measurements) const {
     if (usual_square_ == 0.0) return 1.0;
-    return (kFewestMeasured + measurements * told(square) / usual_square_) / (kFewestMeasured + measurements);
+    return (kFewestMeasured + measurements * clamped(square) / usual_square_) / (kFewestMeasured + measurements);
   }
 
   /// Ratio between a motion's variance and the variance if the errors of its points were independent. Neighbours in the
@@ -101,8 +101,8 @@ class Noise {
   double shared() const { return std::max(shared_, 1.0); }
 
  private:
-  /// Identical images give residuals near 0: the square is clamped, so that they teach no noise of 0.
-  static double told(double square) {
+  /// Identical images give residuals near 0: the square is clamped, else the mean would become 0.
+  static double clamped(double square) {
     constexpr double kMedian = 1.386;  // of chi-square of two: 2 log 2
     return std::max(square, kMedian / (kMost * kMost));
   }
