@@ -6,6 +6,17 @@
 
 #include "../common/kernel.hpp"
 
+// Compilers unpack bytes to floats by more than twice the instructions of these.
+#ifdef SDVO_HAVE_AVX2
+#include <immintrin.h>
+#define SDVO_SAMPLER SDVO_AVX2
+#elif defined(SDVO_HAVE_NEON)
+#include <arm_neon.h>
+
+#include <cstring>
+#define SDVO_SAMPLER
+#endif
+
 namespace sdvo {
 namespace {
 
@@ -35,17 +46,43 @@ struct PlaceRows {
   }
 };
 
-struct SampleRows {
-  static SDVO_IN_KERNEL void run(const std::uint8_t* image, std::size_t step, const Places* places, int rows,
-                                 float* patch) {
-    for (int j = 0; j < rows; ++j, image += step, patch += kPatchStride) {
-      const std::uint8_t *upper = image + places->column[j], *lower = upper + step;
-      for (int i = 0; i < kPatchStride; ++i)
-        patch[i] = places->w00[j] * upper[i] + places->w01[j] * upper[i + 1] + places->w10[j] * lower[i] +
-                   places->w11[j] * lower[i + 1];
-    }
+void samplePlain(const std::uint8_t* image, std::size_t step, const Places& places, int rows, float* patch) {
+  for (int j = 0; j < rows; ++j, image += step, patch += kPatchStride) {
+    const std::uint8_t *upper = image + places.column[j], *lower = upper + step;
+    for (int i = 0; i < kPatchStride; ++i)
+      patch[i] = places.w00[j] * upper[i] + places.w01[j] * upper[i + 1] + places.w10[j] * lower[i] +
+                 places.w11[j] * lower[i + 1];
   }
-};
+}
+
+#ifdef SDVO_HAVE_AVX2
+SDVO_SAMPLER inline Lanes eightPixels(const std::uint8_t* pixels) {
+  return _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(reinterpret_cast<const __m128i*>(pixels))));
+}
+#elif defined(SDVO_HAVE_NEON)
+inline Lanes eightPixels(const std::uint8_t* pixels) {
+  const uint16x8_t words = vmovl_u8(vld1_u8(pixels));
+  const float32x4_t halves[] = {vcvtq_f32_u32(vmovl_u16(vget_low_u16(words))),
+                                vcvtq_f32_u32(vmovl_u16(vget_high_u16(words)))};
+  Lanes lanes;
+  std::memcpy(&lanes, halves, sizeof lanes);
+  return lanes;
+}
+#endif
+
+#ifdef SDVO_SAMPLER
+/// The same operations in the same order, eight columns at once.
+SDVO_SAMPLER void sampleWithVectors(const std::uint8_t* image, std::size_t step, const Places& places, int rows,
+                                    float* patch) {
+  for (int j = 0; j < rows; ++j, image += step, patch += kPatchStride) {
+    const std::uint8_t *upper = image + places.column[j], *lower = upper + step;
+    for (int i = 0; i < kPatchStride; i += 8)
+      store(places.w00[j] * eightPixels(upper + i) + places.w01[j] * eightPixels(upper + i + 1) +
+                places.w10[j] * eightPixels(lower + i) + places.w11[j] * eightPixels(lower + i + 1),
+            patch + i);
+  }
+}
+#endif
 
 /// Sums over the patch, or over products with it.
 struct LayerSums {
@@ -119,7 +156,10 @@ void samplePatch(const cv::Mat& image, int margin, float x, float y, float slant
   const std::uint8_t* first = image.ptr(row - radius + margin) - radius + margin;
   Places places;
   runKernel<PlaceRows>(x, y - static_cast<float>(row), slant, radius, &places);
-  runKernel<SampleRows>(first, image.step[0], &places, rows, patch);
+#ifdef SDVO_SAMPLER
+  if (usesVectorKernels()) return sampleWithVectors(first, image.step[0], places, rows, patch);
+#endif
+  samplePlain(first, image.step[0], places, rows, patch);
 }
 
 SlantedPatch::SlantedPatch() {
