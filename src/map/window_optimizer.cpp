@@ -11,13 +11,6 @@
 namespace sdvo {
 namespace {
 
-/// The unknowns: poses, points (ray and inverse depth of each point with an observation, in their order), calibration.
-struct Estimate {
-  std::vector<Eigen::Isometry3d> T_camera_origin;
-  std::vector<Eigen::Vector3d> points;
-  RigCalibration calibration;
-};
-
 /// Square of the mean residual of a point's disparities, in standard deviations: the error that they share. The point's
 /// estimate follows a part of that error; the result is corrected for this part. None if it is more than half.
 std::optional<double> commonSquare(const EliminatedPoint& point) {
@@ -78,6 +71,14 @@ class WindowOptimizer::Solver {
   }
 
  private:
+  /// The unknowns: poses, points (ray and inverse depth of each point with an observation, in their order),
+  /// calibration.
+  struct Estimate {
+    std::vector<Eigen::Isometry3d> T_camera_origin;
+    std::vector<Eigen::Vector3d> points;
+    RigCalibration calibration;
+  };
+
   /// Starts with a window, which must stay valid; its values become the first estimate.
   void take(const Window& window) {
     window_ = &window;
