@@ -92,7 +92,7 @@ void PlaceRecognition::forget(int id) {
 
 /// Whether the last pair becomes a key frame: it is far enough from the last one and has enough features.
 bool PlaceRecognition::isKeyframe(const StereoFeatures& features) const {
-  if (features.count() < kLeastPlaceInliers) return false;
+  if (features.count() < PlaceVerifier::kLeastInliers) return false;
   if (!last_ || !way_.known) return true;
   const Eigen::Isometry3d T_keyframe_camera = places_.at(*last_).T_odom_camera.inverse() * *way_.T_odom_camera;
   return T_keyframe_camera.translation().norm() >= options_.keyframe_distance ||
@@ -132,7 +132,7 @@ void PlaceRecognition::addKeyframe(const StereoFeatures& features, int id) {
 void PlaceRecognition::recognise(const Place& here, PlaceReport& report) {
   report.reason = "no place looks similar";
   for (const PlaceCandidate& candidate : report.candidates) {
-    report.match = verifyPlace(places_.at(candidate.place).features, here.features);
+    report.match = verifier_.verify(places_.at(candidate.place).features, here.features);
     report.reason = report.match.reason;
     if (!report.match.same) continue;
     const GraphEdge loop{candidate.place, here.id, GraphEdge::Kind::kLoop, report.match.T_place_camera,
@@ -204,7 +204,7 @@ std::vector<PlaceCandidate> PlaceRecognition::find(const PlaceSignature& signatu
 }
 
 PlaceMatch PlaceRecognition::verify(int place, const StereoFeatures& features) const {
-  return verifyPlace(places_.at(place).features, thinOut(features, options_.max_features));
+  return verifier_.verify(places_.at(place).features, thinOut(features, options_.max_features));
 }
 
 void PlaceRecognition::restore(std::vector<Place> places, const PoseGraph& graph) {

@@ -4,7 +4,7 @@
 
 #include "../belief/motion_hypotheses.hpp"
 #include "../common/text.hpp"
-#include "stereo_descriptor_vo/matching/view_matcher.hpp"
+#include "stereo_descriptor_vo/matching/feature_matcher.hpp"
 
 namespace sdvo {
 namespace {
@@ -30,12 +30,13 @@ MotionEstimatorOptions estimatorOptions() {
 
 }  // namespace
 
-PlaceMatch verifyPlace(const StereoFeatures& place, const StereoFeatures& current) {
-  static const ViewMatcher views(matcherOptions(), estimatorOptions());
-  const auto [matches, correspondences, motion] = views.match(place, current, RigCalibration());
+PlaceVerifier::PlaceVerifier() : views_(matcherOptions(), estimatorOptions()) {}
+
+PlaceMatch PlaceVerifier::verify(const StereoFeatures& place, const StereoFeatures& current) const {
+  const auto [matches, correspondences, motion] = views_.match(place, current, RigCalibration());
   PlaceMatch match;
   match.matches = static_cast<int>(matches.size());
-  if (match.matches < kLeastPlaceInliers) {
+  if (match.matches < kLeastInliers) {
     match.reason = text(0, "only ", match.matches, " matches");
     return match;
   }
@@ -54,7 +55,7 @@ PlaceMatch verifyPlace(const StereoFeatures& place, const StereoFeatures& curren
   match.covariance = 2.0 * motion.covariance;
 
   const std::string inliers = text(0, match.inliers, " of ", match.matches, " matches");
-  if (match.inliers < kLeastPlaceInliers || match.inliers < kLeastRatio * match.matches)
+  if (match.inliers < kLeastInliers || match.inliers < kLeastRatio * match.matches)
     match.reason = "only " + inliers + " agree";
   else if (match.coverage < kLeastCoverage)
     match.reason = inliers + " agree, but only in a small part of the image";

@@ -27,12 +27,14 @@ StereoFeatures see(const synthetic::World& world, const Eigen::Isometry3d& T_wor
 }
 
 TEST(PlaceVerifier, TellsFromWhereThePlaceIsSeenNowAndHowWellItKnows) {
+  const PlaceVerifier verifier;
   double sum = 0.0;
   constexpr int kTrials = 20;
   for (int i = 0; i < kTrials; ++i) {
     const Eigen::Isometry3d T_world_place = pose({0.3, 0.0, 0.1 * i}, 0.05),
                             T_world_camera = pose({-1.0, 0.1, 1.5}, -0.15);
-    const PlaceMatch match = verifyPlace(see(kWorld, T_world_place, 2 * i + 1), see(kWorld, T_world_camera, 2 * i + 2));
+    const PlaceMatch match =
+        verifier.verify(see(kWorld, T_world_place, 2 * i + 1), see(kWorld, T_world_camera, 2 * i + 2));
     ASSERT_TRUE(match.same) << match.reason;
     EXPECT_GE(match.inliers, 100);
     const Eigen::Isometry3d T_true = T_world_place.inverse() * T_world_camera;
@@ -47,7 +49,8 @@ TEST(PlaceVerifier, TellsFromWhereThePlaceIsSeenNowAndHowWellItKnows) {
 
 TEST(PlaceVerifier, AnotherPlaceIsNotTheSame) {
   const synthetic::World other = synthetic::randomWorld(2, 500, {-8.0, -4.0, 4.0}, {8.0, 4.0, 25.0});
-  const PlaceMatch match = verifyPlace(see(kWorld, pose({0, 0, 0}, 0.0), 1), see(other, pose({0, 0, 0}, 0.0), 2));
+  const PlaceMatch match =
+      PlaceVerifier().verify(see(kWorld, pose({0, 0, 0}, 0.0), 1), see(other, pose({0, 0, 0}, 0.0), 2));
   EXPECT_FALSE(match.same);
   EXPECT_FALSE(match.reason.empty());
 }
@@ -61,15 +64,17 @@ TEST(PlaceVerifier, AThingInACornerIsNoPlace) {
     world->points.insert(world->points.end(), thing.points.begin(), thing.points.end());
     world->rows.insert(world->rows.end(), thing.rows.begin(), thing.rows.end());
   }
-  const PlaceMatch match = verifyPlace(see(here, pose({0, 0, 0}, 0.0), 1), see(there, pose({0.5, 0, 0}, 0.0), 2));
+  const PlaceMatch match =
+      PlaceVerifier().verify(see(here, pose({0, 0, 0}, 0.0), 1), see(there, pose({0.5, 0, 0}, 0.0), 2));
   EXPECT_FALSE(match.same);
   EXPECT_TRUE(contains(match.reason, "small part of the image")) << match.reason;
 }
 
 TEST(PlaceVerifier, NothingToSeeIsNoError) {
   const StereoFeatures nothing = synthetic::noFeatures(camera()), some = see(kWorld, pose({0, 0, 0}, 0.0), 1);
-  EXPECT_EQ(verifyPlace(nothing, some).reason, "only 0 matches");
-  EXPECT_FALSE(verifyPlace(some, nothing).same);
+  const PlaceVerifier verifier;
+  EXPECT_EQ(verifier.verify(nothing, some).reason, "only 0 matches");
+  EXPECT_FALSE(verifier.verify(some, nothing).same);
 }
 
 }  // namespace sdvo::test_place_verifier

@@ -131,6 +131,7 @@ class PlaceRecognition {
 
   PlaceRecognitionOptions options_;
   PlaceIndex index_;
+  PlaceVerifier verifier_;
   LoopAgreement agreement_;
   PoseGraph graph_;
   std::map<int, Place> places_;

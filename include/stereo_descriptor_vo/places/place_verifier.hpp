@@ -5,6 +5,7 @@
 
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/matching/view_matcher.hpp"
 
 namespace sdvo {
 
@@ -19,9 +20,17 @@ struct PlaceMatch {
   double rms = 0.0;       ///< px per coordinate
 };
 
-constexpr int kLeastPlaceInliers = 40;  ///< fewer are not the same place
-
 /// Decides by geometry alone whether two stereo pairs show the same place: match, consensus, refinement.
-PlaceMatch verifyPlace(const StereoFeatures& place, const StereoFeatures& current);
+class PlaceVerifier {
+ public:
+  static constexpr int kLeastInliers = 40;  ///< fewer are not the same place
+
+  PlaceVerifier();
+
+  PlaceMatch verify(const StereoFeatures& place, const StereoFeatures& current) const;
+
+ private:
+  ViewMatcher views_;
+};
 
 }  // namespace sdvo

@@ -66,8 +66,9 @@ void signature(benchmark::State& state) {
 }
 
 void verifyAnotherPlace(benchmark::State& state) {
+  const sdvo::PlaceVerifier verifier;
   const sdvo::StereoFeatures here = unevenRows(1), there = unevenRows(2);
-  for (auto _ : state) benchmark::DoNotOptimize(sdvo::verifyPlace(there, here));
+  for (auto _ : state) benchmark::DoNotOptimize(verifier.verify(there, here));
 }
 
 /// A square of streets driven again and again, with loops to the round before.
