@@ -1,42 +1,14 @@
 #include <gtest/gtest.h>
 
-#include "../synthetic_scene.hpp"
+#include "seen_points.hpp"
 #include "stereo_descriptor_vo/motion/sample_consensus.hpp"
 
 namespace sdvo::test_genetic_consensus {
 
-/// Correspondences of which a share is measured at random places.
-struct Scene {
-  StereoCamera camera = synthetic::camera();
-  Eigen::Isometry3d T_current_reference = Eigen::Isometry3d::Identity();
-  std::vector<Correspondence> correspondences;
-
-  Scene(double outlier_share, double noise, unsigned seed) {
-    std::mt19937 random(seed);
-    std::uniform_real_distribution<double> uniform(0.0, 1.0);
-    std::normal_distribution<double> normal(0.0, 1.0);
-    Vector6d motion;
-    motion << -0.03, 0.01, -1.1, -0.003, 0.02, 0.004;
-    T_current_reference = expSE3(motion);
-    constexpr int kCount = 150;
-    for (int i = 0; i < kCount; ++i) {
-      const auto somewhere = [&] {
-        return camera.backProject(30.0 + 580.0 * uniform(random), 30.0 + 420.0 * uniform(random),
-                                  5.0 + 30.0 * uniform(random));
-      };
-      const Eigen::Vector3d point = somewhere();
-      const bool outlier = i < outlier_share * kCount;
-      Eigen::Vector3d measurement = camera.project(outlier ? somewhere() : T_current_reference * point);
-      for (int k = 0; k < 3; ++k) measurement[k] += noise * normal(random);
-      correspondences.push_back({point, measurement});
-    }
-  }
-};
-
 constexpr double kCertainty = 1.0;  // never reached: the whole budget is used
 constexpr double kNone = 0.0;       // reached with the first pose
 
-Consensus search(const Scene& scene, const GeneticConsensusOptions& options, bool adaptive, int iterations,
+Consensus search(const SeenPoints& scene, const GeneticConsensusOptions& options, bool adaptive, int iterations,
                  unsigned seed, double confidence = kCertainty) {
   const PoseProblem problem(scene.camera, scene.correspondences, 2.0);
   std::mt19937 random(seed);
@@ -49,7 +21,7 @@ bool equal(const Consensus& a, const Consensus& b) {
 }
 
 TEST(GeneticSearch, UsesItsBudgetExactlyAndStopsWhenConfident) {
-  const Scene scene(0.5, 0.3, 1);
+  const SeenPoints scene = seenPoints(1, 150, 0.3, 0.5);
   for (const bool adaptive : {false, true}) {
     for (const int iterations : {1, 10, 24, 25, 137})
       EXPECT_EQ(search(scene, {}, adaptive, iterations, 1).iterations, iterations) << adaptive;
@@ -60,7 +32,7 @@ TEST(GeneticSearch, UsesItsBudgetExactlyAndStopsWhenConfident) {
 }
 
 TEST(GeneticSearch, TheCostIsThatOfThePose) {
-  const Scene scene(0.6, 0.3, 2);
+  const SeenPoints scene = seenPoints(2, 150, 0.3, 0.6);
   const PoseProblem problem(scene.camera, scene.correspondences, 2.0);
   for (const bool adaptive : {false, true}) {
     const Consensus result = search(scene, {}, adaptive, 300, 3);
@@ -71,7 +43,7 @@ TEST(GeneticSearch, TheCostIsThatOfThePose) {
 }
 
 TEST(GeneticSearch, AnswersTheSameToTheSameSeed) {
-  const Scene scene(0.6, 0.3, 3);
+  const SeenPoints scene = seenPoints(3, 150, 0.3, 0.6);
   for (const bool adaptive : {false, true}) {
     EXPECT_TRUE(equal(search(scene, {}, adaptive, 200, 5), search(scene, {}, adaptive, 200, 5)));
     int different = 0;
@@ -83,7 +55,7 @@ TEST(GeneticSearch, AnswersTheSameToTheSameSeed) {
 
 /// The ablation: learning steers the adaptive search, and only that one.
 TEST(GeneticSearch, LearningSteersTheAdaptiveSearchAlone) {
-  const Scene scene(0.7, 0.3, 4);
+  const SeenPoints scene = seenPoints(4, 150, 0.3, 0.7);
   GeneticConsensusOptions without;
   without.learning = false;
   int different = 0;
@@ -100,9 +72,9 @@ TEST(GeneticSearch, LearningFindsTheMotionMoreOften) {
   without.learning = false;
   int found_with = 0, found_without = 0;
   for (unsigned seed = 1; seed <= 150; ++seed) {
-    const Scene scene(0.8, 0.3, 100 + seed);
+    const SeenPoints scene = seenPoints(100 + seed, 150, 0.3, 0.8);
     const PoseProblem problem(scene.camera, scene.correspondences, 2.0);
-    const double right = 1.05 * problem.truncatedCost(scene.T_current_reference);
+    const double right = 1.05 * problem.truncatedCost(trueMotion());
     found_with += search(scene, {}, true, 150, seed).cost < right;
     found_without += search(scene, without, true, 150, seed).cost < right;
   }

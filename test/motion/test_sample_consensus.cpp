@@ -3,7 +3,7 @@
 #include <set>
 
 #include "../said.hpp"
-#include "../synthetic_scene.hpp"
+#include "seen_points.hpp"
 #include "stereo_descriptor_vo/motion/sample_consensus.hpp"
 
 namespace sdvo {
@@ -53,42 +53,7 @@ TEST(SampleBudget, KeepsItsLimits) {
 
 namespace test_sample_consensus {
 
-struct Scene {
-  StereoCamera camera = synthetic::camera();
-  Eigen::Isometry3d T_current_reference = Eigen::Isometry3d::Identity();
-  std::vector<Correspondence> correspondences;
-  std::vector<int> true_inliers;
-};
-
-/// Points in a box ahead, a car's motion, Gaussian noise on what the second pair measures; every outlier is measured
-/// somewhere else in the image, at least 15 px from the truth.
-Scene makeScene(int count, double outlier_share, double noise, unsigned seed) {
-  Scene scene;
-  std::mt19937 random(seed);
-  std::uniform_real_distribution<double> uniform(0.0, 1.0);
-  std::normal_distribution<double> normal(0.0, 1.0);
-  Vector6d motion;
-  motion << 0.05, -0.02, -0.9, 0.004, 0.03, -0.002;
-  scene.T_current_reference = expSE3(motion);
-  const StereoCamera& camera = scene.camera;
-  for (int i = 0; i < count; ++i) {
-    const Eigen::Vector3d point = camera.backProject(40.0 + 560.0 * uniform(random), 40.0 + 400.0 * uniform(random),
-                                                     6.0 + 30.0 * uniform(random));
-    Eigen::Vector3d measurement = camera.project(scene.T_current_reference * point);
-    for (int k = 0; k < 3; ++k) measurement[k] += noise * normal(random);
-    if (i < outlier_share * count) {
-      const double angle = 2.0 * CV_PI * uniform(random), distance = 15.0 + 200.0 * uniform(random);
-      measurement += Eigen::Vector3d(distance * std::cos(angle), distance * std::sin(angle),
-                                     distance * std::cos(angle) + 20.0 * normal(random));
-    } else {
-      scene.true_inliers.push_back(i);
-    }
-    scene.correspondences.push_back({point, measurement});
-  }
-  return scene;
-}
-
-Consensus search(const Scene& scene, const std::string& method, int seed = 1, int max_iterations = 500) {
+Consensus search(const SeenPoints& scene, const std::string& method, int seed = 1, int max_iterations = 500) {
   SampleConsensusOptions options;
   options.consensus = valueOf<ConsensusMethod>(method);
   options.seed = seed;
@@ -96,7 +61,7 @@ Consensus search(const Scene& scene, const std::string& method, int seed = 1, in
   return findConsensus(PoseProblem(scene.camera, scene.correspondences, options.inlier_threshold), options, {});
 }
 
-std::vector<int> inliersOf(const Consensus& consensus, const Scene& scene) {
+std::vector<int> inliersOf(const Consensus& consensus, const SeenPoints& scene) {
   return PoseProblem(scene.camera, scene.correspondences, SampleConsensusOptions().inlier_threshold)
       .inliers(consensus.T_current_reference);
 }
@@ -105,17 +70,17 @@ class EveryMethod : public testing::TestWithParam<const char*> {};
 
 TEST_P(EveryMethod, RecoversTheMotionAmongSixtyPercentOutliers) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
-    const Scene scene = makeScene(200, 0.6, 0.2, seed);
-    ASSERT_EQ(scene.true_inliers.size(), 80u);
+    const SeenPoints scene = seenPoints(seed, 200, 0.2, 0.6);
+    ASSERT_EQ(scene.inliers.size(), 80u);
     const Consensus consensus = search(scene, GetParam(), static_cast<int>(seed));
     ASSERT_TRUE(consensus.found) << "seed " << seed;
-    const Eigen::Isometry3d error = scene.T_current_reference.inverse() * consensus.T_current_reference;
+    const Eigen::Isometry3d error = trueMotion().inverse() * consensus.T_current_reference;
     // A minimal sample is as good as its three points: 0.2 px at 400 px focal length are 0.5 mrad.
     EXPECT_LT(error.translation().norm(), 0.12) << "seed " << seed;
     EXPECT_LT(logSO3(error.linear()).norm(), 0.01) << "seed " << seed;
     const std::vector<int> inliers = inliersOf(consensus, scene);
     std::vector<int> right;
-    std::set_intersection(inliers.begin(), inliers.end(), scene.true_inliers.begin(), scene.true_inliers.end(),
+    std::set_intersection(inliers.begin(), inliers.end(), scene.inliers.begin(), scene.inliers.end(),
                           std::back_inserter(right));
     EXPECT_GE(right.size(), 60u) << "seed " << seed;
     EXPECT_LE(inliers.size() - right.size(), 3u) << "seed " << seed;
@@ -123,17 +88,17 @@ TEST_P(EveryMethod, RecoversTheMotionAmongSixtyPercentOutliers) {
 }
 
 TEST_P(EveryMethod, IsExactWithoutNoise) {
-  const Scene scene = makeScene(60, 0.3, 0.0, 5);
+  const SeenPoints scene = seenPoints(5, 60, 0.0, 0.3);
   const Consensus consensus = search(scene, GetParam());
   ASSERT_TRUE(consensus.found);
-  EXPECT_EQ(inliersOf(consensus, scene), scene.true_inliers);
-  const Eigen::Isometry3d error = scene.T_current_reference.inverse() * consensus.T_current_reference;
+  EXPECT_EQ(inliersOf(consensus, scene), scene.inliers);
+  const Eigen::Isometry3d error = trueMotion().inverse() * consensus.T_current_reference;
   EXPECT_LT(error.translation().norm(), 1e-4);
   EXPECT_LT(logSO3(error.linear()).norm(), 1e-5);
 }
 
 TEST_P(EveryMethod, EqualSeedsGiveEqualResultsAndOthersDiffer) {
-  const Scene scene = makeScene(200, 0.5, 0.5, 2);
+  const SeenPoints scene = seenPoints(2, 200, 0.5, 0.5);
   const Consensus first = search(scene, GetParam(), 7), again = search(scene, GetParam(), 7);
   EXPECT_TRUE(first.T_current_reference.matrix() == again.T_current_reference.matrix());
   EXPECT_EQ(first.iterations, again.iterations);
@@ -144,14 +109,14 @@ TEST_P(EveryMethod, EqualSeedsGiveEqualResultsAndOthersDiffer) {
 }
 
 TEST_P(EveryMethod, KeepsToTheBoundsOnSamples) {
-  const Scene hopeless = makeScene(200, 1.0, 0.0, 3);
+  const SeenPoints hopeless = seenPoints(3, 200, 0.0, 1.0);
   EXPECT_EQ(search(hopeless, GetParam(), 1, 120).iterations, 120);
-  const Scene clean = makeScene(200, 0.0, 0.05, 3);
+  const SeenPoints clean = seenPoints(3, 200, 0.05, 0.0);
   EXPECT_LE(search(clean, GetParam()).iterations, GeneticConsensusOptions::kPopulation) << "the first generation";
 }
 
 TEST_P(EveryMethod, FindsNothingInTooFewCorrespondences) {
-  Scene scene = makeScene(3, 0.0, 0.0, 1);
+  SeenPoints scene = seenPoints(1, 3, 0.0, 0.0);
   EXPECT_FALSE(search(scene, GetParam()).found);
   scene.correspondences.clear();
   const Consensus none = search(scene, GetParam());
@@ -173,7 +138,7 @@ TEST(SampleConsensus, RefusesUnknownNames) {
 TEST(SampleConsensus, LocalOptimisationFindsMoreInliers) {
   std::size_t plain = 0, optimised = 0;
   for (unsigned seed = 1; seed <= 10; ++seed) {
-    const Scene scene = makeScene(200, 0.4, 0.7, seed);
+    const SeenPoints scene = seenPoints(seed, 200, 0.7, 0.4);
     plain += inliersOf(search(scene, "ransac", static_cast<int>(seed)), scene).size();
     optimised += inliersOf(search(scene, "lo_ransac", static_cast<int>(seed)), scene).size();
   }
@@ -184,7 +149,7 @@ TEST(SampleConsensus, LocalOptimisationFindsMoreInliers) {
 TEST(SampleConsensus, MoreSamplesNeverGiveAWorsePose) {
   for (const char* method : {"msac", "lo_ransac"})
     for (unsigned seed = 1; seed <= 5; ++seed) {
-      const Scene scene = makeScene(100, 0.4, 0.7, seed);
+      const SeenPoints scene = seenPoints(seed, 100, 0.7, 0.4);
       SampleConsensusOptions options;
       options.consensus = valueOf<ConsensusMethod>(method);
       const PoseProblem problem(scene.camera, scene.correspondences, options.inlier_threshold);
@@ -201,7 +166,7 @@ TEST(SampleConsensus, MoreSamplesNeverGiveAWorsePose) {
 }
 
 TEST(SampleConsensus, LocalOptimisationUsesTheKernelOfTheRefinement) {
-  const Scene scene = makeScene(200, 0.4, 0.7, 1);
+  const SeenPoints scene = seenPoints(1, 200, 0.7, 0.4);
   SampleConsensusOptions options;
   options.consensus = ConsensusMethod::kLoRansac;
   const PoseProblem problem(scene.camera, scene.correspondences, options.inlier_threshold);
