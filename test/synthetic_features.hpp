@@ -89,12 +89,9 @@ class SyntheticScene {
 
 /// A drive of 1 m forward per pair that swings a little to both sides and nods.
 inline Eigen::Isometry3d syntheticPose(int pair) {
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.translation() = Eigen::Vector3d(0.3 * std::sin(0.2 * pair), 0.02 * std::sin(0.9 * pair), 1.0 * pair);
-  T.linear() = (Eigen::AngleAxisd(0.06 * std::sin(0.2 * pair), Eigen::Vector3d::UnitY()) *
-                Eigen::AngleAxisd(0.005 * std::sin(0.9 * pair), Eigen::Vector3d::UnitX()))
-                   .toRotationMatrix();
-  return T;
+  return Eigen::Translation3d(0.3 * std::sin(0.2 * pair), 0.02 * std::sin(0.9 * pair), 1.0 * pair) *
+         Eigen::AngleAxisd(0.06 * std::sin(0.2 * pair), Eigen::Vector3d::UnitY()) *
+         Eigen::AngleAxisd(0.005 * std::sin(0.9 * pair), Eigen::Vector3d::UnitX());
 }
 
 }  // namespace sdvo

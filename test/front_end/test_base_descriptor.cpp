@@ -70,10 +70,12 @@ const TwoDistances& twoDistances() {
   return scene;
 }
 
-class EveryDescriptor : public testing::TestWithParam<std::string> {};
+class EveryDescriptor : public testing::TestWithParam<std::string> {
+ protected:
+  const std::unique_ptr<const BaseDescriptor> descriptor = makeBaseDescriptor(valueOf<DescriptorType>(GetParam()));
+};
 
 TEST_P(EveryDescriptor, SeesTheSameWhenTheSizeFollowsTheDistance) {
-  const auto descriptor = makeBaseDescriptor(valueOf<DescriptorType>(GetParam()));
   const double following = twoDistances().meanDistance(*descriptor, 2.0);
   const double same_size = twoDistances().meanDistance(*descriptor, 1.0);
   EXPECT_LT(following, 0.6 * same_size);
@@ -83,7 +85,6 @@ TEST_P(EveryDescriptor, SeesTheSameWhenTheSizeFollowsTheDistance) {
 TEST_P(EveryDescriptor, KeepsRowsAlignedWhereOthersLeaveTheImage) {
   const synthetic::Texture texture(7, 6.0, 60.0);
   const cv::Mat image = synthetic::render({420, 300}, texture);
-  const auto descriptor = makeBaseDescriptor(valueOf<DescriptorType>(GetParam()));
   // Large and small, in and out of the image, in an order that sorting by octave or by validity would disturb.
   std::vector<ViewKeypoint> keypoints;
   std::mt19937 random(3);
@@ -110,7 +111,6 @@ TEST_P(EveryDescriptor, KeepsRowsAlignedWhereOthersLeaveTheImage) {
 
 TEST_P(EveryDescriptor, ReachesAsFarAsItSays) {
   const cv::Mat image = cv::Mat::zeros(200, 300, CV_8U);
-  const auto descriptor = makeBaseDescriptor(valueOf<DescriptorType>(GetParam()));
   const float size = 11.f, near = static_cast<float>(descriptor->reach(size)) - 0.5f, right = 299.f - near,
               bottom = 199.f - near;
   constexpr float kLittle = 0.01f;  // px
@@ -122,7 +122,6 @@ TEST_P(EveryDescriptor, ReachesAsFarAsItSays) {
 }
 
 TEST_P(EveryDescriptor, TakesNoKeypoints) {
-  const auto descriptor = makeBaseDescriptor(valueOf<DescriptorType>(GetParam()));
   const cv::Mat image = cv::Mat::zeros(100, 100, CV_8U);
   EXPECT_EQ(descriptor->describe(image, {}).rows.rows, 0);
   const ViewDescriptors outside = descriptor->describe(image, {{-5.f, 50.f, 7.f, -1.f}, {50.f, 104.f, 7.f, -1.f}});

@@ -198,13 +198,14 @@ TEST(SpreadOverBuckets, TakesPositionsOutsideTheImage) {
   EXPECT_TRUE(spreadOverBuckets({}, kSize, kBucket, 10).empty());
 }
 
-/// What a border hides is hidden; the rest is where it is in the whole image.
-float nearestOther(const std::vector<Corner>& corners, const Corner& corner) {
-  float nearest = 1e9f;
+double apart(const Corner& a, const Corner& b) {
+  return cv::norm(a.position - b.position);
+}
+
+double nearestOther(const std::vector<Corner>& corners, const Corner& corner) {
+  double nearest = 1e9;
   for (const Corner& other : corners)
-    if (&other != &corner)
-      nearest =
-          std::min(nearest, std::hypot(other.position.x - corner.position.x, other.position.y - corner.position.y));
+    if (&other != &corner) nearest = std::min(nearest, apart(corner, other));
   return nearest;
 }
 
@@ -218,14 +219,10 @@ TEST(KeepApart, LeavesOutExactlyWhatLiesNearerToAStrongerOne) {
   for (const double spacing : {0.4, 1.0, 4.0, 23.5}) {
     const std::vector<Corner> kept = keepApart(corners, spacing);
     for (const Corner& corner : kept) EXPECT_GE(nearestOther(kept, corner), spacing);
-    for (const Corner& corner : corners) {
-      bool explained = false;
-      for (const Corner& other : kept)
-        explained |= other.response >= corner.response &&
-                     std::hypot(other.position.x - corner.position.x, other.position.y - corner.position.y) < spacing;
-      // What is kept explains itself: it lies at its own place.
-      EXPECT_TRUE(explained);
-    }
+    for (const Corner& corner : corners)  // what is kept explains itself: it lies at its own place
+      EXPECT_TRUE(std::any_of(kept.begin(), kept.end(), [&](const Corner& other) {
+        return other.response >= corner.response && apart(corner, other) < spacing;
+      }));
     std::shuffle(corners.begin(), corners.end(), random);
     const std::vector<Corner> again = keepApart(corners, spacing);
     ASSERT_EQ(again.size(), kept.size());
@@ -248,36 +245,35 @@ TEST(FeatureDetector, KeepsCornersApart) {
   options.max_features = 5000;
   const std::vector<Corner> all = FeatureDetector(options).detect(unevenTexture());
   options.min_spacing = 6.0;
-  const std::vector<Corner> apart = FeatureDetector(options).detect(unevenTexture());
+  const std::vector<Corner> fewer = FeatureDetector(options).detect(unevenTexture());
   const auto nearestOf = [](const std::vector<Corner>& corners) {
-    float nearest = 1e9f;
+    double nearest = 1e9;
     for (const Corner& corner : corners) nearest = std::min(nearest, nearestOther(corners, corner));
     return nearest;
   };
   EXPECT_LT(nearestOf(all), 4.0);
-  EXPECT_GE(nearestOf(apart), 6.0);
-  EXPECT_GT(apart.size(), 200u);
+  EXPECT_GE(nearestOf(fewer), 6.0);
+  EXPECT_GT(fewer.size(), 200u);
 }
 
+/// What a border hides is hidden; the rest is where it is in the whole image.
 TEST(FeatureDetector, BorderLeavesPositionsWhereTheyAre) {
   constexpr int kBorder = 40;
   const cv::Mat image = unevenTexture();
   FeatureDetectorOptions options;
   options.max_features = 20000;
   options.subpixel = false;
-  std::set<std::pair<float, float>> of_image;
-  for (const Corner& corner : FeatureDetector(options).detect(image))
-    of_image.insert({corner.position.x, corner.position.y});
+  const std::vector<Corner> of_image = FeatureDetector(options).detect(image);
   const std::vector<Corner> inner = FeatureDetector(options).detect(image, kBorder);
   ASSERT_GT(inner.size(), 50u);
+  const cv::Rect2f visible(kBorder, kBorder, kSize.width - 2.f * kBorder, kSize.height - 2.f * kBorder);
+  // Whether a corner is the strongest around depends at the very border on what is hidden there.
+  const cv::Rect2f clear(visible.x + 5.f, visible.y + 5.f, visible.width - 10.f, visible.height - 10.f);
   for (const Corner& corner : inner) {
-    // Whether a corner is the strongest around depends at the very border on what is hidden there.
-    const cv::Rect2f clear(kBorder + 5.f, kBorder + 5.f, kSize.width - 2.f * kBorder - 10.f,
-                           kSize.height - 2.f * kBorder - 10.f);
-    const bool known = of_image.count({corner.position.x, corner.position.y}) == 1;
+    const bool known = std::any_of(of_image.begin(), of_image.end(),
+                                   [&](const Corner& other) { return other.position == corner.position; });
     EXPECT_TRUE(known || !clear.contains(corner.position)) << corner.position;
-    EXPECT_TRUE(corner.position.x >= kBorder && corner.position.x <= kSize.width - 1 - kBorder) << corner.position;
-    EXPECT_TRUE(corner.position.y >= kBorder && corner.position.y <= kSize.height - 1 - kBorder) << corner.position;
+    EXPECT_TRUE(visible.contains(corner.position)) << corner.position;
   }
 }
 
@@ -419,13 +415,19 @@ std::vector<std::pair<std::size_t, cv::Point2d>> locationErrors(const std::vecto
   return errors;
 }
 
+/// Positions from `first` px on, `step` px apart, each at another fraction of a pixel.
+std::vector<cv::Point2d> offTheGrid(int rows, int columns, double first, double step) {
+  std::vector<cv::Point2d> positions;
+  for (int row = 0; row < rows; ++row)
+    for (int column = 0; column < columns; ++column)
+      positions.emplace_back(first + step * column + 0.083 * row - 0.4, first + step * row + 0.067 * column - 0.45);
+  return positions;
+}
+
 TEST_P(CornerDetector, LocatesDotsBetweenPixels) {
   // All gradients of a round dot point at its centre, so that its position is not a matter of definition.
   constexpr double kTolerance = 0.15, kSigma = 1.3;  // px
-  std::vector<cv::Point2d> truth;
-  for (int row = 0; row < 9; ++row)
-    for (int column = 0; column < 14; ++column)
-      truth.emplace_back(30.0 + 40.0 * column + 0.083 * row - 0.4, 30.0 + 40.0 * row + 0.067 * column - 0.45);
+  const std::vector<cv::Point2d> truth = offTheGrid(9, 14, 30.0, 40.0);
   const cv::Mat image = synthetic::render(kSize, [&](double u, double v) {
     double sum = 40.0;
     for (const cv::Point2d& dot : truth)
@@ -443,10 +445,7 @@ TEST(FeatureDetector, LocatesObliqueCrossingsBetweenPixels) {
   // Two edges that cross at 60 degrees, fading outwards: all gradients point along lines through the crossing, and
   // their x and y go together.
   constexpr double kTolerance = 0.1;  // px
-  std::vector<cv::Point2d> truth;
-  for (int row = 0; row < 6; ++row)
-    for (int column = 0; column < 9; ++column)
-      truth.emplace_back(40.0 + 60.0 * column + 0.083 * row - 0.4, 40.0 + 60.0 * row + 0.067 * column - 0.45);
+  const std::vector<cv::Point2d> truth = offTheGrid(6, 9, 40.0, 60.0);
   const cv::Mat image = synthetic::render(kSize, [&](double u, double v) {
     double sum = 128.0;
     for (const cv::Point2d& crossing : truth) {

@@ -26,11 +26,14 @@ FeatureExtractorOptions fewFeatures() {
   return options;
 }
 
+StereoFeatures extract(const Pair& pair, const FeatureExtractorOptions& options = fewFeatures(), std::int64_t stamp = 0,
+                       const StereoCamera& camera = synthetic::camera()) {
+  return FeatureExtractor(options).extract(camera, pair.left, pair.right, stamp);
+}
+
 /// A disparity of 267 px in an image of 640.
 TEST(FeatureExtractor, FollowsAPlaneThatIsNearerThanTheSearchReaches) {
-  const StereoCamera camera = synthetic::camera();
-  const Pair pair = planeAt(0.75);
-  const StereoFeatures features = FeatureExtractor(fewFeatures()).extract(camera, pair.left, pair.right, 0);
+  const StereoFeatures features = extract(planeAt(0.75));
   EXPECT_FALSE(features.report.refused) << features.report.status;
   const auto right = std::count_if(features.disparity.begin(), features.disparity.end(),
                                    [](float disparity) { return std::abs(disparity - 266.7f) < 1.f; });
@@ -44,10 +47,8 @@ TEST(FeatureExtractor, MeasuresAPlaneAtKnownDepth) {
   options.size_curve.slope = 0.8;
   options.size_curve.min_size = 4.0;
   options.size_curve.max_size = 40.0;
-  const FeatureExtractor extractor(options);
   for (const double depth : {8.0, 16.0}) {
-    const Pair pair = planeAt(depth);
-    const StereoFeatures features = extractor.extract(camera, pair.left, pair.right, 1234);
+    const StereoFeatures features = extract(planeAt(depth), options, 1234);
     ASSERT_NO_THROW(features.check());
     EXPECT_GE(features.count(), 200);
     EXPECT_EQ(features.stamp, 1234);
@@ -82,7 +83,7 @@ TEST(FeatureExtractor, DescribesTheRightViewWhereTheFeatureIs) {
   for (const double dv : {-1.2, 1.2}) {
     cv::Mat right = synthetic::render(size, texture, kDisparity, dv);
     right.rowRange(0, 160).setTo(90);  // the first corners have no match
-    const StereoFeatures features = FeatureExtractor(fewFeatures()).extract(camera, left, right, 0);
+    const StereoFeatures features = extract({left, right});
     ASSERT_GE(features.count(), 100);
     const Freak left_view(left), right_view(right);
     double apart = 0.0, mean_dv = 0.0;
@@ -119,7 +120,7 @@ TEST(FeatureExtractor, FollowsTheRowsOfARightCameraThatTurned) {
     const auto line = [&](double u) { return rows.offset + rows.slope * (u - 0.5 * size.width); };
     const cv::Mat right =
         synthetic::render(size, [&](double u, double v) { return texture.at(u + 14.0, v - line(u)); });
-    const StereoFeatures features = FeatureExtractor(fewFeatures()).extract(camera, left, right, 0);
+    const StereoFeatures features = extract({left, right});
     EXPECT_TRUE(contains(features.report.status, rows.words)) << features.report.status;
     EXPECT_EQ(features.report.refused, rows.is_refused) << "beyond a degree";
     EXPECT_EQ(features.count() >= 100, !rows.is_refused);
@@ -140,9 +141,7 @@ TEST(FeatureExtractor, DetectsWhereTheSmallestDescriptorFits) {
   options.size_curve.max_size = 40.0;
   options.descriptor.extend_border = false;
   const double reach = Freak::reach(10.0);
-  const StereoCamera camera = synthetic::camera();
-  const Pair pair = planeAt(10.0);  // disparity 20 px
-  const StereoFeatures features = FeatureExtractor(options).extract(camera, pair.left, pair.right, 0);
+  const StereoFeatures features = extract(planeAt(10.0), options);  // disparity 20 px
   float top = 1e9f, nearest_right_view = 1e9f;
   for (std::size_t k = 0; k < features.u.size(); ++k) {
     top = std::min(top, features.v[k]);
@@ -162,7 +161,7 @@ TEST(FeatureExtractor, MeasuresBrightnessAndSharpness) {
     return x < 200.0 ? x : 400.0 - x;
   });
   const cv::Mat right(camera.height, camera.width, CV_8U, cv::Scalar(77));
-  const ExtractionReport report = FeatureExtractor(fewFeatures()).extract(camera, left, right, 0).report;
+  const ExtractionReport report = extract({left, right}).report;
   double mean = 0.0;
   for (int u = 0; u < camera.width; ++u) mean += left.at<std::uint8_t>(0, u) / static_cast<double>(camera.width);
   EXPECT_NEAR(report.mean_intensity[0], mean, 0.5);
@@ -199,19 +198,18 @@ TEST(FeatureExtractor, SaysWhyAPairGivesNothing) {
   StereoCamera flat = camera;
   flat.height = 36;
   const cv::Range rows(100, 100 + flat.height);
-  const auto expectEmpty = [&](const cv::Mat& left, const cv::Mat& right, const std::string& words,
-                               const StereoCamera& rig, const FeatureExtractorOptions& options) {
-    const StereoFeatures features = FeatureExtractor(options).extract(rig, left, right, 5);
+  for (const auto& [features, words] : std::vector<std::pair<StereoFeatures, std::string>>{
+           {extract({black, black}), "corners"},
+           {extract({black, pair.right}), "corners"},
+           {extract({pair.left, black}), "the right image has no texture"},
+           {extract({pair.right, pair.left}), "swapped"},
+           {extract(pair, huge), "border"},
+           {extract({pair.left.rowRange(rows), pair.right.rowRange(rows)}, fewFeatures(), 5, flat),
+            "the image is too small"}}) {
     EXPECT_EQ(features.count(), 0);
     EXPECT_NO_THROW(features.check());
     expectWords(features.report.status, {words});
-  };
-  expectEmpty(black, black, "corners", camera, fewFeatures());
-  expectEmpty(black, pair.right, "corners", camera, fewFeatures());
-  expectEmpty(pair.left, black, "the right image has no texture", camera, fewFeatures());
-  expectEmpty(pair.right, pair.left, "swapped", camera, fewFeatures());
-  expectEmpty(pair.left, pair.right, "border", camera, huge);
-  expectEmpty(pair.left.rowRange(rows), pair.right.rowRange(rows), "the image is too small", flat, fewFeatures());
+  }
 }
 
 /// A thermal camera's shutter: for some frames one side shows a plate, with noise, or its last image again.
@@ -241,19 +239,18 @@ TEST(FeatureExtractor, NamesTheSideThatShowsNothingOrRepeats) {
 }
 
 TEST(FeatureExtractor, SizesFollowTheDescriptorUnlessSet) {
-  const StereoCamera camera = synthetic::camera();
   const Pair pair = planeAt(8.0);
   for (const DescriptorType type : {DescriptorType::kFreak, DescriptorType::kBrief, DescriptorType::kOrb}) {
     FeatureExtractorOptions options = fewFeatures();
     options.descriptor.type = type;
     const DepthScale own(DepthScaleOptions{}.completedFor(type));
-    const StereoFeatures features = FeatureExtractor(options).extract(camera, pair.left, pair.right, 1);
+    const StereoFeatures features = extract(pair, options);
     ASSERT_GE(features.count(), 200) << nameOf(type);
     for (std::size_t k = 0; k < features.size.size(); ++k)
       ASSERT_NEAR(features.size[k], own.size(features.disparity[k]), 1e-4) << nameOf(type);
 
     options.size_curve.min_size = options.size_curve.max_size = 12.0;
-    const StereoFeatures set = FeatureExtractor(options).extract(camera, pair.left, pair.right, 1);
+    const StereoFeatures set = extract(pair, options);
     ASSERT_GE(set.count(), 200) << nameOf(type);
     for (const float size : set.size) ASSERT_EQ(size, 12.f) << nameOf(type);
   }
@@ -273,8 +270,7 @@ TEST(FeatureExtractor, DescribesMostOfASmallImage) {
   small.cx -= 100.0, small.cy -= 100.0;
   const Pair pair = planeAt(5.0);
   const cv::Range rows(100, 340), columns(100, 524);
-  const StereoFeatures features = FeatureExtractor(FeatureExtractorOptions())
-                                      .extract(small, pair.left(rows, columns), pair.right(rows, columns), 0);
+  const StereoFeatures features = extract({pair.left(rows, columns), pair.right(rows, columns)}, {}, 0, small);
   ASSERT_GT(features.report.stereo_matched, 100);
   EXPECT_GT(features.count(), 0.85 * features.report.stereo_matched);
   for (const float size : features.size) EXPECT_NEAR(size, 28.8f, 0.5f);
@@ -304,17 +300,15 @@ TEST(FeatureExtractor, IsStateless) {
   const FeatureExtractor extractor(fewFeatures());
   const Pair first = planeAt(8.0), second = planeAt(12.0, 32);
   const StereoFeatures before = extractor.extract(camera, first.left, first.right, 1);
-  const StereoFeatures other = extractor.extract(camera, second.left, second.right, 2);
-  const StereoFeatures after = extractor.extract(camera, first.left, first.right, 3);
-  EXPECT_NE(before.u, other.u);
-  synthetic::expectEqual(before, after);
-  synthetic::expectEqual(before, FeatureExtractor(fewFeatures()).extract(camera, first.left, first.right, 4));
+  EXPECT_NE(before.u, extractor.extract(camera, second.left, second.right, 2).u);
+  synthetic::expectEqual(before, extractor.extract(camera, first.left, first.right, 3));
+  synthetic::expectEqual(before, extract(first));
 }
 
 TEST(FeatureExtractor, LeavesItsImagesAlone) {
   const Pair pair = planeAt(8.0);
   const cv::Mat left = pair.left.clone(), right = pair.right.clone();
-  FeatureExtractor(fewFeatures()).extract(synthetic::camera(), pair.left, pair.right, 1);
+  extract(pair);
   EXPECT_TRUE(synthetic::equalMats(pair.left, left));
   EXPECT_TRUE(synthetic::equalMats(pair.right, right));
 }

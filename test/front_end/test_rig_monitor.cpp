@@ -15,7 +15,7 @@ const synthetic::Texture& texture() {
 }
 
 cv::Mat leftImage() {
-  return synthetic::render(kSize, [](double u, double v) { return texture().at(u, v); });
+  return synthetic::render(kSize, texture());
 }
 
 /// The right view of a plane at kDisparity whose content appears `dv` px lower and turned clockwise by `turn` rad.
@@ -43,10 +43,6 @@ cv::Mat flipped(const cv::Mat& image, int code) {
   cv::Mat result;
   cv::flip(image, result, code);
   return result;
-}
-
-void expectSaid(const std::string& diagnosis, const std::string& words) {
-  EXPECT_TRUE(contains(diagnosis, words)) << "'" << diagnosis << "' does not say '" << words << "'";
 }
 
 TEST(RigMonitor, LooksOnlyWhenFewCornersAreFound) {
@@ -88,21 +84,22 @@ TEST(RigMonitor, LooksNoFurtherOnceAFewCornersClearIt) {
 }
 
 TEST(RigMonitor, NamesTheHeightOfTheRightImage) {
-  expectSaid(diagnosis(leftImage(), rightImage(4.0)), "right image 4.0 px too low: not rectified?");
-  expectSaid(diagnosis(leftImage(), rightImage(-5.0)), "right image 5.0 px too high: not rectified?");
-  expectSaid(diagnosis(leftImage(), rightImage(4.0, 0.0, 0.5)), "right image 4.0 px too low");
+  expectWords(diagnosis(leftImage(), rightImage(4.0)), {"right image 4.0 px too low: not rectified?"});
+  expectWords(diagnosis(leftImage(), rightImage(-5.0)), {"right image 5.0 px too high: not rectified?"});
+  expectWords(diagnosis(leftImage(), rightImage(4.0, 0.0, 0.5)), {"right image 4.0 px too low"});
 }
 
 TEST(RigMonitor, NamesARotation) {
-  expectSaid(diagnosis(leftImage(), rightImage(0.0, 2.0 * CV_PI / 180.0)), "turned by 2.0 degrees clockwise");
-  expectSaid(diagnosis(leftImage(), rightImage(0.0, -3.0 * CV_PI / 180.0)), "turned by 3.0 degrees counterclockwise");
+  expectWords(diagnosis(leftImage(), rightImage(0.0, 2.0 * CV_PI / 180.0)), {"turned by 2.0 degrees clockwise"});
+  expectWords(diagnosis(leftImage(), rightImage(0.0, -3.0 * CV_PI / 180.0)),
+              {"turned by 3.0 degrees counterclockwise"});
 }
 
 TEST(RigMonitor, NamesSidesThatAreSwappedOrFlipped) {
   const cv::Mat left = leftImage(), right = rightImage(0.0);
   const std::string swapped = "are swapped, both are mirrored, or";
-  expectSaid(diagnosis(right, left), swapped);
-  expectSaid(diagnosis(flipped(left, 1), flipped(right, 1)), swapped);
+  expectWords(diagnosis(right, left), {swapped});
+  expectWords(diagnosis(flipped(left, 1), flipped(right, 1)), {swapped});
   struct OneSide {
     int code;
     std::string of_left, of_right;
@@ -110,10 +107,10 @@ TEST(RigMonitor, NamesSidesThatAreSwappedOrFlipped) {
   for (const OneSide& flip : {OneSide{1, "left image is mirrored, or the right one is and both are swapped",
                                       "right image is mirrored, or the left one is and both are swapped"},
                               OneSide{-1, "the left image is upside down", "the right image is upside down"}}) {
-    expectSaid(diagnosis(flipped(left, flip.code), right), flip.of_left);
-    expectSaid(diagnosis(left, flipped(right, flip.code)), flip.of_right);
+    expectWords(diagnosis(flipped(left, flip.code), right), {flip.of_left});
+    expectWords(diagnosis(left, flipped(right, flip.code)), {flip.of_right});
   }
-  expectSaid(diagnosis(flipped(right, 1), left), "right image is mirrored, or the left one is and both are swapped");
+  expectWords(diagnosis(flipped(right, 1), left), {"right image is mirrored, or the left one is and both are swapped"});
 }
 
 /// A robot before a wall: few corners are in both views, and a wrong one far from them shows no slope of the rows.
@@ -131,23 +128,22 @@ TEST(RigMonitor, NamesAWallThatIsTooNear) {
 
 /// A twentieth of the light, rounded to whole levels.
 TEST(RigMonitor, NamesThemInTheDark) {
-  expectSaid(diagnosis(0.05 * rightImage(0.0), 0.05 * leftImage()), "are swapped, both are mirrored");
-  expectSaid(diagnosis(0.05 * leftImage(), 0.05 * rightImage(4.0)), "px too low");
+  expectWords(diagnosis(0.05 * rightImage(0.0), 0.05 * leftImage()), {"are swapped, both are mirrored"});
+  expectWords(diagnosis(0.05 * leftImage(), 0.05 * rightImage(4.0)), {"px too low"});
 }
 
 TEST(RigMonitor, NamesRowsThatDiffer) {
   // Waves of 6 px, as no offset and no rotation makes them.
   const cv::Mat wavy = synthetic::render(
       kSize, [](double u, double v) { return texture().at(u + kDisparity, v - 6.0 * std::sin(u / 40.0)); });
-  expectSaid(diagnosis(leftImage(), wavy), "px here and there");
+  expectWords(diagnosis(leftImage(), wavy), {"px here and there"});
 }
 
 TEST(RigMonitor, SaysNothingWhereNothingIsFound) {
   const cv::Mat dark(kSize, CV_8U, cv::Scalar(3));
   EXPECT_EQ(diagnosis(leftImage(), dark), "");
   EXPECT_EQ(diagnosis(dark, dark), "");
-  const synthetic::Texture other(99, 5.0, 160.0);
-  EXPECT_EQ(diagnosis(leftImage(), synthetic::render(kSize, [&](double u, double v) { return other.at(u, v); })), "");
+  EXPECT_EQ(diagnosis(leftImage(), synthetic::render(kSize, synthetic::Texture(99, 5.0, 160.0))), "");
   EXPECT_EQ(RigMonitor({}, 1.5, 192.0).diagnose(leftImage(), rightImage(4.0), {}).words, "");
 }
 

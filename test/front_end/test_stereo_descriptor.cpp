@@ -23,6 +23,14 @@ DescriptorOptions withLayout(DescriptorLayout layout, bool oriented = false) {
   return options;
 }
 
+/// Rows of a key point in both views, one after the other.
+cv::Mat rowsOf(const Freak& left, const Freak& right, const StereoKeypoint& k, float angle = -1.f) {
+  cv::Mat rows(1, 2 * Freak::kBytes, CV_8U);
+  left.describe({{k.u_left, k.v_left, k.size, angle}}, {rows.ptr()});
+  right.describe({{k.u_right, k.v_right, k.size, angle}}, {rows.ptr() + Freak::kBytes});
+  return rows;
+}
+
 /// With a reach of 22 px: fits, leaves the left view, leaves the right view, fits, leaves it at the bottom, fits.
 std::vector<StereoKeypoint> mixedKeypoints() {
   return {{100.25f, 90.f, 80.f, 90.4f, 7.f}, {310.f, 90.f, 280.f, 90.f, 7.f},   {40.f, 60.f, 10.f, 60.f, 7.f},
@@ -59,10 +67,7 @@ TEST(StereoDescriptor, IsTheConcatenationOfBothViews) {
   const Freak left_view(left), right_view(right);
   for (int row = 0; row < both.rows.rows; ++row) {
     const StereoKeypoint& k = keypoints[static_cast<std::size_t>(both.index[static_cast<std::size_t>(row)])];
-    cv::Mat expected(1, 2 * Freak::kBytes, CV_8U);
-    left_view.describe({{k.u_left, k.v_left, k.size, -1.f}}, {expected.ptr()});
-    right_view.describe({{k.u_right, k.v_right, k.size, -1.f}}, {expected.ptr() + Freak::kBytes});
-    EXPECT_TRUE(synthetic::equalMats(both.rows.row(row), expected)) << "row " << row;
+    EXPECT_TRUE(synthetic::equalMats(both.rows.row(row), rowsOf(left_view, right_view, k))) << "row " << row;
   }
   const DescribedKeypoints left_alone =
       StereoDescriptor(withLayout(DescriptorLayout::kLeft)).describe(left, right, keypoints);
@@ -127,9 +132,7 @@ TEST(StereoDescriptor, OrientedHalvesTurnByTheLeftAngle) {
     EXPECT_NEAR(std::remainder(described.angle[row] - angle, 2.0 * CV_PI), 0.0, 1e-5);
     EXPECT_GE(described.angle[row], 0.f);
     EXPECT_LT(described.angle[row], static_cast<float>(2.0 * CV_PI));
-    cv::Mat expected(1, 2 * Freak::kBytes, CV_8U);
-    left_view.describe({{k.u_left, k.v_left, k.size, angle}}, {expected.ptr()});
-    right_view.describe({{k.u_right, k.v_right, k.size, angle}}, {expected.ptr() + Freak::kBytes});
+    const cv::Mat expected = rowsOf(left_view, right_view, k, angle);
     EXPECT_TRUE(synthetic::equalMats(described.rows.row(static_cast<int>(row)), expected)) << "row " << row;
   }
 }
