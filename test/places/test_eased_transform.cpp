@@ -5,10 +5,7 @@
 namespace sdvo::test_eased_transform {
 
 Eigen::Isometry3d target(double x, double turn) {
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.translation().x() = x;
-  T.linear() = Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  return T;
+  return Eigen::Translation3d(x, 0.0, 0.0) * Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitZ());
 }
 
 TEST(EasedTransform, ArrivesSmoothlyAndStays) {

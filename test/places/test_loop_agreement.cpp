@@ -50,8 +50,7 @@ TEST(LoopAgreement, NeighboursThatDisagreeAreNot) {
   LoopAgreement agreement;
   agreement.confirm(graph, proposal(10, 50, ahead(0.0)));
   EXPECT_TRUE(agreement.confirm(graph, proposal(11, 51, ahead(0.7))).empty()) << "0.7 m apart";
-  Eigen::Isometry3d turned = ahead(0.0);
-  turned.linear() = Eigen::AngleAxisd(0.05, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  const Eigen::Isometry3d turned(Eigen::AngleAxisd(0.05, Eigen::Vector3d::UnitY()));
   EXPECT_TRUE(agreement.confirm(graph, proposal(11, 52, turned)).empty()) << "3 degrees apart, one step off";
   EXPECT_TRUE(agreement.confirm(graph, proposal(30, 53, ahead(0.0))).empty()) << "of another place";
 }

@@ -12,12 +12,13 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr int kAround = 189, kStep = 3;
 constexpr std::int64_t kPeriod = 300'000'000;  // ns
 
+Eigen::AngleAxisd turned(double angle) {
+  return {angle, Eigen::Vector3d::UnitY()};
+}
+
 Eigen::Isometry3d onCircle(double metres) {
   const double radius = kAround / (2.0 * kPi), angle = metres / radius;
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.linear() = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY()).toRotationMatrix();
-  T.translation() = radius * Eigen::Vector3d(1.0 - std::cos(angle), 0.0, std::sin(angle));
-  return T;
+  return Eigen::Translation3d(radius * Eigen::Vector3d(1.0 - std::cos(angle), 0.0, std::sin(angle))) * turned(angle);
 }
 
 const synthetic::World& world() {
@@ -53,11 +54,8 @@ struct Drive {
     std::vector<PlaceReport> reports;
     for (int metre = from; metre < to; metre += kStep) {
       const Eigen::Isometry3d T_true = onCircle(metre);
-      if (last_true && continuous) {
-        Eigen::Isometry3d error = Eigen::Isometry3d::Identity();
-        error.linear() = Eigen::AngleAxisd(drift * kStep, Eigen::Vector3d::UnitY()).toRotationMatrix();
-        T_odom_camera = T_odom_camera * last_true->inverse() * T_true * error;
-      }
+      if (last_true && continuous)
+        T_odom_camera = T_odom_camera * last_true->inverse() * T_true * turned(drift * kStep);
       last_true = T_true;
       const CameraMotion motion{T_odom_camera, 1e-6 * Matrix6d::Identity(), continuous};
       continuous = true;
@@ -76,6 +74,13 @@ struct Drive {
   /// How far the last pair is off in the map, m.
   double error() const {
     return (recognition.T_map_odom() * T_odom_camera * last_true->inverse()).translation().norm();
+  }
+
+  /// As they are saved.
+  std::vector<Place> places() const {
+    std::vector<Place> places;
+    for (const auto& [id, place] : recognition.places()) places.push_back(place);
+    return places;
   }
 
   PlaceRecognition recognition;
@@ -113,8 +118,7 @@ TEST(PlaceRecognition, KeyframesAreApartByWayOrByTurn) {
   EXPECT_EQ(sparser.recognition.places().size(), 6u) << "every second step";
   PlaceRecognition turning{PlaceRecognitionOptions()};
   for (int i = 0; i <= 60; i += 5) {
-    Eigen::Isometry3d T = onCircle(0.0);
-    T.linear() = Eigen::AngleAxisd(i * kPi / 180.0, Eigen::Vector3d::UnitY()).toRotationMatrix();
+    const Eigen::Isometry3d T = onCircle(0.0) * turned(i * kPi / 180.0);
     turning.observe(see(T, kPeriod * (i + 1)), {T, Matrix6d::Zero(), true});
   }
   EXPECT_EQ(turning.places().size(), 5u) << "every 15 degrees";
@@ -165,17 +169,10 @@ TEST(PlaceRecognition, AfterAnUnknownMotionAKnownPlaceSaysWhereItIs) {
   EXPECT_LT(drive.error(), 0.3);
 }
 
-/// As they are saved.
-std::vector<Place> placesOf(const PlaceRecognition& recognition) {
-  std::vector<Place> places;
-  for (const auto& [id, place] : recognition.places()) places.push_back(place);
-  return places;
-}
-
 TEST(PlaceRecognition, RestoredPlacesLetANewSessionFindItself) {
   Drive mapping;
   mapping.go(0, 120);
-  std::vector<Place> places = placesOf(mapping.recognition);
+  std::vector<Place> places = mapping.places();
 
   Drive later;
   later.recognition.restore(places, mapping.recognition.graph());
@@ -186,10 +183,10 @@ TEST(PlaceRecognition, RestoredPlacesLetANewSessionFindItself) {
   EXPECT_LT(later.error(), 0.3) << "in the old map's frame";
   EXPECT_GT(later.recognition.places().size(), known);
 
-  EXPECT_TRUE(contains(errorOf([&] { later.recognition.restore(places, mapping.recognition.graph()); }), "before"));
+  expectError([&] { later.recognition.restore(places, mapping.recognition.graph()); }, {"before"});
   PlaceRecognition fresh{PlaceRecognitionOptions()};
   places.pop_back();
-  EXPECT_TRUE(contains(errorOf([&] { fresh.restore(places, mapping.recognition.graph()); }), "without a place"));
+  expectError([&] { fresh.restore(places, mapping.recognition.graph()); }, {"without a place"});
   EXPECT_TRUE(fresh.places().empty());
 }
 
@@ -198,7 +195,7 @@ Drive localisingIn(const Drive& mapping) {
   PlaceRecognitionOptions options = Drive::fewAndFast();
   options.localisation_only = true;
   Drive drive(0.001, options);
-  drive.recognition.restore(placesOf(mapping.recognition), mapping.recognition.graph());
+  drive.recognition.restore(mapping.places(), mapping.recognition.graph());
   drive.T_odom_camera = Eigen::Isometry3d::Identity();  // an origin of its own
   return drive;
 }
@@ -225,9 +222,7 @@ TEST(PlaceRecognition, AHintSaysWhereItIsAndWhereNotToLook) {
   // What the odometry has as its origin is 50 m along the circle.
   const Eigen::Isometry3d true_hint = onCircle(50.0), wrong_hint = onCircle(120.0);
   Drive right = localisingIn(mapping), wrong = localisingIn(mapping);
-  Eigen::Isometry3d inexact = true_hint;
-  inexact.translation() += Eigen::Vector3d(0.5, 0.0, 0.5);
-  right.recognition.expect(inexact, 5.0);
+  right.recognition.expect(Eigen::Translation3d(0.5, 0.0, 0.5) * true_hint, 5.0);
   const auto first = right.go(50, 53);
   ASSERT_EQ(first.size(), 1u);
   EXPECT_LT(right.error(), 0.8) << "as told, before anything was recognised";
@@ -247,7 +242,7 @@ TEST(PlaceRecognition, PlacesWithWildNumbersAreNotTakenUp) {
   mapping.go(0, 6);
   ASSERT_EQ(mapping.recognition.places().size(), 2u);
   const auto refusal = [&](int id, int segment) {
-    std::vector<Place> places = placesOf(mapping.recognition);
+    std::vector<Place> places = mapping.places();
     places[1].id = id;
     places[1].segment = segment;
     std::map<int, Eigen::Isometry3d> nodes = {{0, Eigen::Isometry3d::Identity()}, {id, Eigen::Isometry3d::Identity()}};
@@ -287,7 +282,7 @@ TEST(PlaceRecognition, TheOldestPlacesGo) {
 TEST(PlaceRecognition, OfRestoredPlacesNoMoreAreKeptThanOfOthers) {
   Drive mapping;
   mapping.go(0, 60);
-  const std::vector<Place> places = placesOf(mapping.recognition);
+  const std::vector<Place> places = mapping.places();
   PlaceRecognitionOptions options;
   options.max_places = 10;
   ASSERT_GT(places.size(), 15u);
@@ -304,10 +299,10 @@ TEST(PlaceRecognition, RefusesOtherDescriptorsAndKeepsItsState) {
   const std::size_t known = drive.recognition.places().size();
   StereoFeatures other = see(onCircle(20.0), 100'000'000'000);
   other.descriptor = "brief";
-  EXPECT_TRUE(contains(errorOf([&] { drive.recognition.observe(other, {}); }), "brief"));
+  expectError([&] { drive.recognition.observe(other, {}); }, {"brief"});
   other.element_type = ElementType::kUint8;
   PlaceRecognition fresh{PlaceRecognitionOptions()};
-  EXPECT_TRUE(contains(errorOf([&] { fresh.observe(other, {}); }), "uint8"));
+  expectError([&] { fresh.observe(other, {}); }, {"uint8"});
   EXPECT_TRUE(fresh.places().empty());
   EXPECT_EQ(drive.recognition.places().size(), known);
 }

@@ -11,10 +11,7 @@ using synthetic::camera;
 const synthetic::World kWorld = synthetic::randomWorld(1, 500, {-8.0, -4.0, 4.0}, {8.0, 4.0, 25.0});
 
 Eigen::Isometry3d pose(const Eigen::Vector3d& translation, double turn) {
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.translation() = translation;
-  T.linear() = Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitY()).toRotationMatrix();
-  return T;
+  return Eigen::Translation3d(translation) * Eigen::AngleAxisd(turn, Eigen::Vector3d::UnitY());
 }
 
 StereoFeatures see(const synthetic::World& world, const Eigen::Isometry3d& T_world_camera, unsigned seed) {
