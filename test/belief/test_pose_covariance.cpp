@@ -12,9 +12,7 @@ constexpr double kForward = 2.0;  // m
 const Eigen::Isometry3d kStill = Eigen::Isometry3d::Identity();
 
 Eigen::Isometry3d forward() {
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.translation().z() = kForward;
-  return T;
+  return Eigen::Isometry3d(Eigen::Translation3d(0.0, 0.0, kForward));
 }
 
 Matrix6d diagonal(double translation, double rotation) {
@@ -227,10 +225,9 @@ TEST(PoseCovariance, RotationDoesNotFallWhereTranslationGrows) {
 
 TEST(PoseCovariance, StaysSymmetricAndPositive) {
   PoseCovariance covariance;
-  Vector6d step;
-  step << 0.1, -0.05, 1.0, 0.02, -0.3, 0.1;
+  const Eigen::Isometry3d step = expSE3((Vector6d() << 0.1, -0.05, 1.0, 0.02, -0.3, 0.1).finished());
   for (int i = 0; i < 1000; ++i) {
-    const Matrix6d motion = covariance.measure(expSE3(step), diagonal(1e-4, 1e-6) * (1 + i % 7));
+    const Matrix6d motion = covariance.measure(step, diagonal(1e-4, 1e-6) * (1 + i % 7));
     if (i % 3 == 0) covariance.markKeyframe();
     if (i % 11 == 0) covariance.doubt(diagonal(1e-2, 1e-4), diagonal(2e-2, 1e-4));
     for (const Matrix6d& matrix : {motion, covariance.value()}) {
@@ -247,7 +244,7 @@ PoseCovariance tenSteps(const RigEstimate::Vector& compensated) {
   by_rig.row(2) << 0.02, 0.005, 3.0;  // m/px, m/px, m/s
   for (int step = 0; step < 10; ++step) {
     for (const int pair : {0, 1}) {  // of which the second is the key frame
-      covariance.measure(pair == 0 ? forward() : Eigen::Isometry3d::Identity(), diagonal(1e-4, 0.0));
+      covariance.measure(pair == 0 ? forward() : kStill, diagonal(1e-4, 0.0));
       covariance.expose(by_rig, compensated);
     }
     covariance.markKeyframe();

@@ -15,12 +15,6 @@ StereoCamera someCamera() {
   return SyntheticScene(1, 0, 10.0).camera;
 }
 
-Eigen::Isometry3d perturbed(const Eigen::Isometry3d& T, int axis, double step) {
-  Vector6d xi = Vector6d::Zero();
-  xi[axis] = step;
-  return expSE3(xi) * T;
-}
-
 constexpr double kPositionSigma = 0.2;  // px
 
 RigCalibration calibrationOf(double offset, double bend) {
@@ -91,9 +85,10 @@ Window disturbedWindow(const RigCalibration& truth, const std::function<Eigen::I
     window.points.push_back(point);
   }
   for (int f = 1; f < 5; ++f)
-    for (int axis = 0; axis < 6; ++axis)
-      window.T_camera_origin[f] =
-          perturbed(window.T_camera_origin[f], axis, uniform(-1, 1) * (axis < 3 ? 0.05 : 0.005));
+    for (int axis = 0; axis < 6; ++axis) {
+      const double step = uniform(-1, 1) * (axis < 3 ? 0.05 : 0.005);
+      window.T_camera_origin[f] = expSE3(step * Vector6d::Unit(axis)) * window.T_camera_origin[f];
+    }
   return window;
 }
 

@@ -16,12 +16,9 @@ std::vector<Eigen::Isometry3d> drive(int pairs, const Pitch& pitch, const Yaw& y
   double heading = 0.0;
   for (int i = 1; i < pairs; ++i) {
     heading += yaw(i);
-    Eigen::Isometry3d pose = Eigen::Isometry3d::Identity();
-    pose.linear() =
-        (Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitY()) * Eigen::AngleAxisd(pitch(i), Eigen::Vector3d::UnitX()))
-            .toRotationMatrix();
-    pose.translation() = poses.back().translation() + pose.linear() * Eigen::Vector3d(0.0, 0.0, kStep);
-    poses.push_back(pose);
+    poses.push_back(Eigen::Translation3d(poses.back().translation()) *
+                    Eigen::AngleAxisd(heading, Eigen::Vector3d::UnitY()) *
+                    Eigen::AngleAxisd(pitch(i), Eigen::Vector3d::UnitX()) * Eigen::Translation3d(0.0, 0.0, kStep));
   }
   return poses;
 }
