@@ -79,18 +79,34 @@ std::string roomOf(const std::string& header, const std::string& room) {
   return header.find('/') == std::string::npos && fs::exists(kSource / "src" / room / header) ? room : "";
 }
 
+/// All files below a folder; none where it does not exist.
+std::vector<fs::path> filesBelow(const fs::path& folder) {
+  std::vector<fs::path> files;
+  if (!fs::exists(folder)) return files;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder))
+    if (entry.is_regular_file()) files.push_back(entry.path());
+  return files;
+}
+
+std::vector<fs::path> filesOf(const std::string& room) {
+  std::vector<fs::path> files = filesBelow(kSource / "src" / room);
+  for (const fs::path& file : filesBelow(kSource / "include" / "stereo_descriptor_vo" / room)) files.push_back(file);
+  return files;
+}
+
+std::vector<Include> includesIn(const fs::path& file) {
+  std::vector<Include> includes;
+  std::ifstream stream(file);
+  std::string line;
+  for (int number = 1; std::getline(stream, line); ++number)
+    if (const std::string header = headerOf(line); !header.empty()) includes.push_back({file, number, header});
+  return includes;
+}
+
 std::vector<Include> includesOf(const std::string& room) {
   std::vector<Include> includes;
-  for (const fs::path& directory : {kSource / "include" / "stereo_descriptor_vo" / room, kSource / "src" / room}) {
-    if (!fs::exists(directory)) continue;
-    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(directory)) {
-      std::ifstream stream(entry.path());
-      std::string line;
-      for (int number = 1; std::getline(stream, line); ++number)
-        if (const std::string header = headerOf(line); !header.empty())
-          includes.push_back({entry.path(), number, header});
-    }
-  }
+  for (const fs::path& file : filesOf(room))
+    for (const Include& include : includesIn(file)) includes.push_back(include);
   return includes;
 }
 
@@ -186,23 +202,12 @@ int linesOf(const fs::path& file) {
   return static_cast<int>(std::count(std::istreambuf_iterator<char>(stream), {}, '\n'));
 }
 
-/// The files of a room and their lines.
-std::map<fs::path, int> filesOf(const std::string& room) {
-  std::map<fs::path, int> files;
-  for (const fs::path& directory : {kSource / "include" / "stereo_descriptor_vo" / room, kSource / "src" / room}) {
-    if (!fs::exists(directory)) continue;
-    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(directory))
-      files[entry.path()] = linesOf(entry.path());
-  }
-  return files;
-}
-
 /// A newcomer reads a room of the motion side in an evening.
 TEST(Rooms, NoneOfTheMotionSideIsLarge) {
   constexpr int kMost = 2400;  // lines
   for (const std::string room : {"motion", "matching", "map", "belief", "rig", "odometry"}) {
     int lines = 0;
-    for (const auto& [file, of_file] : filesOf(room)) lines += of_file;
+    for (const fs::path& file : filesOf(room)) lines += linesOf(file);
     EXPECT_LE(lines, kMost) << room;
     EXPECT_GT(lines, 500) << room;
   }
@@ -214,18 +219,16 @@ TEST(Rooms, ShortFilesAreFew) {
   constexpr int kShort = 40, kMost = 45;               // lines; files
   std::map<std::string, std::set<std::string>> users;  // of a header, by its name without ending
   for (const fs::path& parent : {kSource / "include", kSource / "src", kSource / "test", kSource / "lab"})
-    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(parent)) {
-      if (entry.path().extension() != ".hpp" && entry.path().extension() != ".cpp") continue;
-      std::ifstream stream(entry.path());
-      for (std::string line; std::getline(stream, line);) {
-        const std::string header = fs::path(headerOf(line)).stem().string();
-        if (header != entry.path().stem()) users[header].insert(entry.path().string());
-      }
+    for (const fs::path& file : filesBelow(parent)) {
+      if (file.extension() != ".hpp" && file.extension() != ".cpp") continue;
+      for (const Include& include : includesIn(file))
+        if (const fs::path header = fs::path(include.header).stem(); header != file.stem())
+          users[header.string()].insert(file.string());
     }
   int files = 0;
   for (const auto& [room, others] : kMayInclude)
-    for (const auto& [file, lines] : filesOf(room)) {
-      if (lines >= kShort) continue;
+    for (const fs::path& file : filesOf(room)) {
+      if (linesOf(file) >= kShort) continue;
       ++files;
       const std::string name = file.stem().string();
       const fs::path source = kSource / "src" / room / (name + ".cpp");
@@ -269,18 +272,13 @@ TEST(Rooms, EveryPublicHeaderIsReachedFromAnEntryPoint) {
   const fs::path include = kSource / "include";
   std::set<std::string> reached;
   const std::function<void(const fs::path&)> follow = [&](const fs::path& file) {
-    std::ifstream stream(file);
-    for (std::string line; std::getline(stream, line);)
-      if (const std::string header = headerOf(line); fs::exists(include / header) && reached.insert(header).second)
-        follow(include / header);
+    for (const auto& [user, line, header] : includesIn(file))
+      if (fs::exists(include / header) && reached.insert(header).second) follow(include / header);
   };
   for (const char* folder : {"src/tools", "src/config", "src/ros", "src/messages", "src/check", "examples"})
-    for (const fs::directory_entry& entry : fs::recursive_directory_iterator(kSource / folder))
-      if (entry.is_regular_file()) follow(entry.path());
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(include))
-    if (entry.is_regular_file()) {
-      EXPECT_EQ(reached.count(entry.path().lexically_relative(include).string()), 1u) << entry.path();
-    }
+    for (const fs::path& file : filesBelow(kSource / folder)) follow(file);
+  for (const fs::path& file : filesBelow(include))
+    EXPECT_EQ(reached.count(file.lexically_relative(include).string()), 1u) << file;
 }
 
 /// With one sentence, before anything that only C++17 has. Headers that include another one of ours leave it to that
@@ -288,14 +286,11 @@ TEST(Rooms, EveryPublicHeaderIsReachedFromAnEntryPoint) {
 TEST(Rooms, EveryPublicHeaderRefusesOlderStandards) {
   const fs::path include = kSource / "include";
   std::set<std::string> public_headers, guarded;
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(include))
-    if (entry.path().extension() == ".hpp") public_headers.insert(entry.path().lexically_relative(include).string());
-  for (const std::string& header : public_headers) {
-    std::ifstream stream(include / header);
-    std::string line;
-    while (std::getline(stream, line))
-      if (public_headers.count(headerOf(line)) > 0) guarded.insert(header);
-  }
+  for (const fs::path& file : filesBelow(include))
+    if (file.extension() == ".hpp") public_headers.insert(file.lexically_relative(include).string());
+  for (const std::string& header : public_headers)
+    for (const Include& included : includesIn(include / header))
+      if (public_headers.count(included.header) > 0) guarded.insert(header);
   guarded.insert("stereo_descriptor_vo/common/cpp17.hpp");
   EXPECT_EQ(guarded, public_headers);
 

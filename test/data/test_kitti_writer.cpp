@@ -22,12 +22,7 @@ class KittiWriterTest : public testing::Test {
   }
 
   std::string errorOfWriter() const {
-    try {
-      KittiWriter writer(directory_);
-    } catch (const std::runtime_error& e) {
-      return e.what();
-    }
-    return "no error";
+    return errorOf([this] { KittiWriter{directory_}; });
   }
 
   const StereoCamera camera_{123.0 / 7.0, 18.5, 20.25, 14.75, 0.1203, 40, 30};
@@ -38,7 +33,7 @@ class KittiWriterTest : public testing::Test {
 
 TEST_F(KittiWriterTest, WhatIsWrittenIsReadBack) {
   Trajectory poses(2, Eigen::Isometry3d::Identity());
-  poses[1].translation() = Eigen::Vector3d(0.5, -0.25, 2.0);
+  poses[1] = Eigen::Translation3d(0.5, -0.25, 2.0);
   KittiWriter writer(directory_ + "/");
   write(writer, poses);
 

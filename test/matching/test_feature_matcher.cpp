@@ -13,10 +13,12 @@ using synthetic::addFeature;
 using synthetic::noFeatures;
 using synthetic::randomRow;
 
-FeatureMatcherOptions withoutGate() {
+std::vector<FeatureMatch> matchWithoutGate(const StereoFeatures& reference, const StereoFeatures& current,
+                                           double max_distance = FeatureMatcherOptions().max_distance) {
   FeatureMatcherOptions options;
   options.gating = false;
-  return options;
+  options.max_distance = max_distance;
+  return FeatureMatcher(options).match(reference, current, std::nullopt);
 }
 
 /// The row with its first `count` bits turned over.
@@ -31,18 +33,15 @@ TEST(FeatureMatcher, FindsShuffledFeaturesAmongStrangers) {
   const StereoCamera camera = synthetic::camera();
   const synthetic::World world = synthetic::randomWorld(1, 400, {-8.0, -4.0, 4.0}, {8.0, 4.0, 30.0});
   synthetic::Sighting first, second;
-  first.seed = 1;
-  first.flipped = 0.05;
-  first.strangers = 100;
-  second.seed = 2;
-  second.flipped = 0.05;
-  second.strangers = 150;
+  first.seed = 1, second.seed = 2;
+  first.flipped = second.flipped = 0.05;
+  first.strangers = 100, second.strangers = 150;
   const StereoFeatures reference = synthetic::observe(world, camera, Eigen::Isometry3d::Identity(), 1, first);
   const StereoFeatures current = synthetic::observe(world, camera, Eigen::Isometry3d::Identity(), 2, second);
   const int common = reference.count() - 100;
   ASSERT_EQ(current.count() - 150, common);
 
-  const std::vector<FeatureMatch> matches = FeatureMatcher(withoutGate()).match(reference, current, std::nullopt);
+  const std::vector<FeatureMatch> matches = matchWithoutGate(reference, current);
   // Two rows of one point differ by 2 * 0.05 * 0.95 of their bits, strangers by half, six standard deviations from 0.3.
   EXPECT_EQ(static_cast<int>(matches.size()), common);
   for (const FeatureMatch& match : matches) {
@@ -65,14 +64,14 @@ TEST(FeatureMatcher, IsOneToOneAndInTheOrderOfTheReference) {
   addFeature(reference, 300, 100, 10, flipped(row, 20));
   addFeature(current, 100, 100, 10, row);
   addFeature(current, 400, 300, 10, randomRow(random, 128));
-  const auto matches = FeatureMatcher(withoutGate()).match(reference, current, std::nullopt);
+  const auto matches = matchWithoutGate(reference, current);
   ASSERT_EQ(matches.size(), 1u);
   EXPECT_EQ(matches[0].reference, 1);
   EXPECT_EQ(matches[0].current, 0);
   EXPECT_NEAR(matches[0].distance, 10.0 / 1024.0, 1e-6);
 
   // The same from the other side.
-  const auto turned = FeatureMatcher(withoutGate()).match(current, reference, std::nullopt);
+  const auto turned = matchWithoutGate(current, reference);
   ASSERT_EQ(turned.size(), 1u);
   EXPECT_EQ(turned[0].current, 1);
 
@@ -84,7 +83,7 @@ TEST(FeatureMatcher, IsOneToOneAndInTheOrderOfTheReference) {
   }
   std::set<int> references, currents;
   int previous = -1;
-  for (const FeatureMatch& match : FeatureMatcher(withoutGate()).match(crowd_a, crowd_b, std::nullopt)) {
+  for (const FeatureMatch& match : matchWithoutGate(crowd_a, crowd_b)) {
     EXPECT_TRUE(references.insert(match.reference).second);
     EXPECT_TRUE(currents.insert(match.current).second);
     EXPECT_GT(match.reference, previous);
@@ -101,19 +100,14 @@ TEST(FeatureMatcher, RefusesDistancesBeyondTheLimit) {
   auto other = row;
   for (std::uint8_t& byte : other) byte ^= 0x11;  // a quarter of the bits
   addFeature(current, 100, 100, 10, other);
-  FeatureMatcherOptions options = withoutGate();
-  options.max_distance = 0.25;
-  ASSERT_EQ(FeatureMatcher(options).match(reference, current, std::nullopt).size(), 1u);
-  options.max_distance = 0.249;
-  EXPECT_TRUE(FeatureMatcher(options).match(reference, current, std::nullopt).empty());
+  EXPECT_EQ(matchWithoutGate(reference, current, 0.25).size(), 1u);
+  EXPECT_TRUE(matchWithoutGate(reference, current, 0.249).empty());
 }
 
 TEST(FeatureMatcher, GateHoldsThePredictedPositionAndNothingFar) {
   std::mt19937 random(5);
   const StereoCamera camera = synthetic::camera();
-  Vector6d xi;
-  xi << 0.3, -0.1, -2.0, 0.01, -0.2, -0.02;
-  const Eigen::Isometry3d T_current_reference = expSE3(xi);
+  const Eigen::Isometry3d T_current_reference = expSE3((Vector6d() << 0.3, -0.1, -2.0, 0.01, -0.2, -0.02).finished());
   FeatureMatcherOptions options;
   options.gate_radius = 25.0;
   const FeatureMatcher matcher(options);
@@ -157,8 +151,7 @@ TEST(FeatureMatcher, TakesPredictionsThatLeaveTheImageOrPassTheCamera) {
   const synthetic::World world = synthetic::randomWorld(6, 300, {-8.0, -4.0, 2.0}, {8.0, 4.0, 30.0});
   const StereoFeatures features = synthetic::observe(world, camera, Eigen::Isometry3d::Identity(), 1);
   for (const double forward : {-60.0, -4.0, 1e6}) {
-    Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-    T.translation() << 1e3 * (forward > 0.0), 0.0, forward;
+    const Eigen::Isometry3d T(Eigen::Translation3d(1e3 * (forward > 0.0), 0.0, forward));
     EXPECT_LE(FeatureMatcher({}).match(features, features, T).size(), static_cast<std::size_t>(features.count()));
   }
 }
@@ -171,8 +164,7 @@ TEST(FeatureMatcher, DoesNotLookForWhatIsBehindTheCamera) {
   StereoFeatures reference = noFeatures(camera);
   const Eigen::Vector3d pixel = camera.project(point);
   addFeature(reference, pixel.x(), pixel.y(), pixel.x() - pixel.z(), row);
-  Eigen::Isometry3d passed = Eigen::Isometry3d::Identity();
-  passed.translation().z() = -10.0;
+  const Eigen::Isometry3d passed(Eigen::Translation3d(0.0, 0.0, -10.0));
   // Where the mirrored projection of a point behind would lie.
   const Eigen::Vector3d mirrored = camera.project(passed * point);
   StereoFeatures current = noFeatures(camera);
@@ -199,9 +191,7 @@ void expectShares(ElementType type) {
   // The second of each set are the alike ones: |a - b|^2 = 1 + 4, |a|^2 = 9 + 16, |b|^2 = 16 + 36.
   const StereoFeatures a = numbers<Element>(type, {{100, 0, 0}, {3, 4, 0}});
   const StereoFeatures b = numbers<Element>(type, {{0, 0, 90}, {4, 6, 0}});
-  FeatureMatcherOptions options = withoutGate();
-  options.max_distance = 1.0;
-  const auto matches = FeatureMatcher(options).match(a, b, std::nullopt);
+  const auto matches = matchWithoutGate(a, b, 1.0);
   ASSERT_EQ(matches.size(), 1u);
   EXPECT_EQ(matches[0].reference, 1);
   EXPECT_EQ(matches[0].current, 1);
@@ -222,7 +212,7 @@ TEST(FeatureMatcher, CountsTheBitsOfRowsThatAreNoMultipleOfEightBytes) {
     auto other = row;
     other.back() = static_cast<std::uint8_t>(other.back() ^ 0x81);
     addFeature(current, 100, 100, 10, other);
-    const auto matches = FeatureMatcher(withoutGate()).match(reference, current, std::nullopt);
+    const auto matches = matchWithoutGate(reference, current);
     ASSERT_EQ(matches.size(), 1u) << bytes;
     EXPECT_NEAR(matches[0].distance, 2.0 / (8.0 * bytes), 1e-6);
   }

@@ -33,14 +33,21 @@ std::vector<std::uint8_t> cut(const Scene& scene, const Eigen::Vector2d& centre,
   return samples;
 }
 
+/// Around the origin, in steps of a pixel.
+std::vector<std::uint8_t> cut(const Scene& scene, std::mt19937& random, double noise = kNoise) {
+  return cut(scene, Eigen::Vector2d::Zero(), 1.0, random, noise);
+}
+
 Patch patchOf(const std::vector<std::uint8_t>& samples, double spacing = 1.0) {
   return {samples.data(), kSide, static_cast<float>(spacing)};
 }
 
 std::optional<PatchShift> align(const std::vector<std::uint8_t>& reference, const std::vector<std::uint8_t>& current,
-                                const PatchAlignmentOptions& options = {}) {
-  return alignPatch(options, patchOf(reference), Eigen::Vector2f::Zero(), patchOf(current),
-                    Eigen::Matrix2f::Identity());
+                                const PatchAlignmentOptions& options = {},
+                                const Eigen::Vector2f& centre = Eigen::Vector2f::Zero(), float ratio = 1.f,
+                                double spacing = 1.0) {
+  return alignPatch(options, patchOf(reference), centre, patchOf(current, spacing),
+                    ratio * Eigen::Matrix2f::Identity());
 }
 
 /// Texture with structure of 5 px and more.
@@ -141,29 +148,25 @@ TEST(PatchAlignment, TheScaleRatioIsWhatDoesIt) {
   EXPECT_GT(ignored.median(), 2.0 * told.median());
 }
 
-TEST(PatchAlignment, GroundAtASlantIsFoundToAFractionOfAPixel) {
-  // A vehicle's step: the ground's rows spread by 1.25, its columns by 1.15, and rows shear; the warp told knows only
-  // the ratio of the depths.
+TEST(PatchAlignment, FindsTheShiftUnderOtherWarpsAndSpacings) {
+  // A vehicle's step: the ground's rows spread by 1.25, its columns by 1.15, and rows shear.
   Eigen::Matrix2d ground;
   ground << 1.15, 0.05, 0.0, 1.25;
-  Trial trial = tryShifts(ground, scaled(1.15));
-  EXPECT_GT(trial.found, 150);
-  EXPECT_LT(trial.median(), 0.15);
-}
-
-TEST(PatchAlignment, RolledViewsAreFoundByTheWarp) {
-  const double roll = 0.3;
-  Eigen::Matrix2d turn;
-  turn << std::cos(roll), -std::sin(roll), std::sin(roll), std::cos(roll);
-  Trial trial = tryShifts(turn, turn);
-  EXPECT_GT(trial.found, 150);
-  EXPECT_LT(trial.median(), 0.05);
-}
-
-TEST(PatchAlignment, ShiftsAreInPixelsWhateverTheSpacing) {
-  Trial trial = tryShifts(scaled(1.0), scaled(1.0), 2.0);
-  EXPECT_GT(trial.found, 190);
-  EXPECT_LT(trial.median(), 0.06);
+  const Eigen::Matrix2d roll = Eigen::Rotation2Dd(0.3).toRotationMatrix();
+  struct {
+    const char* what;
+    Eigen::Matrix2d truth, told;
+    double spacing;
+    int least;
+    double tolerance;  // px
+  } const cases[] = {{"ground, of which the ratio of the depths is told", ground, scaled(1.15), 1.0, 150, 0.15},
+                     {"a rolled view", roll, roll, 1.0, 150, 0.05},
+                     {"shifts are in pixels whatever the spacing", scaled(1.0), scaled(1.0), 2.0, 190, 0.06}};
+  for (const auto& c : cases) {
+    Trial trial = tryShifts(c.truth, c.told, c.spacing);
+    EXPECT_GT(trial.found, c.least) << c.what;
+    EXPECT_LT(trial.median(), c.tolerance) << c.what;
+  }
 }
 
 TEST(PatchAlignment, ErrorsAreAsLargeAsToldBySigmaAtEachScale) {
@@ -180,10 +183,9 @@ TEST(PatchAlignment, ThePointMayLieBesideTheReferencesMiddle) {
   std::mt19937 random(5);
   const Scene scene = texture(4);
   const Eigen::Vector2d centre(1.0, -0.75), shift(0.3, 0.2);
-  const auto reference = cut(scene, Eigen::Vector2d::Zero(), 1.0, random, 0.0);
-  const auto current = cut(moved(scene, scaled(1.0), shift - centre), Eigen::Vector2d::Zero(), 1.0, random, 0.0);
-  const auto found = alignPatch(PatchAlignmentOptions(), patchOf(reference), centre.cast<float>(), patchOf(current),
-                                Eigen::Matrix2f::Identity());
+  const auto reference = cut(scene, random, 0.0);
+  const auto current = cut(moved(scene, scaled(1.0), shift - centre), random, 0.0);
+  const auto found = align(reference, current, {}, centre.cast<float>());
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->shift.x(), 0.3, 0.03);
   EXPECT_NEAR(found->shift.y(), 0.2, 0.03);
@@ -193,9 +195,8 @@ TEST(PatchAlignment, BlindToBrightnessAndContrast) {
   std::mt19937 random(5);
   const Scene scene = texture(9);
   const Scene darker = [&](double x, double y) { return 0.6 * scene(x - 0.5, y + 0.25) - 20.0; };
-  const auto reference = cut(scene, Eigen::Vector2d::Zero(), 1.0, random, 0.0);
-  const auto current = cut(darker, Eigen::Vector2d::Zero(), 1.0, random, 0.0);
-  const auto found = align(reference, current);
+  const auto reference = cut(scene, random, 0.0);
+  const auto found = align(reference, cut(darker, random, 0.0));
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->shift.x(), 0.5, 0.08);
   EXPECT_NEAR(found->shift.y(), -0.25, 0.08);
@@ -205,8 +206,8 @@ TEST(PatchAlignment, BlindToBrightnessAndContrast) {
 TEST(PatchAlignment, RefusesWhatIsNotTheSame) {
   std::mt19937 random(5);
   const auto agree = [&](const Scene& a, const Scene& b) {
-    const auto reference = cut(a, Eigen::Vector2d::Zero(), 1.0, random);
-    return align(reference, cut(b, Eigen::Vector2d::Zero(), 1.0, random)).has_value();
+    const auto reference = cut(a, random);
+    return align(reference, cut(b, random)).has_value();
   };
   int unrelated = 0, occluded = 0;
   for (unsigned seed = 0; seed < 100; ++seed) {
@@ -223,19 +224,18 @@ TEST(PatchAlignment, RefusesWhatIsNotTheSame) {
   const Scene edge = [](double x, double) { return x < 0.2 ? 50.0 : 200.0; };
   std::mt19937 quiet(1);
   for (const Scene& scene : {flat, edge}) {
-    const auto patch = cut(scene, Eigen::Vector2d::Zero(), 1.0, quiet, 0.0);
+    const auto patch = cut(scene, quiet, 0.0);
     EXPECT_FALSE(align(patch, patch));
   }
 }
 
 TEST(PatchAlignment, RefusesPatchesThatCorrelateByLessThanSeventyPerCent) {
   std::mt19937 random(7);
-  const auto reference = cut(texture(3), Eigen::Vector2d::Zero(), 1.0, random);
+  const auto reference = cut(texture(3), random);
   float least = 1.f;
   int refused = 0;
   for (double noise = 5.0; noise < 80.0; noise += 5.0) {
-    const auto current = cut(texture(3), Eigen::Vector2d::Zero(), 1.0, random, noise);
-    const auto found = align(reference, current);
+    const auto found = align(reference, cut(texture(3), random, noise));
     if (found) least = std::min(least, found->correlation);
     refused += !found;
   }
@@ -246,8 +246,8 @@ TEST(PatchAlignment, RefusesPatchesThatCorrelateByLessThanSeventyPerCent) {
 
 TEST(PatchAlignment, RefusesAFartherShiftThanAskedFor) {
   std::mt19937 random(7);
-  const auto reference = cut(texture(3), Eigen::Vector2d::Zero(), 1.0, random);
-  const auto current = cut(moved(texture(3), scaled(1.0), {0.0, -0.8}), Eigen::Vector2d::Zero(), 1.0, random);
+  const auto reference = cut(texture(3), random);
+  const auto current = cut(moved(texture(3), scaled(1.0), {0.0, -0.8}), random);
   PatchAlignmentOptions options;
   options.noise.corner = 0.3;  // 3.9 of which bound the shift
   EXPECT_TRUE(align(reference, current, options));
@@ -260,7 +260,7 @@ TEST(PatchAlignment, RefusesSlantedEdges) {
   std::mt19937 random(7);
   for (const double slant : {-1.03, 1.03}) {
     const Scene edge = [slant](double x, double y) { return 125.0 + 75.0 * std::tanh(0.7 * (x + slant * y)); };
-    const auto patch = cut(edge, Eigen::Vector2d::Zero(), 1.0, random, 0.0);
+    const auto patch = cut(edge, random, 0.0);
     EXPECT_FALSE(align(patch, patch));
   }
 }
@@ -268,10 +268,9 @@ TEST(PatchAlignment, RefusesSlantedEdges) {
 TEST(PatchAlignment, PatchesMayBeSpacedDifferently) {
   std::mt19937 random(7);
   const Eigen::Vector2d shift(0.6, -0.4);
-  const auto reference = cut(texture(3), Eigen::Vector2d::Zero(), 1.0, random);
+  const auto reference = cut(texture(3), random);
   const auto current = cut(moved(texture(3), scaled(1.0), shift), Eigen::Vector2d::Zero(), 1.6, random);
-  const auto found = alignPatch(PatchAlignmentOptions(), patchOf(reference, 1.0), Eigen::Vector2f::Zero(),
-                                patchOf(current, 1.6), Eigen::Matrix2f::Identity());
+  const auto found = align(reference, current, {}, Eigen::Vector2f::Zero(), 1.f, 1.6);
   ASSERT_TRUE(found);
   EXPECT_LT((found->shift.cast<double>() - shift).norm(), 0.15);
   EXPECT_GT(found->correlation, 0.95f);
@@ -280,18 +279,16 @@ TEST(PatchAlignment, PatchesMayBeSpacedDifferently) {
 TEST(PatchAlignment, RefusesWhatLiesOutside) {
   std::mt19937 random(5);
   const Scene scene = texture(2);
-  const auto reference = cut(scene, Eigen::Vector2d::Zero(), 1.0, random, 0.0);
-  const auto far = cut(moved(scene, scaled(1.0), {2.5, 0.0}), Eigen::Vector2d::Zero(), 1.0, random, 0.0);
-  const auto align = [&](const std::vector<std::uint8_t>& current, const Eigen::Vector2f& centre, float ratio) {
-    return alignPatch(PatchAlignmentOptions(), patchOf(reference), centre, patchOf(current),
-                      ratio * Eigen::Matrix2f::Identity());
-  };
-  EXPECT_FALSE(align(far, Eigen::Vector2f::Zero(), 1.f)) << "farther than a corner is off";
-  const auto beside = cut(scene, {1.5, 0.0}, 1.0, random, 0.0);
-  EXPECT_TRUE(align(cut(scene, {1.0, 0.0}, 1.0, random, 0.0), {1.f, 0.f}, 1.f));
-  EXPECT_FALSE(align(beside, {1.5f, 0.f}, 1.f)) << "the reference's square and its neighbours leave its patch";
-  EXPECT_FALSE(align(reference, Eigen::Vector2f::Zero(), 1.6f)) << "the warped square leaves the current patch";
-  EXPECT_FALSE(align(reference, Eigen::Vector2f::Zero(), std::numeric_limits<float>::quiet_NaN()));
+  const auto reference = cut(scene, random, 0.0);
+  const auto at = [&](double x) { return cut(scene, {x, 0.0}, 1.0, random, 0.0); };
+  EXPECT_FALSE(align(reference, cut(moved(scene, scaled(1.0), {2.5, 0.0}), random, 0.0)))
+      << "farther than a corner is off";
+  EXPECT_TRUE(align(reference, at(1.0), {}, {1.f, 0.f}));
+  EXPECT_FALSE(align(reference, at(1.5), {}, {1.5f, 0.f}))
+      << "the reference's square and its neighbours leave its patch";
+  for (const float ratio : {1.6f, std::numeric_limits<float>::quiet_NaN()})
+    EXPECT_FALSE(align(reference, reference, {}, Eigen::Vector2f::Zero(), ratio))
+        << "the warped square leaves the current patch";
 }
 
 TEST(PatchAlignment, IsTheSameToTheBitWithAndWithoutVectors) {
@@ -303,8 +300,8 @@ TEST(PatchAlignment, IsTheSameToTheBitWithAndWithoutVectors) {
     const Scene scene = texture(trial);
     const Eigen::Vector2d shift(part(random), part(random));
     const Eigen::Matrix2d warp = scaled(1.0 + 0.2 * part(random));
-    const auto reference = cut(scene, {0.0, 0.0}, 1.0, random);
-    const auto current = cut(moved(scene, warp, shift), {0.0, 0.0}, 1.0, random);
+    const auto reference = cut(scene, random);
+    const auto current = cut(moved(scene, warp, shift), random);
     PatchAlignmentOptions options;
     options.radius = 2 + static_cast<int>(trial % 4);
     const Eigen::Vector2f centre(0.4f * static_cast<float>(part(random)), 0.4f * static_cast<float>(part(random)));
