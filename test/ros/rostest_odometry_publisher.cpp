@@ -21,6 +21,11 @@ class Inbox {
 
   bool isConnected() const { return subscriber_.getNumPublishers() > 0; }
 
+  /// Waits for a message.
+  bool comes() const {
+    return spinUntil([this] { return !messages.empty(); });
+  }
+
   std::vector<Message> messages;
 
  private:
@@ -70,7 +75,7 @@ class OdometryPublisherTest : public ::testing::Test {
 TEST_F(OdometryPublisherTest, OdometryTransformAndPathSayTheSame) {
   start({});
   publish(resultAt(2));
-  ASSERT_TRUE(spinUntil([&] { return !tf_->messages.empty() && !path_->messages.empty(); }));
+  ASSERT_TRUE(tf_->comes() && path_->comes());
   const geometry_msgs::TransformStamped& transform = tf_->messages.at(0).transforms.at(0);
   EXPECT_EQ(odom_->messages[0].pose.pose.position.z, 2.0);
   EXPECT_EQ(transform.transform.translation.z, 2.0);
@@ -89,7 +94,7 @@ TEST_F(OdometryPublisherTest, ThePoseIsThatOfTheOdometry) {
   start({});
   ASSERT_TRUE(spinUntil([&] { return poses.isConnected(); }));
   publish(resultAt(2));
-  ASSERT_TRUE(spinUntil([&] { return !poses.messages.empty(); }));
+  ASSERT_TRUE(poses.comes());
   EXPECT_EQ(poses.messages[0].header.stamp, odom_->messages[0].header.stamp);
   EXPECT_EQ(poses.messages[0].header.frame_id, "odom");
   EXPECT_EQ(poses.messages[0].pose.pose.position.z, 2.0);
@@ -101,16 +106,15 @@ TEST_F(OdometryPublisherTest, MapPointsAreInTheCamerasFrame) {
   Inbox<sensor_msgs::PointCloud2> clouds(nh_, "map_points");
   start({});
   ASSERT_TRUE(spinUntil([&] { return clouds.isConnected() && publisher_->wantsMap(); }));
-  Eigen::Isometry3d T_odom_start = Eigen::Isometry3d::Identity(), T_origin_camera = T_odom_start;
-  T_odom_start.translation() << 500000.25, 5400000.5, 100.0;
+  Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
   T_origin_camera.linear() << 0, 0, 1, 0, 1, 0, -1, 0, 0;  // turned to the right
   T_origin_camera.translation() << 1.0, 0.0, 2.0;
   std_msgs::Header header;
   header.frame_id = "left_optical";
   header.stamp = ros::Time(7);
-  publisher_->restart(T_odom_start);
+  publisher_->restart(Eigen::Isometry3d(Eigen::Translation3d(500000.25, 5400000.5, 100.0)));
   publisher_->publishMap({{4.001, 2.0, 3.0}}, T_origin_camera, header);
-  ASSERT_TRUE(spinUntil([&] { return !clouds.messages.empty(); }));
+  ASSERT_TRUE(clouds.comes());
   const sensor_msgs::PointCloud2& cloud = clouds.messages[0];
   EXPECT_EQ(cloud.header.frame_id, "left_optical");
   EXPECT_EQ(cloud.header.stamp, ros::Time(7));
@@ -138,7 +142,7 @@ TEST_F(OdometryPublisherTest, WhileLostZerosAreThereWhereTheyAreAskedFor) {
   EXPECT_EQ(null.pose.pose.orientation.w, 0.0);
   EXPECT_EQ(null.pose.covariance[0], 9999.0);
   EXPECT_EQ(null.twist.covariance[35], 9999.0);
-  ASSERT_TRUE(spinUntil([&] { return !tf_->messages.empty(); }));
+  ASSERT_TRUE(tf_->comes());
   EXPECT_EQ(tf_->messages.size(), 1u) << "none of the zeros";
 }
 
@@ -147,7 +151,7 @@ TEST_F(OdometryPublisherTest, TransformsGoWhereTheNodeHasThemRemapped) {
   Inbox<tf2_msgs::TFMessage> process_tf(global_nh_, "/tf");
   start({});
   publish(resultAt(2));
-  ASSERT_TRUE(spinUntil([&] { return !tf_->messages.empty(); }));
+  ASSERT_TRUE(tf_->comes());
   EXPECT_FALSE(process_tf.isConnected()) << "nobody announces transforms there";
 }
 
@@ -157,7 +161,7 @@ TEST_F(OdometryPublisherTest, WithoutAPoseThereIsNeitherOdometryNorPath) {
   lost.has_pose = false;
   publish(lost);
   publish(resultAt(2));
-  ASSERT_TRUE(spinUntil([&] { return !path_->messages.empty(); }));
+  ASSERT_TRUE(path_->comes());
   EXPECT_EQ(odom_->messages.size(), 1u);
   EXPECT_EQ(path_->messages.size(), 1u);
   EXPECT_EQ(path_->messages[0].poses.size(), 1u);
@@ -170,7 +174,7 @@ TEST_F(OdometryPublisherTest, FramesAndTransformAsConfigured) {
   options.invert_tf = true;
   start(options);
   publish(resultAt(3));
-  ASSERT_TRUE(spinUntil([&] { return !tf_->messages.empty(); }));
+  ASSERT_TRUE(tf_->comes());
   EXPECT_EQ(odom_->messages[0].header.frame_id, "world");
   EXPECT_EQ(odom_->messages[0].child_frame_id, "robot");
   const geometry_msgs::TransformStamped& transform = tf_->messages[0].transforms.at(0);
@@ -225,19 +229,16 @@ TEST_F(OdometryPublisherTest, APoseThatIsSetLeavesThePathOfBefore) {
 TEST_F(OdometryPublisherTest, WhoeverSubscribesLateGetsThePath) {
   start({});
   publish(resultAt(1));
-  ASSERT_TRUE(spinUntil([&] { return !path_->messages.empty(); }));
+  ASSERT_TRUE(path_->comes());
   path_.reset();
   path_ = std::make_unique<Inbox<nav_msgs::Path>>(nh_, "path");
-  ASSERT_TRUE(spinUntil([&] { return !path_->messages.empty(); }));
+  ASSERT_TRUE(path_->comes());
   EXPECT_EQ(path_->messages[0].poses.size(), 1u);
 }
 
 TEST_F(OdometryPublisherTest, StartsAgainFromAnyPlace) {
   start({});
-  Eigen::Isometry3d T_odom_start = Eigen::Isometry3d::Identity();
-  T_odom_start.translation() << 10.0, 20.0, 30.0;
-  T_odom_start.linear() = Eigen::AngleAxisd(0.5 * M_PI, Eigen::Vector3d::UnitX()).toRotationMatrix();
-  publisher_->restart(T_odom_start);
+  publisher_->restart(Eigen::Translation3d(10.0, 20.0, 30.0) * Eigen::AngleAxisd(0.5 * M_PI, Eigen::Vector3d::UnitX()));
   publish(resultAt(2));  // 2 m along z, which is -y of odom now
   const geometry_msgs::Pose& pose = odom_->messages.at(0).pose.pose;
   EXPECT_NEAR(pose.position.x, 10.0, 1e-9);
@@ -251,7 +252,7 @@ TEST_F(OdometryPublisherTest, InfoTellsLatencyAndSession) {
   start({});
   const ros::Time stamp = ros::Time::now() - ros::Duration(2.0);
   const stereo_descriptor_vo::VoInfo published = publisher_->publishInfo({}, stamp);
-  ASSERT_TRUE(spinUntil([&] { return !info_->messages.empty(); }));
+  ASSERT_TRUE(info_->comes());
   EXPECT_EQ(info_->messages[0].header.stamp, stamp);
   EXPECT_NEAR(published.latency, 2.0, 0.5);
   EXPECT_EQ(info_->messages[0].latency, published.latency);

@@ -58,13 +58,21 @@ class ReconfigureServerTest : public ::testing::Test {
     if (sample_.low > sample_.high) throw std::invalid_argument("low exceeds high");
   }
 
-  template <class Array, class Value>
-  static void add(Array& array, const std::string& name, const Value& value) {
-    typename Array::value_type parameter;
-    parameter.name = name;
-    parameter.value = value;
-    array.push_back(parameter);
-  }
+  /// Values by their names, one after the other.
+  struct Values : Config {
+    Values& set(const std::string& name, bool value) { return add(bools, name, value); }
+    Values& set(const std::string& name, int value) { return add(ints, name, value); }
+    Values& set(const std::string& name, double value) { return add(doubles, name, value); }
+    Values& set(const std::string& name, const char* value) { return add(strs, name, value); }
+
+   private:
+    template <class Array, class Value>
+    Values& add(Array& array, const std::string& name, const Value& value) {
+      array.emplace_back();
+      array.back().name = name, array.back().value = value;
+      return *this;
+    }
+  };
 
   Config request(const Config& config) {
     dynamic_reconfigure::Reconfigure call;
@@ -100,12 +108,7 @@ class ReconfigureServerTest : public ::testing::Test {
 
 TEST_F(ReconfigureServerTest, WhatWasSetIsOnTheParameterServerAndWhatWasRefusedIsNot) {
   for (const char* name : {"flag", "low", "ratio", "kind"}) nh_.deleteParam(name);
-  Config config;
-  add(config.bools, "flag", true);
-  add(config.ints, "low", 4);
-  add(config.doubles, "ratio", 2.0);  // clamped
-  add(config.strs, "kind", std::string("b"));
-  request(config);
+  request(Values().set("flag", true).set("low", 4).set("ratio", 2.0).set("kind", "b"));  // the ratio is clamped
   EXPECT_TRUE(becomes("kind", std::string("b"))) << "the last one";
   bool flag = false;
   int low = 0;
@@ -117,24 +120,15 @@ TEST_F(ReconfigureServerTest, WhatWasSetIsOnTheParameterServerAndWhatWasRefusedI
   EXPECT_EQ(ratio, 1.0);
   EXPECT_FALSE(nh_.hasParam("high")) << "nobody has set it";
 
-  Config wrong;
-  add(wrong.ints, "low", 9);  // exceeds high
-  request(wrong);
-  Config right;
-  add(right.ints, "high", 10);
-  request(right);
+  request(Values().set("low", 9));  // exceeds high
+  request(Values().set("high", 10));
   EXPECT_TRUE(becomes("high", 10));
   EXPECT_TRUE(nh_.getParam("low", low));
   EXPECT_EQ(low, 4);
 }
 
 TEST_F(ReconfigureServerTest, SetsEachTypeAndAnswersWithTheWholeSet) {
-  Config config;
-  add(config.bools, "flag", true);
-  add(config.ints, "low", 4);
-  add(config.doubles, "ratio", 0.1);
-  add(config.strs, "kind", "b");
-  const Config response = request(config);
+  const Config response = request(Values().set("flag", true).set("low", 4).set("ratio", 0.1).set("kind", "b"));
   EXPECT_TRUE(sample_.flag);
   EXPECT_EQ(sample_.ratio, 0.1);
   EXPECT_EQ(sample_.kind, Kind::kB);
@@ -146,56 +140,35 @@ TEST_F(ReconfigureServerTest, SetsEachTypeAndAnswersWithTheWholeSet) {
 }
 
 TEST_F(ReconfigureServerTest, TheSameValuesAreNoChange) {
-  Config config;
-  add(config.ints, "low", 2);
-  add(config.doubles, "ratio", 0.5);
-  request(config);
+  request(Values().set("low", 2).set("ratio", 0.5));
   request(Config());
   EXPECT_EQ(applied_, 0);
 }
 
 TEST_F(ReconfigureServerTest, NumbersOutOfRangeAreClamped) {
-  Config config;
-  add(config.ints, "high", 99);
-  expectLimits(request(config), 2, 10);
+  expectLimits(request(Values().set("high", 99)), 2, 10);
 }
 
 TEST_F(ReconfigureServerTest, AWrongNameOrValueRefusesTheWholeSet) {
-  Config wrong_choice;
-  add(wrong_choice.ints, "low", 5);
-  add(wrong_choice.strs, "kind", "c");
-  expectLimits(request(wrong_choice), 2, 8);
-  Config wrong_name;
-  add(wrong_name.ints, "low", 5);
-  add(wrong_name.ints, "lower", 5);
-  expectLimits(request(wrong_name), 2, 8);
-  Config no_number;
-  add(no_number.ints, "low", 5);
-  add(no_number.doubles, "ratio", std::numeric_limits<double>::quiet_NaN());
-  expectLimits(request(no_number), 2, 8);
+  expectLimits(request(Values().set("low", 5).set("kind", "c")), 2, 8);
+  expectLimits(request(Values().set("low", 5).set("lower", 5)), 2, 8);
+  expectLimits(request(Values().set("low", 5).set("ratio", std::numeric_limits<double>::quiet_NaN())), 2, 8);
   EXPECT_EQ(sample_.ratio, 0.5);
   EXPECT_EQ(applied_, 0);
 }
 
 TEST_F(ReconfigureServerTest, ASetThatDoesNotGoTogetherIsRefusedAndTheNextOneWorks) {
-  Config config;
-  add(config.ints, "low", 9);  // in its range, but above high
-  add(config.bools, "flag", true);
-  expectLimits(request(config), 2, 8);
+  Values values = Values().set("low", 9).set("flag", true);  // in its range, but above high
+  expectLimits(request(values), 2, 8);
   EXPECT_FALSE(sample_.flag);
-  add(config.ints, "high", 10);
-  expectLimits(request(config), 9, 10);
+  expectLimits(request(values.set("high", 10)), 9, 10);
   EXPECT_TRUE(sample_.flag);
 }
 
 TEST_F(ReconfigureServerTest, RequestsAreTakenOverOneAfterTheOther) {
   pause_ = 0.02;
   const auto call = [this](int low) {
-    for (int i = 0; i < 5; ++i) {
-      Config config;
-      add(config.ints, "low", low + i % 2);
-      request(config);
-    }
+    for (int i = 0; i < 5; ++i) request(Values().set("low", low + i % 2));
   };
   std::thread first([&] { call(1); }), second([&] { call(3); });
   first.join();

@@ -55,6 +55,11 @@ class RobotTransformsTest : public ::testing::Test {
     ASSERT_TRUE(spinUntil([&] { return transforms_->find("markers", child, problem).has_value(); })) << problem;
   }
 
+  void expectOneWarning(const std::vector<std::string>& words) const {
+    ASSERT_EQ(warnings_.size(), 1u);
+    expectWords(warnings_[0], words);
+  }
+
   static constexpr std::uint32_t kTag = 7;
 
   /// As TransformPublisher sends it.
@@ -155,9 +160,8 @@ TEST_F(RobotTransformsTest, AnotherPublisherOfOurChildIsNamed) {
   EXPECT_TRUE(warnings_.empty());
   for (int i = 0; i < 3; ++i) send(tf_, {transform("world", "base_link", ros::Time::now())});
   waitForMarker(tf_);
-  ASSERT_EQ(warnings_.size(), 1u);
-  expectWords(warnings_[0], {ros::this_node::getName() + " publishes world -> base_link",
-                             ros::this_node::getName() + " publishes odom -> base_link"});
+  expectOneWarning({ros::this_node::getName() + " publishes world -> base_link",
+                    ros::this_node::getName() + " publishes odom -> base_link"});
 }
 
 /// On TF the nodelets of one process have one name.
@@ -168,9 +172,7 @@ TEST_F(RobotTransformsTest, AnotherNodeletOfTheProcessThatPublishesTheSameIsName
     send(tf_, {tagged(same, kTag), tagged(same, kTag + 1)});
   }
   waitForMarker(tf_);
-  ASSERT_EQ(warnings_.size(), 1u);
-  expectWords(warnings_[0],
-              {"another nodelet of " + ros::this_node::getName(), "set publish_tf to false in one of them"});
+  expectOneWarning({"another nodelet of " + ros::this_node::getName(), "set publish_tf to false in one of them"});
 }
 
 TEST_F(RobotTransformsTest, TheCamerasPlaceIsAwaitedOnceAndNotWhenItIsUrgent) {
@@ -195,8 +197,7 @@ TEST_F(RobotTransformsTest, ARobotsOwnFrameAboveTheBaseIsNamedAsTheOneToMove) {
   waitForMarker(tf_static_);
   send(tf_, {tagged(transform("odom", "base_link", ros::Time::now() + ros::Duration(1.0)), kTag)});
   waitForMarker(tf_);
-  ASSERT_EQ(warnings_.size(), 1u);
-  EXPECT_TRUE(contains(warnings_[0], "set base_frame_id:=base_footprint (or invert_tf)")) << warnings_[0];
+  expectOneWarning({"set base_frame_id:=base_footprint (or invert_tf)"});
 }
 
 TEST_F(RobotTransformsTest, ACycleIsNamed) {
@@ -206,8 +207,7 @@ TEST_F(RobotTransformsTest, ACycleIsNamed) {
   EXPECT_TRUE(warnings_.empty());
   send(tf_, {transform("camera", "map", ros::Time::now())});
   waitForMarker(tf_);
-  ASSERT_EQ(warnings_.size(), 1u);
-  expectWords(warnings_[0], {"publishes camera -> map", "a cycle"});
+  expectOneWarning({"publishes camera -> map", "a cycle"});
 }
 
 TEST_F(RobotTransformsTest, ATransformMayBeClaimedLater) {
@@ -215,8 +215,7 @@ TEST_F(RobotTransformsTest, ATransformMayBeClaimedLater) {
   transforms_->claim({"map", "odom"});
   send(tf_, {transform("site", "odom", ros::Time::now())});
   waitForMarker(tf_);
-  ASSERT_EQ(warnings_.size(), 1u);
-  EXPECT_TRUE(contains(warnings_[0], ros::this_node::getName() + " publishes map -> odom")) << warnings_[0];
+  expectOneWarning({ros::this_node::getName() + " publishes map -> odom"});
 }
 
 TEST_F(RobotTransformsTest, WithoutATransformOfOursThereIsNoContention) {

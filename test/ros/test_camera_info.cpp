@@ -18,71 +18,60 @@ sensor_msgs::CameraInfo cameraInfo(double tx, double f = 700.0) {
   return info;
 }
 
+/// A left and a right camera_info, both changed alike.
+struct Infos {
+  explicit Infos(const std::function<void(sensor_msgs::CameraInfo&)>& change = [](auto&) {}) {
+    change(left), change(right);
+  }
+  StereoCamera camera() const { return toStereoCamera(left, right); }
+
+  sensor_msgs::CameraInfo left = cameraInfo(0.0), right = cameraInfo(-350.0);
+};
+
 TEST(ToStereoCamera, BaselineIsTheDifferenceOfBothOffsets) {
   const StereoCamera camera = toStereoCamera(cameraInfo(42.0), cameraInfo(-336.0));
-  EXPECT_DOUBLE_EQ(camera.fx, 700.0);
-  EXPECT_DOUBLE_EQ(camera.fy, 700.0);
-  EXPECT_DOUBLE_EQ(camera.cx, 600.0);
-  EXPECT_DOUBLE_EQ(camera.cy, 180.0);
+  EXPECT_EQ(camera, (StereoCamera{700.0, 700.0, 600.0, 180.0, camera.baseline, 1200, 360}));
   EXPECT_NEAR(camera.baseline, 0.54, 1e-12);  // (42 + 336) / 700
-  EXPECT_EQ(camera.width, 1200);
-  EXPECT_EQ(camera.height, 360);
 }
 
 TEST(ToStereoCamera, GeometryComesFromPNotFromK) {
-  sensor_msgs::CameraInfo left = cameraInfo(0.0), right = cameraInfo(-350.0);
-  for (sensor_msgs::CameraInfo* info : {&left, &right}) info->K = {900.0, 0.0, 1.0, 0.0, 900.0, 2.0, 0.0, 0.0, 1.0};
-  const StereoCamera camera = toStereoCamera(left, right);
+  const StereoCamera camera =
+      Infos([](auto& info) { info.K = {900.0, 0.0, 1.0, 0.0, 900.0, 2.0, 0.0, 0.0, 1.0}; }).camera();
   EXPECT_DOUBLE_EQ(camera.fx, 700.0);
   EXPECT_DOUBLE_EQ(camera.cx, 600.0);
 }
 
 /// As of a driver that rectifies itself.
 TEST(ToStereoCamera, PAloneIsEnough) {
-  sensor_msgs::CameraInfo left = cameraInfo(0.0), right = cameraInfo(-350.0);
-  for (sensor_msgs::CameraInfo* info : {&left, &right}) {
-    info->K.assign(0.0);
-    info->R.assign(0.0);
-    info->D.clear();
-    info->distortion_model.clear();
-  }
-  EXPECT_EQ(toStereoCamera(left, right), toStereoCamera(cameraInfo(0.0), cameraInfo(-350.0)));
-  EXPECT_EQ(whyUnrectified(left, right), "");
+  const Infos infos([](auto& info) {
+    info.K.assign(0.0);
+    info.R.assign(0.0);
+    info.D.clear();
+    info.distortion_model.clear();
+  });
+  EXPECT_EQ(infos.camera(), Infos().camera());
+  EXPECT_EQ(whyUnrectified(infos.left, infos.right), "");
 }
 
 TEST(ToStereoCamera, BinningAndRegionOfInterest) {
-  sensor_msgs::CameraInfo left = cameraInfo(0.0), right = cameraInfo(-350.0);
-  for (sensor_msgs::CameraInfo* info : {&left, &right}) {
-    info->binning_x = info->binning_y = 2;
-    info->roi.x_offset = 200;
-    info->roi.y_offset = 40;
-    info->roi.width = 800;
-    info->roi.height = 240;
-  }
-  const StereoCamera camera = toStereoCamera(left, right);
-  EXPECT_DOUBLE_EQ(camera.fx, 350.0);
-  EXPECT_DOUBLE_EQ(camera.fy, 350.0);
-  EXPECT_DOUBLE_EQ(camera.cx, 200.0);        // (600 - 200) / 2
-  EXPECT_DOUBLE_EQ(camera.cy, 70.0);         // (180 - 40) / 2
-  EXPECT_NEAR(camera.baseline, 0.5, 1e-12);  // metres do not shrink with the pixels
-  EXPECT_EQ(camera.width, 400);
-  EXPECT_EQ(camera.height, 120);
+  const Infos infos([](auto& info) {
+    info.binning_x = info.binning_y = 2;
+    info.roi.x_offset = 200;
+    info.roi.y_offset = 40;
+    info.roi.width = 800;
+    info.roi.height = 240;
+  });
+  // (600 - 200) / 2, (180 - 40) / 2; metres do not shrink with the pixels.
+  EXPECT_EQ(infos.camera(), (StereoCamera{350.0, 350.0, 200.0, 70.0, 0.5, 400, 120}));
 }
 
-/// A left and a right camera_info.
-struct Infos {
-  sensor_msgs::CameraInfo left = cameraInfo(0.0), right = cameraInfo(-350.0);
-};
-
 TEST(ToStereoCamera, RefusesWhatIsNoRectifiedPair) {
-  expectRefusals(Infos(), [](const Infos& infos) { toStereoCamera(infos.left, infos.right); },
+  expectRefusals(Infos(), [](const Infos& infos) { infos.camera(); },
                  {{[](Infos& i) { i.right.P.assign(0.0); }, "right camera_info: P is zero"},
                   {[](Infos& i) { i.left.P.assign(0.0); }, "left camera_info: P is zero"},
                   {[](Infos& i) { i.left.width = 0; }, "size"},
                   {[](Infos& i) { i.left.P[3] = -700.0; }, "Swap the topics"},
-                  {[](Infos& i) {
-                     i = {cameraInfo(0.0, -700.0), cameraInfo(-350.0, -700.0)};
-                   },
+                  {[](Infos& i) { i.left = cameraInfo(0.0, -700.0), i.right = cameraInfo(-350.0, -700.0); },
                    "left camera_info: a focal length in P is negative"},
                   {[](Infos& i) { i.right.P[3] = 350.0; }, "wrong sign"},
                   {[](Infos& i) { i.right = cameraInfo(-350.0, 701.0); }, "not rectified"},
@@ -106,29 +95,23 @@ TEST(ToStereoCamera, TheLensChangesNothingOfARegionOfInterest) {
   // image_proc publishes as many pixels. So are those that crop_decimate cuts out of rectified images.
   for (const bool do_rectify : {false, true})
     for (const std::vector<double>& lens : {std::vector<double>{}, {-0.28, 0.07, 2e-4, 2e-5, 0.0}, {0.1, 0.1, 0.1}}) {
-      sensor_msgs::CameraInfo left = cameraInfo(0.0), right = cameraInfo(-350.0);
-      for (sensor_msgs::CameraInfo* info : {&left, &right}) {
-        info->D = lens;
-        info->roi.x_offset = 41;
-        info->roi.y_offset = 30;
-        info->roi.width = 641;
-        info->roi.height = 303;
-        info->roi.do_rectify = do_rectify;
-        info->binning_x = 2;
-        info->binning_y = 4;
-      }
-      const StereoCamera camera = toStereoCamera(left, right);
-      EXPECT_EQ(camera, (StereoCamera{350.0, 175.0, (600.0 - 41.0) / 2.0, (180.0 - 30.0) / 4.0, 0.5, 320, 75}));
+      const Infos infos([&](auto& info) {
+        info.D = lens;
+        info.roi.x_offset = 41;
+        info.roi.y_offset = 30;
+        info.roi.width = 641;
+        info.roi.height = 303;
+        info.roi.do_rectify = do_rectify;
+        info.binning_x = 2;
+        info.binning_y = 4;
+      });
+      EXPECT_EQ(infos.camera(), (StereoCamera{350.0, 175.0, (600.0 - 41.0) / 2.0, (180.0 - 30.0) / 4.0, 0.5, 320, 75}));
     }
 }
 
 TEST(ToStereoCamera, ARegionWithoutASizeIsWhatIsLeft) {
-  sensor_msgs::CameraInfo left = cameraInfo(0.0), right = cameraInfo(-350.0);
-  for (sensor_msgs::CameraInfo* info : {&left, &right}) info->roi.x_offset = 200;
-  const StereoCamera camera = toStereoCamera(left, right);
-  EXPECT_EQ(camera.width, 1000);
-  EXPECT_EQ(camera.height, 360);
-  EXPECT_EQ(camera.cx, 400.0);
+  EXPECT_EQ(Infos([](auto& info) { info.roi.x_offset = 200; }).camera(),
+            (StereoCamera{700.0, 700.0, 400.0, 180.0, 0.5, 1000, 360}));
 }
 
 TEST(ToStereoCamera, PMayBeRounded) {

@@ -18,10 +18,8 @@ Eigen::Isometry3d mountedCamera() {
 /// Constant turn of the base in its plane over dt: an arc of a circle.
 Eigen::Isometry3d arc(double speed, double yaw_rate, double dt) {
   const double angle = yaw_rate * dt, radius = speed / yaw_rate;
-  Eigen::Isometry3d T = Eigen::Isometry3d::Identity();
-  T.linear() = Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ()).toRotationMatrix();
-  T.translation() << radius * std::sin(angle), radius * (1.0 - std::cos(angle)), 0.0;
-  return T;
+  return Eigen::Translation3d(radius * std::sin(angle), radius * (1.0 - std::cos(angle)), 0.0) *
+         Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ());
 }
 
 /// Of a position or a vector.
@@ -48,8 +46,7 @@ double yawOf(const geometry_msgs::Quaternion& q) {
 
 TEST(ToOdometry, ForwardOfTheCameraIsXAndALeftTurnIsPositiveYaw) {
   OdometryResult result = trackedResult();
-  Eigen::Isometry3d optical = Eigen::Isometry3d::Identity();
-  optical.linear() = mountedCamera().linear();
+  const Eigen::Isometry3d optical(mountedCamera().linear());
 
   result.T_origin_camera = Eigen::Translation3d(0.0, 0.0, 2.5);  // optical z is forward
   geometry_msgs::Pose pose = toOdometry(result, optical, {}).pose.pose;
@@ -68,8 +65,7 @@ TEST(ToOdometry, ForwardOfTheCameraIsXAndALeftTurnIsPositiveYaw) {
 
 TEST(ToOdometry, GoesOnFromWhereTheBaseWasPut) {
   OdometryResult result = trackedResult();
-  Eigen::Isometry3d optical = Eigen::Isometry3d::Identity();
-  optical.linear() = mountedCamera().linear();
+  const Eigen::Isometry3d optical(mountedCamera().linear());
   result.T_origin_camera = Eigen::Translation3d(0.0, 0.0, 2.5);  // forward
   const Eigen::Isometry3d T_odom_start =
       Eigen::Translation3d(10.0, 5.0, 0.0) * Eigen::AngleAxisd(CV_PI / 2.0, Eigen::Vector3d::UnitZ());  // looks along y
@@ -176,10 +172,8 @@ Matrix6d sampledCovariance(const Matrix6d& covariance,
     for (int k = 0; k < 6; ++k) xi[k] = normal(random);
     xi = root * xi;
     // To first order, all that counts at a few milliradian.
-    Eigen::Isometry3d perturbation = Eigen::Isometry3d::Identity();
-    perturbation.translation() = xi.head<3>();
-    perturbation.linear() = Eigen::AngleAxisd(xi.tail<3>().norm(), xi.tail<3>().normalized()).toRotationMatrix();
-    const Vector6d y = measure(perturbation);
+    const Vector6d y =
+        measure(Eigen::Translation3d(xi.head<3>()) * Eigen::AngleAxisd(xi.tail<3>().norm(), xi.tail<3>().normalized()));
     sum += y * y.transpose();
   }
   return sum / kSamples;
