@@ -34,6 +34,11 @@ StereoPair renderOne(const DriveRenderer& renderer, int frame) {
   return renderer.render(frame, worker);
 }
 
+/// Of the street, by these options.
+StereoPair renderOne(const DrivePath& path, const RenderOptions& options, int frame) {
+  return renderOne(street(path, options), frame);
+}
+
 double meanDifference(const cv::Mat& a, const cv::Mat& b) {
   cv::Mat difference;
   cv::absdiff(a, b, difference);
@@ -43,9 +48,9 @@ double meanDifference(const cv::Mat& a, const cv::Mat& b) {
 TEST(RenderDrive, TheRightCameraCanBeLate) {
   const DrivePath path = makePresetPath("straight", 4, 10.0, 1);
   RenderOptions options = plainOptions();
-  const StereoPair before = renderOne(street(path, options), 1), after = renderOne(street(path, options), 2);
+  const StereoPair before = renderOne(path, options, 1), after = renderOne(path, options, 2);
   options.shutters.right_delay = 0.1;
-  const StereoPair late = renderOne(street(path, options), 1);
+  const StereoPair late = renderOne(path, options, 1);
   EXPECT_EQ(0.0, cv::norm(late.left, before.left, cv::NORM_INF));
   EXPECT_EQ(0.0, cv::norm(late.right, after.right, cv::NORM_INF));
 }
@@ -53,16 +58,16 @@ TEST(RenderDrive, TheRightCameraCanBeLate) {
 TEST(RenderDrive, ARollingShutterTakesTheFirstRowsEarlierAndTheLastOnesLater) {
   const DrivePath path = makePresetPath("straight", 4, 10.0, 1);
   RenderOptions options = plainOptions();
-  const StereoPair now = renderOne(street(path, options), 1), after = renderOne(street(path, options), 2);
+  const StereoPair now = renderOne(path, options, 1), after = renderOne(path, options, 2);
   options.shutters.readout = 0.1;
-  const StereoPair rolling = renderOne(street(path, options), 1);
+  const StereoPair rolling = renderOne(path, options, 1);
   const cv::Range middle(45, 49), last(86, 94);  // of 94 rows; half of the readout later are the last ones
   EXPECT_LT(meanDifference(rolling.left.rowRange(middle), now.left.rowRange(middle)),
             0.5 * meanDifference(after.left.rowRange(middle), now.left.rowRange(middle)));
   EXPECT_GT(meanDifference(rolling.left.rowRange(last), now.left.rowRange(last)), 1.0);
   options.shutters.readout = 0.0;
   options.shutters.right_delay = 0.05;
-  const StereoPair half = renderOne(street(path, options), 1);
+  const StereoPair half = renderOne(path, options, 1);
   EXPECT_LT(meanDifference(rolling.right.rowRange(last), half.right.rowRange(last)),
             0.5 * meanDifference(rolling.right.rowRange(last), now.right.rowRange(last)));
 }
@@ -71,8 +76,7 @@ TEST(RenderDrive, IsTheSameForAnyNumberOfThreadsAndDiffersByTheSeed) {
   const DrivePath path = makePresetPath("straight", 10, 10.0, 1);
   RenderOptions options;
   options.moving_share = 0.02;
-  const DriveRenderer one(path, DriveRenderer::Scenery::kStreet, smallCamera(), options, 0, 10, 1);
-  const DriveRenderer three(path, DriveRenderer::Scenery::kStreet, smallCamera(), options, 0, 10, 3);
+  const DriveRenderer one = street(path, options), three = street(path, options, 3);
   // Another order of frames as well: nothing may be carried over.
   const StereoPair last_of_three = renderOne(three, 9), first_of_three = renderOne(three, 0);
   const StereoPair first_of_one = renderOne(one, 0), last_of_one = renderOne(one, 9);
@@ -80,15 +84,14 @@ TEST(RenderDrive, IsTheSameForAnyNumberOfThreadsAndDiffersByTheSeed) {
   EXPECT_EQ(0.0, cv::norm(first_of_one.right, first_of_three.right, cv::NORM_INF));
   EXPECT_EQ(0.0, cv::norm(last_of_one.left, last_of_three.left, cv::NORM_INF));
   options.seed = 2;
-  const DriveRenderer other(path, DriveRenderer::Scenery::kStreet, smallCamera(), options, 0, 10, 1);
-  EXPECT_GT(meanDifference(renderOne(other, 0).left, first_of_one.left), 5.0);
+  EXPECT_GT(meanDifference(renderOne(path, options, 0).left, first_of_one.left), 5.0);
 }
 
 TEST(RenderDrive, FlowAndDisparityOfTheTruthExplainTheImages) {
   const DrivePath path = makePresetPath("straight", 6, 10.0, 1);
   RenderOptions options = plainOptions();
   options.moving_share = 0.05;
-  const DriveRenderer renderer(path, DriveRenderer::Scenery::kStreet, smallCamera(), options, 0, 6, 1);
+  const DriveRenderer renderer = street(path, options);
   DriveRenderer::Worker worker = renderer.makeWorker();
   const StereoPair now = renderer.render(3, worker), next = renderer.render(4, worker);
   const Truth truth = renderer.truth(3, worker);
@@ -164,7 +167,7 @@ TEST(RenderDrive, MovingShareIsMetAndZeroMeansNone) {
   const DrivePath path = makePresetPath("straight", 60, 10.0, 1);
   RenderOptions options = plainOptions();
   options.moving_share = 0.04;
-  const DriveRenderer busy(path, DriveRenderer::Scenery::kStreet, smallCamera(), options, 0, 60, 1);
+  const DriveRenderer busy = street(path, options);
   DriveRenderer::Worker worker = busy.makeWorker();
   double share = 0.0;
   for (int frame = 0; frame < 60; frame += 3) share += cv::mean(busy.truth(frame, worker).moving)[0] / 20.0;
@@ -199,9 +202,9 @@ TEST(RenderDrive, CarsBeyondTheEndOfTheRoadAreNotThere) {
 TEST(RenderDrive, MisalignmentMovesTheRightImageOnly) {
   const DrivePath path = makePresetPath("still", 1, 10.0, 1);
   RenderOptions options = plainOptions();
-  const StereoPair right_way = renderOne(street(path, options), 0);
+  const StereoPair right_way = renderOne(path, options, 0);
   options.misalignment.disparity_offset = 2.0;
-  const StereoPair offset = renderOne(street(path, options), 0);
+  const StereoPair offset = renderOne(path, options, 0);
   EXPECT_EQ(0.0, cv::norm(right_way.left, offset.left, cv::NORM_INF));
   // A larger disparity: what was at u is now at u - 2.
   const cv::Rect window(6, 0, 294, 94), shifted(4, 0, 294, 94);
@@ -212,19 +215,18 @@ TEST(RenderDrive, MisalignmentMovesTheRightImageOnly) {
 TEST(RenderDrive, ATurnedRightCameraSeesWhatItsHomographySays) {
   const DrivePath path = makePresetPath("still", 1, 10.0, 1);
   RenderOptions options = plainOptions();
-  const cv::Mat straight = renderOne(street(path, options), 0).right;
+  const cv::Mat straight = renderOne(path, options, 0).right;
   Misalignment& wrong = options.misalignment;
   wrong.rotation_x = 0.5, wrong.rotation_y = -1.0, wrong.rotation_z = 1.5;
-  const cv::Mat turned = renderOne(street(path, options), 0).right;
+  const cv::Mat turned = renderOne(path, options, 0).right;
 
   // Turned by R, it sees at u what it saw at K R K^-1 u.
   const auto turn = [](double degrees, const Eigen::Vector3d& axis) {
     return Eigen::AngleAxisd(degrees * M_PI / 180.0, axis);
   };
-  const Eigen::Matrix3d R =
-      (turn(wrong.rotation_z, Eigen::Vector3d::UnitZ()) * turn(wrong.rotation_y, Eigen::Vector3d::UnitY()) *
-       turn(wrong.rotation_x, Eigen::Vector3d::UnitX()))
-          .toRotationMatrix();
+  const Eigen::Matrix3d R(turn(wrong.rotation_z, Eigen::Vector3d::UnitZ()) *
+                          turn(wrong.rotation_y, Eigen::Vector3d::UnitY()) *
+                          turn(wrong.rotation_x, Eigen::Vector3d::UnitX()));
   const StereoCamera camera = smallCamera();
   Eigen::Matrix3d K;
   K << camera.fx, 0.0, camera.cx, 0.0, camera.fy, camera.cy, 0.0, 0.0, 1.0;
@@ -288,17 +290,15 @@ TEST(RenderEffects, NoiseVignettingExposureAndBlurHaveTheirStrength) {
 
 TEST(RenderDrive, MotionBlurSmearsAlongTheMotionAndKeepsTheMiddle) {
   // Turning right by 0.1 rad per frame of 0.1 s with 20 ms exposure: 0.02 rad, 3.5 px sideways, none up or down.
-  std::vector<Eigen::Isometry3d> poses(3, Eigen::Isometry3d::Identity());
-  for (int i = 0; i < 3; ++i)
-    poses[i].linear() = Eigen::AngleAxisd(0.1 * i, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  std::vector<Eigen::Isometry3d> poses;
+  for (int i = 0; i < 3; ++i) poses.emplace_back(Eigen::AngleAxisd(0.1 * i, Eigen::Vector3d::UnitY()));
   const DrivePath path(poses, 10.0);
   RenderOptions options = plainOptions();
-  const cv::Mat1b sharp = renderOne(street(path, options), 1).left;
+  const cv::Mat1b sharp = renderOne(path, options, 1).left;
   options.effects.motion_blur = 0.02;
-  const cv::Mat1b blurred = renderOne(street(path, options), 1).left;
-  cv::Mat1b expected;
+  const cv::Mat1b blurred = renderOne(path, options, 1).left;
+  cv::Mat1b expected, wrong;
   cv::blur(sharp, expected, cv::Size(3, 1));
-  cv::Mat1b wrong;
   cv::blur(sharp, wrong, cv::Size(1, 3));
   EXPECT_LT(meanDifference(blurred, expected), 0.75 * meanDifference(blurred, sharp));
   EXPECT_LT(meanDifference(blurred, expected), 0.75 * meanDifference(blurred, wrong));

@@ -248,9 +248,8 @@ TEST(RobotWorlds, BelongToTheirMotions) {
 TEST(RobotWorlds, AFastTurnSmearsEdgesInsteadOfRepeatingThem) {
   // 5 rad/s to the right for 24 ms: 25 px at the middle of d435_small.
   constexpr double kRate = 5.0, kExposure = 0.024;
-  std::vector<Eigen::Isometry3d> poses(3, Eigen::Isometry3d::Identity());
-  for (int i = 0; i < 3; ++i)
-    poses[i].linear() = Eigen::AngleAxisd(0.05 * kRate * i, Eigen::Vector3d::UnitY()).toRotationMatrix();
+  std::vector<Eigen::Isometry3d> poses;
+  for (int i = 0; i < 3; ++i) poses.emplace_back(Eigen::AngleAxisd(0.05 * kRate * i, Eigen::Vector3d::UnitY()));
   const DrivePath path(poses, 20.0);
   const auto shot = [&](double exposure) {
     RenderOptions options;
