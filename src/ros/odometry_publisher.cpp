@@ -36,9 +36,10 @@ OdometryPublisher::OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOp
 
 void OdometryPublisher::publish(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera) {
   if (!result.has_pose) {
+    const ros::Time stamp = ros::Time().fromNSec(static_cast<std::uint64_t>(result.stamp));
+    // By pointer as below: roscpp may swap messages that reach a subscriber of this process by value and by pointer.
     if (options_.publish_null_when_lost && result.state == TrackingState::kLost)
-      odom_publisher_.publish(
-          ros_conversions::toNullOdometry(ros::Time().fromNSec(static_cast<std::uint64_t>(result.stamp)), frames_));
+      odom_publisher_.publish(boost::make_shared<nav_msgs::Odometry>(ros_conversions::toNullOdometry(stamp, frames_)));
     return;
   }
   const auto odometry = boost::make_shared<nav_msgs::Odometry>(
