@@ -128,7 +128,7 @@ void takeOut(const RigCalibration& rig, std::vector<StereoFeatures>& pairs) {
   constexpr float kSmallest = 0.05f;  // px
   for (StereoFeatures& features : pairs)
     for (int i = 0; i < features.count(); ++i) {
-      const auto error = static_cast<float>(rig.disparityError(features.camera, features.u[i]));
+      const auto error = static_cast<float>(rig.disparityError(features.camera, features.u[i], features.v[i]));
       features.disparity[i] = std::max(features.disparity[i] - error, kSmallest);
     }
 }

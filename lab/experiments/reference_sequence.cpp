@@ -52,7 +52,7 @@ OdometryRun runOdometry(const KittiSequence& images, int frames, const std::stri
       throw std::runtime_error("the reference odometry loses " + images.directory() + " at pair " + std::to_string(i) +
                                "; use --reference ground_truth");
     run.poses.push_back(result.T_origin_camera);
-    if (std::isfinite(result.disparity_offset)) run.rig.value = {result.disparity_offset, result.disparity_bend};
+    if (std::isfinite(result.disparity_offset)) run.rig.value = {result.disparity_offset, result.disparity_bend, 0.0};
   }
   return run;
 }

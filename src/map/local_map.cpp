@@ -180,7 +180,7 @@ void LocalMap::startPoint(const StereoFeatures& features, int feature, int id, c
   const StereoCamera& camera = features.camera;
   const double u = features.u[feature], v = features.v[feature];
   const double disparity =
-      std::max(features.disparity[feature] - calibration.disparityError(camera, u), kFarthestDisparity);
+      std::max(features.disparity[feature] - calibration.disparityError(camera, u, v), kFarthestDisparity);
   Point& point = points_.emplace_back();
   point.position.T_origin_anchor = T_camera_origin.inverse();
   point.position.ray_and_inverse_depth = {(u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy,

@@ -21,7 +21,7 @@ struct WindowResidual {
     const Eigen::Isometry3d& T = point.T_camera_anchor[seen.frame];
     const Eigen::Vector3d& ray = point.ray_and_inverse_depth;
     P = T.linear().col(0) * ray.x() + T.linear().col(1) * ray.y() + T.linear().col(2) + T.translation() * ray.z();
-    shape = RigCalibration::shape(camera, seen.measurement.x());
+    shape = RigCalibration::shape(camera, seen.measurement.x(), seen.measurement.y());
     inverse_noise << 1.0 / seen.sigma, 1.0 / seen.sigma, point.inverse_disparity_sigma;
     const double iz = 1.0 / P.z();
     const Eigen::Vector3d predicted(

@@ -5,7 +5,7 @@ namespace sdvo {
 Eigen::Vector3d measurementOf(const StereoFeatures& features, int feature, const RigCalibration& calibration,
                               const Eigen::Vector2d& shift) {
   const double u = features.u[feature] + shift.x(), v = features.v[feature] + shift.y();
-  return {u, v, u - (features.disparity[feature] - calibration.disparityError(features.camera, u))};
+  return {u, v, u - (features.disparity[feature] - calibration.disparityError(features.camera, u, v))};
 }
 
 std::vector<Correspondence> correspond(const DescribedPoints& reference, const StereoFeatures& features,

@@ -34,15 +34,19 @@ void reportRig(const LearntRig& rig, OdometryResult& result) {
   if (rig.calibration.hasWindow()) {
     const RigEstimate known = rig.calibration.estimate();
     const RigEstimate::Vector sigma = known.covariance.diagonal().cwiseSqrt();
-    if (!known.covariance.topLeftCorner<2, 2>().isZero()) {
+    if (known.covariance(0, 0) > 0.0) {
       result.disparity_offset = known.mean[0], result.disparity_offset_sigma = sigma[0];
       result.disparity_bend = known.mean[1], result.disparity_bend_sigma = sigma[1];
     }
     result.right_delay = known.delay(), result.right_delay_sigma = sigma[RigEstimate::kDelay];
   }
   if (const auto rotation = rig.usual_rows.rotation()) {
-    result.right_rotation = rig.rotation + rotation->value;
-    result.right_rotation_sigma = (rig.rotation_covariance + rotation->covariance).diagonal().cwiseSqrt();
+    Eigen::Vector3d value = rotation->value, variance = rotation->covariance.diagonal();
+    const RigEstimate known = rig.calibration.estimate();
+    const double of_roll = known.covariance(RigEstimate::kRoll, RigEstimate::kRoll);
+    if (of_roll > 0.0) value.z() = known.mean[RigEstimate::kRoll], variance.z() = of_roll;
+    result.right_rotation = rig.rotation + value;
+    result.right_rotation_sigma = (rig.rotation_covariance.diagonal() + variance).cwiseSqrt();
   }
 }
 

@@ -17,6 +17,14 @@ namespace {
 
 constexpr int kManyMatches = 100;  // of one pair: agreement on no motion is then no lack of points (chosen)
 
+/// Moment of a motion's difference from the prior, if that is no chance: the stamps may be wrong, or the camera did
+/// what none does.
+Matrix6d unexpected(const MotionScene& scene, const MotionHypothesis& found) {
+  if (!(found.innovation > noiseGate(6))) return Matrix6d::Zero();
+  const Vector6d innovation = scene.prior.front().innovation(found.motion.T_current_reference.inverse());
+  return innovation * innovation.transpose();
+}
+
 /// The pose of an optical frame (z ahead, x right) at the origin of a base (x ahead, z up).
 Eigen::Isometry3d lookingAhead() {
   Eigen::Isometry3d T_base_camera = Eigen::Isometry3d::Identity();
@@ -396,46 +404,47 @@ void VisualOdometry::finish(const Pair& pair, Step& step) {
   state_.outage.havePose();
 }
 
-/// The pair joins the map unless the adjustment refutes its motion.
+/// The pair joins the map unless its motion is refuted, before or after the adjustment.
 VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, const MotionScene& scene,
                                                MotionHypothesis& found, double dt,
                                                const std::vector<Evidence>& evidence) {
-  const auto refute = [&](const std::string& why) {
+  const auto passOver = [&](const std::string& why) {
     state_.doubt.raise(evidence);
     return state_.interrupted ? startMap(options_, features, state_)
                               : predictMotion(options_, features, dt, why, state_);
   };
   const double since = scene.map.secondsUntil(features);
-  std::string refutation =
+  const std::string too_fast =
       state_.prior.tooFast(found.motion.T_current_reference.inverse(), found.motion.covariance, since);
-  if (!refutation.empty()) return refute(refutation);
+  if (!too_fast.empty()) return passOver(too_fast);
   const Candidate candidate = adjustBeyondDoubt(features, scene, found);
-  refutation = search_.chanceWords(scene, found);
+  std::string refutation = search_.chanceWords(scene, found);
   if (refutation.empty()) refutation = state_.prior.tooFast(candidate.motion, found.motion.covariance, since);
-  if (!refutation.empty()) return refute(refutation + " after the adjustment");
+  if (!refutation.empty()) return passOver(refutation + " after the adjustment");
 
   const bool is_seed = state_.seed && &scene.map == &*state_.seed, starts_again = is_seed && !state_.seed_has_pose;
   if (starts_again) state_.startAgain();
   if (is_seed) state_.covariance.assume(state_.covariance.value());
   const Belief belief = state_.doubt.weigh(scene, found, evidence);
-  commit(candidate, belief.probability);
+  commit(candidate, belief);
   Step step = measure(found, candidate);
   const Matrix6d measured = step.covariance;
-  judge(scene, found, candidate, belief, step);
+  widen(scene, found, belief, step);
+  const std::string doubt = doubtWords(scene, found, candidate, belief);
+  step.state = doubt.empty() && !starts_again ? TrackingState::kTracking : TrackingState::kDegraded;
   step.probability = belief.probability;
-  const bool is_confirmed = step.state == TrackingState::kTracking;
+  step.starts_again = starts_again;
+  if (!doubt.empty()) step.reason = "doubtful: " + doubt;
   // A motion that is likely something else's predicts nothing.
   if (belief.probability >= 0.5)
-    state_.prior.takeVelocity(features.stamp, found.motion.T_current_reference.inverse(), since, measured, is_confirmed,
-                              step.covariance - measured);
+    state_.prior.takeVelocity(features.stamp, found.motion.T_current_reference.inverse(), since, measured,
+                              doubt.empty(), step.covariance - measured);
   if (options_.planar.planar) {
     const std::string off = state_.floor.note(*floor(), state_.map->newestPose());
     if (step.reason.empty()) step.reason = off;
   }
   state_.outage.end();
   state_.seed.reset();
-  step.starts_again = starts_again;
-  if (starts_again) step.state = TrackingState::kDegraded;
   if (std::exchange(state_.interrupted, false))
     step.reason = (starts_again ? kStartedAgain
                    : is_seed    ? "goes on where the guess had the camera"
@@ -479,7 +488,7 @@ VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features,
   const std::optional<Floor> floor = this->floor();
   const auto [T_oldest_newest, seconds] = map.motionOfWindow();
   candidate.calibration_by_rig = RigEstimate::shape(
-      features.camera, logSO3(T_oldest_newest.linear()).y() / state_.prior.interval(seconds, T_oldest_newest));
+      features.camera, logSO3(T_oldest_newest.linear()) / state_.prior.interval(seconds, T_oldest_newest));
   candidate.adjustment =
       map.adjust(optimizer_, state_.rig.calibration.prior(map.oldestId(), candidate.calibration_by_rig),
                  candidate.calibration, floor);
@@ -497,54 +506,51 @@ VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features,
   return candidate;
 }
 
-/// Doubtful is a motion that is the camera's with too small a probability, or that has too large a covariance.
-void VisualOdometry::judge(const MotionScene& scene, const MotionHypothesis& found, const Candidate& candidate,
-                           const Belief& belief, Step& step) {
+/// What the pair may have taken for the camera's motion is in its covariances: rivals, places that look alike, stamps
+/// that are wrong, and, of a doubtful motion, whatever misled it.
+void VisualOdometry::widen(const MotionScene& scene, const MotionHypothesis& found, const Belief& belief, Step& step) {
   const auto add = [&](const Matrix6d& motion, const Matrix6d& pose) {
     step.covariance += motion;
     state_.covariance.doubt(motion, pose);
   };
   add(found.rivals_moment, found.rivals_moment);
-  Matrix6d covariance = candidate.adjustment.since_keyframe;
-  if (scene.place) {
-    step.covariance += scene.place->moment;
-    covariance += scene.place->moment;
-    state_.covariance.spread(scene.place->moment);
-  }
-  std::string reason;
-  if (found.innovation > noiseGate(6)) {
-    // The stamps may be wrong, or the camera did what none does. The pose does not rest on stamps, but the velocity
-    // does.
-    const Vector6d innovation = scene.prior.front().innovation(found.motion.T_current_reference.inverse());
-    covariance += innovation * innovation.transpose();
-    add(innovation * innovation.transpose(), Matrix6d::Zero());
-    reason = innovationWords(found);
-  }
-  if (belief.probability < options_.tracking.probability) {
-    add(belief.moment, belief.pose_moment);
-    reason = belief.reason;
-  } else {
-    const double deviation = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
-    if (deviation <= options_.tracking.doubtful_deviation + kTolerableRatio * candidate.distance) return;
-    std::ostringstream words;
-    words << "a distance of " << candidate.distance << " m with a standard deviation of " << deviation
-          << " m exceeds tracking/doubtful_deviation";
-    if (reason.empty()) reason = words.str();
-    if (scene.place) reason += scene.place->reason;
-  }
-  step.state = TrackingState::kDegraded;
-  step.reason = "doubtful: " + reason;
+  add(unexpected(scene, found), Matrix6d::Zero());  // the pose does not rest on stamps, but the velocity does
+  if (isDoubtful(belief)) add(belief.moment, belief.pose_moment);
+  if (!scene.place) return;
+  step.covariance += scene.place->moment;
+  state_.covariance.spread(scene.place->moment);
 }
 
-void VisualOdometry::commit(const Candidate& candidate, double probability) {
+/// In words, if a motion is the camera's with too small a probability, or has too large a covariance.
+std::string VisualOdometry::doubtWords(const MotionScene& scene, const MotionHypothesis& found,
+                                       const Candidate& candidate, const Belief& belief) const {
+  if (isDoubtful(belief)) return belief.reason;
+  Matrix6d covariance = candidate.adjustment.since_keyframe + unexpected(scene, found);
+  if (scene.place) covariance += scene.place->moment;
+  const double deviation = std::sqrt(covariance.topLeftCorner<3, 3>().trace());
+  if (deviation <= options_.tracking.doubtful_deviation + kTolerableRatio * candidate.distance) return "";
+  std::ostringstream words;
+  if (found.innovation > noiseGate(6))
+    words << innovationWords(found);
+  else
+    words << "a distance of " << candidate.distance << " m with a standard deviation of " << deviation
+          << " m exceeds tracking/doubtful_deviation";
+  return words.str() + (scene.place ? scene.place->reason : "");
+}
+
+bool VisualOdometry::isDoubtful(const Belief& belief) const {
+  return belief.probability < options_.tracking.probability;
+}
+
+void VisualOdometry::commit(const Candidate& candidate, const Belief& belief) {
   std::swap(state_.map, state_.candidate);
   // In doubt, what is followed agrees with itself whatever it is.
-  if (probability < options_.tracking.probability) state_.map->discountNewest();
+  if (isDoubtful(belief)) state_.map->discountNewest();
   const LocalMap::Adjustment& adjustment = candidate.adjustment;
   if (!adjustment.success) return;
   state_.rig.calibration.note(state_.map->oldestId(), state_.map->newestId(), candidate.calibration_by_rig,
                               candidate.calibration, adjustment.calibration_information);
-  if (probability < options_.tracking.probability) return;
+  if (isDoubtful(belief)) return;
   state_.rig.noise.learnPair(adjustment.newest_square);
   if (adjustment.common_disparity_square) state_.rig.calibration.noteCommon(*adjustment.common_disparity_square);
 }
@@ -553,7 +559,6 @@ void VisualOdometry::commit(const Candidate& candidate, double probability) {
 VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, const Candidate& candidate) {
   const LocalMap& map = *state_.map;
   Step step;
-  step.state = TrackingState::kTracking;
   step.rejected_features = candidate.adjustment.rejected;
   step.T_previous_current = (map.newestPose() * state_.T_origin_camera).inverse();
   if (!candidate.adjustment.success) {
@@ -563,9 +568,8 @@ VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, cons
   }
   step.covariance = state_.covariance.measure(*step.T_previous_current, candidate.adjustment.since_keyframe,
                                               candidate.adjustment.growth);
-  RigEstimate::Vector compensated;
-  compensated << candidate.calibration.value, candidate.delay;
-  state_.covariance.expose(candidate.adjustment.by_calibration * candidate.calibration_by_rig, compensated);
+  state_.covariance.expose(candidate.adjustment.by_calibration * candidate.calibration_by_rig,
+                           RigEstimate::of(*state_.camera, candidate.calibration, candidate.delay));
   // The motion between two reported poses contains what the map has learnt of the first one meanwhile: a perturbation
   // of the key frame before, then of the newest pair.
   step.correction = adjoint(map.newestPose() * map.poseBeforeNewest().inverse()) *

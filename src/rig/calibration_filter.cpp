@@ -16,10 +16,16 @@ using Vector = RigEstimate::Vector;
 constexpr int kRememberedCommons = 200;  // windows (chosen) over which the mean of what is left at a point is taken
 // px/sqrt(s) (chosen): half a pixel in 100 s, by warmth or by small knocks that no detector finds.
 constexpr double kWarming = 0.05;
+constexpr double kRolling = 5e-5;  // rad/sqrt(s) (chosen): the same for f = 1000 px
 constexpr double kClocks = 1e-4;  // s/sqrt(s) (chosen): a millisecond in 100 s, as of clocks whose rates differ by 1e-5
 
 Vector priorOf(const CalibrationOptions& options) {
-  return {options.prior_offset, options.prior_bend, options.right_delay};
+  return {options.prior_offset, options.prior_bend, 0.0, options.right_delay};
+}
+
+/// Of px, rad and s.
+Matrix diagonal(double disparity, double roll, double delay) {
+  return Vector(disparity, disparity, roll, delay).asDiagonal();
 }
 
 }  // namespace
@@ -47,14 +53,14 @@ CalibrationBelief CalibrationFilter::prior(int oldest_id, const RigEstimate::Sha
   return belief;
 }
 
-/// Mean and covariance of the mixture: of rigs with and without an error of their disparities, and with and without one
-/// of their delay.
+/// Mean and covariance of the mixture: of rigs with and without an error of their disparities, of their roll, and of
+/// their delay.
 RigEstimate CalibrationFilter::weigh(const Evidence& windows) const {
   const Vector prior = priorOf(options_);
   Matrix information = windows.information;
   Vector shown = windows.information_mean - information * prior;
-  information(RigEstimate::kDelay, RigEstimate::kDelay) += rows_information_;
-  shown[RigEstimate::kDelay] += rows_information_ * (rows_delay_ - prior[RigEstimate::kDelay]);
+  information.diagonal() += rows_information_;
+  shown += rows_information_.cwiseProduct(rows_ - prior);
   struct Component {
     double log_weight;
     Vector mean;
@@ -62,17 +68,17 @@ RigEstimate CalibrationFilter::weigh(const Evidence& windows) const {
   };
   std::vector<Component> components;
   double largest = 0.0;
-  for (const double disparity_sigma : {0.0, options_.prior_sigma}) {
-    if (disparity_sigma > 0.0 && !options_.enabled) continue;
-    for (const double delay_sigma : {0.0, options_.right_delay_sigma}) {
-      const Matrix sigma = Vector(disparity_sigma, disparity_sigma, delay_sigma).asDiagonal();
-      const Matrix whitened = Matrix::Identity() + sigma * information * sigma;
-      const Matrix covariance = sigma * whitened.inverse() * sigma;
-      const Vector mean = covariance * shown;
-      components.push_back({0.5 * (shown.dot(mean) - std::log(whitened.determinant())), mean, covariance});
-      largest = std::max(largest, components.back().log_weight);
-    }
-  }
+  const double may_err = options_.enabled ? 1.0 : 0.0;
+  for (const double disparity_sigma : {0.0, may_err * options_.prior_sigma})
+    for (const double roll_sigma : {0.0, may_err * options_.right_roll_sigma})
+      for (const double delay_sigma : {0.0, options_.right_delay_sigma}) {
+        const Matrix sigma = diagonal(disparity_sigma, roll_sigma, delay_sigma);
+        const Matrix whitened = Matrix::Identity() + sigma * information * sigma;
+        const Matrix covariance = sigma * whitened.inverse() * sigma;
+        const Vector mean = covariance * shown;
+        components.push_back({0.5 * (shown.dot(mean) - std::log(whitened.determinant())), mean, covariance});
+        largest = std::max(largest, components.back().log_weight);
+      }
   RigEstimate estimate;
   double sum = 0.0;
   for (const auto& [log_weight, mean, covariance] : components) {
@@ -110,20 +116,19 @@ void CalibrationFilter::note(int oldest_id, int newest_id, const RigEstimate::Sh
   pending_ = *present_;
 }
 
-void CalibrationFilter::noteRows(double delay, double sigma) {
-  constexpr double kExact = 1e-6;  // s, as the least prior: rows without noise, as of a simulator
-  rows_information_ = 1.0 / (sigma * sigma + kExact * kExact);
-  rows_delay_ = delay;
+void CalibrationFilter::noteRows(int parameter, double value, double sigma) {
+  constexpr double kExact = 1e-6;  // rad or s, as the least prior: rows without noise, as of a simulator
+  rows_information_[parameter] = 1.0 / (sigma * sigma + kExact * kExact);
+  rows_[parameter] = value;
 }
 
 void CalibrationFilter::predict(double dt) {
-  widen(Matrix(Vector(kWarming * kWarming * dt, kWarming * kWarming * dt, kClocks * kClocks * dt).asDiagonal()));
+  widen(diagonal(kWarming * kWarming * dt, kRolling * kRolling * dt, kClocks * kClocks * dt));
 }
 
-void CalibrationFilter::widen(double variance) {
-  Matrix covariance = Matrix::Zero();
-  covariance.topLeftCorner<RigCalibration::kParameters, RigCalibration::kParameters>().setConstant(variance);
-  widen(covariance);
+void CalibrationFilter::widen(const StereoCamera& camera, const Eigen::Matrix3d& rotation) {
+  const auto by_rotation = RigEstimate::byRotation(camera);
+  widen(by_rotation * rotation * by_rotation.transpose());
 }
 
 void CalibrationFilter::widen(const Matrix& covariance) {

@@ -8,6 +8,15 @@
 #include <utility>
 
 namespace sdvo {
+namespace {
+
+/// Covariance of a rotation that is measured, errors of rectification included.
+Eigen::Matrix3d ofRigs(const RightRotation& measured) {
+  constexpr double kUsual = 0.2;  // px: of rigs that nothing disturbs (KITTI, EuRoC) the most is half a pixel
+  return measured.covariance + kUsual * kUsual * measured.spread;
+}
+
+}  // namespace
 
 std::string ShownRotation::words() const {
   std::ostringstream words;
@@ -22,8 +31,7 @@ LearntRig::LearntRig(const CalibrationOptions& options, const NoiseOptions& assu
 /// A rotation against what changes on rigs, and on this one, as a rule.
 ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const MotionHypothesis& found,
                                        const Eigen::Vector3d& rate) const {
-  constexpr double kUsualOfRigs = 0.2;  // px: of rigs that nothing disturbs (KITTI, EuRoC) the most is half a pixel
-  constexpr double kKnock = 0.0175;     // rad: a degree (chosen)
+  constexpr double kKnock = 0.0175;  // rad: a degree (chosen)
   ShownRotation shown;
   if (features.count() < kFewestMeasured) return shown;
   std::optional<RightRotation> by_disparities;
@@ -38,7 +46,7 @@ ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const Mot
   Eigen::Vector3d weighted = Eigen::Vector3d::Zero();
   for (const auto& by : {usual_rows.change(features), by_disparities}) {
     if (!by) continue;
-    const Eigen::Matrix3d known = (by->covariance + kUsualOfRigs * kUsualOfRigs * by->spread).inverse();
+    const Eigen::Matrix3d known = ofRigs(*by).inverse();
     information += known, weighted += known * by->value;
   }
   if (!(information.determinant() > 0.0)) return shown;
@@ -62,7 +70,7 @@ void LearntRig::rotate(const ShownRotation& shown, const StereoCamera& camera) {
     return;
   }
   rotation = now, rotation_covariance = covariance;
-  calibration.widen(camera.fx * camera.fx * shown.covariance(1, 1));
+  calibration.widen(camera, shown.covariance);
 }
 
 void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measured, const MotionHypothesis& found,
@@ -83,7 +91,9 @@ void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measur
     right_delay.learn(measured->features, measured->dt, measured->velocity(), calibration.delay(), is_confirmed);
   else
     right_delay.interrupt();
-  if (const auto delay = right_delay.estimate()) calibration.noteRows(delay->value, delay->sigma);
+  if (const auto delay = right_delay.estimate()) calibration.noteRows(RigEstimate::kDelay, delay->value, delay->sigma);
+  if (const auto by_rows = usual_rows.rotation())
+    calibration.noteRows(RigEstimate::kRoll, by_rows->value.z(), std::sqrt(ofRigs(*by_rows)(2, 2)));
 }
 
 }  // namespace sdvo

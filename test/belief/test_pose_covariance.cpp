@@ -241,7 +241,7 @@ TEST(PoseCovariance, StaysSymmetricAndPositive) {
 PoseCovariance tenSteps(const RigEstimate::Vector& compensated) {
   PoseCovariance covariance;
   RigEstimate::MotionJacobian by_rig = RigEstimate::MotionJacobian::Zero();
-  by_rig.row(2) << 0.02, 0.005, 3.0;  // m/px, m/px, m/s
+  by_rig.row(2) << 0.02, 0.005, 0.4, 3.0;  // m/px, m/px, m/rad, m/s
   for (int step = 0; step < 10; ++step) {
     for (const int pair : {0, 1}) {  // of which the second is the key frame
       covariance.measure(pair == 0 ? forward() : kStill, diagonal(1e-4, 0.0));
@@ -254,18 +254,19 @@ PoseCovariance tenSteps(const RigEstimate::Vector& compensated) {
 
 TEST(PoseCovariance, TheRigsErrorAddsUpWithTheDistance) {
   RigEstimate known;
-  known.covariance.diagonal() << 0.09, 0.25, 1e-6;
+  known.covariance.diagonal() << 0.09, 0.25, 1e-4, 1e-6;
   const Matrix6d moment = tenSteps(RigEstimate::Vector::Zero()).byRig(known);
-  EXPECT_NEAR(std::sqrt(moment(2, 2)), 10.0 * std::hypot(0.02 * 0.3, 0.005 * 0.5, 3.0 * 0.001), 1e-12);
+  const Eigen::Vector4d of_each(0.02 * 0.3, 0.005 * 0.5, 0.4 * 0.01, 3.0 * 0.001);
+  EXPECT_NEAR(std::sqrt(moment(2, 2)), 10.0 * of_each.norm(), 1e-12);
   EXPECT_NEAR(moment.trace(), moment(2, 2), 1e-12);
 }
 
 TEST(PoseCovariance, TheRigsErrorIsFromTheOneThatWasCompensated) {
-  const RigEstimate::Vector compensated(0.1, -0.2, 0.002);
+  const RigEstimate::Vector compensated(0.1, -0.2, 0.01, 0.002);
   RigEstimate known;
   known.mean = compensated;
   EXPECT_LT(tenSteps(compensated).byRig(known).norm(), 1e-20);
-  known.mean << 0.3, -0.2, 0.002;
+  known.mean << 0.3, -0.2, 0.01, 0.002;
   EXPECT_NEAR(std::sqrt(tenSteps(compensated).byRig(known)(2, 2)), 10.0 * 0.02 * 0.2, 1e-12);
 }
 
@@ -274,7 +275,7 @@ TEST(PoseCovariance, TheWayBackUndoesTheRigsError) {
   RigEstimate known;
   known.covariance.setIdentity();
   RigEstimate::MotionJacobian by_rig = RigEstimate::MotionJacobian::Zero();
-  by_rig.row(2) << -0.02, -0.005, -3.0;
+  by_rig.row(2) << -0.02, -0.005, -0.4, -3.0;
   for (int step = 0; step < 10; ++step) {
     covariance.measure(forward().inverse(), diagonal(1e-4, 0.0));
     covariance.expose(by_rig, RigEstimate::Vector::Zero());

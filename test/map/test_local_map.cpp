@@ -346,10 +346,11 @@ TEST(LocalMap, PointsAreWithoutTheRigsError) {
   const synthetic::World world = someWorld(20);
   StereoFeatures features = see(world, 0, 20, kOrigin);
   RigCalibration calibration;
-  calibration.value << 0.5, -2.0;
+  calibration.value << 0.5, -2.0, 1.0;
   for (int i = 0; i < 20; ++i) {
     const double x = (features.u[i] - features.camera.cx) / features.camera.fx;
-    features.disparity[i] += static_cast<float>(0.5 - 2.0 * x * x);
+    const double y = (features.v[i] - features.camera.cy) / features.camera.fy;
+    features.disparity[i] += static_cast<float>(0.5 - 2.0 * x * x + y);
   }
   LocalMap map({});
   add(map, features, 1, kOrigin, {}, calibration);

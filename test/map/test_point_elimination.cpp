@@ -24,7 +24,7 @@ struct Scene {
   std::vector<WindowObservation> observations;
 
   explicit Scene(const std::vector<int>& frames, const Eigen::Vector3d& where = {0.4, -0.2, 1.0 / 9.0}) {
-    calibration.value << 0.2, -0.7;
+    calibration.value << 0.2, -0.7, 0.4;
     point.T_origin_anchor = syntheticPose(-2);
     point.ray_and_inverse_depth = where;
     for (int f = 0; f <= kPoses; ++f) T_camera_origin.push_back(syntheticPose(f).inverse());
@@ -113,14 +113,15 @@ std::vector<Row> rowsOf(const Scene& scene, double bend = kLinearisation.bend) {
     const Jacobians jacobians = jacobiansOf(scene.camera, T, scene.point);
     const Eigen::Vector3d& measured = seen.measurement;
     const Eigen::Vector3d noise(1.0 / seen.sigma, 1.0 / seen.sigma, 1.0 / kDisparitySigma);
-    prediction->z() += scene.calibration.disparityError(scene.camera, measured.x());
+    prediction->z() += scene.calibration.disparityError(scene.camera, measured.x(), measured.y());
     Row row;
     row.residual = noise.cwiseProduct(measured - *prediction);
     row.square = row.residual.squaredNorm();
     row.weight = 1.0 / (1.0 + row.square / bend);
-    row.jacobian.setZero(3, 6 * kPoses + 5);
+    row.jacobian.setZero(3, 6 * kPoses + kCalibration + 3);
     if (seen.frame > 0) row.jacobian.middleCols<6>(6 * (seen.frame - 1)) = jacobians.pose;
-    row.jacobian.row(2).segment<2>(6 * kPoses) = RigCalibration::shape(scene.camera, measured.x());
+    row.jacobian.row(2).segment<kCalibration>(6 * kPoses) =
+        RigCalibration::shape(scene.camera, measured.x(), measured.y());
     row.jacobian.rightCols<3>() = jacobians.point;
     row.jacobian = noise.asDiagonal() * row.jacobian;
     rows.push_back(row);
@@ -130,8 +131,8 @@ std::vector<Row> rowsOf(const Scene& scene, double bend = kLinearisation.bend) {
 
 /// Weighted normal equations of everything.
 struct Whole {
-  Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(6 * kPoses + 5, 6 * kPoses + 5);
-  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(6 * kPoses + 5);
+  Eigen::MatrixXd hessian = Eigen::MatrixXd::Zero(6 * kPoses + kCalibration + 3, 6 * kPoses + kCalibration + 3);
+  Eigen::VectorXd gradient = Eigen::VectorXd::Zero(6 * kPoses + kCalibration + 3);
 
   explicit Whole(const Scene& scene) {
     for (const Row& row : rowsOf(scene)) {
@@ -191,7 +192,7 @@ TEST(PointElimination, GradientsOfSightingsAndPointsAddUp) {
     const PoseFactor& factor = reduced.factors[static_cast<std::size_t>(k)];
     sum.segment<6>(6 * factor.pose) += factor.gradient;
   }
-  sum.tail<2>() = reduced.point.calibration_gradient;
+  sum.tail<kCalibration>() = reduced.point.calibration_gradient;
   expectNear(sum, reduced.gradient, "gradient");
 }
 
@@ -226,7 +227,7 @@ std::vector<Eigen::Vector3d> movedPoints(const std::vector<Scene>& scenes) {
     moved.push_back(scene.point.ray_and_inverse_depth);
   }
   const Eigen::VectorXd step = someStep();
-  movePoints(points, factors, step.head(6 * kPoses), step.tail<2>(), moved);
+  movePoints(points, factors, step.head(6 * kPoses), step.tail<kCalibration>(), moved);
   return moved;
 }
 

@@ -19,7 +19,7 @@ constexpr double kPositionSigma = 0.2;  // px
 
 RigCalibration calibrationOf(double offset, double bend) {
   RigCalibration calibration;
-  calibration.value << offset, bend;
+  calibration.value << offset, bend, 0.4;
   return calibration;
 }
 

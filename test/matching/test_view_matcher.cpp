@@ -16,7 +16,7 @@ TEST(Correspondences, MeasurementsAreWithoutTheRigsError) {
   const StereoFeatures features = twoFeatures();
   EXPECT_TRUE(measurementOf(features, 0, {}).isApprox(Eigen::Vector3d(100.0, 50.0, 80.0)));
   RigCalibration rig;
-  rig.value = {0.5, 0.0};  // a disparity of 19.5 px is measured as 20 px
+  rig.value = {0.5, 0.0, 0.0};  // a disparity of 19.5 px is measured as 20 px
   EXPECT_TRUE(measurementOf(features, 0, rig).isApprox(Eigen::Vector3d(100.0, 50.0, 80.5)));
   EXPECT_TRUE(measurementOf(features, 1, rig, {0.25, -0.5}).isApprox(Eigen::Vector3d(500.25, 59.5, 490.75)))
       << "both views move by the shift";

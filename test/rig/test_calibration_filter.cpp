@@ -3,6 +3,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <utility>
 
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/motion/noise.hpp"
@@ -12,6 +13,7 @@ namespace sdvo::test_calibration_filter {
 
 using Matrix = RigCalibration::Matrix;
 using Vector = RigCalibration::Vector;
+constexpr int kRoll = RigEstimate::kRoll, kDelay = RigEstimate::kDelay;
 
 const double kSigma =
     std::sqrt(1.0 / (4.0 * CalibrationFilter::kHonest));  // px: an information of 4 in a window's units
@@ -24,21 +26,21 @@ CalibrationOptions someOptions() {
   return options;
 }
 
-const Vector kPrior(0.5, -1.0);
-const Matrix kInformation = Vector(12.0, 5.0).asDiagonal();  // as a window states it
+const Vector kPrior(0.5, -1.0, 0.0);
+const Matrix kInformation = Vector(12.0, 5.0, 7.0).asDiagonal();  // as a window states it
 
-const RigEstimate::Shape kAhead = RigEstimate::Shape::Identity();  // of a camera that does not turn
+const RigEstimate::Shape kAhead = RigEstimate::Shape::Identity();  // of a camera that does not turn, with f = -1 px
 
 CalibrationBelief priorOf(const CalibrationFilter& filter, int oldest) {
   return filter.prior(oldest, kAhead);
 }
 
 Vector meanOf(const CalibrationFilter& filter) {
-  return filter.estimate().mean.head<2>();
+  return filter.estimate().mean.head<3>();
 }
 
 Vector sigmaOf(const CalibrationFilter& filter) {
-  return filter.estimate().covariance.diagonal().head<2>().cwiseSqrt();
+  return filter.estimate().covariance.diagonal().head<3>().cwiseSqrt();
 }
 
 /// Adds the window of these pairs that would find `own` without a prior.
@@ -54,12 +56,14 @@ double normal(double distance, double variance) {
   return std::exp(-0.5 * distance * distance / variance) / std::sqrt(variance);
 }
 
-/// Moments of the mixture of a rig as the options say and one around that, given what windows measured together.
+/// Moments of offset and bend in the mixture of a rig as the options say and one around that, given what windows
+/// measured together. They show no roll.
 struct Moments {
   Vector mean, variance;
 };
 Moments mixed(const Vector& own, const Matrix& information) {
-  const Vector variance = (CalibrationFilter::kHonest * information.diagonal()).cwiseInverse(), distance = own - kPrior;
+  const Eigen::Vector2d variance = (CalibrationFilter::kHonest * information.diagonal().head<2>()).cwiseInverse();
+  const Eigen::Vector2d distance = (own - kPrior).head<2>();
   double as_options = 1.0, other = 1.0;
   for (int i = 0; i < 2; ++i) {
     as_options *= normal(distance[i], variance[i]);
@@ -68,7 +72,10 @@ Moments mixed(const Vector& own, const Matrix& information) {
   const double probability = other / (other + as_options);
   const Eigen::Array2d gain = kSigma * kSigma / (variance.array() + kSigma * kSigma), moved = gain * distance.array();
   const Eigen::Array2d mean = probability * moved, square = probability * (gain * variance.array() + moved.square());
-  return {kPrior + mean.matrix(), (square - mean.square()).matrix()};
+  Moments moments{kPrior, Vector::Zero()};
+  moments.mean.head<2>() += mean.matrix();
+  moments.variance.head<2>() = (square - mean.square()).matrix();
+  return moments;
 }
 
 TEST(CalibrationFilter, BeginsAsTheOptionsSayOrAroundThat) {
@@ -84,11 +91,11 @@ TEST(CalibrationFilter, GoesOverFromTheOptionsToWhatWindowsMeasure) {
   const double sigma = 1.0 / std::sqrt(12.0 * CalibrationFilter::kHonest);
   for (const double sigmas : {0.0, 1.0, 2.0, 3.0, 5.0, 20.0}) {
     CalibrationFilter filter(someOptions());
-    const Vector own = kPrior + sigmas * Vector(sigma, -0.5 * sigma);
+    const Vector own = kPrior + sigmas * Vector(sigma, -0.5 * sigma, 0.0);
     addWindow(filter, 1, 9, own);
     const Moments expected = mixed(own, kInformation);
     EXPECT_LT((meanOf(filter) - expected.mean).norm(), 1e-9) << sigmas;
-    EXPECT_LT((sigmaOf(filter).cwiseAbs2() - expected.variance).norm(), 1e-9) << sigmas;
+    EXPECT_LT((sigmaOf(filter).cwiseAbs2() - expected.variance).head<2>().norm(), 1e-9) << sigmas;
     EXPECT_LT((priorOf(filter, 10).mean - expected.mean).norm(), 1e-9) << sigmas;
     EXPECT_EQ(priorOf(filter, 9).mean, kPrior) << "it shares a pair with this one";
   }
@@ -96,7 +103,7 @@ TEST(CalibrationFilter, GoesOverFromTheOptionsToWhatWindowsMeasure) {
 
 TEST(CalibrationFilter, OfWindowsThatOverlapOneCounts) {
   CalibrationFilter filter(someOptions());
-  const Vector own(30.0, -30.0);
+  const Vector own(30.0, -30.0, 0.0);
   for (const int newest : {5, 6, 7, 8}) {
     addWindow(filter, newest - 4, newest, own);
     EXPECT_EQ(priorOf(filter, newest - 4).mean, kPrior);
@@ -107,7 +114,7 @@ TEST(CalibrationFilter, OfWindowsThatOverlapOneCounts) {
 
 TEST(CalibrationFilter, ManyWindowsKnowMoreAndPoorOnesTakeNothingAway) {
   CalibrationFilter filter(someOptions());
-  const Vector own(3.5, -2.0);
+  const Vector own(3.5, -2.0, 0.0);
   double before = 2.0 * kSigma;
   for (int k = 0; k < 50; ++k) {
     addWindow(filter, 10 * k + 1, 10 * k + 9, own);
@@ -121,21 +128,28 @@ TEST(CalibrationFilter, ManyWindowsKnowMoreAndPoorOnesTakeNothingAway) {
 
 TEST(CalibrationFilter, WhatIsOldIsKnownLess) {
   CalibrationFilter filter(someOptions());
-  addWindow(filter, 1, 9, {3.5, -2.0}, 1e6 * kInformation);
+  addWindow(filter, 1, 9, {3.5, -2.0, 0.0}, 1e6 * kInformation);
   const double before = sigmaOf(filter)[0];
   for (int second = 0; second < 100; ++second) filter.predict(1.0);
   EXPECT_NEAR(sigmaOf(filter)[0], 0.5, 0.02) << "half a pixel in 100 s";
   EXPECT_LT(before, 0.01);
-  EXPECT_LT((meanOf(filter) - Vector(3.5, -2.0)).norm(), 0.1);
+  EXPECT_LT((meanOf(filter) - Vector(3.5, -2.0, 0.0)).norm(), 0.1);
 }
 
-TEST(CalibrationFilter, AKnockMakesBothUnknownAlike) {
+constexpr double kFocal = 400.0;  // px
+
+StereoCamera someCamera() {
+  return {kFocal, kFocal, 500.0, 300.0, 0.1, 1000, 600};
+}
+
+TEST(CalibrationFilter, AKnockMakesOffsetBendAndRollUnknown) {
   CalibrationFilter filter(someOptions());
-  addWindow(filter, 1, 9, {3.5, -2.0}, 1e6 * kInformation);
-  filter.widen(0.25);
+  addWindow(filter, 1, 9, {3.5, -2.0, 0.0}, 1e6 * kInformation);
+  filter.widen(someCamera(), Eigen::Vector3d(0.0, 0.25 / (kFocal * kFocal), 1e-6).asDiagonal());
   const RigEstimate::Matrix covariance = filter.estimate().covariance;
   EXPECT_NEAR(covariance(0, 0), 0.25, 0.02);
   EXPECT_NEAR(covariance(0, 1), 0.25, 0.02) << "a turn about the vertical axis moves offset and bend alike";
+  EXPECT_GT(covariance(RigEstimate::kRoll, RigEstimate::kRoll), 0.3e-6) << "as far as its prior";
 }
 
 TEST(CalibrationFilter, HoldsThePriorWhenNotEnabled) {
@@ -143,24 +157,20 @@ TEST(CalibrationFilter, HoldsThePriorWhenNotEnabled) {
   options.enabled = false;
   CalibrationFilter filter(options);
   EXPECT_TRUE(sigmaOf(filter).isZero());
-  addWindow(filter, 1, 9, {100.0, 100.0});
+  addWindow(filter, 1, 9, {100.0, 100.0, 100.0});
   EXPECT_EQ(priorOf(filter, 10).mean, kPrior);
   EXPECT_LT((filter.calibration().value - kPrior).norm(), 0.01) << "of 100 px";
   EXPECT_EQ(meanOf(filter), kPrior);
 }
 
-constexpr double kFocal = 400.0;  // px
-
 RigEstimate::Shape turning(double yaw) {
-  StereoCamera camera;
-  camera.fx = kFocal;
-  return RigEstimate::shape(camera, yaw);
+  return RigEstimate::shape(someCamera(), {0.0, yaw, 0.0});
 }
 
 /// A window of a rig without misalignment whose right image is so late beyond what is compensated.
 void addTurn(CalibrationFilter& filter, int k, double yaw, double delay) {
   const double shown = kFocal * yaw * (delay - filter.delay());
-  addWindow(filter, 10 * k + 1, 10 * k + 9, Vector(shown, shown), 1e4 * Matrix::Identity(), turning(yaw));
+  addWindow(filter, 10 * k + 1, 10 * k + 9, Vector(shown, shown, 0.0), 1e4 * Matrix::Identity(), turning(yaw));
 }
 
 TEST(CalibrationFilter, ADelayIsWhatFollowsTheYawAndAnOffsetWhatStays) {
@@ -169,10 +179,10 @@ TEST(CalibrationFilter, ADelayIsWhatFollowsTheYawAndAnOffsetWhatStays) {
     addTurn(filter, 0, 0.5, delay);
     const RigEstimate one = filter.estimate();
     if (delay != 0.0) {
-      EXPECT_LT(one.covariance(0, 2), -0.5 * std::sqrt(one.covariance(0, 0) * one.covariance(2, 2)))
+      EXPECT_LT(one.covariance(0, kDelay), -0.5 * std::sqrt(one.covariance(0, 0) * one.covariance(kDelay, kDelay)))
           << "one turn shows their sum";
     }
-    EXPECT_LT(one.covariance(2, 2), 0.003 * 0.003);
+    EXPECT_LT(one.covariance(kDelay, kDelay), 0.003 * 0.003);
     for (int k = 1; k < 20; ++k) addTurn(filter, k, k % 2 ? -0.5 : 0.5, delay);
     EXPECT_NEAR(filter.delay(), delay, 1e-4);
     EXPECT_LT(meanOf(filter).norm(), 0.05) << delay;
@@ -180,37 +190,50 @@ TEST(CalibrationFilter, ADelayIsWhatFollowsTheYawAndAnOffsetWhatStays) {
   }
 }
 
-TEST(CalibrationFilter, RowsShowTheDelayToo) {
+TEST(CalibrationFilter, ARollIsATiltOfDisparities) {
   CalibrationFilter filter{CalibrationOptions()};
-  EXPECT_NEAR(std::sqrt(filter.estimate().covariance(2, 2)), std::sqrt(0.5) * CalibrationOptions().right_delay_sigma,
-              1e-9)
-      << "half of the rigs are in step";
-  for (const double delay : {0.0002, 0.003}) {
-    filter.noteRows(delay, 0.0002);
-    EXPECT_LE(filter.delay(), delay);
-    EXPECT_NEAR(filter.delay(), delay > 0.001 ? delay : 0.0, 5e-5) << "as far as chance does not explain it";
-    const double left = delay - filter.delay();
-    EXPECT_GT(filter.estimate().covariance(2, 2) + 1e-12, left * left / 9.0);
-  }
-  for (int second = 0; second < 100; ++second) filter.predict(1.0);
-  EXPECT_NEAR(filter.delay(), 0.003, 5e-5) << "rows have a memory of their own";
+  for (int k = 0; k < 5; ++k)
+    addWindow(filter, 10 * k + 1, 10 * k + 9, {0.0, 0.0, -kFocal * 0.002}, 1e4 * Matrix::Identity(), turning(0.0));
+  EXPECT_NEAR(filter.estimate().mean[kRoll], 0.002, 1e-4);
+  EXPECT_LT(meanOf(filter).head<2>().norm(), 0.05);
+  EXPECT_NEAR(filter.prior(1000, turning(0.0)).mean[2], -kFocal * 0.002, 0.05);
 }
 
-/// As a late right image has it: a point far away, in the middle and at 45 degrees.
-TEST(RigEstimate, ShapeIsThatOfARightImageThatIsLate) {
-  StereoCamera camera;
-  camera.fx = camera.fy = kFocal, camera.cx = 500.0, camera.cy = 300.0, camera.baseline = 0.1;
-  constexpr double kYaw = 0.4, kDelay = 0.002;
-  Vector6d turn = Vector6d::Zero();
-  turn[4] = kYaw * kDelay;
-  for (const double u : {500.0, 100.0, 900.0}) {
-    const Eigen::Vector3d point = camera.backProject(u, 300.0, 1e-3);
-    const Eigen::Vector3d late = camera.project(expSE3(turn).inverse() * point);
-    RigCalibration shown;
-    shown.value = RigEstimate::shape(camera, kYaw) * Eigen::Vector3d(0.0, 0.0, kDelay);
-    const double disparity_error = u - late.x();  // the left one is at u, the right one would be, too
-    EXPECT_NEAR(shown.disparityError(camera, u), disparity_error, 0.01) << u;
+TEST(CalibrationFilter, RowsShowRollAndDelayToo) {
+  const CalibrationOptions options;
+  const std::pair<int, double> both[] = {{kRoll, options.right_roll_sigma}, {kDelay, options.right_delay_sigma}};
+  for (const auto& [parameter, prior] : both) {
+    CalibrationFilter filter{options};
+    const double measured = prior / 15.0;
+    EXPECT_NEAR(std::sqrt(filter.estimate().covariance(parameter, parameter)), std::sqrt(0.5) * prior, 1e-9)
+        << "half of the rigs have none";
+    for (const double shown : {measured, prior}) {
+      filter.noteRows(parameter, shown, measured);
+      const double mean = filter.estimate().mean[parameter];
+      EXPECT_LE(mean, shown);
+      EXPECT_NEAR(mean, shown > measured ? shown : 0.0, 0.25 * measured) << "as far as chance does not explain it";
+      EXPECT_GT(filter.estimate().covariance(parameter, parameter) + 1e-12, (shown - mean) * (shown - mean) / 9.0);
+    }
+    for (int second = 0; second < 100; ++second) filter.predict(1.0);
+    EXPECT_NEAR(filter.estimate().mean[parameter], prior, 0.25 * measured) << "rows have a memory of their own";
   }
+}
+
+/// As a late right image has it: points far away, in the middle and towards the corners.
+TEST(RigEstimate, ShapeIsThatOfARightImageThatIsLate) {
+  const StereoCamera camera = someCamera();
+  constexpr double kLate = 0.002;  // s
+  for (const Eigen::Vector3d& rate : {Eigen::Vector3d(0.0, 0.4, 0.0), Eigen::Vector3d(0.0, 0.0, 0.4)})
+    for (const double u : {500.0, 100.0, 900.0})
+      for (const double v : {300.0, 100.0}) {
+        Vector6d turn = Vector6d::Zero();
+        turn.tail<3>() = kLate * rate;
+        const Eigen::Vector3d late = camera.project(expSE3(turn).inverse() * camera.backProject(u, v, 1e-3));
+        RigCalibration shown;
+        shown.value = RigEstimate::shape(camera, rate).col(kDelay) * kLate;
+        const double disparity_error = u - late.x();  // the left one is at u, the right one would be, too
+        EXPECT_NEAR(shown.disparityError(camera, u, v), disparity_error, 0.01) << rate.transpose() << " at " << u;
+      }
 }
 
 /// The optimizer fills one triangle of its matrices.
@@ -247,7 +270,7 @@ TEST(CalibrationFilter, WhatIsLeftAtAPointMayChange) {
 TEST(CalibrationFilter, AskingForAPriorChangesNothing) {
   CalibrationFilter asked{CalibrationOptions{}}, other{CalibrationOptions{}};
   RigCalibration found;
-  found.value << 0.3, -0.5;
+  found.value << 0.3, -0.5, 0.0;
   for (CalibrationFilter* filter : {&asked, &other}) filter->note(0, 4, kAhead, found, 1e4 * Matrix::Identity());
   priorOf(asked, 5);
   for (CalibrationFilter* filter : {&asked, &other}) filter->note(4, 8, kAhead, found, 1e4 * Matrix::Identity());

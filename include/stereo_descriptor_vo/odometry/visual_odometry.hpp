@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
@@ -94,10 +95,12 @@ class VisualOdometry {
   Candidate adjustBeyondDoubt(const StereoFeatures& features, const MotionScene& scene, MotionHypothesis& found);
   Candidate adjust(const StereoFeatures& features, const LocalMap& before, const MotionHypothesis& found,
                    bool may_recall);
-  void commit(const Candidate& candidate, double probability);
+  void commit(const Candidate& candidate, const Belief& belief);
   Step measure(const MotionHypothesis& found, const Candidate& candidate);
-  void judge(const MotionScene& scene, const MotionHypothesis& found, const Candidate& candidate, const Belief& belief,
-             Step& step);
+  void widen(const MotionScene& scene, const MotionHypothesis& found, const Belief& belief, Step& step);
+  std::string doubtWords(const MotionScene& scene, const MotionHypothesis& found, const Candidate& candidate,
+                         const Belief& belief) const;
+  bool isDoubtful(const Belief& belief) const;
   void finish(const Pair& pair, Step& step);
 
   VisualOdometryOptions options_;

@@ -12,6 +12,7 @@ struct CalibrationOptions {
   double prior_offset = 0.0;
   double prior_bend = 0.0;
   double prior_sigma = 1.0;
+  double right_roll_sigma = 0.001;  // chosen: 0.3 px at the upper edge of KITTI's images
   double right_delay = 0.0;
   double right_delay_sigma = 0.003;  // chosen: one trigger leaves 0.2 ms (twelve drives), none half a frame
 
@@ -23,6 +24,9 @@ struct CalibrationOptions {
     list.add("prior_sigma", prior_sigma, {1e-4, 10.0}, "px",
              "standard deviation of an error of both, in the centre and at 45 degrees from it, which is beforehand as "
              "likely as none");
+    list.add("right_roll_sigma", right_roll_sigma, {1e-6, 0.1}, "rad",
+             "standard deviation of the right camera's rotation about its optical axis, which is beforehand as likely "
+             "as none; rows and disparities show it");
     list.add("right_delay", right_delay, {-0.1, 0.1}, "s",
              "time by which right images are known to be later than left ones; what it lacks is estimated");
     list.add("right_delay_sigma", right_delay_sigma, {1e-6, 0.1}, "s",
@@ -34,8 +38,9 @@ struct CalibrationOptions {
 /// Windows overlap: one is part of the prior only for windows that share no pair with it.
 ///
 /// The prior is a mixture with equal weights. The disparities' error is the options' value, or it is normally
-/// distributed around that with `prior_sigma`. The delay has the same prior, with `right_delay_sigma`. Measurements
-/// shift the weights (Bayes factor), so what is compensated moves to the measured values without a threshold.
+/// distributed around that with `prior_sigma`. Roll and delay have the same prior, each with its own sigma.
+/// Measurements shift the weights (Bayes factor), so what is compensated moves to the measured values without a
+/// threshold.
 class CalibrationFilter {
  public:
   /// Ratio between the information of a window and what it states: it counts points as if they erred independently
@@ -56,14 +61,15 @@ class CalibrationFilter {
   void note(int oldest_id, int newest_id, const RigEstimate::Shape& shape, const RigCalibration& calibration,
             const RigCalibration::Matrix& information);
 
-  /// Notes the delay, s, that rows have shown up to now, and its standard deviation.
-  void noteRows(double delay, double sigma);
+  /// Notes what rows have shown up to now of the roll, rad, or of the delay, s (RigEstimate::kRoll or kDelay), and its
+  /// standard deviation.
+  void noteRows(int parameter, double value, double sigma);
 
   /// Notes the square (px^2) of what a window found the calibration to leave at a point.
   void noteCommon(double square);
 
-  /// The right camera rotated, which is compensated but for an error of this variance, px^2, of all disparities.
-  void widen(double variance);
+  /// The right camera rotated, which is compensated but for an error of this covariance, rad^2.
+  void widen(const StereoCamera& camera, const Eigen::Matrix3d& rotation);
 
   /// Of the last window.
   const RigCalibration& calibration() const { return calibration_; }
@@ -89,9 +95,10 @@ class CalibrationFilter {
   Evidence past_;     ///< of windows that share no pair with the present one
   Evidence pending_;  ///< of these and of one more, which is past to windows that begin after pair `pending_id_`
   int pending_id_ = -1;
-  std::optional<Evidence> present_;                   ///< of the past and the last window
-  double rows_information_ = 0.0, rows_delay_ = 0.0;  ///< 1/s^2, s
-  int commons_ = 0;                                   ///< how many squares were noted
+  std::optional<Evidence> present_;                                     ///< of the past and the last window
+  RigEstimate::Vector rows_ = RigEstimate::Vector::Zero();              ///< as rows show each alone
+  RigEstimate::Vector rows_information_ = RigEstimate::Vector::Zero();  ///< 1/rad^2 and 1/s^2
+  int commons_ = 0;                                                     ///< how many squares were noted
   double common_square_ = 0.0;
 };
 
