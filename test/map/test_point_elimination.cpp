@@ -170,7 +170,7 @@ void expectNear(const Eigen::MatrixXd& value, const Eigen::MatrixXd& expected, c
 void expectSchurComplement(const Scene& scene) {
   const Whole whole(scene);
   const Reduced reduced(scene);
-  const int n = 6 * kPoses + 2;
+  const int n = 6 * kPoses + kCalibration;
   const Eigen::Matrix3d inverse = whole.hessian.bottomRightCorner<3, 3>().inverse();
   const Eigen::MatrixXd with_point = whole.hessian.topRightCorner(n, 3);
   const Eigen::MatrixXd expected = whole.hessian.topLeftCorner(n, n) - with_point * inverse * with_point.transpose();
@@ -210,7 +210,7 @@ TEST(PointElimination, SightingsFromBehindCostButDoNotPull) {
 
 /// Some step of the poses, then of the calibration.
 Eigen::VectorXd someStep() {
-  Eigen::VectorXd step(6 * kPoses + 2);
+  Eigen::VectorXd step(6 * kPoses + kCalibration);
   for (int i = 0; i < step.size(); ++i) step[i] = 0.01 * std::sin(1.0 + i);
   return step;
 }
