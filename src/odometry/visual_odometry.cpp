@@ -506,8 +506,8 @@ VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features,
   return candidate;
 }
 
-/// What the pair may have taken for the camera's motion is in its covariances: rivals, places that look alike, stamps
-/// that are wrong, and, of a doubtful motion, whatever misled it.
+/// Adds to the covariances what may be the camera's motion instead: that of rivals, of places that look alike, and of a
+/// camera whose stamps are wrong. A doubtful motion has the moment of its doubt as well.
 void VisualOdometry::widen(const MotionScene& scene, const MotionHypothesis& found, const Belief& belief, Step& step) {
   const auto add = [&](const Matrix6d& motion, const Matrix6d& pose) {
     step.covariance += motion;

@@ -16,7 +16,7 @@ using Vector = RigEstimate::Vector;
 constexpr int kRememberedCommons = 200;  // windows (chosen) over which the mean of what is left at a point is taken
 // px/sqrt(s) (chosen): half a pixel in 100 s, by warmth or by small knocks that no detector finds.
 constexpr double kWarming = 0.05;
-constexpr double kRolling = 5e-5;  // rad/sqrt(s) (chosen): the same for f = 1000 px
+constexpr double kRolling = 5e-5;  // rad/sqrt(s) (chosen): kWarming at f = 1000 px
 constexpr double kClocks = 1e-4;  // s/sqrt(s) (chosen): a millisecond in 100 s, as of clocks whose rates differ by 1e-5
 
 Vector priorOf(const CalibrationOptions& options) {

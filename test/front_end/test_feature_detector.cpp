@@ -256,7 +256,7 @@ TEST(FeatureDetector, KeepsCornersApart) {
   EXPECT_GT(fewer.size(), 200u);
 }
 
-/// What a border hides is hidden; the rest is where it is in the whole image.
+/// A border hides its features; the others are where the whole image has them.
 TEST(FeatureDetector, BorderLeavesPositionsWhereTheyAre) {
   constexpr int kBorder = 40;
   const cv::Mat image = unevenTexture();

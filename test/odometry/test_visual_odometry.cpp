@@ -849,7 +849,7 @@ TEST(VisualOdometry, RotationsOfABurstAreMeasured) {
   }
 }
 
-/// What stands 60 to 120 m away, where half a pixel is metres, hardly tells a step from a standstill.
+/// Points 60 to 120 m away hardly tell a step from a standstill: there half a pixel is metres.
 const synthetic::World& farWorld() {
   static const synthetic::World far = synthetic::randomWorld(31, 2000, {-80.0, -40.0, 60.0}, {80.0, 40.0, 120.0});
   return far;

@@ -178,7 +178,7 @@ class LocalMap {
     int seen = 1;  ///< number of confirmed pairs that saw it, also of those that left the map
   };
 
-  /// The optimizer's input, and which points and observations of the map it consists of.
+  /// The optimizer's input, and where the map has its points and newest observations.
   struct Problem {
     Window window;
     std::vector<int> points;  ///< for each point of the window its index in the map

@@ -101,7 +101,8 @@ class Noise {
   double shared() const { return std::max(shared_, 1.0); }
 
  private:
-  /// Identical images give residuals near 0: the square is clamped, else the mean would become 0.
+  /// No less than a quarter of the expected square: identical images have residuals near 0, and ofPair() divides by
+  /// their mean.
   static double clamped(double square) {
     constexpr double kMedian = 1.386;  // of chi-square of two: 2 log 2
     return std::max(square, kMedian / (kMost * kMost));

@@ -12,7 +12,7 @@ struct CalibrationOptions {
   double prior_offset = 0.0;
   double prior_bend = 0.0;
   double prior_sigma = 1.0;
-  double right_roll_sigma = 0.001;  // chosen: 0.3 px at the upper edge of KITTI's images
+  double right_roll_sigma = 0.001;  // chosen: 0.2 px at the upper edge of KITTI's images
   double right_delay = 0.0;
   double right_delay_sigma = 0.003;  // chosen: one trigger leaves 0.2 ms (twelve drives), none half a frame
 
