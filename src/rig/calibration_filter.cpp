@@ -13,17 +13,17 @@ namespace {
 using Matrix = RigEstimate::Matrix;
 using Vector = RigEstimate::Vector;
 
-constexpr int kRememberedCommons = 200;  // windows (chosen) over which the mean of what is left at a point is taken
-// px/sqrt(s) (chosen): half a pixel in 100 s, by warmth or by small knocks that no detector finds.
+constexpr int kRememberedCommons = 200;  // windows (chosen): memory of noteCommon()
+// px/sqrt(s) (chosen): offset and bend change by 0.5 px in 100 s, by warmth or by knocks too small for a detection.
 constexpr double kWarming = 0.05;
 constexpr double kRolling = 5e-5;  // rad/sqrt(s) (chosen): kWarming at f = 1000 px
-constexpr double kClocks = 1e-4;  // s/sqrt(s) (chosen): a millisecond in 100 s, as of clocks whose rates differ by 1e-5
+constexpr double kClocks = 1e-4;   // s/sqrt(s) (chosen): 1 ms in 100 s, as of clocks whose rates differ by 1e-5
 
 Vector priorOf(const CalibrationOptions& options) {
   return {options.prior_offset, options.prior_bend, 0.0, options.right_delay};
 }
 
-/// Of px, rad and s.
+/// Diagonal of (offset, bend, roll, delay): variances or standard deviations.
 Matrix diagonal(double disparity, double roll, double delay) {
   return Vector(disparity, disparity, roll, delay).asDiagonal();
 }
@@ -34,12 +34,12 @@ CalibrationFilter::CalibrationFilter(const CalibrationOptions& options) : option
   calibration_.value = priorOf(options_).head<RigCalibration::kParameters>();
 }
 
-const CalibrationFilter::Evidence& CalibrationFilter::pastBefore(int oldest_id) const {
+const CalibrationFilter::Likelihood& CalibrationFilter::pastBefore(int oldest_id) const {
   return pending_id_ >= 0 && pending_id_ < oldest_id ? pending_ : past_;
 }
 
 CalibrationBelief CalibrationFilter::prior(int oldest_id, const RigEstimate::Shape& shape) const {
-  constexpr double kExact = 0.01;  // px: 0.1 % of the depth at 10 px of disparity; less makes the equations stiff
+  constexpr double kExact = 0.01;  // px: 0.1 % of the depth at 10 px of disparity; less is ill-conditioned
   CalibrationBelief belief;
   RigCalibration::Matrix covariance = kExact * kExact * RigCalibration::Matrix::Identity();
   belief.mean = priorOf(options_).head<RigCalibration::kParameters>();
@@ -53,14 +53,13 @@ CalibrationBelief CalibrationFilter::prior(int oldest_id, const RigEstimate::Sha
   return belief;
 }
 
-/// Mean and covariance of the mixture: of rigs with and without an error of their disparities, of their roll, and of
-/// their delay.
-RigEstimate CalibrationFilter::weigh(const Evidence& windows) const {
+/// Mean and covariance of the mixture. Its eight components have an error, or none, of disparity, roll and delay.
+RigEstimate CalibrationFilter::weigh(const Likelihood& windows) const {
   const Vector prior = priorOf(options_);
   Matrix information = windows.information;
-  Vector shown = windows.information_mean - information * prior;
+  Vector weighted = windows.information_mean - information * prior;
   information.diagonal() += rows_information_;
-  shown += rows_information_.cwiseProduct(rows_ - prior);
+  weighted += rows_information_.cwiseProduct(rows_ - prior);
   struct Component {
     double log_weight;
     Vector mean;
@@ -68,15 +67,15 @@ RigEstimate CalibrationFilter::weigh(const Evidence& windows) const {
   };
   std::vector<Component> components;
   double largest = 0.0;
-  const double may_err = options_.enabled ? 1.0 : 0.0;
-  for (const double disparity_sigma : {0.0, may_err * options_.prior_sigma})
-    for (const double roll_sigma : {0.0, may_err * options_.right_roll_sigma})
+  const double is_estimated = options_.enabled ? 1.0 : 0.0;
+  for (const double disparity_sigma : {0.0, is_estimated * options_.prior_sigma})
+    for (const double roll_sigma : {0.0, is_estimated * options_.right_roll_sigma})
       for (const double delay_sigma : {0.0, options_.right_delay_sigma}) {
         const Matrix sigma = diagonal(disparity_sigma, roll_sigma, delay_sigma);
         const Matrix whitened = Matrix::Identity() + sigma * information * sigma;
         const Matrix covariance = sigma * whitened.inverse() * sigma;
-        const Vector mean = covariance * shown;
-        components.push_back({0.5 * (shown.dot(mean) - std::log(whitened.determinant())), mean, covariance});
+        const Vector mean = covariance * weighted;
+        components.push_back({0.5 * (weighted.dot(mean) - std::log(whitened.determinant())), mean, covariance});
         largest = std::max(largest, components.back().log_weight);
       }
   RigEstimate estimate;
@@ -104,20 +103,20 @@ void CalibrationFilter::note(int oldest_id, int newest_id, const RigEstimate::Sh
   const RigCalibration::Vector compensated = shape.col(RigEstimate::kDelay) * delay();
   past_ = pastBefore(oldest_id);
   calibration_ = calibration;
-  // The window's result combines its own evidence with the prior, so its own is the result's less the prior's. Only one
-  // triangle of `information` is accurate; a difference between both would grow from window to window.
+  // `calibration` has the information of data and prior: own * own_mean = (own + prior) * value - prior * prior_mean.
+  // Only one triangle of `information` is accurate, and an asymmetry would grow from window to window.
   const RigCalibration::Matrix own = 0.5 * kHonest * (information + information.transpose());
   const RigCalibration::Vector own_mean =
       own * (calibration.value + compensated) + kHonest * prior.information * (calibration.value - prior.mean);
-  present_ = Evidence{past_.information + shape.transpose() * own * shape,
-                      past_.information_mean + shape.transpose() * own_mean};
+  present_ = Likelihood{past_.information + shape.transpose() * own * shape,
+                        past_.information_mean + shape.transpose() * own_mean};
   if (pending_id_ >= oldest_id) return;
   pending_id_ = newest_id;
   pending_ = *present_;
 }
 
 void CalibrationFilter::noteRows(int parameter, double value, double sigma) {
-  constexpr double kExact = 1e-6;  // rad or s, as the least prior: rows without noise, as of a simulator
+  constexpr double kExact = 1e-6;  // rad or s, the options' least sigma: rows of a simulator have no noise
   rows_information_[parameter] = 1.0 / (sigma * sigma + kExact * kExact);
   rows_[parameter] = value;
 }
@@ -132,7 +131,7 @@ void CalibrationFilter::widen(const StereoCamera& camera, const Eigen::Matrix3d&
 }
 
 void CalibrationFilter::widen(const Matrix& covariance) {
-  const auto widened = [&](Evidence& known) {
+  const auto widened = [&](Likelihood& known) {
     const Matrix less = (Matrix::Identity() + known.information * covariance).inverse();
     known = {less * known.information, less * known.information_mean};
   };

@@ -11,13 +11,13 @@
 namespace sdvo {
 namespace {
 
-/// Of so many things of which some are of one kind, nats.
+/// Nats that label each of `all` things, `some` of which are of one kind.
 double entropyOf(int some, int all) {
   const auto nats = [all](int n) { return n > 0 ? n * std::log(static_cast<double>(all) / n) : 0.0; };
   return nats(some) + nats(all - some);
 }
 
-/// The features that a motion would have moved by more than `noise`, px.
+/// Whether a motion would have moved each feature by more than `noise`, px.
 std::vector<bool> movedBy(const Eigen::Isometry3d& T_previous_current, const StereoFeatures& features, double noise) {
   const Eigen::Isometry3d T_current_previous = T_previous_current.inverse();
   std::vector<bool> moved(features.u.size());
@@ -46,7 +46,7 @@ double RepeatedImages::logOddsOfOld() const {
   return *have_noise_ ? kCertain : kUnsuspected;
 }
 
-/// Which features stand where one of the pair before stood, to the digit.
+/// Whether each feature has exactly the position of a feature of the previous pair.
 std::vector<bool> RepeatedImages::repeated(const StereoFeatures& features) const {
   std::vector<std::pair<float, float>> before(features_[0].size());
   for (std::size_t i = 0; i < before.size(); ++i) before[i] = {features_[0][i], features_[1][i]};
@@ -62,7 +62,7 @@ std::vector<int> RepeatedImages::newFeatures(const StereoFeatures& features, dou
   std::vector<int> indices(features.u.size());
   std::iota(indices.begin(), indices.end(), 0);
   if (!T_previous_current) return indices;
-  // What stands still in the image tells nothing.
+  // Features that the motion would not move have equal positions in new images, too.
   const std::vector<bool> moved = movedBy(*T_previous_current, features, noise);
   const std::vector<bool> repeated = this->repeated(features);
   std::vector<int> order;
@@ -75,21 +75,21 @@ std::vector<int> RepeatedImages::newFeatures(const StereoFeatures& features, dou
   const int count = static_cast<int>(order.size());
   if (all_old < kFewestMeasured || count - all_old < kFewestMeasured) return indices;
   std::sort(order.begin(), order.end(), [&](int a, int b) { return features.v[a] < features.v[b]; });
-  std::vector<int> old{0};  // among the first so many from above
+  std::vector<int> old{0};  // old[k]: repeated ones among the uppermost k
   for (const int i : order) old.push_back(old.back() + repeated[static_cast<std::size_t>(i)]);
   int best = 0, border = 0;
-  bool is_above = false;  // the old part
+  bool is_above = false;  // the repeated part is above the border
   for (int k = 0; k <= count; ++k) {
     const int below = k - old[k] + all_old - old[k], above = count - below;
     if (std::max(below, above) <= best) continue;
     best = std::max(below, above), border = k, is_above = above > below;
   }
-  // Matches err at the tear. How much fewer nats tell old from new, against what some border of chance saves.
+  // A border must save more nats in labels (repeated or new) than the best of count + 1 random borders does.
   const double saved = entropyOf(all_old, count) - entropyOf(count - best, count);
   if (saved < std::log((count + 1) / kTailProbability)) return indices;
   const float tear =
       features.v[order[static_cast<std::size_t>(std::clamp(is_above ? border : border - 1, 0, count - 1))]];
-  // A descriptor across the tear shows no point of the scene.
+  // A descriptor across the tear has content of two moments.
   const auto is_old = [&](int i) {
     const float below = features.v[i] - tear;
     return std::abs(below) < 0.5f * features.size[i] || (is_above ? below < 0.f : below > 0.f);
@@ -99,13 +99,13 @@ std::vector<int> RepeatedImages::newFeatures(const StereoFeatures& features, dou
 }
 
 void RepeatedImages::remember(const StereoFeatures& features, bool stood) {
-  constexpr int kStill = 4;  // pairs (chosen): one that starts from rest may seem to stand for two
+  constexpr int kStill = 4;  // pairs (chosen): a slow start looks like standstill for two
   const bool repeats = repeat(features);
   if (!repeats) single_ = in_a_row_ == 1 ? single_ + 1 : 0;
   in_a_row_ = repeats ? in_a_row_ + 1 : 0;
   still_ = stood && !repeats ? still_ + 1 : 0;
   if (still_ >= kStill) {
-    // Something that moves in view changes the pair, but leaves the rest of a simulator's images as they were.
+    // A mover changes the pair, but without noise most features keep their exact positions.
     const std::vector<bool> repeated = this->repeated(features);
     have_noise_ = 2 * std::count(repeated.begin(), repeated.end(), true) < features.count();
   }

@@ -9,45 +9,44 @@
 
 namespace sdvo {
 
-/// Recognises images, and parts of them, that repeat those of the pair before. Where the camera moved between the two
-/// they show nothing of it.
+/// Detects images, or rows of them, that repeat the previous pair. They imply standstill even if the camera moved.
 class RepeatedImages {
  public:
-  /// Whether the pair shows what the one before did, to the digit.
+  /// Whether all features equal those of the previous pair exactly.
   bool repeat(const StereoFeatures& features) const;
 
-  /// Whether a motion would have moved most features by more than `noise`, px.
+  /// Whether a motion would have moved more than half of the features by more than `noise`, px.
   static bool shouldHaveMoved(const StereoFeatures& features, double noise,
                               const Eigen::Isometry3d& T_previous_current);
 
-  /// Indices of the features whose part of the image is new, with the motion that is expected. From some row of a torn
-  /// image on, or up to it, the left image is still that of the pair before. There features stand where they stood, to
-  /// the digit, although they should have moved by more than `noise`, px.
+  /// Indices of features outside of repeated rows. A torn left image shows the previous one above or below some row.
+  /// Features there have exactly a previous position, although the expected motion `T_previous_current` moves them by
+  /// more than `noise`, px. Without an expected motion or a significant tear these are all features.
   std::vector<int> newFeatures(const StereoFeatures& features, double noise,
                                const std::optional<Eigen::Isometry3d>& T_previous_current) const;
 
-  /// Repetitions in a row up to the last pair.
+  /// Number of successive repeated pairs up to the last one.
   int inARow() const { return in_a_row_; }
 
-  /// Whether the last two pairs that repeated the one before did so once each: the driver sends each pair twice.
+  /// Whether the driver sends each pair twice: the last two repetitions were single ones, followed by a new pair.
   bool comeTwice() const { return in_a_row_ == 0 && single_ >= 2; }
 
-  /// Log-odds that images which repeat are old ones, before anything is known of the motion. Images with noise never
-  /// repeat by themselves; those of a simulator without noise do whenever it stands. Until the camera stood for some
-  /// pairs, a stop and a driver at fault are equally likely.
+  /// Log-odds that repeated images are old ones, before the motion is considered. Images with noise repeat by a fault
+  /// only, a simulator's without noise whenever the camera stands. Both are equally likely until the camera has stood
+  /// for some pairs.
   double logOddsOfOld() const;
 
-  /// `stood`: no significant motion was measured since the pair before.
+  /// Stores a pair. `stood`: its motion since the previous pair is confirmed and not significant.
   void remember(const StereoFeatures& features, bool stood);
 
  private:
   std::vector<bool> repeated(const StereoFeatures& features) const;
 
   std::array<std::vector<float>, 3> features_;  ///< u, v and disparity of the last pair's features, px
-  int in_a_row_ = 0;                            ///< repetitions up to the last pair
-  int single_ = 0;                              ///< repetitions that came alone, every second pair
-  int still_ = 0;                               ///< pairs in a row that stood and did not repeat as a whole
-  std::optional<bool> have_noise_;              ///< known once the camera stood
+  int in_a_row_ = 0;                            ///< see inARow()
+  int single_ = 0;                              ///< successive single repetitions, see comeTwice()
+  int still_ = 0;                               ///< successive pairs that stood and differ from the previous one
+  std::optional<bool> have_noise_;              ///< none until the camera has stood
 };
 
 }  // namespace sdvo

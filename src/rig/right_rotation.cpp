@@ -22,7 +22,7 @@ Eigen::Matrix<double, 2, 3> rotationJacobian(const StereoCamera& camera, double 
 }
 
 StereoFeatures rotatedBack(const StereoFeatures& features, const Eigen::Vector3d& rotation) {
-  constexpr double kFar = std::numeric_limits<float>::epsilon();  // px: of points that end beyond infinity
+  constexpr double kFar = std::numeric_limits<float>::epsilon();  // px: for points that end beyond infinity
   StereoFeatures result = features;
   for (int i = 0; i < features.count(); ++i) {
     const Eigen::Vector2d moved =
@@ -40,7 +40,7 @@ std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, c
                                                    const std::vector<int>& inliers,
                                                    const Eigen::Isometry3d& T_current_reference) {
   constexpr int kSteps = 3, kMotion = 6, kUnknowns = kMotion + 3;
-  constexpr double kBend = noiseGate(3);  // of Cauchy's kernel, squared in standard deviations
+  constexpr double kCauchy = noiseGate(3);  // squared scale of Cauchy's kernel, in standard deviations
   using Vector = Eigen::Matrix<double, kUnknowns, 1>;
   using Matrix = Eigen::Matrix<double, kUnknowns, kUnknowns>;
   if (static_cast<int>(inliers.size()) < kFewestMeasured) return std::nullopt;
@@ -52,7 +52,7 @@ std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, c
   Matrix hessian;
   std::array<Vector, RowDelay::kParts> gradients;
   for (int step = 0;; ++step) {
-    hessian.setIdentity();  // a baseline, 1 rad: where the view shows nothing
+    hessian.setIdentity();  // prior of a baseline and 1 rad, for what the view does not constrain
     hessian.diagonal().head<3>() /= camera.baseline * camera.baseline;
     gradients.fill(Vector::Zero());
     for (const int i : inliers) {
@@ -61,13 +61,13 @@ std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, c
       if (!residual) continue;
       Eigen::Matrix<double, 3, kUnknowns> jacobian = Eigen::Matrix<double, 3, kUnknowns>::Zero();
       jacobian.leftCols<kMotion>() = motionJacobian(camera, T, c.point);
-      // The disparity in place of u_right, whose error is mostly that of u_left.
+      // The disparity replaces u_right, whose error is mostly that of u_left.
       jacobian.row(2) = jacobian.row(0) - jacobian.row(2);
       jacobian.bottomRightCorner<1, 3>() = -rotationJacobian(camera, c.measurement.z(), c.measurement.y()).row(0);
       (*residual)[2] = (*residual)[0] - (*residual)[2] - jacobian.bottomRightCorner<1, 3>().dot(found.value);
       jacobian = scale.asDiagonal() * jacobian;
       *residual = scale.cwiseProduct(*residual);
-      const double weight = kBend / (kBend + residual->squaredNorm());
+      const double weight = kCauchy / (kCauchy + residual->squaredNorm());
       const Eigen::Matrix<double, kUnknowns, 3> weighted = weight * jacobian.transpose();
       hessian += weighted.lazyProduct(jacobian);  // a general product takes six times as long
       const int part = RowDelay::cellOf(c.measurement.x(), c.measurement.y(), camera.width, camera.height);
@@ -81,7 +81,7 @@ std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, c
     T = expSE3(Vector6d(moved.head<kMotion>())) * T;
     found.value += moved.tail<3>();
   }
-  Matrix meat = hessian;  // a part's gradients sum up to its errors' by chance, too
+  Matrix meat = hessian;  // lower bound: correlated errors of a part may cancel by chance
   for (const Vector& of_part : gradients) meat += of_part * of_part.transpose();
   const Matrix inverse = hessian.inverse();
   found.covariance = (inverse * meat * inverse).bottomRightCorner<3, 3>();

@@ -11,25 +11,25 @@
 
 namespace sdvo {
 
-/// A rotation w of the right camera, rad about the axes of the left optical frame, as a measurement has it. The
-/// right view moves by (du, dv), where (x, y) are normalised coordinates in the right image.
+/// Measured rotation w of the right camera, rad about the axes of the left optical frame. It moves the right view by
+/// (du, dv), px, where (x, y) are normalised coordinates in the right image.
 ///   du = f * (w_x * x * y - w_y * (1 + x^2) + w_z * y),  dv = f * (w_x * (1 + y^2) - w_y * x * y - w_z * x).
 struct RightRotation {
   Eigen::Vector3d value = Eigen::Vector3d::Zero();
-  /// Sandwich (White 1980) over parts of the image: errors within a part are alike.
+  /// Sandwich (White 1980) over parts of the image, within which errors are correlated.
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
-  /// Covariance of a rotation that shifts what was measured by 1 px (root mean square).
+  /// Covariance, rad^2, of random rotations that shift the measured disparities or rows by 1 px (root mean square).
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
 };
 
-/// Derivative of (du, dv), px, by the rotation at a position of the right image, px.
+/// Derivative of (du, dv), px, by the rotation, rad, at a position in the right image, px.
 Eigen::Matrix<double, 2, 3> rotationJacobian(const StereoCamera& camera, double u, double v);
 
-/// The features as the right camera saw them before it rotated.
+/// The features as the right camera would have seen them without the rotation.
 StereoFeatures rotatedBack(const StereoFeatures& features, const Eigen::Vector3d& rotation);
 
-/// The right camera's rotation since the reference, by the disparities of a motion's inliers: the motion and the
-/// rotation are estimated together. Rows are left out, since they have a pattern of their own. None of too few points.
+/// Rotation of the right camera since the reference, from the disparities of a motion's inliers. Motion and rotation
+/// are estimated together. Rows are not used: rectification distorts them (RowPattern). None with too few inliers.
 std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, const NoiseOptions& noise,
                                                    const std::vector<Correspondence>& correspondences,
                                                    const std::vector<int>& inliers,

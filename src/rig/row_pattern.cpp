@@ -15,7 +15,7 @@ std::size_t partOf(const StereoFeatures& features, int i) {
 
 }  // namespace
 
-/// Takes medians of dv, because a part has wrong matches.
+/// Medians of dv over a part, because some matches are wrong.
 RowPattern::Parts RowPattern::partsOf(const StereoFeatures& features) {
   Parts parts;
   std::array<std::vector<double>, RowDelay::kParts> dv;
@@ -76,7 +76,7 @@ std::optional<RightRotation> RowPattern::fit(const Parts& parts) {
     product += part.weight * part.dv * part.effect.transpose();
   }
   if (known < kFewest) return std::nullopt;
-  constexpr double kSteady = 1e-3;  // keeps the equations solvable where all parts lie in a line, 1/rad^2
+  constexpr double kSteady = 1e-3;  // 1/rad^2: keeps the equations solvable if all parts lie in a line
   const Eigen::Matrix3d inverse = (information + kSteady * Eigen::Matrix3d::Identity()).inverse();
   RightRotation rotation{inverse * product, Eigen::Matrix3d::Zero(), weight / 3.0 * inverse};
   for (const Part& part : parts) {

@@ -10,26 +10,26 @@
 
 namespace sdvo {
 
-/// Mean dv (v_right - v_left, px) of a rig in each part of the image. Rectification leaves errors that stay in their
-/// part. Hence the rig changed only if a pair differs from this pattern.
+/// Mean dv (v_right - v_left, px) of a rig in each part of the image. Rectification leaves constant errors in each
+/// part, so only a change against this pattern is evidence of a changed rig.
 class RowPattern {
  public:
-  /// `memory`: ratio of the past that a pair leaves.
+  /// `memory`: factor on the weight of previous pairs with each new pair.
   explicit RowPattern(double memory) : memory_(memory) {}
 
   void learn(const StereoFeatures& features);
 
-  /// dv of a feature less the mean of its part, px; dv itself in a part without a mean.
+  /// Difference of feature `i` in dv from the mean of its part, px; dv itself in a part without a mean.
   double change(const StereoFeatures& features, int i) const;
 
-  /// The rotation of the right camera that fits the pattern best; none if too few parts have a mean.
+  /// Rotation of the right camera that fits the mean rows; none if too few parts have a mean.
   std::optional<RightRotation> rotation() const;
-  /// The rotation that fits the differences of a pair from the pattern best; none if too few parts have both.
+  /// Rotation that fits a pair's differences from the mean rows; none if too few parts have both.
   std::optional<RightRotation> change(const StereoFeatures& features) const;
 
  private:
   struct Part {
-    double weight = 0.0, dv = 0.0;                           ///< number of features; mean, px
+    double weight = 0.0, dv = 0.0;                           ///< number of features; mean or median, px
     Eigen::RowVector3d effect = Eigen::RowVector3d::Zero();  ///< mean derivative of dv by the rotation, px/rad
   };
   using Parts = std::array<Part, RowDelay::kParts>;

@@ -14,7 +14,7 @@ struct CalibrationOptions {
   double prior_sigma = 1.0;
   double right_roll_sigma = 0.001;  // chosen: 0.2 px at the upper edge of KITTI's images
   double right_delay = 0.0;
-  double right_delay_sigma = 0.003;  // chosen: one trigger leaves 0.2 ms (twelve drives), none half a frame
+  double right_delay_sigma = 0.003;  // chosen: 0.2 ms with a common trigger (twelve drives), half a frame without
 
   void describe(OptionList& list) {
     list.add("enabled", enabled, "estimate the rig's residual disparity error while driving and compensate it");
@@ -34,71 +34,71 @@ struct CalibrationOptions {
   }
 };
 
-/// Estimate of the rig: a Kalman filter, in information form, over the windows of pairs and the rows of the features.
-/// Windows overlap: one is part of the prior only for windows that share no pair with it.
+/// Kalman filter, in information form, of a rig's disparity error (offset, bend), right roll and right delay. Windows
+/// of the map and rows of features measure them. A window's prior excludes all windows that share a pair with it.
 ///
-/// The prior is a mixture with equal weights. The disparities' error is the options' value, or it is normally
-/// distributed around that with `prior_sigma`. Roll and delay have the same prior, each with its own sigma.
-/// Measurements shift the weights (Bayes factor), so what is compensated moves to the measured values without a
-/// threshold.
+/// The options' prior is a mixture with equal weights: the disparity error equals the options' value, or is normally
+/// distributed around it with `prior_sigma`. The same holds for roll and delay, each with its own sigma. Measurements
+/// shift the weights (Bayes factor), so no threshold decides what is compensated.
 class CalibrationFilter {
  public:
-  /// Ratio between the information of a window and what it states: it counts points as if they erred independently
-  /// (chosen by the errors of long drives).
+  /// Factor on the information that a window's adjustment reports. The adjustment assumes independent errors of points,
+  /// so it is overconfident (chosen by the errors of long drives).
   static constexpr double kHonest = 0.16 * 0.16;
 
   explicit CalibrationFilter(const CalibrationOptions& options);
 
-  /// Process noise of `dt` s, in which the rig warms up or cools down, and its cameras' clocks drift.
+  /// Adds the process noise of `dt` s: the rig warms up or cools down, and its cameras' clocks drift.
   void predict(double dt);
 
-  /// Estimate by the pairs before the window that begins with pair `oldest_id`: of the calibration that its disparities
-  /// have while they are compensated for the present delay().
+  /// Calibration before the window that begins with pair `oldest_id`, from rows and from windows that ended before that
+  /// pair. The mean excludes the effect of delay(), for which disparities are compensated already. `shape`: derivative
+  /// of the calibration by the rig.
   CalibrationBelief prior(int oldest_id, const RigEstimate::Shape& shape) const;
 
-  /// Notes the result of the window from pair `oldest_id` to `newest_id`, which had its prior(); `information` excludes
-  /// that.
+  /// Adds the window from pair `oldest_id` to `newest_id`. `calibration` includes the window's prior(), `information`
+  /// (1/px^2) excludes it.
   void note(int oldest_id, int newest_id, const RigEstimate::Shape& shape, const RigCalibration& calibration,
             const RigCalibration::Matrix& information);
 
-  /// Notes what rows have shown up to now of the roll, rad, or of the delay, s (RigEstimate::kRoll or kDelay), and its
-  /// standard deviation.
+  /// Sets the roll, rad, or the delay, s (RigEstimate::kRoll or kDelay), that all rows up to now imply, and its
+  /// standard deviation. It replaces the value of the last call.
   void noteRows(int parameter, double value, double sigma);
 
-  /// Notes the square (px^2) of what a window found the calibration to leave at a point.
+  /// Averages the variance, px^2, of the disparity error that a window's points have in all their sightings.
   void noteCommon(double square);
 
-  /// The right camera rotated, which is compensated but for an error of this covariance, rad^2.
+  /// The right camera rotated, and features are rotated back. Adds the covariance of this rotation, rad^2.
   void widen(const StereoCamera& camera, const Eigen::Matrix3d& rotation);
 
-  /// Of the last window.
+  /// Result of the last window, px.
   const RigCalibration& calibration() const { return calibration_; }
-  /// Estimate by the options, rows and all windows.
-  RigEstimate estimate() const { return weigh(present_.value_or(Evidence())); }
+  /// Estimate from the options, rows and all windows.
+  RigEstimate estimate() const { return weigh(present_.value_or(Likelihood())); }
   /// The delay that is compensated, s.
   double delay() const { return estimate().delay(); }
   bool hasWindow() const { return present_.has_value(); }
 
  private:
-  /// Of measurements, the options' prior excluded.
-  struct Evidence {
+  /// Information of measurements, without the options' prior.
+  struct Likelihood {
     RigEstimate::Matrix information = RigEstimate::Matrix::Zero();
     RigEstimate::Vector information_mean = RigEstimate::Vector::Zero();  ///< information * mean
   };
 
-  const Evidence& pastBefore(int oldest_id) const;
-  RigEstimate weigh(const Evidence& windows) const;
+  const Likelihood& pastBefore(int oldest_id) const;
+  RigEstimate weigh(const Likelihood& windows) const;
   void widen(const RigEstimate::Matrix& covariance);
 
   CalibrationOptions options_;
   RigCalibration calibration_;
-  Evidence past_;     ///< of windows that share no pair with the present one
-  Evidence pending_;  ///< of these and of one more, which is past to windows that begin after pair `pending_id_`
+  Likelihood past_;     ///< of windows that share no pair with the last one
+  Likelihood pending_;  ///< and of one more, which ends with pair `pending_id_`: past of windows that begin later
   int pending_id_ = -1;
-  std::optional<Evidence> present_;                                     ///< of the past and the last window
-  RigEstimate::Vector rows_ = RigEstimate::Vector::Zero();              ///< as rows show each alone
+  std::optional<Likelihood> present_;                                   ///< of past_ and the last window
+  RigEstimate::Vector rows_ = RigEstimate::Vector::Zero();              ///< see noteRows(): rad and s
   RigEstimate::Vector rows_information_ = RigEstimate::Vector::Zero();  ///< 1/rad^2 and 1/s^2
-  int commons_ = 0;                                                     ///< how many squares were noted
+  int commons_ = 0;                                                     ///< number of noteCommon() calls, bounded
   double common_square_ = 0.0;
 };
 
