@@ -41,7 +41,7 @@ std::vector<int> sorted(std::vector<int> values) {
 
 using Points = std::vector<Eigen::Vector2d>;  // px, in the left image
 
-/// One for each part of it that has any: neighbours are no independent witnesses.
+/// Mean of the points in each part of the image, because errors of neighbours are correlated.
 Points byParts(const Points& pixels) {
   std::map<std::pair<int, int>, std::pair<Eigen::Vector2d, int>> parts;
   for (const Eigen::Vector2d& pixel : pixels) {
@@ -61,9 +61,9 @@ double nearest(const Eigen::Vector2d& pixel, const Points& others) {
   return least;
 }
 
-/// Whether some points are those of an object among the others. An object fills a part of the view, so its points have
-/// each other for neighbours. Points that fit another motion because rectification or matching errs lie among the
-/// others. Join counts (Cliff and Ord 1973) against places at random.
+/// Whether some points are an object's among the others. Points of an object have each other for neighbours. Points
+/// that miss a motion by errors of rectification or matching lie among the others. Join counts (Cliff and Ord 1973)
+/// against random places.
 bool isObject(const Points& points, const Points& others) {
   const Points inside = byParts(points), outside = byParts(others);
   if (inside.size() < 2) return false;
@@ -75,8 +75,8 @@ bool isObject(const Points& points, const Points& others) {
   return binomialTail(static_cast<int>(inside.size()), static_cast<int>(joined), chance) < kTailProbability;
 }
 
-/// Whether a row of the image divides points from others. A torn or damaged image lacks all rows from one to its end.
-/// How many these are does not tell which part shows the camera's motion.
+/// Whether a row of the image separates points from others, as in a torn or damaged image. Their numbers do not imply
+/// which part shows the camera's motion.
 bool areDivided(const Points& points, const Points& others) {
   constexpr double kAstray = 0.1;  // of either side (chosen): some wrong matches agree by chance
   const auto rowsOf = [](const Points& pixels) {
@@ -92,7 +92,7 @@ bool areDivided(const Points& points, const Points& others) {
          quantile(other_rows, 1.0 - kAstray) <= quantile(rows, kAstray);
 }
 
-/// The matches that each hypothesis of a pair explains. A match of one hypothesis counts for all of them.
+/// The matches that each hypothesis of a pair explains, among the matches of all hypotheses.
 class Explanations {
  public:
   Explanations(const MotionScene& scene, double threshold, const std::vector<MotionHypothesis>& hypotheses)
@@ -115,9 +115,8 @@ class Explanations {
     }
   }
 
-  /// Logarithm of how many times likelier one hypothesis is than another one, by prior and by the points that they do
-  /// not agree on. Those of an object move together; those that lie among each other err one by one; those of a torn
-  /// image are no evidence.
+  /// Log-odds of hypothesis a against b, by the prior and the points that only one of them explains. Points of an
+  /// object count by their effective number, scattered ones each for itself, those of a torn image not at all.
   double logRatio(std::size_t a, std::size_t b) const {
     double of_a = 0.0, of_b = 0.0;
     for (std::size_t i = 0; i < sightings_.size(); ++i)
@@ -132,8 +131,8 @@ class Explanations {
     return logPrior(hypotheses_[a]) - logPrior(hypotheses_[b]) + images;
   }
 
-  /// Whether two hypotheses mean one motion, for what the one explains and for what the other does: far points alone do
-  /// not tell a turn from a step.
+  /// Whether two hypotheses are one motion for the inliers of both. Far points alone do not distinguish rotation from
+  /// translation.
   bool areOne(std::size_t a, std::size_t b) const {
     const Eigen::Isometry3d& T_a = hypotheses_[a].motion.T_current_reference;
     const Eigen::Isometry3d& T_b = hypotheses_[b].motion.T_current_reference;
@@ -143,8 +142,8 @@ class Explanations {
     return explains_both(hypotheses_[a]) && explains_both(hypotheses_[b]) && !areTorn(a, b);
   }
 
-  /// Whether a row divides what one hypothesis explains from what the other one does alone, which is a good part of
-  /// both.
+  /// Whether a row separates the points of one hypothesis from those that only the other one explains. Each must
+  /// explain more than kGoodPart alone.
   bool areTorn(std::size_t a, std::size_t b) const {
     const Points of_a = explainedBy(a), of_b = explainedBy(b), only_a = explainedBy(a, b), only_b = explainedBy(b, a);
     const double all = static_cast<double>(of_a.size() + only_b.size());
@@ -152,8 +151,8 @@ class Explanations {
     return areDivided(of_a, only_b) || areDivided(of_b, only_a);
   }
 
-  /// The one whose strongest rival is the weakest: what two of them do not agree on may be weighed otherwise than what
-  /// one of these and a third do not.
+  /// The one whose strongest rival is the weakest. A simple maximum may not exist: each two of them are compared by
+  /// other points.
   std::size_t likeliest() const {
     const std::size_t count = hypotheses_.size();
     std::vector<double> strongest(count, -std::numeric_limits<double>::infinity());
@@ -167,7 +166,7 @@ class Explanations {
   }
 
  private:
-  /// Positions in the left image, px, of what a hypothesis explains, and `but` does not.
+  /// Positions in the left image, px, that a hypothesis explains and `but` does not.
   Points explainedBy(std::size_t hypothesis, std::optional<std::size_t> but = {}) const {
     Points points;
     for (std::size_t i = 0; i < pixels_.size(); ++i)
@@ -182,15 +181,15 @@ class Explanations {
   std::vector<std::vector<bool>> explained_;  ///< by each hypothesis
 };
 
-/// A motion that explains a part of the pair that the chosen one does not, and that chance does not either.
+/// A motion of features that the chosen one does not explain, more than chance gives.
 struct RivalMotion {
   std::size_t hypothesis;
-  double log_ratio;           ///< by how much it is likelier than the chosen one
-  std::vector<int> features;  ///< of the pair, that it explains alone
-  bool is_torn;               ///< a row of the image divides it from the chosen one
+  double log_ratio;           ///< log-odds against the chosen one
+  std::vector<int> features;  ///< of the pair, explained by it alone
+  bool is_torn;               ///< a row of the image separates both
 };
 
-/// Each motion once. Of the hypotheses, `likeliest` and `chosen` mean one motion.
+/// Rivals of the chosen motion, each once. `likeliest` and `chosen` are estimates of one motion.
 std::vector<RivalMotion> rivalsOf(double threshold, const std::vector<MotionHypothesis>& hypotheses,
                                   const Explanations& explanations, std::size_t likeliest, std::size_t chosen) {
   const std::vector<int> own = sorted(hypotheses[chosen].inlierFeatures());
@@ -224,7 +223,7 @@ void compare(const MotionScene& scene, const std::vector<MotionHypothesis>& hypo
     explained.insert(explained.end(), rival.features.begin(), rival.features.end());
     const Eigen::Isometry3d& T = hypotheses[rival.hypothesis].motion.T_current_reference;
     const double probability = std::exp(rival.log_ratio) / total;
-    // Both start from the same pair of the map.
+    // Both motions have the same reference.
     const Eigen::Isometry3d apart = chosen.motion.T_current_reference * T.inverse();
     chosen.rivals_moment += probability * momentOf(logSE3(apart));
     if (isTolerable(scene, chosen.motion.T_current_reference, apart)) continue;
@@ -232,7 +231,7 @@ void compare(const MotionScene& scene, const std::vector<MotionHypothesis>& hypo
     if (!chosen.rival || chosen.rival->probability < probability)
       chosen.rival = {T, probability, static_cast<int>(rival.features.size()), rival.is_torn};
   }
-  // What rivals explain does not speak against the chosen one.
+  // Matches that rivals explain are no evidence against the chosen motion.
   explained = sorted(std::move(explained));
   for (int i = 0; i < static_cast<int>(chosen.matches.size()); ++i) {
     const int feature = chosen.matches[static_cast<std::size_t>(i)].current;
@@ -340,7 +339,7 @@ double logFalseAlarms(int matches, int inliers, double chance) {
 }
 
 double chanceOfAgreement(double threshold, double gate) {
-  // A ball of (u_left, v_left, u_right) in a cylinder as deep as it is wide.
+  // A ball in (u_left, v_left, u_right) of radius `threshold`, and a cylinder of radius and half length `gate`.
   return std::min(2.0 / 3.0 * std::pow(threshold / gate, 3), 0.5);
 }
 
@@ -362,7 +361,6 @@ double logLikelihood(double of_others, int points) {
 double logAgreement(const MotionScene& scene, const MotionHypothesis& hypothesis) {
   const Agreement& agreement = hypothesis.agreement;
   if (agreement.lasting_matches == 0) return 0.0;
-  // Agreement with the camera's motion against agreement with one of something that moves.
   const double by_chance = probabilityOf(-kLogOddsOfSighting * MotionHypothesis::kLastingSightings);
   const double usual = std::max(scene.usual_agreement, 0.5);
   const double ratio = static_cast<double>(agreement.lasting_inliers) / agreement.lasting_matches;
@@ -385,13 +383,13 @@ MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::v
                                               [](const MotionHypothesis& h) { return h.motion.success; });
   MotionHypothesis chosen;
   if (failures == hypotheses.begin()) {
-    // The largest failure has the best reason.
+    // The reason of the failure with most inliers.
     chosen = *std::max_element(hypotheses.begin(), hypotheses.end(), by_inliers);
   } else {
     hypotheses.erase(failures, hypotheses.end());
     const Explanations explanations(scene, threshold, hypotheses);
     const std::size_t likeliest = explanations.likeliest();
-    // Of one motion the estimate with the most inliers.
+    // Of the estimates of this motion the one with most inliers.
     std::size_t largest = likeliest;
     for (std::size_t k = 0; k < hypotheses.size(); ++k)
       if (by_inliers(hypotheses[largest], hypotheses[k]) && explanations.areOne(likeliest, k)) largest = k;

@@ -19,30 +19,29 @@
 
 namespace sdvo {
 
-/// How many matches agree with a motion. Lasting ones are of points that four confirmed pairs saw.
+/// Number of matches that agree with a motion. Lasting ones are of points that four confirmed pairs saw.
 struct Agreement {
   int matches = 0, inliers = 0;
   int lasting_matches = 0, lasting_inliers = 0;
-  int sightings = 0, inlier_sightings = 0;  ///< confirmed ones of their points, four at most for each
+  int sightings = 0, inlier_sightings = 0;  ///< confirmed sightings of their points, each four at most
 };
 
-/// Log-odds of being misled, that is of following another motion than the camera's. Of a pair that nothing contradicts
-/// (probability of 0.001, chosen), and of an event that leaves a wrong map or a wrong rig.
+/// Log-odds that a measured motion is not the camera's (misled): without any evidence (probability of 0.001, chosen),
+/// and after an event that leaves a wrong map or rig.
 constexpr double kUnsuspected = -6.9, kCertain = -kUnsuspected;
 
 /// Probabilities as log-odds: log(p / (1 - p)).
 double logOdds(double probability);
 double probabilityOf(double log_odds);
 
-/// Posterior of where in the map a pair is, after an outage.
+/// Posterior of the pair's pose in the map, after an outage.
 struct PlaceBelief {
-  Eigen::Isometry3d T_current_newest;  ///< of the likeliest place
+  Eigen::Isometry3d T_current_newest;  ///< motion to the likeliest place
   Matrix6d moment;                     ///< second moment of its error, m and rad
-  std::string reason;                  ///< in words, what else it may be
+  std::string reason;                  ///< names the alternative
 };
 
-/// Places that look alike are a mixture. So is the motion of a camera that went on as before (`prior`), if this place
-/// looks alike by chance.
+/// Mixture of the places that look alike and, if these match by chance, of the camera's motion by the `prior`.
 PlaceBelief weigh(const FoundPlace& place, const std::vector<ExpectedMotion>& prior);
 
 /// The input of a search for a pair's motion. The references must outlive it.
@@ -50,72 +49,72 @@ struct MotionScene {
   const LocalMap& map;
   RigCalibration calibration;
   const StereoFeatures& features;
-  std::optional<Eigen::Isometry3d> T_current_reference;  ///< as predicted, since the map's newest pair
-  std::optional<Eigen::Isometry3d> guess;                ///< the same as something else than images has it
-  std::vector<ExpectedMotion> prior;  ///< of T_reference_current: a mixture; without any, all motions are as likely
-  double usual_agreement = 0.9;       ///< ratio of lasting matches that agree with the camera's motion on this rig
-  bool is_suspected = false;          ///< what is followed may not be the camera's motion by the pairs before
-  bool is_doubted = false;            ///< … and likely is not
+  std::optional<Eigen::Isometry3d> T_current_reference;  ///< predicted; reference: the map's newest pair
+  std::optional<Eigen::Isometry3d> guess;                ///< the same from another source than images
+  std::vector<ExpectedMotion> prior;  ///< mixture for T_reference_current; empty: all motions are equally likely
+  double usual_agreement = 0.9;       ///< mean ratio of lasting matches that agree with this rig's motions
+  bool is_suspected = false;          ///< carried doubt lasts: all hypotheses compete
+  bool is_doubted = false;            ///< … and makes pairs doubtful: the search radius is wide at once
   double tolerance = 0.05;            ///< m: motions that differ by less than this and 3 % are equally good
   Noise noise{NoiseOptions()};
-  std::optional<PlaceBelief> place{};  ///< of a pair that an outage's map shows
+  std::optional<PlaceBelief> place{};  ///< where the map was recognised after an outage
 };
 
-/// A motion that competes for being the camera's, and what speaks for it.
+/// A motion that competes for being the camera's, its matches and its rivals.
 struct MotionHypothesis {
-  MotionEstimate motion;                       ///< since the map's newest pair
-  std::shared_ptr<const LocalMap::View> view;  ///< of the map; one for all hypotheses of a pair
-  std::vector<FeatureMatch> matches;           ///< indices of the view to those of the pair's features
+  MotionEstimate motion;                       ///< T_current_reference, since the map's newest pair
+  std::shared_ptr<const LocalMap::View> view;  ///< of the map, shared by all hypotheses of a pair
+  std::vector<FeatureMatch> matches;           ///< of the view (reference) and the pair's features (current)
   std::vector<Correspondence> correspondences;
   std::vector<LocalMap::Sighting> sightings;   ///< of the motion's inliers
-  double gate = 0.0;                           ///< px: how far from their prediction matches may be
+  double gate = 0.0;                           ///< px: search radius around predicted positions
   double match_time = 0.0, motion_time = 0.0;  ///< s
 
-  Agreement agreement;       ///< without the matches that rivals explain
-  double innovation = 0.0;   ///< square from the prior, in standard deviations; zero without prior
-  double probability = 1.0;  ///< among all hypotheses, of the camera's motion being within tolerance of this one
+  Agreement agreement;       ///< matches that rivals explain are left out
+  double innovation = 0.0;   ///< squared Mahalanobis distance from the prior; 0 without one
+  double probability = 1.0;  ///< that the camera's motion is within tolerance of this one
   /// The likeliest motion beyond tolerance.
   struct Rival {
     Eigen::Isometry3d T_current_reference;
     double probability;
-    int matches;   ///< that it alone explains
-    bool is_torn;  ///< a row of the image divides them from the motion's own
+    int matches;   ///< explained by it alone
+    bool is_torn;  ///< a row of the image separates them from the motion's inliers
   };
   std::optional<Rival> rival;
-  Matrix6d rivals_moment = Matrix6d::Zero();  ///< second moment of the rivals around the motion, m and rad.
-  /// Between the motion of the lasting inliers and that of all, if it is taken for noise: the square in standard
-  /// deviations of points that err independently.
+  Matrix6d rivals_moment = Matrix6d::Zero();  ///< second moment of the rivals around the motion, m and rad
+  /// Squared Mahalanobis distance, for independent points, between the motion of the lasting inliers and that of all;
+  /// none if it is significant.
   std::optional<double> lasting_square;
 
-  /// Of a match: confirmed sightings of its point, four at most.
+  /// Confirmed sightings of a match's point, four at most.
   int sightingsOf(int match) const;
   bool isLasting(int match) const { return sightingsOf(match) >= kLastingSightings; }
 
-  /// Features of the pair that the inliers matched, but for the rejected ones.
+  /// Features of the pair that the inliers matched, without the rejected ones.
   std::vector<int> inlierFeatures(const std::vector<int>& rejected = {}) const;
 
-  /// Of all matches and of the motion's inliers.
+  /// Counts all matches, and the inliers, into `agreement`.
   void countAgreement();
-  /// The motion is this one, which leaves some of the inliers, by their features, to the one that was found.
+  /// Takes another motion. The motion before becomes the rival, supported by the inliers with the features `left`.
   void replaceMotion(const MotionScene& scene, const Eigen::Isometry3d& T_current_reference,
                      const std::vector<int>& left);
-  /// Counts the inliers without these features of the pair.
+  /// Counts the inliers again, without these features of the pair.
   void reject(const std::vector<int>& features);
 
   static constexpr int kLastingSightings = 4;
 };
 
-/// Ratio of all points (chosen) above which a part of them is no matter of chance.
+/// Ratio of all points (chosen) above which a group of them is more than wrong matches.
 constexpr double kGoodPart = 0.1;
 
-/// Ratio of a motion by which it may be off.
+/// Tolerated error of a motion, as a ratio of its distance or angle.
 constexpr double kTolerableRatio = 0.03;
 
-/// Whether a motion would do as well as another one that is so far `apart`.
+/// Whether `motion` differs within tolerance from another one; `apart`: the motion between both.
 bool isTolerable(const MotionScene& scene, const Eigen::Isometry3d& motion, const Eigen::Isometry3d& apart);
 
-/// Logarithm of the Bayes factor (Kass and Raftery 1995) between a difference that has this covariance and none at all,
-/// by a measurement of it with that information.
+/// Log Bayes factor (Kass and Raftery 1995) of a measured difference: normal with the prior `covariance`, against zero.
+/// `information`: of the measurement.
 template <int N>
 double logBayesFactor(const Eigen::Matrix<double, N, 1>& measured, const Eigen::Matrix<double, N, N>& information,
                       const Eigen::Matrix<double, N, N>& covariance) {
@@ -127,33 +126,31 @@ double logBayesFactor(const Eigen::Matrix<double, N, 1>& measured, const Eigen::
 }
 
 /// Logarithm of the number of false alarms (a contrario, Moisan and Stival 2004): the expected number of motions with
-/// as many inliers, if each match agrees by `chance`.
+/// as many inliers, if each match agrees with the probability `chance`.
 double logFalseAlarms(int matches, int inliers, double chance);
 
-/// Chance that a wrong match, anywhere within `gate` px of its prediction, is within `threshold` px of a motion.
+/// Probability that a wrong match, anywhere within `gate` px of its prediction, is within `threshold` px of a motion.
 double chanceOfAgreement(double threshold, double gate);
 
-/// Whether two motions T_current_reference mean the same: they project most of the given points within so many px.
+/// Whether two motions T_current_reference are one: they project most of `points` (indices) within so many px.
 bool agree(const StereoCamera& camera, const std::vector<Correspondence>& correspondences,
            const std::vector<int>& points, const Eigen::Isometry3d& a, const Eigen::Isometry3d& b, double within);
 
-/// Logarithm of the likelihood, up to a constant, of a motion that leaves some of the `points` to other motions.
-/// `of_others`: the sum of their confirmed sightings. Points are no independent witnesses, because what
-/// moves has many of them: the sum is tempered by their effective number.
+/// Log-likelihood, up to a constant, of a motion that does not explain some of the `points`. `of_others`: the sum of
+/// their confirmed sightings. Points of one mover have correlated errors, so their effective number scales the sum.
 double logLikelihood(double of_others, int points);
 
-/// Logarithm of how many times likelier the agreement of lasting points is with the camera's motion than with that of
-/// something that moves.
+/// Log-likelihood ratio of the lasting points' agreement: under the camera's motion, against a mover's.
 double logAgreement(const MotionScene& scene, const MotionHypothesis& hypothesis);
 
-/// Log-odds that a motion is not the camera's, by the pair itself: the prior against the agreement of lasting points.
+/// Log-odds that a motion is not the camera's, by this pair's innovation and agreement of lasting points.
 double logOddsMisled(const MotionScene& scene, const MotionHypothesis& hypothesis);
 
-/// Weighs all hypotheses by prior and likelihood, merges those of one motion and takes the likeliest. The one that is
-/// returned has the rivals and the times of all. `threshold`, px, of an inlier.
+/// Weighs hypotheses by prior and likelihood, and merges those of one motion. Returns the likeliest with its rivals and
+/// the times of all. `threshold`, px: of an inlier.
 MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::vector<MotionHypothesis> hypotheses);
 
-/// Ratio of an 8x4 grid's cells over the image that hold one of these features.
+/// Ratio of the cells in an 8x4 grid over the image that have one of these features.
 double coverage(const StereoFeatures& features, const std::vector<int>& indices);
 
 }  // namespace sdvo

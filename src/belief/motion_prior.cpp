@@ -17,15 +17,15 @@ double ExpectedMotion::normalisedSquare(const Eigen::Isometry3d& measured, const
   return mahalanobisSquare(difference, covariance + measured_covariance);
 }
 
-/// The mean velocities of two neighbouring intervals differ by a third of the velocity's variance over both: by at most
-/// two thirds of that over the longer one.
+/// Mean velocities over neighbouring intervals T1, T2 differ with the variance a^2 (T1 + T2) / 3. That is at most two
+/// thirds of a^2 times the longer interval.
 Matrix6d MotionPrior::processNoise(double dt, double before, double age) const {
   const double seconds_cubed = (2.0 / 3.0 * std::max(before, dt) + age) * dt * dt;
   return isotropic(options_.acceleration * options_.acceleration * seconds_cubed,
                    options_.rotation_acceleration * options_.rotation_acceleration * seconds_cubed);
 }
 
-/// The velocity and the interval rest on two stamps each, of which they share one: it counts twice.
+/// The error is that of (t2 - t1) - (t1 - t0): six times the variance of a stamp.
 Matrix6d MotionPrior::stampNoise(const Vector6d& velocity) const {
   const Vector6d shift = std::sqrt(6.0) * options_.stamp_sigma * velocity;
   return shift * shift.transpose();
@@ -36,7 +36,7 @@ void MotionPrior::noteInterval(double dt) {
 }
 
 double MotionPrior::interval(double dt, const Eigen::Isometry3d& motion) const {
-  constexpr double kBurst = 0.1;  // ratio of the usual interval (chosen); a camera does not change its rate by as much
+  constexpr double kBurst = 0.1;  // ratio of intervals (chosen): a camera does not change its rate by as much
   return std::max({dt < kBurst * interval_ ? interval_ : dt, motion.translation().norm() / options_.max_speed,
                    logSO3(motion.linear()).norm() / options_.max_rotation_rate});
 }
@@ -109,7 +109,7 @@ void MotionPrior::takeVelocity(std::int64_t stamp, const Eigen::Isometry3d& moti
                                const Matrix6d& covariance, bool is_confirmed, const Matrix6d& doubt) {
   doubt_ = doubt;
   const Vector6d velocity = logSE3(motion) / dt;
-  // A motion may be that fast within the error of its stamps, but no other one after it.
+  // The error of stamps may make a motion too fast, but such a velocity predicts no other motion.
   if (!(velocity.head<3>().norm() <= options_.max_speed) || !(velocity.tail<3>().norm() <= options_.max_rotation_rate))
     return;
   before_ = std::exchange(velocity_, velocity);

@@ -75,7 +75,8 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene, double max_doubt) 
   }
 }
 
-/// The expectation itself may be what misled the search, and what moves by itself may outnumber the world.
+/// Searches the other hypotheses: the expected motion may have misled the first search, and movers may have more points
+/// than the static world.
 std::vector<MotionHypothesis> MotionSearch::compete(const MotionScene& scene, const ViewPtr& view,
                                                     MotionHypothesis first) const {
   const std::optional<Eigen::Isometry3d>& expected = scene.guess ? scene.guess : scene.T_current_reference;
@@ -91,9 +92,10 @@ std::vector<MotionHypothesis> MotionSearch::compete(const MotionScene& scene, co
     rest.push_back(i);
   }
   hypotheses.push_back(searchAmong(scene, all, lasting));
-  // A compromise between two motions may have more inliers than the one that goes on as before.
+  // A compromise between two motions may have more inliers than the camera's, so matches that fit the expected motion
+  // compete as well.
   if (expected) hypotheses.push_back(searchAmong(scene, all, agreeing(scene, all, *expected)));
-  // What moves by itself may have left copies of itself in the map, each with a motion of its own.
+  // Movers may have left copies of themselves in the map, each with its own motion: search outliers repeatedly.
   MotionEstimate peeled = all.motion;
   do {
     rest = without(rest, peeled.inliers);
@@ -103,8 +105,8 @@ std::vector<MotionHypothesis> MotionSearch::compete(const MotionScene& scene, co
   return hypotheses;
 }
 
-/// Neither prior nor lasting points contradict, the majority agrees with the motion, all over the image, and lasting
-/// points that lack more than usual would be no serious rival even if they moved together.
+/// Prior and lasting points do not contradict, and the majority agrees with the motion, all over the image. The lasting
+/// outliers in excess of this rig's mean would be no serious rival even if they moved together.
 bool MotionSearch::isBeyondDoubt(const MotionScene& scene, const MotionHypothesis& found, double max_doubt) const {
   if (!found.motion.success || found.innovation > noiseGate(6) || logOddsMisled(scene, found) > max_doubt) return false;
   const double agree = found.agreement.lasting_inliers;
@@ -118,7 +120,7 @@ bool MotionSearch::isBeyondDoubt(const MotionScene& scene, const MotionHypothesi
   return 2 * found.agreement.inlier_sightings >= found.agreement.sightings && !endsAtRow(found);
 }
 
-/// First where a good prediction has the points, then three times as far.
+/// Searches in the radius of a good prediction, then in three times this radius.
 MotionHypothesis MotionSearch::searchNear(const MotionScene& scene, const ViewPtr& view,
                                           const std::optional<Eigen::Isometry3d>& T_current_reference,
                                           double max_doubt) const {
@@ -134,7 +136,7 @@ MotionHypothesis MotionSearch::searchNear(const MotionScene& scene, const ViewPt
   return found;
 }
 
-/// Whether the motion found has a good part of the points where the search did not look for them.
+/// Whether the motion puts more than kGoodPart of the points outside of the search radius around the prediction.
 bool MotionSearch::leavesGate(const MotionScene& scene, const Eigen::Isometry3d& predicted,
                               const MotionHypothesis& found) const {
   const StereoCamera& camera = scene.features.camera;
@@ -168,7 +170,7 @@ MotionHypothesis MotionSearch::search(const FeatureMatcher& matcher, const Motio
   return found;
 }
 
-/// A motion that some of another hypothesis' matches agree on, and whatever else does.
+/// The motion that some of another hypothesis' matches agree on, with all matches that fit it.
 MotionHypothesis MotionSearch::searchAmong(const MotionScene& scene, const MotionHypothesis& all,
                                            const std::vector<int>& subset) const {
   Stopwatch stopwatch;
@@ -184,14 +186,14 @@ MotionHypothesis MotionSearch::searchAmong(const MotionScene& scene, const Motio
   return found;
 }
 
-/// Matches of a hypothesis that agree with a motion.
+/// Indices of a hypothesis' matches that agree with a motion.
 std::vector<int> MotionSearch::agreeing(const MotionScene& scene, const MotionHypothesis& all,
                                         const Eigen::Isometry3d& T_current_reference) const {
   return PoseProblem(scene.features.camera, all.correspondences, options(scene).inlier_threshold)
       .inliers(T_current_reference);
 }
 
-/// Gathers what speaks for the motion found.
+/// Sets agreement and innovation. A motion that chance explains fails.
 void MotionSearch::weigh(const MotionScene& scene, MotionHypothesis& found) const {
   found.countAgreement();
   if (!found.motion.success) return;
@@ -242,8 +244,8 @@ MotionSearch::Alignment MotionSearch::align(const MotionScene& scene, const Moti
   return alignment;
 }
 
-/// The lasting points' own motion, if it is likelier another one than the motion of all inliers. The difference of a
-/// mover has the prior's covariance; that of a rigid world has this rig's noise alone.
+/// The lasting points' own motion, if its difference from that of all inliers is likelier a mover's than noise. A
+/// mover's difference has the prior's covariance, in a rigid world it has the noise of this rig.
 std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene& scene, const Alignment& aligned,
                                                                MotionHypothesis& found) const {
   const StereoCamera& camera = scene.features.camera;
@@ -257,7 +259,7 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene
   Eigen::Isometry3d T_lasting = T;
   const NormalEquations equations = refineMotion(camera, options(scene), lasting, T_lasting);
   const Vector6d difference = logSE3(T_lasting * T.inverse());
-  // The lasting points are a part of all, so the difference has the covariance of the part less that of all (Hausman
+  // Lasting points are a part of all, so the covariance of the difference is the part's less that of all (Hausman
   // 1978). With the others' information O its inverse is H + H O^-1 H.
   MotionEstimatorOptions at_once = options(scene);
   at_once.refinement_iterations = 0;
@@ -272,8 +274,8 @@ std::optional<Eigen::Isometry3d> MotionSearch::motionOfLasting(const MotionScene
   return std::nullopt;
 }
 
-/// Something that moves by less than what corners may err by is among the inliers of every hypothesis and draws them
-/// all away. Aligned positions tell it from the points that stood still so far.
+/// Keeps the inliers whose aligned positions fit the lasting points' motion. A mover slower than corner noise is an
+/// inlier of every hypothesis and biases it.
 void MotionSearch::keepTo(const MotionScene& scene, const Eigen::Isometry3d& T_lasting,
                           const std::vector<Correspondence>& measured, MotionHypothesis& found) const {
   const std::vector<int> kept =

@@ -15,30 +15,30 @@
 
 namespace sdvo {
 
-/// Finds the motion of a pair since the map's newest pair among hypotheses. The first one rests on the guess, else on
-/// the prediction. Unless it is beyond doubt, others compete: the prediction's, one without a prediction, one of the
-/// lasting points, and those of the outliers, which may be of a mover.
+/// Finds the motion of a pair since the map's newest pair (reference). The first hypothesis is searched near the guess,
+/// else near the prediction. Unless isBeyondDoubt(), others compete: near the prediction, without prediction, of the
+/// lasting points, and of the outliers, which may be a mover's.
 class MotionSearch {
  public:
   MotionSearch(const FeatureMatcherOptions& matcher, const MotionEstimatorOptions& motion,
                const PatchAlignmentOptions& alignment);
 
-  /// `max_doubt`: log-odds of being misled up to which a motion that the majority agrees with is taken at once.
+  /// `max_doubt`: log-odds that a motion is not the camera's, up to which a majority's motion needs no competition.
   MotionHypothesis find(const MotionScene& scene, double max_doubt) const;
 
-  /// Whether no other hypothesis needs to compete with it.
+  /// Whether no other hypothesis needs to compete with this one.
   bool isBeyondDoubt(const MotionScene& scene, const MotionHypothesis& found, double max_doubt) const;
 
-  /// In words, if there are too few inliers for a motion, or as many as chance gives.
+  /// Reason, if there are too few inliers, or as many as chance gives; else empty.
   std::string chanceWords(const MotionScene& scene, const MotionHypothesis& found) const;
 
  private:
-  /// With the noise that was learnt of the rig.
+  /// Motion options at this rig's learnt noise.
   MotionEstimatorOptions options(const MotionScene& scene) const;
 
   using ViewPtr = std::shared_ptr<const LocalMap::View>;
 
-  /// A hypothesis' inliers as their patches have them, and the motion refined on these.
+  /// A hypothesis' inliers at the positions of their aligned patches, and the motion refined on these.
   struct Alignment {
     Eigen::Isometry3d T_current_reference;
     std::vector<LocalMap::Sighting> sightings;

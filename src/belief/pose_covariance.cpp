@@ -15,7 +15,7 @@ Matrix6d carriedBy(const Eigen::Isometry3d& motion, const Matrix6d& covariance) 
   return 0.5 * (carried + carried.transpose());
 }
 
-/// A covariance, its translation and its rotation each scaled up to the trace that they had before.
+/// The covariance with translation and rotation scaled up to their traces before, if these were larger.
 Matrix6d noLessThan(const Matrix6d& before, Matrix6d covariance) {
   for (const int first : {0, 3}) {
     const double had = before.block<3, 3>(first, first).trace(), has = covariance.block<3, 3>(first, first).trace();
@@ -28,7 +28,7 @@ Matrix6d noLessThan(const Matrix6d& before, Matrix6d covariance) {
   return covariance;
 }
 
-/// No less than either in any direction.
+/// A covariance that is no less than either in any direction.
 Matrix6d covering(const Matrix6d& a, const Matrix6d& b) {
   return b + positivePart(a - b);
 }
@@ -36,7 +36,7 @@ Matrix6d covering(const Matrix6d& a, const Matrix6d& b) {
 }  // namespace
 
 Matrix6d lacking(const Matrix6d& covariance, const Vector6d& deviation) {
-  constexpr double kExpected = 3.0;  // chi-square of six: half its mean, for a deviation is a part of the error only
+  constexpr double kExpected = 3.0;  // half the mean of chi-square of six: a deviation is a part of the error
   if (!(mahalanobisSquare(deviation, covariance) > kExpected)) return Matrix6d::Zero();
   return deviation * deviation.transpose() + kTolerableRatio * kTolerableRatio * momentOf(deviation);
 }

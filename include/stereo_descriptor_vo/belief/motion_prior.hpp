@@ -33,30 +33,30 @@ struct MotionPriorOptions {
   }
 };
 
-/// A motion with the covariance of a right perturbation, m and rad.
+/// Normal distribution of a motion; the covariance is of a right perturbation, m and rad.
 struct ExpectedMotion {
   Eigen::Isometry3d motion = Eigen::Isometry3d::Identity();
   Matrix6d covariance = Matrix6d::Zero();
 
-  /// How far another motion, which has a covariance of its own, is from it.
+  /// Right perturbation, m and rad, from this motion to a measured one.
   Vector6d innovation(const Eigen::Isometry3d& measured) const { return logSE3(motion.inverse() * measured); }
-  /// The square of that in standard deviations: chi-square of six where it is such a motion.
+  /// Its squared Mahalanobis distance: chi-square of six if the measured motion is of this distribution.
   double normalisedSquare(const Eigen::Isometry3d& measured, const Matrix6d& measured_covariance) const;
 };
 
-/// How the camera goes on: constant velocity with white acceleration, stamps with an error, and velocities that are
-/// less certain the older they are. The velocity of the last measured pair predicts the next motion; the last confirmed
-/// one is the distribution that motions are compared with.
+/// Distribution of the next motion: constant velocity with white acceleration, errors of stamps, and a velocity that
+/// grows uncertain with age. The velocity of the last measured pair predicts the next motion. The last confirmed one
+/// gives the prior that measured motions are compared with.
 class MotionPrior {
  public:
   explicit MotionPrior(const MotionPriorOptions& options) : options_(options) {}
 
   void configure(const MotionPriorOptions& options) { options_ = options; }
 
-  /// Takes note of the time since the pair before, s. Gaps longer than that over which motions are predicted are none.
+  /// Notes the time since the previous pair, s. Leave out gaps over which no motion is predicted (max_gap).
   void noteInterval(double dt);
 
-  /// Of the camera in its own frame, m/s and rad/s; none where no motion can be predicted.
+  /// Last measured velocity in the camera's frame, m/s and rad/s; none where no motion can be predicted.
   const std::optional<Vector6d>& velocity() const { return velocity_; }
 
   /// Duration of a motion, s, between pairs whose stamps are `dt` s apart. It is longer than `dt` for a burst, whose
@@ -64,32 +64,33 @@ class MotionPrior {
   /// max_rotation_rate.
   double interval(double dt, const Eigen::Isometry3d& motion) const;
 
-  /// The next motion as the velocity, which must be known, predicts it.
+  /// The next motion, over `dt` s. velocity() must be known.
   ExpectedMotion predicted(double dt) const;
 
-  /// Of the motion over `dt` s from the moment `stamp` on, ns, by the confirmed velocity. None where there was none,
-  /// and where it is so long ago that its error exceeds any distance between two pairs (max_speed times max_gap).
+  /// Prior of the motion over `dt` s after `stamp`, ns, by the confirmed velocity. None without one, or if it is so old
+  /// that its error exceeds the distance at max_speed over max_gap.
   std::optional<ExpectedMotion> confirmed(std::int64_t stamp, double dt) const;
 
-  /// The same around a motion that another source measured, whose error is as a prediction's within one pair.
+  /// Distribution around another source's motion over `dt` s, with the process noise of a prediction over one pair.
   ExpectedMotion around(const Eigen::Isometry3d& motion, double dt) const;
 
-  /// By how much (logarithm of the ratio) the last motion and this one, over `dt` s, are likelier if their pairs
-  /// changed places. The first one then seems twice as far, and the second one behind it.
+  /// Log-likelihood ratio that two pairs came in the wrong order, from the last motion and this one, over `dt` s. In
+  /// wrong order the first motion spans both intervals, and the second one leads back.
   double logRatioOfSwap(const Eigen::Isometry3d& motion, double dt) const;
 
-  /// Of an unseen motion around a standstill, m and rad: its speed was that of the confirmed velocity, and is bounded.
+  /// Covariance, m^2 and rad^2, of the motion over so many seconds without images; its mean is standstill. It starts at
+  /// the confirmed speed in any direction. max_speed and half a turn bound it.
   Matrix6d unseen(double seconds) const;
 
   /// Covariance, m^2 and rad^2, of a motion without any measurement. The standard deviations are the distance at
   /// max_speed over max_gap, and half a radian.
   Matrix6d unknown() const;
 
-  /// In words, if no motion may be as fast, noise and stamps considered.
+  /// Reason, if a motion over `dt` s exceeds a limit by more than its noise and stamps allow; else empty.
   std::string tooFast(const Eigen::Isometry3d& motion, const Matrix6d& covariance, double dt) const;
 
-  /// Takes over the velocity of a measured motion. One in doubt predicts the next pair, but confirms nothing; what it
-  /// is doubted by makes the prediction as uncertain.
+  /// Takes over the velocity of a motion over `dt` s up to `stamp`, ns. A doubtful motion leaves the confirmed velocity
+  /// as it is. `doubt`: its covariance, m and rad, beyond the measured one, which widens the next prediction.
   void takeVelocity(std::int64_t stamp, const Eigen::Isometry3d& motion, double dt, const Matrix6d& covariance,
                     bool is_confirmed, const Matrix6d& doubt);
 
@@ -97,7 +98,7 @@ class MotionPrior {
   void interrupt() { velocity_.reset(), before_.reset(), doubt_.setZero(); }
 
  private:
-  /// Covariance, m^2 and rad^2, of a motion over `dt` s under white acceleration. The prediction is the mean velocity
+  /// Covariance, m^2 and rad^2, of a motion over `dt` s under white acceleration. Its prediction is a mean velocity
   /// over `before` s, an interval that ended `age` s earlier.
   Matrix6d processNoise(double dt, double before, double age) const;
   Matrix6d stampNoise(const Vector6d& velocity) const;
@@ -106,13 +107,13 @@ class MotionPrior {
   std::optional<Vector6d> velocity_, before_,
       confirmed_;  ///< m/s and rad/s; `before_` is of the motion before the last
   Matrix6d velocity_covariance_ = Matrix6d::Zero(), confirmed_covariance_ = Matrix6d::Zero();
-  Matrix6d doubt_ = Matrix6d::Zero();                          ///< of the last measured motion, m and rad
+  Matrix6d doubt_ = Matrix6d::Zero();                          ///< see takeVelocity(): m and rad
   std::int64_t confirmed_stamp_ = 0;                           ///< ns
   double velocity_interval_ = 0.0, confirmed_interval_ = 0.0;  ///< s, over which the velocities were measured
-  double interval_ = 0.0;                                      ///< s: about the longest of the last intervals
+  double interval_ = 0.0;                                      ///< s: decaying maximum of the intervals
 };
 
-/// The second moment of a difference between motions, the same in every direction of its translation and rotation.
+/// Second moment of a difference between motions, equal in every direction of translation and of rotation.
 Matrix6d momentOf(const Vector6d& difference);
 
 }  // namespace sdvo
