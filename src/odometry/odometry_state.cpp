@@ -11,7 +11,7 @@ LearntRig unknownRig(const VisualOdometryOptions& options) {
   return {options.calibration, options.noise};
 }
 
-/// The matches, which of them are inliers, and what follows from these.
+/// Reports matches, inliers, and their coverage and residual.
 void reportMatches(const StereoFeatures& features, const std::vector<int>& given_indices, const MotionHypothesis& found,
                    const std::vector<int>& rejected, OdometryResult& result) {
   result.flow.reserve(found.matches.size());
@@ -73,7 +73,7 @@ void OdometryState::startAgain() {
 }
 
 void OdometryState::takeSeed() {
-  // The guesses' error up to the seed's pair is in all poses that are measured against it.
+  // The guesses' error up to the seed is in all poses that are measured against it.
   covariance.assume(covariance.value());
   map = std::exchange(seed, std::nullopt);
   started = true;

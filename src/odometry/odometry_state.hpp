@@ -22,18 +22,18 @@
 
 namespace sdvo {
 
-/// State and motion that a pair adds to the pose.
+/// A pair's state, and its motion since the last pose.
 struct OdometryStep {
   TrackingState state = TrackingState::kWaiting;
   std::string reason;
   double probability = std::numeric_limits<double>::quiet_NaN();  ///< that a measured motion is the camera's
   std::optional<Eigen::Isometry3d> T_previous_current;
   Matrix6d covariance = Matrix6d::Zero();  ///< of that motion
-  Vector6d correction = Vector6d::Zero();  ///< the part of it that the map corrects
+  Vector6d correction = Vector6d::Zero();  ///< see OdometryResult
   std::vector<int> rejected_features;      ///< matched features of the pair that the adjustment does not confirm
-  double dt = 0.0;                         ///< over which that motion is, else since the previous pair, s
-  double time = 0.0;                       ///< s
-  bool starts_again = false;               ///< that motion began at no pose that was reported
+  double dt = 0.0;                         ///< see OdometryResult, s
+  double time = 0.0;                       ///< of computation, s
+  bool starts_again = false;               ///< a new epoch: the motion is since a pair without a pose
 
   bool hasPose() const { return state == TrackingState::kTracking || state == TrackingState::kDegraded; }
 };
@@ -41,11 +41,11 @@ struct OdometryStep {
 /// The memory of the odometry from pair to pair.
 struct OdometryState {
   std::optional<LocalMap> map;
-  std::optional<LocalMap> candidate;  ///< the map with the pair; between pairs only its memory matters.
-  /// The map that the newest pair of an outage would begin. It is placed where the guesses have the camera, else at the
-  /// last pose. It becomes the map once the next pair is measured against it.
+  std::optional<LocalMap> candidate;  ///< the map with the pair; kept to reuse its memory
+  /// The map that the newest pair of an outage begins, at the guesses' pose, else at the last pose. It replaces `map`
+  /// once the next pair is measured against it.
   std::optional<LocalMap> seed;
-  bool seed_has_pose = false;  ///< guesses have the motion from the map to the seed
+  bool seed_has_pose = false;  ///< the seed's pose is that of the guesses
   LearntRig rig;
   MotionPrior prior;
   Doubt doubt;
@@ -61,25 +61,25 @@ struct OdometryState {
   int pairs = 0;
   int epoch = 0;
   bool started = false;
-  bool frozen = false;       ///< the last images repeated those before although the camera moved
-  bool interrupted = false;  ///< where in the map the camera is is unknown
+  bool frozen = false;       ///< the last images repeat the previous ones although the camera moved
+  bool interrupted = false;  ///< the camera's pose in the map is unknown
 
   OdometryState(const VisualOdometryOptions& options, int first_epoch);
 
-  /// Another rig: its estimates start anew.
+  /// The estimates of the rig start anew.
   void forgetRig(const VisualOdometryOptions& options);
 
   /// The next pair does not continue the last one.
   void interrupt();
 
-  /// A new epoch begins at the seed: the camera's motion before it is unknown.
+  /// A new epoch begins at the seed. The unknown motion before it widens the covariance.
   void startAgain();
   /// The seed becomes the map.
   void takeSeed();
 
   void move(const Eigen::Isometry3d& T_previous_current);
 
-  /// `given_indices`: of each feature in the pair as it was given.
+  /// `given_indices`: for each feature its index in the pair as given.
   OdometryResult report(const StereoFeatures& features, const std::vector<int>& given_indices,
                         const MotionHypothesis& found, const OdometryStep& step,
                         const std::optional<Floor>& known_floor) const;
@@ -89,14 +89,14 @@ struct OdometryState {
 
 constexpr const char* kStartedAgain = "started again from the last pose; the motion in between is unknown";
 
-/// The pair begins a map: the first one, or where the guesses have the camera, or at the last pose. While there is a
-/// map from before, the odometry is lost until the next pair is found in either.
+/// Begins a map with the pair: the first one, or at the guesses' pose, or at the last pose. While there is a map from
+/// before the outage, the odometry is lost until the next pair is found in either.
 OdometryStep startMap(const VisualOdometryOptions& options, const StereoFeatures& features, OdometryState& state);
 
-/// Images that repeat themselves show no motion: the pose stays, as uncertain as the prior makes it meanwhile.
+/// Repeated images contain no motion: the pose stays, and the possible motion widens its covariance.
 OdometryStep holdPose(double dt, OdometryState& state);
 
-/// The motion by the guess or by the velocity; without them the odometry is lost. `failure`: why it is not measured.
+/// Moves the pose by the guess or the velocity, else the odometry is lost. `failure`: why no motion is measured.
 OdometryStep predictMotion(const VisualOdometryOptions& options, const StereoFeatures& features, double dt,
                            const std::string& failure, OdometryState& state);
 

@@ -24,15 +24,15 @@ void Outage::extend(double dt, const std::optional<MotionGuess>& guess, const Mo
   followed_->rotation_only |= guess->rotation_only;
 }
 
-/// Of the guess, on top of those before it: the part of a scale error that a longer way adds. No odometry stands still
-/// better than to a small part of what the camera may have done.
+/// Covariance that a guess adds to those before it. A scale error's standard deviation is proportional to the whole
+/// distance. Each guess counts for some distance, because no odometry at rest is exact.
 Matrix6d Outage::covarianceOf(const MotionGuess& guess, const Matrix6d& process_noise) {
-  constexpr double kLeast = 0.02;  // standard deviations (chosen): at 10 Hz a millimetre
+  constexpr double kLeast = 0.02;  // of the process noise's standard deviation (chosen): 1 mm at 10 Hz
   const Vector6d motion = logSE3(guess.T_previous_current);
-  const auto grow = [&](double& way, double by, double variance) {
-    const double before = way;
-    way += std::max(by, kLeast * std::sqrt(variance));
-    return guess.error * guess.error * (way * way - before * before);
+  const auto grow = [&](double& path, double by, double variance) {
+    const double before = path;
+    path += std::max(by, kLeast * std::sqrt(variance));
+    return guess.error * guess.error * (path * path - before * before);
   };
   Vector6d variance;
   variance.head<3>().setConstant(grow(distance_, motion.head<3>().norm(), process_noise(0, 0)));

@@ -10,7 +10,7 @@ std::string missing(const StereoFeatures& features) {
          (features.report.status.empty() ? "" : ": " + features.report.status);
 }
 
-/// Whether a guess has the motion of a pair that shows nothing, not too long after the last one that did.
+/// Whether guesses move the pose: the pair has too few features, and the last measured one is recent.
 bool canFollow(const VisualOdometryOptions& options, const StereoFeatures& features, const OdometryState& state) {
   const auto& followed = state.outage.followed();
   if (!state.map || !followed || features.count() >= options.motion.min_inliers) return false;
@@ -18,7 +18,7 @@ bool canFollow(const VisualOdometryOptions& options, const StereoFeatures& featu
   return state.map->secondsUntil(features) <= (followed->rotation_only ? tracking.max_gap : tracking.max_guessed);
 }
 
-/// The pose moves on by a motion that is not measured.
+/// Moves the pose by an unmeasured motion.
 OdometryStep follow(const ExpectedMotion& expected, const std::string& reason, OdometryState& state) {
   OdometryStep step;
   step.state = TrackingState::kDegraded;
@@ -47,7 +47,7 @@ OdometryStep startMap(const VisualOdometryOptions& options, const StereoFeatures
   state.seed->insert(options.alignment, features, state.pairs, (state.T_origin_camera * T_previous_current).inverse(),
                      {}, state.rig.calibration.calibration());
   state.seed_has_pose = is_guessed && !followed->rotation_only;
-  // Only a pair that is measured against the seed replaces the map from before.
+  // The seed replaces a map from before the outage only when a pair is measured against it.
   const bool has_map = state.started && state.map && state.map->continuedBy(features);
   if (is_guessed) {
     step = follow(*followed,
@@ -91,7 +91,7 @@ OdometryStep predictMotion(const VisualOdometryOptions& options, const StereoFea
   const std::string reason = failure + (features.report.status.empty() ? "" : "; " + features.report.status);
   const bool can_predict = state.prior.velocity() && dt <= options.tracking.max_gap &&
                            state.outage.predictedPairs() < options.tracking.max_predicted_pairs;
-  // The prior's translation over one pair is better than that around a standstill, which a gyro needs.
+  // A gyro's guess has the translation's covariance around standstill; over one pair the prior's is smaller.
   if (canFollow(options, features, state) && !(can_predict && state.outage.followed()->rotation_only))
     return follow(*state.outage.followed(), "motion by the guess: " + reason, state);
   if (can_predict) {

@@ -17,19 +17,19 @@ inline const char* toString(TrackingState state) {
   return words[static_cast<int>(state)];
 }
 
-/// Where a matched feature was in the last measured pair, as predicted by the local map, and where it is now.
+/// A matched feature: its position in the last measured pair as the map predicts it, and its index in this pair.
 struct FeatureFlow {
   float u_previous, v_previous, disparity_previous;  ///< px, left image
   int current;                                       ///< index of the pair's feature
-  bool inlier;  ///< agrees with the motion that was found, used or not, and with the map
+  bool inlier;  ///< agrees with the pair's motion and with the adjusted map, even if the motion is rejected
 };
 
 /// State, pose and motion after one pair. Everything published is derived from this one object.
 struct OdometryResult {
   TrackingState state = TrackingState::kWaiting;
-  std::string reason;      ///< in words, for every state but plain tracking
+  std::string reason;      ///< empty only in TRACKING without remarks
   std::int64_t stamp = 0;  ///< of the left image, ns
-  /// That the measured motion is the camera's; NaN where none was measured.
+  /// Probability that the measured motion is the camera's; NaN without a measurement.
   double probability = std::numeric_limits<double>::quiet_NaN();
   int epoch = 0;  ///< one more after every discontinuity of the pose
 
@@ -38,15 +38,15 @@ struct OdometryResult {
   Matrix6d pose_covariance = Matrix6d::Zero();  ///< of a right perturbation: T_origin_camera * exp(xi), m and rad
 
   bool has_motion = false;  ///< false for the first pair and right after a discontinuity
-  double dt = 0.0;          ///< s, over which the motion is: since the last pose; else since the previous pair
+  double dt = 0.0;          ///< duration of the motion, from the last pose, s; without a motion since the previous pair
   Eigen::Isometry3d T_previous_current = Eigen::Isometry3d::Identity();
   Matrix6d motion_covariance = Matrix6d::Zero();  ///< of a right perturbation of T_previous_current
-  /// The part of that motion which is the map's second thought about the previous pose: another right perturbation.
+  /// Part of the motion that corrects the previous pose in the map: right perturbation like the motion's, m and rad.
   Vector6d correction = Vector6d::Zero();
 
   int features = 0, matches = 0, inliers = 0;
-  double coverage = 0.0;  ///< share of an 8x4 grid's cells over the image that hold an inlier
-  double rms = 0.0;  ///< of the corners that agreed on the motion, before alignment and adjustment, px per coordinate
+  double coverage = 0.0;  ///< ratio of the cells in an 8x4 grid over the image that have an inlier
+  double rms = 0.0;       ///< residual of the motion's corners, before alignment and adjustment, px per coordinate
   double match_time = 0.0, motion_time = 0.0;  ///< s
   double distance = 0.0;                       ///< travelled since the start or reset, m
   int keyframe_id = 0;            ///< running number of the map's last key frame, this pair included; 0 without a map
@@ -57,7 +57,7 @@ struct OdometryResult {
   double disparity_offset_sigma = std::numeric_limits<double>::quiet_NaN();  ///< px
   double disparity_bend = std::numeric_limits<double>::quiet_NaN();  ///< its change at 45 degrees, px; compensated
   double disparity_bend_sigma = std::numeric_limits<double>::quiet_NaN();  ///< px
-  double right_delay = std::numeric_limits<double>::quiet_NaN();           ///< of its images, s; compensated
+  double right_delay = std::numeric_limits<double>::quiet_NaN();           ///< right images are later, s; compensated
   double right_delay_sigma = std::numeric_limits<double>::quiet_NaN();     ///< s
   Eigen::Vector3d right_rotation = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());        ///< rad
   Eigen::Vector3d right_rotation_sigma = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());  ///< rad

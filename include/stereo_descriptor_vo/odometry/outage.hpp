@@ -8,18 +8,17 @@
 
 namespace sdvo {
 
-/// How the camera moved since the pair before, as something else than the images has it.
+/// Motion of the camera since the previous pair, from another source than images.
 struct MotionGuess {
   Eigen::Isometry3d T_previous_current = Eigen::Isometry3d::Identity();
-  bool rotation_only = false;  ///< a gyro's: of the translation it says nothing
-  double error =
-      0.1;  ///< standard deviation of distance and turn, as ratios of them; it is a scale: all guesses share it
+  bool rotation_only = false;  ///< from a gyro: the translation is not used
+  double error = 0.1;          ///< standard deviation as a ratio of distance and angle: a scale common to all guesses
 
-  /// The motion over `dt` s. The translation that a gyro lacks is the prior's.
+  /// The motion over `dt` s; a gyro's gets the translation of the prior.
   Eigen::Isometry3d motion(const MotionPrior& prior, double dt) const;
 };
 
-/// The pairs since the last measured motion, and what guesses have of the motion meanwhile.
+/// Time since the last measured motion, pairs that were predicted, and the motion by guesses meanwhile.
 class Outage {
  public:
   /// Motion since the last pose, m and rad.
@@ -27,19 +26,19 @@ class Outage {
     bool rotation_only = false;  ///< the translation is the prior's
   };
 
-  /// A pair comes `dt` s after the one before, with a guess of the motion between them, or with none.
+  /// Adds a pair `dt` s after the previous one, and the guess of the motion between them, if there is one.
   void extend(double dt, const std::optional<MotionGuess>& guess, const MotionPrior& prior);
 
-  /// As guesses have it; nothing while one is missing since the last pose.
+  /// The motion by guesses; none if a guess is missing since the last pose.
   const std::optional<Followed>& followed() const { return followed_; }
 
-  /// The covariance by which the unseen motion grew over the last `dt` s.
+  /// Covariance, m^2 and rad^2, by which the unknown motion of the outage grew in the last `dt` s.
   Matrix6d growth(const MotionPrior& prior, double dt) const;
 
   int predictedPairs() const { return predicted_pairs_; }
   void countPrediction() { ++predicted_pairs_; }
 
-  /// The pair has a pose: guesses are followed from there on.
+  /// The pair has a pose, and followed() begins there.
   void havePose() { followed_ = Followed(); }
   /// The pair's motion is measured.
   void end();
@@ -48,7 +47,7 @@ class Outage {
   Matrix6d covarianceOf(const MotionGuess& guess, const Matrix6d& process_noise);
 
   std::optional<Followed> followed_ = Followed();
-  double distance_ = 0.0, angle_ = 0.0;  ///< of the guesses, m and rad
+  double distance_ = 0.0, angle_ = 0.0;  ///< sums over the outage's guesses, m and rad
   double seconds_ = 0.0;
   int predicted_pairs_ = 0;
 };

@@ -33,19 +33,19 @@ class VisualOdometry {
   ~VisualOdometry();
 
   /// Processes the next pair. Stamps must increase and the features must pass check(), else std::invalid_argument and
-  /// the state is as before. `guess` is one more place to look for the motion; it is never taken for a measurement.
-  /// Each pair may have a camera of its own: one that isLike() the first one's goes on, another one starts a new epoch.
+  /// the state is as before. `guess` is one more hypothesis of the motion, never a measurement. A pair's camera that
+  /// isLike() the first one's continues the map; another camera starts a new epoch.
   OdometryResult update(const StereoFeatures& features, const std::optional<MotionGuess>& guess = std::nullopt);
 
   /// Back to the initial pose and a new epoch; nothing is remembered.
   void reset();
 
-  /// Tells that the next pair does not continue the last one (a pause, a restarted source). The odometry goes on where
-  /// it finds the pair in its map, else from the last pose under a new epoch.
+  /// The next pair does not continue the last one (a pause, a restarted source). The odometry goes on where it finds
+  /// the pair in its map, else from the last pose under a new epoch.
   void breakStream();
 
-  /// Tells that something else has the last pose, with this covariance (of its right perturbation): a new epoch begins.
-  /// The map is kept, unless the camera's place in it is unknown: then the next pair starts a map at the last pose.
+  /// Another source sets the last pose's covariance (right perturbation, m and rad); a new epoch begins. The map is
+  /// kept. After an interruption the next pair starts a map at the last pose instead.
   void takePose(const Matrix6d& covariance);
 
   /// T_origin_camera of the last pair that had a pose.
@@ -58,12 +58,12 @@ class VisualOdometry {
 
   const VisualOdometryOptions& options() const { return options_; }
 
-  /// Where the camera sits on the base, whose floor `planar` is about; until then at the base's origin, looking ahead.
-  /// Another place on the way is that of another camera. The odometry goes on from the base's last pose under a new
-  /// epoch. The origin is where this camera was in the beginning.
+  /// The camera's pose on the base, whose floor `planar` constrains; initially at the base's origin, looking ahead. A
+  /// new pose counts as another camera: the odometry goes on from the base's last pose under a new epoch. The origin is
+  /// where this camera was in the beginning.
   void mountAt(const Eigen::Isometry3d& T_base_camera);
 
-  /// The local map's points at a finite distance, in the origin, m; empty while there is no map.
+  /// The local map's points at a finite distance, in the origin's frame, m; empty without a map.
   std::vector<Eigen::Vector3d> mapPoints() const;
 
  private:
@@ -105,7 +105,7 @@ class VisualOdometry {
 
   VisualOdometryOptions options_;
   Eigen::Isometry3d T_base_camera_;
-  std::unique_ptr<Parts> parts_;  ///< what the next ones refer to
+  std::unique_ptr<Parts> parts_;  ///< owns the following ones
   MotionSearch& search_;
   Reacquisition& reacquisition_;
   Revisit& revisit_;
