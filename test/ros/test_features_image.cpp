@@ -53,14 +53,17 @@ TEST(DrawFeatures, LeavesOutFlowThatNoImageHolds) {
   EXPECT_EQ(colouredPixels(picture), 0);
 }
 
-TEST(DrawFeatures, WordsFitIntoASmallImage) {
+TEST(DrawFeatures, WordsFitIntoASmallImageAndStandOutOnWhite) {
   const FeaturesMessage none = toMessage(synthetic::noFeatures(someFeatures().camera), DepthScaleOptions());
-  const auto captionOf = [&](int width) {
-    const cv::Mat grey(240, width, CV_8UC1, cv::Scalar(90));
+  const auto captionOf = [&](int width, int level = 90) -> cv::Mat {
+    const cv::Mat grey(240, width, CV_8UC1, cv::Scalar(level));
     cv::Mat one;
     cv::extractChannel(drawFeatures(grey, grey, none, {}, "TRACKING"), one, 0);
-    return one != 90;
+    return one > 170;
   };
+  const int first_line = cv::countNonZero(captionOf(500).rowRange(0, 24));
+  EXPECT_GT(first_line, 100);
+  EXPECT_NEAR(cv::countNonZero(captionOf(500, 255).rowRange(0, 24)), first_line, 0.3 * first_line);
   for (const int width : {320, 376}) {
     const cv::Mat words = captionOf(width);
     EXPECT_EQ(cv::countNonZero(words.colRange(width - 4, width)), 0) << width << " px: cut";
