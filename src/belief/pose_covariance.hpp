@@ -51,9 +51,9 @@ class PoseCovariance {
 
   /// The pose moved and was measured against the key frame with the covariance `since_keyframe`. `growth`: by how much
   /// its covariance in the map exceeds the key frame's. Returns the covariance of the motion between the two reported
-  /// poses. After a key frame, this is `since_keyframe`. Otherwise the key frame's noise is in both poses and cancels.
-  /// It is that of the better pose, because its points have been seen as often. So the larger one of both covariances
-  /// since the key frame remains. Predictions and doubts of the previous pose are added.
+  /// poses. After a key frame, this is `since_keyframe`. Otherwise both poses have the key frame's noise, which
+  /// cancels. Its covariance is that of the better pose, because its points have been seen as often. So the larger
+  /// covariance since the key frame remains. Predictions and doubts of the previous pose are added.
   Matrix6d measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe, const Matrix6d& growth);
   /// The same in a map of one key frame.
   Matrix6d measure(const Eigen::Isometry3d& T_previous_current, const Matrix6d& since_keyframe) {
@@ -80,7 +80,7 @@ class PoseCovariance {
   Matrix6d doubted_ = Matrix6d::Zero();     ///< of the pose by predictions and doubts since then
   Matrix6d keyframe_ = Matrix6d::Zero();    ///< of the key frame, in the last pose's frame
   std::optional<Matrix6d> since_keyframe_;  ///< of the last measured motion; none at the key frame
-  Matrix6d unmeasured_ = Matrix6d::Zero();  ///< as doubted_, but part of the next motion
+  Matrix6d unmeasured_ = Matrix6d::Zero();  ///< of the motion since the last measured pose
   Exposure exposure_ = Exposure::Zero();
   Exposure keyframe_exposure_ = Exposure::Zero();  ///< in the last pose's frame
 };

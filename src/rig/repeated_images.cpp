@@ -84,7 +84,7 @@ std::vector<int> RepeatedImages::newFeatures(const StereoFeatures& features, dou
     if (std::max(below, above) <= best) continue;
     best = std::max(below, above), border = k, is_above = above > below;
   }
-  // A border must save more nats in labels (repeated or new) than the best of count + 1 random borders does.
+  // Given a border, labels (repeated or new) need fewer nats. The best of count + 1 random borders must save less.
   const double saved = entropyOf(all_old, count) - entropyOf(count - best, count);
   if (saved < std::log((count + 1) / kTailProbability)) return indices;
   const float tear =

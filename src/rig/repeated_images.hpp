@@ -9,7 +9,7 @@
 
 namespace sdvo {
 
-/// Detects images, or rows of them, that repeat the previous pair. They imply standstill even if the camera moved.
+/// Detects images, or rows of them, that repeat the previous pair: their features stand still even if the camera moves.
 class RepeatedImages {
  public:
   /// Whether all features equal those of the previous pair exactly.

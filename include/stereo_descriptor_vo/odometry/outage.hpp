@@ -14,7 +14,7 @@ struct MotionGuess {
   bool rotation_only = false;  ///< from a gyro: the translation is not used
   double error = 0.1;          ///< standard deviation as a ratio of distance and angle: a scale common to all guesses
 
-  /// The motion over `dt` s; a gyro's gets the translation of the prior.
+  /// The motion over `dt` s; a gyro's guess gets the translation of the prior.
   Eigen::Isometry3d motion(const MotionPrior& prior, double dt) const;
 };
 

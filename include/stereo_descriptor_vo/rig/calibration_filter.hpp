@@ -65,7 +65,7 @@ class CalibrationFilter {
   /// standard deviation. It replaces the value of the last call.
   void noteRows(int parameter, double value, double sigma);
 
-  /// Averages the variance, px^2, of the disparity error that a window's points have in all their sightings.
+  /// Averages the variance, px^2, of the disparity error that all sightings of a point share, as a window estimates it.
   void noteCommon(double square);
 
   /// The right camera rotated, and features are rotated back. Adds the covariance of this rotation, rad^2.
@@ -93,7 +93,7 @@ class CalibrationFilter {
   CalibrationOptions options_;
   RigCalibration calibration_;
   Likelihood past_;     ///< of windows that share no pair with the last one
-  Likelihood pending_;  ///< and of one more, which ends with pair `pending_id_`: past of windows that begin later
+  Likelihood pending_;  ///< of past_ and a window up to pair `pending_id_`: past of windows that begin later
   int pending_id_ = -1;
   std::optional<Likelihood> present_;                                   ///< of past_ and the last window
   RigEstimate::Vector rows_ = RigEstimate::Vector::Zero();              ///< see noteRows(): rad and s
