@@ -107,11 +107,24 @@ std::string RobotTransforms::explainMissing(const std::string& base_frame, const
   if (is_base || (ours_ && camera_frame == ours_->odom))
     return "the left images' frame_id is '" + camera_frame + "', as " + (is_base ? "base" : "odom") +
            "_frame_id: set the camera's optical frame in its driver";
+  const std::string missing =
+      "no transform from camera frame '" + camera_frame + "' to base frame '" + base_frame + "' on TF: ";
   const std::vector<std::string> above = ancestors(camera_frame);
-  const std::string root = above.empty() ? camera_frame : cleanFrameId(above.back());
-  return "no transform from camera frame '" + camera_frame + "' to base frame '" + base_frame + "' on TF: publish " +
-         base_frame + " -> " + root + " (static; `mount_rpy` of the camera's launch file), or set base_frame_id" +
-         (above.empty() ? "" : " to '" + root + "', where TF has the camera");
+  const std::string root = above.empty() ? camera_frame : above.back();
+  if (isMoving(root, camera_frame)) {  // `root` may be a world's frame, of another odometry
+    std::string names;
+    for (const std::string& frame : above) names += (names.empty() ? "'" : ", '") + cleanFrameId(frame) + "'";
+    return missing + "it has the camera below " + names + "; set base_frame_id to the robot's own one of these";
+  }
+  return missing + "publish " + base_frame + " -> " + cleanFrameId(root) +
+         " (static; `mount_rpy` of the camera's launch file), or set base_frame_id" +
+         (above.empty() ? "" : " to '" + cleanFrameId(root) + "', where TF has the camera");
+}
+
+bool RobotTransforms::isMoving(const std::string& parent, const std::string& child) const try {
+  return !buffer_.lookupTransform(parent, child, ros::Time(0)).header.stamp.isZero();  // zero: static throughout
+} catch (const tf2::TransformException&) {
+  return false;
 }
 
 void CameraMount::await(const std::string& base_frame, const std::string& camera_frame,

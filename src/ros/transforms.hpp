@@ -51,6 +51,7 @@ class RobotTransforms {
   void watch(const geometry_msgs::TransformStamped& transform, const std::string& publisher);
   std::vector<std::string> ancestors(const std::string& frame) const;
   bool hasAncestor(const std::string& frame, const std::string& ancestor) const;
+  bool isMoving(const std::string& parent, const std::string& child) const;
 
   std::optional<ros_conversions::OdometryFrames> ours_;
   const std::uint32_t tag_;

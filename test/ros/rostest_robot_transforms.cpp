@@ -82,6 +82,10 @@ TEST_F(RobotTransformsTest, AMissingTransformIsNamedFromWhereTfHasTheCamera) {
   const std::string within = transforms_->explainMissing("base_link", "oak_left");
   expectWords(within, {"'oak_left' to base frame 'base_link'", "publish base_link -> oak_base (static",
                        "set base_frame_id to 'oak_base'"});
+  send(tf_, {transform("odom", "oak_base", ros::Time::now())});
+  waitForMarker(tf_);
+  expectWords(transforms_->explainMissing("base_link", "oak_left"),
+              {"below 'oak_body', 'oak_base', 'odom'; set base_frame_id to the robot's own one"});
   const std::string alone = transforms_->explainMissing("base_link", "nowhere");
   EXPECT_TRUE(contains(alone, "publish base_link -> nowhere (static")) << alone;
   EXPECT_FALSE(contains(alone, "where TF has")) << alone;
