@@ -11,7 +11,7 @@ std::optional<CornerPair> CornerPairs::add(const cv::Mat& left, const cv::Mat& r
   CornerPair pair{left, right, before_, 1e-9 * static_cast<double>(stamp - stamp_before_), {}};
   before_ = left.clone();
   stamp_before_ = stamp;
-  if (pair.before.size() != left.size() || !(pair.dt > 0.0) || stamp - last_ < kPeriod) return std::nullopt;
+  if (pair.before.size() != left.size() || !(pair.dt > 0.0) || (last_ && stamp - *last_ < kPeriod)) return std::nullopt;
   last_ = stamp;
   cv::goodFeaturesToTrack(left, pair.corners, 200, 0.01, 8.0);
   return pair;

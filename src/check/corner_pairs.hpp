@@ -23,7 +23,8 @@ class CornerPairs {
 
  private:
   cv::Mat before_;
-  std::int64_t stamp_before_ = 0, last_ = 0;  ///< ns
+  std::int64_t stamp_before_ = 0;     ///< ns
+  std::optional<std::int64_t> last_;  ///< ns: of the last of the five
 };
 
 /// Lucas-Kanade from `guess` on, which becomes the result. Whether each point was found. `levels` of the pyramid: 0 for

@@ -38,7 +38,8 @@ Finding OdometryCheck::shutter() const {
   const auto readout = readout_.estimate();
   if (!readout) return {Verdict::kOpen, "too few pairs with a motion that changes", "turn"};
   return judged(false, readout->isRolling(),
-                text(1, "last row ", 1e3 * readout->value, " ms later than the first, +- ", 1e3 * readout->sigma),
+                text(1, "last row ", 1e3 * std::abs(readout->value), " +- ", 1e3 * readout->sigma, " ms ",
+                     readout->value > 0.0 ? "after" : "before", " the first"),
                 "a rolling shutter: take cameras with a global one");
 }
 

@@ -28,6 +28,18 @@ TEST(CornerPairs, AreFiveASecondWithThePairBefore) {
       pairs.add(cv::Mat(24, 32, CV_8U, cv::Scalar(9)), cv::Mat(24, 32, CV_8U, cv::Scalar(9)), 2'000'000'000LL));
 }
 
+/// A folder of KITTI begins at 0, a bag made of it does not.
+TEST(CornerPairs, AreTheSameWhereverTheStampsBegin) {
+  const auto taken = [](std::int64_t first) {
+    CornerPairs pairs;
+    std::vector<int> found;
+    for (int i = 0; i < 8; ++i)
+      if (pairs.add(plane(i, 0.0), plane(i - 9.0, 0.0), first + i * 100'000'000LL)) found.push_back(i);
+    return found;
+  };
+  EXPECT_EQ(taken(0), taken(1'000'000'000'000'000'000LL));
+}
+
 TEST(CornerPairs, CornersAreFollowedBothWaysAndThoseThatVanishAreNot) {
   cv::Mat moved = plane(7.5, -3.25);
   moved(cv::Rect(0, 0, 160, 240)) = cv::Scalar(90);
