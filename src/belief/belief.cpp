@@ -24,7 +24,7 @@ void Doubt::raise(const std::vector<Evidence>& evidence) {
 }
 
 void Doubt::fade() {
-  // Pairs: half of those that make a point a lasting one, whose agreement is new evidence.
+  // Pairs: half of kLastingSightings, after which new lasting points give evidence.
   constexpr double kHalfLife = 0.5 * MotionHypothesis::kLastingSightings;
   log_odds_ = kUnsuspected + (log_odds_ - kUnsuspected) * std::exp2(-1.0 / kHalfLife);
   if (!lasts()) distance_ = angle_ = largest_ = 0.0;
@@ -43,7 +43,7 @@ Belief Doubt::weigh(const MotionScene& scene, const MotionHypothesis& found, con
 
   Belief belief;
   belief.probability = 1.0 / (1.0 + rivals + misled + shown + carried);
-  // Where nothing is expected, the camera may as well have stood.
+  // Without a prior the camera may as well have stood.
   const ExpectedMotion expected = scene.prior.empty() ? ExpectedMotion() : scene.prior.front();
   const Vector6d innovation = expected.innovation(found.motion.T_current_reference.inverse());
   const Matrix6d deviation = momentOf(innovation) + expected.covariance;
@@ -67,7 +67,7 @@ Belief Doubt::weigh(const MotionScene& scene, const MotionHypothesis& found, con
   raise(rivals + misled, !found.rival || rivals < misled ? "the motion changed faster than a vehicle's can"
                          : found.rival->is_torn          ? "the images seemed to be torn or damaged"
                                                          : "something else moved in view");
-  // The errors of motions that follow one thing add up.
+  // Errors of successive motions that follow one mover add up.
   double distance = distance_ + std::sqrt(deviation.topLeftCorner<3, 3>().trace() / 3.0);
   double angle = angle_ + std::sqrt(deviation.bottomRightCorner<3, 3>().trace() / 3.0);
   belief.pose_moment = another * isotropic(distance * distance, angle * angle);

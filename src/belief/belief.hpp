@@ -8,48 +8,47 @@
 
 namespace sdvo {
 
-/// Something that may have misled a pair: log-odds that it did, and in words.
+/// Something that may have misled a pair's motion: the log-odds that it did, and its name.
 struct Evidence {
   double log_odds;
   std::string cause;
-  bool lasts = false;  ///< the next pairs may follow it, too; else it ends with the pair
+  bool lasts = false;  ///< it may mislead the next pairs, too; else it ends with the pair
 };
 
 /// Posterior of a pair's motion.
 struct Belief {
-  double probability = 1.0;  ///< that it is the camera's
-  /// Second moment (m and rad) of its error where it is not, times the probability of that.
-  /// The pose's is summed since the doubt began.
+  double probability = 1.0;  ///< that the motion is the camera's
+  /// Second moment (m and rad) of the motion's error if it is not the camera's, times the probability of that. The
+  /// pose's moment has the sum of the errors since the doubt began.
   Matrix6d moment = Matrix6d::Zero(), pose_moment = Matrix6d::Zero();
-  std::string reason;  ///< in words, of the likeliest alternative
+  std::string reason;  ///< names the likeliest alternative
 };
 
-/// The doubt that pairs leave to those after them: log-odds that what is followed is not the camera's motion, or not in
-/// a sound map. It is one event, from the pair that raised it until it has faded or lasting points refute it: these
-/// were confirmed before.
+/// Carried doubt: log-odds from earlier pairs that the motion is not the camera's, or that the map is wrong. A doubt is
+/// one event. It ends when it has faded, or when lasting points, confirmed before it, refute it.
 class Doubt {
  public:
   double logOdds() const { return log_odds_; }
-  /// Whether it is still twice as likely as without a cause.
+  /// Whether its odds are more than twice those without a cause.
   bool lasts() const;
 
-  /// Posterior of a motion: its rivals, the prior, what the pair itself shows and what the pairs before left.
+  /// Posterior of a motion, by its rivals, the prior, the pair's own evidence and the carried doubt, which is updated.
   Belief weigh(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence);
-  /// A pair without a measured motion shows only this.
+  /// Adds the evidence of a pair without a measured motion.
   void raise(const std::vector<Evidence>& evidence);
-  /// A pair is over: what is followed may end to be so.
+  /// Lets the doubt fade after a pair: a mover may leave the view.
   void fade();
 
  private:
   void raise(double odds, const std::string& cause);
 
   double log_odds_ = kUnsuspected;
-  std::string cause_;                    ///< in words, of the largest odds since it began
-  double largest_ = 0.0;                 ///< these odds
-  double distance_ = 0.0, angle_ = 0.0;  ///< by which the pose is off if the doubt is right, m and rad
+  std::string cause_;                    ///< that with the largest odds since the doubt began
+  double largest_ = 0.0;                 ///< its odds
+  double distance_ = 0.0, angle_ = 0.0;  ///< error of the pose if the doubt is right, m and rad
 };
 
-/// The pair's own evidence against its motion.
+/// The innovation and the lasting points' agreement, in words.
 std::string innovationWords(const MotionHypothesis& found);
 
 }  // namespace sdvo

@@ -59,7 +59,7 @@ void RowDelay::Sums::add(double w, const Eigen::Vector3d& moved, double lower) {
 }
 
 /// Each part of the pair is one observation: the mean of its samples, weighted by a Huber kernel. Differences within a
-/// part do not count. On a road they have the same pattern in all pairs, as has the error of the rectification.
+/// part are not used: on a road they have the same pattern in all pairs, as the rectification's error has.
 void RowDelay::add(const std::vector<Sample>& pair) {
   constexpr int kReweightings = 3;
   double square = 0.0;
