@@ -15,10 +15,9 @@
 namespace sdvo {
 namespace {
 
-constexpr int kManyMatches = 100;  // of one pair: agreement on no motion is then no lack of points (chosen)
+constexpr int kManyMatches = 100;  // of a pair (chosen): if no motion fits so many, points are not lacking
 
-/// Moment of a motion's difference from the prior, if that is no chance: the stamps may be wrong, or the camera did
-/// what none does.
+/// Second moment of an innovation that chance does not explain: stamps may be wrong, or the camera did what none does.
 Matrix6d unexpected(const MotionScene& scene, const MotionHypothesis& found) {
   if (!(found.innovation > noiseGate(6))) return Matrix6d::Zero();
   const Vector6d innovation = scene.prior.front().innovation(found.motion.T_current_reference.inverse());
@@ -50,16 +49,17 @@ std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHy
 
 }  // namespace
 
-/// A pair as it is searched: of the map's camera, without features of the pair before, both images of one moment.
+/// A pair as it is searched: in the map's camera, without repeated rows, with the right image rotated back and
+/// synchronous.
 struct VisualOdometry::Pair {
   const StereoFeatures& given;
   std::optional<StereoFeatures> refocused{}, new_part{}, rotated_back{}, synchronised{};
   std::vector<int> new_features{};
   double dt = 0.0;               ///< since the previous pair, s
-  double frozen = kUnsuspected;  ///< log-odds that its images are old although the camera moved
-  /// Without a map of its stream; after an outage; with old images; after a pose.
+  double frozen = kUnsuspected;  ///< log-odds that its images repeat although the camera moved
+  /// Without a map of its camera; after an outage; with repeated images; after a pose.
   enum { kFirst, kSought, kFrozen, kFollowed } is = kFirst;
-  ShownRotation rotation{};  ///< of the right camera beyond what is known
+  ShownRotation rotation{};  ///< of the right camera beyond the known one
 
   const StereoFeatures& whole() const { return refocused ? *refocused : given; }
   const StereoFeatures& part() const { return new_part ? *new_part : whole(); }
@@ -67,14 +67,14 @@ struct VisualOdometry::Pair {
   const StereoFeatures& features() const { return synchronised ? *synchronised : taken(); }
 };
 
-/// The map as it would be with the pair, adjusted. Nothing has changed until it is committed.
+/// The map with the pair, adjusted. The state does not change until commit().
 struct VisualOdometry::Candidate {
   RigCalibration calibration;
   RigEstimate::Shape calibration_by_rig;
-  double delay = 0.0;  ///< of the right camera, as it is compensated, s
+  double delay = 0.0;  ///< of the right camera, compensated, s
   LocalMap::Adjustment adjustment;
   Eigen::Isometry3d motion;             ///< T_reference_current after the adjustment
-  Eigen::Isometry3d T_keyframe_origin;  ///< of the key frame before the pair, before the adjustment
+  Eigen::Isometry3d T_keyframe_origin;  ///< of the last key frame, before the adjustment
   double distance = 0.0;                ///< from that key frame, m
 };
 
@@ -154,7 +154,7 @@ OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::op
   search(pair, guess, scene, found);
   const StereoFeatures& features = pair.features();
 
-  // Nothing has changed so far, and from here on nothing is refused.
+  // The state has not changed so far, and from here on no input is rejected.
   Stopwatch stopwatch;
   begin(pair, guess);
   const std::optional<MeasuredPair> measured = measuredPair(pair, found);
@@ -182,11 +182,11 @@ void VisualOdometry::refuse(const StereoFeatures& features) const {
                                 std::to_string(*state_.last_stamp) + " ns");
 }
 
-/// The pair as the motion is searched with it.
+/// Prepares a pair for the search of its motion.
 VisualOdometry::Pair VisualOdometry::usable(const StereoFeatures& given,
                                             const std::optional<MotionGuess>& guess) const {
   Pair pair{given};
-  // A lens that focuses changes the camera with every pair; the pixels of one map are those of one camera.
+  // A focusing lens changes the camera with every pair, but the pixels of a map are of one camera.
   if (state_.camera && *state_.camera != given.camera && state_.camera->isLike(given.camera))
     pair.refocused = given.seenBy(*state_.camera);
   if (state_.last_stamp) pair.dt = static_cast<double>(given.stamp - *state_.last_stamp) * 1e-9;
@@ -207,7 +207,7 @@ VisualOdometry::Pair VisualOdometry::usable(const StereoFeatures& given,
   return pair;
 }
 
-/// The pair as a rig would have seen it whose right camera did not rotate and was in step.
+/// Features as of a right camera that did not rotate and is synchronous.
 void VisualOdometry::straighten(Pair& pair) const {
   const LearntRig& rig = state_.rig;
   const bool is_new = pair.rotation.log_odds > 0.0;
@@ -218,8 +218,8 @@ void VisualOdometry::straighten(Pair& pair) const {
     pair.synchronised = synchronised(pair.taken(), pair.dt, *state_.prior.velocity());
 }
 
-/// The motion of the pair: in the map, or in that which the last pair of an outage would begin. Where the camera moves
-/// otherwise than expected, or the right one seems to have rotated, the pair is straightened and searched again.
+/// Searches the pair's motion in the map, after an outage also in the seed. If the camera turns otherwise than
+/// expected, or the right one seems to have rotated, features are compensated again and the search is repeated.
 void VisualOdometry::search(Pair& pair, const std::optional<MotionGuess>& guess, std::optional<MotionScene>& scene,
                             MotionHypothesis& found) const {
   const auto find = [&] {
@@ -249,7 +249,7 @@ void VisualOdometry::search(Pair& pair, const std::optional<MotionGuess>& guess,
   findSynchronised();
 }
 
-/// Over the `dt` s since the pair before: that of another source, else that of the velocity.
+/// Expected motion over the `dt` s since the previous pair: the guess, else the prediction.
 std::optional<Eigen::Isometry3d> VisualOdometry::expectedMotion(double dt,
                                                                 const std::optional<MotionGuess>& guess) const {
   if (guess) return guess->motion(state_.prior, dt);
@@ -257,8 +257,8 @@ std::optional<Eigen::Isometry3d> VisualOdometry::expectedMotion(double dt,
   return state_.prior.predicted(dt).motion;
 }
 
-/// A camera that repeats its images seems to stand. The guess, or the motion before, shows whether it does. A robot may
-/// stop from one pair to the next as far as the prior allows that; the first repeated pair decides.
+/// Log-odds that images repeat although the camera moved. The guess, or the last motion, implies whether it did. A
+/// robot may stop from one pair to the next as far as the prior allows; the first repeated pair decides.
 double VisualOdometry::logOddsOfFrozen(const StereoFeatures& features, double dt,
                                        const std::optional<MotionGuess>& guess) const {
   const RepeatedImages& images = state_.images;
@@ -280,8 +280,8 @@ double VisualOdometry::logOddsOfFrozen(const StereoFeatures& features, double dt
   return std::min(images.logOddsOfOld() + std::min(stop, -std::log(kTailProbability)), kCertain);
 }
 
-/// The map, the pair, and the motion between them as it is expected: what was already covered by predicted pairs, and
-/// from there on the velocity or the guess.
+/// The map, the pair, and the expected motion between them: that of predicted pairs since the reference, then the
+/// velocity or the guess.
 MotionScene VisualOdometry::sceneOf(const LocalMap& map, const StereoFeatures& features, double dt,
                                     const std::optional<MotionGuess>& guess) const {
   const MotionPrior& prior = state_.prior;
@@ -308,7 +308,7 @@ MotionScene VisualOdometry::sceneOf(const LocalMap& map, const StereoFeatures& f
   return scene;
 }
 
-/// The features as of one moment, if the right image is known to be late.
+/// The features at the time of the left image; none if no delay is known.
 std::optional<StereoFeatures> VisualOdometry::synchronised(const StereoFeatures& taken, double dt,
                                                            const Vector6d& velocity) const {
   const double known = state_.rig.calibration.delay();
@@ -316,7 +316,7 @@ std::optional<StereoFeatures> VisualOdometry::synchronised(const StereoFeatures&
   return state_.rig.right_delay.synchronised(taken, dt, velocity, known);
 }
 
-/// The pair with the motion that the search found; nothing without one, and none that spans an outage.
+/// The pair with its measured motion; none without a motion, or with one that spans an outage.
 std::optional<MeasuredPair> VisualOdometry::measuredPair(const Pair& pair, const MotionHypothesis& found) const {
   if (!found.motion.success || state_.interrupted || !(pair.dt > 0.0)) return std::nullopt;
   const StereoFeatures& taken = pair.taken();
@@ -326,16 +326,16 @@ std::optional<MeasuredPair> VisualOdometry::measuredPair(const Pair& pair, const
                       rowMotions(taken, found, since, state_.rig.usual_rows)};
 }
 
-/// What the pair shows of causes that would mislead its motion. It decides nothing.
+/// Evidence of the pair that its motion is not the camera's. It decides nothing.
 std::vector<Evidence> VisualOdometry::evidenceAgainst(const Pair& pair, const MotionHypothesis& found,
                                                       const std::optional<MeasuredPair>& measured) {
   LearntRig& rig = state_.rig;
-  // The map is of another rig than this pair.
+  // The map is from before the rotation.
   std::vector<Evidence> evidence{{pair.rotation.log_odds, pair.rotation.words()}};
   if (pair.features().report.refused) evidence.push_back({kCertain, "left and right did not belong together"});
   if (pair.is == Pair::kFollowed)
     evidence.push_back({pair.frozen, "images as of the previous pair, by a stop or a frozen driver", true});
-  // Unless the camera went unseen, the views may not be of one rigid world, and the next map would be as wrong.
+  // After a short gap, the views may not be of one rigid world, and the next map would be as wrong.
   if (pair.is == Pair::kFollowed && !found.motion.success && found.agreement.matches >= kManyMatches &&
       pair.dt <= options_.tracking.max_gap)
     evidence.push_back({kCertain, "many matches agreed on no motion", true});
@@ -349,13 +349,12 @@ std::vector<Evidence> VisualOdometry::evidenceAgainst(const Pair& pair, const Mo
   return evidence;
 }
 
-/// Log-odds of being misled above which a motion is doubtful.
+/// Log-odds that a motion is not the camera's, above which it is doubtful.
 double VisualOdometry::largestDoubt() const {
   return logOdds(1.0 - options_.tracking.probability);
 }
 
-/// Looks for the pair in the map from before an outage, then in that which the last pair would begin. How the camera
-/// moved meanwhile is unknown.
+/// Searches the pair in the map from before an outage, then in the seed. The camera's motion meanwhile is unknown.
 std::optional<MotionScene> VisualOdometry::reacquire(const StereoFeatures& features) const {
   std::optional<MotionScene> scene;
   const LocalMap& map = *state_.map;
@@ -372,7 +371,7 @@ std::optional<MotionScene> VisualOdometry::reacquire(const StereoFeatures& featu
   return scene;
 }
 
-/// Takes note of the pair, whatever becomes of its motion.
+/// Updates what each pair changes, whatever its motion.
 void VisualOdometry::begin(const Pair& pair, const std::optional<MotionGuess>& guess) {
   const StereoFeatures& features = pair.features();
   if (state_.camera && *state_.camera != features.camera) state_.forgetRig(options_);
@@ -381,11 +380,11 @@ void VisualOdometry::begin(const Pair& pair, const std::optional<MotionGuess>& g
   ++state_.pairs;
   if (pair.dt <= options_.tracking.max_gap) state_.prior.noteInterval(pair.dt);
   state_.outage.extend(pair.dt, guess, state_.prior);
-  state_.rig.calibration.predict(std::min(pair.dt, options_.tracking.max_gap));  // a clock's step changes no rig
+  state_.rig.calibration.predict(std::min(pair.dt, options_.tracking.max_gap));  // a clock's jump ages no rig
   if (pair.rotation.log_odds > 0.0) state_.rig.rotate(pair.rotation, features.camera);
 }
 
-/// Takes note of what became of the pair.
+/// Updates the state by the pair's step.
 void VisualOdometry::finish(const Pair& pair, Step& step) {
   const StereoFeatures& features = pair.features();
   state_.doubt.fade();
@@ -404,7 +403,7 @@ void VisualOdometry::finish(const Pair& pair, Step& step) {
   state_.outage.havePose();
 }
 
-/// The pair joins the map unless its motion is refuted, before or after the adjustment.
+/// The pair joins the map unless its motion is rejected, before or after the adjustment.
 VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, const MotionScene& scene,
                                                MotionHypothesis& found, double dt,
                                                const std::vector<Evidence>& evidence) {
@@ -435,7 +434,7 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   step.probability = belief.probability;
   step.starts_again = starts_again;
   if (!doubt.empty()) step.reason = "doubtful: " + doubt;
-  // A motion that is likely something else's predicts nothing.
+  // A motion that is probably not the camera's predicts nothing.
   if (belief.probability >= 0.5)
     state_.prior.takeVelocity(features.stamp, found.motion.T_current_reference.inverse(), since, measured,
                               doubt.empty(), step.covariance - measured);
@@ -454,7 +453,8 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
   return step;
 }
 
-/// Adjusts the map with the pair, which may refute most of what was inliers by corners. Then all hypotheses compete.
+/// Adjusts the map with the pair. If it rejects so many inliers that the motion is not beyond doubt, all hypotheses
+/// compete.
 VisualOdometry::Candidate VisualOdometry::adjustBeyondDoubt(const StereoFeatures& features, const MotionScene& scene,
                                                             MotionHypothesis& found) {
   const bool is_sound = !state_.doubt.lasts();
@@ -495,33 +495,32 @@ VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features,
   map.noteVariance(state_.rig.noise.ofPair(candidate.adjustment.newest_square, candidate.adjustment.newest_measured));
   candidate.adjustment.since_keyframe *= map.varianceOfMotion();
   candidate.adjustment.growth *= map.varianceOfMotion();
-  // The window's first pose does not move in the adjustment: what it carries in height and tilt goes with the whole
-  // map.
+  // The adjustment fixes the window's first pose: its error of height and tilt is corrected by moving the whole map.
   if (floor) map.moveTo(floor->settled(map.newestPose(), state_.covariance.value()));
   map.renewAppearance(features, found.sightings);
-  // What the adjustment did to the map as a whole is no motion.
+  // A shift of the whole map by the adjustment is no motion.
   const Eigen::Isometry3d T_before_after = candidate.T_keyframe_origin.inverse() * map.poseBeforeNewest();
   candidate.motion = T_previous_origin * T_before_after * map.newestPose().inverse();
   candidate.distance = (map.poseBeforeNewest() * map.newestPose().inverse()).translation().norm();
   return candidate;
 }
 
-/// Adds to the covariances what may be the camera's motion instead: that of rivals, of places that look alike, and of a
-/// camera whose stamps are wrong. A doubtful motion has the moment of its doubt as well.
+/// Adds second moments to the covariances: of rivals, of places that look alike, and of an unexpected innovation. A
+/// doubtful motion has the moment of its doubt as well.
 void VisualOdometry::widen(const MotionScene& scene, const MotionHypothesis& found, const Belief& belief, Step& step) {
   const auto add = [&](const Matrix6d& motion, const Matrix6d& pose) {
     step.covariance += motion;
     state_.covariance.doubt(motion, pose);
   };
   add(found.rivals_moment, found.rivals_moment);
-  add(unexpected(scene, found), Matrix6d::Zero());  // the pose does not rest on stamps, but the velocity does
+  add(unexpected(scene, found), Matrix6d::Zero());  // stamps change the velocity, not the pose
   if (isDoubtful(belief)) add(belief.moment, belief.pose_moment);
   if (!scene.place) return;
   step.covariance += scene.place->moment;
   state_.covariance.spread(scene.place->moment);
 }
 
-/// In words, if a motion is the camera's with too small a probability, or has too large a covariance.
+/// Reason, if a motion has too small a probability or too large a covariance; else empty.
 std::string VisualOdometry::doubtWords(const MotionScene& scene, const MotionHypothesis& found,
                                        const Candidate& candidate, const Belief& belief) const {
   if (isDoubtful(belief)) return belief.reason;
@@ -544,7 +543,7 @@ bool VisualOdometry::isDoubtful(const Belief& belief) const {
 
 void VisualOdometry::commit(const Candidate& candidate, const Belief& belief) {
   std::swap(state_.map, state_.candidate);
-  // In doubt, what is followed agrees with itself whatever it is.
+  // Points of a mover agree with each other: a doubtful pair does not confirm them.
   if (isDoubtful(belief)) state_.map->discountNewest();
   const LocalMap::Adjustment& adjustment = candidate.adjustment;
   if (!adjustment.success) return;
@@ -555,7 +554,7 @@ void VisualOdometry::commit(const Candidate& candidate, const Belief& belief) {
   if (adjustment.common_disparity_square) state_.rig.calibration.noteCommon(*adjustment.common_disparity_square);
 }
 
-/// The motion between the two poses, and its covariance.
+/// The motion between the two reported poses, and its covariance.
 VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, const Candidate& candidate) {
   const LocalMap& map = *state_.map;
   Step step;
@@ -570,8 +569,8 @@ VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, cons
                                               candidate.adjustment.growth);
   state_.covariance.expose(candidate.adjustment.by_calibration * candidate.calibration_by_rig,
                            RigEstimate::of(*state_.camera, candidate.calibration, candidate.delay));
-  // The motion between two reported poses contains what the map has learnt of the first one meanwhile: a perturbation
-  // of the key frame before, then of the newest pair.
+  // The motion between two reported poses includes the map's correction of the first one: a perturbation of the key
+  // frame before, here of the newest pair.
   step.correction = adjoint(map.newestPose() * map.poseBeforeNewest().inverse()) *
                     logSE3(candidate.T_keyframe_origin * map.poseBeforeNewest().inverse());
   state_.covariance.cover(step.correction);

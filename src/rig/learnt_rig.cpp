@@ -10,9 +10,9 @@
 namespace sdvo {
 namespace {
 
-/// Covariance of a rotation that is measured, errors of rectification included.
+/// Covariance of a measured rotation, with errors of rectification.
 Eigen::Matrix3d ofRigs(const RightRotation& measured) {
-  constexpr double kUsual = 0.2;  // px: of rigs that nothing disturbs (KITTI, EuRoC) the most is half a pixel
+  constexpr double kUsual = 0.2;  // px (rms): healthy rigs (KITTI, EuRoC) have half a pixel at most
   return measured.covariance + kUsual * kUsual * measured.spread;
 }
 
@@ -28,14 +28,14 @@ std::string ShownRotation::words() const {
 LearntRig::LearntRig(const CalibrationOptions& options, const NoiseOptions& assumed)
     : calibration(options), noise(assumed), assumed_(assumed), delay_sigma_(options.right_delay_sigma) {}
 
-/// A rotation against what changes on rigs, and on this one, as a rule.
+/// Weighs a rotation against the usual errors of rigs, and of this one.
 ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const MotionHypothesis& found,
                                        const Eigen::Vector3d& rate) const {
   constexpr double kKnock = 0.0175;  // rad: a degree (chosen)
   ShownRotation shown;
   if (features.count() < kFewestMeasured) return shown;
   std::optional<RightRotation> by_disparities;
-  // A motion of the minority may be something else's.
+  // A minority's motion may be a mover's.
   if (found.motion.success && 2 * found.agreement.inliers > found.agreement.matches) {
     NoiseOptions scaled = assumed_;
     scaled.corner *= noise.scale();
@@ -51,7 +51,7 @@ ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const Mot
   }
   if (!(information.determinant() > 0.0)) return shown;
   const Eigen::Matrix3d covariance = information.inverse();
-  // A right image that is late by d shows a camera that turns at the rate w as if it had rotated by d * w.
+  // While the camera turns at the rate w, a right image that is late by d looks rotated by d * w.
   const Eigen::Vector3d by_delay = delay_sigma_ * rate;
   shown.value = covariance * weighted;
   shown.covariance = covariance + by_delay * by_delay.transpose() + usual_change_;
@@ -65,7 +65,7 @@ void LearntRig::rotate(const ShownRotation& shown, const StereoCamera& camera) {
   const Eigen::Matrix3d covariance = rotation_covariance + shown.covariance;
   std::swap(rotation, rotation_before_), std::swap(rotation_covariance, covariance_before_);
   if (back.dot((covariance + rotation_covariance).inverse() * back) < noiseGate(3)) {
-    // The rig is as it was before the last one: no knock, but what its images do.
+    // The rig is again as before the last rotation: an error of images, no knock.
     usual_change_ += shown.value * shown.value.transpose();
     return;
   }

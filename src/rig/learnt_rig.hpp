@@ -14,31 +14,31 @@
 
 namespace sdvo {
 
-/// A pair whose motion was measured, as its rig learns from it.
+/// A pair with a measured motion, from which the rig is learnt.
 struct MeasuredPair {
-  const StereoFeatures& features;  ///< as taken
-  double dt;                       ///< s, since the pair before
+  const StereoFeatures& features;  ///< before compensation of the delay
+  double dt;                       ///< s, since the previous pair
   Eigen::Isometry3d T_current_reference;
   double since_reference;  ///< s
   std::vector<RowMotion> rows;
 
-  /// Mean of the camera in its own frame since the reference, m/s and rad/s.
+  /// Mean velocity since the reference, in the camera's frame, m/s and rad/s.
   Vector6d velocity() const { return logSE3(T_current_reference.inverse()) / since_reference; }
 };
 
-/// A rotation of the right camera since the pairs before, as the rows and disparities of one pair show it.
+/// A new rotation of the right camera, as rows and disparities of one pair imply it.
 struct ShownRotation {
   Eigen::Vector3d value = Eigen::Vector3d::Zero();       ///< rad
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< rad^2
-  double log_odds = kUnsuspected;                        ///< that it is one, and not what changes on this rig as a rule
+  double log_odds = kUnsuspected;                        ///< that it rotated, against the usual errors of this rig
   std::string words() const;
 };
 
-/// Calibration, rows, rotation, delay and noise of the rig, estimated from its pairs.
+/// Estimates of a rig's calibration, rows, rotation, delay and noise, from its pairs.
 struct LearntRig {
   CalibrationFilter calibration;
-  RowPattern usual_rows{RowDelay::kMemory};  ///< of confirmed pairs
-  /// Of the right camera since the map began, rad. Features are rotated back by it before anything else is done.
+  RowPattern usual_rows{RowDelay::kMemory};  ///< mean over confirmed pairs
+  /// Rotation of the right camera since the map began, rad. Features are rotated back by it before all other steps.
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
   Eigen::Matrix3d rotation_covariance = Eigen::Matrix3d::Zero();
   RightCameraDelay right_delay;
@@ -47,24 +47,23 @@ struct LearntRig {
 
   LearntRig(const CalibrationOptions& options, const NoiseOptions& noise);
 
-  /// `features`: as seen before the rotation that is known; `found`: their motion, if there is one; `rate`: of the
-  /// camera's turn, rad/s.
+  /// New rotation of the right camera. `features`: rotated back by the known one; `found`: their motion, if any;
+  /// `rate`: of the camera's rotation, rad/s.
   ShownRotation shownRotation(const StereoFeatures& features, const MotionHypothesis& found,
                               const Eigen::Vector3d& rate) const;
 
-  /// Takes a rotation for true.
+  /// Adds a new rotation. One that takes the last one back counts as a usual error of this rig.
   void rotate(const ShownRotation& shown, const StereoCamera& camera);
 
-  /// Takes in a pair whose motion is believed: confirmed ones teach all of it, doubted ones what follows the map alone.
-  /// `measured` is null where the pair has no motion.
+  /// Learns from a pair; unconfirmed ones only interrupt the delay's pairs. `measured` is null without a motion.
   void learn(const StereoFeatures& features, const MeasuredPair* measured, const MotionHypothesis& found,
              const ShownRotation& shown, bool is_confirmed);
 
  private:
   NoiseOptions assumed_;
-  double delay_sigma_;  ///< s: of the moments at which single right images are taken
+  double delay_sigma_;                                         ///< s: standard deviation of the delay of one pair
   Eigen::Matrix3d usual_change_ = Eigen::Matrix3d::Zero();     ///< rad^2: second moment of confirmed pairs' rotations
-  Eigen::Vector3d rotation_before_ = Eigen::Vector3d::Zero();  ///< until the last one
+  Eigen::Vector3d rotation_before_ = Eigen::Vector3d::Zero();  ///< before the last rotate()
   Eigen::Matrix3d covariance_before_ = Eigen::Matrix3d::Zero();
 };
 

@@ -14,7 +14,7 @@
 namespace sdvo {
 namespace {
 
-/// Velocity (px/s) of a point in the right image: at infinity, and for each px of disparity.
+/// Velocity (px/s) of a point in the right image: at infinity, and its part for each px of disparity.
 struct RightFlow {
   Eigen::Vector2d far, near;
 };
@@ -50,16 +50,16 @@ Synchronised synchronised(const StereoFeatures& features, int i, double delay, c
   return result;
 }
 
-/// The mean velocity during the delay, from that at the pair and the means over the intervals before and after it.
+/// Mean velocity during the delay, from that at the pair and the means over the intervals before and after it.
 Vector6d velocityDuring(double delay, double dt, const Vector6d& before, const Vector6d& at, const Vector6d& after) {
   const double share = std::min(std::abs(delay) / dt, 1.0);
   return at + share * ((delay < 0.0 ? before : after) - at);
 }
 
-/// Mean square (px^2, cut off) of what the rows differ from those of a right image that is late by `delay`, and lower
-/// by a constant.
+/// Mean squared residual (px^2, each cut off) of rows against a right image that is late by `delay` and lower by a
+/// constant.
 double misfit(const std::vector<RowMotion>& rows, double delay) {
-  constexpr double kCut = 2.0 * RowDelay::kKernel;  // rows further off are matched wrongly
+  constexpr double kCut = 2.0 * RowDelay::kKernel;  // px: larger residuals are wrong matches
   std::vector<double> rest;
   rest.reserve(rows.size());
   for (const RowMotion& row : rows) rest.push_back(row.dv - delay * row.velocity);
@@ -70,9 +70,9 @@ double misfit(const std::vector<RowMotion>& rows, double delay) {
   return sum / static_cast<double>(rest.size());
 }
 
-/// Ratio of the rows' apparent motion during `delay` that is an error of the left image: both the velocity and dv
-/// contain that error, so dv follows the velocity by this ratio even if the right image is in step (errors in
-/// variables, Fuller 1987). `row_error`: its standard deviation, px.
+/// Ratio of the rows' apparent motion during `delay` that is error of the left image. Velocity and dv share this error,
+/// so even in a synchronous rig dv follows the velocity by this ratio (errors in variables, Fuller 1987). `row_error`:
+/// its standard deviation, px.
 double errorRatio(const std::vector<RowMotion>& rows, double delay, double row_error) {
   double sum = 0.0, square = 0.0;
   for (const RowMotion& row : rows) sum += row.velocity, square += row.velocity * row.velocity;
@@ -81,12 +81,12 @@ double errorRatio(const std::vector<RowMotion>& rows, double delay, double row_e
   return variance > row_error * row_error ? row_error * row_error / variance : 1.0;
 }
 
-/// By how much (logarithm of the ratio) the rows are likelier if the right image is late by `delay` than in step. Their
-/// variance is unknown, and errors within a part of the image are alike.
+/// Log-likelihood ratio of the rows: right image late by `delay`, against synchronous. Their variance is unknown. Each
+/// part of the image counts as one observation, because its errors are correlated.
 double logRatioOfOtherPair(const std::vector<RowMotion>& rows, double delay, double row_error) {
   std::bitset<RowDelay::kParts> seen;
   for (const RowMotion& row : rows) seen.set(static_cast<std::size_t>(row.part));
-  const double parts = static_cast<double>(seen.count()) - 1.0;  // one tells the constant
+  const double parts = static_cast<double>(seen.count()) - 1.0;  // one fixes the constant
   const double synchronised = misfit(rows, delay < 0.0 ? delay * errorRatio(rows, delay, row_error) : 0.0);
   const double late = misfit(rows, delay);
   return synchronised == late ? 0.0 : 0.5 * parts * std::log(synchronised / late);
@@ -104,7 +104,7 @@ RightCameraDelay::RightCameraDelay()
 void RightCameraDelay::watch(const std::vector<RowMotion>& rows, double dt, double row_error) {
   if (rows.size() < kFewestMeasured || !(dt > 0.0)) return;
   for (auto* other : {&earlier_, &later_}) {
-    // Evidence fades without renewal, because a standing camera shows none.
+    // Evidence fades without renewal, because a standing camera gives none.
     const double carried = kUnsuspected + kUsualMemory * (*other - kUnsuspected);
     *other = std::clamp(carried + logRatioOfOtherPair(rows, other == &earlier_ ? -dt : dt, row_error), kUnsuspected,
                         kCertain);
@@ -139,12 +139,12 @@ std::string RightCameraDelay::OtherPair::words() const {
   return words.str();
 }
 
-/// The rows of the third last pair, whose neighbours are known.
+/// Adds the rows of the third last pair, between intervals of known velocity.
 void RightCameraDelay::addRows(double dt, double known) {
   const StereoFeatures& features = pairs_[1].features;
   const double stamped = features.right_delay, delay = stamped + known;
-  // The value at the border of two intervals by the means of four, to the fourth order. Motions too fast for
-  // the rate of the pairs are not in it, so the instrument has none of them.
+  // Velocity at the pair, to the fourth order, from the means over the four intervals around it. The instrument is
+  // their mean: it lacks motions too fast for the rate of pairs.
   const Vector6d near = pairs_[1].velocity + pairs_[2].velocity, far = pairs_[0].velocity + pairs_[3].velocity;
   const Vector6d at = (7.0 * near - far) / 12.0;
   const Vector6d during = velocityDuring(delay, dt, pairs_[1].velocity, at, pairs_[2].velocity);
@@ -163,15 +163,15 @@ void RightCameraDelay::addRows(double dt, double known) {
 StereoFeatures RightCameraDelay::synchronised(const StereoFeatures& features, double dt, const Vector6d& velocity,
                                               double known) const {
   const double delay = features.right_delay + known;
-  // The velocity goes on as it changed.
+  // The velocity changes as it did over the last interval.
   const Vector6d change = pairs_.empty() ? Vector6d::Zero() : Vector6d(velocity - pairs_.back().velocity);
   const Vector6d during = velocityDuring(delay, dt, velocity, velocity + 0.5 * change, velocity + change);
-  constexpr double kFar = std::numeric_limits<float>::epsilon();  // px: of points that noise puts beyond infinity
+  constexpr double kFar = std::numeric_limits<float>::epsilon();  // px: for points that noise puts beyond infinity
   StereoFeatures result = features;
   result.right_delay = 0.0;
   for (int i = 0; i < features.count(); ++i) {
     const Synchronised step = sdvo::synchronised(features, i, delay, during);
-    // In sideways motion the two views may be from one place.
+    // In sideways motion a late camera may be where the left one was: disparities vanish.
     result.disparity[i] = static_cast<float>(std::clamp<double>(step.disparity, kFar, features.camera.width));
     result.dv[i] -= static_cast<float>(delay * step.flow.y());
   }

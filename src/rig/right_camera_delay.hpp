@@ -13,21 +13,21 @@
 
 namespace sdvo {
 
-/// A point that agrees with the motion.
+/// Row of an inlier of the pair's motion.
 struct RowMotion {
   double velocity;  ///< down in the left image, px/s
-  double dv;        ///< v_right - v_left beyond what is usual at its place, px
+  double dv;        ///< v_right - v_left beyond RowPattern and the known delay, px
   int part;         ///< of the image (RowDelay::cellOf)
 };
 
-/// The time by which the right image is taken later than the left one, as rows show it, and what it does to the
-/// features. `known` is what the difference of their stamps, which the features name, leaves, s.
+/// Delay of right images against left ones, from rows, and its effect on features. `known`, s: the delay beyond the
+/// difference of the stamps (StereoFeatures::right_delay), as it is estimated.
 class RightCameraDelay {
  public:
   RightCameraDelay();
 
-  /// Evidence of a pair `dt` s after the one before for a right image that is another pair's. `row_error`, px: standard
-  /// deviation of a row in the left image.
+  /// Updates the evidence that right images are those of the previous or next pair, `dt` s apart. `row_error`, px:
+  /// standard deviation of a row in the left image.
   void watch(const std::vector<RowMotion>& rows, double dt, double row_error);
 
   /// Takes in a pair, as taken, with the camera's mean velocity (its own frame, m/s and rad/s) over the `dt` s before
@@ -41,7 +41,7 @@ class RightCameraDelay {
   /// The pair that the right images seem to belong to.
   struct OtherPair {
     double delay;     ///< s
-    double log_odds;  ///< that it is so
+    double log_odds;  ///< that they belong to it
     std::string words() const;
   };
   /// The likeliest one of a stream with a pair every `dt` s.
@@ -53,8 +53,8 @@ class RightCameraDelay {
 
  private:
   struct Pair {
-    StereoFeatures features;  ///< their positions alone
-    Vector6d velocity;        ///< over the time before it
+    StereoFeatures features;  ///< positions only
+    Vector6d velocity;        ///< mean over the interval before it
   };
   void addRows(double dt, double known);
 
