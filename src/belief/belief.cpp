@@ -24,7 +24,7 @@ void Doubt::raise(const std::vector<Evidence>& evidence) {
 }
 
 void Doubt::fade() {
-  // Pairs: half of kLastingSightings, after which new lasting points give evidence.
+  // Pairs: half of the time in which new points become lasting ones, and new evidence.
   constexpr double kHalfLife = 0.5 * MotionHypothesis::kLastingSightings;
   log_odds_ = kUnsuspected + (log_odds_ - kUnsuspected) * std::exp2(-1.0 / kHalfLife);
   if (!lasts()) distance_ = angle_ = largest_ = 0.0;

@@ -151,8 +151,7 @@ class Explanations {
     return areDivided(of_a, only_b) || areDivided(of_b, only_a);
   }
 
-  /// The one whose strongest rival is the weakest. A simple maximum may not exist: each two of them are compared by
-  /// other points.
+  /// The one whose strongest rival is the weakest: pairwise ratios compare different points, so no order may exist.
   std::size_t likeliest() const {
     const std::size_t count = hypotheses_.size();
     std::vector<double> strongest(count, -std::numeric_limits<double>::infinity());

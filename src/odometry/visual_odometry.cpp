@@ -569,8 +569,8 @@ VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, cons
                                               candidate.adjustment.growth);
   state_.covariance.expose(candidate.adjustment.by_calibration * candidate.calibration_by_rig,
                            RigEstimate::of(*state_.camera, candidate.calibration, candidate.delay));
-  // The motion between two reported poses includes the map's correction of the first one: a perturbation of the key
-  // frame before, here of the newest pair.
+  // The motion between two reported poses includes the map's correction of the first one. It is found as a perturbation
+  // of the key frame, and reported as one of the newest pair.
   step.correction = adjoint(map.newestPose() * map.poseBeforeNewest().inverse()) *
                     logSE3(candidate.T_keyframe_origin * map.poseBeforeNewest().inverse());
   state_.covariance.cover(step.correction);

@@ -31,7 +31,7 @@ LearntRig::LearntRig(const CalibrationOptions& options, const NoiseOptions& assu
 /// Weighs a rotation against the usual errors of rigs, and of this one.
 ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const MotionHypothesis& found,
                                        const Eigen::Vector3d& rate) const {
-  constexpr double kKnock = 0.0175;  // rad: a degree (chosen)
+  constexpr double kKnock = 0.0175;  // rad (chosen): prior of a knock, a degree
   ShownRotation shown;
   if (features.count() < kFewestMeasured) return shown;
   std::optional<RightRotation> by_disparities;

@@ -10,10 +10,10 @@
 
 namespace sdvo {
 
-/// Delay of a rig's right images, from rows. A point that moves down in the right image at v' px/s is v' * delay px
-/// lower in a late one. Other errors of rows are fitted, too: constant ones of rectification in each part of the image,
-/// and one of a lower right camera, proportional to disparity. Instrumental variables (Wright 1928), with a fixed
-/// effect for each part.
+/// Delay of a rig's right images, from rows. In a late image, a point that moves down at v' px/s is v' * delay px
+/// lower. Other errors of rows are fitted, too: constant ones of rectification in each part of the image, and one of a
+/// lower right camera, proportional to disparity. Instrumental variables (Wright 1928), with a fixed effect for each
+/// part.
 class RowDelay {
  public:
   static constexpr int kColumns = 6, kRows = 4, kParts = kColumns * kRows;  ///< of the image
@@ -21,8 +21,8 @@ class RowDelay {
   static constexpr double kKernel = 0.5;    ///< px (chosen): of Huber's kernel; errors of healthy rows are smaller
   static constexpr double kSquare = noiseGate(1);  ///< squared standard deviations that chance explains
   /// Delays to warn of, and to fail at, s. 2 ms is 2 cm at 10 m/s, and 0.4 px at 100 deg/s and f = 120 px. Synchronous
-  /// rigs have 0.2 ms at most (proved(), twelve drives). 10 ms is 3.7 px at 100 deg/s and f = 212 px: beyond 3 m, a rig
-  /// of 5 cm then has negative disparities.
+  /// rigs have 0.2 ms at most (proved(), twelve drives). 10 ms is 3.7 px at 100 deg/s and f = 212 px: beyond 3 m,
+  /// disparities of a baseline of 5 cm are then negative.
   static constexpr double kWarn = 0.002, kFail = 0.01;
 
   /// Rows of a feature.
