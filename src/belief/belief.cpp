@@ -31,8 +31,8 @@ void Doubt::fade() {
 }
 
 Belief Doubt::weigh(const MotionScene& scene, const MotionHypothesis& found, const std::vector<Evidence>& evidence) {
-  const double rivals = 1.0 / found.probability - 1.0, misled = std::exp(logOddsMisled(scene, found));
-  if (lasts()) log_odds_ = std::clamp(log_odds_ - logAgreement(scene, found), kUnsuspected, kCertain);
+  const double rivals = 1.0 / found.probability - 1.0, misled = std::exp(logOddsMisled(found));
+  if (lasts()) log_odds_ = std::clamp(log_odds_ - logAgreement(found.agreement), kUnsuspected, kCertain);
   const double carried = std::exp(log_odds_);
   const std::string carried_cause = cause_;
   const auto largest = std::max_element(evidence.begin(), evidence.end(),

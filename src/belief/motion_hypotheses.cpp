@@ -17,6 +17,7 @@ namespace sdvo {
 namespace {
 
 constexpr double kLogOddsOfSighting = 0.75;  // that a point stands still, by each confirmed sighting (chosen)
+constexpr double kTorn = 0.1;  // odds (chosen) that a row divides two motions because the image is torn, not by a mover
 
 /// Of n observations that are correlated by this coefficient (Kish 1965, the design effect): 2.5 at most. Points of one
 /// object move together, and a view has few objects.
@@ -116,7 +117,8 @@ class Explanations {
   }
 
   /// Log-odds of hypothesis a against b, by the prior and the points that only one of them explains. Points of an
-  /// object count by their effective number, scattered ones each for itself, those of a torn image not at all.
+  /// object count by their effective number, scattered ones each for itself. Where a row divides them, they may be of a
+  /// torn image and then do not count.
   double logRatio(std::size_t a, std::size_t b) const {
     double of_a = 0.0, of_b = 0.0;
     for (std::size_t i = 0; i < sightings_.size(); ++i)
@@ -125,7 +127,8 @@ class Explanations {
     const int points = static_cast<int>(only_a.size() + only_b.size());
     double images = kLogOddsOfSighting * (of_a - of_b);
     if (areTorn(a, b))
-      images = 0.0;
+      images =
+          std::log((std::exp(logLikelihood(of_b, points)) + kTorn) / (std::exp(logLikelihood(of_a, points)) + kTorn));
     else if (isObject(only_a, only_b) || isObject(only_b, only_a))
       images = logLikelihood(of_b, points) - logLikelihood(of_a, points);
     return logPrior(hypotheses_[a]) - logPrior(hypotheses_[b]) + images;
@@ -357,18 +360,17 @@ double logLikelihood(double of_others, int points) {
   return -effectiveNumber(points) * kLogOddsOfSighting * of_others / points;
 }
 
-double logAgreement(const MotionScene& scene, const MotionHypothesis& hypothesis) {
-  const Agreement& agreement = hypothesis.agreement;
+double logAgreement(const Agreement& agreement) {
   if (agreement.lasting_matches == 0) return 0.0;
   const double by_chance = probabilityOf(-kLogOddsOfSighting * MotionHypothesis::kLastingSightings);
-  const double usual = std::max(scene.usual_agreement, 0.5);
   const double ratio = static_cast<double>(agreement.lasting_inliers) / agreement.lasting_matches;
   return effectiveNumber(agreement.lasting_matches) *
-         (ratio * std::log(usual / by_chance) + (1.0 - ratio) * std::log((1.0 - usual) / (1.0 - by_chance)));
+         (ratio * std::log(kLastingAgreement / by_chance) +
+          (1.0 - ratio) * std::log((1.0 - kLastingAgreement) / (1.0 - by_chance)));
 }
 
-double logOddsMisled(const MotionScene& scene, const MotionHypothesis& hypothesis) {
-  return kUnsuspected - logPrior(hypothesis) - logAgreement(scene, hypothesis);
+double logOddsMisled(const MotionHypothesis& hypothesis) {
+  return kUnsuspected - logPrior(hypothesis) - logAgreement(hypothesis.agreement);
 }
 
 MotionHypothesis chooseMotion(const MotionScene& scene, double threshold, std::vector<MotionHypothesis> hypotheses) {

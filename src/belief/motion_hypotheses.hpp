@@ -52,7 +52,6 @@ struct MotionScene {
   std::optional<Eigen::Isometry3d> T_current_reference;  ///< predicted; reference: the map's newest pair
   std::optional<Eigen::Isometry3d> guess;                ///< the same from another source than images
   std::vector<ExpectedMotion> prior;  ///< mixture for T_reference_current; empty: all motions are equally likely
-  double usual_agreement = 0.9;       ///< mean ratio of lasting matches that agree with this rig's motions
   bool is_suspected = false;          ///< carried doubt lasts: all hypotheses compete
   bool is_doubted = false;            ///< … and makes pairs doubtful: the search radius is wide at once
   double tolerance = 0.05;            ///< m: motions that differ by less than this and 3 % are equally good
@@ -107,6 +106,9 @@ struct MotionHypothesis {
 /// Ratio of all points (chosen) above which a group of them is more than wrong matches.
 constexpr double kGoodPart = 0.1;
 
+/// Ratio of lasting matches that agree with the camera's motion (chosen); others are wrong.
+constexpr double kLastingAgreement = 0.9;
+
 /// Tolerated error of a motion, as a ratio of its distance or angle.
 constexpr double kTolerableRatio = 0.03;
 
@@ -141,10 +143,10 @@ bool agree(const StereoCamera& camera, const std::vector<Correspondence>& corres
 double logLikelihood(double of_others, int points);
 
 /// Log-likelihood ratio of the lasting points' agreement: under the camera's motion, against a mover's.
-double logAgreement(const MotionScene& scene, const MotionHypothesis& hypothesis);
+double logAgreement(const Agreement& agreement);
 
 /// Log-odds that a motion is not the camera's, by this pair's innovation and agreement of lasting points.
-double logOddsMisled(const MotionScene& scene, const MotionHypothesis& hypothesis);
+double logOddsMisled(const MotionHypothesis& hypothesis);
 
 /// Weighs hypotheses by prior and likelihood, and merges those of one motion. Returns the likeliest with its rivals and
 /// the times of all. `threshold`, px: of an inlier.

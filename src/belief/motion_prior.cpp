@@ -32,12 +32,15 @@ Matrix6d MotionPrior::stampNoise(const Vector6d& velocity) const {
 }
 
 void MotionPrior::noteInterval(double dt) {
+  constexpr double kMean = 1.0 / (1.0 - kUsualMemory);  // intervals
+  intervals_ = std::min(intervals_ + 1.0, kMean);
+  mean_interval_ += (dt - mean_interval_) / intervals_;
   interval_ = std::max(dt, kUsualMemory * interval_);
 }
 
 double MotionPrior::interval(double dt, const Eigen::Isometry3d& motion) const {
-  constexpr double kBurst = 0.1;  // ratio of intervals (chosen): a camera does not change its rate by as much
-  return std::max({dt < kBurst * interval_ ? interval_ : dt, motion.translation().norm() / options_.max_speed,
+  constexpr double kBurst = 0.2;  // ratio of the mean interval (chosen): a camera does not change its rate by as much
+  return std::max({dt < kBurst * mean_interval_ ? interval_ : dt, motion.translation().norm() / options_.max_speed,
                    logSO3(motion.linear()).norm() / options_.max_rotation_rate});
 }
 

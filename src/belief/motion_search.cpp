@@ -58,7 +58,7 @@ MotionHypothesis MotionSearch::find(const MotionScene& scene, double max_doubt) 
   for (bool is_chosen = false;; is_chosen = true) {
     if (is_chosen)
       found = chooseMotion(scene, options(scene).inlier_threshold, compete(scene, view, std::move(found)));
-    else if (scene.is_suspected || !isBeyondDoubt(scene, found, max_doubt))
+    else if (scene.is_suspected || !isBeyondDoubt(found, max_doubt))
       continue;
     if (!found.motion.success) return found;
     stopwatch.lap();
@@ -107,10 +107,10 @@ std::vector<MotionHypothesis> MotionSearch::compete(const MotionScene& scene, co
 
 /// Prior and lasting points do not contradict, and the majority agrees with the motion, all over the image. The lasting
 /// outliers in excess of this rig's mean would be no serious rival even if they moved together.
-bool MotionSearch::isBeyondDoubt(const MotionScene& scene, const MotionHypothesis& found, double max_doubt) const {
-  if (!found.motion.success || found.innovation > noiseGate(6) || logOddsMisled(scene, found) > max_doubt) return false;
+bool MotionSearch::isBeyondDoubt(const MotionHypothesis& found, double max_doubt) const {
+  if (!found.motion.success || found.innovation > noiseGate(6) || logOddsMisled(found) > max_doubt) return false;
   const double agree = found.agreement.lasting_inliers;
-  const double lacking = scene.usual_agreement * found.agreement.lasting_matches - agree;
+  const double lacking = kLastingAgreement * found.agreement.lasting_matches - agree;
   if (lacking >= motion_options_.min_inliers) {
     constexpr int kSightings = MotionHypothesis::kLastingSightings;
     const int points = static_cast<int>(agree + lacking);
@@ -128,7 +128,7 @@ MotionHypothesis MotionSearch::searchNear(const MotionScene& scene, const ViewPt
   double match_time = 0.0, motion_time = 0.0;
   if (!scene.is_doubted) {
     MotionHypothesis found = search(matcher_, scene, view, T_current_reference);
-    if (isBeyondDoubt(scene, found, max_doubt) && !leavesGate(scene, *T_current_reference, found)) return found;
+    if (isBeyondDoubt(found, max_doubt) && !leavesGate(scene, *T_current_reference, found)) return found;
     match_time = found.match_time, motion_time = found.motion_time;
   }
   MotionHypothesis found = search(wide_matcher_, scene, view, T_current_reference);

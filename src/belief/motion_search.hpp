@@ -27,7 +27,7 @@ class MotionSearch {
   MotionHypothesis find(const MotionScene& scene, double max_doubt) const;
 
   /// Whether no other hypothesis needs to compete with this one.
-  bool isBeyondDoubt(const MotionScene& scene, const MotionHypothesis& found, double max_doubt) const;
+  bool isBeyondDoubt(const MotionHypothesis& found, double max_doubt) const;
 
   /// Reason, if there are too few inliers, or as many as chance gives; else empty.
   std::string chanceWords(const MotionScene& scene, const MotionHypothesis& found) const;

@@ -31,9 +31,10 @@ Eigen::Isometry3d lookingAhead() {
   return T_base_camera;
 }
 
-/// Of the motion's inliers over the last `dt` s, as the motion has them: corners have more noise.
+/// Of the motion's inliers over the last `dt` s, as the motion has them: corners have more noise. `delay`: of the right
+/// image as far as it is known, s.
 std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHypothesis& found, double dt,
-                                  const RowPattern& usual) {
+                                  const RowPattern& usual, double delay) {
   std::vector<RowMotion> rows;
   rows.reserve(found.motion.inliers.size());
   for (const int i : found.motion.inliers) {
@@ -41,7 +42,7 @@ std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHy
     const Eigen::Vector3d now = found.motion.T_current_reference * found.view->points.positions[reference];
     const StereoCamera& camera = features.camera;
     const double velocity = (camera.project(now).y() - found.view->pixels[reference].y) / dt;
-    rows.push_back({velocity, usual.change(features, current) - features.right_delay * velocity,
+    rows.push_back({velocity, usual.change(features, current) - delay * velocity,
                     RowDelay::cellOf(features.u[current], features.v[current], camera.width, camera.height)});
   }
   return rows;
@@ -291,7 +292,6 @@ MotionScene VisualOdometry::sceneOf(const LocalMap& map, const StereoFeatures& f
                     {},
                     {},
                     {},
-                    state_.rig.usual_agreement,
                     state_.doubt.lasts(),
                     state_.doubt.logOdds() > largestDoubt(),
                     options_.tracking.doubtful_deviation,
@@ -322,8 +322,9 @@ std::optional<MeasuredPair> VisualOdometry::measuredPair(const Pair& pair, const
   const StereoFeatures& taken = pair.taken();
   const Eigen::Isometry3d& motion = found.motion.T_current_reference;
   const double since = state_.prior.interval(state_.map->secondsUntil(taken), motion);
-  return MeasuredPair{taken, state_.prior.interval(pair.dt, motion), motion, since,
-                      rowMotions(taken, found, since, state_.rig.usual_rows)};
+  return MeasuredPair{
+      taken, state_.prior.interval(pair.dt, motion), motion, since,
+      rowMotions(taken, found, since, state_.rig.usual_rows, taken.right_delay + state_.rig.calibration.delay())};
 }
 
 /// Evidence of the pair that its motion is not the camera's. It decides nothing.
@@ -341,7 +342,7 @@ std::vector<Evidence> VisualOdometry::evidenceAgainst(const Pair& pair, const Mo
     evidence.push_back({kCertain, "many matches agreed on no motion", true});
   if (!measured) return evidence;
   rig.right_delay.watch(measured->rows, measured->dt, options_.noise.corner * rig.noise.scale());
-  const RightCameraDelay::OtherPair other = rig.right_delay.otherPair(measured->dt, rig.calibration.delay());
+  const RightCameraDelay::OtherPair other = rig.right_delay.otherPair(measured->dt);
   evidence.push_back({other.log_odds, other.words()});
   evidence.push_back(
       {kUnsuspected + state_.prior.logRatioOfSwap(measured->T_current_reference.inverse(), measured->since_reference),
@@ -458,10 +459,10 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
 VisualOdometry::Candidate VisualOdometry::adjustBeyondDoubt(const StereoFeatures& features, const MotionScene& scene,
                                                             MotionHypothesis& found) {
   const bool is_sound = !state_.doubt.lasts();
-  const bool was_beyond_doubt = search_.isBeyondDoubt(scene, found, largestDoubt());
+  const bool was_beyond_doubt = search_.isBeyondDoubt(found, largestDoubt());
   Candidate candidate = adjust(features, scene.map, found, is_sound);
   found.reject(candidate.adjustment.rejected);
-  if (!was_beyond_doubt || search_.isBeyondDoubt(scene, found, largestDoubt())) return candidate;
+  if (!was_beyond_doubt || search_.isBeyondDoubt(found, largestDoubt())) return candidate;
   MotionScene suspected = scene;
   suspected.is_suspected = true;
   MotionHypothesis chosen = search_.find(suspected, largestDoubt());

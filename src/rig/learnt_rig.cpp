@@ -75,17 +75,11 @@ void LearntRig::rotate(const ShownRotation& shown, const StereoCamera& camera) {
 
 void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measured, const MotionHypothesis& found,
                       const ShownRotation& shown, bool is_confirmed) {
-  constexpr double kMost = 0.95;  // even if all agree, a few need not in the next pair (chosen)
   if (is_confirmed) {
     usual_change_ += (1.0 - kUsualMemory) * (shown.value * shown.value.transpose() - usual_change_);
     usual_rows.learn(features);
     noise.learn(found.motion.rms);
     if (found.lasting_square) noise.learnShared(*found.lasting_square);
-    const Agreement& agreement = found.agreement;
-    if (agreement.lasting_matches > 0) {
-      const double ratio = static_cast<double>(agreement.lasting_inliers) / agreement.lasting_matches;
-      usual_agreement += (1.0 - kUsualMemory) * (std::min(ratio, kMost) - usual_agreement);
-    }
   }
   if (measured)
     right_delay.learn(measured->features, measured->dt, measured->velocity(), calibration.delay(), is_confirmed);

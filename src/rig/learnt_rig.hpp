@@ -43,7 +43,6 @@ struct LearntRig {
   Eigen::Matrix3d rotation_covariance = Eigen::Matrix3d::Zero();
   RightCameraDelay right_delay;
   Noise noise;
-  double usual_agreement = 0.9;  ///< ratio of lasting matches that agree with confirmed motions
 
   LearntRig(const CalibrationOptions& options, const NoiseOptions& noise);
 

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <sstream>
-#include <utility>
 #include <vector>
 
 #include "../common/statistics.hpp"
@@ -92,14 +91,12 @@ double logRatioOfOtherPair(const std::vector<RowMotion>& rows, double delay, dou
   return synchronised == late ? 0.0 : 0.5 * parts * std::log(synchronised / late);
 }
 
-constexpr int kRefutable = 30;         // pairs (chosen) within which a wrong pair is known
 constexpr int kSamePoints = 2;         // pairs in a row whose errors are alike (chosen)
 constexpr double kLeastTurning = 2.0;  // px/s: rotations from images err by less
 
 }  // namespace
 
-RightCameraDelay::RightCameraDelay()
-    : rows_(RowDelay::kMemory, kLeastTurning, kSamePoints), newer_(rows_), older_(rows_) {}
+RightCameraDelay::RightCameraDelay() : rows_(RowDelay::kMemory, kLeastTurning, kSamePoints) {}
 
 void RightCameraDelay::watch(const std::vector<RowMotion>& rows, double dt, double row_error) {
   if (rows.size() < kFewestMeasured || !(dt > 0.0)) return;
@@ -113,7 +110,6 @@ void RightCameraDelay::watch(const std::vector<RowMotion>& rows, double dt, doub
 
 void RightCameraDelay::learn(const StereoFeatures& features, double dt, const Vector6d& velocity, double known,
                              bool is_confirmed) {
-  if (std::max(earlier_, later_) > 0.0) rows_ = newer_ = older_;
   if (!is_confirmed) return interrupt();
   StereoFeatures positions;
   positions.camera = features.camera;
@@ -124,11 +120,9 @@ void RightCameraDelay::learn(const StereoFeatures& features, double dt, const Ve
   if (pairs_.size() < 4) return;
   addRows(dt, known);
   pairs_.pop_front();
-  if (++taught_ % kRefutable == 0) older_ = std::exchange(newer_, rows_);
 }
 
-RightCameraDelay::OtherPair RightCameraDelay::otherPair(double dt, double known) const {
-  if (2.0 * std::abs(known) > dt) return {known, kCertain};
+RightCameraDelay::OtherPair RightCameraDelay::otherPair(double dt) const {
   return earlier_ > later_ ? OtherPair{-dt, earlier_} : OtherPair{dt, later_};
 }
 

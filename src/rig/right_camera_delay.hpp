@@ -31,7 +31,7 @@ class RightCameraDelay {
   void watch(const std::vector<RowMotion>& rows, double dt, double row_error);
 
   /// Takes in a pair, as taken, with the camera's mean velocity (its own frame, m/s and rad/s) over the `dt` s before
-  /// it. The last pairs are forgotten once their right images are likely those of other pairs.
+  /// it.
   void learn(const StereoFeatures& features, double dt, const Vector6d& velocity, double known, bool is_confirmed);
   /// The next pair does not continue the last one.
   void interrupt() { pairs_.clear(); }
@@ -45,7 +45,7 @@ class RightCameraDelay {
     std::string words() const;
   };
   /// The likeliest one of a stream with a pair every `dt` s.
-  OtherPair otherPair(double dt, double known) const;
+  OtherPair otherPair(double dt) const;
 
   /// The features as the right camera would have seen them at the left one's moment. `velocity`: the mean over the
   /// `dt` s before the pair.
@@ -59,8 +59,6 @@ class RightCameraDelay {
   void addRows(double dt, double known);
 
   RowDelay rows_;
-  RowDelay newer_, older_;  ///< as they were some tens of pairs ago
-  int taught_ = 0;          ///< pairs
   std::deque<Pair> pairs_;  ///< the last ones
   /// Log-odds of a right image that is the pair's before or after.
   double earlier_ = kUnsuspected, later_ = kUnsuspected;

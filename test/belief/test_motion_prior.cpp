@@ -71,11 +71,18 @@ TEST(MotionPrior, StampsMakeTheWayUncertainNotTheSides) {
 
 TEST(MotionPrior, APredictionWithinABurstIsAsUncertainAsTheIntervalBefore) {
   MotionPrior prior = moving({});
-  prior.noteInterval(0.1);
+  for (int i = 0; i < 10; ++i) prior.noteInterval(0.1);
   prior.noteInterval(0.001);
   EXPECT_GT(std::sqrt(prior.predicted(0.001).covariance(2, 2)), 3.0 * 0.079);
   for (int i = 0; i < 100; ++i) prior.noteInterval(0.001);
   EXPECT_LT(std::sqrt(prior.predicted(0.001).covariance(2, 2)), 1e-3);
+}
+
+TEST(MotionPrior, AnIntervalAfterAHiccupIsNoBurst) {
+  MotionPrior prior({});
+  for (int i = 0; i < 10; ++i) prior.noteInterval(0.033);
+  prior.noteInterval(0.9);
+  EXPECT_EQ(prior.interval(0.033, ahead(0.1)), 0.033);
 }
 
 TEST(MotionPrior, NothingTakesPlaceInLessTimeThanItMayTake) {
