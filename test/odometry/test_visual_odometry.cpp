@@ -826,6 +826,24 @@ TEST(VisualOdometry, StampsThatMisleadThePriorDoNotMisleadThePose) {
   EXPECT_GE(degraded, 5) << "the stamps are not believed";
 }
 
+TEST(VisualOdometry, AKnownDelayBeyondHalfAnIntervalIsNoOtherPairs) {
+  VisualOdometryOptions options = knownRig();
+  options.calibration.right_delay = 0.055;
+  VisualOdometry odometry(options);
+  for (int i = 0; i <= 20; ++i) {
+    StereoFeatures late = pairOf(i, 0.1);
+    const Eigen::Isometry3d motion = drivePose(i).inverse() * drivePose(i + 1);
+    const Eigen::Isometry3d T_late_left = expSE3(0.55 * logSE3(motion)).inverse();
+    for (int k = 0; k < late.count(); ++k) {
+      const Eigen::Vector3d right = late.camera.project(T_late_left * late.point(k));
+      late.disparity[k] = std::max(late.u[k] - static_cast<float>(right.z()), 0.01f);
+      late.dv[k] += static_cast<float>(right.y()) - late.v[k];
+    }
+    const OdometryResult result = odometry.update(late);
+    EXPECT_TRUE(result.state == TrackingState::kTracking || i < 5) << i << ": " << result.reason;
+  }
+}
+
 TEST(VisualOdometry, WhatIsPredictedFromADoubtfulMotionIsDoubtful) {
   VisualOdometry odometry({}), sound({});
   follow(odometry, 5);
