@@ -20,6 +20,13 @@ std::string replaced(std::string text, const std::string& from, const std::strin
   return text;
 }
 
+/// " " and the left image of each camera.
+std::string leftImages(const std::vector<ros::M_string>& cameras) {
+  std::string names;
+  for (const ros::M_string& camera : cameras) names += " " + camera.at("left/image_rect");
+  return names;
+}
+
 }  // namespace
 
 bool isAmong(const ros::master::V_TopicInfo& topics, const std::string& name) {
@@ -36,7 +43,14 @@ std::string explainUnpublished(const std::vector<std::string>& names, const ros:
           ", but its /compressed: set stereo_features/image_transport to compressed, for one side alone "
           "stereo_features/left_image/image_transport or right_image/image_transport";
   }
-  return text;
+  return text.empty() ? text : text + listStereoCameras(topics);
+}
+
+std::string listStereoCameras(const ros::master::V_TopicInfo& topics) {
+  if (const auto cameras = findStereoCameras("/", topics); !cameras.empty())
+    return "; stereo cameras are on:" + leftImages(cameras);
+  const auto raw = findStereoCameras("/", topics, {"image_raw"});
+  return raw.empty() ? "" : "; raw stereo cameras, for stereo_raw.launch, are on:" + leftImages(raw);
 }
 
 std::vector<ros::M_string> findStereoCameras(const std::string& ns, const ros::master::V_TopicInfo& topics,
@@ -84,9 +98,8 @@ bool CameraFinder::update(const ros::master::V_TopicInfo& topics, std::string& r
   if (cameras.empty()) return false;
   report = "nobody publishes " + left_ + " and " + right_;
   if (cameras.size() > 1) {
-    report +=
-        ", and there are several stereo cameras in " + ns_ + ": set left_image_topic and the like to those of one:";
-    for (const ros::M_string& camera : cameras) report += " " + camera.at("left/image_rect");
+    report += ", and there are several stereo cameras in " + ns_ +
+              ": set left_image_topic and the like to those of one:" + leftImages(cameras);
     return false;
   }
   names_ = cameras.front();

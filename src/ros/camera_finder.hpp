@@ -19,9 +19,11 @@ bool isAmong(const ros::master::V_TopicInfo& topics, const std::string& name);
 std::vector<ros::M_string> findStereoCameras(const std::string& ns, const ros::master::V_TopicInfo& topics,
                                              const std::vector<std::string>& images = kRectifiedImages);
 
-/// Reports those of the topics that nobody publishes, with a remedy if the compressed ones are published. Each begins
-/// with
-/// "; ".
+/// "; " and the left images of all stereo cameras, or if there is none of those with raw images, or nothing.
+std::string listStereoCameras(const ros::master::V_TopicInfo& topics);
+
+/// Reports those of the topics that nobody publishes, with a remedy if the compressed ones are published, and the
+/// cameras that there are. Each begins with "; ".
 std::string explainUnpublished(const std::vector<std::string>& names, const ros::master::V_TopicInfo& topics);
 
 /// Chooses the only stereo camera under a node's namespace while nobody publishes the node's own image topics, and goes

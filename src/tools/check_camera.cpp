@@ -16,6 +16,7 @@
 #include "../check/finding.hpp"
 #include "../common/worker.hpp"
 #include "../messages/stamps.hpp"
+#include "../ros/camera_finder.hpp"
 #include "camera_check.hpp"
 #include "camera_input.hpp"
 #include "page.hpp"
@@ -115,7 +116,11 @@ int check(const Arguments& arguments) {
   CameraInput input(topics, infosOf(arguments.source), [&](const ArrivedPair& pair) { worker.push(pair.messages); });
   listen(arguments, topics, input);
   worker.stop();
-  return report(topics[0], input.findings(arguments.base_frame, false));
+  ArrivalFindings findings = input.findings(arguments.base_frame, false);
+  ros::master::V_TopicInfo published;
+  if (findings.topics.verdict == Verdict::kFail && ros::master::getTopics(published))
+    findings.topics.remedy += listStereoCameras(published);
+  return report(topics[0], findings);
 }
 
 }  // namespace

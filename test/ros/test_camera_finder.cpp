@@ -53,7 +53,12 @@ TEST(CameraFinder, TopicsWithoutAPublisherAreNamed) {
   const std::vector<std::string> names = {"/stereo/left/image_rect", "/stereo/right/image_rect",
                                           "/stereo/left/camera_info"};
   EXPECT_EQ(explainUnpublished(names, published), "");
-  EXPECT_EQ(explainUnpublished({"/other/image_rect"}, published), "; nobody publishes /other/image_rect");
+  const std::string other = "; nobody publishes /other/image_rect";
+  EXPECT_EQ(explainUnpublished({"/other/image_rect"}, {}), other);
+  EXPECT_EQ(explainUnpublished({"/other/image_rect"}, published),
+            other + "; stereo cameras are on: /stereo/left/image_rect");
+  EXPECT_EQ(explainUnpublished({"/other/image_rect"}, topics({"/stereo/left/", "/stereo/right/"}, {"image_raw"})),
+            other + "; raw stereo cameras, for stereo_raw.launch, are on: /stereo/left/image_raw");
   published.erase(published.begin() + 1);
   const std::string only_compressed = explainUnpublished(names, published);
   EXPECT_EQ(only_compressed.find("; nobody publishes /stereo/left/image_rect, but its /compressed: set "), 0u);
