@@ -303,7 +303,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     restart("reset was called", std::make_shared<PlaceSession>(recognition_options_));
   }
 
-  /// Returns the number of places in words.
+  /// Returns the number of places and the file in words.
   std::string save(const std::string& path) {
     std::unique_lock<std::mutex> lock(mutex_);
     const SavedPlaces saved = session_->saved();
@@ -320,7 +320,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
       kept_[path] = saved.places.size();
       if (path == inRosHome(options_.places_file)) saved_changes_ = changes;
     }
-    return std::to_string(saved.places.size()) + " places";
+    return std::to_string(saved.places.size()) + " places in '" + path + "'";
   }
 
   /// Writes places_file, each minute and at the end. At the end roslaunch grants 15 s, and rosconsole is gone.
@@ -352,7 +352,7 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     const ros::SteadyTime begin = ros::SteadyTime::now();
     try {
       const std::string saved = save(path);
-      if (at_end) say(saved + " are saved");
+      if (at_end) say("saved: " + saved);
     } catch (const std::exception& e) {
       say(std::string("the map is not saved: ") + e.what());
     }

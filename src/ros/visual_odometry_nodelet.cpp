@@ -484,7 +484,7 @@ class VisualOdometryNodelet : public RobotNodelet {
     given_start_ = true;
   }
 
-  /// Returns the number of poses in words.
+  /// Returns the number of poses and the file in words.
   std::string save(const std::string& format, const std::string& file) {
     const nav_msgs::Path path = publisher_->path();
     if (path.poses.empty()) throw std::runtime_error("there is no pose to save yet: reason of vo_info says why");
@@ -493,7 +493,7 @@ class VisualOdometryNodelet : public RobotNodelet {
                                "' was there before: give another path, or set visual_odometry/overwrite at the start");
     saveTrajectory(path, *mount_->last(), format, file);
     saved_.insert(file);
-    return std::to_string(path.poses.size()) + " poses";
+    return std::to_string(path.poses.size()) + " poses in '" + file + "'";
   }
 
   static constexpr double kOtherClock = 3600.0;  // s of latency, more than any slow machine has

@@ -432,7 +432,7 @@ class Live(PipelineCase):
         for i in range(4):
             self.feed(i)
         answer = self.call('visual_odometry/save_trajectory', SaveTrajectory, path, 'tum')
-        self.assertEqual((answer.success, answer.message), (True, '4 poses'))
+        self.assertEqual((answer.success, answer.message), (True, "4 poses in '%s'" % path))
         rows = np.loadtxt(path)
         np.testing.assert_allclose(rows[:, 0], [m.header.stamp.to_sec() for m in self.odometry])
         np.testing.assert_allclose(rows[:, 1], [m.pose.pose.position.x for m in self.odometry], atol=1e-9)

@@ -425,7 +425,7 @@ class Places(unittest.TestCase):
             self.assertEqual(count(file), 2)
         # Places left beside, as by a process that was killed while it saved.
         open(file + '.partial-1', 'w').close()
-        self.assertIn("6 places are saved", run(4, save_by_itself))
+        self.assertIn("saved: 6 places", run(4, save_by_itself))
         self.assertEqual(count(file), 6)
         self.assertEqual([name for name in os.listdir(self.directory) if 'site' in name], ['site.bag'])
         shutil.copy(file, other)
