@@ -17,7 +17,7 @@ namespace sdvo {
 namespace {
 
 constexpr double kLogOddsOfSighting = 0.75;  // that a point stands still, by each confirmed sighting (chosen)
-constexpr double kTorn = 0.1;  // odds (chosen) that a row divides two motions because the image is torn, not by a mover
+constexpr double kTorn = 0.1;  // odds (chosen) of a torn image against a mover, where a row separates two motions
 
 /// Of n observations that are correlated by this coefficient (Kish 1965, the design effect): 2.5 at most. Points of one
 /// object move together, and a view has few objects.

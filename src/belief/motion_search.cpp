@@ -106,7 +106,7 @@ std::vector<MotionHypothesis> MotionSearch::compete(const MotionScene& scene, co
 }
 
 /// Prior and lasting points do not contradict, and the majority agrees with the motion, all over the image. The lasting
-/// outliers beyond the usual ratio would be no serious rival even if they moved together.
+/// outliers beyond kLastingAgreement would be no serious rival even if they moved together.
 bool MotionSearch::isBeyondDoubt(const MotionHypothesis& found, double max_doubt) const {
   if (!found.motion.success || found.innovation > noiseGate(6) || logOddsMisled(found) > max_doubt) return false;
   const double agree = found.agreement.lasting_inliers;

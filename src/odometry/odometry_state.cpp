@@ -40,7 +40,7 @@ void reportRig(const LearntRig& rig, OdometryResult& result) {
     }
     result.right_delay = known.delay(), result.right_delay_sigma = sigma[RigEstimate::kDelay];
   }
-  if (const auto rotation = rig.usual_rows.rotation()) {
+  if (const auto rotation = rig.row_pattern.rotation()) {
     Eigen::Vector3d value = rotation->value, variance = rotation->covariance.diagonal();
     const RigEstimate known = rig.calibration.estimate();
     const double of_roll = known.covariance(RigEstimate::kRoll, RigEstimate::kRoll);

@@ -31,10 +31,10 @@ Eigen::Isometry3d lookingAhead() {
   return T_base_camera;
 }
 
-/// Of the motion's inliers over the last `dt` s, as the motion has them: corners have more noise. `delay`: of the right
-/// image as far as it is known, s.
+/// Rows of the motion's inliers over the last `dt` s, with the motion's velocities, because corners have more noise.
+/// `delay`: known delay of the right image, s.
 std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHypothesis& found, double dt,
-                                  const RowPattern& usual, double delay) {
+                                  const RowPattern& pattern, double delay) {
   std::vector<RowMotion> rows;
   rows.reserve(found.motion.inliers.size());
   for (const int i : found.motion.inliers) {
@@ -42,7 +42,7 @@ std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHy
     const Eigen::Vector3d now = found.motion.T_current_reference * found.view->points.positions[reference];
     const StereoCamera& camera = features.camera;
     const double velocity = (camera.project(now).y() - found.view->pixels[reference].y) / dt;
-    rows.push_back({velocity, usual.change(features, current) - delay * velocity,
+    rows.push_back({velocity, pattern.change(features, current) - delay * velocity,
                     RowDelay::cellOf(features.u[current], features.v[current], camera.width, camera.height)});
   }
   return rows;
@@ -149,7 +149,7 @@ void VisualOdometry::takePose(const Matrix6d& covariance) {
 
 OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::optional<MotionGuess>& guess) {
   refuse(given);
-  Pair pair = usable(given, guess);
+  Pair pair = prepared(given, guess);
   std::optional<MotionScene> scene;
   MotionHypothesis found;
   search(pair, guess, scene, found);
@@ -184,8 +184,8 @@ void VisualOdometry::refuse(const StereoFeatures& features) const {
 }
 
 /// Prepares a pair for the search of its motion.
-VisualOdometry::Pair VisualOdometry::usable(const StereoFeatures& given,
-                                            const std::optional<MotionGuess>& guess) const {
+VisualOdometry::Pair VisualOdometry::prepared(const StereoFeatures& given,
+                                              const std::optional<MotionGuess>& guess) const {
   Pair pair{given};
   // A focusing lens changes the camera with every pair, but the pixels of a map are of one camera.
   if (state_.camera && *state_.camera != given.camera && state_.camera->isLike(given.camera))
@@ -204,12 +204,12 @@ VisualOdometry::Pair VisualOdometry::usable(const StereoFeatures& given,
     pair.is = Pair::kFrozen;
   else
     pair.is = Pair::kFollowed;
-  straighten(pair);
+  compensate(pair);
   return pair;
 }
 
 /// Features as of a right camera that did not rotate and is synchronous.
-void VisualOdometry::straighten(Pair& pair) const {
+void VisualOdometry::compensate(Pair& pair) const {
   const LearntRig& rig = state_.rig;
   const bool is_new = pair.rotation.log_odds > 0.0;
   const Eigen::Vector3d rotation = is_new ? Eigen::Vector3d(rig.rotation + pair.rotation.value) : rig.rotation;
@@ -246,7 +246,7 @@ void VisualOdometry::search(Pair& pair, const std::optional<MotionGuess>& guess,
   const Vector6d velocity = findSynchronised();
   pair.rotation = state_.rig.shownRotation(pair.features(), found, velocity.tail<3>());
   if (!(pair.rotation.log_odds > 0.0)) return;
-  straighten(pair);
+  compensate(pair);
   findSynchronised();
 }
 
@@ -324,7 +324,7 @@ std::optional<MeasuredPair> VisualOdometry::measuredPair(const Pair& pair, const
   const double since = state_.prior.interval(state_.map->secondsUntil(taken), motion);
   return MeasuredPair{
       taken, state_.prior.interval(pair.dt, motion), motion, since,
-      rowMotions(taken, found, since, state_.rig.usual_rows, taken.right_delay + state_.rig.calibration.delay())};
+      rowMotions(taken, found, since, state_.rig.row_pattern, taken.right_delay + state_.rig.calibration.delay())};
 }
 
 /// Evidence of the pair that its motion is not the camera's. It decides nothing.

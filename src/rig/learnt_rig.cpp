@@ -11,7 +11,7 @@ namespace sdvo {
 namespace {
 
 /// Covariance of a measured rotation, with errors of rectification.
-Eigen::Matrix3d ofRigs(const RightRotation& measured) {
+Eigen::Matrix3d withRectification(const RightRotation& measured) {
   constexpr double kUsual = 0.2;  // px (rms): healthy rigs (KITTI, EuRoC) have half a pixel at most
   return measured.covariance + kUsual * kUsual * measured.spread;
 }
@@ -28,7 +28,7 @@ std::string ShownRotation::words() const {
 LearntRig::LearntRig(const CalibrationOptions& options, const NoiseOptions& assumed)
     : calibration(options), noise(assumed), assumed_(assumed), delay_sigma_(options.right_delay_sigma) {}
 
-/// Weighs a rotation against the usual errors of rigs, and of this one.
+/// Weighs a rotation against errors of rectification and the noise of this rig's rotations.
 ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const MotionHypothesis& found,
                                        const Eigen::Vector3d& rate) const {
   constexpr double kKnock = 0.0175;  // rad (chosen): prior of a knock, a degree
@@ -44,9 +44,9 @@ ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const Mot
   }
   Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
   Eigen::Vector3d weighted = Eigen::Vector3d::Zero();
-  for (const auto& by : {usual_rows.change(features), by_disparities}) {
+  for (const auto& by : {row_pattern.change(features), by_disparities}) {
     if (!by) continue;
-    const Eigen::Matrix3d known = ofRigs(*by).inverse();
+    const Eigen::Matrix3d known = withRectification(*by).inverse();
     information += known, weighted += known * by->value;
   }
   if (!(information.determinant() > 0.0)) return shown;
@@ -54,7 +54,7 @@ ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const Mot
   // While the camera turns at the rate w, a right image that is late by d looks rotated by d * w.
   const Eigen::Vector3d by_delay = delay_sigma_ * rate;
   shown.value = covariance * weighted;
-  shown.covariance = covariance + by_delay * by_delay.transpose() + usual_change_;
+  shown.covariance = covariance + by_delay * by_delay.transpose() + rotation_noise_;
   shown.log_odds = kUnsuspected + logBayesFactor<3>(shown.value, shown.covariance.inverse(),
                                                     kKnock * kKnock * Eigen::Matrix3d::Identity());
   return shown;
@@ -66,7 +66,7 @@ void LearntRig::rotate(const ShownRotation& shown, const StereoCamera& camera) {
   std::swap(rotation, rotation_before_), std::swap(rotation_covariance, covariance_before_);
   if (back.dot((covariance + rotation_covariance).inverse() * back) < noiseGate(3)) {
     // The rig is again as before the last rotation: an error of images, no knock.
-    usual_change_ += shown.value * shown.value.transpose();
+    rotation_noise_ += shown.value * shown.value.transpose();
     return;
   }
   rotation = now, rotation_covariance = covariance;
@@ -76,8 +76,8 @@ void LearntRig::rotate(const ShownRotation& shown, const StereoCamera& camera) {
 void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measured, const MotionHypothesis& found,
                       const ShownRotation& shown, bool is_confirmed) {
   if (is_confirmed) {
-    usual_change_ += (1.0 - kUsualMemory) * (shown.value * shown.value.transpose() - usual_change_);
-    usual_rows.learn(features);
+    rotation_noise_ += (1.0 - kUsualMemory) * (shown.value * shown.value.transpose() - rotation_noise_);
+    row_pattern.learn(features);
     noise.learn(found.motion.rms);
     if (found.lasting_square) noise.learnShared(*found.lasting_square);
   }
@@ -86,8 +86,8 @@ void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measur
   else
     right_delay.interrupt();
   if (const auto delay = right_delay.estimate()) calibration.noteRows(RigEstimate::kDelay, delay->value, delay->sigma);
-  if (const auto by_rows = usual_rows.rotation())
-    calibration.noteRows(RigEstimate::kRoll, by_rows->value.z(), std::sqrt(ofRigs(*by_rows)(2, 2)));
+  if (const auto by_rows = row_pattern.rotation())
+    calibration.noteRows(RigEstimate::kRoll, by_rows->value.z(), std::sqrt(withRectification(*by_rows)(2, 2)));
 }
 
 }  // namespace sdvo

@@ -30,14 +30,14 @@ struct MeasuredPair {
 struct ShownRotation {
   Eigen::Vector3d value = Eigen::Vector3d::Zero();       ///< rad
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< rad^2
-  double log_odds = kUnsuspected;                        ///< that it rotated, against the usual errors of this rig
+  double log_odds = kUnsuspected;                        ///< that it rotated, against the noise of this rig
   std::string words() const;
 };
 
 /// Estimates of a rig's calibration, rows, rotation, delay and noise, from its pairs.
 struct LearntRig {
   CalibrationFilter calibration;
-  RowPattern usual_rows{RowDelay::kMemory};  ///< mean over confirmed pairs
+  RowPattern row_pattern{RowDelay::kMemory};  ///< mean over confirmed pairs
   /// Rotation of the right camera since the map began, rad. Features are rotated back by it before all other steps.
   Eigen::Vector3d rotation = Eigen::Vector3d::Zero();
   Eigen::Matrix3d rotation_covariance = Eigen::Matrix3d::Zero();
@@ -51,7 +51,7 @@ struct LearntRig {
   ShownRotation shownRotation(const StereoFeatures& features, const MotionHypothesis& found,
                               const Eigen::Vector3d& rate) const;
 
-  /// Adds a new rotation. One that takes the last one back counts as a usual error of this rig.
+  /// Adds a new rotation. One that takes the last one back counts as noise of this rig.
   void rotate(const ShownRotation& shown, const StereoCamera& camera);
 
   /// Learns from a pair; unconfirmed ones only interrupt the delay's pairs. `measured` is null without a motion.
@@ -61,7 +61,7 @@ struct LearntRig {
  private:
   NoiseOptions assumed_;
   double delay_sigma_;                                         ///< s: standard deviation of the delay of one pair
-  Eigen::Matrix3d usual_change_ = Eigen::Matrix3d::Zero();     ///< rad^2: second moment of confirmed pairs' rotations
+  Eigen::Matrix3d rotation_noise_ = Eigen::Matrix3d::Zero();   ///< rad^2: second moment of confirmed pairs' rotations
   Eigen::Vector3d rotation_before_ = Eigen::Vector3d::Zero();  ///< before the last rotate()
   Eigen::Matrix3d covariance_before_ = Eigen::Matrix3d::Zero();
 };

@@ -22,11 +22,13 @@ struct RightFlow {
 RightFlow rightFlow(const StereoCamera& camera, const Vector6d& velocity, double u, double v) {
   const double x = (u - camera.cx) / camera.fx, y = (v - camera.cy) / camera.fy;
   const Eigen::Vector3d turn = velocity.tail<3>();
-  const Eigen::Vector3d way = velocity.head<3>() + turn.cross(camera.baseline * Eigen::Vector3d::UnitX());
+  const Eigen::Vector3d translation = velocity.head<3>() + turn.cross(camera.baseline * Eigen::Vector3d::UnitX());
   const double disparity = camera.fx * camera.baseline;  // at 1 m
   return {{camera.fx * (turn.x() * x * y - turn.y() * (1.0 + x * x) + turn.z() * y),
            camera.fy * (turn.x() * (1.0 + y * y) - turn.y() * x * y - turn.z() * x)},
-          Eigen::Vector2d(camera.fx * (x * way.z() - way.x()), camera.fy * (y * way.z() - way.y())) / disparity};
+          Eigen::Vector2d(camera.fx * (x * translation.z() - translation.x()),
+                          camera.fy * (y * translation.z() - translation.y())) /
+              disparity};
 }
 
 /// Disparity (px) of a feature without the delay, and its velocity in the right image (px/s) during the delay.
@@ -91,8 +93,8 @@ double logRatioOfOtherPair(const std::vector<RowMotion>& rows, double delay, dou
   return synchronised == late ? 0.0 : 0.5 * parts * std::log(synchronised / late);
 }
 
-constexpr int kSamePoints = 2;         // pairs in a row whose errors are alike (chosen)
-constexpr double kLeastTurning = 2.0;  // px/s: rotations from images err by less
+constexpr int kSamePoints = 2;         // successive pairs with correlated errors (chosen)
+constexpr double kLeastTurning = 2.0;  // px/s: more than errors of measured rotations
 
 }  // namespace
 

@@ -30,8 +30,8 @@ class RightCameraDelay {
   /// standard deviation of a row in the left image.
   void watch(const std::vector<RowMotion>& rows, double dt, double row_error);
 
-  /// Takes in a pair, as taken, with the camera's mean velocity (its own frame, m/s and rad/s) over the `dt` s before
-  /// it.
+  /// Adds a pair before compensation, with the camera's mean velocity (its own frame, m/s and rad/s) over the `dt` s
+  /// before it.
   void learn(const StereoFeatures& features, double dt, const Vector6d& velocity, double known, bool is_confirmed);
   /// The next pair does not continue the last one.
   void interrupt() { pairs_.clear(); }
@@ -44,11 +44,11 @@ class RightCameraDelay {
     double log_odds;  ///< that they belong to it
     std::string words() const;
   };
-  /// The likeliest one of a stream with a pair every `dt` s.
+  /// The likeliest one, for pairs `dt` s apart.
   OtherPair otherPair(double dt) const;
 
-  /// The features as the right camera would have seen them at the left one's moment. `velocity`: the mean over the
-  /// `dt` s before the pair.
+  /// The features as the right camera would see them at the time of the left image. `velocity`: mean over the `dt` s
+  /// before the pair.
   StereoFeatures synchronised(const StereoFeatures& features, double dt, const Vector6d& velocity, double known) const;
 
  private:
@@ -60,7 +60,7 @@ class RightCameraDelay {
 
   RowDelay rows_;
   std::deque<Pair> pairs_;  ///< the last ones
-  /// Log-odds of a right image that is the pair's before or after.
+  /// Log-odds that the right image is that of the previous, or of the next pair.
   double earlier_ = kUnsuspected, later_ = kUnsuspected;
 };
 

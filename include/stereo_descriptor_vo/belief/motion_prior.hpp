@@ -111,7 +111,7 @@ class MotionPrior {
   std::int64_t confirmed_stamp_ = 0;                           ///< ns
   double velocity_interval_ = 0.0, confirmed_interval_ = 0.0;  ///< s, over which the velocities were measured
   double interval_ = 0.0;                                      ///< s: decaying maximum of the intervals
-  double mean_interval_ = 0.0, intervals_ = 0.0;               ///< of the last intervals, s; their number
+  double mean_interval_ = 0.0, intervals_ = 0.0;               ///< mean of the last intervals, s; their number
 };
 
 /// Second moment of a difference between motions, equal in every direction of translation and of rotation.

@@ -73,8 +73,8 @@ class VisualOdometry {
   struct Parts;
 
   void refuse(const StereoFeatures& features) const;
-  Pair usable(const StereoFeatures& given, const std::optional<MotionGuess>& guess) const;
-  void straighten(Pair& pair) const;
+  Pair prepared(const StereoFeatures& given, const std::optional<MotionGuess>& guess) const;
+  void compensate(Pair& pair) const;
   void search(Pair& pair, const std::optional<MotionGuess>& guess, std::optional<MotionScene>& scene,
               MotionHypothesis& found) const;
   std::optional<Eigen::Isometry3d> expectedMotion(double dt, const std::optional<MotionGuess>& guess) const;
