@@ -14,10 +14,12 @@ LEAST = 2**30  # bytes; rosbag records nothing where less is free
 
 
 def unused(path):
+    """A file, and whether it has the name asked for."""
     root = os.path.abspath(os.path.expanduser(path))
     root = root[:-len('.bag')] if root.endswith('.bag') else root
     names = (root + number + '.bag' for number in itertools.chain([''], ('_%d' % i for i in itertools.count(2))))
-    return next(name for name in names if not os.path.lexists(name) and not os.path.lexists(name + '.active'))
+    file = next(name for name in names if not os.path.lexists(name) and not os.path.lexists(name + '.active'))
+    return file, file == root + '.bag'
 
 
 def refuse(why):
@@ -37,13 +39,14 @@ def inputs(image_side):
 
 
 def main(image_side, recorder, option, path, *topics):
-    file = unused(path)
+    file, is_asked_for = unused(path)
     folder = os.path.dirname(file)
     if not os.access(folder, os.W_OK):
         refuse('there is no folder %s that may be written' % folder)
     if shutil.disk_usage(folder).free < LEAST:
         refuse('less than 1 GB is free in %s' % folder)
-    print('[ INFO] recording to %s once there are images' % file, file=sys.stderr, flush=True)
+    how = '[ INFO]' if is_asked_for else '[ WARN] an older drive has the name asked for:'
+    print('%s recording to %s once there are images' % (how, file), file=sys.stderr, flush=True)
     os.execv(recorder, [recorder, option, file, *topics, *inputs(image_side)])
 
 

@@ -132,7 +132,9 @@ class Launch(unittest.TestCase):
             self.assertEqual(waiting.communicate(timeout=20)[0].split(), ['-O', home + '/drive.bag', '/tf', 'odom'] + topics)
             for there, expected in (('drive.bag', 'drive_2.bag'), ('drive_2.bag.active', 'drive_3.bag')):  # a killed recorder's
                 open(os.path.join(home, there), 'w').close()
-                self.assertIn(' %s/%s ' % (home, expected), record('~/drive').communicate(timeout=20)[0])
+                said, warned = record('~/drive').communicate(timeout=20)
+                self.assertIn(' %s/%s ' % (home, expected), said)
+                self.assertIn('[ WARN] an older drive has the name asked for: recording to %s/%s ' % (home, expected), warned)
             refused = record(home + '/missing/drive.bag')
             self.assertIn('[ERROR] nothing is recorded: there is no folder %s/missing' % home, refused.communicate(timeout=20)[1])
             self.assertEqual(refused.returncode, 1)
