@@ -35,6 +35,8 @@ Eigen::Isometry3d lookingAhead() {
 /// `delay`: known delay of the right image, s.
 std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHypothesis& found, double dt,
                                   const RowPattern& pattern, double delay) {
+  // A pattern of late right images contains what is looked for.
+  const bool has_pattern = !pattern.isOfOtherPairs(dt);
   std::vector<RowMotion> rows;
   rows.reserve(found.motion.inliers.size());
   for (const int i : found.motion.inliers) {
@@ -42,7 +44,8 @@ std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHy
     const Eigen::Vector3d now = found.motion.T_current_reference * found.view->points.positions[reference];
     const StereoCamera& camera = features.camera;
     const double velocity = (camera.project(now).y() - found.view->pixels[reference].y) / dt;
-    rows.push_back({velocity, pattern.change(features, current) - delay * velocity,
+    const double dv = has_pattern ? pattern.change(features, current) : features.dv[current];
+    rows.push_back({velocity, dv - delay * velocity,
                     RowDelay::cellOf(features.u[current], features.v[current], camera.width, camera.height)});
   }
   return rows;

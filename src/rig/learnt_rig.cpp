@@ -77,7 +77,7 @@ void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measur
                       const ShownRotation& shown, bool is_confirmed) {
   if (is_confirmed) {
     rotation_noise_ += (1.0 - kUsualMemory) * (shown.value * shown.value.transpose() - rotation_noise_);
-    row_pattern.learn(features);
+    row_pattern.learn(features, measured ? measured->rows : std::vector<RowMotion>());
     noise.learn(found.motion.rms);
     if (found.lasting_square) noise.learnShared(*found.lasting_square);
   }

@@ -82,9 +82,12 @@ double errorRatio(const std::vector<RowMotion>& rows, double delay, double row_e
   return variance > row_error * row_error ? row_error * row_error / variance : 1.0;
 }
 
-/// Log-likelihood ratio of the rows: right image late by `delay`, against synchronous. Their variance is unknown. Each
-/// part of the image counts as one observation, because its errors are correlated.
-double logRatioOfOtherPair(const std::vector<RowMotion>& rows, double delay, double row_error) {
+constexpr int kSamePoints = 2;         // successive pairs with correlated errors (chosen)
+constexpr double kLeastTurning = 2.0;  // px/s: more than errors of measured rotations
+
+}  // namespace
+
+double logRatioOfDelay(const std::vector<RowMotion>& rows, double delay, double row_error) {
   std::bitset<RowDelay::kParts> seen;
   for (const RowMotion& row : rows) seen.set(static_cast<std::size_t>(row.part));
   const double parts = static_cast<double>(seen.count()) - 1.0;  // one fixes the constant
@@ -93,11 +96,6 @@ double logRatioOfOtherPair(const std::vector<RowMotion>& rows, double delay, dou
   return synchronised == late ? 0.0 : 0.5 * parts * std::log(synchronised / late);
 }
 
-constexpr int kSamePoints = 2;         // successive pairs with correlated errors (chosen)
-constexpr double kLeastTurning = 2.0;  // px/s: more than errors of measured rotations
-
-}  // namespace
-
 RightCameraDelay::RightCameraDelay() : rows_(RowDelay::kMemory, kLeastTurning, kSamePoints) {}
 
 void RightCameraDelay::watch(const std::vector<RowMotion>& rows, double dt, double row_error) {
@@ -105,7 +103,7 @@ void RightCameraDelay::watch(const std::vector<RowMotion>& rows, double dt, doub
   for (auto* other : {&earlier_, &later_}) {
     // Evidence fades without renewal, because a standing camera gives none.
     const double carried = kUnsuspected + kUsualMemory * (*other - kUnsuspected);
-    *other = std::clamp(carried + logRatioOfOtherPair(rows, other == &earlier_ ? -dt : dt, row_error), kUnsuspected,
+    *other = std::clamp(carried + logRatioOfDelay(rows, other == &earlier_ ? -dt : dt, row_error), kUnsuspected,
                         kCertain);
   }
 }

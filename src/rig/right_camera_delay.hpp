@@ -13,12 +13,10 @@
 
 namespace sdvo {
 
-/// Row of an inlier of the pair's motion.
-struct RowMotion {
-  double velocity;  ///< down in the left image, px/s
-  double dv;        ///< v_right - v_left beyond RowPattern and the known delay, px
-  int part;         ///< of the image (RowDelay::cellOf)
-};
+/// Log-likelihood ratio of the rows: right images late by `delay`, s, against synchronous. Their variance is unknown.
+/// Each part of the image counts as one observation, because its errors are correlated. `row_error`, px: standard
+/// deviation of a row in the left image.
+double logRatioOfDelay(const std::vector<RowMotion>& rows, double delay, double row_error);
 
 /// Delay of right images against left ones, from rows, and its effect on features. `known`, s: the delay beyond the
 /// difference of the stamps (StereoFeatures::right_delay), as it is estimated.

@@ -10,6 +10,13 @@
 
 namespace sdvo {
 
+/// Row of an inlier of the pair's motion.
+struct RowMotion {
+  double velocity;  ///< down in the left image, px/s
+  double dv;        ///< v_right - v_left beyond RowPattern and the known delay, px
+  int part;         ///< of the image (RowDelay::cellOf)
+};
+
 /// Delay of a rig's right images, from rows. In a late image, a point that moves down at v' px/s is v' * delay px
 /// lower. Other errors of rows are fitted, too: constant ones of rectification in each part of the image, and one of a
 /// lower right camera, proportional to disparity. Instrumental variables (Wright 1928), with a fixed effect for each

@@ -5,6 +5,9 @@
 #include <cstddef>
 #include <vector>
 
+#include "../belief/motion_hypotheses.hpp"
+#include "right_camera_delay.hpp"
+
 namespace sdvo {
 namespace {
 
@@ -34,16 +37,28 @@ RowPattern::Parts RowPattern::partsOf(const StereoFeatures& features) {
   return parts;
 }
 
-void RowPattern::learn(const StereoFeatures& features) {
+void RowPattern::learn(const StereoFeatures& features, const std::vector<RowMotion>& rows) {
   const Parts now = partsOf(features);
+  std::array<double, RowDelay::kParts> velocity{}, count{};
+  for (const RowMotion& row : rows)
+    velocity[static_cast<std::size_t>(row.part)] += row.velocity, ++count[static_cast<std::size_t>(row.part)];
   for (std::size_t p = 0; p < now.size(); ++p) {
     Part& part = parts_[p];
     part.weight = memory_ * part.weight + now[p].weight;
     if (!(now[p].weight > 0.0)) continue;
     const double ratio = now[p].weight / part.weight;
     part.dv += ratio * (now[p].dv - part.dv);
+    if (count[p] > 0.0) part.velocity += ratio * (velocity[p] / count[p] - part.velocity);
     part.effect += ratio * (now[p].effect - part.effect);
   }
+}
+
+bool RowPattern::isOfOtherPairs(double dt) const {
+  std::vector<RowMotion> rows;
+  for (std::size_t p = 0; p < parts_.size(); ++p)
+    if (parts_[p].weight > 0.0) rows.push_back({parts_[p].velocity, parts_[p].dv, static_cast<int>(p)});
+  if (rows.empty()) return false;
+  return kUnsuspected + std::max(logRatioOfDelay(rows, -dt, 0.0), logRatioOfDelay(rows, dt, 0.0)) > 0.0;
 }
 
 double RowPattern::change(const StereoFeatures& features, int i) const {

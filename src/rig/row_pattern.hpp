@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <optional>
+#include <vector>
 
 #include "right_rotation.hpp"
 #include "row_delay.hpp"
@@ -17,7 +18,11 @@ class RowPattern {
   /// `memory`: factor on the weight of previous pairs with each new pair.
   explicit RowPattern(double memory) : memory_(memory) {}
 
-  void learn(const StereoFeatures& features);
+  /// `rows`: of the pair's inliers, whose velocities the mean rows may depend on.
+  void learn(const StereoFeatures& features, const std::vector<RowMotion>& rows = {});
+
+  /// Whether the mean rows follow the mean velocities as those of right images that are another pair's, `dt` s apart.
+  bool isOfOtherPairs(double dt) const;
 
   /// Difference of feature `i` in dv from the mean of its part, px; dv itself in a part without a mean.
   double change(const StereoFeatures& features, int i) const;
@@ -30,6 +35,7 @@ class RowPattern {
  private:
   struct Part {
     double weight = 0.0, dv = 0.0;                           ///< number of features; mean or median, px
+    double velocity = 0.0;                                   ///< mean, down in the left image, px/s
     Eigen::RowVector3d effect = Eigen::RowVector3d::Zero();  ///< mean derivative of dv by the rotation, px/rad
   };
   using Parts = std::array<Part, RowDelay::kParts>;
