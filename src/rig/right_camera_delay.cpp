@@ -103,8 +103,8 @@ void RightCameraDelay::watch(const std::vector<RowMotion>& rows, double dt, doub
   for (auto* other : {&earlier_, &later_}) {
     // Evidence fades without renewal, because a standing camera gives none.
     const double carried = kUnsuspected + kUsualMemory * (*other - kUnsuspected);
-    *other = std::clamp(carried + logRatioOfDelay(rows, other == &earlier_ ? -dt : dt, row_error), kUnsuspected,
-                        kCertain);
+    *other =
+        std::clamp(carried + logRatioOfDelay(rows, other == &earlier_ ? -dt : dt, row_error), kUnsuspected, kCertain);
   }
 }
 

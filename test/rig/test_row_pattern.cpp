@@ -90,4 +90,23 @@ TEST(RowPattern, CovarianceIsThatOfTheErrorsHoweverAlikeTheyAreInAPart) {
     for (const double ratio : squareByVariance(is_alike)) EXPECT_NEAR(ratio, 1.0, 0.35);
 }
 
+TEST(RowPattern, MeanRowsThatFollowTheMeanFlowAreOfOtherPairs) {
+  constexpr double kPeriod = 0.1;
+  for (const double delay : {-kPeriod, 0.0, kPeriod}) {
+    RowPattern pattern(0.9);
+    for (int pair = 0; pair < 20; ++pair) {
+      StereoFeatures features = gridSeenWith({0.3e-3, 0.0, -0.5e-3});
+      std::vector<RowMotion> rows;
+      for (int i = 0; i < features.count(); ++i) {
+        const double velocity = 0.1 * (features.v[i] - features.camera.cy) + 0.02 * features.disparity[i];
+        rows.push_back({velocity, 0.0,
+                        RowDelay::cellOf(features.u[i], features.v[i], features.camera.width, features.camera.height)});
+        features.dv[i] += static_cast<float>(delay * velocity);
+      }
+      pattern.learn(features, rows);
+    }
+    EXPECT_EQ(pattern.isOfOtherPairs(kPeriod), delay != 0.0) << delay;
+  }
+}
+
 }  // namespace sdvo::test_row_pattern
