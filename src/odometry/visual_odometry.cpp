@@ -247,7 +247,10 @@ void VisualOdometry::search(Pair& pair, const std::optional<MotionGuess>& guess,
     return find();
   };
   const Vector6d velocity = findSynchronised();
-  pair.rotation = state_.rig.shownRotation(pair.features(), found, velocity.tail<3>());
+  const Eigen::Vector3d turn = pair.dt * velocity.tail<3>();
+  const Eigen::Vector3d before = pair.dt * state_.prior.velocity().value_or(Vector6d::Zero()).tail<3>();
+  const Eigen::Matrix3d turns = turn * turn.transpose() + before * before.transpose();
+  pair.rotation = state_.rig.shownRotation(pair.features(), found, turns, pair.dt);
   if (!(pair.rotation.log_odds > 0.0)) return;
   compensate(pair);
   findSynchronised();
@@ -335,7 +338,8 @@ std::vector<Evidence> VisualOdometry::evidenceAgainst(const Pair& pair, const Mo
                                                       const std::optional<MeasuredPair>& measured) {
   LearntRig& rig = state_.rig;
   // The map is from before the rotation.
-  std::vector<Evidence> evidence{{pair.rotation.log_odds, pair.rotation.words()}};
+  std::vector<Evidence> evidence{{pair.rotation.log_odds, pair.rotation.words()},
+                                 {pair.rotation.other_moment, "the right image seemed to be of another moment"}};
   if (pair.features().report.refused) evidence.push_back({kCertain, "left and right did not belong together"});
   if (pair.is == Pair::kFollowed)
     evidence.push_back({pair.frozen, "images as of the previous pair, by a stop or a frozen driver", true});

@@ -2,6 +2,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 #include <iomanip>
 #include <opencv2/core.hpp>
 #include <sstream>
@@ -14,6 +15,11 @@ namespace {
 Eigen::Matrix3d withRectification(const RightRotation& measured) {
   constexpr double kUsual = 0.2;  // px (rms): healthy rigs (KITTI, EuRoC) have half a pixel at most
   return measured.covariance + kUsual * kUsual * measured.spread;
+}
+
+/// log(1 + exp(x)), for any x.
+double logOnePlus(double x) {
+  return std::max(x, 0.0) + std::log1p(std::exp(-std::abs(x)));
 }
 
 }  // namespace
@@ -30,7 +36,7 @@ LearntRig::LearntRig(const CalibrationOptions& options, const NoiseOptions& assu
 
 /// Weighs a rotation against errors of rectification and the noise of this rig's rotations.
 ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const MotionHypothesis& found,
-                                       const Eigen::Vector3d& rate) const {
+                                       const Eigen::Matrix3d& turns, double dt) const {
   constexpr double kKnock = 0.0175;  // rad (chosen): prior of a knock, a degree
   ShownRotation shown;
   if (features.count() < kFewestMeasured) return shown;
@@ -51,12 +57,17 @@ ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const Mot
   }
   if (!(information.determinant() > 0.0)) return shown;
   const Eigen::Matrix3d covariance = information.inverse();
-  // While the camera turns at the rate w, a right image that is late by d looks rotated by d * w.
-  const Eigen::Vector3d by_delay = delay_sigma_ * rate;
+  // A right image that is late by d looks rotated by d / dt of the camera's rotation, and so does the map's last one.
+  const double late = dt > 0.0 ? delay_sigma_ / dt : 0.0;
   shown.value = covariance * weighted;
-  shown.covariance = covariance + by_delay * by_delay.transpose() + rotation_noise_;
-  shown.log_odds = kUnsuspected + logBayesFactor<3>(shown.value, shown.covariance.inverse(),
-                                                    kKnock * kKnock * Eigen::Matrix3d::Identity());
+  shown.covariance = covariance + late * late * turns + rotation_noise_;
+  const auto log_factor = [&](const Eigen::Matrix3d& prior) {
+    return logBayesFactor<3>(shown.value, shown.covariance.inverse(), prior);
+  };
+  const double knock = kUnsuspected + log_factor(kKnock * kKnock * Eigen::Matrix3d::Identity());
+  const double other_moment = driver_fault_ + log_factor(turns);
+  shown.log_odds = knock - logOnePlus(other_moment);
+  shown.other_moment = other_moment - logOnePlus(knock);
   return shown;
 }
 
@@ -75,6 +86,7 @@ void LearntRig::rotate(const ShownRotation& shown, const StereoCamera& camera) {
 
 void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measured, const MotionHypothesis& found,
                       const ShownRotation& shown, bool is_confirmed) {
+  driver_fault_ = features.report.refused ? 0.0 : driver_fault_ - std::log(2.0);
   if (is_confirmed) {
     rotation_noise_ += (1.0 - kUsualMemory) * (shown.value * shown.value.transpose() - rotation_noise_);
     row_pattern.learn(features, measured ? measured->rows : std::vector<RowMotion>());

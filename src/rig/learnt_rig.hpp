@@ -1,5 +1,6 @@
 #pragma once
 
+#include <limits>
 #include <optional>
 #include <string>
 #include <vector>
@@ -31,6 +32,7 @@ struct ShownRotation {
   Eigen::Vector3d value = Eigen::Vector3d::Zero();       ///< rad
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();  ///< rad^2
   double log_odds = kUnsuspected;                        ///< that it rotated, against the noise of this rig
+  double other_moment = kUnsuspected;                    ///< log-odds of images of different moments instead
   std::string words() const;
 };
 
@@ -47,9 +49,9 @@ struct LearntRig {
   LearntRig(const CalibrationOptions& options, const NoiseOptions& noise);
 
   /// New rotation of the right camera. `features`: rotated back by the known one; `found`: their motion, if any;
-  /// `rate`: of the camera's rotation, rad/s.
+  /// `turns`, rad^2: second moment of the camera's rotations over the last two intervals, of `dt` s each.
   ShownRotation shownRotation(const StereoFeatures& features, const MotionHypothesis& found,
-                              const Eigen::Vector3d& rate) const;
+                              const Eigen::Matrix3d& turns, double dt) const;
 
   /// Adds a new rotation. One that takes the last one back counts as noise of this rig.
   void rotate(const ShownRotation& shown, const StereoCamera& camera);
@@ -60,6 +62,8 @@ struct LearntRig {
 
  private:
   NoiseOptions assumed_;
+  /// Log-odds of right images of other moments: even at a refused pair, and half of that with each pair after it.
+  double driver_fault_ = -std::numeric_limits<double>::infinity();
   double delay_sigma_;                                         ///< s: standard deviation of the delay of one pair
   Eigen::Matrix3d rotation_noise_ = Eigen::Matrix3d::Zero();   ///< rad^2: second moment of confirmed pairs' rotations
   Eigen::Vector3d rotation_before_ = Eigen::Vector3d::Zero();  ///< before the last rotate()

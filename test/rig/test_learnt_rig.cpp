@@ -7,8 +7,8 @@
 namespace sdvo::test_learnt_rig {
 
 ShownRotation shown(const LearntRig& rig, const StereoFeatures& features,
-                    const Eigen::Vector3d& rate = Eigen::Vector3d::Zero()) {
-  return rig.shownRotation(features, MotionHypothesis(), rate);
+                    const Eigen::Vector3d& turn = Eigen::Vector3d::Zero()) {
+  return rig.shownRotation(features, MotionHypothesis(), turn * turn.transpose(), 0.1);
 }
 
 void learn(LearntRig& rig, const StereoFeatures& features, int pairs = 1) {
@@ -69,6 +69,21 @@ TEST(LearntRig, WhatALateRightImageShowsInATurnIsNoRotation) {
   const StereoFeatures turned = gridSeenWith({0.0, 0.0, 6e-3});
   EXPECT_GT(shown(rig, turned).log_odds, 0.0);
   EXPECT_LT(shown(rig, turned, rate).log_odds, logOdds(0.05));
+}
+
+TEST(LearntRig, WhereImagesWereRefusedARotationByTheCamerasTurnIsAnotherMoment) {
+  const StereoFeatures before = gridSeenWith(Eigen::Vector3d::Zero()), turned = gridSeenWith({0.0, 0.0, 6e-3});
+  LearntRig rig = steady(before);
+  const Eigen::Vector3d turn(0.0, 0.0, 6e-3), another(0.0, 6e-3, 0.0);
+  EXPECT_GT(shown(rig, turned, turn).log_odds, 0.0) << "images without fault";
+  StereoFeatures refused = synthetic::noFeatures(before.camera);
+  refused.report.refused = true;
+  rig.learn(refused, nullptr, {}, {}, false);
+  EXPECT_LT(shown(rig, turned, turn).log_odds, 0.0);
+  EXPECT_GT(shown(rig, turned, turn).other_moment, 0.0);
+  EXPECT_GT(shown(rig, turned, another).log_odds, 0.0);
+  learn(rig, before, 20);
+  EXPECT_GT(shown(rig, turned, turn).log_odds, 0.0) << "long ago";
 }
 
 }  // namespace sdvo::test_learnt_rig
