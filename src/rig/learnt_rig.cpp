@@ -86,7 +86,7 @@ void LearntRig::rotate(const ShownRotation& shown, const StereoCamera& camera) {
 
 void LearntRig::learn(const StereoFeatures& features, const MeasuredPair* measured, const MotionHypothesis& found,
                       const ShownRotation& shown, bool is_confirmed) {
-  driver_fault_ = features.report.refused ? 0.0 : driver_fault_ - std::log(2.0);
+  driver_fault_ = features.report.refused ? kUnsuspected : driver_fault_ - std::log(2.0);
   if (is_confirmed) {
     rotation_noise_ += (1.0 - kUsualMemory) * (shown.value * shown.value.transpose() - rotation_noise_);
     row_pattern.learn(features, measured ? measured->rows : std::vector<RowMotion>());
