@@ -62,8 +62,8 @@ struct LearntRig {
 
  private:
   NoiseOptions assumed_;
-  /// Log-odds of a right image of another moment: those of a knock at a refused pair, and half of that with each pair
-  /// after it.
+  /// Log-odds of a right image of another moment: as a knock's at a refused pair; the odds halve with each pair after
+  /// it.
   double driver_fault_ = -std::numeric_limits<double>::infinity();
   double delay_sigma_;                                         ///< s: standard deviation of the delay of one pair
   Eigen::Matrix3d rotation_noise_ = Eigen::Matrix3d::Zero();   ///< rad^2: second moment of confirmed pairs' rotations

@@ -13,7 +13,7 @@ namespace sdvo {
 /// Row of an inlier of the pair's motion.
 struct RowMotion {
   double velocity;  ///< down in the left image, px/s
-  double dv;        ///< v_right - v_left beyond RowPattern and the known delay, px
+  double dv;        ///< v_right - v_left beyond a sound RowPattern and the known delay, px
   int part;         ///< of the image (RowDelay::cellOf)
 };
 

@@ -26,7 +26,7 @@ StereoFeatures seen(const Vector6d& velocity, double delay, double noise = 0.0, 
   return features;
 }
 
-/// As the points move in the left image, in step.
+/// As the points move in the left image, without delay.
 std::vector<RowMotion> rowsOf(const StereoFeatures& features, const Vector6d& velocity) {
   std::vector<RowMotion> rows;
   constexpr double kStep = 1e-3;  // s
