@@ -35,7 +35,7 @@ Eigen::Isometry3d lookingAhead() {
 /// `delay`: known delay of the right image, s.
 std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHypothesis& found, double dt,
                                   const RowPattern& pattern, double delay) {
-  // A pattern of late right images contains what is looked for.
+  // Mean rows of other pairs' right images contain the delay itself: subtracting them would hide it.
   const bool has_pattern = !pattern.isOfOtherPairs(dt);
   std::vector<RowMotion> rows;
   rows.reserve(found.motion.inliers.size());

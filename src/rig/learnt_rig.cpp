@@ -57,7 +57,8 @@ ShownRotation LearntRig::shownRotation(const StereoFeatures& features, const Mot
   }
   if (!(information.determinant() > 0.0)) return shown;
   const Eigen::Matrix3d covariance = information.inverse();
-  // A right image that is late by d looks rotated by d / dt of the camera's rotation, and so does the map's last one.
+  // A right image that is late by d looks rotated by d / dt of the camera's rotation. The map's last pair may be late,
+  // too.
   const double late = dt > 0.0 ? delay_sigma_ / dt : 0.0;
   shown.value = covariance * weighted;
   shown.covariance = covariance + late * late * turns + rotation_noise_;

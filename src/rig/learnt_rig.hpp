@@ -53,17 +53,18 @@ struct LearntRig {
   ShownRotation shownRotation(const StereoFeatures& features, const MotionHypothesis& found,
                               const Eigen::Matrix3d& turns, double dt) const;
 
-  /// Adds a new rotation. One that takes the last one back counts as noise of this rig.
+  /// Adds a new rotation. A rotation that undoes the last one counts as noise of this rig.
   void rotate(const ShownRotation& shown, const StereoCamera& camera);
 
-  /// Learns from a pair; unconfirmed ones only interrupt the delay's pairs. `measured` is null without a motion.
+  /// Learns from a pair. Refused pairs raise the odds of right images of other moments, unconfirmed ones interrupt the
+  /// delay's pairs. `measured` is null without a motion.
   void learn(const StereoFeatures& features, const MeasuredPair* measured, const MotionHypothesis& found,
              const ShownRotation& shown, bool is_confirmed);
 
  private:
   NoiseOptions assumed_;
-  /// Log-odds of a right image of another moment: as a knock's at a refused pair; the odds halve with each pair after
-  /// it.
+  /// Log-odds of a right image of another moment. At a refused pair they are those of a knock. Each pair after it
+  /// halves the odds.
   double driver_fault_ = -std::numeric_limits<double>::infinity();
   double delay_sigma_;                                         ///< s: standard deviation of the delay of one pair
   Eigen::Matrix3d rotation_noise_ = Eigen::Matrix3d::Zero();   ///< rad^2: second moment of confirmed pairs' rotations
