@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "motion_hypotheses.hpp"
@@ -8,11 +10,15 @@
 
 namespace sdvo {
 
-/// Something that may have misled a pair's motion: the log-odds that it did, and its name.
+/// Something that may have misled a pair's motion.
 struct Evidence {
+  /// Log-odds that it did (`any`), bounded by those of certainty: nothing is more certain than the model behind it.
+  Evidence(double any, std::string named, bool may_last = false)
+      : log_odds(any > kUnsuspected ? std::min(any, kCertain) : kUnsuspected), cause(std::move(named)), lasts(may_last) {}
+
   double log_odds;
   std::string cause;
-  bool lasts = false;  ///< it may mislead the next pairs, too; else it ends with the pair
+  bool lasts;  ///< it may mislead the next pairs, too; else it ends with the pair
 };
 
 /// Posterior of a pair's motion.

@@ -218,18 +218,23 @@ std::vector<RivalMotion> rivalsOf(double threshold, const std::vector<MotionHypo
 /// The chosen motion's probability, and the moment of the rivals around it.
 void compare(const MotionScene& scene, const std::vector<MotionHypothesis>& hypotheses,
              const std::vector<RivalMotion>& rivals, MotionHypothesis& chosen) {
-  double total = 1.0;
-  for (const RivalMotion& rival : rivals) total += std::exp(rival.log_ratio);
+  double largest = 0.0;  // of the chosen one
+  for (const RivalMotion& rival : rivals) largest = std::max(largest, rival.log_ratio);
+  double total = std::exp(-largest);
+  for (const RivalMotion& rival : rivals) total += std::exp(rival.log_ratio - largest);
+  chosen.probability = std::exp(-largest) / total;
   std::vector<int> explained;
   for (const RivalMotion& rival : rivals) {
     explained.insert(explained.end(), rival.features.begin(), rival.features.end());
     const Eigen::Isometry3d& T = hypotheses[rival.hypothesis].motion.T_current_reference;
-    const double probability = std::exp(rival.log_ratio) / total;
+    const double probability = std::exp(rival.log_ratio - largest) / total;
     // Both motions have the same reference.
     const Eigen::Isometry3d apart = chosen.motion.T_current_reference * T.inverse();
     chosen.rivals_moment += probability * momentOf(logSE3(apart));
-    if (isTolerable(scene, chosen.motion.T_current_reference, apart)) continue;
-    chosen.probability -= probability;
+    if (isTolerable(scene, chosen.motion.T_current_reference, apart)) {
+      chosen.probability += probability;
+      continue;
+    }
     if (!chosen.rival || chosen.rival->probability < probability)
       chosen.rival = {T, probability, static_cast<int>(rival.features.size()), rival.is_torn};
   }

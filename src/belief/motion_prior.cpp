@@ -89,6 +89,15 @@ Matrix6d MotionPrior::unseen(double seconds) const {
                    spread(velocity.tail<3>().norm(), options_.rotation_acceleration, CV_PI));
 }
 
+Matrix6d MotionPrior::unseen(double seconds, double dt) const {
+  const Vector6d velocity = confirmed_.value_or(Vector6d::Zero());
+  const auto spread = [&](double speed, double acceleration, double most) {
+    return std::min(speed * speed + acceleration * acceleration * seconds, most * most) * dt * dt;
+  };
+  return isotropic(spread(velocity.head<3>().norm(), options_.acceleration, options_.max_speed),
+                   spread(velocity.tail<3>().norm(), options_.rotation_acceleration, options_.max_rotation_rate));
+}
+
 Matrix6d MotionPrior::unknown() const {
   constexpr double kTurn = 0.5;  // rad (chosen)
   const double longest = options_.max_speed * options_.max_gap;

@@ -4,6 +4,7 @@
 #include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
+#include <stdexcept>
 
 namespace sdvo {
 
@@ -78,6 +79,12 @@ Matrix6d positivePart(const Matrix6d& matrix) {
   const Matrix6d roots =
       unit.asDiagonal() * solver.eigenvectors() * solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal();
   return Matrix6d((roots * roots.transpose()).selfadjointView<Eigen::Lower>());
+}
+
+void checkRigid(const Eigen::Isometry3d& T, const std::string& what) {
+  constexpr double kRounding = 1e-3;  // of a quaternion of floats, some times multiplied
+  if (!T.matrix().allFinite() || !T.linear().isUnitary(kRounding) || T.linear().determinant() < 0.0)
+    throw std::invalid_argument(what + " is not a rigid motion of finite numbers");
 }
 
 Eigen::Isometry3d orthonormalised(const Eigen::Isometry3d& T) {

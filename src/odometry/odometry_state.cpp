@@ -64,6 +64,17 @@ void OdometryState::interrupt() {
   prior.interrupt();
 }
 
+void OdometryState::recover(const VisualOdometryOptions& options) {
+  OdometryState fresh(options, epoch);
+  fresh.T_origin_camera = sound.T_origin_camera;
+  fresh.covariance.assume(sound.pose_covariance);
+  fresh.distance = sound.distance;
+  fresh.camera = camera, fresh.last_stamp = last_stamp, fresh.last_pose_stamp = last_pose_stamp;
+  fresh.pairs = pairs, fresh.started = started;
+  fresh.sound = std::move(sound);
+  *this = std::move(fresh);
+}
+
 void OdometryState::startAgain() {
   ++epoch;
   const std::int64_t last = last_pose_stamp.value_or(seed->newestStamp());

@@ -56,6 +56,7 @@ struct OdometryState {
   std::optional<std::int64_t> last_stamp;
   Eigen::Isometry3d T_origin_camera = Eigen::Isometry3d::Identity();
   PoseCovariance covariance;                    ///< of that pose
+  OdometryResult sound;                         ///< the last one with a pose
   std::optional<std::int64_t> last_pose_stamp;  ///< ns
   double distance = 0.0;                        ///< m
   int pairs = 0;
@@ -71,6 +72,10 @@ struct OdometryState {
 
   /// The next pair does not continue the last one.
   void interrupt();
+
+  /// A result had a defect, whose cause may be anywhere in the memory: only the last sound pose and what the caller
+  /// gave is kept. The next pair starts a map there under a new epoch.
+  void recover(const VisualOdometryOptions& options);
 
   /// A new epoch begins at the seed. The unknown motion before it widens the covariance.
   void startAgain();

@@ -2,8 +2,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <stdexcept>
+#include <string>
 
 namespace sdvo {
+
+void MotionGuess::check() const {
+  checkRigid(T_previous_current, "the guess of the motion");
+  if (!(error > 0.0) || !std::isfinite(error))
+    throw std::invalid_argument("the error of the guess is " + std::to_string(error) +
+                                ", not a positive ratio of the motion");
+}
 
 Eigen::Isometry3d MotionGuess::motion(const MotionPrior& prior, double dt) const {
   Eigen::Isometry3d motion = T_previous_current;

@@ -80,8 +80,8 @@ OdometryStep holdPose(double dt, OdometryState& state) {
                     ? "each pair comes twice: is the driver's rate above the sensor's?"
                     : "the images repeat those of the previous pair although the camera moved: is the driver frozen?";
   step.T_previous_current = Eigen::Isometry3d::Identity();
-  step.covariance = state.outage.growth(state.prior, dt);
-  state.covariance.advance(*step.T_previous_current, step.covariance);
+  step.covariance = state.outage.last(state.prior, dt);
+  state.covariance.advance(*step.T_previous_current, state.outage.growth(state.prior, dt));
   state.prior.interrupt();
   return step;
 }

@@ -131,6 +131,7 @@ void VisualOdometry::breakStream() {
 }
 
 void VisualOdometry::mountAt(const Eigen::Isometry3d& T_base_camera) {
+  checkRigid(T_base_camera, "the camera's pose on the base");
   const Eigen::Isometry3d T_before_now = T_base_camera_.inverse() * T_base_camera;
   const bool is_same = T_base_camera.matrix() == T_base_camera_.matrix();
   T_base_camera_ = T_base_camera;
@@ -143,6 +144,9 @@ void VisualOdometry::mountAt(const Eigen::Isometry3d& T_base_camera) {
 }
 
 void VisualOdometry::takePose(const Matrix6d& covariance) {
+  OdometryResult given;
+  given.has_pose = true, given.pose_covariance = covariance;
+  if (const std::string defect = given.defect(); !defect.empty()) throw std::invalid_argument(defect);
   state_.covariance.assume(covariance);
   ++state_.epoch;
   if (!state_.interrupted) return;
@@ -152,6 +156,7 @@ void VisualOdometry::takePose(const Matrix6d& covariance) {
 
 OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::optional<MotionGuess>& guess) {
   refuse(given);
+  if (guess) guess->check();
   Pair pair = prepared(given, guess);
   std::optional<MotionScene> scene;
   MotionHypothesis found;
@@ -176,7 +181,23 @@ OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::op
                    step.state == TrackingState::kTracking && scene);
   finish(pair, step);
   step.time = stopwatch.lap();
-  return state_.report(features, pair.new_features, found, step, floor());
+  return sound(state_.report(features, pair.new_features, found, step, floor()));
+}
+
+/// The only way out of update(): no result leaves with a number that is not finite or a covariance that is none.
+OdometryResult VisualOdometry::sound(OdometryResult result) {
+  const std::string defect = result.defect();
+  if (defect.empty()) {
+    if (result.has_pose) state_.sound = result;
+    return result;
+  }
+  state_.recover(options_);
+  OdometryResult lost;
+  lost.state = TrackingState::kLost;
+  lost.reason = "defect of the odometry: " + defect + "; goes on from the last sound pose. Please report it";
+  lost.stamp = result.stamp, lost.epoch = result.epoch, lost.dt = result.dt;
+  lost.features = result.features, lost.matches = result.matches, lost.distance = state_.distance;
+  return lost;
 }
 
 void VisualOdometry::refuse(const StereoFeatures& features) const {

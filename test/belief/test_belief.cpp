@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
 #include "../../src/belief/belief.hpp"
 
@@ -64,6 +65,27 @@ TEST_F(Weighed, AMotionThatNothingSpeaksAgainstIsBelieved) {
   Doubt doubt;
   EXPECT_GT(weigh(doubt, 90).probability, 0.99);
   EXPECT_FALSE(doubt.lasts());
+}
+
+/// exp() of log-odds above 709 is infinite, and infinity times a probability of zero is no number.
+TEST_F(Weighed, OverwhelmingEvidenceLeavesFiniteNumbers) {
+  const double nan = std::numeric_limits<double>::quiet_NaN(), infinity = std::numeric_limits<double>::infinity();
+  for (const double log_odds : {6.9, 100.0, 709.0, 710.0, 2000.0, infinity, -infinity, nan}) {
+    Doubt doubt;
+    const Belief belief = weigh(doubt, 90, {{log_odds, "a knock", true}});
+    EXPECT_TRUE(belief.moment.allFinite() && belief.pose_moment.allFinite()) << log_odds;
+    EXPECT_EQ(belief.probability < 0.1, log_odds > 0.0) << log_odds << ": " << belief.probability;
+    EXPECT_LE(doubt.logOdds(), kCertain) << log_odds;
+  }
+}
+
+TEST_F(Weighed, AMotionOfNoProbabilityLeavesFiniteNumbers) {
+  MotionHypothesis found;
+  found.probability = 0.0;
+  Doubt doubt;
+  const Belief belief = doubt.weigh(scene_, found, {});
+  EXPECT_TRUE(belief.moment.allFinite() && belief.pose_moment.allFinite());
+  EXPECT_LT(belief.probability, 0.01);
 }
 
 /// A weight below zero would make the covariance indefinite.

@@ -528,6 +528,42 @@ TEST(VisualOdometry, DoubtsTheNextMapWhereManyMatchesAgreedOnNoMotion) {
   EXPECT_GE(count[TrackingState::kDegraded], 3) << "a map of the wrong depths explains one another's pairs";
 }
 
+/// What no input may cause is not published: the odometry is lost, says why, and goes on from the last sound pose.
+TEST(VisualOdometry, ACovarianceThatIsNoneIsLostAndGoesOn) {
+  VisualOdometry odometry({});
+  const OdometryResult before = follow(odometry, 8);
+  odometry.takePose(1e308 * Matrix6d::Identity());  // the next motion multiplies it beyond all numbers
+  const OdometryResult lost = odometry.update(pairOf(9));
+  expectState(lost, TrackingState::kLost, "covariance of the pose is not finite");
+  EXPECT_FALSE(lost.has_pose);
+  const OdometryResult again = odometry.update(pairOf(10));
+  expectState(again, TrackingState::kDegraded, "started again");
+  EXPECT_GT(again.epoch, lost.epoch);
+  EXPECT_TRUE(again.T_origin_camera.isApprox(before.T_origin_camera));
+  EXPECT_GT(positionSigma(again), 1.0) << "the motion in between is unknown";
+  const OdometryResult last = follow(odometry, 14, 11);
+  expectState(last, TrackingState::kTracking);
+  expectHealthy(last);
+}
+
+TEST(VisualOdometry, RefusesGuessesMountsAndCovariancesThatAreNone) {
+  VisualOdometry odometry({}), undisturbed({});
+  follow(odometry, 4), follow(undisturbed, 4);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  MotionGuess scaled, unknown, exact;
+  scaled.T_previous_current.linear() *= 1.1;
+  unknown.T_previous_current.translation().x() = nan;
+  exact.error = 0.0;
+  for (const MotionGuess& guess : {scaled, unknown, exact})
+    EXPECT_THROW(odometry.update(pairOf(5), guess), std::invalid_argument);
+  EXPECT_THROW(odometry.mountAt(scaled.T_previous_current), std::invalid_argument);
+  EXPECT_THROW(odometry.mountAt(unknown.T_previous_current), std::invalid_argument);
+  EXPECT_THROW(odometry.takePose(nan * Matrix6d::Identity()), std::invalid_argument);
+  EXPECT_THROW(odometry.takePose(-Matrix6d::Identity()), std::invalid_argument);
+  EXPECT_THROW(odometry.takePose(Matrix6d::Identity() - Matrix6d::Ones()), std::invalid_argument);
+  expectSame(odometry.update(pairOf(5)), undisturbed.update(pairOf(5)));
+}
+
 TEST(VisualOdometry, DoesNotDoubtForLongWhatComesAfterAGap) {
   constexpr std::int64_t kGap = 3000000000;  // ns
   VisualOdometry odometry({});
@@ -914,6 +950,7 @@ TEST(VisualOdometry, ASimulatedCameraThatStopsDeadIsNotLost) {
     ASSERT_EQ(result.state, TrackingState::kDegraded) << i;
     ASSERT_TRUE(result.T_origin_camera.isApprox(before.T_origin_camera, 1e-9)) << i;
     ASSERT_GT(result.pose_covariance.trace(), trace) << i;
+    ASSERT_GT(result.motion_covariance(4, 4), 0.01 * 0.01) << i << ": it may turn meanwhile";
     ASSERT_EQ(result.reason,
               "the images repeat those of the previous pair although the camera moved: is the driver frozen?");
     trace = result.pose_covariance.trace();

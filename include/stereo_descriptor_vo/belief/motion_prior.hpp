@@ -82,6 +82,10 @@ class MotionPrior {
   /// the confirmed speed in any direction. max_speed and half a turn bound it.
   Matrix6d unseen(double seconds) const;
 
+  /// The same of the motion in the last `dt` s of these. max_speed and max_rotation_rate bound it, so unlike the
+  /// growth of unseen() it never ends.
+  Matrix6d unseen(double seconds, double dt) const;
+
   /// Covariance, m^2 and rad^2, of a motion without any measurement. The standard deviations are the distance at
   /// max_speed over max_gap, and half a radian.
   Matrix6d unknown() const;

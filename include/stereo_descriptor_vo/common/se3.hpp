@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <string>
 
 #include "stereo_descriptor_vo/common/cpp17.hpp"
 
@@ -35,6 +36,9 @@ double mahalanobisSquare(const Vector6d& difference, const Matrix6d& covariance)
 
 /// A symmetric matrix with its negative eigenvalues set to zero. A difference of covariances may have such.
 Matrix6d positivePart(const Matrix6d& matrix);
+
+/// Throws std::invalid_argument that says what is not a rigid motion of finite numbers.
+void checkRigid(const Eigen::Isometry3d& T, const std::string& what);
 
 /// The same pose with its rotation made orthonormal again; products of many rotations drift away from that.
 Eigen::Isometry3d orthonormalised(const Eigen::Isometry3d& T);

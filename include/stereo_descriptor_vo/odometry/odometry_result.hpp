@@ -61,6 +61,9 @@ struct OdometryResult {
   double right_delay_sigma = std::numeric_limits<double>::quiet_NaN();     ///< s
   Eigen::Vector3d right_rotation = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());        ///< rad
   Eigen::Vector3d right_rotation_sigma = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());  ///< rad
+
+  /// Names what of pose and motion is not finite, or which covariance is not positive semidefinite; empty: none.
+  std::string defect() const;
 };
 
 }  // namespace sdvo

@@ -14,6 +14,9 @@ struct MotionGuess {
   bool rotation_only = false;  ///< from a gyro: the translation is not used
   double error = 0.1;          ///< standard deviation as a ratio of distance and angle: a scale common to all guesses
 
+  /// Throws std::invalid_argument if it is not a rigid motion, or its error is not positive.
+  void check() const;
+
   /// The motion over `dt` s; a gyro's guess gets the translation of the prior.
   Eigen::Isometry3d motion(const MotionPrior& prior, double dt) const;
 };
@@ -34,6 +37,8 @@ class Outage {
 
   /// Covariance, m^2 and rad^2, by which the unknown motion of the outage grew in the last `dt` s.
   Matrix6d growth(const MotionPrior& prior, double dt) const;
+  /// That of the unknown motion in the last `dt` s alone.
+  Matrix6d last(const MotionPrior& prior, double dt) const { return prior.unseen(seconds_, dt); }
 
   int predictedPairs() const { return predicted_pairs_; }
   void countPrediction() { ++predicted_pairs_; }

@@ -32,8 +32,8 @@ class VisualOdometry {
   explicit VisualOdometry(const VisualOdometryOptions& options);
   ~VisualOdometry();
 
-  /// Processes the next pair. Stamps must increase and the features must pass check(), else std::invalid_argument and
-  /// the state is as before. `guess` is one more hypothesis of the motion, never a measurement. A pair's camera that
+  /// Processes the next pair. Stamps must increase, features and guess must pass check(), else std::invalid_argument
+  /// and the state is as before. `guess` is one more hypothesis of the motion, never a measurement. A pair's camera that
   /// isLike() the first one's continues the map; another camera starts a new epoch.
   OdometryResult update(const StereoFeatures& features, const std::optional<MotionGuess>& guess = std::nullopt);
 
@@ -45,7 +45,8 @@ class VisualOdometry {
   void breakStream();
 
   /// Another source sets the last pose's covariance (right perturbation, m and rad); a new epoch begins. The map is
-  /// kept. After an interruption the next pair starts a map at the last pose instead.
+  /// kept. After an interruption the next pair starts a map at the last pose instead. Throws std::invalid_argument, and
+  /// changes nothing, when the covariance is not finite or not positive semidefinite.
   void takePose(const Matrix6d& covariance);
 
   /// T_origin_camera of the last pair that had a pose.
@@ -60,7 +61,7 @@ class VisualOdometry {
 
   /// The camera's pose on the base, whose floor `planar` constrains; initially at the base's origin, looking ahead. A
   /// new pose counts as another camera: the odometry goes on from the base's last pose under a new epoch. The origin is
-  /// where this camera was in the beginning.
+  /// where this camera was in the beginning. Throws std::invalid_argument when it is not a rigid motion.
   void mountAt(const Eigen::Isometry3d& T_base_camera);
 
   /// The local map's points at a finite distance, in the origin's frame, m; empty without a map.
@@ -73,6 +74,7 @@ class VisualOdometry {
   struct Parts;
 
   void refuse(const StereoFeatures& features) const;
+  OdometryResult sound(OdometryResult result);
   Pair prepared(const StereoFeatures& given, const std::optional<MotionGuess>& guess) const;
   void compensate(Pair& pair) const;
   void search(Pair& pair, const std::optional<MotionGuess>& guess, std::optional<MotionScene>& scene,
