@@ -12,12 +12,12 @@
 #include "../belief/pose_covariance.hpp"
 #include "../rig/learnt_rig.hpp"
 #include "../rig/repeated_images.hpp"
+#include "outage.hpp"
 #include "stereo_descriptor_vo/belief/motion_prior.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/map/floor.hpp"
 #include "stereo_descriptor_vo/map/local_map.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
-#include "stereo_descriptor_vo/odometry/outage.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry_options.hpp"
 
 namespace sdvo {

@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/odometry/outage.hpp"
+#include "outage.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -14,9 +14,9 @@ void MotionGuess::check() const {
                                 ", not a positive ratio of the motion");
 }
 
-Eigen::Isometry3d MotionGuess::motion(const MotionPrior& prior, double dt) const {
-  Eigen::Isometry3d motion = T_previous_current;
-  if (rotation_only) motion.translation() = prior.velocity().value_or(Vector6d::Zero()).head<3>() * dt;
+Eigen::Isometry3d motionBy(const MotionGuess& guess, const MotionPrior& prior, double dt) {
+  Eigen::Isometry3d motion = guess.T_previous_current;
+  if (guess.rotation_only) motion.translation() = prior.velocity().value_or(Vector6d::Zero()).head<3>() * dt;
   return motion;
 }
 
@@ -24,7 +24,7 @@ void Outage::extend(double dt, const std::optional<MotionGuess>& guess, const Mo
   seconds_ += dt;
   if (!guess) followed_.reset();
   if (!followed_) return;
-  const Eigen::Isometry3d motion = guess->motion(prior, dt);
+  const Eigen::Isometry3d motion = motionBy(*guess, prior, dt);
   const Matrix6d carried = adjoint(motion.inverse());
   Matrix6d covariance = covarianceOf(*guess, prior.around(motion, dt).covariance);
   if (guess->rotation_only) covariance.topLeftCorner<3, 3>() = growth(prior, dt).topLeftCorner<3, 3>();

@@ -53,67 +53,135 @@ std::vector<RowMotion> rowMotions(const StereoFeatures& features, const MotionHy
 
 }  // namespace
 
-/// A pair as it is searched: in the map's camera, without repeated rows, with the right image rotated back and
-/// synchronous.
-struct VisualOdometry::Pair {
-  const StereoFeatures& given;
-  std::optional<StereoFeatures> refocused{}, new_part{}, rotated_back{}, synchronised{};
-  std::vector<int> new_features{};
-  double dt = 0.0;               ///< since the previous pair, s
-  double frozen = kUnsuspected;  ///< log-odds that its images repeat although the camera moved
-  /// Without a map of its camera; after an outage; with repeated images; after a pose.
-  enum { kFirst, kSought, kFrozen, kFollowed } is = kFirst;
-  ShownRotation rotation{};  ///< of the right camera beyond the known one
+/// The steps of a pair, in the order of update(), and what they remember.
+class VisualOdometry::Impl {
+ public:
+  explicit Impl(const VisualOdometryOptions& options);
 
-  const StereoFeatures& whole() const { return refocused ? *refocused : given; }
-  const StereoFeatures& part() const { return new_part ? *new_part : whole(); }
-  const StereoFeatures& taken() const { return rotated_back ? *rotated_back : part(); }
-  const StereoFeatures& features() const { return synchronised ? *synchronised : taken(); }
+  OdometryResult update(const StereoFeatures& given, const std::optional<MotionGuess>& guess);
+  void reset() { state_ = OdometryState(options_, state_.epoch + 1); }
+  void breakStream() { state_.interrupt(); }
+  void takePose(const Matrix6d& covariance);
+  const Eigen::Isometry3d& lastPose() const { return state_.T_origin_camera; }
+  void configure(const VisualOdometryOptions& options);
+  const VisualOdometryOptions& options() const { return options_; }
+  void mountAt(const Eigen::Isometry3d& T_base_camera);
+  std::vector<Eigen::Vector3d> mapPoints() const;
+
+ private:
+  using Step = OdometryStep;
+
+  /// A pair as it is searched: in the map's camera, without repeated rows, with the right image rotated back and
+  /// synchronous.
+  struct Pair {
+    const StereoFeatures& given;
+    std::optional<StereoFeatures> refocused{}, new_part{}, rotated_back{}, synchronised{};
+    std::vector<int> new_features{};
+    double dt = 0.0;               ///< since the previous pair, s
+    double frozen = kUnsuspected;  ///< log-odds that its images repeat although the camera moved
+    /// Without a map of its camera; after an outage; with repeated images; after a pose.
+    enum { kFirst, kSought, kFrozen, kFollowed } is = kFirst;
+    ShownRotation rotation{};  ///< of the right camera beyond the known one
+
+    const StereoFeatures& whole() const { return refocused ? *refocused : given; }
+    const StereoFeatures& part() const { return new_part ? *new_part : whole(); }
+    const StereoFeatures& taken() const { return rotated_back ? *rotated_back : part(); }
+    const StereoFeatures& features() const { return synchronised ? *synchronised : taken(); }
+  };
+
+  /// The map with the pair, adjusted. The state does not change until commit().
+  struct Candidate {
+    RigCalibration calibration;
+    RigEstimate::Shape calibration_by_rig;
+    double delay = 0.0;  ///< of the right camera, compensated, s
+    LocalMap::Adjustment adjustment;
+    Eigen::Isometry3d motion;             ///< T_reference_current after the adjustment
+    Eigen::Isometry3d T_keyframe_origin;  ///< of the last key frame, before the adjustment
+    double distance = 0.0;                ///< from that key frame, m
+  };
+
+  void refuse(const StereoFeatures& features) const;
+  OdometryResult sound(OdometryResult result);
+  Pair prepared(const StereoFeatures& given, const std::optional<MotionGuess>& guess) const;
+  void compensate(Pair& pair) const;
+  void search(Pair& pair, const std::optional<MotionGuess>& guess, std::optional<MotionScene>& scene,
+              MotionHypothesis& found) const;
+  std::optional<Eigen::Isometry3d> expectedMotion(double dt, const std::optional<MotionGuess>& guess) const;
+  double logOddsOfFrozen(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
+  std::optional<StereoFeatures> synchronised(const StereoFeatures& taken, double dt, const Vector6d& velocity) const;
+  MotionScene sceneOf(const LocalMap& map, const StereoFeatures& features, double dt,
+                      const std::optional<MotionGuess>& guess) const;
+  std::optional<MotionScene> reacquire(const StereoFeatures& features) const;
+  double largestDoubt() const;
+  std::optional<Floor> floor() const;
+
+  void begin(const Pair& pair, const std::optional<MotionGuess>& guess);
+  std::optional<MeasuredPair> measuredPair(const Pair& pair, const MotionHypothesis& found) const;
+  std::vector<Evidence> evidenceAgainst(const Pair& pair, const MotionHypothesis& found,
+                                        const std::optional<MeasuredPair>& measured);
+  Step extendMap(const StereoFeatures& features, const MotionScene& scene, MotionHypothesis& found, double dt,
+                 const std::vector<Evidence>& evidence);
+  Candidate adjustBeyondDoubt(const StereoFeatures& features, const MotionScene& scene, MotionHypothesis& found);
+  Candidate adjust(const StereoFeatures& features, const LocalMap& before, const MotionHypothesis& found,
+                   bool may_recall);
+  void commit(const Candidate& candidate, const Belief& belief);
+  Step measure(const MotionHypothesis& found, const Candidate& candidate);
+  void widen(const MotionScene& scene, const MotionHypothesis& found, const Belief& belief, Step& step);
+  std::string doubtWords(const MotionScene& scene, const MotionHypothesis& found, const Candidate& candidate,
+                         const Belief& belief) const;
+  bool isDoubtful(const Belief& belief) const;
+  void finish(const Pair& pair, Step& step);
+
+  VisualOdometryOptions options_;
+  Eigen::Isometry3d T_base_camera_;
+  MotionSearch search_;
+  Reacquisition reacquisition_;
+  Revisit revisit_;
+  WindowOptimizer optimizer_;
+  OdometryState state_;
 };
 
-/// The map with the pair, adjusted. The state does not change until commit().
-struct VisualOdometry::Candidate {
-  RigCalibration calibration;
-  RigEstimate::Shape calibration_by_rig;
-  double delay = 0.0;  ///< of the right camera, compensated, s
-  LocalMap::Adjustment adjustment;
-  Eigen::Isometry3d motion;             ///< T_reference_current after the adjustment
-  Eigen::Isometry3d T_keyframe_origin;  ///< of the last key frame, before the adjustment
-  double distance = 0.0;                ///< from that key frame, m
-};
-
-struct VisualOdometry::Parts {
-  explicit Parts(const VisualOdometryOptions& options)
-      : search(options.matcher, options.motion, options.alignment),
-        reacquisition(options.matcher, options.motion),
-        revisit(options.matcher, options.motion, options.alignment),
-        optimizer(options.window),
-        state(options, 0) {}
-
-  MotionSearch search;
-  Reacquisition reacquisition;
-  Revisit revisit;
-  WindowOptimizer optimizer;
-  OdometryState state;
-};
-
-VisualOdometry::VisualOdometry(const VisualOdometryOptions& options)
-    : options_(checked(options).withOneNoise()),
-      T_base_camera_(lookingAhead()),
-      parts_(std::make_unique<Parts>(options_)),
-      search_(parts_->search),
-      reacquisition_(parts_->reacquisition),
-      revisit_(parts_->revisit),
-      optimizer_(parts_->optimizer),
-      state_(parts_->state) {}
-
+VisualOdometry::VisualOdometry(const VisualOdometryOptions& options) : impl_(std::make_unique<Impl>(options)) {}
 VisualOdometry::~VisualOdometry() = default;
 
+OdometryResult VisualOdometry::update(const StereoFeatures& features, const std::optional<MotionGuess>& guess) {
+  return impl_->update(features, guess);
+}
+void VisualOdometry::reset() {
+  impl_->reset();
+}
+void VisualOdometry::breakStream() {
+  impl_->breakStream();
+}
+void VisualOdometry::takePose(const Matrix6d& covariance) {
+  impl_->takePose(covariance);
+}
 const Eigen::Isometry3d& VisualOdometry::lastPose() const {
-  return state_.T_origin_camera;
+  return impl_->lastPose();
+}
+void VisualOdometry::configure(const VisualOdometryOptions& options) {
+  impl_->configure(options);
+}
+const VisualOdometryOptions& VisualOdometry::options() const {
+  return impl_->options();
+}
+void VisualOdometry::mountAt(const Eigen::Isometry3d& T_base_camera) {
+  impl_->mountAt(T_base_camera);
+}
+std::vector<Eigen::Vector3d> VisualOdometry::mapPoints() const {
+  return impl_->mapPoints();
 }
 
-void VisualOdometry::configure(const VisualOdometryOptions& options) {
+VisualOdometry::Impl::Impl(const VisualOdometryOptions& options)
+    : options_(checked(options).withOneNoise()),
+      T_base_camera_(lookingAhead()),
+      search_(options_.matcher, options_.motion, options_.alignment),
+      reacquisition_(options_.matcher, options_.motion),
+      revisit_(options_.matcher, options_.motion, options_.alignment),
+      optimizer_(options_.window),
+      state_(options_, 0) {}
+
+void VisualOdometry::Impl::configure(const VisualOdometryOptions& options) {
   options_ = checked(options).withOneNoise();
   search_ = MotionSearch(options_.matcher, options_.motion, options_.alignment);
   reacquisition_ = Reacquisition(options_.matcher, options_.motion);
@@ -122,15 +190,7 @@ void VisualOdometry::configure(const VisualOdometryOptions& options) {
   state_.prior.configure(options.tracking);
 }
 
-void VisualOdometry::reset() {
-  state_ = OdometryState(options_, state_.epoch + 1);
-}
-
-void VisualOdometry::breakStream() {
-  state_.interrupt();
-}
-
-void VisualOdometry::mountAt(const Eigen::Isometry3d& T_base_camera) {
+void VisualOdometry::Impl::mountAt(const Eigen::Isometry3d& T_base_camera) {
   checkRigid(T_base_camera, "the camera's pose on the base");
   const Eigen::Isometry3d T_before_now = T_base_camera_.inverse() * T_base_camera;
   const bool is_same = T_base_camera.matrix() == T_base_camera_.matrix();
@@ -143,7 +203,7 @@ void VisualOdometry::mountAt(const Eigen::Isometry3d& T_base_camera) {
   state_.covariance.advance(T_before_now, Matrix6d::Zero());
 }
 
-void VisualOdometry::takePose(const Matrix6d& covariance) {
+void VisualOdometry::Impl::takePose(const Matrix6d& covariance) {
   OdometryResult given;
   given.has_pose = true, given.pose_covariance = covariance;
   if (const std::string defect = given.defect(); !defect.empty()) throw std::invalid_argument(defect);
@@ -154,7 +214,7 @@ void VisualOdometry::takePose(const Matrix6d& covariance) {
   state_.started = false;
 }
 
-OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::optional<MotionGuess>& guess) {
+OdometryResult VisualOdometry::Impl::update(const StereoFeatures& given, const std::optional<MotionGuess>& guess) {
   refuse(given);
   if (guess) guess->check();
   Pair pair = prepared(given, guess);
@@ -185,7 +245,7 @@ OdometryResult VisualOdometry::update(const StereoFeatures& given, const std::op
 }
 
 /// The only way out of update(): no result leaves with a number that is not finite or a covariance that is none.
-OdometryResult VisualOdometry::sound(OdometryResult result) {
+OdometryResult VisualOdometry::Impl::sound(OdometryResult result) {
   const std::string defect = result.defect();
   if (defect.empty()) {
     if (result.has_pose) state_.sound = result;
@@ -200,7 +260,7 @@ OdometryResult VisualOdometry::sound(OdometryResult result) {
   return lost;
 }
 
-void VisualOdometry::refuse(const StereoFeatures& features) const {
+void VisualOdometry::Impl::refuse(const StereoFeatures& features) const {
   features.check();
   if (state_.last_stamp && features.stamp <= *state_.last_stamp)
     throw std::invalid_argument("stamp " + std::to_string(features.stamp) + " ns is not later than the last one, " +
@@ -208,8 +268,8 @@ void VisualOdometry::refuse(const StereoFeatures& features) const {
 }
 
 /// Prepares a pair for the search of its motion.
-VisualOdometry::Pair VisualOdometry::prepared(const StereoFeatures& given,
-                                              const std::optional<MotionGuess>& guess) const {
+VisualOdometry::Impl::Pair VisualOdometry::Impl::prepared(const StereoFeatures& given,
+                                                          const std::optional<MotionGuess>& guess) const {
   Pair pair{given};
   // A focusing lens changes the camera with every pair, but the pixels of a map are of one camera.
   if (state_.camera && *state_.camera != given.camera && state_.camera->isLike(given.camera))
@@ -233,7 +293,7 @@ VisualOdometry::Pair VisualOdometry::prepared(const StereoFeatures& given,
 }
 
 /// Features as of a right camera that did not rotate and is synchronous.
-void VisualOdometry::compensate(Pair& pair) const {
+void VisualOdometry::Impl::compensate(Pair& pair) const {
   const LearntRig& rig = state_.rig;
   const bool is_new = pair.rotation.log_odds > 0.0;
   const Eigen::Vector3d rotation = is_new ? Eigen::Vector3d(rig.rotation + pair.rotation.value) : rig.rotation;
@@ -245,8 +305,8 @@ void VisualOdometry::compensate(Pair& pair) const {
 
 /// Searches the pair's motion in the map, after an outage also in the seed. If the camera turns otherwise than
 /// expected, or the right one seems to have rotated, features are compensated again and the search is repeated.
-void VisualOdometry::search(Pair& pair, const std::optional<MotionGuess>& guess, std::optional<MotionScene>& scene,
-                            MotionHypothesis& found) const {
+void VisualOdometry::Impl::search(Pair& pair, const std::optional<MotionGuess>& guess,
+                                  std::optional<MotionScene>& scene, MotionHypothesis& found) const {
   const auto find = [&] {
     scene.reset();
     if (pair.is == Pair::kFollowed) scene.emplace(sceneOf(*state_.map, pair.features(), pair.dt, guess));
@@ -278,17 +338,17 @@ void VisualOdometry::search(Pair& pair, const std::optional<MotionGuess>& guess,
 }
 
 /// Expected motion over the `dt` s since the previous pair: the guess, else the prediction.
-std::optional<Eigen::Isometry3d> VisualOdometry::expectedMotion(double dt,
-                                                                const std::optional<MotionGuess>& guess) const {
-  if (guess) return guess->motion(state_.prior, dt);
+std::optional<Eigen::Isometry3d> VisualOdometry::Impl::expectedMotion(double dt,
+                                                                      const std::optional<MotionGuess>& guess) const {
+  if (guess) return motionBy(*guess, state_.prior, dt);
   if (state_.interrupted || !state_.prior.velocity() || dt > options_.tracking.max_gap) return std::nullopt;
   return state_.prior.predicted(dt).motion;
 }
 
 /// Log-odds that images repeat although the camera moved. The guess, or the last motion, implies whether it did. A
 /// robot may stop from one pair to the next as far as the prior allows; the first repeated pair decides.
-double VisualOdometry::logOddsOfFrozen(const StereoFeatures& features, double dt,
-                                       const std::optional<MotionGuess>& guess) const {
+double VisualOdometry::Impl::logOddsOfFrozen(const StereoFeatures& features, double dt,
+                                             const std::optional<MotionGuess>& guess) const {
   const RepeatedImages& images = state_.images;
   if (!images.repeat(features)) return kUnsuspected;
   const auto moved = [&](const Eigen::Isometry3d& T_previous_current) {
@@ -310,8 +370,8 @@ double VisualOdometry::logOddsOfFrozen(const StereoFeatures& features, double dt
 
 /// The map, the pair, and the expected motion between them: that of predicted pairs since the reference, then the
 /// velocity or the guess.
-MotionScene VisualOdometry::sceneOf(const LocalMap& map, const StereoFeatures& features, double dt,
-                                    const std::optional<MotionGuess>& guess) const {
+MotionScene VisualOdometry::Impl::sceneOf(const LocalMap& map, const StereoFeatures& features, double dt,
+                                          const std::optional<MotionGuess>& guess) const {
   const MotionPrior& prior = state_.prior;
   MotionScene scene{map,
                     state_.rig.calibration.calibration(),
@@ -329,22 +389,22 @@ MotionScene VisualOdometry::sceneOf(const LocalMap& map, const StereoFeatures& f
   if (prior.velocity() && dt <= options_.tracking.max_gap)
     scene.T_current_reference = (T_reference_previous * prior.predicted(dt).motion).inverse();
   if (guess) {
-    scene.guess = (T_reference_previous * guess->motion(prior, dt)).inverse();
+    scene.guess = (T_reference_previous * motionBy(*guess, prior, dt)).inverse();
     if (!scene.prior.empty()) scene.prior.push_back(prior.around(scene.guess->inverse(), since));
   }
   return scene;
 }
 
 /// The features at the time of the left image; none if no delay is known.
-std::optional<StereoFeatures> VisualOdometry::synchronised(const StereoFeatures& taken, double dt,
-                                                           const Vector6d& velocity) const {
+std::optional<StereoFeatures> VisualOdometry::Impl::synchronised(const StereoFeatures& taken, double dt,
+                                                                 const Vector6d& velocity) const {
   const double known = state_.rig.calibration.delay();
   if (taken.right_delay + known == 0.0) return std::nullopt;
   return state_.rig.right_delay.synchronised(taken, dt, velocity, known);
 }
 
 /// The pair with its measured motion; none without a motion, or with one that spans an outage.
-std::optional<MeasuredPair> VisualOdometry::measuredPair(const Pair& pair, const MotionHypothesis& found) const {
+std::optional<MeasuredPair> VisualOdometry::Impl::measuredPair(const Pair& pair, const MotionHypothesis& found) const {
   if (!found.motion.success || state_.interrupted || !(pair.dt > 0.0)) return std::nullopt;
   const StereoFeatures& taken = pair.taken();
   const Eigen::Isometry3d& motion = found.motion.T_current_reference;
@@ -354,9 +414,9 @@ std::optional<MeasuredPair> VisualOdometry::measuredPair(const Pair& pair, const
       rowMotions(taken, found, since, state_.rig.row_pattern, taken.right_delay + state_.rig.calibration.delay())};
 }
 
-/// Evidence of the pair that its motion is not the camera's. It decides nothing.
-std::vector<Evidence> VisualOdometry::evidenceAgainst(const Pair& pair, const MotionHypothesis& found,
-                                                      const std::optional<MeasuredPair>& measured) {
+/// Evidence of the pair that its motion is not the camera's.
+std::vector<Evidence> VisualOdometry::Impl::evidenceAgainst(const Pair& pair, const MotionHypothesis& found,
+                                                            const std::optional<MeasuredPair>& measured) {
   LearntRig& rig = state_.rig;
   // The map is from before the rotation.
   std::vector<Evidence> evidence{{pair.rotation.log_odds, pair.rotation.words()},
@@ -379,12 +439,12 @@ std::vector<Evidence> VisualOdometry::evidenceAgainst(const Pair& pair, const Mo
 }
 
 /// Log-odds that a motion is not the camera's, above which it is doubtful.
-double VisualOdometry::largestDoubt() const {
+double VisualOdometry::Impl::largestDoubt() const {
   return logOdds(1.0 - options_.tracking.probability);
 }
 
 /// Searches the pair in the map from before an outage, then in the seed. The camera's motion meanwhile is unknown.
-std::optional<MotionScene> VisualOdometry::reacquire(const StereoFeatures& features) const {
+std::optional<MotionScene> VisualOdometry::Impl::reacquire(const StereoFeatures& features) const {
   std::optional<MotionScene> scene;
   const LocalMap& map = *state_.map;
   const auto place = reacquisition_.find(map, features, state_.rig.calibration.calibration());
@@ -401,7 +461,7 @@ std::optional<MotionScene> VisualOdometry::reacquire(const StereoFeatures& featu
 }
 
 /// Updates what each pair changes, whatever its motion.
-void VisualOdometry::begin(const Pair& pair, const std::optional<MotionGuess>& guess) {
+void VisualOdometry::Impl::begin(const Pair& pair, const std::optional<MotionGuess>& guess) {
   const StereoFeatures& features = pair.features();
   if (state_.camera && *state_.camera != features.camera) state_.forgetRig(options_);
   state_.camera = features.camera;
@@ -414,7 +474,7 @@ void VisualOdometry::begin(const Pair& pair, const std::optional<MotionGuess>& g
 }
 
 /// Updates the state by the pair's step.
-void VisualOdometry::finish(const Pair& pair, Step& step) {
+void VisualOdometry::Impl::finish(const Pair& pair, Step& step) {
   const StereoFeatures& features = pair.features();
   state_.doubt.fade();
   const auto stood = [&step] {
@@ -433,9 +493,9 @@ void VisualOdometry::finish(const Pair& pair, Step& step) {
 }
 
 /// The pair joins the map unless its motion is rejected, before or after the adjustment.
-VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, const MotionScene& scene,
-                                               MotionHypothesis& found, double dt,
-                                               const std::vector<Evidence>& evidence) {
+VisualOdometry::Impl::Step VisualOdometry::Impl::extendMap(const StereoFeatures& features, const MotionScene& scene,
+                                                           MotionHypothesis& found, double dt,
+                                                           const std::vector<Evidence>& evidence) {
   const auto passOver = [&](const std::string& why) {
     state_.doubt.raise(evidence);
     return state_.interrupted ? startMap(options_, features, state_)
@@ -484,8 +544,9 @@ VisualOdometry::Step VisualOdometry::extendMap(const StereoFeatures& features, c
 
 /// Adjusts the map with the pair. If it rejects so many inliers that the motion is not beyond doubt, all hypotheses
 /// compete.
-VisualOdometry::Candidate VisualOdometry::adjustBeyondDoubt(const StereoFeatures& features, const MotionScene& scene,
-                                                            MotionHypothesis& found) {
+VisualOdometry::Impl::Candidate VisualOdometry::Impl::adjustBeyondDoubt(const StereoFeatures& features,
+                                                                        const MotionScene& scene,
+                                                                        MotionHypothesis& found) {
   const bool is_sound = !state_.doubt.lasts();
   const bool was_beyond_doubt = search_.isBeyondDoubt(found, largestDoubt());
   Candidate candidate = adjust(features, scene.map, found, is_sound);
@@ -502,8 +563,8 @@ VisualOdometry::Candidate VisualOdometry::adjustBeyondDoubt(const StereoFeatures
 }
 
 /// Adjusts a copy of the map with the pair in it.
-VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features, const LocalMap& before,
-                                                 const MotionHypothesis& found, bool may_recall) {
+VisualOdometry::Impl::Candidate VisualOdometry::Impl::adjust(const StereoFeatures& features, const LocalMap& before,
+                                                             const MotionHypothesis& found, bool may_recall) {
   const Eigen::Isometry3d T_previous_origin = before.newestPose();
   state_.candidate = before;
   LocalMap& map = *state_.candidate;
@@ -536,7 +597,8 @@ VisualOdometry::Candidate VisualOdometry::adjust(const StereoFeatures& features,
 
 /// Adds second moments to the covariances: of rivals, of places that look alike, and of an unexpected innovation. A
 /// doubtful motion has the moment of its doubt as well.
-void VisualOdometry::widen(const MotionScene& scene, const MotionHypothesis& found, const Belief& belief, Step& step) {
+void VisualOdometry::Impl::widen(const MotionScene& scene, const MotionHypothesis& found, const Belief& belief,
+                                 Step& step) {
   const auto add = [&](const Matrix6d& motion, const Matrix6d& pose) {
     step.covariance += motion;
     state_.covariance.doubt(motion, pose);
@@ -550,8 +612,8 @@ void VisualOdometry::widen(const MotionScene& scene, const MotionHypothesis& fou
 }
 
 /// Reason, if a motion has too small a probability or too large a covariance; else empty.
-std::string VisualOdometry::doubtWords(const MotionScene& scene, const MotionHypothesis& found,
-                                       const Candidate& candidate, const Belief& belief) const {
+std::string VisualOdometry::Impl::doubtWords(const MotionScene& scene, const MotionHypothesis& found,
+                                             const Candidate& candidate, const Belief& belief) const {
   if (isDoubtful(belief)) return belief.reason;
   Matrix6d covariance = candidate.adjustment.since_keyframe + unexpected(scene, found);
   if (scene.place) covariance += scene.place->moment;
@@ -566,11 +628,11 @@ std::string VisualOdometry::doubtWords(const MotionScene& scene, const MotionHyp
   return words.str() + (scene.place ? scene.place->reason : "");
 }
 
-bool VisualOdometry::isDoubtful(const Belief& belief) const {
+bool VisualOdometry::Impl::isDoubtful(const Belief& belief) const {
   return belief.probability < options_.tracking.probability;
 }
 
-void VisualOdometry::commit(const Candidate& candidate, const Belief& belief) {
+void VisualOdometry::Impl::commit(const Candidate& candidate, const Belief& belief) {
   std::swap(state_.map, state_.candidate);
   // Points of a mover agree with each other: a doubtful pair does not confirm them.
   if (isDoubtful(belief)) state_.map->discountNewest();
@@ -584,7 +646,7 @@ void VisualOdometry::commit(const Candidate& candidate, const Belief& belief) {
 }
 
 /// The motion between the two reported poses, and its covariance.
-VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, const Candidate& candidate) {
+VisualOdometry::Impl::Step VisualOdometry::Impl::measure(const MotionHypothesis& found, const Candidate& candidate) {
   const LocalMap& map = *state_.map;
   Step step;
   step.rejected_features = candidate.adjustment.rejected;
@@ -613,12 +675,12 @@ VisualOdometry::Step VisualOdometry::measure(const MotionHypothesis& found, cons
   return step;
 }
 
-std::optional<Floor> VisualOdometry::floor() const {
+std::optional<Floor> VisualOdometry::Impl::floor() const {
   if (!options_.planar.planar) return std::nullopt;
   return Floor(options_.planar, T_base_camera_, state_.floor.height());
 }
 
-std::vector<Eigen::Vector3d> VisualOdometry::mapPoints() const {
+std::vector<Eigen::Vector3d> VisualOdometry::Impl::mapPoints() const {
   return state_.map ? state_.map->positions() : std::vector<Eigen::Vector3d>();
 }
 

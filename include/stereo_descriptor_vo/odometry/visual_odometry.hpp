@@ -3,26 +3,14 @@
 #include <Eigen/Geometry>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/odometry/motion_guess.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
-#include "stereo_descriptor_vo/odometry/outage.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry_options.hpp"
 
 namespace sdvo {
-
-struct Belief;
-struct Evidence;
-struct MeasuredPair;
-struct MotionHypothesis;
-struct MotionScene;
-struct OdometryState;
-struct OdometryStep;
-class MotionSearch;
-class Reacquisition;
-class Revisit;
 
 /// Stereo odometry on stereo features alone. Every pair is matched to a local map of the points around the camera,
 /// separated from outliers by sample consensus, and adjusted together with the last key frames.
@@ -33,8 +21,8 @@ class VisualOdometry {
   ~VisualOdometry();
 
   /// Processes the next pair. Stamps must increase, features and guess must pass check(), else std::invalid_argument
-  /// and the state is as before. `guess` is one more hypothesis of the motion, never a measurement. A pair's camera that
-  /// isLike() the first one's continues the map; another camera starts a new epoch.
+  /// and the state is as before. `guess` is one more hypothesis of the motion, never a measurement. A pair's camera
+  /// that isLike() the first one's continues the map; another camera starts a new epoch.
   OdometryResult update(const StereoFeatures& features, const std::optional<MotionGuess>& guess = std::nullopt);
 
   /// Back to the initial pose and a new epoch; nothing is remembered.
@@ -57,7 +45,7 @@ class VisualOdometry {
   /// Throws std::invalid_argument, and keeps the old ones, when an option is out of its range.
   void configure(const VisualOdometryOptions& options);
 
-  const VisualOdometryOptions& options() const { return options_; }
+  const VisualOdometryOptions& options() const;
 
   /// The camera's pose on the base, whose floor `planar` constrains; initially at the base's origin, looking ahead. A
   /// new pose counts as another camera: the odometry goes on from the base's last pose under a new epoch. The origin is
@@ -68,51 +56,8 @@ class VisualOdometry {
   std::vector<Eigen::Vector3d> mapPoints() const;
 
  private:
-  using Step = OdometryStep;
-  struct Pair;
-  struct Candidate;
-  struct Parts;
-
-  void refuse(const StereoFeatures& features) const;
-  OdometryResult sound(OdometryResult result);
-  Pair prepared(const StereoFeatures& given, const std::optional<MotionGuess>& guess) const;
-  void compensate(Pair& pair) const;
-  void search(Pair& pair, const std::optional<MotionGuess>& guess, std::optional<MotionScene>& scene,
-              MotionHypothesis& found) const;
-  std::optional<Eigen::Isometry3d> expectedMotion(double dt, const std::optional<MotionGuess>& guess) const;
-  double logOddsOfFrozen(const StereoFeatures& features, double dt, const std::optional<MotionGuess>& guess) const;
-  std::optional<StereoFeatures> synchronised(const StereoFeatures& taken, double dt, const Vector6d& velocity) const;
-  MotionScene sceneOf(const LocalMap& map, const StereoFeatures& features, double dt,
-                      const std::optional<MotionGuess>& guess) const;
-  std::optional<MotionScene> reacquire(const StereoFeatures& features) const;
-  double largestDoubt() const;
-  std::optional<Floor> floor() const;
-
-  void begin(const Pair& pair, const std::optional<MotionGuess>& guess);
-  std::optional<MeasuredPair> measuredPair(const Pair& pair, const MotionHypothesis& found) const;
-  std::vector<Evidence> evidenceAgainst(const Pair& pair, const MotionHypothesis& found,
-                                        const std::optional<MeasuredPair>& measured);
-  Step extendMap(const StereoFeatures& features, const MotionScene& scene, MotionHypothesis& found, double dt,
-                 const std::vector<Evidence>& evidence);
-  Candidate adjustBeyondDoubt(const StereoFeatures& features, const MotionScene& scene, MotionHypothesis& found);
-  Candidate adjust(const StereoFeatures& features, const LocalMap& before, const MotionHypothesis& found,
-                   bool may_recall);
-  void commit(const Candidate& candidate, const Belief& belief);
-  Step measure(const MotionHypothesis& found, const Candidate& candidate);
-  void widen(const MotionScene& scene, const MotionHypothesis& found, const Belief& belief, Step& step);
-  std::string doubtWords(const MotionScene& scene, const MotionHypothesis& found, const Candidate& candidate,
-                         const Belief& belief) const;
-  bool isDoubtful(const Belief& belief) const;
-  void finish(const Pair& pair, Step& step);
-
-  VisualOdometryOptions options_;
-  Eigen::Isometry3d T_base_camera_;
-  std::unique_ptr<Parts> parts_;  ///< owns the following ones
-  MotionSearch& search_;
-  Reacquisition& reacquisition_;
-  Revisit& revisit_;
-  WindowOptimizer& optimizer_;
-  OdometryState& state_;
+  class Impl;
+  std::unique_ptr<Impl> impl_;
 };
 
 }  // namespace sdvo

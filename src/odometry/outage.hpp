@@ -5,21 +5,12 @@
 
 #include "stereo_descriptor_vo/belief/motion_prior.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
+#include "stereo_descriptor_vo/odometry/motion_guess.hpp"
 
 namespace sdvo {
 
-/// Motion of the camera since the previous pair, from another source than images.
-struct MotionGuess {
-  Eigen::Isometry3d T_previous_current = Eigen::Isometry3d::Identity();
-  bool rotation_only = false;  ///< from a gyro: the translation is not used
-  double error = 0.1;          ///< standard deviation as a ratio of distance and angle: a scale common to all guesses
-
-  /// Throws std::invalid_argument if it is not a rigid motion, or its error is not positive.
-  void check() const;
-
-  /// The motion over `dt` s; a gyro's guess gets the translation of the prior.
-  Eigen::Isometry3d motion(const MotionPrior& prior, double dt) const;
-};
+/// The guess's motion over `dt` s; a gyro's gets the translation of the prior.
+Eigen::Isometry3d motionBy(const MotionGuess& guess, const MotionPrior& prior, double dt);
 
 /// Time since the last measured motion, pairs that were predicted, and the motion by guesses meanwhile.
 class Outage {
