@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Counts test cases in JUnit files and ends with one line: N passed, N failed, N skipped. Exits 1 on any failure. Tests may
+"""Counts test cases in JUnit files, names the ten slowest, and ends with one line: N passed, N failed, N skipped. Exits 1 on any failure. Tests may
 only be skipped for want of a data set, or of a processor's instructions: with KITTI_DIR, EUROC_DIR and KARLSRUHE_DIR all set
 none other may be."""
 import argparse
@@ -41,6 +41,7 @@ def main():
 
     counts = {"passed": len(arguments.passed), "failed": len(arguments.failed), "skipped": 0}
     bad = list(arguments.failed)
+    seconds = []
     for path in sorted(arguments.directory.rglob("*.xml")):
         try:
             root = ElementTree.parse(path).getroot()
@@ -55,8 +56,11 @@ def main():
         for case in root.iter("testcase"):
             result = outcome(case)
             counts[result] += 1
+            seconds.append((float(case.get("time") or 0), f"{case.get('classname')}.{case.get('name')}"))
             if result != "passed":
                 print(f"{result.upper()}: {case.get('classname')}.{case.get('name')} ({path.name})")
+    for time, name in sorted(seconds, reverse=True)[:10]:
+        print(f"{time:.1f} s: {name}")
     if sum(counts.values()) == 0:
         bad.append("no test ran")
     for name in bad:
