@@ -11,12 +11,12 @@
 #include <tuple>
 
 #include "../../src/common/progress.hpp"
+#include "../../src/motion/sample_consensus.hpp"
 #include "aligned_motion.hpp"
 #include "correct_matches.hpp"
 #include "csv_table.hpp"
 #include "odometry_systems.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
-#include "stereo_descriptor_vo/motion/sample_consensus.hpp"
 
 namespace sdvo {
 namespace {

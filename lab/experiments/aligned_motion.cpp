@@ -3,7 +3,7 @@
 #include <numeric>
 #include <optional>
 
-#include "stereo_descriptor_vo/map/map_point.hpp"
+#include "../../src/map/map_point.hpp"
 
 namespace sdvo {
 namespace {

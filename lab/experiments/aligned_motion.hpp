@@ -3,9 +3,9 @@
 #include <Eigen/Geometry>
 #include <vector>
 
+#include "../../src/motion/motion_estimator.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/matching/feature_matcher.hpp"
-#include "stereo_descriptor_vo/motion/motion_estimator.hpp"
 
 namespace sdvo {
 

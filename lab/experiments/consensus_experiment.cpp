@@ -7,9 +7,9 @@
 #include <random>
 
 #include "../../src/common/progress.hpp"
+#include "../../src/motion/motion_estimator.hpp"
 #include "csv_table.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
-#include "stereo_descriptor_vo/motion/motion_estimator.hpp"
 
 namespace sdvo {
 namespace {

@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "stereo_descriptor_vo/motion/sample_consensus.hpp"
+#include "../../src/motion/sample_consensus.hpp"
 
 namespace sdvo {
 

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <optional>
 
-#include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
+#include "../../src/motion/correspondence_arrays.hpp"
 
 namespace sdvo {
 

@@ -3,8 +3,8 @@
 #include <string>
 #include <vector>
 
+#include "../../src/front_end/depth_scale.hpp"
 #include "reference_sequence.hpp"
-#include "stereo_descriptor_vo/front_end/depth_scale.hpp"
 
 namespace sdvo {
 

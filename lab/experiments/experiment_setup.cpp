@@ -40,13 +40,14 @@ std::vector<Ablation> ablations() {
 PipelineOptions ExperimentSetup::options() const {
   const auto read = [this](bool freak) {
     // A loose threshold, as in the paper: weak corners belong to the large feature sets.
-    std::vector<std::string> all = {"stereo_features/detector/max_features=5000", "detector/min_contrast=6",
-                                    "detector/corner_quality=0.0002"};
+    std::vector<std::string> all = {"stereo_features/detector/max_features=5000", "detector/min_contrast=6"};
     if (setup == Setup::kPaper)
       for (const SetupDifference& difference : paperDifferences())
         if (freak || !difference.of_freak) all.insert(all.end(), difference.with.begin(), difference.with.end());
     all.insert(all.end(), settings.begin(), settings.end());
-    return readPipelineOptions("", all);
+    PipelineOptions options = readPipelineOptions("", all);
+    options.stereo_features.detector.corner_quality = 0.0002;
+    return options;
   };
   const bool freak = read(true).stereo_features.descriptor.type == DescriptorType::kFreak;
   return read(freak);

@@ -5,13 +5,13 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
+#include "../../src/front_end/depth_scale.hpp"
+#include "../../src/front_end/feature_detector.hpp"
+#include "../../src/front_end/patch_cutter.hpp"
+#include "../../src/front_end/stereo_descriptor.hpp"
+#include "../../src/front_end/stereo_matcher.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
-#include "stereo_descriptor_vo/front_end/depth_scale.hpp"
-#include "stereo_descriptor_vo/front_end/feature_detector.hpp"
-#include "stereo_descriptor_vo/front_end/patch_cutter.hpp"
-#include "stereo_descriptor_vo/front_end/stereo_descriptor.hpp"
-#include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
 
 namespace sdvo {
 

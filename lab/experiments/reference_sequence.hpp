@@ -4,10 +4,10 @@
 #include <cstddef>
 #include <string>
 
+#include "../../src/motion/rig_calibration.hpp"
 #include "experiment_setup.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
-#include "stereo_descriptor_vo/motion/rig_calibration.hpp"
 
 namespace sdvo {
 

@@ -7,11 +7,11 @@
 
 #include "../../src/common/progress.hpp"
 #include "../../src/front_end/opencv_features.hpp"
+#include "../../src/motion/correspondence_arrays.hpp"
 #include "correct_matches.hpp"
 #include "csv_table.hpp"
 #include "keypoint_set.hpp"
 #include "reference_sequence.hpp"
-#include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
 
 namespace sdvo {
 namespace {

@@ -14,6 +14,7 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*[<"](?:\.\./|stereo_descriptor_vo/)([a-
 # What the includes do not tell: what a room is for, and its place from left (0) to right in the picture.
 ROOMS = {
     "common": ("what all sides speak", 0.5),
+    "options": ("options of features and odometry", 1.7),
     "front_end": ("image side: pair of images to features", 1.0),
     "motion": ("correspondences to a pose", 0.0),
     "matching": ("features to matches, aligned patches", 0.0),

@@ -13,9 +13,9 @@
 #include <stdexcept>
 
 #include "../../src/data/text_file.hpp"
+#include "../../src/front_end/feature_detector.hpp"
 #include "../../src/front_end/freak.hpp"
 #include "learn.hpp"
-#include "stereo_descriptor_vo/front_end/feature_detector.hpp"
 
 namespace {
 

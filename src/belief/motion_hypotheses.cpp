@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "../common/statistics.hpp"
-#include "stereo_descriptor_vo/motion/motion_estimator.hpp"
-#include "stereo_descriptor_vo/motion/pose_problem.hpp"
+#include "../motion/motion_estimator.hpp"
+#include "../motion/pose_problem.hpp"
 
 namespace sdvo {
 namespace {

@@ -8,14 +8,14 @@
 #include <string>
 #include <vector>
 
+#include "../map/local_map.hpp"
 #include "../map/reacquisition.hpp"
-#include "stereo_descriptor_vo/belief/motion_prior.hpp"
+#include "../motion/motion_estimator.hpp"
+#include "../motion/noise.hpp"
+#include "motion_prior.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/map/local_map.hpp"
 #include "stereo_descriptor_vo/matching/feature_matcher.hpp"
-#include "stereo_descriptor_vo/motion/motion_estimator.hpp"
-#include "stereo_descriptor_vo/motion/noise.hpp"
 
 namespace sdvo {
 

@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/belief/motion_prior.hpp"
+#include "motion_prior.hpp"
 
 #include <algorithm>
 #include <cmath>

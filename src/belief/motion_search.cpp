@@ -10,9 +10,9 @@
 
 #include "../common/statistics.hpp"
 #include "../common/stopwatch.hpp"
-#include "stereo_descriptor_vo/matching/view_matcher.hpp"
-#include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
-#include "stereo_descriptor_vo/motion/motion_estimator.hpp"
+#include "../matching/view_matcher.hpp"
+#include "../motion/correspondence_arrays.hpp"
+#include "../motion/motion_estimator.hpp"
 
 namespace sdvo {
 namespace {

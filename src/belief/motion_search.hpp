@@ -6,12 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "../map/local_map.hpp"
+#include "../matching/patch_alignment.hpp"
+#include "../motion/motion_estimator.hpp"
 #include "motion_hypotheses.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
-#include "stereo_descriptor_vo/map/local_map.hpp"
 #include "stereo_descriptor_vo/matching/feature_matcher.hpp"
-#include "stereo_descriptor_vo/matching/patch_alignment.hpp"
-#include "stereo_descriptor_vo/motion/motion_estimator.hpp"
 
 namespace sdvo {
 

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
+#include "../motion/noise.hpp"
 #include "motion_hypotheses.hpp"
-#include "stereo_descriptor_vo/motion/noise.hpp"
 
 namespace sdvo {
 namespace {

@@ -3,8 +3,8 @@
 #include <Eigen/Geometry>
 #include <optional>
 
+#include "../motion/rig_calibration.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
-#include "stereo_descriptor_vo/motion/rig_calibration.hpp"
 
 namespace sdvo {
 

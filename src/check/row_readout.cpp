@@ -3,8 +3,8 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 
-#include "stereo_descriptor_vo/motion/noise.hpp"
-#include "stereo_descriptor_vo/motion/pose_problem.hpp"
+#include "../motion/noise.hpp"
+#include "../motion/pose_problem.hpp"
 
 namespace sdvo {
 

@@ -8,37 +8,18 @@ namespace sdvo {
 
 /// Healthy input for diagnostics: 5 to 60 Hz with a tolerance of a tenth, and nearly all of it used.
 struct RateOptions {
-  double min_rate = 4.5;
-  double max_rate = 66.0;
-  double max_unused = 0.05;
-
-  void describe(OptionList& list) {
-    list.add("min_rate", min_rate, {0.0, 1000.0}, "Hz",
-             "/diagnostics warn when pairs come less often, by their stamps");
-    list.add("max_rate", max_rate, {0.0, 10000.0}, "Hz",
-             "/diagnostics warn when pairs come more often, by their stamps");
-    list.add("max_unused", max_unused, {0.0, 1.0}, "ratio",
-             "/diagnostics and the log warn when more of the last seconds' input is not used");
-  }
+  double min_rate = 4.5;     ///< Hz, by stamps
+  double max_rate = 66.0;    ///< Hz
+  double max_unused = 0.05;  ///< ratio of the last seconds' input (chosen)
 };
 
-/// Limits beyond which diagnostics of the image side report a fault.
+/// Limits beyond which diagnostics of the image side report a fault (chosen).
 struct ImageThresholds {
-  double max_gap = 0.005;
-  double min_intensity = 20.0;
-  double max_intensity = 235.0;
-  int min_corners = 100;
-  double max_load = 0.9;
-
-  void describe(OptionList& list) {
-    list.add("max_gap", max_gap, {0.0, 1.0}, "s",
-             "/diagnostics warn when the stamps of left and right are farther apart");
-    list.add("min_intensity", min_intensity, {0.0, 255.0}, "", "/diagnostics warn below this mean grey level");
-    list.add("max_intensity", max_intensity, {0.0, 255.0}, "", "/diagnostics warn above this mean grey level");
-    list.add("min_corners", min_corners, {0, 100000}, "", "/diagnostics warn when fewer corners are detected");
-    list.add("max_load", max_load, {0.0, 1.0}, "",
-             "/diagnostics warn when the worker takes a larger share of one processor");
-  }
+  double max_gap = 0.005;        ///< s, between the stamps of left and right
+  double min_intensity = 20.0;   ///< mean grey level
+  double max_intensity = 235.0;  ///< mean grey level
+  int min_corners = 100;         ///< detected
+  double max_load = 0.9;         ///< of one processor
 };
 
 /// Options of the image side's nodelet beside those of FeatureExtractor.
@@ -74,8 +55,8 @@ struct StereoInputOptions {
              "OpenCV's threads, of the whole process; 0: none beside the caller's, -1: left as they are");
     list.add("max_silence", max_silence, {0.1, 3600.0}, "s",
              "/diagnostics report an error when no pair has come for longer (wall time)");
-    list.group("diagnostics", rates);
-    list.group("diagnostics", thresholds);
+    list.add("diagnostics/max_unused", rates.max_unused, {0.0, 1.0}, "ratio",
+             "/diagnostics and the log warn when more of the last seconds' input is not used");
   }
 };
 
@@ -96,8 +77,8 @@ struct OdometryOutputOptions {
   bool overwrite = false;
   double max_silence = 2.0;
   RateOptions rates;
-  double max_load = 0.9;
-  double max_latency = 0.5;
+  double max_load = 0.9;     ///< of one processor: /diagnostics warn beyond it (chosen)
+  double max_latency = 0.5;  ///< s, of poses after their images (chosen)
 
   void describe(OptionList& list) {
     list.add("odom_frame_id", odom_frame_id, "world-fixed frame of the odometry");
@@ -127,11 +108,6 @@ struct OdometryOutputOptions {
     list.add("overwrite", overwrite, "save_trajectory may replace files that were there before");
     list.add("max_silence", max_silence, {0.1, 3600.0}, "s",
              "/diagnostics report an error when no pair has come for longer (wall time)");
-    list.group("diagnostics", rates);
-    list.add("diagnostics/max_load", max_load, {0.0, 1.0}, "",
-             "/diagnostics warn when the worker takes a larger share of one processor");
-    list.add("diagnostics/max_latency", max_latency, {0.0, 3600.0}, "s",
-             "/diagnostics warn when poses are later than their images by more");
   }
 };
 
@@ -139,36 +115,30 @@ struct OdometryOutputOptions {
 struct PlaceOutputOptions {
   std::string map_frame_id = "map";
   bool publish_tf = true;
-  double correction_time = 2.0;
+  double correction_time = 2.0;  ///< s in which a correction goes into map -> odom (chosen)
   int sync_queue_size = 100;
   int queue_size = 10;
-  double max_silence = 10.0;
+  double max_silence = 10.0;  ///< s of wall time without a pair, which /diagnostics warn of (chosen)
   std::string places_file;
   bool save_at_shutdown = false;
   bool overwrite = false;
   std::string robot_name;
-  double other_min_score = 0.05;
-  double other_timeout = 2.0;
+  double other_min_score = 0.05;  ///< likeness from which another robot is asked for its rows (chosen)
+  double other_timeout = 2.0;     ///< s of wall time in which another robot must answer (chosen)
   bool initialpose_while_mapping = false;
 
   void describe(OptionList& list) {
     list.add("map_frame_id", map_frame_id, "frame of the corrected poses, parent of the odometry's frame");
     list.add("publish_tf", publish_tf, "publish map -> odom on /tf");
-    list.add("correction_time", correction_time, {0.0, 600.0}, "s", "in which a correction goes into map -> odom");
     list.add("sync_queue_size", sync_queue_size, {2, 10000}, "",
              "messages kept per input until those that belong to them have come");
     list.add("queue_size", queue_size, {1, 10000}, "", "pairs that wait while one is processed; the newest win");
-    list.add("max_silence", max_silence, {0.1, 3600.0}, "s",
-             "/diagnostics warn when no pair with odometry has come for longer (wall time)");
     list.add("places_file", places_file,
              "file of save_places to begin with, relative ones below ROS_HOME; empty: with no places");
     list.add("save_at_shutdown", save_at_shutdown, "write the places to places_file each minute and at the end");
     list.add("overwrite", overwrite,
              "files that are none of save_places, and maps with other or more places, may be replaced");
     list.add("robot_name", robot_name, "what other robots know this one by; empty: the namespace");
-    list.add("other_min_score", other_min_score, {0.0, 1.0}, "",
-             "least likeness of a place of mine for which another robot is asked for its rows");
-    list.add("other_timeout", other_timeout, {0.01, 60.0}, "s", "wall time in which another robot must answer");
     list.add("initialpose_while_mapping", initialpose_while_mapping,
              "take poses on initialpose also where no map was loaded, or when the robot is found in it already");
   }

@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "../common/text.hpp"
-#include "stereo_descriptor_vo/data/stereo_rectification.hpp"
+#include "stereo_rectification.hpp"
 #include "text_file.hpp"
 
 namespace sdvo {

@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/data/euroc_dataset.hpp"
+#include "euroc_dataset.hpp"
 
 #include <algorithm>
 #include <filesystem>

@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/data/stereo_rectification.hpp"
+#include "stereo_rectification.hpp"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/front_end/base_descriptor.hpp"
+#include "base_descriptor.hpp"
 
 #include <algorithm>
 #include <cmath>

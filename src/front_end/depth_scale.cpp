@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/front_end/depth_scale.hpp"
+#include "depth_scale.hpp"
 
 #include <algorithm>
 #include <cmath>

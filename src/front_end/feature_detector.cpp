@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/front_end/feature_detector.hpp"
+#include "feature_detector.hpp"
 
 #include <png.h>
 

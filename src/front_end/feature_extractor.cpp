@@ -9,7 +9,13 @@
 #include "../common/kernel.hpp"
 #include "../common/stopwatch.hpp"
 #include "../common/text.hpp"
+#include "depth_scale.hpp"
 #include "exposure_balance.hpp"
+#include "feature_detector.hpp"
+#include "patch_cutter.hpp"
+#include "rig_monitor.hpp"
+#include "stereo_descriptor.hpp"
+#include "stereo_matcher.hpp"
 
 namespace sdvo {
 namespace {
@@ -79,7 +85,47 @@ void FeatureExtractorOptions::check() const {
   }
 }
 
-FeatureExtractor::FeatureExtractor(const FeatureExtractorOptions& options)
+class FeatureExtractor::Impl {
+ public:
+  explicit Impl(const FeatureExtractorOptions& options);
+
+  StereoFeatures extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp,
+                         const cv::Mat& mask, const ExtractionReport& before) const;
+  DepthScaleOptions sizeCurve(cv::Size image) const;
+  const FeatureExtractorOptions& options() const { return options_; }
+
+ private:
+  /// Stereo matches of a rig whose rows differ by a line.
+  std::vector<StereoMatch> matchAlong(const RowLine& rows, const cv::Mat& left, const cv::Mat& right,
+                                      const std::vector<cv::Point2f>& positions) const;
+  /// Appends what both views describe of the matched corners.
+  void describe(const cv::Mat& left, const cv::Mat& right, const std::vector<Corner>& corners,
+                const std::vector<StereoMatch>& matches, StereoFeatures& features) const;
+
+  FeatureExtractorOptions options_;
+  FeatureDetector detector_;
+  StereoMatcher stereo_matcher_;
+  RigMonitor rig_monitor_;
+  DepthScale depth_scale_;
+  StereoDescriptor descriptor_;
+};
+
+FeatureExtractor::FeatureExtractor(const FeatureExtractorOptions& options) : impl_(std::make_unique<Impl>(options)) {}
+FeatureExtractor::~FeatureExtractor() = default;
+
+StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
+                                         std::int64_t stamp, const cv::Mat& mask,
+                                         const ExtractionReport& before) const {
+  return impl_->extract(camera, left, right, stamp, mask, before);
+}
+DepthScaleOptions FeatureExtractor::sizeCurve(cv::Size image) const {
+  return impl_->sizeCurve(image);
+}
+const FeatureExtractorOptions& FeatureExtractor::options() const {
+  return impl_->options();
+}
+
+FeatureExtractor::Impl::Impl(const FeatureExtractorOptions& options)
     : options_(checked(options)),
       detector_(options.detector),
       stereo_matcher_(options.stereo),
@@ -87,15 +133,15 @@ FeatureExtractor::FeatureExtractor(const FeatureExtractorOptions& options)
       depth_scale_(options.sizeCurve()),
       descriptor_(options.descriptor) {}
 
-DepthScaleOptions FeatureExtractor::sizeCurve(cv::Size image) const {
+DepthScaleOptions FeatureExtractor::Impl::sizeCurve(cv::Size image) const {
   DepthScaleOptions curve = options_.sizeCurve();
   const double largest = descriptor_.largestSize(image);
   for (double* size : {&curve.min_size, &curve.max_size, &curve.constant_size}) *size = std::min(*size, largest);
   return curve;
 }
 
-void FeatureExtractor::describe(const cv::Mat& left, const cv::Mat& right, const std::vector<Corner>& corners,
-                                const std::vector<StereoMatch>& matches, StereoFeatures& features) const {
+void FeatureExtractor::Impl::describe(const cv::Mat& left, const cv::Mat& right, const std::vector<Corner>& corners,
+                                      const std::vector<StereoMatch>& matches, StereoFeatures& features) const {
   // Size from depth, as far as the image has room for it, then the descriptor of both views at that size.
   const double largest = descriptor_.largestSize(left.size());
   std::vector<StereoKeypoint> keypoints;
@@ -116,8 +162,9 @@ void FeatureExtractor::describe(const cv::Mat& left, const cv::Mat& right, const
   features.descriptors = described.rows;
 }
 
-std::vector<StereoMatch> FeatureExtractor::matchAlong(const RowLine& rows, const cv::Mat& left, const cv::Mat& right,
-                                                      const std::vector<cv::Point2f>& positions) const {
+std::vector<StereoMatch> FeatureExtractor::Impl::matchAlong(const RowLine& rows, const cv::Mat& left,
+                                                            const cv::Mat& right,
+                                                            const std::vector<cv::Point2f>& positions) const {
   cv::Mat sheared;
   const cv::Matx23d there(1.0, 0.0, 0.0, rows.slope, 1.0, rows.at(0.0));
   cv::warpAffine(right, sheared, there, right.size(), cv::INTER_LINEAR | cv::WARP_INVERSE_MAP, cv::BORDER_REPLICATE);
@@ -127,9 +174,9 @@ std::vector<StereoMatch> FeatureExtractor::matchAlong(const RowLine& rows, const
   return matches;
 }
 
-StereoFeatures FeatureExtractor::extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
-                                         std::int64_t stamp, const cv::Mat& mask,
-                                         const ExtractionReport& before) const {
+StereoFeatures FeatureExtractor::Impl::extract(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
+                                               std::int64_t stamp, const cv::Mat& mask,
+                                               const ExtractionReport& before) const {
   camera.check();
   checkImage(left, "left", camera);
   checkImage(right, "right", camera);

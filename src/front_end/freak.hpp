@@ -6,8 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "base_descriptor.hpp"
 #include "integral_image.hpp"
-#include "stereo_descriptor_vo/front_end/base_descriptor.hpp"
 
 namespace sdvo {
 

@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/front_end/patch_cutter.hpp"
+#include "patch_cutter.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/front_end/rig_monitor.hpp"
+#include "rig_monitor.hpp"
 
 #include <algorithm>
 
@@ -111,7 +111,7 @@ RigDiagnosis judgeSides(const cv::Mat& left, const cv::Mat& right, const Extract
 }  // namespace
 
 RigMonitor::RigMonitor(const RigMonitorOptions& options, double max_dv, double max_disparity)
-    : options_(checked(options)), max_dv_(max_dv), max_disparity_(max_disparity) {}
+    : options_(options), max_dv_(max_dv), max_disparity_(max_disparity) {}
 
 bool RigMonitor::isSuspicious(int corners, int found) const {
   return corners >= kEnough && found < options_.suspicious_share * corners;

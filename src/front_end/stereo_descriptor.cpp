@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/front_end/stereo_descriptor.hpp"
+#include "stereo_descriptor.hpp"
 
 #include <algorithm>
 #include <cmath>

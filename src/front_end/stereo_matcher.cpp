@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
+#include "stereo_matcher.hpp"
 
 #include <Eigen/Core>
 #include <algorithm>

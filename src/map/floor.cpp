@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/map/floor.hpp"
+#include "floor.hpp"
 
 #include <Eigen/Cholesky>
 #include <opencv2/core.hpp>

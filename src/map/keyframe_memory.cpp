@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/map/keyframe_memory.hpp"
+#include "keyframe_memory.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/map/local_map.hpp"
+#include "local_map.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <unordered_map>
 
 #include "../common/statistics.hpp"
-#include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
+#include "../motion/correspondence_arrays.hpp"
 
 namespace sdvo {
 namespace {

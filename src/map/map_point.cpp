@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/map/map_point.hpp"
+#include "map_point.hpp"
 
 namespace sdvo {
 

@@ -3,7 +3,7 @@
 #include <Eigen/Cholesky>
 #include <cstddef>
 
-#include "stereo_descriptor_vo/map/map_point.hpp"
+#include "map_point.hpp"
 
 namespace sdvo {
 namespace {

@@ -3,10 +3,10 @@
 #include <Eigen/Geometry>
 #include <vector>
 
+#include "../motion/rig_calibration.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
-#include "stereo_descriptor_vo/map/window_optimizer.hpp"
-#include "stereo_descriptor_vo/motion/rig_calibration.hpp"
+#include "window_optimizer.hpp"
 
 namespace sdvo {
 

@@ -6,9 +6,9 @@
 #include <utility>
 
 #include "../common/statistics.hpp"
-#include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
-#include "stereo_descriptor_vo/motion/motion_refinement.hpp"
-#include "stereo_descriptor_vo/motion/noise.hpp"
+#include "../motion/correspondence_arrays.hpp"
+#include "../motion/motion_refinement.hpp"
+#include "../motion/noise.hpp"
 
 namespace sdvo {
 namespace {

@@ -5,11 +5,11 @@
 #include <optional>
 #include <vector>
 
+#include "../matching/patch_alignment.hpp"
+#include "../matching/view_matcher.hpp"
+#include "../motion/rig_calibration.hpp"
+#include "local_map.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/map/local_map.hpp"
-#include "stereo_descriptor_vo/matching/patch_alignment.hpp"
-#include "stereo_descriptor_vo/matching/view_matcher.hpp"
-#include "stereo_descriptor_vo/motion/rig_calibration.hpp"
 
 namespace sdvo {
 

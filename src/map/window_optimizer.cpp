@@ -1,12 +1,12 @@
-#include "stereo_descriptor_vo/map/window_optimizer.hpp"
+#include "window_optimizer.hpp"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "../common/statistics.hpp"
+#include "../motion/motion_refinement.hpp"
 #include "point_elimination.hpp"
-#include "stereo_descriptor_vo/motion/motion_refinement.hpp"
 
 namespace sdvo {
 namespace {

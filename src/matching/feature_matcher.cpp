@@ -6,8 +6,8 @@
 #include <stdexcept>
 #include <type_traits>
 
+#include "../motion/correspondence_arrays.hpp"
 #include "hamming_distances.hpp"
-#include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
 
 namespace sdvo {
 namespace {

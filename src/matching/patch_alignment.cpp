@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/matching/patch_alignment.hpp"
+#include "patch_alignment.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>
@@ -112,9 +112,10 @@ bool makeTemplate(const NearPatch& reference, const Eigen::Vector2f& centre, con
 std::string PatchAlignmentOptions::complaint(int patch_side) const {
   if (patch_side == 0 || canAlign(patch_side)) return "";
   const std::string side = std::to_string(patch_side);
-  return "patches of " + side + "x" + side + " samples are too small for alignment/radius " + std::to_string(radius) +
-         ": no match is aligned; descriptor/patch_side of stereo_features must be " + std::to_string(leastSide()) +
-         " or more";
+  return "patches of " + side + "x" + side +
+         " samples are too small for the alignment: no match is aligned; descriptor/patch_side of stereo_features must "
+         "be " +
+         std::to_string(leastSide()) + " or more";
 }
 
 std::optional<PatchShift> alignPatch(const PatchAlignmentOptions& options, const Patch& reference,

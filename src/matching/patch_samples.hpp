@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "stereo_descriptor_vo/matching/patch_alignment.hpp"
+#include "patch_alignment.hpp"
 
 namespace sdvo {
 

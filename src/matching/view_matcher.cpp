@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/matching/view_matcher.hpp"
+#include "view_matcher.hpp"
 
 namespace sdvo {
 

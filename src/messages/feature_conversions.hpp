@@ -3,8 +3,8 @@
 #include <sensor_msgs/PointCloud2.h>
 #include <stereo_descriptor_vo/StereoFeatures.h>
 
+#include "../front_end/depth_scale.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/front_end/depth_scale.hpp"
 #include "stereo_descriptor_vo/messages/stereo_features_view.hpp"
 
 namespace sdvo::ros_conversions {

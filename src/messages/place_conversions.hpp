@@ -14,8 +14,8 @@
 #include <map>
 #include <string>
 
-#include "stereo_descriptor_vo/front_end/depth_scale.hpp"
-#include "stereo_descriptor_vo/places/place_index.hpp"
+#include "../front_end/depth_scale.hpp"
+#include "../places/place_index.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
 #include "stereo_descriptor_vo/places/pose_graph.hpp"
 

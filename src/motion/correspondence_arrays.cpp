@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
+#include "correspondence_arrays.hpp"
 
 #include <cstddef>
 #include <limits>

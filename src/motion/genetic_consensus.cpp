@@ -3,7 +3,7 @@
 #include <optional>
 #include <vector>
 
-#include "stereo_descriptor_vo/motion/sample_consensus.hpp"
+#include "sample_consensus.hpp"
 
 namespace sdvo {
 namespace {

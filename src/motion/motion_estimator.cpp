@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/motion/motion_estimator.hpp"
+#include "motion_estimator.hpp"
 
 #include <Eigen/Cholesky>
 #include <cmath>

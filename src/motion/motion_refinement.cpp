@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/motion/motion_refinement.hpp"
+#include "motion_refinement.hpp"
 
 #include <Eigen/Cholesky>
 #include <utility>

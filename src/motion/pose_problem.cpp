@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/motion/pose_problem.hpp"
+#include "pose_problem.hpp"
 
 #include <algorithm>
 #include <cmath>

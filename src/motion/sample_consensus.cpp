@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/motion/sample_consensus.hpp"
+#include "sample_consensus.hpp"
 
 #include <algorithm>
 #include <cmath>

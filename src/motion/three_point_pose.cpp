@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/motion/three_point_pose.hpp"
+#include "three_point_pose.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>

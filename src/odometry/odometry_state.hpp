@@ -9,16 +9,16 @@
 
 #include "../belief/belief.hpp"
 #include "../belief/motion_hypotheses.hpp"
+#include "../belief/motion_prior.hpp"
 #include "../belief/pose_covariance.hpp"
+#include "../map/floor.hpp"
+#include "../map/local_map.hpp"
 #include "../rig/learnt_rig.hpp"
 #include "../rig/repeated_images.hpp"
 #include "outage.hpp"
-#include "stereo_descriptor_vo/belief/motion_prior.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/map/floor.hpp"
-#include "stereo_descriptor_vo/map/local_map.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
-#include "stereo_descriptor_vo/odometry/visual_odometry_options.hpp"
+#include "stereo_descriptor_vo/options/visual_odometry_options.hpp"
 
 namespace sdvo {
 
@@ -37,6 +37,13 @@ struct OdometryStep {
 
   bool hasPose() const { return state == TrackingState::kTracking || state == TrackingState::kDegraded; }
 };
+
+/// Alignment of patches under the odometry's noise.
+inline PatchAlignmentOptions alignmentWith(const NoiseOptions& noise) {
+  PatchAlignmentOptions alignment;
+  alignment.noise = noise;
+  return alignment;
+}
 
 /// The memory of the odometry from pair to pair.
 struct OdometryState {

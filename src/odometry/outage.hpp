@@ -3,7 +3,7 @@
 #include <Eigen/Geometry>
 #include <optional>
 
-#include "stereo_descriptor_vo/belief/motion_prior.hpp"
+#include "../belief/motion_prior.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/odometry/motion_guess.hpp"
 

@@ -44,8 +44,8 @@ OdometryStep startMap(const VisualOdometryOptions& options, const StereoFeatures
   const bool is_guessed = state.started && followed;
   const Eigen::Isometry3d T_previous_current = is_guessed ? followed->motion : Eigen::Isometry3d::Identity();
   state.seed.emplace(options.map);
-  state.seed->insert(options.alignment, features, state.pairs, (state.T_origin_camera * T_previous_current).inverse(),
-                     {}, state.rig.calibration.calibration());
+  state.seed->insert(alignmentWith(options.noise), features, state.pairs,
+                     (state.T_origin_camera * T_previous_current).inverse(), {}, state.rig.calibration.calibration());
   state.seed_has_pose = is_guessed && !followed->rotation_only;
   // The seed replaces a map from before the outage only when a pair is measured against it.
   const bool has_map = state.started && state.map && state.map->continuedBy(features);

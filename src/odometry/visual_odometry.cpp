@@ -24,6 +24,13 @@ Matrix6d unexpected(const MotionScene& scene, const MotionHypothesis& found) {
   return innovation * innovation.transpose();
 }
 
+/// Adjustment of windows under the odometry's noise.
+WindowOptimizerOptions windowWith(const NoiseOptions& noise) {
+  WindowOptimizerOptions window;
+  window.noise = noise;
+  return window;
+}
+
 /// The pose of an optical frame (z ahead, x right) at the origin of a base (x ahead, z up).
 Eigen::Isometry3d lookingAhead() {
   Eigen::Isometry3d T_base_camera = Eigen::Isometry3d::Identity();
@@ -175,18 +182,18 @@ std::vector<Eigen::Vector3d> VisualOdometry::mapPoints() const {
 VisualOdometry::Impl::Impl(const VisualOdometryOptions& options)
     : options_(checked(options).withOneNoise()),
       T_base_camera_(lookingAhead()),
-      search_(options_.matcher, options_.motion, options_.alignment),
-      reacquisition_(options_.matcher, options_.motion),
-      revisit_(options_.matcher, options_.motion, options_.alignment),
-      optimizer_(options_.window),
+      search_(FeatureMatcherOptions(), options_.motion, alignmentWith(options_.noise)),
+      reacquisition_(FeatureMatcherOptions(), options_.motion),
+      revisit_(FeatureMatcherOptions(), options_.motion, alignmentWith(options_.noise)),
+      optimizer_(windowWith(options_.noise)),
       state_(options_, 0) {}
 
 void VisualOdometry::Impl::configure(const VisualOdometryOptions& options) {
   options_ = checked(options).withOneNoise();
-  search_ = MotionSearch(options_.matcher, options_.motion, options_.alignment);
-  reacquisition_ = Reacquisition(options_.matcher, options_.motion);
-  revisit_ = Revisit(options_.matcher, options_.motion, options_.alignment);
-  optimizer_ = WindowOptimizer(options_.window);
+  search_ = MotionSearch(FeatureMatcherOptions(), options_.motion, alignmentWith(options_.noise));
+  reacquisition_ = Reacquisition(FeatureMatcherOptions(), options_.motion);
+  revisit_ = Revisit(FeatureMatcherOptions(), options_.motion, alignmentWith(options_.noise));
+  optimizer_ = WindowOptimizer(windowWith(options_.noise));
   state_.prior.configure(options.tracking);
 }
 
@@ -571,8 +578,8 @@ VisualOdometry::Impl::Candidate VisualOdometry::Impl::adjust(const StereoFeature
   Candidate candidate;
   candidate.calibration = state_.rig.calibration.calibration();
   candidate.delay = state_.rig.calibration.delay();
-  map.insert(options_.alignment, features, state_.pairs, found.motion.T_current_reference * T_previous_origin,
-             found.sightings, candidate.calibration);
+  map.insert(alignmentWith(options_.noise), features, state_.pairs,
+             found.motion.T_current_reference * T_previous_origin, found.sightings, candidate.calibration);
   candidate.T_keyframe_origin = map.poseBeforeNewest();
   if (map.newestIsKeyframe() && may_recall) revisit_.recall(features, candidate.calibration, map);
   const std::optional<Floor> floor = this->floor();

@@ -1,8 +1,8 @@
+#include "loop_agreement.hpp"
+
 #include <Eigen/Geometry>
 #include <opencv2/core.hpp>
 #include <set>
-
-#include "stereo_descriptor_vo/places/place_recognition.hpp"
 
 namespace sdvo {
 namespace {

@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/places/place_index.hpp"
+#include "place_index.hpp"
 
 #include <algorithm>
 #include <array>

@@ -9,6 +9,9 @@
 
 #include "../common/stopwatch.hpp"
 #include "../common/text.hpp"
+#include "loop_agreement.hpp"
+#include "place_index.hpp"
+#include "place_verifier.hpp"
 
 namespace sdvo {
 namespace {
@@ -23,7 +26,16 @@ Matrix6d unknown() {
 
 }  // namespace
 
-PlaceRecognition::PlaceRecognition(const PlaceRecognitionOptions& options) : options_(checked(options)) {}
+struct PlaceRecognition::Parts {
+  PlaceIndex index;
+  PlaceVerifier verifier;
+  LoopAgreement agreement;
+};
+
+PlaceRecognition::PlaceRecognition(const PlaceRecognitionOptions& options)
+    : options_(checked(options)), parts_(std::make_unique<Parts>()) {}
+PlaceRecognition::PlaceRecognition(PlaceRecognition&&) noexcept = default;
+PlaceRecognition::~PlaceRecognition() = default;
 
 std::optional<PlaceReport> PlaceRecognition::observe(const StereoFeatures& features, const CameraMotion& motion) {
   features.check();
@@ -47,12 +59,12 @@ std::optional<PlaceReport> PlaceRecognition::observe(const StereoFeatures& featu
   report.id = next_id_;
   Stopwatch stopwatch;
   const StereoFeatures kept = thinOut(features, options_.max_features);
-  const PlaceSignature signature = index_.signature(kept);
+  const PlaceSignature signature = parts_->index.signature(kept);
   addKeyframe(kept, next_id_++);
   const Place& here = places_.at(report.id);
   report.candidates =
-      index_.find(signature, options_.candidates, [&](int id) { return isCandidate(places_.at(id), here); });
-  if (!options_.localisation_only) index_.add(report.id, signature);
+      parts_->index.find(signature, options_.candidates, [&](int id) { return isCandidate(places_.at(id), here); });
+  if (!options_.localisation_only) parts_->index.add(report.id, signature);
   report.find_time = stopwatch.lap();
   recognise(here, report);
   report.verify_time = stopwatch.lap();
@@ -85,7 +97,7 @@ void PlaceRecognition::forgetOldest() {
 }
 
 void PlaceRecognition::forget(int id) {
-  index_.remove(id);
+  parts_->index.remove(id);
   graph_.remove(id);
   places_.erase(id);
 }
@@ -132,7 +144,7 @@ void PlaceRecognition::addKeyframe(const StereoFeatures& features, int id) {
 void PlaceRecognition::recognise(const Place& here, PlaceReport& report) {
   report.reason = "no place looks similar";
   for (const PlaceCandidate& candidate : report.candidates) {
-    report.match = verifier_.verify(places_.at(candidate.place).features, here.features);
+    report.match = parts_->verifier.verify(places_.at(candidate.place).features, here.features);
     report.reason = report.match.reason;
     if (!report.match.same) continue;
     const GraphEdge loop{candidate.place, here.id, GraphEdge::Kind::kLoop, report.match.T_place_camera,
@@ -142,7 +154,7 @@ void PlaceRecognition::recognise(const Place& here, PlaceReport& report) {
       continue;
     }
     report.same = candidate.place;
-    const std::vector<GraphEdge> loops = agreement_.confirm(graph_, loop);
+    const std::vector<GraphEdge> loops = parts_->agreement.confirm(graph_, loop);
     for (const GraphEdge& trusted : loops) graph_.close(trusted);
     report.loop = !loops.empty();
     if (report.loop) {
@@ -188,7 +200,7 @@ Eigen::Isometry3d PlaceRecognition::T_map_odom() const {
 }
 
 PlaceSignature PlaceRecognition::signature(int place) const {
-  return index_.signature(places_.at(place).features);
+  return parts_->index.signature(places_.at(place).features);
 }
 
 std::size_t PlaceRecognition::bytes() const {
@@ -200,11 +212,11 @@ std::size_t PlaceRecognition::bytes() const {
 }
 
 std::vector<PlaceCandidate> PlaceRecognition::find(const PlaceSignature& signature) const {
-  return index_.find(signature, options_.candidates, [](int) { return true; });
+  return parts_->index.find(signature, options_.candidates, [](int) { return true; });
 }
 
 PlaceMatch PlaceRecognition::verify(int place, const StereoFeatures& features) const {
-  return verifier_.verify(places_.at(place).features, thinOut(features, options_.max_features));
+  return parts_->verifier.verify(places_.at(place).features, thinOut(features, options_.max_features));
 }
 
 void PlaceRecognition::restore(std::vector<Place> places, const PoseGraph& graph) {
@@ -235,7 +247,7 @@ void PlaceRecognition::restore(std::vector<Place> places, const PoseGraph& graph
     throw std::invalid_argument(text(0, "places ", first, " and ", last, " cannot be of one map"));
   segment_ = segment;
   places_ = std::move(restored);
-  index_ = std::move(index);
+  parts_->index = std::move(index);
   graph_ = graph;
   next_id_ = restored_ = places_.rbegin()->first + 1;
   if (options_.localisation_only) graph_.hold(restored_ - 1);

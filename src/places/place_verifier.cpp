@@ -1,4 +1,4 @@
-#include "stereo_descriptor_vo/places/place_verifier.hpp"
+#include "place_verifier.hpp"
 
 #include <vector>
 

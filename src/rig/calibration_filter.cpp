@@ -1,11 +1,11 @@
-#include "stereo_descriptor_vo/rig/calibration_filter.hpp"
+#include "calibration_filter.hpp"
 
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
-#include "stereo_descriptor_vo/motion/noise.hpp"
+#include "../motion/noise.hpp"
 
 namespace sdvo {
 namespace {

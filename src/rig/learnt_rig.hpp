@@ -7,11 +7,11 @@
 
 #include "../belief/belief.hpp"
 #include "../belief/motion_hypotheses.hpp"
+#include "../motion/noise.hpp"
+#include "calibration_filter.hpp"
 #include "right_camera_delay.hpp"
 #include "right_rotation.hpp"
 #include "row_pattern.hpp"
-#include "stereo_descriptor_vo/motion/noise.hpp"
-#include "stereo_descriptor_vo/rig/calibration_filter.hpp"
 
 namespace sdvo {
 

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "../belief/motion_hypotheses.hpp"
-#include "stereo_descriptor_vo/motion/noise.hpp"
+#include "../motion/noise.hpp"
 
 namespace sdvo {
 namespace {

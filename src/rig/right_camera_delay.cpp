@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "../common/statistics.hpp"
-#include "stereo_descriptor_vo/motion/noise.hpp"
+#include "../motion/noise.hpp"
 
 namespace sdvo {
 namespace {

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <limits>
 
+#include "../motion/pose_problem.hpp"
 #include "row_delay.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
-#include "stereo_descriptor_vo/motion/pose_problem.hpp"
 
 namespace sdvo {
 

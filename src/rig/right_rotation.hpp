@@ -5,9 +5,9 @@
 #include <optional>
 #include <vector>
 
+#include "../motion/correspondence_arrays.hpp"
+#include "../motion/noise.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
-#include "stereo_descriptor_vo/motion/noise.hpp"
 
 namespace sdvo {
 

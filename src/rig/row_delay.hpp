@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "stereo_descriptor_vo/motion/noise.hpp"
+#include "../motion/noise.hpp"
 
 namespace sdvo {
 

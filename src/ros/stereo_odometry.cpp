@@ -11,7 +11,7 @@
 #include "../config/interface_options.hpp"
 #include "params.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
-#include "stereo_descriptor_vo/odometry/visual_odometry_options.hpp"
+#include "stereo_descriptor_vo/options/visual_odometry_options.hpp"
 
 namespace {
 

@@ -23,6 +23,7 @@
 #include "../common/text.hpp"
 #include "../common/worker.hpp"
 #include "../config/interface_options.hpp"
+#include "../matching/patch_alignment.hpp"
 #include "../messages/feature_conversions.hpp"
 #include "../messages/frames.hpp"
 #include "../messages/pose_conversions.hpp"
@@ -269,7 +270,7 @@ class VisualOdometryNodelet : public RobotNodelet {
   OdometryResult track(const StereoFeatures& features, const FeaturesMessage& message, const Guess& guess) {
     if (processed_epoch_ && *processed_epoch_ != message.stream_epoch) odometry_->breakStream();
     processed_epoch_ = message.stream_epoch;
-    const std::string complaint = odometry_->options().alignment.complaint(features.patch_layout.side);
+    const std::string complaint = PatchAlignmentOptions().complaint(features.patch_layout.side);
     if (!complaint.empty()) SDVO_WARN("patches", complaint);
     odometry_->mountAt(*mount_->last());
     const std::optional<MotionGuess> motion = guess.since == processed_stamp_ ? guess.motion : std::nullopt;  // no jump

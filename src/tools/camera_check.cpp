@@ -5,6 +5,7 @@
 
 #include "../check/calibration_check.hpp"
 #include "../common/text.hpp"
+#include "../front_end/rig_monitor.hpp"
 
 namespace sdvo {
 

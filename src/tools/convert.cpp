@@ -26,12 +26,12 @@
 #include <vector>
 
 #include "../common/progress.hpp"
+#include "../data/euroc_dataset.hpp"
 #include "../ros/output_files.hpp"
 #include "pair_reader.hpp"
 #include "recording.hpp"
 #include "run_tool.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
-#include "stereo_descriptor_vo/data/euroc_dataset.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 
 namespace {
@@ -115,10 +115,10 @@ nav_msgs::Odometry makeOdometry(const std::vector<ros::Time>& stamps, const Traj
 class StereoBag {
  public:
   /// `camera`: of the rectified views; `camera_poses`: those of the rectified left one at each stamp, or none.
-  StereoBag(const std::string& path, const std::string& tool, std::vector<ros::Time> stamps, const StereoCamera& camera,
+  StereoBag(const std::string& path, std::vector<ros::Time> stamps, const StereoCamera& camera,
             const Trajectory& camera_poses)
       : name_("--output '" + path + "'"),
-        caller_("/" + tool),
+        caller_("/convert"),
         file_(newFile(path)),
         bag_(guard("create", [&] { return OutputBag(file_.partial()); })),
         stamps_(std::move(stamps)),
@@ -200,7 +200,7 @@ class StereoBag {
 };
 
 struct Arguments {
-  std::string tool, input, output;
+  std::string input, output;
   std::string poses;  ///< empty: look beside the input
   StereoSource source;
   int frames = std::numeric_limits<int>::max();
@@ -239,7 +239,7 @@ void writeBag(const Arguments& arguments, const Sequence& sequence, const Geomet
   std::vector<ros::Time> stamps;
   for (int i = 0; i < frames; ++i)
     stamps.push_back(ros::Time().fromNSec(static_cast<std::uint64_t>(epoch + sequence.stamp(i))));
-  StereoBag bag(arguments.output, arguments.tool, stamps, rectified, groundTruth(arguments, stamps.size()));
+  StereoBag bag(arguments.output, stamps, rectified, groundTruth(arguments, stamps.size()));
   Progress progress("writing bag", frames);
   for (int i = 0; i < frames; ++i, progress.step())
     bag.write(static_cast<std::size_t>(i), topic, sequence.load(i), left, right);
@@ -287,8 +287,7 @@ void writeFolder(const Arguments& arguments) {
 }
 
 int convert(const Arguments& arguments) {
-  const bool is_to_bag = std::filesystem::path(arguments.output).extension() == ".bag" ||
-                         arguments.tool.find("_to_bag") != std::string::npos;
+  const bool is_to_bag = std::filesystem::path(arguments.output).extension() == ".bag";
   is_to_bag ? writeBag(arguments) : writeFolder(arguments);
   return 0;
 }
@@ -303,9 +302,8 @@ int main(int argc, char** argv) {
       "TUM-VI folder or a bag: rectified images, calib.txt, times.txt (seconds since the first stamp) and, where they "
       "are known, poses.txt of the left camera");
   Arguments arguments;
-  arguments.tool = std::filesystem::path(argv[0]).filename().string();
   app.add_option(
-         "input,--input,--sequence", arguments.input,
+         "input", arguments.input,
          "folder of KITTI (image_0, image_1, calib.txt, times.txt), EuRoC or TUM-VI (mav0, or cam0 and cam1), or bag")
       ->required();
   app.add_option("--output", arguments.output, "NAME.bag, or folder to create")->required();

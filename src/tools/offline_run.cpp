@@ -12,6 +12,7 @@
 #include "../common/statistics.hpp"
 #include "../common/stopwatch.hpp"
 #include "../data/text_file.hpp"
+#include "../matching/patch_alignment.hpp"
 
 namespace sdvo {
 namespace {
@@ -36,7 +37,7 @@ std::string withoutCommas(std::string text) {
 OfflineRun::OfflineRun(const PipelineOptions& options)
     : extractor_(options.stereo_features), odometry_(options.visual_odometry) {
   const int side = options.stereo_features.patch.layout().side;
-  const std::string complaint = options.visual_odometry.alignment.complaint(side);
+  const std::string complaint = PatchAlignmentOptions().complaint(side);
   if (!complaint.empty()) throw std::invalid_argument(complaint);
 }
 

@@ -6,9 +6,9 @@
 #include <cstdint>
 #include <optional>
 
+#include "../data/stereo_rectification.hpp"
 #include "../ros/pair_decoder.hpp"
 #include "recording.hpp"
-#include "stereo_descriptor_vo/data/stereo_rectification.hpp"
 #include "stereo_messages.hpp"
 
 namespace sdvo {

@@ -14,11 +14,11 @@
 
 #include "../common/stamp_filter.hpp"
 #include "../config/interface_options.hpp"
+#include "../data/euroc_dataset.hpp"
 #include "../messages/stamps.hpp"
 #include "../ros/arrival_log.hpp"
 #include "camera_input.hpp"
 #include "pair_reader.hpp"
-#include "stereo_descriptor_vo/data/euroc_dataset.hpp"
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
 

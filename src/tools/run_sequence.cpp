@@ -280,7 +280,6 @@ int main(int argc, char** argv) {
       "verdict "
       "is FAIL. Many drives: run_many");
   Arguments arguments;
-  arguments.places = fs::path(argv[0]).filename() == "run_places";
   app.add_option("recordings", arguments.inputs,
                  "bag, folder with image_0, image_1, calib.txt, times.txt, or folder with mav0")
       ->required();
@@ -322,8 +321,7 @@ int main(int argc, char** argv) {
   app.add_flag("--halves", arguments.halves,
                "runs on two halves of the features, too: says how far they differ (NAME.self_check.csv)");
 
-  app.add_flag("--places", arguments.places,
-               "recognises places, too: --poses are those in the map; run_places is run_sequence --places");
+  app.add_flag("--places", arguments.places, "recognises places, too: --poses are those in the map");
   app.add_option("--before", arguments.before, "places: recordings of other places driven before; repeatable")
       ->allow_extra_args(false);
   app.add_option("--odometry", arguments.odometry, "places: poses of the odometry to write, 12 numbers a line");

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <random>
 
+#include "../../src/belief/motion_prior.hpp"
 #include "../said.hpp"
-#include "stereo_descriptor_vo/belief/motion_prior.hpp"
 
 namespace sdvo::test_motion_prior {
 

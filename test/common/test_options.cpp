@@ -2,12 +2,13 @@
 
 #include <set>
 
+#include "../../src/front_end/feature_detector.hpp"
+#include "../../src/front_end/stereo_matcher.hpp"
+#include "../../src/map/local_map.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
-#include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
-#include "stereo_descriptor_vo/motion/motion_estimator.hpp"
 #include "stereo_descriptor_vo/odometry/visual_odometry.hpp"
 
 namespace sdvo::test_options {
@@ -108,12 +109,12 @@ TEST(Options, ComponentsRefuseWhatIsOutOfRange) {
   expectChecked<FeatureExtractor>(extractor, "detector/max_features");
   expectChecked<FeatureDetector>(extractor.detector, "max_features");
   StereoMatcherOptions stereo;
-  stereo.min_disparity = 0.0;
-  expectChecked<StereoMatcher>(stereo, "min_disparity");
+  stereo.max_epipolar_residual = 0.0;
+  expectChecked<StereoMatcher>(stereo, "max_epipolar_residual");
   VisualOdometryOptions odometry;
-  odometry.motion.min_inliers = 0;
-  expectChecked<VisualOdometry>(odometry, "motion/min_inliers");
-  expectChecked<MotionEstimator>(odometry.motion, "min_inliers");
+  odometry.map.keyframes = 0;
+  expectChecked<VisualOdometry>(odometry, "map/keyframes");
+  expectChecked<LocalMap>(odometry.map, "keyframes");
 }
 
 /// What fields demand of each other is checked with the whole set, wherever the component stands in it.

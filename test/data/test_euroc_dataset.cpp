@@ -3,9 +3,9 @@
 #include <fstream>
 #include <opencv2/imgcodecs.hpp>
 
+#include "../../src/data/euroc_dataset.hpp"
 #include "../said.hpp"
 #include "../temporary_folder.hpp"
-#include "stereo_descriptor_vo/data/euroc_dataset.hpp"
 
 namespace sdvo::test_euroc_dataset {
 

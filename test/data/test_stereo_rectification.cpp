@@ -6,9 +6,9 @@
 #include <opencv2/core/eigen.hpp>
 #include <tuple>
 
+#include "../../src/data/stereo_rectification.hpp"
 #include "../said.hpp"
 #include "../temporary_folder.hpp"
-#include "stereo_descriptor_vo/data/stereo_rectification.hpp"
 
 namespace sdvo::test_stereo_rectification {
 

@@ -2,9 +2,9 @@
 
 #include <opencv2/features2d.hpp>
 
+#include "../../src/front_end/base_descriptor.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/front_end/base_descriptor.hpp"
 
 namespace sdvo::test_base_descriptor {
 

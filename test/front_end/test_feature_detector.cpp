@@ -6,10 +6,10 @@
 #include <opencv2/imgcodecs.hpp>
 #include <set>
 
+#include "../../src/front_end/feature_detector.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
 #include "../temporary_folder.hpp"
-#include "stereo_descriptor_vo/front_end/feature_detector.hpp"
 
 namespace sdvo::test_feature_detector {
 

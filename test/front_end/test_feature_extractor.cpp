@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "../../src/front_end/depth_scale.hpp"
 #include "../../src/front_end/freak.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "../../src/common/processor.hpp"
-#include "stereo_descriptor_vo/front_end/patch_cutter.hpp"
+#include "../../src/front_end/patch_cutter.hpp"
 
 namespace sdvo::test_patch_cutter {
 

@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
+#include "../../src/front_end/rig_monitor.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/front_end/rig_monitor.hpp"
 
 namespace sdvo::test_rig_monitor {
 

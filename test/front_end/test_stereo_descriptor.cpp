@@ -3,9 +3,9 @@
 #include <opencv2/imgproc.hpp>
 
 #include "../../src/front_end/freak.hpp"
+#include "../../src/front_end/stereo_descriptor.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/front_end/stereo_descriptor.hpp"
 
 namespace sdvo::test_stereo_descriptor {
 

@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
 #include "../../src/common/processor.hpp"
+#include "../../src/front_end/stereo_matcher.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
 
 namespace sdvo {
 

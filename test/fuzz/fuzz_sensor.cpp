@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <stdexcept>
 
+#include "../../src/data/euroc_dataset.hpp"
 #include "fuzz_file.hpp"
-#include "stereo_descriptor_vo/data/euroc_dataset.hpp"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const std::uint8_t* end = data + size;

@@ -2,7 +2,7 @@
 
 #include <Eigen/Eigenvalues>
 
-#include "stereo_descriptor_vo/map/floor.hpp"
+#include "../../src/map/floor.hpp"
 
 namespace sdvo::test_floor {
 

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "stereo_descriptor_vo/map/keyframe_memory.hpp"
+#include "../../src/map/keyframe_memory.hpp"
 
 namespace sdvo::test_keyframe_memory {
 

@@ -5,10 +5,10 @@
 #include <cstring>
 
 #include "../../src/belief/pose_covariance.hpp"
+#include "../../src/map/local_map.hpp"
+#include "../../src/rig/calibration_filter.hpp"
 #include "../synthetic_features.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/map/local_map.hpp"
-#include "stereo_descriptor_vo/rig/calibration_filter.hpp"
 
 namespace sdvo::test_local_map {
 

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
+#include "../../src/map/map_point.hpp"
 #include "../synthetic_features.hpp"
-#include "stereo_descriptor_vo/map/map_point.hpp"
 
 namespace sdvo::test_map_point {
 

@@ -4,8 +4,8 @@
 #include <Eigen/LU>
 
 #include "../../src/map/point_elimination.hpp"
+#include "../../src/map/window_optimizer.hpp"
 #include "../synthetic_features.hpp"
-#include "stereo_descriptor_vo/map/window_optimizer.hpp"
 
 namespace sdvo::test_point_elimination {
 

@@ -6,8 +6,8 @@
 #include <tuple>
 
 #include "../../src/common/processor.hpp"
+#include "../../src/map/window_optimizer.hpp"
 #include "../synthetic_features.hpp"
-#include "stereo_descriptor_vo/map/window_optimizer.hpp"
 
 namespace sdvo::test_window_optimizer {
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "../../src/common/processor.hpp"
-#include "stereo_descriptor_vo/matching/patch_alignment.hpp"
+#include "../../src/matching/patch_alignment.hpp"
 
 namespace sdvo::test_patch_alignment {
 

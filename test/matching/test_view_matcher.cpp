@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
+#include "../../src/matching/view_matcher.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/matching/view_matcher.hpp"
 
 namespace sdvo::test_correspondences {
 

@@ -1,8 +1,8 @@
 #pragma once
 
+#include "../../src/motion/correspondence_arrays.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
-#include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
 
 namespace sdvo {
 

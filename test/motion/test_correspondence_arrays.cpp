@@ -1,9 +1,9 @@
 #include <gtest/gtest.h>
 
 #include "../../src/common/processor.hpp"
+#include "../../src/motion/pose_problem.hpp"
 #include "../synthetic_scene.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
-#include "stereo_descriptor_vo/motion/pose_problem.hpp"
 
 namespace sdvo::test_correspondence_arrays {
 

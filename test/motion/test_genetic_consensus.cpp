@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
+#include "../../src/motion/sample_consensus.hpp"
 #include "seen_points.hpp"
-#include "stereo_descriptor_vo/motion/sample_consensus.hpp"
 
 namespace sdvo::test_genetic_consensus {
 

@@ -2,9 +2,9 @@
 
 #include <Eigen/Cholesky>
 
+#include "../../src/motion/motion_estimator.hpp"
 #include "../said.hpp"
 #include "seen_points.hpp"
-#include "stereo_descriptor_vo/motion/motion_estimator.hpp"
 
 namespace sdvo::test_motion_estimator {
 

@@ -2,8 +2,8 @@
 
 #include <numeric>
 
+#include "../../src/motion/motion_refinement.hpp"
 #include "seen_points.hpp"
-#include "stereo_descriptor_vo/motion/motion_refinement.hpp"
 
 namespace sdvo::test_motion_refinement {
 

@@ -2,7 +2,7 @@
 
 #include <random>
 
-#include "stereo_descriptor_vo/motion/noise.hpp"
+#include "../../src/motion/noise.hpp"
 
 namespace sdvo::test_noise {
 

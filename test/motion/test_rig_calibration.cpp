@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "stereo_descriptor_vo/motion/rig_calibration.hpp"
+#include "../../src/motion/rig_calibration.hpp"
 
 namespace sdvo::test_rig_calibration {
 

@@ -2,9 +2,9 @@
 
 #include <set>
 
+#include "../../src/motion/sample_consensus.hpp"
 #include "../said.hpp"
 #include "seen_points.hpp"
-#include "stereo_descriptor_vo/motion/sample_consensus.hpp"
 
 namespace sdvo {
 

@@ -8,8 +8,8 @@
 #include <random>
 #include <vector>
 
+#include "../../src/motion/three_point_pose.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
-#include "stereo_descriptor_vo/motion/three_point_pose.hpp"
 
 namespace sdvo::test_three_point_pose {
 

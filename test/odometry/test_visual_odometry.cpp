@@ -1149,10 +1149,10 @@ TEST(VisualOdometry, TakesOtherOptionsOverWhileRunning) {
   VisualOdometry odometry({});
   follow(odometry, 5);
   VisualOdometryOptions options;
-  options.tracking.max_predicted_pairs = 1000;
+  options.tracking.max_gap = -1.0;
   EXPECT_THROW(odometry.configure(options), std::invalid_argument);
-  EXPECT_EQ(odometry.options().tracking.max_predicted_pairs, 1);
-  options.tracking.max_predicted_pairs = 0;
+  EXPECT_EQ(odometry.options().tracking.max_gap, 1.0);
+  options.tracking.max_gap = 1.0, options.tracking.max_predicted_pairs = 0;
   odometry.configure(options);
   EXPECT_EQ(odometry.update(pairOf(6)).state, TrackingState::kTracking) << "the map goes on";
   EXPECT_EQ(odometry.update(blindPair(7)).state, TrackingState::kLost);

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "../../src/places/loop_agreement.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
 
 namespace sdvo::test_loop_agreement {

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
+#include "../../src/places/place_index.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/places/place_index.hpp"
 
 namespace sdvo::test_place {
 

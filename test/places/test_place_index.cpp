@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
+#include "../../src/places/place_index.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/places/place_index.hpp"
 
 namespace sdvo::test_place_index {
 

@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
+#include "../../src/places/place_verifier.hpp"
 #include "../said.hpp"
 #include "../synthetic_scene.hpp"
-#include "stereo_descriptor_vo/places/place_verifier.hpp"
 
 namespace sdvo::test_place_verifier {
 

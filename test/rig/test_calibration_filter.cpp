@@ -5,9 +5,9 @@
 #include <cmath>
 #include <utility>
 
+#include "../../src/motion/noise.hpp"
+#include "../../src/rig/calibration_filter.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
-#include "stereo_descriptor_vo/motion/noise.hpp"
-#include "stereo_descriptor_vo/rig/calibration_filter.hpp"
 
 namespace sdvo::test_calibration_filter {
 

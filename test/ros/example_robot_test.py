@@ -28,7 +28,7 @@ def launch(*arguments):
 
 
 class Drive:
-    """What a bag of kitti_to_bag holds: the truth at each stamp, of a base whose origin is the left camera."""
+    """What a bag of convert holds: the truth at each stamp, of a base whose origin is the left camera."""
 
     def __init__(self, path):
         with rosbag.Bag(path) as bag:
@@ -76,7 +76,7 @@ class ExampleRobot(unittest.TestCase):
         drive, bag = os.path.join(cls.directory, 'drive'), os.path.join(cls.directory, 'drive.bag')
         run_tool('render_drive', '--trajectory', 'turn_in_place', '--rig', 'd435_small', '--frames', str(PAIRS), '--output',
                  drive)
-        run_tool('kitti_to_bag', '--sequence', drive, '--output', bag)
+        run_tool('convert', drive, '--output', bag)
         cls.drive = Drive(bag)
 
         cls.odometry, cls.info = Collector('/stereo/odom', Odometry), Collector('/stereo/vo_info', VoInfo)

@@ -197,8 +197,8 @@ class Examples(unittest.TestCase):
         directory = tempfile.mkdtemp(prefix='sdvo_examples_')
         self.addCleanup(shutil.rmtree, directory, ignore_errors=True)
         bag = os.path.join(directory, 'sequence.bag')
-        converter = roslib.packages.find_node(PACKAGE, 'kitti_to_bag')[0]
-        subprocess.run([converter, '--sequence', sequence, '--frames', str(pairs), '--output', bag], check=True,
+        converter = roslib.packages.find_node(PACKAGE, 'convert')[0]
+        subprocess.run([converter, sequence, '--frames', str(pairs), '--output', bag], check=True,
                        stdout=subprocess.DEVNULL)
         self.listen('/stereo')
         nodes = ['/stereo/stereo_vo_manager', '/stereo/descriptor_listener']

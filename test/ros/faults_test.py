@@ -200,8 +200,7 @@ class Faults(PipelineCase):
 
     def test_diagnostics_name_the_cause(self):
         ok, warn, error = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
-        self.start(config=self.config('{stereo_features: {max_silence: 3.0, diagnostics: {max_load: 1.0}}, '
-                                      'visual_odometry: {max_silence: 3.0, diagnostics: {max_load: 1.0, max_latency: 3600.0}}}\n'))
+        self.start(config=self.config('{stereo_features: {max_silence: 3.0}, visual_odometry: {max_silence: 3.0}}\n'))
         self.expect('stereo_features', 'input rate', warn, 'no pairs yet on', 'left/image_rect')
         self.expect('visual_odometry', 'input rate', warn, 'no features yet on')
         self.expect('stereo_features', 'input rate', error, 'no pairs yet on')

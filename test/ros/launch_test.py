@@ -176,11 +176,11 @@ class Launch(unittest.TestCase):
                 file.write('#!/bin/sh\nexec /usr/bin/python3 -I -S "$@"\n')
             os.chmod(python, 0o755)
             with open(config, 'w') as file:
-                file.write('visual_odometry: {motion: {seed: 7}}')
+                file.write('visual_odometry: {map: {keyframes: 7}}')
             path = os.environ['PATH']
             os.environ['PATH'] = folder + ':' + path
             try:
-                self.assertEqual(parameters(config=config), {'visual_odometry/motion/seed': 7})
+                self.assertEqual(parameters(config=config), {'visual_odometry/map/keyframes': 7})
                 process = subprocess.Popen(['roslaunch', '--wait', PACKAGE, 'stereo_vo.launch', 'record:=/missing/drive.bag'],
                                            stderr=subprocess.PIPE, universal_newlines=True)
             finally:
@@ -248,8 +248,8 @@ class Launch(unittest.TestCase):
             path = os.path.join(folder, 'my config.yaml')
             for text, expected in (('stereo_features:\nvisual_odometry:\n  tracking: {max_speed: 3}\n',
                                     {'/stereo/visual_odometry/tracking/max_speed': 3}),
-                                   ('stereo_features:\n  detector:\n    max_features:\n    bucket_size: 40\n',
-                                    {'/stereo/stereo_features/detector/bucket_size': 40}), ('', {}), ('# none\n', {})):
+                                   ('stereo_features:\n  detector:\n    max_features:\n    min_spacing: 4.0\n',
+                                    {'/stereo/stereo_features/detector/min_spacing': 4.0}), ('', {}), ('# none\n', {})):
                 with open(path, 'w') as config:
                     config.write(text)
                 self.assertEqual(load('odometry.launch', config=path).params, expected, text)

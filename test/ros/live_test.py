@@ -467,10 +467,10 @@ class Live(PipelineCase):
             self.until(lambda: sum('nothing reconfigured' in w for w in self.rosout.warnings) == i + 1)
             self.assertGreater(self.feed(i + 1).detected, 400)
         # What comes next and is right takes effect.
-        answer = client.update_configuration({'detector/max_features': 200, 'stereo/min_disparity': 1000.0})
+        answer = client.update_configuration({'detector/max_features': 200, 'stereo/max_epipolar_residual': 1000.0})
         self.assertEqual(answer['detector/max_features'], 200)
-        self.assertEqual(answer['stereo/min_disparity'], 50.0)  # the end of its range
-        client.update_configuration({'stereo/min_disparity': 0.5})
+        self.assertEqual(answer['stereo/max_epipolar_residual'], 4.0)  # the end of its range
+        client.update_configuration({'stereo/max_epipolar_residual': 1.5})
         after = self.feed(4)
         self.assertEqual(after.detected, 200)
         # Fewer features are described as before: nothing begins anew. Nor with the same value.

@@ -43,7 +43,7 @@ class Raw(unittest.TestCase):
         cls.directory = tempfile.mkdtemp(prefix='sdvo_raw_')
         cls.addClassCleanup(shutil.rmtree, cls.directory, ignore_errors=True)
         bag = os.path.join(cls.directory, 'raw.bag')
-        run_tool('euroc_to_bag', '--input', recording, '--output', bag)
+        run_tool('convert', recording, '--output', bag)
         with rosbag.Bag(bag) as recorded:
             cls.truth = {m.header.stamp: m for _, m, _ in recorded.read_messages('/ground_truth/odom')}
         cls.stamps = sorted(cls.truth)

@@ -31,7 +31,7 @@ class RenderedPlaces(unittest.TestCase):
         run_tool('render_drive', '--trajectory', 'figure_eight', '--rate', str(RATE), '--frames', str(PAIRS), '--calib', CALIBRATION,
                  '--size', SIZE, '--output', drive)
         bag = os.path.join(cls.directory, 'drive.bag')
-        run_tool('kitti_to_bag', '--sequence', drive, '--output', bag)
+        run_tool('convert', drive, '--output', bag)
         with rosbag.Bag(bag) as recorded:
             cls.truth = {m.header.stamp: matrix_of(m.pose.pose) for _, m, _ in recorded.read_messages('/ground_truth/odom')}
 

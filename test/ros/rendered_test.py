@@ -58,7 +58,7 @@ class RenderedDrive(unittest.TestCase):
         run_tool('render_drive', '--trajectory', poses, '--rate', str(RATE), '--calib', CALIBRATION, '--size', SIZE,
                  '--output', drive)
         bag = os.path.join(cls.directory, 'drive.bag')
-        run_tool('kitti_to_bag', '--sequence', drive, '--output', bag)
+        run_tool('convert', drive, '--output', bag)
         with rosbag.Bag(bag) as recorded:
             cls.truth = {m.header.stamp: m for _, m, _ in recorded.read_messages('/ground_truth/odom')}
         cls.stamps = sorted(cls.truth)

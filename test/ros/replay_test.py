@@ -35,7 +35,7 @@ class Replay(unittest.TestCase):
         cls.addClassCleanup(shutil.rmtree, cls.directory, ignore_errors=True)
         bag = os.path.join(cls.directory, 'sequence.bag')
         poses = os.path.join(cls.directory, 'poses.txt')
-        run_tool('kitti_to_bag', '--sequence', sequence, '--output', bag)
+        run_tool('convert', sequence, '--output', bag)
         run_tool('run_sequence', sequence, '--poses', poses)
         cls.offline = np.loadtxt(poses).reshape(-1, 3, 4)
         with rosbag.Bag(bag) as recorded:

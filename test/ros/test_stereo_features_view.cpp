@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
+#include "../../src/front_end/feature_detector.hpp"
 #include "message_samples.hpp"
-#include "stereo_descriptor_vo/front_end/feature_detector.hpp"
 #include "stereo_descriptor_vo/messages/stereo_features_view.hpp"
 
 namespace sdvo::ros_conversions::test_stereo_features_view {

@@ -8,7 +8,7 @@
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/odometry/motion_guess.hpp"
 #include "stereo_descriptor_vo/odometry/odometry_result.hpp"
-#include "stereo_descriptor_vo/odometry/visual_odometry_options.hpp"
+#include "stereo_descriptor_vo/options/visual_odometry_options.hpp"
 
 namespace sdvo {
 

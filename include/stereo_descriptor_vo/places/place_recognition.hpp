@@ -3,8 +3,8 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
-#include <deque>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -12,8 +12,7 @@
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/places/place_index.hpp"
-#include "stereo_descriptor_vo/places/place_verifier.hpp"
+#include "stereo_descriptor_vo/places/place.hpp"
 #include "stereo_descriptor_vo/places/pose_graph.hpp"
 
 namespace sdvo {
@@ -21,23 +20,18 @@ namespace sdvo {
 struct PlaceRecognitionOptions {
   double keyframe_distance = 3.0;
   double keyframe_angle = 15.0;
-  int max_features = 500;
+  int max_features = 500;  ///< kept of a key frame (chosen)
   int max_places = 10000;
-  double min_age = 20.0;
-  double min_travel = 30.0;
-  int candidates = 1;
+  double min_age = 20.0;     ///< s: younger key frames are no candidates, unless there was a break since (chosen)
+  double min_travel = 30.0;  ///< m: … nor those from which the path here is shorter (chosen)
+  int candidates = 1;        ///< places that geometry looks at for each key frame (chosen)
   bool localisation_only = false;
 
   void describe(OptionList& list) {
     list.add("keyframe_distance", keyframe_distance, {0.01, 100.0}, "m",
              "a pair is kept as a key frame after so long a way");
     list.add("keyframe_angle", keyframe_angle, {0.5, 180.0}, "deg", "… or after such a turn");
-    list.add("max_features", max_features, {50, 10000}, "", "features kept of a key frame");
     list.add("max_places", max_places, {10, 1000000}, "", "key frames kept; the oldest goes");
-    list.add("min_age", min_age, {0.0, 3600.0}, "s",
-             "no place is looked for among key frames younger than that, unless there was a break since");
-    list.add("min_travel", min_travel, {0.0, 10000.0}, "m", "… or from which the way here is shorter");
-    list.add("candidates", candidates, {1, 100}, "", "places that geometry looks at for each key frame");
     list.add("localisation_only", localisation_only,
              "a map that was loaded stays as it is: no places are added, none is moved");
   }
@@ -62,28 +56,14 @@ struct PlaceReport {
   double find_time = 0.0, verify_time = 0.0;  ///< s
 };
 
-/// Accepts a loop only if another one, of neighbouring key frames, gives the same relative pose. A single one may be
-/// wrong by chance.
-class LoopAgreement {
- public:
-  /// The loops that are newly trusted: none, or this one and the earlier ones that it is the first to agree with.
-  std::vector<GraphEdge> confirm(const PoseGraph& graph, const GraphEdge& proposal);
-
- private:
-  struct Proposal {
-    GraphEdge loop;
-    bool trusted;
-  };
-
-  std::deque<Proposal> proposals_;  ///< of the last few key frames
-};
-
 /// Recognises places by the features of stereo pairs, without images, and keeps a graph of their poses. Where the
 /// camera comes back to a place, the drift of the odometry is corrected.
 class PlaceRecognition {
  public:
   /// Throws std::invalid_argument when an option is out of its range.
   explicit PlaceRecognition(const PlaceRecognitionOptions& options);
+  PlaceRecognition(PlaceRecognition&&) noexcept;
+  ~PlaceRecognition();
 
   /// Takes the next pair of the odometry. Returns a report if it became a key frame. The graph is not optimised here:
   /// that takes long and may be done on a copy meanwhile (graph(), PoseGraph::optimise(), adopt()). Throws
@@ -130,9 +110,8 @@ class PlaceRecognition {
   void forget(int id);
 
   PlaceRecognitionOptions options_;
-  PlaceIndex index_;
-  PlaceVerifier verifier_;
-  LoopAgreement agreement_;
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
   PoseGraph graph_;
   std::map<int, Place> places_;
   std::optional<int> last_;        ///< key frame of this session

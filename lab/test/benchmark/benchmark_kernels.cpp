@@ -10,8 +10,8 @@
 #include "../../../src/common/processor.hpp"
 #include "../../../src/front_end/fast_corners.hpp"
 #include "../../../src/front_end/freak.hpp"
-#include "stereo_descriptor_vo/front_end/stereo_matcher.hpp"
-#include "stereo_descriptor_vo/matching/patch_alignment.hpp"
+#include "../../../src/front_end/stereo_matcher.hpp"
+#include "../../../src/matching/patch_alignment.hpp"
 
 namespace {
 

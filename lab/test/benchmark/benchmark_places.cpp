@@ -1,9 +1,9 @@
 // Times what the recognition of places costs as the map grows.
 #include <benchmark/benchmark.h>
 
+#include "../../../src/places/place_index.hpp"
+#include "../../../src/places/place_verifier.hpp"
 #include "../../../test/synthetic_scene.hpp"
-#include "stereo_descriptor_vo/places/place_index.hpp"
-#include "stereo_descriptor_vo/places/place_verifier.hpp"
 #include "stereo_descriptor_vo/places/pose_graph.hpp"
 
 namespace {

@@ -5,9 +5,9 @@
 #include <optional>
 #include <vector>
 
+#include "../matching/patch_alignment.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/matching/patch_alignment.hpp"
 
 namespace sdvo {
 

@@ -5,8 +5,8 @@
 #include <optional>
 #include <string>
 
+#include "../motion/noise.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
-#include "stereo_descriptor_vo/motion/noise.hpp"
 
 namespace sdvo {
 

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/options/feature_extractor_options.hpp"
 
 namespace sdvo {
 
@@ -27,7 +28,7 @@ struct ViewDescriptors {
 /// the implementation reads (size, octave, level). At 7 px, the size of a FAST corner, it is the published descriptor.
 class BaseDescriptor {
  public:
-  static constexpr double kStandardSize = 7.0;  ///< px
+  static constexpr double kStandardSize = DepthScaleOptions::kStandardSize;  ///< px
 
   virtual ~BaseDescriptor() = default;
 
@@ -40,14 +41,6 @@ class BaseDescriptor {
   virtual ElementType elementType() const = 0;
   virtual int bytes() const = 0;
 };
-
-/// The base descriptors, also those that the OpenCV at hand lacks.
-enum class DescriptorType { kBrief, kBrisk, kFreak, kOrb, kSift, kSurf };
-
-inline const std::vector<std::string>& namesOf(DescriptorType) {
-  static const std::vector<std::string> names = {"brief", "brisk", "freak", "orb", "sift", "surf"};
-  return names;
-}
 
 /// Throws std::invalid_argument when the OpenCV at hand lacks the descriptor, saying which build has it.
 std::unique_ptr<BaseDescriptor> makeBaseDescriptor(DescriptorType type);

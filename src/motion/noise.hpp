@@ -5,11 +5,9 @@
 #include <cstddef>
 
 #include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/options/visual_odometry_options.hpp"
 
 namespace sdvo {
-
-/// Probability that chance exceeds the limits of this package, for normal distributions as well as for agreement.
-constexpr double kTailProbability = 1e-4;
 
 /// Least number of measurements for a variance, or for a motion that is compared with another one (chosen).
 constexpr int kFewestMeasured = 20;
@@ -19,44 +17,6 @@ constexpr double kUsualMemory = 0.9;
 
 /// Side, px (chosen), of a part of the image within which the errors of patches and rectification are correlated.
 constexpr double kPart = 24.0;
-
-/// Chi-square of so many degrees of freedom that is exceeded with this probability.
-constexpr double noiseGate(int numbers) {
-  constexpr double gates[] = {15.14, 18.42, 21.11, 23.51, 25.74, 27.86};
-  return gates[numbers - 1];
-}
-
-/// Standard deviations of measurements, px, and the limits that follow from them.
-struct NoiseOptions {
-  double corner = 0.4;
-  /// Standard deviation of a position that is aligned with the point's reference patch, px.
-  static constexpr double kReference = 0.1;
-  double disparity = 0.1;
-  double common_disparity = 0.3;
-
-  void describe(OptionList& list) {
-    list.add("corner", corner, {0.01, 10.0}, "px",
-             "standard deviation of a detected corner's position, in each direction; times the scale that is learnt");
-    list.add("disparity", disparity, {0.01, 10.0}, "px",
-             "standard deviation of a disparity's noise, which is new in every sighting");
-    list.add(
-        "common_disparity", common_disparity, {0.0, 10.0}, "px",
-        "standard deviation of the error that all disparities of one point share: what the calibration's two terms "
-        "leave of the rig's, and what its texture does to the matching; until 20 windows told more of it");
-  }
-
-  /// Root mean square length of (u_left, v_left, u_right) between a corner and the map's point: both err.
-  double length() const { return std::sqrt(6.0 * corner * corner + common_disparity * common_disparity); }
-
-  /// The largest such length. u_left and u_right share the corners' errors.
-  double inlierGate() const { return 2.0 * corner * std::sqrt(noiseGate(1)); }
-
-  /// The largest distance of a corner from its point, in each direction.
-  double cornerGate() const { return corner * std::sqrt(noiseGate(1)); }
-
-  /// Of a corner whose patch is not the point's: it lies anywhere in a disc with u_left and u_right within the gate.
-  double unconfirmed() const { return inlierGate() / std::sqrt(8.0); }
-};
 
 /// The errors of measurements of a rig, and the differences of motions that follow from them.
 class Noise {

@@ -2,37 +2,11 @@
 
 #include <optional>
 
+#include "../motion/rig_calibration.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
-#include "stereo_descriptor_vo/motion/rig_calibration.hpp"
+#include "stereo_descriptor_vo/options/visual_odometry_options.hpp"
 
 namespace sdvo {
-
-struct CalibrationOptions {
-  bool enabled = true;
-  double prior_offset = 0.0;
-  double prior_bend = 0.0;
-  double prior_sigma = 1.0;
-  double right_roll_sigma = 0.001;  // chosen: 0.2 px at the upper edge of KITTI's images
-  double right_delay = 0.0;
-  double right_delay_sigma = 0.003;  // chosen: 0.2 ms with a common trigger (twelve drives), half a frame without
-
-  void describe(OptionList& list) {
-    list.add("enabled", enabled, "estimate the rig's residual disparity error while driving and compensate it");
-    list.add("prior_offset", prior_offset, {-20.0, 20.0}, "px",
-             "that error in the image centre as far as it is known beforehand; held fixed when not enabled");
-    list.add("prior_bend", prior_bend, {-20.0, 20.0}, "px", "the same for its change at 45 degrees from the centre");
-    list.add("prior_sigma", prior_sigma, {1e-4, 10.0}, "px",
-             "standard deviation of an error of both, in the centre and at 45 degrees from it, which is beforehand as "
-             "likely as none");
-    list.add("right_roll_sigma", right_roll_sigma, {1e-6, 0.1}, "rad",
-             "standard deviation of the right camera's rotation about its optical axis, which is beforehand as likely "
-             "as none; rows and disparities show it");
-    list.add("right_delay", right_delay, {-0.1, 0.1}, "s",
-             "time by which right images are known to be later than left ones; what it lacks is estimated");
-    list.add("right_delay_sigma", right_delay_sigma, {1e-6, 0.1}, "s",
-             "standard deviation of an error of that time, which is beforehand as likely as none");
-  }
-};
 
 /// Kalman filter, in information form, of a rig's disparity error (offset, bend), right roll and right delay. Windows
 /// of the map and rows of features measure them. A window's prior excludes all windows that share a pair with it.

@@ -5,11 +5,11 @@
 #include <optional>
 #include <vector>
 
+#include "../motion/motion_estimator.hpp"
+#include "../motion/pose_problem.hpp"
+#include "../motion/rig_calibration.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
 #include "stereo_descriptor_vo/matching/feature_matcher.hpp"
-#include "stereo_descriptor_vo/motion/motion_estimator.hpp"
-#include "stereo_descriptor_vo/motion/pose_problem.hpp"
-#include "stereo_descriptor_vo/motion/rig_calibration.hpp"
 
 namespace sdvo {
 

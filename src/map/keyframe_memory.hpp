@@ -5,7 +5,7 @@
 #include <memory>
 #include <vector>
 
-#include "stereo_descriptor_vo/map/map_point.hpp"
+#include "map_point.hpp"
 #include "stereo_descriptor_vo/matching/feature_matcher.hpp"
 
 namespace sdvo {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "stereo_descriptor_vo/data/kitti_dataset.hpp"
-#include "stereo_descriptor_vo/data/stereo_rectification.hpp"
 #include "stereo_descriptor_vo/data/trajectory.hpp"
+#include "stereo_rectification.hpp"
 
 namespace sdvo {
 

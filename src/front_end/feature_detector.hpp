@@ -5,41 +5,9 @@
 #include <vector>
 
 #include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/options/feature_extractor_options.hpp"
 
 namespace sdvo {
-
-enum class DetectorType { kFast, kGftt, kOrb, kSift };
-
-inline const std::vector<std::string>& namesOf(DetectorType) {
-  static const std::vector<std::string> names = {"fast", "gftt", "orb", "sift"};
-  return names;
-}
-
-struct FeatureDetectorOptions {
-  DetectorType type = DetectorType::kFast;
-  int max_features = 600;
-  int bucket_size = 50;
-  double min_spacing = 0.0;
-  double min_contrast = 9.0;
-  double corner_quality = 0.002;
-  bool subpixel = true;
-  std::string mask;
-
-  void describe(OptionList& list) {
-    list.add("type", type, "corner detector");
-    list.add("max_features", max_features, {1, 20000}, "", "corners kept per left image");
-    list.add("bucket_size", bucket_size, {8, 4096}, "px", "side of the square buckets that share the corners evenly");
-    list.add("min_spacing", min_spacing, {0.0, 100.0}, "px",
-             "corners nearer than this to a stronger one are left out; 0: none is");
-    list.add("min_contrast", min_contrast, {1.0, 100.0}, "sigma of the image's noise",
-             "fast, orb: weakest corner considered; down to a quarter of it where there are too few");
-    list.add("corner_quality", corner_quality, {1e-6, 1.0}, "", "gftt: weakest response relative to the best");
-    list.add("subpixel", subpixel, "fast, gftt: refine corners to sub-pixel positions");
-    list.add("mask", mask, "PNG (absolute path) of the left image's size: no corners where it is black; empty: none");
-  }
-  /// Throws std::invalid_argument when the OpenCV at hand lacks the detector.
-  void check() const;
-};
 
 /// A corner in the left image.
 struct Corner {

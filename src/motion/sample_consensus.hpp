@@ -5,10 +5,11 @@
 #include <string>
 #include <vector>
 
+#include "motion_refinement.hpp"
+#include "noise.hpp"
+#include "pose_problem.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
-#include "stereo_descriptor_vo/motion/motion_refinement.hpp"
-#include "stereo_descriptor_vo/motion/noise.hpp"
-#include "stereo_descriptor_vo/motion/pose_problem.hpp"
+#include "stereo_descriptor_vo/options/visual_odometry_options.hpp"
 
 namespace sdvo {
 
@@ -31,34 +32,6 @@ class SampleBudget {
  private:
   double at_most_, confidence_;
   double needed_;
-};
-
-enum class ConsensusMethod { kRansac, kMsac, kLoRansac, kGasac, kAdaptiveGasac };
-
-inline const std::vector<std::string>& namesOf(ConsensusMethod) {
-  static const std::vector<std::string> names = {"ransac", "msac", "lo_ransac", "gasac", "adaptive_gasac"};
-  return names;
-}
-
-struct GeneticConsensusOptions {
-  static constexpr int kPopulation = 24;        ///< individuals of a generation
-  static constexpr double kMutationRate = 0.1;  ///< gasac: ratio of a child's genes replaced at random
-  bool learning = true;                         ///< adaptive: how good a replacement each gene is
-};
-
-struct SampleConsensusOptions {
-  ConsensusMethod consensus = ConsensusMethod::kMsac;
-  double inlier_threshold = NoiseOptions().inlierGate();  ///< px, of (u_left, v_left, u_right)
-  int max_iterations = 500;
-  int seed = 1;
-  GeneticConsensusOptions genetic;
-
-  void describe(OptionList& list) {
-    list.add("consensus", consensus, "outlier rejection; adaptive_gasac is the paper's");
-    list.add("max_iterations", max_iterations, {1, 100000}, "",
-             "samples drawn at most; fewer once one without outliers was drawn with a probability of 0.9999");
-    list.add("seed", seed, {0, 1000000000}, "", "of the random samples; equal seeds give equal results");
-  }
 };
 
 /// The pose that most correspondences agree on.

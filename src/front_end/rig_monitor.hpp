@@ -8,19 +8,9 @@
 
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
+#include "stereo_descriptor_vo/options/feature_extractor_options.hpp"
 
 namespace sdvo {
-
-struct RigMonitorOptions {
-  double suspicious_share = 0.4;
-
-  void describe(OptionList& list) {
-    list.add(
-        "suspicious_share", suspicious_share, {0.0, 1.0}, "",
-        "the rig is looked at, and the pair refused where its rows do not agree, when a smaller share of the corners "
-        "is found in the right image; 0: never");
-  }
-};
 
 /// v_right - v_left as a straight line over the columns of the image, px: the effect of a small pitch or roll of the
 /// right camera.
@@ -49,8 +39,7 @@ class RigMonitor {
  public:
   static constexpr double kReach = 24.0;  ///< px, rows above and below its own in which a corner is looked for
 
-  /// `max_dv`: largest tolerated |v_right - v_left|, px. Throws std::invalid_argument when an option is out of its
-  /// range.
+  /// `max_dv`: largest tolerated |v_right - v_left|, px.
   RigMonitor(const RigMonitorOptions& options, double max_dv, double max_disparity);
 
   /// Whether so few of the corners were found in the right image that diagnose() is worth its time.

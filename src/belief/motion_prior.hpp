@@ -6,32 +6,12 @@
 #include <string>
 #include <vector>
 
+#include "../motion/noise.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
-#include "stereo_descriptor_vo/motion/noise.hpp"
+#include "stereo_descriptor_vo/options/visual_odometry_options.hpp"
 
 namespace sdvo {
-
-struct MotionPriorOptions {
-  double max_speed = 70.0;
-  double max_rotation_rate = 6.3;
-  double acceleration = 2.2;
-  double rotation_acceleration = 1.4;
-  double stamp_sigma = 0.005;
-  double max_gap = 1.0;
-
-  void describe(OptionList& list) {
-    list.add("max_speed", max_speed, {0.1, 1000.0}, "m/s", "a faster motion is a wrong one");
-    list.add("max_rotation_rate", max_rotation_rate, {0.1, 100.0}, "rad/s", "a faster rotation is a wrong one");
-    list.add("acceleration", acceleration, {0.01, 1000.0}, "m/s",
-             "standard deviation, in each direction, of the velocity's change within a second: white acceleration, so "
-             "half of it in a quarter of the time");
-    list.add("rotation_acceleration", rotation_acceleration, {0.01, 1000.0}, "rad/s",
-             "the same for the rate of rotation");
-    list.add("stamp_sigma", stamp_sigma, {0.0, 1.0}, "s", "standard deviation of a stamp's error");
-    list.add("max_gap", max_gap, {0.01, 60.0}, "s", "longest time between pairs over which the motion is predicted");
-  }
-};
 
 /// Normal distribution of a motion; the covariance is of a right perturbation, m and rad.
 struct ExpectedMotion {

@@ -8,39 +8,17 @@
 #include <utility>
 #include <vector>
 
+#include "../matching/patch_alignment.hpp"
+#include "../motion/noise.hpp"
+#include "keyframe_memory.hpp"
+#include "map_point.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/map/keyframe_memory.hpp"
-#include "stereo_descriptor_vo/map/map_point.hpp"
-#include "stereo_descriptor_vo/map/window_optimizer.hpp"
 #include "stereo_descriptor_vo/matching/feature_matcher.hpp"
-#include "stereo_descriptor_vo/matching/patch_alignment.hpp"
-#include "stereo_descriptor_vo/motion/noise.hpp"
+#include "stereo_descriptor_vo/options/visual_odometry_options.hpp"
+#include "window_optimizer.hpp"
 
 namespace sdvo {
-
-struct LocalMapOptions {
-  int keyframes = 8;
-  int lasting_points = 150;
-  int remembered_keyframes = 40;
-  double keyframe_parallax = 4.0;
-  double keyframe_overlap = 0.6;
-  NoiseOptions noise;
-
-  void describe(OptionList& list) {
-    list.add("keyframes", keyframes, {2, 50}, "",
-             "newest key frames, which the map holds whatever they see; as many older ones at most, because they share "
-             "points with the newest pair");
-    list.add("lasting_points", lasting_points, {1, 10000}, "",
-             "points that such an older key frame must share at least");
-    list.add("remembered_keyframes", remembered_keyframes, {0, 1000}, "",
-             "key frames that are remembered beyond that, by where they were taken, for a camera that comes back");
-    list.add("keyframe_parallax", keyframe_parallax, {0.0, 500.0}, "px",
-             "a pair is kept as a key frame once its points moved by this median since the last one");
-    list.add("keyframe_overlap", keyframe_overlap, {0.0, 1.0}, "",
-             "… or once a smaller share of its points was seen in the last key frame");
-  }
-};
 
 /// The points around the camera and the key frames that saw them. The next pair's motion is measured against it.
 class LocalMap {

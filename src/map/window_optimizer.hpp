@@ -5,12 +5,12 @@
 #include <optional>
 #include <vector>
 
+#include "../motion/noise.hpp"
+#include "../motion/rig_calibration.hpp"
+#include "floor.hpp"
+#include "map_point.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
-#include "stereo_descriptor_vo/map/floor.hpp"
-#include "stereo_descriptor_vo/map/map_point.hpp"
-#include "stereo_descriptor_vo/motion/noise.hpp"
-#include "stereo_descriptor_vo/motion/rig_calibration.hpp"
 
 namespace sdvo {
 

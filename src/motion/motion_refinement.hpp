@@ -6,8 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "stereo_descriptor_vo/motion/noise.hpp"
-#include "stereo_descriptor_vo/motion/pose_problem.hpp"
+#include "noise.hpp"
+#include "pose_problem.hpp"
+#include "stereo_descriptor_vo/options/visual_odometry_options.hpp"
 
 namespace sdvo {
 
@@ -27,11 +28,6 @@ class LogSum {
 
  private:
   double product_ = 1.0, sum_ = 0.0;
-};
-
-struct MotionRefinementOptions {
-  double kernel_scale = NoiseOptions().length();  ///< px: residual at which the Cauchy kernel has the weight 1/2
-  int refinement_iterations = 20;                 ///< Levenberg-Marquardt steps at most
 };
 
 /// The weighted least squares problem around a pose, for the left perturbation xi = (translation, rotation) of it.

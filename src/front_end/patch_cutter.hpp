@@ -5,22 +5,9 @@
 
 #include "stereo_descriptor_vo/common/descriptor_format.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/options/feature_extractor_options.hpp"
 
 namespace sdvo {
-
-struct PatchOptions {
-  int patch_side = 13;
-
-  void describe(OptionList& list) {
-    list.add("patch_side", patch_side, {0, kMostSamples}, "samples",
-             "side of the grey patch sent with each feature, for its alignment between pairs; 0: none is sent");
-  }
-
-  /// Samples are a tenth of the feature's size apart, and at least 1 px.
-  PatchLayout layout() const { return {patch_side, 1.f, 0.1f}; }
-
-  static constexpr int kMostSamples = 16;
-};
 
 /// Cuts grey patches out of one image.
 class PatchCutter {

@@ -5,26 +5,12 @@
 #include <string>
 #include <vector>
 
+#include "base_descriptor.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/stereo_features.hpp"
-#include "stereo_descriptor_vo/front_end/base_descriptor.hpp"
+#include "stereo_descriptor_vo/options/feature_extractor_options.hpp"
 
 namespace sdvo {
-
-struct DescriptorOptions {
-  DescriptorType type = DescriptorType::kFreak;
-  DescriptorLayout layout = DescriptorLayout::kLeftAndRight;
-  bool oriented = false;
-  bool extend_border = true;
-
-  /// px: a key point whose own size does not fit into the image is described if this size does, on an image extended
-  /// by its border pixels. Chosen: with 7 px, 17 % of a near view's corners stay undescribed at 424x240, with 5 px 6 %.
-  static constexpr double kInsideSize = 5.0;
-
-  void describe(OptionList& list);
-  /// Throws std::invalid_argument when the OpenCV at hand lacks the base descriptor.
-  void check() const;
-};
 
 /// A key point seen in both views, as the stereo descriptor needs it.
 struct StereoKeypoint {

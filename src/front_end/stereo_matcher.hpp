@@ -5,36 +5,9 @@
 #include <vector>
 
 #include "stereo_descriptor_vo/common/options.hpp"
+#include "stereo_descriptor_vo/options/feature_extractor_options.hpp"
 
 namespace sdvo {
-
-struct EpipolarOptions {
-  double max_disparity = 192.0;
-  double uniqueness = 0.9;
-  double min_correlation = 0.8;
-
-  void describe(OptionList& list) {
-    list.add("max_disparity", max_disparity, {4.0, 2000.0}, "px", "largest disparity looked for, before alignment");
-    list.add("uniqueness", uniqueness, {0.1, 1.0}, "",
-             "largest ratio between the difference of the best block and that of the best one elsewhere");
-    list.add("min_correlation", min_correlation, {0.0, 1.0}, "", "least correlation of the aligned patches");
-  }
-};
-
-struct StereoMatcherOptions {
-  EpipolarOptions epipolar;
-  double max_epipolar_residual = 1.5;
-  double min_disparity = 0.5;
-
-  void describe(OptionList& list) {
-    list.group("epipolar", epipolar);
-    list.add("max_epipolar_residual", max_epipolar_residual, {0.1, 4.0}, "px",
-             "largest difference of the rows in both views; KITTI's rectification really leaves up to 1.3");
-    list.add("min_disparity", min_disparity, {0.01, 50.0}, "px", "smallest disparity of a point at finite depth");
-  }
-  /// Throws std::invalid_argument when no disparity is left to look for.
-  void check() const;
-};
 
 /// Where a left corner was found in the right image.
 struct StereoMatch {

@@ -4,26 +4,12 @@
 #include <cmath>
 #include <string>
 
+#include "../motion/noise.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
-#include "stereo_descriptor_vo/motion/noise.hpp"
+#include "stereo_descriptor_vo/options/visual_odometry_options.hpp"
 
 namespace sdvo {
-
-struct PlanarOptions {
-  bool planar = false;
-  double planar_height_sigma = 0.01;
-  double planar_tilt_sigma = 0.3;
-
-  void describe(OptionList& list) {
-    list.add("planar", planar,
-             "the base drives on a flat floor: its height, roll and pitch are constrained in the adjustment");
-    list.add("planar_height_sigma", planar_height_sigma, {1e-4, 10.0}, "m",
-             "planar: standard deviation of the base's height over the floor");
-    list.add("planar_tilt_sigma", planar_tilt_sigma, {1e-3, 90.0}, "deg",
-             "planar: standard deviation of the base's roll and pitch");
-  }
-};
 
 /// The floor that a base drives on: the plane z = height in the frame of the base's first pose.
 struct Floor {

@@ -7,31 +7,13 @@
 #include <string>
 #include <vector>
 
+#include "motion_refinement.hpp"
+#include "pose_problem.hpp"
+#include "sample_consensus.hpp"
 #include "stereo_descriptor_vo/common/options.hpp"
-#include "stereo_descriptor_vo/motion/motion_refinement.hpp"
-#include "stereo_descriptor_vo/motion/pose_problem.hpp"
-#include "stereo_descriptor_vo/motion/sample_consensus.hpp"
+#include "stereo_descriptor_vo/options/visual_odometry_options.hpp"
 
 namespace sdvo {
-
-struct MotionEstimatorOptions : SampleConsensusOptions, MotionRefinementOptions {
-  int min_inliers = 12;
-
-  void describe(OptionList& list) {
-    SampleConsensusOptions::describe(list);
-    list.add("min_inliers", min_inliers, {4, 10000}, "", "fewer are no motion");
-  }
-
-  /// For measurements with this noise.
-  void assume(const NoiseOptions& noise) { inlier_threshold = noise.inlierGate(), kernel_scale = noise.length(); }
-
-  /// With the thresholds multiplied by `noise`.
-  MotionEstimatorOptions scaled(double noise) const {
-    MotionEstimatorOptions options = *this;
-    options.inlier_threshold *= noise, options.kernel_scale *= noise;
-    return options;
-  }
-};
 
 struct MotionEstimate {
   bool success = false;

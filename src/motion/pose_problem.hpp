@@ -6,10 +6,10 @@
 #include <optional>
 #include <vector>
 
+#include "correspondence_arrays.hpp"
 #include "stereo_descriptor_vo/common/se3.hpp"
 #include "stereo_descriptor_vo/common/stereo_camera.hpp"
-#include "stereo_descriptor_vo/motion/correspondence_arrays.hpp"
-#include "stereo_descriptor_vo/motion/three_point_pose.hpp"
+#include "three_point_pose.hpp"
 
 namespace sdvo {
 
