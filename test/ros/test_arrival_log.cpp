@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "../../src/ros/arrival_log.hpp"
 #include "../../src/ros/synchronisers.hpp"
 #include "../said.hpp"

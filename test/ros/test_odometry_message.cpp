@@ -2,6 +2,7 @@
 #include <tf2/LinearMath/Quaternion.h>
 
 #include <Eigen/Eigenvalues>
+#include <random>
 
 #include "message_samples.hpp"
 
