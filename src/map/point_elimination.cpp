@@ -1,8 +1,10 @@
 #include "point_elimination.hpp"
 
-#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 
+#include "../common/kernel.hpp"
 #include "map_point.hpp"
 
 namespace sdvo {
@@ -33,44 +35,180 @@ struct WindowResidual {
   bool isInFront() const { return P.z() >= kNearestScaled; }
 };
 
-/// Derivatives of the prediction, divided by the noise.
-struct WindowJacobians {
-  Eigen::Matrix3d by_place;  ///< by P at constant rho
-  Eigen::Matrix3d by_point;
-  Vector6d disparity_by_pose;
+/// An observation's derivatives by its pose, divided by the noise and times the root of its weight: a column for each
+/// number of the measurement.
+struct WeightedJacobians {
+  double by_pose[3][kFactorRows] = {};
+  double by_point[3][3];  ///< a row for each number of the measurement
 
-  WindowJacobians(const WindowProjection& projection, const ObservedPoint& point, const WindowResidual& at,
-                  const Eigen::Isometry3d& T) {
-    const double rho = point.ray_and_inverse_depth.z(), iz = 1.0 / at.P.z();
-    const double a = projection.camera.fx * iz * at.inverse_noise.x();
-    const double b = projection.camera.fy * iz * at.inverse_noise.y();
-    const double c = projection.camera.fx * projection.camera.baseline * iz * at.inverse_noise.z(), d = c * rho * iz;
-    const double x = at.P.x() * iz, y = at.P.y() * iz;
-    by_place << a, 0.0, -a * x, 0.0, b, -b * y, 0.0, 0.0, -d;
-    const auto byDirection = [&](const auto& v) {
-      return Eigen::Vector3d(a * (v.x() - x * v.z()), b * (v.y() - y * v.z()), -d * v.z());
-    };
-    by_point << byDirection(T.linear().col(0)), byDirection(T.linear().col(1)), byDirection(T.translation());
-    by_point(2, 2) += c;
-    disparity_by_pose << 0.0, 0.0, -rho * d, -d * at.P.y(), d * at.P.x(), 0.0;
+  SDVO_IN_KERNEL WeightedJacobians(const WindowProjection& projection, double rho, const WindowResidual& at,
+                                   const Eigen::Isometry3d& T, double root) {
+    const double *P = at.P.data(), *R = T.matrix().data(), iz = 1.0 / P[2];  // of T four rows, column by column
+    const double a = root * projection.camera.fx * iz * at.inverse_noise[0];
+    const double b = root * projection.camera.fy * iz * at.inverse_noise[1];
+    const double c = root * projection.camera.fx * projection.camera.baseline * iz * at.inverse_noise[2];
+    const double d = c * rho * iz, x = P[0] * iz, y = P[1] * iz;
+    // The rows by P at constant rho are (a, 0, -a x), (0, b, -b y) and (0, 0, -d). A perturbation (t, w) of the pose
+    // moves P by rho t + w x P.
+    double *u = by_pose[0], *v = by_pose[1], *disparity = by_pose[2];
+    u[0] = rho * a, u[2] = -rho * a * x, u[3] = -a * x * P[1], u[4] = a * (P[2] + x * P[0]), u[5] = -a * P[1];
+    v[1] = rho * b, v[2] = -rho * b * y, v[3] = -b * (P[2] + y * P[1]), v[4] = b * y * P[0], v[5] = b * P[0];
+    disparity[2] = -rho * d, disparity[3] = -d * P[1], disparity[4] = d * P[0];
+    constexpr int kColumns[] = {0, 4, 12};  // the ray's x and y turn with the camera, the inverse depth moves with it
+    for (int k = 0; k < 3; ++k) {
+      const double* moved = R + kColumns[k];
+      by_point[0][k] = a * (moved[0] - x * moved[2]);
+      by_point[1][k] = b * (moved[1] - y * moved[2]);
+      by_point[2][k] = -d * moved[2];
+    }
+    by_point[2][2] += c;
   }
 };
 
-/// From columns of derivatives by P to those by the pose: a perturbation (t, w) of it moves P by rho t + w x P.
-template <int kColumns>
-void toPose(double rho, const Eigen::Vector3d& P, const Eigen::Matrix<double, 3, kColumns>& by_place,
-            Eigen::Matrix<double, 6, kColumns>& by_pose) {
-  by_pose.template topRows<3>() = rho * by_place;
-  for (int k = 0; k < kColumns; ++k) by_pose.col(k).template tail<3>() = P.cross(by_place.col(k));
+/// block += a b^T for blocks of six columns, each with kRows rows, which lie in memory one after the other.
+template <int kRows, int kTerms>
+SDVO_IN_KERNEL void addProduct(const double* a, const double* b, double* block) {
+  constexpr int kLanes = 4;
+  for (int row = 0; row < kRows; row += kLanes) {
+    DoubleLanes of_a[kTerms];
+    for (int m = 0; m < kTerms; ++m) load(a + kRows * m + row, of_a[m]);
+    for (int k = 0; k < 6; ++k) {
+      DoubleLanes sum;
+      load(block + kRows * k + row, sum);
+      for (int m = 0; m < kTerms; ++m) sum += of_a[m] * b[kFactorRows * m + k];
+      store(sum, block + kRows * k + row);
+    }
+  }
 }
 
-/// block -= a b^T. Column by column: so a compiler keeps `a` in registers.
-template <class Block>
-void subtractProduct(const Eigen::Matrix<double, 6, 3>& a, const Eigen::Matrix<double, 6, 3>& b, Block&& block) {
-  for (int k = 0; k < 6; ++k) block.col(k) -= a.col(0) * b(k, 0) + a.col(1) * b(k, 1) + a.col(2) * b(k, 2);
+/// Columns of kFactorRows numbers times a 3x3 matrix that is given row by row.
+SDVO_IN_KERNEL void multiply(const double* columns, const double (&matrix)[3][3], double* products) {
+  for (int row = 0; row < kFactorRows; row += 4) {
+    DoubleLanes a, b, c;
+    load(columns + row, a), load(columns + kFactorRows + row, b), load(columns + 2 * kFactorRows + row, c);
+    for (int k = 0; k < 3; ++k)
+      store(a * matrix[0][k] + b * matrix[1][k] + c * matrix[2][k], products + kFactorRows * k + row);
+  }
+}
+
+/// Columns of kFactorRows numbers times a vector, added to the first six sums.
+SDVO_IN_KERNEL void addTimes(const double* columns, const double* vector, double* sums) {
+  for (int row = 0; row < 6; ++row)
+    sums[row] +=
+        columns[row] * vector[0] + columns[kFactorRows + row] * vector[1] + columns[2 * kFactorRows + row] * vector[2];
+}
+
+/// Inverse of the Cholesky factor of a matrix, of which the lower triangle is given. What rounding makes smaller than
+/// `least` becomes that.
+SDVO_IN_KERNEL void invertRoot(const double (&H)[3][3], const double (&least)[3], double (&R)[3][3]) {
+  R[0][1] = R[0][2] = R[1][2] = 0.0;
+  R[0][0] = 1.0 / std::sqrt(std::max(H[0][0], least[0]));
+  const double l10 = H[1][0] * R[0][0], l20 = H[2][0] * R[0][0];
+  R[1][1] = 1.0 / std::sqrt(std::max(H[1][1] - l10 * l10, least[1]));
+  const double l21 = (H[2][1] - l20 * l10) * R[1][1];
+  R[2][2] = 1.0 / std::sqrt(std::max(H[2][2] - l20 * l20 - l21 * l21, least[2]));
+  R[1][0] = -l10 * R[0][0] * R[1][1];
+  R[2][1] = -l21 * R[1][1] * R[2][2];
+  R[2][0] = -(l20 * R[0][0] + l21 * R[1][0]) * R[2][2];
 }
 
 }  // namespace
+
+/// PoseEquations::add() as a kernel.
+struct AddPoint {
+  SDVO_IN_KERNEL static void run(const WindowProjection* projection, const ObservedPoint* point,
+                                 const Linearisation* linearisation, PoseEquations* equations, PoseFactor* factors,
+                                 double* squares, EliminatedPoint* result) {
+    constexpr double kLeastInformation = 1e-9;  // keeps H invertible if no observation constrains a direction
+    const double rho = point->ray_and_inverse_depth.z();
+    double H[3][3] = {}, g[3] = {}, by_calibration[3][3] = {}, of_calibration[3] = {};
+    double weight = 0.0, disparity_residual = 0.0, disparity_by_point[3] = {};
+    int observations = 0, count = 0;
+    for (int i = 0; i < point->count; ++i) {
+      const WindowObservation& seen = point->observations[i];
+      const WindowResidual at(*projection, *point, seen);
+      squares[i] = at.square;
+      if (!at.isInFront()) continue;
+      const double w = linearisation->bend / (linearisation->bend + at.square), root = std::sqrt(w);
+      const WeightedJacobians J(*projection, rho, at, point->T_camera_anchor[seen.frame], root);
+      const double residual[3] = {root * at.value[0], root * at.value[1], root * at.value[2]};
+      double shape[4] = {};  // changes disparities alone
+      for (int k = 0; k < kCalibration; ++k) shape[k] = root * at.inverse_noise[2] * at.shape[k];
+      for (int k = 0; k < 3; ++k) {
+        for (int m = 0; m < 3; ++m) {
+          for (int l = 0; l <= k; ++l) H[k][l] += J.by_point[m][k] * J.by_point[m][l];
+          g[k] += J.by_point[m][k] * residual[m];
+        }
+        for (int l = 0; l < 3; ++l) by_calibration[k][l] += J.by_point[2][k] * shape[l];
+        of_calibration[k] += shape[k] * residual[2];
+        disparity_by_point[k] += root * J.by_point[2][k];
+      }
+      for (int k = 0; k < kCalibration; ++k)
+        for (int l = 0; l <= k; ++l) equations->of_calibration_(k, l) += shape[k] * shape[l];
+      weight += w;
+      disparity_residual += root * residual[2];
+      ++observations;
+      if (seen.frame == 0) continue;
+      PoseFactor& factor = factors[count++];
+      factor.pose = seen.frame - 1;
+      multiply(J.by_pose[0], J.by_point, factor.Y.data());
+      factor.gradient.setZero();
+      addTimes(J.by_pose[0], residual, factor.gradient.data());
+      addProduct<kFactorRows, 3>(J.by_pose[0], J.by_pose[0], equations->ofPoses(factor.pose, factor.pose));
+      addProduct<4, 1>(shape, J.by_pose[2], equations->of_both_[factor.pose].values);
+    }
+
+    const double baseline = projection->camera.baseline;
+    const double least[3] = {kLeastInformation, kLeastInformation, kLeastInformation * baseline * baseline};
+    for (int k = 0; k < 3; ++k) H[k][k] = H[k][k] * (1.0 + linearisation->damping) + least[k];
+    double R[3][3];
+    invertRoot(H, least, R);
+    const double transposed[3][3] = {{R[0][0], R[1][0], R[2][0]}, {0.0, R[1][1], R[2][1]}, {0.0, 0.0, R[2][2]}};
+    double reduced[3], reduced_calibration[3][4] = {}, negative_calibration[3][4] = {};
+    for (int k = 0; k < 3; ++k) {
+      reduced[k] = R[k][0] * g[0] + R[k][1] * g[1] + R[k][2] * g[2];
+      for (int l = 0; l < 3; ++l) {
+        reduced_calibration[k][l] =
+            R[k][0] * by_calibration[0][l] + R[k][1] * by_calibration[1][l] + R[k][2] * by_calibration[2][l];
+        negative_calibration[k][l] = -reduced_calibration[k][l];
+      }
+    }
+    const double negative[3] = {-reduced[0], -reduced[1], -reduced[2]};
+    for (int l = 0; l < kCalibration; ++l)
+      for (int k = 0; k < 3; ++k) of_calibration[l] -= reduced_calibration[k][l] * reduced[k];
+
+    for (int k = 0; k < count; ++k) {
+      PoseFactor& factor = factors[k];
+      double* Y = factor.Y.data();
+      multiply(Y, transposed, Y);
+      addTimes(Y, negative, factor.gradient.data());
+      double opposite[3 * kFactorRows];
+      for (int i = 0; i < 3 * kFactorRows; ++i) opposite[i] = -Y[i];
+      for (int other = 0; other <= k; ++other)
+        addProduct<kFactorRows, 3>(opposite, factors[other].Y.data(),
+                                   equations->ofPoses(factor.pose, factors[other].pose));
+      addProduct<4, 3>(negative_calibration[0], Y, equations->of_both_[factor.pose].values);
+      for (int i = 0; i < 6; ++i) equations->gradient_[6 * factor.pose + i] += factor.gradient[i];
+    }
+    const Eigen::Index tail = equations->gradient_.size() - kCalibration;
+    for (int k = 0; k < kCalibration; ++k) {
+      equations->gradient_[tail + k] += of_calibration[k];
+      for (int l = 0; l <= k; ++l)
+        for (int m = 0; m < 3; ++m)
+          equations->of_calibration_(k, l) -= reduced_calibration[m][k] * reduced_calibration[m][l];
+    }
+
+    *result = {};
+    for (int k = 0; k < 3; ++k) {
+      for (int l = 0; l < 3; ++l) result->R(k, l) = R[k][l], result->by_calibration(l, k) = reduced_calibration[k][l];
+      result->gradient[k] = reduced[k];
+      result->calibration_gradient[k] = of_calibration[k];
+      result->disparity_by_point[k] = disparity_by_point[k];
+    }
+    result->factors = count, result->observations = observations;
+    result->weight = weight, result->disparity_residual = disparity_residual;
+  }
+};
 
 void squareResiduals(const WindowProjection& projection, const ObservedPoint& point, double* squares) {
   for (int i = 0; i < point.count; ++i) squares[i] = WindowResidual(projection, point, point.observations[i]).square;
@@ -83,83 +221,38 @@ void movePoints(const std::vector<EliminatedPoint>& points, const std::vector<Po
   for (std::size_t p = 0; p < points.size(); ++p) {
     Eigen::Vector3d rest = points[p].gradient - points[p].by_calibration.transpose() * calibration_step;
     for (const PoseFactor* end = factor + points[p].factors; factor != end; ++factor)
-      rest.noalias() -= factor->Y.transpose() * pose_steps.segment<6>(6 * factor->pose);
+      rest.noalias() -= factor->Y.topRows<6>().transpose() * pose_steps.segment<6>(6 * factor->pose);
     ray_and_inverse_depth[p].noalias() += points[p].R.transpose() * rest;
   }
 }
 
 void PoseEquations::setZero(int poses) {
-  hessian.setZero(6 * poses + kCalibration, 6 * poses + kCalibration);
-  gradient.setZero(6 * poses + kCalibration);
+  of_poses_.assign(static_cast<std::size_t>(poses * (poses + 1) / 2), {});
+  of_both_.assign(static_cast<std::size_t>(poses), {});
+  of_calibration_.setZero();
+  gradient_.setZero(6 * poses + kCalibration);
 }
 
 EliminatedPoint PoseEquations::add(const WindowProjection& projection, const ObservedPoint& point,
                                    const Linearisation& linearisation, PoseFactor* factors, double* squares) {
-  constexpr double kLeastInformation = 1e-9;  // keeps H invertible if no observation constrains a direction
-  const Eigen::Index calibration = hessian.rows() - kCalibration;
-  Eigen::Matrix3d H = Eigen::Matrix3d::Zero();
-  Eigen::Vector3d g = Eigen::Vector3d::Zero();
   EliminatedPoint result;
-  result.by_calibration.setZero();
-  result.calibration_gradient.setZero();
-  result.disparity_by_point.setZero();
-  result.weight = result.disparity_residual = 0.0;
-  result.observations = result.factors = 0;
-  for (int i = 0; i < point.count; ++i) {
-    const WindowObservation& seen = point.observations[i];
-    const WindowResidual at(projection, point, seen);
-    squares[i] = at.square;
-    if (!at.isInFront()) continue;
-    const double w = linearisation.bend / (linearisation.bend + at.square);
-    const WindowJacobians J(projection, point, at, point.T_camera_anchor[seen.frame]);
-    const RigCalibration::RowVector weighted_shape = w * at.inverse_noise.z() * at.shape;  // changes disparities alone
-    const Eigen::Matrix3d weighted = w * J.by_point;
-    H.noalias() += weighted.transpose() * J.by_point;
-    g.noalias() += weighted.transpose() * at.value;
-    result.by_calibration.noalias() += weighted_shape.transpose() * J.by_point.row(2);
-    result.calibration_gradient += weighted_shape.transpose() * at.value.z();
-    hessian.bottomRightCorner<kCalibration, kCalibration>() +=
-        at.inverse_noise.z() * at.shape.transpose() * weighted_shape;
-    result.weight += w;
-    result.disparity_residual += w * at.value.z();
-    result.disparity_by_point += weighted.row(2).transpose();
-    ++result.observations;
-    if (seen.frame == 0) continue;
-    PoseFactor& factor = factors[result.factors++];
-    factor.pose = seen.frame - 1;
-    const double rho = point.ray_and_inverse_depth.z();
-    const Eigen::Matrix3d weighted_place = w * J.by_place.transpose();
-    toPose<3>(rho, at.P, weighted_place.lazyProduct(J.by_point), factor.Y);
-    toPose<1>(rho, at.P, weighted_place.lazyProduct(at.value), factor.gradient);
-    Eigen::Matrix<double, 6, 3> by_both;
-    toPose<3>(rho, at.P, weighted_place.lazyProduct(J.by_place), by_both);
-    auto of_pose = hessian.block<6, 6>(6 * factor.pose, 6 * factor.pose);
-    of_pose.leftCols<3>() += rho * by_both;
-    for (int k = 3; k < 6; ++k) of_pose.block<1, 3>(k, 3) += at.P.cross(by_both.row(k)).transpose();
-    hessian.block<kCalibration, 6>(calibration, 6 * factor.pose).noalias() +=
-        weighted_shape.transpose() * J.disparity_by_pose.transpose();
-  }
-
-  const Eigen::Vector3d unit(1.0, 1.0, projection.camera.baseline * projection.camera.baseline);
-  H.diagonal() = H.diagonal() * (1.0 + linearisation.damping) + kLeastInformation * unit;
-  const Eigen::LLT<Eigen::Matrix3d> root(H);
-  result.R = root.matrixL().solve(Eigen::Matrix3d::Identity());
-  result.gradient = result.R * g;
-  result.by_calibration = (result.by_calibration * result.R.transpose()).eval();
-  result.calibration_gradient -= result.by_calibration * result.gradient;
-  for (int k = 0; k < result.factors; ++k) {
-    PoseFactor& factor = factors[k];
-    factor.Y = (factor.Y * result.R.transpose()).eval();
-    factor.gradient.noalias() -= factor.Y * result.gradient;
-    gradient.segment<6>(6 * factor.pose) += factor.gradient;
-    hessian.block<kCalibration, 6>(calibration, 6 * factor.pose).noalias() -=
-        result.by_calibration * factor.Y.transpose();
-    for (int other = 0; other <= k; ++other)
-      subtractProduct(factor.Y, factors[other].Y, hessian.block<6, 6>(6 * factor.pose, 6 * factors[other].pose));
-  }
-  hessian.bottomRightCorner<kCalibration, kCalibration>() -= result.by_calibration * result.by_calibration.transpose();
-  gradient.tail<kCalibration>() += result.calibration_gradient;
+  runKernel<AddPoint>(&projection, &point, &linearisation, this, factors, squares, &result);
   return result;
+}
+
+void PoseEquations::writeHessian(Eigen::MatrixXd& hessian) const {
+  const Eigen::Index poses = static_cast<Eigen::Index>(of_both_.size());
+  hessian.setZero(gradient_.size(), gradient_.size());
+  const PoseBlock* block = of_poses_.data();
+  for (Eigen::Index row = 0; row < poses; ++row)
+    for (Eigen::Index column = 0; column <= row; ++column, ++block)
+      hessian.block<6, 6>(6 * row, 6 * column) =
+          Eigen::Map<const Eigen::Matrix<double, kFactorRows, 6>>(block->values).topRows<6>();
+  for (Eigen::Index pose = 0; pose < poses; ++pose)
+    hessian.block<kCalibration, 6>(6 * poses, 6 * pose) =
+        Eigen::Map<const Eigen::Matrix<double, 4, 6>>(of_both_[static_cast<std::size_t>(pose)].values)
+            .topRows<kCalibration>();
+  hessian.bottomRightCorner<kCalibration, kCalibration>() = of_calibration_;
 }
 
 }  // namespace sdvo

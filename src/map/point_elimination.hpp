@@ -33,11 +33,14 @@ constexpr double kBehindSquare = 1e4;
 /// Squares of the observations' normalised residuals; kBehindSquare where the point is not in front of the camera.
 void squareResiduals(const WindowProjection& projection, const ObservedPoint& point, double* squares);
 
+/// Rows of a factor: six, and two of zeros, so that they fill registers.
+constexpr int kFactorRows = 8;
+
 /// An observation's entries in the normal equations, by its pose (left perturbation: m, rad).
 struct PoseFactor {
-  Eigen::Matrix<double, 6, 3> Y;  ///< J_pose^T W J_point R^T: products of these are the Schur complement
-  Vector6d gradient;              ///< its share of the reduced gradient
-  int pose;                       ///< among the poses that may move, from zero on
+  Eigen::Matrix<double, kFactorRows, 3> Y;  ///< J_pose^T W J_point R^T: products of these are the Schur complement
+  Vector6d gradient;                        ///< its share of the reduced gradient
+  int pose;                                 ///< among the poses that may move, from zero on
 };
 
 /// A point's 3x3 normal equations H x = g, factored as H = L L^T with R = L^-1. `by_calibration` is the block of the
@@ -69,16 +72,38 @@ void movePoints(const std::vector<EliminatedPoint>& points, const std::vector<Po
                 std::vector<Eigen::Vector3d>& ray_and_inverse_depth);
 
 /// Reduced normal equations of all poses of a window but the first, and of the rig's calibration.
-struct PoseEquations {
-  Eigen::MatrixXd hessian;   ///< lower triangle: the poses by their left perturbations (m, rad), then the calibration
-  Eigen::VectorXd gradient;  ///< in the same order
-
+class PoseEquations {
+ public:
   void setZero(int poses);
 
   /// Adds a point's observations with the point eliminated (Schur complement). Writes a factor for each observation
-  /// from a pose that may move, and the same squares as squareResiduals().
+  /// from a pose that may move, and the same squares as squareResiduals(). Observations are in the order of their
+  /// frames.
   EliminatedPoint add(const WindowProjection& projection, const ObservedPoint& point,
                       const Linearisation& linearisation, PoseFactor* factors, double* squares);
+
+  /// The lower triangle of the matrix: the poses by their left perturbations (m, rad), then the calibration.
+  void writeHessian(Eigen::MatrixXd& hessian) const;
+  const Eigen::VectorXd& gradient() const { return gradient_; }  ///< in the same order
+
+ private:
+  friend struct AddPoint;
+  /// Column by column, contiguous. Rows beyond the sixth, or beyond the calibration's, are not used.
+  struct PoseBlock {
+    double values[6 * kFactorRows];
+  };
+  struct CalibrationBlock {
+    double values[6 * 4];
+  };
+
+  double* ofPoses(int row, int column) {
+    return of_poses_[static_cast<std::size_t>(row * (row + 1) / 2 + column)].values;
+  }
+
+  std::vector<PoseBlock> of_poses_;        ///< lower triangle, row by row
+  std::vector<CalibrationBlock> of_both_;  ///< calibration and each pose
+  RigCalibration::Matrix of_calibration_;
+  Eigen::VectorXd gradient_;
 };
 
 }  // namespace sdvo

@@ -140,8 +140,8 @@ class WindowOptimizer::Solver {
                                   linearised_squares_.data() + first_of_point_[p]);
       factors += points_[p].factors;
     }
-    hessian_ = equations_.hessian;
-    gradient_ = equations_.gradient;
+    equations_.writeHessian(hessian_);
+    gradient_ = equations_.gradient();
     addPriors(hessian_, gradient_);
     cost_ = costOf(estimate_, linearised_squares_);
   }
@@ -205,7 +205,8 @@ class WindowOptimizer::Solver {
     known_.setZero(size, size);  // information of the priors, without the points'
     addPriors(known_, gradient_);
     const auto [bread, meat] = sandwichScale();
-    hessian_ = bread * equations_.hessian + known_;
+    equations_.writeHessian(hessian_);
+    hessian_ = bread * hessian_ + known_;
     factor_.compute(hessian_);
     if (factor_.info() != Eigen::Success) return false;
 
