@@ -35,11 +35,13 @@ struct WindowResidual {
   bool isInFront() const { return P.z() >= kNearestScaled; }
 };
 
+constexpr int kLanes = 4;
+
 /// An observation's derivatives by its pose, divided by the noise and times the root of its weight: a column for each
 /// number of the measurement.
 struct WeightedJacobians {
   double by_pose[3][kFactorRows] = {};
-  double by_point[3][3];  ///< a row for each number of the measurement
+  double by_point[3][kLanes] = {};  ///< a row for each number of the measurement, and a zero
 
   SDVO_IN_KERNEL WeightedJacobians(const WindowProjection& projection, double rho, const WindowResidual& at,
                                    const Eigen::Isometry3d& T, double root) {
@@ -65,25 +67,27 @@ struct WeightedJacobians {
   }
 };
 
-/// block += a b^T for blocks of six columns, each with kRows rows, which lie in memory one after the other.
-template <int kRows, int kTerms>
+/// block += sign a b^T for blocks of six columns, each with kRows rows, which lie in memory one after the other.
+template <int kRows, int kTerms, int kSign>
 SDVO_IN_KERNEL void addProduct(const double* a, const double* b, double* block) {
-  constexpr int kLanes = 4;
   for (int row = 0; row < kRows; row += kLanes) {
     DoubleLanes of_a[kTerms];
     for (int m = 0; m < kTerms; ++m) load(a + kRows * m + row, of_a[m]);
     for (int k = 0; k < 6; ++k) {
       DoubleLanes sum;
       load(block + kRows * k + row, sum);
-      for (int m = 0; m < kTerms; ++m) sum += of_a[m] * b[kFactorRows * m + k];
+      for (int m = 0; m < kTerms; ++m) {
+        const DoubleLanes product = of_a[m] * b[kFactorRows * m + k];
+        sum = kSign > 0 ? sum + product : sum - product;
+      }
       store(sum, block + kRows * k + row);
     }
   }
 }
 
 /// Columns of kFactorRows numbers times a 3x3 matrix that is given row by row.
-SDVO_IN_KERNEL void multiply(const double* columns, const double (&matrix)[3][3], double* products) {
-  for (int row = 0; row < kFactorRows; row += 4) {
+SDVO_IN_KERNEL void multiply(const double* columns, const double (&matrix)[3][kLanes], double* products) {
+  for (int row = 0; row < kFactorRows; row += kLanes) {
     DoubleLanes a, b, c;
     load(columns + row, a), load(columns + kFactorRows + row, b), load(columns + 2 * kFactorRows + row, c);
     for (int k = 0; k < 3; ++k)
@@ -91,16 +95,21 @@ SDVO_IN_KERNEL void multiply(const double* columns, const double (&matrix)[3][3]
   }
 }
 
-/// Columns of kFactorRows numbers times a vector, added to the first six sums.
+/// sums += sign times columns of kFactorRows numbers times a vector.
+template <int kSign>
 SDVO_IN_KERNEL void addTimes(const double* columns, const double* vector, double* sums) {
-  for (int row = 0; row < 6; ++row)
-    sums[row] +=
-        columns[row] * vector[0] + columns[kFactorRows + row] * vector[1] + columns[2 * kFactorRows + row] * vector[2];
+  for (int row = 0; row < kFactorRows; row += kLanes) {
+    DoubleLanes sum, a, b, c;
+    load(sums + row, sum);
+    load(columns + row, a), load(columns + kFactorRows + row, b), load(columns + 2 * kFactorRows + row, c);
+    const DoubleLanes product = a * vector[0] + b * vector[1] + c * vector[2];
+    store(kSign > 0 ? sum + product : sum - product, sums + row);
+  }
 }
 
 /// Inverse of the Cholesky factor of a matrix, of which the lower triangle is given. What rounding makes smaller than
 /// `least` becomes that.
-SDVO_IN_KERNEL void invertRoot(const double (&H)[3][3], const double (&least)[3], double (&R)[3][3]) {
+SDVO_IN_KERNEL void invertRoot(const double (&H)[3][kLanes], const double (&least)[3], double (&R)[3][3]) {
   R[0][1] = R[0][2] = R[1][2] = 0.0;
   R[0][0] = 1.0 / std::sqrt(std::max(H[0][0], least[0]));
   const double l10 = H[1][0] * R[0][0], l20 = H[2][0] * R[0][0];
@@ -121,8 +130,9 @@ struct AddPoint {
                                  double* squares, EliminatedPoint* result) {
     constexpr double kLeastInformation = 1e-9;  // keeps H invertible if no observation constrains a direction
     const double rho = point->ray_and_inverse_depth.z();
-    double H[3][3] = {}, g[3] = {}, by_calibration[3][3] = {}, of_calibration[3] = {};
-    double weight = 0.0, disparity_residual = 0.0, disparity_by_point[3] = {};
+    // Sums over the observations: a lane for each number of the point, or of the calibration.
+    DoubleLanes of_H[3] = {}, of_g = {}, of_both[3] = {}, of_disparity = {}, of_shapes[3] = {}, of_shape = {};
+    double weight = 0.0, disparity_residual = 0.0;
     int observations = 0, count = 0;
     for (int i = 0; i < point->count; ++i) {
       const WindowObservation& seen = point->observations[i];
@@ -132,19 +142,19 @@ struct AddPoint {
       const double w = linearisation->bend / (linearisation->bend + at.square), root = std::sqrt(w);
       const WeightedJacobians J(*projection, rho, at, point->T_camera_anchor[seen.frame], root);
       const double residual[3] = {root * at.value[0], root * at.value[1], root * at.value[2]};
-      double shape[4] = {};  // changes disparities alone
+      double shape[kLanes] = {};  // changes disparities alone
       for (int k = 0; k < kCalibration; ++k) shape[k] = root * at.inverse_noise[2] * at.shape[k];
+      DoubleLanes row[3], shapes;
+      for (int m = 0; m < 3; ++m) load(J.by_point[m], row[m]);
+      load(shape, shapes);
       for (int k = 0; k < 3; ++k) {
-        for (int m = 0; m < 3; ++m) {
-          for (int l = 0; l <= k; ++l) H[k][l] += J.by_point[m][k] * J.by_point[m][l];
-          g[k] += J.by_point[m][k] * residual[m];
-        }
-        for (int l = 0; l < 3; ++l) by_calibration[k][l] += J.by_point[2][k] * shape[l];
-        of_calibration[k] += shape[k] * residual[2];
-        disparity_by_point[k] += root * J.by_point[2][k];
+        for (int m = 0; m < 3; ++m) of_H[k] += row[m] * J.by_point[m][k];
+        of_g += row[k] * residual[k];
+        of_both[k] += shapes * J.by_point[2][k];
+        of_shapes[k] += shapes * shape[k];
       }
-      for (int k = 0; k < kCalibration; ++k)
-        for (int l = 0; l <= k; ++l) equations->of_calibration_(k, l) += shape[k] * shape[l];
+      of_shape += shapes * residual[2];
+      of_disparity += row[2] * root;
       weight += w;
       disparity_residual += root * residual[2];
       ++observations;
@@ -153,49 +163,49 @@ struct AddPoint {
       factor.pose = seen.frame - 1;
       multiply(J.by_pose[0], J.by_point, factor.Y.data());
       factor.gradient.setZero();
-      addTimes(J.by_pose[0], residual, factor.gradient.data());
-      addProduct<kFactorRows, 3>(J.by_pose[0], J.by_pose[0], equations->ofPoses(factor.pose, factor.pose));
-      addProduct<4, 1>(shape, J.by_pose[2], equations->of_both_[factor.pose].values);
+      addTimes<1>(J.by_pose[0], residual, factor.gradient.data());
+      addProduct<kFactorRows, 3, 1>(J.by_pose[0], J.by_pose[0], equations->ofPoses(factor.pose, factor.pose));
+      addProduct<kLanes, 1, 1>(shape, J.by_pose[2], equations->of_both_[factor.pose].values);
     }
+    double H[3][kLanes], g[kLanes], by_calibration[3][kLanes], of_calibration[kLanes], disparity_by_point[kLanes];
+    double calibration[3][kLanes];
+    for (int k = 0; k < 3; ++k)
+      store(of_H[k], H[k]), store(of_both[k], by_calibration[k]), store(of_shapes[k], calibration[k]);
+    store(of_g, g), store(of_shape, of_calibration), store(of_disparity, disparity_by_point);
 
     const double baseline = projection->camera.baseline;
     const double least[3] = {kLeastInformation, kLeastInformation, kLeastInformation * baseline * baseline};
     for (int k = 0; k < 3; ++k) H[k][k] = H[k][k] * (1.0 + linearisation->damping) + least[k];
     double R[3][3];
     invertRoot(H, least, R);
-    const double transposed[3][3] = {{R[0][0], R[1][0], R[2][0]}, {0.0, R[1][1], R[2][1]}, {0.0, 0.0, R[2][2]}};
-    double reduced[3], reduced_calibration[3][4] = {}, negative_calibration[3][4] = {};
+    const double transposed[3][kLanes] = {{R[0][0], R[1][0], R[2][0]}, {0.0, R[1][1], R[2][1]}, {0.0, 0.0, R[2][2]}};
+    double reduced[3], reduced_calibration[3][kLanes] = {};
     for (int k = 0; k < 3; ++k) {
       reduced[k] = R[k][0] * g[0] + R[k][1] * g[1] + R[k][2] * g[2];
-      for (int l = 0; l < 3; ++l) {
+      for (int l = 0; l < kCalibration; ++l)
         reduced_calibration[k][l] =
             R[k][0] * by_calibration[0][l] + R[k][1] * by_calibration[1][l] + R[k][2] * by_calibration[2][l];
-        negative_calibration[k][l] = -reduced_calibration[k][l];
-      }
     }
-    const double negative[3] = {-reduced[0], -reduced[1], -reduced[2]};
-    for (int l = 0; l < kCalibration; ++l)
-      for (int k = 0; k < 3; ++k) of_calibration[l] -= reduced_calibration[k][l] * reduced[k];
+    const Eigen::Index tail = equations->gradient_.size() - kCalibration;
+    for (int k = 0; k < kCalibration; ++k) {
+      for (int m = 0; m < 3; ++m) {
+        of_calibration[k] -= reduced_calibration[m][k] * reduced[m];
+        for (int l = 0; l <= k; ++l) calibration[k][l] -= reduced_calibration[m][k] * reduced_calibration[m][l];
+      }
+      equations->gradient_[tail + k] += of_calibration[k];
+      for (int l = 0; l <= k; ++l) equations->of_calibration_(k, l) += calibration[k][l];
+    }
 
     for (int k = 0; k < count; ++k) {
       PoseFactor& factor = factors[k];
       double* Y = factor.Y.data();
       multiply(Y, transposed, Y);
-      addTimes(Y, negative, factor.gradient.data());
-      double opposite[3 * kFactorRows];
-      for (int i = 0; i < 3 * kFactorRows; ++i) opposite[i] = -Y[i];
+      addTimes<-1>(Y, reduced, factor.gradient.data());
       for (int other = 0; other <= k; ++other)
-        addProduct<kFactorRows, 3>(opposite, factors[other].Y.data(),
-                                   equations->ofPoses(factor.pose, factors[other].pose));
-      addProduct<4, 3>(negative_calibration[0], Y, equations->of_both_[factor.pose].values);
+        addProduct<kFactorRows, 3, -1>(Y, factors[other].Y.data(),
+                                       equations->ofPoses(factor.pose, factors[other].pose));
+      addProduct<kLanes, 3, -1>(reduced_calibration[0], Y, equations->of_both_[factor.pose].values);
       for (int i = 0; i < 6; ++i) equations->gradient_[6 * factor.pose + i] += factor.gradient[i];
-    }
-    const Eigen::Index tail = equations->gradient_.size() - kCalibration;
-    for (int k = 0; k < kCalibration; ++k) {
-      equations->gradient_[tail + k] += of_calibration[k];
-      for (int l = 0; l <= k; ++l)
-        for (int m = 0; m < 3; ++m)
-          equations->of_calibration_(k, l) -= reduced_calibration[m][k] * reduced_calibration[m][l];
     }
 
     *result = {};

@@ -39,8 +39,8 @@ constexpr int kFactorRows = 8;
 /// An observation's entries in the normal equations, by its pose (left perturbation: m, rad).
 struct PoseFactor {
   Eigen::Matrix<double, kFactorRows, 3> Y;  ///< J_pose^T W J_point R^T: products of these are the Schur complement
-  Vector6d gradient;                        ///< its share of the reduced gradient
-  int pose;                                 ///< among the poses that may move, from zero on
+  Eigen::Matrix<double, kFactorRows, 1> gradient;  ///< its share of the reduced gradient
+  int pose;                                        ///< among the poses that may move, from zero on
 };
 
 /// A point's 3x3 normal equations H x = g, factored as H = L L^T with R = L^-1. `by_calibration` is the block of the

@@ -280,7 +280,7 @@ class WindowOptimizer::Solver {
       const EliminatedPoint& point = points_[p];
       Vector6d moved = by.rightCols<kCalibration>().lazyProduct(point.calibration_gradient);
       for (const PoseFactor* end = observation + point.factors; observation != end; ++observation)
-        moved += by.middleCols<6>(6 * observation->pose).lazyProduct(observation->gradient);
+        moved += by.middleCols<6>(6 * observation->pose).lazyProduct(observation->gradient.head<6>());
       clusters_.push_back({index(estimate_.points[p].x()), index(estimate_.points[p].y()), moved});
     }
     double most = 0.0;

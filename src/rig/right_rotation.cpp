@@ -39,6 +39,7 @@ std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, c
                                                    const std::vector<Correspondence>& correspondences,
                                                    const std::vector<int>& inliers,
                                                    const Eigen::Isometry3d& T_current_reference) {
+  constexpr double kSmall = 0.01;  // squared standard deviations (chosen): equations from before such a step serve
   constexpr int kSteps = 3, kMotion = 6, kUnknowns = kMotion + 3;
   constexpr double kCauchy = noiseGate(3);  // squared scale of Cauchy's kernel, in standard deviations
   using Vector = Eigen::Matrix<double, kUnknowns, 1>;
@@ -80,6 +81,7 @@ std::optional<RightRotation> rotationByDisparities(const StereoCamera& camera, c
     if (!moved.allFinite()) return std::nullopt;
     T = expSE3(Vector6d(moved.head<kMotion>())) * T;
     found.value += moved.tail<3>();
+    if (gradient.dot(moved) < kSmall) break;
   }
   Matrix meat = hessian;  // lower bound: correlated errors of a part may cancel by chance
   for (const Vector& of_part : gradients) meat += of_part * of_part.transpose();

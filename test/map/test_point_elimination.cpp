@@ -190,7 +190,7 @@ TEST(PointElimination, GradientsOfSightingsAndPointsAddUp) {
   Eigen::VectorXd sum = Eigen::VectorXd::Zero(reduced.gradient.size());
   for (int k = 0; k < reduced.point.factors; ++k) {
     const PoseFactor& factor = reduced.factors[static_cast<std::size_t>(k)];
-    sum.segment<6>(6 * factor.pose) += factor.gradient;
+    sum.segment<6>(6 * factor.pose) += factor.gradient.head<6>();
   }
   sum.tail<kCalibration>() = reduced.point.calibration_gradient;
   expectNear(sum, reduced.gradient, "gradient");
