@@ -37,9 +37,10 @@ def main():
     parser.add_argument("directory", type=pathlib.Path, help="folder with the JUnit files")
     parser.add_argument("--passed", action="append", default=[], help="a check beside the JUnit files that passed")
     parser.add_argument("--failed", action="append", default=[], help="a check beside the JUnit files that failed")
+    parser.add_argument("--skipped", action="append", default=[], help="a check beside the JUnit files that could not be made; it said why")
     arguments = parser.parse_args()
 
-    counts = {"passed": len(arguments.passed), "failed": len(arguments.failed), "skipped": 0}
+    counts = {"passed": len(arguments.passed), "failed": len(arguments.failed), "skipped": len(arguments.skipped)}
     bad = list(arguments.failed)
     seconds = []
     for path in sorted(arguments.directory.rglob("*.xml")):
@@ -63,6 +64,8 @@ def main():
         print(f"{time:.1f} s: {name}")
     if sum(counts.values()) == 0:
         bad.append("no test ran")
+    for name in arguments.skipped:
+        print(f"SKIPPED: {name}")
     for name in bad:
         print(f"FAILED: {name}")
     print("{passed} passed, {failed} failed, {skipped} skipped".format(**counts))

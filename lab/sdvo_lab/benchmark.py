@@ -83,16 +83,16 @@ def small_images(folder):
 SIDES = ("sdvo::FeatureExtractor::extract(*", "sdvo::VisualOdometry::update(*")
 
 
-def counted(drive, side, *arguments):
-    """Instructions on one side, a function, of the pairs from the third to the thirtieth."""
+def counted(drive, sides, pairs, *arguments):
+    """Instructions on these sides, functions, of each of the first pairs."""
     with tempfile.TemporaryDirectory() as work:
-        subprocess.run(["valgrind", "--tool=callgrind", f"--callgrind-out-file={work}/part", f"--toggle-collect={side}",
-                        "--dump-before=sdvo::OfflineRun::process(*", programs.program("run_sequence"), drive.directory, "--frames", "30",
-                        "--poses", f"{work}/poses.txt", *arguments],
+        subprocess.run(["valgrind", "--tool=callgrind", f"--callgrind-out-file={work}/part", *(f"--toggle-collect={side}" for side in sides),
+                        "--dump-before=sdvo::OfflineRun::process(*", programs.program("run_sequence"), drive.directory, "--frames", str(pairs),
+                        "--poses", f"{work}/poses.txt", "--threads", "1", *arguments],
                        check=True, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         # The first part ends before the first pair, the last one has no number.
         parts = sorted(pathlib.Path(work).glob("part.*"), key=lambda part: int(part.suffix[1:]))[1:] + [pathlib.Path(work) / "part"]
-        return [int(re.search(r"^totals: (\d+)", part.read_text(), re.MULTILINE).group(1)) for part in parts][2:]
+        return [int(re.search(r"^totals: (\d+)", part.read_text(), re.MULTILINE).group(1)) for part in parts]
 
 
 def stored(name):
@@ -107,7 +107,7 @@ def instructions(folder):
     before = stored("instructions")
     chosen = {"KITTI 06": drives.recorded("kitti", "06"), "EuRoC MH_01_half": drives.recorded("euroc", "MH_01_half", folder), **in_a_room(folder)}
     for name, drive in chosen.items():
-        counts = [counted(drive, side) for side in SIDES]
+        counts = [counted(drive, [side], 30)[2:] for side in SIDES]
         sides = [statistics.mean(side) * 1e-6 for side in counts]
         whole = sorted(map(sum, zip(*counts)))
         ratio = sum(sides) / float(before[name][3]) if name in before else 1.0
@@ -129,7 +129,7 @@ def growth(folder):
         row, setting = [count], ["--param", f"detector/max_features={count}"]
         for drive in chosen:
             mean = odometry.errors(drive.truth, odometry.run(drive.directory, *setting).poses, drive.lengths)["mean"]
-            millions = sum(statistics.mean(counted(drive, side, *setting)) * 1e-6 for side in SIDES)
+            millions = statistics.mean(counted(drive, SIDES, 30, *setting)[2:]) * 1e-6
             row += [f"{millions:.1f}", f"{mean['translation_percent']:.3f}", f"{mean['rotation_deg_per_m']:.4f}"]
         yield row
 
