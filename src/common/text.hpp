@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <iomanip>
+#include <locale>
 #include <sstream>
 #include <string>
 #include <type_traits>
@@ -9,11 +10,12 @@
 namespace sdvo {
 
 /// Numbers with `digits` after the point, and words between them. A wild number has an exponent, not hundreds of
-/// digits.
+/// digits. In the C locale, whatever a nodelet of this process has set.
 template <class... Parts>
 std::string text(int digits, const Parts&... parts) {
   constexpr double kWild = 1e12;
   std::ostringstream stream;
+  stream.imbue(std::locale::classic());
   const auto put = [&](const auto& part) {
     if constexpr (std::is_floating_point_v<std::decay_t<decltype(part)>>)
       stream << (std::abs(part) < kWild ? std::fixed : std::scientific) << std::setprecision(digits) << part;

@@ -89,8 +89,8 @@ std::optional<double> InputMonitor::rate() const {
 
 Findings InputMonitor::judge(WallUpdater::Status& values) {
   const std::optional<double> measured = rate();
-  values.addf("rate [Hz]", "%.2f", measured.value_or(0.0));
-  values.addf("expected [Hz]", "%g to %g", rates_.min_rate, rates_.max_rate);
+  values.add("rate [Hz]", text(2, measured.value_or(0.0)));
+  values.add("expected [Hz]", text(1, rates_.min_rate, " to ", rates_.max_rate));
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     values.add("topics", topics_);
@@ -144,8 +144,8 @@ Findings WorkLoad::judge(WallUpdater::Status& values) {
   const int items = std::exchange(items_, 0);
   const std::uint64_t dropped = dropped_ - std::exchange(reported_, dropped_);
   longest_wait_ = 0.0;
-  values.addf("CPU time [ms a pair]", "%.2f", items > 0 ? 1e3 * time / items : 0.0);
-  values.addf("CPU time [share of one processor]", "%.2f", load);
+  values.add("CPU time [ms a pair]", text(2, items > 0 ? 1e3 * time / items : 0.0));
+  values.add("CPU time [share of one processor]", text(2, load));
   values.add("dropped since the start", dropped_);
   const std::string loss = text(0, dropped, " pairs dropped in ", period, " s");
   if (dropped > 0 && wait > time) return {{Verdict::kWarn, loss + ", while it waited for " + awaited_}};

@@ -74,8 +74,8 @@ Findings ImageDiagnostics::judgeSynchronisation(Status& values) {
   const std::string loss = arrivals_.explainLoss(now);
   const auto silence = arrivals_.pairs().silence();
   const double gap = arrivals_.takeLargestGap();
-  values.addf("largest gap [ms]", "%.2f", 1e3 * gap);
-  for (const auto& [topic, rate] : arrivals_.rates(now)) values.addf("rate of " + topic + " [Hz]", "%.2f", rate);
+  values.add("largest gap [ms]", text(2, 1e3 * gap));
+  for (const auto& [topic, rate] : arrivals_.rates(now)) values.add("rate of " + topic + " [Hz]", text(2, rate));
   Finding finding{Verdict::kOk, silence ? kNoPairs : "left and right belong together"};
   if (!loss.empty() && (!silence || silence->isFault()))
     finding = {Verdict::kWarn, loss};
@@ -90,8 +90,8 @@ Findings ImageDiagnostics::judgeExposure(Status& values) {
   if (arrivals_.pairs().silence()) return {{Verdict::kOk, kNoPairs}};
   if (!last_ || (pairs_ == 0 && !failure_.empty())) return {{Verdict::kOk, "no pair was used"}};
   const double left = last_->mean_intensity[0], right = last_->mean_intensity[1];
-  values.addf("mean grey level", "%.1f left, %.1f right", left, right);
-  values.addf("sharpness [grey levels a px]", "%.2f left, %.2f right", last_->sharpness[0], last_->sharpness[1]);
+  values.add("mean grey level", text(1, left, " left, ", right, " right"));
+  values.add("sharpness [grey levels a px]", text(2, last_->sharpness[0], " left, ", last_->sharpness[1], " right"));
   return {checkExposure(std::min(left, right), std::max(left, right), exposures_.takeTurns(), thresholds_.min_intensity,
                         thresholds_.max_intensity)
               .asWarning()};
@@ -128,10 +128,10 @@ OdometryDiagnostics::OdometryDiagnostics(ros::NodeHandle& nh, ros::NodeHandle& p
 }
 
 void OdometryDiagnostics::note(const stereo_descriptor_vo::VoInfo& info) {
-  input_.note(nanoseconds(info.header.stamp));
   load_.noteDropped(info.dropped_features);
   const std::lock_guard<std::mutex> lock(mutex_);
   last_ = info;
+  input_.note(nanoseconds(info.header.stamp));  // under the lock, so that no task sees an input without its state
 }
 
 Findings OdometryDiagnostics::judge(Status& values) {
@@ -166,14 +166,14 @@ void OdometryDiagnostics::addValues(Status& values) const {
   values.add("rms reprojection error [px]", last_->rms_reprojection_error);
   values.add("distance [m]", last_->distance);
   if (std::isfinite(last_->disparity_offset))
-    values.addf(
-        "calibration", "disparities are off by %.2f +- %.2f px in the centre, another %.2f +- %.2f px at 45 degrees",
-        last_->disparity_offset, last_->disparity_offset_sigma, last_->disparity_bend, last_->disparity_bend_sigma);
+    values.add("calibration", text(2, "disparities are off by ", last_->disparity_offset, " +- ",
+                                   last_->disparity_offset_sigma, " px in the centre, another ", last_->disparity_bend,
+                                   " +- ", last_->disparity_bend_sigma, " px at 45 degrees"));
   if (std::isfinite(last_->right_delay))
-    values.addf("right camera delay [ms]", "%.2f +- %.2f", 1e3 * last_->right_delay, 1e3 * last_->right_delay_sigma);
+    values.add("right camera delay [ms]", text(2, 1e3 * last_->right_delay, " +- ", 1e3 * last_->right_delay_sigma));
   if (std::isfinite(last_->right_rotation[0]))
-    values.addf("right camera rotation [mrad]", "%.2f %.2f %.2f", 1e3 * last_->right_rotation[0],
-                1e3 * last_->right_rotation[1], 1e3 * last_->right_rotation[2]);
+    values.add("right camera rotation [mrad]", text(2, 1e3 * last_->right_rotation[0], " ", 1e3 * last_->right_rotation[1],
+                                                    " ", 1e3 * last_->right_rotation[2]));
   values.add("latency [s]", last_->latency);
   values.add("dropped pairs", last_->dropped_pairs);
 }
@@ -207,7 +207,7 @@ Findings PlaceDiagnostics::judge(Status& values) {
   if (!last_) return findings;
   values.add("places", last_->places);
   values.add("loops", last_->loops);
-  values.addf("memory [MB]", "%.1f", 1e-6 * static_cast<double>(last_->bytes));
+  values.add("memory [MB]", text(1, 1e-6 * static_cast<double>(last_->bytes)));
   values.add("key frame", last_->id);
   values.add("no loop there, because", last_->reason);
   values.add("find time [s]", last_->find_time);

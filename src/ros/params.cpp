@@ -6,6 +6,7 @@
 #include <ros/this_node.h>
 
 #include <algorithm>
+#include <locale>
 #include <sstream>
 #include <stdexcept>
 #include <utility>
@@ -15,12 +16,21 @@
 namespace sdvo {
 namespace {
 
-/// With all digits of a double.
+/// With all digits of a double. Like numberOf() in the C locale, for another nodelet may have set one of the process.
 std::string textOf(double number) {
   std::ostringstream text;
+  text.imbue(std::locale::classic());
   text.precision(17);
   text << number;
   return text.str();
+}
+
+double numberOf(const std::string& text) {
+  std::istringstream stream(text);
+  stream.imbue(std::locale::classic());
+  double number = 0.0;
+  stream >> number;
+  return number;
 }
 
 /// By the parameter's text, for YAML takes `5e0` for text and `2.0` for a double.
@@ -46,7 +56,7 @@ template <class Use>
 auto withValue(const Option& option, const std::string& text, const Use& use) {
   if (std::holds_alternative<bool*>(option.value)) return use(text == "true");
   if (std::holds_alternative<int*>(option.value)) return use(std::stoi(text));
-  if (std::holds_alternative<double*>(option.value)) return use(std::stod(text));
+  if (std::holds_alternative<double*>(option.value)) return use(numberOf(text));
   return use(text);
 }
 

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "../../src/ros/params.hpp"
+#include "../comma_locale.hpp"
 #include "../said.hpp"
 
 namespace sdvo::rostest_reconfigure_server {
@@ -137,6 +138,12 @@ TEST_F(ReconfigureServerTest, SetsEachTypeAndAnswersWithTheWholeSet) {
   EXPECT_EQ(response.doubles.at(0).value, 0.1);
   EXPECT_EQ(response.strs.at(0).value, "b");
   EXPECT_EQ(applied_, 1);
+}
+
+TEST_F(ReconfigureServerTest, ALocaleOfAnotherNodeletChangesNoNumber) {
+  const CommaLocale set;
+  EXPECT_EQ(request(Values().set("ratio", 0.75)).doubles.at(0).value, 0.75);
+  EXPECT_TRUE(becomes("ratio", 0.75));
 }
 
 TEST_F(ReconfigureServerTest, TheSameValuesAreNoChange) {
