@@ -1,9 +1,13 @@
 #!/usr/bin/env python3
-"""Copies a YAML file for config.launch: blocks and values that are left empty are left out, and what has no effect is named."""
+"""Copies a YAML file for config.launch: blocks and values that are left empty are left out, and what has no effect is named, in the
+file and among the arguments of roslaunch."""
 
+import difflib
+import glob
 import os
 import sys
 import time
+import xml.etree.ElementTree
 
 import rosparam  # noqa: F401 reads !degrees and !radians for yaml
 import yaml
@@ -50,6 +54,23 @@ def check(value, name):
         raise ValueError('%s = %s does not fit into 32 bits' % (name[:-1], value))
 
 
+def refuse_unknown_arguments():
+    """Of `roslaunch stereo_descriptor_vo FILE name:=value`, from which roslaunch leaves out names that the file lacks."""
+    with open('/proc/%d/cmdline' % os.getppid()) as file:
+        words = file.read().split('\0')
+    if 'stereo_descriptor_vo' not in words[:-1]:
+        return
+    file = words[words.index('stereo_descriptor_vo') + 1]
+    for path in glob.glob(os.path.join(glob.escape(os.path.dirname(os.path.abspath(__file__))), '**', file), recursive=True):
+        arguments = xml.etree.ElementTree.parse(path).getroot().findall('arg')
+        known = [argument.get('name') for argument in arguments if argument.get('value') is None]
+        for name in (word.split(':=')[0] for word in words if ':=' in word and not word.startswith('__')):
+            if name not in known:
+                alike = difflib.get_close_matches(name, known, 1)
+                sys.exit('ERROR: %s has no argument %s%s; roslaunch --ros-args stereo_descriptor_vo %s lists them' % (
+                    file, name, ': is it %s?' % alike[0] if alike else '', file))
+
+
 def remove_with_the_launch(copy):
     """In a process of its own: a launch that fails has no last word."""
     launch = os.getppid()
@@ -67,6 +88,7 @@ def remove_with_the_launch(copy):
 
 
 def main(path, copy):
+    refuse_unknown_arguments()
     try:
         if not os.path.isfile(path):
             raise ValueError('there is no such file')  # a pipe would be waited for

@@ -8,7 +8,8 @@ import shutil
 import sys
 import time
 
-import rosgraph.names
+import rosgraph
+from rosgraph.names import get_ros_namespace, load_mappings, resolve_name
 
 LEAST = 2**30  # bytes; rosbag records nothing where less is free
 
@@ -29,13 +30,20 @@ def refuse(why):
 def inputs(image_side):
     """Images and calibrations, with their transport's ending, once somebody publishes the images."""
     master = rosgraph.Master('/record_drive')
-    image_side = rosgraph.names.ns_join(rosgraph.names.get_ros_namespace(), image_side)
+    image_side = resolve_name(image_side, get_ros_namespace() + 'recorder')
     while True:
         if master.hasParam(image_side + '/input_topics'):
             topics = master.getParam(image_side + '/input_topics')
             if {name for name, _ in master.getPublishedTopics('')}.issuperset(topics[:2]):
                 return topics
         time.sleep(0.2)
+
+
+def resolved(arguments):
+    """Topics by their full names, which the bag keeps; the recorder would write those that it is given."""
+    node = get_ros_namespace() + 'recorder'
+    remaps = {resolve_name(a, node): resolve_name(b, node) for a, b in load_mappings(arguments).items()}
+    return [argument if ':=' in argument else resolve_name(argument, node, remaps) for argument in arguments]
 
 
 def main(image_side, recorder, option, path, *topics):
@@ -47,7 +55,7 @@ def main(image_side, recorder, option, path, *topics):
         refuse('less than 1 GB is free in %s' % folder)
     how = '[ INFO]' if is_asked_for else '[ WARN] an older drive has the name asked for:'
     print('%s recording to %s once there are images' % (how, file), file=sys.stderr, flush=True)
-    os.execv(recorder, [recorder, option, file, *topics, *inputs(image_side)])
+    os.execv(recorder, [recorder, option, file, *resolved(topics), *inputs(image_side)])
 
 
 if __name__ == '__main__':

@@ -121,7 +121,7 @@ class Launch(unittest.TestCase):
 
             def record(path, **options):
                 return subprocess.Popen(['sh', os.path.join(FOLDER, 'ros_python'), os.path.join(FOLDER, 'record_drive.py'), 'stereo_features',
-                                         '/bin/echo', '-O', path, '/tf', 'odom'], env=environment, stdout=subprocess.PIPE,
+                                         '/bin/echo', '-O', path, '/tf', 'odom', 'vo_info', 'odom:=/robot/odom'], env=environment, stdout=subprocess.PIPE,
                                         stderr=subprocess.PIPE, universal_newlines=True, **options)
             waiting = record('~/drive.bag')
             self.addCleanup(rospy.delete_param, '/recorded')
@@ -129,7 +129,8 @@ class Launch(unittest.TestCase):
             time.sleep(2)
             self.assertIsNone(waiting.poll(), 'there are no images')
             publishers = [rospy.Publisher(topic, CompressedImage, queue_size=1) for topic in topics[:2]]
-            self.assertEqual(waiting.communicate(timeout=20)[0].split(), ['-O', home + '/drive.bag', '/tf', 'odom'] + topics)
+            self.assertEqual(waiting.communicate(timeout=20)[0].split(), ['-O', home + '/drive.bag', '/tf', '/robot/odom', '/recorded/vo_info', 'odom:=/robot/odom'] + topics,
+                             'names of a bag are those of its topics')
             for there, expected in (('drive.bag', 'drive_2.bag'), ('drive_2.bag.active', 'drive_3.bag')):  # a killed recorder's
                 open(os.path.join(home, there), 'w').close()
                 said, warned = record('~/drive').communicate(timeout=20)
@@ -280,6 +281,15 @@ class Launch(unittest.TestCase):
                     '/tmp/stereo_vo_config_test_%d.yaml' % os.getpid()))
             subprocess.run(['roslaunch', '--dump-params', failing], stderr=subprocess.DEVNULL)
         self.assertTrue(wait_until(lambda: not copies() - before), copies() - before)
+
+    def test_arguments_that_a_file_lacks_are_refused(self):
+        """By a command line, which roslaunch itself does not check."""
+        def refusal(*arguments):
+            command = ['roslaunch', '--dump-params', PACKAGE, 'stereo_vo.launch'] + list(arguments)
+            return subprocess.run(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, universal_newlines=True).stderr
+        self.assertIn('stereo_vo.launch has no argument mount_rpy', refusal('mount_rpy:=0 0 0.5 0 0 0'))
+        self.assertIn('no argument base_frame: is it base_frame_id?', refusal('base_frame:=base_footprint'))
+        self.assertNotIn('no argument', refusal('base_frame_id:=base_footprint', '__log:=/tmp/x'))
 
     def test_rviz_shows_what_is_in_its_namespace(self):
         folder = os.path.join(FOLDER, '..', 'rviz')
