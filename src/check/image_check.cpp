@@ -177,12 +177,14 @@ Finding ImageCheck::blur() const {
 
 Finding ImageCheck::frameRate(const std::vector<double>& rotations) const {
   // docs/robot.md: less than 20 deg of turn and half a view between pairs. Half of that leaves room.
-  constexpr double kTurn = 20.0, kView = 0.5;  // deg, share of the width
+  constexpr double kTurn = 20.0, kView = 0.5, kUnrelated = 0.5;  // deg, ratios of the width and of the views
   if (moved_.empty() && lost_views_ == 0) return {Verdict::kOpen, "no two pairs"};
   const double turn = quantile(rotations, 0.95), view = quantile(moved_, 0.95);
   const double unrelated = static_cast<double>(lost_views_) / static_cast<double>(moved_.size() + lost_views_);
-  const std::string what = text(1, "up to ", turn, " deg and ", 100.0 * view, " % of the view from pair to pair");
-  return judged(turn > kTurn || view > kView || unrelated > 0.5, turn > 0.5 * kTurn || view > 0.5 * kView, what,
+  const std::string what =
+      text(1, "up to ", turn, " deg (limit ", kTurn, ") and ", 100.0 * view, " % of the view (limit ", 100.0 * kView,
+           ") from pair to pair, ", 100.0 * unrelated, " % of the views have nothing in common with the one before");
+  return judged(turn > kTurn || view > kView, turn > 0.5 * kTurn || view > 0.5 * kView || unrelated > kUnrelated, what,
                 "a higher frame rate, or slower turns");
 }
 

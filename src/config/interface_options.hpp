@@ -22,11 +22,29 @@ struct ImageThresholds {
   double max_load = 0.9;         ///< of one processor
 };
 
-/// Options of the image side's nodelet beside those of FeatureExtractor.
-struct StereoInputOptions {
+/// Which images make a pair, live and in bags.
+struct PairingOptions {
   double sync_tolerance = 0.001;
   bool approximate_sync = false;
   double max_interval = 0.025;  // half of a period at 20 Hz
+
+  /// s between the stamps of a pair.
+  double allowedGap() const { return approximate_sync ? max_interval : sync_tolerance; }
+
+  void describe(OptionList& list) {
+    list.add("sync_tolerance", sync_tolerance, {0.0, 0.1}, "s",
+             "largest difference of stamps of one trigger (less than half of a period); 0: equal stamps only");
+    list.add("approximate_sync", approximate_sync,
+             "pair images of cameras that are not triggered together, whose stamps differ by up to max_interval; the "
+             "difference is taken as the right image's delay");
+    list.add("max_interval", max_interval, {1e-4, 1.0}, "s",
+             "approximate_sync: largest difference of stamps in a pair");
+  }
+};
+
+/// Options of the image side's nodelet beside those of FeatureExtractor.
+struct StereoInputOptions {
+  PairingOptions pairing;
   int sync_queue_size = 20;
   int queue_size = 1;
   double max_rate = 0.0;
@@ -37,13 +55,7 @@ struct StereoInputOptions {
   ImageThresholds thresholds;
 
   void describe(OptionList& list) {
-    list.add("sync_tolerance", sync_tolerance, {0.0, 0.1}, "s",
-             "largest difference of stamps of one trigger (less than half of a period); 0: equal stamps only");
-    list.add("approximate_sync", approximate_sync,
-             "pair images of cameras that are not triggered together, whose stamps differ by up to max_interval; the "
-             "difference is taken as the right image's delay");
-    list.add("max_interval", max_interval, {1e-4, 1.0}, "s",
-             "approximate_sync: largest difference of stamps in a pair");
+    pairing.describe(list);
     list.add("sync_queue_size", sync_queue_size, {1, 1000}, "",
              "messages kept per input until those that belong to them have come");
     list.add("queue_size", queue_size, {1, 1000}, "", "pairs that wait while one is processed; the newest win");
@@ -80,12 +92,16 @@ struct OdometryOutputOptions {
   double max_load = 0.9;     ///< of one processor: /diagnostics warn beyond it (chosen)
   double max_latency = 0.5;  ///< s, of poses after their images (chosen)
 
+  /// Whether TF gets odom -> guess_frame_id, for base has that odometry's parent.
+  bool correctsGuess() const { return publish_tf && !invert_tf && !guess_frame_id.empty(); }
+
   void describe(OptionList& list) {
     list.add("odom_frame_id", odom_frame_id, "world-fixed frame of the odometry");
     list.add("base_frame_id", base_frame_id, "the robot's frame, whose pose is published");
     list.add("initial_pose", initial_pose,
              "pose of the base in odom at the start and after a reset: 'x y z roll pitch yaw' (m, rad), as in URDF");
-    list.add("publish_tf", publish_tf, "publish odom -> base on /tf");
+    list.add("publish_tf", publish_tf,
+             "publish odom -> base on /tf, with guess_frame_id odom -> guess_frame_id, also while LOST");
     list.add("invert_tf", invert_tf, "publish base -> odom instead, where base already has a parent");
     list.add("publish_null_when_lost", publish_null_when_lost,
              "while LOST publish odometry of zeros, quaternion included, with variances of 9999, as rtabmap does");

@@ -37,7 +37,9 @@ void apply(const YAML::Node& node, const std::string& path, std::vector<Option>&
     return;
   }
   if (node.IsNull()) return;  // left empty: as launch/copy_config.py has it, it is not there
-  if (!belongsToNodelet(path)) setOption(options, path, textOf(node));
+  const bool is_known =
+      std::any_of(options.begin(), options.end(), [&](const Option& option) { return option.name == path; });
+  if (is_known || !belongsToNodelet(path)) setOption(options, path, textOf(node));
 }
 
 }  // namespace

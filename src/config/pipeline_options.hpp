@@ -10,14 +10,16 @@
 
 namespace sdvo {
 
-/// The options of all nodelets under the nodelets' names, so that one YAML file serves the launch files and the tools.
+/// The options of all nodelets that offline runs have, too, under the nodelets' names, so that one YAML file serves the launch files and the tools.
 struct PipelineOptions {
   FeatureExtractorOptions stereo_features;
   VisualOdometryOptions visual_odometry;
   PlaceRecognitionOptions place_recognition;
+  PairingOptions pairing;
 
   void describe(OptionList& list) {
     list.group("stereo_features", stereo_features);
+    list.group("stereo_features", pairing);
     list.group("visual_odometry", visual_odometry);
     list.group("place_recognition", place_recognition);
   }

@@ -86,7 +86,8 @@ StereoCamera toStereoCamera(const CameraInfo& left_info, const CameraInfo& right
   const auto differ = [](double a, double b) { return !(std::abs(a - b) <= kSame); };
   if (differ(left.fx, right.fx) || differ(left.fy, right.fy))
     throw std::invalid_argument("left and right camera_info have different focal lengths" + both() +
-                                ", the pair is not rectified");
+                                ": they are of two single calibrations, or of raw images. Calibrate both as one stereo pair (camera_calibration "
+                                "or Kalibr), and rectify (stereo_raw.launch; offline --calibration)");
   // A rectification without CALIB_ZERO_DISPARITY; every depth would be wrong.
   if (differ(left.cx, right.cx) || differ(left.cy, right.cy))
     throw std::invalid_argument("left and right camera_info have different principal points" + both() +

@@ -211,7 +211,7 @@ Finding ArrivalLog::checkTopics() {
                     text(1, periods + 1, " pairs, ", rate, " Hz"), "5 to 60 Hz suit, 15 Hz or more for fast turns");
     }
   }
-  return {Verdict::kFail, explainSilence(newest), "see docs/troubleshooting.md, synchronisation"};
+  return {Verdict::kFail, explainSilence(newest), "see docs/troubleshooting.md, 'Pairs that do not come together'"};
 }
 
 Finding ArrivalLog::checkStamps() const {
@@ -253,11 +253,11 @@ ArrivalLog::Gaps ArrivalLog::gapsBetween(Input from, Input to, double begin) con
       if (there.stamp == 0) continue;
       const double here_to_there = std::abs(secondsBetween(here.stamp, there.stamp));
       gap = std::min(gap, here_to_there);
-      if (here_to_there <= allowedGap()) gaps.delay = std::max(gaps.delay, std::abs(there.now - here.now));
+      if (here_to_there <= options_.pairing.allowedGap()) gaps.delay = std::max(gaps.delay, std::abs(there.now - here.now));
     }
     ++gaps.all;
     gaps.missing += gap >= half;
-    if (gap <= allowedGap() || gap >= half) continue;
+    if (gap <= options_.pairing.allowedGap() || gap >= half) continue;
     ++gaps.apart;
     gaps.least = std::min(gaps.least, gap);
     gaps.most = std::max(gaps.most, gap);
@@ -271,11 +271,12 @@ std::string ArrivalLog::advise(double begin) const {
   if (topics_[kLeftImage].arrivals.empty() || topics_[kRightImage].arrivals.empty()) return "";  // the counts show it
   if (2 * right.apart > right.all)
     return text(1, "; the nearest stamps of left and right are ", 1e3 * right.least, " to ", 1e3 * right.most,
-                " ms apart, more than ", options_.approximate_sync ? "max_interval (" : "sync_tolerance (",
-                1e3 * allowedGap(), " ms)",
-                options_.approximate_sync
-                    ? ""
-                    : ": set a larger sync_tolerance if one trigger takes both, else approximate_sync");
+                " ms apart, more than ", options_.pairing.approximate_sync ? "max_interval (" : "sync_tolerance (",
+                1e3 * options_.pairing.allowedGap(), " ms)") +
+           (options_.pairing.approximate_sync
+                ? ""
+                : text(3, ": set sync_tolerance to ", right.most + 0.001,
+                       " if one trigger takes both, else approximate_sync to true"));
   for (const auto& [gaps, sides] :
        {std::pair(right, " left images have no right one"), std::pair(left, " right images have no left one")})
     if (2 * gaps.missing > gaps.all)

@@ -85,7 +85,6 @@ class ArrivalLog {
   };
 
   /// Of stamps in a pair, s.
-  double allowedGap() const { return options_.approximate_sync ? options_.max_interval : options_.sync_tolerance; }
   double period() const;
   std::vector<double> pairPeriods() const;
   bool isEarly(const Arrival& arrival) const;

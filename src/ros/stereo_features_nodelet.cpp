@@ -98,7 +98,7 @@ class StereoFeaturesNodelet : public RobotNodelet {
     if (!input_) return;
     ros::master::V_TopicInfo topics;
     std::string report;
-    const bool searches = options_.find_camera && (!has_pairs_ || !finder_->names().empty());
+    const bool searches = options_.find_camera && finder_->isSearching(has_pairs_);
     if (searches && ros::master::getTopics(topics) && finder_->update(topics, report)) {
       NODELET_WARN_STREAM(report);
       input_.reset();
@@ -190,7 +190,7 @@ class StereoFeaturesNodelet : public RobotNodelet {
     StereoFeatures features =
         extractor_->extract(decoded.camera, decoded.left, decoded.right, nanoseconds(stamp), mask_, last_report_);
     last_report_ = features.report;
-    if (options_.approximate_sync) features.right_delay = secondsBetween(stamp, pair.right_image->header.stamp);
+    if (options_.pairing.approximate_sync) features.right_delay = secondsBetween(stamp, pair.right_image->header.stamp);
     // After the extraction, which throws if the calibration does not fit the images: such a one begins no new stream.
     const std::string unrectified = ros_conversions::whyUnrectified(*pair.left_info, *pair.right_info);
     noteCamera(decoded.camera, pair.left_info->distortion_model, unrectified);

@@ -29,11 +29,11 @@ StereoInput::StereoInput(ros::NodeHandle nh, StereoImageTransport& transport, co
       refuse_(std::move(refuse)),
       topics_(resolvedTopics(nh)),
       arrivals_(arrivals),
-      exact_(options.sync_queue_size, options.sync_tolerance,
+      exact_(options.sync_queue_size, options.pairing.sync_tolerance,
              [this](const auto&... messages) { onPair(messages...); }) {
-  if (options.approximate_sync)
+  if (options.pairing.approximate_sync)
     approximate_ = std::make_unique<ApproximateSynchroniser<Image, Image, Info, Info>>(
-        options.sync_queue_size, options.max_interval, [this](const auto&... messages) { onPair(messages...); });
+        options.sync_queue_size, options.pairing.max_interval, [this](const auto&... messages) { onPair(messages...); });
   arrivals_.begin(topics_, steadyTime());
   const auto queue = static_cast<std::uint32_t>(std::max({kArrivalQueue, options.sync_queue_size, options.queue_size}));
   ros::NodeHandle right_nh = right_callbacks_.serve(nh);

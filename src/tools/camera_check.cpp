@@ -1,7 +1,7 @@
 #include "camera_check.hpp"
 
 #include <algorithm>
-#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "../check/calibration_check.hpp"
 #include "../common/text.hpp"
@@ -33,7 +33,7 @@ void CameraCheck::add(const RecordedPair& pair, const StereoFeatures& features) 
   images_.add(pair.left, pair.right, features.report);
   emitter_.add(pair.left);
   odometry_.add(features, run_.last());
-  cv::vconcat(pair.left, pair.right, picture_);
+  cv::hconcat(pair.left, pair.right, picture_);
 }
 
 void CameraCheck::addUnusable(const std::string& problem) {
@@ -42,6 +42,7 @@ void CameraCheck::addUnusable(const std::string& problem) {
 }
 
 std::vector<CheckStep> CameraCheck::steps(const ArrivalFindings& arrivals) const {
+  const Finding odometry = odometry_.judge(), frame_rate = images_.frameRate(odometry_.rotations());
   std::vector<CheckStep> steps = {
       {"topics", arrivals.topics},
       {"stamps", arrivals.stamps},
@@ -57,8 +58,8 @@ std::vector<CheckStep> CameraCheck::steps(const ArrivalFindings& arrivals) const
       {"texture", images_.texture(thresholds_.min_corners, options_.stereo_features.rig_monitor.suspicious_share)},
       {"motion blur", images_.blur()},
       {"emitter", emitter_.judge()},
-      {"frame rate", images_.frameRate(odometry_.rotations())},
-      {"odometry", odometry_.judge()},
+      {"frame rate", odometry.isFault() ? frame_rate : frame_rate.asWarning()},  // which is enough to be followed
+      {"odometry", odometry},
       {"load", load(arrivals.rate)}};
   const auto fault = std::find_if(steps.begin(), steps.end(),
                                   [](const CheckStep& step) { return step.finding.verdict == Verdict::kFail; });
@@ -72,6 +73,18 @@ Finding CameraCheck::calibration() const {
   if (unusable_ > 0) return {Verdict::kFail, problem_, "see docs/cameras.md, 'What a wrong camera_info looks like'"};
   if (used_ == 0) return {Verdict::kOpen, "no pairs"};
   return checkCalibration(camera_, lens_, unrectified_);
+}
+
+cv::Mat CameraCheck::picture() const {
+  constexpr int kLines = 8;
+  if (picture_.empty()) return {};
+  cv::Mat drawn;
+  cv::cvtColor(picture_, drawn, cv::COLOR_GRAY2BGR);
+  for (int line = 1; line < kLines; ++line) {
+    const int row = line * drawn.rows / kLines;
+    cv::line(drawn, {0, row}, {drawn.cols - 1, row}, {0, 200, 255});
+  }
+  return drawn;
 }
 
 Finding CameraCheck::rig() const {

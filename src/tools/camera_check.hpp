@@ -32,8 +32,9 @@ class CameraCheck {
   std::vector<CheckStep> steps(const ArrivalFindings& arrivals) const;
 
   cv::Mat rows() const { return rows_.map(); }
-  /// The last pair that was used, left above right; empty: none.
-  const cv::Mat& picture() const { return picture_; }
+  /// The last pair that was used, left beside right, with lines along the rows, on which both show the same; empty:
+  /// none.
+  cv::Mat picture() const;
 
  private:
   Finding calibration() const;

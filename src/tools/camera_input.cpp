@@ -3,7 +3,9 @@
 #include <nav_msgs/Odometry.h>
 #include <tf2_eigen/tf2_eigen.h>
 
+#include <algorithm>
 #include <boost/make_shared.hpp>
+#include <limits>
 #include <stdexcept>
 #include <utility>
 
@@ -20,22 +22,53 @@ constexpr int kWaiting = 100;
 
 }  // namespace
 
-CameraInput::CameraInput(const StereoTopics& topics, std::optional<StereoInfos> infos, Use use)
+CameraInput::CameraInput(const StereoTopics& topics, std::optional<StereoInfos> infos, const PairingOptions& pairing,
+                         Use use)
     : topics_(topics),
       infos_(std::move(infos)),
-      pairs_(
-          kWaiting, StereoInputOptions().sync_tolerance,
-          [this, use = std::move(use)](const auto& left, const auto& right, const auto& left_info,
-                                       const auto& right_info) {
-            const std::int64_t stamp = nanoseconds(left->header.stamp);
-            arrivals_.notePair(stamp, nanoseconds(right->header.stamp), newest_.toSec());
-            use({{left->image, right->image, left_info->info, right_info->info},
-                 stamp,
-                 newest_,
-                 {left->recorded, right->recorded}});
-          },
+      use_(std::move(use)),
+      arrivals_(
+          [&] {
+            StereoInputOptions options;
+            options.pairing = pairing;
+            return options;
+          }(),
+          unused_, std::numeric_limits<double>::infinity()),
+      exact_(
+          kWaiting, pairing.sync_tolerance, [this](const auto&... messages) { onPair(messages...); },
           [this](const auto&...) { ++given_up_; }) {
+  if (pairing.approximate_sync)
+    approximate_.emplace(kWaiting, pairing.max_interval, [this](const auto&... messages) { onPair(messages...); });
   arrivals_.begin(topics, 0.0);  // long ago: a short recording is judged, too
+}
+
+void CameraInput::onPair(const MessagePtr& left, const MessagePtr& right, const MessagePtr& left_info,
+                         const MessagePtr& right_info) {
+  const ros::Time &stamp = left->header.stamp, &of_right = right->header.stamp;
+  ++paired_;
+  arrivals_.notePair(nanoseconds(stamp), nanoseconds(of_right), newest_.toSec());
+  use_({{left->image, right->image, left_info->info, right_info->info},
+        nanoseconds(stamp),
+        newest_,
+        approximate_ ? secondsBetween(stamp, of_right) : 0.0,
+        {left->recorded, right->recorded}});
+}
+
+int CameraInput::unused() const {
+  return unusable_ +
+         (approximate_ ? std::max(lefts_ - paired_, 0) : given_up_ + static_cast<int>(exact_.waiting()));
+}
+
+std::string CameraInput::problem() {
+  return problem_.empty() ? arrivals_.explainSilence(newest_.toSec()) : problem_;
+}
+
+template <int input>
+void CameraInput::pair(const MessagePtr& message) {
+  if (approximate_)
+    approximate_->add<input>(message);
+  else
+    exact_.add<input>(message);
 }
 
 void CameraInput::add(const StereoMessage& message) {
@@ -44,15 +77,16 @@ void CameraInput::add(const StereoMessage& message) {
   newest_ = message.arrival;
   arrivals_.note(input, nanoseconds(stamp), newest_.toSec());
   if (input == ArrivalLog::kLeftImage) frame_ = message.header.frame_id;
+  lefts_ += input == ArrivalLog::kLeftImage;
   if (const std::string why = whyUnusable(stamp); !why.empty()) {
     ++unusable_;
     problem_ = topics_[input] + ": " + why;
   } else {
     const auto shared = boost::make_shared<const StereoMessage>(message);
-    if (input == ArrivalLog::kLeftImage) pairs_.add<ArrivalLog::kLeftImage>(shared);
-    if (input == ArrivalLog::kRightImage) pairs_.add<ArrivalLog::kRightImage>(shared);
-    if (input == ArrivalLog::kLeftInfo) pairs_.add<ArrivalLog::kLeftInfo>(shared);
-    if (input == ArrivalLog::kRightInfo) pairs_.add<ArrivalLog::kRightInfo>(shared);
+    if (input == ArrivalLog::kLeftImage) pair<ArrivalLog::kLeftImage>(shared);
+    if (input == ArrivalLog::kRightImage) pair<ArrivalLog::kRightImage>(shared);
+    if (input == ArrivalLog::kLeftInfo) pair<ArrivalLog::kLeftInfo>(shared);
+    if (input == ArrivalLog::kRightInfo) pair<ArrivalLog::kRightInfo>(shared);
   }
   if (!infos_ || !message.image) return;
   const auto info = boost::make_shared<sensor_msgs::CameraInfo>((*infos_)[message.input]);
@@ -112,7 +146,9 @@ ArrivalFindings CameraInput::findings(const std::string& base_frame_given, bool 
       found.transform = {
           Verdict::kFail,
           "no transform from " + camera + " to " + base_frame + ": " + (tf_problem_.empty() ? e.what() : tf_problem_),
-          "publish it: URDF, or static_transform_publisher; launch/cameras has an argument mount_rpy"};
+          "publish it in the URDF or by the driver. For a camera that looks ahead: rosrun tf2_ros "
+          "static_transform_publisher 0 0 0 -0.5 0.5 -0.5 0.5 " +
+              base_frame + " " + camera};
   }
   return found;
 }

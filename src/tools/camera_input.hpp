@@ -28,6 +28,7 @@ struct ArrivedPair {
   StereoPairMessages messages;
   std::int64_t stamp;                                                    ///< of the left image, ns
   ros::Time complete;                                                    ///< when the last one came
+  double right_delay;                                                    ///< s, by the stamps; 0 for one trigger
   std::array<std::shared_ptr<const rosbag::MessageInstance>, 2> images;  ///< where a bag has them; null: live
 };
 
@@ -38,7 +39,7 @@ class CameraInput {
   using Use = std::function<void(const ArrivedPair&)>;
 
   /// `infos`: used with each image in place of camera_info messages.
-  CameraInput(const StereoTopics& topics, std::optional<StereoInfos> infos, Use use);
+  CameraInput(const StereoTopics& topics, std::optional<StereoInfos> infos, const PairingOptions& pairing, Use use);
 
   void add(const StereoMessage& message);
   void add(const tf2_msgs::TFMessage& message, bool is_static);
@@ -49,23 +50,31 @@ class CameraInput {
   /// above the camera on TF that is the child frame of an odometry in the bag, else for base_link.
   ArrivalFindings findings(const std::string& base_frame, bool is_recorded);
 
-  /// Number of stamps without a pair, with those that still wait; reason of the last unusable one.
-  int unused() const { return unusable_ + given_up_ + static_cast<int>(pairs_.waiting()); }
-  const std::string& problem() const { return problem_; }
+  /// Number of stamps without a pair, with those that still wait.
+  int unused() const;
+  /// Why there is no pair: what is wrong with the last unusable message, else how the stamps differ.
+  std::string problem();
 
  private:
   using Message = StereoMessage;
+  using MessagePtr = boost::shared_ptr<const Message>;
 
+  void onPair(const MessagePtr& left, const MessagePtr& right, const MessagePtr& left_info,
+              const MessagePtr& right_info);
+  template <int input>
+  void pair(const MessagePtr& message);
   std::string baseAbove(std::string frame) const;
 
   const StereoTopics topics_;
   const std::optional<StereoInfos> infos_;
+  const Use use_;
   UnusedInput unused_{"messages", 1.0};
-  ArrivalLog arrivals_{StereoInputOptions(), unused_, std::numeric_limits<double>::infinity()};
+  ArrivalLog arrivals_;
   ros::Time newest_;  ///< arrival
-  int unusable_ = 0, given_up_ = 0;
-  std::string problem_ = "no four stamps agree", tf_problem_;
-  TriggerSynchroniser<Message, Message, Message, Message> pairs_;
+  int unusable_ = 0, given_up_ = 0, lefts_ = 0, paired_ = 0;
+  std::string problem_, tf_problem_;
+  TriggerSynchroniser<Message, Message, Message, Message> exact_;
+  std::optional<ApproximateSynchroniser<Message, Message, Message, Message>> approximate_;  ///< in its place
   tf2::BufferCore transforms_;
   bool has_transforms_ = false;
   std::optional<std::string> frame_;  ///< of the left images

@@ -38,7 +38,7 @@ void writeCheckPage(const std::string& path, const std::string& camera, const st
   const Verdict verdict = worst.finding.verdict;
   const std::string sentence = verdict == Verdict::kOk ? "OK: every step that this recording shows" : worst.text();
   constexpr std::size_t kMostBytes = 1000000;
-  const std::string pictures = pair.empty() ? "[]" : "[" + pictureOf(pair, "left above right", kMostBytes) + "]";
+  const std::string pictures = pair.empty() ? "[]" : "[" + pictureOf(pair, "left and right, with lines along the rows", kMostBytes) + "]";
   writePage(path, "Stereo camera " + camera, {verdict, sentence}, steps, rows, {{"pictures", pictures}});
 }
 
@@ -81,10 +81,12 @@ void listen(const Arguments& arguments, const StereoTopics& topics, CameraInput&
 int check(const Arguments& arguments) {
   cv::setNumThreads(1);
   const PipelineOptions options = readPipelineOptions(arguments.config, arguments.settings);
+  StereoSource source = arguments.source;
+  source.pairing = options.pairing;
   OfflineRun run(options);
   CameraCheck check(options, run);
   const auto use = [&](const RecordedPair& pair) {
-    check.add(pair, run.process(pair.camera, pair.left, pair.right, pair.stamp));
+    check.add(pair, run.process(pair.camera, pair.left, pair.right, pair.stamp, pair.right_delay));
   };
   const auto report = [&](const std::string& camera, const ArrivalFindings& arrivals) {
     const std::vector<CheckStep> steps = check.steps(arrivals);
@@ -95,25 +97,26 @@ int check(const Arguments& arguments) {
     return exitCodeOf(worstOf(steps).finding.verdict);
   };
   if (!arguments.bag.empty()) {
-    const auto recording = openRecording({arguments.bag}, arguments.source);
+    const auto recording = openRecording({arguments.bag}, source);
     recording->forEach(std::numeric_limits<int>::max(), use, [&](const std::string& why) { check.addUnusable(why); });
     return report(arguments.bag, recording->arrivals(arguments.base_frame));
   }
-  const StereoTopics topics = arguments.source.topics();
-  PairReader reader(topics, arguments.source.fov);
+  const StereoTopics topics = source.topics();
+  PairReader reader(topics, source.fov);
   std::int64_t last_stamp = 0;  // ns
   constexpr std::size_t kWaitingPairs = 100;
-  Worker<StereoPairMessages> worker(kWaitingPairs, [&](const StereoPairMessages& pair) {
-    const std::int64_t stamp = nanoseconds(pair.left_image->header.stamp);
-    if (stamp <= last_stamp) return;  // which the step of the stamps reports
+  Worker<ArrivedPair> worker(kWaitingPairs, [&](const ArrivedPair& pair) {
+    if (pair.stamp <= last_stamp) return;  // which the step of the stamps reports
     try {
-      use(reader.read(pair, stamp));
-      last_stamp = stamp;
+      RecordedPair read = reader.read(pair.messages, pair.stamp);
+      read.right_delay = pair.right_delay;
+      use(read);
+      last_stamp = pair.stamp;
     } catch (const std::exception& e) {
       check.addUnusable(e.what());
     }
   });
-  CameraInput input(topics, infosOf(arguments.source), [&](const ArrivedPair& pair) { worker.push(pair.messages); });
+  CameraInput input(topics, infosOf(source), source.pairing, [&](const ArrivedPair& pair) { worker.push(pair); });
   listen(arguments, topics, input);
   worker.stop();
   ArrivalFindings findings = input.findings(arguments.base_frame, false);

@@ -131,7 +131,9 @@ std::vector<Words> figuresOf(const DriveReport& report, const OfflineRun& run) {
   if (frames.front().odometry.stamp > kThisCentury)
     rows.push_back({"first stamp", dateOf(frames.front().odometry.stamp)});
   if (report.left_out > 0) rows.push_back({"stamps without a usable pair", std::to_string(report.left_out)});
-  for (const SelfCheck& check : report.self_checks) rows.push_back({"implied error", check.text()});
+  for (const SelfCheck& check : report.self_checks)
+    rows.push_back({check.name == "shuttle" ? "implied error, there and back" : "implied error, half of the features each",
+                    check.text()});
   if (const auto errors = errorsOf(report, frames)) {
     const auto& lengths = errors->per_length;
     rows.push_back({"true error", percent(errors->sub_paths.translation_percent) +
@@ -180,9 +182,10 @@ void DrivePictures::add(const RecordedPair& pair, const StereoFeatures& features
   const bool is_due = spread_ < kSpread && seen_ >= (2 * spread_ + 1) * pairs_ / (2 * kSpread);
   if (is_end || is_due) {
     const double seconds = 1e-9 * static_cast<double>(pair.stamp - first_stamp_);
-    pictures_.push_back(
-        {drawLeft(pair, features, result).clone(),
-         text(1, seconds, " s, ", toString(result.state), result.reason.empty() ? "" : ": ", result.reason)});
+    const bool is_new = std::exchange(reason_, result.reason) != result.reason;  // a refused drive has one throughout
+    pictures_.push_back({drawLeft(pair, features, result).clone(),
+                         text(1, seconds, " s, ", toString(result.state), is_new && !reason_.empty() ? ": " : "",
+                              is_new ? reason_ : "")});
   }
   if (is_end) ++ends_;
   if (is_due) ++spread_;

@@ -41,6 +41,7 @@ class DrivePictures {
   int pairs_, seen_ = 0, spread_ = 0, ends_ = 0;
   std::int64_t first_stamp_ = 0;  ///< ns
   bool was_tracking_ = true;
+  std::string reason_;  ///< of the last picture
   std::vector<Picture> pictures_;
 };
 

@@ -82,7 +82,11 @@ int run() {
   PipelineOptions core;
   InterfaceOptions nodelets;
   std::vector<Option> options = listOptions(nodelets);
-  for (const Option& option : listOptions(core)) options.push_back(option);
+  const auto isListed = [&](const Option& added) {
+    return std::any_of(options.begin(), options.end(), [&](const Option& option) { return option.name == added.name; });
+  };
+  for (const Option& option : listOptions(core))
+    if (!isListed(option)) options.push_back(option);
 
   std::cout << "# Parameters\n\n"
                "Private parameters of the nodelets: first the ten that most users change, then all others. Made by "

@@ -42,13 +42,13 @@ OfflineRun::OfflineRun(const PipelineOptions& options)
 }
 
 StereoFeatures OfflineRun::process(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
-                                   std::int64_t stamp) {
-  processBeside(camera, left, right, stamp);
+                                   std::int64_t stamp, double right_delay) {
+  processBeside(camera, left, right, stamp, right_delay);
   return *finish();
 }
 
 void OfflineRun::processBeside(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right,
-                               std::int64_t stamp) {
+                               std::int64_t stamp, double right_delay) {
   const double cpu_before = cpuSeconds();
   Stopwatch stopwatch;
   // The extraction stays in this thread, which has its buffers.
@@ -60,6 +60,7 @@ void OfflineRun::processBeside(const StereoCamera& camera, const cv::Mat& left, 
                                                   : frames_.back().extraction;
   Extracted pair{extractor_.extract(camera, left, right, stamp, cv::Mat(), last), 0.0};
   if (odometry.valid()) odometry.get();
+  pair.features.right_delay = right_delay;
   pair.time = stopwatch.lap();
   waiting_ = std::move(pair);
   cpu_time_ += cpuSeconds() - cpu_before;

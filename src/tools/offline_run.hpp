@@ -21,11 +21,13 @@ class OfflineRun {
   explicit OfflineRun(const PipelineOptions& options);
 
   /// Stamps (ns) must increase. Returns the pair's features.
-  StereoFeatures process(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
+  StereoFeatures process(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp,
+                         double right_delay = 0.0);
 
   /// The same with the odometry of the previous pair in a second thread during this pair's extraction, as in the
   /// nodelets. Results are equal, and available after the next call or finish().
-  void processBeside(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp);
+  void processBeside(const StereoCamera& camera, const cv::Mat& left, const cv::Mat& right, std::int64_t stamp,
+                     double right_delay = 0.0);
   /// Returns the features of the last pair, if its odometry was not done yet.
   std::optional<StereoFeatures> finish();
 

@@ -89,7 +89,7 @@ class BagRecording : public Recording {
  public:
   /// Throws std::runtime_error where a topic is missing.
   BagRecording(const std::vector<std::string>& parts, const StereoSource& source)
-      : fov_(source.fov), infos_(infosOf(source)) {
+      : fov_(source.fov), infos_(infosOf(source)), pairing_(source.pairing) {
     ros::Time begin;  // of the part before; its end may be a little later than the next one's begin
     for (const std::string& part : parts) {
       openBag(part, *bags_.emplace_back(std::make_unique<rosbag::Bag>()));
@@ -124,7 +124,9 @@ class BagRecording : public Recording {
       StereoPairMessages messages = pair->messages;
       messages.left_image = readStereoMessage(*pair->images[0], topics_).image;
       messages.right_image = readStereoMessage(*pair->images[1], topics_).image;
-      use(reader.read(messages, ends - pair->stamp));
+      RecordedPair mirrored = reader.read(messages, ends - pair->stamp);
+      mirrored.right_delay = -pair->right_delay;
+      use(mirrored);
     }
   }
 
@@ -140,7 +142,9 @@ class BagRecording : public Recording {
     const auto isEnough = [&] { return static_cast<int>(used_.size()) == limit; };
     const auto process = [&](const ArrivedPair& pair) {
       try {
-        use(reader.read(pair.messages, pair.stamp));
+        RecordedPair read = reader.read(pair.messages, pair.stamp);
+        read.right_delay = pair.right_delay;
+        use(read);
         used_.push_back(pair);
         used_.back().messages.left_image = used_.back().messages.right_image = nullptr;
       } catch (const std::invalid_argument& e) {
@@ -149,7 +153,7 @@ class BagRecording : public Recording {
         if (refuse) refuse(problem);
       }
     };
-    input_ = std::make_unique<CameraInput>(topics_, infos_, [&](const ArrivedPair& pair) {
+    input_ = std::make_unique<CameraInput>(topics_, infos_, pairing_, [&](const ArrivedPair& pair) {
       for (const auto& passed : filter.add(pair, pair.stamp, nanoseconds(pair.complete))) {
         if (passed.source_restarts > 0 && !refuse)
           throw std::runtime_error(
@@ -173,6 +177,7 @@ class BagRecording : public Recording {
 
   const double fov_;
   const std::optional<StereoInfos> infos_;  ///< in place of those of the bag
+  const PairingOptions pairing_;
   std::vector<std::unique_ptr<rosbag::Bag>> bags_;
   std::string names_;  ///< of the bags, in quotes
   StereoTopics topics_;

@@ -22,6 +22,7 @@ struct RecordedPair {
   std::int64_t stamp;       ///< ns
   std::string lens;         ///< the calibration's model in words; empty: unknown
   std::string unrectified;  ///< evidence that the images are not rectified; empty: none
+  double right_delay = 0.0;  ///< s, of the right image by its stamp, where approximate_sync pairs them
 };
 
 /// Steps of a camera's check that concern how the messages of pairs arrive.

@@ -1,4 +1,6 @@
 // Runs the odometry on recorded drives without a ROS master: the same core as the nodelets, every pair processed.
+#include <ros/time.h>
+
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <filesystem>
@@ -63,9 +65,9 @@ void follow(Recording& recording, const Arguments& arguments, Drive& drive, Plac
   Progress progress(places ? "places" : "odometry", std::min(arguments.frames, recording.size()));
   drive.left_out = recording.forEach(arguments.frames, [&](const RecordedPair& pair) {
     if (arguments.threads > 1 && !places && !arguments.halves && !seen && arguments.pictures.empty()) {
-      drive.whole.processBeside(pair.camera, pair.left, pair.right, pair.stamp);
+      drive.whole.processBeside(pair.camera, pair.left, pair.right, pair.stamp, pair.right_delay);
     } else {
-      const StereoFeatures features = drive.whole.process(pair.camera, pair.left, pair.right, pair.stamp);
+      const StereoFeatures features = drive.whole.process(pair.camera, pair.left, pair.right, pair.stamp, pair.right_delay);
       if (places) places->process(features, drive.whole.last());
       if (!arguments.pictures.empty()) {
         std::ostringstream name;
@@ -91,7 +93,7 @@ std::vector<SelfCheck> checkItself(const Recording& recording, const Drive& driv
     OfflineRun back(options);
     Progress progress("backwards", drive.whole.pairs());
     recording.forEachBackwards([&](const RecordedPair& pair) {
-      back.process(pair.camera, pair.left, pair.right, pair.stamp);
+      back.process(pair.camera, pair.left, pair.right, pair.stamp, pair.right_delay);
       progress.step();
     });
     checks.push_back(checkShuttle(drive.whole, back));
@@ -105,7 +107,7 @@ void writePoses(const std::string& path, const std::string& format, const Offlin
 }
 
 void printSummary(const OfflineRun& run, PipelineOptions options) {
-  std::cout << "options " << hashOptions(listOptions(options)) << "\n"
+  std::cout << "options " << hashOptions(listOptions(options)) << " (a hash: of equal options it is equal)\n"
             << run.pairs() << " pairs, " << run.pairsWithoutPose() << " without a pose, " << run.distance()
             << " m travelled\n"
             << "time per pair: median " << run.time(0.5) << " ms, p95 " << run.time(0.95) << " ms, CPU "
@@ -223,6 +225,8 @@ int run(const Arguments& arguments) {
         "several recordings are run_many's; --join where they are parts of one drive (see --help)");
   cv::setNumThreads(arguments.threads);
   const PipelineOptions options = readPipelineOptions(arguments.config, arguments.settings);
+  StereoSource source = arguments.source;
+  source.pairing = options.pairing;
   std::optional<PlaceRun> places;
   if (arguments.places) places.emplace(options.place_recognition);
   double way = 0.0;  // m, of all recordings
@@ -230,7 +234,7 @@ int run(const Arguments& arguments) {
     Arguments whole = arguments;
     whole.frames = kAll;
     Drive drive(options);
-    follow(*openRecording({before}, arguments.source), whole, drive, &*places);
+    follow(*openRecording({before}, source), whole, drive, &*places);
     way += drive.whole.distance();
     places->startSequence();
   }
@@ -242,7 +246,7 @@ int run(const Arguments& arguments) {
   if (!arguments.pictures.empty() && !fs::is_empty(arguments.pictures))
     throw std::runtime_error("--pictures '" + arguments.pictures + "' is not empty: choose another folder");
   if (!arguments.output.empty()) fs::remove(reportOf(arguments));  // of an earlier run
-  const auto recording = openRecording(arguments.inputs, arguments.source);
+  const auto recording = openRecording(arguments.inputs, source);
   Drive drive(options);
   std::optional<Seen> seen;
   if (!arguments.page.empty())
@@ -274,6 +278,7 @@ int run(const Arguments& arguments) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  ros::Time::init();  // message_filters, by which approximate_sync pairs, asks for the time
   CLI::App app(
       "Stereo odometry of a recorded drive, every pair: a bag, a folder in the layout of KITTI, EuRoC or TUM-VI. Raw "
       "images are rectified. Writes the files that are asked for, such as a --page to look at. Exit code 2: its "

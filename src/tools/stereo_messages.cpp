@@ -94,6 +94,8 @@ void StereoSource::addTo(CLI::App& app) {
   app.add_option("--image", image,
                  "topics: name of the images, such as image_rect_raw; without 'rect' in it they are raw, and rectified")
       ->capture_default_str();
+  app.add_option("--infos", infos, "topics: camera_info of left and right, where they are not beside the images")
+      ->expected(2);
   app.add_option("--calibration", calibration,
                  "in place of camera_info or sensor.yaml: Kalibr's camera chain, or the files of left and right: "
                  "camera_info (YAML) or sensor.yaml of EuRoC")
@@ -111,7 +113,8 @@ std::string StereoSource::folder() const {
 StereoTopics StereoSource::topics() const {
   const std::string of_left = folder() + left + "/", of_right = folder() + right + "/";
   if (calibration.empty())
-    return {of_left + image, of_right + image, of_left + "camera_info", of_right + "camera_info"};
+    return {of_left + image, of_right + image, infos.empty() ? of_left + "camera_info" : infos.front(),
+            infos.empty() ? of_right + "camera_info" : infos.back()};
   return {of_left + image, of_right + image, calibration.front(), calibration.back()};
 }
 

@@ -17,6 +17,8 @@
 #include <string>
 #include <vector>
 
+#include "../config/interface_options.hpp"
+
 namespace sdvo {
 
 /// Topics of a stereo camera: left and right image, left and right calibration (the order of ArrivalLog::Input).
@@ -27,6 +29,8 @@ struct StereoSource {
   std::string camera = "/stereo", left = "left", right = "right", image = "image_rect";
   std::vector<std::string> calibration;  ///< files of readCalibration() in place of camera_info; none: camera_info
   double fov = 0.0;                      ///< of raw images once they are rectified, deg; 0: as calibrated
+  std::vector<std::string> infos;        ///< topics of camera_info, left and right; none: beside the images
+  PairingOptions pairing;
 
   void addTo(CLI::App& app);
   std::string folder() const;  ///< the namespace, which ends with `/`
@@ -93,6 +97,14 @@ struct StereoMessage {
   sensor_msgs::CameraInfoConstPtr info;
   std::shared_ptr<const rosbag::MessageInstance> recorded = nullptr;  ///< where the bag has it; null: live
 };
+
+}  // namespace sdvo
+
+/// By which message_filters finds the stamp.
+template <>
+struct ros::message_traits::HasHeader<sdvo::StereoMessage> : TrueType {};
+
+namespace sdvo {
 
 /// From an image or a camera_info.
 inline StereoMessage toStereoMessage(std::size_t input, const ros::Time& arrival,

@@ -17,7 +17,7 @@ class ArrivalLogTest : public ::testing::Test {
 
   static StereoInputOptions options(bool approximate) {
     StereoInputOptions options;
-    options.approximate_sync = approximate;
+    options.pairing.approximate_sync = approximate;
     return options;
   }
 
@@ -66,7 +66,7 @@ TEST_F(ArrivalLogTest, AnAccidentIsCountedAndNotSaid) {
 struct JitterTest : ArrivalLogTest {
   int used = 0;
   TriggerSynchroniser<sensor_msgs::Image, sensor_msgs::Image, sensor_msgs::CameraInfo, sensor_msgs::CameraInfo>
-      synchroniser{options(false).sync_queue_size, options(false).sync_tolerance,
+      synchroniser{options(false).sync_queue_size, options(false).pairing.sync_tolerance,
                    [this](const auto& left, const auto& right, const auto&, const auto&) {
                      ++used;
                      log_.notePair(nanoseconds(left->header.stamp), nanoseconds(right->header.stamp), now);
@@ -105,7 +105,7 @@ TEST_F(JitterTest, OfFiveHundredPairsWhoseStampsDifferEachIsUsedOrCountedAndTheS
   }
   const std::string loss = log_.explainLoss(now);
   expectWords(loss, {"stereo pairs in 5 s are not used", "left and", "the nearest stamps of left and right are 1.",
-                     "ms apart, more than sync_tolerance (1.0 ms): set a larger sync_tolerance"});
+                     "ms apart, more than sync_tolerance (1.0 ms): set sync_tolerance to 0.0"});
   log_.explainLoss(now + 10.0);  // what waits for partners is given up
   EXPECT_GT(used, 80);
   EXPECT_LT(used, 200);

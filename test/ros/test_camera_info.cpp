@@ -74,8 +74,8 @@ TEST(ToStereoCamera, RefusesWhatIsNoRectifiedPair) {
                   {[](Infos& i) { i.left = cameraInfo(0.0, -700.0), i.right = cameraInfo(-350.0, -700.0); },
                    "left camera_info: a focal length in P is negative"},
                   {[](Infos& i) { i.right.P[3] = 350.0; }, "wrong sign"},
-                  {[](Infos& i) { i.right = cameraInfo(-350.0, 701.0); }, "not rectified"},
-                  {[](Infos& i) { i.right.P[5] = 650.0; }, "not rectified"},
+                  {[](Infos& i) { i.right = cameraInfo(-350.0, 701.0); }, "single calibrations"},
+                  {[](Infos& i) { i.right.P[5] = 650.0; }, "single calibrations"},
                   // Rectified without CALIB_ZERO_DISPARITY: depth would be wrong everywhere.
                   {[](Infos& i) { i.right.P[2] += 5.0; }, "principal point"},
                   {[](Infos& i) { i.right.P[6] += 5.0; }, "principal point"},
