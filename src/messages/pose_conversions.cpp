@@ -27,6 +27,7 @@ constexpr const char* kAxes[] = {"x", "y", "z", "roll", "pitch", "yaw"};
 Matrix6d meantCovariance(const Matrix6d& sent) {
   constexpr double kNone = 1e-6;      // m^2, rad^2, for a variance of zero
   constexpr double kRounding = 1e-3;  // of a correlation, between floats
+  constexpr double kLargest = 1e16;   // m^2, rad^2: of the farthest position
   const auto between = [](int i, int j) { return std::string("covariance of ") + kAxes[i] + " and " + kAxes[j]; };
   Matrix6d meant;
   for (int i = 0; i < 6; ++i)
@@ -34,6 +35,9 @@ Matrix6d meantCovariance(const Matrix6d& sent) {
       const double lower = sent(i, j), upper = sent(j, i);
       if (!std::isfinite(lower) || !std::isfinite(upper))
         throw std::invalid_argument("the " + between(i, j) + " is not finite: send a number, 0 if it is not known");
+      if (i == j && lower > kLargest)
+        throw std::invalid_argument(std::string("the covariance's variance of ") + kAxes[i] +
+                                    " is beyond 1e16: send at most that for what is not known");
       if (i == j && lower < 0.0)
         throw std::invalid_argument(std::string("the covariance's variance of ") + kAxes[i] +
                                     " is negative: send it in m^2 or rad^2, 0 for 1 mm or 1 mrad");
@@ -70,6 +74,10 @@ Eigen::Translation3d checked(double x, double y, double z) {
 }
 
 }  // namespace
+
+Eigen::Isometry3d bodyToOptical() {
+  return Eigen::Isometry3d(Eigen::Quaterniond(0.5, -0.5, 0.5, -0.5));
+}
 
 Eigen::Isometry3d toPose(const std::string& text) {
   std::istringstream stream(text);

@@ -10,6 +10,9 @@
 
 namespace sdvo::ros_conversions {
 
+/// T_body_optical at one place: a body's axes are x ahead, y left, z up, an optical frame's x right, y down, z ahead.
+Eigen::Isometry3d bodyToOptical();
+
 /// A pose of six numbers, "x y z roll pitch yaw" (m, rad; about the fixed axes x, y and z in this order, as in URDF).
 /// Throws std::invalid_argument when it is none.
 Eigen::Isometry3d toPose(const std::string& text);

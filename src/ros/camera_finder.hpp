@@ -33,6 +33,10 @@ class CameraFinder {
   /// `ns` of the node; `left` and `right`: its names of the images.
   CameraFinder(const std::string& ns, std::string left, std::string right);
 
+  /// Whether topics are of interest: before the first pairs, and since another camera was chosen, for its driver and the
+  /// node's own may take turns.
+  bool isSearching(bool has_pairs) const { return !has_pairs || has_chosen_; }
+
   /// `topics`: those that are published. True if the node must subscribe to other images; `report` has the reason, or
   /// why none was chosen.
   bool update(const ros::master::V_TopicInfo& topics, std::string& report);
@@ -46,6 +50,7 @@ class CameraFinder {
  private:
   const std::string ns_, left_, right_;
   ros::M_string names_;
+  bool has_chosen_ = false;
 };
 
 }  // namespace sdvo

@@ -2,11 +2,14 @@
 
 #include <utility>
 
+#include "../common/text.hpp"
 #include "../messages/frames.hpp"
 #include "../messages/stamps.hpp"
 
 namespace sdvo {
 namespace {
+
+constexpr double kFastest = 100.0;  // rad/s (chosen), beyond the range of gyros of 2000 and 4000 deg/s
 
 const std::string kNoRates = " measures no rates (angular_velocity_covariance[0] is -1)";
 const std::string kNoAccelerations = " measures no accelerations (linear_acceleration_covariance[0] is -1)";
@@ -22,7 +25,13 @@ ImuInput::ImuInput(ros::NodeHandle& nh, const RobotTransforms& transforms, Unuse
 }
 
 void ImuInput::take(const sensor_msgs::Imu& message) {
-  const std::string problem = whyUnusable(message.header.stamp);
+  constexpr double kNotThere = -1.0;  // sensor_msgs/Imu: first element of the covariance of what is not measured
+  const auto& rate = message.angular_velocity;
+  const auto& acceleration = message.linear_acceleration;
+  const bool has_rates = message.angular_velocity_covariance[0] != kNotThere;
+  std::string problem = whyUnusable(message.header.stamp);
+  if (problem.empty() && has_rates && !(Eigen::Vector3d(rate.x, rate.y, rate.z).norm() <= kFastest))
+    problem = text(0, "its rate is no number, or beyond ", kFastest, " rad/s");
   if (!problem.empty()) {
     unused_.add(UnusedInput::kImu);
     return warn_(topic() + ": a message of the IMU is not used: " + problem);
@@ -31,12 +40,8 @@ void ImuInput::take(const sensor_msgs::Imu& message) {
     const std::lock_guard<std::mutex> lock(mutex_);
     frame_ = ros_conversions::cleanFrameId(message.header.frame_id);
   }
-  constexpr double kNotThere = -1.0;  // sensor_msgs/Imu: first element of the covariance of what is not measured
-  const auto& rate = message.angular_velocity;
-  const auto& acceleration = message.linear_acceleration;
   const std::int64_t stamp = nanoseconds(message.header.stamp);
   has_accelerations_ = message.linear_acceleration_covariance[0] != kNotThere;
-  const bool has_rates = message.angular_velocity_covariance[0] != kNotThere;
   if (has_rates_.exchange(has_rates) && !has_rates) warn_(topic() + kNoRates + ": no guess of the rotation");
   if (has_rates) gyro_.add(stamp, nanoseconds(ros::Time::now()), {rate.x, rate.y, rate.z});
   if (has_accelerations_)

@@ -14,22 +14,22 @@ OdometryPairInput::OdometryPairInput(const ros::NodeHandle& nh, int queue_size, 
       callback_(std::move(callback)),
       refuse_(std::move(refuse)),
       unused_(unused),
+      synchroniser_(makeSynchroniser()),
       subscriptions_(
           [this] {
-            if (!synchroniser_) beginAnew();
             return std::vector<ros::Subscriber>{subscribe<0, Features>("stereo_features"),
                                                 subscribe<1, Odometry>("odom"), subscribe<2, Info>("vo_info")};
           },
           [this] {
             ++resumes_;
-            beginAnew();
+            synchroniser_ = makeSynchroniser();
           }) {}
 
 std::string OdometryPairInput::topics() const {
   return nh_.resolveName("stereo_features") + ", " + nh_.resolveName("odom") + " and " + nh_.resolveName("vo_info");
 }
 
-void OdometryPairInput::beginAnew() {
+std::unique_ptr<OdometryPairInput::Synchroniser> OdometryPairInput::makeSynchroniser() {
   const auto onPair = [this](const Features::ConstPtr& features, const Odometry::ConstPtr& odometry,
                              const Info::ConstPtr& info) {
     callback_({features, odometry, info, resumes_});
@@ -37,11 +37,11 @@ void OdometryPairInput::beginAnew() {
   };
   const auto onUnpaired = [this](const Features::ConstPtr&, const Odometry::ConstPtr& odometry,
                                  const Info::ConstPtr& info) {
-    const bool has_odometry = !info || (info->state != "LOST" && info->state != "WAITING");
+    const bool has_odometry = info && info->state != "LOST" && info->state != "WAITING";
     if (odometry || has_odometry) unused_.add(UnusedInput::kUnpaired);
   };
   constexpr double kEqual = 0.0;  // s: all three have the stamp of the left image
-  synchroniser_ = std::make_unique<Synchroniser>(queue_size_, kEqual, onPair, onUnpaired);
+  return std::make_unique<Synchroniser>(queue_size_, kEqual, onPair, onUnpaired);
 }
 
 template <int input, class Message>

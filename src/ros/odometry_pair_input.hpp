@@ -31,7 +31,7 @@ class OdometryPairInput {
   using Refusal = std::function<void(const std::string& topic, const ros::Time& stamp, const std::string& why)>;
 
   /// `queue_size`: incomplete pairs that wait. Refused messages count as `unused`, and incomplete pairs unless the
-  /// odometry had no pose.
+  /// odometry had no pose, or is paused and says nothing.
   OdometryPairInput(const ros::NodeHandle& nh, int queue_size, UnusedInput& unused, Callback callback, Refusal refuse);
 
   /// While they are paused the image side has one listener less.
@@ -46,7 +46,7 @@ class OdometryPairInput {
   using Info = stereo_descriptor_vo::VoInfo;
   using Synchroniser = TriggerSynchroniser<Features, Odometry, Info>;
 
-  void beginAnew();
+  std::unique_ptr<Synchroniser> makeSynchroniser();
   template <int input, class Message>
   ros::Subscriber subscribe(const std::string& topic);
   template <int input, class Message>

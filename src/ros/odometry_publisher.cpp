@@ -1,5 +1,7 @@
 #include "odometry_publisher.hpp"
 
+#include <tf2_eigen/tf2_eigen.h>
+
 #include <boost/make_shared.hpp>
 #include <limits>
 
@@ -34,9 +36,11 @@ OdometryPublisher::OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOp
   });
 }
 
-void OdometryPublisher::publish(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera) {
+void OdometryPublisher::publish(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera,
+                                const std::optional<Eigen::Isometry3d>& T_guess_base) {
+  const ros::Time stamp = ros::Time().fromNSec(static_cast<std::uint64_t>(result.stamp));
   if (!result.has_pose) {
-    const ros::Time stamp = ros::Time().fromNSec(static_cast<std::uint64_t>(result.stamp));
+    sendCorrection(stamp);
     // By pointer as below: roscpp may swap messages that reach a subscriber of this process by value and by pointer.
     if (options_.publish_null_when_lost && result.state == TrackingState::kLost)
       odom_publisher_.publish(boost::make_shared<nav_msgs::Odometry>(ros_conversions::toNullOdometry(stamp, frames_)));
@@ -45,13 +49,28 @@ void OdometryPublisher::publish(const OdometryResult& result, const Eigen::Isome
   const auto odometry = boost::make_shared<nav_msgs::Odometry>(
       ros_conversions::toOdometry(result, T_base_camera, frames_, T_odom_start_));
   // TF first: whoever acts on the odometry finds the transform there.
-  if (options_.publish_tf) transform_publisher_.send(ros_conversions::toTransform(*odometry, options_.invert_tf));
+  Eigen::Isometry3d T_odom_base;
+  tf2::fromMsg(odometry->pose.pose, T_odom_base);
+  if (T_guess_base) T_odom_guess_ = T_odom_base * T_guess_base->inverse();
+  sendCorrection(stamp);
+  if (options_.publish_tf && !options_.correctsGuess())
+    transform_publisher_.send(ros_conversions::toTransform(*odometry, options_.invert_tf));
   odom_publisher_.publish(odometry);
   const auto pose = boost::make_shared<geometry_msgs::PoseWithCovarianceStamped>();
   pose->header = odometry->header;
   pose->pose = odometry->pose;
   pose_publisher_.publish(pose);
   extendPath(*odometry);
+}
+
+/// odom -> guess_frame_id stays without a pose: meanwhile the other odometry carries the base.
+void OdometryPublisher::sendCorrection(const ros::Time& stamp) {
+  if (!options_.correctsGuess() || !T_odom_guess_) return;
+  geometry_msgs::TransformStamped correction = tf2::eigenToTransform(*T_odom_guess_);
+  correction.header.stamp = stamp;
+  correction.header.frame_id = frames_.odom;
+  correction.child_frame_id = ros_conversions::cleanFrameId(options_.guess_frame_id);
+  transform_publisher_.send(correction);
 }
 
 stereo_descriptor_vo::VoInfo OdometryPublisher::publishInfo(stereo_descriptor_vo::VoInfo info, const ros::Time& stamp) {
@@ -89,6 +108,7 @@ void OdometryPublisher::publishPoints(const StereoFeaturesView& features) {
 
 void OdometryPublisher::restart(const Eigen::Isometry3d& T_odom_start) {
   moveTo(T_odom_start);
+  T_odom_guess_.reset();
   const std::lock_guard<std::mutex> lock(path_mutex_);
   if (!path_.empty()) path_changed_ = true;
   path_.clear();

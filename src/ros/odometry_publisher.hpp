@@ -7,6 +7,7 @@
 #include <atomic>
 #include <boost/circular_buffer.hpp>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "../config/interface_options.hpp"
@@ -23,8 +24,10 @@ class OdometryPublisher {
   /// `tag`: of TransformPublisher.
   OdometryPublisher(ros::NodeHandle& nh, const OdometryOutputOptions& options, std::uint32_t tag);
 
-  /// Without a pose publishes neither odom nor TF; with publish_null_when_lost an odom of zeros.
-  void publish(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera);
+  /// Without a pose publishes neither odom nor TF; with publish_null_when_lost an odom of zeros. `T_guess_base`: by the
+  /// odometry of guess_frame_id, where it is known.
+  void publish(const OdometryResult& result, const Eigen::Isometry3d& T_base_camera,
+               const std::optional<Eigen::Isometry3d>& T_guess_base = std::nullopt);
   /// Fills in header, session and latency; returns what was published.
   stereo_descriptor_vo::VoInfo publishInfo(stereo_descriptor_vo::VoInfo info, const ros::Time& stamp);
   void publishFlow(const OdometryResult& result, const StereoFeatures& features, const std_msgs::Header& header);
@@ -54,6 +57,7 @@ class OdometryPublisher {
   static constexpr double kPathPeriod = 1.0;  // s of wall time
 
   void extendPath(const nav_msgs::Odometry& odometry);
+  void sendCorrection(const ros::Time& stamp);
 
   OdometryOutputOptions options_;
   ros_conversions::OdometryFrames frames_;
@@ -62,6 +66,7 @@ class OdometryPublisher {
       flow_publisher_;
   TransformPublisher transform_publisher_;
   Eigen::Isometry3d T_odom_start_ = Eigen::Isometry3d::Identity();
+  std::optional<Eigen::Isometry3d> T_odom_guess_;  ///< at the last pose
   mutable std::mutex path_mutex_;
   boost::circular_buffer<PathPose> path_;
   std::atomic<bool> path_changed_{false};  ///< since it was published

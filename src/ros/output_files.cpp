@@ -37,8 +37,14 @@ void writeKitti(const nav_msgs::Path& poses, const Eigen::Isometry3d& T_base_cam
 std::string inRosHome(const std::string& path) {
   const char *ros_home = std::getenv("ROS_HOME"), *home = std::getenv("HOME");
   if (path.empty() || (!ros_home && !home)) return path;
-  if (home && path.compare(0, 2, "~/") == 0) return home + path.substr(1);  // no shell has replaced it
-  return ((ros_home ? std::filesystem::path(ros_home) : std::filesystem::path(home) / ".ros") / path).string();
+  namespace fs = std::filesystem;
+  const bool in_home = home && path.compare(0, 2, "~/") == 0;  // no shell has replaced it
+  const fs::path whole = in_home    ? fs::path(home + path.substr(1))
+                         : ros_home ? fs::path(ros_home) / path
+                                    : fs::path(home) / ".ros" / path;
+  std::error_code failed;
+  const fs::path real = fs::weakly_canonical(whole, failed);
+  return (failed ? whole : real).string();
 }
 
 void saveTrajectory(const nav_msgs::Path& poses, const Eigen::Isometry3d& T_base_camera, const std::string& format,

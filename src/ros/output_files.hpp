@@ -51,7 +51,7 @@ class OutputBag {
   bool closed_ = false;
 };
 
-/// Relative paths begin in ROS_HOME (~/.ros), where roslaunch starts nodes.
+/// The one spelling of a file's path. Relative paths begin in ROS_HOME (~/.ros), where roslaunch starts nodes.
 std::string inRosHome(const std::string& path);
 
 /// Writes the poses of the base as SaveTrajectory.srv describes it. A file appears whole or not at all. Throws

@@ -29,6 +29,7 @@
 #include "place_session.hpp"
 #include "places_file.hpp"
 #include "robot_nodelet.hpp"
+#include "signals.hpp"
 #include "stereo_descriptor_vo/places/place_recognition.hpp"
 #include "transforms.hpp"
 
@@ -94,8 +95,10 @@ class PlaceRecognitionNodelet : public RobotNodelet {
       if (!place) throw std::invalid_argument("there is no place " + std::to_string(request.id));
       response.place = *place;
     });
-    if (options_.save_at_shutdown)
+    if (options_.save_at_shutdown) {
+      endAsBySigint();
       saving_ = disk_nh.createWallTimer(kSavePeriod, [this](const ros::WallTimerEvent&) { saveByItself(false); });
+    }
     observer_ = std::make_unique<Worker<Arrived>>(static_cast<std::size_t>(options_.queue_size),
                                                   [this](const Arrived& arrived) { observe(arrived); });
     optimiser_ = std::make_unique<Worker<Job>>(1, [this](const Job& job) { optimise(job); });
@@ -233,9 +236,12 @@ class PlaceRecognitionNodelet : public RobotNodelet {
     replace(std::move(anew));
   }
 
-  /// A session with the places of a file, if it exists.
-  std::shared_ptr<PlaceSession> sessionOf(const std::string& file) const {
+  /// A session with the places of a file, if it exists and can be read.
+  std::shared_ptr<PlaceSession> sessionOf(const std::string& file) const try {
     return std::filesystem::exists(file) ? load(file) : std::make_shared<PlaceSession>(recognition_options_);
+  } catch (const std::exception& e) {
+    NODELET_ERROR_STREAM("begins without places, those of the file cannot be read: " << e.what());
+    return std::make_shared<PlaceSession>(recognition_options_);
   }
 
   void replace(std::shared_ptr<PlaceSession> session) {

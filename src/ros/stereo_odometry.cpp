@@ -10,6 +10,7 @@
 
 #include "../config/interface_options.hpp"
 #include "params.hpp"
+#include "signals.hpp"
 #include "stereo_descriptor_vo/front_end/feature_extractor.hpp"
 #include "stereo_descriptor_vo/options/visual_odometry_options.hpp"
 
@@ -66,6 +67,7 @@ int main(int argc, char** argv) {
   const std::vector<std::string> arguments(argv + 1, argv + argc);
   ros::init(argc, argv, "stereo_odometry");
   const ros::NodeHandle private_nh("~");
+  sdvo::endAsBySigint();  // what follows ros::spin() happens after any of them
   std::vector<std::string> mine;  // parameters that nobody else gave
   for (const std::string& argument : arguments)
     if (argument.find(":=") != std::string::npos && argument[0] == '_' && argument[1] != '_')

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <exception>
+#include <stdexcept>
 #include <utility>
 
 #include "../common/text.hpp"
@@ -17,6 +18,20 @@
 namespace sdvo {
 
 using ros_conversions::cleanFrameId;
+
+namespace {
+
+/// Throws std::invalid_argument for what is no place on a robot, nor on the earth.
+Eigen::Isometry3d checked(const geometry_msgs::TransformStamped& transform) {
+  constexpr double kFarthest = 1e8;  // m, as of poses
+  const Eigen::Isometry3d T = tf2::transformToEigen(transform);
+  if (!(T.translation().norm() <= kFarthest) || !T.matrix().allFinite())
+    throw std::invalid_argument("TF has '" + transform.child_frame_id + "' beyond 1e8 m of '" +
+                                transform.header.frame_id + "': correct its publisher");
+  return T;
+}
+
+}  // namespace
 
 RobotTransforms::RobotTransforms(ros::NodeHandle& nh, std::optional<ros_conversions::OdometryFrames> ours,
                                  std::uint32_t tag, Report warn)
@@ -33,8 +48,8 @@ RobotTransforms::RobotTransforms(ros::NodeHandle& nh, std::optional<ros_conversi
 }
 
 std::optional<Eigen::Isometry3d> RobotTransforms::find(const std::string& parent, const std::string& child,
-                                                       std::string& problem) const try {
-  return tf2::transformToEigen(buffer_.lookupTransform(parent, child, ros::Time(0)));
+                                                       std::string& problem, const ros::Time& time) const try {
+  return checked(buffer_.lookupTransform(parent, child, time));
 } catch (const std::exception& e) {
   problem = e.what();
   return std::nullopt;
@@ -43,13 +58,24 @@ std::optional<Eigen::Isometry3d> RobotTransforms::find(const std::string& parent
 std::optional<Eigen::Isometry3d> RobotTransforms::findMotion(const std::string& fixed, const std::string& child,
                                                              const ros::Time& from, const ros::Time& to,
                                                              std::string& problem) const try {
-  return tf2::transformToEigen(buffer_.lookupTransform(child, from, child, to, fixed));
+  return checked(buffer_.lookupTransform(child, from, child, to, fixed));
 } catch (const std::exception& e) {
   problem = e.what();
   return std::nullopt;
 }
 
+void RobotTransforms::claim(const ros_conversions::OdometryFrames& ours) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ours_ = ours;
+}
+
+std::optional<ros_conversions::OdometryFrames> RobotTransforms::ours() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return ours_;
+}
+
 void RobotTransforms::receive(const Event& event, bool is_static) {
+  constexpr double kAhead = 10.0;  // s that tf2 keeps before the newest one: it would refuse all of the present
   const ros::Time now = ros::Time::now();
   if (now < last_update_) buffer_.clear();  // the clock jumped back: static transforms stay
   last_update_ = now;
@@ -57,6 +83,8 @@ void RobotTransforms::receive(const Event& event, bool is_static) {
   for (const geometry_msgs::TransformStamped& transform : event.getMessage()->transforms) try {
       const bool is_timeless = transform.header.stamp.isZero();
       if (!is_timeless && !whyUnusable(transform.header.stamp).empty()) continue;
+      if (const double ahead = secondsBetween(now, transform.header.stamp); !now.isZero() && !is_static && ahead > kAhead)
+        throw std::invalid_argument(text(1, "its stamp is ", ahead, " s ahead of this machine's clock"));
       buffer_.setTransform(transform, publisher, is_static);
       watch(transform, publisher);
     } catch (const std::exception& e) {
@@ -66,23 +94,24 @@ void RobotTransforms::receive(const Event& event, bool is_static) {
 }
 
 void RobotTransforms::watch(const geometry_msgs::TransformStamped& transform, const std::string& publisher) {
-  if (!ours_) return;
+  const std::optional<ros_conversions::OdometryFrames> ours = this->ours();
+  if (!ours) return;
   const std::string parent = cleanFrameId(transform.header.frame_id);
   const std::string child = cleanFrameId(transform.child_frame_id);
   const std::string& us = ros::this_node::getName();
-  if (publisher == us && parent == ours_->odom && child == ours_->base && transform.header.seq == tag_) return;
+  if (publisher == us && parent == ours->odom && child == ours->base && transform.header.seq == tag_) return;
   if (!watched_.insert(publisher + " " + parent + " " + child).second) return;
   const std::string who = publisher == us ? "another nodelet of " + us : publisher;
   const std::string contention = "TF: " + who + " publishes " + parent + " -> " + child + ", " + us + " publishes " +
-                                 ours_->odom + " -> " + ours_->base;
-  if (child == ours_->base && parent == ours_->odom)
+                                 ours->odom + " -> " + ours->base;
+  if (child == ours->base && parent == ours->odom)
     warn_(contention + ": frame '" + child + "' jumps between the two; set publish_tf to false in one of them");
-  else if (child == ours_->base)
+  else if (child == ours->base)
     warn_(contention + ": '" + child + "' has a parent already, '" + parent +
           "'. If that is a part of the robot, set " + "base_frame_id:=" + parent +
           " (or invert_tf), else set publish_tf to false in one of them");
-  else if ((child == ours_->odom || hasAncestor(ours_->odom, child)) &&
-           (parent == ours_->base || hasAncestor(parent, ours_->base)))
+  else if ((child == ours->odom || hasAncestor(ours->odom, child)) &&
+           (parent == ours->base || hasAncestor(parent, ours->base)))
     warn_(contention + ": a cycle; nothing can be looked up on TF. Swap frames, or set publish_tf to false here");
 }
 
@@ -101,24 +130,48 @@ bool RobotTransforms::hasAncestor(const std::string& frame, const std::string& a
   return std::any_of(all.begin(), all.end(), [&](const auto& each) { return cleanFrameId(each) == ancestor; });
 }
 
+/// `base_frame`, or the frame below it whose name begins most like that of `frame`: a part of the same camera.
+std::string RobotTransforms::nearestBelow(const std::string& base_frame, const std::string& frame) const {
+  constexpr std::ptrdiff_t kLeast = 3;  // letters (chosen)
+  std::vector<std::string> all;
+  buffer_._getFrameStrings(all);
+  std::string nearest = base_frame;
+  std::ptrdiff_t most = kLeast;
+  for (const std::string& each : all) {
+    const auto differ = std::mismatch(each.begin(), each.end(), frame.begin(), frame.end());
+    const std::ptrdiff_t alike = differ.first - each.begin();
+    if (alike <= most || !hasAncestor(each, base_frame)) continue;
+    nearest = each;
+    most = alike;
+  }
+  return nearest;
+}
+
 std::string RobotTransforms::explainMissing(const std::string& base_frame, const std::string& camera_frame) const {
   if (camera_frame.empty()) return "the left images have no frame_id: set the camera's optical frame in its driver";
-  const bool is_base = camera_frame == base_frame;  // tf2 refuses a transform from a frame to itself
-  if (is_base || (ours_ && camera_frame == ours_->odom))
-    return "the left images' frame_id is '" + camera_frame + "', as " + (is_base ? "base" : "odom") +
-           "_frame_id: set the camera's optical frame in its driver";
+  const std::optional<ros_conversions::OdometryFrames> ours = this->ours();
+  if (ours && camera_frame == ours->odom)
+    return "the left images' frame_id is '" + camera_frame +
+           "', as odom_frame_id: set the camera's optical frame in its driver";
   const std::string missing =
       "no transform from camera frame '" + camera_frame + "' to base frame '" + base_frame + "' on TF: ";
   const std::vector<std::string> above = ancestors(camera_frame);
-  const std::string root = above.empty() ? camera_frame : above.back();
+  const std::string root = cleanFrameId(above.empty() ? camera_frame : above.back());
   if (isMoving(root, camera_frame)) {  // `root` may be a world's frame, of another odometry
     std::string names;
     for (const std::string& frame : above) names += (names.empty() ? "'" : ", '") + cleanFrameId(frame) + "'";
     return missing + "it has the camera below " + names + "; set base_frame_id to the robot's own one of these";
   }
-  return missing + "publish " + base_frame + " -> " + cleanFrameId(root) +
-         " (static; `mount_rpy` of the camera's launch file), or set base_frame_id" +
-         (above.empty() ? "" : " to '" + cleanFrameId(root) + "', where TF has the camera");
+  const bool has_base = buffer_._frameExists(base_frame);
+  const std::string last = nearestBelow(base_frame, root);
+  const bool is_optical = above.empty();  // nothing but the images names it
+  return missing + "the link " + last + " -> " + root + " is missing (TF has " +
+         (has_base ? "" : "no '" + base_frame + "' and ") +
+         (is_optical ? "nothing above '" + camera_frame + "'" : "'" + camera_frame + "' below '" + root + "'") +
+         "). Let the robot's URDF or the camera's driver publish it. For a camera that looks ahead: rosrun tf2_ros "
+         "static_transform_publisher 0 0 0 " +
+         (is_optical ? "-0.5 0.5 -0.5 0.5 " : "0 0 0 ") + last + " " + root +
+         (has_base ? "" : ". For one in the hand: base_frame_id:=" + root);
 }
 
 bool RobotTransforms::isMoving(const std::string& parent, const std::string& child) const try {

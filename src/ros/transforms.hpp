@@ -20,7 +20,7 @@
 namespace sdvo {
 
 /// Listens to TF. An exception in tf2_ros' own listener ends the process, for example of one wild stamp on /tf; here
-/// such a transform is left out. Warns of publishers that contradict this node's transform.
+/// such a transform is left out. Warns of publishers that contradict this node's transform. For any thread.
 class RobotTransforms {
  public:
   using Report = std::function<void(const std::string&)>;
@@ -30,14 +30,15 @@ class RobotTransforms {
   RobotTransforms(ros::NodeHandle& nh, std::optional<ros_conversions::OdometryFrames> ours, std::uint32_t tag,
                   Report warn);
 
-  /// Sets `ours` later. For the thread of its callbacks.
-  void claim(ros_conversions::OdometryFrames ours) { ours_ = std::move(ours); }
+  /// Sets `ours` later.
+  void claim(const ros_conversions::OdometryFrames& ours);
 
-  /// T_parent_child at the newest time known. None, with the `problem`, while TF has no such transform.
-  std::optional<Eigen::Isometry3d> find(const std::string& parent, const std::string& child,
-                                        std::string& problem) const;
+  /// T_parent_child at a time, by default at the newest one known. None, with the `problem`, while TF has no such
+  /// transform.
+  std::optional<Eigen::Isometry3d> find(const std::string& parent, const std::string& child, std::string& problem,
+                                        const ros::Time& time = ros::Time(0)) const;
 
-  /// Why find() returns none, and what to publish.
+  /// Why find() returns none: the link that lacks, and a command that publishes it.
   std::string explainMissing(const std::string& base_frame, const std::string& camera_frame) const;
 
   /// T_child(from)_child(to): motion of a frame between two times, by its pose in `fixed`.
@@ -51,9 +52,12 @@ class RobotTransforms {
   void watch(const geometry_msgs::TransformStamped& transform, const std::string& publisher);
   std::vector<std::string> ancestors(const std::string& frame) const;
   bool hasAncestor(const std::string& frame, const std::string& ancestor) const;
+  std::string nearestBelow(const std::string& base_frame, const std::string& frame) const;
+  std::optional<ros_conversions::OdometryFrames> ours() const;
   bool isMoving(const std::string& parent, const std::string& child) const;
 
-  std::optional<ros_conversions::OdometryFrames> ours_;
+  mutable std::mutex mutex_;
+  std::optional<ros_conversions::OdometryFrames> ours_;  // under the mutex
   const std::uint32_t tag_;
   Report warn_;
   tf2::BufferCore buffer_;

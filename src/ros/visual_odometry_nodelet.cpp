@@ -147,7 +147,8 @@ class VisualOdometryNodelet : public RobotNodelet {
   /// Parent and child of the transform that is published on TF.
   std::optional<ros_conversions::OdometryFrames> publishedFrames() const {
     if (!options_.publish_tf) return std::nullopt;
-    ros_conversions::OdometryFrames frames{options_.odom_frame_id, options_.base_frame_id};
+    ros_conversions::OdometryFrames frames{
+        options_.odom_frame_id, options_.correctsGuess() ? options_.guess_frame_id : options_.base_frame_id};
     if (options_.invert_tf) std::swap(frames.odom, frames.base);
     return frames;
   }
@@ -280,7 +281,10 @@ class VisualOdometryNodelet : public RobotNodelet {
     processed_stamp_ = message.header.stamp;
     epoch_ = result.epoch;
     report(result, message.header.stamp);
-    publisher_->publish(result, *mount_->last());
+    std::optional<Eigen::Isometry3d> T_guess_base;
+    if (std::string ignored; options_.correctsGuess())
+      T_guess_base = transforms_->find(options_.guess_frame_id, options_.base_frame_id, ignored, message.header.stamp);
+    publisher_->publish(result, *mount_->last(), T_guess_base);
     if (publisher_->wantsMap() && result.has_pose)
       publisher_->publishMap(odometry_->mapPoints(), result.T_origin_camera, message.header);
     return result;
@@ -293,7 +297,7 @@ class VisualOdometryNodelet : public RobotNodelet {
       if (!std::exchange(last, found).isFault() && found.isFault())
         NODELET_WARN_STREAM(step << ": " << found.text() << consequence);
     };
-    optical_axis_.add(*mount_->last(), result.T_previous_current);
+    if (!base_is_camera_) optical_axis_.add(*mount_->last(), result.T_previous_current);
     warnOnce("axes", optical_found_, optical_axis_.judge(), "");
     constexpr double kSame = 1e-3;  // s: after an outage the motion is of another time than the guess
     if (!guess || !guess->rotation_only ||
@@ -446,6 +450,10 @@ class VisualOdometryNodelet : public RobotNodelet {
     if (const std::optional<Eigen::Isometry3d> found = mount_->find(base_frame, camera_frame, problem)) {
       if (const Finding mount = checkMount(base_frame, camera_frame, *found); mount.isFault())
         NODELET_WARN_STREAM(mount.remedy);
+      if (base_frame == camera_frame && !std::exchange(base_is_camera_, true)) {
+        T_odom_start_ = T_odom_start_ * ros_conversions::bodyToOptical();
+        if (!given_start_) publisher_->restart(T_odom_start_);
+      }
       if (!camera_frame_.empty() && camera_frame_ != camera_frame)
         NODELET_WARN_STREAM("the images' frame was '" << camera_frame_ << "' and is '" << camera_frame
                                                       << "' now: another camera goes on from the base's last pose "
@@ -537,6 +545,7 @@ class VisualOdometryNodelet : public RobotNodelet {
   std::optional<ros::Time> processed_stamp_;
   bool to_be_levelled_ = false;  // T_odom_start_ still needs the accelerometer
   bool latency_reported_ = false;
+  bool base_is_camera_ = false;         // the base has optical axes, those of odom are REP-105's
   bool given_start_ = false;            // a service has set the pose, which is not levelled
   std::optional<double> levels_until_;  // s, steady time
   Patience patience_{0.0};              // with guesses

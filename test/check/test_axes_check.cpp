@@ -25,6 +25,13 @@ Verdict verdictOf(const Matrix3d& R_base_camera, const Vector3d& step, const Vec
 }
 
 /// A camera that looks along its z axis moves along it where a robot drives.
+TEST(CheckMount, ABodysAxesAreNoOpticalOnesButOfACameraThatIsTheBase) {
+  const Eigen::Isometry3d same = Eigen::Isometry3d::Identity();
+  EXPECT_EQ(checkMount("base_link", "camera", same).verdict, Verdict::kWarn);
+  EXPECT_EQ(checkMount("base_link", "base_link", same).verdict, Verdict::kWarn) << "a robot's, by its name";
+  EXPECT_EQ(checkMount("camera_optical", "camera_optical", same).verdict, Verdict::kOk);
+}
+
 TEST(OpticalAxisCheck, ABodysFrameIsNoOpticalOne) {
   const Vector3d ahead(0.001, 0.0, 0.02);
   for (const double yaw : {0.0, 90.0, 180.0})

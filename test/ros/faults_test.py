@@ -320,6 +320,9 @@ class Faults(PipelineCase):
         self.until(lambda: own.is_subscribed() and not front.has_subscribers(), 60)
         self.until(lambda: self.rosout.warned('somebody publishes'))
         self.until(lambda: is_drawn(own))
+        own.close()
+        self.closeables.remove(own)
+        self.until(lambda: is_drawn(front), 60)  # the two drivers take turns
         self.tearDown()
         self.setUp()
 

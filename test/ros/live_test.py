@@ -88,7 +88,7 @@ class Live(PipelineCase):
             self.assertEqual((used['stereo_features']['detector']['max_features'], used['stereo_features']['queue_size'],
                               used['visual_odometry']['queue_size'], used['visual_odometry']['planar']), (600, 100, 100, True))
             self.assertEqual(used['stereo_features']['left_image']['image_transport'], 'raw')
-            process.send_signal(signal.SIGINT)
+            process.send_signal(signal.SIGTERM)  # of systemd; as Ctrl-C
             said = process.communicate(timeout=30)[1]
             self.assertEqual(process.returncode, 0)
         finally:
@@ -550,7 +550,7 @@ class Live(PipelineCase):
         self.until(lambda: self.diagnosis('input rate').level == DiagnosticStatus.ERROR)
 
     def test_another_odometry_tells_of_a_motion_that_was_not_to_be_expected(self):
-        self.start(config=self.config('visual_odometry: {guess_frame_id: wheels, guess_timeout: 0.5, publish_tf: false}\n'))
+        self.start(config=self.config('visual_odometry: {guess_frame_id: wheels, guess_timeout: 0.5}\n'))
         for i in range(4):
             self.feed(i)
         self.until(lambda: self.rosout.warned('no guess of the motion'))
@@ -573,6 +573,17 @@ class Live(PipelineCase):
         self.assertEqual(info.state, 'TRACKING', info.reason)
         now = self.odometry[-1].pose.pose.position
         self.assertAlmostEqual(np.hypot(now.x - last.x, now.y - last.y), 6.0 * step, delta=0.5)
+        # TF has odom -> wheels, in which the wheels carry the base. It stays in the dark.
+        all_tf = self.keep(Collector('/tf', TFMessage))
+
+        def corrections():
+            return [t for m in list(all_tf) for t in m.transforms if (t.header.frame_id, t.child_frame_id) == ('odom', 'wheels')]
+        self.until(lambda: ('out', '/tf', rospy.get_name()) in links(self.pipeline.manager))
+        times = itertools.count(5)
+        self.until(lambda: self.feed_messages(*self.camera.dark(9, time_of=next(times))).state == 'LOST')
+        self.until(lambda: corrections() and corrections()[-1].header.stamp == self.info[-1].header.stamp)
+        T_odom_base = matrix_of(corrections()[-1].transform) @ matrix_of(transform.transform)
+        np.testing.assert_allclose(T_odom_base[:3, 3], [now.x, now.y, self.odometry[3].pose.pose.position.z], atol=1.0)
 
     def test_a_gyro_is_asked_for_the_rotation(self):
         self.start(config=self.config('visual_odometry: {use_imu: true, guess_timeout: 1.0}\n'))
@@ -605,6 +616,10 @@ class Live(PipelineCase):
         self.broadcaster.sendTransform([camera_transform(FRAME), transform])  # what is latched replaces what was
         for i in range(2, 6):
             self.assertEqual(feed(i, 0.02).state, 'TRACKING')
+        for rate in (float('nan'), 1e300):
+            measure(self.info[-1].header.stamp + rospy.Duration.from_sec(0.005), 0.01, rate)
+        self.until(lambda: self.rosout.warned('a message of the IMU is not used', 'rad/s'))
+        self.assertEqual(feed(6, 0.02).state, 'TRACKING')
 
     def test_an_accelerometer_levels_after_a_reset_and_is_no_gyro(self):
         self.start(config=self.config('visual_odometry: {use_imu: true}\n'))
@@ -627,6 +642,17 @@ class Live(PipelineCase):
             self.assertEqual(self.feed(i, time_of=next(times)).state, 'TRACKING')
         self.until(lambda: self.rosout.warned('measures no rates'))
         self.assertFalse(self.rosout.warned('no guess of the motion'), self.rosout.warnings)
+
+    def test_a_camera_that_is_the_base_needs_no_transform(self):
+        """A camera in the hand: odom has x ahead and z up, the base the axes of its images."""
+        frame = self.namespace[1:] + '_optical'
+        self.start(base_frame_id=frame)
+        for i in range(4):
+            self.assertEqual(self.feed(i, frame=frame).state, 'TRACKING')
+        first, last = (matrix_of(self.odometry[i].pose.pose) for i in (0, -1))
+        np.testing.assert_allclose(first[:3, :3], [[0, 0, 1], [-1, 0, 0], [0, -1, 0]], atol=1e-9)
+        self.assertGreater(last[0, 3], 3.0 * max(abs(last[1, 3]), abs(last[2, 3])))
+        self.assertEqual((self.rosout.errors, self.rosout.warnings), ([], []))
 
     def test_another_image_frame_goes_on_from_the_last_pose_of_the_base(self):
         side = camera_transform('side')

@@ -23,7 +23,7 @@ from std_srvs.srv import Empty, Trigger
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import MarkerArray
 
-from kitti_replay import FRAME, PACKAGE, Collector, Rosout, SimulatedClock, links, matrix_of, wait_until
+from kitti_replay import FRAME, PACKAGE, Collector, Rosout, SimulatedClock, links, matrix_of, node_pid, wait_until
 from pipeline_case import camera_transform
 from stereo_descriptor_vo.msg import MapGraph, PlaceInfo, PlaceMatch, PlaceRequest, PlaceSignature, StereoFeatures, VoInfo
 from stereo_descriptor_vo.srv import GetPlace, LoadPlaces, SavePlaces
@@ -157,8 +157,11 @@ class Recognition:
         rospy.wait_for_service(name, 20)
         return rospy.ServiceProxy(name, service)(*arguments)
 
-    def close(self):
-        """Returns what the console has."""
+    def close(self, end=signal.SIGINT):
+        """Ends the manager by this signal and the launch by Ctrl-C. Returns what the console has."""
+        if end != signal.SIGINT:
+            os.kill(node_pid(self.namespace + '/places_manager'), end)
+            wait_until(lambda: node_pid(self.namespace + '/places_manager') is None, 30)
         self.process.send_signal(signal.SIGINT)
         self.process.wait()
         self.console.seek(0)
@@ -263,6 +266,7 @@ class Places(unittest.TestCase):
         self.another_robot_that_does_not_answer(recognition, b)
         self.another_robot_restarted_in_that_map(recognition, b, file)
         self.another_camera(file)
+        self.an_odometry_that_is_paused_is_no_fault(robot, recognition)
         self.paused_and_resumed(robot, recognition)
         self.the_odometry_is_lost_and_restarted(robot, recognition)
         self.the_source_restarts(robot, recognition)
@@ -345,6 +349,14 @@ class Places(unittest.TestCase):
         self.assertEqual(len(recognition.info), 0)
         recognition.close()
 
+    def an_odometry_that_is_paused_is_no_fault(self, robot, recognition):
+        """Its features come alone."""
+        before = recognition.info[-1].unpaired
+        for _ in range(3):
+            robot.stamp += rospy.Duration(1)
+            robot.features.publish(robot.ring.seen_from(robot.truth(), robot.stamp))
+        self.assertEqual(self.drive(robot, recognition, 1).unpaired, before)
+
     def paused_and_resumed(self, robot, recognition):
         self.assertTrue(recognition.call('pause', Trigger).success)
         self.assertTrue(wait_until(lambda: not recognition.inputs() & links(rospy.get_name())))
@@ -410,15 +422,16 @@ class Places(unittest.TestCase):
             with rosbag.Bag(path) as bag:
                 return bag.get_message_count(['place'])
 
-        def run(pairs, act=lambda recognition: None):
+        def run(pairs, act=lambda recognition: None, end=signal.SIGINT):
             robot = Robot(namespace, self.ring, self.clock)
             robot.session = rospy.Time(100 + next(starts))
-            recognition = self.start(namespace, places_file=file, save_at_shutdown='true')
+            recognition = self.start(namespace, places_file=os.path.join(self.directory, '.', 'site.bag'),
+                                     save_at_shutdown='true')
             self.assertTrue(wait_until(recognition.is_connected, 60), 'it did not start')
             self.drive(robot, recognition, 2)
             act(recognition)
             self.drive(robot, recognition, pairs)
-            return recognition.close()
+            return recognition.close(end)
 
         def save_by_itself(_):
             self.assertTrue(wait_until(lambda: os.path.exists(file), 75), 'nothing was saved while it ran')
@@ -428,11 +441,15 @@ class Places(unittest.TestCase):
         self.assertIn("saved: 6 places", run(4, save_by_itself))
         self.assertEqual(count(file), 6)
         self.assertEqual([name for name in os.listdir(self.directory) if 'site' in name], ['site.bag'])
+        # By systemd or a closed terminal; the same file by another name.
+        self.assertIn("saved: ", run(1, lambda recognition: recognition.call('load_places', LoadPlaces, file), signal.SIGTERM))
+        self.assertGreater(count(file), 6)
         shutil.copy(file, other)
+        kept = count(file)
         for service, arguments in (('reset', (Empty,)), ('load_places', (LoadPlaces, other))):
             self.assertIn("are not saved: '%s' has others, or more" % file,
                           run(8, lambda recognition: recognition.call(service, *arguments)), service)
-            self.assertEqual((count(file), count(other)), (6, 6))
+            self.assertEqual((count(file), count(other)), (kept, kept))
         os.remove(file)
         os.mkdir(file)
         refused = self.start(namespace, places_file=file, save_at_shutdown='true')

@@ -75,22 +75,48 @@ class RobotTransformsTest : public ::testing::Test {
   int markers_ = 0;
 };
 
-TEST_F(RobotTransformsTest, AMissingTransformIsNamedFromWhereTfHasTheCamera) {
+TEST_F(RobotTransformsTest, TheMissingLinkIsNamedWithACommandThatPublishesIt) {
   start();
+  const std::string alone = transforms_->explainMissing("base_link", "left_optical");
+  expectWords(alone, {"'left_optical' to base frame 'base_link'", "the link base_link -> left_optical is missing",
+                      "no 'base_link'", "static_transform_publisher 0 0 0 -0.5 0.5 -0.5 0.5 base_link left_optical",
+                      "base_frame_id:=left_optical"});
+  EXPECT_FALSE(contains(alone, "mount_rpy")) << "not every launch file has it";
   send(tf_static_, {transform("oak_base", "oak_body", ros::Time()), transform("oak_body", "oak_left", ros::Time())});
   waitForMarker(tf_static_);
-  const std::string within = transforms_->explainMissing("base_link", "oak_left");
-  expectWords(within, {"'oak_left' to base frame 'base_link'", "publish base_link -> oak_base (static",
-                       "set base_frame_id to 'oak_base'"});
+  expectWords(transforms_->explainMissing("base_link", "oak_left"),
+              {"the link base_link -> oak_base is missing", "'oak_left' below 'oak_base'",
+               "static_transform_publisher 0 0 0 0 0 0 base_link oak_base", "base_frame_id:=oak_base"});
+  send(tf_static_, {transform("base_link", "camera_link", ros::Time()), transform("base_link", "laser", ros::Time())});
+  waitForMarker(tf_static_);
+  const std::string of_driver = transforms_->explainMissing("base_link", "camera_infra1_optical_frame");
+  expectWords(of_driver, {"the link camera_link -> camera_infra1_optical_frame is missing"});
+  EXPECT_FALSE(contains(of_driver, "base_frame_id")) << "a robot is there";
   send(tf_, {transform("odom", "oak_base", ros::Time::now())});
   waitForMarker(tf_);
   expectWords(transforms_->explainMissing("base_link", "oak_left"),
               {"below 'oak_body', 'oak_base', 'odom'; set base_frame_id to the robot's own one"});
-  const std::string alone = transforms_->explainMissing("base_link", "nowhere");
-  EXPECT_TRUE(contains(alone, "publish base_link -> nowhere (static")) << alone;
-  EXPECT_FALSE(contains(alone, "where TF has")) << alone;
   EXPECT_TRUE(contains(transforms_->explainMissing("base_link", ""), "no frame_id"));
-  EXPECT_TRUE(contains(transforms_->explainMissing("base_link", "base_link"), "as base_frame_id: set the camera's"));
+}
+
+TEST_F(RobotTransformsTest, AStampFarAheadIsLeftOutAndNamedAndThePresentStays) {
+  start();
+  std::string problem;
+  const ros::Time now = ros::Time::now();
+  send(tf_, {transform("wheels", "base", now + ros::Duration(3600.0))});
+  send(tf_, {transform("wheels", "base", now, 1.0), transform("wheels", "base", now + ros::Duration(0.1), 2.0)});
+  waitForMarker(tf_);
+  expectOneWarning({"wheels -> base", "3600", "ahead of this machine's clock"});
+  EXPECT_TRUE(transforms_->findMotion("wheels", "base", now, now + ros::Duration(0.1), problem)) << problem;
+}
+
+TEST_F(RobotTransformsTest, WhatIsBeyondTheEarthIsNoMount) {
+  start();
+  send(tf_static_, {transform("base_link", "camera", ros::Time(), 1e30)});
+  waitForMarker(tf_static_);
+  std::string problem;
+  EXPECT_FALSE(transforms_->find("base_link", "camera", problem));
+  expectWords(problem, {"'camera' beyond 1e8 m of 'base_link'"});
 }
 
 TEST_F(RobotTransformsTest, TheCamerasPlaceIsReadOnceAndAgainWhenItIsForgotten) {

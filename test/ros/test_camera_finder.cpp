@@ -89,6 +89,7 @@ TEST_F(CameraFinderTest, TheOnlyCameraIsTakenWithAReasonAndGivenBackOnceTheNodes
   EXPECT_EQ(finder_.names().at("left/image_rect"), "/stereo/front/left/image_rect");
   for (const char* word : {"nobody publishes /stereo/left/image_rect", "/stereo/front/right/image_rect", "find_camera"})
     EXPECT_TRUE(contains(report_, word)) << report_;
+  EXPECT_TRUE(finder_.isSearching(true)) << "for the node's own images";
   EXPECT_FALSE(finder_.update(other, report_)) << "it is in use";
   const auto two = with({"/stereo/front/left/", "/stereo/front/right/", "/stereo/back/left/", "/stereo/back/right/"});
   EXPECT_FALSE(finder_.update(two, report_)) << "a camera in use stays";
@@ -96,6 +97,8 @@ TEST_F(CameraFinderTest, TheOnlyCameraIsTakenWithAReasonAndGivenBackOnceTheNodes
   ASSERT_TRUE(finder_.update(with({"/stereo/left/", "/stereo/front/left/", "/stereo/front/right/"}), report_));
   EXPECT_TRUE(finder_.names().empty());
   EXPECT_EQ(report_.find("somebody publishes /stereo/left/image_rect"), 0u) << report_;
+  ASSERT_TRUE(finder_.isSearching(true)) << "the two drivers may take turns";
+  EXPECT_TRUE(finder_.update(other, report_));
 }
 
 TEST_F(CameraFinderTest, OfSeveralNoneIsTaken) {
@@ -109,6 +112,8 @@ TEST_F(CameraFinderTest, NamesThatTheUserChoseStay) {
   CameraFinder finder("/stereo", "/stereo/cam/left", "/stereo/right/image_rect");
   EXPECT_FALSE(finder.update(with({"/stereo/front/left/", "/stereo/front/right/"}), report_));
   EXPECT_EQ(report_, "");
+  EXPECT_TRUE(finder.isSearching(false));
+  EXPECT_FALSE(finder.isSearching(true));
 }
 
 }  // namespace sdvo::test_camera_finder

@@ -77,6 +77,7 @@ TEST(InRosHome, RelativePathsLeadFromThereOn) {
   ::setenv("ROS_HOME", "/ros_home", 1);
   EXPECT_EQ(inRosHome("maps/site.bag"), "/ros_home/maps/site.bag");
   EXPECT_EQ(inRosHome("/site.bag"), "/site.bag");
+  EXPECT_EQ(inRosHome("/maps/./new/../site.bag"), "/maps/site.bag") << "each file has one spelling";
   EXPECT_EQ(inRosHome(""), "");
   ::unsetenv("ROS_HOME");
   EXPECT_EQ(inRosHome("site.bag"), std::string(std::getenv("HOME")) + "/.ros/site.bag");
