@@ -71,9 +71,10 @@ double MotionPrior::logRatioOfSwap(const Eigen::Isometry3d& motion, double dt) c
   if (!velocity_ || !before_) return 0.0;
   const Vector6d second = logSE3(motion), now = second / dt;
   const Vector6d first = *velocity_ + second / velocity_interval_;
+  const Matrix6d measured = 2.0 * dt * dt * velocity_covariance_;  // of two motions
   // Bounded by the probability that the prior is wrong.
   const auto cost = [&](const Vector6d& from, const Vector6d& to) {
-    const double square = around(expSE3(from * dt), dt).normalisedSquare(expSE3(to * dt), Matrix6d::Zero());
+    const double square = around(expSE3(from * dt), dt).normalisedSquare(expSE3(to * dt), measured);
     return std::min(0.5 * square, -std::log(kTailProbability));
   };
   return cost(*before_, *velocity_) + cost(*velocity_, now) - cost(*before_, first) - cost(first, -now);

@@ -41,20 +41,30 @@ Matrix6d lacking(const Matrix6d& covariance, const Vector6d& deviation) {
   return deviation * deviation.transpose() + kTolerableRatio * kTolerableRatio * momentOf(deviation);
 }
 
-Matrix6d PoseCovariance::byRig(const RigEstimate& known) const {
-  const RigEstimate::MotionJacobian derivative = exposure_.leftCols<RigEstimate::kParameters>();
-  const Vector6d deviation = derivative * known.mean + exposure_.rightCols<1>();
+Matrix6d PoseCovariance::momentOf(const Exposure& exposure, const RigEstimate& known) {
+  const RigEstimate::MotionJacobian derivative = exposure.leftCols<RigEstimate::kParameters>();
+  const Vector6d deviation = derivative * known.mean + exposure.rightCols<1>();
   return derivative * known.covariance * derivative.transpose() + deviation * deviation.transpose();
 }
 
-void PoseCovariance::expose(const RigEstimate::MotionJacobian& since_keyframe, const RigEstimate::Vector& compensated) {
+Matrix6d PoseCovariance::expose(const RigEstimate::MotionJacobian& since_keyframe, const RigEstimate& known,
+                                const RigEstimate::Vector& compensated) {
+  const Exposure before = exposure_;
   exposure_ = keyframe_exposure_;
   exposure_.leftCols<RigEstimate::kParameters>() += since_keyframe;
   exposure_.rightCols<1>() -= since_keyframe * compensated;
+  return momentOf(exposure_ - before, known);
 }
 
 void PoseCovariance::cover(const Vector6d& correction) {
   spread(lacking(value(), correction));  // the next poses are measured from the same key frame
+}
+
+void PoseCovariance::beginMap() {
+  measured_ += doubted_;
+  doubted_.setZero();
+  unmeasured_.setZero();
+  markKeyframe();
 }
 
 void PoseCovariance::markKeyframe() {

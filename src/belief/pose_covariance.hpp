@@ -29,7 +29,7 @@ class PoseCovariance {
 
   /// Second moment of the last pose's error by the rig: the covariance of `known`, and its distance from what was
   /// compensated on the way.
-  Matrix6d byRig(const RigEstimate& known) const;
+  Matrix6d byRig(const RigEstimate& known) const { return momentOf(exposure_, known); }
 
   /// The map corrected the last pose by this right perturbation: widens the covariance to explain it.
   void cover(const Vector6d& correction);
@@ -46,6 +46,10 @@ class PoseCovariance {
     measured_ = keyframe_ = covariance;
   }
 
+  /// The last pose is the key frame of a new map. All that is unknown of it, the rig's part as well, is in all poses
+  /// that are measured in that map.
+  void beginMap();
+
   /// The pose moved by an unmeasured motion of this covariance, as a prediction.
   void advance(const Eigen::Isometry3d& T_previous_current, const Matrix6d& covariance);
 
@@ -61,8 +65,9 @@ class PoseCovariance {
   }
 
   /// Derivative of the last measured pose by the rig since the key frame (right perturbation), and the rig that was
-  /// compensated.
-  void expose(const RigEstimate::MotionJacobian& since_keyframe, const RigEstimate::Vector& compensated);
+  /// compensated. Returns the second moment that the `known` rig has in the motion between the two reported poses.
+  Matrix6d expose(const RigEstimate::MotionJacobian& since_keyframe, const RigEstimate& known,
+                  const RigEstimate::Vector& compensated);
 
   /// Adds second moments of doubt to the last motion and pose, until the next pose is measured in the map.
   void doubt(const Matrix6d& motion, const Matrix6d& pose);
@@ -74,6 +79,7 @@ class PoseCovariance {
   /// Derivatives by the rig; last column: minus the sum of derivative times compensated rig.
   using Exposure = Eigen::Matrix<double, 6, RigEstimate::kParameters + 1>;
 
+  static Matrix6d momentOf(const Exposure& exposure, const RigEstimate& known);
   void carry(const Eigen::Isometry3d& T_previous_current);
 
   Matrix6d measured_ = Matrix6d::Zero();    ///< of the last measured pose, in the last pose's frame

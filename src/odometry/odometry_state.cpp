@@ -31,10 +31,10 @@ void reportMatches(const StereoFeatures& features, const std::vector<int>& given
 }
 
 void reportRig(const LearntRig& rig, OdometryResult& result) {
+  const RigEstimate known = rig.calibration.used();
   if (rig.calibration.hasWindow()) {
-    const RigEstimate known = rig.calibration.estimate();
     const RigEstimate::Vector sigma = known.covariance.diagonal().cwiseSqrt();
-    if (known.covariance(0, 0) > 0.0) {
+    if (rig.calibration.isEstimated()) {
       result.disparity_offset = known.mean[0], result.disparity_offset_sigma = sigma[0];
       result.disparity_bend = known.mean[1], result.disparity_bend_sigma = sigma[1];
     }
@@ -42,7 +42,6 @@ void reportRig(const LearntRig& rig, OdometryResult& result) {
   }
   if (const auto rotation = rig.row_pattern.rotation()) {
     Eigen::Vector3d value = rotation->value, variance = rotation->covariance.diagonal();
-    const RigEstimate known = rig.calibration.estimate();
     const double of_roll = known.covariance(RigEstimate::kRoll, RigEstimate::kRoll);
     if (of_roll > 0.0) value.z() = known.mean[RigEstimate::kRoll], variance.z() = of_roll;
     result.right_rotation = rig.rotation + value;
@@ -79,13 +78,14 @@ void OdometryState::startAgain() {
   ++epoch;
   const std::int64_t last = last_pose_stamp.value_or(seed->newestStamp());
   const Matrix6d unseen = prior.unseen(static_cast<double>(seed->newestStamp() - last) * 1e-9);
-  covariance.assume(covariance.value() + prior.unknown() + unseen);
+  covariance.beginMap();
+  covariance.spread(prior.unknown() + unseen);
   last_pose_stamp = seed->newestStamp();
 }
 
 void OdometryState::takeSeed() {
   // The guesses' error up to the seed is in all poses that are measured against it.
-  covariance.assume(covariance.value());
+  covariance.beginMap();
   map = std::exchange(seed, std::nullopt);
   started = true;
   interrupted = false;

@@ -519,7 +519,7 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::extendMap(const StereoFeatures&
 
   const bool is_seed = state_.seed && &scene.map == &*state_.seed, starts_again = is_seed && !state_.seed_has_pose;
   if (starts_again) state_.startAgain();
-  if (is_seed) state_.covariance.assume(state_.covariance.value());
+  if (is_seed) state_.covariance.beginMap();
   const Belief belief = state_.doubt.weigh(scene, found, evidence);
   commit(candidate, belief);
   Step step = measure(found, candidate);
@@ -587,8 +587,7 @@ VisualOdometry::Impl::Candidate VisualOdometry::Impl::adjust(const StereoFeature
   candidate.calibration_by_rig = RigEstimate::shape(
       features.camera, logSO3(T_oldest_newest.linear()) / state_.prior.interval(seconds, T_oldest_newest));
   candidate.adjustment =
-      map.adjust(optimizer_, state_.rig.calibration.prior(map.oldestId(), candidate.calibration_by_rig),
-                 candidate.calibration, floor);
+      map.adjust(optimizer_, state_.rig.calibration.prior(candidate.calibration_by_rig), candidate.calibration, floor);
   map.noteVariance(state_.rig.noise.ofPair(candidate.adjustment.newest_square, candidate.adjustment.newest_measured));
   candidate.adjustment.since_keyframe *= map.varianceOfMotion();
   candidate.adjustment.growth *= map.varianceOfMotion();
@@ -665,15 +664,16 @@ VisualOdometry::Impl::Step VisualOdometry::Impl::measure(const MotionHypothesis&
   }
   step.covariance = state_.covariance.measure(*step.T_previous_current, candidate.adjustment.since_keyframe,
                                               candidate.adjustment.growth);
-  state_.covariance.expose(candidate.adjustment.by_calibration * candidate.calibration_by_rig,
-                           RigEstimate::of(*state_.camera, candidate.calibration, candidate.delay));
+  const Matrix6d by_rig = state_.covariance.expose(
+      candidate.adjustment.by_calibration * candidate.calibration_by_rig, state_.rig.calibration.estimate(),
+      RigEstimate::of(*state_.camera, candidate.calibration, candidate.delay));
   // The motion between two reported poses includes the map's correction of the first one. It is found as a perturbation
   // of the key frame, and reported as one of the newest pair.
   step.correction = adjoint(map.newestPose() * map.poseBeforeNewest().inverse()) *
                     logSE3(candidate.T_keyframe_origin * map.poseBeforeNewest().inverse());
   state_.covariance.cover(step.correction);
   const bool by_chance = mahalanobisSquare(step.correction, step.covariance) <= noiseGate(6);
-  step.covariance += lacking(step.covariance, step.correction);
+  step.covariance += lacking(step.covariance, step.correction) + by_rig;
   if (by_chance) return step;
   std::ostringstream reason;
   reason << "the map corrected the pose by " << step.correction.head<3>().norm() << " m and "

@@ -31,21 +31,22 @@ Matrix diagonal(double disparity, double roll, double delay) {
 }  // namespace
 
 CalibrationFilter::CalibrationFilter(const CalibrationOptions& options) : options_(checked(options)) {
-  calibration_.value = priorOf(options_).head<RigCalibration::kParameters>();
+  used_ = priorOf(options_);
+  calibration_.value = used_.head<RigCalibration::kParameters>();
 }
 
 const CalibrationFilter::Likelihood& CalibrationFilter::pastBefore(int oldest_id) const {
   return pending_id_ >= 0 && pending_id_ < oldest_id ? pending_ : past_;
 }
 
-CalibrationBelief CalibrationFilter::prior(int oldest_id, const RigEstimate::Shape& shape) const {
+CalibrationBelief CalibrationFilter::prior(const RigEstimate::Shape& shape) const {
   constexpr double kExact = 0.01;  // px: 0.1 % of the depth at 10 px of disparity; less is ill-conditioned
   CalibrationBelief belief;
   RigCalibration::Matrix covariance = kExact * kExact * RigCalibration::Matrix::Identity();
   belief.mean = priorOf(options_).head<RigCalibration::kParameters>();
   if (options_.enabled) {
-    const RigEstimate known = weigh(pastBefore(oldest_id));
-    belief.mean = shape * known.mean - shape.col(RigEstimate::kDelay) * delay();
+    const RigEstimate known = estimate();
+    belief.mean = shape.leftCols<RigEstimate::kDelay>() * known.mean.head<RigEstimate::kDelay>();
     covariance += shape * known.covariance * shape.transpose();
   }
   belief.information = covariance.inverse() / kHonest;
@@ -92,6 +93,12 @@ RigEstimate CalibrationFilter::weigh(const Likelihood& windows) const {
   return estimate;
 }
 
+RigEstimate CalibrationFilter::used() const {
+  const RigEstimate known = estimate();
+  const Vector apart = known.mean - used_;
+  return {used_, known.covariance + apart * apart.transpose()};
+}
+
 void CalibrationFilter::noteCommon(double square) {
   commons_ = std::min(commons_ + 1, kRememberedCommons);
   common_square_ += (square - common_square_) / commons_;
@@ -99,8 +106,9 @@ void CalibrationFilter::noteCommon(double square) {
 
 void CalibrationFilter::note(int oldest_id, int newest_id, const RigEstimate::Shape& shape,
                              const RigCalibration& calibration, const RigCalibration::Matrix& information) {
-  const CalibrationBelief prior = this->prior(oldest_id, shape);
-  const RigCalibration::Vector compensated = shape.col(RigEstimate::kDelay) * delay();
+  const CalibrationBelief prior = this->prior(shape);
+  used_ << calibration.value.head<2>(), calibration.value[2] / shape(2, RigEstimate::kRoll), delay();
+  const RigCalibration::Vector compensated = shape.col(RigEstimate::kDelay) * used_[RigEstimate::kDelay];
   past_ = pastBefore(oldest_id);
   calibration_ = calibration;
   // `calibration` has the information of data and prior: own * own_mean = (own + prior) * value - prior * prior_mean.

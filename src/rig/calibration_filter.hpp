@@ -9,7 +9,7 @@
 namespace sdvo {
 
 /// Kalman filter, in information form, of a rig's disparity error (offset, bend), right roll and right delay. Windows
-/// of the map and rows of features measure them. A window's prior excludes all windows that share a pair with it.
+/// of the map and rows of features measure them. Windows that share a pair replace each other.
 ///
 /// The options' prior is a mixture with equal weights: the disparity error equals the options' value, or is normally
 /// distributed around it with `prior_sigma`. The same holds for roll and delay, each with its own sigma. Measurements
@@ -25,10 +25,11 @@ class CalibrationFilter {
   /// Adds the process noise of `dt` s: the rig warms up or cools down, and its cameras' clocks drift.
   void predict(double dt);
 
-  /// Calibration before the window that begins with pair `oldest_id`, from rows and from windows that ended before that
-  /// pair. The mean excludes the effect of delay(), for which disparities are compensated already. `shape`: derivative
-  /// of the calibration by the rig.
-  CalibrationBelief prior(int oldest_id, const RigEstimate::Shape& shape) const;
+  /// Calibration before a window's adjustment: estimate(), which has the window up to its last pair. Without it, a rig
+  /// without error keeps half of the options' prior for as long as one key frame stays, and the window follows noise.
+  /// The mean excludes the effect of delay(), for which disparities are compensated already. `shape`: derivative of the
+  /// calibration by the rig.
+  CalibrationBelief prior(const RigEstimate::Shape& shape) const;
 
   /// Adds the window from pair `oldest_id` to `newest_id`. `calibration` includes the window's prior(), `information`
   /// (1/px^2) excludes it.
@@ -47,11 +48,15 @@ class CalibrationFilter {
 
   /// Result of the last window, px.
   const RigCalibration& calibration() const { return calibration_; }
+  /// The rig that the last window compensated, and the second moment of estimate() around it.
+  RigEstimate used() const;
   /// Estimate from the options, rows and all windows.
   RigEstimate estimate() const { return weigh(present_.value_or(Likelihood())); }
   /// The delay that is compensated, s.
   double delay() const { return estimate().delay(); }
   bool hasWindow() const { return present_.has_value(); }
+  /// Whether the disparity's error is estimated, else held at the options' value.
+  bool isEstimated() const { return options_.enabled; }
 
  private:
   /// Information of measurements, without the options' prior.
@@ -66,8 +71,9 @@ class CalibrationFilter {
 
   CalibrationOptions options_;
   RigCalibration calibration_;
-  Likelihood past_;     ///< of windows that share no pair with the last one
-  Likelihood pending_;  ///< of past_ and a window up to pair `pending_id_`: past of windows that begin later
+  RigEstimate::Vector used_;  ///< by the last window
+  Likelihood past_;           ///< of windows that share no pair with the last one
+  Likelihood pending_;        ///< of past_ and a window up to pair `pending_id_`: past of windows that begin later
   int pending_id_ = -1;
   std::optional<Likelihood> present_;                                   ///< of past_ and the last window
   RigEstimate::Vector rows_ = RigEstimate::Vector::Zero();              ///< see noteRows(): rad and s

@@ -74,7 +74,7 @@ TEST_F(Weighed, OverwhelmingEvidenceLeavesFiniteNumbers) {
     Doubt doubt;
     const Belief belief = weigh(doubt, 90, {{log_odds, "a knock", true}});
     EXPECT_TRUE(belief.moment.allFinite() && belief.pose_moment.allFinite()) << log_odds;
-    EXPECT_EQ(belief.probability < 0.1, log_odds > 0.0) << log_odds << ": " << belief.probability;
+    EXPECT_EQ(belief.probability<0.1, log_odds> 0.0) << log_odds << ": " << belief.probability;
     EXPECT_LE(doubt.logOdds(), kCertain) << log_odds;
   }
 }

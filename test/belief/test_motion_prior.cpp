@@ -126,6 +126,10 @@ TEST(MotionPrior, APairThatGoesBackAfterOneThatWentTwiceAsFarChangedPlacesWithIt
   EXPECT_GT(prior.logRatioOfSwap(ahead(kBack), kStep), 6.9) << "a thousand times as likely";
   EXPECT_LT(prior.logRatioOfSwap(ahead(0.18), kStep), 0.0) << "it became faster";
   EXPECT_LT(prior.logRatioOfSwap(ahead(0.09), kStep), 0.0);
+  MotionPrior vague = moving({});
+  for (const double distance : {0.09, 0.18})
+    vague.takeVelocity(kSecond, ahead(distance), kStep, 0.2 * 0.2 * Matrix6d::Identity(), true, Matrix6d::Zero());
+  EXPECT_LT(vague.logRatioOfSwap(ahead(kBack), kStep), 2.0) << "motions of few features jump to and fro as well";
 }
 
 TEST(MotionPrior, ATurnThatIsReversedIsNoSwap) {

@@ -245,7 +245,7 @@ PoseCovariance tenSteps(const RigEstimate::Vector& compensated) {
   for (int step = 0; step < 10; ++step) {
     for (const int pair : {0, 1}) {  // of which the second is the key frame
       covariance.measure(pair == 0 ? forward() : kStill, diagonal(1e-4, 0.0));
-      covariance.expose(by_rig, compensated);
+      covariance.expose(by_rig, RigEstimate(), compensated);
     }
     covariance.markKeyframe();
   }
@@ -278,10 +278,29 @@ TEST(PoseCovariance, TheWayBackUndoesTheRigsError) {
   by_rig.row(2) << -0.02, -0.005, -0.4, -3.0;
   for (int step = 0; step < 10; ++step) {
     covariance.measure(forward().inverse(), diagonal(1e-4, 0.0));
-    covariance.expose(by_rig, RigEstimate::Vector::Zero());
+    covariance.expose(by_rig, RigEstimate(), RigEstimate::Vector::Zero());
     covariance.markKeyframe();
   }
   EXPECT_LT(covariance.byRig(known).norm(), 1e-20);
+}
+
+TEST(PoseCovariance, AMotionHasItsPartOfTheRigsErrorAndAMapThatBeginsKeepsThePoses) {
+  PoseCovariance covariance = tenSteps(RigEstimate::Vector::Zero());
+  RigEstimate known;
+  known.covariance(0, 0) = 0.09;
+  RigEstimate::MotionJacobian by_rig = RigEstimate::MotionJacobian::Zero();
+  by_rig(2, 0) = 0.02;  // m/px
+  const auto step = [&](double pixels) {
+    covariance.measure(forward(), diagonal(1e-4, 0.0));
+    return std::sqrt(covariance.expose(pixels * by_rig, known, RigEstimate::Vector::Zero())(2, 2));
+  };
+  EXPECT_NEAR(step(1.0), 0.02 * 0.3, 1e-12);
+  EXPECT_NEAR(step(3.0), 2.0 * 0.02 * 0.3, 1e-12) << "since the last pose, not since the key frame";
+  const Matrix6d before = covariance.value() + covariance.byRig(known);
+  covariance.beginMap();
+  EXPECT_LT((covariance.value() + covariance.byRig(known) - before).norm(), 1e-12);
+  EXPECT_NEAR(step(1.0), 0.02 * 0.3, 1e-12);
+  EXPECT_NEAR(std::sqrt(covariance.byRig(known)(2, 2)), 14.0 * 0.02 * 0.3, 1e-12);
 }
 
 }  // namespace sdvo::test_pose_covariance
