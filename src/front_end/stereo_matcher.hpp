@@ -11,9 +11,10 @@ namespace sdvo {
 
 /// Where a left corner was found in the right image.
 struct StereoMatch {
-  int left_index;   ///< index into the left positions
-  float disparity;  ///< u_left - u_right, px, sub-pixel, positive
-  float dv;         ///< v_right - v_left, px
+  int left_index;      ///< index into the left positions
+  float disparity;     ///< u_left - u_right, px, sub-pixel, positive
+  float dv;            ///< v_right - v_left, px
+  float period = 0.f;  ///< px; the texture repeats after it, and the disparity may be off by it; 0: unique
 };
 
 /// Finds left positions in the right image (paper, section 4: by feature tracking, which is slower and needs a pyramid
@@ -25,7 +26,8 @@ class StereoMatcher {
 
   /// Matches in the order of `left_positions`. A position has none if no block stands out, if the alignment moves by
   /// more than 2 px, or if the aligned patches differ. Images are CV_8U of one size. `max_disparity`, px, replaces that
-  /// of the options.
+  /// of the options. In views whose texture repeats along the rows, matches have a period, unless unique ones around
+  /// agree.
   std::vector<StereoMatch> match(const cv::Mat& left, const cv::Mat& right,
                                  const std::vector<cv::Point2f>& left_positions,
                                  std::optional<double> max_disparity = std::nullopt) const;

@@ -65,6 +65,77 @@ double slantedPlaneError(double middle, double slant) {
   return std::sqrt(square / static_cast<double>(std::max<std::size_t>(matches.size(), 1)));
 }
 
+constexpr double kPeriod = 93.7, kNearDisparity = 6.6;  // px
+
+/// A wall of equal bays, sampled without a lens' blur, with noise; `dirt` is added to it at (u, v) of the left image.
+Views bays(const std::function<double(double u, double v)>& dirt = [](double, double) { return 0.0; }) {
+  const synthetic::Texture texture(41, 2.2, 40.0);
+  const auto grey = [&](double u, double v) {
+    return texture.at(u - kPeriod * std::floor(u / kPeriod), v) + dirt(u, v);
+  };
+  Views pair{synthetic::render(kSize, grey),
+             synthetic::render(kSize, [&](double u, double v) { return grey(u + kNearDisparity, v); })};
+  cv::RNG random(3);
+  for (cv::Mat* view : {&pair.left, &pair.right}) {
+    cv::Mat noise(kSize, CV_16S);
+    random.fill(noise, cv::RNG::NORMAL, 0.0, 1.5);
+    cv::add(*view, noise, *view, cv::noArray(), CV_8U);
+  }
+  return pair;
+}
+
+/// Unique and right, unique and wrong, ambiguous.
+struct Counts {
+  int right = 0, wrong = 0, ambiguous = 0;
+};
+Counts countBays(const Views& pair, double max_disparity = 192.0) {
+  StereoMatcherOptions options;
+  options.epipolar.max_disparity = max_disparity;
+  Counts counts;
+  for (const StereoMatch& match : StereoMatcher(options).match(pair.left, pair.right, grid(5.0)))
+    ++(match.period > 0.f                                 ? counts.ambiguous
+       : std::abs(match.disparity - kNearDisparity) < 1.0 ? counts.right
+                                                          : counts.wrong);
+  return counts;
+}
+
+TEST(StereoMatcher, TextureThatRepeatsAlongTheRowIsAmbiguous) {
+  const Views pair = bays();
+  const Counts counts = countBays(pair);
+  EXPECT_LE(counts.wrong, 2);
+  EXPECT_GT(counts.ambiguous, 200);
+  int off = 0;
+  for (const StereoMatch& match : StereoMatcher({}).match(pair.left, pair.right, grid(5.0))) {
+    if (match.period > 0.f) {
+      EXPECT_NEAR(std::remainder(match.period, kPeriod), 0.0, 0.5);
+    }
+    off += std::abs(match.disparity - kNearDisparity - kPeriod) < 1.0;
+  }
+  EXPECT_GT(off, 20) << "the better block is often the wrong one";
+}
+
+TEST(StereoMatcher, DirtDecidesBetweenPeriods) {
+  const Counts counts = countBays(bays([](double u, double v) {
+    const double blot = std::sin(0.0431 * u + 0.6 * std::sin(0.05 * v)) * std::sin(0.057 * v + 0.013 * u);
+    return blot > 0.8 ? -90.0 : 0.0;
+  }));
+  EXPECT_GT(counts.right, 150);
+  EXPECT_LE(20 * counts.wrong, counts.right);
+}
+
+TEST(StereoMatcher, ASearchBelowThePeriodIsNotAmbiguous) {
+  const Counts counts = countBays(bays(), 64.0);
+  EXPECT_EQ(counts.ambiguous, 0);
+  EXPECT_EQ(counts.wrong, 0);
+  EXPECT_GT(counts.right, 200);
+}
+
+TEST(StereoMatcher, TextureThatDoesNotRepeatHasNoPeriod) {
+  const Views pair = texturedPair([](double) { return 6.6; });
+  for (const StereoMatch& match : StereoMatcher({}).match(pair.left, pair.right, grid(20.0)))
+    EXPECT_EQ(match.period, 0.f);
+}
+
 TEST(StereoMatcher, FollowsSlantedPlanes) {
   // A window that moves as a whole is off by half the slant times its reach on one side; the fitted slant is not.
   EXPECT_LT(slantedPlaneError(30.0, 0.08), 0.05);
