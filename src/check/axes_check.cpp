@@ -46,13 +46,10 @@ Finding OpticalAxisCheck::judge() const {
       "the images' frame_id names a body's frame (x ahead) instead of an optical one (z ahead), or lacks its rotation"};
 }
 
-void GyroAxesCheck::Turns::add(const Eigen::Matrix3d& by_gyro, const Eigen::Matrix3d& by_images) {
-  constexpr double kLeast = 0.2 * M_PI / 180.0;  // rad, as much as bias and noise give
-  const Eigen::Vector3d gyro = logSO3(by_gyro), images = logSO3(by_images);
-  if (std::max(gyro.norm(), images.norm()) < kLeast) return;
-  product += gyro.dot(images);
-  of_gyro += gyro.squaredNorm();
-  of_images += images.squaredNorm();
+void GyroAxesCheck::Turns::add(const Eigen::Vector3d& by_gyro, const Eigen::Vector3d& by_images) {
+  product += by_gyro.dot(by_images);
+  of_gyro += by_gyro.squaredNorm();
+  of_images += by_images.squaredNorm();
 }
 
 double GyroAxesCheck::Turns::cosine() const {
@@ -61,11 +58,14 @@ double GyroAxesCheck::Turns::cosine() const {
 
 void GyroAxesCheck::add(std::int64_t from, std::int64_t to, const Eigen::Matrix3d& by_gyro,
                         const Eigen::Matrix3d& by_images) {
-  constexpr std::int64_t kKept = 8'000'000'000;  // ns, shorter than the track of the gyro's measurements
-  turns_.add(by_gyro, by_images);
-  turned_ += logSO3(by_images).norm();
-  pairs_.push_back({from, to, by_images});
-  while (pairs_.back().to - pairs_.front().from > kKept) pairs_.pop_front();
+  constexpr double kLeast = 0.2 * M_PI / 180.0;  // rad, as much as bias and noise give
+  constexpr double kKept = 60.0 * M_PI / 180.0;  // rad, thrice what suffices
+  const Pair pair{from, to, logSO3(by_gyro), logSO3(by_images)};
+  if (std::max(pair.by_gyro.norm(), pair.by_images.norm()) < kLeast) return;
+  turned_ += pair.by_images.norm();
+  pairs_.push_back(pair);
+  for (; turned_ - pairs_.front().by_images.norm() > kKept; pairs_.pop_front())
+    turned_ -= pairs_.front().by_images.norm();
 }
 
 Finding GyroAxesCheck::judge(const Gyro& gyro) const {
@@ -73,12 +73,14 @@ Finding GyroAxesCheck::judge(const Gyro& gyro) const {
   constexpr double kAgree = 0.7, kMost = 2.0;      // cosine; ratio of the rates
   if (turned_ < kEnough) return {Verdict::kOpen, "the camera did not turn enough", "turn it"};
   const auto degrees = [](double cosine) { return 180.0 / M_PI * std::acos(cosine); };
-  const double ratio = std::sqrt(turns_.of_gyro / turns_.of_images);
-  const std::string what = text(1, "gyro and images turn about axes ", degrees(turns_.cosine()),
+  Turns turns;
+  for (const Pair& pair : pairs_) turns.add(pair.by_gyro, pair.by_images);
+  const double ratio = std::sqrt(turns.of_gyro / turns.of_images);
+  const std::string what = text(1, "gyro and images turn about axes ", degrees(turns.cosine()),
                                 " degrees apart, by angles of ratio ", ratio);
   if (ratio > kMost) return {Verdict::kWarn, what, "is angular_velocity in rad/s, and of this camera's IMU?"};
   // If the gyro turns less than the images, a moving object may fill the view.
-  if (turns_.cosine() >= kAgree || ratio * kMost <= 1.0) return {Verdict::kOk, what};
+  if (turns.cosine() >= kAgree || ratio * kMost <= 1.0) return {Verdict::kOk, what};
   constexpr int kSteps = 15;                    // to either side
   constexpr std::int64_t kStep = 10'000'000;    // ns
   constexpr double kFound = 0.9, kKnown = 0.5;  // cosine; ratio of the pairs' turns that must be there
@@ -87,8 +89,8 @@ Finding GyroAxesCheck::judge(const Gyro& gyro) const {
   for (std::int64_t k = -kSteps; k <= kSteps; ++k) {
     Turns shifted;
     for (const Pair& pair : pairs_)
-      if (const auto turn = gyro(pair.from + k * kStep, pair.to + k * kStep)) shifted.add(*turn, pair.by_images);
-    if (shifted.of_images < kKnown * turns_.of_images || shifted.cosine() <= best) continue;
+      if (const auto turn = gyro(pair.from + k * kStep, pair.to + k * kStep)) shifted.add(logSO3(*turn), pair.by_images);
+    if (shifted.of_images < kKnown * turns.of_images || shifted.cosine() <= best) continue;
     best = shifted.cosine();
     shift = k * kStep;
   }

@@ -47,17 +47,16 @@ class GyroAxesCheck {
   struct Turns {
     double product = 0.0, of_gyro = 0.0, of_images = 0.0;  ///< sums of products and squares, rad^2
 
-    void add(const Eigen::Matrix3d& by_gyro, const Eigen::Matrix3d& by_images);
+    void add(const Eigen::Vector3d& by_gyro, const Eigen::Vector3d& by_images);
     double cosine() const;
   };
   struct Pair {
     std::int64_t from, to;
-    Eigen::Matrix3d by_images;
+    Eigen::Vector3d by_gyro, by_images;  ///< rotation vectors, rad
   };
 
-  Turns turns_;
-  double turned_ = 0.0;     ///< rad
-  std::deque<Pair> pairs_;  ///< of the last seconds
+  double turned_ = 0.0;     ///< by pairs_, rad
+  std::deque<Pair> pairs_;  ///< the last ones that turned: older ones are of another time
 };
 
 }  // namespace sdvo

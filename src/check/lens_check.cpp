@@ -88,7 +88,7 @@ void LensCheck::add(const StereoCamera& camera, const CornerPair& pair) {
 void LensCheck::add(const StereoCamera& camera, const std::vector<Track>& tracks) {
   constexpr std::size_t kFewest = 20, kMost = 300;  // tracks of a pair; pairs, a minute of them
   if (tracks.size() < kFewest || pairs_.size() >= kMost) return;
-  if (camera != camera_) pairs_.clear();
+  if (!camera_.isLike(camera)) pairs_.clear();  // an autofocus changes it with each pair
   camera_ = camera;
   std::vector<Ray> rays;
   for (const Track& track : tracks)

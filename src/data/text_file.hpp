@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <cstdlib>
@@ -12,6 +13,7 @@
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "../common/whole_file.hpp"
@@ -55,7 +57,10 @@ inline std::string kindOfText(const std::string& text) {
 inline void writeTextFile(const std::string& path, const std::string& text) {
   namespace fs = std::filesystem;
   if (fs::exists(path) && !fs::is_regular_file(path) && !fs::is_directory(path)) {
-    std::ofstream(path) << text;
+    std::ofstream device(path);
+    device << text;
+    device.close();
+    if (!device) throw std::runtime_error("'" + path + "': cannot be written: is the device full?");
     return;
   }
   if (fs::is_regular_file(path) && !fs::is_empty(path)) {
@@ -114,9 +119,11 @@ void readLines(const std::string& path, bool lines_count, const Read& read) {
 
 /// Digits alone; throws std::invalid_argument.
 inline std::int64_t parseNanoseconds(const std::string& word) {
-  if (word.empty() || word.size() > 18 + 1 || word.find_first_not_of("0123456789") != std::string::npos)
+  std::int64_t stamp = -1;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), stamp);
+  if (error != std::errc() || end != word.data() + word.size() || stamp < 0)
     throw std::invalid_argument("'" + word + "' is not a stamp in nanoseconds");
-  return std::stoll(word);
+  return stamp;
 }
 
 /// Seconds as a decimal number to nanoseconds. Goes through long double: a double near today's Unix time resolves 200

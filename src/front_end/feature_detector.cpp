@@ -167,6 +167,7 @@ std::vector<Corner> keepApart(std::vector<Corner> corners, double min_spacing) {
   if (min_spacing <= 0.0) return corners;
   std::sort(corners.begin(), corners.end(), isStronger);
   // Positions that are kept, by the cell of a grid. Those too near to a corner lie in its cell or in a neighbour of it.
+  const double side = std::max(min_spacing, 1.0);  // px
   std::map<std::pair<int, int>, std::vector<cv::Point2f>> cells;
   const auto isFree = [&](const cv::Point2f& position, int column, int row) {
     for (int y = row - 1; y <= row + 1; ++y)
@@ -178,7 +179,7 @@ std::vector<Corner> keepApart(std::vector<Corner> corners, double min_spacing) {
   };
   std::vector<Corner> kept;
   for (const Corner& corner : corners) {
-    const int column = cvFloor(corner.position.x / min_spacing), row = cvFloor(corner.position.y / min_spacing);
+    const int column = cvFloor(corner.position.x / side), row = cvFloor(corner.position.y / side);
     if (!isFree(corner.position, column, row)) continue;
     cells[{column, row}].push_back(corner.position);
     kept.push_back(corner);

@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
+#include <cstdio>
 #include <exception>
 #include <iostream>
 #include <string>
@@ -31,7 +32,10 @@ int runTool(CLI::App& app, int argc, char** argv, const Work& work) {
     return e.get_exit_code() == 0 ? app.exit(e) : fail(std::string(e.what()) + " (see --help)");
   }
   try {
-    return work();
+    const int exit_code = work();
+    if (std::cout.flush().fail() || std::fflush(stdout) != 0 || std::ferror(stdout) != 0)
+      return fail("cannot write to the standard output: is the disk full?");
+    return exit_code;
   } catch (const std::exception& e) {
     return fail(e.what());
   }

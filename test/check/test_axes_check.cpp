@@ -100,6 +100,19 @@ TEST(GyroAxesCheck, StampsOfAnotherTimeAreNoFaultOfTheMount) {
   EXPECT_TRUE(contains(shaken(other, 0.0).remedy, "mounted"));
 }
 
+/// An hour of turns before does not outvote it.
+TEST(GyroAxesCheck, AFaultThatBeginsLateIsNamed) {
+  const AngleAxisd turn(1.0 * kDegree, Vector3d::UnitY());
+  GyroAxesCheck check;
+  const auto add = [&](int pairs, const Matrix3d& by_gyro) {
+    for (int i = 0; i < pairs; ++i) check.add(i, i + 1, by_gyro, turn.toRotationMatrix());
+    return check.judge([](std::int64_t, std::int64_t) { return std::nullopt; }).verdict;
+  };
+  EXPECT_EQ(add(3600, turn.toRotationMatrix()), Verdict::kOk);
+  EXPECT_EQ(add(60, turn.inverse().toRotationMatrix()), Verdict::kWarn);
+  EXPECT_EQ(add(60, turn.toRotationMatrix()), Verdict::kOk);
+}
+
 TEST(GyroAxesCheck, NothingIsSaidWithoutATurn) {
   EXPECT_EQ(verdictOf(Matrix3d::Identity(), 1.0, {0.0, 0.1 * kDegree, 0.0}), Verdict::kOpen);
 }

@@ -12,13 +12,14 @@ namespace sdvo::test_lens_check {
 const StereoCamera kTrue{400.0, 400.0, 320.0, 200.0, 0.1, 640, 400};
 
 /// Pairs of a camera that turns by some degrees, or goes straight ahead, seen by `kTrue` with 0.2 px of noise and a
-/// tenth of movers, and judged by another camera's numbers.
-Finding judged(const StereoCamera& told, bool turns = true) {
+/// tenth of movers, and judged by another camera's numbers. `focus`: change of fx with each pair, px.
+Finding judged(StereoCamera told, bool turns = true, double focus = 0.0) {
   LensCheck check;
   std::mt19937 random(3);
   std::uniform_real_distribution<double> u(0.0, 640.0), v(0.0, 400.0), disparity(2.0, 30.0), any(-1.0, 1.0);
   std::normal_distribution<double> noise(0.0, 0.2);
   for (int pair = 0; pair < 40; ++pair) {
+    told.fx += pair % 2 == 0 ? focus : -focus;
     Eigen::Isometry3d T_before_now = Eigen::Isometry3d::Identity();
     T_before_now.translation() = Eigen::Vector3d(0.01 * any(random), 0.01 * any(random), 0.1);
     if (turns)
@@ -60,6 +61,11 @@ TEST(LensCheck, WhatCameraInfoDoesNotHaveOfTheImagesIsNamed) {
     EXPECT_EQ(finding.verdict, c.verdict) << finding.what;
     EXPECT_TRUE(contains(finding.what, c.words)) << finding.what;
   }
+}
+
+TEST(LensCheck, AnAutofocusIsJudgedToo) {
+  EXPECT_EQ(judged(kTrue, true, 0.5).verdict, Verdict::kOk);
+  EXPECT_EQ(judged(scaled(0.75, 0.0, 0.0), true, 0.5).verdict, Verdict::kWarn);
 }
 
 TEST(LensCheck, AWayStraightAheadShowsNothing) {

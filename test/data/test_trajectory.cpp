@@ -124,6 +124,8 @@ TEST(TumPoses, ErrorsNameFileAndLine) {
     expectError([&] { readPoses(file.path()); }, {file.path() + "', line 2: ", what});
   }
   EXPECT_THROW(writeTumPoses("/dev/null", {{0}, {}}), std::invalid_argument);
+  const TemporaryFile beyond("9999999999999999999 " + std::string(kIdentityLine));  // of 64 bits
+  expectError([&] { readPoses(beyond.path()); }, {beyond.path() + "', line 1: ", "not a stamp"});
 }
 
 TEST(Poses, AFormatIsKnownByItsFirstLine) {

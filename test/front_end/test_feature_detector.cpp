@@ -237,6 +237,7 @@ TEST(KeepApart, NoSpacingLeavesEverythingAsItIs) {
   EXPECT_EQ(keepApart(corners, 0.6).size(), 1u);
   EXPECT_EQ(keepApart(corners, 0.6).front().response, 3.f);
   EXPECT_TRUE(keepApart({}, 4.0).empty());
+  EXPECT_EQ(keepApart({{{600.f, 5.f}, 1.f}, {{600.f, 5.f}, 3.f}}, 1e-7).size(), 1u);
 }
 
 TEST(FeatureDetector, KeepsCornersApart) {

@@ -249,7 +249,8 @@ TEST_F(Tools, OutputThatCannotBeWritten) {
            {"run_sequence", drive_ + " --poses /dev/null --states "},
            {"convert", drive_ + " --output "},
            {"evaluate_trajectory", "--ground-truth " + truth + " --estimate " + truth + " --lengths 0.2 --json "}})
-    expectError(run(tool, arguments + missing), missing);
+    for (const std::string& output : {missing, std::string("/dev/full")}) expectError(run(tool, arguments + output), output);
+  EXPECT_EQ(run("list_parameters", "> /dev/full || echo failed").out, "failed\n");
 }
 
 TEST_F(Tools, OutputIsNeverADeviceOrAPipe) {
